@@ -1,1 +1,48 @@
-//! placeholder
+//! The contract between `rt-core` and `host-ui`: what may lie in shared memory, who writes it, who reads it.
+//!
+//! | service | form | written by | read by | holds |
+//! |---|---|---|---|---|
+//! | `session` | publish-subscribe, newest one kept | bridge | hosts | [`Session`]: which run this is, what the kernel granted |
+//! | `state/<session>` | blackboard, one per run | haptic thread | hosts | [`HapticState`]: the latest tick |
+//! | `records` | slices of [`TickRecord`] | bridge | hosts | every tick of the force loop |
+//! | `snapshots` | slices of [`Vertex`] under a [`SnapshotHeader`] | tissue thread, sent by the bridge | hosts | the deformed surface, needle and seeds |
+//! | `scene` | words under a [`SceneHeader`], newest one kept | bridge | hosts | rest surface and triangles |
+//! | `events` | [`Event`], last 64 kept | bridge | hosts | what happened, once each |
+//! | `parameters` | [`ParametersInForce`], newest one kept | bridge | hosts | the parameters that took effect, and when |
+//! | `plan` | [`PlanInForce`], newest one kept | bridge | hosts | planned seeds and needle path |
+//! | `commands` | [`Command`] | hosts | bridge | requests |
+//! | `replies` | [`Reply`] | bridge | hosts | accepted, or refused and why |
+//! | `uploads` | label cells under an [`UploadHeader`] | hosts | bridge | a segmented volume |
+//!
+//! Every type is plain old data, valid for every bit pattern: no `bool`, `enum` or `char`, no padding, no pointer.
+//! A reader believes nothing: [`check`] says what is verified before a value is used.
+//! Quantities are SI (m, s, N, rad) in the *scene frame*: origin at the corner of the lattice, axes along it, needle along +z by default.
+
+pub mod check;
+mod command;
+mod event;
+mod params;
+mod plan;
+mod record;
+mod scene;
+pub mod service;
+mod session;
+mod snapshot;
+mod state;
+mod text;
+
+pub use command::{Command, CommandKind, MAX_COMMAND_VALUES, Reply, ReplyStatus};
+pub use event::{Event, EventKind};
+pub use params::{
+    PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterId, ParameterSet, ParameterSpec, ParametersInForce,
+};
+pub use plan::{MAX_SEEDS, PlanInForce, PlannedSeed};
+pub use record::TickRecord;
+pub use scene::{SceneHeader, UploadHeader};
+pub use session::{Session, ThreadReport};
+pub use snapshot::{SeedPose, SnapshotHeader, Vertex};
+pub use state::{Fault, HapticState, Phase, flags};
+pub use text::Text;
+
+/// Both programs must agree on this; it is part of every service name.
+pub const SCHEMA_VERSION: u32 = 1;

@@ -1,0 +1,151 @@
+//! What a reader verifies before it uses a value that came out of shared memory.
+
+use crate::{HapticState, MAX_SEEDS, ParametersInForce, PlanInForce, SceneHeader, SnapshotHeader, TickRecord, Vertex};
+
+/// Why a value was not believed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rubbish(pub &'static str);
+
+impl std::fmt::Display for Rubbish {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "not believed: {}", self.0)
+    }
+}
+
+impl std::error::Error for Rubbish {}
+
+/// No scene is larger than this, so no coordinate is.
+pub const MAX_COORDINATE_M: f64 = 20.0;
+const MAX_FORCE_N: f64 = 100.0;
+const MAX_SPEED_M_PER_S: f64 = 100.0;
+
+fn within(values: &[f64], limit: f64) -> bool {
+    // NaN compares false.
+    values.iter().all(|v| v.abs() <= limit)
+}
+
+fn ensure(holds: bool, what: &'static str) -> Result<(), Rubbish> {
+    if holds { Ok(()) } else { Err(Rubbish(what)) }
+}
+
+pub fn state(s: &HapticState) -> Result<(), Rubbish> {
+    ensure(within(&s.tip_in_scene_m, MAX_COORDINATE_M), "tip position")?;
+    ensure(within(&s.contact_in_scene_m, MAX_COORDINATE_M), "contact position")?;
+    ensure(within(&s.needle_direction, 1.001), "needle direction")?;
+    ensure(within(&[s.depth_m], MAX_COORDINATE_M), "depth")?;
+    ensure(within(&[s.speed_m_per_s], MAX_SPEED_M_PER_S), "speed")?;
+    ensure(within(&s.force_on_hand_n, MAX_FORCE_N), "force")?;
+    ensure(within(&s.torque_on_hand_nm, MAX_FORCE_N), "torque")?;
+    ensure(within(&s.force_terms_n, 1e4), "force terms")?;
+    ensure(
+        within(&[s.peak_force_n, s.force_scale, s.device_limit_n], MAX_FORCE_N),
+        "force limits",
+    )?;
+    ensure(s.worst_residual.is_finite(), "residual")?;
+    ensure(s.seed_count as usize <= MAX_SEEDS, "seed count")
+}
+
+pub fn record(r: &TickRecord) -> Result<(), Rubbish> {
+    ensure(within(&r.tip_in_scene_m, MAX_COORDINATE_M), "tip position")?;
+    ensure(within(&r.force_on_hand_n, MAX_FORCE_N), "force")?;
+    ensure(within(&[r.depth_m], MAX_COORDINATE_M), "depth")?;
+    ensure(within(&[r.speed_m_per_s], MAX_SPEED_M_PER_S), "speed")?;
+    ensure(within(&r.force_terms_n, 1e4), "force terms")?;
+    ensure(
+        r.wake_latency_ns < 3_600_000_000_000 && r.work_ns < 3_600_000_000_000,
+        "timing",
+    )
+}
+
+/// `vertices` are those that came with the header.
+pub fn snapshot(h: &SnapshotHeader, vertices: &[Vertex]) -> Result<(), Rubbish> {
+    ensure(h.vertex_count as usize == vertices.len(), "vertex count")?;
+    ensure(h.seed_count as usize <= MAX_SEEDS, "seed count")?;
+    ensure(within(&h.tip_in_scene_m, MAX_COORDINATE_M), "tip position")?;
+    ensure(within(&h.needle_direction, 1.001), "needle direction")?;
+    ensure(within(&h.held_in_scene_m, MAX_COORDINATE_M), "held position")?;
+    ensure(h.residual.is_finite() && h.max_displacement_m.is_finite(), "residual")?;
+    for seed in &h.seeds[..h.seed_count as usize] {
+        ensure(within(&seed.position_m, MAX_COORDINATE_M), "seed position")?;
+        ensure(within(&seed.dropped_at_m, MAX_COORDINATE_M), "seed drop position")?;
+        ensure(within(&seed.axis, 1.001), "seed axis")?;
+    }
+    let limit = MAX_COORDINATE_M as f32;
+    ensure(
+        vertices.iter().all(|v| v.position_m.iter().all(|c| c.abs() <= limit)),
+        "vertex position",
+    )
+}
+
+/// `words` are those that came with the header.
+pub fn scene(h: &SceneHeader, words: &[u32]) -> Result<(), Rubbish> {
+    ensure(h.word_count() == Some(words.len()), "vertex or triangle count")?;
+    ensure(h.spacing_m > 0.0 && h.spacing_m < 1.0, "spacing")?;
+    ensure(h.volume_m3.is_finite(), "volume")?;
+    ensure(
+        within(&h.lower_m, MAX_COORDINATE_M) && within(&h.upper_m, MAX_COORDINATE_M),
+        "bounding box",
+    )?;
+    ensure(within(&h.patient_from_scene, MAX_COORDINATE_M), "patient transform")?;
+    let (positions, indices) = words.split_at(3 * h.vertex_count as usize);
+    let limit = MAX_COORDINATE_M as f32;
+    ensure(
+        positions.iter().all(|&w| f32::from_bits(w).abs() <= limit),
+        "vertex position",
+    )?;
+    ensure(indices.iter().all(|&i| i < h.vertex_count), "triangle index")
+}
+
+pub fn parameters(p: &ParametersInForce) -> Result<(), Rubbish> {
+    ensure(p.set.problems().is_empty(), "parameter outside its limits")
+}
+
+pub fn plan(p: &PlanInForce) -> Result<(), Rubbish> {
+    ensure(p.seed_count as usize <= MAX_SEEDS, "seed count")?;
+    ensure(within(&p.entry_m, MAX_COORDINATE_M), "entry")?;
+    ensure(p.generation == 0 || is_unit(&p.direction), "direction")?;
+    ensure(
+        p.seeds[..p.seed_count as usize]
+            .iter()
+            .all(|s| within(&s.position_m, MAX_COORDINATE_M)),
+        "seed position",
+    )
+}
+
+pub fn is_unit(v: &[f64; 3]) -> bool {
+    let norm2 = v.iter().map(|c| c * c).sum::<f64>();
+    (norm2 - 1.0).abs() < 1e-3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    #[test]
+    fn all_ones_and_not_a_number_are_not_believed() {
+        let ones = |size: usize| vec![0xff_u8; size];
+        let s: HapticState = bytemuck::pod_read_unaligned(&ones(size_of::<HapticState>()));
+        assert!(state(&s).is_err());
+        let r: TickRecord = bytemuck::pod_read_unaligned(&ones(size_of::<TickRecord>()));
+        assert!(record(&r).is_err());
+        let h: SnapshotHeader = bytemuck::pod_read_unaligned(&ones(size_of::<SnapshotHeader>()));
+        assert!(snapshot(&h, &[]).is_err());
+        let h: SceneHeader = bytemuck::pod_read_unaligned(&ones(size_of::<SceneHeader>()));
+        assert!(scene(&h, &[]).is_err());
+        assert!(state(&HapticState::zeroed()).is_ok());
+    }
+
+    #[test]
+    fn one_bad_index_or_vertex_is_found() {
+        let mut h = SceneHeader::zeroed();
+        (h.vertex_count, h.triangle_count, h.spacing_m) = (1, 1, 1e-3);
+        let word = 1.0_f32.to_bits();
+        assert!(scene(&h, &[word, word, word, 0, 0, 0]).is_ok());
+        assert_eq!(scene(&h, &[word, word, word, 0, 1, 0]), Err(Rubbish("triangle index")));
+        assert_eq!(
+            scene(&h, &[word, u32::MAX, word, 0, 0, 0]),
+            Err(Rubbish("vertex position"))
+        );
+    }
+}

@@ -1,0 +1,192 @@
+//! Names and configuration of every service, so that both programs meet without reading a foreign file.
+
+use crate::*;
+use iceoryx2::config::Config;
+use iceoryx2::node::{Node, NodeBuilder};
+use iceoryx2::prelude::{FileName, LogLevel, Path, SemanticString, ServiceName, SignalHandlingMode, set_log_level};
+use iceoryx2::service::ipc;
+use iceoryx2::service::port_factory::{blackboard, publish_subscribe};
+use std::time::Duration;
+
+/// The form of service that both programs use.
+pub type Ipc = ipc::Service;
+pub type Plain<T> = publish_subscribe::PortFactory<Ipc, T, ()>;
+pub type Slices<T, H> = publish_subscribe::PortFactory<Ipc, [T], H>;
+pub type StateBoard = blackboard::PortFactory<Ipc, u64>;
+
+/// The only key on the board.
+pub const STATE_KEY: u64 = 0;
+
+/// Records in one batch at most.
+pub const MAX_BATCH: usize = 256;
+/// Batches that a slow host may be behind before the oldest is dropped.
+pub const RECORD_BUFFER: usize = 64;
+/// Snapshots that the bridge loans ahead.
+pub const SNAPSHOTS_AHEAD: usize = 4;
+/// Hosts at once.
+pub const MAX_HOSTS: usize = 6;
+
+/// Why shared memory could not be used; the text says what to do.
+#[derive(Debug)]
+pub struct ServiceError(pub String);
+
+impl std::fmt::Display for ServiceError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for ServiceError {}
+
+fn failed(what: &str, why: impl std::fmt::Debug) -> ServiceError {
+    ServiceError(format!(
+        "{what}: {why:?}. Both programs must run as the same user and come from the same build, and /dev/shm needs room (df -h /dev/shm)"
+    ))
+}
+
+/// Where two programs meet: the same user and the same instance name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Instance(String);
+
+impl Instance {
+    /// Letters, digits and `-`, 1 to 24 of them.
+    pub fn new(name: &str) -> Result<Self, ServiceError> {
+        let fits = (1..=24).contains(&name.len()) && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-');
+        if fits {
+            Ok(Self(name.to_owned()))
+        } else {
+            Err(ServiceError(format!(
+                "instance name {name:?}: use 1 to 24 letters, digits or '-'"
+            )))
+        }
+    }
+
+    pub fn name(&self) -> &str {
+        &self.0
+    }
+
+    /// Folder of the management files, on tmpfs because iceoryx2 syncs them.
+    pub fn root(&self) -> String {
+        format!("/dev/shm/{}", self.prefix().trim_end_matches('_'))
+    }
+
+    /// Begins the name of every shared-memory object.
+    pub fn prefix(&self) -> String {
+        // SAFETY: getuid has no preconditions.
+        let user = unsafe { libc::getuid() };
+        format!("stylet_{user}_{}_", self.0)
+    }
+
+    fn config(&self) -> Result<Config, ServiceError> {
+        let mut config = Config::default();
+        config
+            .global
+            .set_root_path(&Path::new(self.root().as_bytes()).map_err(|e| failed("root path", e))?);
+        config.global.prefix = FileName::new(self.prefix().as_bytes()).map_err(|e| failed("prefix", e))?;
+        config.global.creation_timeout = Duration::from_millis(20);
+        Ok(config)
+    }
+
+    /// A node of this instance; removes what dead programs left.
+    pub fn node(&self) -> Result<Node<Ipc>, ServiceError> {
+        set_log_level(LogLevel::Fatal);
+        NodeBuilder::new()
+            .config(&self.config()?)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<Ipc>()
+            .map_err(|e| failed("cannot use shared memory", e))
+    }
+}
+
+impl Default for Instance {
+    fn default() -> Self {
+        Self("main".to_owned())
+    }
+}
+
+fn name(service: &str) -> Result<ServiceName, ServiceError> {
+    ServiceName::new(&format!("stylet/{SCHEMA_VERSION}/{service}")).map_err(|e| failed(service, e))
+}
+
+macro_rules! plain {
+    ($(#[$doc:meta])* $function:ident, $type:ty, $service:literal, publishers $publishers:expr, history $history:expr, buffer $buffer:expr) => {
+        $(#[$doc])*
+        pub fn $function(node: &Node<Ipc>) -> Result<Plain<$type>, ServiceError> {
+            node.service_builder(&name($service)?)
+                .publish_subscribe::<$type>()
+                .max_publishers($publishers)
+                .max_subscribers(MAX_HOSTS + 2)
+                .max_nodes(MAX_HOSTS + 4)
+                .history_size($history)
+                .subscriber_max_buffer_size($buffer)
+                .open_or_create()
+                .map_err(|e| failed(concat!("service ", $service), e))
+        }
+    };
+}
+
+macro_rules! slices {
+    ($(#[$doc:meta])* $function:ident, $type:ty, $header:ty, $service:literal, publishers $publishers:expr, history $history:expr, buffer $buffer:expr) => {
+        $(#[$doc])*
+        pub fn $function(node: &Node<Ipc>) -> Result<Slices<$type, $header>, ServiceError> {
+            node.service_builder(&name($service)?)
+                .publish_subscribe::<[$type]>()
+                .user_header::<$header>()
+                .max_publishers($publishers)
+                .max_subscribers(MAX_HOSTS + 2)
+                .max_nodes(MAX_HOSTS + 4)
+                .history_size($history)
+                .subscriber_max_buffer_size($buffer)
+                .open_or_create()
+                .map_err(|e| failed(concat!("service ", $service), e))
+        }
+    };
+}
+
+plain!(session, Session, "session", publishers 1, history 1, buffer 2);
+plain!(events, Event, "events", publishers 1, history 64, buffer 128);
+plain!(parameters, ParametersInForce, "parameters", publishers 1, history 1, buffer 2);
+plain!(plan, PlanInForce, "plan", publishers 1, history 1, buffer 2);
+plain!(commands, Command, "commands", publishers MAX_HOSTS, history 0, buffer 64);
+plain!(replies, Reply, "replies", publishers 1, history 0, buffer 64);
+slices!(records, TickRecord, u64, "records", publishers 1, history 0, buffer RECORD_BUFFER);
+slices!(snapshots, Vertex, SnapshotHeader, "snapshots", publishers 1, history 1, buffer 2);
+slices!(
+    /// Sent again under a new generation when the scene changes.
+    scene, u32, SceneHeader, "scene", publishers 1, history 1, buffer 2);
+slices!(uploads, u8, UploadHeader, "uploads", publishers MAX_HOSTS, history 0, buffer 2);
+
+fn board_name(session_id: u64) -> Result<ServiceName, ServiceError> {
+    name(&format!("state/{session_id:016x}"))
+}
+
+/// A board named per run: a writer killed while it holds the entry would block its name for good (iceoryx2 issue 2008).
+pub fn create_state_board(node: &Node<Ipc>, session_id: u64) -> Result<StateBoard, ServiceError> {
+    node.service_builder(&board_name(session_id)?)
+        .blackboard_creator::<u64>()
+        .add::<HapticState>(STATE_KEY, bytemuck::Zeroable::zeroed())
+        .max_readers(MAX_HOSTS + 2)
+        .max_nodes(MAX_HOSTS + 4)
+        .create()
+        .map_err(|e| failed("state board", e))
+}
+
+pub fn open_state_board(node: &Node<Ipc>, session_id: u64) -> Result<StateBoard, ServiceError> {
+    node.service_builder(&board_name(session_id)?)
+        .blackboard_opener::<u64>()
+        .open()
+        .map_err(|e| failed("state board", e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn instance_names_are_file_names() {
+        assert!(Instance::new("lab-2").is_ok());
+        for bad in ["", "../x", "a b", "a_b", "0123456789012345678901234"] {
+            assert!(Instance::new(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! The deformed gland at 200 Hz, filled straight into memory that the bridge loaned ahead.
+
+use crate::MAX_SEEDS;
+use bytemuck::{Pod, Zeroable};
+use iceoryx2::prelude::ZeroCopySend;
+
+/// Deformed position of one surface vertex, scene frame.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
+#[type_name("stylet.Vertex")]
+pub struct Vertex {
+    pub position_m: [f32; 3],
+}
+
+/// Where a seed is now.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
+#[type_name("stylet.SeedPose")]
+pub struct SeedPose {
+    pub position_m: [f64; 3],
+    /// Unit vector along the seed; it turns with the tissue.
+    pub axis: [f64; 3],
+    /// Where the tip was when the seed left it.
+    pub dropped_at_m: [f64; 3],
+}
+
+/// What comes with the vertices of one tissue tick.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
+#[type_name("stylet.SnapshotHeader")]
+pub struct SnapshotHeader {
+    pub session_id: u64,
+    /// Which [`crate::SceneHeader`] the vertices belong to.
+    pub scene_generation: u64,
+    pub tissue_tick: u64,
+    pub time_ns: u64,
+    pub tip_in_scene_m: [f64; 3],
+    pub needle_direction: [f64; 3],
+    pub held_in_scene_m: [f64; 3],
+    /// Largest constraint violation after this tick, in elements.
+    pub residual: f64,
+    pub max_displacement_m: f64,
+    pub work_ns: u64,
+    pub passes: u32,
+    pub moved_elements: u32,
+    /// `u32::MAX` when the needle holds nothing.
+    pub held_element: u32,
+    pub phase: u32,
+    pub vertex_count: u32,
+    pub seed_count: u32,
+    pub seeds: [SeedPose; MAX_SEEDS],
+}

@@ -1,0 +1,154 @@
+//! The latest state of the force loop, rewritten each millisecond on a wait-free blackboard.
+
+use bytemuck::{Pod, Zeroable};
+use iceoryx2::prelude::ZeroCopySend;
+
+/// One tick, as the operator's program sees it. Written by the haptic thread only.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
+#[type_name("stylet.HapticState")]
+pub struct HapticState {
+    /// Ticks since the loop began; 0 means that no tick has run.
+    pub tick: u64,
+    /// `CLOCK_MONOTONIC` at the wake-up of this tick.
+    pub time_ns: u64,
+    pub tip_in_scene_m: [f64; 3],
+    /// Unit vector from hub to tip.
+    pub needle_direction: [f64; 3],
+    /// Where the tip met the membrane; only meaningful while [`flags::IN_CONTACT`] is set.
+    pub contact_in_scene_m: [f64; 3],
+    /// Depth since the tip met the membrane (u_tip of paper eq. 6).
+    pub depth_m: f64,
+    /// Speed along the path, positive inwards (paper eq. 7), filtered.
+    pub speed_m_per_s: f64,
+    /// Force on the operator, after the safety gate.
+    pub force_on_hand_n: [f64; 3],
+    pub torque_on_hand_nm: [f64; 3],
+    /// Signed along the insertion direction, before the gate: F_R, guide (magnitude), damping, shaft friction, F_G.
+    pub force_terms_n: [f64; 5],
+    /// Largest magnitude written to the device since the last reset.
+    pub peak_force_n: f64,
+    pub force_scale: f64,
+    pub device_limit_n: f64,
+    pub missed_deadlines: u64,
+    pub worst_wake_ns: u64,
+    pub worst_work_ns: u64,
+    pub tissue_tick: u64,
+    pub tissue_missed_deadlines: u64,
+    pub tissue_worst_wake_ns: u64,
+    /// Largest constraint violation left by any tissue tick since the last reset, in elements.
+    pub worst_residual: f64,
+    pub worst_tissue_work_ns: u64,
+    /// Records that the ring could not take because the bridge was late.
+    pub records_lost: u64,
+    /// Times that the gate had to change the force.
+    pub gate_interventions: u64,
+    pub parameters_generation: u64,
+    /// [`Phase`] by number.
+    pub phase: u32,
+    /// [`Fault`] by number.
+    pub fault: u32,
+    /// Bits of [`flags`].
+    pub flags: u32,
+    pub seed_count: u32,
+}
+
+/// Bits of [`HapticState::flags`] and [`crate::TickRecord::flags`].
+pub mod flags {
+    /// Both threads run under `SCHED_FIFO`, as read back from the kernel.
+    pub const REAL_TIME: u32 = 1;
+    /// The operator has armed the force.
+    pub const ENGAGED: u32 = 1 << 1;
+    pub const IN_CONTACT: u32 = 1 << 2;
+    pub const PUNCTURED: u32 = 1 << 3;
+    /// The device is a simulation.
+    pub const SIMULATED_DEVICE: u32 = 1 << 4;
+    /// The hand has reached the goal it was last given.
+    pub const AT_GOAL: u32 = 1 << 5;
+    /// The gate limited this tick's force.
+    pub const GATE_ACTED: u32 = 1 << 6;
+}
+
+/// Phase of needle and tissue (paper eq. 6), by stable number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Phase {
+    Outside = 0,
+    Contraction = 1,
+    Penetration = 2,
+    Retraction = 3,
+    Hold = 4,
+}
+
+impl Phase {
+    pub fn from_number(number: u32) -> Option<Self> {
+        [
+            Self::Outside,
+            Self::Contraction,
+            Self::Penetration,
+            Self::Retraction,
+            Self::Hold,
+        ]
+        .into_iter()
+        .find(|p| *p as u32 == number)
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Outside => "outside",
+            Self::Contraction => "membrane contraction",
+            Self::Penetration => "penetration",
+            Self::Retraction => "retraction",
+            Self::Hold => "hold",
+        }
+    }
+}
+
+/// Why the force is off, by stable number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Fault {
+    None = 0,
+    DeviceSilent = 1,
+    DeviceError = 2,
+    NonFiniteInput = 3,
+    NonFiniteForce = 4,
+    TissueStale = 5,
+    TissueUnsolved = 6,
+    OverrunStreak = 7,
+}
+
+impl Fault {
+    pub fn from_number(number: u32) -> Option<Self> {
+        [
+            Self::None,
+            Self::DeviceSilent,
+            Self::DeviceError,
+            Self::NonFiniteInput,
+            Self::NonFiniteForce,
+            Self::TissueStale,
+            Self::TissueUnsolved,
+            Self::OverrunStreak,
+        ]
+        .into_iter()
+        .find(|f| *f as u32 == number)
+    }
+
+    /// What a person reads.
+    pub fn message(self) -> &'static str {
+        match self {
+            Self::None => "no fault",
+            Self::DeviceSilent => "the device stopped answering; check its cable, then re-arm",
+            Self::DeviceError => "the device reported an error; check it, then re-arm",
+            Self::NonFiniteInput => "the device sent a position that is not a number; re-arm to go on",
+            Self::NonFiniteForce => {
+                "the force law gave a value that is not a number; reset the parameters, then re-arm"
+            }
+            Self::TissueStale => "the tissue step is late by more than 50 ms; lower the load on its core, then re-arm",
+            Self::TissueUnsolved => "the tissue constraints could not be met; retract the needle, then re-arm",
+            Self::OverrunStreak => {
+                "the force loop missed 20 deadlines in a row; lower the load on its core, then re-arm"
+            }
+        }
+    }
+}
