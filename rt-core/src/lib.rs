@@ -1,1 +1,3 @@
-//! placeholder
+//! The real-time process: scenes, tissue, force loop.
+
+pub mod scene;
