@@ -1,3 +1,4 @@
 //! The real-time process: scenes, tissue, force loop.
 
 pub mod scene;
+pub mod tissue;

@@ -1,0 +1,149 @@
+//! The arithmetic of one link, over slices of links; straight loops that the compiler turns into vectors.
+//!
+//! Components come in the order along, side, side: `u[axis]` first, then the two other axes.
+
+use crate::tissue::limits::LinkLimits;
+
+/// Links whose outer end is the upper one; `LOWER` where it is the lower one.
+pub(crate) const UPPER: bool = true;
+pub(crate) const LOWER: bool = false;
+
+// f32::min and max treat NaN with care that costs instructions; states are finite.
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+pub(crate) fn clamp(value: f32, low: f32, high: f32) -> f32 {
+    lesser(greater(value, low), high)
+}
+
+/// Where the outer end of a link must be, given both ends: stretch first, then shear.
+#[inline(always)]
+pub(crate) fn clamped_outer<const OUTER: bool>(
+    limits: &LinkLimits,
+    inner: [f32; 3],
+    outer: [f32; 3],
+) -> [f32; 3] {
+    let sign = if OUTER == UPPER { 1.0 } else { -1.0 };
+    let along = clamp(sign * (outer[0] - inner[0]), limits.low, limits.high);
+    let shear = limits.tan * (1.0 + along);
+    [
+        inner[0] + sign * along,
+        inner[1] + clamp(outer[1] - inner[1], -shear, shear),
+        inner[2] + clamp(outer[2] - inner[2], -shear, shear),
+    ]
+}
+
+/// Moves the outer end of each link into its limits.
+pub(crate) fn clamp_outer<const OUTER: bool>(
+    limits: &LinkLimits,
+    inner: [&[f32]; 3],
+    outer: [&mut [f32]; 3],
+) {
+    let [a, b, c] = outer;
+    let n = a.len();
+    let (b, c) = (&mut b[..n], &mut c[..n]);
+    let [ia, ib, ic] = inner.map(|component| &component[..n]);
+    for e in 0..n {
+        let moved = clamped_outer::<OUTER>(limits, [ia[e], ib[e], ic[e]], [a[e], b[e], c[e]]);
+        [a[e], b[e], c[e]] = moved;
+    }
+}
+
+/// How far one link is outside its limits, at most; negative inside.
+#[inline(always)]
+fn link_violation(limits: &LinkLimits, lo: [f32; 3], hi: [f32; 3]) -> f32 {
+    let along = hi[0] - lo[0];
+    let stretch = greater(limits.low - along, along - limits.high);
+    let side = greater((hi[1] - lo[1]).abs(), (hi[2] - lo[2]).abs());
+    greater(stretch, side - limits.tan * (1.0 + along))
+}
+
+const LANES: usize = 16;
+
+/// Largest violation over the links between two slices; zero if there is none.
+pub(crate) fn violation(limits: &LinkLimits, lo: [&[f32]; 3], hi: [&[f32]; 3]) -> f32 {
+    let n = hi[0].len();
+    let (lo, hi) = (lo.map(|s| &s[..n]), hi.map(|s| &s[..n]));
+    let mut worst = [0.0_f32; LANES];
+    let mut start = 0;
+    while start + LANES <= n {
+        let range = start..start + LANES;
+        let lo = lo.map(|s| &s[range.clone()]);
+        let hi = hi.map(|s| &s[range.clone()]);
+        for lane in 0..LANES {
+            let found = link_violation(limits, at(lo, lane), at(hi, lane));
+            worst[lane] = greater(found, worst[lane]);
+        }
+        start += LANES;
+    }
+    for e in start..n {
+        worst[0] = greater(link_violation(limits, at(lo, e), at(hi, e)), worst[0]);
+    }
+    worst.into_iter().fold(0.0, greater)
+}
+
+#[inline(always)]
+fn at(slices: [&[f32]; 3], e: usize) -> [f32; 3] {
+    [slices[0][e], slices[1][e], slices[2][e]]
+}
+
+/// Where both ends of a link go when each gives half: orthogonal projections onto the link's five
+/// half-spaces in turn.
+#[inline(always)]
+pub(crate) fn projected(limits: &LinkLimits, lo: [f32; 3], hi: [f32; 3]) -> [[f32; 3]; 2] {
+    let first = [hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]];
+    let mut d = first;
+    d[0] = clamp(d[0], limits.low, limits.high);
+    let per_square = 1.0 / (1.0 + limits.tan * limits.tan);
+    for side in 1..3 {
+        let over = greater(d[side].abs() - limits.tan * (1.0 + d[0]), 0.0) * per_square;
+        d[side] -= over.copysign(d[side]);
+        d[0] += over * limits.tan;
+    }
+    let half = [0, 1, 2].map(|c| 0.5 * (d[c] - first[c]));
+    [
+        [lo[0] - half[0], lo[1] - half[1], lo[2] - half[2]],
+        [hi[0] + half[0], hi[1] + half[1], hi[2] + half[2]],
+    ]
+}
+
+/// Projects each link between two slices.
+pub(crate) fn project(limits: &LinkLimits, lo: [&mut [f32]; 3], hi: [&mut [f32]; 3]) {
+    let [ha, hb, hc] = hi;
+    let n = ha.len();
+    let (hb, hc) = (&mut hb[..n], &mut hc[..n]);
+    let [la, lb, lc] = lo.map(|component| &mut component[..n]);
+    for e in 0..n {
+        let [l, h] = projected(limits, [la[e], lb[e], lc[e]], [ha[e], hb[e], hc[e]]);
+        [la[e], lb[e], lc[e]] = l;
+        [ha[e], hb[e], hc[e]] = h;
+    }
+}
+
+/// Largest factor on all differences that leaves a link within `tolerance` of its limits.
+///
+/// Each limit reads `A s <= B` in the factor s; zero always satisfies it.
+#[inline(always)]
+pub(crate) fn feasible_scale(limits: &LinkLimits, d: [f32; 3], tolerance: f32) -> f32 {
+    let side = greater(d[1].abs(), d[2].abs());
+    let each = [
+        (-d[0], -limits.low),
+        (d[0], limits.high),
+        (side - limits.tan * d[0], limits.tan),
+    ];
+    let mut scale = 1.0;
+    for (a, b) in each {
+        if a > b + tolerance {
+            scale = lesser(scale, (b + tolerance) / a);
+        }
+    }
+    scale
+}
