@@ -44,13 +44,25 @@ pub(crate) fn clamped_outer<const OUTER: bool>(
 /// Moves the outer end of each link into its limits.
 pub(crate) fn clamp_outer<const OUTER: bool>(
     limits: &LinkLimits,
-    inner: [&[f32]; 3],
-    outer: [&mut [f32]; 3],
+    [ia, ib, ic]: [&[f32]; 3],
+    [a, b, c]: [&mut [f32]; 3],
 ) {
-    let [a, b, c] = outer;
+    clamp_outer_slices::<OUTER>(limits, ia, ib, ic, a, b, c);
+}
+
+/// Each slice an argument of its own: the compiler then knows that they do not overlap.
+fn clamp_outer_slices<const OUTER: bool>(
+    limits: &LinkLimits,
+    ia: &[f32],
+    ib: &[f32],
+    ic: &[f32],
+    a: &mut [f32],
+    b: &mut [f32],
+    c: &mut [f32],
+) {
     let n = a.len();
+    let (ia, ib, ic) = (&ia[..n], &ib[..n], &ic[..n]);
     let (b, c) = (&mut b[..n], &mut c[..n]);
-    let [ia, ib, ic] = inner.map(|component| &component[..n]);
     for e in 0..n {
         let moved = clamped_outer::<OUTER>(limits, [ia[e], ib[e], ic[e]], [a[e], b[e], c[e]]);
         [a[e], b[e], c[e]] = moved;
@@ -66,33 +78,19 @@ fn link_violation(limits: &LinkLimits, lo: [f32; 3], hi: [f32; 3]) -> f32 {
     greater(stretch, side - limits.tan * (1.0 + along))
 }
 
-const LANES: usize = 16;
-
 /// Largest violation over the links between two slices; zero if there is none.
 pub(crate) fn violation(limits: &LinkLimits, lo: [&[f32]; 3], hi: [&[f32]; 3]) -> f32 {
     let n = hi[0].len();
-    let (lo, hi) = (lo.map(|s| &s[..n]), hi.map(|s| &s[..n]));
-    let mut worst = [0.0_f32; LANES];
-    let mut start = 0;
-    while start + LANES <= n {
-        let range = start..start + LANES;
-        let lo = lo.map(|s| &s[range.clone()]);
-        let hi = hi.map(|s| &s[range.clone()]);
-        for lane in 0..LANES {
-            let found = link_violation(limits, at(lo, lane), at(hi, lane));
-            worst[lane] = greater(found, worst[lane]);
-        }
-        start += LANES;
+    let [la, lb, lc] = lo.map(|s| &s[..n]);
+    let [ha, hb, hc] = hi.map(|s| &s[..n]);
+    // As integers the bits of floats above zero have the order of the floats, and those below zero are
+    // below zero: an integer maximum is one that the compiler may take in any order.
+    let mut worst = 0_i32;
+    for e in 0..n {
+        let found = link_violation(limits, [la[e], lb[e], lc[e]], [ha[e], hb[e], hc[e]]);
+        worst = worst.max(found.to_bits() as i32);
     }
-    for e in start..n {
-        worst[0] = greater(link_violation(limits, at(lo, e), at(hi, e)), worst[0]);
-    }
-    worst.into_iter().fold(0.0, greater)
-}
-
-#[inline(always)]
-fn at(slices: [&[f32]; 3], e: usize) -> [f32; 3] {
-    [slices[0][e], slices[1][e], slices[2][e]]
+    f32::from_bits(worst as u32)
 }
 
 /// Where both ends of a link go when each gives half: orthogonal projections onto the link's five
@@ -116,11 +114,26 @@ pub(crate) fn projected(limits: &LinkLimits, lo: [f32; 3], hi: [f32; 3]) -> [[f3
 }
 
 /// Projects each link between two slices.
-pub(crate) fn project(limits: &LinkLimits, lo: [&mut [f32]; 3], hi: [&mut [f32]; 3]) {
-    let [ha, hb, hc] = hi;
+pub(crate) fn project(
+    limits: &LinkLimits,
+    [la, lb, lc]: [&mut [f32]; 3],
+    [ha, hb, hc]: [&mut [f32]; 3],
+) {
+    project_slices(limits, la, lb, lc, ha, hb, hc);
+}
+
+fn project_slices(
+    limits: &LinkLimits,
+    la: &mut [f32],
+    lb: &mut [f32],
+    lc: &mut [f32],
+    ha: &mut [f32],
+    hb: &mut [f32],
+    hc: &mut [f32],
+) {
     let n = ha.len();
+    let (la, lb, lc) = (&mut la[..n], &mut lb[..n], &mut lc[..n]);
     let (hb, hc) = (&mut hb[..n], &mut hc[..n]);
-    let [la, lb, lc] = lo.map(|component| &mut component[..n]);
     for e in 0..n {
         let [l, h] = projected(limits, [la[e], lb[e], lc[e]], [ha[e], hb[e], hc[e]]);
         [la[e], lb[e], lc[e]] = l;

@@ -28,7 +28,7 @@ pub enum HeldOutcome {
 /// How far the solver had to go, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Solve {
-    /// No limit was violated.
+    /// No element was held: recovery breaks no limit.
     Nothing,
     Sweeps,
     Projections,
@@ -84,6 +84,7 @@ pub fn step(
     };
     report.residual = f64::from(residual);
     measure_motion(state, &mut report);
+    state.max_displacement = report.max_displacement;
     report.converged = residual <= model.limits.tolerance && report.max_displacement.is_finite();
     report
 }
@@ -157,8 +158,7 @@ fn solve(
 ) -> f32 {
     let tolerance = model.limits.tolerance;
     let held_cell = model.lattice.cell(held as u32);
-    let mut residual = largest_violation_f32(model, state);
-    while residual > tolerance {
+    loop {
         let stage = match report.passes {
             n if n < MAX_SWEEPS => Solve::Sweeps,
             n if n < MAX_SWEEPS + MAX_PROJECTIONS => Solve::Projections,
@@ -174,29 +174,29 @@ fn solve(
         }
         report.passes += 1;
         report.solve = report.solve.max(stage);
-        residual = largest_violation_f32(model, state);
-        if stage == Solve::Reanchored {
-            break;
+        let residual = largest_violation_f32(model, state);
+        if residual <= tolerance || stage == Solve::Reanchored {
+            return residual;
         }
     }
-    residual
 }
 
 fn measure_motion(state: &TissueState, report: &mut StepReport) {
-    let ([x, y, z], [bx, by, bz]) = (&state.u, &state.before);
-    let n = x.len();
-    let (y, z, bx, by, bz) = (&y[..n], &z[..n], &bx[..n], &by[..n], &bz[..n]);
-    let (mut moved, mut largest, mut sum) = (0_u32, 0.0_f32, 0.0_f32);
+    let n = state.u[0].len();
+    let [x, y, z] = state.u.each_ref().map(|c| &c[..n]);
+    let [bx, by, bz] = state.before.each_ref().map(|c| &c[..n]);
+    // Bits of squares, which are not below zero, have the order of the squares (see `violation`); a NaN
+    // is above all of them once its sign is off.
+    let (mut moved, mut largest) = (0_i32, 0_i32);
     for e in 0..n {
         let same = (x[e] == bx[e]) & (y[e] == by[e]) & (z[e] == bz[e]);
-        moved += u32::from(!same);
+        moved += i32::from(!same);
         let square = x[e] * x[e] + y[e] * y[e] + z[e] * z[e];
-        largest = if square > largest { square } else { largest };
-        sum += square;
+        largest = largest.max(square.abs().to_bits() as i32);
     }
-    report.moved = moved;
-    // The sum is not finite if any displacement is not; a comparison would miss it.
-    report.max_displacement = if sum.is_finite() {
+    let largest = f32::from_bits(largest as u32);
+    report.moved = moved as u32;
+    report.max_displacement = if largest.is_finite() {
         largest.sqrt()
     } else {
         f32::INFINITY
