@@ -15,8 +15,9 @@ mod spans;
 mod sweep;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod times;
 
 pub(crate) use kernels::violation;
 pub use model::{ChainMail, TissueState};
 pub use solve::{HeldOutcome, Solve, StepReport, step};
-pub(crate) use spans::{Links, links_along};

@@ -10,7 +10,7 @@ pub const MAX_SWEEPS: u32 = 40;
 /// Passes of projections tried after that.
 pub const MAX_PROJECTIONS: u32 = 60;
 /// Parts that a step longer than an element is cut into, at most.
-const MAX_PARTS: u32 = 8;
+const MAX_PARTS: u32 = 1;
 /// Farthest from rest that a held element is followed, in elements; f32 resolves the tolerance up to here.
 pub const REACH: f64 = 2048.0;
 

@@ -123,6 +123,7 @@ pub(super) fn outward(model: &ChainMail, held_cell: [usize; 3], u: &mut [Vec<f32
 
 /// The textbook's single pass as sweeps: the held line along x, then rows of its plane along y, then
 /// planes along z. Follows one tree of links, so it leaves other links violated.
+#[cfg(test)]
 pub(super) fn single_pass(model: &ChainMail, held_cell: [usize; 3], u: &mut [Vec<f32>; 3]) {
     let [held_i, held_j, held_k] = held_cell;
     let [x, y, z] = &model.limits.links;
