@@ -166,3 +166,7 @@ fn nearest_sample(model: &ChainMail, state: &TissueState, p: [f64; 3]) -> u32 {
     }
     nearest.1
 }
+
+#[cfg(test)]
+#[path = "point_tests.rs"]
+mod tests;

@@ -5,12 +5,10 @@ use super::{project, sweep};
 use crate::tissue::Held;
 use crate::tissue::check::largest_violation_f32;
 
-/// Outward sweeps tried first, over all parts of a step.
-pub const MAX_SWEEPS: u32 = 40;
+/// Outward sweeps tried first.
+pub const MAX_SWEEPS: u32 = 6;
 /// Passes of projections tried after that.
 pub const MAX_PROJECTIONS: u32 = 60;
-/// Parts that a step longer than an element is cut into, at most.
-const MAX_PARTS: u32 = 1;
 /// Farthest from rest that a held element is followed, in elements; f32 resolves the tolerance up to here.
 pub const REACH: f64 = 2048.0;
 
@@ -79,7 +77,7 @@ pub fn step(
         before.copy_from_slice(now);
     }
     let residual = match target {
-        Some((element, u)) => follow(model, state, element, u, &mut report),
+        Some((element, u)) => solve(model, state, element, u, &mut report),
         None => largest_violation_f32(model, state),
     };
     report.residual = f64::from(residual);
@@ -122,33 +120,7 @@ fn recover(state: &mut TissueState, kept: f32) {
     }
 }
 
-/// Brings the held element to `target` in parts of at most about an element, and solves each.
-fn follow(
-    model: &ChainMail,
-    state: &mut TissueState,
-    held: usize,
-    target: [f32; 3],
-    report: &mut StepReport,
-) -> f32 {
-    let start = state.displacement_of(held as u32).map(|c| c as f32);
-    let way = [0, 1, 2].map(|a| target[a] - start[a]);
-    let length = way.iter().map(|c| c * c).sum::<f32>().sqrt();
-    let parts = (length.ceil() as u32).clamp(1, MAX_PARTS);
-    let mut residual = 0.0;
-    for part in 1..=parts {
-        let fraction = part as f32 / parts as f32;
-        let at = if part == parts {
-            target
-        } else {
-            [0, 1, 2].map(|a| start[a] + fraction * way[a])
-        };
-        state.put(held, at);
-        residual = solve(model, state, held, at, report);
-    }
-    residual
-}
-
-/// Sweeps, then projections, then re-anchoring, until the residual is within tolerance.
+/// Puts the held element in place, then sweeps, then projects, then re-anchors, until the residual is within tolerance.
 fn solve(
     model: &ChainMail,
     state: &mut TissueState,
@@ -158,6 +130,7 @@ fn solve(
 ) -> f32 {
     let tolerance = model.limits.tolerance;
     let held_cell = model.lattice.cell(held as u32);
+    state.put(held, at);
     loop {
         let stage = match report.passes {
             n if n < MAX_SWEEPS => Solve::Sweeps,

@@ -59,6 +59,8 @@ fn oracle_violation(model: &ChainMail, state: &TissueState, parameters: &TissueP
 struct Run {
     worst_solve: Solve,
     most_passes: u32,
+    solves: [u32; 4],
+    passes: u32,
 }
 
 /// Wanders for `ticks` ticks by up to `per_tick` elements, turning back now and then, and checks each step.
@@ -78,6 +80,8 @@ fn wander(
     let mut run = Run {
         worst_solve: Solve::Nothing,
         most_passes: 0,
+        solves: [0; 4],
+        passes: 0,
     };
     for tick in 0..ticks {
         if tick % 50 == 0 {
@@ -110,6 +114,8 @@ fn wander(
                 "residual is not honest"
             );
         }
+        run.solves[report.solve as usize] += 1;
+        run.passes += report.passes;
         run.worst_solve = run.worst_solve.max(report.solve);
         run.most_passes = run.most_passes.max(report.passes);
     }
@@ -133,8 +139,8 @@ fn no_limit_is_violated_on_any_body_at_any_speed() {
         for per_tick in [0.04, 0.5, 3.0] {
             let run = wander(&labels, &TissueParameters::default(), per_tick, 1000, 5);
             println!(
-                "{name}, {per_tick} per tick: {:?}, {} passes",
-                run.worst_solve, run.most_passes
+                "{name}, {per_tick} per tick: {:?} {:?}, {} passes at most, {} in all",
+                run.worst_solve, run.solves, run.most_passes, run.passes
             );
         }
     }
