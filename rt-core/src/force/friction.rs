@@ -36,7 +36,7 @@ pub fn friction(limits: &FrictionLimits, state: &mut FrictionState, position_m: 
         limits.forward_n.max(0.0),
         limits.backward_n.max(0.0),
     );
-    if !position_m.is_finite() || !(k > 0.0) {
+    if !position_m.is_finite() || k.is_nan() || k <= 0.0 {
         state.release();
         return 0.0;
     }

@@ -101,7 +101,7 @@ pub fn membrane(
     input: &ForceInput,
     axis: &Vector3<f64>,
 ) -> Vector3<f64> {
-    if input.punctured || !(input.puncture_depth_m > 0.0) {
+    if input.punctured || input.puncture_depth_m <= 0.0 {
         return Vector3::zeros();
     }
     // `clamp` keeps what is not a number, so that the gate sees it.

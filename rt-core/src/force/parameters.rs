@@ -124,7 +124,7 @@ impl ForceParameters {
             ),
         ] {
             // Not a number fails as well.
-            if !(stiffness * scale <= limit) {
+            if (stiffness * scale).is_nan() || stiffness * scale > limit {
                 problems.add(
                     key,
                     stiffness,

@@ -60,7 +60,7 @@ pub fn step(
 ) -> Vector3<f64> {
     let taken_j = -applied_n.dot(moved_m);
     let moved_squared = moved_m.norm_squared();
-    if !taken_j.is_finite() || !moved_squared.is_finite() || !(dt_s > 0.0) {
+    if !taken_j.is_finite() || !moved_squared.is_finite() || dt_s.is_nan() || dt_s <= 0.0 {
         return *wanted_n;
     }
     state.energy_j = (state.energy_j + taken_j).min(parameters.store_limit_j);

@@ -45,7 +45,8 @@ impl VelocityEstimator {
     /// Takes the sample of `dt_s` after the last one. A sample that is not finite, or a period that is not
     /// positive, changes nothing.
     pub fn update(&mut self, position_m: &Vector3<f64>, dt_s: f64) -> Vector3<f64> {
-        if !position_m.iter().all(|x| x.is_finite()) || !(dt_s > 0.0 && dt_s.is_finite()) {
+        let usable = position_m.iter().all(|x| x.is_finite()) && dt_s > 0.0 && dt_s.is_finite();
+        if !usable {
             return self.velocity_m_per_s;
         }
         for (_, age_s) in &mut self.history {
