@@ -19,6 +19,7 @@ pub struct GateParameters {
     pub max_force_n: f64,
     pub slew_n_per_s: f64,
     pub ramp_in_ticks: u32,
+    /// The ramp out keeps to its ticks even where that is steeper than the slew limit.
     pub ramp_out_ticks: u32,
     /// Time constant of the motors' warming, for the limit on continuous force.
     pub thermal_time_s: f64,

@@ -17,3 +17,6 @@ pub use law::{ForceInput, ForceState, ForceTerms, force};
 pub use parameters::ForceParameters;
 pub use passivity::{PassivityParameters, PassivityState};
 pub use velocity::VelocityEstimator;
+
+#[cfg(test)]
+mod chain_tests;
