@@ -83,7 +83,8 @@ impl HandPath {
     }
 
     /// The fastest speed from which steps of `speed_step` still stop at the goal: the solution of
-    /// `v^2 / 2a + v dt / 2 = distance`, which is exact for the discrete motion.
+    /// `v^2 / 2a + v dt / 2 = distance`, as the discrete motion has it. The last
+    /// step may end past the goal by a small part of `a dt^2`; the next one is on it.
     fn approach_speed(&self, distance: f64, speed_step: f64, dt_s: f64) -> f64 {
         let stopping = speed_step * ((0.25 + 2.0 * distance / (speed_step * dt_s)).sqrt() - 0.5);
         stopping.min(self.goal.speed_m_per_s).min(distance / dt_s)
