@@ -31,6 +31,9 @@ impl MaterialPoint {
             return None;
         }
         let p = point_m.map(|c| c / model.lattice.spacing_m);
+        if out_of_reach(model, state, p) {
+            return None;
+        }
         let known = |&element: &u32| (element as usize) < model.element_count();
         let from_hint = hint.filter(known).and_then(|e| walk(model, state, p, e));
         from_hint.or_else(|| walk(model, state, p, nearest_sample(model, state, p)))
@@ -120,6 +123,14 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
         a[2] * b[0] - a[0] * b[2],
         a[0] * b[1] - a[1] * b[0],
     ]
+}
+
+/// Farther from the body at rest than any element has moved, and its own size at the largest stretch.
+fn out_of_reach(model: &ChainMail, state: &TissueState, p: [f64; 3]) -> bool {
+    let [low, high] = model.rest_box;
+    let stretch = model.limits.links.iter().map(|link| f64::from(link.high));
+    let margin = 1.0 + stretch.sum::<f64>() + f64::from(state.max_displacement);
+    (0..3).any(|a| p[a] < low[a] - margin || p[a] > high[a] + margin)
 }
 
 /// Steps to the neighbour on the side where the point is farthest out, until it is inside a cell.

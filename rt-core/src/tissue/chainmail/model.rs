@@ -17,6 +17,8 @@ pub struct ChainMail {
     pub(crate) rows_of_plane: Vec<[usize; 2]>,
     /// Part of the body that each element belongs to; no link joins two parts.
     pub(crate) part: Vec<u32>,
+    /// Corners of the box around the body at rest, in elements.
+    pub(crate) rest_box: [[f64; 3]; 2],
 }
 
 impl ChainMail {
@@ -31,6 +33,7 @@ impl ChainMail {
             }
         });
         let rows = (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k)));
+        let (low, high) = lattice.bounds_m();
         ChainMail {
             limits,
             y_links: links_along(1, &lattice),
@@ -38,6 +41,7 @@ impl ChainMail {
             runs: rows.flat_map(|(j, k)| lattice.row(j, k)).copied().collect(),
             rows_of_plane: rows_of_plane.collect(),
             part: parts(&lattice),
+            rest_box: [low, high].map(|corner| corner.map(|c| c / lattice.spacing_m)),
             lattice,
         }
     }

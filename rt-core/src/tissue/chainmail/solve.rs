@@ -111,11 +111,15 @@ fn kept_fraction(model: &ChainMail, dt_s: f64) -> f32 {
     }
 }
 
+/// Displacements below this become zero, long before they become denormal and slow.
+const AT_REST: f32 = 1e-12;
+
 /// Recovery by the surroundings: differences shrink in proportion, so no limit is broken.
 fn recover(state: &mut TissueState, kept: f32) {
     for component in &mut state.u {
         for value in component {
-            *value *= kept;
+            let left = *value * kept;
+            *value = if left.abs() > AT_REST { left } else { 0.0 };
         }
     }
 }
@@ -140,7 +144,7 @@ fn solve(
         match stage {
             Solve::Reanchored => project::reanchor(model, held, &mut state.u),
             Solve::Projections => {
-                project::project_all(model, report.passes % 2 == 0, &mut state.u);
+                project::project_all(model, report.passes.is_multiple_of(2), &mut state.u);
                 state.put(held, at);
             }
             _ => sweep::outward(model, held_cell, &mut state.u),

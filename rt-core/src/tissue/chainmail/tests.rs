@@ -238,6 +238,19 @@ fn body_returns_to_rest_when_nothing_is_held() {
 }
 
 #[test]
+fn body_left_alone_comes_to_rest_exactly_and_not_through_denormals() {
+    let model = model_of(&test_bodies::block([4, 4, 4]));
+    let mut state = TissueState::at_rest(&model);
+    let held = held_at(&model, 9, [1.0, 1.0, 1.0]);
+    step(&model, &mut state, Some(held), 1e-3);
+    for _ in 0..20_000 {
+        step(&model, &mut state, None, 1e-3);
+        assert!(!state.u.iter().flatten().any(|u| u.is_subnormal()));
+    }
+    assert_eq!(state.displacement_of(9), [0.0; 3]);
+}
+
+#[test]
 fn insert_and_retract_cycles_do_not_drift() {
     let model = model_of(&test_bodies::block([9, 9, 12]));
     let element = model.lattice().element_of_cell(4, 4, 2).expect("inside");

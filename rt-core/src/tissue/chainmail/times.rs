@@ -33,6 +33,33 @@ fn print_times() {
             }
         });
     }
+    let mut random = crate::scene::test_bodies::Random(1);
+    let (mut held_now, mut way_m, mut direction) = (element, [0.0; 3], [0.0; 3]);
+    print_run(
+        "wandering by up to an element a tick",
+        &model,
+        1000,
+        &mut |tick, state| {
+            if tick % 50 == 0 {
+                held_now = (random.unit() * model.element_count() as f64) as u32;
+                let (at, rest) = (
+                    state.position_m(&model, held_now),
+                    scene.lattice.rest_m(held_now),
+                );
+                way_m = [0, 1, 2].map(|a| at[a] - rest[a]);
+            }
+            if tick % 7 == 0 {
+                direction = [(); 3].map(|()| random.signed() * scene.lattice.spacing_m);
+            }
+            way_m = [0, 1, 2].map(|a| (way_m[a] + direction[a]).clamp(-0.02, 0.02));
+            let rest = scene.lattice.rest_m(held_now);
+            let position_m = [0, 1, 2].map(|a| rest[a] + way_m[a]);
+            Held {
+                element: held_now,
+                position_m,
+            }
+        },
+    );
     // Like a needle: hold for 4 mm, let go, hold the element that is then at the tip; 40 mm in and out.
     let mut at_tip = MaterialPoint {
         element,
