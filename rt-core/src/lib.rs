@@ -1,11 +1,11 @@
-<<<<<<< HEAD
-//! The real-time process: scenes, tissue, force loop.
-
-pub mod scene;
-pub mod tissue;
-=======
 //! The real-time process: device, force loop, tissue.
 
+pub mod active;
+pub mod bridge;
+pub mod cli;
+pub mod core;
 pub mod force;
 pub mod needle;
->>>>>>> force
+pub mod rt;
+pub mod scene;
+pub mod tissue;

@@ -17,6 +17,7 @@ pub struct TipPose {
     /// Inwards along the needle, filtered.
     pub speed_along_m_per_s: f64,
     pub phase: Phase,
+    pub punctured: bool,
     /// Sum of the held element's steps (eq. 6) since the loop began; its differences drive the tissue.
     pub held_travel_m: Vector3<f64>,
     /// The last contact that the haptic loop has ended.
@@ -31,6 +32,7 @@ impl Default for TipPose {
             direction: Vector3::z(),
             speed_along_m_per_s: 0.0,
             phase: Phase::Outside,
+            punctured: false,
             held_travel_m: Vector3::zeros(),
             released_contact: 0,
         }

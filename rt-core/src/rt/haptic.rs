@@ -326,6 +326,7 @@ impl HapticLoop {
         self.pose.direction = sample.direction_in_world();
         self.pose.speed_along_m_per_s = response.speed_m_per_s;
         self.pose.phase = response.phase;
+        self.pose.punctured = self.needle_state.punctured;
         self.ports.pose.write(self.pose);
     }
 

@@ -1,6 +1,5 @@
 //! The tissue tick, 200 Hz: newest pose → contact → held element → constraints → seeds → response → snapshot.
 
-use crate::needle::Phase;
 use crate::rt::arm::Armed;
 use crate::rt::clock::{self, Grid};
 use crate::rt::exchange::*;
@@ -208,7 +207,7 @@ impl TissueLoop {
         let Some(held) = self.held else { return };
         let mut next = held;
         // Before puncture the membrane keeps its element; after it the tip passes from one to the next.
-        if matches!(self.pose.phase, Phase::Penetration | Phase::Retraction | Phase::Hold)
+        if self.pose.punctured
             && let Some(at_tip) = self.locate(&self.pose.tip_in_scene, Some(held.element))
             && at_tip.element != held.element
         {
