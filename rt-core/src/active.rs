@@ -24,7 +24,14 @@ pub fn activate(set: &ParameterSet, device: &DeviceInfo) -> Result<Active, Vec<S
     let force = force(set, device);
     let limits = tissue(set).validate();
     problems.extend(needle.validate().err().into_iter().flatten().map(|p| p.to_string()));
-    problems.extend(force.validate_for(&needle, device).err().into_iter().flatten().map(|p| p.to_string()));
+    problems.extend(
+        force
+            .validate_for(&needle, device)
+            .err()
+            .into_iter()
+            .flatten()
+            .map(|p| p.to_string()),
+    );
     match limits {
         Ok(limits) if problems.is_empty() => Ok(Active { needle, force, limits }),
         Ok(_) => Err(problems),

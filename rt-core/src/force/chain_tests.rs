@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 use stylet_hw::{Device, HandGoal, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
 
 use super::{
-    ForceInput, ForceParameters, ForceState, GateState, PassivityParameters, PassivityState,
-    VelocityEstimator, force, gate, passivity,
+    ForceInput, ForceParameters, ForceState, GateState, PassivityParameters, PassivityState, VelocityEstimator, force,
+    gate, passivity,
 };
 use crate::needle::{self, NeedleInput, NeedleParameters, NeedleState, Phase};
 
@@ -86,11 +86,7 @@ fn a_needle_goes_in_holds_still_and_comes_out() {
     let (log, state, gate, interventions) = insertion(&[(0, 0.04), (5000, -0.01)], 10_000);
     assert_eq!((state.punctures, gate.fault()), (1, None));
 
-    let peak = log
-        .iter()
-        .map(|t| -t.force_n.z)
-        .take(1500)
-        .fold(0.0, f64::max);
+    let peak = log.iter().map(|t| -t.force_n.z).take(1500).fold(0.0, f64::max);
     println!(
         "peak {peak:.2} N, {interventions} passivity interventions, {:?}",
         gate.counts()
@@ -100,18 +96,10 @@ fn a_needle_goes_in_holds_still_and_comes_out() {
     let hold: Vec<_> = log.get(4500..5000).unwrap().iter().collect();
     let low = hold.iter().map(|t| t.force_n.z).fold(f64::MAX, f64::min);
     let high = hold.iter().map(|t| t.force_n.z).fold(f64::MIN, f64::max);
-    assert!(
-        high - low < 0.2,
-        "the force at rest moves by {} N",
-        high - low
-    );
+    assert!(high - low < 0.2, "the force at rest moves by {} N", high - low);
     for tick in hold {
         assert!((tick.depth_m - 0.04).abs() < 3e-4, "{} m", tick.depth_m);
-        assert!(
-            tick.speed_m_per_s < 1e-3,
-            "{} m/s at rest",
-            tick.speed_m_per_s
-        );
+        assert!(tick.speed_m_per_s < 1e-3, "{} m/s at rest", tick.speed_m_per_s);
         assert_eq!(tick.phase, Phase::Hold);
     }
     let last = log.last().unwrap();
@@ -123,9 +111,7 @@ fn a_needle_goes_in_holds_still_and_comes_out() {
 fn the_same_session_gives_the_same_bytes() {
     let bits = || {
         let (log, ..) = insertion(&[(0, 0.02), (1500, 0.0)], 3000);
-        log.iter()
-            .map(|t| t.force_n.z.to_bits())
-            .collect::<Vec<_>>()
+        log.iter().map(|t| t.force_n.z.to_bits()).collect::<Vec<_>>()
     };
     assert_eq!(bits(), bits());
 }

@@ -83,10 +83,7 @@ mod tests {
             let force = friction(&LIMITS, &mut state, 0.02 + tremble);
             assert!((force + 700.0 * tremble).abs() < 1e-9);
         }
-        assert!(
-            (state.anchor_m.unwrap() - 0.02).abs() < 1e-12,
-            "the anchor drifts"
-        );
+        assert!((state.anchor_m.unwrap() - 0.02).abs() < 1e-12, "the anchor drifts");
     }
 
     #[test]

@@ -44,18 +44,8 @@ impl GateParameters {
         problems.range("gate.force_scale", self.force_scale, 0.0, 2.0);
         problems.range("gate.max_force_n", self.max_force_n, 0.0, 40.0);
         problems.range("gate.slew_n_per_s", self.slew_n_per_s, 1.0, 1e5);
-        problems.range(
-            "gate.ramp_in_ticks",
-            f64::from(self.ramp_in_ticks),
-            1.0,
-            1e4,
-        );
-        problems.range(
-            "gate.ramp_out_ticks",
-            f64::from(self.ramp_out_ticks),
-            1.0,
-            100.0,
-        );
+        problems.range("gate.ramp_in_ticks", f64::from(self.ramp_in_ticks), 1.0, 1e4);
+        problems.range("gate.ramp_out_ticks", f64::from(self.ramp_out_ticks), 1.0, 100.0);
         problems.range("gate.thermal_time_s", self.thermal_time_s, 1.0, 1e5);
         problems.finish()
     }
@@ -222,9 +212,7 @@ pub fn step(
             within_slew(parameters, state, allowed_n, dt_s)
         }
         Mode::RampOut { from_n, ticks } => {
-            *ticks = ticks
-                .saturating_add(1)
-                .min(parameters.ramp_out_ticks.max(1));
+            *ticks = ticks.saturating_add(1).min(parameters.ramp_out_ticks.max(1));
             *from_n * (1.0 - f64::from(*ticks) / f64::from(parameters.ramp_out_ticks.max(1)))
         }
     };
@@ -270,12 +258,7 @@ fn within_magnitude(
     force_n
 }
 
-fn within_slew(
-    parameters: &GateParameters,
-    state: &mut GateState,
-    force_n: Vector3<f64>,
-    dt_s: f64,
-) -> Vector3<f64> {
+fn within_slew(parameters: &GateParameters, state: &mut GateState, force_n: Vector3<f64>, dt_s: f64) -> Vector3<f64> {
     let longest_n = (parameters.slew_n_per_s * dt_s).max(0.0);
     let (change_n, cut) = limited(force_n - state.output_n, longest_n);
     state.counts.slew_limited = state.counts.slew_limited.wrapping_add(u64::from(cut));

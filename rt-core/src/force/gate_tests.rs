@@ -8,12 +8,7 @@ fn device() -> DeviceInfo {
     DeviceInfo::phantom_premium_1_5()
 }
 
-fn run(
-    parameters: &GateParameters,
-    state: &mut GateState,
-    wanted_n: Vector3<f64>,
-    ticks: usize,
-) -> GateOutput {
+fn run(parameters: &GateParameters, state: &mut GateState, wanted_n: Vector3<f64>, ticks: usize) -> GateOutput {
     (0..ticks)
         .map(|_| step(parameters, &device(), state, &wanted_n, DT_S))
         .last()
@@ -35,21 +30,13 @@ fn defaults_are_valid_and_every_problem_is_listed() {
     };
     let problems = broken.validate().unwrap_err();
     assert_eq!(problems.len(), 3);
-    assert_eq!(
-        problems[1].to_string(),
-        "gate.max_force_n = -1: must be within 0 to 40"
-    );
+    assert_eq!(problems[1].to_string(), "gate.max_force_n = -1: must be within 0 to 40");
 }
 
 #[test]
 fn a_gate_that_was_not_engaged_gives_nothing() {
     let mut state = GateState::default();
-    let out = run(
-        &GateParameters::default(),
-        &mut state,
-        Vector3::new(5.0, 0.0, 0.0),
-        100,
-    );
+    let out = run(&GateParameters::default(), &mut state, Vector3::new(5.0, 0.0, 0.0), 100);
     assert_eq!((out.force_n, out.engaged), (Vector3::zeros(), false));
 }
 
@@ -112,15 +99,9 @@ fn a_force_that_is_no_number_leads_to_zero_within_the_ramp_and_says_so() {
         assert_eq!(out.fault.map(ForceFault::code), Some(1));
         assert!(out.force_n.norm() < 4.0);
         let ticks = parameters.ramp_out_ticks as usize - 1;
-        assert_eq!(
-            run(&parameters, &mut state, good, ticks).force_n,
-            Vector3::zeros()
-        );
+        assert_eq!(run(&parameters, &mut state, good, ticks).force_n, Vector3::zeros());
         // It latches.
-        assert_eq!(
-            run(&parameters, &mut state, good, 1000).force_n,
-            Vector3::zeros()
-        );
+        assert_eq!(run(&parameters, &mut state, good, 1000).force_n, Vector3::zeros());
         state.engage();
         let again = run(&parameters, &mut state, good, 1000);
         assert!(again.fault.is_none() && (again.force_n - good).norm() < 1e-9);

@@ -61,11 +61,7 @@ pub struct ForceState {
 }
 
 /// The force on the operator. Input that is not finite comes out as such, for the gate to catch and report.
-pub fn force(
-    parameters: &ForceParameters,
-    state: &mut ForceState,
-    input: &ForceInput,
-) -> ForceTerms {
+pub fn force(parameters: &ForceParameters, state: &mut ForceState, input: &ForceInput) -> ForceTerms {
     let gravity_n = gravity(parameters);
     let axis = input.path_direction.try_normalize(1e-9);
     let (Some(axis), true) = (axis, input.phase != Phase::Outside) else {
@@ -96,11 +92,7 @@ pub fn force(
 /// Eq. 10, read as a membrane that resists in proportion to depth, most at `u_cri`, and not at all once it
 /// is open. Along `-r`, whichever way the tip moves: an elastic membrane has no reason to care, and a force
 /// that did would chatter at rest.
-pub fn membrane(
-    parameters: &ForceParameters,
-    input: &ForceInput,
-    axis: &Vector3<f64>,
-) -> Vector3<f64> {
+pub fn membrane(parameters: &ForceParameters, input: &ForceInput, axis: &Vector3<f64>) -> Vector3<f64> {
     if input.punctured || input.puncture_depth_m <= 0.0 {
         return Vector3::zeros();
     }
@@ -110,11 +102,7 @@ pub fn membrane(
 }
 
 /// First part of eq. 9: towards the straight path, across it, after puncture.
-pub fn guide(
-    parameters: &ForceParameters,
-    input: &ForceInput,
-    axis: &Vector3<f64>,
-) -> Vector3<f64> {
+pub fn guide(parameters: &ForceParameters, input: &ForceInput, axis: &Vector3<f64>) -> Vector3<f64> {
     if !input.punctured {
         return Vector3::zeros();
     }

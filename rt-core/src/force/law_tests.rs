@@ -19,21 +19,14 @@ fn input(depth_m: f64, punctured: bool, phase: Phase) -> ForceInput {
 }
 
 fn fresh(input: &ForceInput) -> ForceTerms {
-    force(
-        &ForceParameters::default(),
-        &mut ForceState::default(),
-        input,
-    )
+    force(&ForceParameters::default(), &mut ForceState::default(), input)
 }
 
 #[test]
 fn defaults_can_be_rendered_by_the_phantom() {
     let device = DeviceInfo::phantom_premium_1_5();
     let needle = NeedleParameters::default();
-    assert_eq!(
-        ForceParameters::default().validate_for(&needle, &device),
-        Ok(())
-    );
+    assert_eq!(ForceParameters::default().validate_for(&needle, &device), Ok(()));
     let stiff = ForceParameters {
         membrane_peak_n: 8.0,
         guide_gain: 3.0,
@@ -72,15 +65,8 @@ fn the_membrane_pushes_out_most_at_the_critical_depth_and_then_lets_go() {
     let after = fresh(&input(critical, true, Phase::Penetration));
     assert_eq!(after.membrane_n, Vector3::zeros());
     let expected = parameters.cutting_force_n + parameters.shaft_friction_n_per_m * critical;
-    assert!(
-        (after.total_n.z + expected).abs() < 1e-9,
-        "{}",
-        after.total_n.z
-    );
-    assert!(
-        expected < 0.5 * parameters.membrane_peak_n,
-        "the drop must be felt"
-    );
+    assert!((after.total_n.z + expected).abs() < 1e-9, "{}", after.total_n.z);
+    assert!(expected < 0.5 * parameters.membrane_peak_n, "the drop must be felt");
 }
 
 #[test]
@@ -113,10 +99,7 @@ fn friction_and_damping_oppose_motion_both_ways_and_grow_with_depth() {
     let parameters = ForceParameters::default();
     let mut state = ForceState::default();
     let mut sizes = Vec::new();
-    for (from, to, phase) in [
-        (0.008, 0.048, Phase::Penetration),
-        (0.048, 0.008, Phase::Retraction),
-    ] {
+    for (from, to, phase) in [(0.008, 0.048, Phase::Penetration), (0.048, 0.008, Phase::Retraction)] {
         for i in 0..=1000 {
             let depth = from + (to - from) * f64::from(i) / 1000.0;
             let mut at = input(depth, true, phase);
@@ -127,10 +110,7 @@ fn friction_and_damping_oppose_motion_both_ways_and_grow_with_depth() {
             // On reversal the stuck shaft first gives back what its spring holds.
             let reversing = phase == Phase::Retraction && from - depth < 0.012;
             if !reversing {
-                assert!(
-                    terms.friction_n.dot(&at.velocity_m_per_s) < 0.0,
-                    "{phase:?} {depth}"
-                );
+                assert!(terms.friction_n.dot(&at.velocity_m_per_s) < 0.0, "{phase:?} {depth}");
             }
             sizes.push((depth, terms.friction_n.z, terms.total_n.norm()));
         }

@@ -53,45 +53,16 @@ impl ForceParameters {
         let mut problems = Problems::default();
         problems.range("force.membrane_peak_n", self.membrane_peak_n, 0.0, 30.0);
         problems.range("force.cutting_force_n", self.cutting_force_n, 0.0, 20.0);
-        problems.range(
-            "force.guide_stiffness_n_per_m",
-            self.guide_stiffness_n_per_m,
-            0.0,
-            1e4,
-        );
+        problems.range("force.guide_stiffness_n_per_m", self.guide_stiffness_n_per_m, 0.0, 1e4);
         problems.range("force.guide_gain", self.guide_gain, 0.0, 10.0);
         problems.range("force.damping_n_s_per_m", self.damping_n_s_per_m, 0.0, 50.0);
-        problems.range(
-            "force.shaft_friction_n_per_m",
-            self.shaft_friction_n_per_m,
-            0.0,
-            1e3,
-        );
-        problems.range(
-            "force.stick_stiffness_n_per_m",
-            self.stick_stiffness_n_per_m,
-            1.0,
-            1e4,
-        );
-        problems.range(
-            "force.compensated_mass_kg",
-            self.compensated_mass_kg,
-            0.0,
-            1.0,
-        );
+        problems.range("force.shaft_friction_n_per_m", self.shaft_friction_n_per_m, 0.0, 1e3);
+        problems.range("force.stick_stiffness_n_per_m", self.stick_stiffness_n_per_m, 1.0, 1e4);
+        problems.range("force.compensated_mass_kg", self.compensated_mass_kg, 0.0, 1.0);
         for (key, value) in [
-            (
-                "force.gravity_in_world_m_per_s2.x",
-                self.gravity_in_world_m_per_s2.x,
-            ),
-            (
-                "force.gravity_in_world_m_per_s2.y",
-                self.gravity_in_world_m_per_s2.y,
-            ),
-            (
-                "force.gravity_in_world_m_per_s2.z",
-                self.gravity_in_world_m_per_s2.z,
-            ),
+            ("force.gravity_in_world_m_per_s2.x", self.gravity_in_world_m_per_s2.x),
+            ("force.gravity_in_world_m_per_s2.y", self.gravity_in_world_m_per_s2.y),
+            ("force.gravity_in_world_m_per_s2.z", self.gravity_in_world_m_per_s2.z),
         ] {
             problems.range(key, value, -20.0, 20.0);
         }
@@ -100,11 +71,7 @@ impl ForceParameters {
     }
 
     /// As [`validate`](Self::validate), and that `device` can render it: no spring stiffer than it can hold.
-    pub fn validate_for(
-        &self,
-        needle: &NeedleParameters,
-        device: &DeviceInfo,
-    ) -> Result<(), Vec<Problem>> {
+    pub fn validate_for(&self, needle: &NeedleParameters, device: &DeviceInfo) -> Result<(), Vec<Problem>> {
         let mut problems = Problems::default();
         problems.extend(self.validate());
         let scale = self.gate.force_scale;
@@ -118,10 +85,7 @@ impl ForceParameters {
                 "force.guide_stiffness_n_per_m * force.guide_gain",
                 self.guide_stiffness_n_per_m * self.guide_gain,
             ),
-            (
-                "force.stick_stiffness_n_per_m",
-                self.stick_stiffness_n_per_m,
-            ),
+            ("force.stick_stiffness_n_per_m", self.stick_stiffness_n_per_m),
         ] {
             // Not a number fails as well.
             if (stiffness * scale).is_nan() || stiffness * scale > limit {

@@ -30,12 +30,7 @@ impl PassivityParameters {
     pub fn validate(&self) -> Result<(), Vec<Problem>> {
         let mut problems = Problems::default();
         problems.range("passivity.store_limit_j", self.store_limit_j, 0.0, 10.0);
-        problems.range(
-            "passivity.max_damping_n_s_per_m",
-            self.max_damping_n_s_per_m,
-            0.0,
-            50.0,
-        );
+        problems.range("passivity.max_damping_n_s_per_m", self.max_damping_n_s_per_m, 0.0, 50.0);
         problems.finish()
     }
 }
@@ -114,10 +109,7 @@ mod tests {
         for stiffness in [800.0, 4000.0] {
             let (free, _) = wall(stiffness, false);
             let (held, interventions) = wall(stiffness, true);
-            assert!(
-                free > 0.05,
-                "the wall of {stiffness} N/m should sing: {free}"
-            );
+            assert!(free > 0.05, "the wall of {stiffness} N/m should sing: {free}");
             assert!(held < 0.2 * free, "{stiffness} N/m: {held} against {free}");
             assert!(interventions > 0);
         }

@@ -51,26 +51,11 @@ impl NeedleParameters {
             1e-6,
             1e3,
         );
-        problems.range(
-            "needle.depth_coefficient_m2",
-            self.depth_coefficient_m2,
-            1e-10,
-            1.0,
-        );
-        problems.range(
-            "needle.static_speed_m_per_s",
-            self.static_speed_m_per_s,
-            0.0,
-            1.0,
-        );
+        problems.range("needle.depth_coefficient_m2", self.depth_coefficient_m2, 1e-10, 1.0);
+        problems.range("needle.static_speed_m_per_s", self.static_speed_m_per_s, 0.0, 1.0);
         problems.range("needle.retraction_ratio", self.retraction_ratio, 0.0, 1.0);
         problems.range("needle.hysteresis_m", self.hysteresis_m, 0.0, 0.01);
-        problems.range(
-            "needle.hold_speed_m_per_s",
-            self.hold_speed_m_per_s,
-            0.0,
-            0.05,
-        );
+        problems.range("needle.hold_speed_m_per_s", self.hold_speed_m_per_s, 0.0, 0.05);
         problems.finish()
     }
 }
@@ -143,11 +128,7 @@ pub struct NeedleState {
 }
 
 /// Advances the needle by one tick. Input that is not finite holds the needle and moves nothing.
-pub fn step(
-    parameters: &NeedleParameters,
-    state: &mut NeedleState,
-    input: &NeedleInput,
-) -> NeedleOutput {
+pub fn step(parameters: &NeedleParameters, state: &mut NeedleState, input: &NeedleInput) -> NeedleOutput {
     let finite = input.depth_m.is_finite()
         && input.speed_along_m_per_s.is_finite()
         && input.speed_m_per_s.is_finite()
@@ -191,11 +172,7 @@ fn crosses_membrane(parameters: &NeedleParameters, state: &mut NeedleState, dept
 }
 
 fn phase(parameters: &NeedleParameters, state: &NeedleState, input: &NeedleInput) -> Phase {
-    let outside_m = if state.punctured {
-        -parameters.hysteresis_m
-    } else {
-        0.0
-    };
+    let outside_m = if state.punctured { -parameters.hysteresis_m } else { 0.0 };
     if input.depth_m <= outside_m {
         Phase::Outside
     } else if input.speed_along_m_per_s.abs() <= parameters.hold_speed_m_per_s {
@@ -221,30 +198,21 @@ fn phase(parameters: &NeedleParameters, state: &NeedleState, input: &NeedleInput
 /// assert_eq!(transmission(Phase::Contraction, 0.5, 1e-3, &p), 1.0);
 /// assert!((transmission(Phase::Penetration, 0.0, deep, &p) - (-1f64).exp()).abs() < 1e-12);
 /// ```
-pub fn transmission(
-    phase: Phase,
-    speed_m_per_s: f64,
-    depth_m: f64,
-    parameters: &NeedleParameters,
-) -> f64 {
+pub fn transmission(phase: Phase, speed_m_per_s: f64, depth_m: f64, parameters: &NeedleParameters) -> f64 {
     let ratio = match phase {
         Phase::Outside => 0.0,
         Phase::Contraction => 1.0,
         Phase::Penetration => {
             let haste = (speed_m_per_s - parameters.static_speed_m_per_s).max(0.0);
             let past = (depth_m - parameters.puncture_depth_m).max(0.0);
-            let exponent = haste * haste / parameters.speed_coefficient_m2_per_s2
-                + past * past / parameters.depth_coefficient_m2;
+            let exponent =
+                haste * haste / parameters.speed_coefficient_m2_per_s2 + past * past / parameters.depth_coefficient_m2;
             (-exponent).exp()
         }
         Phase::Retraction => parameters.retraction_ratio,
         Phase::Hold => 1.0,
     };
-    if ratio.is_finite() {
-        ratio.clamp(0.0, 1.0)
-    } else {
-        0.0
-    }
+    if ratio.is_finite() { ratio.clamp(0.0, 1.0) } else { 0.0 }
 }
 
 /// In how many equal pieces a tip step goes to the tissue, so that none is longer than half an element.

@@ -20,12 +20,7 @@ fn defaults_are_valid_and_every_problem_is_listed() {
         retraction_ratio: 1.5,
         ..NeedleParameters::default()
     };
-    let keys: Vec<_> = broken
-        .validate()
-        .unwrap_err()
-        .iter()
-        .map(|p| p.key)
-        .collect();
+    let keys: Vec<_> = broken.validate().unwrap_err().iter().map(|p| p.key).collect();
     assert_eq!(
         keys,
         [
@@ -119,10 +114,7 @@ fn an_insertion_goes_through_its_phases_and_punctures_once() {
         }
     }
     use Phase::*;
-    assert_eq!(
-        seen,
-        [Outside, Contraction, Penetration, Hold, Retraction, Outside]
-    );
+    assert_eq!(seen, [Outside, Contraction, Penetration, Hold, Retraction, Outside]);
     assert_eq!((punctures, state.punctures, state.punctured), (1, 1, false));
 }
 
@@ -145,9 +137,7 @@ fn a_membrane_that_was_not_punctured_comes_back_with_the_tip() {
     for i in 0..10_000 {
         let speed = if i % 200 < 100 { 0.02 } else { -0.02 };
         depth += speed * 1e-3;
-        held += step(&p, &mut state, &input(depth, speed, speed * 1e-3))
-            .held_step_m
-            .z;
+        held += step(&p, &mut state, &input(depth, speed, speed * 1e-3)).held_step_m.z;
     }
     assert!(held.abs() < 1e-9, "the membrane creeps by {held} m");
 }
@@ -160,10 +150,7 @@ fn holding_and_nonsense_move_nothing() {
         ..NeedleState::default()
     };
     let out = step(&p, &mut state, &input(0.02, 0.0, 0.0));
-    assert_eq!(
-        (out.phase, out.held_step_m),
-        (Phase::Hold, Vector3::zeros())
-    );
+    assert_eq!((out.phase, out.held_step_m), (Phase::Hold, Vector3::zeros()));
     for bad in [
         input(f64::NAN, 0.1, 1e-3),
         input(0.1, f64::INFINITY, 1e-3),

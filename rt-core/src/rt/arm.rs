@@ -42,16 +42,23 @@ pub fn arm(ask: Ask) -> Result<Armed, Refused> {
         core_affinity::set_for_current(core_affinity::CoreId { id: core });
     }
     if let Some(priority) = ask.priority {
-        let parameters = libc::sched_param { sched_priority: priority as libc::c_int };
+        let parameters = libc::sched_param {
+            sched_priority: priority as libc::c_int,
+        };
         // SAFETY: `parameters` is valid for reads; 0 names the calling thread.
         if unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &parameters) } != 0 {
             let why = std::io::Error::last_os_error();
-            return Err(Refused(advice(&format!("the kernel does not grant SCHED_FIFO priority {priority} ({why})"))));
+            return Err(Refused(advice(&format!(
+                "the kernel does not grant SCHED_FIFO priority {priority} ({why})"
+            ))));
         }
     }
     touch_stack();
     flush_denormals();
-    Ok(Armed { report: read_back(ask), not_send: PhantomData })
+    Ok(Armed {
+        report: read_back(ask),
+        not_send: PhantomData,
+    })
 }
 
 /// Locks present and future pages; `Err` says which limit to raise.

@@ -15,9 +15,8 @@ pub fn sleep_until(time_ns: u64) {
         tv_nsec: (time_ns % 1_000_000_000) as libc::c_long,
     };
     // SAFETY: `time` is valid for reads; with TIMER_ABSTIME the remainder is not written.
-    while unsafe {
-        libc::clock_nanosleep(libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME, &time, std::ptr::null_mut())
-    } == libc::EINTR
+    while unsafe { libc::clock_nanosleep(libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME, &time, std::ptr::null_mut()) }
+        == libc::EINTR
     {}
 }
 
@@ -31,7 +30,10 @@ pub struct Grid {
 impl Grid {
     /// The first point is one period after `start_ns`.
     pub fn from(start_ns: u64, period_ns: u64) -> Self {
-        Self { period_ns, due_ns: start_ns + period_ns }
+        Self {
+            period_ns,
+            due_ns: start_ns + period_ns,
+        }
     }
 
     /// Moves to the first point that lies after `now_ns`; returns how many were missed on the way.

@@ -81,11 +81,25 @@ pub type Ticket = u64;
 /// Bridge to haptic.
 #[derive(Clone, Copy, Debug)]
 pub enum HapticOrder {
-    Parameters { ticket: Ticket, generation: u64, needle: NeedleParameters, force: ForceParameters },
-    Hand { ticket: Ticket, goal: HandGoal },
-    Engage { ticket: Ticket },
-    Disengage { ticket: Ticket },
-    Reset { ticket: Ticket },
+    Parameters {
+        ticket: Ticket,
+        generation: u64,
+        needle: NeedleParameters,
+        force: ForceParameters,
+    },
+    Hand {
+        ticket: Ticket,
+        goal: HandGoal,
+    },
+    Engage {
+        ticket: Ticket,
+    },
+    Disengage {
+        ticket: Ticket,
+    },
+    Reset {
+        ticket: Ticket,
+    },
 }
 
 /// Bridge to tissue.
@@ -100,16 +114,54 @@ pub enum TissueOrder {
 /// Either loop to the bridge: what happened, once each.
 #[derive(Clone, Copy, Debug)]
 pub enum Notice {
-    Done { ticket: Ticket, tick: u64 },
-    Refused { ticket: Ticket, why: Refusal },
-    ParametersActive { ticket: Ticket, generation: u64, tick: u64 },
-    Contact { tick: u64, time_ns: u64, position_m: Vector3<f64> },
-    Puncture { tick: u64, time_ns: u64, depth_m: f64, position_m: Vector3<f64> },
-    LeftTissue { tick: u64, time_ns: u64 },
-    Seed { tick: u64, time_ns: u64, index: u32, position_m: Vector3<f64> },
-    Fault { tick: u64, time_ns: u64, fault: Fault },
-    Rearmed { tick: u64, time_ns: u64 },
-    WorldSwapped { ticket: Ticket, generation: u64, tick: u64 },
+    Done {
+        ticket: Ticket,
+        tick: u64,
+    },
+    Refused {
+        ticket: Ticket,
+        why: Refusal,
+    },
+    ParametersActive {
+        ticket: Ticket,
+        generation: u64,
+        tick: u64,
+    },
+    Contact {
+        tick: u64,
+        time_ns: u64,
+        position_m: Vector3<f64>,
+    },
+    Puncture {
+        tick: u64,
+        time_ns: u64,
+        depth_m: f64,
+        position_m: Vector3<f64>,
+    },
+    LeftTissue {
+        tick: u64,
+        time_ns: u64,
+    },
+    Seed {
+        tick: u64,
+        time_ns: u64,
+        index: u32,
+        position_m: Vector3<f64>,
+    },
+    Fault {
+        tick: u64,
+        time_ns: u64,
+        fault: Fault,
+    },
+    Rearmed {
+        tick: u64,
+        time_ns: u64,
+    },
+    WorldSwapped {
+        ticket: Ticket,
+        generation: u64,
+        tick: u64,
+    },
 }
 
 /// Why a loop would not do as asked.
@@ -129,7 +181,9 @@ impl Refusal {
             Self::NoSeedLeft => "128 seeds are placed already; undo one first",
             Self::NoSeedToUndo => "no seed has been placed",
             Self::NeedleInTissue => "the needle is in the tissue: retract it first",
-            Self::BadGoal => "the goal for the hand needs a finite place, a direction, and a speed and acceleration above zero",
+            Self::BadGoal => {
+                "the goal for the hand needs a finite place, a direction, and a speed and acceleration above zero"
+            }
         }
     }
 }

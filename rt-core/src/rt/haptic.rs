@@ -157,17 +157,29 @@ impl HapticLoop {
         while let Ok(order) = self.ports.orders.pop() {
             let tick = self.state.tick + 1;
             match order {
-                HapticOrder::Parameters { ticket, generation, needle, force } => {
+                HapticOrder::Parameters {
+                    ticket,
+                    generation,
+                    needle,
+                    force,
+                } => {
                     (self.needle, self.force) = (needle, force);
                     self.state.parameters_generation = generation;
-                    self.notify(Notice::ParametersActive { ticket, generation, tick });
+                    self.notify(Notice::ParametersActive {
+                        ticket,
+                        generation,
+                        tick,
+                    });
                 }
                 HapticOrder::Hand { ticket, goal } if goal.is_valid() => {
                     self.device.set_hand_goal(&goal);
                     self.goal = Some(goal);
                     self.notify(Notice::Done { ticket, tick });
                 }
-                HapticOrder::Hand { ticket, .. } => self.notify(Notice::Refused { ticket, why: Refusal::BadGoal }),
+                HapticOrder::Hand { ticket, .. } => self.notify(Notice::Refused {
+                    ticket,
+                    why: Refusal::BadGoal,
+                }),
                 HapticOrder::Engage { ticket } => self.engage(ticket, tick),
                 HapticOrder::Disengage { ticket } => {
                     self.gate.release();
@@ -264,8 +276,16 @@ impl HapticLoop {
         if touching {
             self.contact = tissue.contact;
         }
-        let axis = if touching { tissue.path_direction } else { sample.direction_in_world() };
-        let depth_m = if touching { (sample.tip_in_world - tissue.contact_in_scene).dot(&axis) } else { 0.0 };
+        let axis = if touching {
+            tissue.path_direction
+        } else {
+            sample.direction_in_world()
+        };
+        let depth_m = if touching {
+            (sample.tip_in_world - tissue.contact_in_scene).dot(&axis)
+        } else {
+            0.0
+        };
         let speed_m_per_s = velocity.dot(&axis);
         let last_tip = self.sample.map_or(sample.tip_in_world, |s| s.tip_in_world);
         let input = NeedleInput {
@@ -277,7 +297,12 @@ impl HapticLoop {
         let output = needle::step(&self.needle, &mut self.needle_state, &input);
         if output.puncture {
             let (tick, time_ns) = (self.state.tick + 1, self.state.time_ns);
-            self.notify(Notice::Puncture { tick, time_ns, depth_m, position_m: sample.tip_in_world });
+            self.notify(Notice::Puncture {
+                tick,
+                time_ns,
+                depth_m,
+                position_m: sample.tip_in_world,
+            });
         }
         if touching && output.phase == Phase::Outside {
             self.end_contact();
@@ -297,7 +322,13 @@ impl HapticLoop {
                 punctured: self.needle_state.punctured,
             },
         );
-        Response { phase: output.phase, depth_m, speed_m_per_s, terms, axis }
+        Response {
+            phase: output.phase,
+            depth_m,
+            speed_m_per_s,
+            terms,
+            axis,
+        }
     }
 
     /// Passivity, then the gate: its output alone reaches the device.
@@ -375,8 +406,13 @@ impl HapticLoop {
         s.depth_m = response.depth_m;
         s.speed_m_per_s = response.speed_m_per_s;
         s.force_on_hand_n = force_n.into();
-        s.force_terms_n =
-            [along(&t.membrane_n), t.guide_n.norm(), along(&t.damping_n), along(&t.friction_n), along(&t.gravity_n)];
+        s.force_terms_n = [
+            along(&t.membrane_n),
+            t.guide_n.norm(),
+            along(&t.damping_n),
+            along(&t.friction_n),
+            along(&t.gravity_n),
+        ];
         s.peak_force_n = s.peak_force_n.max(force_n.norm());
         s.force_scale = self.force.gate.force_scale;
         s.missed_deadlines += u64::from(missed);

@@ -75,6 +75,11 @@ impl TissueLoop {
         }
     }
 
+    /// What the haptic loop was last told.
+    pub fn response(&self) -> &TissueResponse {
+        &self.response
+    }
+
     /// Runs on the ideal grid until `stop`.
     pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool) {
         let mut grid = Grid::from(clock::now_ns(), (self.period_s * 1e9) as u64);
@@ -107,7 +112,7 @@ impl TissueLoop {
     fn take_orders(&mut self) {
         while let Ok(order) = self.ports.orders.pop() {
             match order {
-                TissueOrder::Limits(limits) => self.world.model.set_limits(limits),
+                TissueOrder::Limits(limits) => self.world.set_limits(limits),
                 TissueOrder::DropSeed { ticket } => self.drop_seed(ticket),
                 TissueOrder::UndoSeed { ticket } => self.undo_seed(ticket),
                 TissueOrder::Reset => self.reset(),
@@ -122,8 +127,7 @@ impl TissueLoop {
     }
 
     fn reset(&mut self) {
-        let world = &mut *self.world;
-        world.state.return_to_rest();
+        self.world.return_to_rest();
         self.seeds.clear();
         self.let_go();
         self.response.worst_residual = 0.0;
@@ -150,7 +154,11 @@ impl TissueLoop {
         self.response.seed_count = 0;
         self.let_go();
         let (generation, tick) = (self.world.generation, self.response.tick);
-        self.notify(Notice::WorldSwapped { ticket, generation, tick });
+        self.notify(Notice::WorldSwapped {
+            ticket,
+            generation,
+            tick,
+        });
     }
 
     fn locate(&self, place: &Vector3<f64>, hint: Option<u32>) -> Option<MaterialPoint> {
@@ -182,11 +190,22 @@ impl TissueLoop {
         }
         let place = self.entry_between(before.tip_in_scene, self.pose.tip_in_scene, point.element);
         self.contacts += 1;
-        self.contact = Some(Contact { number: self.contacts, place, direction: self.pose.direction });
+        self.contact = Some(Contact {
+            number: self.contacts,
+            place,
+            direction: self.pose.direction,
+        });
         let position_m = self.world.state.position_m(&self.world.model, point.element);
-        self.held = Some(Held { element: point.element, position_m });
+        self.held = Some(Held {
+            element: point.element,
+            position_m,
+        });
         let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
-        self.notify(Notice::Contact { tick, time_ns, position_m: place });
+        self.notify(Notice::Contact {
+            tick,
+            time_ns,
+            position_m: place,
+        });
     }
 
     /// Bisection between a place outside and one inside; the inner one where even the start is inside.
@@ -212,7 +231,10 @@ impl TissueLoop {
             && at_tip.element != held.element
         {
             let position_m = self.world.state.position_m(&self.world.model, at_tip.element);
-            next = Held { element: at_tip.element, position_m };
+            next = Held {
+                element: at_tip.element,
+                position_m,
+            };
         }
         for (coordinate, by) in next.position_m.iter_mut().zip(travel.iter()) {
             *coordinate += by;
@@ -225,8 +247,14 @@ impl TissueLoop {
         let hint = self.held.map(|h| h.element);
         let found = self.locate(&tip_m, hint);
         let notice = match found {
-            None => Notice::Refused { ticket, why: Refusal::TipOutsideTissue },
-            Some(_) if self.seeds.len() >= MAX_SEEDS => Notice::Refused { ticket, why: Refusal::NoSeedLeft },
+            None => Notice::Refused {
+                ticket,
+                why: Refusal::TipOutsideTissue,
+            },
+            Some(_) if self.seeds.len() >= MAX_SEEDS => Notice::Refused {
+                ticket,
+                why: Refusal::NoSeedLeft,
+            },
             Some(tip) => {
                 let tail = self.locate(&(tip_m - self.pose.direction * SEED_LENGTH_M), Some(tip.element));
                 // Room for MAX_SEEDS was reserved: this push does not allocate.
@@ -239,7 +267,12 @@ impl TissueLoop {
                 self.response.seed_count = self.seeds.len() as u32;
                 let tick = self.response.tick;
                 let index = self.seeds.len() as u32 - 1;
-                self.notify(Notice::Seed { tick, time_ns: self.pose.time_ns, index, position_m: tip_m });
+                self.notify(Notice::Seed {
+                    tick,
+                    time_ns: self.pose.time_ns,
+                    index,
+                    position_m: tip_m,
+                });
                 Notice::Done { ticket, tick }
             }
         };
@@ -250,7 +283,10 @@ impl TissueLoop {
         let tick = self.response.tick;
         let notice = match self.seeds.pop() {
             Some(_) => Notice::Done { ticket, tick },
-            None => Notice::Refused { ticket, why: Refusal::NoSeedToUndo },
+            None => Notice::Refused {
+                ticket,
+                why: Refusal::NoSeedToUndo,
+            },
         };
         self.response.seed_count = self.seeds.len() as u32;
         self.notify(notice);
@@ -280,7 +316,10 @@ impl TissueLoop {
             if filled {
                 self.fill(&slot, woke_ns, work_ns, report);
             }
-            let _ = self.ports.filled.push(SnapshotReturn { index: slot.index, filled });
+            let _ = self.ports.filled.push(SnapshotReturn {
+                index: slot.index,
+                filled,
+            });
             if filled {
                 return;
             }
@@ -292,7 +331,12 @@ impl TissueLoop {
         // until the slot is returned; they were zeroed, and Vertex is valid for every bit pattern.
         let vertices = unsafe { std::slice::from_raw_parts_mut(slot.vertices, slot.vertex_count) };
         let positions: &mut [[f32; 3]] = bytemuck::cast_slice_mut::<Vertex, [f32; 3]>(vertices);
-        crate::tissue::write_surface(&self.world.model, &self.world.state, &self.world.scene.surface, positions);
+        crate::tissue::write_surface(
+            &self.world.model,
+            &self.world.state,
+            &self.world.scene.surface,
+            positions,
+        );
         // SAFETY: as above, for the header.
         let header = unsafe { &mut *slot.header };
         let spacing_m = self.world.scene.lattice.spacing_m;
@@ -323,8 +367,14 @@ impl TissueLoop {
     fn pose_of(&self, seed: &Seed) -> SeedPose {
         let (model, state) = (&self.world.model, &self.world.state);
         let position_m = seed.tip.position_m(model, state);
-        let along = seed.tail.map(|tail| Vector3::from(position_m) - Vector3::from(tail.position_m(model, state)));
+        let along = seed
+            .tail
+            .map(|tail| Vector3::from(position_m) - Vector3::from(tail.position_m(model, state)));
         let axis = along.and_then(|a| a.try_normalize(1e-9)).map_or(seed.axis, Into::into);
-        SeedPose { position_m, axis, dropped_at_m: seed.dropped_at_m }
+        SeedPose {
+            position_m,
+            axis,
+            dropped_at_m: seed.dropped_at_m,
+        }
     }
 }

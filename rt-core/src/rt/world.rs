@@ -16,6 +16,23 @@ impl World {
     pub fn new(scene: Scene, limits: Limits, generation: u64) -> Self {
         let model = ChainMail::new(&scene, limits);
         let state = TissueState::at_rest(&model);
-        Self { generation, scene, model, state }
+        Self {
+            generation,
+            scene,
+            model,
+            state,
+        }
+    }
+
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.model.limits = limits;
+    }
+
+    /// Every element to its place at rest, at once.
+    pub fn return_to_rest(&mut self) {
+        for component in &mut self.state.u {
+            component.fill(0.0);
+        }
+        self.state.max_displacement = 0.0;
     }
 }

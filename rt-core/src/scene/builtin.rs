@@ -58,8 +58,7 @@ pub(super) fn paper() -> Labels {
         for j in 0..dims[1] {
             for i in 0..dims[0] {
                 let cell = [i, j, k];
-                let from_centre =
-                    [0, 1, 2].map(|axis| cell[axis] as f64 + 0.5 - 0.5 * dims[axis] as f64);
+                let from_centre = [0, 1, 2].map(|axis| cell[axis] as f64 + 0.5 - 0.5 * dims[axis] as f64);
                 cells.push(u8::from(PAPER_GLAND.contains(from_centre)));
             }
         }
@@ -103,13 +102,7 @@ mod tests {
         assert!(area(88 - 12) < area(88 + 11), "apex narrower than base");
         let (low, high) = lattice.bounds_m();
         let middle = |axis: usize| 0.5 * lattice.dims[axis] as f64 * lattice.spacing_m;
-        assert!(
-            (low[0] + high[0] - 2.0 * middle(0)).abs() < 1e-9,
-            "centred in x"
-        );
-        assert!(
-            middle(1) - low[1] < high[1] - middle(1),
-            "posterior flatter"
-        );
+        assert!((low[0] + high[0] - 2.0 * middle(0)).abs() < 1e-9, "centred in x");
+        assert!(middle(1) - low[1] < high[1] - middle(1), "posterior flatter");
     }
 }

@@ -84,8 +84,7 @@ impl Lattice {
 
     /// Centre of an element at rest, in the scene frame.
     pub fn rest_m(&self, element: u32) -> [f64; 3] {
-        self.cell(element)
-            .map(|c| (c as f64 + 0.5) * self.spacing_m)
+        self.cell(element).map(|c| (c as f64 + 0.5) * self.spacing_m)
     }
 
     pub fn element_of_cell(&self, i: usize, j: usize, k: usize) -> Option<u32> {

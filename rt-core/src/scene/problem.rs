@@ -18,10 +18,7 @@ impl fmt::Display for SceneProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::NoCells { axis } => {
-                write!(
-                    f,
-                    "0 cells along {axis}, at least 1 needed: give the volume's size"
-                )
+                write!(f, "0 cells along {axis}, at least 1 needed: give the volume's size")
             }
             Self::TooManyCells { axis, cells } => write!(
                 f,
@@ -65,9 +62,7 @@ impl fmt::Display for SceneError {
             }
             Self::Invalid(problems) => {
                 write!(f, "the scene has {} problem(s)", problems.len())?;
-                problems
-                    .iter()
-                    .try_for_each(|problem| write!(f, "\n  {problem}"))
+                problems.iter().try_for_each(|problem| write!(f, "\n  {problem}"))
             }
         }
     }
@@ -87,9 +82,7 @@ pub(super) fn problems_of(labels: &Labels) -> Vec<SceneProblem> {
         }
     }
     let dims = labels.dims;
-    let product = dims
-        .iter()
-        .try_fold(1_usize, |product, &n| product.checked_mul(n));
+    let product = dims.iter().try_fold(1_usize, |product, &n| product.checked_mul(n));
     if product != Some(labels.cells.len()) {
         let cells = labels.cells.len();
         problems.push(SceneProblem::CellCount { dims, cells });

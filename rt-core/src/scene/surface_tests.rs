@@ -13,8 +13,7 @@ fn assert_closed(surface: &Surface) {
     for &[a, b, c] in &surface.triangles {
         assert!(a != b && b != c && c != a, "degenerate triangle");
         for (from, to) in [(a, b), (b, c), (c, a)] {
-            *balance.entry((from.min(to), from.max(to))).or_default() +=
-                if from < to { 1 } else { -1 };
+            *balance.entry((from.min(to), from.max(to))).or_default() += if from < to { 1 } else { -1 };
         }
     }
     assert!(balance.values().all(|&count| count == 0), "open edge");
@@ -24,9 +23,7 @@ fn signed_volume_m3(lattice: &Lattice, surface: &Surface) -> f64 {
     let point = |vertex: u32| lattice.rest_m(surface.vertex_elements[vertex as usize]);
     let six_fold = surface.triangles.iter().map(|&[a, b, c]| {
         let (a, b, c) = (point(a), point(b), point(c));
-        a[0] * (b[1] * c[2] - b[2] * c[1])
-            + a[1] * (b[2] * c[0] - b[0] * c[2])
-            + a[2] * (b[0] * c[1] - b[1] * c[0])
+        a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
     });
     six_fold.sum::<f64>() / 6.0
 }

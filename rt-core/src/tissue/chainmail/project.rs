@@ -26,12 +26,7 @@ pub(super) fn project_all(model: &ChainMail, upward: bool, u: &mut [Vec<f32>; 3]
     }
 }
 
-fn project_run(
-    limits: &crate::tissue::limits::LinkLimits,
-    run: Run,
-    upward: bool,
-    u: &mut [Vec<f32>; 3],
-) {
+fn project_run(limits: &crate::tissue::limits::LinkLimits, run: Run, upward: bool, u: &mut [Vec<f32>; 3]) {
     let (first, end) = (run.first as usize, run.end() as usize);
     let [x, y, z] = u.each_mut().map(|c| &mut c[first..end]);
     let links = x.len() - 1;
@@ -79,12 +74,7 @@ fn smallest_scale(model: &ChainMail, part: u32, u: &[Vec<f32>; 3]) -> f32 {
     let along_z = model.z_links.all().iter().map(|s| (z, [2, 0, 1], s));
     for (limits, order, span) in along_y.chain(along_z) {
         for n in 0..span.len {
-            link(
-                limits,
-                order,
-                (span.lo + n) as usize,
-                (span.hi + n) as usize,
-            );
+            link(limits, order, (span.lo + n) as usize, (span.hi + n) as usize);
         }
     }
     scale
