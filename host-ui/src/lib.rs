@@ -1,1 +1,5 @@
-//! placeholder
+//! The operator's program: what it reads from the core, the files it opens, the procedure it runs.
+
+pub mod files;
+pub mod link;
+pub mod workflow;
