@@ -8,7 +8,7 @@ use crate::tissue::check::largest_violation_f32;
 /// Outward sweeps tried first.
 pub const MAX_SWEEPS: u32 = 6;
 /// Passes of projections tried after that.
-pub const MAX_PROJECTIONS: u32 = 60;
+pub const MAX_PROJECTIONS: u32 = 12;
 /// Farthest from rest that a held element is followed, in elements; f32 resolves the tolerance up to here.
 pub const REACH: f64 = 2048.0;
 

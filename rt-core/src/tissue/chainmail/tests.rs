@@ -132,6 +132,24 @@ fn no_limit_is_violated_on_any_body_at_any_speed() {
 }
 
 #[test]
+fn re_anchoring_reaches_the_limits_from_any_state_and_spares_other_parts() {
+    let parameters = TissueParameters::default();
+    let model = model_of(&test_bodies::two_parts());
+    let mut random = Random(8);
+    for _ in 0..50 {
+        let mut state = TissueState::at_rest(&model);
+        let size = 1e-3 + 30.0 * random.unit();
+        for element in (0..model.element_count()).filter(|&e| model.part[e] == 0) {
+            state.put(element, [(); 3].map(|()| (size * random.signed()) as f32));
+        }
+        let held = state.displacement_of(3);
+        project::reanchor(&model, 3, &mut state.u);
+        assert!(oracle_violation(&model, &state, &parameters) <= parameters.residual_tolerance);
+        assert_eq!(state.displacement_of(3), held);
+    }
+}
+
+#[test]
 fn rigid_limits_move_the_body_as_a_whole() {
     let rigid = TissueParameters {
         min_stretch: 1.0,
