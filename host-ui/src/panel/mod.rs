@@ -10,7 +10,7 @@ pub mod status;
 pub mod workflow;
 
 pub use seeds::{SeedError, seed_errors};
-pub use shown::{LoadState, Shown};
+pub use shown::{LoadState, Note, Shown};
 
 use std::path::PathBuf;
 use stylet_shm_schema::CommandKind;
