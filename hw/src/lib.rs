@@ -1,1 +1,13 @@
-//! placeholder
+//! Haptic devices: the [`Device`] trait and its back ends.
+//!
+//! The only place where encoder counts, driver units and calibration live: everything that leaves this
+//! crate is in SI units and in the world frame.
+
+pub mod convert;
+pub mod device;
+pub mod sim;
+
+pub use device::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
+pub use sim::hand::{Effort, Hand};
+pub use sim::path::{HandPath, ScriptedPath, Waypoint};
+pub use sim::phantom::{SimulatedPhantom, SimulatedPhantomConfig};

@@ -1,1 +1,11 @@
-//! placeholder
+//! The real-time process: device, force loop, tissue.
+
+pub mod active;
+pub mod bridge;
+pub mod cli;
+pub mod core;
+pub mod force;
+pub mod needle;
+pub mod rt;
+pub mod scene;
+pub mod tissue;

@@ -25,12 +25,14 @@ pub enum ParameterId {
     GuideGain,
     Damping,
     ShaftFriction,
-    GravityForce,
+    HandleMass,
     ForceScale,
     SlewLimit,
+    HoldSpeed,
+    StickStiffness,
 }
 
-pub const PARAMETER_COUNT: usize = 21;
+pub const PARAMETER_COUNT: usize = 23;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterGroup {
@@ -107,21 +109,23 @@ parameters! {
     ShearVertical "tissue.shear_vertical" "Shear, vertical" Tissue "deg" (1.0 / RAD), 0.0, 85.0, 26.565, "paper eq. 5", "Largest shear angle of links along y and z (maxVertRy). With the horizontal one it must stay under 90 deg (eq. 1).";
     RecoveryTime "tissue.recovery_time" "Recovery time" Tissue "ms" 1e3, 5.0, 10000.0, 250.0, "ours", "Time in which the surroundings bring the gland back by 63 %.";
     ResidualTolerance "tissue.residual_tolerance" "Residual tolerance" Tissue "elements" 1.0, 1e-4, 1e-2, 1e-3, "design section 3", "Largest constraint violation that a tissue step may leave.";
-    PunctureDepth "needle.puncture_depth" "Puncture depth u_cri" Needle "mm" 1e3, 0.5, 20.0, 6.0, "paper eq. 6", "Depth at which the needle goes through the membrane.";
+    PunctureDepth "needle.puncture_depth" "Puncture depth u_cri" Needle "mm" 1e3, 0.5, 20.0, 8.0, "paper eq. 6", "Depth at which the needle goes through the membrane.";
     SpeedCoefficient "needle.speed_coefficient" "Speed coefficient K_V" Needle "mm2/s2" 1e6, 1.0, 1e6, 10000.0, "paper eq. 6", "The larger, the more a fast needle drags the tissue along.";
-    DepthCoefficient "needle.depth_coefficient" "Depth coefficient K_s" Needle "mm2" 1e6, 0.01, 1000.0, 100.0, "paper eq. 6", "The larger, the longer the tissue follows the tip after puncture.";
-    StaticSpeed "needle.static_speed" "Static friction speed V_0" Needle "mm/s" 1e3, 0.0, 200.0, 10.0, "paper eq. 6", "Below this speed the tissue sticks to the needle.";
+    DepthCoefficient "needle.depth_coefficient" "Depth coefficient K_s" Needle "mm2" 1e6, 0.01, 1000.0, 64.0, "paper eq. 6", "The larger, the longer the tissue follows the tip after puncture.";
+    StaticSpeed "needle.static_speed" "Static friction speed V_0" Needle "mm/s" 1e3, 0.0, 200.0, 20.0, "paper eq. 6", "Below this speed the tissue sticks to the needle.";
     RetractionRatio "needle.retraction_ratio" "Retraction ratio K_ret" Needle "" 1.0, 0.0, 1.0, 0.3, "paper eq. 6", "Share of the tip's step that the tissue follows on the way out.";
     PunctureHysteresis "needle.puncture_hysteresis" "Puncture hysteresis" Needle "mm" 1e3, 0.0, 5.0, 0.5, "design section 4", "How far the tip must come back out before the membrane counts as closed.";
     MembranePeak "force.membrane_peak" "Membrane force F_R" Force "N" 1.0, 0.0, 20.0, 5.6, "design section 9", "Force at the moment of puncture (paper eq. 10).";
     CuttingForce "force.cutting" "Cutting force" Force "N" 1.0, 0.0, 10.0, 1.5, "ours", "Force at the tip while it cuts tissue.";
-    GuideStiffness "force.guide_stiffness" "Guide stiffness K" Force "N/m" 1.0, 0.0, 800.0, 300.0, "paper eq. 9", "Spring towards the straight path.";
+    GuideStiffness "force.guide_stiffness" "Guide stiffness K" Force "N/m" 1.0, 0.0, 800.0, 400.0, "paper eq. 9", "Spring towards the straight path.";
     GuideGain "force.guide_gain" "Guide gain K_C" Force "" 1.0, 0.0, 1.0, 1.0, "paper eq. 9", "Scales the guide; 0 turns it off.";
-    Damping "force.damping" "Damping K_V" Force "N s/m" 1.0, 0.0, 20.0, 3.0, "paper eq. 9", "Force against the tip's speed. Not the K_V of the needle.";
-    ShaftFriction "force.shaft_friction" "Shaft friction K_f" Force "N/m" 1.0, 0.0, 500.0, 50.0, "paper eq. 9", "Friction along the shaft for each metre inside.";
-    GravityForce "force.gravity_compensation" "Gravity compensation F_G" Force "N" 1.0, 0.0, 2.0, 0.0, "paper eq. 8", "Lifts the weight of the handle.";
+    Damping "force.damping" "Damping K_V" Force "N s/m" 1.0, 0.0, 20.0, 5.0, "paper eq. 9", "Force against the tip's speed. Not the K_V of the needle.";
+    ShaftFriction "force.shaft_friction" "Shaft friction K_f" Force "N/m" 1.0, 0.0, 500.0, 80.0, "paper eq. 9", "Friction along the shaft for each metre inside.";
+    HandleMass "force.handle_mass" "Handle mass for F_G" Force "g" 1e3, 0.0, 200.0, 0.0, "paper eq. 8", "Mass whose weight F_G takes off the hand; the simulated device has none to carry.";
     ForceScale "force.scale" "Force scale" Force "" 1.0, 0.0, 2.0, 1.0, "design section 5", "Fits the force of a real needle to the device; always shown.";
-    SlewLimit "force.slew_limit" "Slew limit" Force "N/ms" 1e-3, 0.05, 10.0, 2.0, "design section 5", "Largest change of force from tick to tick.";
+    SlewLimit "force.slew_limit" "Slew limit" Force "N/ms" 1e-3, 0.05, 10.0, 0.5, "design section 5", "Largest change of force from tick to tick.";
+    HoldSpeed "needle.hold_speed" "Hold speed" Needle "mm/s" 1e3, 0.0, 50.0, 2.0, "ours", "Below this speed along the path the needle is at rest; above the noise of the velocity estimate.";
+    StickStiffness "force.stick_stiffness" "Stick stiffness" Force "N/m" 1.0, 1.0, 800.0, 700.0, "ours", "How stiffly the tissue holds a needle that sticks to it.";
 }
 
 /// One value for every row of [`PARAMETERS`], SI.

@@ -50,3 +50,15 @@ pub struct UploadHeader {
     pub patient_from_scene: [f64; 12],
     pub name: Text<64>,
 }
+
+impl Default for SceneHeader {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}
+
+impl Default for UploadHeader {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}

@@ -6,7 +6,7 @@ use iceoryx2::prelude::ZeroCopySend;
 
 /// Deformed position of one surface vertex, scene frame.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.Vertex")]
 pub struct Vertex {
     pub position_m: [f32; 3],
@@ -49,4 +49,10 @@ pub struct SnapshotHeader {
     pub vertex_count: u32,
     pub seed_count: u32,
     pub seeds: [SeedPose; MAX_SEEDS],
+}
+
+impl Default for SnapshotHeader {
+    fn default() -> Self {
+        Self::zeroed()
+    }
 }

@@ -1,0 +1,5 @@
+//! Files that a user brings.
+
+mod volume;
+
+pub use volume::LabelVolume;

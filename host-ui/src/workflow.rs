@@ -1,0 +1,7 @@
+//! The four steps of an implantation: plan, place the needle, insert, drop seeds while retracting.
+
+mod plan;
+mod run;
+
+pub use plan::{NeedlePlan, Pace, default_plan, move_values, plan_values, plan_with_seeds};
+pub use run::{Run, RunStatus, Step};

@@ -1,0 +1,5 @@
+//! A Phantom and the hand that holds it, simulated.
+
+pub mod hand;
+pub mod path;
+pub mod phantom;

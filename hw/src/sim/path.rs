@@ -1,0 +1,163 @@
+//! Where the simulated hand means to be: a straight way to the goal with a trapezoidal speed.
+
+use nalgebra::Vector3;
+
+use crate::device::HandGoal;
+
+/// The moving equilibrium of the hand.
+///
+/// From rest it follows a straight line to its goal. A new goal takes over from the present position and
+/// velocity, so that the velocity never changes by more than acceleration times period.
+#[derive(Debug, Clone)]
+pub struct HandPath {
+    position_m: Vector3<f64>,
+    velocity_m_per_s: Vector3<f64>,
+    goal: HandGoal,
+}
+
+impl HandPath {
+    /// At rest at `start_m`, with the needle along `direction`.
+    pub fn at(start_m: Vector3<f64>, direction: Vector3<f64>) -> Self {
+        Self {
+            position_m: start_m,
+            velocity_m_per_s: Vector3::zeros(),
+            goal: HandGoal {
+                tip_in_world: start_m,
+                direction,
+                speed_m_per_s: 0.05,
+                acceleration_m_per_s2: 1.0,
+            },
+        }
+    }
+
+    /// Takes a new goal; one that is not valid is ignored and gives `false`.
+    pub fn set_goal(&mut self, goal: &HandGoal) -> bool {
+        let valid = goal.is_valid();
+        if valid {
+            self.goal = *goal;
+        }
+        valid
+    }
+
+    pub fn position_m(&self) -> &Vector3<f64> {
+        &self.position_m
+    }
+
+    pub fn velocity_m_per_s(&self) -> &Vector3<f64> {
+        &self.velocity_m_per_s
+    }
+
+    pub fn goal(&self) -> &HandGoal {
+        &self.goal
+    }
+
+    pub fn arrived(&self) -> bool {
+        self.velocity_m_per_s == Vector3::zeros() && self.position_m == self.goal.tip_in_world
+    }
+
+    /// Advances by `dt_s`, which the caller has checked to be positive.
+    pub fn step(&mut self, dt_s: f64) {
+        let way = self.goal.tip_in_world - self.position_m;
+        let distance = way.norm();
+        let speed_step = self.goal.acceleration_m_per_s2 * dt_s;
+        let close = distance <= 0.5 * speed_step * dt_s || distance < 1e-12;
+        if close && self.velocity_m_per_s.norm() <= speed_step {
+            self.position_m = self.goal.tip_in_world;
+            self.velocity_m_per_s = Vector3::zeros();
+            return;
+        }
+        let wanted = if distance > 1e-12 {
+            way * (self.approach_speed(distance, speed_step, dt_s) / distance)
+        } else {
+            Vector3::zeros()
+        };
+        let change = wanted - self.velocity_m_per_s;
+        let size = change.norm();
+        let limited = if size > speed_step {
+            change * (speed_step / size)
+        } else {
+            change
+        };
+        self.velocity_m_per_s += limited;
+        self.position_m += self.velocity_m_per_s * dt_s;
+    }
+
+    /// The fastest speed from which steps of `speed_step` still stop at the goal: the solution of
+    /// `v^2 / 2a + v dt / 2 = distance`, as the discrete motion has it. The last
+    /// step may end past the goal by a small part of `a dt^2`; the next one is on it.
+    fn approach_speed(&self, distance: f64, speed_step: f64, dt_s: f64) -> f64 {
+        let stopping = speed_step * ((0.25 + 2.0 * distance / (speed_step * dt_s)).sqrt() - 0.5);
+        stopping.min(self.goal.speed_m_per_s).min(distance / dt_s)
+    }
+}
+
+/// One stop of a script: go there, stay there, go on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Waypoint {
+    pub goal: HandGoal,
+    /// How long to stay after arriving.
+    pub dwell_s: f64,
+    /// How long to try at most, dwell included; the script goes on after it in any case.
+    pub timeout_s: f64,
+}
+
+/// A list of goals for a run without an operator.
+#[derive(Debug, Clone)]
+pub struct ScriptedPath {
+    waypoints: Vec<Waypoint>,
+    index: usize,
+    announced: bool,
+    elapsed_s: f64,
+    dwelt_s: f64,
+    arrival_tolerance_m: f64,
+}
+
+impl ScriptedPath {
+    /// Owns its waypoints: nothing is allocated later.
+    pub fn new(waypoints: Vec<Waypoint>, arrival_tolerance_m: f64) -> Self {
+        Self {
+            waypoints,
+            index: 0,
+            announced: false,
+            elapsed_s: 0.0,
+            dwelt_s: 0.0,
+            arrival_tolerance_m,
+        }
+    }
+
+    /// Call once a tick with the tip of the newest sample. Gives a goal in the tick in which it changes.
+    pub fn step(&mut self, dt_s: f64, tip_in_world: &Vector3<f64>) -> Option<HandGoal> {
+        let waypoint = *self.waypoints.get(self.index)?;
+        if !self.announced {
+            self.announced = true;
+            return Some(waypoint.goal);
+        }
+        self.elapsed_s += dt_s;
+        let error_m = (tip_in_world - waypoint.goal.tip_in_world).norm();
+        if self.dwelt_s > 0.0 || error_m <= self.arrival_tolerance_m {
+            self.dwelt_s += dt_s;
+        }
+        if self.dwelt_s > waypoint.dwell_s || self.elapsed_s > waypoint.timeout_s {
+            self.index += 1;
+            (self.elapsed_s, self.dwelt_s) = (0.0, 0.0);
+            self.announced = self.index < self.waypoints.len();
+            return self.waypoints.get(self.index).map(|next| next.goal);
+        }
+        None
+    }
+
+    /// Index of the present waypoint, or their number when the script has ended.
+    pub fn index(&self) -> usize {
+        self.index
+    }
+
+    pub fn finished(&self) -> bool {
+        self.index >= self.waypoints.len()
+    }
+
+    pub fn restart(&mut self) {
+        self.index = 0;
+        self.announced = false;
+        (self.elapsed_s, self.dwelt_s) = (0.0, 0.0);
+    }
+}

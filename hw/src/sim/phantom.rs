@@ -1,0 +1,242 @@
+//! A Phantom Premium 1.5 in the grip of a hand: inertia, dry friction, encoders, amplifiers.
+
+use nalgebra::{Unit, UnitQuaternion, Vector3};
+
+use crate::convert::quantise;
+use crate::device::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
+use crate::sim::hand::Hand;
+use crate::sim::path::HandPath;
+
+/// The dynamics advance in steps no longer than this, so that their error does not show at the tick.
+const LONGEST_STEP_S: f64 = 5e-5;
+/// A late caller advances the simulated device by no more than this, so that a read stays short.
+const LONGEST_ADVANCE_S: f64 = 0.02;
+
+/// What a simulated device is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SimulatedPhantomConfig {
+    pub info: DeviceInfo,
+    /// What the device weighs at its tip.
+    pub apparent_mass_kg: f64,
+    /// Dry friction of its joints, felt at the tip.
+    pub coulomb_friction_n: f64,
+    pub hand: Hand,
+    pub start_tip_in_world: Vector3<f64>,
+    pub start_direction: Vector3<f64>,
+    pub turn_rate_rad_per_s: f64,
+    /// Lower and upper corner that the tip cannot leave.
+    pub workspace_m: Option<(Vector3<f64>, Vector3<f64>)>,
+}
+
+impl Default for SimulatedPhantomConfig {
+    fn default() -> Self {
+        Self {
+            info: DeviceInfo {
+                name: "simulated Phantom Premium 1.5 6DOF",
+                simulated: true,
+                ..DeviceInfo::phantom_premium_1_5()
+            },
+            apparent_mass_kg: 0.075,
+            coulomb_friction_n: 0.04,
+            hand: Hand::steady(),
+            start_tip_in_world: Vector3::zeros(),
+            start_direction: Vector3::z(),
+            turn_rate_rad_per_s: 2.0,
+            workspace_m: None,
+        }
+    }
+}
+
+/// See the module. Reads advance it; what is written acts during the next read.
+#[derive(Debug, Clone)]
+pub struct SimulatedPhantom {
+    config: SimulatedPhantomConfig,
+    path: HandPath,
+    tip_in_world: Vector3<f64>,
+    velocity_m_per_s: Vector3<f64>,
+    push_n: Vector3<f64>,
+    world_from_tool: UnitQuaternion<f64>,
+    wrench: Wrench,
+    buttons: u32,
+    sequence: u64,
+}
+
+impl SimulatedPhantom {
+    pub fn new(config: SimulatedPhantomConfig) -> Self {
+        let direction = unit_or_z(&config.start_direction);
+        Self {
+            config,
+            path: HandPath::at(config.start_tip_in_world, direction),
+            tip_in_world: config.start_tip_in_world,
+            velocity_m_per_s: Vector3::zeros(),
+            push_n: Vector3::zeros(),
+            world_from_tool: turn(&Vector3::z(), &direction, core::f64::consts::PI),
+            wrench: Wrench::zero(),
+            buttons: 0,
+            sequence: 0,
+        }
+    }
+
+    /// Where the tip is before the encoders round it.
+    pub fn true_tip_in_world(&self) -> &Vector3<f64> {
+        &self.tip_in_world
+    }
+
+    pub fn true_velocity_m_per_s(&self) -> &Vector3<f64> {
+        &self.velocity_m_per_s
+    }
+
+    pub fn path(&self) -> &HandPath {
+        &self.path
+    }
+
+    /// The wrench that acts, after the amplifiers have had their say.
+    pub fn applied_wrench(&self) -> &Wrench {
+        &self.wrench
+    }
+
+    /// Kinetic energy of device and hand, and what the hand's spring holds.
+    pub fn energy_j(&self) -> f64 {
+        let lag_m = self.path.position_m() - self.tip_in_world;
+        0.5 * self.moving_mass_kg() * self.velocity_m_per_s.norm_squared()
+            + 0.5 * self.config.hand.total_stiffness_n_per_m() * lag_m.norm_squared()
+    }
+
+    pub fn set_buttons(&mut self, buttons: u32) {
+        self.buttons = buttons;
+    }
+
+    fn moving_mass_kg(&self) -> f64 {
+        (self.config.apparent_mass_kg + self.config.hand.mass_kg).max(1e-3)
+    }
+
+    /// One step, implicit in spring, damper and friction: `(m + h b + h^2 k) v' = p` without friction, and
+    /// friction takes from the impulse `p` what it can, at most all of it. Stable at any stiffness.
+    fn advance(&mut self, h: f64) {
+        self.path.step(h);
+        let hand = &self.config.hand;
+        let (k, b) = (
+            hand.total_stiffness_n_per_m(),
+            hand.total_damping_n_s_per_m(),
+        );
+        let lag_m = self.path.position_m() - self.tip_in_world;
+        self.push_n = hand.push_n(&self.push_n, &lag_m, h);
+        let mass = self.moving_mass_kg();
+        let force_n =
+            self.wrench.force_n + self.push_n + lag_m * k + self.path.velocity_m_per_s() * b;
+        let impulse = self.velocity_m_per_s * mass + force_n * h;
+        let friction = self.config.coulomb_friction_n * h;
+        let size = impulse.norm();
+        self.velocity_m_per_s = if size <= friction {
+            Vector3::zeros()
+        } else {
+            impulse * ((size - friction) / size / (mass + h * b + h * h * k))
+        };
+        self.tip_in_world += self.velocity_m_per_s * h;
+        if let Some((lower, upper)) = self.config.workspace_m {
+            self.stop_at_walls(&lower, &upper);
+        }
+    }
+
+    fn stop_at_walls(&mut self, lower: &Vector3<f64>, upper: &Vector3<f64>) {
+        let inside = self.tip_in_world.sup(lower).inf(upper);
+        self.velocity_m_per_s
+            .zip_zip_apply(&self.tip_in_world, &inside, |v, at, allowed| {
+                if at != allowed {
+                    *v = 0.0;
+                }
+            });
+        self.tip_in_world = inside;
+    }
+
+    fn sample(&self) -> Sample {
+        Sample {
+            tip_in_world: quantise(&self.tip_in_world, self.config.info.position_step_m),
+            world_from_tool: self.world_from_tool,
+            buttons: self.buttons,
+            sequence: self.sequence,
+        }
+    }
+}
+
+impl Device for SimulatedPhantom {
+    fn info(&self) -> DeviceInfo {
+        self.config.info
+    }
+
+    fn read(&mut self, dt_s: f64) -> Result<Sample, DeviceFault> {
+        if !dt_s.is_finite() || dt_s < 0.0 {
+            return Err(DeviceFault::InvalidPeriod);
+        }
+        if dt_s > 0.0 {
+            let span_s = dt_s.min(LONGEST_ADVANCE_S);
+            let steps = (span_s / LONGEST_STEP_S - 1e-9).ceil().max(1.0);
+            for _ in 0..steps as u32 {
+                self.advance(span_s / steps);
+            }
+            let aim = unit_or_z(&self.path.goal().direction);
+            let step_rad = self.config.turn_rate_rad_per_s * span_s;
+            let axis = self.world_from_tool * Vector3::z();
+            self.world_from_tool = turn(&axis, &aim, step_rad) * self.world_from_tool;
+            self.world_from_tool.renormalize_fast();
+            self.sequence = self.sequence.wrapping_add(1);
+        }
+        let sample = self.sample();
+        if sample.is_finite() {
+            Ok(sample)
+        } else {
+            Err(DeviceFault::NonFiniteSample)
+        }
+    }
+
+    fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceFault> {
+        if !wrench.is_finite() {
+            self.wrench = Wrench::zero();
+            return Err(DeviceFault::NonFiniteWrench);
+        }
+        self.wrench = Wrench {
+            force_n: saturated(&wrench.force_n, self.config.info.peak_force_n),
+            torque_nm: saturated(&wrench.torque_nm, self.config.info.peak_torque_nm),
+        };
+        Ok(())
+    }
+
+    fn set_hand_goal(&mut self, goal: &HandGoal) {
+        self.path.set_goal(goal);
+    }
+}
+
+/// The same direction, no longer than `limit`. Finite also where the square of the length is not.
+fn saturated(v: &Vector3<f64>, limit: f64) -> Vector3<f64> {
+    let largest = v.amax();
+    if largest <= 0.0 {
+        return Vector3::zeros();
+    }
+    let scaled = v / largest;
+    let size = scaled.norm();
+    if size * largest <= limit {
+        *v
+    } else {
+        scaled * (limit / size)
+    }
+}
+
+fn unit_or_z(v: &Vector3<f64>) -> Vector3<f64> {
+    v.try_normalize(1e-9).unwrap_or_else(Vector3::z)
+}
+
+/// The rotation that takes `from` towards `to` (unit vectors) by at most `limit_rad`.
+fn turn(from: &Vector3<f64>, to: &Vector3<f64>, limit_rad: f64) -> UnitQuaternion<f64> {
+    let normal = from.cross(to);
+    let angle = normal.norm().atan2(from.dot(to));
+    let axis = Unit::try_new(normal, 1e-12).unwrap_or_else(|| {
+        // Parallel: nothing to turn. Opposite: any axis across the needle will do.
+        let helper = if from.x.abs() < 0.7 {
+            Vector3::x()
+        } else {
+            Vector3::y()
+        };
+        Unit::new_normalize(from.cross(&helper))
+    });
+    UnitQuaternion::from_axis_angle(&axis, angle.min(limit_rad))
+}

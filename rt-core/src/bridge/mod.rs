@@ -1,0 +1,548 @@
+//! The normal-priority thread that owns every port: hosts come and go here, and the loops do not notice.
+
+pub mod ports;
+mod requests;
+mod snapshots;
+
+use crate::active::activate;
+use crate::rt::clock;
+use crate::rt::exchange::*;
+use crate::rt::world::World;
+use crate::scene::{Labels, Scene, surface_elements};
+use iceoryx2::node::Node;
+use ports::Ports;
+use requests::Request;
+pub use snapshots::SnapshotLoans;
+use std::collections::HashMap;
+use std::sync::mpsc;
+use std::time::Duration;
+use stylet_hw::DeviceInfo;
+use stylet_shm_schema::service::{Ipc, MAX_BATCH, ServiceError};
+use stylet_shm_schema::*;
+
+const PASS: Duration = Duration::from_millis(2);
+const ANNOUNCE_NS: u64 = 200_000_000;
+const CLEAN_UP_NS: u64 = 1_000_000_000;
+const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+
+/// Ends of the rings to and from both loops.
+pub struct LoopPorts {
+    pub records: rtrb::Consumer<TickRecord>,
+    pub haptic_orders: rtrb::Producer<HapticOrder>,
+    pub haptic_notices: rtrb::Consumer<Notice>,
+    pub tissue_orders: rtrb::Producer<TissueOrder>,
+    pub tissue_notices: rtrb::Consumer<Notice>,
+    pub old_worlds: rtrb::Consumer<Box<World>>,
+    pub loans: SnapshotLoans,
+}
+
+/// A scene that a loader thread has built, or why it could not.
+struct Loaded {
+    ticket: Ticket,
+    name: String,
+    patient_from_scene: [f64; 12],
+    scene: Result<Box<Scene>, String>,
+}
+
+/// What hosts need to draw a scene.
+struct ScenePicture {
+    header: SceneHeader,
+    words: Vec<u32>,
+}
+
+/// Everything that the bridge thread owns.
+pub struct Bridge {
+    node: Node<Ipc>,
+    ports: Ports,
+    loops: LoopPorts,
+    device: DeviceInfo,
+    session: Session,
+    parameters: ParametersInForce,
+    plan: PlanInForce,
+    /// The scene that runs, and the one handed to the tissue loop but not yet taken up.
+    picture: ScenePicture,
+    coming: Option<ScenePicture>,
+    /// Who waits for what: host and command behind each ticket.
+    waiting: HashMap<Ticket, (u64, u64)>,
+    waiting_parameters: HashMap<u64, ParameterSet>,
+    tickets: Ticket,
+    events: u64,
+    loading: bool,
+    loaded: (mpsc::Sender<Loaded>, mpsc::Receiver<Loaded>),
+    announced_ns: u64,
+    cleaned_ns: u64,
+    batch: Vec<TickRecord>,
+}
+
+impl Bridge {
+    pub fn new(
+        node: Node<Ipc>,
+        ports: Ports,
+        loops: LoopPorts,
+        device: DeviceInfo,
+        session: Session,
+        scene: &Scene,
+    ) -> Self {
+        let picture = picture(scene, &session, 1, IDENTITY);
+        let mut plan: PlanInForce = bytemuck::Zeroable::zeroed();
+        plan.session_id = session.session_id;
+        let parameters = ParametersInForce {
+            session_id: session.session_id,
+            generation: 1,
+            effective_tick: 0,
+            set: ParameterSet::default(),
+        };
+        let bridge = Self {
+            node,
+            ports,
+            loops,
+            device,
+            session,
+            parameters,
+            plan,
+            picture,
+            coming: None,
+            waiting: HashMap::new(),
+            waiting_parameters: HashMap::new(),
+            tickets: 0,
+            events: 0,
+            loading: false,
+            loaded: mpsc::channel(),
+            announced_ns: 0,
+            cleaned_ns: 0,
+            batch: Vec::with_capacity(MAX_BATCH),
+        };
+        bridge.send_scene();
+        let _ = bridge.ports.parameters.send_copy(bridge.parameters);
+        let _ = bridge.ports.plan.send_copy(bridge.plan);
+        bridge
+    }
+
+    /// Serves hosts until `stopped` or a host asks to end.
+    pub fn run(&mut self, stopped: impl Fn() -> bool) -> Result<(), ServiceError> {
+        while !stopped() {
+            if self.pass() {
+                return Ok(());
+            }
+            std::thread::sleep(PASS);
+        }
+        Ok(())
+    }
+
+    /// One pass; true when a host asked to end.
+    fn pass(&mut self) -> bool {
+        self.ports.update_connections();
+        self.announce();
+        let end = self.take_commands();
+        self.take_uploads();
+        self.take_loaded();
+        self.take_notices();
+        while self.loops.old_worlds.pop().is_ok() {}
+        self.send_records();
+        let (generation, vertices) = (
+            self.picture.header.generation,
+            self.picture.header.vertex_count as usize,
+        );
+        self.loops.loans.pass(&self.ports, generation, vertices);
+        end
+    }
+
+    fn announce(&mut self) {
+        let now_ns = clock::now_ns();
+        if now_ns - self.announced_ns >= ANNOUNCE_NS {
+            self.announced_ns = now_ns;
+            self.session.time_ns = now_ns;
+            let _ = self.ports.session.send_copy(self.session);
+        }
+        if now_ns - self.cleaned_ns >= CLEAN_UP_NS {
+            self.cleaned_ns = now_ns;
+            self.node.try_cleanup_dead_nodes();
+        }
+    }
+
+    fn send_records(&mut self) {
+        loop {
+            while self.batch.len() < MAX_BATCH
+                && let Ok(record) = self.loops.records.pop()
+            {
+                self.batch.push(record);
+            }
+            if self.batch.is_empty() {
+                return;
+            }
+            if let Ok(mut sample) = self.ports.records.loan_slice_uninit(self.batch.len()) {
+                *sample.user_header_mut() = self.session.session_id;
+                let _ = sample.write_from_slice(&self.batch).send();
+            }
+            self.batch.clear();
+        }
+    }
+
+    fn send_scene(&self) {
+        if let Ok(mut sample) = self.ports.scene.loan_slice_uninit(self.picture.words.len()) {
+            *sample.user_header_mut() = self.picture.header;
+            let _ = sample.write_from_slice(&self.picture.words).send();
+        }
+    }
+
+    fn ticket(&mut self, host: u64, command: u64) -> Ticket {
+        self.tickets += 1;
+        self.waiting.insert(self.tickets, (host, command));
+        self.tickets
+    }
+
+    fn reply(&self, (host_id, command_id): (u64, u64), refused: Option<&str>, effective_tick: u64) {
+        let status = if refused.is_some() {
+            ReplyStatus::Refused
+        } else {
+            ReplyStatus::Accepted
+        };
+        let _ = self.ports.replies.send_copy(Reply {
+            session_id: self.session.session_id,
+            host_id,
+            command_id,
+            effective_tick,
+            status: status as u32,
+            reserved: 0,
+            text: Text::new(refused.unwrap_or("")),
+        });
+    }
+
+    fn answer(&mut self, ticket: Ticket, refused: Option<&str>, tick: u64) {
+        if let Some(who) = self.waiting.remove(&ticket) {
+            self.reply(who, refused, tick);
+        }
+    }
+
+    fn take_commands(&mut self) -> bool {
+        while let Ok(Some(sample)) = self.ports.commands.receive() {
+            let command = *sample.payload();
+            drop(sample);
+            let who = (command.host_id, command.command_id);
+            match requests::read(&command, &self.parameters.set, &self.device) {
+                Ok(Request::Shutdown) => {
+                    self.reply(who, None, 0);
+                    return true;
+                }
+                Ok(request) => self.carry_out(request, who),
+                Err(why) => {
+                    self.event(EventKind::RubbishRefused, 0, 0.0, [0.0; 3], (0, clock::now_ns()), &why);
+                    self.reply(who, Some(&why), 0);
+                }
+            }
+        }
+        false
+    }
+
+    fn carry_out(&mut self, request: Request, who: (u64, u64)) {
+        let ticket = self.ticket(who.0, who.1);
+        let taken = match request {
+            Request::Parameters(set, active) => {
+                let generation = self.parameters.generation + 1 + self.waiting_parameters.len() as u64;
+                self.waiting_parameters.insert(generation, set);
+                let order = HapticOrder::Parameters {
+                    ticket,
+                    generation,
+                    needle: active.needle,
+                    force: active.force,
+                };
+                self.loops
+                    .tissue_orders
+                    .push(TissueOrder::Limits(active.limits))
+                    .is_ok()
+                    && self.loops.haptic_orders.push(order).is_ok()
+            }
+            Request::Plan(plan) => {
+                let generation = self.plan.generation + 1;
+                let empty = plan.generation == 0;
+                self.plan = *plan;
+                self.plan.generation = if empty { 0 } else { generation };
+                self.plan.session_id = self.session.session_id;
+                self.plan.scene_generation = self.picture.header.generation;
+                let _ = self.ports.plan.send_copy(self.plan);
+                self.answer(ticket, None, 0);
+                true
+            }
+            Request::Haptic(order) => self.loops.haptic_orders.push(order(ticket)).is_ok(),
+            Request::Hand(goal) => self
+                .loops
+                .haptic_orders
+                .push(HapticOrder::Hand { ticket, goal })
+                .is_ok(),
+            Request::Tissue(order) => self.loops.tissue_orders.push(order(ticket)).is_ok(),
+            Request::Reset => {
+                self.event(EventKind::Reset, 0, 0.0, [0.0; 3], (0, clock::now_ns()), "");
+                self.loops.tissue_orders.push(TissueOrder::Reset).is_ok()
+                    && self.loops.haptic_orders.push(HapticOrder::Reset { ticket }).is_ok()
+            }
+            Request::BuiltinScene => {
+                self.load(ticket, "paper".to_owned(), IDENTITY, || {
+                    Scene::builtin("paper").map_err(|e| e.to_string())
+                });
+                true
+            }
+            Request::Shutdown => true,
+        };
+        if !taken {
+            self.answer(ticket, Some("too many requests at once; send fewer"), 0);
+        }
+    }
+
+    fn take_uploads(&mut self) {
+        while let Ok(Some(sample)) = self.ports.uploads.receive() {
+            let header = *sample.user_header();
+            let who = (header.host_id, header.command_id);
+            let name = header.name.read();
+            if let Err(why) = check_upload(&header, sample.payload().len()) {
+                self.event(EventKind::RubbishRefused, 0, 0.0, [0.0; 3], (0, clock::now_ns()), &why);
+                self.reply(who, Some(&why), 0);
+                continue;
+            }
+            let labels = Labels {
+                dims: header.dims.map(|d| d as usize),
+                spacing_m: header.spacing_m,
+                cells: sample.payload().to_vec(),
+            };
+            drop(sample);
+            let ticket = self.ticket(who.0, who.1);
+            self.load(ticket, name.clone(), header.patient_from_scene, move || {
+                Scene::from_labels(&name, &labels)
+                    .map_err(|problems| problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))
+            });
+        }
+    }
+
+    /// Builds a scene beside the bridge; the running one goes on until it is ready.
+    fn load(
+        &mut self,
+        ticket: Ticket,
+        name: String,
+        patient_from_scene: [f64; 12],
+        build: impl FnOnce() -> Result<Scene, String> + Send + 'static,
+    ) {
+        if self.loading || self.coming.is_some() {
+            self.answer(ticket, Some("another scene is being loaded; wait until it is ready"), 0);
+            return;
+        }
+        self.loading = true;
+        let sender = self.loaded.0.clone();
+        let built = std::thread::Builder::new()
+            .name("scene-loader".to_owned())
+            .spawn(move || {
+                let scene = build().map(Box::new);
+                let _ = sender.send(Loaded {
+                    ticket,
+                    name,
+                    patient_from_scene,
+                    scene,
+                });
+            });
+        if built.is_err() {
+            self.loading = false;
+            self.answer(ticket, Some("no thread could be started to load the scene"), 0);
+        }
+    }
+
+    fn take_loaded(&mut self) {
+        let Ok(loaded) = self.loaded.1.try_recv() else { return };
+        self.loading = false;
+        let scene = match loaded.scene {
+            Ok(scene) => scene,
+            Err(why) => return self.answer(loaded.ticket, Some(&why), 0),
+        };
+        let limits = match activate(&self.parameters.set, &self.device) {
+            Ok(active) => active.limits,
+            Err(why) => return self.answer(loaded.ticket, Some(&why.join("\n")), 0),
+        };
+        let generation = self.picture.header.generation + 1;
+        let mut picture = picture(&scene, &self.session, generation, loaded.patient_from_scene);
+        picture.header.name = Text::new(&loaded.name);
+        let world = Box::new(World::new(*scene, limits, generation));
+        if self
+            .loops
+            .tissue_orders
+            .push(TissueOrder::World {
+                ticket: loaded.ticket,
+                world,
+            })
+            .is_err()
+        {
+            return self.answer(
+                loaded.ticket,
+                Some("too many requests at once; load the scene again"),
+                0,
+            );
+        }
+        self.coming = Some(picture);
+    }
+
+    fn take_notices(&mut self) {
+        while let Ok(notice) = self.loops.haptic_notices.pop() {
+            self.take_notice(notice);
+        }
+        while let Ok(notice) = self.loops.tissue_notices.pop() {
+            self.take_notice(notice);
+        }
+    }
+
+    fn take_notice(&mut self, notice: Notice) {
+        match notice {
+            Notice::Done { ticket, tick } => self.answer(ticket, None, tick),
+            Notice::Refused { ticket, why } => self.answer(ticket, Some(why.message()), 0),
+            Notice::ParametersActive {
+                ticket,
+                generation,
+                tick,
+            } => {
+                if let Some(set) = self.waiting_parameters.remove(&generation) {
+                    self.parameters = ParametersInForce {
+                        session_id: self.session.session_id,
+                        generation,
+                        effective_tick: tick,
+                        set,
+                    };
+                    let _ = self.ports.parameters.send_copy(self.parameters);
+                }
+                self.answer(ticket, None, tick);
+            }
+            Notice::WorldSwapped {
+                ticket,
+                generation,
+                tick,
+            } => {
+                if let Some(picture) = self.coming.take() {
+                    self.picture = picture;
+                    self.plan = bytemuck::Zeroable::zeroed();
+                    self.plan.session_id = self.session.session_id;
+                    self.send_scene();
+                    let _ = self.ports.plan.send_copy(self.plan);
+                }
+                let name = self.picture.header.name.read();
+                self.event(
+                    EventKind::SceneLoaded,
+                    generation as u32,
+                    0.0,
+                    [0.0; 3],
+                    (tick, clock::now_ns()),
+                    &name,
+                );
+                self.answer(ticket, None, tick);
+            }
+            Notice::Contact {
+                tick,
+                time_ns,
+                position_m,
+            } => {
+                self.event(EventKind::Contact, 0, 0.0, position_m.into(), (tick, time_ns), "");
+            }
+            Notice::Puncture {
+                tick,
+                time_ns,
+                depth_m,
+                position_m,
+            } => {
+                self.event(EventKind::Puncture, 0, depth_m, position_m.into(), (tick, time_ns), "");
+            }
+            Notice::LeftTissue { tick, time_ns } => {
+                self.event(EventKind::LeftTissue, 0, 0.0, [0.0; 3], (tick, time_ns), "");
+            }
+            Notice::Seed {
+                tick,
+                time_ns,
+                index,
+                position_m,
+            } => {
+                self.event(
+                    EventKind::SeedDropped,
+                    index,
+                    0.0,
+                    position_m.into(),
+                    (tick, time_ns),
+                    "",
+                );
+            }
+            Notice::Fault { tick, time_ns, fault } => {
+                self.event(
+                    EventKind::FaultRaised,
+                    fault as u32,
+                    0.0,
+                    [0.0; 3],
+                    (tick, time_ns),
+                    fault.message(),
+                );
+            }
+            Notice::Rearmed { tick, time_ns } => {
+                self.event(EventKind::Rearmed, 0, 0.0, [0.0; 3], (tick, time_ns), "");
+            }
+        }
+    }
+
+    fn event(
+        &mut self,
+        kind: EventKind,
+        code: u32,
+        value: f64,
+        position_m: [f64; 3],
+        (tick, time_ns): (u64, u64),
+        text: &str,
+    ) {
+        self.events += 1;
+        let _ = self.ports.events.send_copy(Event {
+            session_id: self.session.session_id,
+            sequence: self.events,
+            time_ns,
+            tick,
+            kind: kind as u32,
+            code,
+            value,
+            position_m,
+            text: Text::new(text),
+        });
+    }
+}
+
+/// Everything that can be wrong with the header of an upload; the labels themselves are checked by the scene.
+fn check_upload(header: &UploadHeader, cells: usize) -> Result<(), String> {
+    let said = header.dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(u64::from(d)));
+    if said != Some(cells as u64) {
+        return Err(format!("the volume says {:?} cells but {cells} came", header.dims));
+    }
+    if !header
+        .patient_from_scene
+        .iter()
+        .all(|v| v.abs() <= check::MAX_COORDINATE_M)
+    {
+        return Err("the transform to the patient is not finite or farther than 20 m".to_owned());
+    }
+    Ok(())
+}
+
+fn picture(scene: &Scene, session: &Session, generation: u64, patient_from_scene: [f64; 12]) -> ScenePicture {
+    let lattice = &scene.lattice;
+    let (lower_m, upper_m) = lattice.bounds_m();
+    let vertices = &scene.surface.vertex_elements;
+    let positions = vertices
+        .iter()
+        .flat_map(|&e| lattice.rest_m(e))
+        .map(|c| (c as f32).to_bits());
+    let indices = scene.surface.triangles.iter().flatten().copied();
+    ScenePicture {
+        words: positions.chain(indices).collect(),
+        header: SceneHeader {
+            session_id: session.session_id,
+            generation,
+            dims: lattice.dims.map(|d| d as u32),
+            element_count: lattice.element_count() as u32,
+            surface_element_count: surface_elements(lattice).len() as u32,
+            vertex_count: vertices.len() as u32,
+            triangle_count: scene.surface.triangles.len() as u32,
+            reserved: 0,
+            spacing_m: lattice.spacing_m,
+            volume_m3: lattice.volume_m3(),
+            lower_m,
+            upper_m,
+            patient_from_scene,
+            name: Text::new(&scene.name),
+        },
+    }
+}

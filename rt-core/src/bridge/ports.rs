@@ -1,0 +1,82 @@
+//! Every port that makes connections; created and used by the bridge thread alone.
+
+use iceoryx2::node::Node;
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
+use stylet_shm_schema::service::{self, Ipc, MAX_BATCH, SNAPSHOTS_AHEAD, ServiceError};
+use stylet_shm_schema::*;
+
+pub struct Ports {
+    pub session: Publisher<Ipc, Session, ()>,
+    pub events: Publisher<Ipc, Event, ()>,
+    pub parameters: Publisher<Ipc, ParametersInForce, ()>,
+    pub plan: Publisher<Ipc, PlanInForce, ()>,
+    pub replies: Publisher<Ipc, Reply, ()>,
+    pub records: Publisher<Ipc, [TickRecord], u64>,
+    pub snapshots: Publisher<Ipc, [Vertex], SnapshotHeader>,
+    pub scene: Publisher<Ipc, [u32], SceneHeader>,
+    pub commands: Subscriber<Ipc, Command, ()>,
+    pub uploads: Subscriber<Ipc, [u8], UploadHeader>,
+}
+
+fn failed(why: impl std::fmt::Debug) -> ServiceError {
+    ServiceError(format!(
+        "cannot use shared memory: {why:?}. Is another rt-core running under this instance name? Choose another with --instance"
+    ))
+}
+
+macro_rules! publisher {
+    ($factory:expr) => {
+        $factory?
+            .publisher_builder()
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .create()
+            .map_err(failed)?
+    };
+    ($factory:expr, slices of $length:expr, loans $loans:expr) => {
+        $factory?
+            .publisher_builder()
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .allocation_strategy(AllocationStrategy::PowerOfTwo)
+            .initial_max_slice_len($length)
+            .max_loaned_samples($loans)
+            .create()
+            .map_err(failed)?
+    };
+}
+
+impl Ports {
+    pub fn new(node: &Node<Ipc>, vertex_count: usize) -> Result<Self, ServiceError> {
+        Ok(Self {
+            session: publisher!(service::session(node)),
+            events: publisher!(service::events(node)),
+            parameters: publisher!(service::parameters(node)),
+            plan: publisher!(service::plan(node)),
+            replies: publisher!(service::replies(node)),
+            records: publisher!(service::records(node), slices of MAX_BATCH, loans 2),
+            snapshots: publisher!(service::snapshots(node), slices of vertex_count, loans 2 * SNAPSHOTS_AHEAD),
+            scene: publisher!(service::scene(node), slices of 16 * vertex_count, loans 2),
+            commands: service::commands(node)?
+                .subscriber_builder()
+                .buffer_size(64)
+                .create()
+                .map_err(failed)?,
+            uploads: service::uploads(node)?.subscriber_builder().create().map_err(failed)?,
+        })
+    }
+
+    /// Meets hosts that came, forgets those that went.
+    pub fn update_connections(&self) {
+        // A host that cannot be met now is met at the next pass.
+        let _ = self.session.update_connections();
+        let _ = self.events.update_connections();
+        let _ = self.parameters.update_connections();
+        let _ = self.plan.update_connections();
+        let _ = self.replies.update_connections();
+        let _ = self.records.update_connections();
+        let _ = self.snapshots.update_connections();
+        let _ = self.scene.update_connections();
+    }
+}

@@ -1,0 +1,66 @@
+//! Slices of shared memory loaned ahead, filled by the tissue thread, sent from here: no copy, no port in the loop.
+
+use crate::bridge::ports::Ports;
+use crate::rt::exchange::{SnapshotReturn, SnapshotSlot};
+use iceoryx2::sample_mut::SampleMut;
+use stylet_shm_schema::service::{Ipc, SNAPSHOTS_AHEAD};
+use stylet_shm_schema::{SnapshotHeader, Vertex};
+
+type Loan = SampleMut<Ipc, [Vertex], SnapshotHeader>;
+
+/// The loans that are out, by the index that their slot carries.
+pub struct SnapshotLoans {
+    out: [Option<Loan>; 2 * SNAPSHOTS_AHEAD],
+    slots: rtrb::Producer<SnapshotSlot>,
+    filled: rtrb::Consumer<SnapshotReturn>,
+}
+
+impl SnapshotLoans {
+    pub fn new(slots: rtrb::Producer<SnapshotSlot>, filled: rtrb::Consumer<SnapshotReturn>) -> Self {
+        Self {
+            out: std::array::from_fn(|_| None),
+            slots,
+            filled,
+        }
+    }
+
+    /// Sends what came back filled, then loans anew for the scene that runs.
+    pub fn pass(&mut self, ports: &Ports, scene_generation: u64, vertex_count: usize) {
+        while let Ok(back) = self.filled.pop() {
+            let loan = self.out.get_mut(back.index as usize).and_then(Option::take);
+            if let (Some(loan), true) = (loan, back.filled) {
+                // A send that fails reaches nobody; the next snapshot is 5 ms away.
+                let _ = loan.send();
+            }
+        }
+        while self.out.iter().flatten().count() < SNAPSHOTS_AHEAD {
+            if !self.loan(ports, scene_generation, vertex_count) {
+                return;
+            }
+        }
+    }
+
+    fn loan(&mut self, ports: &Ports, scene_generation: u64, vertex_count: usize) -> bool {
+        let Some(index) = self.out.iter().position(Option::is_none) else {
+            return false;
+        };
+        let Ok(mut loan) = ports.snapshots.loan_slice(vertex_count) else {
+            return false;
+        };
+        let header: *mut SnapshotHeader = loan.user_header_mut();
+        let vertices = loan.payload_mut().as_mut_ptr();
+        let slot = SnapshotSlot {
+            index: index as u32,
+            scene_generation,
+            header,
+            vertices,
+            vertex_count,
+        };
+        self.out[index] = Some(loan);
+        if self.slots.push(slot).is_err() {
+            self.out[index] = None;
+            return false;
+        }
+        true
+    }
+}

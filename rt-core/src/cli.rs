@@ -1,0 +1,87 @@
+//! The command line of `rt-core`.
+
+use crate::core::Options;
+use clap::Parser;
+use stylet_shm_schema::service::Instance;
+
+/// Real-time process of Stylet: owns the haptic device, the 1 kHz force loop and the 200 Hz tissue step.
+///
+/// Start it first; any number of `host-ui` windows may come and go. It asks for SCHED_FIFO and locked memory and
+/// refuses to run without them, unless told --no-rt.
+#[derive(Parser, Debug)]
+#[command(name = "rt-core", version)]
+pub struct Cli {
+    /// Name under which hosts find this process; letters, digits and '-'
+    #[arg(long, default_value = "main")]
+    instance: String,
+    /// Built-in scene to start with
+    #[arg(long, default_value = "paper")]
+    scene: String,
+    /// Run without real-time scheduling; every record and screen then says so
+    #[arg(long)]
+    no_rt: bool,
+    /// Try real time first and go on without it when the rights are missing
+    #[arg(long, conflicts_with = "no_rt")]
+    rt_if_allowed: bool,
+    /// Core of the force loop [default: the last one]
+    #[arg(long, value_name = "N")]
+    haptic_core: Option<usize>,
+    /// Core of the tissue step [default: the one before]
+    #[arg(long, value_name = "N")]
+    tissue_core: Option<usize>,
+    /// SCHED_FIFO priority of the force loop
+    #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u32).range(1..=98), value_name = "1-98")]
+    haptic_priority: u32,
+    /// SCHED_FIFO priority of the tissue step
+    #[arg(long, default_value_t = 70, value_parser = clap::value_parser!(u32).range(1..=98), value_name = "1-98")]
+    tissue_priority: u32,
+    /// End when the program that started this one ends, however it ends
+    #[arg(long)]
+    pub exit_with_parent: bool,
+    /// On exit write what each loop cost to FILE, as JSON
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<std::path::PathBuf>,
+}
+
+impl Cli {
+    /// Lists what is wrong with the settings.
+    pub fn options(&self) -> Result<Options, String> {
+        let cores: Vec<usize> = core_affinity::get_core_ids()
+            .unwrap_or_default()
+            .iter()
+            .map(|c| c.id)
+            .collect();
+        let mut problems = Vec::new();
+        for (option, core) in [("--haptic-core", self.haptic_core), ("--tissue-core", self.tissue_core)] {
+            if let Some(core) = core.filter(|c| !cores.contains(c)) {
+                problems.push(format!("{option} {core}: this process may use cores {cores:?}"));
+            }
+        }
+        let instance = Instance::new(&self.instance).map_err(|e| problems.push(e.to_string()));
+        match instance {
+            Ok(instance) if problems.is_empty() => Ok(Options {
+                instance,
+                scene: self.scene.clone(),
+                no_rt: self.no_rt || (self.rt_if_allowed && !may_be_real_time()),
+                haptic_core: self.haptic_core.or(cores.last().copied()),
+                tissue_core: self.tissue_core.or(cores.iter().rev().nth(1).or(cores.last()).copied()),
+                haptic_priority: self.haptic_priority,
+                tissue_priority: self.tissue_priority,
+            }),
+            _ => Err(problems.join("\n")),
+        }
+    }
+}
+
+/// Tries it in a thread of its own, which then ends.
+fn may_be_real_time() -> bool {
+    let ask = crate::rt::arm::Ask {
+        priority: Some(1),
+        core: None,
+    };
+    let fifo = std::thread::spawn(move || crate::rt::arm::arm(ask).is_ok())
+        .join()
+        .unwrap_or(false);
+    // SAFETY: both calls have no preconditions; what is locked now is unlocked again.
+    fifo && unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0 && libc::munlockall() == 0 }
+}

@@ -1,0 +1,93 @@
+//! `rt-core`: the real-time process.
+
+use clap::Parser;
+use rt_core::cli::Cli;
+use rt_core::core::{LoopReport, RunReport};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match start(&cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(why) => {
+            eprintln!("rt-core: {why}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn start(cli: &Cli) -> Result<(), String> {
+    abort_on_panic();
+    if cli.exit_with_parent {
+        follow_parent();
+    }
+    let options = cli.options()?;
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [
+        signal_hook::consts::SIGINT,
+        signal_hook::consts::SIGTERM,
+        signal_hook::consts::SIGHUP,
+    ] {
+        signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(|e| format!("signal handler: {e}"))?;
+    }
+    eprintln!(
+        "rt-core: instance '{}', scene '{}', {}",
+        options.instance.name(),
+        options.scene,
+        if options.no_rt { "NOT real-time" } else { "real-time" }
+    );
+    let report = rt_core::core::run(&options, &stop)?;
+    if let Some(path) = &cli.report {
+        std::fs::write(path, to_json(&report)).map_err(|e| format!("cannot write {}: {e}", path.display()))?;
+    }
+    Ok(())
+}
+
+/// A panic in any thread ends the process, and with it the force.
+fn abort_on_panic() {
+    let print = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        print(info);
+        std::process::abort();
+    }));
+}
+
+/// The kernel sends SIGTERM when the parent dies, even by SIGKILL.
+fn follow_parent() {
+    // SAFETY: PR_SET_PDEATHSIG takes a signal number; getppid has no preconditions.
+    let orphan = unsafe {
+        libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGTERM);
+        libc::getppid() == 1
+    };
+    if orphan {
+        std::process::exit(0);
+    }
+}
+
+fn to_json(report: &RunReport) -> String {
+    let one = |r: &LoopReport| {
+        format!(
+            "{{\"policy\": {}, \"priority\": {}, \"core\": {}, \"ticks\": {}, \"missed_deadlines\": {}, \
+             \"worst_wake_us\": {:.1}, \"heap_calls\": {}, \"minor_faults\": {}, \"major_faults\": {}, \
+             \"voluntary_switches\": {}, \"involuntary_switches\": {}}}",
+            r.thread.policy,
+            r.thread.priority,
+            r.thread.core,
+            r.ticks,
+            r.missed,
+            r.worst_wake_ns as f64 / 1e3,
+            r.usage.heap_calls,
+            r.usage.minor_faults,
+            r.usage.major_faults,
+            r.usage.voluntary_switches,
+            r.usage.involuntary_switches
+        )
+    };
+    format!(
+        "{{\n  \"haptic\": {},\n  \"tissue\": {}\n}}\n",
+        one(&report.haptic),
+        one(&report.tissue)
+    )
+}

@@ -1,0 +1,454 @@
+//! The haptic tick, 1 kHz: read → velocity → needle → force law → passivity → gate → write → pose → record.
+
+use crate::force::{
+    ForceFault, ForceInput, ForceParameters, ForceState, ForceTerms, GateState, PassivityParameters, PassivityState,
+    VelocityEstimator, force, gate, passivity,
+};
+use crate::needle::{self, NeedleInput, NeedleParameters, NeedleState, Phase};
+use crate::rt::arm::Armed;
+use crate::rt::clock::{self, Grid};
+use crate::rt::exchange::*;
+use iceoryx2::port::writer::EntryHandleMut;
+use nalgebra::Vector3;
+use std::sync::atomic::{AtomicBool, Ordering};
+use stylet_hw::{Device, DeviceInfo, HandGoal, Sample, Wrench};
+use stylet_shm_schema::service::Ipc;
+use stylet_shm_schema::{Fault, HapticState, TickRecord, flags};
+
+/// The blackboard entry; made and used by the haptic thread alone.
+pub type StateEntry = EntryHandleMut<Ipc, u64, HapticState>;
+
+/// Tissue older than this turns the force off.
+pub const STALE_TISSUE_NS: u64 = 100_000_000;
+/// So many ticks in a row with a missed deadline turn the force off.
+pub const OVERRUN_STREAK: u32 = 20;
+/// So many repeated samples in a row turn the force off.
+pub const SILENT_SAMPLES: u32 = 20;
+/// The hand is at its goal within this distance, at rest.
+const AT_GOAL_M: f64 = 4e-4;
+const AT_REST_M_PER_S: f64 = 3e-3;
+
+/// Ends of the rings that this loop owns.
+pub struct HapticPorts {
+    pub pose: triple_buffer::Input<TipPose>,
+    pub response: triple_buffer::Output<TissueResponse>,
+    pub orders: rtrb::Consumer<HapticOrder>,
+    pub notices: rtrb::Producer<Notice>,
+    pub records: RecordRing,
+}
+
+/// Everything that the haptic thread owns.
+pub struct HapticLoop {
+    session_id: u64,
+    device: Box<dyn Device>,
+    info: DeviceInfo,
+    ports: HapticPorts,
+    needle: NeedleParameters,
+    force: ForceParameters,
+    passivity: PassivityParameters,
+    estimator: VelocityEstimator,
+    needle_state: NeedleState,
+    force_state: ForceState,
+    passivity_state: PassivityState,
+    gate: GateState,
+    sample: Option<Sample>,
+    contact: u64,
+    pose: TipPose,
+    goal: Option<HandGoal>,
+    fault: Fault,
+    silent: u32,
+    streak: u32,
+    /// What hosts see; also holds the counters.
+    pub state: HapticState,
+    period_s: f64,
+}
+
+/// One tick's way from sample to force.
+struct Response {
+    phase: Phase,
+    depth_m: f64,
+    speed_m_per_s: f64,
+    terms: ForceTerms,
+    axis: Vector3<f64>,
+}
+
+impl HapticLoop {
+    pub fn new(
+        session_id: u64,
+        device: Box<dyn Device>,
+        ports: HapticPorts,
+        (needle, force): (NeedleParameters, ForceParameters),
+        period_s: f64,
+        base_flags: u32,
+    ) -> Self {
+        let info = device.info();
+        let mut state: HapticState = bytemuck::Zeroable::zeroed();
+        state.flags = base_flags | if info.simulated { flags::SIMULATED_DEVICE } else { 0 };
+        state.device_limit_n = info.peak_force_n;
+        state.parameters_generation = 1;
+        Self {
+            session_id,
+            info,
+            device,
+            ports,
+            needle,
+            force,
+            passivity: PassivityParameters::default(),
+            estimator: VelocityEstimator::new(info.position_step_m),
+            needle_state: NeedleState::default(),
+            force_state: ForceState::default(),
+            passivity_state: PassivityState::default(),
+            gate: GateState::default(),
+            sample: None,
+            contact: 0,
+            pose: TipPose::default(),
+            goal: None,
+            fault: Fault::None,
+            silent: 0,
+            streak: 0,
+            state,
+            period_s,
+        }
+    }
+
+    /// Runs on the ideal grid until `stop`, then ramps the force to zero and leaves.
+    pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool, mut publish: impl FnMut(&HapticState)) {
+        let mut grid = Grid::from(clock::now_ns(), (self.period_s * 1e9) as u64);
+        let mut missed = 0;
+        let mut last_ticks = self.force.gate.ramp_out_ticks + 1;
+        while last_ticks > 0 {
+            // SYNC: pairs with the bridge's release store; nothing but the flag is carried.
+            if stop.load(Ordering::Acquire) {
+                self.gate.release();
+                last_ticks -= 1;
+            }
+            clock::sleep_until(grid.due_ns);
+            let woke_ns = clock::now_ns();
+            self.tick(grid.due_ns, woke_ns, missed);
+            publish(&self.state);
+            missed = grid.advance(clock::now_ns());
+        }
+        let _ = self.device.write(&Wrench::zero());
+    }
+
+    /// One tick; in the order of the data.
+    pub fn tick(&mut self, due_ns: u64, woke_ns: u64, missed: u32) {
+        self.take_orders();
+        let sample = self.read();
+        let tissue = *self.ports.response.read();
+        self.watch(woke_ns, missed, &tissue);
+        let response = self.respond(&sample, &tissue);
+        let force_n = self.guard(&sample, &response);
+        let wrench = Wrench::from_force(force_n);
+        if self.device.write(&wrench).is_err() {
+            self.raise(Fault::DeviceError, ForceFault::DeviceFault);
+        }
+        let written_ns = clock::now_ns();
+        self.hand_over_pose(woke_ns, &sample, &response);
+        self.record(due_ns, [woke_ns, written_ns], missed, &tissue, &response, force_n);
+    }
+
+    fn notify(&mut self, notice: Notice) {
+        // A full ring means that the bridge is gone; there is nobody to tell.
+        let _ = self.ports.notices.push(notice);
+    }
+
+    fn take_orders(&mut self) {
+        while let Ok(order) = self.ports.orders.pop() {
+            let tick = self.state.tick + 1;
+            match order {
+                HapticOrder::Parameters {
+                    ticket,
+                    generation,
+                    needle,
+                    force,
+                } => {
+                    (self.needle, self.force) = (needle, force);
+                    self.state.parameters_generation = generation;
+                    self.notify(Notice::ParametersActive {
+                        ticket,
+                        generation,
+                        tick,
+                    });
+                }
+                HapticOrder::Hand { ticket, goal } if goal.is_valid() => {
+                    self.device.set_hand_goal(&goal);
+                    self.goal = Some(goal);
+                    self.notify(Notice::Done { ticket, tick });
+                }
+                HapticOrder::Hand { ticket, .. } => self.notify(Notice::Refused {
+                    ticket,
+                    why: Refusal::BadGoal,
+                }),
+                HapticOrder::Engage { ticket } => self.engage(ticket, tick),
+                HapticOrder::Disengage { ticket } => {
+                    self.gate.release();
+                    self.notify(Notice::Done { ticket, tick });
+                }
+                HapticOrder::Reset { ticket } => self.reset(ticket, tick),
+            }
+        }
+    }
+
+    fn engage(&mut self, ticket: Ticket, tick: u64) {
+        if self.fault != Fault::None {
+            self.fault = Fault::None;
+            (self.silent, self.streak) = (0, 0);
+            let time_ns = self.state.time_ns;
+            self.notify(Notice::Rearmed { tick, time_ns });
+        }
+        self.gate.engage();
+        self.notify(Notice::Done { ticket, tick });
+    }
+
+    fn reset(&mut self, ticket: Ticket, tick: u64) {
+        self.end_contact();
+        self.state.peak_force_n = 0.0;
+        self.state.missed_deadlines = 0;
+        self.state.worst_wake_ns = 0;
+        self.state.worst_work_ns = 0;
+        self.state.worst_residual = 0.0;
+        self.state.worst_tissue_work_ns = 0;
+        self.notify(Notice::Done { ticket, tick });
+    }
+
+    /// The newest sample; the last good one when the device has a fault.
+    fn read(&mut self) -> Sample {
+        let last = self.sample.unwrap_or(Sample {
+            tip_in_world: Vector3::zeros(),
+            world_from_tool: nalgebra::UnitQuaternion::identity(),
+            buttons: 0,
+            sequence: 0,
+        });
+        let sample = match self.device.read(self.period_s) {
+            Ok(sample) if sample.is_finite() => sample,
+            Ok(_) => {
+                self.raise(Fault::NonFiniteInput, ForceFault::DeviceFault);
+                last
+            }
+            Err(_) => {
+                self.raise(Fault::DeviceError, ForceFault::DeviceFault);
+                last
+            }
+        };
+        let repeated = self.sample.is_some_and(|s| s.sequence == sample.sequence);
+        self.silent = if repeated { self.silent + 1 } else { 0 };
+        if self.silent >= SILENT_SAMPLES {
+            self.raise(Fault::DeviceSilent, ForceFault::StaleDevice);
+        }
+        sample
+    }
+
+    fn raise(&mut self, fault: Fault, to_gate: ForceFault) {
+        self.gate.trip(to_gate);
+        if self.fault == Fault::None {
+            self.fault = fault;
+            let (tick, time_ns) = (self.state.tick + 1, self.state.time_ns);
+            self.notify(Notice::Fault { tick, time_ns, fault });
+        }
+    }
+
+    /// Watchdog over the other thread and over this one.
+    fn watch(&mut self, woke_ns: u64, missed: u32, tissue: &TissueResponse) {
+        self.streak = if missed > 0 { self.streak + 1 } else { 0 };
+        if !self.gate.engaged() {
+            return;
+        }
+        if woke_ns.saturating_sub(tissue.time_ns) > STALE_TISSUE_NS {
+            self.raise(Fault::TissueStale, ForceFault::StaleTissue);
+        } else if tissue.unsolved {
+            self.raise(Fault::TissueUnsolved, ForceFault::StaleTissue);
+        } else if self.streak >= OVERRUN_STREAK {
+            self.raise(Fault::OverrunStreak, ForceFault::Overrun);
+        }
+    }
+
+    fn end_contact(&mut self) {
+        self.pose.released_contact = self.contact;
+        self.needle_state = NeedleState::default();
+        self.force_state = ForceState::default();
+    }
+
+    /// Eq. 6-10 for this sample.
+    fn respond(&mut self, sample: &Sample, tissue: &TissueResponse) -> Response {
+        let velocity = self.estimator.update(&sample.tip_in_world, self.period_s);
+        let touching = tissue.contact > self.pose.released_contact;
+        if touching {
+            self.contact = tissue.contact;
+        }
+        let axis = if touching {
+            tissue.path_direction
+        } else {
+            sample.direction_in_world()
+        };
+        let depth_m = if touching {
+            (sample.tip_in_world - tissue.contact_in_scene).dot(&axis)
+        } else {
+            0.0
+        };
+        let speed_m_per_s = velocity.dot(&axis);
+        let last_tip = self.sample.map_or(sample.tip_in_world, |s| s.tip_in_world);
+        let input = NeedleInput {
+            depth_m: if touching { depth_m } else { -1.0 },
+            speed_along_m_per_s: speed_m_per_s,
+            speed_m_per_s: velocity.norm(),
+            tip_step_m: sample.tip_in_world - last_tip,
+        };
+        let output = needle::step(&self.needle, &mut self.needle_state, &input);
+        if output.puncture {
+            let (tick, time_ns) = (self.state.tick + 1, self.state.time_ns);
+            self.notify(Notice::Puncture {
+                tick,
+                time_ns,
+                depth_m,
+                position_m: sample.tip_in_world,
+            });
+        }
+        if touching && output.phase == Phase::Outside {
+            self.end_contact();
+        }
+        self.pose.held_travel_m += output.held_step_m;
+        let terms = force(
+            &self.force,
+            &mut self.force_state,
+            &ForceInput {
+                tip_in_world: sample.tip_in_world,
+                velocity_m_per_s: velocity,
+                path_origin_in_world: tissue.contact_in_scene,
+                path_direction: axis,
+                depth_m,
+                puncture_depth_m: self.needle.puncture_depth_m,
+                phase: output.phase,
+                punctured: self.needle_state.punctured,
+            },
+        );
+        Response {
+            phase: output.phase,
+            depth_m,
+            speed_m_per_s,
+            terms,
+            axis,
+        }
+    }
+
+    /// Passivity, then the gate: its output alone reaches the device.
+    fn guard(&mut self, sample: &Sample, response: &Response) -> Vector3<f64> {
+        let last_tip = self.sample.map_or(sample.tip_in_world, |s| s.tip_in_world);
+        let applied_n = *self.gate.output_n();
+        let wanted_n = passivity::step(
+            &self.passivity,
+            &mut self.passivity_state,
+            &applied_n,
+            &(sample.tip_in_world - last_tip),
+            self.period_s,
+            &response.terms.total_n,
+        );
+        let output = gate::step(&self.force.gate, &self.info, &mut self.gate, &wanted_n, self.period_s);
+        if output.fault == Some(ForceFault::NonFiniteForce) && self.fault == Fault::None {
+            self.raise(Fault::NonFiniteForce, ForceFault::NonFiniteForce);
+        }
+        self.sample = Some(*sample);
+        output.force_n
+    }
+
+    fn hand_over_pose(&mut self, woke_ns: u64, sample: &Sample, response: &Response) {
+        self.pose.time_ns = woke_ns;
+        self.pose.tip_in_scene = sample.tip_in_world;
+        self.pose.direction = sample.direction_in_world();
+        self.pose.speed_along_m_per_s = response.speed_m_per_s;
+        self.pose.phase = response.phase;
+        self.pose.punctured = self.needle_state.punctured;
+        self.ports.pose.write(self.pose);
+    }
+
+    fn flags(&self, response: &Response) -> u32 {
+        let always = flags::REAL_TIME | flags::SIMULATED_DEVICE;
+        let speed = self.estimator.velocity_m_per_s().norm();
+        let at_goal = self.goal.is_some_and(|goal| {
+            (self.pose.tip_in_scene - goal.tip_in_world).norm() < AT_GOAL_M && speed < AT_REST_M_PER_S
+        });
+        let bit = |set: bool, flag: u32| if set { flag } else { 0 };
+        (self.state.flags & always)
+            | bit(self.gate.engaged(), flags::ENGAGED)
+            | bit(response.phase != Phase::Outside, flags::IN_CONTACT)
+            | bit(self.needle_state.punctured, flags::PUNCTURED)
+            | bit(at_goal, flags::AT_GOAL)
+    }
+
+    fn interventions(&self) -> u64 {
+        let c = self.gate.counts();
+        c.non_finite + c.magnitude_limited + c.thermal_limited + c.slew_limited + c.device_limited + c.faults
+    }
+
+    fn record(
+        &mut self,
+        due_ns: u64,
+        [woke_ns, written_ns]: [u64; 2],
+        missed: u32,
+        tissue: &TissueResponse,
+        response: &Response,
+        force_n: Vector3<f64>,
+    ) {
+        let t = &response.terms;
+        let along = |v: &Vector3<f64>| v.dot(&response.axis);
+        let interventions = self.interventions();
+        let mut now_flags = self.flags(response);
+        if interventions > self.state.gate_interventions {
+            now_flags |= flags::GATE_ACTED;
+        }
+        let wake_latency_ns = woke_ns.saturating_sub(due_ns);
+        let s = &mut self.state;
+        s.tick += 1;
+        s.time_ns = woke_ns;
+        s.tip_in_scene_m = self.pose.tip_in_scene.into();
+        s.needle_direction = self.pose.direction.into();
+        s.contact_in_scene_m = tissue.contact_in_scene.into();
+        s.depth_m = response.depth_m;
+        s.speed_m_per_s = response.speed_m_per_s;
+        s.force_on_hand_n = force_n.into();
+        s.force_terms_n = [
+            along(&t.membrane_n),
+            t.guide_n.norm(),
+            along(&t.damping_n),
+            along(&t.friction_n),
+            along(&t.gravity_n),
+        ];
+        s.peak_force_n = s.peak_force_n.max(force_n.norm());
+        s.force_scale = self.force.gate.force_scale;
+        s.missed_deadlines += u64::from(missed);
+        s.worst_wake_ns = s.worst_wake_ns.max(wake_latency_ns);
+        s.tissue_tick = tissue.tick;
+        s.tissue_missed_deadlines = tissue.missed;
+        s.tissue_worst_wake_ns = tissue.worst_wake_ns;
+        s.worst_residual = tissue.worst_residual;
+        s.worst_tissue_work_ns = tissue.worst_work_ns;
+        s.gate_interventions = interventions;
+        s.phase = response.phase.code();
+        s.fault = self.fault as u32;
+        s.flags = now_flags;
+        s.seed_count = tissue.seed_count;
+        let work_ns = clock::now_ns() - woke_ns;
+        s.worst_work_ns = s.worst_work_ns.max(work_ns);
+        let record = TickRecord {
+            session_id: self.session_id,
+            tick: s.tick,
+            due_ns,
+            wake_latency_ns,
+            force_written_ns: written_ns - woke_ns,
+            work_ns,
+            missed,
+            phase: s.phase,
+            fault: s.fault,
+            flags: s.flags,
+            tip_in_scene_m: s.tip_in_scene_m,
+            force_on_hand_n: s.force_on_hand_n,
+            depth_m: s.depth_m,
+            speed_m_per_s: s.speed_m_per_s,
+            force_terms_n: s.force_terms_n,
+            tissue_tick: s.tissue_tick,
+        };
+        if self.ports.records.push(record).is_err() {
+            s.records_lost += 1;
+        }
+    }
+}

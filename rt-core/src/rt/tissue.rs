@@ -1,0 +1,380 @@
+//! The tissue tick, 200 Hz: newest pose → contact → held element → constraints → seeds → response → snapshot.
+
+use crate::rt::arm::Armed;
+use crate::rt::clock::{self, Grid};
+use crate::rt::exchange::*;
+use crate::rt::world::World;
+use crate::tissue::{Held, MaterialPoint, StepReport, step};
+use nalgebra::Vector3;
+use std::sync::atomic::{AtomicBool, Ordering};
+use stylet_shm_schema::{MAX_SEEDS, SeedPose, SnapshotHeader, Vertex};
+
+/// The needle must move inwards at least this fast to meet a membrane.
+const CONTACT_SPEED_M_PER_S: f64 = 1e-3;
+/// A seed is 4.5 mm long; its tail shows where its axis points.
+const SEED_LENGTH_M: f64 = 4.5e-3;
+
+/// Ends of the rings that this loop owns.
+pub struct TissuePorts {
+    pub pose: triple_buffer::Output<TipPose>,
+    pub response: triple_buffer::Input<TissueResponse>,
+    pub orders: rtrb::Consumer<TissueOrder>,
+    pub notices: rtrb::Producer<Notice>,
+    pub old_worlds: rtrb::Producer<Box<World>>,
+    pub slots: rtrb::Consumer<SnapshotSlot>,
+    pub filled: rtrb::Producer<SnapshotReturn>,
+}
+
+#[derive(Clone, Copy)]
+struct Seed {
+    tip: MaterialPoint,
+    tail: Option<MaterialPoint>,
+    axis: [f64; 3],
+    dropped_at_m: [f64; 3],
+}
+
+#[derive(Clone, Copy)]
+struct Contact {
+    number: u64,
+    place: Vector3<f64>,
+    direction: Vector3<f64>,
+}
+
+/// Everything that the tissue thread owns.
+pub struct TissueLoop {
+    pub session_id: u64,
+    pub ports: TissuePorts,
+    world: Box<World>,
+    seeds: Vec<Seed>,
+    contact: Option<Contact>,
+    contacts: u64,
+    /// The tip has been outside since the last contact.
+    clear: bool,
+    held: Option<Held>,
+    pose: TipPose,
+    report: Option<StepReport>,
+    response: TissueResponse,
+    period_s: f64,
+}
+
+impl TissueLoop {
+    pub fn new(session_id: u64, ports: TissuePorts, world: Box<World>, period_s: f64) -> Self {
+        Self {
+            session_id,
+            ports,
+            world,
+            seeds: Vec::with_capacity(MAX_SEEDS),
+            contact: None,
+            contacts: 0,
+            clear: true,
+            held: None,
+            pose: TipPose::default(),
+            report: None,
+            response: TissueResponse::default(),
+            period_s,
+        }
+    }
+
+    /// What the haptic loop was last told.
+    pub fn response(&self) -> &TissueResponse {
+        &self.response
+    }
+
+    /// Runs on the ideal grid until `stop`.
+    pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool) {
+        let mut grid = Grid::from(clock::now_ns(), (self.period_s * 1e9) as u64);
+        // SYNC: pairs with the bridge's release store; nothing but the flag is carried.
+        while !stop.load(Ordering::Acquire) {
+            clock::sleep_until(grid.due_ns);
+            let woke_ns = clock::now_ns();
+            self.response.worst_wake_ns = self.response.worst_wake_ns.max(woke_ns - grid.due_ns);
+            self.tick(woke_ns);
+            self.response.missed += u64::from(grid.advance(clock::now_ns()));
+        }
+    }
+
+    /// One tick; in the order of the data.
+    pub fn tick(&mut self, woke_ns: u64) {
+        self.take_orders();
+        let before = self.pose;
+        self.pose = *self.ports.pose.read();
+        self.end_contact_if_released();
+        self.begin_contact_if_met(&before);
+        let travel = self.pose.held_travel_m - before.held_travel_m;
+        self.hold(travel);
+        let world = &mut *self.world;
+        let report = step(&world.model, &mut world.state, self.held, self.period_s);
+        self.report = Some(report);
+        self.respond(woke_ns, &report);
+        self.publish_snapshot(woke_ns, &report);
+    }
+
+    fn take_orders(&mut self) {
+        while let Ok(order) = self.ports.orders.pop() {
+            match order {
+                TissueOrder::Limits(limits) => self.world.set_limits(limits),
+                TissueOrder::DropSeed { ticket } => self.drop_seed(ticket),
+                TissueOrder::UndoSeed { ticket } => self.undo_seed(ticket),
+                TissueOrder::Reset => self.reset(),
+                TissueOrder::World { ticket, world } => self.swap(ticket, world),
+            }
+        }
+    }
+
+    fn notify(&mut self, notice: Notice) {
+        // A full ring means that the bridge is gone; there is nobody to tell.
+        let _ = self.ports.notices.push(notice);
+    }
+
+    fn reset(&mut self) {
+        self.world.return_to_rest();
+        self.seeds.clear();
+        self.let_go();
+        self.response.worst_residual = 0.0;
+        self.response.worst_work_ns = 0;
+        self.response.worst_wake_ns = 0;
+        self.response.missed = 0;
+        self.response.seed_count = 0;
+    }
+
+    fn let_go(&mut self) {
+        self.contact = None;
+        self.held = None;
+        self.clear = false;
+        self.response.contact = 0;
+    }
+
+    fn swap(&mut self, ticket: Ticket, world: Box<World>) {
+        let old = std::mem::replace(&mut self.world, world);
+        // The ring has room for every world that can be under way; else leak it rather than free it here.
+        if let Err(rtrb::PushError::Full(old)) = self.ports.old_worlds.push(old) {
+            std::mem::forget(old);
+        }
+        self.seeds.clear();
+        self.response.seed_count = 0;
+        self.let_go();
+        let (generation, tick) = (self.world.generation, self.response.tick);
+        self.notify(Notice::WorldSwapped {
+            ticket,
+            generation,
+            tick,
+        });
+    }
+
+    fn locate(&self, place: &Vector3<f64>, hint: Option<u32>) -> Option<MaterialPoint> {
+        MaterialPoint::locate(&self.world.model, &self.world.state, (*place).into(), hint)
+    }
+
+    fn end_contact_if_released(&mut self) {
+        if let Some(contact) = self.contact
+            && self.pose.released_contact >= contact.number
+        {
+            self.let_go();
+            let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
+            self.notify(Notice::LeftTissue { tick, time_ns });
+        }
+    }
+
+    /// The membrane is met where the tip's way since the last tick enters the deformed body.
+    fn begin_contact_if_met(&mut self, before: &TipPose) {
+        if self.contact.is_some() || self.pose.time_ns == 0 {
+            return;
+        }
+        let inside = self.locate(&self.pose.tip_in_scene, None);
+        let Some(point) = inside else {
+            self.clear = true;
+            return;
+        };
+        if !self.clear || self.pose.speed_along_m_per_s < CONTACT_SPEED_M_PER_S {
+            return;
+        }
+        let place = self.entry_between(before.tip_in_scene, self.pose.tip_in_scene, point.element);
+        self.contacts += 1;
+        self.contact = Some(Contact {
+            number: self.contacts,
+            place,
+            direction: self.pose.direction,
+        });
+        let position_m = self.world.state.position_m(&self.world.model, point.element);
+        self.held = Some(Held {
+            element: point.element,
+            position_m,
+        });
+        let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
+        self.notify(Notice::Contact {
+            tick,
+            time_ns,
+            position_m: place,
+        });
+    }
+
+    /// Bisection between a place outside and one inside; the inner one where even the start is inside.
+    fn entry_between(&self, mut outside: Vector3<f64>, mut inside: Vector3<f64>, hint: u32) -> Vector3<f64> {
+        for _ in 0..8 {
+            let middle = (outside + inside) / 2.0;
+            if self.locate(&middle, Some(hint)).is_some() {
+                inside = middle;
+            } else {
+                outside = middle;
+            }
+        }
+        inside
+    }
+
+    /// The held element is the one at the tip, found by walking from the last one; it takes the eq. 6 step.
+    fn hold(&mut self, travel: Vector3<f64>) {
+        let Some(held) = self.held else { return };
+        let mut next = held;
+        // Before puncture the membrane keeps its element; after it the tip passes from one to the next.
+        if self.pose.punctured
+            && let Some(at_tip) = self.locate(&self.pose.tip_in_scene, Some(held.element))
+            && at_tip.element != held.element
+        {
+            let position_m = self.world.state.position_m(&self.world.model, at_tip.element);
+            next = Held {
+                element: at_tip.element,
+                position_m,
+            };
+        }
+        for (coordinate, by) in next.position_m.iter_mut().zip(travel.iter()) {
+            *coordinate += by;
+        }
+        self.held = Some(next);
+    }
+
+    fn drop_seed(&mut self, ticket: Ticket) {
+        let tip_m = self.pose.tip_in_scene;
+        let hint = self.held.map(|h| h.element);
+        let found = self.locate(&tip_m, hint);
+        let notice = match found {
+            None => Notice::Refused {
+                ticket,
+                why: Refusal::TipOutsideTissue,
+            },
+            Some(_) if self.seeds.len() >= MAX_SEEDS => Notice::Refused {
+                ticket,
+                why: Refusal::NoSeedLeft,
+            },
+            Some(tip) => {
+                let tail = self.locate(&(tip_m - self.pose.direction * SEED_LENGTH_M), Some(tip.element));
+                // Room for MAX_SEEDS was reserved: this push does not allocate.
+                self.seeds.push(Seed {
+                    tip,
+                    tail,
+                    axis: self.pose.direction.into(),
+                    dropped_at_m: tip_m.into(),
+                });
+                self.response.seed_count = self.seeds.len() as u32;
+                let tick = self.response.tick;
+                let index = self.seeds.len() as u32 - 1;
+                self.notify(Notice::Seed {
+                    tick,
+                    time_ns: self.pose.time_ns,
+                    index,
+                    position_m: tip_m,
+                });
+                Notice::Done { ticket, tick }
+            }
+        };
+        self.notify(notice);
+    }
+
+    fn undo_seed(&mut self, ticket: Ticket) {
+        let tick = self.response.tick;
+        let notice = match self.seeds.pop() {
+            Some(_) => Notice::Done { ticket, tick },
+            None => Notice::Refused {
+                ticket,
+                why: Refusal::NoSeedToUndo,
+            },
+        };
+        self.response.seed_count = self.seeds.len() as u32;
+        self.notify(notice);
+    }
+
+    fn respond(&mut self, woke_ns: u64, report: &StepReport) {
+        let contact = self.contact;
+        let response = &mut self.response;
+        response.tick += 1;
+        response.time_ns = woke_ns;
+        response.contact = contact.map_or(0, |c| c.number);
+        if let Some(contact) = contact {
+            response.contact_in_scene = contact.place;
+            response.path_direction = contact.direction;
+        }
+        response.worst_residual = response.worst_residual.max(report.residual);
+        response.unsolved = !report.converged;
+        self.ports.response.write(*response);
+    }
+
+    fn publish_snapshot(&mut self, woke_ns: u64, report: &StepReport) {
+        let work_ns = clock::now_ns() - woke_ns;
+        self.response.worst_work_ns = self.response.worst_work_ns.max(work_ns);
+        while let Ok(slot) = self.ports.slots.pop() {
+            let filled = slot.scene_generation == self.world.generation
+                && slot.vertex_count == self.world.scene.surface.vertex_elements.len();
+            if filled {
+                self.fill(&slot, woke_ns, work_ns, report);
+            }
+            let _ = self.ports.filled.push(SnapshotReturn {
+                index: slot.index,
+                filled,
+            });
+            if filled {
+                return;
+            }
+        }
+    }
+
+    fn fill(&self, slot: &SnapshotSlot, woke_ns: u64, work_ns: u64, report: &StepReport) {
+        // SAFETY: the bridge loaned `vertex_count` vertices at this address to us alone and keeps them mapped
+        // until the slot is returned; they were zeroed, and Vertex is valid for every bit pattern.
+        let vertices = unsafe { std::slice::from_raw_parts_mut(slot.vertices, slot.vertex_count) };
+        let positions: &mut [[f32; 3]] = bytemuck::cast_slice_mut::<Vertex, [f32; 3]>(vertices);
+        crate::tissue::write_surface(
+            &self.world.model,
+            &self.world.state,
+            &self.world.scene.surface,
+            positions,
+        );
+        // SAFETY: as above, for the header.
+        let header = unsafe { &mut *slot.header };
+        let spacing_m = self.world.scene.lattice.spacing_m;
+        *header = SnapshotHeader {
+            session_id: self.session_id,
+            scene_generation: self.world.generation,
+            tissue_tick: self.response.tick,
+            time_ns: woke_ns,
+            tip_in_scene_m: self.pose.tip_in_scene.into(),
+            needle_direction: self.pose.direction.into(),
+            held_in_scene_m: self.held.map_or([0.0; 3], |h| h.position_m),
+            residual: report.residual,
+            max_displacement_m: f64::from(report.max_displacement) * spacing_m,
+            work_ns,
+            passes: report.passes,
+            moved_elements: report.moved,
+            held_element: self.held.map_or(u32::MAX, |h| h.element),
+            phase: self.pose.phase.code(),
+            vertex_count: slot.vertex_count as u32,
+            seed_count: self.seeds.len() as u32,
+            seeds: [bytemuck::Zeroable::zeroed(); MAX_SEEDS],
+        };
+        for (slot, seed) in header.seeds.iter_mut().zip(&self.seeds) {
+            *slot = self.pose_of(seed);
+        }
+    }
+
+    fn pose_of(&self, seed: &Seed) -> SeedPose {
+        let (model, state) = (&self.world.model, &self.world.state);
+        let position_m = seed.tip.position_m(model, state);
+        let along = seed
+            .tail
+            .map(|tail| Vector3::from(position_m) - Vector3::from(tail.position_m(model, state)));
+        let axis = along.and_then(|a| a.try_normalize(1e-9)).map_or(seed.axis, Into::into);
+        SeedPose {
+            position_m,
+            axis,
+            dropped_at_m: seed.dropped_at_m,
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! The lattice of cubic elements cut from a label volume, and the map between elements and cells.
+
+use super::Labels;
+
+/// A maximal stretch of neighbouring elements along x; its elements have consecutive numbers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Run {
+    pub first: u32,
+    pub len: u32,
+    pub start_i: u32,
+}
+
+impl Run {
+    /// One past the last element.
+    pub fn end(&self) -> u32 {
+        self.first + self.len
+    }
+}
+
+/// Elements in the order x fastest, then y, then z. Never empty once it is part of a `Scene`.
+///
+/// Only occupied cells take memory: a row of cells knows its runs, so a mostly empty volume stays small.
+#[derive(Clone, Debug)]
+pub struct Lattice {
+    /// Cells along x, y, z.
+    pub dims: [usize; 3],
+    /// Edge of a cubic element.
+    pub spacing_m: f64,
+    cells: Vec<[u16; 3]>,
+    runs: Vec<Run>,
+    /// First run of each row `j + dims[1] * k`, with one more entry at the end.
+    row_runs: Vec<u32>,
+}
+
+impl Lattice {
+    /// Expects labels that `Scene::from_labels` has accepted.
+    pub(crate) fn from_checked_labels(labels: &Labels) -> Self {
+        let [nx, ny, nz] = labels.dims;
+        let mut lattice = Lattice {
+            dims: labels.dims,
+            spacing_m: labels.spacing_m,
+            cells: Vec::new(),
+            runs: Vec::new(),
+            row_runs: Vec::with_capacity(ny * nz + 1),
+        };
+        for (row_index, row) in labels.cells.chunks_exact(nx).enumerate() {
+            lattice.row_runs.push(lattice.runs.len() as u32);
+            lattice.push_row(row, row_index % ny, row_index / ny);
+        }
+        lattice.row_runs.push(lattice.runs.len() as u32);
+        lattice
+    }
+
+    fn push_row(&mut self, row: &[u8], j: usize, k: usize) {
+        let mut inside = false;
+        for (i, &label) in row.iter().enumerate() {
+            if label != 0 {
+                if !inside {
+                    self.runs.push(Run {
+                        first: self.cells.len() as u32,
+                        len: 0,
+                        start_i: i as u32,
+                    });
+                }
+                if let Some(run) = self.runs.last_mut() {
+                    run.len += 1;
+                }
+                self.cells.push([i as u16, j as u16, k as u16]);
+            }
+            inside = label != 0;
+        }
+    }
+
+    pub fn element_count(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// The cell of an element; the last element's for a number past the end.
+    pub fn cell(&self, element: u32) -> [usize; 3] {
+        let last = self.cells.len().saturating_sub(1);
+        let cell = self.cells.get((element as usize).min(last));
+        cell.map_or([0; 3], |c| c.map(usize::from))
+    }
+
+    /// Centre of an element at rest, in the scene frame.
+    pub fn rest_m(&self, element: u32) -> [f64; 3] {
+        self.cell(element).map(|c| (c as f64 + 0.5) * self.spacing_m)
+    }
+
+    pub fn element_of_cell(&self, i: usize, j: usize, k: usize) -> Option<u32> {
+        if j >= self.dims[1] || k >= self.dims[2] {
+            return None;
+        }
+        let i = u32::try_from(i).ok()?;
+        let runs = self.row(j, k);
+        let after = runs.partition_point(|run| run.start_i <= i);
+        let run = runs.get(after.checked_sub(1)?)?;
+        let offset = i - run.start_i;
+        (offset < run.len).then(|| run.first + offset)
+    }
+
+    /// As `element_of_cell`, for coordinates that may lie below zero.
+    pub(crate) fn element_at(&self, [i, j, k]: [i64; 3]) -> Option<u32> {
+        let index = |c: i64| usize::try_from(c).ok();
+        self.element_of_cell(index(i)?, index(j)?, index(k)?)
+    }
+
+    /// Neighbours in the order -x, +x, -y, +y, -z, +z.
+    pub fn neighbours(&self, element: u32) -> [Option<u32>; 6] {
+        let [i, j, k] = self.cell(element).map(|c| c as i64);
+        [
+            self.element_at([i - 1, j, k]),
+            self.element_at([i + 1, j, k]),
+            self.element_at([i, j - 1, k]),
+            self.element_at([i, j + 1, k]),
+            self.element_at([i, j, k - 1]),
+            self.element_at([i, j, k + 1]),
+        ]
+    }
+
+    pub fn volume_m3(&self) -> f64 {
+        self.element_count() as f64 * self.spacing_m.powi(3)
+    }
+
+    /// Lowest and highest corner of the box around all elements at rest (faces, not centres).
+    pub fn bounds_m(&self) -> ([f64; 3], [f64; 3]) {
+        let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
+        for cell in &self.cells {
+            for axis in 0..3 {
+                low[axis] = low[axis].min(cell[axis] as usize);
+                high[axis] = high[axis].max(cell[axis] as usize + 1);
+            }
+        }
+        let metres = |corner: [usize; 3]| corner.map(|c| c as f64 * self.spacing_m);
+        (metres(low), metres(high))
+    }
+
+    /// Runs of the row of cells at `j`, `k`, in the order of x.
+    pub(crate) fn row(&self, j: usize, k: usize) -> &[Run] {
+        let row = j + self.dims[1] * k;
+        &self.runs[self.row_runs[row] as usize..self.row_runs[row + 1] as usize]
+    }
+}

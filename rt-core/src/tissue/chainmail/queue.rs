@@ -1,0 +1,73 @@
+//! The textbook's propagation, first moved first processed: one pass, as the reference for tests and benches.
+//!
+//! It leaves violations behind (see `sweep`); nothing in the loop uses it.
+
+use std::collections::VecDeque;
+
+use super::kernels::{self, LOWER, UPPER};
+use super::model::{ChainMail, TissueState};
+use super::sweep::ordered;
+use crate::tissue::Held;
+
+/// Neighbour table and scratch, allocated once.
+pub struct QueuePass {
+    neighbours: Vec<[Option<u32>; 6]>,
+    queue: VecDeque<u32>,
+    visited: Vec<bool>,
+}
+
+impl QueuePass {
+    pub fn new(model: &ChainMail) -> Self {
+        let elements = 0..model.element_count() as u32;
+        QueuePass {
+            neighbours: elements.map(|e| model.lattice.neighbours(e)).collect(),
+            queue: VecDeque::with_capacity(model.element_count()),
+            visited: vec![false; model.element_count()],
+        }
+    }
+
+    /// Puts the held element in place and moves others outward from it; returns how many moved.
+    ///
+    /// An element is moved once, by the first neighbour that violates a limit with it.
+    pub fn run(&mut self, model: &ChainMail, state: &mut TissueState, held: Held) -> u32 {
+        let rest = model.lattice.rest_m(held.element);
+        let u = [0, 1, 2].map(|a| (held.position_m[a] - rest[a]) / model.lattice.spacing_m);
+        state.put(held.element as usize, u.map(|c| c as f32));
+        self.visited.fill(false);
+        self.visited[held.element as usize] = true;
+        self.queue.push_back(held.element);
+        let mut moved = 1;
+        while let Some(inner) = self.queue.pop_front() {
+            for (direction, neighbour) in self.neighbours[inner as usize].into_iter().enumerate() {
+                let Some(outer) = neighbour else { continue };
+                if !self.visited[outer as usize] && push(model, state, direction, inner, outer) {
+                    self.visited[outer as usize] = true;
+                    self.queue.push_back(outer);
+                    moved += 1;
+                }
+            }
+        }
+        moved
+    }
+}
+
+/// Moves `outer` into the limits of its link with `inner`; whether it had to move.
+fn push(model: &ChainMail, state: &mut TissueState, direction: usize, inner: u32, outer: u32) -> bool {
+    let axis = direction / 2;
+    let limits = &model.limits.links[axis];
+    let at = |e: u32| ordered(axis, state.u.each_ref().map(|c| c[e as usize]));
+    let (from, old) = (at(inner), at(outer));
+    let new = if direction % 2 == 1 {
+        kernels::clamped_outer::<UPPER>(limits, from, old)
+    } else {
+        kernels::clamped_outer::<LOWER>(limits, from, old)
+    };
+    let [a, b, c] = new;
+    let xyz = match axis {
+        0 => [a, b, c],
+        1 => [b, a, c],
+        _ => [b, c, a],
+    };
+    state.put(outer as usize, xyz);
+    (0..3).any(|n| (new[n] - old[n]).abs() > 1e-6)
+}

@@ -1,0 +1,174 @@
+//! A point of the tissue: the element it belongs to and where in that element; moves and turns with it.
+
+use super::chainmail::{ChainMail, TissueState};
+
+/// `local` runs from -0.5 to 0.5 across an element, along the deformed links.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MaterialPoint {
+    pub element: u32,
+    pub local: [f32; 3],
+}
+
+/// Elements visited by one walk, at most.
+const MAX_WALK: usize = 512;
+/// Elements looked at to find a start for a walk without a hint, at most.
+const MAX_STARTS: usize = 32_768;
+/// Cells of a sheared lattice do not quite fill space: so far outside a cell still counts as in it, where
+/// there is a neighbour on that side.
+const GAP: f64 = 0.3;
+
+impl MaterialPoint {
+    /// The material point at a place of the scene frame; `None` outside the tissue.
+    ///
+    /// Walks through the deformed lattice from `hint`, or else from the nearest of a bounded sample.
+    pub fn locate(
+        model: &ChainMail,
+        state: &TissueState,
+        point_m: [f64; 3],
+        hint: Option<u32>,
+    ) -> Option<MaterialPoint> {
+        if !state.fits(model) || point_m.iter().any(|c| !c.is_finite()) {
+            return None;
+        }
+        let p = point_m.map(|c| c / model.lattice.spacing_m);
+        if out_of_reach(model, state, p) {
+            return None;
+        }
+        let known = |&element: &u32| (element as usize) < model.element_count();
+        let from_hint = hint.filter(known).and_then(|e| walk(model, state, p, e));
+        from_hint.or_else(|| walk(model, state, p, nearest_sample(model, state, p)))
+    }
+
+    /// Where the point is now, in the scene frame.
+    pub fn position_m(&self, model: &ChainMail, state: &TissueState) -> [f64; 3] {
+        let links = link_vectors(model, state, self.element);
+        let mut p = centre(model, state, self.element);
+        for (link, local) in links.iter().zip(self.local) {
+            for axis in 0..3 {
+                p[axis] += f64::from(local) * link[axis];
+            }
+        }
+        p.map(|c| c * model.lattice.spacing_m)
+    }
+
+    /// Where a direction of the tissue at rest points now, as a unit vector; unchanged if it has no length.
+    pub fn direction(&self, model: &ChainMail, state: &TissueState, rest_dir: [f64; 3]) -> [f64; 3] {
+        let links = link_vectors(model, state, self.element);
+        let mut now = [0.0; 3];
+        for (link, part) in links.iter().zip(rest_dir) {
+            for axis in 0..3 {
+                now[axis] += part * link[axis];
+            }
+        }
+        let length = now.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if length > 1e-12 && length.is_finite() {
+            now.map(|c| c / length)
+        } else {
+            rest_dir
+        }
+    }
+}
+
+/// Centre of an element, in elements.
+fn centre(model: &ChainMail, state: &TissueState, element: u32) -> [f64; 3] {
+    let cell = model.lattice.cell(element);
+    let u = state.displacement_of(element);
+    [0, 1, 2].map(|a| cell[a] as f64 + 0.5 + u[a])
+}
+
+/// Links through an element along each axis: central differences, one-sided at the surface, as at rest
+/// where there is no neighbour.
+fn link_vectors(model: &ChainMail, state: &TissueState, element: u32) -> [[f64; 3]; 3] {
+    let around = model.lattice.neighbours(element);
+    [0, 1, 2].map(|axis| {
+        let (below, above) = (around[2 * axis], around[2 * axis + 1]);
+        let steps = f64::from(u8::from(below.is_some()) + u8::from(above.is_some()));
+        let lo = state.displacement_of(below.unwrap_or(element));
+        let hi = state.displacement_of(above.unwrap_or(element));
+        let mut link = [0, 1, 2].map(|a| (hi[a] - lo[a]) / steps.max(1.0));
+        link[axis] += 1.0;
+        link
+    })
+}
+
+/// Coefficients of `p - centre` in the links of an element; `None` for a flat cell.
+fn local_of(model: &ChainMail, state: &TissueState, p: [f64; 3], element: u32) -> Option<[f64; 3]> {
+    let [a, b, c] = link_vectors(model, state, element);
+    let x = centre(model, state, element);
+    let r = [0, 1, 2].map(|axis| p[axis] - x[axis]);
+    let volume = dot(a, cross(b, c));
+    if volume.abs() < 1e-9 {
+        return None;
+    }
+    let parts = [dot(r, cross(b, c)), dot(r, cross(c, a)), dot(r, cross(a, b))];
+    Some(parts.map(|part| part / volume))
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// Farther from the body at rest than any element has moved, and its own size at the largest stretch.
+fn out_of_reach(model: &ChainMail, state: &TissueState, p: [f64; 3]) -> bool {
+    let [low, high] = model.rest_box;
+    let stretch = model.limits.links.iter().map(|link| f64::from(link.high));
+    let margin = 1.0 + stretch.sum::<f64>() + f64::from(state.max_displacement);
+    (0..3).any(|a| p[a] < low[a] - margin || p[a] > high[a] + margin)
+}
+
+/// Steps to the neighbour on the side where the point is farthest out, until it is inside a cell.
+fn walk(model: &ChainMail, state: &TissueState, p: [f64; 3], start: u32) -> Option<MaterialPoint> {
+    let mut element = start;
+    let mut best: Option<(f64, MaterialPoint)> = None;
+    for _ in 0..MAX_WALK {
+        let local = local_of(model, state, p, element)?;
+        let around = model.lattice.neighbours(element);
+        let outside = |axis: usize| local[axis].abs() - 0.5;
+        let beyond = |axis: usize| around[2 * axis + usize::from(local[axis] > 0.0)];
+        let worst = (0..3).map(outside).fold(f64::MIN, f64::max);
+        let in_tissue = (0..3).all(|a| outside(a) <= 1e-6 || beyond(a).is_some());
+        let found = MaterialPoint {
+            element,
+            local: local.map(|c| c as f32),
+        };
+        if worst <= 1e-6 {
+            return Some(found);
+        }
+        if in_tissue && worst <= GAP && best.is_none_or(|(least, _)| worst < least) {
+            best = Some((worst, found));
+        }
+        let ways = (0..3).filter(|&a| outside(a) > 1e-6 && beyond(a).is_some());
+        let way = ways.max_by(|&a, &b| outside(a).total_cmp(&outside(b)));
+        let Some(next) = way.and_then(beyond) else {
+            break;
+        };
+        element = next;
+    }
+    best.map(|(_, found)| found)
+}
+
+/// The element nearest to `p` now, among a sample.
+fn nearest_sample(model: &ChainMail, state: &TissueState, p: [f64; 3]) -> u32 {
+    let stride = model.element_count().div_ceil(MAX_STARTS).max(1);
+    let mut nearest = (f64::INFINITY, 0);
+    for element in (0..model.element_count() as u32).step_by(stride) {
+        let x = centre(model, state, element);
+        let square = (0..3).map(|a| (p[a] - x[a]).powi(2)).sum::<f64>();
+        if square < nearest.0 {
+            nearest = (square, element);
+        }
+    }
+    nearest.1
+}
+
+#[cfg(test)]
+#[path = "point_tests.rs"]
+mod tests;
