@@ -1,0 +1,33 @@
+# Two commands: `make run` starts the simulator, `make test` checks all of it.
+
+SHELL := /bin/bash
+CARGO ?= cargo
+BIN := $(or $(CARGO_TARGET_DIR),target)/release
+
+.PHONY: help run test build picture clean deps-run deps-test
+
+help: ## This list
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
+
+run: deps-run build ## Build, start rt-core and open the window; without a display run the procedure headless
+	@docs/tools/run "$(BIN)"
+
+build: ## Build both programs
+	$(CARGO) build --release -p rt-core -p host-ui
+
+test: deps-test ## Install what the tests need, build everything, run all tests
+	$(CARGO) build --release --workspace --all-targets
+	$(CARGO) test --release --workspace --exclude stylet-tests
+	$(CARGO) test --release -p stylet-tests -- --test-threads=1
+
+picture: deps-test build ## Draw the README's picture anew
+	UPDATE_SNAPSHOTS=1 $(CARGO) test --release -p stylet-tests --test ui_live -- --test-threads=1
+
+clean: ## Remove what was built
+	$(CARGO) clean
+
+deps-run:
+	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers
+
+deps-test:
+	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers python3-nibabel
