@@ -1,0 +1,92 @@
+//! From SI to what a person reads; the only place of the window that converts units.
+
+/// Millimetres from metres.
+pub fn mm(metres: f64) -> f64 {
+    metres * 1e3
+}
+
+/// Metres from millimetres that a person typed or dragged.
+pub fn metres(mm: f64) -> f64 {
+    mm * 1e-3
+}
+
+/// Microseconds from nanoseconds.
+pub fn us(ns: u64) -> f64 {
+    ns as f64 * 1e-3
+}
+
+/// Seconds from nanoseconds.
+pub fn seconds(ns: u64) -> f64 {
+    ns as f64 * 1e-9
+}
+
+pub fn length(metres: f64) -> String {
+    format!("{:.1} mm", unsigned_zero(mm(metres), 0.05))
+}
+
+/// With its sign, to be read as an error.
+pub fn signed_mm(metres: f64) -> String {
+    format!("{:+.2}", mm(metres))
+}
+
+pub fn speed(metres_per_second: f64) -> String {
+    format!("{:.1} mm/s", unsigned_zero(mm(metres_per_second), 0.05))
+}
+
+pub fn force(newton: f64) -> String {
+    format!("{:.2} N", unsigned_zero(newton, 0.005))
+}
+
+pub fn volume(cubic_metres: f64) -> String {
+    format!("{:.1} cc", cubic_metres * 1e6)
+}
+
+/// `n/a` where there is nothing to tell.
+pub fn microseconds(value: Option<f64>) -> String {
+    match value {
+        None => "n/a".to_owned(),
+        Some(us) if us >= 10_000.0 => format!("{:.1} ms", us * 1e-3),
+        Some(us) => format!("{us:.1} us"),
+    }
+}
+
+pub fn rate(period_ns: u64) -> String {
+    match period_ns {
+        0 => "n/a".to_owned(),
+        ns => format!("{:.0} Hz", 1e9 / ns as f64),
+    }
+}
+
+/// Counts with a thin grouping, so that a tick of eight digits can be read.
+pub fn count(n: u64) -> String {
+    let digits = n.to_string();
+    let mut out = String::with_capacity(digits.len() + digits.len() / 3);
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            out.push(' ');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+/// Avoids "-0.0", which makes a figure at rest flicker.
+fn unsigned_zero(value: f64, half_digit: f64) -> f64 {
+    if value.abs() < half_digit { 0.0 } else { value }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_read_as_a_person_writes_them() {
+        assert_eq!(length(0.0123), "12.3 mm");
+        assert_eq!(length(-1e-9), "0.0 mm");
+        assert_eq!(signed_mm(-0.00125), "-1.25");
+        assert_eq!(count(12_345_678), "12 345 678");
+        assert_eq!(count(999), "999");
+        assert_eq!(microseconds(None), "n/a");
+        assert_eq!(rate(1_000_000), "1000 Hz");
+    }
+}

@@ -1,0 +1,73 @@
+//! Keys: which there are, and what is held or pressed in this frame.
+
+use crate::panel::Action;
+use egui::{Key, Modifiers};
+use stylet_shm_schema::CommandKind;
+
+/// Every key, for the overlay and the manual.
+pub const KEYS: [(&str, &str); 13] = [
+    ("W  or  Up", "advance the needle along its path while held"),
+    ("S  or  Down", "retract the needle while held"),
+    ("Shift with W, S", "four times slower"),
+    ("Space", "drop a seed at the tip"),
+    ("Ctrl+Z", "take the last seed back"),
+    ("E", "force on; after a fault: re-arm"),
+    ("D", "force off"),
+    ("P", "parameters"),
+    ("R", "reset the view"),
+    ("F1", "this help"),
+    ("Esc", "close a dialog, give the keys back to the needle"),
+    ("Left drag, right drag", "turn the view, shift it"),
+    ("Wheel", "come nearer, go farther"),
+];
+
+/// What the keys say in one frame.
+#[derive(Debug, Default, PartialEq)]
+pub struct Keys {
+    pub actions: Vec<Action>,
+    /// Metres per second along the path, positive inwards; 0 when no key is held.
+    pub drive_m_per_s: f64,
+}
+
+const DRIVE_M_PER_S: f64 = 0.04;
+
+/// Nothing while a widget has the focus: typing a path must not drop a seed.
+pub fn read(ctx: &egui::Context) -> Keys {
+    let mut keys = Keys::default();
+    if ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F1)) {
+        keys.actions.push(Action::ToggleHelp);
+    }
+    if ctx.memory(|m| m.focused().is_some()) {
+        return keys;
+    }
+    let pressed = [
+        (Modifiers::CTRL, Key::Z, Action::Send(CommandKind::UndoSeed)),
+        (Modifiers::NONE, Key::Space, Action::Send(CommandKind::DropSeed)),
+        (Modifiers::NONE, Key::E, Action::Send(CommandKind::Engage)),
+        (Modifiers::NONE, Key::D, Action::Send(CommandKind::Disengage)),
+        (Modifiers::NONE, Key::P, Action::OpenParameters),
+        (Modifiers::NONE, Key::R, Action::ResetView),
+    ];
+    ctx.input_mut(|i| {
+        for (modifiers, key, action) in pressed {
+            // A key that repeats while held must not drop a row of seeds.
+            if fresh_press(i, modifiers, key) {
+                keys.actions.push(action);
+            }
+        }
+        let held = |a, b| f64::from(u8::from(i.key_down(a) || i.key_down(b)));
+        let slow = if i.modifiers.shift { 0.25 } else { 1.0 };
+        if !i.modifiers.command {
+            keys.drive_m_per_s =
+                (held(Key::W, Key::ArrowUp) - held(Key::S, Key::ArrowDown)) * DRIVE_M_PER_S * slow;
+        }
+    });
+    keys
+}
+
+fn fresh_press(input: &egui::InputState, modifiers: Modifiers, wanted: Key) -> bool {
+    input.events.iter().any(|event| {
+        matches!(event, egui::Event::Key { key, pressed: true, repeat: false, modifiers: held, .. }
+            if *key == wanted && held.matches_logically(modifiers))
+    })
+}

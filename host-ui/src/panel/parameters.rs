@@ -1,0 +1,231 @@
+//! The dialog of every parameter of tissue, needle and force, made from the table of the contract.
+
+use super::Shown;
+use crate::{format, theme};
+use egui::{Button, DragValue, RichText};
+use stylet_shm_schema::{PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterSpec};
+
+/// What stands under a row.
+#[derive(Clone, Debug, Default, PartialEq)]
+enum RowNote {
+    #[default]
+    None,
+    InForce(u64),
+    Refused(String),
+}
+
+/// One change at a time is on its way; what is edited meanwhile waits and goes with the next.
+#[derive(Default)]
+pub struct ParametersState {
+    pub open: bool,
+    /// Edited and not yet in force, SI.
+    drafts: [Option<f64>; PARAMETER_COUNT],
+    in_flight: Option<(u64, Vec<(usize, f64)>)>,
+    /// Edited since the last request went out.
+    unsent: bool,
+    notes: [RowNote; PARAMETER_COUNT],
+    foot: Option<(bool, String)>,
+}
+
+impl ParametersState {
+    /// Pairs for `SetParameters`, when there is something to send and nothing is on its way.
+    pub fn request(&self) -> Option<Vec<(usize, f64)>> {
+        if !self.unsent || self.in_flight.is_some() {
+            return None;
+        }
+        let pairs: Vec<_> = self.drafts.iter().enumerate().filter_map(|(i, d)| Some((i, (*d)?))).collect();
+        (!pairs.is_empty()).then_some(pairs)
+    }
+
+    pub fn sent(&mut self, command_id: u64, pairs: Vec<(usize, f64)>) {
+        self.unsent = false;
+        self.in_flight = Some((command_id, pairs));
+    }
+
+    pub fn not_sent(&mut self, why: String) {
+        self.unsent = false;
+        self.drafts = [None; PARAMETER_COUNT];
+        self.foot = Some((true, why));
+    }
+
+    pub fn waiting_for(&self) -> Option<u64> {
+        self.in_flight.as_ref().map(|(id, _)| *id)
+    }
+
+    /// A refusal names every reason by key; what names no row stands at the foot only.
+    pub fn answered(&mut self, accepted: bool, text: &str, effective_tick: u64) {
+        let Some((_, pairs)) = self.in_flight.take() else { return };
+        for (index, value) in pairs {
+            let (Some(spec), Some(draft)) = (PARAMETERS.get(index), self.drafts.get_mut(index)) else {
+                continue;
+            };
+            if *draft == Some(value) {
+                *draft = None;
+            }
+            self.notes[index] = match accepted {
+                true => RowNote::InForce(effective_tick),
+                false => RowNote::Refused(reason_for(spec, text)),
+            };
+        }
+        self.foot = Some(match accepted {
+            true => (false, format!("In force since tick {}", format::count(effective_tick))),
+            false => (true, format!("Refused, nothing changed: {text}")),
+        });
+    }
+
+    /// The core went away: what was on its way is lost.
+    pub fn forget(&mut self) {
+        self.in_flight = None;
+        self.drafts = [None; PARAMETER_COUNT];
+        self.unsent = false;
+    }
+
+    fn edit(&mut self, index: usize, value: f64) {
+        self.drafts[index] = Some(value);
+        self.notes[index] = RowNote::None;
+        self.unsent = true;
+    }
+}
+
+fn reason_for(spec: &ParameterSpec, text: &str) -> String {
+    text.lines()
+        .find(|line| line.contains(spec.key))
+        .unwrap_or("refused with others, see below")
+        .to_owned()
+}
+
+pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersState) {
+    let mut open = state.open;
+    egui::Window::new("Parameters")
+        .open(&mut open)
+        .default_size([700.0, 600.0])
+        .default_pos([300.0, 90.0])
+        .collapsible(false)
+        .show(ctx, |ui| {
+            if shown.parameters.is_none() {
+                ui.label(RichText::new("rt-core has not told its parameters yet; these are the defaults.").color(theme::WARN));
+            }
+            let height = (ui.ctx().content_rect().height() - 260.0).clamp(200.0, 640.0);
+            egui::ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
+                for group in [ParameterGroup::Tissue, ParameterGroup::Needle, ParameterGroup::Force] {
+                    group_ui(ui, shown, state, group);
+                }
+            });
+            ui.separator();
+            foot_ui(ui, shown, state);
+        });
+    state.open = open;
+}
+
+fn group_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState, group: ParameterGroup) {
+    ui.heading(group.name());
+    egui::Grid::new(group.name()).num_columns(5).striped(true).spacing([14.0, 4.0]).show(ui, |ui| {
+        for (index, spec) in PARAMETERS.iter().enumerate().filter(|(_, p)| p.group == group) {
+            row_ui(ui, shown, state, index, spec);
+        }
+    });
+    ui.add_space(4.0);
+}
+
+fn row_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState, index: usize, spec: &ParameterSpec) {
+    let in_force = shown.parameters.map_or(spec.default, |p| p.set.get(spec.id));
+    let value = state.drafts[index].unwrap_or(in_force);
+    let scale = spec.display_per_si;
+    let (low, high) = (spec.min * scale, spec.max * scale);
+    let label = ui.label(spec.label).on_hover_text(format!("{}\n{}", spec.help, spec.key));
+    let mut displayed = value * scale;
+    let drag = DragValue::new(&mut displayed)
+        .range(low..=high)
+        .speed((high - low) * 0.002)
+        .max_decimals(4)
+        .update_while_editing(false)
+        .suffix(if spec.unit.is_empty() { String::new() } else { format!(" {}", spec.unit) });
+    let response = ui.add_enabled_ui(shown.is_live(), |ui| ui.add_sized([124.0, 22.0], drag)).inner;
+    let response = response.labelled_by(label.id).on_hover_text(spec.help);
+    if response.changed() {
+        state.edit(index, (displayed / scale).clamp(spec.min, spec.max));
+    }
+    ui.label(theme::small(format!("{} to {}", plain(low), plain(high))));
+    ui.label(theme::small(spec.source)).on_hover_text(spec.help);
+    ui.horizontal(|ui| {
+        let changed = (value - spec.default).abs() > 1e-9 * spec.default.abs().max(1e-12);
+        let reset = ui.add_enabled(changed && shown.is_live(), Button::new("Reset").small());
+        reset.widget_info(|| {
+            egui::WidgetInfo::labeled(egui::accesskit::Role::Button, changed, format!("Reset {}", spec.label))
+        });
+        if reset.on_hover_text(format!("Back to {} {}", plain(spec.default * scale), spec.unit)).clicked() {
+            state.edit(index, spec.default);
+        }
+        note_ui(ui, state, index);
+    });
+    ui.end_row();
+}
+
+fn note_ui(ui: &mut egui::Ui, state: &ParametersState, index: usize) {
+    if state.drafts[index].is_some() {
+        ui.label(theme::small("sent"));
+        return;
+    }
+    match &state.notes[index] {
+        RowNote::None => {}
+        RowNote::InForce(tick) => {
+            ui.label(RichText::new(format!("since tick {}", format::count(*tick))).small().color(theme::GOOD));
+        }
+        RowNote::Refused(why) => {
+            let text = RichText::new("refused").small().color(theme::BAD);
+            ui.label(text).on_hover_text(why);
+        }
+    }
+}
+
+fn foot_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState) {
+    ui.horizontal(|ui| {
+        if ui.add_enabled(shown.is_live(), Button::new("Reset all parameters")).clicked() {
+            for (index, spec) in PARAMETERS.iter().enumerate() {
+                state.edit(index, spec.default);
+            }
+        }
+        if let Some(p) = &shown.parameters {
+            let text = format!("change {} in force since tick {}", p.generation, format::count(p.effective_tick));
+            ui.label(theme::small(text));
+        }
+    });
+    if let Some((refused, text)) = &state.foot {
+        let color = if *refused { theme::BAD } else { theme::GOOD };
+        ui.label(RichText::new(text).color(color));
+    }
+}
+
+/// As few digits as say it.
+fn plain(value: f64) -> String {
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edits_made_while_a_change_is_on_its_way_are_sent_after_it() {
+        let mut state = ParametersState::default();
+        state.edit(0, 0.6);
+        let pairs = state.request().expect("something to send");
+        state.sent(7, pairs);
+        state.edit(0, 0.7);
+        assert_eq!(state.request(), None);
+        state.answered(true, "", 100);
+        assert_eq!(state.request(), Some(vec![(0, 0.7)]));
+    }
+
+    #[test]
+    fn a_refusal_stands_at_its_row_and_the_draft_is_gone() {
+        let mut state = ParametersState::default();
+        state.edit(6, 0.01);
+        let pairs = state.request().expect("something to send");
+        state.sent(7, pairs);
+        state.answered(false, "other\nneedle.puncture_depth is too large", 0);
+        assert_eq!(state.notes[6], RowNote::Refused("needle.puncture_depth is too large".to_owned()));
+        assert_eq!(state.drafts[6], None);
+    }
+}

@@ -1,0 +1,139 @@
+//! The right panel: force and depth of the last seconds, and the timing of the loop.
+
+use super::Shown;
+use super::history::{BINS, History, Percentiles, Tick, WINDOW_S, bin_low_us};
+use crate::{format, theme};
+use egui::{Color32, RichText};
+use egui_plot::{Bar, BarChart, GridMark, Line, Plot, PlotPoints};
+
+const PLOT_HEIGHT: f32 = 112.0;
+
+pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
+    let now = |value: Option<String>| value.unwrap_or_else(|| "n/a".to_owned());
+    let force = now(shown.resistance_n().map(format::force));
+    title(ui, "Force along the needle, N", &force, theme::PLOT_FORCE);
+    strip(ui, history, ("force", theme::PLOT_FORCE, [-0.5, 2.0]), |t| t.resistance_n);
+    let depth = now(shown.state.map(|s| format::length(s.depth_m)));
+    title(ui, "Depth, mm", &depth, theme::PLOT_DEPTH);
+    strip(ui, history, ("depth", theme::PLOT_DEPTH, [0.0, 10.0]), |t| t.depth_mm);
+    let worst = now(shown.state.map(|s| format::microseconds(Some(format::us(s.worst_wake_ns)))));
+    title(ui, "Wake-up latency, us", &format!("worst {worst}"), theme::PLOT_WAKE);
+    strip(ui, history, ("wake-up latency", theme::PLOT_WAKE, [0.0, 50.0]), |t| t.wake_us);
+    histogram_ui(ui, history);
+    timing_ui(ui, shown, history);
+}
+
+fn title(ui: &mut egui::Ui, name: &str, value: &str, color: Color32) {
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(name).color(color).size(12.5));
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.monospace(value);
+        });
+    });
+}
+
+fn strip(ui: &mut egui::Ui, history: &History, (name, color, least): (&str, Color32, [f64; 2]), value: impl Fn(&Tick) -> f32) {
+    let buckets = ui.available_width().max(50.0) as usize;
+    let points = history.decimated(buckets, value);
+    plot(name)
+        .height(PLOT_HEIGHT)
+        .include_x(-WINDOW_S)
+        .include_x(0.0)
+        .include_y(least[0])
+        .include_y(least[1])
+        .x_axis_formatter(|mark: GridMark, _: &_| format!("{:.0} s", mark.value))
+        .show(ui, |plot| plot.line(Line::new(name, PlotPoints::new(points)).color(color).width(1.3)));
+}
+
+/// Only to be looked at: a plot that moves must not be dragged by accident.
+fn plot(name: &str) -> Plot<'static> {
+    Plot::new(name.to_owned())
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .allow_axis_zoom_drag(false)
+        .show_x(false)
+        .y_axis_min_width(34.0)
+        .show_background(true)
+        .set_margin_fraction(egui::vec2(0.0, 0.08))
+}
+
+/// Both axes logarithmic, because one late tick in a minute must be seen.
+fn histogram_ui(ui: &mut egui::Ui, history: &History) {
+    let timing = &history.timing;
+    let ticks = format!("{} ticks", format::count(timing.samples as u64));
+    title(ui, "How often which wake-up latency", &ticks, theme::PLOT_WAKE);
+    let bars: Vec<Bar> = timing
+        .histogram
+        .iter()
+        .enumerate()
+        .filter(|(_, n)| **n > 0)
+        .map(|(bin, n)| Bar::new(bin as f64 + 0.5, f64::from(*n).log10() + 0.3).width(0.9))
+        .collect();
+    plot("wake-up histogram")
+        .height(78.0)
+        .include_x(0.0)
+        .include_x(BINS as f64)
+        .include_y(0.0)
+        .include_y(5.0)
+        .x_grid_spacer(|_| decade_marks(5.0, 5))
+        .y_grid_spacer(|_| decade_marks(2.0, 3))
+        .x_axis_formatter(|mark: GridMark, _: &_| decade(bin_low_us(mark.value.max(0.0) as usize)))
+        .y_axis_formatter(|mark: GridMark, _: &_| format!("{:.0}", 10.0_f64.powf(mark.value)))
+        .show(ui, |plot| plot.bar_chart(BarChart::new("ticks", bars).color(theme::PLOT_WAKE)));
+}
+
+fn decade_marks(step: f64, count: usize) -> Vec<GridMark> {
+    (0..=count)
+        .map(|i| GridMark {
+            value: i as f64 * step,
+            step_size: step,
+        })
+        .collect()
+}
+
+fn decade(us: f64) -> String {
+    if us >= 999.0 { format!("{:.0} ms", us * 1e-3) } else { format!("{us:.0} us") }
+}
+
+fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
+    egui::Grid::new("timing").num_columns(5).min_col_width(50.0).spacing([8.0, 2.0]).show(ui, |ui| {
+        for head in ["last minute", "p50", "p99", "p99.9", "max"] {
+            ui.label(theme::small(head));
+        }
+        ui.end_row();
+        percentile_row(ui, "wake-up", &history.timing.wake);
+        percentile_row(ui, "tick work", &history.timing.work);
+    });
+    let Some(s) = &shown.state else {
+        ui.label(theme::small("missed deadlines n/a"));
+        return;
+    };
+    ui.horizontal(|ui| {
+        let color = if s.missed_deadlines > 0 { theme::WARN } else { theme::GOOD };
+        let text = format!("missed deadlines {}", format::count(s.missed_deadlines));
+        ui.label(RichText::new(text).color(color).strong());
+        ui.label(theme::small(format!("of {} ticks", format::count(s.tick))));
+    });
+    let text = format!(
+        "tissue: missed {}, worst work {}; records lost {}; gate acted {}",
+        format::count(s.tissue_missed_deadlines),
+        format::microseconds(Some(format::us(s.worst_tissue_work_ns))),
+        format::count(s.records_lost),
+        format::count(s.gate_interventions)
+    );
+    ui.label(theme::small(text));
+}
+
+fn percentile_row(ui: &mut egui::Ui, name: &str, p: &Percentiles) {
+    ui.label(theme::small(name));
+    for value in [p.p50, p.p99, p.p999, p.max] {
+        let text = RichText::new(format::microseconds(value)).monospace().size(11.5);
+        let response = ui.label(text);
+        if value.is_none() {
+            response.on_hover_text("Told only with at least ten samples beyond it");
+        }
+    }
+    ui.end_row();
+}

@@ -1,0 +1,186 @@
+//! What one frame shows, taken from the link once, so that no panel touches shared memory.
+
+use crate::link::{Link, LinkStatus};
+use crate::workflow::Step;
+use stylet_shm_schema::{
+    Fault, HapticState, ParametersInForce, Phase, PlanInForce, PlannedSeed, SceneHeader, SeedPose, Session, flags,
+};
+
+/// Past the deepest seed the needle may go this far, and the path is drawn this far.
+pub const PAST_LAST_SEED_M: f64 = 0.01;
+
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum LoadState {
+    #[default]
+    Idle,
+    Reading(String),
+    Sending(String),
+    Loaded(String),
+    Refused(String),
+}
+
+impl LoadState {
+    pub fn is_busy(&self) -> bool {
+        matches!(self, Self::Reading(_) | Self::Sending(_))
+    }
+}
+
+#[derive(Clone)]
+pub struct Shown {
+    pub instance: String,
+    pub status: LinkStatus,
+    pub session: Option<Session>,
+    pub state: Option<HapticState>,
+    pub scene: Option<SceneHeader>,
+    /// Only a plan with at least one seed.
+    pub plan: Option<PlanInForce>,
+    pub parameters: Option<ParametersInForce>,
+    pub seeds: Vec<SeedPose>,
+    pub snapshot_residual: Option<f64>,
+    pub rubbish_refused: u64,
+    /// Step of the scripted procedure while it runs or after it ran.
+    pub running: bool,
+    pub run_step: Option<Step>,
+    /// The last answer that the operator should read.
+    pub note: Option<Note>,
+    pub load: LoadState,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct Note {
+    pub refused: bool,
+    pub text: String,
+}
+
+impl Shown {
+    pub fn empty(instance: &str) -> Self {
+        Self {
+            instance: instance.to_owned(),
+            status: LinkStatus::Absent { why: String::new() },
+            session: None,
+            state: None,
+            scene: None,
+            plan: None,
+            parameters: None,
+            seeds: Vec::new(),
+            snapshot_residual: None,
+            rubbish_refused: 0,
+            running: false,
+            run_step: None,
+            note: None,
+            load: LoadState::Idle,
+        }
+    }
+
+    pub fn take(&mut self, link: &Link) {
+        self.status = link.status();
+        self.session = link.session().copied();
+        self.state = link.state().copied();
+        self.scene = link.scene().map(|s| s.header);
+        self.plan = link.plan().filter(|p| p.generation > 0 && p.seed_count > 0).copied();
+        self.parameters = link.parameters().copied();
+        self.rubbish_refused = link.rubbish_refused();
+        self.seeds.clear();
+        self.snapshot_residual = None;
+        if let Some(snapshot) = link.snapshot() {
+            let count = snapshot.header.seed_count as usize;
+            self.seeds.extend(snapshot.header.seeds.iter().take(count).copied());
+            self.snapshot_residual = Some(snapshot.header.residual);
+        }
+    }
+
+    pub fn is_live(&self) -> bool {
+        matches!(self.status, LinkStatus::Live)
+    }
+
+    pub fn is_absent(&self) -> bool {
+        matches!(self.status, LinkStatus::Absent { .. })
+    }
+
+    fn has_flag(&self, flag: u32) -> bool {
+        self.state.is_some_and(|s| s.flags & flag != 0)
+    }
+
+    pub fn is_engaged(&self) -> bool {
+        self.has_flag(flags::ENGAGED)
+    }
+
+    pub fn is_real_time(&self) -> bool {
+        self.has_flag(flags::REAL_TIME)
+    }
+
+    pub fn has_punctured(&self) -> bool {
+        self.has_flag(flags::PUNCTURED)
+    }
+
+    /// `None` for a number that this program does not know, which is a fault too.
+    pub fn fault(&self) -> Option<Fault> {
+        Fault::from_number(self.state.map_or(0, |s| s.fault))
+    }
+
+    pub fn phase(&self) -> &'static str {
+        match self.state.map(|s| Phase::from_number(s.phase)) {
+            None => "n/a",
+            Some(None) => "unknown",
+            Some(Some(phase)) => phase.name(),
+        }
+    }
+
+    pub fn tip_m(&self) -> Option<[f64; 3]> {
+        self.state.filter(|s| s.tick > 0).map(|s| s.tip_in_scene_m)
+    }
+
+    pub fn planned(&self) -> &[PlannedSeed] {
+        self.plan.as_ref().map_or(&[], |plan| {
+            let count = (plan.seed_count as usize).min(plan.seeds.len());
+            &plan.seeds[..count]
+        })
+    }
+
+    /// Depth of the tip along the planned path, from the entry.
+    pub fn path_depth_m(&self) -> Option<f64> {
+        let (plan, tip) = (self.plan.as_ref()?, self.tip_m()?);
+        Some(along(plan, tip))
+    }
+
+    /// How far the needle may go along the path.
+    pub fn path_length_m(&self) -> Option<f64> {
+        let plan = self.plan.as_ref()?;
+        let deepest = self.planned().iter().map(|s| along(plan, s.position_m)).fold(0.0, f64::max);
+        Some((deepest + PAST_LAST_SEED_M).min(0.3))
+    }
+
+    /// Depth of the deepest planned seed.
+    pub fn deepest_seed_m(&self) -> Option<f64> {
+        Some(self.path_length_m()? - PAST_LAST_SEED_M)
+    }
+
+    pub fn on_path_m(&self, depth_m: f64) -> Option<[f64; 3]> {
+        let plan = self.plan.as_ref()?;
+        Some([0, 1, 2].map(|i| plan.entry_m[i] + plan.direction[i] * depth_m))
+    }
+
+    pub fn path_end_m(&self) -> Option<[f64; 3]> {
+        self.on_path_m(self.path_length_m()?)
+    }
+
+    /// How far the tip is beside the planned path.
+    pub fn off_path_m(&self) -> Option<f64> {
+        let (tip, foot) = (self.tip_m()?, self.on_path_m(self.path_depth_m()?)?);
+        Some([0, 1, 2].map(|i| (tip[i] - foot[i]).powi(2)).iter().sum::<f64>().sqrt())
+    }
+
+    /// Force that resists the insertion: against the needle's direction.
+    pub fn resistance_n(&self) -> Option<f64> {
+        let s = self.state.as_ref()?;
+        Some(-dot(s.force_on_hand_n, s.needle_direction))
+    }
+}
+
+fn along(plan: &PlanInForce, place_m: [f64; 3]) -> f64 {
+    dot([0, 1, 2].map(|i| place_m[i] - plan.entry_m[i]), plan.direction)
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}

@@ -1,0 +1,302 @@
+//! The bar at the top and the banners under it: is it alive, is it real time, is the force on.
+
+use super::{Action, Shown};
+use crate::link::LinkStatus;
+use crate::{format, theme};
+use egui::{Align, Color32, Layout, RichText, Sense, Vec2};
+use stylet_shm_schema::{CommandKind, Fault, ParameterId};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    Bad,
+    Warn,
+    Info,
+}
+
+impl Severity {
+    fn color(self) -> Color32 {
+        match self {
+            Self::Bad => theme::BAD,
+            Self::Warn => theme::WARN,
+            Self::Info => theme::LINE,
+        }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct Banner {
+    pub severity: Severity,
+    pub title: &'static str,
+    pub text: String,
+    /// The one thing to do about it, where a click can do it.
+    pub remedy: Option<(&'static str, Action)>,
+}
+
+/// Worst first. What cannot be known is not claimed: without a core nothing is said about its force.
+pub fn banners(shown: &Shown) -> Vec<Banner> {
+    match &shown.status {
+        LinkStatus::Absent { why } => return vec![absent(shown, why)],
+        LinkStatus::Silent { since } => {
+            return vec![Banner {
+                severity: Severity::Bad,
+                title: "rt-core is silent",
+                text: format!(
+                    "Nothing came for {:.1} s. What you see is old. If it stays so, look at the terminal where rt-core runs.",
+                    since.as_secs_f64()
+                ),
+                remedy: None,
+            }];
+        }
+        LinkStatus::Live => {}
+    }
+    let mut list = Vec::new();
+    let fault = shown.fault();
+    if fault != Some(Fault::None) {
+        list.push(Banner {
+            severity: Severity::Bad,
+            title: "Fault: the force is off",
+            text: fault.map_or("rt-core reports a fault that this program does not know".to_owned(), |f| {
+                sentence(f.message())
+            }),
+            remedy: Some(("Re-arm", Action::Send(CommandKind::Engage))),
+        });
+    }
+    if shown.state.is_some() && !shown.is_real_time() {
+        list.push(not_real_time(shown));
+    }
+    if shown.state.is_some() && fault == Some(Fault::None) && !shown.is_engaged() {
+        list.push(Banner {
+            severity: Severity::Info,
+            title: "The force is off",
+            text: "The device is moved but not felt. Key E or \"Engage force\" turns it on.".to_owned(),
+            remedy: None,
+        });
+    }
+    list
+}
+
+fn absent(shown: &Shown, why: &str) -> Banner {
+    let why = if why.is_empty() { String::new() } else { format!("  ({why})") };
+    Banner {
+        severity: Severity::Bad,
+        title: "rt-core is absent",
+        text: format!(
+            "Start it in a terminal; this window finds it by itself:   rt-core --instance {}{why}",
+            shown.instance
+        ),
+        remedy: None,
+    }
+}
+
+fn not_real_time(shown: &Shown) -> Banner {
+    let advice = shown.session.map(|s| s.advice.read()).unwrap_or_default();
+    let asked = shown.session.is_some_and(|s| s.no_rt_asked != 0);
+    let text = match (advice.trim(), asked) {
+        ("", true) => "rt-core was started with --no-rt: timing here says nothing about this machine.".to_owned(),
+        ("", false) => "Run setcap cap_sys_nice,cap_ipc_lock+ep on rt-core, or allow rtprio and memlock in /etc/security/limits.d, then start it again.".to_owned(),
+        (advice, _) => advice.replace('\n', "  "),
+    };
+    Banner {
+        severity: Severity::Warn,
+        title: "Not real-time",
+        text,
+        remedy: None,
+    }
+}
+
+fn sentence(text: &str) -> String {
+    let mut chars = text.chars();
+    chars
+        .next()
+        .map(|first| format!("{}{}.", first.to_uppercase(), chars.as_str()))
+        .unwrap_or_default()
+}
+
+pub fn banners_ui(ui: &mut egui::Ui, list: &[Banner]) -> Option<Action> {
+    let mut action = None;
+    for banner in list {
+        let fill = banner.severity.color();
+        let ink = match banner.severity {
+            Severity::Info => theme::TEXT,
+            _ => theme::ON_SIGNAL,
+        };
+        egui::Frame::new()
+            .fill(fill)
+            .inner_margin(egui::Margin::symmetric(10, 5))
+            .show(ui, |ui| {
+                ui.set_min_width(ui.available_width());
+                ui.horizontal(|ui| {
+                    ui.label(RichText::new(banner.title).strong().size(15.0).color(ink));
+                    if let Some((name, remedy)) = &banner.remedy
+                        && ui.button(*name).clicked()
+                    {
+                        action = Some(remedy.clone());
+                    }
+                    ui.add(egui::Label::new(RichText::new(&banner.text).color(ink)).wrap())
+                        .on_hover_text(&banner.text);
+                });
+            });
+    }
+    action
+}
+
+pub fn status_ui(ui: &mut egui::Ui, shown: &Shown) -> Option<Action> {
+    let mut action = None;
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Stylet").strong().size(17.0));
+        link_ui(ui, shown);
+        ui.separator();
+        figures_ui(ui, shown);
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            if ui.button("Help").on_hover_text("Key F1").clicked() {
+                action = Some(Action::ToggleHelp);
+            }
+            if ui.button("Parameters").clicked() {
+                action = Some(Action::OpenParameters);
+            }
+            force_ui(ui, shown);
+        });
+    });
+    action
+}
+
+fn link_ui(ui: &mut egui::Ui, shown: &Shown) {
+    let (word, color) = match shown.status {
+        LinkStatus::Live => ("LIVE", theme::GOOD),
+        LinkStatus::Silent { .. } => ("SILENT", theme::BAD),
+        LinkStatus::Absent { .. } => ("ABSENT", theme::BAD),
+    };
+    let response = badge(ui, word, color);
+    if let Some(session) = &shown.session {
+        response.on_hover_text(format!(
+            "instance {}, session {:016x}, process {}, version {}\nforce loop {}, tissue {}\nmessages not believed: {}",
+            shown.instance,
+            session.session_id,
+            session.pid,
+            session.version.read(),
+            format::rate(session.period_ns),
+            format::rate(session.tissue_period_ns),
+            shown.rubbish_refused
+        ));
+    }
+    if shown.is_absent() {
+        return;
+    }
+    if shown.state.is_some() {
+        let (word, color) = if shown.is_real_time() {
+            ("REAL-TIME", theme::GOOD)
+        } else {
+            ("not real-time", theme::WARN)
+        };
+        badge(ui, word, color);
+    }
+    if let Some(session) = &shown.session {
+        let device = session.device.read();
+        let short = format!("{:04x}", session.session_id & 0xffff);
+        let text = theme::weak(format!("{device}, session {short}"));
+        ui.add(egui::Label::new(text).truncate());
+    }
+}
+
+fn badge(ui: &mut egui::Ui, word: &str, color: Color32) -> egui::Response {
+    egui::Frame::new()
+        .fill(color)
+        .corner_radius(4)
+        .inner_margin(egui::Margin::symmetric(6, 2))
+        .show(ui, |ui| {
+            ui.label(RichText::new(word).strong().size(12.0).color(theme::ON_SIGNAL))
+        })
+        .response
+}
+
+fn figures_ui(ui: &mut egui::Ui, shown: &Shown) {
+    let state = shown.state.as_ref();
+    let na = || "n/a".to_owned();
+    figure(ui, "phase", shown.phase(), 126.0);
+    figure(ui, "depth", &state.map_or_else(na, |s| format::length(s.depth_m)), 58.0);
+    figure(ui, "speed", &state.map_or_else(na, |s| format::speed(s.speed_m_per_s)), 72.0);
+}
+
+/// Fixed width, so that the bar does not jump as figures change.
+fn figure(ui: &mut egui::Ui, name: &str, value: &str, width: f32) {
+    ui.label(theme::small(name));
+    let height = ui.spacing().interact_size.y;
+    ui.allocate_ui_with_layout(Vec2::new(width, height), Layout::left_to_right(Align::Center), |ui| {
+        ui.set_min_width(width);
+        ui.add(egui::Label::new(RichText::new(value).strong()).truncate());
+    });
+}
+
+/// Right to left: the scale, the bar, its name.
+fn force_ui(ui: &mut egui::Ui, shown: &Shown) {
+    let scale = shown
+        .state
+        .map(|s| s.force_scale)
+        .or_else(|| shown.parameters.map(|p| p.set.get(ParameterId::ForceScale)));
+    let text = scale.map_or("scale n/a".to_owned(), |s| format!("scale {s:.2}"));
+    ui.label(theme::weak(text))
+        .on_hover_text("Force on the hand for each newton of a real needle");
+    let (force, limit, peak) = shown.state.map_or((0.0, 0.0, 0.0), |s| {
+        let size = s.force_on_hand_n.iter().map(|c| c * c).sum::<f64>().sqrt();
+        (size, s.device_limit_n, s.peak_force_n)
+    });
+    let known = shown.state.is_some();
+    let label = match (known, limit > 0.0) {
+        (false, _) => "n/a".to_owned(),
+        (true, false) => format::force(force),
+        (true, true) => format!("{} of {limit:.1} N", format::force(force)),
+    };
+    let (rect, response) = ui.allocate_exact_size(Vec2::new(140.0, 18.0), Sense::hover());
+    let share = |value: f64| if limit > 0.0 { (value / limit).clamp(0.0, 1.0) as f32 } else { 0.0 };
+    let painter = ui.painter();
+    painter.rect_filled(rect, 3.0, theme::BACKGROUND);
+    let mut filled = rect;
+    filled.set_width(rect.width() * share(force));
+    let color = if share(force) > 0.85 { theme::BAD } else { theme::PLOT_FORCE.gamma_multiply(0.75) };
+    painter.rect_filled(filled, 3.0, color);
+    if peak > 0.0 && limit > 0.0 {
+        let x = rect.left() + rect.width() * share(peak);
+        painter.vline(x, rect.y_range(), egui::Stroke::new(1.5, theme::TEXT));
+    }
+    let font = egui::FontId::proportional(12.0);
+    painter.text(rect.center(), egui::Align2::CENTER_CENTER, &label, font, theme::TEXT);
+    response.widget_info(|| {
+        egui::WidgetInfo::labeled(egui::accesskit::Role::ProgressIndicator, true, format!("Force {label}"))
+    });
+    response.on_hover_text(format!("Peak since the last reset: {}", format::force(peak)));
+    ui.label(theme::small("force"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+    use stylet_shm_schema::{HapticState, flags};
+
+    fn live() -> Shown {
+        let mut shown = Shown::empty("lab");
+        shown.status = LinkStatus::Live;
+        let mut state = HapticState::zeroed();
+        state.flags = flags::REAL_TIME | flags::ENGAGED;
+        shown.state = Some(state);
+        shown
+    }
+
+    #[test]
+    fn all_well_needs_no_banner_and_absence_says_what_to_type() {
+        assert!(banners(&live()).is_empty());
+        let list = banners(&Shown::empty("lab"));
+        assert!(list[0].text.contains("rt-core --instance lab"), "{}", list[0].text);
+    }
+
+    #[test]
+    fn fault_comes_first_and_an_unknown_one_is_a_fault() {
+        let mut shown = live();
+        if let Some(state) = &mut shown.state {
+            (state.fault, state.flags) = (999, 0);
+        }
+        let list = banners(&shown);
+        assert_eq!(list[0].severity, Severity::Bad);
+        assert_eq!(list[1].title, "Not real-time");
+    }
+}

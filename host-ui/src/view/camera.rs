@@ -1,0 +1,127 @@
+//! An orbiting camera: where the eye is, and how a point of the scene lands on the picture.
+
+use nalgebra::{Matrix4, Perspective3, Point3, Vector3, Vector4};
+
+const FIELD_OF_VIEW_RAD: f32 = 0.55;
+const NEAREST_M: f32 = 0.01;
+const FARTHEST_M: f32 = 5.0;
+/// Short of the pole, where "up" has no meaning.
+const STEEPEST_RAD: f32 = 1.5;
+
+/// `yaw` turns about +y, `pitch` lifts the eye; at zero the eye looks along +x and +z points right.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    pub target_m: [f32; 3],
+    pub yaw_rad: f32,
+    pub pitch_rad: f32,
+    pub distance_m: f32,
+}
+
+impl Default for Camera {
+    fn default() -> Self {
+        Self::looking_at([0.03; 3], 0.05)
+    }
+}
+
+impl Camera {
+    /// The view to begin with: the whole of a body of this radius, needle from the left.
+    pub fn looking_at(target_m: [f32; 3], radius_m: f32) -> Self {
+        Self {
+            target_m,
+            yaw_rad: 0.5,
+            pitch_rad: 0.32,
+            distance_m: (radius_m * 4.6).clamp(NEAREST_M, FARTHEST_M),
+        }
+    }
+
+    pub fn orbit(&mut self, turn_rad: [f32; 2]) {
+        self.yaw_rad = (self.yaw_rad + turn_rad[0]) % std::f32::consts::TAU;
+        self.pitch_rad = (self.pitch_rad + turn_rad[1]).clamp(-STEEPEST_RAD, STEEPEST_RAD);
+    }
+
+    /// `shift` is in heights of the picture, so that what lies at the target follows the pointer.
+    pub fn pan(&mut self, shift: [f32; 2]) {
+        let per_height = self.height_at_target_m();
+        let (right, up) = self.right_and_up();
+        let moved = (right * -shift[0] + up * shift[1]) * per_height;
+        let target = Vector3::from(self.target_m) + moved;
+        self.target_m = target.map(|c| c.clamp(-FARTHEST_M, FARTHEST_M)).into();
+    }
+
+    pub fn zoom(&mut self, factor: f32) {
+        self.distance_m = (self.distance_m / factor).clamp(NEAREST_M, FARTHEST_M);
+    }
+
+    /// Height of the picture in m at the distance of the target.
+    pub fn height_at_target_m(&self) -> f32 {
+        2.0 * self.distance_m * (0.5 * FIELD_OF_VIEW_RAD).tan()
+    }
+
+    pub fn eye_m(&self) -> Vector3<f32> {
+        Vector3::from(self.target_m) - self.forward() * self.distance_m
+    }
+
+    pub fn forward(&self) -> Vector3<f32> {
+        let (sy, cy) = self.yaw_rad.sin_cos();
+        let (sp, cp) = self.pitch_rad.sin_cos();
+        Vector3::new(cy * cp, -sp, sy * cp)
+    }
+
+    pub fn right_and_up(&self) -> (Vector3<f32>, Vector3<f32>) {
+        let forward = self.forward();
+        let right = forward.cross(&Vector3::y()).normalize();
+        (right, right.cross(&forward))
+    }
+
+    /// Depth 0 to 1, as wgpu has it.
+    pub fn clip_from_scene(&self, aspect: f32) -> Matrix4<f32> {
+        let near = self.distance_m * 0.05;
+        let far = self.distance_m * 8.0 + 1.0;
+        let gl = Perspective3::new(aspect.max(0.01), FIELD_OF_VIEW_RAD, near, far).to_homogeneous();
+        #[rustfmt::skip]
+        let half_depth = Matrix4::new(
+            1.0, 0.0, 0.0, 0.0,
+            0.0, 1.0, 0.0, 0.0,
+            0.0, 0.0, 0.5, 0.5,
+            0.0, 0.0, 0.0, 1.0,
+        );
+        let eye = Point3::from(self.eye_m());
+        let view = Matrix4::look_at_rh(&eye, &Point3::from(Vector3::from(self.target_m)), &Vector3::y());
+        half_depth * gl * view
+    }
+
+    /// Place on the picture, 0 to 1 from the upper left; `None` behind the eye.
+    pub fn project(&self, aspect: f32, point_m: [f32; 3]) -> Option<[f32; 2]> {
+        let [x, y, z] = point_m;
+        let clip = self.clip_from_scene(aspect) * Vector4::new(x, y, z, 1.0);
+        (clip.w > 1e-6).then(|| [0.5 + 0.5 * clip.x / clip.w, 0.5 - 0.5 * clip.y / clip.w])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn target_is_in_the_middle_and_z_points_right() {
+        let camera = Camera::looking_at([0.01, 0.02, 0.03], 0.05);
+        let [x, y] = camera.project(1.5, [0.01, 0.02, 0.03]).expect("in front");
+        assert!((x - 0.5).abs() < 1e-4 && (y - 0.5).abs() < 1e-4);
+        let [right, _] = camera.project(1.5, [0.01, 0.02, 0.04]).expect("in front");
+        assert!(right > x);
+        let [_, above] = camera.project(1.5, [0.01, 0.03, 0.03]).expect("in front");
+        assert!(above < y);
+    }
+
+    #[test]
+    fn no_amount_of_dragging_leaves_the_numbers() {
+        let mut camera = Camera::default();
+        for _ in 0..1000 {
+            camera.orbit([3.0, 3.0]);
+            camera.zoom(0.1);
+            camera.pan([100.0, -100.0]);
+        }
+        assert!(camera.clip_from_scene(1.0).iter().all(|c| c.is_finite()));
+        assert!(camera.distance_m <= FARTHEST_M);
+    }
+}

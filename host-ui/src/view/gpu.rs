@@ -1,0 +1,396 @@
+//! The offscreen picture: textures, pipelines and buffers on the graphics card.
+//!
+//! The picture is drawn into a texture of its own and shown as an image, so that a window and a test see the same pixels.
+
+use super::marks::{MarkVertex, Marks};
+use super::mesh::SurfaceVertex;
+use bytemuck::{Pod, Zeroable};
+use eframe::egui_wgpu::RenderState;
+use eframe::wgpu;
+use std::mem::size_of;
+
+/// What egui takes for an image that is already gamma-encoded.
+const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+const SAMPLES: u32 = 4;
+const LARGEST_SIDE: u32 = 4096;
+
+/// As `Scene` in `scene.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct SceneUniform {
+    pub clip_from_scene: [[f32; 4]; 4],
+    pub eye_m: [f32; 4],
+    pub light: [f32; 4],
+    pub surface: [f32; 4],
+    pub look: [f32; 4],
+}
+
+/// A buffer that grows by doubling and is otherwise reused.
+struct Growing {
+    buffer: wgpu::Buffer,
+    usage: wgpu::BufferUsages,
+    /// Elements that count, not bytes.
+    len: u32,
+}
+
+impl Growing {
+    fn new(device: &wgpu::Device, usage: wgpu::BufferUsages) -> Self {
+        Self {
+            buffer: allocate(device, usage, 1024),
+            usage,
+            len: 0,
+        }
+    }
+
+    fn write<T: Pod>(&mut self, state: &RenderState, items: &[T]) {
+        let bytes: &[u8] = bytemuck::cast_slice(items);
+        let size = bytes.len() as u64;
+        if size > state.device.limits().max_buffer_size {
+            // A scene that does not fit is not drawn; the rest of the window goes on.
+            self.len = 0;
+            return;
+        }
+        if size > self.buffer.size() {
+            self.buffer = allocate(&state.device, self.usage, size.next_power_of_two());
+        }
+        if size > 0 {
+            state.queue.write_buffer(&self.buffer, 0, bytes);
+        }
+        self.len = items.len() as u32;
+    }
+}
+
+fn allocate(device: &wgpu::Device, usage: wgpu::BufferUsages, size: u64) -> wgpu::Buffer {
+    device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("stylet view"),
+        size,
+        usage: usage | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}
+
+struct Targets {
+    size: [u32; 2],
+    resolved: wgpu::TextureView,
+    color: wgpu::TextureView,
+    depth: wgpu::TextureView,
+    id: egui::TextureId,
+}
+
+struct Pipelines {
+    solid: wgpu::RenderPipeline,
+    line: wgpu::RenderPipeline,
+    surface_back: wgpu::RenderPipeline,
+    surface_front: wgpu::RenderPipeline,
+}
+
+struct Material {
+    uniform: wgpu::Buffer,
+    bind: wgpu::BindGroup,
+}
+
+pub struct Gpu {
+    state: RenderState,
+    pipelines: Pipelines,
+    gland: Material,
+    ghost: Material,
+    solids: Growing,
+    lines: Growing,
+    gland_vertices: Growing,
+    ghost_vertices: Growing,
+    indices: Growing,
+    targets: Option<Targets>,
+}
+
+impl Gpu {
+    pub fn new(state: RenderState) -> Self {
+        let device = &state.device;
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("stylet scene"),
+            entries: &[wgpu::BindGroupLayoutEntry {
+                binding: 0,
+                visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+                ty: wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Uniform,
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+                count: None,
+            }],
+        });
+        let vertex = wgpu::BufferUsages::VERTEX;
+        Self {
+            pipelines: pipelines(device, &layout),
+            gland: material(device, &layout),
+            ghost: material(device, &layout),
+            solids: Growing::new(device, vertex),
+            lines: Growing::new(device, vertex),
+            gland_vertices: Growing::new(device, vertex),
+            ghost_vertices: Growing::new(device, vertex),
+            indices: Growing::new(device, wgpu::BufferUsages::INDEX),
+            targets: None,
+            state,
+        }
+    }
+
+    pub fn set_scene(&mut self, rest: &[SurfaceVertex], indices: &[u32]) {
+        self.ghost_vertices.write(&self.state, rest);
+        self.indices.write(&self.state, indices);
+    }
+
+    pub fn set_surface(&mut self, vertices: &[SurfaceVertex]) {
+        self.gland_vertices.write(&self.state, vertices);
+    }
+
+    pub fn set_marks(&mut self, marks: &Marks) {
+        self.solids.write(&self.state, &marks.triangles);
+        self.lines.write(&self.state, &marks.lines);
+    }
+
+    /// Sizes in pixels. True when the picture is new and has to be drawn.
+    pub fn resize(&mut self, size: [u32; 2]) -> bool {
+        let size = size.map(|side| side.clamp(1, LARGEST_SIDE));
+        if self.targets.as_ref().is_some_and(|t| t.size == size) {
+            return false;
+        }
+        let old = self.targets.take().map(|t| t.id);
+        self.targets = Some(targets(&self.state, size, old));
+        true
+    }
+
+    pub fn texture(&self) -> Option<egui::TextureId> {
+        self.targets.as_ref().map(|t| t.id)
+    }
+
+    /// Opaque first, then the rest shape, then the gland's far side and its near side.
+    pub fn draw(&mut self, gland: &SceneUniform, ghost: Option<&SceneUniform>, clear: [f64; 3]) {
+        let Some(targets) = &self.targets else { return };
+        let queue = &self.state.queue;
+        queue.write_buffer(&self.gland.uniform, 0, bytemuck::bytes_of(gland));
+        if let Some(ghost) = ghost {
+            queue.write_buffer(&self.ghost.uniform, 0, bytemuck::bytes_of(ghost));
+        }
+        let mut encoder = self
+            .state
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("stylet view") });
+        {
+            let mut pass = begin(&mut encoder, targets, clear);
+            pass.set_bind_group(0, &self.gland.bind, &[]);
+            draw_list(&mut pass, &self.pipelines.solid, &self.solids);
+            draw_list(&mut pass, &self.pipelines.line, &self.lines);
+            if ghost.is_some() {
+                pass.set_bind_group(0, &self.ghost.bind, &[]);
+                self.draw_surface(&mut pass, &self.pipelines.surface_front, &self.ghost_vertices);
+                pass.set_bind_group(0, &self.gland.bind, &[]);
+            }
+            self.draw_surface(&mut pass, &self.pipelines.surface_back, &self.gland_vertices);
+            self.draw_surface(&mut pass, &self.pipelines.surface_front, &self.gland_vertices);
+        }
+        queue.submit([encoder.finish()]);
+    }
+
+    fn draw_surface(&self, pass: &mut wgpu::RenderPass<'_>, pipeline: &wgpu::RenderPipeline, vertices: &Growing) {
+        // The indices were made for the rest shape; fewer vertices than that are not drawn.
+        if self.indices.len == 0 || vertices.len == 0 || vertices.len < self.ghost_vertices.len {
+            return;
+        }
+        pass.set_pipeline(pipeline);
+        pass.set_vertex_buffer(0, vertices.buffer.slice(..));
+        pass.set_index_buffer(self.indices.buffer.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..self.indices.len, 0, 0..1);
+    }
+}
+
+fn draw_list(pass: &mut wgpu::RenderPass<'_>, pipeline: &wgpu::RenderPipeline, list: &Growing) {
+    if list.len > 0 {
+        pass.set_pipeline(pipeline);
+        pass.set_vertex_buffer(0, list.buffer.slice(..));
+        pass.draw(0..list.len, 0..1);
+    }
+}
+
+fn begin<'a>(encoder: &'a mut wgpu::CommandEncoder, targets: &Targets, clear: [f64; 3]) -> wgpu::RenderPass<'a> {
+    let [r, g, b] = clear;
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some("stylet view"),
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view: &targets.color,
+            depth_slice: None,
+            resolve_target: Some(&targets.resolved),
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
+                store: wgpu::StoreOp::Discard,
+            },
+        })],
+        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+            view: &targets.depth,
+            depth_ops: Some(wgpu::Operations {
+                load: wgpu::LoadOp::Clear(1.0),
+                store: wgpu::StoreOp::Discard,
+            }),
+            stencil_ops: None,
+        }),
+        timestamp_writes: None,
+        occlusion_query_set: None,
+        multiview_mask: None,
+    })
+}
+
+fn targets(state: &RenderState, size: [u32; 2], old: Option<egui::TextureId>) -> Targets {
+    let make = |format, samples, usage| {
+        let texture = state.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("stylet view"),
+            size: wgpu::Extent3d {
+                width: size[0],
+                height: size[1],
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: samples,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage,
+            view_formats: &[],
+        });
+        texture.create_view(&wgpu::TextureViewDescriptor::default())
+    };
+    let drawn = wgpu::TextureUsages::RENDER_ATTACHMENT;
+    let resolved = make(COLOR, 1, drawn | wgpu::TextureUsages::TEXTURE_BINDING);
+    let mut renderer = state.renderer.write();
+    let filter = wgpu::FilterMode::Linear;
+    let id = match old {
+        Some(id) => {
+            renderer.update_egui_texture_from_wgpu_texture(&state.device, &resolved, filter, id);
+            id
+        }
+        None => renderer.register_native_texture(&state.device, &resolved, filter),
+    };
+    Targets {
+        size,
+        color: make(COLOR, SAMPLES, drawn),
+        depth: make(DEPTH, SAMPLES, drawn),
+        resolved,
+        id,
+    }
+}
+
+fn material(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> Material {
+    let uniform = allocate(device, wgpu::BufferUsages::UNIFORM, size_of::<SceneUniform>() as u64);
+    let bind = device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("stylet scene"),
+        layout,
+        entries: &[wgpu::BindGroupEntry {
+            binding: 0,
+            resource: uniform.as_entire_binding(),
+        }],
+    });
+    Material { uniform, bind }
+}
+
+fn pipelines(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> Pipelines {
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some("stylet scene"),
+        source: wgpu::ShaderSource::Wgsl(include_str!("scene.wgsl").into()),
+    });
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("stylet scene"),
+        bind_group_layouts: &[Some(layout)],
+        immediate_size: 0,
+    });
+    let mark = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4];
+    let surface = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
+    let solid = Kind {
+        stage: "mark",
+        stride: size_of::<MarkVertex>(),
+        attributes: &mark,
+        topology: wgpu::PrimitiveTopology::TriangleList,
+        cull: None,
+        opaque: true,
+    };
+    let front = Kind {
+        stage: "surface",
+        stride: size_of::<SurfaceVertex>(),
+        attributes: &surface,
+        topology: wgpu::PrimitiveTopology::TriangleList,
+        cull: Some(wgpu::Face::Back),
+        opaque: false,
+    };
+    let line = Kind {
+        topology: wgpu::PrimitiveTopology::LineList,
+        ..solid
+    };
+    let back = Kind {
+        cull: Some(wgpu::Face::Front),
+        ..front
+    };
+    Pipelines {
+        solid: pipeline(device, &layout, &module, &solid),
+        line: pipeline(device, &layout, &module, &line),
+        surface_back: pipeline(device, &layout, &module, &back),
+        surface_front: pipeline(device, &layout, &module, &front),
+    }
+}
+
+/// In what the four pipelines differ.
+#[derive(Clone, Copy)]
+struct Kind<'a> {
+    stage: &'static str,
+    stride: usize,
+    attributes: &'a [wgpu::VertexAttribute],
+    topology: wgpu::PrimitiveTopology,
+    cull: Option<wgpu::Face>,
+    opaque: bool,
+}
+
+fn pipeline(
+    device: &wgpu::Device,
+    layout: &wgpu::PipelineLayout,
+    module: &wgpu::ShaderModule,
+    kind: &Kind<'_>,
+) -> wgpu::RenderPipeline {
+    let blend = (!kind.opaque).then_some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(kind.stage),
+        layout: Some(layout),
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some(&format!("{}_vertex", kind.stage)),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            buffers: &[Some(wgpu::VertexBufferLayout {
+                array_stride: kind.stride as u64,
+                step_mode: wgpu::VertexStepMode::Vertex,
+                attributes: kind.attributes,
+            })],
+        },
+        primitive: wgpu::PrimitiveState {
+            topology: kind.topology,
+            cull_mode: kind.cull,
+            ..Default::default()
+        },
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(kind.opaque),
+            depth_compare: Some(wgpu::CompareFunction::Less),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState {
+            count: SAMPLES,
+            ..Default::default()
+        },
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: Some(&format!("{}_fragment", kind.stage)),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            targets: &[Some(wgpu::ColorTargetState {
+                format: COLOR,
+                blend,
+                write_mask: wgpu::ColorWrites::ALL,
+            })],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}

@@ -1,0 +1,244 @@
+//! Solids and lines that are not tissue: needle, seeds, path, entry, grid and axes.
+
+use crate::theme;
+use bytemuck::{Pod, Zeroable};
+use egui::Color32;
+use nalgebra::Vector3;
+
+type V = Vector3<f32>;
+
+pub const SEED_LENGTH_M: f32 = 4.5e-3;
+pub const SEED_RADIUS_M: f32 = 0.4e-3;
+/// 18 gauge.
+const NEEDLE_RADIUS_M: f32 = 0.635e-3;
+const NEEDLE_LENGTH_M: f32 = 0.12;
+const BEVEL_M: f32 = 2.5e-3;
+const RING_RADIUS_M: f32 = 1.6e-3;
+const RING_THICKNESS_M: f32 = 0.16e-3;
+const DASH_M: f32 = 2e-3;
+const SIDES: usize = 16;
+const CAP_RINGS: usize = 4;
+
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct MarkVertex {
+    pub place_m: [f32; 3],
+    /// Zero for lines, which are not lit.
+    pub normal: [f32; 3],
+    pub color: [u8; 4],
+}
+
+/// Triangles and line segments of one picture, both as plain lists.
+#[derive(Default)]
+pub struct Marks {
+    pub triangles: Vec<MarkVertex>,
+    pub lines: Vec<MarkVertex>,
+}
+
+fn single(v: [f64; 3]) -> V {
+    V::new(v[0] as f32, v[1] as f32, v[2] as f32)
+}
+
+/// A unit vector, whatever came.
+fn unit_or_z(v: V) -> V {
+    v.try_normalize(1e-6).unwrap_or_else(V::z)
+}
+
+fn frame_about(axis: V) -> (V, V) {
+    let helper = if axis.x.abs() < 0.8 { V::x() } else { V::y() };
+    let u = unit_or_z(axis.cross(&helper));
+    (u, axis.cross(&u))
+}
+
+impl Marks {
+    pub fn clear(&mut self) {
+        self.triangles.clear();
+        self.lines.clear();
+    }
+
+    pub fn needle(&mut self, tip_m: [f64; 3], direction: [f64; 3]) {
+        let (tip, axis) = (single(tip_m), unit_or_z(single(direction)));
+        let shoulder = tip - axis * BEVEL_M;
+        let hub = tip - axis * NEEDLE_LENGTH_M;
+        self.cone(hub, shoulder, [NEEDLE_RADIUS_M, NEEDLE_RADIUS_M], theme::NEEDLE);
+        self.cone(shoulder, tip, [NEEDLE_RADIUS_M, 0.0], theme::NEEDLE_TIP);
+        // The hub, so that a person sees which end is held.
+        let grip = hub - axis * 0.012;
+        self.cone(grip, hub, [2.6e-3, 2.0e-3], theme::PATH);
+        self.cone(grip - axis * 1e-4, grip, [0.0, 2.6e-3], theme::PATH);
+        self.cone(hub, hub + axis * 1e-4, [2.0e-3, 0.0], theme::PATH);
+    }
+
+    pub fn placed_seed(&mut self, center_m: [f64; 3], axis: [f64; 3]) {
+        let (center, axis) = (single(center_m), unit_or_z(single(axis)));
+        let half = axis * (0.5 * SEED_LENGTH_M - SEED_RADIUS_M);
+        let radius = SEED_RADIUS_M * 1.35;
+        self.cone(center - half, center + half, [radius, radius], theme::SEED_PLACED);
+        self.cap(center + half, axis, radius, theme::SEED_PLACED);
+        self.cap(center - half, -axis, radius, theme::SEED_PLACED);
+    }
+
+    /// Three rings, a wire sphere: nothing like the capsule of a placed seed.
+    pub fn planned_seed(&mut self, center_m: [f64; 3], direction: [f64; 3]) {
+        let (center, axis) = (single(center_m), unit_or_z(single(direction)));
+        let (u, v) = frame_about(axis);
+        for (a, b) in [(u, v), (axis, u), (axis, v)] {
+            self.ring(center, a, b, RING_RADIUS_M, theme::SEED_PLANNED);
+        }
+    }
+
+    pub fn path(&mut self, from_m: [f64; 3], to_m: [f64; 3]) {
+        let (from, to) = (single(from_m), single(to_m));
+        let length = (to - from).norm().min(1.0);
+        let axis = unit_or_z(to - from);
+        let dashes = (length / (2.0 * DASH_M)).ceil() as usize;
+        for dash in 0..dashes {
+            let start = dash as f32 * 2.0 * DASH_M;
+            let end = (start + DASH_M).min(length);
+            self.cone(from + axis * start, from + axis * end, [0.17e-3; 2], theme::PATH);
+        }
+    }
+
+    /// A flat ring and a cross about the place where the needle goes in.
+    pub fn entry(&mut self, place_m: [f64; 3], direction: [f64; 3]) {
+        let (center, axis) = (single(place_m), unit_or_z(single(direction)));
+        let (u, v) = frame_about(axis);
+        self.ring(center, u, v, 3.2e-3, theme::ENTRY);
+        for arm in [u, -u, v, -v] {
+            self.cone(center + arm * 2.0e-3, center + arm * 4.6e-3, [0.2e-3; 2], theme::ENTRY);
+        }
+    }
+
+    /// Lines each 10 mm under the body, and the three axes from its corner.
+    pub fn ground(&mut self, lower_m: [f64; 3], upper_m: [f64; 3]) {
+        const STEP_M: f32 = 0.01;
+        let (lower, upper) = (single(lower_m), single(upper_m));
+        let y = lower.y - STEP_M;
+        let cells = |from: f32, to: f32| {
+            let first = (from / STEP_M).floor() - 1.0;
+            let last = (to / STEP_M).ceil() + 1.0;
+            (first, (last - first).clamp(1.0, 60.0) as usize)
+        };
+        let (x0, nx) = cells(lower.x, upper.x);
+        let (z0, nz) = cells(lower.z, upper.z);
+        let at = |i: usize, k: usize| V::new((x0 + i as f32) * STEP_M, y, (z0 + k as f32) * STEP_M);
+        for i in 0..=nx {
+            self.line(at(i, 0), at(i, nz), theme::GRID);
+        }
+        for k in 0..=nz {
+            self.line(at(0, k), at(nx, k), theme::GRID);
+        }
+        let corner = at(0, 0);
+        for axis in [V::x(), V::y(), V::z()] {
+            self.cone(corner, corner + axis * STEP_M, [0.2e-3; 2], theme::WEAK);
+            self.cone(corner + axis * STEP_M, corner + axis * 1.25 * STEP_M, [0.6e-3, 0.0], theme::WEAK);
+        }
+    }
+
+    /// Where [`Self::ground`] put its corner.
+    pub fn ground_corner(lower_m: [f64; 3]) -> [f32; 3] {
+        const STEP_M: f32 = 0.01;
+        let lower = single(lower_m);
+        [
+            ((lower.x / STEP_M).floor() - 1.0) * STEP_M,
+            lower.y - STEP_M,
+            ((lower.z / STEP_M).floor() - 1.0) * STEP_M,
+        ]
+    }
+
+    fn line(&mut self, from: V, to: V, color: Color32) {
+        for place in [from, to] {
+            self.lines.push(vertex(place, V::zeros(), color));
+        }
+    }
+
+    fn quad(&mut self, corners: [(V, V); 4], color: Color32) {
+        for index in [0, 1, 2, 0, 2, 3] {
+            let (place, normal) = corners[index];
+            self.triangles.push(vertex(place, normal, color));
+        }
+    }
+
+    /// The side of a cone, a cylinder when both radii are the same; open at both ends.
+    fn cone(&mut self, from: V, to: V, radii: [f32; 2], color: Color32) {
+        let axis = unit_or_z(to - from);
+        let (u, v) = frame_about(axis);
+        let slope = (radii[0] - radii[1]) / (to - from).norm().max(1e-9);
+        let around = |side: usize| {
+            let (s, c) = (std::f32::consts::TAU * side as f32 / SIDES as f32).sin_cos();
+            u * c + v * s
+        };
+        for side in 0..SIDES {
+            let (a, b) = (around(side), around(side + 1));
+            let (na, nb) = (unit_or_z(a + axis * slope), unit_or_z(b + axis * slope));
+            let corners = [
+                (from + a * radii[0], na),
+                (from + b * radii[0], nb),
+                (to + b * radii[1], nb),
+                (to + a * radii[1], na),
+            ];
+            self.quad(corners, color);
+        }
+    }
+
+    fn cap(&mut self, center: V, axis: V, radius: f32, color: Color32) {
+        let (u, v) = frame_about(axis);
+        let normal = |ring: usize, side: usize| {
+            let (lift, out) = (std::f32::consts::FRAC_PI_2 * ring as f32 / CAP_RINGS as f32).sin_cos();
+            let (s, c) = (std::f32::consts::TAU * side as f32 / SIDES as f32).sin_cos();
+            (u * c + v * s) * out + axis * lift
+        };
+        for ring in 0..CAP_RINGS {
+            for side in 0..SIDES {
+                let corners = [(ring, side), (ring, side + 1), (ring + 1, side + 1), (ring + 1, side)]
+                    .map(|(r, s)| (center + normal(r, s) * radius, normal(r, s)));
+                self.quad(corners, color);
+            }
+        }
+    }
+
+    fn ring(&mut self, center: V, a: V, b: V, radius: f32, color: Color32) {
+        const STEPS: usize = 28;
+        const TUBE: usize = 6;
+        let out_of_plane = a.cross(&b);
+        let corner = |step: usize, tube: usize| {
+            let (s, c) = (std::f32::consts::TAU * step as f32 / STEPS as f32).sin_cos();
+            let (ts, tc) = (std::f32::consts::TAU * tube as f32 / TUBE as f32).sin_cos();
+            let outward = a * c + b * s;
+            let normal = outward * tc + out_of_plane * ts;
+            (center + outward * radius + normal * RING_THICKNESS_M, normal)
+        };
+        for step in 0..STEPS {
+            for tube in 0..TUBE {
+                let corners = [(step, tube), (step + 1, tube), (step + 1, tube + 1), (step, tube + 1)]
+                    .map(|(s, t)| corner(s, t));
+                self.quad(corners, color);
+            }
+        }
+    }
+}
+
+fn vertex(place: V, normal: V, color: Color32) -> MarkVertex {
+    MarkVertex {
+        place_m: place.into(),
+        normal: normal.into(),
+        color: color.to_array(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_of_degenerate_input_are_finite() {
+        let mut marks = Marks::default();
+        marks.needle([0.0; 3], [0.0; 3]);
+        marks.placed_seed([1.0; 3], [0.0; 3]);
+        marks.planned_seed([0.0; 3], [0.0; 3]);
+        marks.path([0.0; 3], [0.0; 3]);
+        marks.ground([-20.0; 3], [20.0; 3]);
+        let all = marks.triangles.iter().chain(&marks.lines);
+        assert!(all.flat_map(|v| v.place_m.iter().chain(&v.normal)).all(|c| c.is_finite()));
+    }
+}
