@@ -1,12 +1,14 @@
 //! The operator's program: what it reads from the core, the files it opens, the procedure it runs.
 
 pub mod app;
+pub mod cli;
 pub mod files;
 pub mod format;
 pub mod keyboard;
 pub mod link;
 mod loader;
 pub mod panel;
+pub mod procedure;
 pub mod theme;
 pub mod view;
 pub mod workflow;

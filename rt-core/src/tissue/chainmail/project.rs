@@ -45,9 +45,6 @@ impl Halves {
     }
 }
 
-<<<<<<< HEAD
-fn project_run(limits: &crate::tissue::limits::LinkLimits, run: Run, upward: bool, u: &mut [Vec<f32>; 3]) {
-=======
 fn project_run(
     limits: &LinkLimits,
     run: Run,
@@ -55,7 +52,6 @@ fn project_run(
     u: &mut [Vec<f32>; 3],
     halves: &mut Halves,
 ) {
->>>>>>> tissue
     let (first, end) = (run.first as usize, run.end() as usize);
     let odd_count = (end - first) / 2;
     let even_count = end - first - odd_count;
@@ -142,7 +138,12 @@ fn smallest_scale(model: &ChainMail, part: u32, u: &[Vec<f32>; 3]) -> f32 {
     let along_z = model.z_links.all().iter().map(|s| (z, [2, 0, 1], s));
     for (limits, order, span) in along_y.chain(along_z) {
         for n in 0..span.len {
-            link(limits, order, (span.lo + n) as usize, (span.hi + n) as usize);
+            link(
+                limits,
+                order,
+                (span.lo + n) as usize,
+                (span.hi + n) as usize,
+            );
         }
     }
     scale
