@@ -30,4 +30,4 @@ deps-run:
 	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers
 
 deps-test:
-	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers python3-nibabel
+	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers python3-nibabel xvfb

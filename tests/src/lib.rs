@@ -121,3 +121,39 @@ pub fn ask(link: &mut Link, kind: CommandKind, values: &[f64]) -> Result<u64, St
     let answer = answer.ok_or_else(|| format!("no answer to {kind:?}"))?;
     if answer.accepted { Ok(answer.effective_tick) } else { Err(answer.text) }
 }
+
+/// A display without a screen, for windows; closed when dropped.
+pub struct Display {
+    server: Child,
+    number: u32,
+}
+
+impl Display {
+    pub fn open() -> Self {
+        // The server picks a free number and writes it to its standard output.
+        let mut server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("Xvfb starts: `make test` installs it");
+        let mut line = String::new();
+        let output = server.stdout.take().expect("piped");
+        std::io::BufRead::read_line(&mut std::io::BufReader::new(output), &mut line).expect("Xvfb names its display");
+        let number = line.trim().parse().expect("a display number");
+        Self { server, number }
+    }
+
+    pub fn name(&self) -> String {
+        format!(":{}", self.number)
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        // SIGTERM lets the server remove its socket and lock file.
+        // SAFETY: the child is ours and not yet waited for.
+        unsafe { libc::kill(self.server.id() as libc::pid_t, libc::SIGTERM) };
+        let _ = self.server.wait();
+    }
+}

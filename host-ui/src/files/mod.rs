@@ -1,7 +1,7 @@
 //! Files that a user brings.
 
 mod affine;
-mod nifti;
+pub mod nifti;
 mod volume;
 
 pub use nifti::{FileError, read};

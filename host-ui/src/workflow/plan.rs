@@ -15,6 +15,7 @@ pub struct NeedlePlan {
     pub entry_m: [f64; 3],
     /// Unit vector from the entry into the gland.
     pub direction: [f64; 3],
+    /// In the order in which they are dropped: deepest first.
     pub seeds_m: Vec<[f64; 3]>,
 }
 
@@ -87,7 +88,7 @@ pub fn plan_with_seeds(scene: &SceneHeader, seeds: usize) -> NeedlePlan {
             let share = if seeds == 1 {
                 0.5
             } else {
-                first + (last - first) * i as f64 / (seeds - 1) as f64
+                last - (last - first) * i as f64 / (seeds - 1) as f64
             };
             (centre + direction * (half * (2.0 * share - 1.0))).into()
         })

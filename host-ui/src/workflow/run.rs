@@ -16,7 +16,7 @@ const REST_FOR: Duration = Duration::from_millis(60);
 const TISSUE_REST_M: f64 = 0.05e-3;
 const TISSUE_REST_FOR: Duration = Duration::from_millis(200);
 /// Tissue that takes longer to come back is left to do so.
-const TISSUE_REST_LIMIT: Duration = Duration::from_secs(5);
+const TISSUE_REST_LIMIT: Duration = Duration::from_secs(10);
 const REPLY_LIMIT: Duration = Duration::from_secs(3);
 const MOVE_MARGIN: Duration = Duration::from_secs(6);
 

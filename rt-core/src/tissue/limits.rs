@@ -26,7 +26,7 @@ impl Default for TissueParameters {
             max_stretch: 1.75,
             shear_deg: 26.565,
             shear_vert_deg: 26.565,
-            recovery_time_s: 0.25,
+            recovery_time_s: 1.0,
             residual_tolerance: 1e-3,
         }
     }
