@@ -1,6 +1,7 @@
 //! The operator's program: what it reads from the core, the files it opens, the procedure it runs.
 
 pub mod app;
+pub mod cli;
 pub mod files;
 pub mod format;
 pub mod keyboard;
@@ -9,4 +10,5 @@ mod loader;
 pub mod panel;
 pub mod theme;
 pub mod view;
+pub mod procedure;
 pub mod workflow;

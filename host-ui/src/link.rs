@@ -4,7 +4,7 @@ mod ports;
 mod receive;
 
 use crate::files::LabelVolume;
-use ports::{Board, OutgoingUpload, Ports, UploadPort};
+use ports::{Board, Ports, UploadPort};
 use receive::Latest;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -282,7 +282,7 @@ impl Link {
         let mut sample = port
             .loan_slice_uninit(expected)
             .map_err(|e| LinkError(format!("no room in shared memory for {expected} cells: {e:?}")))?;
-        *sample.user_header_mut() = OutgoingUpload(header);
+        *sample.user_header_mut() = header;
         let taken = sample.write_from_slice(&volume.cells).send();
         // The core still has to map the port's memory.
         self.upload_port = Some(port);

@@ -1,5 +1,15 @@
 //! A segmented volume as the core takes it: cubic elements on the lattice of the scene frame.
 
+use super::affine::VoxelFrame;
+use nalgebra::{Matrix3, Vector3};
+
+/// Room around the tissue.
+const MARGIN_M: f64 = 0.020;
+const MAX_DIM: usize = 1024;
+const MAX_TISSUE: usize = 4_000_000;
+const MAX_CELLS: usize = 64 << 20;
+const COARSER: f64 = 1.1;
+
 /// Element (i, j, k) has its centre at ((i + 0.5) h, (j + 0.5) h, (k + 0.5) h), x fastest; every cell but 0 is tissue.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelVolume {
@@ -13,4 +23,205 @@ pub struct LabelVolume {
     pub voxels_per_label: Vec<(u8, u64)>,
     /// What the user should know about how the file was read.
     pub warnings: Vec<String>,
+}
+
+/// The voxels of a file as they lie in it, x fastest.
+pub struct Voxels {
+    pub dims: [usize; 3],
+    pub labels: Vec<u8>,
+    pub frame: VoxelFrame,
+}
+
+/// First and last tissue voxel along each axis.
+type Bounds = ([usize; 3], [usize; 3]);
+
+impl LabelVolume {
+    pub fn tissue_elements(&self) -> usize {
+        self.cells.iter().filter(|&&c| c != 0).count()
+    }
+
+    pub fn from_voxels(voxels: &Voxels, label: Option<u8>, name: String) -> Result<Self, String> {
+        let mut counts = [0_u64; 256];
+        for &l in &voxels.labels {
+            counts[usize::from(l)] += 1;
+        }
+        let present: Vec<(u8, u64)> = (1..=255)
+            .map(|l| (l, counts[usize::from(l)]))
+            .filter(|p| p.1 > 0)
+            .collect();
+        let bounds = tissue_bounds(voxels, label).ok_or_else(|| no_tissue(label, &present))?;
+        let finest = voxels.frame.spacing_m.iter().fold(0.0_f64, |a, &b| a.max(b));
+        let mut h = finest;
+        loop {
+            let volume = Self::resampled(voxels, label, bounds, h);
+            if let Some((dims, origin, cells)) = volume.filter(|v| tissue(&v.2) <= MAX_TISSUE) {
+                if tissue(&cells) == 0 {
+                    return Err(format!("the tissue is thinner than its elements of {:.2} mm", h * 1e3));
+                }
+                let mut warnings: Vec<String> = voxels.frame.warning.iter().cloned().collect();
+                if h > finest {
+                    warnings.push(format!(
+                        "the elements were made {:.2} mm instead of {:.2} mm so that the volume can be sent",
+                        h * 1e3,
+                        finest * 1e3
+                    ));
+                }
+                if label.is_none() && present.len() > 1 {
+                    warnings.push(format!("all labels are taken as one tissue: {}", list(&present)));
+                }
+                return Ok(Self {
+                    dims,
+                    spacing_m: h,
+                    cells,
+                    patient_from_scene: transform(&voxels.frame, voxels.dims, origin),
+                    name,
+                    voxels_per_label: present,
+                    warnings,
+                });
+            }
+            h *= COARSER;
+        }
+    }
+
+    /// Size, corner of the lattice in the upright voxel frame (m), and cells; `None` when it would be too large.
+    fn resampled(v: &Voxels, label: Option<u8>, bounds: Bounds, h: f64) -> Option<([usize; 3], [f64; 3], Vec<u8>)> {
+        let (low, high) = upright(bounds, mirrored(&v.frame), v.dims);
+        let mut dims = [0; 3];
+        let mut corner = [0.0; 3];
+        for a in 0..3 {
+            let s = v.frame.spacing_m[a];
+            let margin = (MARGIN_M / h).ceil();
+            let inside = ((high[a] + 1 - low[a]) as f64 * s / h - 1e-9).ceil();
+            corner[a] = low[a] as f64 * s - margin * h;
+            dims[a] = (inside + 2.0 * margin) as usize;
+        }
+        let count = dims.iter().product::<usize>();
+        if dims.iter().any(|&d| d > MAX_DIM) || count > MAX_CELLS {
+            return None;
+        }
+        // Shares of each element that each voxel covers, per axis.
+        let covers = [0, 1, 2].map(|a| covers(dims[a], corner[a], h, v.frame.spacing_m[a], v.dims[a]));
+        let flip = mirrored(&v.frame);
+        let mut cells = vec![0_u8; count];
+        for k in 0..dims[2] {
+            for j in 0..dims[1] {
+                for i in 0..dims[0] {
+                    let share = covered(v, label, flip, [&covers[0][i], &covers[1][j], &covers[2][k]]);
+                    cells[(k * dims[1] + j) * dims[0] + i] = u8::from(share >= 0.5);
+                }
+            }
+        }
+        Some((dims, corner, cells))
+    }
+}
+
+fn tissue(cells: &[u8]) -> usize {
+    cells.iter().filter(|&&c| c != 0).count()
+}
+
+/// The first axis is turned round when the voxel axes are left-handed.
+fn mirrored(frame: &VoxelFrame) -> bool {
+    frame.directions.determinant() < 0.0
+}
+
+fn upright((mut low, mut high): Bounds, flip: bool, dims: [usize; 3]) -> Bounds {
+    if flip {
+        (low[0], high[0]) = (dims[0] - 1 - high[0], dims[0] - 1 - low[0]);
+    }
+    (low, high)
+}
+
+/// Voxels under each element with their shares of its length.
+fn covers(elements: usize, corner: f64, h: f64, side: f64, voxels: usize) -> Vec<Vec<(usize, f64)>> {
+    (0..elements)
+        .map(|e| {
+            let (from, to) = ((corner + e as f64 * h) / side, (corner + (e + 1) as f64 * h) / side);
+            let first = from.floor().max(0.0) as usize;
+            (first..voxels)
+                .take_while(|&x| (x as f64) < to)
+                .map(|x| (x, (to.min((x + 1) as f64) - from.max(x as f64)) / (to - from)))
+                .filter(|&(_, share)| share > 1e-9)
+                .collect()
+        })
+        .collect()
+}
+
+fn covered(v: &Voxels, label: Option<u8>, flip: bool, [xs, ys, zs]: [&Vec<(usize, f64)>; 3]) -> f64 {
+    let mut sum = 0.0;
+    for &(z, wz) in zs {
+        for &(y, wy) in ys {
+            let row = (z * v.dims[1] + y) * v.dims[0];
+            for &(x, wx) in xs {
+                let x = if flip { v.dims[0] - 1 - x } else { x };
+                if is_tissue(v.labels[row + x], label) {
+                    sum += wx * wy * wz;
+                }
+            }
+        }
+    }
+    sum + 1e-9
+}
+
+fn is_tissue(value: u8, label: Option<u8>) -> bool {
+    label.map_or(value != 0, |l| value == l && l != 0)
+}
+
+fn tissue_bounds(v: &Voxels, label: Option<u8>) -> Option<Bounds> {
+    let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
+    for (index, _) in v.labels.iter().enumerate().filter(|(_, l)| is_tissue(**l, label)) {
+        let at = [
+            index % v.dims[0],
+            index / v.dims[0] % v.dims[1],
+            index / v.dims[0] / v.dims[1],
+        ];
+        for a in 0..3 {
+            low[a] = low[a].min(at[a]);
+            high[a] = high[a].max(at[a]);
+        }
+    }
+    (low[0] != usize::MAX).then_some((low, high))
+}
+
+fn list(present: &[(u8, u64)]) -> String {
+    let each: Vec<String> = present.iter().map(|(l, n)| format!("{l} ({n} voxels)")).collect();
+    each.join(", ")
+}
+
+fn no_tissue(label: Option<u8>, present: &[(u8, u64)]) -> String {
+    match label {
+        _ if present.is_empty() => {
+            "every voxel is 0, so there is no tissue; export the segmentation that has the gland".to_owned()
+        }
+        Some(0) => format!("label 0 is the background; choose one of {}", list(present)),
+        Some(l) => format!("no voxel has label {l}; choose one of {}", list(present)),
+        None => "there is no tissue".to_owned(),
+    }
+}
+
+/// The corner of voxel 0 lies half a voxel before its centre, where the file puts the origin.
+fn transform(frame: &VoxelFrame, dims: [usize; 3], corner_m: [f64; 3]) -> [f64; 12] {
+    let side = Vector3::from(frame.spacing_m);
+    let mut rotation: Matrix3<f64> = frame.directions;
+    let mut corner = frame.origin_m - rotation * (side / 2.0);
+    if mirrored(frame) {
+        corner += rotation.column(0) * (dims[0] as f64 * side.x);
+        let turned = -rotation.column(0);
+        rotation.set_column(0, &turned);
+    }
+    let t = corner + rotation * Vector3::from(corner_m);
+    let r = rotation;
+    [
+        r[(0, 0)],
+        r[(0, 1)],
+        r[(0, 2)],
+        r[(1, 0)],
+        r[(1, 1)],
+        r[(1, 2)],
+        r[(2, 0)],
+        r[(2, 1)],
+        r[(2, 2)],
+        t.x,
+        t.y,
+        t.z,
+    ]
 }

@@ -3,37 +3,14 @@
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::reader::{EntryHandle, Reader};
 use iceoryx2::port::subscriber::Subscriber;
-use iceoryx2::prelude::{BackpressureStrategy, Node, PortFactory, ServiceName, ZeroCopySend};
+use iceoryx2::prelude::{BackpressureStrategy, Node, ZeroCopySend};
 use std::fmt::Debug;
 use stylet_shm_schema::service::{self, Instance, Ipc, Plain, ServiceError, Slices, StateBoard};
 use stylet_shm_schema::*;
 
 pub type From<T> = Subscriber<Ipc, T, ()>;
 pub type SlicesFrom<T, H> = Subscriber<Ipc, [T], H>;
-pub type UploadPort = Publisher<Ipc, [u8], OutgoingUpload>;
-
-/// An [`UploadHeader`] under its own name and layout: iceoryx2 lends slices only with a header that has a default.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, ZeroCopySend)]
-#[type_name("stylet.UploadHeader")]
-pub struct OutgoingUpload(pub UploadHeader);
-
-impl Default for OutgoingUpload {
-    fn default() -> Self {
-        Self(bytemuck::Zeroable::zeroed())
-    }
-}
-
-fn outgoing_uploads(node: &Node<Ipc>) -> Result<Slices<u8, OutgoingUpload>, ServiceError> {
-    // The contract creates the service; this one only opens it.
-    let created = service::uploads(node)?;
-    let name = ServiceName::new(&created.name().to_string()).map_err(|e| failed("uploads", e))?;
-    node.service_builder(&name)
-        .publish_subscribe::<[u8]>()
-        .user_header::<OutgoingUpload>()
-        .open()
-        .map_err(|e| failed("uploads", e))
-}
+pub type UploadPort = Publisher<Ipc, [u8], UploadHeader>;
 
 // Ports before the node, so that they go first.
 pub struct Ports {
@@ -46,7 +23,7 @@ pub struct Ports {
     pub snapshots: SlicesFrom<Vertex, SnapshotHeader>,
     pub scene: SlicesFrom<u32, SceneHeader>,
     pub commands: Publisher<Ipc, Command, ()>,
-    uploads: Slices<u8, OutgoingUpload>,
+    uploads: Slices<u8, UploadHeader>,
     pub node: Node<Ipc>,
 }
 
@@ -86,7 +63,7 @@ impl Ports {
                 .backpressure_strategy(BackpressureStrategy::DiscardData)
                 .create()
                 .map_err(|e| failed("commands", e))?,
-            uploads: outgoing_uploads(&node)?,
+            uploads: service::uploads(&node)?,
             node,
         })
     }

@@ -1,0 +1,141 @@
+//! The command line of `host-ui`.
+
+use crate::{app, files, procedure};
+use clap::{Args, Parser, Subcommand};
+use std::path::{Path, PathBuf};
+use stylet_shm_schema::service::Instance;
+
+/// Operator's program of Stylet, a haptic simulator of prostate brachytherapy.
+///
+/// Start `rt-core` first, then `host-ui` for the window. `host-ui procedure` implants the seeds of the default plan
+/// without a window and writes what happened.
+#[derive(Parser, Debug)]
+#[command(name = "host-ui", version, args_conflicts_with_subcommands = true)]
+pub struct Cli {
+    #[command(flatten)]
+    window: Common,
+    #[command(subcommand)]
+    task: Option<Task>,
+}
+
+#[derive(Args, Debug)]
+struct Common {
+    /// Name that rt-core was started under
+    #[arg(long, default_value = "main")]
+    instance: String,
+    /// Segmented volume to run, NIfTI-1 (.nii or .nii.gz) [default: the scene that rt-core runs]
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+    /// Which label of the volume is the gland [default: all but 0]
+    #[arg(long, value_name = "N", requires = "scene")]
+    label: Option<u8>,
+}
+
+#[derive(Subcommand, Debug)]
+enum Task {
+    /// Plan, place the needle, insert, drop the seeds while retracting; write result.json and force.csv
+    Procedure {
+        #[command(flatten)]
+        common: Common,
+        /// Folder for the results [default: out/procedure-<UTC time>]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        /// Start this rt-core when none is running, and end it afterwards
+        #[arg(long, value_name = "PATH")]
+        core: Option<PathBuf>,
+        /// Speed of insertion in mm/s
+        #[arg(long, default_value_t = 50.0, value_name = "MM/S")]
+        insert_speed: f64,
+        /// Seeds along the needle, 1 to 128
+        #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=128))]
+        seeds: u16,
+    },
+    /// Segmented volumes
+    #[command(subcommand)]
+    Scene(SceneTask),
+}
+
+#[derive(Subcommand, Debug)]
+enum SceneTask {
+    /// Read a volume and say what would be sent to rt-core
+    Check {
+        /// NIfTI-1 file (.nii or .nii.gz)
+        file: PathBuf,
+        /// Which label is the gland [default: all but 0]
+        #[arg(long, value_name = "N")]
+        label: Option<u8>,
+    },
+}
+
+impl Cli {
+    pub fn run(self) -> Result<(), String> {
+        match self.task {
+            None => app::run(app::Options {
+                instance: instance(&self.window.instance)?,
+                scene: self.window.scene,
+                label: self.window.label,
+            }),
+            Some(Task::Scene(SceneTask::Check { file, label })) => check(&file, label),
+            Some(Task::Procedure {
+                common,
+                out,
+                core,
+                insert_speed,
+                seeds,
+            }) => {
+                if !(0.1..=500.0).contains(&insert_speed) {
+                    return Err(format!("--insert-speed {insert_speed}: give 0.1 to 500 mm/s"));
+                }
+                procedure::run(procedure::Options {
+                    instance: instance(&common.instance)?,
+                    scene: common.scene,
+                    label: common.label,
+                    out,
+                    core,
+                    insert_m_per_s: insert_speed / 1e3,
+                    seeds: usize::from(seeds),
+                })
+            }
+        }
+    }
+}
+
+fn instance(name: &str) -> Result<Instance, String> {
+    Instance::new(name).map_err(|e| e.to_string())
+}
+
+fn check(file: &Path, label: Option<u8>) -> Result<(), String> {
+    let v = files::read(file, label).map_err(|e| e.to_string())?;
+    println!("{}", v.name);
+    for (label, voxels) in &v.voxels_per_label {
+        println!("  label {label}: {voxels} voxels");
+    }
+    let h_mm = v.spacing_m * 1e3;
+    println!(
+        "  sent as {} x {} x {} cells of {h_mm:.3} mm, {:.2} MiB",
+        v.dims[0],
+        v.dims[1],
+        v.dims[2],
+        v.cells.len() as f64 / f64::from(1 << 20)
+    );
+    println!(
+        "  tissue: {} elements, {:.2} cm3",
+        v.tissue_elements(),
+        v.tissue_elements() as f64 * (h_mm / 10.0).powi(3)
+    );
+    let p = v.patient_from_scene;
+    println!("  patient (RAS, mm) from scene:");
+    for r in 0..3 {
+        println!(
+            "    {:8.4} {:8.4} {:8.4}  {:9.3}",
+            p[3 * r],
+            p[3 * r + 1],
+            p[3 * r + 2],
+            p[9 + r] * 1e3
+        );
+    }
+    for warning in &v.warnings {
+        println!("  note: {warning}");
+    }
+    Ok(())
+}

@@ -1,0 +1,14 @@
+//! Starts the window, or the procedure without one.
+
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    match host_ui::cli::Cli::parse().run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(why) => {
+            eprintln!("host-ui: {why}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! The whole procedure without a window, with what happened written to files.
+
+mod child;
+mod report;
+
+use crate::files;
+use crate::link::{Link, LinkStatus};
+use crate::workflow::{NeedlePlan, Pace, Run, RunStatus, Step, plan_with_seeds};
+use child::Core;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::*;
+
+const POLL_EVERY: Duration = Duration::from_millis(5);
+const FIND_LIMIT: Duration = Duration::from_secs(3);
+const START_LIMIT: Duration = Duration::from_secs(20);
+const LOAD_LIMIT: Duration = Duration::from_secs(60);
+
+pub struct Options {
+    pub instance: Instance,
+    pub scene: Option<PathBuf>,
+    pub label: Option<u8>,
+    pub out: Option<PathBuf>,
+    pub core: Option<PathBuf>,
+    pub insert_m_per_s: f64,
+    pub seeds: usize,
+}
+
+/// What was seen while the script ran.
+#[derive(Default)]
+struct Seen {
+    records: Vec<TickRecord>,
+    punctured: bool,
+    displacement_before_puncture_m: f64,
+    last_event: Option<u64>,
+    events: Vec<Event>,
+}
+
+/// An error when not every step was completed.
+pub fn run(options: Options) -> Result<(), String> {
+    let volume = options
+        .scene
+        .as_deref()
+        .map(|path| files::read(path, options.label))
+        .transpose()
+        .map_err(|e| e.to_string())?;
+    let interrupted = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        signal_hook::flag::register(signal, interrupted.clone()).map_err(|e| e.to_string())?;
+    }
+    let mut link = Link::new(options.instance.clone());
+    let mut core = None;
+    find_core(&mut link, &mut core, &options, &interrupted)?;
+    if let Some(volume) = &volume {
+        for note in &volume.warnings {
+            println!("note: {note}");
+        }
+        load(&mut link, volume, &interrupted)?;
+    }
+    let scene = link.scene().ok_or("the core sent no scene")?.clone();
+    let pace = Pace {
+        insert_m_per_s: options.insert_m_per_s,
+        ..Pace::default()
+    };
+    let plan = plan_with_seeds(&scene.header, options.seeds);
+    println!(
+        "scene {}: {} elements of {:.2} mm",
+        scene.header.name.read(),
+        scene.header.element_count,
+        scene.header.spacing_m * 1e3
+    );
+    let mut seen = Seen::default();
+    let outcome = perform(&mut link, &plan, pace, &interrupted, &mut seen);
+    if outcome.is_err() {
+        // The force must not stay on for nobody.
+        let _asked = link.send(CommandKind::Disengage, &[]);
+    }
+    let out = options
+        .out
+        .unwrap_or_else(|| PathBuf::from(format!("out/procedure-{}", report::utc_now())));
+    let written = report::write(&out, &link, &plan, &pace, &seen, outcome.as_ref().err());
+    drop(core);
+    outcome?;
+    written
+}
+
+fn wait(
+    link: &mut Link,
+    interrupted: &AtomicBool,
+    limit: Duration,
+    mut ready: impl FnMut(&mut Link) -> Result<bool, String>,
+) -> Result<bool, String> {
+    let begun = Instant::now();
+    while begun.elapsed() < limit {
+        if interrupted.load(Ordering::Relaxed) {
+            return Err("interrupted".to_owned());
+        }
+        link.poll();
+        if ready(link)? {
+            return Ok(true);
+        }
+        std::thread::sleep(POLL_EVERY);
+    }
+    Ok(false)
+}
+
+fn is_ready(link: &Link) -> bool {
+    link.status() == LinkStatus::Live && link.state().is_some() && link.scene().is_some() && link.snapshot().is_some()
+}
+
+fn find_core(
+    link: &mut Link,
+    core: &mut Option<Core>,
+    options: &Options,
+    interrupted: &AtomicBool,
+) -> Result<(), String> {
+    if wait(link, interrupted, FIND_LIMIT, |link| Ok(is_ready(link)))? {
+        return Ok(());
+    }
+    let missing = match link.status() {
+        LinkStatus::Absent { why } => why,
+        _ => return Err("rt-core is there but does not answer; end it and start it again".to_owned()),
+    };
+    let Some(path) = &options.core else {
+        return Err(format!("{missing}, or add --core PATH to have it started"));
+    };
+    let child = core.insert(Core::start(path, &options.instance)?);
+    let found = wait(link, interrupted, START_LIMIT, |link| match child.ended() {
+        Some(why) => Err(why),
+        None => Ok(is_ready(link)),
+    })?;
+    if found {
+        return Ok(());
+    }
+    Err("the rt-core that was started does not answer".to_owned())
+}
+
+fn load(link: &mut Link, volume: &files::LabelVolume, interrupted: &AtomicBool) -> Result<(), String> {
+    let before = link.scene().map(|s| s.header.generation);
+    let id = link.upload(volume).map_err(|e| e.0)?;
+    let mut accepted = false;
+    let shown = wait(link, interrupted, LOAD_LIMIT, |link| {
+        if let Some(answer) = link.reply(id) {
+            if !answer.accepted {
+                return Err(format!("the core refused the volume: {}", answer.text));
+            }
+            accepted = true;
+        }
+        Ok(accepted && link.scene().map(|s| s.header.generation) != before && link.snapshot().is_some())
+    })?;
+    if shown {
+        Ok(())
+    } else {
+        Err("the core did not show the volume in time".to_owned())
+    }
+}
+
+fn perform(
+    link: &mut Link,
+    plan: &NeedlePlan,
+    pace: Pace,
+    interrupted: &AtomicBool,
+    seen: &mut Seen,
+) -> Result<(), String> {
+    let mut run = Run::new(plan.clone(), pace);
+    let begun = Instant::now();
+    let mut step: Option<Step> = None;
+    seen.last_event = link.events().back().map(|e| e.sequence);
+    link.take_records();
+    loop {
+        if interrupted.load(Ordering::Relaxed) {
+            return Err("interrupted".to_owned());
+        }
+        link.poll();
+        let status = run.advance(link);
+        if step != Some(run.step()) {
+            step = Some(run.step());
+            println!("{:7.2} s  step: {}", begun.elapsed().as_secs_f64(), run.step().name());
+        }
+        seen.take(link, begun);
+        match status {
+            RunStatus::Working => std::thread::sleep(POLL_EVERY),
+            RunStatus::Done => return Ok(()),
+            RunStatus::Failed(why) => return Err(why),
+        }
+    }
+}
+
+impl Seen {
+    fn take(&mut self, link: &mut Link, begun: Instant) {
+        self.records.extend(link.take_records());
+        for event in link
+            .events()
+            .iter()
+            .filter(|e| self.last_event.is_none_or(|last| e.sequence > last))
+        {
+            self.events.push(*event);
+            let kind = EventKind::from_number(event.kind);
+            self.punctured |= kind == Some(EventKind::Puncture);
+            let what = kind.map_or_else(String::new, |k| format!("{k:?}"));
+            println!("{:7.2} s  {what} {}", begun.elapsed().as_secs_f64(), event.text.read());
+        }
+        self.last_event = link.events().back().map(|e| e.sequence).or(self.last_event);
+        let snapshot = link.snapshot().filter(|_| !self.punctured);
+        if let Some(s) = snapshot {
+            self.displacement_before_puncture_m = self.displacement_before_puncture_m.max(s.header.max_displacement_m);
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! An `rt-core` that the procedure started and ends.
+
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use stylet_shm_schema::service::Instance;
+
+const END_LIMIT: Duration = Duration::from_secs(4);
+
+pub struct Core(Child);
+
+impl Core {
+    pub fn start(path: &Path, instance: &Instance) -> Result<Self, String> {
+        Command::new(path)
+            .args(["--instance", instance.name(), "--rt-if-allowed", "--exit-with-parent"])
+            .stdin(Stdio::null())
+            .spawn()
+            .map(Self)
+            .map_err(|e| format!("{} cannot be started ({e}); check --core", path.display()))
+    }
+
+    /// Why it is no longer there.
+    pub fn ended(&mut self) -> Option<String> {
+        let status = self.0.try_wait().ok()??;
+        Some(format!(
+            "the rt-core that was started has ended ({status}); its message stands above"
+        ))
+    }
+}
+
+impl Drop for Core {
+    fn drop(&mut self) {
+        if self.ended().is_some() {
+            return;
+        }
+        let _asked = Command::new("kill").args(["-TERM", &self.0.id().to_string()]).status();
+        let asked = Instant::now();
+        while self.ended().is_none() {
+            if asked.elapsed() > END_LIMIT {
+                let _killed = self.0.kill();
+                let _reaped = self.0.wait();
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+}

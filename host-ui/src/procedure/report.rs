@@ -1,0 +1,238 @@
+//! result.json, force.csv and the table on the terminal.
+
+use super::Seen;
+use crate::link::Link;
+use crate::workflow::{NeedlePlan, Pace};
+use nalgebra::{Matrix3, Vector3};
+use serde_json::{Value, json};
+use std::io::Write;
+use std::path::Path;
+use stylet_shm_schema::*;
+
+/// As 20260131T235959Z.
+pub fn utc_now() -> String {
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    let seconds = now.map_or(0, |d| d.as_secs());
+    let (days, rest) = (seconds / 86400, seconds % 86400);
+    // Days to a date of the Gregorian calendar, years beginning in March.
+    let z = days + 719_468;
+    let (era, day_of_era) = (z / 146_097, z % 146_097);
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * shifted + 2) / 5 + 1;
+    let month = if shifted < 10 { shifted + 3 } else { shifted - 9 };
+    let year = year_of_era + era * 400 + u64::from(month <= 2);
+    format!(
+        "{year:04}{month:02}{day:02}T{:02}{:02}{:02}Z",
+        rest / 3600,
+        rest / 60 % 60,
+        rest % 60
+    )
+}
+
+pub fn write(
+    out: &Path,
+    link: &Link,
+    plan: &NeedlePlan,
+    pace: &Pace,
+    seen: &Seen,
+    failure: Option<&String>,
+) -> Result<(), String> {
+    let told = |e: std::io::Error| {
+        format!(
+            "{} cannot be written ({e}); choose another folder with --out",
+            out.display()
+        )
+    };
+    std::fs::create_dir_all(out).map_err(told)?;
+    let seeds = seeds(link, plan);
+    let result = json!({
+        "completed": failure.is_none(),
+        "failure": failure,
+        "seeds": seeds,
+        "force": force(link, plan, seen),
+        "timing": timing(link, seen),
+        "plan": {
+            "entry_mm": mm(plan.entry_m), "direction": plan.direction,
+            "insert_speed_mm_s": pace.insert_m_per_s * 1e3, "retract_speed_mm_s": pace.retract_m_per_s * 1e3,
+        },
+        "largest_displacement_before_puncture_mm": seen.displacement_before_puncture_m * 1e3,
+        "parameters": parameters(link),
+        "scene": link.scene().map(|s| json!({
+            "name": s.header.name.read(), "elements": s.header.element_count, "spacing_mm": s.header.spacing_m * 1e3,
+            "volume_cm3": s.header.volume_m3 * 1e6,
+        })),
+        "session": link.session().map(session),
+        "versions": { "host_ui": env!("CARGO_PKG_VERSION"), "schema": SCHEMA_VERSION },
+    });
+    let text = serde_json::to_string_pretty(&result).map_err(|e| e.to_string())?;
+    std::fs::write(out.join("result.json"), text + "\n").map_err(told)?;
+    force_csv(out, plan, seen).map_err(told)?;
+    table(&result);
+    println!("written: {}", out.display());
+    Ok(())
+}
+
+fn mm(v: [f64; 3]) -> [f64; 3] {
+    v.map(|c| c * 1e3)
+}
+
+fn patient_mm(patient_from_scene: &[f64; 12], v: [f64; 3]) -> [f64; 3] {
+    let p = patient_from_scene;
+    let at = Matrix3::from_row_slice(&p[..9]) * Vector3::from(v) + Vector3::new(p[9], p[10], p[11]);
+    mm(at.into())
+}
+
+fn seeds(link: &Link, plan: &NeedlePlan) -> Vec<Value> {
+    let (Some(snapshot), Some(scene)) = (link.snapshot(), link.scene()) else {
+        return Vec::new();
+    };
+    let to_patient = |v| patient_mm(&scene.header.patient_from_scene, v);
+    let direction = Vector3::from(plan.direction);
+    let placed = &snapshot.header.seeds[..snapshot.header.seed_count as usize];
+    plan.deepest_first()
+        .into_iter()
+        .zip(placed)
+        .map(|(planned, seed)| {
+            let off = Vector3::from(seed.position_m) - Vector3::from(planned);
+            let along = off.dot(&direction);
+            json!({
+                "planned_mm": mm(planned), "dropped_at_mm": mm(seed.dropped_at_m), "placed_mm": mm(seed.position_m),
+                "planned_ras_mm": to_patient(planned), "dropped_at_ras_mm": to_patient(seed.dropped_at_m),
+                "placed_ras_mm": to_patient(seed.position_m),
+                "error_mm": off.norm() * 1e3, "error_along_mm": along * 1e3,
+                "error_across_mm": (off - direction * along).norm() * 1e3,
+            })
+        })
+        .collect()
+}
+
+fn along(plan: &NeedlePlan, r: &TickRecord) -> f64 {
+    Vector3::from(r.force_on_hand_n).dot(&Vector3::from(plan.direction))
+}
+
+fn force(link: &Link, plan: &NeedlePlan, seen: &Seen) -> Value {
+    let puncture = seen
+        .events
+        .iter()
+        .find(|e| EventKind::from_number(e.kind) == Some(EventKind::Puncture));
+    let puncture_force = puncture.map(|p| {
+        let before = seen.records.iter().filter(|r| r.tick <= p.tick);
+        before.map(|r| along(plan, r).abs()).fold(0.0, f64::max)
+    });
+    let state = link.state();
+    json!({
+        "peak_n": state.map(|s| s.peak_force_n),
+        "puncture_n": puncture_force,
+        "puncture_depth_mm": puncture.map(|p| p.value * 1e3),
+        "device_limit_n": state.map(|s| s.device_limit_n),
+        "scale": state.map(|s| s.force_scale),
+        "gate_interventions": state.map(|s| s.gate_interventions),
+    })
+}
+
+fn timing(link: &Link, seen: &Seen) -> Value {
+    let advice = link.session().map(|s| s.advice.read()).filter(|a| !a.is_empty());
+    let span = match (seen.records.first(), seen.records.last()) {
+        (Some(first), Some(last)) => last.tick.saturating_sub(first.tick) + 1,
+        _ => 0,
+    };
+    let worst_wake_ns = seen.records.iter().map(|r| r.wake_latency_ns).max();
+    let state = link.state();
+    json!({
+        "real_time": state.is_some_and(|s| s.flags & flags::REAL_TIME != 0),
+        "not_real_time_because": advice,
+        "ticks": state.map(|s| s.tick),
+        "missed_deadlines": state.map(|s| s.missed_deadlines),
+        "worst_wake_us": state.map(|s| s.worst_wake_ns as f64 / 1e3),
+        "worst_wake_in_records_us": worst_wake_ns.map(|n| n as f64 / 1e3),
+        "worst_work_us": state.map(|s| s.worst_work_ns as f64 / 1e3),
+        "tissue_missed_deadlines": state.map(|s| s.tissue_missed_deadlines),
+        "tissue_worst_wake_us": state.map(|s| s.tissue_worst_wake_ns as f64 / 1e3),
+        "tissue_worst_work_us": state.map(|s| s.worst_tissue_work_ns as f64 / 1e3),
+        "worst_residual_elements": state.map(|s| s.worst_residual),
+        "records_received": seen.records.len(),
+        "records_not_received": span.saturating_sub(seen.records.len() as u64),
+        "records_lost_in_core": state.map(|s| s.records_lost),
+        "rubbish_refused": link.rubbish_refused(),
+    })
+}
+
+fn parameters(link: &Link) -> Value {
+    let Some(p) = link.parameters() else { return Value::Null };
+    PARAMETERS
+        .iter()
+        .zip(p.set.values)
+        .map(|(spec, value)| json!({ "key": spec.key, "value": value * spec.display_per_si, "unit": spec.unit }))
+        .collect()
+}
+
+fn session(s: &Session) -> Value {
+    let thread = |t: &ThreadReport| {
+        json!({
+            "scheduler": if t.is_fifo() { "SCHED_FIFO" } else { "SCHED_OTHER" },
+            "priority": t.priority, "asked_priority": t.asked_priority,
+            "core": (t.core != u32::MAX).then_some(t.core), "asked_core": (t.asked_core != u32::MAX).then_some(t.asked_core),
+        })
+    };
+    json!({
+        "id": format!("{:016x}", s.session_id), "core_version": s.version.read(), "device": s.device.read(),
+        "period_us": s.period_ns as f64 / 1e3, "tissue_period_us": s.tissue_period_ns as f64 / 1e3,
+        "haptic_thread": thread(&s.haptic), "tissue_thread": thread(&s.tissue),
+        "memory_locked": s.memory_locked == 1, "no_rt_asked": s.no_rt_asked == 1,
+    })
+}
+
+fn force_csv(out: &Path, plan: &NeedlePlan, seen: &Seen) -> std::io::Result<()> {
+    let mut file = std::io::BufWriter::new(std::fs::File::create(out.join("force.csv"))?);
+    writeln!(file, "time_s,tick,depth_mm,speed_mm_s,force_n,phase,tissue_tick")?;
+    let begin = seen.records.first().map_or(0, |r| r.due_ns);
+    for r in &seen.records {
+        writeln!(
+            file,
+            "{:.6},{},{:.4},{:.3},{:.5},{},{}",
+            r.due_ns.saturating_sub(begin) as f64 / 1e9,
+            r.tick,
+            r.depth_m * 1e3,
+            r.speed_m_per_s * 1e3,
+            along(plan, r),
+            Phase::from_number(r.phase).map_or("unknown", Phase::name),
+            r.tissue_tick
+        )?;
+    }
+    file.flush()
+}
+
+fn table(result: &Value) {
+    println!("seed  along the needle (mm)  across (mm)  total (mm)");
+    for (index, seed) in result["seeds"].as_array().into_iter().flatten().enumerate() {
+        let value = |key: &str| seed[key].as_f64().unwrap_or(f64::NAN);
+        println!(
+            "{:4}  {:21.3}  {:11.3}  {:10.3}",
+            index + 1,
+            value("error_along_mm"),
+            value("error_across_mm"),
+            value("error_mm")
+        );
+    }
+    let (force, timing) = (&result["force"], &result["timing"]);
+    let number = |v: &Value| v.as_f64().map_or_else(|| "-".to_owned(), |n| format!("{n:.3}"));
+    println!(
+        "force: peak {} N, at puncture {} N, device limit {} N",
+        number(&force["peak_n"]),
+        number(&force["puncture_n"]),
+        number(&force["device_limit_n"])
+    );
+    println!(
+        "timing: real time {}, {} deadlines missed, worst wake-up {} us; records received {}, not received {}",
+        timing["real_time"],
+        timing["missed_deadlines"],
+        number(&timing["worst_wake_us"]),
+        timing["records_received"],
+        timing["records_not_received"]
+    );
+    if let Some(why) = timing["not_real_time_because"].as_str() {
+        println!("{why}");
+    }
+}
