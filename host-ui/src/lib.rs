@@ -8,7 +8,7 @@ pub mod keyboard;
 pub mod link;
 mod loader;
 pub mod panel;
+pub mod procedure;
 pub mod theme;
 pub mod view;
-pub mod procedure;
 pub mod workflow;

@@ -41,5 +41,5 @@ impl Loader {
 }
 
 fn read(path: &Path, label: Option<u8>) -> Outcome {
-    crate::files::nifti::read(path, label).map_err(|e| e.to_string())
+    crate::files::read(path, label).map_err(|e| e.to_string())
 }

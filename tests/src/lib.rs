@@ -1,1 +1,123 @@
-//! placeholder
+//! Fixtures for whole-system tests: a core process of its own for each test, and a host that talks to it.
+
+use host_ui::link::{Link, LinkStatus};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::service::Instance;
+
+/// A built program of the workspace; `make test` builds them first.
+pub fn program(name: &str) -> PathBuf {
+    let test = std::env::current_exe().expect("a test knows its own file");
+    let folder = test.parent().and_then(|deps| deps.parent()).expect("tests live in <target>/<profile>/deps");
+    let path = folder.join(name);
+    assert!(path.exists(), "{} is missing: run `cargo build --release --workspace` first", path.display());
+    path
+}
+
+/// An instance name that no other test uses.
+pub fn fresh_instance() -> Instance {
+    static NEXT: AtomicU32 = AtomicU32::new(0);
+    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    Instance::new(&format!("t{}-{number}", std::process::id())).expect("letters, digits and a hyphen")
+}
+
+/// A folder for one test's files, emptied first.
+pub fn scratch(name: &str) -> PathBuf {
+    let folder = program("rt-core").parent().expect("has a folder").join("test-out").join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("the target folder can be written");
+    folder
+}
+
+/// A running `rt-core`; ended when dropped.
+pub struct Core {
+    child: Child,
+    pub instance: Instance,
+    report: PathBuf,
+}
+
+impl Core {
+    pub fn start() -> Self {
+        Self::start_with(&["--rt-if-allowed"])
+    }
+
+    pub fn start_with(options: &[&str]) -> Self {
+        let instance = fresh_instance();
+        let report = scratch(&format!("core-{}", instance.name())).join("report.json");
+        let child = Command::new(program("rt-core"))
+            .args(["--instance", instance.name(), "--exit-with-parent", "--report"])
+            .arg(&report)
+            .args(options)
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("rt-core starts");
+        Self { child, instance, report }
+    }
+
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    pub fn is_running(&mut self) -> bool {
+        matches!(self.child.try_wait(), Ok(None))
+    }
+
+    /// A host that sees this core live.
+    pub fn host(&mut self) -> Link {
+        let mut link = Link::new(self.instance.clone());
+        let live = until(Duration::from_secs(10), || {
+            link.poll();
+            matches!(link.status(), LinkStatus::Live)
+                && link.scene().is_some()
+                && link.parameters().is_some()
+                && link.snapshot().is_some()
+        });
+        assert!(live, "no live core: {:?}, running {}", link.status(), self.is_running());
+        link
+    }
+
+    /// Ends it and reads what each loop cost.
+    pub fn finish(mut self) -> serde_json::Value {
+        // SAFETY: the child is ours and not yet waited for.
+        unsafe { libc::kill(self.child.id() as libc::pid_t, libc::SIGTERM) };
+        let status = self.child.wait().expect("rt-core ends");
+        assert!(status.success(), "rt-core ended with {status}");
+        let text = std::fs::read_to_string(&self.report).expect("rt-core wrote its report");
+        serde_json::from_str(&text).expect("the report is JSON")
+    }
+}
+
+impl Drop for Core {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Polls `ready` every 2 ms; false when it has not come true in time.
+pub fn until(limit: Duration, mut ready: impl FnMut() -> bool) -> bool {
+    let start = Instant::now();
+    while start.elapsed() < limit {
+        if ready() {
+            return true;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    false
+}
+
+/// Sends one command and waits for its answer: `Ok` with the first tick that knew it, or the reasons against it.
+pub fn ask(link: &mut Link, kind: CommandKind, values: &[f64]) -> Result<u64, String> {
+    let id = link.send(kind, values).map_err(|e| e.to_string())?;
+    let mut answer = None;
+    until(Duration::from_secs(5), || {
+        link.poll();
+        answer = link.reply(id);
+        answer.is_some()
+    });
+    let answer = answer.ok_or_else(|| format!("no answer to {kind:?}"))?;
+    if answer.accepted { Ok(answer.effective_tick) } else { Err(answer.text) }
+}

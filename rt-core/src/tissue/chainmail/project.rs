@@ -3,7 +3,8 @@
 use super::kernels;
 use super::model::ChainMail;
 use super::sweep::{ends, run_violation};
-use crate::scene::Run;
+use crate::scene::{MAX_CELLS_PER_AXIS, Run};
+use crate::tissue::limits::LinkLimits;
 
 /// One pass of orthogonal projections over all links, both ends giving half.
 ///
@@ -19,23 +20,86 @@ pub(super) fn project_all(model: &ChainMail, upward: bool, u: &mut [Vec<f32>; 3]
             kernels::project(limits, lo, hi);
         }
     }
+    let mut halves = Halves::new();
     for &run in &model.runs {
         if run_violation(x, run, u) > 0.0 {
-            project_run(x, run, upward, u);
+            project_run(x, run, upward, u, &mut halves);
         }
     }
 }
 
-fn project_run(limits: &crate::tissue::limits::LinkLimits, run: Run, upward: bool, u: &mut [Vec<f32>; 3]) {
+/// Every other element of a run: links of one half to the other do not share ends, so they go in vectors.
+struct Halves {
+    even: [[f32; HALF_RUN]; 3],
+    odd: [[f32; HALF_RUN]; 3],
+}
+
+const HALF_RUN: usize = MAX_CELLS_PER_AXIS / 2;
+
+impl Halves {
+    fn new() -> Self {
+        Halves {
+            even: [[0.0; HALF_RUN]; 3],
+            odd: [[0.0; HALF_RUN]; 3],
+        }
+    }
+}
+
+fn project_run(
+    limits: &LinkLimits,
+    run: Run,
+    upward: bool,
+    u: &mut [Vec<f32>; 3],
+    halves: &mut Halves,
+) {
     let (first, end) = (run.first as usize, run.end() as usize);
-    let [x, y, z] = u.each_mut().map(|c| &mut c[first..end]);
-    let links = x.len() - 1;
-    for n in 0..links {
-        let e = if upward { n } else { links - 1 - n };
-        let (lo, hi) = ([x[e], y[e], z[e]], [x[e + 1], y[e + 1], z[e + 1]]);
-        let [l, h] = kernels::projected(limits, lo, hi);
-        [x[e], y[e], z[e]] = l;
-        [x[e + 1], y[e + 1], z[e + 1]] = h;
+    let odd_count = (end - first) / 2;
+    let even_count = end - first - odd_count;
+    let even = halves.even.each_mut().map(|c| &mut c[..even_count]);
+    let odd = halves.odd.each_mut().map(|c| &mut c[..odd_count]);
+    let ([ex, ey, ez], [ox, oy, oz]) = (even, odd);
+    for (component, even, odd) in [
+        (0, &mut *ex, &mut *ox),
+        (1, &mut *ey, &mut *oy),
+        (2, &mut *ez, &mut *oz),
+    ] {
+        split(&u[component][first..end], even, odd);
+    }
+    for turn in [upward, !upward] {
+        if turn {
+            let n = odd_count;
+            kernels::project(
+                limits,
+                [&mut ex[..n], &mut ey[..n], &mut ez[..n]],
+                [ox, oy, oz],
+            );
+        } else {
+            let n = even_count - 1;
+            let lo = [&mut ox[..n], &mut oy[..n], &mut oz[..n]];
+            kernels::project(limits, lo, [&mut ex[1..], &mut ey[1..], &mut ez[1..]]);
+        }
+    }
+    for (component, even, odd) in [(0, ex, ox), (1, ey, oy), (2, ez, oz)] {
+        join(even, odd, &mut u[component][first..end]);
+    }
+}
+
+fn split(values: &[f32], even: &mut [f32], odd: &mut [f32]) {
+    for (pair, (e, o)) in values.chunks_exact(2).zip(even.iter_mut().zip(odd)) {
+        (*e, *o) = (pair[0], pair[1]);
+    }
+    if let ([last], Some(e)) = (values.chunks_exact(2).remainder(), even.last_mut()) {
+        *e = *last;
+    }
+}
+
+fn join(even: &[f32], odd: &[f32], values: &mut [f32]) {
+    let mut pairs = values.chunks_exact_mut(2);
+    for (pair, (e, o)) in pairs.by_ref().zip(even.iter().zip(odd)) {
+        (pair[0], pair[1]) = (*e, *o);
+    }
+    if let ([last], Some(e)) = (pairs.into_remainder(), even.last()) {
+        *last = *e;
     }
 }
 
@@ -74,7 +138,12 @@ fn smallest_scale(model: &ChainMail, part: u32, u: &[Vec<f32>; 3]) -> f32 {
     let along_z = model.z_links.all().iter().map(|s| (z, [2, 0, 1], s));
     for (limits, order, span) in along_y.chain(along_z) {
         for n in 0..span.len {
-            link(limits, order, (span.lo + n) as usize, (span.hi + n) as usize);
+            link(
+                limits,
+                order,
+                (span.lo + n) as usize,
+                (span.hi + n) as usize,
+            );
         }
     }
     scale

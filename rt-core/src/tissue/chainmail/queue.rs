@@ -29,6 +29,10 @@ impl QueuePass {
     /// Puts the held element in place and moves others outward from it; returns how many moved.
     ///
     /// An element is moved once, by the first neighbour that violates a limit with it.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such element, or the state is of another model.
     pub fn run(&mut self, model: &ChainMail, state: &mut TissueState, held: Held) -> u32 {
         let rest = model.lattice.rest_m(held.element);
         let u = [0, 1, 2].map(|a| (held.position_m[a] - rest[a]) / model.lattice.spacing_m);
@@ -52,7 +56,13 @@ impl QueuePass {
 }
 
 /// Moves `outer` into the limits of its link with `inner`; whether it had to move.
-fn push(model: &ChainMail, state: &mut TissueState, direction: usize, inner: u32, outer: u32) -> bool {
+fn push(
+    model: &ChainMail,
+    state: &mut TissueState,
+    direction: usize,
+    inner: u32,
+    outer: u32,
+) -> bool {
     let axis = direction / 2;
     let limits = &model.limits.links[axis];
     let at = |e: u32| ordered(axis, state.u.each_ref().map(|c| c[e as usize]));
