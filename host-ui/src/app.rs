@@ -139,7 +139,8 @@ impl App {
         if let Some(id) = self.parameters.waiting_for()
             && let Some(answer) = self.link.reply(id)
         {
-            self.parameters.answered(answer.accepted, &answer.text, answer.effective_tick);
+            self.parameters
+                .answered(answer.accepted, &answer.text, answer.effective_tick);
         }
         let (link, note) = (&mut self.link, &mut self.shown.note);
         self.waiting.retain(|w| match link.reply(w.id) {
@@ -304,7 +305,9 @@ impl App {
             return;
         }
         let (Some(depth), Some(length)) = (self.shown.path_depth_m(), self.shown.path_length_m()) else {
-            self.shown.note = Some(refusal("The keys follow the planned path: plan the seeds first.".to_owned()));
+            self.shown.note = Some(refusal(
+                "The keys follow the planned path: plan the seeds first.".to_owned(),
+            ));
             return;
         };
         let step = speed_m_per_s * frame_s.min(LONGEST_FRAME_S);
@@ -330,7 +333,9 @@ impl App {
 
     fn frame_ui(&mut self, ui: &mut egui::Ui) -> Vec<Action> {
         let mut actions = Vec::new();
-        let bar = egui::Frame::new().fill(theme::PANEL).inner_margin(egui::Margin::symmetric(10, 5));
+        let bar = egui::Frame::new()
+            .fill(theme::PANEL)
+            .inner_margin(egui::Margin::symmetric(10, 5));
         egui::Panel::top("status").frame(bar).show(ui, |ui| {
             actions.extend(status::status_ui(ui, &self.shown));
         });
@@ -341,13 +346,17 @@ impl App {
                 actions.extend(status::banners_ui(ui, &banners));
             });
         }
-        let left = egui::Panel::left("workflow").exact_size(theme::LEFT_WIDTH).frame(theme::side_panel());
+        let left = egui::Panel::left("workflow")
+            .exact_size(theme::LEFT_WIDTH)
+            .frame(theme::side_panel());
         left.resizable(false).show(ui, |ui| {
             egui::ScrollArea::vertical().show(ui, |ui| {
                 actions.extend(workflow_ui(ui, &self.shown, &mut self.workflow));
             });
         });
-        let right = egui::Panel::right("plots").exact_size(theme::RIGHT_WIDTH).frame(theme::side_panel());
+        let right = egui::Panel::right("plots")
+            .exact_size(theme::RIGHT_WIDTH)
+            .frame(theme::side_panel());
         right.resizable(false).show(ui, |ui| {
             egui::ScrollArea::vertical().show(ui, |ui| plots::plots_ui(ui, &self.shown, &self.history));
         });
@@ -360,7 +369,13 @@ impl App {
     }
 
     fn dropped_file(ctx: &egui::Context) -> Option<Action> {
-        let path = ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).find(|p| !p.as_os_str().is_empty()))?;
+        let path = ctx.input(|i| {
+            i.raw
+                .dropped_files
+                .iter()
+                .map(|f| f.path().to_owned())
+                .find(|p| !p.as_os_str().is_empty())
+        })?;
         Some(Action::LoadScene(path))
     }
 }

@@ -45,7 +45,7 @@ pub fn volume(cubic_metres: f64) -> String {
 pub fn microseconds(value: Option<f64>) -> String {
     match value {
         None => "n/a".to_owned(),
-        Some(us) if us >= 10_000.0 => format!("{:.1} ms", us * 1e-3),
+        Some(us) if us >= 1000.0 => format!("{:.1} ms", us * 1e-3),
         Some(us) => format!("{us:.1} us"),
     }
 }

@@ -58,8 +58,7 @@ pub fn read(ctx: &egui::Context) -> Keys {
         let held = |a, b| f64::from(u8::from(i.key_down(a) || i.key_down(b)));
         let slow = if i.modifiers.shift { 0.25 } else { 1.0 };
         if !i.modifiers.command {
-            keys.drive_m_per_s =
-                (held(Key::W, Key::ArrowUp) - held(Key::S, Key::ArrowDown)) * DRIVE_M_PER_S * slow;
+            keys.drive_m_per_s = (held(Key::W, Key::ArrowUp) - held(Key::S, Key::ArrowDown)) * DRIVE_M_PER_S * slow;
         }
     });
     keys

@@ -16,10 +16,12 @@ impl Loader {
     pub fn begin(&mut self, path: &Path, label: Option<u8>) {
         let (sender, receiver) = channel();
         let owned = path.to_owned();
-        let spawned = std::thread::Builder::new().name("scene reader".to_owned()).spawn(move || {
-            // The window may be gone by now; then nobody wants the answer.
-            let _ = sender.send(read(&owned, label));
-        });
+        let spawned = std::thread::Builder::new()
+            .name("scene reader".to_owned())
+            .spawn(move || {
+                // The window may be gone by now; then nobody wants the answer.
+                let _ = sender.send(read(&owned, label));
+            });
         // When no thread can be had the sender is gone and `poll` says so.
         drop(spawned);
         self.reading = Some((path.to_owned(), receiver));
@@ -39,5 +41,5 @@ impl Loader {
 }
 
 fn read(path: &Path, label: Option<u8>) -> Outcome {
-    crate::files::nifti::read(path, label).map_err(|e| e.to_string())
+    crate::files::read(path, label).map_err(|e| e.to_string())
 }

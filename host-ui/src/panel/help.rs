@@ -9,13 +9,18 @@ pub fn help_ui(ctx: &egui::Context, open: &mut bool) {
         .resizable(false)
         .anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO)
         .show(ctx, |ui| {
-            egui::Grid::new("keys").num_columns(2).spacing([24.0, 6.0]).show(ui, |ui| {
-                for (keys, what) in keyboard::KEYS {
-                    ui.label(theme::strong(keys));
-                    ui.label(what);
-                    ui.end_row();
-                }
-            });
-            ui.label(theme::small("Keys move the needle unless a field has the focus; Esc gives them back."));
+            egui::Grid::new("keys")
+                .num_columns(2)
+                .spacing([24.0, 6.0])
+                .show(ui, |ui| {
+                    for (keys, what) in keyboard::KEYS {
+                        ui.label(theme::strong(keys));
+                        ui.label(what);
+                        ui.end_row();
+                    }
+                });
+            ui.label(theme::small(
+                "Keys move the needle unless a field has the focus; Esc gives them back.",
+            ));
         });
 }

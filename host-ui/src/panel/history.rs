@@ -63,15 +63,23 @@ impl History {
             }
             self.missed += u64::from(r.missed);
             let along: f64 = r.force_on_hand_n.iter().zip(direction).map(|(f, d)| f * d).sum();
-            push_bounded(&mut self.ticks, KEPT_TICKS, Tick {
-                time_ns: r.due_ns,
-                resistance_n: -along as f32,
-                depth_mm: format::mm(r.depth_m) as f32,
-                wake_us: format::us(r.wake_latency_ns) as f32,
-                work_us: format::us(r.work_ns) as f32,
-            });
+            push_bounded(
+                &mut self.ticks,
+                KEPT_TICKS,
+                Tick {
+                    time_ns: r.due_ns,
+                    resistance_n: -along as f32,
+                    depth_mm: format::mm(r.depth_m) as f32,
+                    wake_us: format::us(r.wake_latency_ns) as f32,
+                    work_us: format::us(r.work_ns) as f32,
+                },
+            );
             let cut = |ns: u64| u32::try_from(ns).unwrap_or(u32::MAX);
-            push_bounded(&mut self.timings, KEPT_TIMINGS, [cut(r.wake_latency_ns), cut(r.work_ns)]);
+            push_bounded(
+                &mut self.timings,
+                KEPT_TIMINGS,
+                [cut(r.wake_latency_ns), cut(r.work_ns)],
+            );
         }
     }
 
@@ -141,7 +149,9 @@ impl Bucket {
     }
 
     fn flush(&mut self, out: &mut Vec<[f64; 2]>) {
-        let (Some(low), Some(high)) = (self.low.take(), self.high.take()) else { return };
+        let (Some(low), Some(high)) = (self.low.take(), self.high.take()) else {
+            return;
+        };
         if low == high {
             out.push(low);
         } else if low[0] <= high[0] {

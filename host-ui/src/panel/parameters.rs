@@ -33,7 +33,12 @@ impl ParametersState {
         if !self.unsent || self.in_flight.is_some() {
             return None;
         }
-        let pairs: Vec<_> = self.drafts.iter().enumerate().filter_map(|(i, d)| Some((i, (*d)?))).collect();
+        let pairs: Vec<_> = self
+            .drafts
+            .iter()
+            .enumerate()
+            .filter_map(|(i, d)| Some((i, (*d)?)))
+            .collect();
         (!pairs.is_empty()).then_some(pairs)
     }
 
@@ -54,7 +59,9 @@ impl ParametersState {
 
     /// A refusal names every reason by key; what names no row stands at the foot only.
     pub fn answered(&mut self, accepted: bool, text: &str, effective_tick: u64) {
-        let Some((_, pairs)) = self.in_flight.take() else { return };
+        let Some((_, pairs)) = self.in_flight.take() else {
+            return;
+        };
         for (index, value) in pairs {
             let (Some(spec), Some(draft)) = (PARAMETERS.get(index), self.drafts.get_mut(index)) else {
                 continue;
@@ -103,14 +110,20 @@ pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersS
         .collapsible(false)
         .show(ctx, |ui| {
             if shown.parameters.is_none() {
-                ui.label(RichText::new("rt-core has not told its parameters yet; these are the defaults.").color(theme::WARN));
+                ui.label(
+                    RichText::new("rt-core has not told its parameters yet; these are the defaults.")
+                        .color(theme::WARN),
+                );
             }
             let height = (ui.ctx().content_rect().height() - 260.0).clamp(200.0, 640.0);
-            egui::ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
-                for group in [ParameterGroup::Tissue, ParameterGroup::Needle, ParameterGroup::Force] {
-                    group_ui(ui, shown, state, group);
-                }
-            });
+            egui::ScrollArea::vertical()
+                .max_height(height)
+                .auto_shrink([false, true])
+                .show(ui, |ui| {
+                    for group in [ParameterGroup::Tissue, ParameterGroup::Needle, ParameterGroup::Force] {
+                        group_ui(ui, shown, state, group);
+                    }
+                });
             ui.separator();
             foot_ui(ui, shown, state);
         });
@@ -119,11 +132,15 @@ pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersS
 
 fn group_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState, group: ParameterGroup) {
     ui.heading(group.name());
-    egui::Grid::new(group.name()).num_columns(5).striped(true).spacing([14.0, 4.0]).show(ui, |ui| {
-        for (index, spec) in PARAMETERS.iter().enumerate().filter(|(_, p)| p.group == group) {
-            row_ui(ui, shown, state, index, spec);
-        }
-    });
+    egui::Grid::new(group.name())
+        .num_columns(5)
+        .striped(true)
+        .spacing([14.0, 4.0])
+        .show(ui, |ui| {
+            for (index, spec) in PARAMETERS.iter().enumerate().filter(|(_, p)| p.group == group) {
+                row_ui(ui, shown, state, index, spec);
+            }
+        });
     ui.add_space(4.0);
 }
 
@@ -132,15 +149,23 @@ fn row_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState, index: 
     let value = state.drafts[index].unwrap_or(in_force);
     let scale = spec.display_per_si;
     let (low, high) = (spec.min * scale, spec.max * scale);
-    let label = ui.label(spec.label).on_hover_text(format!("{}\n{}", spec.help, spec.key));
+    let label = ui
+        .label(spec.label)
+        .on_hover_text(format!("{}\n{}", spec.help, spec.key));
     let mut displayed = value * scale;
     let drag = DragValue::new(&mut displayed)
         .range(low..=high)
         .speed((high - low) * 0.002)
         .max_decimals(4)
         .update_while_editing(false)
-        .suffix(if spec.unit.is_empty() { String::new() } else { format!(" {}", spec.unit) });
-    let response = ui.add_enabled_ui(shown.is_live(), |ui| ui.add_sized([124.0, 22.0], drag)).inner;
+        .suffix(if spec.unit.is_empty() {
+            String::new()
+        } else {
+            format!(" {}", spec.unit)
+        });
+    let response = ui
+        .add_enabled_ui(shown.is_live(), |ui| ui.add_sized([124.0, 22.0], drag))
+        .inner;
     let response = response.labelled_by(label.id).on_hover_text(spec.help);
     if response.changed() {
         state.edit(index, (displayed / scale).clamp(spec.min, spec.max));
@@ -153,7 +178,10 @@ fn row_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState, index: 
         reset.widget_info(|| {
             egui::WidgetInfo::labeled(egui::accesskit::Role::Button, changed, format!("Reset {}", spec.label))
         });
-        if reset.on_hover_text(format!("Back to {} {}", plain(spec.default * scale), spec.unit)).clicked() {
+        if reset
+            .on_hover_text(format!("Back to {} {}", plain(spec.default * scale), spec.unit))
+            .clicked()
+        {
             state.edit(index, spec.default);
         }
         note_ui(ui, state, index);
@@ -169,7 +197,11 @@ fn note_ui(ui: &mut egui::Ui, state: &ParametersState, index: usize) {
     match &state.notes[index] {
         RowNote::None => {}
         RowNote::InForce(tick) => {
-            ui.label(RichText::new(format!("since tick {}", format::count(*tick))).small().color(theme::GOOD));
+            ui.label(
+                RichText::new(format!("since tick {}", format::count(*tick)))
+                    .small()
+                    .color(theme::GOOD),
+            );
         }
         RowNote::Refused(why) => {
             let text = RichText::new("refused").small().color(theme::BAD);
@@ -180,13 +212,20 @@ fn note_ui(ui: &mut egui::Ui, state: &ParametersState, index: usize) {
 
 fn foot_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState) {
     ui.horizontal(|ui| {
-        if ui.add_enabled(shown.is_live(), Button::new("Reset all parameters")).clicked() {
+        if ui
+            .add_enabled(shown.is_live(), Button::new("Reset all parameters"))
+            .clicked()
+        {
             for (index, spec) in PARAMETERS.iter().enumerate() {
                 state.edit(index, spec.default);
             }
         }
         if let Some(p) = &shown.parameters {
-            let text = format!("change {} in force since tick {}", p.generation, format::count(p.effective_tick));
+            let text = format!(
+                "change {} in force since tick {}",
+                p.generation,
+                format::count(p.effective_tick)
+            );
             ui.label(theme::small(text));
         }
     });
@@ -225,7 +264,10 @@ mod tests {
         let pairs = state.request().expect("something to send");
         state.sent(7, pairs);
         state.answered(false, "other\nneedle.puncture_depth is too large", 0);
-        assert_eq!(state.notes[6], RowNote::Refused("needle.puncture_depth is too large".to_owned()));
+        assert_eq!(
+            state.notes[6],
+            RowNote::Refused("needle.puncture_depth is too large".to_owned())
+        );
         assert_eq!(state.drafts[6], None);
     }
 }

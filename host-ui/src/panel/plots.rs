@@ -6,19 +6,25 @@ use crate::{format, theme};
 use egui::{Color32, RichText};
 use egui_plot::{Bar, BarChart, GridMark, Line, Plot, PlotPoints};
 
-const PLOT_HEIGHT: f32 = 112.0;
+const PLOT_HEIGHT: f32 = 102.0;
 
 pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
     let now = |value: Option<String>| value.unwrap_or_else(|| "n/a".to_owned());
     let force = now(shown.resistance_n().map(format::force));
     title(ui, "Force along the needle, N", &force, theme::PLOT_FORCE);
-    strip(ui, history, ("force", theme::PLOT_FORCE, [-0.5, 2.0]), |t| t.resistance_n);
+    strip(ui, history, ("force", theme::PLOT_FORCE, [-0.5, 2.0]), |t| {
+        t.resistance_n
+    });
     let depth = now(shown.state.map(|s| format::length(s.depth_m)));
     title(ui, "Depth, mm", &depth, theme::PLOT_DEPTH);
     strip(ui, history, ("depth", theme::PLOT_DEPTH, [0.0, 10.0]), |t| t.depth_mm);
-    let worst = now(shown.state.map(|s| format::microseconds(Some(format::us(s.worst_wake_ns)))));
+    let worst = now(shown
+        .state
+        .map(|s| format::microseconds(Some(format::us(s.worst_wake_ns)))));
     title(ui, "Wake-up latency, us", &format!("worst {worst}"), theme::PLOT_WAKE);
-    strip(ui, history, ("wake-up latency", theme::PLOT_WAKE, [0.0, 50.0]), |t| t.wake_us);
+    strip(ui, history, ("wake-up latency", theme::PLOT_WAKE, [0.0, 50.0]), |t| {
+        t.wake_us
+    });
     histogram_ui(ui, history);
     timing_ui(ui, shown, history);
 }
@@ -32,7 +38,12 @@ fn title(ui: &mut egui::Ui, name: &str, value: &str, color: Color32) {
     });
 }
 
-fn strip(ui: &mut egui::Ui, history: &History, (name, color, least): (&str, Color32, [f64; 2]), value: impl Fn(&Tick) -> f32) {
+fn strip(
+    ui: &mut egui::Ui,
+    history: &History,
+    (name, color, least): (&str, Color32, [f64; 2]),
+    value: impl Fn(&Tick) -> f32,
+) {
     let buckets = ui.available_width().max(50.0) as usize;
     let points = history.decimated(buckets, value);
     plot(name)
@@ -41,8 +52,17 @@ fn strip(ui: &mut egui::Ui, history: &History, (name, color, least): (&str, Colo
         .include_x(0.0)
         .include_y(least[0])
         .include_y(least[1])
-        .x_axis_formatter(|mark: GridMark, _: &_| format!("{:.0} s", mark.value))
-        .show(ui, |plot| plot.line(Line::new(name, PlotPoints::new(points)).color(color).width(1.3)));
+        .x_grid_spacer(|_| marks(-WINDOW_S, 2.5, 4))
+        .x_axis_formatter(|mark: GridMark, _: &_| {
+            if mark.value < 0.0 {
+                format!("{} s", mark.value)
+            } else {
+                "now".to_owned()
+            }
+        })
+        .show(ui, |plot| {
+            plot.line(Line::new(name, PlotPoints::new(points)).color(color).width(1.3))
+        });
 }
 
 /// Only to be looked at: a plot that moves must not be dragged by accident.
@@ -76,42 +96,56 @@ fn histogram_ui(ui: &mut egui::Ui, history: &History) {
         .include_x(0.0)
         .include_x(BINS as f64)
         .include_y(0.0)
-        .include_y(5.0)
-        .x_grid_spacer(|_| decade_marks(5.0, 5))
-        .y_grid_spacer(|_| decade_marks(2.0, 3))
+        .include_y(4.8)
+        .x_grid_spacer(|_| marks(0.0, 5.0, 5))
+        .y_grid_spacer(|_| marks(0.0, 2.0, 2))
         .x_axis_formatter(|mark: GridMark, _: &_| decade(bin_low_us(mark.value.max(0.0) as usize)))
         .y_axis_formatter(|mark: GridMark, _: &_| format!("{:.0}", 10.0_f64.powf(mark.value)))
-        .show(ui, |plot| plot.bar_chart(BarChart::new("ticks", bars).color(theme::PLOT_WAKE)));
+        .show(ui, |plot| {
+            plot.bar_chart(BarChart::new("ticks", bars).color(theme::PLOT_WAKE))
+        });
 }
 
-fn decade_marks(step: f64, count: usize) -> Vec<GridMark> {
+fn marks(first: f64, step: f64, count: usize) -> Vec<GridMark> {
     (0..=count)
         .map(|i| GridMark {
-            value: i as f64 * step,
+            value: first + i as f64 * step,
             step_size: step,
         })
         .collect()
 }
 
 fn decade(us: f64) -> String {
-    if us >= 999.0 { format!("{:.0} ms", us * 1e-3) } else { format!("{us:.0} us") }
+    if us >= 999.0 {
+        format!("{:.0} ms", us * 1e-3)
+    } else {
+        format!("{us:.0} us")
+    }
 }
 
 fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
-    egui::Grid::new("timing").num_columns(5).min_col_width(50.0).spacing([8.0, 2.0]).show(ui, |ui| {
-        for head in ["last minute", "p50", "p99", "p99.9", "max"] {
-            ui.label(theme::small(head));
-        }
-        ui.end_row();
-        percentile_row(ui, "wake-up", &history.timing.wake);
-        percentile_row(ui, "tick work", &history.timing.work);
-    });
+    egui::Grid::new("timing")
+        .num_columns(5)
+        .min_col_width(48.0)
+        .spacing([6.0, 2.0])
+        .show(ui, |ui| {
+            for head in ["last 60 s", "p50", "p99", "p99.9", "max"] {
+                ui.label(theme::small(head));
+            }
+            ui.end_row();
+            percentile_row(ui, "wake-up", &history.timing.wake);
+            percentile_row(ui, "tick work", &history.timing.work);
+        });
     let Some(s) = &shown.state else {
         ui.label(theme::small("missed deadlines n/a"));
         return;
     };
     ui.horizontal(|ui| {
-        let color = if s.missed_deadlines > 0 { theme::WARN } else { theme::GOOD };
+        let color = if s.missed_deadlines > 0 {
+            theme::WARN
+        } else {
+            theme::GOOD
+        };
         let text = format!("missed deadlines {}", format::count(s.missed_deadlines));
         ui.label(RichText::new(text).color(color).strong());
         ui.label(theme::small(format!("of {} ticks", format::count(s.tick))));
@@ -129,7 +163,7 @@ fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
 fn percentile_row(ui: &mut egui::Ui, name: &str, p: &Percentiles) {
     ui.label(theme::small(name));
     for value in [p.p50, p.p99, p.p999, p.max] {
-        let text = RichText::new(format::microseconds(value)).monospace().size(11.5);
+        let text = RichText::new(format::microseconds(value)).monospace().size(11.0);
         let response = ui.label(text);
         if value.is_none() {
             response.on_hover_text("Told only with at least ten samples beyond it");

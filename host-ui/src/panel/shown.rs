@@ -146,7 +146,11 @@ impl Shown {
     /// How far the needle may go along the path.
     pub fn path_length_m(&self) -> Option<f64> {
         let plan = self.plan.as_ref()?;
-        let deepest = self.planned().iter().map(|s| along(plan, s.position_m)).fold(0.0, f64::max);
+        let deepest = self
+            .planned()
+            .iter()
+            .map(|s| along(plan, s.position_m))
+            .fold(0.0, f64::max);
         Some((deepest + PAST_LAST_SEED_M).min(0.3))
     }
 

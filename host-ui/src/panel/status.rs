@@ -55,9 +55,10 @@ pub fn banners(shown: &Shown) -> Vec<Banner> {
         list.push(Banner {
             severity: Severity::Bad,
             title: "Fault: the force is off",
-            text: fault.map_or("rt-core reports a fault that this program does not know".to_owned(), |f| {
-                sentence(f.message())
-            }),
+            text: fault.map_or(
+                "rt-core reports a fault that this program does not know".to_owned(),
+                |f| sentence(f.message()),
+            ),
             remedy: Some(("Re-arm", Action::Send(CommandKind::Engage))),
         });
     }
@@ -76,7 +77,11 @@ pub fn banners(shown: &Shown) -> Vec<Banner> {
 }
 
 fn absent(shown: &Shown, why: &str) -> Banner {
-    let why = if why.is_empty() { String::new() } else { format!("  ({why})") };
+    let why = if why.is_empty() {
+        String::new()
+    } else {
+        format!("  ({why})")
+    };
     Banner {
         severity: Severity::Bad,
         title: "rt-core is absent",
@@ -132,8 +137,14 @@ pub fn banners_ui(ui: &mut egui::Ui, list: &[Banner]) -> Option<Action> {
                     {
                         action = Some(remedy.clone());
                     }
-                    ui.add(egui::Label::new(RichText::new(&banner.text).color(ink)).wrap())
-                        .on_hover_text(&banner.text);
+                    let body = RichText::new(&banner.text).color(ink);
+                    // Two hyphens of a command must not look like one dash.
+                    let body = if banner.text.contains("--") {
+                        body.monospace()
+                    } else {
+                        body
+                    };
+                    ui.add(egui::Label::new(body).wrap()).on_hover_text(&banner.text);
                 });
             });
     }
@@ -214,7 +225,12 @@ fn figures_ui(ui: &mut egui::Ui, shown: &Shown) {
     let na = || "n/a".to_owned();
     figure(ui, "phase", shown.phase(), 126.0);
     figure(ui, "depth", &state.map_or_else(na, |s| format::length(s.depth_m)), 58.0);
-    figure(ui, "speed", &state.map_or_else(na, |s| format::speed(s.speed_m_per_s)), 72.0);
+    figure(
+        ui,
+        "speed",
+        &state.map_or_else(na, |s| format::speed(s.speed_m_per_s)),
+        72.0,
+    );
 }
 
 /// Fixed width, so that the bar does not jump as figures change.
@@ -247,12 +263,22 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown) {
         (true, true) => format!("{} of {limit:.1} N", format::force(force)),
     };
     let (rect, response) = ui.allocate_exact_size(Vec2::new(140.0, 18.0), Sense::hover());
-    let share = |value: f64| if limit > 0.0 { (value / limit).clamp(0.0, 1.0) as f32 } else { 0.0 };
+    let share = |value: f64| {
+        if limit > 0.0 {
+            (value / limit).clamp(0.0, 1.0) as f32
+        } else {
+            0.0
+        }
+    };
     let painter = ui.painter();
     painter.rect_filled(rect, 3.0, theme::BACKGROUND);
     let mut filled = rect;
     filled.set_width(rect.width() * share(force));
-    let color = if share(force) > 0.85 { theme::BAD } else { theme::PLOT_FORCE.gamma_multiply(0.75) };
+    let color = if share(force) > 0.85 {
+        theme::BAD
+    } else {
+        theme::PLOT_FORCE.gamma_multiply(0.75)
+    };
     painter.rect_filled(filled, 3.0, color);
     if peak > 0.0 && limit > 0.0 {
         let x = rect.left() + rect.width() * share(peak);

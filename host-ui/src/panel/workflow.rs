@@ -40,7 +40,10 @@ pub fn progress(shown: &Shown) -> Progress {
         Progress::Drop
     } else if beside > PLACED_WITHIN_M || depth < -REACHED_WITHIN_M * 5.0 {
         Progress::Place
-    } else if shown.deepest_seed_m().is_some_and(|deepest| depth < deepest - REACHED_WITHIN_M) {
+    } else if shown
+        .deepest_seed_m()
+        .is_some_and(|deepest| depth < deepest - REACHED_WITHIN_M)
+    {
         Progress::Insert
     } else {
         Progress::Drop
@@ -169,11 +172,16 @@ fn plan_ui(ui: &mut egui::Ui, shown: &Shown, now: Progress, actions: &mut Vec<Ac
 
 fn place_ui(ui: &mut egui::Ui, shown: &Shown, now: Progress, actions: &mut Vec<Action>) {
     let what = "Bring the tip to the entry, along the path.";
-    step_ui(ui, (Progress::Place, "2  Place the needle", what), (shown, now), |ui, ready| {
-        if ui.add_enabled(ready, Button::new("Place needle")).clicked() {
-            actions.push(Action::PlaceNeedle);
-        }
-    });
+    step_ui(
+        ui,
+        (Progress::Place, "2  Place the needle", what),
+        (shown, now),
+        |ui, ready| {
+            if ui.add_enabled(ready, Button::new("Place needle")).clicked() {
+                actions.push(Action::PlaceNeedle);
+            }
+        },
+    );
 }
 
 fn insert_ui(ui: &mut egui::Ui, shown: &Shown, now: Progress, actions: &mut Vec<Action>) {
@@ -188,7 +196,9 @@ fn insert_ui(ui: &mut egui::Ui, shown: &Shown, now: Progress, actions: &mut Vec<
             let mut goal_mm = depth_mm.clamp(0.0, length_mm);
             let label = ui.label(theme::small("Depth"));
             ui.spacing_mut().slider_width = 76.0;
-            let slider = egui::Slider::new(&mut goal_mm, 0.0..=length_mm).suffix(" mm").fixed_decimals(1);
+            let slider = egui::Slider::new(&mut goal_mm, 0.0..=length_mm)
+                .suffix(" mm")
+                .fixed_decimals(1);
             let response = ui.add_enabled(ready, slider).labelled_by(label.id);
             if response.changed() {
                 actions.push(Action::MoveTo(format::metres(goal_mm)));
@@ -204,10 +214,17 @@ fn drop_ui(ui: &mut egui::Ui, shown: &Shown, now: Progress, actions: &mut Vec<Ac
     step_ui(ui, step, (shown, now), |ui, ready| {
         let live = shown.is_live() && !shown.running;
         ui.horizontal(|ui| {
-            if ui.add_enabled(ready, Button::new("Drop seed")).on_hover_text("Space").clicked() {
+            if ui
+                .add_enabled(ready, Button::new("Drop seed"))
+                .on_hover_text("Space")
+                .clicked()
+            {
                 actions.push(Action::Send(CommandKind::DropSeed));
             }
-            if ui.add_enabled(live && shown.plan.is_some(), Button::new("Retract")).clicked() {
+            if ui
+                .add_enabled(live && shown.plan.is_some(), Button::new("Retract"))
+                .clicked()
+            {
                 actions.push(Action::Retract);
             }
             let undo = ui.add_enabled(live && dropped > 0, Button::new("Undo seed"));
@@ -222,10 +239,18 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         let live = shown.is_live();
         let engaged = shown.is_engaged();
-        if ui.add_enabled(live && !engaged, Button::new("Engage force")).on_hover_text("Key E").clicked() {
+        if ui
+            .add_enabled(live && !engaged, Button::new("Engage force"))
+            .on_hover_text("Key E")
+            .clicked()
+        {
             actions.push(Action::Send(CommandKind::Engage));
         }
-        if ui.add_enabled(live && engaged, Button::new("Disengage")).on_hover_text("Key D").clicked() {
+        if ui
+            .add_enabled(live && engaged, Button::new("Disengage"))
+            .on_hover_text("Key D")
+            .clicked()
+        {
             actions.push(Action::Send(CommandKind::Disengage));
         }
         let reset = ui.add_enabled(live, Button::new("Reset"));
@@ -249,13 +274,18 @@ fn seeds_ui(ui: &mut egui::Ui, shown: &Shown) {
         ui.set_min_width(ui.available_width());
         ui.label(theme::strong("Seed error, mm"))
             .on_hover_text("Where the seed lies now against where it was planned; along is positive inwards");
-        egui::Grid::new("seed errors").num_columns(4).striped(true).min_col_width(52.0).spacing([8.0, 2.0]).show(ui, |ui| {
-            for head in ["seed", "along", "across", "total"] {
-                ui.label(theme::small(head));
-            }
-            ui.end_row();
-            rows.iter().take(20).for_each(|row| seed_row_ui(ui, row));
-        });
+        egui::Grid::new("seed errors")
+            .num_columns(4)
+            .striped(true)
+            .min_col_width(52.0)
+            .spacing([8.0, 2.0])
+            .show(ui, |ui| {
+                for head in ["seed", "along", "across", "total"] {
+                    ui.label(theme::small(head));
+                }
+                ui.end_row();
+                rows.iter().take(20).for_each(|row| seed_row_ui(ui, row));
+            });
         let placed: Vec<f64> = rows.iter().filter(|r| r.placed.is_some()).map(total_m).collect();
         let mean = placed.iter().sum::<f64>() / placed.len().max(1) as f64;
         let worst = placed.iter().copied().fold(0.0, f64::max);
@@ -302,7 +332,9 @@ fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, actions
         let field = ui.add(edit).labelled_by(label.id);
         let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
         let path = state.scene_path.trim();
-        let clicked = ui.add_enabled(free && !path.is_empty(), Button::new("Load scene…")).clicked();
+        let clicked = ui
+            .add_enabled(free && !path.is_empty(), Button::new("Load scene…"))
+            .clicked();
         if (clicked || entered) && free && !path.is_empty() {
             actions.push(Action::LoadScene(PathBuf::from(path)));
         }

@@ -174,7 +174,9 @@ impl Gpu {
         let mut encoder = self
             .state
             .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("stylet view") });
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
+                label: Some("stylet view"),
+            });
         {
             let mut pass = begin(&mut encoder, targets, clear);
             pass.set_bind_group(0, &self.gland.bind, &[]);

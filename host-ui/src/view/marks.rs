@@ -109,8 +109,8 @@ impl Marks {
         }
     }
 
-    /// Lines each 10 mm under the body, and the three axes from its corner.
-    pub fn ground(&mut self, lower_m: [f64; 3], upper_m: [f64; 3]) {
+    /// Lines each 10 mm under the body, and the three axes from a far corner, which is returned.
+    pub fn ground(&mut self, lower_m: [f64; 3], upper_m: [f64; 3]) -> [f32; 3] {
         const STEP_M: f32 = 0.01;
         let (lower, upper) = (single(lower_m), single(upper_m));
         let y = lower.y - STEP_M;
@@ -128,22 +128,17 @@ impl Marks {
         for k in 0..=nz {
             self.line(at(0, k), at(nx, k), theme::GRID);
         }
-        let corner = at(0, 0);
+        let corner = at(nx, 0);
         for axis in [V::x(), V::y(), V::z()] {
             self.cone(corner, corner + axis * STEP_M, [0.2e-3; 2], theme::WEAK);
-            self.cone(corner + axis * STEP_M, corner + axis * 1.25 * STEP_M, [0.6e-3, 0.0], theme::WEAK);
+            self.cone(
+                corner + axis * STEP_M,
+                corner + axis * 1.25 * STEP_M,
+                [0.6e-3, 0.0],
+                theme::WEAK,
+            );
         }
-    }
-
-    /// Where [`Self::ground`] put its corner.
-    pub fn ground_corner(lower_m: [f64; 3]) -> [f32; 3] {
-        const STEP_M: f32 = 0.01;
-        let lower = single(lower_m);
-        [
-            ((lower.x / STEP_M).floor() - 1.0) * STEP_M,
-            lower.y - STEP_M,
-            ((lower.z / STEP_M).floor() - 1.0) * STEP_M,
-        ]
+        corner.into()
     }
 
     fn line(&mut self, from: V, to: V, color: Color32) {
@@ -210,8 +205,8 @@ impl Marks {
         };
         for step in 0..STEPS {
             for tube in 0..TUBE {
-                let corners = [(step, tube), (step + 1, tube), (step + 1, tube + 1), (step, tube + 1)]
-                    .map(|(s, t)| corner(s, t));
+                let corners =
+                    [(step, tube), (step + 1, tube), (step + 1, tube + 1), (step, tube + 1)].map(|(s, t)| corner(s, t));
                 self.quad(corners, color);
             }
         }
@@ -239,6 +234,9 @@ mod tests {
         marks.path([0.0; 3], [0.0; 3]);
         marks.ground([-20.0; 3], [20.0; 3]);
         let all = marks.triangles.iter().chain(&marks.lines);
-        assert!(all.flat_map(|v| v.place_m.iter().chain(&v.normal)).all(|c| c.is_finite()));
+        assert!(
+            all.flat_map(|v| v.place_m.iter().chain(&v.normal))
+                .all(|c| c.is_finite())
+        );
     }
 }

@@ -52,6 +52,8 @@ pub struct Scene3d {
     uploaded_snapshot: Option<(u64, u64)>,
     drawn: Option<Key>,
     marks: Marks,
+    /// Where the axes are drawn.
+    corner_m: Option<[f32; 3]>,
     vertices: Vec<SurfaceVertex>,
 }
 
@@ -65,6 +67,7 @@ impl Scene3d {
             uploaded_snapshot: None,
             drawn: None,
             marks: Marks::default(),
+            corner_m: None,
             vertices: Vec::new(),
         }
     }
@@ -133,7 +136,8 @@ impl Scene3d {
     fn steer(&mut self, ui: &egui::Ui, response: &egui::Response, rect: Rect) {
         let drag = response.drag_delta();
         if response.dragged_by(PointerButton::Primary) {
-            self.camera.orbit([-drag.x * TURN_PER_POINT_RAD, drag.y * TURN_PER_POINT_RAD]);
+            self.camera
+                .orbit([-drag.x * TURN_PER_POINT_RAD, drag.y * TURN_PER_POINT_RAD]);
         } else if response.dragged_by(PointerButton::Secondary) || response.dragged_by(PointerButton::Middle) {
             let height = rect.height().max(1.0);
             self.camera.pan([drag.x / height, drag.y / height]);
@@ -158,7 +162,7 @@ impl Scene3d {
             seed_count: shown.seeds.len(),
         };
         if fresh || self.drawn != Some(key) {
-            collect(&mut self.marks, shown);
+            self.corner_m = collect(&mut self.marks, shown);
             gpu.set_marks(&self.marks);
             let gland = uniform(&self.camera, aspect, theme::GLAND, 1.0 - self.look.transparency);
             let ghost = uniform(&self.camera, aspect, theme::GHOST, 0.22);
@@ -178,8 +182,7 @@ impl Scene3d {
             Some(rect.min + Vec2::new(x * rect.width(), y * rect.height()))
         };
         let font = FontId::proportional(12.0);
-        if let Some(scene) = &shown.scene {
-            let corner = Marks::ground_corner(scene.lower_m);
+        if let Some(corner) = self.corner_m {
             for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
                 let mut end = corner;
                 end[axis] += 0.0145;
@@ -209,7 +212,9 @@ impl Scene3d {
                 }
                 let label = ui.label(theme::weak("Transparency"));
                 let mut percent = self.look.transparency * 100.0;
-                let slider = egui::Slider::new(&mut percent, 0.0..=100.0).suffix(" %").fixed_decimals(0);
+                let slider = egui::Slider::new(&mut percent, 0.0..=100.0)
+                    .suffix(" %")
+                    .fixed_decimals(0);
                 if ui.add(slider).labelled_by(label.id).changed() {
                     self.look.transparency = percent / 100.0;
                 }
@@ -232,11 +237,9 @@ fn uniform(camera: &Camera, aspect: f32, color: Color32, opacity: f32) -> SceneU
     }
 }
 
-fn collect(marks: &mut Marks, shown: &Shown) {
+fn collect(marks: &mut Marks, shown: &Shown) -> Option<[f32; 3]> {
     marks.clear();
-    if let Some(scene) = &shown.scene {
-        marks.ground(scene.lower_m, scene.upper_m);
-    }
+    let corner = shown.scene.map(|scene| marks.ground(scene.lower_m, scene.upper_m));
     if let (Some(tip), Some(state)) = (shown.tip_m(), &shown.state) {
         marks.needle(tip, state.needle_direction);
     }
@@ -252,6 +255,7 @@ fn collect(marks: &mut Marks, shown: &Shown) {
             marks.path(plan.entry_m, end);
         }
     }
+    corner
 }
 
 fn scale_bar(painter: &egui::Painter, rect: Rect, height_m: f32) {
@@ -269,7 +273,13 @@ fn scale_bar(painter: &egui::Painter, rect: Rect, height_m: f32) {
     }
     let text = format!("{length_mm:.0} mm");
     let middle = start + (end - start) * 0.5 - Vec2::new(0.0, 6.0);
-    painter.text(middle, Align2::CENTER_BOTTOM, text, FontId::proportional(12.0), theme::PATH);
+    painter.text(
+        middle,
+        Align2::CENTER_BOTTOM,
+        text,
+        FontId::proportional(12.0),
+        theme::PATH,
+    );
 }
 
 fn legend(painter: &egui::Painter, rect: Rect, shown: &Shown, look: Look) {
