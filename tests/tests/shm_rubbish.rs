@@ -18,7 +18,10 @@ fn rubbish<T: Pod>() -> Vec<T> {
         seed as u8
     };
     let mut all = vec![pod_read_unaligned(&vec![0xff; size_of::<T>()]), T::zeroed()];
-    all.extend((0..200).map(|_| pod_read_unaligned(&(0..size_of::<T>()).map(|_| random()).collect::<Vec<u8>>())));
+    for _ in 0..200 {
+        let bytes: Vec<u8> = (0..size_of::<T>()).map(|_| random()).collect();
+        all.push(pod_read_unaligned(&bytes));
+    }
     // Doubles that are not numbers, in every place.
     let nan = f64::NAN.to_ne_bytes();
     all.push(pod_read_unaligned(&nan.iter().copied().cycle().take(size_of::<T>()).collect::<Vec<u8>>()));
