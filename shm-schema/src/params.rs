@@ -111,7 +111,7 @@ parameters! {
     ResidualTolerance "tissue.residual_tolerance" "Residual tolerance" Tissue "elements" 1.0, 1e-4, 1e-2, 1e-3, "design section 3", "Largest constraint violation that a tissue step may leave.";
     PunctureDepth "needle.puncture_depth" "Puncture depth u_cri" Needle "mm" 1e3, 0.5, 20.0, 8.0, "paper eq. 6", "Depth at which the needle goes through the membrane.";
     SpeedCoefficient "needle.speed_coefficient" "Speed coefficient K_V" Needle "mm2/s2" 1e6, 1.0, 1e6, 10000.0, "paper eq. 6", "The larger, the more a fast needle drags the tissue along.";
-    DepthCoefficient "needle.depth_coefficient" "Depth coefficient K_s" Needle "mm2" 1e6, 0.01, 1000.0, 64.0, "paper eq. 6", "The larger, the longer the tissue follows the tip after puncture.";
+    DepthCoefficient "needle.depth_coefficient" "Depth coefficient K_s" Needle "mm2" 1e6, 0.01, 1000.0, 200.0, "paper eq. 6", "The larger, the longer the tissue follows the tip after puncture.";
     StaticSpeed "needle.static_speed" "Static friction speed V_0" Needle "mm/s" 1e3, 0.0, 200.0, 20.0, "paper eq. 6", "Below this speed the tissue sticks to the needle.";
     RetractionRatio "needle.retraction_ratio" "Retraction ratio K_ret" Needle "" 1.0, 0.0, 1.0, 0.3, "paper eq. 6", "Share of the tip's step that the tissue follows on the way out.";
     PunctureHysteresis "needle.puncture_hysteresis" "Puncture hysteresis" Needle "mm" 1e3, 0.0, 5.0, 0.5, "design section 4", "How far the tip must come back out before the membrane counts as closed.";
