@@ -86,6 +86,11 @@ pub fn run(options: Options) -> Result<(), String> {
 }
 
 impl App {
+    /// What the window knows of the core.
+    pub fn link(&self) -> &Link {
+        &self.link
+    }
+
     pub fn new(cc: &eframe::CreationContext<'_>, options: Options) -> Self {
         theme::apply(&cc.egui_ctx);
         let shown = Shown::empty(options.instance.name());

@@ -1,6 +1,7 @@
 //! The command line of `rt-core`.
 
 use crate::core::Options;
+use crate::rt::arm;
 use clap::Parser;
 use stylet_shm_schema::service::Instance;
 
@@ -58,11 +59,14 @@ impl Cli {
             }
         }
         let instance = Instance::new(&self.instance).map_err(|e| problems.push(e.to_string()));
+        let refused = if self.rt_if_allowed { may_be_real_time().err() } else { None };
         match instance {
             Ok(instance) if problems.is_empty() => Ok(Options {
                 instance,
                 scene: self.scene.clone(),
-                no_rt: self.no_rt || (self.rt_if_allowed && !may_be_real_time()),
+                no_rt: self.no_rt || refused.is_some(),
+                no_rt_asked: self.no_rt,
+                rights_missing: refused,
                 haptic_core: self.haptic_core.or(cores.last().copied()),
                 tissue_core: self.tissue_core.or(cores.iter().rev().nth(1).or(cores.last()).copied()),
                 haptic_priority: self.haptic_priority,
@@ -73,15 +77,12 @@ impl Cli {
     }
 }
 
-/// Tries it in a thread of its own, which then ends.
-fn may_be_real_time() -> bool {
-    let ask = crate::rt::arm::Ask {
-        priority: Some(1),
-        core: None,
-    };
-    let fifo = std::thread::spawn(move || crate::rt::arm::arm(ask).is_ok())
-        .join()
-        .unwrap_or(false);
+/// Tries it in a thread of its own, which then ends; `Err` says how to grant what is missing.
+fn may_be_real_time() -> Result<(), String> {
+    let ask = arm::Ask { priority: Some(1), core: None };
+    let armed = std::thread::spawn(move || arm::arm(ask).map(drop).map_err(|e| e.to_string())).join();
+    armed.unwrap_or_else(|_| Err("the trial of real-time scheduling ended by itself".to_owned()))?;
     // SAFETY: both calls have no preconditions; what is locked now is unlocked again.
-    fifo && unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0 && libc::munlockall() == 0 }
+    let lockable = unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0 && libc::munlockall() == 0 };
+    if lockable { Ok(()) } else { Err(arm::advice("the kernel does not lock memory")) }
 }

@@ -29,6 +29,10 @@ pub struct Options {
     pub scene: String,
     /// Go on without real-time scheduling.
     pub no_rt: bool,
+    /// The operator wanted it so.
+    pub no_rt_asked: bool,
+    /// Why real time was tried and not granted, and how to grant it.
+    pub rights_missing: Option<String>,
     pub haptic_core: Option<usize>,
     pub tissue_core: Option<usize>,
     pub haptic_priority: u32,
@@ -189,7 +193,7 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
         haptic: haptic_report,
         tissue: tissue_report,
         memory_locked: u32::from(locked.is_none()),
-        no_rt_asked: u32::from(options.no_rt),
+        no_rt_asked: u32::from(options.no_rt_asked),
         device: Text::new(info.name),
         version: Text::new(env!("CARGO_PKG_VERSION")),
         advice: Text::new(&missing_rights(options, locked.as_deref())),
@@ -240,10 +244,11 @@ fn lock_memory(options: &Options) -> Result<Option<String>, String> {
 }
 
 fn missing_rights(options: &Options, unlocked: Option<&str>) -> String {
-    match (options.no_rt, unlocked) {
-        (false, None) => String::new(),
-        (_, Some(why)) => why.to_owned(),
-        (true, None) => "started with --no-rt: real-time scheduling was not asked for. Restart without it".to_owned(),
+    match (&options.rights_missing, unlocked) {
+        (Some(why), _) => why.clone(),
+        (None, Some(why)) => why.to_owned(),
+        (None, None) if !options.no_rt => String::new(),
+        (None, None) => "started with --no-rt: real-time scheduling was not asked for. Restart without it".to_owned(),
     }
 }
 

@@ -144,14 +144,21 @@ fn group_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState, group
     ui.add_space(4.0);
 }
 
+/// Text in a column of the same width in every group, so that the groups line up.
+fn column(ui: &mut egui::Ui, width: f32, text: RichText) -> egui::Response {
+    ui.horizontal(|ui| {
+        ui.set_min_width(width);
+        ui.label(text)
+    })
+    .inner
+}
+
 fn row_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState, index: usize, spec: &ParameterSpec) {
     let in_force = shown.parameters.map_or(spec.default, |p| p.set.get(spec.id));
     let value = state.drafts[index].unwrap_or(in_force);
     let scale = spec.display_per_si;
     let (low, high) = (spec.min * scale, spec.max * scale);
-    let label = ui
-        .label(spec.label)
-        .on_hover_text(format!("{}\n{}", spec.help, spec.key));
+    let label = column(ui, 165.0, spec.label.into()).on_hover_text(format!("{}\n{}", spec.help, spec.key));
     let mut displayed = value * scale;
     let drag = DragValue::new(&mut displayed)
         .range(low..=high)
@@ -170,8 +177,8 @@ fn row_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState, index: 
     if response.changed() {
         state.edit(index, (displayed / scale).clamp(spec.min, spec.max));
     }
-    ui.label(theme::small(format!("{} to {}", plain(low), plain(high))));
-    ui.label(theme::small(spec.source)).on_hover_text(spec.help);
+    column(ui, 95.0, theme::small(format!("{} to {}", plain(low), plain(high))));
+    column(ui, 100.0, theme::small(spec.source)).on_hover_text(spec.help);
     ui.horizontal(|ui| {
         let changed = (value - spec.default).abs() > 1e-9 * spec.default.abs().max(1e-12);
         let reset = ui.add_enabled(changed && shown.is_live(), Button::new("Reset").small());

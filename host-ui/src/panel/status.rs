@@ -77,18 +77,15 @@ pub fn banners(shown: &Shown) -> Vec<Banner> {
 }
 
 fn absent(shown: &Shown, why: &str) -> Banner {
-    let why = if why.is_empty() {
-        String::new()
+    let text = if why.is_empty() {
+        format!("Start it in another terminal: rt-core --instance {}", shown.instance)
     } else {
-        format!("  ({why})")
+        sentence(why)
     };
     Banner {
         severity: Severity::Bad,
         title: "rt-core is absent",
-        text: format!(
-            "Start it in a terminal; this window finds it by itself:   rt-core --instance {}{why}",
-            shown.instance
-        ),
+        text,
         remedy: None,
     }
 }
@@ -98,7 +95,7 @@ fn not_real_time(shown: &Shown) -> Banner {
     let asked = shown.session.is_some_and(|s| s.no_rt_asked != 0);
     let text = match (advice.trim(), asked) {
         ("", true) => "rt-core was started with --no-rt: timing here says nothing about this machine.".to_owned(),
-        ("", false) => "Run setcap cap_sys_nice,cap_ipc_lock+ep on rt-core, or allow rtprio and memlock in /etc/security/limits.d, then start it again.".to_owned(),
+        ("", false) => "Run setcap cap_sys_nice,cap_ipc_lock=ep on rt-core, or allow rtprio and memlock in /etc/security/limits.d, then start it again.".to_owned(),
         (advice, _) => advice.replace('\n', "  "),
     };
     Banner {

@@ -193,14 +193,17 @@ fn insert_ui(ui: &mut egui::Ui, shown: &Shown, now: Progress, actions: &mut Vec<
             }
             let depth_mm = format::mm(shown.path_depth_m().unwrap_or(0.0));
             let length_mm = format::mm(shown.path_length_m().unwrap_or(0.01));
-            let mut goal_mm = depth_mm.clamp(0.0, length_mm);
+            let at_mm = depth_mm.clamp(0.0, length_mm);
+            let mut goal_mm = at_mm;
             let label = ui.label(theme::small("Depth"));
             ui.spacing_mut().slider_width = 76.0;
             let slider = egui::Slider::new(&mut goal_mm, 0.0..=length_mm)
                 .suffix(" mm")
                 .fixed_decimals(1);
             let response = ui.add_enabled(ready, slider).labelled_by(label.id);
-            if response.changed() {
+            // The slider rounds what it is given and calls that a change; only a hand on it may move the needle.
+            let by_hand = response.dragged() || response.has_focus();
+            if by_hand && (goal_mm - at_mm).abs() > 0.06 {
                 actions.push(Action::MoveTo(format::metres(goal_mm)));
             }
         });
