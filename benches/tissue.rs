@@ -18,7 +18,11 @@ struct Row {
 
 impl Row {
     fn new(name: &'static str) -> Self {
-        Self { name, micros: Vec::with_capacity(ROUNDS), violation: 0.0 }
+        Self {
+            name,
+            micros: Vec::with_capacity(ROUNDS),
+            violation: 0.0,
+        }
     }
 
     fn add(&mut self, start: Instant, model: &ChainMail, state: &TissueState) {
@@ -39,10 +43,16 @@ fn main() {
     let h = scene.lattice.spacing_m;
     let (lower, upper) = scene.lattice.bounds_m();
     let middle = [0, 1, 2].map(|a| ((lower[a] + upper[a]) / 2.0 / h) as usize);
-    let element = scene.lattice.element_of_cell(middle[0], middle[1], middle[2]).expect("the gland is convex");
+    let element = scene
+        .lattice
+        .element_of_cell(middle[0], middle[1], middle[2])
+        .expect("the gland is convex");
     let rest = scene.lattice.rest_m(element);
     // Far enough that every element moves.
-    let far = Held { element, position_m: [rest[0] + 30.0 * h, rest[1] - 20.0 * h, rest[2] + 50.0 * h] };
+    let far = Held {
+        element,
+        position_m: [rest[0] + 30.0 * h, rest[1] - 20.0 * h, rest[2] + 50.0 * h],
+    };
 
     let mut queue = QueuePass::new(&model);
     let mut rows = [
@@ -65,19 +75,34 @@ fn main() {
 
         // 0.25 mm a tick, in and out over 10 mm.
         let depth = 2.5e-4 * (40 - (round as i64 % 80 - 40).abs()) as f64;
-        let held = Held { element: 0, position_m: [tip_rest[0], tip_rest[1], tip_rest[2] + depth] };
+        let held = Held {
+            element: 0,
+            position_m: [tip_rest[0], tip_rest[1], tip_rest[2] + depth],
+        };
         let start = Instant::now();
         std::hint::black_box(step(&model, &mut inserted, Some(held), 5e-3));
         rows[2].add(start, &model, &inserted);
     }
 
-    println!("{} elements, {ROUNDS} interleaved rounds; violation in elements", scene.lattice.element_count());
-    println!("{:<42} {:>9} {:>9} {:>9} {:>8} {:>11}", "", "p50 us", "p99 us", "max us", "ratio", "violation");
+    println!(
+        "{} elements, {ROUNDS} interleaved rounds; violation in elements",
+        scene.lattice.element_count()
+    );
+    println!(
+        "{:<42} {:>9} {:>9} {:>9} {:>8} {:>11}",
+        "", "p50 us", "p99 us", "max us", "ratio", "violation"
+    );
     let base = rows[0].quantile(0.5);
     for row in &mut rows {
         let p50 = row.quantile(0.5);
         let (p99, max, ratio) = (row.quantile(0.99), row.quantile(1.0), base / p50);
-        println!("{:<42} {p50:>9.1} {p99:>9.1} {max:>9.1} {ratio:>8.2} {:>11.2e}", row.name, row.violation);
+        println!(
+            "{:<42} {p50:>9.1} {p99:>9.1} {max:>9.1} {ratio:>8.2} {:>11.2e}",
+            row.name, row.violation
+        );
     }
-    assert!(rows[1].violation <= 1e-3 && rows[2].violation <= 1e-3, "a step left its limits");
+    assert!(
+        rows[1].violation <= 1e-3 && rows[2].violation <= 1e-3,
+        "a step left its limits"
+    );
 }

@@ -70,11 +70,16 @@ enum SceneTask {
 impl Cli {
     pub fn run(self) -> Result<(), String> {
         match self.task {
-            None => app::run(app::Options {
-                instance: instance(&self.window.instance)?,
-                scene: self.window.scene,
-                label: self.window.label,
-            }),
+            None => {
+                let instance = instance(&self.window.instance)?;
+                let ended = app::run(app::Options {
+                    instance: instance.clone(),
+                    scene: self.window.scene,
+                    label: self.window.label,
+                });
+                instance.sweep();
+                ended
+            }
             Some(Task::Scene(SceneTask::Check { file, label })) => check(&file, label),
             Some(Task::Procedure {
                 common,
@@ -86,15 +91,18 @@ impl Cli {
                 if !(0.1..=500.0).contains(&insert_speed) {
                     return Err(format!("--insert-speed {insert_speed}: give 0.1 to 500 mm/s"));
                 }
-                procedure::run(procedure::Options {
-                    instance: instance(&common.instance)?,
+                let instance = instance(&common.instance)?;
+                let ended = procedure::run(procedure::Options {
+                    instance: instance.clone(),
                     scene: common.scene,
                     label: common.label,
                     out,
                     core,
                     insert_m_per_s: insert_speed / 1e3,
                     seeds: usize::from(seeds),
-                })
+                });
+                instance.sweep();
+                ended
             }
         }
     }

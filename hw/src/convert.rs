@@ -5,11 +5,7 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 /// Counts of an encoder whose step is `step`; half a step rounds away from zero. Saturates, and gives
 /// zero for what is not a number or a step that is not positive.
 pub fn counts_from_si(value: f64, step: f64) -> i64 {
-    if step > 0.0 {
-        (value / step).round() as i64
-    } else {
-        0
-    }
+    if step > 0.0 { (value / step).round() as i64 } else { 0 }
 }
 
 /// The value in the middle of the encoder step `counts`.
@@ -38,9 +34,7 @@ pub fn millinewton_metres_from_newton_metres(torque_nm: &Vector3<f64>) -> Vector
 
 /// Position (m) and orientation from a driver's homogeneous transform: column-major, in millimetres.
 /// `None` where it is not finite or its upper block is not close to a rotation.
-pub fn pose_from_column_major_mm(
-    transform: &[f64; 16],
-) -> Option<(Vector3<f64>, UnitQuaternion<f64>)> {
+pub fn pose_from_column_major_mm(transform: &[f64; 16]) -> Option<(Vector3<f64>, UnitQuaternion<f64>)> {
     if transform.iter().any(|x| !x.is_finite()) {
         return None;
     }
@@ -50,8 +44,7 @@ pub fn pose_from_column_major_mm(
     if defect > 1e-3 || rotation.determinant() < 0.0 {
         return None;
     }
-    let orientation =
-        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+    let orientation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
     let tip = metres_from_millimetres(&Vector3::new(px, py, pz));
     Some((tip, orientation))
 }
@@ -67,11 +60,7 @@ mod tests {
             let p = Vector3::new(f64::from(i) * 1.37e-6, 0.1, -f64::from(i) * 2.1e-5);
             let q = quantise(&p, step);
             assert!((q - p).amax() <= 0.5 * step * (1.0 + 1e-9));
-            assert_eq!(
-                quantise(&q, step),
-                q,
-                "a position on the grid stays where it is"
-            );
+            assert_eq!(quantise(&q, step), q, "a position on the grid stays where it is");
         }
     }
 

@@ -81,8 +81,7 @@ pub struct Sample {
 
 impl Sample {
     pub fn is_finite(&self) -> bool {
-        self.tip_in_world.iter().all(|x| x.is_finite())
-            && self.world_from_tool.coords.iter().all(|x| x.is_finite())
+        self.tip_in_world.iter().all(|x| x.is_finite()) && self.world_from_tool.coords.iter().all(|x| x.is_finite())
     }
 
     /// Unit vector along the needle, towards its tip.
@@ -114,10 +113,7 @@ impl Wrench {
     }
 
     pub fn is_finite(&self) -> bool {
-        self.force_n
-            .iter()
-            .chain(self.torque_nm.iter())
-            .all(|x| x.is_finite())
+        self.force_n.iter().chain(self.torque_nm.iter()).all(|x| x.is_finite())
     }
 }
 

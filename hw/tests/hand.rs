@@ -5,8 +5,7 @@ mod common;
 use common::DT_S;
 use nalgebra::Vector3;
 use stylet_hw::{
-    Device, Hand, HandGoal, HandPath, ScriptedPath, SimulatedPhantom, SimulatedPhantomConfig,
-    Waypoint, Wrench,
+    Device, Hand, HandGoal, HandPath, ScriptedPath, SimulatedPhantom, SimulatedPhantomConfig, Waypoint, Wrench,
 };
 
 fn goal(x: f64, y: f64, z: f64) -> HandGoal {
@@ -40,10 +39,7 @@ fn from_rest_the_path_is_straight_trapezoidal_and_ends_at_the_goal() {
     }
     // length / v + v / a
     let expected_s = length / 0.05 + 0.05 / 0.5;
-    assert!(
-        (f64::from(ticks) * DT_S - expected_s).abs() < 5e-3,
-        "{ticks}"
-    );
+    assert!((f64::from(ticks) * DT_S - expected_s).abs() < 5e-3, "{ticks}");
     assert!((fastest - 0.05).abs() < 1e-12);
     assert_eq!(*path.position_m(), target.tip_in_world);
 }
@@ -137,9 +133,7 @@ fn a_steady_operator_reaches_the_goal_and_does_not_lunge_at_puncture() {
     for tick in 0..5000 {
         let depth = device.read(DT_S).unwrap().tip_in_world.z;
         let force = tissue(depth, &mut punctured, &mut held_at);
-        device
-            .write(&Wrench::from_force(Vector3::z() * force))
-            .unwrap();
+        device.write(&Wrench::from_force(Vector3::z() * force)).unwrap();
         most_ahead = most_ahead.max(depth - device.path().position_m().z);
         if tick >= 4500 {
             assert!((depth - 0.04).abs() < 3e-4, "{depth} m in tick {tick}");
@@ -157,9 +151,7 @@ fn a_passive_hand_yields_as_its_spring_says() {
         coulomb_friction_n: 0.0,
         ..SimulatedPhantomConfig::default()
     });
-    device
-        .write(&Wrench::from_force(Vector3::x() * 20.0))
-        .unwrap();
+    device.write(&Wrench::from_force(Vector3::x() * 20.0)).unwrap();
     for _ in 0..5000 {
         device.read(DT_S).unwrap();
     }

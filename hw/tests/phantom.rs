@@ -35,11 +35,7 @@ fn the_phantom_meets_the_contract_in_any_hand() {
 fn a_step_of_force_gives_the_response_of_mass_spring_and_damper() {
     let hand = Hand::passive();
     let mut device = frictionless(hand);
-    let (m, b, k) = (
-        0.075 + hand.mass_kg,
-        hand.damping_n_s_per_m,
-        hand.stiffness_n_per_m,
-    );
+    let (m, b, k) = (0.075 + hand.mass_kg, hand.damping_n_s_per_m, hand.stiffness_n_per_m);
     let force_n = 3.0;
     push(&mut device, Vector3::x() * force_n);
     let decay = b / (2.0 * m);
@@ -70,10 +66,7 @@ fn below_its_friction_the_device_sticks_exactly_and_a_slide_stops_in_finite_time
     let mut device = SimulatedPhantom::new(config(Hand::absent()));
     for tick in 0..10_000 {
         let angle = f64::from(tick);
-        push(
-            &mut device,
-            Vector3::new(angle.sin(), angle.cos(), 0.0) * 0.0399,
-        );
+        push(&mut device, Vector3::new(angle.sin(), angle.cos(), 0.0) * 0.0399);
         device.read(DT_S).unwrap();
         assert_eq!(*device.true_tip_in_world(), Vector3::zeros());
     }
@@ -112,10 +105,7 @@ fn the_amplifier_keeps_the_direction_and_stops_at_its_peak() {
         let asked = Vector3::new(2.0, -1.0, 2.0) / 3.0;
         push(&mut device, asked * size);
         let given = device.applied_wrench().force_n;
-        assert!(
-            (given - asked * f64::min(size, 8.5)).norm() < 1e-9,
-            "{size}"
-        );
+        assert!((given - asked * f64::min(size, 8.5)).norm() < 1e-9, "{size}");
     }
     let wrench = Wrench {
         force_n: Vector3::zeros(),

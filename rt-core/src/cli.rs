@@ -59,7 +59,11 @@ impl Cli {
             }
         }
         let instance = Instance::new(&self.instance).map_err(|e| problems.push(e.to_string()));
-        let refused = if self.rt_if_allowed { may_be_real_time().err() } else { None };
+        let refused = if self.rt_if_allowed {
+            may_be_real_time().err()
+        } else {
+            None
+        };
         match instance {
             Ok(instance) if problems.is_empty() => Ok(Options {
                 instance,
@@ -79,10 +83,17 @@ impl Cli {
 
 /// Tries it in a thread of its own, which then ends; `Err` says how to grant what is missing.
 fn may_be_real_time() -> Result<(), String> {
-    let ask = arm::Ask { priority: Some(1), core: None };
+    let ask = arm::Ask {
+        priority: Some(1),
+        core: None,
+    };
     let armed = std::thread::spawn(move || arm::arm(ask).map(drop).map_err(|e| e.to_string())).join();
     armed.unwrap_or_else(|_| Err("the trial of real-time scheduling ended by itself".to_owned()))?;
     // SAFETY: both calls have no preconditions; what is locked now is unlocked again.
     let lockable = unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0 && libc::munlockall() == 0 };
-    if lockable { Ok(()) } else { Err(arm::advice("the kernel does not lock memory")) }
+    if lockable {
+        Ok(())
+    } else {
+        Err(arm::advice("the kernel does not lock memory"))
+    }
 }

@@ -2,8 +2,10 @@
 
 use crate::*;
 use iceoryx2::config::Config;
-use iceoryx2::node::{Node, NodeBuilder};
-use iceoryx2::prelude::{FileName, LogLevel, Path, SemanticString, ServiceName, SignalHandlingMode, set_log_level};
+use iceoryx2::node::{Node, NodeBuilder, NodeState};
+use iceoryx2::prelude::{
+    CallbackProgression, FileName, LogLevel, Path, SemanticString, ServiceName, SignalHandlingMode, set_log_level,
+};
 use iceoryx2::service::ipc;
 use iceoryx2::service::port_factory::{blackboard, publish_subscribe};
 use std::time::Duration;
@@ -95,6 +97,28 @@ impl Instance {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<Ipc>()
             .map_err(|e| failed("cannot use shared memory", e))
+    }
+
+    /// Removes every file of this instance, unless a program still uses it. For the program that ends last.
+    pub fn sweep(&self) {
+        let Ok(config) = self.config() else { return };
+        let mut used = false;
+        let listed = Node::<Ipc>::list(&config, |state| {
+            // What cannot be told is taken as alive.
+            used |= !matches!(state, NodeState::Dead(_));
+            CallbackProgression::Continue
+        });
+        if used || listed.is_err() {
+            return;
+        }
+        // Files that another program removes at the same time are gone as well.
+        let _ = std::fs::remove_dir_all(self.root());
+        let prefix = self.prefix();
+        for entry in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
+            if entry.file_name().to_string_lossy().starts_with(&prefix) {
+                let _ = std::fs::remove_file(entry.path());
+            }
+        }
     }
 }
 

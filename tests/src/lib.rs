@@ -11,9 +11,16 @@ use stylet_shm_schema::service::Instance;
 /// A built program of the workspace; `make test` builds them first.
 pub fn program(name: &str) -> PathBuf {
     let test = std::env::current_exe().expect("a test knows its own file");
-    let folder = test.parent().and_then(|deps| deps.parent()).expect("tests live in <target>/<profile>/deps");
+    let folder = test
+        .parent()
+        .and_then(|deps| deps.parent())
+        .expect("tests live in <target>/<profile>/deps");
     let path = folder.join(name);
-    assert!(path.exists(), "{} is missing: run `cargo build --release --workspace` first", path.display());
+    assert!(
+        path.exists(),
+        "{} is missing: run `cargo build --release --workspace` first",
+        path.display()
+    );
     path
 }
 
@@ -26,7 +33,11 @@ pub fn fresh_instance() -> Instance {
 
 /// A folder for one test's files, emptied first.
 pub fn scratch(name: &str) -> PathBuf {
-    let folder = program("rt-core").parent().expect("has a folder").join("test-out").join(name);
+    let folder = program("rt-core")
+        .parent()
+        .expect("has a folder")
+        .join("test-out")
+        .join(name);
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder).expect("the target folder can be written");
     folder
@@ -54,7 +65,11 @@ impl Core {
             .stderr(Stdio::null())
             .spawn()
             .expect("rt-core starts");
-        Self { child, instance, report }
+        Self {
+            child,
+            instance,
+            report,
+        }
     }
 
     pub fn id(&self) -> u32 {
@@ -94,6 +109,7 @@ impl Drop for Core {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
+        self.instance.sweep();
     }
 }
 
@@ -119,7 +135,11 @@ pub fn ask(link: &mut Link, kind: CommandKind, values: &[f64]) -> Result<u64, St
         answer.is_some()
     });
     let answer = answer.ok_or_else(|| format!("no answer to {kind:?}"))?;
-    if answer.accepted { Ok(answer.effective_tick) } else { Err(answer.text) }
+    if answer.accepted {
+        Ok(answer.effective_tick)
+    } else {
+        Err(answer.text)
+    }
 }
 
 /// A display without a screen, for windows; closed when dropped.

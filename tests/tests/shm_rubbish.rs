@@ -24,7 +24,9 @@ fn rubbish<T: Pod>() -> Vec<T> {
     }
     // Doubles that are not numbers, in every place.
     let nan = f64::NAN.to_ne_bytes();
-    all.push(pod_read_unaligned(&nan.iter().copied().cycle().take(size_of::<T>()).collect::<Vec<u8>>()));
+    all.push(pod_read_unaligned(
+        &nan.iter().copied().cycle().take(size_of::<T>()).collect::<Vec<u8>>(),
+    ));
     all
 }
 
@@ -35,7 +37,10 @@ fn core_refuses_rubbish_from_hosts_and_runs_on() {
     let before = *link.state().expect("live");
     let node = core.instance.node().expect("same user");
     let commands = service::commands(&node).expect("service");
-    let commands = commands.publisher_builder().backpressure_strategy(BackpressureStrategy::DiscardData).create();
+    let commands = commands
+        .publisher_builder()
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .create();
     let commands = commands.expect("a free place");
     let mut sent = 0;
     for mut command in rubbish::<Command>() {
@@ -79,11 +84,26 @@ fn core_refuses_rubbish_from_hosts_and_runs_on() {
     assert!(went_on && core.is_running(), "the core stopped");
     let state = *link.state().expect("live");
     assert_eq!(state.fault, Fault::None as u32);
-    assert_eq!(link.parameters().expect("live").set, ParameterSet::default(), "rubbish changed a parameter");
-    let refused = link.events().iter().filter(|e| e.kind == EventKind::RubbishRefused as u32).count();
+    assert_eq!(
+        link.parameters().expect("live").set,
+        ParameterSet::default(),
+        "rubbish changed a parameter"
+    );
+    let refused = link
+        .events()
+        .iter()
+        .filter(|e| e.kind == EventKind::RubbishRefused as u32)
+        .count();
     assert!(refused > 50, "{refused} refusals were told");
-    let why = ask(&mut link, CommandKind::SetParameters, &[f64::from(ParameterId::ShearVertical as u32), 1.4]);
-    assert!(why.as_ref().is_err_and(|w| w.contains("90")), "eq. 1 is not enforced: {why:?}");
+    let why = ask(
+        &mut link,
+        CommandKind::SetParameters,
+        &[f64::from(ParameterId::ShearVertical as u32), 1.4],
+    );
+    assert!(
+        why.as_ref().is_err_and(|w| w.contains("90")),
+        "eq. 1 is not enforced: {why:?}"
+    );
     ask(&mut link, CommandKind::Engage, &[]).expect("a good command is still carried out");
 }
 
@@ -97,7 +117,11 @@ fn host_refuses_rubbish_from_a_core_and_goes_on() {
     let entry = writer.entry::<HapticState>(&service::STATE_KEY).expect("entry");
     macro_rules! publisher {
         ($factory:expr) => {
-            $factory.expect("service").publisher_builder().create().expect("publisher")
+            $factory
+                .expect("service")
+                .publisher_builder()
+                .create()
+                .expect("publisher")
         };
         ($factory:expr, slices) => {
             $factory
@@ -132,7 +156,10 @@ fn host_refuses_rubbish_from_a_core_and_goes_on() {
         replies.send_copy(rubbish::<Reply>()[i]).expect("sent");
         let mut sample = records.loan_slice_uninit(4).expect("loaned");
         *sample.user_header_mut() = session_id;
-        sample.write_from_fn(|_| rubbish::<TickRecord>()[i]).send().expect("sent");
+        sample
+            .write_from_fn(|_| rubbish::<TickRecord>()[i])
+            .send()
+            .expect("sent");
         let mut sample = snapshots.loan_slice_uninit(8).expect("loaned");
         *sample.user_header_mut() = rubbish::<SnapshotHeader>()[i];
         sample.write_from_fn(|_| rubbish::<Vertex>()[i]).send().expect("sent");
@@ -147,7 +174,11 @@ fn host_refuses_rubbish_from_a_core_and_goes_on() {
         sessions.send_copy(session).expect("sent");
         link.poll();
     }
-    assert!(link.rubbish_refused() > 200, "{} values were refused", link.rubbish_refused());
+    assert!(
+        link.rubbish_refused() > 200,
+        "{} values were refused",
+        link.rubbish_refused()
+    );
     assert!(link.scene().is_none(), "a scene of rubbish was believed");
     let _: LinkStatus = link.status();
 }

@@ -45,11 +45,21 @@ fn insertion(display: &Display, kill: bool) -> Vec<TickRecord> {
     let plan = default_plan(&link.scene().expect("live").header);
     ask(&mut link, CommandKind::SetPlan, &plan_values(&plan)).expect("planned");
     ask(&mut link, CommandKind::Engage, &[]).expect("engaged");
-    ask(&mut link, CommandKind::MoveHand, &move_values(plan.entry_m, plan.direction, 0.2, 2.0)).expect("moved");
+    ask(
+        &mut link,
+        CommandKind::MoveHand,
+        &move_values(plan.entry_m, plan.direction, 0.2, 2.0),
+    )
+    .expect("moved");
     std::thread::sleep(Duration::from_millis(800));
     link.poll();
     link.take_records();
-    ask(&mut link, CommandKind::MoveHand, &move_values(plan.seeds_m[0], plan.direction, 0.005, 2.0)).expect("moved");
+    ask(
+        &mut link,
+        CommandKind::MoveHand,
+        &move_values(plan.seeds_m[0], plan.direction, 0.005, 2.0),
+    )
+    .expect("moved");
 
     let mut records = Vec::new();
     let mut window = Window::open(display, &core);
@@ -74,7 +84,11 @@ fn insertion(display: &Display, kill: bool) -> Vec<TickRecord> {
             && late.state().is_some_and(|s| s.phase != Phase::Outside as u32)
             && late.snapshot().is_some_and(|s| s.header.max_displacement_m > 1e-3)
     });
-    assert!(sees, "a host that came late does not see the insertion: {:?}", late.state());
+    assert!(
+        sees,
+        "a host that came late does not see the insertion: {:?}",
+        late.state()
+    );
     assert!(window.is_running(), "the window that came late ended by itself");
     drop(window);
     drop(link);
@@ -84,7 +98,11 @@ fn insertion(display: &Display, kill: bool) -> Vec<TickRecord> {
 }
 
 fn longest_gap_ms(records: &[TickRecord]) -> u64 {
-    records.windows(2).map(|w| (w[1].due_ns - w[0].due_ns) / 1_000_000).max().unwrap_or(0)
+    records
+        .windows(2)
+        .map(|w| (w[1].due_ns - w[0].due_ns) / 1_000_000)
+        .max()
+        .unwrap_or(0)
 }
 
 fn missed(records: &[TickRecord]) -> u64 {
@@ -103,12 +121,19 @@ fn killing_hosts_in_an_insertion_leaves_no_gap_that_a_run_without_kills_does_not
                 assert_eq!(pair[1].tick, pair[0].tick + 1, "a tick is missing");
             }
             let figures = (longest_gap_ms(&records), missed(&records));
-            if kill { killed.push(figures) } else { control.push(figures) }
+            if kill {
+                killed.push(figures)
+            } else {
+                control.push(figures)
+            }
         }
     }
     println!("longest gap in ms and missed deadlines: without kills {control:?}, with kills {killed:?}");
     // The best of each side shows what the kills do; the rest is the machine.
     let best = |runs: &[(u64, u64)]| runs.iter().map(|r| r.0).min().unwrap_or(0);
     let worst = |runs: &[(u64, u64)]| runs.iter().map(|r| r.0).max().unwrap_or(0);
-    assert!(best(&killed) <= worst(&control), "control {control:?}, killed {killed:?}");
+    assert!(
+        best(&killed) <= worst(&control),
+        "control {control:?}, killed {killed:?}"
+    );
 }

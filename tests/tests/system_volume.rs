@@ -31,8 +31,16 @@ print(*centre[:3], len(voxels) * zooms.prod())
 "#;
 
 fn write_volume(path: &Path) -> [f64; 4] {
-    let out = Command::new("/usr/bin/python3").args(["-c", WRITE_VOLUME]).arg(path).output().expect("python3 runs");
-    assert!(out.status.success(), "nibabel: {}", String::from_utf8_lossy(&out.stderr));
+    let out = Command::new("/usr/bin/python3")
+        .args(["-c", WRITE_VOLUME])
+        .arg(path)
+        .output()
+        .expect("python3 runs");
+    assert!(
+        out.status.success(),
+        "nibabel: {}",
+        String::from_utf8_lossy(&out.stderr)
+    );
     let text = String::from_utf8_lossy(&out.stdout).into_owned();
     let numbers: Vec<f64> = text.split_whitespace().map(|n| n.parse().expect("a number")).collect();
     numbers.try_into().expect("centre and volume")
@@ -56,7 +64,11 @@ fn procedure_runs_in_an_oblique_anisotropic_volume_and_the_geometry_is_right() {
     let mut core = Core::start();
     let out = folder.join("out");
     let run = procedure(&core, &file, &out);
-    let said = format!("{}{}", String::from_utf8_lossy(&run.stdout), String::from_utf8_lossy(&run.stderr));
+    let said = format!(
+        "{}{}",
+        String::from_utf8_lossy(&run.stdout),
+        String::from_utf8_lossy(&run.stderr)
+    );
     assert!(run.status.success(), "{said}");
     let result: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(out.join("result.json")).expect("result.json")).expect("JSON");
@@ -66,13 +78,15 @@ fn procedure_runs_in_an_oblique_anisotropic_volume_and_the_geometry_is_right() {
     let link = core.host();
     let scene = link.scene().expect("live");
     let t = scene.header.patient_from_scene;
-    let to_patient_mm = |p: [f64; 3]| {
-        [0, 1, 2].map(|r| (t[3 * r] * p[0] + t[3 * r + 1] * p[1] + t[3 * r + 2] * p[2] + t[9 + r]) * 1e3)
-    };
+    let to_patient_mm =
+        |p: [f64; 3]| [0, 1, 2].map(|r| (t[3 * r] * p[0] + t[3 * r + 1] * p[1] + t[3 * r + 2] * p[2] + t[9 + r]) * 1e3);
     let centre = centre_of_volume(&scene.rest_m, &scene.triangles);
     let found = to_patient_mm(centre);
     let off_mm = ((found[0] - x).powi(2) + (found[1] - y).powi(2) + (found[2] - z).powi(2)).sqrt();
-    println!("gland centre off by {off_mm:.3} mm, {} elements", scene.header.element_count);
+    println!(
+        "gland centre off by {off_mm:.3} mm, {} elements",
+        scene.header.element_count
+    );
     // Half of the smallest voxel side.
     assert!(off_mm < 0.2, "centre {found:?} mm, voxels say {x} {y} {z}");
     let volume_error = (scene.header.volume_m3 * 1e9 - volume_mm3).abs() / volume_mm3;
@@ -84,7 +98,11 @@ fn centre_of_volume(points: &[[f32; 3]], triangles: &[[u32; 3]]) -> [f64; 3] {
     let (mut centre, mut volume) = ([0.0; 3], 0.0);
     for t in triangles {
         let [a, b, c] = t.map(|i| points[i as usize].map(f64::from));
-        let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
+        let cross = [
+            b[1] * c[2] - b[2] * c[1],
+            b[2] * c[0] - b[0] * c[2],
+            b[0] * c[1] - b[1] * c[0],
+        ];
         let six = a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2];
         volume += six;
         for axis in 0..3 {
@@ -108,7 +126,12 @@ fn unusable_volumes_get_one_clear_message_and_the_scene_goes_on() {
     };
     add("empty", &[]);
     add("cut-off", &bytes[..bytes.len() / 2]);
-    add("wrong", b"this is a letter, not a volume, and it goes on for a while ".repeat(20).as_slice());
+    add(
+        "wrong",
+        b"this is a letter, not a volume, and it goes on for a while "
+            .repeat(20)
+            .as_slice(),
+    );
     let mut absurd = bytes.clone();
     // dim[1..=3] = 32767: 35 TB of voxels are claimed.
     for axis in 0..3 {
@@ -131,7 +154,10 @@ fn unusable_volumes_get_one_clear_message_and_the_scene_goes_on() {
         assert!(!said.contains("panicked"), "{name}: {said}");
         let messages = said.lines().filter(|l| l.starts_with("host-ui:")).count();
         assert_eq!(messages, 1, "{name}: {said}");
-        assert!(said.contains(&*path.file_name().expect("named").to_string_lossy()), "{name} is not named: {said}");
+        assert!(
+            said.contains(&*path.file_name().expect("named").to_string_lossy()),
+            "{name} is not named: {said}"
+        );
     }
     let tick = link.state().expect("live").tick;
     let goes_on = until(Duration::from_secs(3), || {
@@ -140,5 +166,8 @@ fn unusable_volumes_get_one_clear_message_and_the_scene_goes_on() {
     });
     assert!(goes_on && core.is_running());
     let after = link.scene().expect("live").header;
-    assert_eq!((before.generation, before.element_count), (after.generation, after.element_count));
+    assert_eq!(
+        (before.generation, before.element_count),
+        (after.generation, after.element_count)
+    );
 }

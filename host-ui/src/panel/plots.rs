@@ -55,7 +55,11 @@ fn strip(
         .x_grid_spacer(|_| marks(-WINDOW_S, 2.5, 4))
         .x_axis_formatter(|mark: GridMark, _: &_| {
             // The last mark lies on the edge, where a label would be cut off.
-            if mark.value < 0.0 { format!("{} s", mark.value) } else { String::new() }
+            if mark.value < 0.0 {
+                format!("{} s", mark.value)
+            } else {
+                String::new()
+            }
         })
         .show(ui, |plot| {
             plot.line(Line::new(name, PlotPoints::new(points)).color(color).width(1.3))

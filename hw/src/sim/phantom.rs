@@ -115,15 +115,11 @@ impl SimulatedPhantom {
     fn advance(&mut self, h: f64) {
         self.path.step(h);
         let hand = &self.config.hand;
-        let (k, b) = (
-            hand.total_stiffness_n_per_m(),
-            hand.total_damping_n_s_per_m(),
-        );
+        let (k, b) = (hand.total_stiffness_n_per_m(), hand.total_damping_n_s_per_m());
         let lag_m = self.path.position_m() - self.tip_in_world;
         self.push_n = hand.push_n(&self.push_n, &lag_m, h);
         let mass = self.moving_mass_kg();
-        let force_n =
-            self.wrench.force_n + self.push_n + lag_m * k + self.path.velocity_m_per_s() * b;
+        let force_n = self.wrench.force_n + self.push_n + lag_m * k + self.path.velocity_m_per_s() * b;
         let impulse = self.velocity_m_per_s * mass + force_n * h;
         let friction = self.config.coulomb_friction_n * h;
         let size = impulse.norm();
@@ -231,11 +227,7 @@ fn turn(from: &Vector3<f64>, to: &Vector3<f64>, limit_rad: f64) -> UnitQuaternio
     let angle = normal.norm().atan2(from.dot(to));
     let axis = Unit::try_new(normal, 1e-12).unwrap_or_else(|| {
         // Parallel: nothing to turn. Opposite: any axis across the needle will do.
-        let helper = if from.x.abs() < 0.7 {
-            Vector3::x()
-        } else {
-            Vector3::y()
-        };
+        let helper = if from.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
         Unit::new_normalize(from.cross(&helper))
     });
     UnitQuaternion::from_axis_angle(&axis, angle.min(limit_rad))

@@ -32,11 +32,7 @@ pub fn conformance(device: &mut dyn Device) {
             ..Wrench::zero()
         };
         assert_eq!(device.write(&torque), Err(DeviceFault::NonFiniteWrench));
-        assert_eq!(
-            device.write(&Wrench::zero()),
-            Ok(()),
-            "zero force is always accepted"
-        );
+        assert_eq!(device.write(&Wrench::zero()), Ok(()), "zero force is always accepted");
         assert!(device.read(DT_S).is_ok());
     }
     let bad_goal = HandGoal {

@@ -38,12 +38,7 @@ pub(super) fn largest_violation_f32(model: &ChainMail, state: &TissueState) -> f
 }
 
 /// Writes the positions of the surface's vertices in metres; stops at the shorter of the two.
-pub fn write_surface(
-    model: &ChainMail,
-    state: &TissueState,
-    surface: &Surface,
-    positions_m: &mut [[f32; 3]],
-) {
+pub fn write_surface(model: &ChainMail, state: &TissueState, surface: &Surface, positions_m: &mut [[f32; 3]]) {
     for (slot, &element) in positions_m.iter_mut().zip(&surface.vertex_elements) {
         *slot = state.position_m(model, element).map(|c| c as f32);
     }

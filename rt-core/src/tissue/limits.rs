@@ -110,13 +110,7 @@ impl TissueParameters {
         let (shear, vert) = (self.shear_deg, self.shear_vert_deg);
         for (name, angle) in [("shear_deg", shear), ("shear_vert_deg", vert)] {
             let advice = "0 forbids shear; the paper has 26.565";
-            check(
-                (0.0..90.0).contains(&angle),
-                name,
-                angle,
-                "from 0 to below 90",
-                advice,
-            );
+            check((0.0..90.0).contains(&angle), name, angle, "from 0 to below 90", advice);
         }
         check(
             shear + vert < 90.0,

@@ -52,12 +52,7 @@ impl MaterialPoint {
     }
 
     /// Where a direction of the tissue at rest points now, as a unit vector; unchanged if it has no length.
-    pub fn direction(
-        &self,
-        model: &ChainMail,
-        state: &TissueState,
-        rest_dir: [f64; 3],
-    ) -> [f64; 3] {
+    pub fn direction(&self, model: &ChainMail, state: &TissueState, rest_dir: [f64; 3]) -> [f64; 3] {
         let links = link_vectors(model, state, self.element);
         let mut now = [0.0; 3];
         for (link, part) in links.iter().zip(rest_dir) {
@@ -105,11 +100,7 @@ fn local_of(model: &ChainMail, state: &TissueState, p: [f64; 3], element: u32) -
     if volume.abs() < 1e-9 {
         return None;
     }
-    let parts = [
-        dot(r, cross(b, c)),
-        dot(r, cross(c, a)),
-        dot(r, cross(a, b)),
-    ];
+    let parts = [dot(r, cross(b, c)), dot(r, cross(c, a)), dot(r, cross(a, b))];
     Some(parts.map(|part| part / volume))
 }
 

@@ -21,18 +21,7 @@ fn deformed() -> (Scene, ChainMail, TissueState) {
     for tick in 1..=80 {
         let way = 0.1 * h * f64::from(tick);
         let position_m = [rest[0] + 0.4 * way, rest[1] - 0.3 * way, rest[2] + way];
-        assert!(
-            step(
-                &model,
-                &mut state,
-                Some(Held {
-                    element,
-                    position_m
-                }),
-                1e-3
-            )
-            .converged
-        );
+        assert!(step(&model, &mut state, Some(Held { element, position_m }), 1e-3).converged);
     }
     (scene, model, state)
 }
@@ -76,10 +65,7 @@ fn at_rest_the_cell_is_the_element() {
     let state = TissueState::at_rest(&model);
     let mut random = Random(2);
     for _ in 0..3000 {
-        let cell = scene
-            .lattice
-            .dims
-            .map(|n| random.unit() * (n + 4) as f64 - 2.0);
+        let cell = scene.lattice.dims.map(|n| random.unit() * (n + 4) as f64 - 2.0);
         let point_m = cell.map(|c| c * scene.lattice.spacing_m);
         let expected = scene.lattice.element_at(cell.map(|c| c.floor() as i64));
         let found = MaterialPoint::locate(&model, &state, point_m, None);
@@ -92,10 +78,7 @@ fn outside_and_not_a_number_are_nowhere() {
     let (scene, model, state) = deformed();
     let (low, high) = scene.lattice.bounds_m();
     for point_m in [[0.0; 3], low, high, [f64::NAN; 3], [1e300, 0.0, 0.0]] {
-        assert_eq!(
-            MaterialPoint::locate(&model, &state, point_m, Some(5)),
-            None
-        );
+        assert_eq!(MaterialPoint::locate(&model, &state, point_m, Some(5)), None);
     }
 }
 

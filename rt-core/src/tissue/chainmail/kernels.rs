@@ -26,11 +26,7 @@ pub(crate) fn clamp(value: f32, low: f32, high: f32) -> f32 {
 
 /// Where the outer end of a link must be, given both ends: stretch first, then shear.
 #[inline(always)]
-pub(crate) fn clamped_outer<const OUTER: bool>(
-    limits: &LinkLimits,
-    inner: [f32; 3],
-    outer: [f32; 3],
-) -> [f32; 3] {
+pub(crate) fn clamped_outer<const OUTER: bool>(limits: &LinkLimits, inner: [f32; 3], outer: [f32; 3]) -> [f32; 3] {
     let sign = if OUTER == UPPER { 1.0 } else { -1.0 };
     let along = clamp(sign * (outer[0] - inner[0]), limits.low, limits.high);
     let shear = limits.tan * (1.0 + along);
@@ -117,11 +113,7 @@ pub(crate) fn projected(limits: &LinkLimits, lo: [f32; 3], hi: [f32; 3]) -> [[f3
 }
 
 /// Projects each link between two slices.
-pub(crate) fn project(
-    limits: &LinkLimits,
-    [la, lb, lc]: [&mut [f32]; 3],
-    [ha, hb, hc]: [&mut [f32]; 3],
-) {
+pub(crate) fn project(limits: &LinkLimits, [la, lb, lc]: [&mut [f32]; 3], [ha, hb, hc]: [&mut [f32]; 3]) {
     project_slices(limits, la, lb, lc, ha, hb, hc);
 }
 

@@ -45,13 +45,7 @@ impl Halves {
     }
 }
 
-fn project_run(
-    limits: &LinkLimits,
-    run: Run,
-    upward: bool,
-    u: &mut [Vec<f32>; 3],
-    halves: &mut Halves,
-) {
+fn project_run(limits: &LinkLimits, run: Run, upward: bool, u: &mut [Vec<f32>; 3], halves: &mut Halves) {
     let (first, end) = (run.first as usize, run.end() as usize);
     let odd_count = (end - first) / 2;
     let even_count = end - first - odd_count;
@@ -68,11 +62,7 @@ fn project_run(
     for turn in [upward, !upward] {
         if turn {
             let n = odd_count;
-            kernels::project(
-                limits,
-                [&mut ex[..n], &mut ey[..n], &mut ez[..n]],
-                [ox, oy, oz],
-            );
+            kernels::project(limits, [&mut ex[..n], &mut ey[..n], &mut ez[..n]], [ox, oy, oz]);
         } else {
             let n = even_count - 1;
             let lo = [&mut ox[..n], &mut oy[..n], &mut oz[..n]];
@@ -138,12 +128,7 @@ fn smallest_scale(model: &ChainMail, part: u32, u: &[Vec<f32>; 3]) -> f32 {
     let along_z = model.z_links.all().iter().map(|s| (z, [2, 0, 1], s));
     for (limits, order, span) in along_y.chain(along_z) {
         for n in 0..span.len {
-            link(
-                limits,
-                order,
-                (span.lo + n) as usize,
-                (span.hi + n) as usize,
-            );
+            link(limits, order, (span.lo + n) as usize, (span.hi + n) as usize);
         }
     }
     scale

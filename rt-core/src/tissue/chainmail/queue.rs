@@ -56,13 +56,7 @@ impl QueuePass {
 }
 
 /// Moves `outer` into the limits of its link with `inner`; whether it had to move.
-fn push(
-    model: &ChainMail,
-    state: &mut TissueState,
-    direction: usize,
-    inner: u32,
-    outer: u32,
-) -> bool {
+fn push(model: &ChainMail, state: &mut TissueState, direction: usize, inner: u32, outer: u32) -> bool {
     let axis = direction / 2;
     let limits = &model.limits.links[axis];
     let at = |e: u32| ordered(axis, state.u.each_ref().map(|c| c[e as usize]));

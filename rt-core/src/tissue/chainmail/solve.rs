@@ -53,12 +53,7 @@ pub struct StepReport {
 /// Advances the tissue by `dt_s`; a `dt_s` that is not above zero recovers nothing.
 ///
 /// A state of another model is left alone and reported as not converged.
-pub fn step(
-    model: &ChainMail,
-    state: &mut TissueState,
-    held: Option<Held>,
-    dt_s: f64,
-) -> StepReport {
+pub fn step(model: &ChainMail, state: &mut TissueState, held: Option<Held>, dt_s: f64) -> StepReport {
     let (target, outcome) = held_target(model, held);
     let mut report = StepReport {
         passes: 0,
@@ -125,13 +120,7 @@ fn recover(state: &mut TissueState, kept: f32) {
 }
 
 /// Puts the held element in place, then sweeps, then projects, then re-anchors, until the residual is within tolerance.
-fn solve(
-    model: &ChainMail,
-    state: &mut TissueState,
-    held: usize,
-    at: [f32; 3],
-    report: &mut StepReport,
-) -> f32 {
+fn solve(model: &ChainMail, state: &mut TissueState, held: usize, at: [f32; 3], report: &mut StepReport) -> f32 {
     let tolerance = model.limits.tolerance;
     let held_cell = model.lattice.cell(held as u32);
     state.put(held, at);

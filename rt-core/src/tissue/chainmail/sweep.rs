@@ -24,11 +24,7 @@ pub(super) fn ordered<T>(axis: usize, [x, y, z]: [T; 3]) -> [T; 3] {
 
 /// Both ends of a span, split so that both can be written.
 #[inline(always)]
-pub(super) fn ends<'a>(
-    u: &'a mut [Vec<f32>; 3],
-    axis: usize,
-    span: Span,
-) -> ([&'a mut [f32]; 3], [&'a mut [f32]; 3]) {
+pub(super) fn ends<'a>(u: &'a mut [Vec<f32>; 3], axis: usize, span: Span) -> ([&'a mut [f32]; 3], [&'a mut [f32]; 3]) {
     let (lo, hi, len) = (span.lo as usize, span.hi as usize, span.len as usize);
     let [x, y, z] = ordered(axis, u.each_mut());
     let split = |component: &'a mut Vec<f32>| {
@@ -39,12 +35,7 @@ pub(super) fn ends<'a>(
     ([xl, yl, zl], [xh, yh, zh])
 }
 
-fn sweep_spans<const OUTER: bool>(
-    limits: &LinkLimits,
-    axis: usize,
-    spans: &[Span],
-    u: &mut [Vec<f32>; 3],
-) {
+fn sweep_spans<const OUTER: bool>(limits: &LinkLimits, axis: usize, spans: &[Span], u: &mut [Vec<f32>; 3]) {
     for &span in spans {
         let (lo, hi) = ends(u, axis, span);
         if OUTER == UPPER {

@@ -64,13 +64,7 @@ struct Run {
 }
 
 /// Wanders for `ticks` ticks by up to `per_tick` elements, turning back now and then, and checks each step.
-fn wander(
-    labels: &Labels,
-    parameters: &TissueParameters,
-    per_tick: f64,
-    ticks: u32,
-    seed: u64,
-) -> Run {
+fn wander(labels: &Labels, parameters: &TissueParameters, per_tick: f64, ticks: u32, seed: u64) -> Run {
     let model = model_with(labels, parameters);
     let mut state = TissueState::at_rest(&model);
     let mut random = Random(seed);
@@ -99,20 +93,11 @@ fn wander(
         assert!(report.converged, "tick {tick}: {report:?}");
         assert_eq!(report.held, HeldOutcome::Followed);
         let now = state.displacement_of(element);
-        assert!(
-            (0..3).all(|a| (now[a] - way[a]).abs() < 1e-5),
-            "held element moved"
-        );
+        assert!((0..3).all(|a| (now[a] - way[a]).abs() < 1e-5), "held element moved");
         if tick % 10 == 0 {
             let found = oracle_violation(&model, &state, parameters);
-            assert!(
-                found <= 1.001e-3,
-                "tick {tick}: violation {found}, {report:?}"
-            );
-            assert!(
-                (found - report.residual).abs() < 2e-5,
-                "residual is not honest"
-            );
+            assert!(found <= 1.001e-3, "tick {tick}: violation {found}, {report:?}");
+            assert!((found - report.residual).abs() < 2e-5, "residual is not honest");
         }
         run.solves[report.solve as usize] += 1;
         run.passes += report.passes;
@@ -210,10 +195,7 @@ fn long_step_leaves_violations_after_one_pass_and_none_after_a_step() {
     queue::QueuePass::new(&model).run(&model, &mut state, held);
     assert!(largest_violation(&model, &state) > 0.1);
     let report = step(&model, &mut state, Some(held), 0.0);
-    assert!(
-        report.converged && report.solve == Solve::Sweeps,
-        "{report:?}"
-    );
+    assert!(report.converged && report.solve == Solve::Sweeps, "{report:?}");
 }
 
 #[test]
@@ -222,12 +204,8 @@ fn one_pass_of_the_queue_and_of_the_sweeps_gives_the_same_bits_on_a_block() {
     let element = model.lattice().element_of_cell(4, 3, 2).expect("inside");
     let (mut by_queue, mut by_sweep) = (TissueState::at_rest(&model), TissueState::at_rest(&model));
     let way = [30.0, -25.0, 40.0];
-    let moved =
-        queue::QueuePass::new(&model).run(&model, &mut by_queue, held_at(&model, element, way));
-    by_sweep.put(
-        element as usize,
-        by_queue.displacement_of(element).map(|c| c as f32),
-    );
+    let moved = queue::QueuePass::new(&model).run(&model, &mut by_queue, held_at(&model, element, way));
+    by_sweep.put(element as usize, by_queue.displacement_of(element).map(|c| c as f32));
     sweep::single_pass(&model, [4, 3, 2], &mut by_sweep.u);
     assert_eq!(moved as usize, model.element_count());
     for axis in 0..3 {
@@ -297,16 +275,8 @@ fn insert_and_retract_cycles_do_not_drift() {
 fn parts_that_hold_nothing_stay_at_rest() {
     let model = model_of(&test_bodies::two_parts());
     let mut state = TissueState::at_rest(&model);
-    step(
-        &model,
-        &mut state,
-        Some(held_at(&model, 0, [9.0, 9.0, -9.0])),
-        1e-3,
-    );
-    let other = model
-        .lattice()
-        .element_of_cell(8, 0, 0)
-        .expect("second part");
+    step(&model, &mut state, Some(held_at(&model, 0, [9.0, 9.0, -9.0])), 1e-3);
+    let other = model.lattice().element_of_cell(8, 0, 0).expect("second part");
     assert_eq!(state.displacement_of(other), [0.0; 3]);
     assert_ne!(state.displacement_of(6), [0.0; 3]);
 }
@@ -319,12 +289,7 @@ fn bad_input_is_refused_and_reported() {
         element,
         position_m: [0.0, 0.0, z],
     };
-    for bad in [
-        held(3, f64::NAN),
-        held(3, f64::INFINITY),
-        held(3, 1e30),
-        held(64, 0.0),
-    ] {
+    for bad in [held(3, f64::NAN), held(3, f64::INFINITY), held(3, 1e30), held(64, 0.0)] {
         let report = step(&model, &mut state, Some(bad), f64::NAN);
         assert_eq!(report.held, HeldOutcome::Refused);
         assert!(report.converged && report.max_displacement == 0.0);

@@ -27,10 +27,7 @@ fn print_times() {
         print_run(name, &model, 1000, &mut |tick, _| {
             let way = way(tick);
             let position_m = [rest[0] + 0.2 * way, rest[1], rest[2] + way];
-            Held {
-                element,
-                position_m,
-            }
+            Held { element, position_m }
         });
     }
     let mut random = crate::scene::test_bodies::Random(1);
@@ -42,10 +39,7 @@ fn print_times() {
         &mut |tick, state| {
             if tick % 50 == 0 {
                 held_now = (random.unit() * model.element_count() as f64) as u32;
-                let (at, rest) = (
-                    state.position_m(&model, held_now),
-                    scene.lattice.rest_m(held_now),
-                );
+                let (at, rest) = (state.position_m(&model, held_now), scene.lattice.rest_m(held_now));
                 way_m = [0, 1, 2].map(|a| at[a] - rest[a]);
             }
             if tick % 7 == 0 {
@@ -71,8 +65,7 @@ fn print_times() {
         let way = if way < 0.04 { way } else { 0.08 - way };
         let tip = [rest[0], rest[1], rest[2] - 0.01 + way];
         if tick % 80 == 1 {
-            at_tip =
-                MaterialPoint::locate(&model, state, tip, Some(at_tip.element)).unwrap_or(at_tip);
+            at_tip = MaterialPoint::locate(&model, state, tip, Some(at_tip.element)).unwrap_or(at_tip);
             let held = state.position_m(&model, at_tip.element);
             grip_m = [0, 1, 2].map(|a| held[a] - tip[a]);
         }
@@ -84,12 +77,7 @@ fn print_times() {
     });
 }
 
-fn print_run(
-    name: &str,
-    model: &ChainMail,
-    ticks: u32,
-    held: &mut dyn FnMut(u32, &TissueState) -> Held,
-) {
+fn print_run(name: &str, model: &ChainMail, ticks: u32, held: &mut dyn FnMut(u32, &TissueState) -> Held) {
     let mut state = TissueState::at_rest(model);
     let mut times = Vec::new();
     let (mut passes, mut residual, mut moved, mut solves) = (0, 0.0_f64, 0, [0; 4]);
@@ -160,9 +148,7 @@ fn print_parts() {
         model.z_links.all().len(),
         model.runs.len()
     );
-    us("project", &mut || {
-        project::project_all(&model, true, &mut state.u)
-    });
+    us("project", &mut || project::project_all(&model, true, &mut state.u));
     us("nothing", &mut || {
         step(&model, &mut state, None, 0.0);
     });
