@@ -10,7 +10,7 @@ help: ## This list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
 
 run: deps-run build ## Build, start rt-core and open the window; without a display run the procedure headless
-	@docs/tools/run "$(BIN)"
+	@setpriv --pdeathsig TERM docs/tools/run "$(BIN)"
 
 build: ## Build both programs
 	$(CARGO) build --release -p rt-core -p host-ui
