@@ -16,9 +16,10 @@ build: ## Build both programs
 	$(CARGO) build --release -p rt-core -p host-ui
 
 test: deps-test ## Install what the tests need, build everything, run all tests
+# The same set of packages both times, or features differ and everything is built twice. One test at a time: each system
+# test has a real-time core of its own.
 	$(CARGO) build --release --workspace --all-targets
-	$(CARGO) test --release --workspace --exclude stylet-tests
-	$(CARGO) test --release -p stylet-tests -- --test-threads=1
+	$(CARGO) test --release --workspace -- --test-threads=1
 
 picture: deps-test build ## Draw the README's picture anew
 	UPDATE_SNAPSHOTS=1 $(CARGO) test --release -p stylet-tests --test ui_live -- --test-threads=1

@@ -293,7 +293,7 @@ impl TissueLoop {
     }
 
     fn respond(&mut self, woke_ns: u64, report: &StepReport) {
-        let contact = self.contact;
+        let (contact, held) = (self.contact, self.held.is_some());
         let response = &mut self.response;
         response.tick += 1;
         response.time_ns = woke_ns;
@@ -303,7 +303,8 @@ impl TissueLoop {
             response.path_direction = contact.direction;
         }
         response.worst_residual = response.worst_residual.max(report.residual);
-        response.unsolved = !report.converged;
+        // Limits tightened over tissue that nothing holds are met as it recovers; no force depends on it.
+        response.unsolved = !report.converged && held;
         self.ports.response.write(*response);
     }
 
