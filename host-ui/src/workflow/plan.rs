@@ -135,9 +135,9 @@ mod tests {
         assert!(near(plan.direction, [0.0, 0.0, 1.0]));
         assert!(near(plan.entry_m, [0.04, 0.04, 0.02]));
         assert_eq!(plan.seeds_m.len(), 5);
-        assert!(near(plan.seeds_m[0], [0.04, 0.04, 0.038]));
-        assert!(near(plan.seeds_m[4], [0.04, 0.04, 0.062]));
-        assert!(near(plan.deepest_first()[0], plan.seeds_m[4]));
+        assert!(near(plan.seeds_m[0], [0.04, 0.04, 0.062]));
+        assert!(near(plan.seeds_m[4], [0.04, 0.04, 0.038]));
+        assert!(near(plan.deepest_first()[0], plan.seeds_m[0]));
         assert_eq!(plan_values(&plan).len(), 21);
     }
 
