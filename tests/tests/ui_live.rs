@@ -48,6 +48,15 @@ impl Driven {
         self.window.run_steps(2);
     }
 
+    fn plan_and_place(&mut self) {
+        self.click("Plan five seeds");
+        self.until("the plan", |app| app.link().plan().is_some_and(|p| p.seed_count == 5));
+        self.click("Place needle");
+        self.until("the needle at its entry", |app| {
+            app.link().state().is_some_and(|s| s.flags & flags::AT_GOAL != 0)
+        });
+    }
+
     fn picture(&mut self, name: &str) -> image::RgbaImage {
         self.window.run_steps(3);
         let picture = self.window.render().expect("a picture");
@@ -65,15 +74,10 @@ fn phase(app: &App) -> u32 {
 #[test]
 fn four_steps_by_label_move_the_gland_and_drop_a_seed() {
     let mut driven = Driven::open([1280.0, 800.0]);
-    driven.click("Plan five seeds");
-    driven.until("the plan", |app| app.link().plan().is_some_and(|p| p.seed_count == 5));
+    driven.plan_and_place();
     driven.click("Engage force");
     driven.until("force", |app| {
         app.link().state().is_some_and(|s| s.flags & flags::ENGAGED != 0)
-    });
-    driven.click("Place needle");
-    driven.until("the needle at its entry", |app| {
-        app.link().state().is_some_and(|s| s.flags & flags::AT_GOAL != 0)
     });
     let before = driven.picture("placed");
     driven.click("Insert");
@@ -118,12 +122,7 @@ fn four_steps_by_label_move_the_gland_and_drop_a_seed() {
 #[test]
 fn a_window_that_comes_moves_nothing_by_itself() {
     let mut driven = Driven::open([1280.0, 800.0]);
-    driven.click("Plan five seeds");
-    driven.until("the plan", |app| app.link().plan().is_some_and(|p| p.seed_count == 5));
-    driven.click("Place needle");
-    driven.until("the entry", |app| {
-        app.link().state().is_some_and(|s| s.flags & flags::AT_GOAL != 0)
-    });
+    driven.plan_and_place();
     let tip = |app: &App| app.link().state().map(|s| s.tip_in_scene_m).expect("live");
     // A tip between two marks of the depth slider once made a new window pull it to the nearest mark.
     driven.click("Insert");
@@ -153,12 +152,7 @@ fn a_window_that_comes_moves_nothing_by_itself() {
 #[test]
 fn keys_drive_the_needle_and_letting_go_stops_it() {
     let mut driven = Driven::open([1280.0, 800.0]);
-    driven.click("Plan five seeds");
-    driven.until("the plan", |app| app.link().plan().is_some_and(|p| p.seed_count == 5));
-    driven.click("Place needle");
-    driven.until("the entry", |app| {
-        app.link().state().is_some_and(|s| s.flags & flags::AT_GOAL != 0)
-    });
+    driven.plan_and_place();
     let z = |app: &App| app.link().state().map_or(0.0, |s| s.tip_in_scene_m[2]);
     let start = z(driven.window.state());
     driven.window.key_down(egui::Key::W);

@@ -2,4 +2,4 @@
 
 pub mod phase;
 
-pub use phase::{NeedleInput, NeedleOutput, NeedleParameters, NeedleState, Phase, pieces_of_step, step, transmission};
+pub use phase::{NeedleInput, NeedleOutput, NeedleParameters, NeedleState, Phase, step, transmission};

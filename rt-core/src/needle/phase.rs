@@ -215,14 +215,6 @@ pub fn transmission(phase: Phase, speed_m_per_s: f64, depth_m: f64, parameters: 
     if ratio.is_finite() { ratio.clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// In how many equal pieces a tip step goes to the tissue, so that none is longer than half an element.
-/// At least one, at most `limit`.
-pub fn pieces_of_step(step_m: f64, element_m: f64, limit: u32) -> u32 {
-    let pieces = (2.0 * step_m.abs() / element_m - 1e-9).ceil();
-    // A cast saturates and takes what is not a number to zero.
-    (pieces as u32).clamp(1, limit.max(1))
-}
-
 #[cfg(test)]
 #[path = "phase_tests.rs"]
 mod tests;

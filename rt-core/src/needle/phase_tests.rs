@@ -164,14 +164,3 @@ fn holding_and_nonsense_move_nothing() {
         assert!(state.punctured);
     }
 }
-
-#[test]
-fn pieces_are_at_most_half_an_element() {
-    for (step_m, pieces) in [(0.0, 1), (0.0005, 1), (0.001, 1), (0.00101, 3), (0.0056, 6)] {
-        let got = pieces_of_step(step_m, 0.002, 64);
-        assert!(step_m / f64::from(got) <= 0.001 + 1e-12);
-        assert!(got <= pieces, "{step_m}: {got}");
-    }
-    assert_eq!(pieces_of_step(f64::NAN, 0.002, 64), 1);
-    assert_eq!(pieces_of_step(1.0, 0.0, 64), 64);
-}
