@@ -302,6 +302,7 @@ impl Bridge {
                 dims: header.dims.map(|d| d as usize),
                 spacing_m: header.spacing_m,
                 cells: sample.payload().to_vec(),
+                structures: Vec::new(),
             };
             drop(sample);
             let ticket = self.ticket(who.0, who.1);

@@ -20,4 +20,40 @@ mod times;
 
 pub(crate) use kernels::violation;
 pub use model::{ChainMail, TissueState};
-pub use solve::{HeldOutcome, Solve, StepReport, step};
+pub use solve::step;
+
+use crate::scene::Scene;
+use crate::tissue::{Deformed, Held, Limits, StepReport, TissueModel};
+
+/// Restricted ChainMail as a tissue model.
+#[derive(Clone)]
+pub struct ChainMailTissue {
+    pub model: ChainMail,
+    pub state: TissueState,
+}
+
+impl ChainMailTissue {
+    pub fn new(scene: &Scene, limits: Limits) -> Self {
+        let model = ChainMail::new(scene, limits);
+        let state = TissueState::at_rest(&model);
+        ChainMailTissue { model, state }
+    }
+}
+
+impl TissueModel for ChainMailTissue {
+    fn step(&mut self, held: Option<Held>, dt_s: f64) -> StepReport {
+        step(&self.model, &mut self.state, held, dt_s)
+    }
+
+    fn deformed(&self) -> Deformed<'_> {
+        self.state.deformed(&self.model)
+    }
+
+    fn return_to_rest(&mut self) {
+        self.state.return_to_rest();
+    }
+
+    fn set_limits(&mut self, limits: Limits) {
+        self.model.limits = limits;
+    }
+}

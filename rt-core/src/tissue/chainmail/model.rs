@@ -2,12 +2,13 @@
 
 use super::spans::{Links, links_along};
 use crate::scene::{Lattice, Run, Scene};
-use crate::tissue::Limits;
+use crate::tissue::{Deformed, Limits};
+use std::sync::Arc;
 
 /// Topology and limits; never changes.
 #[derive(Clone, Debug)]
 pub struct ChainMail {
-    pub(crate) lattice: Lattice,
+    pub(crate) lattice: Arc<Lattice>,
     pub(crate) limits: Limits,
     pub(crate) y_links: Links,
     pub(crate) z_links: Links,
@@ -17,8 +18,6 @@ pub struct ChainMail {
     pub(crate) rows_of_plane: Vec<[usize; 2]>,
     /// Part of the body that each element belongs to; no link joins two parts.
     pub(crate) part: Vec<u32>,
-    /// Corners of the box around the body at rest, in elements.
-    pub(crate) rest_box: [[f64; 3]; 2],
 }
 
 impl ChainMail {
@@ -33,7 +32,6 @@ impl ChainMail {
             }
         });
         let rows = (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k)));
-        let (low, high) = lattice.bounds_m();
         ChainMail {
             limits,
             y_links: links_along(1, &lattice),
@@ -41,7 +39,6 @@ impl ChainMail {
             runs: rows.flat_map(|(j, k)| lattice.row(j, k)).copied().collect(),
             rows_of_plane: rows_of_plane.collect(),
             part: parts(&lattice),
-            rest_box: [low, high].map(|corner| corner.map(|c| c / lattice.spacing_m)),
             lattice,
         }
     }
@@ -109,17 +106,28 @@ impl TissueState {
         self.u.get(axis).map_or(&[], Vec::as_slice)
     }
 
-    /// Centre of an element in the scene frame; the last element's for a number past the end.
-    pub fn position_m(&self, model: &ChainMail, element: u32) -> [f64; 3] {
-        let rest = model.lattice.rest_m(element);
-        let u = self.displacement_of(element);
-        [0, 1, 2].map(|a| rest[a] + model.lattice.spacing_m * u[a])
+    /// The body as it is now.
+    pub fn deformed<'a>(&'a self, model: &'a ChainMail) -> Deformed<'a> {
+        let stretch = model.limits.links.iter().map(|link| link.high).sum::<f32>();
+        Deformed {
+            lattice: &model.lattice,
+            u: self.u.each_ref().map(Vec::as_slice),
+            scale: 1.0,
+            reach: 1.0 + stretch + self.max_displacement,
+        }
     }
 
-    /// Displacement of one element, in elements.
-    pub(crate) fn displacement_of(&self, element: u32) -> [f64; 3] {
-        let e = (element as usize).min(self.u[0].len().saturating_sub(1));
-        [0, 1, 2].map(|a| self.u[a].get(e).copied().map_or(0.0, f64::from))
+    /// Centre of an element in the scene frame; the last element's for a number past the end.
+    pub fn position_m(&self, model: &ChainMail, element: u32) -> [f64; 3] {
+        self.deformed(model).position_m(element)
+    }
+
+    /// Every element to its place at rest, at once.
+    pub fn return_to_rest(&mut self) {
+        for component in &mut self.u {
+            component.fill(0.0);
+        }
+        self.max_displacement = 0.0;
     }
 
     pub(crate) fn put(&mut self, element: usize, u: [f32; 3]) {
