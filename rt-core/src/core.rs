@@ -68,7 +68,8 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
     let session_id = clock::now_ns() ^ (u64::from(std::process::id()) << 40);
     let picture = ScenePicture::first(&scene, session_id);
     let node = options.instance.node().map_err(|e| e.to_string())?;
-    let ports = Ports::new(&node, scene.surface.vertex_elements.len()).map_err(|e| e.to_string())?;
+    let ports =
+        Ports::new(&node, scene.surface.vertex_elements.len(), picture.word_count()).map_err(|e| e.to_string())?;
     let world = Box::new(World::new(scene, active.limits, 1));
     let board = service::create_state_board(&node, session_id).map_err(|e| e.to_string())?;
     let locked = lock_memory(options)?;

@@ -58,6 +58,7 @@ pub struct Bridge {
     plan: PlanInForce,
     /// The scene that runs, and the one handed to the tissue loop but not yet taken up.
     picture: ScenePicture,
+    picture_sent: bool,
     coming: Option<ScenePicture>,
     /// Who waits for what: host and command behind each ticket.
     waiting: HashMap<Ticket, (u64, u64)>,
@@ -97,6 +98,7 @@ impl Bridge {
             parameters,
             plan,
             picture,
+            picture_sent: false,
             coming: None,
             waiting: HashMap::new(),
             waiting_parameters: HashMap::new(),
@@ -108,7 +110,6 @@ impl Bridge {
             cleaned_ns: 0,
             batch: Vec::with_capacity(MAX_BATCH),
         };
-        bridge.send_scene();
         let _ = bridge.ports.parameters.send_copy(bridge.parameters);
         let _ = bridge.ports.plan.send_copy(bridge.plan);
         bridge
@@ -133,6 +134,9 @@ impl Bridge {
         self.take_uploads();
         self.take_loaded();
         self.take_notices();
+        if !self.picture_sent {
+            self.send_scene();
+        }
         while self.loops.old_worlds.pop().is_ok() {}
         self.send_records();
         let (generation, vertices) = (
@@ -174,10 +178,11 @@ impl Bridge {
         }
     }
 
-    fn send_scene(&self) {
+    /// Tried again at the next pass when there is no room.
+    fn send_scene(&mut self) {
         if let Ok(mut sample) = self.ports.scene.loan_slice_uninit(self.picture.words.len()) {
             *sample.user_header_mut() = self.picture.header;
-            let _ = sample.write_from_slice(&self.picture.words).send();
+            self.picture_sent = sample.write_from_slice(&self.picture.words).send().is_ok();
         }
     }
 
@@ -406,9 +411,10 @@ impl Bridge {
             } => {
                 if let Some(picture) = self.coming.take() {
                     self.picture = picture;
+                    self.picture_sent = false;
+                    self.send_scene();
                     self.plan = bytemuck::Zeroable::zeroed();
                     self.plan.session_id = self.session.session_id;
-                    self.send_scene();
                     let _ = self.ports.plan.send_copy(self.plan);
                 }
                 let name = self.picture.header.name.read();

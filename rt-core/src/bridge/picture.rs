@@ -17,6 +17,10 @@ impl ScenePicture {
         Self::of(scene, session_id, 1, IDENTITY)
     }
 
+    pub fn word_count(&self) -> usize {
+        self.words.len()
+    }
+
     pub(super) fn of(scene: &Scene, session_id: u64, generation: u64, patient_from_scene: [f64; 12]) -> Self {
         let (lattice, surface) = (&scene.lattice, &scene.surface);
         let (lower_m, upper_m) = lattice.bounds_m();

@@ -49,3 +49,35 @@ fn draw(structures: Vec<Structure>, label_at: impl Fn([f64; 3]) -> u8) -> Labels
         structures,
     }
 }
+
+#[cfg(test)]
+mod times {
+    use super::*;
+    use crate::scene::{Lattice, Scene, Surface};
+    use std::time::Instant;
+
+    /// `cargo test --release -p rt-core --lib times_of_cutting -- --ignored --nocapture`
+    #[test]
+    #[ignore = "a measurement"]
+    fn times_of_cutting() {
+        for name in stylet_shm_schema::BUILTIN_SCENES {
+            for _ in 0..3 {
+                let start = Instant::now();
+                let labels = super::labels(name).expect("known").expect("valid");
+                let drawn = start.elapsed();
+                let lattice = Lattice::from_checked_labels(&labels);
+                let cut = start.elapsed() - drawn;
+                let surface = Surface::of(&lattice, &labels.structures);
+                let meshed = start.elapsed() - drawn - cut;
+                let whole = Instant::now();
+                let scene = Scene::builtin(name).expect("built in");
+                println!(
+                    "{name}: drawn {drawn:.1?}, cut {cut:.1?}, surface {meshed:.1?} ({} vertices); all {:.1?}, {} elements",
+                    surface.vertex_elements.len(),
+                    whole.elapsed(),
+                    scene.lattice.element_count()
+                );
+            }
+        }
+    }
+}
