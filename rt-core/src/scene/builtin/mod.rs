@@ -52,7 +52,6 @@ fn draw(structures: Vec<Structure>, label_at: impl Fn([f64; 3]) -> u8) -> Labels
 
 #[cfg(test)]
 mod times {
-    use super::*;
     use crate::scene::{Lattice, Scene, Surface};
     use std::time::Instant;
 
