@@ -22,6 +22,7 @@
 
 pub mod chainmail;
 mod check;
+pub mod fem;
 mod limits;
 mod point;
 
