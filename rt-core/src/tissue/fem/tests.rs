@@ -4,11 +4,12 @@ use super::solve::hold_cells;
 use super::*;
 use crate::scene::{Labels, Lattice, Scene};
 
-fn cube(n: usize, edge_m: f64) -> Lattice {
+fn cube(n: usize, edge_m: f64) -> std::sync::Arc<Lattice> {
     let labels = Labels {
         dims: [n; 3],
         spacing_m: edge_m / n as f64,
         cells: vec![1; n * n * n],
+        structures: Vec::new(),
     };
     Scene::from_labels("cube", &labels).expect("valid labels").lattice
 }
