@@ -9,16 +9,26 @@
 mod activity;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx2_relax;
 mod classes;
 mod held;
 mod kernels;
 mod model;
 mod project;
 pub mod queue;
+mod relax;
+#[cfg(test)]
+mod relax_tests;
+#[cfg(test)]
+mod scene_tests;
+mod segments;
 mod single;
 mod solve;
 mod spans;
 mod state;
+#[cfg(test)]
+mod state_tests;
 mod sweep;
 #[cfg(test)]
 mod tests;
