@@ -5,6 +5,9 @@
 //! vertical for links along y and z). All limits together are a convex set, and the body at rest, moved
 //! as a whole, is in it. Hence: recovery toward rest never breaks a limit, and there is always a way back
 //! to a state without violations.
+//!
+//! A step works on what moves: `activity` remembers which stretches those are, `sweep` follows them outward,
+//! `project` is for what sweeps do not solve, `relax` makes the body elastic where that is asked for.
 
 mod activity;
 #[cfg(target_arch = "x86_64")]
@@ -14,9 +17,11 @@ mod avx2_relax;
 mod classes;
 mod held;
 mod kernels;
+mod look;
 mod model;
 mod project;
 pub mod queue;
+pub mod reference;
 mod relax;
 #[cfg(test)]
 mod relax_tests;

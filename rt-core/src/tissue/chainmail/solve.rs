@@ -102,8 +102,8 @@ fn solve<K: Kernels + relax::Rows>(
 
 /// Violations that f32 cannot do without: two ends at `farthest`, rounded.
 fn slack(model: &ChainMail, farthest: f32) -> f32 {
-    const LEAST: f32 = 4e-6;
-    (LEAST + 2.0 * f32::EPSILON * farthest).min(0.25 * model.limits().tolerance)
+    const LEAST: f32 = 1e-6;
+    (LEAST + f32::EPSILON * farthest).min(0.25 * model.limits().tolerance)
 }
 
 /// Brings a body that is relaxed back into its limits.

@@ -35,11 +35,6 @@ impl Links {
         }
     }
 
-    /// Links whose upper end is in rows `first..end`.
-    pub fn below_rows(&self, first: usize, end: usize) -> &[Span] {
-        &self.spans[self.groups[first] as usize..self.groups[end] as usize]
-    }
-
     pub fn bytes(&self) -> usize {
         size_of::<Span>() * self.spans.capacity() + size_of::<u32>() * self.groups.capacity()
     }

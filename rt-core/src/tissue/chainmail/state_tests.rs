@@ -198,6 +198,35 @@ fn ten_thousand_cycles_in_the_gland_end_where_one_ends() {
 }
 
 #[test]
+fn f32_and_looking_only_at_what_moves_cost_next_to_nothing() {
+    let relaxed = TissueParameters {
+        relaxation_iterations: 5,
+        ..TissueParameters::default()
+    };
+    for parameters in [TissueParameters::default(), relaxed] {
+        let model = model_with(&test_bodies::block([15, 13, 14]), &parameters);
+        let (mut state, mut reference) = (TissueState::at_rest(&model), reference::Reference::at_rest(&model));
+        let element = model.lattice().element_of_cell(7, 6, 2).expect("inside");
+        let mut worst = 0.0_f64;
+        for tick in 0..200 {
+            let way = 0.06 * f64::from(if tick < 100 { tick } else { 200 - tick });
+            let held = held_at(&model, element, [0.1 * way, -0.2 * way, way]);
+            step(&model, &mut state, Some(held), 5e-3);
+            assert!(reference.step(&model, held, 5e-3) <= 1e-3);
+            for (e, expected) in reference.u.iter().enumerate() {
+                let now = state.deformed(&model).displacement(e as u32);
+                worst = (0..3).fold(worst, |w, axis| w.max((now[axis] - expected[axis]).abs()));
+            }
+        }
+        println!(
+            "{} passes of relaxation: {worst:.1e} elements from f64",
+            parameters.relaxation_iterations
+        );
+        assert!(worst < 1e-3, "{worst}");
+    }
+}
+
+#[test]
 fn step_that_moves_nothing_reports_the_same_again() {
     let model = paper();
     let element = model.lattice().element_of_cell(53, 31, 80).expect("inside");
