@@ -2,7 +2,7 @@
 //!
 //! `cargo bench -p stylet-benches`. Rounds are interleaved, so that a noisy machine disturbs all rows alike.
 
-use rt_core::scene::{Labels, Scene};
+use rt_core::scene::Scene;
 use rt_core::tissue::chainmail::queue::QueuePass;
 use rt_core::tissue::chainmail::single_pass;
 use rt_core::tissue::{ChainMail, Held, MaterialPoint, TissueParameters, TissueState, largest_violation, step};
@@ -113,17 +113,6 @@ impl Needle {
         }
         self.held
     }
-}
-
-fn scene_full() -> Scene {
-    let dims = [107, 62, 176];
-    let labels = Labels {
-        dims,
-        spacing_m: 1.3641e-3,
-        cells: vec![1; dims.iter().product()],
-        structures: Vec::new(),
-    };
-    Scene::from_labels("full", &labels).expect("valid")
 }
 
 fn bench(scene: &Scene, rounds: usize, ticks_a_round: usize, with_queue: bool) {
@@ -245,5 +234,5 @@ fn bench(scene: &Scene, rounds: usize, ticks_a_round: usize, with_queue: bool) {
 
 fn main() {
     bench(&Scene::builtin("paper").expect("built in"), 200, 10, true);
-    bench(&scene_full(), 20, 50, true);
+    bench(&Scene::builtin("full").expect("built in"), 20, 50, true);
 }

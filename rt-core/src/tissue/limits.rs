@@ -210,19 +210,6 @@ impl TissueParameters {
     }
 }
 
-impl AxisLimits {
-    /// Every problem with a structure's limits along x, y and z.
-    pub fn problems(axes: &[AxisLimits; 3]) -> Vec<ParameterProblem> {
-        let mut problems = Problems::default();
-        for axis in axes {
-            problems.of_stretch(axis.min_stretch, axis.max_stretch);
-            problems.of_angle("shear_deg", axis.shear_deg);
-        }
-        problems.of_folding("shear_deg of x, y, z", axes.each_ref().map(|axis| axis.shear_deg));
-        problems.0
-    }
-}
-
 /// How close a corner of three links with these shear angles can come to folding: at 1 its volume can be zero,
 /// above it negative (`docs/physics.md`).
 pub fn folding(shear_deg: [f64; 3]) -> f64 {
@@ -368,19 +355,5 @@ mod tests {
                 assert!(problems[0].to_string().contains("eq. 1 in three dimensions"));
             }
         }
-    }
-
-    #[test]
-    fn every_problem_of_a_structure_is_listed() {
-        let axis = |min_stretch, max_stretch, shear_deg| AxisLimits {
-            min_stretch,
-            max_stretch,
-            shear_deg,
-        };
-        let good = axis(0.9, 1.1, 20.0);
-        assert!(AxisLimits::problems(&[good; 3]).is_empty());
-        let bad = [axis(2.0, 0.5, 95.0), good, axis(f64::NAN, 1.0, 20.0)];
-        let names: Vec<_> = AxisLimits::problems(&bad).iter().map(|p| p.name).collect();
-        assert_eq!(names, ["min_stretch", "max_stretch", "shear_deg", "min_stretch"]);
     }
 }
