@@ -105,8 +105,8 @@ macro_rules! parameters {
 parameters! {
     MinStretch "tissue.min_stretch" "Smallest link" Tissue "elements" 1.0, 0.05, 1.0, 0.55, "paper eq. 4", "How far a link between neighbouring elements can be compressed.";
     MaxStretch "tissue.max_stretch" "Largest link" Tissue "elements" 1.0, 1.0, 4.0, 1.75, "paper eq. 3", "How far a link between neighbouring elements can be stretched.";
-    ShearHorizontal "tissue.shear_horizontal" "Shear, horizontal" Tissue "deg" (1.0 / RAD), 0.0, 85.0, 26.565, "paper eq. 5", "Largest shear angle of links along x (maxHoriRx). With the vertical one it must stay under 90 deg (eq. 1).";
-    ShearVertical "tissue.shear_vertical" "Shear, vertical" Tissue "deg" (1.0 / RAD), 0.0, 85.0, 26.565, "paper eq. 5", "Largest shear angle of links along y and z (maxVertRy). With the horizontal one it must stay under 90 deg (eq. 1).";
+    ShearHorizontal "tissue.shear_horizontal" "Shear, horizontal" Tissue "deg" (1.0 / RAD), 0.0, 85.0, 26.565, "paper eq. 5", "Largest shear angle of links along x (maxHoriRx). No cell may fold (eq. 1 in three dimensions): 26.565 with the same vertically, 60 with 12.";
+    ShearVertical "tissue.shear_vertical" "Shear, vertical" Tissue "deg" (1.0 / RAD), 0.0, 45.0, 26.565, "paper eq. 5", "Largest shear angle of links along y and z (maxVertRy). No cell may fold (eq. 1 in three dimensions): 26.565 with the same horizontally, 44 with 0.";
     RecoveryTime "tissue.recovery_time" "Recovery time" Tissue "ms" 1e3, 5.0, 10000.0, 1000.0, "ours", "Time in which the surroundings bring the gland back by 63 %.";
     ResidualTolerance "tissue.residual_tolerance" "Residual tolerance" Tissue "elements" 1.0, 1e-4, 1e-2, 1e-3, "design section 3", "Largest constraint violation that a tissue step may leave.";
     PunctureDepth "needle.puncture_depth" "Puncture depth u_cri" Needle "mm" 1e3, 0.5, 20.0, 8.0, "paper eq. 6", "Depth at which the needle goes through the membrane.";

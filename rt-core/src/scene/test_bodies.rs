@@ -1,6 +1,7 @@
 //! Small bodies that the tests of scene and tissue share.
 
-use super::Labels;
+use super::{Labels, Structure};
+use crate::tissue::AxisLimits;
 
 fn labels(dims: [usize; 3], is_tissue: impl Fn([usize; 3]) -> bool) -> Labels {
     let [nx, ny, _] = dims;
@@ -41,6 +42,38 @@ pub fn speckle(seed: u64) -> Labels {
     let mut random = Random(seed);
     let keep: Vec<bool> = (0..9 * 9 * 9).map(|_| random.unit() < 0.6).collect();
     labels([9, 9, 9], |[i, j, k]| keep[i + 9 * j + 81 * k])
+}
+
+/// A stiff layer, anisotropic, in soft tissue.
+pub fn layers() -> Labels {
+    let mut labels = labels([12, 9, 10], |_| true);
+    for (n, cell) in labels.cells.iter_mut().enumerate() {
+        if (4..7).contains(&(n % 12)) || n / 108 == 7 {
+            *cell = 2;
+        }
+    }
+    labels.structures = vec![Structure::soft("soft", 1), Structure::soft("stiff", 2)];
+    let axis = |min_stretch, max_stretch, shear_deg| AxisLimits {
+        min_stretch,
+        max_stretch,
+        shear_deg,
+    };
+    labels.structures[1].material.limits = Some([axis(0.9, 1.1, 5.0), axis(0.95, 1.02, 10.0), axis(0.8, 1.3, 3.0)]);
+    labels
+}
+
+/// Soft tissue between a fixed wall and a fixed bar.
+pub fn bone() -> Labels {
+    let mut labels = labels([12, 9, 10], |_| true);
+    for (n, cell) in labels.cells.iter_mut().enumerate() {
+        let (i, j, k) = (n % 12, n / 12 % 9, n / 108);
+        if k == 0 || (i > 8 && (6..8).contains(&j)) {
+            *cell = 2;
+        }
+    }
+    labels.structures = vec![Structure::soft("soft", 1), Structure::soft("bone", 2)];
+    labels.structures[1].material.fixed = true;
+    labels
 }
 
 /// Numbers that look random and are the same on every run (splitmix64).

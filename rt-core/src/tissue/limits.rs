@@ -13,10 +13,18 @@ pub struct TissueParameters {
     pub shear_deg: f64,
     /// Shear angle of links along y and z (`maxVertRy`).
     pub shear_vert_deg: f64,
-    /// Time in which the surroundings take 63 % of a displacement back.
+    /// Time in which the surroundings take 63 % of a displacement back; infinite: they do not.
     pub recovery_time_s: f64,
     /// Largest violation of a limit that counts as none, in elements.
     pub residual_tolerance: f64,
+    /// Passes of elastic relaxation after each propagation; 0 for none, at no cost.
+    pub relaxation_iterations: u32,
+    /// How much of the way a pass of relaxation takes: 1 for all, up to below 2 to go beyond, which converges faster.
+    pub relaxation_weight: f64,
+    /// Stiffness of a link across over that along it.
+    pub shear_to_axial: f64,
+    /// Stiffness of the surroundings for each element, over that along a link.
+    pub ground_stiffness: f64,
 }
 
 impl Default for TissueParameters {
@@ -28,6 +36,10 @@ impl Default for TissueParameters {
             shear_vert_deg: 26.565,
             recovery_time_s: 1.0,
             residual_tolerance: 1e-3,
+            relaxation_iterations: 0,
+            relaxation_weight: 1.6,
+            shear_to_axial: 0.25,
+            ground_stiffness: 0.01,
         }
     }
 }
@@ -79,6 +91,16 @@ pub struct Limits {
     pub(crate) links: [LinkLimits; 3],
     pub(crate) recovery_time_s: f64,
     pub(crate) tolerance: f32,
+    pub(crate) relaxation: Option<Relaxation>,
+}
+
+/// Elastic relaxation; stiffnesses beside that along a link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Relaxation {
+    pub iterations: u32,
+    pub weight: f32,
+    pub shear: f32,
+    pub ground: f32,
 }
 
 /// A setting that is out of its range.
@@ -107,65 +129,63 @@ impl std::error::Error for ParameterProblem {}
 impl TissueParameters {
     /// Lists every problem. A value that is not a number is out of every range.
     pub fn validate(&self) -> Result<Limits, Vec<ParameterProblem>> {
-        let mut problems = Vec::new();
-        let mut check = |ok: bool, name, value, limit, advice| {
-            if !ok {
-                problems.push(ParameterProblem {
-                    name,
-                    value,
-                    limit,
-                    advice,
-                });
-            }
-        };
-        let min = self.min_stretch;
-        check(
-            min > 0.0 && min <= 1.0,
-            "min_stretch",
-            min,
-            "above 0 and at most 1",
-            "1 forbids compression",
-        );
-        let max = self.max_stretch;
-        check(
-            (1.0..=100.0).contains(&max),
-            "max_stretch",
-            max,
-            "from 1 to 100",
-            "1 forbids extension",
-        );
+        let mut problems = Problems::default();
+        problems.of_stretch(self.min_stretch, self.max_stretch);
         let (shear, vert) = (self.shear_deg, self.shear_vert_deg);
-        for (name, angle) in [("shear_deg", shear), ("shear_vert_deg", vert)] {
-            let advice = "0 forbids shear; the paper has 26.565";
-            check((0.0..90.0).contains(&angle), name, angle, "from 0 to below 90", advice);
-        }
-        check(
-            shear + vert < 90.0,
-            "shear_deg + shear_vert_deg",
-            shear + vert,
-            "below 90 (eq. 1)",
-            "lower one of them, or cells fold over",
-        );
+        problems.of_angle("shear_deg", shear);
+        problems.of_angle("shear_vert_deg", vert);
+        problems.of_folding("shear_deg, shear_vert_deg", [shear, vert, vert]);
         let tau = self.recovery_time_s;
-        check(
-            tau > 0.0 && tau.is_finite(),
+        problems.check(
+            tau > 0.0,
             "recovery_time_s",
             tau,
-            "above 0 and finite",
-            "large values recover slowly",
+            "above 0",
+            "large values recover slowly, infinite not at all",
         );
-        let tolerance = self.residual_tolerance;
-        check(
-            (1e-4..=0.1).contains(&tolerance),
+        problems.check(
+            (1e-4..=0.1).contains(&self.residual_tolerance),
             "residual_tolerance",
-            tolerance,
+            self.residual_tolerance,
             "from 0.0001 to 0.1 elements",
             "less is below what f32 can resolve",
         );
-        if problems.is_empty() {
+        self.check_relaxation(&mut problems);
+        if problems.0.is_empty() {
             Ok(self.active())
         } else {
-            Err(problems)
+            Err(problems.0)
+        }
+    }
+
+    fn check_relaxation(&self, problems: &mut Problems) {
+        let iterations = f64::from(self.relaxation_iterations);
+        problems.check(
+            iterations <= 1000.0,
+            "relaxation_iterations",
+            iterations,
+            "at most 1000",
+            "each is a pass over the whole body in every tick",
+        );
+        let weight = self.relaxation_weight;
+        problems.check(
+            weight > 0.0 && weight < 2.0,
+            "relaxation_weight",
+            weight,
+            "above 0 and below 2",
+            "from 2 on the body would swing up instead of coming to rest",
+        );
+        for (name, value, from) in [
+            ("shear_to_axial", self.shear_to_axial, 1e-3),
+            ("ground_stiffness", self.ground_stiffness, 0.0),
+        ] {
+            let advice = "stiffness along a link is 1";
+            let limit = if from > 0.0 {
+                "from 0.001 to 1000"
+            } else {
+                "from 0 to 1000"
+            };
+            problems.check((from..=1000.0).contains(&value), name, value, limit, advice);
         }
     }
 
@@ -180,6 +200,71 @@ impl TissueParameters {
             links: [horizontal, vertical, vertical],
             recovery_time_s: self.recovery_time_s,
             tolerance: self.residual_tolerance as f32,
+            relaxation: (self.relaxation_iterations > 0).then_some(Relaxation {
+                iterations: self.relaxation_iterations,
+                weight: self.relaxation_weight as f32,
+                shear: self.shear_to_axial as f32,
+                ground: self.ground_stiffness as f32,
+            }),
+        }
+    }
+}
+
+/// How close a corner of three links with these shear angles can come to folding: at 1 its volume can be zero,
+/// above it negative (`docs/physics.md`).
+pub fn folding(shear_deg: [f64; 3]) -> f64 {
+    let [x, y, z] = shear_deg.map(|angle| angle.to_radians().tan());
+    x * y + y * z + z * x + 2.0 * x * y * z
+}
+
+#[derive(Default)]
+struct Problems(Vec<ParameterProblem>);
+
+impl Problems {
+    fn check(&mut self, ok: bool, name: &'static str, value: f64, limit: &'static str, advice: &'static str) {
+        if !ok {
+            self.0.push(ParameterProblem {
+                name,
+                value,
+                limit,
+                advice,
+            });
+        }
+    }
+
+    fn of_stretch(&mut self, min: f64, max: f64) {
+        self.check(
+            min > 0.0 && min <= 1.0,
+            "min_stretch",
+            min,
+            "above 0 and at most 1",
+            "1 forbids compression",
+        );
+        self.check(
+            (1.0..=100.0).contains(&max),
+            "max_stretch",
+            max,
+            "from 1 to 100",
+            "1 forbids extension",
+        );
+    }
+
+    fn of_angle(&mut self, name: &'static str, angle: f64) {
+        let advice = "0 forbids shear; the paper has 26.565";
+        self.check((0.0..90.0).contains(&angle), name, angle, "from 0 to below 90", advice);
+    }
+
+    /// Eq. 1 in three dimensions; angles that are out of range have been told already.
+    fn of_folding(&mut self, name: &'static str, shear_deg: [f64; 3]) {
+        if shear_deg.iter().all(|angle| (0.0..90.0).contains(angle)) {
+            let value = folding(shear_deg);
+            self.check(
+                value <= 1.0,
+                name,
+                value,
+                "at most 1 (eq. 1 in three dimensions: tx ty + ty tz + tz tx + 2 tx ty tz <= 1)",
+                "lower an angle, or cells fold over",
+            );
         }
     }
 }
@@ -202,15 +287,23 @@ mod tests {
             shear_vert_deg: 45.0,
             recovery_time_s: 0.0,
             residual_tolerance: f64::INFINITY,
+            relaxation_iterations: 1001,
+            relaxation_weight: 2.0,
+            shear_to_axial: 0.0,
+            ground_stiffness: f64::NAN,
         };
-        let problems = parameters.validate().expect_err("five problems");
+        let problems = parameters.validate().expect_err("nine problems");
         let names: Vec<_> = problems.iter().map(|problem| problem.name).collect();
         let expected = [
             "min_stretch",
             "max_stretch",
-            "shear_deg + shear_vert_deg",
+            "shear_deg, shear_vert_deg",
             "recovery_time_s",
             "residual_tolerance",
+            "relaxation_iterations",
+            "relaxation_weight",
+            "shear_to_axial",
+            "ground_stiffness",
         ];
         assert_eq!(names, expected);
         assert_eq!(
@@ -220,13 +313,47 @@ mod tests {
     }
 
     #[test]
-    fn equation_1_refuses_ninety_degrees_and_accepts_just_below() {
-        let with = |shear_deg| TissueParameters {
+    fn equation_1_in_three_dimensions_is_the_sign_of_the_smallest_corner() {
+        // Oracle: the least determinant over all signs of all six shears.
+        let mut random = crate::scene::test_bodies::Random(5);
+        for _ in 0..2000 {
+            let angles = [(); 3].map(|()| 60.0 * random.unit());
+            let t = angles.map(|angle: f64| angle.to_radians().tan());
+            let least = (0..64).map(|signs| {
+                let a = |n: usize, axis: usize| if signs >> n & 1 == 0 { t[axis] } else { -t[axis] };
+                let m = nalgebra::Matrix3::new(1.0, a(0, 0), a(1, 0), a(2, 1), 1.0, a(3, 1), a(4, 2), a(5, 2), 1.0);
+                m.determinant()
+            });
+            let least = least.fold(f64::INFINITY, f64::min);
+            assert!(
+                (least - (1.0 - folding(angles))).abs() < 1e-9 * (1.0 + least.abs()),
+                "{angles:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn angles_at_the_edge_of_folding_are_accepted_and_those_beyond_refused() {
+        let with = |shear_deg, shear_vert_deg| TissueParameters {
             shear_deg,
-            shear_vert_deg: 30.0,
+            shear_vert_deg,
             ..TissueParameters::default()
         };
-        assert!(with(60.0).validate().is_err());
-        assert!(with(59.999).validate().is_ok());
+        for (shear, vert, ok) in [
+            (26.565, 26.565, true),
+            (26.566, 26.566, false),
+            (0.0, 44.999, true),
+            (0.0, 45.001, false),
+            // Eq. 1 in a plane allows this one.
+            (30.0, 59.99, false),
+            (60.0, 12.0, true),
+            (60.0, 13.0, false),
+        ] {
+            let result = with(shear, vert).validate();
+            assert_eq!(result.is_ok(), ok, "{shear}, {vert}");
+            if let Err(problems) = result {
+                assert!(problems[0].to_string().contains("eq. 1 in three dimensions"));
+            }
+        }
     }
 }

@@ -32,6 +32,6 @@ pub use chainmail::{ChainMail, ChainMailTissue, TissueState, step};
 pub use check::largest_violation;
 pub use deformed::Deformed;
 pub use fem::FemTissue;
-pub use limits::{AxisLimits, Limits, ParameterProblem, TissueParameters};
+pub use limits::{AxisLimits, Limits, ParameterProblem, TissueParameters, folding};
 pub use model::{Held, HeldOutcome, Solve, StepReport, TissueModel};
 pub use point::MaterialPoint;

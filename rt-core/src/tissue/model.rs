@@ -43,7 +43,8 @@ pub struct StepReport {
     pub passes: u32,
     /// ChainMail: largest violation over all links, in elements. FEM: residual force over the tip's force.
     pub residual: f64,
-    /// Elements that the solver moved, besides recovery; the held one counts.
+    /// Elements that the solver moved, besides recovery; the held one counts. ChainMail counts whole stretches of a
+    /// run, from the first that moved to the last.
     pub moved: u32,
     /// The residual is within the model's tolerance.
     pub converged: bool,

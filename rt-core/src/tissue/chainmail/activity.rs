@@ -105,6 +105,10 @@ impl Active {
         count
     }
 
+    pub fn bytes(&self) -> usize {
+        size_of::<Stretch>() * (self.of_run.len() + self.rows.len())
+    }
+
     pub fn copy_from(&mut self, other: &Active) {
         self.of_run.copy_from_slice(&other.of_run);
         self.rows.copy_from_slice(&other.rows);

@@ -15,28 +15,31 @@ impl Kernels for Avx2 {
         let len = u[0].len().min(u[1].len()).min(u[2].len());
         assert!(inner + n <= len && outer + n <= len);
         // SAFETY: both stretches are inside every component; AVX2 is there (type's doc).
-        unsafe { clamp::<OUTER>(l, u.each_mut().map(|c| c.as_mut_ptr()), inner, outer, n) }
+        unsafe { clamp::<OUTER>(l, u.each_mut().map(|c| c.as_mut_ptr()), inner, outer, n, len) }
     }
 
     #[inline(always)]
     fn violation(l: &Scaled, u: &[&[f32]; 3], lo: usize, hi: usize, n: usize) -> f32 {
-        assert!(lo.max(hi) + n <= shortest(u));
+        let len = shortest(u);
+        assert!(lo.max(hi) + n <= len);
         // SAFETY: as above.
-        unsafe { violation(l, u.map(<[f32]>::as_ptr), lo, hi, n) }
+        unsafe { violation(l, u.map(<[f32]>::as_ptr), lo, hi, n, len) }
     }
 
     #[inline(always)]
     fn first_violated(l: &Scaled, u: &[&[f32]; 3], start: usize, end: usize) -> usize {
-        assert!(start >= end || end < shortest(u));
+        let len = shortest(u);
+        assert!(start >= end || end < len);
         // SAFETY: as above; link `end - 1` reads element `end`.
-        unsafe { first_violated(l, u.map(<[f32]>::as_ptr), start, end) }
+        unsafe { first_violated(l, u.map(<[f32]>::as_ptr), start, end, len) }
     }
 
     #[inline(always)]
     fn past_last_violated(l: &Scaled, u: &[&[f32]; 3], start: usize, end: usize) -> usize {
-        assert!(start >= end || end < shortest(u));
+        let len = shortest(u);
+        assert!(start >= end || end < len);
         // SAFETY: as above.
-        unsafe { past_last_violated(l, u.map(<[f32]>::as_ptr), start, end) }
+        unsafe { past_last_violated(l, u.map(<[f32]>::as_ptr), start, end, len) }
     }
 
     #[inline(always)]
@@ -115,21 +118,31 @@ unsafe fn store<const ALL: bool>(p: *mut f32, mask: __m256i, value: __m256) {
 }
 
 /// # Safety
-/// `inner..inner + n` and `outer..outer + n` must be inside each component.
+/// `inner..inner + n` and `outer..outer + n` must be inside each component, which all have `len` values.
 #[target_feature(enable = "avx2")]
 #[inline]
-unsafe fn clamp<const OUTER: bool>(l: &Scaled, u: [*mut f32; 3], inner: usize, outer: usize, n: usize) -> Stretch {
+unsafe fn clamp<const OUTER: bool>(
+    l: &Scaled,
+    u: [*mut f32; 3],
+    inner: usize,
+    outer: usize,
+    n: usize,
+    len: usize,
+) -> Stretch {
     let l = lanes(l);
     let mut hull = Stretch::EMPTY;
     let mut e = 0;
     while e < n {
         let left = n - e;
-        // SAFETY: all eight, or the first `left`, are before `n`.
+        let ends_inside = inner.max(outer) + e + LANES <= len;
+        // SAFETY: all eight are before `len`, or those of the mask before `n`.
         let moved = unsafe {
             if left >= LANES {
-                clamp_eight::<OUTER, true>(&l, u, inner + e, outer + e, _mm256_setzero_si256())
+                clamp_eight::<OUTER, true, true>(&l, u, inner + e, outer + e, _mm256_setzero_si256())
+            } else if ends_inside {
+                clamp_eight::<OUTER, true, false>(&l, u, inner + e, outer + e, first_lanes(left))
             } else {
-                clamp_eight::<OUTER, false>(&l, u, inner + e, outer + e, first_lanes(left))
+                clamp_eight::<OUTER, false, false>(&l, u, inner + e, outer + e, first_lanes(left))
             }
         };
         if moved != 0 {
@@ -143,13 +156,14 @@ unsafe fn clamp<const OUTER: bool>(l: &Scaled, u: [*mut f32; 3], inner: usize, o
     hull
 }
 
-/// The lanes that had to move.
+/// The lanes that had to move: of all eight, or of `mask`. Loads and stores whole vectors where it may, even if some
+/// lanes are not to move: stores under a mask hold up the loads that follow.
 ///
 /// # Safety
-/// As for `clamp`, for eight lanes or those of `mask`.
+/// As for `clamp`, for eight lanes if `WHOLE`, else for those of `mask`.
 #[target_feature(enable = "avx2")]
 #[inline]
-unsafe fn clamp_eight<const OUTER: bool, const ALL: bool>(
+unsafe fn clamp_eight<const OUTER: bool, const WHOLE: bool, const ALL: bool>(
     l: &Lanes,
     [a, b, c]: [*mut f32; 3],
     inner: usize,
@@ -159,12 +173,12 @@ unsafe fn clamp_eight<const OUTER: bool, const ALL: bool>(
     // SAFETY: the caller's promise.
     let (ia, ib, ic, oa, ob, oc) = unsafe {
         (
-            load::<ALL>(a.add(inner), mask),
-            load::<ALL>(b.add(inner), mask),
-            load::<ALL>(c.add(inner), mask),
-            load::<ALL>(a.add(outer), mask),
-            load::<ALL>(b.add(outer), mask),
-            load::<ALL>(c.add(outer), mask),
+            load::<WHOLE>(a.add(inner), mask),
+            load::<WHOLE>(b.add(inner), mask),
+            load::<WHOLE>(c.add(inner), mask),
+            load::<WHOLE>(a.add(outer), mask),
+            load::<WHOLE>(b.add(outer), mask),
+            load::<WHOLE>(c.add(outer), mask),
         )
     };
     let d = if OUTER == UPPER {
@@ -182,13 +196,21 @@ unsafe fn clamp_eight<const OUTER: bool, const ALL: bool>(
     let shear = _mm256_mul_ps(l.tan, _mm256_add_ps(l.rest, along));
     let (new_b, moved_b) = clamp_side(l, shear, ib, ob);
     let (new_c, moved_c) = clamp_side(l, shear, ic, oc);
+    let live = |moved: __m256| {
+        if ALL {
+            moved
+        } else {
+            _mm256_and_ps(moved, _mm256_castsi256_ps(mask))
+        }
+    };
+    let (moved_a, moved_b, moved_c) = (live(moved_a), live(moved_b), live(moved_c));
     let moved = _mm256_movemask_ps(_mm256_or_ps(moved_a, _mm256_or_ps(moved_b, moved_c)));
     if moved != 0 {
         // SAFETY: the caller's promise.
         unsafe {
-            store::<ALL>(a.add(outer), mask, _mm256_blendv_ps(oa, new_a, moved_a));
-            store::<ALL>(b.add(outer), mask, _mm256_blendv_ps(ob, new_b, moved_b));
-            store::<ALL>(c.add(outer), mask, _mm256_blendv_ps(oc, new_c, moved_c));
+            store::<WHOLE>(a.add(outer), mask, _mm256_blendv_ps(oa, new_a, moved_a));
+            store::<WHOLE>(b.add(outer), mask, _mm256_blendv_ps(ob, new_b, moved_b));
+            store::<WHOLE>(c.add(outer), mask, _mm256_blendv_ps(oc, new_c, moved_c));
         }
     }
     moved as u32
@@ -234,6 +256,26 @@ unsafe fn violation_eight<const ALL: bool>(
     _mm256_max_ps(stretch, _mm256_sub_ps(side, shear))
 }
 
+/// Violations of the first `n` links; zero or less for the other lanes.
+///
+/// # Safety
+/// `n` elements from both places must be inside each component, which all have `len` values.
+#[target_feature(enable = "avx2")]
+#[inline]
+unsafe fn violation_tail(l: &Lanes, u: [*const f32; 3], [lo, hi]: [usize; 2], n: usize, len: usize) -> __m256 {
+    let mask = first_lanes(n);
+    // SAFETY: whole vectors where they end inside, else the caller's promise; lanes that are not read count as at
+    // rest, within every limit.
+    unsafe {
+        if lo.max(hi) + LANES <= len {
+            let found = violation_eight::<true>(l, u, lo, hi, mask);
+            _mm256_and_ps(found, _mm256_castsi256_ps(mask))
+        } else {
+            violation_eight::<false>(l, u, lo, hi, mask)
+        }
+    }
+}
+
 #[target_feature(enable = "avx2")]
 #[inline]
 fn largest_lane(v: __m256) -> f32 {
@@ -246,7 +288,7 @@ fn largest_lane(v: __m256) -> f32 {
 /// `lo..lo + n` and `hi..hi + n` must be inside each component.
 #[target_feature(enable = "avx2")]
 #[inline]
-unsafe fn violation(l: &Scaled, u: [*const f32; 3], lo: usize, hi: usize, n: usize) -> f32 {
+unsafe fn violation(l: &Scaled, u: [*const f32; 3], lo: usize, hi: usize, n: usize, len: usize) -> f32 {
     let l = lanes(l);
     let mut worst = _mm256_setzero_ps();
     let mut e = 0;
@@ -257,8 +299,8 @@ unsafe fn violation(l: &Scaled, u: [*const f32; 3], lo: usize, hi: usize, n: usi
         e += LANES;
     }
     if e < n {
-        // SAFETY: the lanes of the mask are before `n`; the others are at rest, within every limit.
-        let found = unsafe { violation_eight::<false>(&l, u, lo + e, hi + e, first_lanes(n - e)) };
+        // SAFETY: all eight are before `len`, or the lanes of the mask before `n`.
+        let found = unsafe { violation_tail(&l, u, [lo + e, hi + e], n - e, len) };
         worst = _mm256_max_ps(found, worst);
     }
     largest_lane(worst)
@@ -270,14 +312,14 @@ unsafe fn violation(l: &Scaled, u: [*const f32; 3], lo: usize, hi: usize, n: usi
 /// Elements `e..=end` must be inside each component.
 #[target_feature(enable = "avx2")]
 #[inline]
-unsafe fn violated(l: &Lanes, u: [*const f32; 3], e: usize, end: usize) -> u32 {
+unsafe fn violated(l: &Lanes, u: [*const f32; 3], e: usize, end: usize, len: usize) -> u32 {
     let left = end - e;
     // SAFETY: the caller's promise.
     let found = unsafe {
         if left >= LANES {
             violation_eight::<true>(l, u, e, e + 1, _mm256_setzero_si256())
         } else {
-            violation_eight::<false>(l, u, e, e + 1, first_lanes(left))
+            violation_tail(l, u, [e, e + 1], left, len)
         }
     };
     _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(found, l.slack)) as u32
@@ -287,12 +329,12 @@ unsafe fn violated(l: &Lanes, u: [*const f32; 3], e: usize, end: usize) -> u32 {
 /// Elements `start..=end` must be inside each component.
 #[target_feature(enable = "avx2")]
 #[inline]
-unsafe fn first_violated(l: &Scaled, u: [*const f32; 3], start: usize, end: usize) -> usize {
+unsafe fn first_violated(l: &Scaled, u: [*const f32; 3], start: usize, end: usize, len: usize) -> usize {
     let l = lanes(l);
     let mut e = start;
     while e < end {
         // SAFETY: `start <= e < end`.
-        let found = unsafe { violated(&l, u, e, end) };
+        let found = unsafe { violated(&l, u, e, end, len) };
         if found != 0 {
             return e + found.trailing_zeros() as usize;
         }
@@ -305,13 +347,13 @@ unsafe fn first_violated(l: &Scaled, u: [*const f32; 3], start: usize, end: usiz
 /// Elements `start..=end` must be inside each component.
 #[target_feature(enable = "avx2")]
 #[inline]
-unsafe fn past_last_violated(l: &Scaled, u: [*const f32; 3], start: usize, end: usize) -> usize {
+unsafe fn past_last_violated(l: &Scaled, u: [*const f32; 3], start: usize, end: usize, len: usize) -> usize {
     let l = lanes(l);
     let mut past = end;
     while past > start {
         let e = past.saturating_sub(LANES).max(start);
         // SAFETY: `start <= e < past <= end`.
-        let found = unsafe { violated(&l, u, e, past) };
+        let found = unsafe { violated(&l, u, e, past, len) };
         if found != 0 {
             return e + 32 - found.leading_zeros() as usize;
         }

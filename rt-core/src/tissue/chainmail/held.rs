@@ -39,8 +39,9 @@ pub(super) fn grip(model: &ChainMail, held: Option<Held>) -> (Option<Grip>, Held
     (Some(grip), HeldOutcome::Followed)
 }
 
-/// Puts what is held in place; what that moves is active.
-pub(super) fn put(model: &ChainMail, state: &mut TissueState, grip: &Grip) {
+/// Puts what is held in place; what that moves is active. Whether anything was not there.
+pub(super) fn put(model: &ChainMail, state: &mut TissueState, grip: &Grip) -> bool {
+    let mut moved = false;
     let [i, j, k] = model.lattice.cell(grip.element);
     let ny = model.lattice.dims[1];
     let around = |n: usize, count: usize| n.saturating_sub(grip.beside)..(n + grip.beside + 1).min(count);
@@ -58,20 +59,28 @@ pub(super) fn put(model: &ChainMail, state: &mut TissueState, grip: &Grip) {
                     end: cells.end as u32,
                 };
                 for n in elements(wanted.within(of_run.start_i, of_run.len)) {
-                    put_one(model, state, of_run.first + n, run, grip.at, [j, k]);
+                    moved |= put_one(model, state, of_run.first + n, run, grip.at, [j, k]);
                 }
             }
         }
     }
+    moved
 }
 
 fn elements(stretch: Stretch) -> std::ops::Range<u32> {
     stretch.start.min(stretch.end)..stretch.end
 }
 
-fn put_one(model: &ChainMail, state: &mut TissueState, element: u32, run: usize, at: [f32; 3], [j, k]: [usize; 2]) {
+fn put_one(
+    model: &ChainMail,
+    state: &mut TissueState,
+    element: u32,
+    run: usize,
+    at: [f32; 3],
+    [j, k]: [usize; 2],
+) -> bool {
     if model.is_fixed(element) || !state.put(element as usize, at) {
-        return;
+        return false;
     }
     let one = Stretch {
         start: element,
@@ -81,4 +90,5 @@ fn put_one(model: &ChainMail, state: &mut TissueState, element: u32, run: usize,
     state.active.add_row(j, k);
     state.moved.add(run, one);
     state.moved.add_row(j, k);
+    true
 }

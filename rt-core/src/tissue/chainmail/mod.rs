@@ -5,20 +5,35 @@
 //! vertical for links along y and z). All limits together are a convex set, and the body at rest, moved
 //! as a whole, is in it. Hence: recovery toward rest never breaks a limit, and there is always a way back
 //! to a state without violations.
+//!
+//! A step works on what moves: `activity` remembers which stretches those are, `sweep` follows them outward,
+//! `project` is for what sweeps do not solve, `relax` makes the body elastic where that is asked for.
 
 mod activity;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx2_relax;
 mod classes;
 mod held;
 mod kernels;
+mod look;
 mod model;
 mod project;
 pub mod queue;
+pub mod reference;
+mod relax;
+#[cfg(test)]
+mod relax_tests;
+#[cfg(test)]
+mod scene_tests;
+mod segments;
 mod single;
 mod solve;
 mod spans;
 mod state;
+#[cfg(test)]
+mod state_tests;
 mod sweep;
 #[cfg(test)]
 mod tests;

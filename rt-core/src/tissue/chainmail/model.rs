@@ -1,6 +1,7 @@
 //! What a ChainMail body is: topology and limits, built once.
 
 use super::classes::Classes;
+use super::segments::Segments;
 use super::spans::{Links, Rows, links_along};
 use crate::scene::{Lattice, Scene};
 use crate::tissue::Limits;
@@ -13,6 +14,7 @@ pub struct ChainMail {
     limits: Limits,
     pub(crate) classes: Classes,
     pub(crate) rows: Rows,
+    pub(crate) segments: Segments,
     /// Links along x, y and z.
     pub(crate) links: [Links; 3],
     /// First and one past the last occupied row j of each plane k.
@@ -46,6 +48,7 @@ impl ChainMail {
             part_is_fixed[part as usize] |= (run.first..run.end()).any(|e| classes.is_fixed(lattice.structure(e)));
         }
         ChainMail {
+            segments: Segments::of(scene, &rows, &classes),
             limits,
             links,
             rows_of_plane: rows_of_plane.collect(),
@@ -74,6 +77,14 @@ impl ChainMail {
     pub fn set_limits(&mut self, limits: Limits) {
         self.classes.set_limits(&limits);
         self.limits = limits;
+    }
+
+    /// Memory that the model takes beside the scene's lattice.
+    pub fn bytes(&self) -> usize {
+        let links = self.links.iter().map(Links::bytes).sum::<usize>();
+        let parts = size_of::<u32>() * self.part_of_run.capacity() + self.part_is_fixed.capacity();
+        let planes = size_of::<[usize; 2]>() * self.rows_of_plane.capacity();
+        links + self.rows.bytes() + self.segments.bytes() + parts + planes
     }
 
     /// Runs the portable kernels, whatever the processor has: they give the same bytes.

@@ -3,6 +3,7 @@
 use super::held::{self, Grip};
 use super::kernels::{Kernels, Portable};
 use super::model::ChainMail;
+use super::relax;
 use super::state::TissueState;
 use super::sweep::Pass;
 use crate::tissue::{Held, HeldOutcome, Solve, StepReport};
@@ -65,52 +66,105 @@ fn solve_avx2(model: &ChainMail, state: &mut TissueState, grip: Option<Grip>, re
     solve::<super::avx2::Avx2>(model, state, grip, report)
 }
 
-/// Puts the held element in place, then sweeps, then projects, then re-anchors, until the residual is within tolerance.
+/// Puts the held element in place, brings the body into its limits, relaxes it and brings it there again.
 #[inline(always)]
-fn solve<K: Kernels>(model: &ChainMail, state: &mut TissueState, grip: Option<Grip>, report: &mut StepReport) -> f32 {
+fn solve<K: Kernels + relax::Rows>(
+    model: &ChainMail,
+    state: &mut TissueState,
+    grip: Option<Grip>,
+    report: &mut StepReport,
+) -> f32 {
     let farthest = grip.map_or(0.0, |g| g.at.iter().fold(0.0, |a: f32, c| a.max(c.abs())));
     let slack = slack(model, farthest.max(state.max_displacement));
-    let residual = match grip {
-        Some(grip) => hold::<K>(model, state, grip, slack, report),
+    let mut residual = match &grip {
+        Some(grip) => {
+            held::put(model, state, grip);
+            propagate::<K>(model, state, grip, slack, report)
+        }
         None if state.active.is_empty() => 0.0,
         None => Pass::new(model, state, [0; 3], slack).check::<K>(),
     };
+    if let Some(relaxation) = &model.limits().relaxation
+        && (grip.is_some() || state.max_displacement > 0.0)
+    {
+        for half in 0..2 * relaxation.iterations {
+            relax::half_pass::<K>(model, state, relaxation, half as usize % 2);
+            if let Some(grip) = &grip {
+                held::put(model, state, grip);
+            }
+        }
+        report.passes += relaxation.iterations;
+        residual = settle::<K>(model, state, grip.as_ref(), slack, report);
+    }
     state.measure(model, K::largest_square);
     residual.max(state.settled)
 }
 
 /// Violations that f32 cannot do without: two ends at `farthest`, rounded.
 fn slack(model: &ChainMail, farthest: f32) -> f32 {
-    const LEAST: f32 = 4e-6;
-    (LEAST + 2.0 * f32::EPSILON * farthest).min(0.25 * model.limits().tolerance)
+    const LEAST: f32 = 1e-6;
+    (LEAST + f32::EPSILON * farthest).min(0.25 * model.limits().tolerance)
 }
 
+/// Brings a body that is relaxed back into its limits.
 #[inline(always)]
-fn hold<K: Kernels>(
+fn settle<K: Kernels>(
     model: &ChainMail,
     state: &mut TissueState,
-    grip: Grip,
+    grip: Option<&Grip>,
     slack: f32,
     report: &mut StepReport,
 ) -> f32 {
-    let tolerance = model.limits().tolerance;
-    let held_cell = model.lattice.cell(grip.element);
-    held::put(model, state, &grip);
-    loop {
-        if state.active.is_empty() {
-            return 0.0;
+    let middle = model.lattice.dims.map(|n| n / 2);
+    let centre = grip.map_or(middle, |g| model.lattice.cell(g.element));
+    let mut residual = Pass::new(model, state, centre, slack).check_all::<K>();
+    if residual <= model.limits().tolerance {
+        return residual;
+    }
+    if let Some(grip) = grip {
+        return propagate::<K>(model, state, grip, slack, report);
+    }
+    for _ in 0..MAX_SWEEPS {
+        residual = Pass::new(model, state, centre, slack).outward::<K>();
+        report.passes += 1;
+        if residual <= model.limits().tolerance {
+            break;
         }
-        let stage = match report.passes {
+    }
+    residual
+}
+
+/// Sweeps, then projects, then re-anchors, until the residual is within tolerance.
+#[inline(always)]
+fn propagate<K: Kernels>(
+    model: &ChainMail,
+    state: &mut TissueState,
+    grip: &Grip,
+    slack: f32,
+    report: &mut StepReport,
+) -> f32 {
+    let held_cell = model.lattice.cell(grip.element);
+    for pass_number in 0.. {
+        if state.active.is_empty() {
+            break;
+        }
+        let stage = match pass_number {
             n if n < MAX_SWEEPS => Solve::Sweeps,
             n if n < MAX_SWEEPS + MAX_PROJECTIONS => Solve::Projections,
             _ => Solve::Reanchored,
         };
         let mut pass = Pass::new(model, state, held_cell, slack);
         let residual = match stage {
-            Solve::Sweeps => pass.outward::<K>(),
+            Solve::Sweeps if grip.beside == 0 && !model.classes.any_fixed() => pass.outward::<K>(),
+            Solve::Sweeps => {
+                // A patch with holes in it can be reached from outside, and bone pushes back; put back, it is active again.
+                let swept = pass.outward::<K>();
+                let disturbed = held::put(model, pass.state, grip);
+                if disturbed { f32::INFINITY } else { swept }
+            }
             Solve::Projections => {
-                pass.project(report.passes.is_multiple_of(2));
-                held::put(model, pass.state, &grip);
+                pass.project(pass_number.is_multiple_of(2));
+                held::put(model, pass.state, grip);
                 pass.check_all::<K>()
             }
             _ => {
@@ -123,8 +177,11 @@ fn hold<K: Kernels>(
         };
         report.passes += 1;
         report.solve = report.solve.max(stage);
-        if residual <= tolerance || stage == Solve::Reanchored {
+        // A sweep of what little is left costs little: go on to the last that f32 can do, within their number.
+        let is_last = pass_number + 1 >= MAX_SWEEPS;
+        if stage == Solve::Reanchored || residual <= model.limits().tolerance && is_last {
             return residual;
         }
     }
+    0.0
 }

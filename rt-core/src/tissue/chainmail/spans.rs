@@ -35,9 +35,8 @@ impl Links {
         }
     }
 
-    /// Links whose upper end is in rows `first..end`.
-    pub fn below_rows(&self, first: usize, end: usize) -> &[Span] {
-        &self.spans[self.groups[first] as usize..self.groups[end] as usize]
+    pub fn bytes(&self) -> usize {
+        size_of::<Span>() * self.spans.capacity() + size_of::<u32>() * self.groups.capacity()
     }
 
     pub fn all(&self) -> &[Span] {
@@ -82,6 +81,10 @@ impl Rows {
         self.first.len().saturating_sub(1)
     }
 
+    pub fn bytes(&self) -> usize {
+        size_of::<Run>() * self.runs.capacity() + size_of::<u32>() * self.first.capacity()
+    }
+
     /// The run that an element is in.
     pub fn run_of(&self, element: u32) -> usize {
         self.runs.partition_point(|run| run.first <= element).saturating_sub(1)
@@ -108,6 +111,7 @@ pub(crate) fn links_along(axis: usize, lattice: &Lattice, rows: &Rows, class_of:
         }
     }
     links.groups.push(links.spans.len() as u32);
+    links.spans.shrink_to_fit();
     links
 }
 

@@ -119,6 +119,14 @@ impl TissueState {
         self.settled = other.settled;
     }
 
+    /// Memory that the state takes.
+    pub fn bytes(&self) -> usize {
+        let floats = self.u.iter().map(Vec::len).sum::<usize>() + self.run_square.len() + self.plane_square.len();
+        let stretches = self.late.iter().map(Vec::len).sum::<usize>();
+        let active = [&self.active, &self.next, &self.moved].map(Active::bytes);
+        size_of::<f32>() * floats + size_of::<Stretch>() * stretches + active.iter().sum::<usize>()
+    }
+
     /// Puts an element `u` elements from rest; whether it was not there. The caller looks after its links.
     pub(crate) fn put(&mut self, element: usize, u: [f32; 3]) -> bool {
         let scale = self.scale();
@@ -139,7 +147,7 @@ impl TissueState {
 
     /// Recovery by the surroundings: differences shrink in proportion, so no limit is broken.
     pub(crate) fn recover(&mut self, model: &ChainMail, kept: f64) {
-        if self.max_displacement == 0.0 || kept == 1.0 {
+        if self.max_displacement == 0.0 {
             return;
         }
         let least = f64::from(model.classes.least_room());

@@ -23,13 +23,10 @@ pub(super) struct Pass<'a> {
 
 /// Where the inner neighbours of a row are.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Inner {
+pub(super) enum Inner {
     Below,
     Above,
 }
-
-/// Violations up to so many slacks count as none: the links' stretch and shear may each be off by one.
-pub(super) const CLEAN: f32 = 2.0;
 
 impl<'a> Pass<'a> {
     pub fn new(model: &'a ChainMail, state: &'a mut TissueState, held_cell: [usize; 3], slack: f32) -> Self {
@@ -76,81 +73,6 @@ impl<'a> Pass<'a> {
         } else {
             self.finish()
         }
-    }
-
-    /// Checks every link, as after a pass that may have moved any element.
-    #[inline(always)]
-    pub fn check_all<K: Kernels>(&mut self) -> f32 {
-        let (rows, ny) = (&self.model.rows, self.model.lattice.dims[1]);
-        self.state.active.add_all(rows, ny);
-        self.state.moved.add_all(rows, ny);
-        self.state.settled = 0.0;
-        self.check::<K>()
-    }
-
-    /// Checks every link at an active stretch; only what is outside its limits stays active.
-    #[inline(always)]
-    pub fn check<K: Kernels>(&mut self) -> f32 {
-        let ny = self.model.lattice.dims[1];
-        let planes = self.state.active.planes();
-        for k in planes.start..planes.end.max(planes.start) {
-            let rows = self.state.active.rows(k as usize);
-            for j in rows.start..rows.end.max(rows.start) {
-                let row = j as usize + ny * k as usize;
-                for run in self.model.rows.numbers(row) {
-                    self.check_run::<K>(run, j as usize, k as usize);
-                }
-            }
-        }
-        self.finish()
-    }
-
-    #[inline(always)]
-    fn check_run<K: Kernels>(&mut self, run: usize, j: usize, k: usize) {
-        let active = self.state.active.of_run(run);
-        if active.is_empty() {
-            return;
-        }
-        let ny = self.model.lattice.dims[1];
-        let row = j + ny * k;
-        let mut worst = 0.0_f32;
-        // A link along x has the number of its lower end.
-        let along_x = Stretch {
-            start: active.start.saturating_sub(1),
-            end: active.end,
-        };
-        let [x, y, z] = &self.model.links;
-        for span in x.below(row).iter().filter(|s| s.lo_run as usize == run) {
-            let links = along_x.within(span.lo, span.len);
-            worst = worst.max(self.violation::<K>(0, span, links));
-        }
-        for (axis, below, above) in [
-            (1, y.below(row), y.below(row + 1)),
-            (2, z.below(row), z.below(row + ny)),
-        ] {
-            for span in below.iter().filter(|s| s.hi_run as usize == run) {
-                worst = worst.max(self.violation::<K>(axis, span, active.within(span.hi, span.len)));
-            }
-            for span in above.iter().filter(|s| s.lo_run as usize == run) {
-                worst = worst.max(self.violation::<K>(axis, span, active.within(span.lo, span.len)));
-            }
-        }
-        if worst <= CLEAN * self.slack {
-            self.state.settled = self.state.settled.max(worst / self.rest);
-        } else {
-            self.worst = self.worst.max(worst);
-            self.state.next.add(run, active);
-            self.state.next.add_row(j, k);
-        }
-    }
-
-    /// What the pass found becomes what the next one works on; says how far it is outside, in elements.
-    #[inline(always)]
-    fn finish(&mut self) -> f32 {
-        let state = &mut *self.state;
-        state.active.clear(&self.model.rows, self.model.lattice.dims[1]);
-        std::mem::swap(&mut state.active, &mut state.next);
-        self.worst / self.rest
     }
 
     #[inline(always)]
@@ -223,7 +145,7 @@ impl<'a> Pass<'a> {
             self.state.moved.add_row(j, k);
         }
         if late {
-            self.check_late::<K>(y_spans, inner_y, z_spans, inner_z, row);
+            self.check_late::<K>([(y_spans, inner_y), (z_spans, inner_z)], row);
         }
         is_active
     }
@@ -365,58 +287,6 @@ impl<'a> Pass<'a> {
             }
         }
         moved
-    }
-
-    /// Checks the links along z that moved after they were seen to, and those along y.
-    #[inline(always)]
-    fn check_late<K: Kernels>(
-        &mut self,
-        y_spans: &[Span],
-        inner_y: Option<Inner>,
-        z_spans: &[Span],
-        inner_z: Option<Inner>,
-        row: usize,
-    ) {
-        let mut worst = 0.0_f32;
-        for (axis, spans, inner) in [(2, z_spans, inner_z), (1, y_spans, inner_y)] {
-            for span in spans {
-                let (first, run) = match inner {
-                    Some(Inner::Below) => (span.hi, span.hi_run as usize),
-                    _ => (span.lo, span.lo_run as usize),
-                };
-                let moved = match axis {
-                    2 => self.state.late[0][run].with(self.state.late[1][run]),
-                    _ => self.state.late[1][run],
-                };
-                let links = moved.within(first, span.len);
-                if !links.is_empty() {
-                    worst = worst.max(self.violation::<K>(axis, span, links));
-                }
-            }
-        }
-        let clean = worst <= CLEAN * self.slack;
-        if clean {
-            self.state.settled = self.state.settled.max(worst / self.rest);
-        } else {
-            self.worst = self.worst.max(worst);
-        }
-        let ny = self.model.lattice.dims[1];
-        for run in self.model.rows.numbers(row) {
-            let [after_z, after_y] = [0, 1].map(|n| std::mem::replace(&mut self.state.late[n][run], Stretch::EMPTY));
-            if !clean {
-                self.state.next.add(run, after_z.with(after_y));
-                self.state.next.add_row(row % ny, row / ny);
-            }
-        }
-    }
-
-    /// Largest violation of some links of a span.
-    #[inline(always)]
-    pub fn violation<K: Kernels>(&self, axis: usize, span: &Span, links: Stretch) -> f32 {
-        let l = self.limits(span.class, axis);
-        let u = kernels::ordered(axis, self.state.u.each_ref().map(Vec::as_slice));
-        let (lo, hi) = ((span.lo + links.start) as usize, (span.hi + links.start) as usize);
-        K::violation(&l, &u, lo, hi, links.len() as usize)
     }
 }
 
