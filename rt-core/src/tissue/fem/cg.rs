@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
+use super::lanes::{add_scaled, dot, keep_free, scale_and_add};
 use super::model::FemModel;
 use super::real::Real;
-use super::smooth::{Product, Residual, dot_line};
+use super::smooth::Product;
 use super::state::FemState;
 use super::sweep::{Field, LineOp, sweep};
 
@@ -20,12 +21,11 @@ impl<T: Real> LineOp<T> for Answer<'_, T> {
     fn line(&mut self, at: Range<usize>, forces: [&[T]; 3], _: [&mut [T]; 3]) {
         let inverse = &self.inverse_diagonal[at.clone()];
         for (kept, force) in self.forces.iter_mut().zip(forces) {
-            kept[at.clone()].copy_from_slice(force);
-            for (&force, &inverse) in force.iter().zip(inverse) {
-                if inverse != T::ZERO {
-                    self.square += force.to_f64().powi(2);
-                }
-            }
+            // What is left on free nodes, by way of the line that the forces go to in the end.
+            let kept = &mut kept[at.clone()];
+            keep_free(inverse, force, kept);
+            self.square += dot(kept, kept);
+            kept.copy_from_slice(force);
         }
     }
 }
@@ -60,15 +60,17 @@ impl<T: Real> FemState<T> {
     fn begin(&mut self, model: &FemModel<T>, n: usize) -> f64 {
         let level = &model.levels[0];
         let stage = &mut self.multigrid.stages[0];
-        let mut op = Residual {
-            b: None,
-            r: &mut stage.b,
+        let mut op = Product {
+            q: &mut stage.b,
             inverse_diagonal: &stage.inverse_diagonal,
+            dot: 0.0,
             square: 0.0,
         };
         let (u, work) = (&mut self.responses[n].u, &mut self.multigrid.work);
         sweep(level, u, work, 0..level.grid.nodes[2], &mut op);
-        op.square.sqrt()
+        let square = op.square;
+        stage.b.iter_mut().flatten().for_each(|b| *b = -*b);
+        square.sqrt()
     }
 
     /// `r . z`, and `z . q` if there is a `q` yet.
@@ -78,9 +80,9 @@ impl<T: Real> FemState<T> {
         for at in model.levels[0].grid.node_spans() {
             for c in 0..3 {
                 let z = &stage.x[c][at.clone()];
-                rz += dot_line(&stage.b[c][at.clone()], z);
+                rz += dot(&stage.b[c][at.clone()], z);
                 if has_q {
-                    zq += dot_line(z, &self.q[c][at.clone()]);
+                    zq += dot(z, &self.q[c][at.clone()]);
                 }
             }
         }
@@ -93,9 +95,7 @@ impl<T: Real> FemState<T> {
         let z = &self.multigrid.stages[0].x;
         for at in model.levels[0].grid.node_spans() {
             for (p, z) in self.p.iter_mut().zip(z) {
-                for (p, &z) in p[at.clone()].iter_mut().zip(&z[at.clone()]) {
-                    *p = z + beta * *p;
-                }
+                scale_and_add(beta, &z[at.clone()], &mut p[at.clone()]);
             }
         }
     }
@@ -108,6 +108,7 @@ impl<T: Real> FemState<T> {
             q: &mut self.q,
             inverse_diagonal: &multigrid.stages[0].inverse_diagonal,
             dot: 0.0,
+            square: 0.0,
         };
         sweep(level, &mut self.p, &mut multigrid.work, 0..level.grid.nodes[2], &mut op);
         op.dot
@@ -122,11 +123,9 @@ impl<T: Real> FemState<T> {
             for c in 0..3 {
                 let (p, q) = (&self.p[c][at.clone()], &self.q[c][at.clone()]);
                 let (u, r) = (&mut u[c][at.clone()], &mut r[c][at.clone()]);
-                for (((u, r), &p), &q) in u.iter_mut().zip(r.iter_mut()).zip(p).zip(q) {
-                    *u += alpha * p;
-                    *r -= alpha * q;
-                }
-                square += dot_line(r, r);
+                add_scaled(alpha, p, u);
+                add_scaled(-alpha, q, r);
+                square += dot(r, r);
             }
         }
         square.sqrt()
@@ -164,10 +163,10 @@ impl<T: Real> FemState<T> {
             }
         }
         let multigrid = &mut self.multigrid;
-        let mut op = Residual {
-            b: None,
-            r: &mut self.q,
+        let mut op = Product {
+            q: &mut self.q,
             inverse_diagonal: &multigrid.stages[0].inverse_diagonal,
+            dot: 0.0,
             square: 0.0,
         };
         sweep(level, &mut self.p, &mut multigrid.work, planes, &mut op);

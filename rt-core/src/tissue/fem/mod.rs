@@ -4,6 +4,7 @@ mod cg;
 mod coarsest;
 mod grid;
 mod hexahedron;
+mod lanes;
 mod level;
 mod material;
 mod model;

@@ -1,6 +1,7 @@
 //! One V-cycle: an approximate inverse, symmetric and positive, that conjugate gradients are preconditioned with.
 
 use super::coarsest::Coarsest;
+use super::lanes::LANES;
 use super::level::Level;
 use super::real::Real;
 use super::smooth::{Residual, smooth};
@@ -41,11 +42,10 @@ impl<T: Real> Multigrid<T> {
             d: zeros(level.grid.len()),
             r: zeros(level.grid.len()),
         };
-        let [nx, ny, _] = levels[0].grid.nodes;
         Multigrid {
             stages: levels.iter().map(stage).collect(),
-            work: Planes::new(nx * ny),
-            line: vec![T::of(1.0); nx + 3],
+            work: Planes::new(levels[0].grid.stride * levels[0].grid.nodes[1]),
+            line: vec![T::of(1.0); 2 * levels[0].grid.stride + 2 * LANES],
             coarsest: Coarsest::new(&levels[levels.len() - 1]),
         }
     }
@@ -84,7 +84,7 @@ impl<T: Real> Multigrid<T> {
                 ..
             } = &mut fine[n];
             let mut op = Residual {
-                b: Some(b),
+                b,
                 r,
                 inverse_diagonal,
                 square: 0.0,
