@@ -7,9 +7,9 @@ use super::lanes::LANES;
 pub(super) struct Grid {
     /// Nodes along x, y, z: odd, so that every second one is a node of the next coarser grid.
     pub nodes: [usize; 3],
-    /// From one line of nodes to the next; those past `nodes[0]` touch no element.
+    /// From one line of nodes to the next; those past `nodes[0]` touch no element. Room for whole lanes from any node.
     pub stride: usize,
-    /// First and one past the last cell in use of each row of cells, by row number `j + nodes[1] * k`.
+    /// First and one past the last cell of the stretch in use of each row of cells, by row number `j + nodes[1] * k`.
     pub cell_rows: Vec<[u32; 2]>,
     /// The same for rows of nodes.
     pub node_rows: Vec<[u32; 2]>,
@@ -22,13 +22,12 @@ impl Grid {
         let rows = nodes[1] * nodes[2];
         let mut grid = Grid {
             nodes,
-            stride: nodes[0].next_multiple_of(LANES),
+            stride: (nodes[0] + LANES).next_multiple_of(LANES),
             cell_rows: vec![[u32::MAX, 0]; rows],
             node_rows: vec![[u32::MAX, 0]; rows],
         };
         for [i, j, k] in used {
             let widen = |row: &mut [u32; 2], first: usize, end: usize| {
-                let (first, end) = (first / LANES * LANES, end.next_multiple_of(LANES));
                 *row = [row[0].min(first as u32), row[1].max(end as u32)];
             };
             widen(&mut grid.cell_rows[j + nodes[1] * k], i, i + 1);
@@ -38,9 +37,13 @@ impl Grid {
             }
         }
         for row in grid.cell_rows.iter_mut().chain(&mut grid.node_rows) {
-            if row[0] > row[1] {
-                *row = [0, 0];
-            }
+            // From an even node, for the sake of interpolation, and in whole lanes.
+            let first = row[0] / 2 * 2;
+            *row = if row[0] > row[1] {
+                [0, 0]
+            } else {
+                [first, first + (row[1] - first).next_multiple_of(LANES as u32)]
+            };
         }
         grid
     }

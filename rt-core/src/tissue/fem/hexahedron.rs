@@ -5,7 +5,7 @@
 //! three, by symmetry, for any isotropic material, and both integrations differ in one coefficient only. That is a third of
 //! the arithmetic of the 24 x 24 matrix, and there is no matrix to load. Derived in `docs/physics.md`.
 
-use super::lanes::LANES;
+use super::lanes::{LANES, each, lanes, lanes_mut};
 use super::material::{Integration, Material};
 use super::real::Real;
 
@@ -92,16 +92,16 @@ fn modes<T: Real>(lines: &[&[T]; 4], e: usize) -> Modes<T> {
     }
 }
 
-/// Forces of `lanes` times `LANES` elements in a row, at most `CHUNK`, from the displacements of the four lines of nodes
+/// Forces of `count` times `LANES` elements in a row, at most `CHUNK`, from the displacements of the four lines of nodes
 /// around them. The scratch has them from `LANES` on; what is before stays zero.
 #[inline(always)]
 pub(super) fn forces<'a, T: Real>(
     [ul, vl, wl]: [[&'a [T]; 4]; 3],
     [mean, varying, shear]: [&[T]; 3],
-    lanes: usize,
+    count: usize,
     scratch: &mut Scratch<T>,
 ) {
-    let n = lanes.min(CHUNK / LANES) * LANES;
+    let n = count.min(CHUNK / LANES) * LANES;
     let (mean, varying, shear) = (&mean[..n], &varying[..n], &shear[..n]);
     let cut = |[a, b, c, d]: [&'a [T]; 4]| [&a[..n + 1], &b[..n + 1], &c[..n + 1], &d[..n + 1]];
     let (ul, vl, wl) = (cut(ul), cut(vl), cut(wl));
@@ -152,12 +152,17 @@ pub(super) fn forces<'a, T: Real>(
 
 /// Adds the forces of a row of elements on the line of their nearer nodes, and of the last on one node more.
 #[inline(always)]
-pub(super) fn add_line<T: Real>(even: &[T; CHUNK + LANES], odd: &[T; CHUNK + LANES], lanes: usize, out: &mut [T]) {
-    let n = lanes.min(CHUNK / LANES) * LANES;
-    let out = &mut out[..n + 1];
-    for e in 0..n {
-        let (here, before) = (e + LANES, e + LANES - 1);
-        out[e] += (even[here] - odd[here]) + (even[before] + odd[before]);
+pub(super) fn add_line<T: Real>(even: &[T; CHUNK + LANES], odd: &[T; CHUNK + LANES], count: usize, out: &mut [T]) {
+    let n = count.min(CHUNK / LANES) * LANES;
+    let mut at = 0;
+    while at < n {
+        let here = |line: &[T; CHUNK + LANES]| lanes(&line[LANES + at..2 * LANES + at])[0];
+        let before = |line: &[T; CHUNK + LANES]| lanes(&line[LANES - 1 + at..2 * LANES - 1 + at])[0];
+        let (near_even, near_odd, far_even, far_odd) = (here(even), here(odd), before(even), before(odd));
+        let out = &mut lanes_mut(&mut out[at..at + LANES])[0];
+        let out0 = *out;
+        *out = each(|n| out0[n] + ((near_even[n] - near_odd[n]) + (far_even[n] + far_odd[n])));
+        at += LANES;
     }
     out[n] += even[n + LANES - 1] + odd[n + LANES - 1];
 }

@@ -4,8 +4,8 @@
 
 use super::real::Real;
 
-/// Lines of nodes start, and stretches begin and end, at multiples of this, so that loops over them have no remainder.
-pub(super) const LANES: usize = 8;
+/// Stretches of lines are multiples of this long, so that loops over them have no remainder.
+pub(super) const LANES: usize = 16;
 
 pub(super) type Lane<T> = [T; LANES];
 
@@ -19,8 +19,9 @@ pub(super) fn lanes_mut<T>(line: &mut [T]) -> &mut [Lane<T>] {
     line.as_chunks_mut().0
 }
 
+/// A lane from its entries.
 #[inline(always)]
-fn each<T: Real>(f: impl Fn(usize) -> T) -> Lane<T> {
+pub(super) fn each<T: Real>(f: impl Fn(usize) -> T) -> Lane<T> {
     let mut lane = [T::ZERO; LANES];
     for (n, value) in lane.iter_mut().enumerate() {
         *value = f(n);
