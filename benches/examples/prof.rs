@@ -14,7 +14,8 @@ fn main() {
     let element = l.element_of_cell(53, 31, 80).unwrap();
     let mut p = l.rest_m(element);
     p[2] += 2e-3;
-    let mut all = vec![]; let mut res = 0.0;
+    let mut all = vec![];
+    let mut res = 0.0;
     for _ in 0..std::env::args().nth(4).and_then(|a| a.parse().ok()).unwrap_or(60) {
         let mut state = FemState::at_rest(&model);
         let t = std::time::Instant::now();
@@ -32,8 +33,13 @@ fn main() {
             },
         );
         let us = t.elapsed().as_secs_f64() * 1e6 / r.cycles as f64;
-        all.push(us); res = r.relative_residual;
+        all.push(us);
+        res = r.relative_residual;
     }
     all.sort_by(f64::total_cmp);
-    println!("min {:.0} p50 {:.0} us/cycle residual {res:e}", all[0], all[all.len() / 2]);
+    println!(
+        "min {:.0} p50 {:.0} us/cycle residual {res:e}",
+        all[0],
+        all[all.len() / 2]
+    );
 }

@@ -4,7 +4,8 @@ use super::grid::Grid;
 use super::hexahedron::Stiffness;
 use super::lanes::LANES;
 use super::real::Real;
-use super::sweep::{Field, LineOp, Planes, Simd, sweep, zeros};
+use super::simd::Simd;
+use super::sweep::{Field, LineOp, Planes, sweep, zeros};
 
 #[derive(Clone, Debug)]
 pub(super) struct Level<T> {

@@ -11,6 +11,7 @@ mod model;
 mod multigrid;
 mod output;
 mod real;
+mod simd;
 mod smooth;
 mod solve;
 mod state;

@@ -10,9 +10,6 @@ use super::transfer::{prolong, restrict};
 
 /// Chebyshev steps before and after the correction from the next level.
 const STEPS: u32 = 2;
-/// The same on coarser levels, where they cost little.
-const COARSE_STEPS: u32 = 3;
-
 /// What one level of a cycle works in.
 #[derive(Clone, Debug)]
 pub(super) struct Stage<T> {
@@ -91,7 +88,8 @@ impl<T: Real> Multigrid<T> {
             };
             let level = &levels[n];
             sweep(level, x, &mut self.work, 0..level.grid.nodes[2], &mut op);
-            restrict(&level.grid, &levels[n + 1].grid, r, &mut self.line, &mut coarse[0].b);
+            let (to, line) = (&levels[n + 1].grid, &mut self.line);
+            level.simd.run(|| restrict(&level.grid, to, r, line, &mut coarse[0].b));
         }
         let stage = &mut self.stages[last];
         self.coarsest.solve(&stage.b, &mut stage.x);
@@ -119,13 +117,12 @@ impl<T: Real> Multigrid<T> {
             d,
             ..
         } = &mut self.stages[n];
-        let steps = if n == 0 { STEPS } else { COARSE_STEPS };
         smooth(
             &levels[n],
             inverse_diagonal,
             [x, b, d],
             &mut self.work,
-            steps,
+            STEPS,
             from_zero,
         );
     }

@@ -47,7 +47,9 @@ pub(super) fn smooth<T: Real>(
     let (mut keep, mut gain) = (0.0, 1.0 / middle);
     for n in 0..steps {
         if n == 0 && from_zero {
-            first_step(level, inverse_diagonal, x, b, d, T::of(gain));
+            level
+                .simd
+                .run(|| first_step(level, inverse_diagonal, x, b, d, T::of(gain)));
         } else {
             let mut op = Step {
                 b,
@@ -65,6 +67,7 @@ pub(super) fn smooth<T: Real>(
 }
 
 /// The first step from `x = 0`, which needs no sweep.
+#[inline(always)]
 fn first_step<T: Real>(
     level: &Level<T>,
     inverse_diagonal: &[T],

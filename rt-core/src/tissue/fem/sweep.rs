@@ -49,30 +49,6 @@ pub(super) fn touched<V: Copy>(count: usize, value: V) -> Vec<V> {
     (0..count).map(|_| std::hint::black_box(value)).collect()
 }
 
-/// Vector instructions of the processor. The results are the same: nothing is reordered or fused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Simd {
-    Portable,
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
-}
-
-impl Simd {
-    pub fn detect() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx512f") {
-            return Simd::Avx512;
-        }
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            return Simd::Avx2;
-        }
-        Simd::Portable
-    }
-}
-
 /// Sweeps the planes of nodes `planes` and calls `op` with each line of nodes in use.
 pub(super) fn sweep<T: Real, O: LineOp<T>>(
     level: &Level<T>,
@@ -81,39 +57,7 @@ pub(super) fn sweep<T: Real, O: LineOp<T>>(
     planes: Range<usize>,
     op: &mut O,
 ) {
-    match level.simd {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: `detect` has found AVX2.
-        Simd::Avx2 => unsafe { sweep_avx2(level, x, work, planes, op) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: `detect` has found AVX-512F.
-        Simd::Avx512 => unsafe { sweep_avx512(level, x, work, planes, op) },
-        Simd::Portable => sweep_lines(level, x, work, planes, op),
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-fn sweep_avx512<T: Real, O: LineOp<T>>(
-    level: &Level<T>,
-    x: &mut Field<T>,
-    work: &mut Planes<T>,
-    planes: Range<usize>,
-    op: &mut O,
-) {
-    sweep_lines(level, x, work, planes, op);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn sweep_avx2<T: Real, O: LineOp<T>>(
-    level: &Level<T>,
-    x: &mut Field<T>,
-    work: &mut Planes<T>,
-    planes: Range<usize>,
-    op: &mut O,
-) {
-    sweep_lines(level, x, work, planes, op);
+    level.simd.run(|| sweep_lines(level, x, work, planes, op));
 }
 
 #[inline(always)]

@@ -11,6 +11,7 @@ fn parents(fine: usize) -> ([usize; 2], usize) {
 }
 
 /// `coarse = transpose(interpolation) fine`. `line` has room for a line of fine nodes and two more.
+#[inline(always)]
 pub(super) fn restrict<T: Real>(fine: &Grid, coarse: &Grid, values: &Field<T>, line: &mut [T], into: &mut Field<T>) {
     for k in 0..coarse.nodes[2] {
         for j in 0..coarse.nodes[1] {
@@ -57,6 +58,7 @@ fn gather<T: Real>(fine: &Grid, values: &[T], [j, k]: [usize; 2], start: usize, 
 }
 
 /// `fine += interpolation coarse` at free nodes. `line` has room for a line of coarse nodes and one more.
+#[inline(always)]
 pub(super) fn prolong<T: Real>(
     coarse: &Grid,
     fine: &Grid,
