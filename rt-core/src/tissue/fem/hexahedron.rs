@@ -3,7 +3,7 @@
 //! The eight corner values of a component are turned into the coefficients of 1, x, y, z, xy, yz, zx, xyz (up
 //! to a factor: a Walsh-Hadamard transform, 24 additions). In these a cube's stiffness falls into blocks of at most
 //! three, by symmetry, for any isotropic material, and both integrations differ in one coefficient only. That is a third of
-//! the arithmetic of the 24 x 24 matrix, and there is no matrix to load. Derived in `docs/physics.md`.
+//! the arithmetic of the 24 x 24 matrix, and there is no matrix to load.
 
 use super::lanes::{LANES, each, lanes, lanes_mut};
 use super::material::{Integration, Material};

@@ -2,9 +2,7 @@
 
 use super::*;
 
-/// A cantilever of 8 x 2 x 1 elements across, clamped at x = 0, its end moved down: force relative to a beam's.
-///
-/// The beam: F = 3 E I w / L^3 with shear by Timoshenko, plane stress as it is free on all sides.
+/// A cantilever of 16 x 4 x 2 mm, clamped at x = 0: the force that moves its last millimetre sideways by 0.1 mm.
 fn cantilever(poisson_ratio: f64, integration: Integration, refined: usize) -> f64 {
     let (length, height, depth) = (16 * refined, 4 * refined, 2 * refined);
     let h = 1e-3 / refined as f64;

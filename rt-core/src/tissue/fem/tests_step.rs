@@ -48,8 +48,13 @@ fn step_finds_what_a_dense_solver_finds() {
     let model = FemModel::<f64>::new(&lattice, &two_materials(&lattice, 20.0, 1e6)).expect("valid");
     let element = lattice.element_count() as u32 / 2;
     let by_m = [0.4e-3, -0.2e-3, 0.7e-3];
+    // The body hangs together by edges and corners in places, so forces must be small for places to be right.
+    let settings = SolveSettings {
+        relative_tolerance: 1e-13,
+        ..EXACT
+    };
     let mut state = FemState::at_rest(&model);
-    let report = step(&model, &mut state, Some(patch(&lattice, element, by_m, 0.0)), &EXACT);
+    let report = step(&model, &mut state, Some(patch(&lattice, element, by_m, 0.0)), &settings);
     assert!(report.converged, "{report:?}");
 
     let (nodes, matrix) = dense(&model);
@@ -101,7 +106,7 @@ fn hard_bodies_converge() {
     ];
     let settings = SolveSettings {
         relative_tolerance: 1e-4,
-        max_cycles: 60,
+        max_cycles: 400,
     };
     for (name, labels) in bodies {
         let lattice = lattice_of(&labels);
@@ -131,7 +136,7 @@ fn loose_part_stays_at_rest() {
     let model = FemModel::<f32>::new(&lattice, &elastic).expect("valid");
     let mut state = FemState::at_rest(&model);
     let settings = SolveSettings {
-        relative_tolerance: 1e-4,
+        relative_tolerance: 1e-6,
         max_cycles: 40,
     };
     for held_part in [0, 1] {
@@ -218,7 +223,7 @@ fn same_patch_is_answered_by_superposition() {
     assert!(report.converged && report.tip_force_n == [0.0; 3] && report.max_displacement == 0.0);
 }
 
-/// The live setting: at most 3 cycles a tick. RMS over the body, relative to how far the patch is from rest.
+/// The live setting: at most 4 cycles a tick. RMS over the body, relative to how far the patch is from rest.
 #[test]
 fn warm_started_insertion_stays_within_one_percent() {
     let scene = Scene::builtin("paper").expect("built in");
@@ -229,7 +234,7 @@ fn warm_started_insertion_stays_within_one_percent() {
     let (mut state, mut solved) = (FemState::at_rest(&live), FemState::at_rest(&exact));
     let settings = SolveSettings {
         relative_tolerance: 1e-3,
-        max_cycles: 3,
+        max_cycles: 4,
     };
     let (mut by_m, mut worst) = (0.0, 0.0_f64);
     for tick in 1..=120 {
@@ -240,12 +245,15 @@ fn warm_started_insertion_stays_within_one_percent() {
         let element = lattice.element_of_cell(53, 31, k).expect("in the gland");
         let held = patch(lattice, element, [0.0, 0.1 * by_m, by_m], 4e-3);
         let report = step(&live, &mut state, Some(held), &settings);
-        assert!(report.cycles <= 3 && report.held == HeldOutcome::Followed);
+        assert!(report.cycles <= 4 && report.held == HeldOutcome::Followed);
         assert!(step(&exact, &mut solved, Some(held), &EXACT).converged);
         let squares = (0..3).flat_map(|a| state.displacement(a).iter().zip(solved.displacement(a)));
         let sum: f64 = squares.map(|(a, b)| f64::from(a - b).powi(2)).sum();
         let rms_m = (sum / lattice.element_count() as f64).sqrt() * lattice.spacing_m;
-        worst = worst.max(rms_m / by_m);
+        if rms_m / by_m > worst {
+            worst = rms_m / by_m;
+            println!("tick {tick}: {:.3} %", 100.0 * worst);
+        }
     }
     println!("worst tick: {:.3} % of travel", 100.0 * worst);
     assert!(worst < 0.01, "{worst}");
