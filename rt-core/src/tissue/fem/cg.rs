@@ -2,9 +2,11 @@
 
 use std::ops::Range;
 
+use super::grid::Grid;
+use super::lanes::{add_scaled, dot, keep_free, scale_and_add};
 use super::model::FemModel;
 use super::real::Real;
-use super::smooth::{Product, Residual, dot_line};
+use super::smooth::Product;
 use super::state::FemState;
 use super::sweep::{Field, LineOp, sweep};
 
@@ -20,14 +22,48 @@ impl<T: Real> LineOp<T> for Answer<'_, T> {
     fn line(&mut self, at: Range<usize>, forces: [&[T]; 3], _: [&mut [T]; 3]) {
         let inverse = &self.inverse_diagonal[at.clone()];
         for (kept, force) in self.forces.iter_mut().zip(forces) {
-            kept[at.clone()].copy_from_slice(force);
-            for (&force, &inverse) in force.iter().zip(inverse) {
-                if inverse != T::ZERO {
-                    self.square += force.to_f64().powi(2);
-                }
-            }
+            // What is left on free nodes, by way of the line that the forces go to in the end.
+            let kept = &mut kept[at.clone()];
+            keep_free(inverse, force, kept);
+            self.square += dot(kept, kept);
+            kept.copy_from_slice(force);
         }
     }
+}
+
+#[inline(always)]
+fn dot_fields<T: Real>(grid: &Grid, a: &Field<T>, b: &Field<T>) -> f64 {
+    let mut sum = 0.0;
+    for at in grid.node_spans() {
+        for (a, b) in a.iter().zip(b) {
+            sum += dot(&a[at.clone()], &b[at.clone()]);
+        }
+    }
+    sum
+}
+
+#[inline(always)]
+fn scale_and_add_fields<T: Real>(grid: &Grid, a: T, x: &Field<T>, y: &mut Field<T>) {
+    for at in grid.node_spans() {
+        for (x, y) in x.iter().zip(y.iter_mut()) {
+            scale_and_add(a, &x[at.clone()], &mut y[at.clone()]);
+        }
+    }
+}
+
+/// `u += alpha p`, `r -= alpha q`; returns `r . r`.
+#[inline(always)]
+fn advance_fields<T: Real>(grid: &Grid, alpha: T, [p, q]: [&Field<T>; 2], [u, r]: [&mut Field<T>; 2]) -> f64 {
+    let mut square = 0.0;
+    for at in grid.node_spans() {
+        for c in 0..3 {
+            let r = &mut r[c][at.clone()];
+            add_scaled(alpha, &p[c][at.clone()], &mut u[c][at.clone()]);
+            add_scaled(-alpha, &q[c][at.clone()], r);
+            square += dot(r, r);
+        }
+    }
+    square
 }
 
 impl<T: Real> FemState<T> {
@@ -60,44 +96,37 @@ impl<T: Real> FemState<T> {
     fn begin(&mut self, model: &FemModel<T>, n: usize) -> f64 {
         let level = &model.levels[0];
         let stage = &mut self.multigrid.stages[0];
-        let mut op = Residual {
-            b: None,
-            r: &mut stage.b,
+        let mut op = Product {
+            q: &mut stage.b,
             inverse_diagonal: &stage.inverse_diagonal,
+            dot: 0.0,
             square: 0.0,
         };
         let (u, work) = (&mut self.responses[n].u, &mut self.multigrid.work);
         sweep(level, u, work, 0..level.grid.nodes[2], &mut op);
-        op.square.sqrt()
+        let square = op.square;
+        stage.b.iter_mut().flatten().for_each(|b| *b = -*b);
+        square.sqrt()
     }
 
     /// `r . z`, and `z . q` if there is a `q` yet.
     fn products(&self, model: &FemModel<T>, has_q: bool) -> (f64, f64) {
+        let level = &model.levels[0];
         let stage = &self.multigrid.stages[0];
-        let (mut rz, mut zq) = (0.0, 0.0);
-        for at in model.levels[0].grid.node_spans() {
-            for c in 0..3 {
-                let z = &stage.x[c][at.clone()];
-                rz += dot_line(&stage.b[c][at.clone()], z);
-                if has_q {
-                    zq += dot_line(z, &self.q[c][at.clone()]);
-                }
-            }
-        }
+        let rz = level.simd.run(|| dot_fields(&level.grid, &stage.b, &stage.x));
+        let zq = if has_q {
+            level.simd.run(|| dot_fields(&level.grid, &stage.x, &self.q))
+        } else {
+            0.0
+        };
         (rz, zq)
     }
 
     /// `p = z + beta p`.
     fn turn(&mut self, model: &FemModel<T>, beta: f64) {
-        let beta = T::of(beta);
-        let z = &self.multigrid.stages[0].x;
-        for at in model.levels[0].grid.node_spans() {
-            for (p, z) in self.p.iter_mut().zip(z) {
-                for (p, &z) in p[at.clone()].iter_mut().zip(&z[at.clone()]) {
-                    *p = z + beta * *p;
-                }
-            }
-        }
+        let level = &model.levels[0];
+        let (z, p) = (&self.multigrid.stages[0].x, &mut self.p);
+        level.simd.run(|| scale_and_add_fields(&level.grid, T::of(beta), z, p));
     }
 
     /// `q = A p`; returns `p . q`.
@@ -108,6 +137,7 @@ impl<T: Real> FemState<T> {
             q: &mut self.q,
             inverse_diagonal: &multigrid.stages[0].inverse_diagonal,
             dot: 0.0,
+            square: 0.0,
         };
         sweep(level, &mut self.p, &mut multigrid.work, 0..level.grid.nodes[2], &mut op);
         op.dot
@@ -115,21 +145,12 @@ impl<T: Real> FemState<T> {
 
     /// `u += alpha p`, `r -= alpha q`; returns the norm of `r`.
     fn advance(&mut self, model: &FemModel<T>, n: usize, alpha: f64) -> f64 {
-        let alpha = T::of(alpha);
-        let mut square = 0.0;
+        let level = &model.levels[0];
         let (u, r) = (&mut self.responses[n].u, &mut self.multigrid.stages[0].b);
-        for at in model.levels[0].grid.node_spans() {
-            for c in 0..3 {
-                let (p, q) = (&self.p[c][at.clone()], &self.q[c][at.clone()]);
-                let (u, r) = (&mut u[c][at.clone()], &mut r[c][at.clone()]);
-                for (((u, r), &p), &q) in u.iter_mut().zip(r.iter_mut()).zip(p).zip(q) {
-                    *u += alpha * p;
-                    *r -= alpha * q;
-                }
-                square += dot_line(r, r);
-            }
-        }
-        square.sqrt()
+        let (p, q) = (&self.p, &self.q);
+        level
+            .simd
+            .run(|| advance_fields(&level.grid, T::of(alpha), [p, q], [u, r]).sqrt())
     }
 
     /// The residual as it is, not as the recurrence has it, and the force that moves the patch.
@@ -164,10 +185,10 @@ impl<T: Real> FemState<T> {
             }
         }
         let multigrid = &mut self.multigrid;
-        let mut op = Residual {
-            b: None,
-            r: &mut self.q,
+        let mut op = Product {
+            q: &mut self.q,
             inverse_diagonal: &multigrid.stages[0].inverse_diagonal,
+            dot: 0.0,
             square: 0.0,
         };
         sweep(level, &mut self.p, &mut multigrid.work, planes, &mut op);

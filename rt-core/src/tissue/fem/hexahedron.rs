@@ -3,8 +3,9 @@
 //! The eight corner values of a component are turned into the coefficients of 1, x, y, z, xy, yz, zx, xyz (up
 //! to a factor: a Walsh-Hadamard transform, 24 additions). In these a cube's stiffness falls into blocks of at most
 //! three, by symmetry, for any isotropic material, and both integrations differ in one coefficient only. That is a third of
-//! the arithmetic of the 24 x 24 matrix, and there is no matrix to load. Derived in `docs/physics.md`.
+//! the arithmetic of the 24 x 24 matrix, and there is no matrix to load.
 
+use super::lanes::{LANES, each, lanes, lanes_mut};
 use super::material::{Integration, Material};
 use super::real::Real;
 
@@ -12,7 +13,7 @@ use super::real::Real;
 pub(super) const CHUNK: usize = 64;
 
 /// Twelve lines that carry the part even in x of the forces, twelve the odd part; by component, then corner of the row.
-pub(super) type Scratch<T> = [[T; CHUNK]; 24];
+pub(super) type Scratch<T> = [[T; CHUNK + LANES]; 24];
 
 /// Stiffness of one cell, N/m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -91,16 +92,19 @@ fn modes<T: Real>(lines: &[&[T]; 4], e: usize) -> Modes<T> {
     }
 }
 
-/// Forces of `mean.len()` elements in a row, at most `CHUNK`, from the displacements of the four lines of nodes around them.
+/// Forces of `count` times `LANES` elements in a row, at most `CHUNK`, from the displacements of the four lines of nodes
+/// around them. The scratch has them from `LANES` on; what is before stays zero.
 #[inline(always)]
-pub(super) fn forces<T: Real>(
-    [ul, vl, wl]: [[&[T]; 4]; 3],
+pub(super) fn forces<'a, T: Real>(
+    [ul, vl, wl]: [[&'a [T]; 4]; 3],
     [mean, varying, shear]: [&[T]; 3],
+    count: usize,
     scratch: &mut Scratch<T>,
 ) {
-    let n = mean.len().min(CHUNK);
-    let (varying, shear) = (&varying[..n], &shear[..n]);
-    let [ul, vl, wl] = [ul, vl, wl].map(|lines| lines.map(|line| &line[..n + 1]));
+    let n = count.min(CHUNK / LANES) * LANES;
+    let (mean, varying, shear) = (&mean[..n], &varying[..n], &shear[..n]);
+    let cut = |[a, b, c, d]: [&'a [T]; 4]| [&a[..n + 1], &b[..n + 1], &c[..n + 1], &d[..n + 1]];
+    let (ul, vl, wl) = (cut(ul), cut(vl), cut(wl));
     let (two, third) = (T::of(2.0), T::of(1.0 / 3.0));
     for e in 0..n {
         let (u, v, w) = (modes(&ul, e), modes(&vl, e), modes(&wl, e));
@@ -139,24 +143,26 @@ pub(super) fn forces<T: Real>(
         for (component, f) in [fu, fv, fw].into_iter().enumerate() {
             let (even, odd) = (corners(f.even), corners(f.odd));
             for corner in 0..4 {
-                scratch[4 * component + corner][e] = even[corner];
-                scratch[12 + 4 * component + corner][e] = odd[corner];
+                scratch[4 * component + corner][LANES + e] = even[corner];
+                scratch[12 + 4 * component + corner][LANES + e] = odd[corner];
             }
         }
     }
 }
 
-/// Adds the forces of `n` elements on one line of `n + 1` nodes.
+/// Adds the forces of a row of elements on the line of their nearer nodes, and of the last on one node more.
 #[inline(always)]
-pub(super) fn add_line<T: Real>(even: &[T; CHUNK], odd: &[T; CHUNK], out: &mut [T]) {
-    let Some(n) = out.len().checked_sub(1).filter(|&n| 0 < n && n <= CHUNK) else {
-        return;
-    };
-    let (even, odd) = (&even[..n], &odd[..n]);
-    out[0] += even[0] - odd[0];
-    out[n] += even[n - 1] + odd[n - 1];
-    let inner = &mut out[1..n];
-    for e in 0..n - 1 {
-        inner[e] += (even[e] + odd[e]) + (even[e + 1] - odd[e + 1]);
+pub(super) fn add_line<T: Real>(even: &[T; CHUNK + LANES], odd: &[T; CHUNK + LANES], count: usize, out: &mut [T]) {
+    let n = count.min(CHUNK / LANES) * LANES;
+    let mut at = 0;
+    while at < n {
+        let here = |line: &[T; CHUNK + LANES]| lanes(&line[LANES + at..2 * LANES + at])[0];
+        let before = |line: &[T; CHUNK + LANES]| lanes(&line[LANES - 1 + at..2 * LANES - 1 + at])[0];
+        let (near_even, near_odd, far_even, far_odd) = (here(even), here(odd), before(even), before(odd));
+        let out = &mut lanes_mut(&mut out[at..at + LANES])[0];
+        let out0 = *out;
+        *out = each(|n| out0[n] + ((near_even[n] - near_odd[n]) + (far_even[n] + far_odd[n])));
+        at += LANES;
     }
+    out[n] += even[n + LANES - 1] + odd[n + LANES - 1];
 }

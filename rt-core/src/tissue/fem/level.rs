@@ -2,8 +2,10 @@
 
 use super::grid::Grid;
 use super::hexahedron::Stiffness;
+use super::lanes::LANES;
 use super::real::Real;
-use super::sweep::{Field, LineOp, Planes, Simd, sweep, zeros};
+use super::simd::Simd;
+use super::sweep::{Field, LineOp, Planes, sweep, zeros};
 
 #[derive(Clone, Debug)]
 pub(super) struct Level<T> {
@@ -29,7 +31,9 @@ pub(super) struct Cells {
 
 impl<T: Real> Level<T> {
     pub fn new(cells: &Cells, work: &mut Planes<T>) -> Self {
-        let part = |f: fn(&Stiffness) -> f64| cells.stiffness.iter().map(|s| T::of(f(s))).collect();
+        // Rows are done in whole lanes, the last one past the end.
+        let past = [Stiffness::default(); LANES];
+        let part = |f: fn(&Stiffness) -> f64| cells.stiffness.iter().chain(&past).map(|s| T::of(f(s))).collect();
         let mut level = Level {
             stiffness: [part(|s| s.mean), part(|s| s.varying), part(|s| s.shear)],
             springs: cells.springs_n_per_m.iter().map(|&s| T::of(s)).collect(),
@@ -60,7 +64,7 @@ fn inverse_diagonal<T: Real>(cells: &Cells) -> Vec<T> {
 
 /// The eight nodes of a cell.
 pub(super) fn corners(grid: &Grid, cell: usize) -> [usize; 8] {
-    let [nx, ny, _] = grid.nodes;
+    let (nx, ny) = (grid.stride, grid.nodes[1]);
     std::array::from_fn(|c| cell + (c & 1) + nx * (c >> 1 & 1) + nx * ny * (c >> 2))
 }
 
@@ -103,11 +107,8 @@ fn largest_eigenvalue<T: Real>(level: &Level<T>, work: &mut Planes<T>) -> f64 {
                 -1.0
             };
             let size = sign * (0.5 + mixed as f64 / (1_u64 << 24) as f64);
-            *value = T::of(if level.inverse_diagonal[node] == T::ZERO {
-                0.0
-            } else {
-                size
-            });
+            let free = level.inverse_diagonal.get(node).is_some_and(|&d| d != T::ZERO);
+            *value = T::of(if free { size } else { 0.0 });
         }
     }
     let mut eigenvalue = 1.0;

@@ -144,7 +144,7 @@ impl Body {
                 .for_each(|node| self.cells.fixed[node] = true),
         }
         match self.runs.last_mut() {
-            Some(run) if run.cell + run.len == cell && cell % self.cells.grid.nodes[0] != 0 => run.len += 1,
+            Some(run) if run.cell + run.len == cell && cell % self.cells.grid.stride != 0 => run.len += 1,
             _ => self.runs.push(CellRun {
                 first: element as usize,
                 len: 1,
@@ -181,8 +181,7 @@ impl Body {
 }
 
 fn levels<T: Real>(cells: &Cells) -> Vec<Level<T>> {
-    let [nx, ny, _] = cells.grid.nodes;
-    let mut work = Planes::new(nx * ny);
+    let mut work = Planes::new(cells.grid.stride * cells.grid.nodes[1]);
     let mut levels: Vec<Level<T>> = vec![Level::new(cells, &mut work)];
     let mut last = coarser(cells);
     loop {

@@ -1,6 +1,7 @@
 //! One V-cycle: an approximate inverse, symmetric and positive, that conjugate gradients are preconditioned with.
 
 use super::coarsest::Coarsest;
+use super::lanes::LANES;
 use super::level::Level;
 use super::real::Real;
 use super::smooth::{Residual, smooth};
@@ -9,9 +10,6 @@ use super::transfer::{prolong, restrict};
 
 /// Chebyshev steps before and after the correction from the next level.
 const STEPS: u32 = 2;
-/// The same on coarser levels, where they cost little.
-const COARSE_STEPS: u32 = 3;
-
 /// What one level of a cycle works in.
 #[derive(Clone, Debug)]
 pub(super) struct Stage<T> {
@@ -41,11 +39,10 @@ impl<T: Real> Multigrid<T> {
             d: zeros(level.grid.len()),
             r: zeros(level.grid.len()),
         };
-        let [nx, ny, _] = levels[0].grid.nodes;
         Multigrid {
             stages: levels.iter().map(stage).collect(),
-            work: Planes::new(nx * ny),
-            line: vec![T::of(1.0); nx + 3],
+            work: Planes::new(levels[0].grid.stride * levels[0].grid.nodes[1]),
+            line: vec![T::of(1.0); 2 * levels[0].grid.stride + 2 * LANES],
             coarsest: Coarsest::new(&levels[levels.len() - 1]),
         }
     }
@@ -84,14 +81,15 @@ impl<T: Real> Multigrid<T> {
                 ..
             } = &mut fine[n];
             let mut op = Residual {
-                b: Some(b),
+                b,
                 r,
                 inverse_diagonal,
                 square: 0.0,
             };
             let level = &levels[n];
             sweep(level, x, &mut self.work, 0..level.grid.nodes[2], &mut op);
-            restrict(&level.grid, &levels[n + 1].grid, r, &mut self.line, &mut coarse[0].b);
+            let (to, line) = (&levels[n + 1].grid, &mut self.line);
+            level.simd.run(|| restrict(&level.grid, to, r, line, &mut coarse[0].b));
         }
         let stage = &mut self.stages[last];
         self.coarsest.solve(&stage.b, &mut stage.x);
@@ -119,13 +117,12 @@ impl<T: Real> Multigrid<T> {
             d,
             ..
         } = &mut self.stages[n];
-        let steps = if n == 0 { STEPS } else { COARSE_STEPS };
         smooth(
             &levels[n],
             inverse_diagonal,
             [x, b, d],
             &mut self.work,
-            steps,
+            STEPS,
             from_zero,
         );
     }

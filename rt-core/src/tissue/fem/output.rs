@@ -30,7 +30,8 @@ pub(super) fn write<T: Real>(model: &FemModel<T>, state: &mut FemState<T>) -> u3
 /// The mean of the eight corners is the displacement of the centre. Returns elements moved and the largest square.
 fn write_piece<T: Real>(model: &FemModel<T>, state: &mut FemState<T>, piece: &CellRun) -> (u32, f32) {
     let n = piece.len;
-    let [nx, ny, _] = model.levels[0].grid.nodes;
+    let grid = &model.levels[0].grid;
+    let (nx, ny) = (grid.stride, grid.nodes[1]);
     let rows = [0, nx, nx * ny, nx * ny + nx].map(|step| piece.cell + step);
     let mut now = [[0.0_f32; CHUNK]; 3];
     let mut same = [true; CHUNK];

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::lanes::{chebyshev, difference_where_free, dot, first_chebyshev, keep_free};
 use super::level::Level;
 use super::real::Real;
 use super::sweep::{Field, LineOp, Planes, sweep};
@@ -21,18 +22,8 @@ impl<T: Real> LineOp<T> for Step<'_, T> {
         let inverse = &self.inverse_diagonal[at.clone()];
         for (c, x) in x.into_iter().enumerate() {
             let (d, b) = (&mut self.d[c][at.clone()], &self.b[c][at.clone()]);
-            step_line(d, b, forces[c], inverse, [self.keep, self.gain], x);
+            chebyshev([self.keep, self.gain], inverse, b, forces[c], d, x);
         }
-    }
-}
-
-#[inline(always)]
-fn step_line<T: Real>(d: &mut [T], b: &[T], forces: &[T], inverse: &[T], [keep, gain]: [T; 2], x: &mut [T]) {
-    let n = x.len();
-    let (d, b, forces, inverse) = (&mut d[..n], &b[..n], &forces[..n], &inverse[..n]);
-    for i in 0..n {
-        d[i] = keep * d[i] + gain * inverse[i] * (b[i] - forces[i]);
-        x[i] += d[i];
     }
 }
 
@@ -56,7 +47,9 @@ pub(super) fn smooth<T: Real>(
     let (mut keep, mut gain) = (0.0, 1.0 / middle);
     for n in 0..steps {
         if n == 0 && from_zero {
-            first_step(level, inverse_diagonal, x, b, d, T::of(gain));
+            level
+                .simd
+                .run(|| first_step(level, inverse_diagonal, x, b, d, T::of(gain)));
         } else {
             let mut op = Step {
                 b,
@@ -74,6 +67,7 @@ pub(super) fn smooth<T: Real>(
 }
 
 /// The first step from `x = 0`, which needs no sweep.
+#[inline(always)]
 fn first_step<T: Real>(
     level: &Level<T>,
     inverse_diagonal: &[T],
@@ -86,19 +80,14 @@ fn first_step<T: Real>(
         let inverse = &inverse_diagonal[at.clone()];
         for c in 0..3 {
             let (x, d, b) = (&mut x[c][at.clone()], &mut d[c][at.clone()], &b[c][at.clone()]);
-            let n = inverse.len();
-            let (x, d, b) = (&mut x[..n], &mut d[..n], &b[..n]);
-            for i in 0..n {
-                d[i] = gain * inverse[i] * b[i];
-                x[i] = d[i];
-            }
+            first_chebyshev(gain, inverse, b, d, x);
         }
     }
 }
 
-/// `r = b - A x` where nodes are free, zero elsewhere; `b` is zero where there is none.
+/// `r = b - A x` where nodes are free, zero elsewhere.
 pub(super) struct Residual<'a, T> {
-    pub b: Option<&'a Field<T>>,
+    pub b: &'a Field<T>,
     pub r: &'a mut Field<T>,
     pub inverse_diagonal: &'a [T],
     pub square: f64,
@@ -108,65 +97,31 @@ impl<T: Real> LineOp<T> for Residual<'_, T> {
     #[inline(always)]
     fn line(&mut self, at: Range<usize>, forces: [&[T]; 3], _: [&mut [T]; 3]) {
         let inverse = &self.inverse_diagonal[at.clone()];
-        let n = inverse.len();
         for c in 0..3 {
-            let (r, force) = (&mut self.r[c][at.clone()][..n], &forces[c][..n]);
-            match self.b {
-                Some(b) => {
-                    let b = &b[c][at.clone()][..n];
-                    for i in 0..n {
-                        r[i] = if inverse[i] == T::ZERO {
-                            T::ZERO
-                        } else {
-                            b[i] - force[i]
-                        };
-                    }
-                }
-                None => {
-                    for i in 0..n {
-                        r[i] = if inverse[i] == T::ZERO { T::ZERO } else { -force[i] };
-                    }
-                }
-            }
-            self.square += dot_line(r, r);
+            let r = &mut self.r[c][at.clone()];
+            difference_where_free(inverse, &self.b[c][at.clone()], forces[c], r);
+            self.square += dot(r, r);
         }
     }
 }
 
-/// `q = A p` where nodes are free, and `p . q`.
+/// `q = A p` where nodes are free, zero elsewhere; `p . q`, and `q . q`.
 pub(super) struct Product<'a, T> {
     pub q: &'a mut Field<T>,
     pub inverse_diagonal: &'a [T],
     pub dot: f64,
+    pub square: f64,
 }
 
 impl<T: Real> LineOp<T> for Product<'_, T> {
     #[inline(always)]
     fn line(&mut self, at: Range<usize>, forces: [&[T]; 3], p: [&mut [T]; 3]) {
         let inverse = &self.inverse_diagonal[at.clone()];
-        let n = inverse.len();
         for (c, p) in p.into_iter().enumerate() {
-            let (q, force) = (&mut self.q[c][at.clone()][..n], &forces[c][..n]);
-            for i in 0..n {
-                q[i] = if inverse[i] == T::ZERO { T::ZERO } else { force[i] };
-            }
-            self.dot += dot_line(q, p);
+            let q = &mut self.q[c][at.clone()];
+            keep_free(inverse, forces[c], q);
+            self.dot += dot(q, p);
+            self.square += dot(q, q);
         }
     }
-}
-
-/// Dot product of a line: sixteen sums side by side, always in the same order, then in f64.
-#[inline(always)]
-pub(super) fn dot_line<T: Real>(a: &[T], b: &[T]) -> f64 {
-    const WIDTH: usize = 16;
-    let mut sums = [T::ZERO; WIDTH];
-    let (a, b) = (a.chunks_exact(WIDTH), b.chunks_exact(WIDTH));
-    let rest = a.remainder().iter().zip(b.remainder());
-    let rest: f64 = rest.map(|(&a, &b)| (a * b).to_f64()).sum();
-    for (a, b) in a.zip(b) {
-        for lane in 0..WIDTH {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    rest + sums.iter().map(|s| s.to_f64()).sum::<f64>()
 }

@@ -3,7 +3,7 @@
 use super::model::FemModel;
 use super::multigrid::Multigrid;
 use super::real::Real;
-use super::sweep::{Field, zeros};
+use super::sweep::{Field, touched, zeros};
 
 /// Directions that a patch can be moved in and still answer by superposition.
 pub(super) const DIRECTIONS: usize = 3;
@@ -55,12 +55,12 @@ impl<T: Real> FemState<T> {
             weight_m: 0.0,
         };
         FemState {
-            displacement: zeros(model.element_count()),
+            displacement: std::array::from_fn(|_| touched(model.element_count(), 0.0)),
             max_displacement: 0.0,
             responses: std::array::from_fn(|_| response()),
             count: 0,
             patch: None,
-            patch_nodes: (0..nodes).map(|_| std::hint::black_box(0)).collect(),
+            patch_nodes: touched(nodes, 0),
             held: 0,
             multigrid: Multigrid::new(&model.levels),
             p: zeros(nodes),

@@ -6,6 +6,7 @@
 use std::ops::Range;
 
 use super::hexahedron::{CHUNK, Scratch, add_line, forces};
+use super::lanes::{LANES, add_products};
 use super::level::Level;
 use super::real::Real;
 
@@ -32,32 +33,20 @@ impl<T: Real> Planes<T> {
         Planes {
             even: zeros(nodes),
             odd: zeros(nodes),
-            scratch: Box::new([[T::ZERO; CHUNK]; 24]),
+            scratch: Box::new([[T::ZERO; CHUNK + LANES]; 24]),
         }
     }
 }
 
-/// Zeros in pages that have been written, so that no later write is the first.
+/// A zero for each node, in pages that have been written, so that no later write is the first; and a few more, as rows of elements
+/// are done in whole lanes.
 pub(super) fn zeros<T: Real>(nodes: usize) -> Field<T> {
-    std::array::from_fn(|_| (0..nodes).map(|_| std::hint::black_box(T::ZERO)).collect())
+    std::array::from_fn(|_| touched(nodes + LANES + 1, T::ZERO))
 }
 
-/// Vector instructions of the processor. The results are the same: nothing is reordered or fused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Simd {
-    Portable,
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-}
-
-impl Simd {
-    pub fn detect() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            return Simd::Avx2;
-        }
-        Simd::Portable
-    }
+/// Copies of a value in pages that have been written.
+pub(super) fn touched<V: Copy>(count: usize, value: V) -> Vec<V> {
+    (0..count).map(|_| std::hint::black_box(value)).collect()
 }
 
 /// Sweeps the planes of nodes `planes` and calls `op` with each line of nodes in use.
@@ -68,24 +57,7 @@ pub(super) fn sweep<T: Real, O: LineOp<T>>(
     planes: Range<usize>,
     op: &mut O,
 ) {
-    match level.simd {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: `detect` has found AVX2.
-        Simd::Avx2 => unsafe { sweep_avx2(level, x, work, planes, op) },
-        Simd::Portable => sweep_lines(level, x, work, planes, op),
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn sweep_avx2<T: Real, O: LineOp<T>>(
-    level: &Level<T>,
-    x: &mut Field<T>,
-    work: &mut Planes<T>,
-    planes: Range<usize>,
-    op: &mut O,
-) {
-    sweep_lines(level, x, work, planes, op);
+    level.simd.run(|| sweep_lines(level, x, work, planes, op));
 }
 
 #[inline(always)]
@@ -98,13 +70,13 @@ fn sweep_lines<T: Real, O: LineOp<T>>(
 ) {
     let Planes { even, odd, scratch } = work;
     let (mut here, mut above) = (even, odd);
-    clear(here);
+    clear(level, here);
     if planes.start > 0 {
-        clear(above);
+        clear(level, above);
         add_plane(level, x, planes.start - 1, above, here, scratch);
     }
     for k in planes {
-        clear(above);
+        clear(level, above);
         if k + 1 < level.grid.nodes[2] {
             add_plane(level, x, k, here, above, scratch);
         }
@@ -114,8 +86,9 @@ fn sweep_lines<T: Real, O: LineOp<T>>(
 }
 
 #[inline(always)]
-fn clear<T: Real>(plane: &mut Field<T>) {
-    plane.iter_mut().for_each(|c| c.fill(T::ZERO));
+fn clear<T: Real>(level: &Level<T>, plane: &mut Field<T>) {
+    let used = level.grid.stride * level.grid.nodes[1] + 1;
+    plane.iter_mut().for_each(|c| c[..used].fill(T::ZERO));
 }
 
 /// Adds the forces of the elements between planes `k` and `k + 1` of nodes.
@@ -128,24 +101,26 @@ fn add_plane<T: Real>(
     above: &mut Field<T>,
     scratch: &mut Scratch<T>,
 ) {
-    let [nx, ny, _] = level.grid.nodes;
+    let (nx, ny) = (level.grid.stride, level.grid.nodes[1]);
     for j in 0..ny - 1 {
-        let [first, end] = level.grid.cell_rows[j + ny * k].map(|i| i as usize);
-        for start in (first..end).step_by(CHUNK) {
-            let n = (end - start).min(CHUNK);
+        let [first, end] = level.grid.cell_rows[j + ny * k];
+        for start in (first as usize..end as usize).step_by(CHUNK) {
+            let lanes = (end as usize - start).min(CHUNK) / LANES;
             let low = start + nx * (j + ny * k);
-            let starts = [low, low + nx, low + nx * ny, low + nx * ny + nx];
-            let lines = [0, 1, 2].map(|c| starts.map(|at| &x[c][at..=at + n]));
-            let stiffness = [0, 1, 2].map(|c| &level.stiffness[c][low..low + n]);
-            forces(lines, stiffness, scratch);
-            let in_plane = start + nx * j;
-            for component in 0..3 {
-                for corner in 0..4 {
-                    let plane = if corner < 2 { &mut *below } else { &mut *above };
-                    let at = in_plane + nx * (corner & 1);
-                    let row = 4 * component + corner;
-                    add_line(&scratch[row], &scratch[12 + row], &mut plane[component][at..=at + n]);
-                }
+            let (high, width) = (low + nx * ny, lanes * LANES + 1);
+            let line = |c: usize, at: usize| &x[c][at..at + width];
+            let four = |c: usize| [line(c, low), line(c, low + nx), line(c, high), line(c, high + nx)];
+            let [mean, varying, shear] = &level.stiffness;
+            let stiffness = [&mean[low..], &varying[low..], &shear[low..]];
+            forces([four(0), four(1), four(2)], stiffness, lanes, scratch);
+            let at = start + nx * j;
+            for c in 0..3 {
+                let rows = |row: usize| (&scratch[row], &scratch[12 + row]);
+                let add = |(even, odd), plane: &mut [T]| add_line(even, odd, lanes, plane);
+                add(rows(4 * c), &mut below[c][at..at + width]);
+                add(rows(4 * c + 1), &mut below[c][at + nx..at + nx + width]);
+                add(rows(4 * c + 2), &mut above[c][at..at + width]);
+                add(rows(4 * c + 3), &mut above[c][at + nx..at + nx + width]);
             }
         }
     }
@@ -154,23 +129,24 @@ fn add_plane<T: Real>(
 /// Adds the springs of plane `k` and hands its lines on.
 #[inline(always)]
 fn finish_plane<T: Real, O: LineOp<T>>(level: &Level<T>, x: &mut Field<T>, k: usize, plane: &mut Field<T>, op: &mut O) {
-    let [nx, ny, _] = level.grid.nodes;
+    let (nx, ny) = (level.grid.stride, level.grid.nodes[1]);
     for j in 0..ny {
-        let [first, end] = level.grid.node_rows[j + ny * k].map(|i| i as usize);
+        let [first, end] = level.grid.node_rows[j + ny * k];
         if first == end {
             continue;
         }
-        let at = first + nx * (j + ny * k)..end + nx * (j + ny * k);
-        let in_plane = first + nx * j..end + nx * j;
+        let in_plane = first as usize + nx * j..end as usize + nx * j;
+        let at = in_plane.start + nx * ny * k..in_plane.end + nx * ny * k;
         let springs = &level.springs[at.clone()];
-        for (plane, x) in plane.iter_mut().zip(x.iter()) {
-            let (force, x) = (&mut plane[in_plane.clone()], &x[at.clone()]);
-            for ((force, &x), &spring) in force.iter_mut().zip(x).zip(springs) {
-                *force += spring * x;
-            }
+        for c in 0..3 {
+            add_products(springs, &x[c][at.clone()], &mut plane[c][in_plane.clone()]);
         }
-        let forces = plane.each_ref().map(|c| &c[in_plane.clone()]);
-        let x = x.each_mut().map(|c| &mut c[at.clone()]);
+        let forces = {
+            let [a, b, c] = &*plane;
+            [&a[in_plane.clone()], &b[in_plane.clone()], &c[in_plane]]
+        };
+        let [a, b, c] = &mut *x;
+        let x = [&mut a[at.clone()], &mut b[at.clone()], &mut c[at.clone()]];
         op.line(at, forces, x);
     }
 }

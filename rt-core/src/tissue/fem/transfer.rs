@@ -11,6 +11,7 @@ fn parents(fine: usize) -> ([usize; 2], usize) {
 }
 
 /// `coarse = transpose(interpolation) fine`. `line` has room for a line of fine nodes and two more.
+#[inline(always)]
 pub(super) fn restrict<T: Real>(fine: &Grid, coarse: &Grid, values: &Field<T>, line: &mut [T], into: &mut Field<T>) {
     for k in 0..coarse.nodes[2] {
         for j in 0..coarse.nodes[1] {
@@ -57,6 +58,7 @@ fn gather<T: Real>(fine: &Grid, values: &[T], [j, k]: [usize; 2], start: usize, 
 }
 
 /// `fine += interpolation coarse` at free nodes. `line` has room for a line of coarse nodes and one more.
+#[inline(always)]
 pub(super) fn prolong<T: Real>(
     coarse: &Grid,
     fine: &Grid,
@@ -73,9 +75,9 @@ pub(super) fn prolong<T: Real>(
             if first == end {
                 continue;
             }
-            let (low, high) = (first / 2, (end - 1).div_ceil(2) + 1);
+            let (low, high) = (first / 2, end / 2 + 1);
             let weight = T::of(1.0 / (plane_count * row_count) as f64);
-            let line = &mut line[..high - low + 1];
+            let line = &mut line[..high - low];
             for (values, into) in values.iter().zip(into.iter_mut()) {
                 line.fill(T::ZERO);
                 for &ck in &planes[..plane_count] {
@@ -91,23 +93,20 @@ pub(super) fn prolong<T: Real>(
                     &mut into[row + first..row + end],
                     &inverse_diagonal[row + first..row + end],
                 );
-                spread(line, first % 2, inverse, into);
+                spread(line, inverse, into);
             }
         }
     }
 }
 
-/// Each coarse value to its node, the mean of two to the node between; the first fine node may be one between.
+/// Each coarse value to its node, the mean of two to the node between. `into` starts at an even node.
 #[inline(always)]
-fn spread<T: Real>(line: &[T], odd: usize, inverse: &[T], into: &mut [T]) {
+fn spread<T: Real>(line: &[T], inverse: &[T], into: &mut [T]) {
     let half = T::of(0.5);
-    for (i, (value, &inverse)) in into.iter_mut().zip(inverse).enumerate() {
-        let (at, between) = ((i + odd) / 2, (i + odd) % 2 == 1);
-        let correction = if between {
-            half * (line[at] + line[at + 1])
-        } else {
-            line[at]
-        };
-        *value += if inverse == T::ZERO { T::ZERO } else { correction };
+    let pairs = into.as_chunks_mut::<2>().0.iter_mut().zip(inverse.as_chunks::<2>().0);
+    for ((into, inverse), two) in pairs.zip(line.windows(2)) {
+        let [at, between] = [two[0], half * (two[0] + two[1])];
+        into[0] += if inverse[0] == T::ZERO { T::ZERO } else { at };
+        into[1] += if inverse[1] == T::ZERO { T::ZERO } else { between };
     }
 }

@@ -1,0 +1,229 @@
+//! A 200 Hz insertion into the paper's gland with FEM: time per tick beside the error against the converged solution.
+
+use std::time::Instant;
+
+use rt_core::needle::{NeedleParameters, Phase, transmission};
+use rt_core::scene::{Lattice, Scene};
+use rt_core::tissue::fem::{self, FemModel, FemSettings, FemState, Integration, Material, SolveSettings, TipPatch};
+use rt_core::tissue::{ChainMail, Held, TissueParameters, TissueState};
+
+const PERIOD_S: f64 = 5e-3;
+const SPEED_M_PER_S: f64 = 0.05;
+const PATCH_M: f64 = 4e-3;
+/// A centimetre of fat of 3 kPa around the gland.
+const FOUNDATION_PA_PER_M: f64 = 3e5;
+/// What counts as solved.
+const EXACT: SolveSettings = SolveSettings {
+    relative_tolerance: 1e-8,
+    max_cycles: 400,
+};
+
+/// One tick's held patch, and how far it is from rest.
+struct Tick {
+    held: TipPatch,
+    by_m: f64,
+}
+
+/// From the apex along `direction` to `depth_m`: the tissue follows up to puncture, then as paper eq. 6 says.
+fn insertion(lattice: &Lattice, direction: [f64; 3], depth_m: f64) -> Vec<Tick> {
+    let needle = NeedleParameters::default();
+    let (low, high) = lattice.bounds_m();
+    let at = |t: f64, start: [f64; 3]| [0, 1, 2].map(|a| start[a] + t * direction[a]);
+    let mut entry = [0, 1, 2].map(|a| 0.5 * (low[a] + high[a]));
+    while element_at(lattice, at(-1e-4, entry)).is_some() {
+        entry = at(-1e-4, entry);
+    }
+    let (mut ticks, mut by_m) = (Vec::new(), 0.0);
+    let step_m = SPEED_M_PER_S * PERIOD_S;
+    for n in 1..=(depth_m / step_m) as usize {
+        let tip_m = n as f64 * step_m;
+        let phase = if tip_m <= needle.puncture_depth_m {
+            Phase::Contraction
+        } else {
+            Phase::Penetration
+        };
+        by_m += step_m * transmission(phase, SPEED_M_PER_S, tip_m, &needle);
+        let Some(element) = element_at(lattice, at(tip_m - by_m, entry)) else {
+            break;
+        };
+        let held = TipPatch {
+            element,
+            position_m: at(by_m, lattice.rest_m(element)),
+            edge_m: PATCH_M,
+        };
+        ticks.push(Tick { held, by_m });
+    }
+    ticks
+}
+
+fn element_at(lattice: &Lattice, place_m: [f64; 3]) -> Option<u32> {
+    let [i, j, k] = place_m.map(|c| (c / lattice.spacing_m).floor() as usize);
+    lattice.element_of_cell(i, j, k)
+}
+
+/// Displacements after each tick, solved to the end in f64.
+fn converged(model: &FemModel<f64>, ticks: &[Tick]) -> Vec<[Vec<f32>; 3]> {
+    let mut state = FemState::at_rest(model);
+    let solved = ticks.iter().map(|tick| {
+        let report = fem::step(model, &mut state, Some(tick.held), &EXACT);
+        assert!(report.converged, "{report:?}");
+        [0, 1, 2].map(|a| state.displacement(a).to_vec())
+    });
+    solved.collect()
+}
+
+/// Root of the mean square of the elements' errors, in elements.
+fn rms<'a>(here: impl Fn(usize) -> &'a [f32], there: &[Vec<f32>; 3]) -> f64 {
+    let squares = (0..3).flat_map(|a| here(a).iter().zip(&there[a]).map(|(h, t)| f64::from(h - t).powi(2)));
+    (squares.sum::<f64>() / there[0].len() as f64).sqrt()
+}
+
+struct Run {
+    nanoseconds: Vec<u64>,
+    cycles: Vec<u32>,
+    /// RMS error of each tick over the held patch's displacement.
+    errors: Vec<f64>,
+}
+
+fn run(
+    model: &FemModel<f32>,
+    ticks: &[Tick],
+    solved: &[[Vec<f32>; 3]],
+    settings: &SolveSettings,
+    rounds: usize,
+) -> Run {
+    let mut run = Run {
+        nanoseconds: Vec::new(),
+        cycles: Vec::new(),
+        errors: Vec::new(),
+    };
+    for round in 0..rounds {
+        let mut state = FemState::at_rest(model);
+        for (tick, solved) in ticks.iter().zip(solved) {
+            let start = Instant::now();
+            let report = fem::step(model, &mut state, Some(tick.held), settings);
+            run.nanoseconds.push(start.elapsed().as_nanos() as u64);
+            if round == 0 {
+                run.cycles.push(report.cycles);
+                let error = rms(|a| state.displacement(a), solved) * model.lattice().spacing_m / tick.by_m;
+                run.errors.push(error);
+            }
+        }
+    }
+    run
+}
+
+fn chainmail(scene: &Scene, ticks: &[Tick], rounds: usize) -> Vec<u64> {
+    let limits = TissueParameters::default().validate().expect("defaults are valid");
+    let model = ChainMail::new(scene, limits);
+    let mut nanoseconds = Vec::new();
+    for _ in 0..rounds {
+        let mut state = TissueState::at_rest(&model);
+        for Tick { held, .. } in ticks {
+            let held = Held {
+                element: held.element,
+                position_m: held.position_m,
+            };
+            let start = Instant::now();
+            let report = rt_core::tissue::step(&model, &mut state, Some(held), PERIOD_S);
+            nanoseconds.push(start.elapsed().as_nanos() as u64);
+            assert!(report.converged);
+        }
+    }
+    nanoseconds
+}
+
+/// p50, p99, p99.9 and maximum.
+fn quantiles<T: Copy + PartialOrd>(values: &[T]) -> [T; 4] {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
+    let at = |part: f64| sorted[((sorted.len() as f64 * part) as usize).min(sorted.len() - 1)];
+    [at(0.5), at(0.99), at(0.999), sorted[sorted.len() - 1]]
+}
+
+fn settings_of(material: Material) -> FemSettings {
+    FemSettings::homogeneous(material, FOUNDATION_PA_PER_M)
+}
+
+fn report_insertion(name: &str, scene: &Scene, material: Material, direction: [f64; 3], rounds: usize) {
+    let lattice = &scene.lattice;
+    let ticks = insertion(lattice, direction, 40e-3);
+    let exact = FemModel::<f64>::new(lattice, &settings_of(material)).expect("valid");
+    let model = FemModel::<f32>::new(lattice, &settings_of(material)).expect("valid");
+    let solved = converged(&exact, &ticks);
+    let changes = ticks
+        .windows(2)
+        .filter(|w| w[0].held.element != w[1].held.element)
+        .count();
+    println!("{name}: {} ticks, {changes} changes of the held element", ticks.len());
+    println!(
+        "  cycles <= | tolerance |  p50 us    p99  p99.9    max | cycles p99 max | RMS error, % of travel p50   p99   max"
+    );
+    for (max_cycles, relative_tolerance) in [(1, 1e-2), (2, 1e-2), (3, 1e-2), (3, 1e-3), (4, 1e-3), (100, 1e-4)] {
+        let settings = SolveSettings {
+            relative_tolerance,
+            max_cycles,
+        };
+        let run = run(&model, &ticks, &solved, &settings, rounds);
+        let us = quantiles(&run.nanoseconds).map(|ns| ns as f64 * 1e-3);
+        let [_, c99, _, cmax] = quantiles(&run.cycles);
+        let [e50, e99, _, emax] = quantiles(&run.errors).map(|e| e * 100.0);
+        println!(
+            "  {max_cycles:9} | {relative_tolerance:9.0e} | {:7.0} {:6.0} {:6.0} {:6.0} | {c99:10} {cmax:3} | {e50:26.3} {e99:5.3} {emax:5.3}",
+            us[0], us[1], us[2], us[3]
+        );
+    }
+    let us = quantiles(&chainmail(scene, &ticks, rounds)).map(|ns| ns as f64 * 1e-3);
+    println!(
+        "  ChainMail             | {:7.0} {:6.0} {:6.0} {:6.0} |",
+        us[0], us[1], us[2], us[3]
+    );
+}
+
+/// The first tick from rest, to several tolerances.
+fn report_cold(name: &str, lattice: &Lattice, material: Material) {
+    let model = FemModel::<f32>::new(lattice, &settings_of(material)).expect("valid");
+    let held = insertion(lattice, [0.0, 0.0, 1.0], 40e-3).pop().expect("ticks").held;
+    print!(
+        "{name}: cold, {} nodes, {} levels:",
+        model.node_count(),
+        model.level_count()
+    );
+    for relative_tolerance in [1e-1, 1e-2, 1e-3, 1e-4, 1e-5] {
+        let settings = SolveSettings {
+            relative_tolerance,
+            max_cycles: 400,
+        };
+        let mut state = FemState::at_rest(&model);
+        let start = Instant::now();
+        let report = fem::step(&model, &mut state, Some(held), &settings);
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        print!("  {relative_tolerance:.0e} {} cycles {ms:.1} ms", report.cycles);
+    }
+    println!();
+}
+
+fn main() {
+    let scene = Scene::builtin("paper").expect("built in");
+    let rounds = std::env::args().filter_map(|a| a.parse().ok()).next().unwrap_or(5);
+    let material = |poisson_ratio, integration| Material {
+        poisson_ratio,
+        integration,
+        ..Material::PROSTATE
+    };
+    let full = material(0.45, Integration::Full);
+    let soft = |nu| material(nu, Integration::MeanDilatation);
+    for (name, material) in [
+        ("nu 0.45 full", full),
+        ("nu 0.45", soft(0.45)),
+        ("nu 0.49", soft(0.49)),
+        ("nu 0.499", soft(0.499)),
+    ] {
+        report_cold(name, &scene.lattice, material);
+    }
+    let oblique = [0.1, -0.05, (1.0_f64 - 0.0125).sqrt()];
+    report_insertion("nu 0.45 full, along z", &scene, full, [0.0, 0.0, 1.0], rounds);
+    report_insertion("nu 0.45, along z", &scene, soft(0.45), [0.0, 0.0, 1.0], rounds);
+    report_insertion("nu 0.49, along z", &scene, soft(0.49), [0.0, 0.0, 1.0], rounds);
+    report_insertion("nu 0.49, oblique", &scene, soft(0.49), oblique, rounds);
+}
