@@ -19,6 +19,7 @@ mod held;
 mod kernels;
 mod look;
 mod model;
+mod one_pass;
 mod project;
 pub mod queue;
 pub mod reference;
@@ -40,6 +41,7 @@ mod tests;
 
 pub(crate) use kernels::{Scaled, link_violation, ordered};
 pub use model::ChainMail;
+pub use one_pass::{OnePass, PassKind};
 pub use single::single_pass;
 pub use solve::step;
 pub use state::TissueState;

@@ -43,7 +43,7 @@ pub fn step(model: &ChainMail, state: &mut TissueState, held: Option<Held>, dt_s
     report
 }
 
-fn kept_fraction(model: &ChainMail, dt_s: f64) -> f64 {
+pub(super) fn kept_fraction(model: &ChainMail, dt_s: f64) -> f64 {
     if dt_s > 0.0 {
         (-dt_s / model.limits().recovery_time_s).exp()
     } else {

@@ -1,0 +1,104 @@
+//! ChainMail's settings fitted to the converged FEM, on the insertions that are meant for it.
+
+use crate::models::chainmail;
+use crate::runs::{Reference, run};
+use argmin::core::{CostFunction, Executor};
+use argmin::solver::neldermead::NelderMead;
+use rt_core::scene::Scene;
+use rt_core::tissue::{Held, TissueParameters};
+
+/// What the fit found.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// Limits and recovery, without relaxation.
+    pub limits: TissueParameters,
+    /// Stiffness of links and surroundings, with relaxation.
+    pub relaxed: TissueParameters,
+}
+
+/// An insertion with its answer.
+pub struct Lesson {
+    pub script: Vec<Held>,
+    pub travel_m: f64,
+    pub reference: Reference,
+}
+
+/// Iterations of relaxation that the fit is made with.
+const FIT_ITERATIONS: u32 = 16;
+const MOST_EVALUATIONS: u64 = 80;
+
+/// Mean over the lessons of the RMS error in parts of the tip's travel; infinite for settings that are not valid.
+struct Cost<'a> {
+    scene: &'a Scene,
+    lessons: &'a [Lesson],
+    settings: fn(&[f64]) -> TissueParameters,
+}
+
+impl CostFunction for Cost<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, p: &Vec<f64>) -> Result<f64, argmin::core::Error> {
+        let parameters = (self.settings)(p);
+        if parameters.validate().is_err() {
+            return Ok(f64::INFINITY);
+        }
+        let mut model = chainmail(self.scene, &parameters);
+        let errors = self.lessons.iter().map(|lesson| {
+            let run = run(&mut model, &lesson.script, &[], lesson.travel_m, &lesson.reference);
+            run.error.rms_m() / lesson.travel_m
+        });
+        Ok(errors.sum::<f64>() / self.lessons.len() as f64)
+    }
+}
+
+/// Logarithms keep what must be positive positive.
+fn limits_of(p: &[f64]) -> TissueParameters {
+    TissueParameters {
+        min_stretch: 1.0 - p[0].exp(),
+        max_stretch: 1.0 + p[1].exp(),
+        shear_deg: p[2].exp(),
+        shear_vert_deg: p[2].exp(),
+        recovery_time_s: p[3].exp(),
+        ..TissueParameters::default()
+    }
+}
+
+fn relaxed_of(p: &[f64]) -> TissueParameters {
+    TissueParameters {
+        relaxation_iterations: FIT_ITERATIONS,
+        shear_to_axial: p[0].exp(),
+        ground_stiffness: p[1].exp(),
+        ..TissueParameters::default()
+    }
+}
+
+pub fn fit(scene: &Scene, lessons: &[Lesson]) -> Fitted {
+    let find = |settings: fn(&[f64]) -> TissueParameters, start: Vec<f64>, step: f64| {
+        let corner = |n: usize| {
+            let mut p = start.clone();
+            p[n] += step;
+            p
+        };
+        let simplex = std::iter::once(start.clone())
+            .chain((0..start.len()).map(corner))
+            .collect();
+        let solver = NelderMead::new(simplex).with_sd_tolerance(1e-5).expect("positive");
+        let cost = Cost {
+            scene,
+            lessons,
+            settings,
+        };
+        let found = Executor::new(cost, solver)
+            .configure(|state| state.max_iters(MOST_EVALUATIONS))
+            .run()
+            .expect("the cost is always defined");
+        settings(&found.state.best_param.unwrap_or(start))
+    };
+    let limits = [0.3_f64.ln(), 0.5_f64.ln(), 20.0_f64.ln(), 0.5_f64.ln()];
+    let relaxed = [0.25_f64.ln(), 0.02_f64.ln()];
+    Fitted {
+        limits: find(limits_of, limits.to_vec(), -0.4),
+        relaxed: find(relaxed_of, relaxed.to_vec(), 0.7),
+    }
+}

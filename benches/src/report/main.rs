@@ -1,0 +1,155 @@
+//! `make report`: every tissue model over the same insertions; speed, error, and what to pick.
+
+mod fit;
+mod models;
+mod page;
+mod picture;
+mod runs;
+mod table;
+
+use clap::Parser;
+use fit::Lesson;
+use models::{converged, entries};
+use rt_core::scene::Scene;
+use rt_core::tissue::{Held, MaterialPoint, TissueModel};
+use runs::{Reference, run};
+use std::error::Error;
+use std::path::PathBuf;
+use std::time::Instant;
+use stylet_benches::bodies::{SPACINGS_M, gland};
+use stylet_benches::error::norm;
+use stylet_benches::insertions::{GLAND, Insertion, TICK_S};
+use stylet_benches::machine;
+use table::{Row, Where, row};
+
+/// Runs every tissue model over the same needle insertions and writes speed, error and advice.
+#[derive(Parser)]
+struct Options {
+    /// Folder to write into; the default is benches/runs/<date>-<host>
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Equal runs of each model, of which the least time of each tick counts
+    #[arg(long, default_value_t = 3)]
+    rounds: usize,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let options = Options::parse();
+    let start = Instant::now();
+    let machine = machine::describe();
+    let out = options.out.unwrap_or_else(|| machine::run_folder(&machine));
+    std::fs::create_dir_all(&out)?;
+
+    eprintln!("fitting ChainMail to the converged FEM ...");
+    let fitted = fit_at(SPACINGS_M[1]);
+    eprintln!("fitted: {fitted:?}");
+    let mut rows = Vec::new();
+    for spacing_m in SPACINGS_M {
+        let scene = gland(spacing_m);
+        for insertion in &GLAND {
+            eprintln!("{:.2} mm, {} ...", spacing_m * 1e3, insertion.name);
+            rows.extend(measure(&scene, insertion, &fitted, options.rounds.max(1)));
+        }
+    }
+    let points = table::points(&rows);
+    table::write(&rows, &out.join("speed-vs-error.csv"))?;
+    picture::draw(&points, &out.join("speed-vs-error.svg"))?;
+    let found = page::Findings {
+        machine: &machine,
+        rows: &rows,
+        points: &points,
+        fitted: &fitted,
+        refinement: &refinement(),
+        seconds: start.elapsed().as_secs_f64(),
+    };
+    std::fs::write(out.join("README.md"), page::write(&found)?)?;
+    println!("{}", out.join("README.md").display());
+    Ok(())
+}
+
+fn fit_at(spacing_m: f64) -> fit::Fitted {
+    let scene = gland(spacing_m);
+    let lessons = GLAND.iter().filter(|i| i.fitted).map(|insertion| {
+        let script = insertion.script(&scene);
+        Lesson {
+            reference: Reference::of(&mut converged(&scene), &script),
+            travel_m: insertion.travel_m,
+            script,
+        }
+    });
+    fit::fit(&scene, &lessons.collect::<Vec<_>>())
+}
+
+/// Every model through one insertion, round by round, so that a noisy machine disturbs all alike.
+fn measure(scene: &Scene, insertion: &Insertion, fitted: &fit::Fitted, rounds: usize) -> Vec<Row> {
+    let script: Vec<Held> = insertion.script(scene);
+    let seeds = insertion.seeds(scene);
+    let reference = Reference::of(&mut converged(scene), &script);
+    let mut entries = entries(scene, fitted);
+    let mut runs: Vec<Vec<_>> = entries.iter().map(|_| Vec::new()).collect();
+    for _ in 0..rounds {
+        for (entry, runs) in entries.iter_mut().zip(&mut runs) {
+            runs.push(run(&mut *entry.model, &script, &seeds, insertion.travel_m, &reference));
+        }
+    }
+    let place = Where {
+        spacing_m: scene.lattice.spacing_m,
+        elements: scene.lattice.element_count(),
+    };
+    let named = entries.iter().zip(&runs);
+    named
+        .map(|(entry, runs)| row(&place, insertion, entry.family, &entry.setting, runs))
+        .collect()
+}
+
+/// What the lattice itself costs: seeds of the converged FEM at each spacing against those of the finest.
+fn refinement() -> Vec<(f64, f64, f64)> {
+    let ends: Vec<Vec<[f64; 3]>> = SPACINGS_M.map(|spacing_m| seeds_after_push(&gland(spacing_m))).into();
+    let finest = ends.last().expect("spacings are given");
+    let apart = |seeds: &Vec<[f64; 3]>| {
+        let each: Vec<f64> = seeds
+            .iter()
+            .zip(finest)
+            .map(|(a, b)| norm([0, 1, 2].map(|c| a[c] - b[c])))
+            .collect();
+        let rms = (each.iter().map(|d| d * d).sum::<f64>() / each.len() as f64).sqrt();
+        (rms * 1e3, each.iter().fold(0.0, |m: f64, d| m.max(*d)) * 1e3)
+    };
+    let rows = SPACINGS_M.iter().zip(&ends).map(|(spacing_m, seeds)| {
+        let (rms, largest) = apart(seeds);
+        (spacing_m * 1e3, rms, largest)
+    });
+    rows.collect()
+}
+
+/// How far the same places of the gland have moved at the end of the first insertion's push.
+fn seeds_after_push(scene: &Scene) -> Vec<[f64; 3]> {
+    let insertion = &GLAND[0];
+    let push = (insertion.travel_m / (insertion.speed_m_per_s * TICK_S)).ceil() as usize;
+    let mut fem = converged(scene);
+    let lattice = &scene.lattice;
+    let (low, high) = lattice.bounds_m();
+    let places = [
+        [3.0, 0.0, -2.0],
+        [0.0, 5.0, 2.0],
+        [-8.0, 0.0, 4.0],
+        [0.0, -3.0, 6.0],
+        [5.0, 5.0, 0.0],
+    ];
+    let points = places.map(|mm: [f64; 3]| {
+        let place = [0, 1, 2].map(|a| 0.5 * (low[a] + high[a]) + 1e-3 * mm[a]);
+        let point = MaterialPoint::locate(&fem.deformed(), place, None).expect("inside the gland");
+        (place, point)
+    });
+    for &held in &insertion.script(scene)[..push] {
+        fem.step(Some(held), TICK_S);
+    }
+    let body = fem.deformed();
+    points
+        .iter()
+        .map(|(place, point)| {
+            let now = point.position_m(&body);
+            [0, 1, 2].map(|a| now[a] - place[a])
+        })
+        .collect()
+}

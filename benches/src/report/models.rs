@@ -1,0 +1,99 @@
+//! The models that are compared, each under the settings that it is compared with.
+
+use crate::fit::Fitted;
+use rt_core::scene::Scene;
+use rt_core::tissue::chainmail::{OnePass, PassKind};
+use rt_core::tissue::{ChainMailTissue, FemTissue, TissueModel, TissueParameters};
+
+/// Models that differ only in a setting belong to one family; the picture draws a family in one colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Family {
+    Queue,
+    OnePass,
+    Sweeps,
+    Relaxed,
+    Fem,
+    FemDouble,
+}
+
+impl Family {
+    pub const ALL: [Family; 6] = [
+        Family::Queue,
+        Family::OnePass,
+        Family::Sweeps,
+        Family::Relaxed,
+        Family::Fem,
+        Family::FemDouble,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Family::Queue => "ChainMail, queue, one pass",
+            Family::OnePass => "ChainMail, sweeps, one pass",
+            Family::Sweeps => "ChainMail, solved",
+            Family::Relaxed => "ChainMail, relaxed",
+            Family::Fem => "FEM, f32",
+            Family::FemDouble => "FEM, f64",
+        }
+    }
+}
+
+/// One model under one setting.
+pub struct Entry {
+    pub family: Family,
+    pub setting: String,
+    pub model: Box<dyn TissueModel>,
+}
+
+/// Iterations of relaxation in a tick.
+const RELAXATIONS: [u32; 6] = [1, 2, 4, 8, 16, 32];
+/// Relative tolerances of FEM.
+const TOLERANCES: [f64; 5] = [1e-1, 3e-2, 1e-2, 1e-3, 1e-4];
+/// Tolerance of what counts as converged.
+const CONVERGED: f64 = 1e-9;
+
+/// FEM in f64, far beyond the accuracy of anything it is compared with.
+pub fn converged(scene: &Scene) -> FemTissue<f64> {
+    let mut fem = FemTissue::<f64>::new(scene).expect("valid materials");
+    (fem.settings.relative_tolerance, fem.settings.max_cycles) = (CONVERGED, 10_000);
+    fem
+}
+
+pub fn chainmail(scene: &Scene, parameters: &TissueParameters) -> ChainMailTissue {
+    ChainMailTissue::new(scene, parameters.validate().expect("fitted settings are valid"))
+}
+
+pub fn entries(scene: &Scene, fitted: &Fitted) -> Vec<Entry> {
+    let limits = fitted.limits.validate().expect("fitted settings are valid");
+    let mut entries = Vec::new();
+    let mut add = |family, setting: String, model: Box<dyn TissueModel>| {
+        entries.push(Entry { family, setting, model });
+    };
+    let pass = |kind| Box::new(OnePass::new(scene, limits.clone(), kind));
+    add(Family::Queue, "fitted limits".to_owned(), pass(PassKind::Queue));
+    add(Family::OnePass, "fitted limits".to_owned(), pass(PassKind::Sweep));
+    let paper = TissueParameters::default();
+    for (name, parameters) in [("paper's limits", &paper), ("fitted limits", &fitted.limits)] {
+        add(Family::Sweeps, name.to_owned(), Box::new(chainmail(scene, parameters)));
+    }
+    for iterations in RELAXATIONS {
+        let parameters = TissueParameters {
+            relaxation_iterations: iterations,
+            ..fitted.relaxed.clone()
+        };
+        let setting = format!("{iterations} iterations");
+        add(Family::Relaxed, setting, Box::new(chainmail(scene, &parameters)));
+    }
+    for tolerance in TOLERANCES {
+        let mut fem = FemTissue::<f32>::new(scene).expect("valid materials");
+        fem.settings.relative_tolerance = tolerance;
+        fem.settings.max_cycles = 200;
+        add(Family::Fem, format!("tolerance {tolerance:.0e}"), Box::new(fem));
+    }
+    for tolerance in [1e-3, 1e-6] {
+        let mut fem = FemTissue::<f64>::new(scene).expect("valid materials");
+        (fem.settings.relative_tolerance, fem.settings.max_cycles) = (tolerance, 1000);
+        add(Family::FemDouble, format!("tolerance {tolerance:.0e}"), Box::new(fem));
+    }
+    entries
+}

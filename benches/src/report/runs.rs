@@ -1,0 +1,66 @@
+//! One model through one insertion: its time, and its error against the converged FEM on the same lattice.
+
+use rt_core::tissue::{Held, TissueModel};
+use std::time::Instant;
+use stylet_benches::error::{Error, Field, field};
+use stylet_benches::insertions::TICK_S;
+
+/// The converged answer to a script, at the ticks that are compared.
+pub struct Reference {
+    fields: Vec<Field>,
+}
+
+/// Every so many ticks the tissue is compared.
+const COMPARED: usize = 4;
+
+fn is_compared(tick: usize, ticks: usize) -> bool {
+    tick % COMPARED == COMPARED - 1 || tick + 1 == ticks
+}
+
+impl Reference {
+    pub fn of(converged: &mut dyn TissueModel, script: &[Held]) -> Reference {
+        let mut fields = Vec::new();
+        for (tick, &held) in script.iter().enumerate() {
+            let report = converged.step(Some(held), TICK_S);
+            assert!(report.converged, "the reference has to converge: {report:?}");
+            if is_compared(tick, script.len()) {
+                fields.push(field(&converged.deformed()));
+            }
+        }
+        Reference { fields }
+    }
+}
+
+/// What one run cost and how far off it was.
+pub struct Run {
+    /// Microseconds of each tick.
+    pub micros: Vec<f64>,
+    pub error: Error,
+    /// Ticks that did not meet the model's own residual, and the largest residual.
+    pub unconverged: usize,
+    pub residual: f64,
+}
+
+/// Steps a model at rest through a script.
+pub fn run(model: &mut dyn TissueModel, script: &[Held], seeds: &[u32], travel_m: f64, reference: &Reference) -> Run {
+    let mut run = Run {
+        micros: Vec::with_capacity(script.len()),
+        error: Error::default(),
+        unconverged: 0,
+        residual: 0.0,
+    };
+    let mut fields = reference.fields.iter();
+    model.return_to_rest();
+    for (tick, &held) in script.iter().enumerate() {
+        let start = Instant::now();
+        let report = std::hint::black_box(model.step(Some(held), TICK_S));
+        run.micros.push(start.elapsed().as_secs_f64() * 1e6);
+        run.unconverged += usize::from(!report.converged);
+        run.residual = run.residual.max(report.residual);
+        if is_compared(tick, script.len()) {
+            let there = fields.next().expect("one field for each compared tick");
+            run.error.add(there, &model.deformed(), travel_m, seeds);
+        }
+    }
+    run
+}

@@ -1,0 +1,28 @@
+//! Every hard case of tissue, for every model: finite, unfolded, residual met; and the page that says so.
+
+#[path = "stability/cases.rs"]
+mod cases;
+#[path = "stability/drive.rs"]
+mod drive;
+#[path = "stability/models.rs"]
+mod models;
+#[path = "stability/table.rs"]
+mod table;
+
+#[test]
+fn every_model_meets_every_hard_case() {
+    let rows = cases::all();
+    for row in &rows {
+        println!(
+            "{:>2} {:<42} {:<20} {} {}",
+            row.number, row.case, row.model, row.met, row.happened
+        );
+    }
+    table::write_or_compare(&rows);
+    let failed: Vec<_> = rows
+        .iter()
+        .filter(|row| !row.met)
+        .map(|row| (row.case, row.model))
+        .collect();
+    assert!(failed.is_empty(), "not met: {failed:?}");
+}
