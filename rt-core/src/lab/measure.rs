@@ -1,0 +1,169 @@
+//! One measurement: the run's own loops and bridge, a host, a load, and two threads that watch the machine.
+
+use crate::core::{self, HAPTIC_PERIOD_NS, LoopReport, Options, RunReport, TISSUE_PERIOD_NS};
+use crate::lab::gaps::{self, GapReport};
+use crate::lab::host::{Host, HostReport};
+use crate::lab::load::{Load, Running};
+use crate::lab::machine::Machine;
+use crate::lab::watch::{self, CoreWatch};
+use crate::rt::timing::{LoopTiming, Measure, PoseTimes, TimingPlan};
+use crate::scene::Scene;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Ticks of the first half second are not recorded: caches and pages are still coming in.
+pub const WARM_UP_S: f64 = 0.5;
+/// Windows of a report at most, none shorter than 100 ms.
+const WINDOWS: u64 = 240;
+const SHORTEST_WINDOW_NS: u64 = 100_000_000;
+/// Below both loops, above everything of normal priority.
+const WATCH_PRIORITY_BELOW_TISSUE: u32 = 10;
+
+/// What to run.
+pub struct Setup<'a> {
+    pub options: &'a Options,
+    pub duration_ns: u64,
+    pub load: Load,
+    /// Where the io load may write.
+    pub folder: &'a Path,
+}
+
+/// What came out.
+pub struct Measured {
+    pub run: RunReport,
+    pub host: HostReport,
+    pub gaps: GapReport,
+    pub cores: Vec<CoreWatch>,
+    pub window_ns: u64,
+}
+
+impl Measured {
+    pub fn haptic(&self) -> &LoopTiming {
+        timing_of(&self.run.haptic)
+    }
+
+    pub fn tissue(&self) -> &LoopTiming {
+        timing_of(&self.run.tissue)
+    }
+}
+
+fn timing_of(report: &LoopReport) -> &LoopTiming {
+    report.timing.as_deref().expect("a measured run brings its timing back")
+}
+
+/// Voluntary switches beyond the one of each sleep. A sleep that was over before it began needs none.
+pub fn switches_beyond_sleep(report: &LoopReport) -> i64 {
+    let unslept = report.timing.as_ref().map_or(0, |t| t.unslept);
+    (report.usage.voluntary_switches - (report.ticks - unslept.min(report.ticks)) as i64).max(0)
+}
+
+pub fn window_ns(duration_ns: u64) -> u64 {
+    (duration_ns / WINDOWS).max(SHORTEST_WINDOW_NS)
+}
+
+fn plan(period_ns: u64, duration_ns: u64) -> TimingPlan {
+    let window_ns = window_ns(duration_ns);
+    TimingPlan {
+        warm_up_ticks: (WARM_UP_S * 1e9) as u64 / period_ns,
+        window_ns,
+        windows: (duration_ns / window_ns + 1) as usize,
+    }
+}
+
+/// A core for the gap watch: one that no loop uses, else that of the tissue loop.
+fn watch_core(options: &Options) -> Option<usize> {
+    let cores = core_affinity::get_core_ids().unwrap_or_default();
+    let free = cores
+        .iter()
+        .map(|c| c.id)
+        .find(|&id| Some(id) != options.haptic_core && Some(id) != options.tissue_core);
+    free.or(options.tissue_core)
+}
+
+/// Runs for `setup.duration_ns` after the first tick that a host saw, or until `interrupted`.
+pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, String> {
+    let scene = Scene::builtin(&setup.options.scene).map_err(|e| e.to_string())?;
+    let pose_times = Arc::new(PoseTimes::new());
+    let mut options = setup.options.clone();
+    options.measure = Some(Measure {
+        haptic: plan(options.haptic_period_ns, setup.duration_ns),
+        tissue: plan(TISSUE_PERIOD_NS, setup.duration_ns),
+        pose_times: Arc::clone(&pose_times),
+    });
+    let machine = Machine::this();
+    let priority = (!options.no_rt).then(|| options.tissue_priority.saturating_sub(WATCH_PRIORITY_BELOW_TISSUE).max(1));
+    let (core, watched) = (watch_core(&options), [options.haptic_core, options.tissue_core]);
+    let stop = Arc::new(AtomicBool::new(false));
+    let load = Running::start(setup.load, &options.instance, setup.folder)?;
+    let (run, host, gaps, cores) = std::thread::scope(|threads| {
+        let stop = &stop;
+        let host = threads.spawn(|| {
+            let host = Host::new(&options.instance, &scene, pose_times).map_err(|e| e.to_string());
+            let report = host.and_then(|h| h.run(setup.duration_ns, || interrupted.load(Ordering::Acquire), stop));
+            // SYNC: pairs with the acquire loads of bridge and watches; nothing but the flag is carried.
+            stop.store(true, Ordering::Release);
+            report
+        });
+        let gaps = threads.spawn(move || gaps::watch(core, priority, stop));
+        let machine = &machine;
+        let cores: Vec<_> = watched
+            .into_iter()
+            .flatten()
+            .map(|core| threads.spawn(move || watch::watch(machine, core, stop)))
+            .collect();
+        let run = core::run(&options, stop);
+        stop.store(true, Ordering::Release);
+        let cores: Vec<CoreWatch> = cores.into_iter().filter_map(|t| t.join().ok()).collect();
+        (run, host.join(), gaps.join(), cores)
+    });
+    drop(load);
+    options.instance.sweep();
+    let gone = |_| "a measuring thread ended by itself".to_owned();
+    // Why the loops did not run says more than that the host saw nothing.
+    let run = run?;
+    Ok(Measured {
+        run,
+        host: host.map_err(gone)??,
+        gaps: gaps.map_err(gone)?,
+        cores,
+        window_ns: window_ns(setup.duration_ns),
+    })
+}
+
+/// The period of a loop at `rate_hz`.
+pub fn period_ns(rate_hz: u32) -> u64 {
+    HAPTIC_PERIOD_NS * 1_000 / u64::from(rate_hz)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rt::arm::Usage;
+
+    #[test]
+    fn windows_cover_the_run_and_are_few() {
+        for duration_s in [1, 10, 60, 3_600] {
+            let duration_ns = duration_s * 1_000_000_000;
+            let plan = plan(1_000_000, duration_ns);
+            assert!(plan.windows as u64 * plan.window_ns >= duration_ns);
+            assert!(plan.windows as u64 <= WINDOWS + 1);
+        }
+        assert_eq!(period_ns(5_000), 200_000);
+    }
+
+    #[test]
+    fn a_switch_for_each_sleep_is_not_counted() {
+        let report = |voluntary_switches| LoopReport {
+            ticks: 100,
+            usage: Usage {
+                voluntary_switches,
+                ..Usage::default()
+            },
+            ..LoopReport::default()
+        };
+        assert_eq!(switches_beyond_sleep(&report(98)), 0);
+        assert_eq!(switches_beyond_sleep(&report(100)), 0);
+        assert_eq!(switches_beyond_sleep(&report(103)), 3);
+    }
+}
