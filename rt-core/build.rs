@@ -26,7 +26,11 @@ fn commit() -> String {
         return "unknown".to_owned();
     };
     let clean = git(&["status", "--porcelain", "--untracked-files=no"]).is_some_and(|s| s.is_empty());
-    if clean { commit } else { format!("{commit} with changes") }
+    if clean {
+        commit
+    } else {
+        format!("{commit} with changes")
+    }
 }
 
 fn git(arguments: &[&str]) -> Option<String> {
@@ -43,7 +47,10 @@ fn dependencies(lock: &Path) -> Option<String> {
     for package in lock.get("package")?.as_array()? {
         let text = |key: &str| package.get(key).and_then(|v| v.as_str()).map(str::to_owned);
         let listed = package.get("dependencies").and_then(|d| d.as_array());
-        let listed = listed.into_iter().flatten().filter_map(|d| d.as_str().map(str::to_owned));
+        let listed = listed
+            .into_iter()
+            .flatten()
+            .filter_map(|d| d.as_str().map(str::to_owned));
         needs.insert((text("name")?, text("version")?), listed.collect());
     }
     let mut found = BTreeSet::new();
@@ -60,5 +67,10 @@ fn dependencies(lock: &Path) -> Option<String> {
         }
     }
     found.retain(|(name, _)| name != "rt-core");
-    Some(found.iter().map(|(name, version)| format!("{name} {version}\n")).collect())
+    Some(
+        found
+            .iter()
+            .map(|(name, version)| format!("{name} {version}\n"))
+            .collect(),
+    )
 }

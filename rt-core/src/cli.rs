@@ -205,7 +205,6 @@ impl RealTimeArgs {
                 tissue_priority: self.tissue_priority,
                 haptic_period_ns: HAPTIC_PERIOD_NS,
                 spin_ns: 0,
-                measure: None,
             }),
             _ => Err(problems.join("\n")),
         }

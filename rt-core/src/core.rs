@@ -6,9 +6,9 @@ use crate::bridge::{Bridge, LoopPorts, SnapshotLoans};
 use crate::rt::arm::{self, Armed, Ask, Usage};
 use crate::rt::clock;
 use crate::rt::exchange::{TipPose, TissueResponse};
-use crate::rt::haptic::{HAPTIC_STAGES, HapticLoop, HapticPorts};
-use crate::rt::timing::{LoopTiming, Measure};
-use crate::rt::tissue::{TISSUE_STAGES, TissueLoop, TissuePorts};
+use crate::rt::haptic::{HapticLoop, HapticPorts};
+use crate::rt::timing::Probes;
+use crate::rt::tissue::{TissueLoop, TissuePorts};
 use crate::rt::world::World;
 use crate::scene::Scene;
 use nalgebra::Vector3;
@@ -41,12 +41,10 @@ pub struct Options {
     pub haptic_period_ns: u64,
     /// Spinning before each haptic deadline; 0 for none.
     pub spin_ns: u64,
-    /// What to measure, if anything.
-    pub measure: Option<Measure>,
 }
 
 /// What a run was.
-#[derive(Debug, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct RunReport {
     pub haptic: LoopReport,
     pub tissue: LoopReport,
@@ -56,14 +54,13 @@ pub struct RunReport {
 }
 
 /// What one loop was, from arming to its end.
-#[derive(Debug, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct LoopReport {
     pub thread: ThreadReport,
     pub ticks: u64,
     pub missed: u64,
     pub worst_wake_ns: u64,
     pub usage: Usage,
-    pub timing: Option<Box<LoopTiming>>,
 }
 
 /// 1 kHz.
@@ -73,6 +70,11 @@ pub const TISSUE_PERIOD_NS: u64 = 5_000_000;
 
 /// Runs until `stop` is set by a signal, or a host asks to end. Errors are for people: they say what to do.
 pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, String> {
+    run_with(options, None, stop)
+}
+
+/// The same run, with a probe in each loop.
+pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool>) -> Result<RunReport, String> {
     let scene = Scene::builtin(&options.scene).map_err(|e| e.to_string())?;
     let device = device_for(&scene);
     let info = device.info();
@@ -129,17 +131,9 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
         filled: filled_in,
     };
     let mut tissue = TissueLoop::new(session_id, tissue_ports, world, TISSUE_PERIOD_NS as f64 / 1e9);
-    if let Some(measure) = &options.measure {
-        let timing = |names, period_ns, plan| {
-            Some(Box::new(LoopTiming::new(
-                names,
-                period_ns,
-                plan,
-                Arc::clone(&measure.pose_times),
-            )))
-        };
-        haptic.timing = timing(HAPTIC_STAGES, options.haptic_period_ns, measure.haptic);
-        tissue.timing = timing(TISSUE_STAGES, TISSUE_PERIOD_NS, measure.tissue);
+    if let Some(probes) = probes {
+        haptic.probe = Some(Box::new(probes.haptic));
+        tissue.probe = Some(Box::new(probes.tissue));
     }
 
     let tissue_thread = spawn(
@@ -158,7 +152,6 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
                 missed: r.missed,
                 worst_wake_ns: r.worst_wake_ns,
                 usage,
-                timing: tissue.timing.take(),
             }
         },
     );
@@ -187,7 +180,6 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
             let start = Usage::now();
             haptic.run(armed, stop, publish);
             let usage = Usage::now().since(start);
-            let timing = haptic.timing.take();
             let s = &haptic.state;
             LoopReport {
                 thread: armed.report,
@@ -195,7 +187,6 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
                 missed: s.missed_deadlines,
                 worst_wake_ns: s.worst_wake_ns,
                 usage,
-                timing,
             }
         },
     );

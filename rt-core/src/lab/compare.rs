@@ -1,10 +1,10 @@
 //! Our wake-up beside that of `cyclictest`, in turns: same core, priority and interval, one after the other.
 
 use crate::core::Options;
+use crate::lab::collect::histogram;
 use crate::lab::load::Running;
 use crate::lab::measure::{Measured, Setup, measure};
 use crate::lab::summary::quantile_us;
-use crate::rt::timing::histogram;
 use hdrhistogram::Histogram;
 use serde::Serialize;
 use std::path::Path;
@@ -70,7 +70,7 @@ pub fn compare(setup: &Setup, rounds: u32, interrupted: &AtomicBool) -> Result<C
     };
     for _ in 0..rounds {
         let measured: Measured = measure(&setup, interrupted)?;
-        let ours = &measured.haptic().wake;
+        let ours = &measured.haptic.wake;
         let theirs = match cyclictest(&setup, interrupted) {
             Ok(theirs) => theirs,
             Err(why) => {
@@ -126,7 +126,9 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
 fn version() -> Option<String> {
     let output = Command::new("cyclictest").arg("--help").output().ok()?;
     let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-    text.lines().find(|l| l.contains("cyclictest")).map(|l| l.trim().to_owned())
+    text.lines()
+        .find(|l| l.contains("cyclictest"))
+        .map(|l| l.trim().to_owned())
 }
 
 fn cyclictest(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, String> {

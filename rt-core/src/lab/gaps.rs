@@ -3,9 +3,9 @@
 //! A thread on another core spins for a tenth of each millisecond and reads the clock. A gap during which the kernel
 //! switched no thread is an interrupt, firmware, or a hypervisor that ran something else.
 
+use crate::lab::collect::histogram;
 use crate::rt::arm::{self, Ask, Usage};
 use crate::rt::clock;
-use crate::rt::timing::histogram;
 use hdrhistogram::Histogram;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -52,7 +52,9 @@ pub fn watch(core: Option<usize>, priority: Option<u32>, stop: &AtomicBool) -> G
     // SYNC: nothing but the flag is carried.
     while !stop.load(Ordering::Acquire) {
         clock::sleep_until(grid.due_ns);
-        report.wake.saturating_record(clock::now_ns().saturating_sub(grid.due_ns));
+        report
+            .wake
+            .saturating_record(clock::now_ns().saturating_sub(grid.due_ns));
         spin(&mut report);
         grid.advance(clock::now_ns());
     }

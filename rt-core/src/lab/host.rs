@@ -1,7 +1,8 @@
 //! A host inside the measurement, at normal priority: it moves the hand, and notes when it sees the tissue answer.
 
+use crate::lab::collect::histogram;
 use crate::rt::clock;
-use crate::rt::timing::{PoseTimes, histogram};
+use crate::rt::timing::PoseTimes;
 use crate::scene::Scene;
 use hdrhistogram::Histogram;
 use iceoryx2::port::publisher::Publisher;
@@ -72,9 +73,18 @@ impl Ports {
         let node = instance.node()?;
         let failed = |e: &dyn Debug| ServiceError(format!("the measuring host cannot use shared memory: {e:?}"));
         Ok(Self {
-            snapshots: service::snapshots(&node)?.subscriber_builder().create().map_err(|e| failed(&e))?,
-            records: service::records(&node)?.subscriber_builder().create().map_err(|e| failed(&e))?,
-            events: service::events(&node)?.subscriber_builder().create().map_err(|e| failed(&e))?,
+            snapshots: service::snapshots(&node)?
+                .subscriber_builder()
+                .create()
+                .map_err(|e| failed(&e))?,
+            records: service::records(&node)?
+                .subscriber_builder()
+                .create()
+                .map_err(|e| failed(&e))?,
+            events: service::events(&node)?
+                .subscriber_builder()
+                .create()
+                .map_err(|e| failed(&e))?,
             commands: service::commands(&node)?
                 .publisher_builder()
                 .backpressure_strategy(BackpressureStrategy::DiscardData)

@@ -40,6 +40,11 @@ fn num(value: f64) -> String {
     grouped
 }
 
+/// The unit as a page writes it.
+fn micro(unit: &str) -> String {
+    unit.replace("us", "\u{b5}s")
+}
+
 fn or_na(value: Option<f64>) -> String {
     value.map_or("<span class=na>n/a</span>".to_owned(), num)
 }
@@ -92,7 +97,12 @@ fn header(r: &Report) -> String {
     let environment = if r.environment.qualified {
         "<p class=note>Environment qualified: no reason was found to doubt the tail.</p>".to_owned()
     } else {
-        let items: String = r.environment.evidence.iter().map(|e| format!("<li>{}</li>", esc(e))).collect();
+        let items: String = r
+            .environment
+            .evidence
+            .iter()
+            .map(|e| format!("<li>{}</li>", esc(&e.replace(" us", " \u{b5}s"))))
+            .collect();
         format!(
             "<div class=warning><strong>Environment not qualified.</strong> Percentiles above p99.5, maxima and missed \
              deadlines are shown but not judged: here they say more about the machine below than about this program.\
@@ -109,7 +119,7 @@ fn header(r: &Report) -> String {
         num(p.tissue_rate_hz),
         format!("{:?}", p.load).to_lowercase(),
         esc(&p.load_is),
-        duration(p.measured_s),
+        format!("{} s", num(p.measured_s.round())),
         p.insertions,
         esc(&r.made_at),
         esc(&r.program),
@@ -122,11 +132,16 @@ fn key_figures(r: &Report) -> String {
         summary.and_then(|s| s.quantile(q)).and_then(|q| q.us)
     };
     let share = r.haptic.work_p999_of_period.map(|s| s * 100.0);
-    let k = r.stiffness.margins.iter().find(|m| m.at == "p99.9").and_then(|m| m.k_max_n_per_m);
+    let k = r
+        .stiffness
+        .margins
+        .iter()
+        .find(|m| m.at == "p99.9")
+        .and_then(|m| m.k_max_n_per_m);
     let cards = [
-        ("wake-up, p50", or_na(of("wake-up", "p50")), "us"),
-        ("wake-up, p99", or_na(of("wake-up", "p99")), "us"),
-        ("own work, p99.9", or_na(of("whole tick", "p99.9")), "us"),
+        ("wake-up, p50", or_na(of("wake-up", "p50")), "\u{b5}s"),
+        ("wake-up, p99", or_na(of("wake-up", "p99")), "\u{b5}s"),
+        ("own work, p99.9", or_na(of("whole tick", "p99.9")), "\u{b5}s"),
         ("of the period", or_na(share), "%"),
         ("missed deadlines", r.haptic.counts.missed_deadlines.to_string(), ""),
         ("stiffness margin, p99.9", or_na(k.map(|k| k / 1e3)), "N/mm"),
@@ -165,8 +180,12 @@ fn limits(r: &Report) -> String {
                 format!("<code>{}</code><br><span class=faint>{}</span>", j.name, j.id),
                 or_na(j.value),
                 format!("{sign} {}", num(j.limit)),
-                j.unit.to_owned(),
-                format!("{}<br><span class=faint>{}</span>", esc(j.reason), esc(&short(&j.evidence))),
+                micro(j.unit),
+                format!(
+                    "{}<br><span class=faint>{}</span>",
+                    esc(j.reason),
+                    esc(&short(&j.evidence).replace(" us", " \u{b5}s"))
+                ),
             ]
         })
         .collect();
@@ -177,14 +196,17 @@ fn limits(r: &Report) -> String {
 
 /// The reasons why the environment does not qualify stand at the top of the page once.
 fn short(evidence: &str) -> String {
-    match (evidence.strip_prefix("environment not qualified"), evidence.rsplit_once("; ")) {
+    match (
+        evidence.strip_prefix("environment not qualified"),
+        evidence.rsplit_once("; "),
+    ) {
         (Some(_), Some((_, own))) => format!("environment not qualified; {own}"),
         _ => evidence.to_owned(),
     }
 }
 
 fn pictures(r: &Report, m: &Measured) -> Result<String, String> {
-    let h = m.haptic();
+    let h = &m.haptic;
     let wake = Series {
         name: "force loop",
         color: BLUE,
@@ -210,11 +232,14 @@ fn pictures(r: &Report, m: &Measured) -> Result<String, String> {
         histogram: &h.work,
     };
     let mut figures = vec![
-        ("Wake-up of the force loop", plots::wake_histogram(&[Series { ..wake }])?),
+        (
+            "Wake-up of the force loop",
+            plots::wake_histogram(&[Series { ..wake }])?,
+        ),
         ("Where a force tick goes", plots::stages(h)?),
         ("Worst of each window", plots::windows(&h.windows, m.window_ns)?),
         ("Cumulative tail", plots::tail(&[wake, own])?),
-        ("Where a tissue tick goes", plots::stages(m.tissue())?),
+        ("Where a tissue tick goes", plots::stages(&m.tissue)?),
     ];
     match &turns {
         Some(turns) => figures.push(("Wake-up beside cyclictest, all turns", plots::wake_histogram(turns)?)),
@@ -227,13 +252,18 @@ fn pictures(r: &Report, m: &Measured) -> Result<String, String> {
             let answered = Series {
                 name: "tip moved to tissue answered",
                 color: ORANGE,
-                histogram: &m.tissue().path,
+                histogram: &m.tissue.path,
             };
             figures.push(("From tip to tissue and host", plots::tail(&[seen, answered])?));
         }
     }
-    let figures = figures.iter().map(|(title, svg)| format!("<figure><figcaption>{title}</figcaption>{svg}</figure>\n"));
-    Ok(format!("<h2>Pictures</h2>\n<section class=figures>{}</section>\n", figures.collect::<String>()))
+    let figures = figures
+        .iter()
+        .map(|(title, svg)| format!("<figure><figcaption>{title}</figcaption>{svg}</figure>\n"));
+    Ok(format!(
+        "<h2>Pictures</h2>\n<section class=figures>{}</section>\n",
+        figures.collect::<String>()
+    ))
 }
 
 fn time_table(times: &[Summary]) -> String {
@@ -278,18 +308,22 @@ fn comparison(r: &Report) -> String {
     }
     let mut rows: Vec<Vec<String>> = Vec::new();
     for (i, round) in c.rounds.iter().enumerate() {
-        let cells = (0..c.names.len()).flat_map(|k| {
-            [round.ours_us[k], round.cyclictest_us[k], round.ratio[k]].map(or_na)
-        });
+        let cells =
+            (0..c.names.len()).flat_map(|k| [round.ours_us[k], round.cyclictest_us[k], round.ratio[k]].map(or_na));
         rows.push([(i + 1).to_string()].into_iter().chain(cells).collect());
     }
-    let median = c.median_ratio.iter().flat_map(|m| {
-        [String::new(), String::new(), format!("<b>{}</b>", or_na(*m))]
-    });
+    let median = c
+        .median_ratio
+        .iter()
+        .flat_map(|m| [String::new(), String::new(), format!("<b>{}</b>", or_na(*m))]);
     rows.push(["<b>median</b>".to_owned()].into_iter().chain(median).collect());
     let mut head = vec!["round".to_owned()];
     for name in c.names {
-        head.extend([format!("{name}<br>ours"), format!("{name}<br>theirs"), "ratio".to_owned()]);
+        head.extend([
+            format!("{name}<br>ours"),
+            format!("{name}<br>theirs"),
+            "ratio".to_owned(),
+        ]);
     }
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
     let classes = vec!["n"; head.len()];
@@ -307,12 +341,18 @@ fn stiffness(r: &Report) -> String {
     let rows: Vec<Vec<String>> = s
         .margins
         .iter()
-        .map(|m| vec![m.at.to_owned(), or_na(m.delay_us), or_na(m.k_max_n_per_m.map(|k| k / 1e3))])
+        .map(|m| {
+            vec![
+                m.at.to_owned(),
+                or_na(m.delay_us),
+                or_na(m.k_max_n_per_m.map(|k| k / 1e3)),
+            ]
+        })
         .collect();
     format!(
         "<h2>What the delay costs the hand</h2>\n{}<p class=faint>{}. b = {} N s/m, a hand in the middle of what people have; \
          B = {} N s/m, damping of the force law. Stiffer walls than K_max may vibrate.</p>\n",
-        table(&["at", "delay t_d, us", "K_max, N/mm"], &rows, &["", "n", "n"]),
+        table(&["at", "delay t_d, \u{b5}s", "K_max, N/mm"], &rows, &["", "n", "n"]),
         esc(s.rule),
         num(s.hand_damping_n_s_per_m),
         num(s.law_damping_n_s_per_m)
@@ -328,12 +368,21 @@ fn counters(r: &Report) -> String {
         plain("ticks", h.ticks, t.ticks),
         plain("missed deadlines", h.missed_deadlines, t.missed_deadlines),
         plain("overruns", h.overruns, t.overruns),
+        plain("ticks not measured", h.unmeasured, t.unmeasured),
         plain("heap calls", h.heap_calls, t.heap_calls),
         signed("minor page faults", h.minor_faults, t.minor_faults),
         signed("major page faults", h.major_faults, t.major_faults),
         signed("voluntary context switches", h.voluntary_switches, t.voluntary_switches),
-        signed("... beyond one for each sleep", h.voluntary_switches_beyond_sleep, t.voluntary_switches_beyond_sleep),
-        signed("involuntary context switches", h.involuntary_switches, t.involuntary_switches),
+        signed(
+            "... beyond one for each sleep",
+            h.voluntary_switches_beyond_sleep,
+            t.voluntary_switches_beyond_sleep,
+        ),
+        signed(
+            "involuntary context switches",
+            h.involuntary_switches,
+            t.involuntary_switches,
+        ),
     ];
     let cores: Vec<Vec<String>> = r
         .cores
@@ -347,8 +396,16 @@ fn counters(r: &Report) -> String {
         .collect();
     format!(
         "<h2>Counters</h2>\n<div class=pair>{}{}</div>\n",
-        table(&["from arming to the end", "force loop", "tissue loop"], &rows, &["", "n", "n"]),
-        table(&["core", "MHz", "steal time, s", "interrupts served"], &cores, &["", "n", "n", "n"])
+        table(
+            &["from arming to the end", "force loop", "tissue loop"],
+            &rows,
+            &["", "n", "n"]
+        ),
+        table(
+            &["core", "MHz", "steal time, s", "interrupts served"],
+            &cores,
+            &["", "n", "n", "n"]
+        )
     )
 }
 
@@ -356,11 +413,22 @@ fn late(r: &Report) -> String {
     let rows: Vec<Vec<String>> = r
         .latest_wake_ups
         .iter()
-        .map(|l| vec![format!("{:.3}", l.at_s), num(l.wake_us), num(l.work_us), esc(&l.cause)])
+        .map(|l| {
+            vec![
+                format!("{:.3}", l.at_s),
+                num(l.wake_us),
+                num(l.work_us),
+                esc(&l.cause.replace(" us", " \u{b5}s")),
+            ]
+        })
         .collect();
     format!(
         "<h2>Latest wake-ups</h2>\n{}",
-        table(&["at, s", "wake-up, us", "work, us", "cause"], &rows, &["n", "n", "n", "wide"])
+        table(
+            &["at, s", "wake-up, \u{b5}s", "work, \u{b5}s", "cause"],
+            &rows,
+            &["n", "n", "n", "wide"]
+        )
     )
 }
 
@@ -389,7 +457,11 @@ fn provenance(r: &Report) -> String {
         table(&["setting", "asked", "got", "met"], &settings, &["", "", "", ""]),
         table(&["", "what", "as told"], &facts, &["", "", "wide"]),
         r.dependencies.len(),
-        table(&["package", "version", "known anomalies"], &dependencies, &["", "", "wide"])
+        table(
+            &["package", "version", "known anomalies"],
+            &dependencies,
+            &["", "", "wide"]
+        )
     )
 }
 
@@ -414,7 +486,10 @@ mod tests {
 
     #[test]
     fn numbers_have_three_digits_and_groups() {
-        assert_eq!([0.0, 0.0734, 1.5, 14.26, 812.4].map(num), ["0", "0.073", "1.5", "14.3", "812"]);
+        assert_eq!(
+            [0.0, 0.0734, 1.5, 14.26, 812.4].map(num),
+            ["0", "0.073", "1.5", "14.3", "812"]
+        );
         assert_eq!(num(4_862_000.0), "4\u{202f}862\u{202f}000");
         assert_eq!([100.0, 20.0].map(num), ["100", "20"]);
     }

@@ -161,8 +161,14 @@ fn write_and_sync(path: &Path, stopped: impl Fn() -> bool) -> std::io::Result<()
 fn copy_all(instance: &Instance, stopped: impl Fn() -> bool) -> Result<(), service::ServiceError> {
     let node = instance.node()?;
     let failed = |e: &dyn std::fmt::Debug| service::ServiceError(format!("the ui load cannot listen: {e:?}"));
-    let snapshots = service::snapshots(&node)?.subscriber_builder().create().map_err(|e| failed(&e))?;
-    let records = service::records(&node)?.subscriber_builder().create().map_err(|e| failed(&e))?;
+    let snapshots = service::snapshots(&node)?
+        .subscriber_builder()
+        .create()
+        .map_err(|e| failed(&e))?;
+    let records = service::records(&node)?
+        .subscriber_builder()
+        .create()
+        .map_err(|e| failed(&e))?;
     let mut vertices = Vec::new();
     let mut kept = Vec::new();
     while !stopped() {

@@ -134,7 +134,11 @@ impl Machine {
             let full = version.split_whitespace().any(|w| w == "PREEMPT");
             full.then_some(Preemption::Full)
         };
-        running.or_else(asked).or_else(built).or_else(named).unwrap_or(Preemption::Unknown)
+        running
+            .or_else(asked)
+            .or_else(built)
+            .or_else(named)
+            .unwrap_or(Preemption::Unknown)
     }
 
     pub fn online_cores(&self) -> BTreeSet<usize> {
@@ -176,7 +180,10 @@ impl Machine {
         let text = self.text("proc/cpuinfo")?;
         let block = text.split("\n\n").nth(core)?;
         let lines = block.lines().filter_map(|line| line.split_once(':'));
-        lines.into_iter().find(|(k, _)| k.trim() == key).map(|(_, v)| v.trim().to_owned())
+        lines
+            .into_iter()
+            .find(|(k, _)| k.trim() == key)
+            .map(|(_, v)| v.trim().to_owned())
     }
 
     /// Name and microseconds to leave of each sleep state that is not disabled.
@@ -217,7 +224,10 @@ impl Machine {
     pub fn interrupts_served(&self, core: usize) -> Option<u64> {
         let table = self.text("proc/interrupts")?;
         let mut lines = table.lines();
-        let column = lines.next()?.split_whitespace().position(|c| c == format!("CPU{core}"))?;
+        let column = lines
+            .next()?
+            .split_whitespace()
+            .position(|c| c == format!("CPU{core}"))?;
         let count = |line: &str| line.split_whitespace().nth(column + 1)?.parse::<u64>().ok();
         Some(lines.filter_map(count).sum())
     }
@@ -249,7 +259,16 @@ impl Machine {
         }
         let dmi = |what: &str| self.text(&format!("sys/class/dmi/id/{what}")).unwrap_or_default();
         let (vendor, product) = (dmi("sys_vendor"), dmi("product_name"));
-        let known = ["QEMU", "VMware", "innotek", "Xen", "Amazon EC2", "Google", "Parallels", "OpenStack"];
+        let known = [
+            "QEMU",
+            "VMware",
+            "innotek",
+            "Xen",
+            "Amazon EC2",
+            "Google",
+            "Parallels",
+            "OpenStack",
+        ];
         let virtual_pc = vendor.contains("Microsoft") && product.contains("Virtual");
         let by_vendor = known.iter().any(|k| vendor.contains(k)) && !product.contains(".metal");
         let flagged = self
@@ -288,7 +307,10 @@ impl Machine {
 
     /// Whether a program of this name runs.
     pub fn runs(&self, name: &str) -> bool {
-        let processes = self.names("proc").into_iter().filter(|n| n.bytes().all(|b| b.is_ascii_digit()));
+        let processes = self
+            .names("proc")
+            .into_iter()
+            .filter(|n| n.bytes().all(|b| b.is_ascii_digit()));
         let mut commands = processes.filter_map(|p| self.text(&format!("proc/{p}/comm")));
         commands.any(|c| c == name)
     }
@@ -313,5 +335,9 @@ pub fn cores(list: &str) -> BTreeSet<usize> {
 /// Prints a set of cores as the kernel does.
 pub fn core_list(cores: &BTreeSet<usize>) -> String {
     let all: Vec<String> = cores.iter().map(ToString::to_string).collect();
-    if all.is_empty() { "none".to_owned() } else { all.join(",") }
+    if all.is_empty() {
+        "none".to_owned()
+    } else {
+        all.join(",")
+    }
 }

@@ -1,12 +1,15 @@
 //! One measurement: the run's own loops and bridge, a host, a load, and two threads that watch the machine.
 
 use crate::core::{self, HAPTIC_PERIOD_NS, LoopReport, Options, RunReport, TISSUE_PERIOD_NS};
+use crate::lab::collect::{LoopTiming, Plan};
 use crate::lab::gaps::{self, GapReport};
 use crate::lab::host::{Host, HostReport};
 use crate::lab::load::{Load, Running};
 use crate::lab::machine::Machine;
 use crate::lab::watch::{self, CoreWatch};
-use crate::rt::timing::{LoopTiming, Measure, PoseTimes, TimingPlan};
+use crate::rt::haptic::HAPTIC_STAGES;
+use crate::rt::timing::{PoseTimes, Probe, Probes};
+use crate::rt::tissue::TISSUE_STAGES;
 use crate::scene::Scene;
 use std::path::Path;
 use std::sync::Arc;
@@ -29,42 +32,33 @@ pub struct Setup<'a> {
     pub folder: &'a Path,
 }
 
+/// The ring to the gathering thread holds so much time of ticks.
+const RING_NS: u64 = 4_000_000_000;
+
 /// What came out.
 pub struct Measured {
     pub run: RunReport,
+    pub haptic: LoopTiming,
+    pub tissue: LoopTiming,
     pub host: HostReport,
     pub gaps: GapReport,
     pub cores: Vec<CoreWatch>,
     pub window_ns: u64,
 }
 
-impl Measured {
-    pub fn haptic(&self) -> &LoopTiming {
-        timing_of(&self.run.haptic)
-    }
-
-    pub fn tissue(&self) -> &LoopTiming {
-        timing_of(&self.run.tissue)
-    }
-}
-
-fn timing_of(report: &LoopReport) -> &LoopTiming {
-    report.timing.as_deref().expect("a measured run brings its timing back")
-}
-
 /// Voluntary switches beyond the one of each sleep. A sleep that was over before it began needs none.
-pub fn switches_beyond_sleep(report: &LoopReport) -> i64 {
-    let unslept = report.timing.as_ref().map_or(0, |t| t.unslept);
-    (report.usage.voluntary_switches - (report.ticks - unslept.min(report.ticks)) as i64).max(0)
+pub fn switches_beyond_sleep(report: &LoopReport, unslept: u64) -> i64 {
+    (report.usage.voluntary_switches - report.ticks.saturating_sub(unslept) as i64).max(0)
 }
 
 pub fn window_ns(duration_ns: u64) -> u64 {
     (duration_ns / WINDOWS).max(SHORTEST_WINDOW_NS)
 }
 
-fn plan(period_ns: u64, duration_ns: u64) -> TimingPlan {
+fn plan(period_ns: u64, duration_ns: u64) -> Plan {
     let window_ns = window_ns(duration_ns);
-    TimingPlan {
+    Plan {
+        period_ns,
         warm_up_ticks: (WARM_UP_S * 1e9) as u64 / period_ns,
         window_ns,
         windows: (duration_ns / window_ns + 1) as usize,
@@ -85,18 +79,27 @@ fn watch_core(options: &Options) -> Option<usize> {
 pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, String> {
     let scene = Scene::builtin(&setup.options.scene).map_err(|e| e.to_string())?;
     let pose_times = Arc::new(PoseTimes::new());
-    let mut options = setup.options.clone();
-    options.measure = Some(Measure {
-        haptic: plan(options.haptic_period_ns, setup.duration_ns),
-        tissue: plan(TISSUE_PERIOD_NS, setup.duration_ns),
-        pose_times: Arc::clone(&pose_times),
-    });
+    let options = setup.options;
+    let ring = |period_ns| rtrb::RingBuffer::new((RING_NS / period_ns) as usize);
+    let (haptic_in, haptic_ring) = ring(options.haptic_period_ns);
+    let (tissue_in, tissue_ring) = ring(TISSUE_PERIOD_NS);
+    let probes = Probes {
+        haptic: Probe::new(haptic_in, Arc::clone(&pose_times)),
+        tissue: Probe::new(tissue_in, Arc::clone(&pose_times)),
+    };
+    let haptic = LoopTiming::new(HAPTIC_STAGES, plan(options.haptic_period_ns, setup.duration_ns));
+    let tissue = LoopTiming::new(TISSUE_STAGES, plan(TISSUE_PERIOD_NS, setup.duration_ns));
     let machine = Machine::this();
-    let priority = (!options.no_rt).then(|| options.tissue_priority.saturating_sub(WATCH_PRIORITY_BELOW_TISSUE).max(1));
-    let (core, watched) = (watch_core(&options), [options.haptic_core, options.tissue_core]);
+    let priority = (!options.no_rt).then(|| {
+        options
+            .tissue_priority
+            .saturating_sub(WATCH_PRIORITY_BELOW_TISSUE)
+            .max(1)
+    });
+    let (core, watched) = (watch_core(options), [options.haptic_core, options.tissue_core]);
     let stop = Arc::new(AtomicBool::new(false));
     let load = Running::start(setup.load, &options.instance, setup.folder)?;
-    let (run, host, gaps, cores) = std::thread::scope(|threads| {
+    let (run, host, gaps, cores, haptic, tissue) = std::thread::scope(|threads| {
         let stop = &stop;
         let host = threads.spawn(|| {
             let host = Host::new(&options.instance, &scene, pose_times).map_err(|e| e.to_string());
@@ -105,6 +108,8 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Stri
             stop.store(true, Ordering::Release);
             report
         });
+        let haptic = threads.spawn(|| haptic.gather(haptic_ring));
+        let tissue = threads.spawn(|| tissue.gather(tissue_ring));
         let gaps = threads.spawn(move || gaps::watch(core, priority, stop));
         let machine = &machine;
         let cores: Vec<_> = watched
@@ -112,10 +117,10 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Stri
             .flatten()
             .map(|core| threads.spawn(move || watch::watch(machine, core, stop)))
             .collect();
-        let run = core::run(&options, stop);
+        let run = core::run_with(options, Some(probes), stop);
         stop.store(true, Ordering::Release);
         let cores: Vec<CoreWatch> = cores.into_iter().filter_map(|t| t.join().ok()).collect();
-        (run, host.join(), gaps.join(), cores)
+        (run, host.join(), gaps.join(), cores, haptic.join(), tissue.join())
     });
     drop(load);
     options.instance.sweep();
@@ -124,6 +129,8 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Stri
     let run = run?;
     Ok(Measured {
         run,
+        haptic: haptic.map_err(gone)?,
+        tissue: tissue.map_err(gone)?,
         host: host.map_err(gone)??,
         gaps: gaps.map_err(gone)?,
         cores,
@@ -162,8 +169,9 @@ mod tests {
             },
             ..LoopReport::default()
         };
-        assert_eq!(switches_beyond_sleep(&report(98)), 0);
-        assert_eq!(switches_beyond_sleep(&report(100)), 0);
-        assert_eq!(switches_beyond_sleep(&report(103)), 3);
+        assert_eq!(switches_beyond_sleep(&report(98), 0), 0);
+        assert_eq!(switches_beyond_sleep(&report(100), 0), 0);
+        assert_eq!(switches_beyond_sleep(&report(103), 0), 3);
+        assert_eq!(switches_beyond_sleep(&report(103), 10), 13);
     }
 }

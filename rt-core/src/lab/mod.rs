@@ -3,6 +3,7 @@
 //! [`latency`] runs a measurement and writes a report; [`verify`] checks that a filed report is as it was
 //! written; [`doctor`] says whether this PC is fit. Nothing in here claims that a standard is met.
 
+pub mod collect;
 pub mod compare;
 pub mod doctor;
 pub mod gaps;

@@ -1,6 +1,6 @@
 //! The pictures of a report, as SVG.
 
-use crate::rt::timing::{LoopTiming, Window};
+use crate::lab::collect::{LoopTiming, Window};
 use hdrhistogram::Histogram;
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{KeyPointHint, Ranged, ValueFormatter};
@@ -37,7 +37,11 @@ fn label() -> TextStyle<'static> {
 
 /// Short, without trailing zeros: 0.1, 20, 5000.
 fn number(value: f64) -> String {
-    let text = if value >= 10.0 { format!("{value:.0}") } else { format!("{value:.3}") };
+    let text = if value >= 10.0 {
+        format!("{value:.0}")
+    } else {
+        format!("{value:.3}")
+    };
     if text.contains('.') {
         text.trim_end_matches('0').trim_end_matches('.').to_owned()
     } else {
@@ -68,7 +72,10 @@ impl Ranged for Decades {
     }
 
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        if !matches!(hint.weight(), plotters::coord::ranged1d::KeyPointWeight::Bold | plotters::coord::ranged1d::KeyPointWeight::Any) {
+        if !matches!(
+            hint.weight(),
+            plotters::coord::ranged1d::KeyPointWeight::Bold | plotters::coord::ranged1d::KeyPointWeight::Any
+        ) {
             return Vec::new();
         }
         let (first, last) = (self.0.start.log10().ceil() as i32, self.0.end.log10().floor() as i32);
@@ -117,7 +124,7 @@ pub fn wake_histogram(series: &[Series]) -> Result<String, String> {
             .set_label_area_size(LabelAreaPosition::Left, 58)
             .set_label_area_size(LabelAreaPosition::Bottom, 40)
             .build_cartesian_2d(0.0..right, Decades(0.5..decade_above(top), number))?;
-        mesh(&mut chart, "wake-up latency, us", "ticks in a bin")?;
+        mesh(&mut chart, "wake-up latency, \u{b5}s", "ticks in a bin")?;
         for (s, counts) in series.iter().zip(&counted) {
             let style = s.color.mix(0.75).filled();
             chart.draw_series(counts.iter().enumerate().filter(|(_, n)| **n > 0).map(|(i, &n)| {
@@ -130,7 +137,10 @@ pub fn wake_histogram(series: &[Series]) -> Result<String, String> {
                 }
             }))?;
         }
-        legend(root, &series.iter().map(|s| (beyond(s, right), s.color)).collect::<Vec<_>>())
+        legend(
+            root,
+            &series.iter().map(|s| (beyond(s, right), s.color)).collect::<Vec<_>>(),
+        )
     })
 }
 
@@ -150,7 +160,7 @@ fn beyond(series: &Series, right_us: f64) -> String {
     let past = h.len() - h.count_between(0, (right_us * 1e3) as u64);
     match past {
         0 => series.name.to_owned(),
-        n => format!("{}, {n} later than {right_us:.0} us", series.name),
+        n => format!("{}, {n} later than {right_us:.0} \u{b5}s", series.name),
     }
 }
 
@@ -181,8 +191,14 @@ pub fn stages(timing: &LoopTiming) -> Result<String, String> {
             let y = count - row as f64 - 0.5;
             let [p50, p999] = [0.5, 0.999].map(|q| us(h.value_at_quantile(q)));
             let color = if *name == "whole tick" { ORANGE } else { BLUE };
-            chart.draw_series([PathElement::new([(p50, y), (us(h.max()), y)], color.mix(0.35).stroke_width(1))])?;
-            chart.draw_series([Rectangle::new([(p50, y - 0.18), (p999.max(p50 * 1.03), y + 0.18)], color.filled())])?;
+            chart.draw_series([PathElement::new(
+                [(p50, y), (us(h.max()), y)],
+                color.mix(0.35).stroke_width(1),
+            )])?;
+            chart.draw_series([Rectangle::new(
+                [(p50, y - 0.18), (p999.max(p50 * 1.03), y + 0.18)],
+                color.filled(),
+            )])?;
             chart.draw_series([Circle::new((us(h.max()), y), 3, color.filled())])?;
             let (_, at) = chart.backend_coord(&(0.01, y));
             let style = label().pos(Pos::new(HPos::Right, VPos::Center));
@@ -204,7 +220,10 @@ pub fn windows(windows: &[Window], window_ns: u64) -> Result<String, String> {
         let window_s = window_ns as f64 / 1e9;
         let right = used.last().map_or(1.0, |(t, _)| t + window_s);
         let us = |ns: u64| (ns as f64 / 1e3).max(0.1);
-        let all = || used.iter().flat_map(|(_, w)| [us(w.worst_wake_ns), us(w.worst_work_ns)]);
+        let all = || {
+            used.iter()
+                .flat_map(|(_, w)| [us(w.worst_wake_ns), us(w.worst_work_ns)])
+        };
         let low = all().fold(f64::MAX, f64::min).min(1.0).log10().floor();
         let high = all().fold(1.0, f64::max);
         let mut chart = ChartBuilder::on(root)
@@ -213,9 +232,15 @@ pub fn windows(windows: &[Window], window_ns: u64) -> Result<String, String> {
             .set_label_area_size(LabelAreaPosition::Left, 58)
             .set_label_area_size(LabelAreaPosition::Bottom, 40)
             .build_cartesian_2d(0.0..right, Decades(10_f64.powf(low)..decade_above(high * 1.5), number))?;
-        mesh(&mut chart, "time into the run, s", "worst in a window, us")?;
-        let wake: Vec<_> = used.iter().map(|(t, w)| (*t + window_s / 2.0, us(w.worst_wake_ns))).collect();
-        let work: Vec<_> = used.iter().map(|(t, w)| (*t + window_s / 2.0, us(w.worst_work_ns))).collect();
+        mesh(&mut chart, "time into the run, s", "worst in a window, \u{b5}s")?;
+        let wake: Vec<_> = used
+            .iter()
+            .map(|(t, w)| (*t + window_s / 2.0, us(w.worst_wake_ns)))
+            .collect();
+        let work: Vec<_> = used
+            .iter()
+            .map(|(t, w)| (*t + window_s / 2.0, us(w.worst_work_ns)))
+            .collect();
         chart.draw_series(LineSeries::new(wake, BLUE.stroke_width(1)))?;
         chart.draw_series(LineSeries::new(work, ORANGE.stroke_width(1)))?;
         legend(root, &[("wake-up".to_owned(), BLUE), ("whole tick".to_owned(), ORANGE)])
@@ -226,6 +251,8 @@ pub fn windows(windows: &[Window], window_ns: u64) -> Result<String, String> {
 pub fn tail(series: &[Series]) -> Result<String, String> {
     picture(|root| {
         let longest = series.iter().map(|s| s.histogram.max()).max().unwrap_or(1) as f64 / 1e3;
+        let shortest = series.iter().map(|s| s.histogram.min()).min().unwrap_or(0) as f64 / 1e3;
+        let left = 10_f64.powi(shortest.max(0.1).log10().floor() as i32);
         let most = series.iter().map(|s| s.histogram.len()).max().unwrap_or(1).max(10) as f64;
         let least = 10_f64.powi((0.5 / most).log10().floor() as i32);
         let mut chart = ChartBuilder::on(root)
@@ -233,12 +260,16 @@ pub fn tail(series: &[Series]) -> Result<String, String> {
             .margin_right(22)
             .set_label_area_size(LabelAreaPosition::Left, 58)
             .set_label_area_size(LabelAreaPosition::Bottom, 40)
-            .build_cartesian_2d(Decades(0.1..decade_above(longest.max(1.0)), number), Decades(least..1.0, share))?;
+            .build_cartesian_2d(
+                Decades(left..decade_above(longest.max(left * 10.0)), number),
+                Decades(least..1.0, share),
+            )?;
         mesh(&mut chart, "microseconds", "share of ticks above")?;
         for s in series {
             chart.draw_series(LineSeries::new(above(s.histogram), s.color.stroke_width(2)))?;
         }
-        legend(root, &series.iter().map(|s| (s.name.to_owned(), s.color)).collect::<Vec<_>>())
+        let entries: Vec<_> = series.iter().map(|s| (s.name.to_owned(), s.color)).collect();
+        legend_at_left(root, &entries)
     })
 }
 
@@ -255,11 +286,7 @@ fn above(histogram: &Histogram<u64>) -> Vec<(f64, f64)> {
     line
 }
 
-fn mesh<X, Y>(
-    chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, Y>>,
-    x: &str,
-    y: &str,
-) -> Drawn
+fn mesh<X, Y>(chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, Y>>, x: &str, y: &str) -> Drawn
 where
     X: Ranged<ValueType = f64> + ValueFormatter<f64>,
     Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
@@ -290,11 +317,21 @@ fn legend(root: &Area, entries: &[(String, RGBColor)]) -> Drawn {
     Ok(())
 }
 
+/// In the lower left corner, where a tail has nothing to show.
+fn legend_at_left(root: &Area, entries: &[(String, RGBColor)]) -> Drawn {
+    for (i, (name, color)) in entries.iter().rev().enumerate() {
+        let y = SIZE.1 as i32 - 66 - 18 * i as i32;
+        root.draw(&Rectangle::new([(82, y - 5), (92, y + 5)], color.filled()))?;
+        let style = label().pos(Pos::new(HPos::Left, VPos::Center));
+        root.draw(&Text::new(name.clone(), (98, y), style))?;
+    }
+    Ok(())
+}
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rt::timing::histogram;
+    use crate::lab::collect::histogram;
 
     #[test]
     fn bins_and_tail_keep_every_sample() {

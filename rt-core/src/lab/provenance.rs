@@ -102,8 +102,16 @@ pub fn facts(machine: &Machine, options: &Options) -> Vec<Fact> {
     add("Kernel", "preemption", machine.preemption().name().to_owned());
     add("Kernel", "command line", text("proc/cmdline"));
     add("Kernel", "real-time share", share(machine));
-    add("Kernel", "real-time groups", or_untold(machine.build_option("RT_GROUP_SCHED")));
-    add("Kernel", "timer", format!("CONFIG_HZ={}", or_untold(machine.build_option("HZ"))));
+    add(
+        "Kernel",
+        "real-time groups",
+        or_untold(machine.build_option("RT_GROUP_SCHED")),
+    );
+    add(
+        "Kernel",
+        "timer",
+        format!("CONFIG_HZ={}", or_untold(machine.build_option("HZ"))),
+    );
     let cpu = |key| or_untold(machine.cpuinfo(0, key));
     add("Processor", "model", cpu("model name"));
     add("Processor", "microcode", cpu("microcode"));
@@ -118,27 +126,56 @@ pub fn facts(machine: &Machine, options: &Options) -> Vec<Fact> {
     let hypervisor = machine.hypervisor().unwrap_or_else(|| "none found".to_owned());
     add("Processor", "hypervisor", hypervisor);
     add("Processor", "firmware", text("sys/class/dmi/id/bios_version"));
-    for (role, core) in [("force loop", options.haptic_core), ("tissue step", options.tissue_core)] {
+    for (role, core) in [
+        ("force loop", options.haptic_core),
+        ("tissue step", options.tissue_core),
+    ] {
         let Some(core) = core else { continue };
-        add("Cores in use", &format!("core of the {role}"), core_facts(machine, core));
+        add(
+            "Cores in use",
+            &format!("core of the {role}"),
+            core_facts(machine, core),
+        );
         let served = machine.interrupts_allowed_on(core);
         let said: Vec<String> = served.iter().map(|(n, who)| format!("{n} {who}")).collect();
-        let said = if said.is_empty() { "none".to_owned() } else { said.join(", ") };
+        let said = if said.is_empty() {
+            "none".to_owned()
+        } else {
+            said.join(", ")
+        };
         add("Cores in use", &format!("interrupts allowed on core {core}"), said);
     }
-    let total = machine.text("proc/meminfo").and_then(|t| t.lines().next().map(str::to_owned));
-    add("Memory", "installed", or_untold(total.map(|l| l.trim_start_matches("MemTotal:").trim().to_owned())));
-    let swaps = machine.text("proc/swaps").map_or(0, |t| t.lines().count().saturating_sub(1));
+    let total = machine
+        .text("proc/meminfo")
+        .and_then(|t| t.lines().next().map(str::to_owned));
+    add(
+        "Memory",
+        "installed",
+        or_untold(total.map(|l| l.trim_start_matches("MemTotal:").trim().to_owned())),
+    );
+    let swaps = machine
+        .text("proc/swaps")
+        .map_or(0, |t| t.lines().count().saturating_sub(1));
     add("Memory", "swap areas", swaps.to_string());
-    add("Memory", "huge pages", text("sys/kernel/mm/transparent_hugepage/enabled"));
+    add(
+        "Memory",
+        "huge pages",
+        text("sys/kernel/mm/transparent_hugepage/enabled"),
+    );
     facts
 }
 
 fn core_facts(machine: &Machine, core: usize) -> String {
-    let governor = machine.governor(core).unwrap_or_else(|| "no frequency scaling seen".to_owned());
+    let governor = machine
+        .governor(core)
+        .unwrap_or_else(|| "no frequency scaling seen".to_owned());
     let states = machine.idle_states(core);
     let states: Vec<String> = states.iter().map(|(name, us)| format!("{name} {us} us")).collect();
-    let states = if states.is_empty() { "not told".to_owned() } else { states.join(", ") };
+    let states = if states.is_empty() {
+        "not told".to_owned()
+    } else {
+        states.join(", ")
+    };
     let siblings = core_list(&machine.siblings(core));
     format!("{core}; governor: {governor}; sleep states: {states}; SMT siblings: {siblings}")
 }
@@ -178,7 +215,12 @@ pub fn settings(machine: &Machine, options: &Options, run: &RunReport) -> Vec<Se
         let told = |policy, priority| format!("{} {priority}", policy_name(policy));
         let met = (t.policy, t.priority) == (asked, t.asked_priority);
         let (wanted, got) = (told(asked, t.asked_priority), told(t.policy, t.priority));
-        add(&format!("{name} thread: policy and priority"), wanted, got, met && asked == 1);
+        add(
+            &format!("{name} thread: policy and priority"),
+            wanted,
+            got,
+            met && asked == 1,
+        );
         let core = |c: u32| if c == u32::MAX { "any".to_owned() } else { c.to_string() };
         add(
             &format!("{name} thread: core"),
@@ -190,7 +232,11 @@ pub fn settings(machine: &Machine, options: &Options, run: &RunReport) -> Vec<Se
     thread("haptic", &run.haptic);
     thread("tissue", &run.tissue);
     let status = machine.text("proc/self/status").unwrap_or_default();
-    let locked = status.lines().find_map(|l| l.strip_prefix("VmLck:")).unwrap_or("not told").trim();
+    let locked = status
+        .lines()
+        .find_map(|l| l.strip_prefix("VmLck:"))
+        .unwrap_or("not told")
+        .trim();
     add(
         "memory lock",
         "all pages, present and future".to_owned(),
@@ -201,7 +247,12 @@ pub fn settings(machine: &Machine, options: &Options, run: &RunReport) -> Vec<Se
         Some(us) => format!("{us} us"),
         None => "not granted".to_owned(),
     };
-    add("core wake-up (/dev/cpu_dma_latency)", "0 us".to_owned(), awake, run.exit_latency_us == Some(0));
+    add(
+        "core wake-up (/dev/cpu_dma_latency)",
+        "0 us".to_owned(),
+        awake,
+        run.exit_latency_us == Some(0),
+    );
     let spin = format!("{} us", options.spin_ns / 1_000);
     add("spin before the deadline", spin.clone(), spin, true);
     settings
@@ -230,9 +281,15 @@ mod tests {
     #[test]
     fn dependencies_are_those_of_the_lock_file_with_their_anomalies() {
         let all = dependencies();
-        let iceoryx2 = all.iter().find(|d| d.name == "iceoryx2").expect("rt-core is built on it");
+        let iceoryx2 = all
+            .iter()
+            .find(|d| d.name == "iceoryx2")
+            .expect("rt-core is built on it");
         assert!(iceoryx2.known_anomalies.iter().any(|a| a.contains("2008")));
-        assert!(all.iter().any(|d| d.name == "stylet-hw" && d.version == env!("CARGO_PKG_VERSION")));
+        assert!(
+            all.iter()
+                .any(|d| d.name == "stylet-hw" && d.version == env!("CARGO_PKG_VERSION"))
+        );
         assert!(all.iter().all(|d| d.name != "host-ui" && d.name != "egui"));
         let lock = include_str!("../../../Cargo.lock");
         assert!(lock.contains(&format!("name = \"iceoryx2\"\nversion = \"{}\"", iceoryx2.version)));

@@ -1,6 +1,7 @@
 //! The report of a measurement: everything in one record, written as JSON, as a page, and as raw histograms.
 
 use crate::core::{LoopReport, Options};
+use crate::lab::collect::LoopTiming;
 use crate::lab::compare::Comparison;
 use crate::lab::html;
 use crate::lab::load::Load;
@@ -10,7 +11,6 @@ use crate::lab::provenance::{self, Dependency, Fact, Setting};
 use crate::lab::summary::{Summary, quantile_us, summary};
 use crate::lab::verdict::{self, Judged, Limits, Outcome};
 use crate::lab::watch::CoreWatch;
-use crate::rt::timing::LoopTiming;
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, Tag};
@@ -54,6 +54,8 @@ pub struct LoopCounts {
     pub ticks: u64,
     pub missed_deadlines: u64,
     pub overruns: u64,
+    /// Ticks that the measurement itself lost.
+    pub unmeasured: u64,
     pub heap_calls: u64,
     pub minor_faults: i64,
     pub major_faults: i64,
@@ -209,13 +211,13 @@ pub fn report(parts: &Parts) -> Report {
         environment: environment(&unqualified, measured),
         haptic: loop_section(
             &measured.run.haptic,
-            measured.haptic(),
+            &measured.haptic,
             rate_hz,
             ["device read to force written", "due to force written"],
         ),
         tissue: loop_section(
             &measured.run.tissue,
-            measured.tissue(),
+            &measured.tissue,
             tissue_rate_hz,
             ["tip moved to response published", "due to response published"],
         ),
@@ -229,7 +231,7 @@ pub fn report(parts: &Parts) -> Report {
             records_missing: host.records_missing,
             faults: host.faults,
         },
-        stiffness: stiffness(&measured.haptic().due_to_output, period_ns),
+        stiffness: stiffness(&measured.haptic.due_to_output, period_ns),
         windows: windows(measured),
         latest_wake_ups: latest(measured),
         gaps: gap_section(measured),
@@ -250,7 +252,7 @@ fn loop_section(run: &LoopReport, timing: &LoopTiming, rate_hz: f64, [path, outp
         of("whole tick", &timing.work),
         of(path, &timing.path),
         of(output, &timing.due_to_output),
-        of("recording of all this", &timing.recording),
+        of("handing over what was measured", &timing.recording),
     ]);
     LoopSection {
         times,
@@ -258,11 +260,12 @@ fn loop_section(run: &LoopReport, timing: &LoopTiming, rate_hz: f64, [path, outp
             ticks: run.ticks,
             missed_deadlines: timing.missed,
             overruns: timing.overruns,
+            unmeasured: timing.lost,
             heap_calls: run.usage.heap_calls,
             minor_faults: run.usage.minor_faults,
             major_faults: run.usage.major_faults,
             voluntary_switches: run.usage.voluntary_switches,
-            voluntary_switches_beyond_sleep: switches_beyond_sleep(run),
+            voluntary_switches_beyond_sleep: switches_beyond_sleep(run, timing.unslept),
             involuntary_switches: run.usage.involuntary_switches,
         },
         work_p999_of_period: quantile_us(&timing.work, 0.999).map(|us| us * rate_hz / 1e6),
@@ -317,7 +320,7 @@ fn stiffness(delay: &Histogram<u64>, period_ns: u64) -> StiffnessSection {
 }
 
 fn windows(measured: &Measured) -> Vec<WindowRow> {
-    let timing = measured.haptic();
+    let timing = &measured.haptic;
     let used = timing.windows.iter().enumerate().filter(|(_, w)| w.ticks > 0);
     used.map(|(i, w)| WindowRow {
         at_s: i as f64 * measured.window_ns as f64 / 1e9,
@@ -329,14 +332,17 @@ fn windows(measured: &Measured) -> Vec<WindowRow> {
 }
 
 fn latest(measured: &Measured) -> Vec<Late> {
-    let timing = measured.haptic();
+    let timing = &measured.haptic;
     let late = timing.worst.iter().filter(|t| t.wake_ns > 0);
     late.map(|t| Late {
         at_s: t.due_ns.saturating_sub(timing.first_due_ns) as f64 / 1e9,
         wake_us: t.wake_ns as f64 / 1e3,
         work_us: t.work_ns as f64 / 1e3,
         cause: match measured.gaps.during(t.due_ns, t.due_ns + t.wake_ns) {
-            Some(ns) => format!("a gap of {:.0} us on the watched core at the same time", ns as f64 / 1e3),
+            Some(ns) => format!(
+                "a gap of {:.0} us on the watched core at the same time",
+                ns as f64 / 1e3
+            ),
             None => "not seen from the watched core".to_owned(),
         },
     })
@@ -386,7 +392,7 @@ pub fn sha256(bytes: &[u8]) -> String {
 /// Every histogram in the interval log format of HdrHistogram, nanoseconds, one tagged line each.
 fn raw_histograms(report: &Report, measured: &Measured) -> Result<Vec<u8>, String> {
     let mut all: Vec<(String, &Histogram<u64>)> = Vec::new();
-    for (name, timing) in [("haptic", measured.haptic()), ("tissue", measured.tissue())] {
+    for (name, timing) in [("haptic", &measured.haptic), ("tissue", &measured.tissue)] {
         let mut add = |what: &str, h| all.push((format!("{name}/{}", what.replace(' ', "_")), h));
         add("wake", &timing.wake);
         add("jitter", &timing.jitter);
@@ -437,7 +443,7 @@ mod tests {
 
     #[test]
     fn margins_fall_as_the_delay_grows() {
-        let mut delay = crate::rt::timing::histogram();
+        let mut delay = crate::lab::collect::histogram();
         for i in 0..20_000_u64 {
             delay.record(15_000 + i * 10).expect("in range");
         }

@@ -1,5 +1,7 @@
 //! Limits, and whether a measurement meets them: pass, fail, or not measurable, each with its evidence.
 
+use crate::core::LoopReport;
+use crate::lab::collect::LoopTiming;
 use crate::lab::measure::{Measured, switches_beyond_sleep};
 use crate::lab::provenance::stiffness_margin_n_per_m;
 use crate::lab::summary::{needed, quantile_us};
@@ -78,7 +80,11 @@ limits! {
 
 impl LimitSpec {
     fn default_for(&self, period_ns: u64) -> f64 {
-        let scale = if self.scales_with_period { period_ns as f64 / 1e6 } else { 1.0 };
+        let scale = if self.scales_with_period {
+            period_ns as f64 / 1e6
+        } else {
+            1.0
+        };
         self.default * scale
     }
 
@@ -238,10 +244,10 @@ fn percentile(histogram: &Histogram<u64>, quantile: f64) -> Read {
 }
 
 fn read(reading: Reading, m: &Measured, period_ns: u64) -> Read {
-    let (haptic, tissue) = (m.haptic(), m.tissue());
-    let loops = [("haptic", &m.run.haptic), ("tissue", &m.run.tissue)];
-    let counted = |what: fn(&crate::core::LoopReport) -> i64| -> Read {
-        let counts = loops.map(|(name, r)| (name, what(r), r.ticks));
+    let (haptic, tissue) = (&m.haptic, &m.tissue);
+    let loops = [("haptic", &m.run.haptic, haptic), ("tissue", &m.run.tissue, tissue)];
+    let counted = |what: fn(&LoopReport, &LoopTiming) -> i64| -> Read {
+        let counts = loops.map(|(name, run, timing)| (name, what(run, timing), run.ticks));
         let said = counts.map(|(name, n, ticks)| format!("{name} {n} in {ticks} ticks"));
         (Some(counts.iter().map(|c| c.1 as f64).sum()), said.join(", "))
     };
@@ -262,9 +268,9 @@ fn read(reading: Reading, m: &Measured, period_ns: u64) -> Read {
         }
         Reading::Missed => of_ticks(haptic.missed),
         Reading::Overruns => of_ticks(haptic.overruns),
-        Reading::HeapCalls => counted(|r| r.usage.heap_calls as i64),
-        Reading::PageFaults => counted(|r| r.usage.minor_faults + r.usage.major_faults),
-        Reading::ExtraSwitches => counted(switches_beyond_sleep),
+        Reading::HeapCalls => counted(|r, _| r.usage.heap_calls as i64),
+        Reading::PageFaults => counted(|r, _| r.usage.minor_faults + r.usage.major_faults),
+        Reading::ExtraSwitches => counted(|r, t| switches_beyond_sleep(r, t.unslept)),
         Reading::RecordsMissing => (
             Some(m.host.records_missing as f64),
             format!("{} records seen by the host", m.host.records),
@@ -280,7 +286,11 @@ mod tests {
     #[test]
     fn names_and_ids_are_unique() {
         for (i, a) in LIMITS.iter().enumerate() {
-            assert!(LIMITS[i + 1..].iter().all(|b| b.name != a.name && b.id != a.id), "{}", a.name);
+            assert!(
+                LIMITS[i + 1..].iter().all(|b| b.name != a.name && b.id != a.id),
+                "{}",
+                a.name
+            );
         }
     }
 
@@ -300,7 +310,10 @@ mod tests {
         let given = ["wake_p50=7", "wake_p99_us=-1", "faults", "wake_max_us=nan"].map(str::to_owned);
         let why = limits(1_000_000, None, &given).expect_err("all four are wrong");
         assert_eq!(why.lines().count(), 5);
-        assert!(why.contains("\"wake_p50\"") && why.contains("wake_p99_us needs"), "{why}");
+        assert!(
+            why.contains("\"wake_p50\"") && why.contains("wake_p99_us needs"),
+            "{why}"
+        );
     }
 
     fn judged(outcome: Outcome) -> Judged {
@@ -330,7 +343,7 @@ mod tests {
 
     #[test]
     fn percentile_without_ten_samples_beyond_is_not_told() {
-        let mut h = crate::rt::timing::histogram();
+        let mut h = crate::lab::collect::histogram();
         for ns in 1..=999_u64 {
             h.record(ns * 1_000).expect("in range");
         }

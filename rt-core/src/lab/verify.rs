@@ -5,7 +5,11 @@ use std::path::Path;
 
 /// Checks the report at `place`, its folder or its `report.json`, and says what it found: 0 when all is as written.
 pub fn run(place: &Path) -> Result<u8, String> {
-    let file = if place.is_dir() { place.join(JSON) } else { place.to_owned() };
+    let file = if place.is_dir() {
+        place.join(JSON)
+    } else {
+        place.to_owned()
+    };
     let text = std::fs::read_to_string(&file).map_err(|e| format!("cannot read {}: {e}", file.display()))?;
     let folder = file.parent().unwrap_or(Path::new("."));
     let problems = problems(&text, |name| std::fs::read(folder.join(name)).ok());
@@ -30,10 +34,15 @@ fn problems(text: &str, read: impl Fn(&str) -> Option<Vec<u8>>) -> Vec<String> {
     let mut problems = Vec::new();
     let found = sha256(text.replacen(digest, NO_DIGEST, 1).as_bytes());
     if found != digest {
-        problems.push(format!("{JSON}: tampered with: its SHA-256 is {found}, it says {digest}"));
+        problems.push(format!(
+            "{JSON}: tampered with: its SHA-256 is {found}, it says {digest}"
+        ));
     }
     for file in report["files"].as_array().into_iter().flatten() {
-        let (name, said) = (file["name"].as_str().unwrap_or_default(), file["sha256"].as_str().unwrap_or_default());
+        let (name, said) = (
+            file["name"].as_str().unwrap_or_default(),
+            file["sha256"].as_str().unwrap_or_default(),
+        );
         let Some(bytes) = read(name) else {
             problems.push(format!("{name}: missing"));
             continue;
@@ -44,7 +53,9 @@ fn problems(text: &str, read: impl Fn(&str) -> Option<Vec<u8>>) -> Vec<String> {
             Err(_) => bytes,
         };
         if sha256(&bare) != said {
-            problems.push(format!("{name}: tampered with: its SHA-256 is not the one that the report names"));
+            problems.push(format!(
+                "{name}: tampered with: its SHA-256 is not the one that the report names"
+            ));
         }
     }
     problems
@@ -71,7 +82,13 @@ mod tests {
     }
 
     fn check(text: &str, raw: Option<&[u8]>, page: &[u8]) -> Vec<String> {
-        problems(text, |name| if name == "raw" { raw.map(<[u8]>::to_vec) } else { Some(page.to_vec()) })
+        problems(text, |name| {
+            if name == "raw" {
+                raw.map(<[u8]>::to_vec)
+            } else {
+                Some(page.to_vec())
+            }
+        })
     }
 
     #[test]

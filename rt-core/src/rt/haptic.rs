@@ -8,7 +8,7 @@ use crate::needle::{self, NeedleInput, NeedleParameters, NeedleState, Phase};
 use crate::rt::arm::Armed;
 use crate::rt::clock::{self, Grid};
 use crate::rt::exchange::*;
-use crate::rt::timing::LoopTiming;
+use crate::rt::timing::Probe;
 use iceoryx2::port::writer::EntryHandleMut;
 use nalgebra::Vector3;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -62,14 +62,20 @@ pub struct HapticLoop {
     /// What hosts see; also holds the counters.
     pub state: HapticState,
     /// Present in a measurement.
-    pub timing: Option<Box<LoopTiming>>,
+    pub probe: Option<Box<Probe>>,
     /// Spinning before each deadline; 0 for none.
     pub spin_ns: u64,
     period_s: f64,
 }
 
-/// What [`LoopTiming`] tells apart in this tick.
-pub const HAPTIC_STAGES: &[&str] = &["orders", "device read", "force law", "gate and write", "publish and record"];
+/// What [`Probe`] tells apart in this tick.
+pub const HAPTIC_STAGES: &[&str] = &[
+    "orders",
+    "device read",
+    "force law",
+    "gate and write",
+    "publish and record",
+];
 /// The mark at which the device read begins.
 const READ_MARK: usize = 0;
 
@@ -117,7 +123,7 @@ impl HapticLoop {
             silent: 0,
             streak: 0,
             state,
-            timing: None,
+            probe: None,
             spin_ns: 0,
             period_s,
         }
@@ -125,8 +131,8 @@ impl HapticLoop {
 
     /// Ends a stage of the tick, in a measurement.
     fn mark(&mut self) {
-        if let Some(timing) = &mut self.timing {
-            timing.mark();
+        if let Some(probe) = &mut self.probe {
+            probe.mark();
         }
     }
 
@@ -145,8 +151,8 @@ impl HapticLoop {
             let woke_ns = clock::now_ns();
             self.tick(grid.due_ns, woke_ns, missed);
             publish(&self.state);
-            if let Some(timing) = &mut self.timing {
-                timing.finish(grid.due_ns, woke_ns, missed, slept);
+            if let Some(probe) = &mut self.probe {
+                probe.finish(grid.due_ns, woke_ns, missed, slept);
             }
             missed = grid.advance(clock::now_ns());
         }
@@ -170,8 +176,8 @@ impl HapticLoop {
         }
         let written_ns = clock::now_ns();
         self.mark();
-        if let Some(timing) = &mut self.timing {
-            timing.output_since_mark(READ_MARK);
+        if let Some(probe) = &mut self.probe {
+            probe.output_since_mark(READ_MARK);
         }
         self.hand_over_pose(woke_ns, &sample, &response);
         self.record(due_ns, [woke_ns, written_ns], missed, &tissue, &response, force_n);

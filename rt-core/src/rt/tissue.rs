@@ -3,7 +3,7 @@
 use crate::rt::arm::Armed;
 use crate::rt::clock::{self, Grid};
 use crate::rt::exchange::*;
-use crate::rt::timing::LoopTiming;
+use crate::rt::timing::Probe;
 use crate::rt::world::World;
 use crate::tissue::{Held, MaterialPoint, StepReport, step};
 use nalgebra::Vector3;
@@ -56,12 +56,18 @@ pub struct TissueLoop {
     report: Option<StepReport>,
     response: TissueResponse,
     /// Present in a measurement.
-    pub timing: Option<Box<LoopTiming>>,
+    pub probe: Option<Box<Probe>>,
     period_s: f64,
 }
 
-/// What [`LoopTiming`] tells apart in this tick.
-pub const TISSUE_STAGES: &[&str] = &["orders and pose", "contact and hold", "constraints", "response", "snapshot"];
+/// What [`Probe`] tells apart in this tick.
+pub const TISSUE_STAGES: &[&str] = &[
+    "orders and pose",
+    "contact and hold",
+    "constraints",
+    "response",
+    "snapshot",
+];
 
 impl TissueLoop {
     pub fn new(session_id: u64, ports: TissuePorts, world: Box<World>, period_s: f64) -> Self {
@@ -77,15 +83,15 @@ impl TissueLoop {
             pose: TipPose::default(),
             report: None,
             response: TissueResponse::default(),
-            timing: None,
+            probe: None,
             period_s,
         }
     }
 
     /// Ends a stage of the tick, in a measurement.
     fn mark(&mut self) {
-        if let Some(timing) = &mut self.timing {
-            timing.mark();
+        if let Some(probe) = &mut self.probe {
+            probe.mark();
         }
     }
 
@@ -104,8 +110,8 @@ impl TissueLoop {
             let woke_ns = clock::now_ns();
             self.response.worst_wake_ns = self.response.worst_wake_ns.max(woke_ns - grid.due_ns);
             self.tick(woke_ns);
-            if let Some(timing) = &mut self.timing {
-                timing.finish(grid.due_ns, woke_ns, missed, slept);
+            if let Some(probe) = &mut self.probe {
+                probe.finish(grid.due_ns, woke_ns, missed, slept);
             }
             missed = grid.advance(clock::now_ns());
             self.response.missed += u64::from(missed);
@@ -129,8 +135,8 @@ impl TissueLoop {
         self.mark();
         self.respond(woke_ns, &report);
         self.mark();
-        if let Some(timing) = &mut self.timing {
-            timing.output_for_pose(self.response.tick, self.pose.time_ns);
+        if let Some(probe) = &mut self.probe {
+            probe.output_for_pose(self.response.tick, self.pose.time_ns);
         }
         self.publish_snapshot(woke_ns, &report);
     }

@@ -35,7 +35,10 @@ pub fn isolation(machine: &Machine, core: usize) -> Finding {
     Finding::new(
         "isolation",
         Severity::Warning,
-        format!("core {core} is open to all threads (isolated cores: {})", core_list(&isolated)),
+        format!(
+            "core {core} is open to all threads (isolated cores: {})",
+            core_list(&isolated)
+        ),
         format!(
             "add to GRUB_CMDLINE_LINUX in /etc/default/grub: isolcpus=managed_irq,domain,{core} nohz_full={core} rcu_nocbs={core}   \
              then: sudo update-grub, and restart"
@@ -52,13 +55,24 @@ pub fn interrupts(machine: &Machine, core: usize) -> Finding {
     if allowed.is_empty() && !balanced {
         return Finding::good("interrupts", format!("no device interrupt is served on core {core}"));
     }
-    let named: Vec<String> = allowed.iter().take(NAMED).map(|(n, who)| format!("{n} {who}")).collect();
+    let named: Vec<String> = allowed
+        .iter()
+        .take(NAMED)
+        .map(|(n, who)| format!("{n} {who}"))
+        .collect();
     let rest = allowed.len().saturating_sub(NAMED);
-    let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
+    let more = if rest > 0 {
+        format!(" and {rest} more")
+    } else {
+        String::new()
+    };
     let mut what = if allowed.is_empty() {
         format!("no device interrupt is served on core {core} now")
     } else {
-        format!("device interrupts may be served on core {core}: {}{more}", named.join(", "))
+        format!(
+            "device interrupts may be served on core {core}: {}{more}",
+            named.join(", ")
+        )
     };
     let mut cure = Vec::new();
     if balanced {
@@ -113,16 +127,27 @@ pub fn sleep_states(machine: &Machine, core: usize) -> Finding {
         (false, true) => Finding::new(
             "sleep states",
             Severity::Note,
-            format!("core {core} may sleep deeply ({}); rt-core forbids it through /dev/cpu_dma_latency while it runs as root", deep.join(", ")),
+            format!(
+                "core {core} may sleep deeply ({}); rt-core forbids it through /dev/cpu_dma_latency while it runs as root",
+                deep.join(", ")
+            ),
             "to run without root: sudo chgrp users /dev/cpu_dma_latency && sudo chmod g+rw /dev/cpu_dma_latency",
         ),
         (false, false) => Finding::new(
             "sleep states",
             Severity::Warning,
-            format!("core {core} may sleep deeply ({}), and there is no /dev/cpu_dma_latency to forbid it", deep.join(", ")),
-            format!("for s in /sys/devices/system/cpu/cpu{core}/cpuidle/state*; do [ $(cat $s/latency) -gt {DEEP_US} ] && echo 1 | sudo tee $s/disable; done"),
+            format!(
+                "core {core} may sleep deeply ({}), and there is no /dev/cpu_dma_latency to forbid it",
+                deep.join(", ")
+            ),
+            format!(
+                "for s in /sys/devices/system/cpu/cpu{core}/cpuidle/state*; do [ $(cat $s/latency) -gt {DEEP_US} ] && echo 1 | sudo tee $s/disable; done"
+            ),
         ),
-        (true, true) => Finding::good("sleep states", format!("no deep sleep state is seen on core {core}, and /dev/cpu_dma_latency is there to forbid one")),
+        (true, true) => Finding::good(
+            "sleep states",
+            format!("no deep sleep state is seen on core {core}, and /dev/cpu_dma_latency is there to forbid one"),
+        ),
         (true, false) => Finding::new(
             "sleep states",
             Severity::Note,

@@ -34,14 +34,21 @@ pub fn haptic(machine: &Machine) -> Finding {
         );
     }
     let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
-    let driver = ["usr/lib64/libHD.so", "usr/lib/libHD.so", "usr/lib/x86_64-linux-gnu/libHD.so"];
+    let driver = [
+        "usr/lib64/libHD.so",
+        "usr/lib/libHD.so",
+        "usr/lib/x86_64-linux-gnu/libHD.so",
+    ];
     if driver.iter().any(|path| machine.exists(path)) {
         Finding::good("devices", format!("{}, and its driver libHD", names.join(", ")))
     } else {
         Finding::new(
             "devices",
             Severity::Warning,
-            format!("{} is connected, but its driver libHD is not installed", names.join(", ")),
+            format!(
+                "{} is connected, but its driver libHD is not installed",
+                names.join(", ")
+            ),
             "install OpenHaptics and the device driver of 3D Systems",
         )
     }
@@ -58,7 +65,10 @@ fn parallel_port(machine: &Machine, modes: &str) -> Finding {
         );
     }
     if machine.exists("dev/phnepp") {
-        return Finding::good("devices", "a parallel port with EPP, linked as /dev/phnepp for a Phantom Premium");
+        return Finding::good(
+            "devices",
+            "a parallel port with EPP, linked as /dev/phnepp for a Phantom Premium",
+        );
     }
     Finding::new(
         "devices",

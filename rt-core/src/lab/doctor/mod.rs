@@ -100,7 +100,10 @@ fn verdict(findings: &[Finding]) -> &'static str {
 
 /// Examines this PC and prints; 1 when there is a blocker.
 pub fn run(json: bool, haptic_core: Option<usize>) -> u8 {
-    let last = core_affinity::get_core_ids().unwrap_or_default().last().map_or(0, |c| c.id);
+    let last = core_affinity::get_core_ids()
+        .unwrap_or_default()
+        .last()
+        .map_or(0, |c| c.id);
     let core = haptic_core.unwrap_or(last);
     let findings = examine(&Machine::this(), core);
     if json {

@@ -17,10 +17,13 @@ pub fn priority(machine: &Machine) -> Finding {
         return Finding::good("priority", "this shell may use any real-time priority (CAP_SYS_NICE)");
     }
     match machine.limit("Max realtime priority") {
-        Some(limit) if limit >= WANTED_PRIORITY => Finding::good("priority", format!("real-time priorities up to {limit} are allowed")),
+        Some(limit) if limit >= WANTED_PRIORITY => {
+            Finding::good("priority", format!("real-time priorities up to {limit} are allowed"))
+        }
         limit => {
             let limit = limit.unwrap_or(0);
-            let what = format!("real-time priorities up to {limit} are allowed, the force loop asks for {WANTED_PRIORITY}");
+            let what =
+                format!("real-time priorities up to {limit} are allowed, the force loop asks for {WANTED_PRIORITY}");
             Finding::new("priority", Severity::Blocker, what, arm::advice("grant it"))
         }
     }
@@ -41,7 +44,10 @@ pub fn memory_lock(machine: &Machine) -> Finding {
             Finding::good("memory lock", format!("{} MiB may be locked", bytes >> 20))
         }
         bytes => {
-            let what = format!("only {} MiB may be locked; a page that is not locked can be taken away mid tick", bytes.unwrap_or(0) >> 20);
+            let what = format!(
+                "only {} MiB may be locked; a page that is not locked can be taken away mid tick",
+                bytes.unwrap_or(0) >> 20
+            );
             Finding::new("memory lock", Severity::Blocker, what, arm::advice("grant it"))
         }
     }

@@ -22,11 +22,17 @@ pub fn free_bytes(path: &Path) -> Option<u64> {
 
 pub fn space(machine: &Machine, free: impl Fn(&Path) -> Option<u64>) -> Finding {
     match free(&machine.path("dev/shm")) {
-        Some(bytes) if bytes >= WANTED_BYTES => Finding::good("shared memory", format!("{} MiB free in /dev/shm", bytes >> 20)),
+        Some(bytes) if bytes >= WANTED_BYTES => {
+            Finding::good("shared memory", format!("{} MiB free in /dev/shm", bytes >> 20))
+        }
         Some(bytes) => Finding::new(
             "shared memory",
             Severity::Blocker,
-            format!("only {} MiB free in /dev/shm; {} MiB are wanted", bytes >> 20, WANTED_BYTES >> 20),
+            format!(
+                "only {} MiB free in /dev/shm; {} MiB are wanted",
+                bytes >> 20,
+                WANTED_BYTES >> 20
+            ),
             "look with: ls -lS /dev/shm   or make it larger: sudo mount -o remount,size=1G /dev/shm",
         ),
         None => Finding::new(
@@ -42,17 +48,30 @@ pub fn space(machine: &Machine, free: impl Fn(&Path) -> Option<u64>) -> Finding 
 pub fn stale_services(machine: &Machine) -> Finding {
     let found = instances(&machine.names("dev/shm"));
     let used = maps(machine);
-    let stale: Vec<&String> = found.iter().filter(|prefix| !used.iter().any(|m| m.contains(*prefix))).collect();
+    let stale: Vec<&String> = found
+        .iter()
+        .filter(|prefix| !used.iter().any(|m| m.contains(*prefix)))
+        .collect();
     if stale.is_empty() {
-        return Finding::good("stale services", format!("{} instances in /dev/shm, each used by a program", found.len()));
+        return Finding::good(
+            "stale services",
+            format!("{} instances in /dev/shm, each used by a program", found.len()),
+        );
     }
     let first: Vec<&str> = stale.iter().take(3).map(|s| s.as_str()).collect();
     let more = if stale.len() > first.len() { ", ..." } else { "" };
-    let remove: Vec<String> = stale.iter().map(|s| format!("rm -r /dev/shm/{s} /dev/shm/{s}_*")).collect();
+    let remove: Vec<String> = stale
+        .iter()
+        .map(|s| format!("rm -r /dev/shm/{s} /dev/shm/{s}_*"))
+        .collect();
     Finding::new(
         "stale services",
         Severity::Note,
-        format!("{} instances in /dev/shm that no program uses: {}{more}", stale.len(), first.join(", ")),
+        format!(
+            "{} instances in /dev/shm that no program uses: {}{more}",
+            stale.len(),
+            first.join(", ")
+        ),
         remove.join("\n"),
     )
 }
@@ -69,11 +88,16 @@ fn instances(names: &[String]) -> BTreeSet<String> {
 
 /// Lines of memory maps that lie in shared memory, of each process that lets us look.
 fn maps(machine: &Machine) -> Vec<String> {
-    let processes = machine.names("proc").into_iter().filter(|n| n.bytes().all(|b| b.is_ascii_digit()));
+    let processes = machine
+        .names("proc")
+        .into_iter()
+        .filter(|n| n.bytes().all(|b| b.is_ascii_digit()));
     let texts = processes.filter_map(|p| machine.text(&format!("proc/{p}/maps")));
     let ours = |text: String| {
         let lines = text.lines().filter_map(|l| l.split_once("/dev/shm/stylet_"));
-        lines.map(|(_, rest)| format!("stylet_{rest}_")).collect::<Vec<String>>()
+        lines
+            .map(|(_, rest)| format!("stylet_{rest}_"))
+            .collect::<Vec<String>>()
     };
     texts.flat_map(ours).collect()
 }
