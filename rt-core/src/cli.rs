@@ -160,7 +160,7 @@ fn longest_spin_ns(period_ns: u64, throttle: Option<Throttle>) -> u64 {
         Some(Throttle::Share(share)) => share,
         Some(Throttle::Off) | None => 0.95,
     };
-    ((share - SHARE_KEPT_FREE).max(0.0) * period_ns as f64) as u64
+    ((share - SHARE_KEPT_FREE).max(0.0) * period_ns as f64).round() as u64
 }
 
 fn duration_ns(text: &str) -> Result<u64, String> {
