@@ -13,8 +13,10 @@ const PERIOD_NS: u64 = 1_000_000;
 const SPIN_NS: u64 = 100_000;
 /// Two reads of the clock are farther apart than this only when something came between.
 const GAP_NS: u64 = 20_000;
-/// Gaps that are kept one by one.
-const KEPT: usize = 256;
+/// A wake-up later than this is kept: no tissue step lasts so long.
+const LATE_NS: u64 = 1_000_000;
+/// Gaps and late wake-ups that are kept one by one.
+const KEPT: usize = 4096;
 
 /// What was found.
 pub struct GapReport {
@@ -27,14 +29,27 @@ pub struct GapReport {
     pub wake: Histogram<u64>,
     /// Begin and length of the first gaps.
     pub found: Vec<(u64, u64)>,
+    /// Due time and lateness of the first wake-ups that were very late.
+    pub late: Vec<(u64, u64)>,
 }
 
 impl GapReport {
-    /// A gap that overlaps `[from_ns, to_ns]`.
-    pub fn during(&self, from_ns: u64, to_ns: u64) -> Option<u64> {
-        let overlaps = |&&(begin, length): &&(u64, u64)| begin < to_ns && begin + length > from_ns;
-        self.found.iter().filter(overlaps).map(|(_, length)| *length).max()
+    /// The longest gap that overlaps `[from_ns, to_ns]`.
+    pub fn gap_during(&self, from_ns: u64, to_ns: u64) -> Option<u64> {
+        longest_overlap(&self.found, from_ns, to_ns)
     }
+
+    /// The latest wake-up of the watch that overlaps `[from_ns, to_ns]`.
+    pub fn late_during(&self, from_ns: u64, to_ns: u64) -> Option<u64> {
+        longest_overlap(&self.late, from_ns, to_ns)
+    }
+}
+
+fn longest_overlap(all: &[(u64, u64)], from_ns: u64, to_ns: u64) -> Option<u64> {
+    let overlap = all
+        .iter()
+        .filter(|(begin, length)| *begin < to_ns && begin + length > from_ns);
+    overlap.map(|(_, length)| *length).max()
 }
 
 /// Watches from `core` at `priority` until `stop`.
@@ -45,6 +60,7 @@ pub fn watch(core: Option<usize>, priority: Option<u32>, stop: &AtomicBool) -> G
         gaps: histogram(),
         wake: histogram(),
         found: Vec::with_capacity(KEPT),
+        late: Vec::with_capacity(KEPT),
     };
     // Without the right to a priority it watches at normal priority: switches are told apart either way.
     let _armed = arm::arm(Ask { priority, core }).or_else(|_| arm::arm(Ask { priority: None, core }));
@@ -52,9 +68,11 @@ pub fn watch(core: Option<usize>, priority: Option<u32>, stop: &AtomicBool) -> G
     // SYNC: nothing but the flag is carried.
     while !stop.load(Ordering::Acquire) {
         clock::sleep_until(grid.due_ns);
-        report
-            .wake
-            .saturating_record(clock::now_ns().saturating_sub(grid.due_ns));
+        let late_ns = clock::now_ns().saturating_sub(grid.due_ns);
+        report.wake.saturating_record(late_ns);
+        if late_ns > LATE_NS && report.late.len() < KEPT {
+            report.late.push((grid.due_ns, late_ns));
+        }
         spin(&mut report);
         grid.advance(clock::now_ns());
     }
@@ -89,16 +107,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_overlapping_gaps_are_named_and_the_longest_wins() {
-        let report = GapReport {
-            core: None,
-            watched_ns: 0,
-            gaps: histogram(),
-            wake: histogram(),
-            found: vec![(100, 50), (120, 10), (300, 5)],
-        };
-        assert_eq!(report.during(140, 200), Some(50));
-        assert_eq!(report.during(150, 300), None);
-        assert_eq!(report.during(0, 1000), Some(50));
+    fn only_what_overlaps_is_named_and_the_longest_wins() {
+        let all = [(100, 50), (120, 10), (300, 5)];
+        assert_eq!(longest_overlap(&all, 140, 200), Some(50));
+        assert_eq!(longest_overlap(&all, 150, 300), None);
+        assert_eq!(longest_overlap(&all, 0, 1000), Some(50));
     }
 }

@@ -44,18 +44,19 @@ pub struct HostReport {
 
 /// Where the script takes the tip.
 #[derive(Clone, Copy, Debug)]
-struct Script {
+pub struct Script {
     outside_m: [f64; 3],
     inside_m: [f64; 3],
 }
 
 impl Script {
-    /// Along the axis of the scene, from 15 mm before it to four fifths of its length.
-    fn of(scene: &Scene) -> Self {
-        let (lower, upper) = scene.lattice.bounds_m();
+    /// Along the axis of the target, from 15 mm before the body to four fifths of the target.
+    pub fn of(scene: &Scene) -> Self {
+        let (lowest, _) = scene.lattice.bounds_m();
+        let (lower, upper) = scene.target_bounds_m();
         let at = |z: f64| [(lower[0] + upper[0]) / 2.0, (lower[1] + upper[1]) / 2.0, z];
         Self {
-            outside_m: at(lower[2] - 0.015),
+            outside_m: at(lowest[2] - 0.015),
             inside_m: at(lower[2] + 0.8 * (upper[2] - lower[2])),
         }
     }
@@ -106,10 +107,10 @@ pub struct Host {
 }
 
 impl Host {
-    pub fn new(instance: &Instance, scene: &Scene, pose_times: Arc<PoseTimes>) -> Result<Self, ServiceError> {
+    pub fn new(instance: &Instance, script: Script, pose_times: Arc<PoseTimes>) -> Result<Self, ServiceError> {
         Ok(Self {
             ports: Ports::new(instance)?,
-            script: Script::of(scene),
+            script,
             pose_times,
             sent: 0,
             last_tick: 0,

@@ -112,14 +112,14 @@ fn header(r: &Report) -> String {
     format!(
         "<header><h1>Latency report</h1>{}</header>\n\
          <p class=sub>Scene <b>{}</b>, force loop at <b>{} Hz</b>, tissue at {} Hz, load <b>{}</b> ({}), \
-         <b>{}</b> measured, {} insertions. {}, {}.</p>\n{environment}\n",
+         <b>{} s</b> measured, {} insertions. {}, {}.</p>\n{environment}\n",
         badge(r.verdict.overall),
         esc(&p.scene),
         num(p.rate_hz),
         num(p.tissue_rate_hz),
         format!("{:?}", p.load).to_lowercase(),
         esc(&p.load_is),
-        format!("{} s", num(p.measured_s.round())),
+        num(p.measured_s.round()),
         p.insertions,
         esc(&r.made_at),
         esc(&r.program),
@@ -272,16 +272,21 @@ fn time_table(times: &[Summary]) -> String {
     head.extend(["max", "samples"]);
     let row = |s: &Summary| {
         let mut cells = vec![esc(&s.name), or_na(s.min_us), or_na(s.mean_us)];
-        cells.extend(s.quantiles.iter().map(|q| match (q.us, q.needs_s) {
-            (Some(us), _) => num(us),
-            (None, Some(needs)) => format!("<span class=na>n/a<br>needs {}</span>", duration(needs)),
-            (None, None) => or_na(None),
-        }));
+        cells.extend(s.quantiles.iter().map(|q| or_na(q.us)));
         cells.extend([or_na(s.max_us), num(s.count as f64)]);
         cells
     };
     let rows: Vec<Vec<String>> = times.iter().map(row).collect();
-    table(&head, &rows, &["", "n", "n", "n", "n", "n", "n", "n", "n", "n"])
+    let table = table(&head, &rows, &["", "n", "n", "n", "n", "n", "n", "n", "n", "n"]);
+    let mut needs: Vec<String> = Vec::new();
+    for q in times.iter().flat_map(|t| &t.quantiles) {
+        let said = q.needs_s.map(|s| format!("{} needs a run of {}", q.name, duration(s)));
+        needs.extend(said.filter(|said| !needs.contains(said)));
+    }
+    if needs.is_empty() {
+        return table;
+    }
+    format!("{table}<p class=faint>n/a: {}.</p>\n", needs.join(", "))
 }
 
 fn times(title: &str, section: &LoopSection) -> String {
@@ -350,7 +355,7 @@ fn stiffness(r: &Report) -> String {
         })
         .collect();
     format!(
-        "<h2>What the delay costs the hand</h2>\n{}<p class=faint>{}. b = {} N s/m, a hand in the middle of what people have; \
+        "<h2>What the delay costs the hand</h2>\n<div class=half>{}</div><p class=faint>{}. b = {} N s/m, a hand in the middle of what people have; \
          B = {} N s/m, damping of the force law. Stiffer walls than K_max may vibrate.</p>\n",
         table(&["at", "delay t_d, \u{b5}s", "K_max, N/mm"], &rows, &["", "n", "n"]),
         esc(s.rule),

@@ -1,12 +1,15 @@
 //! Work of normal priority beside the loops: child processes of this program, so that none of their memory is locked.
 
 use clap::ValueEnum;
+use iceoryx2::port::subscriber::Subscriber;
 use serde::Serialize;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use stylet_shm_schema::service::{self, Instance};
+use std::time::Duration;
+use stylet_shm_schema::service::{self, Instance, Ipc, ServiceError};
+use stylet_shm_schema::{SnapshotHeader, TickRecord, Vertex};
 
 /// What runs beside the loops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
@@ -157,18 +160,35 @@ fn write_and_sync(path: &Path, stopped: impl Fn() -> bool) -> std::io::Result<()
     Ok(())
 }
 
-/// A host that never rests: the worst neighbour that a window could be.
-fn copy_all(instance: &Instance, stopped: impl Fn() -> bool) -> Result<(), service::ServiceError> {
+type Snapshots = Subscriber<Ipc, [Vertex], SnapshotHeader>;
+type Records = Subscriber<Ipc, [TickRecord], u64>;
+
+fn listen(instance: &Instance) -> Result<(Snapshots, Records), ServiceError> {
     let node = instance.node()?;
-    let failed = |e: &dyn std::fmt::Debug| service::ServiceError(format!("the ui load cannot listen: {e:?}"));
-    let snapshots = service::snapshots(&node)?
-        .subscriber_builder()
-        .create()
-        .map_err(|e| failed(&e))?;
-    let records = service::records(&node)?
-        .subscriber_builder()
-        .create()
-        .map_err(|e| failed(&e))?;
+    let failed = |e: &dyn std::fmt::Debug| ServiceError(format!("the ui load cannot listen: {e:?}"));
+    let snapshots = service::snapshots(&node)?.subscriber_builder().create();
+    let records = service::records(&node)?.subscriber_builder().create();
+    Ok((snapshots.map_err(|e| failed(&e))?, records.map_err(|e| failed(&e))?))
+}
+
+/// Services come and go as a core starts beside it; past this many tries there is another reason.
+const TRIES: u32 = 200;
+const BETWEEN_TRIES: Duration = Duration::from_millis(25);
+
+/// A host that never rests: the worst neighbour that a window could be.
+fn copy_all(instance: &Instance, stopped: impl Fn() -> bool) -> Result<(), ServiceError> {
+    let mut tries = 0;
+    let (snapshots, records) = loop {
+        match listen(instance) {
+            Ok(ports) => break ports,
+            Err(_) if stopped() => return Ok(()),
+            Err(why) if tries >= TRIES => return Err(why),
+            Err(_) => {
+                tries += 1;
+                std::thread::sleep(BETWEEN_TRIES);
+            }
+        }
+    };
     let mut vertices = Vec::new();
     let mut kept = Vec::new();
     while !stopped() {

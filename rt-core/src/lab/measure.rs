@@ -3,7 +3,7 @@
 use crate::core::{self, HAPTIC_PERIOD_NS, LoopReport, Options, RunReport, TISSUE_PERIOD_NS};
 use crate::lab::collect::{LoopTiming, Plan};
 use crate::lab::gaps::{self, GapReport};
-use crate::lab::host::{Host, HostReport};
+use crate::lab::host::{Host, HostReport, Script};
 use crate::lab::load::{Load, Running};
 use crate::lab::machine::Machine;
 use crate::lab::watch::{self, CoreWatch};
@@ -77,7 +77,7 @@ fn watch_core(options: &Options) -> Option<usize> {
 
 /// Runs for `setup.duration_ns` after the first tick that a host saw, or until `interrupted`.
 pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, String> {
-    let scene = Scene::builtin(&setup.options.scene).map_err(|e| e.to_string())?;
+    let script = Script::of(&Scene::builtin(&setup.options.scene).map_err(|e| e.to_string())?);
     let pose_times = Arc::new(PoseTimes::new());
     let options = setup.options;
     let ring = |period_ns| rtrb::RingBuffer::new((RING_NS / period_ns) as usize);
@@ -102,7 +102,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Stri
     let (run, host, gaps, cores, haptic, tissue) = std::thread::scope(|threads| {
         let stop = &stop;
         let host = threads.spawn(|| {
-            let host = Host::new(&options.instance, &scene, pose_times).map_err(|e| e.to_string());
+            let host = Host::new(&options.instance, script, pose_times).map_err(|e| e.to_string());
             let report = host.and_then(|h| h.run(setup.duration_ns, || interrupted.load(Ordering::Acquire), stop));
             // SYNC: pairs with the acquire loads of bridge and watches; nothing but the flag is carried.
             stop.store(true, Ordering::Release);

@@ -112,8 +112,10 @@ pub struct Series<'a> {
 /// How many wake-ups came how late; linear microseconds, logarithmic count. Says how many lie past the right edge.
 pub fn wake_histogram(series: &[Series]) -> Result<String, String> {
     picture(|root| {
-        let p999 = |s: &Series| s.histogram.value_at_quantile(0.999) as f64 / 1e3;
-        let right = series.iter().map(p999).fold(1.0, f64::max) * 1.25;
+        // Wide enough for the body; a long tail would press it into a line, and has a picture of its own.
+        let at = |s: &Series, q| s.histogram.value_at_quantile(q) as f64 / 1e3;
+        let wide = |s: &Series| (at(s, 0.999) * 1.25).min(at(s, 0.99) * 4.0);
+        let right = series.iter().map(wide).fold(1.0, f64::max);
         let bin_us = (right / 100.0).max(0.05);
         let right = bin_us * 100.0;
         let counted: Vec<Vec<u64>> = series.iter().map(|s| bins(s.histogram, bin_us, 100)).collect();

@@ -3,6 +3,7 @@
 use crate::core::{LoopReport, Options};
 use crate::lab::collect::LoopTiming;
 use crate::lab::compare::Comparison;
+use crate::lab::gaps::GapReport;
 use crate::lab::html;
 use crate::lab::load::Load;
 use crate::lab::machine::Machine;
@@ -338,15 +339,27 @@ fn latest(measured: &Measured) -> Vec<Late> {
         at_s: t.due_ns.saturating_sub(timing.first_due_ns) as f64 / 1e9,
         wake_us: t.wake_ns as f64 / 1e3,
         work_us: t.work_ns as f64 / 1e3,
-        cause: match measured.gaps.during(t.due_ns, t.due_ns + t.wake_ns) {
-            Some(ns) => format!(
-                "a gap of {:.0} us on the watched core at the same time",
-                ns as f64 / 1e3
-            ),
-            None => "not seen from the watched core".to_owned(),
-        },
+        cause: cause(&measured.gaps, t.due_ns, t.due_ns + t.wake_ns),
     })
     .collect()
+}
+
+/// What the gap watch saw between two times.
+fn cause(gaps: &GapReport, from_ns: u64, to_ns: u64) -> String {
+    let core = gaps.core.map_or("another core".to_owned(), |c| format!("core {c}"));
+    if let Some(ns) = gaps.gap_during(from_ns, to_ns) {
+        return format!(
+            "a gap of {:.0} us on {core} at the same time, without a switch",
+            ns as f64 / 1e3
+        );
+    }
+    match gaps.late_during(from_ns, to_ns) {
+        Some(ns) => format!(
+            "the gap watch on {core} woke {:.0} us late at the same time: not this core alone",
+            ns as f64 / 1e3
+        ),
+        None => format!("nothing seen on {core}: this core alone"),
+    }
 }
 
 fn gap_section(measured: &Measured) -> GapSection {
