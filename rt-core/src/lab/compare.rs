@@ -142,6 +142,8 @@ fn cyclictest(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>,
         .map_err(|e| format!("cyclictest does not start: {e}"))?;
     let ended = wait(&mut child, interrupted);
     drop(load);
+    // The ui load was in shared memory, and there was no core to clean up after it.
+    setup.options.instance.sweep();
     let text = std::fs::read_to_string(&file).unwrap_or_default();
     let _ = std::fs::remove_file(&file);
     match ended {
