@@ -1,22 +1,77 @@
 //! The command line of `rt-core`.
 
-use crate::core::Options;
+use crate::core::{HAPTIC_PERIOD_NS, Options};
+use crate::lab::load::{Load, Work};
+use crate::lab::machine::{Machine, Throttle};
+use crate::lab::measure;
 use crate::rt::arm;
-use clap::Parser;
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
 use stylet_shm_schema::BUILTIN_SCENES;
 use stylet_shm_schema::service::Instance;
 
 /// Real-time process of Stylet: owns the haptic device, the 1 kHz force loop and the 200 Hz tissue step.
 ///
 /// Start it first; any number of `host-ui` windows may come and go. It asks for SCHED_FIFO and locked memory and
-/// refuses to run without them, unless told --no-rt.
+/// refuses to run without them, unless told --no-rt. With a subcommand it does not run but answers a question.
 #[derive(Parser, Debug)]
-#[command(name = "rt-core", version)]
+#[command(name = "rt-core", version, args_conflicts_with_subcommands = true)]
 pub struct Cli {
+    #[command(subcommand)]
+    pub task: Option<Task>,
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+#[derive(Subcommand, Debug)]
+pub enum Task {
+    /// Measure how late the loops are on this machine, and write a report with a verdict
+    Latency(Box<LatencyArgs>),
+    /// Check that a filed latency report is as it was written
+    Verify {
+        /// The folder of the report, or its report.json
+        report: PathBuf,
+    },
+    /// Say whether this PC is fit for the force loop, and what to change
+    Doctor {
+        /// As JSON
+        #[arg(long)]
+        json: bool,
+        /// Core of the force loop [default: the last one]
+        #[arg(long, value_name = "N")]
+        haptic_core: Option<usize>,
+    },
+    /// One process of a load; started by `latency`
+    #[command(hide = true)]
+    Load {
+        work: Work,
+        #[arg(long)]
+        instance: String,
+        #[arg(long)]
+        file: PathBuf,
+    },
+}
+
+/// Running the simulator.
+#[derive(Args, Debug)]
+pub struct RunArgs {
     /// Name under which hosts find this process; letters, digits and '-'
     #[arg(long, default_value = "main")]
     instance: String,
+    #[command(flatten)]
+    real_time: RealTimeArgs,
+    /// End when the program that started this one ends, however it ends
+    #[arg(long)]
+    pub exit_with_parent: bool,
+    /// On exit write what each loop cost to FILE, as JSON
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+}
+
+/// What a run and a measurement have in common.
+#[derive(Args, Debug)]
+pub struct RealTimeArgs {
     /// Built-in scene to start with
     #[arg(long, default_value = BUILTIN_SCENES[0], value_parser = scenes())]
     scene: String,
@@ -38,12 +93,40 @@ pub struct Cli {
     /// SCHED_FIFO priority of the tissue step
     #[arg(long, default_value_t = 70, value_parser = clap::value_parser!(u32).range(1..=98), value_name = "1-98")]
     tissue_priority: u32,
-    /// End when the program that started this one ends, however it ends
+}
+
+/// A measurement.
+#[derive(Args, Debug)]
+pub struct LatencyArgs {
+    /// How long to measure: 60s, 10m, 1h
+    #[arg(long, default_value = "60s", value_parser = duration_ns, value_name = "TIME")]
+    pub duration: u64,
+    /// What runs beside the loops
+    #[arg(long, value_enum, default_value_t = Load::None)]
+    pub load: Load,
+    /// Rate of the force loop, Hz
+    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(500..=10_000), value_name = "HZ")]
+    pub rate: u32,
+    /// Spin for the last N microseconds before each deadline
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub spin_us: u64,
+    /// Then measure in turns with cyclictest (Debian package rt-tests): same core, priority and interval
     #[arg(long)]
-    pub exit_with_parent: bool,
-    /// On exit write what each loop cost to FILE, as JSON
+    pub compare: bool,
+    /// Pairs of turns of the comparison
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100), value_name = "N")]
+    pub rounds: u32,
+    /// Limits in a TOML file, one `name = value` a line
     #[arg(long, value_name = "FILE")]
-    pub report: Option<std::path::PathBuf>,
+    pub limits: Option<PathBuf>,
+    /// One limit; wins over the file
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub limit: Vec<String>,
+    /// Folder for report.json, report.html and histograms.hlog
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    real_time: RealTimeArgs,
 }
 
 fn scenes() -> PossibleValuesParser {
@@ -56,9 +139,54 @@ fn scenes() -> PossibleValuesParser {
     PossibleValuesParser::new(BUILTIN_SCENES.map(|name| PossibleValue::new(name).help(help(name))))
 }
 
-impl Cli {
+impl RunArgs {
     /// Lists what is wrong with the settings.
     pub fn options(&self) -> Result<Options, String> {
+        self.real_time.options(&self.instance)
+    }
+}
+
+impl LatencyArgs {
+    /// An instance of its own, so that a running simulator is not disturbed in its shared memory.
+    pub fn options(&self) -> Result<Options, String> {
+        let mut options = self.real_time.options(&format!("lab-{}", std::process::id()))?;
+        options.haptic_period_ns = measure::period_ns(self.rate);
+        options.spin_ns = self.spin_us * 1_000;
+        let longest_us = longest_spin_ns(options.haptic_period_ns, Machine::this().throttle()) / 1_000;
+        if self.spin_us > longest_us {
+            return Err(format!(
+                "--spin-us {}: at {} Hz at most {longest_us}, or the kernel would stop the loop for its share of real-time work",
+                self.spin_us, self.rate
+            ));
+        }
+        Ok(options)
+    }
+}
+
+/// What the loop itself and all else of real-time priority on its core may need besides spinning.
+const SHARE_KEPT_FREE: f64 = 0.15;
+
+/// The longest spin that leaves the core below the kernel's share for real-time threads.
+fn longest_spin_ns(period_ns: u64, throttle: Option<Throttle>) -> u64 {
+    let share = match throttle {
+        Some(Throttle::Share(share)) => share,
+        Some(Throttle::Off) | None => 0.95,
+    };
+    ((share - SHARE_KEPT_FREE).max(0.0) * period_ns as f64).round() as u64
+}
+
+fn duration_ns(text: &str) -> Result<u64, String> {
+    let duration: jiff::SignedDuration = text.parse().map_err(|e: jiff::Error| e.to_string())?;
+    let ns = u64::try_from(duration.as_nanos()).unwrap_or(0);
+    if (1_000_000_000..=172_800_000_000_000).contains(&ns) {
+        Ok(ns)
+    } else {
+        Err("between 1s and 48h".to_owned())
+    }
+}
+
+impl RealTimeArgs {
+    fn options(&self, instance: &str) -> Result<Options, String> {
         let cores: Vec<usize> = core_affinity::get_core_ids()
             .unwrap_or_default()
             .iter()
@@ -70,7 +198,7 @@ impl Cli {
                 problems.push(format!("{option} {core}: this process may use cores {cores:?}"));
             }
         }
-        let instance = Instance::new(&self.instance).map_err(|e| problems.push(e.to_string()));
+        let instance = Instance::new(instance).map_err(|e| problems.push(e.to_string()));
         let refused = if self.rt_if_allowed {
             may_be_real_time().err()
         } else {
@@ -87,6 +215,8 @@ impl Cli {
                 tissue_core: self.tissue_core.or(cores.iter().rev().nth(1).or(cores.last()).copied()),
                 haptic_priority: self.haptic_priority,
                 tissue_priority: self.tissue_priority,
+                haptic_period_ns: HAPTIC_PERIOD_NS,
+                spin_ns: 0,
             }),
             _ => Err(problems.join("\n")),
         }
@@ -107,5 +237,34 @@ fn may_be_real_time() -> Result<(), String> {
         Ok(())
     } else {
         Err(arm::advice("the kernel does not lock memory"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn flags_without_a_subcommand_still_run_the_simulator() {
+        Cli::command().debug_assert();
+        let cli = Cli::parse_from(["rt-core", "--instance", "t1", "--rt-if-allowed", "--exit-with-parent"]);
+        assert!(cli.task.is_none() && cli.run.exit_with_parent);
+        assert!(Cli::try_parse_from(["rt-core", "--scene", "paper", "doctor"]).is_err());
+    }
+
+    #[test]
+    fn a_spin_leaves_the_kernel_its_share() {
+        assert_eq!(longest_spin_ns(1_000_000, Some(Throttle::Share(0.95))), 800_000);
+        assert_eq!(longest_spin_ns(200_000, Some(Throttle::Share(0.5))), 70_000);
+        assert_eq!(longest_spin_ns(1_000_000, Some(Throttle::Share(0.1))), 0);
+        assert_eq!(longest_spin_ns(1_000_000, Some(Throttle::Off)), 800_000);
+    }
+
+    #[test]
+    fn durations_are_read_with_their_unit() {
+        assert_eq!(duration_ns("90s"), Ok(90_000_000_000));
+        assert_eq!(duration_ns("1h"), Ok(3_600_000_000_000));
+        assert!(duration_ns("5").is_err() && duration_ns("10ms").is_err() && duration_ns("-5s").is_err());
     }
 }

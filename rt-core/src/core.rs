@@ -7,6 +7,7 @@ use crate::rt::arm::{self, Armed, Ask, Usage};
 use crate::rt::clock;
 use crate::rt::exchange::{TipPose, TissueResponse};
 use crate::rt::haptic::{HapticLoop, HapticPorts};
+use crate::rt::timing::Probes;
 use crate::rt::tissue::{TissueLoop, TissuePorts};
 use crate::rt::world::World;
 use crate::scene::Scene;
@@ -37,6 +38,9 @@ pub struct Options {
     pub tissue_core: Option<usize>,
     pub haptic_priority: u32,
     pub tissue_priority: u32,
+    pub haptic_period_ns: u64,
+    /// Spinning before each haptic deadline; 0 for none.
+    pub spin_ns: u64,
 }
 
 /// What a run was.
@@ -44,6 +48,9 @@ pub struct Options {
 pub struct RunReport {
     pub haptic: LoopReport,
     pub tissue: LoopReport,
+    pub memory_locked: bool,
+    /// What the kernel granted for the exit from core sleep states, as read back; `None` when it was not asked or refused.
+    pub exit_latency_us: Option<i32>,
 }
 
 /// What one loop was, from arming to its end.
@@ -56,11 +63,18 @@ pub struct LoopReport {
     pub usage: Usage,
 }
 
-const HAPTIC_PERIOD_S: f64 = 1e-3;
-const TISSUE_PERIOD_S: f64 = 5e-3;
+/// 1 kHz.
+pub const HAPTIC_PERIOD_NS: u64 = 1_000_000;
+/// 200 Hz.
+pub const TISSUE_PERIOD_NS: u64 = 5_000_000;
 
 /// Runs until `stop` is set by a signal, or a host asks to end. Errors are for people: they say what to do.
 pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, String> {
+    run_with(options, None, stop)
+}
+
+/// The same run, with a probe in each loop.
+pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool>) -> Result<RunReport, String> {
     let scene = Scene::builtin(&options.scene).map_err(|e| e.to_string())?;
     let device = device_for(&scene);
     let info = device.info();
@@ -73,6 +87,7 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
     let world = Box::new(World::new(scene, active.limits, 1));
     let board = service::create_state_board(&node, session_id).map_err(|e| e.to_string())?;
     let locked = lock_memory(options)?;
+    let awake = (!options.no_rt).then(arm::keep_cores_awake).flatten();
 
     let (pose_in, pose_out) = triple_buffer::triple_buffer(&TipPose::default());
     let (response_in, response_out) = triple_buffer::triple_buffer(&TissueResponse::default());
@@ -99,14 +114,15 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
         notices: haptic_notice_in,
         records: record_in,
     };
-    let haptic = HapticLoop::new(
+    let mut haptic = HapticLoop::new(
         session_id,
         device,
         haptic_ports,
         (active.needle, active.force),
-        HAPTIC_PERIOD_S,
+        options.haptic_period_ns as f64 / 1e9,
         real_time,
     );
+    haptic.spin_ns = options.spin_ns;
     let tissue_ports = TissuePorts {
         pose: pose_out,
         response: response_in,
@@ -116,7 +132,11 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
         slots: slot_out,
         filled: filled_in,
     };
-    let tissue = TissueLoop::new(session_id, tissue_ports, world, TISSUE_PERIOD_S);
+    let mut tissue = TissueLoop::new(session_id, tissue_ports, world, TISSUE_PERIOD_NS as f64 / 1e9);
+    if let Some(probes) = probes {
+        haptic.probe = Some(Box::new(probes.haptic));
+        tissue.probe = Some(Box::new(probes.tissue));
+    }
 
     let tissue_thread = spawn(
         "tissue",
@@ -190,8 +210,8 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
         pid: std::process::id(),
         time_ns: 0,
         started_ns: clock::now_ns(),
-        period_ns: (HAPTIC_PERIOD_S * 1e9) as u64,
-        tissue_period_ns: (TISSUE_PERIOD_S * 1e9) as u64,
+        period_ns: options.haptic_period_ns,
+        tissue_period_ns: TISSUE_PERIOD_NS,
         haptic: haptic_report,
         tissue: tissue_report,
         memory_locked: u32::from(locked.is_none()),
@@ -217,7 +237,12 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
     let gone = |_| "a real-time thread ended by itself".to_owned();
     let haptic = haptic_thread.join().map_err(gone)?;
     let tissue = tissue_thread.join().map_err(gone)?;
-    served.map(|()| RunReport { haptic, tissue })
+    served.map(|()| RunReport {
+        haptic,
+        tissue,
+        memory_locked: locked.is_none(),
+        exit_latency_us: awake.map(|a| a.exit_latency_us),
+    })
 }
 
 /// The simulated hand starts outside the body, below its target.

@@ -5,6 +5,7 @@ pub mod bridge;
 pub mod cli;
 pub mod core;
 pub mod force;
+pub mod lab;
 pub mod needle;
 pub mod rt;
 pub mod scene;

@@ -1,16 +1,25 @@
-//! `rt-core`: the real-time process.
+//! `rt-core`: the real-time process, and the laboratory that measures it.
 
 use clap::Parser;
-use rt_core::cli::Cli;
+use rt_core::cli::{Cli, RunArgs, Task};
 use rt_core::core::{LoopReport, RunReport};
+use rt_core::lab::{doctor, latency, load, verify};
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
+use stylet_shm_schema::service::Instance;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    match start(&cli) {
-        Ok(()) => ExitCode::SUCCESS,
+    let ended = match &cli.task {
+        None => run(&cli.run).map(|()| 0),
+        Some(Task::Latency(args)) => stop_on_signal().and_then(|stop| latency::run(args, &stop)),
+        Some(Task::Verify { report }) => verify::run(report),
+        Some(Task::Doctor { json, haptic_core }) => Ok(doctor::run(*json, *haptic_core)),
+        Some(Task::Load { work, instance, file }) => serve_as_load(*work, instance, file).map(|()| 0),
+    };
+    match ended {
+        Ok(code) => ExitCode::from(code),
         Err(why) => {
             eprintln!("rt-core: {why}");
             ExitCode::FAILURE
@@ -18,12 +27,8 @@ fn main() -> ExitCode {
     }
 }
 
-fn start(cli: &Cli) -> Result<(), String> {
-    abort_on_panic();
-    if cli.exit_with_parent {
-        follow_parent();
-    }
-    let options = cli.options()?;
+/// Set by the first signal that asks this program to end.
+fn stop_on_signal() -> Result<Arc<AtomicBool>, String> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [
         signal_hook::consts::SIGINT,
@@ -32,6 +37,24 @@ fn start(cli: &Cli) -> Result<(), String> {
     ] {
         signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(|e| format!("signal handler: {e}"))?;
     }
+    Ok(stop)
+}
+
+fn serve_as_load(work: load::Work, instance: &str, file: &std::path::Path) -> Result<(), String> {
+    follow_parent();
+    let instance = Instance::new(instance).map_err(|e| e.to_string())?;
+    let stop = stop_on_signal()?;
+    // SYNC: set by a signal handler; nothing but the flag is carried.
+    load::work(work, &instance, file, || stop.load(Ordering::Acquire))
+}
+
+fn run(args: &RunArgs) -> Result<(), String> {
+    abort_on_panic();
+    if args.exit_with_parent {
+        follow_parent();
+    }
+    let options = args.options()?;
+    let stop = stop_on_signal()?;
     eprintln!(
         "rt-core: instance '{}', scene '{}', {}",
         options.instance.name(),
@@ -41,7 +64,7 @@ fn start(cli: &Cli) -> Result<(), String> {
     let report = rt_core::core::run(&options, &stop);
     options.instance.sweep();
     let report = report?;
-    if let Some(path) = &cli.report {
+    if let Some(path) = &args.report {
         std::fs::write(path, to_json(&report)).map_err(|e| format!("cannot write {}: {e}", path.display()))?;
     }
     Ok(())

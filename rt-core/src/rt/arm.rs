@@ -77,6 +77,32 @@ pub fn lock_memory() -> Result<(), Refused> {
     Err(Refused(advice(&format!("the kernel does not lock memory ({why})"))))
 }
 
+/// A request to the kernel, in force while it is kept.
+pub struct CoresAwake {
+    /// The longest exit from a sleep state that the kernel now allows, as read back, microseconds.
+    pub exit_latency_us: i32,
+    _request: std::fs::File,
+}
+
+/// Asks the kernel to keep the cores out of sleep states that take long to leave.
+/// `None` where the machine does not offer it or the right is missing.
+pub fn keep_cores_awake() -> Option<CoresAwake> {
+    use std::os::unix::fs::FileExt;
+    let request = std::fs::File::options()
+        .read(true)
+        .write(true)
+        .open("/dev/cpu_dma_latency")
+        .ok()?;
+    // The kernel takes and gives microseconds as a C int.
+    request.write_all_at(&0_i32.to_ne_bytes(), 0).ok()?;
+    let mut in_force = [0; 4];
+    request.read_exact_at(&mut in_force, 0).ok()?;
+    Some(CoresAwake {
+        exit_latency_us: i32::from_ne_bytes(in_force),
+        _request: request,
+    })
+}
+
 fn read_back(ask: Ask) -> ThreadReport {
     let mut parameters = libc::sched_param { sched_priority: 0 };
     // SAFETY: `parameters` is valid for writes; 0 names the calling thread.

@@ -20,6 +20,17 @@ pub fn sleep_until(time_ns: u64) {
     {}
 }
 
+/// Sleeps until `spin_ns` before `time_ns`, then spins; true when the thread had reason to sleep.
+pub fn wait_until(time_ns: u64, spin_ns: u64) -> bool {
+    let sleep_ns = time_ns - spin_ns;
+    let ahead = now_ns() < sleep_ns;
+    sleep_until(sleep_ns);
+    while spin_ns > 0 && now_ns() < time_ns {
+        std::hint::spin_loop();
+    }
+    ahead
+}
+
 /// The ideal grid of a periodic loop: late wake-ups skip grid points and count them, none is made up for.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid {
@@ -59,6 +70,15 @@ mod tests {
         assert_eq!((grid.advance(1_150), grid.due_ns), (0, 1_200));
         assert_eq!((grid.advance(1_300), grid.due_ns), (1, 1_400));
         assert_eq!((grid.advance(1_799), grid.due_ns), (3, 1_800));
+    }
+
+    #[test]
+    fn waiting_never_ends_early_with_or_without_a_spin() {
+        for spin_ns in [0, 1_500_000, 5_000_000] {
+            let due = now_ns() + 2_000_000;
+            assert_eq!(wait_until(due, spin_ns), spin_ns < 2_000_000);
+            assert!(now_ns() >= due);
+        }
     }
 
     #[test]

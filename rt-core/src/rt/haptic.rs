@@ -8,6 +8,7 @@ use crate::needle::{self, NeedleInput, NeedleParameters, NeedleState, Phase};
 use crate::rt::arm::Armed;
 use crate::rt::clock::{self, Grid};
 use crate::rt::exchange::*;
+use crate::rt::timing::Probe;
 use iceoryx2::port::writer::EntryHandleMut;
 use nalgebra::Vector3;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -60,8 +61,23 @@ pub struct HapticLoop {
     streak: u32,
     /// What hosts see; also holds the counters.
     pub state: HapticState,
+    /// Present in a measurement.
+    pub probe: Option<Box<Probe>>,
+    /// Spinning before each deadline; 0 for none.
+    pub spin_ns: u64,
     period_s: f64,
 }
+
+/// What [`Probe`] tells apart in this tick.
+pub const HAPTIC_STAGES: &[&str] = &[
+    "orders",
+    "device read",
+    "force law",
+    "gate and write",
+    "publish and record",
+];
+/// The mark at which the device read begins.
+const READ_MARK: usize = 0;
 
 /// One tick's way from sample to force.
 struct Response {
@@ -107,7 +123,16 @@ impl HapticLoop {
             silent: 0,
             streak: 0,
             state,
+            probe: None,
+            spin_ns: 0,
             period_s,
+        }
+    }
+
+    /// Ends a stage of the tick, in a measurement.
+    fn mark(&mut self) {
+        if let Some(probe) = &mut self.probe {
+            probe.mark();
         }
     }
 
@@ -122,10 +147,13 @@ impl HapticLoop {
                 self.gate.release();
                 last_ticks -= 1;
             }
-            clock::sleep_until(grid.due_ns);
+            let slept = clock::wait_until(grid.due_ns, self.spin_ns);
             let woke_ns = clock::now_ns();
             self.tick(grid.due_ns, woke_ns, missed);
             publish(&self.state);
+            if let Some(probe) = &mut self.probe {
+                probe.finish(grid.due_ns, woke_ns, missed, slept);
+            }
             missed = grid.advance(clock::now_ns());
         }
         let _ = self.device.write(&Wrench::zero());
@@ -134,16 +162,23 @@ impl HapticLoop {
     /// One tick; in the order of the data.
     pub fn tick(&mut self, due_ns: u64, woke_ns: u64, missed: u32) {
         self.take_orders();
+        self.mark();
         let sample = self.read();
+        self.mark();
         let tissue = *self.ports.response.read();
         self.watch(woke_ns, missed, &tissue);
         let response = self.respond(&sample, &tissue);
+        self.mark();
         let force_n = self.guard(&sample, &response);
         let wrench = Wrench::from_force(force_n);
         if self.device.write(&wrench).is_err() {
             self.raise(Fault::DeviceError, ForceFault::DeviceFault);
         }
         let written_ns = clock::now_ns();
+        self.mark();
+        if let Some(probe) = &mut self.probe {
+            probe.output_since_mark(READ_MARK);
+        }
         self.hand_over_pose(woke_ns, &sample, &response);
         self.record(due_ns, [woke_ns, written_ns], missed, &tissue, &response, force_n);
     }

@@ -3,6 +3,7 @@
 use crate::rt::arm::Armed;
 use crate::rt::clock::{self, Grid};
 use crate::rt::exchange::*;
+use crate::rt::timing::Probe;
 use crate::rt::world::World;
 use crate::tissue::{Held, MaterialPoint, StepReport};
 use nalgebra::Vector3;
@@ -54,8 +55,19 @@ pub struct TissueLoop {
     pose: TipPose,
     report: Option<StepReport>,
     response: TissueResponse,
+    /// Present in a measurement.
+    pub probe: Option<Box<Probe>>,
     period_s: f64,
 }
+
+/// What [`Probe`] tells apart in this tick.
+pub const TISSUE_STAGES: &[&str] = &[
+    "orders and pose",
+    "contact and hold",
+    "constraints",
+    "response",
+    "snapshot",
+];
 
 impl TissueLoop {
     pub fn new(session_id: u64, ports: TissuePorts, world: Box<World>, period_s: f64) -> Self {
@@ -71,7 +83,15 @@ impl TissueLoop {
             pose: TipPose::default(),
             report: None,
             response: TissueResponse::default(),
+            probe: None,
             period_s,
+        }
+    }
+
+    /// Ends a stage of the tick, in a measurement.
+    fn mark(&mut self) {
+        if let Some(probe) = &mut self.probe {
+            probe.mark();
         }
     }
 
@@ -83,13 +103,18 @@ impl TissueLoop {
     /// Runs on the ideal grid until `stop`.
     pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool) {
         let mut grid = Grid::from(clock::now_ns(), (self.period_s * 1e9) as u64);
+        let mut missed = 0;
         // SYNC: pairs with the bridge's release store; nothing but the flag is carried.
         while !stop.load(Ordering::Acquire) {
-            clock::sleep_until(grid.due_ns);
+            let slept = clock::wait_until(grid.due_ns, 0);
             let woke_ns = clock::now_ns();
             self.response.worst_wake_ns = self.response.worst_wake_ns.max(woke_ns - grid.due_ns);
             self.tick(woke_ns);
-            self.response.missed += u64::from(grid.advance(clock::now_ns()));
+            if let Some(probe) = &mut self.probe {
+                probe.finish(grid.due_ns, woke_ns, missed, slept);
+            }
+            missed = grid.advance(clock::now_ns());
+            self.response.missed += u64::from(missed);
         }
     }
 
@@ -98,13 +123,20 @@ impl TissueLoop {
         self.take_orders();
         let before = self.pose;
         self.pose = *self.ports.pose.read();
+        self.mark();
         self.end_contact_if_released();
         self.begin_contact_if_met(&before);
         let travel = self.pose.held_travel_m - before.held_travel_m;
         self.hold(travel);
+        self.mark();
         let report = self.world.tissue.step(self.held, self.period_s);
         self.report = Some(report);
+        self.mark();
         self.respond(woke_ns, &report);
+        self.mark();
+        if let Some(probe) = &mut self.probe {
+            probe.output_for_pose(self.response.tick, self.pose.time_ns);
+        }
         self.publish_snapshot(woke_ns, &report);
     }
 

@@ -1,0 +1,244 @@
+//! Work of normal priority beside the loops: child processes of this program, so that none of their memory is locked.
+
+use clap::ValueEnum;
+use iceoryx2::port::subscriber::Subscriber;
+use serde::Serialize;
+use std::fs::File;
+use std::io::{Seek, SeekFrom, Write};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+use stylet_shm_schema::service::{self, Instance, Ipc, ServiceError};
+use stylet_shm_schema::{SnapshotHeader, TickRecord, Vertex};
+
+/// What runs beside the loops.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Load {
+    /// Nothing
+    None,
+    /// One process that computes for each core
+    Cpu,
+    /// One process that streams 64 MiB through memory for each core
+    Memory,
+    /// Two processes that write 4 MiB and sync them to disk, again and again
+    Io,
+    /// A host that takes everything the core publishes and copies it without a pause
+    Ui,
+    /// All of the above
+    All,
+}
+
+/// One process of a load.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Work {
+    Cpu,
+    Memory,
+    Io,
+    Ui,
+}
+
+impl Load {
+    fn work(self, cores: usize) -> Vec<Work> {
+        let some = |work: Work, count: usize| std::iter::repeat_n(work, count);
+        match self {
+            Self::None => Vec::new(),
+            Self::Cpu => some(Work::Cpu, cores).collect(),
+            Self::Memory => some(Work::Memory, cores).collect(),
+            Self::Io => some(Work::Io, 2).collect(),
+            Self::Ui => vec![Work::Ui],
+            Self::All => some(Work::Cpu, cores)
+                .chain(some(Work::Memory, cores))
+                .chain(some(Work::Io, 2))
+                .chain([Work::Ui])
+                .collect(),
+        }
+    }
+
+    pub fn describe(self, cores: usize) -> String {
+        let all = self.work(cores);
+        let count = |work: Work| all.iter().filter(|w| **w == work).count();
+        let parts = [
+            (count(Work::Cpu), "computing"),
+            (count(Work::Memory), "streaming 64 MiB through memory"),
+            (count(Work::Io), "writing 4 MiB and syncing"),
+            (count(Work::Ui), "copying all that is published"),
+        ];
+        let said: Vec<String> = parts
+            .iter()
+            .filter(|(n, _)| *n > 0)
+            .map(|(n, what)| format!("{n} {what}"))
+            .collect();
+        if said.is_empty() {
+            "nothing but the measurement".to_owned()
+        } else {
+            format!("processes of normal priority: {}", said.join(", "))
+        }
+    }
+}
+
+/// The processes of a load; ended when dropped.
+pub struct Running(Vec<Child>);
+
+impl Running {
+    /// `folder`: where the io load may write.
+    pub fn start(load: Load, instance: &Instance, folder: &Path) -> Result<Self, String> {
+        let program = std::env::current_exe().map_err(|e| format!("cannot find this program: {e}"))?;
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let mut running = Self(Vec::new());
+        for (index, work) in load.work(cores).into_iter().enumerate() {
+            let name = work.to_possible_value().expect("no variant is skipped");
+            let child = Command::new(&program)
+                .args(["load", name.get_name(), "--instance", instance.name(), "--file"])
+                .arg(folder.join(format!("load-{index}.tmp")))
+                .stdin(Stdio::null())
+                .spawn()
+                .map_err(|e| format!("cannot start the load: {e}"))?;
+            running.0.push(child);
+        }
+        Ok(running)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        for child in &mut self.0 {
+            // SIGTERM lets the child remove its file and leave shared memory.
+            // SAFETY: the child is ours and not yet waited for.
+            unsafe { libc::kill(child.id() as libc::pid_t, libc::SIGTERM) };
+        }
+        for child in &mut self.0 {
+            let _ = child.wait();
+        }
+    }
+}
+
+/// The body of one such process; ends when `stopped`.
+pub fn work(kind: Work, instance: &Instance, file: &Path, stopped: impl Fn() -> bool) -> Result<(), String> {
+    match kind {
+        Work::Cpu => compute(stopped),
+        Work::Memory => stream(stopped),
+        Work::Io => {
+            let ended = write_and_sync(file, stopped).map_err(|e| format!("{}: {e}", file.display()));
+            let _ = std::fs::remove_file(file);
+            ended?;
+        }
+        Work::Ui => copy_all(instance, stopped).map_err(|e| e.to_string())?,
+    }
+    Ok(())
+}
+
+fn compute(stopped: impl Fn() -> bool) {
+    let mut x = 1.0_f64;
+    while !stopped() {
+        for _ in 0..100_000 {
+            x = std::hint::black_box(x * 1.000_000_1 + 1e-9).sqrt();
+        }
+    }
+}
+
+/// More than any cache holds.
+const STREAMED_BYTES: usize = 64 << 20;
+
+fn stream(stopped: impl Fn() -> bool) {
+    let mut from = vec![1_u64; STREAMED_BYTES / 16];
+    let mut to = vec![0_u64; STREAMED_BYTES / 16];
+    while !stopped() {
+        to.copy_from_slice(std::hint::black_box(&from));
+        std::mem::swap(&mut from, &mut to);
+    }
+}
+
+fn write_and_sync(path: &Path, stopped: impl Fn() -> bool) -> std::io::Result<()> {
+    let mut file = File::create(path)?;
+    let block = vec![0x5a_u8; 4 << 20];
+    while !stopped() {
+        file.seek(SeekFrom::Start(0))?;
+        file.write_all(&block)?;
+        file.sync_all()?;
+    }
+    Ok(())
+}
+
+type Snapshots = Subscriber<Ipc, [Vertex], SnapshotHeader>;
+type Records = Subscriber<Ipc, [TickRecord], u64>;
+
+fn listen(instance: &Instance) -> Result<(Snapshots, Records), ServiceError> {
+    let node = instance.node()?;
+    let failed = |e: &dyn std::fmt::Debug| ServiceError(format!("the ui load cannot listen: {e:?}"));
+    let snapshots = service::snapshots(&node)?.subscriber_builder().create();
+    let records = service::records(&node)?.subscriber_builder().create();
+    Ok((snapshots.map_err(|e| failed(&e))?, records.map_err(|e| failed(&e))?))
+}
+
+/// Services come and go as a core starts beside it; past this many tries there is another reason.
+const TRIES: u32 = 200;
+const BETWEEN_TRIES: Duration = Duration::from_millis(25);
+
+/// A host that never rests: the worst neighbour that a window could be.
+fn copy_all(instance: &Instance, stopped: impl Fn() -> bool) -> Result<(), ServiceError> {
+    let mut tries = 0;
+    let (snapshots, records) = loop {
+        match listen(instance) {
+            Ok(ports) => break ports,
+            Err(_) if stopped() => return Ok(()),
+            Err(why) if tries >= TRIES => return Err(why),
+            Err(_) => {
+                tries += 1;
+                std::thread::sleep(BETWEEN_TRIES);
+            }
+        }
+    };
+    let mut vertices = Vec::new();
+    let mut kept = Vec::new();
+    while !stopped() {
+        let mut idle = true;
+        while let Ok(Some(sample)) = snapshots.receive() {
+            vertices.clear();
+            vertices.extend_from_slice(sample.payload());
+            idle = false;
+        }
+        while let Ok(Some(sample)) = records.receive() {
+            kept.clear();
+            kept.extend_from_slice(sample.payload());
+            idle = false;
+        }
+        // What a window does with a picture: go over it again and again.
+        for _ in 0..if idle { 1 } else { 16 } {
+            std::hint::black_box(vertices.clone());
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_is_the_sum_of_the_others() {
+        let sum: usize = [Load::Cpu, Load::Memory, Load::Io, Load::Ui]
+            .iter()
+            .map(|l| l.work(3).len())
+            .sum();
+        assert_eq!(Load::All.work(3).len(), sum);
+        assert!(Load::None.work(3).is_empty());
+        assert!(Load::All.describe(3).contains("3 computing"));
+    }
+
+    #[test]
+    fn io_load_writes_and_leaves_nothing() {
+        let file = std::env::temp_dir().join(format!("stylet-load-{}", std::process::id()));
+        let passes = std::cell::Cell::new(0);
+        let seen = std::cell::Cell::new(0);
+        let stopped = || {
+            seen.set(seen.get().max(std::fs::metadata(&file).map_or(0, |m| m.len())));
+            passes.set(passes.get() + 1);
+            passes.get() > 2
+        };
+        let instance = Instance::default();
+        work(Work::Io, &instance, &file, stopped).expect("the temporary folder can be written");
+        assert_eq!(seen.get(), 4 << 20);
+        assert!(!file.exists());
+    }
+}

@@ -1,0 +1,343 @@
+//! What the kernel tells about this PC, read below a root path so that tests can show it another machine.
+
+use flate2::read::GzDecoder;
+use std::collections::BTreeSet;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// A machine as seen through `/proc`, `/sys`, `/dev` and `/boot`.
+#[derive(Clone, Debug)]
+pub struct Machine {
+    root: PathBuf,
+}
+
+/// How soon the kernel lets a woken real-time thread run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preemption {
+    RealTime,
+    Full,
+    Lazy,
+    Voluntary,
+    None,
+    Unknown,
+}
+
+impl Preemption {
+    fn from_word(word: &str) -> Option<Self> {
+        Some(match word {
+            "full" => Self::Full,
+            "lazy" => Self::Lazy,
+            "voluntary" => Self::Voluntary,
+            "none" => Self::None,
+            _ => return None,
+        })
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::RealTime => "PREEMPT_RT",
+            Self::Full => "full (PREEMPT)",
+            Self::Lazy => "lazy (PREEMPT_LAZY)",
+            Self::Voluntary => "voluntary (PREEMPT_VOLUNTARY)",
+            Self::None => "none (PREEMPT_NONE)",
+            Self::Unknown => "not told by the kernel",
+        }
+    }
+}
+
+/// The kernel's share for real-time threads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Throttle {
+    Off,
+    /// Of each second, or whatever the period is.
+    Share(f64),
+}
+
+impl Machine {
+    /// The machine that this program runs on.
+    pub fn this() -> Self {
+        Self::at("/")
+    }
+
+    pub fn at(root: impl Into<PathBuf>) -> Self {
+        Self { root: root.into() }
+    }
+
+    /// `path` without its leading slash.
+    pub fn path(&self, path: &str) -> PathBuf {
+        self.root.join(path)
+    }
+
+    /// Contents without the white space around them; `None` where the file is missing or not readable.
+    pub fn text(&self, path: &str) -> Option<String> {
+        let text = std::fs::read_to_string(self.path(path)).ok()?;
+        Some(text.trim_matches(|c: char| c.is_whitespace() || c == '\0').to_owned())
+    }
+
+    /// Names in a folder, sorted; empty where it is missing.
+    pub fn names(&self, folder: &str) -> Vec<String> {
+        let entries = std::fs::read_dir(self.path(folder)).into_iter().flatten().flatten();
+        let mut names: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    /// `value` of the word `key=value` on the kernel's command line.
+    pub fn boot_option(&self, key: &str) -> Option<String> {
+        let line = self.text("proc/cmdline")?;
+        let value = line.split_whitespace().filter_map(|word| word.split_once('='));
+        value.filter(|(k, _)| *k == key).map(|(_, v)| v.to_owned()).next_back()
+    }
+
+    /// The value of `CONFIG_<key>` with which the kernel was built.
+    pub fn build_option(&self, key: &str) -> Option<String> {
+        let config = self.build_config()?;
+        let start = format!("CONFIG_{key}=");
+        config.lines().find_map(|l| l.strip_prefix(&start)).map(str::to_owned)
+    }
+
+    fn build_config(&self) -> Option<String> {
+        let release = self.text("proc/sys/kernel/osrelease").unwrap_or_default();
+        if let Some(config) = self.text(&format!("boot/config-{release}")) {
+            return Some(config);
+        }
+        let mut config = String::new();
+        let packed = std::fs::File::open(self.path("proc/config.gz")).ok()?;
+        GzDecoder::new(packed).read_to_string(&mut config).ok()?;
+        Some(config)
+    }
+
+    pub fn preemption(&self) -> Preemption {
+        let version = self.text("proc/version").unwrap_or_default();
+        if self.text("sys/kernel/realtime").as_deref() == Some("1") || version.contains("PREEMPT_RT") {
+            return Preemption::RealTime;
+        }
+        // "none voluntary (full) lazy": the one in brackets is in force.
+        let running = self.text("sys/kernel/debug/sched/preempt").and_then(|text| {
+            let word = text.split_once('(')?.1.split_once(')')?.0;
+            Preemption::from_word(word)
+        });
+        let asked = || Preemption::from_word(&self.boot_option("preempt")?);
+        let built = || {
+            let is = |key: &str| self.build_option(key).as_deref() == Some("y");
+            [
+                ("PREEMPT_LAZY", Preemption::Lazy),
+                ("PREEMPT_VOLUNTARY", Preemption::Voluntary),
+                ("PREEMPT_NONE", Preemption::None),
+                ("PREEMPT", Preemption::Full),
+            ]
+            .into_iter()
+            .find(|(key, _)| is(key))
+            .map(|(_, model)| model)
+        };
+        let named = || {
+            let full = version.split_whitespace().any(|w| w == "PREEMPT");
+            full.then_some(Preemption::Full)
+        };
+        running
+            .or_else(asked)
+            .or_else(built)
+            .or_else(named)
+            .unwrap_or(Preemption::Unknown)
+    }
+
+    pub fn online_cores(&self) -> BTreeSet<usize> {
+        cores(&self.text("sys/devices/system/cpu/online").unwrap_or_default())
+    }
+
+    pub fn isolated_cores(&self) -> BTreeSet<usize> {
+        cores(&self.text("sys/devices/system/cpu/isolated").unwrap_or_default())
+    }
+
+    pub fn tickless_cores(&self) -> BTreeSet<usize> {
+        let list = self.text("sys/devices/system/cpu/nohz_full").unwrap_or_default();
+        cores(&list)
+    }
+
+    /// Other threads of the same physical core.
+    pub fn siblings(&self, core: usize) -> BTreeSet<usize> {
+        let path = format!("sys/devices/system/cpu/cpu{core}/topology/thread_siblings_list");
+        let mut all = cores(&self.text(&path).unwrap_or_default());
+        all.remove(&core);
+        all
+    }
+
+    pub fn governor(&self, core: usize) -> Option<String> {
+        self.text(&format!("sys/devices/system/cpu/cpu{core}/cpufreq/scaling_governor"))
+    }
+
+    /// From cpufreq, else from `/proc/cpuinfo`, which does not change on many machines.
+    pub fn frequency_mhz(&self, core: usize) -> Option<f64> {
+        let scaling = self.text(&format!("sys/devices/system/cpu/cpu{core}/cpufreq/scaling_cur_freq"));
+        if let Some(khz) = scaling.and_then(|t| t.parse::<f64>().ok()) {
+            return Some(khz / 1e3);
+        }
+        self.cpuinfo(core, "cpu MHz")?.parse().ok()
+    }
+
+    /// A line of one core in `/proc/cpuinfo`.
+    pub fn cpuinfo(&self, core: usize, key: &str) -> Option<String> {
+        let text = self.text("proc/cpuinfo")?;
+        let block = text.split("\n\n").nth(core)?;
+        let lines = block.lines().filter_map(|line| line.split_once(':'));
+        lines
+            .into_iter()
+            .find(|(k, _)| k.trim() == key)
+            .map(|(_, v)| v.trim().to_owned())
+    }
+
+    /// Name and microseconds to leave of each sleep state that is not disabled.
+    pub fn idle_states(&self, core: usize) -> Vec<(String, u64)> {
+        let folder = format!("sys/devices/system/cpu/cpu{core}/cpuidle");
+        let state = |name: &String| {
+            let read = |what: &str| self.text(&format!("{folder}/{name}/{what}"));
+            let disabled = read("disable").as_deref() == Some("1");
+            (!disabled).then(|| Some((read("name")?, read("latency")?.parse().ok()?)))?
+        };
+        self.names(&folder).iter().filter_map(state).collect()
+    }
+
+    /// Interrupts that may be served on `core`: number and who uses it.
+    pub fn interrupts_allowed_on(&self, core: usize) -> Vec<(u32, String)> {
+        let table = self.text("proc/interrupts").unwrap_or_default();
+        let user = |number: u32| {
+            let start = format!("{number}:");
+            let line = table.lines().find_map(|l| l.trim_start().strip_prefix(&start));
+            line.and_then(|l| l.split_whitespace().last()).unwrap_or("?").to_owned()
+        };
+        let mut found: Vec<(u32, String)> = Vec::new();
+        for number in self.names("proc/irq").iter().filter_map(|n| n.parse::<u32>().ok()) {
+            let folder = format!("proc/irq/{number}");
+            let allowed = self
+                .text(&format!("{folder}/effective_affinity_list"))
+                .filter(|t| !t.is_empty())
+                .or_else(|| self.text(&format!("{folder}/smp_affinity_list")));
+            if allowed.is_some_and(|list| cores(&list).contains(&core)) {
+                found.push((number, user(number)));
+            }
+        }
+        found.sort_unstable();
+        found
+    }
+
+    /// Interrupts served by `core` since start, all kinds.
+    pub fn interrupts_served(&self, core: usize) -> Option<u64> {
+        let table = self.text("proc/interrupts")?;
+        let mut lines = table.lines();
+        let column = lines
+            .next()?
+            .split_whitespace()
+            .position(|c| c == format!("CPU{core}"))?;
+        let count = |line: &str| line.split_whitespace().nth(column + 1)?.parse::<u64>().ok();
+        Some(lines.filter_map(count).sum())
+    }
+
+    /// Time that the hypervisor kept from `core`, as the kernel tells it, in seconds.
+    pub fn steal_s(&self, core: usize) -> Option<f64> {
+        let text = self.text("proc/stat")?;
+        let start = format!("cpu{core} ");
+        let line = text.lines().find_map(|l| l.strip_prefix(&start))?;
+        // SAFETY: sysconf has no preconditions.
+        let per_s = unsafe { libc::sysconf(libc::_SC_CLK_TCK) } as f64;
+        Some(line.split_whitespace().nth(7)?.parse::<f64>().ok()? / per_s)
+    }
+
+    pub fn throttle(&self) -> Option<Throttle> {
+        let runtime: f64 = self.text("proc/sys/kernel/sched_rt_runtime_us")?.parse().ok()?;
+        let period: f64 = self.text("proc/sys/kernel/sched_rt_period_us")?.parse().ok()?;
+        Some(if runtime < 0.0 {
+            Throttle::Off
+        } else {
+            Throttle::Share(runtime / period)
+        })
+    }
+
+    /// The hypervisor by name, as far as it can be told; `None` on bare metal.
+    pub fn hypervisor(&self) -> Option<String> {
+        if let Some(kind) = self.text("sys/hypervisor/type").filter(|t| !t.is_empty()) {
+            return Some(kind);
+        }
+        let dmi = |what: &str| self.text(&format!("sys/class/dmi/id/{what}")).unwrap_or_default();
+        let (vendor, product) = (dmi("sys_vendor"), dmi("product_name"));
+        let known = [
+            "QEMU",
+            "VMware",
+            "innotek",
+            "Xen",
+            "Amazon EC2",
+            "Google",
+            "Parallels",
+            "OpenStack",
+        ];
+        let virtual_pc = vendor.contains("Microsoft") && product.contains("Virtual");
+        let by_vendor = known.iter().any(|k| vendor.contains(k)) && !product.contains(".metal");
+        let flagged = self
+            .cpuinfo(0, "flags")
+            .is_some_and(|flags| flags.split_whitespace().any(|f| f == "hypervisor"));
+        if !flagged && !virtual_pc && !by_vendor {
+            return None;
+        }
+        let clocks = self.text("sys/devices/system/clocksource/clocksource0/available_clocksource");
+        Some(match clocks {
+            _ if virtual_pc || by_vendor => format!("{vendor} {product}").trim().to_owned(),
+            Some(clocks) if clocks.contains("kvm-clock") => "KVM".to_owned(),
+            Some(clocks) if clocks.contains("hyperv") => "Hyper-V".to_owned(),
+            _ => "of unknown make".to_owned(),
+        })
+    }
+
+    pub fn clock_source(&self) -> Option<String> {
+        self.text("sys/devices/system/clocksource/clocksource0/current_clocksource")
+    }
+
+    /// Soft limit of this process from `/proc/self/limits`; `None` for unlimited or not told.
+    pub fn limit(&self, name: &str) -> Option<u64> {
+        let text = self.text("proc/self/limits")?;
+        let line = text.lines().find_map(|l| l.strip_prefix(name))?;
+        line.split_whitespace().next()?.parse().ok()
+    }
+
+    /// Whether this process has the capability with number `bit`.
+    pub fn capable(&self, bit: u32) -> bool {
+        let status = self.text("proc/self/status").unwrap_or_default();
+        let mask = status.lines().find_map(|l| l.strip_prefix("CapEff:"));
+        let mask = mask.and_then(|m| u64::from_str_radix(m.trim(), 16).ok()).unwrap_or(0);
+        mask >> bit & 1 == 1
+    }
+
+    /// Whether a program of this name runs.
+    pub fn runs(&self, name: &str) -> bool {
+        let processes = self
+            .names("proc")
+            .into_iter()
+            .filter(|n| n.bytes().all(|b| b.is_ascii_digit()));
+        let mut commands = processes.filter_map(|p| self.text(&format!("proc/{p}/comm")));
+        commands.any(|c| c == name)
+    }
+
+    pub fn exists(&self, path: &str) -> bool {
+        Path::new(&self.path(path)).exists()
+    }
+}
+
+/// Reads a list of cores as the kernel prints it: `0-2,5`.
+pub fn cores(list: &str) -> BTreeSet<usize> {
+    let mut all = BTreeSet::new();
+    for part in list.trim().split(',') {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        if let (Ok(first), Ok(last)) = (first.trim().parse::<usize>(), last.trim().parse::<usize>()) {
+            all.extend(first..=last.min(first + 4096));
+        }
+    }
+    all
+}
+
+/// Prints a set of cores as the kernel does.
+pub fn core_list(cores: &BTreeSet<usize>) -> String {
+    let all: Vec<String> = cores.iter().map(ToString::to_string).collect();
+    if all.is_empty() {
+        "none".to_owned()
+    } else {
+        all.join(",")
+    }
+}
