@@ -119,6 +119,11 @@ fn hard_bodies_converge() {
         relative_tolerance: 1e-4,
         max_cycles: 400,
     };
+    // The cells at random, joined by edges and corners, are the slow ones.
+    let patient = SolveSettings {
+        max_cycles: 3000,
+        ..EXACT
+    };
     for (name, labels) in bodies {
         let lattice = lattice_of(&labels);
         let (_, report) = hold_corner::<f32>(&lattice, 1.0, &settings);
@@ -127,7 +132,7 @@ fn hard_bodies_converge() {
             report.converged && report.max_displacement.is_finite(),
             "{name} {report:?}"
         );
-        let (solved, report) = hold_corner::<f64>(&lattice, 1000.0, &EXACT);
+        let (solved, report) = hold_corner::<f64>(&lattice, 1000.0, &patient);
         let (state, rough) = hold_corner::<f32>(&lattice, 1000.0, &settings);
         let pairs = (0..3).flat_map(|a| state.displacement(a).iter().zip(solved.displacement(a)));
         let off = pairs.fold(0.0, |m: f32, (a, b)| m.max((a - b).abs())) / report.max_displacement;
