@@ -8,11 +8,12 @@
 use core::fmt;
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use stylet_hw::DeviceInfo;
 
 use super::check::{Problem, Problems};
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GateParameters {
     /// Force of the device for each newton of the model: real needles reach 9 to 16 N. Shown to the operator.
     pub force_scale: f64,
@@ -52,7 +53,7 @@ impl GateParameters {
 }
 
 /// Why the force goes to zero. The numbers are stable: they appear in records.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u32)]
 pub enum ForceFault {
     NonFiniteForce = 1,
@@ -83,7 +84,7 @@ impl fmt::Display for ForceFault {
 }
 
 /// How often each limit had a say.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct GateCounts {
     pub non_finite: u64,
     pub magnitude_limited: u64,
@@ -93,7 +94,7 @@ pub struct GateCounts {
     pub faults: u64,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 enum Mode {
     /// Zero force, or on the way there from `from_n`.
     RampOut {
@@ -106,7 +107,7 @@ enum Mode {
 }
 
 /// One for a device. Begins disengaged, at zero force.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GateState {
     mode: Mode,
     fault: Option<ForceFault>,

@@ -8,22 +8,21 @@ use crate::needle::{self, NeedleInput, NeedleParameters, NeedleState, Phase};
 use crate::rt::arm::Armed;
 use crate::rt::clock::{self, Grid};
 use crate::rt::exchange::*;
+use crate::rt::haptic_tape::{HapticMemory, HapticTape};
+use crate::rt::recorder::Recorder;
+use crate::rt::watchdog::{Watchdog, Watched, at_gate};
 use iceoryx2::port::writer::EntryHandleMut;
 use nalgebra::Vector3;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stylet_hw::{Device, DeviceInfo, HandGoal, Sample, Wrench};
+use stylet_hw::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
 use stylet_shm_schema::service::Ipc;
 use stylet_shm_schema::{Fault, HapticState, TickRecord, flags};
+
+mod flight;
 
 /// The blackboard entry; made and used by the haptic thread alone.
 pub type StateEntry = EntryHandleMut<Ipc, u64, HapticState>;
 
-/// Tissue older than this turns the force off.
-pub const STALE_TISSUE_NS: u64 = 100_000_000;
-/// So many ticks in a row with a missed deadline turn the force off.
-pub const OVERRUN_STREAK: u32 = 20;
-/// So many repeated samples in a row turn the force off.
-pub const SILENT_SAMPLES: u32 = 20;
 /// The hand is at its goal within this distance, at rest.
 const AT_GOAL_M: f64 = 4e-4;
 const AT_REST_M_PER_S: f64 = 3e-3;
@@ -35,6 +34,7 @@ pub struct HapticPorts {
     pub orders: rtrb::Consumer<HapticOrder>,
     pub notices: rtrb::Producer<Notice>,
     pub records: RecordRing,
+    pub flight: Recorder<HapticTape>,
 }
 
 /// Everything that the haptic thread owns.
@@ -55,12 +55,27 @@ pub struct HapticLoop {
     contact: u64,
     pose: TipPose,
     goal: Option<HandGoal>,
-    fault: Fault,
-    silent: u32,
-    streak: u32,
+    watchdog: Watchdog,
+    /// What the device answered in this tick, for the recording.
+    answer: DeviceAnswer,
     /// What hosts see; also holds the counters.
     pub state: HapticState,
     period_s: f64,
+}
+
+/// What the device said to the last read and the last write.
+struct DeviceAnswer {
+    read: Result<Sample, DeviceFault>,
+    write_failed: bool,
+}
+
+impl Default for DeviceAnswer {
+    fn default() -> Self {
+        Self {
+            read: Err(DeviceFault::NotConnected),
+            write_failed: false,
+        }
+    }
 }
 
 /// One tick's way from sample to force.
@@ -103,9 +118,8 @@ impl HapticLoop {
             contact: 0,
             pose: TipPose::default(),
             goal: None,
-            fault: Fault::None,
-            silent: 0,
-            streak: 0,
+            watchdog: Watchdog::default(),
+            answer: DeviceAnswer::default(),
             state,
             period_s,
         }
@@ -129,10 +143,12 @@ impl HapticLoop {
             missed = grid.advance(clock::now_ns());
         }
         let _ = self.device.write(&Wrench::zero());
+        self.ports.flight.hand_over();
     }
 
     /// One tick; in the order of the data.
     pub fn tick(&mut self, due_ns: u64, woke_ns: u64, missed: u32) {
+        self.checkpoint();
         self.take_orders();
         let sample = self.read();
         let tissue = *self.ports.response.read();
@@ -140,8 +156,9 @@ impl HapticLoop {
         let response = self.respond(&sample, &tissue);
         let force_n = self.guard(&sample, &response);
         let wrench = Wrench::from_force(force_n);
-        if self.device.write(&wrench).is_err() {
-            self.raise(Fault::DeviceError, ForceFault::DeviceFault);
+        self.answer.write_failed = self.device.write(&wrench).is_err();
+        if self.answer.write_failed {
+            self.raise(Fault::DeviceError);
         }
         let written_ns = clock::now_ns();
         self.hand_over_pose(woke_ns, &sample, &response);
@@ -156,6 +173,9 @@ impl HapticLoop {
     fn take_orders(&mut self) {
         while let Ok(order) = self.ports.orders.pop() {
             let tick = self.state.tick + 1;
+            if let Some(tape) = self.ports.flight.tape() {
+                tape.order(order);
+            }
             match order {
                 HapticOrder::Parameters {
                     ticket,
@@ -186,14 +206,13 @@ impl HapticLoop {
                     self.notify(Notice::Done { ticket, tick });
                 }
                 HapticOrder::Reset { ticket } => self.reset(ticket, tick),
+                HapticOrder::HandOverTape => self.ports.flight.hand_over(),
             }
         }
     }
 
     fn engage(&mut self, ticket: Ticket, tick: u64) {
-        if self.fault != Fault::None {
-            self.fault = Fault::None;
-            (self.silent, self.streak) = (0, 0);
+        if self.watchdog.rearm() {
             let time_ns = self.state.time_ns;
             self.notify(Notice::Rearmed { tick, time_ns });
         }
@@ -220,29 +239,28 @@ impl HapticLoop {
             buttons: 0,
             sequence: 0,
         });
-        let sample = match self.device.read(self.period_s) {
+        self.answer.read = self.device.read(self.period_s);
+        let sample = match self.answer.read {
             Ok(sample) if sample.is_finite() => sample,
             Ok(_) => {
-                self.raise(Fault::NonFiniteInput, ForceFault::DeviceFault);
+                self.raise(Fault::NonFiniteInput);
                 last
             }
             Err(_) => {
-                self.raise(Fault::DeviceError, ForceFault::DeviceFault);
+                self.raise(Fault::DeviceError);
                 last
             }
         };
         let repeated = self.sample.is_some_and(|s| s.sequence == sample.sequence);
-        self.silent = if repeated { self.silent + 1 } else { 0 };
-        if self.silent >= SILENT_SAMPLES {
-            self.raise(Fault::DeviceSilent, ForceFault::StaleDevice);
+        if let Some(fault) = self.watchdog.sample(repeated) {
+            self.raise(fault);
         }
         sample
     }
 
-    fn raise(&mut self, fault: Fault, to_gate: ForceFault) {
-        self.gate.trip(to_gate);
-        if self.fault == Fault::None {
-            self.fault = fault;
+    fn raise(&mut self, fault: Fault) {
+        self.gate.trip(at_gate(fault));
+        if self.watchdog.raise(fault) {
             let (tick, time_ns) = (self.state.tick + 1, self.state.time_ns);
             self.notify(Notice::Fault { tick, time_ns, fault });
         }
@@ -250,16 +268,15 @@ impl HapticLoop {
 
     /// Watchdog over the other thread and over this one.
     fn watch(&mut self, woke_ns: u64, missed: u32, tissue: &TissueResponse) {
-        self.streak = if missed > 0 { self.streak + 1 } else { 0 };
-        if !self.gate.engaged() {
-            return;
-        }
-        if woke_ns.saturating_sub(tissue.time_ns) > STALE_TISSUE_NS {
-            self.raise(Fault::TissueStale, ForceFault::StaleTissue);
-        } else if tissue.unsolved {
-            self.raise(Fault::TissueUnsolved, ForceFault::StaleTissue);
-        } else if self.streak >= OVERRUN_STREAK {
-            self.raise(Fault::OverrunStreak, ForceFault::Overrun);
+        let fault = self.watchdog.tick(&Watched {
+            woke_ns,
+            missed,
+            tissue_ns: tissue.time_ns,
+            tissue_unsolved: tissue.unsolved,
+            engaged: self.gate.engaged(),
+        });
+        if let Some(fault) = fault {
+            self.raise(fault);
         }
     }
 
@@ -344,8 +361,8 @@ impl HapticLoop {
             &response.terms.total_n,
         );
         let output = gate::step(&self.force.gate, &self.info, &mut self.gate, &wanted_n, self.period_s);
-        if output.fault == Some(ForceFault::NonFiniteForce) && self.fault == Fault::None {
-            self.raise(Fault::NonFiniteForce, ForceFault::NonFiniteForce);
+        if output.fault == Some(ForceFault::NonFiniteForce) && self.watchdog.fault() == Fault::None {
+            self.raise(Fault::NonFiniteForce);
         }
         self.sample = Some(*sample);
         output.force_n
@@ -424,7 +441,7 @@ impl HapticLoop {
         s.worst_tissue_work_ns = tissue.worst_work_ns;
         s.gate_interventions = interventions;
         s.phase = response.phase.code();
-        s.fault = self.fault as u32;
+        s.fault = self.watchdog.fault() as u32;
         s.flags = now_flags;
         s.seed_count = tissue.seed_count;
         let work_ns = clock::now_ns() - woke_ns;
@@ -450,5 +467,6 @@ impl HapticLoop {
         if self.ports.records.push(record).is_err() {
             s.records_lost += 1;
         }
+        self.tape(woke_ns, tissue, record);
     }
 }

@@ -6,6 +6,7 @@
 mod builtin;
 mod lattice;
 mod problem;
+mod source;
 mod surface;
 #[cfg(test)]
 pub(crate) mod test_bodies;
@@ -13,6 +14,7 @@ pub(crate) mod test_bodies;
 pub use lattice::Lattice;
 pub(crate) use lattice::Run;
 pub use problem::{SceneError, SceneProblem};
+pub use source::SceneSource;
 pub use surface::{Surface, surface_elements};
 
 /// Most cells along one axis.

@@ -1,5 +1,6 @@
 //! What the tissue may do: the paper's limits as settings, checked, and as the loop uses them.
 
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Settings as read. Paper eq. 3-5, Table 1.
@@ -36,7 +37,7 @@ impl Default for TissueParameters {
 ///
 /// Displacements instead of positions: at rest every difference is zero, wherever the element is, so f32
 /// keeps the same precision far from the origin.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LinkLimits {
     /// `min_stretch - 1`
     pub low: f32,
@@ -47,7 +48,7 @@ pub(crate) struct LinkLimits {
 }
 
 /// Checked settings, as the step uses them.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
     pub(crate) links: [LinkLimits; 3],
     pub(crate) recovery_time_s: f64,

@@ -30,8 +30,10 @@ pub use check::{largest_violation, write_surface};
 pub use limits::{Limits, ParameterProblem, TissueParameters};
 pub use point::MaterialPoint;
 
+use serde::{Deserialize, Serialize};
+
 /// An element kept at a position of the scene frame during a step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Held {
     pub element: u32,
     pub position_m: [f64; 3],

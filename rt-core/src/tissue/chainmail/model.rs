@@ -3,6 +3,7 @@
 use super::spans::{Links, links_along};
 use crate::scene::{Lattice, Run, Scene};
 use crate::tissue::Limits;
+use serde::{Deserialize, Serialize};
 
 /// Topology and limits; never changes.
 #[derive(Clone, Debug)]
@@ -81,7 +82,7 @@ fn parts(lattice: &Lattice) -> Vec<u32> {
 }
 
 /// Displacements from rest of all elements, in elements, one array for each axis; and scratch.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TissueState {
     pub(crate) u: [Vec<f32>; 3],
     pub(crate) before: [Vec<f32>; 3],
@@ -102,6 +103,34 @@ impl TissueState {
             before: std::array::from_fn(|_| touched()),
             max_displacement: 0.0,
         }
+    }
+
+    /// Of no body: a place holder where none is kept.
+    pub fn empty() -> Self {
+        TissueState {
+            u: std::array::from_fn(|_| Vec::new()),
+            before: std::array::from_fn(|_| Vec::new()),
+            max_displacement: 0.0,
+        }
+    }
+
+    /// Takes the displacements of a state of the same model; allocates nothing.
+    pub fn copy_from(&mut self, other: &Self) {
+        for (component, from) in self.u.iter_mut().zip(&other.u) {
+            let count = component.len().min(from.len());
+            component[..count].copy_from_slice(&from[..count]);
+        }
+        self.max_displacement = other.max_displacement;
+    }
+
+    /// Elements whose displacement differs from `other`'s in any bit; `None` for states of different bodies.
+    pub fn different_elements(&self, other: &Self) -> Option<usize> {
+        let count = self.u[0].len();
+        if self.u.iter().chain(&other.u).any(|c| c.len() != count) {
+            return None;
+        }
+        let differs = |e: &usize| (0..3).any(|a| self.u[a][*e].to_bits() != other.u[a][*e].to_bits());
+        Some((0..count).filter(differs).count())
     }
 
     /// Displacement from rest along `axis` (0 to 2) of all elements, in elements.
