@@ -52,6 +52,7 @@ fn main() {
     let far = Held {
         element,
         position_m: [rest[0] + 30.0 * h, rest[1] - 20.0 * h, rest[2] + 50.0 * h],
+        patch_m: 0.0,
     };
 
     let mut queue = QueuePass::new(&model);
@@ -78,6 +79,7 @@ fn main() {
         let held = Held {
             element: 0,
             position_m: [tip_rest[0], tip_rest[1], tip_rest[2] + depth],
+            patch_m: 0.0,
         };
         let start = Instant::now();
         std::hint::black_box(step(&model, &mut inserted, Some(held), 5e-3));

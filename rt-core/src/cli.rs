@@ -2,7 +2,9 @@
 
 use crate::core::Options;
 use crate::rt::arm;
-use clap::Parser;
+use crate::replay::{self, cli::Replay};
+use clap::{Parser, Subcommand};
+use std::path::PathBuf;
 use stylet_shm_schema::service::Instance;
 
 /// Real-time process of Stylet: owns the haptic device, the 1 kHz force loop and the 200 Hz tissue step.
@@ -10,8 +12,10 @@ use stylet_shm_schema::service::Instance;
 /// Start it first; any number of `host-ui` windows may come and go. It asks for SCHED_FIFO and locked memory and
 /// refuses to run without them, unless told --no-rt.
 #[derive(Parser, Debug)]
-#[command(name = "rt-core", version)]
+#[command(name = "rt-core", version, args_conflicts_with_subcommands = true)]
 pub struct Cli {
+    #[command(subcommand)]
+    pub task: Option<Task>,
     /// Name under which hosts find this process; letters, digits and '-'
     #[arg(long, default_value = "main")]
     instance: String,
@@ -39,9 +43,22 @@ pub struct Cli {
     /// End when the program that started this one ends, however it ends
     #[arg(long)]
     pub exit_with_parent: bool,
+    /// Folder of the flight recordings [default: $XDG_STATE_HOME/stylet/flights or ~/.local/state/stylet/flights]
+    #[arg(long, value_name = "DIR")]
+    flight_dir: Option<PathBuf>,
+    /// 'simulated', or 'replay:FILE' for a motion made by 'host-ui export --motion'
+    #[arg(long, default_value = "simulated", value_name = "DEVICE")]
+    device: String,
     /// On exit write what each loop cost to FILE, as JSON
     #[arg(long, value_name = "FILE")]
-    pub report: Option<std::path::PathBuf>,
+    pub report: Option<PathBuf>,
+}
+
+/// What can be done instead of running.
+#[derive(Subcommand, Debug)]
+pub enum Task {
+    /// Show a flight recording, repeat it, and say whether every force and position is the same in every bit
+    Replay(Replay),
 }
 
 impl Cli {
@@ -57,6 +74,10 @@ impl Cli {
             if let Some(core) = core.filter(|c| !cores.contains(c)) {
                 problems.push(format!("{option} {core}: this process may use cores {cores:?}"));
             }
+        }
+        let motion = self.device.strip_prefix("replay:").map(PathBuf::from);
+        if motion.is_none() && self.device != "simulated" {
+            problems.push(format!("--device {}: 'simulated' or 'replay:FILE'", self.device));
         }
         let instance = Instance::new(&self.instance).map_err(|e| problems.push(e.to_string()));
         let refused = if self.rt_if_allowed {
@@ -75,6 +96,8 @@ impl Cli {
                 tissue_core: self.tissue_core.or(cores.iter().rev().nth(1).or(cores.last()).copied()),
                 haptic_priority: self.haptic_priority,
                 tissue_priority: self.tissue_priority,
+                flight_folder: self.flight_dir.clone().unwrap_or_else(replay::file::default_folder),
+                motion,
             }),
             _ => Err(problems.join("\n")),
         }

@@ -6,6 +6,7 @@ pub mod cli;
 pub mod core;
 pub mod force;
 pub mod needle;
+pub mod replay;
 pub mod rt;
 pub mod scene;
 pub mod tissue;

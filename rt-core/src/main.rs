@@ -1,7 +1,7 @@
 //! `rt-core`: the real-time process.
 
 use clap::Parser;
-use rt_core::cli::Cli;
+use rt_core::cli::{Cli, Task};
 use rt_core::core::{LoopReport, RunReport};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -9,8 +9,13 @@ use std::sync::atomic::AtomicBool;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    match start(&cli) {
-        Ok(()) => ExitCode::SUCCESS,
+    let done = match &cli.task {
+        Some(Task::Replay(replay)) => replay.run(),
+        None => start(&cli).map(|()| true),
+    };
+    match done {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
         Err(why) => {
             eprintln!("rt-core: {why}");
             ExitCode::FAILURE

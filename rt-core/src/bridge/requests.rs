@@ -21,6 +21,15 @@ pub enum Request {
     Reset,
     BuiltinScene,
     Shutdown,
+    SaveFlight,
+}
+
+impl Request {
+    /// Takes the force off the hand.
+    pub fn lets_go(&self) -> bool {
+        let Self::Haptic(order) = self else { return false };
+        matches!(order(0), HapticOrder::Disengage { .. })
+    }
 }
 
 /// Reads one command; `Err` holds every reason against it, one a line.
@@ -48,6 +57,7 @@ pub fn read(command: &Command, now: &ParameterSet, device: &DeviceInfo) -> Resul
         CommandKind::Reset => Ok(Request::Reset),
         CommandKind::LoadBuiltinScene => Ok(Request::BuiltinScene),
         CommandKind::Shutdown => Ok(Request::Shutdown),
+        CommandKind::SaveFlight => Ok(Request::SaveFlight),
     }
 }
 

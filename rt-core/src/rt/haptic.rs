@@ -88,39 +88,28 @@ struct Response {
 }
 
 impl HapticLoop {
-    pub fn new(
-        session_id: u64,
-        device: Box<dyn Device>,
-        ports: HapticPorts,
-        (needle, force): (NeedleParameters, ForceParameters),
-        period_s: f64,
-        base_flags: u32,
-    ) -> Self {
-        let info = device.info();
-        let mut state: HapticState = bytemuck::Zeroable::zeroed();
-        state.flags = base_flags | if info.simulated { flags::SIMULATED_DEVICE } else { 0 };
-        state.device_limit_n = info.peak_force_n;
-        state.parameters_generation = 1;
+    /// Begins with `memory`, which names every field.
+    pub fn new(session_id: u64, device: Box<dyn Device>, ports: HapticPorts, memory: &HapticMemory, period_s: f64) -> Self {
         Self {
             session_id,
-            info,
+            info: device.info(),
             device,
             ports,
-            needle,
-            force,
+            needle: memory.needle,
+            force: memory.force,
             passivity: PassivityParameters::default(),
-            estimator: VelocityEstimator::new(info.position_step_m),
-            needle_state: NeedleState::default(),
-            force_state: ForceState::default(),
-            passivity_state: PassivityState::default(),
-            gate: GateState::default(),
-            sample: None,
-            contact: 0,
-            pose: TipPose::default(),
-            goal: None,
-            watchdog: Watchdog::default(),
+            estimator: memory.estimator,
+            needle_state: memory.needle_state,
+            force_state: memory.force_state,
+            passivity_state: memory.passivity_state,
+            gate: memory.gate,
+            sample: memory.sample,
+            contact: memory.contact,
+            pose: memory.pose,
+            goal: memory.goal,
+            watchdog: memory.watchdog,
             answer: DeviceAnswer::default(),
-            state,
+            state: memory.state,
             period_s,
         }
     }
@@ -133,7 +122,7 @@ impl HapticLoop {
         while last_ticks > 0 {
             // SYNC: pairs with the bridge's release store; nothing but the flag is carried.
             if stop.load(Ordering::Acquire) {
-                self.gate.release();
+                self.release_for_the_end();
                 last_ticks -= 1;
             }
             clock::sleep_until(grid.due_ns);
@@ -463,6 +452,9 @@ impl HapticLoop {
             speed_m_per_s: s.speed_m_per_s,
             force_terms_n: s.force_terms_n,
             tissue_tick: s.tissue_tick,
+            world_from_tool: self.sample.map_or([0.0; 4], |sample| sample.world_from_tool.coords.into()),
+            buttons: self.sample.map_or(0, |sample| sample.buttons),
+            reserved: 0,
         };
         if self.ports.records.push(record).is_err() {
             s.records_lost += 1;

@@ -7,8 +7,8 @@ use crate::rt::recorder::{FLIGHT_TICKS, Last, Tape, complete_from};
 use crate::rt::taped::pod;
 use crate::rt::watchdog::Watchdog;
 use serde::{Deserialize, Serialize};
-use stylet_hw::{DeviceFault, HandGoal, Sample};
-use stylet_shm_schema::{HapticState, TickRecord};
+use stylet_hw::{DeviceFault, DeviceInfo, HandGoal, Sample};
+use stylet_shm_schema::{HapticState, TickRecord, flags};
 
 /// Ticks between two checkpoints.
 const CHECKPOINT_EVERY: u64 = 256;
@@ -32,6 +32,31 @@ pub struct HapticMemory {
     pub watchdog: Watchdog,
     #[serde(with = "pod")]
     pub state: HapticState,
+}
+
+impl HapticMemory {
+    /// Before the first tick.
+    pub fn new(info: &DeviceInfo, (needle, force): (NeedleParameters, ForceParameters), base_flags: u32) -> Self {
+        let mut state: HapticState = bytemuck::Zeroable::zeroed();
+        state.flags = base_flags | if info.simulated { flags::SIMULATED_DEVICE } else { 0 };
+        state.device_limit_n = info.peak_force_n;
+        state.parameters_generation = 1;
+        Self {
+            needle,
+            force,
+            estimator: VelocityEstimator::new(info.position_step_m),
+            needle_state: NeedleState::default(),
+            force_state: ForceState::default(),
+            passivity_state: PassivityState::default(),
+            gate: GateState::default(),
+            sample: None,
+            contact: 0,
+            pose: TipPose::default(),
+            goal: None,
+            watchdog: Watchdog::default(),
+            state,
+        }
+    }
 }
 
 /// What went into one tick and what came out.

@@ -120,6 +120,14 @@ impl<T: Tape> Recorder<T> {
         self.tape.as_deref_mut()
     }
 
+    pub fn take(&mut self) -> Option<Box<T>> {
+        self.tape.take()
+    }
+
+    pub fn put(&mut self, tape: Box<T>) {
+        self.tape = Some(tape);
+    }
+
     pub fn hand_over(&mut self) {
         if let Some(tape) = self.tape.take() {
             self.send(tape);

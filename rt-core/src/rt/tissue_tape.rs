@@ -4,7 +4,8 @@ use crate::rt::exchange::{TipPose, TissueResponse};
 use crate::rt::recorder::{Last, Tape, complete_from};
 use crate::rt::tissue::{Contact, Seed};
 use crate::scene::SceneSource;
-use crate::tissue::{Held, Limits, TissueState};
+use crate::rt::world::World;
+use crate::tissue::{Held, Limits};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use stylet_shm_schema::MAX_SEEDS;
@@ -12,8 +13,8 @@ use stylet_shm_schema::MAX_SEEDS;
 /// Ticks between two checkpoints: 5 s at 200 Hz. Two are kept, so that a tape reaches back at least so far.
 const CHECKPOINT_EVERY: u64 = 1000;
 const ORDERS: usize = 1024;
-/// Larger bodies are not recorded: a copy of their displacements would take too much of a tick.
-pub const MAX_TAPED_ELEMENTS: usize = 500_000;
+/// Larger bodies are not recorded: a copy of one would take too much of a tick.
+pub const MAX_BODY_BYTES: usize = 8 << 20;
 
 /// An order to the tissue loop, as far as it can be written down. A new scene begins a new tape instead.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -35,7 +36,8 @@ pub struct TissueMemory {
     pub pose: TipPose,
     pub response: TissueResponse,
     pub limits: Limits,
-    pub state: TissueState,
+    /// As the tissue model saves it.
+    pub body: Vec<u8>,
 }
 
 /// What went into one tick and what came out.
@@ -62,8 +64,10 @@ pub struct TissueTape {
 }
 
 impl TissueTape {
-    pub fn new(scene_generation: u64, scene: Arc<SceneSource>, limits: &Limits, state: &TissueState) -> Self {
-        let too_large = state.displacement(0).len() > MAX_TAPED_ELEMENTS;
+    /// For the body of `world`, built from `scene`.
+    pub fn new(world: &World, scene: Arc<SceneSource>) -> Self {
+        let body_len = world.tissue.memory_len();
+        let too_large = body_len > MAX_BODY_BYTES;
         let memory = || TissueMemory {
             seeds: Vec::with_capacity(MAX_SEEDS),
             contact: None,
@@ -72,8 +76,8 @@ impl TissueTape {
             held: None,
             pose: TipPose::default(),
             response: TissueResponse::default(),
-            limits: limits.clone(),
-            state: if too_large { TissueState::empty() } else { state.clone() },
+            limits: world.limits.clone(),
+            body: vec![0; if too_large { 0 } else { body_len }],
         };
         let blank = TissueEntry {
             woke_ns: 0,
@@ -83,7 +87,7 @@ impl TissueTape {
             response: TissueResponse::default(),
         };
         Self {
-            scene_generation,
+            scene_generation: world.generation,
             scene,
             ticks: Last::new(&blank, if too_large { 1 } else { 2 * CHECKPOINT_EVERY as usize }),
             orders: Last::new(&(0, TapedOrder::Reset), ORDERS),

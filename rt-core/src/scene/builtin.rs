@@ -67,6 +67,7 @@ pub(super) fn paper() -> Labels {
         dims,
         spacing_m: SPACING_M,
         cells,
+        structures: Vec::new(),
     }
 }
 

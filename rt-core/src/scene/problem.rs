@@ -112,6 +112,7 @@ mod tests {
             dims: [0, 2000, 3],
             spacing_m: f64::NAN,
             cells: vec![0; 5],
+            structures: Vec::new(),
         };
         let problems = Scene::from_labels("bad", &labels).expect_err("five problems");
         assert_eq!(problems.len(), 5);
@@ -128,6 +129,7 @@ mod tests {
             dims,
             spacing_m: 1e-3,
             cells: vec![1; dims.iter().product()],
+            structures: Vec::new(),
         };
         let problems = Scene::from_labels("large", &labels).expect_err("too many");
         let elements = 4_040_000;

@@ -2,8 +2,9 @@
 
 use super::*;
 use crate::scene::{Labels, Scene, test_bodies};
+use std::sync::Arc;
 
-fn surface_of(labels: &Labels) -> (Lattice, Surface) {
+fn surface_of(labels: &Labels) -> (Arc<Lattice>, Surface) {
     let scene = Scene::from_labels("test", labels).expect("valid labels");
     (scene.lattice, scene.surface)
 }

@@ -1,7 +1,6 @@
-//! What a state is worth: its largest violation over all links; and its surface for those who draw it.
+//! What a state is worth: its largest violation over all links.
 
 use super::chainmail::{ChainMail, TissueState, violation};
-use crate::scene::Surface;
 
 /// Largest violation of a limit over all links, in elements; zero if there is none, infinite for a state
 /// of another model.
@@ -35,11 +34,4 @@ pub(super) fn largest_violation_f32(model: &ChainMail, state: &TissueState) -> f
         }
     }
     worst
-}
-
-/// Writes the positions of the surface's vertices in metres; stops at the shorter of the two.
-pub fn write_surface(model: &ChainMail, state: &TissueState, surface: &Surface, positions_m: &mut [[f32; 3]]) {
-    for (slot, &element) in positions_m.iter_mut().zip(&surface.vertex_elements) {
-        *slot = state.position_m(model, element).map(|c| c as f32);
-    }
 }

@@ -33,6 +33,14 @@ impl Default for TissueParameters {
     }
 }
 
+/// Settings of links along one axis, for structures that have their own.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AxisLimits {
+    pub min_stretch: f64,
+    pub max_stretch: f64,
+    pub shear_deg: f64,
+}
+
 /// Limits of links along one axis, on the difference of the displacements of their ends, in elements.
 ///
 /// Displacements instead of positions: at rest every difference is zero, wherever the element is, so f32

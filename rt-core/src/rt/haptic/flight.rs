@@ -1,7 +1,7 @@
 //! The haptic loop's side of the flight recorder: all that one tick leaves to the next, out and in.
 
 use super::HapticLoop;
-use crate::rt::exchange::TissueResponse;
+use crate::rt::exchange::{HapticOrder, TissueResponse};
 use crate::rt::haptic_tape::{HapticEntry, HapticMemory};
 use stylet_shm_schema::TickRecord;
 
@@ -47,21 +47,12 @@ impl HapticLoop {
         }
     }
 
-    /// Goes on from where another loop was.
-    pub fn remember(&mut self, memory: &HapticMemory) {
-        self.needle = memory.needle;
-        self.force = memory.force;
-        self.estimator = memory.estimator;
-        self.needle_state = memory.needle_state;
-        self.force_state = memory.force_state;
-        self.passivity_state = memory.passivity_state;
-        self.gate = memory.gate;
-        self.sample = memory.sample;
-        self.contact = memory.contact;
-        self.pose = memory.pose;
-        self.goal = memory.goal;
-        self.watchdog = memory.watchdog;
-        self.state = memory.state;
+    /// The end counts as an order, so that its ramp can be repeated.
+    pub(super) fn release_for_the_end(&mut self) {
+        self.gate.release();
+        if let Some(tape) = self.ports.flight.tape() {
+            tape.order(HapticOrder::Disengage { ticket: 0 });
+        }
     }
 
     pub(super) fn checkpoint(&mut self) {

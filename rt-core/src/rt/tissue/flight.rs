@@ -1,7 +1,8 @@
 //! The tissue loop's side of the flight recorder: all that one tick leaves to the next, out and in.
 
 use super::TissueLoop;
-use crate::rt::tissue_tape::{TapedOrder, TissueEntry, TissueMemory};
+use crate::rt::tissue_tape::{TapedOrder, TissueEntry, TissueMemory, TissueTape};
+use crate::tissue::{Deformed, Held};
 
 impl TissueLoop {
     /// Names every field, so that a new one is not forgotten. Allocates nothing: `to` was made for this body.
@@ -28,8 +29,8 @@ impl TissueLoop {
         to.held = *held;
         to.pose = *pose;
         to.response = *response;
-        to.limits.clone_from(world.limits());
-        to.state.copy_from(&world.state);
+        to.limits.clone_from(&world.limits);
+        world.tissue.save(&mut to.body);
     }
 
     /// Goes on from where another loop was.
@@ -43,27 +44,22 @@ impl TissueLoop {
         self.pose = memory.pose;
         self.response = memory.response;
         self.world.set_limits(memory.limits.clone());
-        self.world.state.copy_from(&memory.state);
+        self.world.tissue.load(&memory.body);
     }
 
-    /// Elements that are elsewhere than in `memory`, in any bit; `None` for another body.
-    pub fn different_elements(&self, memory: &TissueMemory) -> Option<usize> {
-        self.world.state.different_elements(&memory.state)
-    }
-
-    pub fn element_count(&self) -> usize {
-        self.world.state.displacement(0).len()
+    pub fn body(&self) -> Deformed<'_> {
+        self.world.tissue.deformed()
     }
 
     /// What the last tick left to be compared: the held element and the residual.
-    pub fn last_step(&self) -> (Option<crate::tissue::Held>, f64) {
+    pub fn last_step(&self) -> (Option<Held>, f64) {
         (self.held, self.report.map_or(0.0, |r| r.residual))
     }
 
     pub(super) fn checkpoint(&mut self) {
         let generation = self.world.generation;
         self.ports.flight.begin_tick(generation);
-        self.with_tape_out(|this, tape| {
+        self.with_tape(|this, tape| {
             if let Some(memory) = tape.checkpoint_due() {
                 this.copy_memory(memory);
             }
@@ -90,11 +86,19 @@ impl TissueLoop {
     }
 
     pub(super) fn hand_over_tape(&mut self) {
-        self.with_tape_out(|this, tape| {
+        self.with_tape(|this, tape| {
             if let Some(memory) = tape.end() {
                 this.copy_memory(memory);
             }
         });
         self.ports.flight.hand_over();
+    }
+
+    /// The tape is taken out meanwhile, so that it can be written to from this loop's own memory.
+    fn with_tape(&mut self, write: impl FnOnce(&Self, &mut TissueTape)) {
+        if let Some(mut tape) = self.ports.flight.take() {
+            write(self, &mut tape);
+            self.ports.flight.put(tape);
+        }
     }
 }

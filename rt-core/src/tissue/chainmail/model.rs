@@ -2,13 +2,13 @@
 
 use super::spans::{Links, links_along};
 use crate::scene::{Lattice, Run, Scene};
-use crate::tissue::Limits;
-use serde::{Deserialize, Serialize};
+use crate::tissue::{Deformed, Limits};
+use std::sync::Arc;
 
 /// Topology and limits; never changes.
 #[derive(Clone, Debug)]
 pub struct ChainMail {
-    pub(crate) lattice: Lattice,
+    pub(crate) lattice: Arc<Lattice>,
     pub(crate) limits: Limits,
     pub(crate) y_links: Links,
     pub(crate) z_links: Links,
@@ -18,8 +18,6 @@ pub struct ChainMail {
     pub(crate) rows_of_plane: Vec<[usize; 2]>,
     /// Part of the body that each element belongs to; no link joins two parts.
     pub(crate) part: Vec<u32>,
-    /// Corners of the box around the body at rest, in elements.
-    pub(crate) rest_box: [[f64; 3]; 2],
 }
 
 impl ChainMail {
@@ -34,7 +32,6 @@ impl ChainMail {
             }
         });
         let rows = (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k)));
-        let (low, high) = lattice.bounds_m();
         ChainMail {
             limits,
             y_links: links_along(1, &lattice),
@@ -42,7 +39,6 @@ impl ChainMail {
             runs: rows.flat_map(|(j, k)| lattice.row(j, k)).copied().collect(),
             rows_of_plane: rows_of_plane.collect(),
             part: parts(&lattice),
-            rest_box: [low, high].map(|corner| corner.map(|c| c / lattice.spacing_m)),
             lattice,
         }
     }
@@ -82,7 +78,7 @@ fn parts(lattice: &Lattice) -> Vec<u32> {
 }
 
 /// Displacements from rest of all elements, in elements, one array for each axis; and scratch.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug)]
 pub struct TissueState {
     pub(crate) u: [Vec<f32>; 3],
     pub(crate) before: [Vec<f32>; 3],
@@ -105,50 +101,33 @@ impl TissueState {
         }
     }
 
-    /// Of no body: a place holder where none is kept.
-    pub fn empty() -> Self {
-        TissueState {
-            u: std::array::from_fn(|_| Vec::new()),
-            before: std::array::from_fn(|_| Vec::new()),
-            max_displacement: 0.0,
-        }
-    }
-
-    /// Takes the displacements of a state of the same model; allocates nothing.
-    pub fn copy_from(&mut self, other: &Self) {
-        for (component, from) in self.u.iter_mut().zip(&other.u) {
-            let count = component.len().min(from.len());
-            component[..count].copy_from_slice(&from[..count]);
-        }
-        self.max_displacement = other.max_displacement;
-    }
-
-    /// Elements whose displacement differs from `other`'s in any bit; `None` for states of different bodies.
-    pub fn different_elements(&self, other: &Self) -> Option<usize> {
-        let count = self.u[0].len();
-        if self.u.iter().chain(&other.u).any(|c| c.len() != count) {
-            return None;
-        }
-        let differs = |e: &usize| (0..3).any(|a| self.u[a][*e].to_bits() != other.u[a][*e].to_bits());
-        Some((0..count).filter(differs).count())
-    }
-
     /// Displacement from rest along `axis` (0 to 2) of all elements, in elements.
     pub fn displacement(&self, axis: usize) -> &[f32] {
         self.u.get(axis).map_or(&[], Vec::as_slice)
     }
 
-    /// Centre of an element in the scene frame; the last element's for a number past the end.
-    pub fn position_m(&self, model: &ChainMail, element: u32) -> [f64; 3] {
-        let rest = model.lattice.rest_m(element);
-        let u = self.displacement_of(element);
-        [0, 1, 2].map(|a| rest[a] + model.lattice.spacing_m * u[a])
+    /// The body as it is now.
+    pub fn deformed<'a>(&'a self, model: &'a ChainMail) -> Deformed<'a> {
+        let stretch = model.limits.links.iter().map(|link| link.high).sum::<f32>();
+        Deformed {
+            lattice: &model.lattice,
+            u: self.u.each_ref().map(Vec::as_slice),
+            scale: 1.0,
+            reach: 1.0 + stretch + self.max_displacement,
+        }
     }
 
-    /// Displacement of one element, in elements.
-    pub(crate) fn displacement_of(&self, element: u32) -> [f64; 3] {
-        let e = (element as usize).min(self.u[0].len().saturating_sub(1));
-        [0, 1, 2].map(|a| self.u[a].get(e).copied().map_or(0.0, f64::from))
+    /// Centre of an element in the scene frame; the last element's for a number past the end.
+    pub fn position_m(&self, model: &ChainMail, element: u32) -> [f64; 3] {
+        self.deformed(model).position_m(element)
+    }
+
+    /// Every element to its place at rest, at once.
+    pub fn return_to_rest(&mut self) {
+        for component in &mut self.u {
+            component.fill(0.0);
+        }
+        self.max_displacement = 0.0;
     }
 
     pub(crate) fn put(&mut self, element: usize, u: [f32; 3]) {

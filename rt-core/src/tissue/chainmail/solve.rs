@@ -2,8 +2,8 @@
 
 use super::model::{ChainMail, TissueState};
 use super::{project, sweep};
-use crate::tissue::Held;
 use crate::tissue::check::largest_violation_f32;
+use crate::tissue::{Held, HeldOutcome, Solve, StepReport};
 
 /// Outward sweeps tried first.
 pub const MAX_SWEEPS: u32 = 6;
@@ -11,44 +11,6 @@ pub const MAX_SWEEPS: u32 = 6;
 pub const MAX_PROJECTIONS: u32 = 12;
 /// Farthest from rest that a held element is followed, in elements; f32 resolves the tolerance up to here.
 pub const REACH: f64 = 2048.0;
-
-/// What became of the held element.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HeldOutcome {
-    /// None was given.
-    None,
-    /// It is where it was asked to be.
-    Followed,
-    /// Not finite, out of reach, or no such element; the step only recovered.
-    Refused,
-}
-
-/// How far the solver had to go, in this order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Solve {
-    /// No element was held: recovery breaks no limit.
-    Nothing,
-    Sweeps,
-    Projections,
-    /// Pulled toward the body at rest moved as a whole.
-    Reanchored,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepReport {
-    /// Passes over all links: sweeps, projections and re-anchoring.
-    pub passes: u32,
-    /// Largest violation over all links after the step, in elements.
-    pub residual: f64,
-    /// Elements that the solver moved, besides recovery; the held one counts.
-    pub moved: u32,
-    /// The residual is within tolerance.
-    pub converged: bool,
-    /// Largest distance of an element from rest, in elements.
-    pub max_displacement: f32,
-    pub held: HeldOutcome,
-    pub solve: Solve,
-}
 
 /// Advances the tissue by `dt_s`; a `dt_s` that is not above zero recovers nothing.
 ///
@@ -63,6 +25,7 @@ pub fn step(model: &ChainMail, state: &mut TissueState, held: Option<Held>, dt_s
         max_displacement: state.max_displacement,
         held: outcome,
         solve: Solve::Nothing,
+        tip_force_n: None,
     };
     if !state.fits(model) {
         return report;

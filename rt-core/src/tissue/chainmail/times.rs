@@ -27,7 +27,11 @@ fn print_times() {
         print_run(name, &model, 1000, &mut |tick, _| {
             let way = way(tick);
             let position_m = [rest[0] + 0.2 * way, rest[1], rest[2] + way];
-            Held { element, position_m }
+            Held {
+                element,
+                position_m,
+                patch_m: 0.0,
+            }
         });
     }
     let mut random = crate::scene::test_bodies::Random(1);
@@ -51,6 +55,7 @@ fn print_times() {
             Held {
                 element: held_now,
                 position_m,
+                patch_m: 0.0,
             }
         },
     );
@@ -65,7 +70,7 @@ fn print_times() {
         let way = if way < 0.04 { way } else { 0.08 - way };
         let tip = [rest[0], rest[1], rest[2] - 0.01 + way];
         if tick % 80 == 1 {
-            at_tip = MaterialPoint::locate(&model, state, tip, Some(at_tip.element)).unwrap_or(at_tip);
+            at_tip = MaterialPoint::locate(&state.deformed(&model), tip, Some(at_tip.element)).unwrap_or(at_tip);
             let held = state.position_m(&model, at_tip.element);
             grip_m = [0, 1, 2].map(|a| held[a] - tip[a]);
         }
@@ -73,6 +78,7 @@ fn print_times() {
         Held {
             element: at_tip.element,
             position_m,
+            patch_m: 0.0,
         }
     });
 }
@@ -166,6 +172,7 @@ fn print_parts() {
             Held {
                 element: held as u32,
                 position_m,
+                patch_m: 0.0,
             },
         );
     });
