@@ -25,10 +25,8 @@ impl ReplayDevice {
     /// assert_eq!(played.read(1e-3).unwrap().tip_in_world, taken[0].tip_in_world);
     /// ```
     pub fn new(info: DeviceInfo, mut samples: Vec<Sample>, period_s: f64) -> Option<Self> {
-        let usable = !samples.is_empty()
-            && samples.iter().all(Sample::is_finite)
-            && period_s.is_finite()
-            && period_s > 0.0;
+        let usable =
+            !samples.is_empty() && samples.iter().all(Sample::is_finite) && period_s.is_finite() && period_s > 0.0;
         for (sample, sequence) in samples.iter_mut().zip(1..) {
             sample.sequence = sequence;
         }
@@ -69,6 +67,10 @@ impl Device for ReplayDevice {
 
     fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceFault> {
         // No motors: nobody feels it.
-        if wrench.is_finite() { Ok(()) } else { Err(DeviceFault::NonFiniteWrench) }
+        if wrench.is_finite() {
+            Ok(())
+        } else {
+            Err(DeviceFault::NonFiniteWrench)
+        }
     }
 }

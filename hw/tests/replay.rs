@@ -34,12 +34,19 @@ fn every_sample_is_played_once_bit_for_bit_and_the_last_one_repeats() {
     let mut last = 0;
     for sample in &samples {
         let seen = device.read(DT_S).unwrap();
-        assert_eq!((seen.tip_in_world, seen.world_from_tool), (sample.tip_in_world, sample.world_from_tool));
+        assert_eq!(
+            (seen.tip_in_world, seen.world_from_tool),
+            (sample.tip_in_world, sample.world_from_tool)
+        );
         assert!(seen.sequence > last, "a new sample has a new number");
         last = seen.sequence;
     }
     for _ in 0..50 {
-        assert_eq!(device.read(DT_S).unwrap().sequence, last, "silence is told by a number that stays");
+        assert_eq!(
+            device.read(DT_S).unwrap().sequence,
+            last,
+            "silence is told by a number that stays"
+        );
     }
 }
 
@@ -56,7 +63,12 @@ fn what_cannot_be_played_is_refused() {
     let info = DeviceInfo::phantom_premium_1_5();
     let mut broken = taken(3);
     broken[1].tip_in_world.y = f64::NAN;
-    for (samples, period_s) in [(Vec::new(), DT_S), (broken, DT_S), (taken(3), 0.0), (taken(3), f64::NAN)] {
+    for (samples, period_s) in [
+        (Vec::new(), DT_S),
+        (broken, DT_S),
+        (taken(3), 0.0),
+        (taken(3), f64::NAN),
+    ] {
         assert!(ReplayDevice::new(info, samples, period_s).is_none());
     }
 }

@@ -1,8 +1,8 @@
 //! The command line of `rt-core`.
 
 use crate::core::Options;
-use crate::rt::arm;
 use crate::replay::{self, cli::Replay};
+use crate::rt::arm;
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use stylet_shm_schema::service::Instance;

@@ -113,13 +113,7 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
         records: record_in,
         flight: haptic_flight,
     };
-    let haptic = HapticLoop::new(
-        session_id,
-        device,
-        haptic_ports,
-        &memory,
-        HAPTIC_PERIOD_S,
-    );
+    let haptic = HapticLoop::new(session_id, device, haptic_ports, &memory, HAPTIC_PERIOD_S);
     let tissue_ports = TissuePorts {
         pose: pose_out,
         response: response_in,
@@ -223,7 +217,12 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
         tissue_notices: tissue_notice_out,
         old_worlds: old_world_out,
         loans: SnapshotLoans::new(slot_in, filled_out),
-        flight: FlightDesk::new(haptic_desk, tissue_desk, options.flight_folder.clone(), flight_of(&info, session_id)),
+        flight: FlightDesk::new(
+            haptic_desk,
+            tissue_desk,
+            options.flight_folder.clone(),
+            flight_of(&info, session_id),
+        ),
     };
     let mut bridge = Bridge::new(node, ports, loops, info, session, &scene);
     // SYNC: set by a signal handler; nothing but the flag is carried.

@@ -39,7 +39,9 @@ impl Motion {
 
     /// Believes nothing: sizes, places and orientations are checked.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Rubbish> {
-        let (header, body) = bytes.split_at_checked(HEADER).ok_or(Rubbish("shorter than its header"))?;
+        let (header, body) = bytes
+            .split_at_checked(HEADER)
+            .ok_or(Rubbish("shorter than its header"))?;
         let word = |at: usize| u64::from_le_bytes(std::array::from_fn(|i| header[at + i]));
         let (period_ns, count) = (word(8), word(16));
         if !header.starts_with(MAGIC) {

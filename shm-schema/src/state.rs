@@ -151,7 +151,9 @@ impl Fault {
             Self::OverrunStreak => {
                 "the force loop missed 20 deadlines in a row; lower the load on its core, then re-arm"
             }
-            Self::LoopStopped => "the force loop has stopped; rt-core ended, so that the device lets go: start it again",
+            Self::LoopStopped => {
+                "the force loop has stopped; rt-core ended, so that the device lets go: start it again"
+            }
         }
     }
 }

@@ -45,10 +45,37 @@ pub fn export(options: &Export) -> Result<(), String> {
 }
 
 const COLUMNS: [&str; 31] = [
-    "session_id", "tick", "due_ns", "wake_latency_ns", "force_written_ns", "work_ns", "missed", "phase", "fault", "flags",
-    "tip_x_m", "tip_y_m", "tip_z_m", "force_x_n", "force_y_n", "force_z_n", "depth_m", "speed_m_per_s",
-    "membrane_n", "guide_n", "damping_n", "friction_n", "gravity_n", "tissue_tick",
-    "tool_i", "tool_j", "tool_k", "tool_w", "buttons", "missing_before", "session_begins",
+    "session_id",
+    "tick",
+    "due_ns",
+    "wake_latency_ns",
+    "force_written_ns",
+    "work_ns",
+    "missed",
+    "phase",
+    "fault",
+    "flags",
+    "tip_x_m",
+    "tip_y_m",
+    "tip_z_m",
+    "force_x_n",
+    "force_y_n",
+    "force_z_n",
+    "depth_m",
+    "speed_m_per_s",
+    "membrane_n",
+    "guide_n",
+    "damping_n",
+    "friction_n",
+    "gravity_n",
+    "tissue_tick",
+    "tool_i",
+    "tool_j",
+    "tool_k",
+    "tool_w",
+    "buttons",
+    "missing_before",
+    "session_begins",
 ];
 
 fn csv(ticks: &[Tick], path: &Path) -> Result<(), csv::Error> {
@@ -58,15 +85,35 @@ fn csv(ticks: &[Tick], path: &Path) -> Result<(), csv::Error> {
     for t in ticks {
         let same = before.filter(|b| b.session_id == t.session_id);
         let missing = same.map_or(0, |b| t.tick - b.tick - 1);
-        let whole = [t.session_id, t.tick, t.due_ns, t.wake_latency_ns, t.force_written_ns, t.work_ns];
+        let whole = [
+            t.session_id,
+            t.tick,
+            t.due_ns,
+            t.wake_latency_ns,
+            t.force_written_ns,
+            t.work_ns,
+        ];
         let small = [t.missed, t.phase, t.fault, t.flags];
         let one = [t.depth_m, t.speed_m_per_s];
-        let real = t.tip_in_scene_m.iter().chain(&t.force_on_hand_n).chain(&one).chain(&t.force_terms_n);
-        let mut row: Vec<String> = whole.iter().map(u64::to_string).chain(small.iter().map(u32::to_string)).collect();
+        let real = t
+            .tip_in_scene_m
+            .iter()
+            .chain(&t.force_on_hand_n)
+            .chain(&one)
+            .chain(&t.force_terms_n);
+        let mut row: Vec<String> = whole
+            .iter()
+            .map(u64::to_string)
+            .chain(small.iter().map(u32::to_string))
+            .collect();
         row.extend(real.map(f64::to_string));
         row.push(t.tissue_tick.to_string());
         row.extend(t.world_from_tool.iter().map(f64::to_string));
-        row.extend([t.buttons.to_string(), missing.to_string(), u8::from(same.is_none()).to_string()]);
+        row.extend([
+            t.buttons.to_string(),
+            missing.to_string(),
+            u8::from(same.is_none()).to_string(),
+        ]);
         table.write_record(&row)?;
         before = Some(t);
     }

@@ -81,8 +81,15 @@ mod tests {
         for tick in [1, 2, 4] {
             assert!(gaps.record(2, tick));
         }
-        let gap = |session_id, tick, missing| Gap { session_id, tick, missing };
+        let gap = |session_id, tick, missing| Gap {
+            session_id,
+            tick,
+            missing,
+        };
         assert_eq!(gaps.gaps(), [gap(1, 7, 2), gap(2, 3, 1)]);
-        assert_eq!((gaps.records(), gaps.missing(), gaps.repeated(), gaps.sessions()), (7, 3, 1, 2));
+        assert_eq!(
+            (gaps.records(), gaps.missing(), gaps.repeated(), gaps.sessions()),
+            (7, 3, 1, 2)
+        );
     }
 }

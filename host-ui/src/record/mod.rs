@@ -54,7 +54,9 @@ pub fn run(options: &Options) -> Result<(), String> {
         .map_err(|e| format!("no thread could be started to write: {e}"))?;
     take(&mut link, options, stop, &send);
     drop(send);
-    let totals = writer.join().map_err(|_| "the recording ended by itself".to_owned())??;
+    let totals = writer
+        .join()
+        .map_err(|_| "the recording ended by itself".to_owned())??;
     println!("{}: {}", options.out.display(), totals.words());
     totals.verdict()
 }

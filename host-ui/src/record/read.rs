@@ -17,8 +17,8 @@ pub fn read(path: &Path) -> Result<Recording, String> {
     let told = |why: String| format!("{}: {why}", path.display());
     let bytes = std::fs::read(path).map_err(|e| told(e.to_string()))?;
     let options = enumset::EnumSet::only(mcap::read::Options::IgnoreEndMagic);
-    let messages = mcap::MessageStream::new_with_options(&bytes, options)
-        .map_err(|e| told(format!("not an MCAP file ({e})")))?;
+    let messages =
+        mcap::MessageStream::new_with_options(&bytes, options).map_err(|e| told(format!("not an MCAP file ({e})")))?;
     let mut recording = Recording {
         ticks: Vec::new(),
         gaps: Gaps::default(),
@@ -35,7 +35,8 @@ pub fn read(path: &Path) -> Result<Recording, String> {
         if message.channel.topic != TICK.topic {
             continue;
         }
-        let tick: Tick = serde_json::from_slice(&message.data).map_err(|e| told(format!("a tick that is none: {e}")))?;
+        let tick: Tick =
+            serde_json::from_slice(&message.data).map_err(|e| told(format!("a tick that is none: {e}")))?;
         if recording.gaps.record(tick.session_id, tick.tick) {
             recording.ticks.push(tick);
         }

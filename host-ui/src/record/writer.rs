@@ -192,5 +192,7 @@ fn epoch_ns() -> u64 {
     unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut time) };
     let monotonic_ns = time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64;
     let since_1970 = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-    since_1970.map_or(0, |d| d.as_nanos() as u64).saturating_sub(monotonic_ns)
+    since_1970
+        .map_or(0, |d| d.as_nanos() as u64)
+        .saturating_sub(monotonic_ns)
 }

@@ -70,7 +70,12 @@ impl FlightDesk {
 
     /// A host asks; false when too many wait already.
     pub fn request(&mut self, ticket: Ticket) -> bool {
-        self.want("request", "a host asked for it".to_owned(), Instant::now(), Some(ticket))
+        self.want(
+            "request",
+            "a host asked for it".to_owned(),
+            Instant::now(),
+            Some(ticket),
+        )
     }
 
     /// A loop has raised a fault.
@@ -84,7 +89,12 @@ impl FlightDesk {
     fn want(&mut self, kind: &'static str, reason: String, due: Instant, ticket: Option<Ticket>) -> bool {
         let room = self.queue.len() < QUEUE;
         if room {
-            self.queue.push_back(Wanted { kind, reason, due, ticket });
+            self.queue.push_back(Wanted {
+                kind,
+                reason,
+                due,
+                ticket,
+            });
         }
         room
     }
@@ -97,7 +107,10 @@ impl FlightDesk {
         tissue_orders: &mut rtrb::Producer<TissueOrder>,
     ) -> Option<Saved> {
         self.take_tapes(scene_generation);
-        if let Some(gathering) = self.gathering.take_if(|g| g.is_whole() || g.since.elapsed() > GATHER_LIMIT) {
+        if let Some(gathering) = self
+            .gathering
+            .take_if(|g| g.is_whole() || g.since.elapsed() > GATHER_LIMIT)
+        {
             self.write(gathering);
         }
         let now = Instant::now();
@@ -135,11 +148,13 @@ impl FlightDesk {
         let path = self.next_path(gathering.wanted.kind);
         let ticket = gathering.wanted.ticket;
         let (flight, sender) = (gathering.into_flight(&self.common), self.written.0.clone());
-        let spawned = std::thread::Builder::new().name("flight-writer".to_owned()).spawn(move || {
-            let result = save(&flight, &path);
-            // Nobody waits for it once the bridge has ended.
-            let _ = sender.send(Saved { ticket, result });
-        });
+        let spawned = std::thread::Builder::new()
+            .name("flight-writer".to_owned())
+            .spawn(move || {
+                let result = save(&flight, &path);
+                // Nobody waits for it once the bridge has ended.
+                let _ = sender.send(Saved { ticket, result });
+            });
         if let Err(why) = spawned {
             let result = Err(format!("no thread could be started to write it: {why}"));
             let _ = self.written.0.send(Saved { ticket, result });
@@ -166,7 +181,11 @@ impl FlightDesk {
     fn next_path(&mut self, kind: &str) -> PathBuf {
         self.files += 1;
         let now = jiff::Timestamp::now().strftime("%Y%m%dT%H%M%SZ");
-        self.folder.join(format!("flight-{now}-{}-{}-{kind}.flight", std::process::id(), self.files))
+        self.folder.join(format!(
+            "flight-{now}-{}-{}-{kind}.flight",
+            std::process::id(),
+            self.files
+        ))
     }
 }
 
@@ -200,7 +219,11 @@ fn save(flight: &Flight, path: &Path) -> Result<PathBuf, String> {
         .map_err(|e| format!("{}: {e}; choose another folder with --flight-dir", folder.display()))?;
     flight.write(path)?;
     forget_oldest(folder, |name| name.ends_with("-exit.flight"), KEPT_EXITS);
-    forget_oldest(folder, |name| name.ends_with(".flight") && !name.ends_with("-exit.flight"), KEPT_OTHERS);
+    forget_oldest(
+        folder,
+        |name| name.ends_with(".flight") && !name.ends_with("-exit.flight"),
+        KEPT_OTHERS,
+    );
     Ok(path.to_owned())
 }
 
@@ -224,7 +247,13 @@ mod tests {
     fn only_the_oldest_of_its_kind_are_forgotten() {
         let folder = std::env::temp_dir().join(format!("stylet-forget-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
-        let names = ["flight-1-exit.flight", "flight-2-exit.flight", "flight-3-exit.flight", "flight-0-fault.flight", "other"];
+        let names = [
+            "flight-1-exit.flight",
+            "flight-2-exit.flight",
+            "flight-3-exit.flight",
+            "flight-0-fault.flight",
+            "other",
+        ];
         for name in names {
             std::fs::write(folder.join(name), "").unwrap();
         }

@@ -17,14 +17,14 @@ use iceoryx2::node::Node;
 use ports::Ports;
 use requests::Request;
 pub use snapshots::SnapshotLoans;
-use supervisor::Supervisor;
 use std::collections::HashMap;
-use std::sync::{Arc, mpsc};
 use std::path::PathBuf;
+use std::sync::{Arc, mpsc};
 use std::time::Duration;
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::service::{Ipc, MAX_BATCH};
 use stylet_shm_schema::*;
+use supervisor::Supervisor;
 
 const PASS: Duration = Duration::from_millis(2);
 const ANNOUNCE_NS: u64 = 200_000_000;
@@ -178,13 +178,22 @@ impl Bridge {
     fn tell_loop_stopped(&mut self) {
         let fault = Fault::LoopStopped;
         let now_ns = clock::now_ns();
-        self.event(EventKind::FaultRaised, fault as u32, 0.0, [0.0; 3], (0, now_ns), fault.message());
+        self.event(
+            EventKind::FaultRaised,
+            fault as u32,
+            0.0,
+            [0.0; 3],
+            (0, now_ns),
+            fault.message(),
+        );
     }
 
     fn serve_flights(&mut self) {
         let loops = &mut self.loops;
         let generation = self.picture.header.generation;
-        let saved = loops.flight.pass(generation, &mut loops.haptic_orders, &mut loops.tissue_orders);
+        let saved = loops
+            .flight
+            .pass(generation, &mut loops.haptic_orders, &mut loops.tissue_orders);
         let Some(saved) = saved else { return };
         let (code, text) = match &saved.result {
             Ok(path) => (0, path.display().to_string()),

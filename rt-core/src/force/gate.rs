@@ -13,6 +13,9 @@ use stylet_hw::DeviceInfo;
 
 use super::check::{Problem, Problems};
 
+/// Ticks of the ramp to zero.
+pub const RAMP_OUT_TICKS: u32 = 20;
+
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GateParameters {
     /// Force of the device for each newton of the model: real needles reach 9 to 16 N. Shown to the operator.
@@ -33,7 +36,7 @@ impl Default for GateParameters {
             max_force_n: 8.5,
             slew_n_per_s: 500.0,
             ramp_in_ticks: 200,
-            ramp_out_ticks: 20,
+            ramp_out_ticks: RAMP_OUT_TICKS,
             thermal_time_s: 600.0,
         }
     }

@@ -52,9 +52,12 @@ impl Replay {
 
 fn tell_haptic(recorded: &HapticFlight) {
     let records = recorded.ticks.iter().map(|e| &e.record);
-    let peak_n = records.clone().map(|r| r.force_on_hand_n.iter().map(|f| f * f).sum::<f64>().sqrt());
+    let peak_n = records
+        .clone()
+        .map(|r| r.force_on_hand_n.iter().map(|f| f * f).sum::<f64>().sqrt());
     let missed: u64 = records.clone().map(|r| u64::from(r.missed)).sum();
-    let longest = |of: fn(&stylet_shm_schema::TickRecord) -> u64| records.clone().map(of).max().unwrap_or(0) as f64 / 1e3;
+    let longest =
+        |of: fn(&stylet_shm_schema::TickRecord) -> u64| records.clone().map(of).max().unwrap_or(0) as f64 / 1e3;
     let engaged = records.clone().filter(|r| r.flags & flags::ENGAGED != 0).count();
     if let (Some(first), Some(last)) = (recorded.ticks.first(), recorded.ticks.last()) {
         println!(
@@ -100,9 +103,17 @@ fn tell(what: &str, found: Option<&Repeated>) -> bool {
         return true;
     };
     let verdict = if r.is_identical() { "bit-identical" } else { "DIFFERENT" };
-    println!("{what}   {verdict}: {} of {} ticks the same", r.ticks - r.different, r.ticks);
+    println!(
+        "{what}   {verdict}: {} of {} ticks the same",
+        r.ticks - r.different,
+        r.ticks
+    );
     if r.positions > 0 {
-        println!("         {} of {} element positions the same", r.positions - r.different_positions, r.positions);
+        println!(
+            "         {} of {} element positions the same",
+            r.positions - r.different_positions,
+            r.positions
+        );
     }
     if let Some(first) = r.first_different {
         println!("         the first that differs is tick {} of the recording", first + 1);

@@ -7,7 +7,12 @@ use stylet_shm_schema::motion::{Motion, MotionSample};
 
 /// The device that plays the motion in `path`; errors say what to do.
 pub fn device(path: &Path) -> Result<ReplayDevice, String> {
-    let told = |why: &str| format!("{}: {why}. Make one with: host-ui export RECORDING.mcap --motion FILE", path.display());
+    let told = |why: &str| {
+        format!(
+            "{}: {why}. Make one with: host-ui export RECORDING.mcap --motion FILE",
+            path.display()
+        )
+    };
     let bytes = std::fs::read(path).map_err(|e| told(&e.to_string()))?;
     let motion = Motion::from_bytes(&bytes).map_err(|e| told(&e.to_string()))?;
     let samples = motion.samples.iter().map(sample).collect();

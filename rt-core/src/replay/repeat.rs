@@ -58,7 +58,11 @@ impl Device for RecordedDevice {
     }
 
     fn write(&mut self, _wrench: &Wrench) -> Result<(), DeviceFault> {
-        if self.write_failed { Err(DeviceFault::Driver) } else { Ok(()) }
+        if self.write_failed {
+            Err(DeviceFault::Driver)
+        } else {
+            Ok(())
+        }
     }
 }
 
@@ -144,7 +148,10 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight) -> Result<Repeated, Stri
     };
     let mut again = TissueLoop::new(flight.session_id, ports, world(), flight.tissue_period_s);
     again.remember(&recorded.memory);
-    let mut compare = Bodies { reference, found: Repeated::default() };
+    let mut compare = Bodies {
+        reference,
+        found: Repeated::default(),
+    };
     let mut orders = recorded.orders.iter().peekable();
     for (index, entry) in recorded.ticks.iter().enumerate() {
         if let Some((_, memory)) = recorded.middle.as_ref().filter(|(tick, _)| *tick == index as u64) {
@@ -180,7 +187,7 @@ fn same_step(again: &TissueLoop, entry: &TissueEntry) -> bool {
         (r.time_ns, r.tick, r.contact, r.seed_count, r.unsolved, numbers, places)
     };
     let (held, residual) = again.last_step();
-    let place = |held: Option<crate::tissue::Held>| held.map(|h| (h.element, bits(&h.position_m)));
+    let place = |held: Option<crate::tissue::Held>| held.map(|h| (h.element, bits(&h.position_m), h.patch_m.to_bits()));
     response(again.response()) == response(&entry.response)
         && place(held) == place(entry.held)
         && residual.to_bits() == entry.residual.to_bits()

@@ -109,8 +109,12 @@ pub enum HapticOrder {
 /// Bridge to tissue.
 pub enum TissueOrder {
     Limits(Limits),
-    DropSeed { ticket: Ticket },
-    UndoSeed { ticket: Ticket },
+    DropSeed {
+        ticket: Ticket,
+    },
+    UndoSeed {
+        ticket: Ticket,
+    },
     Reset,
     World {
         ticket: Ticket,

@@ -89,7 +89,13 @@ struct Response {
 
 impl HapticLoop {
     /// Begins with `memory`, which names every field.
-    pub fn new(session_id: u64, device: Box<dyn Device>, ports: HapticPorts, memory: &HapticMemory, period_s: f64) -> Self {
+    pub fn new(
+        session_id: u64,
+        device: Box<dyn Device>,
+        ports: HapticPorts,
+        memory: &HapticMemory,
+        period_s: f64,
+    ) -> Self {
         Self {
             session_id,
             info: device.info(),
@@ -452,7 +458,9 @@ impl HapticLoop {
             speed_m_per_s: s.speed_m_per_s,
             force_terms_n: s.force_terms_n,
             tissue_tick: s.tissue_tick,
-            world_from_tool: self.sample.map_or([0.0; 4], |sample| sample.world_from_tool.coords.into()),
+            world_from_tool: self
+                .sample
+                .map_or([0.0; 4], |sample| sample.world_from_tool.coords.into()),
             buttons: self.sample.map_or(0, |sample| sample.buttons),
             reserved: 0,
         };

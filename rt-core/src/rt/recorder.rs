@@ -159,7 +159,10 @@ mod tests {
             last.push(value);
         }
         assert_eq!((last.first(), last.next()), (3, 7));
-        assert_eq!((last.get(2), last.get(3), last.get(6), last.get(7)), (None, Some(&13), Some(&16), None));
+        assert_eq!(
+            (last.get(2), last.get(3), last.get(6), last.get(7)),
+            (None, Some(&13), Some(&16), None)
+        );
         assert_eq!(last.since(5).copied().collect::<Vec<_>>(), [15, 16]);
         last.clear();
         assert_eq!(last.since(0).count(), 0);

@@ -3,8 +3,8 @@
 use crate::rt::exchange::{TipPose, TissueResponse};
 use crate::rt::recorder::{Last, Tape, complete_from};
 use crate::rt::tissue::{Contact, Seed};
-use crate::scene::SceneSource;
 use crate::rt::world::World;
+use crate::scene::SceneSource;
 use crate::tissue::{Held, Limits};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -59,15 +59,15 @@ pub struct TissueTape {
     /// Written in turn, each with the tick that it comes before.
     checkpoints: [(u64, TissueMemory); 2],
     end: TissueMemory,
-    /// The body is too large to be recorded.
-    too_large: bool,
+    /// The body is too large to be recorded, or its model cannot be saved.
+    not_kept: bool,
 }
 
 impl TissueTape {
     /// For the body of `world`, built from `scene`.
     pub fn new(world: &World, scene: Arc<SceneSource>) -> Self {
         let body_len = world.tissue.memory_len();
-        let too_large = body_len > MAX_BODY_BYTES;
+        let not_kept = body_len == 0 || body_len > MAX_BODY_BYTES;
         let memory = || TissueMemory {
             seeds: Vec::with_capacity(MAX_SEEDS),
             contact: None,
@@ -77,7 +77,7 @@ impl TissueTape {
             pose: TipPose::default(),
             response: TissueResponse::default(),
             limits: world.limits.clone(),
-            body: vec![0; if too_large { 0 } else { body_len }],
+            body: vec![0; if not_kept { 0 } else { body_len }],
         };
         let blank = TissueEntry {
             woke_ns: 0,
@@ -89,18 +89,18 @@ impl TissueTape {
         Self {
             scene_generation: world.generation,
             scene,
-            ticks: Last::new(&blank, if too_large { 1 } else { 2 * CHECKPOINT_EVERY as usize }),
+            ticks: Last::new(&blank, if not_kept { 1 } else { 2 * CHECKPOINT_EVERY as usize }),
             orders: Last::new(&(0, TapedOrder::Reset), ORDERS),
             checkpoints: [(0, memory()), (0, memory())],
             end: memory(),
-            too_large,
+            not_kept,
         }
     }
 
     /// Where to copy all that the tick that begins now starts from, when it is time to.
     pub fn checkpoint_due(&mut self) -> Option<&mut TissueMemory> {
         let tick = self.ticks.next();
-        if self.too_large || !tick.is_multiple_of(CHECKPOINT_EVERY) {
+        if self.not_kept || !tick.is_multiple_of(CHECKPOINT_EVERY) {
             return None;
         }
         let slot = &mut self.checkpoints[(tick / CHECKPOINT_EVERY % 2) as usize];
@@ -114,18 +114,19 @@ impl TissueTape {
 
     /// Where to copy what the last tick left, before the tape is handed over.
     pub fn end(&mut self) -> Option<&mut TissueMemory> {
-        (!self.too_large).then_some(&mut self.end)
+        (!self.not_kept).then_some(&mut self.end)
     }
 
     /// The stretch from the older checkpoint that can be repeated.
     pub fn flight(&self) -> Option<TissueFlight> {
         let next = self.ticks.next();
-        if self.too_large || next == 0 {
+        if self.not_kept || next == 0 {
             return None;
         }
         // The newest was written before the tick that is a multiple of the distance, the older one a distance before.
         let newest = (next - 1) / CHECKPOINT_EVERY * CHECKPOINT_EVERY;
-        let mut points: Vec<&(u64, TissueMemory)> = self.checkpoints.iter().filter(|(tick, _)| *tick <= newest).collect();
+        let mut points: Vec<&(u64, TissueMemory)> =
+            self.checkpoints.iter().filter(|(tick, _)| *tick <= newest).collect();
         points.sort_by_key(|(tick, _)| *tick);
         points.dedup_by_key(|(tick, _)| *tick);
         points.retain(|(tick, _)| *tick >= complete_from(&self.orders));

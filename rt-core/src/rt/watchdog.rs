@@ -1,6 +1,6 @@
 //! Watches the device and both loops: says which tick must begin to ramp the force out, and why.
 //!
-//! From the tick that raises a fault the force is zero within [`ZERO_WITHIN_TICKS`], on a straight ramp. The first
+//! [`RAMP_OUT_TICKS`](crate::force::gate::RAMP_OUT_TICKS) ticks after the one that raises a fault the force is zero, on a straight ramp. The first
 //! fault is kept until the operator re-arms. A haptic loop that stops altogether cannot watch itself: that is seen
 //! by `bridge/supervisor.rs`.
 
@@ -15,8 +15,6 @@ pub const STALE_TISSUE_NS: u64 = 100_000_000;
 pub const OVERRUN_STREAK: u32 = 20;
 /// So many repeated samples in a row turn the force off.
 pub const SILENT_SAMPLES: u32 = 20;
-/// Ticks from the one that raises a fault to a force of zero, both counted.
-pub const ZERO_WITHIN_TICKS: u32 = 20;
 
 /// What a tick knows of the other thread and of its own punctuality.
 #[derive(Clone, Copy, Debug)]

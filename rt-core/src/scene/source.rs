@@ -39,7 +39,13 @@ impl SceneSource {
     pub fn build(&self) -> Result<Scene, String> {
         match self {
             Self::Builtin(name) => Scene::builtin(name).map_err(|e| e.to_string()),
-            Self::Labels { name, dims, spacing_m, runs, structures } => {
+            Self::Labels {
+                name,
+                dims,
+                spacing_m,
+                runs,
+                structures,
+            } => {
                 let cells: u64 = runs.iter().map(|(_, count)| u64::from(*count)).sum();
                 let wanted = dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(d as u64));
                 // Checked before anything of that size is allocated.
@@ -49,7 +55,10 @@ impl SceneSource {
                 let labels = Labels {
                     dims: *dims,
                     spacing_m: *spacing_m,
-                    cells: runs.iter().flat_map(|&(label, count)| std::iter::repeat_n(label, count as usize)).collect(),
+                    cells: runs
+                        .iter()
+                        .flat_map(|&(label, count)| std::iter::repeat_n(label, count as usize))
+                        .collect(),
                     structures: structures.clone(),
                 };
                 Scene::from_labels(name, &labels)
@@ -66,15 +75,35 @@ mod tests {
     #[test]
     fn labels_survive_and_a_wrong_count_is_refused() {
         let cells = (0..4 * 5 * 6).map(|i| u8::from(i % 7 > 2)).collect();
-        let labels = Labels { dims: [4, 5, 6], spacing_m: 1e-3, cells, structures: Vec::new() };
+        let labels = Labels {
+            dims: [4, 5, 6],
+            spacing_m: 1e-3,
+            cells,
+            structures: Vec::new(),
+        };
         let source = SceneSource::of_labels("block", &labels);
         let again = source.build().unwrap();
         let first = Scene::from_labels("block", &labels).unwrap();
         assert_eq!(again.lattice.element_count(), first.lattice.element_count());
         assert_eq!(again.surface.vertex_elements, first.surface.vertex_elements);
 
-        let SceneSource::Labels { name, spacing_m, runs, structures, .. } = source else { panic!() };
-        let short = SceneSource::Labels { name, dims: [4, 5, 7], spacing_m, runs, structures };
+        let SceneSource::Labels {
+            name,
+            spacing_m,
+            runs,
+            structures,
+            ..
+        } = source
+        else {
+            panic!()
+        };
+        let short = SceneSource::Labels {
+            name,
+            dims: [4, 5, 7],
+            spacing_m,
+            runs,
+            structures,
+        };
         assert!(short.build().is_err_and(|why| why.contains("120")));
     }
 }

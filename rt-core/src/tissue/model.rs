@@ -74,12 +74,14 @@ pub trait TissueModel: Send {
     /// Takes new limits, where the model has such; without allocating.
     fn set_limits(&mut self, limits: Limits);
 
-    /// Bytes of all that one step leaves to the next; constant for the life of the model.
-    fn memory_len(&self) -> usize;
+    /// Bytes of all that one step leaves to the next; constant for the life of the model. 0: it cannot be saved.
+    fn memory_len(&self) -> usize {
+        0
+    }
 
     /// Writes those bytes, without allocating; nothing where `to` has another length.
-    fn save(&self, to: &mut [u8]);
+    fn save(&self, _to: &mut [u8]) {}
 
     /// Takes up what a model of the same body saved; nothing where `from` has another length.
-    fn load(&mut self, from: &[u8]);
+    fn load(&mut self, _from: &[u8]) {}
 }

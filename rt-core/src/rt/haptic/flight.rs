@@ -57,7 +57,11 @@ impl HapticLoop {
 
     pub(super) fn checkpoint(&mut self) {
         // The haptic loop's tape serves every scene.
-        let due = self.ports.flight.begin_tick(0).is_some_and(|tape| tape.is_checkpoint_due());
+        let due = self
+            .ports
+            .flight
+            .begin_tick(0)
+            .is_some_and(|tape| tape.is_checkpoint_due());
         if due {
             let memory = self.memory();
             if let Some(tape) = self.ports.flight.tape() {
