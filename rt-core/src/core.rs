@@ -83,6 +83,7 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
     let ports = Ports::new(&node, scene.surface.vertex_elements.len()).map_err(|e| e.to_string())?;
     let session_id = clock::now_ns() ^ (u64::from(std::process::id()) << 40);
     let board = service::create_state_board(&node, session_id).map_err(|e| e.to_string())?;
+    options.instance.secure_room().map_err(|e| e.to_string())?;
     let locked = lock_memory(options)?;
 
     let (pose_in, pose_out) = triple_buffer::triple_buffer(&TipPose::default());

@@ -44,7 +44,7 @@ fn start(cli: &Cli) -> Result<(), String> {
         if options.no_rt { "NOT real-time" } else { "real-time" }
     );
     let report = rt_core::core::run(&options, &stop);
-    options.instance.sweep();
+    options.instance.sweep_at_end();
     let report = report?;
     if let Some(path) = &cli.report {
         std::fs::write(path, to_json(&report)).map_err(|e| format!("cannot write {}: {e}", path.display()))?;
