@@ -2,7 +2,7 @@
 
 use crate::*;
 use iceoryx2::config::Config;
-use iceoryx2::node::{Node, NodeBuilder, NodeState};
+use iceoryx2::node::{Node, NodeBuilder, NodeState, NodeView};
 use iceoryx2::prelude::{
     CallbackProgression, FileName, LogLevel, Path, SemanticString, ServiceName, SignalHandlingMode, set_log_level,
 };

@@ -1,7 +1,5 @@
 //! One thread of another process, stopped while the others go on.
 
-use std::time::Duration;
-
 /// Stopped by ptrace until dropped. The process must be a child of this one, or this one root.
 pub struct StoppedThread(libc::pid_t);
 
@@ -28,21 +26,28 @@ impl StoppedThread {
         assert_eq!(seized, 0, "ptrace: {}", std::io::Error::last_os_error());
         // SAFETY: as above; it takes neither address nor data.
         unsafe { libc::ptrace(libc::PTRACE_INTERRUPT, id, nothing, nothing) };
-        let state = || std::fs::read_to_string(format!("/proc/{process}/task/{id}/stat")).unwrap_or_default();
-        let stopped = crate::until(Duration::from_secs(2), || state().contains(") t "));
-        assert!(stopped, "the thread {name} did not stop: {}", state());
+        // SAFETY: a thread that is seized; the status is not wanted.
+        let waited = unsafe { libc::waitpid(id, std::ptr::null_mut(), libc::__WALL) };
+        assert_eq!(waited, id, "the thread {name} did not stop");
         Self(id)
     }
+}
+
+/// All threads of the process have ended but those that are traced, or it is gone.
+pub fn is_dead(process: u32) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat"));
+    stat.map_or(true, |s| s.contains(") Z "))
 }
 
 impl Drop for StoppedThread {
     fn drop(&mut self) {
         let nothing = std::ptr::null_mut::<libc::c_void>();
-        // Detaching needs a stop that was waited for.
-        // SAFETY: a thread that we have seized; the status is not wanted.
+        // SAFETY: a thread that we have seized; the status is not wanted. One that ended meanwhile is waited for, or its
+        // process could not be.
         unsafe {
-            libc::waitpid(self.0, std::ptr::null_mut(), libc::__WALL);
-            libc::ptrace(libc::PTRACE_DETACH, self.0, nothing, nothing);
+            if libc::ptrace(libc::PTRACE_DETACH, self.0, nothing, nothing) != 0 {
+                libc::waitpid(self.0, std::ptr::null_mut(), libc::__WALL);
+            }
         }
     }
 }

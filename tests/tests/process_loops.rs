@@ -3,7 +3,7 @@
 use std::time::Duration;
 use stylet_shm_schema::{CommandKind, EventKind, Fault, flags};
 use stylet_tests::hand::{Insertion, assert_smooth, force_n};
-use stylet_tests::stopped::StoppedThread;
+use stylet_tests::stopped::{StoppedThread, is_dead};
 use stylet_tests::{Core, ask, left_behind, until};
 
 /// Words that the operator reads about a fault.
@@ -70,9 +70,15 @@ fn a_force_loop_that_stops_ends_the_process_and_leaves_nothing() {
     hand.press();
     let instance = core.instance.clone();
     let stopped = StoppedThread::stop(core.id(), "haptic");
-    let status = core
-        .ended(Duration::from_secs(5))
-        .expect("a core whose force loop stands still must end");
+    let begun = std::time::Instant::now();
+    let id = core.id();
+    assert!(
+        until(Duration::from_secs(5), || is_dead(id)),
+        "a core whose force loop stands still must end"
+    );
+    println!("ended {:?} after the force loop stopped", begun.elapsed());
+    drop(stopped);
+    let status = core.ended(Duration::from_secs(5)).expect("dead");
     assert_eq!(status.code(), Some(1), "it ends with an error, not by a signal");
     hand.watch(Duration::from_millis(200));
     assert!(
@@ -80,7 +86,6 @@ fn a_force_loop_that_stops_ends_the_process_and_leaves_nothing() {
         "the operator is not told: {:?}",
         hand.link.events().back()
     );
-    drop(stopped);
     drop(hand);
     drop(core);
     assert_eq!(left_behind(&instance), [""; 0]);

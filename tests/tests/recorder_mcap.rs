@@ -30,7 +30,7 @@ fn text(output: &Output) -> String {
 }
 
 /// A real window, on a display without a screen.
-struct Window(Child, Display);
+struct Window(Child, #[allow(dead_code)] Display);
 
 impl Window {
     fn open(core: &Core) -> Self {
