@@ -185,6 +185,7 @@ fn a_flood_of_good_commands_reaches_neither_hand_nor_loop_and_the_operator_can_s
     let asked = Instant::now();
     ask(&mut hand.link, CommandKind::Disengage, &[]).expect("letting go is never refused");
     println!("let go {:?} after it was asked, under a flood", asked.elapsed());
+    assert!(hand.watch_until(Duration::from_secs(10), |_| flooder.is_finished()));
     let sent = flooder.join().expect("ours");
     hand.watch(Duration::from_millis(500));
     let session = *hand.link.session().expect("live");

@@ -1,7 +1,7 @@
 //! Cores that are killed, restarted, doubled, or find no memory: what the operator reads, and what is left.
 
-use host_ui::link::LinkStatus;
-use std::process::{Command, Output, Stdio};
+use host_ui::link::{Link, LinkStatus};
+use std::process::{Command, Stdio};
 use std::time::Duration;
 use stylet_shm_schema::CommandKind;
 use stylet_shm_schema::service::Instance;
@@ -73,18 +73,27 @@ fn a_killed_core_is_seen_and_its_successor_is_found_by_the_same_host() {
 fn a_second_core_is_refused_under_the_same_name_and_runs_under_another() {
     let mut first = Core::start();
     let mut hand = Insertion::begin(&mut first, 0.005);
-    let Output { status, stderr, .. } = core(&first.instance).output().expect("runs");
-    let words = String::from_utf8_lossy(&stderr).into_owned();
+    let mut second = core(&first.instance).stderr(Stdio::piped()).spawn().expect("runs");
+    let mut status = None;
+    assert!(hand.watch_until(Duration::from_secs(10), |_| {
+        status = second.try_wait().expect("ours");
+        status.is_some()
+    }));
+    let words = std::io::read_to_string(second.stderr.take().expect("piped")).expect("text");
     println!("{words}");
-    assert_eq!(status.code(), Some(1));
+    assert_eq!(status.and_then(|s| s.code()), Some(1));
     assert!(
         words.contains("another rt-core") && words.contains("--instance"),
         "{words}"
     );
 
-    let mut other = Core::start();
-    let mut link = other.host();
-    ask(&mut link, CommandKind::Engage, &[]).expect("another name is another core");
+    let other = Core::start();
+    let mut link = Link::new(other.instance.clone());
+    let live = hand.watch_until(Duration::from_secs(10), |_| {
+        link.poll();
+        link.status() == LinkStatus::Live && link.parameters().is_some()
+    });
+    assert!(live, "another name is another core: {:?}", link.status());
     hand.watch(Duration::from_secs(2));
     assert_undisturbed(&hand.records);
     drop(link);
