@@ -3,3 +3,4 @@
 pub mod bodies;
 pub mod error;
 pub mod insertions;
+pub mod machine;

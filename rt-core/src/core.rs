@@ -3,7 +3,7 @@
 use crate::active::activate;
 use crate::bridge::flight::FlightDesk;
 use crate::bridge::ports::Ports;
-use crate::bridge::{Bridge, LoopPorts, SnapshotLoans};
+use crate::bridge::{Bridge, LoopPorts, ScenePicture, SnapshotLoans};
 use crate::replay::file::Flight;
 use crate::replay::motion;
 use crate::rt::arm::{self, Armed, Ask, Usage};
@@ -76,12 +76,14 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
     let device = device_for(&scene, options)?;
     let info = device.info();
     let active = activate(&ParameterSet::default(), &info).map_err(|p| p.join("\n"))?;
-    let world = Box::new(World::new(scene.clone(), active.limits.clone(), 1));
+    let session_id = clock::now_ns() ^ (u64::from(std::process::id()) << 40);
+    let picture = ScenePicture::first(&scene, session_id);
+    let node = options.instance.node().map_err(|e| e.to_string())?;
+    let ports =
+        Ports::new(&node, scene.surface.vertex_elements.len(), picture.word_count()).map_err(|e| e.to_string())?;
+    let world = Box::new(World::new(scene, active.limits, 1));
     let source = Arc::new(SceneSource::Builtin(options.scene.clone()));
     let (tissue_flight, tissue_desk) = recorder(Box::new(TissueTape::new(&world, source)));
-    let node = options.instance.node().map_err(|e| e.to_string())?;
-    let ports = Ports::new(&node, scene.surface.vertex_elements.len()).map_err(|e| e.to_string())?;
-    let session_id = clock::now_ns() ^ (u64::from(std::process::id()) << 40);
     let board = service::create_state_board(&node, session_id).map_err(|e| e.to_string())?;
     options.instance.secure_room().map_err(|e| e.to_string())?;
     let locked = lock_memory(options)?;
@@ -225,7 +227,7 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
             flight_of(&info, session_id),
         ),
     };
-    let mut bridge = Bridge::new(node, ports, loops, info, session, &scene);
+    let mut bridge = Bridge::new(node, ports, loops, info, session, picture);
     // SYNC: set by a signal handler; nothing but the flag is carried.
     let served = bridge.run(|| stop.load(Ordering::Acquire));
     // SYNC: pairs with the acquire loads in both loops.
@@ -258,16 +260,17 @@ fn flight_of(device: &DeviceInfo, session_id: u64) -> Flight {
     }
 }
 
-/// A recorded motion, or the simulated hand, which starts before the scene, on its axis.
+/// A recorded motion, or the simulated hand, which starts outside the body, below its target.
 fn device_for(scene: &Scene, options: &Options) -> Result<Box<dyn Device>, String> {
     if let Some(path) = &options.motion {
         return Ok(Box::new(motion::device(path)?));
     }
-    let (lower, upper) = scene.lattice.bounds_m();
+    let (lowest, _) = scene.lattice.bounds_m();
+    let (lower, upper) = scene.target_bounds_m();
     let start = Vector3::new(
         (lower[0] + upper[0]) / 2.0,
         (lower[1] + upper[1]) / 2.0,
-        lower[2] - 0.03,
+        lowest[2] - 0.03,
     );
     Ok(Box::new(SimulatedPhantom::new(SimulatedPhantomConfig {
         start_tip_in_world: start,

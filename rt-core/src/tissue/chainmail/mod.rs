@@ -6,21 +6,29 @@
 //! as a whole, is in it. Hence: recovery toward rest never breaks a limit, and there is always a way back
 //! to a state without violations.
 
+mod activity;
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+mod classes;
+mod held;
 mod kernels;
+mod memory;
 mod model;
 mod project;
 pub mod queue;
+mod single;
 mod solve;
 mod spans;
+mod state;
 mod sweep;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod times;
 
-pub(crate) use kernels::violation;
-pub use model::{ChainMail, TissueState};
+pub(crate) use kernels::{Scaled, link_violation, ordered};
+pub use model::ChainMail;
+pub use single::single_pass;
 pub use solve::step;
+pub use state::TissueState;
 
 use crate::scene::Scene;
 use crate::tissue::{Deformed, Held, Limits, StepReport, TissueModel};
@@ -50,42 +58,23 @@ impl TissueModel for ChainMailTissue {
     }
 
     fn return_to_rest(&mut self) {
-        self.state.return_to_rest();
+        self.state.return_to_rest(&self.model);
     }
 
     fn set_limits(&mut self, limits: Limits) {
-        self.model.limits = limits;
+        self.model.set_limits(limits);
+        self.state.disturb(&self.model);
     }
 
     fn memory_len(&self) -> usize {
-        size_of::<f32>() * (3 * self.model.element_count() + 1)
+        self.state.memory().iter().map(|part| part.len()).sum()
     }
 
     fn save(&self, to: &mut [u8]) {
-        if to.len() != self.memory_len() {
-            return;
-        }
-        let mut rest = to;
-        for component in &self.state.u {
-            let bytes: &[u8] = bytemuck::cast_slice(component);
-            let (here, after) = rest.split_at_mut(bytes.len());
-            here.copy_from_slice(bytes);
-            rest = after;
-        }
-        rest.copy_from_slice(&self.state.max_displacement.to_ne_bytes());
+        self.state.save(to);
     }
 
     fn load(&mut self, from: &[u8]) {
-        if from.len() != self.memory_len() {
-            return;
-        }
-        let mut rest = from;
-        for component in &mut self.state.u {
-            let bytes: &mut [u8] = bytemuck::cast_slice_mut(component);
-            let (here, after) = rest.split_at(bytes.len());
-            bytes.copy_from_slice(here);
-            rest = after;
-        }
-        self.state.max_displacement = bytemuck::pod_read_unaligned(rest);
+        self.state.load(&self.model, from);
     }
 }
