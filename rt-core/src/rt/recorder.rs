@@ -120,14 +120,17 @@ impl<T: Tape> Recorder<T> {
         self.tape.as_deref_mut()
     }
 
+    /// Takes the tape out, to be written to from elsewhere; to be put back in the same tick.
     pub fn take(&mut self) -> Option<Box<T>> {
         self.tape.take()
     }
 
+    /// Puts back what was taken.
     pub fn put(&mut self, tape: Box<T>) {
         self.tape = Some(tape);
     }
 
+    /// Sends the tape to the bridge.
     pub fn hand_over(&mut self) {
         if let Some(tape) = self.tape.take() {
             self.send(tape);
