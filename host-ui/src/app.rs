@@ -427,5 +427,6 @@ fn command_name(kind: CommandKind) -> &'static str {
         CommandKind::LoadBuiltinScene => "Built-in scene",
         CommandKind::UndoSeed => "Undo seed",
         CommandKind::Shutdown => "Shutdown",
+        CommandKind::SaveFlight => "Flight recording",
     }
 }

@@ -1,8 +1,9 @@
 //! The command line of `host-ui`.
 
-use crate::{app, files, procedure};
+use crate::{app, files, procedure, record};
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use stylet_shm_schema::service::Instance;
 
 /// Operator's program of Stylet, a haptic simulator of prostate brachytherapy.
@@ -50,6 +51,38 @@ enum Task {
         #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=128))]
         seeds: u16,
     },
+    /// Keep every tick of the force loop and the tissue's snapshots in an MCAP file, and count what is missing
+    Record {
+        /// Name that rt-core was started under
+        #[arg(long, default_value = "main")]
+        instance: String,
+        /// File to write
+        #[arg(long, value_name = "FILE.mcap")]
+        out: PathBuf,
+        /// Seconds to record [default: until interrupted or until rt-core ends]
+        #[arg(long, value_name = "S")]
+        duration: Option<f64>,
+        /// Snapshots of the gland kept in a second, 0 to 200
+        #[arg(long, default_value_t = 20.0, value_name = "HZ")]
+        snapshot_rate: f64,
+    },
+    /// Make a table or a motion for rt-core's replay device from a recording
+    Export {
+        /// Recording made by 'host-ui record'
+        recording: PathBuf,
+        /// Table with one row a tick
+        #[arg(long, value_name = "FILE.csv", required_unless_present = "motion")]
+        csv: Option<PathBuf>,
+        /// The hand's motion, for 'rt-core --device replay:FILE'
+        #[arg(long, value_name = "FILE")]
+        motion: Option<PathBuf>,
+    },
+    /// Have rt-core write its flight recording: the last seconds of both loops, to be repeated with 'rt-core replay'
+    Flight {
+        /// Name that rt-core was started under
+        #[arg(long, default_value = "main")]
+        instance: String,
+    },
     /// Segmented volumes
     #[command(subcommand)]
     Scene(SceneTask),
@@ -81,6 +114,30 @@ impl Cli {
                 ended
             }
             Some(Task::Scene(SceneTask::Check { file, label })) => check(&file, label),
+            Some(Task::Record {
+                instance: name,
+                out,
+                duration,
+                snapshot_rate,
+            }) => {
+                let fits = duration.is_none_or(|s| s > 0.0 && s < 1e6) && (0.0..=200.0).contains(&snapshot_rate);
+                if !fits {
+                    return Err("--duration needs seconds above 0, --snapshot-rate 0 to 200 Hz".to_owned());
+                }
+                let instance = instance(&name)?;
+                let ended = record::run(&record::Options {
+                    instance: instance.clone(),
+                    out,
+                    duration: duration.map(Duration::from_secs_f64),
+                    snapshots_hz: snapshot_rate,
+                });
+                instance.sweep();
+                ended
+            }
+            Some(Task::Export { recording, csv, motion }) => record::export(&record::Export { recording, csv, motion }),
+            Some(Task::Flight { instance: name }) => {
+                record::save_flight(&instance(&name)?).map(|path| println!("written: {path}"))
+            }
             Some(Task::Procedure {
                 common,
                 out,

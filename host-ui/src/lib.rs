@@ -9,6 +9,7 @@ pub mod link;
 mod loader;
 pub mod panel;
 pub mod procedure;
+pub mod record;
 pub mod theme;
 pub mod view;
 pub mod workflow;

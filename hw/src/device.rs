@@ -3,6 +3,7 @@
 use core::fmt;
 
 use nalgebra::{UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// A haptic device of six degrees of freedom, called once a tick from the force loop.
 ///
@@ -68,7 +69,7 @@ impl DeviceInfo {
 }
 
 /// One reading of the device.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
     pub tip_in_world: Vector3<f64>,
     /// The needle lies along +z of the tool frame, pointing out of the handle towards the tip.
@@ -124,7 +125,7 @@ impl Default for Wrench {
 }
 
 /// Where the simulated hand should go, and how.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HandGoal {
     pub tip_in_world: Vector3<f64>,
     /// Needle axis towards the tip; any length but zero.
@@ -147,7 +148,7 @@ impl HandGoal {
 }
 
 /// Why a device could not do what it was asked. The numbers are stable: they appear in records.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u32)]
 pub enum DeviceFault {
     NotConnected = 1,

@@ -4,6 +4,7 @@ use crate::core::{HAPTIC_PERIOD_NS, Options};
 use crate::lab::load::{Load, Work};
 use crate::lab::machine::{Machine, Throttle};
 use crate::lab::measure;
+use crate::replay::{self, cli::Replay};
 use crate::rt::arm;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Args, Parser, Subcommand};
@@ -42,6 +43,8 @@ pub enum Task {
         #[arg(long, value_name = "N")]
         haptic_core: Option<usize>,
     },
+    /// Show a flight recording, repeat it, and say whether every force and position is the same in every bit
+    Replay(Replay),
     /// One process of a load; started by `latency`
     #[command(hide = true)]
     Load {
@@ -64,6 +67,12 @@ pub struct RunArgs {
     /// End when the program that started this one ends, however it ends
     #[arg(long)]
     pub exit_with_parent: bool,
+    /// Folder of the flight recordings [default: $XDG_STATE_HOME/stylet/flights or ~/.local/state/stylet/flights]
+    #[arg(long, value_name = "DIR")]
+    flight_dir: Option<PathBuf>,
+    /// 'simulated', or 'replay:FILE' for a motion made by 'host-ui export --motion'
+    #[arg(long, default_value = "simulated", value_name = "DEVICE")]
+    device: String,
     /// On exit write what each loop cost to FILE, as JSON
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
@@ -142,7 +151,15 @@ fn scenes() -> PossibleValuesParser {
 impl RunArgs {
     /// Lists what is wrong with the settings.
     pub fn options(&self) -> Result<Options, String> {
-        self.real_time.options(&self.instance)
+        let mut options = self.real_time.options(&self.instance)?;
+        options.motion = self.device.strip_prefix("replay:").map(PathBuf::from);
+        if options.motion.is_none() && self.device != "simulated" {
+            return Err(format!("--device {}: 'simulated' or 'replay:FILE'", self.device));
+        }
+        if let Some(folder) = &self.flight_dir {
+            options.flight_folder = folder.clone();
+        }
+        Ok(options)
     }
 }
 
@@ -217,6 +234,8 @@ impl RealTimeArgs {
                 tissue_priority: self.tissue_priority,
                 haptic_period_ns: HAPTIC_PERIOD_NS,
                 spin_ns: 0,
+                flight_folder: replay::file::default_folder(),
+                motion: None,
             }),
             _ => Err(problems.join("\n")),
         }

@@ -1,24 +1,31 @@
 //! Puts the process together: session, scene, device, two armed threads, and the bridge on the calling thread.
 
 use crate::active::activate;
+use crate::bridge::flight::FlightDesk;
 use crate::bridge::ports::Ports;
 use crate::bridge::{Bridge, LoopPorts, ScenePicture, SnapshotLoans};
+use crate::replay::file::Flight;
+use crate::replay::motion;
 use crate::rt::arm::{self, Armed, Ask, Usage};
 use crate::rt::clock;
 use crate::rt::exchange::{TipPose, TissueResponse};
 use crate::rt::haptic::{HapticLoop, HapticPorts};
 use crate::rt::timing::Probes;
+use crate::rt::haptic_tape::{HapticMemory, HapticTape};
+use crate::rt::recorder::recorder;
 use crate::rt::tissue::{TissueLoop, TissuePorts};
+use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneSource};
 use nalgebra::Vector3;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::thread::JoinHandle;
-use stylet_hw::{Device, SimulatedPhantom, SimulatedPhantomConfig};
+use stylet_hw::{Device, DeviceInfo, SimulatedPhantom, SimulatedPhantomConfig};
 use stylet_shm_schema::service::{self, Instance, STATE_KEY};
-use stylet_shm_schema::{HapticState, ParameterSet, Session, Text, ThreadReport, flags};
+use stylet_shm_schema::{Fault, HapticState, ParameterSet, Session, Text, ThreadReport, flags};
 
 /// Records that the bridge may be late by: four seconds of them.
 const RECORD_RING: usize = 4096;
@@ -41,6 +48,10 @@ pub struct Options {
     pub haptic_period_ns: u64,
     /// Spinning before each haptic deadline; 0 for none.
     pub spin_ns: u64,
+    /// Where flight recordings go.
+    pub flight_folder: PathBuf,
+    /// A recorded motion to play instead of the simulated hand.
+    pub motion: Option<PathBuf>,
 }
 
 /// What a run was.
@@ -76,7 +87,7 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
 /// The same run, with a probe in each loop.
 pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool>) -> Result<RunReport, String> {
     let scene = Scene::builtin(&options.scene).map_err(|e| e.to_string())?;
-    let device = device_for(&scene);
+    let device = device_for(&scene, options)?;
     let info = device.info();
     let active = activate(&ParameterSet::default(), &info).map_err(|p| p.join("\n"))?;
     let session_id = clock::now_ns() ^ (u64::from(std::process::id()) << 40);
@@ -85,7 +96,10 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
     let ports =
         Ports::new(&node, scene.surface.vertex_elements.len(), picture.word_count()).map_err(|e| e.to_string())?;
     let world = Box::new(World::new(scene, active.limits, 1));
+    let source = Arc::new(SceneSource::Builtin(options.scene.clone()));
+    let (tissue_flight, tissue_desk) = recorder(Box::new(TissueTape::new(&world, source)));
     let board = service::create_state_board(&node, session_id).map_err(|e| e.to_string())?;
+    options.instance.secure_room().map_err(|e| e.to_string())?;
     let locked = lock_memory(options)?;
     let awake = (!options.no_rt).then(arm::keep_cores_awake).flatten();
 
@@ -107,20 +121,22 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
     let real_time = if options.no_rt { 0 } else { flags::REAL_TIME };
     // The loops have a flag of their own: the bridge must be able to end them when a host asks.
     let end = Arc::new(AtomicBool::new(false));
+    let memory = HapticMemory::new(&info, (active.needle, active.force), real_time);
+    let (haptic_flight, haptic_desk) = recorder(Box::new(HapticTape::new(&memory)));
     let haptic_ports = HapticPorts {
         pose: pose_in,
         response: response_out,
         orders: haptic_order_out,
         notices: haptic_notice_in,
         records: record_in,
+        flight: haptic_flight,
     };
     let mut haptic = HapticLoop::new(
         session_id,
         device,
         haptic_ports,
-        (active.needle, active.force),
+        &memory,
         options.haptic_period_ns as f64 / 1e9,
-        real_time,
     );
     haptic.spin_ns = options.spin_ns;
     let tissue_ports = TissuePorts {
@@ -131,6 +147,7 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
         old_worlds: old_world_in,
         slots: slot_out,
         filled: filled_in,
+        flight: tissue_flight,
     };
     let mut tissue = TissueLoop::new(session_id, tissue_ports, world, TISSUE_PERIOD_NS as f64 / 1e9);
     if let Some(probes) = probes {
@@ -216,6 +233,7 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
         tissue: tissue_report,
         memory_locked: u32::from(locked.is_none()),
         no_rt_asked: u32::from(options.no_rt_asked),
+        refused: 0,
         device: Text::new(info.name),
         version: Text::new(env!("CARGO_PKG_VERSION")),
         advice: Text::new(&missing_rights(options, locked.as_deref())),
@@ -228,16 +246,29 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
         tissue_notices: tissue_notice_out,
         old_worlds: old_world_out,
         loans: SnapshotLoans::new(slot_in, filled_out),
+        flight: FlightDesk::new(
+            haptic_desk,
+            tissue_desk,
+            options.flight_folder.clone(),
+            flight_of(&info, session_id, options.haptic_period_ns),
+        ),
     };
     let mut bridge = Bridge::new(node, ports, loops, info, session, picture);
     // SYNC: set by a signal handler; nothing but the flag is carried.
-    let served = bridge.run(|| stop.load(Ordering::Acquire)).map_err(|e| e.to_string());
+    let served = bridge.run(|| stop.load(Ordering::Acquire));
     // SYNC: pairs with the acquire loads in both loops.
     end.store(true, Ordering::Release);
+    if served.is_err() {
+        // Not joined: a loop that stands still would be waited for in vain.
+        return Err(Fault::LoopStopped.message().to_owned());
+    }
     let gone = |_| "a real-time thread ended by itself".to_owned();
     let haptic = haptic_thread.join().map_err(gone)?;
     let tissue = tissue_thread.join().map_err(gone)?;
-    served.map(|()| RunReport {
+    if let Err(why) = bridge.save_last_flight() {
+        eprintln!("rt-core: the flight recording was not saved: {why}");
+    }
+    Ok(RunReport {
         haptic,
         tissue,
         memory_locked: locked.is_none(),
@@ -245,8 +276,26 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
     })
 }
 
-/// The simulated hand starts outside the body, below its target.
-fn device_for(scene: &Scene) -> Box<dyn Device> {
+/// What every flight recording of this run says.
+fn flight_of(device: &DeviceInfo, session_id: u64, haptic_period_ns: u64) -> Flight {
+    Flight {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        session_id,
+        reason: String::new(),
+        device_name: device.name.to_owned(),
+        device: device.into(),
+        haptic_period_s: haptic_period_ns as f64 / 1e9,
+        tissue_period_s: TISSUE_PERIOD_NS as f64 / 1e9,
+        haptic: None,
+        tissue: None,
+    }
+}
+
+/// A recorded motion, or the simulated hand, which starts outside the body, below its target.
+fn device_for(scene: &Scene, options: &Options) -> Result<Box<dyn Device>, String> {
+    if let Some(path) = &options.motion {
+        return Ok(Box::new(motion::device(path)?));
+    }
     let (lowest, _) = scene.lattice.bounds_m();
     let (lower, upper) = scene.target_bounds_m();
     let start = Vector3::new(
@@ -254,10 +303,10 @@ fn device_for(scene: &Scene) -> Box<dyn Device> {
         (lower[1] + upper[1]) / 2.0,
         lowest[2] - 0.03,
     );
-    Box::new(SimulatedPhantom::new(SimulatedPhantomConfig {
+    Ok(Box::new(SimulatedPhantom::new(SimulatedPhantomConfig {
         start_tip_in_world: start,
         ..SimulatedPhantomConfig::default()
-    }))
+    })))
 }
 
 /// `None` when memory is locked; else what is missing, which only `--no-rt` accepts.

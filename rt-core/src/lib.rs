@@ -7,6 +7,7 @@ pub mod core;
 pub mod force;
 pub mod lab;
 pub mod needle;
+pub mod replay;
 pub mod rt;
 pub mod scene;
 pub mod tissue;

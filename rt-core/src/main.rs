@@ -16,6 +16,7 @@ fn main() -> ExitCode {
         Some(Task::Latency(args)) => stop_on_signal().and_then(|stop| latency::run(args, &stop)),
         Some(Task::Verify { report }) => verify::run(report),
         Some(Task::Doctor { json, haptic_core }) => Ok(doctor::run(*json, *haptic_core)),
+        Some(Task::Replay(replay)) => replay.run().map(|same| u8::from(!same)),
         Some(Task::Load { work, instance, file }) => serve_as_load(*work, instance, file).map(|()| 0),
     };
     match ended {
@@ -62,7 +63,7 @@ fn run(args: &RunArgs) -> Result<(), String> {
         if options.no_rt { "NOT real-time" } else { "real-time" }
     );
     let report = rt_core::core::run(&options, &stop);
-    options.instance.sweep();
+    options.instance.sweep_at_end();
     let report = report?;
     if let Some(path) = &args.report {
         std::fs::write(path, to_json(&report)).map_err(|e| format!("cannot write {}: {e}", path.display()))?;

@@ -54,6 +54,7 @@ pub fn record(r: &TickRecord) -> Result<(), Rubbish> {
     ensure(within(&[r.depth_m], MAX_COORDINATE_M), "depth")?;
     ensure(within(&[r.speed_m_per_s], MAX_SPEED_M_PER_S), "speed")?;
     ensure(within(&r.force_terms_n, 1e4), "force terms")?;
+    ensure(within(&r.world_from_tool, 1.001), "orientation")?;
     ensure(
         r.wake_latency_ns < 3_600_000_000_000 && r.work_ns < 3_600_000_000_000,
         "timing",

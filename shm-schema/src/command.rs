@@ -59,6 +59,8 @@ pub enum CommandKind {
     UndoSeed = 9,
     /// End `rt-core`.
     Shutdown = 10,
+    /// Write the flight recording of both loops to disk.
+    SaveFlight = 11,
 }
 
 impl CommandKind {
@@ -74,6 +76,7 @@ impl CommandKind {
             Self::LoadBuiltinScene,
             Self::UndoSeed,
             Self::Shutdown,
+            Self::SaveFlight,
         ]
         .into_iter()
         .find(|k| *k as u32 == number)

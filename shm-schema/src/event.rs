@@ -14,7 +14,7 @@ pub struct Event {
     pub tick: u64,
     /// [`EventKind`] by number.
     pub kind: u32,
-    /// Seed index, fault number or nothing, by kind.
+    /// Seed index, fault number, 1 for a flight that was not saved, or nothing, by kind.
     pub code: u32,
     /// Depth, force, or nothing, by kind.
     pub value: f64,
@@ -41,6 +41,8 @@ pub enum EventKind {
     Reset = 8,
     /// A message from shared memory was not believed; `text` says why.
     RubbishRefused = 9,
+    /// `text`: the file, or why none could be written.
+    FlightSaved = 10,
 }
 
 impl EventKind {
@@ -55,6 +57,7 @@ impl EventKind {
             Self::SceneLoaded,
             Self::Reset,
             Self::RubbishRefused,
+            Self::FlightSaved,
         ]
         .into_iter()
         .find(|k| *k as u32 == number)

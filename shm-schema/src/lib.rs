@@ -21,6 +21,7 @@
 pub mod check;
 mod command;
 mod event;
+pub mod motion;
 mod params;
 mod plan;
 mod record;
@@ -45,4 +46,4 @@ pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.
-pub const SCHEMA_VERSION: u32 = 1;
+pub const SCHEMA_VERSION: u32 = 2;

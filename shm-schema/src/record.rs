@@ -29,4 +29,8 @@ pub struct TickRecord {
     /// F_R, guide, damping, shaft friction, F_G before the gate.
     pub force_terms_n: [f64; 5],
     pub tissue_tick: u64,
+    /// Quaternion i, j, k, w; with the tip all that the device said.
+    pub world_from_tool: [f64; 4],
+    pub buttons: u32,
+    pub reserved: u32,
 }

@@ -2,7 +2,7 @@
 
 use crate::*;
 use iceoryx2::config::Config;
-use iceoryx2::node::{Node, NodeBuilder, NodeState};
+use iceoryx2::node::{Node, NodeBuilder, NodeState, NodeView};
 use iceoryx2::prelude::{
     CallbackProgression, FileName, LogLevel, Path, SemanticString, ServiceName, SignalHandlingMode, set_log_level,
 };
@@ -92,6 +92,10 @@ impl Instance {
     /// A node of this instance; removes what dead programs left.
     pub fn node(&self) -> Result<Node<Ipc>, ServiceError> {
         set_log_level(LogLevel::Fatal);
+        let free = free_bytes();
+        if free < MIN_ROOM_BYTES {
+            return Err(failed("shared memory is full", format!("{free} bytes left")));
+        }
         NodeBuilder::new()
             .config(&self.config()?)
             .signal_handling_mode(SignalHandlingMode::Disabled)
@@ -99,13 +103,56 @@ impl Instance {
             .map_err(|e| failed("cannot use shared memory", e))
     }
 
+    /// Has the kernel give all memory that this instance's objects may use: writing to an object that finds none left
+    /// would end the program by a signal.
+    pub fn secure_room(&self) -> Result<(), ServiceError> {
+        use std::os::fd::AsRawFd;
+        let prefix = self.prefix();
+        for entry in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
+            let ours = entry.file_name().to_string_lossy().starts_with(&prefix);
+            let Some(size) = entry
+                .metadata()
+                .ok()
+                .filter(|m| ours && m.is_file() && m.len() > 0)
+                .map(|m| m.len())
+            else {
+                continue;
+            };
+            // One that has just gone needs no memory.
+            let Ok(file) = std::fs::File::options().write(true).open(entry.path()) else {
+                continue;
+            };
+            // SAFETY: the file is open; allocating within its size changes nothing that it holds.
+            let code = unsafe { libc::posix_fallocate(file.as_raw_fd(), 0, size as libc::off_t) };
+            if code == libc::ENOSPC {
+                return Err(failed("shared memory is full", format!("no room for {size} bytes")));
+            }
+        }
+        Ok(())
+    }
+
     /// Removes every file of this instance, unless a program still uses it. For the program that ends last.
     pub fn sweep(&self) {
+        self.sweep_unless(|_| true);
+    }
+
+    /// The same for a program that ends although a thread of its own may keep its node from being dropped.
+    pub fn sweep_at_end(&self) {
+        let me = std::process::id();
+        self.sweep_unless(|pid| pid != Some(me));
+    }
+
+    /// `counts` tells whether a node of that process is in use.
+    fn sweep_unless(&self, counts: impl Fn(Option<u32>) -> bool) {
         let Ok(config) = self.config() else { return };
         let mut used = false;
         let listed = Node::<Ipc>::list(&config, |state| {
-            // What cannot be told is taken as alive.
-            used |= !matches!(state, NodeState::Dead(_));
+            used |= match &state {
+                NodeState::Dead(_) => false,
+                NodeState::Alive(view) => counts(view.id().pid::<Ipc>().ok().map(|pid| pid.value() as u32)),
+                // What cannot be told is taken as alive.
+                _ => true,
+            };
             CallbackProgression::Continue
         });
         if used || listed.is_err() {
@@ -119,6 +166,22 @@ impl Instance {
                 let _ = std::fs::remove_file(entry.path());
             }
         }
+    }
+}
+
+/// Less than this, and even the first objects of a program might not fit.
+const MIN_ROOM_BYTES: u64 = 4 << 20;
+
+/// Free memory in `/dev/shm`; all there could be when the kernel does not say.
+fn free_bytes() -> u64 {
+    // SAFETY: an all-zero statvfs is valid.
+    let mut stat: libc::statvfs = unsafe { std::mem::zeroed() };
+    // SAFETY: the path ends in a zero byte and `stat` is valid for writes.
+    let told = unsafe { libc::statvfs(c"/dev/shm".as_ptr(), &mut stat) };
+    if told == 0 {
+        stat.f_bavail * stat.f_frsize
+    } else {
+        u64::MAX
     }
 }
 

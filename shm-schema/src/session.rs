@@ -23,6 +23,8 @@ pub struct Session {
     pub memory_locked: u32,
     /// 1 when `--no-rt` was asked for.
     pub no_rt_asked: u32,
+    /// Messages from hosts that were refused in this run.
+    pub refused: u64,
     pub device: Text<64>,
     pub version: Text<32>,
     /// What was asked for and not granted, and what to do about it; empty when nothing is missing.

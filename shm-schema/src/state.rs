@@ -116,6 +116,7 @@ pub enum Fault {
     TissueStale = 5,
     TissueUnsolved = 6,
     OverrunStreak = 7,
+    LoopStopped = 8,
 }
 
 impl Fault {
@@ -129,6 +130,7 @@ impl Fault {
             Self::TissueStale,
             Self::TissueUnsolved,
             Self::OverrunStreak,
+            Self::LoopStopped,
         ]
         .into_iter()
         .find(|f| *f as u32 == number)
@@ -148,6 +150,9 @@ impl Fault {
             Self::TissueUnsolved => "the tissue constraints could not be met; retract the needle, then re-arm",
             Self::OverrunStreak => {
                 "the force loop missed 20 deadlines in a row; lower the load on its core, then re-arm"
+            }
+            Self::LoopStopped => {
+                "the force loop has stopped; rt-core ended, so that the device lets go: start it again"
             }
         }
     }

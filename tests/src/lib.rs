@@ -1,5 +1,8 @@
 //! Fixtures for whole-system tests: a core process of its own for each test, and a host that talks to it.
 
+pub mod hand;
+pub mod stopped;
+
 use host_ui::link::{Link, LinkStatus};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
@@ -56,11 +59,17 @@ impl Core {
     }
 
     pub fn start_with(options: &[&str]) -> Self {
-        let instance = fresh_instance();
+        Self::start_as(fresh_instance(), options)
+    }
+
+    /// Under a name that another core may have had.
+    pub fn start_as(instance: Instance, options: &[&str]) -> Self {
         let report = scratch(&format!("core-{}", instance.name())).join("report.json");
         let child = Command::new(program("rt-core"))
             .args(["--instance", instance.name(), "--exit-with-parent", "--report"])
             .arg(&report)
+            .arg("--flight-dir")
+            .arg(report.with_file_name("flights"))
             .args(options)
             .stderr(Stdio::null())
             .spawn()
@@ -70,6 +79,35 @@ impl Core {
             instance,
             report,
         }
+    }
+
+    /// Flight recordings written so far, oldest first.
+    pub fn flights(&self) -> Vec<PathBuf> {
+        let files = std::fs::read_dir(self.report.with_file_name("flights"));
+        let mut files: Vec<PathBuf> = files.into_iter().flatten().flatten().map(|f| f.path()).collect();
+        files.retain(|f| f.extension().is_some_and(|e| e == "flight"));
+        files.sort();
+        files
+    }
+
+    /// SIGKILL: nothing is tidied up. Gives the name, for the next core.
+    pub fn kill(mut self) -> Instance {
+        self.child.kill().expect("ours");
+        self.child.wait().expect("ours");
+        let instance = self.instance.clone();
+        // The files of the dead core stay: that is what the next one must cope with.
+        std::mem::forget(self);
+        instance
+    }
+
+    /// Waits until it ends by itself.
+    pub fn ended(&mut self, limit: Duration) -> Option<std::process::ExitStatus> {
+        let mut status = None;
+        until(limit, || {
+            status = self.child.try_wait().expect("ours");
+            status.is_some()
+        });
+        status
     }
 
     pub fn id(&self) -> u32 {
@@ -111,6 +149,14 @@ impl Drop for Core {
         let _ = self.child.wait();
         self.instance.sweep();
     }
+}
+
+/// What an instance has in shared memory.
+pub fn left_behind(instance: &Instance) -> Vec<String> {
+    let prefix = instance.prefix();
+    let names = std::fs::read_dir("/dev/shm").into_iter().flatten().flatten();
+    let names = names.map(|e| e.file_name().to_string_lossy().into_owned());
+    names.filter(|n| n.starts_with(prefix.trim_end_matches('_'))).collect()
 }
 
 /// Polls `ready` every 2 ms; false when it has not come true in time.

@@ -1,16 +1,20 @@
 //! The normal-priority thread that owns every port: hosts come and go here, and the loops do not notice.
 
+pub mod flight;
 mod picture;
 pub mod ports;
 mod requests;
 mod snapshots;
+mod supervisor;
 mod upload;
 
 use crate::active::activate;
 use crate::rt::clock;
 use crate::rt::exchange::*;
+use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneSource};
+use flight::FlightDesk;
 use iceoryx2::node::Node;
 use picture::IDENTITY;
 pub use picture::ScenePicture;
@@ -18,15 +22,19 @@ use ports::Ports;
 use requests::Request;
 pub use snapshots::SnapshotLoans;
 use std::collections::HashMap;
-use std::sync::mpsc;
+use std::path::PathBuf;
+use std::sync::{Arc, mpsc};
 use std::time::Duration;
 use stylet_hw::DeviceInfo;
-use stylet_shm_schema::service::{Ipc, MAX_BATCH, ServiceError};
+use stylet_shm_schema::service::{Ipc, MAX_BATCH};
 use stylet_shm_schema::*;
+use supervisor::Supervisor;
 
 const PASS: Duration = Duration::from_millis(2);
 const ANNOUNCE_NS: u64 = 200_000_000;
 const CLEAN_UP_NS: u64 = 1_000_000_000;
+/// Requests carried out in one pass. More are refused, so that a flood reaches neither loop.
+const MAX_REQUESTS_PER_PASS: u32 = 16;
 
 /// Ends of the rings to and from both loops.
 pub struct LoopPorts {
@@ -37,14 +45,21 @@ pub struct LoopPorts {
     pub tissue_notices: rtrb::Consumer<Notice>,
     pub old_worlds: rtrb::Consumer<Box<World>>,
     pub loans: SnapshotLoans,
+    pub flight: FlightDesk,
 }
+
+/// The force loop has stopped by itself.
+#[derive(Debug)]
+pub struct LoopStopped;
+
+const TOO_MANY: &str = "too many requests at once; send fewer";
 
 /// A scene that a loader thread has built, or why it could not.
 struct Loaded {
     ticket: Ticket,
     name: String,
     patient_from_scene: [f64; 12],
-    scene: Result<Box<Scene>, String>,
+    scene: Result<(Box<Scene>, SceneSource), String>,
 }
 
 /// Everything that the bridge thread owns.
@@ -70,6 +85,7 @@ pub struct Bridge {
     announced_ns: u64,
     cleaned_ns: u64,
     batch: Vec<TickRecord>,
+    supervisor: Supervisor,
 }
 
 impl Bridge {
@@ -109,16 +125,18 @@ impl Bridge {
             announced_ns: 0,
             cleaned_ns: 0,
             batch: Vec::with_capacity(MAX_BATCH),
+            supervisor: Supervisor::default(),
         };
         let _ = bridge.ports.parameters.send_copy(bridge.parameters);
         let _ = bridge.ports.plan.send_copy(bridge.plan);
         bridge
     }
 
-    /// Serves hosts until `stopped` or a host asks to end.
-    pub fn run(&mut self, stopped: impl Fn() -> bool) -> Result<(), ServiceError> {
+    /// Serves hosts until `stopped` or a host asks to end. An error when the force loop has stopped by itself: then
+    /// neither loop must be waited for.
+    pub fn run(&mut self, stopped: impl Fn() -> bool) -> Result<(), LoopStopped> {
         while !stopped() {
-            if self.pass() {
+            if self.pass()? {
                 return Ok(());
             }
             std::thread::sleep(PASS);
@@ -126,8 +144,13 @@ impl Bridge {
         Ok(())
     }
 
+    /// Both loops have ended: writes what they recorded last.
+    pub fn save_last_flight(&mut self) -> Result<PathBuf, String> {
+        self.loops.flight.save_at_end(self.picture.header.generation)
+    }
+
     /// One pass; true when a host asked to end.
-    fn pass(&mut self) -> bool {
+    fn pass(&mut self) -> Result<bool, LoopStopped> {
         self.ports.update_connections();
         self.announce();
         let end = self.take_commands();
@@ -138,13 +161,48 @@ impl Bridge {
             self.send_scene();
         }
         while self.loops.old_worlds.pop().is_ok() {}
-        self.send_records();
+        let made_a_tick = self.send_records();
+        self.serve_flights();
         let (generation, vertices) = (
             self.picture.header.generation,
             self.picture.header.vertex_count as usize,
         );
         self.loops.loans.pass(&self.ports, generation, vertices);
-        end
+        if self.supervisor.pass(made_a_tick) {
+            self.tell_loop_stopped();
+            return Err(LoopStopped);
+        }
+        Ok(end)
+    }
+
+    fn tell_loop_stopped(&mut self) {
+        let fault = Fault::LoopStopped;
+        let now_ns = clock::now_ns();
+        self.event(
+            EventKind::FaultRaised,
+            fault as u32,
+            0.0,
+            [0.0; 3],
+            (0, now_ns),
+            fault.message(),
+        );
+    }
+
+    fn serve_flights(&mut self) {
+        let loops = &mut self.loops;
+        let generation = self.picture.header.generation;
+        let saved = loops
+            .flight
+            .pass(generation, &mut loops.haptic_orders, &mut loops.tissue_orders);
+        let Some(saved) = saved else { return };
+        let (code, text) = match &saved.result {
+            Ok(path) => (0, path.display().to_string()),
+            Err(why) => (1, why.clone()),
+        };
+        self.event(EventKind::FlightSaved, code, 0.0, [0.0; 3], (0, clock::now_ns()), &text);
+        if let Some(ticket) = saved.ticket {
+            self.answer(ticket, saved.result.as_ref().err().map(String::as_str), 0);
+        }
     }
 
     fn announce(&mut self) {
@@ -160,7 +218,9 @@ impl Bridge {
         }
     }
 
-    fn send_records(&mut self) {
+    /// True when the force loop has made a tick.
+    fn send_records(&mut self) -> bool {
+        let mut any = false;
         loop {
             while self.batch.len() < MAX_BATCH
                 && let Ok(record) = self.loops.records.pop()
@@ -168,8 +228,9 @@ impl Bridge {
                 self.batch.push(record);
             }
             if self.batch.is_empty() {
-                return;
+                return any;
             }
+            any = true;
             if let Ok(mut sample) = self.ports.records.loan_slice_uninit(self.batch.len()) {
                 *sample.user_header_mut() = self.session.session_id;
                 let _ = sample.write_from_slice(&self.batch).send();
@@ -216,6 +277,7 @@ impl Bridge {
     }
 
     fn take_commands(&mut self) -> bool {
+        let mut carried_out = 0;
         while let Ok(Some(sample)) = self.ports.commands.receive() {
             let command = *sample.payload();
             drop(sample);
@@ -225,10 +287,15 @@ impl Bridge {
                     self.reply(who, None, 0);
                     return true;
                 }
-                Ok(request) => self.carry_out(request, who),
+                // A request to let go is never too much.
+                Ok(request) if carried_out < MAX_REQUESTS_PER_PASS || request.lets_go() => {
+                    carried_out += 1;
+                    self.carry_out(request, who);
+                }
+                Ok(_) => self.refuse(who, TOO_MANY),
                 Err(why) => {
                     self.event(EventKind::RubbishRefused, 0, 0.0, [0.0; 3], (0, clock::now_ns()), &why);
-                    self.reply(who, Some(&why), 0);
+                    self.refuse(who, &why);
                 }
             }
         }
@@ -278,15 +345,23 @@ impl Bridge {
             }
             Request::BuiltinScene(name) => {
                 self.load(ticket, name.to_owned(), IDENTITY, || {
-                    Scene::builtin(name).map_err(|e| e.to_string())
+                    let source = SceneSource::Builtin(name.to_owned());
+                    source.build().map(|scene| (scene, source))
                 });
                 true
             }
+            Request::SaveFlight => self.loops.flight.request(ticket),
             Request::Shutdown => true,
         };
         if !taken {
-            self.answer(ticket, Some("too many requests at once; send fewer"), 0);
+            self.session.refused += 1;
+            self.answer(ticket, Some(TOO_MANY), 0);
         }
+    }
+
+    fn refuse(&mut self, who: (u64, u64), why: &str) {
+        self.session.refused += 1;
+        self.reply(who, Some(why), 0);
     }
 
     fn take_uploads(&mut self) {
@@ -298,14 +373,16 @@ impl Bridge {
                 Ok(labels) => labels,
                 Err(why) => {
                     self.event(EventKind::RubbishRefused, 0, 0.0, [0.0; 3], (0, clock::now_ns()), &why);
-                    self.reply(who, Some(&why), 0);
+                    self.refuse(who, &why);
                     continue;
                 }
             };
             drop(sample);
             let ticket = self.ticket(who.0, who.1);
             self.load(ticket, name.clone(), header.patient_from_scene, move || {
+                let source = SceneSource::of_labels(&name, &labels);
                 Scene::from_labels(&name, &labels)
+                    .map(|scene| (scene, source))
                     .map_err(|problems| problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))
             });
         }
@@ -317,7 +394,7 @@ impl Bridge {
         ticket: Ticket,
         name: String,
         patient_from_scene: [f64; 12],
-        build: impl FnOnce() -> Result<Scene, String> + Send + 'static,
+        build: impl FnOnce() -> Result<(Scene, SceneSource), String> + Send + 'static,
     ) {
         if self.loading || self.coming.is_some() {
             self.answer(ticket, Some("another scene is being loaded; wait until it is ready"), 0);
@@ -328,7 +405,7 @@ impl Bridge {
         let built = std::thread::Builder::new()
             .name("scene-loader".to_owned())
             .spawn(move || {
-                let scene = build().map(Box::new);
+                let scene = build().map(|(scene, source)| (Box::new(scene), source));
                 let _ = sender.send(Loaded {
                     ticket,
                     name,
@@ -345,8 +422,8 @@ impl Bridge {
     fn take_loaded(&mut self) {
         let Ok(loaded) = self.loaded.1.try_recv() else { return };
         self.loading = false;
-        let scene = match loaded.scene {
-            Ok(scene) => scene,
+        let (scene, source) = match loaded.scene {
+            Ok(built) => built,
             Err(why) => return self.answer(loaded.ticket, Some(&why), 0),
         };
         let limits = match activate(&self.parameters.set, &self.device) {
@@ -357,12 +434,14 @@ impl Bridge {
         let mut picture = ScenePicture::of(&scene, self.session.session_id, generation, loaded.patient_from_scene);
         picture.header.name = Text::new(&loaded.name);
         let world = Box::new(World::new(*scene, limits, generation));
+        let tape = Box::new(TissueTape::new(&world, Arc::new(source)));
         if self
             .loops
             .tissue_orders
             .push(TissueOrder::World {
                 ticket: loaded.ticket,
                 world,
+                tape,
             })
             .is_err()
         {
@@ -462,6 +541,7 @@ impl Bridge {
                 );
             }
             Notice::Fault { tick, time_ns, fault } => {
+                self.loops.flight.fault(fault.message());
                 self.event(
                     EventKind::FaultRaised,
                     fault as u32,

@@ -22,6 +22,15 @@ pub enum Request {
     /// By name.
     BuiltinScene(&'static str),
     Shutdown,
+    SaveFlight,
+}
+
+impl Request {
+    /// Takes the force off the hand.
+    pub fn lets_go(&self) -> bool {
+        let Self::Haptic(order) = self else { return false };
+        matches!(order(0), HapticOrder::Disengage { .. })
+    }
 }
 
 /// Reads one command; `Err` holds every reason against it, one a line.
@@ -49,6 +58,7 @@ pub fn read(command: &Command, now: &ParameterSet, device: &DeviceInfo) -> Resul
         CommandKind::Reset => Ok(Request::Reset),
         CommandKind::LoadBuiltinScene => builtin_scene(values).map(Request::BuiltinScene),
         CommandKind::Shutdown => Ok(Request::Shutdown),
+        CommandKind::SaveFlight => Ok(Request::SaveFlight),
     }
 }
 

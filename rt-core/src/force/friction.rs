@@ -5,6 +5,8 @@
 //! can hold, with the anchor dragged along by what is left over (Kikuuwe 2006). No velocity enters, so
 //! nothing chatters at rest, and an anchor that holds does not drift.
 
+use serde::{Deserialize, Serialize};
+
 /// What friction can hold, on either side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionLimits {
@@ -16,7 +18,7 @@ pub struct FrictionLimits {
 }
 
 /// Where the shaft is held. `None`: not in touch.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct FrictionState {
     pub anchor_m: Option<f64>,
 }

@@ -8,11 +8,15 @@
 use core::fmt;
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use stylet_hw::DeviceInfo;
 
 use super::check::{Problem, Problems};
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Ticks of the ramp to zero.
+pub const RAMP_OUT_TICKS: u32 = 20;
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GateParameters {
     /// Force of the device for each newton of the model: real needles reach 9 to 16 N. Shown to the operator.
     pub force_scale: f64,
@@ -32,7 +36,7 @@ impl Default for GateParameters {
             max_force_n: 8.5,
             slew_n_per_s: 500.0,
             ramp_in_ticks: 200,
-            ramp_out_ticks: 20,
+            ramp_out_ticks: RAMP_OUT_TICKS,
             thermal_time_s: 600.0,
         }
     }
@@ -52,7 +56,7 @@ impl GateParameters {
 }
 
 /// Why the force goes to zero. The numbers are stable: they appear in records.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u32)]
 pub enum ForceFault {
     NonFiniteForce = 1,
@@ -83,7 +87,7 @@ impl fmt::Display for ForceFault {
 }
 
 /// How often each limit had a say.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct GateCounts {
     pub non_finite: u64,
     pub magnitude_limited: u64,
@@ -93,7 +97,7 @@ pub struct GateCounts {
     pub faults: u64,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 enum Mode {
     /// Zero force, or on the way there from `from_n`.
     RampOut {
@@ -106,7 +110,7 @@ enum Mode {
 }
 
 /// One for a device. Begins disengaged, at zero force.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GateState {
     mode: Mode,
     fault: Option<ForceFault>,

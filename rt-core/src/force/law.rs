@@ -1,6 +1,7 @@
 //! The force law, paper eq. 8-10: `F = F_R + F_C + F_G`, all on the operator's hand.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use super::friction::{FrictionLimits, FrictionState, friction};
 use super::parameters::ForceParameters;
@@ -55,7 +56,7 @@ impl ForceTerms {
 }
 
 /// What the law remembers: where the tissue holds the shaft.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ForceState {
     pub friction: FrictionState,
 }

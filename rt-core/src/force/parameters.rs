@@ -1,6 +1,7 @@
 //! The settings of the force law, and which of them can be used.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use stylet_hw::DeviceInfo;
 
 use super::check::{Problem, Problems};
@@ -8,7 +9,7 @@ use super::gate::GateParameters;
 use crate::needle::NeedleParameters;
 
 /// Coefficients of eq. 8-10, and the gate behind them.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ForceParameters {
     /// Height of `F_R` (eq. 10): what the membrane resists with when it gives way.
     pub membrane_peak_n: f64,

@@ -5,6 +5,7 @@
 //! pay for a later instability; so it is capped.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use super::check::{Problem, Problems};
 
@@ -35,7 +36,7 @@ impl PassivityParameters {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PassivityState {
     /// Taken from the hand minus given to it. Below zero the simulator is a source of energy.
     pub energy_j: f64,

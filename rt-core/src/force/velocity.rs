@@ -7,15 +7,18 @@
 //! delay and 0.94 mm/s of noise for a step of 0.03 mm at 1 kHz.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use serde_big_array::BigArray;
 
 /// Longest window, in periods.
 pub const WINDOW: usize = 32;
 
 /// Preallocated; one for a tip.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct VelocityEstimator {
     step_m: f64,
     /// Newest first: position, and time since it was taken.
+    #[serde(with = "BigArray")]
     history: [(Vector3<f64>, f64); WINDOW + 1],
     filled: usize,
     velocity_m_per_s: Vector3<f64>,

@@ -1,11 +1,12 @@
 //! How much of the needle's motion the held tissue follows (paper eq. 6, 7), and when a membrane gives way.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::force::check::{Problem, Problems};
 
 /// The coefficients of eq. 6, for one membrane and the tissue behind it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NeedleParameters {
     /// `u_cri`: how far the membrane is pushed in before it gives way.
     pub puncture_depth_m: f64,
@@ -61,7 +62,7 @@ impl NeedleParameters {
 }
 
 /// What the needle does to the tissue. The numbers are stable: they appear in records.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[repr(u32)]
 pub enum Phase {
     /// The tip has not met the membrane.
@@ -120,7 +121,7 @@ pub struct NeedleOutput {
 }
 
 /// What one membrane remembers.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct NeedleState {
     pub phase: Phase,
     pub punctured: bool,

@@ -2,14 +2,16 @@
 
 use crate::force::ForceParameters;
 use crate::needle::{NeedleParameters, Phase};
+use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use crate::tissue::Limits;
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use stylet_hw::HandGoal;
 use stylet_shm_schema::{Fault, SnapshotHeader, TickRecord, Vertex};
 
 /// Haptic to tissue, each tick: the newest pose.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct TipPose {
     pub time_ns: u64,
     pub tip_in_scene: Vector3<f64>,
@@ -40,7 +42,7 @@ impl Default for TipPose {
 }
 
 /// Tissue to haptic, each tissue tick.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct TissueResponse {
     pub time_ns: u64,
     pub tick: u64,
@@ -79,7 +81,7 @@ impl Default for TissueResponse {
 pub type Ticket = u64;
 
 /// Bridge to haptic.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub enum HapticOrder {
     Parameters {
         ticket: Ticket,
@@ -100,15 +102,27 @@ pub enum HapticOrder {
     Reset {
         ticket: Ticket,
     },
+    /// Hand the flight recording over; the loop records anew once it has it back.
+    HandOverTape,
 }
 
 /// Bridge to tissue.
 pub enum TissueOrder {
     Limits(Limits),
-    DropSeed { ticket: Ticket },
-    UndoSeed { ticket: Ticket },
+    DropSeed {
+        ticket: Ticket,
+    },
+    UndoSeed {
+        ticket: Ticket,
+    },
     Reset,
-    World { ticket: Ticket, world: Box<World> },
+    World {
+        ticket: Ticket,
+        world: Box<World>,
+        tape: Box<TissueTape>,
+    },
+    /// Hand the flight recording over; the loop records anew once it has it back.
+    HandOverTape,
 }
 
 /// Either loop to the bridge: what happened, once each.

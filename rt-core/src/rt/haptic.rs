@@ -8,23 +8,22 @@ use crate::needle::{self, NeedleInput, NeedleParameters, NeedleState, Phase};
 use crate::rt::arm::Armed;
 use crate::rt::clock::{self, Grid};
 use crate::rt::exchange::*;
+use crate::rt::haptic_tape::{HapticMemory, HapticTape};
+use crate::rt::recorder::Recorder;
+use crate::rt::watchdog::{Watchdog, Watched, at_gate};
 use crate::rt::timing::Probe;
 use iceoryx2::port::writer::EntryHandleMut;
 use nalgebra::Vector3;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stylet_hw::{Device, DeviceInfo, HandGoal, Sample, Wrench};
+use stylet_hw::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
 use stylet_shm_schema::service::Ipc;
 use stylet_shm_schema::{Fault, HapticState, TickRecord, flags};
+
+mod flight;
 
 /// The blackboard entry; made and used by the haptic thread alone.
 pub type StateEntry = EntryHandleMut<Ipc, u64, HapticState>;
 
-/// Tissue older than this turns the force off.
-pub const STALE_TISSUE_NS: u64 = 100_000_000;
-/// So many ticks in a row with a missed deadline turn the force off.
-pub const OVERRUN_STREAK: u32 = 20;
-/// So many repeated samples in a row turn the force off.
-pub const SILENT_SAMPLES: u32 = 20;
 /// The hand is at its goal within this distance, at rest.
 const AT_GOAL_M: f64 = 4e-4;
 const AT_REST_M_PER_S: f64 = 3e-3;
@@ -36,6 +35,7 @@ pub struct HapticPorts {
     pub orders: rtrb::Consumer<HapticOrder>,
     pub notices: rtrb::Producer<Notice>,
     pub records: RecordRing,
+    pub flight: Recorder<HapticTape>,
 }
 
 /// Everything that the haptic thread owns.
@@ -56,9 +56,9 @@ pub struct HapticLoop {
     contact: u64,
     pose: TipPose,
     goal: Option<HandGoal>,
-    fault: Fault,
-    silent: u32,
-    streak: u32,
+    watchdog: Watchdog,
+    /// What the device answered in this tick, for the recording.
+    answer: DeviceAnswer,
     /// What hosts see; also holds the counters.
     pub state: HapticState,
     /// Present in a measurement.
@@ -79,6 +79,21 @@ pub const HAPTIC_STAGES: &[&str] = &[
 /// The mark at which the device read begins.
 const READ_MARK: usize = 0;
 
+/// What the device said to the last read and the last write.
+struct DeviceAnswer {
+    read: Result<Sample, DeviceFault>,
+    write_failed: bool,
+}
+
+impl Default for DeviceAnswer {
+    fn default() -> Self {
+        Self {
+            read: Err(DeviceFault::NotConnected),
+            write_failed: false,
+        }
+    }
+}
+
 /// One tick's way from sample to force.
 struct Response {
     phase: Phase,
@@ -89,40 +104,34 @@ struct Response {
 }
 
 impl HapticLoop {
+    /// Begins with `memory`, which names every field.
     pub fn new(
         session_id: u64,
         device: Box<dyn Device>,
         ports: HapticPorts,
-        (needle, force): (NeedleParameters, ForceParameters),
+        memory: &HapticMemory,
         period_s: f64,
-        base_flags: u32,
     ) -> Self {
-        let info = device.info();
-        let mut state: HapticState = bytemuck::Zeroable::zeroed();
-        state.flags = base_flags | if info.simulated { flags::SIMULATED_DEVICE } else { 0 };
-        state.device_limit_n = info.peak_force_n;
-        state.parameters_generation = 1;
         Self {
             session_id,
-            info,
+            info: device.info(),
             device,
             ports,
-            needle,
-            force,
+            needle: memory.needle,
+            force: memory.force,
             passivity: PassivityParameters::default(),
-            estimator: VelocityEstimator::new(info.position_step_m),
-            needle_state: NeedleState::default(),
-            force_state: ForceState::default(),
-            passivity_state: PassivityState::default(),
-            gate: GateState::default(),
-            sample: None,
-            contact: 0,
-            pose: TipPose::default(),
-            goal: None,
-            fault: Fault::None,
-            silent: 0,
-            streak: 0,
-            state,
+            estimator: memory.estimator,
+            needle_state: memory.needle_state,
+            force_state: memory.force_state,
+            passivity_state: memory.passivity_state,
+            gate: memory.gate,
+            sample: memory.sample,
+            contact: memory.contact,
+            pose: memory.pose,
+            goal: memory.goal,
+            watchdog: memory.watchdog,
+            answer: DeviceAnswer::default(),
+            state: memory.state,
             probe: None,
             spin_ns: 0,
             period_s,
@@ -144,7 +153,7 @@ impl HapticLoop {
         while last_ticks > 0 {
             // SYNC: pairs with the bridge's release store; nothing but the flag is carried.
             if stop.load(Ordering::Acquire) {
-                self.gate.release();
+                self.release_for_the_end();
                 last_ticks -= 1;
             }
             let slept = clock::wait_until(grid.due_ns, self.spin_ns);
@@ -157,10 +166,12 @@ impl HapticLoop {
             missed = grid.advance(clock::now_ns());
         }
         let _ = self.device.write(&Wrench::zero());
+        self.ports.flight.hand_over();
     }
 
     /// One tick; in the order of the data.
     pub fn tick(&mut self, due_ns: u64, woke_ns: u64, missed: u32) {
+        self.checkpoint();
         self.take_orders();
         self.mark();
         let sample = self.read();
@@ -171,8 +182,9 @@ impl HapticLoop {
         self.mark();
         let force_n = self.guard(&sample, &response);
         let wrench = Wrench::from_force(force_n);
-        if self.device.write(&wrench).is_err() {
-            self.raise(Fault::DeviceError, ForceFault::DeviceFault);
+        self.answer.write_failed = self.device.write(&wrench).is_err();
+        if self.answer.write_failed {
+            self.raise(Fault::DeviceError);
         }
         let written_ns = clock::now_ns();
         self.mark();
@@ -191,6 +203,9 @@ impl HapticLoop {
     fn take_orders(&mut self) {
         while let Ok(order) = self.ports.orders.pop() {
             let tick = self.state.tick + 1;
+            if let Some(tape) = self.ports.flight.tape() {
+                tape.order(order);
+            }
             match order {
                 HapticOrder::Parameters {
                     ticket,
@@ -221,14 +236,13 @@ impl HapticLoop {
                     self.notify(Notice::Done { ticket, tick });
                 }
                 HapticOrder::Reset { ticket } => self.reset(ticket, tick),
+                HapticOrder::HandOverTape => self.ports.flight.hand_over(),
             }
         }
     }
 
     fn engage(&mut self, ticket: Ticket, tick: u64) {
-        if self.fault != Fault::None {
-            self.fault = Fault::None;
-            (self.silent, self.streak) = (0, 0);
+        if self.watchdog.rearm() {
             let time_ns = self.state.time_ns;
             self.notify(Notice::Rearmed { tick, time_ns });
         }
@@ -255,29 +269,28 @@ impl HapticLoop {
             buttons: 0,
             sequence: 0,
         });
-        let sample = match self.device.read(self.period_s) {
+        self.answer.read = self.device.read(self.period_s);
+        let sample = match self.answer.read {
             Ok(sample) if sample.is_finite() => sample,
             Ok(_) => {
-                self.raise(Fault::NonFiniteInput, ForceFault::DeviceFault);
+                self.raise(Fault::NonFiniteInput);
                 last
             }
             Err(_) => {
-                self.raise(Fault::DeviceError, ForceFault::DeviceFault);
+                self.raise(Fault::DeviceError);
                 last
             }
         };
         let repeated = self.sample.is_some_and(|s| s.sequence == sample.sequence);
-        self.silent = if repeated { self.silent + 1 } else { 0 };
-        if self.silent >= SILENT_SAMPLES {
-            self.raise(Fault::DeviceSilent, ForceFault::StaleDevice);
+        if let Some(fault) = self.watchdog.sample(repeated) {
+            self.raise(fault);
         }
         sample
     }
 
-    fn raise(&mut self, fault: Fault, to_gate: ForceFault) {
-        self.gate.trip(to_gate);
-        if self.fault == Fault::None {
-            self.fault = fault;
+    fn raise(&mut self, fault: Fault) {
+        self.gate.trip(at_gate(fault));
+        if self.watchdog.raise(fault) {
             let (tick, time_ns) = (self.state.tick + 1, self.state.time_ns);
             self.notify(Notice::Fault { tick, time_ns, fault });
         }
@@ -285,16 +298,15 @@ impl HapticLoop {
 
     /// Watchdog over the other thread and over this one.
     fn watch(&mut self, woke_ns: u64, missed: u32, tissue: &TissueResponse) {
-        self.streak = if missed > 0 { self.streak + 1 } else { 0 };
-        if !self.gate.engaged() {
-            return;
-        }
-        if woke_ns.saturating_sub(tissue.time_ns) > STALE_TISSUE_NS {
-            self.raise(Fault::TissueStale, ForceFault::StaleTissue);
-        } else if tissue.unsolved {
-            self.raise(Fault::TissueUnsolved, ForceFault::StaleTissue);
-        } else if self.streak >= OVERRUN_STREAK {
-            self.raise(Fault::OverrunStreak, ForceFault::Overrun);
+        let fault = self.watchdog.tick(&Watched {
+            woke_ns,
+            missed,
+            tissue_ns: tissue.time_ns,
+            tissue_unsolved: tissue.unsolved,
+            engaged: self.gate.engaged(),
+        });
+        if let Some(fault) = fault {
+            self.raise(fault);
         }
     }
 
@@ -379,8 +391,8 @@ impl HapticLoop {
             &response.terms.total_n,
         );
         let output = gate::step(&self.force.gate, &self.info, &mut self.gate, &wanted_n, self.period_s);
-        if output.fault == Some(ForceFault::NonFiniteForce) && self.fault == Fault::None {
-            self.raise(Fault::NonFiniteForce, ForceFault::NonFiniteForce);
+        if output.fault == Some(ForceFault::NonFiniteForce) && self.watchdog.fault() == Fault::None {
+            self.raise(Fault::NonFiniteForce);
         }
         self.sample = Some(*sample);
         output.force_n
@@ -459,7 +471,7 @@ impl HapticLoop {
         s.worst_tissue_work_ns = tissue.worst_work_ns;
         s.gate_interventions = interventions;
         s.phase = response.phase.code();
-        s.fault = self.fault as u32;
+        s.fault = self.watchdog.fault() as u32;
         s.flags = now_flags;
         s.seed_count = tissue.seed_count;
         let work_ns = clock::now_ns() - woke_ns;
@@ -481,9 +493,15 @@ impl HapticLoop {
             speed_m_per_s: s.speed_m_per_s,
             force_terms_n: s.force_terms_n,
             tissue_tick: s.tissue_tick,
+            world_from_tool: self
+                .sample
+                .map_or([0.0; 4], |sample| sample.world_from_tool.coords.into()),
+            buttons: self.sample.map_or(0, |sample| sample.buttons),
+            reserved: 0,
         };
         if self.ports.records.push(record).is_err() {
             s.records_lost += 1;
         }
+        self.tape(woke_ns, tissue, record);
     }
 }

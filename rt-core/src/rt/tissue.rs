@@ -3,10 +3,13 @@
 use crate::rt::arm::Armed;
 use crate::rt::clock::{self, Grid};
 use crate::rt::exchange::*;
+use crate::rt::recorder::Recorder;
+use crate::rt::tissue_tape::{TapedOrder, TissueTape};
 use crate::rt::timing::Probe;
 use crate::rt::world::World;
 use crate::tissue::{Held, MaterialPoint, StepReport};
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_shm_schema::{MAX_SEEDS, SeedPose, SnapshotHeader, Vertex};
 
@@ -24,18 +27,23 @@ pub struct TissuePorts {
     pub old_worlds: rtrb::Producer<Box<World>>,
     pub slots: rtrb::Consumer<SnapshotSlot>,
     pub filled: rtrb::Producer<SnapshotReturn>,
+    pub flight: Recorder<TissueTape>,
 }
 
-#[derive(Clone, Copy)]
-struct Seed {
+mod flight;
+
+/// A seed left in the tissue.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Seed {
     tip: MaterialPoint,
     tail: Option<MaterialPoint>,
     axis: [f64; 3],
     dropped_at_m: [f64; 3],
 }
 
-#[derive(Clone, Copy)]
-struct Contact {
+/// The contact that lasts.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Contact {
     number: u64,
     place: Vector3<f64>,
     direction: Vector3<f64>,
@@ -116,10 +124,12 @@ impl TissueLoop {
             missed = grid.advance(clock::now_ns());
             self.response.missed += u64::from(missed);
         }
+        self.hand_over_tape();
     }
 
     /// One tick; in the order of the data.
     pub fn tick(&mut self, woke_ns: u64) {
+        self.checkpoint();
         self.take_orders();
         let before = self.pose;
         self.pose = *self.ports.pose.read();
@@ -133,6 +143,7 @@ impl TissueLoop {
         self.report = Some(report);
         self.mark();
         self.respond(woke_ns, &report);
+        self.tape(woke_ns, report.residual);
         self.mark();
         if let Some(probe) = &mut self.probe {
             probe.output_for_pose(self.response.tick, self.pose.time_ns);
@@ -143,11 +154,28 @@ impl TissueLoop {
     fn take_orders(&mut self) {
         while let Ok(order) = self.ports.orders.pop() {
             match order {
-                TissueOrder::Limits(limits) => self.world.tissue.set_limits(limits),
-                TissueOrder::DropSeed { ticket } => self.drop_seed(ticket),
-                TissueOrder::UndoSeed { ticket } => self.undo_seed(ticket),
-                TissueOrder::Reset => self.reset(),
-                TissueOrder::World { ticket, world } => self.swap(ticket, world),
+                TissueOrder::Limits(limits) => {
+                    self.tape_order(TapedOrder::Limits(limits.clone()));
+                    self.world.set_limits(limits);
+                }
+                TissueOrder::DropSeed { ticket } => {
+                    self.tape_order(TapedOrder::DropSeed);
+                    self.drop_seed(ticket);
+                }
+                TissueOrder::UndoSeed { ticket } => {
+                    self.tape_order(TapedOrder::UndoSeed);
+                    self.undo_seed(ticket);
+                }
+                TissueOrder::Reset => {
+                    self.tape_order(TapedOrder::Reset);
+                    self.reset();
+                }
+                TissueOrder::World { ticket, world, tape } => {
+                    self.swap(ticket, world);
+                    self.ports.flight.replace(tape);
+                    self.checkpoint();
+                }
+                TissueOrder::HandOverTape => self.hand_over_tape(),
             }
         }
     }

@@ -9,14 +9,22 @@ pub struct World {
     pub generation: u64,
     pub scene: Scene,
     pub tissue: Box<dyn TissueModel>,
+    /// As the tissue was last given them.
+    pub limits: Limits,
 }
 
 impl World {
     pub fn new(scene: Scene, limits: Limits, generation: u64) -> Self {
         Self {
             generation,
-            tissue: Box::new(ChainMailTissue::new(&scene, limits)),
+            tissue: Box::new(ChainMailTissue::new(&scene, limits.clone())),
             scene,
+            limits,
         }
+    }
+
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.limits.clone_from(&limits);
+        self.tissue.set_limits(limits);
     }
 }

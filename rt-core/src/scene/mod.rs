@@ -12,6 +12,7 @@ mod memory;
 mod problem;
 #[cfg(test)]
 mod problem_tests;
+mod source;
 mod structure;
 mod surface;
 #[cfg(test)]
@@ -20,6 +21,7 @@ pub(crate) mod test_bodies;
 pub(crate) use lattice::Run;
 pub use lattice::{Extent, Lattice};
 pub use problem::{SceneError, SceneProblem};
+pub use source::SceneSource;
 pub use structure::{Material, Role, Structure};
 pub use stylet_shm_schema::MAX_STRUCTURES;
 pub use surface::{Surface, SurfacePart, surface_elements};

@@ -1,9 +1,10 @@
 //! What a scene is made of: named structures, each with its own material.
 
 use crate::tissue::AxisLimits;
+use serde::{Deserialize, Serialize};
 
 /// One anatomical structure; its cells carry its label.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Structure {
     pub name: String,
     pub label: u8,
@@ -12,7 +13,7 @@ pub struct Structure {
 }
 
 /// What a structure is in the procedure.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Role {
     /// What seeds are planned in.
     Target,
@@ -23,7 +24,7 @@ pub enum Role {
 }
 
 /// What a structure does when pushed.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Material {
     /// Limits of ChainMail for links along x, y, z; `None` for those that the operator has set.
     pub limits: Option<[AxisLimits; 3]>,

@@ -1,5 +1,6 @@
 //! What the tissue may do: the paper's limits as settings, checked, and as the loop uses them.
 
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Settings as read. Paper eq. 3-5, Table 1.
@@ -45,7 +46,7 @@ impl Default for TissueParameters {
 }
 
 /// Settings of links along one axis, for structures that have their own.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AxisLimits {
     pub min_stretch: f64,
     pub max_stretch: f64,
@@ -56,7 +57,7 @@ pub struct AxisLimits {
 ///
 /// Displacements instead of positions: at rest every difference is zero, wherever the element is, so f32
 /// keeps the same precision far from the origin.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LinkLimits {
     /// `min_stretch - 1`
     pub low: f32,
@@ -86,7 +87,7 @@ impl LinkLimits {
 }
 
 /// Checked settings, as the step uses them.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
     pub(crate) links: [LinkLimits; 3],
     pub(crate) recovery_time_s: f64,

@@ -1,9 +1,10 @@
 //! What every tissue model is: a body that takes steps and can be read.
 
 use super::{Deformed, Limits};
+use serde::{Deserialize, Serialize};
 
 /// An element kept at a position of the scene frame during a step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Held {
     pub element: u32,
     pub position_m: [f64; 3],
@@ -73,4 +74,15 @@ pub trait TissueModel: Send {
 
     /// Takes new limits, where the model has such; without allocating.
     fn set_limits(&mut self, limits: Limits);
+
+    /// Bytes of all that one step leaves to the next; constant for the life of the model. 0: it cannot be saved.
+    fn memory_len(&self) -> usize {
+        0
+    }
+
+    /// Writes those bytes, without allocating; nothing where `to` has another length.
+    fn save(&self, _to: &mut [u8]) {}
+
+    /// Takes up what a model of the same body saved; nothing where `from` has another length.
+    fn load(&mut self, _from: &[u8]) {}
 }

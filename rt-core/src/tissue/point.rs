@@ -1,9 +1,10 @@
 //! A point of the tissue: the element it belongs to and where in that element; moves and turns with it.
 
 use super::Deformed;
+use serde::{Deserialize, Serialize};
 
 /// `local` runs from -0.5 to 0.5 across an element, along the deformed links.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MaterialPoint {
     pub element: u32,
     pub local: [f32; 3],

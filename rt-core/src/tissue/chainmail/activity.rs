@@ -109,6 +109,32 @@ impl Active {
         size_of::<Stretch>() * (self.of_run.len() + self.rows.len())
     }
 
+    /// What it is made of, as bytes.
+    pub fn memory(&self) -> [&[u8]; 3] {
+        [
+            bytemuck::cast_slice(&self.of_run),
+            bytemuck::cast_slice(&self.rows),
+            bytemuck::bytes_of(&self.planes),
+        ]
+    }
+
+    pub fn memory_mut(&mut self) -> [&mut [u8]; 3] {
+        [
+            bytemuck::cast_slice_mut(&mut self.of_run),
+            bytemuck::cast_slice_mut(&mut self.rows),
+            bytemuck::bytes_of_mut(&mut self.planes),
+        ]
+    }
+
+    /// Every stretch that is not empty lies within its run, its plane and the lattice.
+    pub fn is_of(&self, rows: &Rows, [_, ny, nz]: [usize; 3]) -> bool {
+        let within = |s: &Stretch, start: u32, end: u32| s.is_empty() || (s.start >= start && s.end <= end);
+        let of_run = self.of_run.iter().zip(&rows.runs);
+        of_run.into_iter().all(|(s, run)| within(s, run.first, run.end()))
+            && self.rows.iter().all(|s| within(s, 0, ny as u32))
+            && within(&self.planes, 0, nz as u32)
+    }
+
     pub fn copy_from(&mut self, other: &Active) {
         self.of_run.copy_from_slice(&other.of_run);
         self.rows.copy_from_slice(&other.rows);

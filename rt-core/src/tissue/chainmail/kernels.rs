@@ -3,6 +3,7 @@
 //! Components come in the order along, side, side: the link's axis first, then the two other axes.
 
 use crate::tissue::limits::LinkLimits;
+use bytemuck::{Pod, Zeroable};
 
 /// Links whose outer end is the upper one; `LOWER` where it is the lower one.
 pub(crate) const UPPER: bool = true;
@@ -35,7 +36,8 @@ impl LinkLimits {
 }
 
 /// Consecutive elements `start..end`; empty if the end is not above the start.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub(crate) struct Stretch {
     pub start: u32,
     pub end: u32,

@@ -18,6 +18,7 @@ mod classes;
 mod held;
 mod kernels;
 mod look;
+mod memory;
 mod model;
 mod one_pass;
 mod project;
@@ -80,5 +81,17 @@ impl TissueModel for ChainMailTissue {
     fn set_limits(&mut self, limits: Limits) {
         self.model.set_limits(limits);
         self.state.disturb(&self.model);
+    }
+
+    fn memory_len(&self) -> usize {
+        self.state.memory().iter().map(|part| part.len()).sum()
+    }
+
+    fn save(&self, to: &mut [u8]) {
+        self.state.save(to);
+    }
+
+    fn load(&mut self, from: &[u8]) {
+        self.state.load(&self.model, from);
     }
 }

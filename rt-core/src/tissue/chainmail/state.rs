@@ -12,7 +12,7 @@ use crate::tissue::Deformed;
 #[derive(Clone, Debug)]
 pub struct TissueState {
     pub(crate) u: [Vec<f32>; 3],
-    scale: f64,
+    pub(super) scale: f64,
     /// Swept and checked by the next pass.
     pub(crate) active: Active,
     /// Found by the pass under way for the one after.
@@ -22,8 +22,8 @@ pub struct TissueState {
     /// Moved in a row after its links along z, and after those along y, were seen to; for the row under way.
     pub(crate) late: [Vec<Stretch>; 2],
     /// Largest square of a displacement in each run and each plane, in the unit of `u`.
-    run_square: Vec<f32>,
-    plane_square: Vec<f32>,
+    pub(super) run_square: Vec<f32>,
+    pub(super) plane_square: Vec<f32>,
     pub(crate) max_displacement: f32,
     /// Largest violation of a link that is not active, at most, in elements.
     pub(crate) settled: f32,

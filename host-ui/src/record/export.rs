@@ -1,0 +1,149 @@
+//! What can be made of a recording: a table, and a motion for the core's replay device.
+
+use super::messages::Tick;
+use super::read::{Recording, read};
+use std::path::{Path, PathBuf};
+use stylet_shm_schema::motion::{Motion, MotionSample};
+
+/// The period of the force loop's ideal grid.
+const PERIOD_NS: u64 = 1_000_000;
+
+pub struct Export {
+    pub recording: PathBuf,
+    pub csv: Option<PathBuf>,
+    pub motion: Option<PathBuf>,
+}
+
+/// Writes what was asked for, and tells what the recording holds.
+pub fn export(options: &Export) -> Result<(), String> {
+    let recording = read(&options.recording)?;
+    println!(
+        "{} ticks of {} session(s), {} missing in {} gaps",
+        recording.gaps.records(),
+        recording.gaps.sessions(),
+        recording.gaps.missing(),
+        recording.gaps.gaps().len()
+    );
+    if let Some(why) = &recording.cut_off {
+        println!("note: the recording was cut off ({why}); what came before is used");
+    }
+    if let Some(path) = &options.csv {
+        csv(&recording.ticks, path).map_err(|e| format!("{}: {e}", path.display()))?;
+        println!("written: {}", path.display());
+    }
+    if let Some(path) = &options.motion {
+        let (motion, filled) = motion(&recording);
+        std::fs::write(path, motion.to_bytes()).map_err(|e| format!("{}: {e}", path.display()))?;
+        println!(
+            "written: {}, {} samples, {filled} of them held where the recording has none; play it with: rt-core --device replay:{}",
+            path.display(),
+            motion.samples.len(),
+            path.display()
+        );
+    }
+    Ok(())
+}
+
+const COLUMNS: [&str; 31] = [
+    "session_id",
+    "tick",
+    "due_ns",
+    "wake_latency_ns",
+    "force_written_ns",
+    "work_ns",
+    "missed",
+    "phase",
+    "fault",
+    "flags",
+    "tip_x_m",
+    "tip_y_m",
+    "tip_z_m",
+    "force_x_n",
+    "force_y_n",
+    "force_z_n",
+    "depth_m",
+    "speed_m_per_s",
+    "membrane_n",
+    "guide_n",
+    "damping_n",
+    "friction_n",
+    "gravity_n",
+    "tissue_tick",
+    "tool_i",
+    "tool_j",
+    "tool_k",
+    "tool_w",
+    "buttons",
+    "missing_before",
+    "session_begins",
+];
+
+fn csv(ticks: &[Tick], path: &Path) -> Result<(), csv::Error> {
+    let mut table = csv::Writer::from_path(path)?;
+    table.write_record(COLUMNS)?;
+    let mut before: Option<&Tick> = None;
+    for t in ticks {
+        let same = before.filter(|b| b.session_id == t.session_id);
+        let missing = same.map_or(0, |b| t.tick - b.tick - 1);
+        let whole = [
+            t.session_id,
+            t.tick,
+            t.due_ns,
+            t.wake_latency_ns,
+            t.force_written_ns,
+            t.work_ns,
+        ];
+        let small = [t.missed, t.phase, t.fault, t.flags];
+        let one = [t.depth_m, t.speed_m_per_s];
+        let real = t
+            .tip_in_scene_m
+            .iter()
+            .chain(&t.force_on_hand_n)
+            .chain(&one)
+            .chain(&t.force_terms_n);
+        let mut row: Vec<String> = whole
+            .iter()
+            .map(u64::to_string)
+            .chain(small.iter().map(u32::to_string))
+            .collect();
+        row.extend(real.map(f64::to_string));
+        row.push(t.tissue_tick.to_string());
+        row.extend(t.world_from_tool.iter().map(f64::to_string));
+        row.extend([
+            t.buttons.to_string(),
+            missing.to_string(),
+            u8::from(same.is_none()).to_string(),
+        ]);
+        table.write_record(&row)?;
+        before = Some(t);
+    }
+    table.flush()?;
+    Ok(())
+}
+
+/// The hand's motion in the first session, on the grid of the force loop; and how many samples had to be held, because
+/// the loop missed a deadline or the recording a tick.
+fn motion(recording: &Recording) -> (Motion, usize) {
+    let mut motion = Motion {
+        period_ns: PERIOD_NS,
+        samples: Vec::new(),
+    };
+    let (mut filled, mut last_due_ns) = (0, None);
+    let first = recording.ticks.first().map(|t| t.session_id);
+    for tick in recording.ticks.iter().filter(|t| Some(t.session_id) == first) {
+        let periods = last_due_ns.map_or(1, |last| tick.due_ns.saturating_sub(last) / PERIOD_NS);
+        if let Some(held) = motion.samples.last().copied() {
+            let held = std::iter::repeat_n(held, periods.saturating_sub(1) as usize);
+            filled += held.len();
+            motion.samples.extend(held);
+        }
+        motion.samples.push(MotionSample {
+            tip_in_scene_m: tick.tip_in_scene_m,
+            world_from_tool: tick.world_from_tool,
+            buttons: tick.buttons,
+            reserved: 0,
+        });
+        last_due_ns = Some(tick.due_ns);
+    }
+    (motion, filled)
+}

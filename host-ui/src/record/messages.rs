@@ -1,0 +1,205 @@
+//! What stands in a recording: JSON messages, each kind with its JSON schema, so that any viewer of MCAP opens them.
+//!
+//! JSON and not a binary form: 1 kHz of it costs one core a few per cent, zstd takes most of its size back (figures in
+//! CHANGELOG), and every reader has a parser. Numbers are written so that they read back to the same bits.
+
+use crate::link::Snapshot;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use stylet_shm_schema::{Event, EventKind, TickRecord, Vertex};
+
+/// Where each kind of message goes, and the name and text of its schema.
+pub struct Channel {
+    pub topic: &'static str,
+    pub schema: &'static str,
+    pub text: fn() -> Value,
+}
+
+pub const TICK: Channel = Channel {
+    topic: "/stylet/tick",
+    schema: "stylet.Tick",
+    text: tick_schema,
+};
+pub const EVENT: Channel = Channel {
+    topic: "/stylet/event",
+    schema: "stylet.Event",
+    text: event_schema,
+};
+pub const TISSUE: Channel = Channel {
+    topic: "/stylet/tissue",
+    schema: "stylet.Tissue",
+    text: tissue_schema,
+};
+/// The well-known schema of this name: viewers draw it.
+pub const GLAND: Channel = Channel {
+    topic: "/stylet/gland",
+    schema: "foxglove.PointCloud",
+    text: gland_schema,
+};
+
+/// A [`TickRecord`], field by field.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tick {
+    pub session_id: u64,
+    pub tick: u64,
+    pub due_ns: u64,
+    pub wake_latency_ns: u64,
+    pub force_written_ns: u64,
+    pub work_ns: u64,
+    pub missed: u32,
+    pub phase: u32,
+    pub fault: u32,
+    pub flags: u32,
+    pub tip_in_scene_m: [f64; 3],
+    pub force_on_hand_n: [f64; 3],
+    pub depth_m: f64,
+    pub speed_m_per_s: f64,
+    pub force_terms_n: [f64; 5],
+    pub tissue_tick: u64,
+    pub world_from_tool: [f64; 4],
+    pub buttons: u32,
+}
+
+impl From<&TickRecord> for Tick {
+    fn from(r: &TickRecord) -> Self {
+        Self {
+            session_id: r.session_id,
+            tick: r.tick,
+            due_ns: r.due_ns,
+            wake_latency_ns: r.wake_latency_ns,
+            force_written_ns: r.force_written_ns,
+            work_ns: r.work_ns,
+            missed: r.missed,
+            phase: r.phase,
+            fault: r.fault,
+            flags: r.flags,
+            tip_in_scene_m: r.tip_in_scene_m,
+            force_on_hand_n: r.force_on_hand_n,
+            depth_m: r.depth_m,
+            speed_m_per_s: r.speed_m_per_s,
+            force_terms_n: r.force_terms_n,
+            tissue_tick: r.tissue_tick,
+            world_from_tool: r.world_from_tool,
+            buttons: r.buttons,
+        }
+    }
+}
+
+fn vector(length: usize, unit: &str) -> Value {
+    json!({ "type": "array", "items": { "type": "number" }, "minItems": length, "maxItems": length, "description": unit })
+}
+
+fn number(unit: &str) -> Value {
+    json!({ "type": "number", "description": unit })
+}
+
+fn whole(what: &str) -> Value {
+    json!({ "type": "integer", "minimum": 0, "description": what })
+}
+
+fn object(title: &str, properties: Value) -> Value {
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, "type": "object",
+        "properties": properties,
+    })
+}
+
+fn tick_schema() -> Value {
+    object(
+        TICK.schema,
+        json!({
+            "session_id": whole("run of rt-core"), "tick": whole("of the force loop"),
+            "due_ns": whole("CLOCK_MONOTONIC, on the ideal grid"), "wake_latency_ns": whole("from due to awake"),
+            "force_written_ns": whole("from awake to force written"), "work_ns": whole("from awake to done"),
+            "missed": whole("deadlines skipped just before"), "phase": whole("0 outside, 1 contraction, 2 penetration, 3 retraction, 4 hold"),
+            "fault": whole("0 none"), "flags": whole("bits: 1 real-time, 2 engaged, 4 in contact, 8 punctured, 16 simulated device, 32 at goal, 64 gate acted"),
+            "tip_in_scene_m": vector(3, "m"), "force_on_hand_n": vector(3, "N, after the gate"), "depth_m": number("m since the membrane"),
+            "speed_m_per_s": number("m/s along the path, inwards"),
+            "force_terms_n": vector(5, "N before the gate: membrane, guide, damping, friction, gravity"),
+            "tissue_tick": whole("of the tissue loop"), "world_from_tool": vector(4, "quaternion i, j, k, w"), "buttons": whole("one bit each"),
+        }),
+    )
+}
+
+fn event_schema() -> Value {
+    object(
+        EVENT.schema,
+        json!({
+            "session_id": whole("run of rt-core"), "sequence": whole("of the event"), "tick": whole("of the loop that told it"),
+            "time_ns": whole("CLOCK_MONOTONIC"), "kind": { "type": "string" }, "code": whole("seed, fault or nothing, by kind"),
+            "value": number("m or nothing, by kind"), "position_m": vector(3, "m"), "text": { "type": "string" },
+        }),
+    )
+}
+
+pub fn event(e: &Event) -> Value {
+    json!({
+        "session_id": e.session_id, "sequence": e.sequence, "tick": e.tick, "time_ns": e.time_ns,
+        "kind": EventKind::from_number(e.kind).map_or_else(String::new, |k| format!("{k:?}")),
+        "code": e.code, "value": e.value, "position_m": e.position_m, "text": e.text.read(),
+    })
+}
+
+fn tissue_schema() -> Value {
+    object(
+        TISSUE.schema,
+        json!({
+            "session_id": whole("run of rt-core"), "tissue_tick": whole("of the tissue loop"), "time_ns": whole("CLOCK_MONOTONIC"),
+            "tip_in_scene_m": vector(3, "m"), "needle_direction": vector(3, "unit vector to the tip"),
+            "held_in_scene_m": vector(3, "m"), "held_element": { "type": ["integer", "null"] }, "phase": whole("as of a tick"),
+            "residual": number("of the model"), "max_displacement_m": number("m"), "work_ns": whole("of the tissue tick"),
+            "seeds": { "type": "array", "items": { "type": "object", "properties": {
+                "position_m": vector(3, "m"), "axis": vector(3, "unit vector"), "dropped_at_m": vector(3, "m"),
+            } } },
+        }),
+    )
+}
+
+pub fn tissue(snapshot: &Snapshot) -> Value {
+    let h = &snapshot.header;
+    let seeds = h.seeds.iter().take(h.seed_count as usize);
+    let seeds = seeds.map(|s| json!({ "position_m": s.position_m, "axis": s.axis, "dropped_at_m": s.dropped_at_m }));
+    json!({
+        "session_id": h.session_id, "tissue_tick": h.tissue_tick, "time_ns": h.time_ns,
+        "tip_in_scene_m": h.tip_in_scene_m, "needle_direction": h.needle_direction, "held_in_scene_m": h.held_in_scene_m,
+        "held_element": (h.held_element != u32::MAX).then_some(h.held_element), "phase": h.phase, "residual": h.residual,
+        "max_displacement_m": h.max_displacement_m, "work_ns": h.work_ns, "seeds": seeds.collect::<Vec<_>>(),
+    })
+}
+
+fn gland_schema() -> Value {
+    let point = |names: &[&str]| {
+        let fields = names.iter().map(|n| (n.to_string(), json!({ "type": "number" })));
+        json!({ "type": "object", "properties": fields.collect::<serde_json::Map<_, _>>() })
+    };
+    object(
+        GLAND.schema,
+        json!({
+            "timestamp": { "type": "object", "title": "time", "properties": { "sec": whole("s"), "nsec": whole("ns") } },
+            "frame_id": { "type": "string" },
+            "pose": { "type": "object", "properties": { "position": point(&["x", "y", "z"]), "orientation": point(&["x", "y", "z", "w"]) } },
+            "point_stride": whole("bytes from one point to the next"),
+            "fields": { "type": "array", "items": { "type": "object", "properties": {
+                "name": { "type": "string" }, "offset": whole("bytes"), "type": whole("7 is FLOAT32"),
+            } } },
+            "data": { "type": "string", "contentEncoding": "base64", "description": "surface vertices, m, scene frame" },
+        }),
+    )
+}
+
+/// Vertices of the deformed surface, in the order of the scene's rest surface.
+pub fn gland(snapshot: &Snapshot, time_ns: u64) -> Value {
+    use base64::Engine;
+    const FLOAT32: u32 = 7;
+    let stride = size_of::<Vertex>();
+    let fields = ["x", "y", "z"].iter().enumerate();
+    let fields = fields.map(|(i, name)| json!({ "name": name, "offset": 4 * i, "type": FLOAT32 }));
+    let bytes: &[u8] = bytemuck::cast_slice(&snapshot.positions_m);
+    json!({
+        "timestamp": { "sec": time_ns / 1_000_000_000, "nsec": time_ns % 1_000_000_000 },
+        "frame_id": "scene",
+        "pose": { "position": { "x": 0.0, "y": 0.0, "z": 0.0 }, "orientation": { "x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0 } },
+        "point_stride": stride, "fields": fields.collect::<Vec<_>>(),
+        "data": base64::engine::general_purpose::STANDARD.encode(bytes),
+    })
+}

@@ -1,0 +1,198 @@
+//! The thread that encodes and writes.
+
+use super::gaps::Gaps;
+use super::messages::{self, Channel, EVENT, GLAND, TICK, TISSUE, Tick};
+use crate::link::Snapshot;
+use mcap::records::{MessageHeader, Metadata};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+use std::sync::mpsc;
+use stylet_shm_schema::{Event, Session, TickRecord};
+
+/// A recording cut off by a crash lacks the last chunk at most: about two seconds.
+const CHUNK_BYTES: u64 = 1 << 20;
+/// Gaps listed one by one in the file; all are counted.
+const GAPS_LISTED: usize = 1000;
+
+/// What the taking thread hands over.
+pub enum Item {
+    Session(Box<Session>),
+    Records(Vec<TickRecord>),
+    Event(Box<Event>),
+    Snapshot(Box<Snapshot>),
+    /// One that was seen and is not kept.
+    SnapshotLeftOut,
+    /// As the core itself says.
+    LostInCore(u64),
+}
+
+/// What a recording holds, and what it lacks.
+#[derive(Default)]
+pub struct Totals {
+    pub gaps: Gaps,
+    pub events: u64,
+    pub snapshots: u64,
+    pub snapshots_left_out: u64,
+    pub lost_in_core: u64,
+    pub bytes: u64,
+}
+
+impl Totals {
+    pub fn words(&self) -> String {
+        format!(
+            "{} ticks of {} session(s), {} missing in {} gaps, {} lost in the core; {} events; {} snapshots kept, {} left out; {:.1} MB",
+            self.gaps.records(),
+            self.gaps.sessions(),
+            self.gaps.missing(),
+            self.gaps.gaps().len(),
+            self.lost_in_core,
+            self.events,
+            self.snapshots,
+            self.snapshots_left_out,
+            self.bytes as f64 / 1e6
+        )
+    }
+
+    fn metadata(&self) -> BTreeMap<String, String> {
+        let listed = self.gaps.gaps().iter().take(GAPS_LISTED);
+        let listed = listed.map(|g| format!("{:016x}:{}+{}", g.session_id, g.tick, g.missing));
+        [
+            ("ticks", self.gaps.records().to_string()),
+            ("ticks_missing", self.gaps.missing().to_string()),
+            ("gaps", self.gaps.gaps().len().to_string()),
+            ("gaps_listed", listed.collect::<Vec<_>>().join(" ")),
+            ("ticks_repeated", self.gaps.repeated().to_string()),
+            ("records_lost_in_core", self.lost_in_core.to_string()),
+            ("sessions", self.gaps.sessions().to_string()),
+            ("events", self.events.to_string()),
+            ("snapshots", self.snapshots.to_string()),
+            ("snapshots_left_out", self.snapshots_left_out.to_string()),
+        ]
+        .map(|(key, value)| (key.to_owned(), value))
+        .into()
+    }
+}
+
+struct Writer {
+    file: mcap::Writer<BufWriter<File>>,
+    channels: [u16; 4],
+    sequences: [u32; 4],
+    /// Added to `CLOCK_MONOTONIC` gives the time since 1970.
+    epoch_ns: u64,
+    totals: Totals,
+}
+
+/// Writes until nobody sends any more; the file is whole then.
+pub fn write_all(path: &Path, from: &mpsc::Receiver<Item>) -> Result<Totals, String> {
+    let told = |e: mcap::McapError| format!("{}: {e}", path.display());
+    let file = File::create(path).map_err(|e| format!("{}: {e}; choose another file with --out", path.display()))?;
+    let mut writer = Writer::new(file).map_err(told)?;
+    for item in from {
+        writer.item(item).map_err(told)?;
+    }
+    writer.finish(path).map_err(told)
+}
+
+impl Writer {
+    fn new(file: File) -> mcap::McapResult<Self> {
+        let mut file = mcap::WriteOptions::new()
+            .compression(Some(mcap::Compression::Zstd))
+            .chunk_size(Some(CHUNK_BYTES))
+            .library(concat!("stylet ", env!("CARGO_PKG_VERSION")))
+            .create(BufWriter::new(file))?;
+        let mut channels = [0; 4];
+        for (id, channel) in channels.iter_mut().zip([&TICK, &EVENT, &TISSUE, &GLAND]) {
+            let Channel { topic, schema, text } = channel;
+            let schema = file.add_schema(schema, "jsonschema", text().to_string().as_bytes())?;
+            *id = file.add_channel(schema, topic, "json", &BTreeMap::new())?;
+        }
+        Ok(Self {
+            file,
+            channels,
+            sequences: [0; 4],
+            epoch_ns: epoch_ns(),
+            totals: Totals::default(),
+        })
+    }
+
+    fn item(&mut self, item: Item) -> mcap::McapResult<()> {
+        match item {
+            Item::Session(session) => self.session(&session)?,
+            Item::Records(records) => {
+                for record in &records {
+                    if self.totals.gaps.record(record.session_id, record.tick) {
+                        let time_ns = record.due_ns + record.wake_latency_ns;
+                        self.message(0, time_ns, &serde_json::to_vec(&Tick::from(record)).unwrap_or_default())?;
+                    }
+                }
+            }
+            Item::Event(event) => {
+                self.totals.events += 1;
+                self.message(1, event.time_ns, messages::event(&event).to_string().as_bytes())?;
+            }
+            Item::Snapshot(snapshot) => {
+                self.totals.snapshots += 1;
+                let time_ns = snapshot.header.time_ns;
+                self.message(2, time_ns, messages::tissue(&snapshot).to_string().as_bytes())?;
+                let gland = messages::gland(&snapshot, time_ns + self.epoch_ns);
+                self.message(3, time_ns, gland.to_string().as_bytes())?;
+            }
+            Item::SnapshotLeftOut => self.totals.snapshots_left_out += 1,
+            Item::LostInCore(count) => self.totals.lost_in_core = self.totals.lost_in_core.max(count),
+        }
+        Ok(())
+    }
+
+    fn message(&mut self, channel: usize, time_ns: u64, data: &[u8]) -> mcap::McapResult<()> {
+        self.sequences[channel] = self.sequences[channel].wrapping_add(1);
+        let log_time = time_ns + self.epoch_ns;
+        let header = MessageHeader {
+            channel_id: self.channels[channel],
+            sequence: self.sequences[channel],
+            log_time,
+            publish_time: log_time,
+        };
+        self.file.write_to_known_channel(&header, data)
+    }
+
+    fn session(&mut self, session: &Session) -> mcap::McapResult<()> {
+        let metadata = [
+            ("session_id", session.session_id.to_string()),
+            ("version", session.version.read()),
+            ("device", session.device.read()),
+            ("period_ns", session.period_ns.to_string()),
+            ("tissue_period_ns", session.tissue_period_ns.to_string()),
+            ("started_ns", session.started_ns.to_string()),
+            ("epoch_from_monotonic_ns", self.epoch_ns.to_string()),
+            ("advice", session.advice.read()),
+        ];
+        self.file.write_metadata(&Metadata {
+            name: "stylet.session".to_owned(),
+            metadata: metadata.map(|(key, value)| (key.to_owned(), value)).into(),
+        })
+    }
+
+    fn finish(mut self, path: &Path) -> mcap::McapResult<Totals> {
+        self.file.write_metadata(&Metadata {
+            name: "stylet.totals".to_owned(),
+            metadata: self.totals.metadata(),
+        })?;
+        self.file.finish()?;
+        self.totals.bytes = std::fs::metadata(path).map_or(0, |m| m.len());
+        Ok(self.totals)
+    }
+}
+
+/// Time since 1970 less `CLOCK_MONOTONIC`, once for a recording: a clock that is set meanwhile makes no step in it.
+fn epoch_ns() -> u64 {
+    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `time` is valid for writes; the clock always exists on Linux.
+    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut time) };
+    let monotonic_ns = time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64;
+    let since_1970 = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    since_1970
+        .map_or(0, |d| d.as_nanos() as u64)
+        .saturating_sub(monotonic_ns)
+}

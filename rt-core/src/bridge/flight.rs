@@ -1,0 +1,265 @@
+//! Asks both loops for their tapes, gives them back, and has a thread of its own write the recording to disk.
+
+use crate::replay::file::Flight;
+use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
+use crate::rt::haptic_tape::{HapticFlight, HapticTape};
+use crate::rt::recorder::{Tape, TapeDesk};
+use crate::rt::tissue_tape::{TissueFlight, TissueTape};
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+/// After a fault the recording goes on for so long, so that it shows how the force went.
+const AFTER_FAULT: Duration = Duration::from_millis(300);
+/// A loop that does not hand its tape over in this time is left out.
+const GATHER_LIMIT: Duration = Duration::from_secs(1);
+/// Requests that wait at once; more are refused.
+const QUEUE: usize = 4;
+/// Recordings of each kind that are kept in the folder: the newest.
+const KEPT_EXITS: usize = 20;
+const KEPT_OTHERS: usize = 100;
+
+/// What came of one request.
+pub struct Saved {
+    pub ticket: Option<Ticket>,
+    pub result: Result<PathBuf, String>,
+}
+
+struct Wanted {
+    /// Goes into the name of the file.
+    kind: &'static str,
+    reason: String,
+    due: Instant,
+    ticket: Option<Ticket>,
+}
+
+struct Gathering {
+    wanted: Wanted,
+    since: Instant,
+    haptic: Option<Option<HapticFlight>>,
+    tissue: Option<Option<TissueFlight>>,
+}
+
+/// Everything that the bridge needs for flight recordings.
+pub struct FlightDesk {
+    haptic: TapeDesk<HapticTape>,
+    tissue: TapeDesk<TissueTape>,
+    folder: PathBuf,
+    /// What is the same in every recording of this run.
+    common: Flight,
+    queue: VecDeque<Wanted>,
+    gathering: Option<Gathering>,
+    written: (mpsc::Sender<Saved>, mpsc::Receiver<Saved>),
+    files: u32,
+}
+
+impl FlightDesk {
+    pub fn new(haptic: TapeDesk<HapticTape>, tissue: TapeDesk<TissueTape>, folder: PathBuf, common: Flight) -> Self {
+        Self {
+            haptic,
+            tissue,
+            folder,
+            common,
+            queue: VecDeque::new(),
+            gathering: None,
+            written: mpsc::channel(),
+            files: 0,
+        }
+    }
+
+    /// A host asks; false when too many wait already.
+    pub fn request(&mut self, ticket: Ticket) -> bool {
+        self.want(
+            "request",
+            "a host asked for it".to_owned(),
+            Instant::now(),
+            Some(ticket),
+        )
+    }
+
+    /// A loop has raised a fault.
+    pub fn fault(&mut self, message: &str) {
+        // One that is waiting for its time shows this fault as well.
+        if !self.queue.iter().any(|w| w.kind == "fault") {
+            self.want("fault", message.to_owned(), Instant::now() + AFTER_FAULT, None);
+        }
+    }
+
+    fn want(&mut self, kind: &'static str, reason: String, due: Instant, ticket: Option<Ticket>) -> bool {
+        let room = self.queue.len() < QUEUE;
+        if room {
+            self.queue.push_back(Wanted {
+                kind,
+                reason,
+                due,
+                ticket,
+            });
+        }
+        room
+    }
+
+    /// One pass of the bridge; gives what was written since the last.
+    pub fn pass(
+        &mut self,
+        scene_generation: u64,
+        haptic_orders: &mut rtrb::Producer<HapticOrder>,
+        tissue_orders: &mut rtrb::Producer<TissueOrder>,
+    ) -> Option<Saved> {
+        self.take_tapes(scene_generation);
+        if let Some(gathering) = self
+            .gathering
+            .take_if(|g| g.is_whole() || g.since.elapsed() > GATHER_LIMIT)
+        {
+            self.write(gathering);
+        }
+        let now = Instant::now();
+        if self.gathering.is_none()
+            && let Some(at) = self.queue.iter().position(|w| w.due <= now)
+            && let Some(wanted) = self.queue.remove(at)
+        {
+            // A ring that is full leaves its loop out.
+            let _ = haptic_orders.push(HapticOrder::HandOverTape);
+            let _ = tissue_orders.push(TissueOrder::HandOverTape);
+            self.gathering = Some(Gathering::new(wanted));
+        }
+        self.written.1.try_recv().ok()
+    }
+
+    fn take_tapes(&mut self, scene_generation: u64) {
+        while let Ok(tape) = self.haptic.taken.pop() {
+            if let Some(gathering) = &mut self.gathering {
+                gathering.haptic = Some(tape.flight());
+            }
+            let _ = self.haptic.back.push(tape);
+        }
+        while let Ok(tape) = self.tissue.taken.pop() {
+            // That of an earlier scene ends here.
+            if tape.is_for(scene_generation) {
+                if let Some(gathering) = &mut self.gathering {
+                    gathering.tissue = Some(tape.flight());
+                }
+                let _ = self.tissue.back.push(tape);
+            }
+        }
+    }
+
+    fn write(&mut self, gathering: Gathering) {
+        let path = self.next_path(gathering.wanted.kind);
+        let ticket = gathering.wanted.ticket;
+        let (flight, sender) = (gathering.into_flight(&self.common), self.written.0.clone());
+        let spawned = std::thread::Builder::new()
+            .name("flight-writer".to_owned())
+            .spawn(move || {
+                let result = save(&flight, &path);
+                // Nobody waits for it once the bridge has ended.
+                let _ = sender.send(Saved { ticket, result });
+            });
+        if let Err(why) = spawned {
+            let result = Err(format!("no thread could be started to write it: {why}"));
+            let _ = self.written.0.send(Saved { ticket, result });
+        }
+    }
+
+    /// Both loops have ended and handed their tapes over.
+    pub fn save_at_end(&mut self, scene_generation: u64) -> Result<PathBuf, String> {
+        let reason = "rt-core ended".to_owned();
+        self.gathering = Some(Gathering::new(Wanted {
+            kind: "exit",
+            reason,
+            due: Instant::now(),
+            ticket: None,
+        }));
+        self.take_tapes(scene_generation);
+        let path = self.next_path("exit");
+        match self.gathering.take() {
+            Some(gathering) if gathering.haptic.is_some() => save(&gathering.into_flight(&self.common), &path),
+            _ => Err("the force loop left no recording".to_owned()),
+        }
+    }
+
+    fn next_path(&mut self, kind: &str) -> PathBuf {
+        self.files += 1;
+        let now = jiff::Timestamp::now().strftime("%Y%m%dT%H%M%SZ");
+        self.folder.join(format!(
+            "flight-{now}-{}-{}-{kind}.flight",
+            std::process::id(),
+            self.files
+        ))
+    }
+}
+
+impl Gathering {
+    fn new(wanted: Wanted) -> Self {
+        Self {
+            wanted,
+            since: Instant::now(),
+            haptic: None,
+            tissue: None,
+        }
+    }
+
+    fn is_whole(&self) -> bool {
+        self.haptic.is_some() && self.tissue.is_some()
+    }
+
+    fn into_flight(self, common: &Flight) -> Flight {
+        Flight {
+            reason: self.wanted.reason,
+            haptic: self.haptic.flatten(),
+            tissue: self.tissue.flatten(),
+            ..common.clone()
+        }
+    }
+}
+
+fn save(flight: &Flight, path: &Path) -> Result<PathBuf, String> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    std::fs::create_dir_all(folder)
+        .map_err(|e| format!("{}: {e}; choose another folder with --flight-dir", folder.display()))?;
+    flight.write(path)?;
+    forget_oldest(folder, |name| name.ends_with("-exit.flight"), KEPT_EXITS);
+    forget_oldest(
+        folder,
+        |name| name.ends_with(".flight") && !name.ends_with("-exit.flight"),
+        KEPT_OTHERS,
+    );
+    Ok(path.to_owned())
+}
+
+/// Names begin with the time, so their order is that of time.
+fn forget_oldest(folder: &Path, of_kind: impl Fn(&str) -> bool, kept: usize) {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.map(|e| e.file_name().to_string_lossy().into_owned());
+    let mut names: Vec<String> = names.filter(|n| n.starts_with("flight-") && of_kind(n)).collect();
+    names.sort();
+    for name in names.iter().rev().skip(kept) {
+        // Another core may have removed it at the same time.
+        let _ = std::fs::remove_file(folder.join(name));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_oldest_of_its_kind_are_forgotten() {
+        let folder = std::env::temp_dir().join(format!("stylet-forget-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let names = [
+            "flight-1-exit.flight",
+            "flight-2-exit.flight",
+            "flight-3-exit.flight",
+            "flight-0-fault.flight",
+            "other",
+        ];
+        for name in names {
+            std::fs::write(folder.join(name), "").unwrap();
+        }
+        forget_oldest(&folder, |name| name.ends_with("-exit.flight"), 2);
+        let left = names.map(|name| folder.join(name).exists());
+        std::fs::remove_dir_all(&folder).unwrap();
+        assert_eq!(left, [false, true, true, true, true]);
+    }
+}

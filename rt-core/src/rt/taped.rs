@@ -1,0 +1,34 @@
+//! How types of the shared memory are written to a flight recording: their bytes, or their stable number.
+
+/// Plain old data as its bytes, bit for bit.
+pub mod pod {
+    use bytemuck::Pod;
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub fn serialize<T: Pod, S: Serializer>(value: &T, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_bytes(bytemuck::bytes_of(value))
+    }
+
+    pub fn deserialize<'de, T: Pod, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
+        let bytes = <&[u8]>::deserialize(from)?;
+        bytemuck::try_pod_read_unaligned(bytes)
+            .map_err(|_| D::Error::custom("a record of another size: written by another version"))
+    }
+}
+
+/// A fault as its number.
+pub mod fault_code {
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+    use stylet_shm_schema::Fault;
+
+    pub fn serialize<S: Serializer>(fault: &Fault, to: S) -> Result<S::Ok, S::Error> {
+        (*fault as u32).serialize(to)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Fault, D::Error> {
+        let number = u32::deserialize(from)?;
+        Fault::from_number(number).ok_or_else(|| D::Error::custom("a fault that is not known"))
+    }
+}

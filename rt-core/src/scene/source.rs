@@ -1,0 +1,109 @@
+//! Where a scene came from, small enough to be kept beside a recording.
+
+use super::{Labels, Scene, Structure};
+use serde::{Deserialize, Serialize};
+
+/// What a scene can be built from again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum SceneSource {
+    Builtin(String),
+    Labels {
+        name: String,
+        dims: [usize; 3],
+        spacing_m: f64,
+        /// Label and number of cells, x fastest.
+        runs: Vec<(u8, u32)>,
+        structures: Vec<Structure>,
+    },
+}
+
+impl SceneSource {
+    pub fn of_labels(name: &str, labels: &Labels) -> Self {
+        let mut runs: Vec<(u8, u32)> = Vec::new();
+        for &cell in &labels.cells {
+            match runs.last_mut() {
+                Some((label, count)) if *label == cell && *count < u32::MAX => *count += 1,
+                _ => runs.push((cell, 1)),
+            }
+        }
+        Self::Labels {
+            name: name.to_owned(),
+            dims: labels.dims,
+            spacing_m: labels.spacing_m,
+            runs,
+            structures: labels.structures.clone(),
+        }
+    }
+
+    /// The same scene again; lists every problem.
+    pub fn build(&self) -> Result<Scene, String> {
+        match self {
+            Self::Builtin(name) => Scene::builtin(name).map_err(|e| e.to_string()),
+            Self::Labels {
+                name,
+                dims,
+                spacing_m,
+                runs,
+                structures,
+            } => {
+                let cells: u64 = runs.iter().map(|(_, count)| u64::from(*count)).sum();
+                let wanted = dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(d as u64));
+                // Checked before anything of that size is allocated.
+                if wanted != Some(cells) || dims.iter().any(|&d| d > super::MAX_CELLS_PER_AXIS) {
+                    return Err(format!("the scene says {dims:?} cells but holds {cells}"));
+                }
+                let labels = Labels {
+                    dims: *dims,
+                    spacing_m: *spacing_m,
+                    cells: runs
+                        .iter()
+                        .flat_map(|&(label, count)| std::iter::repeat_n(label, count as usize))
+                        .collect(),
+                    structures: structures.clone(),
+                };
+                Scene::from_labels(name, &labels)
+                    .map_err(|problems| problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_survive_and_a_wrong_count_is_refused() {
+        let cells = (0..4 * 5 * 6).map(|i| u8::from(i % 7 > 2)).collect();
+        let labels = Labels {
+            dims: [4, 5, 6],
+            spacing_m: 1e-3,
+            cells,
+            structures: Vec::new(),
+        };
+        let source = SceneSource::of_labels("block", &labels);
+        let again = source.build().unwrap();
+        let first = Scene::from_labels("block", &labels).unwrap();
+        assert_eq!(again.lattice.element_count(), first.lattice.element_count());
+        assert_eq!(again.surface.vertex_elements, first.surface.vertex_elements);
+
+        let SceneSource::Labels {
+            name,
+            spacing_m,
+            runs,
+            structures,
+            ..
+        } = source
+        else {
+            panic!()
+        };
+        let short = SceneSource::Labels {
+            name,
+            dims: [4, 5, 7],
+            spacing_m,
+            runs,
+            structures,
+        };
+        assert!(short.build().is_err_and(|why| why.contains("120")));
+    }
+}

@@ -1,0 +1,108 @@
+//! What the hand feels: a slow insertion, and the force record that it leaves.
+
+use crate::{Core, ask, until};
+use host_ui::link::Link;
+use host_ui::workflow::{default_plan, move_values, plan_values};
+use std::time::Duration;
+use stylet_shm_schema::{CommandKind, ParameterId, TickRecord, flags};
+
+/// A host that inserts slowly and keeps every record.
+pub struct Insertion {
+    pub link: Link,
+    pub records: Vec<TickRecord>,
+    entry_m: [f64; 3],
+    direction: [f64; 3],
+}
+
+impl Insertion {
+    /// Engaged, with the tip at the entry, then moving at `speed_m_per_s` for at most 60 mm.
+    pub fn begin(core: &mut Core, speed_m_per_s: f64) -> Self {
+        let mut link = core.host();
+        let plan = default_plan(&link.scene().expect("live").header);
+        ask(&mut link, CommandKind::SetPlan, &plan_values(&plan)).expect("planned");
+        ask(&mut link, CommandKind::Engage, &[]).expect("engaged");
+        let to = move_values(plan.entry_m, plan.direction, 0.2, 2.0);
+        ask(&mut link, CommandKind::MoveHand, &to).expect("moved");
+        std::thread::sleep(Duration::from_millis(800));
+        link.poll();
+        link.take_records();
+        let (entry_m, direction) = (plan.entry_m, plan.direction);
+        let mut insertion = Self {
+            link,
+            records: Vec::new(),
+            entry_m,
+            direction,
+        };
+        insertion.go(0.06, speed_m_per_s);
+        insertion
+    }
+
+    /// To `depth_m` behind the entry.
+    pub fn go(&mut self, depth_m: f64, speed_m_per_s: f64) {
+        let to = std::array::from_fn(|a| self.entry_m[a] + self.direction[a] * depth_m);
+        let values = move_values(to, self.direction, speed_m_per_s, 2.0);
+        ask(&mut self.link, CommandKind::MoveHand, &values).expect("moved");
+        self.take();
+    }
+
+    pub fn take(&mut self) {
+        self.link.poll();
+        self.records.append(&mut self.link.take_records());
+    }
+
+    /// Takes for so long what comes.
+    pub fn watch(&mut self, time: Duration) {
+        until(time, || {
+            self.take();
+            false
+        });
+    }
+
+    /// Takes until `ready`; false if that does not come in time.
+    pub fn watch_until(&mut self, limit: Duration, mut ready: impl FnMut(&mut Link) -> bool) -> bool {
+        until(limit, || {
+            self.take();
+            ready(&mut self.link)
+        })
+    }
+
+    /// Until the membrane resists with 2 N.
+    pub fn press(&mut self) {
+        let pressed = until(Duration::from_secs(20), || {
+            self.take();
+            self.records.last().is_some_and(|r| force_n(r) > 2.0)
+        });
+        assert!(pressed, "no force: {:?}", self.link.state());
+    }
+}
+
+pub fn force_n(record: &TickRecord) -> f64 {
+    record.force_on_hand_n.iter().map(|f| f * f).sum::<f64>().sqrt()
+}
+
+pub fn missed(records: &[TickRecord]) -> u64 {
+    records.iter().map(|r| u64::from(r.missed)).sum()
+}
+
+/// No tick is missing, and no force differs from the one before by more than the slew limit allows.
+pub fn assert_smooth(records: &[TickRecord]) {
+    assert!(records.len() > 100, "{} records", records.len());
+    let slew = stylet_shm_schema::PARAMETERS
+        .iter()
+        .find(|p| p.id == ParameterId::SlewLimit)
+        .expect("in the table");
+    let longest_n = slew.default * 1e-3 * (1.0 + 1e-9);
+    for pair in records.windows(2) {
+        assert_eq!(pair[1].tick, pair[0].tick + 1, "a tick is missing");
+        let (a, b) = (pair[0].force_on_hand_n, pair[1].force_on_hand_n);
+        let step_n = (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
+        assert!(step_n <= longest_n, "{a:?} N to {b:?} N in tick {}", pair[1].tick);
+    }
+}
+
+/// The force was on all the time and no fault was raised.
+pub fn assert_undisturbed(records: &[TickRecord]) {
+    assert_smooth(records);
+    let disturbed = records.iter().find(|r| r.fault != 0 || r.flags & flags::ENGAGED == 0);
+    assert!(disturbed.is_none(), "disturbed: {disturbed:?}");
+}
