@@ -5,9 +5,11 @@
 
 pub mod convert;
 pub mod device;
+pub mod libhd;
 pub mod sim;
 
 pub use device::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
+pub use libhd::{Phantom, PhantomConfig};
 pub use sim::hand::{Effort, Hand};
 pub use sim::path::{HandPath, ScriptedPath, Waypoint};
 pub use sim::phantom::{SimulatedPhantom, SimulatedPhantomConfig};
