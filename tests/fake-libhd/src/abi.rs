@@ -340,11 +340,9 @@ pub extern "C" fn hdCheckCalibration() -> u32 {
     if fails("hdCheckCalibration") || control().uncalibrated.load(Relaxed) == 0 {
         return 0x5000;
     }
-    match style() {
-        2 => 0x5001,
-        4 if control().in_inkwell.load(Relaxed) != 0 => 0x5001,
-        _ => 0x5002,
-    }
+    let in_inkwell = control().in_inkwell.load(Relaxed) != 0;
+    let ready = style() == 2 || (style() & 4 != 0 && in_inkwell);
+    if ready { 0x5001 } else { 0x5002 }
 }
 
 #[unsafe(no_mangle)]

@@ -30,6 +30,8 @@ pub struct Control {
     pub in_inkwell: AtomicU32,
     pub in_neutral_pose: AtomicU32,
     pub buttons: AtomicU32,
+    /// The buttons show the number of the tick instead.
+    pub buttons_count: AtomicU32,
     /// The scheduler runs and calls nobody.
     pub stalled: AtomicU32,
     /// Each tick is late by so much.
@@ -138,7 +140,7 @@ impl Control {
         self.force_n.each_ref().map(get)
     }
 
-    /// Of `tick`, N; kept for the last `FORCES_KEPT` ticks.
+    /// What the callback of `tick` told, N; kept for the last `FORCES_KEPT` ticks.
     pub fn force_at(&self, tick: u64) -> [f64; 3] {
         self.forces_n[tick as usize % FORCES_KEPT].each_ref().map(get)
     }

@@ -200,6 +200,7 @@ impl Driver {
     pub fn ints(&self, parameter: u32) -> Option<Vec<i32>> {
         let c = control();
         Some(match parameter {
+            0x2000 if c.buttons_count.load(Relaxed) != 0 => vec![c.ticks.load(Relaxed) as i32],
             0x2000 => vec![c.buttons.load(Relaxed) as i32],
             0x2553 => vec![6],
             0x2554 => vec![if c.model.load(Relaxed) == 0 { 6 } else { 3 }],
