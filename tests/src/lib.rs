@@ -58,12 +58,18 @@ impl Core {
     }
 
     pub fn start_with(options: &[&str]) -> Self {
+        Self::start_in(options, &[])
+    }
+
+    /// With these variables in its environment.
+    pub fn start_in(options: &[&str], variables: &[(&str, &str)]) -> Self {
         let instance = fresh_instance();
         let report = scratch(&format!("core-{}", instance.name())).join("report.json");
         let child = Command::new(program("rt-core"))
             .args(["--instance", instance.name(), "--exit-with-parent", "--report"])
             .arg(&report)
             .args(options)
+            .envs(variables.iter().copied())
             .stderr(Stdio::null())
             .spawn()
             .expect("rt-core starts");
