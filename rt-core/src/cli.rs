@@ -1,9 +1,11 @@
 //! The command line of `rt-core`.
 
 use crate::core::Options;
+use crate::device::DeviceChoice;
 use crate::rt::arm;
 use clap::Parser;
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use std::path::PathBuf;
 use stylet_shm_schema::BUILTIN_SCENES;
 use stylet_shm_schema::service::Instance;
 
@@ -38,6 +40,12 @@ pub struct Cli {
     /// SCHED_FIFO priority of the tissue step
     #[arg(long, default_value_t = 70, value_parser = clap::value_parser!(u32).range(1..=98), value_name = "1-98")]
     tissue_priority: u32,
+    /// simulated, phantom (the driver's default device) or phantom:NAME
+    #[arg(long, default_value = "simulated", value_name = "DEVICE")]
+    device: DeviceChoice,
+    /// The driver's library libHD.so [default: STYLET_LIBHD, else where the system has it]
+    #[arg(long, value_name = "PATH")]
+    libhd: Option<PathBuf>,
     /// End when the program that started this one ends, however it ends
     #[arg(long)]
     pub exit_with_parent: bool,
@@ -87,6 +95,11 @@ impl Cli {
                 tissue_core: self.tissue_core.or(cores.iter().rev().nth(1).or(cores.last()).copied()),
                 haptic_priority: self.haptic_priority,
                 tissue_priority: self.tissue_priority,
+                device: self.device.clone(),
+                libhd: self
+                    .libhd
+                    .clone()
+                    .or_else(|| std::env::var_os("STYLET_LIBHD").map(PathBuf::from)),
             }),
             _ => Err(problems.join("\n")),
         }

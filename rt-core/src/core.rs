@@ -3,6 +3,7 @@
 use crate::active::activate;
 use crate::bridge::ports::Ports;
 use crate::bridge::{Bridge, LoopPorts, ScenePicture, SnapshotLoans};
+use crate::device::{self, DeviceChoice};
 use crate::rt::arm::{self, Armed, Ask, Usage};
 use crate::rt::clock;
 use crate::rt::exchange::{TipPose, TissueResponse};
@@ -10,12 +11,11 @@ use crate::rt::haptic::{HapticLoop, HapticPorts};
 use crate::rt::tissue::{TissueLoop, TissuePorts};
 use crate::rt::world::World;
 use crate::scene::Scene;
-use nalgebra::Vector3;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::thread::JoinHandle;
-use stylet_hw::{Device, SimulatedPhantom, SimulatedPhantomConfig};
 use stylet_shm_schema::service::{self, Instance, STATE_KEY};
 use stylet_shm_schema::{HapticState, ParameterSet, Session, Text, ThreadReport, flags};
 
@@ -37,6 +37,9 @@ pub struct Options {
     pub tissue_core: Option<usize>,
     pub haptic_priority: u32,
     pub tissue_priority: u32,
+    pub device: DeviceChoice,
+    /// The driver of a Phantom; `None` tries its usual names.
+    pub libhd: Option<PathBuf>,
 }
 
 /// What a run was.
@@ -62,7 +65,18 @@ const TISSUE_PERIOD_S: f64 = 5e-3;
 /// Runs until `stop` is set by a signal, or a host asks to end. Errors are for people: they say what to do.
 pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, String> {
     let scene = Scene::builtin(&options.scene).map_err(|e| e.to_string())?;
-    let device = device_for(&scene);
+    let force_loop = Ask {
+        priority: (!options.no_rt).then_some(options.haptic_priority),
+        core: options.haptic_core,
+    };
+    // Its servo thread goes to the core of the tissue step, which can wait for it longer than the force loop can.
+    let device = device::open(
+        &options.device,
+        options.libhd.clone(),
+        &scene,
+        force_loop,
+        options.tissue_core,
+    )?;
     let info = device.info();
     let active = activate(&ParameterSet::default(), &info).map_err(|p| p.join("\n"))?;
     let session_id = clock::now_ns() ^ (u64::from(std::process::id()) << 40);
@@ -218,21 +232,6 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
     let haptic = haptic_thread.join().map_err(gone)?;
     let tissue = tissue_thread.join().map_err(gone)?;
     served.map(|()| RunReport { haptic, tissue })
-}
-
-/// The simulated hand starts outside the body, below its target.
-fn device_for(scene: &Scene) -> Box<dyn Device> {
-    let (lowest, _) = scene.lattice.bounds_m();
-    let (lower, upper) = scene.target_bounds_m();
-    let start = Vector3::new(
-        (lower[0] + upper[0]) / 2.0,
-        (lower[1] + upper[1]) / 2.0,
-        lowest[2] - 0.03,
-    );
-    Box::new(SimulatedPhantom::new(SimulatedPhantomConfig {
-        start_tip_in_world: start,
-        ..SimulatedPhantomConfig::default()
-    }))
 }
 
 /// `None` when memory is locked; else what is missing, which only `--no-rt` accepts.

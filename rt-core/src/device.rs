@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use stylet_hw::libhd::Placement;
 use stylet_hw::{Device, DeviceFault, Phantom, PhantomConfig, SimulatedPhantom, SimulatedPhantomConfig};
-use stylet_shm_schema::Fault;
+use stylet_shm_schema::{Fault, ThreadReport};
 
 /// Of the driver's servo loop.
 const SERVO_HZ: u32 = 1000;
@@ -36,7 +36,7 @@ impl FromStr for DeviceChoice {
     }
 }
 
-/// Opens it, with its tip or its origin before the scene, on the scene's axis. `force_loop` is what the force loop's
+/// Opens it, with its tip or its origin outside the body, below the target. `force_loop` is what the force loop's
 /// thread asks for, `servo_core` where the driver's own thread goes.
 pub fn open(
     choice: &DeviceChoice,
@@ -45,8 +45,13 @@ pub fn open(
     force_loop: Ask,
     servo_core: Option<usize>,
 ) -> Result<Box<dyn Device>, String> {
-    let (lower, upper) = scene.lattice.bounds_m();
-    let start = Vector3::new((lower[0] + upper[0]) / 2.0, (lower[1] + upper[1]) / 2.0, lower[2] - 0.03);
+    let (lowest, _) = scene.lattice.bounds_m();
+    let (lower, upper) = scene.target_bounds_m();
+    let start = Vector3::new(
+        (lower[0] + upper[0]) / 2.0,
+        (lower[1] + upper[1]) / 2.0,
+        lowest[2] - 0.03,
+    );
     let name = match choice {
         DeviceChoice::Simulated => {
             return Ok(Box::new(SimulatedPhantom::new(SimulatedPhantomConfig {
@@ -66,11 +71,32 @@ pub fn open(
         priority: force_loop.priority.map(|p| (p + SERVO_AHEAD).min(98)),
         core: servo_core,
     };
-    let arm = move || arm::arm(ask).map(|armed| armed.report.to_string()).map_err(|e| e.to_string());
-    let phantom = Phantom::open(config, Box::new(arm), Box::new(|text| eprintln!("rt-core: device: {text}")));
+    let arm = move || {
+        arm::arm(ask)
+            .map(|armed| words(&armed.report))
+            .map_err(|e| e.to_string())
+    };
+    let phantom = Phantom::open(
+        config,
+        Box::new(arm),
+        Box::new(|text| eprintln!("rt-core: device: {text}")),
+    );
     match phantom {
         Ok(phantom) => Ok(Box::new(phantom)),
         Err(why) => Err(format!("{why}\nOr start with --device simulated.")),
+    }
+}
+
+/// What a thread was granted.
+fn words(granted: &ThreadReport) -> String {
+    let policy = if granted.is_fifo() {
+        format!("SCHED_FIFO {}", granted.priority)
+    } else {
+        "no real-time scheduling".to_owned()
+    };
+    match granted.core {
+        u32::MAX => format!("{policy} on any core"),
+        core => format!("{policy} on core {core}"),
     }
 }
 
@@ -96,7 +122,10 @@ mod tests {
     fn a_device_is_named_as_the_help_says_and_not_otherwise() {
         assert_eq!("simulated".parse(), Ok(DeviceChoice::Simulated));
         assert_eq!("phantom".parse(), Ok(DeviceChoice::Phantom(None)));
-        assert_eq!("phantom:Left arm".parse(), Ok(DeviceChoice::Phantom(Some("Left arm".to_owned()))));
+        assert_eq!(
+            "phantom:Left arm".parse(),
+            Ok(DeviceChoice::Phantom(Some("Left arm".to_owned())))
+        );
         for wrong in ["", "phantom:", "Phantom", "simulated:x", "falcon"] {
             assert!(wrong.parse::<DeviceChoice>().is_err(), "{wrong}");
         }

@@ -116,6 +116,10 @@ pub enum Fault {
     TissueStale = 5,
     TissueUnsolved = 6,
     OverrunStreak = 7,
+    DeviceLost = 9,
+    DeviceNotCalibrated = 10,
+    DeviceWarm = 11,
+    DeviceStopped = 12,
 }
 
 impl Fault {
@@ -129,6 +133,10 @@ impl Fault {
             Self::TissueStale,
             Self::TissueUnsolved,
             Self::OverrunStreak,
+            Self::DeviceLost,
+            Self::DeviceNotCalibrated,
+            Self::DeviceWarm,
+            Self::DeviceStopped,
         ]
         .into_iter()
         .find(|f| *f as u32 == number)
@@ -149,6 +157,15 @@ impl Fault {
             Self::OverrunStreak => {
                 "the force loop missed 20 deadlines in a row; lower the load on its core, then re-arm"
             }
+            Self::DeviceLost => {
+                "the device is not connected; check power and cable, wait until it is found again, then re-arm"
+            }
+            Self::DeviceNotCalibrated => {
+                "the device is not calibrated; put the stylus into the inkwell, or hold the arm in its neutral pose \
+                 and press the stylus button; then re-arm"
+            }
+            Self::DeviceWarm => "the motors of the device are too warm; let them cool for some minutes, then re-arm",
+            Self::DeviceStopped => "the device stopped itself at a limit of force or speed; move slower, then re-arm",
         }
     }
 }

@@ -24,6 +24,7 @@ const SILENT_FOR: Duration = Duration::from_millis(250);
 const RETRY_EVERY: Duration = Duration::from_millis(500);
 const CALIBRATION_EVERY: Duration = Duration::from_millis(50);
 const FIRST_CALL_LIMIT: Duration = Duration::from_secs(2);
+const FIRST_SAMPLE_LIMIT: Duration = Duration::from_millis(100);
 /// For the callback to write its zero before the scheduler stops.
 const RELEASE_LIMIT: Duration = Duration::from_millis(50);
 /// A driver that hangs is left alone after this.
@@ -191,11 +192,21 @@ impl Keeper {
         let begun = Instant::now();
         while begun.elapsed() < FIRST_CALL_LIMIT {
             if let Some(granted) = armed() {
-                return granted.map_err(Trouble::NotArmed);
+                let granted = granted.map_err(Trouble::NotArmed)?;
+                self.wait_for_sample();
+                return Ok(granted);
             }
             thread::park_timeout(Duration::from_millis(1));
         }
         Err(Trouble::NoCallback)
+    }
+
+    /// The first callback has begun; whoever opened the device finds a sample, unless something is wrong.
+    fn wait_for_sample(&self) {
+        let begun = Instant::now();
+        while self.servo.shared.fault().is_some() && begun.elapsed() < FIRST_SAMPLE_LIMIT {
+            thread::park_timeout(Duration::from_millis(1));
+        }
     }
 
     /// Until the device is lost, with the reason, or the end is asked for.

@@ -1,5 +1,6 @@
 //! The haptic tick, 1 kHz: read → velocity → needle → force law → passivity → gate → write → pose → record.
 
+use crate::device::fault_of;
 use crate::force::{
     ForceFault, ForceInput, ForceParameters, ForceState, ForceTerms, GateState, PassivityParameters, PassivityState,
     VelocityEstimator, force, gate, passivity,
@@ -226,8 +227,8 @@ impl HapticLoop {
                 self.raise(Fault::NonFiniteInput, ForceFault::DeviceFault);
                 last
             }
-            Err(_) => {
-                self.raise(Fault::DeviceError, ForceFault::DeviceFault);
+            Err(fault) => {
+                self.raise(fault_of(fault), ForceFault::DeviceFault);
                 last
             }
         };
