@@ -161,8 +161,8 @@ impl Fault {
                 "the device is not connected; check power and cable, wait until it is found again, then re-arm"
             }
             Self::DeviceNotCalibrated => {
-                "the device is not calibrated; put the stylus into the inkwell, or hold the arm in its neutral pose \
-                 and press the stylus button; then re-arm"
+                "the device is not calibrated: stylus into the inkwell, or arm in neutral pose and press its button; then \
+                 re-arm"
             }
             Self::DeviceWarm => "the motors of the device are too warm; let them cool for some minutes, then re-arm",
             Self::DeviceStopped => "the device stopped itself at a limit of force or speed; move slower, then re-arm",
