@@ -306,7 +306,7 @@ fn set_reals(parameter: u32, values: [f64; 3]) {
     }
     match parameter {
         0x2700 => d.force_n = values,
-        0x2704 => d.torque_mnm = values,
+        0x2704 if control().model.load(Relaxed) == 0 => d.torque_mnm = values,
         _ => d.raise(0x0100),
     }
 }

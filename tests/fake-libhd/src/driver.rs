@@ -98,10 +98,6 @@ impl Driver {
             put(&c.torque_mnm[axis], self.torque_mnm[axis]);
             put(&c.forces_n[tick as usize % FORCES_KEPT][axis], self.force_n[axis]);
         }
-        let size = Vector3::from(self.force_n).norm();
-        if size > get(&c.peak_force_n) {
-            put(&c.peak_force_n, size);
-        }
         // SYNC: pairs with the release of `send_hand`.
         let number = c.goal_number.load(Acquire);
         if number != self.goal_number {
@@ -132,6 +128,9 @@ impl Driver {
     /// What the motors have to say about this frame's force.
     pub fn check_force(&mut self) {
         let size = Vector3::from(self.force_n).norm();
+        if size > get(&control().peak_force_n) {
+            put(&control().peak_force_n, size);
+        }
         if !size.is_finite() {
             control().non_finite_forces.fetch_add(1, Relaxed);
             self.raise(0x0204);
