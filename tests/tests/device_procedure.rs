@@ -41,7 +41,12 @@ impl Rig {
         };
         let mut core = Core::start_in(&options, given);
         let link = core.host();
+        assert!(until(LONG, || {
+            link.poll();
+            link.state().is_some_and(|s| s.tick > 10)
+        }));
         let state = *link.state().expect("live");
+        assert_eq!(state.fault, 0, "{:?}", Fault::from_number(state.fault));
         let origin_m = Vector3::from(state.tip_in_scene_m);
         Self {
             core,
