@@ -40,7 +40,7 @@ impl Rig {
             &variables[..1]
         };
         let mut core = Core::start_in(&options, given);
-        let link = core.host();
+        let mut link = core.host();
         assert!(until(LONG, || {
             link.poll();
             link.state().is_some_and(|s| s.tick > 10)

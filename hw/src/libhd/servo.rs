@@ -261,8 +261,10 @@ impl Inner {
         self.state.quiet = 0;
     }
 
+    /// Before any other fault: without a connection the pose is no pose either.
     fn lose(&mut self, shared: &Shared, fault: DeviceFault) {
-        self.pause(fault);
+        self.state.trouble = Some(fault);
+        self.state.quiet = 0;
         shared.set_fault(self.state.trouble);
         shared.lost.store(true, Ordering::Relaxed);
     }
