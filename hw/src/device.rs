@@ -16,7 +16,8 @@ use serde::{Deserialize, Serialize};
 /// - [`write`](Device::write) of [`Wrench::zero`] is accepted at any time, also after a fault;
 /// - a wrench that is not finite is refused with [`DeviceFault::NonFiniteWrench`] and leaves zero force;
 /// - a wrench past what the device can give keeps its direction and loses magnitude;
-/// - the wrench holds until the next `write`, and a dropped device leaves zero force.
+/// - the wrench holds until the next `write`, and a dropped device leaves zero force. A real device also lets go of
+///   a wrench that was not renewed for a tenth of a second.
 ///
 /// ```
 /// use stylet_hw::{Device, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
@@ -113,6 +114,14 @@ impl Wrench {
         }
     }
 
+    /// The same directions, with no more force and torque than the device can give.
+    pub fn within(&self, info: &DeviceInfo) -> Self {
+        Self {
+            force_n: saturated(&self.force_n, info.peak_force_n),
+            torque_nm: saturated(&self.torque_nm, info.peak_torque_nm),
+        }
+    }
+
     pub fn is_finite(&self) -> bool {
         self.force_n.iter().chain(self.torque_nm.iter()).all(|x| x.is_finite())
     }
@@ -121,6 +130,21 @@ impl Wrench {
 impl Default for Wrench {
     fn default() -> Self {
         Self::zero()
+    }
+}
+
+/// The same direction, no longer than `limit`. Finite also where the square of the length is not.
+fn saturated(v: &Vector3<f64>, limit: f64) -> Vector3<f64> {
+    let largest = v.amax();
+    if largest <= 0.0 {
+        return Vector3::zeros();
+    }
+    let scaled = v / largest;
+    let size = scaled.norm();
+    if size * largest <= limit {
+        *v
+    } else {
+        scaled * (limit / size)
     }
 }
 

@@ -5,10 +5,12 @@
 
 pub mod convert;
 pub mod device;
+pub mod libhd;
 pub mod replay;
 pub mod sim;
 
 pub use device::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
+pub use libhd::{Phantom, PhantomConfig};
 pub use replay::ReplayDevice;
 pub use sim::hand::{Effort, Hand};
 pub use sim::path::{HandPath, ScriptedPath, Waypoint};

@@ -1,6 +1,7 @@
 //! The command line of `rt-core`.
 
 use crate::core::{HAPTIC_PERIOD_NS, Options};
+use crate::device::DeviceChoice;
 use crate::lab::load::{Load, Work};
 use crate::lab::machine::{Machine, Throttle};
 use crate::lab::measure;
@@ -70,9 +71,12 @@ pub struct RunArgs {
     /// Folder of the flight recordings [default: $XDG_STATE_HOME/stylet/flights or ~/.local/state/stylet/flights]
     #[arg(long, value_name = "DIR")]
     flight_dir: Option<PathBuf>,
-    /// 'simulated', or 'replay:FILE' for a motion made by 'host-ui export --motion'
+    /// simulated, phantom (the driver's default device), phantom:NAME, or replay:FILE (from 'host-ui export --motion')
     #[arg(long, default_value = "simulated", value_name = "DEVICE")]
-    device: String,
+    device: DeviceChoice,
+    /// The driver's library libHD.so [default: STYLET_LIBHD, else where the system has it]
+    #[arg(long, value_name = "PATH")]
+    libhd: Option<PathBuf>,
     /// On exit write what each loop cost to FILE, as JSON
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
@@ -152,10 +156,9 @@ impl RunArgs {
     /// Lists what is wrong with the settings.
     pub fn options(&self) -> Result<Options, String> {
         let mut options = self.real_time.options(&self.instance)?;
-        options.motion = self.device.strip_prefix("replay:").map(PathBuf::from);
-        if options.motion.is_none() && self.device != "simulated" {
-            return Err(format!("--device {}: 'simulated' or 'replay:FILE'", self.device));
-        }
+        options.device = self.device.clone();
+        let from_environment = || std::env::var_os("STYLET_LIBHD").map(PathBuf::from);
+        options.libhd = self.libhd.clone().or_else(from_environment);
         if let Some(folder) = &self.flight_dir {
             options.flight_folder = folder.clone();
         }
@@ -235,7 +238,8 @@ impl RealTimeArgs {
                 haptic_period_ns: HAPTIC_PERIOD_NS,
                 spin_ns: 0,
                 flight_folder: replay::file::default_folder(),
-                motion: None,
+                device: DeviceChoice::Simulated,
+                libhd: None,
             }),
             _ => Err(problems.join("\n")),
         }

@@ -4,26 +4,25 @@ use crate::active::activate;
 use crate::bridge::flight::FlightDesk;
 use crate::bridge::ports::Ports;
 use crate::bridge::{Bridge, LoopPorts, ScenePicture, SnapshotLoans};
+use crate::device::{self, DeviceChoice};
 use crate::replay::file::Flight;
-use crate::replay::motion;
 use crate::rt::arm::{self, Armed, Ask, Usage};
 use crate::rt::clock;
 use crate::rt::exchange::{TipPose, TissueResponse};
 use crate::rt::haptic::{HapticLoop, HapticPorts};
-use crate::rt::timing::Probes;
 use crate::rt::haptic_tape::{HapticMemory, HapticTape};
 use crate::rt::recorder::recorder;
+use crate::rt::timing::Probes;
 use crate::rt::tissue::{TissueLoop, TissuePorts};
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use crate::scene::{Scene, SceneSource};
-use nalgebra::Vector3;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::thread::JoinHandle;
-use stylet_hw::{Device, DeviceInfo, SimulatedPhantom, SimulatedPhantomConfig};
+use stylet_hw::DeviceInfo;
 use stylet_shm_schema::service::{self, Instance, STATE_KEY};
 use stylet_shm_schema::{Fault, HapticState, ParameterSet, Session, Text, ThreadReport, flags};
 
@@ -50,8 +49,9 @@ pub struct Options {
     pub spin_ns: u64,
     /// Where flight recordings go.
     pub flight_folder: PathBuf,
-    /// A recorded motion to play instead of the simulated hand.
-    pub motion: Option<PathBuf>,
+    pub device: DeviceChoice,
+    /// The driver of a Phantom; `None` tries its usual names.
+    pub libhd: Option<PathBuf>,
 }
 
 /// What a run was.
@@ -87,7 +87,18 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
 /// The same run, with a probe in each loop.
 pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool>) -> Result<RunReport, String> {
     let scene = Scene::builtin(&options.scene).map_err(|e| e.to_string())?;
-    let device = device_for(&scene, options)?;
+    let force_loop = Ask {
+        priority: (!options.no_rt).then_some(options.haptic_priority),
+        core: options.haptic_core,
+    };
+    // Its servo thread goes to the core of the tissue step, which can wait for it longer than the force loop can.
+    let device = device::open(
+        &options.device,
+        options.libhd.clone(),
+        &scene,
+        force_loop,
+        options.tissue_core,
+    )?;
     let info = device.info();
     let active = activate(&ParameterSet::default(), &info).map_err(|p| p.join("\n"))?;
     let session_id = clock::now_ns() ^ (u64::from(std::process::id()) << 40);
@@ -289,24 +300,6 @@ fn flight_of(device: &DeviceInfo, session_id: u64, haptic_period_ns: u64) -> Fli
         haptic: None,
         tissue: None,
     }
-}
-
-/// A recorded motion, or the simulated hand, which starts outside the body, below its target.
-fn device_for(scene: &Scene, options: &Options) -> Result<Box<dyn Device>, String> {
-    if let Some(path) = &options.motion {
-        return Ok(Box::new(motion::device(path)?));
-    }
-    let (lowest, _) = scene.lattice.bounds_m();
-    let (lower, upper) = scene.target_bounds_m();
-    let start = Vector3::new(
-        (lower[0] + upper[0]) / 2.0,
-        (lower[1] + upper[1]) / 2.0,
-        lowest[2] - 0.03,
-    );
-    Ok(Box::new(SimulatedPhantom::new(SimulatedPhantomConfig {
-        start_tip_in_world: start,
-        ..SimulatedPhantomConfig::default()
-    })))
 }
 
 /// `None` when memory is locked; else what is missing, which only `--no-rt` accepts.

@@ -4,6 +4,7 @@ pub mod active;
 pub mod bridge;
 pub mod cli;
 pub mod core;
+pub mod device;
 pub mod force;
 pub mod lab;
 pub mod needle;

@@ -117,6 +117,10 @@ pub enum Fault {
     TissueUnsolved = 6,
     OverrunStreak = 7,
     LoopStopped = 8,
+    DeviceLost = 9,
+    DeviceNotCalibrated = 10,
+    DeviceWarm = 11,
+    DeviceStopped = 12,
 }
 
 impl Fault {
@@ -131,6 +135,10 @@ impl Fault {
             Self::TissueUnsolved,
             Self::OverrunStreak,
             Self::LoopStopped,
+            Self::DeviceLost,
+            Self::DeviceNotCalibrated,
+            Self::DeviceWarm,
+            Self::DeviceStopped,
         ]
         .into_iter()
         .find(|f| *f as u32 == number)
@@ -154,6 +162,15 @@ impl Fault {
             Self::LoopStopped => {
                 "the force loop has stopped; rt-core ended, so that the device lets go: start it again"
             }
+            Self::DeviceLost => {
+                "the device is not connected; check power and cable, wait until it is found again, then re-arm"
+            }
+            Self::DeviceNotCalibrated => {
+                "the device is not calibrated: stylus into the inkwell, or arm in neutral pose and press its button; then \
+                 re-arm"
+            }
+            Self::DeviceWarm => "the motors of the device are too warm; let them cool for some minutes, then re-arm",
+            Self::DeviceStopped => "the device stopped itself at a limit of force or speed; move slower, then re-arm",
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Fixtures for whole-system tests: a core process of its own for each test, and a host that talks to it.
 
 pub mod hand;
+pub mod phantom;
 pub mod stopped;
 
 use host_ui::link::{Link, LinkStatus};
@@ -59,11 +60,20 @@ impl Core {
     }
 
     pub fn start_with(options: &[&str]) -> Self {
-        Self::start_as(fresh_instance(), options)
+        Self::launch(fresh_instance(), options, &[])
     }
 
     /// Under a name that another core may have had.
     pub fn start_as(instance: Instance, options: &[&str]) -> Self {
+        Self::launch(instance, options, &[])
+    }
+
+    /// With these variables in its environment.
+    pub fn start_in(options: &[&str], variables: &[(&str, &str)]) -> Self {
+        Self::launch(fresh_instance(), options, variables)
+    }
+
+    fn launch(instance: Instance, options: &[&str], variables: &[(&str, &str)]) -> Self {
         let report = scratch(&format!("core-{}", instance.name())).join("report.json");
         let child = Command::new(program("rt-core"))
             .args(["--instance", instance.name(), "--exit-with-parent", "--report"])
@@ -71,6 +81,7 @@ impl Core {
             .arg("--flight-dir")
             .arg(report.with_file_name("flights"))
             .args(options)
+            .envs(variables.iter().copied())
             .stderr(Stdio::null())
             .spawn()
             .expect("rt-core starts");

@@ -190,30 +190,12 @@ impl Device for SimulatedPhantom {
             self.wrench = Wrench::zero();
             return Err(DeviceFault::NonFiniteWrench);
         }
-        self.wrench = Wrench {
-            force_n: saturated(&wrench.force_n, self.config.info.peak_force_n),
-            torque_nm: saturated(&wrench.torque_nm, self.config.info.peak_torque_nm),
-        };
+        self.wrench = wrench.within(&self.config.info);
         Ok(())
     }
 
     fn set_hand_goal(&mut self, goal: &HandGoal) {
         self.path.set_goal(goal);
-    }
-}
-
-/// The same direction, no longer than `limit`. Finite also where the square of the length is not.
-fn saturated(v: &Vector3<f64>, limit: f64) -> Vector3<f64> {
-    let largest = v.amax();
-    if largest <= 0.0 {
-        return Vector3::zeros();
-    }
-    let scaled = v / largest;
-    let size = scaled.norm();
-    if size * largest <= limit {
-        *v
-    } else {
-        scaled * (limit / size)
     }
 }
 

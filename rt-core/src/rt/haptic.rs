@@ -1,5 +1,6 @@
 //! The haptic tick, 1 kHz: read → velocity → needle → force law → passivity → gate → write → pose → record.
 
+use crate::device::fault_of;
 use crate::force::{
     ForceFault, ForceInput, ForceParameters, ForceState, ForceTerms, GateState, PassivityParameters, PassivityState,
     VelocityEstimator, force, gate, passivity,
@@ -10,8 +11,8 @@ use crate::rt::clock::{self, Grid};
 use crate::rt::exchange::*;
 use crate::rt::haptic_tape::{HapticMemory, HapticTape};
 use crate::rt::recorder::Recorder;
-use crate::rt::watchdog::{Watchdog, Watched, at_gate};
 use crate::rt::timing::Probe;
+use crate::rt::watchdog::{Watchdog, Watched, at_gate};
 use iceoryx2::port::writer::EntryHandleMut;
 use nalgebra::Vector3;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -276,8 +277,8 @@ impl HapticLoop {
                 self.raise(Fault::NonFiniteInput);
                 last
             }
-            Err(_) => {
-                self.raise(Fault::DeviceError);
+            Err(fault) => {
+                self.raise(fault_of(fault));
                 last
             }
         };

@@ -1,0 +1,116 @@
+//! The driver's errors: number, name, and what each means for the force.
+
+use crate::device::DeviceFault;
+
+/// What an error asks of the servo loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// The force is off until the error has stayed away for a while; the connection holds.
+    Pause,
+    /// The connection is gone: stop, disable, initialise anew.
+    Reconnect,
+}
+
+/// A known error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Known {
+    pub code: u32,
+    pub name: &'static str,
+    pub fault: DeviceFault,
+    pub severity: Severity,
+}
+
+const fn pause(code: u32, name: &'static str, fault: DeviceFault) -> Known {
+    let severity = Severity::Pause;
+    Known {
+        code,
+        name,
+        fault,
+        severity,
+    }
+}
+
+const fn reconnect(code: u32, name: &'static str, fault: DeviceFault) -> Known {
+    let severity = Severity::Reconnect;
+    Known {
+        code,
+        name,
+        fault,
+        severity,
+    }
+}
+
+pub const SUCCESS: u32 = 0;
+pub const DEVICE_ALREADY_INITIATED: u32 = 0x0301;
+
+/// Every error of the interface but success.
+pub const KNOWN: &[Known] = &[
+    pause(0x0100, "HD_INVALID_ENUM", DeviceFault::Driver),
+    pause(0x0101, "HD_INVALID_VALUE", DeviceFault::Driver),
+    pause(0x0102, "HD_INVALID_OPERATION", DeviceFault::Driver),
+    pause(0x0103, "HD_INVALID_INPUT_TYPE", DeviceFault::Driver),
+    reconnect(0x0104, "HD_BAD_HANDLE", DeviceFault::NotConnected),
+    pause(0x0200, "HD_WARM_MOTORS", DeviceFault::Overheated),
+    pause(0x0201, "HD_EXCEEDED_MAX_FORCE", DeviceFault::SafetyStop),
+    pause(0x0202, "HD_EXCEEDED_MAX_FORCE_IMPULSE", DeviceFault::SafetyStop),
+    pause(0x0203, "HD_EXCEEDED_MAX_VELOCITY", DeviceFault::SafetyStop),
+    pause(0x0204, "HD_FORCE_ERROR", DeviceFault::SafetyStop),
+    reconnect(0x0300, "HD_DEVICE_FAULT", DeviceFault::NotConnected),
+    reconnect(
+        DEVICE_ALREADY_INITIATED,
+        "HD_DEVICE_ALREADY_INITIATED",
+        DeviceFault::Driver,
+    ),
+    reconnect(0x0302, "HD_COMM_ERROR", DeviceFault::NotConnected),
+    reconnect(0x0303, "HD_COMM_CONFIG_ERROR", DeviceFault::NotConnected),
+    reconnect(0x0304, "HD_TIMER_ERROR", DeviceFault::TimedOut),
+    pause(0x0400, "HD_ILLEGAL_BEGIN", DeviceFault::Driver),
+    pause(0x0401, "HD_ILLEGAL_END", DeviceFault::Driver),
+    pause(0x0402, "HD_FRAME_ERROR", DeviceFault::Driver),
+    reconnect(0x0500, "HD_INVALID_PRIORITY", DeviceFault::Driver),
+    reconnect(0x0501, "HD_SCHEDULER_FULL", DeviceFault::Driver),
+    reconnect(0x0600, "HD_INVALID_LICENSE", DeviceFault::Driver),
+];
+
+/// The entry of `code`; a number that the interface does not have pauses the force as a driver's error.
+pub fn known(code: u32) -> Known {
+    let found = KNOWN.iter().find(|k| k.code == code);
+    found
+        .copied()
+        .unwrap_or(pause(code, "unknown error", DeviceFault::Driver))
+}
+
+/// What a person can do about it.
+pub fn cure(code: u32) -> &'static str {
+    match code {
+        0x0200 => "let the motors cool for some minutes; lower the force scale",
+        0x0201..=0x0204 => "move slower and re-arm; lower the force limits if it comes back",
+        0x0104 | 0x0300 | 0x0302 => "check power and cable of the device; it is taken up again by itself",
+        0x0303 => "check the parallel port: mode EPP in the BIOS, and that no other program uses it",
+        0x0301 => "another program uses the device; end it",
+        0x0304 => "the driver has no timer; check that its kernel interface is loaded",
+        0x0600 => "install the OpenHaptics licence of this PC",
+        _ => "end and start rt-core anew; if it comes back, report it with this number",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_error_has_one_entry_and_only_a_lost_connection_asks_for_a_new_one() {
+        for (i, k) in KNOWN.iter().enumerate() {
+            assert!(
+                KNOWN[i + 1..]
+                    .iter()
+                    .all(|other| other.code != k.code && other.name != k.name)
+            );
+            assert_eq!(known(k.code), *k);
+        }
+        assert_eq!(KNOWN.len(), 21);
+        assert_eq!(known(0x0302).severity, Severity::Reconnect);
+        assert_eq!(known(0x0200).fault, DeviceFault::Overheated);
+        assert_eq!(known(0xBEEF).severity, Severity::Pause);
+    }
+}

@@ -1,0 +1,215 @@
+//! The C interface of `libHD.so`, as OpenHaptics 3.00 to 3.30 have it, loaded at run time.
+//!
+//! Types, numbers and the 36 functions are facts of the vendor's interface (HDAPI reference; names checked against the
+//! symbols of `libHD.so.3.0.0`). The library stays loaded until the process ends: its driver fails when it is loaded a
+//! second time after it was closed.
+
+#![allow(non_snake_case)]
+
+use core::ffi::{c_char, c_int, c_long, c_ulong, c_ushort, c_void};
+use std::path::{Path, PathBuf};
+
+use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_LAZY};
+
+/// A device; [`INVALID_HANDLE`] for none.
+pub type Handle = u32;
+/// A number of [`parameter`], [`capability`], [`calibration`] or [`style`].
+pub type Enum = u32;
+/// What the scheduler gives for a callback.
+pub type Schedule = c_ulong;
+pub type Callback = unsafe extern "system" fn(*mut c_void) -> u32;
+
+/// One entry of the driver's error stack; returned by value.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ErrorInfo {
+    pub code: u32,
+    pub internal: c_int,
+    pub device: Handle,
+}
+
+pub const INVALID_HANDLE: Handle = 0xFFFF_FFFF;
+pub const CALLBACK_DONE: u32 = 0;
+pub const CALLBACK_CONTINUE: u32 = 1;
+pub const WAIT_CHECK_STATUS: u32 = 0;
+/// Order among the callbacks of one tick, not a thread priority.
+pub const PRIORITY_MAX: c_ushort = 0xFFFF;
+
+/// What can be read and set; behind each, count and unit.
+pub mod parameter {
+    /// 1 int, a bit mask.
+    pub const BUTTONS: u32 = 0x2000;
+    /// 6 long.
+    pub const ENCODERS: u32 = 0x2010;
+    /// 3, mm/s, smoothed by the driver.
+    pub const VELOCITY: u32 = 0x2051;
+    /// 16, column-major, mm.
+    pub const TRANSFORM: u32 = 0x2052;
+    /// 3, rad: right +, up -, clockwise +.
+    pub const GIMBAL_ANGLES: u32 = 0x2150;
+    /// Strings.
+    pub const VERSION: u32 = 0x2500;
+    pub const MODEL: u32 = 0x2501;
+    pub const DRIVER_VERSION: u32 = 0x2502;
+    pub const SERIAL: u32 = 0x2504;
+    /// 1 int; 6 means torques.
+    pub const OUTPUT_DOF: u32 = 0x2554;
+    /// 1 int, bits of [`super::style`].
+    pub const CALIBRATION_STYLE: u32 = 0x2555;
+    /// 1, N.
+    pub const MAX_FORCE: u32 = 0x2603;
+    /// 1, N.
+    pub const MAX_CONTINUOUS_FORCE: u32 = 0x2604;
+    /// 3 or 6, 0 to 1, predicted by the driver.
+    pub const MOTOR_TEMPERATURE: u32 = 0x2605;
+    /// 3, N.
+    pub const FORCE: u32 = 0x2700;
+    /// 3, mN m, one for each gimbal joint.
+    pub const GIMBAL_TORQUE: u32 = 0x2704;
+}
+
+pub mod capability {
+    pub const FORCE_OUTPUT: u32 = 0x4000;
+    pub const MAX_FORCE_CLAMPING: u32 = 0x4001;
+    pub const FORCE_RAMPING: u32 = 0x4002;
+    pub const SOFTWARE_FORCE_LIMIT: u32 = 0x4003;
+}
+
+pub mod calibration {
+    pub const OK: u32 = 0x5000;
+    pub const NEEDS_UPDATE: u32 = 0x5001;
+    pub const NEEDS_MANUAL_INPUT: u32 = 0x5002;
+}
+
+/// How a device is calibrated, a bit each.
+pub mod style {
+    pub const ENCODER_RESET: u32 = 1;
+    pub const AUTO: u32 = 2;
+    pub const INKWELL: u32 = 4;
+}
+
+macro_rules! functions {
+    ($(fn $name:ident($($argument:ty),*) $(-> $result:ty)?;)*) => {
+        /// Every function of the library.
+        #[derive(Clone, Copy)]
+        pub struct Api {
+            $(pub $name: unsafe extern "system" fn($($argument),*) $(-> $result)?,)*
+        }
+
+        /// Their names, in the order of [`Api`].
+        pub const FUNCTIONS: &[&str] = &[$(stringify!($name)),*];
+
+        impl Api {
+            /// Every name that the library lacks, when it lacks one.
+            fn from_library(library: &Library) -> Result<Self, Vec<&'static str>> {
+                let missing: Vec<_> = FUNCTIONS.iter().copied().filter(|name| {
+                    // SAFETY: only the presence of the symbol is asked for; it is not used.
+                    unsafe { library.get::<*mut c_void>(name.as_bytes()) }.is_err()
+                }).collect();
+                $(
+                    // SAFETY: the type is that of the vendor's interface, which has not changed from 3.00 to 3.30.
+                    let $name = unsafe {
+                        library.get::<unsafe extern "system" fn($($argument),*) $(-> $result)?>(stringify!($name).as_bytes())
+                    };
+                )*
+                match ($($name,)*) {
+                    ($(Ok($name),)*) => Ok(Self { $($name: *$name,)* }),
+                    _ => Err(missing),
+                }
+            }
+        }
+    };
+}
+
+functions! {
+    fn hdInitDevice(*const c_char) -> Handle;
+    fn hdDisableDevice(Handle);
+    fn hdMakeCurrentDevice(Handle);
+    fn hdGetCurrentDevice() -> Handle;
+    fn hdBeginFrame(Handle);
+    fn hdEndFrame(Handle);
+    fn hdGetError() -> ErrorInfo;
+    fn hdGetErrorString(u32) -> *const c_char;
+    fn hdEnable(Enum);
+    fn hdDisable(Enum);
+    fn hdIsEnabled(Enum) -> u8;
+    fn hdGetBooleanv(Enum, *mut u8);
+    fn hdGetIntegerv(Enum, *mut c_int);
+    fn hdGetFloatv(Enum, *mut f32);
+    fn hdGetDoublev(Enum, *mut f64);
+    fn hdGetLongv(Enum, *mut c_long);
+    fn hdGetString(Enum) -> *const c_char;
+    fn hdSetBooleanv(Enum, *const u8);
+    fn hdSetIntegerv(Enum, *const c_int);
+    fn hdSetFloatv(Enum, *const f32);
+    fn hdSetDoublev(Enum, *const f64);
+    fn hdSetLongv(Enum, *const c_long);
+    fn hdCheckCalibration() -> Enum;
+    fn hdCheckCalibrationStyle() -> Enum;
+    fn hdUpdateCalibrationMessage(Enum);
+    fn hdUpdateCalibration(Enum);
+    fn hdScaleGimbalAngles(f64, f64, f64, *mut f64);
+    fn hdDeploymentLicense(*const c_char, *const c_char, *const c_char) -> u8;
+    fn hdStartScheduler();
+    fn hdStopScheduler();
+    fn hdSetSchedulerRate(c_ulong);
+    fn hdScheduleSynchronous(Callback, *mut c_void, c_ushort);
+    fn hdScheduleAsynchronous(Callback, *mut c_void, c_ushort) -> Schedule;
+    fn hdUnschedule(Schedule);
+    fn hdWaitForCompletion(Schedule, u32) -> u8;
+    fn hdGetSchedulerTimeStamp() -> f64;
+}
+
+/// Names under which the library is installed, in the order in which they are tried.
+pub const LIBRARY_NAMES: &[&str] = &["libHD.so", "libHD.so.3.0", "libHD.so.3.4"];
+
+/// Why no library could be loaded: each name that was tried, with what the loader said.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LoadError(pub Vec<(PathBuf, String)>);
+
+impl core::fmt::Display for LoadError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("OpenHaptics (libHD.so) cannot be loaded")?;
+        for (name, why) in &self.0 {
+            write!(f, "\n  {}: {why}", name.display())?;
+        }
+        Ok(())
+    }
+}
+
+impl core::error::Error for LoadError {}
+
+impl Api {
+    /// Loads the library at `path`, or the first of [`LIBRARY_NAMES`] that can be loaded, and never closes it.
+    pub fn load(path: Option<&Path>) -> Result<Self, LoadError> {
+        let names: Vec<PathBuf> = match path {
+            Some(path) => vec![path.to_owned()],
+            None => LIBRARY_NAMES.iter().map(PathBuf::from).collect(),
+        };
+        let mut tried = Vec::new();
+        for name in names {
+            match Self::load_one(&name) {
+                Ok(api) => return Ok(api),
+                Err(why) => tried.push((name, why)),
+            }
+        }
+        Err(LoadError(tried))
+    }
+
+    fn load_one(name: &Path) -> Result<Self, String> {
+        // SAFETY: runs the constructors of a library that the operator installed for this purpose.
+        let library = unsafe { Library::open(Some(name), RTLD_LAZY | RTLD_GLOBAL) }.map_err(|e| spoken(&e))?;
+        let api = Self::from_library(&library)
+            .map_err(|missing| format!("not OpenHaptics 3: it lacks {}", missing.join(", ")));
+        core::mem::forget(library);
+        api
+    }
+}
+
+/// The loader's own words.
+fn spoken(error: &libloading::Error) -> String {
+    match error {
+        libloading::Error::DlOpen { desc } => format!("{desc:?}").trim_matches('"').to_owned(),
+        other => other.to_string(),
+    }
+}

@@ -1,0 +1,128 @@
+//! Where the device stands in the world, and which torque of its gimbal joints makes a torque in space.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::convert::pose_from_column_major_mm;
+
+/// The device's frame in the world. The driver's frame has x to the operator's right, y up, z towards the operator.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placement {
+    pub origin_in_world: Vector3<f64>,
+    pub world_from_device: UnitQuaternion<f64>,
+}
+
+impl Placement {
+    /// The operator sits before the perineum of a patient on the back: world z (superior) points away from the
+    /// operator, world y (anterior) up, world x (the patient's right) to the operator's left.
+    pub fn facing_patient(origin_in_world: Vector3<f64>) -> Self {
+        Self {
+            origin_in_world,
+            world_from_device: half_turn_about_y(),
+        }
+    }
+
+    /// Tip (m) and tool of a driver's transform. The stylus points along -z of its own frame, the needle along +z of
+    /// the tool frame. `None` for what is not a pose.
+    pub fn pose(&self, transform: &[f64; 16]) -> Option<(Vector3<f64>, UnitQuaternion<f64>)> {
+        let (tip_in_device, device_from_stylus) = pose_from_column_major_mm(transform)?;
+        let tip_in_world = self.origin_in_world + self.world_from_device * tip_in_device;
+        Some((
+            tip_in_world,
+            self.world_from_device * device_from_stylus * half_turn_about_y(),
+        ))
+    }
+
+    /// A force or a torque of the world in the device's frame.
+    pub fn to_device(&self, vector_in_world: &Vector3<f64>) -> Vector3<f64> {
+        self.world_from_device.inverse_transform_vector(vector_in_world)
+    }
+}
+
+fn half_turn_about_y() -> UnitQuaternion<f64> {
+    UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(0.0, 0.0, 1.0, 0.0))
+}
+
+/// Torques of the gimbal joints (turn, lift, roll; N m) that together are `torque_nm` in the device's frame.
+///
+/// Each joint gives the part of the torque that lies along its axis: so the power at the joints is the power in space.
+/// The joints turn about -y, -x and -z of the frames they carry, as the driver counts their angles: right, down and
+/// clockwise are positive. That torques have the sign of the angles is inferred, not stated by the vendor.
+pub fn gimbal_torque_nm(
+    torque_nm: &Vector3<f64>,
+    device_from_stylus: &UnitQuaternion<f64>,
+    [_, lift_rad, roll_rad]: [f64; 3],
+) -> [f64; 3] {
+    let before_roll = device_from_stylus * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll_rad);
+    let before_lift = before_roll * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), lift_rad);
+    let turn = -(before_lift * Vector3::y());
+    let lift = -(before_roll * Vector3::x());
+    let roll = -(device_from_stylus * Vector3::z());
+    [turn.dot(torque_nm), lift.dot(torque_nm), roll.dot(torque_nm)]
+}
+
+/// The same direction, with no joint over its limit.
+pub fn within_joint_limits(torque_nm: [f64; 3], limits_nm: &[f64; 3]) -> [f64; 3] {
+    let excess = torque_nm
+        .iter()
+        .zip(limits_nm)
+        .map(|(torque, limit)| torque.abs() / limit)
+        .fold(1.0, f64::max);
+    torque_nm.map(|torque| torque / excess)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn axis_turn(axis: Vector3<f64>, angle: f64) -> UnitQuaternion<f64> {
+        UnitQuaternion::from_scaled_axis(axis * angle)
+    }
+
+    /// Forward kinematics of the gimbal on a forearm of any orientation.
+    fn stylus(forearm: &UnitQuaternion<f64>, [turn, lift, roll]: [f64; 3]) -> UnitQuaternion<f64> {
+        forearm * axis_turn(-Vector3::y(), turn) * axis_turn(-Vector3::x(), lift) * axis_turn(-Vector3::z(), roll)
+    }
+
+    #[test]
+    fn joint_torques_do_the_work_of_the_torque_in_space() {
+        let forearm = UnitQuaternion::from_euler_angles(0.2, -0.4, 0.9);
+        let (angles, torque) = ([0.3, -0.6, 1.1], Vector3::new(0.05, -0.08, 0.02));
+        let device_from_stylus = stylus(&forearm, angles);
+        let joints = gimbal_torque_nm(&torque, &device_from_stylus, angles);
+        for joint in 0..3 {
+            let mut moved = angles;
+            moved[joint] += 1e-6;
+            let turned = (stylus(&forearm, moved) * device_from_stylus.inverse()).scaled_axis();
+            let work_in_space = torque.dot(&turned) / 1e-6;
+            assert!((joints[joint] - work_in_space).abs() < 1e-7, "joint {joint}");
+        }
+    }
+
+    #[test]
+    fn a_stylus_that_points_away_from_the_operator_is_a_needle_along_world_z() {
+        let placement = Placement::facing_patient(Vector3::new(0.1, 0.2, 0.3));
+        let mut transform = [0.0; 16];
+        for i in 0..4 {
+            transform[5 * i] = 1.0;
+        }
+        (transform[12], transform[13], transform[14]) = (10.0, 20.0, -30.0);
+        let (tip, tool) = placement.pose(&transform).unwrap();
+        assert!(
+            (tip - Vector3::new(0.09, 0.22, 0.33)).norm() < 1e-12,
+            "right is -x, up is +y, away is +z"
+        );
+        assert!((tool * Vector3::z() - Vector3::z()).norm() < 1e-12);
+        let push_away = placement.to_device(&Vector3::z());
+        assert!((push_away + Vector3::z()).norm() < 1e-12);
+    }
+
+    #[test]
+    fn joint_limits_keep_the_direction() {
+        let limited = within_joint_limits([0.4, 0.1, 0.0], &[0.2, 0.2, 0.05]);
+        assert!((limited[0] - 0.2).abs() < 1e-12 && (limited[1] - 0.05).abs() < 1e-12 && limited[2] == 0.0);
+        assert_eq!(
+            within_joint_limits([0.1, 0.1, 0.01], &[0.2, 0.2, 0.05]),
+            [0.1, 0.1, 0.01]
+        );
+    }
+}

@@ -1,0 +1,272 @@
+//! One connection to a device, from initialisation to disabling: the calls that may block, made by one thread.
+
+use core::ffi::{CStr, c_char, c_int};
+use core::fmt;
+use std::ffi::CString;
+
+use crate::device::DeviceInfo;
+use crate::libhd::errors;
+use crate::libhd::ffi::{
+    Api, Callback, Enum, Handle, INVALID_HANDLE, PRIORITY_MAX, Schedule, WAIT_CHECK_STATUS, capability, parameter,
+};
+use crate::libhd::model;
+
+/// Names that the driver's set-up programs give the first device, old and new; no name at all fails on some systems.
+const DEVICE_NAMES: &[&CStr] = &[c"Default PHANToM", c"Default Device"];
+
+/// Why there is no connection, in words that say what to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Trouble {
+    /// No name could be initialised; each with the driver's answer.
+    NoDevice(Vec<(String, u32)>),
+    WrongModel(String),
+    /// The device that came back is another one: limits were set for `was`.
+    OtherModel {
+        was: &'static str,
+        is: String,
+    },
+    /// A call failed with this error.
+    Call(&'static str, u32),
+    /// The driver would not switch forces on.
+    NoForce,
+    /// The scheduler runs, but no callback came.
+    NoCallback,
+    /// The servo thread was not granted what it must have.
+    NotArmed(String),
+}
+
+impl fmt::Display for Trouble {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoDevice(tried) => {
+                f.write_str("the driver finds no device")?;
+                for (name, code) in tried {
+                    let error = errors::known(*code).name;
+                    write!(f, "\n  {name}: {error} (0x{code:04x}): {}", errors::cure(*code))?;
+                }
+                Ok(())
+            }
+            Self::WrongModel(model) => write!(
+                f,
+                "the device is a \"{model}\", of which no limits are known; known are: {}",
+                model::known_models()
+            ),
+            Self::OtherModel { was, is } => {
+                write!(
+                    f,
+                    "a \"{is}\" came back in place of the {was}: plug that in, or start rt-core anew"
+                )
+            }
+            Self::Call(call, code) => {
+                let error = errors::known(*code).name;
+                write!(f, "{call} failed with {error} (0x{code:04x}): {}", errors::cure(*code))
+            }
+            Self::NoForce => f.write_str("the driver does not switch forces on: check the power of the amplifiers"),
+            Self::NoCallback => f.write_str(
+                "the driver's servo loop does not run: check the device's power, its cable and the port's mode",
+            ),
+            Self::NotArmed(why) => write!(f, "the driver's servo thread is not real-time: {why}"),
+        }
+    }
+}
+
+impl core::error::Error for Trouble {}
+
+/// What the driver tells of the device.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Description {
+    pub info: DeviceInfo,
+    pub model: String,
+    pub serial: String,
+    pub driver: String,
+    pub library: String,
+    pub output_dof: c_int,
+}
+
+impl fmt::Display for Description {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}, serial {}, driver {}, OpenHaptics {}, {} axes of force, at most {:.1} N ({:.1} N continuous)",
+            self.model,
+            self.serial,
+            self.driver,
+            self.library,
+            self.output_dof,
+            self.info.peak_force_n,
+            self.info.continuous_force_n
+        )
+    }
+}
+
+/// An initialised device.
+pub struct Session<'a> {
+    api: &'a Api,
+    pub handle: Handle,
+    schedule: Option<Schedule>,
+    started: bool,
+}
+
+impl<'a> Session<'a> {
+    /// Tries `name`, or the usual names and then the first device.
+    pub fn open(api: &'a Api, name: Option<&str>) -> Result<Self, Trouble> {
+        discard_errors(api);
+        let mut names: Vec<Option<CString>> = Vec::new();
+        match name {
+            Some(name) => names.push(Some(CString::new(name).unwrap_or_default())),
+            None => {
+                names.extend(DEVICE_NAMES.iter().map(|n| Some((*n).to_owned())));
+                names.push(None);
+            }
+        }
+        let mut tried = Vec::new();
+        for name in names {
+            let pointer = name.as_ref().map_or(core::ptr::null(), |n| n.as_ptr());
+            // SAFETY: null or a string that ends with zero and outlives the call.
+            let handle = unsafe { (api.hdInitDevice)(pointer) };
+            let error = last_error(api);
+            if handle != INVALID_HANDLE && error == errors::SUCCESS {
+                // SAFETY: the handle is the driver's own.
+                unsafe { (api.hdMakeCurrentDevice)(handle) };
+                return Ok(Self {
+                    api,
+                    handle,
+                    schedule: None,
+                    started: false,
+                });
+            }
+            let shown = name.map_or("(first device)".to_owned(), |n| n.to_string_lossy().into_owned());
+            tried.push((shown, error));
+        }
+        Err(Trouble::NoDevice(tried))
+    }
+
+    /// Model, versions and limits.
+    pub fn describe(&self) -> Result<Description, Trouble> {
+        let model = self.string(parameter::MODEL);
+        self.check("hdGetString")?;
+        let figures = model::figures(&model).ok_or_else(|| Trouble::WrongModel(model.clone()))?;
+        let (mut output_dof, mut peak_n, mut continuous_n) = (0, 0.0, 0.0);
+        // SAFETY: one number each, as the interface states.
+        unsafe {
+            (self.api.hdGetIntegerv)(parameter::OUTPUT_DOF, &mut output_dof);
+            (self.api.hdGetDoublev)(parameter::MAX_FORCE, &mut peak_n);
+            (self.api.hdGetDoublev)(parameter::MAX_CONTINUOUS_FORCE, &mut continuous_n);
+        }
+        self.check("hdGetDoublev")?;
+        let description = Description {
+            info: model::with_reported(figures, peak_n, continuous_n, output_dof),
+            serial: self.string(parameter::SERIAL),
+            driver: self.string(parameter::DRIVER_VERSION),
+            library: self.string(parameter::VERSION),
+            model,
+            output_dof,
+        };
+        // An old driver may not know all of the strings.
+        discard_errors(self.api);
+        Ok(description)
+    }
+
+    /// Forces on, limits on, callback scheduled at `rate_hz`, scheduler started from the calling thread, whose policy
+    /// and cores the driver's thread inherits.
+    ///
+    /// # Safety
+    ///
+    /// `callback` may be called with `context` from any thread until the process ends.
+    pub unsafe fn start(
+        &mut self,
+        callback: Callback,
+        context: *mut core::ffi::c_void,
+        rate_hz: u32,
+    ) -> Result<(), Trouble> {
+        use capability::*;
+        for capability in [FORCE_OUTPUT, MAX_FORCE_CLAMPING, FORCE_RAMPING, SOFTWARE_FORCE_LIMIT] {
+            // SAFETY: no preconditions.
+            unsafe { (self.api.hdEnable)(capability) };
+            self.check("hdEnable")?;
+        }
+        // SAFETY: no preconditions.
+        if unsafe { (self.api.hdIsEnabled)(FORCE_OUTPUT) } == 0 {
+            return Err(Trouble::NoForce);
+        }
+        // SAFETY: by the contract of this function.
+        let schedule = unsafe { (self.api.hdScheduleAsynchronous)(callback, context, PRIORITY_MAX) };
+        self.check("hdScheduleAsynchronous")?;
+        self.schedule = Some(schedule);
+        // SAFETY: no preconditions.
+        unsafe { (self.api.hdSetSchedulerRate)(rate_hz.into()) };
+        self.check("hdSetSchedulerRate")?;
+        // SAFETY: no preconditions.
+        unsafe { (self.api.hdStartScheduler)() };
+        self.started = true;
+        self.check("hdStartScheduler")
+    }
+
+    /// Does the driver still run the callback?
+    pub fn is_scheduled(&self) -> bool {
+        // SAFETY: the schedule is the driver's own; asking does not wait.
+        self.schedule
+            .is_some_and(|s| unsafe { (self.api.hdWaitForCompletion)(s, WAIT_CHECK_STATUS) } != 0)
+    }
+
+    pub fn is_running(&self) -> bool {
+        self.started
+    }
+
+    /// Stops, unschedules and disables; the callbacks have written zero before.
+    pub fn close(self) {
+        // SAFETY: handles are the driver's own, each used for the last time.
+        unsafe {
+            if self.started {
+                (self.api.hdStopScheduler)();
+            }
+            if let Some(schedule) = self.schedule {
+                (self.api.hdUnschedule)(schedule);
+            }
+            (self.api.hdDisable)(capability::FORCE_OUTPUT);
+            (self.api.hdDisableDevice)(self.handle);
+        }
+        discard_errors(self.api);
+    }
+
+    fn check(&self, call: &'static str) -> Result<(), Trouble> {
+        match last_error(self.api) {
+            errors::SUCCESS => Ok(()),
+            code => Err(Trouble::Call(call, code)),
+        }
+    }
+
+    fn string(&self, what: Enum) -> String {
+        // SAFETY: the driver gives null or a static string.
+        unsafe { text((self.api.hdGetString)(what)) }
+    }
+}
+
+/// The oldest error that the driver holds; it is then forgotten with all that came after.
+pub fn last_error(api: &Api) -> u32 {
+    let mut oldest = errors::SUCCESS;
+    // The driver's stack has its newest on top. It is bounded; so is this.
+    for _ in 0..64 {
+        // SAFETY: no preconditions.
+        match unsafe { (api.hdGetError)() }.code {
+            errors::SUCCESS => break,
+            code => oldest = code,
+        }
+    }
+    oldest
+}
+
+pub fn discard_errors(api: &Api) {
+    let _ = last_error(api);
+}
+
+/// # Safety
+///
+/// `pointer` is null or a string that ends with zero.
+unsafe fn text(pointer: *const c_char) -> String {
+    if pointer.is_null() {
+        return "unknown".to_owned();
+    }
+    // SAFETY: by the contract of this function.
+    unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned()
+}
