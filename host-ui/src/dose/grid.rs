@@ -1,0 +1,150 @@
+//! Dose on a regular grid, kept up to date seed by seed.
+
+use super::kernel::{BLOCK, Block, DoseKernel, Placed};
+use super::seed::Seed;
+use rayon::prelude::*;
+
+/// A grid with more voxels is refused (2 GiB).
+const MAX_VOXELS: usize = 1 << 28;
+
+/// Voxel (i, j, k) has its centre at `origin_m + (i, j, k) spacing_m`; x runs fastest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DoseGrid {
+    origin_m: [f64; 3],
+    spacing_m: [f64; 3],
+    dims: [usize; 3],
+    dose_gy: Vec<f64>,
+}
+
+impl DoseGrid {
+    pub fn new(origin_m: [f64; 3], spacing_m: [f64; 3], dims: [usize; 3]) -> Result<Self, String> {
+        let voxels = dims.iter().try_fold(1_usize, |n, &d| n.checked_mul(d));
+        if !origin_m.iter().chain(&spacing_m).all(|v| v.is_finite()) || spacing_m.iter().any(|&h| h <= 0.0) {
+            return Err("the voxels of a dose grid need a side above 0".to_owned());
+        }
+        match voxels {
+            Some(voxels @ 1..=MAX_VOXELS) => Ok(Self {
+                origin_m,
+                spacing_m,
+                dims,
+                dose_gy: vec![0.0; voxels],
+            }),
+            _ => Err(format!(
+                "a dose grid of {} x {} x {} voxels; allowed are 1 to {MAX_VOXELS} in all: choose larger voxels",
+                dims[0], dims[1], dims[2]
+            )),
+        }
+    }
+
+    /// Covers a box with cubes.
+    pub fn covering(low_m: [f64; 3], high_m: [f64; 3], spacing_m: f64) -> Result<Self, String> {
+        let dims = [0, 1, 2].map(|a| ((high_m[a] - low_m[a]) / spacing_m - 1e-9).ceil().max(0.0) as usize + 1);
+        Self::new(low_m, [spacing_m; 3], dims)
+    }
+
+    pub fn dims(&self) -> [usize; 3] {
+        self.dims
+    }
+
+    pub fn spacing_m(&self) -> [f64; 3] {
+        self.spacing_m
+    }
+
+    /// Voxel by voxel, x fastest.
+    pub fn dose_gy(&self) -> &[f64] {
+        &self.dose_gy
+    }
+
+    /// Sets each voxel to a given field (Gy), as another program may have computed it.
+    pub fn fill(&mut self, field_gy: impl Fn([f64; 3]) -> f64 + Sync) {
+        let (origin, spacing, dims) = (self.origin_m, self.spacing_m, self.dims);
+        self.dose_gy
+            .par_chunks_mut(dims[0])
+            .enumerate()
+            .for_each(|(row, doses)| {
+                for (i, dose) in doses.iter_mut().enumerate() {
+                    let at = [i, row % dims[1], row / dims[1]];
+                    *dose = field_gy([0, 1, 2].map(|a| origin[a] + at[a] as f64 * spacing[a]));
+                }
+            });
+    }
+
+    pub fn centre_m(&self, [i, j, k]: [usize; 3]) -> [f64; 3] {
+        let at = [i as f64, j as f64, k as f64];
+        [0, 1, 2].map(|a| self.origin_m[a] + at[a] * self.spacing_m[a])
+    }
+
+    pub fn add(&mut self, kernel: &DoseKernel, seeds: &[Seed]) {
+        self.change(kernel, seeds, 1.0);
+    }
+
+    /// Undoes [`DoseGrid::add`] to the last bit.
+    pub fn remove(&mut self, kernel: &DoseKernel, seeds: &[Seed]) {
+        self.change(kernel, seeds, -1.0);
+    }
+
+    fn change(&mut self, kernel: &DoseKernel, seeds: &[Seed], sign: f64) {
+        // Single precision is fine enough from the middle of the grid.
+        let anchor_m = self.centre_m(self.dims.map(|d| d / 2));
+        let placed: Vec<Placed> = seeds.iter().map(|s| DoseKernel::place(s, anchor_m)).collect();
+        let from_anchor = |a: usize| -> Vec<f32> {
+            let at = |i| self.origin_m[a] + i as f64 * self.spacing_m[a] - anchor_m[a];
+            (0..self.dims[a]).map(|i| at(i) as f32).collect()
+        };
+        let axes = [from_anchor(0), from_anchor(1), from_anchor(2)];
+        let [nx, ny, _] = self.dims;
+        // Several blocks to a task, whole rows or not.
+        let task = BLOCK * 16;
+        self.dose_gy.par_chunks_mut(task).enumerate().for_each(|(t, doses)| {
+            for (b, dose) in doses.chunks_mut(BLOCK).enumerate() {
+                let first = t * task + b * BLOCK;
+                let mut at = [first % nx, first / nx % ny, first / nx / ny];
+                let mut block = Block::ORIGIN;
+                for i in 0..BLOCK {
+                    block.x_m[i] = axes[0][at[0]];
+                    block.y_m[i] = axes[1][at[1]];
+                    block.z_m[i] = axes[2][at[2]];
+                    if i + 1 < dose.len() {
+                        at = next(at, nx, ny);
+                    }
+                }
+                kernel.add(&placed, &block, sign, dose);
+            }
+        });
+    }
+
+    /// Trilinear between the centres of voxels; beyond the outermost ones their dose.
+    pub fn at_gy(&self, point_m: [f64; 3]) -> f64 {
+        let mut low = [0; 3];
+        let mut share = [0.0; 3];
+        for a in 0..3 {
+            let most = (self.dims[a] - 1) as f64;
+            let x = ((point_m[a] - self.origin_m[a]) / self.spacing_m[a]).clamp(0.0, most);
+            low[a] = (x as usize).min(self.dims[a].saturating_sub(2));
+            share[a] = x - low[a] as f64;
+        }
+        let step = [1, self.dims[0], self.dims[0] * self.dims[1]];
+        let first = low[0] + low[1] * step[1] + low[2] * step[2];
+        let up = [0, 1, 2].map(|a| if self.dims[a] > 1 { step[a] } else { 0 });
+        let along = |from: usize| {
+            let (a, b) = (self.dose_gy[from], self.dose_gy[from + up[0]]);
+            a + share[0] * (b - a)
+        };
+        let plane = |from: usize| {
+            let (a, b) = (along(from), along(from + up[1]));
+            a + share[1] * (b - a)
+        };
+        let (a, b) = (plane(first), plane(first + up[2]));
+        a + share[2] * (b - a)
+    }
+}
+
+fn next([i, j, k]: [usize; 3], nx: usize, ny: usize) -> [usize; 3] {
+    if i + 1 < nx {
+        [i + 1, j, k]
+    } else if j + 1 < ny {
+        [0, j + 1, k]
+    } else {
+        [0, 0, k + 1]
+    }
+}
