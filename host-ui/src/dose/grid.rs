@@ -113,29 +113,68 @@ impl DoseGrid {
         });
     }
 
-    /// Trilinear between the centres of voxels; beyond the outermost ones their dose.
+    /// Cubic between the centres of voxels (Lagrange, four along each axis), but never beyond the doses of the eight around; outside
+    /// the outermost centres their dose.
+    ///
+    /// Straight lines would cut the tops off: 0.2 % of a volume at voxels of 1 mm.
     pub fn at_gy(&self, point_m: [f64; 3]) -> f64 {
-        let mut low = [0; 3];
-        let mut share = [0.0; 3];
-        for a in 0..3 {
-            let most = (self.dims[a] - 1) as f64;
-            let x = ((point_m[a] - self.origin_m[a]) / self.spacing_m[a]).clamp(0.0, most);
-            low[a] = (x as usize).min(self.dims[a].saturating_sub(2));
-            share[a] = x - low[a] as f64;
+        let [x, y, z] = [0, 1, 2].map(|a| Taps::new((point_m[a] - self.origin_m[a]) / self.spacing_m[a], self.dims[a]));
+        let [nx, ny, _] = self.dims;
+        let (mut sum, mut lowest, mut highest) = (0.0, f64::INFINITY, f64::NEG_INFINITY);
+        for k in 0..z.count {
+            let mut plane = 0.0;
+            for j in 0..y.count {
+                let first = ((z.first + k) * ny + y.first + j) * nx + x.first;
+                let row = &self.dose_gy[first..first + x.count];
+                plane += y.weights[j] * row.iter().zip(x.weights).map(|(d, w)| d * w).sum::<f64>();
+                if z.is_next(k) && y.is_next(j) {
+                    for (_, dose) in row.iter().enumerate().filter(|(i, _)| x.is_next(*i)) {
+                        lowest = dose.min(lowest);
+                        highest = dose.max(highest);
+                    }
+                }
+            }
+            sum += z.weights[k] * plane;
         }
-        let step = [1, self.dims[0], self.dims[0] * self.dims[1]];
-        let first = low[0] + low[1] * step[1] + low[2] * step[2];
-        let up = [0, 1, 2].map(|a| if self.dims[a] > 1 { step[a] } else { 0 });
-        let along = |from: usize| {
-            let (a, b) = (self.dose_gy[from], self.dose_gy[from + up[0]]);
-            a + share[0] * (b - a)
-        };
-        let plane = |from: usize| {
-            let (a, b) = (along(from), along(from + up[1]));
-            a + share[1] * (b - a)
-        };
-        let (a, b) = (plane(first), plane(first + up[2]));
-        a + share[2] * (b - a)
+        sum.max(lowest).min(highest)
+    }
+}
+
+/// The voxels along one axis that a place is read from.
+struct Taps {
+    first: usize,
+    count: usize,
+    weights: [f64; 4],
+    /// Which of them lies before the place.
+    before: usize,
+}
+
+impl Taps {
+    fn new(at: f64, voxels: usize) -> Self {
+        let at = at.clamp(0.0, (voxels - 1) as f64);
+        let low = (at as usize).min(voxels.saturating_sub(2));
+        if voxels < 4 {
+            let share = at - low as f64;
+            return Self {
+                first: low,
+                count: voxels.min(2),
+                weights: [1.0 - share, share, 0.0, 0.0],
+                before: 0,
+            };
+        }
+        let first = low.saturating_sub(1).min(voxels - 4);
+        let u = at - first as f64;
+        let (a, b, c, d) = (u, u - 1.0, u - 2.0, u - 3.0);
+        Self {
+            first,
+            count: 4,
+            weights: [-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0],
+            before: low - first,
+        }
+    }
+
+    fn is_next(&self, tap: usize) -> bool {
+        tap == self.before || tap == self.before + 1
     }
 }
 

@@ -1,9 +1,9 @@
 //! Dose of seeds at many points: TG-43 once into a table over distance and angle, then four entries of it for each point.
 //!
-//! The table holds dose times r², which varies slowly: over r² in steps of 1/32 of an octave (taken from the bits of the
-//! number) and over the angle in degrees. Nearer than [`DoseKernel::near_m`] and farther than 0.25 m the formulae themselves
-//! are used. What a seed gives to a point is rounded to 2^-20 Gy; sums of such numbers are exact, so that the order of seeds does
-//! not matter and a seed that is taken away leaves no trace.
+//! The table holds dose times r², which varies slowly, every eighth of a millimetre and every degree; the radii and angles at which
+//! TG-43 tables bend are among them. Nearer than [`DoseKernel::near_m`] and farther than 0.15 m the formulae themselves are used.
+//! What a seed gives to a point is rounded to 2^-30 Gy; sums of such numbers are exact, so that the order of seeds does not matter
+//! and a seed that is taken away leaves no trace.
 
 use super::Seed;
 use super::decay::Interval;
@@ -13,29 +13,26 @@ use rayon::prelude::*;
 
 /// Points that are worked on together; they stay in the first cache.
 pub const BLOCK: usize = 64;
-const STEPS_LOG2: u32 = 5;
-/// Bits of a single-precision number below those that choose the row.
-const FRACTION_BITS: u32 = f32::MANTISSA_DIGITS - 1 - STEPS_LOG2;
-const COLUMNS: usize = 181;
-const FARTHEST_M: f64 = 0.25;
-/// The line source's field has no sharp feature farther away than this many half lengths.
-const NEAR_HALF_LENGTHS: f64 = 1.6;
-/// Adding and taking away 12 rounds a number below 4 to 2^-20, the last place of numbers from 8 to 16, and larger ones to a multiple of it.
-const ROUNDER_GY: f32 = 12.0;
+const STEPS_PER_M: f64 = 8000.0;
+const FARTHEST_M: f64 = 0.15;
+/// Beyond this many half lengths of the capsule the field times r² is nearly a straight line between two rows.
+const NEAR_HALF_LENGTHS: f64 = 2.2;
+/// Adding and taking away 3 * 2^-8 rounds a number below 2^-8 to 2^-30, its own last place, and larger ones to a multiple of that.
+const ROUNDER_GY: f32 = 3.0 / 256.0;
 
 /// Dose of a seed of 1 U over an interval.
 #[derive(Clone, Debug)]
 pub struct DoseKernel {
     tables: Tables,
     equivalent_s: f64,
-    /// Dose times r² (Gy m² for 1 U), rows over r², columns over the angle.
+    /// Dose times r² (Gy m² for 1 U), rows over r, columns over the angle.
     one_d: Vec<f32>,
     two_d: Vec<f32>,
-    /// Bits of r² of the first row.
-    first_bits: u32,
-    last_bits: u32,
-    /// Whether angles above 90 deg are other than those below.
-    two_ends: bool,
+    /// Number of the first row, in steps from the middle of the seed.
+    first_row: usize,
+    rows: usize,
+    /// One for each degree: 91, or 181 where the ends of the seed differ.
+    columns: usize,
 }
 
 /// A seed in the frame of the points it is added to.
@@ -66,41 +63,38 @@ impl DoseKernel {
     pub fn new(source: &Source, interval: Interval) -> Self {
         let tables = source.tables.clone();
         let half_length_m = tables.capsule.half_length_m.max(tables.active_length_m / 2.0);
-        let near_m = (NEAR_HALF_LENGTHS * half_length_m).max(3.0 * tables.capsule.radius_m);
-        let row_of = |r_m: f64| ((r_m * r_m) as f32).to_bits() >> FRACTION_BITS;
-        let (first, last) = (row_of(near_m) + 1, row_of(FARTHEST_M));
+        let near_m = (NEAR_HALF_LENGTHS * half_length_m).max(10.0 * tables.capsule.radius_m);
+        let first_row = (near_m * STEPS_PER_M).ceil() as usize;
+        let f = tables.anisotropy_2d.as_ref();
+        let two_ends = f.is_some_and(|f| f.columns_at.last() > Some(&90.0));
         let mut kernel = Self {
             equivalent_s: interval.equivalent_s(source.half_life_s),
             one_d: Vec::new(),
             two_d: Vec::new(),
-            first_bits: first << FRACTION_BITS,
-            last_bits: last << FRACTION_BITS,
-            two_ends: tables
-                .anisotropy_2d
-                .as_ref()
-                .is_some_and(|f| f.columns_at.last() > Some(&90.0)),
+            first_row,
+            rows: ((FARTHEST_M * STEPS_PER_M) as usize).max(first_row) + 2 - first_row,
+            columns: if two_ends { 181 } else { 91 },
             tables,
         };
-        kernel.one_d = kernel.table(first..=last, Formalism::OneD);
-        kernel.two_d = kernel.table(first..=last, Formalism::TwoD);
+        kernel.one_d = kernel.table(Formalism::OneD);
+        kernel.two_d = kernel.table(Formalism::TwoD);
         kernel
     }
 
-    fn table(&self, rows: std::ops::RangeInclusive<u32>, formalism: Formalism) -> Vec<f32> {
-        let of_row = |row: u32| {
-            let square_m2 = f64::from(f32::from_bits(row << FRACTION_BITS));
-            let r_m = square_m2.sqrt();
-            (0..COLUMNS).map(move |degree| {
+    fn table(&self, formalism: Formalism) -> Vec<f32> {
+        let of_row = |row: usize| {
+            let r_m = (self.first_row + row) as f64 / STEPS_PER_M;
+            (0..self.columns).map(move |degree| {
                 let (across, along) = (degree as f64).to_radians().sin_cos();
-                (self.exact_gy(formalism, r_m * across, r_m * along) * square_m2) as f32
+                (self.exact_gy(formalism, r_m * across, r_m * along) * r_m * r_m) as f32
             })
         };
-        rows.into_par_iter().flat_map_iter(of_row).collect()
+        (0..self.rows).into_par_iter().flat_map_iter(of_row).collect()
     }
 
     /// Points nearer than this to the middle of a seed get the formulae (m).
     pub fn near_m(&self) -> f64 {
-        f64::from(f32::from_bits(self.first_bits)).sqrt()
+        self.first_row as f64 / STEPS_PER_M
     }
 
     /// Dose of 1 U by the formulae, for a point beside and along the axis.
@@ -157,7 +151,11 @@ impl DoseKernel {
     /// Cell and weights of each point; whether a point lies outside the table.
     fn prepare(&self, seed: &Placed, points: &Block, work: &mut Work) -> bool {
         let (p, axis) = (seed.position_m, seed.axis);
-        let (first, last) = (self.first_bits as i32, self.last_bits as i32);
+        let bounds = self.squares();
+        let first_row = self.first_row as f32;
+        let last_row = (self.rows - 2) as f32;
+        let last_column = (self.columns - 2) as f32;
+        let two_ends = self.columns > 91;
         let mut outside = false;
         for i in 0..BLOCK {
             let (x, y, z) = (points.x_m[i] - p[0], points.y_m[i] - p[1], points.z_m[i] - p[2]);
@@ -170,32 +168,38 @@ impl DoseKernel {
                 x * axis[1] - y * axis[0],
             ];
             let across_square = cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2];
-            // As signed numbers, bits of numbers above 0 have the order of the numbers.
-            let bits = square.to_bits() as i32;
-            outside |= bits < first || bits >= last;
-            let bits = bits.max(first).min(last - 1);
-            let inverse = 1.0 / f32::from_bits(bits as u32);
-            let cosine = (along.abs() * inverse.sqrt()).min(1.0);
-            let deg = angle_deg(cosine, across_square * inverse);
-            let deg = if self.two_ends && along < 0.0 { 180.0 - deg } else { deg };
-            // A whole number below 2^23 stands in the last bits of itself plus 2^23.
-            let column = ((deg - 0.5) + TWO_TO_23).max(TWO_TO_23).min(TWO_TO_23 + LAST_COLUMN);
-            work.angle_share[i] = deg - (column - TWO_TO_23);
-            work.square_share[i] = (bits & FRACTION_MASK) as f32 * (1.0 / (FRACTION_MASK + 1) as f32);
-            let row = (bits - first) >> FRACTION_BITS;
-            work.cell[i] = (row * COLUMNS as i32 + (column.to_bits() & 0xff) as i32) as u32;
+            outside |= square < bounds[0] || square >= bounds[1];
+            let square = square.max(bounds[0]).min(bounds[1]);
+            let inverse = 1.0 / square;
+            let r = square.sqrt();
+            let cosine = (along.abs() * r * inverse).min(1.0);
+            let deg = angle_deg(cosine, (across_square * inverse).min(1.0));
+            let deg = if two_ends && along < 0.0 { 180.0 - deg } else { deg };
+            let row_at = r * STEPS_PER_M as f32 - first_row;
+            let (row, column) = (whole(row_at, last_row), whole(deg, last_column));
+            work.row_share[i] = row_at - (row - TWO_TO_23);
+            work.column_share[i] = deg - (column - TWO_TO_23);
+            work.row[i] = row.to_bits() & MANTISSA;
+            work.column[i] = column.to_bits() & MANTISSA;
             work.scale[i] = seed.strength_u * inverse;
         }
         outside
     }
 
+    /// Squares of the distances (m²) between which the table is used.
+    fn squares(&self) -> [f32; 2] {
+        let square = |row: usize| (row as f64 / STEPS_PER_M).powi(2) as f32;
+        [square(self.first_row), square(self.first_row + self.rows - 1)]
+    }
+
     fn look_up(&self, table: &[f32], work: &mut Work) {
+        let columns = self.columns;
         for i in 0..BLOCK {
-            let cell = work.cell[i] as usize;
-            let around = &table[cell..cell + COLUMNS + 2];
-            let (across, down) = (work.angle_share[i], work.square_share[i]);
-            let near = around[0] + across * (around[1] - around[0]);
-            let far = around[COLUMNS] + across * (around[COLUMNS + 1] - around[COLUMNS]);
+            let cell = work.row[i] as usize * columns + work.column[i] as usize;
+            let (near, far) = (&table[cell..cell + 2], &table[cell + columns..cell + columns + 2]);
+            let (across, down) = (work.column_share[i], work.row_share[i]);
+            let near = near[0] + across * (near[1] - near[0]);
+            let far = far[0] + across * (far[1] - far[0]);
             work.gy[i] = (near + down * (far - near)) * work.scale[i];
         }
     }
@@ -203,10 +207,12 @@ impl DoseKernel {
     #[cold]
     fn replace_by_exact(&self, seed: &Placed, points: &Block, work: &mut Work) {
         let p = seed.position_m;
+        let [nearest, farthest] = self.squares().map(f64::from);
         for i in 0..BLOCK {
             let d = [points.x_m[i] - p[0], points.y_m[i] - p[1], points.z_m[i] - p[2]].map(f64::from);
             let square: f64 = d.iter().map(|d| d * d).sum();
-            if (self.first_bits..self.last_bits).contains(&(square as f32).to_bits()) {
+            // Rounding may put a point on the other side here than in `prepare`; both ways are right there.
+            if (nearest..farthest).contains(&square) {
                 continue;
             }
             let along: f64 = d.iter().zip(seed.axis).map(|(d, a)| d * f64::from(a)).sum();
@@ -217,14 +223,21 @@ impl DoseKernel {
 }
 
 const TWO_TO_23: f32 = 8_388_608.0;
-const LAST_COLUMN: f32 = (COLUMNS - 2) as f32;
-const FRACTION_MASK: i32 = (1 << FRACTION_BITS) - 1;
+const MANTISSA: u32 = 0x007f_ffff;
+
+/// The whole part of a number from 0, at most `most`, plus 2^23: then it stands in the last bits.
+///
+/// A whole number itself may come out one less; the share that is left is 1 then, which means the same place.
+fn whole(value: f32, most: f32) -> f32 {
+    ((value - 0.5) + TWO_TO_23).max(TWO_TO_23).min(TWO_TO_23 + most)
+}
 
 /// Where the points of a block lie in the table.
 struct Work {
-    cell: [u32; BLOCK],
-    angle_share: [f32; BLOCK],
-    square_share: [f32; BLOCK],
+    row: [u32; BLOCK],
+    column: [u32; BLOCK],
+    row_share: [f32; BLOCK],
+    column_share: [f32; BLOCK],
     /// Strength over r².
     scale: [f32; BLOCK],
     gy: [f32; BLOCK],
@@ -232,9 +245,10 @@ struct Work {
 
 impl Work {
     const EMPTY: Self = Self {
-        cell: [0; BLOCK],
-        angle_share: [0.0; BLOCK],
-        square_share: [0.0; BLOCK],
+        row: [0; BLOCK],
+        column: [0; BLOCK],
+        row_share: [0.0; BLOCK],
+        column_share: [0.0; BLOCK],
         scale: [0.0; BLOCK],
         gy: [0.0; BLOCK],
     };
