@@ -174,7 +174,6 @@ impl PerturbArgs {
         within("--sigma-mm", self.sigma_mm, 0.0, 100.0)?;
         let (source, kernel, plan) = c.load(&self.plan)?;
         let judge = c.judge(&self.structures, &source, &plan, POINTS_FOR_A_TRIAL)?;
-        write::folder(&c.out)?;
         let how = perturb::Perturbation {
             sigma_m: self.sigma_mm * 1e-3,
             trials: self.trials as usize,
@@ -185,6 +184,7 @@ impl PerturbArgs {
         signal_hook::flag::register_conditional_shutdown(signal_hook::consts::SIGINT, 130, Arc::clone(&stop))
             .and_then(|_| signal_hook::flag::register(signal_hook::consts::SIGINT, Arc::clone(&stop)))
             .map_err(|e| format!("Ctrl-C cannot be caught ({e})"))?;
+        write::folder(&c.out)?;
         let planned = judge.values(&judge.judge(&kernel, &plan));
         let bar = indicatif::ProgressBar::new(self.trials).with_style(
             indicatif::ProgressStyle::with_template("{bar:40} {pos}/{len} trials, {eta} left")

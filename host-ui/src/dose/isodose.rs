@@ -3,6 +3,7 @@
 use super::DoseGrid;
 use fast_surface_nets::ndshape::{RuntimeShape, Shape};
 use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
+use rayon::prelude::*;
 
 /// A surface in the frame of the grid (m), normals outwards by the order of the corners.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -30,12 +31,11 @@ pub fn isodose(grid: &DoseGrid, level_gy: f64) -> Isodose {
     surface_nets(&field, &shape, [0; 3], dims.map(|d| d - 1), &mut buffer);
     let (origin, spacing) = (grid.centre_m([0; 3]), grid.spacing_m());
     let place = |p: &[f32; 3]| [0, 1, 2].map(|a| origin[a] + (f64::from(p[a]) - 1.0) * spacing[a]);
-    let strides = [1, dims[0] as usize, (dims[0] * dims[1]) as usize];
     Isodose {
         points_m: buffer
             .positions
-            .iter()
-            .map(|p| place(&onto_surface(&field, strides, *p)))
+            .par_iter()
+            .map(|p| onto_surface(grid, level_gy, place(p)))
             .collect(),
         triangles: buffer
             .indices
@@ -45,33 +45,40 @@ pub fn isodose(grid: &DoseGrid, level_gy: f64) -> Isodose {
     }
 }
 
-/// A net's points lie within the surface where it is curved; one step of Newton's method puts them onto it.
-fn onto_surface(field: &[f32], strides: [usize; 3], p: [f32; 3]) -> [f32; 3] {
-    let low = p.map(|v| v.floor());
-    let t = [0, 1, 2].map(|a| p[a] - low[a]);
-    let first: usize = (0..3).map(|a| low[a] as usize * strides[a]).sum();
-    let (mut value, mut slope) = (0.0, [0.0; 3]);
-    for corner in 0..8 {
-        let up = [corner & 1, corner >> 1 & 1, corner >> 2];
-        let at = field[first + (0..3).map(|a| up[a] * strides[a]).sum::<usize>()];
-        if at.abs() >= NOTHING {
-            // At a face of the grid the surface follows the face.
+/// A net's points lie within the surface where it is curved; Newton's method puts them onto it.
+fn onto_surface(grid: &DoseGrid, level_gy: f64, start_m: [f64; 3]) -> [f64; 3] {
+    let spacing = grid.spacing_m();
+    let (low, high) = (grid.centre_m([0; 3]), grid.centre_m(grid.dims().map(|d| d - 1)));
+    let mut p = start_m;
+    for _ in 0..NEWTON_STEPS {
+        if (0..3).any(|a| p[a] < low[a] || p[a] > high[a]) {
+            // Along a face of the grid the surface follows the face.
+            return start_m;
+        }
+        let above = |p: [f64; 3]| (grid.at_gy(p) / level_gy).max(f64::MIN_POSITIVE).ln();
+        let slope_per_voxel = [0, 1, 2].map(|a| {
+            let beside = |voxels: f64| {
+                let mut q = p;
+                q[a] += voxels * spacing[a];
+                above(q)
+            };
+            (beside(PROBE) - beside(-PROBE)) / (2.0 * PROBE)
+        });
+        let square: f64 = slope_per_voxel.iter().map(|s| s * s).sum();
+        let value = above(p);
+        if square < 1e-12 {
             return p;
         }
-        let weight = |a: usize| if up[a] == 1 { t[a] } else { 1.0 - t[a] };
-        value += at * weight(0) * weight(1) * weight(2);
         for a in 0..3 {
-            let sign = if up[a] == 1 { 1.0 } else { -1.0 };
-            slope[a] += at * sign * weight((a + 1) % 3) * weight((a + 2) % 3);
+            p[a] -= (value * slope_per_voxel[a] / square).clamp(-0.5, 0.5) * spacing[a];
         }
     }
-    let square: f32 = slope.iter().map(|s| s * s).sum();
-    if square == 0.0 {
-        return p;
-    }
-    // Not out of the neighbourhood where the slope means something.
-    [0, 1, 2].map(|a| p[a] - (value * slope[a] / square).clamp(-0.5, 0.5))
+    p
 }
+
+const NEWTON_STEPS: usize = 2;
+/// Voxels to either side from which the slope is taken.
+const PROBE: f64 = 0.25;
 
 /// Logarithm of the level over the dose where there is no dose.
 const NOTHING: f32 = 50.0;
