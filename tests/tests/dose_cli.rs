@@ -7,7 +7,7 @@ use stylet_tests::{program, scratch};
 
 /// A gland, a urethra and a rectum in voxels of 1.0 x 0.9 x 2.5 mm under an oblique affine, and 40 seeds along tilted needles;
 /// prints volume, D90, V100, V150 of the gland, D30 of the urethra, D2cc of the rectum, from 27 points in each voxel.
-const WRITE_CASE: &str = r#"
+const WRITE_CASE: &str = r##"
 import sys, math, tomllib, numpy as np, nibabel as nib
 volume, seeds_file, source_file = sys.argv[1:4]
 shape, zooms = (64, 70, 30), np.array([1.0, 0.9, 2.5])
@@ -59,7 +59,7 @@ def doses(label):
     return np.sort(np.concatenate(parts))[::-1], len(at) * zooms.prod() / 1000
 d, cc = doses(1); u, _ = doses(2); w, wcc = doses(3)
 print(cc, d[int(0.9 * len(d))], (d >= 145).mean() * 100, (d >= 217.5).mean() * 100, u[int(0.3 * len(u))], w[int(2 / wcc * len(w))])
-"#;
+"##;
 
 struct Case {
     folder: PathBuf,
@@ -112,7 +112,11 @@ fn metrics_of_a_plan_agree_with_numpy() {
     let case = case("dose-case");
     let out = case.folder.join("dose");
     let mut command = host(
-        &[&["dose", "--strength-u", "0.5", "--metric", "D2cc", "--metric", "V145Gy"], NAMES.as_slice()].concat(),
+        &[
+            &["dose", "--strength-u", "0.5", "--metric", "D2cc", "--metric", "V145Gy"],
+            NAMES.as_slice(),
+        ]
+        .concat(),
         &[
             ("--source", source()),
             ("--seeds", case.folder.join("seeds.csv")),
@@ -125,7 +129,9 @@ fn metrics_of_a_plan_agree_with_numpy() {
     println!("{}", String::from_utf8_lossy(&ended.stdout));
     let result = json(&out.join("metrics.json"));
     let of = |i: usize, name: &str, unit: &str| {
-        result["structures"][i]["metrics"][name][unit].as_f64().unwrap_or_else(|| panic!("{name} of {i}: {result:#}"))
+        result["structures"][i]["metrics"][name][unit]
+            .as_f64()
+            .unwrap_or_else(|| panic!("{name} of {i}: {result:#}"))
     };
     let [cc, d90, v100, v150, d30, d2cc] = case.expected;
     println!("numpy: {:?}", case.expected);
@@ -137,18 +143,33 @@ fn metrics_of_a_plan_agree_with_numpy() {
     ] {
         assert!((found / expected - 1.0).abs() < 2e-3, "{what}: {found} and {expected}");
     }
-    for (what, found, expected) in [("V100", of(0, "V100", "percent"), v100), ("V150", of(0, "V150", "percent"), v150)] {
+    for (what, found, expected) in [
+        ("V100", of(0, "V100", "percent"), v100),
+        ("V150", of(0, "V150", "percent"), v150),
+    ] {
         assert!((found - expected).abs() < 0.2, "{what}: {found} and {expected}");
     }
     assert_eq!(of(0, "V100", "cc"), of(0, "V145Gy", "cc"));
     assert_eq!(result["target"]["name"], "Prostate");
-    let fit = |key: &str| result["target"][key].as_f64().unwrap_or_else(|| panic!("{key}: {result:#}"));
+    let fit = |key: &str| {
+        result["target"][key]
+            .as_f64()
+            .unwrap_or_else(|| panic!("{key}: {result:#}"))
+    };
     assert!((fit("homogeneity") - (1.0 - v150 / v100)).abs() < 5e-3);
     // COIN from its definition; the volume at the prescription lies in and around the gland.
     let share = v100 / 100.0;
     let coin = share * share * cc / fit("volume_at_prescription_cc");
-    assert!((fit("conformity") - coin).abs() < 5e-3, "{} and {coin}", fit("conformity"));
-    assert!(std::fs::read_to_string(out.join("dvh.svg")).expect("a picture").contains("Prostate"));
+    assert!(
+        (fit("conformity") - coin).abs() < 5e-3,
+        "{} and {coin}",
+        fit("conformity")
+    );
+    assert!(
+        std::fs::read_to_string(out.join("dvh.svg"))
+            .expect("a picture")
+            .contains("Prostate")
+    );
     let dvh = std::fs::read_to_string(out.join("dvh.csv")).expect("a table");
     assert!(dvh.starts_with("structure,dose_from_gy,dose_to_gy,") && dvh.contains("\nRectum,"));
 }
@@ -160,7 +181,10 @@ fn dose_at_points_and_over_a_time_comes_as_csv() {
         std::fs::write(folder.join(name), text).expect("written");
         folder.join(name)
     };
-    let seeds = write("seeds.csv", "x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u\n1,2,3,0,0,2,2\n");
+    let seeds = write(
+        "seeds.csv",
+        "x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u\n1,2,3,0,0,2,2\n",
+    );
     let points = write("points.csv", "x_mm,y_mm,z_mm\n11,2,3\n");
     let dose = |more: &[&str]| {
         let files = [
@@ -174,7 +198,11 @@ fn dose_at_points_and_over_a_time_comes_as_csv() {
         let text = std::fs::read_to_string(folder.join("out/dose_points.csv")).expect("written");
         let line = text.lines().nth(1).expect("a point").to_owned();
         assert_eq!(text.lines().next(), Some("x_mm,y_mm,z_mm,dose_gy"));
-        line.split(',').nth(3).expect("a dose").parse::<f64>().expect("a number")
+        line.split(',')
+            .nth(3)
+            .expect("a dose")
+            .parse::<f64>()
+            .expect("a number")
     };
     let all = dose(&[]);
     assert!((all - 2.0 * 19.847).abs() < 2e-3, "{all}");
@@ -197,14 +225,18 @@ fn trials_are_the_same_on_any_number_of_threads_and_none_moves_without_an_error(
         let arguments = [&["perturb", "--strength-u", "0.5"], NAMES.as_slice(), more].concat();
         let ended = run(host(&arguments, &files).env("RAYON_NUM_THREADS", threads));
         assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
-        (std::fs::read(out.join("trials.csv")).expect("written"), json(&out.join("distribution.json")))
+        (
+            std::fs::read(out.join("trials.csv")).expect("written"),
+            json(&out.join("distribution.json")),
+        )
     };
     let (one, spread) = trials("1", &["--trials", "20", "--seed", "5"], "one");
     let (many, _) = trials("3", &["--trials", "20", "--seed", "5"], "many");
     assert!(one == many, "the number of threads shows in the trials");
     let (other, _) = trials("3", &["--trials", "20", "--seed", "6"], "other");
     assert!(one != other);
-    let of = |spread: &serde_json::Value, name: &str, key: &str| spread["measures"][name][key].as_f64().expect("a number");
+    let of =
+        |spread: &serde_json::Value, name: &str, key: &str| spread["measures"][name][key].as_f64().expect("a number");
     let d90 = "Prostate D90 [gy]";
     // Seeds that miss by 4 mm leave the gland colder, by less than a third.
     let loss = 1.0 - of(&spread, d90, "mean") / of(&spread, d90, "planned");
@@ -229,7 +261,10 @@ fn ctrl_c_ends_early_and_writes_what_was_done() {
         ("--out", out.clone()),
     ];
     let mut command = host(&["perturb", "--strength-u", "0.5", "--trials", "1000000"], &files);
-    let child = command.stdout(std::process::Stdio::piped()).spawn().expect("host-ui runs");
+    let child = command
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .expect("host-ui runs");
     // The folder is made when the work begins.
     while !out.exists() {
         std::thread::sleep(Duration::from_millis(20));
@@ -240,8 +275,13 @@ fn ctrl_c_ends_early_and_writes_what_was_done() {
     let ended = child.wait_with_output().expect("it ends");
     let said = String::from_utf8_lossy(&ended.stdout).into_owned();
     assert!(ended.status.success() && said.contains("stopped after"), "{said}");
-    let lines = std::fs::read_to_string(out.join("trials.csv")).expect("written").lines().count();
-    let trials = json(&out.join("distribution.json"))["trials"].as_u64().expect("a number");
+    let lines = std::fs::read_to_string(out.join("trials.csv"))
+        .expect("written")
+        .lines()
+        .count();
+    let trials = json(&out.join("distribution.json"))["trials"]
+        .as_u64()
+        .expect("a number");
     assert!(trials > 0 && lines as u64 == trials + 1);
 }
 
@@ -264,18 +304,54 @@ fn what_is_wrong_is_told_once_with_its_file_and_line() {
         ("x_mm,y_mm,z_mm,colour\n", &[], "\"colour\" is not known"),
         ("x_mm,y_mm,z_mm\n", &[], "no line beside its header"),
         ("x_mm,y_mm,z_mm\n1,2,3\n", &[], "line 2: no strength"),
-        ("# c\nx_mm,y_mm,z_mm,strength_u\n1,2,3,1\n\n1,oh,3,1\n", &[], "line 5: y_mm is \"oh\""),
-        ("x_mm,y_mm,z_mm,strength_u\n1,2,3\n", &[], "line 2: it has 3 fields and the header 4"),
+        (
+            "# c\nx_mm,y_mm,z_mm,strength_u\n1,2,3,1\n\n1,oh,3,1\n",
+            &[],
+            "line 5: y_mm is \"oh\"",
+        ),
+        (
+            "x_mm,y_mm,z_mm,strength_u\n1,2,3\n",
+            &[],
+            "line 2: it has 3 fields and the header 4",
+        ),
         ("x_mm,y_mm,z_mm,strength_u\n1,2,1e9,1\n", &[], "line 2: 1000000000 mm"),
         ("x_mm,y_mm,z_mm,strength_u\n1,2,nan,1\n", &[], "line 2: z_mm is \"nan\""),
-        ("x_mm,y_mm,z_mm,strength_u\n1,2,3,-1\n", &[], "line 2: a strength of -1 U"),
-        ("x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u\n1,2,3,0,0,0,1\n", &[], "line 2: the axis has the length 0"),
-        ("x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u\n1,2,3,0,,1,1\n", &[], "line 2: the axis is not complete"),
-        ("x_mm,y_mm,z_mm,strength_u,activity_mci\n1,2,3,1,1\n", &[], "line 2: both"),
+        (
+            "x_mm,y_mm,z_mm,strength_u\n1,2,3,-1\n",
+            &[],
+            "line 2: a strength of -1 U",
+        ),
+        (
+            "x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u\n1,2,3,0,0,0,1\n",
+            &[],
+            "line 2: the axis has the length 0",
+        ),
+        (
+            "x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u\n1,2,3,0,,1,1\n",
+            &[],
+            "line 2: the axis is not complete",
+        ),
+        (
+            "x_mm,y_mm,z_mm,strength_u,activity_mci\n1,2,3,1,1\n",
+            &[],
+            "line 2: both",
+        ),
         (good, &["--to-days", "-1"], "--to-days -1: give 0"),
-        (good, &["--structures", "/nowhere.nii", "--metric", "Q5"], "\"Q5\" is no metric"),
-        (good, &["--structures", "/nowhere.nii"], "/nowhere.nii: it cannot be opened"),
-        (good, &["--structures", "/nowhere.nii", "--name", "x=y"], "--name x=y: write LABEL=NAME"),
+        (
+            good,
+            &["--structures", "/nowhere.nii", "--metric", "Q5"],
+            "\"Q5\" is no metric",
+        ),
+        (
+            good,
+            &["--structures", "/nowhere.nii"],
+            "/nowhere.nii: it cannot be opened",
+        ),
+        (
+            good,
+            &["--structures", "/nowhere.nii", "--name", "x=y"],
+            "--name x=y: write LABEL=NAME",
+        ),
         (good, &["--points", "/nowhere.csv"], "/nowhere.csv: it cannot be opened"),
         (good, &["--spacing-mm", "0"], "--spacing-mm 0: give 0.05 to 100"),
     ] {
