@@ -92,9 +92,9 @@ fn structures() -> Vec<Structure> {
         Structure::of_region(name, &Ellipsoid { middle_m, half_m }, pitch_m)
     };
     vec![
-        body("Prostate", 0.0, [0.024, 0.019, 0.022], 0.5e-3),
-        body("Urethra", 0.004, [0.003, 0.003, 0.022], 0.3e-3),
-        body("Rectum", -0.027, [0.012, 0.006, 0.03], 0.5e-3),
+        body("Prostate", 0.0, [0.024, 0.019, 0.022], SPACING_M),
+        body("Urethra", 0.004, [0.003, 0.003, 0.022], 0.5e-3),
+        body("Rectum", -0.027, [0.012, 0.006, 0.03], SPACING_M),
     ]
 }
 

@@ -18,7 +18,7 @@ use std::sync::atomic::AtomicBool;
 
 mod write;
 
-const POINTS_FOR_DOSE: usize = 500_000;
+const POINTS_FOR_DOSE: usize = 300_000;
 const POINTS_FOR_A_TRIAL: usize = 40_000;
 /// The grid reaches this far beyond the outermost seeds.
 const GRID_MARGIN_M: f64 = 0.02;

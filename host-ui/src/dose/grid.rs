@@ -121,20 +121,29 @@ impl DoseGrid {
     pub fn at_gy(&self, point_m: [f64; 3]) -> f64 {
         let [x, y, z] = [0, 1, 2].map(|a| Taps::new((point_m[a] - self.origin_m[a]) / self.spacing_m[a], self.dims[a]));
         let [nx, ny, _] = self.dims;
-        let (mut sum, mut near, mut all) = (0.0, Range::NONE, Range::NONE);
+        let row = |k: usize, j: usize| {
+            let first = ((z.first + k) * ny + y.first + j) * nx + x.first;
+            &self.dose_gy[first..first + x.count]
+        };
+        let (mut sum, mut near) = (0.0, Range::NONE);
         for k in 0..z.count {
             let mut plane = 0.0;
             for j in 0..y.count {
-                let first = ((z.first + k) * ny + y.first + j) * nx + x.first;
-                let row = &self.dose_gy[first..first + x.count];
+                let row = row(k, j);
                 plane += y.weights[j] * row.iter().zip(x.weights).map(|(d, w)| d * w).sum::<f64>();
-                row.iter().for_each(|&d| all.take(d));
                 if z.is_next(k) && y.is_next(j) {
                     let next = &row[x.before..(x.before + 2).min(x.count)];
                     next.iter().for_each(|&d| near.take(d));
                 }
             }
             sum += z.weights[k] * plane;
+        }
+        if (near.low..=near.high).contains(&sum) {
+            return sum;
+        }
+        let mut all = Range::NONE;
+        for (k, j) in (0..z.count).flat_map(|k| (0..y.count).map(move |j| (k, j))) {
+            row(k, j).iter().for_each(|&d| all.take(d));
         }
         let swing = (all.high - all.low) / 8.0;
         sum.min(near.high + swing)

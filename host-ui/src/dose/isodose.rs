@@ -16,8 +16,8 @@ pub struct Isodose {
 ///
 /// Naive surface nets on the logarithm of the dose, which is nearly linear between voxels where the dose itself is not.
 pub fn isodose(grid: &DoseGrid, level_gy: f64) -> Isodose {
-    // One layer of nothing around the grid, so that the surface closes.
-    let dims = grid.dims().map(|d| d as u32 + 2);
+    // Nothing around the grid, so that the surface closes; the crate makes no faces in the last layer.
+    let dims = grid.dims().map(|d| d as u32 + 3);
     let shape = RuntimeShape::<u32, 3>::new(dims);
     let mut field = vec![NOTHING; shape.usize()];
     let [nx, ny, _] = grid.dims();

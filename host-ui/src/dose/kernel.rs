@@ -9,7 +9,10 @@ use super::Seed;
 use super::decay::Interval;
 use super::source::Source;
 use super::tg43::{Formalism, Tables};
+use lanes::{Layout, Line};
 use rayon::prelude::*;
+
+mod lanes;
 
 /// Points that are worked on together; they stay in the first cache.
 pub const BLOCK: usize = 64;
@@ -38,9 +41,7 @@ pub struct DoseKernel {
 /// A seed in the frame of the points it is added to.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed {
-    position_m: [f32; 3],
-    axis: [f32; 3],
-    strength_u: f32,
+    line: Line,
     formalism: Formalism,
 }
 
@@ -117,9 +118,11 @@ impl DoseKernel {
     /// A seed as [`DoseKernel::add`] takes it, for points given from `anchor_m`.
     pub fn place(seed: &Seed, anchor_m: [f64; 3]) -> Placed {
         Placed {
-            position_m: [0, 1, 2].map(|a| (seed.position_m[a] - anchor_m[a]) as f32),
-            axis: seed.axis.unwrap_or([0.0, 0.0, 1.0]).map(|c| c as f32),
-            strength_u: seed.strength_u as f32,
+            line: Line {
+                position_m: [0, 1, 2].map(|a| (seed.position_m[a] - anchor_m[a]) as f32),
+                axis: seed.axis.unwrap_or([0.0, 0.0, 1.0]).map(|c| c as f32),
+                strength_u: seed.strength_u as f32,
+            },
             formalism: if seed.axis.is_some() {
                 Formalism::TwoD
             } else {
@@ -130,60 +133,26 @@ impl DoseKernel {
 
     /// Adds the dose of seeds to at most [`BLOCK`] points; `sign` is 1, or -1 to take the seeds away.
     pub fn add(&self, seeds: &[Placed], points: &Block, sign: f64, dose_gy: &mut [f64]) {
-        let mut work = Work::EMPTY;
+        let layout = Layout {
+            rows_per_m: STEPS_PER_M as f32,
+            first_row: self.first_row as f32,
+            rows: self.rows,
+            columns: self.columns,
+            squares_m2: self.squares(),
+        };
+        let mut gy = [0.0; BLOCK];
         for seed in seeds {
             let table = match seed.formalism {
                 Formalism::OneD => &self.one_d,
                 Formalism::TwoD => &self.two_d,
             };
-            if self.prepare(seed, points, &mut work) {
-                self.look_up(table, &mut work);
-                self.replace_by_exact(seed, points, &mut work);
-            } else {
-                self.look_up(table, &mut work);
+            if lanes::doses(table, &layout, &seed.line, points, &mut gy) {
+                self.replace_by_exact(seed, points, &mut gy);
             }
-            for (dose, gy) in dose_gy.iter_mut().zip(work.gy) {
+            for (dose, gy) in dose_gy.iter_mut().zip(gy) {
                 *dose += sign * f64::from((gy + ROUNDER_GY) - ROUNDER_GY);
             }
         }
-    }
-
-    /// Cell and weights of each point; whether a point lies outside the table.
-    fn prepare(&self, seed: &Placed, points: &Block, work: &mut Work) -> bool {
-        let (p, axis) = (seed.position_m, seed.axis);
-        let bounds = self.squares();
-        let first_row = self.first_row as f32;
-        let last_row = (self.rows - 2) as f32;
-        let last_column = (self.columns - 2) as f32;
-        let two_ends = self.columns > 91;
-        let mut outside = false;
-        for i in 0..BLOCK {
-            let (x, y, z) = (points.x_m[i] - p[0], points.y_m[i] - p[1], points.z_m[i] - p[2]);
-            let square = x * x + y * y + z * z;
-            let along = x * axis[0] + y * axis[1] + z * axis[2];
-            // Not from r² and `along`, which leave no digits near the axis.
-            let cross = [
-                y * axis[2] - z * axis[1],
-                z * axis[0] - x * axis[2],
-                x * axis[1] - y * axis[0],
-            ];
-            let across_square = cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2];
-            outside |= square < bounds[0] || square >= bounds[1];
-            let square = square.max(bounds[0]).min(bounds[1]);
-            let inverse = 1.0 / square;
-            let r = square.sqrt();
-            let cosine = (along.abs() * r * inverse).min(1.0);
-            let deg = angle_deg(cosine, (across_square * inverse).min(1.0));
-            let deg = if two_ends && along < 0.0 { 180.0 - deg } else { deg };
-            let row_at = r * STEPS_PER_M as f32 - first_row;
-            let (row, column) = (whole(row_at, last_row), whole(deg, last_column));
-            work.row_share[i] = row_at - (row - TWO_TO_23);
-            work.column_share[i] = deg - (column - TWO_TO_23);
-            work.row[i] = row.to_bits() & MANTISSA;
-            work.column[i] = column.to_bits() & MANTISSA;
-            work.scale[i] = seed.strength_u * inverse;
-        }
-        outside
     }
 
     /// Squares of the distances (m²) between which the table is used.
@@ -192,81 +161,20 @@ impl DoseKernel {
         [square(self.first_row), square(self.first_row + self.rows - 1)]
     }
 
-    fn look_up(&self, table: &[f32], work: &mut Work) {
-        let columns = self.columns;
-        for i in 0..BLOCK {
-            let cell = work.row[i] as usize * columns + work.column[i] as usize;
-            let (near, far) = (&table[cell..cell + 2], &table[cell + columns..cell + columns + 2]);
-            let (across, down) = (work.column_share[i], work.row_share[i]);
-            let near = near[0] + across * (near[1] - near[0]);
-            let far = far[0] + across * (far[1] - far[0]);
-            work.gy[i] = (near + down * (far - near)) * work.scale[i];
-        }
-    }
-
     #[cold]
-    fn replace_by_exact(&self, seed: &Placed, points: &Block, work: &mut Work) {
-        let p = seed.position_m;
+    fn replace_by_exact(&self, seed: &Placed, points: &Block, gy: &mut [f32; BLOCK]) {
+        let p = seed.line.position_m;
         let [nearest, farthest] = self.squares().map(f64::from);
         for i in 0..BLOCK {
             let d = [points.x_m[i] - p[0], points.y_m[i] - p[1], points.z_m[i] - p[2]].map(f64::from);
             let square: f64 = d.iter().map(|d| d * d).sum();
-            // Rounding may put a point on the other side here than in `prepare`; both ways are right there.
+            // Rounding may put a point on the other side here than in `doses`; both ways are right there.
             if (nearest..farthest).contains(&square) {
                 continue;
             }
-            let along: f64 = d.iter().zip(seed.axis).map(|(d, a)| d * f64::from(a)).sum();
+            let along: f64 = d.iter().zip(seed.line.axis).map(|(d, a)| d * f64::from(a)).sum();
             let across = (square - along * along).max(0.0).sqrt();
-            work.gy[i] = (self.exact_gy(seed.formalism, across, along) * f64::from(seed.strength_u)) as f32;
+            gy[i] = (self.exact_gy(seed.formalism, across, along) * f64::from(seed.line.strength_u)) as f32;
         }
     }
-}
-
-const TWO_TO_23: f32 = 8_388_608.0;
-const MANTISSA: u32 = 0x007f_ffff;
-
-/// The whole part of a number from 0, at most `most`, plus 2^23: then it stands in the last bits.
-///
-/// A whole number itself may come out one less; the share that is left is 1 then, which means the same place.
-fn whole(value: f32, most: f32) -> f32 {
-    ((value - 0.5) + TWO_TO_23).max(TWO_TO_23).min(TWO_TO_23 + most)
-}
-
-/// Where the points of a block lie in the table.
-struct Work {
-    row: [u32; BLOCK],
-    column: [u32; BLOCK],
-    row_share: [f32; BLOCK],
-    column_share: [f32; BLOCK],
-    /// Strength over r².
-    scale: [f32; BLOCK],
-    gy: [f32; BLOCK],
-}
-
-impl Work {
-    const EMPTY: Self = Self {
-        row: [0; BLOCK],
-        column: [0; BLOCK],
-        row_share: [0.0; BLOCK],
-        column_share: [0.0; BLOCK],
-        scale: [0.0; BLOCK],
-        gy: [0.0; BLOCK],
-    };
-}
-
-/// From the cosine (0 to 1) and the square of the sine; Abramowitz and Stegun 4.4.46, wrong by 2e-8 rad at most.
-fn angle_deg(cosine: f32, sine_square: f32) -> f32 {
-    const TERMS: [f32; 8] = [
-        -0.001_262_491_1,
-        0.006_670_09,
-        -0.017_088_126,
-        0.030_891_88,
-        -0.050_174_305,
-        0.088_978_99,
-        -0.214_598_8,
-        1.570_796_3,
-    ];
-    let polynomial = TERMS.iter().fold(0.0, |sum, term| sum * cosine + term);
-    // The root of 1 - cosine, with its digits.
-    (sine_square / (1.0 + cosine)).sqrt() * polynomial * (180.0 / std::f32::consts::PI)
 }
