@@ -4,7 +4,9 @@ use super::seed::Seed;
 use std::path::Path;
 
 const MAX_ROWS: usize = 1_000_000;
+const MAX_BYTES: u64 = 256 << 20;
 const MAX_PROBLEMS: usize = 8;
+const COMMENT: u8 = b'#';
 const MAX_MM: f64 = 10_000.0;
 const MAX_U: f64 = 1e5;
 const PLACE: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
@@ -107,41 +109,39 @@ fn strength_u(row: &Row, defaults: SeedDefaults) -> Result<f64, String> {
 
 fn read<T>(path: &Path, known: &[&str], parse: impl Fn(&Row) -> Result<T, String>) -> Result<Vec<T>, String> {
     let told = |why: String| format!("{}: {why}", path.display());
+    let opened = |e: std::io::Error| told(format!("it cannot be opened ({e}); check the path"));
+    let size = std::fs::metadata(path).map_err(opened)?.len();
+    if size > MAX_BYTES {
+        return Err(told(format!("it has {size} bytes, more than {MAX_BYTES}")));
+    }
+    let text = std::fs::read(path).map_err(opened)?;
+    let lines = record_lines(&text);
+    let line_of = |record: usize| lines.get(record).copied().unwrap_or(1);
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_path(path)
-        .map_err(|e| told(format!("it cannot be opened ({e}); check the path")))?;
+        .comment(Some(COMMENT))
+        .from_reader(text.as_slice());
     let columns: Vec<String> = reader
         .headers()
-        .map_err(|e| told(format!("its first line cannot be read ({e})")))?
+        .map_err(|e| told(format!("line {}: {}", line_of(0), field_count(&e))))?
         .iter()
         .map(|c| c.trim_start_matches('\u{feff}').to_ascii_lowercase())
         .collect();
-    let header_line = reader
-        .headers()
-        .ok()
-        .and_then(|h| h.position())
-        .map_or(1, csv::Position::line);
-    check_columns(&columns, known).map_err(|why| told(format!("line {header_line}: {why}")))?;
+    check_columns(&columns, known).map_err(|why| told(format!("line {}: {why}", line_of(0))))?;
     let (mut all, mut problems) = (Vec::new(), Vec::new());
     for (index, record) in reader.records().enumerate() {
         if index >= MAX_ROWS {
             return Err(told(format!("it has more than {MAX_ROWS} lines")));
         }
-        let found = record
-            .map_err(|e| (e.position().map(csv::Position::line), field_count(&e)))
-            .and_then(|record| {
-                let line = record.position().map(csv::Position::line);
-                let row = Row {
-                    columns: &columns,
-                    record: &record,
-                };
-                parse(&row).map_err(|why| (line, why))
-            });
+        let found = record.map_err(|e| field_count(&e)).and_then(|record| {
+            parse(&Row {
+                columns: &columns,
+                record: &record,
+            })
+        });
         match found {
             Ok(value) => all.push(value),
-            Err((line, why)) => problems.push(format!("line {}: {why}", line.unwrap_or(0))),
+            Err(why) => problems.push(format!("line {}: {why}", line_of(index + 1))),
         }
         if problems.len() == MAX_PROBLEMS {
             problems.push("and perhaps more".to_owned());
@@ -154,6 +154,13 @@ fn read<T>(path: &Path, known: &[&str], parse: impl Fn(&Row) -> Result<T, String
         1 => Err(told(problems.remove(0))),
         _ => Err(told(format!("\n  {}", problems.join("\n  ")))),
     }
+}
+
+/// Numbers of the lines that hold records: the crate's own count stops before the empty lines and comments that it skips.
+fn record_lines(text: &[u8]) -> Vec<usize> {
+    let lines = text.split(|&b| b == b'\n').zip(1..);
+    let records = lines.filter(|(line, _)| !matches!(line.first(), None | Some(&b'\r' | &COMMENT)));
+    records.map(|(_, number)| number).collect()
 }
 
 fn field_count(error: &csv::Error) -> String {
