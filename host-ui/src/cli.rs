@@ -1,5 +1,6 @@
 //! The command line of `host-ui`.
 
+use crate::dose::command::{DoseArgs, PerturbArgs};
 use crate::{app, files, procedure, record};
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
@@ -86,6 +87,10 @@ enum Task {
     /// Segmented volumes
     #[command(subcommand)]
     Scene(SceneTask),
+    /// Dose of seeds (TG-43U1) at points, in structures, or on a grid
+    Dose(DoseArgs),
+    /// What becomes of a plan's dose when every seed misses its place at random
+    Perturb(PerturbArgs),
 }
 
 #[derive(Subcommand, Debug)]
@@ -138,6 +143,8 @@ impl Cli {
             Some(Task::Flight { instance: name }) => {
                 record::save_flight(&instance(&name)?).map(|path| println!("written: {path}"))
             }
+            Some(Task::Dose(args)) => args.run(),
+            Some(Task::Perturb(args)) => args.run(),
             Some(Task::Procedure {
                 common,
                 out,

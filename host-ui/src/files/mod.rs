@@ -4,5 +4,6 @@ mod affine;
 pub mod nifti;
 mod volume;
 
-pub use nifti::{FileError, read};
-pub use volume::LabelVolume;
+pub use affine::VoxelFrame;
+pub use nifti::{FileError, read, read_voxels};
+pub use volume::{LabelVolume, Voxels};

@@ -27,17 +27,26 @@ impl std::error::Error for FileError {}
 
 /// The tissue of a label volume: every label but 0, or the one asked for.
 pub fn read(path: &Path, label: Option<u8>) -> Result<LabelVolume, FileError> {
-    let told = |why: String| FileError(format!("{}: {why}", path.display()));
+    let voxels = read_voxels(path)?;
+    let name = path
+        .file_name()
+        .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    LabelVolume::from_voxels(&voxels, label, name).map_err(|why| told(path, &why))
+}
+
+/// The labels as they lie in the file.
+pub fn read_voxels(path: &Path) -> Result<Voxels, FileError> {
+    let told = |why: String| told(path, &why);
     let (header, frame, dims) = read_header(path).map_err(told)?;
     // The crate has assertions of its own about what it reads.
     let labels = std::panic::catch_unwind(|| read_labels(path, &header, dims))
         .unwrap_or_else(|_| Err("its voxels could not be read; write the file again".to_owned()))
         .map_err(told)?;
-    let name = path
-        .file_name()
-        .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let voxels = Voxels { dims, labels, frame };
-    LabelVolume::from_voxels(&voxels, label, name).map_err(told)
+    Ok(Voxels { dims, labels, frame })
+}
+
+fn told(path: &Path, why: &str) -> FileError {
+    FileError(format!("{}: {why}", path.display()))
 }
 
 fn read_header(path: &Path) -> Result<(NiftiHeader, VoxelFrame, [usize; 3]), String> {

@@ -1,0 +1,77 @@
+//! Dose at points that lie anywhere.
+
+use super::kernel::{BLOCK, Block, DoseKernel, Placed};
+use super::seed::Seed;
+use rayon::prelude::*;
+
+/// Points with the dose they have got so far.
+#[derive(Clone, Debug)]
+pub struct DosePoints {
+    blocks: Vec<[[f32; BLOCK]; 3]>,
+    /// The middle of the points, from which single precision is fine enough.
+    anchor_m: [f64; 3],
+    dose_gy: Vec<f64>,
+}
+
+impl DosePoints {
+    pub fn new(points_m: &[[f64; 3]]) -> Self {
+        let count = points_m.len().max(1) as f64;
+        let anchor_m = [0, 1, 2].map(|a| points_m.iter().map(|p| p[a]).sum::<f64>() / count);
+        let of_block = |points: &[[f64; 3]]| {
+            let last = points.len() - 1;
+            [0, 1, 2].map(|a| std::array::from_fn(|i| (points[i.min(last)][a] - anchor_m[a]) as f32))
+        };
+        Self {
+            blocks: points_m.chunks(BLOCK).map(of_block).collect(),
+            anchor_m,
+            dose_gy: vec![0.0; points_m.len()],
+        }
+    }
+
+    /// In the order of the points.
+    pub fn dose_gy(&self) -> &[f64] {
+        &self.dose_gy
+    }
+
+    pub fn add(&mut self, kernel: &DoseKernel, seeds: &[Seed]) {
+        self.change(kernel, seeds, 1.0);
+    }
+
+    /// Undoes [`DosePoints::add`] to the last bit.
+    pub fn remove(&mut self, kernel: &DoseKernel, seeds: &[Seed]) {
+        self.change(kernel, seeds, -1.0);
+    }
+
+    fn change(&mut self, kernel: &DoseKernel, seeds: &[Seed], sign: f64) {
+        let placed = self.place(seeds);
+        Self::accumulate(&self.blocks, kernel, &placed, sign, &mut self.dose_gy);
+    }
+
+    fn accumulate(blocks: &[[[f32; BLOCK]; 3]], kernel: &DoseKernel, seeds: &[Placed], sign: f64, dose_gy: &mut [f64]) {
+        dose_gy
+            .par_chunks_mut(BLOCK)
+            .zip(blocks)
+            .with_min_len(16)
+            .for_each(|(dose, block)| kernel.add(seeds, &as_block(block), sign, dose));
+    }
+
+    /// Dose of these seeds alone.
+    pub fn of_seeds_gy(&self, kernel: &DoseKernel, seeds: &[Seed]) -> Vec<f64> {
+        let placed = self.place(seeds);
+        let mut dose_gy = vec![0.0; self.dose_gy.len()];
+        Self::accumulate(&self.blocks, kernel, &placed, 1.0, &mut dose_gy);
+        dose_gy
+    }
+
+    fn place(&self, seeds: &[Seed]) -> Vec<Placed> {
+        seeds.iter().map(|s| DoseKernel::place(s, self.anchor_m)).collect()
+    }
+}
+
+fn as_block(axes: &[[f32; BLOCK]; 3]) -> Block {
+    Block {
+        x_m: axes[0],
+        y_m: axes[1],
+        z_m: axes[2],
+    }
+}

@@ -1,0 +1,259 @@
+//! What a plan is judged by: the measures of each structure, homogeneity and conformity of the target.
+
+use super::Dvh;
+use super::kernel::DoseKernel;
+use super::metric::{Metric, Value};
+use super::points::DosePoints;
+use super::seed::Seed;
+use super::structure::{Structure, bounds};
+use serde_json::{Value as Json, json};
+
+/// Room around seeds and target in which the volume at the prescription is looked for.
+const MARGIN_M: f64 = 0.03;
+/// Parts of the names that people give to the target, in the order of preference.
+const TARGETS: [&str; 6] = ["ptv", "ctv", "prostate", "gland", "gtv", "target"];
+
+/// Structures, ready to be judged under any set of seeds.
+pub struct Judge {
+    structures: Vec<Judged>,
+    target: usize,
+    around: Around,
+    prescription_gy: f64,
+}
+
+struct Judged {
+    name: String,
+    metrics: Vec<Metric>,
+    points: DosePoints,
+    volumes_m3: Vec<f64>,
+}
+
+/// A box around everything: only there can a dose as high as the prescription be.
+struct Around {
+    points: DosePoints,
+    point_m3: f64,
+    /// Points next to a face of the box.
+    outermost: Vec<usize>,
+}
+
+/// How well the dose fits the target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fit {
+    /// Dose homogeneity index (V100 - V150) / V100 of the target (Wu, Ulin, Sternick, Med. Phys. 15, 104, 1988); `None` at V100 = 0.
+    pub homogeneity: Option<f64>,
+    /// COIN (Baltas et al., Int. J. Radiat. Oncol. 40, 515, 1998), product of the share of the target at the prescription
+    /// and the target's share of all that is; `None` where that volume leaves the box.
+    pub conformity: Option<f64>,
+    /// All that gets the prescription (m³).
+    pub at_prescription_m3: Option<f64>,
+}
+
+/// Everything known under one set of seeds.
+pub struct Verdict {
+    pub dvhs: Vec<Dvh>,
+    pub fit: Fit,
+}
+
+impl Judge {
+    /// `target` by name, or the structure that is called like one, or the first; `extra` metrics are asked of every structure.
+    pub fn new(
+        structures: Vec<Structure>,
+        target: Option<&str>,
+        extra: &[Metric],
+        prescription_gy: f64,
+        seeds: &[Seed],
+        most_points: usize,
+    ) -> Result<Self, String> {
+        let names: Vec<&str> = structures.iter().map(|s| s.name.as_str()).collect();
+        let target = choose_target(&names, target)?;
+        let mut corners: Vec<[f64; 3]> = seeds.iter().map(|s| s.position_m).collect();
+        corners.extend(<[[f64; 3]; 2]>::from(structures[target].bounds_m()));
+        let around = Around::new(&corners, most_points);
+        let structures = structures
+            .into_iter()
+            .enumerate()
+            .map(|(i, s)| Judged {
+                metrics: metrics(&s.name, i == target, extra),
+                points: DosePoints::new(&s.points_m),
+                volumes_m3: s.volumes_m3,
+                name: s.name,
+            })
+            .collect();
+        Ok(Self {
+            structures,
+            target,
+            around,
+            prescription_gy,
+        })
+    }
+
+    pub fn judge(&self, kernel: &DoseKernel, seeds: &[Seed]) -> Verdict {
+        let dvhs: Vec<Dvh> = self
+            .structures
+            .iter()
+            .filter_map(|s| Dvh::new(&s.points.of_seeds_gy(kernel, seeds), &s.volumes_m3))
+            .collect();
+        let fit = self.fit(&dvhs[self.target], kernel, seeds);
+        Verdict { dvhs, fit }
+    }
+
+    fn fit(&self, target: &Dvh, kernel: &DoseKernel, seeds: &[Seed]) -> Fit {
+        let (v100, v150) = (
+            target.at_least_m3(self.prescription_gy),
+            target.at_least_m3(1.5 * self.prescription_gy),
+        );
+        let dose = self.around.points.of_seeds_gy(kernel, seeds);
+        let reached = |d: &f64| *d >= self.prescription_gy;
+        let inside = !self.around.outermost.iter().any(|&i| reached(&dose[i]));
+        let at_prescription_m3 =
+            inside.then(|| dose.iter().filter(|d| reached(d)).count() as f64 * self.around.point_m3);
+        Fit {
+            homogeneity: (v100 > 0.0).then(|| (v100 - v150) / v100),
+            conformity: at_prescription_m3.map(|all| {
+                // The two volumes come from different points, which may leave a share just above 1.
+                let share = if all > 0.0 { (v100 / all).min(1.0) } else { 0.0 };
+                v100 / target.volume_m3() * share
+            }),
+            at_prescription_m3,
+        }
+    }
+
+    /// Name, unit and value of every measure, in an order that does not depend on the seeds.
+    pub fn values(&self, verdict: &Verdict) -> Vec<(String, Option<f64>)> {
+        let mut all = Vec::new();
+        for (s, dvh) in self.structures.iter().zip(&verdict.dvhs) {
+            for &m in &s.metrics {
+                all.push((
+                    format!("{} {m} [{}]", s.name, m.unit()),
+                    m.of(dvh, self.prescription_gy).main(),
+                ));
+            }
+        }
+        let name = &self.structures[self.target].name;
+        all.push((format!("{name} homogeneity [1]"), verdict.fit.homogeneity));
+        all.push((format!("{name} conformity [1]"), verdict.fit.conformity));
+        all
+    }
+
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.structures.iter().map(|s| s.name.as_str())
+    }
+
+    pub fn to_json(&self, verdict: &Verdict) -> Json {
+        let structures: Vec<Json> = self
+            .structures
+            .iter()
+            .zip(&verdict.dvhs)
+            .map(|(s, dvh)| {
+                let metrics: serde_json::Map<String, Json> = s
+                    .metrics
+                    .iter()
+                    .map(|&m| (m.to_string(), value_json(m.of(dvh, self.prescription_gy))))
+                    .collect();
+                json!({ "name": s.name, "volume_cc": dvh.volume_m3() * 1e6, "metrics": metrics })
+            })
+            .collect();
+        let fit = &verdict.fit;
+        json!({
+            "prescription_gy": self.prescription_gy,
+            "structures": structures,
+            "target": {
+                "name": self.structures[self.target].name,
+                "homogeneity": fit.homogeneity,
+                "homogeneity_is": "(V100 - V150) / V100, Wu, Ulin and Sternick 1988",
+                "conformity": fit.conformity,
+                "conformity_is": "COIN, Baltas et al. 1998; null where the prescription isodose leaves the box of 30 mm around target and seeds",
+                "volume_at_prescription_cc": fit.at_prescription_m3.map(|v| v * 1e6),
+            },
+        })
+    }
+
+    pub fn table(&self, verdict: &Verdict) -> String {
+        let mut text = String::new();
+        for (s, dvh) in self.structures.iter().zip(&verdict.dvhs) {
+            text += &format!("{} ({:.2} cc)\n", s.name, dvh.volume_m3() * 1e6);
+            for &m in &s.metrics {
+                text += &format!(
+                    "  {:<8} {}\n",
+                    m.to_string(),
+                    value_text(m.of(dvh, self.prescription_gy))
+                );
+            }
+        }
+        let number = |v: Option<f64>| v.map_or_else(|| "not defined".to_owned(), |v| format!("{v:.3}"));
+        text + &format!(
+            "homogeneity {}, conformity {} of {}\n",
+            number(verdict.fit.homogeneity),
+            number(verdict.fit.conformity),
+            self.structures[self.target].name
+        )
+    }
+}
+
+impl Around {
+    fn new(corners_m: &[[f64; 3]], most_points: usize) -> Self {
+        let (low, high) = bounds(corners_m);
+        let (low, high) = (low.map(|v| v - MARGIN_M), high.map(|v| v + MARGIN_M));
+        let volume: f64 = (0..3).map(|a| high[a] - low[a]).product();
+        let pitch = (volume / most_points as f64).cbrt();
+        let cells = Structure::of_box("around", low, high, pitch);
+        let at_face = |p: &[f64; 3]| (0..3).any(|a| p[a] < low[a] + pitch || p[a] > high[a] - pitch);
+        Self {
+            outermost: (0..cells.points_m.len())
+                .filter(|&i| at_face(&cells.points_m[i]))
+                .collect(),
+            point_m3: cells.volumes_m3[0],
+            points: DosePoints::new(&cells.points_m),
+        }
+    }
+}
+
+fn choose_target(names: &[&str], wanted: Option<&str>) -> Result<usize, String> {
+    if let Some(wanted) = wanted {
+        return names
+            .iter()
+            .position(|n| n.eq_ignore_ascii_case(wanted))
+            .ok_or_else(|| format!("no structure is called {wanted}; there are {}", names.join(", ")));
+    }
+    if names.is_empty() {
+        return Err("there is no structure: every voxel is 0".to_owned());
+    }
+    let called = |part: &&str| names.iter().position(|n| n.to_ascii_lowercase().contains(*part));
+    Ok(TARGETS.iter().find_map(called).unwrap_or(0))
+}
+
+/// What is usually reported of a structure of that name (AAPM TG-137, GEC-ESTRO), then what was asked for.
+fn metrics(name: &str, is_target: bool, extra: &[Metric]) -> Vec<Metric> {
+    use Metric::{DoseToShare, DoseToVolume, Mean, VolumeAtShare};
+    let (cc2, cc01) = (DoseToVolume { m3: 2e-6 }, DoseToVolume { m3: 0.1e-6 });
+    let lower = name.to_ascii_lowercase();
+    let mut all = match () {
+        () if is_target => vec![
+            DoseToShare(0.9),
+            VolumeAtShare(1.0),
+            VolumeAtShare(1.5),
+            VolumeAtShare(2.0),
+        ],
+        () if lower.contains("urethra") => vec![DoseToShare(0.1), DoseToShare(0.3)],
+        () if lower.contains("rectum") => vec![cc2, cc01],
+        () => vec![Mean, cc2, cc01],
+    };
+    all.extend(extra.iter().filter(|m| !all.contains(m)).copied().collect::<Vec<_>>());
+    all
+}
+
+fn value_json(value: Value) -> Json {
+    match value {
+        Value::Dose { gy, percent } => json!({ "gy": gy, "percent": percent }),
+        Value::Volume { cc, percent } => json!({ "cc": cc, "percent": percent }),
+        Value::TooSmall { cc } => json!({ "undefined": format!("the structure has only {cc:.3} cc") }),
+    }
+}
+
+fn value_text(value: Value) -> String {
+    match value {
+        Value::Dose { gy, percent } => format!("{gy:9.2} Gy  {percent:8.2} %"),
+        Value::Volume { cc, percent } => format!("{cc:9.3} cc  {percent:8.2} %"),
+        Value::TooSmall { cc } => format!("not defined: the structure has only {cc:.3} cc"),
+    }
+}
