@@ -104,7 +104,12 @@ pub fn at_gate(fault: Fault) -> ForceFault {
     match fault {
         Fault::None => ForceFault::Stopped,
         Fault::DeviceSilent => ForceFault::StaleDevice,
-        Fault::DeviceError | Fault::NonFiniteInput => ForceFault::DeviceFault,
+        Fault::DeviceError
+        | Fault::NonFiniteInput
+        | Fault::DeviceLost
+        | Fault::DeviceNotCalibrated
+        | Fault::DeviceWarm
+        | Fault::DeviceStopped => ForceFault::DeviceFault,
         Fault::NonFiniteForce => ForceFault::NonFiniteForce,
         Fault::TissueStale | Fault::TissueUnsolved => ForceFault::StaleTissue,
         Fault::OverrunStreak | Fault::LoopStopped => ForceFault::Overrun,
