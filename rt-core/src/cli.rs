@@ -7,6 +7,7 @@ use crate::lab::machine::{Machine, Throttle};
 use crate::lab::measure;
 use crate::replay::{self, cli::Replay};
 use crate::rt::arm;
+use crate::tissue::TissueKind;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -46,6 +47,12 @@ pub enum Task {
     },
     /// Show a flight recording, repeat it, and say whether every force and position is the same in every bit
     Replay(Replay),
+    /// Measure what each part of a scene costs in a tissue tick
+    Cost {
+        /// Built-in scene
+        #[arg(long, default_value = BUILTIN_SCENES[0], value_parser = scenes())]
+        scene: String,
+    },
     /// One process of a load; started by `latency`
     #[command(hide = true)]
     Load {
@@ -71,6 +78,9 @@ pub struct RunArgs {
     /// Folder of the flight recordings [default: $XDG_STATE_HOME/stylet/flights or ~/.local/state/stylet/flights]
     #[arg(long, value_name = "DIR")]
     flight_dir: Option<PathBuf>,
+    /// What computes the tissue
+    #[arg(long, value_enum, default_value_t)]
+    tissue: TissueKind,
     /// simulated, phantom (the driver's default device), phantom:NAME, or replay:FILE (from 'host-ui export --motion')
     #[arg(long, default_value = "simulated", value_name = "DEVICE")]
     device: DeviceChoice,
@@ -156,6 +166,7 @@ impl RunArgs {
     /// Lists what is wrong with the settings.
     pub fn options(&self) -> Result<Options, String> {
         let mut options = self.real_time.options(&self.instance)?;
+        options.tissue = self.tissue;
         options.device = self.device.clone();
         let from_environment = || std::env::var_os("STYLET_LIBHD").map(PathBuf::from);
         options.libhd = self.libhd.clone().or_else(from_environment);
@@ -238,6 +249,7 @@ impl RealTimeArgs {
                 haptic_period_ns: HAPTIC_PERIOD_NS,
                 spin_ns: 0,
                 flight_folder: replay::file::default_folder(),
+                tissue: TissueKind::default(),
                 device: DeviceChoice::Simulated,
                 libhd: None,
             }),

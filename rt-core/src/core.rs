@@ -17,6 +17,7 @@ use crate::rt::tissue::{TissueLoop, TissuePorts};
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use crate::scene::{Scene, SceneSource};
+use crate::tissue::TissueKind;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -49,6 +50,8 @@ pub struct Options {
     pub spin_ns: u64,
     /// Where flight recordings go.
     pub flight_folder: PathBuf,
+    /// Of every scene of the run.
+    pub tissue: TissueKind,
     pub device: DeviceChoice,
     /// The driver of a Phantom; `None` tries its usual names.
     pub libhd: Option<PathBuf>,
@@ -86,7 +89,8 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
 
 /// The same run, with a probe in each loop.
 pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool>) -> Result<RunReport, String> {
-    let scene = Scene::builtin(&options.scene).map_err(|e| e.to_string())?;
+    let mut scene = Scene::builtin(&options.scene).map_err(|e| e.to_string())?;
+    scene.tissue = options.tissue;
     let force_loop = Ask {
         priority: (!options.no_rt).then_some(options.haptic_priority),
         core: options.haptic_core,
@@ -106,7 +110,7 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
     let node = options.instance.node().map_err(|e| e.to_string())?;
     let ports =
         Ports::new(&node, scene.surface.vertex_elements.len(), picture.word_count()).map_err(|e| e.to_string())?;
-    let world = Box::new(World::new(scene, active.limits, 1));
+    let world = Box::new(World::new(scene, active.limits, 1)?);
     let source = Arc::new(SceneSource::Builtin(options.scene.clone()));
     let (tissue_flight, tissue_desk) = recorder(Box::new(TissueTape::new(&world, source)));
     let board = service::create_state_board(&node, session_id).map_err(|e| e.to_string())?;
@@ -264,7 +268,7 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
             flight_of(&info, session_id, options.haptic_period_ns),
         ),
     };
-    let mut bridge = Bridge::new(node, ports, loops, info, session, picture);
+    let mut bridge = Bridge::new(node, ports, loops, info, session, picture, options.tissue);
     // SYNC: set by a signal handler; nothing but the flag is carried.
     let served = bridge.run(|| stop.load(Ordering::Acquire));
     // SYNC: pairs with the acquire loads in both loops.

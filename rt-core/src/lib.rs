@@ -4,6 +4,7 @@ pub mod active;
 pub mod bridge;
 pub mod cli;
 pub mod core;
+pub mod cost;
 pub mod device;
 pub mod force;
 pub mod lab;

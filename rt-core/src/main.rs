@@ -4,6 +4,7 @@ use clap::Parser;
 use rt_core::cli::{Cli, RunArgs, Task};
 use rt_core::core::{LoopReport, RunReport};
 use rt_core::lab::{doctor, latency, load, verify};
+use rt_core::scene::Scene;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,6 +18,7 @@ fn main() -> ExitCode {
         Some(Task::Verify { report }) => verify::run(report),
         Some(Task::Doctor { json, haptic_core }) => Ok(doctor::run(*json, *haptic_core)),
         Some(Task::Replay(replay)) => replay.run().map(|same| u8::from(!same)),
+        Some(Task::Cost { scene }) => cost(scene).map(|()| 0),
         Some(Task::Load { work, instance, file }) => serve_as_load(*work, instance, file).map(|()| 0),
     };
     match ended {
@@ -47,6 +49,12 @@ fn serve_as_load(work: load::Work, instance: &str, file: &std::path::Path) -> Re
     let stop = stop_on_signal()?;
     // SYNC: set by a signal handler; nothing but the flag is carried.
     load::work(work, &instance, file, || stop.load(Ordering::Acquire))
+}
+
+fn cost(scene: &str) -> Result<(), String> {
+    let scene = Scene::builtin(scene).map_err(|e| e.to_string())?;
+    println!("{}", rt_core::cost::table(&scene)?);
+    Ok(())
 }
 
 fn run(args: &RunArgs) -> Result<(), String> {

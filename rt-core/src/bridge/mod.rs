@@ -14,6 +14,7 @@ use crate::rt::exchange::*;
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use crate::scene::{Scene, SceneSource};
+use crate::tissue::TissueKind;
 use flight::FlightDesk;
 use iceoryx2::node::Node;
 use picture::IDENTITY;
@@ -73,6 +74,8 @@ pub struct Bridge {
     plan: PlanInForce,
     /// The scene that runs, and the one handed to the tissue loop but not yet taken up.
     picture: ScenePicture,
+    /// The tissue model of every scene of the run.
+    tissue: TissueKind,
     picture_sent: bool,
     coming: Option<ScenePicture>,
     /// Who waits for what: host and command behind each ticket.
@@ -96,6 +99,7 @@ impl Bridge {
         device: DeviceInfo,
         session: Session,
         picture: ScenePicture,
+        tissue: TissueKind,
     ) -> Self {
         let mut plan: PlanInForce = bytemuck::Zeroable::zeroed();
         plan.session_id = session.session_id;
@@ -114,6 +118,7 @@ impl Bridge {
             parameters,
             plan,
             picture,
+            tissue,
             picture_sent: false,
             coming: None,
             waiting: HashMap::new(),
@@ -422,10 +427,11 @@ impl Bridge {
     fn take_loaded(&mut self) {
         let Ok(loaded) = self.loaded.1.try_recv() else { return };
         self.loading = false;
-        let (scene, source) = match loaded.scene {
+        let (mut scene, source) = match loaded.scene {
             Ok(built) => built,
             Err(why) => return self.answer(loaded.ticket, Some(&why), 0),
         };
+        scene.tissue = self.tissue;
         let limits = match activate(&self.parameters.set, &self.device) {
             Ok(active) => active.limits,
             Err(why) => return self.answer(loaded.ticket, Some(&why.join("\n")), 0),
@@ -433,7 +439,10 @@ impl Bridge {
         let generation = self.picture.header.generation + 1;
         let mut picture = ScenePicture::of(&scene, self.session.session_id, generation, loaded.patient_from_scene);
         picture.header.name = Text::new(&loaded.name);
-        let world = Box::new(World::new(*scene, limits, generation));
+        let world = match World::new(*scene, limits, generation) {
+            Ok(world) => Box::new(world),
+            Err(why) => return self.answer(loaded.ticket, Some(&why), 0),
+        };
         let tape = Box::new(TissueTape::new(&world, Arc::new(source)));
         if self
             .loops

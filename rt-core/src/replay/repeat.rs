@@ -123,8 +123,8 @@ fn is_same(record: &TickRecord, entry: &HapticEntry) -> bool {
 /// The tissue chain: response and held element of each tick, and every element's position at each checkpoint.
 pub fn tissue(flight: &Flight, recorded: &TissueFlight) -> Result<Repeated, String> {
     let scene = recorded.scene.build()?;
-    let world = || Box::new(World::new(scene.clone(), recorded.memory.limits.clone(), 1));
-    let reference = world();
+    let world = || World::new(scene.clone(), recorded.memory.limits.clone(), 1).map(Box::new);
+    let reference = world()?;
     if reference.tissue.memory_len() != recorded.memory.body.len() {
         return Err("the recorded tissue is not that of its scene: another version recorded it".to_owned());
     }
@@ -146,7 +146,7 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight) -> Result<Repeated, Stri
         filled,
         flight: tape,
     };
-    let mut again = TissueLoop::new(flight.session_id, ports, world(), flight.tissue_period_s);
+    let mut again = TissueLoop::new(flight.session_id, ports, world()?, flight.tissue_period_s);
     again.remember(&recorded.memory);
     let mut compare = Bodies {
         reference,

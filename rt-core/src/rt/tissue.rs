@@ -258,7 +258,7 @@ impl TissueLoop {
         self.held = Some(Held {
             element: point.element,
             position_m,
-            patch_m: 0.0,
+            patch_m: self.world.scene.tissue.tip_patch_m(),
         });
         let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
         self.notify(Notice::Contact {
@@ -294,7 +294,7 @@ impl TissueLoop {
             next = Held {
                 element: at_tip.element,
                 position_m,
-                patch_m: 0.0,
+                patch_m: self.world.scene.tissue.tip_patch_m(),
             };
         }
         for (coordinate, by) in next.position_m.iter_mut().zip(travel.iter()) {

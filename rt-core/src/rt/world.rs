@@ -1,7 +1,7 @@
 //! The scene as the tissue loop owns it: built by another thread, swapped in whole.
 
 use crate::scene::Scene;
-use crate::tissue::{ChainMailTissue, Limits, TissueModel};
+use crate::tissue::{ChainMailTissue, FemTissue, Limits, TissueKind, TissueModel};
 
 /// Body, tissue and surface of one scene.
 pub struct World {
@@ -14,13 +14,22 @@ pub struct World {
 }
 
 impl World {
-    pub fn new(scene: Scene, limits: Limits, generation: u64) -> Self {
-        Self {
+    /// Errors are for people.
+    pub fn new(scene: Scene, limits: Limits, generation: u64) -> Result<Self, String> {
+        let tissue: Box<dyn TissueModel> = match scene.tissue {
+            TissueKind::ChainMail => Box::new(ChainMailTissue::new(&scene, limits.clone())),
+            TissueKind::Fem => {
+                let words = |problems: Vec<_>| problems.iter().map(ToString::to_string).collect::<Vec<_>>();
+                let fem = FemTissue::<f32>::new(&scene).map_err(|p| words(p).join("\n"))?;
+                Box::new(fem)
+            }
+        };
+        Ok(Self {
             generation,
-            tissue: Box::new(ChainMailTissue::new(&scene, limits.clone())),
+            tissue,
             scene,
             limits,
-        }
+        })
     }
 
     pub fn set_limits(&mut self, limits: Limits) {

@@ -140,6 +140,14 @@ impl Lattice {
         &self.structures
     }
 
+    /// The same cells as one structure.
+    pub fn homogeneous(&self) -> Lattice {
+        Lattice {
+            structures: Vec::new(),
+            ..self.clone()
+        }
+    }
+
     pub fn volume_m3(&self) -> f64 {
         self.element_count() as f64 * self.spacing_m.powi(3)
     }

@@ -3,6 +3,7 @@
 //! Scene frame: axes along the lattice, metres; the centre of cell (i, j, k) is at
 //! ((i + 0.5) h, (j + 0.5) h, (k + 0.5) h).
 
+use crate::tissue::TissueKind;
 use std::sync::Arc;
 
 mod builtin;
@@ -52,6 +53,8 @@ pub struct Scene {
     /// Shared with the tissue model, which would otherwise hold a copy.
     pub lattice: Arc<Lattice>,
     pub surface: Surface,
+    /// What computes where its elements are.
+    pub tissue: TissueKind,
 }
 
 impl Scene {
@@ -80,6 +83,7 @@ impl Scene {
             structures,
             lattice: Arc::new(lattice),
             surface,
+            tissue: TissueKind::default(),
         })
     }
     /// Box around the targets at rest; around the whole body where there is none.

@@ -33,5 +33,5 @@ pub use check::largest_violation;
 pub use deformed::Deformed;
 pub use fem::FemTissue;
 pub use limits::{AxisLimits, Limits, ParameterProblem, TissueParameters, folding};
-pub use model::{Held, HeldOutcome, Solve, StepReport, TissueModel};
+pub use model::{Held, HeldOutcome, Solve, StepReport, TissueKind, TissueModel};
 pub use point::MaterialPoint;

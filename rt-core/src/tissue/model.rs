@@ -1,6 +1,28 @@
 //! What every tissue model is: a body that takes steps and can be read.
 
 use super::{Deformed, Limits};
+
+/// The tissue models that a scene can choose.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum TissueKind {
+    /// Restricted ChainMail: microseconds a tick, limits that always hold, no forces
+    #[default]
+    #[value(name = "chainmail")]
+    ChainMail,
+    /// Linear elastic finite elements: millimetres and forces to be believed, for bodies of some 20,000 elements
+    Fem,
+}
+
+impl TissueKind {
+    /// Edge of the tissue that moves as one piece with the tip. FEM needs one: the force on a single node goes to
+    /// zero with the spacing.
+    pub fn tip_patch_m(self) -> f64 {
+        match self {
+            TissueKind::ChainMail => 0.0,
+            TissueKind::Fem => 4e-3,
+        }
+    }
+}
 use serde::{Deserialize, Serialize};
 
 /// An element kept at a position of the scene frame during a step.
@@ -61,7 +83,8 @@ pub struct StepReport {
 ///
 /// Obligations: `step` does not allocate, lock or panic, whatever it is given; its work is bounded by a number
 /// of passes; the same calls give the same bytes; a held element that is `Followed` is where it was asked to
-/// be; positions stay finite. One suite holds every model to them (`tissue/conformance.rs`).
+/// be; positions stay finite. One suite holds every model to
+/// them: `tests/tests/physics_stability.rs`.
 pub trait TissueModel: Send {
     /// Advances by `dt_s` with `held` in place; a `dt_s` that is not above zero recovers nothing.
     fn step(&mut self, held: Option<Held>, dt_s: f64) -> StepReport;
