@@ -120,7 +120,7 @@ pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersS
                 .max_height(height)
                 .auto_shrink([false, true])
                 .show(ui, |ui| {
-                    for group in [ParameterGroup::Tissue, ParameterGroup::Needle, ParameterGroup::Force] {
+                    for group in ParameterGroup::ALL {
                         group_ui(ui, shown, state, group);
                     }
                 });

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 pub const WINDOW: usize = 32;
 
 /// Preallocated; one for a tip.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub struct VelocityEstimator {
     step_m: f64,
     /// Newest first: position, and time since it was taken.

@@ -11,5 +11,6 @@ pub mod clock;
 pub mod exchange;
 pub mod haptic;
 pub mod heap;
+pub mod layers_met;
 pub mod tissue;
 pub mod world;
