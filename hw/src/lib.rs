@@ -9,5 +9,6 @@ pub mod sim;
 
 pub use device::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
 pub use sim::hand::{Effort, Hand};
+pub use sim::link::{BadLink, LinkFaults};
 pub use sim::path::{HandPath, ScriptedPath, Waypoint};
 pub use sim::phantom::{SimulatedPhantom, SimulatedPhantomConfig};

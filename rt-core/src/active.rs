@@ -101,10 +101,25 @@ fn layers(set: &ParameterSet) -> Layers {
         shaft_friction_n_per_m: set.get(friction),
     };
     Layers([
-        layer(Some(P::PunctureDepth), Some(P::MembranePeak), P::CuttingForce, P::ShaftFriction),
-        layer(Some(P::SkinPunctureDepth), Some(P::SkinPeak), P::SkinCutting, P::SkinFriction),
+        layer(
+            Some(P::PunctureDepth),
+            Some(P::MembranePeak),
+            P::CuttingForce,
+            P::ShaftFriction,
+        ),
+        layer(
+            Some(P::SkinPunctureDepth),
+            Some(P::SkinPeak),
+            P::SkinCutting,
+            P::SkinFriction,
+        ),
         layer(None, None, P::SurroundingsCutting, P::SurroundingsFriction),
-        layer(Some(P::WallPunctureDepth), Some(P::WallPeak), P::WallCutting, P::WallFriction),
+        layer(
+            Some(P::WallPunctureDepth),
+            Some(P::WallPeak),
+            P::WallCutting,
+            P::WallFriction,
+        ),
     ])
 }
 

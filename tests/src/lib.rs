@@ -1,5 +1,7 @@
 //! Fixtures for whole-system tests: a core process of its own for each test, and a host that talks to it.
 
+pub mod rig;
+
 use host_ui::link::{Link, LinkStatus};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};

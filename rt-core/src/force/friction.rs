@@ -146,7 +146,10 @@ mod tests {
             assert!(state.stored_j(&LIMITS) <= stored);
             stored = state.stored_j(&LIMITS);
         }
-        assert!((state.elastic_n - full / 3.0).abs() < 1e-9, "down to the floor and no further");
+        assert!(
+            (state.elastic_n - full / 3.0).abs() < 1e-9,
+            "down to the floor and no further"
+        );
     }
 
     #[test]

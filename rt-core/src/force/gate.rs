@@ -128,10 +128,15 @@ impl GateCounts {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Mode {
     /// Zero force, or on the way there from `from`.
-    RampOut { from: Wrench, ticks: u32 },
+    RampOut {
+        from: Wrench,
+        ticks: u32,
+    },
     /// Asked to engage; the model still asks for too much.
     Waiting,
-    Engaged { ticks: u32 },
+    Engaged {
+        ticks: u32,
+    },
 }
 
 /// One for a device. Begins disengaged, at zero force.

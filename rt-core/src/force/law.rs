@@ -98,7 +98,11 @@ pub fn force(parameters: &ForceParameters, state: &mut ForceState, input: &Force
         };
     };
     // What the tissue answers takes the place of what eq. 9 and 10 say along the path.
-    let coupling = if input.tissue_n.is_some() { parameters.coupling } else { 0.0 };
+    let coupling = if input.tissue_n.is_some() {
+        parameters.coupling
+    } else {
+        0.0
+    };
     let tissue_n = axis * (input.tissue_n.unwrap_or(0.0) * coupling);
     let membrane_n = membrane(parameters, input, &axis) * (1.0 - coupling);
     let guide_n = guide(parameters, input, &axis);
@@ -176,7 +180,11 @@ pub fn damping(
 
 fn friction_limits(parameters: &ForceParameters, input: &ForceInput) -> FrictionLimits {
     let friction_n = parameters.shaft_gain * input.shaft_friction_n;
-    let cutting_n = if input.punctured { parameters.cutting_gain * input.tissue.cutting_force_n } else { 0.0 };
+    let cutting_n = if input.punctured {
+        parameters.cutting_gain * input.tissue.cutting_force_n
+    } else {
+        0.0
+    };
     FrictionLimits {
         stiffness_n_per_m: parameters.stick_stiffness_n_per_m,
         damping_n_s_per_m: parameters.stick_damping_n_s_per_m,

@@ -74,7 +74,12 @@ impl ForceParameters {
         problems.range("force.cutting_gain", self.cutting_gain, 0.0, 2.0);
         problems.range("force.shaft_gain", self.shaft_gain, 0.0, 2.0);
         problems.range("force.coupling", self.coupling, 0.0, 1.0);
-        problems.range("force.tissue_stiffness_n_per_m", self.tissue_stiffness_n_per_m, 0.0, 1e4);
+        problems.range(
+            "force.tissue_stiffness_n_per_m",
+            self.tissue_stiffness_n_per_m,
+            0.0,
+            1e4,
+        );
         problems.range("force.guide_stiffness_n_per_m", self.guide_stiffness_n_per_m, 0.0, 1e4);
         problems.range("force.guide_gain", self.guide_gain, 0.0, 10.0);
         problems.range("force.damping_n_s_per_m", self.damping_n_s_per_m, 0.0, 50.0);

@@ -24,7 +24,13 @@ fn wall(stiffness: f64, late: usize, parameters: &PassivityParameters) -> f64 {
         };
         let pressed = x.max(0.0);
         let wanted = Vector3::x() * (-stiffness * pressed);
-        let asked = step(parameters, &mut state, &motion, 0.5 * stiffness * pressed * pressed, &wanted);
+        let asked = step(
+            parameters,
+            &mut state,
+            &motion,
+            0.5 * stiffness * pressed * pressed,
+            &wanted,
+        );
         state.book(&asked);
         queue.rotate_right(1);
         queue[0] = asked.x;
@@ -42,7 +48,10 @@ fn a_wall_past_its_stable_stiffness_is_quietened_whatever_the_delay() {
         let free = wall(stiffness, late, &PassivityParameters::OFF);
         let held = wall(stiffness, late, &PassivityParameters::default());
         println!("{stiffness} N/m, {late} late: {free:.4} m/s without, {held:.4} m/s with control");
-        assert!(free > 0.05, "the wall of {stiffness} N/m, {late} late, should sing: {free}");
+        assert!(
+            free > 0.05,
+            "the wall of {stiffness} N/m, {late} late, should sing: {free}"
+        );
         assert!(held < 0.2 * free, "{stiffness} N/m, {late} late: {held} against {free}");
     }
 }

@@ -104,7 +104,12 @@ impl NeedlePath {
     pub fn front(&self, layers: &Layers, along_m: f64) -> Option<Front> {
         let innermost = self.sections().last()?;
         let with_membrane = |s: &&Section| layers.of(s.kind).has_membrane();
-        let membrane = self.sections().iter().rev().find(with_membrane).or(self.sections().first())?;
+        let membrane = self
+            .sections()
+            .iter()
+            .rev()
+            .find(with_membrane)
+            .or(self.sections().first())?;
         Some(Front {
             depth_m: along_m - membrane.entry_m,
             membrane: layers.of(membrane.kind),
@@ -119,7 +124,11 @@ impl NeedlePath {
         let ends = self.sections().iter().skip(1).map(|s| s.entry_m).chain([along_m]);
         let friction = |(section, end_m): (&Section, f64)| {
             let length_m = (end_m - section.entry_m).max(0.0);
-            if section.open { layers.of(section.kind).shaft_friction_n_per_m * length_m } else { 0.0 }
+            if section.open {
+                layers.of(section.kind).shaft_friction_n_per_m * length_m
+            } else {
+                0.0
+            }
         };
         self.sections().iter().zip(ends).map(friction).sum()
     }

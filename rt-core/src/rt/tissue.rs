@@ -1,9 +1,9 @@
 //! The tissue tick, 200 Hz: newest pose → contact → held element → constraints → seeds → response → snapshot.
 
-use crate::rt::arm::Armed;
-use crate::rt::clock::{self, Grid};
 use crate::force::LocalResponse;
 use crate::needle::LayerKind;
+use crate::rt::arm::Armed;
+use crate::rt::clock::{self, Grid};
 use crate::rt::exchange::*;
 use crate::rt::layers_met::LayersMet;
 use crate::rt::world::World;
@@ -250,7 +250,10 @@ impl TissueLoop {
     ) -> Vector3<f64> {
         for _ in 0..8 {
             let middle = (outside + inside) / 2.0;
-            if self.locate(&middle, Some(hint)).is_some_and(|point| is_inside(point.element)) {
+            if self
+                .locate(&middle, Some(hint))
+                .is_some_and(|point| is_inside(point.element))
+            {
                 inside = middle;
             } else {
                 outside = middle;
