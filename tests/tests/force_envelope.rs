@@ -48,15 +48,15 @@ fn session(hand: Hand, faults: LinkFaults, place: Place, controlled: bool) -> Ca
         rig = rig.without_passivity_control();
     }
     rig.go_to(rest_m, 0.05);
-    let mut ticks = rig.run(3.0);
+    let mut ticks = rig.run(2.0);
     rig.device.device.set_hand(hand);
     // A nudge: 2 mm back and forth, quicker than a hand means to move.
     rig.go_to(rest_m - 2e-3, 0.1);
     ticks.extend(rig.run(0.05));
     rig.go_to(rest_m, 0.1);
     ticks.extend(rig.run(0.45));
-    let early = rig.run(1.5);
-    let late = rig.run(1.5);
+    let early = rig.run(1.0);
+    let late = rig.run(1.0);
     let fastest = |ticks: &[Tick]| ticks.iter().map(|t| t.true_speed_m_per_s).fold(0.0, f64::max);
     let (early_m_per_s, late_m_per_s) = (fastest(&early), fastest(&late));
     ticks.extend(early);

@@ -14,7 +14,7 @@ use crate::needle::{self, Front, LayerKind, NeedleInput, NeedleParameters, Needl
 
 /// A stuck shaft is never softer than this, unless the operator set it so: the stiffest that every hand holds
 /// with three ticks of delay (`tests/force_envelope.rs`).
-pub const SOFTEST_STICK_N_PER_M: f64 = 2000.0;
+pub const SOFTEST_STICK_N_PER_M: f64 = 1500.0;
 
 /// Settings; changed as a whole at a tick.
 #[derive(Debug, Clone, Copy)]
@@ -253,6 +253,7 @@ fn guard(
         motion: Motion {
             moved_m,
             velocity_m_per_s,
+            position_step_m: device.position_step_m,
             dt_s,
         },
     };

@@ -15,6 +15,7 @@ fn still(wanted_n: Vector3<f64>) -> GateInput {
         motion: Motion {
             moved_m: Vector3::zeros(),
             velocity_m_per_s: Vector3::zeros(),
+            position_step_m: 3e-5,
             dt_s: DT_S,
         },
     }

@@ -4,7 +4,8 @@
 //! measured displacement is exact, if it is known when the force began to act. A link may be late by some
 //! ticks and does not say so: the work is booked for each possible lateness, and the worst account counts.
 //! An account holds no more than what the springs of the force law hold now, and a margin: what was
-//! dissipated is gone, and cannot pay for a later instability.
+//! dissipated is gone, and cannot pay for a later instability. What rounding the position may have hidden is not
+//! held against the simulator: half an encoder step times the change of the force.
 
 use nalgebra::Vector3;
 
@@ -17,7 +18,7 @@ pub const DELAYS: usize = 4;
 pub struct PassivityParameters {
     /// Energy that may be held in credit beyond what the springs hold.
     pub margin_j: f64,
-    /// The controller never damps more than this; 0 turns it off.
+    /// The controller never damps more than this; 0 turns it off. Late damping drives a light hand, so not much.
     pub max_damping_n_s_per_m: f64,
 }
 
@@ -25,7 +26,7 @@ impl Default for PassivityParameters {
     fn default() -> Self {
         Self {
             margin_j: 2e-3,
-            max_damping_n_s_per_m: 20.0,
+            max_damping_n_s_per_m: 5.0,
         }
     }
 }
@@ -50,7 +51,7 @@ pub struct PassivityState {
     /// Taken from the hand minus given to it, by lateness. Below zero the simulator is a source of energy.
     accounts_j: [f64; DELAYS],
     /// What was asked of the device, newest first.
-    forces_n: [Vector3<f64>; DELAYS],
+    forces_n: [Vector3<f64>; DELAYS + 1],
     /// In debt, as of the last tick.
     in_debt: bool,
 }
@@ -81,6 +82,8 @@ pub struct Motion {
     pub moved_m: Vector3<f64>,
     /// Filtered.
     pub velocity_m_per_s: Vector3<f64>,
+    /// Of the encoders.
+    pub position_step_m: f64,
     pub dt_s: f64,
 }
 
@@ -93,8 +96,10 @@ pub fn step(
     wanted_n: &Vector3<f64>,
 ) -> Vector3<f64> {
     let most_j = parameters.margin_j + if stored_j.is_finite() { stored_j.max(0.0) } else { 0.0 };
-    for (account_j, force_n) in state.accounts_j.iter_mut().zip(&state.forces_n) {
-        let taken_j = -force_n.dot(&motion.moved_m);
+    for (account_j, forces_n) in state.accounts_j.iter_mut().zip(state.forces_n.windows(2)) {
+        let [force_n, before_n] = [forces_n[0], forces_n[1]];
+        let hidden_j = 0.5 * motion.position_step_m * (force_n - before_n).abs().sum();
+        let taken_j = hidden_j - force_n.dot(&motion.moved_m);
         if taken_j.is_finite() {
             *account_j = (*account_j + taken_j).min(most_j);
         }

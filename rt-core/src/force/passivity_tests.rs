@@ -20,6 +20,7 @@ fn wall(stiffness: f64, late: usize, parameters: &PassivityParameters) -> f64 {
         let motion = Motion {
             moved_m: Vector3::x() * (x - before),
             velocity_m_per_s: Vector3::x() * v,
+            position_step_m: 0.0,
             dt_s: DT_S,
         };
         let pressed = x.max(0.0);
@@ -65,6 +66,7 @@ fn a_passive_force_is_left_alone() {
         let motion = Motion {
             moved_m: velocity_m_per_s * DT_S,
             velocity_m_per_s,
+            position_step_m: 0.0,
             dt_s: DT_S,
         };
         let drag = -velocity_m_per_s * 5.0;
@@ -83,6 +85,7 @@ fn credit_is_no_more_than_springs_hold_and_nonsense_books_nothing() {
     let motion = |metres: f64| Motion {
         moved_m: Vector3::x() * metres,
         velocity_m_per_s: Vector3::x() * 0.1,
+        position_step_m: 0.0,
         dt_s: DT_S,
     };
     step(&parameters, &mut state, &motion(0.1), 0.01, &Vector3::zeros());
@@ -91,4 +94,25 @@ fn credit_is_no_more_than_springs_hold_and_nonsense_books_nothing() {
     assert_eq!(state.accounts_j[0], 0.012);
     step(&parameters, &mut state, &motion(0.0), 0.0, &Vector3::zeros());
     assert_eq!(state.accounts_j[0], parameters.margin_j, "the springs let go");
+}
+
+#[test]
+fn flicker_of_an_encoder_is_no_debt() {
+    let parameters = PassivityParameters::default();
+    let mut state = PassivityState::default();
+    let (step_m, stiffness) = (3e-5, 6000.0);
+    for tick in 0..10_000u32 {
+        // The true position does not move.
+        let at = |tick: u32| f64::from(tick.wrapping_mul(2_654_435_761) >> 31) * step_m;
+        let motion = Motion {
+            moved_m: Vector3::x() * (at(tick + 1) - at(tick)),
+            velocity_m_per_s: Vector3::x() * 1e-3,
+            position_step_m: step_m,
+            dt_s: DT_S,
+        };
+        let wanted = Vector3::x() * (-stiffness * at(tick + 1));
+        let asked = self::step(&parameters, &mut state, &motion, 0.0, &wanted);
+        state.book(&asked);
+        assert!(!state.in_debt(), "tick {tick}: {} J", state.energy_j());
+    }
 }
