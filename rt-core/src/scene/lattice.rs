@@ -151,6 +151,25 @@ impl Lattice {
         (metres(low), metres(high))
     }
 
+    /// Size and box of each of the first `count` structures.
+    pub fn extents(&self, count: usize) -> Vec<Extent> {
+        let mut boxes = vec![(0_u32, [usize::MAX; 3], [0; 3]); count];
+        for (element, cell) in self.cells.iter().enumerate() {
+            let structure = self.structures.get(element).copied().unwrap_or(0);
+            if let Some((elements, low, high)) = boxes.get_mut(structure as usize) {
+                *elements += 1;
+                widen(low, high, cell);
+            }
+        }
+        let metres = |corner: [usize; 3]| corner.map(|c| c as f64 * self.spacing_m);
+        let extents = boxes.into_iter().map(|(elements, low, high)| Extent {
+            elements,
+            lower_m: metres(if elements > 0 { low } else { [0; 3] }),
+            upper_m: metres(high),
+        });
+        extents.collect()
+    }
+
     /// Runs of the row of cells at `j`, `k`, in the order of x.
     pub(crate) fn row(&self, j: usize, k: usize) -> &[Run] {
         let row = j + self.dims[1] * k;
@@ -158,13 +177,25 @@ impl Lattice {
     }
 }
 
+/// How large a structure is: its elements, and the box around them at rest (faces, not centres).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    pub elements: u32,
+    pub lower_m: [f64; 3],
+    pub upper_m: [f64; 3],
+}
+
 fn occupied_box(cells: &[[u16; 3]]) -> [[usize; 3]; 2] {
     let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
     for cell in cells {
-        for axis in 0..3 {
-            low[axis] = low[axis].min(cell[axis] as usize);
-            high[axis] = high[axis].max(cell[axis] as usize + 1);
-        }
+        widen(&mut low, &mut high, cell);
     }
     [low, high]
+}
+
+fn widen(low: &mut [usize; 3], high: &mut [usize; 3], cell: &[u16; 3]) {
+    for axis in 0..3 {
+        low[axis] = low[axis].min(cell[axis] as usize);
+        high[axis] = high[axis].max(cell[axis] as usize + 1);
+    }
 }

@@ -7,7 +7,19 @@ use crate::tissue::AxisLimits;
 pub struct Structure {
     pub name: String,
     pub label: u8,
+    pub role: Role,
     pub material: Material,
+}
+
+/// What a structure is in the procedure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Role {
+    /// What seeds are planned in.
+    Target,
+    /// To be kept from needles and dose.
+    Spare,
+    #[default]
+    Tissue,
 }
 
 /// What a structure does when pushed.
@@ -35,6 +47,7 @@ impl Structure {
         Structure {
             name: name.to_owned(),
             label,
+            role: Role::Target,
             material,
         }
     }

@@ -54,6 +54,25 @@ pub(crate) struct LinkLimits {
     pub tan: f32,
 }
 
+impl LinkLimits {
+    pub(crate) fn of(limits: &AxisLimits) -> LinkLimits {
+        LinkLimits {
+            low: (limits.min_stretch - 1.0) as f32,
+            high: (limits.max_stretch - 1.0) as f32,
+            tan: limits.shear_deg.to_radians().tan() as f32,
+        }
+    }
+
+    /// Of each limit the tighter one.
+    pub(crate) fn tighter(&self, other: &LinkLimits) -> LinkLimits {
+        LinkLimits {
+            low: self.low.max(other.low),
+            high: self.high.min(other.high),
+            tan: self.tan.min(other.tan),
+        }
+    }
+}
+
 /// Checked settings, as the step uses them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {

@@ -23,6 +23,7 @@
 pub mod chainmail;
 mod check;
 mod deformed;
+pub mod fem;
 mod limits;
 mod model;
 mod point;
@@ -30,6 +31,7 @@ mod point;
 pub use chainmail::{ChainMail, ChainMailTissue, TissueState, step};
 pub use check::largest_violation;
 pub use deformed::Deformed;
+pub use fem::FemTissue;
 pub use limits::{AxisLimits, Limits, ParameterProblem, TissueParameters};
 pub use model::{Held, HeldOutcome, Solve, StepReport, TissueModel};
 pub use point::MaterialPoint;

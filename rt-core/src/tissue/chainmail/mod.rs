@@ -6,21 +6,28 @@
 //! as a whole, is in it. Hence: recovery toward rest never breaks a limit, and there is always a way back
 //! to a state without violations.
 
+mod activity;
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+mod classes;
+mod held;
 mod kernels;
 mod model;
 mod project;
 pub mod queue;
+mod single;
 mod solve;
 mod spans;
+mod state;
 mod sweep;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod times;
 
-pub(crate) use kernels::violation;
-pub use model::{ChainMail, TissueState};
+pub(crate) use kernels::{Scaled, link_violation, ordered};
+pub use model::ChainMail;
+pub use single::single_pass;
 pub use solve::step;
+pub use state::TissueState;
 
 use crate::scene::Scene;
 use crate::tissue::{Deformed, Held, Limits, StepReport, TissueModel};
@@ -50,10 +57,11 @@ impl TissueModel for ChainMailTissue {
     }
 
     fn return_to_rest(&mut self) {
-        self.state.return_to_rest();
+        self.state.return_to_rest(&self.model);
     }
 
     fn set_limits(&mut self, limits: Limits) {
-        self.model.limits = limits;
+        self.model.set_limits(limits);
+        self.state.disturb(&self.model);
     }
 }

@@ -140,11 +140,11 @@ fn re_anchoring_reaches_the_limits_from_any_state_and_spares_other_parts() {
     for _ in 0..50 {
         let mut state = TissueState::at_rest(&model);
         let size = 1e-3 + 30.0 * random.unit();
-        for element in (0..model.element_count()).filter(|&e| model.part[e] == 0) {
+        for element in (0..model.element_count()).filter(|&e| model.part(e as u32) == 0) {
             state.put(element, [(); 3].map(|()| (size * random.signed()) as f32));
         }
         let held = state.deformed(&model).displacement(3);
-        project::reanchor(&model, 3, &mut state.u);
+        sweep::Pass::new(&model, &mut state, [0; 3], 4e-6).reanchor(3);
         assert!(oracle_violation(&model, &state, &parameters) <= parameters.residual_tolerance);
         assert_eq!(state.deformed(&model).displacement(3), held);
     }
@@ -206,11 +206,7 @@ fn one_pass_of_the_queue_and_of_the_sweeps_gives_the_same_bits_on_a_block() {
     let (mut by_queue, mut by_sweep) = (TissueState::at_rest(&model), TissueState::at_rest(&model));
     let way = [30.0, -25.0, 40.0];
     let moved = queue::QueuePass::new(&model).run(&model, &mut by_queue, held_at(&model, element, way));
-    by_sweep.put(
-        element as usize,
-        by_queue.deformed(&model).displacement(element).map(|c| c as f32),
-    );
-    sweep::single_pass(&model, [4, 3, 2], &mut by_sweep.u);
+    single_pass(&model, &mut by_sweep, held_at(&model, element, way));
     assert_eq!(moved as usize, model.element_count());
     for axis in 0..3 {
         assert_eq!(by_queue.displacement(axis), by_sweep.displacement(axis));
@@ -264,7 +260,11 @@ fn insert_and_retract_cycles_do_not_drift() {
                 1e-3,
             );
         }
-        state.u.clone()
+        let scale = state.scale();
+        state
+            .u
+            .clone()
+            .map(|c| c.into_iter().map(|u| u * scale).collect::<Vec<_>>())
     };
     (0..5000).for_each(|_| drop(cycle()));
     let settled = cycle();
@@ -320,7 +320,8 @@ fn place_in_the_grid_does_not_change_the_result() {
             let report = step(&model, &mut state, Some(held_at(&model, 40, way)), 1e-3);
             assert!(report.converged);
         }
-        state.u
+        let scale = state.scale();
+        state.u.map(|c| c.into_iter().map(|u| u * scale).collect::<Vec<_>>())
     });
     for (a, b) in results[0].iter().flatten().zip(results[1].iter().flatten()) {
         assert!((a - b).abs() < 1e-5, "{a} and {b}");

@@ -1,0 +1,204 @@
+//! Conjugate gradients, preconditioned with one multigrid cycle, on one response.
+
+use std::ops::Range;
+
+use super::model::FemModel;
+use super::real::Real;
+use super::smooth::{Product, Residual, dot_line};
+use super::state::FemState;
+use super::sweep::{Field, LineOp, sweep};
+
+/// Forces on all nodes, the residual on the free ones.
+struct Answer<'a, T> {
+    forces: &'a mut Field<T>,
+    inverse_diagonal: &'a [T],
+    square: f64,
+}
+
+impl<T: Real> LineOp<T> for Answer<'_, T> {
+    #[inline(always)]
+    fn line(&mut self, at: Range<usize>, forces: [&[T]; 3], _: [&mut [T]; 3]) {
+        let inverse = &self.inverse_diagonal[at.clone()];
+        for (kept, force) in self.forces.iter_mut().zip(forces) {
+            kept[at.clone()].copy_from_slice(force);
+            for (&force, &inverse) in force.iter().zip(inverse) {
+                if inverse != T::ZERO {
+                    self.square += force.to_f64().powi(2);
+                }
+            }
+        }
+    }
+}
+
+impl<T: Real> FemState<T> {
+    /// Refines response `n` until its residual norm is at most `target` or `cycles` are used up; returns the cycles used.
+    pub(super) fn refine(&mut self, model: &FemModel<T>, n: usize, target: f64, cycles: u32) -> u32 {
+        let mut used = 0;
+        let mut residual = self.begin(model, n);
+        let mut rz_before = 0.0;
+        let mut alpha = 0.0;
+        while residual > target && used < cycles {
+            self.multigrid.cycle(&model.levels);
+            used += 1;
+            let (rz, zq) = self.products(model, used > 1);
+            // Polak and Ribière's form: f32 makes the cycle slightly asymmetric, and this one does not mind.
+            let beta = if used > 1 { -alpha * zq / rz_before } else { 0.0 };
+            self.turn(model, beta);
+            let pq = self.product(model);
+            alpha = rz / pq;
+            rz_before = rz;
+            if !(alpha.is_finite() && alpha > 0.0) {
+                break;
+            }
+            residual = self.advance(model, n, alpha);
+        }
+        self.finish(model, n);
+        used
+    }
+
+    /// The residual of response `n` becomes the right-hand side of the cycle.
+    fn begin(&mut self, model: &FemModel<T>, n: usize) -> f64 {
+        let level = &model.levels[0];
+        let stage = &mut self.multigrid.stages[0];
+        let mut op = Residual {
+            b: None,
+            r: &mut stage.b,
+            inverse_diagonal: &stage.inverse_diagonal,
+            square: 0.0,
+        };
+        let (u, work) = (&mut self.responses[n].u, &mut self.multigrid.work);
+        sweep(level, u, work, 0..level.grid.nodes[2], &mut op);
+        op.square.sqrt()
+    }
+
+    /// `r . z`, and `z . q` if there is a `q` yet.
+    fn products(&self, model: &FemModel<T>, has_q: bool) -> (f64, f64) {
+        let stage = &self.multigrid.stages[0];
+        let (mut rz, mut zq) = (0.0, 0.0);
+        for at in model.levels[0].grid.node_spans() {
+            for c in 0..3 {
+                let z = &stage.x[c][at.clone()];
+                rz += dot_line(&stage.b[c][at.clone()], z);
+                if has_q {
+                    zq += dot_line(z, &self.q[c][at.clone()]);
+                }
+            }
+        }
+        (rz, zq)
+    }
+
+    /// `p = z + beta p`.
+    fn turn(&mut self, model: &FemModel<T>, beta: f64) {
+        let beta = T::of(beta);
+        let z = &self.multigrid.stages[0].x;
+        for at in model.levels[0].grid.node_spans() {
+            for (p, z) in self.p.iter_mut().zip(z) {
+                for (p, &z) in p[at.clone()].iter_mut().zip(&z[at.clone()]) {
+                    *p = z + beta * *p;
+                }
+            }
+        }
+    }
+
+    /// `q = A p`; returns `p . q`.
+    fn product(&mut self, model: &FemModel<T>) -> f64 {
+        let level = &model.levels[0];
+        let multigrid = &mut self.multigrid;
+        let mut op = Product {
+            q: &mut self.q,
+            inverse_diagonal: &multigrid.stages[0].inverse_diagonal,
+            dot: 0.0,
+        };
+        sweep(level, &mut self.p, &mut multigrid.work, 0..level.grid.nodes[2], &mut op);
+        op.dot
+    }
+
+    /// `u += alpha p`, `r -= alpha q`; returns the norm of `r`.
+    fn advance(&mut self, model: &FemModel<T>, n: usize, alpha: f64) -> f64 {
+        let alpha = T::of(alpha);
+        let mut square = 0.0;
+        let (u, r) = (&mut self.responses[n].u, &mut self.multigrid.stages[0].b);
+        for at in model.levels[0].grid.node_spans() {
+            for c in 0..3 {
+                let (p, q) = (&self.p[c][at.clone()], &self.q[c][at.clone()]);
+                let (u, r) = (&mut u[c][at.clone()], &mut r[c][at.clone()]);
+                for (((u, r), &p), &q) in u.iter_mut().zip(r.iter_mut()).zip(p).zip(q) {
+                    *u += alpha * p;
+                    *r -= alpha * q;
+                }
+                square += dot_line(r, r);
+            }
+        }
+        square.sqrt()
+    }
+
+    /// The residual as it is, not as the recurrence has it, and the force that moves the patch.
+    fn finish(&mut self, model: &FemModel<T>, n: usize) {
+        let level = &model.levels[0];
+        let multigrid = &mut self.multigrid;
+        let mut op = Answer {
+            forces: &mut self.q,
+            inverse_diagonal: &multigrid.stages[0].inverse_diagonal,
+            square: 0.0,
+        };
+        let response = &mut self.responses[n];
+        sweep(
+            level,
+            &mut response.u,
+            &mut multigrid.work,
+            0..level.grid.nodes[2],
+            &mut op,
+        );
+        response.residual = op.square.sqrt();
+        let patch = &self.patch_nodes[..self.held];
+        response.force_n_per_m = [0, 1, 2].map(|c| patch.iter().map(|&node| self.q[c][node as usize].to_f64()).sum());
+    }
+
+    /// The norm of the forces that the patch alone causes on free nodes when it is moved along `direction`.
+    pub(super) fn load(&mut self, model: &FemModel<T>, direction: [f64; 3], planes: Range<usize>) -> f64 {
+        let level = &model.levels[0];
+        self.p.iter_mut().for_each(|c| c.fill(T::ZERO));
+        for (p, part) in self.p.iter_mut().zip(direction) {
+            for &node in &self.patch_nodes[..self.held] {
+                p[node as usize] = T::of(part);
+            }
+        }
+        let multigrid = &mut self.multigrid;
+        let mut op = Residual {
+            b: None,
+            r: &mut self.q,
+            inverse_diagonal: &multigrid.stages[0].inverse_diagonal,
+            square: 0.0,
+        };
+        sweep(level, &mut self.p, &mut multigrid.work, planes, &mut op);
+        op.square.sqrt()
+    }
+
+    /// Half of displacement times force, over elements and springs: the elastic energy.
+    pub fn strain_energy_j(&mut self, model: &FemModel<T>) -> f64 {
+        let level = &model.levels[0];
+        self.p.iter_mut().for_each(|c| c.fill(T::ZERO));
+        for response in &self.responses[..self.count] {
+            let weight = T::of(response.weight_m);
+            for (p, u) in self.p.iter_mut().zip(&response.u) {
+                p.iter_mut().zip(u).for_each(|(p, &u)| *p += weight * u);
+            }
+        }
+        let mut op = Answer {
+            forces: &mut self.q,
+            inverse_diagonal: &self.multigrid.stages[0].inverse_diagonal,
+            square: 0.0,
+        };
+        sweep(
+            level,
+            &mut self.p,
+            &mut self.multigrid.work,
+            0..level.grid.nodes[2],
+            &mut op,
+        );
+        let products = self.p.iter().zip(&self.q);
+        0.5 * products
+            .map(|(p, q)| p.iter().zip(q).map(|(&p, &q)| (p * q).to_f64()).sum::<f64>())
+            .sum::<f64>()
+    }
+}

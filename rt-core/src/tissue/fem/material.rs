@@ -1,0 +1,152 @@
+//! What a structure is made of, and what that makes of one hexahedron.
+
+use std::fmt;
+
+/// How the volumetric part of an element's energy is integrated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Integration {
+    /// 2 x 2 x 2 Gauss points for everything, as textbooks do; locks as nu comes near 0.5.
+    Full,
+    /// The element's mean dilatation carries all of the volumetric energy (B-bar, Hughes 1980); does not lock.
+    MeanDilatation,
+}
+
+/// Isotropic and linear elastic.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    pub youngs_modulus_pa: f64,
+    pub poisson_ratio: f64,
+    pub integration: Integration,
+}
+
+impl Material {
+    /// Prostate: 17 kPa (Ahn 2010), and close enough to incompressible that more changes little.
+    pub const PROSTATE: Material = Material {
+        youngs_modulus_pa: 17e3,
+        poisson_ratio: 0.49,
+        integration: Integration::MeanDilatation,
+    };
+
+    pub(super) fn lame_pa(&self) -> (f64, f64) {
+        let (e, nu) = (self.youngs_modulus_pa, self.poisson_ratio);
+        (e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu)))
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Structure {
+    Elastic(Material),
+    /// Bone, a probe: its nodes do not move.
+    Fixed,
+}
+
+/// What a model is made from, besides the lattice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FemSettings {
+    pub structures: Vec<Structure>,
+    /// Structure of each element; empty if there is one structure only.
+    pub structure_of: Vec<u8>,
+    /// Springs to rest that stand for what surrounds the body: stiffness per surface area.
+    pub foundation_pa_per_m: f64,
+}
+
+impl FemSettings {
+    /// One material, in surroundings of the given stiffness.
+    pub fn homogeneous(material: Material, foundation_pa_per_m: f64) -> Self {
+        FemSettings {
+            structures: vec![Structure::Elastic(material)],
+            structure_of: Vec::new(),
+            foundation_pa_per_m,
+        }
+    }
+}
+
+/// Largest Poisson ratio; multigrid needs ever more cycles towards 0.5.
+pub const MAX_POISSON_RATIO: f64 = 0.499;
+
+#[derive(Clone, Debug, PartialEq)]
+pub enum FemProblem {
+    NoStructures,
+    Modulus { structure: usize, youngs_modulus_pa: f64 },
+    PoissonRatio { structure: usize, poisson_ratio: f64 },
+    Foundation { foundation_pa_per_m: f64 },
+    StructureCount { elements: usize, given: usize },
+    UnknownStructure { element: usize, structure: u8 },
+}
+
+impl fmt::Display for FemProblem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::NoStructures => write!(f, "0 structures, at least 1 needed"),
+            Self::Modulus {
+                structure,
+                youngs_modulus_pa,
+            } => write!(
+                f,
+                "Young's modulus {youngs_modulus_pa} Pa of structure {structure}, must be from 1 Pa to 1e12 Pa"
+            ),
+            Self::PoissonRatio {
+                structure,
+                poisson_ratio,
+            } => write!(
+                f,
+                "Poisson ratio {poisson_ratio} of structure {structure}, must be from 0 to {MAX_POISSON_RATIO}"
+            ),
+            Self::Foundation { foundation_pa_per_m } => write!(
+                f,
+                "stiffness of the surroundings {foundation_pa_per_m} Pa/m, must be from 0 to 1e15 Pa/m"
+            ),
+            Self::StructureCount { elements, given } => write!(
+                f,
+                "{given} structure numbers for {elements} elements: give one for each element, or none"
+            ),
+            Self::UnknownStructure { element, structure } => {
+                write!(f, "element {element} is of structure {structure}, which is not given")
+            }
+        }
+    }
+}
+
+impl std::error::Error for FemProblem {}
+
+/// Every problem; of elements with an unknown structure, the first.
+pub(super) fn problems_of(settings: &FemSettings, elements: usize) -> Vec<FemProblem> {
+    let mut problems = Vec::new();
+    if settings.structures.is_empty() {
+        problems.push(FemProblem::NoStructures);
+    }
+    for (structure, material) in settings.structures.iter().enumerate() {
+        let Structure::Elastic(material) = *material else {
+            continue;
+        };
+        if !(1.0..=1e12).contains(&material.youngs_modulus_pa) {
+            problems.push(FemProblem::Modulus {
+                structure,
+                youngs_modulus_pa: material.youngs_modulus_pa,
+            });
+        }
+        if !(0.0..=MAX_POISSON_RATIO).contains(&material.poisson_ratio) {
+            problems.push(FemProblem::PoissonRatio {
+                structure,
+                poisson_ratio: material.poisson_ratio,
+            });
+        }
+    }
+    if !(0.0..=1e15).contains(&settings.foundation_pa_per_m) {
+        problems.push(FemProblem::Foundation {
+            foundation_pa_per_m: settings.foundation_pa_per_m,
+        });
+    }
+    let given = settings.structure_of.len();
+    if given != 0 && given != elements {
+        problems.push(FemProblem::StructureCount { elements, given });
+    }
+    let known = |&structure: &u8| usize::from(structure) < settings.structures.len();
+    if let Some(element) = settings.structure_of.iter().position(|s| !known(s)) {
+        problems.push(FemProblem::UnknownStructure {
+            element,
+            structure: settings.structure_of[element],
+        });
+    }
+    problems
+}

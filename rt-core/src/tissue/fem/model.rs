@@ -1,0 +1,229 @@
+//! What an elastic body is: built once, never changed.
+
+use super::grid::Grid;
+use super::hexahedron::Stiffness;
+use super::level::{Cells, Level, coarser, corners};
+use super::material::{FemProblem, FemSettings, Structure, problems_of};
+use super::real::Real;
+use super::sweep::Planes;
+use crate::scene::Lattice;
+
+/// Below so many free nodes the coarsest level is solved directly.
+const DIRECT_NODES: usize = 30;
+/// A node that touches no element.
+const NO_PART: u32 = u32::MAX;
+
+/// A stretch of elements with consecutive numbers, and the cell of the first.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CellRun {
+    pub first: usize,
+    pub len: usize,
+    pub cell: usize,
+}
+
+/// Topology, materials and all levels of the multigrid, in `f32` or `f64`.
+#[derive(Clone, Debug)]
+pub struct FemModel<T = f32> {
+    pub(super) lattice: Lattice,
+    /// Finest first.
+    pub(super) levels: Vec<Level<T>>,
+    /// Lattice cell at the lowest corner of the finest grid.
+    pub(super) low_cell: [usize; 3],
+    pub(super) runs: Vec<CellRun>,
+    pub(super) is_cell: Vec<bool>,
+    /// Part of the body that each node belongs to; parts share no node.
+    pub(super) part: Vec<u32>,
+    /// Nodes of the parts that neither springs nor fixed nodes keep in place.
+    pub(super) loose: Vec<Vec<u32>>,
+}
+
+impl<T: Real> FemModel<T> {
+    /// The body of a lattice, or every problem with the settings.
+    pub fn new(lattice: &Lattice, settings: &FemSettings) -> Result<Self, Vec<FemProblem>> {
+        Self::with_fixed_nodes(lattice, settings, |_| false)
+    }
+
+    /// The same with more fixed nodes: those for whose place in the scene frame (m) `is_fixed` holds.
+    pub fn with_fixed_nodes(
+        lattice: &Lattice,
+        settings: &FemSettings,
+        is_fixed: impl Fn([f64; 3]) -> bool,
+    ) -> Result<Self, Vec<FemProblem>> {
+        let problems = problems_of(settings, lattice.element_count());
+        if !problems.is_empty() {
+            return Err(problems);
+        }
+        let body = Body::new(lattice, settings, is_fixed);
+        let (part, anchored) = parts(&body);
+        let mut loose = vec![Vec::new(); anchored.len()];
+        for (node, &part) in part.iter().enumerate() {
+            if part != NO_PART && !anchored[part as usize] {
+                loose[part as usize].push(node as u32);
+            }
+        }
+        loose.retain(|nodes| !nodes.is_empty());
+        Ok(FemModel {
+            lattice: lattice.clone(),
+            levels: levels(&body.cells),
+            low_cell: body.low_cell,
+            runs: body.runs,
+            is_cell: body.is_cell,
+            part,
+            loose,
+        })
+    }
+
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    pub fn element_count(&self) -> usize {
+        self.lattice.element_count()
+    }
+
+    /// Nodes that touch an element.
+    pub fn node_count(&self) -> usize {
+        self.part.iter().filter(|&&part| part != NO_PART).count()
+    }
+
+    pub fn level_count(&self) -> usize {
+        self.levels.len()
+    }
+}
+
+struct Body {
+    cells: Cells,
+    low_cell: [usize; 3],
+    runs: Vec<CellRun>,
+    is_cell: Vec<bool>,
+}
+
+impl Body {
+    fn new(lattice: &Lattice, settings: &FemSettings, is_fixed: impl Fn([f64; 3]) -> bool) -> Self {
+        let edge_m = lattice.spacing_m;
+        let (low, high) = lattice.bounds_m();
+        let low_cell = low.map(|c| (c / edge_m).round() as usize);
+        let size = [0, 1, 2].map(|a| (high[a] / edge_m).round() as usize - low_cell[a]);
+        let elements = 0..lattice.element_count() as u32;
+        let cell_of = |element: u32| {
+            let cell = lattice.cell(element);
+            [0, 1, 2].map(|a| cell[a] - low_cell[a])
+        };
+        let grid = Grid::new(size, elements.clone().map(cell_of));
+        let mut body = Body {
+            low_cell,
+            runs: Vec::new(),
+            is_cell: vec![false; grid.len()],
+            cells: Cells {
+                stiffness: vec![Stiffness::default(); grid.len()],
+                springs_n_per_m: vec![0.0; grid.len()],
+                fixed: vec![false; grid.len()],
+                grid,
+            },
+        };
+        for element in elements {
+            let cell = body.cells.grid.index(cell_of(element));
+            body.add_element(element, cell, settings, edge_m);
+        }
+        body.add_surroundings(settings.foundation_pa_per_m * edge_m * edge_m / 4.0);
+        for node in 0..body.cells.grid.len() {
+            let place = body.cells.grid.place(node);
+            let place_m = [0, 1, 2].map(|a| (place[a] + low_cell[a]) as f64 * edge_m);
+            body.cells.fixed[node] |= is_fixed(place_m);
+        }
+        body
+    }
+
+    fn add_element(&mut self, element: u32, cell: usize, settings: &FemSettings, edge_m: f64) {
+        self.is_cell[cell] = true;
+        let structure = settings.structure_of.get(element as usize).copied().unwrap_or(0);
+        match &settings.structures[usize::from(structure)] {
+            Structure::Elastic(material) => self.cells.stiffness[cell] = Stiffness::of(material, edge_m),
+            Structure::Fixed => corners(&self.cells.grid, cell)
+                .into_iter()
+                .for_each(|node| self.cells.fixed[node] = true),
+        }
+        match self.runs.last_mut() {
+            Some(run) if run.cell + run.len == cell && cell % self.cells.grid.nodes[0] != 0 => run.len += 1,
+            _ => self.runs.push(CellRun {
+                first: element as usize,
+                len: 1,
+                cell,
+            }),
+        }
+    }
+
+    /// A quarter of each free face's springs to each of its nodes.
+    fn add_surroundings(&mut self, quarter_n_per_m: f64) {
+        let grid = &self.cells.grid;
+        for cell in (0..grid.len()).filter(|&cell| self.is_cell[cell]) {
+            let nodes = corners(grid, cell);
+            for axis in 0..3 {
+                let step = grid.index([0, 1, 2].map(|a| usize::from(a == axis)));
+                for upper in [false, true] {
+                    let beyond = if upper {
+                        cell.checked_add(step)
+                    } else {
+                        cell.checked_sub(step)
+                    };
+                    if beyond.and_then(|c| self.is_cell.get(c)) == Some(&true) {
+                        continue;
+                    }
+                    for (corner, &node) in nodes.iter().enumerate() {
+                        if (corner >> axis & 1 == 1) == upper {
+                            self.cells.springs_n_per_m[node] += quarter_n_per_m;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn levels<T: Real>(cells: &Cells) -> Vec<Level<T>> {
+    let [nx, ny, _] = cells.grid.nodes;
+    let mut work = Planes::new(nx * ny);
+    let mut levels: Vec<Level<T>> = vec![Level::new(cells, &mut work)];
+    let mut last = coarser(cells);
+    loop {
+        let finest = &levels[levels.len() - 1];
+        let free = finest.inverse_diagonal.iter().filter(|&&d| d != T::ZERO).count();
+        if free <= DIRECT_NODES || last.grid.nodes == finest.grid.nodes {
+            return levels;
+        }
+        levels.push(Level::new(&last, &mut work));
+        last = coarser(&last);
+    }
+}
+
+/// The part of each node, and whether the part has a spring or a fixed node.
+fn parts(body: &Body) -> (Vec<u32>, Vec<bool>) {
+    let grid = &body.cells.grid;
+    let mut part = vec![NO_PART; grid.len()];
+    let mut anchored = Vec::new();
+    let mut open = Vec::new();
+    for cell in (0..grid.len()).filter(|&cell| body.is_cell[cell]) {
+        if part[cell] != NO_PART {
+            continue;
+        }
+        let number = anchored.len() as u32;
+        anchored.push(false);
+        part[cell] = number;
+        open.push(cell);
+        while let Some(node) = open.pop() {
+            let kept = body.cells.fixed[node] || body.cells.springs_n_per_m[node] > 0.0;
+            anchored[number as usize] |= kept;
+            for cell in corners(grid, 0).into_iter().filter_map(|back| node.checked_sub(back)) {
+                if body.is_cell[cell] {
+                    for next in corners(grid, cell) {
+                        if part[next] == NO_PART {
+                            part[next] = number;
+                            open.push(next);
+                        }
+                    }
+                }
+            }
+        }
+    }
+    (part, anchored)
+}

@@ -1,0 +1,132 @@
+//! One V-cycle: an approximate inverse, symmetric and positive, that conjugate gradients are preconditioned with.
+
+use super::coarsest::Coarsest;
+use super::level::Level;
+use super::real::Real;
+use super::smooth::{Residual, smooth};
+use super::sweep::{Field, Planes, sweep, zeros};
+use super::transfer::{prolong, restrict};
+
+/// Chebyshev steps before and after the correction from the next level.
+const STEPS: u32 = 2;
+/// The same on coarser levels, where they cost little.
+const COARSE_STEPS: u32 = 3;
+
+/// What one level of a cycle works in.
+#[derive(Clone, Debug)]
+pub(super) struct Stage<T> {
+    /// The level's, but zero also at nodes that are held.
+    pub inverse_diagonal: Vec<T>,
+    pub x: Field<T>,
+    pub b: Field<T>,
+    d: Field<T>,
+    r: Field<T>,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Multigrid<T> {
+    pub stages: Vec<Stage<T>>,
+    pub work: Planes<T>,
+    line: Vec<T>,
+    coarsest: Coarsest<T>,
+}
+
+impl<T: Real> Multigrid<T> {
+    /// Expects at least one level.
+    pub fn new(levels: &[Level<T>]) -> Self {
+        let stage = |level: &Level<T>| Stage {
+            inverse_diagonal: level.inverse_diagonal.clone(),
+            x: zeros(level.grid.len()),
+            b: zeros(level.grid.len()),
+            d: zeros(level.grid.len()),
+            r: zeros(level.grid.len()),
+        };
+        let [nx, ny, _] = levels[0].grid.nodes;
+        Multigrid {
+            stages: levels.iter().map(stage).collect(),
+            work: Planes::new(nx * ny),
+            line: vec![T::of(1.0); nx + 3],
+            coarsest: Coarsest::new(&levels[levels.len() - 1]),
+        }
+    }
+
+    /// Holds the nodes `held` of the finest level, and those of the coarser ones that are in the same place.
+    pub fn hold(&mut self, levels: &[Level<T>], held: &[u32]) {
+        for (stage, level) in self.stages.iter_mut().zip(levels) {
+            stage.inverse_diagonal.copy_from_slice(&level.inverse_diagonal);
+        }
+        for &node in held {
+            let mut place = levels[0].grid.place(node as usize);
+            for (stage, level) in self.stages.iter_mut().zip(levels) {
+                stage.inverse_diagonal[level.grid.index(place)] = T::ZERO;
+                if place.iter().any(|c| c % 2 == 1) {
+                    break;
+                }
+                place = place.map(|c| c / 2);
+            }
+        }
+        if let (Some(stage), Some(level)) = (self.stages.last(), levels.last()) {
+            self.coarsest.refactor(level, &stage.inverse_diagonal, &mut self.work);
+        }
+    }
+
+    /// One cycle: `stages[0].x` becomes an approximation of the solution of `A x = stages[0].b`.
+    pub fn cycle(&mut self, levels: &[Level<T>]) {
+        let last = levels.len() - 1;
+        for n in 0..last {
+            self.smooth(levels, n, true);
+            let (fine, coarse) = self.stages.split_at_mut(n + 1);
+            let Stage {
+                inverse_diagonal,
+                x,
+                b,
+                r,
+                ..
+            } = &mut fine[n];
+            let mut op = Residual {
+                b: Some(b),
+                r,
+                inverse_diagonal,
+                square: 0.0,
+            };
+            let level = &levels[n];
+            sweep(level, x, &mut self.work, 0..level.grid.nodes[2], &mut op);
+            restrict(&level.grid, &levels[n + 1].grid, r, &mut self.line, &mut coarse[0].b);
+        }
+        let stage = &mut self.stages[last];
+        self.coarsest.solve(&stage.b, &mut stage.x);
+        for n in (0..last).rev() {
+            let (fine, coarse) = self.stages.split_at_mut(n + 1);
+            let stage = &mut fine[n];
+            let (from, to) = (&levels[n + 1].grid, &levels[n].grid);
+            prolong(
+                from,
+                to,
+                &coarse[0].x,
+                &stage.inverse_diagonal,
+                &mut self.line,
+                &mut stage.x,
+            );
+            self.smooth(levels, n, false);
+        }
+    }
+
+    fn smooth(&mut self, levels: &[Level<T>], n: usize, from_zero: bool) {
+        let Stage {
+            inverse_diagonal,
+            x,
+            b,
+            d,
+            ..
+        } = &mut self.stages[n];
+        let steps = if n == 0 { STEPS } else { COARSE_STEPS };
+        smooth(
+            &levels[n],
+            inverse_diagonal,
+            [x, b, d],
+            &mut self.work,
+            steps,
+            from_zero,
+        );
+    }
+}
