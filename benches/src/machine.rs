@@ -9,10 +9,14 @@ pub fn describe() -> Vec<(String, String)> {
     let output = |program: &str, arguments: &[&str]| {
         let run = Command::new(program).args(arguments).output();
         let text = run.map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned());
-        text.ok().filter(|t| !t.is_empty()).unwrap_or_else(|| "not known".to_owned())
+        text.ok()
+            .filter(|t| !t.is_empty())
+            .unwrap_or_else(|| "not known".to_owned())
     };
     let cpu = file("/proc/cpuinfo");
-    let model = cpu.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    let model = cpu
+        .lines()
+        .find_map(|line| line.strip_prefix("model name")?.split_once(": "));
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
     let pairs = [
         ("date", output("date", &["-u", "+%Y-%m-%d"])),
@@ -29,5 +33,7 @@ pub fn describe() -> Vec<(String, String)> {
 /// `benches/runs/<date>-<host>`.
 pub fn run_folder(machine: &[(String, String)]) -> PathBuf {
     let of = |name: &str| machine.iter().find(|(n, _)| n == name).map_or("", |(_, value)| value);
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("runs").join(format!("{}-{}", of("date"), of("host")))
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("runs")
+        .join(format!("{}-{}", of("date"), of("host")))
 }

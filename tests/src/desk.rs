@@ -1,9 +1,9 @@
 //! Hand, device, force chain and tissue loop on one thread and one clock: a session that can be repeated.
 
 use nalgebra::Vector3;
-use rt_core::force::chain::{self, ChainOutput, ChainParameters, ChainState, Touch};
 use rt_core::force::ForceParameters;
-use rt_core::needle::NeedleParameters;
+use rt_core::force::chain::{self, ChainOutput, ChainParameters, ChainState, Touch};
+use rt_core::needle::{LayerKind, NeedleParameters};
 use rt_core::rt::exchange::{TipPose, TissueResponse};
 use rt_core::rt::tissue::{TissueLoop, TissuePorts};
 use rt_core::rt::world::World;
@@ -90,7 +90,14 @@ impl Desk {
             local: tissue.local,
         });
         self.contact = if touching { tissue.contact } else { self.contact };
-        let output = chain::step(&self.parameters, &self.info, &mut self.chain, &sample, touch.as_ref(), DT_S);
+        let output = chain::step(
+            &self.parameters,
+            &self.info,
+            &mut self.chain,
+            &sample,
+            touch.as_ref(),
+            DT_S,
+        );
         self.device.write(&output.wrench).expect("the gate gives numbers");
         if output.left {
             self.pose.released_contact = self.contact;
@@ -117,4 +124,35 @@ impl Desk {
     pub fn run(&mut self, seconds: f64) -> Vec<ChainOutput> {
         (0..(seconds / DT_S).round() as u64).map(|_| self.step()).collect()
     }
+}
+
+/// 5 mm before the tissue, on the axis of the gland.
+pub fn axis_start(world: &World) -> Vector3<f64> {
+    let lattice = &world.scene.lattice;
+    let elements = 0..lattice.element_count() as u32;
+    let (mut sum, mut count) = (Vector3::zeros(), 0.0);
+    for element in elements.filter(|&e| world.layer(e) == LayerKind::Gland) {
+        sum += Vector3::from(lattice.rest_m(element));
+        count += 1.0;
+    }
+    let mut start = sum / count;
+    let on_axis = |e: &u32| {
+        let at = lattice.rest_m(*e);
+        (0..2).all(|a| (at[a] - start[a]).abs() <= lattice.spacing_m)
+    };
+    let first_m = (0..lattice.element_count() as u32)
+        .filter(on_axis)
+        .map(|e| lattice.rest_m(e)[2]);
+    start.z = first_m.fold(f64::INFINITY, f64::min) - 0.5 * lattice.spacing_m - 5e-3;
+    start
+}
+
+/// How far the gland as a whole has moved along z.
+pub fn gland_shift_m(world: &World) -> f64 {
+    let body = world.tissue.deformed();
+    let gland = (0..body.lattice.element_count() as u32).filter(|&e| world.layer(e) == LayerKind::Gland);
+    let (sum, count) = gland.fold((0.0, 0.0), |(sum, count), e| {
+        (sum + body.displacement(e)[2], count + 1.0)
+    });
+    sum / count * body.lattice.spacing_m
 }

@@ -35,10 +35,24 @@ pub struct Tick {
 impl Rig {
     /// Engaged, 5 mm before the first layer.
     pub fn new(hand: Hand, faults: LinkFaults, layers: &[(f64, LayerKind)], period_s: f64) -> Self {
-        let phantom = SimulatedPhantom::new(SimulatedPhantomConfig {
+        let config = SimulatedPhantomConfig {
             hand,
-            start_tip_in_world: Vector3::z() * -5e-3,
             ..SimulatedPhantomConfig::default()
+        };
+        Self::over(config, faults, layers, period_s)
+    }
+
+    /// A steady hand, a good link, and encoders of this step.
+    pub fn with_position_step(step_m: f64, layers: &[(f64, LayerKind)]) -> Self {
+        let mut config = SimulatedPhantomConfig::default();
+        config.info.position_step_m = step_m;
+        Self::over(config, LinkFaults::default(), layers, 1e-3)
+    }
+
+    fn over(config: SimulatedPhantomConfig, faults: LinkFaults, layers: &[(f64, LayerKind)], period_s: f64) -> Self {
+        let phantom = SimulatedPhantom::new(SimulatedPhantomConfig {
+            start_tip_in_world: Vector3::z() * -5e-3,
+            ..config
         });
         let info = phantom.info();
         let mut chain = ChainState::new(&info);
@@ -59,7 +73,8 @@ impl Rig {
         }
     }
 
-    pub fn without_passivity_control(mut self) -> Self {
+    /// Energy is watched but not controlled, and a shake softens nothing.
+    pub fn uncontrolled(mut self) -> Self {
         self.parameters.force.gate.passivity = PassivityParameters::OFF;
         self
     }

@@ -3,9 +3,7 @@
 use nalgebra::Vector3;
 use rt_core::force::gate::{self, GateInput};
 use rt_core::force::{GateParameters, GateState, Motion, PassivityParameters, VelocityEstimator};
-use stylet_hw::{
-    BadLink, Device, Hand, HandGoal, LinkFaults, SimulatedPhantom, SimulatedPhantomConfig, Wrench,
-};
+use stylet_hw::{BadLink, Device, Hand, HandGoal, LinkFaults, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
 
 #[derive(Clone, Copy, Debug)]
 pub struct Wall {
@@ -52,7 +50,10 @@ impl Wall {
         state.engage();
         let (mut before, mut fastest) = (Vector3::z() * -1e-3, 0.0f64);
         for tick in 0..(1.5 / self.period_s) as u64 {
-            let tip = device.read(self.period_s).expect("the simulated device answers").tip_in_world;
+            let tip = device
+                .read(self.period_s)
+                .expect("the simulated device answers")
+                .tip_in_world;
             let velocity_m_per_s = velocity.update(&tip, self.period_s);
             let pressed_m = tip.z.max(0.0);
             let damping = if pressed_m > 0.0 { self.damping_n_s_per_m } else { 0.0 };

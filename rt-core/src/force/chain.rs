@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use stylet_hw::{DeviceInfo, Sample, Wrench};
 
+use super::chatter::ChatterState;
 use super::coupling::{self, CouplingState, LocalResponse};
 use super::friction::FrictionState;
 use super::gate::{self, GateInput, GateState};
@@ -43,6 +44,7 @@ pub struct ChainState {
     pub needle: NeedleState,
     pub path: NeedlePath,
     pub law: ForceState,
+    pub chatter: ChatterState,
     pub coupling: CouplingState,
     pub gate: GateState,
     pub tip_in_world: Option<Vector3<f64>>,
@@ -73,6 +75,7 @@ impl ChainState {
             needle: NeedleState::default(),
             path: NeedlePath::default(),
             law: ForceState::default(),
+            chatter: ChatterState::default(),
             coupling: CouplingState::default(),
             gate: GateState::default(),
             tip_in_world: None,
@@ -88,6 +91,7 @@ impl ChainState {
         };
         self.path.clear();
         self.law = ForceState::default();
+        self.chatter = ChatterState::default();
         self.coupling.release();
     }
 }
@@ -116,6 +120,11 @@ pub fn step(
     }
     if needle_out.puncture {
         state.path.open();
+    }
+    let controlled = parameters.force.gate.passivity.max_damping_n_s_per_m > 0.0;
+    let shakes = controlled && touch.is_some() && state.chatter.shakes(along_m, device.position_step_m, dt_s);
+    if shakes {
+        soften(&mut state.law.friction, 0.8, parameters.force.stick_stiffness_n_per_m);
     }
     let terms = match (touch, front) {
         (Some(touch), Some(front)) => {
@@ -259,13 +268,13 @@ fn guard(
     };
     let output = gate::step(&parameters.force.gate, device, &mut state.gate, &input);
     if state.gate.passivity().in_debt() {
-        soften(&mut state.law.friction, parameters.force.stick_stiffness_n_per_m);
+        soften(&mut state.law.friction, 0.9, parameters.force.stick_stiffness_n_per_m);
     }
     output.wrench
 }
 
-fn soften(friction: &mut FrictionState, stiffness_n_per_m: f64) {
-    friction.soften(SOFTEST_STICK_N_PER_M / stiffness_n_per_m.max(1.0));
+fn soften(friction: &mut FrictionState, by: f64, stiffness_n_per_m: f64) {
+    friction.soften(by, SOFTEST_STICK_N_PER_M / stiffness_n_per_m.max(1.0));
 }
 
 #[cfg(test)]

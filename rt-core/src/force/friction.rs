@@ -5,6 +5,9 @@
 //! can hold, with the anchor dragged along by what is left over (Kikuuwe 2006). A damper beside the spring takes
 //! the energy that sampling would otherwise leak into a stuck shaft; the two together never pass the limit.
 
+/// Slip after which a softened shaft has its full stiffness again: at the limit a stiffer spring holds less energy.
+const RESTORE_M: f64 = 0.02;
+
 /// What friction can hold, on either side, and how.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionLimits {
@@ -42,10 +45,10 @@ impl FrictionState {
         *self = Self::default();
     }
 
-    /// The loop gives energy to the hand: a softer spring at the same anchor holds less of it. Down to
-    /// `floor`, a part of the full stiffness, until the needle is out.
-    pub fn soften(&mut self, floor: f64) {
-        self.softness = (self.softness * 0.9).max(floor.clamp(0.0, 1.0));
+    /// The loop shakes, or gives energy to the hand: a softer spring at the same anchor holds less of it. Down to
+    /// `floor`, a part of the full stiffness. Slip brings the stiffness back.
+    pub fn soften(&mut self, by: f64, floor: f64) {
+        self.softness = (self.softness * by).max(floor.clamp(0.0, 1.0));
     }
 
     /// Energy in the spring, at most what it can give back.
@@ -69,7 +72,10 @@ pub fn friction(limits: &FrictionLimits, state: &mut FrictionState, position_m: 
         return 0.0;
     }
     let anchor_m = state.anchor_m.unwrap_or(position_m - forward / k);
-    state.elastic_n = (k * (anchor_m - position_m)).max(-forward).min(backward);
+    let stuck_n = k * (anchor_m - position_m);
+    state.elastic_n = stuck_n.max(-forward).min(backward);
+    let slip_m = (stuck_n - state.elastic_n).abs() / k;
+    state.softness = (state.softness + slip_m / RESTORE_M).min(1.0);
     state.anchor_m = Some(position_m + state.elastic_n / k);
     (state.elastic_n - limits.damping_n_s_per_m * speed_m_per_s).clamp(-forward, backward)
 }
@@ -141,7 +147,7 @@ mod tests {
         let full = friction(&LIMITS, &mut state, 1e-4, 0.0);
         let mut stored = state.stored_j(&LIMITS);
         for _ in 0..100 {
-            state.soften(1.0 / 3.0);
+            state.soften(0.9, 1.0 / 3.0);
             friction(&LIMITS, &mut state, 1e-4, 0.0);
             assert!(state.stored_j(&LIMITS) <= stored);
             stored = state.stored_j(&LIMITS);

@@ -1,10 +1,11 @@
 //! From the tip's motion to the force on the operator's hand.
 //!
-//! In the order of the data, as [`chain`] calls them: [`velocity`] → [`law`] (with [`friction`] and [`coupling`]) →
+//! In the order of the data, as [`chain`] calls them: [`velocity`] → [`law`] (with [`friction`], [`chatter`] and [`coupling`]) →
 //! [`gate`] (with [`passivity`] and [`thermal`]) → device. Every force here acts on the operator's hand. Nothing called
 //! in a tick allocates or panics.
 
 pub mod chain;
+pub mod chatter;
 pub mod check;
 pub mod coupling;
 pub mod friction;

@@ -25,7 +25,7 @@ pub struct PassivityParameters {
 impl Default for PassivityParameters {
     fn default() -> Self {
         Self {
-            margin_j: 2e-3,
+            margin_j: 5e-3,
             max_damping_n_s_per_m: 5.0,
         }
     }
@@ -34,7 +34,7 @@ impl Default for PassivityParameters {
 impl PassivityParameters {
     /// Only watches.
     pub const OFF: Self = Self {
-        margin_j: 2e-3,
+        margin_j: 5e-3,
         max_damping_n_s_per_m: 0.0,
     };
 

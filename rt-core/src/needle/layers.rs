@@ -1,7 +1,7 @@
 //! The layers that a needle goes through: each with its own membrane, cutting force and shaft friction.
 
 use crate::force::check::{Problem, Problems};
-use crate::scene::Structure;
+use crate::scene::{Role, Structure};
 
 /// What the tip is in. The numbers are stable: they index [`Layers`] and appear between the loops.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -19,17 +19,14 @@ pub enum LayerKind {
 }
 
 impl LayerKind {
-    /// What a structure of a scene is to the needle, by its name. A body of one structure is the gland.
+    /// What a structure of a scene is to the needle: by its role, and skin by its name.
     pub fn of_structure(structure: &Structure) -> LayerKind {
-        let is = |words: &[&str]| words.iter().any(|word| structure.name.contains(word));
-        if is(&["perineum", "skin"]) {
-            Self::Perineum
-        } else if is(&["wall", "urethra", "bladder", "rectum"]) {
-            Self::Wall
-        } else if is(&["gland", "capsule", "prostate", "tissue"]) {
-            Self::Gland
-        } else {
-            Self::Surroundings
+        let is_skin = ["skin", "perineum"].iter().any(|word| structure.name.contains(word));
+        match structure.role {
+            Role::Target => Self::Gland,
+            Role::Spare => Self::Wall,
+            Role::Tissue if is_skin => Self::Perineum,
+            Role::Tissue => Self::Surroundings,
         }
     }
 }

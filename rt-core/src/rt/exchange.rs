@@ -94,6 +94,8 @@ impl Default for TissueResponse {
 pub type Ticket = u64;
 
 /// Bridge to haptic.
+// Copied through a ring: a box would be freed in the loop.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug)]
 pub enum HapticOrder {
     Parameters {

@@ -85,6 +85,11 @@ impl TissueLoop {
         &self.response
     }
 
+    /// The scene that it works on.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
     /// Runs on the ideal grid until `stop`.
     pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool) {
         let mut grid = Grid::from(clock::now_ns(), (self.period_s * 1e9) as u64);
