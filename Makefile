@@ -4,7 +4,7 @@ SHELL := /bin/bash
 CARGO ?= cargo
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: help run test build picture clean deps-run deps-test
+.PHONY: help run test build picture force-pictures clean deps-run deps-test
 
 help: ## This list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -23,6 +23,9 @@ test: deps-test ## Install what the tests need, build everything, run all tests
 
 picture: deps-test build ## Draw the README's picture anew
 	UPDATE_SNAPSHOTS=1 $(CARGO) test --release -p stylet-tests --test ui_live -- --test-threads=1
+
+force-pictures: ## Measure the stiffness that the loop holds, and draw the pictures of force anew
+	$(CARGO) bench -p stylet-benches --bench force
 
 clean: ## Remove what was built
 	$(CARGO) clean

@@ -10,9 +10,9 @@ use rt_core::rt::world::World;
 use rt_core::scene::Scene;
 use rt_core::tissue::TissueParameters;
 use std::path::{Path, PathBuf};
+use stylet_benches::desk::{Desk, axis_start, gland_shift_m};
+use stylet_benches::wall::Wall;
 use stylet_hw::Hand;
-use stylet_tests::desk::{Desk, axis_start, gland_shift_m};
-use stylet_tests::wall::Wall;
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 

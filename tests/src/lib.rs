@@ -1,9 +1,5 @@
 //! Fixtures for whole-system tests: a core process of its own for each test, and a host that talks to it.
 
-pub mod desk;
-pub mod rig;
-pub mod wall;
-
 use host_ui::link::{Link, LinkStatus};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};

@@ -5,8 +5,8 @@ use rt_core::rt::world::World;
 use rt_core::scene::Scene;
 use rt_core::tissue::TissueParameters;
 use rt_core::tissue::fem::FemTissue;
+use stylet_benches::desk::{Desk, axis_start};
 use stylet_hw::Hand;
-use stylet_tests::desk::{Desk, axis_start};
 
 /// Follows its path to a micrometre whatever the force, so that two sessions have one motion.
 const GUIDED: Hand = Hand {

@@ -1,8 +1,8 @@
 //! Every hand of the envelope, every lateness of the link, three places: does the loop sing?
 
 use rt_core::needle::LayerKind;
+use stylet_benches::rig::{Rig, Tick, hand_envelope};
 use stylet_hw::{Hand, LinkFaults};
-use stylet_tests::rig::{Rig, Tick, hand_envelope};
 
 /// Where the needle is brought to rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -131,7 +131,9 @@ fn no_hand_of_the_envelope_makes_the_loop_sing_at_any_lateness_anywhere() {
     for place in PLACES {
         let mut all = Vec::new();
         for late_ticks in 0..=3 {
-            let cases: Vec<Case> = hand_envelope().map(|hand| session(hand, late_ticks, place, true)).collect();
+            let cases: Vec<Case> = hand_envelope()
+                .map(|hand| session(hand, late_ticks, place, true))
+                .collect();
             all.extend(cases);
         }
         let (late_m, where_late) = worst(&all, |c| c.late_m);
@@ -139,12 +141,26 @@ fn no_hand_of_the_envelope_makes_the_loop_sing_at_any_lateness_anywhere() {
         let (after_j, where_after) = worst(&all, |c| c.after_j);
         println!("{place:?}, {} sessions:", all.len());
         println!("  to and fro {:.3} mm ({where_late})", late_m * 1e3);
-        println!("  given beyond taken and rounding {:.3} mJ ({where_given})", given_j * 1e3);
+        println!(
+            "  given beyond taken and rounding {:.3} mJ ({where_given})",
+            given_j * 1e3
+        );
         println!("  from the change of hands on {:.3} mJ ({where_after})", after_j * 1e3);
         for case in &all {
-            assert!(!case.sings(), "{} sings: {} m, before {} m", case.name, case.late_m, case.early_m);
+            assert!(
+                !case.sings(),
+                "{} sings: {} m, before {} m",
+                case.name,
+                case.late_m,
+                case.early_m
+            );
             assert!(case.late_m <= case.early_m + STEP_M, "{} grows", case.name);
-            assert!(case.excess_j <= case.bound_j, "{} gives {} J", case.name, case.excess_j - case.bound_j);
+            assert!(
+                case.excess_j <= case.bound_j,
+                "{} gives {} J",
+                case.name,
+                case.excess_j - case.bound_j
+            );
         }
     }
 }

@@ -5,8 +5,8 @@ use rt_core::needle::Phase;
 use rt_core::rt::world::World;
 use rt_core::scene::Scene;
 use rt_core::tissue::TissueParameters;
+use stylet_benches::desk::{Desk, axis_start, gland_shift_m};
 use stylet_hw::Hand;
-use stylet_tests::desk::{Desk, axis_start, gland_shift_m};
 
 /// What an insertion was: largest force, largest shift of the gland, punctures.
 fn insertion(scene: &str, depth_m: f64, speed_m_per_s: f64) -> (f64, f64, u32) {

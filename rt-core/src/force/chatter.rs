@@ -34,7 +34,11 @@ impl ChatterState {
         if ahead_m > -STEPS * position_step_m {
             return false;
         }
-        self.quick_turns = if self.since_turn_s < QUICK_S { self.quick_turns.saturating_add(1) } else { 0 };
+        self.quick_turns = if self.since_turn_s < QUICK_S {
+            self.quick_turns.saturating_add(1)
+        } else {
+            0
+        };
         self.backwards = !self.backwards;
         self.extreme_m = Some(position_m);
         self.since_turn_s = 0.0;

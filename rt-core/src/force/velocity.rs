@@ -148,7 +148,12 @@ mod tests {
             (longest, loudest) = (longest.max(delay), loudest.max(noise));
             worst = worst.max((v - 0.15 * (omega * t).cos()).abs());
         }
-        println!("delay up to {:.1} ms, noise up to {:.2} mm/s, error up to {:.2} mm/s", longest * 1e3, loudest * 1e3, worst * 1e3);
+        println!(
+            "delay up to {:.1} ms, noise up to {:.2} mm/s, error up to {:.2} mm/s",
+            longest * 1e3,
+            loudest * 1e3,
+            worst * 1e3
+        );
         assert!(longest <= 0.016 + 1e-9);
     }
 
