@@ -3,12 +3,13 @@
 //! A loop whose link is later than it should be shakes a stuck shaft between its limits. No energy account tells
 //! at once, since the lateness is not known; the turns do.
 
-/// A turn counts when it follows the last one within this time.
-const QUICK_S: f64 = 0.08;
+/// A turn counts when it follows the last one within this time: a swing of 9 Hz. The tremor of a hand lies at 8 to 12 Hz,
+/// but its swings against a stuck shaft are shorter than what counts.
+const QUICK_S: f64 = 0.055;
 /// So many quick turns in a row are a shake: one and a half swings.
 const TURNS: u32 = 3;
 /// A turn is a way back of so many encoder steps.
-const STEPS: f64 = 2.5;
+const STEPS: f64 = 1.5;
 
 /// Of one tip along its path.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -65,8 +66,8 @@ mod tests {
     fn a_shake_is_seen_and_what_a_hand_means_to_do_is_not() {
         let seen = turns(20.0, 2e-4);
         assert!((70..80).contains(&seen), "{seen} turns of 80");
-        assert_eq!(turns(4.0, 2e-3), 0, "quick work of a hand");
-        assert_eq!(turns(20.0, 3e-5), 0, "flicker of the encoder");
+        assert_eq!(turns(8.0, 3e-4), 0, "a hand that trembles");
+        assert_eq!(turns(20.0, 1.4e-5), 0, "flicker of the encoder");
         let mut state = ChatterState::default();
         assert!(!state.shakes(f64::NAN, 3e-5, 1e-3));
     }
