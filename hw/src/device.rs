@@ -93,7 +93,7 @@ impl Sample {
 }
 
 /// Force and torque on the operator's hand, in the world frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Wrench {
     pub force_n: Vector3<f64>,
     pub torque_nm: Vector3<f64>,

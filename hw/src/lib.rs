@@ -13,5 +13,6 @@ pub use device::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
 pub use libhd::{Phantom, PhantomConfig};
 pub use replay::ReplayDevice;
 pub use sim::hand::{Effort, Hand};
+pub use sim::link::{BadLink, LinkFaults};
 pub use sim::path::{HandPath, ScriptedPath, Waypoint};
 pub use sim::phantom::{SimulatedPhantom, SimulatedPhantomConfig};

@@ -4,7 +4,7 @@ mod common;
 
 use common::{DT_S, conformance};
 use nalgebra::Vector3;
-use stylet_hw::{Device, DeviceFault, Hand, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
+use stylet_hw::{BadLink, Device, DeviceFault, Hand, LinkFaults, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
 
 fn config(hand: Hand) -> SimulatedPhantomConfig {
     SimulatedPhantomConfig {
@@ -193,4 +193,58 @@ fn strange_periods_are_refused_or_cut_short() {
     assert_eq!(device.read(0.0).unwrap(), first, "no time, no new sample");
     let late = device.read(1e9).unwrap();
     assert!(late.sequence == first.sequence + 1 && late.is_finite());
+}
+
+#[test]
+fn a_bad_link_delays_loses_and_repeats_as_asked() {
+    let faults = LinkFaults {
+        late_ticks: 2,
+        ..LinkFaults::default()
+    };
+    let phantom = || SimulatedPhantom::new(config(Hand::passive()));
+    let mut late = BadLink::new(phantom(), faults);
+    for tick in 0..10 {
+        late.write(&Wrench::from_force(Vector3::x() * f64::from(tick))).unwrap();
+        let arrived = late.device.applied_wrench().force_n.x;
+        assert_eq!(arrived, f64::from((tick - 2).max(0)));
+    }
+    let faults = LinkFaults {
+        lost_per_thousand: 100,
+        repeated_per_thousand: 50,
+        ..LinkFaults::default()
+    };
+    let mut bad = BadLink::new(phantom(), faults);
+    let (mut lost, mut repeated, mut sequence) = (0, 0, 0);
+    for tick in 1..=10_000 {
+        let sample = bad.read(DT_S).unwrap();
+        repeated += u32::from(sample.sequence == sequence);
+        sequence = sample.sequence;
+        let wrench = Wrench::from_force(Vector3::x() * (1e-4 * f64::from(tick)));
+        bad.write(&wrench).unwrap();
+        lost += u32::from(*bad.device.applied_wrench() != wrench);
+    }
+    assert!(
+        (900..1100).contains(&lost) && (400..600).contains(&repeated),
+        "{lost} {repeated}"
+    );
+    conformance(&mut BadLink::new(phantom(), LinkFaults::default()));
+}
+
+#[test]
+fn the_work_of_a_force_is_the_energy_that_device_and_hand_gain() {
+    let hand = Hand {
+        damping_n_s_per_m: 0.0,
+        ..Hand::passive()
+    };
+    let mut device = frictionless(hand);
+    push(&mut device, Vector3::new(2.0, -1.0, 0.5));
+    for _ in 0..20 {
+        device.read(DT_S).unwrap();
+    }
+    // The implicit step damps a little.
+    let (work, energy) = (device.work_j(), device.energy_j());
+    assert!(
+        energy > 1e-3 && (work - energy).abs() < 0.02 * work,
+        "{work} J in, {energy} J there"
+    );
 }

@@ -1,7 +1,7 @@
 //! Parameters as the loops own them: the raw set of shared memory, validated as a whole.
 
 use crate::force::ForceParameters;
-use crate::needle::NeedleParameters;
+use crate::needle::{Layer, Layers, NeedleParameters};
 use crate::tissue::{Limits, TissueParameters};
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::{ParameterId, ParameterSet};
@@ -26,7 +26,7 @@ pub fn activate(set: &ParameterSet, device: &DeviceInfo) -> Result<Active, Vec<S
     problems.extend(needle.validate().err().into_iter().flatten().map(|p| p.to_string()));
     problems.extend(
         force
-            .validate_for(&needle, device)
+            .validate_for(device)
             .err()
             .into_iter()
             .flatten()
@@ -71,13 +71,18 @@ fn needle(set: &ParameterSet) -> NeedleParameters {
 fn force(set: &ParameterSet, device: &DeviceInfo) -> ForceParameters {
     use ParameterId as P;
     let mut force = ForceParameters {
-        membrane_peak_n: set.get(P::MembranePeak),
-        cutting_force_n: set.get(P::CuttingForce),
+        layers: layers(set),
+        membrane_gain: set.get(P::MembraneGain),
+        cutting_gain: set.get(P::CuttingGain),
+        shaft_gain: set.get(P::ShaftGain),
+        coupling: set.get(P::Coupling),
+        tissue_stiffness_n_per_m: set.get(P::TissueStiffness),
         guide_stiffness_n_per_m: set.get(P::GuideStiffness),
         guide_gain: set.get(P::GuideGain),
         damping_n_s_per_m: set.get(P::Damping),
-        shaft_friction_n_per_m: set.get(P::ShaftFriction),
+        guide_torque_nm_per_rad: set.get(P::GuideTorque),
         stick_stiffness_n_per_m: set.get(P::StickStiffness),
+        stick_damping_n_s_per_m: set.get(P::StickDamping),
         compensated_mass_kg: set.get(P::HandleMass),
         ..ForceParameters::default()
     };
@@ -85,6 +90,38 @@ fn force(set: &ParameterSet, device: &DeviceInfo) -> ForceParameters {
     force.gate.slew_n_per_s = set.get(P::SlewLimit);
     force.gate.max_force_n = device.peak_force_n;
     force
+}
+
+/// In the order of `LayerKind`.
+fn layers(set: &ParameterSet) -> Layers {
+    use ParameterId as P;
+    let layer = |depth: Option<P>, peak: Option<P>, cutting, friction| Layer {
+        puncture_depth_m: depth.map_or(0.0, |id| set.get(id)),
+        puncture_force_n: peak.map_or(0.0, |id| set.get(id)),
+        cutting_force_n: set.get(cutting),
+        shaft_friction_n_per_m: set.get(friction),
+    };
+    Layers([
+        layer(
+            Some(P::PunctureDepth),
+            Some(P::MembranePeak),
+            P::CuttingForce,
+            P::ShaftFriction,
+        ),
+        layer(
+            Some(P::SkinPunctureDepth),
+            Some(P::SkinPeak),
+            P::SkinCutting,
+            P::SkinFriction,
+        ),
+        layer(None, None, P::SurroundingsCutting, P::SurroundingsFriction),
+        layer(
+            Some(P::WallPunctureDepth),
+            Some(P::WallPeak),
+            P::WallCutting,
+            P::WallFriction,
+        ),
+    ])
 }
 
 #[cfg(test)]
@@ -108,9 +145,19 @@ mod tests {
         close(active.needle.hysteresis_m, n.hysteresis_m);
         close(active.needle.hold_speed_m_per_s, n.hold_speed_m_per_s);
         let f = ForceParameters::default();
-        close(active.force.membrane_peak_n, f.membrane_peak_n);
+        for (ours, default) in active.force.layers.0.iter().zip(f.layers.0) {
+            close(ours.puncture_depth_m, default.puncture_depth_m);
+            close(ours.puncture_force_n, default.puncture_force_n);
+            close(ours.cutting_force_n, default.cutting_force_n);
+            close(ours.shaft_friction_n_per_m, default.shaft_friction_n_per_m);
+        }
+        close(active.force.gate.force_scale, f.gate.force_scale);
+        close(active.force.stick_stiffness_n_per_m, f.stick_stiffness_n_per_m);
+        close(active.force.stick_damping_n_s_per_m, f.stick_damping_n_s_per_m);
+        close(active.force.guide_torque_nm_per_rad, f.guide_torque_nm_per_rad);
+        close(active.force.coupling, f.coupling);
+        close(active.force.tissue_stiffness_n_per_m, f.tissue_stiffness_n_per_m);
         close(active.force.damping_n_s_per_m, f.damping_n_s_per_m);
-        close(active.force.shaft_friction_n_per_m, f.shaft_friction_n_per_m);
         close(active.force.gate.slew_n_per_s, f.gate.slew_n_per_s);
         let t = TissueParameters::default();
         close(tissue(&set).shear_deg, t.shear_deg);

@@ -44,6 +44,7 @@ pub fn state(s: &HapticState) -> Result<(), Rubbish> {
         within(&[s.peak_force_n, s.force_scale, s.device_limit_n], MAX_FORCE_N),
         "force limits",
     )?;
+    ensure(within(&[s.energy_j, s.warmth_n, s.tissue_force_n], 1e4), "gate figures")?;
     ensure(s.worst_residual.is_finite(), "residual")?;
     ensure(s.seed_count as usize <= MAX_SEEDS, "seed count")
 }

@@ -43,6 +43,14 @@ pub struct HapticState {
     pub records_lost: u64,
     /// Times that the gate had to change the force.
     pub gate_interventions: u64,
+    /// How often each stage of the gate acted: not finite, passivity, slew, magnitude, continuous, device, torque, fault.
+    pub gate_counts: [u64; 8],
+    /// Energy taken from the hand minus given to it, as the passivity controller books it.
+    pub energy_j: f64,
+    /// Root mean square of the force over the thermal time of the motors.
+    pub warmth_n: f64,
+    /// Coupled mode: the tissue's answer along the insertion direction, before the gate.
+    pub tissue_force_n: f64,
     pub parameters_generation: u64,
     /// [`Phase`] by number.
     pub phase: u32,
@@ -67,6 +75,8 @@ pub mod flags {
     pub const AT_GOAL: u32 = 1 << 5;
     /// The gate limited this tick's force.
     pub const GATE_ACTED: u32 = 1 << 6;
+    /// Engaged, but the force is still too large to begin with: move the needle until it is small.
+    pub const WAITING: u32 = 1 << 7;
 }
 
 /// Phase of needle and tissue (paper eq. 6), by stable number.

@@ -67,13 +67,7 @@ fn report_holds_the_whole_path_and_the_loops_stayed_clean() {
     let whole_us = times(&report, "haptic", "whole tick")["max_us"]
         .as_f64()
         .expect("measured");
-    for stage in [
-        "orders",
-        "device read",
-        "force law",
-        "gate and write",
-        "publish and record",
-    ] {
+    for stage in ["orders", "device read", "force chain", "write", "publish and record"] {
         let us = times(&report, "haptic", stage)["max_us"].as_f64().expect("measured");
         assert!(us <= whole_us * 1.002, "{stage} {us} us in a tick of {whole_us} us");
     }

@@ -15,7 +15,6 @@ enum RowNote {
 }
 
 /// One change at a time is on its way; what is edited meanwhile waits and goes with the next.
-#[derive(Default)]
 pub struct ParametersState {
     pub open: bool,
     /// Edited and not yet in force, SI.
@@ -25,6 +24,19 @@ pub struct ParametersState {
     unsent: bool,
     notes: [RowNote; PARAMETER_COUNT],
     foot: Option<(bool, String)>,
+}
+
+impl Default for ParametersState {
+    fn default() -> Self {
+        Self {
+            open: false,
+            drafts: [None; PARAMETER_COUNT],
+            in_flight: None,
+            unsent: false,
+            notes: [const { RowNote::None }; PARAMETER_COUNT],
+            foot: None,
+        }
+    }
 }
 
 impl ParametersState {
@@ -120,7 +132,7 @@ pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersS
                 .max_height(height)
                 .auto_shrink([false, true])
                 .show(ui, |ui| {
-                    for group in [ParameterGroup::Tissue, ParameterGroup::Needle, ParameterGroup::Force] {
+                    for group in ParameterGroup::ALL {
                         group_ui(ui, shown, state, group);
                     }
                 });

@@ -57,6 +57,7 @@ pub struct SimulatedPhantom {
     push_n: Vector3<f64>,
     world_from_tool: UnitQuaternion<f64>,
     wrench: Wrench,
+    work_j: f64,
     buttons: u32,
     sequence: u64,
 }
@@ -72,6 +73,7 @@ impl SimulatedPhantom {
             push_n: Vector3::zeros(),
             world_from_tool: turn(&Vector3::z(), &direction, core::f64::consts::PI),
             wrench: Wrench::zero(),
+            work_j: 0.0,
             buttons: 0,
             sequence: 0,
         }
@@ -95,11 +97,22 @@ impl SimulatedPhantom {
         &self.wrench
     }
 
+    /// Work that the applied force has done on device and hand since the start.
+    pub fn work_j(&self) -> f64 {
+        self.work_j
+    }
+
     /// Kinetic energy of device and hand, and what the hand's spring holds.
     pub fn energy_j(&self) -> f64 {
         let lag_m = self.path.position_m() - self.tip_in_world;
         0.5 * self.moving_mass_kg() * self.velocity_m_per_s.norm_squared()
             + 0.5 * self.config.hand.total_stiffness_n_per_m() * lag_m.norm_squared()
+    }
+
+    /// Another hand takes over, with no push of its own yet.
+    pub fn set_hand(&mut self, hand: Hand) {
+        self.config.hand = hand;
+        self.push_n = Vector3::zeros();
     }
 
     pub fn set_buttons(&mut self, buttons: u32) {
@@ -129,6 +142,7 @@ impl SimulatedPhantom {
             impulse * ((size - friction) / size / (mass + h * b + h * h * k))
         };
         self.tip_in_world += self.velocity_m_per_s * h;
+        self.work_j += self.wrench.force_n.dot(&self.velocity_m_per_s) * h;
         if let Some((lower, upper)) = self.config.workspace_m {
             self.stop_at_walls(&lower, &upper);
         }

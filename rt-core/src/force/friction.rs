@@ -1,16 +1,20 @@
 //! Dry friction that sticks at zero speed: a set-valued law, solved implicitly in closed form.
 //!
-//! The tissue holds the shaft at an anchor through a stiff spring. The implicit step of
+//! The tissue holds the shaft at an anchor through a spring. The implicit step of
 //! `force in -limit * sgn(anchor speed)` has one solution: the spring's force projected on what friction
-//! can hold, with the anchor dragged along by what is left over (Kikuuwe 2006). No velocity enters, so
-//! nothing chatters at rest, and an anchor that holds does not drift.
+//! can hold, with the anchor dragged along by what is left over (Kikuuwe 2006). A damper beside the spring takes
+//! the energy that sampling would otherwise leak into a stuck shaft; the two together never pass the limit.
 
 use serde::{Deserialize, Serialize};
 
-/// What friction can hold, on either side.
+/// Slip after which a softened shaft has its full stiffness again: at the limit a stiffer spring holds less energy.
+const RESTORE_M: f64 = 0.02;
+
+/// What friction can hold, on either side, and how.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionLimits {
     pub stiffness_n_per_m: f64,
+    pub damping_n_s_per_m: f64,
     /// Against motion towards larger positions.
     pub forward_n: f64,
     /// Against motion towards smaller positions.
@@ -18,23 +22,50 @@ pub struct FrictionLimits {
 }
 
 /// Where the shaft is held. `None`: not in touch.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FrictionState {
     pub anchor_m: Option<f64>,
+    /// Part of the stiffness that the loop has been able to hold, in 0..=1.
+    pub softness: f64,
+    /// What the spring gives, without the damper.
+    pub elastic_n: f64,
 }
 
-impl FrictionState {
-    pub fn release(&mut self) {
-        self.anchor_m = None;
+impl Default for FrictionState {
+    fn default() -> Self {
+        Self {
+            anchor_m: None,
+            softness: 1.0,
+            elastic_n: 0.0,
+        }
     }
 }
 
-/// Force along the axis on the body at `position_m`, within `-forward_n ..= backward_n`.
+impl FrictionState {
+    /// Out of touch; the next touch begins with the full stiffness again.
+    pub fn release(&mut self) {
+        *self = Self::default();
+    }
+
+    /// The loop shakes, or gives energy to the hand: a softer spring at the same anchor holds less of it. Down to
+    /// `floor`, a part of the full stiffness. Slip brings the stiffness back.
+    pub fn soften(&mut self, by: f64, floor: f64) {
+        self.softness = (self.softness * by).max(floor.clamp(0.0, 1.0));
+    }
+
+    /// Energy in the spring, at most what it can give back.
+    pub fn stored_j(&self, limits: &FrictionLimits) -> f64 {
+        0.5 * self.elastic_n * self.elastic_n / (limits.stiffness_n_per_m * self.softness).max(1.0)
+    }
+}
+
+/// Force along the axis on the body at `position_m` that moves with `speed_m_per_s`, within
+/// `-forward_n ..= backward_n`.
 ///
 /// A shaft that comes into touch does so sliding forward, with all of the friction at once.
-pub fn friction(limits: &FrictionLimits, state: &mut FrictionState, position_m: f64) -> f64 {
+pub fn friction(limits: &FrictionLimits, state: &mut FrictionState, position_m: f64, speed_m_per_s: f64) -> f64 {
     let (k, forward, backward) = (
-        limits.stiffness_n_per_m,
+        limits.stiffness_n_per_m * state.softness,
         limits.forward_n.max(0.0),
         limits.backward_n.max(0.0),
     );
@@ -43,9 +74,12 @@ pub fn friction(limits: &FrictionLimits, state: &mut FrictionState, position_m: 
         return 0.0;
     }
     let anchor_m = state.anchor_m.unwrap_or(position_m - forward / k);
-    let force_n = (k * (anchor_m - position_m)).max(-forward).min(backward);
-    state.anchor_m = Some(position_m + force_n / k);
-    force_n
+    let stuck_n = k * (anchor_m - position_m);
+    state.elastic_n = stuck_n.max(-forward).min(backward);
+    let slip_m = (stuck_n - state.elastic_n).abs() / k;
+    state.softness = (state.softness + slip_m / RESTORE_M).min(1.0);
+    state.anchor_m = Some(position_m + state.elastic_n / k);
+    (state.elastic_n - limits.damping_n_s_per_m * speed_m_per_s).clamp(-forward, backward)
 }
 
 #[cfg(test)]
@@ -53,7 +87,8 @@ mod tests {
     use super::*;
 
     const LIMITS: FrictionLimits = FrictionLimits {
-        stiffness_n_per_m: 700.0,
+        stiffness_n_per_m: 6000.0,
+        damping_n_s_per_m: 10.0,
         forward_n: 2.0,
         backward_n: 1.0,
     };
@@ -61,6 +96,7 @@ mod tests {
     fn at_rest(position_m: f64) -> FrictionState {
         FrictionState {
             anchor_m: Some(position_m),
+            ..FrictionState::default()
         }
     }
 
@@ -68,22 +104,22 @@ mod tests {
     fn sliding_friction_has_its_full_size_against_the_motion() {
         let mut state = at_rest(0.0);
         let forward = (1..=100)
-            .map(|i| friction(&LIMITS, &mut state, f64::from(i) * 1e-4))
+            .map(|i| friction(&LIMITS, &mut state, f64::from(i) * 1e-4, 0.1))
             .last();
         assert_eq!(forward, Some(-2.0));
         let backward = (1..=100)
-            .map(|i| friction(&LIMITS, &mut state, 0.01 - f64::from(i) * 1e-4))
+            .map(|i| friction(&LIMITS, &mut state, 0.01 - f64::from(i) * 1e-4, -0.1))
             .last();
         assert_eq!(backward, Some(1.0));
     }
 
     #[test]
-    fn a_stuck_shaft_is_a_spring_that_forgets_nothing() {
+    fn a_stuck_shaft_is_a_spring_and_a_damper_that_forget_nothing() {
         let mut state = at_rest(0.02);
         for i in 0..100_000 {
-            let tremble = 1e-3 * f64::from(i).sin();
-            let force = friction(&LIMITS, &mut state, 0.02 + tremble);
-            assert!((force + 700.0 * tremble).abs() < 1e-9);
+            let (tremble, speed) = (1e-4 * f64::from(i).sin(), 1e-3 * f64::from(i).cos());
+            let force = friction(&LIMITS, &mut state, 0.02 + tremble, speed);
+            assert!((force + 6000.0 * tremble + 10.0 * speed).abs() < 1e-9);
         }
         assert!((state.anchor_m.unwrap() - 0.02).abs() < 1e-12, "the anchor drifts");
     }
@@ -95,22 +131,40 @@ mod tests {
         for i in 0..200_000 {
             let t = f64::from(i) * 1e-3;
             let position = 0.01 * (1.3 * t).sin() + 0.003 * (17.0 * t).sin();
+            let speed = (position - previous) / 1e-3;
             let held = state.anchor_m.unwrap_or(0.0);
-            let force = friction(&LIMITS, &mut state, position);
+            let force = friction(&LIMITS, &mut state, position, speed);
             let slip = state.anchor_m.unwrap_or(0.0) - held;
-            assert!(force * slip <= 1e-15, "friction drives the slip");
+            assert!(state.elastic_n * slip <= 1e-15, "friction drives the slip");
             work += force * (position - previous);
             previous = position;
         }
-        let held_at_most = 2.0 * 2.0 / (2.0 * 700.0);
+        let held_at_most = 2.0 * 2.0 / (2.0 * 6000.0);
         assert!(work < held_at_most, "work done on the operator: {work} J");
+    }
+
+    #[test]
+    fn softening_takes_energy_out_of_a_stuck_shaft() {
+        let mut state = at_rest(0.0);
+        let full = friction(&LIMITS, &mut state, 1e-4, 0.0);
+        let mut stored = state.stored_j(&LIMITS);
+        for _ in 0..100 {
+            state.soften(0.9, 1.0 / 3.0);
+            friction(&LIMITS, &mut state, 1e-4, 0.0);
+            assert!(state.stored_j(&LIMITS) <= stored);
+            stored = state.stored_j(&LIMITS);
+        }
+        assert!(
+            (state.elastic_n - full / 3.0).abs() < 1e-9,
+            "down to the floor and no further"
+        );
     }
 
     #[test]
     fn touch_begins_with_all_of_the_friction() {
         let mut state = FrictionState::default();
-        assert!((friction(&LIMITS, &mut state, 0.5) + 2.0).abs() < 1e-9);
-        assert_eq!(friction(&LIMITS, &mut state, f64::NAN), 0.0);
+        assert!((friction(&LIMITS, &mut state, 0.5, 0.0) + 2.0).abs() < 1e-9);
+        assert_eq!(friction(&LIMITS, &mut state, f64::NAN, 0.0), 0.0);
         assert_eq!(state.anchor_m, None);
     }
 }

@@ -22,6 +22,8 @@ pub struct VelocityEstimator {
     history: [(Vector3<f64>, f64); WINDOW + 1],
     filled: usize,
     velocity_m_per_s: Vector3<f64>,
+    /// Length of the window of the last estimate, on each axis.
+    window_s: Vector3<f64>,
 }
 
 impl VelocityEstimator {
@@ -33,11 +35,22 @@ impl VelocityEstimator {
             history: [(Vector3::zeros(), 0.0); WINDOW + 1],
             filled: 0,
             velocity_m_per_s: Vector3::zeros(),
+            window_s: Vector3::zeros(),
         }
     }
 
     pub fn velocity_m_per_s(&self) -> &Vector3<f64> {
         &self.velocity_m_per_s
+    }
+
+    /// How old the last estimate is, on each axis: the velocity of the middle of its window.
+    pub fn delay_s(&self) -> Vector3<f64> {
+        self.window_s / 2.0
+    }
+
+    /// Largest error of the last estimate that rounding explains, on each axis; infinite before the second sample.
+    pub fn noise_m_per_s(&self) -> Vector3<f64> {
+        self.window_s.map(|window_s| self.step_m / window_s)
     }
 
     pub fn reset(&mut self) {
@@ -61,22 +74,24 @@ impl VelocityEstimator {
         }
         self.filled = (self.filled + 1).min(WINDOW + 1);
         let samples = self.history.get(..self.filled).unwrap_or(&[]);
-        self.velocity_m_per_s = Vector3::new(
+        let slopes = [
             slope(samples, |p| p.x, self.step_m),
             slope(samples, |p| p.y, self.step_m),
             slope(samples, |p| p.z, self.step_m),
-        );
+        ];
+        self.velocity_m_per_s = slopes.map(|(slope, _)| slope).into();
+        self.window_s = slopes.map(|(_, window_s)| window_s).into();
         self.velocity_m_per_s
     }
 }
 
-/// Slope of the longest admissible line through the newest of `samples`, on one axis.
-fn slope(samples: &[(Vector3<f64>, f64)], axis: impl Fn(&Vector3<f64>) -> f64, band_m: f64) -> f64 {
+/// Slope of the longest admissible line through the newest of `samples`, on one axis, and how long it is.
+fn slope(samples: &[(Vector3<f64>, f64)], axis: impl Fn(&Vector3<f64>) -> f64, band_m: f64) -> (f64, f64) {
     let Some((newest, _)) = samples.first() else {
-        return 0.0;
+        return (0.0, 0.0);
     };
     let newest = axis(newest);
-    let mut found = 0.0;
+    let mut found = (0.0, 0.0);
     for (n, (oldest, age_s)) in samples.iter().enumerate().skip(1) {
         let candidate = (newest - axis(oldest)) / age_s;
         let fits = samples
@@ -86,7 +101,7 @@ fn slope(samples: &[(Vector3<f64>, f64)], axis: impl Fn(&Vector3<f64>) -> f64, b
         if !fits {
             break;
         }
-        found = candidate;
+        found = (candidate, *age_s);
     }
     found
 }
@@ -115,6 +130,34 @@ mod tests {
             let bound = STEP_M / (WINDOW as f64 * 1e-3);
             assert!(worst <= bound * 1.001, "speed {speed}: {worst}");
         }
+    }
+
+    /// Against the motion itself: a tip that speeds up and turns back within a second.
+    #[test]
+    fn the_estimate_is_the_velocity_of_its_stated_delay_within_its_stated_noise() {
+        let mut estimator = VelocityEstimator::new(STEP_M);
+        // Most of 0.15 m/s, 0.94 m/s2 and 5.9 m/s3.
+        let omega = 6.28;
+        let (mut longest, mut loudest, mut worst) = (0.0f64, 0.0f64, 0.0f64);
+        for i in 0..5000 {
+            let t = f64::from(i) * 1e-3;
+            let v = estimator.update(&rounded(0.15 / omega * (omega * t).sin()), 1e-3).x;
+            let (delay, noise) = (estimator.delay_s().x, estimator.noise_m_per_s().x);
+            if i <= WINDOW as i32 {
+                continue;
+            }
+            let then = 0.15 * (omega * (t - delay)).cos();
+            assert!((v - then).abs() <= 2.0 * noise, "{v} for {then} m/s, noise {noise}");
+            (longest, loudest) = (longest.max(delay), loudest.max(noise));
+            worst = worst.max((v - 0.15 * (omega * t).cos()).abs());
+        }
+        println!(
+            "delay up to {:.1} ms, noise up to {:.2} mm/s, error up to {:.2} mm/s",
+            longest * 1e3,
+            loudest * 1e3,
+            worst * 1e3
+        );
+        assert!(longest <= 0.016 + 1e-9);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What the two loops and the bridge hand each other: plain data through wait-free rings and triple buffers.
 
-use crate::force::ForceParameters;
-use crate::needle::{NeedleParameters, Phase};
+use crate::force::{ForceParameters, LocalResponse};
+use crate::needle::{LayerKind, NeedleParameters, Phase};
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use crate::tissue::Limits;
@@ -24,6 +24,9 @@ pub struct TipPose {
     pub held_travel_m: Vector3<f64>,
     /// The last contact that the haptic loop has ended.
     pub released_contact: u64,
+    /// Number of the innermost layer that the shaft is in, and the largest number taken up so far.
+    pub innermost_layer: u64,
+    pub seen_layer: u64,
 }
 
 impl Default for TipPose {
@@ -37,6 +40,8 @@ impl Default for TipPose {
             punctured: false,
             held_travel_m: Vector3::zeros(),
             released_contact: 0,
+            innermost_layer: 0,
+            seen_layer: 0,
         }
     }
 }
@@ -51,6 +56,12 @@ pub struct TissueResponse {
     pub contact_in_scene: Vector3<f64>,
     /// r of eq. 6, kept for the whole contact.
     pub path_direction: Vector3<f64>,
+    /// The innermost layer met, under a number that rises over the run, and where.
+    pub layer: LayerKind,
+    pub layer_number: u64,
+    pub layer_in_scene: Vector3<f64>,
+    /// What the body answers at the tip.
+    pub local: LocalResponse,
     pub worst_residual: f64,
     pub worst_work_ns: u64,
     pub worst_wake_ns: u64,
@@ -67,6 +78,10 @@ impl Default for TissueResponse {
             contact: 0,
             contact_in_scene: Vector3::zeros(),
             path_direction: Vector3::z(),
+            layer: LayerKind::default(),
+            layer_number: 0,
+            layer_in_scene: Vector3::zeros(),
+            local: LocalResponse::default(),
             worst_residual: 0.0,
             worst_work_ns: 0,
             worst_wake_ns: 0,
@@ -81,6 +96,8 @@ impl Default for TissueResponse {
 pub type Ticket = u64;
 
 /// Bridge to haptic.
+// Copied through a ring: a box would be freed in the loop.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub enum HapticOrder {
     Parameters {

@@ -1,11 +1,9 @@
-//! The haptic tick, 1 kHz: read → velocity → needle → force law → passivity → gate → write → pose → record.
+//! The haptic tick, 1 kHz: read → chain (velocity, needle, force law, gate) → write → pose → record.
 
 use crate::device::fault_of;
-use crate::force::{
-    ForceFault, ForceInput, ForceParameters, ForceState, ForceTerms, GateState, PassivityParameters, PassivityState,
-    VelocityEstimator, force, gate, passivity,
-};
-use crate::needle::{self, NeedleInput, NeedleParameters, NeedleState, Phase};
+use crate::force::ForceFault;
+use crate::force::chain::{self, ChainOutput, ChainParameters, ChainState, Touch};
+use crate::needle::Phase;
 use crate::rt::arm::Armed;
 use crate::rt::clock::{self, Grid};
 use crate::rt::exchange::*;
@@ -45,14 +43,8 @@ pub struct HapticLoop {
     device: Box<dyn Device>,
     info: DeviceInfo,
     ports: HapticPorts,
-    needle: NeedleParameters,
-    force: ForceParameters,
-    passivity: PassivityParameters,
-    estimator: VelocityEstimator,
-    needle_state: NeedleState,
-    force_state: ForceState,
-    passivity_state: PassivityState,
-    gate: GateState,
+    parameters: ChainParameters,
+    chain: ChainState,
     sample: Option<Sample>,
     contact: u64,
     pose: TipPose,
@@ -70,13 +62,7 @@ pub struct HapticLoop {
 }
 
 /// What [`Probe`] tells apart in this tick.
-pub const HAPTIC_STAGES: &[&str] = &[
-    "orders",
-    "device read",
-    "force law",
-    "gate and write",
-    "publish and record",
-];
+pub const HAPTIC_STAGES: &[&str] = &["orders", "device read", "force chain", "write", "publish and record"];
 /// The mark at which the device read begins.
 const READ_MARK: usize = 0;
 
@@ -95,15 +81,6 @@ impl Default for DeviceAnswer {
     }
 }
 
-/// One tick's way from sample to force.
-struct Response {
-    phase: Phase,
-    depth_m: f64,
-    speed_m_per_s: f64,
-    terms: ForceTerms,
-    axis: Vector3<f64>,
-}
-
 impl HapticLoop {
     /// Begins with `memory`, which names every field.
     pub fn new(
@@ -118,14 +95,8 @@ impl HapticLoop {
             info: device.info(),
             device,
             ports,
-            needle: memory.needle,
-            force: memory.force,
-            passivity: PassivityParameters::default(),
-            estimator: memory.estimator,
-            needle_state: memory.needle_state,
-            force_state: memory.force_state,
-            passivity_state: memory.passivity_state,
-            gate: memory.gate,
+            parameters: memory.parameters,
+            chain: memory.chain,
             sample: memory.sample,
             contact: memory.contact,
             pose: memory.pose,
@@ -150,7 +121,7 @@ impl HapticLoop {
     pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool, mut publish: impl FnMut(&HapticState)) {
         let mut grid = Grid::from(clock::now_ns(), (self.period_s * 1e9) as u64);
         let mut missed = 0;
-        let mut last_ticks = self.force.gate.ramp_out_ticks + 1;
+        let mut last_ticks = self.parameters.force.gate.ramp_out_ticks + 1;
         while last_ticks > 0 {
             // SYNC: pairs with the bridge's release store; nothing but the flag is carried.
             if stop.load(Ordering::Acquire) {
@@ -181,9 +152,7 @@ impl HapticLoop {
         self.watch(woke_ns, missed, &tissue);
         let response = self.respond(&sample, &tissue);
         self.mark();
-        let force_n = self.guard(&sample, &response);
-        let wrench = Wrench::from_force(force_n);
-        self.answer.write_failed = self.device.write(&wrench).is_err();
+        self.answer.write_failed = self.device.write(&response.wrench).is_err();
         if self.answer.write_failed {
             self.raise(Fault::DeviceError);
         }
@@ -193,7 +162,7 @@ impl HapticLoop {
             probe.output_since_mark(READ_MARK);
         }
         self.hand_over_pose(woke_ns, &sample, &response);
-        self.record(due_ns, [woke_ns, written_ns], missed, &tissue, &response, force_n);
+        self.record(due_ns, [woke_ns, written_ns], missed, &tissue, &response);
     }
 
     fn notify(&mut self, notice: Notice) {
@@ -214,7 +183,7 @@ impl HapticLoop {
                     needle,
                     force,
                 } => {
-                    (self.needle, self.force) = (needle, force);
+                    self.parameters = ChainParameters { needle, force };
                     self.state.parameters_generation = generation;
                     self.notify(Notice::ParametersActive {
                         ticket,
@@ -233,7 +202,7 @@ impl HapticLoop {
                 }),
                 HapticOrder::Engage { ticket } => self.engage(ticket, tick),
                 HapticOrder::Disengage { ticket } => {
-                    self.gate.release();
+                    self.chain.gate.release();
                     self.notify(Notice::Done { ticket, tick });
                 }
                 HapticOrder::Reset { ticket } => self.reset(ticket, tick),
@@ -247,7 +216,7 @@ impl HapticLoop {
             let time_ns = self.state.time_ns;
             self.notify(Notice::Rearmed { tick, time_ns });
         }
-        self.gate.engage();
+        self.chain.gate.engage();
         self.notify(Notice::Done { ticket, tick });
     }
 
@@ -290,7 +259,7 @@ impl HapticLoop {
     }
 
     fn raise(&mut self, fault: Fault) {
-        self.gate.trip(at_gate(fault));
+        self.chain.gate.trip(at_gate(fault));
         if self.watchdog.raise(fault) {
             let (tick, time_ns) = (self.state.tick + 1, self.state.time_ns);
             self.notify(Notice::Fault { tick, time_ns, fault });
@@ -304,7 +273,7 @@ impl HapticLoop {
             missed,
             tissue_ns: tissue.time_ns,
             tissue_unsolved: tissue.unsolved,
-            engaged: self.gate.engaged(),
+            engaged: self.chain.gate.engaged(),
         });
         if let Some(fault) = fault {
             self.raise(fault);
@@ -313,119 +282,81 @@ impl HapticLoop {
 
     fn end_contact(&mut self) {
         self.pose.released_contact = self.contact;
-        self.needle_state = NeedleState::default();
-        self.force_state = ForceState::default();
+        self.chain.end_contact();
     }
 
-    /// Eq. 6-10 for this sample.
-    fn respond(&mut self, sample: &Sample, tissue: &TissueResponse) -> Response {
-        let velocity = self.estimator.update(&sample.tip_in_world, self.period_s);
-        let touching = tissue.contact > self.pose.released_contact;
-        if touching {
-            self.contact = tissue.contact;
+    /// Where the tip meets tissue, unless this loop has ended that contact already.
+    fn touch(&mut self, tissue: &TissueResponse) -> Option<Touch> {
+        if tissue.contact <= self.pose.released_contact {
+            return None;
         }
-        let axis = if touching {
-            tissue.path_direction
-        } else {
-            sample.direction_in_world()
-        };
-        let depth_m = if touching {
-            (sample.tip_in_world - tissue.contact_in_scene).dot(&axis)
-        } else {
-            0.0
-        };
-        let speed_m_per_s = velocity.dot(&axis);
-        let last_tip = self.sample.map_or(sample.tip_in_world, |s| s.tip_in_world);
-        let input = NeedleInput {
-            depth_m: if touching { depth_m } else { -1.0 },
-            speed_along_m_per_s: speed_m_per_s,
-            speed_m_per_s: velocity.norm(),
-            tip_step_m: sample.tip_in_world - last_tip,
-        };
-        let output = needle::step(&self.needle, &mut self.needle_state, &input);
+        self.contact = tissue.contact;
+        Some(Touch {
+            contact_in_world: tissue.contact_in_scene,
+            path_direction: tissue.path_direction,
+            layer: tissue.layer,
+            layer_number: tissue.layer_number,
+            layer_in_world: tissue.layer_in_scene,
+            local: tissue.local,
+        })
+    }
+
+    /// Eq. 6-10 for this sample, and the gate.
+    fn respond(&mut self, sample: &Sample, tissue: &TissueResponse) -> ChainOutput {
+        let touch = self.touch(tissue);
+        let output = chain::step(
+            &self.parameters,
+            &self.info,
+            &mut self.chain,
+            sample,
+            touch.as_ref(),
+            self.period_s,
+        );
         if output.puncture {
             let (tick, time_ns) = (self.state.tick + 1, self.state.time_ns);
             self.notify(Notice::Puncture {
                 tick,
                 time_ns,
-                depth_m,
+                depth_m: output.depth_m,
                 position_m: sample.tip_in_world,
             });
         }
-        if touching && output.phase == Phase::Outside {
-            self.end_contact();
+        if output.left {
+            self.pose.released_contact = self.contact;
         }
-        self.pose.held_travel_m += output.held_step_m;
-        let terms = force(
-            &self.force,
-            &mut self.force_state,
-            &ForceInput {
-                tip_in_world: sample.tip_in_world,
-                velocity_m_per_s: velocity,
-                path_origin_in_world: tissue.contact_in_scene,
-                path_direction: axis,
-                depth_m,
-                puncture_depth_m: self.needle.puncture_depth_m,
-                phase: output.phase,
-                punctured: self.needle_state.punctured,
-            },
-        );
-        Response {
-            phase: output.phase,
-            depth_m,
-            speed_m_per_s,
-            terms,
-            axis,
-        }
-    }
-
-    /// Passivity, then the gate: its output alone reaches the device.
-    fn guard(&mut self, sample: &Sample, response: &Response) -> Vector3<f64> {
-        let last_tip = self.sample.map_or(sample.tip_in_world, |s| s.tip_in_world);
-        let applied_n = *self.gate.output_n();
-        let wanted_n = passivity::step(
-            &self.passivity,
-            &mut self.passivity_state,
-            &applied_n,
-            &(sample.tip_in_world - last_tip),
-            self.period_s,
-            &response.terms.total_n,
-        );
-        let output = gate::step(&self.force.gate, &self.info, &mut self.gate, &wanted_n, self.period_s);
-        if output.fault == Some(ForceFault::NonFiniteForce) && self.watchdog.fault() == Fault::None {
+        if self.chain.gate.fault() == Some(ForceFault::NonFiniteForce) && self.watchdog.fault() == Fault::None {
             self.raise(Fault::NonFiniteForce);
         }
         self.sample = Some(*sample);
-        output.force_n
+        output
     }
 
-    fn hand_over_pose(&mut self, woke_ns: u64, sample: &Sample, response: &Response) {
+    fn hand_over_pose(&mut self, woke_ns: u64, sample: &Sample, response: &ChainOutput) {
         self.pose.time_ns = woke_ns;
         self.pose.tip_in_scene = sample.tip_in_world;
         self.pose.direction = sample.direction_in_world();
-        self.pose.speed_along_m_per_s = response.speed_m_per_s;
+        self.pose.speed_along_m_per_s = response.speed_along_m_per_s;
         self.pose.phase = response.phase;
-        self.pose.punctured = self.needle_state.punctured;
+        self.pose.punctured = self.chain.needle.punctured;
+        self.pose.held_travel_m = self.chain.held_travel_m;
+        self.pose.innermost_layer = self.chain.path.innermost();
+        self.pose.seen_layer = self.chain.path.seen();
         self.ports.pose.write(self.pose);
     }
 
-    fn flags(&self, response: &Response) -> u32 {
+    fn flags(&self, response: &ChainOutput) -> u32 {
         let always = flags::REAL_TIME | flags::SIMULATED_DEVICE;
-        let speed = self.estimator.velocity_m_per_s().norm();
+        let speed = self.chain.estimator.velocity_m_per_s().norm();
         let at_goal = self.goal.is_some_and(|goal| {
             (self.pose.tip_in_scene - goal.tip_in_world).norm() < AT_GOAL_M && speed < AT_REST_M_PER_S
         });
         let bit = |set: bool, flag: u32| if set { flag } else { 0 };
         (self.state.flags & always)
-            | bit(self.gate.engaged(), flags::ENGAGED)
+            | bit(self.chain.gate.engaged(), flags::ENGAGED)
+            | bit(self.chain.gate.waiting(), flags::WAITING)
             | bit(response.phase != Phase::Outside, flags::IN_CONTACT)
-            | bit(self.needle_state.punctured, flags::PUNCTURED)
+            | bit(self.chain.needle.punctured, flags::PUNCTURED)
             | bit(at_goal, flags::AT_GOAL)
-    }
-
-    fn interventions(&self) -> u64 {
-        let c = self.gate.counts();
-        c.non_finite + c.magnitude_limited + c.thermal_limited + c.slew_limited + c.device_limited + c.faults
     }
 
     fn record(
@@ -434,12 +365,14 @@ impl HapticLoop {
         [woke_ns, written_ns]: [u64; 2],
         missed: u32,
         tissue: &TissueResponse,
-        response: &Response,
-        force_n: Vector3<f64>,
+        response: &ChainOutput,
     ) {
         let t = &response.terms;
         let along = |v: &Vector3<f64>| v.dot(&response.axis);
-        let interventions = self.interventions();
+        let gate = &self.chain.gate;
+        let gate_counts = gate.counts().all();
+        let interventions = gate_counts.iter().sum();
+        let (energy_j, warmth_n) = (gate.passivity().energy_j(), gate.warmth_n());
         let mut now_flags = self.flags(response);
         if interventions > self.state.gate_interventions {
             now_flags |= flags::GATE_ACTED;
@@ -452,8 +385,9 @@ impl HapticLoop {
         s.needle_direction = self.pose.direction.into();
         s.contact_in_scene_m = tissue.contact_in_scene.into();
         s.depth_m = response.depth_m;
-        s.speed_m_per_s = response.speed_m_per_s;
-        s.force_on_hand_n = force_n.into();
+        s.speed_m_per_s = response.speed_along_m_per_s;
+        s.force_on_hand_n = response.wrench.force_n.into();
+        s.torque_on_hand_nm = response.wrench.torque_nm.into();
         s.force_terms_n = [
             along(&t.membrane_n),
             t.guide_n.norm(),
@@ -461,8 +395,8 @@ impl HapticLoop {
             along(&t.friction_n),
             along(&t.gravity_n),
         ];
-        s.peak_force_n = s.peak_force_n.max(force_n.norm());
-        s.force_scale = self.force.gate.force_scale;
+        s.peak_force_n = s.peak_force_n.max(response.wrench.force_n.norm());
+        s.force_scale = self.parameters.force.gate.force_scale;
         s.missed_deadlines += u64::from(missed);
         s.worst_wake_ns = s.worst_wake_ns.max(wake_latency_ns);
         s.tissue_tick = tissue.tick;
@@ -471,6 +405,10 @@ impl HapticLoop {
         s.worst_residual = tissue.worst_residual;
         s.worst_tissue_work_ns = tissue.worst_work_ns;
         s.gate_interventions = interventions;
+        s.gate_counts = gate_counts;
+        s.energy_j = energy_j;
+        s.warmth_n = warmth_n;
+        s.tissue_force_n = along(&t.tissue_n);
         s.phase = response.phase.code();
         s.fault = self.watchdog.fault() as u32;
         s.flags = now_flags;

@@ -1,7 +1,8 @@
 //! What the haptic loop writes to its flight recording, each tick.
 
-use crate::force::{ForceParameters, ForceState, GateState, PassivityState, VelocityEstimator};
-use crate::needle::{NeedleParameters, NeedleState};
+use crate::force::ForceParameters;
+use crate::force::chain::{ChainParameters, ChainState};
+use crate::needle::NeedleParameters;
 use crate::rt::exchange::{HapticOrder, TipPose, TissueResponse};
 use crate::rt::recorder::{FLIGHT_TICKS, Last, Tape, complete_from};
 use crate::rt::taped::pod;
@@ -18,13 +19,8 @@ const ORDERS: usize = 4096;
 /// Everything that one tick of the haptic loop leaves to the next.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct HapticMemory {
-    pub needle: NeedleParameters,
-    pub force: ForceParameters,
-    pub estimator: VelocityEstimator,
-    pub needle_state: NeedleState,
-    pub force_state: ForceState,
-    pub passivity_state: PassivityState,
-    pub gate: GateState,
+    pub parameters: ChainParameters,
+    pub chain: ChainState,
     pub sample: Option<Sample>,
     pub contact: u64,
     pub pose: TipPose,
@@ -42,13 +38,8 @@ impl HapticMemory {
         state.device_limit_n = info.peak_force_n;
         state.parameters_generation = 1;
         Self {
-            needle,
-            force,
-            estimator: VelocityEstimator::new(info.position_step_m),
-            needle_state: NeedleState::default(),
-            force_state: ForceState::default(),
-            passivity_state: PassivityState::default(),
-            gate: GateState::default(),
+            parameters: ChainParameters { needle, force },
+            chain: ChainState::new(info),
             sample: None,
             contact: 0,
             pose: TipPose::default(),

@@ -12,6 +12,7 @@ pub mod exchange;
 pub mod haptic;
 pub mod haptic_tape;
 pub mod heap;
+pub mod layers_met;
 pub mod recorder;
 pub mod taped;
 pub mod timing;

@@ -1,8 +1,11 @@
 //! The tissue tick, 200 Hz: newest pose → contact → held element → constraints → seeds → response → snapshot.
 
+use crate::force::LocalResponse;
+use crate::needle::LayerKind;
 use crate::rt::arm::Armed;
 use crate::rt::clock::{self, Grid};
 use crate::rt::exchange::*;
+use crate::rt::layers_met::LayersMet;
 use crate::rt::recorder::Recorder;
 use crate::rt::timing::Probe;
 use crate::rt::tissue_tape::{TapedOrder, TissueTape};
@@ -57,6 +60,7 @@ pub struct TissueLoop {
     seeds: Vec<Seed>,
     contact: Option<Contact>,
     contacts: u64,
+    layers: LayersMet,
     /// The tip has been outside since the last contact.
     clear: bool,
     held: Option<Held>,
@@ -86,6 +90,7 @@ impl TissueLoop {
             seeds: Vec::with_capacity(MAX_SEEDS),
             contact: None,
             contacts: 0,
+            layers: LayersMet::default(),
             clear: true,
             held: None,
             pose: TipPose::default(),
@@ -106,6 +111,11 @@ impl TissueLoop {
     /// What the haptic loop was last told.
     pub fn response(&self) -> &TissueResponse {
         &self.response
+    }
+
+    /// The scene that it works on.
+    pub fn world(&self) -> &World {
+        &self.world
     }
 
     /// Runs on the ideal grid until `stop`.
@@ -136,6 +146,7 @@ impl TissueLoop {
         self.mark();
         self.end_contact_if_released();
         self.begin_contact_if_met(&before);
+        self.meet_next_layer(&before);
         let travel = self.pose.held_travel_m - before.held_travel_m;
         self.hold(travel);
         self.mark();
@@ -198,6 +209,7 @@ impl TissueLoop {
 
     fn let_go(&mut self) {
         self.contact = None;
+        self.layers.end();
         self.held = None;
         self.clear = false;
         self.response.contact = 0;
@@ -247,19 +259,16 @@ impl TissueLoop {
         if !self.clear || self.pose.speed_along_m_per_s < CONTACT_SPEED_M_PER_S {
             return;
         }
-        let place = self.entry_between(before.tip_in_scene, self.pose.tip_in_scene, point.element);
+        let place = self.entry_between(before.tip_in_scene, self.pose.tip_in_scene, point.element, |_| true);
         self.contacts += 1;
         self.contact = Some(Contact {
             number: self.contacts,
             place,
             direction: self.pose.direction,
         });
-        let position_m = self.world.tissue.deformed().position_m(point.element);
-        self.held = Some(Held {
-            element: point.element,
-            position_m,
-            patch_m: self.world.scene.tissue.tip_patch_m(),
-        });
+        let layer = self.world.layer(point.element);
+        let number = self.layers.begin(layer);
+        self.take_hold_at(layer, number, place, point.element);
         let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
         self.notify(Notice::Contact {
             tick,
@@ -268,11 +277,48 @@ impl TissueLoop {
         });
     }
 
+    /// The tip has come from one layer into another: a membrane of its own, and a new held element.
+    fn meet_next_layer(&mut self, before: &TipPose) {
+        let (Some(_), Some(held)) = (self.contact, self.held) else {
+            return;
+        };
+        let Some(point) = self.locate(&self.pose.tip_in_scene, Some(held.element)) else {
+            return;
+        };
+        let layer = self.world.layer(point.element);
+        let inwards = self.pose.speed_along_m_per_s > CONTACT_SPEED_M_PER_S;
+        if let Some(number) = self.layers.enter(layer, inwards, &self.pose) {
+            let (from, to) = (before.tip_in_scene, self.pose.tip_in_scene);
+            let place = self.entry_between(from, to, point.element, |e| self.world.layer(e) == layer);
+            self.take_hold_at(layer, number, place, point.element);
+        }
+    }
+
+    fn take_hold_at(&mut self, layer: LayerKind, number: u64, place: Vector3<f64>, element: u32) {
+        self.response.layer = layer;
+        self.response.layer_number = number;
+        self.response.layer_in_scene = place;
+        self.held = Some(Held {
+            element,
+            position_m: self.world.tissue.deformed().position_m(element),
+            patch_m: self.world.scene.tissue.tip_patch_m(),
+        });
+    }
+
     /// Bisection between a place outside and one inside; the inner one where even the start is inside.
-    fn entry_between(&self, mut outside: Vector3<f64>, mut inside: Vector3<f64>, hint: u32) -> Vector3<f64> {
+    fn entry_between(
+        &self,
+        mut outside: Vector3<f64>,
+        mut inside: Vector3<f64>,
+        hint: u32,
+        is_inside: impl Fn(u32) -> bool,
+    ) -> Vector3<f64> {
         for _ in 0..8 {
             let middle = (outside + inside) / 2.0;
-            if self.locate(&middle, Some(hint)).is_some() {
+            if self
+                .locate(&middle, Some(hint))
+                .is_some_and(|point| is_inside(point.element))
+            {
                 inside = middle;
             } else {
                 outside = middle;
@@ -355,6 +401,7 @@ impl TissueLoop {
 
     fn respond(&mut self, woke_ns: u64, report: &StepReport) {
         let (contact, held) = (self.contact, self.held.is_some());
+        let local = self.local_response(report);
         let response = &mut self.response;
         response.tick += 1;
         response.time_ns = woke_ns;
@@ -363,10 +410,26 @@ impl TissueLoop {
             response.contact_in_scene = contact.place;
             response.path_direction = contact.direction;
         }
+        response.local = local;
         response.worst_residual = response.worst_residual.max(report.residual);
         // Limits tightened over tissue that nothing holds are met as it recovers; no force depends on it.
         response.unsolved = !report.converged && held;
         self.ports.response.write(*response);
+    }
+
+    /// What the haptic loop carries on at its own rate; no answer while nothing is held.
+    fn local_response(&self, report: &StepReport) -> LocalResponse {
+        let Some(held) = self.held else {
+            return LocalResponse::default();
+        };
+        let rest_m = Vector3::from(self.world.scene.lattice.rest_m(held.element));
+        let now_m = Vector3::from(self.world.tissue.deformed().position_m(held.element));
+        LocalResponse {
+            tick: self.response.tick + 1,
+            travel_m: self.pose.held_travel_m,
+            displacement_m: now_m - rest_m,
+            force_n: report.tip_force_n.map(Vector3::from),
+        }
     }
 
     fn publish_snapshot(&mut self, woke_ns: u64, report: &StepReport) {

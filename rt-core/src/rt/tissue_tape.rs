@@ -1,6 +1,7 @@
 //! What the tissue loop writes to its flight recording, each tick.
 
 use crate::rt::exchange::{TipPose, TissueResponse};
+use crate::rt::layers_met::LayersMet;
 use crate::rt::recorder::{Last, Tape, complete_from};
 use crate::rt::tissue::{Contact, Seed};
 use crate::rt::world::World;
@@ -31,6 +32,7 @@ pub struct TissueMemory {
     pub seeds: Vec<Seed>,
     pub contact: Option<Contact>,
     pub contacts: u64,
+    pub layers: LayersMet,
     pub clear: bool,
     pub held: Option<Held>,
     pub pose: TipPose,
@@ -72,6 +74,7 @@ impl TissueTape {
             seeds: Vec::with_capacity(MAX_SEEDS),
             contact: None,
             contacts: 0,
+            layers: LayersMet::default(),
             clear: true,
             held: None,
             pose: TipPose::default(),

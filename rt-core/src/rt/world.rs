@@ -1,5 +1,6 @@
 //! The scene as the tissue loop owns it: built by another thread, swapped in whole.
 
+use crate::needle::LayerKind;
 use crate::scene::Scene;
 use crate::tissue::{ChainMailTissue, FemTissue, Limits, TissueKind, TissueModel};
 
@@ -8,6 +9,8 @@ pub struct World {
     /// Rises with each scene of a run.
     pub generation: u64,
     pub scene: Scene,
+    /// What each structure of the scene is to the needle.
+    pub layers: Vec<LayerKind>,
     pub tissue: Box<dyn TissueModel>,
     /// As the tissue was last given them.
     pub limits: Limits,
@@ -26,6 +29,7 @@ impl World {
         };
         Ok(Self {
             generation,
+            layers: scene.structures.iter().map(LayerKind::of_structure).collect(),
             tissue,
             scene,
             limits,
@@ -35,5 +39,11 @@ impl World {
     pub fn set_limits(&mut self, limits: Limits) {
         self.limits.clone_from(&limits);
         self.tissue.set_limits(limits);
+    }
+
+    /// The layer that an element belongs to.
+    pub fn layer(&self, element: u32) -> LayerKind {
+        let structure = usize::from(self.scene.lattice.structure(element));
+        self.layers.get(structure).copied().unwrap_or_default()
     }
 }

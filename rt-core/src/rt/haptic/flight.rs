@@ -13,14 +13,8 @@ impl HapticLoop {
             device: _,
             info: _,
             ports: _,
-            needle,
-            force,
-            passivity: _,
-            estimator,
-            needle_state,
-            force_state,
-            passivity_state,
-            gate,
+            parameters,
+            chain,
             sample,
             contact,
             pose,
@@ -28,16 +22,13 @@ impl HapticLoop {
             watchdog,
             answer: _,
             state,
+            probe: _,
+            spin_ns: _,
             period_s: _,
         } = self;
         HapticMemory {
-            needle: *needle,
-            force: *force,
-            estimator: *estimator,
-            needle_state: *needle_state,
-            force_state: *force_state,
-            passivity_state: *passivity_state,
-            gate: *gate,
+            parameters: *parameters,
+            chain: *chain,
             sample: *sample,
             contact: *contact,
             pose: *pose,
@@ -49,7 +40,7 @@ impl HapticLoop {
 
     /// The end counts as an order, so that its ramp can be repeated.
     pub(super) fn release_for_the_end(&mut self) {
-        self.gate.release();
+        self.chain.gate.release();
         if let Some(tape) = self.ports.flight.tape() {
             tape.order(HapticOrder::Disengage { ticket: 0 });
         }

@@ -14,17 +14,20 @@ impl TissueLoop {
             seeds,
             contact,
             contacts,
+            layers,
             clear,
             held,
             pose,
             report: _,
             response,
+            probe: _,
             period_s: _,
         } = self;
         to.seeds.clear();
         to.seeds.extend_from_slice(seeds);
         to.contact = *contact;
         to.contacts = *contacts;
+        to.layers = *layers;
         to.clear = *clear;
         to.held = *held;
         to.pose = *pose;
@@ -39,6 +42,7 @@ impl TissueLoop {
         self.seeds.extend_from_slice(&memory.seeds);
         self.contact = memory.contact;
         self.contacts = memory.contacts;
+        self.layers = memory.layers;
         self.clear = memory.clear;
         self.held = memory.held;
         self.pose = memory.pose;
