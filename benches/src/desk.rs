@@ -5,8 +5,12 @@ use rt_core::force::ForceParameters;
 use rt_core::force::chain::{self, ChainOutput, ChainParameters, ChainState, Touch};
 use rt_core::needle::{LayerKind, NeedleParameters};
 use rt_core::rt::exchange::{TipPose, TissueResponse};
+use rt_core::rt::recorder::recorder;
 use rt_core::rt::tissue::{TissueLoop, TissuePorts};
+use rt_core::rt::tissue_tape::TissueTape;
 use rt_core::rt::world::World;
+use rt_core::scene::SceneSource;
+use std::sync::Arc;
 use stylet_hw::{Device, DeviceInfo, Hand, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
 
 /// Haptic ticks are 1 ms; the tissue answers every `tissue_every`th.
@@ -37,6 +41,8 @@ impl Desk {
         let info = device.info();
         let (pose_in, pose) = triple_buffer::triple_buffer(&TipPose::default());
         let (response, response_out) = triple_buffer::triple_buffer(&TissueResponse::default());
+        let source = Arc::new(SceneSource::Builtin(world.scene.name.clone()));
+        let (flight, _) = recorder(Box::new(TissueTape::new(&world, source)));
         let ports = TissuePorts {
             pose,
             response,
@@ -45,6 +51,7 @@ impl Desk {
             old_worlds: rtrb::RingBuffer::new(1).0,
             slots: rtrb::RingBuffer::new(1).1,
             filled: rtrb::RingBuffer::new(1).0,
+            flight,
         };
         let mut chain = ChainState::new(&info);
         chain.gate.engage();

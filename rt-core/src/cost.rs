@@ -227,7 +227,7 @@ fn read_body(scene: &Scene, model: &mut dyn TissueModel, script: &Script, [locat
     let mut hint = None;
     play(model, script, &mut Vec::new(), |model, tip| {
         let body = model.deformed();
-        let mut timed = |part: &mut Part, work: &mut dyn FnMut()| {
+        let timed = |part: &mut Part, work: &mut dyn FnMut()| {
             let start = Instant::now();
             work();
             part.micros.push(start.elapsed().as_secs_f64() * 1e6);

@@ -138,7 +138,7 @@ impl Rig {
         self.cause.store(cause as u32, Ordering::Relaxed);
         self.tissue.unsolved = cause == Cause::TissueUnsolved;
         let force = ForceParameters {
-            membrane_peak_n: if cause == Cause::ForceNotANumber { f64::NAN } else { 5.6 },
+            membrane_gain: if cause == Cause::ForceNotANumber { f64::NAN } else { 1.0 },
             ..ForceParameters::default()
         };
         self.order(HapticOrder::Parameters {

@@ -96,7 +96,7 @@ pub struct Limits {
 }
 
 /// Elastic relaxation; stiffnesses beside that along a link.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Relaxation {
     pub iterations: u32,
     pub weight: f32,
