@@ -158,7 +158,12 @@ fn no_hand_of_the_envelope_makes_the_loop_sing_at_any_lateness_anywhere() {
             );
             assert!(case.late_m <= case.early_m + STEP_M, "{} grows", case.name);
             // Until a shake is seen to be one; uncontrolled it is some hundred times that.
-            assert!(case.after_j < 10e-3, "{} gives {} J after the change", case.name, case.after_j);
+            assert!(
+                case.after_j < 10e-3,
+                "{} gives {} J after the change",
+                case.name,
+                case.after_j
+            );
             assert!(
                 case.excess_j <= case.bound_j,
                 "{} gives {} J",
@@ -178,7 +183,10 @@ fn without_control_late_links_sing() {
                 .map(|hand| session(hand, late_ticks, place, false))
                 .collect();
             let (after_j, _) = worst(&cases, |c| c.after_j);
-            println!("{place:?}, {late_ticks} late, uncontrolled: given {:.0} mJ", after_j * 1e3);
+            println!(
+                "{place:?}, {late_ticks} late, uncontrolled: given {:.0} mJ",
+                after_j * 1e3
+            );
             cases.iter().filter(|case| case.sings()).count()
         });
         println!("{place:?}, uncontrolled: of 27 hands sing, by lateness: {singing:?}");

@@ -108,7 +108,10 @@ fn on_reversal_friction_turns_within_a_millimetre() {
         let (low_m, _) = span(&rig.run(2.0), |t| t.true_tip_m);
         let recoil_m = before_m - low_m;
         println!("recoil at 45 mm, {who}: {:.2} mm", recoil_m * 1e3);
-        assert!(hand == Hand::absent() || recoil_m < 1.5e-3, "springs back by {recoil_m} m");
+        assert!(
+            hand == Hand::absent() || recoil_m < 1.5e-3,
+            "springs back by {recoil_m} m"
+        );
     }
 }
 
