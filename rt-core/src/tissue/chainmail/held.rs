@@ -42,25 +42,37 @@ pub(super) fn grip(model: &ChainMail, held: Option<Held>) -> (Option<Grip>, Held
 /// Puts what is held in place; what that moves is active. Whether anything was not there.
 pub(super) fn put(model: &ChainMail, state: &mut TissueState, grip: &Grip) -> bool {
     let mut moved = false;
-    let [i, j, k] = model.lattice.cell(grip.element);
-    let ny = model.lattice.dims[1];
-    let around = |n: usize, count: usize| n.saturating_sub(grip.beside)..(n + grip.beside + 1).min(count);
+    let [_, j, k] = model.lattice.cell(grip.element);
+    for k in around(k, grip, model.lattice.dims[2]) {
+        for j in around(j, grip, model.lattice.dims[1]) {
+            moved |= put_row(model, state, grip, [j, k]);
+        }
+    }
+    moved
+}
+
+fn around(centre: usize, grip: &Grip, count: usize) -> std::ops::Range<usize> {
+    centre.saturating_sub(grip.beside)..(centre + grip.beside + 1).min(count)
+}
+
+/// As `put`, for what is held in one row; nothing if nothing is.
+pub(super) fn put_row(model: &ChainMail, state: &mut TissueState, grip: &Grip, [j, k]: [usize; 2]) -> bool {
+    let [held_i, held_j, held_k] = model.lattice.cell(grip.element);
+    if j.abs_diff(held_j) > grip.beside || k.abs_diff(held_k) > grip.beside {
+        return false;
+    }
     let part = model.part(grip.element);
-    let cells = around(i, model.lattice.dims[0]);
-    for k in around(k, model.lattice.dims[2]) {
-        for j in around(j, ny) {
-            for run in model.rows.numbers(j + ny * k) {
-                if model.part_of_run(run) != part {
-                    continue;
-                }
-                let of_run = model.rows.runs[run];
-                let wanted = Stretch {
-                    start: cells.start as u32,
-                    end: cells.end as u32,
-                };
-                for n in elements(wanted.within(of_run.start_i, of_run.len)) {
-                    moved |= put_one(model, state, of_run.first + n, run, grip.at, [j, k]);
-                }
+    let cells = around(held_i, grip, model.lattice.dims[0]);
+    let wanted = Stretch {
+        start: cells.start as u32,
+        end: cells.end as u32,
+    };
+    let mut moved = false;
+    for run in model.rows.numbers(j + model.lattice.dims[1] * k) {
+        if model.part_of_run(run) == part {
+            let of_run = model.rows.runs[run];
+            for n in elements(wanted.within(of_run.start_i, of_run.len)) {
+                moved |= put_one(model, state, of_run.first + n, run, grip.at, [j, k]);
             }
         }
     }

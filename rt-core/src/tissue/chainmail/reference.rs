@@ -38,8 +38,7 @@ impl Reference {
         let mut residual = self.sweep(model, held.element);
         if let Some(relaxation) = model.limits().relaxation {
             for half in 0..2 * relaxation.iterations as usize {
-                self.relax(model, half % 2);
-                self.u[held.element as usize] = at;
+                self.relax(model, held.element, half % 2);
             }
             residual = self.sweep(model, held.element);
         }
@@ -112,10 +111,11 @@ impl Reference {
     }
 
     /// One half pass of relaxation, as `relax::half_pass`.
-    fn relax(&mut self, model: &ChainMail, parity: usize) {
+    fn relax(&mut self, model: &ChainMail, held: u32, parity: usize) {
         let Some(relaxation) = model.limits().relaxation else {
             return;
         };
+        let at = self.u[held as usize];
         let [_, ny, nz] = model.lattice.dims;
         let (shear, ground) = (f64::from(relaxation.shear), f64::from(relaxation.ground));
         for (j, k) in (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k))) {
@@ -145,6 +145,7 @@ impl Reference {
                     }
                     left = own;
                 }
+                self.u[held as usize] = at;
             }
         }
     }

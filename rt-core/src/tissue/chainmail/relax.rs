@@ -5,6 +5,7 @@
 //! relaxed row by row, first the rows with even j + k and then the others, elements of a row all at once: that
 //! converges for weights between 0 and 2 (`docs/physics.md`).
 
+use super::held::{self, Grip};
 use super::model::ChainMail;
 use super::segments::{LEFT, RIGHT, Segment};
 use super::state::TissueState;
@@ -26,9 +27,15 @@ pub(super) trait Rows {
     fn relax(u: &mut [f32], segment: &Segment, shares: &Shares);
 }
 
-/// One pass over the rows whose j + k is even (`parity` 0) or odd (1).
+/// One pass over the rows whose j + k is even (`parity` 0) or odd (1); what is held stays.
 #[inline(always)]
-pub(super) fn half_pass<K: Rows>(model: &ChainMail, state: &mut TissueState, relaxation: &Relaxation, parity: usize) {
+pub(super) fn half_pass<K: Rows>(
+    model: &ChainMail,
+    state: &mut TissueState,
+    grip: Option<&Grip>,
+    relaxation: &Relaxation,
+    parity: usize,
+) {
     let ny = model.lattice.dims[1];
     let uniform = [0, 1, 2].map(|component| shares(relaxation, component, &[1.0; 6]));
     for (k, &[first, end]) in model.rows_of_plane.iter().enumerate() {
@@ -40,6 +47,10 @@ pub(super) fn half_pass<K: Rows>(model: &ChainMail, state: &mut TissueState, rel
                         None => K::relax(u, segment, &uniform[component]),
                         Some(weights) => K::relax(u, segment, &shares(relaxation, component, weights)),
                     }
+                }
+                // At once, before the next segment of the row looks at it.
+                if let Some(grip) = grip {
+                    held::put_row(model, state, grip, [j, k]);
                 }
             }
         }

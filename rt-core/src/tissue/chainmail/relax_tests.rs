@@ -130,7 +130,7 @@ fn size_after(weight: f32, passes: u32) -> f32 {
     };
     let before = size(&state);
     for pass in 0..2 * passes {
-        relax::half_pass::<kernels::Portable>(&model, &mut state, &relaxation, pass as usize % 2);
+        relax::half_pass::<kernels::Portable>(&model, &mut state, None, &relaxation, pass as usize % 2);
     }
     size(&state) / before
 }

@@ -88,10 +88,7 @@ fn solve<K: Kernels + relax::Rows>(
         && (grip.is_some() || state.max_displacement > 0.0)
     {
         for half in 0..2 * relaxation.iterations {
-            relax::half_pass::<K>(model, state, relaxation, half as usize % 2);
-            if let Some(grip) = &grip {
-                held::put(model, state, grip);
-            }
+            relax::half_pass::<K>(model, state, grip.as_ref(), relaxation, half as usize % 2);
         }
         report.passes += relaxation.iterations;
         residual = settle::<K>(model, state, grip.as_ref(), slack, report);
