@@ -275,6 +275,9 @@ impl App {
                     self.send("Plan five seeds", CommandKind::SetPlan, &values);
                 }
             }
+            Action::LoadBuiltinScene(number) => {
+                self.send("Built-in scene", CommandKind::LoadBuiltinScene, &[number as f64]);
+            }
             Action::PlaceNeedle => self.move_to("Place needle", 0.0, self.pace.approach_m_per_s),
             Action::Insert => {
                 let depth = self.shown.deepest_seed_m().unwrap_or(0.0);

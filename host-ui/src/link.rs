@@ -269,10 +269,10 @@ impl Link {
             host_id: self.host_id,
             command_id: id,
             dims: volume.dims.map(|d| d as u32),
-            reserved: 0,
             spacing_m: volume.spacing_m,
             patient_from_scene: volume.patient_from_scene,
             name: Text::new(&volume.name),
+            ..UploadHeader::default()
         };
         self.upload_port = None;
         let Some(ports) = &self.ports else {

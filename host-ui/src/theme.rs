@@ -18,6 +18,10 @@ pub const BAD: Color32 = Color32::from_rgb(226, 101, 28);
 pub const ON_SIGNAL: Color32 = Color32::from_rgb(18, 20, 23);
 
 pub const GLAND: Color32 = Color32::from_rgb(196, 142, 132);
+/// The body around the gland.
+pub const BODY: Color32 = Color32::from_rgb(150, 150, 140);
+pub const SPARED: Color32 = Color32::from_rgb(204, 121, 167);
+pub const BONE: Color32 = Color32::from_rgb(222, 212, 180);
 pub const GHOST: Color32 = Color32::from_rgb(120, 140, 165);
 pub const NEEDLE: Color32 = Color32::from_rgb(214, 221, 228);
 pub const NEEDLE_TIP: Color32 = Color32::from_rgb(255, 255, 255);

@@ -3,6 +3,8 @@
 use crate::core::Options;
 use crate::rt::arm;
 use clap::Parser;
+use clap::builder::{PossibleValue, PossibleValuesParser};
+use stylet_shm_schema::BUILTIN_SCENES;
 use stylet_shm_schema::service::Instance;
 
 /// Real-time process of Stylet: owns the haptic device, the 1 kHz force loop and the 200 Hz tissue step.
@@ -16,7 +18,7 @@ pub struct Cli {
     #[arg(long, default_value = "main")]
     instance: String,
     /// Built-in scene to start with
-    #[arg(long, default_value = "paper")]
+    #[arg(long, default_value = BUILTIN_SCENES[0], value_parser = scenes())]
     scene: String,
     /// Run without real-time scheduling; every record and screen then says so
     #[arg(long)]
@@ -42,6 +44,16 @@ pub struct Cli {
     /// On exit write what each loop cost to FILE, as JSON
     #[arg(long, value_name = "FILE")]
     pub report: Option<std::path::PathBuf>,
+}
+
+fn scenes() -> PossibleValuesParser {
+    let help = |name| match name {
+        "paper" => "the gland alone, one tissue, 19,307 elements",
+        "pelvis" => "the gland with capsule and urethra among rectum, bladder, pubic arch, fat and perineum",
+        "full" => "every cell of the grid, one tissue, 1,167,584 elements: for measuring",
+        _ => "",
+    };
+    PossibleValuesParser::new(BUILTIN_SCENES.map(|name| PossibleValue::new(name).help(help(name))))
 }
 
 impl Cli {

@@ -2,7 +2,7 @@
 
 use crate::active::activate;
 use crate::bridge::ports::Ports;
-use crate::bridge::{Bridge, LoopPorts, SnapshotLoans};
+use crate::bridge::{Bridge, LoopPorts, ScenePicture, SnapshotLoans};
 use crate::rt::arm::{self, Armed, Ask, Usage};
 use crate::rt::clock;
 use crate::rt::exchange::{TipPose, TissueResponse};
@@ -65,10 +65,12 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
     let device = device_for(&scene);
     let info = device.info();
     let active = activate(&ParameterSet::default(), &info).map_err(|p| p.join("\n"))?;
-    let world = Box::new(World::new(scene.clone(), active.limits.clone(), 1));
-    let node = options.instance.node().map_err(|e| e.to_string())?;
-    let ports = Ports::new(&node, scene.surface.vertex_elements.len()).map_err(|e| e.to_string())?;
     let session_id = clock::now_ns() ^ (u64::from(std::process::id()) << 40);
+    let picture = ScenePicture::first(&scene, session_id);
+    let node = options.instance.node().map_err(|e| e.to_string())?;
+    let ports =
+        Ports::new(&node, scene.surface.vertex_elements.len(), picture.word_count()).map_err(|e| e.to_string())?;
+    let world = Box::new(World::new(scene, active.limits, 1));
     let board = service::create_state_board(&node, session_id).map_err(|e| e.to_string())?;
     let locked = lock_memory(options)?;
 
@@ -207,7 +209,7 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
         old_worlds: old_world_out,
         loans: SnapshotLoans::new(slot_in, filled_out),
     };
-    let mut bridge = Bridge::new(node, ports, loops, info, session, &scene);
+    let mut bridge = Bridge::new(node, ports, loops, info, session, picture);
     // SYNC: set by a signal handler; nothing but the flag is carried.
     let served = bridge.run(|| stop.load(Ordering::Acquire)).map_err(|e| e.to_string());
     // SYNC: pairs with the acquire loads in both loops.
@@ -218,13 +220,14 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, Strin
     served.map(|()| RunReport { haptic, tissue })
 }
 
-/// The simulated hand starts before the scene, on its axis.
+/// The simulated hand starts outside the body, below its target.
 fn device_for(scene: &Scene) -> Box<dyn Device> {
-    let (lower, upper) = scene.lattice.bounds_m();
+    let (lowest, _) = scene.lattice.bounds_m();
+    let (lower, upper) = scene.target_bounds_m();
     let start = Vector3::new(
         (lower[0] + upper[0]) / 2.0,
         (lower[1] + upper[1]) / 2.0,
-        lower[2] - 0.03,
+        lowest[2] - 0.03,
     );
     Box::new(SimulatedPhantom::new(SimulatedPhantomConfig {
         start_tip_in_world: start,

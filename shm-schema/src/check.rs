@@ -1,6 +1,9 @@
 //! What a reader verifies before it uses a value that came out of shared memory.
 
-use crate::{HapticState, MAX_SEEDS, ParametersInForce, PlanInForce, SceneHeader, SnapshotHeader, TickRecord, Vertex};
+use crate::{
+    HapticState, MAX_SEEDS, MAX_STRUCTURES, ParametersInForce, PlanInForce, SceneHeader, SnapshotHeader, TickRecord,
+    Vertex,
+};
 
 /// Why a value was not believed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,7 +89,24 @@ pub fn scene(h: &SceneHeader, words: &[u32]) -> Result<(), Rubbish> {
         within(&h.lower_m, MAX_COORDINATE_M) && within(&h.upper_m, MAX_COORDINATE_M),
         "bounding box",
     )?;
+    ensure(
+        within(&h.target_lower_m, MAX_COORDINATE_M) && within(&h.target_upper_m, MAX_COORDINATE_M),
+        "bounding box of the targets",
+    )?;
     ensure(within(&h.patient_from_scene, MAX_COORDINATE_M), "patient transform")?;
+    ensure(h.body_triangle_count <= h.triangle_count, "triangles of the body")?;
+    ensure(h.structure_count as usize <= MAX_STRUCTURES, "structure count")?;
+    for structure in h.structures() {
+        let end = structure.first_triangle.checked_add(structure.triangle_count);
+        ensure(
+            end.is_some_and(|end| end <= h.triangle_count),
+            "triangles of a structure",
+        )?;
+        ensure(
+            within(&structure.lower_m, MAX_COORDINATE_M) && within(&structure.upper_m, MAX_COORDINATE_M),
+            "bounding box of a structure",
+        )?;
+    }
     let (positions, indices) = words.split_at(3 * h.vertex_count as usize);
     let limit = MAX_COORDINATE_M as f32;
     ensure(
@@ -147,5 +167,14 @@ mod tests {
             scene(&h, &[word, u32::MAX, word, 0, 0, 0]),
             Err(Rubbish("vertex position"))
         );
+        let words = [word, word, word, 0, 0, 0];
+        (h.structure_count, h.structures[0].triangle_count) = (1, 1);
+        assert!(scene(&h, &words).is_ok());
+        h.structures[0].first_triangle = 1;
+        assert_eq!(scene(&h, &words), Err(Rubbish("triangles of a structure")));
+        (h.structures[0].first_triangle, h.structures[0].upper_m[1]) = (0, f64::NAN);
+        assert_eq!(scene(&h, &words), Err(Rubbish("bounding box of a structure")));
+        h.structure_count = MAX_STRUCTURES as u32 + 1;
+        assert_eq!(scene(&h, &words), Err(Rubbish("structure count")));
     }
 }

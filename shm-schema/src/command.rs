@@ -53,7 +53,7 @@ pub enum CommandKind {
     Disengage = 6,
     /// Tissue to rest, seeds removed, peaks and worst cases forgotten.
     Reset = 7,
-    /// Go back to the built-in scene.
+    /// Run a built-in scene: its place in [`crate::BUILTIN_SCENES`]; the first one without a value.
     LoadBuiltinScene = 8,
     /// Remove the last seed.
     UndoSeed = 9,

@@ -6,7 +6,7 @@
 //! | `state/<session>` | blackboard, one per run | haptic thread | hosts | [`HapticState`]: the latest tick |
 //! | `records` | slices of [`TickRecord`] | bridge | hosts | every tick of the force loop |
 //! | `snapshots` | slices of [`Vertex`] under a [`SnapshotHeader`] | tissue thread, sent by the bridge | hosts | the deformed surface, needle and seeds |
-//! | `scene` | words under a [`SceneHeader`], newest one kept | bridge | hosts | rest surface and triangles |
+//! | `scene` | words under a [`SceneHeader`], newest one kept | bridge | hosts | rest surface, triangles, structures |
 //! | `events` | [`Event`], last 64 kept | bridge | hosts | what happened, once each |
 //! | `parameters` | [`ParametersInForce`], newest one kept | bridge | hosts | the parameters that took effect, and when |
 //! | `plan` | [`PlanInForce`], newest one kept | bridge | hosts | planned seeds and needle path |
@@ -38,7 +38,7 @@ pub use params::{
 };
 pub use plan::{MAX_SEEDS, PlanInForce, PlannedSeed};
 pub use record::TickRecord;
-pub use scene::{SceneHeader, UploadHeader};
+pub use scene::{BUILTIN_SCENES, MAX_STRUCTURES, SceneHeader, StructureInfo, UploadHeader, UploadStructure, role};
 pub use session::{Session, ThreadReport};
 pub use snapshot::{SeedPose, SnapshotHeader, Vertex};
 pub use state::{Fault, HapticState, Phase, flags};

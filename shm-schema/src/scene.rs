@@ -4,6 +4,44 @@ use crate::Text;
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
+/// Scenes that the core can draw without a file; [`crate::CommandKind::LoadBuiltinScene`] takes the place in this list.
+pub const BUILTIN_SCENES: [&str; 3] = ["paper", "pelvis", "full"];
+
+/// Structures in a scene at most.
+pub const MAX_STRUCTURES: usize = 255;
+
+/// What a structure is, as bits of [`StructureInfo::role`] and [`UploadStructure::role`].
+pub mod role {
+    /// What seeds are planned in.
+    pub const TARGET: u32 = 1;
+    /// To be kept from needles and dose.
+    pub const SPARE: u32 = 2;
+    /// Never moves.
+    pub const FIXED: u32 = 4;
+    /// All that are known.
+    pub const ALL: u32 = TARGET | SPARE | FIXED;
+}
+
+/// One structure of the scene that runs.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
+#[type_name("stylet.StructureInfo")]
+pub struct StructureInfo {
+    pub label: u32,
+    /// Bits of [`role`].
+    pub role: u32,
+    pub element_count: u32,
+    /// The triangles of its own surface; none where it is not drawn by itself. The targets together are drawn under the
+    /// first of them.
+    pub first_triangle: u32,
+    pub triangle_count: u32,
+    pub reserved: u32,
+    /// Bounding box at rest.
+    pub lower_m: [f64; 3],
+    pub upper_m: [f64; 3],
+    pub name: Text<32>,
+}
+
 /// Goes with `3 * vertex_count` words of rest positions (`f32` bits, m) and `3 * triangle_count` words of indices.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
@@ -17,23 +55,55 @@ pub struct SceneHeader {
     pub surface_element_count: u32,
     pub vertex_count: u32,
     pub triangle_count: u32,
+    /// The first triangles are the body's; after them come those of the structures in it.
+    pub body_triangle_count: u32,
+    /// How many of `structures` count; at least one.
+    pub structure_count: u32,
     pub reserved: u32,
     pub spacing_m: f64,
     pub volume_m3: f64,
     /// Bounding box of the tissue.
     pub lower_m: [f64; 3],
     pub upper_m: [f64; 3],
+    /// Bounding box of the targets: what a plan aims at.
+    pub target_lower_m: [f64; 3],
+    pub target_upper_m: [f64; 3],
     /// Patient (RAS, m) from scene: row-major rotation, then translation. Identity for built-in scenes.
     pub patient_from_scene: [f64; 12],
     pub name: Text<64>,
+    pub structures: [StructureInfo; MAX_STRUCTURES],
 }
 
 impl SceneHeader {
+    /// Those that count.
+    pub fn structures(&self) -> &[StructureInfo] {
+        &self.structures[..(self.structure_count as usize).min(MAX_STRUCTURES)]
+    }
+
     /// Words that must follow the header; `None` when the counts are absurd.
     pub fn word_count(&self) -> Option<usize> {
         let words = 3 * (u64::from(self.vertex_count) + u64::from(self.triangle_count));
         (words <= 3 * 64_000_000).then_some(words as usize)
     }
+}
+
+/// One structure of a volume that a host sends, with its material.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
+#[type_name("stylet.UploadStructure")]
+pub struct UploadStructure {
+    /// The label of its cells, 1 to 255.
+    pub label: u32,
+    /// Bits of [`role`].
+    pub role: u32,
+    /// 1: `limits` count; 0: the structure takes the limits that the operator sets.
+    pub own_limits: u32,
+    pub reserved: u32,
+    pub young_pa: f64,
+    pub poisson: f64,
+    /// For links along x, y, z: shortest and longest as a share of their length at rest, and shear (rad).
+    pub limits: [[f64; 3]; 3],
+    pub name: Text<32>,
 }
 
 /// Goes with `dims[0] * dims[1] * dims[2]` cells, x fastest; every cell but 0 is tissue.
@@ -45,10 +115,12 @@ pub struct UploadHeader {
     /// The reply carries it back.
     pub command_id: u64,
     pub dims: [u32; 3],
-    pub reserved: u32,
+    /// How many of `structures` count; 0: all tissue is one structure.
+    pub structure_count: u32,
     pub spacing_m: f64,
     pub patient_from_scene: [f64; 12],
     pub name: Text<64>,
+    pub structures: [UploadStructure; MAX_STRUCTURES],
 }
 
 impl Default for SceneHeader {

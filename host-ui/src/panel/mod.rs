@@ -29,6 +29,8 @@ pub enum Action {
     RunAll,
     StopRun,
     LoadScene(PathBuf),
+    /// By its place among [`stylet_shm_schema::BUILTIN_SCENES`].
+    LoadBuiltinScene(usize),
     OpenParameters,
     ToggleHelp,
     ResetView,

@@ -5,7 +5,7 @@ use crate::workflow::Step;
 use crate::{format, theme};
 use egui::{Button, RichText};
 use std::path::PathBuf;
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::{BUILTIN_SCENES, CommandKind, SceneHeader, role};
 
 /// Beside the path by less than this, the needle counts as placed.
 const PLACED_WITHIN_M: f64 = 1.5e-3;
@@ -357,7 +357,40 @@ fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, actions
             ui.label(RichText::new(why).small().color(theme::BAD));
         }
     }
-    if ui.add_enabled(free, Button::new("Built-in scene")).clicked() {
-        actions.push(Action::Send(CommandKind::LoadBuiltinScene));
+    ui.horizontal(|ui| {
+        ui.label(theme::small("Built in"));
+        for (number, name) in BUILTIN_SCENES.into_iter().enumerate() {
+            if ui.add_enabled(free, Button::new(name)).clicked() {
+                actions.push(Action::LoadBuiltinScene(number));
+            }
+        }
+    });
+    if let Some(scene) = shown.scene.as_ref().filter(|s| s.structures().len() > 1) {
+        structures_ui(ui, scene);
+    }
+}
+
+fn structures_ui(ui: &mut egui::Ui, scene: &SceneHeader) {
+    let title = format!("{} structures", scene.structures().len());
+    egui::CollapsingHeader::new(theme::small(title)).show(ui, |ui| {
+        let grid = egui::Grid::new("structures").num_columns(3).striped(true);
+        grid.spacing([10.0, 2.0]).show(ui, |ui| {
+            for structure in scene.structures() {
+                ui.label(theme::small(structure.name.read()));
+                let volume_m3 = f64::from(structure.element_count) * scene.spacing_m.powi(3);
+                ui.label(theme::small(format::volume(volume_m3)));
+                ui.label(theme::small(role_name(structure.role)));
+                ui.end_row();
+            }
+        });
+    });
+}
+
+fn role_name(bits: u32) -> &'static str {
+    match bits {
+        b if b & role::TARGET != 0 => "target",
+        b if b & role::FIXED != 0 => "fixed",
+        b if b & role::SPARE != 0 => "spared",
+        _ => "",
     }
 }

@@ -62,6 +62,10 @@ pub fn write(
         "scene": link.scene().map(|s| json!({
             "name": s.header.name.read(), "elements": s.header.element_count, "spacing_mm": s.header.spacing_m * 1e3,
             "volume_cm3": s.header.volume_m3 * 1e6,
+            "structures": s.header.structures().iter().map(|t| json!({
+                "name": t.name.read(), "label": t.label, "elements": t.element_count,
+                "volume_cm3": f64::from(t.element_count) * s.header.spacing_m.powi(3) * 1e6,
+            })).collect::<Vec<_>>(),
         })),
         "session": link.session().map(session),
         "versions": { "host_ui": env!("CARGO_PKG_VERSION"), "schema": SCHEMA_VERSION },

@@ -8,6 +8,7 @@ use bytemuck::{Pod, Zeroable};
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
 use std::mem::size_of;
+use std::ops::Range;
 
 /// What egui takes for an image that is already gamma-encoded.
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
@@ -90,14 +91,22 @@ struct Material {
     bind: wgpu::BindGroup,
 }
 
+/// One closed surface: its indices, and what it looks like.
+struct Layer {
+    indices: Range<u32>,
+    material: Material,
+}
+
 pub struct Gpu {
     state: RenderState,
+    layout: wgpu::BindGroupLayout,
     pipelines: Pipelines,
-    gland: Material,
+    /// The body's surface, then those inside it.
+    surfaces: Vec<Layer>,
     ghost: Material,
     solids: Growing,
     lines: Growing,
-    gland_vertices: Growing,
+    surface_vertices: Growing,
     ghost_vertices: Growing,
     indices: Growing,
     targets: Option<Targets>,
@@ -122,25 +131,37 @@ impl Gpu {
         let vertex = wgpu::BufferUsages::VERTEX;
         Self {
             pipelines: pipelines(device, &layout),
-            gland: material(device, &layout),
+            surfaces: Vec::new(),
             ghost: material(device, &layout),
             solids: Growing::new(device, vertex),
             lines: Growing::new(device, vertex),
-            gland_vertices: Growing::new(device, vertex),
+            surface_vertices: Growing::new(device, vertex),
             ghost_vertices: Growing::new(device, vertex),
             indices: Growing::new(device, wgpu::BufferUsages::INDEX),
             targets: None,
+            layout,
             state,
         }
     }
 
-    pub fn set_scene(&mut self, rest: &[SurfaceVertex], indices: &[u32]) {
+    /// The indices of each surface, the body's first.
+    pub fn set_scene(&mut self, rest: &[SurfaceVertex], surfaces: &[Vec<u32>]) {
         self.ghost_vertices.write(&self.state, rest);
-        self.indices.write(&self.state, indices);
+        self.indices.write(&self.state, &surfaces.concat());
+        let mut end = 0;
+        self.surfaces.clear();
+        for indices in surfaces {
+            let start = end;
+            end += indices.len() as u32;
+            self.surfaces.push(Layer {
+                indices: start..end,
+                material: material(&self.state.device, &self.layout),
+            });
+        }
     }
 
     pub fn set_surface(&mut self, vertices: &[SurfaceVertex]) {
-        self.gland_vertices.write(&self.state, vertices);
+        self.surface_vertices.write(&self.state, vertices);
     }
 
     pub fn set_marks(&mut self, marks: &Marks) {
@@ -163,12 +184,16 @@ impl Gpu {
         self.targets.as_ref().map(|t| t.id)
     }
 
-    /// Opaque first, then the rest shape, then the gland's far side and its near side.
-    pub fn draw(&mut self, gland: &SceneUniform, ghost: Option<&SceneUniform>, clear: [f64; 3]) {
+    /// Opaque first, then the rest shape, then the body's far side, what is in the body, and the body's near side.
+    /// `looks` has one uniform for each surface.
+    pub fn draw(&mut self, looks: &[SceneUniform], ghost: Option<&SceneUniform>, clear: [f64; 3]) {
         let Some(targets) = &self.targets else { return };
         let queue = &self.state.queue;
-        queue.write_buffer(&self.gland.uniform, 0, bytemuck::bytes_of(gland));
-        if let Some(ghost) = ghost {
+        for (surface, look) in self.surfaces.iter().zip(looks) {
+            queue.write_buffer(&surface.material.uniform, 0, bytemuck::bytes_of(look));
+        }
+        // Marks take the light and the eye from it.
+        if let Some(ghost) = ghost.or(looks.first()) {
             queue.write_buffer(&self.ghost.uniform, 0, bytemuck::bytes_of(ghost));
         }
         let mut encoder = self
@@ -179,29 +204,44 @@ impl Gpu {
             });
         {
             let mut pass = begin(&mut encoder, targets, clear);
-            pass.set_bind_group(0, &self.gland.bind, &[]);
+            pass.set_bind_group(0, &self.ghost.bind, &[]);
             draw_list(&mut pass, &self.pipelines.solid, &self.solids);
             draw_list(&mut pass, &self.pipelines.line, &self.lines);
-            if ghost.is_some() {
-                pass.set_bind_group(0, &self.ghost.bind, &[]);
-                self.draw_surface(&mut pass, &self.pipelines.surface_front, &self.ghost_vertices);
-                pass.set_bind_group(0, &self.gland.bind, &[]);
+            let (far, near) = (&self.pipelines.surface_back, &self.pipelines.surface_front);
+            if let Some((body, inner)) = self.surfaces.split_first() {
+                if ghost.is_some() {
+                    self.draw_surface(&mut pass, near, &self.ghost_vertices, &self.ghost, &body.indices);
+                }
+                let now = &self.surface_vertices;
+                self.draw_surface(&mut pass, far, now, &body.material, &body.indices);
+                for surface in inner {
+                    self.draw_surface(&mut pass, far, now, &surface.material, &surface.indices);
+                    self.draw_surface(&mut pass, near, now, &surface.material, &surface.indices);
+                }
+                self.draw_surface(&mut pass, near, now, &body.material, &body.indices);
             }
-            self.draw_surface(&mut pass, &self.pipelines.surface_back, &self.gland_vertices);
-            self.draw_surface(&mut pass, &self.pipelines.surface_front, &self.gland_vertices);
         }
         queue.submit([encoder.finish()]);
     }
 
-    fn draw_surface(&self, pass: &mut wgpu::RenderPass<'_>, pipeline: &wgpu::RenderPipeline, vertices: &Growing) {
+    fn draw_surface(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        pipeline: &wgpu::RenderPipeline,
+        vertices: &Growing,
+        material: &Material,
+        indices: &Range<u32>,
+    ) {
         // The indices were made for the rest shape; fewer vertices than that are not drawn.
-        if self.indices.len == 0 || vertices.len == 0 || vertices.len < self.ghost_vertices.len {
+        let drawable = indices.end <= self.indices.len && vertices.len > 0 && vertices.len >= self.ghost_vertices.len;
+        if !drawable || indices.is_empty() {
             return;
         }
         pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &material.bind, &[]);
         pass.set_vertex_buffer(0, vertices.buffer.slice(..));
         pass.set_index_buffer(self.indices.buffer.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(0..self.indices.len, 0, 0..1);
+        pass.draw_indexed(indices.clone(), 0, 0..1);
     }
 }
 

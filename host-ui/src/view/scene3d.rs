@@ -10,6 +10,7 @@ use crate::{format, theme};
 use eframe::egui_wgpu::RenderState;
 use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense, Stroke, Vec2};
 use std::sync::Arc;
+use stylet_shm_schema::{SceneHeader, StructureInfo, role};
 
 const TURN_PER_POINT_RAD: f32 = 0.008;
 const LIGHT: [f32; 4] = [-0.48, 0.78, -0.40, 0.0];
@@ -95,7 +96,7 @@ impl Scene3d {
             self.reset_view(shown);
             mesh::surface(&model.rest_m, &model.triangles, &mut self.vertices);
             if let Some(gpu) = &mut self.gpu {
-                gpu.set_scene(&self.vertices, &mesh::indices(&model.triangles, model.rest_m.len()));
+                gpu.set_scene(&self.vertices, &surfaces(model));
                 gpu.set_surface(&self.vertices);
             }
         }
@@ -164,11 +165,14 @@ impl Scene3d {
         if fresh || self.drawn != Some(key) {
             self.corner_m = collect(&mut self.marks, shown);
             gpu.set_marks(&self.marks);
-            let gland = uniform(&self.camera, aspect, theme::GLAND, 1.0 - self.look.transparency);
+            let opacity = 1.0 - self.look.transparency;
+            let looks: Vec<SceneUniform> = kinds(shown.scene.as_ref())
+                .map(|kind| uniform(&self.camera, aspect, kind.color(), opacity * kind.share()))
+                .collect();
             let ghost = uniform(&self.camera, aspect, theme::GHOST, 0.22);
             let clear = theme::rgba(theme::BACKGROUND, 1.0);
             let clear = [clear[0], clear[1], clear[2]].map(f64::from);
-            gpu.draw(&gland, self.look.rest_shape.then_some(&ghost), clear);
+            gpu.draw(&looks, self.look.rest_shape.then_some(&ghost), clear);
             self.drawn = Some(key);
         }
         gpu.texture()
@@ -223,6 +227,70 @@ impl Scene3d {
             });
         });
     }
+}
+
+/// What a surface is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// The body around the others.
+    Body,
+    Gland,
+    Spared,
+    Bone,
+}
+
+impl Kind {
+    fn color(self) -> Color32 {
+        match self {
+            Self::Body => theme::BODY,
+            Self::Gland => theme::GLAND,
+            Self::Spared => theme::SPARED,
+            Self::Bone => theme::BONE,
+        }
+    }
+
+    /// Of the opacity that a person set: what lies around the gland must not hide it.
+    fn share(self) -> f32 {
+        match self {
+            Self::Body => 0.16,
+            Self::Gland => 1.0,
+            Self::Spared => 0.5,
+            Self::Bone => 0.6,
+        }
+    }
+}
+
+/// Structures that are drawn by themselves.
+fn drawn(scene: &SceneHeader) -> impl Iterator<Item = &StructureInfo> {
+    scene.structures().iter().filter(|s| s.triangle_count > 0)
+}
+
+/// What each surface is of, the body's first. A body without others in it is the gland.
+fn kinds(scene: Option<&SceneHeader>) -> impl Iterator<Item = Kind> {
+    let inner = scene.into_iter().flat_map(drawn).map(|s| match s.role {
+        bits if bits & role::TARGET != 0 => Kind::Gland,
+        bits if bits & role::FIXED != 0 => Kind::Bone,
+        _ => Kind::Spared,
+    });
+    let body = if scene.is_some_and(|s| drawn(s).next().is_some()) {
+        Kind::Body
+    } else {
+        Kind::Gland
+    };
+    std::iter::once(body).chain(inner)
+}
+
+/// The indices of each surface, in the order of [`kinds`].
+fn surfaces(model: &SceneModel) -> Vec<Vec<u32>> {
+    let header = &model.header;
+    let inner = drawn(header).map(|s| (s.first_triangle as usize, s.triangle_count as usize));
+    std::iter::once((0, header.body_triangle_count as usize))
+        .chain(inner)
+        .map(|(first, count)| {
+            let triangles = model.triangles.get(first..first + count).unwrap_or(&[]);
+            mesh::indices(triangles, model.rest_m.len())
+        })
+        .collect()
 }
 
 fn uniform(camera: &Camera, aspect: f32, color: Color32, opacity: f32) -> SceneUniform {
@@ -284,8 +352,18 @@ fn scale_bar(painter: &egui::Painter, rect: Rect, height_m: f32) {
 
 fn legend(painter: &egui::Painter, rect: Rect, shown: &Shown, look: Look) {
     let mut rows: Vec<(&str, Color32, bool)> = Vec::new();
-    if shown.scene.is_some() {
+    if let Some(scene) = &shown.scene {
         rows.push(("gland", theme::GLAND, true));
+        let others: Vec<Kind> = kinds(Some(scene)).collect();
+        for (kind, name) in [
+            (Kind::Spared, "to be spared"),
+            (Kind::Bone, "bone"),
+            (Kind::Body, "body"),
+        ] {
+            if others.contains(&kind) {
+                rows.push((name, kind.color(), true));
+            }
+        }
     }
     if look.rest_shape {
         rows.push(("gland at rest", theme::GHOST, true));

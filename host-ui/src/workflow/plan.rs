@@ -1,13 +1,17 @@
 //! One needle through the gland and the seeds along it (paper fig. 6).
 
 use nalgebra::Vector3;
-use stylet_shm_schema::{MAX_SEEDS, SceneHeader};
+use stylet_shm_schema::{MAX_SEEDS, SceneHeader, StructureInfo, role};
 
-/// The needle begins this far below the gland.
+/// The needle begins this far outside the body.
 const ENTRY_CLEARANCE_M: f64 = 0.010;
 /// The seeds lie between these shares of the needle's way through the gland.
 const SEEDED_SHARE: (f64, f64) = (0.2, 0.8);
 const SEEDS: usize = 5;
+/// The needle keeps this far from the boxes around urethra, rectum and bladder.
+const SPARED_M: f64 = 0.005;
+/// Places beside the middle of the target that are tried are so far apart: half the holes of a usual template.
+const ASIDE_M: f64 = 0.0025;
 
 /// The needle's path and the seeds along it, scene frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,36 +57,39 @@ impl Default for Pace {
     }
 }
 
-/// The patient's inferior-to-superior axis: the perineum, where the needle enters, is inferior.
-fn superior_in_scene(scene: &SceneHeader) -> Vector3<f64> {
-    // The third row of the rotation is its transpose times +S.
-    let row = Vector3::new(
-        scene.patient_from_scene[6],
-        scene.patient_from_scene[7],
-        scene.patient_from_scene[8],
-    );
+/// An axis of the patient (0 right, 2 superior) in the scene; `otherwise` when the transform is not one.
+fn patient_axis(scene: &SceneHeader, axis: usize, otherwise: Vector3<f64>) -> Vector3<f64> {
+    // A row of the rotation is its transpose times that axis.
+    let row = Vector3::from_column_slice(&scene.patient_from_scene[3 * axis..3 * axis + 3]);
     row.try_normalize(0.5)
         .filter(|d| d.iter().all(|c| c.is_finite()))
-        .unwrap_or_else(Vector3::z)
+        .unwrap_or(otherwise)
 }
 
-/// Five seeds along one needle through the middle of the gland.
+/// Five seeds along one needle through the middle of the target.
 pub fn default_plan(scene: &SceneHeader) -> NeedlePlan {
     plan_with_seeds(scene, SEEDS)
 }
 
-/// As [`default_plan`], with 1 to [`MAX_SEEDS`] seeds.
+/// As [`default_plan`], with 1 to [`MAX_SEEDS`] seeds. The needle comes from the perineum, which is inferior; where
+/// something to be spared is in its way it goes beside the middle.
 pub fn plan_with_seeds(scene: &SceneHeader, seeds: usize) -> NeedlePlan {
-    let direction = superior_in_scene(scene);
-    let (lower, upper) = (Vector3::from(scene.lower_m), Vector3::from(scene.upper_m));
-    let centre = (lower + upper) / 2.0;
-    // Half of the needle's way through the bounding box: the nearest pair of faces ends it.
-    let half = (0..3)
-        .filter(|&a| direction[a].abs() > 1e-9)
-        .map(|a| (upper[a] - lower[a]) / 2.0 / direction[a].abs())
-        .fold(f64::INFINITY, f64::min);
-    let seeds = seeds.clamp(1, MAX_SEEDS);
+    let direction = patient_axis(scene, 2, Vector3::z());
+    let target = Box3::of(scene.target_lower_m, scene.target_upper_m);
+    let body = Box3::of(scene.lower_m, scene.upper_m);
+    let half = target.way_from_middle_m(direction);
     let (first, last) = SEEDED_SHARE;
+    let deepest_m = half * (2.0 * last - 1.0);
+    let out_m = body.way_out_m(target.middle(), -direction) + ENTRY_CLEARANCE_M;
+    let beside = beside(scene, &target, direction);
+    let is_clear = |through: &Vector3<f64>| {
+        let spared = scene.structures().iter().filter(|s| s.role & role::SPARE != 0);
+        spared
+            .map(Box3::around)
+            .all(|b| !b.is_met(*through, direction, [-out_m, deepest_m]))
+    };
+    let centre = beside.into_iter().find(is_clear).unwrap_or(target.middle());
+    let seeds = seeds.clamp(1, MAX_SEEDS);
     let seeds_m = (0..seeds)
         .map(|i| {
             let share = if seeds == 1 {
@@ -94,9 +101,88 @@ pub fn plan_with_seeds(scene: &SceneHeader, seeds: usize) -> NeedlePlan {
         })
         .collect();
     NeedlePlan {
-        entry_m: (centre - direction * (half + ENTRY_CLEARANCE_M)).into(),
+        entry_m: (centre - direction * out_m).into(),
         direction: direction.into(),
         seeds_m,
+    }
+}
+
+/// The middle of the target, then places to its left and right, the nearest first, to half-way to its side.
+fn beside(scene: &SceneHeader, target: &Box3, direction: Vector3<f64>) -> Vec<Vector3<f64>> {
+    let right = patient_axis(scene, 0, Vector3::x());
+    let Some(aside) = (right - direction * right.dot(&direction)).try_normalize(1e-3) else {
+        return vec![target.middle()];
+    };
+    let farthest_m = 0.5 * target.way_from_middle_m(aside);
+    let steps = (farthest_m / ASIDE_M).clamp(0.0, 100.0) as usize;
+    let each = (1..=steps).flat_map(|n| [n as f64, -(n as f64)]);
+    std::iter::once(0.0)
+        .chain(each)
+        .map(|n| target.middle() + aside * (n * ASIDE_M))
+        .collect()
+}
+
+/// A box along the axes of the scene.
+struct Box3 {
+    lower: Vector3<f64>,
+    upper: Vector3<f64>,
+}
+
+impl Box3 {
+    fn of(lower_m: [f64; 3], upper_m: [f64; 3]) -> Self {
+        Self {
+            lower: lower_m.into(),
+            upper: upper_m.into(),
+        }
+    }
+
+    /// What the needle must not come into on behalf of a structure.
+    fn around(structure: &StructureInfo) -> Self {
+        let margin = Vector3::repeat(SPARED_M);
+        Self {
+            lower: Vector3::from(structure.lower_m) - margin,
+            upper: Vector3::from(structure.upper_m) + margin,
+        }
+    }
+
+    fn middle(&self) -> Vector3<f64> {
+        (self.lower + self.upper) / 2.0
+    }
+
+    /// How far a line from the middle goes before it leaves: the nearest pair of faces ends it.
+    fn way_from_middle_m(&self, direction: Vector3<f64>) -> f64 {
+        self.way_out_m(self.middle(), direction)
+    }
+
+    fn way_out_m(&self, from: Vector3<f64>, direction: Vector3<f64>) -> f64 {
+        (0..3)
+            .filter(|&a| direction[a].abs() > 1e-9)
+            .map(|a| {
+                let face = if direction[a] > 0.0 {
+                    self.upper[a]
+                } else {
+                    self.lower[a]
+                };
+                (face - from[a]) / direction[a]
+            })
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether the piece of a line between two distances from `through` comes into the box.
+    fn is_met(&self, through: Vector3<f64>, direction: Vector3<f64>, [from_m, to_m]: [f64; 2]) -> bool {
+        let (mut enter, mut leave) = (from_m, to_m);
+        for a in 0..3 {
+            let (lower, upper) = (self.lower[a] - through[a], self.upper[a] - through[a]);
+            if direction[a].abs() < 1e-9 {
+                if lower > 0.0 || upper < 0.0 {
+                    return false;
+                }
+                continue;
+            }
+            let (one, other) = (lower / direction[a], upper / direction[a]);
+            (enter, leave) = (enter.max(one.min(other)), leave.min(one.max(other)));
+        }
+        enter <= leave
     }
 }
 
@@ -122,6 +208,7 @@ mod tests {
     fn scene(patient_from_scene: [f64; 12]) -> SceneHeader {
         let mut scene = SceneHeader::zeroed();
         (scene.lower_m, scene.upper_m) = ([0.02, 0.02, 0.03], [0.06, 0.06, 0.07]);
+        (scene.target_lower_m, scene.target_upper_m) = (scene.lower_m, scene.upper_m);
         scene.patient_from_scene = patient_from_scene;
         scene
     }
@@ -148,5 +235,31 @@ mod tests {
         assert!((plan.direction[1] + 1.0).abs() < 1e-12);
         assert!(plan.entry_m[1] > 0.06);
         assert_eq!(default_plan(&scene([0.0; 12])).direction, [0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn the_needle_starts_outside_the_body_and_seeds_lie_in_the_target() {
+        let mut scene = scene(IDENTITY);
+        (scene.lower_m, scene.upper_m) = ([0.0; 3], [0.1, 0.1, 0.2]);
+        let plan = default_plan(&scene);
+        assert!((plan.entry_m[2] + 0.01).abs() < 1e-12);
+        assert!((plan.seeds_m[0][2] - 0.062).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_needle_goes_beside_what_is_spared_and_no_farther_than_it_must() {
+        let mut scene = scene(IDENTITY);
+        scene.structure_count = 2;
+        let urethra = &mut scene.structures[0];
+        (urethra.role, urethra.lower_m, urethra.upper_m) = (role::SPARE, [0.037, 0.03, 0.02], [0.043, 0.05, 0.08]);
+        // Beyond the deepest seed: not in the way.
+        let bladder = &mut scene.structures[1];
+        (bladder.role, bladder.lower_m, bladder.upper_m) = (role::SPARE, [0.02, 0.02, 0.068], [0.06, 0.06, 0.09]);
+        let plan = default_plan(&scene);
+        // 3 mm and 5 mm from the middle, in steps of 2.5 mm.
+        assert!((plan.entry_m[0] - 0.05).abs() < 1e-12, "{:?}", plan.entry_m);
+        assert!((plan.seeds_m[4][0] - 0.05).abs() < 1e-12);
+        scene.structures[0].role = 0;
+        assert!((default_plan(&scene).entry_m[0] - 0.04).abs() < 1e-12);
     }
 }

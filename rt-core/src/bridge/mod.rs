@@ -1,15 +1,19 @@
 //! The normal-priority thread that owns every port: hosts come and go here, and the loops do not notice.
 
+mod picture;
 pub mod ports;
 mod requests;
 mod snapshots;
+mod upload;
 
 use crate::active::activate;
 use crate::rt::clock;
 use crate::rt::exchange::*;
 use crate::rt::world::World;
-use crate::scene::{Labels, Scene, surface_elements};
+use crate::scene::Scene;
 use iceoryx2::node::Node;
+use picture::IDENTITY;
+pub use picture::ScenePicture;
 use ports::Ports;
 use requests::Request;
 pub use snapshots::SnapshotLoans;
@@ -23,7 +27,6 @@ use stylet_shm_schema::*;
 const PASS: Duration = Duration::from_millis(2);
 const ANNOUNCE_NS: u64 = 200_000_000;
 const CLEAN_UP_NS: u64 = 1_000_000_000;
-const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
 /// Ends of the rings to and from both loops.
 pub struct LoopPorts {
@@ -44,12 +47,6 @@ struct Loaded {
     scene: Result<Box<Scene>, String>,
 }
 
-/// What hosts need to draw a scene.
-struct ScenePicture {
-    header: SceneHeader,
-    words: Vec<u32>,
-}
-
 /// Everything that the bridge thread owns.
 pub struct Bridge {
     node: Node<Ipc>,
@@ -61,6 +58,7 @@ pub struct Bridge {
     plan: PlanInForce,
     /// The scene that runs, and the one handed to the tissue loop but not yet taken up.
     picture: ScenePicture,
+    picture_sent: bool,
     coming: Option<ScenePicture>,
     /// Who waits for what: host and command behind each ticket.
     waiting: HashMap<Ticket, (u64, u64)>,
@@ -81,9 +79,8 @@ impl Bridge {
         loops: LoopPorts,
         device: DeviceInfo,
         session: Session,
-        scene: &Scene,
+        picture: ScenePicture,
     ) -> Self {
-        let picture = picture(scene, &session, 1, IDENTITY);
         let mut plan: PlanInForce = bytemuck::Zeroable::zeroed();
         plan.session_id = session.session_id;
         let parameters = ParametersInForce {
@@ -101,6 +98,7 @@ impl Bridge {
             parameters,
             plan,
             picture,
+            picture_sent: false,
             coming: None,
             waiting: HashMap::new(),
             waiting_parameters: HashMap::new(),
@@ -112,7 +110,6 @@ impl Bridge {
             cleaned_ns: 0,
             batch: Vec::with_capacity(MAX_BATCH),
         };
-        bridge.send_scene();
         let _ = bridge.ports.parameters.send_copy(bridge.parameters);
         let _ = bridge.ports.plan.send_copy(bridge.plan);
         bridge
@@ -137,6 +134,9 @@ impl Bridge {
         self.take_uploads();
         self.take_loaded();
         self.take_notices();
+        if !self.picture_sent {
+            self.send_scene();
+        }
         while self.loops.old_worlds.pop().is_ok() {}
         self.send_records();
         let (generation, vertices) = (
@@ -178,10 +178,11 @@ impl Bridge {
         }
     }
 
-    fn send_scene(&self) {
+    /// Tried again at the next pass when there is no room.
+    fn send_scene(&mut self) {
         if let Ok(mut sample) = self.ports.scene.loan_slice_uninit(self.picture.words.len()) {
             *sample.user_header_mut() = self.picture.header;
-            let _ = sample.write_from_slice(&self.picture.words).send();
+            self.picture_sent = sample.write_from_slice(&self.picture.words).send().is_ok();
         }
     }
 
@@ -275,9 +276,9 @@ impl Bridge {
                 self.loops.tissue_orders.push(TissueOrder::Reset).is_ok()
                     && self.loops.haptic_orders.push(HapticOrder::Reset { ticket }).is_ok()
             }
-            Request::BuiltinScene => {
-                self.load(ticket, "paper".to_owned(), IDENTITY, || {
-                    Scene::builtin("paper").map_err(|e| e.to_string())
+            Request::BuiltinScene(name) => {
+                self.load(ticket, name.to_owned(), IDENTITY, || {
+                    Scene::builtin(name).map_err(|e| e.to_string())
                 });
                 true
             }
@@ -293,15 +294,13 @@ impl Bridge {
             let header = *sample.user_header();
             let who = (header.host_id, header.command_id);
             let name = header.name.read();
-            if let Err(why) = check_upload(&header, sample.payload().len()) {
-                self.event(EventKind::RubbishRefused, 0, 0.0, [0.0; 3], (0, clock::now_ns()), &why);
-                self.reply(who, Some(&why), 0);
-                continue;
-            }
-            let labels = Labels {
-                dims: header.dims.map(|d| d as usize),
-                spacing_m: header.spacing_m,
-                cells: sample.payload().to_vec(),
+            let labels = match upload::labels(&header, sample.payload()) {
+                Ok(labels) => labels,
+                Err(why) => {
+                    self.event(EventKind::RubbishRefused, 0, 0.0, [0.0; 3], (0, clock::now_ns()), &why);
+                    self.reply(who, Some(&why), 0);
+                    continue;
+                }
             };
             drop(sample);
             let ticket = self.ticket(who.0, who.1);
@@ -355,7 +354,7 @@ impl Bridge {
             Err(why) => return self.answer(loaded.ticket, Some(&why.join("\n")), 0),
         };
         let generation = self.picture.header.generation + 1;
-        let mut picture = picture(&scene, &self.session, generation, loaded.patient_from_scene);
+        let mut picture = ScenePicture::of(&scene, self.session.session_id, generation, loaded.patient_from_scene);
         picture.header.name = Text::new(&loaded.name);
         let world = Box::new(World::new(*scene, limits, generation));
         if self
@@ -412,9 +411,10 @@ impl Bridge {
             } => {
                 if let Some(picture) = self.coming.take() {
                     self.picture = picture;
+                    self.picture_sent = false;
+                    self.send_scene();
                     self.plan = bytemuck::Zeroable::zeroed();
                     self.plan.session_id = self.session.session_id;
-                    self.send_scene();
                     let _ = self.ports.plan.send_copy(self.plan);
                 }
                 let name = self.picture.header.name.read();
@@ -498,51 +498,5 @@ impl Bridge {
             position_m,
             text: Text::new(text),
         });
-    }
-}
-
-/// Everything that can be wrong with the header of an upload; the labels themselves are checked by the scene.
-fn check_upload(header: &UploadHeader, cells: usize) -> Result<(), String> {
-    let said = header.dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(u64::from(d)));
-    if said != Some(cells as u64) {
-        return Err(format!("the volume says {:?} cells but {cells} came", header.dims));
-    }
-    if !header
-        .patient_from_scene
-        .iter()
-        .all(|v| v.abs() <= check::MAX_COORDINATE_M)
-    {
-        return Err("the transform to the patient is not finite or farther than 20 m".to_owned());
-    }
-    Ok(())
-}
-
-fn picture(scene: &Scene, session: &Session, generation: u64, patient_from_scene: [f64; 12]) -> ScenePicture {
-    let lattice = &scene.lattice;
-    let (lower_m, upper_m) = lattice.bounds_m();
-    let vertices = &scene.surface.vertex_elements;
-    let positions = vertices
-        .iter()
-        .flat_map(|&e| lattice.rest_m(e))
-        .map(|c| (c as f32).to_bits());
-    let indices = scene.surface.triangles.iter().flatten().copied();
-    ScenePicture {
-        words: positions.chain(indices).collect(),
-        header: SceneHeader {
-            session_id: session.session_id,
-            generation,
-            dims: lattice.dims.map(|d| d as u32),
-            element_count: lattice.element_count() as u32,
-            surface_element_count: surface_elements(lattice).len() as u32,
-            vertex_count: vertices.len() as u32,
-            triangle_count: scene.surface.triangles.len() as u32,
-            reserved: 0,
-            spacing_m: lattice.spacing_m,
-            volume_m3: lattice.volume_m3(),
-            lower_m,
-            upper_m,
-            patient_from_scene,
-            name: Text::new(&scene.name),
-        },
     }
 }

@@ -35,29 +35,36 @@ macro_rules! publisher {
             .create()
             .map_err(failed)?
     };
-    ($factory:expr, slices of $length:expr, loans $loans:expr) => {
+    ($factory:expr, slices of $length:expr, loans $loans:expr, kept $kept:expr) => {
         $factory?
             .publisher_builder()
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .allocation_strategy(AllocationStrategy::PowerOfTwo)
             .initial_max_slice_len($length)
             .max_loaned_samples($loans)
+            .override_sample_preallocation($kept)
             .create()
             .map_err(failed)?
     };
 }
 
+/// Slices that memory is taken for at once. iceoryx2 takes enough for every host to hold every slice that it may, which
+/// for a large scene is hundreds of MB of locked memory; hosts hold the newest, and where they hold more it takes more.
+const SNAPSHOTS_KEPT: usize = 4 * SNAPSHOTS_AHEAD;
+const SCENES_KEPT: usize = 3;
+
 impl Ports {
-    pub fn new(node: &Node<Ipc>, vertex_count: usize) -> Result<Self, ServiceError> {
+    /// For a scene of so many vertices and words.
+    pub fn new(node: &Node<Ipc>, vertex_count: usize, word_count: usize) -> Result<Self, ServiceError> {
         Ok(Self {
             session: publisher!(service::session(node)),
             events: publisher!(service::events(node)),
             parameters: publisher!(service::parameters(node)),
             plan: publisher!(service::plan(node)),
             replies: publisher!(service::replies(node)),
-            records: publisher!(service::records(node), slices of MAX_BATCH, loans 2),
-            snapshots: publisher!(service::snapshots(node), slices of vertex_count, loans 2 * SNAPSHOTS_AHEAD),
-            scene: publisher!(service::scene(node), slices of 16 * vertex_count, loans 2),
+            records: publisher!(service::records(node), slices of MAX_BATCH, loans 2, kept |all| all),
+            snapshots: publisher!(service::snapshots(node), slices of vertex_count, loans 2 * SNAPSHOTS_AHEAD, kept |_| SNAPSHOTS_KEPT),
+            scene: publisher!(service::scene(node), slices of word_count, loans 2, kept |_| SCENES_KEPT),
             commands: service::commands(node)?
                 .subscriber_builder()
                 .buffer_size(64)

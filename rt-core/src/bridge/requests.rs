@@ -19,7 +19,8 @@ pub enum Request {
     Hand(HandGoal),
     Tissue(fn(Ticket) -> TissueOrder),
     Reset,
-    BuiltinScene,
+    /// By name.
+    BuiltinScene(&'static str),
     Shutdown,
 }
 
@@ -46,7 +47,7 @@ pub fn read(command: &Command, now: &ParameterSet, device: &DeviceInfo) -> Resul
         CommandKind::Engage => Ok(Request::Haptic(|ticket| HapticOrder::Engage { ticket })),
         CommandKind::Disengage => Ok(Request::Haptic(|ticket| HapticOrder::Disengage { ticket })),
         CommandKind::Reset => Ok(Request::Reset),
-        CommandKind::LoadBuiltinScene => Ok(Request::BuiltinScene),
+        CommandKind::LoadBuiltinScene => builtin_scene(values).map(Request::BuiltinScene),
         CommandKind::Shutdown => Ok(Request::Shutdown),
     }
 }
@@ -110,6 +111,19 @@ fn plan(values: &[f64]) -> Result<PlanInForce, String> {
     Ok(plan)
 }
 
+fn builtin_scene(values: &[f64]) -> Result<&'static str, String> {
+    let number = match values {
+        [] => 0.0,
+        [number] => *number,
+        _ => return Err(format!("a built-in scene is one number, {} values came", values.len())),
+    };
+    let found = (0..).zip(BUILTIN_SCENES).find(|(n, _)| f64::from(*n) == number);
+    found.map(|(_, name)| name).ok_or_else(|| {
+        let known = BUILTIN_SCENES.join(", ");
+        format!("there is no built-in scene number {number}; from 0 they are {known}")
+    })
+}
+
 fn hand(values: &[f64]) -> Result<HandGoal, String> {
     let [.., speed, acceleration] = values else {
         return Err("a hand goal has 8 values".to_owned());
@@ -163,8 +177,25 @@ mod tests {
             (CommandKind::MoveHand, &[0.0, 0.0, 1e30, 0.0, 0.0, 1.0, 0.1, 1.0]),
             (CommandKind::MoveHand, &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1e9, 1.0]),
             (CommandKind::MoveHand, &[]),
+            (CommandKind::LoadBuiltinScene, &[3.0]),
+            (CommandKind::LoadBuiltinScene, &[0.5]),
+            (CommandKind::LoadBuiltinScene, &[-1.0]),
+            (CommandKind::LoadBuiltinScene, &[0.0, 1.0]),
         ] {
             assert!(try_read(kind, values).is_err(), "{kind:?} {values:?}");
+        }
+    }
+
+    #[test]
+    fn a_built_in_scene_is_chosen_by_its_place_in_the_list() {
+        for (values, expected) in [
+            (&[][..], "paper"),
+            (&[0.0], "paper"),
+            (&[1.0], "pelvis"),
+            (&[2.0], "full"),
+        ] {
+            let read = try_read(CommandKind::LoadBuiltinScene, values);
+            assert!(matches!(read, Ok(Request::BuiltinScene(name)) if name == expected));
         }
     }
 

@@ -4,7 +4,7 @@ use crate::rt::arm::Armed;
 use crate::rt::clock::{self, Grid};
 use crate::rt::exchange::*;
 use crate::rt::world::World;
-use crate::tissue::{Held, MaterialPoint, StepReport, step};
+use crate::tissue::{Held, MaterialPoint, StepReport};
 use nalgebra::Vector3;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_shm_schema::{MAX_SEEDS, SeedPose, SnapshotHeader, Vertex};
@@ -102,8 +102,7 @@ impl TissueLoop {
         self.begin_contact_if_met(&before);
         let travel = self.pose.held_travel_m - before.held_travel_m;
         self.hold(travel);
-        let world = &mut *self.world;
-        let report = step(&world.model, &mut world.state, self.held, self.period_s);
+        let report = self.world.tissue.step(self.held, self.period_s);
         self.report = Some(report);
         self.respond(woke_ns, &report);
         self.publish_snapshot(woke_ns, &report);
@@ -112,7 +111,7 @@ impl TissueLoop {
     fn take_orders(&mut self) {
         while let Ok(order) = self.ports.orders.pop() {
             match order {
-                TissueOrder::Limits(limits) => self.world.set_limits(limits),
+                TissueOrder::Limits(limits) => self.world.tissue.set_limits(limits),
                 TissueOrder::DropSeed { ticket } => self.drop_seed(ticket),
                 TissueOrder::UndoSeed { ticket } => self.undo_seed(ticket),
                 TissueOrder::Reset => self.reset(),
@@ -127,7 +126,7 @@ impl TissueLoop {
     }
 
     fn reset(&mut self) {
-        self.world.return_to_rest();
+        self.world.tissue.return_to_rest();
         self.seeds.clear();
         self.let_go();
         self.response.worst_residual = 0.0;
@@ -162,7 +161,7 @@ impl TissueLoop {
     }
 
     fn locate(&self, place: &Vector3<f64>, hint: Option<u32>) -> Option<MaterialPoint> {
-        MaterialPoint::locate(&self.world.model, &self.world.state, (*place).into(), hint)
+        MaterialPoint::locate(&self.world.tissue.deformed(), (*place).into(), hint)
     }
 
     fn end_contact_if_released(&mut self) {
@@ -195,10 +194,11 @@ impl TissueLoop {
             place,
             direction: self.pose.direction,
         });
-        let position_m = self.world.state.position_m(&self.world.model, point.element);
+        let position_m = self.world.tissue.deformed().position_m(point.element);
         self.held = Some(Held {
             element: point.element,
             position_m,
+            patch_m: 0.0,
         });
         let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
         self.notify(Notice::Contact {
@@ -230,10 +230,11 @@ impl TissueLoop {
             && let Some(at_tip) = self.locate(&self.pose.tip_in_scene, Some(held.element))
             && at_tip.element != held.element
         {
-            let position_m = self.world.state.position_m(&self.world.model, at_tip.element);
+            let position_m = self.world.tissue.deformed().position_m(at_tip.element);
             next = Held {
                 element: at_tip.element,
                 position_m,
+                patch_m: 0.0,
             };
         }
         for (coordinate, by) in next.position_m.iter_mut().zip(travel.iter()) {
@@ -332,12 +333,8 @@ impl TissueLoop {
         // until the slot is returned; they were zeroed, and Vertex is valid for every bit pattern.
         let vertices = unsafe { std::slice::from_raw_parts_mut(slot.vertices, slot.vertex_count) };
         let positions: &mut [[f32; 3]] = bytemuck::cast_slice_mut::<Vertex, [f32; 3]>(vertices);
-        crate::tissue::write_surface(
-            &self.world.model,
-            &self.world.state,
-            &self.world.scene.surface,
-            positions,
-        );
+        let body = self.world.tissue.deformed();
+        body.write_surface(&self.world.scene.surface, positions);
         // SAFETY: as above, for the header.
         let header = unsafe { &mut *slot.header };
         let spacing_m = self.world.scene.lattice.spacing_m;
@@ -366,11 +363,11 @@ impl TissueLoop {
     }
 
     fn pose_of(&self, seed: &Seed) -> SeedPose {
-        let (model, state) = (&self.world.model, &self.world.state);
-        let position_m = seed.tip.position_m(model, state);
+        let body = self.world.tissue.deformed();
+        let position_m = seed.tip.position_m(&body);
         let along = seed
             .tail
-            .map(|tail| Vector3::from(position_m) - Vector3::from(tail.position_m(model, state)));
+            .map(|tail| Vector3::from(position_m) - Vector3::from(tail.position_m(&body)));
         let axis = along.and_then(|a| a.try_normalize(1e-9)).map_or(seed.axis, Into::into);
         SeedPose {
             position_m,

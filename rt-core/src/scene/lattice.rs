@@ -27,27 +27,39 @@ pub struct Lattice {
     /// Edge of a cubic element.
     pub spacing_m: f64,
     cells: Vec<[u16; 3]>,
+    /// Number of each element's structure in the scene's list; empty if there is only one.
+    structures: Vec<u8>,
     runs: Vec<Run>,
     /// First run of each row `j + dims[1] * k`, with one more entry at the end.
     row_runs: Vec<u32>,
+    /// Lowest and one past the highest cell that is occupied.
+    occupied: [[usize; 3]; 2],
 }
 
 impl Lattice {
     /// Expects labels that `Scene::from_labels` has accepted.
     pub(crate) fn from_checked_labels(labels: &Labels) -> Self {
         let [nx, ny, nz] = labels.dims;
+        let number_of_label = |label: u8| labels.structures.iter().position(|s| s.label == label).unwrap_or(0) as u8;
         let mut lattice = Lattice {
             dims: labels.dims,
             spacing_m: labels.spacing_m,
             cells: Vec::new(),
+            structures: Vec::new(),
             runs: Vec::new(),
             row_runs: Vec::with_capacity(ny * nz + 1),
+            occupied: [[0; 3]; 2],
         };
         for (row_index, row) in labels.cells.chunks_exact(nx).enumerate() {
             lattice.row_runs.push(lattice.runs.len() as u32);
             lattice.push_row(row, row_index % ny, row_index / ny);
         }
         lattice.row_runs.push(lattice.runs.len() as u32);
+        if labels.structures.len() > 1 {
+            let tissue = labels.cells.iter().filter(|&&label| label != 0);
+            lattice.structures = tissue.map(|&label| number_of_label(label)).collect();
+        }
+        lattice.occupied = occupied_box(&lattice.cells);
         lattice
     }
 
@@ -118,26 +130,72 @@ impl Lattice {
         ]
     }
 
+    /// Number of an element's structure in the scene's list.
+    pub fn structure(&self, element: u32) -> u8 {
+        self.structures.get(element as usize).copied().unwrap_or(0)
+    }
+
+    /// Structure of every element, in their order; empty if there is only one.
+    pub fn structures(&self) -> &[u8] {
+        &self.structures
+    }
+
     pub fn volume_m3(&self) -> f64 {
         self.element_count() as f64 * self.spacing_m.powi(3)
     }
 
     /// Lowest and highest corner of the box around all elements at rest (faces, not centres).
     pub fn bounds_m(&self) -> ([f64; 3], [f64; 3]) {
-        let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
-        for cell in &self.cells {
-            for axis in 0..3 {
-                low[axis] = low[axis].min(cell[axis] as usize);
-                high[axis] = high[axis].max(cell[axis] as usize + 1);
+        let metres = |corner: [usize; 3]| corner.map(|c| c as f64 * self.spacing_m);
+        let [low, high] = self.occupied;
+        (metres(low), metres(high))
+    }
+
+    /// Size and box of each of the first `count` structures.
+    pub fn extents(&self, count: usize) -> Vec<Extent> {
+        let mut boxes = vec![(0_u32, [usize::MAX; 3], [0; 3]); count];
+        for (element, cell) in self.cells.iter().enumerate() {
+            let structure = self.structures.get(element).copied().unwrap_or(0);
+            if let Some((elements, low, high)) = boxes.get_mut(structure as usize) {
+                *elements += 1;
+                widen(low, high, cell);
             }
         }
         let metres = |corner: [usize; 3]| corner.map(|c| c as f64 * self.spacing_m);
-        (metres(low), metres(high))
+        let extents = boxes.into_iter().map(|(elements, low, high)| Extent {
+            elements,
+            lower_m: metres(if elements > 0 { low } else { [0; 3] }),
+            upper_m: metres(high),
+        });
+        extents.collect()
     }
 
     /// Runs of the row of cells at `j`, `k`, in the order of x.
     pub(crate) fn row(&self, j: usize, k: usize) -> &[Run] {
         let row = j + self.dims[1] * k;
         &self.runs[self.row_runs[row] as usize..self.row_runs[row + 1] as usize]
+    }
+}
+
+/// How large a structure is: its elements, and the box around them at rest (faces, not centres).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    pub elements: u32,
+    pub lower_m: [f64; 3],
+    pub upper_m: [f64; 3],
+}
+
+fn occupied_box(cells: &[[u16; 3]]) -> [[usize; 3]; 2] {
+    let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
+    for cell in cells {
+        widen(&mut low, &mut high, cell);
+    }
+    [low, high]
+}
+
+fn widen(low: &mut [usize; 3], high: &mut [usize; 3], cell: &[u16; 3]) {
+    for axis in 0..3 {
+        low[axis] = low[axis].min(cell[axis] as usize);
+        high[axis] = high[axis].max(cell[axis] as usize + 1);
     }
 }

@@ -2,21 +2,77 @@
 
 use std::fmt;
 
-use super::{Labels, MAX_CELLS_PER_AXIS, MAX_ELEMENTS, SPACING_RANGE_M, Scene};
+use super::{Labels, MAX_CELLS_PER_AXIS, MAX_ELEMENTS, MAX_STRUCTURES, SPACING_RANGE_M, Structure, material, memory};
+use stylet_shm_schema::BUILTIN_SCENES;
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum SceneProblem {
-    NoCells { axis: char },
-    TooManyCells { axis: char, cells: usize },
-    CellCount { dims: [usize; 3], cells: usize },
-    Spacing { spacing_m: f64 },
+    NoCells {
+        axis: char,
+    },
+    TooManyCells {
+        axis: char,
+        cells: usize,
+    },
+    CellCount {
+        dims: [usize; 3],
+        cells: usize,
+    },
+    Spacing {
+        spacing_m: f64,
+    },
     Empty,
-    TooManyElements { elements: usize },
+    TooManyElements {
+        elements: usize,
+    },
+    /// More than there is.
+    Memory {
+        elements: usize,
+        needed_bytes: u64,
+        available_bytes: u64,
+    },
+    TooManyStructures {
+        structures: usize,
+    },
+    /// Label 0 is no tissue.
+    ZeroLabel {
+        structure: String,
+    },
+    SameLabel {
+        label: u8,
+        structures: [String; 2],
+    },
+    /// Cells whose label belongs to no structure.
+    UnknownLabel {
+        label: u8,
+        cells: usize,
+    },
+    /// A structure without cells: empty, or outside the volume.
+    NoCellOf {
+        structure: String,
+        label: u8,
+    },
+    /// A solid drawn by formula that leaves the volume; both along one axis.
+    Outside {
+        structure: String,
+        axis: char,
+        reach_m: [f64; 2],
+        volume_m: [f64; 2],
+    },
+    /// A number of a structure's material out of its range.
+    Material {
+        structure: String,
+        what: String,
+        value: f64,
+        limit: &'static str,
+    },
+    AllFixed,
 }
 
 impl fmt::Display for SceneProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
+        const MIB: u64 = 1 << 20;
+        match self {
             Self::NoCells { axis } => {
                 write!(f, "0 cells along {axis}, at least 1 needed: give the volume's size")
             }
@@ -42,6 +98,57 @@ impl fmt::Display for SceneProblem {
                 f,
                 "{elements} elements, at most {MAX_ELEMENTS}: crop the tissue or merge voxels into larger elements"
             ),
+            Self::Memory {
+                elements,
+                needed_bytes,
+                available_bytes,
+            } => write!(
+                f,
+                "{elements} elements need {} MiB, {} MiB of memory are free: merge voxels into larger elements, or end other programs",
+                needed_bytes.div_ceil(MIB),
+                available_bytes / MIB
+            ),
+            Self::TooManyStructures { structures } => write!(
+                f,
+                "{structures} structures, at most {MAX_STRUCTURES}: give several of them one label"
+            ),
+            Self::ZeroLabel { structure } => write!(
+                f,
+                "structure \"{structure}\" has label 0, which is no tissue: give it a label from 1 to 255"
+            ),
+            Self::SameLabel { label, structures } => write!(
+                f,
+                "structures \"{}\" and \"{}\" both have label {label}: give each its own",
+                structures[0], structures[1]
+            ),
+            Self::UnknownLabel { label, cells } => write!(
+                f,
+                "{cells} cells have label {label}, which no structure has: add the structure or clear the cells"
+            ),
+            Self::NoCellOf { structure, label } => write!(
+                f,
+                "structure \"{structure}\" has no cell (label {label}): it is empty or lies outside the volume; leave it out or enlarge the volume"
+            ),
+            Self::Outside {
+                structure,
+                axis,
+                reach_m: [low, high],
+                volume_m: [from, to],
+            } => write!(
+                f,
+                "structure \"{structure}\" reaches from {:.1} to {:.1} mm along {axis}, the volume from {:.1} to {:.1} mm: move it inside",
+                low * 1e3,
+                high * 1e3,
+                from * 1e3,
+                to * 1e3
+            ),
+            Self::Material {
+                structure,
+                what,
+                value,
+                limit,
+            } => write!(f, "structure \"{structure}\": {what} is {value}, must be {limit}"),
+            Self::AllFixed => write!(f, "every structure is fixed: nothing can move; leave one of them free"),
         }
     }
 }
@@ -57,7 +164,7 @@ impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unknown(name) => {
-                let known = Scene::BUILTIN.join(", ");
+                let known = BUILTIN_SCENES.join(", ");
                 write!(f, "no built-in scene \"{name}\": choose one of {known}")
             }
             Self::Invalid(problems) => {
@@ -92,51 +199,50 @@ pub(super) fn problems_of(labels: &Labels) -> Vec<SceneProblem> {
         let spacing_m = labels.spacing_m;
         problems.push(SceneProblem::Spacing { spacing_m });
     }
-    let elements = labels.cells.iter().filter(|&&label| label != 0).count();
+    let mut cells_of_label = [0_usize; 256];
+    for &label in &labels.cells {
+        cells_of_label[label as usize] += 1;
+    }
+    let elements = labels.cells.len() - cells_of_label[0];
     if elements == 0 {
         problems.push(SceneProblem::Empty);
     }
     if elements > MAX_ELEMENTS {
         problems.push(SceneProblem::TooManyElements { elements });
     }
+    problems.extend(memory::problem(elements, labels.cells.len(), memory::available_bytes()));
+    if !labels.structures.is_empty() {
+        problems.extend(problems_of_structures(&labels.structures, &cells_of_label));
+    }
     problems
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_problem_is_listed_at_once() {
-        let labels = Labels {
-            dims: [0, 2000, 3],
-            spacing_m: f64::NAN,
-            cells: vec![0; 5],
-        };
-        let problems = Scene::from_labels("bad", &labels).expect_err("five problems");
-        assert_eq!(problems.len(), 5);
-        let text = SceneError::Invalid(problems).to_string();
-        for part in ["along x", "2000", "1024", "5 labels", "NaN", "0 elements"] {
-            assert!(text.contains(part), "{part} not in: {text}");
+fn problems_of_structures(structures: &[Structure], cells_of_label: &[usize; 256]) -> Vec<SceneProblem> {
+    let mut problems = Vec::new();
+    if structures.len() > MAX_STRUCTURES {
+        let structures = structures.len();
+        problems.push(SceneProblem::TooManyStructures { structures });
+    }
+    for (number, structure) in structures.iter().enumerate() {
+        let (name, label) = (structure.name.clone(), structure.label);
+        if let Some(earlier) = structures[..number].iter().find(|s| s.label == label) {
+            let structures = [earlier.name.clone(), name.clone()];
+            problems.push(SceneProblem::SameLabel { label, structures });
+        }
+        if label == 0 {
+            problems.push(SceneProblem::ZeroLabel { structure: name });
+        } else if cells_of_label[label as usize] == 0 {
+            problems.push(SceneProblem::NoCellOf { structure: name, label });
+        }
+        problems.extend(material::problems_of(structure));
+    }
+    for (label, &cells) in (1..=255_u8).zip(&cells_of_label[1..]) {
+        if cells > 0 && structures.iter().all(|s| s.label != label) {
+            problems.push(SceneProblem::UnknownLabel { label, cells });
         }
     }
-
-    #[test]
-    fn too_many_elements_are_refused_by_number() {
-        let dims = [200, 200, 101];
-        let labels = Labels {
-            dims,
-            spacing_m: 1e-3,
-            cells: vec![1; dims.iter().product()],
-        };
-        let problems = Scene::from_labels("large", &labels).expect_err("too many");
-        let elements = 4_040_000;
-        assert_eq!(problems, [SceneProblem::TooManyElements { elements }]);
+    if structures.iter().all(|s| s.material.fixed) {
+        problems.push(SceneProblem::AllFixed);
     }
-
-    #[test]
-    fn unknown_scene_names_the_known_ones() {
-        let error = Scene::builtin("papper").expect_err("not a scene");
-        assert!(error.to_string().contains("paper"));
-    }
+    problems
 }

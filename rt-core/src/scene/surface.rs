@@ -1,25 +1,47 @@
-//! The closed triangle mesh over the surface elements of a lattice.
+//! Closed triangle meshes over the elements at the surface of a body and of the structures in it.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
-use super::Lattice;
+use super::{Lattice, Role, Structure};
 
-/// Closed and oriented outward: each directed edge is matched by its opposite.
+/// Triangle meshes over the body and over the structures inside it that are looked at, each closed and oriented
+/// outward: each directed edge is matched by its opposite.
 ///
 /// Parts that are one element thick have no inside between their two faces: those triangles cancel, and
 /// their elements stay as vertices without triangles.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    /// Every surface element, in the order of elements.
+    /// Every element on one of the surfaces, in the order of elements.
     pub vertex_elements: Vec<u32>,
-    /// Indices into `vertex_elements`.
+    /// Indices into `vertex_elements`: the body's first, then the parts'.
     pub triangles: Vec<[u32; 3]>,
+    /// How many triangles are the body's.
+    pub body_triangles: usize,
+    /// Elements on the surface of the body.
+    pub body_elements: usize,
+    /// One for the targets together, one for each structure that is spared or fixed; none in a body of one structure.
+    pub parts: Vec<SurfacePart>,
+}
+
+/// Triangles of one structure's own surface.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SurfacePart {
+    /// Number of the structure in the scene's list; the first one where several are one part.
+    pub structure: u8,
+    pub triangles: Range<usize>,
 }
 
 /// Elements with at least one of their six neighbours missing.
 pub fn surface_elements(lattice: &Lattice) -> Vec<u32> {
+    boundary(lattice, |_| true)
+}
+
+/// Elements of a part of the body with at least one of their six neighbours not in it.
+fn boundary(lattice: &Lattice, is_in: impl Fn(u32) -> bool) -> Vec<u32> {
+    let inner = |neighbour: &Option<u32>| neighbour.is_some_and(&is_in);
     (0..lattice.element_count() as u32)
-        .filter(|&element| lattice.neighbours(element).contains(&None))
+        .filter(|&element| is_in(element) && !lattice.neighbours(element).iter().all(inner))
         .collect()
 }
 
@@ -36,9 +58,73 @@ const FACES: [[usize; 4]; 6] = [
 const NONE: u32 = u32::MAX;
 
 impl Surface {
+    pub fn of(lattice: &Lattice, structures: &[Structure]) -> Self {
+        let mut meshes = vec![(0, Mesh::of(lattice, |_| true))];
+        for (first, members) in parts_of(structures) {
+            let mesh = Mesh::of(lattice, |element| members[lattice.structure(element) as usize]);
+            meshes.push((first, mesh));
+        }
+        Surface::joined(&meshes)
+    }
+
+    /// The same element is the same vertex in all of them.
+    fn joined(meshes: &[(u8, Mesh)]) -> Self {
+        let mut vertex_elements: Vec<u32> = meshes.iter().flat_map(|(_, m)| &m.vertex_elements).copied().collect();
+        vertex_elements.sort_unstable();
+        vertex_elements.dedup();
+        let mut triangles = Vec::with_capacity(meshes.iter().map(|(_, m)| m.triangles.len()).sum());
+        let mut parts = Vec::new();
+        for (structure, mesh) in meshes {
+            let vertex_of = |element: &u32| vertex_elements.partition_point(|e| e < element) as u32;
+            let joined: Vec<u32> = mesh.vertex_elements.iter().map(vertex_of).collect();
+            let start = triangles.len();
+            triangles.extend(mesh.triangles.iter().map(|t| t.map(|vertex| joined[vertex as usize])));
+            parts.push(SurfacePart {
+                structure: *structure,
+                triangles: start..triangles.len(),
+            });
+        }
+        let body = parts.remove(0);
+        Surface {
+            vertex_elements,
+            triangles,
+            body_triangles: body.triangles.len(),
+            body_elements: meshes[0].1.vertex_elements.len(),
+            parts,
+        }
+    }
+}
+
+/// The structures that have a surface of their own: number of the first, and which are in it.
+fn parts_of(structures: &[Structure]) -> Vec<(u8, Vec<bool>)> {
+    if structures.len() < 2 {
+        return Vec::new();
+    }
+    let is_target = |s: &Structure| s.role == Role::Target;
+    let targets: Vec<bool> = structures.iter().map(is_target).collect();
+    let target = structures
+        .iter()
+        .position(is_target)
+        .map(|first| (first as u8, targets));
+    let is_looked_at = |s: &Structure| s.role == Role::Spare || (s.material.fixed && s.role != Role::Target);
+    let others = structures.iter().enumerate().filter(|(_, s)| is_looked_at(s));
+    let alone = |number: usize| (0..structures.len()).map(|n| n == number).collect();
+    target
+        .into_iter()
+        .chain(others.map(|(number, _)| (number as u8, alone(number))))
+        .collect()
+}
+
+/// The surface of one part of the body.
+struct Mesh {
+    vertex_elements: Vec<u32>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Mesh {
     /// Marching cubes on the occupancy, each vertex moved onto the inside end of its cube edge.
-    pub fn of(lattice: &Lattice) -> Self {
-        let vertex_elements = surface_elements(lattice);
+    fn of(lattice: &Lattice, is_in: impl Fn(u32) -> bool) -> Self {
+        let vertex_elements = boundary(lattice, &is_in);
         let mut vertex_of_element = vec![NONE; lattice.element_count()];
         for (vertex, &element) in vertex_elements.iter().enumerate() {
             vertex_of_element[element as usize] = vertex as u32;
@@ -48,29 +134,25 @@ impl Surface {
             let cell = lattice.cell(element).map(|c| c as i64);
             for corner in 0..8 {
                 let base = [0, 1, 2].map(|axis| cell[axis] - (corner >> axis & 1));
-                let corners = cube_corners(lattice, base, &vertex_of_element);
+                let corners: Corners = std::array::from_fn(|corner| {
+                    let cell = [0, 1, 2].map(|axis| base[axis] + (corner as i64 >> axis & 1));
+                    let element = lattice.element_at(cell).filter(|&e| is_in(e))?;
+                    Some(vertex_of_element[element as usize])
+                });
                 if lowest_vertex(&corners) == Some(vertex as u32) {
                     push_cube(&corners, &mut triangles);
                 }
             }
         }
-        Surface {
+        Mesh {
             vertex_elements,
             triangles: without_opposites(triangles),
         }
     }
 }
 
-/// What is at a corner of a cube: nothing, an element inside the body (`Some(NONE)`) or a surface vertex.
+/// What is at a corner of a cube: nothing, an element inside the part (`Some(NONE)`) or a surface vertex.
 type Corners = [Option<u32>; 8];
-
-fn cube_corners(lattice: &Lattice, base: [i64; 3], vertex_of_element: &[u32]) -> Corners {
-    std::array::from_fn(|corner| {
-        let cell = [0, 1, 2].map(|axis| base[axis] + (corner as i64 >> axis & 1));
-        let element = lattice.element_at(cell)?;
-        Some(vertex_of_element[element as usize])
-    })
-}
 
 /// The vertex that handles a cube, so that each cube is handled once.
 fn lowest_vertex(corners: &Corners) -> Option<u32> {

@@ -10,6 +10,7 @@ fn labels(dims: [usize; 3], is_tissue: impl Fn([usize; 3]) -> bool) -> Labels {
         dims,
         spacing_m: 1.5e-3,
         cells: (0..count).map(|n| u8::from(is_tissue(cell(n)))).collect(),
+        structures: Vec::new(),
     }
 }
 

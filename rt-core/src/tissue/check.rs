@@ -1,45 +1,26 @@
-//! What a state is worth: its largest violation over all links; and its surface for those who draw it.
+//! What a state is worth: its largest violation over all links.
 
-use super::chainmail::{ChainMail, TissueState, violation};
-use crate::scene::Surface;
+use super::chainmail::{ChainMail, Scaled, TissueState, link_violation, ordered};
 
 /// Largest violation of a limit over all links, in elements; zero if there is none, infinite for a state
 /// of another model.
+///
+/// Looks at every link by itself: the reference for what a step reports after looking only at what moved.
 pub fn largest_violation(model: &ChainMail, state: &TissueState) -> f64 {
-    if state.fits(model) {
-        f64::from(largest_violation_f32(model, state))
-    } else {
-        f64::INFINITY
+    if !state.fits(model) {
+        return f64::INFINITY;
     }
-}
-
-pub(super) fn largest_violation_f32(model: &ChainMail, state: &TissueState) -> f32 {
-    let [x, y, z] = &model.limits.links;
-    let u = state.u.each_ref().map(Vec::as_slice);
+    let rest = 1.0 / state.scale();
     let mut worst = 0.0_f32;
-    for run in &model.runs {
-        let (first, end) = (run.first as usize, run.end() as usize);
-        let lo = u.map(|c| &c[first..end - 1]);
-        let hi = u.map(|c| &c[first + 1..end]);
-        worst = worst.max(violation(x, lo, hi));
-    }
-    let [ux, uy, uz] = u;
-    let along_y = (y, &model.y_links, [uy, ux, uz]);
-    let along_z = (z, &model.z_links, [uz, ux, uy]);
-    for (limits, links, u) in [along_y, along_z] {
-        for span in links.all() {
-            let (lo, hi, len) = (span.lo as usize, span.hi as usize, span.len as usize);
-            let lo = u.map(|c| &c[lo..lo + len]);
-            let hi = u.map(|c| &c[hi..hi + len]);
-            worst = worst.max(violation(limits, lo, hi));
+    for axis in 0..3 {
+        let u = ordered(axis, state.u.each_ref().map(Vec::as_slice));
+        for span in model.links[axis].all() {
+            let l: Scaled = model.classes.limits(span.class, axis).scaled(rest, 0.0);
+            for n in 0..span.len {
+                let [lo, hi] = [span.lo, span.hi].map(|first| u.map(|c| c[(first + n) as usize]));
+                worst = worst.max(link_violation(&l, lo, hi));
+            }
         }
     }
-    worst
-}
-
-/// Writes the positions of the surface's vertices in metres; stops at the shorter of the two.
-pub fn write_surface(model: &ChainMail, state: &TissueState, surface: &Surface, positions_m: &mut [[f32; 3]]) {
-    for (slot, &element) in positions_m.iter_mut().zip(&surface.vertex_elements) {
-        *slot = state.position_m(model, element).map(|c| c as f32);
-    }
+    f64::from(worst / rest)
 }

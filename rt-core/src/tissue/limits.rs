@@ -32,6 +32,14 @@ impl Default for TissueParameters {
     }
 }
 
+/// Settings of links along one axis, for structures that have their own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisLimits {
+    pub min_stretch: f64,
+    pub max_stretch: f64,
+    pub shear_deg: f64,
+}
+
 /// Limits of links along one axis, on the difference of the displacements of their ends, in elements.
 ///
 /// Displacements instead of positions: at rest every difference is zero, wherever the element is, so f32
@@ -44,6 +52,25 @@ pub(crate) struct LinkLimits {
     pub high: f32,
     /// Tangent of the shear angle: `|d_side| <= tan * (1 + d_along)`, a frustum.
     pub tan: f32,
+}
+
+impl LinkLimits {
+    pub(crate) fn of(limits: &AxisLimits) -> LinkLimits {
+        LinkLimits {
+            low: (limits.min_stretch - 1.0) as f32,
+            high: (limits.max_stretch - 1.0) as f32,
+            tan: limits.shear_deg.to_radians().tan() as f32,
+        }
+    }
+
+    /// Of each limit the tighter one.
+    pub(crate) fn tighter(&self, other: &LinkLimits) -> LinkLimits {
+        LinkLimits {
+            low: self.low.max(other.low),
+            high: self.high.min(other.high),
+            tan: self.tan.min(other.tan),
+        }
+    }
 }
 
 /// Checked settings, as the step uses them.

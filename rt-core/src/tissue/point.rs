@@ -1,6 +1,6 @@
 //! A point of the tissue: the element it belongs to and where in that element; moves and turns with it.
 
-use super::chainmail::{ChainMail, TissueState};
+use super::Deformed;
 
 /// `local` runs from -0.5 to 0.5 across an element, along the deformed links.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,39 +21,31 @@ impl MaterialPoint {
     /// The material point at a place of the scene frame; `None` outside the tissue.
     ///
     /// Walks through the deformed lattice from `hint`, or else from the nearest of a bounded sample.
-    pub fn locate(
-        model: &ChainMail,
-        state: &TissueState,
-        point_m: [f64; 3],
-        hint: Option<u32>,
-    ) -> Option<MaterialPoint> {
-        if !state.fits(model) || point_m.iter().any(|c| !c.is_finite()) {
+    pub fn locate(body: &Deformed, point_m: [f64; 3], hint: Option<u32>) -> Option<MaterialPoint> {
+        let p = point_m.map(|c| c / body.lattice.spacing_m);
+        if p.iter().any(|c| !c.is_finite()) || out_of_reach(body, p) {
             return None;
         }
-        let p = point_m.map(|c| c / model.lattice.spacing_m);
-        if out_of_reach(model, state, p) {
-            return None;
-        }
-        let known = |&element: &u32| (element as usize) < model.element_count();
-        let from_hint = hint.filter(known).and_then(|e| walk(model, state, p, e));
-        from_hint.or_else(|| walk(model, state, p, nearest_sample(model, state, p)))
+        let known = |&element: &u32| (element as usize) < body.lattice.element_count();
+        let from_hint = hint.filter(known).and_then(|e| walk(body, p, e));
+        from_hint.or_else(|| walk(body, p, nearest_sample(body, p)))
     }
 
     /// Where the point is now, in the scene frame.
-    pub fn position_m(&self, model: &ChainMail, state: &TissueState) -> [f64; 3] {
-        let links = link_vectors(model, state, self.element);
-        let mut p = centre(model, state, self.element);
+    pub fn position_m(&self, body: &Deformed) -> [f64; 3] {
+        let links = link_vectors(body, self.element);
+        let mut p = centre(body, self.element);
         for (link, local) in links.iter().zip(self.local) {
             for axis in 0..3 {
                 p[axis] += f64::from(local) * link[axis];
             }
         }
-        p.map(|c| c * model.lattice.spacing_m)
+        p.map(|c| c * body.lattice.spacing_m)
     }
 
     /// Where a direction of the tissue at rest points now, as a unit vector; unchanged if it has no length.
-    pub fn direction(&self, model: &ChainMail, state: &TissueState, rest_dir: [f64; 3]) -> [f64; 3] {
-        let links = link_vectors(model, state, self.element);
+    pub fn direction(&self, body: &Deformed, rest_dir: [f64; 3]) -> [f64; 3] {
+        let links = link_vectors(body, self.element);
         let mut now = [0.0; 3];
         for (link, part) in links.iter().zip(rest_dir) {
             for axis in 0..3 {
@@ -70,21 +62,21 @@ impl MaterialPoint {
 }
 
 /// Centre of an element, in elements.
-fn centre(model: &ChainMail, state: &TissueState, element: u32) -> [f64; 3] {
-    let cell = model.lattice.cell(element);
-    let u = state.displacement_of(element);
+fn centre(body: &Deformed, element: u32) -> [f64; 3] {
+    let cell = body.lattice.cell(element);
+    let u = body.displacement(element);
     [0, 1, 2].map(|a| cell[a] as f64 + 0.5 + u[a])
 }
 
 /// Links through an element along each axis: central differences, one-sided at the surface, as at rest
 /// where there is no neighbour.
-fn link_vectors(model: &ChainMail, state: &TissueState, element: u32) -> [[f64; 3]; 3] {
-    let around = model.lattice.neighbours(element);
+fn link_vectors(body: &Deformed, element: u32) -> [[f64; 3]; 3] {
+    let around = body.lattice.neighbours(element);
     [0, 1, 2].map(|axis| {
         let (below, above) = (around[2 * axis], around[2 * axis + 1]);
         let steps = f64::from(u8::from(below.is_some()) + u8::from(above.is_some()));
-        let lo = state.displacement_of(below.unwrap_or(element));
-        let hi = state.displacement_of(above.unwrap_or(element));
+        let lo = body.displacement(below.unwrap_or(element));
+        let hi = body.displacement(above.unwrap_or(element));
         let mut link = [0, 1, 2].map(|a| (hi[a] - lo[a]) / steps.max(1.0));
         link[axis] += 1.0;
         link
@@ -92,9 +84,9 @@ fn link_vectors(model: &ChainMail, state: &TissueState, element: u32) -> [[f64; 
 }
 
 /// Coefficients of `p - centre` in the links of an element; `None` for a flat cell.
-fn local_of(model: &ChainMail, state: &TissueState, p: [f64; 3], element: u32) -> Option<[f64; 3]> {
-    let [a, b, c] = link_vectors(model, state, element);
-    let x = centre(model, state, element);
+fn local_of(body: &Deformed, p: [f64; 3], element: u32) -> Option<[f64; 3]> {
+    let [a, b, c] = link_vectors(body, element);
+    let x = centre(body, element);
     let r = [0, 1, 2].map(|axis| p[axis] - x[axis]);
     let volume = dot(a, cross(b, c));
     if volume.abs() < 1e-9 {
@@ -117,20 +109,20 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// Farther from the body at rest than any element has moved, and its own size at the largest stretch.
-fn out_of_reach(model: &ChainMail, state: &TissueState, p: [f64; 3]) -> bool {
-    let [low, high] = model.rest_box;
-    let stretch = model.limits.links.iter().map(|link| f64::from(link.high));
-    let margin = 1.0 + stretch.sum::<f64>() + f64::from(state.max_displacement);
+fn out_of_reach(body: &Deformed, p: [f64; 3]) -> bool {
+    let (low, high) = body.lattice.bounds_m();
+    let [low, high] = [low, high].map(|corner| corner.map(|c| c / body.lattice.spacing_m));
+    let margin = f64::from(body.reach);
     (0..3).any(|a| p[a] < low[a] - margin || p[a] > high[a] + margin)
 }
 
 /// Steps to the neighbour on the side where the point is farthest out, until it is inside a cell.
-fn walk(model: &ChainMail, state: &TissueState, p: [f64; 3], start: u32) -> Option<MaterialPoint> {
+fn walk(body: &Deformed, p: [f64; 3], start: u32) -> Option<MaterialPoint> {
     let mut element = start;
     let mut best: Option<(f64, MaterialPoint)> = None;
     for _ in 0..MAX_WALK {
-        let local = local_of(model, state, p, element)?;
-        let around = model.lattice.neighbours(element);
+        let local = local_of(body, p, element)?;
+        let around = body.lattice.neighbours(element);
         let outside = |axis: usize| local[axis].abs() - 0.5;
         let beyond = |axis: usize| around[2 * axis + usize::from(local[axis] > 0.0)];
         let worst = (0..3).map(outside).fold(f64::MIN, f64::max);
@@ -156,11 +148,11 @@ fn walk(model: &ChainMail, state: &TissueState, p: [f64; 3], start: u32) -> Opti
 }
 
 /// The element nearest to `p` now, among a sample.
-fn nearest_sample(model: &ChainMail, state: &TissueState, p: [f64; 3]) -> u32 {
-    let stride = model.element_count().div_ceil(MAX_STARTS).max(1);
+fn nearest_sample(body: &Deformed, p: [f64; 3]) -> u32 {
+    let stride = body.lattice.element_count().div_ceil(MAX_STARTS).max(1);
     let mut nearest = (f64::INFINITY, 0);
-    for element in (0..model.element_count() as u32).step_by(stride) {
-        let x = centre(model, state, element);
+    for element in (0..body.lattice.element_count() as u32).step_by(stride) {
+        let x = centre(body, element);
         let square = (0..3).map(|a| (p[a] - x[a]).powi(2)).sum::<f64>();
         if square < nearest.0 {
             nearest = (square, element);

@@ -3,7 +3,7 @@
 use super::*;
 use crate::scene::test_bodies::Random;
 use crate::scene::{Scene, test_bodies};
-use crate::tissue::{Held, TissueParameters, step, write_surface};
+use crate::tissue::{ChainMail, Held, TissueParameters, TissueState, step};
 
 fn model_of(scene: &Scene) -> ChainMail {
     let limits = TissueParameters::default().validate().expect("valid");
@@ -21,7 +21,19 @@ fn deformed() -> (Scene, ChainMail, TissueState) {
     for tick in 1..=80 {
         let way = 0.1 * h * f64::from(tick);
         let position_m = [rest[0] + 0.4 * way, rest[1] - 0.3 * way, rest[2] + way];
-        assert!(step(&model, &mut state, Some(Held { element, position_m }), 1e-3).converged);
+        assert!(
+            step(
+                &model,
+                &mut state,
+                Some(Held {
+                    element,
+                    position_m,
+                    patch_m: 0.0
+                }),
+                1e-3
+            )
+            .converged
+        );
     }
     (scene, model, state)
 }
@@ -39,9 +51,9 @@ fn point_is_found_where_it_is_in_a_deformed_body() {
         let element = (random.unit() * model.element_count() as f64) as u32;
         let local = [(); 3].map(|()| 0.45 * random.signed() as f32);
         let point = MaterialPoint { element, local };
-        let position = point.position_m(&model, &state);
+        let position = point.position_m(&state.deformed(&model));
         for hint in [Some(element), Some(0), Some(u32::MAX), None] {
-            let Some(again) = MaterialPoint::locate(&model, &state, position, hint) else {
+            let Some(again) = MaterialPoint::locate(&state.deformed(&model), position, hint) else {
                 assert!(
                     scene.lattice.neighbours(element).contains(&None),
                     "lost inside the body"
@@ -50,7 +62,7 @@ fn point_is_found_where_it_is_in_a_deformed_body() {
             };
             found += 1;
             same += u32::from(again.element == element);
-            let apart = distance(again.position_m(&model, &state), position);
+            let apart = distance(again.position_m(&state.deformed(&model)), position);
             assert!(apart < 1e-5 * scene.lattice.spacing_m, "{apart} m apart");
         }
     }
@@ -68,7 +80,7 @@ fn at_rest_the_cell_is_the_element() {
         let cell = scene.lattice.dims.map(|n| random.unit() * (n + 4) as f64 - 2.0);
         let point_m = cell.map(|c| c * scene.lattice.spacing_m);
         let expected = scene.lattice.element_at(cell.map(|c| c.floor() as i64));
-        let found = MaterialPoint::locate(&model, &state, point_m, None);
+        let found = MaterialPoint::locate(&state.deformed(&model), point_m, None);
         assert_eq!(found.map(|point| point.element), expected, "at {cell:?}");
     }
 }
@@ -78,7 +90,7 @@ fn outside_and_not_a_number_are_nowhere() {
     let (scene, model, state) = deformed();
     let (low, high) = scene.lattice.bounds_m();
     for point_m in [[0.0; 3], low, high, [f64::NAN; 3], [1e300, 0.0, 0.0]] {
-        assert_eq!(MaterialPoint::locate(&model, &state, point_m, Some(5)), None);
+        assert_eq!(MaterialPoint::locate(&state.deformed(&model), point_m, Some(5)), None);
     }
 }
 
@@ -86,27 +98,27 @@ fn outside_and_not_a_number_are_nowhere() {
 fn direction_is_that_of_two_points_a_little_apart() {
     let (scene, model, state) = deformed();
     let element = scene.lattice.element_of_cell(55, 33, 84).expect("inside");
-    let at = |local| MaterialPoint { element, local }.position_m(&model, &state);
+    let at = |local| MaterialPoint { element, local }.position_m(&state.deformed(&model));
     let (a, b) = (at([0.0; 3]), at([0.1, -0.2, 0.3]));
     let way = [0, 1, 2].map(|n| (b[n] - a[n]) / distance(a, b));
     let point = MaterialPoint {
         element,
         local: [0.0; 3],
     };
-    let direction = point.direction(&model, &state, [0.1, -0.2, 0.3]);
+    let direction = point.direction(&state.deformed(&model), [0.1, -0.2, 0.3]);
     assert!(distance(way, direction) < 1e-6);
     assert!(
         distance(direction, [0.1, -0.2, 0.3].map(|c| c / 0.14_f64.sqrt())) > 1e-3,
         "it turned"
     );
-    assert_eq!(point.direction(&model, &state, [0.0; 3]), [0.0; 3]);
+    assert_eq!(point.direction(&state.deformed(&model), [0.0; 3]), [0.0; 3]);
 }
 
 #[test]
 fn surface_is_written_in_metres() {
     let (scene, model, state) = deformed();
     let mut positions = vec![[0.0; 3]; scene.surface.vertex_elements.len()];
-    write_surface(&model, &state, &scene.surface, &mut positions);
+    state.deformed(&model).write_surface(&scene.surface, &mut positions);
     for (position, &element) in positions.iter().zip(&scene.surface.vertex_elements) {
         let expected = state.position_m(&model, element);
         assert!(distance(position.map(f64::from), expected) < 1e-7);

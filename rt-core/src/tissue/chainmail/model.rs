@@ -1,47 +1,59 @@
-//! What a ChainMail body is (built once) and where it is (changed by each step).
+//! What a ChainMail body is: topology and limits, built once.
 
-use super::spans::{Links, links_along};
-use crate::scene::{Lattice, Run, Scene};
+use super::classes::Classes;
+use super::spans::{Links, Rows, links_along};
+use crate::scene::{Lattice, Scene};
 use crate::tissue::Limits;
+use std::sync::Arc;
 
-/// Topology and limits; never changes.
+/// Topology and limits; only the limits ever change.
 #[derive(Clone, Debug)]
 pub struct ChainMail {
-    pub(crate) lattice: Lattice,
-    pub(crate) limits: Limits,
-    pub(crate) y_links: Links,
-    pub(crate) z_links: Links,
-    /// All runs along x; links along x are between neighbours in a run.
-    pub(crate) runs: Vec<Run>,
+    pub(crate) lattice: Arc<Lattice>,
+    limits: Limits,
+    pub(crate) classes: Classes,
+    pub(crate) rows: Rows,
+    /// Links along x, y and z.
+    pub(crate) links: [Links; 3],
     /// First and one past the last occupied row j of each plane k.
     pub(crate) rows_of_plane: Vec<[usize; 2]>,
-    /// Part of the body that each element belongs to; no link joins two parts.
-    pub(crate) part: Vec<u32>,
-    /// Corners of the box around the body at rest, in elements.
-    pub(crate) rest_box: [[f64; 3]; 2],
+    /// Part of the body that each run belongs to; no link joins two parts.
+    part_of_run: Vec<u32>,
+    /// Each part, whether something in it is fixed.
+    part_is_fixed: Vec<bool>,
+    /// The processor has AVX2.
+    pub(crate) vectors: bool,
 }
 
 impl ChainMail {
     pub fn new(scene: &Scene, limits: Limits) -> Self {
         let lattice = scene.lattice.clone();
+        let rows = Rows::of(&lattice);
         let [_, ny, nz] = lattice.dims;
         let rows_of_plane = (0..nz).map(|k| {
-            let occupied = || (0..ny).filter(|&j| !lattice.row(j, k).is_empty());
+            let occupied = || (0..ny).filter(|&j| !rows.numbers(j + ny * k).is_empty());
             match (occupied().next(), occupied().next_back()) {
                 (Some(first), Some(last)) => [first, last + 1],
                 _ => [0, 0],
             }
         });
-        let rows = (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k)));
-        let (low, high) = lattice.bounds_m();
+        let classes = Classes::new(&scene.structures, &limits);
+        let class_of = |_axis: usize, lo, hi| classes.of_link(lattice.structure(lo), lattice.structure(hi));
+        let links = [0, 1, 2].map(|axis| links_along(axis, &lattice, &rows, &class_of));
+        let part_of_run = parts(&lattice, &rows);
+        let mut part_is_fixed = vec![false; part_of_run.iter().map(|&p| p as usize + 1).max().unwrap_or(0)];
+        for (run, &part) in rows.runs.iter().zip(&part_of_run) {
+            part_is_fixed[part as usize] |= (run.first..run.end()).any(|e| classes.is_fixed(lattice.structure(e)));
+        }
         ChainMail {
             limits,
-            y_links: links_along(1, &lattice),
-            z_links: links_along(2, &lattice),
-            runs: rows.flat_map(|(j, k)| lattice.row(j, k)).copied().collect(),
+            links,
             rows_of_plane: rows_of_plane.collect(),
-            part: parts(&lattice),
-            rest_box: [low, high].map(|corner| corner.map(|c| c / lattice.spacing_m)),
+            part_of_run,
+            part_is_fixed,
+            vectors: vectors(),
+            classes,
+            rows,
             lattice,
         }
     }
@@ -53,85 +65,75 @@ impl ChainMail {
     pub fn element_count(&self) -> usize {
         self.lattice.element_count()
     }
+
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Takes new limits; states that ran with others must hear of it (`TissueState::disturb`).
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.classes.set_limits(&limits);
+        self.limits = limits;
+    }
+
+    /// Runs the portable kernels, whatever the processor has: they give the same bytes.
+    pub fn without_vectors(mut self) -> Self {
+        self.vectors = false;
+        self
+    }
+
+    pub(crate) fn is_fixed(&self, element: u32) -> bool {
+        self.classes.any_fixed() && self.classes.is_fixed(self.lattice.structure(element))
+    }
+
+    pub(crate) fn part(&self, element: u32) -> u32 {
+        self.part_of_run[self.rows.run_of(element)]
+    }
+
+    pub(crate) fn part_of_run(&self, run: usize) -> u32 {
+        self.part_of_run[run]
+    }
+
+    pub(crate) fn part_is_fixed(&self, part: u32) -> bool {
+        self.part_is_fixed[part as usize]
+    }
 }
 
-/// Numbers the connected parts of a body.
-fn parts(lattice: &Lattice) -> Vec<u32> {
+fn vectors() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return is_x86_feature_detected!("avx2");
+    #[cfg(not(target_arch = "x86_64"))]
+    false
+}
+
+/// Numbers the connected parts of a body, for each run: all elements of a run are connected.
+fn parts(lattice: &Lattice, rows: &Rows) -> Vec<u32> {
     const UNSEEN: u32 = u32::MAX;
-    let mut part = vec![UNSEEN; lattice.element_count()];
+    let mut neighbours = vec![Vec::new(); rows.runs.len()];
+    for axis in [1, 2] {
+        for span in links_along(axis, lattice, rows, &|_, _, _| Some((0, super::kernels::Pin::None))).all() {
+            neighbours[span.lo_run as usize].push(span.hi_run);
+            neighbours[span.hi_run as usize].push(span.lo_run);
+        }
+    }
+    let mut part = vec![UNSEEN; rows.runs.len()];
     let mut open = Vec::new();
     let mut count = 0;
-    for start in 0..part.len() as u32 {
-        if part[start as usize] != UNSEEN {
+    for start in 0..part.len() {
+        if part[start] != UNSEEN {
             continue;
         }
-        part[start as usize] = count;
-        open.push(start);
-        while let Some(element) = open.pop() {
-            for neighbour in lattice.neighbours(element).into_iter().flatten() {
-                if part[neighbour as usize] == UNSEEN {
-                    part[neighbour as usize] = count;
-                    open.push(neighbour);
+        part[start] = count;
+        open.push(start as u32);
+        while let Some(run) = open.pop() {
+            for &next in &neighbours[run as usize] {
+                if part[next as usize] == UNSEEN {
+                    part[next as usize] = count;
+                    open.push(next);
                 }
             }
         }
         count += 1;
     }
     part
-}
-
-/// Displacements from rest of all elements, in elements, one array for each axis; and scratch.
-#[derive(Clone, Debug)]
-pub struct TissueState {
-    pub(crate) u: [Vec<f32>; 3],
-    pub(crate) before: [Vec<f32>; 3],
-    /// Of the last step, in elements.
-    pub(crate) max_displacement: f32,
-}
-
-impl TissueState {
-    /// The body at rest. Writes every page, so that no step is the first to touch one.
-    pub fn at_rest(model: &ChainMail) -> Self {
-        let touched = || {
-            let mut component = Vec::with_capacity(model.element_count());
-            component.extend((0..model.element_count()).map(|_| std::hint::black_box(0.0)));
-            component
-        };
-        TissueState {
-            u: std::array::from_fn(|_| touched()),
-            before: std::array::from_fn(|_| touched()),
-            max_displacement: 0.0,
-        }
-    }
-
-    /// Displacement from rest along `axis` (0 to 2) of all elements, in elements.
-    pub fn displacement(&self, axis: usize) -> &[f32] {
-        self.u.get(axis).map_or(&[], Vec::as_slice)
-    }
-
-    /// Centre of an element in the scene frame; the last element's for a number past the end.
-    pub fn position_m(&self, model: &ChainMail, element: u32) -> [f64; 3] {
-        let rest = model.lattice.rest_m(element);
-        let u = self.displacement_of(element);
-        [0, 1, 2].map(|a| rest[a] + model.lattice.spacing_m * u[a])
-    }
-
-    /// Displacement of one element, in elements.
-    pub(crate) fn displacement_of(&self, element: u32) -> [f64; 3] {
-        let e = (element as usize).min(self.u[0].len().saturating_sub(1));
-        [0, 1, 2].map(|a| self.u[a].get(e).copied().map_or(0.0, f64::from))
-    }
-
-    pub(crate) fn put(&mut self, element: usize, u: [f32; 3]) {
-        for (component, value) in self.u.iter_mut().zip(u) {
-            if let Some(slot) = component.get_mut(element) {
-                *slot = value;
-            }
-        }
-    }
-
-    pub(crate) fn fits(&self, model: &ChainMail) -> bool {
-        let n = model.element_count();
-        self.u.iter().chain(&self.before).all(|c| c.len() == n)
-    }
 }

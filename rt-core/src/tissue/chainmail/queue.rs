@@ -4,9 +4,9 @@
 
 use std::collections::VecDeque;
 
-use super::kernels::{self, LOWER, UPPER};
-use super::model::{ChainMail, TissueState};
-use super::sweep::ordered;
+use super::kernels::{self, LOWER, Scaled, UPPER, ordered};
+use super::model::ChainMail;
+use super::state::TissueState;
 use crate::tissue::Held;
 
 /// Neighbour table and scratch, allocated once.
@@ -32,11 +32,15 @@ impl QueuePass {
     ///
     /// # Panics
     ///
-    /// If there is no such element, or the state is of another model.
+    /// If there is no such element, the state is of another model, or the body has several structures.
     pub fn run(&mut self, model: &ChainMail, state: &mut TissueState, held: Held) -> u32 {
         let rest = model.lattice.rest_m(held.element);
         let u = [0, 1, 2].map(|a| (held.position_m[a] - rest[a]) / model.lattice.spacing_m);
         state.put(held.element as usize, u.map(|c| c as f32));
+        assert_eq!(model.classes.count(), 1, "the textbook knows one kind of tissue");
+        let rest = 1.0 / state.scale();
+        let limits = [0, 1, 2].map(|axis| model.classes.limits(0, axis).scaled(rest, 0.0));
+        state.disturb(model);
         self.visited.fill(false);
         self.visited[held.element as usize] = true;
         self.queue.push_back(held.element);
@@ -44,7 +48,7 @@ impl QueuePass {
         while let Some(inner) = self.queue.pop_front() {
             for (direction, neighbour) in self.neighbours[inner as usize].into_iter().enumerate() {
                 let Some(outer) = neighbour else { continue };
-                if !self.visited[outer as usize] && push(model, state, direction, inner, outer) {
+                if !self.visited[outer as usize] && push(&limits, state, direction, inner, outer) {
                     self.visited[outer as usize] = true;
                     self.queue.push_back(outer);
                     moved += 1;
@@ -56,22 +60,20 @@ impl QueuePass {
 }
 
 /// Moves `outer` into the limits of its link with `inner`; whether it had to move.
-fn push(model: &ChainMail, state: &mut TissueState, direction: usize, inner: u32, outer: u32) -> bool {
+fn push(limits: &[Scaled; 3], state: &mut TissueState, direction: usize, inner: u32, outer: u32) -> bool {
     let axis = direction / 2;
-    let limits = &model.limits.links[axis];
+    let limits = &limits[axis];
     let at = |e: u32| ordered(axis, state.u.each_ref().map(|c| c[e as usize]));
     let (from, old) = (at(inner), at(outer));
-    let new = if direction % 2 == 1 {
+    let (new, moved) = if direction % 2 == 1 {
         kernels::clamped_outer::<UPPER>(limits, from, old)
     } else {
         kernels::clamped_outer::<LOWER>(limits, from, old)
     };
-    let [a, b, c] = new;
-    let xyz = match axis {
-        0 => [a, b, c],
-        1 => [b, a, c],
-        _ => [b, c, a],
-    };
-    state.put(outer as usize, xyz);
-    (0..3).any(|n| (new[n] - old[n]).abs() > 1e-6)
+    if moved {
+        for (component, value) in ordered(axis, state.u.each_mut()).into_iter().zip(new) {
+            component[outer as usize] = value;
+        }
+    }
+    moved
 }

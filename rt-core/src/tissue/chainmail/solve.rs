@@ -1,9 +1,11 @@
 //! One step: recover, hold, solve to the residual, report.
 
-use super::model::{ChainMail, TissueState};
-use super::{project, sweep};
-use crate::tissue::Held;
-use crate::tissue::check::largest_violation_f32;
+use super::held::{self, Grip};
+use super::kernels::{Kernels, Portable};
+use super::model::ChainMail;
+use super::state::TissueState;
+use super::sweep::Pass;
+use crate::tissue::{Held, HeldOutcome, Solve, StepReport};
 
 /// Outward sweeps tried first.
 pub const MAX_SWEEPS: u32 = 6;
@@ -12,49 +14,11 @@ pub const MAX_PROJECTIONS: u32 = 12;
 /// Farthest from rest that a held element is followed, in elements; f32 resolves the tolerance up to here.
 pub const REACH: f64 = 2048.0;
 
-/// What became of the held element.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HeldOutcome {
-    /// None was given.
-    None,
-    /// It is where it was asked to be.
-    Followed,
-    /// Not finite, out of reach, or no such element; the step only recovered.
-    Refused,
-}
-
-/// How far the solver had to go, in this order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Solve {
-    /// No element was held: recovery breaks no limit.
-    Nothing,
-    Sweeps,
-    Projections,
-    /// Pulled toward the body at rest moved as a whole.
-    Reanchored,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepReport {
-    /// Passes over all links: sweeps, projections and re-anchoring.
-    pub passes: u32,
-    /// Largest violation over all links after the step, in elements.
-    pub residual: f64,
-    /// Elements that the solver moved, besides recovery; the held one counts.
-    pub moved: u32,
-    /// The residual is within tolerance.
-    pub converged: bool,
-    /// Largest distance of an element from rest, in elements.
-    pub max_displacement: f32,
-    pub held: HeldOutcome,
-    pub solve: Solve,
-}
-
 /// Advances the tissue by `dt_s`; a `dt_s` that is not above zero recovers nothing.
 ///
 /// A state of another model is left alone and reported as not converged.
 pub fn step(model: &ChainMail, state: &mut TissueState, held: Option<Held>, dt_s: f64) -> StepReport {
-    let (target, outcome) = held_target(model, held);
+    let (grip, outcome) = held::grip(model, held);
     let mut report = StepReport {
         passes: 0,
         residual: f64::INFINITY,
@@ -63,108 +27,104 @@ pub fn step(model: &ChainMail, state: &mut TissueState, held: Option<Held>, dt_s
         max_displacement: state.max_displacement,
         held: outcome,
         solve: Solve::Nothing,
+        tip_force_n: None,
     };
     if !state.fits(model) {
         return report;
     }
-    recover(state, kept_fraction(model, dt_s));
-    for (before, now) in state.before.iter_mut().zip(&state.u) {
-        before.copy_from_slice(now);
-    }
-    let residual = match target {
-        Some((element, u)) => solve(model, state, element, u, &mut report),
-        None => largest_violation_f32(model, state),
-    };
+    state.recover(model, kept_fraction(model, dt_s));
+    state.moved.clear(&model.rows, model.lattice.dims[1]);
+    let residual = dispatch(model, state, grip, &mut report);
     report.residual = f64::from(residual);
-    measure_motion(state, &mut report);
-    state.max_displacement = report.max_displacement;
-    report.converged = residual <= model.limits.tolerance && report.max_displacement.is_finite();
+    report.moved = state.moved.element_count(&model.rows, model.lattice.dims[1]);
+    report.max_displacement = state.max_displacement;
+    report.converged = residual <= model.limits().tolerance && report.max_displacement.is_finite();
     report
 }
 
-/// The held element and its displacement, if it can be followed.
-fn held_target(model: &ChainMail, held: Option<Held>) -> (Option<(usize, [f32; 3])>, HeldOutcome) {
-    let Some(held) = held else {
-        return (None, HeldOutcome::None);
-    };
-    let rest = model.lattice.rest_m(held.element);
-    let u = [0, 1, 2].map(|a| (held.position_m[a] - rest[a]) / model.lattice.spacing_m);
-    let known = (held.element as usize) < model.element_count();
-    if known && u.iter().all(|c| c.abs() <= REACH) {
-        let u = u.map(|c| c as f32);
-        (Some((held.element as usize, u)), HeldOutcome::Followed)
-    } else {
-        (None, HeldOutcome::Refused)
-    }
-}
-
-fn kept_fraction(model: &ChainMail, dt_s: f64) -> f32 {
+fn kept_fraction(model: &ChainMail, dt_s: f64) -> f64 {
     if dt_s > 0.0 {
-        (-dt_s / model.limits.recovery_time_s).exp() as f32
+        (-dt_s / model.limits().recovery_time_s).exp()
     } else {
         1.0
     }
 }
 
-/// Displacements below this become zero, long before they become denormal and slow.
-const AT_REST: f32 = 1e-12;
-
-/// Recovery by the surroundings: differences shrink in proportion, so no limit is broken.
-fn recover(state: &mut TissueState, kept: f32) {
-    for component in &mut state.u {
-        for value in component {
-            let left = *value * kept;
-            *value = if left.abs() > AT_REST { left } else { 0.0 };
-        }
+fn dispatch(model: &ChainMail, state: &mut TissueState, grip: Option<Grip>, report: &mut StepReport) -> f32 {
+    #[cfg(target_arch = "x86_64")]
+    if model.vectors {
+        // SAFETY: `vectors` says that the processor has AVX2.
+        return unsafe { solve_avx2(model, state, grip, report) };
     }
+    solve::<Portable>(model, state, grip, report)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn solve_avx2(model: &ChainMail, state: &mut TissueState, grip: Option<Grip>, report: &mut StepReport) -> f32 {
+    solve::<super::avx2::Avx2>(model, state, grip, report)
 }
 
 /// Puts the held element in place, then sweeps, then projects, then re-anchors, until the residual is within tolerance.
-fn solve(model: &ChainMail, state: &mut TissueState, held: usize, at: [f32; 3], report: &mut StepReport) -> f32 {
-    let tolerance = model.limits.tolerance;
-    let held_cell = model.lattice.cell(held as u32);
-    state.put(held, at);
+#[inline(always)]
+fn solve<K: Kernels>(model: &ChainMail, state: &mut TissueState, grip: Option<Grip>, report: &mut StepReport) -> f32 {
+    let farthest = grip.map_or(0.0, |g| g.at.iter().fold(0.0, |a: f32, c| a.max(c.abs())));
+    let slack = slack(model, farthest.max(state.max_displacement));
+    let residual = match grip {
+        Some(grip) => hold::<K>(model, state, grip, slack, report),
+        None if state.active.is_empty() => 0.0,
+        None => Pass::new(model, state, [0; 3], slack).check::<K>(),
+    };
+    state.measure(model, K::largest_square);
+    residual.max(state.settled)
+}
+
+/// Violations that f32 cannot do without: two ends at `farthest`, rounded.
+fn slack(model: &ChainMail, farthest: f32) -> f32 {
+    const LEAST: f32 = 4e-6;
+    (LEAST + 2.0 * f32::EPSILON * farthest).min(0.25 * model.limits().tolerance)
+}
+
+#[inline(always)]
+fn hold<K: Kernels>(
+    model: &ChainMail,
+    state: &mut TissueState,
+    grip: Grip,
+    slack: f32,
+    report: &mut StepReport,
+) -> f32 {
+    let tolerance = model.limits().tolerance;
+    let held_cell = model.lattice.cell(grip.element);
+    held::put(model, state, &grip);
     loop {
+        if state.active.is_empty() {
+            return 0.0;
+        }
         let stage = match report.passes {
             n if n < MAX_SWEEPS => Solve::Sweeps,
             n if n < MAX_SWEEPS + MAX_PROJECTIONS => Solve::Projections,
             _ => Solve::Reanchored,
         };
-        match stage {
-            Solve::Reanchored => project::reanchor(model, held, &mut state.u),
+        let mut pass = Pass::new(model, state, held_cell, slack);
+        let residual = match stage {
+            Solve::Sweeps => pass.outward::<K>(),
             Solve::Projections => {
-                project::project_all(model, report.passes.is_multiple_of(2), &mut state.u);
-                state.put(held, at);
+                pass.project(report.passes.is_multiple_of(2));
+                held::put(model, pass.state, &grip);
+                pass.check_all::<K>()
             }
-            _ => sweep::outward(model, held_cell, &mut state.u),
-        }
+            _ => {
+                pass.reanchor(grip.element as usize);
+                if model.part_is_fixed(model.part(grip.element)) {
+                    report.held = HeldOutcome::Limited;
+                }
+                pass.check_all::<K>()
+            }
+        };
         report.passes += 1;
         report.solve = report.solve.max(stage);
-        let residual = largest_violation_f32(model, state);
         if residual <= tolerance || stage == Solve::Reanchored {
             return residual;
         }
     }
-}
-
-fn measure_motion(state: &TissueState, report: &mut StepReport) {
-    let n = state.u[0].len();
-    let [x, y, z] = state.u.each_ref().map(|c| &c[..n]);
-    let [bx, by, bz] = state.before.each_ref().map(|c| &c[..n]);
-    // Bits of squares, which are not below zero, have the order of the squares (see `violation`); a NaN
-    // is above all of them once its sign is off.
-    let (mut moved, mut largest) = (0_i32, 0_i32);
-    for e in 0..n {
-        let same = (x[e] == bx[e]) & (y[e] == by[e]) & (z[e] == bz[e]);
-        moved += i32::from(!same);
-        let square = x[e] * x[e] + y[e] * y[e] + z[e] * z[e];
-        largest = largest.max(square.abs().to_bits() as i32);
-    }
-    let largest = f32::from_bits(largest as u32);
-    report.moved = moved as u32;
-    report.max_displacement = if largest.is_finite() {
-        largest.sqrt()
-    } else {
-        f32::INFINITY
-    };
 }

@@ -1,6 +1,7 @@
-//! Links grouped into spans: stretches of consecutive elements linked to consecutive elements.
+//! Links grouped into spans: stretches of consecutive elements linked to consecutive elements, all of one class.
 
-use crate::scene::Lattice;
+use super::kernels::Pin;
+use crate::scene::{Lattice, Run};
 
 /// Element `lo + n` is linked to element `hi + n` for `n < len`.
 #[derive(Clone, Copy, Debug)]
@@ -8,10 +9,15 @@ pub(crate) struct Span {
     pub lo: u32,
     pub hi: u32,
     pub len: u32,
+    /// Runs of the two ends; the same for links along x.
+    pub lo_run: u32,
+    pub hi_run: u32,
+    /// Row in the table of limits.
+    pub class: u16,
+    pub pin: Pin,
 }
 
-/// Spans along y or z in groups, each group the links between a row and the next (y) or between a plane
-/// and the next (z).
+/// Spans along one axis in groups, one for each row `j + dims[1] * k`: the links whose upper end is in it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Links {
     spans: Vec<Span>,
@@ -20,63 +26,145 @@ pub(crate) struct Links {
 }
 
 impl Links {
-    /// Links whose upper end is in row or plane `index`.
-    pub fn below(&self, index: usize) -> &[Span] {
-        match (self.groups.get(index), self.groups.get(index + 1)) {
+    /// Links whose upper end is in row `row`.
+    #[inline(always)]
+    pub fn below(&self, row: usize) -> &[Span] {
+        match (self.groups.get(row), self.groups.get(row + 1)) {
             (Some(&start), Some(&end)) => &self.spans[start as usize..end as usize],
             _ => &[],
         }
     }
 
+    /// Links whose upper end is in rows `first..end`.
+    pub fn below_rows(&self, first: usize, end: usize) -> &[Span] {
+        &self.spans[self.groups[first] as usize..self.groups[end] as usize]
+    }
+
     pub fn all(&self) -> &[Span] {
         &self.spans
     }
+}
 
-    fn end_group(&mut self) {
-        self.groups.push(self.spans.len() as u32);
+/// The runs of every row, numbered through.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rows {
+    pub runs: Vec<Run>,
+    /// First run of each row, with one more entry at the end.
+    first: Vec<u32>,
+}
+
+impl Rows {
+    pub fn of(lattice: &Lattice) -> Rows {
+        let mut rows = Rows::default();
+        for k in 0..lattice.dims[2] {
+            for j in 0..lattice.dims[1] {
+                rows.first.push(rows.runs.len() as u32);
+                rows.runs.extend_from_slice(lattice.row(j, k));
+            }
+        }
+        rows.first.push(rows.runs.len() as u32);
+        rows
     }
 
-    /// Adds the links between two rows of cells.
-    fn push_rows(&mut self, lattice: &Lattice, lo: [usize; 2], hi: [usize; 2]) {
-        let (lo_row, hi_row) = (lattice.row(lo[0], lo[1]), lattice.row(hi[0], hi[1]));
-        let (mut a, mut b) = (0, 0);
-        while let (Some(l), Some(h)) = (lo_row.get(a), hi_row.get(b)) {
-            let (l_end, h_end) = (l.start_i + l.len, h.start_i + h.len);
-            let (start, end) = (l.start_i.max(h.start_i), l_end.min(h_end));
-            if start < end {
-                self.spans.push(Span {
-                    lo: l.first + start - l.start_i,
-                    hi: h.first + start - h.start_i,
-                    len: end - start,
-                });
-            }
-            if l_end < h_end {
-                a += 1;
-            } else {
-                b += 1;
-            }
+    /// Numbers of the runs of a row.
+    #[inline(always)]
+    pub fn numbers(&self, row: usize) -> std::ops::Range<usize> {
+        self.first[row] as usize..self.first[row + 1] as usize
+    }
+
+    /// Numbers of the runs of rows `first..end`.
+    #[inline(always)]
+    pub fn numbers_of_rows(&self, first: usize, end: usize) -> std::ops::Range<usize> {
+        self.first[first] as usize..self.first[end] as usize
+    }
+
+    pub fn count(&self) -> usize {
+        self.first.len().saturating_sub(1)
+    }
+
+    /// The run that an element is in.
+    pub fn run_of(&self, element: u32) -> usize {
+        self.runs.partition_point(|run| run.first <= element).saturating_sub(1)
+    }
+}
+
+/// Says what class a link is of and which end is fixed, or `None` if nothing can move it.
+pub(crate) type ClassOf<'a> = &'a dyn Fn(usize, u32, u32) -> Option<(u16, Pin)>;
+
+/// All links along `axis`.
+pub(crate) fn links_along(axis: usize, lattice: &Lattice, rows: &Rows, class_of: ClassOf) -> Links {
+    let ny = lattice.dims[1];
+    let mut links = Links::default();
+    for row in 0..rows.count() {
+        links.groups.push(links.spans.len() as u32);
+        let lower = match axis {
+            0 => Some(row),
+            1 if !row.is_multiple_of(ny) => Some(row - 1),
+            2 => row.checked_sub(ny),
+            _ => None,
+        };
+        if let Some(lower) = lower {
+            push_row(axis, rows, [lower, row], class_of, &mut links.spans);
+        }
+    }
+    links.groups.push(links.spans.len() as u32);
+    links
+}
+
+/// Adds the links between two rows of cells, or between neighbours in one row.
+fn push_row(axis: usize, rows: &Rows, [lower, upper]: [usize; 2], class_of: ClassOf, spans: &mut Vec<Span>) {
+    if axis == 0 {
+        for number in rows.numbers(upper) {
+            let run = rows.runs[number];
+            let ends = [number as u32; 2];
+            push_classes(axis, [run.first, run.first + 1], run.len - 1, ends, class_of, spans);
+        }
+        return;
+    }
+    let (mut a, mut b) = (rows.numbers(lower), rows.numbers(upper));
+    while let (Some(low), Some(high)) = (a.clone().next(), b.clone().next()) {
+        let (l, h) = (rows.runs[low], rows.runs[high]);
+        let (l_end, h_end) = (l.start_i + l.len, h.start_i + h.len);
+        let (start, end) = (l.start_i.max(h.start_i), l_end.min(h_end));
+        if start < end {
+            let first = [l.first + start - l.start_i, h.first + start - h.start_i];
+            push_classes(axis, first, end - start, [low as u32, high as u32], class_of, spans);
+        }
+        if l_end < h_end {
+            a.next();
+        } else {
+            b.next();
         }
     }
 }
 
-/// All links along y (`axis` 1, groups by row `j + dims[1] * k`) or z (`axis` 2, groups by plane `k`).
-pub(crate) fn links_along(axis: usize, lattice: &Lattice) -> Links {
-    let mut links = Links::default();
-    links.end_group();
-    for k in 0..lattice.dims[2] {
-        for j in 0..lattice.dims[1] {
-            if axis == 1 {
-                if j > 0 {
-                    links.push_rows(lattice, [j - 1, k], [j, k]);
-                }
-                links.end_group();
-            } else if k > 0 {
-                links.push_rows(lattice, [j, k - 1], [j, k]);
+/// Cuts a stretch of links where their class changes.
+fn push_classes(
+    axis: usize,
+    [lo, hi]: [u32; 2],
+    len: u32,
+    [lo_run, hi_run]: [u32; 2],
+    class_of: ClassOf,
+    spans: &mut Vec<Span>,
+) {
+    let mut open: Option<Span> = None;
+    for n in 0..len {
+        let here = class_of(axis, lo + n, hi + n);
+        match (&mut open, here) {
+            (Some(span), Some((class, pin))) if (span.class, span.pin) == (class, pin) => span.len += 1,
+            _ => {
+                spans.extend(open.take());
+                open = here.map(|(class, pin)| Span {
+                    lo: lo + n,
+                    hi: hi + n,
+                    len: 1,
+                    lo_run,
+                    hi_run,
+                    class,
+                    pin,
+                });
             }
         }
-        if axis == 2 {
-            links.end_group();
-        }
     }
-    links
+    spans.extend(open);
 }

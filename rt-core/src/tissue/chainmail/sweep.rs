@@ -1,137 +1,439 @@
-//! Outward sweeps: the held element stays, and every link moves its outer end.
+//! Outward sweeps: the held element stays, and every link at an active stretch moves its outer end.
 //!
 //! Planes outward from the held plane; in a plane, rows outward from the held row; in a row, elements
-//! outward from the held column. Each element is moved after its inner neighbours.
+//! outward from the held column. Each element is moved after its inner neighbours, and what moves is active
+//! for those that come after it: a sweep goes as far as something moves. A fixed element is always the inner end.
 
-use super::kernels::{self, LOWER, UPPER};
+use super::kernels::{self, Kernels, LOWER, Pin, Scaled, Stretch, UPPER};
 use super::model::ChainMail;
 use super::spans::Span;
-use crate::scene::Run;
-use crate::tissue::limits::LinkLimits;
+use super::state::TissueState;
 
-/// Violations that a row may keep: rounding, far below any tolerance.
-const ROUNDING: f32 = 1e-5;
+/// What a pass works on, and at which scale.
+pub(super) struct Pass<'a> {
+    pub model: &'a ChainMail,
+    pub state: &'a mut TissueState,
+    /// One element, and the slack, in the unit of the state.
+    pub rest: f32,
+    pub slack: f32,
+    /// Largest violation found that the pass leaves, in the unit of the state.
+    pub worst: f32,
+    pub held_cell: [usize; 3],
+}
 
-/// The components in the order along, side, side.
-#[inline(always)]
-pub(super) fn ordered<T>(axis: usize, [x, y, z]: [T; 3]) -> [T; 3] {
-    match axis {
-        0 => [x, y, z],
-        1 => [y, x, z],
-        _ => [z, x, y],
+/// Where the inner neighbours of a row are.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Inner {
+    Below,
+    Above,
+}
+
+/// Violations up to so many slacks count as none: the links' stretch and shear may each be off by one.
+pub(super) const CLEAN: f32 = 2.0;
+
+impl<'a> Pass<'a> {
+    pub fn new(model: &'a ChainMail, state: &'a mut TissueState, held_cell: [usize; 3], slack: f32) -> Self {
+        let rest = 1.0 / state.scale();
+        Pass {
+            model,
+            state,
+            rest,
+            slack: slack * rest,
+            worst: 0.0,
+            held_cell,
+        }
     }
-}
 
-/// Both ends of a span, split so that both can be written.
-#[inline(always)]
-pub(super) fn ends<'a>(u: &'a mut [Vec<f32>; 3], axis: usize, span: Span) -> ([&'a mut [f32]; 3], [&'a mut [f32]; 3]) {
-    let (lo, hi, len) = (span.lo as usize, span.hi as usize, span.len as usize);
-    let [x, y, z] = ordered(axis, u.each_mut());
-    let split = |component: &'a mut Vec<f32>| {
-        let (below, above) = component.split_at_mut(hi);
-        (&mut below[lo..lo + len], &mut above[..len])
-    };
-    let ((xl, xh), (yl, yh), (zl, zh)) = (split(x), split(y), split(z));
-    ([xl, yl, zl], [xh, yh, zh])
-}
+    #[inline(always)]
+    pub fn limits(&self, class: u16, axis: usize) -> Scaled {
+        self.model.classes.limits(class, axis).scaled(self.rest, self.slack)
+    }
 
-fn sweep_spans<const OUTER: bool>(limits: &LinkLimits, axis: usize, spans: &[Span], u: &mut [Vec<f32>; 3]) {
-    for &span in spans {
-        let (lo, hi) = ends(u, axis, span);
-        if OUTER == UPPER {
-            kernels::clamp_outer::<UPPER>(limits, lo.map(|s| &*s), hi);
+    /// One outward sweep. Leaves active what is still violated; says how far, in elements.
+    #[inline(always)]
+    pub fn outward<K: Kernels>(&mut self) -> f32 {
+        let nz = self.model.lattice.dims[2];
+        let held_k = self.held_cell[2];
+        let planes = self.state.active.planes();
+        if planes.start as usize <= held_k && held_k < planes.end as usize {
+            self.plane::<K>(held_k, None);
+        }
+        for k in (held_k + 1).max(planes.start as usize)..nz {
+            if k >= planes.end as usize && self.state.active.rows(k - 1).is_empty() {
+                break;
+            }
+            self.plane::<K>(k, Some(Inner::Below));
+        }
+        for k in (0..held_k.min(planes.end as usize)).rev() {
+            if k < planes.start as usize && self.state.active.rows(k + 1).is_empty() {
+                break;
+            }
+            self.plane::<K>(k, Some(Inner::Above));
+        }
+        if self.model.classes.any_fixed() {
+            // Inner elements have moved too, whose links were already seen to.
+            self.check::<K>()
         } else {
-            kernels::clamp_outer::<LOWER>(limits, hi.map(|s| &*s), lo);
+            self.finish()
         }
     }
-}
 
-/// Largest violation of the links of one run.
-pub(super) fn run_violation(limits: &LinkLimits, run: Run, u: &[Vec<f32>; 3]) -> f32 {
-    let (first, end) = (run.first as usize, run.end() as usize);
-    let lo = u.each_ref().map(|c| &c[first..end - 1]);
-    let hi = u.each_ref().map(|c| &c[first + 1..end]);
-    kernels::violation(limits, lo, hi)
-}
+    /// Checks every link, as after a pass that may have moved any element.
+    #[inline(always)]
+    pub fn check_all<K: Kernels>(&mut self) -> f32 {
+        let (rows, ny) = (&self.model.rows, self.model.lattice.dims[1]);
+        self.state.active.add_all(rows, ny);
+        self.state.moved.add_all(rows, ny);
+        self.state.settled = 0.0;
+        self.check::<K>()
+    }
 
-/// Moves the elements of a run outward from the column of the held element, if any link is violated.
-fn sweep_run(limits: &LinkLimits, run: Run, held_i: u32, u: &mut [Vec<f32>; 3]) {
-    if run_violation(limits, run, u) <= ROUNDING {
-        return;
-    }
-    let (first, end) = (run.first as usize, run.end() as usize);
-    let [x, y, z] = u.each_mut().map(|c| &mut c[first..end]);
-    let start = (held_i.saturating_sub(run.start_i) as usize).min(x.len() - 1);
-    let mut inner = [x[start], y[start], z[start]];
-    for e in start + 1..x.len() {
-        inner = kernels::clamped_outer::<UPPER>(limits, inner, [x[e], y[e], z[e]]);
-        [x[e], y[e], z[e]] = inner;
-    }
-    inner = [x[start], y[start], z[start]];
-    for e in (0..start).rev() {
-        inner = kernels::clamped_outer::<LOWER>(limits, inner, [x[e], y[e], z[e]]);
-        [x[e], y[e], z[e]] = inner;
-    }
-}
-
-/// Rows of plane `k` in the order outward from row `held_j`: the held row, those above, those below.
-fn sweep_rows(model: &ChainMail, [held_i, held_j, _]: [usize; 3], k: usize, u: &mut [Vec<f32>; 3]) {
-    let [x, y, _] = &model.limits.links;
-    let ny = model.lattice.dims[1];
-    let [start, end] = model.rows_of_plane[k];
-    let sweep_row = |j: usize, u: &mut [Vec<f32>; 3]| {
-        for &run in model.lattice.row(j, k) {
-            sweep_run(x, run, held_i as u32, u);
+    /// Checks every link at an active stretch; only what is outside its limits stays active.
+    #[inline(always)]
+    pub fn check<K: Kernels>(&mut self) -> f32 {
+        let ny = self.model.lattice.dims[1];
+        let planes = self.state.active.planes();
+        for k in planes.start..planes.end.max(planes.start) {
+            let rows = self.state.active.rows(k as usize);
+            for j in rows.start..rows.end.max(rows.start) {
+                let row = j as usize + ny * k as usize;
+                for run in self.model.rows.numbers(row) {
+                    self.check_run::<K>(run, j as usize, k as usize);
+                }
+            }
         }
-    };
-    if (start..end).contains(&held_j) {
-        sweep_row(held_j, u);
+        self.finish()
     }
-    for j in start.max(held_j + 1)..end {
-        sweep_spans::<UPPER>(y, 1, model.y_links.below(j + ny * k), u);
-        sweep_row(j, u);
+
+    #[inline(always)]
+    fn check_run<K: Kernels>(&mut self, run: usize, j: usize, k: usize) {
+        let active = self.state.active.of_run(run);
+        if active.is_empty() {
+            return;
+        }
+        let ny = self.model.lattice.dims[1];
+        let row = j + ny * k;
+        let mut worst = 0.0_f32;
+        // A link along x has the number of its lower end.
+        let along_x = Stretch {
+            start: active.start.saturating_sub(1),
+            end: active.end,
+        };
+        let [x, y, z] = &self.model.links;
+        for span in x.below(row).iter().filter(|s| s.lo_run as usize == run) {
+            let links = along_x.within(span.lo, span.len);
+            worst = worst.max(self.violation::<K>(0, span, links));
+        }
+        for (axis, below, above) in [
+            (1, y.below(row), y.below(row + 1)),
+            (2, z.below(row), z.below(row + ny)),
+        ] {
+            for span in below.iter().filter(|s| s.hi_run as usize == run) {
+                worst = worst.max(self.violation::<K>(axis, span, active.within(span.hi, span.len)));
+            }
+            for span in above.iter().filter(|s| s.lo_run as usize == run) {
+                worst = worst.max(self.violation::<K>(axis, span, active.within(span.lo, span.len)));
+            }
+        }
+        if worst <= CLEAN * self.slack {
+            self.state.settled = self.state.settled.max(worst / self.rest);
+        } else {
+            self.worst = self.worst.max(worst);
+            self.state.next.add(run, active);
+            self.state.next.add_row(j, k);
+        }
     }
-    for j in (start..end.min(held_j)).rev() {
-        sweep_spans::<LOWER>(y, 1, model.y_links.below(j + 1 + ny * k), u);
-        sweep_row(j, u);
+
+    /// What the pass found becomes what the next one works on; says how far it is outside, in elements.
+    #[inline(always)]
+    fn finish(&mut self) -> f32 {
+        let state = &mut *self.state;
+        state.active.clear(&self.model.rows, self.model.lattice.dims[1]);
+        std::mem::swap(&mut state.active, &mut state.next);
+        self.worst / self.rest
+    }
+
+    #[inline(always)]
+    fn plane<K: Kernels>(&mut self, k: usize, inner_z: Option<Inner>) {
+        let held_j = self.held_cell[1];
+        let [first, end] = self.model.rows_of_plane[k];
+        let own = self.state.active.rows(k);
+        let rows = match inner_z {
+            Some(Inner::Below) => own.with(self.state.active.rows(k - 1)),
+            Some(Inner::Above) => own.with(self.state.active.rows(k + 1)),
+            None => own,
+        };
+        let is_in = |j: usize| rows.start as usize <= j && j < rows.end as usize;
+        let mut moving = false;
+        if (first..end).contains(&held_j) && is_in(held_j) {
+            moving = self.row::<K>(held_j, k, None, inner_z);
+        }
+        let held_row_moves = moving;
+        for j in first.max(held_j + 1)..end {
+            if is_in(j) || moving {
+                moving = self.row::<K>(j, k, Some(Inner::Below), inner_z);
+            } else if j >= rows.end as usize {
+                break;
+            }
+        }
+        moving = held_row_moves;
+        for j in (first..end.min(held_j)).rev() {
+            if is_in(j) || moving {
+                moving = self.row::<K>(j, k, Some(Inner::Above), inner_z);
+            } else if j < rows.start as usize {
+                break;
+            }
+        }
+    }
+
+    /// Sees to the links of a row with its inner neighbours and in itself; whether anything in it is active.
+    #[inline(always)]
+    fn row<K: Kernels>(&mut self, j: usize, k: usize, inner_y: Option<Inner>, inner_z: Option<Inner>) -> bool {
+        let model = self.model;
+        let ny = model.lattice.dims[1];
+        let row = j + ny * k;
+        let spans_of = |axis: usize, stride: usize, inner: Option<Inner>| match inner {
+            Some(Inner::Below) => model.links[axis].below(row),
+            Some(Inner::Above) => model.links[axis].below(row + stride),
+            None => &[],
+        };
+        let (y_spans, z_spans) = (spans_of(1, 1, inner_y), spans_of(2, ny, inner_z));
+        for span in z_spans {
+            self.push::<K>(2, span, inner_z == Some(Inner::Below), row);
+        }
+        for span in y_spans {
+            self.push::<K>(1, span, inner_y == Some(Inner::Below), row);
+        }
+        let mut is_active = false;
+        let mut late = false;
+        for run in model.rows.numbers(row) {
+            if !self.state.active.of_run(run).is_empty() {
+                is_active = true;
+                let moved = self.along_x::<K>(run, row);
+                if !moved.is_empty() {
+                    self.state.active.add(run, moved);
+                    self.state.moved.add(run, moved);
+                    self.state.late[1][run] = moved;
+                }
+                late |= !self.state.late[0][run].is_empty() || !moved.is_empty();
+            }
+        }
+        if is_active {
+            self.state.active.add_row(j, k);
+            self.state.moved.add_row(j, k);
+        }
+        if late {
+            self.check_late::<K>(y_spans, inner_y, z_spans, inner_z, row);
+        }
+        is_active
+    }
+
+    /// The part of a span that touches an active stretch, counted from its first link.
+    #[inline(always)]
+    fn touched(&self, span: &Span) -> Stretch {
+        let lo = self.state.active.of_run(span.lo_run as usize).within(span.lo, span.len);
+        let hi = self.state.active.of_run(span.hi_run as usize).within(span.hi, span.len);
+        lo.with(hi)
+    }
+
+    /// Moves the outer ends of a span into their limits.
+    #[inline(always)]
+    fn push<K: Kernels>(&mut self, axis: usize, span: &Span, upper: bool, row: usize) {
+        let links = self.touched(span);
+        if links.is_empty() {
+            return;
+        }
+        let l = self.limits(span.class, axis);
+        // The end that is moved: the outer one, unless that is fixed.
+        let moves_hi = match span.pin {
+            Pin::None => upper,
+            Pin::Lo => true,
+            Pin::Hi => false,
+        };
+        let (lo, hi) = ((span.lo + links.start) as usize, (span.hi + links.start) as usize);
+        let n = links.len() as usize;
+        let mut u = kernels::ordered(axis, self.state.u.each_mut().map(Vec::as_mut_slice));
+        let (moved, run) = if moves_hi {
+            let moved = K::clamp::<UPPER>(&l, &mut u, lo, hi, n);
+            (moved.from(hi as u32), span.hi_run as usize)
+        } else {
+            let moved = K::clamp::<LOWER>(&l, &mut u, hi, lo, n);
+            (moved.from(lo as u32), span.lo_run as usize)
+        };
+        if moved.is_empty() {
+            return;
+        }
+        self.state.active.add(run, moved);
+        self.state.moved.add(run, moved);
+        if moves_hi != upper {
+            let ny = self.model.lattice.dims[1];
+            let stride = if axis == 1 { 1 } else { ny };
+            let inner_row = if upper { row - stride } else { row + stride };
+            self.state.active.add_row(inner_row % ny, inner_row / ny);
+            self.state.moved.add_row(inner_row % ny, inner_row / ny);
+        } else if axis == 1 {
+            self.state.late[0][run] = self.state.late[0][run].with(moved);
+        }
+    }
+
+    /// Moves the elements of a run outward from the held column; says which moved.
+    #[inline(always)]
+    fn along_x<K: Kernels>(&mut self, run: usize, row: usize) -> Stretch {
+        let of_run = self.model.rows.runs[run];
+        let first = of_run.first as usize;
+        let held_i = (self.held_cell[0] as u32).clamp(of_run.start_i, of_run.start_i + of_run.len - 1);
+        let start = first + (held_i - of_run.start_i) as usize;
+        let active = self.state.active.of_run(run);
+        let mut moved = Stretch::EMPTY;
+        let spans = self.model.links[0].below(row);
+        for span in spans.iter().filter(|s| s.lo_run as usize == run) {
+            let reach = active.with(moved).end as usize;
+            let from = (span.lo as usize)
+                .max(start)
+                .max((active.start as usize).saturating_sub(1));
+            let links = [from, (span.lo + span.len) as usize, reach];
+            moved = moved.with(self.up::<K>(span, links));
+        }
+        for span in spans.iter().rev().filter(|s| s.lo_run as usize == run) {
+            let reach = (active.with(moved).start as usize).saturating_sub(1);
+            let end = ((span.lo + span.len) as usize).min(start).min(active.end as usize);
+            let links = [span.lo as usize, end, reach];
+            moved = moved.with(self.down::<K>(span, links));
+        }
+        moved
+    }
+
+    /// Sees to links `from..end` of a run upward, from `from` to `reach` or as far as something moves.
+    #[inline(always)]
+    fn up<K: Kernels>(&mut self, span: &Span, [from, end, reach]: [usize; 3]) -> Stretch {
+        let l = self.limits(span.class, 0);
+        let mut u = self.state.u.each_mut().map(Vec::as_mut_slice);
+        let mut moved = Stretch::EMPTY;
+        let (mut link, stop) = (from, end.min(reach));
+        while link < stop {
+            link = K::first_violated(&l, &u.each_ref().map(|c| &**c), link, stop);
+            if link >= stop {
+                break;
+            }
+            if span.pin == Pin::Hi {
+                moved = moved.with(move_one::<LOWER>(&l, &mut u, link + 1, link));
+                link += 1;
+                continue;
+            }
+            let mut inner = kernels::at(&u, link);
+            while link < end {
+                let (new, moves) = kernels::clamped_outer::<UPPER>(&l, inner, kernels::at(&u, link + 1));
+                link += 1;
+                if !moves {
+                    break;
+                }
+                [u[0][link], u[1][link], u[2][link]] = new;
+                moved = moved.with(one(link));
+                inner = new;
+            }
+        }
+        moved
+    }
+
+    /// Sees to links `start..end` of a run downward, from `end` to `reach` or as far as something moves.
+    #[inline(always)]
+    fn down<K: Kernels>(&mut self, span: &Span, [start, end, reach]: [usize; 3]) -> Stretch {
+        let l = self.limits(span.class, 0);
+        let mut u = self.state.u.each_mut().map(Vec::as_mut_slice);
+        let mut moved = Stretch::EMPTY;
+        let (mut past, stop) = (end, start.max(reach));
+        while past > stop {
+            past = K::past_last_violated(&l, &u.each_ref().map(|c| &**c), stop, past);
+            if past <= stop {
+                break;
+            }
+            if span.pin == Pin::Lo {
+                moved = moved.with(move_one::<UPPER>(&l, &mut u, past - 1, past));
+                past -= 1;
+                continue;
+            }
+            let mut inner = kernels::at(&u, past);
+            while past > start {
+                let (new, moves) = kernels::clamped_outer::<LOWER>(&l, inner, kernels::at(&u, past - 1));
+                past -= 1;
+                if !moves {
+                    break;
+                }
+                [u[0][past], u[1][past], u[2][past]] = new;
+                moved = moved.with(one(past));
+                inner = new;
+            }
+        }
+        moved
+    }
+
+    /// Checks the links along z that moved after they were seen to, and those along y.
+    #[inline(always)]
+    fn check_late<K: Kernels>(
+        &mut self,
+        y_spans: &[Span],
+        inner_y: Option<Inner>,
+        z_spans: &[Span],
+        inner_z: Option<Inner>,
+        row: usize,
+    ) {
+        let mut worst = 0.0_f32;
+        for (axis, spans, inner) in [(2, z_spans, inner_z), (1, y_spans, inner_y)] {
+            for span in spans {
+                let (first, run) = match inner {
+                    Some(Inner::Below) => (span.hi, span.hi_run as usize),
+                    _ => (span.lo, span.lo_run as usize),
+                };
+                let moved = match axis {
+                    2 => self.state.late[0][run].with(self.state.late[1][run]),
+                    _ => self.state.late[1][run],
+                };
+                let links = moved.within(first, span.len);
+                if !links.is_empty() {
+                    worst = worst.max(self.violation::<K>(axis, span, links));
+                }
+            }
+        }
+        let clean = worst <= CLEAN * self.slack;
+        if clean {
+            self.state.settled = self.state.settled.max(worst / self.rest);
+        } else {
+            self.worst = self.worst.max(worst);
+        }
+        let ny = self.model.lattice.dims[1];
+        for run in self.model.rows.numbers(row) {
+            let [after_z, after_y] = [0, 1].map(|n| std::mem::replace(&mut self.state.late[n][run], Stretch::EMPTY));
+            if !clean {
+                self.state.next.add(run, after_z.with(after_y));
+                self.state.next.add_row(row % ny, row / ny);
+            }
+        }
+    }
+
+    /// Largest violation of some links of a span.
+    #[inline(always)]
+    pub fn violation<K: Kernels>(&self, axis: usize, span: &Span, links: Stretch) -> f32 {
+        let l = self.limits(span.class, axis);
+        let u = kernels::ordered(axis, self.state.u.each_ref().map(Vec::as_slice));
+        let (lo, hi) = ((span.lo + links.start) as usize, (span.hi + links.start) as usize);
+        K::violation(&l, &u, lo, hi, links.len() as usize)
     }
 }
 
-/// One outward sweep over every link.
-pub(super) fn outward(model: &ChainMail, held_cell: [usize; 3], u: &mut [Vec<f32>; 3]) {
-    let z = &model.limits.links[2];
-    let (held_k, nz) = (held_cell[2], model.lattice.dims[2]);
-    sweep_rows(model, held_cell, held_k, u);
-    for k in held_k + 1..nz {
-        sweep_spans::<UPPER>(z, 2, model.z_links.below(k), u);
-        sweep_rows(model, held_cell, k, u);
-    }
-    for k in (0..held_k).rev() {
-        sweep_spans::<LOWER>(z, 2, model.z_links.below(k + 1), u);
-        sweep_rows(model, held_cell, k, u);
+#[inline(always)]
+fn one(element: usize) -> Stretch {
+    Stretch {
+        start: element as u32,
+        end: element as u32 + 1,
     }
 }
 
-/// The textbook's single pass as sweeps: the held line along x, then rows of its plane along y, then
-/// planes along z. Follows one tree of links, so it leaves other links violated.
-#[cfg(test)]
-pub(super) fn single_pass(model: &ChainMail, held_cell: [usize; 3], u: &mut [Vec<f32>; 3]) {
-    let [held_i, held_j, held_k] = held_cell;
-    let [x, y, z] = &model.limits.links;
-    let [_, ny, nz] = model.lattice.dims;
-    for &run in model.lattice.row(held_j, held_k) {
-        sweep_run(x, run, held_i as u32, u);
+#[inline(always)]
+fn move_one<const OUTER: bool>(l: &Scaled, u: &mut [&mut [f32]; 3], inner: usize, outer: usize) -> Stretch {
+    let (new, moves) = kernels::clamped_outer::<OUTER>(l, kernels::at(u, inner), kernels::at(u, outer));
+    if !moves {
+        return Stretch::EMPTY;
     }
-    for j in held_j + 1..ny {
-        sweep_spans::<UPPER>(y, 1, model.y_links.below(j + ny * held_k), u);
-    }
-    for j in (0..held_j).rev() {
-        sweep_spans::<LOWER>(y, 1, model.y_links.below(j + 1 + ny * held_k), u);
-    }
-    for k in held_k + 1..nz {
-        sweep_spans::<UPPER>(z, 2, model.z_links.below(k), u);
-    }
-    for k in (0..held_k).rev() {
-        sweep_spans::<LOWER>(z, 2, model.z_links.below(k + 1), u);
-    }
+    [u[0][outer], u[1][outer], u[2][outer]] = new;
+    one(outer)
 }

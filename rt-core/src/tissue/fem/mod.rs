@@ -48,6 +48,7 @@ mod smooth;
 mod solve;
 mod state;
 mod sweep;
+mod tissue;
 mod transfer;
 
 pub use material::{FemProblem, FemSettings, Integration, MAX_POISSON_RATIO, Material, Structure};
@@ -55,6 +56,7 @@ pub use model::FemModel;
 pub use real::Real;
 pub use solve::{FemReport, REACH, SolveSettings, TipPatch, step};
 pub use state::FemState;
+pub use tissue::FemTissue;
 
 #[cfg(test)]
 #[path = "tests.rs"]

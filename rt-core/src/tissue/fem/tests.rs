@@ -1,5 +1,7 @@
 //! What the tests of the elastic body share.
 
+use std::sync::Arc;
+
 use super::solve::hold_cells;
 use super::*;
 use crate::scene::test_bodies::Random;
@@ -20,15 +22,16 @@ const EXACT: SolveSettings = SolveSettings {
     max_cycles: 400,
 };
 
-fn lattice_of(labels: &Labels) -> Lattice {
+fn lattice_of(labels: &Labels) -> Arc<Lattice> {
     Scene::from_labels("test", labels).expect("valid labels").lattice
 }
 
-fn block(dims: [usize; 3], spacing_m: f64) -> Lattice {
+fn block(dims: [usize; 3], spacing_m: f64) -> Arc<Lattice> {
     lattice_of(&Labels {
         dims,
         spacing_m,
         cells: vec![1; dims.iter().product()],
+        structures: Vec::new(),
     })
 }
 

@@ -1,15 +1,10 @@
 //! The scene of the paper, drawn by formula: a prostate of 49 cc in the paper's grid.
 
-use super::Labels;
-
-/// Voxels of the paper's volume; 3 x 3 voxels of a slice make one element.
-const VOXELS: [usize; 3] = [323, 187, 176];
-const VOXELS_PER_ELEMENT: usize = 3;
-/// 19,304 elements of this edge are 49 cc.
-const SPACING_M: f64 = 1.3641e-3;
+use super::draw;
+use crate::scene::Labels;
 
 /// A gland along z, in elements: apex at low z, base at high z, posterior at low y.
-struct Gland {
+pub(super) struct Gland {
     half_width: f64,
     half_height_anterior: f64,
     /// Less than anterior: the side towards the rectum is flat.
@@ -21,7 +16,7 @@ struct Gland {
     exponent: f64,
 }
 
-const PAPER_GLAND: Gland = Gland {
+pub(super) const PAPER_GLAND: Gland = Gland {
     half_width: 18.27,
     half_height_anterior: 15.05,
     half_height_posterior: 11.49,
@@ -32,7 +27,7 @@ const PAPER_GLAND: Gland = Gland {
 
 impl Gland {
     /// `x`, `y`, `z` from the gland's centre, in elements.
-    fn contains(&self, [x, y, z]: [f64; 3]) -> bool {
+    pub fn contains(&self, [x, y, z]: [f64; 3]) -> bool {
         let along = z / self.half_length;
         let left = 1.0 - along.abs().powf(self.exponent);
         if left <= 0.0 {
@@ -50,24 +45,8 @@ impl Gland {
     }
 }
 
-pub(super) fn paper() -> Labels {
-    let [vx, vy, vz] = VOXELS;
-    let dims = [vx / VOXELS_PER_ELEMENT, vy / VOXELS_PER_ELEMENT, vz];
-    let mut cells = Vec::with_capacity(dims.iter().product());
-    for k in 0..dims[2] {
-        for j in 0..dims[1] {
-            for i in 0..dims[0] {
-                let cell = [i, j, k];
-                let from_centre = [0, 1, 2].map(|axis| cell[axis] as f64 + 0.5 - 0.5 * dims[axis] as f64);
-                cells.push(u8::from(PAPER_GLAND.contains(from_centre)));
-            }
-        }
-    }
-    Labels {
-        dims,
-        spacing_m: SPACING_M,
-        cells,
-    }
+pub(super) fn labels() -> Labels {
+    draw(Vec::new(), |from_middle| u8::from(PAPER_GLAND.contains(from_middle)))
 }
 
 #[cfg(test)]

@@ -1,0 +1,65 @@
+//! Bodies that are measured: the gland at any spacing, and the cube of the solved reference problem.
+
+use rt_core::scene::{Labels, Scene, Structure};
+use rt_core::tissue::AxisLimits;
+
+/// Edge of the tip patch. Odd numbers of elements of 2.5, 1.5 and 1.0714 mm fill it exactly.
+pub const PATCH_M: f64 = 7.5e-3;
+
+/// Spacings at which the patch is a whole, odd number of elements wide.
+pub const SPACINGS_M: [f64; 3] = [PATCH_M / 3.0, PATCH_M / 5.0, PATCH_M / 7.0];
+
+/// The paper's gland cut anew with elements of `spacing_m`.
+pub fn gland(spacing_m: f64) -> Scene {
+    let paper = Scene::builtin("paper").expect("built in");
+    let (low, high) = paper.lattice.bounds_m();
+    let dims = [0, 1, 2].map(|a| ((high[a] - low[a]) / spacing_m).ceil() as usize);
+    // Centred, so that the gland's two sides are cut alike.
+    let origin = [0, 1, 2].map(|a| 0.5 * (low[a] + high[a] - dims[a] as f64 * spacing_m));
+    let cells = cells(dims).map(|cell| {
+        let [i, j, k] = [0, 1, 2].map(|a| {
+            let centre = origin[a] + (cell[a] as f64 + 0.5) * spacing_m;
+            (centre / paper.lattice.spacing_m) as usize
+        });
+        u8::from(paper.lattice.element_of_cell(i, j, k).is_some())
+    });
+    let labels = Labels {
+        dims,
+        spacing_m,
+        cells: cells.collect(),
+        structures: Vec::new(),
+    };
+    Scene::from_labels("gland", &labels).expect("as valid as the paper's")
+}
+
+/// Edge of the cube of the reference problem.
+pub const CUBE_M: f64 = 60e-3;
+
+/// A cube of soft tissue on a fixed plate one element thick.
+pub fn cube(elements: usize) -> Scene {
+    let dims = [elements, elements, elements + 1];
+    let mut soft = Structure::soft("cube", 1);
+    (soft.material.young_pa, soft.material.poisson) = (30e3, 0.45);
+    let mut plate = Structure::soft("plate", 2);
+    plate.material.fixed = true;
+    plate.material.limits = Some(
+        [AxisLimits {
+            min_stretch: 0.5,
+            max_stretch: 2.0,
+            shear_deg: 26.0,
+        }; 3],
+    );
+    let labels = Labels {
+        dims,
+        spacing_m: CUBE_M / elements as f64,
+        cells: cells(dims).map(|[_, _, k]| if k == 0 { 2 } else { 1 }).collect(),
+        structures: vec![soft, plate],
+    };
+    Scene::from_labels("cube", &labels).expect("a block")
+}
+
+/// All cells, x fastest.
+fn cells(dims: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+    let [nx, ny, nz] = dims;
+    (0..nx * ny * nz).map(move |n| [n % nx, n / nx % ny, n / (nx * ny)])
+}

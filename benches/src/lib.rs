@@ -1,0 +1,6 @@
+//! What the measurements share: bodies, insertions, and the error of one run against another.
+
+pub mod bodies;
+pub mod error;
+pub mod insertions;
+pub mod machine;

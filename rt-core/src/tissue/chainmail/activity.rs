@@ -1,0 +1,113 @@
+//! Which stretches of which runs need looking at: what has moved, or is outside its limits.
+//!
+//! Recovery breaks no limit, so a link between elements that the solver has not moved stays as good as it was:
+//! only links at active stretches are swept and checked.
+
+use super::kernels::Stretch;
+use super::spans::Rows;
+
+/// A stretch for each run, and which rows and planes have any.
+#[derive(Clone, Debug)]
+pub(crate) struct Active {
+    of_run: Vec<Stretch>,
+    /// Rows j of each plane k, and planes k, that may have active runs; the others have none.
+    rows: Vec<Stretch>,
+    planes: Stretch,
+}
+
+impl Active {
+    /// None. Writes every page, so that no step is the first to touch one.
+    pub fn none(runs: usize, planes: usize) -> Self {
+        let touched = |n| (0..n).map(|_| std::hint::black_box(Stretch::EMPTY)).collect();
+        Active {
+            of_run: touched(runs),
+            rows: touched(planes),
+            planes: Stretch::EMPTY,
+        }
+    }
+
+    #[inline(always)]
+    pub fn of_run(&self, run: usize) -> Stretch {
+        self.of_run[run]
+    }
+
+    #[inline(always)]
+    pub fn rows(&self, k: usize) -> Stretch {
+        self.rows[k]
+    }
+
+    #[inline(always)]
+    pub fn planes(&self) -> Stretch {
+        self.planes
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.planes.is_empty()
+    }
+
+    /// Adds to a run; its row must be made known by `add_row`.
+    #[inline(always)]
+    pub fn add(&mut self, run: usize, stretch: Stretch) {
+        self.of_run[run] = self.of_run[run].with(stretch);
+    }
+
+    #[inline(always)]
+    pub fn add_row(&mut self, j: usize, k: usize) {
+        let one = |n: usize| Stretch {
+            start: n as u32,
+            end: n as u32 + 1,
+        };
+        self.rows[k] = self.rows[k].with(one(j));
+        self.planes = self.planes.with(one(k));
+    }
+
+    /// Everything in these rows of cells.
+    pub fn add_all(&mut self, rows: &Rows, ny: usize) {
+        for row in 0..rows.count() {
+            for run in rows.numbers(row) {
+                self.of_run[run] = Stretch {
+                    start: rows.runs[run].first,
+                    end: rows.runs[run].end(),
+                };
+                self.add_row(row % ny, row / ny);
+            }
+        }
+    }
+
+    /// Calls `f` for each row that may have active runs.
+    pub fn for_each_row(&self, mut f: impl FnMut(usize, usize)) {
+        for k in self.planes.start..self.planes.end.max(self.planes.start) {
+            let rows = self.rows[k as usize];
+            for j in rows.start..rows.end.max(rows.start) {
+                f(j as usize, k as usize);
+            }
+        }
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self, rows: &Rows, ny: usize) {
+        for k in self.planes.start..self.planes.end.max(self.planes.start) {
+            let in_plane = self.rows[k as usize];
+            for j in in_plane.start..in_plane.end.max(in_plane.start) {
+                for run in rows.numbers(j as usize + ny * k as usize) {
+                    self.of_run[run] = Stretch::EMPTY;
+                }
+            }
+            self.rows[k as usize] = Stretch::EMPTY;
+        }
+        self.planes = Stretch::EMPTY;
+    }
+
+    /// Elements in active stretches.
+    pub fn element_count(&self, rows: &Rows, ny: usize) -> u32 {
+        let mut count = 0;
+        self.for_each_row(|j, k| count += rows.numbers(j + ny * k).map(|run| self.of_run[run].len()).sum::<u32>());
+        count
+    }
+
+    pub fn copy_from(&mut self, other: &Active) {
+        self.of_run.copy_from_slice(&other.of_run);
+        self.rows.copy_from_slice(&other.rows);
+        self.planes = other.planes;
+    }
+}

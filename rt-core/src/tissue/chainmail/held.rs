@@ -1,0 +1,84 @@
+//! The elements that a needle holds: one, or a cube of them.
+
+use super::kernels::Stretch;
+use super::model::ChainMail;
+use super::solve::REACH;
+use super::state::TissueState;
+use crate::tissue::{Held, HeldOutcome};
+
+/// A held element and where it goes, in elements from rest.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grip {
+    pub element: u32,
+    pub at: [f32; 3],
+    /// Elements beside it along each axis that go along.
+    pub beside: usize,
+}
+
+/// What a step holds, if it can be followed.
+pub(super) fn grip(model: &ChainMail, held: Option<Held>) -> (Option<Grip>, HeldOutcome) {
+    let Some(held) = held else {
+        return (None, HeldOutcome::None);
+    };
+    let (rest, h) = (model.lattice.rest_m(held.element), model.lattice.spacing_m);
+    let at = [0, 1, 2].map(|a| (held.position_m[a] - rest[a]) / h);
+    let known = (held.element as usize) < model.element_count();
+    // Centres within half the edge; a hair more, as the quotient may be a whole number.
+    let beside = 0.5 * held.patch_m / h + 1e-6;
+    if !known || !at.iter().all(|c| c.abs() <= REACH) || !(0.0..=REACH).contains(&beside) {
+        return (None, HeldOutcome::Refused);
+    }
+    if model.is_fixed(held.element) {
+        return (None, HeldOutcome::Limited);
+    }
+    let grip = Grip {
+        element: held.element,
+        at: at.map(|c| c as f32),
+        beside: beside as usize,
+    };
+    (Some(grip), HeldOutcome::Followed)
+}
+
+/// Puts what is held in place; what that moves is active.
+pub(super) fn put(model: &ChainMail, state: &mut TissueState, grip: &Grip) {
+    let [i, j, k] = model.lattice.cell(grip.element);
+    let ny = model.lattice.dims[1];
+    let around = |n: usize, count: usize| n.saturating_sub(grip.beside)..(n + grip.beside + 1).min(count);
+    let part = model.part(grip.element);
+    let cells = around(i, model.lattice.dims[0]);
+    for k in around(k, model.lattice.dims[2]) {
+        for j in around(j, ny) {
+            for run in model.rows.numbers(j + ny * k) {
+                if model.part_of_run(run) != part {
+                    continue;
+                }
+                let of_run = model.rows.runs[run];
+                let wanted = Stretch {
+                    start: cells.start as u32,
+                    end: cells.end as u32,
+                };
+                for n in elements(wanted.within(of_run.start_i, of_run.len)) {
+                    put_one(model, state, of_run.first + n, run, grip.at, [j, k]);
+                }
+            }
+        }
+    }
+}
+
+fn elements(stretch: Stretch) -> std::ops::Range<u32> {
+    stretch.start.min(stretch.end)..stretch.end
+}
+
+fn put_one(model: &ChainMail, state: &mut TissueState, element: u32, run: usize, at: [f32; 3], [j, k]: [usize; 2]) {
+    if model.is_fixed(element) || !state.put(element as usize, at) {
+        return;
+    }
+    let one = Stretch {
+        start: element,
+        end: element + 1,
+    };
+    state.active.add(run, one);
+    state.active.add_row(j, k);
+    state.moved.add(run, one);
+    state.moved.add_row(j, k);
+}

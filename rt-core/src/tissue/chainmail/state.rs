@@ -1,0 +1,198 @@
+//! Where a body is: displacements times a scale, so that recovery is one multiplication.
+
+use super::activity::Active;
+use super::kernels::Stretch;
+use super::model::ChainMail;
+use crate::tissue::Deformed;
+
+/// Displacements from rest of all elements, one array for each axis; and what the last step left to look at.
+///
+/// `scale` times an entry is a displacement in elements. Entries are f32, whose precision is relative: a small
+/// scale costs none, until the exponent runs out.
+#[derive(Clone, Debug)]
+pub struct TissueState {
+    pub(crate) u: [Vec<f32>; 3],
+    scale: f64,
+    /// Swept and checked by the next pass.
+    pub(crate) active: Active,
+    /// Found by the pass under way for the one after.
+    pub(crate) next: Active,
+    /// What the solver has moved in this step.
+    pub(crate) moved: Active,
+    /// Moved in a row after its links along z, and after those along y, were seen to; for the row under way.
+    pub(crate) late: [Vec<Stretch>; 2],
+    /// Largest square of a displacement in each run and each plane, in the unit of `u`.
+    run_square: Vec<f32>,
+    plane_square: Vec<f32>,
+    pub(crate) max_displacement: f32,
+    /// Largest violation of a link that is not active, at most, in elements.
+    pub(crate) settled: f32,
+}
+
+/// Scale below which displacements are written anew: f32 squares still have room on both sides.
+const SMALLEST_SCALE: f64 = 1e-9;
+/// Displacements below this become zero, long before they become denormal and slow.
+const AT_REST: f32 = 1e-12;
+
+impl TissueState {
+    /// The body at rest. Writes every page, so that no step is the first to touch one.
+    pub fn at_rest(model: &ChainMail) -> Self {
+        let zeros = |n: usize| {
+            let mut values = Vec::with_capacity(n);
+            values.extend((0..n).map(|_| std::hint::black_box(0.0)));
+            values
+        };
+        let (runs, planes) = (model.rows.runs.len(), model.lattice.dims[2]);
+        let none = || Active::none(runs, planes);
+        TissueState {
+            u: std::array::from_fn(|_| zeros(model.element_count())),
+            scale: 1.0,
+            active: none(),
+            next: none(),
+            moved: none(),
+            late: std::array::from_fn(|_| vec![std::hint::black_box(Stretch::EMPTY); runs]),
+            run_square: zeros(runs),
+            plane_square: zeros(planes),
+            max_displacement: 0.0,
+            settled: 0.0,
+        }
+    }
+
+    /// Displacement from rest along `axis` (0 to 2) of all elements; `scale` times these is in elements.
+    pub fn displacement(&self, axis: usize) -> &[f32] {
+        self.u.get(axis).map_or(&[], Vec::as_slice)
+    }
+
+    pub fn scale(&self) -> f32 {
+        self.scale as f32
+    }
+
+    /// The body as it is now.
+    pub fn deformed<'a>(&'a self, model: &'a ChainMail) -> Deformed<'a> {
+        let stretch = model.classes.longest().iter().sum::<f32>();
+        Deformed {
+            lattice: &model.lattice,
+            u: self.u.each_ref().map(Vec::as_slice),
+            scale: self.scale(),
+            reach: 1.0 + stretch + self.max_displacement,
+        }
+    }
+
+    /// Centre of an element in the scene frame; the last element's for a number past the end.
+    pub fn position_m(&self, model: &ChainMail, element: u32) -> [f64; 3] {
+        self.deformed(model).position_m(element)
+    }
+
+    /// Every element to its place at rest, at once.
+    pub fn return_to_rest(&mut self, model: &ChainMail) {
+        for component in &mut self.u {
+            component.fill(0.0);
+        }
+        self.run_square.fill(0.0);
+        self.plane_square.fill(0.0);
+        self.active.clear(&model.rows, model.lattice.dims[1]);
+        (self.scale, self.max_displacement, self.settled) = (1.0, 0.0, 0.0);
+    }
+
+    /// Has the next step look at every link, as it must when the limits are new.
+    pub fn disturb(&mut self, model: &ChainMail) {
+        self.active.add_all(&model.rows, model.lattice.dims[1]);
+        self.settled = 0.0;
+    }
+
+    /// Becomes `other`, a state of the same model, without allocating.
+    ///
+    /// # Panics
+    ///
+    /// If the other is of another model.
+    pub fn copy_from(&mut self, other: &TissueState) {
+        for (mine, theirs) in self.u.iter_mut().zip(&other.u) {
+            mine.copy_from_slice(theirs);
+        }
+        self.active.copy_from(&other.active);
+        self.next.copy_from(&other.next);
+        self.moved.copy_from(&other.moved);
+        self.run_square.copy_from_slice(&other.run_square);
+        self.plane_square.copy_from_slice(&other.plane_square);
+        self.scale = other.scale;
+        self.max_displacement = other.max_displacement;
+        self.settled = other.settled;
+    }
+
+    /// Puts an element `u` elements from rest; whether it was not there. The caller looks after its links.
+    pub(crate) fn put(&mut self, element: usize, u: [f32; 3]) -> bool {
+        let scale = self.scale();
+        let mut moved = false;
+        for (component, value) in self.u.iter_mut().zip(u) {
+            if let Some(slot) = component.get_mut(element) {
+                let before = std::mem::replace(slot, value / scale);
+                moved |= before != *slot;
+            }
+        }
+        moved
+    }
+
+    pub(crate) fn fits(&self, model: &ChainMail) -> bool {
+        let n = model.element_count();
+        self.u.iter().all(|c| c.len() == n) && self.run_square.len() == model.rows.runs.len()
+    }
+
+    /// Recovery by the surroundings: differences shrink in proportion, so no limit is broken.
+    pub(crate) fn recover(&mut self, model: &ChainMail, kept: f64) {
+        if self.max_displacement == 0.0 || kept == 1.0 {
+            return;
+        }
+        let least = f64::from(model.classes.least_room());
+        self.settled = (kept * f64::from(self.settled) - (1.0 - kept) * least).max(0.0) as f32;
+        self.max_displacement *= kept as f32;
+        self.scale *= kept;
+        if self.max_displacement < AT_REST {
+            self.return_to_rest(model);
+        } else if self.scale < SMALLEST_SCALE {
+            self.renormalise();
+        }
+    }
+
+    /// Writes the scale into the displacements, and starts again from 1.
+    fn renormalise(&mut self) {
+        let scale = self.scale();
+        for value in self.u.iter_mut().flatten() {
+            let left = *value * scale;
+            *value = if left.abs() > AT_REST { left } else { 0.0 };
+        }
+        for square in self.run_square.iter_mut().chain(&mut self.plane_square) {
+            *square *= scale * scale;
+        }
+        self.scale = 1.0;
+    }
+
+    /// Takes the largest displacement again, from what this step has moved; `square` gives that of a stretch.
+    pub(crate) fn measure(&mut self, model: &ChainMail, square: impl Fn(&[&[f32]; 3], usize, usize) -> f32) {
+        let ny = model.lattice.dims[1];
+        let u = self.u.each_ref().map(Vec::as_slice);
+        let planes = self.moved.planes();
+        for k in planes.start..planes.end.max(planes.start) {
+            let rows = self.moved.rows(k as usize);
+            for j in rows.start..rows.end.max(rows.start) {
+                for run in model.rows.numbers(j as usize + ny * k as usize) {
+                    if !self.moved.of_run(run).is_empty() {
+                        let of_run = &model.rows.runs[run];
+                        self.run_square[run] = square(&u, of_run.first as usize, of_run.end() as usize);
+                    }
+                }
+            }
+            let [first, end] = model.rows_of_plane[k as usize];
+            let runs = model
+                .rows
+                .numbers_of_rows(first + ny * k as usize, end + ny * k as usize);
+            self.plane_square[k as usize] = largest(&self.run_square[runs]);
+        }
+        if !planes.is_empty() {
+            self.max_displacement = largest(&self.plane_square).sqrt() * self.scale();
+        }
+    }
+}
+
+fn largest(values: &[f32]) -> f32 {
+    values.iter().fold(0.0, |a, &b| if b > a { b } else { a })
+}

@@ -1,0 +1,36 @@
+//! The body as it is now: what everything but the models reads.
+
+use crate::scene::{Lattice, Surface};
+
+/// A lattice and the displacement of each of its elements.
+#[derive(Clone, Copy)]
+pub struct Deformed<'a> {
+    pub lattice: &'a Lattice,
+    /// Along x, y, z; `scale` times these is in elements.
+    pub u: [&'a [f32]; 3],
+    pub scale: f32,
+    /// No corner of an element is farther from the element's box at rest, in elements.
+    pub reach: f32,
+}
+
+impl Deformed<'_> {
+    /// Displacement from rest of one element, in elements; the last element's for a number past the end.
+    pub fn displacement(&self, element: u32) -> [f64; 3] {
+        let e = (element as usize).min(self.lattice.element_count().saturating_sub(1));
+        self.u.map(|c| c.get(e).map_or(0.0, |u| f64::from(self.scale * u)))
+    }
+
+    /// Centre of an element in the scene frame; the last element's for a number past the end.
+    pub fn position_m(&self, element: u32) -> [f64; 3] {
+        let rest = self.lattice.rest_m(element);
+        let u = self.displacement(element);
+        [0, 1, 2].map(|a| rest[a] + self.lattice.spacing_m * u[a])
+    }
+
+    /// Writes the positions of the surface's vertices in metres; stops at the shorter of the two.
+    pub fn write_surface(&self, surface: &Surface, positions_m: &mut [[f32; 3]]) {
+        for (slot, &element) in positions_m.iter_mut().zip(&surface.vertex_elements) {
+            *slot = self.position_m(element).map(|c| c as f32);
+        }
+    }
+}
