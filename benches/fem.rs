@@ -123,6 +123,7 @@ fn chainmail(scene: &Scene, ticks: &[Tick], rounds: usize) -> Vec<u64> {
             let held = Held {
                 element: held.element,
                 position_m: held.position_m,
+                patch_m: held.edge_m,
             };
             let start = Instant::now();
             let report = rt_core::tissue::step(&model, &mut state, Some(held), PERIOD_S);

@@ -17,13 +17,12 @@ const GUIDED: Hand = Hand {
 };
 
 fn world(fem: bool) -> World {
-    let scene = Scene::builtin("paper").expect("built in");
-    let limits = TissueParameters::default().validate().expect("defaults are valid");
-    let mut world = World::new(scene, limits, 1);
+    let mut scene = Scene::builtin("paper").expect("built in");
     if fem {
-        world.tissue = Box::new(FemTissue::<f32>::new(&world.scene).expect("the paper's gland can be solved"));
+        scene.tissue = TissueKind::Fem;
     }
-    world
+    let limits = TissueParameters::default().validate().expect("defaults are valid");
+    World::new(scene, limits, 1).expect("the paper's gland can be solved")
 }
 
 /// Forces of the tissue along the path by tick: as the haptic loop has them, and as the body has just answered.

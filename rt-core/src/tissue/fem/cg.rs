@@ -6,6 +6,7 @@ use super::grid::Grid;
 use super::lanes::{add_scaled, dot, keep_free, scale_and_add};
 use super::model::FemModel;
 use super::real::Real;
+use super::simd::{Simd, vectorised};
 use super::smooth::Product;
 use super::state::FemState;
 use super::sweep::{Field, LineOp, sweep};
@@ -31,8 +32,8 @@ impl<T: Real> LineOp<T> for Answer<'_, T> {
     }
 }
 
-#[inline(always)]
-fn dot_fields<T: Real>(grid: &Grid, a: &Field<T>, b: &Field<T>) -> f64 {
+vectorised! {
+fn dot_fields<T>(grid: &Grid, a: &Field<T>, b: &Field<T>) -> f64 {
     let mut sum = 0.0;
     for at in grid.node_spans() {
         for (a, b) in a.iter().zip(b) {
@@ -41,19 +42,21 @@ fn dot_fields<T: Real>(grid: &Grid, a: &Field<T>, b: &Field<T>) -> f64 {
     }
     sum
 }
+}
 
-#[inline(always)]
-fn scale_and_add_fields<T: Real>(grid: &Grid, a: T, x: &Field<T>, y: &mut Field<T>) {
+vectorised! {
+fn scale_and_add_fields<T>(grid: &Grid, a: T, x: &Field<T>, y: &mut Field<T>) {
     for at in grid.node_spans() {
         for (x, y) in x.iter().zip(y.iter_mut()) {
             scale_and_add(a, &x[at.clone()], &mut y[at.clone()]);
         }
     }
 }
+}
 
+vectorised! {
 /// `u += alpha p`, `r -= alpha q`; returns `r . r`.
-#[inline(always)]
-fn advance_fields<T: Real>(grid: &Grid, alpha: T, [p, q]: [&Field<T>; 2], [u, r]: [&mut Field<T>; 2]) -> f64 {
+fn advance_fields<T>(grid: &Grid, alpha: T, p: &Field<T>, q: &Field<T>, u: &mut Field<T>, r: &mut Field<T>) -> f64 {
     let mut square = 0.0;
     for at in grid.node_spans() {
         for c in 0..3 {
@@ -64,6 +67,7 @@ fn advance_fields<T: Real>(grid: &Grid, alpha: T, [p, q]: [&Field<T>; 2], [u, r]
         }
     }
     square
+}
 }
 
 impl<T: Real> FemState<T> {
@@ -113,9 +117,9 @@ impl<T: Real> FemState<T> {
     fn products(&self, model: &FemModel<T>, has_q: bool) -> (f64, f64) {
         let level = &model.levels[0];
         let stage = &self.multigrid.stages[0];
-        let rz = level.simd.run(|| dot_fields(&level.grid, &stage.b, &stage.x));
+        let rz = dot_fields(level.simd, &level.grid, &stage.b, &stage.x);
         let zq = if has_q {
-            level.simd.run(|| dot_fields(&level.grid, &stage.x, &self.q))
+            dot_fields(level.simd, &level.grid, &stage.x, &self.q)
         } else {
             0.0
         };
@@ -126,7 +130,7 @@ impl<T: Real> FemState<T> {
     fn turn(&mut self, model: &FemModel<T>, beta: f64) {
         let level = &model.levels[0];
         let (z, p) = (&self.multigrid.stages[0].x, &mut self.p);
-        level.simd.run(|| scale_and_add_fields(&level.grid, T::of(beta), z, p));
+        scale_and_add_fields(level.simd, &level.grid, T::of(beta), z, p);
     }
 
     /// `q = A p`; returns `p . q`.
@@ -148,9 +152,7 @@ impl<T: Real> FemState<T> {
         let level = &model.levels[0];
         let (u, r) = (&mut self.responses[n].u, &mut self.multigrid.stages[0].b);
         let (p, q) = (&self.p, &self.q);
-        level
-            .simd
-            .run(|| advance_fields(&level.grid, T::of(alpha), [p, q], [u, r]).sqrt())
+        advance_fields(level.simd, &level.grid, T::of(alpha), p, q, u, r).sqrt()
     }
 
     /// The residual as it is, not as the recurrence has it, and the force that moves the patch.

@@ -89,7 +89,7 @@ impl<T: Real> Multigrid<T> {
             let level = &levels[n];
             sweep(level, x, &mut self.work, 0..level.grid.nodes[2], &mut op);
             let (to, line) = (&levels[n + 1].grid, &mut self.line);
-            level.simd.run(|| restrict(&level.grid, to, r, line, &mut coarse[0].b));
+            restrict(level.simd, &level.grid, to, r, line, &mut coarse[0].b);
         }
         let stage = &mut self.stages[last];
         self.coarsest.solve(&stage.b, &mut stage.x);
@@ -98,6 +98,7 @@ impl<T: Real> Multigrid<T> {
             let stage = &mut fine[n];
             let (from, to) = (&levels[n + 1].grid, &levels[n].grid);
             prolong(
+                levels[n].simd,
                 from,
                 to,
                 &coarse[0].x,

@@ -22,30 +22,44 @@ impl Simd {
         }
         Simd::Portable
     }
+}
 
-    /// Calls `f`, compiled for these instructions as far as it can be inlined.
-    #[inline(always)]
-    pub fn run<R>(self, f: impl FnOnce() -> R) -> R {
-        match self {
+/// Makes a function that is compiled for each set of instructions and takes the one to use as its first argument.
+///
+/// A closure would not do: what is called from several places is not inlined, and only what is inlined is compiled for the
+/// instructions of its caller.
+macro_rules! vectorised {
+    (
+        $(#[$attribute:meta])*
+        fn $name:ident<$t:ident $(, $o:ident: $bound:ident)?>($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? $body:block
+    ) => {
+        $(#[$attribute])*
+        pub(super) fn $name<$t: Real $(, $o: $bound<$t>)?>(simd: Simd, $($argument: $type),*) $(-> $result)? {
+            #[inline(always)]
+            fn portable<$t: Real $(, $o: $bound<$t>)?>($($argument: $type),*) $(-> $result)? $body
+
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: `detect` has found AVX-512F.
-            Simd::Avx512 => unsafe { with_avx512(f) },
+            #[target_feature(enable = "avx2")]
+            fn avx2<$t: Real $(, $o: $bound<$t>)?>($($argument: $type),*) $(-> $result)? {
+                portable($($argument),*)
+            }
+
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: `detect` has found AVX2.
-            Simd::Avx2 => unsafe { with_avx2(f) },
-            Simd::Portable => f(),
+            #[target_feature(enable = "avx512f")]
+            fn avx512<$t: Real $(, $o: $bound<$t>)?>($($argument: $type),*) $(-> $result)? {
+                portable($($argument),*)
+            }
+
+            match simd {
+                #[cfg(target_arch = "x86_64")]
+                // SAFETY: `detect` has found AVX-512F.
+                Simd::Avx512 => unsafe { avx512($($argument),*) },
+                #[cfg(target_arch = "x86_64")]
+                // SAFETY: `detect` has found AVX2.
+                Simd::Avx2 => unsafe { avx2($($argument),*) },
+                Simd::Portable => portable($($argument),*),
+            }
         }
-    }
+    };
 }
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-fn with_avx512<R>(f: impl FnOnce() -> R) -> R {
-    f()
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn with_avx2<R>(f: impl FnOnce() -> R) -> R {
-    f()
-}
+pub(super) use vectorised;

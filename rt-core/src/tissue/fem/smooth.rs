@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::lanes::{chebyshev, difference_where_free, dot, first_chebyshev, keep_free};
 use super::level::Level;
 use super::real::Real;
+use super::simd::{Simd, vectorised};
 use super::sweep::{Field, LineOp, Planes, sweep};
 
 /// `x += d` after `d = keep d + gain (b - A x) / diagonal`: one step of a Chebyshev iteration.
@@ -47,9 +48,7 @@ pub(super) fn smooth<T: Real>(
     let (mut keep, mut gain) = (0.0, 1.0 / middle);
     for n in 0..steps {
         if n == 0 && from_zero {
-            level
-                .simd
-                .run(|| first_step(level, inverse_diagonal, x, b, d, T::of(gain)));
+            first_step(level.simd, level, inverse_diagonal, x, b, d, T::of(gain));
         } else {
             let mut op = Step {
                 b,
@@ -66,9 +65,9 @@ pub(super) fn smooth<T: Real>(
     }
 }
 
+vectorised! {
 /// The first step from `x = 0`, which needs no sweep.
-#[inline(always)]
-fn first_step<T: Real>(
+fn first_step<T>(
     level: &Level<T>,
     inverse_diagonal: &[T],
     x: &mut Field<T>,
@@ -83,6 +82,7 @@ fn first_step<T: Real>(
             first_chebyshev(gain, inverse, b, d, x);
         }
     }
+}
 }
 
 /// `r = b - A x` where nodes are free, zero elsewhere.

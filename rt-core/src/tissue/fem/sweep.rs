@@ -9,6 +9,7 @@ use super::hexahedron::{CHUNK, Scratch, add_line, forces};
 use super::lanes::{LANES, add_products};
 use super::level::Level;
 use super::real::Real;
+use super::simd::{Simd, vectorised};
 
 /// One value for each node along x, y, z.
 pub(super) type Field<T> = [Vec<T>; 3];
@@ -57,17 +58,17 @@ pub(super) fn sweep<T: Real, O: LineOp<T>>(
     planes: Range<usize>,
     op: &mut O,
 ) {
-    level.simd.run(|| sweep_lines(level, x, work, planes, op));
+    sweep_planes(level.simd, level, x, work, planes, op);
 }
 
-#[inline(always)]
-fn sweep_lines<T: Real, O: LineOp<T>>(
-    level: &Level<T>,
-    x: &mut Field<T>,
-    work: &mut Planes<T>,
-    planes: Range<usize>,
-    op: &mut O,
-) {
+vectorised! {
+    fn sweep_planes<T, O: LineOp>(
+        level: &Level<T>,
+        x: &mut Field<T>,
+        work: &mut Planes<T>,
+        planes: Range<usize>,
+        op: &mut O,
+    ) {
     let Planes { even, odd, scratch } = work;
     let (mut here, mut above) = (even, odd);
     clear(level, here);
@@ -83,6 +84,7 @@ fn sweep_lines<T: Real, O: LineOp<T>>(
         finish_plane(level, x, k, here, op);
         std::mem::swap(&mut here, &mut above);
     }
+}
 }
 
 #[inline(always)]

@@ -1,5 +1,7 @@
 //! What the tests of the elastic body share.
 
+use std::sync::Arc;
+
 use super::solve::hold_cells;
 use super::*;
 use crate::scene::test_bodies::Random;

@@ -97,7 +97,7 @@ fn largest(a: &Field<f64>) -> f64 {
     a.iter().flatten().fold(0.0, |m, v| v.abs().max(m))
 }
 
-fn irregular() -> (std::sync::Arc<Lattice>, FemModel<f64>) {
+fn irregular() -> (Arc<Lattice>, FemModel<f64>) {
     let lattice = lattice_of(&test_bodies::speckle(3));
     let model = FemModel::new(&lattice, &two_materials(&lattice, 50.0, 0.0)).expect("valid");
     (lattice, model)

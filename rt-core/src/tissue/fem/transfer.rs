@@ -2,6 +2,7 @@
 
 use super::grid::Grid;
 use super::real::Real;
+use super::simd::{Simd, vectorised};
 use super::sweep::Field;
 
 /// Weight of the two or one coarse lines (or planes) that a fine one lies between.
@@ -10,9 +11,9 @@ fn parents(fine: usize) -> ([usize; 2], usize) {
     ([fine / 2, fine.div_ceil(2)], fine % 2 + 1)
 }
 
+vectorised! {
 /// `coarse = transpose(interpolation) fine`. `line` has room for a line of fine nodes and two more.
-#[inline(always)]
-pub(super) fn restrict<T: Real>(fine: &Grid, coarse: &Grid, values: &Field<T>, line: &mut [T], into: &mut Field<T>) {
+fn restrict<T>(fine: &Grid, coarse: &Grid, values: &Field<T>, line: &mut [T], into: &mut Field<T>) {
     for k in 0..coarse.nodes[2] {
         for j in 0..coarse.nodes[1] {
             let [first, end] = coarse.node_rows[j + coarse.nodes[1] * k].map(|i| i as usize);
@@ -34,6 +35,7 @@ pub(super) fn restrict<T: Real>(fine: &Grid, coarse: &Grid, values: &Field<T>, l
             }
         }
     }
+}
 }
 
 /// Adds the nine fine lines around a coarse one; `line[1]` is the fine node `start`.
@@ -57,9 +59,9 @@ fn gather<T: Real>(fine: &Grid, values: &[T], [j, k]: [usize; 2], start: usize, 
     }
 }
 
+vectorised! {
 /// `fine += interpolation coarse` at free nodes. `line` has room for a line of coarse nodes and one more.
-#[inline(always)]
-pub(super) fn prolong<T: Real>(
+fn prolong<T>(
     coarse: &Grid,
     fine: &Grid,
     values: &Field<T>,
@@ -97,6 +99,7 @@ pub(super) fn prolong<T: Real>(
             }
         }
     }
+}
 }
 
 /// Each coarse value to its node, the mean of two to the node between. `into` starts at an even node.
