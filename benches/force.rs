@@ -112,7 +112,7 @@ struct Sample {
 fn insertion(speed_m_per_s: f64) -> Vec<Sample> {
     let scene = Scene::builtin("pelvis").expect("built in");
     let limits = TissueParameters::default().validate().expect("the defaults are valid");
-    let world = World::new(scene, limits, 1);
+    let world = World::new(scene, limits, 1).expect("ChainMail takes every scene");
     let start = axis_start(&world);
     let mut desk = Desk::new(world, start, Hand::steady(), 5);
     desk.go_to(start + Vector3::z() * 0.085, speed_m_per_s);

@@ -3,8 +3,7 @@
 use nalgebra::Vector3;
 use rt_core::rt::world::World;
 use rt_core::scene::Scene;
-use rt_core::tissue::TissueParameters;
-use rt_core::tissue::fem::FemTissue;
+use rt_core::tissue::{TissueKind, TissueParameters};
 use stylet_benches::desk::{Desk, axis_start};
 use stylet_hw::Hand;
 

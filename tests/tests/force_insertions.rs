@@ -12,7 +12,7 @@ use stylet_hw::Hand;
 fn insertion(scene: &str, depth_m: f64, speed_m_per_s: f64) -> (f64, f64, u32) {
     let scene = Scene::builtin(scene).expect("built in");
     let limits = TissueParameters::default().validate().expect("defaults are valid");
-    let world = World::new(scene, limits, 1);
+    let world = World::new(scene, limits, 1).expect("ChainMail takes every scene");
     let start = axis_start(&world);
     let mut desk = Desk::new(world, start, Hand::steady(), 5);
     desk.go_to(start + Vector3::z() * depth_m, speed_m_per_s);

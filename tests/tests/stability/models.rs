@@ -32,7 +32,7 @@ impl Kind {
 
     pub fn on(self, scene: &Scene, parameters: &TissueParameters) -> Box<dyn TissueModel> {
         match self {
-            Kind::Fem => Box::new(FemTissue::new(scene).expect("the case gives valid materials")),
+            Kind::Fem => Box::new(FemTissue::<f32>::new(scene).expect("the case gives valid materials")),
             Kind::ChainMail | Kind::Relaxed => Box::new(ChainMailTissue::new(scene, self.limits(parameters))),
         }
     }

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use super::solve::hold_cells;
 use super::*;
 use crate::scene::test_bodies::Random;
-use std::sync::Arc;
 
 use crate::scene::{Labels, Lattice, Scene, test_bodies};
 use crate::tissue::HeldOutcome;
