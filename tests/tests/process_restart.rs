@@ -62,10 +62,13 @@ fn a_killed_core_is_seen_and_its_successor_is_found_by_the_same_host() {
         ask(&mut hand.link, CommandKind::Engage, &[]).expect("a host that was there before commands the new core");
         instance = next.kill();
     }
-    let last = Core::start_as(instance.clone(), &["--rt-if-allowed"]);
-    assert!(hand.watch_until(Duration::from_secs(15), |link| link.status() == LinkStatus::Live));
+    let end = Core::start_as(instance.clone(), &["--rt-if-allowed"]);
+    let found = hand.watch_until(Duration::from_secs(15), |link| {
+        link.status() == LinkStatus::Live && link.session().is_some_and(|s| s.session_id != last)
+    });
+    assert!(found, "not found again: {:?}", hand.link.status());
     drop(hand);
-    last.finish();
+    end.finish();
     assert_eq!(left_behind(&instance), [""; 0]);
 }
 

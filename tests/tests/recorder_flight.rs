@@ -52,7 +52,7 @@ fn a_request_a_fault_and_the_end_each_leave_a_recording_that_repeats_bit_for_bit
         f64::from(ParameterId::MembranePeak as u32),
         4.5,
         f64::from(ParameterId::ShearHorizontal as u32),
-        0.5,
+        0.4,
     ];
     ask(&mut hand.link, CommandKind::SetParameters, &membrane).expect("set");
     hand.watch(Duration::from_secs(3));

@@ -65,7 +65,7 @@ struct Common {
     #[arg(long, value_name = "DAYS", default_value_t = 0.0)]
     from_days: f64,
     /// Count dose up to this day after the implant [default: for ever]
-    #[arg(long, value_name = "DAYS")]
+    #[arg(allow_negative_numbers = true, long, value_name = "DAYS")]
     to_days: Option<f64>,
     /// Prescribed dose in Gy [default: that of the source file]
     #[arg(long, value_name = "GY")]

@@ -114,7 +114,8 @@ fn beside(scene: &SceneHeader, target: &Box3, direction: Vector3<f64>) -> Vec<Ve
         return vec![target.middle()];
     };
     let farthest_m = 0.5 * target.way_from_middle_m(aside);
-    let steps = (farthest_m / ASIDE_M).clamp(0.0, 100.0) as usize;
+    // A hair more, as the quotient may be a whole number.
+    let steps = (farthest_m / ASIDE_M + 1e-6).clamp(0.0, 100.0) as usize;
     let each = (1..=steps).flat_map(|n| [n as f64, -(n as f64)]);
     std::iter::once(0.0)
         .chain(each)

@@ -3,7 +3,7 @@
 use super::*;
 use crate::force::ForceParameters;
 use crate::force::gate::RAMP_OUT_TICKS;
-use crate::needle::NeedleParameters;
+use crate::needle::{LayerKind, NeedleParameters};
 use crate::rt::exchange::{HapticOrder, Notice, TissueResponse};
 use crate::rt::haptic::{HapticLoop, HapticPorts};
 use crate::rt::haptic_tape::{HapticMemory, HapticTape};
@@ -168,6 +168,7 @@ impl Rig {
         // The membrane is met where the tip passes it.
         if record.tip_in_scene_m[2] > 0.0 && self.tissue.contact == 0 {
             self.tissue.contact = 1;
+            (self.tissue.layer, self.tissue.layer_number) = (LayerKind::Gland, 1);
         }
         record
     }

@@ -10,6 +10,37 @@ const TICK_S: f64 = 5e-3;
 /// The tolerance of both models.
 const TOLERANCE: f64 = 1.001e-3;
 
+/// What is known to fall short, and why; the page says so. A case that is met again must leave this list.
+pub const SHORT: [(u32, Kind, &str); 7] = [
+    (
+        3,
+        Kind::Fem,
+        "small strain knows no limit on a cell: pushed by more than an element or two in a body this small, cells beside the tip fold",
+    ),
+    (
+        4,
+        Kind::ChainMail,
+        "what cannot be reached is drawn back toward rest, the farther the more was asked: it should stop at the last place that was feasible",
+    ),
+    (4, Kind::Relaxed, "as above"),
+    (
+        5,
+        Kind::Fem,
+        "as in (3): the element beside the fixed one is pushed by several elements",
+    ),
+    (
+        7,
+        Kind::Fem,
+        "at 0.499 forty cycles do not always meet the tolerance within one tick; the answer follows a few ticks later",
+    ),
+    (
+        14,
+        Kind::Fem,
+        "as in (3), by a hundredth: the cells between hard and soft",
+    ),
+    (17, Kind::Fem, "as in (3)"),
+];
+
 struct Case {
     number: u32,
     name: &'static str,
@@ -239,8 +270,7 @@ fn fast_turns(kind: Kind) -> Option<(String, bool)> {
     let scene = block([16, 14, 14]);
     let reach = if kind == Kind::Fem { 3.0 } else { 12.0 };
     let seen = wander(&mut *kind.on(&scene, &TissueParameters::default()), &scene, 3.0, reach);
-    // Small strain knows no limit on a cell: whether it folds is a matter of how far it is pushed.
-    let unfolded = kind == Kind::Fem || seen.least_corner > -1e-3;
+    let unfolded = seen.least_corner > -1e-3;
     Some((words(&seen), sound(&seen) && unfolded))
 }
 
@@ -279,7 +309,7 @@ fn beside_bone(kind: Kind) -> Option<(String, bool)> {
         words(&seen),
         seen.limited
     );
-    let told = kind == Kind::Fem || (seen.limited > 0 && seen.least_corner > -1e-3);
+    let told = (kind == Kind::Fem || seen.limited > 0) && seen.least_corner > -1e-3;
     Some((happened, sound(&seen) && told && moved == 0.0))
 }
 
@@ -411,7 +441,7 @@ fn contrast(kind: Kind) -> Option<(String, bool)> {
     });
     let mut model = kind.on(&scene, &TissueParameters::default());
     let seen = wander(&mut *model, &scene, 0.2, 2.0);
-    Some((words(&seen), sound(&seen) && seen.least_corner > 0.0))
+    Some((words(&seen), sound(&seen) && seen.least_corner > -1e-3))
 }
 
 fn rigid(kind: Kind) -> Option<(String, bool)> {
@@ -475,15 +505,21 @@ fn parts(kind: Kind) -> Option<(String, bool)> {
     let seen = drive(&mut *model, 160, TICK_S, |tick, body| {
         Some(held_at(body, element, turning(tick, 0.3, reach)))
     });
+    // FEM solves both parts in one, to its tolerance of the travel.
+    let still = if kind == Kind::Fem {
+        TOLERANCE * seen.farthest
+    } else {
+        0.0
+    };
     let moved = model
         .deformed()
         .displacement(other)
         .iter()
         .fold(0.0_f64, |m, c| m.max(c.abs()));
-    let unfolded = kind == Kind::Fem || seen.least_corner > -1e-3;
+    let unfolded = seen.least_corner > -1e-3;
     Some((
         format!("{}, other part moved {moved:.0e}", words(&seen)),
-        sound(&seen) && unfolded && moved == 0.0,
+        sound(&seen) && unfolded && moved <= still,
     ))
 }
 

@@ -45,11 +45,14 @@ pub fn drive(
             seen.grew_free = seen.grew_free.max(after - before);
         }
         before = after;
-        seen.finite &= after.is_finite() && report.residual.is_finite();
+        let refused = report.held == HeldOutcome::Refused;
+        seen.finite &= after.is_finite() && (refused || report.residual.is_finite());
         seen.farthest = seen.farthest.max(after);
-        seen.worst_residual = seen.worst_residual.max(report.residual);
-        seen.unconverged += u32::from(!report.converged);
-        seen.refused += u32::from(report.held == HeldOutcome::Refused);
+        if !refused {
+            seen.worst_residual = seen.worst_residual.max(report.residual);
+            seen.unconverged += u32::from(!report.converged);
+        }
+        seen.refused += u32::from(refused);
         seen.limited += u32::from(report.held == HeldOutcome::Limited);
         if tick % 8 == 0 || tick + 1 == ticks {
             seen.least_corner = seen.least_corner.min(least_corner(&body));

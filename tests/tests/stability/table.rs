@@ -1,5 +1,7 @@
 //! The table of hard cases, as it stands in `docs/stability.md`.
 
+use crate::cases::SHORT;
+use crate::models::Kind;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -38,7 +40,7 @@ pub fn write_or_compare(rows: &[Row]) {
     let old = std::fs::read_to_string(page()).unwrap_or_default();
     let rest = old.split_once(END).map_or("", |(_, rest)| rest);
     if std::env::var_os("UPDATE_DOCS").is_some() {
-        let text = format!("{HEAD}{}{END}{rest}", table(rows));
+        let text = format!("{HEAD}{}{}{END}{rest}", table(rows), shortfalls(rows));
         std::fs::write(page(), text).expect("docs can be written");
         return;
     }
@@ -49,6 +51,21 @@ pub fn write_or_compare(rows: &[Row]) {
             "docs/stability.md lacks \"{line}\": run the command at its head"
         );
     }
+}
+
+/// Why rows are not met.
+fn shortfalls(rows: &[Row]) -> String {
+    let mut text = String::from("\nWhy what is not met is not:\n\n");
+    for (number, kind, why) in SHORT {
+        if rows.iter().any(|row| is(row, number, kind) && !row.met) {
+            writeln!(text, "- ({number}) {}: {why}.", kind.name()).expect("a string takes all");
+        }
+    }
+    text
+}
+
+pub fn is(row: &Row, number: u32, kind: Kind) -> bool {
+    row.number == number && row.model == kind.name()
 }
 
 fn table(rows: &[Row]) -> String {
