@@ -288,7 +288,12 @@ fn every_cause_ramps_the_force_out_in_time_and_the_operator_can_rearm() {
         record.extend(rig.run(400));
         let last = record.last().expect("ticks");
         assert_eq!(last.fault, 0, "{cause:?}");
-        assert!(force_n(last) > 0.5, "{cause:?}: no force after re-arming");
+        // Where the model asks for much, the gate waits until it asks for little.
+        assert_ne!(
+            last.flags & (flags::ENGAGED | flags::WAITING),
+            0,
+            "{cause:?}: neither on nor waiting after re-arming"
+        );
         assert!(rig.seen.iter().any(|n| matches!(n, Notice::Rearmed { .. })));
         assert_no_step(&record, &format!("{cause:?}"));
     }
