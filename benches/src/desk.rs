@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use rt_core::force::ForceParameters;
-use rt_core::force::chain::{self, ChainOutput, ChainParameters, ChainState, Touch};
+use rt_core::force::chain::{self, ChainOutput, ChainParameters, ChainState};
 use rt_core::needle::{LayerKind, NeedleParameters};
 use rt_core::rt::exchange::{TipPose, TissueResponse};
 use rt_core::rt::recorder::recorder;
@@ -88,14 +88,7 @@ impl Desk {
         let sample = self.device.read(DT_S).expect("the simulated device answers");
         let tissue = *self.response_out.read();
         let touching = tissue.contact > self.pose.released_contact;
-        let touch = touching.then_some(Touch {
-            contact_in_world: tissue.contact_in_scene,
-            path_direction: tissue.path_direction,
-            layer: tissue.layer,
-            layer_number: tissue.layer_number,
-            layer_in_world: tissue.layer_in_scene,
-            local: tissue.local,
-        });
+        let touch = touching.then(|| tissue.touch());
         self.contact = if touching { tissue.contact } else { self.contact };
         let output = chain::step(
             &self.parameters,

@@ -1,5 +1,6 @@
 //! What the two loops and the bridge hand each other: plain data through wait-free rings and triple buffers.
 
+use crate::force::chain::Touch;
 use crate::force::{ForceParameters, LocalResponse};
 use crate::needle::{LayerKind, NeedleParameters, Phase};
 use crate::rt::tissue_tape::TissueTape;
@@ -68,6 +69,20 @@ pub struct TissueResponse {
     pub missed: u64,
     pub seed_count: u32,
     pub unsolved: bool,
+}
+
+impl TissueResponse {
+    /// Where the tip meets tissue; means something while there is contact.
+    pub fn touch(&self) -> Touch {
+        Touch {
+            contact_in_world: self.contact_in_scene,
+            path_direction: self.path_direction,
+            layer: self.layer,
+            layer_number: self.layer_number,
+            layer_in_world: self.layer_in_scene,
+            local: self.local,
+        }
+    }
 }
 
 impl Default for TissueResponse {

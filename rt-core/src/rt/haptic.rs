@@ -291,14 +291,7 @@ impl HapticLoop {
             return None;
         }
         self.contact = tissue.contact;
-        Some(Touch {
-            contact_in_world: tissue.contact_in_scene,
-            path_direction: tissue.path_direction,
-            layer: tissue.layer,
-            layer_number: tissue.layer_number,
-            layer_in_world: tissue.layer_in_scene,
-            local: tissue.local,
-        })
+        Some(tissue.touch())
     }
 
     /// Eq. 6-10 for this sample, and the gate.

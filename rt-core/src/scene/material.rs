@@ -1,14 +1,12 @@
 //! What a structure may be made of: stiffness that exists, and limits under which no cell folds over.
 
 use super::{SceneProblem, Structure};
-use crate::tissue::AxisLimits;
+use crate::tissue::{AxisLimits, folding};
 
 /// Largest Poisson's ratio that the solvers take: 0.5 would need a pressure of its own.
 pub(super) const MAX_POISSON: f64 = 0.499;
 /// Above bone and steel, a number that is most likely in the wrong unit.
 const MAX_YOUNG_PA: f64 = 1e12;
-/// Angles are given to a thousandth of a degree; the paper's 26.565 deg lie on the edge of the condition below.
-const FOLD_TOLERANCE: f64 = 1e-4;
 
 /// Everything wrong with the material of one structure.
 pub(super) fn problems_of(structure: &Structure) -> Vec<SceneProblem> {
@@ -38,6 +36,21 @@ pub(super) fn problems_of(structure: &Structure) -> Vec<SceneProblem> {
         found.folds(limits.map(|axis| axis.shear_deg));
     }
     found.found
+}
+
+/// Three links that meet in a corner may be of three structures: the widest angle along each axis must not fold it.
+/// Structures under the operator's limits are not counted; those are not known here.
+pub(super) fn folding_between(structures: &[Structure]) -> Option<SceneProblem> {
+    let own = structures.iter().filter(|s| !s.material.fixed).filter_map(|s| s.material.limits.as_ref());
+    let angles: Vec<[f64; 3]> = own.map(|l| l.each_ref().map(|axis| axis.shear_deg)).collect();
+    let widest = [0, 1, 2].map(|a| angles.iter().map(|angle| angle[a]).fold(0.0, f64::max));
+    let each_is_told = angles.iter().any(|&angle| folding(angle).is_nan() || folding(angle) > 1.0);
+    (!each_is_told && folding(widest) > 1.0).then(|| SceneProblem::Material {
+        structure: "all structures together".to_owned(),
+        what: "tx ty + ty tz + tz tx + 2 tx ty tz of the widest shear_deg along each axis".to_owned(),
+        value: folding(widest),
+        limit: "at most 1 (eq. 1 in three dimensions), or cells between structures fold over",
+    })
 }
 
 struct Problems<'a> {
@@ -79,28 +92,15 @@ impl Problems<'_> {
         );
     }
 
-    /// Eq. 1 for each pair of axes; then the same for all three: three links sheared against each other by the
-    /// tangents t span a volume of at least 1 - (tx ty + ty tz + tz tx) - 2 tx ty tz.
+    /// Eq. 1 in three dimensions, which has eq. 1 for each pair of axes in it.
     fn folds(&mut self, shear_deg: [f64; 3]) {
-        if !shear_deg.iter().all(|angle| (0.0..90.0).contains(angle)) {
-            return;
+        if shear_deg.iter().all(|angle| (0.0..90.0).contains(angle)) {
+            self.unless(
+                folding(shear_deg) <= 1.0,
+                "tx ty + ty tz + tz tx + 2 tx ty tz of the tangents of its shear_deg",
+                folding(shear_deg),
+                "at most 1 (eq. 1 in three dimensions), or cells fold over",
+            );
         }
-        let before = self.found.len();
-        for (a, b, axes) in [(0, 1, "x and y"), (1, 2, "y and z"), (2, 0, "z and x")] {
-            let sum = shear_deg[a] + shear_deg[b];
-            let what = format!("sum of shear_deg along {axes}");
-            self.unless(sum < 90.0, &what, sum, "below 90 (eq. 1), or cells fold over");
-        }
-        if self.found.len() > before {
-            return;
-        }
-        let [x, y, z] = shear_deg.map(|angle| angle.to_radians().tan());
-        let folded = x * y + y * z + z * x + 2.0 * x * y * z;
-        self.unless(
-            folded <= 1.0 + FOLD_TOLERANCE,
-            "tx ty + ty tz + tz tx + 2 tx ty tz of the tangents of its shear_deg",
-            folded,
-            "at most 1 (eq. 1 in three dimensions), or cells fold over",
-        );
     }
 }

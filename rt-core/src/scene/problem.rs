@@ -236,6 +236,7 @@ fn problems_of_structures(structures: &[Structure], cells_of_label: &[usize; 256
         }
         problems.extend(material::problems_of(structure));
     }
+    problems.extend(material::folding_between(structures));
     for (label, &cells) in (1..=255_u8).zip(&cells_of_label[1..]) {
         if cells > 0 && structures.iter().all(|s| s.label != label) {
             problems.push(SceneProblem::UnknownLabel { label, cells });

@@ -1,79 +1,63 @@
-//! Haptic devices that a driver could find.
+//! Haptic devices: what is connected, and whether their driver would find it.
 
 use super::{Finding, Severity};
 use crate::lab::machine::Machine;
+use stylet_hw::libhd::diagnose::{self, Surroundings};
 
 /// USB vendor of 3D Systems: Touch and Touch X, as in the udev rules of its driver.
 const USB_VENDOR: &str = "2988";
 /// IEEE 1394 vendor of SensAble, the maker of the Phantoms, as registered (OUI 00-0B-99).
 const FIREWIRE_VENDOR: &str = "0x000b99";
 
-pub fn haptic(machine: &Machine) -> Finding {
+/// Devices on buses that tell their vendor; a Premium on a parallel port does not.
+fn connected(machine: &Machine) -> Vec<String> {
     let mut found = Vec::new();
-    for name in machine.names("sys/bus/firewire/devices") {
-        let read = |what: &str| machine.text(&format!("sys/bus/firewire/devices/{name}/{what}"));
-        if read("vendor").as_deref() == Some(FIREWIRE_VENDOR) {
-            found.push((format!("FireWire {name}"), format!("dev/{name}")));
+    for (bus, file, vendor, name_of_bus) in [
+        ("firewire", "vendor", FIREWIRE_VENDOR, "FireWire"),
+        ("usb", "idVendor", USB_VENDOR, "USB"),
+    ] {
+        let folder = format!("sys/bus/{bus}/devices");
+        for name in machine.names(&folder) {
+            if machine.text(&format!("{folder}/{name}/{file}")).as_deref() == Some(vendor) {
+                found.push(format!("{name_of_bus} {name}"));
+            }
         }
     }
-    for name in machine.names("sys/bus/usb/devices") {
-        let vendor = machine.text(&format!("sys/bus/usb/devices/{name}/idVendor"));
-        if vendor.as_deref() == Some(USB_VENDOR) {
-            found.push((format!("USB {name}"), String::new()));
-        }
-    }
-    if let (Some(modes), true) = (machine.text("proc/sys/dev/parport/parport0/modes"), found.is_empty()) {
-        return parallel_port(machine, &modes);
-    }
+    found
+}
+
+pub fn haptic(machine: &Machine) -> Finding {
+    let found = connected(machine);
     if found.is_empty() {
         return Finding::new(
             "devices",
             Severity::Note,
-            "no haptic device is seen on FireWire, USB or a parallel port; the simulated one will be used",
+            "no haptic device is seen on FireWire or USB; without a Premium on a parallel port the simulated one is there",
             "",
         );
     }
-    let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
-    let driver = [
-        "usr/lib64/libHD.so",
-        "usr/lib/libHD.so",
-        "usr/lib/x86_64-linux-gnu/libHD.so",
-    ];
-    if driver.iter().any(|path| machine.exists(path)) {
-        Finding::good("devices", format!("{}, and its driver libHD", names.join(", ")))
-    } else {
-        Finding::new(
-            "devices",
-            Severity::Warning,
-            format!(
-                "{} is connected, but its driver libHD is not installed",
-                names.join(", ")
-            ),
-            "install OpenHaptics and the device driver of 3D Systems",
-        )
-    }
+    Finding::good("devices", found.join(", "))
 }
 
-/// A Phantom Premium 1.5 talks EPP to a parallel port on the board; whether one is connected cannot be told from here.
-fn parallel_port(machine: &Machine, modes: &str) -> Finding {
-    if !modes.split(',').any(|m| m.trim() == "EPP") {
-        return Finding::new(
-            "devices",
-            Severity::Warning,
-            format!("the parallel port does not offer EPP (it has {modes}); a Phantom Premium needs it"),
-            "set the port to EPP, not to ECP+EPP, in the firmware set-up (BIOS)",
-        );
-    }
-    if machine.exists("dev/phnepp") {
-        return Finding::good(
-            "devices",
-            "a parallel port with EPP, linked as /dev/phnepp for a Phantom Premium",
-        );
-    }
-    Finding::new(
-        "devices",
-        Severity::Note,
-        "a parallel port with EPP, but no link to it for a Phantom Premium",
-        "sudo ln -s /dev/parport0 /dev/phnepp && sudo ln -s /proc/sys/dev/parport/parport0/modes /dev/phnepp_modes",
-    )
+/// What stands between a Phantom and `--device phantom`. It matters less where no device is connected.
+pub fn driver(machine: &Machine, here: &Surroundings) -> Vec<Finding> {
+    let worst = if connected(machine).is_empty() {
+        Severity::Note
+    } else {
+        Severity::Warning
+    };
+    let findings = diagnose::diagnose(&machine.path(""), here).into_iter();
+    findings
+        .map(|f| {
+            let severity = match f.severity {
+                diagnose::Severity::Good => Severity::Good,
+                diagnose::Severity::Note => Severity::Note,
+                diagnose::Severity::Warning | diagnose::Severity::Problem => worst,
+            };
+            Finding::new(PHANTOM, severity, f.what, f.cure)
+        })
+        .collect()
 }
+
+/// All findings about the driver have this name.
+pub const PHANTOM: &str = "phantom";

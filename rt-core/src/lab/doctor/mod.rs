@@ -14,6 +14,7 @@ mod tests;
 
 use crate::lab::machine::Machine;
 use serde::Serialize;
+use stylet_hw::libhd::diagnose::Surroundings;
 
 /// How much a finding matters, least first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -66,8 +67,8 @@ impl Finding {
 }
 
 /// All findings, in the order in which one would mend them.
-pub fn examine(machine: &Machine, haptic_core: usize) -> Vec<Finding> {
-    vec![
+pub fn examine(machine: &Machine, haptic_core: usize, here: &Surroundings) -> Vec<Finding> {
+    let mut findings = vec![
         kernel::hypervisor(machine),
         kernel::preemption(machine),
         rights::priority(machine),
@@ -86,7 +87,9 @@ pub fn examine(machine: &Machine, haptic_core: usize) -> Vec<Finding> {
         shared::space(machine, shared::free_bytes),
         shared::stale_services(machine),
         devices::haptic(machine),
-    ]
+    ];
+    findings.extend(devices::driver(machine, here));
+    findings
 }
 
 /// What all findings together say.
@@ -105,7 +108,8 @@ pub fn run(json: bool, haptic_core: Option<usize>) -> u8 {
         .last()
         .map_or(0, |c| c.id);
     let core = haptic_core.unwrap_or(last);
-    let findings = examine(&Machine::this(), core);
+    let (here, _) = Surroundings::of_this_process(None);
+    let findings = examine(&Machine::this(), core, &here);
     if json {
         let all = serde_json::json!({ "haptic_core": core, "verdict": verdict(&findings), "findings": findings });
         println!("{all:#}");
