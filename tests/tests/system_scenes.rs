@@ -54,7 +54,6 @@ fn every_built_in_scene_runs_by_its_number_and_says_what_it_is_made_of() {
 }
 
 #[test]
-#[ignore = "falls short: after the puncture single tissue steps re-anchor the whole body, which takes more than 100 ms"]
 fn the_default_needle_reaches_the_gland_in_the_pelvis_past_bone_urethra_and_rectum() {
     let mut core = Core::start_with(&["--rt-if-allowed", "--scene", "pelvis"]);
     let mut link = core.host();

@@ -11,18 +11,12 @@ const TICK_S: f64 = 5e-3;
 const TOLERANCE: f64 = 1.001e-3;
 
 /// What is known to fall short, and why; the page says so. A case that is met again must leave this list.
-pub const SHORT: [(u32, Kind, &str); 6] = [
+pub const SHORT: [(u32, Kind, &str); 4] = [
     (
         3,
         Kind::Fem,
         "small strain knows no limit on a cell: pushed by more than an element or two in a body this small, cells beside the tip fold",
     ),
-    (
-        4,
-        Kind::ChainMail,
-        "what cannot be reached is drawn back toward rest, the farther the more was asked: it should stop at the last place that was feasible",
-    ),
-    (4, Kind::Relaxed, "as above"),
     (
         5,
         Kind::Fem,

@@ -91,7 +91,11 @@ fn put_one(
     at: [f32; 3],
     [j, k]: [usize; 2],
 ) -> bool {
-    if model.is_fixed(element) || !state.put(element as usize, at) {
+    if model.is_fixed(element) {
+        return false;
+    }
+    state.keep(model, run);
+    if !state.put(element as usize, at) {
         return false;
     }
     let one = Stretch {

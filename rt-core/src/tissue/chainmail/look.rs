@@ -97,10 +97,7 @@ impl Pass<'_> {
                     2 => self.state.late[0][run].with(self.state.late[1][run]),
                     _ => self.state.late[1][run],
                 };
-                let links = moved.within(first, span.len);
-                if !links.is_empty() {
-                    worst = worst.max(self.violation::<K>(axis, span, links));
-                }
+                worst = worst.max(self.violation::<K>(axis, span, moved.within(first, span.len)));
             }
         }
         let clean = worst <= CLEAN * self.slack;
@@ -122,6 +119,9 @@ impl Pass<'_> {
     /// Largest violation of some links of a span.
     #[inline(always)]
     pub fn violation<K: Kernels>(&self, axis: usize, span: &Span, links: Stretch) -> f32 {
+        if links.is_empty() {
+            return 0.0;
+        }
         let l = self.limits(span.class, axis);
         let u = kernels::ordered(axis, self.state.u.each_ref().map(Vec::as_slice));
         let (lo, hi) = ((span.lo + links.start) as usize, (span.hi + links.start) as usize);

@@ -4,7 +4,7 @@ use super::model::ChainMail;
 use super::state::TissueState;
 use bytemuck::{bytes_of, bytes_of_mut, cast_slice, cast_slice_mut};
 
-const PARTS: usize = 17;
+const PARTS: usize = 18;
 
 impl TissueState {
     /// Every part that a later step reads before it writes it.
@@ -31,6 +31,7 @@ impl TissueState {
             cast_slice(&self.plane_square),
             bytes_of(&self.max_displacement),
             bytes_of(&self.settled),
+            bytes_of(&self.residual),
         ]
     }
 
@@ -58,6 +59,7 @@ impl TissueState {
             cast_slice_mut(&mut self.plane_square),
             bytes_of_mut(&mut self.max_displacement),
             bytes_of_mut(&mut self.settled),
+            bytes_of_mut(&mut self.residual),
         ]
     }
 

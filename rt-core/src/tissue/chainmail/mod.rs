@@ -7,7 +7,7 @@
 //! to a state without violations.
 //!
 //! A step works on what moves: `activity` remembers which stretches those are, `sweep` follows them outward,
-//! `project` is for what sweeps do not solve, `relax` makes the body elastic where that is asked for.
+//! `project` is for what sweeps do not solve, `follow` for what fixed tissue does not let happen, `relax` makes the body elastic where that is asked for.
 
 mod activity;
 #[cfg(target_arch = "x86_64")]
@@ -15,6 +15,7 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx2_relax;
 mod classes;
+mod follow;
 mod held;
 mod kernels;
 mod look;

@@ -1,5 +1,6 @@
 //! One step: recover, hold, solve to the residual, report.
 
+use super::follow::follow;
 use super::held::{self, Grip};
 use super::kernels::{Kernels, Portable};
 use super::model::ChainMail;
@@ -71,12 +72,16 @@ fn solve_avx2(model: &ChainMail, state: &mut TissueState, grip: Option<Grip>, re
 fn solve<K: Kernels + relax::Rows>(
     model: &ChainMail,
     state: &mut TissueState,
-    grip: Option<Grip>,
+    mut grip: Option<Grip>,
     report: &mut StepReport,
 ) -> f32 {
     let farthest = grip.map_or(0.0, |g| g.at.iter().fold(0.0, |a: f32, c| a.max(c.abs())));
     let slack = slack(model, farthest.max(state.max_displacement));
-    let mut residual = match &grip {
+    let mut residual = match &mut grip {
+        // A step can only be undone to a state that meets the limits.
+        Some(grip) if model.part_is_fixed(model.part(grip.element)) && state.residual <= model.limits().tolerance => {
+            follow::<K>(model, state, grip, slack, report)
+        }
         Some(grip) => {
             held::put(model, state, grip);
             propagate::<K>(model, state, grip, slack, report)
@@ -94,7 +99,8 @@ fn solve<K: Kernels + relax::Rows>(
         residual = settle::<K>(model, state, grip.as_ref(), slack, report);
     }
     state.measure(model, K::largest_square);
-    residual.max(state.settled)
+    state.residual = residual.max(state.settled);
+    state.residual
 }
 
 /// Violations that f32 cannot do without: two ends at `farthest`, rounded.
@@ -140,45 +146,85 @@ fn propagate<K: Kernels>(
     slack: f32,
     report: &mut StepReport,
 ) -> f32 {
+    let tolerance = model.limits().tolerance;
+    let mut residual = sweep::<K>(model, state, grip, slack, Patience::ToTheLast, report);
+    if residual > tolerance {
+        residual = project::<K>(model, state, grip, slack, report);
+    }
+    if residual > tolerance {
+        if model.part_is_fixed(model.part(grip.element)) {
+            report.held = HeldOutcome::Limited;
+        }
+        let mut pass = Pass::new(model, state, model.lattice.cell(grip.element), slack);
+        pass.reanchor(grip.element as usize);
+        residual = pass.check_all::<K>();
+        report.passes += 1;
+        report.solve = Solve::Reanchored;
+    }
+    residual
+}
+
+/// When sweeps are given up.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Patience {
+    ToTheLast,
+    /// Once one does not halve what is left.
+    WhileItHelps,
+}
+
+#[inline(always)]
+pub(super) fn sweep<K: Kernels>(
+    model: &ChainMail,
+    state: &mut TissueState,
+    grip: &Grip,
+    slack: f32,
+    patience: Patience,
+    report: &mut StepReport,
+) -> f32 {
     let held_cell = model.lattice.cell(grip.element);
-    for pass_number in 0.. {
+    let mut residual = 0.0;
+    // A sweep of what little is left costs little: go on to the last that f32 can do, within their number.
+    for number in 0..MAX_SWEEPS {
         if state.active.is_empty() {
             break;
         }
-        let stage = match pass_number {
-            n if n < MAX_SWEEPS => Solve::Sweeps,
-            n if n < MAX_SWEEPS + MAX_PROJECTIONS => Solve::Projections,
-            _ => Solve::Reanchored,
-        };
-        let mut pass = Pass::new(model, state, held_cell, slack);
-        let residual = match stage {
-            Solve::Sweeps if grip.beside == 0 && !model.classes.any_fixed() => pass.outward::<K>(),
-            Solve::Sweeps => {
-                // A patch with holes in it can be reached from outside, and bone pushes back; put back, it is active again.
-                let swept = pass.outward::<K>();
-                let disturbed = held::put(model, pass.state, grip);
-                if disturbed { f32::INFINITY } else { swept }
-            }
-            Solve::Projections => {
-                pass.project(pass_number.is_multiple_of(2));
-                held::put(model, pass.state, grip);
-                pass.check_all::<K>()
-            }
-            _ => {
-                pass.reanchor(grip.element as usize);
-                if model.part_is_fixed(model.part(grip.element)) {
-                    report.held = HeldOutcome::Limited;
-                }
-                pass.check_all::<K>()
-            }
-        };
+        let before = residual;
+        residual = Pass::new(model, state, held_cell, slack).outward::<K>();
+        // A patch with holes in it can be reached from outside, and bone pushes back; put back, it is active again.
+        let may_be_reached = grip.beside > 0 || model.classes.any_fixed();
+        if may_be_reached && held::put(model, state, grip) {
+            residual = f32::INFINITY;
+        }
         report.passes += 1;
-        report.solve = report.solve.max(stage);
-        // A sweep of what little is left costs little: go on to the last that f32 can do, within their number.
-        let is_last = pass_number + 1 >= MAX_SWEEPS;
-        if stage == Solve::Reanchored || residual <= model.limits().tolerance && is_last {
-            return residual;
+        report.solve = report.solve.max(Solve::Sweeps);
+        let helps = number == 0 || residual < 0.5 * before || residual <= model.limits().tolerance;
+        if patience == Patience::WhileItHelps && !helps {
+            break;
         }
     }
-    0.0
+    residual
+}
+
+/// Passes of projections over the whole body.
+#[inline(always)]
+fn project<K: Kernels>(
+    model: &ChainMail,
+    state: &mut TissueState,
+    grip: &Grip,
+    slack: f32,
+    report: &mut StepReport,
+) -> f32 {
+    let mut residual = f32::INFINITY;
+    for number in 0..MAX_PROJECTIONS {
+        let mut pass = Pass::new(model, state, [0; 3], slack);
+        pass.project(number.is_multiple_of(2));
+        held::put(model, pass.state, grip);
+        residual = pass.check_all::<K>();
+        report.passes += 1;
+        report.solve = report.solve.max(Solve::Projections);
+        if residual <= model.limits().tolerance {
+            break;
+        }
+    }
+    residual
 }

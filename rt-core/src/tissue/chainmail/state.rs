@@ -27,6 +27,19 @@ pub struct TissueState {
     pub(crate) max_displacement: f32,
     /// Largest violation of a link that is not active, at most, in elements.
     pub(crate) settled: f32,
+    /// What the last step left violated, in elements; infinite where nobody knows.
+    pub(super) residual: f32,
+    trial: Trial,
+}
+
+/// What a step that may be undone found: runs that moved, as they were.
+#[derive(Clone, Debug)]
+struct Trial {
+    is_under_way: bool,
+    before: [Vec<f32>; 3],
+    active: Active,
+    was_active: bool,
+    settled: f32,
 }
 
 /// Scale below which displacements are written anew: f32 squares still have room on both sides.
@@ -55,6 +68,20 @@ impl TissueState {
             plane_square: zeros(planes),
             max_displacement: 0.0,
             settled: 0.0,
+            residual: 0.0,
+            trial: Trial {
+                is_under_way: false,
+                before: std::array::from_fn(|_| {
+                    zeros(if model.classes.any_fixed() {
+                        model.element_count()
+                    } else {
+                        0
+                    })
+                }),
+                active: none(),
+                was_active: false,
+                settled: 0.0,
+            },
         }
     }
 
@@ -91,13 +118,13 @@ impl TissueState {
         self.run_square.fill(0.0);
         self.plane_square.fill(0.0);
         self.active.clear(&model.rows, model.lattice.dims[1]);
-        (self.scale, self.max_displacement, self.settled) = (1.0, 0.0, 0.0);
+        (self.scale, self.max_displacement, self.settled, self.residual) = (1.0, 0.0, 0.0, 0.0);
     }
 
     /// Has the next step look at every link, as it must when the limits are new.
     pub fn disturb(&mut self, model: &ChainMail) {
         self.active.add_all(&model.rows, model.lattice.dims[1]);
-        self.settled = 0.0;
+        (self.settled, self.residual) = (0.0, f32::INFINITY);
     }
 
     /// Becomes `other`, a state of the same model, without allocating.
@@ -117,11 +144,62 @@ impl TissueState {
         self.scale = other.scale;
         self.max_displacement = other.max_displacement;
         self.settled = other.settled;
+        self.residual = other.residual;
+    }
+
+    /// From here on, what moves can be undone; nothing may have moved in this step.
+    pub(super) fn begin_trial(&mut self) {
+        self.trial.is_under_way = true;
+        self.trial.settled = self.settled;
+        // Most often there is nothing to copy.
+        if !self.active.is_empty() {
+            self.trial.active.copy_from(&self.active);
+        }
+        self.trial.was_active = !self.active.is_empty();
+    }
+
+    pub(super) fn end_trial(&mut self) {
+        self.trial.is_under_way = false;
+    }
+
+    /// To be called before anything in a run moves.
+    #[inline(always)]
+    pub(super) fn keep(&mut self, model: &ChainMail, run: usize) {
+        if self.trial.is_under_way && self.moved.of_run(run).is_empty() {
+            let run = model.rows.runs[run];
+            let elements = run.first as usize..run.end() as usize;
+            for (before, now) in self.trial.before.iter_mut().zip(&self.u) {
+                before[elements.clone()].copy_from_slice(&now[elements.clone()]);
+            }
+        }
+    }
+
+    /// Back to the begin of the trial.
+    pub(super) fn undo(&mut self, model: &ChainMail) {
+        let ny = model.lattice.dims[1];
+        let (u, before, moved) = (&mut self.u, &self.trial.before, &self.moved);
+        moved.for_each_row(|j, k| {
+            for run in model.rows.numbers(j + ny * k) {
+                if !moved.of_run(run).is_empty() {
+                    let elements = model.rows.runs[run].first as usize..model.rows.runs[run].end() as usize;
+                    for (now, before) in u.iter_mut().zip(before) {
+                        now[elements.clone()].copy_from_slice(&before[elements.clone()]);
+                    }
+                }
+            }
+        });
+        self.moved.clear(&model.rows, ny);
+        self.active.clear(&model.rows, ny);
+        if self.trial.was_active {
+            self.active.copy_from(&self.trial.active);
+        }
+        self.settled = self.trial.settled;
     }
 
     /// Memory that the state takes.
     pub fn bytes(&self) -> usize {
         let floats = self.u.iter().map(Vec::len).sum::<usize>() + self.run_square.len() + self.plane_square.len();
+        let floats = floats + self.trial.before.iter().map(Vec::len).sum::<usize>();
         let stretches = self.late.iter().map(Vec::len).sum::<usize>();
         let active = [&self.active, &self.next, &self.moved].map(Active::bytes);
         size_of::<f32>() * floats + size_of::<Stretch>() * stretches + active.iter().sum::<usize>()

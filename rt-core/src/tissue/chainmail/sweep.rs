@@ -174,13 +174,13 @@ impl<'a> Pass<'a> {
         };
         let (lo, hi) = ((span.lo + links.start) as usize, (span.hi + links.start) as usize);
         let n = links.len() as usize;
+        let run = if moves_hi { span.hi_run } else { span.lo_run } as usize;
+        self.state.keep(self.model, run);
         let mut u = kernels::ordered(axis, self.state.u.each_mut().map(Vec::as_mut_slice));
-        let (moved, run) = if moves_hi {
-            let moved = K::clamp::<UPPER>(&l, &mut u, lo, hi, n);
-            (moved.from(hi as u32), span.hi_run as usize)
+        let moved = if moves_hi {
+            K::clamp::<UPPER>(&l, &mut u, lo, hi, n).from(hi as u32)
         } else {
-            let moved = K::clamp::<LOWER>(&l, &mut u, hi, lo, n);
-            (moved.from(lo as u32), span.lo_run as usize)
+            K::clamp::<LOWER>(&l, &mut u, hi, lo, n).from(lo as u32)
         };
         if moved.is_empty() {
             return;
@@ -201,6 +201,7 @@ impl<'a> Pass<'a> {
     /// Moves the elements of a run outward from the held column; says which moved.
     #[inline(always)]
     fn along_x<K: Kernels>(&mut self, run: usize, row: usize) -> Stretch {
+        self.state.keep(self.model, run);
         let of_run = self.model.rows.runs[run];
         let first = of_run.first as usize;
         let held_i = (self.held_cell[0] as u32).clamp(of_run.start_i, of_run.start_i + of_run.len - 1);
