@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 use stylet_tests::hand::Insertion;
-use stylet_tests::{Core, Display, program, scratch, until};
+use stylet_tests::window_process::Window;
+use stylet_tests::{Core, program, scratch, until};
 
 /// Of the recording; `STYLET_RECORD_S` makes it longer for a figure.
 fn seconds() -> f64 {
@@ -27,30 +28,6 @@ fn text(output: &Output) -> String {
         String::from_utf8_lossy(&output.stdout),
         String::from_utf8_lossy(&output.stderr)
     )
-}
-
-/// A real window, on a display without a screen.
-struct Window(Child, #[allow(dead_code)] Display);
-
-impl Window {
-    fn open(core: &Core) -> Self {
-        let display = Display::open();
-        let child = Command::new(program("host-ui"))
-            .args(["--instance", core.instance.name()])
-            .env("DISPLAY", display.name())
-            .env_remove("WAYLAND_DISPLAY")
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn();
-        Self(child.expect("host-ui starts"), display)
-    }
-}
-
-impl Drop for Window {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
 }
 
 /// The MCAP project's own reader for Python, in a virtual environment that is made once.

@@ -2,41 +2,14 @@
 
 use host_ui::link::LinkStatus;
 use host_ui::workflow::{default_plan, move_values, plan_values};
-use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 use stylet_shm_schema::{CommandKind, Phase, TickRecord};
-use stylet_tests::{Core, Display, ask, program, until};
+use stylet_tests::window_process::Window;
+use stylet_tests::{Core, Display, ask, until};
 
 /// How long each window lives.
 const WINDOW_LIFE: Duration = Duration::from_millis(2500);
 const WINDOWS: u32 = 3;
-
-/// A window on a display of its own; killed with SIGKILL when dropped.
-struct Window(Child);
-
-impl Window {
-    fn open(display: &Display, core: &Core) -> Self {
-        let child = Command::new(program("host-ui"))
-            .args(["--instance", core.instance.name()])
-            .env("DISPLAY", display.name())
-            .env_remove("WAYLAND_DISPLAY")
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn();
-        Self(child.expect("host-ui starts"))
-    }
-
-    fn is_running(&mut self) -> bool {
-        matches!(self.0.try_wait(), Ok(None))
-    }
-}
-
-impl Drop for Window {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
 
 /// Records of one slow insertion with a window open; with `kill` it is killed and opened anew on the way.
 fn insertion(display: &Display, kill: bool) -> Vec<TickRecord> {
@@ -62,7 +35,7 @@ fn insertion(display: &Display, kill: bool) -> Vec<TickRecord> {
     .expect("moved");
 
     let mut records = Vec::new();
-    let mut window = Window::open(display, &core);
+    let mut window = Window::open_on(display, &core);
     for _ in 0..WINDOWS {
         until(WINDOW_LIFE, || {
             link.poll();
@@ -72,7 +45,7 @@ fn insertion(display: &Display, kill: bool) -> Vec<TickRecord> {
         assert!(window.is_running(), "the window ended by itself");
         if kill {
             drop(window);
-            window = Window::open(display, &core);
+            window = Window::open_on(display, &core);
         }
     }
     // A host that comes now sees the insertion that is under way.

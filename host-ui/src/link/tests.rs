@@ -4,8 +4,24 @@ use super::*;
 use bytemuck::Zeroable;
 use stylet_shm_schema::service;
 
-fn instance(name: &str) -> Instance {
-    Instance::new(&format!("{name}-{}", std::process::id())).unwrap()
+/// A name that leaves nothing in shared memory; to be dropped last.
+struct Swept(Instance);
+
+impl std::ops::Deref for Swept {
+    type Target = Instance;
+    fn deref(&self) -> &Instance {
+        &self.0
+    }
+}
+
+impl Drop for Swept {
+    fn drop(&mut self) {
+        self.0.sweep();
+    }
+}
+
+fn instance(name: &str) -> Swept {
+    Swept(Instance::new(&format!("{name}-{}", std::process::id())).unwrap())
 }
 
 fn announce(id: u64, time_ns: u64) -> Session {
@@ -17,7 +33,8 @@ fn announce(id: u64, time_ns: u64) -> Session {
 
 #[test]
 fn no_core_says_what_to_type() {
-    let mut link = Link::new(instance("absent"));
+    let instance = instance("absent");
+    let mut link = Link::new(instance.0.clone());
     link.poll();
     let LinkStatus::Absent { why } = link.status() else {
         panic!("{:?}", link.status())
@@ -29,7 +46,7 @@ fn no_core_says_what_to_type() {
 #[test]
 fn a_restarted_core_is_found_and_nothing_of_the_first_run_is_left() {
     let instance = instance("restart");
-    let mut link = Link::new(instance.clone());
+    let mut link = Link::new(instance.0.clone());
     link.poll();
     for run in 1..=3_u64 {
         let node = instance.node().unwrap();
@@ -67,7 +84,7 @@ fn a_restarted_core_is_found_and_nothing_of_the_first_run_is_left() {
 #[test]
 fn rubbish_is_counted_and_not_used() {
     let instance = instance("rubbish");
-    let mut link = Link::new(instance.clone());
+    let mut link = Link::new(instance.0.clone());
     link.poll();
     let node = instance.node().unwrap();
     let sessions = service::session(&node).unwrap().publisher_builder().create().unwrap();
@@ -88,7 +105,7 @@ fn rubbish_is_counted_and_not_used() {
 #[test]
 fn a_command_and_a_volume_arrive_and_are_answered_once() {
     let instance = instance("answer");
-    let mut link = Link::new(instance.clone());
+    let mut link = Link::new(instance.0.clone());
     link.poll();
     let node = instance.node().unwrap();
     let sessions = service::session(&node).unwrap().publisher_builder().create().unwrap();

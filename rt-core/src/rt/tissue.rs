@@ -402,6 +402,7 @@ impl TissueLoop {
     fn respond(&mut self, woke_ns: u64, report: &StepReport) {
         let (contact, held) = (self.contact, self.held.is_some());
         let local = self.local_response(report);
+        let may_be_felt = self.world.tissue.may_be_felt(report);
         let response = &mut self.response;
         response.tick += 1;
         response.time_ns = woke_ns;
@@ -413,7 +414,7 @@ impl TissueLoop {
         response.local = local;
         response.worst_residual = response.worst_residual.max(report.residual);
         // Limits tightened over tissue that nothing holds are met as it recovers; no force depends on it.
-        response.unsolved = !report.converged && held;
+        response.unsolved = !may_be_felt && held;
         self.ports.response.write(*response);
     }
 

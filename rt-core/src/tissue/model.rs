@@ -89,6 +89,11 @@ pub trait TissueModel: Send {
     /// Advances by `dt_s` with `held` in place; a `dt_s` that is not above zero recovers nothing.
     fn step(&mut self, held: Option<Held>, dt_s: f64) -> StepReport;
 
+    /// Whether forces may go by this step: one that has not converged is for no hand, but where a model says otherwise.
+    fn may_be_felt(&self, report: &StepReport) -> bool {
+        report.converged
+    }
+
     /// The body after the last step.
     fn deformed(&self) -> Deformed<'_>;
 

@@ -32,7 +32,12 @@ impl Kind {
 
     pub fn on(self, scene: &Scene, parameters: &TissueParameters) -> Box<dyn TissueModel> {
         match self {
-            Kind::Fem => Box::new(FemTissue::<f32>::new(scene).expect("the case gives valid materials")),
+            Kind::Fem => {
+                let mut fem = FemTissue::<f32>::new(scene).expect("the case gives valid materials");
+                // What the solver can do, not what it has time for in the loop.
+                fem.settings.max_cycles = 40;
+                Box::new(fem)
+            }
             Kind::ChainMail | Kind::Relaxed => Box::new(ChainMailTissue::new(scene, self.limits(parameters))),
         }
     }

@@ -92,7 +92,7 @@ impl<T: Real> FemState<T> {
             }
             residual = self.advance(model, n, alpha);
         }
-        self.finish(model, n);
+        self.finish(model, n, residual, target);
         used
     }
 
@@ -155,9 +155,16 @@ impl<T: Real> FemState<T> {
         advance_fields(level.simd, &level.grid, T::of(alpha), p, q, u, r).sqrt()
     }
 
-    /// The residual as it is, not as the recurrence has it, and the force that moves the patch.
-    fn finish(&mut self, model: &FemModel<T>, n: usize) {
+    /// The force that moves the patch, and the residual: as it is where `recurred` says that it is small enough, else as
+    /// the recurrence has it, which spares a sweep of all but the planes at the patch.
+    fn finish(&mut self, model: &FemModel<T>, n: usize, recurred: f64, target: f64) {
         let level = &model.levels[0];
+        let is_done = recurred <= target;
+        let all = 0..level.grid.nodes[2];
+        let planes = match self.patch {
+            Some(cells) if !is_done => cells[2][0].saturating_sub(1)..(cells[2][1] + 2).min(all.end),
+            _ => all,
+        };
         let multigrid = &mut self.multigrid;
         let mut op = Answer {
             forces: &mut self.q,
@@ -169,10 +176,10 @@ impl<T: Real> FemState<T> {
             level,
             &mut response.u,
             &mut multigrid.work,
-            0..level.grid.nodes[2],
+            planes,
             &mut op,
         );
-        response.residual = op.square.sqrt();
+        response.residual = if is_done { op.square.sqrt() } else { recurred };
         let patch = &self.patch_nodes[..self.held];
         response.force_n_per_m = [0, 1, 2].map(|c| patch.iter().map(|&node| self.q[c][node as usize].to_f64()).sum());
     }

@@ -7,6 +7,7 @@ use super::material::{FemProblem, FemSettings, Structure, problems_of};
 use super::real::Real;
 use super::sweep::Planes;
 use crate::scene::Lattice;
+use std::sync::Arc;
 
 /// Below so many free nodes the coarsest level is solved directly.
 const DIRECT_NODES: usize = 30;
@@ -24,7 +25,7 @@ pub(super) struct CellRun {
 /// Topology, materials and all levels of the multigrid, in `f32` or `f64`.
 #[derive(Clone, Debug)]
 pub struct FemModel<T = f32> {
-    pub(super) lattice: Lattice,
+    pub(super) lattice: Arc<Lattice>,
     /// Finest first.
     pub(super) levels: Vec<Level<T>>,
     /// Lattice cell at the lowest corner of the finest grid.
@@ -39,13 +40,13 @@ pub struct FemModel<T = f32> {
 
 impl<T: Real> FemModel<T> {
     /// The body of a lattice, or every problem with the settings.
-    pub fn new(lattice: &Lattice, settings: &FemSettings) -> Result<Self, Vec<FemProblem>> {
+    pub fn new(lattice: &Arc<Lattice>, settings: &FemSettings) -> Result<Self, Vec<FemProblem>> {
         Self::with_fixed_nodes(lattice, settings, |_| false)
     }
 
     /// The same with more fixed nodes: those for whose place in the scene frame (m) `is_fixed` holds.
     pub fn with_fixed_nodes(
-        lattice: &Lattice,
+        lattice: &Arc<Lattice>,
         settings: &FemSettings,
         is_fixed: impl Fn([f64; 3]) -> bool,
     ) -> Result<Self, Vec<FemProblem>> {

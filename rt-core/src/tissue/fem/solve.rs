@@ -10,6 +10,9 @@ use crate::tissue::HeldOutcome;
 pub const REACH: f64 = 2048.0;
 /// A direction is new if this part of the displacement is outside those known.
 const NEW_DIRECTION: f64 = 1e-6;
+/// A patch is the next one up to so many cells away, and pushed the same way up to an angle of this cosine.
+const NEXT_PATCH: isize = 2;
+const SAME_WAY: f64 = 0.9;
 
 /// A cube of tissue around an element that moves as one piece with the needle's tip: a single node would be ill-posed,
 /// as its force goes to zero with the lattice's spacing.
@@ -172,15 +175,39 @@ fn refine<T: Real>(model: &FemModel<T>, state: &mut FemState<T>, settings: &Solv
     }
 }
 
+/// From one patch to the next of the same size: by how many nodes, and how far the first one was from rest. Nothing
+/// where they are far apart, or pushed in different directions.
+fn moved_along(
+    before: [[usize; 2]; 3],
+    now: [[usize; 2]; 3],
+    at_m: [f64; 3],
+    direction: [f64; 3],
+) -> Option<([isize; 3], f64)> {
+    let distance = at_m.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let along = (0..3).map(|a| at_m[a] * direction[a]).sum::<f64>();
+    let by = [0, 1, 2].map(|a| now[a][0] as isize - before[a][0] as isize);
+    let same_size = (0..3).all(|a| now[a][1] - now[a][0] == before[a][1] - before[a][0]);
+    let near = by.iter().all(|n| n.abs() <= NEXT_PATCH);
+    (same_size && near && distance > 0.0 && along > SAME_WAY * distance).then_some((by, distance))
+}
+
 impl<T: Real> FemState<T> {
-    /// Takes up another patch: the present displacement becomes the first guess of the response along `direction`.
+    /// Takes up another patch: the present displacement becomes the first guess of the response along `direction`,
+    /// moved along where the patch is the next one: deep inside a body that would be the answer.
     ///
     /// False if no node in `cells` can move.
     fn take_up(&mut self, model: &FemModel<T>, cells: [[usize; 2]; 3], direction: [f64; 3], distance: f64) -> bool {
+        let before = self.patch.map(|patch| (patch, self.held_at_m()));
         if !self.find_nodes(model, cells) {
             return false;
         }
-        self.collapse(1.0 / distance);
+        match before.and_then(|(patch, at_m)| moved_along(patch, cells, at_m, direction)) {
+            Some((by, distance)) => {
+                self.collapse(1.0 / distance);
+                self.shift(model, by);
+            }
+            None => self.collapse(1.0 / distance),
+        }
         let held = &self.patch_nodes[..self.held];
         self.multigrid.hold(&model.levels, held);
         for nodes in &model.loose {
@@ -244,6 +271,44 @@ impl<T: Real> FemState<T> {
             let weight = T::of(other.weight_m * scale);
             for (u, v) in first.u.iter_mut().zip(&other.u) {
                 u.iter_mut().zip(v).for_each(|(u, &v)| *u += weight * v);
+            }
+        }
+    }
+
+    /// How far the patch is from rest.
+    fn held_at_m(&self) -> [f64; 3] {
+        let used = &self.responses[..self.count];
+        [0, 1, 2].map(|a| used.iter().map(|r| r.weight_m * r.direction[a]).sum())
+    }
+
+    /// Response 0 moved by so many nodes along each axis; nodes that would take theirs from outside the body keep it.
+    fn shift(&mut self, model: &FemModel<T>, by: [isize; 3]) {
+        let level = &model.levels[0];
+        let [nx, ny, nz] = level.grid.nodes;
+        let is_node = |place: [usize; 3]| level.inverse_diagonal[level.grid.index(place)] != T::ZERO;
+        let from = |place: [usize; 3]| {
+            let mut from = [0; 3];
+            for a in 0..3 {
+                from[a] = place[a]
+                    .checked_add_signed(-by[a])
+                    .filter(|&n| n < level.grid.nodes[a])?;
+            }
+            is_node(from).then(|| level.grid.index(from))
+        };
+        let u = &mut self.responses[0].u;
+        for (u, moved) in u.iter_mut().zip(&mut self.p) {
+            for k in 0..nz {
+                for j in 0..ny {
+                    for i in (0..nx).filter(|&i| is_node([i, j, k])) {
+                        let here = level.grid.index([i, j, k]);
+                        moved[here] = u[from([i, j, k]).unwrap_or(here)];
+                    }
+                }
+            }
+            for at in level.grid.node_spans() {
+                for here in at.filter(|&here| level.inverse_diagonal[here] != T::ZERO) {
+                    u[here] = moved[here];
+                }
             }
         }
     }

@@ -11,6 +11,11 @@ use crate::tissue::{Deformed, Held, Limits, Solve, StepReport, TissueModel};
 /// What surrounds a body: 20 mm of fat of 5 kPa, per surface area (assumed).
 pub const SURROUNDINGS_PA_PER_M: f64 = 5e3 / 20e-3;
 
+/// Cycles in one tick: as many as 5 ms have room for on the paper's gland. What is left is done in the ticks after.
+pub const LIVE_CYCLES: u32 = 2;
+/// Residual force, over the tip's, up to which an answer that is still being refined may be felt.
+const FELT: f64 = 0.2;
+
 /// Linear elasticity, quasi-static, on a scene's lattice.
 #[derive(Clone)]
 pub struct FemTissue<T = f32> {
@@ -41,7 +46,7 @@ impl<T: Real> FemTissue<T> {
             model,
             settings: SolveSettings {
                 relative_tolerance: 1e-3,
-                max_cycles: 40,
+                max_cycles: LIVE_CYCLES,
             },
         })
     }
@@ -71,6 +76,10 @@ impl<T: Real> TissueModel for FemTissue<T> {
             // The tissue pushes the tip with the opposite of what moves the patch.
             tip_force_n: Some(report.tip_force_n.map(|f| -f)),
         }
+    }
+
+    fn may_be_felt(&self, report: &StepReport) -> bool {
+        report.residual <= FELT && report.max_displacement.is_finite()
     }
 
     fn deformed(&self) -> Deformed<'_> {
