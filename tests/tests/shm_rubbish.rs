@@ -107,6 +107,9 @@ fn core_refuses_rubbish_from_hosts_and_runs_on() {
     ask(&mut link, CommandKind::Engage, &[]).expect("a good command is still carried out");
 }
 
+/// More than 10,000 values of each kind of message.
+const ROUNDS_OF_RUBBISH: usize = 50;
+
 #[test]
 fn host_refuses_rubbish_from_a_core_and_goes_on() {
     let instance = fresh_instance();
@@ -146,36 +149,47 @@ fn host_refuses_rubbish_from_a_core_and_goes_on() {
     let mut good = Session::zeroed();
     (good.session_id, good.schema_version) = (session_id, SCHEMA_VERSION);
     let states = rubbish::<HapticState>();
-    for (i, state) in states.iter().enumerate() {
+    let (bad_events, bad_parameters, bad_plans) = (
+        rubbish::<Event>(),
+        rubbish::<ParametersInForce>(),
+        rubbish::<PlanInForce>(),
+    );
+    let (bad_replies, bad_records) = (rubbish::<Reply>(), rubbish::<TickRecord>());
+    let (bad_snapshots, bad_vertices, bad_scenes) = (
+        rubbish::<SnapshotHeader>(),
+        rubbish::<Vertex>(),
+        rubbish::<SceneHeader>(),
+    );
+    let mut sent = 0;
+    for i in (0..states.len()).cycle().take(ROUNDS_OF_RUBBISH * states.len()) {
         good.time_ns += 1;
         sessions.send_copy(good).expect("sent");
-        entry.update_with_copy(*state);
-        events.send_copy(rubbish::<Event>()[i]).expect("sent");
-        parameters.send_copy(rubbish::<ParametersInForce>()[i]).expect("sent");
-        plans.send_copy(rubbish::<PlanInForce>()[i]).expect("sent");
-        replies.send_copy(rubbish::<Reply>()[i]).expect("sent");
+        entry.update_with_copy(states[i]);
+        events.send_copy(bad_events[i]).expect("sent");
+        parameters.send_copy(bad_parameters[i]).expect("sent");
+        plans.send_copy(bad_plans[i]).expect("sent");
+        replies.send_copy(bad_replies[i]).expect("sent");
         let mut sample = records.loan_slice_uninit(4).expect("loaned");
         *sample.user_header_mut() = session_id;
-        sample
-            .write_from_fn(|_| rubbish::<TickRecord>()[i])
-            .send()
-            .expect("sent");
+        sample.write_from_fn(|_| bad_records[i]).send().expect("sent");
         let mut sample = snapshots.loan_slice_uninit(8).expect("loaned");
-        *sample.user_header_mut() = rubbish::<SnapshotHeader>()[i];
-        sample.write_from_fn(|_| rubbish::<Vertex>()[i]).send().expect("sent");
+        *sample.user_header_mut() = bad_snapshots[i];
+        sample.write_from_fn(|_| bad_vertices[i]).send().expect("sent");
         let mut sample = scenes.loan_slice_uninit(9).expect("loaned");
-        *sample.user_header_mut() = rubbish::<SceneHeader>()[i];
+        *sample.user_header_mut() = bad_scenes[i];
         sample.write_from_fn(|_| u32::MAX).send().expect("sent");
+        sent += 8;
         link.poll();
         link.take_records();
     }
+    println!("{sent} messages of rubbish, {} values refused", link.rubbish_refused());
     // And rubbish that says it is a session of its own.
     for session in rubbish::<Session>() {
         sessions.send_copy(session).expect("sent");
         link.poll();
     }
     assert!(
-        link.rubbish_refused() > 200,
+        link.rubbish_refused() > 10_000,
         "{} values were refused",
         link.rubbish_refused()
     );
