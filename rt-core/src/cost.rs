@@ -3,9 +3,9 @@
 //! An insertion at clinical speed is played to the parts in turn, round by round, so that a noisy machine disturbs all alike.
 
 use crate::scene::{Scene, Structure};
-use crate::tissue::{ChainMailTissue, FemTissue, Held, MaterialPoint, TissueModel, TissueParameters};
+use crate::tissue::{ChainMailTissue, FemTissue, Held, MaterialPoint, TissueKind, TissueModel, TissueParameters};
 use std::fmt::Write as _;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Tissue ticks of one insertion: 50 mm/s at 200 Hz over 40 mm and back.
 const TICKS: usize = 320;
@@ -18,10 +18,14 @@ const SEEDS: usize = 100;
 /// Iterations of relaxation whose cost is shown.
 const RELAXATION: u32 = 8;
 
-/// Microseconds of every tick of one part.
+/// A part that takes longer than this in one round is measured over its first ticks only, and the table says so.
+const ROUND_LIMIT: Duration = Duration::from_secs(5);
+
+/// Microseconds of every tick of one part, in each round; at last the least of each tick, in order.
 struct Part {
     name: String,
     period_us: f64,
+    rounds: Vec<Vec<f64>>,
     micros: Vec<f64>,
 }
 
@@ -67,7 +71,7 @@ pub fn table(scene: &Scene) -> Result<String, String> {
 
 fn measure(scene: &Scene) -> Result<Vec<Part>, String> {
     let mut models = models(scene)?;
-    let mut parts: Vec<Part> = models.iter().map(|(name, _)| part(name, TICK_S)).collect();
+    let mut parts: Vec<Part> = models.iter().map(|timed| part(&timed.name, TICK_S)).collect();
     let others = [
         "find the element at the tip",
         "poses of 100 seeds",
@@ -75,15 +79,21 @@ fn measure(scene: &Scene) -> Result<Vec<Part>, String> {
     ];
     parts.extend(others.map(|name| part(name, TICK_S)));
     let script = Script::through(scene);
-    for _ in 0..ROUNDS {
-        for ((_, model), part) in models.iter_mut().zip(&mut parts) {
-            play(&mut **model, &script, &mut part.micros, |_, _| ());
+    for round in 1..=ROUNDS {
+        for (timed, part) in models.iter_mut().zip(&mut parts) {
+            eprintln!("round {round} of {ROUNDS}: {}", part.name.trim_start());
+            part.rounds.push(Vec::new());
+            play(timed, &script, &mut part.rounds[round - 1], |_, _| ());
         }
         let first = parts.len() - others.len();
         let [locate, seeds, surface] = &mut parts[first..] else {
             unreachable!("three were added")
         };
-        read_body(scene, &mut *models[0].1, &script, [locate, seeds, surface]);
+        let mut micros = [const { Vec::new() }; 3];
+        read_body(scene, &mut models[0], &script, &mut micros);
+        for (part, micros) in [locate, seeds, surface].into_iter().zip(micros) {
+            part.rounds.push(micros);
+        }
     }
     for part in &mut parts {
         keep_least(part);
@@ -95,59 +105,66 @@ fn part(name: &str, period_s: f64) -> Part {
     Part {
         name: name.to_owned(),
         period_us: period_s * 1e6,
+        rounds: Vec::new(),
         micros: Vec::new(),
     }
 }
 
 /// Of equal rounds, the least time of each tick; then in order.
 fn keep_least(part: &mut Part) {
-    let ticks = part.micros.len() / ROUNDS;
-    let least = |tick: usize| {
-        part.micros
-            .iter()
-            .skip(tick)
-            .step_by(ticks)
-            .copied()
-            .fold(f64::INFINITY, f64::min)
-    };
-    let mut micros: Vec<f64> = (0..ticks).map(least).collect();
-    micros.sort_by(f64::total_cmp);
-    part.micros = micros;
+    let ticks = part.rounds.iter().map(Vec::len).min().unwrap_or(0);
+    let least = |tick: usize| part.rounds.iter().map(|r| r[tick]).fold(f64::INFINITY, f64::min);
+    part.micros = (0..ticks).map(least).collect();
+    part.micros.sort_by(f64::total_cmp);
+    if ticks < TICKS {
+        part.name = format!("{} [{ticks} ticks]", part.name);
+    }
+}
+
+/// A tissue model, and the patch that moves with the tip in it.
+struct Timed {
+    name: String,
+    model: Box<dyn TissueModel>,
+    patch_m: f64,
 }
 
 /// The scene as it is, and what single parts of it add.
-fn models(scene: &Scene) -> Result<Vec<(String, Box<dyn TissueModel>)>, String> {
-    let chainmail = |scene: &Scene, parameters: &TissueParameters| -> Result<Box<dyn TissueModel>, String> {
+fn models(scene: &Scene) -> Result<Vec<Timed>, String> {
+    let chainmail = |name: String, scene: &Scene, parameters: &TissueParameters| -> Result<Timed, String> {
         let limits = parameters
             .validate()
             .map_err(|p| p.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
-        Ok(Box::new(ChainMailTissue::new(scene, limits)))
+        Ok(Timed {
+            name,
+            model: Box::new(ChainMailTissue::new(scene, limits)),
+            patch_m: TissueKind::ChainMail.tip_patch_m(),
+        })
     };
     let plain = TissueParameters::default();
-    let mut models = vec![("tissue step, as the scene is".to_owned(), chainmail(scene, &plain)?)];
+    let mut models = vec![chainmail("tissue step, as the scene is".to_owned(), scene, &plain)?];
     if scene.structures.len() > 1 {
         let one = Scene {
             structures: vec![Structure::soft("tissue", 1)],
             lattice: scene.lattice.homogeneous().into(),
             ..scene.clone()
         };
-        models.push((
-            "  the same as one homogeneous structure".to_owned(),
-            chainmail(&one, &plain)?,
-        ));
+        let name = "  the same as one homogeneous structure".to_owned();
+        models.push(chainmail(name, &one, &plain)?);
     }
     let relaxed = TissueParameters {
         relaxation_iterations: RELAXATION,
         ..plain
     };
-    models.push((
-        format!("  with relaxation, {RELAXATION} iterations (off by default)"),
-        chainmail(scene, &relaxed)?,
-    ));
+    let name = format!("  with relaxation, {RELAXATION} iterations (off by default)");
+    models.push(chainmail(name, scene, &relaxed)?);
     if scene.lattice.element_count() <= FEM_ELEMENTS {
         let fem = FemTissue::<f32>::new(scene)
             .map_err(|p| p.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
-        models.push(("  FEM in its place (--tissue fem)".to_owned(), Box::new(fem)));
+        models.push(Timed {
+            name: "  FEM in its place (--tissue fem)".to_owned(),
+            model: Box::new(fem),
+            patch_m: TissueKind::Fem.tip_patch_m(),
+        });
     }
     Ok(models)
 }
@@ -180,11 +197,12 @@ impl Script {
 
 /// As the loop does: the first element is held until the membrane gives, then the one at the tip.
 fn play(
-    model: &mut dyn TissueModel,
+    Timed { model, patch_m, .. }: &mut Timed,
     script: &Script,
     micros: &mut Vec<f64>,
     mut look: impl FnMut(&dyn TissueModel, [f64; 3]),
 ) {
+    let begun = Instant::now();
     model.return_to_rest();
     let mut held = script.first;
     let mut grip_m = model.deformed().position_m(held);
@@ -203,19 +221,20 @@ fn play(
         let now = Held {
             element: held,
             position_m: grip_m,
-            patch_m: TIP_PATCH_M,
+            patch_m: *patch_m,
         };
         let start = Instant::now();
         std::hint::black_box(model.step(Some(now), TICK_S));
         micros.push(start.elapsed().as_secs_f64() * 1e6);
-        look(model, tip);
+        look(&**model, tip);
+        if begun.elapsed() > ROUND_LIMIT {
+            return;
+        }
     }
 }
 
-const TIP_PATCH_M: f64 = 0.0;
-
 /// What the loop reads from the body after each step.
-fn read_body(scene: &Scene, model: &mut dyn TissueModel, script: &Script, [locate, seeds, surface]: [&mut Part; 3]) {
+fn read_body(scene: &Scene, timed: &mut Timed, script: &Script, [locate, seeds, surface]: &mut [Vec<f64>; 3]) {
     let n = scene.lattice.element_count();
     let points: Vec<MaterialPoint> = (0..SEEDS)
         .map(|s| MaterialPoint {
@@ -225,12 +244,12 @@ fn read_body(scene: &Scene, model: &mut dyn TissueModel, script: &Script, [locat
         .collect();
     let mut positions_m = vec![[0.0_f32; 3]; scene.surface.vertex_elements.len()];
     let mut hint = None;
-    play(model, script, &mut Vec::new(), |model, tip| {
+    play(timed, script, &mut Vec::new(), |model, tip| {
         let body = model.deformed();
-        let timed = |part: &mut Part, work: &mut dyn FnMut()| {
+        let timed = |micros: &mut Vec<f64>, work: &mut dyn FnMut()| {
             let start = Instant::now();
             work();
-            part.micros.push(start.elapsed().as_secs_f64() * 1e6);
+            micros.push(start.elapsed().as_secs_f64() * 1e6);
         };
         timed(locate, &mut || {
             hint = std::hint::black_box(MaterialPoint::locate(&body, tip, hint)).map(|p| p.element);

@@ -172,13 +172,7 @@ impl<T: Real> FemState<T> {
             square: 0.0,
         };
         let response = &mut self.responses[n];
-        sweep(
-            level,
-            &mut response.u,
-            &mut multigrid.work,
-            planes,
-            &mut op,
-        );
+        sweep(level, &mut response.u, &mut multigrid.work, planes, &mut op);
         response.residual = if is_done { op.square.sqrt() } else { recurred };
         let patch = &self.patch_nodes[..self.held];
         response.force_n_per_m = [0, 1, 2].map(|c| patch.iter().map(|&node| self.q[c][node as usize].to_f64()).sum());
