@@ -1,7 +1,8 @@
 //! A segmented volume as the core takes it: cubic elements on the lattice of the scene frame.
 
-use super::affine::VoxelFrame;
+use super::frame::VoxelFrame;
 use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
 
 /// Room around the tissue.
 const MARGIN_M: f64 = 0.020;
@@ -26,10 +27,13 @@ pub struct LabelVolume {
 }
 
 /// The voxels of a file as they lie in it, x fastest.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Voxels {
     pub dims: [usize; 3],
     pub labels: Vec<u8>,
     pub frame: VoxelFrame,
+    /// What the file calls its labels, where it says so.
+    pub names: BTreeMap<u8, String>,
 }
 
 /// First and last tissue voxel along each axis.
