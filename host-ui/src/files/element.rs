@@ -45,7 +45,10 @@ impl Element {
         let n = bytes.len();
         match endian {
             Endian::Little => b[..n].copy_from_slice(bytes),
-            Endian::Big => b[..n].iter_mut().zip(bytes.iter().rev()).for_each(|(to, from)| *to = *from),
+            Endian::Big => b[..n]
+                .iter_mut()
+                .zip(bytes.iter().rev())
+                .for_each(|(to, from)| *to = *from),
         }
         let [b0, b1, b2, b3, ..] = b;
         match self {
@@ -119,11 +122,15 @@ pub fn read_labels(
 /// As [`read_labels`], from numbers written out.
 pub fn labels_from_text(text: &[u8], count: usize) -> Result<Vec<u8>, String> {
     let text = std::str::from_utf8(text).map_err(|_| "its numbers are not text".to_owned())?;
-    let words = text.split(|c: char| c.is_ascii_whitespace() || c == ',').filter(|w| !w.is_empty());
+    let words = text
+        .split(|c: char| c.is_ascii_whitespace() || c == ',')
+        .filter(|w| !w.is_empty());
     let mut labels = Vec::with_capacity(count.min(text.len()));
     for word in words {
         if labels.len() == count {
-            return Err(format!("it holds more than the {count} values of its size; export it again"));
+            return Err(format!(
+                "it holds more than the {count} values of its size; export it again"
+            ));
         }
         let value: f64 = word
             .parse()

@@ -102,7 +102,8 @@ fn frame(h: &Header) -> Result<VoxelFrame, String> {
         (None, Some(lettered)) => lettered,
         (None, None) => {
             warning = Some(
-                "the file says nothing of the patient's orientation; its axes are taken as left, posterior, superior".to_owned(),
+                "the file says nothing of the patient's orientation; its axes are taken as left, posterior, superior"
+                    .to_owned(),
             );
             Matrix3::identity()
         }
@@ -112,7 +113,9 @@ fn frame(h: &Header) -> Result<VoxelFrame, String> {
     let origin = ras_from_lps(Vector3::from(h.origin_mm) * 1e-3);
     let mut frame = VoxelFrame::new(turned, origin, "TransformMatrix and ElementSpacing")?;
     if h.directions.is_some() {
-        let off = h.directions.map_or(0.0, |d| (0..3).map(|a| (d.column(a).norm() - 1.0).abs()).fold(0.0, f64::max));
+        let off = h.directions.map_or(0.0, |d| {
+            (0..3).map(|a| (d.column(a).norm() - 1.0).abs()).fold(0.0, f64::max)
+        });
         if off > 1e-3 {
             return Err("its TransformMatrix scales as well as it turns; write it with unit vectors".to_owned());
         }

@@ -1,6 +1,7 @@
 //! Files that a user brings: label volumes of any format as the same voxels. Nothing that a header says is believed.
 
 mod affine;
+pub mod convert;
 pub mod element;
 pub mod error;
 mod frame;

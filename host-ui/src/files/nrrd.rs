@@ -50,7 +50,9 @@ fn read_data(h: &Header, data: &[u8], count: usize) -> Result<Vec<u8>, String> {
     let encoding = h.encoding.as_str();
     let endian = h.endian.unwrap_or(Endian::Little);
     if h.element.bytes() > 1 && h.endian.is_none() && ["raw", "gzip", "gz", "hex"].contains(&encoding) {
-        return Err("it does not say in which order the bytes of a number are: the field \"endian\" is missing".to_owned());
+        return Err(
+            "it does not say in which order the bytes of a number are: the field \"endian\" is missing".to_owned(),
+        );
     }
     let skipped = skip_lines(data, h.line_skip)?;
     let size = (count * h.element.bytes()) as u64;
@@ -126,7 +128,11 @@ fn skip_lines(mut data: &[u8], lines: usize) -> Result<&[u8], String> {
 
 fn unhex(text: &[u8]) -> Result<Vec<u8>, String> {
     let digit = |b: u8| (b as char).to_digit(16).map(|d| d as u8);
-    let digits: Option<Vec<u8>> = text.iter().filter(|b| !b.is_ascii_whitespace()).map(|&b| digit(b)).collect();
+    let digits: Option<Vec<u8>> = text
+        .iter()
+        .filter(|b| !b.is_ascii_whitespace())
+        .map(|&b| digit(b))
+        .collect();
     let digits = digits.ok_or("its data hold a character that is no hexadecimal digit")?;
     if digits.len() % 2 == 1 {
         return Err("its data hold half a byte too many".to_owned());
@@ -162,7 +168,12 @@ fn frame(h: &Header, space: [usize; 3]) -> Result<VoxelFrame, String> {
                 step[column] = *s;
                 step
             }
-            _ => return Err("it says nothing of the size of its voxels: neither \"space directions\" nor \"spacings\"".to_owned()),
+            _ => {
+                return Err(
+                    "it says nothing of the size of its voxels: neither \"space directions\" nor \"spacings\""
+                        .to_owned(),
+                );
+            }
         };
         columns.set_column(column, &step);
     }
@@ -187,9 +198,13 @@ fn element(name: &str) -> Option<Element> {
         "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => Element::U16,
         "int" | "signed int" | "int32" | "int32_t" => Element::I32,
         "uint" | "unsigned int" | "uint32" | "uint32_t" => Element::U32,
-        "longlong" | "long long" | "long long int" | "signed long long" | "signed long long int" | "int64" | "int64_t" => {
-            Element::I64
-        }
+        "longlong"
+        | "long long"
+        | "long long int"
+        | "signed long long"
+        | "signed long long int"
+        | "int64"
+        | "int64_t" => Element::I64,
         "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => Element::U64,
         "float" => Element::F32,
         "double" => Element::F64,

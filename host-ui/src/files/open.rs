@@ -38,7 +38,9 @@ pub fn voxels(bytes: &[u8], beside: super::Beside) -> Result<Voxels, String> {
     } else if metaimage::is_metaimage(bytes) {
         metaimage::read(bytes, beside)
     } else {
-        Err(format!("it is none of the formats that are read: {FORMATS}; export the segmentation as one of them"))
+        Err(format!(
+            "it is none of the formats that are read: {FORMATS}; export the segmentation as one of them"
+        ))
     }
 }
 

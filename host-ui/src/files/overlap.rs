@@ -26,12 +26,21 @@ pub fn smallest_wins(
             continue;
         };
         *label = smallest;
-        found.iter().filter(|&&l| l != smallest).for_each(|&l| taken[usize::from(l)] += 1);
+        found
+            .iter()
+            .filter(|&&l| l != smallest)
+            .for_each(|&l| taken[usize::from(l)] += 1);
     }
     let lost: Vec<String> = names
         .iter()
         .filter(|(label, _)| taken[usize::from(**label)] > 0)
-        .map(|(label, name)| format!("{name} ({} of {} voxels)", taken[usize::from(*label)], sizes[usize::from(*label)]))
+        .map(|(label, name)| {
+            format!(
+                "{name} ({} of {} voxels)",
+                taken[usize::from(*label)],
+                sizes[usize::from(*label)]
+            )
+        })
         .collect();
     let warning = (!lost.is_empty()).then(|| {
         format!(

@@ -37,7 +37,9 @@ impl Header {
                 Some(end) => (&rest[..end], &rest[end + 1..]),
                 None => (&rest[..rest.len().min(MAX_HEADER_BYTES)], &[][..]),
             };
-            let line = std::str::from_utf8(line).map_err(|_| "its header is not text; copy or export it again")?.trim();
+            let line = std::str::from_utf8(line)
+                .map_err(|_| "its header is not text; copy or export it again")?
+                .trim();
             let Some((key, value)) = line.split_once('=') else {
                 return Err(if line.is_empty() && after.is_empty() {
                     "it is cut off: its header has no ElementDataFile; copy or export it again".to_owned()
@@ -56,7 +58,9 @@ impl Header {
         let mut reader = Fields { fields, problems };
         let header = build(&mut reader);
         error::all(reader.problems)?;
-        header.map(|h| (h, rest)).ok_or_else(|| "its header is not complete".to_owned())
+        header
+            .map(|h| (h, rest))
+            .ok_or_else(|| "its header is not complete".to_owned())
     }
 }
 
@@ -71,8 +75,11 @@ impl<'a> Fields<'a> {
     }
 
     fn wrong(&mut self, names: &[&str], expected: &str) {
-        let value = self.get(names).map_or("missing".to_owned(), |v| format!("\"{}\"", short(v)));
-        self.problems.push(format!("{} is {value}; it must be {expected}", names[0]));
+        let value = self
+            .get(names)
+            .map_or("missing".to_owned(), |v| format!("\"{}\"", short(v)));
+        self.problems
+            .push(format!("{} is {value}; it must be {expected}", names[0]));
     }
 
     fn yes(&mut self, names: &[&str], otherwise: bool) -> bool {
@@ -119,7 +126,11 @@ fn build(r: &mut Fields) -> Option<Header> {
         r.wrong(&["ElementNumberOfChannels"], "1: labels are single numbers");
     }
     let order = ["ElementByteOrderMSB", "BinaryDataByteOrderMSB"];
-    let endian = if r.yes(&order, false) { Endian::Big } else { Endian::Little };
+    let endian = if r.yes(&order, false) {
+        Endian::Big
+    } else {
+        Endian::Little
+    };
     let matrix = r.numbers::<9>(&["TransformMatrix", "Orientation", "Rotation"]);
     let origin_mm = r.numbers(&["Offset", "Position", "Origin"]).unwrap_or_default();
     let sides = ["ElementSpacing", "ElementSize"];
@@ -139,9 +150,13 @@ fn build(r: &mut Fields) -> Option<Header> {
     let compressed = r.yes(&["CompressedData"], false);
     let data_file = r.get(&["ElementDataFile"]).unwrap_or_default().to_owned();
     if data_file.starts_with("LIST") || data_file.contains(['%', '*']) {
-        r.problems.push("its data are in several files; write it as one .mha file".to_owned());
+        r.problems
+            .push("its data are in several files; write it as one .mha file".to_owned());
     }
-    let letters = r.get(&["AnatomicalOrientation"]).filter(|l| !l.contains('?')).map(str::to_owned);
+    let letters = r
+        .get(&["AnatomicalOrientation"])
+        .filter(|l| !l.contains('?'))
+        .map(str::to_owned);
     Some(Header {
         sizes: sizes?,
         element: element?,

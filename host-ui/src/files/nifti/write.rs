@@ -12,7 +12,10 @@ const DATA_AT: usize = 352;
 /// The whole file, packed. Places in the header are the standard's.
 pub fn bytes(v: &Voxels) -> Result<Vec<u8>, String> {
     if v.dims.iter().any(|&d| d > 32767) {
-        return Err(format!("NIfTI-1 holds at most 32767 voxels along an axis, and there are {:?}", v.dims));
+        return Err(format!(
+            "NIfTI-1 holds at most 32767 voxels along an axis, and there are {:?}",
+            v.dims
+        ));
     }
     let mut b = vec![0_u8; DATA_AT];
     let mut put = |at: usize, bytes: &[u8]| b[at..at + bytes.len()].copy_from_slice(bytes);

@@ -87,7 +87,9 @@ impl Header {
         let mut reader = Fields { fields, problems };
         let header = build(&mut reader, pairs);
         error::all(reader.problems)?;
-        header.map(|h| (h, rest)).ok_or_else(|| "its header is not complete".to_owned())
+        header
+            .map(|h| (h, rest))
+            .ok_or_else(|| "its header is not complete".to_owned())
     }
 
     /// Which of its axes are those of space.
@@ -159,7 +161,8 @@ impl<'a> Fields<'a> {
     }
 
     fn wrong(&mut self, field: &str, value: &str, expected: &str) {
-        self.problems.push(format!("{field}: \"{}\" is not {expected}", short(value)));
+        self.problems
+            .push(format!("{field}: \"{}\" is not {expected}", short(value)));
     }
 }
 
@@ -170,10 +173,14 @@ fn build(r: &mut Fields, pairs: Pairs) -> Option<Header> {
         r.wrong("type", &type_name, "a type of whole numbers");
     }
     let dimension = r.needed(&["dimension"]);
-    let dimension: usize = dimension.parse().ok().filter(|d| (3..=MAX_DIMENSION).contains(d)).unwrap_or_else(|| {
-        r.wrong("dimension", dimension, "3, or 4 with layers of segments");
-        0
-    });
+    let dimension: usize = dimension
+        .parse()
+        .ok()
+        .filter(|d| (3..=MAX_DIMENSION).contains(d))
+        .unwrap_or_else(|| {
+            r.wrong("dimension", dimension, "3, or 4 with layers of segments");
+            0
+        });
     let encoding = r.needed(&["encoding"]).to_ascii_lowercase();
     let endian = match r.take(&["endian"]).map(str::to_ascii_lowercase).as_deref() {
         None => None,
@@ -201,8 +208,11 @@ fn build(r: &mut Fields, pairs: Pairs) -> Option<Header> {
     });
     let units_m = units(r);
     let kinds = words(r.take(&["kinds"]).unwrap_or_default());
-    if r.take(&["centers", "centerings"]).is_some_and(|c| words(c).iter().any(|w| w.eq_ignore_ascii_case("node"))) {
-        r.problems.push("its samples are at nodes and not in cells; save it with cell centering".to_owned());
+    if r.take(&["centers", "centerings"])
+        .is_some_and(|c| words(c).iter().any(|w| w.eq_ignore_ascii_case("node")))
+    {
+        r.problems
+            .push("its samples are at nodes and not in cells; save it with cell centering".to_owned());
     }
     let data_file = r.take(&["data file", "datafile"]).map(str::to_owned);
     let line_skip = whole(r, &["line skip", "lineskip"], 0).unwrap_or_default() as usize;
@@ -212,11 +222,17 @@ fn build(r: &mut Fields, pairs: Pairs) -> Option<Header> {
         if let Some(text) = r.take(&[name])
             && words(text).iter().any(|w| !w.eq_ignore_ascii_case("nan"))
         {
-            r.problems.push(format!("\"{name}\" is not read; save the volume with \"space directions\""));
+            r.problems.push(format!(
+                "\"{name}\" is not read; save the volume with \"space directions\""
+            ));
         }
     }
     r.fields.retain(|(name, _)| !UNUSED.contains(&name.as_str()));
-    let unknown: Vec<String> = r.fields.iter().map(|(name, _)| format!("\"{}\" is no field of NRRD", short(name))).collect();
+    let unknown: Vec<String> = r
+        .fields
+        .iter()
+        .map(|(name, _)| format!("\"{}\" is no field of NRRD", short(name)))
+        .collect();
     r.problems.extend(unknown);
     Some(Header {
         element: element?,
@@ -251,9 +267,16 @@ fn axes(r: &mut Fields, dimension: usize) -> Vec<Axis> {
     let spacings = r.take(&["spacings"]);
     if let Some(text) = r.take(&["space directions"]) {
         return match vectors(text).filter(|v| v.len() == dimension) {
-            Some(vectors) => vectors.into_iter().map(|v| v.map_or(Axis::None, Axis::Direction)).collect(),
+            Some(vectors) => vectors
+                .into_iter()
+                .map(|v| v.map_or(Axis::None, Axis::Direction))
+                .collect(),
             None => {
-                r.wrong("space directions", text, &format!("{dimension} vectors such as (1,0,0), or none"));
+                r.wrong(
+                    "space directions",
+                    text,
+                    &format!("{dimension} vectors such as (1,0,0), or none"),
+                );
                 Vec::new()
             }
         };

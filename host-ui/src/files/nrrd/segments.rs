@@ -4,8 +4,8 @@ use super::super::element::short;
 use super::super::frame::VoxelFrame;
 use super::super::overlap;
 use super::super::volume::Voxels;
-use super::header::Header;
 use super::Pairs;
+use super::header::Header;
 use std::collections::BTreeMap;
 
 const MAX_SEGMENTS: usize = 255;
@@ -40,16 +40,25 @@ fn segments(pairs: &Pairs) -> Result<Vec<Segment>, String> {
         if ["ID", "Name", "LabelValue"].iter().all(|w| of(w).is_none()) {
             return Ok(all);
         }
-        let name = of("Name").or(of("ID")).filter(|n| !n.is_empty()).map_or(format!("segment {n}"), str::to_owned);
+        let name = of("Name")
+            .or(of("ID"))
+            .filter(|n| !n.is_empty())
+            .map_or(format!("segment {n}"), str::to_owned);
         let number = |what: &str, otherwise: usize, most: usize| match of(what) {
             None => Ok(otherwise),
             Some(text) => text.parse::<usize>().ok().filter(|v| *v <= most).ok_or_else(|| {
-                format!("Segment{n}_{what} is \"{}\"; it must be a whole number to {most}", short(text))
+                format!(
+                    "Segment{n}_{what} is \"{}\"; it must be a whole number to {most}",
+                    short(text)
+                )
             }),
         };
         let value = number("LabelValue", n + 1, 255)? as u8;
         if value == 0 {
-            return Err(format!("its segment \"{}\" has label 0, which is the background", short(&name)));
+            return Err(format!(
+                "its segment \"{}\" has label 0, which is the background",
+                short(&name)
+            ));
         }
         all.push(Segment {
             name,
@@ -71,14 +80,21 @@ pub fn flatten(h: &Header, values: &[u8], list: usize, frame: VoxelFrame, dims: 
         ));
     }
     if let Some(s) = segments.iter().find(|s| s.layer >= layers) {
-        return Err(format!("its segment \"{}\" is in layer {} of {layers}", short(&s.name), s.layer));
+        return Err(format!(
+            "its segment \"{}\" is in layer {} of {layers}",
+            short(&s.name),
+            s.layer
+        ));
     }
     // The label of each value of each layer, counted from 1 in the order of the segments.
     let mut label_of = vec![[0_u8; 256]; layers];
     for (segment, label) in segments.iter().zip(1_u8..=255) {
         let place = &mut label_of[segment.layer][usize::from(segment.value)];
         if *place != 0 {
-            return Err(format!("two segments have label {} in layer {}", segment.value, segment.layer));
+            return Err(format!(
+                "two segments have label {} in layer {}",
+                segment.value, segment.layer
+            ));
         }
         *place = label;
     }
