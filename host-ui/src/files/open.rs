@@ -2,14 +2,15 @@
 
 use super::error::FileError;
 use super::volume::{LabelVolume, Voxels};
-use super::{metaimage, nifti, nrrd};
+use super::{dicom, metaimage, nifti, nrrd};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path};
 
 /// Larger than any segmentation of a pelvis.
 const MAX_FILE_BYTES: u64 = 1 << 30;
-pub const FORMATS: &str = "NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr, .seg.nrrd), MetaImage (.mha, .mhd)";
+pub const FORMATS: &str =
+    "NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr, .seg.nrrd), MetaImage (.mha, .mhd), DICOM RT Structure Set (.dcm)";
 
 /// The tissue of a label volume: its structures where it names them, otherwise every label but 0 or the one asked for.
 pub fn read(path: &Path, label: Option<u8>) -> Result<LabelVolume, FileError> {
@@ -26,6 +27,10 @@ pub fn file_name(path: &Path) -> String {
 pub fn read_voxels(path: &Path) -> Result<Voxels, FileError> {
     let told = |why: String| FileError::of(path, &why);
     let bytes = whole(path).map_err(told)?;
+    if dicom::is_dicom(&bytes) {
+        let object = dicom::read(&bytes).map_err(told)?;
+        return dicom::structures::read(&object, path.parent()).map_err(told);
+    }
     voxels(&bytes, &|name| beside(path, name)).map_err(told)
 }
 

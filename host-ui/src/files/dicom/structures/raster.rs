@@ -1,0 +1,246 @@
+//! Contours to voxels: a voxel belongs to a structure that covers at least half of it in the plane of the slice.
+
+use super::super::super::element::short;
+use super::super::images::Grid;
+use super::{Contoured, SAME_PLANE_M};
+use std::collections::BTreeMap;
+
+/// Lines across each row of voxels along which coverage is measured.
+const LINES: usize = 4;
+/// Crossings of lines and edges in one file; a pelvis on fine images has some million.
+const MAX_CROSSINGS: f64 = 3e7;
+/// Pieces of voxels that lines cover in one file.
+const MAX_PIECES: usize = 2_000_000_000;
+const MAX_RUNS: usize = 20_000_000;
+/// Planes of contours that are farther apart than this many usual distances have a gap between them.
+const GAP: f64 = 1.5;
+
+/// Columns from and to (exclusive), in a row of a slice.
+#[derive(Clone, Copy)]
+struct Run {
+    row: u32,
+    from: u32,
+    to: u32,
+}
+
+/// What was done so far; a file may not ask for any amount.
+#[derive(Default)]
+struct Work {
+    crossings: f64,
+    pieces: usize,
+    runs: usize,
+}
+
+impl Work {
+    fn check(&self) -> Result<(), String> {
+        if self.crossings <= MAX_CROSSINGS && self.pieces <= MAX_PIECES && self.runs <= MAX_RUNS {
+            return Ok(());
+        }
+        Err("its contours have too many long edges to be drawn; export it with fewer corners".to_owned())
+    }
+}
+
+/// The labels 1, 2, ... of the structures in their order, and what they took from each other in words.
+pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<String>), String> {
+    let mut work = Work::default();
+    let mut all = Vec::new();
+    for structure in structures {
+        all.push(runs(structure, grid, &mut work)?);
+    }
+    let sizes: Vec<usize> = all
+        .iter()
+        .map(|runs| runs.iter().map(|r| (r.to - r.from) as usize).sum())
+        .collect();
+    let mut order: Vec<usize> = (0..all.len()).collect();
+    // Larger ones first, so that what lies in them is painted over them.
+    order.sort_by_key(|&s| (std::cmp::Reverse(sizes[s]), s));
+    let mut labels = vec![0_u8; grid.dims.iter().product()];
+    let mut taken = vec![0_usize; all.len() + 1];
+    for s in order {
+        for run in &all[s] {
+            let row = run.row as usize * grid.dims[0];
+            for label in &mut labels[row + run.from as usize..row + run.to as usize] {
+                taken[usize::from(*label)] += 1;
+                *label = s as u8 + 1;
+            }
+        }
+    }
+    let lost: Vec<String> = structures
+        .iter()
+        .enumerate()
+        .filter(|(s, _)| taken[s + 1] > 0)
+        .map(|(s, c)| format!("{} ({} of {} voxels)", short(&c.name), taken[s + 1], sizes[s]))
+        .collect();
+    let mut notes: Vec<String> = structures
+        .iter()
+        .zip(&sizes)
+        .filter(|(_, size)| **size == 0)
+        .map(|(c, _)| format!("{} covers no voxel of the images", short(&c.name)))
+        .collect();
+    if !lost.is_empty() {
+        notes.push(format!(
+            "structures overlap, and where they do the smaller one has the voxel; others have it taken from them: {}",
+            lost.join(", ")
+        ));
+    }
+    Ok((labels, notes))
+}
+
+/// Corners of polygons in columns and rows.
+type Polygons = Vec<Vec<[f64; 2]>>;
+
+fn runs(structure: &Contoured, grid: &Grid, work: &mut Work) -> Result<Vec<Run>, String> {
+    let planes = planes(structure, grid)?;
+    let heights: Vec<f64> = planes.iter().map(|(h, _)| *h).collect();
+    let mut runs = Vec::new();
+    for (plane, [from, to]) in planes.iter().zip(slabs(&heights)) {
+        let mut covered: Option<Vec<Run>> = None;
+        // Middles of slices from the lower end of a slab up to its upper end.
+        let (first, last) = (
+            (from - 1e-6).ceil().max(0.0),
+            (to - 1e-6).ceil().min(grid.dims[2] as f64),
+        );
+        for slice in first as usize..last.max(0.0) as usize {
+            if covered.is_none() {
+                covered = Some(fill(&plane.1, [grid.dims[0], grid.dims[1]], work)?);
+            }
+            let covered = covered.as_deref().unwrap_or_default();
+            work.runs += covered.len();
+            work.check()?;
+            let base = (slice * grid.dims[1]) as u32;
+            runs.extend(covered.iter().map(|r| Run {
+                row: base + r.row,
+                ..*r
+            }));
+        }
+    }
+    Ok(runs)
+}
+
+/// The contours by the height of their plane, in slices.
+fn planes(structure: &Contoured, grid: &Grid) -> Result<Vec<(f64, Polygons)>, String> {
+    let step_m = grid.frame.spacing_m[2];
+    let mut placed = Vec::new();
+    for contour in &structure.contours {
+        let corners: Vec<[f64; 3]> = contour.iter().map(|p| grid.frame.index_of(*p)).collect();
+        let height = corners.iter().map(|c| c[2]).sum::<f64>() / corners.len() as f64;
+        let off_m = corners.iter().map(|c| (c[2] - height).abs()).fold(0.0, f64::max) * step_m;
+        if off_m > 10.0 * SAME_PLANE_M {
+            return Err(format!(
+                "{}: a contour is tilted {:.2} mm out of the slices of the images; export it in their planes",
+                short(&structure.name),
+                off_m * 1e3
+            ));
+        }
+        placed.push((height, corners.into_iter().map(|[x, y, _]| [x, y]).collect::<Vec<_>>()));
+    }
+    placed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut planes: Vec<(f64, Polygons)> = Vec::new();
+    for (height, polygon) in placed {
+        match planes.last_mut() {
+            Some((h, polygons)) if (height - *h) * step_m < SAME_PLANE_M => polygons.push(polygon),
+            _ => planes.push((height, vec![polygon])),
+        }
+    }
+    Ok(planes)
+}
+
+/// From where to where each plane stands for its structure: half-way to its neighbours.
+fn slabs(heights: &[f64]) -> Vec<[f64; 2]> {
+    let mut gaps: Vec<f64> = heights.windows(2).map(|w| w[1] - w[0]).collect();
+    gaps.sort_by(f64::total_cmp);
+    // A single plane stands for the slice it is in.
+    let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(1.0);
+    let half = |gap: f64| if gap > GAP * usual { usual / 2.0 } else { gap / 2.0 };
+    (0..heights.len())
+        .map(|i| {
+            let below = if i > 0 {
+                half(heights[i] - heights[i - 1])
+            } else {
+                usual / 2.0
+            };
+            let above = heights.get(i + 1).map_or(usual / 2.0, |next| half(next - heights[i]));
+            [heights[i] - below, heights[i] + above]
+        })
+        .collect()
+}
+
+/// Even and odd: what lies in two contours of a plane is a hole, and so is what a keyhole leads to.
+fn fill(polygons: &Polygons, [columns, rows]: [usize; 2], work: &mut Work) -> Result<Vec<Run>, String> {
+    let mut lines: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    for polygon in polygons {
+        let next = polygon.iter().cycle().skip(1);
+        for (a, b) in polygon.iter().zip(next) {
+            cross(*a, *b, rows, &mut lines, work)?;
+        }
+    }
+    let mut runs = Vec::new();
+    let mut covered = vec![0.0; columns];
+    let mut lines = lines.into_iter().peekable();
+    while let Some((line, at)) = lines.next() {
+        let row = line / LINES;
+        work.pieces += add_line(at, &mut covered);
+        work.check()?;
+        if lines.peek().is_none_or(|(next, _)| next / LINES != row) {
+            collect(row, &covered, &mut runs);
+            covered.fill(0.0);
+        }
+    }
+    Ok(runs)
+}
+
+/// Where an edge crosses the lines. A voxel reaches half a step to each side of its index.
+fn cross(
+    a: [f64; 2],
+    b: [f64; 2],
+    rows: usize,
+    lines: &mut BTreeMap<usize, Vec<f64>>,
+    work: &mut Work,
+) -> Result<(), String> {
+    let (low, high) = if a[1] <= b[1] { (a, b) } else { (b, a) };
+    let line_of = |y: f64| (y + 0.5) * LINES as f64 - 0.5;
+    let most = (rows * LINES) as f64;
+    let first = line_of(low[1]).ceil().clamp(0.0, most);
+    let last = line_of(high[1]).ceil().clamp(0.0, most);
+    work.crossings += last - first;
+    work.check()?;
+    for line in first as usize..last as usize {
+        let y = (line as f64 + 0.5) / LINES as f64 - 0.5;
+        let share = (y - low[1]) / (high[1] - low[1]);
+        lines.entry(line).or_default().push(low[0] + share * (high[0] - low[0]));
+    }
+    Ok(())
+}
+
+/// What a line covers of each voxel of its row; gives how many pieces it covers.
+fn add_line(mut at: Vec<f64>, covered: &mut [f64]) -> usize {
+    let mut pieces = 0;
+    at.sort_by(f64::total_cmp);
+    for pair in at.chunks_exact(2) {
+        let [from, to] = [pair[0] + 0.5, pair[1] + 0.5].map(|x| x.clamp(0.0, covered.len() as f64));
+        let (first, last) = (from as usize, (to.ceil() as usize).min(covered.len()));
+        for (x, share) in covered.iter_mut().enumerate().take(last).skip(first) {
+            *share += (to.min((x + 1) as f64) - from.max(x as f64)) / LINES as f64;
+        }
+        pieces += last.saturating_sub(first);
+    }
+    pieces
+}
+
+fn collect(row: usize, covered: &[f64], runs: &mut Vec<Run>) {
+    let mut from = None;
+    for (x, share) in covered.iter().chain([&0.0]).enumerate() {
+        match (*share >= 0.5 - 1e-9, from) {
+            (true, None) => from = Some(x),
+            (false, Some(begin)) => {
+                runs.push(Run {
+                    row: row as u32,
+                    from: begin as u32,
+                    to: x as u32,
+                });
+                from = None;
+            }
+            _ => {}
+        }
+    }
+}
