@@ -2,7 +2,7 @@
 
 use super::error::FileError;
 use super::volume::{LabelVolume, Voxels};
-use super::{dicom, metaimage, nifti, nrrd};
+use super::{dicom, metaimage, nifti, nrrd, scene};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path};
@@ -13,7 +13,17 @@ pub const FORMATS: &str =
     "NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr, .seg.nrrd), MetaImage (.mha, .mhd), DICOM RT Structure Set (.dcm)";
 
 /// The tissue of a label volume: its structures where it names them, otherwise every label but 0 or the one asked for.
+/// A scene file says itself what is what.
 pub fn read(path: &Path, label: Option<u8>) -> Result<LabelVolume, FileError> {
+    if scene::is_scene(path) {
+        if label.is_some() {
+            return Err(FileError::of(
+                path,
+                "a scene file names its structures itself; leave --label out",
+            ));
+        }
+        return scene::load(path).map(|(_, volume)| volume);
+    }
     let voxels = read_voxels(path)?;
     LabelVolume::from_voxels(&voxels, label, file_name(path)).map_err(|why| FileError::of(path, &why))
 }

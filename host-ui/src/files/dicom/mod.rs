@@ -9,7 +9,7 @@ mod values;
 mod write;
 
 pub use checked::{Object, is_dicom, read};
-pub use write::Identity;
+pub use write::{Identity, new_uid};
 
 /// The frame of an image series out of one of its files twice, one slice apart; for checking the reader by itself.
 pub fn image_geometry(bytes: &[u8]) -> Result<(), String> {
