@@ -37,4 +37,4 @@ deps-run:
 	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers
 
 deps-test:
-	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers python3-nibabel xvfb
+	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers python3-nibabel python3-pydicom xvfb

@@ -169,7 +169,7 @@ impl<'a> Fields<'a> {
 fn build(r: &mut Fields, pairs: Pairs) -> Option<Header> {
     let type_name = r.needed(&["type"]).to_ascii_lowercase();
     let element = element(&type_name);
-    if element.is_none() {
+    if element.is_none() && !type_name.is_empty() {
         r.wrong("type", &type_name, "a type of whole numbers");
     }
     let dimension = r.needed(&["dimension"]);
@@ -178,7 +178,9 @@ fn build(r: &mut Fields, pairs: Pairs) -> Option<Header> {
         .ok()
         .filter(|d| (3..=MAX_DIMENSION).contains(d))
         .unwrap_or_else(|| {
-            r.wrong("dimension", dimension, "3, or 4 with layers of segments");
+            if !dimension.is_empty() {
+                r.wrong("dimension", dimension, "3, or 4 with layers of segments");
+            }
             0
         });
     let encoding = r.needed(&["encoding"]).to_ascii_lowercase();

@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 const LINES: usize = 4;
 /// Crossings of lines and edges in one file; a pelvis on fine images has some million.
 const MAX_CROSSINGS: f64 = 3e7;
-/// Pieces of voxels that lines cover in one file.
-const MAX_PIECES: usize = 2_000_000_000;
+/// Voxels that are looked at and painted in one file; a whole pelvis has a hundred million.
+const MAX_VOXELS_TOUCHED: usize = 600_000_000;
 const MAX_RUNS: usize = 20_000_000;
 /// Planes of contours that are farther apart than this many usual distances have a gap between them.
 const GAP: f64 = 1.5;
@@ -27,16 +27,19 @@ struct Run {
 #[derive(Default)]
 struct Work {
     crossings: f64,
-    pieces: usize,
+    voxels: usize,
     runs: usize,
 }
 
 impl Work {
     fn check(&self) -> Result<(), String> {
-        if self.crossings <= MAX_CROSSINGS && self.pieces <= MAX_PIECES && self.runs <= MAX_RUNS {
+        if self.crossings <= MAX_CROSSINGS && self.voxels <= MAX_VOXELS_TOUCHED && self.runs <= MAX_RUNS {
             return Ok(());
         }
-        Err("its contours have too many long edges to be drawn; export it with fewer corners".to_owned())
+        Err(
+            "its contours are too large or too many to be drawn; export fewer structures, or ones with fewer corners"
+                .to_owned(),
+        )
     }
 }
 
@@ -47,6 +50,8 @@ pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<Str
     for structure in structures {
         all.push(runs(structure, grid, &mut work)?);
     }
+    work.voxels += all.iter().flatten().map(|r| (r.to - r.from) as usize).sum::<usize>();
+    work.check()?;
     let sizes: Vec<usize> = all
         .iter()
         .map(|runs| runs.iter().map(|r| (r.to - r.from) as usize).sum())
@@ -175,15 +180,15 @@ fn fill(polygons: &Polygons, [columns, rows]: [usize; 2], work: &mut Work) -> Re
         }
     }
     let mut runs = Vec::new();
-    let mut covered = vec![0.0; columns];
+    let mut covered = Coverage::new(columns);
     let mut lines = lines.into_iter().peekable();
     while let Some((line, at)) = lines.next() {
         let row = line / LINES;
-        work.pieces += add_line(at, &mut covered);
-        work.check()?;
+        covered.add_line(at);
         if lines.peek().is_none_or(|(next, _)| next / LINES != row) {
-            collect(row, &covered, &mut runs);
-            covered.fill(0.0);
+            work.voxels += columns;
+            work.check()?;
+            covered.take_row(row as u32, &mut runs);
         }
     }
     Ok(runs)
@@ -212,35 +217,60 @@ fn cross(
     Ok(())
 }
 
-/// What a line covers of each voxel of its row; gives how many pieces it covers.
-fn add_line(mut at: Vec<f64>, covered: &mut [f64]) -> usize {
-    let mut pieces = 0;
-    at.sort_by(f64::total_cmp);
-    for pair in at.chunks_exact(2) {
-        let [from, to] = [pair[0] + 0.5, pair[1] + 0.5].map(|x| x.clamp(0.0, covered.len() as f64));
-        let (first, last) = (from as usize, (to.ceil() as usize).min(covered.len()));
-        for (x, share) in covered.iter_mut().enumerate().take(last).skip(first) {
-            *share += (to.min((x + 1) as f64) - from.max(x as f64)) / LINES as f64;
-        }
-        pieces += last.saturating_sub(first);
-    }
-    pieces
+/// What the lines of one row cover of each of its voxels.
+struct Coverage {
+    /// Of a voxel in which a line begins or ends.
+    ends: Vec<f64>,
+    /// Change from the voxel before of what lines cover that go right through.
+    through: Vec<f64>,
 }
 
-fn collect(row: usize, covered: &[f64], runs: &mut Vec<Run>) {
-    let mut from = None;
-    for (x, share) in covered.iter().chain([&0.0]).enumerate() {
-        match (*share >= 0.5 - 1e-9, from) {
-            (true, None) => from = Some(x),
-            (false, Some(begin)) => {
-                runs.push(Run {
-                    row: row as u32,
-                    from: begin as u32,
-                    to: x as u32,
-                });
-                from = None;
-            }
-            _ => {}
+impl Coverage {
+    fn new(columns: usize) -> Self {
+        Self {
+            ends: vec![0.0; columns + 1],
+            through: vec![0.0; columns + 1],
         }
+    }
+
+    fn add_line(&mut self, mut at: Vec<f64>) {
+        at.sort_by(f64::total_cmp);
+        let columns = self.ends.len() - 1;
+        for pair in at.chunks_exact(2) {
+            let [from, to] = [pair[0] + 0.5, pair[1] + 0.5].map(|x| x.clamp(0.0, columns as f64));
+            let (first, last) = (from as usize, to as usize);
+            if first == last {
+                self.ends[first] += to - from;
+                continue;
+            }
+            self.ends[first] += (first + 1) as f64 - from;
+            self.ends[last] += to - last as f64;
+            self.through[first + 1] += 1.0;
+            self.through[last] -= 1.0;
+        }
+    }
+
+    /// The runs of a row that are covered at least by half; ready for the next row then.
+    fn take_row(&mut self, row: u32, runs: &mut Vec<Run>) {
+        let (mut through, mut begun) = (0.0, None);
+        for x in 0..self.ends.len() {
+            through += self.through[x];
+            let share = (through + self.ends[x]) / LINES as f64;
+            // Nothing is beyond the last column, so that a run ends there.
+            match (share >= 0.5 - 1e-9 && x + 1 < self.ends.len(), begun) {
+                (true, None) => begun = Some(x as u32),
+                (false, Some(from)) => {
+                    runs.push(Run {
+                        row,
+                        from,
+                        to: x as u32,
+                    });
+                    begun = None;
+                }
+                _ => {}
+            }
+        }
+        self.ends.fill(0.0);
+        self.through.fill(0.0);
     }
 }
