@@ -14,6 +14,9 @@ use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::io::Read;
 
+/// A "byte skip" of -1 stands for at most so much.
+const MAX_BEFORE_END: u64 = 1 << 20;
+
 pub fn is_nrrd(bytes: &[u8]) -> bool {
     bytes.starts_with(b"NRRD000")
 }
@@ -69,7 +72,8 @@ fn read_data(h: &Header, data: &[u8], count: usize) -> Result<Vec<u8>, String> {
         }
         "gzip" | "gz" => {
             if h.byte_skip == -1 {
-                return Err("its \"byte skip\" is -1, which has no meaning for packed data".to_owned());
+                let end = unpacked_end(skipped, size)?;
+                return read_labels(end.as_slice(), h.element, endian, count, identity);
             }
             must_hold(size.saturating_add(h.byte_skip as u64), skipped.len() as u64, true)?;
             let mut from = MultiGzDecoder::new(skipped);
@@ -92,6 +96,27 @@ fn read_data(h: &Header, data: &[u8], count: usize) -> Result<Vec<u8>, String> {
         other => Err(format!(
             "its encoding \"{}\" is not known; save it with gzip, raw, text or hex encoding",
             super::element::short(other)
+        )),
+    }
+}
+
+/// The last bytes of packed data; a header of another format may stand before them.
+fn unpacked_end(packed: &[u8], size: u64) -> Result<Vec<u8>, String> {
+    must_hold(size, packed.len() as u64, true)?;
+    let mut all = Vec::new();
+    MultiGzDecoder::new(packed)
+        .take(size + MAX_BEFORE_END + 1)
+        .read_to_end(&mut all)
+        .map_err(|e| format!("it is cut off or damaged ({e}); copy or export it again"))?;
+    let before = (all.len() as u64).checked_sub(size);
+    match before {
+        Some(before) if before <= MAX_BEFORE_END => Ok(all.split_off(before as usize)),
+        Some(_) => Err(format!(
+            "its data have more than {MAX_BEFORE_END} bytes before what its size asks for"
+        )),
+        None => Err(format!(
+            "it is cut off: {} of {size} bytes are there; copy or export it again",
+            all.len()
         )),
     }
 }

@@ -129,6 +129,17 @@ fn packed_data_are_unpacked_no_further_than_the_header_asks() {
         file
     };
     assert!(why(&file("2 2 1")).contains("go on behind"));
+    let to_end = |sizes: &str| {
+        let bytes = file(sizes);
+        let at = bytes.windows(9).position(|w| w == b"encoding:").unwrap();
+        [&bytes[..at], b"byte skip: -1\n".as_slice(), &bytes[at..]].concat()
+    };
+    assert!(why(&to_end("2 2 1")).contains("more than 1048576 bytes before"));
+    assert_eq!(
+        read(&to_end("1000 1000 49"), &no_file).unwrap().labels.len(),
+        49_000_000
+    );
+    assert!(why(&to_end("1000 1000 51")).contains("it is cut off"));
     assert!(why(&file("1000 1000 200")).contains("the header asks for 200000000 bytes"));
     assert_eq!(read(&file("1000 1000 50"), &no_file).unwrap().labels.len(), 50_000_000);
 }
