@@ -8,7 +8,7 @@ use super::report::Judge;
 use super::seed::Seed;
 use super::source::Source;
 use super::structure::Structure;
-use super::{DoseGrid, DosePoints, labels, perturb, picture, structure};
+use super::{DoseGrid, DosePoints, contours, labels, perturb, picture, structure};
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -271,6 +271,23 @@ impl Common {
             .collect::<Result<Vec<_>, _>>()?;
         let given = self.label_names()?;
         let prescription_gy = self.prescription_gy(source)?;
+        let structures = match contours::structures(file, most_points)? {
+            Some((_, _)) if !given.is_empty() => {
+                return Err(format!("--name: {} names its structures itself", file.display()));
+            }
+            Some((structures, notes)) => {
+                notes
+                    .iter()
+                    .for_each(|note| eprintln!("note: {}: {note}", file.display()));
+                structures
+            }
+            None => self.labelled(file, given, most_points)?,
+        };
+        let target = self.target.as_deref();
+        Judge::new(structures, target, &extra, prescription_gy, seeds, most_points)
+    }
+
+    fn labelled(&self, file: &Path, given: BTreeMap<u8, String>, most_points: usize) -> Result<Vec<Structure>, String> {
         let voxels = crate::files::read_voxels(file).map_err(|e| e.to_string())?;
         if let Some((label, name)) = given.iter().find(|(label, _)| !voxels.labels.contains(label)) {
             return Err(format!(
@@ -284,9 +301,7 @@ impl Common {
         // What the file calls its labels counts where nothing else is said.
         let mut names = voxels.names.clone();
         names.extend(given);
-        let structures: Vec<Structure> = labels::structures(&voxels, &names, most_points);
-        let target = self.target.as_deref();
-        Judge::new(structures, target, &extra, prescription_gy, seeds, most_points)
+        Ok(labels::structures(&voxels, &names, most_points))
     }
 
     fn label_names(&self) -> Result<BTreeMap<u8, String>, String> {

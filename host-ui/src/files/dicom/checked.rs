@@ -25,22 +25,48 @@ pub struct Object {
 }
 
 pub fn is_dicom(bytes: &[u8]) -> bool {
+    has_preamble(bytes) || is_bare(bytes)
+}
+
+fn has_preamble(bytes: &[u8]) -> bool {
     bytes.get(128..132) == Some(b"DICM")
+}
+
+/// Old files begin with their first element, of group 8, little endian; nearly always the length of that group or the character set.
+fn is_bare(bytes: &[u8]) -> bool {
+    bytes.len() > 132 && bytes[..2] == [8, 0] && matches!(bytes[2..4], [0x00 | 0x01 | 0x05 | 0x08 | 0x12 | 0x16, 0])
+}
+
+/// Where the data set begins and how it is written; of a bare file two letters tell.
+fn syntax(bytes: &[u8]) -> Result<(Syntax, usize), String> {
+    if has_preamble(bytes) {
+        let (uid, from) = transfer_syntax(bytes)?;
+        return Ok((Syntax::of(&uid)?, from));
+    }
+    if !is_bare(bytes) {
+        return Err("it has no DICM at byte 128, so it is no DICOM file; export it again".to_owned());
+    }
+    let letters = [bytes[4], bytes[5]];
+    let explicit = VR::from_binary(letters).is_some();
+    Ok((
+        if explicit {
+            Syntax::ExplicitLittle
+        } else {
+            Syntax::ImplicitLittle
+        },
+        0,
+    ))
 }
 
 /// Everything before the pixels.
 pub fn read(bytes: &[u8]) -> Result<Object, String> {
-    if !is_dicom(bytes) {
-        return Err("it has no DICM at byte 128, so it is no DICOM file; export it again".to_owned());
-    }
     let values = bytes.iter().filter(|&&b| b == b'\\').count();
     if values > MAX_VALUES {
         return Err(format!(
             "it has {values} values in lists, more than {MAX_VALUES}; export fewer structures"
         ));
     }
-    let (syntax_uid, from) = transfer_syntax(bytes)?;
-    let syntax = Syntax::of(&syntax_uid)?;
+    let (syntax, from) = syntax(bytes)?;
     let mut walk = Walk {
         bytes,
         at: from,

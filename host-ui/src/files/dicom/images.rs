@@ -83,7 +83,7 @@ pub fn find(folder: &Path, series: &[String], named: &[String]) -> Result<Vec<Sl
 fn begins_as_dicom(path: &Path) -> bool {
     use std::io::Read;
     let mut start = Vec::new();
-    let read = std::fs::File::open(path).and_then(|f| f.take(132).read_to_end(&mut start));
+    let read = std::fs::File::open(path).and_then(|f| f.take(160).read_to_end(&mut start));
     path.is_file() && read.is_ok() && checked::is_dicom(&start)
 }
 

@@ -2,6 +2,7 @@
 
 mod outline;
 mod raster;
+mod solid;
 pub mod write;
 
 use super::super::element::{short, voxel_count};
@@ -15,6 +16,7 @@ use super::values::{items, name, needed, numbers, text};
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::InMemDicomObject;
 use nalgebra::{Matrix3, Vector3};
+pub use solid::Solid;
 use std::path::Path;
 
 const MAX_STRUCTURES: usize = 255;

@@ -3,6 +3,7 @@
 use super::super::element::short;
 use dicom_core::Tag;
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
+use dicom_core::value::{PrimitiveValue, Value};
 use dicom_dictionary_std::StandardDataDictionary;
 use dicom_object::InMemDicomObject;
 
@@ -14,7 +15,12 @@ pub fn name(tag: Tag) -> String {
 
 /// `None` where it is absent or empty.
 pub fn text(object: &InMemDicomObject, tag: Tag) -> Option<String> {
-    let value = object.get(tag)?.to_str().ok()?;
+    let element = object.get(tag)?;
+    let value = match element.value() {
+        // Of a kind that the writer did not know.
+        Value::Primitive(PrimitiveValue::U8(bytes)) => String::from_utf8_lossy(bytes).into_owned(),
+        _ => element.to_str().ok()?.into_owned(),
+    };
     let value = value.trim_matches(['\0', ' ']);
     (!value.is_empty()).then(|| value.to_owned())
 }
@@ -25,13 +31,10 @@ pub fn items(object: &InMemDicomObject, tag: Tag) -> &[InMemDicomObject] {
 
 /// All finite; `None` where it is absent or empty.
 pub fn numbers(object: &InMemDicomObject, tag: Tag) -> Result<Option<Vec<f64>>, String> {
-    let Some(element) = object.get(tag).filter(|_| text(object, tag).is_some()) else {
+    let (Some(element), Some(shown)) = (object.get(tag), text(object, tag)) else {
         return Ok(None);
     };
-    let wrong = || {
-        let shown = text(object, tag).unwrap_or_default();
-        format!("{} is \"{}\", which is no list of numbers", name(tag), short(&shown))
-    };
+    let wrong = || format!("{} is \"{}\", which is no list of numbers", name(tag), short(&shown));
     let values = element.to_multi_float64().map_err(|_| wrong())?;
     if values.iter().all(|v| v.is_finite()) {
         return Ok(Some(values));

@@ -268,7 +268,7 @@ fn sizes(r: &mut Fields, dimension: usize) -> Vec<u64> {
 fn axes(r: &mut Fields, dimension: usize) -> Vec<Axis> {
     let spacings = r.take(&["spacings"]);
     if let Some(text) = r.take(&["space directions"]) {
-        return match vectors(text).filter(|v| v.len() == dimension) {
+        return match vectors(text).filter(|v| v.len() == dimension || dimension == 0) {
             Some(vectors) => vectors
                 .into_iter()
                 .map(|v| v.map_or(Axis::None, Axis::Direction))
@@ -288,7 +288,7 @@ fn axes(r: &mut Fields, dimension: usize) -> Vec<Axis> {
     };
     let spacings: Option<Vec<f64>> = text.split_whitespace().map(|w| w.parse().ok()).collect();
     match spacings {
-        Some(all) if all.len() == dimension => {
+        Some(all) if all.len() == dimension || dimension == 0 => {
             let axis = |s: f64| if s.is_nan() { Axis::None } else { Axis::Spacing(s) };
             all.into_iter().map(axis).collect()
         }

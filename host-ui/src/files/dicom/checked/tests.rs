@@ -72,6 +72,13 @@ fn sequences_deeper_than_any_plan_has_are_refused() {
 }
 
 #[test]
+fn an_old_file_that_begins_with_its_first_element_is_read_too() {
+    let good = good();
+    let (_, from) = transfer_syntax(&good).unwrap();
+    assert_eq!(read(&good[from..]).and_then(|o| of(&o)).unwrap().seeds.len(), 1);
+}
+
+#[test]
 fn a_kind_of_value_that_there_is_not_and_a_foreign_syntax_are_told() {
     let good = good();
     let mut bent = good.clone();

@@ -98,7 +98,8 @@ fn runs(structure: &Contoured, grid: &Grid, work: &mut Work) -> Result<Vec<Run>,
     let planes = planes(structure, grid)?;
     let heights: Vec<f64> = planes.iter().map(|(h, _)| *h).collect();
     let mut runs = Vec::new();
-    for (plane, [from, to]) in planes.iter().zip(slabs(&heights)) {
+    // A single plane stands for the slice it is in.
+    for (plane, [from, to]) in planes.iter().zip(slabs(&heights, 1.0)) {
         let mut covered: Option<Vec<Run>> = None;
         // Middles of slices from the lower end of a slab up to its upper end.
         let (first, last) = (
@@ -150,12 +151,12 @@ fn planes(structure: &Contoured, grid: &Grid) -> Result<Vec<(f64, Polygons)>, St
     Ok(planes)
 }
 
-/// From where to where each plane stands for its structure: half-way to its neighbours.
-fn slabs(heights: &[f64]) -> Vec<[f64; 2]> {
+/// From where to where each plane stands for its structure: half-way to its neighbours, but no farther than half of the
+/// usual distance across a gap; `single` is the thickness of one without neighbours.
+pub fn slabs(heights: &[f64], single: f64) -> Vec<[f64; 2]> {
     let mut gaps: Vec<f64> = heights.windows(2).map(|w| w[1] - w[0]).collect();
     gaps.sort_by(f64::total_cmp);
-    // A single plane stands for the slice it is in.
-    let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(1.0);
+    let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(single);
     let half = |gap: f64| if gap > GAP * usual { usual / 2.0 } else { gap / 2.0 };
     (0..heights.len())
         .map(|i| {

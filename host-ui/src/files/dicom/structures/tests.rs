@@ -116,6 +116,34 @@ fn what_lies_inside_of_a_structure_has_its_own_label_and_the_user_is_told() {
     }
 }
 
+/// Dose is counted in a solid: its volume is that of what was drawn, and what lies in it takes nothing from it.
+#[test]
+fn a_solid_is_what_was_drawn_with_its_hole_and_whatever_else_lies_in_it() {
+    let grid = grid([60, 60, 5], [0.5, 0.5, 2.0]);
+    let ring = (0..5)
+        .flat_map(|k| [10.0, 4.0].map(|r| circle(&grid, f64::from(k), [15.0, 15.0], r)))
+        .collect();
+    let inside: Vec<_> = (1..3).map(|k| circle(&grid, f64::from(k), [22.0, 15.0], 1.5)).collect();
+    let solids = set(vec![("Prostate", ring), ("Urethra", inside)]).solids().unwrap();
+    // The trapezoid rule over a lattice that is not in line with the planes.
+    let volume = |solid: &Solid, step: f64| {
+        let counts = [0, 1, 2].map(|a| ((solid.upper_m[a] - solid.lower_m[a]) / step).ceil() as usize);
+        let total: usize = counts.iter().product();
+        let inside = |n: usize| {
+            let at = [n % counts[0], n / counts[0] % counts[1], n / counts[0] / counts[1]];
+            solid.contains([0, 1, 2].map(|a| solid.lower_m[a] + (at[a] as f64 + 0.5) * step))
+        };
+        (0..total).filter(|&n| inside(n)).count() as f64 * (step * 1e3).powi(3)
+    };
+    let disc = |r: f64| 100.0 * (2.0 * PI / 200.0).sin() * r * r;
+    let (gland, urethra) = (volume(&solids[0], 0.25e-3), volume(&solids[1], 0.1e-3));
+    assert!(
+        (gland / ((disc(10.0) - disc(4.0)) * 10.0) - 1.0).abs() < 2e-3,
+        "{gland}"
+    );
+    assert!((urethra / (disc(1.5) * 4.0) - 1.0).abs() < 1e-2, "{urethra}");
+}
+
 #[test]
 fn planes_farther_apart_than_slices_fill_the_slices_between_but_not_a_gap() {
     let grid = grid([40, 40, 20], [0.5, 0.5, 1.0]);
