@@ -46,7 +46,7 @@ fn replay(reader: &str, read: fn(&[u8]) -> Option<String>) {
     for (_, bytes) in corpus(reader) {
         take(&bytes);
         (0..64).for_each(|n| take(&bytes[..bytes.len() * n / 64]));
-        let step = (bytes.len() / 512).max(1);
+        let step = (bytes.len() / 192).max(1);
         for at in (0..bytes.len()).step_by(step) {
             for change in [0x01, 0x80, 0xff] {
                 let mut bent = bytes.clone();

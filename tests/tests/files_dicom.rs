@@ -41,10 +41,48 @@ fn volume_mm3(v: &Voxels, name: &str) -> f64 {
     count as f64 * v.frame.spacing_m.iter().product::<f64>() * 1e9
 }
 
-/// Polygons of 48 corners.
-fn disc_mm2(radius_mm: f64) -> f64 {
-    let n = 48.0;
-    0.5 * n * (2.0 * std::f64::consts::PI / n).sin() * radius_mm.powi(2)
+/// Every voxel against 24 x 24 points in it, by the radii that the phantom was drawn with; those that are about half covered may go
+/// either way, and are counted.
+fn compare_with_what_was_drawn(v: &Voxels) -> usize {
+    type Inside = fn(f64, f64) -> bool;
+    // Smaller ones first, with their slices.
+    let drawn: [(&str, std::ops::Range<usize>, Inside); 4] = [
+        ("Urethra", 0..6, |x, y| (x - 6.0).hypot(y - 10.0) < 1.2),
+        ("Rectum", 2..4, |x, y| (1.5..3.0).contains(&(x - 10.0).hypot(y - 10.0))),
+        ("Bladder", 5..6, |x, y| (4.0..8.0).contains(&(x - 10.0).hypot(y - 10.0))),
+        ("Prostate", 1..5, |x, y| (x - 10.0).hypot(y - 10.0) < 7.0),
+    ];
+    let mut near_half = 0;
+    for (index, label) in v.labels.iter().enumerate() {
+        let (i, j, k) = (
+            index % v.dims[0],
+            index / v.dims[0] % v.dims[1],
+            index / v.dims[0] / v.dims[1],
+        );
+        let share = |inside: Inside| {
+            let point = |n: usize| {
+                let within = |m: usize| (m as f64 + 0.5) / 24.0 - 0.5;
+                inside((i as f64 + within(n % 24)) * 0.5, (j as f64 + within(n / 24)) * 0.6)
+            };
+            (0..576).filter(|&n| point(n)).count() as f64 / 576.0
+        };
+        let shares: Vec<(&str, f64)> = drawn
+            .iter()
+            .filter(|d| d.1.contains(&k))
+            .map(|d| (d.0, share(d.2)))
+            .collect();
+        if shares.iter().any(|(_, s)| (s - 0.5).abs() < 0.05) {
+            near_half += 1;
+            continue;
+        }
+        let expected = shares.iter().find(|(_, s)| *s > 0.5).map(|(name, _)| *name);
+        assert_eq!(
+            v.names.get(label).map(String::as_str),
+            expected,
+            "voxel {i}, {j}, {k}: {shares:?}"
+        );
+    }
+    near_half
 }
 
 #[test]
@@ -61,20 +99,9 @@ fn a_structure_set_lies_on_the_grid_of_its_tilted_images() {
         let normal = v.frame.directions.column(2).into_owned();
         let tilt = 0.35_f64;
         assert!((normal - nalgebra::Vector3::new(0.0, tilt.sin(), tilt.cos())).norm() < 1e-6);
-        // Radius 1.2 mm through six slices; a keyhole of 3 and 1.5 mm in two; a ring of 8 and 4 mm cut by exclusive or.
-        // The edges of things so small are off by some of their voxels, but not in the mean over a structure.
-        for (structure, expected, tolerance) in [
-            ("Urethra", disc_mm2(1.2) * 12.0, 0.06),
-            ("Rectum", (disc_mm2(3.0) - disc_mm2(1.5)) * 4.0, 0.06),
-            ("Bladder", (disc_mm2(8.0) - disc_mm2(4.0)) * 2.0, 0.03),
-        ] {
-            let found = volume_mm3(&v, structure);
-            println!("{name}: {structure} {found:.1} mm3, drawn {expected:.1}");
-            assert!(
-                (found / expected - 1.0).abs() < tolerance,
-                "{structure}: {found} and {expected}"
-            );
-        }
+        let near_half = compare_with_what_was_drawn(&v);
+        println!("{name}: {near_half} voxels are covered by half");
+        assert!(near_half < 60);
         let notes = v.frame.warning.expect("notes");
         assert!(notes.contains("Isocentre is left out: a contour is POINT"), "{notes}");
         assert!(notes.contains("Prostate ("), "{notes}");

@@ -58,11 +58,14 @@ fn decimal(value: f64) -> String {
     if exact.len() <= 16 {
         return exact;
     }
-    // As many digits as fit with sign, point and exponent.
+    // As near as sixteen characters come to it, with an exponent or without.
     (0..=15)
-        .rev()
         .flat_map(|digits| [format!("{value:.digits$}"), format!("{value:.digits$e}")])
-        .find(|text| text.len() <= 16)
+        .filter(|text| text.len() <= 16)
+        .min_by(|a, b| {
+            let off = |text: &str| text.parse::<f64>().map_or(f64::INFINITY, |v| (v - value).abs());
+            off(a).total_cmp(&off(b))
+        })
         .unwrap_or_else(|| format!("{value:.8e}"))
 }
 
@@ -148,4 +151,27 @@ pub fn bytes(object: InMemDicomObject) -> Result<Vec<u8>, String> {
     file.write_all(&mut bytes)
         .map_err(|e| format!("it cannot be written ({e})"))?;
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::decimal;
+
+    /// A small number once lost most of its digits to leading zeros.
+    #[test]
+    fn sixteen_characters_keep_as_many_digits_as_they_can() {
+        for (value, relative) in [
+            (8.876_543_210_123e-9, 1e-10),
+            (-1.234_567_890_123_456e-12, 1e-8),
+            (-123.456_789_012_345_67, 1e-13),
+            (0.1 + 0.2, 1e-14),
+            (6_405_120.123_456_789, 1e-14),
+        ] {
+            let text = decimal(value);
+            let read: f64 = text.parse().unwrap();
+            assert!(text.len() <= 16, "{text}");
+            assert!(((read - value) / value).abs() < relative, "{text} for {value:e}");
+        }
+        assert_eq!(decimal(145.0), "145");
+    }
 }

@@ -4,13 +4,14 @@ use super::super::super::element::short;
 use super::super::images::Grid;
 use super::{Contoured, SAME_PLANE_M};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Lines across each row of voxels along which coverage is measured.
 const LINES: usize = 4;
 /// Crossings of lines and edges in one file; a pelvis on fine images has some million.
 const MAX_CROSSINGS: f64 = 3e7;
-/// Voxels that are looked at and painted in one file; a whole pelvis has a hundred million.
-const MAX_VOXELS_TOUCHED: usize = 600_000_000;
+/// Voxels that are looked at and painted in one file; a whole pelvis has some ten million.
+const MAX_VOXELS_TOUCHED: usize = 150_000_000;
 const MAX_RUNS: usize = 20_000_000;
 /// Planes of contours that are farther apart than this many usual distances have a gap between them.
 const GAP: f64 = 1.5;
@@ -187,7 +188,7 @@ fn fill(polygons: &Polygons, [columns, rows]: [usize; 2], work: &mut Work) -> Re
         let row = line / LINES;
         covered.add_line(at);
         if lines.peek().is_none_or(|(next, _)| next / LINES != row) {
-            work.voxels += columns;
+            work.voxels += covered.touched.len();
             work.check()?;
             covered.take_row(row as u32, &mut runs);
         }
@@ -224,6 +225,8 @@ struct Coverage {
     ends: Vec<f64>,
     /// Change from the voxel before of what lines cover that go right through.
     through: Vec<f64>,
+    /// Columns outside of these are not covered at all.
+    touched: Range<usize>,
 }
 
 impl Coverage {
@@ -231,6 +234,7 @@ impl Coverage {
         Self {
             ends: vec![0.0; columns + 1],
             through: vec![0.0; columns + 1],
+            touched: 0..0,
         }
     }
 
@@ -240,6 +244,11 @@ impl Coverage {
         for pair in at.chunks_exact(2) {
             let [from, to] = [pair[0] + 0.5, pair[1] + 0.5].map(|x| x.clamp(0.0, columns as f64));
             let (first, last) = (from as usize, to as usize);
+            self.touched = if self.touched.is_empty() {
+                first..last + 1
+            } else {
+                self.touched.start.min(first)..self.touched.end.max(last + 1)
+            };
             if first == last {
                 self.ends[first] += to - from;
                 continue;
@@ -254,11 +263,12 @@ impl Coverage {
     /// The runs of a row that are covered at least by half; ready for the next row then.
     fn take_row(&mut self, row: u32, runs: &mut Vec<Run>) {
         let (mut through, mut begun) = (0.0, None);
-        for x in 0..self.ends.len() {
+        let touched = std::mem::take(&mut self.touched);
+        let columns = self.ends.len() - 1;
+        for x in touched.clone() {
             through += self.through[x];
             let share = (through + self.ends[x]) / LINES as f64;
-            // Nothing is beyond the last column, so that a run ends there.
-            match (share >= 0.5 - 1e-9 && x + 1 < self.ends.len(), begun) {
+            match (share >= 0.5 - 1e-9 && x < columns, begun) {
                 (true, None) => begun = Some(x as u32),
                 (false, Some(from)) => {
                     runs.push(Run {
@@ -271,7 +281,11 @@ impl Coverage {
                 _ => {}
             }
         }
-        self.ends.fill(0.0);
-        self.through.fill(0.0);
+        if let Some(from) = begun {
+            let to = touched.end as u32;
+            runs.push(Run { row, from, to });
+        }
+        self.ends[touched.clone()].fill(0.0);
+        self.through[touched].fill(0.0);
     }
 }
