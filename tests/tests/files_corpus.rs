@@ -43,9 +43,16 @@ fn replay(reader: &str, read: fn(&[u8]) -> Option<String>) {
             );
         }
     };
-    for (_, bytes) in corpus(reader) {
+    for (path, bytes) in corpus(reader) {
         take(&bytes);
         (0..64).for_each(|n| take(&bytes[..bytes.len() * n / 64]));
+        // What was found is slow by nature; bent it only takes long.
+        if path
+            .file_name()
+            .is_some_and(|n| n.to_string_lossy().starts_with("found"))
+        {
+            continue;
+        }
         let step = (bytes.len() / 192).max(1);
         for at in (0..bytes.len()).step_by(step) {
             for change in [0x01, 0x80, 0xff] {

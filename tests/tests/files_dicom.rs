@@ -101,7 +101,8 @@ fn a_structure_set_lies_on_the_grid_of_its_tilted_images() {
         assert!((normal - nalgebra::Vector3::new(0.0, tilt.sin(), tilt.cos())).norm() < 1e-6);
         let near_half = compare_with_what_was_drawn(&v);
         println!("{name}: {near_half} voxels are covered by half");
-        assert!(near_half < 60);
+        // All others are compared.
+        assert!(near_half * 50 < v.labels.len());
         let notes = v.frame.warning.expect("notes");
         assert!(notes.contains("Isocentre is left out: a contour is POINT"), "{notes}");
         assert!(notes.contains("Prostate ("), "{notes}");

@@ -3,13 +3,12 @@
 use super::super::super::element::short;
 use super::super::images::Grid;
 use super::{Contoured, SAME_PLANE_M};
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Lines across each row of voxels along which coverage is measured.
 const LINES: usize = 4;
 /// Crossings of lines and edges in one file; a pelvis on fine images has some million.
-const MAX_CROSSINGS: f64 = 3e7;
+const MAX_CROSSINGS: f64 = 1e7;
 /// Voxels that are looked at and painted in one file; a whole pelvis has some ten million.
 const MAX_VOXELS_TOUCHED: usize = 150_000_000;
 const MAX_RUNS: usize = 20_000_000;
@@ -174,36 +173,29 @@ pub fn slabs(heights: &[f64], single: f64) -> Vec<[f64; 2]> {
 
 /// Even and odd: what lies in two contours of a plane is a hole, and so is what a keyhole leads to.
 fn fill(polygons: &Polygons, [columns, rows]: [usize; 2], work: &mut Work) -> Result<Vec<Run>, String> {
-    let mut lines: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    let mut crossed: Vec<(u32, f64)> = Vec::new();
     for polygon in polygons {
         let next = polygon.iter().cycle().skip(1);
         for (a, b) in polygon.iter().zip(next) {
-            cross(*a, *b, rows, &mut lines, work)?;
+            cross(*a, *b, rows, &mut crossed, work)?;
         }
     }
+    crossed.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let mut runs = Vec::new();
     let mut covered = Coverage::new(columns);
-    let mut lines = lines.into_iter().peekable();
-    while let Some((line, at)) = lines.next() {
-        let row = line / LINES;
-        covered.add_line(at);
-        if lines.peek().is_none_or(|(next, _)| next / LINES != row) {
-            work.voxels += covered.touched.len();
-            work.check()?;
-            covered.take_row(row as u32, &mut runs);
+    for of_row in crossed.chunk_by(|a, b| a.0 / LINES as u32 == b.0 / LINES as u32) {
+        for line in of_row.chunk_by(|a, b| a.0 == b.0) {
+            covered.add_line(line);
         }
+        work.voxels += covered.touched.len();
+        work.check()?;
+        covered.take_row(of_row[0].0 / LINES as u32, &mut runs);
     }
     Ok(runs)
 }
 
 /// Where an edge crosses the lines. A voxel reaches half a step to each side of its index.
-fn cross(
-    a: [f64; 2],
-    b: [f64; 2],
-    rows: usize,
-    lines: &mut BTreeMap<usize, Vec<f64>>,
-    work: &mut Work,
-) -> Result<(), String> {
+fn cross(a: [f64; 2], b: [f64; 2], rows: usize, crossed: &mut Vec<(u32, f64)>, work: &mut Work) -> Result<(), String> {
     let (low, high) = if a[1] <= b[1] { (a, b) } else { (b, a) };
     let line_of = |y: f64| (y + 0.5) * LINES as f64 - 0.5;
     let most = (rows * LINES) as f64;
@@ -214,7 +206,7 @@ fn cross(
     for line in first as usize..last as usize {
         let y = (line as f64 + 0.5) / LINES as f64 - 0.5;
         let share = (y - low[1]) / (high[1] - low[1]);
-        lines.entry(line).or_default().push(low[0] + share * (high[0] - low[0]));
+        crossed.push((line as u32, low[0] + share * (high[0] - low[0])));
     }
     Ok(())
 }
@@ -238,11 +230,11 @@ impl Coverage {
         }
     }
 
-    fn add_line(&mut self, mut at: Vec<f64>) {
-        at.sort_by(f64::total_cmp);
+    /// Its crossings in order.
+    fn add_line(&mut self, line: &[(u32, f64)]) {
         let columns = self.ends.len() - 1;
-        for pair in at.chunks_exact(2) {
-            let [from, to] = [pair[0] + 0.5, pair[1] + 0.5].map(|x| x.clamp(0.0, columns as f64));
+        for pair in line.chunks_exact(2) {
+            let [from, to] = [pair[0].1 + 0.5, pair[1].1 + 0.5].map(|x| x.clamp(0.0, columns as f64));
             let (first, last) = (from as usize, to as usize);
             self.touched = if self.touched.is_empty() {
                 first..last + 1
