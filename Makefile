@@ -4,7 +4,7 @@ SHELL := /bin/bash
 CARGO ?= cargo
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: help run test build picture report force-pictures clean deps-run deps-test
+.PHONY: help run test build picture report fuzz force-pictures clean deps-run deps-test
 
 help: ## This list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -27,6 +27,9 @@ picture: deps-test build ## Draw the README's picture anew
 report: ## Speed against error of every tissue model, into benches/runs/<date>-<host> (some minutes)
 	$(CARGO) run --release -p stylet-benches --bin report
 
+fuzz: ## Feed each reader of files with what it does not expect for FUZZ_SECONDS (600) seconds
+	docs/tools/fuzz
+
 force-pictures: ## Measure the stiffness that the loop holds, and draw the pictures of force anew
 	$(CARGO) bench -p stylet-benches --bench force
 
@@ -37,4 +40,4 @@ deps-run:
 	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers
 
 deps-test:
-	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers python3-nibabel xvfb
+	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers python3-nibabel python3-pydicom xvfb

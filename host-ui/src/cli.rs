@@ -1,11 +1,36 @@
 //! The command line of `host-ui`.
 
+use crate::convert::ConvertArgs;
 use crate::dose::command::{DoseArgs, PerturbArgs};
+use crate::dose::files::{SeedDefaults, read_seeds};
 use crate::{app, files, procedure, record};
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use stylet_shm_schema::service::Instance;
+
+const SCENE_HELP: &str = "\
+A scene file is TOML; all but [volume] may be left out, and what is not said comes from the name of the structure:
+  name = \"phantom\"
+  [volume]
+  file = \"gland.seg.nrrd\"         # beside the scene file
+  [[structure]]
+  name = \"Prostate\"               # as the volume calls it; or label = 1, and called = \"Prostate\"
+  role = \"target\"                 # or \"spare\", \"tissue\", \"leave out\"
+  young_kpa = 17
+  poisson = 0.49
+  stretch = [0.6, 1.7]            # shortest and longest link, as a share of its length at rest
+  shear_deg = 25
+  fixed = false                   # true: never moves, as bone
+  [needle]
+  insert_mm_per_s = 50
+  retract_mm_per_s = 50
+  [device]
+  name = \"sim\"                    # for an rt-core that host-ui starts (--core)
+  [plan]
+  file = \"plan.dcm\"               # RT Plan or CSV
+
+Names that are known follow TG-263: Prostate, PTV, CTV (targets), Urethra, Rectum, Bladder, PenileBulb, Bowel (spared), and so on.";
 
 /// Operator's program of Stylet, a haptic simulator of prostate brachytherapy.
 ///
@@ -25,7 +50,7 @@ struct Common {
     /// Name that rt-core was started under
     #[arg(long, default_value = "main")]
     instance: String,
-    /// Segmented volume to run, NIfTI-1 (.nii or .nii.gz) [default: the scene that rt-core runs]
+    /// Volume to run instead of rt-core's scene: NIfTI-1, NRRD, MetaImage, DICOM RT Structure Set, or a scene file (.toml)
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Which label of the volume is the gland [default: all but 0]
@@ -45,9 +70,9 @@ enum Task {
         /// Start this rt-core when none is running, and end it afterwards
         #[arg(long, value_name = "PATH")]
         core: Option<PathBuf>,
-        /// Speed of insertion in mm/s
-        #[arg(long, default_value_t = 50.0, value_name = "MM/S")]
-        insert_speed: f64,
+        /// Speed of insertion in mm/s [default: that of the scene file, or 50]
+        #[arg(long, value_name = "MM/S")]
+        insert_speed: Option<f64>,
         /// Seeds along the needle, 1 to 128
         #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=128))]
         seeds: u16,
@@ -84,9 +109,11 @@ enum Task {
         #[arg(long, default_value = "main")]
         instance: String,
     },
-    /// Segmented volumes
+    /// Segmented volumes and scene files
     #[command(subcommand)]
     Scene(SceneTask),
+    /// Label volumes, seed plans and doses from one format to another, DICOM among them
+    Convert(ConvertArgs),
     /// Dose of seeds (TG-43U1) at points, in structures, or on a grid
     Dose(DoseArgs),
     /// What becomes of a plan's dose when every seed misses its place at random
@@ -95,9 +122,10 @@ enum Task {
 
 #[derive(Subcommand, Debug)]
 enum SceneTask {
-    /// Read a volume and say what would be sent to rt-core
+    /// Read a volume or a scene file and say what would be sent to rt-core
+    #[command(after_long_help = SCENE_HELP)]
     Check {
-        /// NIfTI-1 file (.nii or .nii.gz)
+        /// NIfTI-1, NRRD (also Slicer's .seg.nrrd), MetaImage, DICOM RT Structure Set, or a scene file (.toml)
         file: PathBuf,
         /// Which label is the gland [default: all but 0]
         #[arg(long, value_name = "N")]
@@ -143,6 +171,7 @@ impl Cli {
             Some(Task::Flight { instance: name }) => {
                 record::save_flight(&instance(&name)?).map(|path| println!("written: {path}"))
             }
+            Some(Task::Convert(args)) => args.run(),
             Some(Task::Dose(args)) => args.run(),
             Some(Task::Perturb(args)) => args.run(),
             Some(Task::Procedure {
@@ -152,8 +181,8 @@ impl Cli {
                 insert_speed,
                 seeds,
             }) => {
-                if !(0.1..=500.0).contains(&insert_speed) {
-                    return Err(format!("--insert-speed {insert_speed}: give 0.1 to 500 mm/s"));
+                if let Some(speed) = insert_speed.filter(|s| !(0.1..=500.0).contains(s)) {
+                    return Err(format!("--insert-speed {speed}: give 0.1 to 500 mm/s"));
                 }
                 let instance = instance(&common.instance)?;
                 let ended = procedure::run(procedure::Options {
@@ -162,7 +191,7 @@ impl Cli {
                     label: common.label,
                     out,
                     core,
-                    insert_m_per_s: insert_speed / 1e3,
+                    insert_m_per_s: insert_speed.map(|s| s / 1e3),
                     seeds: usize::from(seeds),
                 });
                 instance.sweep();
@@ -179,6 +208,9 @@ fn instance(name: &str) -> Result<Instance, String> {
 fn check(file: &Path, label: Option<u8>) -> Result<(), String> {
     let v = files::read(file, label).map_err(|e| e.to_string())?;
     println!("{}", v.name);
+    if files::scene::is_scene(file) {
+        check_scene_file(file)?;
+    }
     for (label, voxels) in &v.voxels_per_label {
         println!("  label {label}: {voxels} voxels");
     }
@@ -195,6 +227,18 @@ fn check(file: &Path, label: Option<u8>) -> Result<(), String> {
         v.tissue_elements(),
         v.tissue_elements() as f64 * (h_mm / 10.0).powi(3)
     );
+    for t in &v.structures {
+        let cells = v.cells.iter().filter(|&&c| c == t.label).count();
+        println!(
+            "  {} (label {}, {:?}): {cells} elements, {:.2} cm3, {} kPa{}",
+            t.name,
+            t.label,
+            t.role,
+            cells as f64 * (h_mm / 10.0).powi(3),
+            t.material.young_pa / 1e3,
+            if t.material.fixed { ", fixed" } else { "" }
+        );
+    }
     let p = v.patient_from_scene;
     println!("  patient (RAS, mm) from scene:");
     for r in 0..3 {
@@ -208,6 +252,26 @@ fn check(file: &Path, label: Option<u8>) -> Result<(), String> {
     }
     for warning in &v.warnings {
         println!("  note: {warning}");
+    }
+    Ok(())
+}
+
+/// What a scene file says besides its volume; its plan is read.
+fn check_scene_file(file: &Path) -> Result<(), String> {
+    let scene = files::scene::read(file).map_err(|e| e.to_string())?;
+    if let Some(plan) = &scene.plan {
+        let path = file.parent().unwrap_or(Path::new("")).join(plan);
+        let seeds = read_seeds(
+            &path,
+            SeedDefaults {
+                strength_u: Some(0.0),
+                ..SeedDefaults::default()
+            },
+        )?;
+        println!("  plan: {} seeds in {}", seeds.len(), path.display());
+    }
+    if let Some(device) = &scene.device {
+        println!("  device: {device}, for an rt-core that host-ui starts");
     }
     Ok(())
 }

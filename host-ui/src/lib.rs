@@ -2,6 +2,7 @@
 
 pub mod app;
 pub mod cli;
+pub mod convert;
 pub mod dose;
 pub mod files;
 pub mod format;

@@ -3,7 +3,7 @@
 mod ports;
 mod receive;
 
-use crate::files::LabelVolume;
+use crate::files::{LabelVolume, Tissue, names};
 use ports::{Board, Ports, UploadPort};
 use receive::Latest;
 use std::collections::{BTreeMap, VecDeque};
@@ -265,15 +265,19 @@ impl Link {
             )));
         }
         let id = self.next_id()?;
-        let header = UploadHeader {
+        let mut header = UploadHeader {
             host_id: self.host_id,
             command_id: id,
             dims: volume.dims.map(|d| d as u32),
             spacing_m: volume.spacing_m,
             patient_from_scene: volume.patient_from_scene,
             name: Text::new(&volume.name),
+            structure_count: volume.structures.len().min(MAX_STRUCTURES) as u32,
             ..UploadHeader::default()
         };
+        for (sent, tissue) in header.structures.iter_mut().zip(&volume.structures) {
+            *sent = upload_structure(tissue);
+        }
         self.upload_port = None;
         let Some(ports) = &self.ports else {
             return Err(LinkError(self.why_absent()));
@@ -398,3 +402,21 @@ impl Link {
 
 #[cfg(test)]
 mod tests;
+
+fn upload_structure(tissue: &Tissue) -> UploadStructure {
+    let role = match tissue.role {
+        names::Role::Target => role::TARGET,
+        names::Role::Spare => role::SPARE,
+        names::Role::Tissue => 0,
+    };
+    UploadStructure {
+        label: u32::from(tissue.label),
+        role: role | if tissue.material.fixed { role::FIXED } else { 0 },
+        own_limits: u32::from(tissue.material.limits.is_some()),
+        reserved: 0,
+        young_pa: tissue.material.young_pa,
+        poisson: tissue.material.poisson,
+        limits: tissue.material.limits.unwrap_or_default(),
+        name: Text::new(&tissue.name),
+    }
+}

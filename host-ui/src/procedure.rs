@@ -25,7 +25,8 @@ pub struct Options {
     pub label: Option<u8>,
     pub out: Option<PathBuf>,
     pub core: Option<PathBuf>,
-    pub insert_m_per_s: f64,
+    /// Otherwise as the scene file says, or as usual.
+    pub insert_m_per_s: Option<f64>,
     pub seeds: usize,
 }
 
@@ -47,13 +48,19 @@ pub fn run(options: Options) -> Result<(), String> {
         .map(|path| files::read(path, options.label))
         .transpose()
         .map_err(|e| e.to_string())?;
+    let scene_file = options.scene.as_deref().filter(|path| files::scene::is_scene(path));
+    let said = scene_file
+        .map(files::scene::read)
+        .transpose()
+        .map_err(|e| e.to_string())?;
     let interrupted = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         signal_hook::flag::register(signal, interrupted.clone()).map_err(|e| e.to_string())?;
     }
     let mut link = Link::new(options.instance.clone());
     let mut core = None;
-    find_core(&mut link, &mut core, &options, &interrupted)?;
+    let device = said.as_ref().and_then(|s| s.device.as_deref());
+    find_core(&mut link, &mut core, &options, device, &interrupted)?;
     if let Some(volume) = &volume {
         for note in &volume.warnings {
             println!("note: {note}");
@@ -61,9 +68,15 @@ pub fn run(options: Options) -> Result<(), String> {
         load(&mut link, volume, &interrupted)?;
     }
     let scene = link.scene().ok_or("the core sent no scene")?.clone();
+    let usual = Pace::default();
+    let of_file = |speed: fn(&files::scene::SceneFile) -> Option<f64>| said.as_ref().and_then(speed);
     let pace = Pace {
-        insert_m_per_s: options.insert_m_per_s,
-        ..Pace::default()
+        insert_m_per_s: options
+            .insert_m_per_s
+            .or(of_file(|s| s.insert_m_per_s))
+            .unwrap_or(usual.insert_m_per_s),
+        retract_m_per_s: of_file(|s| s.retract_m_per_s).unwrap_or(usual.retract_m_per_s),
+        ..usual
     };
     let plan = plan_with_seeds(&scene.header, options.seeds);
     println!(
@@ -115,6 +128,7 @@ fn find_core(
     link: &mut Link,
     core: &mut Option<Core>,
     options: &Options,
+    device: Option<&str>,
     interrupted: &AtomicBool,
 ) -> Result<(), String> {
     if wait(link, interrupted, FIND_LIMIT, |link| Ok(is_ready(link)))? {
@@ -127,7 +141,7 @@ fn find_core(
     let Some(path) = &options.core else {
         return Err(format!("{missing}, or add --core PATH to have it started"));
     };
-    let child = core.insert(Core::start(path, &options.instance)?);
+    let child = core.insert(Core::start(path, &options.instance, device)?);
     let found = wait(link, interrupted, START_LIMIT, |link| match child.ended() {
         Some(why) => Err(why),
         None => Ok(is_ready(link)),

@@ -284,7 +284,12 @@ fn labels_are_counted_by_their_voxels_in_place_and_volume() {
             }
         }
     }
-    let voxels = Voxels { dims, labels, frame };
+    let voxels = Voxels {
+        dims,
+        labels,
+        frame,
+        names: BTreeMap::new(),
+    };
     let names = BTreeMap::from([(2, "Urethra".to_owned())]);
     let found = structures(&voxels, &names, 500_000);
     assert_eq!(

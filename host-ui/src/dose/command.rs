@@ -8,7 +8,7 @@ use super::report::Judge;
 use super::seed::Seed;
 use super::source::Source;
 use super::structure::Structure;
-use super::{DoseGrid, DosePoints, labels, perturb, picture, structure};
+use super::{DoseGrid, DosePoints, contours, labels, perturb, picture, structure};
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -89,13 +89,13 @@ struct Common {
 pub struct DoseArgs {
     #[command(flatten)]
     common: Common,
-    /// Seeds (CSV); see --help
+    /// Seeds (CSV, or a DICOM RT Plan); see --help
     #[arg(long, value_name = "FILE")]
     seeds: PathBuf,
     /// Points to take the dose at (CSV: x_mm,y_mm,z_mm)
     #[arg(long, value_name = "FILE")]
     points: Option<PathBuf>,
-    /// Label volume with the structures (NIfTI-1)
+    /// Structures: NIfTI-1, NRRD, MetaImage or a DICOM RT Structure Set
     #[arg(long, value_name = "FILE")]
     structures: Option<PathBuf>,
     /// Side of the voxels of the grid
@@ -111,10 +111,10 @@ pub struct DoseArgs {
 pub struct PerturbArgs {
     #[command(flatten)]
     common: Common,
-    /// Planned seeds (CSV); see `host-ui dose --help`
+    /// Planned seeds (CSV, or a DICOM RT Plan); see `host-ui dose --help`
     #[arg(long, value_name = "FILE")]
     plan: PathBuf,
-    /// Label volume with the structures (NIfTI-1)
+    /// Structures: NIfTI-1, NRRD, MetaImage or a DICOM RT Structure Set
     #[arg(long, value_name = "FILE")]
     structures: PathBuf,
     /// Standard deviation of a seed's error along each axis
@@ -269,10 +269,27 @@ impl Common {
             .iter()
             .map(|m| Metric::parse(m))
             .collect::<Result<Vec<_>, _>>()?;
-        let names = self.label_names()?;
+        let given = self.label_names()?;
         let prescription_gy = self.prescription_gy(source)?;
+        let structures = match contours::structures(file, most_points)? {
+            Some((_, _)) if !given.is_empty() => {
+                return Err(format!("--name: {} names its structures itself", file.display()));
+            }
+            Some((structures, notes)) => {
+                notes
+                    .iter()
+                    .for_each(|note| eprintln!("note: {}: {note}", file.display()));
+                structures
+            }
+            None => self.labelled(file, given, most_points)?,
+        };
+        let target = self.target.as_deref();
+        Judge::new(structures, target, &extra, prescription_gy, seeds, most_points)
+    }
+
+    fn labelled(&self, file: &Path, given: BTreeMap<u8, String>, most_points: usize) -> Result<Vec<Structure>, String> {
         let voxels = crate::files::read_voxels(file).map_err(|e| e.to_string())?;
-        if let Some((label, name)) = names.iter().find(|(label, _)| !voxels.labels.contains(label)) {
+        if let Some((label, name)) = given.iter().find(|(label, _)| !voxels.labels.contains(label)) {
             return Err(format!(
                 "--name {label}={name}: {} has no voxel with label {label}",
                 file.display()
@@ -281,9 +298,10 @@ impl Common {
         if let Some(warning) = &voxels.frame.warning {
             eprintln!("note: {}: {warning}", file.display());
         }
-        let structures: Vec<Structure> = labels::structures(&voxels, &names, most_points);
-        let target = self.target.as_deref();
-        Judge::new(structures, target, &extra, prescription_gy, seeds, most_points)
+        // What the file calls its labels counts where nothing else is said.
+        let mut names = voxels.names.clone();
+        names.extend(given);
+        Ok(labels::structures(&voxels, &names, most_points))
     }
 
     fn label_names(&self) -> Result<BTreeMap<u8, String>, String> {

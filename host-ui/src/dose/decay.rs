@@ -41,6 +41,10 @@ pub fn days_to_s(days: f64) -> f64 {
     days * SECONDS_PER_DAY
 }
 
+pub fn s_to_days(s: f64) -> f64 {
+    s / days_to_s(1.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,6 +1,7 @@
 //! Seeds and points from CSV; every problem is told with its line.
 
 use super::seed::Seed;
+use crate::files::dicom::plan::PlanSeed;
 use std::path::Path;
 
 const MAX_ROWS: usize = 1_000_000;
@@ -21,7 +22,18 @@ pub struct SeedDefaults {
 }
 
 /// Seeds of a file with the columns `x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u|activity_mci]`.
+///
+/// Or those of a DICOM RT Plan, which says their strength itself.
 pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<Vec<Seed>, String> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("dcm")) {
+        let plan = crate::convert::read_plan(path)?;
+        let seed = |s: PlanSeed| Seed {
+            position_m: s.position_m,
+            axis: s.axis,
+            strength_u: s.strength_u,
+        };
+        return Ok(plan.seeds.into_iter().map(seed).collect());
+    }
     let known = [PLACE.as_slice(), &AXIS, &["strength_u", "activity_mci"]].concat();
     read(path, &known, |row| {
         Ok(Seed {
@@ -35,6 +47,57 @@ pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<Vec<Seed>, Stri
 /// Points of a file with the columns `x_mm,y_mm,z_mm`.
 pub fn read_points(path: &Path) -> Result<Vec<[f64; 3]>, String> {
     read(path, &PLACE, position_m)
+}
+
+/// Doses on a grid; x runs fastest, places in RAS.
+pub struct Dosed {
+    pub dims: [usize; 3],
+    pub origin_m: [f64; 3],
+    pub spacing_m: [f64; 3],
+    pub dose_gy: Vec<f64>,
+}
+
+/// A dose grid as `host-ui dose` writes it: every place of a regular grid, x fastest.
+pub fn read_dose(path: &Path) -> Result<Dosed, String> {
+    let rows = read(path, &[PLACE.as_slice(), &["dose_gy"]].concat(), |row| {
+        let dose = row.number("dose_gy")?.ok_or("dose_gy is empty")?;
+        Ok((position_m(row)?, dose))
+    })?;
+    grid_of(&rows).ok_or_else(|| {
+        format!(
+            "{}: its places are no grid with x running fastest, as dose_grid.csv has them",
+            path.display()
+        )
+    })
+}
+
+fn grid_of(rows: &[([f64; 3], f64)]) -> Option<Dosed> {
+    let origin_m = rows.first()?.0;
+    let near = |a: f64, b: f64| (a - b).abs() < 2e-7;
+    let first_off = |from: usize, axis: usize| (from..rows.len()).find(|&r| !near(rows[r].0[axis], origin_m[axis]));
+    let stride_y = first_off(0, 1).unwrap_or(rows.len());
+    let stride_z = first_off(0, 2).unwrap_or(rows.len());
+    if stride_y > stride_z || stride_z % stride_y != 0 || rows.len() % stride_z != 0 {
+        return None;
+    }
+    let dims = [stride_y, stride_z / stride_y, rows.len() / stride_z];
+    let last = rows.last()?.0;
+    let spacing_m = [0, 1, 2].map(|a| match dims[a] {
+        // One layer has no distance to tell; it is as thick as the grid is fine.
+        1 => (last[0] - origin_m[0]) / (dims[0].max(2) - 1) as f64,
+        n => (last[a] - origin_m[a]) / (n - 1) as f64,
+    });
+    let fits = |(r, (place, _)): (usize, &([f64; 3], f64))| {
+        let at = [r % stride_y, r / stride_y % dims[1], r / stride_z];
+        (0..3).all(|a| near(place[a], origin_m[a] + at[a] as f64 * spacing_m[a]))
+    };
+    let is_grid = spacing_m.iter().all(|s| *s > 0.0) && rows.iter().enumerate().all(fits);
+    is_grid.then(|| Dosed {
+        dims,
+        origin_m,
+        spacing_m,
+        dose_gy: rows.iter().map(|r| r.1).collect(),
+    })
 }
 
 /// Numbers of a line by the names of their columns; empty fields are absent.

@@ -1,20 +1,8 @@
-//! Where the voxels of a NIfTI file lie in the patient (RAS, m).
+//! The orientation that a NIfTI header gives.
 
+use super::frame::VoxelFrame;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use nifti::NiftiHeader;
-
-/// Axes whose cosine is larger are sheared.
-const SHEAR: f64 = 1e-3;
-
-/// `patient = directions * (spacing_m .* index) + origin_m`, index at voxel centres.
-#[derive(Clone, Debug)]
-pub struct VoxelFrame {
-    /// Orthonormal; mirrored when its determinant is negative.
-    pub directions: Matrix3<f64>,
-    pub spacing_m: [f64; 3],
-    pub origin_m: Vector3<f64>,
-    pub warning: Option<String>,
-}
 
 pub fn voxel_frame(h: &NiftiHeader) -> Result<VoxelFrame, String> {
     let (unit_m, unknown_unit) = match h.xyzt_units & 7 {
@@ -31,59 +19,16 @@ pub fn voxel_frame(h: &NiftiHeader) -> Result<VoxelFrame, String> {
         let columns = Matrix3::from_diagonal(&Vector3::from(pixdim(h)));
         (columns, Vector3::zeros(), "pixdim")
     };
-    let (columns, origin_m) = (columns * unit_m, origin * unit_m);
-    if !columns.iter().chain(origin_m.iter()).all(|v| v.is_finite()) {
-        return Err(format!(
-            "its {source} holds a value that is not a number; write the file again with a valid orientation"
-        ));
+    let mut frame = VoxelFrame::new(columns * unit_m, origin * unit_m, source)?;
+    if source == "pixdim" {
+        frame.warning = Some(
+            "the file says nothing of the patient's orientation (sform and qform are 0); +x, +y, +z are taken as right, anterior, superior"
+                .to_owned(),
+        );
+    } else if unknown_unit {
+        frame.warning = Some("the file names no unit of length; mm is assumed".to_owned());
     }
-    let spacing_m: [f64; 3] = [0, 1, 2].map(|a| columns.column(a).norm());
-    if spacing_m.iter().any(|s| !(1e-5..=0.1).contains(s)) {
-        let mm = spacing_m.map(|s| s * 1e3);
-        return Err(format!(
-            "its {source} gives voxels of {:.4} x {:.4} x {:.4} mm; each side must be 0.01 to 100 mm",
-            mm[0], mm[1], mm[2]
-        ));
-    }
-    if origin_m.amax() > 10.0 {
-        return Err(format!(
-            "its {source} puts the first voxel {:.1} m from the origin; at most 10 m is believed",
-            origin_m.amax()
-        ));
-    }
-    let raw = Matrix3::from_columns(&[0, 1, 2].map(|a| columns.column(a) / spacing_m[a]));
-    let worst = [(0, 1), (0, 2), (1, 2)]
-        .map(|(a, b)| raw.column(a).dot(&raw.column(b)).abs())
-        .into_iter()
-        .fold(0.0, f64::max);
-    if worst > SHEAR {
-        return Err(format!(
-            "its {source} is sheared (axes {:.2} deg off a right angle); resample it to a rectangular grid first",
-            worst.min(1.0).asin().to_degrees()
-        ));
-    }
-    let mut warning = (source == "pixdim").then(|| {
-        "the file says nothing of the patient's orientation (sform and qform are 0); +x, +y, +z are taken as right, anterior, superior"
-            .to_owned()
-    });
-    if unknown_unit && warning.is_none() {
-        warning = Some("the file names no unit of length; mm is assumed".to_owned());
-    }
-    Ok(VoxelFrame {
-        directions: nearest_orthonormal(raw),
-        spacing_m,
-        origin_m,
-        warning,
-    })
-}
-
-/// Single precision leaves the columns a little off.
-fn nearest_orthonormal(m: Matrix3<f64>) -> Matrix3<f64> {
-    let svd = m.svd(true, true);
-    match (svd.u, svd.v_t) {
-        (Some(u), Some(v_t)) => u * v_t,
-        _ => m,
-    }
+    Ok(frame)
 }
 
 fn pixdim(h: &NiftiHeader) -> [f64; 3] {

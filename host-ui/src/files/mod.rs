@@ -1,9 +1,24 @@
-//! Files that a user brings.
+//! Files that a user brings: label volumes of any format as the same voxels. Nothing that a header says is believed.
 
 mod affine;
+pub mod convert;
+pub mod dicom;
+pub mod element;
+pub mod error;
+mod frame;
+pub mod metaimage;
+pub mod names;
 pub mod nifti;
+pub mod nrrd;
+pub mod open;
+mod overlap;
+pub mod scene;
 mod volume;
 
-pub use affine::VoxelFrame;
-pub use nifti::{FileError, read, read_voxels};
-pub use volume::{LabelVolume, Voxels};
+pub use error::FileError;
+pub use frame::{VoxelFrame, ras_from_lps};
+pub use open::{read, read_voxels};
+pub use volume::{LabelVolume, Tissue, Voxels};
+
+/// Reads the file that a header names as that of its data.
+pub type Beside<'a> = &'a dyn Fn(&str) -> Result<Vec<u8>, String>;

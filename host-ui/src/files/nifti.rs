@@ -1,97 +1,86 @@
-//! A segmented volume from a NIfTI-1 file (.nii, .nii.gz); believes nothing that its header says.
+//! The labels of a NIfTI-1 file (.nii, .nii.gz); believes nothing that its header says.
 
-use super::affine::{VoxelFrame, voxel_frame};
-use super::volume::{LabelVolume, Voxels};
-use nifti::{IntoNdArray, NiftiHeader, NiftiObject, NiftiType, ReaderStreamedOptions};
+pub mod write;
+
+use super::affine::voxel_frame;
+use super::element::{Element, Endian, must_hold, read_labels, voxel_count};
+use super::volume::Voxels;
+use flate2::read::MultiGzDecoder;
+use nifti::{Endianness, NiftiHeader, NiftiType};
+use std::collections::BTreeMap;
 use std::io::Read;
-use std::path::Path;
 
-const HEADER_BYTES: u64 = 348;
-/// A volume with more voxels is not a prostate.
-const MAX_VOXELS: u64 = 1 << 30;
-/// Nothing that deflate makes is larger than this many times its file.
-const MAX_DEFLATE_RATIO: u64 = 1032;
+const HEADER_BYTES: usize = 348;
 const MAX_VOX_OFFSET: f32 = 16_777_216.0;
+const GZIP: [u8; 2] = [0x1f, 0x8b];
 
-/// Why a file was not taken: what was found, what was expected, what to do.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FileError(pub String);
-
-impl std::fmt::Display for FileError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
-    }
+/// Whether the first bytes are such a file's, packed or not.
+pub fn is_nifti(bytes: &[u8]) -> bool {
+    bytes.starts_with(&GZIP) || declared_size(bytes).is_some_and(|n| n == 348 || n == 540)
 }
 
-impl std::error::Error for FileError {}
-
-/// The tissue of a label volume: every label but 0, or the one asked for.
-pub fn read(path: &Path, label: Option<u8>) -> Result<LabelVolume, FileError> {
-    let voxels = read_voxels(path)?;
-    let name = path
-        .file_name()
-        .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    LabelVolume::from_voxels(&voxels, label, name).map_err(|why| told(path, &why))
+fn declared_size(bytes: &[u8]) -> Option<i32> {
+    let first: [u8; 4] = bytes.get(..4)?.try_into().ok()?;
+    let (little, big) = (i32::from_le_bytes(first), i32::from_be_bytes(first));
+    Some(if [348, 540].contains(&big) { big } else { little })
 }
 
-/// The labels as they lie in the file.
-pub fn read_voxels(path: &Path) -> Result<Voxels, FileError> {
-    let told = |why: String| told(path, &why);
-    let (header, frame, dims) = read_header(path).map_err(told)?;
-    // The crate has assertions of its own about what it reads.
-    let labels = std::panic::catch_unwind(|| read_labels(path, &header, dims))
-        .unwrap_or_else(|_| Err("its voxels could not be read; write the file again".to_owned()))
-        .map_err(told)?;
-    Ok(Voxels { dims, labels, frame })
-}
-
-fn told(path: &Path, why: &str) -> FileError {
-    FileError(format!("{}: {why}", path.display()))
-}
-
-fn read_header(path: &Path) -> Result<(NiftiHeader, VoxelFrame, [usize; 3]), String> {
-    let file_bytes = check_file(path)?;
-    let header = NiftiHeader::from_file(path).map_err(|e| match e {
-        nifti::NiftiError::Io(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => format!(
-            "it is cut off: {file_bytes} bytes, and the header alone needs {HEADER_BYTES}; copy or export it again"
-        ),
-        nifti::NiftiError::InvalidFormat => {
-            "its magic is not \"n+1\", so it is no NIfTI-1 file; export the segmentation as NIfTI-1 (.nii or .nii.gz)"
-                .to_owned()
-        }
-        other => format!("its header cannot be read ({other}); export the segmentation as NIfTI-1 again"),
-    })?;
+/// The whole file, packed or not.
+pub fn read(bytes: &[u8]) -> Result<Voxels, String> {
+    let packed = bytes.starts_with(&GZIP);
+    let mut from: Box<dyn Read + '_> = if packed {
+        Box::new(MultiGzDecoder::new(bytes))
+    } else {
+        Box::new(bytes)
+    };
+    let header = read_header(&mut from, bytes.len())?;
     let dims = checked_dims(&header)?;
-    check_size(path, &header, dims, file_bytes)?;
+    let element = element(&header)?;
+    let data_at = data_at(&header)?;
+    let count = voxel_count(&dims.map(|d| d as u64))?;
+    must_hold((data_at + count * element.bytes()) as u64, bytes.len() as u64, packed)?;
     let frame = voxel_frame(&header)?;
-    Ok((header, frame, dims))
+    let skipped = (data_at - HEADER_BYTES) as u64;
+    std::io::copy(&mut from.by_ref().take(skipped), &mut std::io::sink())
+        .map_err(|e| format!("it is cut off or damaged ({e}); copy or export it again"))?;
+    let endian = if header.endianness == Endianness::Big {
+        Endian::Big
+    } else {
+        Endian::Little
+    };
+    let labels = read_labels(from, element, endian, count, scale(&header))?;
+    Ok(Voxels {
+        dims,
+        labels,
+        frame,
+        names: BTreeMap::new(),
+    })
 }
 
-fn is_gz(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"))
-}
-
-fn check_file(path: &Path) -> Result<u64, String> {
-    let kind = std::fs::metadata(path).map_err(|e| format!("it cannot be opened ({e}); check the path"))?;
-    if !kind.is_file() {
-        return Err("it is not a file; give the path of a .nii or .nii.gz file".to_owned());
+fn read_header(from: &mut dyn Read, file_bytes: usize) -> Result<NiftiHeader, String> {
+    let mut start = Vec::with_capacity(HEADER_BYTES);
+    from.take(HEADER_BYTES as u64)
+        .read_to_end(&mut start)
+        .map_err(|e| format!("it is gzip data that cannot be unpacked ({e}); copy or export it again"))?;
+    if declared_size(&start) == Some(540) {
+        return Err("it is NIfTI-2; convert it to NIfTI-1".to_owned());
     }
-    if kind.len() == 0 {
-        return Err("it is empty; copy or export it again".to_owned());
+    if start.len() < HEADER_BYTES {
+        return Err(format!(
+            "it is cut off: {file_bytes} bytes, and the header alone needs {HEADER_BYTES}; copy or export it again"
+        ));
     }
-    let mut start = Vec::new();
-    std::fs::File::open(path)
-        .and_then(|f| f.take(4).read_to_end(&mut start))
-        .map_err(|e| format!("it cannot be read ({e}); check its permissions"))?;
-    let packed = start.starts_with(&[0x1f, 0x8b]);
-    match (is_gz(path), packed) {
-        (true, false) => Err("its name ends in .gz but it is not gzip data; rename it to .nii".to_owned()),
-        (false, true) => Err("it is gzip data; rename it to .nii.gz".to_owned()),
-        (false, false) if start == 540_i32.to_le_bytes() || start == 540_i32.to_be_bytes() => {
-            Err("it is NIfTI-2; convert it to NIfTI-1".to_owned())
-        }
-        _ => Ok(kind.len()),
+    if start.ends_with(b"ni1\0") {
+        return Err("it is the header of a .hdr/.img pair; convert it to one .nii file".to_owned());
     }
+    if !start.ends_with(b"n+1\0") {
+        return Err(
+            "its magic is not \"n+1\", so it is no NIfTI-1 file; export the segmentation as NIfTI-1 (.nii or .nii.gz)"
+                .to_owned(),
+        );
+    }
+    NiftiHeader::from_reader(start.as_slice())
+        .map_err(|e| format!("its header cannot be read ({e}); export the segmentation as NIfTI-1 again"))
 }
 
 fn checked_dims(h: &NiftiHeader) -> Result<[usize; 3], String> {
@@ -115,90 +104,44 @@ fn checked_dims(h: &NiftiHeader) -> Result<[usize; 3], String> {
     Ok(dims)
 }
 
-/// Before anything as large as the header claims is read or allocated.
-fn check_size(path: &Path, h: &NiftiHeader, dims: [usize; 3], file_bytes: u64) -> Result<(), String> {
-    let voxel_bytes = match h.data_type() {
-        Ok(
-            t @ (NiftiType::Uint8
-            | NiftiType::Int8
-            | NiftiType::Int16
-            | NiftiType::Uint16
-            | NiftiType::Int32
-            | NiftiType::Uint32
-            | NiftiType::Int64
-            | NiftiType::Uint64
-            | NiftiType::Float32
-            | NiftiType::Float64),
-        ) => t.size_of() as u64,
+fn element(h: &NiftiHeader) -> Result<Element, String> {
+    Ok(match h.data_type() {
+        Ok(NiftiType::Uint8) => Element::U8,
+        Ok(NiftiType::Int8) => Element::I8,
+        Ok(NiftiType::Uint16) => Element::U16,
+        Ok(NiftiType::Int16) => Element::I16,
+        Ok(NiftiType::Uint32) => Element::U32,
+        Ok(NiftiType::Int32) => Element::I32,
+        Ok(NiftiType::Uint64) => Element::U64,
+        Ok(NiftiType::Int64) => Element::I64,
+        Ok(NiftiType::Float32) => Element::F32,
+        Ok(NiftiType::Float64) => Element::F64,
         _ => {
             return Err(format!(
                 "its data type is number {}; labels must be whole numbers (uint8 is best)",
                 h.datatype
             ));
         }
-    };
-    if &h.magic != b"n+1\0" {
-        return Err("it is the header of a .hdr/.img pair; convert it to one .nii file".to_owned());
-    }
-    if !(352.0..=MAX_VOX_OFFSET).contains(&h.vox_offset) {
-        return Err(format!(
-            "its voxels begin at byte {}; expected 352 or a little more",
-            h.vox_offset
-        ));
-    }
-    let voxels = dims.iter().map(|&d| d as u64).product::<u64>();
-    if voxels > MAX_VOXELS {
-        return Err(format!(
-            "its header claims {} x {} x {} voxels, more than {MAX_VOXELS}; crop it to the gland",
-            dims[0], dims[1], dims[2]
-        ));
-    }
-    let needed = h.vox_offset as u64 + voxels * voxel_bytes;
-    let most = if is_gz(path) {
-        file_bytes.saturating_mul(MAX_DEFLATE_RATIO)
-    } else {
-        file_bytes
-    };
-    if needed > most {
-        return Err(format!(
-            "it is cut off or its header is wrong: the header asks for {needed} bytes and the file of {file_bytes} bytes cannot hold them; copy or export it again"
-        ));
-    }
-    Ok(())
+    })
 }
 
-fn read_labels(path: &Path, h: &NiftiHeader, dims: [usize; 3]) -> Result<Vec<u8>, String> {
-    let cut = |e: nifti::NiftiError| format!("it is cut off or damaged ({e}); copy or export it again");
-    let mut volume = ReaderStreamedOptions::new()
-        .read_file_rank(path, 2)
-        .map_err(cut)?
-        .into_volume();
-    if h.dim[1..4].iter().zip(dims).any(|(&a, b)| usize::from(a) != b) {
-        return Err("it changed while it was read".to_owned());
-    }
-    let mut labels = Vec::with_capacity(dims.iter().product());
-    for _ in 0..dims[2] {
-        let slice = volume.read_slice().map_err(cut)?;
-        let values = slice.into_ndarray::<f64>().map_err(cut)?;
-        // Transposed, so that x runs fastest.
-        for &value in values.t() {
-            labels.push(label_of(value)?);
-        }
-    }
-    if labels.len() != dims.iter().product::<usize>() {
-        return Err("it holds another number of voxels than its header says; export it again".to_owned());
-    }
-    Ok(labels)
-}
-
-fn label_of(value: f64) -> Result<u8, String> {
-    let whole = value.round();
-    if (value - whole).abs() < 1e-3 && (0.0..=255.0).contains(&whole) {
-        return Ok(whole as u8);
+fn data_at(h: &NiftiHeader) -> Result<usize, String> {
+    if (352.0..=MAX_VOX_OFFSET).contains(&h.vox_offset) {
+        return Ok(h.vox_offset as usize);
     }
     Err(format!(
-        "it holds the value {value}; a segmentation holds whole numbers 0 to 255. Is this the image instead of its labels?"
+        "its voxels begin at byte {}; expected 352 or a little more",
+        h.vox_offset
     ))
+}
+
+/// As the standard has it, a slope of 0 means that nothing is scaled.
+fn scale(h: &NiftiHeader) -> [f64; 2] {
+    let (slope, intercept) = (f64::from(h.scl_slope), f64::from(h.scl_inter));
+    if slope == 0.0 || !slope.is_finite() || !intercept.is_finite() {
+        return [1.0, 0.0];
+    }
+    [slope, intercept]
 }
 
 #[cfg(test)]

@@ -1,7 +1,9 @@
 //! A segmented volume as the core takes it: cubic elements on the lattice of the scene frame.
 
-use super::affine::VoxelFrame;
+use super::frame::VoxelFrame;
+use super::names::{Material, Role, known, unknown};
 use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
 
 /// Room around the tissue.
 const MARGIN_M: f64 = 0.020;
@@ -10,12 +12,23 @@ const MAX_TISSUE: usize = 4_000_000;
 const MAX_CELLS: usize = 64 << 20;
 const COARSER: f64 = 1.1;
 
+/// One structure of a volume and what it is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tissue {
+    pub label: u8,
+    pub name: String,
+    pub role: Role,
+    pub material: Material,
+}
+
 /// Element (i, j, k) has its centre at ((i + 0.5) h, (j + 0.5) h, (k + 0.5) h), x fastest; every cell but 0 is tissue.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelVolume {
     pub dims: [usize; 3],
     pub spacing_m: f64,
     pub cells: Vec<u8>,
+    /// What the cells with each label are; empty: all tissue is one.
+    pub structures: Vec<Tissue>,
     /// Patient (RAS, m) from scene: row-major rotation, then translation.
     pub patient_from_scene: [f64; 12],
     pub name: String,
@@ -26,10 +39,13 @@ pub struct LabelVolume {
 }
 
 /// The voxels of a file as they lie in it, x fastest.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Voxels {
     pub dims: [usize; 3],
     pub labels: Vec<u8>,
     pub frame: VoxelFrame,
+    /// What the file calls its labels, where it says so.
+    pub names: BTreeMap<u8, String>,
 }
 
 /// First and last tissue voxel along each axis.
@@ -40,20 +56,73 @@ impl LabelVolume {
         self.cells.iter().filter(|&&c| c != 0).count()
     }
 
+    /// The structures that the volume names, or all labels as one tissue, or only the one asked for.
     pub fn from_voxels(voxels: &Voxels, label: Option<u8>, name: String) -> Result<Self, String> {
-        let mut counts = [0_u64; 256];
-        for &l in &voxels.labels {
-            counts[usize::from(l)] += 1;
+        if label.is_none() && !voxels.names.is_empty() {
+            return Self::from_tissues(voxels, by_name(voxels), name);
         }
-        let present: Vec<(u8, u64)> = (1..=255)
-            .map(|l| (l, counts[usize::from(l)]))
-            .filter(|p| p.1 > 0)
+        let present = present(voxels);
+        let mut keep = [0_u8; 256];
+        (1..=255)
+            .filter(|&l| label.is_none_or(|only| only == l))
+            .for_each(|l| keep[usize::from(l)] = 1);
+        let mut volume = Self::resized(voxels, &keep, name, || no_tissue(label, &present))?;
+        if label.is_none() && present.len() > 1 {
+            volume
+                .warnings
+                .push(format!("all labels are taken as one tissue: {}", list(&present)));
+        }
+        Ok(volume)
+    }
+
+    /// Labels that none of the structures has are left out.
+    pub fn from_tissues(voxels: &Voxels, structures: Vec<Tissue>, name: String) -> Result<Self, String> {
+        let mut keep = [0_u8; 256];
+        structures.iter().for_each(|t| keep[usize::from(t.label)] = t.label);
+        let present = present(voxels);
+        let nothing = || "none of its structures has a voxel; export the segmentation again".to_owned();
+        let mut volume = Self::resized(voxels, &keep, name, nothing)?;
+        let in_cells = |t: &Tissue| volume.cells.contains(&t.label);
+        let (structures, lost): (Vec<Tissue>, Vec<Tissue>) = structures.into_iter().partition(in_cells);
+        let notes = &mut volume.warnings;
+        notes.extend(
+            lost.iter()
+                .map(|t| format!("\"{}\" is thinner than an element and is left out", t.name)),
+        );
+        let left_out: Vec<(u8, u64)> = present
+            .into_iter()
+            .filter(|(l, _)| keep[usize::from(*l)] == 0)
             .collect();
-        let bounds = tissue_bounds(voxels, label).ok_or_else(|| no_tissue(label, &present))?;
+        if !left_out.is_empty() {
+            notes.push(format!("labels without a structure are left out: {}", list(&left_out)));
+        }
+        for t in structures.iter().filter(|t| known(&t.name).is_none()) {
+            notes.push(format!(
+                "\"{}\" is no name of TG-263 that is known here (as Prostate, Urethra, Rectum, Bladder are); it is taken as {}",
+                t.name,
+                match t.role {
+                    Role::Target => "a target",
+                    Role::Spare => "to be spared",
+                    Role::Tissue => "tissue around",
+                }
+            ));
+        }
+        if !structures.iter().any(|t| t.role == Role::Target) {
+            notes.push(
+                "no structure is a target, so the whole body is aimed at; name one Prostate, CTV or PTV".to_owned(),
+            );
+        }
+        volume.structures = structures;
+        Ok(volume)
+    }
+
+    /// With elements as large as the longest side of a voxel, or larger when that would be too many.
+    fn resized(voxels: &Voxels, keep: &[u8; 256], name: String, nothing: impl Fn() -> String) -> Result<Self, String> {
+        let bounds = tissue_bounds(voxels, keep).ok_or_else(nothing)?;
         let finest = voxels.frame.spacing_m.iter().fold(0.0_f64, |a, &b| a.max(b));
         let mut h = finest;
         loop {
-            let volume = Self::resampled(voxels, label, bounds, h);
+            let volume = Self::resampled(voxels, keep, bounds, h);
             if let Some((dims, origin, cells)) = volume.filter(|v| tissue(&v.2) <= MAX_TISSUE) {
                 if tissue(&cells) == 0 {
                     return Err(format!("the tissue is thinner than its elements of {:.2} mm", h * 1e3));
@@ -66,16 +135,14 @@ impl LabelVolume {
                         finest * 1e3
                     ));
                 }
-                if label.is_none() && present.len() > 1 {
-                    warnings.push(format!("all labels are taken as one tissue: {}", list(&present)));
-                }
                 return Ok(Self {
                     dims,
                     spacing_m: h,
                     cells,
+                    structures: Vec::new(),
                     patient_from_scene: transform(&voxels.frame, voxels.dims, origin),
                     name,
-                    voxels_per_label: present,
+                    voxels_per_label: present(voxels),
                     warnings,
                 });
             }
@@ -84,7 +151,7 @@ impl LabelVolume {
     }
 
     /// Size, corner of the lattice in the upright voxel frame (m), and cells; `None` when it would be too large.
-    fn resampled(v: &Voxels, label: Option<u8>, bounds: Bounds, h: f64) -> Option<([usize; 3], [f64; 3], Vec<u8>)> {
+    fn resampled(v: &Voxels, keep: &[u8; 256], bounds: Bounds, h: f64) -> Option<([usize; 3], [f64; 3], Vec<u8>)> {
         let (low, high) = upright(bounds, mirrored(&v.frame), v.dims);
         let mut dims = [0; 3];
         let mut corner = [0.0; 3];
@@ -106,8 +173,8 @@ impl LabelVolume {
         for k in 0..dims[2] {
             for j in 0..dims[1] {
                 for i in 0..dims[0] {
-                    let share = covered(v, label, flip, [&covers[0][i], &covers[1][j], &covers[2][k]]);
-                    cells[(k * dims[1] + j) * dims[0] + i] = u8::from(share >= 0.5);
+                    let label = covered(v, keep, flip, [&covers[0][i], &covers[1][j], &covers[2][k]]);
+                    cells[(k * dims[1] + j) * dims[0] + i] = label;
                 }
             }
         }
@@ -146,29 +213,59 @@ fn covers(elements: usize, corner: f64, h: f64, side: f64, voxels: usize) -> Vec
         .collect()
 }
 
-fn covered(v: &Voxels, label: Option<u8>, flip: bool, [xs, ys, zs]: [&Vec<(usize, f64)>; 3]) -> f64 {
+/// The label that covers most of an element, of those that together cover at least half of it; else 0.
+fn covered(v: &Voxels, keep: &[u8; 256], flip: bool, [xs, ys, zs]: [&Vec<(usize, f64)>; 3]) -> u8 {
+    let mut shares: [(u8, f64); 8] = [(0, 0.0); 8];
     let mut sum = 0.0;
     for &(z, wz) in zs {
         for &(y, wy) in ys {
             let row = (z * v.dims[1] + y) * v.dims[0];
             for &(x, wx) in xs {
                 let x = if flip { v.dims[0] - 1 - x } else { x };
-                if is_tissue(v.labels[row + x], label) {
-                    sum += wx * wy * wz;
+                let label = keep[usize::from(v.labels[row + x])];
+                if label == 0 {
+                    continue;
+                }
+                sum += wx * wy * wz;
+                // More than eight structures meet in no element that is worth an argument.
+                if let Some(share) = shares.iter_mut().find(|(l, _)| *l == label || *l == 0) {
+                    *share = (label, share.1 + wx * wy * wz);
                 }
             }
         }
     }
-    sum + 1e-9
+    let most = shares.iter().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+    most.filter(|_| sum + 1e-9 >= 0.5).map_or(0, |(label, _)| *label)
 }
 
-fn is_tissue(value: u8, label: Option<u8>) -> bool {
-    label.map_or(value != 0, |l| value == l && l != 0)
+/// Each label but 0 with its number of voxels.
+fn present(v: &Voxels) -> Vec<(u8, u64)> {
+    let mut counts = [0_u64; 256];
+    v.labels.iter().for_each(|&l| counts[usize::from(l)] += 1);
+    (1..=255)
+        .map(|l| (l, counts[usize::from(l)]))
+        .filter(|p| p.1 > 0)
+        .collect()
 }
 
-fn tissue_bounds(v: &Voxels, label: Option<u8>) -> Option<Bounds> {
+/// The labels that a volume has, each what its name says.
+pub fn by_name(v: &Voxels) -> Vec<Tissue> {
+    let tissue = |(label, _)| {
+        let name = v.names.get(&label).cloned().unwrap_or_else(|| format!("label {label}"));
+        let (role, material) = known(&name).unwrap_or_else(unknown);
+        Tissue {
+            label,
+            name,
+            role,
+            material,
+        }
+    };
+    present(v).into_iter().map(tissue).collect()
+}
+
+fn tissue_bounds(v: &Voxels, keep: &[u8; 256]) -> Option<Bounds> {
     let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
-    for (index, _) in v.labels.iter().enumerate().filter(|(_, l)| is_tissue(**l, label)) {
+    for (index, _) in v.labels.iter().enumerate().filter(|(_, l)| keep[usize::from(**l)] != 0) {
         let at = [
             index % v.dims[0],
             index / v.dims[0] % v.dims[1],

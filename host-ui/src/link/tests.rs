@@ -134,6 +134,7 @@ fn a_command_and_a_volume_arrive_and_are_answered_once() {
     let volume = LabelVolume {
         dims: [2, 3, 4],
         spacing_m: 1e-3,
+        structures: Vec::new(),
         cells: (0..24).collect(),
         patient_from_scene: [0.0; 12],
         name: "gland".to_owned(),

@@ -10,8 +10,10 @@ const END_LIMIT: Duration = Duration::from_secs(4);
 pub struct Core(Child);
 
 impl Core {
-    pub fn start(path: &Path, instance: &Instance) -> Result<Self, String> {
+    pub fn start(path: &Path, instance: &Instance, device: Option<&str>) -> Result<Self, String> {
+        let device = device.iter().flat_map(|name| ["--device", name]);
         Command::new(path)
+            .args(device)
             .args(["--instance", instance.name(), "--rt-if-allowed", "--exit-with-parent"])
             .stdin(Stdio::null())
             .spawn()

@@ -1,0 +1,4 @@
+//! The readers of files as they are, without the window.
+
+#[path = "../../src/files/mod.rs"]
+pub mod files;

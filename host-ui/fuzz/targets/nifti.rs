@@ -1,0 +1,10 @@
+//! NIfTI-1, packed or not.
+
+#![no_main]
+
+use host_ui_fuzz::files;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    let _answer = files::nifti::read(data);
+});

@@ -1,0 +1,10 @@
+//! NRRD; a detached header finds the file itself as its data.
+
+#![no_main]
+
+use host_ui_fuzz::files;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    let _answer = files::nrrd::read(data, &|_| Ok(data.to_vec()));
+});

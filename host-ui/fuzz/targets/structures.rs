@@ -1,0 +1,10 @@
+//! RT Structure Set without its images.
+
+#![no_main]
+
+use host_ui_fuzz::files;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    let _answer = files::dicom::read(data).and_then(|o| files::dicom::structures::read(&o, None));
+});

@@ -1,0 +1,354 @@
+//! A DICOM file as an object; its lengths and its depth are checked first, as the parser makes room for what an element claims.
+
+use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
+use dicom_core::{Tag, VR};
+use dicom_dictionary_std::{StandardDataDictionary, tags, uids};
+use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
+use std::io::Read;
+
+const MAX_DEPTH: usize = 16;
+const MAX_ELEMENTS: usize = 1 << 20;
+/// Every value of a list becomes a string of its own.
+const MAX_VALUES: usize = 8 << 20;
+/// Retired, but there are files in it.
+const EXPLICIT_VR_BIG_ENDIAN: &str = "1.2.840.10008.1.2.2";
+const UNDEFINED: u32 = u32::MAX;
+const ITEM: Tag = Tag(0xfffe, 0xe000);
+const ITEM_END: Tag = Tag(0xfffe, 0xe00d);
+const SEQUENCE_END: Tag = Tag(0xfffe, 0xe0dd);
+/// Pixels of any kind begin here; they are not read.
+const FIRST_PIXELS: Tag = Tag(0x7fe0, 0x0008);
+
+pub struct Object {
+    pub sop_class: String,
+    pub data: InMemDicomObject,
+}
+
+pub fn is_dicom(bytes: &[u8]) -> bool {
+    has_preamble(bytes) || is_bare(bytes)
+}
+
+fn has_preamble(bytes: &[u8]) -> bool {
+    bytes.get(128..132) == Some(b"DICM")
+}
+
+/// Old files begin with their first element, of group 8, little endian; nearly always the length of that group or the character set.
+fn is_bare(bytes: &[u8]) -> bool {
+    bytes.len() > 132 && bytes[..2] == [8, 0] && matches!(bytes[2..4], [0x00 | 0x01 | 0x05 | 0x08 | 0x12 | 0x16, 0])
+}
+
+/// Where the data set begins and how it is written; of a bare file two letters tell.
+fn syntax(bytes: &[u8]) -> Result<(Syntax, usize), String> {
+    if has_preamble(bytes) {
+        let (uid, from) = transfer_syntax(bytes)?;
+        return Ok((Syntax::of(&uid)?, from));
+    }
+    if !is_bare(bytes) {
+        return Err("it has no DICM at byte 128, so it is no DICOM file; export it again".to_owned());
+    }
+    let letters = [bytes[4], bytes[5]];
+    let explicit = VR::from_binary(letters).is_some();
+    Ok((
+        if explicit {
+            Syntax::ExplicitLittle
+        } else {
+            Syntax::ImplicitLittle
+        },
+        0,
+    ))
+}
+
+/// Everything before the pixels.
+pub fn read(bytes: &[u8]) -> Result<Object, String> {
+    let values = bytes.iter().filter(|&&b| b == b'\\').count();
+    if values > MAX_VALUES {
+        return Err(format!(
+            "it has {values} values in lists, more than {MAX_VALUES}; export fewer structures"
+        ));
+    }
+    let (syntax, from) = syntax(bytes)?;
+    let mut walk = Walk {
+        bytes,
+        at: from,
+        syntax,
+        elements: 0,
+    };
+    let end = walk.top().map_err(|why| format!("{why}; copy or export it again"))?;
+    let data = parse(syntax, &bytes[from..end])?;
+    let sop_class = super::values::text(&data, tags::SOP_CLASS_UID).unwrap_or_default();
+    Ok(Object { sop_class, data })
+}
+
+/// With a group 2 of our own in front, as that of the file has served.
+fn parse(syntax: Syntax, dataset: &[u8]) -> Result<InMemDicomObject, String> {
+    let meta = FileMetaTableBuilder::new()
+        .transfer_syntax(syntax.uid())
+        .media_storage_sop_class_uid(uids::RAW_DATA_STORAGE)
+        .media_storage_sop_instance_uid("2.25.0")
+        .build()
+        .map_err(|e| e.to_string())?;
+    let mut front = [[0; 128].as_slice(), b"DICM"].concat();
+    meta.write(&mut front).map_err(|e| e.to_string())?;
+    dicom_object::from_reader(front.as_slice().chain(dataset))
+        .map(|o| o.into_inner())
+        .map_err(|e| format!("it cannot be read ({e}); export it again"))
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Syntax {
+    ExplicitLittle,
+    ImplicitLittle,
+    ExplicitBig,
+}
+
+impl Syntax {
+    fn uid(self) -> &'static str {
+        match self {
+            Self::ExplicitLittle => uids::EXPLICIT_VR_LITTLE_ENDIAN,
+            Self::ImplicitLittle => uids::IMPLICIT_VR_LITTLE_ENDIAN,
+            Self::ExplicitBig => EXPLICIT_VR_BIG_ENDIAN,
+        }
+    }
+
+    fn of(uid: &str) -> Result<Self, String> {
+        match uid {
+            uids::IMPLICIT_VR_LITTLE_ENDIAN => Ok(Self::ImplicitLittle),
+            uids::EXPLICIT_VR_LITTLE_ENDIAN => Ok(Self::ExplicitLittle),
+            EXPLICIT_VR_BIG_ENDIAN => Ok(Self::ExplicitBig),
+            // Packed pixels: everything before them is written as without.
+            packed if packed.starts_with("1.2.840.10008.1.2.4.") || packed == uids::RLE_LOSSLESS => {
+                Ok(Self::ExplicitLittle)
+            }
+            other => Err(format!(
+                "its transfer syntax {} is not read; export it as explicit VR little endian",
+                super::super::element::short(other)
+            )),
+        }
+    }
+}
+
+/// Group 2, always explicit and little: which syntax the rest has, and where that begins.
+fn transfer_syntax(bytes: &[u8]) -> Result<(String, usize), String> {
+    let mut walk = Walk {
+        bytes,
+        at: 132,
+        syntax: Syntax::ExplicitLittle,
+        elements: 0,
+    };
+    let mut found = None;
+    while walk.at < bytes.len() && walk.group()? == 2 {
+        let head = walk.head()?;
+        let value = walk
+            .value(&head)
+            .map_err(|why| format!("{why}; copy or export it again"))?;
+        if head.tag == tags::TRANSFER_SYNTAX_UID {
+            found = Some(String::from_utf8_lossy(value).trim_end_matches(['\0', ' ']).to_owned());
+        }
+    }
+    found
+        .map(|uid| (uid, walk.at))
+        .ok_or_else(|| "it does not say its transfer syntax; export it again".to_owned())
+}
+
+struct Head {
+    tag: Tag,
+    vr: VR,
+    length: u32,
+}
+
+struct Walk<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    syntax: Syntax,
+    elements: usize,
+}
+
+impl<'a> Walk<'a> {
+    /// Through the whole data set; gives where it ends or its pixels begin.
+    fn top(&mut self) -> Result<usize, String> {
+        while self.at < self.bytes.len() {
+            let begin = self.at;
+            let head = self.head()?;
+            if head.tag >= FIRST_PIXELS && head.tag.group() == FIRST_PIXELS.group() {
+                return Ok(begin);
+            }
+            self.content(&head, self.bytes.len(), 0)?;
+        }
+        Ok(self.at)
+    }
+
+    fn content(&mut self, head: &Head, end: usize, depth: usize) -> Result<(), String> {
+        self.elements += 1;
+        if self.elements > MAX_ELEMENTS {
+            return Err(format!("it has more than {MAX_ELEMENTS} elements"));
+        }
+        let nested = head.vr == VR::SQ || (self.syntax == Syntax::ImplicitLittle && head.length == UNDEFINED);
+        if nested {
+            return self.sequence(head, end, depth + 1);
+        }
+        self.value(head).and_then(|_| self.within(head.tag, end))
+    }
+
+    fn sequence(&mut self, head: &Head, end: usize, depth: usize) -> Result<(), String> {
+        if depth > MAX_DEPTH {
+            return Err(format!("its sequences lie more than {MAX_DEPTH} deep in one another"));
+        }
+        let sequence_end = self.end_of(head, end)?;
+        while self.at < sequence_end.unwrap_or(end) {
+            let item = self.head()?;
+            if item.tag == SEQUENCE_END && sequence_end.is_none() && item.length == 0 {
+                return Ok(());
+            }
+            if item.tag != ITEM {
+                return Err(format!(
+                    "in the sequence {} there is {} where an item must be",
+                    head.tag, item.tag
+                ));
+            }
+            self.item(&item, sequence_end.unwrap_or(end), depth)?;
+        }
+        match sequence_end {
+            Some(_) => self.within(head.tag, end),
+            None => Err(format!("the sequence {} has no end", head.tag)),
+        }
+    }
+
+    fn item(&mut self, item: &Head, end: usize, depth: usize) -> Result<(), String> {
+        let item_end = self.end_of(item, end)?;
+        while self.at < item_end.unwrap_or(end) {
+            let head = self.head()?;
+            if head.tag == ITEM_END && item_end.is_none() && head.length == 0 {
+                return Ok(());
+            }
+            self.content(&head, item_end.unwrap_or(end), depth)?;
+        }
+        match item_end {
+            Some(_) => self.within(item.tag, end),
+            None => Err("an item of a sequence has no end".to_owned()),
+        }
+    }
+
+    /// `None` for a length that is told by a mark at the end.
+    fn end_of(&self, head: &Head, end: usize) -> Result<Option<usize>, String> {
+        if head.length == UNDEFINED {
+            return Ok(None);
+        }
+        let own = self.at + head.length as usize;
+        if own > end {
+            return Err(self.too_long(head, end));
+        }
+        Ok(Some(own))
+    }
+
+    fn too_long(&self, head: &Head, end: usize) -> String {
+        format!(
+            "it is cut off or damaged: the element {} claims {} bytes and {} are left",
+            head.tag,
+            head.length,
+            end.saturating_sub(self.at)
+        )
+    }
+
+    fn within(&self, tag: Tag, end: usize) -> Result<(), String> {
+        if self.at <= end {
+            return Ok(());
+        }
+        Err(format!("it is damaged: the element {tag} is longer than what it is in"))
+    }
+
+    fn value(&mut self, head: &Head) -> Result<&'a [u8], String> {
+        if head.length == UNDEFINED {
+            return Err(format!("the element {} ({}) has no length", head.tag, head.vr));
+        }
+        let value = self.bytes.get(self.at..self.at + head.length as usize);
+        let value = value.ok_or_else(|| self.too_long(head, self.bytes.len()))?;
+        self.at += value.len();
+        Ok(value)
+    }
+
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], String> {
+        let part = self
+            .bytes
+            .get(self.at..self.at + N)
+            .and_then(|p| <[u8; N]>::try_from(p).ok());
+        self.at += N;
+        part.ok_or_else(|| "it is cut off in the middle of an element".to_owned())
+    }
+
+    fn u16(&mut self) -> Result<u16, String> {
+        let bytes = self.take()?;
+        Ok(match self.syntax {
+            Syntax::ExplicitBig => u16::from_be_bytes(bytes),
+            _ => u16::from_le_bytes(bytes),
+        })
+    }
+
+    fn u32(&mut self) -> Result<u32, String> {
+        let bytes = self.take()?;
+        Ok(match self.syntax {
+            Syntax::ExplicitBig => u32::from_be_bytes(bytes),
+            _ => u32::from_le_bytes(bytes),
+        })
+    }
+
+    fn group(&mut self) -> Result<u16, String> {
+        let at = self.at;
+        let group = self.u16();
+        self.at = at;
+        group
+    }
+
+    fn head(&mut self) -> Result<Head, String> {
+        let tag = Tag(self.u16()?, self.u16()?);
+        if tag.group() == ITEM.group() {
+            let length = self.u32()?;
+            return Ok(Head {
+                tag,
+                vr: VR::UN,
+                length,
+            });
+        }
+        if self.syntax == Syntax::ImplicitLittle {
+            let known = StandardDataDictionary.by_tag(tag).map(|e| e.vr().relaxed());
+            let length = self.u32()?;
+            return Ok(Head {
+                tag,
+                vr: known.unwrap_or(VR::UN),
+                length,
+            });
+        }
+        let code: [u8; 2] = self.take()?;
+        let vr = VR::from_binary(code).ok_or_else(|| {
+            format!(
+                "the element {tag} is of a kind that DICOM does not have ({:?})",
+                String::from_utf8_lossy(&code)
+            )
+        })?;
+        let long = matches!(
+            vr,
+            VR::OB
+                | VR::OD
+                | VR::OF
+                | VR::OL
+                | VR::OV
+                | VR::OW
+                | VR::SQ
+                | VR::SV
+                | VR::UC
+                | VR::UN
+                | VR::UR
+                | VR::UT
+                | VR::UV
+        );
+        let length = if long {
+            self.u16()?;
+            self.u32()?
+        } else {
+            u32::from(self.u16()?)
+        };
+        Ok(Head { tag, vr, length })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,128 @@
+//! The grid of the image series that a structure set was drawn on.
+
+use super::super::element::voxel_count;
+use super::super::frame::{VoxelFrame, ras_from_lps};
+use super::checked;
+use super::values::{exactly, needed, text};
+use dicom_dictionary_std::tags;
+use nalgebra::{Matrix3, Vector3};
+use std::path::Path;
+
+/// A series has some hundreds.
+const MAX_FILES: usize = 4096;
+/// Slices may be so far from even distances, as a share of one.
+const UNEVEN: f64 = 0.02;
+
+/// Voxels without their values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    pub dims: [usize; 3],
+    pub frame: VoxelFrame,
+}
+
+/// One slice, LPS, mm.
+#[derive(Clone, Debug)]
+pub struct Slice {
+    pub uid: String,
+    corner: Vector3<f64>,
+    /// Steps from column to column, and from row to row.
+    steps: [Vector3<f64>; 2],
+    /// Columns, rows.
+    size: [u64; 2],
+}
+
+/// The slice that a file holds; `None` for anything that is not one.
+pub fn slice(bytes: &[u8]) -> Option<Result<(String, Slice), String>> {
+    let object = checked::is_dicom(bytes).then(|| checked::read(bytes).ok())??;
+    let series = text(&object.data, tags::SERIES_INSTANCE_UID)?;
+    object.data.get(tags::IMAGE_POSITION_PATIENT)?;
+    object.data.get(tags::ROWS)?;
+    let data = &object.data;
+    let read = || {
+        let [x, y, z] = exactly(data, tags::IMAGE_POSITION_PATIENT)?.ok_or("no position")?;
+        let [a, b, c, d, e, f] = exactly(data, tags::IMAGE_ORIENTATION_PATIENT)?.ok_or("no orientation")?;
+        let [between_rows, between_columns] = exactly(data, tags::PIXEL_SPACING)?.ok_or("no pixel spacing")?;
+        let size = [tags::COLUMNS, tags::ROWS].map(|t| needed(data, t, 1.0, 65535.0));
+        let [columns, rows] = size;
+        Ok::<_, String>(Slice {
+            uid: text(data, tags::SOP_INSTANCE_UID).unwrap_or_default(),
+            corner: Vector3::new(x, y, z),
+            steps: [
+                Vector3::new(a, b, c) * between_columns,
+                Vector3::new(d, e, f) * between_rows,
+            ],
+            size: [columns? as u64, rows? as u64],
+        })
+    };
+    Some(read().map(|slice| (series, slice)))
+}
+
+/// The slices in a folder that belong to a series or are named one by one.
+pub fn find(folder: &Path, series: &[String], named: &[String]) -> Result<Vec<Slice>, String> {
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return Ok(Vec::new());
+    };
+    let mut found = Vec::new();
+    for entry in entries.flatten().take(MAX_FILES) {
+        let path = entry.path();
+        if !begins_as_dicom(&path) {
+            continue;
+        }
+        let Some(read) = super::super::open::whole(&path).ok().and_then(|b| slice(&b)) else {
+            continue;
+        };
+        let (of_series, slice) = read.map_err(|why| format!("the image {}: {why}", path.display()))?;
+        if series.contains(&of_series) || named.contains(&slice.uid) {
+            found.push(slice);
+        }
+    }
+    Ok(found)
+}
+
+/// So that a folder with other large files is not read for nothing.
+fn begins_as_dicom(path: &Path) -> bool {
+    use std::io::Read;
+    let mut start = Vec::new();
+    let read = std::fs::File::open(path).and_then(|f| f.take(160).read_to_end(&mut start));
+    path.is_file() && read.is_ok() && checked::is_dicom(&start)
+}
+
+/// `None` for fewer than two slices.
+pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, String> {
+    let Some(first) = slices.first().cloned() else {
+        return Ok(None);
+    };
+    let normal = first.steps[0]
+        .cross(&first.steps[1])
+        .try_normalize(1e-9)
+        .ok_or("the images have no orientation")?;
+    let alike = |s: &Slice| {
+        let near = |a: Vector3<f64>, b: Vector3<f64>| (a - b).norm() < 1e-3 * a.norm();
+        s.size == first.size && near(first.steps[0], s.steps[0]) && near(first.steps[1], s.steps[1])
+    };
+    if !slices.iter().all(alike) {
+        return Err("the images of its series differ in size, spacing or orientation; export one series".to_owned());
+    }
+    slices.sort_by(|a, b| a.corner.dot(&normal).total_cmp(&b.corner.dot(&normal)));
+    let heights: Vec<f64> = slices.iter().map(|s| s.corner.dot(&normal)).collect();
+    let count = slices.len();
+    if count < 2 {
+        return Ok(None);
+    }
+    let step = (heights[count - 1] - heights[0]) / (count - 1) as f64;
+    let uneven = |(i, h): (usize, &f64)| (h - heights[0] - step * i as f64).abs() > UNEVEN * step.abs().max(1e-3);
+    if step < 1e-3 || heights.iter().enumerate().any(uneven) {
+        return Err(format!(
+            "the {count} images of its series do not lie at even distances (on average {step:.3} mm): some are missing or there twice"
+        ));
+    }
+    let across = (slices[count - 1].corner - slices[0].corner) / (count - 1) as f64;
+    let columns = Matrix3::from_columns(&[first.steps[0], first.steps[1], across].map(|c| ras_from_lps(c) * 1e-3));
+    let frame = VoxelFrame::new(columns, ras_from_lps(slices[0].corner) * 1e-3, "image series")?;
+    let dims = [first.size[0], first.size[1], count as u64];
+    voxel_count(&dims)?;
+    Ok(Some(Grid {
+        dims: dims.map(|d| d as usize),
+        frame,
+    }))
+}

@@ -1,0 +1,21 @@
+//! DICOM of radiotherapy: structure sets and their images as label volumes, brachytherapy plans, dose grids.
+
+mod checked;
+pub mod dose;
+mod images;
+pub mod plan;
+pub mod structures;
+mod values;
+mod write;
+
+pub use checked::{Object, is_dicom, read};
+pub use write::{Identity, new_uid};
+
+/// The frame of an image series out of one of its files twice, one slice apart; for checking the reader by itself.
+pub fn image_geometry(bytes: &[u8]) -> Result<(), String> {
+    let Some(read) = images::slice(bytes) else {
+        return Ok(());
+    };
+    let (_, slice) = read?;
+    images::grid(vec![slice.clone(), slice]).map(|_| ())
+}

@@ -1,0 +1,102 @@
+//! Plans that were written are read as they were.
+
+use super::super::checked;
+use super::super::new_uid;
+use super::*;
+
+pub fn plan(count: usize) -> SeedPlan {
+    let seed = |i: usize| {
+        let t = i as f64;
+        let axis = [t.sin() * t.cos(), t.sin() * t.sin(), t.cos()];
+        PlanSeed {
+            needle: format!("{}{}", (b'A' + (i % 13) as u8) as char, i % 7 + 1),
+            position_m: [t * 1.234567e-3 - 0.03, 0.0123456789 - t * 1e-4, -0.1 + t / 3e3],
+            axis: (i % 5 != 4).then_some(axis),
+            strength_u: [0.5, 0.4321, 0.62][i % 3],
+        }
+    };
+    SeedPlan {
+        label: "test".to_owned(),
+        identity: Identity::new(),
+        uid: new_uid(),
+        prescription_gy: Some(145.0),
+        source: PlanSource {
+            model: "6711".to_owned(),
+            manufacturer: "nobody".to_owned(),
+            isotope: "I-125".to_owned(),
+            half_life_days: 59.4,
+            active_length_m: 3e-3,
+        },
+        seeds: (0..count).map(seed).collect(),
+        notes: Vec::new(),
+    }
+}
+
+fn again(plan: &SeedPlan) -> Result<SeedPlan, String> {
+    checked::read(&bytes(plan).unwrap()).and_then(|o| of(&o))
+}
+
+#[test]
+fn a_plan_that_is_written_is_the_same_plan_when_it_is_read() {
+    let plan = plan(90);
+    let mut again = again(&plan).unwrap();
+    for (seed, was) in again.seeds.iter_mut().zip(&plan.seeds) {
+        let off = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max);
+        // Sixteen characters a number, and an axis in single precision.
+        assert!(off(seed.position_m, was.position_m) < 1e-13);
+        assert_eq!(seed.axis.is_some(), was.axis.is_some());
+        assert!(seed.axis.zip(was.axis).is_none_or(|(a, b)| off(a, b) < 2e-7));
+        (seed.position_m, seed.axis) = (was.position_m, was.axis);
+    }
+    assert_eq!(again, plan);
+}
+
+#[test]
+fn patients_of_dicom_look_to_the_left_and_back_where_ours_look_to_the_right_and_front() {
+    use super::super::values::{exactly, items};
+    use dicom_dictionary_std::tags;
+    let object = checked::read(&bytes(&plan(1)).unwrap()).unwrap();
+    let setup = &items(&object.data, tags::APPLICATION_SETUP_SEQUENCE)[0];
+    let channel = &items(setup, tags::CHANNEL_SEQUENCE)[0];
+    let points = items(channel, tags::BRACHY_CONTROL_POINT_SEQUENCE);
+    assert_eq!(points.len(), 2);
+    let place = exactly::<3>(&points[0], tags::CONTROL_POINT3_D_POSITION)
+        .unwrap()
+        .unwrap();
+    assert_eq!(place, [30.0, -12.3456789, -100.0]);
+}
+
+#[test]
+fn plans_that_mix_isotopes_or_refer_to_nothing_are_refused() {
+    let mut data = checked::read(&bytes(&plan(4)).unwrap()).unwrap().data;
+    let tags = |name: &str| StandardDataDictionary.parse_selector(name).unwrap();
+    use dicom_core::dictionary::DataDictionary;
+    use dicom_core::ops::{ApplyOp, AttributeAction, AttributeOp};
+    use dicom_dictionary_std::StandardDataDictionary;
+    let set = |data: &mut dicom_object::InMemDicomObject, at: &str, value: &str| {
+        let action = AttributeAction::SetStr(value.to_owned().into());
+        data.apply(AttributeOp::new(tags(at), action)).unwrap();
+    };
+    let read = |data: &dicom_object::InMemDicomObject| {
+        let bytes = super::super::write::bytes(data.clone()).unwrap();
+        checked::read(&bytes).and_then(|o| of(&o)).map(|p| p.label)
+    };
+    let original = data.clone();
+    set(&mut data, "300A0210[1].300A0226", "Pd-103");
+    assert!(read(&data).unwrap_err().contains("mixes seeds of I-125 and Pd-103"));
+    data = original.clone();
+    set(&mut data, "300A0230[0].300A0280[2].300C000E", "77");
+    assert!(read(&data).unwrap_err().contains("channel 3: it refers to source 77"));
+    data = original.clone();
+    set(&mut data, "300A0230[0].300A0280[0].300A02D0[0].300A02D4", "1\\2");
+    set(&mut data, "300A0230[0].300A0280[1].300A02D0[0].300A02D4", "1\\2\\x");
+    let both = read(&data).unwrap_err();
+    assert!(
+        both.contains("2 problems") && both.contains("channel 1") && both.contains("channel 2"),
+        "{both}"
+    );
+    data = original;
+    set(&mut data, "300A0200", "INTERSTITIAL");
+    set(&mut data, "300A0202", "HDR");
+    assert!(read(&data).unwrap_err().contains("taken out again"));
+}

@@ -1,0 +1,269 @@
+//! RT Structure Set: named contours, as a label volume on the grid of their images.
+
+mod outline;
+mod raster;
+mod solid;
+pub mod write;
+
+use super::super::element::{short, voxel_count};
+use super::super::error;
+use super::super::frame::{VoxelFrame, ras_from_lps};
+use super::super::overlap::told;
+use super::super::volume::Voxels;
+use super::checked::Object;
+use super::images::{self, Grid};
+use super::values::{items, name, needed, numbers, text};
+use dicom_dictionary_std::{tags, uids};
+use dicom_object::InMemDicomObject;
+use nalgebra::{Matrix3, Vector3};
+pub use solid::Solid;
+use std::path::Path;
+
+const MAX_STRUCTURES: usize = 255;
+const MAX_MM: f64 = 10_000.0;
+/// Side of a voxel where there are no images.
+const SIDE_M: f64 = 0.5e-3;
+/// Contours that are farther apart are of different planes.
+const SAME_PLANE_M: f64 = 0.05e-3;
+
+/// The closed contours of one structure; corners in RAS, m.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contoured {
+    pub name: String,
+    pub contours: Vec<Vec<Vector3<f64>>>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct StructureSet {
+    pub structures: Vec<Contoured>,
+    /// Series and single images that it was drawn on.
+    pub series: Vec<String>,
+    pub images: Vec<String>,
+    /// What was left out, and why.
+    pub notes: Vec<String>,
+}
+
+/// Of a file and the images beside it.
+pub fn read(object: &Object, folder: Option<&Path>) -> Result<Voxels, String> {
+    let set = StructureSet::of(object)?;
+    let slices = folder.map_or(Ok(Vec::new()), |f| images::find(f, &set.series, &set.images))?;
+    set.voxels(images::grid(slices)?)
+}
+
+impl StructureSet {
+    pub fn of(object: &Object) -> Result<Self, String> {
+        if object.sop_class != uids::RT_STRUCTURE_SET_STORAGE {
+            return Err(format!(
+                "it is DICOM of another kind (SOP class {}); a segmentation is an RT Structure Set",
+                short(&object.sop_class)
+            ));
+        }
+        let data = &object.data;
+        let mut names = Vec::new();
+        for roi in items(data, tags::STRUCTURE_SET_ROI_SEQUENCE) {
+            let number = needed(roi, tags::ROI_NUMBER, -2e9, 2e9)?;
+            let roi_name = text(roi, tags::ROI_NAME).unwrap_or_else(|| format!("ROI {number}"));
+            names.push((number, roi_name));
+        }
+        let (mut structures, mut notes, mut problems) = (Vec::new(), Vec::new(), Vec::new());
+        for drawn in items(data, tags::ROI_CONTOUR_SEQUENCE) {
+            let number = needed(drawn, tags::REFERENCED_ROI_NUMBER, -2e9, 2e9)?;
+            let known = names.iter().find(|(n, _)| *n == number);
+            let roi_name = known.map_or_else(|| format!("ROI {number}"), |(_, n)| n.clone());
+            match contours(drawn) {
+                Ok(contours) => structures.push(Contoured {
+                    name: roi_name,
+                    contours,
+                }),
+                Err(Unusable::LeftOut(why)) => notes.push(format!("{} is left out: {why}", short(&roi_name))),
+                Err(Unusable::Wrong(why)) => problems.push(format!("{}: {why}", short(&roi_name))),
+            }
+        }
+        error::all(problems)?;
+        if structures.is_empty() {
+            let why = if notes.is_empty() {
+                "there are no contours".to_owned()
+            } else {
+                notes.join("; ")
+            };
+            return Err(format!("it holds no structure that has a volume: {why}"));
+        }
+        if structures.len() > MAX_STRUCTURES {
+            return Err(format!(
+                "it holds {} structures; at most {MAX_STRUCTURES} can be told apart",
+                structures.len()
+            ));
+        }
+        let (series, images) = references(data);
+        Ok(Self {
+            structures,
+            series,
+            images,
+            notes,
+        })
+    }
+
+    /// On the grid of the images, or else on one around the contours.
+    pub fn voxels(self, grid: Option<Grid>) -> Result<Voxels, String> {
+        let mut notes = self.notes.clone();
+        let grid = match grid {
+            Some(grid) => grid,
+            None => {
+                notes.push(format!(
+                    "its images are not beside it: a grid of {} mm in the plane of the contours is taken",
+                    SIDE_M * 1e3
+                ));
+                self.grid_around()?
+            }
+        };
+        let (labels, lost) = raster::labels(&self.structures, &grid)?;
+        notes.extend(lost);
+        let names = (1_u8..=255).zip(self.structures.into_iter().map(|s| s.name)).collect();
+        let voxels = Voxels {
+            dims: grid.dims,
+            labels,
+            frame: grid.frame,
+            names,
+        };
+        Ok(told(voxels, (!notes.is_empty()).then(|| notes.join("; "))))
+    }
+
+    /// Two voxels larger than all contours on each side.
+    fn grid_around(&self) -> Result<Grid, String> {
+        let points = || self.structures.iter().flat_map(|s| s.contours.iter().flatten());
+        let largest = self
+            .structures
+            .iter()
+            .flat_map(|s| &s.contours)
+            .map(|c| area_vector(c))
+            .max_by(|a, b| a.norm().total_cmp(&b.norm()));
+        let normal = largest
+            .and_then(|a| a.try_normalize(1e-12))
+            .ok_or("its contours enclose no area")?;
+        // Along the patient's axes where the planes allow it.
+        let right = (Vector3::x() - normal * normal.x).try_normalize(0.5);
+        let across = right
+            .or((Vector3::y() - normal * normal.y).try_normalize(0.5))
+            .unwrap_or(Vector3::z());
+        let across = (across - normal * across.dot(&normal)).normalize();
+        let axes = Matrix3::from_columns(&[across, normal.cross(&across), normal]);
+        let step_m = self.plane_distance_m(normal)?;
+        let sides = [SIDE_M, SIDE_M, step_m];
+        let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+        for p in points() {
+            let along = axes.transpose() * p;
+            (low, high) = (low.inf(&along), high.sup(&along));
+        }
+        let margin = Vector3::new(2.0 * SIDE_M, 2.0 * SIDE_M, step_m);
+        let low = low - margin;
+        let dims = [0, 1, 2].map(|a| ((high[a] + margin[a] - low[a]) / sides[a] - 1e-6).ceil() as u64 + 1);
+        voxel_count(&dims)?;
+        let columns = axes * Matrix3::from_diagonal(&Vector3::from(sides));
+        Ok(Grid {
+            dims: dims.map(|d| d as usize),
+            frame: VoxelFrame::new(columns, axes * low, "contours")?,
+        })
+    }
+
+    /// The smallest distance between two planes of one structure.
+    fn plane_distance_m(&self, normal: Vector3<f64>) -> Result<f64, String> {
+        let mut smallest = f64::INFINITY;
+        for structure in &self.structures {
+            let mut heights: Vec<f64> = structure.contours.iter().map(|c| c[0].dot(&normal)).collect();
+            heights.sort_by(f64::total_cmp);
+            let gaps = heights.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > SAME_PLANE_M);
+            smallest = gaps.fold(smallest, f64::min);
+        }
+        if smallest.is_finite() {
+            return Ok(smallest);
+        }
+        Err(
+            "each of its structures has contours in one plane only, so none has a thickness; put its images beside it"
+                .to_owned(),
+        )
+    }
+}
+
+/// Why a structure cannot be taken.
+enum Unusable {
+    /// It is none with a volume.
+    LeftOut(String),
+    Wrong(String),
+}
+
+fn contours(drawn: &InMemDicomObject) -> Result<Vec<Vec<Vector3<f64>>>, Unusable> {
+    let mut all = Vec::new();
+    for contour in items(drawn, tags::CONTOUR_SEQUENCE) {
+        let kind = text(contour, tags::CONTOUR_GEOMETRIC_TYPE).unwrap_or_default();
+        if !["CLOSED_PLANAR", "CLOSEDPLANAR_XOR"].contains(&kind.as_str()) {
+            return Err(Unusable::LeftOut(format!(
+                "a contour is {}; only closed planar ones enclose a volume",
+                if kind.is_empty() { "of no kind" } else { &kind }
+            )));
+        }
+        all.push(closed(contour).map_err(Unusable::Wrong)?);
+    }
+    if all.is_empty() {
+        return Err(Unusable::LeftOut("it has no contour".to_owned()));
+    }
+    Ok(all)
+}
+
+fn closed(contour: &InMemDicomObject) -> Result<Vec<Vector3<f64>>, String> {
+    let values = numbers(contour, tags::CONTOUR_DATA)?.unwrap_or_default();
+    if values.len() % 3 != 0 || values.len() < 9 {
+        return Err(format!(
+            "{} has {} values; a closed contour has three for each of at least three corners",
+            name(tags::CONTOUR_DATA),
+            values.len()
+        ));
+    }
+    if let Some(far) = values.iter().find(|v| v.abs() > MAX_MM) {
+        return Err(format!("a corner lies at {far} mm; at most {MAX_MM} mm is believed"));
+    }
+    let points: Vec<_> = values
+        .chunks_exact(3)
+        .map(|p| ras_from_lps(Vector3::new(p[0], p[1], p[2])) * 1e-3)
+        .collect();
+    if let Some(normal) = area_vector(&points).try_normalize(1e-12) {
+        let off = points
+            .iter()
+            .map(|p| (p - points[0]).dot(&normal).abs())
+            .fold(0.0, f64::max);
+        if off > 10.0 * SAME_PLANE_M {
+            return Err(format!("a contour called planar is {:.2} mm off its plane", off * 1e3));
+        }
+    }
+    Ok(points)
+}
+
+/// Normal to the plane of a polygon, as long as its area (m2).
+fn area_vector(corners: &[Vector3<f64>]) -> Vector3<f64> {
+    let next = corners.iter().cycle().skip(1);
+    let origin = corners[0];
+    corners
+        .iter()
+        .zip(next)
+        .map(|(a, b)| (a - origin).cross(&(b - origin)))
+        .sum::<Vector3<f64>>()
+        / 2.0
+}
+
+fn references(data: &InMemDicomObject) -> (Vec<String>, Vec<String>) {
+    let (mut series_uids, mut images) = (Vec::new(), Vec::new());
+    let frames = items(data, tags::REFERENCED_FRAME_OF_REFERENCE_SEQUENCE).iter();
+    let studies = frames.flat_map(|f| items(f, tags::RT_REFERENCED_STUDY_SEQUENCE));
+    for series in studies.flat_map(|s| items(s, tags::RT_REFERENCED_SERIES_SEQUENCE)) {
+        series_uids.extend(text(series, tags::SERIES_INSTANCE_UID));
+        let of_series = items(series, tags::CONTOUR_IMAGE_SEQUENCE);
+        images.extend(
+            of_series
+                .iter()
+                .filter_map(|i| text(i, tags::REFERENCED_SOP_INSTANCE_UID)),
+        );
+    }
+    (series_uids, images)
+}
+
+#[cfg(test)]
+mod tests;

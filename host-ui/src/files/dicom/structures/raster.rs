@@ -1,0 +1,283 @@
+//! Contours to voxels: a voxel belongs to a structure that covers at least half of it in the plane of the slice.
+
+use super::super::super::element::short;
+use super::super::images::Grid;
+use super::{Contoured, SAME_PLANE_M};
+use std::ops::Range;
+
+/// Lines across each row of voxels along which coverage is measured.
+const LINES: usize = 4;
+/// Crossings of lines and edges in one file; a pelvis on fine images has some million.
+const MAX_CROSSINGS: f64 = 1e7;
+/// Voxels that are looked at and painted in one file; a whole pelvis has some ten million.
+const MAX_VOXELS_TOUCHED: usize = 150_000_000;
+const MAX_RUNS: usize = 20_000_000;
+/// Planes of contours that are farther apart than this many usual distances have a gap between them.
+const GAP: f64 = 1.5;
+
+/// Columns from and to (exclusive), in a row of a slice.
+#[derive(Clone, Copy)]
+struct Run {
+    row: u32,
+    from: u32,
+    to: u32,
+}
+
+/// What was done so far; a file may not ask for any amount.
+#[derive(Default)]
+struct Work {
+    crossings: f64,
+    voxels: usize,
+    runs: usize,
+}
+
+impl Work {
+    fn check(&self) -> Result<(), String> {
+        if self.crossings <= MAX_CROSSINGS && self.voxels <= MAX_VOXELS_TOUCHED && self.runs <= MAX_RUNS {
+            return Ok(());
+        }
+        Err(
+            "its contours are too large or too many to be drawn; export fewer structures, or ones with fewer corners"
+                .to_owned(),
+        )
+    }
+}
+
+/// The labels 1, 2, ... of the structures in their order, and what they took from each other in words.
+pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<String>), String> {
+    let mut work = Work::default();
+    let mut all = Vec::new();
+    for structure in structures {
+        all.push(runs(structure, grid, &mut work)?);
+    }
+    work.voxels += all.iter().flatten().map(|r| (r.to - r.from) as usize).sum::<usize>();
+    work.check()?;
+    let sizes: Vec<usize> = all
+        .iter()
+        .map(|runs| runs.iter().map(|r| (r.to - r.from) as usize).sum())
+        .collect();
+    let mut order: Vec<usize> = (0..all.len()).collect();
+    // Larger ones first, so that what lies in them is painted over them.
+    order.sort_by_key(|&s| (std::cmp::Reverse(sizes[s]), s));
+    let mut labels = vec![0_u8; grid.dims.iter().product()];
+    let mut taken = vec![0_usize; all.len() + 1];
+    for s in order {
+        for run in &all[s] {
+            let row = run.row as usize * grid.dims[0];
+            for label in &mut labels[row + run.from as usize..row + run.to as usize] {
+                taken[usize::from(*label)] += 1;
+                *label = s as u8 + 1;
+            }
+        }
+    }
+    let lost: Vec<String> = structures
+        .iter()
+        .enumerate()
+        .filter(|(s, _)| taken[s + 1] > 0)
+        .map(|(s, c)| format!("{} ({} of {} voxels)", short(&c.name), taken[s + 1], sizes[s]))
+        .collect();
+    let mut notes: Vec<String> = structures
+        .iter()
+        .zip(&sizes)
+        .filter(|(_, size)| **size == 0)
+        .map(|(c, _)| format!("{} covers no voxel of the images", short(&c.name)))
+        .collect();
+    if !lost.is_empty() {
+        notes.push(format!(
+            "structures overlap, and where they do the smaller one has the voxel; others have it taken from them: {}",
+            lost.join(", ")
+        ));
+    }
+    Ok((labels, notes))
+}
+
+/// Corners of polygons in columns and rows.
+type Polygons = Vec<Vec<[f64; 2]>>;
+
+fn runs(structure: &Contoured, grid: &Grid, work: &mut Work) -> Result<Vec<Run>, String> {
+    let planes = planes(structure, grid)?;
+    let heights: Vec<f64> = planes.iter().map(|(h, _)| *h).collect();
+    let mut runs = Vec::new();
+    // A single plane stands for the slice it is in.
+    for (plane, [from, to]) in planes.iter().zip(slabs(&heights, 1.0)) {
+        let mut covered: Option<Vec<Run>> = None;
+        // Middles of slices from the lower end of a slab up to its upper end.
+        let (first, last) = (
+            (from - 1e-6).ceil().max(0.0),
+            (to - 1e-6).ceil().min(grid.dims[2] as f64),
+        );
+        for slice in first as usize..last.max(0.0) as usize {
+            if covered.is_none() {
+                covered = Some(fill(&plane.1, [grid.dims[0], grid.dims[1]], work)?);
+            }
+            let covered = covered.as_deref().unwrap_or_default();
+            work.runs += covered.len();
+            work.check()?;
+            let base = (slice * grid.dims[1]) as u32;
+            runs.extend(covered.iter().map(|r| Run {
+                row: base + r.row,
+                ..*r
+            }));
+        }
+    }
+    Ok(runs)
+}
+
+/// The contours by the height of their plane, in slices.
+fn planes(structure: &Contoured, grid: &Grid) -> Result<Vec<(f64, Polygons)>, String> {
+    let step_m = grid.frame.spacing_m[2];
+    let mut placed = Vec::new();
+    for contour in &structure.contours {
+        let corners: Vec<[f64; 3]> = contour.iter().map(|p| grid.frame.index_of(*p)).collect();
+        let height = corners.iter().map(|c| c[2]).sum::<f64>() / corners.len() as f64;
+        let off_m = corners.iter().map(|c| (c[2] - height).abs()).fold(0.0, f64::max) * step_m;
+        if off_m > 10.0 * SAME_PLANE_M {
+            return Err(format!(
+                "{}: a contour is tilted {:.2} mm out of the slices of the images; export it in their planes",
+                short(&structure.name),
+                off_m * 1e3
+            ));
+        }
+        placed.push((height, corners.into_iter().map(|[x, y, _]| [x, y]).collect::<Vec<_>>()));
+    }
+    placed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut planes: Vec<(f64, Polygons)> = Vec::new();
+    for (height, polygon) in placed {
+        match planes.last_mut() {
+            Some((h, polygons)) if (height - *h) * step_m < SAME_PLANE_M => polygons.push(polygon),
+            _ => planes.push((height, vec![polygon])),
+        }
+    }
+    Ok(planes)
+}
+
+/// From where to where each plane stands for its structure: half-way to its neighbours, but no farther than half of the
+/// usual distance across a gap; `single` is the thickness of one without neighbours.
+pub fn slabs(heights: &[f64], single: f64) -> Vec<[f64; 2]> {
+    let mut gaps: Vec<f64> = heights.windows(2).map(|w| w[1] - w[0]).collect();
+    gaps.sort_by(f64::total_cmp);
+    let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(single);
+    let half = |gap: f64| if gap > GAP * usual { usual / 2.0 } else { gap / 2.0 };
+    (0..heights.len())
+        .map(|i| {
+            let below = if i > 0 {
+                half(heights[i] - heights[i - 1])
+            } else {
+                usual / 2.0
+            };
+            let above = heights.get(i + 1).map_or(usual / 2.0, |next| half(next - heights[i]));
+            [heights[i] - below, heights[i] + above]
+        })
+        .collect()
+}
+
+/// Even and odd: what lies in two contours of a plane is a hole, and so is what a keyhole leads to.
+fn fill(polygons: &Polygons, [columns, rows]: [usize; 2], work: &mut Work) -> Result<Vec<Run>, String> {
+    let mut crossed: Vec<(u32, f64)> = Vec::new();
+    for polygon in polygons {
+        let next = polygon.iter().cycle().skip(1);
+        for (a, b) in polygon.iter().zip(next) {
+            cross(*a, *b, rows, &mut crossed, work)?;
+        }
+    }
+    crossed.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let mut runs = Vec::new();
+    let mut covered = Coverage::new(columns);
+    for of_row in crossed.chunk_by(|a, b| a.0 / LINES as u32 == b.0 / LINES as u32) {
+        for line in of_row.chunk_by(|a, b| a.0 == b.0) {
+            covered.add_line(line);
+        }
+        work.voxels += covered.touched.len();
+        work.check()?;
+        covered.take_row(of_row[0].0 / LINES as u32, &mut runs);
+    }
+    Ok(runs)
+}
+
+/// Where an edge crosses the lines. A voxel reaches half a step to each side of its index.
+fn cross(a: [f64; 2], b: [f64; 2], rows: usize, crossed: &mut Vec<(u32, f64)>, work: &mut Work) -> Result<(), String> {
+    let (low, high) = if a[1] <= b[1] { (a, b) } else { (b, a) };
+    let line_of = |y: f64| (y + 0.5) * LINES as f64 - 0.5;
+    let most = (rows * LINES) as f64;
+    let first = line_of(low[1]).ceil().clamp(0.0, most);
+    let last = line_of(high[1]).ceil().clamp(0.0, most);
+    work.crossings += last - first;
+    work.check()?;
+    for line in first as usize..last as usize {
+        let y = (line as f64 + 0.5) / LINES as f64 - 0.5;
+        let share = (y - low[1]) / (high[1] - low[1]);
+        crossed.push((line as u32, low[0] + share * (high[0] - low[0])));
+    }
+    Ok(())
+}
+
+/// What the lines of one row cover of each of its voxels.
+struct Coverage {
+    /// Of a voxel in which a line begins or ends.
+    ends: Vec<f64>,
+    /// Change from the voxel before of what lines cover that go right through.
+    through: Vec<f64>,
+    /// Columns outside of these are not covered at all.
+    touched: Range<usize>,
+}
+
+impl Coverage {
+    fn new(columns: usize) -> Self {
+        Self {
+            ends: vec![0.0; columns + 1],
+            through: vec![0.0; columns + 1],
+            touched: 0..0,
+        }
+    }
+
+    /// Its crossings in order.
+    fn add_line(&mut self, line: &[(u32, f64)]) {
+        let columns = self.ends.len() - 1;
+        for pair in line.chunks_exact(2) {
+            let [from, to] = [pair[0].1 + 0.5, pair[1].1 + 0.5].map(|x| x.clamp(0.0, columns as f64));
+            let (first, last) = (from as usize, to as usize);
+            self.touched = if self.touched.is_empty() {
+                first..last + 1
+            } else {
+                self.touched.start.min(first)..self.touched.end.max(last + 1)
+            };
+            if first == last {
+                self.ends[first] += to - from;
+                continue;
+            }
+            self.ends[first] += (first + 1) as f64 - from;
+            self.ends[last] += to - last as f64;
+            self.through[first + 1] += 1.0;
+            self.through[last] -= 1.0;
+        }
+    }
+
+    /// The runs of a row that are covered at least by half; ready for the next row then.
+    fn take_row(&mut self, row: u32, runs: &mut Vec<Run>) {
+        let (mut through, mut begun) = (0.0, None);
+        let touched = std::mem::take(&mut self.touched);
+        let columns = self.ends.len() - 1;
+        for x in touched.clone() {
+            through += self.through[x];
+            let share = (through + self.ends[x]) / LINES as f64;
+            match (share >= 0.5 - 1e-9 && x < columns, begun) {
+                (true, None) => begun = Some(x as u32),
+                (false, Some(from)) => {
+                    runs.push(Run {
+                        row,
+                        from,
+                        to: x as u32,
+                    });
+                    begun = None;
+                }
+                _ => {}
+            }
+        }
+        if let Some(from) = begun {
+            let to = touched.end as u32;
+            runs.push(Run { row, from, to });
+        }
+        self.ends[touched.clone()].fill(0.0);
+        self.through[touched].fill(0.0);
+    }
+}

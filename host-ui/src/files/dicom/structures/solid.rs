@@ -1,0 +1,117 @@
+//! The body that the contours of one structure enclose, asked point by point: dose is counted in it as it is drawn, whatever overlaps.
+
+use super::raster::slabs;
+use super::{Contoured, SAME_PLANE_M, StructureSet, area_vector};
+use nalgebra::{Matrix3, Vector3};
+
+/// RAS, m.
+#[derive(Clone, Debug)]
+pub struct Solid {
+    pub name: String,
+    /// One axis a column; the third is across the planes.
+    axes: Matrix3<f64>,
+    planes: Vec<Plane>,
+    pub lower_m: [f64; 3],
+    pub upper_m: [f64; 3],
+}
+
+#[derive(Clone, Debug)]
+struct Plane {
+    from_m: f64,
+    to_m: f64,
+    polygons: Vec<Vec<[f64; 2]>>,
+}
+
+impl StructureSet {
+    /// Every structure by itself.
+    pub fn solids(&self) -> Result<Vec<Solid>, String> {
+        let contours = self.structures.iter().flat_map(|s| &s.contours);
+        let largest = contours
+            .map(|c| area_vector(c))
+            .max_by(|a, b| a.norm().total_cmp(&b.norm()));
+        let normal = largest
+            .and_then(|a| a.try_normalize(1e-12))
+            .ok_or("its contours enclose no area")?;
+        let usual_m = self.plane_distance_m(normal)?;
+        Ok(self.structures.iter().map(|s| Solid::of(s, normal, usual_m)).collect())
+    }
+}
+
+impl Solid {
+    fn of(structure: &Contoured, normal: Vector3<f64>, usual_m: f64) -> Self {
+        let aside = if normal.x.abs() < 0.9 {
+            Vector3::x()
+        } else {
+            Vector3::y()
+        };
+        let across = (aside - normal * aside.dot(&normal)).normalize();
+        let axes = Matrix3::from_columns(&[across, normal.cross(&across), normal]);
+        let mut drawn: Vec<(f64, Vec<[f64; 2]>)> = Vec::new();
+        for contour in &structure.contours {
+            let corners: Vec<Vector3<f64>> = contour.iter().map(|p| axes.transpose() * p).collect();
+            let height = corners.iter().map(|c| c.z).sum::<f64>() / corners.len() as f64;
+            drawn.push((height, corners.iter().map(|c| [c.x, c.y]).collect()));
+        }
+        drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut heights: Vec<f64> = Vec::new();
+        let mut polygons: Vec<Vec<Vec<[f64; 2]>>> = Vec::new();
+        for (height, polygon) in drawn {
+            match (heights.last(), polygons.last_mut()) {
+                (Some(last), Some(of_plane)) if height - last < SAME_PLANE_M => of_plane.push(polygon),
+                _ => {
+                    heights.push(height);
+                    polygons.push(vec![polygon]);
+                }
+            }
+        }
+        let planes = slabs(&heights, usual_m).into_iter().zip(polygons);
+        let planes: Vec<Plane> = planes
+            .map(|([from_m, to_m], polygons)| Plane { from_m, to_m, polygons })
+            .collect();
+        let (lower_m, upper_m) = bounds(&axes, &planes);
+        Self {
+            name: structure.name.clone(),
+            axes,
+            planes,
+            lower_m,
+            upper_m,
+        }
+    }
+
+    pub fn contains(&self, place_m: [f64; 3]) -> bool {
+        let at = self.axes.transpose() * Vector3::from(place_m);
+        // The last plane that begins below.
+        let next = self.planes.partition_point(|p| p.from_m <= at.z);
+        let plane = next.checked_sub(1).map(|i| &self.planes[i]).filter(|p| at.z < p.to_m);
+        plane.is_some_and(|p| {
+            p.polygons
+                .iter()
+                .filter(|polygon| encloses(polygon, [at.x, at.y]))
+                .count()
+                % 2
+                == 1
+        })
+    }
+}
+
+/// Edges that a ray to the right crosses, even or odd.
+fn encloses(polygon: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
+    let next = polygon.iter().cycle().skip(1);
+    let crossed = |(a, b): (&[f64; 2], &[f64; 2])| {
+        (a[1] > y) != (b[1] > y) && x < a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+    };
+    polygon.iter().zip(next).filter(|&edge| crossed(edge)).count() % 2 == 1
+}
+
+fn bounds(axes: &Matrix3<f64>, planes: &[Plane]) -> ([f64; 3], [f64; 3]) {
+    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    for plane in planes {
+        for corner in plane.polygons.iter().flatten() {
+            for height in [plane.from_m, plane.to_m] {
+                let place = axes * Vector3::new(corner[0], corner[1], height);
+                (low, high) = (low.inf(&place), high.sup(&place));
+            }
+        }
+    }
+    (low.into(), high.into())
+}

@@ -1,0 +1,234 @@
+//! Contours against closed forms, and outlines that give their voxels back.
+
+use super::super::write::Identity;
+use super::super::{checked, images};
+use super::*;
+use nalgebra::Rotation3;
+use std::f64::consts::PI;
+
+fn grid(dims: [usize; 3], sides_mm: [f64; 3]) -> Grid {
+    let turned = Rotation3::from_euler_angles(0.2, -0.3, 0.4);
+    let columns = turned.matrix() * Matrix3::from_diagonal(&(Vector3::from(sides_mm) * 1e-3));
+    Grid {
+        dims,
+        frame: VoxelFrame::new(columns, Vector3::new(0.01, -0.02, 0.03), "test").unwrap(),
+    }
+}
+
+/// In columns and rows of a slice.
+fn circle(grid: &Grid, slice: f64, middle_mm: [f64; 2], radius_mm: f64) -> Vec<Vector3<f64>> {
+    let corner = |i: usize| {
+        let t = i as f64 / 200.0 * 2.0 * PI;
+        let mm = [middle_mm[0] + radius_mm * t.cos(), middle_mm[1] + radius_mm * t.sin()];
+        let side = grid.frame.spacing_m;
+        grid.frame
+            .place_m([mm[0] * 1e-3 / side[0], mm[1] * 1e-3 / side[1], slice])
+    };
+    (0..200).map(corner).collect()
+}
+
+fn set(structures: Vec<(&str, Vec<Vec<Vector3<f64>>>)>) -> StructureSet {
+    let structure = |(name, contours): (&str, _)| Contoured {
+        name: name.to_owned(),
+        contours,
+    };
+    StructureSet {
+        structures: structures.into_iter().map(structure).collect(),
+        series: Vec::new(),
+        images: Vec::new(),
+        notes: Vec::new(),
+    }
+}
+
+fn volume_mm3(v: &Voxels, label: u8) -> f64 {
+    let voxels = v.labels.iter().filter(|&&l| l == label).count();
+    voxels as f64 * v.frame.spacing_m.iter().product::<f64>() * 1e9
+}
+
+#[test]
+fn a_cylinder_has_its_volume_and_its_hole_is_no_part_of_it() {
+    let grid = grid([90, 70, 10], [0.4, 0.5, 2.5]);
+    let middle = [17.0, 16.3];
+    let outer = |k| circle(&grid, k, middle, 12.0);
+    let inner = |k| circle(&grid, k, middle, 5.0);
+    let ring: Vec<_> = (2..7)
+        .flat_map(|k| [outer(f64::from(k)), inner(f64::from(k))])
+        .collect();
+    let v = set(vec![("Rectum", ring)]).voxels(Some(grid.clone())).unwrap();
+    // Every voxel against a fine lattice of points in it: only where about half is covered may four lines see it otherwise.
+    let mut near_half = 0;
+    for index in 0..90 * 70 {
+        let at = [index % 90, index / 90].map(|i| i as f64);
+        let point = |n: usize| {
+            let within = [n % 32, n / 32].map(|i| (i as f64 + 0.5) / 32.0 - 0.5);
+            let mm = [
+                (at[0] + within[0]) * 0.4 - middle[0],
+                (at[1] + within[1]) * 0.5 - middle[1],
+            ];
+            (5.0..12.0).contains(&mm[0].hypot(mm[1]))
+        };
+        let share = (0..1024).filter(|&n| point(n)).count() as f64 / 1024.0;
+        let labels = [2, 6].map(|k| v.labels[k * 90 * 70 + index]);
+        assert_eq!(labels[0], labels[1]);
+        if (share - 0.5).abs() < 0.03 {
+            near_half += 1;
+        } else {
+            assert_eq!(labels[0] == 1, share > 0.5, "{at:?} is covered by {share}");
+        }
+    }
+    assert!(near_half < 40, "{near_half}");
+    assert!(
+        [1, 7]
+            .iter()
+            .all(|k| !v.labels[k * 90 * 70..(k + 1) * 90 * 70].contains(&1))
+    );
+    let expected = PI * (12.0_f64.powi(2) - 5.0_f64.powi(2)) * 2.5 * 5.0;
+    assert!((volume_mm3(&v, 1) / expected - 1.0).abs() < 0.01);
+    // The same by a keyhole: out, along a cut, back round the hole.
+    let keyhole = |k| {
+        let (out, mut hole) = (outer(k), inner(k));
+        hole.reverse();
+        let (first, back) = (out[0], hole[0]);
+        [out, vec![first], vec![back], hole[1..].to_vec(), vec![back]].concat()
+    };
+    let keyholes = (2..7).map(|k| keyhole(f64::from(k))).collect();
+    let same = set(vec![("Rectum", keyholes)]).voxels(Some(grid)).unwrap();
+    let differ = v.labels.iter().zip(&same.labels).filter(|(a, b)| a != b).count();
+    assert!(differ <= 10, "{differ}");
+}
+
+#[test]
+fn what_lies_inside_of_a_structure_has_its_own_label_and_the_user_is_told() {
+    let grid = grid([60, 60, 5], [0.5, 0.5, 2.0]);
+    let gland: Vec<_> = (0..5)
+        .map(|k| circle(&grid, f64::from(k), [15.0, 15.0], 10.0))
+        .collect();
+    let urethra: Vec<_> = (0..5).map(|k| circle(&grid, f64::from(k), [13.0, 15.0], 3.0)).collect();
+    // Whichever comes first.
+    for (order, label) in [([0, 1], 2), ([1, 0], 1)] {
+        let both = [("Prostate", gland.clone()), ("Urethra", urethra.clone())];
+        let v = set(order.map(|i| both[i].clone()).to_vec())
+            .voxels(Some(grid.clone()))
+            .unwrap();
+        let expected = PI * 9.0 * 10.0;
+        assert!((volume_mm3(&v, label) / expected - 1.0).abs() < 0.03);
+        assert!(v.frame.warning.unwrap().contains("Prostate ("));
+    }
+}
+
+/// Dose is counted in a solid: its volume is that of what was drawn, and what lies in it takes nothing from it.
+#[test]
+fn a_solid_is_what_was_drawn_with_its_hole_and_whatever_else_lies_in_it() {
+    let grid = grid([60, 60, 5], [0.5, 0.5, 2.0]);
+    let ring = (0..5)
+        .flat_map(|k| [10.0, 4.0].map(|r| circle(&grid, f64::from(k), [15.0, 15.0], r)))
+        .collect();
+    let inside: Vec<_> = (1..3).map(|k| circle(&grid, f64::from(k), [22.0, 15.0], 1.5)).collect();
+    let solids = set(vec![("Prostate", ring), ("Urethra", inside)]).solids().unwrap();
+    // The trapezoid rule over a lattice that is not in line with the planes.
+    let volume = |solid: &Solid, step: f64| {
+        let counts = [0, 1, 2].map(|a| ((solid.upper_m[a] - solid.lower_m[a]) / step).ceil() as usize);
+        let total: usize = counts.iter().product();
+        let inside = |n: usize| {
+            let at = [n % counts[0], n / counts[0] % counts[1], n / counts[0] / counts[1]];
+            solid.contains([0, 1, 2].map(|a| solid.lower_m[a] + (at[a] as f64 + 0.5) * step))
+        };
+        (0..total).filter(|&n| inside(n)).count() as f64 * (step * 1e3).powi(3)
+    };
+    let disc = |r: f64| 100.0 * (2.0 * PI / 200.0).sin() * r * r;
+    let (gland, urethra) = (volume(&solids[0], 0.25e-3), volume(&solids[1], 0.1e-3));
+    assert!(
+        (gland / ((disc(10.0) - disc(4.0)) * 10.0) - 1.0).abs() < 2e-3,
+        "{gland}"
+    );
+    assert!((urethra / (disc(1.5) * 4.0) - 1.0).abs() < 1e-2, "{urethra}");
+}
+
+#[test]
+fn planes_farther_apart_than_slices_fill_the_slices_between_but_not_a_gap() {
+    let grid = grid([40, 40, 20], [0.5, 0.5, 1.0]);
+    // Every second slice, and one piece far from the others.
+    let planes = [2.0, 4.0, 6.0, 14.0, 16.0];
+    let contours = planes.iter().map(|&k| circle(&grid, k, [10.0, 10.0], 6.0)).collect();
+    let v = set(vec![("Bladder", contours)]).voxels(Some(grid)).unwrap();
+    let used: Vec<usize> = (0..20)
+        .filter(|k| v.labels[k * 1600..(k + 1) * 1600].contains(&1))
+        .collect();
+    assert_eq!(used, [1, 2, 3, 4, 5, 6, 13, 14, 15, 16]);
+}
+
+#[test]
+fn without_images_the_grid_is_around_the_contours() {
+    let grid = grid([60, 60, 8], [0.5, 0.5, 3.0]);
+    let contours = (1..7)
+        .map(|k| circle(&grid, f64::from(k), [14.0, 15.0], 11.0))
+        .collect();
+    let v = set(vec![("Prostate", contours)]).voxels(None).unwrap();
+    let expected = PI * 121.0 * 18.0;
+    assert!((volume_mm3(&v, 1) / expected - 1.0).abs() < 0.01);
+    assert!((v.frame.spacing_m[2] - 3e-3).abs() < 1e-9);
+    let normal = grid.frame.directions.column(2);
+    assert!(v.frame.directions.column(2).dot(&normal).abs() > 1.0 - 1e-9);
+    assert!(v.frame.warning.unwrap().contains("images are not beside"));
+}
+
+/// A seeded scatter of blobs with holes and voxels that touch at corners.
+#[test]
+fn voxels_that_are_outlined_and_drawn_again_are_the_same() {
+    let grid = grid([23, 19, 6], [0.7, 0.9, 2.0]);
+    let count = 23 * 19 * 6;
+    let mut state = 7_u32;
+    let labels: Vec<u8> = (0..count)
+        .map(|_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            [0, 0, 1, 1, 3][(state >> 16) as usize % 5]
+        })
+        .collect();
+    let v = Voxels {
+        dims: grid.dims,
+        labels,
+        frame: grid.frame.clone(),
+        names: [(1, "Prostate".to_owned()), (3, "Urethra".to_owned())].into(),
+    };
+    let bytes = write::bytes(&v, &Identity::new()).unwrap();
+    let set = StructureSet::of(&checked::read(&bytes).unwrap()).unwrap();
+    assert_eq!(
+        set.structures.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(),
+        ["Prostate", "Urethra"]
+    );
+    let again = set
+        .voxels(Some(images::Grid {
+            dims: grid.dims,
+            frame: grid.frame,
+        }))
+        .unwrap();
+    // Labels are counted anew: 1 and 2.
+    let expected: Vec<u8> = v.labels.iter().map(|l| [0, 1, 0, 2][usize::from(*l)]).collect();
+    assert_eq!(again.labels, expected);
+    assert!(again.frame.warning.is_none());
+}
+
+#[test]
+fn contours_that_lie_in_no_slice_and_ones_beyond_all_measure_are_refused() {
+    let grid = grid([40, 40, 6], [0.5, 0.5, 2.0]);
+    let mut tilted = circle(&grid, 2.0, [10.0, 10.0], 6.0);
+    let normal: Vector3<f64> = grid.frame.directions.column(2).into();
+    let along: Vector3<f64> = grid.frame.directions.column(0).into();
+    let middle = tilted[0];
+    tilted
+        .iter_mut()
+        .for_each(|p| *p += normal * (*p - middle).dot(&along) * 0.5);
+    let why = set(vec![("Prostate", vec![tilted])])
+        .voxels(Some(grid.clone()))
+        .unwrap_err();
+    assert!(why.contains("tilted"), "{why}");
+    // A saw from one end of the slice to the other, again and again.
+    let saw: Vec<_> = (0..200_000)
+        .map(|i| {
+            grid.frame
+                .place_m([f64::from(i % 40), f64::from(i % 2) * 1e4 - 5e3, 2.0])
+        })
+        .collect();
+    let why = set(vec![("Prostate", vec![saw])]).voxels(Some(grid)).unwrap_err();
+    assert!(why.contains("too many to be drawn"), "{why}");
+}

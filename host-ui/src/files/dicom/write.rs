@@ -1,0 +1,177 @@
+//! What all DICOM files of ours have in common: who, when, and numbers that nobody else uses.
+
+use dicom_core::value::{DataSetSequence, PrimitiveValue};
+use dicom_core::{DataElement, Length, Tag, VR};
+use dicom_dictionary_std::{tags, uids};
+use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
+use std::hash::{BuildHasher, Hasher, RandomState};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Names the program in the files it writes; under 2.25 as it has no root of its own.
+const IMPLEMENTATION: &str = "2.25.302416733929811471066208173541526011461";
+
+/// To whom and to which frame a file belongs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Identity {
+    pub patient_name: String,
+    pub patient_id: String,
+    pub study: String,
+    pub frame_of_reference: String,
+}
+
+impl Identity {
+    /// Nobody's.
+    pub fn new() -> Self {
+        Self {
+            patient_name: "Stylet^Simulation".to_owned(),
+            patient_id: "STYLET".to_owned(),
+            study: new_uid(),
+            frame_of_reference: new_uid(),
+        }
+    }
+}
+
+impl Default for Identity {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// 128 random bits under 2.25, as the standard has it for those without a root.
+pub fn new_uid() -> String {
+    let random = || u128::from(RandomState::new().build_hasher().finish());
+    format!("2.25.{}", (random() << 64 | random()).max(1))
+}
+
+pub fn string(tag: Tag, vr: VR, value: &str) -> DataElement<InMemDicomObject> {
+    DataElement::new(tag, vr, PrimitiveValue::from(value))
+}
+
+/// Numbers as text, to the 16 characters that there is room for.
+pub fn decimals(tag: Tag, values: &[f64]) -> DataElement<InMemDicomObject> {
+    let texts: Vec<String> = values.iter().map(|&v| decimal(v)).collect();
+    DataElement::new(tag, VR::DS, PrimitiveValue::Strs(texts.into()))
+}
+
+fn decimal(value: f64) -> String {
+    let exact = format!("{value}");
+    if exact.len() <= 16 {
+        return exact;
+    }
+    // As near as sixteen characters come to it, with an exponent or without.
+    (0..=15)
+        .flat_map(|digits| [format!("{value:.digits$}"), format!("{value:.digits$e}")])
+        .filter(|text| text.len() <= 16)
+        .min_by(|a, b| {
+            let off = |text: &str| text.parse::<f64>().map_or(f64::INFINITY, |v| (v - value).abs());
+            off(a).total_cmp(&off(b))
+        })
+        .unwrap_or_else(|| format!("{value:.8e}"))
+}
+
+pub fn whole(tag: Tag, value: usize) -> DataElement<InMemDicomObject> {
+    string(tag, VR::IS, &value.to_string())
+}
+
+pub fn sequence(tag: Tag, items: Vec<InMemDicomObject>) -> DataElement<InMemDicomObject> {
+    DataElement::new(tag, VR::SQ, DataSetSequence::new(items, Length::UNDEFINED))
+}
+
+pub fn item(elements: impl IntoIterator<Item = DataElement<InMemDicomObject>>) -> InMemDicomObject {
+    InMemDicomObject::from_element_iter(elements)
+}
+
+/// The modules of patient, study, series, frame and equipment.
+pub fn common(sop_class: &str, modality: &str, of: &Identity) -> InMemDicomObject {
+    let (date, time) = now();
+    item([
+        string(tags::SPECIFIC_CHARACTER_SET, VR::CS, "ISO_IR 192"),
+        string(tags::SOP_CLASS_UID, VR::UI, sop_class),
+        string(tags::SOP_INSTANCE_UID, VR::UI, &new_uid()),
+        string(tags::STUDY_DATE, VR::DA, &date),
+        string(tags::STUDY_TIME, VR::TM, &time),
+        string(tags::INSTANCE_CREATION_DATE, VR::DA, &date),
+        string(tags::INSTANCE_CREATION_TIME, VR::TM, &time),
+        string(tags::ACCESSION_NUMBER, VR::SH, ""),
+        string(tags::MODALITY, VR::CS, modality),
+        string(tags::MANUFACTURER, VR::LO, "Stylet"),
+        string(
+            tags::MANUFACTURER_MODEL_NAME,
+            VR::LO,
+            "Stylet simulator, not for treatment",
+        ),
+        string(tags::SOFTWARE_VERSIONS, VR::LO, env!("CARGO_PKG_VERSION")),
+        string(tags::REFERRING_PHYSICIAN_NAME, VR::PN, ""),
+        string(tags::OPERATORS_NAME, VR::PN, ""),
+        string(tags::PATIENT_NAME, VR::PN, &of.patient_name),
+        string(tags::PATIENT_ID, VR::LO, &of.patient_id),
+        string(tags::PATIENT_BIRTH_DATE, VR::DA, ""),
+        string(tags::PATIENT_SEX, VR::CS, ""),
+        string(tags::STUDY_INSTANCE_UID, VR::UI, &of.study),
+        string(tags::SERIES_INSTANCE_UID, VR::UI, &new_uid()),
+        string(tags::STUDY_ID, VR::SH, ""),
+        string(tags::SERIES_NUMBER, VR::IS, "1"),
+        string(tags::FRAME_OF_REFERENCE_UID, VR::UI, &of.frame_of_reference),
+        string(tags::POSITION_REFERENCE_INDICATOR, VR::LO, ""),
+    ])
+}
+
+/// UTC as DICOM writes date and time.
+pub fn now() -> (String, String) {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let (days, of_day) = (seconds / 86_400, seconds % 86_400);
+    // Civil date from a count of days (era of 400 years from 1 March).
+    let shifted = days + 719_468;
+    let (era, of_era) = (shifted / 146_097, shifted % 146_097);
+    let year_of_era = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let from_march = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * from_march + 2) / 5 + 1;
+    let month = if from_march < 10 {
+        from_march + 3
+    } else {
+        from_march - 9
+    };
+    let year = year_of_era + era * 400 + u64::from(month <= 2);
+    (
+        format!("{year:04}{month:02}{day:02}"),
+        format!("{:02}{:02}{:02}", of_day / 3600, of_day / 60 % 60, of_day % 60),
+    )
+}
+
+pub fn bytes(object: InMemDicomObject) -> Result<Vec<u8>, String> {
+    let meta = FileMetaTableBuilder::new()
+        .transfer_syntax(uids::EXPLICIT_VR_LITTLE_ENDIAN)
+        .implementation_class_uid(IMPLEMENTATION)
+        .implementation_version_name("STYLET");
+    let file = object
+        .with_meta(meta)
+        .map_err(|e| format!("it cannot be written ({e})"))?;
+    let mut bytes = Vec::new();
+    file.write_all(&mut bytes)
+        .map_err(|e| format!("it cannot be written ({e})"))?;
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::decimal;
+
+    /// A small number once lost most of its digits to leading zeros.
+    #[test]
+    fn sixteen_characters_keep_as_many_digits_as_they_can() {
+        for (value, relative) in [
+            (8.876_543_210_123e-9, 1e-10),
+            (-1.234_567_890_123_456e-12, 1e-8),
+            (-123.456_789_012_345_67, 1e-13),
+            (0.1 + 0.2, 1e-14),
+            (6_405_120.123_456_789, 1e-14),
+        ] {
+            let text = decimal(value);
+            let read: f64 = text.parse().unwrap();
+            assert!(text.len() <= 16, "{text}");
+            assert!(((read - value) / value).abs() < relative, "{text} for {value:e}");
+        }
+        assert_eq!(decimal(145.0), "145");
+    }
+}

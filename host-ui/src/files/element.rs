@@ -1,0 +1,166 @@
+//! The numbers in a volume's data, as labels; only as much is held as the data really give.
+
+use std::io::Read;
+
+/// A volume with more voxels is not a prostate.
+pub const MAX_VOXELS: u64 = 1 << 28;
+/// Nothing that deflate makes is larger than this many times what it was made from.
+pub const MAX_DEFLATE_RATIO: u64 = 1032;
+/// Read at a time; a whole number of elements of any type.
+const CHUNK_BYTES: usize = 1 << 16;
+
+/// What one voxel is stored as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Element {
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+    U64,
+    I64,
+    F32,
+    F64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Endian {
+    Little,
+    Big,
+}
+
+impl Element {
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 => 2,
+            Self::U32 | Self::I32 | Self::F32 => 4,
+            Self::U64 | Self::I64 | Self::F64 => 8,
+        }
+    }
+
+    fn value(self, bytes: &[u8], endian: Endian) -> f64 {
+        let mut b = [0_u8; 8];
+        let n = bytes.len();
+        match endian {
+            Endian::Little => b[..n].copy_from_slice(bytes),
+            Endian::Big => b[..n]
+                .iter_mut()
+                .zip(bytes.iter().rev())
+                .for_each(|(to, from)| *to = *from),
+        }
+        let [b0, b1, b2, b3, ..] = b;
+        match self {
+            Self::U8 => f64::from(b0),
+            Self::I8 => f64::from(b0 as i8),
+            Self::U16 => f64::from(u16::from_le_bytes([b0, b1])),
+            Self::I16 => f64::from(i16::from_le_bytes([b0, b1])),
+            Self::U32 => f64::from(u32::from_le_bytes([b0, b1, b2, b3])),
+            Self::I32 => f64::from(i32::from_le_bytes([b0, b1, b2, b3])),
+            Self::F32 => f64::from(f32::from_le_bytes([b0, b1, b2, b3])),
+            Self::U64 => u64::from_le_bytes(b) as f64,
+            Self::I64 => i64::from_le_bytes(b) as f64,
+            Self::F64 => f64::from_le_bytes(b),
+        }
+    }
+}
+
+/// How many voxels a header claims, when that can be believed at all.
+pub fn voxel_count(dims: &[u64]) -> Result<usize, String> {
+    let size = || dims.iter().map(u64::to_string).collect::<Vec<_>>().join(" x ");
+    if dims.contains(&0) {
+        return Err(format!("its size is {} voxels; each side must be at least 1", size()));
+    }
+    match dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(d)) {
+        Some(n) if n <= MAX_VOXELS => Ok(n as usize),
+        _ => Err(format!(
+            "its header claims {} voxels, more than {MAX_VOXELS} in all; crop it to the gland",
+            size()
+        )),
+    }
+}
+
+/// Whether data of so many bytes can hold what the header claims, before anything of that size is made.
+pub fn must_hold(needed: u64, have: u64, packed: bool) -> Result<(), String> {
+    let most = if packed {
+        have.saturating_mul(MAX_DEFLATE_RATIO)
+    } else {
+        have
+    };
+    if needed <= most {
+        return Ok(());
+    }
+    Err(format!(
+        "it is cut off or its header is wrong: the header asks for {needed} bytes and the {have} bytes there are cannot hold them; copy or export it again"
+    ))
+}
+
+/// Exactly `count` labels, each the stored number times `slope` plus `intercept`.
+pub fn read_labels(
+    mut from: impl Read,
+    element: Element,
+    endian: Endian,
+    count: usize,
+    [slope, intercept]: [f64; 2],
+) -> Result<Vec<u8>, String> {
+    let size = element.bytes();
+    // Grows with what is really there.
+    let mut labels = Vec::with_capacity(count.min(CHUNK_BYTES));
+    let mut chunk = vec![0_u8; CHUNK_BYTES];
+    while labels.len() < count {
+        let part = &mut chunk[..((count - labels.len()) * size).min(CHUNK_BYTES)];
+        from.read_exact(part)
+            .map_err(|e| format!("it is cut off or damaged ({e}); copy or export it again"))?;
+        for bytes in part.chunks_exact(size) {
+            labels.push(label_of(element.value(bytes, endian) * slope + intercept)?);
+        }
+    }
+    Ok(labels)
+}
+
+/// As [`read_labels`], from numbers written out.
+pub fn labels_from_text(text: &[u8], count: usize) -> Result<Vec<u8>, String> {
+    let text = std::str::from_utf8(text).map_err(|_| "its numbers are not text".to_owned())?;
+    let words = text
+        .split(|c: char| c.is_ascii_whitespace() || c == ',')
+        .filter(|w| !w.is_empty());
+    let mut labels = Vec::with_capacity(count.min(text.len()));
+    for word in words {
+        if labels.len() == count {
+            return Err(format!(
+                "it holds more than the {count} values of its size; export it again"
+            ));
+        }
+        let value: f64 = word
+            .parse()
+            .map_err(|_| format!("it holds \"{}\" where a number must be", short(word)))?;
+        labels.push(label_of(value)?);
+    }
+    if labels.len() == count {
+        return Ok(labels);
+    }
+    Err(format!(
+        "it is cut off: {} of {count} values are there; copy or export it again",
+        labels.len()
+    ))
+}
+
+pub fn label_of(value: f64) -> Result<u8, String> {
+    let whole = value.round();
+    if (value - whole).abs() < 1e-3 && (0.0..=255.0).contains(&whole) {
+        return Ok(whole as u8);
+    }
+    Err(format!(
+        "it holds the value {value}; a segmentation holds whole numbers 0 to 255. Is this the image instead of its labels?"
+    ))
+}
+
+/// Enough of a foreign text to recognise it.
+pub fn short(text: &str) -> String {
+    let mut start: String = text.chars().take(40).filter(|c| !c.is_control()).collect();
+    if start.len() < text.len() {
+        start.push_str("...");
+    }
+    start
+}

@@ -1,0 +1,90 @@
+//! Where the voxels of a file lie in the patient (RAS, m), whatever the format.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// Axes whose cosine is larger are sheared.
+const SHEAR: f64 = 1e-3;
+
+/// `patient = directions * (spacing_m .* index) + origin_m`, index at voxel centres.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VoxelFrame {
+    /// Orthonormal; mirrored when its determinant is negative.
+    pub directions: Matrix3<f64>,
+    pub spacing_m: [f64; 3],
+    pub origin_m: Vector3<f64>,
+    pub warning: Option<String>,
+}
+
+impl VoxelFrame {
+    /// From the steps between voxels along each axis, one a column, and the middle of the first voxel (RAS, m); `source` is what the
+    /// file calls them.
+    pub fn new(columns_m: Matrix3<f64>, origin_m: Vector3<f64>, source: &str) -> Result<Self, String> {
+        if !columns_m.iter().chain(origin_m.iter()).all(|v| v.is_finite()) {
+            return Err(format!(
+                "its {source} holds a value that is not a number; write the file again with a valid orientation"
+            ));
+        }
+        let spacing_m: [f64; 3] = [0, 1, 2].map(|a| columns_m.column(a).norm());
+        if spacing_m.iter().any(|s| !(1e-5..=0.1).contains(s)) {
+            let mm = spacing_m.map(|s| s * 1e3);
+            return Err(format!(
+                "its {source} gives voxels of {:.4} x {:.4} x {:.4} mm; each side must be 0.01 to 100 mm",
+                mm[0], mm[1], mm[2]
+            ));
+        }
+        if origin_m.amax() > 10.0 {
+            return Err(format!(
+                "its {source} puts the first voxel {:.1} m from the origin; at most 10 m is believed",
+                origin_m.amax()
+            ));
+        }
+        let raw = Matrix3::from_columns(&[0, 1, 2].map(|a| columns_m.column(a) / spacing_m[a]));
+        let worst = [(0, 1), (0, 2), (1, 2)]
+            .map(|(a, b)| raw.column(a).dot(&raw.column(b)).abs())
+            .into_iter()
+            .fold(0.0, f64::max);
+        if worst > SHEAR {
+            return Err(format!(
+                "its {source} is sheared (axes {:.2} deg off a right angle); resample it to a rectangular grid first",
+                worst.min(1.0).asin().to_degrees()
+            ));
+        }
+        Ok(Self {
+            directions: nearest_orthonormal(raw),
+            spacing_m,
+            origin_m,
+            warning: None,
+        })
+    }
+
+    /// The middle of a voxel, which need not be a whole one (RAS, m).
+    pub fn place_m(&self, index: [f64; 3]) -> Vector3<f64> {
+        let along = Vector3::from([0, 1, 2].map(|a| index[a] * self.spacing_m[a]));
+        self.directions * along + self.origin_m
+    }
+
+    /// Undoes [`VoxelFrame::place_m`].
+    pub fn index_of(&self, place_m: Vector3<f64>) -> [f64; 3] {
+        let along = self.directions.transpose() * (place_m - self.origin_m);
+        [0, 1, 2].map(|a| along[a] / self.spacing_m[a])
+    }
+
+    /// The step from voxel to voxel along each axis, one a column (RAS, m).
+    pub fn columns_m(&self) -> Matrix3<f64> {
+        self.directions * Matrix3::from_diagonal(&Vector3::from(self.spacing_m))
+    }
+}
+
+/// Single precision and rounded text leave the columns a little off.
+fn nearest_orthonormal(m: Matrix3<f64>) -> Matrix3<f64> {
+    let svd = m.svd(true, true);
+    match (svd.u, svd.v_t) {
+        (Some(u), Some(v_t)) => u * v_t,
+        _ => m,
+    }
+}
+
+/// RAS out of LPS and back: the first two axes turn round.
+pub fn ras_from_lps(v: Vector3<f64>) -> Vector3<f64> {
+    Vector3::new(-v.x, -v.y, v.z)
+}

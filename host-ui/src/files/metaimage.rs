@@ -1,0 +1,155 @@
+//! The labels of a MetaImage file (.mha, .mhd with its data beside it).
+
+mod header;
+pub mod write;
+
+use super::Beside;
+use super::element::{labels_from_text, must_hold, read_labels, voxel_count};
+use super::frame::{VoxelFrame, ras_from_lps};
+use super::nrrd::nothing_left;
+use super::volume::Voxels;
+use flate2::read::ZlibDecoder;
+use header::Header;
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
+
+/// What the first line of such a file may be.
+const FIRST: [&str; 8] = [
+    "ObjectType",
+    "NDims",
+    "Comment",
+    "ObjectSubType",
+    "Name",
+    "ID",
+    "TransformType",
+    "BinaryData",
+];
+
+pub fn is_metaimage(bytes: &[u8]) -> bool {
+    let line = bytes.split(|&b| b == b'\n').next().unwrap_or_default();
+    let Ok(line) = std::str::from_utf8(line) else {
+        return false;
+    };
+    line.split_once('=').is_some_and(|(key, _)| FIRST.contains(&key.trim()))
+}
+
+/// The whole file; `beside` reads the data of a detached header.
+pub fn read(bytes: &[u8], beside: Beside) -> Result<Voxels, String> {
+    let (header, rest) = Header::parse(bytes)?;
+    let frame = frame(&header)?;
+    let count = voxel_count(&header.sizes)?;
+    let detached;
+    let data = if header.data_file.eq_ignore_ascii_case("LOCAL") {
+        rest
+    } else {
+        detached = beside(&header.data_file)?;
+        &detached
+    };
+    let labels = read_data(&header, data, count)?;
+    Ok(Voxels {
+        dims: [0, 1, 2].map(|a| header.sizes[a] as usize),
+        labels,
+        frame,
+        names: BTreeMap::new(),
+    })
+}
+
+fn read_data(h: &Header, data: &[u8], count: usize) -> Result<Vec<u8>, String> {
+    let size = (count * h.element.bytes()) as u64;
+    if !h.binary {
+        must_hold(count as u64, data.len() as u64, false)?;
+        return labels_from_text(data, count);
+    }
+    if h.compressed {
+        if h.header_bytes != 0 {
+            return Err("its data are packed and yet have a HeaderSize; write it again".to_owned());
+        }
+        must_hold(size, data.len() as u64, true)?;
+        let mut from = ZlibDecoder::new(data);
+        let labels = read_labels(&mut from, h.element, h.endian, count, [1.0, 0.0])?;
+        nothing_left(from)?;
+        return Ok(labels);
+    }
+    let data = match h.header_bytes {
+        // The data are the end of the file, whatever is before them.
+        -1 => &data[data.len().saturating_sub(size as usize)..],
+        n => data.get(n as usize..).unwrap_or_default(),
+    };
+    must_hold(size, data.len() as u64, false)?;
+    if data.len() as u64 > size {
+        return Err(format!(
+            "the header asks for {size} bytes and {} are there: header and data do not belong together; write it again",
+            data.len()
+        ));
+    }
+    read_labels(data, h.element, h.endian, count, [1.0, 0.0])
+}
+
+/// RAS, m; the file is in LPS, mm.
+fn frame(h: &Header) -> Result<VoxelFrame, String> {
+    let lettered = h.letters.as_deref().and_then(axes_of_letters);
+    let mut warning = None;
+    let directions = match (h.directions, lettered) {
+        (Some(directions), lettered) => {
+            if lettered.is_some_and(|l| !same_octants(&l, &directions)) {
+                warning = Some(format!(
+                    "AnatomicalOrientation = {} does not fit TransformMatrix, which is believed",
+                    h.letters.as_deref().unwrap_or_default()
+                ));
+            }
+            directions
+        }
+        (None, Some(lettered)) => lettered,
+        (None, None) => {
+            warning = Some(
+                "the file says nothing of the patient's orientation; its axes are taken as left, posterior, superior"
+                    .to_owned(),
+            );
+            Matrix3::identity()
+        }
+    };
+    let columns = directions * Matrix3::from_diagonal(&Vector3::from(h.spacing_mm)) * 1e-3;
+    let turned = Matrix3::from_columns(&[0, 1, 2].map(|a| ras_from_lps(columns.column(a).into())));
+    let origin = ras_from_lps(Vector3::from(h.origin_mm) * 1e-3);
+    let mut frame = VoxelFrame::new(turned, origin, "TransformMatrix and ElementSpacing")?;
+    if h.directions.is_some() {
+        let off = h.directions.map_or(0.0, |d| {
+            (0..3).map(|a| (d.column(a).norm() - 1.0).abs()).fold(0.0, f64::max)
+        });
+        if off > 1e-3 {
+            return Err("its TransformMatrix scales as well as it turns; write it with unit vectors".to_owned());
+        }
+    }
+    frame.warning = warning;
+    Ok(frame)
+}
+
+/// The letters say where each axis comes from: RAI is left, posterior, superior.
+fn axes_of_letters(letters: &str) -> Option<Matrix3<f64>> {
+    let mut axes = Matrix3::zeros();
+    let mut seen = [false; 3];
+    for (column, letter) in letters.chars().enumerate() {
+        let (row, sign) = match letter {
+            'R' => (0, 1.0),
+            'L' => (0, -1.0),
+            'A' => (1, 1.0),
+            'P' => (1, -1.0),
+            'I' => (2, 1.0),
+            'S' => (2, -1.0),
+            _ => return None,
+        };
+        if column > 2 || std::mem::replace(&mut seen[row], true) {
+            return None;
+        }
+        axes[(row, column)] = sign;
+    }
+    (seen == [true; 3]).then_some(axes)
+}
+
+/// Whether each axis goes mainly where the letters say.
+fn same_octants(lettered: &Matrix3<f64>, directions: &Matrix3<f64>) -> bool {
+    (0..3).all(|a| lettered.column(a).dot(&directions.column(a)) > 0.5)
+}
+
+#[cfg(test)]
+mod tests;

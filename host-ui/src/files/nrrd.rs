@@ -1,0 +1,244 @@
+//! The labels of an NRRD file (.nrrd, .nhdr with its data beside it, Slicer's .seg.nrrd).
+
+mod header;
+pub mod segments;
+pub mod write;
+
+use super::Beside;
+use super::element::{Element, Endian, labels_from_text, must_hold, read_labels, voxel_count};
+use super::frame::VoxelFrame;
+use super::volume::Voxels;
+use flate2::read::MultiGzDecoder;
+use header::{Axis, Header};
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
+use std::io::Read;
+
+/// A "byte skip" of -1 stands for at most so much.
+const MAX_BEFORE_END: u64 = 1 << 20;
+
+pub fn is_nrrd(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"NRRD000")
+}
+
+/// The whole file; `beside` reads the data of a detached header.
+pub fn read(bytes: &[u8], beside: Beside) -> Result<Voxels, String> {
+    let (header, rest) = Header::parse(bytes)?;
+    let space = header.space_axes()?;
+    let frame = frame(&header, space)?;
+    let count = voxel_count(&header.sizes)?;
+    let detached;
+    let data = match &header.data_file {
+        None => rest,
+        Some(name) => {
+            detached = beside(name)?;
+            &detached
+        }
+    };
+    let values = read_data(&header, data, count)?;
+    let dims = space.map(|a| header.sizes[a] as usize);
+    let list = (0..header.sizes.len()).find(|a| !space.contains(a));
+    let Some(list) = list.filter(|&a| header.sizes[a] > 1) else {
+        return Ok(Voxels {
+            dims,
+            labels: values,
+            frame,
+            names: segments::names(&header.pairs)?,
+        });
+    };
+    segments::flatten(&header, &values, list, frame, dims)
+}
+
+fn read_data(h: &Header, data: &[u8], count: usize) -> Result<Vec<u8>, String> {
+    let encoding = h.encoding.as_str();
+    let endian = h.endian.unwrap_or(Endian::Little);
+    if h.element.bytes() > 1 && h.endian.is_none() && ["raw", "gzip", "gz", "hex"].contains(&encoding) {
+        return Err(
+            "it does not say in which order the bytes of a number are: the field \"endian\" is missing".to_owned(),
+        );
+    }
+    let skipped = skip_lines(data, h.line_skip)?;
+    let size = (count * h.element.bytes()) as u64;
+    let identity = [1.0, 0.0];
+    match encoding {
+        "raw" => {
+            let data = match h.byte_skip {
+                // The data are the end of the file, whatever is before them.
+                -1 => &skipped[skipped.len().saturating_sub(size as usize)..],
+                n => skipped.get(n as usize..).unwrap_or_default(),
+            };
+            exactly(size, data.len() as u64)?;
+            read_labels(data, h.element, endian, count, identity)
+        }
+        "gzip" | "gz" => {
+            if h.byte_skip == -1 {
+                let end = unpacked_end(skipped, size)?;
+                return read_labels(end.as_slice(), h.element, endian, count, identity);
+            }
+            must_hold(size.saturating_add(h.byte_skip as u64), skipped.len() as u64, true)?;
+            let mut from = MultiGzDecoder::new(skipped);
+            std::io::copy(&mut from.by_ref().take(h.byte_skip as u64), &mut std::io::sink())
+                .map_err(|e| format!("it is cut off or damaged ({e}); copy or export it again"))?;
+            let labels = read_labels(&mut from, h.element, endian, count, identity)?;
+            nothing_left(from)?;
+            Ok(labels)
+        }
+        "ascii" | "text" | "txt" => {
+            must_hold(count as u64, skipped.len() as u64, false)?;
+            labels_from_text(skipped, count)
+        }
+        "hex" => {
+            let bytes = unhex(skipped)?;
+            exactly(size, bytes.len() as u64)?;
+            read_labels(bytes.as_slice(), h.element, endian, count, identity)
+        }
+        "bzip2" | "bz2" => Err("its data are packed with bzip2; save it with gzip or raw encoding".to_owned()),
+        other => Err(format!(
+            "its encoding \"{}\" is not known; save it with gzip, raw, text or hex encoding",
+            super::element::short(other)
+        )),
+    }
+}
+
+/// The last bytes of packed data; a header of another format may stand before them.
+fn unpacked_end(packed: &[u8], size: u64) -> Result<Vec<u8>, String> {
+    must_hold(size, packed.len() as u64, true)?;
+    let mut all = Vec::new();
+    MultiGzDecoder::new(packed)
+        .take(size + MAX_BEFORE_END + 1)
+        .read_to_end(&mut all)
+        .map_err(|e| format!("it is cut off or damaged ({e}); copy or export it again"))?;
+    let before = (all.len() as u64).checked_sub(size);
+    match before {
+        Some(before) if before <= MAX_BEFORE_END => Ok(all.split_off(before as usize)),
+        Some(_) => Err(format!(
+            "its data have more than {MAX_BEFORE_END} bytes before what its size asks for"
+        )),
+        None => Err(format!(
+            "it is cut off: {} of {size} bytes are there; copy or export it again",
+            all.len()
+        )),
+    }
+}
+
+fn exactly(needed: u64, have: u64) -> Result<(), String> {
+    must_hold(needed, have, false)?;
+    if have > needed {
+        return Err(format!(
+            "the header asks for {needed} bytes and {have} are there: header and data do not belong together; export it again"
+        ));
+    }
+    Ok(())
+}
+
+/// A longer stream than the header says is another volume's.
+pub(super) fn nothing_left(mut from: impl Read) -> Result<(), String> {
+    match from.read(&mut [0]) {
+        Ok(0) => Ok(()),
+        Ok(_) => Err("its data go on behind what its size asks for: header and data do not belong together".to_owned()),
+        Err(e) => Err(format!("it is damaged ({e}); copy or export it again")),
+    }
+}
+
+fn skip_lines(mut data: &[u8], lines: usize) -> Result<&[u8], String> {
+    for _ in 0..lines {
+        let end = data
+            .iter()
+            .position(|&b| b == b'\n')
+            .ok_or_else(|| format!("its \"line skip\" is {lines}, more lines than there are"))?;
+        data = &data[end + 1..];
+    }
+    Ok(data)
+}
+
+fn unhex(text: &[u8]) -> Result<Vec<u8>, String> {
+    let digit = |b: u8| (b as char).to_digit(16).map(|d| d as u8);
+    let digits: Option<Vec<u8>> = text
+        .iter()
+        .filter(|b| !b.is_ascii_whitespace())
+        .map(|&b| digit(b))
+        .collect();
+    let digits = digits.ok_or("its data hold a character that is no hexadecimal digit")?;
+    if digits.len() % 2 == 1 {
+        return Err("its data hold half a byte too many".to_owned());
+    }
+    Ok(digits.chunks_exact(2).map(|d| d[0] << 4 | d[1]).collect())
+}
+
+const NO_SPACE: &str = "the file names no anatomical space; its axes are taken as right, anterior, superior";
+
+/// RAS, m.
+fn frame(h: &Header, space: [usize; 3]) -> Result<VoxelFrame, String> {
+    let (flip, named) = match h.space.as_deref() {
+        Some("right-anterior-superior" | "ras") => ([1.0, 1.0, 1.0], true),
+        Some("left-anterior-superior" | "las") => ([-1.0, 1.0, 1.0], true),
+        Some("left-posterior-superior" | "lps") => ([-1.0, -1.0, 1.0], true),
+        Some("scanner-xyz" | "3d-right-handed" | "3d-left-handed") | None => ([1.0, 1.0, 1.0], false),
+        Some(other) => {
+            return Err(format!(
+                "its space \"{}\" is none of an anatomical volume; save it as left-posterior-superior or right-anterior-superior",
+                super::element::short(other)
+            ));
+        }
+    };
+    let flip = Matrix3::from_diagonal(&Vector3::from(flip));
+    let mut columns = Matrix3::zeros();
+    let mut turned = true;
+    for (column, axis) in space.into_iter().enumerate() {
+        let step = match h.axes.get(axis) {
+            Some(Axis::Direction(d)) => Vector3::from(*d),
+            Some(Axis::Spacing(s)) => {
+                turned = false;
+                let mut step = Vector3::zeros();
+                step[column] = *s;
+                step
+            }
+            _ => {
+                return Err(
+                    "it says nothing of the size of its voxels: neither \"space directions\" nor \"spacings\""
+                        .to_owned(),
+                );
+            }
+        };
+        columns.set_column(column, &step);
+    }
+    let unit = Matrix3::from_diagonal(&Vector3::from(h.units_m));
+    let origin = Vector3::from(h.origin.unwrap_or_default());
+    let source = if turned { "space directions" } else { "spacings" };
+    let mut frame = VoxelFrame::new(flip * unit * columns, flip * unit * origin, source)?;
+    if !named || !turned {
+        frame.warning = Some(NO_SPACE.to_owned());
+    } else if h.origin.is_none() {
+        frame.warning = Some("the file names no space origin; its first voxel is taken as the origin".to_owned());
+    }
+    Ok(frame)
+}
+
+/// The types an NRRD may have, by their many names.
+fn element(name: &str) -> Option<Element> {
+    Some(match name {
+        "signed char" | "int8" | "int8_t" => Element::I8,
+        "uchar" | "unsigned char" | "uint8" | "uint8_t" => Element::U8,
+        "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => Element::I16,
+        "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => Element::U16,
+        "int" | "signed int" | "int32" | "int32_t" => Element::I32,
+        "uint" | "unsigned int" | "uint32" | "uint32_t" => Element::U32,
+        "longlong"
+        | "long long"
+        | "long long int"
+        | "signed long long"
+        | "signed long long int"
+        | "int64"
+        | "int64_t" => Element::I64,
+        "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => Element::U64,
+        "float" => Element::F32,
+        "double" => Element::F64,
+        _ => return None,
+    })
+}
+
+/// Key and value pairs of a header, as Slicer keeps its segments in.
+type Pairs = BTreeMap<String, String>;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,37 @@
+//! A label volume as NRRD, with Slicer's names of segments.
+
+use super::super::volume::Voxels;
+use flate2::{Compression, write::GzEncoder};
+use nalgebra::Vector3;
+use std::io::Write;
+
+/// The whole file, packed.
+pub fn bytes(v: &Voxels) -> Result<Vec<u8>, String> {
+    let vector = |c: Vector3<f64>| format!("({},{},{})", c.x * 1e3, c.y * 1e3, c.z * 1e3);
+    let columns = v.frame.columns_m();
+    // The patient in LPS, as nearly all have it.
+    let lps = super::super::frame::ras_from_lps;
+    let directions: Vec<String> = (0..3).map(|a| vector(lps(columns.column(a).into()))).collect();
+    let mut out = format!(
+        "NRRD0004\ntype: unsigned char\ndimension: 3\nspace: left-posterior-superior\nsizes: {} {} {}\n\
+         space directions: {}\nkinds: domain domain domain\nendian: little\nencoding: gzip\nspace origin: {}\n",
+        v.dims[0],
+        v.dims[1],
+        v.dims[2],
+        directions.join(" "),
+        vector(lps(v.frame.origin_m))
+    );
+    for (n, (label, name)) in v.names.iter().enumerate() {
+        let name: String = name.chars().filter(|c| !c.is_control()).collect();
+        out.push_str(&format!(
+            "Segment{n}_ID:=Segment_{label}\nSegment{n}_Name:={name}\nSegment{n}_LabelValue:={label}\nSegment{n}_Layer:=0\n"
+        ));
+    }
+    out.push('\n');
+    let mut packed = GzEncoder::new(out.into_bytes(), Compression::default());
+    // The header is in front as it is: only what is written from here on is packed.
+    packed
+        .write_all(&v.labels)
+        .and_then(|()| packed.finish())
+        .map_err(|e| format!("the labels cannot be packed ({e})"))
+}

@@ -1,0 +1,93 @@
+//! Which format a file has, by what is in it; the formats' own readers do the rest.
+
+use super::error::FileError;
+use super::volume::{LabelVolume, Voxels};
+use super::{dicom, metaimage, nifti, nrrd, scene};
+use std::fs::File;
+use std::io::Read;
+use std::path::{Component, Path};
+
+/// Larger than any segmentation of a pelvis.
+const MAX_FILE_BYTES: u64 = 1 << 30;
+pub const FORMATS: &str =
+    "NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr, .seg.nrrd), MetaImage (.mha, .mhd), DICOM RT Structure Set (.dcm)";
+
+/// The tissue of a label volume: its structures where it names them, otherwise every label but 0 or the one asked for.
+/// A scene file says itself what is what.
+pub fn read(path: &Path, label: Option<u8>) -> Result<LabelVolume, FileError> {
+    if scene::is_scene(path) {
+        if label.is_some() {
+            return Err(FileError::of(
+                path,
+                "a scene file names its structures itself; leave --label out",
+            ));
+        }
+        return scene::load(path).map(|(_, volume)| volume);
+    }
+    let voxels = read_voxels(path)?;
+    LabelVolume::from_voxels(&voxels, label, file_name(path)).map_err(|why| FileError::of(path, &why))
+}
+
+pub fn file_name(path: &Path) -> String {
+    path.file_name()
+        .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+}
+
+/// The labels as they lie in the file.
+pub fn read_voxels(path: &Path) -> Result<Voxels, FileError> {
+    let told = |why: String| FileError::of(path, &why);
+    let bytes = whole(path).map_err(told)?;
+    if dicom::is_dicom(&bytes) {
+        let object = dicom::read(&bytes).map_err(told)?;
+        return dicom::structures::read(&object, path.parent()).map_err(told);
+    }
+    voxels(&bytes, &|name| beside(path, name)).map_err(told)
+}
+
+/// As [`read_voxels`], from the bytes of the file and a way to read another one in its folder.
+pub fn voxels(bytes: &[u8], beside: super::Beside) -> Result<Voxels, String> {
+    if nrrd::is_nrrd(bytes) {
+        nrrd::read(bytes, beside)
+    } else if nifti::is_nifti(bytes) {
+        nifti::read(bytes)
+    } else if metaimage::is_metaimage(bytes) {
+        metaimage::read(bytes, beside)
+    } else {
+        Err(format!(
+            "it is none of the formats that are read: {FORMATS}; export the segmentation as one of them"
+        ))
+    }
+}
+
+/// All of a file that is not too large.
+pub fn whole(path: &Path) -> Result<Vec<u8>, String> {
+    let kind = std::fs::metadata(path).map_err(|e| format!("it cannot be opened ({e}); check the path"))?;
+    if !kind.is_file() {
+        return Err(format!("it is not a file; give the path of a file: {FORMATS}"));
+    }
+    if kind.len() == 0 {
+        return Err("it is empty; copy or export it again".to_owned());
+    }
+    let mut bytes = Vec::new();
+    File::open(path)
+        .and_then(|f| f.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes))
+        .map_err(|e| format!("it cannot be read ({e}); check its permissions"))?;
+    if bytes.len() as u64 > MAX_FILE_BYTES {
+        return Err(format!("it has more than {MAX_FILE_BYTES} bytes; crop it to the gland"));
+    }
+    Ok(bytes)
+}
+
+/// The data that a header names; a header from elsewhere must not reach outside of its folder.
+fn beside(header: &Path, name: &str) -> Result<Vec<u8>, String> {
+    let mut parts = Path::new(name).components();
+    let inside = matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None));
+    if !inside {
+        return Err(format!(
+            "its data are in \"{}\"; only a file in the same folder is read",
+            super::element::short(name)
+        ));
+    }
+    let path = header.with_file_name(name);
+    whole(&path).map_err(|why| format!("its data file {}: {why}", path.display()))
+}

@@ -1,0 +1,61 @@
+//! Structures that lie in one another, as one label a voxel: the smaller structure has it.
+
+use super::volume::Voxels;
+use std::collections::BTreeMap;
+
+/// `of_voxel` adds every label that a voxel has. Gives the labels, and what was lost by it in words.
+pub fn smallest_wins(
+    count: usize,
+    names: &BTreeMap<u8, String>,
+    of_voxel: impl Fn(usize, &mut Vec<u8>),
+) -> (Vec<u8>, Option<String>) {
+    let mut sizes = [0_u64; 256];
+    let mut found = Vec::new();
+    for voxel in 0..count {
+        found.clear();
+        of_voxel(voxel, &mut found);
+        found.iter().for_each(|&l| sizes[usize::from(l)] += 1);
+    }
+    let mut taken = [0_u64; 256];
+    let mut labels = vec![0_u8; count];
+    for (voxel, label) in labels.iter_mut().enumerate() {
+        found.clear();
+        of_voxel(voxel, &mut found);
+        // The lower label where sizes are equal.
+        let Some(&smallest) = found.iter().min_by_key(|&&l| (sizes[usize::from(l)], l)) else {
+            continue;
+        };
+        *label = smallest;
+        found
+            .iter()
+            .filter(|&&l| l != smallest)
+            .for_each(|&l| taken[usize::from(l)] += 1);
+    }
+    let lost: Vec<String> = names
+        .iter()
+        .filter(|(label, _)| taken[usize::from(**label)] > 0)
+        .map(|(label, name)| {
+            format!(
+                "{name} ({} of {} voxels)",
+                taken[usize::from(*label)],
+                sizes[usize::from(*label)]
+            )
+        })
+        .collect();
+    let warning = (!lost.is_empty()).then(|| {
+        format!(
+            "structures overlap, and where they do the smaller one has the voxel; others have it taken from them: {}",
+            lost.join(", ")
+        )
+    });
+    (labels, warning)
+}
+
+/// The volume with one more thing that the user should know.
+pub fn told(mut voxels: Voxels, warning: Option<String>) -> Voxels {
+    voxels.frame.warning = match (voxels.frame.warning.take(), warning) {
+        (Some(one), Some(other)) => Some(format!("{one}; {other}")),
+        (one, other) => one.or(other),
+    };
+    voxels
+}

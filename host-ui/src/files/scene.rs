@@ -1,0 +1,264 @@
+//! Scene files (TOML): a volume, what its structures are made of, needle, device and plan; every problem is told at once.
+
+mod keys;
+
+use super::names::{Material, Role, known, unknown};
+use super::open::{file_name, read_voxels, whole};
+use super::volume::{LabelVolume, Tissue, Voxels};
+use super::{FileError, error};
+use keys::Keys;
+use std::path::{Path, PathBuf};
+
+const MAX_BYTES: usize = 1 << 20;
+const MAX_STRUCTURES: usize = 255;
+
+/// What a scene file says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneFile {
+    pub name: Option<String>,
+    /// Beside the scene file, or from its folder on.
+    pub volume: PathBuf,
+    /// Empty: as the names of the volume say.
+    pub structures: Vec<Part>,
+    pub insert_m_per_s: Option<f64>,
+    pub retract_m_per_s: Option<f64>,
+    pub device: Option<String>,
+    pub plan: Option<PathBuf>,
+}
+
+/// How a structure is picked in the volume.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pick {
+    Label(u8),
+    Name(String),
+}
+
+/// One structure of the scene; what is not said comes from its name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    pub pick: Pick,
+    pub called: Option<String>,
+    /// `None` within: the structure is left out.
+    pub role: Option<Option<Role>>,
+    pub young_pa: Option<f64>,
+    pub poisson: Option<f64>,
+    pub limits: Option<[[f64; 3]; 3]>,
+    pub fixed: Option<bool>,
+}
+
+/// Whether a file is a scene file: the only format here that is known by its name.
+pub fn is_scene(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+}
+
+/// Reads a scene file.
+pub fn read(path: &Path) -> Result<SceneFile, FileError> {
+    let told = |why: String| FileError::of(path, &why);
+    let bytes = whole(path).map_err(told)?;
+    if bytes.len() > MAX_BYTES {
+        return Err(told(format!(
+            "it has {} bytes; a scene file has a few thousand",
+            bytes.len()
+        )));
+    }
+    let text = std::str::from_utf8(&bytes).map_err(|_| told("it is not text (UTF-8)".to_owned()))?;
+    parse(text).map_err(told)
+}
+
+/// The volume of a scene file, its structures made of what the file says.
+pub fn load(path: &Path) -> Result<(SceneFile, LabelVolume), FileError> {
+    let scene = read(path)?;
+    let beside = path.parent().unwrap_or(Path::new("")).join(&scene.volume);
+    let voxels = read_voxels(&beside)?;
+    let name = scene.name.clone().unwrap_or_else(|| file_name(path));
+    let told = |why: String| FileError::of(path, &why);
+    let tissues = scene.tissues(&voxels).map_err(told)?;
+    let volume = LabelVolume::from_tissues(&voxels, tissues, name).map_err(told)?;
+    Ok((scene, volume))
+}
+
+/// From the text of a scene file.
+pub fn parse(text: &str) -> Result<SceneFile, String> {
+    let root: toml::Table = text.parse().map_err(|e| format!("it is not TOML: {e}"))?;
+    let mut problems = Vec::new();
+    let mut top = Keys::new(&root, String::new(), &mut problems);
+    top.only(&["name", "volume", "structure", "needle", "device", "plan"]);
+    let name = top.text("name");
+    let volume = top.table("volume", |k| {
+        k.only(&["file"]);
+        k.path("file")
+    });
+    let needle = top.table("needle", |k| {
+        k.only(&["insert_mm_per_s", "retract_mm_per_s"]);
+        Some(["insert_mm_per_s", "retract_mm_per_s"].map(|key| k.number(key, 0.1, 500.0).map(|v| v * 1e-3)))
+    });
+    let device = top.table("device", |k| {
+        k.only(&["name"]);
+        k.text("name")
+    });
+    let plan = top.table("plan", |k| {
+        k.only(&["file"]);
+        k.path("file")
+    });
+    let structures = top.tables("structure", MAX_STRUCTURES, part);
+    let absent = !root.contains_key("volume");
+    if absent || (volume.is_none() && problems.is_empty()) {
+        problems.push("[volume] file is missing: the label volume to run".to_owned());
+    }
+    error::all(problems)?;
+    let [insert_m_per_s, retract_m_per_s] = needle.unwrap_or_default();
+    Ok(SceneFile {
+        name,
+        volume: volume.ok_or("[volume] file is missing")?,
+        structures,
+        insert_m_per_s,
+        retract_m_per_s,
+        device,
+        plan,
+    })
+}
+
+fn part(k: &mut Keys) -> Option<Part> {
+    k.only(&[
+        "label",
+        "name",
+        "called",
+        "role",
+        "young_kpa",
+        "poisson",
+        "stretch",
+        "shear_deg",
+        "fixed",
+    ]);
+    let label = k.number("label", 1.0, 255.0);
+    if label.is_some_and(|l| l.fract() != 0.0) {
+        k.problem("label", "must be a whole number");
+    }
+    let pick = match (label, k.text("name")) {
+        (Some(label), None) => Some(Pick::Label(label as u8)),
+        (None, Some(name)) => Some(Pick::Name(name)),
+        (Some(_), Some(_)) => {
+            k.problem(
+                "label",
+                "and name are both there; give the one by which the structure is found, and its name as \"called\"",
+            );
+            None
+        }
+        (None, None) => {
+            k.problem(
+                "label",
+                "or name is missing: by which the structure is found in the volume",
+            );
+            None
+        }
+    };
+    let role = match k.text("role").as_deref() {
+        None => None,
+        Some("target") => Some(Some(Role::Target)),
+        Some("spare") => Some(Some(Role::Spare)),
+        Some("tissue") => Some(Some(Role::Tissue)),
+        Some("leave out") => Some(None),
+        Some(_) => {
+            k.problem("role", "must be \"target\", \"spare\", \"tissue\" or \"leave out\"");
+            None
+        }
+    };
+    let stretch = k.numbers::<2>("stretch", 0.01, 100.0);
+    let shear_deg = k.number("shear_deg", 0.1, 89.0);
+    if stretch.is_some() != shear_deg.is_some() {
+        k.problem("stretch", "and shear_deg belong together: give both or none");
+    }
+    if stretch.is_some_and(|[short, long]| !(short < 1.0 && long > 1.0)) {
+        k.problem(
+            "stretch",
+            "must be [below 1, above 1]: shortest and longest as a share of the length at rest",
+        );
+    }
+    let limits = stretch
+        .zip(shear_deg)
+        .map(|([short, long], deg)| [[short, long, deg.to_radians()]; 3]);
+    Some(Part {
+        called: k.text("called"),
+        role,
+        young_pa: k.number("young_kpa", 0.01, 1e8).map(|v| v * 1e3),
+        poisson: k.number("poisson", 0.0, 0.4999),
+        limits,
+        fixed: k.yes("fixed"),
+        pick: pick?,
+    })
+}
+
+impl SceneFile {
+    /// What each label of the volume is made of; labels that no structure names are left out.
+    fn tissues(&self, voxels: &Voxels) -> Result<Vec<Tissue>, String> {
+        if self.structures.is_empty() {
+            return Ok(super::volume::by_name(voxels));
+        }
+        let mut problems = Vec::new();
+        let mut tissues: Vec<Tissue> = Vec::new();
+        for (part, number) in self.structures.iter().zip(1..) {
+            match part.find(voxels) {
+                Err(why) => problems.push(format!("[[structure]] {number}: {why}")),
+                Ok(label) if tissues.iter().any(|t| t.label == label) => {
+                    problems.push(format!("[[structure]] {number}: label {label} has a structure already"));
+                }
+                Ok(label) => tissues.extend(part.tissue(label, voxels)),
+            }
+        }
+        error::all(problems)?;
+        if tissues.is_empty() {
+            return Err("all structures are left out".to_owned());
+        }
+        Ok(tissues)
+    }
+}
+
+impl Part {
+    fn find(&self, voxels: &Voxels) -> Result<u8, String> {
+        match &self.pick {
+            Pick::Label(label) if voxels.labels.contains(label) => Ok(*label),
+            Pick::Label(label) => Err(format!("the volume has no voxel with label {label}")),
+            Pick::Name(name) => {
+                let found = voxels.names.iter().find(|(_, n)| n.eq_ignore_ascii_case(name));
+                found.map(|(label, _)| *label).ok_or_else(|| {
+                    let names: Vec<&str> = voxels.names.values().map(String::as_str).collect();
+                    let there = if names.is_empty() {
+                        "no names; give label = N".to_owned()
+                    } else {
+                        names.join(", ")
+                    };
+                    format!("the volume has no structure \"{name}\"; it has {there}")
+                })
+            }
+        }
+    }
+
+    /// `None` for one that is left out.
+    fn tissue(&self, label: u8, voxels: &Voxels) -> Option<Tissue> {
+        let picked = match &self.pick {
+            Pick::Name(name) => Some(name.clone()),
+            Pick::Label(_) => voxels.names.get(&label).cloned(),
+        };
+        let name = self
+            .called
+            .clone()
+            .or(picked)
+            .unwrap_or_else(|| format!("label {label}"));
+        let (role, material) = known(&name).unwrap_or_else(unknown);
+        let role = self.role.unwrap_or(Some(role))?;
+        Some(Tissue {
+            label,
+            name,
+            role,
+            material: Material {
+                young_pa: self.young_pa.unwrap_or(material.young_pa),
+                poisson: self.poisson.unwrap_or(material.poisson),
+                limits: self.limits.or(material.limits),
+                fixed: self.fixed.unwrap_or(material.fixed),
+            },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;
