@@ -1,6 +1,7 @@
 //! The command line of `host-ui`.
 
 use crate::dose::command::{DoseArgs, PerturbArgs};
+use crate::plan::command::PlanArgs;
 use crate::{app, files, procedure, record};
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
@@ -35,7 +36,7 @@ struct Common {
 
 #[derive(Subcommand, Debug)]
 enum Task {
-    /// Plan, place the needle, insert, drop the seeds while retracting; write result.json and force.csv
+    /// Plan, place the needles, insert, drop the seeds while retracting; write result.json, force.csv and, of a plan, a debrief
     Procedure {
         #[command(flatten)]
         common: Common,
@@ -48,8 +49,17 @@ enum Task {
         /// Speed of insertion in mm/s
         #[arg(long, default_value_t = 50.0, value_name = "MM/S")]
         insert_speed: f64,
-        /// Seeds along the needle, 1 to 128
-        #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=128))]
+        /// Plan of many needles (TOML), as 'host-ui plan' writes it [default: one needle through the middle]
+        #[arg(long, value_name = "FILE")]
+        plan: Option<PathBuf>,
+        /// Rehearse every needle first, and drop each seed so that it comes to rest on plan
+        #[arg(long)]
+        compensate: bool,
+        /// Source file for the score [default: the source that the plan names, 6711 or 200]
+        #[arg(long, value_name = "FILE", requires = "plan")]
+        source: Option<PathBuf>,
+        /// Seeds along the needle, 1 to 128, where no plan is given
+        #[arg(long, default_value_t = 5, conflicts_with = "plan", value_parser = clap::value_parser!(u16).range(1..=128))]
         seeds: u16,
     },
     /// Keep every tick of the force loop and the tissue's snapshots in an MCAP file, and count what is missing
@@ -87,6 +97,8 @@ enum Task {
     /// Segmented volumes
     #[command(subcommand)]
     Scene(SceneTask),
+    /// Make a plan for the scene that runs: needles through the template, seeds, their strength; or from a table of seeds
+    Plan(PlanArgs),
     /// Dose of seeds (TG-43U1) at points, in structures, or on a grid
     Dose(DoseArgs),
     /// What becomes of a plan's dose when every seed misses its place at random
@@ -143,6 +155,7 @@ impl Cli {
             Some(Task::Flight { instance: name }) => {
                 record::save_flight(&instance(&name)?).map(|path| println!("written: {path}"))
             }
+            Some(Task::Plan(args)) => args.run(),
             Some(Task::Dose(args)) => args.run(),
             Some(Task::Perturb(args)) => args.run(),
             Some(Task::Procedure {
@@ -150,6 +163,9 @@ impl Cli {
                 out,
                 core,
                 insert_speed,
+                plan,
+                compensate,
+                source,
                 seeds,
             }) => {
                 if !(0.1..=500.0).contains(&insert_speed) {
@@ -157,13 +173,18 @@ impl Cli {
                 }
                 let instance = instance(&common.instance)?;
                 let ended = procedure::run(procedure::Options {
-                    instance: instance.clone(),
-                    scene: common.scene,
-                    label: common.label,
+                    connect: procedure::Connect {
+                        instance: instance.clone(),
+                        scene: common.scene,
+                        label: common.label,
+                        core,
+                    },
                     out,
-                    core,
                     insert_m_per_s: insert_speed / 1e3,
                     seeds: usize::from(seeds),
+                    plan,
+                    compensate,
+                    source,
                 });
                 instance.sweep();
                 ended

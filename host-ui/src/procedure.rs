@@ -1,12 +1,15 @@
 //! The whole procedure without a window, with what happened written to files.
 
 mod child;
+mod debrief;
+pub mod job;
 mod report;
 
 use crate::files;
-use crate::link::{Link, LinkStatus};
-use crate::workflow::{NeedlePlan, Pace, Run, RunStatus, Step, plan_with_seeds};
+use crate::link::{Link, LinkStatus, SceneModel};
+use crate::workflow::{Pace, Run, RunStatus, Step};
 use child::Core;
+use job::Job;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,14 +22,64 @@ const FIND_LIMIT: Duration = Duration::from_secs(3);
 const START_LIMIT: Duration = Duration::from_secs(20);
 const LOAD_LIMIT: Duration = Duration::from_secs(60);
 
-pub struct Options {
+/// Which core, and which scene in it.
+pub struct Connect {
     pub instance: Instance,
+    /// A volume to be loaded; else the scene that runs.
     pub scene: Option<PathBuf>,
     pub label: Option<u8>,
-    pub out: Option<PathBuf>,
+    /// To be started when none is running.
     pub core: Option<PathBuf>,
+}
+
+/// A core that answers, with the scene that was asked for.
+pub struct Live {
+    pub link: Link,
+    /// The core that was started for this; ends with it.
+    core: Option<Core>,
+    pub scene: Arc<SceneModel>,
+    /// Set by Ctrl-C.
+    pub interrupted: Arc<AtomicBool>,
+}
+
+impl Live {
+    pub fn connect(options: &Connect) -> Result<Self, String> {
+        let volume = options.scene.as_deref().map(|path| files::read(path, options.label));
+        let volume = volume.transpose().map_err(|e| e.to_string())?;
+        let interrupted = Arc::new(AtomicBool::new(false));
+        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+            signal_hook::flag::register(signal, interrupted.clone()).map_err(|e| e.to_string())?;
+        }
+        let mut link = Link::new(options.instance.clone());
+        let mut core = None;
+        find_core(&mut link, &mut core, options, &interrupted)?;
+        if let Some(volume) = &volume {
+            for note in &volume.warnings {
+                println!("note: {note}");
+            }
+            load(&mut link, volume, &interrupted)?;
+        }
+        let scene = link.scene().ok_or("the core sent no scene")?.clone();
+        Ok(Self {
+            link,
+            core,
+            scene,
+            interrupted,
+        })
+    }
+}
+
+pub struct Options {
+    pub connect: Connect,
+    pub out: Option<PathBuf>,
     pub insert_m_per_s: f64,
     pub seeds: usize,
+    /// Many needles, from a file; else one through the middle.
+    pub plan: Option<PathBuf>,
+    /// Rehearse each needle first, and move its drops.
+    pub compensate: bool,
+    /// For the score; else the one that the plan names.
+    pub source: Option<PathBuf>,
 }
 
 /// What was seen while the script ran.
@@ -41,39 +94,31 @@ struct Seen {
 
 /// An error when not every step was completed.
 pub fn run(options: Options) -> Result<(), String> {
-    let volume = options
-        .scene
-        .as_deref()
-        .map(|path| files::read(path, options.label))
-        .transpose()
-        .map_err(|e| e.to_string())?;
-    let interrupted = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        signal_hook::flag::register(signal, interrupted.clone()).map_err(|e| e.to_string())?;
-    }
-    let mut link = Link::new(options.instance.clone());
-    let mut core = None;
-    find_core(&mut link, &mut core, &options, &interrupted)?;
-    if let Some(volume) = &volume {
-        for note in &volume.warnings {
-            println!("note: {note}");
-        }
-        load(&mut link, volume, &interrupted)?;
-    }
-    let scene = link.scene().ok_or("the core sent no scene")?.clone();
+    let Live {
+        mut link,
+        core,
+        scene,
+        interrupted,
+    } = Live::connect(&options.connect)?;
     let pace = Pace {
         insert_m_per_s: options.insert_m_per_s,
         ..Pace::default()
     };
-    let plan = plan_with_seeds(&scene.header, options.seeds);
+    let mut job = match &options.plan {
+        Some(path) => Job::from_file(path, &scene)?,
+        None => Job::suggested(&scene, options.seeds),
+    };
     println!(
         "scene {}: {} elements of {:.2} mm",
         scene.header.name.read(),
         scene.header.element_count,
         scene.header.spacing_m * 1e3
     );
+    if options.compensate {
+        job.compensate(&mut link, &pace, &interrupted)?;
+    }
     let mut seen = Seen::default();
-    let outcome = perform(&mut link, &plan, pace, &interrupted, &mut seen);
+    let outcome = perform(&mut link, &job, pace, &interrupted, &mut seen);
     if outcome.is_err() {
         // The force must not stay on for nobody.
         let _asked = link.send(CommandKind::Disengage, &[]);
@@ -81,10 +126,11 @@ pub fn run(options: Options) -> Result<(), String> {
     let out = options
         .out
         .unwrap_or_else(|| PathBuf::from(format!("out/procedure-{}", report::utc_now())));
-    let written = report::write(&out, &link, &plan, &pace, &seen, outcome.as_ref().err());
+    let written = report::write(&out, &link, &job, &pace, &seen, outcome.as_ref().err());
+    let scored = written.and_then(|()| debrief::write(&out, &link, &scene, &job, &seen, options.source.as_deref()));
     drop(core);
     outcome?;
-    written
+    scored
 }
 
 fn wait(
@@ -114,7 +160,7 @@ fn is_ready(link: &Link) -> bool {
 fn find_core(
     link: &mut Link,
     core: &mut Option<Core>,
-    options: &Options,
+    options: &Connect,
     interrupted: &AtomicBool,
 ) -> Result<(), String> {
     if wait(link, interrupted, FIND_LIMIT, |link| Ok(is_ready(link)))? {
@@ -158,16 +204,10 @@ fn load(link: &mut Link, volume: &files::LabelVolume, interrupted: &AtomicBool) 
     }
 }
 
-fn perform(
-    link: &mut Link,
-    plan: &NeedlePlan,
-    pace: Pace,
-    interrupted: &AtomicBool,
-    seen: &mut Seen,
-) -> Result<(), String> {
-    let mut run = Run::new(plan.clone(), pace);
+fn perform(link: &mut Link, job: &Job, pace: Pace, interrupted: &AtomicBool, seen: &mut Seen) -> Result<(), String> {
+    let mut run = Run::of_needles(job.tasks.clone(), pace);
     let begun = Instant::now();
-    let mut step: Option<Step> = None;
+    let mut step: Option<(usize, Step)> = None;
     seen.last_event = link.events().back().map(|e| e.sequence);
     link.take_records();
     loop {
@@ -176,9 +216,14 @@ fn perform(
         }
         link.poll();
         let status = run.advance(link);
-        if step != Some(run.step()) {
-            step = Some(run.step());
-            println!("{:7.2} s  step: {}", begun.elapsed().as_secs_f64(), run.step().name());
+        if step != Some((run.needle(), run.step())) {
+            step = Some((run.needle(), run.step()));
+            let (number, count) = (run.needle() + 1, job.tasks.len());
+            let seconds = begun.elapsed().as_secs_f64();
+            println!(
+                "{seconds:7.2} s  needle {number} of {count}, step: {}",
+                run.step().name()
+            );
         }
         seen.take(link, begun);
         match status {
