@@ -90,6 +90,8 @@ struct Seen {
     displacement_before_puncture_m: f64,
     last_event: Option<u64>,
     events: Vec<Event>,
+    /// Numbers of planned drops that left no seed.
+    lost: Vec<usize>,
 }
 
 /// An error when not every step was completed.
@@ -226,6 +228,10 @@ fn perform(link: &mut Link, job: &Job, pace: Pace, interrupted: &AtomicBool, see
             );
         }
         seen.take(link, begun);
+        for number in run.lost().iter().skip(seen.lost.len()) {
+            println!("note: seed {} is lost: the tip was outside the tissue", number + 1);
+        }
+        seen.lost = run.lost().to_vec();
         match status {
             RunStatus::Working => std::thread::sleep(POLL_EVERY),
             RunStatus::Done => return Ok(()),

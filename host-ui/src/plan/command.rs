@@ -17,7 +17,7 @@ const POINTS: usize = 100_000;
 
 const HELP: &str = "\
 Without --seeds the plan is modified peripheral loading: needles near the edge of the target, fewer inside, none near what is to
-be spared; the strength of a seed is the one with which 97.5 % of the target gets the prescription. With --seeds it is those of a
+be spared; the strength of a seed is the one with which 96 % of the target gets the prescription. With --seeds it is those of a
 table (columns as in 'host-ui dose --help'), put on needles by their lines.
 
 Units: mm, patient frame (RAS); strength in U (1 U = 1 cGy cm2/h).

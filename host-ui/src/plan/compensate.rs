@@ -44,12 +44,16 @@ const LEAST_MOVE_M: f64 = 0.05e-3;
 /// Drops of one needle keep their order by at least this.
 const APART_M: f64 = 0.1e-3;
 
+/// Where dropping as planned is not possible, drops are tried so much deeper at a time.
+const DEEPER_M: f64 = 1e-3;
+
 /// One needle, before and after.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compensation {
     pub drops: Drops,
-    /// Rest minus plan of each seed, deepest first, when dropped as planned.
-    pub before_m: Vec<[f64; 3]>,
+    /// Rest minus plan of each seed, deepest first, when dropped as planned; `None` where that cannot be done: the tip would be
+    /// outside the tissue, which has moved ahead.
+    pub before_m: Option<Vec<[f64; 3]>>,
     /// The same when dropped as `drops` says.
     pub after_m: Vec<[f64; 3]>,
     pub rehearsals: usize,
@@ -57,7 +61,7 @@ pub struct Compensation {
 
 impl Compensation {
     pub fn errors_before_m(&self) -> impl Iterator<Item = f64> + '_ {
-        self.before_m.iter().map(|e| Vector3::from(*e).norm())
+        self.before_m.iter().flatten().map(|e| Vector3::from(*e).norm())
     }
 
     pub fn errors_after_m(&self) -> impl Iterator<Item = f64> + '_ {
@@ -82,15 +86,15 @@ impl Tried {
     }
 }
 
-/// The best way found; dropping as planned where nothing is better. An error when the needle cannot even be gone through as planned.
+/// The best way found; dropping as planned where nothing is better. An error when no way was found to go through with the needle.
 pub fn compensate(
     needle: &Needle,
     pace: &Pace,
     limits: &Limits,
     rehearser: &mut dyn Rehearser,
 ) -> Result<Compensation, String> {
-    let first = try_it(needle, Drops::as_planned(needle), pace, rehearser)?;
-    let (mut best, mut last) = (first.clone(), first.clone());
+    let (start, is_as_planned) = start(needle, pace, limits, rehearser)?;
+    let (mut best, mut last) = (start.clone(), start.clone());
     let mut before_last: Option<Tried> = None;
     let mut rehearsals = 1;
     // Shortened when a step leads out of the tissue or makes it worse.
@@ -123,11 +127,36 @@ pub fn compensate(
     }
     let vectors = |t: &Tried| t.error_m.iter().map(|e| (*e).into()).collect();
     Ok(Compensation {
-        before_m: vectors(&first),
+        before_m: is_as_planned.then(|| vectors(&start)),
         after_m: vectors(&best),
         drops: best.drops,
         rehearsals,
     })
+}
+
+/// As planned, and whether that could be done; else with all drops deeper by the first millimetres that can.
+fn start(
+    needle: &Needle,
+    pace: &Pace,
+    limits: &Limits,
+    rehearser: &mut dyn Rehearser,
+) -> Result<(Tried, bool), String> {
+    let planned = Drops::as_planned(needle);
+    let why = match try_it(needle, planned.clone(), pace, rehearser) {
+        Ok(tried) => return Ok((tried, true)),
+        Err(why) => why,
+    };
+    let steps = (limits.along_m / DEEPER_M) as usize;
+    for step in 1..=steps {
+        let mut drops = planned.clone();
+        for along_m in &mut drops.along_m {
+            *along_m = (*along_m + step as f64 * DEEPER_M).min(limits.reach_m);
+        }
+        if let Ok(tried) = try_it(needle, drops, pace, rehearser) {
+            return Ok((tried, false));
+        }
+    }
+    Err(why)
 }
 
 fn try_it(needle: &Needle, drops: Drops, pace: &Pace, rehearser: &mut dyn Rehearser) -> Result<Tried, String> {
@@ -192,7 +221,7 @@ fn aside(needle: &Needle, last: &Tried, share: f64, limits: &Limits, drops: &mut
     drops.entry_m = (Vector3::from(needle.entry_m) + kept).into();
 }
 
-/// Means and the worst, in the order before, after.
+/// Means and the worst: before, of the needles that can be done as planned; after, of all.
 pub fn summary_m(all: &[Compensation]) -> [[f64; 2]; 2] {
     let figures = |errors: Vec<f64>| {
         let mean = errors.iter().sum::<f64>() / errors.len().max(1) as f64;

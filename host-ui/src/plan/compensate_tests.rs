@@ -7,7 +7,8 @@ use crate::plan::NeedleSeed;
 struct Known<F> {
     ahead_m: F,
     across_m: [f64; 3],
-    /// Beyond this the tip is outside.
+    /// Before and beyond this the tip is outside.
+    tissue_from_m: f64,
     tissue_to_m: f64,
     asked: usize,
 }
@@ -15,7 +16,11 @@ struct Known<F> {
 impl<F: Fn(f64) -> f64> Rehearser for Known<F> {
     fn rehearse(&mut self, drops: &Drops, _: &Pace) -> Result<Rest, String> {
         self.asked += 1;
-        if drops.along_m.iter().any(|&z| z > self.tissue_to_m) {
+        if drops
+            .along_m
+            .iter()
+            .any(|&z| z > self.tissue_to_m || z < self.tissue_from_m)
+        {
             return Err("the tip is outside the tissue".to_owned());
         }
         let rest = |&z: &f64| {
@@ -50,6 +55,7 @@ fn tissue<F: Fn(f64) -> f64>(ahead_m: F) -> Known<F> {
     Known {
         ahead_m,
         across_m: [0.0; 3],
+        tissue_from_m: 0.0,
         tissue_to_m: 1.0,
         asked: 0,
     }
@@ -120,6 +126,12 @@ fn limits_hold_and_what_cannot_be_had_is_approached() {
     assert!(done.drops.along_m[0] <= 0.052);
     let [mean_before, mean_after]: [f64; 2] = [done.errors_before_m().sum(), done.errors_after_m().sum()];
     assert!(mean_after < mean_before);
+    // Tissue that begins beyond the plan's last drop: nothing can be done as planned, but deeper.
+    let mut ahead = tissue(|_| 4e-3);
+    ahead.tissue_from_m = 0.032;
+    let done = run(&needle(Loading::Loose), &mut ahead);
+    assert!(done.before_m.is_none());
+    assert!(done.errors_after_m().all(|e| e < 0.1e-3), "{:?}", done.after_m);
     shallow.tissue_to_m = 0.01;
     assert!(
         compensate(

@@ -1,13 +1,14 @@
 //! After the last needle: what the implant was worth, written beside the other results.
 
 use super::Seen;
-use super::job::Job;
+use super::job::{self, Job, PlannedDrop};
 use crate::dose::decay::Interval;
 use crate::dose::{DoseKernel, Seed, Source};
 use crate::link::{Link, SceneModel};
 use crate::plan::Anatomy;
 use crate::score::{self, Implant, Score, SeedPair};
 use std::path::Path;
+use stylet_shm_schema::SeedPose;
 
 /// Writes `score.json` and `debrief.html`; nothing without a plan file, whose seeds have no strength. `source` by the plan's name
 /// where no file is given.
@@ -27,12 +28,16 @@ pub fn write(
     };
     let header = &link.snapshot().ok_or("the core sent no tissue")?.header;
     let placed = &header.seeds[..header.seed_count as usize];
-    let pair = |(drop, pose): (super::job::PlannedDrop, &stylet_shm_schema::SeedPose)| {
-        let planned = Seed {
+    let drops = job.planned();
+    let planned = |drop: &PlannedDrop| {
+        Some(Seed {
             position_m: drop.planned_m,
             axis: Some(drop.direction),
             strength_u: drop.strength_u?,
-        };
+        })
+    };
+    let pair = |(drop, pose): (&PlannedDrop, &SeedPose)| {
+        let planned = planned(drop)?;
         Some(SeedPair {
             needle: drop.needle,
             hole: drop.hole,
@@ -49,7 +54,13 @@ pub fn write(
     let kernel = DoseKernel::new(&source, Interval::ALL);
     let score = Score::of(Implant {
         title: format!("Scene {}", scene.header.name.read()),
-        pairs: job.planned().into_iter().zip(placed).filter_map(pair).collect(),
+        pairs: job::placed(&drops, &seen.lost, placed).filter_map(pair).collect(),
+        lost: seen
+            .lost
+            .iter()
+            .filter_map(|&n| drops.get(n))
+            .filter_map(planned)
+            .collect(),
         anatomy: &anatomy,
         kernel: &kernel,
         source: format!("{} {}", source.nuclide, source.model),

@@ -7,8 +7,8 @@ use crate::plan::rehearse::{Drops, LinkRehearser};
 use crate::plan::{Anatomy, Compensation, Hole, ImplantPlan, Limits, Needle, check, compensate};
 use crate::workflow::{NeedlePlan, NeedleTask, Pace, plan_with_seeds};
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
-use stylet_shm_schema::MAX_SEEDS;
+use std::sync::atomic::{AtomicBool, Ordering};
+use stylet_shm_schema::{MAX_SEEDS, SeedPose};
 
 /// A seed as it is planned, in the order of the drops.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +21,16 @@ pub struct PlannedDrop {
     pub direction: [f64; 3],
     /// `None` where no plan file says.
     pub strength_u: Option<f64>,
+}
+
+/// Each seed in the tissue with what was planned for it; `lost` are the numbers of drops that left none.
+pub fn placed<'a>(
+    planned: &'a [PlannedDrop],
+    lost: &'a [usize],
+    seeds: &'a [SeedPose],
+) -> impl Iterator<Item = (&'a PlannedDrop, &'a SeedPose)> {
+    let kept = planned.iter().enumerate().filter(|(number, _)| !lost.contains(number));
+    kept.map(|(_, drop)| drop).zip(seeds)
 }
 
 /// Everything that is done in one procedure.
@@ -74,14 +84,23 @@ impl Job {
             };
             let needle = needle.unwrap_or_else(|| needle_of(&task.plan));
             let mut rehearser = LinkRehearser { link, interrupted };
-            let done = compensate(&needle, pace, &Limits::default(), &mut rehearser)
-                .map_err(|why| format!("needle {}: {why}", number + 1))?;
+            let done = match compensate(&needle, pace, &Limits::default(), &mut rehearser) {
+                Ok(done) => done,
+                Err(why) if interrupted.load(Ordering::Relaxed) => return Err(why),
+                Err(why) => {
+                    println!("note: needle {} of {count} is not compensated: {why}", number + 1);
+                    continue;
+                }
+            };
             let [[before, _], [after, _]] = summary_m(std::slice::from_ref(&done));
+            let as_planned = match done.before_m {
+                Some(_) => format!("{:.2} mm", before * 1e3),
+                None => "not possible".to_owned(),
+            };
             println!(
-                "needle {} of {count} rehearsed {} times: mean error {:.2} mm as planned, {:.2} mm compensated",
+                "needle {} of {count} rehearsed {} times: mean error as planned {as_planned}, compensated {:.2} mm",
                 number + 1,
                 done.rehearsals,
-                before * 1e3,
                 after * 1e3
             );
             task.drops.clone_from(&done.drops);

@@ -1,7 +1,7 @@
 //! result.json, force.csv and the table on the terminal.
 
 use super::Seen;
-use super::job::{Job, PlannedDrop};
+use super::job::{Job, PlannedDrop, placed};
 use crate::link::Link;
 use crate::plan::compensate::summary_m;
 use crate::workflow::Pace;
@@ -50,11 +50,11 @@ pub fn write(
     std::fs::create_dir_all(out).map_err(told)?;
     let first = job.tasks.first().ok_or("nothing was planned")?;
     let direction = first.plan.direction;
-    let seeds = seeds(link, &job.planned());
+    let seeds = seeds(link, &job.planned(), &seen.lost);
     let result = json!({
         "completed": failure.is_none(),
         "failure": failure,
-        "seeds": seeds,
+        "seeds": seeds, "lost_seeds": seen.lost.iter().map(|n| n + 1).collect::<Vec<_>>(),
         "force": force(link, direction, seen),
         "timing": timing(link, seen),
         "plan": {
@@ -93,15 +93,13 @@ fn patient_mm(patient_from_scene: &[f64; 12], v: [f64; 3]) -> [f64; 3] {
     mm(at.into())
 }
 
-fn seeds(link: &Link, planned: &[PlannedDrop]) -> Vec<Value> {
+fn seeds(link: &Link, planned: &[PlannedDrop], lost: &[usize]) -> Vec<Value> {
     let (Some(snapshot), Some(scene)) = (link.snapshot(), link.scene()) else {
         return Vec::new();
     };
     let to_patient = |v| patient_mm(&scene.header.patient_from_scene, v);
-    let placed = &snapshot.header.seeds[..snapshot.header.seed_count as usize];
-    planned
-        .iter()
-        .zip(placed)
+    let in_tissue = &snapshot.header.seeds[..snapshot.header.seed_count as usize];
+    placed(planned, lost, in_tissue)
         .map(|(drop, seed)| {
             let (planned, direction) = (drop.planned_m, Vector3::from(drop.direction));
             let off = Vector3::from(seed.position_m) - Vector3::from(planned);

@@ -54,6 +54,8 @@ impl SeedPair {
 pub struct Implant<'a> {
     pub title: String,
     pub pairs: Vec<SeedPair>,
+    /// Planned, and not delivered.
+    pub lost: Vec<Seed>,
     pub anatomy: &'a Anatomy,
     pub kernel: &'a DoseKernel,
     /// As the source file names itself.
@@ -80,14 +82,15 @@ impl<'a> Score<'a> {
             return Err("no seed was placed; there is nothing to score".to_owned());
         }
         let seeds = |one: fn(&SeedPair) -> Seed| implant.pairs.iter().map(one).collect::<Vec<_>>();
-        let (planned, delivered) = (seeds(|p| p.planned), seeds(|p| p.delivered));
+        let (on_plan, delivered) = (seeds(|p| p.planned), seeds(|p| p.delivered));
+        let planned = [on_plan.clone(), implant.lost.clone()].concat();
         let structures = implant.anatomy.structures(DOSE_PITCH_M);
         let target = implant.anatomy.target.name.clone();
         let costs = costs(
             &structures,
             implant.kernel,
             implant.prescription_gy,
-            &planned,
+            &on_plan,
             &delivered,
         );
         let all = [planned.clone(), delivered.clone()].concat();

@@ -44,6 +44,14 @@ pub fn page(score: &Score) -> Result<String, String> {
         escaped(&i.source),
         i.prescription_gy
     );
+    if !i.lost.is_empty() {
+        let _ = writeln!(
+            text,
+            "<p class=\"bad\">{} of {} planned seeds were lost: the tip was outside the tissue when they were dropped.</p>",
+            i.lost.len(),
+            i.pairs.len() + i.lost.len()
+        );
+    }
     text += &cards(score);
     text += "<h2>Where the seeds are</h2>\n<div class=\"key\"><span><i style=\"border:2px solid var(--planned)\"></i>planned</span>\
              <span><i style=\"background:var(--delivered)\"></i>delivered</span>\

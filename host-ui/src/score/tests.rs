@@ -52,6 +52,7 @@ fn score<'a>(off: &[usize], anatomy: &'a Anatomy, kernel: &'a DoseKernel, record
     Score::of(Implant {
         title: "a <test>".to_owned(),
         pairs: pairs(off),
+        lost: Vec::new(),
         anatomy,
         kernel,
         source: "6711".to_owned(),
@@ -100,6 +101,26 @@ fn the_cost_of_the_only_seed_off_plan_is_all_that_the_implant_lost() {
     assert!((cost.urethra_d30_gy.unwrap() + lost(1, "D30")).abs() < 1e-6);
     assert!(cost.target_d90_gy.abs() > 1e-3 && cost.urethra_d30_gy.unwrap().abs() > 1e-3);
     assert!(score.costs[5].target_d90_gy.abs() < 1e-9);
+}
+
+#[test]
+fn a_lost_seed_is_missing_from_the_dose_delivered_and_not_from_the_plan() {
+    let (anatomy, kernel) = (anatomy(), kernel());
+    let mut pairs = pairs(&[]);
+    let lost = vec![pairs.remove(7).planned];
+    let all = score(&[], &anatomy, &kernel, &[]);
+    let less = Score::of(Implant {
+        pairs,
+        lost,
+        title: String::new(),
+        source: String::new(),
+        ..score(&[], &anatomy, &kernel, &[]).implant
+    });
+    let less = less.unwrap();
+    let d90 = |v: &Verdict| Metric::parse("D90").unwrap().of(&v.dvhs[0], 145.0).main().unwrap();
+    assert!((d90(&less.planned) - d90(&all.planned)).abs() < 1e-6);
+    assert!(d90(&less.delivered) < d90(&all.delivered) - 0.5);
+    assert_eq!(to_json(&less)["seeds_lost"], 1);
 }
 
 #[test]

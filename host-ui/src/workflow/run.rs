@@ -9,6 +9,8 @@ use std::time::{Duration, Instant};
 use stylet_shm_schema::script::{TISSUE_REST_FOR, TISSUE_REST_LIMIT, TISSUE_REST_M, arrived_after, move_limit};
 use stylet_shm_schema::{CommandKind, Fault, HapticState};
 
+/// In the core's refusal of a drop that leaves the procedure as it is.
+const TIP_OUTSIDE: &str = "outside the tissue";
 const REPLY_LIMIT: Duration = Duration::from_secs(3);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +49,8 @@ enum Action {
         direction: [f64; 3],
         speed_m_per_s: f64,
     },
-    SeedCount(u32),
+    /// With its number, counted from 0 over all needles.
+    Drop(usize),
     TissueRest,
 }
 
@@ -81,6 +84,8 @@ pub struct Run {
     pace: Pace,
     /// Each with the number of its needle.
     actions: VecDeque<(usize, Step, Action)>,
+    /// Drops that the core refused because the tip was outside the tissue.
+    lost: Vec<usize>,
     status: RunStatus,
     session_id: Option<u64>,
     /// The armed force may fault from here on.
@@ -103,6 +108,7 @@ impl Run {
         Self {
             actions: script(&tasks, &pace),
             tasks,
+            lost: Vec::new(),
             pace,
             status: RunStatus::Working,
             session_id: None,
@@ -122,6 +128,11 @@ impl Run {
     pub fn needle(&self) -> usize {
         let last = self.tasks.len().saturating_sub(1);
         self.actions.front().map_or(last, |(needle, _, _)| *needle)
+    }
+
+    /// Numbers of the drops that left no seed, counted from 0 over all needles: the tip was outside the tissue.
+    pub fn lost(&self) -> &[usize] {
+        &self.lost
     }
 
     /// Of the needle at work.
@@ -179,10 +190,7 @@ impl Run {
                 let off = Vector3::from(state.tip_in_scene_m) - Vector3::from(*to_m);
                 self.arrived(&state, off.dot(&Vector3::from(*direction)), *speed_m_per_s)
             }
-            Action::SeedCount(count) => {
-                self.in_time("the seed in the tissue", REPLY_LIMIT)?;
-                Ok(state.seed_count >= *count)
-            }
+            Action::Drop(number) => self.dropped(link, &state, *number),
             Action::TissueRest => {
                 let moved = link.snapshot().map(|s| s.header.max_displacement_m);
                 let at_rest = moved.is_some_and(|d| d < TISSUE_REST_M);
@@ -201,6 +209,21 @@ impl Run {
         }
         self.session_id = id;
         Ok(())
+    }
+
+    /// True once the seed lies in the tissue, or is lost because the tip is not in it.
+    fn dropped(&mut self, link: &mut Link, state: &HapticState, number: usize) -> Result<bool, String> {
+        match self.command(link, state, CommandKind::DropSeed, &[]) {
+            Ok(false) => return Ok(false),
+            Ok(true) => {}
+            Err(why) if why.contains(TIP_OUTSIDE) => {
+                self.lost.push(number);
+                return Ok(true);
+            }
+            Err(why) => return Err(why),
+        }
+        self.in_time("the seed in the tissue", REPLY_LIMIT)?;
+        Ok(state.seed_count as usize + self.lost.len() > number)
     }
 
     /// True once the command was accepted and the state shows it.
@@ -294,9 +317,8 @@ fn script(tasks: &[NeedleTask], pace: &Pace) -> VecDeque<(usize, Step, Action)> 
             } else {
                 then(Step::DropAndRetract, go(along_m, pace.retract_m_per_s));
             }
+            then(Step::DropAndRetract, Action::Drop(seeds));
             seeds += 1;
-            then(Step::DropAndRetract, command(CommandKind::DropSeed));
-            then(Step::DropAndRetract, Action::SeedCount(seeds));
         }
         if drops.retract_to_m > 0.0 {
             then(Step::DropAndRetract, go(drops.retract_to_m, pace.retract_m_per_s));
