@@ -25,7 +25,7 @@ Units: mm, patient frame (RAS); strength in U (1 U = 1 cGy cm2/h).
 Examples:
   host-ui plan --core target/release/rt-core --source sources/i125_6711.toml --out plan.toml --csv seeds.csv
   host-ui plan --source sources/i125_6711.toml --seeds seeds.csv --strength-u 0.5 --out plan.toml
-  host-ui procedure --plan plan.toml --compensate --out out/implant";
+  host-ui procedure --plan plan.toml --compensate --insert-speed 120 --out out/implant";
 
 #[derive(Args, Debug)]
 #[command(after_long_help = HELP)]

@@ -134,7 +134,7 @@ pub fn compensate(
     })
 }
 
-/// As planned, and whether that could be done; else with all drops deeper by the first millimetres that can.
+/// As planned, and whether that could be done; else with drops deeper by the first millimetres that can.
 fn start(
     needle: &Needle,
     pace: &Pace,
@@ -146,11 +146,17 @@ fn start(
         Ok(tried) => return Ok((tried, true)),
         Err(why) => why,
     };
+    let last = planned.along_m.len().saturating_sub(1).max(1) as f64;
+    // All by as much; or, where seeds are loose, the last one most: the first may be near the far end of the tissue.
+    let ways: &[fn(usize, f64) -> f64] = match needle.loading {
+        Loading::Loose => &[|_, _| 1.0, |i, last| i as f64 / last],
+        Loading::Stranded { .. } => &[|_, _| 1.0],
+    };
     let steps = (limits.along_m / DEEPER_M) as usize;
-    for step in 1..=steps {
+    for (step, share) in (1..=steps).flat_map(|step| ways.iter().map(move |share| (step, share))) {
         let mut drops = planned.clone();
-        for along_m in &mut drops.along_m {
-            *along_m = (*along_m + step as f64 * DEEPER_M).min(limits.reach_m);
+        for (i, along_m) in drops.along_m.iter_mut().enumerate() {
+            *along_m = (*along_m + step as f64 * DEEPER_M * share(i, last)).min(limits.reach_m);
         }
         if let Ok(tried) = try_it(needle, drops, pace, rehearser) {
             return Ok((tried, false));
