@@ -4,7 +4,7 @@ use host_ui::dose::decay::Interval;
 use host_ui::dose::{DoseKernel, Source};
 use host_ui::plan::automatic::{self, Aims};
 use host_ui::plan::compensate::summary_m;
-use host_ui::plan::{Anatomy, Compensation, ImplantPlan, Limits, Needle, Template, compensate};
+use host_ui::plan::{Anatomy, ImplantPlan, Limits, Needle, Template, compensate};
 use host_ui::workflow::{Pace, plan_with_seeds};
 use rt_core::scene::Labels;
 use std::fmt::Write as _;
