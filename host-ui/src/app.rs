@@ -428,5 +428,6 @@ fn command_name(kind: CommandKind) -> &'static str {
         CommandKind::UndoSeed => "Undo seed",
         CommandKind::Shutdown => "Shutdown",
         CommandKind::SaveFlight => "Flight recording",
+        CommandKind::Rehearse => "Rehearsal",
     }
 }

@@ -3,6 +3,7 @@
 use crate::convert::ConvertArgs;
 use crate::dose::command::{DoseArgs, PerturbArgs};
 use crate::dose::files::{SeedDefaults, read_seeds};
+use crate::plan::command::PlanArgs;
 use crate::{app, files, procedure, record};
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
@@ -60,7 +61,7 @@ struct Common {
 
 #[derive(Subcommand, Debug)]
 enum Task {
-    /// Plan, place the needle, insert, drop the seeds while retracting; write result.json and force.csv
+    /// Plan, place the needles, insert, drop the seeds while retracting; write result.json, force.csv and, of a plan, a debrief
     Procedure {
         #[command(flatten)]
         common: Common,
@@ -73,8 +74,17 @@ enum Task {
         /// Speed of insertion in mm/s [default: that of the scene file, or 50]
         #[arg(long, value_name = "MM/S")]
         insert_speed: Option<f64>,
-        /// Seeds along the needle, 1 to 128
-        #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=128))]
+        /// Plan of many needles (TOML), as 'host-ui plan' writes it [default: that of the scene file, or one needle through the middle]
+        #[arg(long, value_name = "FILE")]
+        plan: Option<PathBuf>,
+        /// Rehearse every needle first, and drop each seed so that it comes to rest on plan
+        #[arg(long)]
+        compensate: bool,
+        /// Source file for the score [default: the source that the plan names, 6711 or 200]
+        #[arg(long, value_name = "FILE")]
+        source: Option<PathBuf>,
+        /// Seeds along the needle, 1 to 128, where no plan is given
+        #[arg(long, default_value_t = 5, conflicts_with = "plan", value_parser = clap::value_parser!(u16).range(1..=128))]
         seeds: u16,
     },
     /// Keep every tick of the force loop and the tissue's snapshots in an MCAP file, and count what is missing
@@ -114,6 +124,8 @@ enum Task {
     Scene(SceneTask),
     /// Label volumes, seed plans and doses from one format to another, DICOM among them
     Convert(ConvertArgs),
+    /// Make a plan for the scene that runs: needles through the template, seeds, their strength; or from a table of seeds
+    Plan(PlanArgs),
     /// Dose of seeds (TG-43U1) at points, in structures, or on a grid
     Dose(DoseArgs),
     /// What becomes of a plan's dose when every seed misses its place at random
@@ -172,6 +184,7 @@ impl Cli {
                 record::save_flight(&instance(&name)?).map(|path| println!("written: {path}"))
             }
             Some(Task::Convert(args)) => args.run(),
+            Some(Task::Plan(args)) => args.run(),
             Some(Task::Dose(args)) => args.run(),
             Some(Task::Perturb(args)) => args.run(),
             Some(Task::Procedure {
@@ -179,6 +192,9 @@ impl Cli {
                 out,
                 core,
                 insert_speed,
+                plan,
+                compensate,
+                source,
                 seeds,
             }) => {
                 if let Some(speed) = insert_speed.filter(|s| !(0.1..=500.0).contains(s)) {
@@ -186,13 +202,18 @@ impl Cli {
                 }
                 let instance = instance(&common.instance)?;
                 let ended = procedure::run(procedure::Options {
-                    instance: instance.clone(),
-                    scene: common.scene,
-                    label: common.label,
+                    connect: procedure::Connect {
+                        instance: instance.clone(),
+                        scene: common.scene,
+                        label: common.label,
+                        core,
+                    },
                     out,
-                    core,
                     insert_m_per_s: insert_speed.map(|s| s / 1e3),
                     seeds: usize::from(seeds),
+                    plan,
+                    compensate,
+                    source,
                 });
                 instance.sweep();
                 ended

@@ -24,6 +24,7 @@ const CONNECT_EVERY: Duration = Duration::from_secs(1);
 const OPEN_BOARD_EVERY: Duration = Duration::from_millis(20);
 const EVENTS_KEPT: usize = 256;
 const ANSWERS_KEPT: usize = 256;
+const REHEARSALS_KEPT: usize = 8;
 const RECORDS_KEPT: usize = 300_000;
 /// The core takes no larger volume.
 pub const MAX_UPLOAD_CELLS: usize = 64 << 20;
@@ -94,6 +95,7 @@ pub struct Link {
     latest: Latest,
     state: Option<HapticState>,
     answers: BTreeMap<u64, Answer>,
+    rehearsals: BTreeMap<u64, Box<Rehearsal>>,
     records: Vec<TickRecord>,
     rubbish_refused: u64,
 }
@@ -125,6 +127,7 @@ impl Link {
             latest: Latest::default(),
             state: None,
             answers: BTreeMap::new(),
+            rehearsals: BTreeMap::new(),
             records: Vec::new(),
             rubbish_refused: 0,
         }
@@ -226,6 +229,11 @@ impl Link {
     /// What the core said; once for each command.
     pub fn reply(&mut self, command_id: u64) -> Option<Answer> {
         self.answers.remove(&command_id)
+    }
+
+    /// What a [`CommandKind::Rehearse`] came to, once its reply says that it was carried out.
+    pub fn rehearsal(&mut self, command_id: u64) -> Option<Box<Rehearsal>> {
+        self.rehearsals.remove(&command_id)
     }
 
     /// Messages from shared memory that were not believed.
@@ -375,8 +383,20 @@ impl Link {
         self.board_tried = None;
         self.state = None;
         self.answers.clear();
+        self.rehearsals.clear();
         self.records.clear();
         self.latest.begin(session);
+    }
+
+    fn take_rehearsal(&mut self, rehearsal: Rehearsal) {
+        let current = self.session().is_some_and(|s| s.session_id == rehearsal.session_id);
+        if rehearsal.host_id != self.host_id || !current {
+            return;
+        }
+        self.rehearsals.insert(rehearsal.command_id, Box::new(rehearsal));
+        if self.rehearsals.len() > REHEARSALS_KEPT {
+            self.rehearsals.pop_first();
+        }
     }
 
     fn take_reply(&mut self, reply: &Reply) {

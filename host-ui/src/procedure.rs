@@ -1,13 +1,16 @@
 //! The whole procedure without a window, with what happened written to files.
 
 mod child;
+mod debrief;
+pub mod job;
 mod report;
 
-use crate::files;
-use crate::link::{Link, LinkStatus};
-use crate::workflow::{NeedlePlan, Pace, Run, RunStatus, Step, plan_with_seeds};
+use crate::files::{self, scene::SceneFile};
+use crate::link::{Link, LinkStatus, SceneModel};
+use crate::workflow::{Pace, Run, RunStatus, Step};
 use child::Core;
-use std::path::PathBuf;
+use job::Job;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -19,15 +22,72 @@ const FIND_LIMIT: Duration = Duration::from_secs(3);
 const START_LIMIT: Duration = Duration::from_secs(20);
 const LOAD_LIMIT: Duration = Duration::from_secs(60);
 
-pub struct Options {
+/// Which core, and which scene in it.
+pub struct Connect {
     pub instance: Instance,
+    /// A volume to be loaded; else the scene that runs.
     pub scene: Option<PathBuf>,
     pub label: Option<u8>,
-    pub out: Option<PathBuf>,
+    /// To be started when none is running.
     pub core: Option<PathBuf>,
+}
+
+/// A core that answers, with the scene that was asked for.
+pub struct Live {
+    pub link: Link,
+    /// The core that was started for this; ends with it.
+    core: Option<Core>,
+    pub scene: Arc<SceneModel>,
+    /// What the scene file says beside the scene.
+    said: Option<SceneFile>,
+    /// Set by Ctrl-C.
+    pub interrupted: Arc<AtomicBool>,
+}
+
+impl Live {
+    pub fn connect(options: &Connect) -> Result<Self, String> {
+        let volume = options.scene.as_deref().map(|path| files::read(path, options.label));
+        let volume = volume.transpose().map_err(|e| e.to_string())?;
+        let scene_file = options.scene.as_deref().filter(|path| files::scene::is_scene(path));
+        let said = scene_file.map(files::scene::read).transpose();
+        let said = said.map_err(|e| e.to_string())?;
+        let interrupted = Arc::new(AtomicBool::new(false));
+        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+            signal_hook::flag::register(signal, interrupted.clone()).map_err(|e| e.to_string())?;
+        }
+        let mut link = Link::new(options.instance.clone());
+        let mut core = None;
+        let device = said.as_ref().and_then(|s| s.device.as_deref());
+        find_core(&mut link, &mut core, options, device, &interrupted)?;
+        if let Some(volume) = &volume {
+            for note in &volume.warnings {
+                println!("note: {note}");
+            }
+            load(&mut link, volume, &interrupted)?;
+        }
+        let scene = link.scene().ok_or("the core sent no scene")?.clone();
+        Ok(Self {
+            link,
+            core,
+            scene,
+            said,
+            interrupted,
+        })
+    }
+}
+
+pub struct Options {
+    pub connect: Connect,
+    pub out: Option<PathBuf>,
     /// Otherwise as the scene file says, or as usual.
     pub insert_m_per_s: Option<f64>,
     pub seeds: usize,
+    /// Many needles, from a file; else one through the middle.
+    pub plan: Option<PathBuf>,
+    /// Rehearse each needle first, and move its drops.
+    pub compensate: bool,
+    /// For the score; else the one that the plan names.
+    pub source: Option<PathBuf>,
 }
 
 /// What was seen while the script ran.
@@ -38,38 +98,21 @@ struct Seen {
     displacement_before_puncture_m: f64,
     last_event: Option<u64>,
     events: Vec<Event>,
+    /// Numbers of planned drops that left no seed.
+    lost: Vec<usize>,
 }
 
 /// An error when not every step was completed.
 pub fn run(options: Options) -> Result<(), String> {
-    let volume = options
-        .scene
-        .as_deref()
-        .map(|path| files::read(path, options.label))
-        .transpose()
-        .map_err(|e| e.to_string())?;
-    let scene_file = options.scene.as_deref().filter(|path| files::scene::is_scene(path));
-    let said = scene_file
-        .map(files::scene::read)
-        .transpose()
-        .map_err(|e| e.to_string())?;
-    let interrupted = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        signal_hook::flag::register(signal, interrupted.clone()).map_err(|e| e.to_string())?;
-    }
-    let mut link = Link::new(options.instance.clone());
-    let mut core = None;
-    let device = said.as_ref().and_then(|s| s.device.as_deref());
-    find_core(&mut link, &mut core, &options, device, &interrupted)?;
-    if let Some(volume) = &volume {
-        for note in &volume.warnings {
-            println!("note: {note}");
-        }
-        load(&mut link, volume, &interrupted)?;
-    }
-    let scene = link.scene().ok_or("the core sent no scene")?.clone();
+    let Live {
+        mut link,
+        core,
+        scene,
+        said,
+        interrupted,
+    } = Live::connect(&options.connect)?;
     let usual = Pace::default();
-    let of_file = |speed: fn(&files::scene::SceneFile) -> Option<f64>| said.as_ref().and_then(speed);
+    let of_file = |speed: fn(&SceneFile) -> Option<f64>| said.as_ref().and_then(speed);
     let pace = Pace {
         insert_m_per_s: options
             .insert_m_per_s
@@ -78,15 +121,24 @@ pub fn run(options: Options) -> Result<(), String> {
         retract_m_per_s: of_file(|s| s.retract_m_per_s).unwrap_or(usual.retract_m_per_s),
         ..usual
     };
-    let plan = plan_with_seeds(&scene.header, options.seeds);
+    let beside = options.connect.scene.as_deref().and_then(Path::parent);
+    let of_scene = said.as_ref().and_then(|s| s.plan.as_deref());
+    let of_scene = of_scene.map(|plan| beside.unwrap_or(Path::new("")).join(plan));
+    let mut job = match options.plan.as_deref().or(of_scene.as_deref()) {
+        Some(path) => Job::from_file(path, &scene)?,
+        None => Job::suggested(&scene, options.seeds),
+    };
     println!(
         "scene {}: {} elements of {:.2} mm",
         scene.header.name.read(),
         scene.header.element_count,
         scene.header.spacing_m * 1e3
     );
+    if options.compensate {
+        job.compensate(&mut link, &pace, &interrupted)?;
+    }
     let mut seen = Seen::default();
-    let outcome = perform(&mut link, &plan, pace, &interrupted, &mut seen);
+    let outcome = perform(&mut link, &job, pace, &interrupted, &mut seen);
     if outcome.is_err() {
         // The force must not stay on for nobody.
         let _asked = link.send(CommandKind::Disengage, &[]);
@@ -94,10 +146,11 @@ pub fn run(options: Options) -> Result<(), String> {
     let out = options
         .out
         .unwrap_or_else(|| PathBuf::from(format!("out/procedure-{}", report::utc_now())));
-    let written = report::write(&out, &link, &plan, &pace, &seen, outcome.as_ref().err());
+    let written = report::write(&out, &link, &job, &pace, &seen, outcome.as_ref().err());
+    let scored = written.and_then(|()| debrief::write(&out, &link, &scene, &job, &seen, options.source.as_deref()));
     drop(core);
     outcome?;
-    written
+    scored
 }
 
 fn wait(
@@ -127,7 +180,7 @@ fn is_ready(link: &Link) -> bool {
 fn find_core(
     link: &mut Link,
     core: &mut Option<Core>,
-    options: &Options,
+    options: &Connect,
     device: Option<&str>,
     interrupted: &AtomicBool,
 ) -> Result<(), String> {
@@ -172,16 +225,10 @@ fn load(link: &mut Link, volume: &files::LabelVolume, interrupted: &AtomicBool) 
     }
 }
 
-fn perform(
-    link: &mut Link,
-    plan: &NeedlePlan,
-    pace: Pace,
-    interrupted: &AtomicBool,
-    seen: &mut Seen,
-) -> Result<(), String> {
-    let mut run = Run::new(plan.clone(), pace);
+fn perform(link: &mut Link, job: &Job, pace: Pace, interrupted: &AtomicBool, seen: &mut Seen) -> Result<(), String> {
+    let mut run = Run::of_needles(job.tasks.clone(), pace);
     let begun = Instant::now();
-    let mut step: Option<Step> = None;
+    let mut step: Option<(usize, Step)> = None;
     seen.last_event = link.events().back().map(|e| e.sequence);
     link.take_records();
     loop {
@@ -190,11 +237,20 @@ fn perform(
         }
         link.poll();
         let status = run.advance(link);
-        if step != Some(run.step()) {
-            step = Some(run.step());
-            println!("{:7.2} s  step: {}", begun.elapsed().as_secs_f64(), run.step().name());
+        if step != Some((run.needle(), run.step())) {
+            step = Some((run.needle(), run.step()));
+            let (number, count) = (run.needle() + 1, job.tasks.len());
+            let seconds = begun.elapsed().as_secs_f64();
+            println!(
+                "{seconds:7.2} s  needle {number} of {count}, step: {}",
+                run.step().name()
+            );
         }
         seen.take(link, begun);
+        for number in run.lost().iter().skip(seen.lost.len()) {
+            println!("note: seed {} is lost: the tip was outside the tissue", number + 1);
+        }
+        seen.lost = run.lost().to_vec();
         match status {
             RunStatus::Working => std::thread::sleep(POLL_EVERY),
             RunStatus::Done => return Ok(()),

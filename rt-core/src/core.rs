@@ -112,7 +112,7 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
         Ports::new(&node, scene.surface.vertex_elements.len(), picture.word_count()).map_err(|e| e.to_string())?;
     let world = Box::new(World::new(scene, active.limits, 1)?);
     let source = Arc::new(SceneSource::Builtin(options.scene.clone()));
-    let (tissue_flight, tissue_desk) = recorder(Box::new(TissueTape::new(&world, source)));
+    let (tissue_flight, tissue_desk) = recorder(Box::new(TissueTape::new(&world, Arc::clone(&source))));
     let board = service::create_state_board(&node, session_id).map_err(|e| e.to_string())?;
     options.instance.secure_room().map_err(|e| e.to_string())?;
     let locked = lock_memory(options)?;
@@ -268,7 +268,7 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
             flight_of(&info, session_id, options.haptic_period_ns),
         ),
     };
-    let mut bridge = Bridge::new(node, ports, loops, info, session, picture, options.tissue);
+    let mut bridge = Bridge::new(node, ports, loops, info, session, picture, (options.tissue, source));
     // SYNC: set by a signal handler; nothing but the flag is carried.
     let served = bridge.run(|| stop.load(Ordering::Acquire));
     // SYNC: pairs with the acquire loads in both loops.

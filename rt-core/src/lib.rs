@@ -9,6 +9,7 @@ pub mod device;
 pub mod force;
 pub mod lab;
 pub mod needle;
+pub mod rehearse;
 pub mod replay;
 pub mod rt;
 pub mod scene;

@@ -1,8 +1,8 @@
 //! What a reader verifies before it uses a value that came out of shared memory.
 
 use crate::{
-    HapticState, MAX_SEEDS, MAX_STRUCTURES, ParametersInForce, PlanInForce, SceneHeader, SnapshotHeader, TickRecord,
-    Vertex,
+    HapticState, MAX_SEEDS, MAX_STRUCTURES, ParametersInForce, PlanInForce, Rehearsal, SceneHeader, SeedPose,
+    SnapshotHeader, TickRecord, Vertex,
 };
 
 /// Why a value was not believed.
@@ -70,11 +70,7 @@ pub fn snapshot(h: &SnapshotHeader, vertices: &[Vertex]) -> Result<(), Rubbish> 
     ensure(within(&h.needle_direction, 1.001), "needle direction")?;
     ensure(within(&h.held_in_scene_m, MAX_COORDINATE_M), "held position")?;
     ensure(h.residual.is_finite() && h.max_displacement_m.is_finite(), "residual")?;
-    for seed in &h.seeds[..h.seed_count as usize] {
-        ensure(within(&seed.position_m, MAX_COORDINATE_M), "seed position")?;
-        ensure(within(&seed.dropped_at_m, MAX_COORDINATE_M), "seed drop position")?;
-        ensure(within(&seed.axis, 1.001), "seed axis")?;
-    }
+    seeds(&h.seeds[..h.seed_count as usize])?;
     let limit = MAX_COORDINATE_M as f32;
     ensure(
         vertices.iter().all(|v| v.position_m.iter().all(|c| c.abs() <= limit)),
@@ -134,6 +130,25 @@ pub fn plan(p: &PlanInForce) -> Result<(), Rubbish> {
     )
 }
 
+pub fn rehearsal(r: &Rehearsal) -> Result<(), Rubbish> {
+    ensure(r.seed_count as usize <= MAX_SEEDS, "seed count")?;
+    ensure(within(&[r.peak_force_n], MAX_FORCE_N), "peak force")?;
+    ensure(
+        within(&[r.displacement_before_puncture_m], MAX_COORDINATE_M),
+        "displacement",
+    )?;
+    seeds(&r.seeds[..r.seed_count as usize])
+}
+
+fn seeds(seeds: &[SeedPose]) -> Result<(), Rubbish> {
+    for seed in seeds {
+        ensure(within(&seed.position_m, MAX_COORDINATE_M), "seed position")?;
+        ensure(within(&seed.dropped_at_m, MAX_COORDINATE_M), "seed drop position")?;
+        ensure(within(&seed.axis, 1.001), "seed axis")?;
+    }
+    Ok(())
+}
+
 pub fn is_unit(v: &[f64; 3]) -> bool {
     let norm2 = v.iter().map(|c| c * c).sum::<f64>();
     (norm2 - 1.0).abs() < 1e-3
@@ -151,6 +166,12 @@ mod tests {
         assert!(state(&s).is_err());
         let r: TickRecord = bytemuck::pod_read_unaligned(&ones(size_of::<TickRecord>()));
         assert!(record(&r).is_err());
+        let r: Rehearsal = bytemuck::pod_read_unaligned(&ones(size_of::<Rehearsal>()));
+        assert!(rehearsal(&r).is_err());
+        let mut r = Rehearsal::zeroed();
+        assert!(rehearsal(&r).is_ok());
+        (r.seed_count, r.seeds[1].position_m[2]) = (2, f64::NAN);
+        assert_eq!(rehearsal(&r), Err(Rubbish("seed position")));
         let h: SnapshotHeader = bytemuck::pod_read_unaligned(&ones(size_of::<SnapshotHeader>()));
         assert!(snapshot(&h, &[]).is_err());
         let h: SceneHeader = bytemuck::pod_read_unaligned(&ones(size_of::<SceneHeader>()));

@@ -61,6 +61,10 @@ pub enum CommandKind {
     Shutdown = 10,
     /// Write the flight recording of both loops to disk.
     SaveFlight = 11,
+    /// Go through one needle ahead of time, in a body of its own, from rest, and send a [`crate::Rehearsal`] before the reply.
+    /// Entry x y z (m), direction x y z, speeds of insertion, retraction and approach (m/s), acceleration (m/s^2), how far from the
+    /// entry the tip is drawn back to (m), then x y z (m) of each drop in its order.
+    Rehearse = 12,
 }
 
 impl CommandKind {
@@ -77,6 +81,7 @@ impl CommandKind {
             Self::UndoSeed,
             Self::Shutdown,
             Self::SaveFlight,
+            Self::Rehearse,
         ]
         .into_iter()
         .find(|k| *k as u32 == number)

@@ -12,6 +12,7 @@
 //! | `plan` | [`PlanInForce`], newest one kept | bridge | hosts | planned seeds and needle path |
 //! | `commands` | [`Command`] | hosts | bridge | requests |
 //! | `replies` | [`Reply`] | bridge | hosts | accepted, or refused and why |
+//! | `rehearsals` | [`Rehearsal`] | bridge | hosts | where the seeds of a needle would end |
 //! | `uploads` | label cells under an [`UploadHeader`] | hosts | bridge | a segmented volume |
 //!
 //! Every type is plain old data, valid for every bit pattern: no `bool`, `enum` or `char`, no padding, no pointer.
@@ -25,7 +26,9 @@ pub mod motion;
 mod params;
 mod plan;
 mod record;
+mod rehearsal;
 mod scene;
+pub mod script;
 pub mod service;
 mod session;
 mod snapshot;
@@ -39,6 +42,7 @@ pub use params::{
 };
 pub use plan::{MAX_SEEDS, PlanInForce, PlannedSeed};
 pub use record::TickRecord;
+pub use rehearsal::{REHEARSAL_HEAD, Rehearsal};
 pub use scene::{BUILTIN_SCENES, MAX_STRUCTURES, SceneHeader, StructureInfo, UploadHeader, UploadStructure, role};
 pub use session::{Session, ThreadReport};
 pub use snapshot::{SeedPose, SnapshotHeader, Vertex};
@@ -46,4 +50,4 @@ pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.
-pub const SCHEMA_VERSION: u32 = 2;
+pub const SCHEMA_VERSION: u32 = 3;

@@ -236,6 +236,7 @@ plain!(parameters, ParametersInForce, "parameters", publishers 1, history 1, buf
 plain!(plan, PlanInForce, "plan", publishers 1, history 1, buffer 2);
 plain!(commands, Command, "commands", publishers MAX_HOSTS, history 0, buffer 64);
 plain!(replies, Reply, "replies", publishers 1, history 0, buffer 64);
+plain!(rehearsals, Rehearsal, "rehearsals", publishers 1, history 0, buffer 8);
 slices!(records, TickRecord, u64, "records", publishers 1, history 0, buffer RECORD_BUFFER);
 slices!(snapshots, Vertex, SnapshotHeader, "snapshots", publishers 1, history 1, buffer 2);
 slices!(

@@ -2,6 +2,7 @@
 
 pub mod hand;
 pub mod phantom;
+pub mod rehearsal;
 pub mod stopped;
 pub mod window_process;
 

@@ -119,6 +119,14 @@ impl Link {
                 self.rubbish_refused += 1;
             }
         }
+        // Before the replies: whoever has the reply to a rehearsal has its result.
+        while let Ok(Some(sample)) = ports.rehearsals.receive() {
+            let rehearsal = *sample.payload();
+            match check::rehearsal(&rehearsal) {
+                Ok(()) => self.take_rehearsal(rehearsal),
+                Err(_) => self.rubbish_refused += 1,
+            }
+        }
         while let Ok(Some(sample)) = ports.replies.receive() {
             self.take_reply(sample.payload());
         }

@@ -1,8 +1,10 @@
 //! result.json, force.csv and the table on the terminal.
 
 use super::Seen;
+use super::job::{Job, PlannedDrop, placed};
 use crate::link::Link;
-use crate::workflow::{NeedlePlan, Pace};
+use crate::plan::compensate::summary_m;
+use crate::workflow::Pace;
 use nalgebra::{Matrix3, Vector3};
 use serde_json::{Value, json};
 use std::io::Write;
@@ -34,7 +36,7 @@ pub fn utc_now() -> String {
 pub fn write(
     out: &Path,
     link: &Link,
-    plan: &NeedlePlan,
+    job: &Job,
     pace: &Pace,
     seen: &Seen,
     failure: Option<&String>,
@@ -46,17 +48,20 @@ pub fn write(
         )
     };
     std::fs::create_dir_all(out).map_err(told)?;
-    let seeds = seeds(link, plan);
+    let first = job.tasks.first().ok_or("nothing was planned")?;
+    let direction = first.plan.direction;
+    let seeds = seeds(link, &job.planned(), &seen.lost);
     let result = json!({
         "completed": failure.is_none(),
         "failure": failure,
-        "seeds": seeds,
-        "force": force(link, plan, seen),
+        "seeds": seeds, "lost_seeds": seen.lost.iter().map(|n| n + 1).collect::<Vec<_>>(),
+        "force": force(link, direction, seen),
         "timing": timing(link, seen),
         "plan": {
-            "entry_mm": mm(plan.entry_m), "direction": plan.direction,
+            "entry_mm": mm(first.plan.entry_m), "direction": direction, "needles": needles(job),
             "insert_speed_mm_s": pace.insert_m_per_s * 1e3, "retract_speed_mm_s": pace.retract_m_per_s * 1e3,
         },
+        "compensation": compensation(job),
         "largest_displacement_before_puncture_mm": seen.displacement_before_puncture_m * 1e3,
         "parameters": parameters(link),
         "scene": link.scene().map(|s| json!({
@@ -72,7 +77,7 @@ pub fn write(
     });
     let text = serde_json::to_string_pretty(&result).map_err(|e| e.to_string())?;
     std::fs::write(out.join("result.json"), text + "\n").map_err(told)?;
-    force_csv(out, plan, seen).map_err(told)?;
+    force_csv(out, direction, seen).map_err(told)?;
     table(&result);
     println!("written: {}", out.display());
     Ok(())
@@ -88,20 +93,20 @@ fn patient_mm(patient_from_scene: &[f64; 12], v: [f64; 3]) -> [f64; 3] {
     mm(at.into())
 }
 
-fn seeds(link: &Link, plan: &NeedlePlan) -> Vec<Value> {
+fn seeds(link: &Link, planned: &[PlannedDrop], lost: &[usize]) -> Vec<Value> {
     let (Some(snapshot), Some(scene)) = (link.snapshot(), link.scene()) else {
         return Vec::new();
     };
     let to_patient = |v| patient_mm(&scene.header.patient_from_scene, v);
-    let direction = Vector3::from(plan.direction);
-    let placed = &snapshot.header.seeds[..snapshot.header.seed_count as usize];
-    plan.deepest_first()
-        .into_iter()
-        .zip(placed)
-        .map(|(planned, seed)| {
+    let in_tissue = &snapshot.header.seeds[..snapshot.header.seed_count as usize];
+    placed(planned, lost, in_tissue)
+        .map(|(drop, seed)| {
+            let (planned, direction) = (drop.planned_m, Vector3::from(drop.direction));
             let off = Vector3::from(seed.position_m) - Vector3::from(planned);
             let along = off.dot(&direction);
             json!({
+                "needle": drop.needle + 1, "hole": drop.hole.map(|h| h.to_string()), "strength_u": drop.strength_u,
+                "axis": seed.axis,
                 "planned_mm": mm(planned), "dropped_at_mm": mm(seed.dropped_at_m), "placed_mm": mm(seed.position_m),
                 "planned_ras_mm": to_patient(planned), "dropped_at_ras_mm": to_patient(seed.dropped_at_m),
                 "placed_ras_mm": to_patient(seed.position_m),
@@ -112,18 +117,42 @@ fn seeds(link: &Link, plan: &NeedlePlan) -> Vec<Value> {
         .collect()
 }
 
-fn along(plan: &NeedlePlan, r: &TickRecord) -> f64 {
-    Vector3::from(r.force_on_hand_n).dot(&Vector3::from(plan.direction))
+fn needles(job: &Job) -> Vec<Value> {
+    let of_task = |task: &crate::workflow::NeedleTask| {
+        json!({
+            "entry_mm": mm(task.drops.entry_m), "direction": task.drops.direction,
+            "planned_along_mm": task.plan.deepest_first().into_iter().map(|s| task.plan.along_m(s) * 1e3).collect::<Vec<_>>(),
+            "dropped_along_mm": task.drops.along_m.iter().map(|a| a * 1e3).collect::<Vec<_>>(),
+        })
+    };
+    job.tasks.iter().map(of_task).collect()
 }
 
-fn force(link: &Link, plan: &NeedlePlan, seen: &Seen) -> Value {
+/// As the rehearsals had it.
+fn compensation(job: &Job) -> Option<Value> {
+    let [[mean_before, worst_before], [mean_after, worst_after]] =
+        summary_m(&job.compensations).map(|e| e.map(|m| m * 1e3));
+    (!job.compensations.is_empty()).then(|| {
+        json!({
+            "mean_error_before_mm": mean_before, "mean_error_after_mm": mean_after,
+            "worst_error_before_mm": worst_before, "worst_error_after_mm": worst_after,
+            "rehearsals": job.compensations.iter().map(|c| c.rehearsals).sum::<usize>(),
+        })
+    })
+}
+
+fn along(direction: [f64; 3], r: &TickRecord) -> f64 {
+    Vector3::from(r.force_on_hand_n).dot(&Vector3::from(direction))
+}
+
+fn force(link: &Link, direction: [f64; 3], seen: &Seen) -> Value {
     let puncture = seen
         .events
         .iter()
         .find(|e| EventKind::from_number(e.kind) == Some(EventKind::Puncture));
     let puncture_force = puncture.map(|p| {
         let before = seen.records.iter().filter(|r| r.tick <= p.tick);
-        before.map(|r| along(plan, r).abs()).fold(0.0, f64::max)
+        before.map(|r| along(direction, r).abs()).fold(0.0, f64::max)
     });
     let state = link.state();
     json!({
@@ -188,7 +217,7 @@ fn session(s: &Session) -> Value {
     })
 }
 
-fn force_csv(out: &Path, plan: &NeedlePlan, seen: &Seen) -> std::io::Result<()> {
+fn force_csv(out: &Path, direction: [f64; 3], seen: &Seen) -> std::io::Result<()> {
     let mut file = std::io::BufWriter::new(std::fs::File::create(out.join("force.csv"))?);
     writeln!(file, "time_s,tick,depth_mm,speed_mm_s,force_n,phase,tissue_tick")?;
     let begin = seen.records.first().map_or(0, |r| r.due_ns);
@@ -200,7 +229,7 @@ fn force_csv(out: &Path, plan: &NeedlePlan, seen: &Seen) -> std::io::Result<()> 
             r.tick,
             r.depth_m * 1e3,
             r.speed_m_per_s * 1e3,
-            along(plan, r),
+            along(direction, r),
             Phase::from_number(r.phase).map_or("unknown", Phase::name),
             r.tissue_tick
         )?;

@@ -2,23 +2,16 @@
 
 use super::{NeedlePlan, Pace, move_values, plan_values};
 use crate::link::{Link, LinkStatus};
+use crate::plan::Drops;
+use nalgebra::Vector3;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
-use stylet_shm_schema::{CommandKind, Fault, HapticState, flags};
+use stylet_shm_schema::script::{TISSUE_REST_FOR, TISSUE_REST_LIMIT, TISSUE_REST_M, arrived_after, move_limit};
+use stylet_shm_schema::{CommandKind, Fault, HapticState};
 
-/// The tip is at its target within this distance along the needle.
-const AT_TARGET_M: f64 = 0.3e-3;
-/// A hand that the force holds back from its goal is taken as arrived within this distance.
-const STALLED_M: f64 = 2e-3;
-const STALLED_AFTER: Duration = Duration::from_millis(1500);
-const REST_SPEED_M_PER_S: f64 = 1e-3;
-const REST_FOR: Duration = Duration::from_millis(60);
-const TISSUE_REST_M: f64 = 0.05e-3;
-const TISSUE_REST_FOR: Duration = Duration::from_millis(200);
-/// Tissue that takes longer to come back is left to do so.
-const TISSUE_REST_LIMIT: Duration = Duration::from_secs(10);
+/// In the core's refusal of a drop that leaves the procedure as it is.
+const TIP_OUTSIDE: &str = "outside the tissue";
 const REPLY_LIMIT: Duration = Duration::from_secs(3);
-const MOVE_MARGIN: Duration = Duration::from_secs(6);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
@@ -51,16 +44,48 @@ pub enum RunStatus {
 #[derive(Clone, Debug)]
 enum Action {
     Command(CommandKind, Vec<f64>),
-    Move { to_m: [f64; 3], speed_m_per_s: f64 },
-    SeedCount(u32),
+    Move {
+        to_m: [f64; 3],
+        direction: [f64; 3],
+        speed_m_per_s: f64,
+    },
+    /// With its number, counted from 0 over all needles.
+    Drop(usize),
     TissueRest,
+}
+
+/// One needle of a script: what is planned, and what is done for it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NeedleTask {
+    pub plan: NeedlePlan,
+    pub drops: Drops,
+}
+
+impl NeedleTask {
+    /// Each seed dropped where it is planned.
+    pub fn as_planned(plan: NeedlePlan) -> Self {
+        let drops = Drops {
+            entry_m: plan.entry_m,
+            direction: plan.direction,
+            along_m: plan
+                .deepest_first()
+                .into_iter()
+                .map(|seed| plan.along_m(seed))
+                .collect(),
+            retract_to_m: 0.0,
+        };
+        Self { plan, drops }
+    }
 }
 
 /// One scripted implantation. Call [`Run::advance`] after each [`Link::poll`].
 pub struct Run {
-    plan: NeedlePlan,
+    tasks: Vec<NeedleTask>,
     pace: Pace,
-    actions: VecDeque<(Step, Action)>,
+    /// Each with the number of its needle.
+    actions: VecDeque<(usize, Step, Action)>,
+    /// Drops that the core refused because the tip was outside the tissue.
+    lost: Vec<usize>,
     status: RunStatus,
     session_id: Option<u64>,
     /// The armed force may fault from here on.
@@ -73,10 +98,17 @@ pub struct Run {
 }
 
 impl Run {
+    /// One needle, each seed dropped where it is planned.
     pub fn new(plan: NeedlePlan, pace: Pace) -> Self {
+        Self::of_needles(vec![NeedleTask::as_planned(plan)], pace)
+    }
+
+    /// One needle after another; between two of them the tissue comes to rest.
+    pub fn of_needles(tasks: Vec<NeedleTask>, pace: Pace) -> Self {
         Self {
-            actions: script(&plan, &pace),
-            plan,
+            actions: script(&tasks, &pace),
+            tasks,
+            lost: Vec::new(),
             pace,
             status: RunStatus::Working,
             session_id: None,
@@ -89,17 +121,29 @@ impl Run {
     }
 
     pub fn step(&self) -> Step {
-        self.actions.front().map_or(Step::Done, |(step, _)| *step)
+        self.actions.front().map_or(Step::Done, |(_, step, _)| *step)
     }
 
-    pub fn plan(&self) -> &NeedlePlan {
-        &self.plan
+    /// Which needle is at work, counted from 0; the last one when all are done.
+    pub fn needle(&self) -> usize {
+        let last = self.tasks.len().saturating_sub(1);
+        self.actions.front().map_or(last, |(needle, _, _)| *needle)
+    }
+
+    /// Numbers of the drops that left no seed, counted from 0 over all needles: the tip was outside the tissue.
+    pub fn lost(&self) -> &[usize] {
+        &self.lost
+    }
+
+    /// Of the needle at work.
+    pub fn plan(&self) -> Option<&NeedlePlan> {
+        self.tasks.get(self.needle()).map(|task| &task.plan)
     }
 
     /// Does what can be done now.
     pub fn advance(&mut self, link: &mut Link) -> RunStatus {
         while self.status == RunStatus::Working {
-            let Some((step, action)) = self.actions.front().cloned() else {
+            let Some((_, step, action)) = self.actions.front().cloned() else {
                 self.status = RunStatus::Done;
                 break;
             };
@@ -133,18 +177,20 @@ impl Run {
         }
         match action {
             Action::Command(kind, values) => self.command(link, &state, *kind, values),
-            Action::Move { to_m, speed_m_per_s } => {
-                let (direction, acceleration) = (self.plan.direction, self.pace.acceleration_m_per_s2);
-                let values = move_values(*to_m, direction, *speed_m_per_s, acceleration);
+            Action::Move {
+                to_m,
+                direction,
+                speed_m_per_s,
+            } => {
+                let acceleration = self.pace.acceleration_m_per_s2;
+                let values = move_values(*to_m, *direction, *speed_m_per_s, acceleration);
                 if !self.command(link, &state, CommandKind::MoveHand, &values)? {
                     return Ok(false);
                 }
-                self.arrived(&state, *to_m, *speed_m_per_s)
+                let off = Vector3::from(state.tip_in_scene_m) - Vector3::from(*to_m);
+                self.arrived(&state, off.dot(&Vector3::from(*direction)), *speed_m_per_s)
             }
-            Action::SeedCount(count) => {
-                self.in_time("the seed in the tissue", REPLY_LIMIT)?;
-                Ok(state.seed_count >= *count)
-            }
+            Action::Drop(number) => self.dropped(link, &state, *number),
             Action::TissueRest => {
                 let moved = link.snapshot().map(|s| s.header.max_displacement_m);
                 let at_rest = moved.is_some_and(|d| d < TISSUE_REST_M);
@@ -163,6 +209,21 @@ impl Run {
         }
         self.session_id = id;
         Ok(())
+    }
+
+    /// True once the seed lies in the tissue, or is lost because the tip is not in it.
+    fn dropped(&mut self, link: &mut Link, state: &HapticState, number: usize) -> Result<bool, String> {
+        match self.command(link, state, CommandKind::DropSeed, &[]) {
+            Ok(false) => return Ok(false),
+            Ok(true) => {}
+            Err(why) if why.contains(TIP_OUTSIDE) => {
+                self.lost.push(number);
+                return Ok(true);
+            }
+            Err(why) => return Err(why),
+        }
+        self.in_time("the seed in the tissue", REPLY_LIMIT)?;
+        Ok(state.seed_count as usize + self.lost.len() > number)
     }
 
     /// True once the command was accepted and the state shows it.
@@ -195,23 +256,18 @@ impl Run {
         Ok(shown)
     }
 
-    fn arrived(&mut self, state: &HapticState, to_m: [f64; 3], speed_m_per_s: f64) -> Result<bool, String> {
-        let off_m = self.plan.along_m(state.tip_in_scene_m) - self.plan.along_m(to_m);
-        let at_rest = state.speed_m_per_s.abs() < REST_SPEED_M_PER_S;
-        let there = off_m.abs() <= AT_TARGET_M && (state.flags & flags::AT_GOAL != 0 || state.depth_m > 0.0);
-        let near = off_m.abs() <= STALLED_M;
-        if !(at_rest && near) {
-            self.condition_since = None;
-        } else if self.held_for(true, if there { REST_FOR } else { STALLED_AFTER }) {
-            return Ok(true);
+    fn arrived(&mut self, state: &HapticState, off_m: f64, speed_m_per_s: f64) -> Result<bool, String> {
+        match arrived_after(state, off_m) {
+            None => self.condition_since = None,
+            Some(long) if self.held_for(true, long) => return Ok(true),
+            Some(_) => {}
         }
-        let limit = MOVE_MARGIN + Duration::from_secs_f64((0.5 / speed_m_per_s.max(1e-4)).min(600.0));
         self.in_time(
             &format!(
                 "the tip at its target; it is {:.2} mm from it along the needle",
                 off_m * 1e3
             ),
-            limit,
+            move_limit(speed_m_per_s),
         )?;
         Ok(false)
     }
@@ -232,25 +288,43 @@ impl Run {
     }
 }
 
-fn script(plan: &NeedlePlan, pace: &Pace) -> VecDeque<(Step, Action)> {
+fn script(tasks: &[NeedleTask], pace: &Pace) -> VecDeque<(usize, Step, Action)> {
     let command = |kind| Action::Command(kind, Vec::new());
-    let go = |to_m, speed_m_per_s| Action::Move { to_m, speed_m_per_s };
-    let mut actions = vec![
-        (Step::Plan, command(CommandKind::Reset)),
-        (Step::Plan, Action::Command(CommandKind::SetPlan, plan_values(plan))),
-        (Step::PlaceNeedle, command(CommandKind::Engage)),
-        (Step::PlaceNeedle, go(plan.entry_m, pace.approach_m_per_s)),
-    ];
-    for (index, seed) in plan.deepest_first().into_iter().enumerate() {
-        actions.push(if index == 0 {
-            (Step::Insert, go(seed, pace.insert_m_per_s))
-        } else {
-            (Step::DropAndRetract, go(seed, pace.retract_m_per_s))
-        });
-        actions.push((Step::DropAndRetract, command(CommandKind::DropSeed)));
-        actions.push((Step::DropAndRetract, Action::SeedCount(index as u32 + 1)));
+    let mut actions = VecDeque::new();
+    let mut seeds = 0;
+    for (number, task) in tasks.iter().enumerate() {
+        let drops = &task.drops;
+        let go = |along_m: f64, speed_m_per_s| Action::Move {
+            to_m: drops.at_m(along_m),
+            direction: drops.direction,
+            speed_m_per_s,
+        };
+        let mut then = |step, action| actions.push_back((number, step, action));
+        if number == 0 {
+            then(Step::Plan, command(CommandKind::Reset));
+        }
+        then(
+            Step::Plan,
+            Action::Command(CommandKind::SetPlan, plan_values(&task.plan)),
+        );
+        if number == 0 {
+            then(Step::PlaceNeedle, command(CommandKind::Engage));
+        }
+        then(Step::PlaceNeedle, go(0.0, pace.approach_m_per_s));
+        for (index, &along_m) in drops.along_m.iter().enumerate() {
+            if index == 0 {
+                then(Step::Insert, go(along_m, pace.insert_m_per_s));
+            } else {
+                then(Step::DropAndRetract, go(along_m, pace.retract_m_per_s));
+            }
+            then(Step::DropAndRetract, Action::Drop(seeds));
+            seeds += 1;
+        }
+        if drops.retract_to_m > 0.0 {
+            then(Step::DropAndRetract, go(drops.retract_to_m, pace.retract_m_per_s));
+        }
+        then(Step::DropAndRetract, go(0.0, pace.retract_m_per_s));
+        then(Step::DropAndRetract, Action::TissueRest);
     }
-    actions.push((Step::DropAndRetract, go(plan.entry_m, pace.retract_m_per_s)));
-    actions.push((Step::DropAndRetract, Action::TissueRest));
-    actions.into()
+    actions
 }

@@ -3,6 +3,7 @@
 pub mod flight;
 mod picture;
 pub mod ports;
+mod rehearsals;
 mod requests;
 mod snapshots;
 mod supervisor;
@@ -20,6 +21,7 @@ use iceoryx2::node::Node;
 use picture::IDENTITY;
 pub use picture::ScenePicture;
 use ports::Ports;
+use rehearsals::RehearsalDesk;
 use requests::Request;
 pub use snapshots::SnapshotLoans;
 use std::collections::HashMap;
@@ -77,7 +79,8 @@ pub struct Bridge {
     /// The tissue model of every scene of the run.
     tissue: TissueKind,
     picture_sent: bool,
-    coming: Option<ScenePicture>,
+    coming: Option<(ScenePicture, Arc<SceneSource>)>,
+    rehearsals: RehearsalDesk,
     /// Who waits for what: host and command behind each ticket.
     waiting: HashMap<Ticket, (u64, u64)>,
     waiting_parameters: HashMap<u64, ParameterSet>,
@@ -99,7 +102,7 @@ impl Bridge {
         device: DeviceInfo,
         session: Session,
         picture: ScenePicture,
-        tissue: TissueKind,
+        (tissue, source): (TissueKind, Arc<SceneSource>),
     ) -> Self {
         let mut plan: PlanInForce = bytemuck::Zeroable::zeroed();
         plan.session_id = session.session_id;
@@ -121,6 +124,7 @@ impl Bridge {
             tissue,
             picture_sent: false,
             coming: None,
+            rehearsals: RehearsalDesk::new(source, tissue, device),
             waiting: HashMap::new(),
             waiting_parameters: HashMap::new(),
             tickets: 0,
@@ -161,6 +165,7 @@ impl Bridge {
         let end = self.take_commands();
         self.take_uploads();
         self.take_loaded();
+        self.take_rehearsed();
         self.take_notices();
         if !self.picture_sent {
             self.send_scene();
@@ -355,6 +360,13 @@ impl Bridge {
                 });
                 true
             }
+            Request::Rehearse(run) => {
+                let (set, generation) = (self.parameters.set, self.picture.header.generation);
+                if let Err(why) = self.rehearsals.begin(ticket, *run, set, generation) {
+                    self.answer(ticket, Some(why), 0);
+                }
+                true
+            }
             Request::SaveFlight => self.loops.flight.request(ticket),
             Request::Shutdown => true,
         };
@@ -443,7 +455,8 @@ impl Bridge {
             Ok(world) => Box::new(world),
             Err(why) => return self.answer(loaded.ticket, Some(&why), 0),
         };
-        let tape = Box::new(TissueTape::new(&world, Arc::new(source)));
+        let source = Arc::new(source);
+        let tape = Box::new(TissueTape::new(&world, Arc::clone(&source)));
         if self
             .loops
             .tissue_orders
@@ -460,7 +473,24 @@ impl Bridge {
                 0,
             );
         }
-        self.coming = Some(picture);
+        self.coming = Some((picture, source));
+    }
+
+    /// The result goes out before the reply, so that a host that has its reply has all.
+    fn take_rehearsed(&mut self) {
+        let Some(told) = self.rehearsals.take(self.picture.header.generation) else {
+            return;
+        };
+        let who = self.waiting.get(&told.ticket).copied();
+        if let (Ok(result), Some((host_id, command_id))) = (&told.outcome, who) {
+            let _ = self.ports.rehearsals.send_copy(Rehearsal {
+                session_id: self.session.session_id,
+                host_id,
+                command_id,
+                ..**result
+            });
+        }
+        self.answer(told.ticket, told.outcome.as_ref().err().map(String::as_str), 0);
     }
 
     fn take_notices(&mut self) {
@@ -497,8 +527,9 @@ impl Bridge {
                 generation,
                 tick,
             } => {
-                if let Some(picture) = self.coming.take() {
+                if let Some((picture, source)) = self.coming.take() {
                     self.picture = picture;
+                    self.rehearsals.change_scene(source);
                     self.picture_sent = false;
                     self.send_scene();
                     self.plan = bytemuck::Zeroable::zeroed();

@@ -17,6 +17,11 @@ impl ScenePicture {
         Self::of(scene, session_id, 1, IDENTITY)
     }
 
+    /// As it is sent: rest positions and triangles behind the header.
+    pub fn parts(&self) -> (&SceneHeader, &[u32]) {
+        (&self.header, &self.words)
+    }
+
     pub fn word_count(&self) -> usize {
         self.words.len()
     }

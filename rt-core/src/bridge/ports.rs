@@ -14,6 +14,7 @@ pub struct Ports {
     pub parameters: Publisher<Ipc, ParametersInForce, ()>,
     pub plan: Publisher<Ipc, PlanInForce, ()>,
     pub replies: Publisher<Ipc, Reply, ()>,
+    pub rehearsals: Publisher<Ipc, Rehearsal, ()>,
     pub records: Publisher<Ipc, [TickRecord], u64>,
     pub snapshots: Publisher<Ipc, [Vertex], SnapshotHeader>,
     pub scene: Publisher<Ipc, [u32], SceneHeader>,
@@ -62,6 +63,7 @@ impl Ports {
             parameters: publisher!(service::parameters(node)),
             plan: publisher!(service::plan(node)),
             replies: publisher!(service::replies(node)),
+            rehearsals: publisher!(service::rehearsals(node)),
             records: publisher!(service::records(node), slices of MAX_BATCH, loans 2, kept |all| all),
             snapshots: publisher!(service::snapshots(node), slices of vertex_count, loans 2 * SNAPSHOTS_AHEAD, kept |_| SNAPSHOTS_KEPT),
             scene: publisher!(service::scene(node), slices of word_count, loans 2, kept |_| SCENES_KEPT),
@@ -82,6 +84,7 @@ impl Ports {
         let _ = self.parameters.update_connections();
         let _ = self.plan.update_connections();
         let _ = self.replies.update_connections();
+        let _ = self.rehearsals.update_connections();
         let _ = self.records.update_connections();
         let _ = self.snapshots.update_connections();
         let _ = self.scene.update_connections();

@@ -1,6 +1,7 @@
 //! What hosts ask for: verified here, then an order for a loop, or a refusal with every reason.
 
 use crate::active::{Active, activate};
+use crate::rehearse::NeedleRun;
 use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
 use nalgebra::Vector3;
 use stylet_hw::{DeviceInfo, HandGoal};
@@ -23,6 +24,7 @@ pub enum Request {
     BuiltinScene(&'static str),
     Shutdown,
     SaveFlight,
+    Rehearse(Box<NeedleRun>),
 }
 
 impl Request {
@@ -59,6 +61,7 @@ pub fn read(command: &Command, now: &ParameterSet, device: &DeviceInfo) -> Resul
         CommandKind::LoadBuiltinScene => builtin_scene(values).map(Request::BuiltinScene),
         CommandKind::Shutdown => Ok(Request::Shutdown),
         CommandKind::SaveFlight => Ok(Request::SaveFlight),
+        CommandKind::Rehearse => rehearsal(values).map(|run| Request::Rehearse(Box::new(run))),
     }
 }
 
@@ -119,6 +122,52 @@ fn plan(values: &[f64]) -> Result<PlanInForce, String> {
     }
     plan.seed_count = (values.len() / 3 - 2) as u64;
     Ok(plan)
+}
+
+fn rehearsal(values: &[f64]) -> Result<NeedleRun, String> {
+    let drops = values
+        .len()
+        .checked_sub(REHEARSAL_HEAD)
+        .filter(|n| n % 3 == 0)
+        .map(|n| n / 3);
+    if !drops.is_some_and(|n| (1..=MAX_SEEDS).contains(&n)) {
+        return Err(format!(
+            "a rehearsal is {REHEARSAL_HEAD} values and 1 to {MAX_SEEDS} drops of three values each; {} values came",
+            values.len()
+        ));
+    }
+    let (head, drops) = values.split_at(REHEARSAL_HEAD);
+    let mut problems = Vec::new();
+    for (what, value, [low, high]) in [
+        ("insertion in m/s", head[6], SPEED_RANGE_M_PER_S),
+        ("retraction in m/s", head[7], SPEED_RANGE_M_PER_S),
+        ("approach in m/s", head[8], SPEED_RANGE_M_PER_S),
+        ("acceleration in m/s2", head[9], ACCELERATION_RANGE_M_PER_S2),
+        ("place drawn back to, in m from the entry,", head[10], [-0.5, 0.5]),
+    ] {
+        if !(low..=high).contains(&value) {
+            problems.push(format!("{what} is {value}; it must be {low} to {high}"));
+        }
+    }
+    let mut told = |place: Result<[f64; 3], String>| place.map_err(|why| problems.push(why)).unwrap_or_default();
+    let run = NeedleRun {
+        entry_m: told(coordinates(&head[..3])).into(),
+        direction: told(direction(&head[3..6])).into(),
+        insert_m_per_s: head[6],
+        retract_m_per_s: head[7],
+        approach_m_per_s: head[8],
+        acceleration_m_per_s2: head[9],
+        retract_to_m: head[10],
+        drops_m: drops
+            .chunks_exact(3)
+            .map(|drop| told(coordinates(drop)).into())
+            .collect(),
+    };
+    if problems.is_empty() {
+        Ok(run)
+    } else {
+        Err(problems.join("\n"))
+    }
 }
 
 fn builtin_scene(values: &[f64]) -> Result<&'static str, String> {
@@ -187,6 +236,9 @@ mod tests {
             (CommandKind::MoveHand, &[0.0, 0.0, 1e30, 0.0, 0.0, 1.0, 0.1, 1.0]),
             (CommandKind::MoveHand, &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1e9, 1.0]),
             (CommandKind::MoveHand, &[]),
+            (CommandKind::Rehearse, &[0.0; 11]),
+            (CommandKind::Rehearse, &[0.0; 15]),
+            (CommandKind::Rehearse, &[0.0; 14]),
             (CommandKind::LoadBuiltinScene, &[3.0]),
             (CommandKind::LoadBuiltinScene, &[0.5]),
             (CommandKind::LoadBuiltinScene, &[-1.0]),
@@ -206,6 +258,24 @@ mod tests {
         ] {
             let read = try_read(CommandKind::LoadBuiltinScene, values);
             assert!(matches!(read, Ok(Request::BuiltinScene(name)) if name == expected));
+        }
+    }
+
+    #[test]
+    fn a_rehearsal_tells_every_bad_value_and_keeps_its_drops_in_order() {
+        let mut values = [0.0; 17];
+        (values[5], values[9], values[11], values[16]) = (1.0, 2.0, 0.1, 0.2);
+        for speed in 6..9 {
+            values[speed] = 0.05;
+        }
+        let Ok(Request::Rehearse(run)) = try_read(CommandKind::Rehearse, &values) else {
+            panic!("refused")
+        };
+        assert_eq!((run.drops_m[0].x, run.drops_m[1].z, run.drops_m.len()), (0.1, 0.2, 2));
+        (values[5], values[6], values[9], values[12]) = (0.9, 0.0, 1e9, 30.0);
+        let why = try_read(CommandKind::Rehearse, &values).err().unwrap();
+        for words in ["unit vector", "insertion", "acceleration", "within 20 m"] {
+            assert!(why.contains(words), "{words}: {why}");
         }
     }
 

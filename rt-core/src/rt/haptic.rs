@@ -406,14 +406,14 @@ impl HapticLoop {
         s.fault = self.watchdog.fault() as u32;
         s.flags = now_flags;
         s.seed_count = tissue.seed_count;
-        let work_ns = clock::now_ns() - woke_ns;
+        let work_ns = clock::now_ns().saturating_sub(woke_ns);
         s.worst_work_ns = s.worst_work_ns.max(work_ns);
         let record = TickRecord {
             session_id: self.session_id,
             tick: s.tick,
             due_ns,
             wake_latency_ns,
-            force_written_ns: written_ns - woke_ns,
+            force_written_ns: written_ns.saturating_sub(woke_ns),
             work_ns,
             missed,
             phase: s.phase,

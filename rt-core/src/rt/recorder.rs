@@ -99,6 +99,13 @@ pub fn recorder<T>(tape: Box<T>) -> (Recorder<T>, TapeDesk<T>) {
 }
 
 impl<T: Tape> Recorder<T> {
+    /// For a loop that is not recorded.
+    pub fn without_tape() -> Self {
+        let (out, _taken) = rtrb::RingBuffer::new(1);
+        let (_give_back, back) = rtrb::RingBuffer::new(1);
+        Self { tape: None, out, back }
+    }
+
     /// The tape for the tick that begins now, only then: one that came back is blank and begins with a whole tick. One
     /// of an earlier scene goes out again.
     pub fn begin_tick(&mut self, scene_generation: u64) -> Option<&mut T> {

@@ -118,6 +118,22 @@ impl TissueLoop {
         &self.world
     }
 
+    /// Where the seeds are now, in the order of the drops.
+    pub fn seeds(&self) -> impl Iterator<Item = SeedPose> {
+        self.seeds.iter().map(|seed| self.pose_of(seed))
+    }
+
+    /// How far any element was from rest after the last tick.
+    pub fn displacement_m(&self) -> f64 {
+        let elements = self.report.map_or(0.0, |r| r.max_displacement);
+        f64::from(elements) * self.world.scene.lattice.spacing_m
+    }
+
+    /// Gives the scene back, as it is.
+    pub fn into_world(self) -> Box<World> {
+        self.world
+    }
+
     /// Runs on the ideal grid until `stop`.
     pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool) {
         let mut grid = Grid::from(clock::now_ns(), (self.period_s * 1e9) as u64);
@@ -434,7 +450,7 @@ impl TissueLoop {
     }
 
     fn publish_snapshot(&mut self, woke_ns: u64, report: &StepReport) {
-        let work_ns = clock::now_ns() - woke_ns;
+        let work_ns = clock::now_ns().saturating_sub(woke_ns);
         self.response.worst_work_ns = self.response.worst_work_ns.max(work_ns);
         while let Ok(slot) = self.ports.slots.pop() {
             let filled = slot.scene_generation == self.world.generation

@@ -1,0 +1,244 @@
+//! Where to drop each seed so that it rests on plan: rehearse, see where the seeds end, drop them so much further the other way,
+//! rehearse again.
+//!
+//! The tissue lies ahead of its place at rest when a seed leaves the needle, by some millimetres that hardly change with the
+//! place of the drop. So each step moves a drop by the error that is left, over the slope of rest against drop that the last two
+//! rehearsals show (a secant; at first 1).
+
+use super::rehearse::{Drops, Rehearser, Rest};
+use super::{Loading, Needle};
+use crate::workflow::Pace;
+use nalgebra::Vector3;
+
+/// What compensation may do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// A drop is never further from its planned place along the needle.
+    pub along_m: f64,
+    /// Nor the needle across; 0 keeps it in its hole.
+    pub across_m: f64,
+    /// Deepest that the tip may go, from the entry.
+    pub reach_m: f64,
+    /// Rehearsals of one needle at most, the first one included.
+    pub rehearsals: usize,
+    /// Good enough: no seed is farther from plan.
+    pub enough_m: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            along_m: 15e-3,
+            across_m: 1.5e-3,
+            reach_m: super::check::REACH_M,
+            rehearsals: 8,
+            enough_m: 0.1e-3,
+        }
+    }
+}
+
+/// The slope of rest against drop is taken to lie between these.
+const SLOPES: [f64; 2] = [0.5, 2.0];
+/// Two drops less far apart say nothing about the slope.
+const LEAST_MOVE_M: f64 = 0.05e-3;
+/// Drops of one needle keep their order by at least this.
+const APART_M: f64 = 0.1e-3;
+
+/// Where dropping as planned is not possible, drops are tried so much deeper at a time.
+const DEEPER_M: f64 = 1e-3;
+
+/// One needle, before and after.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Compensation {
+    pub drops: Drops,
+    /// Rest minus plan of each seed, deepest first, when dropped as planned; `None` where that cannot be done: the tip would be
+    /// outside the tissue, which has moved ahead.
+    pub before_m: Option<Vec<[f64; 3]>>,
+    /// The same when dropped as `drops` says.
+    pub after_m: Vec<[f64; 3]>,
+    pub rehearsals: usize,
+}
+
+impl Compensation {
+    pub fn errors_before_m(&self) -> impl Iterator<Item = f64> + '_ {
+        self.before_m.iter().flatten().map(|e| Vector3::from(*e).norm())
+    }
+
+    pub fn errors_after_m(&self) -> impl Iterator<Item = f64> + '_ {
+        self.after_m.iter().map(|e| Vector3::from(*e).norm())
+    }
+}
+
+/// A way to go about the needle, and what it comes to.
+#[derive(Clone)]
+struct Tried {
+    drops: Drops,
+    error_m: Vec<Vector3<f64>>,
+}
+
+impl Tried {
+    fn mean_m(&self) -> f64 {
+        self.error_m.iter().map(Vector3::norm).sum::<f64>() / self.error_m.len().max(1) as f64
+    }
+
+    fn worst_m(&self) -> f64 {
+        self.error_m.iter().map(Vector3::norm).fold(0.0, f64::max)
+    }
+}
+
+/// The best way found; dropping as planned where nothing is better. An error when no way was found to go through with the needle.
+pub fn compensate(
+    needle: &Needle,
+    pace: &Pace,
+    limits: &Limits,
+    rehearser: &mut dyn Rehearser,
+) -> Result<Compensation, String> {
+    let (start, is_as_planned) = start(needle, pace, limits, rehearser)?;
+    let (mut best, mut last) = (start.clone(), start.clone());
+    let mut before_last: Option<Tried> = None;
+    let mut rehearsals = 1;
+    // Shortened when a step leads out of the tissue or makes it worse.
+    let mut share = 1.0;
+    while rehearsals < limits.rehearsals && best.worst_m() > limits.enough_m {
+        let drops = next(needle, &last, before_last.as_ref(), share, limits);
+        if drops == last.drops {
+            break;
+        }
+        rehearsals += 1;
+        match try_it(needle, drops, pace, rehearser) {
+            Ok(tried) => {
+                share = if tried.mean_m() > last.mean_m() {
+                    0.5 * share
+                } else {
+                    1.0
+                };
+                if tried.mean_m() < best.mean_m() {
+                    best = tried.clone();
+                }
+                before_last = Some(std::mem::replace(&mut last, tried));
+            }
+            // A drop outside the tissue: go less far from the best that worked.
+            Err(_) if share > 0.1 => {
+                share *= 0.5;
+                (last, before_last) = (best.clone(), None);
+            }
+            Err(why) => return Err(why),
+        }
+    }
+    let vectors = |t: &Tried| t.error_m.iter().map(|e| (*e).into()).collect();
+    Ok(Compensation {
+        before_m: is_as_planned.then(|| vectors(&start)),
+        after_m: vectors(&best),
+        drops: best.drops,
+        rehearsals,
+    })
+}
+
+/// As planned, and whether that could be done; else with drops deeper by the first millimetres that can.
+fn start(
+    needle: &Needle,
+    pace: &Pace,
+    limits: &Limits,
+    rehearser: &mut dyn Rehearser,
+) -> Result<(Tried, bool), String> {
+    let planned = Drops::as_planned(needle);
+    let why = match try_it(needle, planned.clone(), pace, rehearser) {
+        Ok(tried) => return Ok((tried, true)),
+        Err(why) => why,
+    };
+    let last = planned.along_m.len().saturating_sub(1).max(1) as f64;
+    // All by as much; or, where seeds are loose, the last one most: the first may be near the far end of the tissue.
+    let ways: &[fn(usize, f64) -> f64] = match needle.loading {
+        Loading::Loose => &[|_, _| 1.0, |i, last| i as f64 / last],
+        Loading::Stranded { .. } => &[|_, _| 1.0],
+    };
+    let steps = (limits.along_m / DEEPER_M) as usize;
+    for (step, share) in (1..=steps).flat_map(|step| ways.iter().map(move |share| (step, share))) {
+        let mut drops = planned.clone();
+        for (i, along_m) in drops.along_m.iter_mut().enumerate() {
+            *along_m = (*along_m + step as f64 * DEEPER_M * share(i, last)).min(limits.reach_m);
+        }
+        if let Ok(tried) = try_it(needle, drops, pace, rehearser) {
+            return Ok((tried, false));
+        }
+    }
+    Err(why)
+}
+
+fn try_it(needle: &Needle, drops: Drops, pace: &Pace, rehearser: &mut dyn Rehearser) -> Result<Tried, String> {
+    let Rest { seeds_m, .. } = rehearser.rehearse(&drops, pace)?;
+    let off = |(rest, planned): (&[f64; 3], [f64; 3])| Vector3::from(*rest) - Vector3::from(planned);
+    Ok(Tried {
+        error_m: seeds_m.iter().zip(needle.seeds_m()).map(off).collect(),
+        drops,
+    })
+}
+
+fn next(needle: &Needle, last: &Tried, before: Option<&Tried>, share: f64, limits: &Limits) -> Drops {
+    let direction = Vector3::from(needle.direction);
+    let along = |t: &Tried, i: usize| t.error_m[i].dot(&direction);
+    let count = last.error_m.len();
+    let mut steps_m: Vec<f64> = (0..count)
+        .map(|i| {
+            let slope = before.map_or(1.0, |b| {
+                let moved_m = last.drops.along_m[i] - b.drops.along_m[i];
+                // What the error changed by is what the seed's rest did.
+                let rest_moved_m = along(last, i) - along(b, i);
+                let slope = if moved_m.abs() < LEAST_MOVE_M {
+                    1.0
+                } else {
+                    rest_moved_m / moved_m
+                };
+                slope.clamp(SLOPES[0], SLOPES[1])
+            });
+            -along(last, i) / slope * share
+        })
+        .collect();
+    if needle.loading != Loading::Loose {
+        let mean_m = steps_m.iter().sum::<f64>() / count.max(1) as f64;
+        steps_m.fill(mean_m);
+    }
+    let mut drops = last.drops.clone();
+    for ((along_m, step_m), planned) in drops.along_m.iter_mut().zip(&steps_m).zip(&needle.seeds) {
+        let [least, most] = [planned.along_m - limits.along_m, planned.along_m + limits.along_m];
+        *along_m = (*along_m + step_m).clamp(least.max(0.0), most.min(limits.reach_m).max(least.max(0.0)));
+    }
+    // Deepest first: a drop must not need the tip to go in again.
+    for i in 1..count {
+        drops.along_m[i] = drops.along_m[i].min(drops.along_m[i - 1] - APART_M);
+    }
+    aside(needle, last, share, limits, &mut drops);
+    drops
+}
+
+/// The needle as a whole moves across by what its seeds are off on average.
+fn aside(needle: &Needle, last: &Tried, share: f64, limits: &Limits, drops: &mut Drops) {
+    let direction = Vector3::from(needle.direction);
+    let sum = last.error_m.iter().fold(Vector3::zeros(), |sum, e| sum + e);
+    let mean = sum / last.error_m.len().max(1) as f64;
+    let across = mean - direction * mean.dot(&direction);
+    let shifted = Vector3::from(drops.entry_m) - across * share - Vector3::from(needle.entry_m);
+    let size = shifted.norm();
+    let kept = if size > limits.across_m {
+        shifted * (limits.across_m / size)
+    } else {
+        shifted
+    };
+    drops.entry_m = (Vector3::from(needle.entry_m) + kept).into();
+}
+
+/// Means and the worst: before, of the needles that can be done as planned; after, of all.
+pub fn summary_m(all: &[Compensation]) -> [[f64; 2]; 2] {
+    let figures = |errors: Vec<f64>| {
+        let mean = errors.iter().sum::<f64>() / errors.len().max(1) as f64;
+        [mean, errors.iter().copied().fold(0.0, f64::max)]
+    };
+    [
+        figures(all.iter().flat_map(Compensation::errors_before_m).collect()),
+        figures(all.iter().flat_map(Compensation::errors_after_m).collect()),
+    ]
+}
+
+#[cfg(test)]
+#[path = "compensate_tests.rs"]
+mod tests;

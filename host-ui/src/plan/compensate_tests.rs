@@ -1,0 +1,154 @@
+//! Compensation in tissues of known motion: what must come out is known without a rehearsal.
+
+use super::*;
+use crate::plan::NeedleSeed;
+
+/// Tissue lies so far ahead, by a law of the drop's place along the needle; seeds are off so far across.
+struct Known<F> {
+    ahead_m: F,
+    across_m: [f64; 3],
+    /// Before and beyond this the tip is outside.
+    tissue_from_m: f64,
+    tissue_to_m: f64,
+    asked: usize,
+}
+
+impl<F: Fn(f64) -> f64> Rehearser for Known<F> {
+    fn rehearse(&mut self, drops: &Drops, _: &Pace) -> Result<Rest, String> {
+        self.asked += 1;
+        if drops
+            .along_m
+            .iter()
+            .any(|&z| z > self.tissue_to_m || z < self.tissue_from_m)
+        {
+            return Err("the tip is outside the tissue".to_owned());
+        }
+        let rest = |&z: &f64| {
+            let p = drops.at_m(z - (self.ahead_m)(z));
+            [0, 1, 2].map(|a| p[a] + self.across_m[a])
+        };
+        Ok(Rest {
+            seeds_m: drops.along_m.iter().map(rest).collect(),
+            peak_force_n: 0.0,
+            displacement_before_puncture_m: 0.0,
+        })
+    }
+}
+
+fn needle(loading: Loading) -> Needle {
+    let seed = |along_m| NeedleSeed {
+        along_m,
+        strength_u: 0.5,
+    };
+    Needle {
+        hole: None,
+        entry_m: [0.01, 0.02, -0.01],
+        direction: [0.0, 0.0, 1.0],
+        depth_m: 0.05,
+        retract_to_m: 0.0,
+        loading,
+        seeds: [0.05, 0.04, 0.03].map(seed).to_vec(),
+    }
+}
+
+fn tissue<F: Fn(f64) -> f64>(ahead_m: F) -> Known<F> {
+    Known {
+        ahead_m,
+        across_m: [0.0; 3],
+        tissue_from_m: 0.0,
+        tissue_to_m: 1.0,
+        asked: 0,
+    }
+}
+
+fn run(needle: &Needle, tissue: &mut dyn Rehearser) -> Compensation {
+    compensate(needle, &Pace::default(), &Limits::default(), tissue).expect("goes through")
+}
+
+#[test]
+fn in_tissue_that_moves_with_depth_every_seed_comes_to_rest_on_plan() {
+    // z - (2 mm + 0.1 z) = planned: the drop must be at (planned + 2 mm) / 0.9.
+    let mut known = tissue(|z| 2e-3 + 0.1 * z);
+    let done = run(&needle(Loading::Loose), &mut known);
+    for (drop, planned) in done.drops.along_m.iter().zip([0.05, 0.04, 0.03]) {
+        assert!((drop - (planned + 2e-3) / 0.9).abs() < 0.1e-3, "{drop} {planned}");
+    }
+    assert!(done.errors_before_m().all(|e| e > 4e-3) && done.errors_after_m().all(|e| e < 0.1e-3));
+    assert!(known.asked <= 4, "{} rehearsals", known.asked);
+}
+
+#[test]
+fn a_strand_takes_the_mean_and_keeps_its_pitch() {
+    let mut known = tissue(|z| 2e-3 + 0.1 * z);
+    let done = run(&needle(Loading::Stranded { spacer_m: 5.5e-3 }), &mut known);
+    let apart = done.drops.along_m[0] - done.drops.along_m[1];
+    assert!((apart - 0.01).abs() < 1e-12);
+    let mean: f64 = done.after_m.iter().map(|e| e[2]).sum::<f64>() / 3.0;
+    assert!(mean.abs() < 0.1e-3, "{mean}");
+    assert!(done.errors_after_m().fold(0.0, f64::max) < 1.1e-3);
+}
+
+#[test]
+fn a_needle_that_is_pushed_aside_is_aimed_beside_but_not_past_its_limit() {
+    let mut known = tissue(|_| 0.0);
+    known.across_m = [1e-3, 0.0, 0.0];
+    let done = run(&needle(Loading::Loose), &mut known);
+    assert!((done.drops.entry_m[0] - 0.009).abs() < 1e-5, "{:?}", done.drops.entry_m);
+    known.across_m = [5e-3, 0.0, 0.0];
+    let done = run(&needle(Loading::Loose), &mut known);
+    assert!(
+        (done.drops.entry_m[0] - 0.0085).abs() < 1e-9,
+        "{:?}",
+        done.drops.entry_m
+    );
+}
+
+#[test]
+fn limits_hold_and_what_cannot_be_had_is_approached() {
+    let mut known = tissue(|_| 20e-3);
+    let done = run(&needle(Loading::Loose), &mut known);
+    assert!(
+        done.drops
+            .along_m
+            .iter()
+            .zip([0.05, 0.04, 0.03])
+            .all(|(d, p)| d - p <= 15e-3 + 1e-12)
+    );
+    assert!(
+        done.errors_after_m().all(|e| (e - 5e-3).abs() < 1e-9),
+        "{:?}",
+        done.after_m
+    );
+
+    let mut shallow = tissue(|_| 4e-3);
+    shallow.tissue_to_m = 0.052;
+    let done = run(&needle(Loading::Loose), &mut shallow);
+    assert!(done.drops.along_m[0] <= 0.052);
+    let [mean_before, mean_after]: [f64; 2] = [done.errors_before_m().sum(), done.errors_after_m().sum()];
+    assert!(mean_after < mean_before);
+    // Tissue that begins beyond the plan's last drop: nothing can be done as planned, but deeper.
+    let mut ahead = tissue(|_| 4e-3);
+    ahead.tissue_from_m = 0.032;
+    let done = run(&needle(Loading::Loose), &mut ahead);
+    assert!(done.before_m.is_none());
+    assert!(done.errors_after_m().all(|e| e < 0.1e-3), "{:?}", done.after_m);
+    shallow.tissue_to_m = 0.01;
+    assert!(
+        compensate(
+            &needle(Loading::Loose),
+            &Pace::default(),
+            &Limits::default(),
+            &mut shallow
+        )
+        .is_err()
+    );
+}
+
+#[test]
+fn tissue_that_overshoots_does_not_send_the_drops_to_and_fro() {
+    // A slope of 1.9 at first sight, bent.
+    let mut known = tissue(|z| 3e-3 - 0.6 * (z - 0.04) + 40.0 * (z - 0.04).powi(2));
+    let done = run(&needle(Loading::Loose), &mut known);
+    let [[before, _], [after, _]] = summary_m(&[done]);
+    assert!(after < 0.1 * before, "{before} {after}");
+}

@@ -1,0 +1,147 @@
+//! Edits against what they say, undo against the plans that were, and checks against plans with one fault each.
+
+use super::*;
+use crate::plan::anatomy::ball;
+use crate::plan::check::problems;
+use crate::plan::{Anatomy, Template};
+
+const GLAND_M: [f64; 3] = [0.05, 0.05, 0.06];
+
+fn anatomy() -> Anatomy {
+    Anatomy {
+        target: ball("gland", GLAND_M, [0.024, 0.02, 0.02]),
+        spared: vec![ball("urethra", GLAND_M, [0.003, 0.003, 0.025])],
+        lower_m: [0.0; 3],
+        upper_m: [0.1; 3],
+        patient_from_scene: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+    }
+}
+
+fn empty() -> ImplantPlan {
+    ImplantPlan {
+        template: Template {
+            middle_m: [0.05, 0.05, -0.01],
+            columns: [-1.0, 0.0, 0.0],
+            rows: [0.0, 1.0, 0.0],
+            inwards: [0.0, 0.0, 1.0],
+            pitch_m: 5e-3,
+        },
+        source: "6711".to_owned(),
+        prescription_gy: 145.0,
+        needles: Vec::new(),
+    }
+}
+
+fn hole(name: &str) -> Hole {
+    name.parse().expect("a hole")
+}
+
+/// Two needles beside the urethra, three seeds each.
+fn good() -> ImplantPlan {
+    let plan = empty().with_needle(hole("E7"), 0.08).unwrap();
+    let plan = plan.with_strand(0, 3, 0.08, 0.5).unwrap();
+    let plan = plan.with_needle(hole("I7"), 0.08).unwrap();
+    let plan = plan.with_seed(1, 0.06, 0.5).unwrap();
+    let plan = plan.with_seed(1, 0.08, 0.5).unwrap();
+    plan.with_seed(1, 0.07, 0.5).unwrap()
+}
+
+#[test]
+fn a_good_plan_has_no_problem_and_its_seeds_are_where_they_were_put() {
+    let plan = good();
+    assert_eq!(problems(&plan, &anatomy()), Vec::new());
+    let z: Vec<f64> = plan.seeds().iter().map(|s| s.position_m[2]).collect();
+    for (found, expected) in z.iter().zip([0.07, 0.06, 0.05, 0.07, 0.06, 0.05]) {
+        assert!((found - expected).abs() < 1e-12, "{z:?}");
+    }
+    assert!((plan.seeds()[0].position_m[0] - 0.06).abs() < 1e-12);
+    assert_eq!(plan.seeds()[0].axis, Some([0.0, 0.0, 1.0]));
+}
+
+#[test]
+fn each_fault_is_told_once_and_all_together() {
+    let anatomy = anatomy();
+    let one = |plan: ImplantPlan, words: &str| {
+        let found = problems(&plan, &anatomy);
+        assert_eq!(found.len(), 1, "{words}: {found:?}");
+        assert!(found[0].to_string().contains(words), "{words}: {}", found[0]);
+    };
+    one(empty(), "no needle");
+    one(good().with_seed(1, 0.0575, 0.5).unwrap(), "nearer than its length");
+    one(good().with_seed(1, 0.04, 0.5).unwrap(), "outside gland");
+    one(good().with_seed(1, 0.065, 20.0).unwrap(), "20 U");
+    one(good().with_needle(hole("E8"), 0.05).unwrap(), "no seed");
+    let through = good()
+        .with_needle(hole("G7"), 0.05)
+        .unwrap()
+        .with_seed(2, 0.055, 0.5)
+        .unwrap();
+    one(through, "goes through urethra");
+    let mut broken = good();
+    broken.needles[0].seeds[1].along_m += 1e-3;
+    one(broken, "strand");
+    let mut deep = good();
+    deep.needles[1].depth_m = 0.25;
+    one(deep, "reaches 200 mm");
+    let mut twice = good();
+    twice.needles[1].hole = Some(hole("E7"));
+    one(twice, "the hole of needle 1");
+    let mut beside = good();
+    beside.needles[1].entry_m = beside.needles[0].entry_m;
+    assert_eq!(problems(&beside, &anatomy).len(), 3, "each seed lies on another");
+
+    let mut wrong = good().with_strength(f64::NAN);
+    wrong.needles[0].direction = [0.0; 3];
+    assert!(problems(&wrong, &anatomy).len() >= 4);
+}
+
+#[test]
+fn a_strand_moves_as_one_and_gives_up_its_ends_only() {
+    let plan = good();
+    let moved = plan.with_seed_at(0, 1, 0.072).unwrap();
+    let along = |p: &ImplantPlan| p.needles[0].seeds.iter().map(|s| s.along_m).collect::<Vec<_>>();
+    for (a, b) in along(&moved).iter().zip([0.082, 0.072, 0.062]) {
+        assert!((a - b).abs() < 1e-12);
+    }
+    assert!(
+        (moved.needles[0].depth_m - 0.082).abs() < 1e-12,
+        "the tip goes as deep as the deepest seed"
+    );
+    assert!(plan.without_seed(0, 1).is_err());
+    assert_eq!(plan.without_seed(0, 0).unwrap().needles[0].seeds.len(), 2);
+    let loose = plan.with_loose_seeds(0).unwrap().with_seed_at(0, 1, 0.072).unwrap();
+    assert!((along(&loose)[0] - 0.08).abs() < 1e-12 && (along(&loose)[1] - 0.072).abs() < 1e-12);
+}
+
+#[test]
+fn a_hole_takes_one_needle() {
+    let plan = good();
+    assert!(plan.with_needle(hole("E7"), 0.05).is_err());
+    assert!(plan.with_needle_at(0, hole("I7")).is_err());
+    let moved = plan.with_needle_at(0, hole("E9")).unwrap();
+    assert!((moved.seeds()[0].position_m[1] - 0.06).abs() < 1e-12);
+    assert!(plan.without_needle(2).is_err());
+}
+
+#[test]
+fn undo_gives_back_each_plan_and_redo_the_next() {
+    let plans = [
+        empty(),
+        empty().with_needle(hole("E7"), 0.08).unwrap(),
+        good(),
+        good().with_strength(0.4),
+    ];
+    let mut history = History::new(plans[0].clone());
+    plans.iter().for_each(|p| history.put(p.clone()));
+    for plan in plans[..3].iter().rev() {
+        assert!(history.undo());
+        assert_eq!(history.plan(), plan);
+    }
+    assert!(!history.undo());
+    assert!(history.redo());
+    assert_eq!(history.plan(), &plans[1]);
+    history.put(good());
+    assert!(!history.redo(), "a new plan forgets those that were taken back");
+    assert!(history.undo());
+    assert_eq!(history.plan(), &plans[1]);
+}

@@ -1,0 +1,49 @@
+//! A score as JSON and as a page.
+
+use super::{Score, page};
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// Every figure of a score; lengths in mm, patient frame (RAS) for places.
+pub fn to_json(score: &Score) -> Value {
+    let i = &score.implant;
+    let frames = crate::plan::file::Frames::new(&i.anatomy.patient_from_scene);
+    let ras_mm = |p: [f64; 3]| frames.to_patient_m(p).map(|c| c * 1e3);
+    let [mean, worst] = score.errors_m();
+    let seed = |(pair, cost): (&super::SeedPair, &super::Cost)| {
+        json!({
+            "needle": pair.needle + 1, "hole": pair.hole.map(|h| h.to_string()), "strength_u": pair.planned.strength_u,
+            "planned_ras_mm": ras_mm(pair.planned.position_m), "delivered_ras_mm": ras_mm(pair.delivered.position_m),
+            "axis_ras": pair.delivered.axis.map(|a| frames.turned_to_patient(a)),
+            "error_mm": pair.error_m() * 1e3, "error_along_mm": pair.error_along_m() * 1e3,
+            "error_across_mm": pair.error_across_m() * 1e3,
+            "cost": {
+                "target_d90_gy": cost.target_d90_gy, "target_v100_percent": cost.target_v100_percent,
+                "urethra_d10_gy": cost.urethra_d10_gy, "urethra_d30_gy": cost.urethra_d30_gy,
+            },
+        })
+    };
+    let m = &score.motion;
+    json!({
+        "title": i.title, "source": i.source, "prescription_gy": i.prescription_gy,
+        "seeds_planned": i.pairs.len() + i.lost.len(), "seeds_lost": i.lost.len(),
+        "mean_error_mm": mean * 1e3, "worst_error_mm": worst * 1e3,
+        "planned": score.judge.to_json(&score.planned),
+        "delivered": score.judge.to_json(&score.delivered),
+        "cost_is": "gain if this seed alone lay on plan: D90 and V100 lost, dose to the urethra saved",
+        "seeds": i.pairs.iter().zip(&score.costs).map(seed).collect::<Vec<_>>(),
+        "motion": {
+            "duration_s": m.duration_s, "in_tissue_s": m.in_tissue_s,
+            "mean_insertion_mm_s": m.mean_insertion_m_per_s * 1e3, "peak_insertion_mm_s": m.peak_insertion_m_per_s * 1e3,
+            "peak_force_n": m.peak_force_n, "insertions": m.insertions, "reinsertions": m.reinsertions,
+        },
+    })
+}
+
+/// `score.json` and `debrief.html` in a folder that is there.
+pub fn write(score: &Score, folder: &Path) -> Result<(), String> {
+    let told = |e: std::io::Error| format!("{} cannot be written ({e})", folder.display());
+    let json = serde_json::to_string_pretty(&to_json(score)).map_err(|e| e.to_string())?;
+    std::fs::write(folder.join("score.json"), json + "\n").map_err(told)?;
+    std::fs::write(folder.join("debrief.html"), page::page(score)?).map_err(told)
+}

@@ -1,0 +1,87 @@
+//! Rehearsals against what must hold of them: the same bytes twice, seeds at rest where the tissue was, and errors in words.
+
+use super::*;
+use std::sync::atomic::AtomicBool;
+use stylet_shm_schema::ParameterId;
+
+fn stage() -> Stage {
+    let source = SceneSource::Builtin("paper".to_owned());
+    Stage::build(&source, TissueKind::ChainMail, DeviceInfo::phantom_premium_1_5()).expect("built in")
+}
+
+/// Along the middle of the paper's gland.
+fn needle() -> NeedleRun {
+    let scene = crate::scene::Scene::builtin("paper").unwrap();
+    let (low, high) = scene.lattice.bounds_m();
+    let (x, y) = ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0);
+    let at = |share: f64| Vector3::new(x, y, low[2] + share * (high[2] - low[2]));
+    NeedleRun {
+        entry_m: Vector3::new(x, y, low[2] - 0.01),
+        direction: Vector3::z(),
+        insert_m_per_s: 0.05,
+        retract_m_per_s: 0.05,
+        approach_m_per_s: 0.1,
+        acceleration_m_per_s2: 2.0,
+        retract_to_m: 0.0,
+        drops_m: [0.8, 0.5, 0.2].map(at).to_vec(),
+    }
+}
+
+#[test]
+fn a_rehearsal_leaves_its_seeds_off_plan_and_repeats_to_the_last_bit() {
+    let (mut stage, run, stop) = (stage(), needle(), AtomicBool::new(false));
+    let set = ParameterSet::default();
+    let first = stage.rehearse(&run, &set, &stop).expect("goes through");
+    let (second, ns) = timed(|| stage.rehearse(&run, &set, &stop).expect("goes through"));
+    assert_eq!(first, second);
+    println!(
+        "{:.1} s in {:.3} s: {:?} N",
+        first.simulated_s,
+        ns as f64 * 1e-9,
+        first.peak_force_n
+    );
+    assert_eq!(first.seeds.len(), 3);
+    assert!(first.displacement_before_puncture_m > 2e-3 && first.peak_force_n > 3.0);
+    for (seed, drop) in first.seeds.iter().zip(&run.drops_m) {
+        let off = Vector3::from(seed.position_m) - drop;
+        println!("{:?} mm", off * 1e3);
+        assert!(off.norm() > 0.1e-3 && off.norm() < 10e-3, "{off:?}");
+        assert!((Vector3::from(seed.dropped_at_m) - drop).norm() < 0.5e-3);
+    }
+}
+
+#[test]
+fn tissue_that_sticks_less_leaves_seeds_nearer_to_plan() {
+    let (mut stage, run, stop) = (stage(), needle(), AtomicBool::new(false));
+    let mut loose = ParameterSet::default();
+    loose.set(ParameterId::DepthCoefficient, 1e-8);
+    loose.set(ParameterId::PunctureDepth, 1e-3);
+    loose.set(ParameterId::MembranePeak, 0.5);
+    let error = |r: &Rehearsed| {
+        let off = r
+            .seeds
+            .iter()
+            .zip(&run.drops_m)
+            .map(|(s, d)| (Vector3::from(s.position_m) - d).norm());
+        off.sum::<f64>() / 3.0
+    };
+    let usual = error(&stage.rehearse(&run, &ParameterSet::default(), &stop).unwrap());
+    let less = error(&stage.rehearse(&run, &loose, &stop).unwrap());
+    assert!(less < 0.5 * usual, "{less} {usual}");
+}
+
+#[test]
+fn a_drop_outside_the_tissue_and_a_stop_are_told_and_leave_the_stage_usable() {
+    let (mut stage, mut run, stop) = (stage(), needle(), AtomicBool::new(false));
+    let set = ParameterSet::default();
+    run.drops_m = vec![run.entry_m + run.direction * 1e-3];
+    assert!(
+        stage
+            .rehearse(&run, &set, &stop)
+            .is_err_and(|e| e.contains("outside the tissue"))
+    );
+    stop.store(true, Ordering::Relaxed);
+    assert!(stage.rehearse(&needle(), &set, &stop).is_err());
+    stop.store(false, Ordering::Relaxed);
+    assert!(stage.rehearse(&needle(), &set, &stop).is_ok());
+}

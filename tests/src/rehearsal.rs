@@ -1,0 +1,75 @@
+//! Rehearsals without processes: the core's own, called from the host's planner.
+
+use host_ui::link::SceneModel;
+use host_ui::plan::rehearse::{Drops, Rehearser, Rest};
+use host_ui::workflow::Pace;
+use nalgebra::Vector3;
+use rt_core::bridge::ScenePicture;
+use rt_core::rehearse::{NeedleRun, Stage};
+use rt_core::scene::{Labels, Scene, SceneSource};
+use rt_core::tissue::TissueKind;
+use std::sync::atomic::AtomicBool;
+use stylet_hw::DeviceInfo;
+use stylet_shm_schema::ParameterSet;
+
+/// A scene with a body to rehearse in, and what a host would see of it.
+pub struct Theatre {
+    pub scene: SceneModel,
+    stage: Stage,
+    pub rehearsals: usize,
+}
+
+impl Theatre {
+    pub fn builtin(name: &str) -> Self {
+        let scene = Scene::builtin(name).expect("built in");
+        Self::of(&scene, &SceneSource::Builtin(name.to_owned()))
+    }
+
+    pub fn of_labels(name: &str, labels: &Labels) -> Self {
+        let scene = Scene::from_labels(name, labels).expect("labels of a test are valid");
+        Self::of(&scene, &SceneSource::of_labels(name, labels))
+    }
+
+    fn of(scene: &Scene, source: &SceneSource) -> Self {
+        let picture = ScenePicture::first(scene, 1);
+        let (header, words) = picture.parts();
+        let (positions, indices) = words.split_at(3 * header.vertex_count as usize);
+        let device = DeviceInfo::phantom_premium_1_5();
+        Self {
+            scene: SceneModel {
+                header: *header,
+                rest_m: positions
+                    .chunks_exact(3)
+                    .map(|w| [0, 1, 2].map(|a| f32::from_bits(w[a])))
+                    .collect(),
+                triangles: indices.chunks_exact(3).map(|w| [w[0], w[1], w[2]]).collect(),
+            },
+            stage: Stage::build(source, TissueKind::ChainMail, device).expect("the scene was built before"),
+            rehearsals: 0,
+        }
+    }
+}
+
+impl Rehearser for Theatre {
+    fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, String> {
+        self.rehearsals += 1;
+        let run = NeedleRun {
+            entry_m: drops.entry_m.into(),
+            direction: drops.direction.into(),
+            insert_m_per_s: pace.insert_m_per_s,
+            retract_m_per_s: pace.retract_m_per_s,
+            approach_m_per_s: pace.approach_m_per_s,
+            acceleration_m_per_s2: pace.acceleration_m_per_s2,
+            retract_to_m: drops.retract_to_m,
+            drops_m: drops.drops_m().map(Vector3::from).collect(),
+        };
+        let done = self
+            .stage
+            .rehearse(&run, &ParameterSet::default(), &AtomicBool::new(false))?;
+        Ok(Rest {
+            seeds_m: done.seeds.iter().map(|s| s.position_m).collect(),
+            peak_force_n: done.peak_force_n,
+            displacement_before_puncture_m: done.displacement_before_puncture_m,
+        })
+    }
+}
