@@ -3,14 +3,17 @@
 pub mod app;
 pub mod cli;
 pub mod dose;
+pub mod dose_desk;
 pub mod files;
 pub mod format;
 pub mod keyboard;
 pub mod link;
 mod loader;
 pub mod panel;
+mod picture;
 pub mod procedure;
 pub mod record;
+pub mod settings;
 pub mod theme;
 pub mod view;
 pub mod workflow;

@@ -1,8 +1,8 @@
 //! What a reader verifies before it uses a value that came out of shared memory.
 
 use crate::{
-    GridInfo, HapticState, MAX_LABEL_CELLS, MAX_NODES, MAX_SEEDS, MAX_STRUCTURES, ParametersInForce, PlanInForce, SceneHeader, SnapshotHeader, TickRecord,
-    Vertex,
+    GridInfo, HapticState, MAX_LABEL_CELLS, MAX_NODES, MAX_SEEDS, MAX_STRUCTURES, ParametersInForce, PlanInForce,
+    SceneHeader, SnapshotHeader, TickRecord, Vertex,
 };
 
 /// Why a value was not believed.

@@ -39,7 +39,10 @@ pub use params::{
 };
 pub use plan::{MAX_SEEDS, PlanInForce, PlannedSeed};
 pub use record::TickRecord;
-pub use scene::{BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, StructureInfo, UploadHeader, UploadStructure, role};
+pub use scene::{
+    BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, StructureInfo, UploadHeader,
+    UploadStructure, role,
+};
 pub use session::{Session, ThreadReport};
 pub use snapshot::{SeedPose, SnapshotHeader, Vertex};
 pub use state::{Fault, HapticState, Phase, flags};

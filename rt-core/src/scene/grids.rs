@@ -25,7 +25,9 @@ impl Steps {
         let cells = [0, 1, 2].map(|a| high[a].saturating_sub(low[a]).max(1));
         let dims_at = |stride: usize| cells.map(|n| (n - 1).div_ceil(stride) + 1);
         let fits = |stride: &usize| dims_at(*stride).iter().product::<usize>() <= most;
-        let stride = (1..=super::MAX_CELLS_PER_AXIS).find(fits).unwrap_or(super::MAX_CELLS_PER_AXIS);
+        let stride = (1..=super::MAX_CELLS_PER_AXIS)
+            .find(fits)
+            .unwrap_or(super::MAX_CELLS_PER_AXIS);
         Self {
             low,
             dims: dims_at(stride),
@@ -130,8 +132,15 @@ mod tests {
             let lattice = Scene::builtin(name).expect("built in").lattice;
             let grid = NodeGrid::of(&lattice);
             let count = grid.info.node_count().expect("sane");
-            println!("{name}: {:?} nodes, {:.2} mm", grid.info.dims, grid.info.spacing_m * 1e3);
-            assert!(count == grid.elements.len() && (1000..=MAX_NODES).contains(&count), "{count}");
+            println!(
+                "{name}: {:?} nodes, {:.2} mm",
+                grid.info.dims,
+                grid.info.spacing_m * 1e3
+            );
+            assert!(
+                count == grid.elements.len() && (1000..=MAX_NODES).contains(&count),
+                "{count}"
+            );
             let [nx, ny, _] = grid.info.dims.map(|d| d as usize);
             for (n, &element) in grid.elements.iter().enumerate() {
                 let at = [n % nx, n / nx % ny, n / nx / ny];

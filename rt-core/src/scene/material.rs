@@ -41,10 +41,15 @@ pub(super) fn problems_of(structure: &Structure) -> Vec<SceneProblem> {
 /// Three links that meet in a corner may be of three structures: the widest angle along each axis must not fold it.
 /// Structures under the operator's limits are not counted; those are not known here.
 pub(super) fn folding_between(structures: &[Structure]) -> Option<SceneProblem> {
-    let own = structures.iter().filter(|s| !s.material.fixed).filter_map(|s| s.material.limits.as_ref());
+    let own = structures
+        .iter()
+        .filter(|s| !s.material.fixed)
+        .filter_map(|s| s.material.limits.as_ref());
     let angles: Vec<[f64; 3]> = own.map(|l| l.each_ref().map(|axis| axis.shear_deg)).collect();
     let widest = [0, 1, 2].map(|a| angles.iter().map(|angle| angle[a]).fold(0.0, f64::max));
-    let each_is_told = angles.iter().any(|&angle| folding(angle).is_nan() || folding(angle) > 1.0);
+    let each_is_told = angles
+        .iter()
+        .any(|&angle| folding(angle).is_nan() || folding(angle) > 1.0);
     (!each_is_told && folding(widest) > 1.0).then(|| SceneProblem::Material {
         structure: "all structures together".to_owned(),
         what: "tx ty + ty tz + tz tx + 2 tx ty tz of the widest shear_deg along each axis".to_owned(),

@@ -137,10 +137,7 @@ fn limits_that_are_none_or_fold_cells_are_refused() {
         (limits(0.55, f64::INFINITY, 20.0), &["max_stretch along x is inf"]),
         (limits(0.55, 1.75, f64::NAN), &["shear_deg along x is NaN"]),
         (limits(0.55, 1.75, -1.0), &["shear_deg along x is -1"]),
-        (
-            limits(0.55, 1.75, 64.0),
-            &["eq. 1 in three dimensions"],
-        ),
+        (limits(0.55, 1.75, 64.0), &["eq. 1 in three dimensions"]),
         (limits(0.55, 1.75, 30.0), &["eq. 1 in three dimensions"]),
     ] {
         let text = text_of(refusal(&with_material(|m| m.limits = Some([x, paper, paper]))));

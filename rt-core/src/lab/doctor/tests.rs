@@ -419,7 +419,10 @@ fn what_the_driver_lacks_is_told_and_weighs_more_where_a_device_is_connected() {
     let ecp = || Fake::new().with("proc/sys/dev/parport/parport0/modes", "PCSPP,TRISTATE,ECP\n");
     let port = |fake: &Fake| {
         let found = devices::driver(&Machine::at(&fake.0), &nobody());
-        found.into_iter().find(|f| f.what.contains("without EPP")).expect("told")
+        found
+            .into_iter()
+            .find(|f| f.what.contains("without EPP"))
+            .expect("told")
     };
     expect(&port(&ecp()), Severity::Note, "without EPP");
     let connected = ecp().with("sys/bus/usb/devices/1-2/idVendor", "2988\n");
