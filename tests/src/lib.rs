@@ -3,6 +3,7 @@
 pub mod hand;
 pub mod phantom;
 pub mod stopped;
+pub mod window;
 
 use host_ui::link::{Link, LinkStatus};
 use std::path::PathBuf;

@@ -4,7 +4,7 @@ use super::history::{BINS, History, Percentiles, Tick, WINDOW_S, bin_low_us};
 use super::{Shown, setup};
 use crate::{format, theme};
 use egui::{Color32, RichText};
-use egui_plot::{Bar, BarChart, GridMark, Line, Plot, PlotPoints};
+use egui_plot::{AxisHints, Bar, BarChart, GridMark, Line, Plot, PlotPoints};
 
 const PLOT_HEIGHT: f32 = 86.0;
 
@@ -103,7 +103,7 @@ fn plot(name: &str) -> Plot<'static> {
         .allow_boxed_zoom(false)
         .allow_axis_zoom_drag(false)
         .show_x(false)
-        .y_axis_min_width(34.0)
+        .custom_y_axes(vec![AxisHints::new_y().min_thickness(34.0).label_spacing(12.0..=20.0)])
         .show_background(true)
         .set_margin_fraction(egui::vec2(0.0, 0.08))
 }
@@ -161,6 +161,7 @@ fn decade(us: f64) -> String {
 }
 
 fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
+    ui.spacing_mut().interact_size.y = 14.0;
     egui::Grid::new("timing")
         .num_columns(5)
         .min_col_width(48.0)

@@ -8,6 +8,8 @@ use stylet_shm_schema::ThreadReport;
 
 pub fn setup_ui(ui: &mut egui::Ui, shown: &Shown) {
     ui.separator();
+    // Lines of words need less room than widgets.
+    ui.spacing_mut().interact_size.y = 14.0;
     egui::Grid::new("set-up")
         .num_columns(2)
         .spacing([10.0, 1.0])
@@ -20,6 +22,7 @@ pub fn setup_ui(ui: &mut egui::Ui, shown: &Shown) {
                 ui.end_row();
             };
             if let Some(session) = &shown.session {
+                row("device", session.device.read(), true);
                 row("force loop", thread(&session.haptic), session.haptic.is_fifo());
                 row("tissue loop", thread(&session.tissue), session.tissue.is_fifo());
                 let locked = session.memory_locked != 0;

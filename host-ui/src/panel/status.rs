@@ -253,12 +253,6 @@ fn link_ui(ui: &mut egui::Ui, shown: &Shown) {
         };
         badge(ui, word, color);
     }
-    if let Some(session) = &shown.session {
-        let device = session.device.read();
-        let short = format!("{:04x}", session.session_id & 0xffff);
-        let text = theme::weak(format!("{device}, session {short}"));
-        ui.add(egui::Label::new(text).truncate());
-    }
 }
 
 fn badge(ui: &mut egui::Ui, word: &str, color: Color32) -> egui::Response {

@@ -30,7 +30,7 @@ impl Camera {
             target_m,
             yaw_rad: 0.5,
             pitch_rad: 0.32,
-            distance_m: (radius_m * 5.2).clamp(NEAREST_M, FARTHEST_M),
+            distance_m: (radius_m * 4.7).clamp(NEAREST_M, FARTHEST_M),
         }
     }
 

@@ -1,7 +1,7 @@
 //! What stands in the middle of the window: the three-dimensional picture, the slices, and the tools over them.
 
 use super::scene3d::{Preset, Scene3d};
-use super::slice::{Orientation, Slices};
+use super::slice::{Orientation, Plane, Slices};
 use super::state::ViewState;
 use crate::dose_desk::DosePicture;
 use crate::link::{SceneModel, Snapshot};
@@ -9,7 +9,7 @@ use crate::panel::{Action, Shown};
 use crate::settings::Layout;
 use crate::theme;
 use eframe::egui_wgpu::RenderState;
-use egui::{Pos2, Rect, Vec2};
+use egui::{Pos2, Rect};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -53,6 +53,11 @@ impl Middle {
         }
     }
 
+    /// The plane that a slice at this place of the window shows.
+    pub fn plane(&self, orientation: Orientation, rect: Rect) -> Plane {
+        self.slices.plane(orientation, &self.view, rect)
+    }
+
     pub fn reset_view(&mut self, shown: &Shown) {
         self.solid.reset_view(shown);
         self.slices.reset_view(shown);
@@ -70,11 +75,12 @@ impl Middle {
         let tools = egui::Frame::new()
             .fill(tokens.panel)
             .inner_margin(egui::Margin::symmetric(8, 4));
+        let spacing = std::mem::take(&mut ui.spacing_mut().item_spacing);
         tools.show(ui, |ui| {
+            ui.spacing_mut().item_spacing = spacing;
             ui.set_min_width(ui.available_width());
             ui.horizontal(|ui| self.tools_ui(ui, layout, shown, &mut actions));
         });
-        ui.spacing_mut().item_spacing = Vec2::ZERO;
         let rect = ui.available_rect_before_wrap();
         ui.advance_cursor_after_rect(rect);
         let places = places(rect, layout);
@@ -200,6 +206,7 @@ fn places(rect: Rect, layout: Layout) -> Places {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use egui::Vec2;
 
     #[test]
     fn pictures_lie_in_the_window_and_not_over_each_other() {

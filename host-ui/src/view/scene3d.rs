@@ -24,6 +24,8 @@ const LIGHT: [f32; 4] = [-0.48, 0.78, -0.40, 0.0];
 const TEMPLATE_BEFORE_M: f32 = 0.01;
 /// The needle's own view is from so far behind the tip.
 const NEEDLE_VIEW_M: f32 = 0.06;
+/// A picture wider than this has room for words about doses.
+const ALONE: f32 = 500.0;
 /// Opacity of isodose surfaces.
 const SHELL: f32 = 0.30;
 
@@ -222,7 +224,9 @@ impl Scene3d {
                 };
                 legend.landmarks(self.corner_m, view);
                 legend.scale_bar();
-                legend.rows(self.look, dose.map(|d| &**d));
+                // Beside the slices these tell the levels already.
+                let alone = dose.filter(|_| rect.width() > ALONE);
+                legend.rows(self.look, alone.map(|d| &**d));
             }
             None => {
                 let text = "No 3D view: the window has no wgpu device.\nInstall a Vulkan driver (mesa-vulkan-drivers)\nand start again; everything else works.";

@@ -125,6 +125,7 @@ pub fn label_grid(lattice: &Lattice) -> (GridInfo, Vec<u8>) {
 mod tests {
     use super::*;
     use crate::scene::Scene;
+    use crate::tissue::{ChainMailTissue, Held, TissueModel, TissueParameters};
 
     #[test]
     fn every_node_speaks_for_the_nearest_element_and_bounds_hold() {
@@ -152,6 +153,55 @@ mod tests {
                     assert_eq!(element, here, "a node in tissue speaks for the element it lies in");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn nodes_tell_how_far_their_elements_have_moved() {
+        let scene = Scene::builtin("paper").expect("built in");
+        let limits = TissueParameters::default().validate().expect("defaults");
+        let mut tissue = ChainMailTissue::new(&scene, limits);
+        let element = scene.nodes.elements[scene.nodes.elements.len() / 2];
+        let rest = scene.lattice.rest_m(element);
+        let held = Held {
+            element,
+            position_m: [rest[0] + 2e-3, rest[1], rest[2] + 6e-3],
+            patch_m: 0.0,
+        };
+        tissue.step(Some(held), 5e-3);
+        let body = tissue.deformed();
+        let mut told = vec![[f32::NAN; 3]; scene.nodes.elements.len()];
+        body.write_displacements(&scene.nodes.elements, &mut told);
+        for (told, &element) in told.iter().zip(&scene.nodes.elements) {
+            let (now, rest) = (body.position_m(element), scene.lattice.rest_m(element));
+            for a in 0..3 {
+                assert!((f64::from(told[a]) - (now[a] - rest[a])).abs() < 1e-8);
+            }
+        }
+        assert!(told.iter().any(|u| u[2] > 4e-3), "the body has moved");
+    }
+
+    /// `cargo test --release -p rt-core --lib times_of_telling -- --ignored --nocapture`
+    #[test]
+    #[ignore = "a measurement"]
+    fn times_of_telling() {
+        for name in stylet_shm_schema::BUILTIN_SCENES {
+            let scene = Scene::builtin(name).expect("built in");
+            let limits = TissueParameters::default().validate().expect("defaults");
+            let mut tissue = ChainMailTissue::new(&scene, limits);
+            let mut told = vec![[0.0; 3]; scene.nodes.elements.len()];
+            let mut times_us: Vec<f64> = (0..1000)
+                .map(|_| {
+                    // As in the loop, other memory is touched in between.
+                    tissue.step(None, 5e-3);
+                    let body = tissue.deformed();
+                    let start = std::time::Instant::now();
+                    body.write_displacements(&scene.nodes.elements, &mut told);
+                    start.elapsed().as_secs_f64() * 1e6
+                })
+                .collect();
+            times_us.sort_by(f64::total_cmp);
+            println!("{name}: {} nodes, p50 {:.1} us, p99 {:.1} us", told.len(), times_us[500], times_us[990]);
         }
     }
 

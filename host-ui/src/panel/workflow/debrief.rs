@@ -23,6 +23,7 @@ pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown) {
         "{} seeds of I-125 6711 against {:.0} Gy",
         dose.seeds, dose.prescription_gy
     )));
+    ui.spacing_mut().interact_size.y = 16.0;
     egui::Grid::new("dose")
         .num_columns(4)
         .striped(true)
@@ -97,6 +98,7 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown) {
         .id_salt("seed errors")
         .max_height(TABLE_HEIGHT)
         .show(ui, |ui| {
+            ui.spacing_mut().interact_size.y = 16.0;
             egui::Grid::new("seed errors")
                 .num_columns(4)
                 .striped(true)

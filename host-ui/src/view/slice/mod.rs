@@ -1,7 +1,7 @@
 //! Three orthogonal slices through the deformed body that look like ultrasound, and what is drawn over them.
 
 mod cut;
-mod field;
+pub mod field;
 mod gpu;
 mod overlay;
 mod plane;
@@ -170,6 +170,10 @@ impl Slices {
         let action = self.steer(&response, &plane, shown, view);
         let painter = ui.painter_at(rect);
         painter.rect_filled(rect, 0.0, IMAGE.ground);
+        if shown.scene.is_none() {
+            overlay::words(&painter, rect, &format!("{}: no scene yet", orientation.name()));
+            return None;
+        }
         let scale = ui.ctx().pixels_per_point();
         let number = orientation as usize;
         match self.gpu.as_mut().and_then(|gpu| gpu.picture(number, &plane, scale)) {
@@ -177,14 +181,13 @@ impl Slices {
                 let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
                 painter.image(texture, rect, whole, Color32::WHITE);
             }
-            None if shown.scene.is_some() => {
+            None => {
                 overlay::words(
                     &painter,
                     rect,
                     "No slice: no wgpu device, or the scene is too large for it",
                 );
             }
-            None => {}
         }
         let dose = dose.filter(|_| view.isodose);
         self.lines[number].update(&plane, (&self.positions_m, self.moved), &self.contours, dose);
