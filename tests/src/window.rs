@@ -4,8 +4,13 @@ use crate::{Core, scratch};
 use egui_kittest::kittest::{NodeT, Queryable, by};
 use egui_kittest::{Harness, SnapshotOptions, image_snapshot_options};
 use host_ui::app::{App, Options};
+use host_ui::view::slice::Orientation;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::flags;
+
+pub fn is_at_rest(app: &App) -> bool {
+    app.link().state().is_some_and(|s| s.speed_m_per_s.abs() < 1e-3)
+}
 
 pub struct Driven {
     pub window: Harness<'static, App>,
@@ -70,6 +75,29 @@ impl Driven {
         self.window.run_steps(2);
     }
 
+    /// A hand takes the tip in the sagittal slice and draws it on.
+    pub fn pull_tip(&mut self, ahead_m: f64) {
+        let at = |driven: &Self, ahead_m: f64| {
+            let app = driven.window.state();
+            let rect = driven.window.get_by_label("Sagittal slice").rect();
+            let plane = app.middle().plane(Orientation::Sagittal, rect);
+            let state = app.link().state().expect("live");
+            let place = [0, 1, 2].map(|a| state.tip_in_scene_m[a] + state.needle_direction[a] * ahead_m);
+            plane.on_screen(place.into())
+        };
+        let (from, to) = (at(self, 0.0), at(self, ahead_m));
+        self.window.drag_at(from);
+        self.window.run_steps(2);
+        for _ in 0..80 {
+            self.window.hover_at(to);
+            self.window.run_steps(1);
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        self.window.drop_at(to);
+        self.window.run_steps(2);
+        self.until("rest", is_at_rest);
+    }
+
     pub fn picture(&mut self, name: &str) -> image::RgbaImage {
         self.window.run_steps(3);
         let picture = self.window.render().expect("a picture");
@@ -82,7 +110,7 @@ impl Driven {
     /// Compares with the picture that is kept; what lives is covered: figures at the top and the plots.
     pub fn compare(&mut self, name: &str) {
         self.window.run_steps(3);
-        let size = self.window.root().rect().size();
+        let size = self.window.ctx.content_rect().size();
         let cover = |from: [f32; 2], to: [f32; 2]| egui::Rect::from_min_max(from.into(), to.into());
         self.window.mask(cover([120.0, 0.0], [size.x - 250.0, 33.0]));
         self.window.mask(cover([size.x - 330.0, 40.0], [size.x, size.y]));
@@ -126,8 +154,14 @@ pub fn keep_for_docs(picture: &image::RgbaImage, name: &str) {
 /// Words and widgets that lie outside the window, and pairs that lie over each other.
 pub fn misplaced(window: &Harness<'_, App>) -> Vec<String> {
     use egui::accesskit::Role;
-    let screen = window.root().rect();
-    let roles = [Role::Label, Role::Button, Role::CheckBox, Role::RadioButton, Role::TextInput];
+    let screen = window.ctx.content_rect();
+    let roles = [
+        Role::Label,
+        Role::Button,
+        Role::CheckBox,
+        Role::RadioButton,
+        Role::TextInput,
+    ];
     let all = window.query_all(by().predicate(move |node| roles.contains(&node.role())));
     let nodes: Vec<(String, egui::Rect)> = all
         .map(|node| {

@@ -1,19 +1,14 @@
 //! The main states of the window in both themes and sizes: nothing clipped, nothing overlapping, and as it was.
 
-use egui::{Key, Pos2};
+use egui::Key;
 use egui_kittest::kittest::Queryable;
 use host_ui::app::App;
-use host_ui::view::slice::Orientation;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::flags;
-use stylet_tests::window::{Driven, keep_for_docs, misplaced};
+use stylet_tests::window::{Driven, is_at_rest, keep_for_docs, misplaced};
 
 const SMALL: [f32; 2] = [1280.0, 800.0];
 const LARGE: [f32; 2] = [1920.0, 1080.0];
-
-fn is_at_goal(app: &App) -> bool {
-    app.link().state().is_some_and(|s| s.flags & flags::AT_GOAL != 0)
-}
 
 fn seeds(app: &App) -> u32 {
     app.link().snapshot().map_or(0, |s| s.header.seed_count)
@@ -35,7 +30,7 @@ fn procedure_by_enter(driven: &mut Driven) {
             driven.window.run_steps(1);
             std::thread::sleep(Duration::from_millis(10));
         }
-        driven.until("rest", is_at_goal);
+        driven.until("rest", is_at_rest);
     }
     driven.press(Key::Enter);
     driven.until("the needle outside", |app| {
@@ -120,24 +115,7 @@ fn a_hand_on_the_tip_in_a_slice_draws_the_needle() {
     driven.press(Key::V);
     let z = |app: &App| app.link().state().map_or(0.0, |s| s.tip_in_scene_m[2]);
     let start = z(driven.window.state());
-    let at = |driven: &Driven, ahead_m: f64| -> Pos2 {
-        let app = driven.window.state();
-        let rect = driven.window.get_by_label("Sagittal slice").rect();
-        let plane = app.middle().plane(Orientation::Sagittal, rect);
-        let mut tip = app.link().state().expect("live").tip_in_scene_m;
-        tip[2] += ahead_m;
-        plane.on_screen(tip.into())
-    };
-    let (from, to) = (at(&driven, 0.0), at(&driven, 0.008));
-    driven.window.drag_at(from);
-    driven.window.run_steps(2);
-    for _ in 0..60 {
-        driven.window.hover_at(to);
-        driven.window.run_steps(1);
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    driven.window.drop_at(to);
-    driven.until("rest", is_at_goal);
+    driven.pull_tip(0.008);
     let went = z(driven.window.state()) - start;
     assert!((went - 0.008).abs() < 1e-3, "drawn by 8 mm, went {went} m");
 }
@@ -149,7 +127,11 @@ fn words_can_be_made_larger_and_stay_in_place() {
     driven.window.key_press_modifiers(egui::Modifiers::COMMAND, Key::Plus);
     driven.window.key_press_modifiers(egui::Modifiers::COMMAND, Key::Plus);
     driven.window.run_steps(4);
-    assert!(driven.window.ctx.zoom_factor() > 1.15, "{}", driven.window.ctx.zoom_factor());
+    assert!(
+        driven.window.ctx.zoom_factor() > 1.15,
+        "{}",
+        driven.window.ctx.zoom_factor()
+    );
     driven.picture("larger");
 }
 

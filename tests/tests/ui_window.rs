@@ -1,7 +1,7 @@
 //! The window without a core: it says what to type, and its dialogs open.
 
-use egui_kittest::kittest::Queryable;
 use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
 use host_ui::app::{App, Options};
 use stylet_shm_schema::PARAMETERS;
 use stylet_shm_schema::service::Instance;

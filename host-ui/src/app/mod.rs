@@ -164,7 +164,8 @@ impl App {
             .exact_size(theme::RIGHT_WIDTH)
             .frame(theme::side_panel(ui));
         right.resizable(false).show(ui, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| plots::plots_ui(ui, &self.shown, &self.history));
+            let height = ui.available_height();
+            egui::ScrollArea::vertical().show(ui, |ui| plots::plots_ui(ui, &self.shown, &self.history, height));
         });
         egui::CentralPanel::default()
             .frame(egui::Frame::new().fill(theme::of(ui).background))

@@ -6,25 +6,28 @@ use crate::{format, theme};
 use egui::{Color32, RichText};
 use egui_plot::{AxisHints, Bar, BarChart, GridMark, Line, Plot, PlotPoints};
 
-const PLOT_HEIGHT: f32 = 86.0;
+/// What stands between and under the three plots over time.
+const BESIDE_PLOTS: f32 = 462.0;
+const PLOT_HEIGHTS: [f32; 2] = [58.0, 150.0];
 
-pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
+/// The plots share what of `height` the rest leaves.
+pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, height: f32) {
+    let each = ((height - BESIDE_PLOTS) / 3.0).clamp(PLOT_HEIGHTS[0], PLOT_HEIGHTS[1]);
+    let strip = |ui: &mut egui::Ui, style, value: fn(&Tick) -> f32| strip(ui, history, style, (each, value));
     let tokens = theme::of(ui);
     tension_ui(ui, shown);
     let now = |value: Option<String>| value.unwrap_or_else(|| "n/a".to_owned());
     let force = now(shown.resistance_n().map(format::force));
     title(ui, "Force along the needle, N", &force, tokens.force);
-    strip(ui, history, ("force", tokens.force, [-0.5, 2.0]), |t| t.resistance_n);
+    strip(ui, ("force", tokens.force, [-0.5, 2.0]), |t| t.resistance_n);
     let depth = now(shown.state.map(|s| format::length(s.depth_m)));
     title(ui, "Depth, mm", &depth, tokens.depth);
-    strip(ui, history, ("depth", tokens.depth, [0.0, 10.0]), |t| t.depth_mm);
+    strip(ui, ("depth", tokens.depth, [0.0, 10.0]), |t| t.depth_mm);
     let worst = now(shown
         .state
         .map(|s| format::microseconds(Some(format::us(s.worst_wake_ns)))));
     title(ui, "Wake-up latency, us", &format!("worst {worst}"), tokens.wake);
-    strip(ui, history, ("wake-up latency", tokens.wake, [0.0, 50.0]), |t| {
-        t.wake_us
-    });
+    strip(ui, ("wake-up latency", tokens.wake, [0.0, 50.0]), |t| t.wake_us);
     histogram_ui(ui, history);
     timing_ui(ui, shown, history);
     setup::setup_ui(ui, shown);
@@ -70,12 +73,12 @@ fn strip(
     ui: &mut egui::Ui,
     history: &History,
     (name, color, least): (&str, Color32, [f64; 2]),
-    value: impl Fn(&Tick) -> f32,
+    (height, value): (f32, fn(&Tick) -> f32),
 ) {
     let buckets = ui.available_width().max(50.0) as usize;
     let points = history.decimated(buckets, value);
     plot(name)
-        .height(PLOT_HEIGHT)
+        .height(height)
         .include_x(-WINDOW_S)
         .include_x(0.0)
         .include_y(least[0])

@@ -330,7 +330,7 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown) {
     });
     response.on_hover_text(format!("Peak since the last reset: {}", format::force(peak)));
     // Beside the bar: no colour of words can be read on both of its parts.
-    let size = Vec2::new(82.0, ui.spacing().interact_size.y);
+    let size = Vec2::new(106.0, ui.spacing().interact_size.y);
     ui.allocate_ui_with_layout(size, Layout::right_to_left(Align::Center), |ui| {
         ui.set_min_width(size.x);
         ui.add(egui::Label::new(theme::strong(&label)).truncate());

@@ -115,8 +115,9 @@ pub struct Gpu {
     /// The body's surface, then those inside it.
     surfaces: Vec<Layer>,
     ghost: Material,
-    solids: Growing,
-    lines: Growing,
+    /// Marks that change with the plan, then those that change with every tick.
+    solids: [Growing; 2],
+    lines: [Growing; 2],
     surface_vertices: Growing,
     ghost_vertices: Growing,
     indices: Growing,
@@ -147,8 +148,8 @@ impl Gpu {
             pipelines: pipelines(device, &layout),
             surfaces: Vec::new(),
             ghost: material(device, &layout),
-            solids: Growing::new(device, vertex),
-            lines: Growing::new(device, vertex),
+            solids: [Growing::new(device, vertex), Growing::new(device, vertex)],
+            lines: [Growing::new(device, vertex), Growing::new(device, vertex)],
             surface_vertices: Growing::new(device, vertex),
             ghost_vertices: Growing::new(device, vertex),
             indices: Growing::new(device, wgpu::BufferUsages::INDEX),
@@ -197,9 +198,10 @@ impl Gpu {
         }
     }
 
-    pub fn set_marks(&mut self, marks: &Marks) {
-        self.uploaded_bytes += self.solids.write(&self.state, &marks.triangles);
-        self.uploaded_bytes += self.lines.write(&self.state, &marks.lines);
+    /// `which` is 0 for marks of the plan, 1 for those of the tick.
+    pub fn set_marks(&mut self, which: usize, marks: &Marks) {
+        self.uploaded_bytes += self.solids[which].write(&self.state, &marks.triangles);
+        self.uploaded_bytes += self.lines[which].write(&self.state, &marks.lines);
     }
 
     /// Sizes in pixels. True when the picture is new and has to be drawn.
@@ -249,8 +251,12 @@ impl Gpu {
         {
             let mut pass = begin(&mut encoder, targets, clear);
             pass.set_bind_group(0, &self.ghost.bind, &[]);
-            draw_list(&mut pass, &self.pipelines.solid, &self.solids);
-            draw_list(&mut pass, &self.pipelines.line, &self.lines);
+            for list in &self.solids {
+                draw_list(&mut pass, &self.pipelines.solid, list);
+            }
+            for list in &self.lines {
+                draw_list(&mut pass, &self.pipelines.line, list);
+            }
             let (far, near) = (&self.pipelines.surface_back, &self.pipelines.surface_front);
             if let Some((body, inner)) = self.surfaces.split_first() {
                 if ghost.is_some() {

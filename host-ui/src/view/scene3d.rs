@@ -104,6 +104,8 @@ pub struct Scene3d {
     /// The dose that the card has.
     shells: u64,
     drawn: Option<Key>,
+    /// What the marks of the plan were made for: scene, plan, template, colours.
+    fixed: Option<((u64, u64), u64, bool, bool)>,
     marks: Marks,
     /// Where the axes are drawn.
     corner_m: Option<[f32; 3]>,
@@ -123,6 +125,7 @@ impl Scene3d {
             surface: 0,
             shells: 0,
             drawn: None,
+            fixed: None,
             marks: Marks::default(),
             corner_m: None,
             vertices: Vec::new(),
@@ -290,8 +293,14 @@ impl Scene3d {
             dark: tokens.dark,
         };
         if fresh || self.drawn.as_ref() != Some(&key) {
-            self.corner_m = collect(&mut self.marks, (shown, view), self.look, tokens);
-            gpu.set_marks(&self.marks);
+            let fixed = (key.scene, key.plan, key.look.template, key.dark);
+            if self.fixed != Some(fixed) {
+                self.fixed = Some(fixed);
+                self.corner_m = collect_fixed(&mut self.marks, shown, self.look, tokens);
+                gpu.set_marks(0, &self.marks);
+            }
+            collect_live(&mut self.marks, (shown, view), self.look, tokens);
+            gpu.set_marks(1, &self.marks);
             let whole = uniform(&self.camera, rect.aspect_ratio());
             let cut = section(&self.camera, view, shown);
             let tinted = |color, opacity, section| tint(whole, color, opacity, section);
@@ -367,23 +376,10 @@ fn tint(whole: SceneUniform, color: Color32, opacity: f32, section: [f32; 4]) ->
     }
 }
 
-fn collect(
-    marks: &mut Marks,
-    (shown, view): (&Shown, &ViewState),
-    look: Look,
-    tokens: &'static Tokens,
-) -> Option<[f32; 3]> {
+/// What changes with the scene and the plan only. Gives the corner where the axes are drawn.
+fn collect_fixed(marks: &mut Marks, shown: &Shown, look: Look, tokens: &'static Tokens) -> Option<[f32; 3]> {
     marks.begin(tokens);
     let corner = shown.scene.map(|scene| marks.ground(scene.lower_m, scene.upper_m));
-    if let (Some(tip), Some(state)) = (shown.tip_m(), &shown.state) {
-        marks.needle(tip, state.needle_direction);
-        if look.force {
-            marks.force(tip, state.force_on_hand_n);
-        }
-    }
-    for seed in &shown.seeds {
-        marks.placed_seed(seed.position_m, seed.axis);
-    }
     if let Some(plan) = &shown.plan {
         marks.entry(plan.entry_m, plan.direction);
         if look.template {
@@ -396,7 +392,20 @@ fn collect(
             marks.path(plan.entry_m, end);
         }
     }
+    corner
+}
+
+fn collect_live(marks: &mut Marks, (shown, view): (&Shown, &ViewState), look: Look, tokens: &'static Tokens) {
+    marks.begin(tokens);
+    if let (Some(tip), Some(state)) = (shown.tip_m(), &shown.state) {
+        marks.needle(tip, state.needle_direction);
+        if look.force {
+            marks.force(tip, state.force_on_hand_n);
+        }
+    }
+    for seed in &shown.seeds {
+        marks.placed_seed(seed.position_m, seed.axis);
+    }
     let measured: Vec<Vector3<f32>> = view.measure.points_m().iter().map(|p| p.map(|c| c as f32)).collect();
     marks.measured(&measured);
-    corner
 }

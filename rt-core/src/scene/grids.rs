@@ -201,7 +201,12 @@ mod tests {
                 })
                 .collect();
             times_us.sort_by(f64::total_cmp);
-            println!("{name}: {} nodes, p50 {:.1} us, p99 {:.1} us", told.len(), times_us[500], times_us[990]);
+            println!(
+                "{name}: {} nodes, p50 {:.1} us, p99 {:.1} us",
+                told.len(),
+                times_us[500],
+                times_us[990]
+            );
         }
     }
 

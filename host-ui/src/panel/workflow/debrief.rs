@@ -18,11 +18,10 @@ pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown) {
         ui.label(theme::small(text));
         return;
     };
-    ui.label(theme::strong("Dose"));
-    ui.label(theme::small(format!(
-        "{} seeds of I-125 6711 against {:.0} Gy",
+    ui.label(format!(
+        "Dose: {} seeds of I-125 6711, {:.0} Gy",
         dose.seeds, dose.prescription_gy
-    )));
+    ));
     ui.spacing_mut().interact_size.y = 16.0;
     egui::Grid::new("dose")
         .num_columns(4)
@@ -64,7 +63,7 @@ fn dvh_ui(ui: &mut egui::Ui, dose: &DosePicture) {
     ui.label(theme::small("Target: volume, %, over dose, % of the prescription"));
     let points: Vec<[f64; 2]> = dose.target_dvh.iter().map(|[x, y]| [x * 100.0, y * 100.0]).collect();
     Plot::new("dvh")
-        .height(96.0)
+        .height(80.0)
         .allow_drag(false)
         .allow_zoom(false)
         .allow_scroll(false)

@@ -9,6 +9,10 @@ const PLACED_WITHIN_M: f64 = 1.5e-3;
 /// The tip is at a goal when it is this near.
 const REACHED_WITHIN_M: f64 = 1.0e-3;
 
+/// A hand that the force holds back from its goal is there when it rests this near.
+const HELD_BACK_M: f64 = 2.0e-3;
+const REST_M_PER_S: f64 = 1e-3;
+
 /// A step of the procedure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Progress {
@@ -64,7 +68,7 @@ pub fn progress(shown: &Shown) -> Progress {
     }
     let is_deep = shown
         .deepest_seed_m()
-        .is_some_and(|deepest| depth >= deepest - REACHED_WITHIN_M);
+        .is_some_and(|deepest| depth >= deepest - HELD_BACK_M);
     if dropped > 0 || is_deep {
         Progress::Drop
     } else if beside > PLACED_WITHIN_M || depth < -REACHED_WITHIN_M * 5.0 {
@@ -123,7 +127,11 @@ pub fn next_action(shown: &Shown) -> Option<Action> {
 
 pub fn is_at_next_seed(shown: &Shown) -> bool {
     match (shown.path_depth_m(), shown.next_seed_m()) {
-        (Some(depth), Some(next)) => (depth - next).abs() <= REACHED_WITHIN_M,
+        (Some(depth), Some(next)) => {
+            let off = (depth - next).abs();
+            let at_rest = shown.state.is_some_and(|s| s.speed_m_per_s.abs() < REST_M_PER_S);
+            off <= REACHED_WITHIN_M || (off <= HELD_BACK_M && at_rest)
+        }
         _ => false,
     }
 }
