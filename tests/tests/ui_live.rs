@@ -4,6 +4,8 @@
 
 use egui_kittest::Harness;
 use host_ui::app::{App, Options};
+use egui_kittest::kittest::Queryable;
+use host_ui::view::slice::Orientation;
 use host_ui::view::slice::field::Field;
 use nalgebra::Vector3;
 use std::time::Duration;
@@ -37,6 +39,7 @@ fn four_steps_by_label_move_the_gland_and_drop_a_seed() {
     keep_for_docs(&during, "contraction");
     assert!(differing_pixels(&before, &during) > 2_000, "the picture did not change");
     assert_inside_moves_as_the_surface_does(driven.window.state());
+    assert_slice_shows_the_dent(&driven, &before, &during);
     driven.click("Insert");
     driven.until("the deepest seed", |app| {
         app.link()
@@ -135,6 +138,28 @@ fn assert_inside_moves_as_the_surface_does(app: &App) {
     // A link stretches by three quarters at most, and a vertex is no farther from a node than the grid is wide.
     assert!(worst_m < 0.75 * field.info.spacing_m, "{worst_m} m");
     assert!(rms_m < 0.1 * moved_m, "{rms_m} m of {moved_m} m");
+}
+
+/// Beside the shaft, behind the tip, lay tissue at rest: now the dent is there, and the picture is as dark as outside.
+fn assert_slice_shows_the_dent(driven: &Driven, before: &image::RgbaImage, during: &image::RgbaImage) {
+    let app = driven.window.state();
+    let rect = driven.window.get_by_label("Sagittal slice").rect();
+    let plane = app.middle().plane(Orientation::Sagittal, rect);
+    let state = app.link().state().expect("live");
+    let (tip, ahead) = (Vector3::from(state.tip_in_scene_m), Vector3::from(state.needle_direction));
+    let mean = |picture: &image::RgbaImage, middle: Vector3<f64>| {
+        let at = plane.on_screen(middle);
+        let (x, y) = (at.x.round() as u32, at.y.round() as u32);
+        let patch = (x - 4..=x + 4).flat_map(|x| (y - 4..=y + 4).map(move |y| (x, y)));
+        patch.map(|(x, y)| f64::from(picture.get_pixel(x, y).0[1])).sum::<f64>() / 81.0
+    };
+    let in_dent = tip - ahead * 4e-3 + plane.up * 2.5e-3;
+    let in_tissue = tip + ahead * 6e-3 + plane.up * 6e-3;
+    let [was, now] = [before, during].map(|picture| mean(picture, in_dent));
+    let inside = mean(during, in_tissue);
+    println!("brightness in the dent: {was:.0} at rest, {now:.0} now; in the tissue {inside:.0}");
+    assert!(was > 0.6 * inside, "at rest there is tissue: {was} of {inside}");
+    assert!(now < 0.6 * inside, "now there is none: {now} of {inside}");
 }
 
 fn differing_pixels(a: &image::RgbaImage, b: &image::RgbaImage) -> usize {
