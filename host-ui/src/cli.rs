@@ -280,8 +280,13 @@ fn check(file: &Path, label: Option<u8>) -> Result<(), String> {
 /// What a scene file says besides its volume; its plan is read.
 fn check_scene_file(file: &Path) -> Result<(), String> {
     let scene = files::scene::read(file).map_err(|e| e.to_string())?;
-    if let Some(plan) = &scene.plan {
-        let path = file.parent().unwrap_or(Path::new("")).join(plan);
+    let plan = scene
+        .plan
+        .as_ref()
+        .map(|plan| file.parent().unwrap_or(Path::new("")).join(plan));
+    if let Some(path) = plan.as_ref().filter(|p| files::scene::is_scene(p)) {
+        println!("  plan: {}, read when there is a scene", path.display());
+    } else if let Some(path) = plan {
         let seeds = read_seeds(
             &path,
             SeedDefaults {

@@ -1,24 +1,41 @@
 //! Keys: which there are, and what is held or pressed in this frame.
 
 use crate::panel::Action;
+use crate::view::scene3d::Preset;
 use egui::{Key, Modifiers};
 use stylet_shm_schema::CommandKind;
 
 /// Every key, for the overlay and the manual.
-pub const KEYS: [(&str, &str); 13] = [
+pub const KEYS: [(&str, &str); 23] = [
     ("W  or  Up", "advance the needle along its path while held"),
     ("S  or  Down", "retract the needle while held"),
     ("Shift with W, S", "four times slower"),
+    ("Enter", "the one thing to do in the present step"),
     ("Space", "drop a seed at the tip"),
-    ("Ctrl+Z", "take the last seed back"),
+    ("Ctrl+Z", "take the last seed back, or else the plan"),
     ("E", "force on; after a fault: re-arm"),
     ("D", "force off"),
     ("P", "parameters"),
     ("R", "reset the view"),
+    (
+        "1 to 5",
+        "look obliquely, from the perineum, the side, above, along the needle",
+    ),
+    ("V", "all views, 3D alone, slices alone"),
+    ("F", "slices follow the tip"),
+    ("M", "measure between two clicks"),
+    ("I", "isodose lines and surfaces"),
+    ("T", "light or dark"),
+    ("Ctrl and +, -, 0", "larger, smaller, usual words"),
+    ("F12", "save the window as a picture"),
     ("F1", "this help"),
     ("Esc", "close a dialog, give the keys back to the needle"),
-    ("Left drag, right drag", "turn the view, shift it"),
-    ("Wheel", "come nearer, go farther"),
+    ("Drag in 3D", "left turns, right shifts, wheel goes nearer"),
+    (
+        "Drag in a slice",
+        "left moves the cross, or the needle by its tip; right shifts",
+    ),
+    ("Wheel in a slice", "through the slices; with Ctrl nearer"),
 ];
 
 /// What the keys say in one frame.
@@ -41,7 +58,19 @@ pub fn read(ctx: &egui::Context) -> Keys {
         return keys;
     }
     let pressed = [
-        (Modifiers::CTRL, Key::Z, Action::Send(CommandKind::UndoSeed)),
+        (Modifiers::CTRL, Key::Z, Action::Undo),
+        (Modifiers::NONE, Key::Enter, Action::Next),
+        (Modifiers::NONE, Key::V, Action::NextLayout),
+        (Modifiers::NONE, Key::F, Action::ToggleFollowTip),
+        (Modifiers::NONE, Key::M, Action::ToggleMeasure),
+        (Modifiers::NONE, Key::I, Action::ToggleIsodose),
+        (Modifiers::NONE, Key::T, Action::ToggleTheme),
+        (Modifiers::NONE, Key::F12, Action::SavePicture),
+        (Modifiers::NONE, Key::Num1, Action::LookFrom(Preset::Oblique)),
+        (Modifiers::NONE, Key::Num2, Action::LookFrom(Preset::Perineum)),
+        (Modifiers::NONE, Key::Num3, Action::LookFrom(Preset::Side)),
+        (Modifiers::NONE, Key::Num4, Action::LookFrom(Preset::Above)),
+        (Modifiers::NONE, Key::Num5, Action::LookFrom(Preset::Needle)),
         (Modifiers::NONE, Key::Space, Action::Send(CommandKind::DropSeed)),
         (Modifiers::NONE, Key::E, Action::Send(CommandKind::Engage)),
         (Modifiers::NONE, Key::D, Action::Send(CommandKind::Disengage)),

@@ -48,13 +48,17 @@ pub struct SceneModel {
     pub header: SceneHeader,
     pub rest_m: Vec<[f32; 3]>,
     pub triangles: Vec<[u32; 3]>,
+    /// One for each cell of `header.labels`: 0 outside, else one more than the place among the header's structures.
+    pub labels: Vec<u8>,
 }
 
-/// The deformed surface of one tissue tick.
+/// The deformed body of one tissue tick.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     pub header: SnapshotHeader,
     pub positions_m: Vec<[f32; 3]>,
+    /// Displacement from rest at each node of the scene's grid.
+    pub displacements_m: Vec<[f32; 3]>,
 }
 
 /// What the core said to a command or an upload.

@@ -27,6 +27,11 @@ impl Loader {
         self.reading = Some((path.to_owned(), receiver));
     }
 
+    /// What is being read is no longer wanted; its thread ends by itself.
+    pub fn cancel(&mut self) {
+        self.reading = None;
+    }
+
     /// Each outcome once; a reader that died is a refusal too.
     pub fn poll(&mut self) -> Option<Outcome> {
         let (path, receiver) = self.reading.as_ref()?;

@@ -108,8 +108,7 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
     let session_id = clock::now_ns() ^ (u64::from(std::process::id()) << 40);
     let picture = ScenePicture::first(&scene, session_id);
     let node = options.instance.node().map_err(|e| e.to_string())?;
-    let ports =
-        Ports::new(&node, scene.surface.vertex_elements.len(), picture.word_count()).map_err(|e| e.to_string())?;
+    let ports = Ports::new(&node, picture.snapshot_size().total(), picture.word_count()).map_err(|e| e.to_string())?;
     let world = Box::new(World::new(scene, active.limits, 1)?);
     let source = Arc::new(SceneSource::Builtin(options.scene.clone()));
     let (tissue_flight, tissue_desk) = recorder(Box::new(TissueTape::new(&world, Arc::clone(&source))));

@@ -1,8 +1,8 @@
 //! What a reader verifies before it uses a value that came out of shared memory.
 
 use crate::{
-    HapticState, MAX_SEEDS, MAX_STRUCTURES, ParametersInForce, PlanInForce, Rehearsal, SceneHeader, SeedPose,
-    SnapshotHeader, TickRecord, Vertex,
+    GridInfo, HapticState, MAX_LABEL_CELLS, MAX_NODES, MAX_SEEDS, MAX_STRUCTURES, ParametersInForce, PlanInForce,
+    Rehearsal, SceneHeader, SeedPose, SnapshotHeader, TickRecord, Vertex,
 };
 
 /// Why a value was not believed.
@@ -62,9 +62,10 @@ pub fn record(r: &TickRecord) -> Result<(), Rubbish> {
     )
 }
 
-/// `vertices` are those that came with the header.
+/// `vertices` are those that came with the header, displacements of nodes included.
 pub fn snapshot(h: &SnapshotHeader, vertices: &[Vertex]) -> Result<(), Rubbish> {
-    ensure(h.vertex_count as usize == vertices.len(), "vertex count")?;
+    let sent = u64::from(h.vertex_count) + u64::from(h.node_count);
+    ensure(sent == vertices.len() as u64, "vertex or node count")?;
     ensure(h.seed_count as usize <= MAX_SEEDS, "seed count")?;
     ensure(within(&h.tip_in_scene_m, MAX_COORDINATE_M), "tip position")?;
     ensure(within(&h.needle_direction, 1.001), "needle direction")?;
@@ -105,13 +106,24 @@ pub fn scene(h: &SceneHeader, words: &[u32]) -> Result<(), Rubbish> {
             "bounding box of a structure",
         )?;
     }
-    let (positions, indices) = words.split_at(3 * h.vertex_count as usize);
+    grid(&h.labels, MAX_LABEL_CELLS, "grid of labels")?;
+    grid(&h.nodes, MAX_NODES, "grid of displacements")?;
+    let (positions, rest) = words.split_at(3 * h.vertex_count as usize);
+    let (indices, labels) = rest.split_at(3 * h.triangle_count as usize);
     let limit = MAX_COORDINATE_M as f32;
     ensure(
         positions.iter().all(|&w| f32::from_bits(w).abs() <= limit),
         "vertex position",
     )?;
-    ensure(indices.iter().all(|&i| i < h.vertex_count), "triangle index")
+    ensure(indices.iter().all(|&i| i < h.vertex_count), "triangle index")?;
+    let known = |word: &u32| word.to_le_bytes().iter().all(|&b| u32::from(b) <= h.structure_count);
+    ensure(labels.iter().all(known), "label of a cell")
+}
+
+fn grid(g: &GridInfo, most: usize, what: &'static str) -> Result<(), Rubbish> {
+    ensure(g.node_count().is_some_and(|n| n <= most), what)?;
+    ensure(within(&g.origin_m, MAX_COORDINATE_M), what)?;
+    ensure(g.dims == [0; 3] || (g.spacing_m > 0.0 && g.spacing_m < 1.0), what)
 }
 
 pub fn parameters(p: &ParametersInForce) -> Result<(), Rubbish> {
@@ -197,7 +209,20 @@ mod tests {
         assert_eq!(scene(&h, &words), Err(Rubbish("triangles of a structure")));
         (h.structures[0].first_triangle, h.structures[0].upper_m[1]) = (0, f64::NAN);
         assert_eq!(scene(&h, &words), Err(Rubbish("bounding box of a structure")));
+        h.structures[0].upper_m[1] = 0.0;
+        (h.labels.dims, h.labels.spacing_m) = ([5, 1, 1], 1e-3);
+        let labelled = |cells: [u32; 2]| [&words[..], &cells[..]].concat();
+        assert!(scene(&h, &labelled([0x0100_0001, 1])).is_ok());
+        assert_eq!(scene(&h, &labelled([0x0200_0001, 1])), Err(Rubbish("label of a cell")));
+        assert_eq!(scene(&h, &words), Err(Rubbish("vertex or triangle count")));
+        h.nodes.dims = [64, 64, 3];
+        assert_eq!(
+            scene(&h, &labelled([0, 0])),
+            Err(Rubbish("grid of displacements")),
+            "more nodes than a tick may fill"
+        );
+        h.nodes.dims = [0; 3];
         h.structure_count = MAX_STRUCTURES as u32 + 1;
-        assert_eq!(scene(&h, &words), Err(Rubbish("structure count")));
+        assert_eq!(scene(&h, &labelled([0, 0])), Err(Rubbish("structure count")));
     }
 }

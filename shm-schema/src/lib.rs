@@ -5,8 +5,8 @@
 //! | `session` | publish-subscribe, newest one kept | bridge | hosts | [`Session`]: which run this is, what the kernel granted |
 //! | `state/<session>` | blackboard, one per run | haptic thread | hosts | [`HapticState`]: the latest tick |
 //! | `records` | slices of [`TickRecord`] | bridge | hosts | every tick of the force loop |
-//! | `snapshots` | slices of [`Vertex`] under a [`SnapshotHeader`] | tissue thread, sent by the bridge | hosts | the deformed surface, needle and seeds |
-//! | `scene` | words under a [`SceneHeader`], newest one kept | bridge | hosts | rest surface, triangles, structures |
+//! | `snapshots` | slices of [`Vertex`] under a [`SnapshotHeader`] | tissue thread, sent by the bridge | hosts | the deformed surface, displacements inside, needle and seeds |
+//! | `scene` | words under a [`SceneHeader`], newest one kept | bridge | hosts | rest surface, triangles, structures, labels of the cells |
 //! | `events` | [`Event`], last 64 kept | bridge | hosts | what happened, once each |
 //! | `parameters` | [`ParametersInForce`], newest one kept | bridge | hosts | the parameters that took effect, and when |
 //! | `plan` | [`PlanInForce`], newest one kept | bridge | hosts | planned seeds and needle path |
@@ -43,7 +43,10 @@ pub use params::{
 pub use plan::{MAX_SEEDS, PlanInForce, PlannedSeed};
 pub use record::TickRecord;
 pub use rehearsal::{REHEARSAL_HEAD, Rehearsal};
-pub use scene::{BUILTIN_SCENES, MAX_STRUCTURES, SceneHeader, StructureInfo, UploadHeader, UploadStructure, role};
+pub use scene::{
+    BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, StructureInfo, UploadHeader,
+    UploadStructure, role,
+};
 pub use session::{Session, ThreadReport};
 pub use snapshot::{SeedPose, SnapshotHeader, Vertex};
 pub use state::{Fault, HapticState, Phase, flags};

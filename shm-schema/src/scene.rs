@@ -7,6 +7,32 @@ use iceoryx2::prelude::ZeroCopySend;
 /// Scenes that the core can draw without a file; [`crate::CommandKind::LoadBuiltinScene`] takes the place in this list.
 pub const BUILTIN_SCENES: [&str; 3] = ["paper", "pelvis", "full"];
 
+/// Nodes of the displacement grid at most: what a tissue tick may spend on it.
+pub const MAX_NODES: usize = 8192;
+
+/// Cells of the label grid at most.
+pub const MAX_LABEL_CELLS: usize = 2 << 20;
+
+/// A regular grid over the body at rest, x fastest: node (i, j, k) lies at `origin_m + (i, j, k) spacing_m`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
+#[type_name("stylet.GridInfo")]
+pub struct GridInfo {
+    pub dims: [u32; 3],
+    pub reserved: u32,
+    pub origin_m: [f64; 3],
+    pub spacing_m: f64,
+}
+
+impl GridInfo {
+    /// Nodes in all; `None` when there are absurdly many.
+    pub fn node_count(&self) -> Option<usize> {
+        let [x, y, z] = self.dims.map(u64::from);
+        let nodes = x.checked_mul(y)?.checked_mul(z)?;
+        (nodes <= 64_000_000).then_some(nodes as usize)
+    }
+}
+
 /// Structures in a scene at most.
 pub const MAX_STRUCTURES: usize = 255;
 
@@ -42,7 +68,8 @@ pub struct StructureInfo {
     pub name: Text<32>,
 }
 
-/// Goes with `3 * vertex_count` words of rest positions (`f32` bits, m) and `3 * triangle_count` words of indices.
+/// Goes with `3 * vertex_count` words of rest positions (`f32` bits, m), `3 * triangle_count` words of indices, and the cells
+/// of `labels`, four to a word, lowest byte first: 0 where there is no tissue, else one more than the place in `structures`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.SceneHeader")]
@@ -70,6 +97,10 @@ pub struct SceneHeader {
     pub target_upper_m: [f64; 3],
     /// Patient (RAS, m) from scene: row-major rotation, then translation. Identity for built-in scenes.
     pub patient_from_scene: [f64; 12],
+    /// What is where in the body at rest.
+    pub labels: GridInfo,
+    /// Where displacements are told with each snapshot.
+    pub nodes: GridInfo,
     pub name: Text<64>,
     pub structures: [StructureInfo; MAX_STRUCTURES],
 }
@@ -82,7 +113,8 @@ impl SceneHeader {
 
     /// Words that must follow the header; `None` when the counts are absurd.
     pub fn word_count(&self) -> Option<usize> {
-        let words = 3 * (u64::from(self.vertex_count) + u64::from(self.triangle_count));
+        let labels = self.labels.node_count()?.div_ceil(4) as u64;
+        let words = 3 * (u64::from(self.vertex_count) + u64::from(self.triangle_count)) + labels;
         (words <= 3 * 64_000_000).then_some(words as usize)
     }
 }

@@ -4,7 +4,8 @@ use crate::MAX_SEEDS;
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// Deformed position of one surface vertex, scene frame.
+/// Deformed position of one surface vertex, scene frame; behind the surface vertices of a snapshot, the displacement
+/// from rest (m) of one node of the scene's [`crate::GridInfo`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.Vertex")]
@@ -47,7 +48,10 @@ pub struct SnapshotHeader {
     pub held_element: u32,
     pub phase: u32,
     pub vertex_count: u32,
+    /// Nodes of the displacement grid; they follow the vertices.
+    pub node_count: u32,
     pub seed_count: u32,
+    pub reserved: u32,
     pub seeds: [SeedPose; MAX_SEEDS],
 }
 

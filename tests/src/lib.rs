@@ -4,6 +4,7 @@ pub mod hand;
 pub mod phantom;
 pub mod rehearsal;
 pub mod stopped;
+pub mod window;
 pub mod window_process;
 
 use host_ui::link::{Link, LinkStatus};

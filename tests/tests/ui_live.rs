@@ -1,71 +1,16 @@
-//! The real window on a running core, driven by label through the four steps.
+//! The real window on a running core, driven by label through the steps.
 //!
 //! The picture that it draws is the README's; `make picture` keeps it.
 
 use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable;
 use host_ui::app::{App, Options};
-use std::time::{Duration, Instant};
+use egui_kittest::kittest::Queryable;
+use host_ui::view::slice::Orientation;
+use host_ui::view::slice::field::Field;
+use nalgebra::Vector3;
+use std::time::Duration;
 use stylet_shm_schema::{Phase, flags};
-use stylet_tests::{Core, scratch};
-
-struct Driven {
-    window: Harness<'static, App>,
-    core: Core,
-}
-
-impl Driven {
-    fn open(size: [f32; 2]) -> Self {
-        let core = Core::start();
-        let options = Options {
-            instance: core.instance.clone(),
-            scene: None,
-            label: None,
-        };
-        let window = Harness::builder()
-            .with_size(size)
-            .wgpu()
-            .build_eframe(|cc| App::new(cc, options));
-        let mut driven = Self { window, core };
-        driven.until("a live core", |app| {
-            app.link().state().is_some() && app.link().scene().is_some()
-        });
-        driven
-    }
-
-    /// Draws frames until the window knows what is waited for.
-    fn until(&mut self, what: &str, ready: impl Fn(&App) -> bool) {
-        let start = Instant::now();
-        while !ready(self.window.state()) {
-            assert!(start.elapsed() < Duration::from_secs(30), "waited in vain for {what}");
-            self.window.run_steps(1);
-            std::thread::sleep(Duration::from_millis(10));
-        }
-    }
-
-    fn click(&mut self, label: &str) {
-        self.window.get_by_label(label).click();
-        self.window.run_steps(2);
-    }
-
-    fn plan_and_place(&mut self) {
-        self.click("Plan five seeds");
-        self.until("the plan", |app| app.link().plan().is_some_and(|p| p.seed_count == 5));
-        self.click("Place needle");
-        self.until("the needle at its entry", |app| {
-            app.link().state().is_some_and(|s| s.flags & flags::AT_GOAL != 0)
-        });
-    }
-
-    fn picture(&mut self, name: &str) -> image::RgbaImage {
-        self.window.run_steps(3);
-        let picture = self.window.render().expect("a picture");
-        picture
-            .save(scratch(&format!("picture-{name}")).join(format!("{name}.png")))
-            .expect("saved");
-        picture
-    }
-}
+use stylet_tests::window::{Driven, keep_for_docs};
 
 fn phase(app: &App) -> u32 {
     app.link().state().map_or(0, |s| s.phase)
@@ -80,8 +25,9 @@ fn four_steps_by_label_move_the_gland_and_drop_a_seed() {
         app.link().state().is_some_and(|s| s.flags & flags::ENGAGED != 0)
     });
     let before = driven.picture("placed");
-    driven.click("Insert");
-    driven.until("contraction", |app| phase(app) == Phase::Contraction as u32);
+    // From the entry, 10 mm before the gland, to 6 mm into it: the membrane gives way at 8 mm.
+    driven.pull_tip(0.016);
+    assert_eq!(phase(driven.window.state()), Phase::Hold as u32, "the hand has stopped");
     driven.until("the gland to move before the puncture", |app| {
         app.link()
             .snapshot()
@@ -90,7 +36,11 @@ fn four_steps_by_label_move_the_gland_and_drop_a_seed() {
     let state = driven.window.state().link().state().copied().expect("live");
     assert_eq!(state.flags & flags::PUNCTURED, 0, "punctured already");
     let during = driven.picture("contraction");
+    keep_for_docs(&during, "contraction");
     assert!(differing_pixels(&before, &during) > 2_000, "the picture did not change");
+    assert_inside_moves_as_the_surface_does(driven.window.state());
+    assert_slice_shows_the_dent(&driven, &before, &during);
+    driven.click("Insert");
     driven.until("the deepest seed", |app| {
         app.link()
             .state()
@@ -100,11 +50,7 @@ fn four_steps_by_label_move_the_gland_and_drop_a_seed() {
     driven.until("a seed", |app| {
         app.link().snapshot().is_some_and(|s| s.header.seed_count == 1)
     });
-    let picture = driven.picture("window");
-    if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
-        let place = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/pictures/window.png");
-        picture.save(place).expect("docs/pictures can be written");
-    }
+    keep_for_docs(&driven.picture("window"), "window");
     driven.click("Retract");
     driven.until("the needle outside", |app| phase(app) == Phase::Outside as u32);
     let generation = driven.window.state().link().parameters().map(|p| p.generation);
@@ -170,6 +116,50 @@ fn keys_drive_the_needle_and_letting_go_stops_it() {
         (z(driven.window.state()) - stopped).abs() < 2e-3,
         "the needle went on by itself"
     );
+}
+
+/// Vertices of the surface are sent in full, displacements inside on a coarse grid: both must say the same of a vertex.
+fn assert_inside_moves_as_the_surface_does(app: &App) {
+    let (scene, snapshot) = (app.link().scene().expect("live"), app.link().snapshot().expect("live"));
+    let field = Field::of(scene, snapshot).expect("the snapshot is the scene's");
+    let errors_m: Vec<f64> = scene
+        .rest_m
+        .iter()
+        .zip(&snapshot.positions_m)
+        .map(|(rest, now)| {
+            let (rest, now) = (Vector3::from(*rest).map(f64::from), Vector3::from(*now).map(f64::from));
+            (field.displacement_m(rest) - (now - rest)).norm()
+        })
+        .collect();
+    let rms_m = (errors_m.iter().map(|e| e * e).sum::<f64>() / errors_m.len() as f64).sqrt();
+    let worst_m = errors_m.iter().copied().fold(0.0, f64::max);
+    let moved_m = snapshot.header.max_displacement_m;
+    println!("moved {moved_m:.4} m; grid against surface: rms {rms_m:.6} m, worst {worst_m:.6} m");
+    // A link stretches by three quarters at most, and a vertex is no farther from a node than the grid is wide.
+    assert!(worst_m < 0.75 * field.info.spacing_m, "{worst_m} m");
+    assert!(rms_m < 0.1 * moved_m, "{rms_m} m of {moved_m} m");
+}
+
+/// Beside the shaft, behind the tip, lay tissue at rest: now the dent is there, and the picture is as dark as outside.
+fn assert_slice_shows_the_dent(driven: &Driven, before: &image::RgbaImage, during: &image::RgbaImage) {
+    let app = driven.window.state();
+    let rect = driven.window.get_by_label("Sagittal slice").rect();
+    let plane = app.middle().plane(Orientation::Sagittal, rect);
+    let state = app.link().state().expect("live");
+    let (tip, ahead) = (Vector3::from(state.tip_in_scene_m), Vector3::from(state.needle_direction));
+    let mean = |picture: &image::RgbaImage, middle: Vector3<f64>| {
+        let at = plane.on_screen(middle);
+        let (x, y) = (at.x.round() as u32, at.y.round() as u32);
+        let patch = (x - 4..=x + 4).flat_map(|x| (y - 4..=y + 4).map(move |y| (x, y)));
+        patch.map(|(x, y)| f64::from(picture.get_pixel(x, y).0[1])).sum::<f64>() / 81.0
+    };
+    let in_dent = tip - ahead * 4e-3 + plane.up * 2.5e-3;
+    let in_tissue = tip + ahead * 6e-3 + plane.up * 6e-3;
+    let [was, now] = [before, during].map(|picture| mean(picture, in_dent));
+    let inside = mean(during, in_tissue);
+    println!("brightness in the dent: {was:.0} at rest, {now:.0} now; in the tissue {inside:.0}");
+    assert!(was > 0.6 * inside, "at rest there is tissue: {was} of {inside}");
+    assert!(now < 0.6 * inside, "now there is none: {now} of {inside}");
 }
 
 fn differing_pixels(a: &image::RgbaImage, b: &image::RgbaImage) -> usize {

@@ -1,26 +1,26 @@
 //! The window without a core: it says what to type, and its dialogs open.
 
+use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
-use egui_kittest::{Harness, SnapshotOptions};
 use host_ui::app::{App, Options};
 use stylet_shm_schema::PARAMETERS;
 use stylet_shm_schema::service::Instance;
+use stylet_tests::window::{misplaced, tolerant};
 
 fn window(instance: &str) -> Harness<'static, App> {
+    window_of(instance, [1280.0, 800.0])
+}
+
+fn window_of(instance: &str, size: [f32; 2]) -> Harness<'static, App> {
     let options = Options {
         instance: Instance::new(instance).expect("a valid name"),
         scene: None,
         label: None,
     };
     Harness::builder()
-        .with_size([1280.0, 800.0])
+        .with_size(size)
         .wgpu()
         .build_eframe(|cc| App::new(cc, options))
-}
-
-/// Another version of the software driver may round a few edges otherwise; a moved or missing widget is thousands of pixels.
-fn tolerant() -> SnapshotOptions {
-    SnapshotOptions::new().max_failed_pixels(500)
 }
 
 /// The window asks for frames for ever, so `run` would never end.
@@ -39,6 +39,49 @@ fn without_a_core_the_window_says_what_to_type() {
         "nothing is known of the force"
     );
     window.snapshot_options("window_absent", &tolerant());
+}
+
+#[test]
+fn nothing_is_misplaced_without_a_core_in_any_theme_or_size() {
+    for size in [[1280.0, 800.0], [1920.0, 1080.0]] {
+        let mut window = window_of("ui-window-places", size);
+        settle(&mut window);
+        assert_eq!(misplaced(&window), Vec::<String>::new(), "dark, {size:?}");
+        window.key_press(egui::Key::T);
+        settle(&mut window);
+        assert_eq!(misplaced(&window), Vec::<String>::new(), "light, {size:?}");
+        if size[0] > 1900.0 {
+            window.snapshot_options("window_absent_light_large", &tolerant());
+        }
+    }
+}
+
+#[test]
+fn help_lists_every_key() {
+    let mut window = window("ui-window-help");
+    settle(&mut window);
+    window.key_press(egui::Key::F1);
+    settle(&mut window);
+    for (key, _) in host_ui::keyboard::KEYS {
+        window.get_by_label(key);
+    }
+    window.snapshot_options("window_help", &tolerant());
+}
+
+#[test]
+fn a_search_leaves_only_what_was_asked_for() {
+    let mut window = window("ui-window-search");
+    settle(&mut window);
+    window.get_by_label("Parameters").click();
+    settle(&mut window);
+    window.get_by_label("Search").click();
+    settle(&mut window);
+    let field = window.get_by_role_and_label(egui::accesskit::Role::TextInput, "Search");
+    field.focus();
+    field.type_text("u_cri");
+    settle(&mut window);
+    window.get_by_label("Puncture depth u_cri");
+    assert!(window.query_by_label("Smallest link").is_none(), "not asked for");
 }
 
 #[test]

@@ -162,7 +162,10 @@ impl Link {
                 self.rubbish_refused += 1;
                 continue;
             }
-            let (positions, indices) = words.split_at(3 * header.vertex_count as usize);
+            let (positions, rest) = words.split_at(3 * header.vertex_count as usize);
+            let (indices, cells) = rest.split_at(3 * header.triangle_count as usize);
+            let mut labels: Vec<u8> = cells.iter().flat_map(|word| word.to_le_bytes()).collect();
+            labels.truncate(header.labels.node_count().unwrap_or(0));
             let model = SceneModel {
                 header,
                 rest_m: positions
@@ -170,6 +173,7 @@ impl Link {
                     .map(|w| [0, 1, 2].map(|a| f32::from_bits(w[a])))
                     .collect(),
                 triangles: indices.chunks_exact(3).map(|w| [w[0], w[1], w[2]]).collect(),
+                labels,
             };
             self.latest
                 .scene
@@ -188,9 +192,12 @@ impl Link {
             self.rubbish_refused += 1;
             return;
         }
+        let (surface, inside) = vertices.split_at(header.vertex_count as usize);
+        let places = |part: &[Vertex]| part.iter().map(|v| v.position_m).collect();
         let snapshot = Snapshot {
             header,
-            positions_m: vertices.iter().map(|v| v.position_m).collect(),
+            positions_m: places(surface),
+            displacements_m: places(inside),
         };
         self.latest.snapshot.put(self.latest.id(), header.session_id, snapshot);
     }

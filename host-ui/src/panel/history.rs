@@ -36,8 +36,9 @@ pub struct Timing {
     pub samples: usize,
     pub wake: Percentiles,
     pub work: Percentiles,
-    /// Counts of wake-up latencies by [`bin_edges_us`].
-    pub histogram: Vec<u32>,
+    /// Counts by [`bin_low_us`].
+    pub wake_histogram: Vec<u32>,
+    pub work_histogram: Vec<u32>,
 }
 
 #[derive(Default)]
@@ -89,14 +90,15 @@ impl History {
             self.scratch.clear();
             self.scratch.extend(self.timings.iter().map(|t| t[which]));
             self.scratch.sort_unstable();
-            percentiles(&self.scratch)
+            (percentiles(&self.scratch), histogram(&self.scratch))
         };
-        let (work, wake) = (of(1), of(0));
+        let ((work, work_histogram), (wake, wake_histogram)) = (of(1), of(0));
         self.timing = Timing {
             samples: self.timings.len(),
             wake,
             work,
-            histogram: histogram(&self.scratch),
+            wake_histogram,
+            work_histogram,
         };
     }
 

@@ -5,13 +5,16 @@ pub mod history;
 pub mod parameters;
 pub mod plots;
 mod seeds;
+pub mod setup;
 mod shown;
 pub mod status;
 pub mod workflow;
 
 pub use seeds::{SeedError, seed_errors};
-pub use shown::{LoadState, Note, Shown};
+pub use shown::{FrameCost, LoadState, Note, Shown};
 
+use crate::settings::Layout;
+use crate::view::scene3d::Preset;
 use std::path::PathBuf;
 use stylet_shm_schema::CommandKind;
 
@@ -26,12 +29,30 @@ pub enum Action {
     Retract,
     /// Depth along the path from the entry, m.
     MoveTo(f64),
+    /// A hand on the needle: depth along the path, m. Carried out once a frame at most.
+    DriveTo(f64),
+    /// The one thing to do in the step that is next.
+    Next,
+    /// Takes back the last step, where it can be.
+    Undo,
     RunAll,
     StopRun,
     LoadScene(PathBuf),
+    CancelLoad,
     /// By its place among [`stylet_shm_schema::BUILTIN_SCENES`].
     LoadBuiltinScene(usize),
     OpenParameters,
     ToggleHelp,
     ResetView,
+    LookFrom(Preset),
+    SetLayout(Layout),
+    NextLayout,
+    ToggleFollowTip,
+    ToggleMeasure,
+    ToggleIsodose,
+    ToggleTheme,
+    /// The window as PNG.
+    SavePicture,
+    /// The refusals told so far were read.
+    PutRefusalsAway,
 }

@@ -1,32 +1,63 @@
 //! The right panel: force and depth of the last seconds, and the timing of the loop.
 
-use super::Shown;
 use super::history::{BINS, History, Percentiles, Tick, WINDOW_S, bin_low_us};
+use super::{Shown, setup};
 use crate::{format, theme};
 use egui::{Color32, RichText};
-use egui_plot::{Bar, BarChart, GridMark, Line, Plot, PlotPoints};
+use egui_plot::{AxisHints, Bar, BarChart, GridMark, Line, Plot, PlotPoints};
 
-const PLOT_HEIGHT: f32 = 102.0;
+/// What stands between and under the three plots over time.
+const BESIDE_PLOTS: f32 = 462.0;
+const PLOT_HEIGHTS: [f32; 2] = [58.0, 150.0];
 
-pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
+/// The plots share what of `height` the rest leaves.
+pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, height: f32) {
+    let each = ((height - BESIDE_PLOTS) / 3.0).clamp(PLOT_HEIGHTS[0], PLOT_HEIGHTS[1]);
+    let strip = |ui: &mut egui::Ui, style, value: fn(&Tick) -> f32| strip(ui, history, style, (each, value));
+    let tokens = theme::of(ui);
+    tension_ui(ui, shown);
     let now = |value: Option<String>| value.unwrap_or_else(|| "n/a".to_owned());
     let force = now(shown.resistance_n().map(format::force));
-    title(ui, "Force along the needle, N", &force, theme::PLOT_FORCE);
-    strip(ui, history, ("force", theme::PLOT_FORCE, [-0.5, 2.0]), |t| {
-        t.resistance_n
-    });
+    title(ui, "Force along the needle, N", &force, tokens.force);
+    strip(ui, ("force", tokens.force, [-0.5, 2.0]), |t| t.resistance_n);
     let depth = now(shown.state.map(|s| format::length(s.depth_m)));
-    title(ui, "Depth, mm", &depth, theme::PLOT_DEPTH);
-    strip(ui, history, ("depth", theme::PLOT_DEPTH, [0.0, 10.0]), |t| t.depth_mm);
+    title(ui, "Depth, mm", &depth, tokens.depth);
+    strip(ui, ("depth", tokens.depth, [0.0, 10.0]), |t| t.depth_mm);
     let worst = now(shown
         .state
         .map(|s| format::microseconds(Some(format::us(s.worst_wake_ns)))));
-    title(ui, "Wake-up latency, us", &format!("worst {worst}"), theme::PLOT_WAKE);
-    strip(ui, history, ("wake-up latency", theme::PLOT_WAKE, [0.0, 50.0]), |t| {
-        t.wake_us
-    });
+    title(ui, "Wake-up latency, us", &format!("worst {worst}"), tokens.wake);
+    strip(ui, ("wake-up latency", tokens.wake, [0.0, 50.0]), |t| t.wake_us);
     histogram_ui(ui, history);
     timing_ui(ui, shown, history);
+    setup::setup_ui(ui, shown);
+}
+
+/// What the membrane does before it gives way, which a mouse cannot let one feel.
+fn tension_ui(ui: &mut egui::Ui, shown: &Shown) {
+    let tokens = theme::of(ui);
+    let tension = shown.membrane_tension();
+    let words = match tension {
+        Some(share) => format!("{:.0} % of the puncture", share * 100.0),
+        None if shown.has_punctured() => "punctured".to_owned(),
+        None => "slack".to_owned(),
+    };
+    title(ui, "Membrane tension", &words, tokens.text);
+    let size = egui::vec2(ui.available_width(), 8.0);
+    let (rect, response) = ui.allocate_exact_size(size, egui::Sense::hover());
+    let share = tension.unwrap_or(0.0) as f32;
+    ui.painter().rect_filled(rect, 4.0, tokens.background);
+    let mut filled = rect;
+    filled.set_width(rect.width() * share);
+    let color = if share > 0.8 { tokens.bad } else { tokens.force };
+    ui.painter().rect_filled(filled, 4.0, color);
+    let edge = rect.left() + 0.8 * rect.width();
+    ui.painter()
+        .vline(edge, rect.y_range(), egui::Stroke::new(1.0, tokens.weak));
+    response.widget_info(|| {
+        let text = format!("Membrane tension {words}");
+        egui::WidgetInfo::labeled(egui::accesskit::Role::ProgressIndicator, true, text)
+    });
 }
 
 fn title(ui: &mut egui::Ui, name: &str, value: &str, color: Color32) {
@@ -42,12 +73,12 @@ fn strip(
     ui: &mut egui::Ui,
     history: &History,
     (name, color, least): (&str, Color32, [f64; 2]),
-    value: impl Fn(&Tick) -> f32,
+    (height, value): (f32, fn(&Tick) -> f32),
 ) {
     let buckets = ui.available_width().max(50.0) as usize;
     let points = history.decimated(buckets, value);
     plot(name)
-        .height(PLOT_HEIGHT)
+        .height(height)
         .include_x(-WINDOW_S)
         .include_x(0.0)
         .include_y(least[0])
@@ -75,25 +106,32 @@ fn plot(name: &str) -> Plot<'static> {
         .allow_boxed_zoom(false)
         .allow_axis_zoom_drag(false)
         .show_x(false)
-        .y_axis_min_width(34.0)
+        .custom_y_axes(vec![AxisHints::new_y().min_thickness(34.0).label_spacing(12.0..=20.0)])
         .show_background(true)
         .set_margin_fraction(egui::vec2(0.0, 0.08))
 }
 
 /// Both axes logarithmic, because one late tick in a minute must be seen.
 fn histogram_ui(ui: &mut egui::Ui, history: &History) {
-    let timing = &history.timing;
+    let (timing, tokens) = (&history.timing, theme::of(ui));
     let ticks = format!("{} ticks", format::count(timing.samples as u64));
-    title(ui, "How often which wake-up latency", &ticks, theme::PLOT_WAKE);
-    let bars: Vec<Bar> = timing
-        .histogram
-        .iter()
-        .enumerate()
-        .filter(|(_, n)| **n > 0)
-        .map(|(bin, n)| Bar::new(bin as f64 + 0.5, f64::from(*n).log10() + 0.3).width(0.9))
-        .collect();
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Ticks by wake-up").color(tokens.wake).size(12.5));
+        ui.label(RichText::new("and work").color(tokens.work).size(12.5));
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.monospace(ticks);
+        });
+    });
+    // Side by side in each bin, so that neither hides the other.
+    let bars = |counts: &[u32], beside: f64| -> Vec<Bar> {
+        let counts = counts.iter().enumerate().filter(|(_, n)| **n > 0);
+        counts
+            .map(|(bin, n)| Bar::new(bin as f64 + beside, f64::from(*n).log10() + 0.3).width(0.45))
+            .collect()
+    };
+    let (wake, work) = (bars(&timing.wake_histogram, 0.25), bars(&timing.work_histogram, 0.75));
     plot("wake-up histogram")
-        .height(78.0)
+        .height(66.0)
         .include_x(0.0)
         .include_x(BINS as f64)
         .include_y(0.0)
@@ -103,7 +141,8 @@ fn histogram_ui(ui: &mut egui::Ui, history: &History) {
         .x_axis_formatter(|mark: GridMark, _: &_| decade(bin_low_us(mark.value.max(0.0) as usize)))
         .y_axis_formatter(|mark: GridMark, _: &_| format!("{:.0}", 10.0_f64.powf(mark.value)))
         .show(ui, |plot| {
-            plot.bar_chart(BarChart::new("ticks", bars).color(theme::PLOT_WAKE))
+            plot.bar_chart(BarChart::new("wake-up", wake).color(tokens.wake));
+            plot.bar_chart(BarChart::new("work", work).color(tokens.work));
         });
 }
 
@@ -125,6 +164,7 @@ fn decade(us: f64) -> String {
 }
 
 fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
+    ui.spacing_mut().interact_size.y = 14.0;
     egui::Grid::new("timing")
         .num_columns(5)
         .min_col_width(48.0)
@@ -142,10 +182,11 @@ fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
         return;
     };
     ui.horizontal(|ui| {
+        let tokens = theme::of(ui);
         let color = if s.missed_deadlines > 0 {
-            theme::WARN
+            tokens.warn
         } else {
-            theme::GOOD
+            tokens.good
         };
         let text = format!("missed deadlines {}", format::count(s.missed_deadlines));
         ui.label(RichText::new(text).color(color).strong());

@@ -1,9 +1,12 @@
 //! What one frame shows, taken from the link once, so that no panel touches shared memory.
 
+use crate::dose_desk::DosePicture;
 use crate::link::{Link, LinkStatus};
 use crate::workflow::Step;
+use std::sync::Arc;
 use stylet_shm_schema::{
-    Fault, HapticState, ParametersInForce, Phase, PlanInForce, PlannedSeed, SceneHeader, SeedPose, Session, flags,
+    EventKind, Fault, HapticState, ParameterId, ParametersInForce, Phase, PlanInForce, PlannedSeed, SceneHeader,
+    SeedPose, Session, flags,
 };
 
 /// Past the deepest seed the needle may go this far, and the path is drawn this far.
@@ -44,6 +47,21 @@ pub struct Shown {
     /// The last answer that the operator should read.
     pub note: Option<Note>,
     pub load: LoadState,
+    /// Of the seeds as they lie now.
+    pub dose: Option<Arc<DosePicture>>,
+    /// Why the dose is not known, where that is so.
+    pub dose_trouble: Option<&'static str>,
+    /// Refusals of requests that the operator has not yet put away, and the last reason.
+    pub refusals: u64,
+    pub last_refusal: String,
+    pub cost: FrameCost,
+}
+
+/// What the last frame cost this program.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FrameCost {
+    pub cpu_us: f64,
+    pub uploaded_bytes: u64,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -69,6 +87,11 @@ impl Shown {
             run_step: None,
             note: None,
             load: LoadState::Idle,
+            dose: None,
+            dose_trouble: None,
+            refusals: 0,
+            last_refusal: String::new(),
+            cost: FrameCost::default(),
         }
     }
 
@@ -80,6 +103,9 @@ impl Shown {
         self.plan = link.plan().filter(|p| p.generation > 0 && p.seed_count > 0).copied();
         self.parameters = link.parameters().copied();
         self.rubbish_refused = link.rubbish_refused();
+        let refusals = link.events().iter().rev();
+        let last = refusals.clone().find(|e| e.kind == EventKind::RubbishRefused as u32);
+        self.last_refusal = last.map_or_else(String::new, |e| e.text.read());
         self.seeds.clear();
         self.snapshot_residual = None;
         if let Some(snapshot) = link.snapshot() {
@@ -103,6 +129,11 @@ impl Shown {
 
     pub fn is_engaged(&self) -> bool {
         self.has_flag(flags::ENGAGED)
+    }
+
+    /// Engaged, but the force would begin with a jump.
+    pub fn is_waiting(&self) -> bool {
+        self.has_flag(flags::WAITING)
     }
 
     pub fn is_real_time(&self) -> bool {
@@ -143,6 +174,11 @@ impl Shown {
         Some(along(plan, tip))
     }
 
+    /// How deep along the planned path a place is.
+    pub fn depth_of_m(&self, place_m: [f64; 3]) -> Option<f64> {
+        Some(along(self.plan.as_ref()?, place_m))
+    }
+
     /// How far the needle may go along the path.
     pub fn path_length_m(&self) -> Option<f64> {
         let plan = self.plan.as_ref()?;
@@ -157,6 +193,26 @@ impl Shown {
     /// Depth of the deepest planned seed.
     pub fn deepest_seed_m(&self) -> Option<f64> {
         Some(self.path_length_m()? - PAST_LAST_SEED_M)
+    }
+
+    /// Depth of the deepest planned seed that no seed was dropped for; `None` when all are.
+    pub fn next_seed_m(&self) -> Option<f64> {
+        let plan = self.plan.as_ref()?;
+        let rows = super::seed_errors(self.planned(), &self.seeds, plan.direction);
+        let missing = rows.iter().filter(|row| row.placed.is_none());
+        missing
+            .map(|row| along(plan, self.planned()[row.planned].position_m))
+            .max_by(f64::total_cmp)
+    }
+
+    /// Share of the way to the puncture that the membrane in front of the tip has gone; `None` where there is none.
+    pub fn membrane_tension(&self) -> Option<f64> {
+        let state = self.state.as_ref().filter(|s| s.flags & flags::IN_CONTACT != 0)?;
+        if Phase::from_number(state.phase) != Some(Phase::Contraction) {
+            return None;
+        }
+        let at_m = self.parameters.map_or(8e-3, |p| p.set.get(ParameterId::PunctureDepth));
+        Some((state.depth_m / at_m.max(1e-6)).clamp(0.0, 1.0))
     }
 
     pub fn on_path_m(&self, depth_m: f64) -> Option<[f64; 3]> {

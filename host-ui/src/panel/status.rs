@@ -2,8 +2,10 @@
 
 use super::{Action, Shown};
 use crate::link::LinkStatus;
+use crate::settings::{SCALES, STRENGTHS_U, Settings, ThemeChoice};
+use crate::theme::Tokens;
 use crate::{format, theme};
-use egui::{Align, Color32, Layout, RichText, Sense, Vec2};
+use egui::{Align, Color32, DragValue, Layout, RichText, Sense, Vec2};
 use stylet_shm_schema::{CommandKind, Fault, ParameterId};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,11 +16,11 @@ pub enum Severity {
 }
 
 impl Severity {
-    fn color(self) -> Color32 {
+    fn color(self, tokens: &Tokens) -> Color32 {
         match self {
-            Self::Bad => theme::BAD,
-            Self::Warn => theme::WARN,
-            Self::Info => theme::LINE,
+            Self::Bad => tokens.bad,
+            Self::Warn => tokens.warn,
+            Self::Info => tokens.accent,
         }
     }
 }
@@ -65,15 +67,41 @@ pub fn banners(shown: &Shown) -> Vec<Banner> {
     if shown.state.is_some() && !shown.is_real_time() {
         list.push(not_real_time(shown));
     }
-    if shown.state.is_some() && fault == Some(Fault::None) && !shown.is_engaged() {
-        list.push(Banner {
-            severity: Severity::Info,
+    if shown.state.is_some() && fault == Some(Fault::None) {
+        list.extend(force_is_off(shown));
+    }
+    list.extend(refused(shown));
+    list
+}
+
+fn force_is_off(shown: &Shown) -> Option<Banner> {
+    if !shown.is_engaged() {
+        return Some(Banner {
+            severity: Severity::Warn,
             title: "The force is off",
-            text: "The device is moved but not felt. Key E or \"Engage force\" turns it on.".to_owned(),
-            remedy: None,
+            text: "The device is moved but not felt. Key E turns it on.".to_owned(),
+            remedy: Some(("Turn it on", Action::Send(CommandKind::Engage))),
         });
     }
-    list
+    shown.is_waiting().then(|| Banner {
+        severity: Severity::Warn,
+        title: "The force waits",
+        text: "It would begin with a jump. Move the needle until it is small: out of the tissue is surest.".to_owned(),
+        remedy: None,
+    })
+}
+
+/// Until they are put away: what was refused may have been asked by another host.
+fn refused(shown: &Shown) -> Option<Banner> {
+    (shown.refusals > 0).then(|| Banner {
+        severity: Severity::Info,
+        title: "rt-core refused",
+        text: match shown.last_refusal.as_str() {
+            "" => format!("{} requests", shown.refusals),
+            why => format!("{} requests; the last: {}", shown.refusals, why.replace('\n', "; ")),
+        },
+        remedy: Some(("Put away", Action::PutRefusalsAway)),
+    })
 }
 
 fn absent(shown: &Shown, why: &str) -> Banner {
@@ -116,12 +144,10 @@ fn sentence(text: &str) -> String {
 
 pub fn banners_ui(ui: &mut egui::Ui, list: &[Banner]) -> Option<Action> {
     let mut action = None;
+    let tokens = theme::of(ui);
+    let ink = tokens.on_signal;
     for banner in list {
-        let fill = banner.severity.color();
-        let ink = match banner.severity {
-            Severity::Info => theme::TEXT,
-            _ => theme::ON_SIGNAL,
-        };
+        let fill = banner.severity.color(tokens);
         egui::Frame::new()
             .fill(fill)
             .inner_margin(egui::Margin::symmetric(10, 5))
@@ -148,7 +174,7 @@ pub fn banners_ui(ui: &mut egui::Ui, list: &[Banner]) -> Option<Action> {
     action
 }
 
-pub fn status_ui(ui: &mut egui::Ui, shown: &Shown) -> Option<Action> {
+pub fn status_ui(ui: &mut egui::Ui, shown: &Shown, settings: &mut Settings) -> Option<Action> {
     let mut action = None;
     ui.horizontal(|ui| {
         ui.label(RichText::new("Stylet").strong().size(17.0));
@@ -159,7 +185,8 @@ pub fn status_ui(ui: &mut egui::Ui, shown: &Shown) -> Option<Action> {
             if ui.button("Help").on_hover_text("Key F1").clicked() {
                 action = Some(Action::ToggleHelp);
             }
-            if ui.button("Parameters").clicked() {
+            ui.menu_button("Settings", |ui| settings_ui(ui, settings));
+            if ui.button("Parameters").on_hover_text("Key P").clicked() {
                 action = Some(Action::OpenParameters);
             }
             force_ui(ui, shown);
@@ -168,11 +195,39 @@ pub fn status_ui(ui: &mut egui::Ui, shown: &Shown) -> Option<Action> {
     action
 }
 
+fn settings_ui(ui: &mut egui::Ui, settings: &mut Settings) {
+    ui.label(theme::weak("Colours"));
+    ui.horizontal(|ui| {
+        ui.radio_value(&mut settings.theme, ThemeChoice::Dark, "Dark");
+        ui.radio_value(&mut settings.theme, ThemeChoice::Light, "Light");
+    });
+    let label = ui.label(theme::weak("Size of words"));
+    let mut percent = settings.scale * 100.0;
+    let drag = DragValue::new(&mut percent)
+        .range(SCALES[0] * 100.0..=SCALES[1] * 100.0)
+        .speed(1.0)
+        .max_decimals(0)
+        .update_while_editing(false)
+        .suffix(" %");
+    if ui.add(drag).labelled_by(label.id).changed() {
+        settings.scale = percent / 100.0;
+    }
+    let label = ui.label(theme::weak("Air kerma strength of a seed"));
+    let drag = DragValue::new(&mut settings.seed_strength_u)
+        .range(STRENGTHS_U[0]..=STRENGTHS_U[1])
+        .speed(0.01)
+        .max_decimals(3)
+        .update_while_editing(false)
+        .suffix(" U");
+    ui.add(drag).labelled_by(label.id);
+}
+
 fn link_ui(ui: &mut egui::Ui, shown: &Shown) {
+    let tokens = theme::of(ui);
     let (word, color) = match shown.status {
-        LinkStatus::Live => ("LIVE", theme::GOOD),
-        LinkStatus::Silent { .. } => ("SILENT", theme::BAD),
-        LinkStatus::Absent { .. } => ("ABSENT", theme::BAD),
+        LinkStatus::Live => ("LIVE", tokens.good),
+        LinkStatus::Silent { .. } => ("SILENT", tokens.bad),
+        LinkStatus::Absent { .. } => ("ABSENT", tokens.bad),
     };
     let response = badge(ui, word, color);
     if let Some(session) = &shown.session {
@@ -192,28 +247,21 @@ fn link_ui(ui: &mut egui::Ui, shown: &Shown) {
     }
     if shown.state.is_some() {
         let (word, color) = if shown.is_real_time() {
-            ("REAL-TIME", theme::GOOD)
+            ("REAL-TIME", tokens.good)
         } else {
-            ("not real-time", theme::WARN)
+            ("not real-time", tokens.warn)
         };
         badge(ui, word, color);
-    }
-    if let Some(session) = &shown.session {
-        let device = session.device.read();
-        let short = format!("{:04x}", session.session_id & 0xffff);
-        let text = theme::weak(format!("{device}, session {short}"));
-        ui.add(egui::Label::new(text).truncate());
     }
 }
 
 fn badge(ui: &mut egui::Ui, word: &str, color: Color32) -> egui::Response {
+    let ink = theme::of(ui).on_signal;
     egui::Frame::new()
         .fill(color)
         .corner_radius(4)
         .inner_margin(egui::Margin::symmetric(6, 2))
-        .show(ui, |ui| {
-            ui.label(RichText::new(word).strong().size(12.0).color(theme::ON_SIGNAL))
-        })
+        .show(ui, |ui| ui.label(RichText::new(word).strong().size(12.0).color(ink)))
         .response
 }
 
@@ -259,7 +307,7 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown) {
         (true, false) => format::force(force),
         (true, true) => format!("{} of {limit:.1} N", format::force(force)),
     };
-    let (rect, response) = ui.allocate_exact_size(Vec2::new(140.0, 18.0), Sense::hover());
+    let (rect, response) = ui.allocate_exact_size(Vec2::new(90.0, 14.0), Sense::hover());
     let share = |value: f64| {
         if limit > 0.0 {
             (value / limit).clamp(0.0, 1.0) as f32
@@ -267,26 +315,26 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown) {
             0.0
         }
     };
-    let painter = ui.painter();
-    painter.rect_filled(rect, 3.0, theme::BACKGROUND);
+    let (painter, tokens) = (ui.painter(), theme::of(ui));
+    painter.rect_filled(rect, 3.0, tokens.background);
     let mut filled = rect;
     filled.set_width(rect.width() * share(force));
-    let color = if share(force) > 0.85 {
-        theme::BAD
-    } else {
-        theme::PLOT_FORCE.gamma_multiply(0.75)
-    };
+    let color = if share(force) > 0.85 { tokens.bad } else { tokens.force };
     painter.rect_filled(filled, 3.0, color);
     if peak > 0.0 && limit > 0.0 {
         let x = rect.left() + rect.width() * share(peak);
-        painter.vline(x, rect.y_range(), egui::Stroke::new(1.5, theme::TEXT));
+        painter.vline(x, rect.y_range(), egui::Stroke::new(1.5, tokens.text));
     }
-    let font = egui::FontId::proportional(12.0);
-    painter.text(rect.center(), egui::Align2::CENTER_CENTER, &label, font, theme::TEXT);
     response.widget_info(|| {
         egui::WidgetInfo::labeled(egui::accesskit::Role::ProgressIndicator, true, format!("Force {label}"))
     });
     response.on_hover_text(format!("Peak since the last reset: {}", format::force(peak)));
+    // Beside the bar: no colour of words can be read on both of its parts.
+    let size = Vec2::new(106.0, ui.spacing().interact_size.y);
+    ui.allocate_ui_with_layout(size, Layout::right_to_left(Align::Center), |ui| {
+        ui.set_min_width(size.x);
+        ui.add(egui::Label::new(theme::strong(&label)).truncate());
+    });
     ui.label(theme::small("force"));
 }
 
@@ -310,6 +358,23 @@ mod tests {
         assert!(banners(&live()).is_empty());
         let list = banners(&Shown::empty("lab"));
         assert!(list[0].text.contains("rt-core --instance lab"), "{}", list[0].text);
+    }
+
+    #[test]
+    fn a_force_that_is_off_or_waits_and_a_refusal_each_have_their_banner() {
+        let titles = |shown: &Shown| banners(shown).iter().map(|b| b.title).collect::<Vec<_>>();
+        let mut shown = live();
+        if let Some(state) = &mut shown.state {
+            state.flags |= flags::WAITING;
+        }
+        assert_eq!(titles(&shown), ["The force waits"]);
+        if let Some(state) = &mut shown.state {
+            state.flags = flags::REAL_TIME;
+        }
+        shown.refusals = 2;
+        shown.last_refusal = "needle.puncture_depth = 1000 mm".to_owned();
+        assert_eq!(titles(&shown), ["The force is off", "rt-core refused"]);
+        assert!(banners(&shown)[1].text.contains("puncture_depth"));
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! What a procedure is asked to do: needles with what is planned and what is done, from a plan file or as the scene suggests.
 
+use crate::dose::files::SeedDefaults;
+use crate::dose::source::Source;
 use crate::link::{Link, SceneModel};
 use crate::plan::compensate::summary_m;
 use crate::plan::file::{self, Frames};
 use crate::plan::rehearse::{Drops, LinkRehearser};
-use crate::plan::{Anatomy, Compensation, Hole, ImplantPlan, Limits, Needle, check, compensate};
+use crate::plan::{Anatomy, Compensation, Hole, ImplantPlan, Limits, Needle, Template, check, compensate};
 use crate::workflow::{NeedlePlan, NeedleTask, Pace, plan_with_seeds};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -42,6 +44,20 @@ pub struct Job {
     pub compensations: Vec<Compensation>,
 }
 
+/// Needles for seeds that say nothing of them, nor of what is prescribed: the usual source's.
+fn from_seeds(path: &Path, scene: &SceneModel, frames: &Frames) -> Result<ImplantPlan, String> {
+    let source = Source::known(USUAL_SOURCE).ok_or("the usual source is not known")?;
+    let prescription_gy = source.prescription_gy.ok_or("the usual source has no prescription")?;
+    let defaults = SeedDefaults {
+        strength_u: None,
+        strength_per_activity_u_per_mci: source.strength_per_activity_u_per_mci,
+    };
+    let template = Template::before(&scene.header);
+    file::import_csv(path, defaults, frames, template, &source.model, prescription_gy)
+}
+
+const USUAL_SOURCE: &str = "6711";
+
 impl Job {
     /// One needle through the middle of the target.
     pub fn suggested(scene: &SceneModel, seeds: usize) -> Self {
@@ -53,9 +69,15 @@ impl Job {
         }
     }
 
-    /// From a plan file in the patient's frame. What is doubtful in it is told and not refused.
+    /// From a plan file, a table of seeds or an RT Plan, in the patient's frame. What is doubtful in it is told and not
+    /// refused.
     pub fn from_file(path: &Path, scene: &SceneModel) -> Result<Self, String> {
-        let plan = file::read(path, &Frames::new(&scene.header.patient_from_scene))?;
+        let frames = Frames::new(&scene.header.patient_from_scene);
+        let is_plan = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+        let plan = match is_plan {
+            true => file::read(path, &frames)?,
+            false => from_seeds(path, scene, &frames)?,
+        };
         let told = |why: String| format!("{}: {why}", path.display());
         if plan.seed_count() == 0 || plan.seed_count() > MAX_SEEDS {
             return Err(told(format!(

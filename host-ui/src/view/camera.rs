@@ -30,8 +30,25 @@ impl Camera {
             target_m,
             yaw_rad: 0.5,
             pitch_rad: 0.32,
-            distance_m: (radius_m * 5.2).clamp(NEAREST_M, FARTHEST_M),
+            distance_m: (radius_m * 4.7).clamp(NEAREST_M, FARTHEST_M),
         }
+    }
+
+    /// The same distance, looking along `forward` (scene frame).
+    pub fn look_along(&mut self, forward: Vector3<f32>) {
+        let Some(f) = forward.try_normalize(1e-6) else { return };
+        self.pitch_rad = (-f.y).asin().clamp(-STEEPEST_RAD, STEEPEST_RAD);
+        if f.x.hypot(f.z) > 1e-3 {
+            self.yaw_rad = f.z.atan2(f.x);
+        }
+    }
+
+    /// From the eye through a place on the picture (0 to 1 from the upper left); a unit vector.
+    pub fn ray(&self, aspect: f32, [x, y]: [f32; 2]) -> Vector3<f32> {
+        let (right, up) = self.right_and_up();
+        let half = (0.5 * FIELD_OF_VIEW_RAD).tan();
+        let (across, along) = ((2.0 * x - 1.0) * half * aspect, (1.0 - 2.0 * y) * half);
+        (self.forward() + right * across + up * along).normalize()
     }
 
     pub fn orbit(&mut self, turn_rad: [f32; 2]) {
@@ -111,6 +128,30 @@ mod tests {
         assert!(right > x);
         let [_, above] = camera.project(1.5, [0.01, 0.03, 0.03]).expect("in front");
         assert!(above < y);
+    }
+
+    #[test]
+    fn a_ray_goes_through_the_place_that_it_is_seen_at() {
+        let mut camera = Camera::looking_at([0.01, 0.02, 0.03], 0.05);
+        camera.orbit([0.3, -0.2]);
+        let point = Vector3::new(0.03, 0.01, 0.05);
+        let at = camera.project(1.4, point.into()).expect("in front");
+        let ray = camera.ray(1.4, at);
+        let to_point = point - camera.eye_m();
+        assert!((to_point.normalize() - ray).norm() < 1e-4, "{ray}");
+    }
+
+    #[test]
+    fn looking_along_an_axis_looks_along_it() {
+        let mut camera = Camera::default();
+        for axis in [Vector3::z(), Vector3::x(), -Vector3::z(), Vector3::new(0.6, -0.5, 0.6)] {
+            camera.look_along(axis);
+            assert!((camera.forward() - axis.normalize()).norm() < 1e-5, "{axis}");
+        }
+        camera.look_along(-Vector3::y());
+        assert!(camera.forward().y < -0.99);
+        camera.look_along(Vector3::zeros());
+        assert!(camera.forward().iter().all(|c| c.is_finite()));
     }
 
     #[test]

@@ -25,6 +25,8 @@ pub struct SceneUniform {
     pub light: [f32; 4],
     pub surface: [f32; 4],
     pub look: [f32; 4],
+    /// Normal and offset of the plane in front of which surfaces are cut away; a normal of zero cuts nothing.
+    pub section: [f32; 4],
 }
 
 /// A buffer that grows by doubling and is otherwise reused.
@@ -44,13 +46,14 @@ impl Growing {
         }
     }
 
-    fn write<T: Pod>(&mut self, state: &RenderState, items: &[T]) {
+    /// Gives the number of bytes sent.
+    fn write<T: Pod>(&mut self, state: &RenderState, items: &[T]) -> u64 {
         let bytes: &[u8] = bytemuck::cast_slice(items);
         let size = bytes.len() as u64;
         if size > state.device.limits().max_buffer_size {
             // A scene that does not fit is not drawn; the rest of the window goes on.
             self.len = 0;
-            return;
+            return 0;
         }
         if size > self.buffer.size() {
             self.buffer = allocate(&state.device, self.usage, size.next_power_of_two());
@@ -59,6 +62,7 @@ impl Growing {
             state.queue.write_buffer(&self.buffer, 0, bytes);
         }
         self.len = items.len() as u32;
+        size
     }
 }
 
@@ -97,6 +101,13 @@ struct Layer {
     material: Material,
 }
 
+/// A surface of one dose.
+struct Shell {
+    vertices: Growing,
+    indices: Growing,
+    material: Material,
+}
+
 pub struct Gpu {
     state: RenderState,
     layout: wgpu::BindGroupLayout,
@@ -104,12 +115,16 @@ pub struct Gpu {
     /// The body's surface, then those inside it.
     surfaces: Vec<Layer>,
     ghost: Material,
-    solids: Growing,
-    lines: Growing,
+    /// Marks that change with the plan, then those that change with every tick.
+    solids: [Growing; 2],
+    lines: [Growing; 2],
     surface_vertices: Growing,
     ghost_vertices: Growing,
     indices: Growing,
+    shells: Vec<Shell>,
     targets: Option<Targets>,
+    /// Bytes sent to the card since the window opened.
+    pub uploaded_bytes: u64,
 }
 
 impl Gpu {
@@ -133,12 +148,14 @@ impl Gpu {
             pipelines: pipelines(device, &layout),
             surfaces: Vec::new(),
             ghost: material(device, &layout),
-            solids: Growing::new(device, vertex),
-            lines: Growing::new(device, vertex),
+            solids: [Growing::new(device, vertex), Growing::new(device, vertex)],
+            lines: [Growing::new(device, vertex), Growing::new(device, vertex)],
             surface_vertices: Growing::new(device, vertex),
             ghost_vertices: Growing::new(device, vertex),
             indices: Growing::new(device, wgpu::BufferUsages::INDEX),
+            shells: Vec::new(),
             targets: None,
+            uploaded_bytes: 0,
             layout,
             state,
         }
@@ -146,8 +163,8 @@ impl Gpu {
 
     /// The indices of each surface, the body's first.
     pub fn set_scene(&mut self, rest: &[SurfaceVertex], surfaces: &[Vec<u32>]) {
-        self.ghost_vertices.write(&self.state, rest);
-        self.indices.write(&self.state, &surfaces.concat());
+        self.uploaded_bytes += self.ghost_vertices.write(&self.state, rest);
+        self.uploaded_bytes += self.indices.write(&self.state, &surfaces.concat());
         let mut end = 0;
         self.surfaces.clear();
         for indices in surfaces {
@@ -161,12 +178,30 @@ impl Gpu {
     }
 
     pub fn set_surface(&mut self, vertices: &[SurfaceVertex]) {
-        self.surface_vertices.write(&self.state, vertices);
+        self.uploaded_bytes += self.surface_vertices.write(&self.state, vertices);
     }
 
-    pub fn set_marks(&mut self, marks: &Marks) {
-        self.solids.write(&self.state, &marks.triangles);
-        self.lines.write(&self.state, &marks.lines);
+    /// Vertices and indices of each isodose surface.
+    pub fn set_shells(&mut self, shells: &[(Vec<SurfaceVertex>, Vec<u32>)]) {
+        let device = &self.state.device;
+        while self.shells.len() < shells.len() {
+            self.shells.push(Shell {
+                vertices: Growing::new(device, wgpu::BufferUsages::VERTEX),
+                indices: Growing::new(device, wgpu::BufferUsages::INDEX),
+                material: material(device, &self.layout),
+            });
+        }
+        self.shells.truncate(shells.len());
+        for (shell, (vertices, indices)) in self.shells.iter_mut().zip(shells) {
+            self.uploaded_bytes += shell.vertices.write(&self.state, vertices);
+            self.uploaded_bytes += shell.indices.write(&self.state, indices);
+        }
+    }
+
+    /// `which` is 0 for marks of the plan, 1 for those of the tick.
+    pub fn set_marks(&mut self, which: usize, marks: &Marks) {
+        self.uploaded_bytes += self.solids[which].write(&self.state, &marks.triangles);
+        self.uploaded_bytes += self.lines[which].write(&self.state, &marks.lines);
     }
 
     /// Sizes in pixels. True when the picture is new and has to be drawn.
@@ -185,13 +220,24 @@ impl Gpu {
     }
 
     /// Opaque first, then the rest shape, then the body's far side, what is in the body, and the body's near side.
-    /// `looks` has one uniform for each surface.
-    pub fn draw(&mut self, looks: &[SceneUniform], ghost: Option<&SceneUniform>, clear: [f64; 3]) {
+    /// `looks` has one uniform for each surface, `shells` one for each isodose surface; those that are not there are not drawn.
+    pub fn draw(
+        &mut self,
+        looks: &[SceneUniform],
+        shells: &[SceneUniform],
+        ghost: Option<&SceneUniform>,
+        clear: [f64; 3],
+    ) {
         let Some(targets) = &self.targets else { return };
         let queue = &self.state.queue;
         for (surface, look) in self.surfaces.iter().zip(looks) {
             queue.write_buffer(&surface.material.uniform, 0, bytemuck::bytes_of(look));
         }
+        for (shell, look) in self.shells.iter().zip(shells) {
+            queue.write_buffer(&shell.material.uniform, 0, bytemuck::bytes_of(look));
+        }
+        let uniforms = looks.len() + shells.len() + 1;
+        self.uploaded_bytes += (uniforms * size_of::<SceneUniform>()) as u64;
         // Marks take the light and the eye from it.
         if let Some(ghost) = ghost.or(looks.first()) {
             queue.write_buffer(&self.ghost.uniform, 0, bytemuck::bytes_of(ghost));
@@ -205,8 +251,12 @@ impl Gpu {
         {
             let mut pass = begin(&mut encoder, targets, clear);
             pass.set_bind_group(0, &self.ghost.bind, &[]);
-            draw_list(&mut pass, &self.pipelines.solid, &self.solids);
-            draw_list(&mut pass, &self.pipelines.line, &self.lines);
+            for list in &self.solids {
+                draw_list(&mut pass, &self.pipelines.solid, list);
+            }
+            for list in &self.lines {
+                draw_list(&mut pass, &self.pipelines.line, list);
+            }
             let (far, near) = (&self.pipelines.surface_back, &self.pipelines.surface_front);
             if let Some((body, inner)) = self.surfaces.split_first() {
                 if ghost.is_some() {
@@ -214,6 +264,7 @@ impl Gpu {
                 }
                 let now = &self.surface_vertices;
                 self.draw_surface(&mut pass, far, now, &body.material, &body.indices);
+                self.draw_shells(&mut pass, shells.len());
                 for surface in inner {
                     self.draw_surface(&mut pass, far, now, &surface.material, &surface.indices);
                     self.draw_surface(&mut pass, near, now, &surface.material, &surface.indices);
@@ -222,6 +273,19 @@ impl Gpu {
             }
         }
         queue.submit([encoder.finish()]);
+    }
+
+    /// The highest dose is innermost and comes first.
+    fn draw_shells(&self, pass: &mut wgpu::RenderPass<'_>, count: usize) {
+        for shell in self.shells.iter().take(count).rev().filter(|s| s.indices.len > 0) {
+            for pipeline in [&self.pipelines.surface_back, &self.pipelines.surface_front] {
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, &shell.material.bind, &[]);
+                pass.set_vertex_buffer(0, shell.vertices.buffer.slice(..));
+                pass.set_index_buffer(shell.indices.buffer.slice(..), wgpu::IndexFormat::Uint32);
+                pass.draw_indexed(0..shell.indices.len, 0, 0..1);
+            }
+        }
     }
 
     fn draw_surface(

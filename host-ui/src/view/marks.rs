@@ -1,6 +1,6 @@
 //! Solids and lines that are not tissue: needle, seeds, path, entry, grid and axes.
 
-use crate::theme;
+use crate::theme::{DARK, Tokens};
 use bytemuck::{Pod, Zeroable};
 use egui::Color32;
 use nalgebra::Vector3;
@@ -29,10 +29,20 @@ pub struct MarkVertex {
 }
 
 /// Triangles and line segments of one picture, both as plain lists.
-#[derive(Default)]
 pub struct Marks {
     pub triangles: Vec<MarkVertex>,
     pub lines: Vec<MarkVertex>,
+    tokens: &'static Tokens,
+}
+
+impl Default for Marks {
+    fn default() -> Self {
+        Self {
+            triangles: Vec::new(),
+            lines: Vec::new(),
+            tokens: &DARK,
+        }
+    }
 }
 
 fn single(v: [f64; 3]) -> V {
@@ -51,7 +61,9 @@ fn frame_about(axis: V) -> (V, V) {
 }
 
 impl Marks {
-    pub fn clear(&mut self) {
+    /// Empty, for a picture in these colours.
+    pub fn begin(&mut self, tokens: &'static Tokens) {
+        self.tokens = tokens;
         self.triangles.clear();
         self.lines.clear();
     }
@@ -60,22 +72,22 @@ impl Marks {
         let (tip, axis) = (single(tip_m), unit_or_z(single(direction)));
         let shoulder = tip - axis * BEVEL_M;
         let hub = tip - axis * NEEDLE_LENGTH_M;
-        self.cone(hub, shoulder, [NEEDLE_RADIUS_M, NEEDLE_RADIUS_M], theme::NEEDLE);
-        self.cone(shoulder, tip, [NEEDLE_RADIUS_M, 0.0], theme::NEEDLE_TIP);
+        self.cone(hub, shoulder, [NEEDLE_RADIUS_M, NEEDLE_RADIUS_M], self.tokens.needle);
+        self.cone(shoulder, tip, [NEEDLE_RADIUS_M, 0.0], self.tokens.needle_tip);
         // The hub, so that a person sees which end is held.
         let grip = hub - axis * 0.012;
-        self.cone(grip, hub, [2.6e-3, 2.0e-3], theme::PATH);
-        self.cone(grip - axis * 1e-4, grip, [0.0, 2.6e-3], theme::PATH);
-        self.cone(hub, hub + axis * 1e-4, [2.0e-3, 0.0], theme::PATH);
+        self.cone(grip, hub, [2.6e-3, 2.0e-3], self.tokens.path);
+        self.cone(grip - axis * 1e-4, grip, [0.0, 2.6e-3], self.tokens.path);
+        self.cone(hub, hub + axis * 1e-4, [2.0e-3, 0.0], self.tokens.path);
     }
 
     pub fn placed_seed(&mut self, center_m: [f64; 3], axis: [f64; 3]) {
         let (center, axis) = (single(center_m), unit_or_z(single(axis)));
         let half = axis * (0.5 * SEED_LENGTH_M - SEED_RADIUS_M);
         let radius = SEED_RADIUS_M * 1.35;
-        self.cone(center - half, center + half, [radius, radius], theme::SEED_PLACED);
-        self.cap(center + half, axis, radius, theme::SEED_PLACED);
-        self.cap(center - half, -axis, radius, theme::SEED_PLACED);
+        self.cone(center - half, center + half, [radius, radius], self.tokens.seed_placed);
+        self.cap(center + half, axis, radius, self.tokens.seed_placed);
+        self.cap(center - half, -axis, radius, self.tokens.seed_placed);
     }
 
     /// Three rings, a wire sphere: nothing like the capsule of a placed seed.
@@ -83,7 +95,7 @@ impl Marks {
         let (center, axis) = (single(center_m), unit_or_z(single(direction)));
         let (u, v) = frame_about(axis);
         for (a, b) in [(u, v), (axis, u), (axis, v)] {
-            self.ring(center, a, b, RING_RADIUS_M, theme::SEED_PLANNED);
+            self.ring(center, a, b, RING_RADIUS_M, self.tokens.seed_planned);
         }
     }
 
@@ -95,7 +107,7 @@ impl Marks {
         for dash in 0..dashes {
             let start = dash as f32 * 2.0 * DASH_M;
             let end = (start + DASH_M).min(length);
-            self.cone(from + axis * start, from + axis * end, [0.17e-3; 2], theme::PATH);
+            self.cone(from + axis * start, from + axis * end, [0.17e-3; 2], self.tokens.path);
         }
     }
 
@@ -103,9 +115,65 @@ impl Marks {
     pub fn entry(&mut self, place_m: [f64; 3], direction: [f64; 3]) {
         let (center, axis) = (single(place_m), unit_or_z(single(direction)));
         let (u, v) = frame_about(axis);
-        self.ring(center, u, v, 3.2e-3, theme::ENTRY);
+        self.ring(center, u, v, 3.2e-3, self.tokens.entry);
         for arm in [u, -u, v, -v] {
-            self.cone(center + arm * 2.0e-3, center + arm * 4.6e-3, [0.2e-3; 2], theme::ENTRY);
+            self.cone(
+                center + arm * 2.0e-3,
+                center + arm * 4.6e-3,
+                [0.2e-3; 2],
+                self.tokens.entry,
+            );
+        }
+    }
+
+    /// What the hand feels, from the tip, 4 mm for each newton.
+    pub fn force(&mut self, tip_m: [f64; 3], force_n: [f64; 3]) {
+        const M_PER_N: f32 = 4e-3;
+        const LEAST_N: f32 = 0.05;
+        const HEAD_M: f32 = 3e-3;
+        let (tip, force) = (single(tip_m), single(force_n));
+        let size = force.norm();
+        // A force that is not a number is not drawn either.
+        if !(size >= LEAST_N) {
+            return;
+        }
+        let axis = force / size;
+        let end = tip + axis * (size * M_PER_N).min(0.06);
+        self.cone(tip, end, [0.5e-3; 2], self.tokens.force);
+        self.cone(end, end + axis * HEAD_M, [1.3e-3, 0.0], self.tokens.force);
+        self.cone(end - axis * 1e-4, end, [0.0, 1.3e-3], self.tokens.force);
+    }
+
+    /// 13 by 13 holes 5 mm apart about the needle's path, `before_m` before the entry.
+    pub fn template(&mut self, entry_m: [f64; 3], direction: [f64; 3], before_m: f32) {
+        const HOLES: i32 = 6;
+        const PITCH_M: f32 = 5e-3;
+        const ARM_M: f32 = 0.7e-3;
+        let (entry, axis) = (single(entry_m), unit_or_z(single(direction)));
+        let (u, v) = frame_about(axis);
+        let middle = entry - axis * before_m;
+        for row in -HOLES..=HOLES {
+            for column in -HOLES..=HOLES {
+                let hole = middle + (u * row as f32 + v * column as f32) * PITCH_M;
+                self.line(hole - u * ARM_M, hole + u * ARM_M, self.tokens.template);
+                self.line(hole - v * ARM_M, hole + v * ARM_M, self.tokens.template);
+            }
+        }
+        let edge = (HOLES as f32 + 1.0) * PITCH_M;
+        let corners =
+            [(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)].map(|(a, b)| middle + u * (a * edge) + v * (b * edge));
+        for side in 0..4 {
+            self.line(corners[side], corners[(side + 1) % 4], self.tokens.template);
+        }
+    }
+
+    /// A line between two places, or a ring about one.
+    pub fn measured(&mut self, points: &[V]) {
+        for point in points {
+            self.ring(*point, V::x(), V::y(), 0.8e-3, self.tokens.measure);
+        }
+        if let [a, b] = points {
+            self.cone(*a, *b, [0.2e-3; 2], self.tokens.measure);
         }
     }
 
@@ -123,19 +191,19 @@ impl Marks {
         let (z0, nz) = cells(lower.z, upper.z);
         let at = |i: usize, k: usize| V::new((x0 + i as f32) * STEP_M, y, (z0 + k as f32) * STEP_M);
         for i in 0..=nx {
-            self.line(at(i, 0), at(i, nz), theme::GRID);
+            self.line(at(i, 0), at(i, nz), self.tokens.grid);
         }
         for k in 0..=nz {
-            self.line(at(0, k), at(nx, k), theme::GRID);
+            self.line(at(0, k), at(nx, k), self.tokens.grid);
         }
         let corner = at(nx, 0);
         for axis in [V::x(), V::y(), V::z()] {
-            self.cone(corner, corner + axis * STEP_M, [0.2e-3; 2], theme::WEAK);
+            self.cone(corner, corner + axis * STEP_M, [0.2e-3; 2], self.tokens.weak);
             self.cone(
                 corner + axis * STEP_M,
                 corner + axis * 1.25 * STEP_M,
                 [0.6e-3, 0.0],
-                theme::WEAK,
+                self.tokens.weak,
             );
         }
         corner.into()
@@ -233,6 +301,10 @@ mod tests {
         marks.planned_seed([0.0; 3], [0.0; 3]);
         marks.path([0.0; 3], [0.0; 3]);
         marks.ground([-20.0; 3], [20.0; 3]);
+        marks.force([0.0; 3], [f64::NAN; 3]);
+        marks.force([0.0; 3], [100.0, 0.0, 0.0]);
+        marks.template([0.0; 3], [0.0; 3], 5e-3);
+        marks.measured(&[V::zeros(), V::zeros()]);
         let all = marks.triangles.iter().chain(&marks.lines);
         assert!(
             all.flat_map(|v| v.place_m.iter().chain(&v.normal))

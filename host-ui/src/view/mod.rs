@@ -1,7 +1,13 @@
-//! What is drawn of the body: the deforming gland, the needle and the seeds, in three dimensions.
+//! What is drawn of the body: the deforming gland, the needle and the seeds, in three dimensions and in slices.
 
 pub mod camera;
 mod gpu;
+mod kinds;
+mod legend;
 mod marks;
 mod mesh;
+pub mod middle;
+mod pick;
 pub mod scene3d;
+pub mod slice;
+pub mod state;

@@ -8,6 +8,8 @@ struct Scene {
     surface: vec4<f32>,
     // x: strength of the rim, y: how much the facing part fades.
     look: vec4<f32>,
+    // Normal and offset of the section; what lies in front of it is cut away.
+    section: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> scene: Scene;
@@ -52,6 +54,9 @@ fn surface_vertex(@location(0) place_m: vec3<f32>, @location(1) normal: vec3<f32
 
 @fragment
 fn surface_fragment(in: SurfaceOut, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+    if dot(scene.section.xyz, in.place_m) > scene.section.w {
+        discard;
+    }
     let to_eye = normalize(scene.eye_m.xyz - in.place_m);
     var n = in.normal / max(length(in.normal), 1e-12);
     if !front {

@@ -1,19 +1,33 @@
-//! The picture in the middle: what it shows, how the pointer turns it, and the words drawn over it.
+//! The three-dimensional picture: what it shows, and how the pointer turns it.
 
 use super::camera::Camera;
 use super::gpu::{Gpu, SceneUniform};
+use super::kinds::{kinds, surfaces};
+use super::legend::Legend;
 use super::marks::Marks;
 use super::mesh::{self, SurfaceVertex};
+use super::pick::pick;
+use super::slice::{Orientation, scene_from_patient};
+use super::state::ViewState;
+use crate::dose_desk::DosePicture;
 use crate::link::{SceneModel, Snapshot};
 use crate::panel::Shown;
-use crate::{format, theme};
+use crate::theme::{self, IMAGE, Tokens};
 use eframe::egui_wgpu::RenderState;
-use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense, Stroke, Vec2};
+use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense};
+use nalgebra::Vector3;
 use std::sync::Arc;
-use stylet_shm_schema::{SceneHeader, StructureInfo, role};
 
 const TURN_PER_POINT_RAD: f32 = 0.008;
 const LIGHT: [f32; 4] = [-0.48, 0.78, -0.40, 0.0];
+/// Behind the entry, where the template is held.
+const TEMPLATE_BEFORE_M: f32 = 0.01;
+/// The needle's own view is from so far behind the tip.
+const NEEDLE_VIEW_M: f32 = 0.06;
+/// A picture wider than this has room for words about doses.
+const ALONE: f32 = 500.0;
+/// Opacity of isodose surfaces.
+const SHELL: f32 = 0.30;
 
 /// What a person set; the same settings and the same data give the same picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +35,8 @@ pub struct Look {
     /// 0 opaque, 1 not to be seen.
     pub transparency: f32,
     pub rest_shape: bool,
+    pub force: bool,
+    pub template: bool,
 }
 
 impl Default for Look {
@@ -28,30 +44,68 @@ impl Default for Look {
         Self {
             transparency: 0.55,
             rest_shape: false,
+            force: true,
+            template: false,
+        }
+    }
+}
+
+/// Places to look from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preset {
+    Oblique,
+    Perineum,
+    Side,
+    Above,
+    Needle,
+}
+
+impl Preset {
+    pub const ALL: [Self; 5] = [Self::Oblique, Self::Perineum, Self::Side, Self::Above, Self::Needle];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Oblique => "Oblique",
+            Self::Perineum => "From the perineum",
+            Self::Side => "From the side",
+            Self::Above => "From above",
+            Self::Needle => "Along the needle",
         }
     }
 }
 
 /// Everything a picture depends on: drawn again only when one of them changed.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, PartialEq)]
 struct Key {
     camera: Camera,
     look: Look,
+    view: ViewState,
     scene: (u64, u64),
-    snapshot: (u64, u64),
+    surface: u64,
     plan: u64,
     tip: [f64; 3],
-    seed_count: usize,
+    force: [f64; 3],
+    seeds: Vec<[f64; 3]>,
+    dose: u64,
+    dark: bool,
 }
 
 pub struct Scene3d {
     gpu: Option<Gpu>,
     pub camera: Camera,
     pub look: Look,
+    model: Option<Arc<SceneModel>>,
     /// Session and generation of the surface that the card has.
     uploaded_scene: Option<(u64, u64)>,
     uploaded_snapshot: Option<(u64, u64)>,
+    positions_m: Vec<[f32; 3]>,
+    /// Rises whenever they change.
+    surface: u64,
+    /// The dose that the card has.
+    shells: u64,
     drawn: Option<Key>,
+    /// What the marks of the plan were made for: scene, plan, template, colours.
+    fixed: Option<((u64, u64), u64, bool, bool)>,
     marks: Marks,
     /// Where the axes are drawn.
     corner_m: Option<[f32; 3]>,
@@ -64,28 +118,53 @@ impl Scene3d {
             gpu: state.map(Gpu::new),
             camera: Camera::default(),
             look: Look::default(),
+            model: None,
             uploaded_scene: None,
             uploaded_snapshot: None,
+            positions_m: Vec::new(),
+            surface: 0,
+            shells: 0,
             drawn: None,
+            fixed: None,
             marks: Marks::default(),
             corner_m: None,
             vertices: Vec::new(),
         }
     }
 
-    pub fn reset_view(&mut self, shown: &Shown) {
-        self.camera = match &shown.scene {
-            None => Camera::default(),
-            Some(scene) => {
-                let middle = [0, 1, 2].map(|i| (0.5 * (scene.lower_m[i] + scene.upper_m[i])) as f32);
-                let size = [0, 1, 2].map(|i| (scene.upper_m[i] - scene.lower_m[i]) as f32);
-                let radius = 0.5 * size.iter().map(|s| s * s).sum::<f32>().sqrt();
-                Camera::looking_at(middle, radius.clamp(5e-3, 1.0))
-            }
-        };
+    pub fn uploaded_bytes(&self) -> u64 {
+        self.gpu.as_ref().map_or(0, |gpu| gpu.uploaded_bytes)
     }
 
-    /// Hands to the card what is new since the last frame, and nothing else.
+    pub fn reset_view(&mut self, shown: &Shown) {
+        if let Some(scene) = &shown.scene {
+            let (low, high) = (scene.target_lower_m, scene.target_upper_m);
+            let middle = [0, 1, 2].map(|a| (0.5 * (low[a] + high[a])) as f32);
+            let radius = (0..3).map(|a| (0.5 * (high[a] - low[a])).powi(2)).sum::<f64>().sqrt() as f32;
+            self.camera = Camera::looking_at(middle, radius);
+        }
+    }
+
+    pub fn look_from(&mut self, preset: Preset, shown: &Shown) {
+        self.reset_view(shown);
+        let Some(scene) = &shown.scene else { return };
+        let patient = scene_from_patient(scene);
+        let along = |axis: Vector3<f64>| (patient * axis).map(|c| c as f32);
+        match preset {
+            Preset::Oblique => {}
+            Preset::Perineum => self.camera.look_along(along(Vector3::z())),
+            Preset::Side => self.camera.look_along(along(Vector3::x())),
+            Preset::Above => self.camera.look_along(along(-Vector3::y())),
+            Preset::Needle => {
+                if let (Some(tip), Some(state)) = (shown.tip_m(), &shown.state) {
+                    self.camera.target_m = tip.map(|c| c as f32);
+                    self.camera.distance_m = NEEDLE_VIEW_M;
+                    self.camera.look_along(state.needle_direction.map(|c| c as f32).into());
+                }
+            }
+        }
+    }
+
     pub fn take(&mut self, shown: &Shown, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
         let Some(model) = model else { return };
         let scene_key = (model.header.session_id, model.header.generation);
@@ -93,7 +172,9 @@ impl Scene3d {
             self.uploaded_scene = Some(scene_key);
             self.uploaded_snapshot = None;
             self.drawn = None;
+            self.model = Some(model.clone());
             self.reset_view(shown);
+            self.positions_m.clone_from(&model.rest_m);
             mesh::surface(&model.rest_m, &model.triangles, &mut self.vertices);
             if let Some(gpu) = &mut self.gpu {
                 gpu.set_scene(&self.vertices, &surfaces(model));
@@ -102,39 +183,63 @@ impl Scene3d {
         }
         let Some(snapshot) = snapshot else { return };
         let snapshot_key = (snapshot.header.session_id, snapshot.header.tissue_tick);
-        if self.uploaded_snapshot != Some(snapshot_key) && snapshot.positions_m.len() == model.rest_m.len() {
-            self.uploaded_snapshot = Some(snapshot_key);
-            mesh::surface(&snapshot.positions_m, &model.triangles, &mut self.vertices);
-            if let Some(gpu) = &mut self.gpu {
-                gpu.set_surface(&self.vertices);
-            }
+        if self.uploaded_snapshot == Some(snapshot_key) || snapshot.positions_m.len() != model.rest_m.len() {
+            return;
+        }
+        self.uploaded_snapshot = Some(snapshot_key);
+        // Tissue at rest is sent 200 times a second too.
+        if self.positions_m == snapshot.positions_m {
+            return;
+        }
+        self.positions_m.clone_from(&snapshot.positions_m);
+        self.surface += 1;
+        mesh::surface(&snapshot.positions_m, &model.triangles, &mut self.vertices);
+        if let Some(gpu) = &mut self.gpu {
+            gpu.set_surface(&self.vertices);
         }
     }
 
-    pub fn scene3d_ui(&mut self, ui: &mut egui::Ui, shown: &Shown) {
-        let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+    pub fn scene3d_ui(
+        &mut self,
+        ui: &mut egui::Ui,
+        rect: Rect,
+        (shown, dose): (&Shown, Option<&Arc<DosePicture>>),
+        view: &mut ViewState,
+    ) {
+        let tokens = theme::of(ui);
+        let response = ui.interact(rect, ui.scope_id().with("scene3d"), Sense::click_and_drag());
         response.widget_info(|| {
             egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, "View of gland, needle and seeds")
         });
-        self.steer(ui, &response, rect);
-        let aspect = rect.width() / rect.height().max(1.0);
-        match self.render(ui.ctx().pixels_per_point(), rect, aspect, shown) {
+        self.steer(ui, &response, rect, view);
+        let dose = dose.filter(|_| view.isodose);
+        let painter = ui.painter_at(rect);
+        match self.render(ui.ctx().pixels_per_point(), rect, (shown, dose, view), tokens) {
             Some(texture) => {
                 let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
-                ui.painter().image(texture, rect, whole, Color32::WHITE);
-                self.words(ui, rect, aspect, shown);
+                painter.image(texture, rect, whole, Color32::WHITE);
+                let legend = Legend {
+                    painter: &painter,
+                    rect,
+                    camera: &self.camera,
+                    tokens,
+                    shown,
+                };
+                legend.landmarks(self.corner_m, view);
+                legend.scale_bar();
+                // Beside the slices these tell the levels already.
+                let alone = dose.filter(|_| rect.width() > ALONE);
+                legend.rows(self.look, alone.map(|d| &**d));
             }
             None => {
-                let text = "No 3D view: the window has no wgpu device.\nInstall a Vulkan driver (mesa-vulkan-drivers) and start again; everything else works.";
-                let font = FontId::proportional(15.0);
-                ui.painter()
-                    .text(rect.center(), Align2::CENTER_CENTER, text, font, theme::WEAK);
+                let text = "No 3D view: the window has no wgpu device.\nInstall a Vulkan driver (mesa-vulkan-drivers)\nand start again; everything else works.";
+                let font = FontId::proportional(13.5);
+                painter.text(rect.center(), Align2::CENTER_CENTER, text, font, tokens.weak);
             }
         }
-        self.controls(ui, rect, shown);
     }
 
-    fn steer(&mut self, ui: &egui::Ui, response: &egui::Response, rect: Rect) {
+    fn steer(&mut self, ui: &egui::Ui, response: &egui::Response, rect: Rect, view: &mut ViewState) {
         let drag = response.drag_delta();
         if response.dragged_by(PointerButton::Primary) {
             self.camera
@@ -147,175 +252,139 @@ impl Scene3d {
             let (scroll, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
             self.camera.zoom(((scroll * 0.003).exp() * pinch).clamp(0.2, 5.0));
         }
+        if response.clicked()
+            && view.measure.active
+            && let (Some(place), Some(model)) = (response.interact_pointer_pos(), &self.model)
+        {
+            let at = (place - rect.min) / rect.size();
+            let ray = self.camera.ray(rect.aspect_ratio(), [at.x, at.y]);
+            if let Some(met) = pick(&self.vertices, &model.triangles, self.camera.eye_m(), ray) {
+                view.measure.take(met.map(f64::from));
+            }
+        }
     }
 
-    fn render(&mut self, scale: f32, rect: Rect, aspect: f32, shown: &Shown) -> Option<egui::TextureId> {
+    fn render(
+        &mut self,
+        scale: f32,
+        rect: Rect,
+        (shown, dose, view): (&Shown, Option<&Arc<DosePicture>>, &ViewState),
+        tokens: &'static Tokens,
+    ) -> Option<egui::TextureId> {
         let gpu = self.gpu.as_mut()?;
         let pixels = [rect.width() * scale, rect.height() * scale].map(|side| side.round().max(1.0) as u32);
         let fresh = gpu.resize(pixels);
+        let number = dose.map_or(0, |d| d.number);
+        if self.shells != number {
+            self.shells = number;
+            gpu.set_shells(&shells(dose));
+        }
         let key = Key {
             camera: self.camera,
             look: self.look,
+            view: view.clone(),
             scene: self.uploaded_scene.unwrap_or_default(),
-            snapshot: self.uploaded_snapshot.unwrap_or_default(),
+            surface: self.surface,
             plan: shown.plan.map_or(0, |p| p.generation),
             tip: shown.tip_m().unwrap_or_default(),
-            seed_count: shown.seeds.len(),
+            force: shown.state.map_or([0.0; 3], |s| s.force_on_hand_n),
+            seeds: shown.seeds.iter().map(|s| s.position_m).collect(),
+            dose: number,
+            dark: tokens.dark,
         };
-        if fresh || self.drawn != Some(key) {
-            self.corner_m = collect(&mut self.marks, shown);
-            gpu.set_marks(&self.marks);
+        if fresh || self.drawn.as_ref() != Some(&key) {
+            let fixed = (key.scene, key.plan, key.look.template, key.dark);
+            if self.fixed != Some(fixed) {
+                self.fixed = Some(fixed);
+                self.corner_m = collect_fixed(&mut self.marks, shown, self.look, tokens);
+                gpu.set_marks(0, &self.marks);
+            }
+            collect_live(&mut self.marks, (shown, view), self.look, tokens);
+            gpu.set_marks(1, &self.marks);
+            let whole = uniform(&self.camera, rect.aspect_ratio());
+            let cut = section(&self.camera, view, shown);
+            let tinted = |color, opacity, section| tint(whole, color, opacity, section);
             let opacity = 1.0 - self.look.transparency;
             let looks: Vec<SceneUniform> = kinds(shown.scene.as_ref())
-                .map(|kind| uniform(&self.camera, aspect, kind.color(), opacity * kind.share()))
+                .map(|kind| tinted(kind.color(tokens), opacity * kind.share(), cut))
                 .collect();
-            let ghost = uniform(&self.camera, aspect, theme::GHOST, 0.22);
-            let clear = theme::rgba(theme::BACKGROUND, 1.0);
+            let shells: Vec<SceneUniform> = dose
+                .iter()
+                .flat_map(|d| &d.shells)
+                .map(|shell| tinted(IMAGE.isodose[shell.level], SHELL, cut))
+                .collect();
+            let ghost = tinted(tokens.ghost, 0.22, [0.0; 4]);
+            let clear = theme::rgba(tokens.background, 1.0);
             let clear = [clear[0], clear[1], clear[2]].map(f64::from);
-            gpu.draw(&looks, self.look.rest_shape.then_some(&ghost), clear);
+            gpu.draw(&looks, &shells, self.look.rest_shape.then_some(&ghost), clear);
             self.drawn = Some(key);
         }
         gpu.texture()
     }
-
-    /// Names of axes and landmarks, the bar that gives the scale, and what each shape means.
-    fn words(&self, ui: &egui::Ui, rect: Rect, aspect: f32, shown: &Shown) {
-        let painter = ui.painter_at(rect);
-        let at = |place_m: [f32; 3]| {
-            let [x, y] = self.camera.project(aspect, place_m)?;
-            Some(rect.min + Vec2::new(x * rect.width(), y * rect.height()))
-        };
-        let font = FontId::proportional(12.0);
-        if let Some(corner) = self.corner_m {
-            for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-                let mut end = corner;
-                end[axis] += 0.0145;
-                if let Some(place) = at(end) {
-                    painter.text(place, Align2::CENTER_CENTER, name, font.clone(), theme::WEAK);
-                }
-            }
-        }
-        if let Some(plan) = &shown.plan {
-            let entry = plan.entry_m.map(|c| c as f32);
-            if let Some(place) = at(entry) {
-                let place = place + Vec2::new(0.0, -16.0);
-                painter.text(place, Align2::CENTER_BOTTOM, "entry", font.clone(), theme::ENTRY);
-            }
-        }
-        scale_bar(&painter, rect, self.camera.height_at_target_m());
-        legend(&painter, rect, shown, self.look);
-    }
-
-    /// The few settings of the picture, over its upper edge.
-    fn controls(&mut self, ui: &mut egui::Ui, rect: Rect, shown: &Shown) {
-        let bar = Rect::from_min_size(rect.min + Vec2::splat(8.0), Vec2::new(rect.width() - 16.0, 28.0));
-        ui.scope_builder(egui::UiBuilder::new().max_rect(bar), |ui| {
-            ui.horizontal(|ui| {
-                if ui.button("Reset view").on_hover_text("Key R").clicked() {
-                    self.reset_view(shown);
-                }
-                let label = ui.label(theme::weak("Transparency"));
-                let mut percent = self.look.transparency * 100.0;
-                let slider = egui::Slider::new(&mut percent, 0.0..=100.0)
-                    .suffix(" %")
-                    .fixed_decimals(0);
-                if ui.add(slider).labelled_by(label.id).changed() {
-                    self.look.transparency = percent / 100.0;
-                }
-                ui.checkbox(&mut self.look.rest_shape, "Rest shape")
-                    .on_hover_text("Shows where the gland was before the needle moved it");
-            });
-        });
-    }
 }
 
-/// What a surface is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    /// The body around the others.
-    Body,
-    Gland,
-    Spared,
-    Bone,
-}
-
-impl Kind {
-    fn color(self) -> Color32 {
-        match self {
-            Self::Body => theme::BODY,
-            Self::Gland => theme::GLAND,
-            Self::Spared => theme::SPARED,
-            Self::Bone => theme::BONE,
-        }
-    }
-
-    /// Of the opacity that a person set: what lies around the gland must not hide it.
-    fn share(self) -> f32 {
-        match self {
-            Self::Body => 0.16,
-            Self::Gland => 1.0,
-            Self::Spared => 0.5,
-            Self::Bone => 0.6,
-        }
-    }
-}
-
-/// Structures that are drawn by themselves.
-fn drawn(scene: &SceneHeader) -> impl Iterator<Item = &StructureInfo> {
-    scene.structures().iter().filter(|s| s.triangle_count > 0)
-}
-
-/// What each surface is of, the body's first. A body without others in it is the gland.
-fn kinds(scene: Option<&SceneHeader>) -> impl Iterator<Item = Kind> {
-    let inner = scene.into_iter().flat_map(drawn).map(|s| match s.role {
-        bits if bits & role::TARGET != 0 => Kind::Gland,
-        bits if bits & role::FIXED != 0 => Kind::Bone,
-        _ => Kind::Spared,
-    });
-    let body = if scene.is_some_and(|s| drawn(s).next().is_some()) {
-        Kind::Body
-    } else {
-        Kind::Gland
-    };
-    std::iter::once(body).chain(inner)
-}
-
-/// The indices of each surface, in the order of [`kinds`].
-fn surfaces(model: &SceneModel) -> Vec<Vec<u32>> {
-    let header = &model.header;
-    let inner = drawn(header).map(|s| (s.first_triangle as usize, s.triangle_count as usize));
-    std::iter::once((0, header.body_triangle_count as usize))
-        .chain(inner)
-        .map(|(first, count)| {
-            let triangles = model.triangles.get(first..first + count).unwrap_or(&[]);
-            mesh::indices(triangles, model.rest_m.len())
+fn shells(dose: Option<&Arc<DosePicture>>) -> Vec<(Vec<SurfaceVertex>, Vec<u32>)> {
+    let shells = dose.iter().flat_map(|d| &d.shells);
+    shells
+        .map(|shell| {
+            let mut vertices = Vec::new();
+            mesh::surface(&shell.points_m, &shell.triangles, &mut vertices);
+            (vertices, mesh::indices(&shell.triangles, shell.points_m.len()))
         })
         .collect()
 }
 
-fn uniform(camera: &Camera, aspect: f32, color: Color32, opacity: f32) -> SceneUniform {
+/// The plane through the cursor whose near side is cut away.
+fn section(camera: &Camera, view: &ViewState, shown: &Shown) -> [f32; 4] {
+    let (Some(orientation), Some(scene)) = (view.section, &shown.scene) else {
+        return [0.0; 4];
+    };
+    let axis = match orientation {
+        Orientation::Axial => Vector3::z(),
+        Orientation::Sagittal => Vector3::x(),
+        Orientation::Coronal => Vector3::y(),
+    };
+    let normal = (scene_from_patient(scene) * axis).map(|c| c as f32);
+    let cursor = view.cursor_m.map(|c| c as f32);
+    let normal = if (camera.eye_m() - cursor).dot(&normal) < 0.0 {
+        -normal
+    } else {
+        normal
+    };
+    [normal.x, normal.y, normal.z, normal.dot(&cursor)]
+}
+
+fn uniform(camera: &Camera, aspect: f32) -> SceneUniform {
     let eye = camera.eye_m();
     let length = LIGHT.iter().map(|c| c * c).sum::<f32>().sqrt();
     SceneUniform {
         clip_from_scene: camera.clip_from_scene(aspect).into(),
         eye_m: [eye.x, eye.y, eye.z, 1.0],
         light: LIGHT.map(|c| c / length),
-        surface: theme::rgba(color, opacity),
-        look: [1.0, 0.25 * (1.0 - opacity), 0.0, 0.0],
+        surface: [1.0; 4],
+        look: [0.0; 4],
+        section: [0.0; 4],
     }
 }
 
-fn collect(marks: &mut Marks, shown: &Shown) -> Option<[f32; 3]> {
-    marks.clear();
+fn tint(whole: SceneUniform, color: Color32, opacity: f32, section: [f32; 4]) -> SceneUniform {
+    SceneUniform {
+        surface: theme::rgba(color, opacity),
+        look: [1.0, 0.25 * (1.0 - opacity), 0.0, 0.0],
+        section,
+        ..whole
+    }
+}
+
+/// What changes with the scene and the plan only. Gives the corner where the axes are drawn.
+fn collect_fixed(marks: &mut Marks, shown: &Shown, look: Look, tokens: &'static Tokens) -> Option<[f32; 3]> {
+    marks.begin(tokens);
     let corner = shown.scene.map(|scene| marks.ground(scene.lower_m, scene.upper_m));
-    if let (Some(tip), Some(state)) = (shown.tip_m(), &shown.state) {
-        marks.needle(tip, state.needle_direction);
-    }
-    for seed in &shown.seeds {
-        marks.placed_seed(seed.position_m, seed.axis);
-    }
     if let Some(plan) = &shown.plan {
         marks.entry(plan.entry_m, plan.direction);
+        if look.template {
+            marks.template(plan.entry_m, plan.direction, TEMPLATE_BEFORE_M);
+        }
         for seed in shown.planned() {
             marks.planned_seed(seed.position_m, plan.direction);
         }
@@ -326,63 +395,17 @@ fn collect(marks: &mut Marks, shown: &Shown) -> Option<[f32; 3]> {
     corner
 }
 
-fn scale_bar(painter: &egui::Painter, rect: Rect, height_m: f32) {
-    let points_per_mm = rect.height() / (format::mm(f64::from(height_m)) as f32).max(1e-6);
-    let length_mm = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0]
-        .into_iter()
-        .find(|mm| mm * points_per_mm >= 60.0)
-        .unwrap_or(500.0_f32);
-    let end = rect.right_bottom() - Vec2::new(16.0, 16.0);
-    let start = end - Vec2::new(length_mm * points_per_mm, 0.0);
-    let stroke = Stroke::new(2.0, theme::PATH);
-    painter.line_segment([start, end], stroke);
-    for place in [start, end] {
-        painter.line_segment([place - Vec2::new(0.0, 4.0), place + Vec2::new(0.0, 4.0)], stroke);
-    }
-    let text = format!("{length_mm:.0} mm");
-    let middle = start + (end - start) * 0.5 - Vec2::new(0.0, 6.0);
-    painter.text(
-        middle,
-        Align2::CENTER_BOTTOM,
-        text,
-        FontId::proportional(12.0),
-        theme::PATH,
-    );
-}
-
-fn legend(painter: &egui::Painter, rect: Rect, shown: &Shown, look: Look) {
-    let mut rows: Vec<(&str, Color32, bool)> = Vec::new();
-    if let Some(scene) = &shown.scene {
-        rows.push(("gland", theme::GLAND, true));
-        let others: Vec<Kind> = kinds(Some(scene)).collect();
-        for (kind, name) in [
-            (Kind::Spared, "to be spared"),
-            (Kind::Bone, "bone"),
-            (Kind::Body, "body"),
-        ] {
-            if others.contains(&kind) {
-                rows.push((name, kind.color(), true));
-            }
+fn collect_live(marks: &mut Marks, (shown, view): (&Shown, &ViewState), look: Look, tokens: &'static Tokens) {
+    marks.begin(tokens);
+    if let (Some(tip), Some(state)) = (shown.tip_m(), &shown.state) {
+        marks.needle(tip, state.needle_direction);
+        if look.force {
+            marks.force(tip, state.force_on_hand_n);
         }
     }
-    if look.rest_shape {
-        rows.push(("gland at rest", theme::GHOST, true));
+    for seed in &shown.seeds {
+        marks.placed_seed(seed.position_m, seed.axis);
     }
-    if shown.plan.is_some() {
-        rows.push(("planned seed", theme::SEED_PLANNED, false));
-    }
-    if !shown.seeds.is_empty() {
-        rows.push(("placed seed", theme::SEED_PLACED, true));
-    }
-    let mut place = rect.left_bottom() + Vec2::new(18.0, -16.0);
-    for (name, color, filled) in rows.into_iter().rev() {
-        if filled {
-            painter.circle_filled(place, 5.0, color);
-        } else {
-            painter.circle_stroke(place, 4.5, Stroke::new(1.5, color));
-        }
-        let text = place + Vec2::new(12.0, 0.0);
-        painter.text(text, Align2::LEFT_CENTER, name, FontId::proportional(12.0), theme::WEAK);
-        place.y -= 18.0;
-    }
+    let measured: Vec<Vector3<f32>> = view.measure.points_m().iter().map(|p| p.map(|c| c as f32)).collect();
+    marks.measured(&measured);
 }

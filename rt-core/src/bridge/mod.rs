@@ -23,7 +23,7 @@ pub use picture::ScenePicture;
 use ports::Ports;
 use rehearsals::RehearsalDesk;
 use requests::Request;
-pub use snapshots::SnapshotLoans;
+pub use snapshots::{SnapshotLoans, SnapshotSize};
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Arc, mpsc};
@@ -173,11 +173,8 @@ impl Bridge {
         while self.loops.old_worlds.pop().is_ok() {}
         let made_a_tick = self.send_records();
         self.serve_flights();
-        let (generation, vertices) = (
-            self.picture.header.generation,
-            self.picture.header.vertex_count as usize,
-        );
-        self.loops.loans.pass(&self.ports, generation, vertices);
+        let (generation, size) = (self.picture.header.generation, self.picture.snapshot_size());
+        self.loops.loans.pass(&self.ports, generation, size);
         if self.supervisor.pass(made_a_tick) {
             self.tell_loop_stopped();
             return Err(LoopStopped);

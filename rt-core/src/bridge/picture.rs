@@ -1,6 +1,7 @@
 //! What hosts need to draw a scene and to plan in it.
 
-use crate::scene::{Role, Scene, Structure};
+use super::SnapshotSize;
+use crate::scene::{Role, Scene, Structure, label_grid};
 use stylet_shm_schema::*;
 
 pub(super) const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
@@ -26,6 +27,14 @@ impl ScenePicture {
         self.words.len()
     }
 
+    /// How much each snapshot of the scene holds.
+    pub fn snapshot_size(&self) -> SnapshotSize {
+        SnapshotSize {
+            vertices: self.header.vertex_count as usize,
+            nodes: self.header.nodes.node_count().unwrap_or(0),
+        }
+    }
+
     pub(super) fn of(scene: &Scene, session_id: u64, generation: u64, patient_from_scene: [f64; 12]) -> Self {
         let (lattice, surface) = (&scene.lattice, &scene.surface);
         let (lower_m, upper_m) = lattice.bounds_m();
@@ -36,8 +45,10 @@ impl ScenePicture {
             .flat_map(|&e| lattice.rest_m(e))
             .map(|c| (c as f32).to_bits());
         let indices = surface.triangles.iter().flatten().copied();
+        let (label_info, labels) = label_grid(lattice);
+        let labels = labels.chunks(4).map(packed);
         Self {
-            words: positions.chain(indices).collect(),
+            words: positions.chain(indices).chain(labels).collect(),
             header: SceneHeader {
                 session_id,
                 generation,
@@ -56,11 +67,20 @@ impl ScenePicture {
                 target_lower_m,
                 target_upper_m,
                 patient_from_scene,
+                labels: label_info,
+                nodes: scene.nodes.info,
                 name: Text::new(&scene.name),
                 structures: structures(scene),
             },
         }
     }
+}
+
+/// Four cells in a word, lowest byte first; no tissue where there are fewer.
+fn packed(cells: &[u8]) -> u32 {
+    let mut bytes = [0; 4];
+    bytes[..cells.len()].copy_from_slice(cells);
+    u32::from_le_bytes(bytes)
 }
 
 fn structures(scene: &Scene) -> [StructureInfo; MAX_STRUCTURES] {

@@ -55,8 +55,8 @@ const SNAPSHOTS_KEPT: usize = 4 * SNAPSHOTS_AHEAD;
 const SCENES_KEPT: usize = 3;
 
 impl Ports {
-    /// For a scene of so many vertices and words.
-    pub fn new(node: &Node<Ipc>, vertex_count: usize, word_count: usize) -> Result<Self, ServiceError> {
+    /// For a scene of so many words whose snapshots have so many vertices and nodes.
+    pub fn new(node: &Node<Ipc>, snapshot_len: usize, word_count: usize) -> Result<Self, ServiceError> {
         Ok(Self {
             session: publisher!(service::session(node)),
             events: publisher!(service::events(node)),
@@ -65,7 +65,7 @@ impl Ports {
             replies: publisher!(service::replies(node)),
             rehearsals: publisher!(service::rehearsals(node)),
             records: publisher!(service::records(node), slices of MAX_BATCH, loans 2, kept |all| all),
-            snapshots: publisher!(service::snapshots(node), slices of vertex_count, loans 2 * SNAPSHOTS_AHEAD, kept |_| SNAPSHOTS_KEPT),
+            snapshots: publisher!(service::snapshots(node), slices of snapshot_len, loans 2 * SNAPSHOTS_AHEAD, kept |_| SNAPSHOTS_KEPT),
             scene: publisher!(service::scene(node), slices of word_count, loans 2, kept |_| SCENES_KEPT),
             commands: service::commands(node)?
                 .subscriber_builder()

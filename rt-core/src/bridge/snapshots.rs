@@ -8,6 +8,19 @@ use stylet_shm_schema::{SnapshotHeader, Vertex};
 
 type Loan = SampleMut<Ipc, [Vertex], SnapshotHeader>;
 
+/// How much one snapshot of a scene holds.
+#[derive(Clone, Copy)]
+pub struct SnapshotSize {
+    pub vertices: usize,
+    pub nodes: usize,
+}
+
+impl SnapshotSize {
+    pub fn total(self) -> usize {
+        self.vertices + self.nodes
+    }
+}
+
 /// The loans that are out, by the index that their slot carries.
 pub struct SnapshotLoans {
     out: [Option<Loan>; 2 * SNAPSHOTS_AHEAD],
@@ -25,7 +38,7 @@ impl SnapshotLoans {
     }
 
     /// Sends what came back filled, then loans anew for the scene that runs.
-    pub fn pass(&mut self, ports: &Ports, scene_generation: u64, vertex_count: usize) {
+    pub fn pass(&mut self, ports: &Ports, scene_generation: u64, size: SnapshotSize) {
         while let Ok(back) = self.filled.pop() {
             let loan = self.out.get_mut(back.index as usize).and_then(Option::take);
             if let (Some(loan), true) = (loan, back.filled) {
@@ -34,17 +47,17 @@ impl SnapshotLoans {
             }
         }
         while self.out.iter().flatten().count() < SNAPSHOTS_AHEAD {
-            if !self.loan(ports, scene_generation, vertex_count) {
+            if !self.loan(ports, scene_generation, size) {
                 return;
             }
         }
     }
 
-    fn loan(&mut self, ports: &Ports, scene_generation: u64, vertex_count: usize) -> bool {
+    fn loan(&mut self, ports: &Ports, scene_generation: u64, size: SnapshotSize) -> bool {
         let Some(index) = self.out.iter().position(Option::is_none) else {
             return false;
         };
-        let Ok(mut loan) = ports.snapshots.loan_slice(vertex_count) else {
+        let Ok(mut loan) = ports.snapshots.loan_slice(size.total()) else {
             return false;
         };
         let header: *mut SnapshotHeader = loan.user_header_mut();
@@ -54,7 +67,8 @@ impl SnapshotLoans {
             scene_generation,
             header,
             vertices,
-            vertex_count,
+            vertex_count: size.vertices,
+            node_count: size.nodes,
         };
         self.out[index] = Some(loan);
         if self.slots.push(slot).is_err() {

@@ -241,6 +241,8 @@ pub struct SnapshotSlot {
     pub header: *mut SnapshotHeader,
     pub vertices: *mut Vertex,
     pub vertex_count: usize,
+    /// Nodes of the displacement grid, behind the vertices.
+    pub node_count: usize,
 }
 
 // SAFETY: the bridge keeps the loan alive and does not touch the memory until the slot comes back through the

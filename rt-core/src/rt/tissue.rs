@@ -454,7 +454,8 @@ impl TissueLoop {
         self.response.worst_work_ns = self.response.worst_work_ns.max(work_ns);
         while let Ok(slot) = self.ports.slots.pop() {
             let filled = slot.scene_generation == self.world.generation
-                && slot.vertex_count == self.world.scene.surface.vertex_elements.len();
+                && slot.vertex_count == self.world.scene.surface.vertex_elements.len()
+                && slot.node_count == self.world.scene.nodes.elements.len();
             if filled {
                 self.fill(&slot, woke_ns, work_ns, report);
             }
@@ -469,12 +470,15 @@ impl TissueLoop {
     }
 
     fn fill(&self, slot: &SnapshotSlot, woke_ns: u64, work_ns: u64, report: &StepReport) {
-        // SAFETY: the bridge loaned `vertex_count` vertices at this address to us alone and keeps them mapped
+        let sent = slot.vertex_count + slot.node_count;
+        // SAFETY: the bridge loaned `vertex_count + node_count` vertices at this address to us alone and keeps them mapped
         // until the slot is returned; they were zeroed, and Vertex is valid for every bit pattern.
-        let vertices = unsafe { std::slice::from_raw_parts_mut(slot.vertices, slot.vertex_count) };
+        let vertices = unsafe { std::slice::from_raw_parts_mut(slot.vertices, sent) };
         let positions: &mut [[f32; 3]] = bytemuck::cast_slice_mut::<Vertex, [f32; 3]>(vertices);
         let body = self.world.tissue.deformed();
-        body.write_surface(&self.world.scene.surface, positions);
+        let (surface, inside) = positions.split_at_mut(slot.vertex_count);
+        body.write_surface(&self.world.scene.surface, surface);
+        body.write_displacements(&self.world.scene.nodes.elements, inside);
         // SAFETY: as above, for the header.
         let header = unsafe { &mut *slot.header };
         let spacing_m = self.world.scene.lattice.spacing_m;
@@ -494,6 +498,8 @@ impl TissueLoop {
             held_element: self.held.map_or(u32::MAX, |h| h.element),
             phase: self.pose.phase.code(),
             vertex_count: slot.vertex_count as u32,
+            node_count: slot.node_count as u32,
+            reserved: 0,
             seed_count: self.seeds.len() as u32,
             seeds: [bytemuck::Zeroable::zeroed(); MAX_SEEDS],
         };

@@ -159,6 +159,11 @@ impl Lattice {
         (metres(low), metres(high))
     }
 
+    /// Lowest and one past the highest cell that is occupied.
+    pub fn occupied(&self) -> [[usize; 3]; 2] {
+        self.occupied
+    }
+
     /// Size and box of each of the first `count` structures.
     pub fn extents(&self, count: usize) -> Vec<Extent> {
         let mut boxes = vec![(0_u32, [usize::MAX; 3], [0; 3]); count];

@@ -7,6 +7,7 @@ use crate::tissue::TissueKind;
 use std::sync::Arc;
 
 mod builtin;
+mod grids;
 mod lattice;
 mod material;
 mod memory;
@@ -19,6 +20,7 @@ mod surface;
 #[cfg(test)]
 pub(crate) mod test_bodies;
 
+pub use grids::{NodeGrid, label_grid};
 pub(crate) use lattice::Run;
 pub use lattice::{Extent, Lattice};
 pub use problem::{SceneError, SceneProblem};
@@ -53,6 +55,8 @@ pub struct Scene {
     /// Shared with the tissue model, which would otherwise hold a copy.
     pub lattice: Arc<Lattice>,
     pub surface: Surface,
+    /// Where its displacements are told to the hosts.
+    pub nodes: NodeGrid,
     /// What computes where its elements are.
     pub tissue: TissueKind,
 }
@@ -81,6 +85,7 @@ impl Scene {
         Ok(Scene {
             name: name.to_owned(),
             structures,
+            nodes: NodeGrid::of(&lattice),
             lattice: Arc::new(lattice),
             surface,
             tissue: TissueKind::default(),

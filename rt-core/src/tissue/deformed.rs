@@ -27,6 +27,13 @@ impl Deformed<'_> {
         [0, 1, 2].map(|a| rest[a] + self.lattice.spacing_m * u[a])
     }
 
+    /// Writes the displacements of elements in metres; stops at the shorter of the two.
+    pub fn write_displacements(&self, elements: &[u32], displacements_m: &mut [[f32; 3]]) {
+        for (slot, &element) in displacements_m.iter_mut().zip(elements) {
+            *slot = self.displacement(element).map(|u| (self.lattice.spacing_m * u) as f32);
+        }
+    }
+
     /// Writes the positions of the surface's vertices in metres; stops at the shorter of the two.
     pub fn write_surface(&self, surface: &Surface, positions_m: &mut [[f32; 3]]) {
         for (slot, &element) in positions_m.iter_mut().zip(&surface.vertex_elements) {

@@ -1,8 +1,11 @@
 //! The dialog of every parameter of tissue, needle and force, made from the table of the contract.
 
+mod preset;
+
 use super::Shown;
 use crate::{format, theme};
 use egui::{Button, DragValue, RichText};
+use std::path::Path;
 use stylet_shm_schema::{PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterSpec};
 
 /// What stands under a row.
@@ -17,6 +20,8 @@ enum RowNote {
 /// One change at a time is on its way; what is edited meanwhile waits and goes with the next.
 pub struct ParametersState {
     pub open: bool,
+    search: String,
+    preset_path: String,
     /// Edited and not yet in force, SI.
     drafts: [Option<f64>; PARAMETER_COUNT],
     in_flight: Option<(u64, Vec<(usize, f64)>)>,
@@ -30,6 +35,8 @@ impl Default for ParametersState {
     fn default() -> Self {
         Self {
             open: false,
+            search: String::new(),
+            preset_path: "parameters.toml".to_owned(),
             drafts: [None; PARAMETER_COUNT],
             in_flight: None,
             unsent: false,
@@ -99,6 +106,23 @@ impl ParametersState {
         self.unsent = false;
     }
 
+    /// Writes what is in force to the file that is named.
+    fn save_preset(&mut self, shown: &Shown) {
+        let set = shown.parameters.map(|p| p.set).unwrap_or_default();
+        self.foot = Some(match preset::save(Path::new(self.preset_path.trim()), &set) {
+            Ok(()) => (false, format!("Saved to {}", self.preset_path.trim())),
+            Err(why) => (true, why),
+        });
+    }
+
+    /// Takes every value of a file, or none and says all that is wrong with it.
+    fn load_preset(&mut self) {
+        match preset::load(Path::new(self.preset_path.trim())) {
+            Ok(values) => values.into_iter().for_each(|(index, value)| self.edit(index, value)),
+            Err(why) => self.foot = Some((true, why)),
+        }
+    }
+
     fn edit(&mut self, index: usize, value: f64) {
         self.drafts[index] = Some(value);
         self.notes[index] = RowNote::None;
@@ -124,16 +148,21 @@ pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersS
             if shown.parameters.is_none() {
                 ui.label(
                     RichText::new("rt-core has not told its parameters yet; these are the defaults.")
-                        .color(theme::WARN),
+                        .color(theme::of(ui).warn),
                 );
             }
-            let height = (ui.ctx().content_rect().height() - 260.0).clamp(200.0, 640.0);
+            search_ui(ui, state);
+            let height = (ui.ctx().content_rect().height() - 330.0).clamp(200.0, 640.0);
             egui::ScrollArea::vertical()
                 .max_height(height)
                 .auto_shrink([false, true])
                 .show(ui, |ui| {
+                    let found = found(&state.search);
                     for group in ParameterGroup::ALL {
-                        group_ui(ui, shown, state, group);
+                        group_ui(ui, shown, state, (group, &found));
+                    }
+                    if found.is_empty() {
+                        ui.label(theme::weak("No parameter has these words."));
                     }
                 });
             ui.separator();
@@ -142,15 +171,50 @@ pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersS
     state.open = open;
 }
 
-fn group_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState, group: ParameterGroup) {
+fn search_ui(ui: &mut egui::Ui, state: &mut ParametersState) {
+    ui.horizontal(|ui| {
+        let label = ui.label(theme::weak("Search"));
+        let edit = egui::TextEdit::singleline(&mut state.search)
+            .hint_text("words of name, key, source or help")
+            .desired_width(300.0);
+        ui.add(edit).labelled_by(label.id);
+        if ui.add_enabled(!state.search.is_empty(), Button::new("Clear")).clicked() {
+            state.search.clear();
+        }
+    });
+}
+
+/// Places in the table whose words hold every word that is searched for.
+fn found(search: &str) -> Vec<usize> {
+    let wanted = search.to_lowercase();
+    let has = |spec: &ParameterSpec| {
+        let text = [
+            spec.label,
+            spec.key,
+            spec.unit,
+            spec.source,
+            spec.help,
+            spec.group.name(),
+        ]
+        .join(" ");
+        let text = text.to_lowercase();
+        wanted.split_whitespace().all(|word| text.contains(word))
+    };
+    (0..PARAMETERS.len()).filter(|&i| has(&PARAMETERS[i])).collect()
+}
+
+fn group_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState, (group, found): (ParameterGroup, &[usize])) {
+    if !found.iter().any(|&i| PARAMETERS[i].group == group) {
+        return;
+    }
     ui.heading(group.name());
     egui::Grid::new(group.name())
         .num_columns(5)
         .striped(true)
         .spacing([14.0, 4.0])
         .show(ui, |ui| {
-            for (index, spec) in PARAMETERS.iter().enumerate().filter(|(_, p)| p.group == group) {
-                row_ui(ui, shown, state, index, spec);
+            for &index in found.iter().filter(|&&i| PARAMETERS[i].group == group) {
+                row_ui(ui, shown, state, index, &PARAMETERS[index]);
             }
         });
     ui.add_space(4.0);
@@ -219,11 +283,11 @@ fn note_ui(ui: &mut egui::Ui, state: &ParametersState, index: usize) {
             ui.label(
                 RichText::new(format!("since tick {}", format::count(*tick)))
                     .small()
-                    .color(theme::GOOD),
+                    .color(theme::of(ui).good),
             );
         }
         RowNote::Refused(why) => {
-            let text = RichText::new("refused").small().color(theme::BAD);
+            let text = RichText::new("refused").small().color(theme::of(ui).bad);
             ui.label(text).on_hover_text(why);
         }
     }
@@ -248,8 +312,24 @@ fn foot_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState) {
             ui.label(theme::small(text));
         }
     });
+    ui.horizontal(|ui| {
+        let label = ui.label(theme::weak("Preset"));
+        let edit = egui::TextEdit::singleline(&mut state.preset_path).desired_width(260.0);
+        ui.add(edit).labelled_by(label.id);
+        let named = !state.preset_path.trim().is_empty();
+        if ui.add_enabled(named, Button::new("Save preset")).clicked() {
+            state.save_preset(shown);
+        }
+        if ui
+            .add_enabled(named && shown.is_live(), Button::new("Load preset"))
+            .clicked()
+        {
+            state.load_preset();
+        }
+    });
     if let Some((refused, text)) = &state.foot {
-        let color = if *refused { theme::BAD } else { theme::GOOD };
+        let tokens = theme::of(ui);
+        let color = if *refused { tokens.bad } else { tokens.good };
         ui.label(RichText::new(text).color(color));
     }
 }
@@ -263,6 +343,15 @@ fn plain(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_search_finds_by_name_key_and_source_and_all_words_count() {
+        assert_eq!(found("").len(), PARAMETER_COUNT);
+        let keys = |search| found(search).iter().map(|&i| PARAMETERS[i].key).collect::<Vec<_>>();
+        assert_eq!(keys("PUNCTURE depth u_cri"), ["needle.puncture_depth"]);
+        assert_eq!(keys("podder capsule"), ["force.membrane_peak"]);
+        assert!(keys("no such thing").is_empty());
+    }
 
     #[test]
     fn edits_made_while_a_change_is_on_its_way_are_sent_after_it() {

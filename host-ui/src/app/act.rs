@@ -1,0 +1,217 @@
+//! What the operator asked for, carried out after all panels are drawn.
+
+use super::{App, Waiting, refusal};
+use crate::panel::workflow::{Undo, next_action, undo_action};
+use crate::panel::{Action, LoadState};
+use crate::settings::ThemeChoice;
+use crate::workflow::{Run, default_plan, move_values, plan_values};
+use std::time::Instant;
+use stylet_shm_schema::{CommandKind, PARAMETERS};
+
+/// The goal of a driven needle runs ahead of the tip by no more than this, so that it stops when the key is let go.
+const LEAD_M: f64 = 0.004;
+/// A hand on the tip may pull it this far ahead.
+const PULLED_M: f64 = 0.02;
+/// A goal nearer than this to the last one is the same.
+const SAME_GOAL_M: f64 = 0.1e-3;
+/// The needle may be drawn back so far before the entry.
+const BEFORE_ENTRY_M: f64 = 0.02;
+/// A longer frame counts as this long, so that a hiccup is not a jump of the needle.
+const LONGEST_FRAME_S: f64 = 0.05;
+/// Answers that are waited for at once; an older one is no longer told.
+const WAITING_AT_MOST: usize = 64;
+
+impl App {
+    pub(super) fn send(&mut self, what: &'static str, kind: CommandKind, values: &[f64]) {
+        match self.link.send(kind, values) {
+            Ok(id) => {
+                if self.waiting.len() >= WAITING_AT_MOST {
+                    self.waiting.remove(0);
+                }
+                self.waiting.push(Waiting {
+                    id,
+                    what,
+                    since: Instant::now(),
+                });
+            }
+            Err(e) => self.shown.note = Some(refusal(format!("{what}: {e}"))),
+        }
+    }
+
+    /// Sends the hand to a depth along the planned path.
+    fn move_to(&mut self, what: &'static str, depth_m: f64, speed_m_per_s: f64) {
+        let (Some(plan), Some(goal)) = (self.shown.plan, self.shown.on_path_m(depth_m)) else {
+            self.shown.note = Some(refusal(format!("{what}: plan the seeds first")));
+            return;
+        };
+        let values = move_values(goal, plan.direction, speed_m_per_s, self.pace.acceleration_m_per_s2);
+        self.send(what, CommandKind::MoveHand, &values);
+    }
+
+    pub(super) fn act(&mut self, action: Action, ctx: &egui::Context) {
+        match action {
+            Action::ToggleHelp => self.help = !self.help,
+            Action::OpenParameters => self.parameters.open = !self.parameters.open,
+            Action::ResetView => self.middle.reset_view(&self.shown),
+            Action::LookFrom(preset) => self.middle.solid.look_from(preset, &self.shown),
+            Action::SetLayout(layout) => self.settings.layout = layout,
+            Action::NextLayout => self.settings.layout = self.settings.layout.next(),
+            Action::ToggleFollowTip => self.middle.view.follow_tip = !self.middle.view.follow_tip,
+            Action::ToggleMeasure => self.middle.view.measure.toggle(),
+            Action::ToggleIsodose => self.middle.view.isodose = !self.middle.view.isodose,
+            Action::ToggleTheme => {
+                self.settings.theme = match self.settings.theme {
+                    ThemeChoice::Dark => ThemeChoice::Light,
+                    ThemeChoice::Light => ThemeChoice::Dark,
+                };
+            }
+            Action::SavePicture => self.pictures.request(ctx),
+            Action::PutRefusalsAway => {
+                if let Some(session) = &self.shown.session {
+                    self.put_away = (session.session_id, session.refused);
+                }
+            }
+            Action::LoadScene(path) => self.load(&path),
+            Action::CancelLoad => self.cancel_load(),
+            Action::StopRun => self.stop_run(),
+            // While the script runs the needle is its own.
+            _ if self.run.is_some() && action != Action::Send(CommandKind::Disengage) => {}
+            Action::Next => {
+                // An action that is carried out names what it does itself.
+                if let Some(action) = next_action(&self.shown) {
+                    self.act(action, ctx);
+                }
+            }
+            Action::Undo => match undo_action(&self.shown) {
+                Some(Undo::Seed) => self.send("Undo seed", CommandKind::UndoSeed, &[]),
+                Some(Undo::Plan) => self.withdraw_plan(),
+                None => {}
+            },
+            Action::RunAll => {
+                if let Some(scene) = &self.shown.scene {
+                    self.run = Some(Run::new(default_plan(scene), self.pace));
+                }
+            }
+            Action::PlanSeeds => {
+                if let Some(scene) = &self.shown.scene {
+                    let values = plan_values(&default_plan(scene));
+                    self.send("Plan five seeds", CommandKind::SetPlan, &values);
+                }
+            }
+            Action::LoadBuiltinScene(number) => {
+                self.send("Built-in scene", CommandKind::LoadBuiltinScene, &[number as f64]);
+            }
+            Action::PlaceNeedle => self.move_to("Place needle", 0.0, self.pace.approach_m_per_s),
+            Action::Insert => {
+                let depth = self.shown.deepest_seed_m().unwrap_or(0.0);
+                self.move_to("Insert", depth, self.pace.insert_m_per_s);
+            }
+            Action::Retract => self.move_to("Retract", 0.0, self.pace.retract_m_per_s),
+            Action::DriveTo(depth) => self.pulled_to_m = Some(depth),
+            Action::MoveTo(depth) => self.move_to("Depth", depth, self.pace.insert_m_per_s),
+            Action::Send(kind) => self.send(command_name(kind), kind, &[]),
+        }
+    }
+
+    /// An empty list of seeds: there is no plan any more.
+    fn withdraw_plan(&mut self) {
+        if let Some(plan) = &self.shown.plan {
+            let values = [plan.entry_m, plan.direction].concat();
+            self.send("Withdraw the plan", CommandKind::SetPlan, &values);
+        }
+    }
+
+    /// A file that is being read is let go; one that is being sent is the core's to answer, and its answer is not waited for.
+    fn cancel_load(&mut self) {
+        self.loader.cancel();
+        self.uploading = None;
+        self.shown.load = LoadState::Idle;
+    }
+
+    /// A hand on the tip: at most one goal a frame, and none that is the same.
+    fn pull(&mut self) {
+        let Some(wanted) = self.pulled_to_m.take() else {
+            self.pulled_goal_m = None;
+            return;
+        };
+        let (Some(depth), Some(length)) = (self.shown.path_depth_m(), self.shown.path_length_m()) else {
+            return;
+        };
+        let near = wanted.clamp(depth - PULLED_M, depth + PULLED_M);
+        let goal = near.clamp(-BEFORE_ENTRY_M, length);
+        if self.pulled_goal_m.is_none_or(|last| (last - goal).abs() > SAME_GOAL_M) {
+            self.pulled_goal_m = Some(goal);
+            self.move_to("Needle", goal, self.pace.insert_m_per_s);
+        }
+    }
+
+    /// The needle stays where it is; the force stays as it is.
+    fn stop_run(&mut self) {
+        self.run = None;
+        self.shown.running = false;
+        if let Some(depth) = self.shown.path_depth_m() {
+            self.move_to("Stop", depth, self.pace.insert_m_per_s);
+        }
+    }
+
+    /// Held keys move the goal along the path; letting go stops it where the tip is. Without a key a hand may pull the tip.
+    pub(super) fn drive(&mut self, speed_m_per_s: f64, frame_s: f64) {
+        if self.run.is_some() || !self.shown.is_live() {
+            (self.goal_m, self.pulled_to_m) = (None, None);
+            return;
+        }
+        if speed_m_per_s == 0.0 {
+            if self.goal_m.take().is_some()
+                && let Some(depth) = self.shown.path_depth_m()
+            {
+                self.move_to("Needle", depth, self.pace.insert_m_per_s);
+            } else {
+                self.pull();
+            }
+            return;
+        }
+        self.pulled_to_m = None;
+        let (Some(depth), Some(length)) = (self.shown.path_depth_m(), self.shown.path_length_m()) else {
+            self.shown.note = Some(refusal(
+                "The keys follow the planned path: plan the seeds first.".to_owned(),
+            ));
+            return;
+        };
+        let step = speed_m_per_s * frame_s.min(LONGEST_FRAME_S);
+        let ahead = (self.goal_m.unwrap_or(depth) + step).clamp(depth - LEAD_M, depth + LEAD_M);
+        let goal = ahead.clamp(-BEFORE_ENTRY_M, length);
+        self.goal_m = Some(goal);
+        self.move_to("Needle", goal, speed_m_per_s.abs());
+    }
+
+    pub(super) fn send_parameters(&mut self) {
+        let Some(pairs) = self.parameters.request() else { return };
+        let mut values = Vec::with_capacity(2 * pairs.len());
+        for (index, value) in &pairs {
+            if let Some(spec) = PARAMETERS.get(*index) {
+                values.extend([f64::from(spec.id as u32), *value]);
+            }
+        }
+        match self.link.send(CommandKind::SetParameters, &values) {
+            Ok(id) => self.parameters.sent(id, pairs),
+            Err(e) => self.parameters.not_sent(e.to_string()),
+        }
+    }
+}
+
+fn command_name(kind: CommandKind) -> &'static str {
+    match kind {
+        CommandKind::SetParameters => "Parameters",
+        CommandKind::SetPlan => "Plan",
+        CommandKind::MoveHand => "Needle",
+        CommandKind::DropSeed => "Drop seed",
+        CommandKind::Engage => "Engage force",
+        CommandKind::Disengage => "Disengage",
+        CommandKind::Reset => "Reset",
+        CommandKind::LoadBuiltinScene => "Built-in scene",
+        CommandKind::UndoSeed => "Undo seed",
+        CommandKind::Shutdown => "Shutdown",
+        CommandKind::SaveFlight => "Flight recording",
+        CommandKind::Rehearse => "Rehearsal",
+    }
+}

@@ -1,0 +1,251 @@
+//! The window: takes what is new, draws the panels, carries out what they ask for. A frame never waits.
+
+mod act;
+mod take;
+
+use crate::dose_desk::DoseDesk;
+use crate::link::{Link, LinkStatus};
+use crate::loader::Loader;
+use crate::panel::history::History;
+use crate::panel::parameters::{ParametersState, parameters_ui};
+use crate::panel::workflow::{WorkflowState, workflow_ui};
+use crate::panel::{Action, FrameCost, Note, Shown, help, plots, status};
+use crate::picture::Pictures;
+use crate::settings::Settings;
+use crate::view::middle::Middle;
+use crate::workflow::{Pace, Run};
+use crate::{format, keyboard, theme};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+use stylet_shm_schema::service::Instance;
+
+const LIVE_FRAME: Duration = Duration::from_millis(16);
+const ABSENT_FRAME: Duration = Duration::from_millis(250);
+
+#[derive(Clone, Debug)]
+pub struct Options {
+    pub instance: Instance,
+    /// Read and sent as soon as a core is there.
+    pub scene: Option<PathBuf>,
+    /// Which label of the file is the gland; all of them when none is given.
+    pub label: Option<u8>,
+}
+
+/// A command that has not been answered yet.
+struct Waiting {
+    id: u64,
+    what: &'static str,
+    since: Instant,
+}
+
+pub struct App {
+    link: Link,
+    label: Option<u8>,
+    /// From the command line, until it is read.
+    first_scene: Option<PathBuf>,
+    shown: Shown,
+    middle: Middle,
+    dose: DoseDesk,
+    pictures: Pictures,
+    settings: Settings,
+    /// As they were when they were last brought into force.
+    applied: Option<Settings>,
+    history: History,
+    summed_up: Instant,
+    loader: Loader,
+    uploading: Option<(u64, String)>,
+    run: Option<Run>,
+    pace: Pace,
+    waiting: Vec<Waiting>,
+    /// Where a driven needle is sent, along the path from the entry.
+    goal_m: Option<f64>,
+    /// Where a hand on the tip has drawn it in this frame, and where it was last sent to.
+    pulled_to_m: Option<f64>,
+    pulled_goal_m: Option<f64>,
+    /// The run of the core, and how many of its refusals were put away.
+    put_away: (u64, u64),
+    workflow: WorkflowState,
+    parameters: ParametersState,
+    help: bool,
+}
+
+/// Opens the window and returns when it is closed.
+pub fn run(options: Options) -> Result<(), String> {
+    let native = eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default()
+            .with_title("Stylet")
+            .with_app_id("stylet")
+            .with_inner_size([1280.0, 800.0])
+            .with_min_inner_size([960.0, 600.0])
+            .with_drag_and_drop(true),
+        renderer: eframe::Renderer::Wgpu,
+        ..Default::default()
+    };
+    let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::new(cc, options))));
+    eframe::run_native("Stylet", native, create).map_err(|e| {
+        format!(
+            "cannot open a window: {e}. It needs a display (DISPLAY or WAYLAND_DISPLAY) and a graphics driver (mesa-vulkan-drivers); \
+             without them use `host-ui procedure`"
+        )
+    })
+}
+
+impl App {
+    /// What the window knows of the core.
+    pub fn link(&self) -> &Link {
+        &self.link
+    }
+
+    /// The pictures in the middle, and where they cut.
+    pub fn middle(&self) -> &Middle {
+        &self.middle
+    }
+
+    /// What the last frame cost.
+    pub fn cost(&self) -> FrameCost {
+        self.shown.cost
+    }
+
+    pub fn new(cc: &eframe::CreationContext<'_>, options: Options) -> Self {
+        theme::apply(&cc.egui_ctx);
+        let settings = Settings::read(cc.storage);
+        let shown = Shown::empty(options.instance.name());
+        Self {
+            link: Link::new(options.instance),
+            label: options.label,
+            first_scene: options.scene,
+            shown,
+            middle: Middle::new(cc.wgpu_render_state.clone()),
+            dose: DoseDesk::new(),
+            pictures: Pictures::default(),
+            applied: None,
+            history: History::default(),
+            summed_up: Instant::now(),
+            loader: Loader::default(),
+            uploading: None,
+            run: None,
+            pace: Pace::default(),
+            waiting: Vec::new(),
+            goal_m: None,
+            pulled_to_m: None,
+            pulled_goal_m: None,
+            put_away: (0, 0),
+            workflow: WorkflowState::with_file(&settings.last_file),
+            settings,
+            parameters: ParametersState::default(),
+            help: false,
+        }
+    }
+
+    fn frame_ui(&mut self, ui: &mut egui::Ui) -> Vec<Action> {
+        let mut actions = Vec::new();
+        let bar = egui::Frame::new()
+            .fill(theme::of(ui).panel)
+            .inner_margin(egui::Margin::symmetric(10, 5));
+        egui::Panel::top("status").frame(bar).show(ui, |ui| {
+            actions.extend(status::status_ui(ui, &self.shown, &mut self.settings));
+        });
+        let banners = status::banners(&self.shown);
+        if !banners.is_empty() {
+            egui::Panel::top("banners").frame(egui::Frame::new()).show(ui, |ui| {
+                ui.spacing_mut().item_spacing.y = 1.0;
+                actions.extend(status::banners_ui(ui, &banners));
+            });
+        }
+        let left = egui::Panel::left("workflow")
+            .exact_size(theme::LEFT_WIDTH)
+            .frame(theme::side_panel(ui));
+        left.resizable(false).show(ui, |ui| {
+            egui::ScrollArea::vertical().show(ui, |ui| {
+                actions.extend(workflow_ui(ui, &self.shown, &mut self.workflow));
+            });
+        });
+        let right = egui::Panel::right("plots")
+            .exact_size(theme::RIGHT_WIDTH)
+            .frame(theme::side_panel(ui));
+        right.resizable(false).show(ui, |ui| {
+            let height = ui.available_height();
+            egui::ScrollArea::vertical().show(ui, |ui| plots::plots_ui(ui, &self.shown, &self.history, height));
+        });
+        egui::CentralPanel::default()
+            .frame(egui::Frame::new().fill(theme::of(ui).background))
+            .show(ui, |ui| {
+                let (layout, dose) = (self.settings.layout, self.shown.dose.as_ref());
+                actions.extend(self.middle.middle_ui(ui, layout, &self.shown, dose));
+            });
+        parameters_ui(ui.ctx(), &self.shown, &mut self.parameters);
+        help::help_ui(ui.ctx(), &mut self.help);
+        actions
+    }
+
+    /// What was set since the last frame, here or by the keys for larger and smaller words.
+    fn apply_settings(&mut self, ctx: &egui::Context) {
+        if self.applied.as_ref() != Some(&self.settings) {
+            self.settings.apply(ctx);
+            self.applied = Some(self.settings.clone());
+        } else {
+            self.settings.scale = ctx.zoom_factor();
+        }
+    }
+
+    fn dropped_file(ctx: &egui::Context) -> Option<Action> {
+        let path = ctx.input(|i| {
+            i.raw
+                .dropped_files
+                .iter()
+                .map(|f| f.path().to_owned())
+                .find(|p| !p.as_os_str().is_empty())
+        })?;
+        Some(Action::LoadScene(path))
+    }
+}
+
+impl eframe::App for App {
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        let ctx = ui.ctx().clone();
+        let begun_ns = thread_cpu_ns();
+        let uploaded = self.middle.uploaded_bytes();
+        self.apply_settings(&ctx);
+        self.take();
+        let keys = keyboard::read(&ctx);
+        let mut actions = self.frame_ui(ui);
+        actions.extend(keys.actions);
+        actions.extend(Self::dropped_file(&ctx));
+        if ctx.input(|i| i.key_pressed(egui::Key::Escape)) {
+            (self.help, self.parameters.open) = (false, false);
+        }
+        for action in actions {
+            self.act(action, &ctx);
+        }
+        self.drive(keys.drive_m_per_s, f64::from(ctx.input(|i| i.stable_dt)));
+        self.send_parameters();
+        self.shown.cost = FrameCost {
+            cpu_us: format::us(thread_cpu_ns().saturating_sub(begun_ns)),
+            uploaded_bytes: self.middle.uploaded_bytes() - uploaded,
+        };
+        ctx.request_repaint_after(match self.shown.status {
+            LinkStatus::Live => LIVE_FRAME,
+            LinkStatus::Silent { .. } | LinkStatus::Absent { .. } => ABSENT_FRAME,
+        });
+    }
+
+    fn save(&mut self, storage: &mut dyn eframe::Storage) {
+        self.settings.write(storage);
+    }
+}
+
+/// Processor time of this thread; 0 where the system does not tell.
+fn thread_cpu_ns() -> u64 {
+    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `time` is valid for writes.
+    let told = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &mut time) };
+    if told == 0 {
+        time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
+    } else {
+        0
+    }
+}
+
+fn refusal(text: String) -> Note {
+    Note { refused: true, text }
+}

@@ -1,0 +1,158 @@
+//! What came since the last frame: records, answers, files that were read, the script's next action.
+
+use super::{App, refusal};
+use crate::files::LabelVolume;
+use crate::panel::{LoadState, Note};
+use crate::workflow::RunStatus;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+const SUM_UP_EVERY: Duration = Duration::from_millis(500);
+/// No answer within this time is told as such.
+const ANSWER_WITHIN: Duration = Duration::from_secs(3);
+
+impl App {
+    /// All that came since the last frame.
+    pub(super) fn take(&mut self) {
+        self.link.poll();
+        self.shown.take(&self.link);
+        let direction = self.shown.state.map_or([0.0, 0.0, 1.0], |s| s.needle_direction);
+        let records = self.link.take_records();
+        self.history.take(&records, direction);
+        if self.summed_up.elapsed() >= SUM_UP_EVERY {
+            self.summed_up = Instant::now();
+            self.history.sum_up();
+        }
+        self.take_answers();
+        self.take_scene_file();
+        self.advance_run();
+        self.dose
+            .take(self.link.scene(), &self.shown.seeds, self.settings.seed_strength_u);
+        self.shown.dose = self.dose.latest().cloned();
+        self.shown.dose_trouble = self.dose.trouble();
+        self.count_refusals();
+        self.take_pictures();
+        self.middle.take(&self.shown, self.link.scene(), self.link.snapshot());
+    }
+
+    /// Those of this run of the core that were not put away.
+    fn count_refusals(&mut self) {
+        let Some(session) = &self.shown.session else { return };
+        if self.put_away.0 != session.session_id {
+            self.put_away = (session.session_id, session.refused);
+        }
+        self.shown.refusals = session.refused.saturating_sub(self.put_away.1);
+    }
+
+    fn take_pictures(&mut self) {
+        match self.pictures.poll() {
+            None => {}
+            Some(Ok(path)) => {
+                self.shown.note = Some(Note {
+                    refused: false,
+                    text: format!("Picture saved as {}", path.display()),
+                });
+            }
+            Some(Err(why)) => self.shown.note = Some(refusal(why)),
+        }
+    }
+
+    fn take_answers(&mut self) {
+        if self.shown.is_absent() {
+            self.parameters.forget();
+            self.waiting.clear();
+            self.goal_m = None;
+            if self.uploading.take().is_some() {
+                self.shown.load = LoadState::Refused("rt-core went away before it answered".to_owned());
+            }
+            return;
+        }
+        if let Some(id) = self.parameters.waiting_for()
+            && let Some(answer) = self.link.reply(id)
+        {
+            self.parameters
+                .answered(answer.accepted, &answer.text, answer.effective_tick);
+        }
+        let (link, note) = (&mut self.link, &mut self.shown.note);
+        self.waiting.retain(|w| match link.reply(w.id) {
+            Some(answer) if answer.accepted => {
+                // An old refusal is no longer true once something was accepted.
+                *note = None;
+                false
+            }
+            Some(answer) => {
+                *note = Some(refusal(format!("{} refused: {}", w.what, answer.text)));
+                false
+            }
+            None if w.since.elapsed() > ANSWER_WITHIN => {
+                *note = Some(refusal(format!("{}: no answer from rt-core", w.what)));
+                false
+            }
+            None => true,
+        });
+        let answer = self.uploading.as_ref().and_then(|(id, _)| self.link.reply(*id));
+        if let (Some(answer), Some((_, name))) = (answer, self.uploading.clone()) {
+            self.uploading = None;
+            self.shown.load = match answer.accepted {
+                true => LoadState::Loaded(format!("{name} is the scene now")),
+                false => LoadState::Refused(format!("{name} refused: {}", answer.text)),
+            };
+        }
+    }
+
+    fn take_scene_file(&mut self) {
+        if self.shown.is_live()
+            && let Some(path) = self.first_scene.take()
+        {
+            self.load(&path);
+        }
+        match self.loader.poll() {
+            None => {}
+            Some(Err(why)) => self.shown.load = LoadState::Refused(why),
+            Some(Ok(volume)) => self.upload(&volume),
+        }
+    }
+
+    pub(super) fn load(&mut self, path: &Path) {
+        if self.shown.load.is_busy() {
+            return;
+        }
+        self.settings.last_file = path.display().to_string();
+        self.shown.load = LoadState::Reading(format!("reading {}", path.display()));
+        self.loader.begin(path, self.label);
+    }
+
+    fn upload(&mut self, volume: &LabelVolume) {
+        let mut name = volume.name.clone();
+        for warning in &volume.warnings {
+            name = format!("{name} ({warning})");
+        }
+        self.shown.load = match self.link.upload(volume) {
+            Err(e) => LoadState::Refused(e.to_string()),
+            Ok(id) => {
+                let text = format!("sending {}", volume.name);
+                self.uploading = Some((id, name));
+                LoadState::Sending(text)
+            }
+        };
+    }
+
+    fn advance_run(&mut self) {
+        if let Some(run) = &mut self.run {
+            let status = run.advance(&mut self.link);
+            self.shown.run_step = Some(run.step());
+            self.shown.note = match status {
+                RunStatus::Working => None,
+                RunStatus::Done => Some(Note {
+                    refused: false,
+                    text: "All four steps are done.".to_owned(),
+                }),
+                RunStatus::Failed(why) => Some(refusal(format!("The run stopped: {why}"))),
+            };
+            if self.shown.note.is_some() {
+                self.run = None;
+            }
+        }
+        self.shown.running = self.run.is_some();
+    }
+}

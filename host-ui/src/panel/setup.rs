@@ -1,0 +1,90 @@
+//! What the loop got from the kernel, how the link is, and what a frame of this window costs.
+
+use super::Shown;
+use crate::link::LinkStatus;
+use crate::{format, theme};
+use egui::RichText;
+use stylet_shm_schema::ThreadReport;
+
+pub fn setup_ui(ui: &mut egui::Ui, shown: &Shown) {
+    ui.separator();
+    // Lines of words need less room than widgets.
+    ui.spacing_mut().interact_size.y = 14.0;
+    egui::Grid::new("set-up")
+        .num_columns(2)
+        .spacing([10.0, 1.0])
+        .show(ui, |ui| {
+            let mut row = |name: &str, value: String, fine: bool| {
+                ui.label(theme::small(name));
+                let tokens = theme::of(ui);
+                let color = if fine { tokens.text } else { tokens.warn };
+                ui.label(RichText::new(value).small().color(color));
+                ui.end_row();
+            };
+            if let Some(session) = &shown.session {
+                row("device", session.device.read(), true);
+                row("force loop", thread(&session.haptic), session.haptic.is_fifo());
+                row("tissue loop", thread(&session.tissue), session.tissue.is_fifo());
+                let locked = session.memory_locked != 0;
+                let memory = if locked {
+                    "locked"
+                } else {
+                    "not locked: pages may be missing"
+                };
+                row("memory", memory.to_owned(), locked);
+            }
+            let (link, fine) = link(shown);
+            row("link", link, fine);
+            row("this window", frame(shown), true);
+        });
+}
+
+fn thread(report: &ThreadReport) -> String {
+    let policy = match report.policy {
+        1 => format!("SCHED_FIFO {}", report.priority),
+        _ => format!("not SCHED_FIFO, {} asked", report.asked_priority),
+    };
+    match report.core {
+        u32::MAX => format!("{policy}, any core"),
+        core => format!("{policy}, core {core}"),
+    }
+}
+
+fn link(shown: &Shown) -> (String, bool) {
+    let (word, fine) = match &shown.status {
+        LinkStatus::Live => ("live".to_owned(), true),
+        LinkStatus::Silent { since } => (format!("silent for {:.1} s", since.as_secs_f64()), false),
+        LinkStatus::Absent { .. } => ("absent".to_owned(), false),
+    };
+    let rubbish = shown.rubbish_refused;
+    let text = format!("{word}, {} messages not believed", format::count(rubbish));
+    (text, fine && rubbish == 0)
+}
+
+fn frame(shown: &Shown) -> String {
+    let cost = shown.cost;
+    format!(
+        "{:.1} ms a frame, {:.0} KiB to the card",
+        cost.cpu_us * 1e-3,
+        cost.uploaded_bytes as f64 / 1024.0
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thread_says_what_it_got_and_what_it_asked_for() {
+        let mut report = ThreadReport {
+            policy: 1,
+            priority: 80,
+            asked_priority: 80,
+            core: 2,
+            ..ThreadReport::default()
+        };
+        assert_eq!(thread(&report), "SCHED_FIFO 80, core 2");
+        (report.policy, report.core) = (0, u32::MAX);
+        assert_eq!(thread(&report), "not SCHED_FIFO, 80 asked, any core");
+    }
+}

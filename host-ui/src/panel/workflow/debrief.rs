@@ -1,0 +1,137 @@
+//! What came of it: the error of each seed, the dose against its limits, the histogram of the target.
+
+use crate::dose_desk::{DosePicture, Figure, Limit};
+use crate::panel::{SeedError, Shown, seed_errors};
+use crate::{format, theme};
+use egui::RichText;
+use egui_plot::{Line, Plot, PlotPoints, VLine};
+
+/// Rows of the table of seeds at once; the rest is scrolled to.
+const TABLE_HEIGHT: f32 = 150.0;
+
+pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown) {
+    seeds_ui(ui, shown);
+    let Some(dose) = &shown.dose else {
+        let text = shown
+            .dose_trouble
+            .unwrap_or("The dose is computed once seeds lie in the tissue.");
+        ui.label(theme::small(text));
+        return;
+    };
+    ui.label(format!(
+        "Dose: {} seeds of I-125 6711, {:.0} Gy",
+        dose.seeds, dose.prescription_gy
+    ));
+    ui.spacing_mut().interact_size.y = 16.0;
+    egui::Grid::new("dose")
+        .num_columns(4)
+        .striped(true)
+        .spacing([10.0, 2.0])
+        .show(ui, |ui| {
+            for figure in &dose.figures {
+                figure_ui(ui, figure);
+            }
+        });
+    dvh_ui(ui, dose);
+}
+
+fn figure_ui(ui: &mut egui::Ui, figure: &Figure) {
+    let tokens = theme::of(ui);
+    let unit = match figure.metric.unit() {
+        "gy" => "Gy",
+        _ => "%",
+    };
+    ui.label(theme::small(&figure.structure));
+    ui.label(figure.metric.to_string());
+    ui.monospace(format!("{:.1} {unit}", figure.value));
+    let Some(limit) = figure.limit else {
+        ui.label("");
+        return ui.end_row();
+    };
+    // The word says it as well as the colour.
+    let (word, color) = match (limit.is_met(figure.value), limit) {
+        (true, _) => ("met".to_owned(), tokens.good),
+        (false, Limit::AtLeast(value)) => (format!("below {value:.0}"), tokens.bad),
+        (false, Limit::AtMost(value)) => (format!("above {value:.0}"), tokens.bad),
+    };
+    ui.label(RichText::new(word).color(color));
+    ui.end_row();
+}
+
+fn dvh_ui(ui: &mut egui::Ui, dose: &DosePicture) {
+    let tokens = theme::of(ui);
+    ui.label(theme::small("Target: volume, %, over dose, % of the prescription"));
+    let points: Vec<[f64; 2]> = dose.target_dvh.iter().map(|[x, y]| [x * 100.0, y * 100.0]).collect();
+    Plot::new("dvh")
+        .height(80.0)
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .allow_axis_zoom_drag(false)
+        .include_x(0.0)
+        .include_x(300.0)
+        .include_y(0.0)
+        .include_y(100.0)
+        .y_axis_min_width(30.0)
+        .show(ui, |plot| {
+            plot.vline(VLine::new("prescription", 100.0).color(tokens.weak));
+            plot.line(
+                Line::new("target", PlotPoints::new(points))
+                    .color(tokens.depth)
+                    .width(1.6),
+            );
+        });
+}
+
+/// Nothing until the first seed is placed: an empty table tells nothing.
+pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown) {
+    let Some(plan) = &shown.plan else { return };
+    if shown.seeds.is_empty() {
+        return;
+    }
+    let rows = seed_errors(shown.planned(), &shown.seeds, plan.direction);
+    ui.label(theme::strong("Seed error, mm"))
+        .on_hover_text("Where the seed lies now against where it was planned; along is positive inwards");
+    egui::ScrollArea::vertical()
+        .id_salt("seed errors")
+        .max_height(TABLE_HEIGHT)
+        .show(ui, |ui| {
+            ui.spacing_mut().interact_size.y = 16.0;
+            egui::Grid::new("seed errors")
+                .num_columns(4)
+                .striped(true)
+                .min_col_width(52.0)
+                .spacing([8.0, 2.0])
+                .show(ui, |ui| {
+                    for head in ["seed", "along", "across", "total"] {
+                        ui.label(theme::small(head));
+                    }
+                    ui.end_row();
+                    rows.iter().for_each(|row| seed_row_ui(ui, row));
+                });
+        });
+    let placed: Vec<f64> = rows.iter().filter(|r| r.placed.is_some()).map(total_m).collect();
+    let mean = placed.iter().sum::<f64>() / placed.len().max(1) as f64;
+    let worst = placed.iter().copied().fold(0.0, f64::max);
+    let text = format!("mean {:.2}, worst {:.2}", format::mm(mean), format::mm(worst));
+    ui.label(theme::small(text));
+}
+
+fn total_m(row: &SeedError) -> f64 {
+    row.along_m.hypot(row.across_m)
+}
+
+fn seed_row_ui(ui: &mut egui::Ui, row: &SeedError) {
+    ui.label(format!("{}", row.planned + 1));
+    if row.placed.is_some() {
+        ui.monospace(format::signed_mm(row.along_m));
+        ui.monospace(format!("{:.2}", format::mm(row.across_m)));
+        ui.monospace(format!("{:.2}", format::mm(total_m(row))));
+    } else {
+        ui.label(theme::small("not placed"));
+        ui.label("");
+        ui.label("");
+    }
+    ui.end_row();
+}

@@ -1,0 +1,294 @@
+//! The left panel: the steps of the procedure, one of them open, with the one thing to do and what it lacks.
+
+mod debrief;
+mod progress;
+mod scene;
+
+use super::{Action, Shown};
+use crate::workflow::Step;
+use crate::{format, theme};
+use egui::{Align2, Button, FontId, RichText, Sense, Stroke, Vec2};
+pub use progress::{Progress, Undo, is_at_next_seed, missing, next_action, progress, undo_action};
+use stylet_shm_schema::CommandKind;
+
+/// What the panel keeps between frames: what a person is typing, and which step was opened by hand.
+#[derive(Default)]
+pub struct WorkflowState {
+    pub scene_path: String,
+    opened: Option<Progress>,
+    was: Option<Progress>,
+}
+
+impl WorkflowState {
+    /// Offers the file that was loaded last.
+    pub fn with_file(path: &str) -> Self {
+        Self {
+            scene_path: path.to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// The step that is open: the present one, until another is opened by hand and the procedure goes on.
+    fn open(&mut self, now: Progress) -> Progress {
+        if self.was != Some(now) {
+            (self.was, self.opened) = (Some(now), None);
+        }
+        self.opened.unwrap_or(now)
+    }
+}
+
+pub fn workflow_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState) -> Vec<Action> {
+    let mut actions = Vec::new();
+    let now = progress(shown);
+    let open = state.open(now);
+    ui.heading("Procedure");
+    run_ui(ui, shown, &mut actions);
+    for step in Progress::ALL {
+        if step == open {
+            step_ui(ui, (step, now), shown, state, &mut actions);
+        } else if head_ui(ui, (step, now), shown).clicked() {
+            state.opened = Some(step);
+        }
+    }
+    if let Some(note) = &shown.note {
+        let tokens = theme::of(ui);
+        let color = if note.refused { tokens.bad } else { tokens.weak };
+        ui.label(RichText::new(&note.text).color(color));
+    }
+    ui.separator();
+    force_ui(ui, shown, &mut actions);
+    actions
+}
+
+fn run_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
+    let wide = egui::vec2(ui.available_width(), 28.0);
+    if shown.running {
+        let step = match shown.run_step {
+            Some(Step::Plan) => "planning",
+            Some(Step::PlaceNeedle) => "placing the needle",
+            Some(Step::Insert) => "inserting",
+            Some(Step::DropAndRetract) => "dropping and retracting",
+            Some(Step::Done) | None => "finishing",
+        };
+        ui.horizontal(|ui| {
+            ui.spinner();
+            ui.label(format!("Running: {step}"));
+            if ui.button("Stop").clicked() {
+                actions.push(Action::StopRun);
+            }
+        });
+        return;
+    }
+    let blocked = missing(shown, Progress::Plan);
+    let response = ui.add_enabled(blocked.is_none(), Button::new("Run all four steps").min_size(wide));
+    if hinted(response, blocked).clicked() {
+        actions.push(Action::RunAll);
+    }
+}
+
+fn hinted(response: egui::Response, blocked: Option<String>) -> egui::Response {
+    match blocked {
+        Some(why) => response.on_disabled_hover_text(why),
+        None => response,
+    }
+}
+
+/// One line: the step's number in a dot that says how far it is, its name, and the same in a word.
+fn head_ui(ui: &mut egui::Ui, (step, now): (Progress, Progress), shown: &Shown) -> egui::Response {
+    let tokens = theme::of(ui);
+    let size = Vec2::new(ui.available_width(), 24.0);
+    let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+    let name = format!("{}  {}", step.number(), step.name());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Button, true, &name));
+    if response.hovered() || response.has_focus() {
+        ui.painter().rect_filled(rect, 4.0, tokens.widget);
+    }
+    let live = shown.is_live();
+    let (word, color, filled) = if live && now > step {
+        ("done", tokens.good, true)
+    } else if live && now == step {
+        ("now", tokens.accent, true)
+    } else {
+        ("", tokens.weak, false)
+    };
+    let dot = rect.left_center() + Vec2::new(12.0, 0.0);
+    if filled {
+        ui.painter().circle_filled(dot, 9.0, color);
+    } else {
+        ui.painter().circle_stroke(dot, 8.5, Stroke::new(1.0, color));
+    }
+    let ink = if filled { tokens.on_signal } else { tokens.weak };
+    let number = step.number().to_string();
+    let text = |at, anchor, text: &str, size, color| {
+        ui.painter().text(at, anchor, text, FontId::proportional(size), color);
+    };
+    text(dot, Align2::CENTER_CENTER, &number, 12.0, ink);
+    let color_of_name = if live && now == step { tokens.text } else { tokens.weak };
+    text(
+        dot + Vec2::new(18.0, 0.0),
+        Align2::LEFT_CENTER,
+        step.name(),
+        13.5,
+        color_of_name,
+    );
+    let end = rect.right_center() - Vec2::new(4.0, 0.0);
+    text(end, Align2::RIGHT_CENTER, word, 11.5, color);
+    response
+}
+
+/// The step that is open.
+fn step_ui(
+    ui: &mut egui::Ui,
+    (step, now): (Progress, Progress),
+    shown: &Shown,
+    state: &mut WorkflowState,
+    actions: &mut Vec<Action>,
+) {
+    let tokens = theme::of(ui);
+    let current = step == now && shown.is_live();
+    let color = if current { tokens.accent } else { tokens.line };
+    theme::card(ui).stroke(Stroke::new(1.0, color)).show(ui, |ui| {
+        ui.set_min_width(ui.available_width());
+        head_ui(ui, (step, now), shown);
+        let blocked = missing(shown, step);
+        match &blocked {
+            Some(why) => ui.label(RichText::new(format!("Missing: {why}.")).color(tokens.warn)),
+            None => ui.label(theme::weak(what(step, shown))),
+        };
+        let ready = blocked.is_none() && !shown.running;
+        match step {
+            Progress::Scene => scene::scene_ui(ui, shown, state, actions),
+            Progress::Plan => plan_ui(ui, shown, ready, actions),
+            Progress::Place => main_button(ui, ("Place needle", Action::PlaceNeedle), ready, actions),
+            Progress::Insert => insert_ui(ui, shown, ready, actions),
+            Progress::Drop => drop_ui(ui, shown, ready, actions),
+            Progress::Retract => retract_ui(ui, shown, actions),
+            Progress::Debrief => debrief::debrief_ui(ui, shown),
+        }
+    });
+}
+
+fn what(step: Progress, shown: &Shown) -> String {
+    match step {
+        Progress::Scene => "A built-in scene, or a segmented volume of your own.".to_owned(),
+        Progress::Plan => "Five seeds along one needle through the gland.".to_owned(),
+        Progress::Place => "Bring the tip to the entry, along the path.".to_owned(),
+        Progress::Insert => "To the deepest planned seed: the button, W and S, or drag the tip in a slice.".to_owned(),
+        Progress::Drop => {
+            let (dropped, planned) = (shown.seeds.len(), shown.planned().len());
+            format!("{dropped} of {planned} seeds dropped. Drop one at each place on the way out.")
+        }
+        Progress::Retract => "All seeds are dropped. Take the needle out.".to_owned(),
+        Progress::Debrief => "Where the seeds came to rest, and the dose.".to_owned(),
+    }
+}
+
+/// The one thing to do in a step.
+fn main_button(ui: &mut egui::Ui, (name, action): (&str, Action), ready: bool, actions: &mut Vec<Action>) {
+    if ui
+        .add_enabled(ready, Button::new(name))
+        .on_hover_text("Enter, while this step is next")
+        .clicked()
+    {
+        actions.push(action);
+    }
+}
+
+fn plan_ui(ui: &mut egui::Ui, shown: &Shown, ready: bool, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        main_button(ui, ("Plan five seeds", Action::PlanSeeds), ready, actions);
+        let undo = ui.add_enabled(
+            ready && undo_action(shown) == Some(Undo::Plan),
+            Button::new("Withdraw the plan"),
+        );
+        if undo.on_hover_text("Ctrl+Z").clicked() {
+            actions.push(Action::Undo);
+        }
+    });
+}
+
+fn insert_ui(ui: &mut egui::Ui, shown: &Shown, ready: bool, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        main_button(ui, ("Insert", Action::Insert), ready, actions);
+        let depth_mm = format::mm(shown.path_depth_m().unwrap_or(0.0));
+        let length_mm = format::mm(shown.path_length_m().unwrap_or(0.01));
+        let at_mm = depth_mm.clamp(0.0, length_mm);
+        let mut goal_mm = at_mm;
+        let label = ui.label(theme::small("Depth"));
+        ui.spacing_mut().slider_width = 76.0;
+        let slider = egui::Slider::new(&mut goal_mm, 0.0..=length_mm)
+            .suffix(" mm")
+            .fixed_decimals(1);
+        let response = ui.add_enabled(ready, slider).labelled_by(label.id);
+        // The slider rounds what it is given and calls that a change; only a hand on it may move the needle.
+        let by_hand = response.dragged() || response.has_focus();
+        if by_hand && (goal_mm - at_mm).abs() > 0.06 {
+            actions.push(Action::MoveTo(format::metres(goal_mm)));
+        }
+    });
+    retract_ui(ui, shown, actions);
+}
+
+fn drop_ui(ui: &mut egui::Ui, shown: &Shown, ready: bool, actions: &mut Vec<Action>) {
+    let live = shown.is_live() && !shown.running;
+    ui.horizontal(|ui| {
+        if ui
+            .add_enabled(ready, Button::new("Drop seed"))
+            .on_hover_text("Space")
+            .clicked()
+        {
+            actions.push(Action::Send(CommandKind::DropSeed));
+        }
+        let next = shown.next_seed_m().filter(|_| !is_at_next_seed(shown));
+        let to_next = ui.add_enabled(live && next.is_some(), Button::new("To the next place"));
+        if let (true, Some(depth_m)) = (to_next.clicked(), next) {
+            actions.push(Action::MoveTo(depth_m));
+        }
+    });
+    retract_ui(ui, shown, actions);
+    debrief::seeds_ui(ui, shown);
+}
+
+fn retract_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
+    let live = shown.is_live() && !shown.running;
+    ui.horizontal(|ui| {
+        if ui
+            .add_enabled(live && shown.plan.is_some(), Button::new("Retract"))
+            .clicked()
+        {
+            actions.push(Action::Retract);
+        }
+        let undo = ui.add_enabled(live && !shown.seeds.is_empty(), Button::new("Undo seed"));
+        if undo.on_hover_text("Ctrl+Z").clicked() {
+            actions.push(Action::Send(CommandKind::UndoSeed));
+        }
+    });
+}
+
+fn force_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        let live = shown.is_live();
+        let engaged = shown.is_engaged();
+        if ui
+            .add_enabled(live && !engaged, Button::new("Engage force"))
+            .on_hover_text("Key E")
+            .clicked()
+        {
+            actions.push(Action::Send(CommandKind::Engage));
+        }
+        if ui
+            .add_enabled(live && engaged, Button::new("Disengage"))
+            .on_hover_text("Key D")
+            .clicked()
+        {
+            actions.push(Action::Send(CommandKind::Disengage));
+        }
+        let reset = ui.add_enabled(live, Button::new("Reset"));
+        if reset
+            .on_hover_text("Tissue to rest, seeds removed, peaks and worst cases forgotten")
+            .clicked()
+        {
+            actions.push(Action::Send(CommandKind::Reset));
+        }
+    });
+}

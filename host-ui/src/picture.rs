@@ -1,0 +1,82 @@
+//! The window as a PNG file, written beside the frames.
+
+use eframe::icon_data::IconDataExt;
+use egui::{ColorImage, IconData};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Under the folder that the program was started in.
+const FOLDER: &str = "out/pictures";
+
+/// What became of a picture: its file, or why there is none.
+type Saved = Result<PathBuf, String>;
+
+pub struct Pictures {
+    done: Sender<Saved>,
+    saved: Receiver<Saved>,
+}
+
+impl Default for Pictures {
+    fn default() -> Self {
+        let (done, saved) = channel();
+        Self { done, saved }
+    }
+}
+
+impl Pictures {
+    /// Asks for the next frame; it is written by a thread of its own.
+    pub fn request(&self, ctx: &egui::Context) {
+        let done = self.done.clone();
+        ctx.request_screenshot(move |image| {
+            let writer = std::thread::Builder::new().name("picture".to_owned());
+            let told = done.clone();
+            let spawned = writer.spawn(move || {
+                // The window may be gone by now; then nobody wants to know.
+                let _ = done.send(save(&image, Path::new(FOLDER)));
+            });
+            if let Err(e) = spawned {
+                let _ = told.send(Err(format!("no thread to write a picture: {e}")));
+            }
+        });
+    }
+
+    /// Each picture once.
+    pub fn poll(&self) -> Option<Saved> {
+        self.saved.try_recv().ok()
+    }
+}
+
+fn save(image: &ColorImage, folder: &Path) -> Saved {
+    let told = |why: String| format!("{}: the picture cannot be written: {why}", folder.display());
+    let icon = IconData {
+        rgba: image.pixels.iter().flat_map(|p| p.to_array()).collect(),
+        width: image.size[0] as u32,
+        height: image.size[1] as u32,
+    };
+    let png = icon.to_png_bytes().map_err(told)?;
+    std::fs::create_dir_all(folder).map_err(|e| told(e.to_string()))?;
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let path = folder.join(format!("stylet-{}.png", now.as_millis()));
+    std::fs::write(&path, png).map_err(|e| told(e.to_string()))?;
+    Ok(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_is_a_png_of_the_same_pixels() {
+        let folder = std::env::temp_dir().join(format!("stylet-picture-{}", std::process::id()));
+        let mut image = ColorImage::filled([3, 2], egui::Color32::from_rgb(10, 20, 30));
+        image.pixels[4] = egui::Color32::from_rgb(200, 100, 50);
+        let path = save(&image, &folder).expect("written");
+        let png = std::fs::read(&path).expect("there");
+        let read = eframe::icon_data::from_png_bytes(&png).expect("a PNG");
+        assert_eq!((read.width, read.height), (3, 2));
+        assert_eq!(&read.rgba[16..20], &[200, 100, 50, 255]);
+        std::fs::remove_dir_all(&folder).expect("ours");
+        assert!(save(&image, Path::new("/proc/nowhere")).is_err());
+    }
+}

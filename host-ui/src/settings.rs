@@ -1,0 +1,170 @@
+//! What a person set in the window and finds again the next time it opens.
+
+use serde::{Deserialize, Serialize};
+
+/// Under which the settings are kept.
+const KEY: &str = "stylet.settings";
+/// Smallest and largest scale of words and widgets.
+pub const SCALES: [f32; 2] = [0.8, 1.6];
+/// Air kerma strength of a seed that can be set (U).
+pub const STRENGTHS_U: [f64; 2] = [0.05, 5.0];
+const LONGEST_FILE_NAME: usize = 4096;
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ThemeChoice {
+    #[default]
+    Dark,
+    Light,
+}
+
+/// What stands in the middle of the window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Layout {
+    /// The three slices and the three-dimensional picture.
+    #[default]
+    Quad,
+    Solid,
+    Slices,
+}
+
+impl Layout {
+    pub const ALL: [Self; 3] = [Self::Quad, Self::Solid, Self::Slices];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Quad => "All views",
+            Self::Solid => "3D",
+            Self::Slices => "Slices",
+        }
+    }
+
+    pub fn next(self) -> Self {
+        match self {
+            Self::Quad => Self::Solid,
+            Self::Solid => Self::Slices,
+            Self::Slices => Self::Quad,
+        }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Settings {
+    pub theme: ThemeChoice,
+    pub scale: f32,
+    pub layout: Layout,
+    /// The volume that was loaded last.
+    pub last_file: String,
+    /// Air kerma strength of each seed (U).
+    pub seed_strength_u: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            theme: ThemeChoice::default(),
+            scale: 1.0,
+            layout: Layout::default(),
+            last_file: String::new(),
+            seed_strength_u: 0.5,
+        }
+    }
+}
+
+impl Settings {
+    /// The defaults where nothing was kept or it cannot be used.
+    pub fn read(storage: Option<&dyn eframe::Storage>) -> Self {
+        let kept: Option<Self> = storage.and_then(|s| eframe::get_value(s, KEY));
+        kept.unwrap_or_default().checked()
+    }
+
+    pub fn write(&self, storage: &mut dyn eframe::Storage) {
+        eframe::set_value(storage, KEY, self);
+    }
+
+    /// The file is not trusted: anyone may have edited it.
+    fn checked(mut self) -> Self {
+        let default = Self::default();
+        if !self.scale.is_finite() {
+            self.scale = default.scale;
+        }
+        if !self.seed_strength_u.is_finite() {
+            self.seed_strength_u = default.seed_strength_u;
+        }
+        self.scale = self.scale.clamp(SCALES[0], SCALES[1]);
+        self.seed_strength_u = self.seed_strength_u.clamp(STRENGTHS_U[0], STRENGTHS_U[1]);
+        if self.last_file.len() > LONGEST_FILE_NAME {
+            self.last_file.clear();
+        }
+        self
+    }
+
+    pub fn apply(&self, ctx: &egui::Context) {
+        ctx.set_theme(match self.theme {
+            ThemeChoice::Dark => egui::Theme::Dark,
+            ThemeChoice::Light => egui::Theme::Light,
+        });
+        ctx.set_zoom_factor(self.scale);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use eframe::Storage;
+    use std::collections::BTreeMap;
+
+    #[derive(Default)]
+    struct Kept(BTreeMap<String, String>);
+
+    impl Storage for Kept {
+        fn get_string(&self, key: &str) -> Option<String> {
+            self.0.get(key).cloned()
+        }
+
+        fn set_string(&mut self, key: &str, value: String) {
+            self.0.insert(key.to_owned(), value);
+        }
+
+        fn remove_string(&mut self, key: &str) {
+            self.0.remove(key);
+        }
+
+        fn flush(&mut self) {}
+    }
+
+    #[test]
+    fn what_was_set_is_found_again() {
+        let set = Settings {
+            theme: ThemeChoice::Light,
+            scale: 1.25,
+            layout: Layout::Slices,
+            last_file: "gland.nii.gz".to_owned(),
+            seed_strength_u: 0.6,
+        };
+        let mut kept = Kept::default();
+        set.write(&mut kept);
+        assert_eq!(Settings::read(Some(&kept)), set);
+    }
+
+    #[test]
+    fn a_damaged_or_hostile_file_gives_settings_that_can_be_used() {
+        let mut kept = Kept::default();
+        for text in [
+            "",
+            "garbage(",
+            "(scale:1e30,seed_strength_u:-4.0)",
+            "(scale:NaN)",
+            "(theme:Dark,new:1)",
+        ] {
+            kept.set_string(KEY, text.to_owned());
+            let read = Settings::read(Some(&kept));
+            assert!((SCALES[0]..=SCALES[1]).contains(&read.scale), "{text}: {read:?}");
+            assert!(
+                (STRENGTHS_U[0]..=STRENGTHS_U[1]).contains(&read.seed_strength_u),
+                "{text}"
+            );
+        }
+        assert_eq!(Settings::read(None), Settings::default());
+    }
+}

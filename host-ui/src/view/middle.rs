@@ -1,0 +1,224 @@
+//! What stands in the middle of the window: the three-dimensional picture, the slices, and the tools over them.
+
+use super::scene3d::{Preset, Scene3d};
+use super::slice::{Orientation, Plane, Slices};
+use super::state::ViewState;
+use crate::dose_desk::DosePicture;
+use crate::link::{SceneModel, Snapshot};
+use crate::panel::{Action, Shown};
+use crate::settings::Layout;
+use crate::theme;
+use eframe::egui_wgpu::RenderState;
+use egui::{Pos2, Rect};
+use nalgebra::Vector3;
+use std::sync::Arc;
+
+/// Between two pictures.
+const GAP: f32 = 2.0;
+
+pub struct Middle {
+    pub solid: Scene3d,
+    slices: Slices,
+    pub view: ViewState,
+}
+
+/// Where each picture stands.
+struct Places {
+    solid: Option<Rect>,
+    slices: Vec<(Orientation, Rect)>,
+}
+
+impl Middle {
+    pub fn new(state: Option<RenderState>) -> Self {
+        Self {
+            solid: Scene3d::new(state.clone()),
+            slices: Slices::new(state),
+            view: ViewState::default(),
+        }
+    }
+
+    /// Bytes sent to the graphics card since the window opened.
+    pub fn uploaded_bytes(&self) -> u64 {
+        self.solid.uploaded_bytes() + self.slices.uploaded_bytes()
+    }
+
+    pub fn take(&mut self, shown: &Shown, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
+        self.solid.take(shown, model, snapshot);
+        self.slices.take(model, snapshot, &mut self.view);
+        if let Some(tip) = shown
+            .tip_m()
+            .filter(|tip| self.view.follow_tip && is_near_body(shown, tip))
+        {
+            self.view.cursor_m = Vector3::from(tip);
+        }
+    }
+
+    /// The plane that a slice at this place of the window shows.
+    pub fn plane(&self, orientation: Orientation, rect: Rect) -> Plane {
+        self.slices.plane(orientation, &self.view, rect)
+    }
+
+    pub fn reset_view(&mut self, shown: &Shown) {
+        self.solid.reset_view(shown);
+        self.slices.reset_view(shown);
+    }
+
+    pub fn middle_ui(
+        &mut self,
+        ui: &mut egui::Ui,
+        layout: Layout,
+        shown: &Shown,
+        dose: Option<&Arc<DosePicture>>,
+    ) -> Vec<Action> {
+        let mut actions = Vec::new();
+        let tokens = theme::of(ui);
+        let tools = egui::Frame::new()
+            .fill(tokens.panel)
+            .inner_margin(egui::Margin::symmetric(8, 4));
+        let spacing = std::mem::take(&mut ui.spacing_mut().item_spacing);
+        tools.show(ui, |ui| {
+            ui.spacing_mut().item_spacing = spacing;
+            ui.set_min_width(ui.available_width());
+            ui.horizontal(|ui| self.tools_ui(ui, layout, shown, &mut actions));
+        });
+        let rect = ui.available_rect_before_wrap();
+        ui.advance_cursor_after_rect(rect);
+        let places = places(rect, layout);
+        for (orientation, rect) in places.slices {
+            actions.extend(
+                self.slices
+                    .slice_ui(ui, rect, orientation, (shown, dose), &mut self.view),
+            );
+        }
+        if let Some(rect) = places.solid {
+            self.solid.scene3d_ui(ui, rect, (shown, dose), &mut self.view);
+        }
+        actions
+    }
+
+    fn tools_ui(&mut self, ui: &mut egui::Ui, layout: Layout, shown: &Shown, actions: &mut Vec<Action>) {
+        for one in Layout::ALL {
+            if ui
+                .selectable_label(layout == one, one.name())
+                .on_hover_text("Key V")
+                .clicked()
+            {
+                actions.push(Action::SetLayout(one));
+            }
+        }
+        ui.separator();
+        ui.toggle_value(&mut self.view.follow_tip, "Follow tip")
+            .on_hover_text("Key F: the slices go through the tip of the needle");
+        let mut measuring = self.view.measure.active;
+        let measure = ui.toggle_value(&mut measuring, "Measure");
+        if measure
+            .on_hover_text("Key M: click two places in any picture")
+            .clicked()
+        {
+            actions.push(Action::ToggleMeasure);
+        }
+        ui.toggle_value(&mut self.view.isodose, "Isodose")
+            .on_hover_text("Key I: 50, 100, 150 and 200 % of the prescription, from the seeds as they lie now");
+        ui.menu_button("3D view", |ui| self.solid_menu(ui, shown, actions));
+        if ui
+            .button("Picture")
+            .on_hover_text("F12: saves the window as PNG")
+            .clicked()
+        {
+            actions.push(Action::SavePicture);
+        }
+    }
+
+    fn solid_menu(&mut self, ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
+        if ui.button("Reset view").on_hover_text("Key R").clicked() {
+            actions.push(Action::ResetView);
+        }
+        for (number, preset) in Preset::ALL.into_iter().enumerate() {
+            let text = format!("{}  {}", number + 1, preset.name());
+            if ui.button(text).clicked() {
+                self.solid.look_from(preset, shown);
+            }
+        }
+        ui.separator();
+        let look = &mut self.solid.look;
+        let label = ui.label(theme::weak("Transparency"));
+        let mut percent = look.transparency * 100.0;
+        let slider = egui::Slider::new(&mut percent, 0.0..=100.0)
+            .suffix(" %")
+            .fixed_decimals(0);
+        if ui.add(slider).labelled_by(label.id).changed() {
+            look.transparency = percent / 100.0;
+        }
+        ui.checkbox(&mut look.rest_shape, "Rest shape")
+            .on_hover_text("Shows where the gland was before the needle moved it");
+        ui.checkbox(&mut look.force, "Force on the hand");
+        ui.checkbox(&mut look.template, "Template")
+            .on_hover_text("13 by 13 holes, 5 mm apart, about the planned path");
+        ui.separator();
+        ui.label(theme::weak("Cut away"));
+        ui.radio_value(&mut self.view.section, None, "Nothing");
+        for orientation in Orientation::ALL {
+            let text = format!("At the {} slice", orientation.name().to_lowercase());
+            ui.radio_value(&mut self.view.section, Some(orientation), text);
+        }
+    }
+}
+
+/// A needle far outside would take the slices to where nothing is.
+fn is_near_body(shown: &Shown, tip_m: &[f64; 3]) -> bool {
+    const NEAR_M: f64 = 0.002;
+    shown
+        .scene
+        .as_ref()
+        .is_some_and(|s| (0..3).all(|a| (s.lower_m[a] - NEAR_M..=s.upper_m[a] + NEAR_M).contains(&tip_m[a])))
+}
+
+fn places(rect: Rect, layout: Layout) -> Places {
+    let [axial, sagittal, coronal] = Orientation::ALL;
+    let middle = rect.center();
+    let cell = |column: usize, row: usize| {
+        let (x, y) = (rect.x_range(), rect.y_range());
+        let half = GAP / 2.0;
+        let [left, right] = [[x.min, middle.x - half], [middle.x + half, x.max]][column];
+        let [top, bottom] = [[y.min, middle.y - half], [middle.y + half, y.max]][row];
+        Rect::from_min_max(Pos2::new(left, top), Pos2::new(right, bottom))
+    };
+    match layout {
+        Layout::Quad => Places {
+            solid: Some(cell(1, 0)),
+            slices: vec![(axial, cell(0, 0)), (sagittal, cell(0, 1)), (coronal, cell(1, 1))],
+        },
+        Layout::Solid => Places {
+            solid: Some(rect),
+            slices: Vec::new(),
+        },
+        Layout::Slices => {
+            // The sagittal slice shows most of an insertion and gets the lower half.
+            let lower = cell(0, 1).union(cell(1, 1));
+            Places {
+                solid: None,
+                slices: vec![(axial, cell(0, 0)), (coronal, cell(1, 0)), (sagittal, lower)],
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use egui::Vec2;
+
+    #[test]
+    fn pictures_lie_in_the_window_and_not_over_each_other() {
+        let rect = Rect::from_min_size(Pos2::new(286.0, 70.0), Vec2::new(664.0, 730.0));
+        for layout in Layout::ALL {
+            let places = places(rect, layout);
+            let all: Vec<Rect> = places.slices.iter().map(|(_, r)| *r).chain(places.solid).collect();
+            for (i, a) in all.iter().enumerate() {
+                assert!(rect.contains_rect(*a), "{layout:?}");
+                assert!(all[i + 1..].iter().all(|b| !a.intersects(*b)), "{layout:?}");
+                assert!(a.width() > 200.0 && a.height() > 200.0, "{layout:?}: {a:?}");
+            }
+        }
+    }
+}

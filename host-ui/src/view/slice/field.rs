@@ -1,0 +1,166 @@
+//! The displacements of a snapshot as a texture takes them, and which material point lies at a place.
+
+use crate::link::{SceneModel, Snapshot};
+use nalgebra::Vector3;
+use stylet_shm_schema::GridInfo;
+
+/// A displacement smaller than this is not seen (m).
+const SEEN_M: f32 = 5e-6;
+/// Steps of the fixed point that finds the material point; with tissue stretched to 1.75 the last is a hundredth of the first.
+pub const STEPS: u32 = 8;
+
+/// Displacements on a grid over the body at rest.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Field {
+    pub info: GridInfo,
+    pub displacements_m: Vec<[f32; 3]>,
+    /// None of them can be seen.
+    pub at_rest: bool,
+}
+
+impl Field {
+    /// `None` where the snapshot does not fit the scene.
+    pub fn of(scene: &SceneModel, snapshot: &Snapshot) -> Option<Self> {
+        let info = scene.header.nodes;
+        let fits = info.node_count() == Some(snapshot.displacements_m.len()) && info.dims.iter().all(|&d| d > 0);
+        fits.then(|| Self {
+            info,
+            at_rest: snapshot.displacements_m.iter().flatten().all(|c| c.abs() < SEEN_M),
+            displacements_m: snapshot.displacements_m.clone(),
+        })
+    }
+
+    /// No displacement anywhere.
+    pub fn rest(info: GridInfo) -> Self {
+        Self {
+            displacements_m: vec![[0.0; 3]; info.node_count().unwrap_or(0)],
+            info,
+            at_rest: true,
+        }
+    }
+
+    /// Straight lines between nodes; beyond the outermost their displacement.
+    pub fn displacement_m(&self, rest: Vector3<f64>) -> Vector3<f64> {
+        let dims = self.info.dims.map(|d| d as usize);
+        if self.displacements_m.len() != dims.iter().product::<usize>() || dims.contains(&0) {
+            return Vector3::zeros();
+        }
+        let axis = |a: usize| {
+            let at = ((rest[a] - self.info.origin_m[a]) / self.info.spacing_m).clamp(0.0, (dims[a] - 1) as f64);
+            let low = (at as usize).min(dims[a].saturating_sub(2));
+            (low, at - low as f64)
+        };
+        let [(x, fx), (y, fy), (z, fz)] = [axis(0), axis(1), axis(2)];
+        let mut sum = Vector3::zeros();
+        for corner in 0..8_usize {
+            let by = [corner & 1, corner >> 1 & 1, corner >> 2];
+            let share = |f: f64, b: usize| if b == 1 { f } else { 1.0 - f };
+            let weight = share(fx, by[0]) * share(fy, by[1]) * share(fz, by[2]);
+            let at = |low: usize, b: usize, n: usize| (low + b).min(n - 1);
+            let node = at(x, by[0], dims[0]) + dims[0] * (at(y, by[1], dims[1]) + dims[1] * at(z, by[2], dims[2]));
+            sum += weight * Vector3::from(self.displacements_m[node]).map(f64::from);
+        }
+        sum
+    }
+
+    /// Where the tissue that is now at `place` was at rest: as the shader finds it.
+    pub fn rest_of_m(&self, place: Vector3<f64>) -> Vector3<f64> {
+        let mut rest = place;
+        for _ in 0..STEPS {
+            rest = place - self.displacement_m(rest);
+        }
+        rest
+    }
+
+    /// Four halves for each node, the last 0: as a texture takes them.
+    pub fn texels(&self, out: &mut Vec<[u16; 4]>) {
+        out.clear();
+        let half = |d: &[f32; 3]| [half_bits(d[0]), half_bits(d[1]), half_bits(d[2]), 0];
+        out.extend(self.displacements_m.iter().map(half));
+    }
+}
+
+/// The bits of a half-precision float, rounded to the nearest; what is too small is 0, what is too large the largest.
+fn half_bits(value: f32) -> u16 {
+    const LARGEST: f32 = 65504.0;
+    let sign = ((value.to_bits() >> 16) & 0x8000) as u16;
+    let size = value.abs().min(LARGEST);
+    if size.is_nan() {
+        return sign;
+    }
+    // Below the smallest normal number steps are of 2^-24.
+    if size < 2.0_f32.powi(-14) {
+        return sign | (size * 2.0_f32.powi(24)).round() as u16;
+    }
+    let rounded = size.to_bits() + 0x0fff + ((size.to_bits() >> 13) & 1);
+    sign | ((rounded >> 13) - (112 << 10)) as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn value_of(bits: u16) -> f64 {
+        let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023));
+        let size = match exponent {
+            0 => fraction * 2.0_f64.powi(-24),
+            _ => (1.0 + fraction / 1024.0) * 2.0_f64.powi(exponent - 15),
+        };
+        if bits & 0x8000 == 0 { size } else { -size }
+    }
+
+    #[test]
+    fn every_half_is_kept_and_between_two_the_nearer_is_taken() {
+        for bits in 0..0x7c00_u16 {
+            let value = value_of(bits);
+            assert_eq!(half_bits(value as f32), bits);
+            assert_eq!(half_bits(-value as f32), bits | 0x8000);
+            if bits + 1 < 0x7c00 {
+                let step = value_of(bits + 1) - value;
+                assert_eq!(half_bits((value + 0.3 * step) as f32), bits);
+                assert_eq!(half_bits((value + 0.7 * step) as f32), bits + 1);
+            }
+        }
+        assert_eq!(half_bits(1e9), 0x7bff);
+        assert_eq!(half_bits(f32::NAN), 0);
+    }
+
+    fn linear(stretch: f64) -> Field {
+        let info = GridInfo {
+            dims: [5, 6, 7],
+            reserved: 0,
+            origin_m: [0.01, 0.0, -0.01],
+            spacing_m: 0.005,
+        };
+        let mut field = Field::rest(info);
+        field.at_rest = false;
+        for (n, d) in field.displacements_m.iter_mut().enumerate() {
+            let at = [n % 5, n / 5 % 6, n / 30];
+            let x = info.origin_m[0] + at[0] as f64 * info.spacing_m;
+            let z = info.origin_m[2] + at[2] as f64 * info.spacing_m;
+            *d = [(stretch * x + 0.2 * z) as f32, 0.001, (-0.3 * z) as f32];
+        }
+        field
+    }
+
+    #[test]
+    fn a_linear_field_is_told_exactly_and_undone() {
+        for stretch in [-0.45, 0.1, 0.6] {
+            let field = linear(stretch);
+            let rest = Vector3::new(0.021, 0.013, 0.008);
+            let by = field.displacement_m(rest);
+            let expected = Vector3::new(stretch * rest.x + 0.2 * rest.z, 0.001, -0.3 * rest.z);
+            assert!((by - expected).norm() < 1e-8, "{by} against {expected}");
+            let found = field.rest_of_m(rest + by);
+            assert!((found - rest).norm() < 0.5e-3, "{} mm off", (found - rest).norm() * 1e3);
+        }
+    }
+
+    #[test]
+    fn outside_the_grid_the_nearest_nodes_speak() {
+        let field = linear(0.1);
+        let far = field.displacement_m(Vector3::new(-1.0, 0.0, 0.0));
+        let near = field.displacement_m(Vector3::new(0.01, 0.0, 0.0));
+        assert!((far - near).norm() < 1e-9);
+    }
+}

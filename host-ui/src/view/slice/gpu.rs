@@ -1,0 +1,383 @@
+//! The ultrasound pictures on the graphics card: three small volumes, and a texture for each slice.
+
+use super::field::{Field, STEPS};
+use super::plane::Plane;
+use super::speckle::{self, GRAIN_M, GRAINS, LARGEST_AMPLITUDE};
+use crate::link::SceneModel;
+use bytemuck::{Pod, Zeroable};
+use eframe::egui_wgpu::RenderState;
+use eframe::wgpu;
+use nalgebra::{Matrix3, Vector3};
+use std::mem::size_of;
+use stylet_shm_schema::GridInfo;
+
+const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+const LARGEST_SIDE: u32 = 2048;
+
+/// As `Slice` in `slice.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+struct SliceUniform {
+    middle_m: [f32; 4],
+    right_m: [f32; 4],
+    up_m: [f32; 4],
+    volume_corner_m: [f32; 4],
+    volume_size_m: [f32; 4],
+    nodes_corner_m: [f32; 4],
+    nodes_size_m: [f32; 4],
+    grain: [[f32; 4]; 3],
+}
+
+/// What belongs to one scene.
+struct Body {
+    brightness: wgpu::TextureView,
+    nodes: wgpu::Texture,
+    nodes_info: GridInfo,
+    at_rest: bool,
+    volume_corner_m: [f32; 3],
+    volume_size_m: [f32; 3],
+    scene_from_patient: Matrix3<f64>,
+}
+
+/// One picture.
+struct Pane {
+    uniform: wgpu::Buffer,
+    bind: wgpu::BindGroup,
+    target: Option<Target>,
+    drawn: Option<(SliceUniform, u64)>,
+}
+
+struct Target {
+    size: [u32; 2],
+    view: wgpu::TextureView,
+    id: egui::TextureId,
+}
+
+pub struct SliceGpu {
+    state: RenderState,
+    layout: wgpu::BindGroupLayout,
+    pipeline: wgpu::RenderPipeline,
+    grain: wgpu::TextureView,
+    clamped: wgpu::Sampler,
+    repeated: wgpu::Sampler,
+    body: Option<Body>,
+    panes: Vec<Pane>,
+    /// Textures of panes whose scene went, to be used again.
+    targets: Vec<Option<Target>>,
+    /// Rises with each new content of the volumes.
+    content: u64,
+    texels: Vec<[u16; 4]>,
+    /// Bytes sent to the card since the window opened.
+    pub uploaded_bytes: u64,
+}
+
+impl SliceGpu {
+    pub fn new(state: RenderState) -> Self {
+        let device = &state.device;
+        let layout = layout(device);
+        let sampler = |mode| {
+            device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("stylet slice"),
+                address_mode_u: mode,
+                address_mode_v: mode,
+                address_mode_w: mode,
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                ..Default::default()
+            })
+        };
+        let grain = volume(&state, wgpu::TextureFormat::R8Unorm, [GRAINS as u32; 3]);
+        let grains = speckle::grain();
+        write(&state, &grain, &grains, 1);
+        Self {
+            pipeline: pipeline(device, &layout),
+            grain: grain.create_view(&wgpu::TextureViewDescriptor::default()),
+            clamped: sampler(wgpu::AddressMode::ClampToEdge),
+            repeated: sampler(wgpu::AddressMode::Repeat),
+            layout,
+            body: None,
+            panes: Vec::new(),
+            targets: Vec::new(),
+            content: 0,
+            texels: Vec::new(),
+            uploaded_bytes: grains.len() as u64,
+            state,
+        }
+    }
+
+    /// Takes the tissues of a scene. A scene too large for the card has no slices.
+    pub fn set_scene(&mut self, model: &SceneModel, scene_from_patient: Matrix3<f64>) {
+        self.targets = self.panes.drain(..).map(|pane| pane.target).collect();
+        self.body = None;
+        self.content += 1;
+        let (info, nodes_info) = (model.header.labels, model.header.nodes);
+        let longest = self.state.device.limits().max_texture_dimension_3d;
+        let has_cells = |grid: &GridInfo| grid.dims.iter().all(|&d| d > 0 && d + 2 <= longest);
+        if !has_cells(&info) || !has_cells(&nodes_info) || model.labels.is_empty() {
+            return;
+        }
+        let (dims, bytes) = speckle::brightness_volume(&model.header, &model.labels);
+        let brightness = volume(&self.state, wgpu::TextureFormat::R8Unorm, dims.map(|d| d as u32));
+        write(&self.state, &brightness, &bytes, 1);
+        self.uploaded_bytes += bytes.len() as u64;
+        let nodes = volume(&self.state, wgpu::TextureFormat::Rgba16Float, nodes_info.dims);
+        self.body = Some(Body {
+            brightness: brightness.create_view(&wgpu::TextureViewDescriptor::default()),
+            nodes,
+            nodes_info,
+            at_rest: false,
+            volume_corner_m: info.origin_m.map(|c| (c - 1.5 * info.spacing_m) as f32),
+            volume_size_m: dims.map(|d| (d as f64 * info.spacing_m) as f32),
+            scene_from_patient,
+        });
+        self.set_field(&Field::rest(nodes_info));
+    }
+
+    pub fn set_field(&mut self, field: &Field) {
+        let Some(body) = &mut self.body else { return };
+        if field.info != body.nodes_info || (field.at_rest && body.at_rest) {
+            return;
+        }
+        field.texels(&mut self.texels);
+        let bytes: &[u8] = bytemuck::cast_slice(&self.texels);
+        write(&self.state, &body.nodes, bytes, 8);
+        body.at_rest = field.at_rest;
+        self.uploaded_bytes += bytes.len() as u64;
+        self.content += 1;
+    }
+
+    /// The picture of a plane, drawn if anything in it has changed; `None` without a scene.
+    pub fn picture(&mut self, number: usize, plane: &Plane, pixels_per_point: f32) -> Option<egui::TextureId> {
+        let body = self.body.as_ref()?;
+        let uniform = uniform(body, plane);
+        while self.panes.len() <= number {
+            let old = self.targets.get_mut(self.panes.len()).and_then(Option::take);
+            let pane = self.pane(old)?;
+            self.panes.push(pane);
+        }
+        let size = [plane.rect.width(), plane.rect.height()]
+            .map(|side| ((side * pixels_per_point).round() as u32).clamp(1, LARGEST_SIDE));
+        let pane = &mut self.panes[number];
+        if pane.target.as_ref().is_none_or(|t| t.size != size) {
+            let old = pane.target.take().map(|t| t.id);
+            pane.target = Some(target(&self.state, size, old));
+            pane.drawn = None;
+        }
+        let target = pane.target.as_ref()?;
+        if pane.drawn != Some((uniform, self.content)) {
+            pane.drawn = Some((uniform, self.content));
+            let bytes = bytemuck::bytes_of(&uniform);
+            self.state.queue.write_buffer(&pane.uniform, 0, bytes);
+            self.uploaded_bytes += bytes.len() as u64;
+            draw(&self.state, &self.pipeline, &pane.bind, &target.view);
+        }
+        Some(target.id)
+    }
+
+    fn pane(&self, target: Option<Target>) -> Option<Pane> {
+        let body = self.body.as_ref()?;
+        let device = &self.state.device;
+        let uniform = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("stylet slice"),
+            size: size_of::<SliceUniform>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let nodes = body.nodes.create_view(&wgpu::TextureViewDescriptor::default());
+        let view = wgpu::BindingResource::TextureView;
+        let resources = [
+            uniform.as_entire_binding(),
+            view(&body.brightness),
+            view(&nodes),
+            view(&self.grain),
+            wgpu::BindingResource::Sampler(&self.clamped),
+            wgpu::BindingResource::Sampler(&self.repeated),
+        ];
+        let entries: Vec<wgpu::BindGroupEntry<'_>> = resources
+            .into_iter()
+            .enumerate()
+            .map(|(binding, resource)| wgpu::BindGroupEntry {
+                binding: binding as u32,
+                resource,
+            })
+            .collect();
+        let bind = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("stylet slice"),
+            layout: &self.layout,
+            entries: &entries,
+        });
+        Some(Pane {
+            uniform,
+            bind,
+            target,
+            drawn: None,
+        })
+    }
+}
+
+fn uniform(body: &Body, plane: &Plane) -> SliceUniform {
+    let four = |v: Vector3<f64>, w: f32| [v.x as f32, v.y as f32, v.z as f32, w];
+    let padded = |v: [f32; 3], w: f32| [v[0], v[1], v[2], w];
+    let half = |side: f32| f64::from(side) / 2.0 * plane.m_per_point;
+    let nodes = &body.nodes_info;
+    let steps = if body.at_rest { 0.0 } else { STEPS as f32 };
+    let grain = [0, 1, 2].map(|a| {
+        let along = body.scene_from_patient.column(a) / (f64::from(GRAIN_M[a]) * GRAINS as f64);
+        four(along.into(), 0.0)
+    });
+    SliceUniform {
+        middle_m: four(plane.middle_m, LARGEST_AMPLITUDE),
+        right_m: four(plane.right * half(plane.rect.width()), 0.0),
+        up_m: four(plane.up * half(plane.rect.height()), 0.0),
+        volume_corner_m: padded(body.volume_corner_m, 0.0),
+        volume_size_m: padded(body.volume_size_m, 0.0),
+        nodes_corner_m: padded(nodes.origin_m.map(|c| (c - 0.5 * nodes.spacing_m) as f32), 0.0),
+        nodes_size_m: padded(nodes.dims.map(|d| (f64::from(d) * nodes.spacing_m) as f32), steps),
+        grain,
+    }
+}
+
+fn extent([width, height, depth_or_array_layers]: [u32; 3]) -> wgpu::Extent3d {
+    wgpu::Extent3d {
+        width,
+        height,
+        depth_or_array_layers,
+    }
+}
+
+fn volume(state: &RenderState, format: wgpu::TextureFormat, dims: [u32; 3]) -> wgpu::Texture {
+    state.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("stylet slice"),
+        size: extent(dims),
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D3,
+        format,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    })
+}
+
+fn write(state: &RenderState, texture: &wgpu::Texture, bytes: &[u8], bytes_per_texel: u32) {
+    let size = texture.size();
+    let layout = wgpu::TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some(size.width * bytes_per_texel),
+        rows_per_image: Some(size.height),
+    };
+    state.queue.write_texture(texture.as_image_copy(), bytes, layout, size);
+}
+
+fn target(state: &RenderState, size: [u32; 2], old: Option<egui::TextureId>) -> Target {
+    let texture = state.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("stylet slice"),
+        size: extent([size[0], size[1], 1]),
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: COLOR,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    });
+    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+    let mut renderer = state.renderer.write();
+    let filter = wgpu::FilterMode::Linear;
+    let id = match old {
+        Some(id) => {
+            renderer.update_egui_texture_from_wgpu_texture(&state.device, &view, filter, id);
+            id
+        }
+        None => renderer.register_native_texture(&state.device, &view, filter),
+    };
+    Target { size, view, id }
+}
+
+fn draw(state: &RenderState, pipeline: &wgpu::RenderPipeline, bind: &wgpu::BindGroup, view: &wgpu::TextureView) {
+    let descriptor = wgpu::CommandEncoderDescriptor {
+        label: Some("stylet slice"),
+    };
+    let mut encoder = state.device.create_command_encoder(&descriptor);
+    {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("stylet slice"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            depth_stencil_attachment: None,
+            timestamp_writes: None,
+            occlusion_query_set: None,
+            multiview_mask: None,
+        });
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, bind, &[]);
+        pass.draw(0..3, 0..1);
+    }
+    state.queue.submit([encoder.finish()]);
+}
+
+fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let volume = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+        view_dimension: wgpu::TextureViewDimension::D3,
+        multisampled: false,
+    };
+    let uniform = wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Uniform,
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    };
+    let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
+    let entries: Vec<wgpu::BindGroupLayoutEntry> = [uniform, volume, volume, volume, sampler, sampler]
+        .into_iter()
+        .enumerate()
+        .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
+            binding: binding as u32,
+            visibility: wgpu::ShaderStages::FRAGMENT,
+            ty,
+            count: None,
+        })
+        .collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("stylet slice"),
+        entries: &entries,
+    })
+}
+
+fn pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::RenderPipeline {
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some("stylet slice"),
+        source: wgpu::ShaderSource::Wgsl(include_str!("slice.wgsl").into()),
+    });
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("stylet slice"),
+        bind_group_layouts: &[Some(layout)],
+        immediate_size: 0,
+    });
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("stylet slice"),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("slice_vertex"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: None,
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: Some("slice_fragment"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            targets: &[Some(COLOR.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}

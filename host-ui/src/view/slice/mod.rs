@@ -1,0 +1,303 @@
+//! Three orthogonal slices through the deformed body that look like ultrasound, and what is drawn over them.
+
+mod cut;
+pub mod field;
+mod gpu;
+mod overlay;
+mod plane;
+mod speckle;
+
+use super::state::ViewState;
+use crate::dose_desk::DosePicture;
+use crate::link::{SceneModel, Snapshot};
+use crate::panel::{Action, Shown};
+use crate::theme::IMAGE;
+use eframe::egui_wgpu::RenderState;
+use egui::{Color32, PointerButton, Pos2, Rect, Sense};
+use field::Field;
+use gpu::SliceGpu;
+use nalgebra::{Matrix3, Vector3};
+use overlay::{Lines, Overlay};
+pub use plane::{Orientation, Plane, scene_from_patient};
+use std::sync::Arc;
+use stylet_shm_schema::role;
+
+/// Of the target, this much is seen at first.
+const MARGIN: f64 = 1.45;
+const ZOOMS: [f64; 2] = [0.2, 12.0];
+/// The tip is taken hold of within this many points.
+const HANDLE: f32 = 16.0;
+const M_PER_SCROLLED_POINT: f64 = 0.05e-3;
+
+/// A surface whose cut is drawn, and in which colour.
+struct Contour {
+    color: Color32,
+    triangles: Vec<[u32; 3]>,
+}
+
+pub struct Slices {
+    gpu: Option<SliceGpu>,
+    scene: Option<(u64, u64)>,
+    snapshot: Option<(u64, u64)>,
+    scene_from_patient: Matrix3<f64>,
+    model: Option<Arc<SceneModel>>,
+    contours: Vec<Contour>,
+    /// Of the surface as it is now.
+    positions_m: Vec<[f32; 3]>,
+    /// Rises whenever they change.
+    moved: u64,
+    field: Field,
+    /// In the middle of all pictures, and how much of it is seen.
+    middle_m: Vector3<f64>,
+    extent_m: f64,
+    zoom: f64,
+    lines: [Lines; 3],
+    /// The pointer holds the needle.
+    holds_needle: bool,
+}
+
+impl Slices {
+    pub fn new(state: Option<RenderState>) -> Self {
+        Self {
+            gpu: state.map(SliceGpu::new),
+            scene: None,
+            snapshot: None,
+            scene_from_patient: Matrix3::identity(),
+            model: None,
+            contours: Vec::new(),
+            positions_m: Vec::new(),
+            moved: 0,
+            field: Field::default(),
+            middle_m: Vector3::repeat(0.03),
+            extent_m: 0.06,
+            zoom: 1.0,
+            lines: Default::default(),
+            holds_needle: false,
+        }
+    }
+
+    pub fn uploaded_bytes(&self) -> u64 {
+        self.gpu.as_ref().map_or(0, |gpu| gpu.uploaded_bytes)
+    }
+
+    /// Directions of the patient in the scene.
+    pub fn scene_from_patient(&self) -> &Matrix3<f64> {
+        &self.scene_from_patient
+    }
+
+    pub fn take(&mut self, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>, view: &mut ViewState) {
+        let Some(model) = model else { return };
+        let key = (model.header.session_id, model.header.generation);
+        if self.scene != Some(key) {
+            self.scene = Some(key);
+            self.take_scene(model);
+            view.cursor_m = self.middle_m;
+        }
+        let Some(snapshot) = snapshot else { return };
+        let key = (snapshot.header.session_id, snapshot.header.tissue_tick);
+        if self.snapshot == Some(key) || snapshot.positions_m.len() != model.rest_m.len() {
+            return;
+        }
+        self.snapshot = Some(key);
+        if self.positions_m != snapshot.positions_m {
+            self.positions_m.clone_from(&snapshot.positions_m);
+            self.moved += 1;
+        }
+        if let Some(field) = Field::of(model, snapshot)
+            && field != self.field
+        {
+            if let Some(gpu) = &mut self.gpu {
+                gpu.set_field(&field);
+            }
+            self.field = field;
+        }
+    }
+
+    fn take_scene(&mut self, model: &Arc<SceneModel>) {
+        self.snapshot = None;
+        self.scene_from_patient = scene_from_patient(&model.header);
+        self.contours = contours(model);
+        self.model = Some(model.clone());
+        self.positions_m.clone_from(&model.rest_m);
+        self.moved += 1;
+        self.field = Field::rest(model.header.nodes);
+        let (low, high) = (
+            Vector3::from(model.header.target_lower_m),
+            Vector3::from(model.header.target_upper_m),
+        );
+        self.middle_m = (low + high) / 2.0;
+        self.extent_m = ((high - low).max() * MARGIN).clamp(1e-3, 2.0);
+        self.zoom = 1.0;
+        if let Some(gpu) = &mut self.gpu {
+            gpu.set_scene(model, self.scene_from_patient);
+        }
+    }
+
+    /// Back to the whole of the target.
+    pub fn reset_view(&mut self, shown: &Shown) {
+        self.zoom = 1.0;
+        if let Some(scene) = &shown.scene {
+            self.middle_m = (Vector3::from(scene.target_lower_m) + Vector3::from(scene.target_upper_m)) / 2.0;
+        }
+    }
+
+    /// The plane that a picture of this size shows.
+    pub fn plane(&self, orientation: Orientation, view: &ViewState, rect: Rect) -> Plane {
+        let m_per_point = self.extent_m / self.zoom / f64::from(rect.width().min(rect.height()).max(20.0));
+        let mut plane = Plane::new(orientation, &self.scene_from_patient, self.middle_m, m_per_point, rect);
+        plane.middle_m += plane.normal() * plane.distance_m(view.cursor_m);
+        plane
+    }
+
+    pub fn slice_ui(
+        &mut self,
+        ui: &mut egui::Ui,
+        rect: Rect,
+        orientation: Orientation,
+        (shown, dose): (&Shown, Option<&Arc<DosePicture>>),
+        view: &mut ViewState,
+    ) -> Option<Action> {
+        let id = ui.scope_id().with(orientation.name());
+        let response = ui.interact(rect, id, Sense::click_and_drag());
+        response.widget_info(|| {
+            let name = format!("{} slice", orientation.name());
+            egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, name)
+        });
+        if response.hovered() {
+            self.scroll(ui, orientation, view, rect);
+        }
+        let plane = self.plane(orientation, view, rect);
+        let action = self.steer(&response, &plane, shown, view);
+        let painter = ui.painter_at(rect);
+        painter.rect_filled(rect, 0.0, IMAGE.ground);
+        if shown.scene.is_none() {
+            overlay::words(&painter, rect, &format!("{}: no scene yet", orientation.name()));
+            return None;
+        }
+        let scale = ui.ctx().pixels_per_point();
+        let number = orientation as usize;
+        match self.gpu.as_mut().and_then(|gpu| gpu.picture(number, &plane, scale)) {
+            Some(texture) => {
+                let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
+                painter.image(texture, rect, whole, Color32::WHITE);
+            }
+            None => {
+                overlay::words(
+                    &painter,
+                    rect,
+                    "No slice: no wgpu device, or the scene is too large for it",
+                );
+            }
+        }
+        let dose = dose.filter(|_| view.isodose);
+        self.lines[number].update(&plane, (&self.positions_m, self.moved), &self.contours, dose);
+        let overlay = Overlay {
+            painter: &painter,
+            plane: &plane,
+            orientation,
+            shown,
+            view,
+            scene_from_patient: &self.scene_from_patient,
+        };
+        overlay.draw(&self.lines[number], dose.is_some());
+        if let Some(place) = response.hover_pos() {
+            overlay.tissue(&self.tissue_at(plane.in_scene(place)));
+        }
+        action
+    }
+
+    /// Name of what lies at a place now; empty outside.
+    fn tissue_at(&self, place_m: Vector3<f64>) -> String {
+        let Some(model) = &self.model else { return String::new() };
+        let (grid, rest_m) = (&model.header.labels, self.field.rest_of_m(place_m));
+        let cell = [0, 1, 2].map(|a| ((rest_m[a] - grid.origin_m[a]) / grid.spacing_m).round());
+        let dims = grid.dims.map(f64::from);
+        if (0..3).any(|a| !(0.0..dims[a]).contains(&cell[a])) {
+            return String::new();
+        }
+        let [x, y, z] = cell.map(|c| c as usize);
+        let n = (z * grid.dims[1] as usize + y) * grid.dims[0] as usize + x;
+        let number = model.labels.get(n).map_or(0, |&label| usize::from(label));
+        let structure = number.checked_sub(1).and_then(|s| model.header.structures().get(s));
+        structure.map_or_else(String::new, |s| s.name.read())
+    }
+
+    /// The wheel goes through the slices; with Ctrl it goes nearer.
+    fn scroll(&mut self, ui: &egui::Ui, orientation: Orientation, view: &mut ViewState, rect: Rect) {
+        let (scroll, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
+        if pinch != 1.0 {
+            self.zoom = (self.zoom * f64::from(pinch)).clamp(ZOOMS[0], ZOOMS[1]);
+        } else if scroll != 0.0 {
+            let normal = self.plane(orientation, view, rect).normal();
+            view.follow_tip = false;
+            view.cursor_m += normal * f64::from(scroll) * M_PER_SCROLLED_POINT;
+        }
+    }
+
+    fn steer(
+        &mut self,
+        response: &egui::Response,
+        plane: &Plane,
+        shown: &Shown,
+        view: &mut ViewState,
+    ) -> Option<Action> {
+        if response.dragged_by(PointerButton::Secondary) || response.dragged_by(PointerButton::Middle) {
+            let by = response.drag_delta();
+            self.middle_m -= (plane.right * f64::from(by.x) - plane.up * f64::from(by.y)) * plane.m_per_point;
+            return None;
+        }
+        let place = response.interact_pointer_pos()?;
+        if response.drag_started_by(PointerButton::Primary) {
+            self.holds_needle = !view.measure.active && is_on_tip(plane, shown, place - response.total_drag_delta()?);
+        }
+        if self.holds_needle && response.dragged_by(PointerButton::Primary) {
+            let depth_m = shown.depth_of_m(plane.in_scene(place).into())?;
+            return Some(Action::DriveTo(depth_m));
+        }
+        self.holds_needle = false;
+        if response.clicked() && view.measure.active {
+            view.measure.take(plane.in_scene(place));
+        } else if !view.measure.active && (response.clicked() || response.dragged_by(PointerButton::Primary)) {
+            view.follow_tip = false;
+            view.cursor_m = plane.in_scene(place);
+        }
+        None
+    }
+}
+
+fn is_on_tip(plane: &Plane, shown: &Shown, place: Pos2) -> bool {
+    let along = |d: [f64; 3]| Vector3::from(d).dot(&plane.normal()).abs() < 0.5;
+    let (Some(tip), Some(plan)) = (shown.tip_m(), &shown.plan) else {
+        return false;
+    };
+    along(plan.direction) && plane.on_screen(tip.into()).distance(place) < HANDLE
+}
+
+/// What is looked at in a scene: its targets, what is spared and what is fixed; the whole body where it is one.
+fn contours(model: &SceneModel) -> Vec<Contour> {
+    let header = &model.header;
+    let part = |first: u32, count: u32| {
+        let (first, count) = (first as usize, count as usize);
+        model.triangles.get(first..first + count).unwrap_or(&[]).to_vec()
+    };
+    let mut contours: Vec<Contour> = header
+        .structures()
+        .iter()
+        .filter(|s| s.triangle_count > 0)
+        .map(|s| Contour {
+            color: match s.role {
+                bits if bits & role::TARGET != 0 => IMAGE.gland,
+                bits if bits & role::FIXED != 0 => IMAGE.bone,
+                _ => IMAGE.spared,
+            },
+            triangles: part(s.first_triangle, s.triangle_count),
+        })
+        .collect();
+    if contours.is_empty() {
+        contours.push(Contour {
+            color: IMAGE.gland,
+            triangles: part(0, header.body_triangle_count),
+        });
+    }
+    contours
+}

@@ -1,0 +1,309 @@
+//! What is drawn over a slice: contours, isodose lines, needle, seeds, planned places, letters and scale.
+
+use super::plane::{Orientation, Plane};
+use super::{Contour, cut};
+use crate::dose_desk::{DosePicture, LEVELS};
+use crate::format;
+use crate::panel::Shown;
+use crate::theme::IMAGE;
+use crate::view::state::ViewState;
+use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2};
+use nalgebra::{Matrix3, Vector3};
+use std::sync::Arc;
+
+/// What lies nearer to the plane than this is in it.
+const IN_PLANE_M: f64 = 1.5e-3;
+/// Half a seed; farther from the plane it is not cut.
+const SEED_HALF_M: f64 = 2.25e-3;
+const NEEDLE_M: f64 = 0.12;
+/// Drawn and blank points of an isodose line; one that is never blank is solid.
+const DASHES: [[f32; 2]; 4] = [[2.0, 3.0], [1.0, 0.0], [8.0, 3.0], [3.0, 2.0]];
+
+/// Lines of one slice, cut anew only when the plane or what it cuts has changed.
+#[derive(Default)]
+pub struct Lines {
+    key: Option<([f64; 4], u64, u64)>,
+    contours: Vec<(Color32, cut::Line)>,
+    /// By level.
+    isodoses: Vec<(usize, cut::Line)>,
+}
+
+impl Lines {
+    pub fn update(
+        &mut self,
+        plane: &Plane,
+        (positions_m, moved): (&[[f32; 3]], u64),
+        contours: &[Contour],
+        dose: Option<&Arc<DosePicture>>,
+    ) {
+        let normal = plane.normal();
+        let offset_m = normal.dot(&plane.middle_m);
+        let key = (
+            [normal.x, normal.y, normal.z, offset_m],
+            moved,
+            dose.map_or(0, |d| d.number),
+        );
+        if self.key == Some(key) {
+            return;
+        }
+        self.key = Some(key);
+        let normal = [normal.x, normal.y, normal.z].map(|c| c as f32);
+        self.contours.clear();
+        for contour in contours {
+            let lines = cut::cut(positions_m, &contour.triangles, normal, offset_m as f32);
+            self.contours
+                .extend(lines.into_iter().map(|line| (contour.color, line)));
+        }
+        self.isodoses.clear();
+        for shell in dose.iter().flat_map(|d| &d.shells) {
+            let lines = cut::cut(&shell.points_m, &shell.triangles, normal, offset_m as f32);
+            self.isodoses.extend(lines.into_iter().map(|line| (shell.level, line)));
+        }
+    }
+}
+
+pub fn words(painter: &Painter, rect: Rect, text: &str) {
+    painter.text(
+        rect.center(),
+        Align2::CENTER_CENTER,
+        text,
+        FontId::proportional(12.5),
+        IMAGE.text,
+    );
+}
+
+pub struct Overlay<'a> {
+    pub painter: &'a Painter,
+    pub plane: &'a Plane,
+    pub orientation: Orientation,
+    pub shown: &'a Shown,
+    pub view: &'a ViewState,
+    pub scene_from_patient: &'a Matrix3<f64>,
+}
+
+impl Overlay<'_> {
+    pub fn draw(&self, lines: &Lines, with_dose: bool) {
+        for (color, line) in &lines.contours {
+            let stroke = Stroke::new(1.3, color.gamma_multiply(0.9));
+            self.painter.add(Shape::line(self.points(line), stroke));
+        }
+        for (level, line) in &lines.isodoses {
+            self.isodose(*level, line);
+        }
+        self.crosshair();
+        self.planned();
+        self.needle();
+        self.placed();
+        self.measure();
+        self.letters();
+        self.scale_bar();
+        if with_dose && self.orientation == Orientation::Axial {
+            self.isodose_legend();
+        }
+    }
+
+    fn points(&self, line: &cut::Line) -> Vec<Pos2> {
+        let place = |p: &[f32; 3]| self.plane.on_screen(Vector3::from(*p).map(f64::from));
+        line.iter().map(place).collect()
+    }
+
+    fn isodose(&self, level: usize, line: &cut::Line) {
+        let (stroke, [dash, gap]) = (Stroke::new(1.4, IMAGE.isodose[level]), DASHES[level]);
+        let points = self.points(line);
+        if gap > 0.0 {
+            self.painter.extend(Shape::dashed_line(&points, stroke, dash, gap));
+        } else {
+            self.painter.add(Shape::line(points, stroke));
+        }
+    }
+
+    /// Where the other two slices are, open in the middle so that nothing is hidden.
+    fn crosshair(&self) {
+        let (at, rect) = (self.plane.on_screen(self.view.cursor_m), self.plane.rect);
+        let stroke = Stroke::new(1.0, IMAGE.crosshair.gamma_multiply(0.5));
+        const OPEN: f32 = 14.0;
+        self.painter
+            .hline(rect.left()..=(at.x - OPEN).max(rect.left()), at.y, stroke);
+        self.painter
+            .hline((at.x + OPEN).min(rect.right())..=rect.right(), at.y, stroke);
+        self.painter
+            .vline(at.x, rect.top()..=(at.y - OPEN).max(rect.top()), stroke);
+        self.painter
+            .vline(at.x, (at.y + OPEN).min(rect.bottom())..=rect.bottom(), stroke);
+    }
+
+    /// Rings: nothing like the bars of placed seeds.
+    fn planned(&self) {
+        let radius = (1.6e-3 / self.plane.m_per_point).max(4.0) as f32;
+        for seed in self.shown.planned() {
+            let place = Vector3::from(seed.position_m);
+            if self.plane.distance_m(place).abs() < SEED_HALF_M {
+                let stroke = Stroke::new(1.4, IMAGE.seed_planned);
+                self.painter.circle_stroke(self.plane.on_screen(place), radius, stroke);
+            }
+        }
+    }
+
+    fn placed(&self) {
+        let width = (0.8e-3 / self.plane.m_per_point).max(3.0) as f32;
+        for seed in &self.shown.seeds {
+            let (place, axis) = (Vector3::from(seed.position_m), Vector3::from(seed.axis));
+            let reach = (axis.dot(&self.plane.normal()).abs() * SEED_HALF_M).max(IN_PLANE_M);
+            if self.plane.distance_m(place).abs() > reach {
+                continue;
+            }
+            let ends = [-1.0, 1.0].map(|end| self.plane.on_screen(place + axis * (SEED_HALF_M * end)));
+            self.painter.line_segment(ends, Stroke::new(width + 2.0, IMAGE.ground));
+            self.painter.line_segment(ends, Stroke::new(width, IMAGE.seed_placed));
+            self.painter
+                .circle_filled(self.plane.on_screen(place), width * 0.8, IMAGE.seed_placed);
+        }
+    }
+
+    /// The part in the plane as a line; where the needle only goes through, a dot; a ring about a tip in the plane.
+    fn needle(&self) {
+        let (Some(tip), Some(state)) = (self.shown.tip_m(), &self.shown.state) else {
+            return;
+        };
+        let (tip, direction) = (Vector3::from(tip), Vector3::from(state.needle_direction));
+        let (at_tip, per_m) = (self.plane.distance_m(tip), -direction.dot(&self.plane.normal()));
+        // Ways back from the tip at which the shaft is a given distance in front of the plane.
+        let back = |distance: f64| ((distance - at_tip) / per_m).clamp(0.0, NEEDLE_M);
+        let (near, far) = if per_m.abs() < 1e-6 {
+            let is_in = at_tip.abs() < IN_PLANE_M;
+            (0.0, if is_in { NEEDLE_M } else { 0.0 })
+        } else {
+            let (a, b) = (back(-IN_PLANE_M), back(IN_PLANE_M));
+            (a.min(b), a.max(b))
+        };
+        if far <= near {
+            return;
+        }
+        let place = |way: f64| self.plane.on_screen(tip - direction * way);
+        let width = (1.27e-3 / self.plane.m_per_point).clamp(2.0, 8.0) as f32;
+        let ends = [place(near), place(far)];
+        if ends[0].distance(ends[1]) < 2.0 * width {
+            let middle = ends[0] + (ends[1] - ends[0]) * 0.5;
+            self.painter.circle_filled(middle, width, IMAGE.needle);
+            self.painter
+                .circle_stroke(middle, width + 3.0, Stroke::new(1.0, IMAGE.needle.gamma_multiply(0.5)));
+        } else {
+            self.painter
+                .line_segment(ends, Stroke::new(width + 2.0, IMAGE.ground.gamma_multiply(0.6)));
+            self.painter
+                .line_segment(ends, Stroke::new(width, IMAGE.needle.gamma_multiply(0.85)));
+        }
+        if at_tip.abs() < IN_PLANE_M {
+            self.painter
+                .circle_stroke(self.plane.on_screen(tip), width + 3.0, Stroke::new(1.5, IMAGE.needle));
+        }
+    }
+
+    fn measure(&self) {
+        let points = self.view.measure.points_m();
+        let places: Vec<Pos2> = points.iter().map(|p| self.plane.on_screen(*p)).collect();
+        for place in &places {
+            self.painter.circle_stroke(*place, 4.0, Stroke::new(1.5, IMAGE.measure));
+        }
+        if let ([a, b], Some(length_m)) = (places.as_slice(), self.view.measure.length_m()) {
+            self.painter.line_segment([*a, *b], Stroke::new(1.5, IMAGE.measure));
+            let middle = *a + (*b - *a) * 0.5 + Vec2::new(6.0, -6.0);
+            self.word(
+                middle,
+                Align2::LEFT_BOTTOM,
+                &format::length(length_m),
+                12.5,
+                IMAGE.measure,
+            );
+        }
+    }
+
+    /// Words on a dark ground, so that they can be read on any tissue.
+    fn word(&self, at: Pos2, anchor: Align2, text: &str, size: f32, color: Color32) -> Rect {
+        let galley = self
+            .painter
+            .layout_no_wrap(text.to_owned(), FontId::proportional(size), color);
+        let rect = anchor.anchor_size(at, galley.size());
+        let ground = IMAGE.ground.gamma_multiply(0.66);
+        self.painter.rect_filled(rect.expand2(Vec2::new(3.0, 0.0)), 2.0, ground);
+        self.painter.galley(rect.min, galley, color);
+        rect
+    }
+
+    fn letters(&self) {
+        let rect = self.plane.rect.shrink(6.0);
+        let [left, right, top, bottom] = self.orientation.letters();
+        let word = |at, anchor, text| self.word(at, anchor, text, 12.0, IMAGE.text);
+        word(rect.left_center(), Align2::LEFT_CENTER, left);
+        word(rect.right_center(), Align2::RIGHT_CENTER, right);
+        word(rect.center_top(), Align2::CENTER_TOP, top);
+        word(rect.center_bottom(), Align2::CENTER_BOTTOM, bottom);
+        let title = format!("{}  {}", self.orientation.name(), self.place());
+        self.word(
+            rect.left_top() + Vec2::new(3.0, 0.0),
+            Align2::LEFT_TOP,
+            &title,
+            12.5,
+            IMAGE.text,
+        );
+    }
+
+    /// Where the slice is, in the patient.
+    fn place(&self) -> String {
+        let Some(scene) = &self.shown.scene else {
+            return String::new();
+        };
+        let (axis, letter) = match self.orientation {
+            Orientation::Axial => (2, "S"),
+            Orientation::Sagittal => (0, "R"),
+            Orientation::Coronal => (1, "A"),
+        };
+        let in_patient =
+            self.scene_from_patient.column(axis).dot(&self.plane.middle_m) + scene.patient_from_scene[9 + axis];
+        format!("{letter} {}", format::length(in_patient))
+    }
+
+    /// Under the title: what the pointer is on.
+    pub fn tissue(&self, name: &str) {
+        if !name.is_empty() {
+            let at = self.plane.rect.left_top() + Vec2::new(9.0, 24.0);
+            self.word(at, Align2::LEFT_TOP, name, 12.0, IMAGE.text);
+        }
+    }
+
+    fn scale_bar(&self) {
+        let length_mm = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0]
+            .into_iter()
+            .find(|&mm| format::metres(mm) / self.plane.m_per_point >= 34.0)
+            .unwrap_or(100.0);
+        let length = (format::metres(length_mm) / self.plane.m_per_point) as f32;
+        let end = self.plane.rect.right_bottom() - Vec2::new(12.0, 10.0);
+        let start = end - Vec2::new(length, 0.0);
+        self.painter.line_segment([start, end], Stroke::new(2.0, IMAGE.text));
+        let middle = start + (end - start) * 0.5 - Vec2::new(0.0, 3.0);
+        self.word(
+            middle,
+            Align2::CENTER_BOTTOM,
+            &format!("{length_mm:.0} mm"),
+            11.0,
+            IMAGE.text,
+        );
+    }
+
+    fn isodose_legend(&self) {
+        let mut at = self.plane.rect.left_bottom() + Vec2::new(10.0, -10.0);
+        for level in (0..LEVELS.len()).rev() {
+            let text = format!("{:.0} %", LEVELS[level] * 100.0);
+            let rect = self.word(at + Vec2::new(26.0, 0.0), Align2::LEFT_BOTTOM, &text, 11.0, IMAGE.text);
+            let y = rect.center().y;
+            let ends = [Pos2::new(at.x, y), Pos2::new(at.x + 20.0, y)];
+            let (stroke, [dash, gap]) = (Stroke::new(2.0, IMAGE.isodose[level]), DASHES[level]);
+            if gap > 0.0 {
+                self.painter.extend(Shape::dashed_line(&ends, stroke, dash, gap));
+            } else {
+                self.painter.line_segment(ends, stroke);
+            }
+            at.y -= 16.0;
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! A plane through the body in the patient's directions, and where its points lie on the screen.
+
+use egui::{Pos2, Rect, Vec2};
+use nalgebra::{Matrix3, Vector3};
+use stylet_shm_schema::SceneHeader;
+
+/// The three ways to cut a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Orientation {
+    Axial,
+    Sagittal,
+    Coronal,
+}
+
+impl Orientation {
+    pub const ALL: [Self; 3] = [Self::Axial, Self::Sagittal, Self::Coronal];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Axial => "Axial",
+            Self::Sagittal => "Sagittal",
+            Self::Coronal => "Coronal",
+        }
+    }
+
+    /// To the right and up on the screen, in patient axes (right, anterior, superior). Axial and coronal are seen as by
+    /// one who faces the patient: the patient's right is on the left.
+    fn axes(self) -> [Vector3<f64>; 2] {
+        let (right, anterior, superior) = (Vector3::x(), Vector3::y(), Vector3::z());
+        match self {
+            Self::Axial => [-right, anterior],
+            Self::Sagittal => [superior, anterior],
+            Self::Coronal => [-right, superior],
+        }
+    }
+
+    /// What lies left, right, above and below.
+    pub fn letters(self) -> [&'static str; 4] {
+        match self {
+            Self::Axial => ["R", "L", "A", "P"],
+            Self::Sagittal => ["I", "S", "A", "P"],
+            Self::Coronal => ["R", "L", "S", "I"],
+        }
+    }
+}
+
+/// Scene from patient directions; the scene's own axes where the transform is no rotation.
+pub fn scene_from_patient(scene: &SceneHeader) -> Matrix3<f64> {
+    let rotation = Matrix3::from_row_slice(&scene.patient_from_scene[..9]);
+    let is_rotation = (rotation * rotation.transpose() - Matrix3::identity()).norm() < 1e-3;
+    if is_rotation {
+        rotation.transpose()
+    } else {
+        Matrix3::identity()
+    }
+}
+
+/// The plane of one picture: its middle, two unit vectors, and how large a point of the screen is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// In the middle of the picture, scene frame.
+    pub middle_m: Vector3<f64>,
+    pub right: Vector3<f64>,
+    pub up: Vector3<f64>,
+    pub m_per_point: f64,
+    pub rect: Rect,
+}
+
+impl Plane {
+    pub fn new(
+        orientation: Orientation,
+        scene_from_patient: &Matrix3<f64>,
+        middle_m: Vector3<f64>,
+        m_per_point: f64,
+        rect: Rect,
+    ) -> Self {
+        let [right, up] = orientation.axes().map(|axis| scene_from_patient * axis);
+        Self {
+            middle_m,
+            right,
+            up,
+            m_per_point,
+            rect,
+        }
+    }
+
+    /// Towards the one who looks.
+    pub fn normal(&self) -> Vector3<f64> {
+        self.right.cross(&self.up)
+    }
+
+    /// Positive in front of the plane.
+    pub fn distance_m(&self, point: Vector3<f64>) -> f64 {
+        (point - self.middle_m).dot(&self.normal())
+    }
+
+    /// Where a point of the scene, dropped onto the plane, lies on the screen.
+    pub fn on_screen(&self, point: Vector3<f64>) -> Pos2 {
+        let from_middle = (point - self.middle_m) / self.m_per_point;
+        let (x, y) = (from_middle.dot(&self.right), from_middle.dot(&self.up));
+        self.rect.center() + Vec2::new(x as f32, -y as f32)
+    }
+
+    pub fn in_scene(&self, place: Pos2) -> Vector3<f64> {
+        let from_middle = place - self.rect.center();
+        let (x, y) = (f64::from(from_middle.x), f64::from(-from_middle.y));
+        self.middle_m + (self.right * x + self.up * y) * self.m_per_point
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    fn plane(orientation: Orientation) -> Plane {
+        let rect = Rect::from_min_size(Pos2::new(10.0, 20.0), Vec2::new(300.0, 200.0));
+        let middle = Vector3::new(0.03, 0.02, 0.05);
+        Plane::new(orientation, &Matrix3::identity(), middle, 0.2e-3, rect)
+    }
+
+    #[test]
+    fn a_point_goes_to_the_screen_and_back() {
+        for orientation in Orientation::ALL {
+            let plane = plane(orientation);
+            let point = plane.middle_m + plane.right * 0.01 - plane.up * 0.004;
+            let back = plane.in_scene(plane.on_screen(point));
+            // A point of the screen is a single-precision number.
+            assert!((back - point).norm() < 1e-7, "{orientation:?}");
+            assert!(plane.distance_m(point).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn patient_right_is_on_the_left_and_up_is_anterior_or_superior() {
+        let more = |axis: Vector3<f64>, orientation| {
+            let p = plane(orientation);
+            p.on_screen(p.middle_m + axis * 0.01) - p.rect.center()
+        };
+        assert!(more(Vector3::x(), Orientation::Axial).x < 0.0);
+        assert!(more(Vector3::y(), Orientation::Axial).y < 0.0, "anterior is up");
+        assert!(more(Vector3::z(), Orientation::Sagittal).x > 0.0);
+        assert!(more(Vector3::z(), Orientation::Coronal).y < 0.0, "superior is up");
+    }
+
+    #[test]
+    fn a_turned_patient_is_cut_in_his_own_directions() {
+        let mut scene = SceneHeader::zeroed();
+        // Superior is -y of the scene, anterior is z.
+        scene.patient_from_scene = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0];
+        let turned = scene_from_patient(&scene);
+        assert!((turned * Vector3::z() + Vector3::y()).norm() < 1e-12);
+        scene.patient_from_scene = [0.0; 12];
+        assert_eq!(scene_from_patient(&scene), Matrix3::identity());
+    }
+}

@@ -1,0 +1,67 @@
+// One slice of simulated ultrasound: for each place the material point that lies there now, its brightness and its grain.
+
+struct Slice {
+    // Middle of the picture, and the ways to its right and upper edge (m).
+    middle_m: vec4<f32>,
+    right_m: vec4<f32>,
+    up_m: vec4<f32>,
+    // Corner and size of the brightness volume and of the grid of displacements (m).
+    volume_corner_m: vec4<f32>,
+    volume_size_m: vec4<f32>,
+    nodes_corner_m: vec4<f32>,
+    // w: how often the fixed point is applied.
+    nodes_size_m: vec4<f32>,
+    // Rows: patient right, anterior, superior in the scene, each over the edge of the cube of grain.
+    grain_x: vec4<f32>,
+    grain_y: vec4<f32>,
+    grain_z: vec4<f32>,
+}
+
+@group(0) @binding(0) var<uniform> slice: Slice;
+@group(0) @binding(1) var brightness: texture_3d<f32>;
+@group(0) @binding(2) var nodes: texture_3d<f32>;
+@group(0) @binding(3) var grain: texture_3d<f32>;
+@group(0) @binding(4) var clamped: sampler;
+@group(0) @binding(5) var repeated: sampler;
+
+struct Out {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) at: vec2<f32>,
+}
+
+@vertex
+fn slice_vertex(@builtin(vertex_index) index: u32) -> Out {
+    // One triangle over the whole picture.
+    let at = vec2(f32(i32(index & 1u) * 4 - 1), f32(i32(index >> 1u) * 4 - 1));
+    return Out(vec4(at, 0.0, 1.0), at);
+}
+
+fn displacement_m(rest_m: vec3<f32>) -> vec3<f32> {
+    let at = (rest_m - slice.nodes_corner_m.xyz) / slice.nodes_size_m.xyz;
+    return textureSampleLevel(nodes, clamped, at, 0.0).xyz;
+}
+
+fn brightness_at(rest_m: vec3<f32>) -> f32 {
+    let at = (rest_m - slice.volume_corner_m.xyz) / slice.volume_size_m.xyz;
+    return textureSampleLevel(brightness, clamped, at, 0.0).x;
+}
+
+@fragment
+fn slice_fragment(in: Out) -> @location(0) vec4<f32> {
+    let place_m = slice.middle_m.xyz + in.at.x * slice.right_m.xyz + in.at.y * slice.up_m.xyz;
+    var rest_m = place_m;
+    let steps = i32(slice.nodes_size_m.w);
+    for (var step = 0; step < steps; step++) {
+        rest_m = place_m - displacement_m(rest_m);
+    }
+    let here = brightness_at(rest_m);
+    // Along the beam, where tissue meets other tissue, it shines.
+    let beam_m = normalize(slice.grain_y.xyz) * 0.0008;
+    let edge = abs(brightness_at(rest_m + beam_m) - brightness_at(rest_m - beam_m));
+    let cell = vec3(dot(slice.grain_x.xyz, rest_m), dot(slice.grain_y.xyz, rest_m), dot(slice.grain_z.xyz, rest_m));
+    let amplitude = textureSampleLevel(grain, repeated, cell, 0.0).x * slice.middle_m.w;
+    // What a scanner shows: the logarithm of what comes back.
+    let level = (here + 0.55 * edge) * (1.0 + 0.34 * log(amplitude + 0.09));
+    let value = clamp(level, 0.0, 1.0);
+    return vec4(value * 0.97, value * 0.985, value, 1.0);
+}

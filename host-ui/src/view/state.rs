@@ -1,0 +1,81 @@
+//! What all pictures in the middle share: where they cut, what is measured, what is shown.
+
+use super::slice::Orientation;
+use nalgebra::Vector3;
+
+/// A distance between two places, taken by two clicks.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Measure {
+    pub active: bool,
+    /// None, one or two, scene frame.
+    points_m: Vec<Vector3<f64>>,
+}
+
+impl Measure {
+    pub fn toggle(&mut self) {
+        self.active = !self.active;
+        self.points_m.clear();
+    }
+
+    /// A third place begins anew.
+    pub fn take(&mut self, point_m: Vector3<f64>) {
+        if self.points_m.len() >= 2 {
+            self.points_m.clear();
+        }
+        self.points_m.push(point_m);
+    }
+
+    pub fn points_m(&self) -> &[Vector3<f64>] {
+        &self.points_m
+    }
+
+    pub fn length_m(&self) -> Option<f64> {
+        match self.points_m.as_slice() {
+            [a, b] => Some((b - a).norm()),
+            _ => None,
+        }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct ViewState {
+    /// Where the three slices meet, scene frame.
+    pub cursor_m: Vector3<f64>,
+    /// The slices go through the tip of the needle.
+    pub follow_tip: bool,
+    pub measure: Measure,
+    /// Half of the body is cut away at this slice.
+    pub section: Option<Orientation>,
+    pub isodose: bool,
+}
+
+impl Default for ViewState {
+    fn default() -> Self {
+        Self {
+            cursor_m: Vector3::repeat(0.03),
+            follow_tip: true,
+            measure: Measure::default(),
+            section: None,
+            isodose: true,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_clicks_measure_and_a_third_begins_anew() {
+        let mut measure = Measure::default();
+        measure.toggle();
+        measure.take(Vector3::zeros());
+        assert_eq!(measure.length_m(), None);
+        measure.take(Vector3::new(0.003, 0.004, 0.0));
+        assert!((measure.length_m().expect("two places") - 0.005).abs() < 1e-12);
+        measure.take(Vector3::zeros());
+        assert_eq!(measure.points_m().len(), 1);
+        measure.toggle();
+        assert!(measure.points_m().is_empty() && !measure.active);
+    }
+}

@@ -1,0 +1,176 @@
+//! The main states of the window in both themes and sizes: nothing clipped, nothing overlapping, and as it was.
+
+use egui::Key;
+use egui_kittest::kittest::Queryable;
+use host_ui::app::App;
+use std::time::{Duration, Instant};
+use stylet_shm_schema::flags;
+use stylet_tests::window::{Driven, is_at_rest, keep_for_docs, misplaced};
+
+const SMALL: [f32; 2] = [1280.0, 800.0];
+const LARGE: [f32; 2] = [1920.0, 1080.0];
+
+fn seeds(app: &App) -> u32 {
+    app.link().snapshot().map_or(0, |s| s.header.seed_count)
+}
+
+fn assert_in_place(driven: &mut Driven, state: &str) {
+    driven.window.run_steps(4);
+    let problems = misplaced(&driven.window);
+    assert!(problems.is_empty(), "{state}:\n{}", problems.join("\n"));
+}
+
+/// By the one key for the next thing to do.
+fn procedure_by_enter(driven: &mut Driven) {
+    let start = Instant::now();
+    while driven.window.query_by_label("Seed error, mm").is_none() || seeds(driven.window.state()) < 5 {
+        assert!(start.elapsed() < Duration::from_secs(90), "the procedure does not end");
+        driven.press(Key::Enter);
+        for _ in 0..40 {
+            driven.window.run_steps(1);
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        driven.until("rest", is_at_rest);
+    }
+    driven.press(Key::Enter);
+    driven.until("the needle outside", |app| {
+        let (Some(state), Some(plan)) = (app.link().state(), app.link().plan()) else {
+            return false;
+        };
+        let depth: f64 = (0..3)
+            .map(|a| (state.tip_in_scene_m[a] - plan.entry_m[a]) * plan.direction[a])
+            .sum();
+        depth < 1e-3
+    });
+    driven.window.run_steps(30);
+}
+
+#[test]
+fn planned_state_is_in_place_and_as_it_was() {
+    for (size, name) in [(SMALL, "small"), (LARGE, "large")] {
+        let mut driven = Driven::open_plain(size);
+        assert_in_place(&mut driven, &format!("scene, {name}"));
+        driven.plan_and_place();
+        assert_in_place(&mut driven, &format!("planned, dark, {name}"));
+        driven.picture(&format!("planned-dark-{name}"));
+        if name == "small" {
+            driven.compare("planned_dark_small");
+        }
+        driven.press(Key::T);
+        assert_in_place(&mut driven, &format!("planned, light, {name}"));
+        let light = driven.picture(&format!("planned-light-{name}"));
+        if name == "small" {
+            keep_for_docs(&light, "light");
+        }
+        // The three-dimensional picture alone.
+        driven.press(Key::V);
+        assert_in_place(&mut driven, &format!("solid, light, {name}"));
+        driven.picture(&format!("solid-light-{name}"));
+        if name == "large" {
+            driven.compare("planned_light_large");
+        }
+        driven.press(Key::V);
+        assert_in_place(&mut driven, &format!("slices, light, {name}"));
+        driven.picture(&format!("slices-light-{name}"));
+    }
+}
+
+#[test]
+fn the_whole_procedure_by_one_key_ends_in_a_debrief() {
+    let mut driven = Driven::open_plain(SMALL);
+    driven.press(Key::E);
+    driven.until("force", |app| {
+        app.link().state().is_some_and(|s| s.flags & flags::ENGAGED != 0)
+    });
+    procedure_by_enter(&mut driven);
+    driven.window.get_by_label_contains("D90");
+    driven.window.get_by_label_contains("seeds of I-125 6711");
+    assert_in_place(&mut driven, "debrief, dark");
+    let picture = driven.picture("debrief");
+    keep_for_docs(&picture, "debrief");
+    driven.press(Key::V);
+    driven.press(Key::Num2);
+    driven.picture("perineum");
+    driven.press(Key::Num1);
+    let picture = driven.picture("dose");
+    keep_for_docs(&picture, "dose");
+    driven.press(Key::T);
+    assert_in_place(&mut driven, "debrief, light");
+    driven.picture("debrief-light");
+    // Back to no seed, one by one, then no plan.
+    for left in (0..5).rev() {
+        driven.window.key_press_modifiers(egui::Modifiers::CTRL, Key::Z);
+        driven.until("a seed less", |app| seeds(app) == left);
+        driven.window.run_steps(2);
+    }
+    driven.window.key_press_modifiers(egui::Modifiers::CTRL, Key::Z);
+    driven.until("no plan", |app| app.link().plan().is_some_and(|p| p.seed_count == 0));
+}
+
+#[test]
+fn a_hand_on_the_tip_in_a_slice_draws_the_needle() {
+    let mut driven = Driven::open_plain(SMALL);
+    driven.plan_and_place();
+    driven.press(Key::V);
+    driven.press(Key::V);
+    let z = |app: &App| app.link().state().map_or(0.0, |s| s.tip_in_scene_m[2]);
+    let start = z(driven.window.state());
+    driven.pull_tip(0.008);
+    let went = z(driven.window.state()) - start;
+    assert!((went - 0.008).abs() < 1e-3, "drawn by 8 mm, went {went} m");
+}
+
+#[test]
+fn words_can_be_made_larger_and_stay_in_place() {
+    let mut driven = Driven::open_plain(LARGE);
+    driven.plan_and_place();
+    driven.window.key_press_modifiers(egui::Modifiers::COMMAND, Key::Plus);
+    driven.window.key_press_modifiers(egui::Modifiers::COMMAND, Key::Plus);
+    driven.window.run_steps(4);
+    assert!(
+        driven.window.ctx.zoom_factor() > 1.15,
+        "{}",
+        driven.window.ctx.zoom_factor()
+    );
+    driven.picture("larger");
+}
+
+/// `cargo test --release -p stylet-tests --test ui_states -- --ignored --nocapture`
+#[test]
+#[ignore = "a measurement"]
+fn cost_of_a_frame() {
+    let mut driven = Driven::open(SMALL);
+    driven.plan_and_place();
+    measure(&mut driven, "at rest", 200);
+    driven.window.key_down(Key::W);
+    measure(&mut driven, "inserting", 100);
+}
+
+fn measure(driven: &mut Driven, what: &str, frames: usize) {
+    let (mut frame_us, mut tessellation_us, mut kib) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..frames {
+        driven.window.run_steps(1);
+        let cost = driven.window.state().cost();
+        let shapes = driven.window.output().shapes.clone();
+        let begun = Instant::now();
+        assert!(!driven.window.ctx.tessellate(shapes, 1.0).is_empty());
+        tessellation_us.push(begun.elapsed().as_secs_f64() * 1e6);
+        frame_us.push(cost.cpu_us);
+        kib.push(cost.uploaded_bytes as f64 / 1024.0);
+        std::thread::sleep(Duration::from_millis(12));
+    }
+    let of = |values: &mut Vec<f64>, share: f64| {
+        values.sort_by(f64::total_cmp);
+        values[((values.len() - 1) as f64 * share) as usize]
+    };
+    println!(
+        "{what}, {frames} frames: panels and pictures p50 {:.2} ms, p99 {:.2} ms; tessellation p50 {:.2} ms, p99 {:.2} ms; \
+         to the card p50 {:.0} KiB, most {:.0} KiB",
+        of(&mut frame_us, 0.5) * 1e-3,
+        of(&mut frame_us, 0.99) * 1e-3,
+        of(&mut tessellation_us, 0.5) * 1e-3,
+        of(&mut tessellation_us, 0.99) * 1e-3,
+        of(&mut kib, 0.5),
+        of(&mut kib, 1.0),
+    );
+}
