@@ -8,7 +8,8 @@ pub const AT_TARGET_M: f64 = 0.3e-3;
 /// A hand that the force holds back from its goal is taken as arrived within this distance.
 pub const STALLED_M: f64 = 2e-3;
 pub const STALLED_AFTER: Duration = Duration::from_millis(1500);
-pub const REST_SPEED_M_PER_S: f64 = 1e-3;
+/// Above the noise of the speed estimate, or chance says when a tip that creeps to its target is there.
+pub const REST_SPEED_M_PER_S: f64 = 3e-3;
 pub const REST_FOR: Duration = Duration::from_millis(60);
 /// No element is farther from its place at rest.
 pub const TISSUE_REST_M: f64 = 0.05e-3;

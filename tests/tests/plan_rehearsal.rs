@@ -5,8 +5,8 @@ use host_ui::plan::rehearse::{Drops, LinkRehearser, Rehearser};
 use host_ui::workflow::{NeedleTask, Pace, Run, RunStatus, default_plan};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-use stylet_shm_schema::script::{REST_FOR, REST_SPEED_M_PER_S};
-use stylet_shm_schema::{CommandKind, EventKind, Fault, TickRecord, flags};
+use stylet_shm_schema::script::arrived_after;
+use stylet_shm_schema::{CommandKind, EventKind, Fault, HapticState, TickRecord, flags};
 use stylet_tests::{Core, ask, until};
 
 /// Live and rehearsed seeds agree within this where the live hand drops in time.
@@ -40,15 +40,11 @@ fn live(link: &mut Link, task: &NeedleTask) -> Live {
     let placed = &header.seeds[..header.seed_count as usize];
     let is_drop = |e: &&stylet_shm_schema::Event| e.kind == EventKind::SeedDropped as u32;
     let drops: Vec<u64> = link.events().iter().filter(is_drop).map(|e| e.time_ns).collect();
-    let late = |dropped_ns: &u64| {
-        let before = records
-            .iter()
-            .rev()
-            .skip_while(|r: &&TickRecord| r.due_ns > *dropped_ns);
-        let rested = before
-            .take_while(|r| r.speed_m_per_s.abs() < REST_SPEED_M_PER_S)
-            .count() as u64;
-        rested.saturating_sub(REST_FOR.as_millis() as u64 + IN_TIME_TICKS)
+    let late = |(number, &dropped_ns): (usize, &u64)| {
+        let after_ns = number.checked_sub(1).map_or(0, |before| drops[before]);
+        let since = records.iter().skip_while(|r: &&TickRecord| r.due_ns <= after_ns);
+        let decided_ns = decided_ns(since, &task.drops, number).unwrap_or(dropped_ns);
+        (dropped_ns.saturating_sub(decided_ns) / 1_000_000).saturating_sub(IN_TIME_TICKS)
     };
     let skew = |dropped_ns: &u64| {
         let until = |r: &&TickRecord| r.due_ns <= *dropped_ns;
@@ -70,8 +66,27 @@ fn live(link: &mut Link, task: &NeedleTask) -> Live {
     Live {
         skew_s: drops.iter().map(skew).collect(),
         seeds_m: placed.iter().map(|s| s.position_m).collect(),
-        late_ticks: drops.iter().map(late).collect(),
+        late_ticks: drops.iter().enumerate().map(late).collect(),
     }
+}
+
+/// When the rule says that the tip has arrived at a drop, tick by tick.
+fn decided_ns<'a>(records: impl Iterator<Item = &'a TickRecord>, drops: &Drops, number: usize) -> Option<u64> {
+    let mut since_ns = None;
+    for r in records {
+        let off = |a: usize| (r.tip_in_scene_m[a] - drops.entry_m[a]) * drops.direction[a];
+        let mut state: HapticState = bytemuck::Zeroable::zeroed();
+        (state.speed_m_per_s, state.depth_m, state.flags) = (r.speed_m_per_s, r.depth_m, r.flags);
+        match arrived_after(&state, (0..3).map(off).sum::<f64>() - drops.along_m[number]) {
+            None => since_ns = None,
+            Some(long) => {
+                if u128::from(r.due_ns - *since_ns.get_or_insert(r.due_ns)) >= long.as_nanos() {
+                    return Some(r.due_ns);
+                }
+            }
+        }
+    }
+    None
 }
 
 fn apart_m(a: &[f64; 3], b: &[f64; 3]) -> f64 {

@@ -11,9 +11,9 @@ main{max-width:1220px;margin:0 auto;padding:28px 24px 48px}
 h1{font-size:26px;font-weight:650;margin:0 0 2px}
 h2{font-size:18px;font-weight:650;margin:36px 0 10px}
 p{margin:4px 0;color:var(--soft)}
-.cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(170px,1fr));gap:12px;margin:22px 0 0}
+.cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(180px,1fr));gap:12px;margin:22px 0 0}
 .card{background:var(--card);border-radius:8px;padding:12px 14px}
-.card b{display:block;font-size:23px;font-weight:650;font-variant-numeric:tabular-nums;white-space:nowrap}
+.card b{display:block;font-size:20px;font-weight:650;font-variant-numeric:tabular-nums;white-space:nowrap}
 .card span{color:var(--soft);font-size:13px}
 svg{width:100%;height:auto;display:block}
 table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}
@@ -30,7 +30,7 @@ footer{margin-top:40px;border-top:1px solid var(--line);padding-top:12px}
 ";
 
 /// Seeds in the table at most; the others are in the JSON.
-const ROWS: usize = 40;
+const ROWS: usize = 20;
 
 /// As HTML.
 pub fn page(score: &Score) -> Result<String, String> {
