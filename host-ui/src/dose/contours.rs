@@ -18,8 +18,11 @@ impl Region for Solid {
     }
 }
 
-/// `None` for a file that is no DICOM. The notes are what was left out of it.
-pub fn structures(path: &Path, most_points: usize) -> Result<Option<(Vec<Structure>, Vec<String>)>, String> {
+/// Structures, and what was left out of the file.
+type Drawn = (Vec<Structure>, Vec<String>);
+
+/// `None` for a file that is no DICOM.
+pub fn structures(path: &Path, most_points: usize) -> Result<Option<Drawn>, String> {
     let told = |why: String| format!("{}: {why}", path.display());
     let bytes = crate::files::open::whole(path).map_err(told)?;
     if !dicom::is_dicom(&bytes) {

@@ -77,7 +77,7 @@ fn grid_of(rows: &[([f64; 3], f64)]) -> Option<Dosed> {
     let first_off = |from: usize, axis: usize| (from..rows.len()).find(|&r| !near(rows[r].0[axis], origin_m[axis]));
     let stride_y = first_off(0, 1).unwrap_or(rows.len());
     let stride_z = first_off(0, 2).unwrap_or(rows.len());
-    if stride_y > stride_z || stride_z % stride_y != 0 || rows.len() % stride_z != 0 {
+    if stride_y > stride_z || !stride_z.is_multiple_of(stride_y) || !rows.len().is_multiple_of(stride_z) {
         return None;
     }
     let dims = [stride_y, stride_z / stride_y, rows.len() / stride_z];
