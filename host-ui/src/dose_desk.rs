@@ -379,11 +379,19 @@ mod tests {
         let kernel = DoseKernel::new(&source, Interval::ALL);
         let shell = &picture.shells[0];
         assert!(!shell.points_m.is_empty());
+        // No farther from the formula's surface than a voxel: one voxel nearer to the seed there is more, one farther less.
+        let level_gy = 0.5 * 145.0;
         for p in &shell.points_m {
-            let dose = kernel.exact_at_gy(&seed(&poses[0], 0.5), p.map(f64::from));
+            let out: Vec<f64> = (0..3).map(|a| f64::from(p[a]) - poses[0].position_m[a]).collect();
+            let r = out.iter().map(|c| c * c).sum::<f64>().sqrt();
+            let dose_at = |r_m: f64| {
+                let place = [0, 1, 2].map(|a| poses[0].position_m[a] + out[a] / r * r_m);
+                kernel.exact_at_gy(&seed(&poses[0], 0.5), place)
+            };
+            let (nearer, farther) = (dose_at(r - SPACING_M), dose_at(r + SPACING_M));
             assert!(
-                (dose / (0.5 * 145.0) - 1.0).abs() < 0.15,
-                "{dose} Gy on the shell of 72.5"
+                nearer > level_gy && farther < level_gy,
+                "{nearer} to {farther} Gy about {p:?}"
             );
         }
         assert_eq!(picture.figures.len(), 3, "{:?}", picture.figures);

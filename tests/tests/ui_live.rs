@@ -3,8 +3,8 @@
 //! The picture that it draws is the README's; `make picture` keeps it.
 
 use egui_kittest::Harness;
-use host_ui::app::{App, Options};
 use egui_kittest::kittest::Queryable;
+use host_ui::app::{App, Options};
 use host_ui::view::slice::Orientation;
 use host_ui::view::slice::field::Field;
 use nalgebra::Vector3;
@@ -146,7 +146,10 @@ fn assert_slice_shows_the_dent(driven: &Driven, before: &image::RgbaImage, durin
     let rect = driven.window.get_by_label("Sagittal slice").rect();
     let plane = app.middle().plane(Orientation::Sagittal, rect);
     let state = app.link().state().expect("live");
-    let (tip, ahead) = (Vector3::from(state.tip_in_scene_m), Vector3::from(state.needle_direction));
+    let (tip, ahead) = (
+        Vector3::from(state.tip_in_scene_m),
+        Vector3::from(state.needle_direction),
+    );
     let mean = |picture: &image::RgbaImage, middle: Vector3<f64>| {
         let at = plane.on_screen(middle);
         let (x, y) = (at.x.round() as u32, at.y.round() as u32);

@@ -207,10 +207,8 @@ impl Shown {
 
     /// Share of the way to the puncture that the membrane in front of the tip has gone; `None` where there is none.
     pub fn membrane_tension(&self) -> Option<f64> {
-        let state = self.state.as_ref().filter(|s| s.flags & flags::IN_CONTACT != 0)?;
-        if Phase::from_number(state.phase) != Some(Phase::Contraction) {
-            return None;
-        }
+        let is_pressed = |s: &&HapticState| s.flags & flags::IN_CONTACT != 0 && s.flags & flags::PUNCTURED == 0;
+        let state = self.state.as_ref().filter(is_pressed)?;
         let at_m = self.parameters.map_or(8e-3, |p| p.set.get(ParameterId::PunctureDepth));
         Some((state.depth_m / at_m.max(1e-6)).clamp(0.0, 1.0))
     }

@@ -60,7 +60,7 @@ fn figure_ui(ui: &mut egui::Ui, figure: &Figure) {
 
 fn dvh_ui(ui: &mut egui::Ui, dose: &DosePicture) {
     let tokens = theme::of(ui);
-    ui.label(theme::small("Target: volume, %, over dose, % of the prescription"));
+    ui.label(theme::small("Target: volume over dose, both in %"));
     let points: Vec<[f64; 2]> = dose.target_dvh.iter().map(|[x, y]| [x * 100.0, y * 100.0]).collect();
     Plot::new("dvh")
         .height(80.0)

@@ -179,7 +179,7 @@ fn what(step: Progress, shown: &Shown) -> String {
             format!("{dropped} of {planned} seeds dropped. Drop one at each place on the way out.")
         }
         Progress::Retract => "All seeds are dropped. Take the needle out.".to_owned(),
-        Progress::Debrief => "Where the seeds came to rest, and the dose.".to_owned(),
+        Progress::Debrief => "Where the seeds came to rest.".to_owned(),
     }
 }
 

@@ -84,10 +84,10 @@ impl Field {
 fn half_bits(value: f32) -> u16 {
     const LARGEST: f32 = 65504.0;
     let sign = ((value.to_bits() >> 16) & 0x8000) as u16;
-    let size = value.abs().min(LARGEST);
-    if size.is_nan() {
-        return sign;
+    if value.is_nan() {
+        return 0;
     }
+    let size = value.abs().min(LARGEST);
     // Below the smallest normal number steps are of 2^-24.
     if size < 2.0_f32.powi(-14) {
         return sign | (size * 2.0_f32.powi(24)).round() as u16;
