@@ -52,6 +52,24 @@ pub struct SceneModel {
     pub labels: Vec<u8>,
 }
 
+impl SceneModel {
+    /// From what the core sends; nothing where it does not hold together.
+    pub fn of_words(header: &SceneHeader, words: &[u32]) -> Option<Self> {
+        check::scene(header, words).ok()?;
+        let (positions, rest) = words.split_at(3 * header.vertex_count as usize);
+        let (indices, cells) = rest.split_at(3 * header.triangle_count as usize);
+        let mut labels: Vec<u8> = cells.iter().flat_map(|word| word.to_le_bytes()).collect();
+        labels.truncate(header.labels.node_count().unwrap_or(0));
+        let place = |w: &[u32]| [0, 1, 2].map(|a| f32::from_bits(w[a]));
+        Some(Self {
+            header: *header,
+            rest_m: positions.chunks_exact(3).map(place).collect(),
+            triangles: indices.chunks_exact(3).map(|w| [w[0], w[1], w[2]]).collect(),
+            labels,
+        })
+    }
+}
+
 /// The deformed body of one tissue tick.
 #[derive(Clone, Debug)]
 pub struct Snapshot {

@@ -33,17 +33,9 @@ impl Theatre {
     fn of(scene: &Scene, source: &SceneSource) -> Self {
         let picture = ScenePicture::first(scene, 1);
         let (header, words) = picture.parts();
-        let (positions, indices) = words.split_at(3 * header.vertex_count as usize);
         let device = DeviceInfo::phantom_premium_1_5();
         Self {
-            scene: SceneModel {
-                header: *header,
-                rest_m: positions
-                    .chunks_exact(3)
-                    .map(|w| [0, 1, 2].map(|a| f32::from_bits(w[a])))
-                    .collect(),
-                triangles: indices.chunks_exact(3).map(|w| [w[0], w[1], w[2]]).collect(),
-            },
+            scene: SceneModel::of_words(header, words).expect("the core's own picture holds together"),
             stage: Stage::build(source, TissueKind::ChainMail, device).expect("the scene was built before"),
             rehearsals: 0,
         }

@@ -158,22 +158,9 @@ impl Link {
     fn receive_scene(&mut self, ports: &Ports) {
         while let Ok(Some(sample)) = ports.scene.receive() {
             let (header, words) = (*sample.user_header(), sample.payload());
-            if check::scene(&header, words).is_err() {
+            let Some(model) = SceneModel::of_words(&header, words) else {
                 self.rubbish_refused += 1;
                 continue;
-            }
-            let (positions, rest) = words.split_at(3 * header.vertex_count as usize);
-            let (indices, cells) = rest.split_at(3 * header.triangle_count as usize);
-            let mut labels: Vec<u8> = cells.iter().flat_map(|word| word.to_le_bytes()).collect();
-            labels.truncate(header.labels.node_count().unwrap_or(0));
-            let model = SceneModel {
-                header,
-                rest_m: positions
-                    .chunks_exact(3)
-                    .map(|w| [0, 1, 2].map(|a| f32::from_bits(w[a])))
-                    .collect(),
-                triangles: indices.chunks_exact(3).map(|w| [w[0], w[1], w[2]]).collect(),
-                labels,
             };
             self.latest
                 .scene
