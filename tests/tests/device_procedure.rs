@@ -229,6 +229,11 @@ fn unplugged_in_mid_insertion_the_force_is_off_the_screen_says_why_and_it_goes_o
         }),
         "the pose comes again"
     );
+    // In the membrane the gate would wait for a small force.
+    assert!(until(LONG, || {
+        rig.link.poll();
+        (tip(&rig.link) - entry).norm() < 2e-3
+    }));
     assert_eq!(rig.felt_n(), 0.0, "no force before it is armed again");
     let mut armed = false;
     assert!(

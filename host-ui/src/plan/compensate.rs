@@ -3,7 +3,7 @@
 //!
 //! The tissue lies ahead of its place at rest when a seed leaves the needle, by some millimetres that hardly change with the
 //! place of the drop. So each step moves a drop by the error that is left, over the slope of rest against drop that the last two
-//! rehearsals show (a secant; at first 1).
+//! rehearsals show (a secant; at first 1). Where that makes it worse, the best drops of the single seeds are tried together.
 
 use super::rehearse::{Drops, Rehearser, Rest};
 use super::{Loading, Needle};
@@ -86,6 +86,36 @@ impl Tried {
     }
 }
 
+/// For each seed, the drop that brought it nearest to plan. Where a seed rests depends on its own drop most of all, so these
+/// together may do where steps of all seeds at once do not.
+struct Nearest(Vec<(f64, f64)>);
+
+impl Nearest {
+    fn of(tried: &Tried) -> Self {
+        let drops = tried.drops.along_m.iter().zip(&tried.error_m);
+        Self(drops.map(|(&along_m, error_m)| (along_m, error_m.norm())).collect())
+    }
+
+    fn take(&mut self, tried: &Tried) {
+        for (kept, new) in self.0.iter_mut().zip(Self::of(tried).0) {
+            if new.1 < kept.1 {
+                *kept = new;
+            }
+        }
+    }
+
+    /// Nothing for a strand, which keeps its pitch, nor where the best way has them already or their order would change.
+    fn together(&self, needle: &Needle, best: &Tried) -> Option<Drops> {
+        let along_m: Vec<f64> = self.0.iter().map(|(along_m, _)| *along_m).collect();
+        let in_order = along_m.windows(2).all(|w| w[1] <= w[0] - APART_M);
+        let is_new = needle.loading == Loading::Loose && along_m != best.drops.along_m;
+        (is_new && in_order).then(|| Drops {
+            along_m,
+            ..best.drops.clone()
+        })
+    }
+}
+
 /// The best way found; dropping as planned where nothing is better. An error when no way was found to go through with the needle.
 pub fn compensate(
     needle: &Needle,
@@ -99,8 +129,14 @@ pub fn compensate(
     let mut rehearsals = 1;
     // Shortened when a step leads out of the tissue or makes it worse.
     let mut share = 1.0;
+    let mut nearest = Nearest::of(&start);
+    let mut is_worse = false;
     while rehearsals < limits.rehearsals && best.worst_m() > limits.enough_m {
-        let drops = next(needle, &last, before_last.as_ref(), share, limits);
+        let together = nearest.together(needle, &best);
+        let drops = match together {
+            Some(drops) if is_worse => drops,
+            _ => next(needle, &last, before_last.as_ref(), share, limits),
+        };
         if drops == last.drops {
             break;
         }
@@ -112,7 +148,9 @@ pub fn compensate(
                 } else {
                     1.0
                 };
-                if tried.mean_m() < best.mean_m() {
+                nearest.take(&tried);
+                is_worse = tried.mean_m() >= best.mean_m();
+                if !is_worse {
                     best = tried.clone();
                 }
                 before_last = Some(std::mem::replace(&mut last, tried));

@@ -150,6 +150,16 @@ fn transfer_syntax(bytes: &[u8]) -> Result<(String, usize), String> {
         .ok_or_else(|| "it does not say its transfer syntax; export it again".to_owned())
 }
 
+/// Bytes of one value of a kind that is written in binary.
+fn size_of_number(vr: VR) -> u32 {
+    match vr {
+        VR::US | VR::SS | VR::OW => 2,
+        VR::UL | VR::SL | VR::FL | VR::AT | VR::OF | VR::OL => 4,
+        VR::FD | VR::SV | VR::UV | VR::OD | VR::OV => 8,
+        _ => 1,
+    }
+}
+
 struct Head {
     tag: Tag,
     vr: VR,
@@ -259,6 +269,13 @@ impl<'a> Walk<'a> {
     fn value(&mut self, head: &Head) -> Result<&'a [u8], String> {
         if head.length == UNDEFINED {
             return Err(format!("the element {} ({}) has no length", head.tag, head.vr));
+        }
+        // The parser takes whole numbers only, and would go on in the middle of the value.
+        if !head.length.is_multiple_of(size_of_number(head.vr)) {
+            return Err(format!(
+                "it is damaged: the element {} ({}) has {} bytes, no whole number of values",
+                head.tag, head.vr, head.length
+            ));
         }
         let value = self.bytes.get(self.at..self.at + head.length as usize);
         let value = value.ok_or_else(|| self.too_long(head, self.bytes.len()))?;
