@@ -107,7 +107,7 @@ fn angle_deg(cosine: f32, sine_square: f32) -> f32 {
         -0.050_174_305,
         0.088_978_99,
         -0.214_598_8,
-        1.570_796_3,
+        std::f32::consts::FRAC_PI_2,
     ];
     let mut polynomial = 0.0;
     for term in TERMS {
