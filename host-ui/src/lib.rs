@@ -7,6 +7,7 @@ pub mod dose;
 pub mod dose_desk;
 pub mod files;
 pub mod format;
+pub mod interrupt;
 pub mod keyboard;
 pub mod link;
 mod loader;

@@ -6,13 +6,13 @@ pub mod job;
 mod report;
 
 use crate::files::{self, scene::SceneFile};
+use crate::interrupt::Interrupt;
 use crate::link::{Link, LinkStatus, SceneModel};
 use crate::workflow::{Pace, Run, RunStatus, Step};
 use child::Core;
 use job::Job;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::service::Instance;
 use stylet_shm_schema::*;
@@ -40,8 +40,7 @@ pub struct Live {
     pub scene: Arc<SceneModel>,
     /// What the scene file says beside the scene.
     said: Option<SceneFile>,
-    /// Set by Ctrl-C.
-    pub interrupted: Arc<AtomicBool>,
+    pub interrupted: Interrupt,
 }
 
 impl Live {
@@ -51,10 +50,7 @@ impl Live {
         let scene_file = options.scene.as_deref().filter(|path| files::scene::is_scene(path));
         let said = scene_file.map(files::scene::read).transpose();
         let said = said.map_err(|e| e.to_string())?;
-        let interrupted = Arc::new(AtomicBool::new(false));
-        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-            signal_hook::flag::register(signal, interrupted.clone()).map_err(|e| e.to_string())?;
-        }
+        let interrupted = Interrupt::on_signals()?;
         let mut link = Link::new(options.instance.clone());
         let mut core = None;
         let device = said.as_ref().and_then(|s| s.device.as_deref());
@@ -155,13 +151,13 @@ pub fn run(options: Options) -> Result<(), String> {
 
 fn wait(
     link: &mut Link,
-    interrupted: &AtomicBool,
+    interrupted: &Interrupt,
     limit: Duration,
     mut ready: impl FnMut(&mut Link) -> Result<bool, String>,
 ) -> Result<bool, String> {
     let begun = Instant::now();
     while begun.elapsed() < limit {
-        if interrupted.load(Ordering::Relaxed) {
+        if interrupted.asked() {
             return Err("interrupted".to_owned());
         }
         link.poll();
@@ -182,7 +178,7 @@ fn find_core(
     core: &mut Option<Core>,
     options: &Connect,
     device: Option<&str>,
-    interrupted: &AtomicBool,
+    interrupted: &Interrupt,
 ) -> Result<(), String> {
     if wait(link, interrupted, FIND_LIMIT, |link| Ok(is_ready(link)))? {
         return Ok(());
@@ -205,7 +201,7 @@ fn find_core(
     Err("the rt-core that was started does not answer".to_owned())
 }
 
-fn load(link: &mut Link, volume: &files::LabelVolume, interrupted: &AtomicBool) -> Result<(), String> {
+fn load(link: &mut Link, volume: &files::LabelVolume, interrupted: &Interrupt) -> Result<(), String> {
     let before = link.scene().map(|s| s.header.generation);
     let id = link.upload(volume).map_err(|e| e.0)?;
     let mut accepted = false;
@@ -225,14 +221,14 @@ fn load(link: &mut Link, volume: &files::LabelVolume, interrupted: &AtomicBool) 
     }
 }
 
-fn perform(link: &mut Link, job: &Job, pace: Pace, interrupted: &AtomicBool, seen: &mut Seen) -> Result<(), String> {
+fn perform(link: &mut Link, job: &Job, pace: Pace, interrupted: &Interrupt, seen: &mut Seen) -> Result<(), String> {
     let mut run = Run::of_needles(job.tasks.clone(), pace);
     let begun = Instant::now();
     let mut step: Option<(usize, Step)> = None;
     seen.last_event = link.events().back().map(|e| e.sequence);
     link.take_records();
     loop {
-        if interrupted.load(Ordering::Relaxed) {
+        if interrupted.asked() {
             return Err("interrupted".to_owned());
         }
         link.poll();

@@ -27,4 +27,6 @@ pub struct Rehearsal {
     pub seed_count: u64,
     /// Where the seeds rest, in the order of the drops.
     pub seeds: [SeedPose; MAX_SEEDS],
+    /// When each was dropped, after the tip's first contact with tissue.
+    pub dropped_after_ns: [u64; MAX_SEEDS],
 }

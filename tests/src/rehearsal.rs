@@ -60,6 +60,7 @@ impl Rehearser for Theatre {
             .rehearse(&run, &ParameterSet::default(), &AtomicBool::new(false))?;
         Ok(Rest {
             seeds_m: done.seeds.iter().map(|s| s.position_m).collect(),
+            dropped_after_s: done.dropped_after_s,
             peak_force_n: done.peak_force_n,
             displacement_before_puncture_m: done.displacement_before_puncture_m,
         })

@@ -9,12 +9,11 @@ use super::seed::Seed;
 use super::source::Source;
 use super::structure::Structure;
 use super::{DoseGrid, DosePoints, contours, labels, perturb, picture, structure};
+use crate::interrupt::Interrupt;
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 mod write;
 
@@ -179,11 +178,7 @@ impl PerturbArgs {
             trials: self.trials as usize,
             random_seed: self.seed,
         };
-        let stop = Arc::new(AtomicBool::new(false));
-        // The first Ctrl-C asks for the end, the second one ends at once.
-        signal_hook::flag::register_conditional_shutdown(signal_hook::consts::SIGINT, 130, Arc::clone(&stop))
-            .and_then(|_| signal_hook::flag::register(signal_hook::consts::SIGINT, Arc::clone(&stop)))
-            .map_err(|e| format!("Ctrl-C cannot be caught ({e})"))?;
+        let stop = Interrupt::on_signals()?;
         write::folder(&c.out)?;
         let planned = judge.values(&judge.judge(&kernel, &plan));
         let bar = indicatif::ProgressBar::new(self.trials).with_style(

@@ -3,11 +3,11 @@
 use super::kernel::DoseKernel;
 use super::report::Judge;
 use super::seed::Seed;
+use crate::interrupt::Interrupt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// How seeds are moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,13 +42,13 @@ pub fn trials(
     kernel: &DoseKernel,
     plan: &[Seed],
     how: Perturbation,
-    stop: &AtomicBool,
+    stop: &Interrupt,
     done: impl Fn() + Sync,
 ) -> Vec<(usize, Vec<Option<f64>>)> {
     (0..how.trials)
         .into_par_iter()
         .filter_map(|trial| {
-            if stop.load(Ordering::Relaxed) {
+            if stop.asked() {
                 return None;
             }
             let moved = moved(plan, how, trial);

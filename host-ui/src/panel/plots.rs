@@ -40,6 +40,7 @@ fn tension_ui(ui: &mut egui::Ui, shown: &Shown) {
     let words = match tension {
         Some(share) => format!("{:.0} % of the puncture", share * 100.0),
         None if shown.has_punctured() => "punctured".to_owned(),
+        None if shown.state.is_none() => "n/a".to_owned(),
         None => "slack".to_owned(),
     };
     title(ui, "Membrane tension", &words, tokens.text);

@@ -29,6 +29,7 @@ impl<F: Fn(f64) -> f64> Rehearser for Known<F> {
         };
         Ok(Rest {
             seeds_m: drops.along_m.iter().map(rest).collect(),
+            dropped_after_s: vec![0.0; drops.along_m.len()],
             peak_force_n: 0.0,
             displacement_before_puncture_m: 0.0,
         })

@@ -1,9 +1,9 @@
 //! One needle gone through ahead of time: what the operator would do, and where the seeds would rest.
 
 use super::Needle;
+use crate::interrupt::Interrupt;
 use crate::link::{Link, LinkStatus};
 use crate::workflow::Pace;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::CommandKind;
 
@@ -60,6 +60,8 @@ impl Drops {
 pub struct Rest {
     /// In the order of the drops.
     pub seeds_m: Vec<[f64; 3]>,
+    /// When each was dropped, after the tip's first contact with tissue.
+    pub dropped_after_s: Vec<f64>,
     pub peak_force_n: f64,
     pub displacement_before_puncture_m: f64,
 }
@@ -73,7 +75,7 @@ pub trait Rehearser {
 /// The core that runs, under the parameters in force.
 pub struct LinkRehearser<'a> {
     pub link: &'a mut Link,
-    pub interrupted: &'a AtomicBool,
+    pub interrupted: &'a Interrupt,
 }
 
 impl Rehearser for LinkRehearser<'_> {
@@ -83,7 +85,7 @@ impl Rehearser for LinkRehearser<'_> {
         let id = link.send(CommandKind::Rehearse, &drops.values(pace)).map_err(|e| e.0)?;
         let begun = Instant::now();
         while begun.elapsed() < LONGEST {
-            if self.interrupted.load(Ordering::Relaxed) {
+            if self.interrupted.asked() {
                 return Err("interrupted".to_owned());
             }
             link.poll();
@@ -99,9 +101,11 @@ impl Rehearser for LinkRehearser<'_> {
                     {
                         return Err("another scene was loaded during the rehearsal; rehearse again".to_owned());
                     }
-                    let seeds = &rehearsal.seeds[..rehearsal.seed_count as usize];
+                    let count = rehearsal.seed_count as usize;
+                    let after_ns = &rehearsal.dropped_after_ns[..count];
                     return Ok(Rest {
-                        seeds_m: seeds.iter().map(|s| s.position_m).collect(),
+                        seeds_m: rehearsal.seeds[..count].iter().map(|s| s.position_m).collect(),
+                        dropped_after_s: after_ns.iter().map(|&ns| ns as f64 * 1e-9).collect(),
                         peak_force_n: rehearsal.peak_force_n,
                         displacement_before_puncture_m: rehearsal.displacement_before_puncture_m,
                     });

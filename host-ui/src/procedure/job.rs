@@ -2,6 +2,7 @@
 
 use crate::dose::files::SeedDefaults;
 use crate::dose::source::Source;
+use crate::interrupt::Interrupt;
 use crate::link::{Link, SceneModel};
 use crate::plan::compensate::summary_m;
 use crate::plan::file::{self, Frames};
@@ -9,7 +10,6 @@ use crate::plan::rehearse::{Drops, LinkRehearser};
 use crate::plan::{Anatomy, Compensation, Hole, ImplantPlan, Limits, Needle, Template, check, compensate};
 use crate::workflow::{NeedlePlan, NeedleTask, Pace, plan_with_seeds};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_shm_schema::{MAX_SEEDS, SeedPose};
 
 /// A seed as it is planned, in the order of the drops.
@@ -97,7 +97,7 @@ impl Job {
     }
 
     /// Rehearses every needle and moves its drops so that the seeds rest on plan.
-    pub fn compensate(&mut self, link: &mut Link, pace: &Pace, interrupted: &AtomicBool) -> Result<(), String> {
+    pub fn compensate(&mut self, link: &mut Link, pace: &Pace, interrupted: &Interrupt) -> Result<(), String> {
         let count = self.tasks.len();
         for (number, task) in self.tasks.iter_mut().enumerate() {
             let needle = match &self.implant {
@@ -108,7 +108,7 @@ impl Job {
             let mut rehearser = LinkRehearser { link, interrupted };
             let done = match compensate(&needle, pace, &Limits::default(), &mut rehearser) {
                 Ok(done) => done,
-                Err(why) if interrupted.load(Ordering::Relaxed) => return Err(why),
+                Err(why) if interrupted.asked() => return Err(why),
                 Err(why) => {
                     println!("note: needle {} of {count} is not compensated: {why}", number + 1);
                     continue;

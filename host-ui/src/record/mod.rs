@@ -14,10 +14,9 @@ pub use export::{Export, export};
 pub use gaps::{Gap, Gaps};
 pub use read::{Recording, read};
 
+use crate::interrupt::Interrupt;
 use crate::link::{Link, LinkStatus};
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::CommandKind;
@@ -39,11 +38,8 @@ pub struct Options {
 
 /// Records until the time is over or it is interrupted; an error when a tick was lost on the way.
 pub fn run(options: &Options) -> Result<(), String> {
-    let interrupted = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        signal_hook::flag::register(signal, interrupted.clone()).map_err(|e| e.to_string())?;
-    }
-    let stop = || interrupted.load(Ordering::Relaxed);
+    let interrupted = Interrupt::on_signals()?;
+    let stop = || interrupted.asked();
     let mut link = Link::new(options.instance.clone());
     find_core(&mut link, stop)?;
     let (send, receive) = mpsc::channel();

@@ -3,18 +3,20 @@
 use crate::rehearse::{NeedleRun, Rehearsed, Stage, timed};
 use crate::scene::SceneSource;
 use crate::tissue::TissueKind;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, mpsc};
+use std::thread::JoinHandle;
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::{MAX_SEEDS, ParameterSet, Rehearsal};
 
 use super::Ticket;
 
 const BUSY: &str = "another rehearsal runs; wait until it is done";
+const PANICKED: &str =
+    "the rehearsal stopped on a fault of its own; what rt-core printed says where. The next one starts afresh";
 
 /// What the thread gives back.
 struct Finished {
-    ticket: Ticket,
     scene_generation: u64,
     wall_ns: u64,
     outcome: Result<Rehearsed, String>,
@@ -35,9 +37,8 @@ pub struct RehearsalDesk {
     device: DeviceInfo,
     /// Of the scene that runs; `None` until the first rehearsal in it, and while one is under way.
     stage: Option<(u64, Stage)>,
-    busy: bool,
+    under_way: Option<(Ticket, JoinHandle<Finished>)>,
     stop: Arc<AtomicBool>,
-    finished: (mpsc::Sender<Finished>, mpsc::Receiver<Finished>),
 }
 
 impl RehearsalDesk {
@@ -47,9 +48,8 @@ impl RehearsalDesk {
             tissue,
             device,
             stage: None,
-            busy: false,
+            under_way: None,
             stop: Arc::new(AtomicBool::new(false)),
-            finished: mpsc::channel(),
         }
     }
 
@@ -67,7 +67,7 @@ impl RehearsalDesk {
         set: ParameterSet,
         scene_generation: u64,
     ) -> Result<(), &'static str> {
-        if self.busy {
+        if self.under_way.is_some() {
             return Err(BUSY);
         }
         let kept = self
@@ -75,7 +75,7 @@ impl RehearsalDesk {
             .take()
             .filter(|(generation, _)| *generation == scene_generation);
         let (source, tissue, device) = (Arc::clone(&self.source), self.tissue, self.device);
-        let (sender, stop) = (self.finished.0.clone(), Arc::clone(&self.stop));
+        let stop = Arc::clone(&self.stop);
         let work = move || {
             let stage = kept.map_or_else(|| Stage::build(&source, tissue, device), |(_, stage)| Ok(stage));
             let (stage, outcome, wall_ns) = match stage {
@@ -85,29 +85,30 @@ impl RehearsalDesk {
                 }
                 Err(why) => (None, Err(why), 0),
             };
-            // The bridge may have ended.
-            let _ = sender.send(Finished {
-                ticket,
+            Finished {
                 scene_generation,
                 wall_ns,
                 outcome,
                 stage,
-            });
+            }
         };
         let thread = std::thread::Builder::new().name("rehearsal".to_owned()).spawn(work);
-        self.busy = thread.is_ok();
-        thread.map(|_| ()).map_err(|_| "no thread could be started to rehearse")
+        self.under_way = Some((ticket, thread.map_err(|_| "no thread could be started to rehearse")?));
+        Ok(())
     }
 
     /// One that has ended since the last call.
     pub fn take(&mut self, scene_generation: u64) -> Option<Told> {
-        let finished = self.finished.1.try_recv().ok()?;
-        self.busy = false;
+        let (ticket, thread) = self.under_way.take_if(|(_, thread)| thread.is_finished())?;
+        let Ok(finished) = thread.join() else {
+            let outcome = Err(PANICKED.to_owned());
+            return Some(Told { ticket, outcome });
+        };
         if finished.scene_generation == scene_generation {
             self.stage = finished.stage.map(|stage| (scene_generation, stage));
         }
         Some(Told {
-            ticket: finished.ticket,
+            ticket,
             outcome: finished
                 .outcome
                 .map(|r| message(&r, finished.scene_generation, finished.wall_ns)),
@@ -132,6 +133,9 @@ fn message(r: &Rehearsed, scene_generation: u64, wall_ns: u64) -> Box<Rehearsal>
     message.seed_count = r.seeds.len().min(MAX_SEEDS) as u64;
     for (slot, seed) in message.seeds.iter_mut().zip(&r.seeds) {
         *slot = *seed;
+    }
+    for (slot, after_s) in message.dropped_after_ns.iter_mut().zip(&r.dropped_after_s) {
+        *slot = (after_s * 1e9) as u64;
     }
     message
 }

@@ -43,6 +43,8 @@ pub struct NeedleRun {
 pub struct Rehearsed {
     /// In the order of the drops, after the tissue has come to rest.
     pub seeds: Vec<SeedPose>,
+    /// When each was dropped, after the tip's first contact with tissue.
+    pub dropped_after_s: Vec<f64>,
     pub peak_force_n: f64,
     pub displacement_before_puncture_m: f64,
     pub simulated_s: f64,
@@ -86,14 +88,21 @@ impl Stage {
 fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearsed, String> {
     let mut script = Script::new(run);
     let mut displacement_before_puncture_m = 0.0_f64;
-    let mut punctured = false;
+    let (mut punctured, mut contact_s) = (false, None);
+    let mut dropped_after_s = Vec::new();
     while rig.seconds() < LONGEST_S {
         // SYNC: set by the bridge when it ends; nothing but the flag is carried.
         if stop.load(Ordering::Relaxed) {
             return Err("rt-core ended during the rehearsal".to_owned());
         }
-        rig.tissue_period();
+        rig.tick();
         let state = rig.state();
+        if state.flags & flags::IN_CONTACT != 0 {
+            contact_s.get_or_insert(rig.seconds());
+        }
+        while dropped_after_s.len() < state.seed_count as usize {
+            dropped_after_s.push(rig.seconds() - contact_s.unwrap_or(rig.seconds()));
+        }
         punctured |= state.flags & flags::PUNCTURED != 0;
         if !punctured {
             displacement_before_puncture_m = displacement_before_puncture_m.max(rig.displacement_m());
@@ -106,6 +115,7 @@ fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearse
             let simulated_s = rig.seconds();
             return Ok(Rehearsed {
                 seeds: rig.seeds(),
+                dropped_after_s,
                 peak_force_n: rig.state().peak_force_n,
                 displacement_before_puncture_m,
                 simulated_s,

@@ -90,14 +90,14 @@ impl Rig {
         }
     }
 
-    /// The force ticks of one tissue period, and the tissue's tick.
-    pub fn tissue_period(&mut self) {
-        for _ in 0..TISSUE_PERIOD_NS / HAPTIC_PERIOD_NS {
-            self.now_ns += HAPTIC_PERIOD_NS;
-            self.haptic.tick(self.now_ns, self.now_ns, 0);
-            while self.records.pop().is_ok() {}
+    /// One tick of the force, and the tissue's where one is due.
+    pub fn tick(&mut self) {
+        self.now_ns += HAPTIC_PERIOD_NS;
+        self.haptic.tick(self.now_ns, self.now_ns, 0);
+        while self.records.pop().is_ok() {}
+        if self.now_ns.is_multiple_of(TISSUE_PERIOD_NS) {
+            self.tissue.tick(self.now_ns);
         }
-        self.tissue.tick(self.now_ns);
         while let Ok(notice) = self.haptic_notices.pop() {
             self.hear(&notice);
         }
@@ -118,7 +118,7 @@ impl Rig {
     }
 
     pub fn engage(&mut self) {
-        // Both rings are emptied each period and are never full.
+        // Both rings are emptied before the script goes on, and are never full.
         let _ = self.haptic_orders.push(HapticOrder::Engage { ticket: 0 });
     }
 

@@ -60,7 +60,7 @@ impl Script {
         }
     }
 
-    /// After each tissue period; true when all is done.
+    /// After each tick of the force; true when all is done.
     pub fn advance(&mut self, rig: &mut Rig) -> Result<bool, String> {
         if let Some(why) = rig.refusal() {
             return Err(why.to_owned());

@@ -1,6 +1,7 @@
 //! The displacements of a snapshot as a texture takes them, and which material point lies at a place.
 
 use crate::link::{SceneModel, Snapshot};
+use half::f16;
 use nalgebra::Vector3;
 use stylet_shm_schema::GridInfo;
 
@@ -75,54 +76,30 @@ impl Field {
     /// Four halves for each node, the last 0: as a texture takes them.
     pub fn texels(&self, out: &mut Vec<[u16; 4]>) {
         out.clear();
-        let half = |d: &[f32; 3]| [half_bits(d[0]), half_bits(d[1]), half_bits(d[2]), 0];
-        out.extend(self.displacements_m.iter().map(half));
+        let node = |d: &[f32; 3]| [texel(d[0]), texel(d[1]), texel(d[2]), f16::ZERO].map(f16::to_bits);
+        out.extend(self.displacements_m.iter().map(node));
     }
 }
 
-/// The bits of a half-precision float, rounded to the nearest; what is too small is 0, what is too large the largest.
-fn half_bits(value: f32) -> u16 {
-    const LARGEST: f32 = 65504.0;
-    let sign = ((value.to_bits() >> 16) & 0x8000) as u16;
-    if value.is_nan() {
-        return 0;
+/// A displacement as a texture takes it; one that cannot be told is none.
+fn texel(metres: f32) -> f16 {
+    if metres.is_nan() {
+        return f16::ZERO;
     }
-    let size = value.abs().min(LARGEST);
-    // Below the smallest normal number steps are of 2^-24.
-    if size < 2.0_f32.powi(-14) {
-        return sign | (size * 2.0_f32.powi(24)).round() as u16;
-    }
-    let rounded = size.to_bits() + 0x0fff + ((size.to_bits() >> 13) & 1);
-    sign | ((rounded >> 13) - (112 << 10)) as u16
+    f16::from_f32(metres.clamp(f16::MIN.to_f32(), f16::MAX.to_f32()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn value_of(bits: u16) -> f64 {
-        let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023));
-        let size = match exponent {
-            0 => fraction * 2.0_f64.powi(-24),
-            _ => (1.0 + fraction / 1024.0) * 2.0_f64.powi(exponent - 15),
-        };
-        if bits & 0x8000 == 0 { size } else { -size }
-    }
-
     #[test]
-    fn every_half_is_kept_and_between_two_the_nearer_is_taken() {
-        for bits in 0..0x7c00_u16 {
-            let value = value_of(bits);
-            assert_eq!(half_bits(value as f32), bits);
-            assert_eq!(half_bits(-value as f32), bits | 0x8000);
-            if bits + 1 < 0x7c00 {
-                let step = value_of(bits + 1) - value;
-                assert_eq!(half_bits((value + 0.3 * step) as f32), bits);
-                assert_eq!(half_bits((value + 0.7 * step) as f32), bits + 1);
-            }
+    fn texels_hold_displacements_to_11_bits_and_what_no_half_can_hold_is_bounded() {
+        for metres in [0.0, 1e-3, -4.2e-3, 0.0313] {
+            assert!((texel(metres).to_f32() - metres).abs() <= metres.abs() / 2048.0);
         }
-        assert_eq!(half_bits(1e9), 0x7bff);
-        assert_eq!(half_bits(f32::NAN), 0);
+        assert_eq!((texel(1e9), texel(-1e9)), (f16::MAX, f16::MIN));
+        assert_eq!(texel(f32::NAN), f16::ZERO);
     }
 
     fn linear(stretch: f64) -> Field {

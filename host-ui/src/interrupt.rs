@@ -1,0 +1,27 @@
+//! Ctrl-C, or a request to terminate: the first asks for an end in good order, the second ends at once.
+
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Long work asks now and then whether it is to end.
+#[derive(Clone, Debug, Default)]
+pub struct Interrupt(Arc<AtomicBool>);
+
+impl Interrupt {
+    pub fn on_signals() -> Result<Self, String> {
+        let interrupt = Self::default();
+        for signal in [SIGINT, SIGTERM] {
+            flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&interrupt.0))
+                .and_then(|_| flag::register(signal, Arc::clone(&interrupt.0)))
+                .map_err(|e| format!("Ctrl-C cannot be caught ({e})"))?;
+        }
+        Ok(interrupt)
+    }
+
+    pub fn asked(&self) -> bool {
+        // SYNC: set by a signal handler; nothing but the flag is carried.
+        self.0.load(Ordering::Relaxed)
+    }
+}
