@@ -98,7 +98,10 @@ fn rehearsed_is_live(scene: &str) {
             i + 1
         );
     }
-    assert!(2 * typical > rest.seeds_m.len(), "only {typical} seeds within the bound");
+    assert!(
+        2 * typical > rest.seeds_m.len(),
+        "only {typical} seeds within the bound"
+    );
     let peak = link.state().expect("live").peak_force_n;
     println!(
         "{scene}: peak force {peak:.3} N live, {:.3} N rehearsed",
