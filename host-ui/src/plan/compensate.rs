@@ -3,7 +3,9 @@
 //!
 //! The tissue lies ahead of its place at rest when a seed leaves the needle, by some millimetres that hardly change with the
 //! place of the drop. So each step moves a drop by the error that is left, over the slope of rest against drop that the last two
-//! rehearsals show (a secant; at first 1). Where that makes it worse, the best drops of the single seeds are tried together.
+//! rehearsals show (a secant; at first 1). Rest against drop has jumps, where the tip takes hold of another element: once a seed
+//! has been seen to rest on both sides of its place, its drop is sought between those two. Where a step makes the needle worse,
+//! the best drops of the single seeds are tried together.
 
 use super::rehearse::{Drops, Rehearser, Rest};
 use super::{Loading, Needle};
@@ -31,7 +33,7 @@ impl Default for Limits {
             along_m: 15e-3,
             across_m: 1.5e-3,
             reach_m: super::check::REACH_M,
-            rehearsals: 8,
+            rehearsals: 16,
             enough_m: 0.1e-3,
         }
     }
@@ -41,6 +43,10 @@ impl Default for Limits {
 const SLOPES: [f64; 2] = [0.5, 2.0];
 /// Two drops less far apart say nothing about the slope.
 const LEAST_MOVE_M: f64 = 0.05e-3;
+/// A seed's drop is sought between two of its last drops, so many of them: older ones were with other drops of its neighbours.
+const REMEMBERED: usize = 5;
+/// Between two drops the next one keeps from both by this part of their distance.
+const KEPT_FROM_ENDS: f64 = 0.1;
 /// Drops of one needle keep their order by at least this.
 const APART_M: f64 = 0.1e-3;
 
@@ -124,8 +130,8 @@ pub fn compensate(
     rehearser: &mut dyn Rehearser,
 ) -> Result<Compensation, String> {
     let (start, is_as_planned) = start(needle, pace, limits, rehearser)?;
-    let (mut best, mut last) = (start.clone(), start.clone());
-    let mut before_last: Option<Tried> = None;
+    let mut best = start.clone();
+    let mut tried = vec![start.clone()];
     let mut rehearsals = 1;
     // Shortened when a step leads out of the tissue or makes it worse.
     let mut share = 1.0;
@@ -135,30 +141,27 @@ pub fn compensate(
         let together = nearest.together(needle, &best);
         let drops = match together {
             Some(drops) if is_worse => drops,
-            _ => next(needle, &last, before_last.as_ref(), share, limits),
+            _ => match next(needle, &tried, share, limits) {
+                Some(drops) if tried.iter().all(|t| t.drops != drops) => drops,
+                _ => break,
+            },
         };
-        if drops == last.drops {
-            break;
-        }
         rehearsals += 1;
         match try_it(needle, drops, pace, rehearser) {
-            Ok(tried) => {
-                share = if tried.mean_m() > last.mean_m() {
-                    0.5 * share
-                } else {
-                    1.0
-                };
-                nearest.take(&tried);
-                is_worse = tried.mean_m() >= best.mean_m();
+            Ok(new) => {
+                let is_worse_than_last = tried.last().is_some_and(|last| new.mean_m() > last.mean_m());
+                share = if is_worse_than_last { 0.5 * share } else { 1.0 };
+                nearest.take(&new);
+                is_worse = new.mean_m() >= best.mean_m();
                 if !is_worse {
-                    best = tried.clone();
+                    best = new.clone();
                 }
-                before_last = Some(std::mem::replace(&mut last, tried));
+                tried.push(new);
             }
             // A drop outside the tissue: go less far from the best that worked.
             Err(_) if share > 0.1 => {
                 share *= 0.5;
-                (last, before_last) = (best.clone(), None);
+                tried = vec![best.clone()];
             }
             Err(why) => return Err(why),
         }
@@ -212,30 +215,25 @@ fn try_it(needle: &Needle, drops: Drops, pace: &Pace, rehearser: &mut dyn Rehear
     })
 }
 
-fn next(needle: &Needle, last: &Tried, before: Option<&Tried>, share: f64, limits: &Limits) -> Drops {
+fn next(needle: &Needle, tried: &[Tried], share: f64, limits: &Limits) -> Option<Drops> {
+    let last = tried.last()?;
     let direction = Vector3::from(needle.direction);
-    let along = |t: &Tried, i: usize| t.error_m[i].dot(&direction);
+    let seen = |i: usize| {
+        tried
+            .iter()
+            .map(move |t| (t.drops.along_m[i], t.error_m[i].dot(&direction)))
+    };
     let count = last.error_m.len();
-    let mut steps_m: Vec<f64> = (0..count)
-        .map(|i| {
-            let slope = before.map_or(1.0, |b| {
-                let moved_m = last.drops.along_m[i] - b.drops.along_m[i];
-                // What the error changed by is what the seed's rest did.
-                let rest_moved_m = along(last, i) - along(b, i);
-                let slope = if moved_m.abs() < LEAST_MOVE_M {
-                    1.0
-                } else {
-                    rest_moved_m / moved_m
-                };
-                slope.clamp(SLOPES[0], SLOPES[1])
-            });
-            -along(last, i) / slope * share
-        })
-        .collect();
-    if needle.loading != Loading::Loose {
-        let mean_m = steps_m.iter().sum::<f64>() / count.max(1) as f64;
-        steps_m.fill(mean_m);
-    }
+    let steps_m: Vec<f64> = if needle.loading == Loading::Loose {
+        (0..count)
+            .map(|i| step_m(&seen(i).collect::<Vec<_>>(), share))
+            .collect()
+    } else {
+        // A strand keeps its pitch: one step for all.
+        let mean = |t: &Tried| t.error_m.iter().map(|e| e.dot(&direction)).sum::<f64>() / count.max(1) as f64;
+        let seen: Vec<_> = tried.iter().map(|t| (t.drops.along_m[0], mean(t))).collect();
+        vec![step_m(&seen, share); count]
+    };
     let mut drops = last.drops.clone();
     for ((along_m, step_m), planned) in drops.along_m.iter_mut().zip(&steps_m).zip(&needle.seeds) {
         let [least, most] = [planned.along_m - limits.along_m, planned.along_m + limits.along_m];
@@ -246,7 +244,35 @@ fn next(needle: &Needle, last: &Tried, before: Option<&Tried>, share: f64, limit
         drops.along_m[i] = drops.along_m[i].min(drops.along_m[i - 1] - APART_M);
     }
     aside(needle, last, share, limits, &mut drops);
-    drops
+    Some(drops)
+}
+
+/// How much farther to drop a seed than the last time, from where it was dropped and how far along it then lay off, oldest first.
+fn step_m(seen: &[(f64, f64)], share: f64) -> f64 {
+    let Some((&(drop_m, error_m), before)) = seen.split_last() else {
+        return 0.0;
+    };
+    let recent = &seen[seen.len().saturating_sub(REMEMBERED)..];
+    let short = recent.iter().filter(|(_, error_m)| *error_m < 0.0);
+    let pairs = short.flat_map(|short| recent.iter().filter(|far| far.1 > 0.0).map(move |far| (short, far)));
+    let nearest = pairs
+        .filter(|(short, far)| far.0 - short.0 > LEAST_MOVE_M)
+        .min_by(|a, b| (a.1.0 - a.0.0).total_cmp(&(b.1.0 - b.0.0)));
+    if let Some((short, far)) = nearest {
+        let part = (short.1 / (short.1 - far.1)).clamp(KEPT_FROM_ENDS, 1.0 - KEPT_FROM_ENDS);
+        return short.0 + part * (far.0 - short.0) - drop_m;
+    }
+    let slope = before.last().map_or(1.0, |&(drop_before_m, error_before_m)| {
+        let moved_m = drop_m - drop_before_m;
+        // What the error changed by is what the seed's rest did.
+        let slope = (error_m - error_before_m) / moved_m;
+        if moved_m.abs() < LEAST_MOVE_M {
+            1.0
+        } else {
+            slope.clamp(SLOPES[0], SLOPES[1])
+        }
+    });
+    -error_m / slope * share
 }
 
 /// The needle as a whole moves across by what its seeds are off on average.
