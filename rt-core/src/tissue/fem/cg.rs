@@ -3,13 +3,32 @@
 use std::ops::Range;
 
 use super::grid::Grid;
-use super::lanes::{add_scaled, dot, keep_free, scale_and_add};
+use super::lanes::{add_scaled, dot, keep_free, keep_opposite, scale_and_add};
 use super::model::FemModel;
 use super::real::Real;
 use super::simd::{Simd, vectorised};
 use super::smooth::Product;
 use super::state::FemState;
 use super::sweep::{Field, LineOp, sweep};
+
+/// `b = -A u` where nodes are free, zero elsewhere: what is left to do from `u` on where nothing pushes free nodes.
+struct Opposite<'a, T> {
+    b: &'a mut Field<T>,
+    inverse_diagonal: &'a [T],
+    square: f64,
+}
+
+impl<T: Real> LineOp<T> for Opposite<'_, T> {
+    #[inline(always)]
+    fn line(&mut self, at: Range<usize>, forces: [&[T]; 3], _: [&mut [T]; 3]) {
+        let inverse = &self.inverse_diagonal[at.clone()];
+        for (b, force) in self.b.iter_mut().zip(forces) {
+            let b = &mut b[at.clone()];
+            keep_opposite(inverse, force, b);
+            self.square += dot(b, b);
+        }
+    }
+}
 
 /// Forces on all nodes, the residual on the free ones.
 struct Answer<'a, T> {
@@ -71,17 +90,17 @@ fn advance_fields<T>(grid: &Grid, alpha: T, p: &Field<T>, q: &Field<T>, u: &mut 
 }
 
 impl<T: Real> FemState<T> {
-    /// Refines response `n` until its residual norm is at most `target` or `cycles` are used up; returns the cycles used.
-    pub(super) fn refine(&mut self, model: &FemModel<T>, n: usize, target: f64, cycles: u32) -> u32 {
+    /// Refines response `n` until its residual norm is at most `target` or `cycles` of a step's `of` are used up; returns those used.
+    pub(super) fn refine(&mut self, model: &FemModel<T>, n: usize, target: f64, cycles: u32, of: u32) -> u32 {
         let mut used = 0;
         let mut residual = self.begin(model, n);
         let mut rz_before = 0.0;
         let mut alpha = 0.0;
         while residual > target && used < cycles {
-            self.multigrid.cycle(&model.levels);
+            self.multigrid.cycle(&model.levels, of);
             used += 1;
             let (rz, zq) = self.products(model, used > 1);
-            // Polak and Ribière's form: f32 makes the cycle slightly asymmetric, and this one does not mind.
+            // Polak and Ribière's form: the cycle is not quite symmetric, and this one does not mind.
             let beta = if used > 1 { -alpha * zq / rz_before } else { 0.0 };
             self.turn(model, beta);
             let pq = self.product(model);
@@ -100,17 +119,14 @@ impl<T: Real> FemState<T> {
     fn begin(&mut self, model: &FemModel<T>, n: usize) -> f64 {
         let level = &model.levels[0];
         let stage = &mut self.multigrid.stages[0];
-        let mut op = Product {
-            q: &mut stage.b,
+        let mut op = Opposite {
+            b: &mut stage.b,
             inverse_diagonal: &stage.inverse_diagonal,
-            dot: 0.0,
             square: 0.0,
         };
         let (u, work) = (&mut self.responses[n].u, &mut self.multigrid.work);
         sweep(level, u, work, 0..level.grid.nodes[2], &mut op);
-        let square = op.square;
-        stage.b.iter_mut().flatten().for_each(|b| *b = -*b);
-        square.sqrt()
+        op.square.sqrt()
     }
 
     /// `r . z`, and `z . q` if there is a `q` yet.

@@ -65,6 +65,15 @@ pub(super) fn keep_free<T: Real>(inverse: &[T], x: &[T], y: &mut [T]) {
     }
 }
 
+/// `-x` where `inverse` is not zero, zero elsewhere.
+#[inline(always)]
+pub(super) fn keep_opposite<T: Real>(inverse: &[T], x: &[T], y: &mut [T]) {
+    for ((y, x), inverse) in lanes_mut(y).iter_mut().zip(lanes(x)).zip(lanes(inverse)) {
+        let (x, inverse) = (*x, *inverse);
+        *y = each(|n| if inverse[n] == T::ZERO { T::ZERO } else { -x[n] });
+    }
+}
+
 /// `b - x` where `inverse` is not zero, zero elsewhere.
 #[inline(always)]
 pub(super) fn difference_where_free<T: Real>(inverse: &[T], b: &[T], x: &[T], y: &mut [T]) {

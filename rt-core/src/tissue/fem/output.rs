@@ -3,6 +3,7 @@
 use super::hexahedron::CHUNK;
 use super::model::{CellRun, FemModel};
 use super::real::Real;
+use super::simd::{Simd, vectorised};
 use super::state::FemState;
 
 /// Superposes the responses and writes the displacements; returns how many elements moved.
@@ -15,7 +16,7 @@ pub(super) fn write<T: Real>(model: &FemModel<T>, state: &mut FemState<T>) -> u3
                 len: (run.len - start).min(CHUNK),
                 cell: run.cell + start,
             };
-            let (count, square) = write_piece(model, state, &piece);
+            let (count, square) = write_piece(model.levels[0].simd, model, state, &piece);
             moved += count;
             largest = largest.max(square);
             if square.is_nan() {
@@ -27,8 +28,9 @@ pub(super) fn write<T: Real>(model: &FemModel<T>, state: &mut FemState<T>) -> u3
     moved
 }
 
+vectorised! {
 /// The mean of the eight corners is the displacement of the centre. Returns elements moved and the largest square.
-fn write_piece<T: Real>(model: &FemModel<T>, state: &mut FemState<T>, piece: &CellRun) -> (u32, f32) {
+fn write_piece<T>(model: &FemModel<T>, state: &mut FemState<T>, piece: &CellRun) -> (u32, f32) {
     let n = piece.len;
     let grid = &model.levels[0].grid;
     let (nx, ny) = (grid.stride, grid.nodes[1]);
@@ -61,4 +63,5 @@ fn write_piece<T: Real>(model: &FemModel<T>, state: &mut FemState<T>, piece: &Ce
     );
     let moved = same[..n].iter().filter(|&&same| !same).count();
     (moved as u32, largest)
+}
 }

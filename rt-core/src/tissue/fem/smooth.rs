@@ -32,8 +32,6 @@ impl<T: Real> LineOp<T> for Step<'_, T> {
 const SMOOTHED: f64 = 5.0;
 
 /// `steps` of a Chebyshev iteration for `A x = b`, which damps the upper part of the spectrum evenly.
-///
-/// The same polynomial before and after the coarse correction keeps the cycle symmetric, as conjugate gradients need.
 pub(super) fn smooth<T: Real>(
     level: &Level<T>,
     inverse_diagonal: &[T],

@@ -1,8 +1,10 @@
 //! One step: take up the held patch, refine what it moves, superpose, report.
 
+use super::level::Level;
 use super::model::FemModel;
 use super::output;
 use super::real::Real;
+use super::simd::{Simd, vectorised};
 use super::state::{DIRECTIONS, FemState};
 use crate::tissue::HeldOutcome;
 
@@ -167,7 +169,7 @@ fn refine<T: Real>(model: &FemModel<T>, state: &mut FemState<T>, settings: &Solv
         }
         let share = settings.relative_tolerance * load / used.len() as f64;
         let target = 0.9 * share / used[most].weight_m.abs();
-        let spent = state.refine(model, most, target, settings.max_cycles - cycles);
+        let spent = state.refine(model, most, target, settings.max_cycles - cycles, settings.max_cycles);
         if spent == 0 {
             return (cycles, residual);
         }
@@ -189,6 +191,31 @@ fn moved_along(
     let same_size = (0..3).all(|a| now[a][1] - now[a][0] == before[a][1] - before[a][0]);
     let near = by.iter().all(|n| n.abs() <= NEXT_PATCH);
     (same_size && near && distance > 0.0 && along > SAME_WAY * distance).then_some((by, distance))
+}
+
+vectorised! {
+/// `moved` at each node is `u` at the node so many nodes before it, or its own `u` where no element touches that one.
+fn shifted<T>(level: &Level<T>, by: [isize; 3], u: &[T], moved: &mut [T]) {
+    let (grid, in_use) = (&level.grid, &level.inverse_diagonal);
+    for (row, at) in grid.node_spans().enumerate() {
+        moved[at.clone()].copy_from_slice(&u[at.clone()]);
+        let (j, k) = (row % grid.nodes[1], row / grid.nodes[1]);
+        let inside = |n: usize, axis: usize| n.checked_add_signed(-by[axis]).filter(|&n| n < grid.nodes[axis]);
+        let (Some(j), Some(k)) = (inside(j, 1), inside(k, 2)) else {
+            continue;
+        };
+        // Past both ends of a line lie nodes that no element touches; only the first line has none before it.
+        let line = grid.index([0, j, k]) + at.start % grid.stride;
+        let skipped = (by[0].max(0) as usize).saturating_sub(line);
+        let from = (line + skipped).saturating_add_signed(-by[0]);
+        let count = (at.len() - skipped).min(in_use.len() - from);
+        let to = &mut moved[at.start + skipped..][..count];
+        let (u, in_use) = (&u[from..][..count], &in_use[from..][..count]);
+        for ((to, &u), &in_use) in to.iter_mut().zip(u).zip(in_use) {
+            *to = if in_use == T::ZERO { *to } else { u };
+        }
+    }
+}
 }
 
 impl<T: Real> FemState<T> {
@@ -284,32 +311,9 @@ impl<T: Real> FemState<T> {
     /// Response 0 moved by so many nodes along each axis; nodes that would take theirs from outside the body keep it.
     fn shift(&mut self, model: &FemModel<T>, by: [isize; 3]) {
         let level = &model.levels[0];
-        let [nx, ny, nz] = level.grid.nodes;
-        let is_node = |place: [usize; 3]| level.inverse_diagonal[level.grid.index(place)] != T::ZERO;
-        let from = |place: [usize; 3]| {
-            let mut from = [0; 3];
-            for a in 0..3 {
-                from[a] = place[a]
-                    .checked_add_signed(-by[a])
-                    .filter(|&n| n < level.grid.nodes[a])?;
-            }
-            is_node(from).then(|| level.grid.index(from))
-        };
-        let u = &mut self.responses[0].u;
-        for (u, moved) in u.iter_mut().zip(&mut self.p) {
-            for k in 0..nz {
-                for j in 0..ny {
-                    for i in (0..nx).filter(|&i| is_node([i, j, k])) {
-                        let here = level.grid.index([i, j, k]);
-                        moved[here] = u[from([i, j, k]).unwrap_or(here)];
-                    }
-                }
-            }
-            for at in level.grid.node_spans() {
-                for here in at.filter(|&here| level.inverse_diagonal[here] != T::ZERO) {
-                    u[here] = moved[here];
-                }
-            }
+        for (u, moved) in self.responses[0].u.iter_mut().zip(&mut self.p) {
+            shifted(level.simd, level, by, u, moved);
+            std::mem::swap(u, moved);
         }
     }
 

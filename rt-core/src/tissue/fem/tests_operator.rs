@@ -3,6 +3,7 @@
 use super::*;
 use crate::tissue::fem::hexahedron::Stiffness;
 use crate::tissue::fem::smooth::Product;
+use crate::tissue::fem::solve::shifted;
 use crate::tissue::fem::sweep::{Field, Planes, sweep, zeros};
 
 /// 24 x 24, from the definition: sum over Gauss points of `B^T D B`, or with the volumetric part of B averaged.
@@ -208,4 +209,48 @@ fn is_inside(model: &FemModel<f64>, node: usize) -> bool {
         let cell = [0, 1, 2].map(|a| place[a].wrapping_sub(c >> a & 1));
         (0..3).all(|a| cell[a] < grid.nodes[a]) && model.is_cell[grid.index(cell)]
     })
+}
+
+/// Place by place, in bodies that fill their box and in ones with holes, by every step that a patch makes.
+#[test]
+fn a_field_moved_along_is_each_nodes_neighbour_or_its_own() {
+    let mut random = Random(7);
+    let holey = Labels {
+        dims: [9, 7, 6],
+        spacing_m: 1e-3,
+        cells: (0..9 * 7 * 6).map(|_| u8::from(random.unit() < 0.7)).collect(),
+        structures: Vec::new(),
+    };
+    for lattice in [block([20, 5, 4], 1e-3), lattice_of(&holey)] {
+        let model = FemModel::<f64>::new(&lattice, &FemSettings::homogeneous(material(0.3, FULL), 1e5)).unwrap();
+        let level = &model.levels[0];
+        let is_node = |n: usize| level.inverse_diagonal[n] != 0.0;
+        let u: Vec<f64> = (0..zeros::<f64>(level.grid.len())[0].len())
+            .map(|n| {
+                if n < level.grid.len() && is_node(n) {
+                    random.unit()
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        for step in 0..125 {
+            let by = [step % 5, step / 5 % 5, step / 25].map(|n| n as isize - 2);
+            let mut moved = vec![0.0; u.len()];
+            shifted(level.simd, level, by, &u, &mut moved);
+            for node in (0..level.grid.len()).filter(|&n| is_node(n)) {
+                let place = level.grid.place(node);
+                let inside = |a: usize| {
+                    let n = place[a].checked_add_signed(-by[a]);
+                    n.filter(|&n| n < level.grid.nodes[a])
+                };
+                let from = inside(0)
+                    .zip(inside(1))
+                    .zip(inside(2))
+                    .map(|((i, j), k)| level.grid.index([i, j, k]));
+                let expected = u[from.filter(|&n| is_node(n)).unwrap_or(node)];
+                assert_eq!(moved[node], expected, "{by:?} at {place:?}");
+            }
+        }
+    }
 }
