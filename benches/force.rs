@@ -58,7 +58,12 @@ fn z_width(path: &PathBuf) -> Drawn {
         .margin(16)
         .x_label_area_size(44)
         .y_label_area_size(64)
-        .build_cartesian_2d((0.8f64..6.5).log_scale(), (100f64..1e5).log_scale())?;
+        .build_cartesian_2d(
+            (0.8f64..6.5)
+                .log_scale()
+                .with_key_points(RATES_HZ.map(|rate| rate / 1e3).to_vec()),
+            (100f64..1e5).log_scale(),
+        )?;
     chart
         .configure_mesh()
         .x_desc("rate of the loop, kHz")
@@ -68,9 +73,9 @@ fn z_width(path: &PathBuf) -> Drawn {
         .draw()?;
     let ideal = RATES_HZ.map(|rate| (rate / 1e3, bound(rate)));
     chart
-        .draw_series(LineSeries::new(ideal, BLACK.stroke_width(1)))?
+        .draw_series(DashedLineSeries::new(ideal, 8, 5, BLACK.stroke_width(2)))?
         .label("2 b / T, b of the hand")
-        .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], BLACK));
+        .legend(|(x, y)| DashedPathElement::new([(x, y), (x + 18, y)], 5, 3, BLACK.stroke_width(2)));
     for (name, damping_n_s_per_m, late_ticks, controlled, colour) in WALLS {
         let reached = RATES_HZ.map(|rate| {
             let wall = Wall {
@@ -133,6 +138,9 @@ fn insertion(speed_m_per_s: f64) -> Vec<Sample> {
         .collect()
 }
 
+const FORCE: RGBColor = RGBColor(30, 60, 120);
+const GLAND: RGBColor = RGBColor(180, 60, 40);
+
 fn shade(phase: Phase) -> RGBAColor {
     match phase {
         Phase::Outside => WHITE.mix(0.0),
@@ -168,15 +176,35 @@ fn insertions(path: &PathBuf) -> Drawn {
             .light_line_style(WHITE)
             .draw()?;
         chart.configure_secondary_axes().y_desc("gland, mm").draw()?;
+        let mut named = vec![Phase::Outside];
         for run in samples.chunk_by(|a, b| a.phase == b.phase) {
             let ends = run.iter().map(|s| s.depth_mm);
             let (low, high) = (ends.clone().fold(f64::MAX, f64::min), ends.fold(f64::MIN, f64::max));
-            chart.draw_series([Rectangle::new([(low, -4.0), (high, 9.0)], shade(run[0].phase).filled())])?;
+            let style = shade(run[0].phase).filled();
+            let shaded = chart.draw_series([Rectangle::new([(low, -4.0), (high, 9.0)], style)])?;
+            if !named.contains(&run[0].phase) {
+                named.push(run[0].phase);
+                shaded
+                    .label(format!("{:?}", run[0].phase).to_lowercase())
+                    .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 18, y + 5)], style));
+            }
         }
         let force = samples.iter().map(|s| (s.depth_mm, s.force_n));
-        chart.draw_series(LineSeries::new(force, RGBColor(30, 60, 120).stroke_width(2)))?;
+        chart
+            .draw_series(LineSeries::new(force, FORCE.stroke_width(2)))?
+            .label("force on the hand")
+            .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], FORCE.stroke_width(2)));
         let shift = samples.iter().map(|s| (s.depth_mm, s.shift_mm));
-        chart.draw_secondary_series(LineSeries::new(shift, RGBColor(180, 60, 40).stroke_width(1)))?;
+        chart
+            .draw_secondary_series(LineSeries::new(shift, GLAND.stroke_width(1)))?
+            .label("gland")
+            .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], GLAND.stroke_width(1)));
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::LowerRight)
+            .background_style(WHITE.mix(0.9))
+            .border_style(BLACK.mix(0.3))
+            .draw()?;
     }
     root.present()?;
     Ok(())
