@@ -129,7 +129,7 @@ impl DoseKernel {
     fn replace_by_exact(&self, seed: &Placed, points: &Block, gy: &mut [f32; BLOCK]) {
         let p = seed.line.position_m;
         let [nearest, farthest] = self.table(seed.formalism).squares_m2();
-        for i in 0..BLOCK {
+        for (i, gy) in gy.iter_mut().enumerate() {
             let d = [points.x_m[i] - p[0], points.y_m[i] - p[1], points.z_m[i] - p[2]].map(f64::from);
             let square: f64 = d.iter().map(|d| d * d).sum();
             // Rounding may put a point on the other side here than in `doses`; both ways are right there.
@@ -138,7 +138,7 @@ impl DoseKernel {
             }
             let along: f64 = d.iter().zip(seed.line.axis).map(|(d, a)| d * f64::from(a)).sum();
             let across = (square - along * along).max(0.0).sqrt();
-            gy[i] = (self.exact_gy(seed.formalism, across, along) * f64::from(seed.line.strength_u)) as f32;
+            *gy = (self.exact_gy(seed.formalism, across, along) * f64::from(seed.line.strength_u)) as f32;
         }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Columns go by the angle in even steps, rows by r² in cm². A row stands at each square whose binary form ends early, at 64 or 256
 //! of them to a doubling: the first bits of a square are its row, and the others its share of the way to the next one, without a
-//! root. The squares of 0.5, 0.75, 1, 1.5, 2 ... 10 cm, where TG-43 tables bend, are among them.
+//! root. The squares of 0.5, 0.75, 1, 1.5, 2 ... 5, 6, 7 cm, where TG-43 tables bend, are among them.
 
 use crate::dose::tg43::{Formalism, Tables};
 use rayon::prelude::*;
@@ -101,9 +101,7 @@ mod tests {
             let step_deg = step_deg(&f.columns_at);
             assert!(f.columns_at.iter().all(|deg| deg % step_deg == 0.0));
             let radii_m = tables.ln_radial.at.iter().chain(&f.rows_at);
-            let far = radii_m.filter(|&&r_m| r_m >= near_m && r_m <= 0.08);
-            for &r_m in far {
-                // Radii come from cm, so that their squares are a last place off.
+            for &r_m in radii_m.filter(|r_m| (near_m..=0.07).contains(*r_m)) {
                 let key = ((r_m * 100.0).powi(2) as f32).to_bits();
                 for bits in ROW_BITS {
                     assert_eq!(key & ((1 << (MANTISSA_BITS - bits)) - 1), 0, "{model}: {r_m} m");
