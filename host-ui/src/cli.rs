@@ -4,7 +4,7 @@ use crate::convert::ConvertArgs;
 use crate::dose::command::{DoseArgs, PerturbArgs};
 use crate::dose::files::{SeedDefaults, read_seeds};
 use crate::plan::command::PlanArgs;
-use crate::{app, files, procedure, record};
+use crate::{app, files, interrupt, procedure, record};
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -147,6 +147,9 @@ enum SceneTask {
 
 impl Cli {
     pub fn run(self) -> Result<(), String> {
+        if self.task.is_some() {
+            interrupt::end_with_reader();
+        }
         match self.task {
             None => {
                 let instance = instance(&self.window.instance)?;

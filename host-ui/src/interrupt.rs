@@ -1,4 +1,4 @@
-//! Ctrl-C, or a request to terminate: the first asks for an end in good order, the second ends at once.
+//! Ctrl-C, or a request to terminate: the first asks for an end in good order, the second ends at once. And an end of output.
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
@@ -24,4 +24,10 @@ impl Interrupt {
         // SYNC: set by a signal handler; nothing but the flag is carried.
         self.0.load(Ordering::Relaxed)
     }
+}
+
+/// A command whose output nobody reads any more ends without a word, as `head` expects of it; Rust would have it panic.
+pub fn end_with_reader() {
+    // SAFETY: the default action of a signal is no code of ours, and no thread has been started that could mind.
+    unsafe { libc::signal(libc::SIGPIPE, libc::SIG_DFL) };
 }

@@ -368,3 +368,24 @@ fn what_is_wrong_is_told_once_with_its_file_and_line() {
     let grid = std::fs::read_to_string(folder.join("out/dose_grid.csv")).expect("written");
     assert_eq!(grid.lines().count(), 1 + 9 * 9 * 9);
 }
+
+/// It used to panic: `host-ui scene check FILE | head -1`.
+#[test]
+fn a_command_whose_output_nobody_reads_ends_without_a_word() {
+    use std::os::unix::process::ExitStatusExt;
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus/nifti");
+    let (reader, writer) = std::io::pipe().expect("a pipe");
+    drop(reader);
+    let mut command = host(&["scene", "check"], &[]);
+    let ended = command
+        .arg(folder.join("itk_u8.nii.gz"))
+        .stdout(writer)
+        .output()
+        .expect("host-ui runs");
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert!(
+        said.is_empty() && ended.status.signal() == Some(libc::SIGPIPE),
+        "{:?}: {said}",
+        ended.status
+    );
+}

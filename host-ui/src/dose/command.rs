@@ -28,7 +28,7 @@ Units: positions in mm (any frame, the same for all files; structures are in pat
 (1 U = 1 cGy cm2/h), activity in mCi, days.
 
 Seeds are CSV with a header; the columns in brackets may be left out, and lines that begin with # are skipped:
-  x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u or activity_mci]
+  x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u or activity_mci][,needle][,hole]
 A seed with an axis gets the 2D formalism, a seed without one the 1D formalism (averaged over directions).
 
 Examples:

@@ -21,25 +21,54 @@ pub struct SeedDefaults {
     pub strength_per_activity_u_per_mci: Option<f64>,
 }
 
-/// Seeds of a file with the columns `x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u|activity_mci]`.
+/// A seed, and the needle that it belongs to where the file says so.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SeedRow {
+    pub seed: Seed,
+    /// From 1.
+    pub needle: Option<u32>,
+    /// Of the template, as it is written.
+    pub hole: Option<String>,
+}
+
+/// As [`read_seed_rows`], the seeds alone.
+pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<Vec<Seed>, String> {
+    let rows = read_seed_rows(path, defaults)?;
+    Ok(rows.into_iter().map(|row| row.seed).collect())
+}
+
+/// Seeds of a file with the columns `x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u|activity_mci][,needle][,hole]`.
 ///
 /// Or those of a DICOM RT Plan, which says their strength itself.
-pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<Vec<Seed>, String> {
+pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<Vec<SeedRow>, String> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("dcm")) {
         let plan = crate::convert::read_plan(path)?;
-        let seed = |s: PlanSeed| Seed {
-            position_m: s.position_m,
-            axis: s.axis,
-            strength_u: s.strength_u,
+        let seed = |s: PlanSeed| SeedRow {
+            seed: Seed {
+                position_m: s.position_m,
+                axis: s.axis,
+                strength_u: s.strength_u,
+            },
+            needle: None,
+            hole: None,
         };
         return Ok(plan.seeds.into_iter().map(seed).collect());
     }
-    let known = [PLACE.as_slice(), &AXIS, &["strength_u", "activity_mci"]].concat();
+    let known = [
+        PLACE.as_slice(),
+        &AXIS,
+        &["strength_u", "activity_mci", "needle", "hole"],
+    ]
+    .concat();
     read(path, &known, |row| {
-        Ok(Seed {
-            position_m: position_m(row)?,
-            axis: axis(row)?,
-            strength_u: strength_u(row, defaults)?,
+        Ok(SeedRow {
+            seed: Seed {
+                position_m: position_m(row)?,
+                axis: axis(row)?,
+                strength_u: strength_u(row, defaults)?,
+            },
+            needle: needle(row)?,
+            hole: row.text("hole").map(str::to_owned),
         })
     })
 }
@@ -107,9 +136,13 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
+    fn text(&self, column: &str) -> Option<&str> {
+        let place = self.columns.iter().position(|c| c == column)?;
+        self.record.get(place).filter(|text| !text.is_empty())
+    }
+
     fn number(&self, column: &str) -> Result<Option<f64>, String> {
-        let place = self.columns.iter().position(|c| c == column);
-        let Some(text) = place.and_then(|i| self.record.get(i)).filter(|t| !t.is_empty()) else {
+        let Some(text) = self.text(column) else {
             return Ok(None);
         };
         match text.parse::<f64>() {
@@ -149,6 +182,14 @@ fn axis(row: &Row) -> Result<Option<[f64; 3]>, String> {
         }
         _ => Err("the axis is not complete; give axis_x, axis_y and axis_z, or none of them".to_owned()),
     }
+}
+
+fn needle(row: &Row) -> Result<Option<u32>, String> {
+    let number = row.text("needle").map(|text| match text.parse() {
+        Ok(number @ 1..) => Ok(number),
+        _ => Err(format!("needle is \"{text}\", not a whole number from 1")),
+    });
+    number.transpose()
 }
 
 fn strength_u(row: &Row, defaults: SeedDefaults) -> Result<f64, String> {

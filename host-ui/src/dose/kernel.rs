@@ -1,41 +1,31 @@
 //! Dose of seeds at many points: TG-43 once into a table over distance and angle, then four entries of it for each point.
 //!
-//! The table holds dose times r², which varies slowly, every eighth of a millimetre and every degree; the radii and angles at which
-//! TG-43 tables bend are among them. Nearer than [`DoseKernel::near_m`] and farther than 0.15 m the formulae themselves are used.
-//! What a seed gives to a point is rounded to 2^-30 Gy; sums of such numbers are exact, so that the order of seeds does not matter
-//! and a seed that is taken away leaves no trace.
+//! The table holds dose times r², which varies slowly. Nearer than 2.2 half lengths of the capsule or ten of its radii, and farther
+//! than 0.15 m, the formulae themselves are used. What a seed gives to a point is rounded to 2^-30 Gy; sums of such numbers are
+//! exact, so that the order of seeds does not matter and a seed that is taken away leaves no trace.
 
 use super::Seed;
 use super::decay::Interval;
 use super::source::Source;
 use super::tg43::{Formalism, Tables};
-use lanes::{Layout, Line};
-use rayon::prelude::*;
+use lanes::Line;
+use table::Table;
 
 mod lanes;
+mod table;
 
 /// Points that are worked on together; they stay in the first cache.
 pub const BLOCK: usize = 64;
-const STEPS_PER_M: f64 = 8000.0;
-const FARTHEST_M: f64 = 0.15;
 /// Beyond this many half lengths of the capsule the field times r² is nearly a straight line between two rows.
 const NEAR_HALF_LENGTHS: f64 = 2.2;
-/// Adding and taking away 3 * 2^-8 rounds a number below 2^-8 to 2^-30, its own last place, and larger ones to a multiple of that.
-const ROUNDER_GY: f32 = 3.0 / 256.0;
 
 /// Dose of a seed of 1 U over an interval.
 #[derive(Clone, Debug)]
 pub struct DoseKernel {
     tables: Tables,
     equivalent_s: f64,
-    /// Dose times r² (Gy m² for 1 U), rows over r, columns over the angle.
-    one_d: Vec<f32>,
-    two_d: Vec<f32>,
-    /// Number of the first row, in steps from the middle of the seed.
-    first_row: usize,
-    rows: usize,
-    /// One for each degree: 91, or 181 where the ends of the seed differ.
-    columns: usize,
+    one_d: Table,
+    two_d: Table,
 }
 
 /// A seed in the frame of the points it is added to.
@@ -63,39 +53,20 @@ impl Block {
 impl DoseKernel {
     pub fn new(source: &Source, interval: Interval) -> Self {
         let tables = source.tables.clone();
+        let equivalent_s = interval.equivalent_s(source.half_life_s);
         let half_length_m = tables.capsule.half_length_m.max(tables.active_length_m / 2.0);
         let near_m = (NEAR_HALF_LENGTHS * half_length_m).max(10.0 * tables.capsule.radius_m);
-        let first_row = (near_m * STEPS_PER_M).ceil() as usize;
-        let f = tables.anisotropy_2d.as_ref();
-        let two_ends = f.is_some_and(|f| f.columns_at.last() > Some(&90.0));
-        let mut kernel = Self {
-            equivalent_s: interval.equivalent_s(source.half_life_s),
-            one_d: Vec::new(),
-            two_d: Vec::new(),
-            first_row,
-            rows: ((FARTHEST_M * STEPS_PER_M) as usize).max(first_row) + 2 - first_row,
-            columns: if two_ends { 181 } else { 91 },
-            tables,
-        };
-        kernel.one_d = kernel.table(Formalism::OneD);
-        kernel.two_d = kernel.table(Formalism::TwoD);
-        kernel
-    }
-
-    fn table(&self, formalism: Formalism) -> Vec<f32> {
-        let of_row = |row: usize| {
-            let r_m = (self.first_row + row) as f64 / STEPS_PER_M;
-            (0..self.columns).map(move |degree| {
-                let (across, along) = (degree as f64).to_radians().sin_cos();
-                (self.exact_gy(formalism, r_m * across, r_m * along) * r_m * r_m) as f32
+        let table = |formalism| {
+            Table::new(&tables, formalism, near_m, |across_m, along_m| {
+                tables.rate_gy_per_s(formalism, across_m, along_m) * equivalent_s
             })
         };
-        (0..self.rows).into_par_iter().flat_map_iter(of_row).collect()
-    }
-
-    /// Points nearer than this to the middle of a seed get the formulae (m).
-    pub fn near_m(&self) -> f64 {
-        self.first_row as f64 / STEPS_PER_M
+        Self {
+            one_d: table(Formalism::OneD),
+            two_d: table(Formalism::TwoD),
+            tables,
+            equivalent_s,
+        }
     }
 
     /// Dose of 1 U by the formulae, for a point beside and along the axis.
@@ -133,39 +104,32 @@ impl DoseKernel {
 
     /// Adds the dose of seeds to at most [`BLOCK`] points; `sign` is 1, or -1 to take the seeds away.
     pub fn add(&self, seeds: &[Placed], points: &Block, sign: f64, dose_gy: &mut [f64]) {
-        let layout = Layout {
-            rows_per_m: STEPS_PER_M as f32,
-            first_row: self.first_row as f32,
-            rows: self.rows,
-            columns: self.columns,
-            squares_m2: self.squares(),
-        };
+        let mut sum_gy = [0.0; BLOCK];
         let mut gy = [0.0; BLOCK];
         for seed in seeds {
-            let table = match seed.formalism {
-                Formalism::OneD => &self.one_d,
-                Formalism::TwoD => &self.two_d,
-            };
-            if lanes::doses(table, &layout, &seed.line, points, &mut gy) {
+            let table = self.table(seed.formalism);
+            if lanes::doses(table, &seed.line, points, &mut gy) {
                 self.replace_by_exact(seed, points, &mut gy);
             }
-            for (dose, gy) in dose_gy.iter_mut().zip(gy) {
-                *dose += sign * f64::from((gy + ROUNDER_GY) - ROUNDER_GY);
-            }
+            lanes::add_rounded(&gy, &mut sum_gy);
+        }
+        for (dose, sum) in dose_gy.iter_mut().zip(sum_gy) {
+            *dose += sign * sum;
         }
     }
 
-    /// Squares of the distances (m²) between which the table is used.
-    fn squares(&self) -> [f32; 2] {
-        let square = |row: usize| (row as f64 / STEPS_PER_M).powi(2) as f32;
-        [square(self.first_row), square(self.first_row + self.rows - 1)]
+    fn table(&self, formalism: Formalism) -> &Table {
+        match formalism {
+            Formalism::OneD => &self.one_d,
+            Formalism::TwoD => &self.two_d,
+        }
     }
 
     #[cold]
     fn replace_by_exact(&self, seed: &Placed, points: &Block, gy: &mut [f32; BLOCK]) {
         let p = seed.line.position_m;
-        let [nearest, farthest] = self.squares().map(f64::from);
-        for i in 0..BLOCK {
+        let [nearest, farthest] = self.table(seed.formalism).squares_m2();
+        for (i, gy) in gy.iter_mut().enumerate() {
             let d = [points.x_m[i] - p[0], points.y_m[i] - p[1], points.z_m[i] - p[2]].map(f64::from);
             let square: f64 = d.iter().map(|d| d * d).sum();
             // Rounding may put a point on the other side here than in `doses`; both ways are right there.
@@ -174,7 +138,7 @@ impl DoseKernel {
             }
             let along: f64 = d.iter().zip(seed.line.axis).map(|(d, a)| d * f64::from(a)).sum();
             let across = (square - along * along).max(0.0).sqrt();
-            gy[i] = (self.exact_gy(seed.formalism, across, along) * f64::from(seed.line.strength_u)) as f32;
+            *gy = (self.exact_gy(seed.formalism, across, along) * f64::from(seed.line.strength_u)) as f32;
         }
     }
 }

@@ -131,7 +131,7 @@ fn seed_alone(found: &mut Found, needle: &Needle, seed: usize, place_m: [f64; 3]
     }
     let deeper = seed.checked_sub(1).map(|s| needle.seeds[s].along_m);
     if let Some(deeper_m) = deeper
-        && !(deeper_m - along_m >= SEED_LENGTH_M - SAME_M)
+        && !(SEED_LENGTH_M - SAME_M..).contains(&(deeper_m - along_m))
     {
         let apart = (deeper_m - along_m) * 1e3;
         let length = SEED_LENGTH_M * 1e3;
@@ -157,7 +157,7 @@ fn strand(found: &mut Found, needle: &Needle) {
     }
     let pitch_m = SEED_LENGTH_M + spacer_m;
     let off = |pair: &[NeedleSeed]| (pair[0].along_m - pair[1].along_m - pitch_m).abs();
-    if needle.seeds.windows(2).any(|pair| !(off(pair) <= SAME_M)) {
+    if needle.seeds.windows(2).any(|pair| !(..=SAME_M).contains(&off(pair))) {
         let pitch = pitch_m * 1e3;
         found.tell(&format!(
             "the seeds of its strand must lie {pitch:.1} mm apart; make it loose or load it anew"

@@ -18,7 +18,7 @@ const POINTS: usize = 100_000;
 const HELP: &str = "\
 Without --seeds the plan is modified peripheral loading: needles near the edge of the target, fewer inside, none near what is to
 be spared; the strength of a seed is the one with which 96 % of the target gets the prescription. With --seeds it is those of a
-table (columns as in 'host-ui dose --help'), put on needles by their lines.
+table (columns as in 'host-ui dose --help'), put on needles by their numbers, or by their lines where it has none.
 
 Units: mm, patient frame (RAS); strength in U (1 U = 1 cGy cm2/h).
 
@@ -103,7 +103,7 @@ impl PlanArgs {
     fn write(&self, plan: &ImplantPlan, frames: &Frames) -> Result<(), String> {
         file::write(&self.out, plan, frames)?;
         let Some(csv) = &self.csv else { return Ok(()) };
-        let text = file::seeds_to_csv(&plan.seeds(), frames);
+        let text = file::seeds_to_csv(plan, frames);
         std::fs::write(csv, text).map_err(|e| format!("{} cannot be written ({e})", csv.display()))
     }
 }

@@ -1,8 +1,7 @@
 //! Plans in files: TOML with everything, CSV with the seeds alone; mm, patient frame (RAS).
 
 use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, Template};
-use crate::dose::Seed;
-use crate::dose::files::{SeedDefaults, read_seeds};
+use crate::dose::files::{SeedDefaults, read_seed_rows};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -14,7 +13,7 @@ const MAX_NEEDLES: usize = 169;
 const MAX_MM: f64 = 10_000.0;
 /// Seeds whose lines are nearer than this are on one needle.
 const SAME_LINE_M: f64 = 0.5e-3;
-const HEADER: &str = "x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u";
+const HEADER: &str = "x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,needle,hole";
 
 /// The patient's frame and the scene's.
 #[derive(Clone, Copy, Debug)]
@@ -245,7 +244,7 @@ fn place(what: &str, mm: [f64; 3], problems: &mut Vec<String>) {
 }
 
 fn unit(what: &str, axis: [f64; 3], problems: &mut Vec<String>) {
-    if !((Vector3::from(axis).norm() - 1.0).abs() < 1e-3) {
+    if !(0.999..1.001).contains(&Vector3::from(axis).norm()) {
         problems.push(format!("{what} is {axis:?}, no unit vector"));
     }
 }
@@ -273,20 +272,23 @@ pub fn write(path: &Path, plan: &ImplantPlan, frames: &Frames) -> Result<(), Str
     std::fs::write(path, text).map_err(|e| format!("{} cannot be written ({e})", path.display()))
 }
 
-/// Seeds as `host-ui dose --seeds` reads them.
-pub fn seeds_to_csv(seeds: &[Seed], frames: &Frames) -> String {
+/// Seeds as `host-ui dose --seeds` reads them, with the number of their needle and its hole.
+pub fn seeds_to_csv(plan: &ImplantPlan, frames: &Frames) -> String {
     let mut text = format!("{HEADER}\n");
-    for seed in seeds {
-        let [x, y, z] = frames.to_patient_m(seed.position_m).map(|c| c * 1e3);
-        let axis = seed.axis.map(|a| frames.turned_to_patient(a));
-        let axis = axis.map_or_else(|| ",,".to_owned(), |[a, b, c]| format!("{a:.9},{b:.9},{c:.9}"));
-        text += &format!("{x:.6},{y:.6},{z:.6},{axis},{}\n", seed.strength_u);
+    for (number, needle) in (1..).zip(&plan.needles) {
+        let [a, b, c] = frames.turned_to_patient(needle.direction);
+        let hole = needle.hole.map_or_else(String::new, |h| h.to_string());
+        for (seed, place_m) in needle.seeds.iter().zip(needle.seeds_m()) {
+            let [x, y, z] = frames.to_patient_m(place_m).map(|c| c * 1e3);
+            let strength = seed.strength_u;
+            text += &format!("{x:.6},{y:.6},{z:.6},{a:.9},{b:.9},{c:.9},{strength},{number},{hole}\n");
+        }
     }
     text
 }
 
-/// Seeds of a CSV file as needles through a template: those on one line are on one needle, which goes along their axis, or along
-/// the template's where they have none.
+/// Seeds of a CSV file as needles through a template: those of one number are on one needle, and those without one where they are
+/// on one line, which goes along their axis, or along the template's where they have none.
 pub fn import_csv(
     path: &Path,
     defaults: SeedDefaults,
@@ -295,41 +297,75 @@ pub fn import_csv(
     source: &str,
     prescription_gy: f64,
 ) -> Result<ImplantPlan, String> {
-    let seeds = read_seeds(path, defaults)?;
-    if seeds.len() > MAX_SEEDS {
-        let count = seeds.len();
-        return Err(format!(
-            "{}: {count} seeds; at most {MAX_SEEDS} can be placed",
-            path.display()
-        ));
+    let told = |why: String| format!("{}: {why}", path.display());
+    let rows = read_seed_rows(path, defaults)?;
+    if rows.len() > MAX_SEEDS {
+        let count = rows.len();
+        return Err(told(format!("{count} seeds; at most {MAX_SEEDS} can be placed")));
     }
-    let mut needles: Vec<Needle> = Vec::new();
-    for seed in &seeds {
-        let place_m = frames.to_scene_m(seed.position_m);
-        let direction = seed
+    let mut needles: Vec<(Option<u32>, Needle)> = Vec::new();
+    let mut problems = Vec::new();
+    for row in &rows {
+        let place_m = frames.to_scene_m(row.seed.position_m);
+        let direction = row
+            .seed
             .axis
             .map_or(template.inwards, |a| inwards(&template, frames.turned_to_scene(a)));
-        let on_line = |n: &Needle| {
-            let along_m = n.along_m(place_m);
-            let off = Vector3::from(place_m) - Vector3::from(n.at_m(along_m));
-            off.norm() < SAME_LINE_M && Vector3::from(n.direction).dot(&Vector3::from(direction)) > 0.999
+        let is_its = |(number, needle): &(Option<u32>, Needle)| {
+            *number == row.needle && (number.is_some() || is_on_line(needle, place_m, direction))
         };
-        let number = needles.iter().position(on_line).unwrap_or_else(|| {
-            needles.push(through(&template, place_m, direction));
+        let at = needles.iter().position(is_its).unwrap_or_else(|| {
+            needles.push((row.needle, through(&template, place_m, direction)));
             needles.len() - 1
         });
-        let along_m = needles[number].along_m(place_m);
-        needles[number].seeds.push(NeedleSeed {
+        let (number, needle) = &mut needles[at];
+        if let Err(why) = fits(needle, row.hole.as_deref(), place_m, direction, &template) {
+            let needle = number.map_or_else(String::new, |n| format!("needle {n}: "));
+            problems.push(format!("{needle}{why}"));
+        }
+        let along_m = needle.along_m(place_m);
+        needle.seeds.push(NeedleSeed {
             along_m,
-            strength_u: seed.strength_u,
+            strength_u: row.seed.strength_u,
         });
+    }
+    problems.dedup();
+    if !problems.is_empty() {
+        return Err(told(problems.join("\n")));
     }
     Ok(ImplantPlan {
         template,
         source: source.to_owned(),
         prescription_gy,
-        needles: needles.into_iter().map(Needle::in_order).collect(),
+        needles: needles.into_iter().map(|(_, needle)| needle.in_order()).collect(),
     })
+}
+
+fn is_on_line(needle: &Needle, place_m: [f64; 3], direction: [f64; 3]) -> bool {
+    let off = Vector3::from(place_m) - Vector3::from(needle.at_m(needle.along_m(place_m)));
+    off.norm() < SAME_LINE_M && Vector3::from(needle.direction).dot(&Vector3::from(direction)) > 0.999
+}
+
+/// What a file says of a needle against where its seeds are.
+fn fits(
+    needle: &Needle,
+    hole: Option<&str>,
+    place_m: [f64; 3],
+    direction: [f64; 3],
+    template: &Template,
+) -> Result<(), String> {
+    if !is_on_line(needle, place_m, direction) {
+        return Err("its seeds are not on one line; correct them, or leave the column needle out".to_owned());
+    }
+    let Some(hole) = hole else { return Ok(()) };
+    let off = Vector3::from(template.hole_m(hole.parse()?)) - Vector3::from(needle.entry_m);
+    if off.norm() < SAME_LINE_M {
+        return Ok(());
+    }
+    Err(format!(
+        "its seeds are {:.1} mm beside hole {hole} of the template before this scene; correct them, or leave the column hole out",
+        off.norm() * 1e3
+    ))
 }
 
 /// A seed has no front: its axis is taken the way that needles go.

@@ -1,7 +1,7 @@
 //! A plan written and read is the same plan; a broken one is refused with everything that is wrong.
 
 use super::*;
-use crate::dose::files::SeedDefaults;
+use crate::dose::files::{SeedDefaults, read_seeds};
 
 /// A quarter turn about x, and a shift: patient y is the scene's -z.
 fn frames() -> Frames {
@@ -90,7 +90,7 @@ fn seeds_written_for_the_dose_command_are_the_same_seeds_when_they_are_read_and_
     let folder = std::env::temp_dir().join(format!("stylet-plan-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let file = folder.join("seeds.csv");
-    std::fs::write(&file, seeds_to_csv(&plan().seeds(), &frames())).unwrap();
+    std::fs::write(&file, seeds_to_csv(&plan(), &frames())).unwrap();
     let read = read_seeds(&file, SeedDefaults::default()).unwrap();
     for (a, b) in plan().seeds().iter().zip(&read) {
         let there = frames().to_patient_m(a.position_m);
@@ -104,4 +104,53 @@ fn seeds_written_for_the_dose_command_are_the_same_seeds_when_they_are_read_and_
     let imported = import_csv(&file, SeedDefaults::default(), &frames(), plan.template, "6711", 145.0).unwrap();
     same(&plan, &imported);
     std::fs::remove_dir_all(&folder).unwrap();
+}
+
+/// What `import_csv` makes of a table.
+fn imported(name: &str, csv: &str) -> Result<ImplantPlan, String> {
+    let file = std::env::temp_dir().join(format!("stylet-plan-{name}-{}.csv", std::process::id()));
+    std::fs::write(&file, csv).unwrap();
+    let plan = import_csv(
+        &file,
+        SeedDefaults::default(),
+        &frames(),
+        plan().template,
+        "6711",
+        145.0,
+    );
+    std::fs::remove_file(&file).unwrap();
+    plan
+}
+
+#[test]
+fn two_needles_through_one_hole_stay_two_in_a_table() {
+    let plan = plan().with_needle("C3".parse().unwrap(), 0.06).unwrap();
+    let mut plan = plan.with_seed(2, 0.061, 0.5).unwrap();
+    let (hole, entry_m) = (plan.needles[1].hole, plan.needles[1].entry_m);
+    (plan.needles[2].hole, plan.needles[2].entry_m) = (hole, entry_m);
+    let csv = seeds_to_csv(&plan, &frames());
+    assert!(csv.starts_with("x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,needle,hole\n"));
+    assert!(csv.ends_with(",0.5,3,I9\n"), "{csv}");
+    same(&plan, &imported("two", &csv).unwrap());
+    // Without the numbers the line decides, and the hole is found by it.
+    let lines = csv.lines().map(|line| line.rsplitn(3, ',').last().unwrap());
+    let by_line = imported("lines", &lines.collect::<Vec<_>>().join("\n")).unwrap();
+    let holes: Vec<_> = by_line.needles.iter().map(|n| n.hole.unwrap().to_string()).collect();
+    assert_eq!(holes, ["E7", "I9"]);
+    assert_eq!(by_line.needles[1].seeds.len(), 3);
+}
+
+#[test]
+fn a_table_whose_needles_contradict_its_places_is_refused() {
+    let csv = seeds_to_csv(&plan(), &frames());
+    for (from, to, told) in [
+        (",2,I9", ",1,E7", "needle 1: its seeds are not on one line"),
+        (",2,I9", ",2,J9", "needle 2: its seeds are 5.0 mm beside hole J9"),
+        (",2,I9", ",2,Z9", "needle 2: \"Z9\" is no hole"),
+        (",2,I9", ",0,I9", "needle is \"0\", not a whole number from 1"),
+        (",2,I9", ",two,I9", "needle is \"two\""),
+    ] {
+        let why = imported("wrong", &csv.replace(from, to)).unwrap_err();
+        assert!(why.contains(told), "{told}: {why}");
+    }
 }

@@ -110,7 +110,7 @@ impl Template {
         let count = |axis: [f64; 3]| (off.dot(&Vector3::from(axis)) / self.pitch_m).round() + f64::from(HOLES / 2);
         let (u, v) = (count(self.columns), count(self.rows));
         let fits = |n: f64| (0.0..f64::from(HOLES)).contains(&n);
-        (fits(u) && fits(v)).then(|| Hole {
+        (fits(u) && fits(v)).then_some(Hole {
             column: u as u8,
             row: v as u8,
         })

@@ -134,7 +134,7 @@ impl Marks {
         let (tip, force) = (single(tip_m), single(force_n));
         let size = force.norm();
         // A force that is not a number is not drawn either.
-        if !(size >= LEAST_N) {
+        if !(LEAST_N..).contains(&size) {
             return;
         }
         let axis = force / size;

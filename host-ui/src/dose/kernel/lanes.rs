@@ -2,19 +2,9 @@
 //!
 //! No product and sum are fused, so every machine gives the same bits.
 
+use super::table::{CM2_PER_M2, Table};
 use super::{BLOCK, Block};
 use multiversion::multiversion;
-
-/// How the table is laid out.
-#[derive(Clone, Copy, Debug)]
-pub struct Layout {
-    pub rows_per_m: f32,
-    pub first_row: f32,
-    pub rows: usize,
-    pub columns: usize,
-    /// Squares of the distances (m²) from and below which the table is used.
-    pub squares_m2: [f32; 2],
-}
 
 /// One seed, from the same place as the points.
 #[derive(Clone, Copy, Debug)]
@@ -24,21 +14,30 @@ pub struct Line {
     pub strength_u: f32,
 }
 
+/// Adding and taking away 3 * 2^-8 rounds a number below 2^-8 to 2^-30, its own last place, and larger ones to a multiple of that.
+const ROUNDER_GY: f32 = 3.0 / 256.0;
+/// Added to a number above 0.5, this leaves its whole part in the last bits; the share that remains is 1 where it might be 0.
+const WHOLE: f32 = TWO_TO_23 - 0.5;
 const TWO_TO_23: f32 = 8_388_608.0;
 const MANTISSA: u32 = 0x007f_ffff;
 
 /// Dose of a seed at the points of a block (Gy); whether some of them lie outside the table and have got a wrong one.
-#[multiversion(targets = "simd")]
-pub fn doses(table: &[f32], layout: &Layout, seed: &Line, points: &Block, gy: &mut [f32; BLOCK]) -> bool {
-    assert!(layout.rows >= 2 && layout.columns >= 2 && table.len() == layout.rows * layout.columns);
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.2",
+    "aarch64+neon"
+))]
+pub fn doses(table: &Table, seed: &Line, points: &Block, gy: &mut [f32; BLOCK]) -> bool {
     let (p, axis) = (seed.position_m, seed.axis);
-    let [nearest, farthest] = layout.squares_m2;
-    let (last_row, last_column) = ((layout.rows - 2) as f32, (layout.columns - 2) as f32);
-    let two_ends = layout.columns > 91;
-    let columns = layout.columns as u32;
+    let (entries, columns, share_bits) = (table.entries(), table.columns as u32, table.share_bits);
+    let most = table.last_key - table.first_key - 1;
+    assert!(columns >= 2 && entries.len() == ((most >> share_bits) as usize + 2) * table.columns);
+    let last_column = TWO_TO_23 + (columns - 2) as f32;
+    let half_turn = table.half_turn.unwrap_or(0.0);
     let mut cell = [0_u32; BLOCK];
     let (mut down, mut along_row, mut scale) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK], [0.0_f32; BLOCK]);
-    let mut outside = 0_u32;
+    let mut outside = 0;
     for i in 0..BLOCK {
         let (x, y, z) = (points.x_m[i] - p[0], points.y_m[i] - p[1], points.z_m[i] - p[2]);
         let square = x * x + y * y + z * z;
@@ -49,32 +48,58 @@ pub fn doses(table: &[f32], layout: &Layout, seed: &Line, points: &Block, gy: &m
             z * axis[0] - x * axis[2],
             x * axis[1] - y * axis[0],
         );
-        let across_square = cx * cx + cy * cy + cz * cz;
-        outside |= u32::from(square < nearest) | u32::from(square >= farthest);
-        let square = lower(higher(square, nearest), farthest);
-        let inverse = 1.0 / square;
-        let r = square.sqrt();
-        let cosine = lower(along.abs() * (r * inverse), 1.0);
-        let deg = angle_deg(cosine, lower(across_square * inverse, 1.0));
-        let deg = if two_ends && along < 0.0 { 180.0 - deg } else { deg };
-        let row_at = r * layout.rows_per_m - layout.first_row;
-        let (row, column) = (whole(row_at, last_row), whole(deg, last_column));
-        down[i] = row_at - (row - TWO_TO_23);
-        along_row[i] = deg - (column - TWO_TO_23);
-        cell[i] = (row.to_bits() & MANTISSA) * columns + (column.to_bits() & MANTISSA);
-        scale[i] = seed.strength_u * inverse;
+        let inverse = 1.0 / square.sqrt();
+        let sine = (cx * cx + cy * cy + cz * cz).sqrt() * inverse;
+        let at = angle(along.abs() * inverse, sine) * table.columns_per_rad;
+        let at = if table.half_turn.is_some() && along < 0.0 {
+            half_turn - at
+        } else {
+            at
+        };
+        let column = lower(higher(at + WHOLE, TWO_TO_23), last_column);
+        along_row[i] = at - (column - TWO_TO_23);
+
+        let past = (square * CM2_PER_M2).to_bits().wrapping_sub(table.first_key) as i32;
+        let key = past.max(0).min(most as i32);
+        outside |= past ^ key;
+        let key = key as u32;
+        // As the digits of a number from 1 to 2.
+        let share = ((key << (23 - share_bits)) & MANTISSA) | 1.0_f32.to_bits();
+        down[i] = f32::from_bits(share) - 1.0;
+        cell[i] = (key >> share_bits) * columns + (column.to_bits() & MANTISSA);
+        scale[i] = seed.strength_u * (inverse * inverse);
     }
     for i in 0..BLOCK {
         let first = cell[i] as usize;
-        // SAFETY: `whole` bounds the row by rows - 2 and the column by columns - 2, whatever number it gets, so the cell and its
-        // neighbours to the right, below and below to the right lie in the table, whose length is checked above.
-        let at = |offset: usize| unsafe { *table.get_unchecked(first + offset) };
-        let near = at(0) + along_row[i] * (at(1) - at(0));
-        let (below, below_right) = (at(layout.columns), at(layout.columns + 1));
-        let far = below + along_row[i] * (below_right - below);
+        // SAFETY: `key` lies in a row before the last and `column` before the last one, whatever numbers they were made of, so the
+        // cell and its neighbours to the right, below and below to the right are entries, whose number is checked above.
+        let pair = |at: usize| unsafe { entries.as_ptr().add(at).cast::<u64>().read_unaligned() };
+        let [left, right] = halves(pair(first));
+        let near = left + along_row[i] * (right - left);
+        let [left, right] = halves(pair(first + columns as usize));
+        let far = left + along_row[i] * (right - left);
         gy[i] = (near + down[i] * (far - near)) * scale[i];
     }
     outside != 0
+}
+
+/// Adds doses, rounded.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.2",
+    "aarch64+neon"
+))]
+pub fn add_rounded(gy: &[f32; BLOCK], sum_gy: &mut [f64; BLOCK]) {
+    for (sum, gy) in sum_gy.iter_mut().zip(gy) {
+        *sum += f64::from((gy + ROUNDER_GY) - ROUNDER_GY);
+    }
+}
+
+/// Two entries that were loaded as one number.
+#[inline(always)]
+fn halves(pair: u64) -> [f32; 2] {
+    bytemuck::cast(pair)
 }
 
 /// As one instruction, unlike `f32::max`; the second where the first is not a number.
@@ -88,31 +113,21 @@ fn lower(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// The whole part of a number from 0, at most `most`, plus 2^23: then it stands in the last bits.
-///
-/// A whole number itself may come out one less; the share that is left is 1 then, which means the same place.
+/// Angle (rad, 0 to a quarter turn) from its cosine and sine: acos(c) / sqrt(1 - c²) as a polynomial, wrong by 2.4e-6 rad at most.
 #[inline(always)]
-fn whole(value: f32, most: f32) -> f32 {
-    lower(higher((value - 0.5) + TWO_TO_23, TWO_TO_23), TWO_TO_23 + most)
-}
-
-/// From the cosine (0 to 1) and the square of the sine; Abramowitz and Stegun 4.4.46, wrong by 2e-8 rad at most.
-#[inline(always)]
-fn angle_deg(cosine: f32, sine_square: f32) -> f32 {
-    const TERMS: [f32; 8] = [
-        -0.001_262_491_1,
-        0.006_670_09,
-        -0.017_088_126,
-        0.030_891_88,
-        -0.050_174_305,
-        0.088_978_99,
-        -0.214_598_8,
-        std::f32::consts::FRAC_PI_2,
+fn angle(cosine: f32, sine: f32) -> f32 {
+    const TERMS: [f32; 7] = [
+        0.049_507_12,
+        -0.214_407_23,
+        0.440_749,
+        -0.626_952_2,
+        0.780_058,
+        -0.999_724_4,
+        1.570_794,
     ];
     let mut polynomial = 0.0;
     for term in TERMS {
         polynomial = polynomial * cosine + term;
     }
-    // The root of 1 - cosine, with its digits.
-    (sine_square / (1.0 + cosine)).sqrt() * polynomial * (180.0 / std::f32::consts::PI)
+    sine * polynomial
 }

@@ -223,7 +223,7 @@ fn uniform(body: &Body, plane: &Plane) -> SliceUniform {
     let steps = if body.at_rest { 0.0 } else { STEPS as f32 };
     let grain = [0, 1, 2].map(|a| {
         let along = body.scene_from_patient.column(a) / (f64::from(GRAIN_M[a]) * GRAINS as f64);
-        four(along.into(), 0.0)
+        four(along, 0.0)
     });
     SliceUniform {
         middle_m: four(plane.middle_m, LARGEST_AMPLITUDE),
