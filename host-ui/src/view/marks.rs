@@ -99,6 +99,27 @@ impl Marks {
         }
     }
 
+    /// A seed of a needle that is not at work: the same wire sphere in thin lines, since there may be a hundred.
+    pub fn planned_seed_thin(&mut self, center_m: [f64; 3], direction: [f64; 3]) {
+        const STEPS: usize = 16;
+        let (center, axis) = (single(center_m), unit_or_z(single(direction)));
+        let (u, v) = frame_about(axis);
+        for (a, b) in [(u, v), (axis, u), (axis, v)] {
+            let at = |step: usize| {
+                let (s, c) = (std::f32::consts::TAU * step as f32 / STEPS as f32).sin_cos();
+                center + (a * c + b * s) * RING_RADIUS_M
+            };
+            for step in 0..STEPS {
+                self.line(at(step), at(step + 1), self.tokens.seed_planned);
+            }
+        }
+    }
+
+    /// Where a needle that is not at work goes.
+    pub fn path_thin(&mut self, from_m: [f64; 3], to_m: [f64; 3]) {
+        self.line(single(from_m), single(to_m), self.tokens.path);
+    }
+
     pub fn path(&mut self, from_m: [f64; 3], to_m: [f64; 3]) {
         let (from, to) = (single(from_m), single(to_m));
         let length = (to - from).norm().min(1.0);
@@ -300,6 +321,8 @@ mod tests {
         marks.placed_seed([1.0; 3], [0.0; 3]);
         marks.planned_seed([0.0; 3], [0.0; 3]);
         marks.path([0.0; 3], [0.0; 3]);
+        marks.planned_seed_thin([0.0; 3], [0.0; 3]);
+        marks.path_thin([0.0; 3], [0.0; 3]);
         marks.ground([-20.0; 3], [20.0; 3]);
         marks.force([0.0; 3], [f64::NAN; 3]);
         marks.force([0.0; 3], [100.0, 0.0, 0.0]);
