@@ -81,6 +81,12 @@ impl App {
 
     /// All needles of the plan; without one, one through the middle.
     pub(super) fn run_all(&mut self) {
+        if self.planner.is_busy() {
+            self.shown.note = Some(refusal(
+                "Wait for what is done for the plan, or cancel it first.".to_owned(),
+            ));
+            return;
+        }
         let tasks = self.planner.tasks();
         if !tasks.is_empty() {
             self.planner.begin_anew();

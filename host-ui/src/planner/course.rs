@@ -32,7 +32,12 @@ impl Course {
         self.first_seed.len()
     }
 
-    /// Needles that can no longer be changed.
+    /// All that have begun are done.
+    pub fn is_done(&self) -> bool {
+        self.begun() > 0 && self.is_done
+    }
+
+    /// Needles that are done.
     pub fn done(&self) -> usize {
         self.begun() - usize::from(self.begun() > 0 && !self.is_done)
     }

@@ -104,12 +104,14 @@ pub fn is_before_needles(shown: &Shown) -> bool {
 
 /// All its seeds are dropped and its tip is outside.
 pub fn is_needle_done(shown: &Shown) -> bool {
-    shown.planning.at_work().is_some() && shown.next_seed_m().is_none() && shown.path_depth_m().is_some_and(is_out_at)
+    let is_out = shown.path_depth_m().is_some_and(is_out_at);
+    // One that was taken back leaves no path, and those before it are done.
+    shown.planning.course.is_done() || (shown.planning.at_work().is_some() && shown.next_seed_m().is_none() && is_out)
 }
 
 /// The needle at work is outside, whatever it has dropped.
 pub fn can_leave_needle(shown: &Shown) -> bool {
-    shown.planning.next_needle().is_some() && shown.path_depth_m().is_some_and(is_out_at)
+    shown.planning.next_needle().is_some() && shown.path_depth_m().is_none_or(is_out_at)
 }
 
 /// What is missing before `step` can be done; `None` when nothing is.

@@ -121,12 +121,13 @@ fn strength_ui(ui: &mut egui::Ui, implant: &Implant, free: bool, actions: &mut V
             .speed(0.005)
             .fixed_decimals(3)
             .update_while_editing(false)
+            .clamp_existing_to_range(false)
             .suffix(" U");
         let response = ui.add_enabled(free, value).labelled_by(label.id);
         if response.changed() && strength_u != first.strength_u {
             actions.push(Action::Plan(PlanAction::SetStrength(strength_u)));
         }
-        let fit = ui.add_enabled(free, Button::new("Fit to the target"));
+        let fit = ui.add_enabled(free, Button::new("Fit dose"));
         if fit
             .on_hover_text("The strength with which 96 % of the target gets the prescription")
             .clicked()

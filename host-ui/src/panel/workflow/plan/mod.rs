@@ -90,7 +90,7 @@ fn head_ui(ui: &mut egui::Ui, implant: &Implant, actions: &mut Vec<Action>) {
                 actions.push(Action::Undo);
             }
             if ui
-                .button("From the perineum")
+                .button("Perineum view")
                 .on_hover_text("The 3D view looks through the template, as this panel does")
                 .clicked()
             {

@@ -119,13 +119,14 @@ fn millimetres(value: &mut f64, range: std::ops::RangeInclusive<f64>) -> DragVal
         .range(range)
         .speed(0.1)
         .fixed_decimals(1)
-        .clamp_existing_to_range(false)
         .suffix(" mm")
 }
 
 fn labelled(ui: &mut egui::Ui, name: &str, value: DragValue<'_>) {
     let label = ui.label(theme::small(name));
-    ui.add(value.update_while_editing(false)).labelled_by(label.id);
+    // What a file says stays as it is until a hand changes it.
+    let value = value.clamp_existing_to_range(false).update_while_editing(false);
+    ui.add(value).labelled_by(label.id);
 }
 
 fn move_ui(ui: &mut egui::Ui, implant: &Implant, number: usize, state: &mut PlanState, actions: &mut Vec<Action>) {
