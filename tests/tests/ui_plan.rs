@@ -249,11 +249,11 @@ fn compensation_tells_how_far_it_is_and_can_be_ended() {
     assert_eq!(task.drops.along_m[0], planned.needles[0].depth_m);
 }
 
-/// Rows of five and four holes about the middle.
+/// About the middle, and one at the edge, where seeds lie outside the target.
 fn twenty() -> Vec<String> {
-    let columns = ["D", "E", "F", "G", "H", "I", "J"];
+    let columns = ["D", "E", "F", "G", "H", "I", "J", "L"];
     let rows: [(u8, &[usize]); 5] = [
-        (5, &[1, 2, 4, 5]),
+        (5, &[1, 2, 4, 7]),
         (6, &[0, 2, 4, 6]),
         (7, &[0, 1, 5, 6]),
         (8, &[0, 2, 4, 6]),

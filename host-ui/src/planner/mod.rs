@@ -90,6 +90,10 @@ impl Planner {
         if self.course.is_undone(seeds) {
             self.set_course(Course::default());
         }
+        self.show();
+    }
+
+    fn show(&mut self) {
         if self.shown_revision != self.revision {
             self.shown_revision = self.revision;
             self.implant = self.history.as_ref().map(|history| {
@@ -452,3 +456,6 @@ impl Planner {
         self.set_course(Course::default());
     }
 }
+
+#[cfg(test)]
+mod tests;

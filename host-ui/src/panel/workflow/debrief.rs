@@ -11,11 +11,11 @@ const TABLE_HEIGHT: f32 = 150.0;
 
 pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown) {
     seeds_ui(ui, shown, &all_errors(shown));
-    dose_ui(ui, shown, "The dose is computed once seeds lie in the tissue.");
+    dose_ui(ui, shown, 80.0, "The dose is computed once seeds lie in the tissue.");
 }
 
-/// Figures and histogram of the seeds that lie in the tissue or are planned.
-pub fn dose_ui(ui: &mut egui::Ui, shown: &Shown, otherwise: &str) {
+/// Figures and histogram, so high, of the seeds that lie in the tissue or are planned.
+pub fn dose_ui(ui: &mut egui::Ui, shown: &Shown, height: f32, otherwise: &str) {
     let Some(dose) = &shown.dose else {
         ui.label(theme::small(shown.dose_trouble.unwrap_or(otherwise)));
         return;
@@ -34,7 +34,7 @@ pub fn dose_ui(ui: &mut egui::Ui, shown: &Shown, otherwise: &str) {
                 figure_ui(ui, figure);
             }
         });
-    dvh_ui(ui, dose);
+    dvh_ui(ui, dose, height);
 }
 
 fn figure_ui(ui: &mut egui::Ui, figure: &Figure) {
@@ -60,12 +60,12 @@ fn figure_ui(ui: &mut egui::Ui, figure: &Figure) {
     ui.end_row();
 }
 
-fn dvh_ui(ui: &mut egui::Ui, dose: &DosePicture) {
+fn dvh_ui(ui: &mut egui::Ui, dose: &DosePicture, height: f32) {
     let tokens = theme::of(ui);
     ui.label(theme::small("Target: volume over dose, both in %"));
     let points: Vec<[f64; 2]> = dose.target_dvh.iter().map(|[x, y]| [x * 100.0, y * 100.0]).collect();
     Plot::new("dvh")
-        .height(80.0)
+        .height(height)
         .allow_drag(false)
         .allow_zoom(false)
         .allow_scroll(false)

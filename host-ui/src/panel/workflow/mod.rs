@@ -170,9 +170,11 @@ fn step_ui(
         head_ui(ui, (step, now), shown);
         let blocked = missing(shown, step);
         match &blocked {
-            Some(why) => ui.label(RichText::new(format!("Missing: {why}.")).color(tokens.warn)),
-            None => ui.label(theme::weak(what(step, shown))),
-        };
+            Some(why) => drop(ui.label(RichText::new(format!("Missing: {why}.")).color(tokens.warn))),
+            // The summary of the plan stands there.
+            None if step == Progress::Plan && shown.planning.implant.is_some() => {}
+            None => drop(ui.label(theme::weak(what(step, shown)))),
+        }
         let ready = blocked.is_none() && !shown.running;
         match step {
             Progress::Scene => scene::scene_ui(ui, shown, state, actions),
@@ -189,7 +191,6 @@ fn step_ui(
 fn what(step: Progress, shown: &Shown) -> String {
     match step {
         Progress::Scene => "A built-in scene, or a segmented volume of your own.".to_owned(),
-        Progress::Plan if shown.planning.implant.is_some() => "Its needles are at the right.".to_owned(),
         Progress::Plan => "Five seeds along one needle through the gland.".to_owned(),
         Progress::Place => {
             let which = plan::at_work(shown).map_or_else(String::new, |text| text + " ");

@@ -6,7 +6,7 @@ use crate::format;
 use crate::panel::workflow::Undo;
 use crate::panel::{Action, PlanAction, Shown};
 use crate::plan::check::STRENGTHS_U;
-use crate::planner::Implant;
+use crate::planner::{Implant, Progress};
 use crate::theme;
 use egui::{Button, DragValue};
 use std::path::PathBuf;
@@ -17,10 +17,13 @@ pub fn plan_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, read
         None => begin_ui(ui, shown, (ready, free), actions),
         Some(implant) => implant_ui(ui, shown, implant, free, actions),
     }
-    work_ui(ui, shown, actions);
-    file_ui(ui, shown, state, free, actions);
+    // What cannot be done meanwhile makes room for how far it is.
+    match &shown.planning.work {
+        Some(work) => work_ui(ui, work, actions),
+        None => file_ui(ui, shown, state, free, actions),
+    }
     if shown.planning.implant.is_some() {
-        debrief::dose_ui(ui, shown, "The dose is computed once the plan has seeds.");
+        debrief::dose_ui(ui, shown, 60.0, "The dose is computed once the plan has seeds.");
     }
 }
 
@@ -93,7 +96,9 @@ fn implant_ui(ui: &mut egui::Ui, shown: &Shown, implant: &Implant, free: bool, a
         }
     });
     compensated_ui(ui, implant);
-    strength_ui(ui, implant, free && waits, actions);
+    if shown.planning.work.is_none() {
+        strength_ui(ui, implant, free && waits, actions);
+    }
 }
 
 fn compensated_ui(ui: &mut egui::Ui, implant: &Implant) {
@@ -103,7 +108,7 @@ fn compensated_ui(ui: &mut egui::Ui, implant: &Implant) {
     }
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
     let text = format!(
-        "{} of {} needles compensated, mean error {:.2} mm",
+        "{} of {} needles compensated, to {:.2} mm",
         errors.len(),
         implant.plan.needles.len(),
         format::mm(mean)
@@ -137,8 +142,7 @@ fn strength_ui(ui: &mut egui::Ui, implant: &Implant, free: bool, actions: &mut V
     });
 }
 
-fn work_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
-    let Some(work) = &shown.planning.work else { return };
+fn work_ui(ui: &mut egui::Ui, work: &Progress, actions: &mut Vec<Action>) {
     match work.share {
         Some(share) => {
             ui.add(egui::Label::new(theme::small(&work.what)).truncate());
@@ -168,7 +172,7 @@ fn cancel_ui(ui: &mut egui::Ui, actions: &mut Vec<Action>) {
 
 fn file_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bool, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
-        let hint = "plan file, or drop one here";
+        let hint = "or drop a file";
         let edit = egui::TextEdit::singleline(&mut state.plan.path)
             .hint_text(hint)
             .desired_width(ui.available_width() - 126.0);

@@ -10,10 +10,10 @@ use egui::{Align2, FontId, Pos2, Rect, Sense, Vec2};
 const ROW: f32 = 19.0;
 /// At least so many rows can be seen at once.
 const LEAST_ROWS: f32 = 4.0;
-/// Left for the findings under it.
-const BELOW: f32 = 104.0;
+/// Left for the findings under it, where there are any and where there are none.
+const BELOW: [f32; 2] = [104.0, 40.0];
 /// Left edges: number, hole, seeds, loading, depth, state.
-const COLUMNS: [f32; 6] = [22.0, 50.0, 84.0, 122.0, 184.0, 244.0];
+const COLUMNS: [f32; 6] = [22.0, 50.0, 84.0, 122.0, 174.0, 246.0];
 
 pub fn list_ui(ui: &mut egui::Ui, implant: &Implant, state: &mut PlanState) {
     let tokens = theme::of(ui);
@@ -27,7 +27,9 @@ pub fn list_ui(ui: &mut egui::Ui, implant: &Implant, state: &mut PlanState) {
         let font = FontId::proportional(11.5);
         ui.painter().text(at, Align2::LEFT_CENTER, name, font, tokens.weak);
     }
-    let rows = ((ui.available_height() - BELOW) / ROW).floor().max(LEAST_ROWS);
+    let is_good = implant.problems.as_ref().is_none_or(|p| p.is_empty());
+    let below = BELOW[usize::from(is_good)];
+    let rows = ((ui.available_height() - below) / ROW).floor().max(LEAST_ROWS);
     ui.spacing_mut().item_spacing.y = 0.0;
     let chosen = state.needle(&implant.plan);
     egui::ScrollArea::vertical()
@@ -49,6 +51,10 @@ pub fn list_ui(ui: &mut egui::Ui, implant: &Implant, state: &mut PlanState) {
 fn row_ui(ui: &mut egui::Ui, implant: &Implant, number: usize, is_chosen: bool, state: &mut PlanState) {
     let (tokens, needle) = (theme::of(ui), &implant.plan.needles[number]);
     let (id, rect) = ui.allocate_space(Vec2::new(ui.available_width(), ROW));
+    if is_chosen && state.listed != Some(number) {
+        state.listed = Some(number);
+        ui.scroll_to_rect_animation(rect, None, egui::style::ScrollAnimation::none());
+    }
     // A row that is mostly cut off is none.
     if ui.clip_rect().expand(0.5).intersect(rect).height() < ROW - 1.0 {
         return;

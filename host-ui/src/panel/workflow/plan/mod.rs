@@ -24,6 +24,8 @@ pub struct PlanState {
     by_hand: Option<usize>,
     /// Of the outlines, from the template's face; `None` until it is set.
     depth_m: Option<f64>,
+    /// The needle that the list was last moved to.
+    listed: Option<usize>,
 }
 
 impl Default for PlanState {
@@ -33,6 +35,7 @@ impl Default for PlanState {
             hole: Hole::middle(),
             by_hand: None,
             depth_m: None,
+            listed: None,
         }
     }
 }
