@@ -99,18 +99,22 @@ impl Marks {
         }
     }
 
-    /// A seed of a needle that is not at work: the same wire sphere in thin lines, since there may be a hundred.
-    pub fn planned_seed_thin(&mut self, center_m: [f64; 3], direction: [f64; 3]) {
-        const STEPS: usize = 16;
-        let (center, axis) = (single(center_m), unit_or_z(single(direction)));
+    /// Seeds of needles that are not at work: the same wire sphere in thin lines, since there may be a hundred.
+    pub fn planned_seeds_thin(&mut self, centers_m: impl Iterator<Item = [f64; 3]>, direction: [f64; 3]) {
+        const STEPS: usize = 12;
+        let axis = unit_or_z(single(direction));
         let (u, v) = frame_about(axis);
-        for (a, b) in [(u, v), (axis, u), (axis, v)] {
-            let at = |step: usize| {
+        let about = |(a, b): (V, V)| {
+            let at = move |step: usize| {
                 let (s, c) = (std::f32::consts::TAU * step as f32 / STEPS as f32).sin_cos();
-                center + (a * c + b * s) * RING_RADIUS_M
+                (a * c + b * s) * RING_RADIUS_M
             };
-            for step in 0..STEPS {
-                self.line(at(step), at(step + 1), self.tokens.seed_planned);
+            (0..STEPS).map(move |step| [at(step), at(step + 1)])
+        };
+        let sphere: Vec<[V; 2]> = [(u, v), (axis, u), (axis, v)].into_iter().flat_map(about).collect();
+        for center in centers_m.map(single) {
+            for [from, to] in &sphere {
+                self.line(center + from, center + to, self.tokens.seed_planned);
             }
         }
     }
@@ -321,7 +325,7 @@ mod tests {
         marks.placed_seed([1.0; 3], [0.0; 3]);
         marks.planned_seed([0.0; 3], [0.0; 3]);
         marks.path([0.0; 3], [0.0; 3]);
-        marks.planned_seed_thin([0.0; 3], [0.0; 3]);
+        marks.planned_seeds_thin([[0.0; 3]].into_iter(), [0.0; 3]);
         marks.path_thin([0.0; 3], [0.0; 3]);
         marks.ground([-20.0; 3], [20.0; 3]);
         marks.force([0.0; 3], [f64::NAN; 3]);

@@ -394,9 +394,7 @@ fn collect_fixed(marks: &mut Marks, shown: &Shown, look: Look, tokens: &'static 
     {
         if Some(number) != at_work {
             marks.path_thin(needle.entry_m, needle.at_m(needle.depth_m));
-            needle
-                .seeds_m()
-                .for_each(|place_m| marks.planned_seed_thin(place_m, needle.direction));
+            marks.planned_seeds_thin(needle.seeds_m(), needle.direction);
         }
     }
     let is_other = shown.planning.waits();
