@@ -1,9 +1,10 @@
-//! Dose of the seeds that lie in the tissue, computed on a thread of its own whenever they have changed.
+//! Dose of the seeds that lie in the tissue or are planned, computed on a thread of its own whenever they have changed.
 
 use crate::dose::decay::Interval;
 use crate::dose::isodose::isodose;
 use crate::dose::{DoseGrid, DoseKernel, DosePoints, Dvh, Metric, Seed, Source};
 use crate::link::SceneModel;
+use crate::plan::exchange::USUAL_SOURCE;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use stylet_shm_schema::{SceneHeader, SeedPose, role};
@@ -55,11 +56,49 @@ impl Limit {
     }
 }
 
+/// Whose dose it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DoseOf {
+    Tissue,
+    Plan,
+}
+
+/// Seeds whose dose is wanted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wanted {
+    pub of: DoseOf,
+    /// Model of their source.
+    pub source: String,
+    /// Otherwise what is usual for it.
+    pub prescription_gy: Option<f64>,
+    pub seeds: Vec<Seed>,
+}
+
+impl Wanted {
+    /// Of seeds as they lie, all of one strength and of the usual source.
+    pub fn in_tissue(poses: &[SeedPose], strength_u: f64) -> Self {
+        Self {
+            of: DoseOf::Tissue,
+            source: USUAL_SOURCE.to_owned(),
+            prescription_gy: None,
+            seeds: poses.iter().map(|p| seed(p, strength_u)).collect(),
+        }
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        (self.of, &self.source, self.prescription_gy) == (other.of, &other.source, other.prescription_gy)
+            && is_same(&self.seeds, &other.seeds)
+    }
+}
+
 /// What is known of the dose of one set of seeds.
 #[derive(Clone, Debug)]
 pub struct DosePicture {
     pub number: u64,
+    pub of: DoseOf,
     pub seeds: usize,
+    /// Nuclide and model.
+    pub source: String,
     pub prescription_gy: f64,
     pub shells: Vec<Shell>,
     pub figures: Vec<Figure>,
@@ -69,7 +108,7 @@ pub struct DosePicture {
 
 struct Request {
     number: u64,
-    seeds: Vec<Seed>,
+    wanted: Wanted,
     scene: Arc<SceneModel>,
 }
 
@@ -78,7 +117,7 @@ pub struct DoseDesk {
     requests: Sender<Request>,
     pictures: Receiver<DosePicture>,
     computing: bool,
-    asked: Option<(u64, u64, Vec<Seed>)>,
+    asked: Option<(u64, u64, Wanted)>,
     number: u64,
     latest: Option<Arc<DosePicture>>,
     lost: bool,
@@ -116,38 +155,39 @@ impl DoseDesk {
     }
 
     /// Asks for a new dose where seeds came, went or moved.
-    pub fn take(&mut self, scene: Option<&Arc<SceneModel>>, poses: &[SeedPose], strength_u: f64) {
+    pub fn take(&mut self, scene: Option<&Arc<SceneModel>>, wanted: &Wanted) {
         match self.pictures.try_recv() {
             Ok(picture) => {
                 self.computing = false;
                 // What was computed for seeds that are all gone by now is no longer true.
-                self.latest = (picture.seeds > 0 && !poses.is_empty()).then(|| Arc::new(picture));
+                self.latest = (picture.seeds > 0 && !wanted.seeds.is_empty()).then(|| Arc::new(picture));
             }
             Err(TryRecvError::Empty) => {}
             Err(TryRecvError::Disconnected) => self.lost = true,
         }
+        // The dose of the plan says nothing of the seeds in the tissue.
+        self.latest = self.latest.take().filter(|picture| picture.of == wanted.of);
         let Some(scene) = scene else { return };
-        if poses.is_empty() {
+        if wanted.seeds.is_empty() {
             (self.latest, self.asked) = (None, None);
             return;
         }
         let key = (scene.header.session_id, scene.header.generation);
-        let seeds: Vec<Seed> = poses.iter().map(|p| seed(p, strength_u)).collect();
         let known = self
             .asked
             .as_ref()
-            .is_some_and(|(session, generation, asked)| (*session, *generation) == key && is_same(asked, &seeds));
+            .is_some_and(|(session, generation, asked)| (*session, *generation) == key && asked.is_same(wanted));
         if known || self.computing || self.lost {
             return;
         }
         self.number += 1;
         let request = Request {
             number: self.number,
-            seeds: seeds.clone(),
+            wanted: wanted.clone(),
             scene: scene.clone(),
         };
         self.computing = self.requests.send(request).is_ok();
-        self.asked = Some((key.0, key.1, seeds));
+        self.asked = Some((key.0, key.1, wanted.clone()));
     }
 }
 
@@ -174,34 +214,48 @@ fn is_same(a: &[Seed], b: &[Seed]) -> bool {
 }
 
 fn compute_all(work: &Receiver<Request>, done: &Sender<DosePicture>) {
-    let source = Source::parse(include_str!("../../sources/i125_6711.toml"));
-    // The file is part of the program; a test reads it.
-    let Ok(source) = source else { return };
-    let kernel = DoseKernel::new(&source, Interval::ALL);
-    let prescription_gy = source.prescription_gy.unwrap_or(USUAL_PRESCRIPTION_GY);
+    let mut known: Option<(String, Source, DoseKernel)> = None;
     while let Ok(request) = work.recv() {
-        let picture = picture(&request, &kernel, prescription_gy);
-        if done.send(picture).is_err() {
+        let model = &request.wanted.source;
+        if known.as_ref().is_none_or(|(name, _, _)| name != model) {
+            // The usual one is part of the program; a test reads it.
+            let Some(source) = Source::known(model).or_else(|| Source::known(USUAL_SOURCE)) else {
+                return;
+            };
+            let kernel = DoseKernel::new(&source, Interval::ALL);
+            known = Some((model.clone(), source, kernel));
+        }
+        let Some((_, source, kernel)) = &known else { return };
+        if done.send(picture(&request, source, kernel)).is_err() {
             return;
         }
     }
 }
 
-fn picture(request: &Request, kernel: &DoseKernel, prescription_gy: f64) -> DosePicture {
+fn picture(request: &Request, source: &Source, kernel: &DoseKernel) -> DosePicture {
+    let seeds = &request.wanted.seeds;
+    let usual_gy = source.prescription_gy.unwrap_or(USUAL_PRESCRIPTION_GY);
+    let prescription_gy = request.wanted.prescription_gy.unwrap_or(usual_gy);
     let header = &request.scene.header;
     let low = header.target_lower_m.map(|c| c - MARGIN_M);
     let high = header.target_upper_m.map(|c| c + MARGIN_M);
     let mut shells = Vec::new();
     // A box that is no box has no shells; the figures do not need it.
     if let Ok(mut grid) = DoseGrid::covering(low, high, SPACING_M) {
-        grid.add(kernel, &request.seeds);
+        grid.add(kernel, seeds);
         shells.extend((0..LEVELS.len()).map(|level| shell(&grid, level, prescription_gy)));
     }
-    let dvhs = dvhs(&request.scene, kernel, &request.seeds);
+    let dvhs = dvhs(&request.scene, kernel, seeds);
     let target = dvhs.first();
     DosePicture {
         number: request.number,
-        seeds: request.seeds.len(),
+        of: request.wanted.of,
+        seeds: seeds.len(),
+        source: if source.model == request.wanted.source {
+            format!("{} {}", source.nuclide, source.model)
+        } else {
+            format!("{} {} (for {})", source.nuclide, source.model, request.wanted.source)
+        },
         prescription_gy,
         shells,
         figures: figures(&dvhs, prescription_gy),
@@ -358,7 +412,7 @@ mod tests {
     fn wait(desk: &mut DoseDesk, scene: &Arc<SceneModel>, poses: &[SeedPose]) -> Arc<DosePicture> {
         let start = Instant::now();
         loop {
-            desk.take(Some(scene), poses, 0.5);
+            desk.take(Some(scene), &Wanted::in_tissue(poses, 0.5));
             if let Some(picture) = desk.latest()
                 && picture.seeds == poses.len()
                 && !desk.is_computing()
@@ -405,11 +459,11 @@ mod tests {
         let first = wait(&mut desk, &scene, &[pose(0.02)]).number;
         let same = wait(&mut desk, &scene, &[pose(0.0201)]).number;
         assert_eq!(first, same, "a tenth of a millimetre");
-        desk.take(Some(&scene), &[pose(0.023)], 0.5);
+        desk.take(Some(&scene), &Wanted::in_tissue(&[pose(0.023)], 0.5));
         assert!(desk.is_computing());
         let two = wait(&mut desk, &scene, &[pose(0.023), pose(0.03)]);
         assert_eq!(two.seeds, 2);
-        desk.take(Some(&scene), &[], 0.5);
+        desk.take(Some(&scene), &Wanted::in_tissue(&[], 0.5));
         assert!(desk.latest().is_none(), "no seeds, no dose");
     }
 }

@@ -20,8 +20,14 @@ impl Interrupt {
         Ok(interrupt)
     }
 
+    /// Asks as a signal would.
+    pub fn ask(&self) {
+        // SYNC: read by `asked`; nothing but the flag is carried.
+        self.0.store(true, Ordering::Relaxed);
+    }
+
     pub fn asked(&self) -> bool {
-        // SYNC: set by a signal handler; nothing but the flag is carried.
+        // SYNC: set by a signal handler or by `ask`; nothing but the flag is carried.
         self.0.load(Ordering::Relaxed)
     }
 }

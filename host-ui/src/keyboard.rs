@@ -6,13 +6,22 @@ use egui::{Key, Modifiers};
 use stylet_shm_schema::CommandKind;
 
 /// Every key, for the overlay and the manual.
-pub const KEYS: [(&str, &str); 23] = [
+pub const KEYS: [(&str, &str); 26] = [
     ("W  or  Up", "advance the needle along its path while held"),
     ("S  or  Down", "retract the needle while held"),
     ("Shift with W, S", "four times slower"),
     ("Enter", "the one thing to do in the present step"),
     ("Space", "drop a seed at the tip"),
     ("Ctrl+Z", "take the last seed back, or else the plan"),
+    (
+        "Ctrl+Z, Ctrl+Shift+Z",
+        "while a plan is edited: take the last change back, put it back",
+    ),
+    (
+        "Arrows, Enter",
+        "in the template: choose a hole, add or show its needle",
+    ),
+    ("Shift+arrows, Del", "in the template: move the needle, take it away"),
     ("E", "force on; after a fault: re-arm"),
     ("D", "force off"),
     ("P", "parameters"),
@@ -54,11 +63,20 @@ pub fn read(ctx: &egui::Context) -> Keys {
     if ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F1)) {
         keys.actions.push(Action::ToggleHelp);
     }
+    // These two are for whatever is edited but words.
+    if !ctx.text_edit_focused() {
+        ctx.input(|i| {
+            if fresh_press(i, Modifiers::CTRL | Modifiers::SHIFT, Key::Z) {
+                keys.actions.push(Action::Redo);
+            } else if fresh_press(i, Modifiers::CTRL, Key::Z) {
+                keys.actions.push(Action::Undo);
+            }
+        });
+    }
     if ctx.memory(|m| m.focused().is_some()) {
         return keys;
     }
     let pressed = [
-        (Modifiers::CTRL, Key::Z, Action::Undo),
         (Modifiers::NONE, Key::Enter, Action::Next),
         (Modifiers::NONE, Key::V, Action::NextLayout),
         (Modifiers::NONE, Key::F, Action::ToggleFollowTip),

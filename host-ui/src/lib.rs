@@ -14,6 +14,7 @@ mod loader;
 pub mod panel;
 mod picture;
 pub mod plan;
+pub mod planner;
 pub mod procedure;
 pub mod record;
 pub mod score;

@@ -107,6 +107,16 @@ impl Driven {
         picture
     }
 
+    /// As [`Driven::compare`], where the plan stands in place of the plots.
+    pub fn compare_plan(&mut self, name: &str) {
+        self.window.run_steps(3);
+        let size = self.window.ctx.content_rect().size();
+        let status = egui::Rect::from_min_max([120.0, 0.0].into(), [size.x - 250.0, 33.0].into());
+        self.window.mask(status);
+        let picture = self.window.render().expect("a picture");
+        image_snapshot_options(&with_fewer_greys(&picture, 51), name, &tolerant());
+    }
+
     /// Compares with the picture that is kept; what lives is covered: figures at the top and the plots.
     pub fn compare(&mut self, name: &str) {
         self.window.run_steps(3);

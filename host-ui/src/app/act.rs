@@ -4,7 +4,7 @@ use super::{App, Waiting, refusal};
 use crate::panel::workflow::{Undo, next_action, undo_action};
 use crate::panel::{Action, LoadState};
 use crate::settings::ThemeChoice;
-use crate::workflow::{Run, default_plan, move_values, plan_values};
+use crate::workflow::{default_plan, move_values, plan_values};
 use std::time::Instant;
 use stylet_shm_schema::{CommandKind, PARAMETERS};
 
@@ -82,16 +82,16 @@ impl App {
                     self.act(action, ctx);
                 }
             }
+            Action::Undo if self.edits_plan() => self.planner.undo(),
+            Action::Redo if self.edits_plan() => self.planner.redo(),
+            Action::Redo => {}
             Action::Undo => match undo_action(&self.shown) {
                 Some(Undo::Seed) => self.send("Undo seed", CommandKind::UndoSeed, &[]),
                 Some(Undo::Plan) => self.withdraw_plan(),
                 None => {}
             },
-            Action::RunAll => {
-                if let Some(scene) = &self.shown.scene {
-                    self.run = Some(Run::new(default_plan(scene), self.pace));
-                }
-            }
+            Action::Plan(action) => self.act_on_plan(action),
+            Action::RunAll => self.run_all(),
             Action::PlanSeeds => {
                 if let Some(scene) = &self.shown.scene {
                     let values = plan_values(&default_plan(scene));
@@ -117,6 +117,7 @@ impl App {
     fn withdraw_plan(&mut self) {
         if let Some(plan) = &self.shown.plan {
             let values = [plan.entry_m, plan.direction].concat();
+            self.planner.step_back();
             self.send("Withdraw the plan", CommandKind::SetPlan, &values);
         }
     }

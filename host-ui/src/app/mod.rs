@@ -1,6 +1,7 @@
 //! The window: takes what is new, draws the panels, carries out what they ask for. A frame never waits.
 
 mod act;
+mod plan;
 mod take;
 
 use crate::dose_desk::DoseDesk;
@@ -8,9 +9,10 @@ use crate::link::{Link, LinkStatus};
 use crate::loader::Loader;
 use crate::panel::history::History;
 use crate::panel::parameters::{ParametersState, parameters_ui};
-use crate::panel::workflow::{WorkflowState, workflow_ui};
-use crate::panel::{Action, FrameCost, Note, Shown, help, plots, status};
+use crate::panel::workflow::{Progress, WorkflowState, editor_ui, workflow_ui};
+use crate::panel::{Action, FrameCost, Note, PlanAction, Shown, help, plots, status};
 use crate::picture::Pictures;
+use crate::planner::Planner;
 use crate::settings::Settings;
 use crate::view::middle::Middle;
 use crate::workflow::{Pace, Run};
@@ -55,6 +57,9 @@ pub struct App {
     loader: Loader,
     uploading: Option<(u64, String)>,
     run: Option<Run>,
+    /// Which needles of the plan the script goes through.
+    run_needles: Vec<usize>,
+    planner: Planner,
     pace: Pace,
     waiting: Vec<Waiting>,
     /// Where a driven needle is sent, along the path from the entry.
@@ -96,6 +101,11 @@ impl App {
         &self.link
     }
 
+    /// The plan of many needles.
+    pub fn planner(&self) -> &Planner {
+        &self.planner
+    }
+
     /// The pictures in the middle, and where they cut.
     pub fn middle(&self) -> &Middle {
         &self.middle
@@ -124,6 +134,8 @@ impl App {
             loader: Loader::default(),
             uploading: None,
             run: None,
+            run_needles: Vec::new(),
+            planner: Planner::default(),
             pace: Pace::default(),
             waiting: Vec::new(),
             goal_m: None,
@@ -164,6 +176,10 @@ impl App {
             .exact_size(theme::RIGHT_WIDTH)
             .frame(theme::side_panel(ui));
         right.resizable(false).show(ui, |ui| {
+            if self.edits_plan() {
+                actions.extend(editor_ui(ui, &self.shown, &mut self.workflow.plan));
+                return;
+            }
             let height = ui.available_height();
             egui::ScrollArea::vertical().show(ui, |ui| plots::plots_ui(ui, &self.shown, &self.history, height));
         });
@@ -188,7 +204,8 @@ impl App {
         }
     }
 
-    fn dropped_file(ctx: &egui::Context) -> Option<Action> {
+    /// While the plan's step is open what is no volume is a plan.
+    fn dropped_file(&self, ctx: &egui::Context) -> Option<Action> {
         let path = ctx.input(|i| {
             i.raw
                 .dropped_files
@@ -196,7 +213,13 @@ impl App {
                 .map(|f| f.path().to_owned())
                 .find(|p| !p.as_os_str().is_empty())
         })?;
-        Some(Action::LoadScene(path))
+        let is_plan = ["toml", "csv", "dcm"]
+            .iter()
+            .any(|ending| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)));
+        Some(match is_plan && self.workflow.is_open(Progress::Plan) {
+            true => Action::Plan(PlanAction::Import(path)),
+            false => Action::LoadScene(path),
+        })
     }
 }
 
@@ -210,7 +233,7 @@ impl eframe::App for App {
         let keys = keyboard::read(&ctx);
         let mut actions = self.frame_ui(ui);
         actions.extend(keys.actions);
-        actions.extend(Self::dropped_file(&ctx));
+        actions.extend(self.dropped_file(&ctx));
         if ctx.input(|i| i.key_pressed(egui::Key::Escape)) {
             (self.help, self.parameters.open) = (false, false);
         }

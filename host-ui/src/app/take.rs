@@ -1,6 +1,7 @@
 //! What came since the last frame: records, answers, files that were read, the script's next action.
 
 use super::{App, refusal};
+use crate::dose_desk::{DoseOf, Wanted};
 use crate::files::LabelVolume;
 use crate::panel::{LoadState, Note};
 use crate::workflow::RunStatus;
@@ -26,13 +27,31 @@ impl App {
         self.take_answers();
         self.take_scene_file();
         self.advance_run();
-        self.dose
-            .take(self.link.scene(), &self.shown.seeds, self.settings.seed_strength_u);
+        self.take_plan();
+        self.dose.take(self.link.scene(), &self.wanted_dose());
         self.shown.dose = self.dose.latest().cloned();
         self.shown.dose_trouble = self.dose.trouble();
         self.count_refusals();
         self.take_pictures();
         self.middle.take(&self.shown, self.link.scene(), self.link.snapshot());
+    }
+
+    /// Of the plan while it is edited or nothing lies in the tissue; else of the seeds as they lie.
+    fn wanted_dose(&self) -> Wanted {
+        let implant = self.shown.planning.implant.as_ref();
+        match implant.filter(|_| self.edits_plan() || self.shown.seeds.is_empty()) {
+            Some(implant) => Wanted {
+                of: DoseOf::Plan,
+                source: implant.plan.source.clone(),
+                prescription_gy: Some(implant.plan.prescription_gy),
+                seeds: implant.seeds.clone(),
+            },
+            None => {
+                let planned = implant.and_then(|i| i.seeds.first());
+                let strength_u = planned.map_or(self.settings.seed_strength_u, |s| s.strength_u);
+                Wanted::in_tissue(&self.shown.seeds, strength_u)
+            }
+        }
     }
 
     /// Those of this run of the core that were not put away.
@@ -140,12 +159,18 @@ impl App {
     fn advance_run(&mut self) {
         if let Some(run) = &mut self.run {
             let status = run.advance(&mut self.link);
+            let needle = run.needle();
             self.shown.run_step = Some(run.step());
+            self.shown.run_needle = (self.run_needles.len() > 1).then_some((needle, self.run_needles.len()));
+            self.follow_run(needle, status == RunStatus::Done);
             self.shown.note = match status {
                 RunStatus::Working => None,
                 RunStatus::Done => Some(Note {
                     refused: false,
-                    text: "All four steps are done.".to_owned(),
+                    text: match self.run_needles.len() {
+                        0 => "All four steps are done.".to_owned(),
+                        n => format!("All {n} needles are done."),
+                    },
                 }),
                 RunStatus::Failed(why) => Some(refusal(format!("The run stopped: {why}"))),
             };

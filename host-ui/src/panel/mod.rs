@@ -10,9 +10,10 @@ mod shown;
 pub mod status;
 pub mod workflow;
 
-pub use seeds::{SeedError, seed_errors};
+pub use seeds::{SeedError, all_errors, own_errors, seed_errors};
 pub use shown::{FrameCost, LoadState, Note, Shown};
 
+use crate::plan::{Hole, Row};
 use crate::settings::Layout;
 use crate::view::scene3d::Preset;
 use std::path::PathBuf;
@@ -35,6 +36,9 @@ pub enum Action {
     Next,
     /// Takes back the last step, where it can be.
     Undo,
+    /// Puts back what was taken back of a plan.
+    Redo,
+    Plan(PlanAction),
     RunAll,
     StopRun,
     LoadScene(PathBuf),
@@ -55,4 +59,28 @@ pub enum Action {
     SavePicture,
     /// The refusals told so far were read.
     PutRefusalsAway,
+}
+
+/// What is asked of a plan of many needles; those are counted from 0.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PlanAction {
+    /// An empty one.
+    Begin,
+    Automatic,
+    Discard,
+    Add(Hole),
+    Remove(usize),
+    Move(usize, Hole),
+    SetRow(usize, Row),
+    /// Of every seed, U.
+    SetStrength(f64),
+    FitStrength,
+    Compensate,
+    Cancel,
+    Import(PathBuf),
+    Export(PathBuf),
+    /// The next one with seeds is set as the one to go in.
+    NextNeedle,
+    /// Slices go to this depth from the template's face, m.
+    LookAt(f64),
 }

@@ -1,5 +1,6 @@
 //! How far each seed came to rest from the place it was planned for.
 
+use super::Shown;
 use nalgebra::Vector3;
 use stylet_shm_schema::{PlannedSeed, SeedPose};
 
@@ -35,6 +36,42 @@ pub fn seed_errors(planned: &[PlannedSeed], placed: &[SeedPose], direction: [f64
         }
     }
     rows
+}
+
+/// Of the needle at work. Those of a plan of many needles are dropped in its order, which tells them apart where compensation drops
+/// one where another is planned.
+pub fn own_errors(shown: &Shown) -> Vec<SeedError> {
+    let Some(plan) = &shown.plan else { return Vec::new() };
+    if shown.planning.at_work().is_none() {
+        return seed_errors(shown.planned(), &shown.seeds, plan.direction);
+    }
+    in_order(shown.planned(), shown.own_seeds(), plan.direction)
+}
+
+/// Of all needles that have begun, each with its number.
+pub fn all_errors(shown: &Shown) -> Vec<(usize, SeedError)> {
+    let Some(implant) = &shown.planning.implant else {
+        return own_errors(shown).into_iter().map(|row| (0, row)).collect();
+    };
+    let course = &shown.planning.course;
+    let of_needle = |number: usize| {
+        let needle = &implant.plan.needles[number];
+        let planned: Vec<PlannedSeed> = needle.seeds_m().map(|position_m| PlannedSeed { position_m }).collect();
+        let placed = &shown.seeds[course.seeds_of(number, shown.seeds.len())];
+        let rows = in_order(&planned, placed, needle.direction);
+        rows.into_iter().map(move |row| (number, row)).collect::<Vec<_>>()
+    };
+    (0..course.begun().min(implant.plan.needles.len()))
+        .flat_map(of_needle)
+        .collect()
+}
+
+fn in_order(planned: &[PlannedSeed], placed: &[SeedPose], direction: [f64; 3]) -> Vec<SeedError> {
+    let row = |(i, target): (usize, &PlannedSeed)| match placed.get(i) {
+        Some(seed) => error(i, i, target, seed, Vector3::from(direction)),
+        None => missing(i),
+    };
+    planned.iter().enumerate().map(row).collect()
 }
 
 fn missing(planned: usize) -> SeedError {

@@ -2,6 +2,7 @@
 
 use crate::dose_desk::DosePicture;
 use crate::link::{Link, LinkStatus};
+use crate::planner::Planning;
 use crate::workflow::Step;
 use std::sync::Arc;
 use stylet_shm_schema::{
@@ -44,13 +45,16 @@ pub struct Shown {
     /// Step of the scripted procedure while it runs or after it ran.
     pub running: bool,
     pub run_step: Option<Step>,
+    /// Which of how many needles the script is at, counted from 0; `None` for one needle.
+    pub run_needle: Option<(usize, usize)>,
     /// The last answer that the operator should read.
     pub note: Option<Note>,
     pub load: LoadState,
-    /// Of the seeds as they lie now.
+    /// Of the seeds as they lie now, or of those of the plan.
     pub dose: Option<Arc<DosePicture>>,
     /// Why the dose is not known, where that is so.
     pub dose_trouble: Option<&'static str>,
+    pub planning: Planning,
     /// Refusals of requests that the operator has not yet put away, and the last reason.
     pub refusals: u64,
     pub last_refusal: String,
@@ -85,10 +89,12 @@ impl Shown {
             rubbish_refused: 0,
             running: false,
             run_step: None,
+            run_needle: None,
             note: None,
             load: LoadState::Idle,
             dose: None,
             dose_trouble: None,
+            planning: Planning::default(),
             refusals: 0,
             last_refusal: String::new(),
             cost: FrameCost::default(),
@@ -179,13 +185,23 @@ impl Shown {
         Some(along(self.plan.as_ref()?, place_m))
     }
 
+    /// Seeds of the needle at work, in the order in which they were dropped.
+    pub fn own_seeds(&self) -> &[SeedPose] {
+        let own = self.planning.course.own_seeds(self.seeds.len());
+        &self.seeds[own]
+    }
+
+    /// How deep the tip is when the planned seed leaves it; compensation may have moved that.
+    fn drop_depth_m(&self, plan: &PlanInForce, number: usize) -> f64 {
+        let planned_m = || along(plan, self.planned()[number].position_m);
+        self.planning.drops_m().get(number).copied().unwrap_or_else(planned_m)
+    }
+
     /// How far the needle may go along the path.
     pub fn path_length_m(&self) -> Option<f64> {
         let plan = self.plan.as_ref()?;
-        let deepest = self
-            .planned()
-            .iter()
-            .map(|s| along(plan, s.position_m))
+        let deepest = (0..self.planned().len())
+            .map(|number| self.drop_depth_m(plan, number))
             .fold(0.0, f64::max);
         Some((deepest + PAST_LAST_SEED_M).min(0.3))
     }
@@ -198,10 +214,10 @@ impl Shown {
     /// Depth of the deepest planned seed that no seed was dropped for; `None` when all are.
     pub fn next_seed_m(&self) -> Option<f64> {
         let plan = self.plan.as_ref()?;
-        let rows = super::seed_errors(self.planned(), &self.seeds, plan.direction);
+        let rows = super::seeds::own_errors(self);
         let missing = rows.iter().filter(|row| row.placed.is_none());
         missing
-            .map(|row| along(plan, self.planned()[row.planned].position_m))
+            .map(|row| self.drop_depth_m(plan, row.planned))
             .max_by(f64::total_cmp)
     }
 

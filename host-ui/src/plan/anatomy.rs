@@ -19,9 +19,26 @@ const BESIDE_M: [f64; 3] = [0.0, 1.37e-8, 2.71e-8];
 pub struct Body {
     pub name: String,
     mesh: Mesh,
+    points_m: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
 }
 
 impl Body {
+    /// The mesh must be closed.
+    fn new(name: &str, points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Self, String> {
+        Ok(Self {
+            name: name.to_owned(),
+            mesh: Mesh::new(points_m, triangles)?,
+            points_m: points_m.iter().map(|p| p.map(|c| c as f32)).collect(),
+            triangles: triangles.iter().map(|t| t.map(|i| i as u32)).collect(),
+        })
+    }
+
+    /// Its surface, as it is drawn.
+    pub fn surface(&self) -> (&[[f32; 3]], &[[u32; 3]]) {
+        (&self.points_m, &self.triangles)
+    }
+
     pub fn contains(&self, point_m: [f64; 3]) -> bool {
         self.mesh.contains([0, 1, 2].map(|a| point_m[a] + BESIDE_M[a]))
     }
@@ -163,19 +180,12 @@ fn body(scene: &SceneModel, name: &str, triangles: &[[u32; 3]]) -> Result<Body, 
     let half_m = scene.header.spacing_m / 2.0;
     let out = |(p, n): (&Vector3<f64>, &Vector3<f64>)| (p + n.try_normalize(1e-30).unwrap_or_default() * half_m).into();
     let moved: Vec<[f64; 3]> = points_m.iter().zip(&normals).map(out).collect();
-    let mesh = Mesh::new(&moved, &corners).map_err(|why| format!("the surface of {name}: {why}"))?;
-    Ok(Body {
-        name: name.to_owned(),
-        mesh,
-    })
+    Body::new(name, &moved, &corners).map_err(|why| format!("the surface of {name}: {why}"))
 }
 
 /// A body from a closed surface that is not the core's.
 pub fn body_of(name: &str, points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Body, String> {
-    Ok(Body {
-        name: name.to_owned(),
-        mesh: Mesh::new(points_m, triangles)?,
-    })
+    Body::new(name, points_m, triangles)
 }
 
 /// A ball, drawn by triangles; for tests and for scenes without files.
@@ -213,11 +223,8 @@ pub fn ball(name: &str, middle_m: [f64; 3], half_m: [f64; 3]) -> Body {
             triangles.push([a, c, d]);
         }
     }
-    let mesh = Mesh::new(&points_m, &triangles);
-    Body {
-        name: name.to_owned(),
-        mesh: mesh.unwrap_or_else(|why| unreachable!("the grid of a ball is closed: {why}")),
-    }
+    let body = Body::new(name, &points_m, &triangles);
+    body.unwrap_or_else(|why| unreachable!("the grid of a ball is closed: {why}"))
 }
 
 /// Box around points.

@@ -1,13 +1,75 @@
 //! Edits of a plan: each gives a new one, so that undo is a stack of values.
 
-use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, SPACER_M};
+use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, SEED_LENGTH_M, SPACER_M};
 
 /// Steps that can be taken back.
 const STEPS: usize = 100;
 const NO_NEEDLE: &str = "there is no such needle";
 const NO_SEED: &str = "there is no such seed on the needle";
 
+/// The seeds of a needle, evenly apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    pub count: usize,
+    /// From the entry to the first one.
+    pub deepest_m: f64,
+    /// From middle to middle.
+    pub pitch_m: f64,
+    pub stranded: bool,
+    pub strength_u: f64,
+}
+
+impl Row {
+    /// As many seeds as fill a piece of a needle at the usual distance, in its middle.
+    pub fn filling([from_m, to_m]: [f64; 2], strength_u: f64) -> Self {
+        let pitch_m = SEED_LENGTH_M + SPACER_M;
+        let count = ((to_m - from_m) / pitch_m).max(0.0) as usize + 1;
+        Self {
+            count,
+            deepest_m: (from_m + to_m + (count - 1) as f64 * pitch_m) / 2.0,
+            pitch_m,
+            stranded: count > 1,
+            strength_u,
+        }
+    }
+
+    /// As the first two seeds of a needle have it; `None` without seeds.
+    pub fn of(needle: &Needle) -> Option<Self> {
+        let first = needle.seeds.first()?;
+        let pitch_m = match needle.seeds.get(1) {
+            Some(second) => first.along_m - second.along_m,
+            None => needle.loading.pitch_m().unwrap_or(SEED_LENGTH_M + SPACER_M),
+        };
+        Some(Self {
+            count: needle.seeds.len(),
+            deepest_m: first.along_m,
+            pitch_m,
+            stranded: needle.loading != Loading::Loose,
+            strength_u: first.strength_u,
+        })
+    }
+}
+
 impl ImplantPlan {
+    /// All seeds of a needle anew.
+    pub fn with_row(&self, needle: usize, row: Row) -> Result<Self, String> {
+        if row.count == 0 || !(row.pitch_m >= SEED_LENGTH_M) {
+            let length_mm = SEED_LENGTH_M * 1e3;
+            return Err(format!(
+                "a needle has at least one seed, and from one to the next it is {length_mm} mm or more; take the needle away instead"
+            ));
+        }
+        self.change(needle, |n| {
+            let spacer_m = row.pitch_m - SEED_LENGTH_M;
+            n.loading = match row.stranded {
+                true => Loading::Stranded { spacer_m },
+                false => Loading::Loose,
+            };
+            n.seeds = Needle::strand(row.count, row.deepest_m, spacer_m, row.strength_u);
+            Ok(())
+        })
+    }
+
     /// A needle through a hole of the template, without seeds.
     pub fn with_needle(&self, hole: Hole, depth_m: f64) -> Result<Self, String> {
         if self.needles.iter().any(|n| n.hole == Some(hole)) {
@@ -160,6 +222,20 @@ impl History {
         if self.before.len() > STEPS {
             self.before.remove(0);
         }
+    }
+
+    /// In place of the present plan, without a step: a value that is still being drawn.
+    pub fn replace(&mut self, plan: ImplantPlan) {
+        self.now = plan;
+        self.taken_back.clear();
+    }
+
+    pub fn can_undo(&self) -> bool {
+        !self.before.is_empty()
+    }
+
+    pub fn can_redo(&self) -> bool {
+        !self.taken_back.is_empty()
     }
 
     /// False when there is nothing to take back.

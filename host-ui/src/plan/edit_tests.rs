@@ -145,3 +145,53 @@ fn undo_gives_back_each_plan_and_redo_the_next() {
     assert!(history.undo());
     assert_eq!(history.plan(), &plans[1]);
 }
+
+#[test]
+fn a_row_lies_evenly_from_its_deepest_seed_and_reads_back_as_it_was_put() {
+    let row = Row {
+        count: 4,
+        deepest_m: 0.081,
+        pitch_m: 8e-3,
+        stranded: true,
+        strength_u: 0.4,
+    };
+    let plan = good().with_row(1, row).unwrap();
+    let along: Vec<f64> = plan.needles[1].seeds.iter().map(|s| s.along_m).collect();
+    for (found, expected) in along.iter().zip([0.081, 0.073, 0.065, 0.057]) {
+        assert!((found - expected).abs() < 1e-12, "{along:?}");
+    }
+    assert_eq!(plan.needles[1].depth_m, 0.081);
+    assert_eq!(plan.needles[1].loading.pitch_m(), Some(8e-3));
+    let back = Row::of(&plan.needles[1]).unwrap();
+    assert!((back.pitch_m - row.pitch_m).abs() < 1e-12);
+    assert_eq!(Row { pitch_m: 8e-3, ..back }, row);
+    assert!(good().with_row(1, Row { pitch_m: 4e-3, ..row }).is_err());
+    assert!(good().with_row(1, Row { count: 0, ..row }).is_err());
+}
+
+#[test]
+fn a_row_fills_a_piece_at_the_usual_distance_and_does_not_leave_it() {
+    for (from_m, to_m, count) in [(0.05, 0.083, 4), (0.05, 0.0801, 4), (0.05, 0.079, 3), (0.05, 0.055, 1)] {
+        let row = Row::filling([from_m, to_m], 0.5);
+        assert_eq!((row.count, row.stranded), (count, count > 1), "{from_m} to {to_m}");
+        let shallowest_m = row.deepest_m - (count - 1) as f64 * row.pitch_m;
+        assert!(row.deepest_m <= to_m + 1e-12 && shallowest_m >= from_m - 1e-12);
+        assert!(
+            (row.deepest_m + shallowest_m - from_m - to_m).abs() < 1e-12,
+            "in the middle"
+        );
+    }
+}
+
+#[test]
+fn a_value_that_is_being_drawn_is_one_step() {
+    let mut history = History::new(empty());
+    history.put(good());
+    for deepest_m in [0.081, 0.082, 0.083] {
+        let mut row = Row::of(&history.plan().needles[0]).unwrap();
+        row.deepest_m = deepest_m;
+        history.replace(history.plan().with_row(0, row).unwrap());
+    }
+    assert!(history.undo());
+    assert_eq!(history.plan(), &empty());
+}

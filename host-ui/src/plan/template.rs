@@ -11,7 +11,7 @@ pub const PITCH_M: f64 = 5e-3;
 const CLEARANCE_M: f64 = 0.010;
 
 /// One hole: A1 is at the patient's right, posterior.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Hash, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Hole {
     column: u8,
     row: u8,
@@ -21,6 +21,21 @@ impl Hole {
     /// Counted from 0.
     pub fn new(column: u8, row: u8) -> Option<Self> {
         (column < HOLES && row < HOLES).then_some(Self { column, row })
+    }
+
+    /// G7.
+    pub fn middle() -> Self {
+        Self {
+            column: HOLES / 2,
+            row: HOLES / 2,
+        }
+    }
+
+    /// So many columns and rows on; `None` beyond the edge.
+    pub fn beside(self, [columns, rows]: [i8; 2]) -> Option<Self> {
+        let column = self.column.checked_add_signed(columns)?;
+        let row = self.row.checked_add_signed(rows)?;
+        Self::new(column, row)
     }
 
     /// Every hole, row by row.

@@ -1,13 +1,11 @@
 //! What a procedure is asked to do: needles with what is planned and what is done, from a plan file or as the scene suggests.
 
-use crate::dose::files::SeedDefaults;
-use crate::dose::source::Source;
 use crate::interrupt::Interrupt;
 use crate::link::{Link, SceneModel};
 use crate::plan::compensate::summary_m;
-use crate::plan::file::{self, Frames};
+use crate::plan::exchange;
 use crate::plan::rehearse::{Drops, LinkRehearser};
-use crate::plan::{Anatomy, Compensation, Hole, ImplantPlan, Limits, Needle, Template, check, compensate};
+use crate::plan::{Anatomy, Compensation, Hole, ImplantPlan, Limits, Needle, check, compensate};
 use crate::workflow::{NeedlePlan, NeedleTask, Pace, plan_with_seeds};
 use std::path::Path;
 use stylet_shm_schema::{MAX_SEEDS, SeedPose};
@@ -44,20 +42,6 @@ pub struct Job {
     pub compensations: Vec<Compensation>,
 }
 
-/// Needles for seeds that say nothing of them, nor of what is prescribed: the usual source's.
-fn from_seeds(path: &Path, scene: &SceneModel, frames: &Frames) -> Result<ImplantPlan, String> {
-    let source = Source::known(USUAL_SOURCE).ok_or("the usual source is not known")?;
-    let prescription_gy = source.prescription_gy.ok_or("the usual source has no prescription")?;
-    let defaults = SeedDefaults {
-        strength_u: None,
-        strength_per_activity_u_per_mci: source.strength_per_activity_u_per_mci,
-    };
-    let template = Template::before(&scene.header);
-    file::import_csv(path, defaults, frames, template, &source.model, prescription_gy)
-}
-
-const USUAL_SOURCE: &str = "6711";
-
 impl Job {
     /// One needle through the middle of the target.
     pub fn suggested(scene: &SceneModel, seeds: usize) -> Self {
@@ -72,12 +56,7 @@ impl Job {
     /// From a plan file, a table of seeds or an RT Plan, in the patient's frame. What is doubtful in it is told and not
     /// refused.
     pub fn from_file(path: &Path, scene: &SceneModel) -> Result<Self, String> {
-        let frames = Frames::new(&scene.header.patient_from_scene);
-        let is_plan = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
-        let plan = match is_plan {
-            true => file::read(path, &frames)?,
-            false => from_seeds(path, scene, &frames)?,
-        };
+        let plan = exchange::read(path, &scene.header)?;
         let told = |why: String| format!("{}: {why}", path.display());
         if plan.seed_count() == 0 || plan.seed_count() > MAX_SEEDS {
             return Err(told(format!(
@@ -90,7 +69,7 @@ impl Job {
         }
         let loaded = plan.needles.iter().filter(|n| !n.seeds.is_empty());
         Ok(Self {
-            tasks: loaded.map(|n| task(n, Drops::as_planned(n))).collect(),
+            tasks: loaded.map(|n| NeedleTask::of(n, Drops::as_planned(n))).collect(),
             implant: Some(plan),
             compensations: Vec::new(),
         })
@@ -155,17 +134,6 @@ impl Job {
                 .collect::<Vec<_>>()
         };
         self.tasks.iter().enumerate().flat_map(of_task).collect()
-    }
-}
-
-fn task(needle: &Needle, drops: Drops) -> NeedleTask {
-    NeedleTask {
-        plan: NeedlePlan {
-            entry_m: needle.entry_m,
-            direction: needle.direction,
-            seeds_m: needle.seeds_m().collect(),
-        },
-        drops,
     }
 }
 

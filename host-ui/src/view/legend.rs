@@ -108,7 +108,7 @@ impl Legend<'_> {
         if look.rest_shape {
             rows.push(("gland at rest".to_owned(), t.ghost, true));
         }
-        if self.shown.plan.is_some() {
+        if self.shown.plan.is_some() || self.shown.planning.implant.is_some() {
             rows.push(("planned seed".to_owned(), t.seed_planned, false));
         }
         if !self.shown.seeds.is_empty() {

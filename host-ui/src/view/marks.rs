@@ -99,6 +99,31 @@ impl Marks {
         }
     }
 
+    /// Seeds of needles that are not at work: the same wire sphere in thin lines, since there may be a hundred.
+    pub fn planned_seeds_thin(&mut self, centers_m: impl Iterator<Item = [f64; 3]>, direction: [f64; 3]) {
+        const STEPS: usize = 12;
+        let axis = unit_or_z(single(direction));
+        let (u, v) = frame_about(axis);
+        let about = |(a, b): (V, V)| {
+            let at = move |step: usize| {
+                let (s, c) = (std::f32::consts::TAU * step as f32 / STEPS as f32).sin_cos();
+                (a * c + b * s) * RING_RADIUS_M
+            };
+            (0..STEPS).map(move |step| [at(step), at(step + 1)])
+        };
+        let sphere: Vec<[V; 2]> = [(u, v), (axis, u), (axis, v)].into_iter().flat_map(about).collect();
+        for center in centers_m.map(single) {
+            for [from, to] in &sphere {
+                self.line(center + from, center + to, self.tokens.seed_planned);
+            }
+        }
+    }
+
+    /// Where a needle that is not at work goes.
+    pub fn path_thin(&mut self, from_m: [f64; 3], to_m: [f64; 3]) {
+        self.line(single(from_m), single(to_m), self.tokens.path);
+    }
+
     pub fn path(&mut self, from_m: [f64; 3], to_m: [f64; 3]) {
         let (from, to) = (single(from_m), single(to_m));
         let length = (to - from).norm().min(1.0);
@@ -300,6 +325,8 @@ mod tests {
         marks.placed_seed([1.0; 3], [0.0; 3]);
         marks.planned_seed([0.0; 3], [0.0; 3]);
         marks.path([0.0; 3], [0.0; 3]);
+        marks.planned_seeds_thin([[0.0; 3]].into_iter(), [0.0; 3]);
+        marks.path_thin([0.0; 3], [0.0; 3]);
         marks.ground([-20.0; 3], [20.0; 3]);
         marks.force([0.0; 3], [f64::NAN; 3]);
         marks.force([0.0; 3], [100.0, 0.0, 0.0]);

@@ -82,7 +82,8 @@ struct Key {
     view: ViewState,
     scene: (u64, u64),
     surface: u64,
-    plan: u64,
+    /// Of the needle at work, and of the plan of all.
+    plan: (u64, u64, usize),
     tip: [f64; 3],
     force: [f64; 3],
     seeds: Vec<[f64; 3]>,
@@ -104,8 +105,8 @@ pub struct Scene3d {
     /// The dose that the card has.
     shells: u64,
     drawn: Option<Key>,
-    /// What the marks of the plan were made for: scene, plan, template, colours.
-    fixed: Option<((u64, u64), u64, bool, bool)>,
+    /// What the marks of the plan were made for: scene, plans, template, colours.
+    fixed: Option<((u64, u64), (u64, u64, usize), bool, bool)>,
     marks: Marks,
     /// Where the axes are drawn.
     corner_m: Option<[f32; 3]>,
@@ -285,7 +286,11 @@ impl Scene3d {
             view: view.clone(),
             scene: self.uploaded_scene.unwrap_or_default(),
             surface: self.surface,
-            plan: shown.plan.map_or(0, |p| p.generation),
+            plan: (
+                shown.plan.map_or(0, |p| p.generation),
+                shown.planning.implant.as_ref().map_or(0, |i| i.revision),
+                shown.planning.course.begun(),
+            ),
             tip: shown.tip_m().unwrap_or_default(),
             force: shown.state.map_or([0.0; 3], |s| s.force_on_hand_n),
             seeds: shown.seeds.iter().map(|s| s.position_m).collect(),
@@ -380,7 +385,20 @@ fn tint(whole: SceneUniform, color: Color32, opacity: f32, section: [f32; 4]) ->
 fn collect_fixed(marks: &mut Marks, shown: &Shown, look: Look, tokens: &'static Tokens) -> Option<[f32; 3]> {
     marks.begin(tokens);
     let corner = shown.scene.map(|scene| marks.ground(scene.lower_m, scene.upper_m));
-    if let Some(plan) = &shown.plan {
+    let at_work = shown.planning.course.begun().checked_sub(1);
+    for (number, needle) in shown
+        .planning
+        .implant
+        .iter()
+        .flat_map(|i| i.plan.needles.iter().enumerate())
+    {
+        if Some(number) != at_work {
+            marks.path_thin(needle.entry_m, needle.at_m(needle.depth_m));
+            marks.planned_seeds_thin(needle.seeds_m(), needle.direction);
+        }
+    }
+    let is_other = shown.planning.waits();
+    if let Some(plan) = shown.plan.as_ref().filter(|_| !is_other) {
         marks.entry(plan.entry_m, plan.direction);
         if look.template {
             marks.template(plan.entry_m, plan.direction, TEMPLATE_BEFORE_M);

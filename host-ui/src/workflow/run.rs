@@ -2,7 +2,7 @@
 
 use super::{NeedlePlan, Pace, move_values, plan_values};
 use crate::link::{Link, LinkStatus};
-use crate::plan::Drops;
+use crate::plan::{Drops, Needle};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -62,6 +62,18 @@ pub struct NeedleTask {
 }
 
 impl NeedleTask {
+    /// A needle of a plan, its seeds dropped so.
+    pub fn of(needle: &Needle, drops: Drops) -> Self {
+        Self {
+            plan: NeedlePlan {
+                entry_m: needle.entry_m,
+                direction: needle.direction,
+                seeds_m: needle.seeds_m().collect(),
+            },
+            drops,
+        }
+    }
+
     /// Each seed dropped where it is planned.
     pub fn as_planned(plan: NeedlePlan) -> Self {
         let drops = Drops {

@@ -1,7 +1,7 @@
 //! What came of it: the error of each seed, the dose against its limits, the histogram of the target.
 
 use crate::dose_desk::{DosePicture, Figure, Limit};
-use crate::panel::{SeedError, Shown, seed_errors};
+use crate::panel::{SeedError, Shown, all_errors};
 use crate::{format, theme};
 use egui::RichText;
 use egui_plot::{Line, Plot, PlotPoints, VLine};
@@ -10,17 +10,19 @@ use egui_plot::{Line, Plot, PlotPoints, VLine};
 const TABLE_HEIGHT: f32 = 150.0;
 
 pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown) {
-    seeds_ui(ui, shown);
+    seeds_ui(ui, shown, &all_errors(shown));
+    dose_ui(ui, shown, 80.0, "The dose is computed once seeds lie in the tissue.");
+}
+
+/// Figures and histogram, so high, of the seeds that lie in the tissue or are planned.
+pub fn dose_ui(ui: &mut egui::Ui, shown: &Shown, height: f32, otherwise: &str) {
     let Some(dose) = &shown.dose else {
-        let text = shown
-            .dose_trouble
-            .unwrap_or("The dose is computed once seeds lie in the tissue.");
-        ui.label(theme::small(text));
+        ui.label(theme::small(shown.dose_trouble.unwrap_or(otherwise)));
         return;
     };
     ui.label(format!(
-        "Dose: {} seeds of I-125 6711, {:.0} Gy",
-        dose.seeds, dose.prescription_gy
+        "Dose: {} seeds of {}, {:.0} Gy",
+        dose.seeds, dose.source, dose.prescription_gy
     ));
     ui.spacing_mut().interact_size.y = 16.0;
     egui::Grid::new("dose")
@@ -32,7 +34,7 @@ pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown) {
                 figure_ui(ui, figure);
             }
         });
-    dvh_ui(ui, dose);
+    dvh_ui(ui, dose, height);
 }
 
 fn figure_ui(ui: &mut egui::Ui, figure: &Figure) {
@@ -58,12 +60,12 @@ fn figure_ui(ui: &mut egui::Ui, figure: &Figure) {
     ui.end_row();
 }
 
-fn dvh_ui(ui: &mut egui::Ui, dose: &DosePicture) {
+fn dvh_ui(ui: &mut egui::Ui, dose: &DosePicture, height: f32) {
     let tokens = theme::of(ui);
     ui.label(theme::small("Target: volume over dose, both in %"));
     let points: Vec<[f64; 2]> = dose.target_dvh.iter().map(|[x, y]| [x * 100.0, y * 100.0]).collect();
     Plot::new("dvh")
-        .height(80.0)
+        .height(height)
         .allow_drag(false)
         .allow_zoom(false)
         .allow_scroll(false)
@@ -85,12 +87,11 @@ fn dvh_ui(ui: &mut egui::Ui, dose: &DosePicture) {
 }
 
 /// Nothing until the first seed is placed: an empty table tells nothing.
-pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown) {
-    let Some(plan) = &shown.plan else { return };
-    if shown.seeds.is_empty() {
+pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
+    if shown.seeds.is_empty() || rows.is_empty() {
         return;
     }
-    let rows = seed_errors(shown.planned(), &shown.seeds, plan.direction);
+    let has_many = shown.planning.implant.is_some();
     ui.label(theme::strong("Seed error, mm"))
         .on_hover_text("Where the seed lies now against where it was planned; along is positive inwards");
     egui::ScrollArea::vertical()
@@ -108,10 +109,12 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown) {
                         ui.label(theme::small(head));
                     }
                     ui.end_row();
-                    rows.iter().for_each(|row| seed_row_ui(ui, row));
+                    rows.iter()
+                        .for_each(|(needle, row)| seed_row_ui(ui, has_many.then_some(*needle), row));
                 });
         });
-    let placed: Vec<f64> = rows.iter().filter(|r| r.placed.is_some()).map(total_m).collect();
+    let placed = rows.iter().map(|(_, row)| row).filter(|r| r.placed.is_some());
+    let placed: Vec<f64> = placed.map(total_m).collect();
     let mean = placed.iter().sum::<f64>() / placed.len().max(1) as f64;
     let worst = placed.iter().copied().fold(0.0, f64::max);
     let text = format!("mean {:.2}, worst {:.2}", format::mm(mean), format::mm(worst));
@@ -122,8 +125,10 @@ fn total_m(row: &SeedError) -> f64 {
     row.along_m.hypot(row.across_m)
 }
 
-fn seed_row_ui(ui: &mut egui::Ui, row: &SeedError) {
-    ui.label(format!("{}", row.planned + 1));
+/// With the number of its needle where there are many.
+fn seed_row_ui(ui: &mut egui::Ui, needle: Option<usize>, row: &SeedError) {
+    let number = row.planned + 1;
+    ui.label(needle.map_or_else(|| number.to_string(), |n| format!("{}.{number}", n + 1)));
     if row.placed.is_some() {
         ui.monospace(format::signed_mm(row.along_m));
         ui.monospace(format!("{:.2}", format::mm(row.across_m)));

@@ -1,20 +1,23 @@
 //! The left panel: the steps of the procedure, one of them open, with the one thing to do and what it lacks.
 
 mod debrief;
+mod plan;
 mod progress;
 mod scene;
 
-use super::{Action, Shown};
+use super::{Action, SeedError, Shown, own_errors};
 use crate::workflow::Step;
 use crate::{format, theme};
 use egui::{Align2, Button, FontId, RichText, Sense, Stroke, Vec2};
-pub use progress::{Progress, Undo, is_at_next_seed, missing, next_action, progress, undo_action};
+pub use plan::{PlanState, editor_ui};
+pub use progress::{Progress, Undo, is_at_next_seed, is_needle_done, missing, next_action, progress, undo_action};
 use stylet_shm_schema::CommandKind;
 
 /// What the panel keeps between frames: what a person is typing, and which step was opened by hand.
 #[derive(Default)]
 pub struct WorkflowState {
     pub scene_path: String,
+    pub plan: PlanState,
     opened: Option<Progress>,
     was: Option<Progress>,
 }
@@ -26,6 +29,11 @@ impl WorkflowState {
             scene_path: path.to_owned(),
             ..Self::default()
         }
+    }
+
+    /// In the last frame.
+    pub fn is_open(&self, step: Progress) -> bool {
+        self.opened.or(self.was) == Some(step)
     }
 
     /// The step that is open: the present one, until another is opened by hand and the procedure goes on.
@@ -72,7 +80,10 @@ fn run_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         };
         ui.horizontal(|ui| {
             ui.spinner();
-            ui.label(format!("Running: {step}"));
+            match shown.run_needle {
+                Some((needle, count)) => ui.label(format!("Needle {} of {count}: {step}", needle + 1)),
+                None => ui.label(format!("Running: {step}")),
+            };
             if ui.button("Stop").clicked() {
                 actions.push(Action::StopRun);
             }
@@ -80,9 +91,16 @@ fn run_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         return;
     }
     let blocked = missing(shown, Progress::Plan);
-    let response = ui.add_enabled(blocked.is_none(), Button::new("Run all four steps").min_size(wide));
+    let response = ui.add_enabled(blocked.is_none(), Button::new(run_name(shown)).min_size(wide));
     if hinted(response, blocked).clicked() {
         actions.push(Action::RunAll);
+    }
+}
+
+fn run_name(shown: &Shown) -> String {
+    match shown.planning.implant.as_ref().map(|i| i.plan.needles.len()) {
+        None | Some(0) => "Run all four steps".to_owned(),
+        Some(count) => format!("Run all {count} needles"),
     }
 }
 
@@ -152,14 +170,16 @@ fn step_ui(
         head_ui(ui, (step, now), shown);
         let blocked = missing(shown, step);
         match &blocked {
-            Some(why) => ui.label(RichText::new(format!("Missing: {why}.")).color(tokens.warn)),
-            None => ui.label(theme::weak(what(step, shown))),
-        };
+            Some(why) => drop(ui.label(RichText::new(format!("Missing: {why}.")).color(tokens.warn))),
+            // The summary of the plan stands there.
+            None if step == Progress::Plan && shown.planning.implant.is_some() => {}
+            None => drop(ui.label(theme::weak(what(step, shown)))),
+        }
         let ready = blocked.is_none() && !shown.running;
         match step {
             Progress::Scene => scene::scene_ui(ui, shown, state, actions),
-            Progress::Plan => plan_ui(ui, shown, ready, actions),
-            Progress::Place => main_button(ui, ("Place needle", Action::PlaceNeedle), ready, actions),
+            Progress::Plan => plan::plan_ui(ui, shown, state, ready, actions),
+            Progress::Place => place_ui(ui, shown, ready, actions),
             Progress::Insert => insert_ui(ui, shown, ready, actions),
             Progress::Drop => drop_ui(ui, shown, ready, actions),
             Progress::Retract => retract_ui(ui, shown, actions),
@@ -172,10 +192,13 @@ fn what(step: Progress, shown: &Shown) -> String {
     match step {
         Progress::Scene => "A built-in scene, or a segmented volume of your own.".to_owned(),
         Progress::Plan => "Five seeds along one needle through the gland.".to_owned(),
-        Progress::Place => "Bring the tip to the entry, along the path.".to_owned(),
+        Progress::Place => {
+            let which = plan::at_work(shown).map_or_else(String::new, |text| text + " ");
+            format!("{which}Bring the tip to the entry, along the path.")
+        }
         Progress::Insert => "To the deepest planned seed: the button, W and S, or drag the tip in a slice.".to_owned(),
         Progress::Drop => {
-            let (dropped, planned) = (shown.seeds.len(), shown.planned().len());
+            let (dropped, planned) = (shown.own_seeds().len(), shown.planned().len());
             format!("{dropped} of {planned} seeds dropped. Drop one at each place on the way out.")
         }
         Progress::Retract => "All seeds are dropped. Take the needle out.".to_owned(),
@@ -194,16 +217,12 @@ fn main_button(ui: &mut egui::Ui, (name, action): (&str, Action), ready: bool, a
     }
 }
 
-fn plan_ui(ui: &mut egui::Ui, shown: &Shown, ready: bool, actions: &mut Vec<Action>) {
+fn place_ui(ui: &mut egui::Ui, shown: &Shown, ready: bool, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
-        main_button(ui, ("Plan five seeds", Action::PlanSeeds), ready, actions);
-        let undo = ui.add_enabled(
-            ready && undo_action(shown) == Some(Undo::Plan),
-            Button::new("Withdraw the plan"),
-        );
-        if undo.on_hover_text("Ctrl+Z").clicked() {
-            actions.push(Action::Undo);
+        if !is_needle_done(shown) {
+            main_button(ui, ("Place needle", Action::PlaceNeedle), ready, actions);
         }
+        plan::next_needle_ui(ui, shown, actions);
     });
 }
 
@@ -246,7 +265,14 @@ fn drop_ui(ui: &mut egui::Ui, shown: &Shown, ready: bool, actions: &mut Vec<Acti
         }
     });
     retract_ui(ui, shown, actions);
-    debrief::seeds_ui(ui, shown);
+    plan::next_needle_ui(ui, shown, actions);
+    debrief::seeds_ui(ui, shown, &own_rows(shown));
+}
+
+/// Of the needle at work.
+fn own_rows(shown: &Shown) -> Vec<(usize, SeedError)> {
+    let needle = shown.planning.at_work().map_or(0, |(number, _)| number);
+    own_errors(shown).into_iter().map(|row| (needle, row)).collect()
 }
 
 fn retract_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {

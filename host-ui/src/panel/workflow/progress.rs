@@ -1,7 +1,7 @@
 //! How far the operator is, what each step lacks, and the one thing to do next.
 
 use crate::format;
-use crate::panel::{Action, Shown};
+use crate::panel::{Action, PlanAction, Shown};
 use stylet_shm_schema::CommandKind;
 
 /// Beside the path by less than this, the needle counts as placed.
@@ -58,13 +58,21 @@ pub fn progress(shown: &Shown) -> Progress {
     if shown.scene.is_none() {
         return Progress::Scene;
     }
+    if shown.planning.waits() {
+        return Progress::Plan;
+    }
     let (Some(depth), Some(beside)) = (shown.path_depth_m(), shown.off_path_m()) else {
         return Progress::Plan;
     };
-    let dropped = shown.seeds.len();
-    let is_out = depth < REACHED_WITHIN_M + 0.002;
+    let dropped = shown.own_seeds().len();
     if shown.next_seed_m().is_none() {
-        return if is_out { Progress::Debrief } else { Progress::Retract };
+        return if !is_out_at(depth) {
+            Progress::Retract
+        } else if next_needle(shown).is_some() {
+            Progress::Place
+        } else {
+            Progress::Debrief
+        };
     }
     let is_deep = shown
         .deepest_seed_m()
@@ -76,6 +84,34 @@ pub fn progress(shown: &Shown) -> Progress {
     } else {
         Progress::Insert
     }
+}
+
+fn is_out_at(depth_m: f64) -> bool {
+    depth_m < REACHED_WITHIN_M + 0.002
+}
+
+/// The needle of a plan that is to go in now: the first one, or the one after a needle whose seeds are all dropped.
+pub fn next_needle(shown: &Shown) -> Option<usize> {
+    let next = shown.planning.next_needle()?;
+    let is_free = shown.planning.waits() || is_needle_done(shown);
+    is_free.then_some(next)
+}
+
+/// Nothing of a plan has gone in yet, so that another one may take its place.
+pub fn is_before_needles(shown: &Shown) -> bool {
+    shown.planning.course.begun() == 0
+}
+
+/// All its seeds are dropped and its tip is outside.
+pub fn is_needle_done(shown: &Shown) -> bool {
+    let is_out = shown.path_depth_m().is_some_and(is_out_at);
+    // One that was taken back leaves no path, and those before it are done.
+    shown.planning.course.is_done() || (shown.planning.at_work().is_some() && shown.next_seed_m().is_none() && is_out)
+}
+
+/// The needle at work is outside, whatever it has dropped.
+pub fn can_leave_needle(shown: &Shown) -> bool {
+    shown.planning.next_needle().is_some() && shown.path_depth_m().is_none_or(is_out_at)
 }
 
 /// What is missing before `step` can be done; `None` when nothing is.
@@ -116,6 +152,9 @@ pub fn next_action(shown: &Shown) -> Option<Action> {
     }
     match step {
         Progress::Scene | Progress::Debrief => None,
+        Progress::Plan | Progress::Place if next_needle(shown).is_some() => Some(Action::Plan(PlanAction::NextNeedle)),
+        // An empty plan of many needles waits for its first one.
+        Progress::Plan if shown.planning.implant.is_some() => None,
         Progress::Plan => Some(Action::PlanSeeds),
         Progress::Place => Some(Action::PlaceNeedle),
         Progress::Insert => Some(Action::Insert),
@@ -140,7 +179,7 @@ pub fn is_at_next_seed(shown: &Shown) -> bool {
 pub fn undo_action(shown: &Shown) -> Option<Undo> {
     if !shown.is_live() {
         None
-    } else if !shown.seeds.is_empty() {
+    } else if !shown.own_seeds().is_empty() {
         Some(Undo::Seed)
     } else if shown.plan.is_some() && !shown.has_punctured() {
         Some(Undo::Plan)

@@ -1,6 +1,6 @@
 //! Three orthogonal slices through the deformed body that look like ultrasound, and what is drawn over them.
 
-mod cut;
+pub(crate) mod cut;
 pub mod field;
 mod gpu;
 mod overlay;

@@ -135,8 +135,12 @@ impl Overlay<'_> {
     /// Rings: nothing like the bars of placed seeds.
     fn planned(&self) {
         let radius = (1.6e-3 / self.plane.m_per_point).max(4.0) as f32;
-        for seed in self.shown.planned() {
-            let place = Vector3::from(seed.position_m);
+        let of_needle = self.shown.planned().iter().map(|s| s.position_m);
+        let implant = self.shown.planning.implant.as_ref();
+        let of_all = implant.iter().flat_map(|i| &i.seeds).map(|s| s.position_m);
+        // The needle at work is one of the plan's.
+        let places = of_needle.filter(|_| implant.is_none()).chain(of_all);
+        for place in places.map(Vector3::from) {
             if self.plane.distance_m(place).abs() < SEED_HALF_M {
                 let stroke = Stroke::new(1.4, IMAGE.seed_planned);
                 self.painter.circle_stroke(self.plane.on_screen(place), radius, stroke);

@@ -1,0 +1,116 @@
+//! What the operator asked for of a plan of many needles.
+
+use super::{App, refusal};
+use crate::panel::workflow::Progress;
+use crate::panel::{Note, PlanAction};
+use crate::workflow::{Run, default_plan, plan_values};
+use nalgebra::Vector3;
+use stylet_shm_schema::CommandKind;
+
+impl App {
+    /// Undo is for the plan while it is edited.
+    pub(super) fn edits_plan(&self) -> bool {
+        self.shown.planning.implant.is_some() && self.workflow.is_open(Progress::Plan)
+    }
+
+    pub(super) fn take_plan(&mut self) {
+        self.planner.take(self.link.scene(), self.shown.seeds.len());
+        if let Some(said) = self.planner.said() {
+            self.shown.note = Some(match said {
+                Ok(text) => Note { refused: false, text },
+                Err(why) => refusal(why),
+            });
+        }
+        self.shown.planning = self.planner.planning();
+        if self.run.is_none() && crate::panel::workflow::is_needle_done(&self.shown) {
+            self.planner.finish_needle();
+        }
+    }
+
+    pub(super) fn act_on_plan(&mut self, action: PlanAction) {
+        if !matches!(action, PlanAction::Export(_) | PlanAction::LookAt(_)) {
+            self.shown.note = None;
+        }
+        let planner = &mut self.planner;
+        match action {
+            PlanAction::Begin => planner.begin(),
+            PlanAction::Automatic => planner.automatic(),
+            PlanAction::Discard => planner.discard(),
+            PlanAction::Add(hole) => planner.add(hole),
+            PlanAction::Remove(needle) => planner.edit(|plan| plan.without_needle(needle)),
+            PlanAction::Move(needle, hole) => planner.edit(|plan| plan.with_needle_at(needle, hole)),
+            PlanAction::SetRow(needle, row) => planner.set_row(needle, row),
+            PlanAction::SetStrength(strength_u) => planner.edit(|plan| Ok(plan.with_strength(strength_u))),
+            PlanAction::FitStrength => planner.fit_strength(),
+            PlanAction::Compensate => planner.compensate(self.link.instance().clone(), self.pace),
+            PlanAction::Cancel => planner.cancel(),
+            PlanAction::Import(path) => {
+                if let Some(scene) = self.link.scene() {
+                    planner.import(path, scene.clone());
+                }
+            }
+            PlanAction::Export(path) => planner.export(path),
+            PlanAction::NextNeedle => self.next_needle(),
+            PlanAction::LookAt(depth_m) => self.look_at(depth_m),
+        }
+    }
+
+    fn next_needle(&mut self) {
+        let Some(number) = self.planner.next_needle() else {
+            return;
+        };
+        let Some(task) = self.planner.task(number) else { return };
+        let mut plan = task.plan;
+        // Compensation may go in a little beside the hole.
+        plan.entry_m = task.drops.entry_m;
+        self.planner.begin_needle(number, self.shown.seeds.len());
+        self.send("Next needle", CommandKind::SetPlan, &plan_values(&plan));
+    }
+
+    /// The axial slice shows what the template does.
+    fn look_at(&mut self, depth_m: f64) {
+        let Some(ground) = &self.shown.planning.ground else {
+            return;
+        };
+        let inwards = Vector3::from(ground.template.inwards);
+        let view = &mut self.middle.view;
+        let off_m = (view.cursor_m - Vector3::from(ground.template.middle_m)).dot(&inwards);
+        view.follow_tip = false;
+        view.cursor_m += inwards * (depth_m - off_m);
+    }
+
+    /// All needles of the plan; without one, one through the middle.
+    pub(super) fn run_all(&mut self) {
+        if self.planner.is_busy() {
+            self.shown.note = Some(refusal(
+                "Wait for what is done for the plan, or cancel it first.".to_owned(),
+            ));
+            return;
+        }
+        let tasks = self.planner.tasks();
+        if !tasks.is_empty() {
+            self.planner.begin_anew();
+            let (numbers, tasks) = tasks.into_iter().unzip();
+            self.run_needles = numbers;
+            self.run = Some(Run::of_needles(tasks, self.pace));
+        } else if let Some(scene) = &self.shown.scene {
+            self.run_needles.clear();
+            self.run = Some(Run::new(default_plan(scene), self.pace));
+        }
+    }
+
+    /// The plan's course goes with the script's.
+    pub(super) fn follow_run(&mut self, at: usize, is_done: bool) {
+        let Some(&number) = self.run_needles.get(at) else {
+            return;
+        };
+        let course = self.planner.course();
+        if course.begun() != number + 1 {
+            let seeds = if at == 0 { 0 } else { self.shown.seeds.len() };
+            self.planner.begin_needle(number, seeds);
+        }
+        if is_done {
+            self.planner.finish_needle();
+        }
+    }
+}

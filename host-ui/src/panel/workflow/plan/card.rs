@@ -1,0 +1,197 @@
+//! In the step: make a plan, compensate it, keep it in a file, and what dose it gives.
+
+use super::super::{WorkflowState, debrief, hinted, main_button, progress, undo_action};
+use super::summary;
+use crate::format;
+use crate::panel::workflow::Undo;
+use crate::panel::{Action, PlanAction, Shown};
+use crate::plan::check::STRENGTHS_U;
+use crate::planner::{Implant, Progress};
+use crate::theme;
+use egui::{Button, DragValue};
+use std::path::PathBuf;
+
+pub fn plan_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, ready: bool, actions: &mut Vec<Action>) {
+    let free = ready && shown.planning.work.is_none();
+    match &shown.planning.implant {
+        None => begin_ui(ui, shown, (ready, free), actions),
+        Some(implant) => implant_ui(ui, shown, implant, free, actions),
+    }
+    // What cannot be done meanwhile makes room for how far it is.
+    match &shown.planning.work {
+        Some(work) => work_ui(ui, work, actions),
+        None => file_ui(ui, shown, state, free, actions),
+    }
+    if shown.planning.implant.is_some() {
+        debrief::dose_ui(ui, shown, 60.0, "The dose is computed once the plan has seeds.");
+    }
+}
+
+/// One needle, or many.
+fn begin_ui(ui: &mut egui::Ui, shown: &Shown, (ready, free): (bool, bool), actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        main_button(ui, ("Plan five seeds", Action::PlanSeeds), ready, actions);
+        let undo = ui.add_enabled(
+            ready && undo_action(shown) == Some(Undo::Plan),
+            Button::new("Withdraw the plan"),
+        );
+        if undo.on_hover_text("Ctrl+Z").clicked() {
+            actions.push(Action::Undo);
+        }
+    });
+    ui.label(theme::small("Or many needles through the template:"));
+    ui.horizontal(|ui| {
+        automatic_ui(ui, shown, free, actions);
+        let empty = ui.add_enabled(free && shown.planning.ground.is_some(), Button::new("Empty plan"));
+        if empty.on_hover_text("Choose the holes yourself").clicked() {
+            actions.push(Action::Plan(PlanAction::Begin));
+        }
+    });
+}
+
+fn automatic_ui(ui: &mut egui::Ui, shown: &Shown, free: bool, actions: &mut Vec<Action>) {
+    let can = free && shown.planning.ground.is_some();
+    let response = ui.add_enabled(can, Button::new("Automatic plan"));
+    let hint = "Needles near the edge of the target, fewer inside, none near what is to be spared";
+    if response.on_hover_text(hint).clicked() {
+        actions.push(Action::Plan(PlanAction::Automatic));
+    }
+}
+
+fn implant_ui(ui: &mut egui::Ui, shown: &Shown, implant: &Implant, free: bool, actions: &mut Vec<Action>) {
+    ui.label(summary(implant));
+    let waits = shown.planning.waits();
+    ui.horizontal(|ui| {
+        if waits {
+            let blocked = shown
+                .planning
+                .next_needle()
+                .is_none()
+                .then(|| "add a needle with seeds first".to_owned());
+            let first = ui.add_enabled(free && blocked.is_none(), Button::new("First needle"));
+            let hint = "Enter: the plan is good, begin with its first needle";
+            if hinted(first, blocked).on_hover_text(hint).clicked() {
+                actions.push(Action::Plan(PlanAction::NextNeedle));
+            }
+        } else {
+            super::next_needle_ui(ui, shown, actions);
+        }
+        let discard = ui.add_enabled(free, Button::new("Put the plan away"));
+        if discard
+            .on_hover_text("Back to one needle; save it first to keep it")
+            .clicked()
+        {
+            actions.push(Action::Plan(PlanAction::Discard));
+        }
+    });
+    ui.horizontal(|ui| {
+        ui.add_enabled_ui(waits, |ui| automatic_ui(ui, shown, free, actions));
+        let compensate = ui.add_enabled(
+            free && shown.planning.next_needle().is_some(),
+            Button::new("Compensate"),
+        );
+        let hint = "Rehearses each needle and moves its drops so that the seeds rest where they are planned";
+        if compensate.on_hover_text(hint).clicked() {
+            actions.push(Action::Plan(PlanAction::Compensate));
+        }
+    });
+    compensated_ui(ui, implant);
+    if shown.planning.work.is_none() {
+        strength_ui(ui, implant, free && waits, actions);
+    }
+}
+
+fn compensated_ui(ui: &mut egui::Ui, implant: &Implant) {
+    let errors: Vec<f64> = implant.rest_errors_m.iter().flatten().copied().collect();
+    if errors.is_empty() {
+        return;
+    }
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    let text = format!(
+        "{} of {} needles compensated, to {:.2} mm",
+        errors.len(),
+        implant.plan.needles.len(),
+        format::mm(mean)
+    );
+    super::weak_line(ui, text);
+}
+
+fn strength_ui(ui: &mut egui::Ui, implant: &Implant, free: bool, actions: &mut Vec<Action>) {
+    let Some(first) = implant.seeds.first() else { return };
+    ui.horizontal(|ui| {
+        let label = ui.label(theme::small("Every seed"));
+        let mut strength_u = first.strength_u;
+        let value = DragValue::new(&mut strength_u)
+            .range(STRENGTHS_U[0]..=STRENGTHS_U[1])
+            .speed(0.005)
+            .fixed_decimals(3)
+            .update_while_editing(false)
+            .clamp_existing_to_range(false)
+            .suffix(" U");
+        let response = ui.add_enabled(free, value).labelled_by(label.id);
+        if response.changed() && strength_u != first.strength_u {
+            actions.push(Action::Plan(PlanAction::SetStrength(strength_u)));
+        }
+        let fit = ui.add_enabled(free, Button::new("Fit dose"));
+        if fit
+            .on_hover_text("The strength with which 96 % of the target gets the prescription")
+            .clicked()
+        {
+            actions.push(Action::Plan(PlanAction::FitStrength));
+        }
+    });
+}
+
+fn work_ui(ui: &mut egui::Ui, work: &Progress, actions: &mut Vec<Action>) {
+    match work.share {
+        Some(share) => {
+            ui.add(egui::Label::new(theme::small(&work.what)).truncate());
+            ui.horizontal(|ui| {
+                let bar = egui::ProgressBar::new(share)
+                    .desired_width(ui.available_width() - 80.0)
+                    .desired_height(12.0);
+                ui.add(bar);
+                cancel_ui(ui, actions);
+            });
+        }
+        None => {
+            ui.horizontal(|ui| {
+                ui.spinner();
+                ui.label(theme::small(&work.what));
+                cancel_ui(ui, actions);
+            });
+        }
+    }
+}
+
+fn cancel_ui(ui: &mut egui::Ui, actions: &mut Vec<Action>) {
+    if ui.button("Cancel").clicked() {
+        actions.push(Action::Plan(PlanAction::Cancel));
+    }
+}
+
+fn file_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bool, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        let hint = "or drop a file";
+        let edit = egui::TextEdit::singleline(&mut state.plan.path)
+            .hint_text(hint)
+            .desired_width(ui.available_width() - 126.0);
+        let field = ui.add(edit);
+        field.widget_info(|| {
+            egui::WidgetInfo::labeled(egui::accesskit::Role::TextInput, true, "Plan file: .toml, .csv or .dcm")
+        });
+        let field = field.on_hover_text(".toml holds all of a plan; .csv and .dcm (RT Plan) its seeds");
+        let path = state.plan.path.trim();
+        let has_name = free && !path.is_empty();
+        let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+        let can_read = has_name && progress::is_before_needles(shown);
+        let import = ui.add_enabled(can_read, Button::new("Import"));
+        if (import.clicked() || entered) && can_read {
+            actions.push(Action::Plan(PlanAction::Import(PathBuf::from(path))));
+        }
+        let export = ui.add_enabled(has_name && shown.planning.implant.is_some(), Button::new("Save"));
+        if export.on_hover_text("To the file named at the left").clicked() {
+            actions.push(Action::Plan(PlanAction::Export(PathBuf::from(path))));
+        }
+    });
+}

@@ -1,0 +1,70 @@
+//! What is wrong with the plan, in words; a click shows the needle.
+
+use super::{PlanState, name_of};
+use crate::plan::check::Problem;
+use crate::planner::Implant;
+use crate::theme;
+use egui::{FontId, RichText, Sense};
+
+pub fn findings_ui(ui: &mut egui::Ui, implant: &Implant, state: &mut PlanState) {
+    let tokens = theme::of(ui);
+    let Some(problems) = &implant.problems else {
+        ui.label(theme::small("The plan is being looked at."));
+        return;
+    };
+    if problems.is_empty() {
+        ui.label(RichText::new("Nothing is wrong with the plan.").color(tokens.good));
+        return;
+    }
+    let what = match problems.len() {
+        1 => "1 thing to look at".to_owned(),
+        n => format!("{n} things to look at"),
+    };
+    ui.label(RichText::new(what).color(tokens.warn));
+    ui.spacing_mut().item_spacing.y = 2.0;
+    let height = ui.available_height().max(30.0);
+    egui::ScrollArea::vertical()
+        .id_salt("findings")
+        .max_height(height)
+        .auto_shrink([false, true])
+        .show(ui, |ui| {
+            for problem in problems.iter() {
+                finding_ui(ui, implant, problem, state);
+            }
+        });
+}
+
+fn finding_ui(ui: &mut egui::Ui, implant: &Implant, problem: &Problem, state: &mut PlanState) {
+    let tokens = theme::of(ui);
+    let text = words(implant, problem);
+    let font = FontId::proportional(11.5);
+    let width = ui.available_width() - 4.0;
+    let galley = ui.painter().layout(text.clone(), font, tokens.text, width);
+    let (id, rect) = ui.allocate_space(galley.size());
+    if ui.clip_rect().expand(0.5).contains_rect(rect) {
+        let response = ui.interact(rect, id, Sense::click());
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Button, ui.is_enabled(), &text));
+        if response.hovered() || response.has_focus() {
+            ui.painter().rect_filled(rect.expand(1.0), 2.0, tokens.widget);
+        }
+        if response.clicked()
+            && let Some(number) = problem.needle
+        {
+            state.look_at(&implant.plan, number);
+        }
+    }
+    ui.painter().galley(rect.min, galley, tokens.text);
+}
+
+/// "Needle 3, E5, seed 2: it lies outside the gland".
+fn words(implant: &Implant, problem: &Problem) -> String {
+    let Some(number) = problem.needle else {
+        return problem.what.clone();
+    };
+    let hole = match implant.plan.needles.get(number).and_then(|n| n.hole) {
+        Some(_) => format!(", {}", name_of(&implant.plan, number)),
+        None => String::new(),
+    };
+    let seed = problem.seed.map_or_else(String::new, |s| format!(", seed {}", s + 1));
+    format!("Needle {}{hole}{seed}: {}", number + 1, problem.what)
+}

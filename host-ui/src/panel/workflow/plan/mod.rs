@@ -1,0 +1,157 @@
+//! The plan: in the step what is done with it as a whole; at the right, instead of the instruments, its needles.
+
+mod card;
+mod findings;
+mod list;
+mod needle;
+mod template;
+
+use super::progress;
+use crate::panel::{Action, PlanAction, Shown};
+use crate::plan::{Hole, ImplantPlan};
+use crate::planner::Implant;
+use crate::theme;
+use crate::view::scene3d::Preset;
+pub(super) use card::plan_ui;
+use egui::Button;
+
+/// What a person is looking at.
+pub struct PlanState {
+    /// Of a plan file.
+    pub path: String,
+    pub(super) hole: Hole,
+    /// A needle that goes through no hole.
+    by_hand: Option<usize>,
+    /// Of the outlines, from the template's face; `None` until it is set.
+    depth_m: Option<f64>,
+    /// The needle that the list was last moved to.
+    listed: Option<usize>,
+}
+
+impl Default for PlanState {
+    fn default() -> Self {
+        Self {
+            path: String::new(),
+            hole: Hole::middle(),
+            by_hand: None,
+            depth_m: None,
+            listed: None,
+        }
+    }
+}
+
+impl PlanState {
+    /// The needle that is looked at.
+    fn needle(&self, plan: &ImplantPlan) -> Option<usize> {
+        let by_hand = self
+            .by_hand
+            .filter(|&n| plan.needles.get(n).is_some_and(|needle| needle.hole.is_none()));
+        by_hand.or_else(|| plan.needles.iter().position(|n| n.hole == Some(self.hole)))
+    }
+
+    fn look_at(&mut self, plan: &ImplantPlan, number: usize) {
+        match plan.needles.get(number).and_then(|n| n.hole) {
+            Some(hole) => (self.hole, self.by_hand) = (hole, None),
+            None => self.by_hand = Some(number),
+        }
+    }
+
+    fn look_at_hole(&mut self, hole: Hole) {
+        (self.hole, self.by_hand) = (hole, None);
+    }
+}
+
+/// The right panel while a plan of many needles is edited.
+pub fn editor_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut PlanState) -> Vec<Action> {
+    let mut actions = Vec::new();
+    let Some(implant) = &shown.planning.implant else {
+        return actions;
+    };
+    head_ui(ui, implant, &mut actions);
+    let free = shown.is_live() && !shown.running;
+    ui.add_enabled_ui(free, |ui| {
+        template::template_ui(ui, shown, implant, state, &mut actions);
+        needle::needle_ui(ui, shown, implant, state, &mut actions);
+        ui.separator();
+        list::list_ui(ui, implant, state);
+        ui.separator();
+        findings::findings_ui(ui, implant, state);
+    });
+    actions
+}
+
+fn head_ui(ui: &mut egui::Ui, implant: &Implant, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        ui.heading("Needles");
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            let redo = ui.add_enabled(implant.can_redo, Button::new("Redo"));
+            if redo.on_hover_text("Ctrl+Shift+Z").clicked() {
+                actions.push(Action::Redo);
+            }
+            let undo = ui.add_enabled(implant.can_undo, Button::new("Undo"));
+            if undo.on_hover_text("Ctrl+Z").clicked() {
+                actions.push(Action::Undo);
+            }
+            if ui
+                .button("Perineum view")
+                .on_hover_text("The 3D view looks through the template, as this panel does")
+                .clicked()
+            {
+                actions.push(Action::LookFrom(Preset::Perineum));
+            }
+        });
+    });
+}
+
+/// "24 needles, 98 seeds of 0.43 U".
+fn summary(implant: &Implant) -> String {
+    let plan = &implant.plan;
+    let strengths = || implant.seeds.iter().map(|s| s.strength_u);
+    let (least, most) = (
+        strengths().fold(f64::INFINITY, f64::min),
+        strengths().fold(0.0, f64::max),
+    );
+    let strength = match implant.seeds.len() {
+        0 => String::new(),
+        _ if most - least < 5e-4 => format!(" of {most:.3} U"),
+        _ => format!(" of {least:.3} to {most:.3} U"),
+    };
+    let needles = plan.needles.len();
+    let plural = if needles == 1 { "" } else { "s" };
+    format!("{needles} needle{plural}, {} seeds{strength}", implant.seeds.len())
+}
+
+/// "E5", or the number of one that is held by hand.
+fn name_of(plan: &ImplantPlan, number: usize) -> String {
+    let hole = plan.needles.get(number).and_then(|n| n.hole);
+    hole.map_or_else(|| format!("needle {}", number + 1), |h| h.to_string())
+}
+
+/// Where in the implantation: "Needle 3 of 24, through E5".
+pub(super) fn at_work(shown: &Shown) -> Option<String> {
+    let implant = shown.planning.implant.as_ref()?;
+    let number = progress::next_needle(shown).or_else(|| Some(shown.planning.at_work()?.0))?;
+    let count = implant.plan.needles.len();
+    let name = name_of(&implant.plan, number);
+    Some(format!("Needle {} of {count}, {name}.", number + 1))
+}
+
+/// The button for the needle after this one, where a person may leave this one.
+pub(super) fn next_needle_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
+    if shown.planning.next_needle().is_none() || shown.planning.waits() {
+        return;
+    }
+    let can = progress::can_leave_needle(shown) && shown.is_live() && !shown.running;
+    let response = ui.add_enabled(can, Button::new("Next needle"));
+    let response = response.on_disabled_hover_text("Take this needle out first");
+    if response
+        .on_hover_text("Enter, once all seeds of this one are dropped")
+        .clicked()
+    {
+        actions.push(Action::Plan(PlanAction::NextNeedle));
+    }
+}
+
+fn weak_line(ui: &mut egui::Ui, text: impl Into<String>) {
+    ui.add(egui::Label::new(theme::small(text)).truncate());
+}

@@ -1,0 +1,461 @@
+//! The plan that is edited in the window: its history, what is wrong with it, the work that is done for it, how far it is
+//! carried out.
+//!
+//! A frame gives it what came and takes what is shown; nothing here takes longer than a copy of the plan.
+
+mod course;
+mod ground;
+mod job;
+mod shown;
+mod work;
+
+use crate::link::SceneModel;
+use crate::plan::check::{Problem, problems};
+use crate::plan::{Compensation, Drops, History, Hole, ImplantPlan, Needle, Row, Template, exchange};
+use crate::workflow::{NeedleTask, Pace};
+pub use course::{Course, NeedleState};
+pub use ground::{Ground, Layer, Outline};
+use job::{Job, News};
+pub use shown::{Implant, Planning};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use stylet_shm_schema::MAX_SEEDS;
+use stylet_shm_schema::service::Instance;
+pub use work::Progress;
+use work::Told;
+
+/// Changes of one needle that follow each other faster are one step to take back.
+const ONE_STEP: Duration = Duration::from_millis(800);
+/// Of seeds of a plan that has none yet.
+const STRENGTH_U: f64 = 0.5;
+
+type Checked = Job<Vec<Problem>>;
+
+#[derive(Default)]
+pub struct Planner {
+    ground: Option<Arc<Ground>>,
+    grounding: Option<(u64, u64, Template, Job<Result<Ground, String>>)>,
+    /// What no ground could be made of.
+    failed: Option<((u64, u64), Template)>,
+    /// The scene that the plan is for: its name and box.
+    of_scene: Option<(String, [f64; 3])>,
+    history: Option<History>,
+    /// Rises with each change of what is shown.
+    revision: u64,
+    problems: Option<Arc<Vec<Problem>>>,
+    checking: Option<(u64, Checked)>,
+    checked: u64,
+    work: Option<(Job<Told>, Progress)>,
+    /// With the needles as they were when they were rehearsed.
+    compensated: Vec<(Needle, Compensation)>,
+    course: Course,
+    /// The needle whose seeds were changed last, and when.
+    drawn: Option<(usize, Instant)>,
+    implant: Option<Arc<Implant>>,
+    shown_revision: u64,
+    /// What the person should read, once.
+    said: Option<Result<String, String>>,
+}
+
+impl Planner {
+    pub fn plan(&self) -> Option<&ImplantPlan> {
+        self.history.as_ref().map(History::plan)
+    }
+
+    pub fn course(&self) -> &Course {
+        &self.course
+    }
+
+    /// What the person should read, once.
+    pub fn said(&mut self) -> Option<Result<String, String>> {
+        self.said.take()
+    }
+
+    pub fn planning(&self) -> Planning {
+        Planning {
+            ground: self.ground.clone(),
+            implant: self.implant.clone(),
+            work: self.work.as_ref().map(|(_, progress)| progress.clone()),
+            course: self.course.clone(),
+        }
+    }
+
+    /// What came since the last frame.
+    pub fn take(&mut self, scene: Option<&Arc<SceneModel>>, seeds: usize) {
+        let Some(scene) = scene else { return };
+        self.take_scene(scene);
+        self.take_work();
+        self.take_problems();
+        if self.course.is_undone(seeds) {
+            self.set_course(Course::default());
+        }
+        self.show();
+    }
+
+    fn show(&mut self) {
+        if self.shown_revision != self.revision {
+            self.shown_revision = self.revision;
+            self.implant = self.history.as_ref().map(|history| {
+                let checked = self.problems.clone().filter(|_| self.checked == self.revision);
+                let old = self.implant.as_ref().and_then(|i| i.problems.clone());
+                Arc::new(Implant::of(
+                    self.revision,
+                    history,
+                    checked.or(old),
+                    &self.course,
+                    &self.compensated,
+                ))
+            });
+        }
+    }
+
+    fn take_scene(&mut self, scene: &Arc<SceneModel>) {
+        let key = (scene.header.session_id, scene.header.generation);
+        let of_scene = (scene.header.name.read(), scene.header.upper_m);
+        if self.of_scene.as_ref() != Some(&of_scene) {
+            if self.history.is_some() {
+                self.said = Some(Err("The plan was for another scene and is put away.".to_owned()));
+            }
+            *self = Self {
+                of_scene: Some(of_scene),
+                said: self.said.take(),
+                revision: self.revision + 1,
+                ..Self::default()
+            };
+        }
+        if let Some((session, generation, template, job)) = &self.grounding {
+            let (key, template) = ((*session, *generation), *template);
+            match job.poll() {
+                News::None => {}
+                News::Told(Ok(ground)) => {
+                    self.ground = Some(Arc::new(ground));
+                    self.grounding = None;
+                    self.change();
+                }
+                News::Told(Err(why)) => self.no_ground(key, template, why),
+                News::Ended => self.no_ground(key, template, "the scene's anatomy was not made out".to_owned()),
+            }
+            return;
+        }
+        let template = self
+            .plan()
+            .map_or_else(|| Template::before(&scene.header), |p| p.template);
+        let is_known = |g: &Arc<Ground>| g.scene == key && g.template == template;
+        if !self.ground.as_ref().is_some_and(is_known) && self.failed != Some((key, template)) {
+            if self.ground.as_ref().is_some_and(|g| g.scene != key) {
+                self.set_course(Course::default());
+                self.compensated.clear();
+            }
+            let model = scene.clone();
+            let job = Job::begin("anatomy", move |told, _| {
+                let _ = told.send(Ground::of(&model, template));
+            });
+            self.grounding = Some((key.0, key.1, template, job));
+        }
+    }
+
+    fn no_ground(&mut self, key: (u64, u64), template: Template, why: String) {
+        (self.ground, self.grounding, self.failed) = (None, None, Some((key, template)));
+        self.said = Some(Err(format!("No plan can be made for this scene: {why}")));
+    }
+
+    fn take_problems(&mut self) {
+        if let Some((revision, job)) = &self.checking {
+            match job.poll() {
+                News::None => return,
+                News::Told(found) => {
+                    self.problems = Some(Arc::new(found));
+                    self.checked = *revision;
+                    let is_new = *revision == self.revision;
+                    self.checking = None;
+                    if is_new {
+                        self.shown_revision = 0;
+                    }
+                }
+                News::Ended => self.checking = None,
+            }
+        }
+        let (Some(ground), Some(plan)) = (&self.ground, self.plan()) else {
+            return;
+        };
+        if self.checked == self.revision || self.checking.is_some() {
+            return;
+        }
+        let (ground, plan) = (ground.clone(), plan.clone());
+        let job = Job::begin("plan check", move |told, _| {
+            let _ = told.send(problems(&plan, &ground.anatomy));
+        });
+        self.checking = Some((self.revision, job));
+    }
+
+    fn take_work(&mut self) {
+        let Some((job, progress)) = &mut self.work else { return };
+        match job.poll() {
+            News::None => {}
+            News::Told(Told::Progress(now)) => *progress = now,
+            News::Told(Told::Plan(plan)) => {
+                self.work = None;
+                match plan.and_then(|plan| self.can_be(plan)) {
+                    Ok(plan) => self.put(plan),
+                    Err(why) => self.said = Some(Err(why)),
+                }
+            }
+            News::Told(Told::Compensated(done)) => {
+                self.compensated.retain(|(needle, _)| *needle != done.0);
+                self.compensated.push(*done);
+                self.refresh();
+            }
+            News::Told(Told::End(end)) => (self.work, self.said) = (None, Some(end)),
+            News::Ended => self.work = None,
+        }
+    }
+
+    pub fn is_busy(&self) -> bool {
+        self.work.is_some()
+    }
+
+    /// What is being done is no longer wanted.
+    pub fn cancel(&mut self) {
+        self.work = None;
+    }
+
+    fn begin_work(&mut self, what: &str, begin: impl FnOnce(&Self, Arc<Ground>) -> Result<Job<Told>, String>) {
+        let job = match (&self.ground, self.is_busy()) {
+            (_, true) => return,
+            (None, _) => Err("the scene's anatomy is not known yet; wait a moment".to_owned()),
+            (Some(ground), false) => begin(self, ground.clone()),
+        };
+        match job {
+            Ok(job) => {
+                let progress = Progress {
+                    what: what.to_owned(),
+                    share: None,
+                };
+                self.work = Some((job, progress));
+            }
+            Err(why) => self.said = Some(Err(why)),
+        }
+    }
+
+    pub fn automatic(&mut self) {
+        self.begin_work("Looking for a first plan", |_, ground| Ok(work::automatic(ground)));
+    }
+
+    pub fn fit_strength(&mut self) {
+        self.begin_work("Looking for the strength", |planner, ground| {
+            Ok(work::strength(ground, Arc::new(planner.planned()?.clone())))
+        });
+    }
+
+    pub fn import(&mut self, path: PathBuf, scene: Arc<SceneModel>) {
+        self.begin_work("Reading the plan", |_, _| Ok(work::import(path, scene)));
+    }
+
+    pub fn export(&mut self, path: PathBuf) {
+        self.begin_work("Writing the plan", |planner, ground| {
+            Ok(work::export(path, Arc::new(planner.planned()?.clone()), ground))
+        });
+    }
+
+    /// Of the needles that are still to come.
+    pub fn compensate(&mut self, instance: Instance, pace: Pace) {
+        self.begin_work("Rehearsing", |planner, _| {
+            let begun = planner.course.begun();
+            let left = planner.planned()?.needles.iter().skip(begun);
+            let needles: Vec<Needle> = left.filter(|n| !n.seeds.is_empty()).cloned().collect();
+            if needles.is_empty() {
+                return Err("no needle with seeds is left to rehearse".to_owned());
+            }
+            Ok(work::compensation(instance, needles, pace))
+        });
+    }
+
+    fn planned(&self) -> Result<&ImplantPlan, String> {
+        self.plan().ok_or_else(|| "there is no plan yet; make one".to_owned())
+    }
+
+    /// An empty one.
+    pub fn begin(&mut self) {
+        let (Some(ground), None) = (&self.ground, &self.history) else {
+            return;
+        };
+        let plan = exchange::usual().map(|(source, prescription_gy)| ImplantPlan {
+            template: ground.template,
+            source: source.model,
+            prescription_gy,
+            needles: Vec::new(),
+        });
+        match plan {
+            Ok(plan) => self.put(plan),
+            Err(why) => self.said = Some(Err(why)),
+        }
+    }
+
+    /// Back to one needle.
+    pub fn discard(&mut self) {
+        (self.history, self.work, self.problems) = (None, None, None);
+        self.compensated.clear();
+        self.course = Course::default();
+        self.change();
+    }
+
+    /// A needle through the hole, with as many seeds as fill the target behind it.
+    pub fn add(&mut self, hole: Hole) {
+        let piece = self.ground.as_ref().and_then(|g| g.piece_m(hole));
+        let strength_u = |plan: &ImplantPlan| {
+            let seeds = plan.needles.iter().flat_map(|n| &n.seeds);
+            seeds.map(|s| s.strength_u).next().unwrap_or(STRENGTH_U)
+        };
+        self.edit(|plan| {
+            let piece_m =
+                piece.ok_or_else(|| format!("a needle through {hole} would miss the target; choose another hole"))?;
+            let added = plan.with_needle(hole, piece_m[1])?;
+            added.with_row(plan.needles.len(), Row::filling(piece_m, strength_u(plan)))
+        });
+    }
+
+    pub fn set_row(&mut self, needle: usize, row: Row) {
+        let last = self.drawn.filter(|(n, at)| *n == needle && at.elapsed() < ONE_STEP);
+        let changed = self.planned().and_then(|plan| plan.with_row(needle, row));
+        match changed.and_then(|plan| self.can_be(plan)) {
+            Ok(plan) => {
+                match &mut self.history {
+                    Some(history) if last.is_some() => history.replace(plan),
+                    Some(history) => history.put(plan),
+                    None => {}
+                }
+                self.drawn = Some((needle, Instant::now()));
+                self.change();
+            }
+            Err(why) => self.said = Some(Err(why)),
+        }
+    }
+
+    pub fn edit(&mut self, edit: impl FnOnce(&ImplantPlan) -> Result<ImplantPlan, String>) {
+        match self.planned().and_then(edit).and_then(|plan| self.can_be(plan)) {
+            Ok(plan) => self.put(plan),
+            Err(why) => self.said = Some(Err(why)),
+        }
+    }
+
+    pub fn undo(&mut self) {
+        self.step(History::undo, History::redo);
+    }
+
+    pub fn redo(&mut self) {
+        self.step(History::redo, History::undo);
+    }
+
+    fn step(&mut self, step: fn(&mut History) -> bool, back: fn(&mut History) -> bool) {
+        let Some(mut history) = self.history.take() else { return };
+        let before = history.plan().clone();
+        if step(&mut history) {
+            if let Err(why) = self.keeps(&before, history.plan()) {
+                back(&mut history);
+                self.said = Some(Err(why));
+            }
+        }
+        self.history = Some(history);
+        self.change();
+    }
+
+    fn put(&mut self, plan: ImplantPlan) {
+        match &mut self.history {
+            Some(history) => history.put(plan),
+            None => self.history = Some(History::new(plan)),
+        }
+        self.change();
+    }
+
+    /// A plan that leaves what is in the tissue as it is and is not too much for the core.
+    fn can_be(&self, plan: ImplantPlan) -> Result<ImplantPlan, String> {
+        if plan.seed_count() > MAX_SEEDS {
+            let count = plan.seed_count();
+            return Err(format!("that makes {count} seeds; at most {MAX_SEEDS} can be placed"));
+        }
+        match self.plan() {
+            Some(before) => self.keeps(before, &plan).map(|()| plan),
+            None => Ok(plan),
+        }
+    }
+
+    fn keeps(&self, before: &ImplantPlan, after: &ImplantPlan) -> Result<(), String> {
+        let begun = self.course.begun();
+        let first = |plan: &ImplantPlan| plan.needles.iter().take(begun).cloned().collect::<Vec<_>>();
+        if begun > 0 && first(before) != first(after) {
+            return Err(format!(
+                "{begun} needles have gone in already; only those after them can be changed"
+            ));
+        }
+        Ok(())
+    }
+
+    /// The plan or what it lies on has changed.
+    fn change(&mut self) {
+        self.revision += 1;
+        let plan = self.history.as_ref().map(History::plan);
+        let needles = plan.map_or(&[][..], |p| &p.needles[..]);
+        self.compensated.retain(|(needle, _)| needles.contains(needle));
+    }
+
+    /// What is shown of it has changed.
+    fn refresh(&mut self) {
+        self.shown_revision = 0;
+    }
+
+    fn set_course(&mut self, course: Course) {
+        if self.course != course {
+            self.course = course;
+            self.refresh();
+        }
+    }
+
+    /// What is done with a needle.
+    pub fn task(&self, number: usize) -> Option<NeedleTask> {
+        let needle = self.plan()?.needles.get(number)?;
+        let found = self.compensated.iter().find(|(n, _)| n == needle);
+        let drops = found.map_or_else(|| Drops::as_planned(needle), |(_, done)| done.drops.clone());
+        Some(NeedleTask::of(needle, drops))
+    }
+
+    /// The next needle that has seeds.
+    pub fn next_needle(&self) -> Option<usize> {
+        self.planning().next_needle()
+    }
+
+    /// All needles with seeds, each with its number.
+    pub fn tasks(&self) -> Vec<(usize, NeedleTask)> {
+        let needles = self.plan().map_or(&[][..], |p| &p.needles[..]).iter().enumerate();
+        let loaded = needles.filter(|(_, n)| !n.seeds.is_empty());
+        loaded
+            .filter_map(|(number, _)| Some((number, self.task(number)?)))
+            .collect()
+    }
+
+    /// The needle goes in now; so many seeds lie in the tissue.
+    pub fn begin_needle(&mut self, number: usize, seeds: usize) {
+        let mut course = self.course.clone();
+        course.begin(number, seeds);
+        self.set_course(course);
+    }
+
+    pub fn finish_needle(&mut self) {
+        let mut course = self.course.clone();
+        course.finish();
+        self.set_course(course);
+    }
+
+    pub fn step_back(&mut self) {
+        let mut course = self.course.clone();
+        course.step_back();
+        self.set_course(course);
+    }
+
+    pub fn begin_anew(&mut self) {
+        self.set_course(Course::default());
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,96 @@
+//! What a frame shows of the plan, made once a change.
+
+use super::course::{Course, NeedleState};
+use super::ground::Ground;
+use super::work::Progress;
+use crate::dose::Seed;
+use crate::plan::check::Problem;
+use crate::plan::{Compensation, History, ImplantPlan, Needle};
+use std::sync::Arc;
+
+/// Everything about plans of many needles that a frame shows.
+#[derive(Clone, Default)]
+pub struct Planning {
+    /// `None` until the scene's anatomy is made out.
+    pub ground: Option<Arc<Ground>>,
+    /// `None` without a plan of many needles.
+    pub implant: Option<Arc<Implant>>,
+    /// While something is done for it.
+    pub work: Option<Progress>,
+    pub course: Course,
+}
+
+impl Planning {
+    /// The next needle that has seeds.
+    pub fn next_needle(&self) -> Option<usize> {
+        let needles = self.implant.as_ref()?.plan.needles.iter().enumerate();
+        let mut left = needles.skip(self.course.begun()).filter(|(_, n)| !n.seeds.is_empty());
+        left.next().map(|(number, _)| number)
+    }
+
+    /// There is a plan, and none of its needles has gone in.
+    pub fn waits(&self) -> bool {
+        self.implant.is_some() && self.course.begun() == 0
+    }
+
+    /// The needle at work, or the last one that was.
+    pub fn at_work(&self) -> Option<(usize, &Needle)> {
+        let number = self.course.begun().checked_sub(1)?;
+        Some((number, self.implant.as_ref()?.plan.needles.get(number)?))
+    }
+
+    /// Where its tip is when each seed leaves it, deepest first; empty where no needle of a plan is at work.
+    pub fn drops_m(&self) -> &[f64] {
+        let drops = self.at_work().and_then(|(n, _)| self.implant.as_ref()?.drops_m.get(n));
+        drops.map_or(&[], |d| d)
+    }
+}
+
+/// A plan as it is shown.
+pub struct Implant {
+    pub revision: u64,
+    pub plan: ImplantPlan,
+    pub seeds: Vec<Seed>,
+    /// `None` until it has been looked at; while it is looked at again, those of the plan before.
+    pub problems: Option<Arc<Vec<Problem>>>,
+    /// One a needle.
+    pub states: Vec<NeedleState>,
+    /// One a needle: how far its seeds rest from plan on average, where that was rehearsed.
+    pub rest_errors_m: Vec<Option<f64>>,
+    /// One a needle, by rehearsal or as planned.
+    pub drops_m: Vec<Vec<f64>>,
+    pub can_undo: bool,
+    pub can_redo: bool,
+}
+
+impl Implant {
+    pub(super) fn of(
+        revision: u64,
+        history: &History,
+        problems: Option<Arc<Vec<Problem>>>,
+        course: &Course,
+        compensated: &[(Needle, Compensation)],
+    ) -> Self {
+        let plan = history.plan().clone();
+        let found = |needle: &Needle| compensated.iter().find(|(n, _)| n == needle).map(|(_, done)| done);
+        let rest_error_m = |needle: &Needle| {
+            let done = found(needle)?;
+            Some(done.errors_after_m().sum::<f64>() / done.after_m.len().max(1) as f64)
+        };
+        let drops_m = |needle: &Needle| match found(needle) {
+            Some(done) => done.drops.along_m.clone(),
+            None => needle.seeds.iter().map(|s| s.along_m).collect(),
+        };
+        Self {
+            revision,
+            seeds: plan.seeds(),
+            problems,
+            states: (0..plan.needles.len()).map(|n| course.state(n)).collect(),
+            rest_errors_m: plan.needles.iter().map(rest_error_m).collect(),
+            drops_m: plan.needles.iter().map(drops_m).collect(),
+            can_undo: history.can_undo(),
+            can_redo: history.can_redo(),
+            plan,
+        }
+    }
+}

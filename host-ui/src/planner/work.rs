@@ -1,0 +1,123 @@
+//! What takes longer than a frame: a first plan, compensation, files.
+
+use super::ground::Ground;
+use super::job::Job;
+use crate::dose::decay::Interval;
+use crate::dose::{DoseKernel, Source};
+use crate::interrupt::Interrupt;
+use crate::link::{Link, SceneModel};
+use crate::plan::automatic::{self, Aims};
+use crate::plan::{Compensation, ImplantPlan, Limits, LinkRehearser, Needle, compensate, exchange};
+use crate::workflow::Pace;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
+use std::time::{Duration, Instant};
+use stylet_shm_schema::service::Instance;
+
+/// A second host finds the core within this time.
+const FIND_LIMIT: Duration = Duration::from_secs(10);
+const POLL_EVERY: Duration = Duration::from_millis(5);
+
+/// What is being done, for people.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Progress {
+    pub what: String,
+    /// 0 to 1, where that is known.
+    pub share: Option<f32>,
+}
+
+pub enum Told {
+    Progress(Progress),
+    Plan(Result<ImplantPlan, String>),
+    Compensated(Box<(Needle, Compensation)>),
+    /// Nothing follows; in words.
+    End(Result<String, String>),
+}
+
+pub fn automatic(ground: Arc<Ground>) -> Job<Told> {
+    Job::begin("first plan", move |told, _| {
+        let plan = exchange::usual().and_then(|(source, prescription_gy)| {
+            let kernel = DoseKernel::new(&source, Interval::ALL);
+            let aims = Aims::new(prescription_gy);
+            automatic::plan(ground.template, &ground.anatomy, &kernel, &source.model, &aims)
+        });
+        // The window may be gone by now; then nobody wants the answer.
+        let _ = told.send(Told::Plan(plan));
+    })
+}
+
+/// The strength with which the plan covers the target as a first plan does.
+pub fn strength(ground: Arc<Ground>, plan: Arc<ImplantPlan>) -> Job<Told> {
+    Job::begin("strength", move |told, _| {
+        let source = Source::known(&plan.source)
+            .ok_or_else(|| format!("source {} is not known; set the strength by hand", plan.source));
+        let scaled = source.and_then(|source| {
+            let kernel = DoseKernel::new(&source, Interval::ALL);
+            let aims = Aims::new(plan.prescription_gy);
+            automatic::strength_u(&plan, &ground.anatomy, &kernel, &aims)
+        });
+        let _ = told.send(Told::Plan(scaled.map(|u| plan.with_strength(u))));
+    })
+}
+
+pub fn import(path: PathBuf, scene: Arc<SceneModel>) -> Job<Told> {
+    Job::begin("plan reader", move |told, _| {
+        let _ = told.send(Told::Plan(exchange::read(&path, &scene.header)));
+    })
+}
+
+pub fn export(path: PathBuf, plan: Arc<ImplantPlan>, ground: Arc<Ground>) -> Job<Told> {
+    Job::begin("plan writer", move |told, _| {
+        let written = exchange::write(&path, &plan, &ground.frames);
+        let _ = told.send(Told::End(written.map(|()| format!("Plan saved as {}", path.display()))));
+    })
+}
+
+/// Every needle in its turn, through a link of its own: the window's goes on meanwhile.
+pub fn compensation(instance: Instance, needles: Vec<Needle>, pace: Pace) -> Job<Told> {
+    Job::begin("compensation", move |told, interrupt| {
+        let end = all(instance, &needles, &pace, told, interrupt);
+        let _ = told.send(Told::End(end));
+    })
+}
+
+fn all(
+    instance: Instance,
+    needles: &[Needle],
+    pace: &Pace,
+    told: &Sender<Told>,
+    interrupt: &Interrupt,
+) -> Result<String, String> {
+    let mut link = Link::new(instance);
+    let begun = Instant::now();
+    while link.scene().is_none() || link.state().is_none() {
+        if interrupt.asked() || begun.elapsed() > FIND_LIMIT {
+            return Err("rt-core does not answer; see that it runs".to_owned());
+        }
+        link.poll();
+        std::thread::sleep(POLL_EVERY);
+    }
+    let mut failed = Vec::new();
+    for (number, needle) in needles.iter().enumerate() {
+        let name = needle.hole.map_or_else(|| format!("{}", number + 1), |h| h.to_string());
+        let progress = Progress {
+            what: format!("Rehearsing needle {} of {}, {name}", number + 1, needles.len()),
+            share: Some(number as f32 / needles.len() as f32),
+        };
+        let _ = told.send(Told::Progress(progress));
+        let mut rehearser = LinkRehearser {
+            link: &mut link,
+            interrupted: interrupt,
+        };
+        match compensate(needle, pace, &Limits::default(), &mut rehearser) {
+            Ok(done) => drop(told.send(Told::Compensated(Box::new((needle.clone(), done))))),
+            Err(_) if interrupt.asked() => return Err("the compensation was ended".to_owned()),
+            Err(why) => failed.push(format!("needle {name}: {why}")),
+        }
+    }
+    match failed.as_slice() {
+        [] => Ok(format!("{} needles are compensated.", needles.len())),
+        _ => Err(format!("Not compensated: {}", failed.join("; "))),
+    }
+}
