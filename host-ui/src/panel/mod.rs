@@ -55,4 +55,6 @@ pub enum Action {
     SavePicture,
     /// The refusals told so far were read.
     PutRefusalsAway,
+    /// That a device was unplugged was read.
+    PutGoneAway,
 }
