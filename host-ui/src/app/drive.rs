@@ -1,6 +1,7 @@
 //! From how fast a hand on keys, stick or cap wants the tip to go, to goals for the simulated hand.
 
 use crate::controller::{SLOWEST_M_PER_S, Wish};
+use crate::panel::TipOnPath;
 use std::time::Duration;
 
 /// The goal of a driven needle runs ahead of the tip by no more than this, so that it stops when the hand lets go.
@@ -13,20 +14,6 @@ const LONGEST_S: f64 = 0.05;
 const GOALS_EVERY: Duration = Duration::from_millis(10);
 /// The needle goes across the template only with its tip before this depth.
 const OUTSIDE_M: f64 = 1e-3;
-
-/// Where the tip is against the planned path.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TipOnPath {
-    /// From the entry along the path, and how far the path goes.
-    pub depth_m: f64,
-    pub length_m: f64,
-    /// Beside the path: to the right and up, as one sees the template.
-    pub beside_m: [f64; 2],
-    /// How far beside the path there are holes.
-    pub room_m: [[f64; 2]; 2],
-    /// The tip touches nothing.
-    pub is_free: bool,
-}
 
 /// For the simulated hand.
 #[derive(Clone, Copy, Debug, PartialEq)]

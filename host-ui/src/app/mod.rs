@@ -4,8 +4,6 @@ mod act;
 mod drive;
 mod take;
 
-pub use drive::TipOnPath;
-
 use crate::controller::{Controllers, SLOW, System, Wish};
 use crate::dose_desk::DoseDesk;
 use crate::link::{Link, LinkStatus};

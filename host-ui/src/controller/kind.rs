@@ -104,6 +104,10 @@ impl Kind {
         }
     }
 
+    pub fn has_use_for(self, key: KeyCode) -> bool {
+        self.button(key).is_some() || self.slows(key)
+    }
+
     pub fn slows(self, key: KeyCode) -> bool {
         self == Self::Gamepad && [KeyCode::BTN_TL, KeyCode::BTN_TR].contains(&key)
     }

@@ -72,11 +72,12 @@ impl Opened for RawDevice {
     }
 }
 
-/// The window's end. The thread ends when this is dropped.
+/// The window's end of the thread.
 pub struct Controllers {
     latest: Output<(Instant, Latest)>,
     thread: Option<JoinHandle<()>>,
-    _open: Option<Sender<()>>,
+    /// The thread ends when this is gone.
+    open: Option<Sender<()>>,
     counted: [u32; Button::ALL.len()],
 }
 
@@ -94,7 +95,7 @@ impl Controllers {
         Self {
             latest,
             thread: thread.ok(),
-            _open: Some(open),
+            open: Some(open),
             counted: [0; Button::ALL.len()],
         }
     }
@@ -104,7 +105,7 @@ impl Controllers {
         Self {
             latest: triple_buffer(&(Instant::now(), Latest::default())).1,
             thread: None,
-            _open: None,
+            open: None,
             counted: [0; Button::ALL.len()],
         }
     }
@@ -116,7 +117,7 @@ impl Controllers {
         if at.elapsed() > WISH_LASTS {
             latest.wish = Wish::REST;
         }
-        if self._open.is_some() && self.thread.as_ref().is_none_or(JoinHandle::is_finished) {
+        if self.open.is_some() && self.thread.as_ref().is_none_or(JoinHandle::is_finished) {
             latest.holder = None;
             latest.denied = vec![
                 "Gamepads and 3D mice are not read: the thread for it has ended. Open the window again.".to_owned(),

@@ -101,6 +101,8 @@ impl State {
             EventSummary::RelativeAxis(_, axis, counts) if axis.0 <= RelativeAxisCode::REL_Z.0 => {
                 self.set(usize::from(axis.0), counts, Some(now_s));
             }
+            // A set of keys panics at a number that it has no place for.
+            EventSummary::Key(_, key, _) if !self.kind.has_use_for(key) => {}
             EventSummary::Key(_, key, 1) if !self.keys.contains(key) => {
                 self.keys.insert(key);
                 return self.pressed(key).map_or(Taken::Nothing, Taken::Pressed);

@@ -11,7 +11,7 @@ pub mod status;
 pub mod workflow;
 
 pub use seeds::{SeedError, seed_errors};
-pub use shown::{FrameCost, LoadState, Note, Shown};
+pub use shown::{FrameCost, LoadState, Note, Shown, TipOnPath};
 
 use crate::settings::Layout;
 use crate::view::scene3d::Preset;

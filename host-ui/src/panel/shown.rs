@@ -1,6 +1,5 @@
 //! What one frame shows, taken from the link once, so that no panel touches shared memory.
 
-use crate::app::TipOnPath;
 use crate::controller::Latest;
 use crate::dose_desk::DosePicture;
 use crate::link::{Link, LinkStatus};
@@ -64,6 +63,20 @@ pub struct Shown {
     /// The device that was unplugged, until that is put away or a device comes.
     pub gone: Option<String>,
     pub cost: FrameCost,
+}
+
+/// Where the tip is against the planned path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TipOnPath {
+    /// From the entry along the path, and how far the path goes.
+    pub depth_m: f64,
+    pub length_m: f64,
+    /// Beside the path: to the right and up, as one sees the template.
+    pub beside_m: [f64; 2],
+    /// How far beside the path there are holes.
+    pub room_m: [[f64; 2]; 2],
+    /// The tip touches nothing.
+    pub is_free: bool,
 }
 
 /// What the last frame cost this program.
