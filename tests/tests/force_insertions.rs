@@ -73,7 +73,7 @@ fn insertion_from(world: World, start: Vector3<f64>, depth_m: f64, speed_m_per_s
     }
 }
 
-/// Layers with a membrane that a line along z meets in the body at rest, each kind once, as they are felt.
+/// Layers with a membrane that a line along z comes into in the body at rest.
 fn membranes_on_line(world: &World, start: Vector3<f64>, depth_m: f64) -> Vec<(LayerKind, f64)> {
     let (lattice, layers) = (&world.scene.lattice, Layers::default());
     let half_m = 0.5 * lattice.spacing_m;
@@ -88,7 +88,7 @@ fn membranes_on_line(world: &World, start: Vector3<f64>, depth_m: f64) -> Vec<(L
     on_line.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut met: Vec<(LayerKind, f64)> = Vec::new();
     for (at_m, kind) in on_line {
-        if layers.of(kind).has_membrane() && met.iter().all(|(known, _)| *known != kind) {
+        if layers.of(kind).has_membrane() && met.last().is_none_or(|(known, _)| *known != kind) {
             println!("  at rest: {kind:?} from {:.1} mm", at_m * 1e3);
             met.push((kind, at_m));
         }
@@ -113,27 +113,45 @@ fn skin_gives_way_at_its_own_force_and_is_not_the_last_membrane() {
     assert!(was.gave_way.len() >= 2, "{:?}", was.gave_way);
 }
 
-/// The axis of the gland goes through skin, capsule and urethra, the planned path past the urethra: three and two.
-#[test]
-fn what_gives_way_in_the_pelvis_is_what_lies_on_the_needles_line() {
-    let theatre = Theatre::builtin("pelvis");
-    let plan = default_plan(&theatre.scene.header);
-    assert_eq!(plan.direction, [0.0, 0.0, 1.0]);
-    let axis = axis_start(&world("pelvis"));
-    for (what, start) in [("axis of the gland", axis), ("planned path", plan.entry_m.into())] {
-        let depth_m = 0.1;
-        println!("{what}, from {:.1} {:.1} mm:", start.x * 1e3, start.y * 1e3);
-        let at_rest = membranes_on_line(&world("pelvis"), start, depth_m);
-        let was = insertion_from(world("pelvis"), start, depth_m, 0.048);
-        let kinds = |list: &[(LayerKind, f64)]| list.iter().map(|(kind, _)| *kind).collect::<Vec<_>>();
-        assert_eq!(kinds(&was.gave_way), kinds(&at_rest), "{what}");
-        for ((kind, met_m), (_, rest_m)) in was.gave_way.iter().zip(&at_rest) {
-            // The needle pushes before it the tissue that it then meets: never nearer than at rest by more than an element.
-            let moved_m = met_m - rest_m;
-            assert!(
-                (-2e-3..0.02).contains(&moved_m),
-                "{what}, {kind:?}: met {moved_m} m deeper than it lies"
-            );
-        }
+/// What is met may be pushed ahead, or have come nearer, by no more than two elements.
+const MET_WITHIN_M: f64 = 2e-3;
+
+fn assert_met(what: &str, met: &[(LayerKind, f64)], lies: &[(LayerKind, f64)]) {
+    let kinds = |list: &[(LayerKind, f64)]| list.iter().map(|(kind, _)| *kind).collect::<Vec<_>>();
+    assert_eq!(kinds(met), kinds(lies), "{what}");
+    for ((kind, met_m), (_, lies_m)) in met.iter().zip(lies) {
+        let off_m = met_m - lies_m;
+        assert!(
+            off_m.abs() < MET_WITHIN_M,
+            "{what}, {kind:?}: met {off_m} m from its place"
+        );
     }
+}
+
+/// Three punctures in the pelvis were once taken for one too many: the third is the bladder.
+#[test]
+fn what_gives_way_in_the_pelvis_lies_on_the_needles_line() {
+    let plan = default_plan(&Theatre::builtin("pelvis").scene.header);
+    assert_eq!(plan.direction, [0.0, 0.0, 1.0]);
+    let deepest_m = plan.seeds_m.iter().map(|s| plan.along_m(*s)).fold(0.0, f64::max);
+    let start = Vector3::from(plan.entry_m);
+    // To where the window lets a needle go, and on into the bladder.
+    for (what, depth_m, membranes) in [("planned path", deepest_m + 0.01, 2), ("beyond it", 0.11, 3)] {
+        let lies = membranes_on_line(&world("pelvis"), start, depth_m);
+        assert_eq!(lies.len(), membranes, "{what}: {lies:?}");
+        let was = insertion_from(world("pelvis"), start, depth_m, 0.048);
+        assert_met(what, &was.gave_way, &lies);
+    }
+}
+
+/// `docs/physics.md`, layers: the tip is in the urethra already when the capsule before it gives way.
+#[test]
+fn on_the_axis_of_the_gland_the_urethra_is_felt_as_gland_and_the_bladder_gives_way() {
+    let start = axis_start(&world("pelvis"));
+    let lies = membranes_on_line(&world("pelvis"), start, 0.1);
+    let [skin, capsule, _urethra, _capsule, bladder] = lies[..] else {
+        panic!("another line than it was: {lies:?}")
+    };
+    let was = insertion_from(world("pelvis"), start, 0.1, 0.048);
+    assert_met("axis", &was.gave_way, &[skin, capsule, bladder]);
 }
