@@ -4,7 +4,7 @@ use crate::convert::ConvertArgs;
 use crate::dose::command::{DoseArgs, PerturbArgs};
 use crate::dose::files::{SeedDefaults, read_seeds};
 use crate::plan::command::PlanArgs;
-use crate::{app, files, interrupt, procedure, record};
+use crate::{app, controller, files, interrupt, procedure, record};
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -36,12 +36,16 @@ Names that are known follow TG-263: Prostate, PTV, CTV (targets), Urethra, Rectu
 /// Operator's program of Stylet, a haptic simulator of prostate brachytherapy.
 ///
 /// Start `rt-core` first, then `host-ui` for the window. `host-ui procedure` implants the seeds of the default plan
-/// without a window and writes what happened.
+/// without a window and writes what happened. In the window keys, mouse, a gamepad or a 3D mouse hold the needle: F1
+/// lists what they do, `host-ui controllers` those that are plugged in.
 #[derive(Parser, Debug)]
 #[command(name = "host-ui", version, args_conflicts_with_subcommands = true)]
 pub struct Cli {
     #[command(flatten)]
     window: Common,
+    /// Leave gamepads and 3D mice alone: only keys and mouse move the needle
+    #[arg(long)]
+    no_controllers: bool,
     #[command(subcommand)]
     task: Option<Task>,
 }
@@ -61,6 +65,8 @@ struct Common {
 
 #[derive(Subcommand, Debug)]
 enum Task {
+    /// Which gamepads and 3D mice are there to hold the needle, whether they can be read, and what their axes and buttons do
+    Controllers,
     /// Plan, place the needles, insert, drop the seeds while retracting; write result.json, force.csv and, of a plan, a debrief
     Procedure {
         #[command(flatten)]
@@ -157,10 +163,12 @@ impl Cli {
                     instance: instance.clone(),
                     scene: self.window.scene,
                     label: self.window.label,
+                    controllers: !self.no_controllers,
                 });
                 instance.sweep();
                 ended
             }
+            Some(Task::Controllers) => controller::list(),
             Some(Task::Scene(SceneTask::Check { file, label })) => check(&file, label),
             Some(Task::Record {
                 instance: name,

@@ -2,6 +2,7 @@
 
 pub mod app;
 pub mod cli;
+pub mod controller;
 pub mod convert;
 pub mod dose;
 pub mod dose_desk;

@@ -1,5 +1,6 @@
 //! Fixtures for whole-system tests: a core process of its own for each test, and a host that talks to it.
 
+pub mod controllers;
 pub mod hand;
 pub mod phantom;
 pub mod rehearsal;

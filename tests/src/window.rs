@@ -32,6 +32,7 @@ impl Driven {
             instance: core.instance.clone(),
             scene: None,
             label: None,
+            controllers: false,
         };
         let window = Harness::builder()
             .with_size(size)

@@ -77,6 +77,7 @@ fn a_window_that_comes_moves_nothing_by_itself() {
         instance: driven.core.instance.clone(),
         scene: None,
         label: None,
+        controllers: false,
     };
     let mut second = Harness::builder()
         .with_size([1280.0, 800.0])

@@ -16,6 +16,7 @@ fn window_of(instance: &str, size: [f32; 2]) -> Harness<'static, App> {
         instance: Instance::new(instance).expect("a valid name"),
         scene: None,
         label: None,
+        controllers: false,
     };
     Harness::builder()
         .with_size(size)

@@ -1,6 +1,8 @@
 //! What the operator asked for, carried out after all panels are drawn.
 
+use super::drive::{BEFORE_ENTRY_M, Drive};
 use super::{App, Waiting, refusal};
+use crate::controller::Wish;
 use crate::panel::workflow::{Undo, next_action, undo_action};
 use crate::panel::{Action, LoadState};
 use crate::settings::ThemeChoice;
@@ -8,16 +10,10 @@ use crate::workflow::{default_plan, move_values, plan_values};
 use std::time::Instant;
 use stylet_shm_schema::{CommandKind, PARAMETERS};
 
-/// The goal of a driven needle runs ahead of the tip by no more than this, so that it stops when the key is let go.
-const LEAD_M: f64 = 0.004;
 /// A hand on the tip may pull it this far ahead.
 const PULLED_M: f64 = 0.02;
 /// A goal nearer than this to the last one is the same.
 const SAME_GOAL_M: f64 = 0.1e-3;
-/// The needle may be drawn back so far before the entry.
-const BEFORE_ENTRY_M: f64 = 0.02;
-/// A longer frame counts as this long, so that a hiccup is not a jump of the needle.
-const LONGEST_FRAME_S: f64 = 0.05;
 /// Answers that are waited for at once; an older one is no longer told.
 const WAITING_AT_MOST: usize = 64;
 
@@ -38,9 +34,10 @@ impl App {
         }
     }
 
-    /// Sends the hand to a depth along the planned path.
+    /// Sends the hand to a depth along the planned path, or along the line beside it where the needle is.
     fn move_to(&mut self, what: &'static str, depth_m: f64, speed_m_per_s: f64) {
-        let (Some(plan), Some(goal)) = (self.shown.plan, self.shown.on_path_m(depth_m)) else {
+        let goal = self.shown.beside_path_m(depth_m, self.drive.beside_m);
+        let (Some(plan), Some(goal)) = (self.shown.plan, goal) else {
             self.shown.note = Some(refusal(format!("{what}: plan the seeds first")));
             return;
         };
@@ -66,6 +63,7 @@ impl App {
                 };
             }
             Action::SavePicture => self.pictures.request(ctx),
+            Action::PutGoneAway => self.shown.gone = None,
             Action::PutRefusalsAway => {
                 if let Some(session) = &self.shown.session {
                     self.put_away = (session.session_id, session.refused);
@@ -101,7 +99,13 @@ impl App {
             Action::LoadBuiltinScene(number) => {
                 self.send("Built-in scene", CommandKind::LoadBuiltinScene, &[number as f64]);
             }
-            Action::PlaceNeedle => self.move_to("Place needle", 0.0, self.pace.approach_m_per_s),
+            Action::PlaceNeedle => {
+                // In the tissue the needle keeps its line: aside it would tear.
+                if !self.shown.has_punctured() {
+                    self.drive.beside_m = [0.0; 2];
+                }
+                self.move_to("Place needle", 0.0, self.pace.approach_m_per_s);
+            }
             Action::Insert => {
                 let depth = self.shown.deepest_seed_m().unwrap_or(0.0);
                 self.move_to("Insert", depth, self.pace.insert_m_per_s);
@@ -150,39 +154,41 @@ impl App {
     fn stop_run(&mut self) {
         self.run = None;
         self.shown.running = false;
+        if let Some(tip) = self.shown.tip_on_path() {
+            self.drive.stop(&tip);
+        }
         if let Some(depth) = self.shown.path_depth_m() {
             self.move_to("Stop", depth, self.pace.insert_m_per_s);
         }
     }
 
-    /// Held keys move the goal along the path; letting go stops it where the tip is. Without a key a hand may pull the tip.
-    pub(super) fn drive(&mut self, speed_m_per_s: f64, frame_s: f64) {
+    /// Held keys, a stick or a cap move the goal along the path; letting go stops it where the tip is. Without them a hand
+    /// may pull the tip.
+    pub(super) fn drive(&mut self, wish: Wish, frame_s: f64) {
         if self.run.is_some() || !self.shown.is_live() {
-            (self.goal_m, self.pulled_to_m) = (None, None);
+            self.drive.forget();
+            self.pulled_to_m = None;
             return;
         }
-        if speed_m_per_s == 0.0 {
-            if self.goal_m.take().is_some()
-                && let Some(depth) = self.shown.path_depth_m()
-            {
-                self.move_to("Needle", depth, self.pace.insert_m_per_s);
-            } else {
-                self.pull();
+        let Some(tip) = self.shown.tip_on_path() else {
+            self.drive = Drive::default();
+            self.pulled_to_m = None;
+            if wish != Wish::REST {
+                let why = "The needle follows the planned path: plan the seeds first.";
+                self.shown.note = Some(refusal(why.to_owned()));
             }
             return;
-        }
-        self.pulled_to_m = None;
-        let (Some(depth), Some(length)) = (self.shown.path_depth_m(), self.shown.path_length_m()) else {
-            self.shown.note = Some(refusal(
-                "The keys follow the planned path: plan the seeds first.".to_owned(),
-            ));
-            return;
         };
-        let step = speed_m_per_s * frame_s.min(LONGEST_FRAME_S);
-        let ahead = (self.goal_m.unwrap_or(depth) + step).clamp(depth - LEAD_M, depth + LEAD_M);
-        let goal = ahead.clamp(-BEFORE_ENTRY_M, length);
-        self.goal_m = Some(goal);
-        self.move_to("Needle", goal, speed_m_per_s.abs());
+        if Drive::follows(&wish, &tip) {
+            self.pulled_to_m = None;
+            if let Some(goal) = self.drive.step(&wish, &tip, frame_s) {
+                self.move_to("Needle", goal.depth_m, goal.speed_m_per_s);
+            }
+        } else if let Some(depth_m) = self.drive.stop(&tip) {
+            self.move_to("Needle", depth_m, self.pace.insert_m_per_s);
+        } else {
+            self.pull();
+        }
     }
 
     pub(super) fn send_parameters(&mut self) {

@@ -1,9 +1,11 @@
 //! The window: takes what is new, draws the panels, carries out what they ask for. A frame never waits.
 
 mod act;
+mod drive;
 mod plan;
 mod take;
 
+use crate::controller::{Controllers, SLOW, System, Wish};
 use crate::dose_desk::DoseDesk;
 use crate::link::{Link, LinkStatus};
 use crate::loader::Loader;
@@ -31,6 +33,8 @@ pub struct Options {
     pub scene: Option<PathBuf>,
     /// Which label of the file is the gland; all of them when none is given.
     pub label: Option<u8>,
+    /// Whether gamepads and 3D mice may hold the needle.
+    pub controllers: bool,
 }
 
 /// A command that has not been answered yet.
@@ -62,8 +66,10 @@ pub struct App {
     planner: Planner,
     pace: Pace,
     waiting: Vec<Waiting>,
-    /// Where a driven needle is sent, along the path from the entry.
-    goal_m: Option<f64>,
+    controllers: Controllers,
+    drive: drive::Drive,
+    /// Buttons of gamepads and 3D mice since the last frame.
+    pressed: Vec<Action>,
     /// Where a hand on the tip has drawn it in this frame, and where it was last sent to.
     pulled_to_m: Option<f64>,
     pulled_goal_m: Option<f64>,
@@ -138,7 +144,13 @@ impl App {
             planner: Planner::default(),
             pace: Pace::default(),
             waiting: Vec::new(),
-            goal_m: None,
+            controllers: if options.controllers {
+                Controllers::start(System::default())
+            } else {
+                Controllers::none()
+            },
+            drive: drive::Drive::default(),
+            pressed: Vec::new(),
             pulled_to_m: None,
             pulled_goal_m: None,
             put_away: (0, 0),
@@ -147,6 +159,11 @@ impl App {
             parameters: ParametersState::default(),
             help: false,
         }
+    }
+
+    /// Other devices than those of the system.
+    pub fn hold_by(&mut self, controllers: Controllers) {
+        self.controllers = controllers;
     }
 
     fn frame_ui(&mut self, ui: &mut egui::Ui) -> Vec<Action> {
@@ -190,7 +207,7 @@ impl App {
                 actions.extend(self.middle.middle_ui(ui, layout, &self.shown, dose));
             });
         parameters_ui(ui.ctx(), &self.shown, &mut self.parameters);
-        help::help_ui(ui.ctx(), &mut self.help);
+        help::help_ui(ui.ctx(), &self.shown, &mut self.help);
         actions
     }
 
@@ -201,6 +218,21 @@ impl App {
             self.applied = Some(self.settings.clone());
         } else {
             self.settings.scale = ctx.zoom_factor();
+        }
+    }
+
+    /// Keys come before a stick or a cap, which moves nothing while another window has the focus.
+    fn wish(&self, ctx: &egui::Context, keys_m_per_s: f64) -> Wish {
+        if keys_m_per_s != 0.0 {
+            return Wish {
+                along_m_per_s: keys_m_per_s,
+                ..Wish::REST
+            };
+        }
+        match (self.shown.has_focus, ctx.input(|i| i.modifiers.shift)) {
+            (false, _) => Wish::REST,
+            (true, false) => self.shown.controllers.wish,
+            (true, true) => self.shown.controllers.wish.slower(SLOW),
         }
     }
 
@@ -229,10 +261,12 @@ impl eframe::App for App {
         let begun_ns = thread_cpu_ns();
         let uploaded = self.middle.uploaded_bytes();
         self.apply_settings(&ctx);
+        self.shown.has_focus = ctx.input(|i| i.focused);
         self.take();
         let keys = keyboard::read(&ctx);
         let mut actions = self.frame_ui(ui);
         actions.extend(keys.actions);
+        actions.extend(self.pressed.drain(..));
         actions.extend(self.dropped_file(&ctx));
         if ctx.input(|i| i.key_pressed(egui::Key::Escape)) {
             (self.help, self.parameters.open) = (false, false);
@@ -240,7 +274,8 @@ impl eframe::App for App {
         for action in actions {
             self.act(action, &ctx);
         }
-        self.drive(keys.drive_m_per_s, f64::from(ctx.input(|i| i.stable_dt)));
+        let wish = self.wish(&ctx, keys.drive_m_per_s);
+        self.drive(wish, f64::from(ctx.input(|i| i.stable_dt)));
         self.send_parameters();
         self.shown.cost = FrameCost {
             cpu_us: format::us(thread_cpu_ns().saturating_sub(begun_ns)),

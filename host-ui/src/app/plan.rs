@@ -1,5 +1,6 @@
 //! What the operator asked for of a plan of many needles.
 
+use super::drive::Drive;
 use super::{App, refusal};
 use crate::panel::workflow::Progress;
 use crate::panel::{Note, PlanAction};
@@ -93,9 +94,11 @@ impl App {
             let (numbers, tasks) = tasks.into_iter().unzip();
             self.run_needles = numbers;
             self.run = Some(Run::of_needles(tasks, self.pace));
+            self.drive = Drive::default();
         } else if let Some(scene) = &self.shown.scene {
             self.run_needles.clear();
             self.run = Some(Run::new(default_plan(scene), self.pace));
+            self.drive = Drive::default();
         }
     }
 

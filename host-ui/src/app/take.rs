@@ -1,12 +1,15 @@
 //! What came since the last frame: records, answers, files that were read, the script's next action.
 
+use super::drive::Drive;
 use super::{App, refusal};
+use crate::controller::Button;
 use crate::dose_desk::{DoseOf, Wanted};
 use crate::files::LabelVolume;
-use crate::panel::{LoadState, Note};
+use crate::panel::{Action, LoadState, Note};
 use crate::workflow::RunStatus;
 use std::path::Path;
 use std::time::{Duration, Instant};
+use stylet_shm_schema::CommandKind;
 
 const SUM_UP_EVERY: Duration = Duration::from_millis(500);
 /// No answer within this time is told as such.
@@ -16,7 +19,11 @@ impl App {
     /// All that came since the last frame.
     pub(super) fn take(&mut self) {
         self.link.poll();
+        let plan_before = self.shown.plan.map(|p| p.generation);
         self.shown.take(&self.link);
+        if self.shown.plan.map(|p| p.generation) != plan_before {
+            self.drive = Drive::default();
+        }
         let direction = self.shown.state.map_or([0.0, 0.0, 1.0], |s| s.needle_direction);
         let records = self.link.take_records();
         self.history.take(&records, direction);
@@ -24,6 +31,7 @@ impl App {
             self.summed_up = Instant::now();
             self.history.sum_up();
         }
+        self.take_controllers();
         self.take_answers();
         self.take_scene_file();
         self.advance_run();
@@ -54,6 +62,21 @@ impl App {
         }
     }
 
+    fn take_controllers(&mut self) {
+        let (latest, pressed) = self.controllers.take();
+        let before = std::mem::replace(&mut self.shown.controllers, latest);
+        let now = &self.shown.controllers;
+        if now.times_gone != before.times_gone {
+            self.shown.gone = Some(now.gone.clone());
+        } else if before.holder.is_none() && now.holder.is_some() {
+            self.shown.gone = None;
+        }
+        // What is pressed while another window has the focus is meant for that one.
+        if self.shown.has_focus {
+            self.pressed.extend(pressed.into_iter().map(asked_by));
+        }
+    }
+
     /// Those of this run of the core that were not put away.
     fn count_refusals(&mut self) {
         let Some(session) = &self.shown.session else { return };
@@ -80,7 +103,7 @@ impl App {
         if self.shown.is_absent() {
             self.parameters.forget();
             self.waiting.clear();
-            self.goal_m = None;
+            self.drive.forget();
             if self.uploading.take().is_some() {
                 self.shown.load = LoadState::Refused("rt-core went away before it answered".to_owned());
             }
@@ -179,5 +202,14 @@ impl App {
             }
         }
         self.shown.running = self.run.is_some();
+    }
+}
+
+fn asked_by(button: Button) -> Action {
+    match button {
+        Button::Drop => Action::Send(CommandKind::DropSeed),
+        Button::Undo => Action::Undo,
+        Button::Stop => Action::StopRun,
+        Button::Engage => Action::Send(CommandKind::Engage),
     }
 }

@@ -11,7 +11,7 @@ pub mod status;
 pub mod workflow;
 
 pub use seeds::{SeedError, all_errors, own_errors, seed_errors};
-pub use shown::{FrameCost, LoadState, Note, Shown};
+pub use shown::{FrameCost, LoadState, Note, Shown, TipOnPath};
 
 use crate::plan::{Hole, Row};
 use crate::settings::Layout;
@@ -59,6 +59,8 @@ pub enum Action {
     SavePicture,
     /// The refusals told so far were read.
     PutRefusalsAway,
+    /// That a device was unplugged was read.
+    PutGoneAway,
 }
 
 /// What is asked of a plan of many needles; those are counted from 0.

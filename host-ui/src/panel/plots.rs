@@ -7,8 +7,8 @@ use egui::{Color32, RichText};
 use egui_plot::{AxisHints, Bar, BarChart, GridMark, Line, Plot, PlotPoints};
 
 /// What stands between and under the three plots over time.
-const BESIDE_PLOTS: f32 = 462.0;
-const PLOT_HEIGHTS: [f32; 2] = [58.0, 150.0];
+const BESIDE_PLOTS: f32 = 492.0;
+const PLOT_HEIGHTS: [f32; 2] = [48.0, 150.0];
 
 /// The plots share what of `height` the rest leaves.
 pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, height: f32) {

@@ -6,6 +6,9 @@ use crate::{format, theme};
 use egui::RichText;
 use stylet_shm_schema::ThreadReport;
 
+/// What there is room for beside the reason why it does not hold the needle.
+const LONGEST_CONTROLLER: usize = 24;
+
 pub fn setup_ui(ui: &mut egui::Ui, shown: &Shown) {
     ui.separator();
     // Lines of words need less room than widgets.
@@ -36,6 +39,9 @@ pub fn setup_ui(ui: &mut egui::Ui, shown: &Shown) {
             let (link, fine) = link(shown);
             row("link", link, fine);
             row("this window", frame(shown), true);
+            let (controller, fine) = controller(shown);
+            row("controller", controller, fine);
+            row("its axes", axes(shown), true);
         });
 }
 
@@ -61,6 +67,29 @@ fn link(shown: &Shown) -> (String, bool) {
     (text, fine && rubbish == 0)
 }
 
+/// Which device holds the needle, and why it does not where that is so.
+fn controller(shown: &Shown) -> (String, bool) {
+    let Some(device) = &shown.controllers.holder else {
+        return match shown.controllers.denied.is_empty() {
+            true => ("n/a".to_owned(), true),
+            false => ("may not be read".to_owned(), false),
+        };
+    };
+    let name: String = device.name.chars().take(LONGEST_CONTROLLER).collect();
+    if !shown.has_focus {
+        (format!("{name}: not the focus"), false)
+    } else if !device.was_let_go {
+        (format!("{name}: let it go first"), false)
+    } else {
+        (name, true)
+    }
+}
+
+fn axes(shown: &Shown) -> String {
+    let holder = shown.controllers.holder.as_ref();
+    holder.map_or("n/a", |device| device.kind.axes()).to_owned()
+}
+
 fn frame(shown: &Shown) -> String {
     let cost = shown.cost;
     format!(
@@ -73,6 +102,30 @@ fn frame(shown: &Shown) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::controller::{Device, Kind};
+
+    #[test]
+    fn the_controller_is_named_with_its_axes_and_why_it_does_not_move_the_needle() {
+        let mut shown = Shown::empty("lab");
+        assert_eq!(
+            (controller(&shown), axes(&shown)),
+            (("n/a".to_owned(), true), "n/a".to_owned())
+        );
+        shown.controllers.denied.push("Pad may not be read".to_owned());
+        assert!(!controller(&shown).1);
+        let holder = |was_let_go| Device {
+            name: "A gamepad with a name that is long".to_owned(),
+            kind: Kind::Gamepad,
+            was_let_go,
+        };
+        shown.controllers.holder = Some(holder(true));
+        assert_eq!(controller(&shown), ("A gamepad with a name th".to_owned(), true));
+        assert!(axes(&shown).contains("left stick"));
+        shown.controllers.holder = Some(holder(false));
+        assert!(controller(&shown).0.ends_with("let it go first"));
+        shown.has_focus = false;
+        assert!(controller(&shown).0.ends_with("not the focus"));
+    }
 
     #[test]
     fn a_thread_says_what_it_got_and_what_it_asked_for() {

@@ -1,9 +1,12 @@
 //! What one frame shows, taken from the link once, so that no panel touches shared memory.
 
+use crate::controller::Latest;
 use crate::dose_desk::DosePicture;
 use crate::link::{Link, LinkStatus};
+use crate::plan::{HOLES, Template};
 use crate::planner::Planning;
 use crate::workflow::Step;
+use nalgebra::Vector3;
 use std::sync::Arc;
 use stylet_shm_schema::{
     EventKind, Fault, HapticState, ParameterId, ParametersInForce, Phase, PlanInForce, PlannedSeed, SceneHeader,
@@ -58,7 +61,26 @@ pub struct Shown {
     /// Refusals of requests that the operator has not yet put away, and the last reason.
     pub refusals: u64,
     pub last_refusal: String,
+    /// Gamepads and 3D mice, and whether this window has the focus that they need.
+    pub controllers: Latest,
+    pub has_focus: bool,
+    /// The device that was unplugged, until that is put away or a device comes.
+    pub gone: Option<String>,
     pub cost: FrameCost,
+}
+
+/// Where the tip is against the planned path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TipOnPath {
+    /// From the entry along the path, and how far the path goes.
+    pub depth_m: f64,
+    pub length_m: f64,
+    /// Beside the path: to the right and up, as one sees the template.
+    pub beside_m: [f64; 2],
+    /// How far beside the path there are holes.
+    pub room_m: [[f64; 2]; 2],
+    /// The tip touches nothing.
+    pub is_free: bool,
 }
 
 /// What the last frame cost this program.
@@ -97,6 +119,9 @@ impl Shown {
             planning: Planning::default(),
             refusals: 0,
             last_refusal: String::new(),
+            controllers: Latest::default(),
+            has_focus: true,
+            gone: None,
             cost: FrameCost::default(),
         }
     }
@@ -232,6 +257,44 @@ impl Shown {
     pub fn on_path_m(&self, depth_m: f64) -> Option<[f64; 3]> {
         let plan = self.plan.as_ref()?;
         Some([0, 1, 2].map(|i| plan.entry_m[i] + plan.direction[i] * depth_m))
+    }
+
+    /// A place at a depth along the planned path and beside it: to the right and up, as one sees the template.
+    pub fn beside_path_m(&self, depth_m: f64, beside_m: [f64; 2]) -> Option<[f64; 3]> {
+        let on_path = self.on_path_m(depth_m)?;
+        let Some((_, axes)) = self.across() else {
+            return Some(on_path);
+        };
+        Some([0, 1, 2].map(|a| on_path[a] + axes[0][a] * beside_m[0] + axes[1][a] * beside_m[1]))
+    }
+
+    /// The template, and its columns and rows made square to the planned path.
+    fn across(&self) -> Option<(Template, [Vector3<f64>; 2])> {
+        let template = Template::before(self.scene.as_ref()?);
+        let direction = Vector3::from(self.plan.as_ref()?.direction);
+        let columns = Vector3::from(template.columns);
+        let right = (columns - direction * direction.dot(&columns)).try_normalize(1e-3)?;
+        Some((template, [right, right.cross(&direction)]))
+    }
+
+    pub fn tip_on_path(&self) -> Option<TipOnPath> {
+        let (plan, tip) = (self.plan.as_ref()?, self.tip_m()?);
+        let off = |from: [f64; 3], to: [f64; 3]| Vector3::from(to) - Vector3::from(from);
+        let (beside_m, room_m) = self.across().map_or(([0.0; 2], [[0.0; 2]; 2]), |(template, axes)| {
+            let half_m = f64::from(HOLES / 2) * template.pitch_m;
+            let to_middle = off(plan.entry_m, template.middle_m);
+            (
+                axes.map(|axis| off(plan.entry_m, tip).dot(&axis)),
+                axes.map(|axis| [-1.0, 1.0].map(|side| to_middle.dot(&axis) + side * half_m)),
+            )
+        });
+        Some(TipOnPath {
+            depth_m: along(plan, tip),
+            length_m: self.path_length_m()?,
+            beside_m,
+            room_m,
+            is_free: !self.has_punctured() && !self.has_flag(flags::IN_CONTACT),
+        })
     }
 
     pub fn path_end_m(&self) -> Option<[f64; 3]> {

@@ -36,6 +36,29 @@ pub struct Banner {
 
 /// Worst first. What cannot be known is not claimed: without a core nothing is said about its force.
 pub fn banners(shown: &Shown) -> Vec<Banner> {
+    let mut list = of_core(shown);
+    list.extend(of_controllers(shown));
+    list
+}
+
+/// What went, and what may not be read.
+fn of_controllers(shown: &Shown) -> Vec<Banner> {
+    let banner = |title, text, remedy| Banner {
+        severity: Severity::Warn,
+        title,
+        text,
+        remedy,
+    };
+    let gone = shown.gone.as_ref().map(|name| {
+        let text = format!("{name}. The needle stays where it is; keys and mouse still move it.");
+        banner("Unplugged", text, Some(("Put away", Action::PutGoneAway)))
+    });
+    let denied = shown.controllers.denied.iter();
+    let denied = denied.map(|why| banner("A controller is not read", why.clone(), None));
+    gone.into_iter().chain(denied).collect()
+}
+
+fn of_core(shown: &Shown) -> Vec<Banner> {
     match &shown.status {
         LinkStatus::Absent { why } => return vec![absent(shown, why)],
         LinkStatus::Silent { since } => {
@@ -375,6 +398,23 @@ mod tests {
         shown.last_refusal = "needle.puncture_depth = 1000 mm".to_owned();
         assert_eq!(titles(&shown), ["The force is off", "rt-core refused"]);
         assert!(banners(&shown)[1].text.contains("puncture_depth"));
+    }
+
+    #[test]
+    fn a_controller_that_went_and_one_without_rights_are_told_with_or_without_a_core() {
+        for mut shown in [live(), Shown::empty("lab")] {
+            let before = banners(&shown).len();
+            shown.gone = Some("Pad".to_owned());
+            shown
+                .controllers
+                .denied
+                .push("Cap may not be read. Run: that".to_owned());
+            let list = banners(&shown);
+            assert_eq!(list.len(), before + 2);
+            assert!(list[before].text.contains("Pad. The needle stays where it is"));
+            assert_eq!(list[before].remedy, Some(("Put away", Action::PutGoneAway)));
+            assert!(list[before + 1].text.contains("Run: that"));
+        }
     }
 
     #[test]

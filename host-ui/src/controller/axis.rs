@@ -1,0 +1,106 @@
+//! One axis of a device: from counts to the share of the greatest speed.
+
+use evdev::AbsInfo;
+
+/// The core refuses a hand that is slower.
+pub const SLOWEST_M_PER_S: f64 = 1e-4;
+/// Many drivers give no dead zone (`flat`), or one that a worn stick does not keep to: it is at least this share of the way.
+const LEAST_DEAD: f64 = 0.08;
+/// A driver that says that nearly all is dead zone is not believed.
+const MOST_DEAD: f64 = 0.5;
+/// Full deflection of a 3D mouse in counts, where its driver reports relative axes, which have no range.
+const RELATIVE_FULL: f64 = 350.0;
+
+/// Range and dead zone in counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axis {
+    middle: f64,
+    half: f64,
+    /// Share of `half`.
+    dead: f64,
+}
+
+impl Axis {
+    /// `None` for a range that is empty.
+    pub fn absolute(info: &AbsInfo) -> Option<Self> {
+        let (low, high) = (f64::from(info.minimum()), f64::from(info.maximum()));
+        let half = (high - low) / 2.0;
+        (half > 0.0).then(|| Self {
+            middle: (high + low) / 2.0,
+            half,
+            dead: (f64::from(info.flat()) / half).clamp(LEAST_DEAD, MOST_DEAD),
+        })
+    }
+
+    pub fn relative() -> Self {
+        Self {
+            middle: 0.0,
+            half: RELATIVE_FULL,
+            dead: LEAST_DEAD,
+        }
+    }
+
+    /// Counts in the middle of the range, where a driver reports nothing else.
+    pub fn at_rest(&self) -> i32 {
+        self.middle.round() as i32
+    }
+
+    /// -1 to 1: 0 in the dead zone, from its edge on with the square of the way, so that small speeds have most of it.
+    pub fn share(&self, counts: i32) -> f64 {
+        let way = (f64::from(counts) - self.middle) / self.half;
+        let beyond = ((way.abs() - self.dead) / (1.0 - self.dead)).clamp(0.0, 1.0);
+        beyond * beyond * way.signum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn axis(low: i32, high: i32, flat: i32) -> Axis {
+        Axis::absolute(&AbsInfo::new(0, low, high, 0, flat, 0)).expect("a range")
+    }
+
+    #[test]
+    fn dead_zone_is_that_of_the_device_and_begins_without_a_jump() {
+        let stick = axis(-32768, 32767, 8192);
+        for counts in [0, 8000, -8000] {
+            assert_eq!(stick.share(counts), 0.0, "{counts}");
+        }
+        let just_outside = stick.share(8400);
+        assert!(just_outside > 0.0 && just_outside < 1e-3, "{just_outside}");
+        // A quarter is dead: half of what is left is at 5/8 of the way, and gives a quarter of the speed.
+        assert!((stick.share(20480) - 0.25).abs() < 1e-3);
+        assert!((stick.share(-20480) + 0.25).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_share_is_odd_grows_and_ends_at_one_whatever_the_range() {
+        for axis in [
+            axis(0, 255, 0),
+            axis(-350, 350, 0),
+            axis(i32::MIN, i32::MAX, 4095),
+            Axis::relative(),
+        ] {
+            let at = |way: f64| (axis.middle + way * axis.half) as i32;
+            let mut last = -1.0;
+            for step in -100..=100 {
+                let share = axis.share(at(f64::from(step) / 100.0));
+                assert!(share >= last && (-1.0..=1.0).contains(&share), "{step}: {share}");
+                last = share;
+            }
+            assert!((axis.share(i32::MAX) - 1.0).abs() < 1e-9);
+            assert!((axis.share(i32::MIN) + 1.0).abs() < 1e-9);
+            assert_eq!(axis.share(axis.at_rest()), 0.0);
+        }
+    }
+
+    #[test]
+    fn a_driver_without_or_with_a_senseless_dead_zone_or_range_gives_a_usable_axis() {
+        assert_eq!(axis(0, 255, 0).share(127 + 9), 0.0, "8 % of the way is dead");
+        assert!(axis(0, 255, 0).share(127 + 14) > 0.0);
+        assert_eq!(axis(0, 255, i32::MAX).share(255), 1.0);
+        assert!(Axis::absolute(&AbsInfo::new(0, 0, 0, 0, 0, 0)).is_none());
+        assert!(Axis::absolute(&AbsInfo::new(0, 5, -5, 0, 0, 0)).is_none());
+    }
+}

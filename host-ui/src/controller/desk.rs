@@ -1,0 +1,389 @@
+//! All devices together: who came, who went, who may not be read, and which one holds the needle.
+
+use super::found::Found;
+use super::kind::{Button, Kind};
+use super::state::{State, Taken, Whole, Wish};
+use evdev::InputEvent;
+use std::io::{self, ErrorKind};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// A node comes before its rights do: what cannot be opened is told when it could not be so often.
+const TOLD_AFTER: u32 = 2;
+
+/// The system's devices, or those of a test.
+pub trait Ground {
+    type Opened: Opened;
+    fn list(&mut self) -> Vec<Found>;
+    fn open(&mut self, found: &Found) -> io::Result<Self::Opened>;
+    /// Until one of them has something to say, or a time has passed.
+    fn wait(&mut self, opened: &[&Self::Opened], at_most: Duration);
+}
+
+/// A device that is being read. Neither call may block.
+pub trait Opened {
+    /// Adds what came; `WouldBlock` for nothing.
+    fn fetch(&mut self, into: &mut Vec<InputEvent>) -> io::Result<()>;
+    fn whole(&self) -> io::Result<Whole>;
+}
+
+/// A device, as the window shows it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Device {
+    pub name: String,
+    pub kind: Kind,
+    /// The stick or the cap must be at rest once before the needle follows it.
+    pub was_let_go: bool,
+}
+
+/// What the window needs to know, as of the last reading.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Latest {
+    /// The device that holds the needle, or would: the one that was moved last.
+    pub holder: Option<Device>,
+    pub wish: Wish,
+    /// How often each of [`Button::ALL`] was pressed since the start.
+    pub presses: [u32; Button::ALL.len()],
+    /// Devices that are there and cannot be read, each with the reason and what to do.
+    pub denied: Vec<String>,
+    /// The device that went last, and how many have gone.
+    pub gone: String,
+    pub times_gone: u32,
+}
+
+struct Held<O> {
+    found: Found,
+    opened: O,
+    state: State,
+}
+
+/// Devices that are there, and what they asked for.
+pub struct Desk<G: Ground> {
+    ground: G,
+    held: Vec<Held<G::Opened>>,
+    refused: Vec<(PathBuf, u32, String)>,
+    holder: Option<PathBuf>,
+    latest: Latest,
+    events: Vec<InputEvent>,
+}
+
+impl<G: Ground> Desk<G> {
+    pub fn new(ground: G) -> Self {
+        Self {
+            ground,
+            held: Vec::new(),
+            refused: Vec::new(),
+            holder: None,
+            latest: Latest::default(),
+            events: Vec::new(),
+        }
+    }
+
+    /// Devices that came and went since the last look.
+    pub fn look(&mut self) {
+        let list = self.ground.list();
+        let is_there = |path: &PathBuf| list.iter().any(|f| f.path == *path);
+        let gone: Vec<PathBuf> = self
+            .held
+            .iter()
+            .map(|h| h.found.path.clone())
+            .filter(|p| !is_there(p))
+            .collect();
+        for path in gone {
+            self.let_go(&path);
+        }
+        self.refused.retain(|(path, ..)| is_there(path));
+        for found in list {
+            if !self.held.iter().any(|h| h.found.path == found.path) {
+                self.come(found);
+            }
+        }
+        let told = self.refused.iter().filter(|(_, times, _)| *times >= TOLD_AFTER);
+        self.latest.denied = told.map(|(.., why)| why.clone()).collect();
+    }
+
+    fn come(&mut self, found: Found) {
+        let opened = self
+            .ground
+            .open(&found)
+            .and_then(|opened| Ok((opened.whole()?, opened)));
+        match opened {
+            Ok((whole, opened)) => {
+                self.refused.retain(|(path, ..)| *path != found.path);
+                let state = State::new(found.kind, &whole);
+                self.held.push(Held { found, opened, state });
+            }
+            Err(e) => {
+                let why = reason(&found, &e);
+                match self.refused.iter_mut().find(|(path, ..)| *path == found.path) {
+                    Some((_, times, text)) => (*times, *text) = (times.saturating_add(1), why),
+                    None => self.refused.push((found.path, 1, why)),
+                }
+            }
+        }
+    }
+
+    fn let_go(&mut self, path: &PathBuf) {
+        if let Some(at) = self.held.iter().position(|h| h.found.path == *path) {
+            let held = self.held.remove(at);
+            self.latest.gone = held.found.name;
+            self.latest.times_gone = self.latest.times_gone.wrapping_add(1);
+        }
+        if self.holder.as_ref() == Some(path) {
+            self.holder = None;
+        }
+    }
+
+    /// What came from all devices; a device that fails has gone.
+    pub fn read(&mut self, now_s: f64) -> &Latest {
+        let mut failed = Vec::new();
+        for held in &mut self.held {
+            self.events.clear();
+            let read = read_one(held, &mut self.events, now_s, &mut self.latest.presses);
+            if read.is_err() {
+                failed.push(held.found.path.clone());
+            }
+        }
+        for path in failed {
+            self.let_go(&path);
+        }
+        self.choose(now_s);
+        &self.latest
+    }
+
+    /// One device at a time: another takes over only while the needle is at rest.
+    fn choose(&mut self, now_s: f64) {
+        let wish = |h: &Held<G::Opened>| h.state.wish(now_s);
+        let holds = |h: &&Held<G::Opened>| Some(&h.found.path) == self.holder.as_ref();
+        let present = self.held.iter().find(holds);
+        let holder = present
+            .filter(|h| wish(h) != Wish::REST)
+            .or_else(|| self.held.iter().find(|h| wish(h) != Wish::REST))
+            .or(present)
+            .or(self.held.first());
+        self.latest.wish = holder.map_or(Wish::REST, wish);
+        self.latest.holder = holder.map(|h| Device {
+            name: h.found.name.clone(),
+            kind: h.found.kind,
+            was_let_go: h.state.was_let_go(),
+        });
+        self.holder = holder.map(|h| h.found.path.clone());
+    }
+
+    pub fn wait(&mut self, at_most: Duration) {
+        let opened: Vec<&G::Opened> = self.held.iter().map(|h| &h.opened).collect();
+        self.ground.wait(&opened, at_most);
+    }
+}
+
+fn read_one<O: Opened>(
+    held: &mut Held<O>,
+    events: &mut Vec<InputEvent>,
+    now_s: f64,
+    presses: &mut [u32; Button::ALL.len()],
+) -> io::Result<()> {
+    match held.opened.fetch(events) {
+        Err(e) if ![ErrorKind::WouldBlock, ErrorKind::Interrupted].contains(&e.kind()) => return Err(e),
+        _ => {}
+    }
+    let mut count = |button: Button| {
+        let count = &mut presses[button as usize];
+        *count = count.wrapping_add(1);
+    };
+    for event in events.drain(..) {
+        match held.state.take(event, now_s) {
+            Taken::Nothing => {}
+            Taken::Pressed(button) => count(button),
+            Taken::Lost => {
+                let whole = held.opened.whole()?;
+                held.state.read_anew(&whole).into_iter().for_each(&mut count);
+            }
+        }
+    }
+    held.state.note_rest(now_s);
+    Ok(())
+}
+
+/// With the command that cures it.
+pub(super) fn reason(found: &Found, error: &io::Error) -> String {
+    let (name, path) = (&found.name, found.path.display());
+    if error.kind() == ErrorKind::PermissionDenied {
+        format!(
+            "{name} ({path}) may not be read. Run: sudo usermod -aG input $USER and log in again, or add a udev rule (docs/controllers.md)."
+        )
+    } else {
+        format!("{name} ({path}) cannot be read: {error}. Unplug it and plug it in again.")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use evdev::{AbsInfo, AbsoluteAxisCode, AttributeSet, EventType, KeyCode};
+    use std::cell::RefCell;
+    use std::collections::VecDeque;
+    use std::rc::Rc;
+
+    type Queue = Rc<RefCell<VecDeque<io::Result<InputEvent>>>>;
+
+    /// Two gamepads at most, with what they are to say.
+    #[derive(Clone, Default)]
+    struct Table {
+        there: Rc<RefCell<Vec<&'static str>>>,
+        locked: Rc<RefCell<bool>>,
+        queues: [Queue; 2],
+    }
+
+    struct Pad(Queue);
+
+    impl Ground for Table {
+        type Opened = Pad;
+
+        fn list(&mut self) -> Vec<Found> {
+            let found = |name: &&str| Found {
+                path: PathBuf::from(name),
+                name: format!("pad {name}"),
+                kind: Kind::Gamepad,
+                vendor: 1,
+            };
+            self.there.borrow().iter().map(found).collect()
+        }
+
+        fn open(&mut self, found: &Found) -> io::Result<Pad> {
+            if *self.locked.borrow() {
+                return Err(ErrorKind::PermissionDenied.into());
+            }
+            Ok(Pad(self.queues[usize::from(found.path.ends_with("b"))].clone()))
+        }
+
+        fn wait(&mut self, _: &[&Pad], _: Duration) {}
+    }
+
+    impl Opened for Pad {
+        fn fetch(&mut self, into: &mut Vec<InputEvent>) -> io::Result<()> {
+            while let Some(event) = self.0.borrow_mut().pop_front() {
+                into.push(event?);
+            }
+            Err(ErrorKind::WouldBlock.into())
+        }
+
+        fn whole(&self) -> io::Result<Whole> {
+            Ok(Whole {
+                axes: vec![(AbsoluteAxisCode::ABS_Y, AbsInfo::new(0, -100, 100, 0, 0, 0))],
+                keys: AttributeSet::new(),
+            })
+        }
+    }
+
+    impl Table {
+        fn with(there: &[&'static str]) -> (Self, Desk<Self>) {
+            let table = Self::default();
+            *table.there.borrow_mut() = there.to_vec();
+            let mut desk = Desk::new(table.clone());
+            desk.look();
+            (table, desk)
+        }
+
+        fn says(&self, pad: usize, kind: EventType, code: u16, value: i32) {
+            let mut queue = self.queues[pad].borrow_mut();
+            queue.push_back(Ok(InputEvent::new(kind.0, code, value)));
+            queue.push_back(Ok(InputEvent::new(EventType::SYNCHRONIZATION.0, 0, 0)));
+        }
+
+        /// Away from the operator by so many of 100.
+        fn pushes(&self, pad: usize, by: i32) {
+            self.says(pad, EventType::ABSOLUTE, AbsoluteAxisCode::ABS_Y.0, -by);
+        }
+    }
+
+    fn holder(latest: &Latest) -> &str {
+        latest.holder.as_ref().map_or("n/a", |h| h.name.as_str())
+    }
+
+    #[test]
+    fn a_device_that_comes_holds_the_needle_and_one_that_goes_leaves_it_at_rest_and_is_told() {
+        let (table, mut desk) = Table::with(&[]);
+        assert_eq!(holder(desk.read(0.0)), "n/a");
+        table.there.borrow_mut().push("a");
+        desk.look();
+        assert_eq!(holder(desk.read(0.0)), "pad a");
+        table.pushes(0, 100);
+        assert!(desk.read(0.0).wish.along_m_per_s > 0.039);
+        table.there.borrow_mut().clear();
+        desk.look();
+        let latest = desk.read(0.0);
+        assert_eq!((holder(latest), latest.wish), ("n/a", Wish::REST));
+        assert_eq!((latest.gone.as_str(), latest.times_gone), ("pad a", 1));
+    }
+
+    #[test]
+    fn a_device_that_fails_while_it_is_read_has_gone_at_once() {
+        let (table, mut desk) = Table::with(&["a"]);
+        table.pushes(0, 100);
+        assert!(desk.read(0.0).wish != Wish::REST);
+        // ENODEV, what the kernel says of a device that was pulled out.
+        table.queues[0]
+            .borrow_mut()
+            .push_back(Err(io::Error::from_raw_os_error(19)));
+        let latest = desk.read(0.0);
+        assert_eq!((latest.wish, latest.times_gone, holder(latest)), (Wish::REST, 1, "n/a"));
+    }
+
+    #[test]
+    fn another_device_takes_over_only_while_the_needle_is_at_rest() {
+        let (table, mut desk) = Table::with(&["a", "b"]);
+        assert_eq!(holder(desk.read(0.0)), "pad a");
+        table.pushes(1, 50);
+        assert_eq!(holder(desk.read(0.0)), "pad b");
+        table.pushes(0, -100);
+        let latest = desk.read(0.0);
+        assert_eq!(holder(latest), "pad b");
+        assert!(latest.wish.along_m_per_s > 0.0, "the other one pulls in vain");
+        table.pushes(1, 0);
+        let latest = desk.read(0.0);
+        assert_eq!(holder(latest), "pad a");
+        assert!(latest.wish.along_m_per_s < 0.0);
+    }
+
+    #[test]
+    fn buttons_of_every_device_are_counted() {
+        let (table, mut desk) = Table::with(&["a", "b"]);
+        for pad in [0, 1] {
+            table.says(pad, EventType::KEY, KeyCode::BTN_SOUTH.0, 1);
+        }
+        table.says(0, EventType::KEY, KeyCode::BTN_START.0, 1);
+        let latest = desk.read(0.0);
+        let pressed = |button: Button| latest.presses[button as usize];
+        assert_eq!(
+            (pressed(Button::Drop), pressed(Button::Engage), pressed(Button::Undo)),
+            (2, 1, 0)
+        );
+    }
+
+    #[test]
+    fn lost_events_have_the_state_read_anew() {
+        let (table, mut desk) = Table::with(&["a"]);
+        table.pushes(0, 100);
+        desk.read(0.0);
+        table.says(0, EventType::SYNCHRONIZATION, 3, 0);
+        // The device says that its stick is in the middle.
+        assert_eq!(desk.read(0.0).wish, Wish::REST);
+    }
+
+    #[test]
+    fn a_device_without_permission_is_told_with_its_cure_until_it_can_be_read() {
+        let (table, mut desk) = Table::with(&[]);
+        *table.locked.borrow_mut() = true;
+        table.there.borrow_mut().push("a");
+        desk.look();
+        assert!(desk.read(0.0).denied.is_empty(), "rights come after the node");
+        desk.look();
+        let denied = desk.read(0.0).denied.clone();
+        assert_eq!(denied.len(), 1);
+        assert!(denied[0].contains("usermod -aG input"), "{denied:?}");
+        *table.locked.borrow_mut() = false;
+        desk.look();
+        let latest = desk.read(0.0);
+        assert_eq!((holder(latest), latest.denied.len()), ("pad a", 0));
+    }
+}

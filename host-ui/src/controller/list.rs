@@ -1,0 +1,42 @@
+//! What `host-ui controllers` prints: each device, whether it can be read, and what it does.
+
+use super::found::{Found, Places, find};
+use super::kind::Kind;
+use super::{Ground, Opened, System};
+
+/// Tells what there is; `Err` where a device cannot be read, with what to do about it.
+pub fn list() -> Result<(), String> {
+    let found = find(&Places::default());
+    if found.is_empty() {
+        println!("n/a: no gamepad and no 3D mouse is plugged in");
+        return Ok(());
+    }
+    let mut troubles = Vec::new();
+    for device in &found {
+        println!("{} ({}, {})", device.name, device.kind.name(), device.path.display());
+        if let Err(why) = try_one(device) {
+            troubles.push(why);
+        }
+    }
+    for kind in [Kind::Gamepad, Kind::Mouse3d] {
+        if found.iter().any(|f| f.kind == kind) {
+            println!("\n{}:", kind.name());
+            for (what, does) in kind.uses() {
+                println!("  {what:26}{does}");
+            }
+        }
+    }
+    if troubles.is_empty() {
+        Ok(())
+    } else {
+        Err(troubles.join("\n"))
+    }
+}
+
+fn try_one(found: &Found) -> Result<(), String> {
+    let opened = System::default().open(found);
+    opened
+        .and_then(|o| o.whole())
+        .map(|_| ())
+        .map_err(|e| super::desk::reason(found, &e))
+}

@@ -1,0 +1,27 @@
+//! Gamepads and 3D mice that hold the needle: found, read and understood on a thread of their own.
+//!
+//! Events go one way: `found` (which devices there are) → `state` (events to a [`Wish`]) → `desk` (which device holds
+//! the needle) → `reader` (the thread) → the window, which asks the core to move the hand as it does for the mouse.
+
+mod axis;
+mod desk;
+mod found;
+mod kind;
+mod list;
+mod reader;
+mod state;
+
+pub use axis::{Axis, SLOWEST_M_PER_S};
+pub use desk::{Desk, Device, Ground, Latest, Opened};
+pub use found::{Found, Places, find};
+pub use kind::{Button, Kind};
+pub use list::list;
+pub use reader::{Controllers, System};
+pub use state::{Whole, Wish};
+
+/// Speed of the tip along the needle with the stick or the cap as far as it goes; that of the keys.
+pub const ALONG_M_PER_S: f64 = 0.04;
+/// The same across the template: a hole in half a second.
+pub const ACROSS_M_PER_S: f64 = 0.01;
+/// What the shoulder buttons and Shift leave of it.
+pub const SLOW: f64 = 0.25;
