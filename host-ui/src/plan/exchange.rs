@@ -41,7 +41,7 @@ pub fn write(path: &Path, plan: &ImplantPlan, frames: &Frames) -> Result<(), Str
     let bytes = if has_ending(path, "toml") {
         file::to_text(plan, frames).map_err(told)?.into_bytes()
     } else if has_ending(path, "csv") {
-        file::seeds_to_csv(&plan.seeds(), frames).into_bytes()
+        file::seeds_to_csv(plan, frames).into_bytes()
     } else if has_ending(path, "dcm") {
         seed_plan(plan, frames).and_then(|p| plan::bytes(&p)).map_err(told)?
     } else {
