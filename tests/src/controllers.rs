@@ -60,7 +60,6 @@ impl Ground for Table {
             path: "/nodes/event7".into(),
             name: format!("Test {}", kind.name()),
             kind,
-            vendor: 1,
         });
         found.into_iter().collect()
     }

@@ -244,7 +244,6 @@ mod tests {
                 path: PathBuf::from(name),
                 name: format!("pad {name}"),
                 kind: Kind::Gamepad,
-                vendor: 1,
             };
             self.there.borrow().iter().map(found).collect()
         }

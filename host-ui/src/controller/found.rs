@@ -28,7 +28,6 @@ pub struct Found {
     pub path: PathBuf,
     pub name: String,
     pub kind: Kind,
-    pub vendor: u16,
 }
 
 /// In the order in which they came.
@@ -69,7 +68,6 @@ fn look(places: &Places, event: &str) -> Option<Found> {
         path: places.nodes.join(event),
         name: if name.is_empty() { kind.name().to_owned() } else { name },
         kind,
-        vendor,
     })
 }
 
