@@ -12,7 +12,9 @@ pub fn help_ui(ctx: &egui::Context, open: &mut bool) {
             egui::Grid::new("keys")
                 .num_columns(2)
                 .spacing([24.0, 6.0])
+                .min_row_height(18.0)
                 .show(ui, |ui| {
+                    ui.spacing_mut().interact_size.y = 18.0;
                     for (keys, what) in keyboard::KEYS {
                         ui.label(theme::strong(keys));
                         ui.label(what);
