@@ -22,7 +22,7 @@ test: deps-test ## Install what the tests need, build everything, run all tests
 	$(CARGO) test --release --workspace -- --test-threads=1
 
 picture: deps-test build ## Draw the pictures of the README and the tour anew
-	UPDATE_SNAPSHOTS=1 $(CARGO) test --release -p stylet-tests --test ui_live --test ui_states --test ui_window -- --test-threads=1
+	UPDATE_SNAPSHOTS=1 $(CARGO) test --release -p stylet-tests --test ui_live --test ui_plan --test ui_states --test ui_window -- --test-threads=1
 
 report: ## Speed against error of every tissue model, into benches/runs/<date>-<host> (some minutes)
 	$(CARGO) run --release -p stylet-benches --bin report

@@ -5,6 +5,7 @@ use crate::dose::isodose::isodose;
 use crate::dose::{DoseGrid, DoseKernel, DosePoints, Dvh, Metric, Seed, Source};
 use crate::link::SceneModel;
 use crate::plan::exchange::USUAL_SOURCE;
+use crate::view::mesh::{self, SurfaceVertex};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use stylet_shm_schema::{SceneHeader, SeedPose, role};
@@ -28,6 +29,9 @@ pub struct Shell {
     pub level: usize,
     pub points_m: Vec<[f32; 3]>,
     pub triangles: Vec<[u32; 3]>,
+    /// As the card takes them: made here, because that takes longer than a frame has.
+    pub vertices: Vec<SurfaceVertex>,
+    pub indices: Vec<u32>,
 }
 
 /// One measure of one structure, ready to be read.
@@ -265,10 +269,16 @@ fn picture(request: &Request, source: &Source, kernel: &DoseKernel) -> DosePictu
 
 fn shell(grid: &DoseGrid, level: usize, prescription_gy: f64) -> Shell {
     let surface = isodose(grid, LEVELS[level] * prescription_gy);
+    let points_m: Vec<[f32; 3]> = surface.points_m.iter().map(|p| p.map(|c| c as f32)).collect();
+    let triangles: Vec<[u32; 3]> = surface.triangles.iter().map(|t| t.map(|i| i as u32)).collect();
+    let mut vertices = Vec::new();
+    mesh::surface(&points_m, &triangles, &mut vertices);
     Shell {
         level,
-        points_m: surface.points_m.iter().map(|p| p.map(|c| c as f32)).collect(),
-        triangles: surface.triangles.iter().map(|t| t.map(|i| i as u32)).collect(),
+        indices: mesh::indices(&triangles, points_m.len()),
+        points_m,
+        triangles,
+        vertices,
     }
 }
 

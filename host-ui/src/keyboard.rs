@@ -6,16 +6,15 @@ use egui::{Key, Modifiers};
 use stylet_shm_schema::CommandKind;
 
 /// Every key, for the overlay and the manual.
-pub const KEYS: [(&str, &str); 26] = [
+pub const KEYS: [(&str, &str); 25] = [
     ("W  or  Up", "advance the needle along its path while held"),
     ("S  or  Down", "retract the needle while held"),
     ("Shift with W, S", "four times slower"),
     ("Enter", "the one thing to do in the present step"),
     ("Space", "drop a seed at the tip"),
-    ("Ctrl+Z", "take the last seed back, or else the plan"),
     (
-        "Ctrl+Z, Ctrl+Shift+Z",
-        "while a plan is edited: take the last change back, put it back",
+        "Ctrl+Z",
+        "take the last seed or change of the plan back; with Shift put it back",
     ),
     (
         "Arrows, Enter",

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::SceneHeader;
 use stylet_tests::scratch;
-use stylet_tests::window::{Driven, is_at_rest, misplaced};
+use stylet_tests::window::{Driven, is_at_rest, keep_for_docs, misplaced};
 
 const SMALL: [f32; 2] = [1280.0, 800.0];
 const LARGE: [f32; 2] = [1920.0, 1080.0];
@@ -256,7 +256,7 @@ fn an_automatic_plan_covers_the_target_and_nothing_is_wrong_with_it() {
         driven.window.run_steps(1);
         std::thread::sleep(Duration::from_millis(10));
     }
-    driven.picture("plan-automatic");
+    keep_for_docs(&driven.picture("plan-automatic"), "plan");
     // D90 and V100 reach what they should.
     assert!(driven.window.query_all_by_label("met").count() >= 2);
     let problems = misplaced(&driven.window);
@@ -359,6 +359,7 @@ fn cost_of_a_frame_with_a_hundred_seeds() {
     pressed(&mut driven, "edits in a row", keys, Modifiers::SHIFT, 12);
     driven.press(Key::Escape);
     driven.press(Key::I);
+    let chosen = plan(&driven).needles[5].hole.expect("a hole");
     pressed(
         &mut driven,
         "3D view turned, no isodose",
@@ -366,7 +367,10 @@ fn cost_of_a_frame_with_a_hundred_seeds() {
         Modifiers::NONE,
         12,
     );
-    driven.window.get_by_label_contains("F6: needle").click();
+    let chosen = format!("{chosen}: needle 6");
+    // The template as a whole says its hole too, before the hole does.
+    let holes = driven.window.get_all_by_label_contains(&chosen);
+    holes.last().expect("the hole").click();
     driven.window.run_steps(3);
     pressed(&mut driven, "edits in a row, no isodose", keys, Modifiers::SHIFT, 12);
 }

@@ -126,7 +126,7 @@ impl Kind {
         let across = format::speed(super::ACROSS_M_PER_S);
         match self {
             Self::Gamepad => vec![
-                ("Left stick", format!("away goes in, towards you out: up to {along}")),
+                ("Left stick", format!("away in, back out: up to {along}")),
                 ("Shoulder buttons, Shift", "four times slower".to_owned()),
                 ("Lower button (A, cross)", "drop a seed at the tip".to_owned()),
                 ("Right button (B, circle)", "stop the needle, and the script".to_owned()),

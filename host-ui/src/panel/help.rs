@@ -43,8 +43,12 @@ fn controllers_ui(ui: &mut egui::Ui, shown: &Shown) {
 }
 
 fn rows_ui<S: Into<String>>(ui: &mut egui::Ui, id: &str, rows: impl IntoIterator<Item = (&'static str, S)>) {
-    let grid = egui::Grid::new(id).num_columns(2).spacing([16.0, 6.0]);
+    let grid = egui::Grid::new(id)
+        .num_columns(2)
+        .spacing([16.0, 6.0])
+        .min_row_height(18.0);
     grid.show(ui, |ui| {
+        ui.spacing_mut().interact_size.y = 18.0;
         for (what, does) in rows {
             ui.label(theme::strong(what));
             ui.label(does.into());

@@ -163,7 +163,7 @@ pub fn compensate(
                 share *= 0.5;
                 tried = vec![best.clone()];
             }
-            Err(why) => return Err(why),
+            Err(_) => break,
         }
     }
     let vectors = |t: &Tried| t.error_m.iter().map(|e| (*e).into()).collect();

@@ -4,6 +4,7 @@
 
 use super::marks::{MarkVertex, Marks};
 use super::mesh::SurfaceVertex;
+use crate::dose_desk;
 use bytemuck::{Pod, Zeroable};
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
@@ -182,7 +183,7 @@ impl Gpu {
     }
 
     /// Vertices and indices of each isodose surface.
-    pub fn set_shells(&mut self, shells: &[(Vec<SurfaceVertex>, Vec<u32>)]) {
+    pub fn set_shells(&mut self, shells: &[dose_desk::Shell]) {
         let device = &self.state.device;
         while self.shells.len() < shells.len() {
             self.shells.push(Shell {
@@ -192,9 +193,9 @@ impl Gpu {
             });
         }
         self.shells.truncate(shells.len());
-        for (shell, (vertices, indices)) in self.shells.iter_mut().zip(shells) {
-            self.uploaded_bytes += shell.vertices.write(&self.state, vertices);
-            self.uploaded_bytes += shell.indices.write(&self.state, indices);
+        for (shell, surface) in self.shells.iter_mut().zip(shells) {
+            self.uploaded_bytes += shell.vertices.write(&self.state, &surface.vertices);
+            self.uploaded_bytes += shell.indices.write(&self.state, &surface.indices);
         }
     }
 

@@ -101,7 +101,7 @@ impl Marks {
 
     /// Seeds of needles that are not at work: the same wire sphere in thin lines, since there may be a hundred.
     pub fn planned_seeds_thin(&mut self, centers_m: impl Iterator<Item = [f64; 3]>, direction: [f64; 3]) {
-        const STEPS: usize = 12;
+        const STEPS: usize = 10;
         let axis = unit_or_z(single(direction));
         let (u, v) = frame_about(axis);
         let about = |(a, b): (V, V)| {

@@ -5,7 +5,7 @@ mod gpu;
 mod kinds;
 mod legend;
 mod marks;
-mod mesh;
+pub mod mesh;
 pub mod middle;
 mod pick;
 pub mod scene3d;

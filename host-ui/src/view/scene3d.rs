@@ -278,7 +278,7 @@ impl Scene3d {
         let number = dose.map_or(0, |d| d.number);
         if self.shells != number {
             self.shells = number;
-            gpu.set_shells(&shells(dose));
+            gpu.set_shells(dose.map_or(&[], |d| &d.shells));
         }
         let key = Key {
             camera: self.camera,
@@ -326,17 +326,6 @@ impl Scene3d {
         }
         gpu.texture()
     }
-}
-
-fn shells(dose: Option<&Arc<DosePicture>>) -> Vec<(Vec<SurfaceVertex>, Vec<u32>)> {
-    let shells = dose.iter().flat_map(|d| &d.shells);
-    shells
-        .map(|shell| {
-            let mut vertices = Vec::new();
-            mesh::surface(&shell.points_m, &shell.triangles, &mut vertices);
-            (vertices, mesh::indices(&shell.triangles, shell.points_m.len()))
-        })
-        .collect()
 }
 
 /// The plane through the cursor whose near side is cut away.

@@ -52,6 +52,8 @@ pub struct Slices {
     extent_m: f64,
     zoom: f64,
     lines: [Lines; 3],
+    /// The frame in which a new dose was cut last.
+    dose_cut_in: u64,
     /// The pointer holds the needle.
     holds_needle: bool,
 }
@@ -72,6 +74,7 @@ impl Slices {
             extent_m: 0.06,
             zoom: 1.0,
             lines: Default::default(),
+            dose_cut_in: 0,
             holds_needle: false,
         }
     }
@@ -190,7 +193,12 @@ impl Slices {
             }
         }
         let dose = dose.filter(|_| view.isodose);
-        self.lines[number].update(&plane, (&self.positions_m, self.moved), &self.contours, dose);
+        // One slice a frame, so that no frame waits for all three.
+        let pass = ui.ctx().cumulative_pass_nr();
+        let surface = (&self.positions_m[..], self.moved);
+        if self.lines[number].update(&plane, surface, &self.contours, dose, self.dose_cut_in != pass) {
+            self.dose_cut_in = pass;
+        }
         let overlay = Overlay {
             painter: &painter,
             plane: &plane,

@@ -22,43 +22,49 @@ const DASHES: [[f32; 2]; 4] = [[2.0, 3.0], [1.0, 0.0], [8.0, 3.0], [3.0, 2.0]];
 /// Lines of one slice, cut anew only when the plane or what it cuts has changed.
 #[derive(Default)]
 pub struct Lines {
-    key: Option<([f64; 4], u64, u64)>,
+    /// Plane and surface of the contours; plane and dose of the isodose lines.
+    body: Option<([f64; 4], u64)>,
+    dose: Option<([f64; 4], u64)>,
     contours: Vec<(Color32, cut::Line)>,
     /// By level.
     isodoses: Vec<(usize, cut::Line)>,
 }
 
 impl Lines {
+    /// A new dose is cut where `may_cut_dose`, else in a later frame; gives whether it was cut.
     pub fn update(
         &mut self,
         plane: &Plane,
         (positions_m, moved): (&[[f32; 3]], u64),
         contours: &[Contour],
         dose: Option<&Arc<DosePicture>>,
-    ) {
+        may_cut_dose: bool,
+    ) -> bool {
         let normal = plane.normal();
         let offset_m = normal.dot(&plane.middle_m);
-        let key = (
-            [normal.x, normal.y, normal.z, offset_m],
-            moved,
-            dose.map_or(0, |d| d.number),
-        );
-        if self.key == Some(key) {
-            return;
-        }
-        self.key = Some(key);
+        let at = [normal.x, normal.y, normal.z, offset_m];
         let normal = [normal.x, normal.y, normal.z].map(|c| c as f32);
-        self.contours.clear();
-        for contour in contours {
-            let lines = cut::cut(positions_m, &contour.triangles, normal, offset_m as f32);
-            self.contours
-                .extend(lines.into_iter().map(|line| (contour.color, line)));
+        if self.body != Some((at, moved)) {
+            self.body = Some((at, moved));
+            self.contours.clear();
+            for contour in contours {
+                let lines = cut::cut(positions_m, &contour.triangles, normal, offset_m as f32);
+                self.contours
+                    .extend(lines.into_iter().map(|line| (contour.color, line)));
+            }
         }
+        let key = (at, dose.map_or(0, |d| d.number));
+        let is_old_plane = self.dose.is_some_and(|(plane, _)| plane == at);
+        if self.dose == Some(key) || (is_old_plane && !may_cut_dose) {
+            return false;
+        }
+        self.dose = Some(key);
         self.isodoses.clear();
         for shell in dose.iter().flat_map(|d| &d.shells) {
             let lines = cut::cut(&shell.points_m, &shell.triangles, normal, offset_m as f32);
             self.isodoses.extend(lines.into_iter().map(|line| (shell.level, line)));
         }
+        true
     }
 }
 

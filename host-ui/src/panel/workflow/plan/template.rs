@@ -263,8 +263,8 @@ impl Look<'_> {
             let at = self.board.at(hole);
             needle_mark(&self.painter, at, implant.states[number], self.tokens);
             if problems.iter().any(|p| p.needle == Some(number)) {
-                let corner = at + Vec2::new(5.0, -5.0);
-                let font = FontId::proportional(12.5);
+                let corner = at + Vec2::new(9.0, 0.0);
+                let font = FontId::proportional(15.0);
                 self.painter
                     .text(corner, Align2::CENTER_CENTER, "!", font, self.tokens.bad);
             }
