@@ -75,7 +75,7 @@ fn z_width(path: &PathBuf) -> Drawn {
     chart
         .draw_series(DashedLineSeries::new(ideal, 8, 5, BLACK.stroke_width(2)))?
         .label("2 b / T, b of the hand")
-        .legend(|(x, y)| DashedPathElement::new([(x, y), (x + 18, y)], 5, 3, BLACK.stroke_width(2)));
+        .legend(|(x, y)| plotters::element::DashedPathElement::new([(x, y), (x + 18, y)], 5, 3, BLACK.stroke_width(2)));
     for (name, damping_n_s_per_m, late_ticks, controlled, colour) in WALLS {
         let reached = RATES_HZ.map(|rate| {
             let wall = Wall {

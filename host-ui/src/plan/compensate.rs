@@ -5,7 +5,8 @@
 //! place of the drop. So each step moves a drop by the error that is left, over the slope of rest against drop that the last two
 //! rehearsals show (a secant; at first 1). Rest against drop has jumps, where the tip takes hold of another element: once a seed
 //! has been seen to rest on both sides of its place, its drop is sought between those two. Where a step makes the needle worse,
-//! the best drops of the single seeds are tried together.
+//! the best drops of the single seeds are tried together. What half of the rehearsals do not bring home is looked for around
+//! each seed's best drop.
 
 use super::rehearse::{Drops, Rehearser, Rest};
 use super::{Loading, Needle};
@@ -50,6 +51,8 @@ const KEPT_FROM_ENDS: f64 = 0.1;
 /// Drops of one needle keep their order by at least this.
 const APART_M: f64 = 0.1e-3;
 
+/// In the second half of the rehearsals each seed is tried so far from its best drop, in turn.
+const AROUND_M: [f64; 6] = [0.3e-3, -0.3e-3, 0.6e-3, -0.6e-3, 0.15e-3, -0.15e-3];
 /// Where dropping as planned is not possible, drops are tried so much deeper at a time.
 const DEEPER_M: f64 = 1e-3;
 
@@ -110,6 +113,16 @@ impl Nearest {
         }
     }
 
+    /// Each loose seed that is not near enough yet, so far from its best drop; nothing for a strand.
+    fn around(&self, needle: &Needle, best: &Tried, turn: usize, limits: &Limits) -> Option<Drops> {
+        let by_m = AROUND_M[turn % AROUND_M.len()];
+        let moved = |&(along_m, off_m): &(f64, f64)| along_m + if off_m > limits.enough_m { by_m } else { 0.0 };
+        let mut drops = best.drops.clone();
+        drops.along_m = self.0.iter().map(moved).collect();
+        keep_within(needle, limits, &mut drops);
+        (needle.loading == Loading::Loose).then_some(drops)
+    }
+
     /// Nothing for a strand, which keeps its pitch, nor where the best way has them already or their order would change.
     fn together(&self, needle: &Needle, best: &Tried) -> Option<Drops> {
         let along_m: Vec<f64> = self.0.iter().map(|(along_m, _)| *along_m).collect();
@@ -141,10 +154,14 @@ pub fn compensate(
         let together = nearest.together(needle, &best);
         let drops = match together {
             Some(drops) if is_worse => drops,
-            _ => match next(needle, &tried, share, limits) {
-                Some(drops) if tried.iter().all(|t| t.drops != drops) => drops,
-                _ => break,
-            },
+            _ => {
+                let turn = rehearsals.checked_sub(limits.rehearsals / 2);
+                let around = turn.and_then(|turn| nearest.around(needle, &best, turn, limits));
+                match around.or_else(|| next(needle, &tried, share, limits)) {
+                    Some(drops) if tried.iter().all(|t| t.drops != drops) => drops,
+                    _ => break,
+                }
+            }
         };
         rehearsals += 1;
         match try_it(needle, drops, pace, rehearser) {
@@ -230,21 +247,38 @@ fn next(needle: &Needle, tried: &[Tried], share: f64, limits: &Limits) -> Option
             .collect()
     } else {
         // A strand keeps its pitch: one step for all.
-        let mean = |t: &Tried| t.error_m.iter().map(|e| e.dot(&direction)).sum::<f64>() / count.max(1) as f64;
-        let seen: Vec<_> = tried.iter().map(|t| (t.drops.along_m[0], mean(t))).collect();
+        let middle = |t: &Tried| median(t.error_m.iter().map(|e| e.dot(&direction)).collect());
+        let seen: Vec<_> = tried.iter().map(|t| (t.drops.along_m[0], middle(t))).collect();
         vec![step_m(&seen, share); count]
     };
     let mut drops = last.drops.clone();
-    for ((along_m, step_m), planned) in drops.along_m.iter_mut().zip(&steps_m).zip(&needle.seeds) {
-        let [least, most] = [planned.along_m - limits.along_m, planned.along_m + limits.along_m];
-        *along_m = (*along_m + step_m).clamp(least.max(0.0), most.min(limits.reach_m).max(least.max(0.0)));
+    for (along_m, step_m) in drops.along_m.iter_mut().zip(&steps_m) {
+        *along_m += step_m;
     }
-    // Deepest first: a drop must not need the tip to go in again.
-    for i in 1..count {
-        drops.along_m[i] = drops.along_m[i].min(drops.along_m[i - 1] - APART_M);
-    }
+    keep_within(needle, limits, &mut drops);
     aside(needle, last, share, limits, &mut drops);
     Some(drops)
+}
+
+/// What a strand is off: moved by that, its seeds are off by the least in the mean, and one that lies far away does not draw the others.
+fn median(mut off_m: Vec<f64>) -> f64 {
+    off_m.sort_by(f64::total_cmp);
+    let n = off_m.len();
+    match n {
+        0 => 0.0,
+        _ => 0.5 * (off_m[(n - 1) / 2] + off_m[n / 2]),
+    }
+}
+
+/// Drops near enough to the plan, none deeper than the tip may go, deepest first: a drop must not need the tip to go in again.
+fn keep_within(needle: &Needle, limits: &Limits, drops: &mut Drops) {
+    for (along_m, planned) in drops.along_m.iter_mut().zip(&needle.seeds) {
+        let [least, most] = [planned.along_m - limits.along_m, planned.along_m + limits.along_m];
+        *along_m = along_m.clamp(least.max(0.0), most.min(limits.reach_m).max(least.max(0.0)));
+    }
+    for i in 1..drops.along_m.len() {
+        drops.along_m[i] = drops.along_m[i].min(drops.along_m[i - 1] - APART_M);
+    }
 }
 
 /// How much farther to drop a seed than the last time, from where it was dropped and how far along it then lay off, oldest first.
