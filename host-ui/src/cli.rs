@@ -1,11 +1,12 @@
 //! The command line of `host-ui`.
 
 use crate::convert::ConvertArgs;
+use crate::core_args::{self, CoreArgs};
 use crate::dose::command::{DoseArgs, PerturbArgs};
 use crate::dose::files::{SeedDefaults, read_seeds};
 use crate::plan::command::PlanArgs;
 use crate::{app, controller, files, interrupt, procedure, record};
-use clap::{Args, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use stylet_shm_schema::service::Instance;
@@ -42,25 +43,15 @@ Names that are known follow TG-263: Prostate, PTV, CTV (targets), Urethra, Rectu
 #[command(name = "host-ui", version, args_conflicts_with_subcommands = true)]
 pub struct Cli {
     #[command(flatten)]
-    window: Common,
+    window: CoreArgs,
     /// Leave gamepads and 3D mice alone: only keys and mouse move the needle
     #[arg(long)]
     no_controllers: bool,
+    /// Draw frame after frame, as fast as the machine can: for measuring
+    #[arg(long)]
+    without_pause: bool,
     #[command(subcommand)]
     task: Option<Task>,
-}
-
-#[derive(Args, Debug)]
-struct Common {
-    /// Name that rt-core was started under
-    #[arg(long, default_value = "main")]
-    instance: String,
-    /// Volume to run instead of rt-core's scene: NIfTI-1, NRRD, MetaImage, DICOM RT Structure Set, or a scene file (.toml)
-    #[arg(long, value_name = "FILE")]
-    scene: Option<PathBuf>,
-    /// Which label of the volume is the gland [default: all but 0]
-    #[arg(long, value_name = "N", requires = "scene")]
-    label: Option<u8>,
 }
 
 #[derive(Subcommand, Debug)]
@@ -70,7 +61,7 @@ enum Task {
     /// Plan, place the needles, insert, drop the seeds while retracting; write result.json, force.csv and, of a plan, a debrief
     Procedure {
         #[command(flatten)]
-        common: Common,
+        common: CoreArgs,
         /// Folder for the results [default: out/procedure-<UTC time>]
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
@@ -96,8 +87,8 @@ enum Task {
     /// Keep every tick of the force loop and the tissue's snapshots in an MCAP file, and count what is missing
     Record {
         /// Name that rt-core was started under
-        #[arg(long, default_value = "main")]
-        instance: String,
+        #[arg(long, default_value = "main", value_parser = core_args::instance)]
+        instance: Instance,
         /// File to write
         #[arg(long, value_name = "FILE.mcap")]
         out: PathBuf,
@@ -122,8 +113,8 @@ enum Task {
     /// Have rt-core write its flight recording: the last seconds of both loops, to be repeated with 'rt-core replay'
     Flight {
         /// Name that rt-core was started under
-        #[arg(long, default_value = "main")]
-        instance: String,
+        #[arg(long, default_value = "main", value_parser = core_args::instance)]
+        instance: Instance,
     },
     /// Segmented volumes and scene files
     #[command(subcommand)]
@@ -158,12 +149,13 @@ impl Cli {
         }
         match self.task {
             None => {
-                let instance = instance(&self.window.instance)?;
+                let instance = self.window.instance;
                 let ended = app::run(app::Options {
                     instance: instance.clone(),
                     scene: self.window.scene,
                     label: self.window.label,
                     controllers: !self.no_controllers,
+                    pause: !self.without_pause,
                 });
                 instance.sweep();
                 ended
@@ -171,7 +163,7 @@ impl Cli {
             Some(Task::Controllers) => controller::list(),
             Some(Task::Scene(SceneTask::Check { file, label })) => check(&file, label),
             Some(Task::Record {
-                instance: name,
+                instance,
                 out,
                 duration,
                 snapshot_rate,
@@ -180,7 +172,6 @@ impl Cli {
                 if !fits {
                     return Err("--duration needs seconds above 0, --snapshot-rate 0 to 200 Hz".to_owned());
                 }
-                let instance = instance(&name)?;
                 let ended = record::run(&record::Options {
                     instance: instance.clone(),
                     out,
@@ -191,8 +182,8 @@ impl Cli {
                 ended
             }
             Some(Task::Export { recording, csv, motion }) => record::export(&record::Export { recording, csv, motion }),
-            Some(Task::Flight { instance: name }) => {
-                record::save_flight(&instance(&name)?).map(|path| println!("written: {path}"))
+            Some(Task::Flight { instance }) => {
+                record::save_flight(&instance).map(|path| println!("written: {path}"))
             }
             Some(Task::Convert(args)) => args.run(),
             Some(Task::Plan(args)) => args.run(),
@@ -211,14 +202,9 @@ impl Cli {
                 if let Some(speed) = insert_speed.filter(|s| !(0.1..=500.0).contains(s)) {
                     return Err(format!("--insert-speed {speed}: give 0.1 to 500 mm/s"));
                 }
-                let instance = instance(&common.instance)?;
+                let instance = common.instance.clone();
                 let ended = procedure::run(procedure::Options {
-                    connect: procedure::Connect {
-                        instance: instance.clone(),
-                        scene: common.scene,
-                        label: common.label,
-                        core,
-                    },
+                    connect: procedure::Connect { asked: common, core },
                     out,
                     insert_m_per_s: insert_speed.map(|s| s / 1e3),
                     seeds: usize::from(seeds),
@@ -231,10 +217,6 @@ impl Cli {
             }
         }
     }
-}
-
-fn instance(name: &str) -> Result<Instance, String> {
-    Instance::new(name).map_err(|e| e.to_string())
 }
 
 fn check(file: &Path, label: Option<u8>) -> Result<(), String> {

@@ -1,5 +1,10 @@
 //! From SI to what a person reads; the only place of the window that converts units.
 
+/// The present time as 20260131T235959Z, for names of files.
+pub fn utc_now() -> String {
+    jiff::Timestamp::now().strftime("%Y%m%dT%H%M%SZ").to_string()
+}
+
 /// Millimetres from metres.
 pub fn mm(metres: f64) -> f64 {
     metres * 1e3

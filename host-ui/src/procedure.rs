@@ -5,7 +5,9 @@ mod debrief;
 pub mod job;
 mod report;
 
+use crate::core_args::{CoreArgs, SceneChoice};
 use crate::files::{self, scene::SceneFile};
+use crate::format;
 use crate::interrupt::Interrupt;
 use crate::link::{Link, LinkStatus, SceneModel};
 use crate::workflow::{Pace, Run, RunStatus, Step};
@@ -14,7 +16,6 @@ use job::Job;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::Instance;
 use stylet_shm_schema::*;
 
 const POLL_EVERY: Duration = Duration::from_millis(5);
@@ -24,10 +25,7 @@ const LOAD_LIMIT: Duration = Duration::from_secs(60);
 
 /// Which core, and which scene in it.
 pub struct Connect {
-    pub instance: Instance,
-    /// A volume to be loaded; else the scene that runs.
-    pub scene: Option<PathBuf>,
-    pub label: Option<u8>,
+    pub asked: CoreArgs,
     /// To be started when none is running.
     pub core: Option<PathBuf>,
 }
@@ -45,13 +43,14 @@ pub struct Live {
 
 impl Live {
     pub fn connect(options: &Connect) -> Result<Self, String> {
-        let volume = options.scene.as_deref().map(|path| files::read(path, options.label));
+        let asked = &options.asked;
+        let volume = asked.file().map(|path| files::read(path, asked.label));
         let volume = volume.transpose().map_err(|e| e.to_string())?;
-        let scene_file = options.scene.as_deref().filter(|path| files::scene::is_scene(path));
+        let scene_file = asked.file().filter(|path| files::scene::is_scene(path));
         let said = scene_file.map(files::scene::read).transpose();
         let said = said.map_err(|e| e.to_string())?;
         let interrupted = Interrupt::on_signals()?;
-        let mut link = Link::new(options.instance.clone());
+        let mut link = Link::new(asked.instance.clone());
         let mut core = None;
         let device = said.as_ref().and_then(|s| s.device.as_deref());
         find_core(&mut link, &mut core, options, device, &interrupted)?;
@@ -59,7 +58,14 @@ impl Live {
             for note in &volume.warnings {
                 println!("note: {note}");
             }
-            load(&mut link, volume, &interrupted)?;
+            load(&mut link, |link| link.upload(volume).map_err(|e| e.0), &interrupted)?;
+        }
+        if let Some(SceneChoice::BuiltIn(number)) = asked.scene {
+            let send = |link: &mut Link| {
+                let sent = link.send(CommandKind::LoadBuiltinScene, &[number as f64]);
+                sent.map_err(|e| e.to_string())
+            };
+            load(&mut link, send, &interrupted)?;
         }
         let scene = link.scene().ok_or("the core sent no scene")?.clone();
         Ok(Self {
@@ -117,7 +123,7 @@ pub fn run(options: Options) -> Result<(), String> {
         retract_m_per_s: of_file(|s| s.retract_m_per_s).unwrap_or(usual.retract_m_per_s),
         ..usual
     };
-    let beside = options.connect.scene.as_deref().and_then(Path::parent);
+    let beside = options.connect.asked.file().and_then(Path::parent);
     let of_scene = said.as_ref().and_then(|s| s.plan.as_deref());
     let of_scene = of_scene.map(|plan| beside.unwrap_or(Path::new("")).join(plan));
     let mut job = match options.plan.as_deref().or(of_scene.as_deref()) {
@@ -141,7 +147,7 @@ pub fn run(options: Options) -> Result<(), String> {
     }
     let out = options
         .out
-        .unwrap_or_else(|| PathBuf::from(format!("out/procedure-{}", report::utc_now())));
+        .unwrap_or_else(|| PathBuf::from(format!("out/procedure-{}", format::utc_now())));
     let written = report::write(&out, &link, &job, &pace, &seen, outcome.as_ref().err());
     let scored = written.and_then(|()| debrief::write(&out, &link, &scene, &job, &seen, options.source.as_deref()));
     drop(core);
@@ -190,7 +196,7 @@ fn find_core(
     let Some(path) = &options.core else {
         return Err(format!("{missing}, or add --core PATH to have it started"));
     };
-    let child = core.insert(Core::start(path, &options.instance, device)?);
+    let child = core.insert(Core::start(path, &options.asked.instance, device)?);
     let found = wait(link, interrupted, START_LIMIT, |link| match child.ended() {
         Some(why) => Err(why),
         None => Ok(is_ready(link)),
@@ -201,14 +207,18 @@ fn find_core(
     Err("the rt-core that was started does not answer".to_owned())
 }
 
-fn load(link: &mut Link, volume: &files::LabelVolume, interrupted: &Interrupt) -> Result<(), String> {
+fn load(
+    link: &mut Link,
+    send: impl FnOnce(&mut Link) -> Result<u64, String>,
+    interrupted: &Interrupt,
+) -> Result<(), String> {
     let before = link.scene().map(|s| s.header.generation);
-    let id = link.upload(volume).map_err(|e| e.0)?;
+    let id = send(link)?;
     let mut accepted = false;
     let shown = wait(link, interrupted, LOAD_LIMIT, |link| {
         if let Some(answer) = link.reply(id) {
             if !answer.accepted {
-                return Err(format!("the core refused the volume: {}", answer.text));
+                return Err(format!("the core refused the scene: {}", answer.text));
             }
             accepted = true;
         }
@@ -217,7 +227,7 @@ fn load(link: &mut Link, volume: &files::LabelVolume, interrupted: &Interrupt) -
     if shown {
         Ok(())
     } else {
-        Err("the core did not show the volume in time".to_owned())
+        Err("the core did not show the scene in time".to_owned())
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::core::{HAPTIC_PERIOD_NS, Options};
 use crate::device::DeviceChoice;
+use crate::lab::compare::Against;
 use crate::lab::load::{Load, Work};
 use crate::lab::machine::{Machine, Throttle};
 use crate::lab::measure;
@@ -133,9 +134,9 @@ pub struct LatencyArgs {
     /// Spin for the last N microseconds before each deadline
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub spin_us: u64,
-    /// Then measure in turns with cyclictest (Debian package rt-tests): same core, priority and interval
-    #[arg(long)]
-    pub compare: bool,
+    /// Then measure in turns with something else
+    #[arg(long, value_enum, num_args = 0..=1, default_missing_value = "cyclictest", value_name = "WITH")]
+    pub compare: Option<Against>,
     /// Pairs of turns of the comparison
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100), value_name = "N")]
     pub rounds: u32,

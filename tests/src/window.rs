@@ -33,6 +33,7 @@ impl Driven {
             scene: None,
             label: None,
             controllers: false,
+            pause: true,
         };
         let window = Harness::builder()
             .with_size(size)

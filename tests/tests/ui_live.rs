@@ -78,6 +78,7 @@ fn a_window_that_comes_moves_nothing_by_itself() {
         scene: None,
         label: None,
         controllers: false,
+        pause: true,
     };
     let mut second = Harness::builder()
         .with_size([1280.0, 800.0])

@@ -17,6 +17,7 @@ fn window_of(instance: &str, size: [f32; 2]) -> Harness<'static, App> {
         scene: None,
         label: None,
         controllers: false,
+        pause: true,
     };
     Harness::builder()
         .with_size(size)

@@ -34,6 +34,10 @@ impl App {
         }
     }
 
+    pub(super) fn load_builtin(&mut self, number: usize) {
+        self.send("Built-in scene", CommandKind::LoadBuiltinScene, &[number as f64]);
+    }
+
     /// Sends the hand to a depth along the planned path, or along the line beside it where the needle is.
     fn move_to(&mut self, what: &'static str, depth_m: f64, speed_m_per_s: f64) {
         let goal = self.shown.beside_path_m(depth_m, self.drive.beside_m);
@@ -63,6 +67,7 @@ impl App {
                 };
             }
             Action::SavePicture => self.pictures.request(ctx),
+            Action::SaveDebrief => self.save_debrief(),
             Action::PutGoneAway => self.shown.gone = None,
             Action::PutRefusalsAway => {
                 if let Some(session) = &self.shown.session {
@@ -96,9 +101,7 @@ impl App {
                     self.send("Plan five seeds", CommandKind::SetPlan, &values);
                 }
             }
-            Action::LoadBuiltinScene(number) => {
-                self.send("Built-in scene", CommandKind::LoadBuiltinScene, &[number as f64]);
-            }
+            Action::LoadBuiltinScene(number) => self.load_builtin(number),
             Action::PlaceNeedle => {
                 // In the tissue the needle keeps its line: aside it would tear.
                 if !self.shown.has_punctured() {

@@ -1,12 +1,15 @@
 //! The window: takes what is new, draws the panels, carries out what they ask for. A frame never waits.
 
 mod act;
+mod debrief;
 mod drive;
 mod plan;
 mod take;
 
+use crate::core_args::SceneChoice;
 use crate::controller::{Controllers, SLOW, System, Wish};
 use crate::dose_desk::DoseDesk;
+use crate::job::Job;
 use crate::link::{Link, LinkStatus};
 use crate::loader::Loader;
 use crate::panel::history::History;
@@ -15,11 +18,11 @@ use crate::panel::workflow::{Progress, WorkflowState, editor_ui, workflow_ui};
 use crate::panel::{Action, FrameCost, Note, PlanAction, Shown, help, plots, status};
 use crate::picture::Pictures;
 use crate::planner::Planner;
+use crate::score::Trace;
 use crate::settings::Settings;
 use crate::view::middle::Middle;
 use crate::workflow::{Pace, Run};
 use crate::{format, keyboard, theme};
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::service::Instance;
 
@@ -30,11 +33,13 @@ const ABSENT_FRAME: Duration = Duration::from_millis(250);
 pub struct Options {
     pub instance: Instance,
     /// Read and sent as soon as a core is there.
-    pub scene: Option<PathBuf>,
+    pub scene: Option<SceneChoice>,
     /// Which label of the file is the gland; all of them when none is given.
     pub label: Option<u8>,
     /// Whether gamepads and 3D mice may hold the needle.
     pub controllers: bool,
+    /// Frames come no faster than a person sees; without, as fast as the machine can.
+    pub pause: bool,
 }
 
 /// A command that has not been answered yet.
@@ -48,7 +53,7 @@ pub struct App {
     link: Link,
     label: Option<u8>,
     /// From the command line, until it is read.
-    first_scene: Option<PathBuf>,
+    first_scene: Option<SceneChoice>,
     shown: Shown,
     middle: Middle,
     dose: DoseDesk,
@@ -57,6 +62,9 @@ pub struct App {
     /// As they were when they were last brought into force.
     applied: Option<Settings>,
     history: History,
+    /// Force and speed since the tip first touched tissue.
+    trace: Trace,
+    debrief: Option<Job<debrief::Saved>>,
     summed_up: Instant,
     loader: Loader,
     uploading: Option<(u64, String)>,
@@ -67,6 +75,7 @@ pub struct App {
     pace: Pace,
     waiting: Vec<Waiting>,
     controllers: Controllers,
+    pause: bool,
     drive: drive::Drive,
     /// Buttons of gamepads and 3D mice since the last frame.
     pressed: Vec<Action>,
@@ -82,7 +91,7 @@ pub struct App {
 
 /// Opens the window and returns when it is closed.
 pub fn run(options: Options) -> Result<(), String> {
-    let native = eframe::NativeOptions {
+    let mut native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("Stylet")
             .with_app_id("stylet")
@@ -92,6 +101,9 @@ pub fn run(options: Options) -> Result<(), String> {
         renderer: eframe::Renderer::Wgpu,
         ..Default::default()
     };
+    if !options.pause {
+        native.wgpu_options.surface.present_mode = eframe::wgpu::PresentMode::AutoNoVsync;
+    }
     let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::new(cc, options))));
     eframe::run_native("Stylet", native, create).map_err(|e| {
         format!(
@@ -136,6 +148,8 @@ impl App {
             pictures: Pictures::default(),
             applied: None,
             history: History::default(),
+            trace: Trace::default(),
+            debrief: None,
             summed_up: Instant::now(),
             loader: Loader::default(),
             uploading: None,
@@ -149,6 +163,7 @@ impl App {
             } else {
                 Controllers::none()
             },
+            pause: options.pause,
             drive: drive::Drive::default(),
             pressed: Vec::new(),
             pulled_to_m: None,
@@ -198,7 +213,9 @@ impl App {
                 return;
             }
             let height = ui.available_height();
-            egui::ScrollArea::vertical().show(ui, |ui| plots::plots_ui(ui, &self.shown, &self.history, height));
+            // The debrief looks back on all of it, not on the last seconds.
+            let whole = self.workflow.is_open(Progress::Debrief).then_some(&self.trace);
+            egui::ScrollArea::vertical().show(ui, |ui| plots::plots_ui(ui, &self.shown, &self.history, whole, height));
         });
         egui::CentralPanel::default()
             .frame(egui::Frame::new().fill(theme::of(ui).background))
@@ -282,7 +299,8 @@ impl eframe::App for App {
             uploaded_bytes: self.middle.uploaded_bytes() - uploaded,
         };
         ctx.request_repaint_after(match self.shown.status {
-            LinkStatus::Live => LIVE_FRAME,
+            LinkStatus::Live if self.pause => LIVE_FRAME,
+            LinkStatus::Live => Duration::ZERO,
             LinkStatus::Silent { .. } | LinkStatus::Absent { .. } => ABSENT_FRAME,
         });
     }

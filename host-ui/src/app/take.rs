@@ -3,6 +3,7 @@
 use super::drive::Drive;
 use super::{App, refusal};
 use crate::controller::Button;
+use crate::core_args::SceneChoice;
 use crate::dose_desk::{DoseOf, Wanted};
 use crate::files::LabelVolume;
 use crate::panel::{Action, LoadState, Note};
@@ -27,6 +28,8 @@ impl App {
         let direction = self.shown.state.map_or([0.0, 0.0, 1.0], |s| s.needle_direction);
         let records = self.link.take_records();
         self.history.take(&records, direction);
+        let scene = self.shown.scene.map(|s| (s.session_id, s.generation));
+        self.trace.take(&records, scene, direction);
         if self.summed_up.elapsed() >= SUM_UP_EVERY {
             self.summed_up = Instant::now();
             self.history.sum_up();
@@ -41,6 +44,7 @@ impl App {
         self.shown.dose_trouble = self.dose.trouble();
         self.count_refusals();
         self.take_pictures();
+        self.take_debrief();
         self.middle.take(&self.shown, self.link.scene(), self.link.snapshot());
     }
 
@@ -144,9 +148,12 @@ impl App {
 
     fn take_scene_file(&mut self) {
         if self.shown.is_live()
-            && let Some(path) = self.first_scene.take()
+            && let Some(scene) = self.first_scene.take()
         {
-            self.load(&path);
+            match scene {
+                SceneChoice::File(path) => self.load(&path),
+                SceneChoice::BuiltIn(number) => self.load_builtin(number),
+            }
         }
         match self.loader.poll() {
             None => {}

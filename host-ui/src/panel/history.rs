@@ -107,23 +107,30 @@ impl History {
         let Some(newest) = self.ticks.back().map(|t| t.time_ns) else {
             return Vec::new();
         };
-        let mut points = Vec::with_capacity(2 * buckets + 2);
-        let mut bucket = Bucket::default();
-        for tick in &self.ticks {
+        let point = |tick: &Tick| {
             let x = -format::seconds(newest.saturating_sub(tick.time_ns));
-            if x < -WINDOW_S {
-                continue;
-            }
-            let index = ((x + WINDOW_S) / WINDOW_S * buckets as f64) as usize;
-            if index != bucket.index {
-                bucket.flush(&mut points);
-                bucket.index = index;
-            }
-            bucket.add([x, f64::from(value(tick))]);
-        }
-        bucket.flush(&mut points);
-        points
+            [x, f64::from(value(tick))]
+        };
+        let points = self.ticks.iter().map(point).filter(|[x, _]| *x >= -WINDOW_S);
+        decimated(points, [-WINDOW_S, 0.0], buckets)
     }
+}
+
+/// At most two points for each of `buckets` between the ends: its smallest and largest, in the order of x.
+pub fn decimated(points: impl Iterator<Item = [f64; 2]>, [from, to]: [f64; 2], buckets: usize) -> Vec<[f64; 2]> {
+    let mut kept = Vec::with_capacity(2 * buckets + 2);
+    let mut bucket = Bucket::default();
+    let per_x = buckets as f64 / (to - from);
+    for [x, y] in points {
+        let index = ((x - from) * per_x) as usize;
+        if index != bucket.index {
+            bucket.flush(&mut kept);
+            bucket.index = index;
+        }
+        bucket.add([x, y]);
+    }
+    bucket.flush(&mut kept);
+    kept
 }
 
 fn push_bounded<T>(queue: &mut VecDeque<T>, limit: usize, item: T) {

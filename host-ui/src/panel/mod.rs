@@ -57,6 +57,8 @@ pub enum Action {
     ToggleTheme,
     /// The window as PNG.
     SavePicture,
+    /// What the implant was worth, as files.
+    SaveDebrief,
     /// The refusals told so far were read.
     PutRefusalsAway,
     /// That a device was unplugged was read.

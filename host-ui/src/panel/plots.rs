@@ -1,28 +1,35 @@
-//! The right panel: force and depth of the last seconds, and the timing of the loop.
+//! The right panel: force and depth of the last seconds, or force and speed of the whole procedure, and the timing of the loop.
 
-use super::history::{BINS, History, Percentiles, Tick, WINDOW_S, bin_low_us};
+use super::history::{BINS, History, Percentiles, Tick, WINDOW_S, bin_low_us, decimated};
 use super::{Shown, setup};
+use crate::score::Trace;
 use crate::{format, theme};
 use egui::{Color32, RichText};
 use egui_plot::{AxisHints, Bar, BarChart, GridMark, Line, Plot, PlotPoints};
+use stylet_shm_schema::TickRecord;
 
 /// What stands between and under the three plots over time.
 const BESIDE_PLOTS: f32 = 492.0;
 const PLOT_HEIGHTS: [f32; 2] = [48.0, 150.0];
 
-/// The plots share what of `height` the rest leaves.
-pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, height: f32) {
+/// The plots share what of `height` the rest leaves. With `whole` they look back on all of the procedure.
+pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, whole: Option<&Trace>, height: f32) {
     let each = ((height - BESIDE_PLOTS) / 3.0).clamp(PLOT_HEIGHTS[0], PLOT_HEIGHTS[1]);
     let strip = |ui: &mut egui::Ui, style, value: fn(&Tick) -> f32| strip(ui, history, style, (each, value));
     let tokens = theme::of(ui);
     tension_ui(ui, shown);
     let now = |value: Option<String>| value.unwrap_or_else(|| "n/a".to_owned());
-    let force = now(shown.resistance_n().map(format::force));
-    title(ui, "Force along the needle, N", &force, tokens.force);
-    strip(ui, ("force", tokens.force, [-0.5, 2.0]), |t| t.resistance_n);
-    let depth = now(shown.state.map(|s| format::length(s.depth_m)));
-    title(ui, "Depth, mm", &depth, tokens.depth);
-    strip(ui, ("depth", tokens.depth, [0.0, 10.0]), |t| t.depth_mm);
+    match whole.filter(|trace| !trace.records().is_empty()) {
+        Some(trace) => whole_ui(ui, trace, each),
+        None => {
+            let force = now(shown.resistance_n().map(format::force));
+            title(ui, "Force along the needle, N", &force, tokens.force);
+            strip(ui, ("force", tokens.force, [-0.5, 2.0]), |t| t.resistance_n);
+            let depth = now(shown.state.map(|s| format::length(s.depth_m)));
+            title(ui, "Depth, mm", &depth, tokens.depth);
+            strip(ui, ("depth", tokens.depth, [0.0, 10.0]), |t| t.depth_mm);
+        }
+    }
     let worst = now(shown
         .state
         .map(|s| format::microseconds(Some(format::us(s.worst_wake_ns)))));
@@ -31,6 +38,51 @@ pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, height: f32
     histogram_ui(ui, history);
     timing_ui(ui, shown, history);
     setup::setup_ui(ui, shown);
+}
+
+/// From the first contact with tissue on.
+fn whole_ui(ui: &mut egui::Ui, trace: &Trace, height: f32) {
+    let (tokens, motion) = (theme::of(ui), trace.motion());
+    let peak = format!("peak {}", format::force(motion.peak_force_n));
+    title(ui, "Whole procedure: force, N", &peak, tokens.force);
+    let force = |r: &TickRecord| r.force_on_hand_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+    whole_strip(ui, trace, ("whole force", tokens.force, height), force);
+    let peak = format!("peak inwards {}", format::speed(motion.peak_insertion_m_per_s));
+    title(ui, "Speed, mm/s", &peak, tokens.depth);
+    let speed = |r: &TickRecord| format::mm(r.speed_m_per_s);
+    whole_strip(ui, trace, ("whole speed", tokens.depth, height), speed);
+}
+
+fn whole_strip(
+    ui: &mut egui::Ui,
+    trace: &Trace,
+    (name, color, height): (&str, Color32, f32),
+    value: impl Fn(&TickRecord) -> f64,
+) {
+    let records = trace.records();
+    let Some((first, last)) = records.first().zip(records.last()) else { return };
+    let seconds = |r: &TickRecord| format::seconds(r.due_ns.saturating_sub(first.due_ns));
+    let end_s = seconds(last).max(1.0);
+    let buckets = ui.available_width().max(50.0) as usize;
+    let points = decimated(records.iter().map(|r| [seconds(r), value(r)]), [0.0, end_s], buckets);
+    plot(name)
+        .height(height)
+        .include_x(0.0)
+        .include_x(end_s)
+        .include_y(0.0)
+        .include_y(1.0)
+        .x_grid_spacer(move |_| marks(0.0, end_s / 4.0, 4))
+        .x_axis_formatter(move |mark: GridMark, _: &_| {
+            // The last mark lies on the edge, where a label would be cut off.
+            if mark.value > 0.99 * end_s {
+                String::new()
+            } else {
+                format!("{:.0} s", mark.value)
+            }
+        })
+        .show(ui, |plot| {
+            plot.line(Line::new(name, PlotPoints::new(points)).color(color).width(1.3))
+        });
 }
 
 /// What the membrane does before it gives way, which a mouse cannot let one feel.

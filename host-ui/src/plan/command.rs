@@ -3,6 +3,7 @@
 use super::automatic::{self, Aims};
 use super::file::{self, Frames};
 use super::{Anatomy, ImplantPlan, Template, check};
+use crate::core_args::CoreArgs;
 use crate::dose::decay::Interval;
 use crate::dose::files::SeedDefaults;
 use crate::dose::report::Judge;
@@ -10,7 +11,6 @@ use crate::dose::{DoseKernel, Source};
 use crate::procedure::{Connect, Live};
 use clap::Args;
 use std::path::PathBuf;
-use stylet_shm_schema::service::Instance;
 
 const DOSE_PITCH_M: f64 = 1e-3;
 const POINTS: usize = 100_000;
@@ -30,15 +30,8 @@ Examples:
 #[derive(Args, Debug)]
 #[command(after_long_help = HELP)]
 pub struct PlanArgs {
-    /// Name that rt-core was started under
-    #[arg(long, default_value = "main")]
-    instance: String,
-    /// Segmented volume to run, NIfTI-1 (.nii or .nii.gz) [default: the scene that rt-core runs]
-    #[arg(long, value_name = "FILE")]
-    scene: Option<PathBuf>,
-    /// Which label of the volume is the gland [default: all but 0]
-    #[arg(long, value_name = "N", requires = "scene")]
-    label: Option<u8>,
+    #[command(flatten)]
+    asked: CoreArgs,
     /// Start this rt-core when none is running, and end it afterwards
     #[arg(long, value_name = "PATH")]
     core: Option<PathBuf>,
@@ -73,9 +66,7 @@ impl PlanArgs {
             )
         })?;
         let live = Live::connect(&Connect {
-            instance: Instance::new(&self.instance).map_err(|e| e.to_string())?,
-            scene: self.scene.clone(),
-            label: self.label,
+            asked: self.asked.clone(),
             core: self.core.clone(),
         })?;
         let (anatomy, template) = (Anatomy::of(&live.scene)?, Template::before(&live.scene.header));

@@ -5,17 +5,16 @@
 
 mod course;
 mod ground;
-mod job;
 mod shown;
 mod work;
 
+use crate::job::{Job, News};
 use crate::link::SceneModel;
 use crate::plan::check::{Problem, problems};
 use crate::plan::{Compensation, Drops, History, Hole, ImplantPlan, Needle, Row, Template, exchange};
 use crate::workflow::{NeedleTask, Pace};
 pub use course::{Course, NeedleState};
 pub use ground::{Ground, Layer, Outline};
-use job::{Job, News};
 pub use shown::{Implant, Planning};
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -1,10 +1,10 @@
 //! What takes longer than a frame: a first plan, compensation, files.
 
 use super::ground::Ground;
-use super::job::Job;
 use crate::dose::decay::Interval;
 use crate::dose::{DoseKernel, Source};
 use crate::interrupt::Interrupt;
+use crate::job::Job;
 use crate::link::{Link, SceneModel};
 use crate::plan::automatic::{self, Aims};
 use crate::plan::{Compensation, ImplantPlan, Limits, LinkRehearser, Needle, compensate, exchange};

@@ -6,7 +6,7 @@ use crate::dose::decay::Interval;
 use crate::dose::{DoseKernel, Seed, Source};
 use crate::link::{Link, SceneModel};
 use crate::plan::Anatomy;
-use crate::score::{self, Implant, Score, SeedPair};
+use crate::score::{self, Implant, Motion, Score, SeedPair};
 use std::path::Path;
 use stylet_shm_schema::SeedPose;
 
@@ -65,6 +65,7 @@ pub fn write(
         kernel: &kernel,
         source: format!("{} {}", source.nuclide, source.model),
         prescription_gy: implant.prescription_gy,
+        motion: Motion::of(&seen.records, drops.first().map_or([0.0, 0.0, 1.0], |d| d.direction)),
         records: &seen.records,
     })?;
     score::write(&score, out)?;

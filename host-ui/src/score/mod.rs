@@ -5,6 +5,7 @@ mod dose_cost;
 mod motion;
 mod page;
 mod picture;
+mod trace;
 mod write;
 
 use crate::dose::report::{Judge, Verdict};
@@ -14,6 +15,7 @@ pub use dose_cost::{Cost, costs};
 pub use motion::Motion;
 use nalgebra::Vector3;
 use stylet_shm_schema::TickRecord;
+pub use trace::Trace;
 pub use write::{to_json, write};
 
 const DOSE_PITCH_M: f64 = 1e-3;
@@ -61,6 +63,8 @@ pub struct Implant<'a> {
     /// As the source file names itself.
     pub source: String,
     pub prescription_gy: f64,
+    pub motion: Motion,
+    /// Force and speed over time; every tick or some of them.
     pub records: &'a [TickRecord],
 }
 
@@ -72,7 +76,6 @@ pub struct Score<'a> {
     pub delivered: Verdict,
     /// In the order of the pairs.
     pub costs: Vec<Cost>,
-    pub motion: Motion,
 }
 
 impl<'a> Score<'a> {
@@ -95,11 +98,9 @@ impl<'a> Score<'a> {
         );
         let all = [planned.clone(), delivered.clone()].concat();
         let judge = Judge::new(structures, Some(&target), &[], implant.prescription_gy, &all, POINTS)?;
-        let direction = implant.pairs.first().map_or([0.0, 0.0, 1.0], |p| p.direction);
         Ok(Self {
             planned: judge.judge(implant.kernel, &planned),
             delivered: judge.judge(implant.kernel, &delivered),
-            motion: Motion::of(implant.records, direction),
             judge,
             costs,
             implant,

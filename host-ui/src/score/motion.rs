@@ -27,39 +27,55 @@ pub struct Motion {
 impl Motion {
     /// `direction`: of the needles, into the body.
     pub fn of(records: &[TickRecord], direction: [f64; 3]) -> Self {
-        let mut motion = Self::default();
-        let (Some(first), Some(last)) = (records.first(), records.last()) else {
-            return motion;
-        };
-        motion.duration_s = seconds(last.due_ns.saturating_sub(first.due_ns));
-        let axis = Vector3::from(direction);
-        let (mut inwards_s, mut inwards_m) = (0.0, 0.0);
-        let mut turns: Option<Turns> = None;
-        let mut before_ns = first.due_ns;
-        for record in records {
-            // A gap in the records is no time in tissue.
-            let dt_s = seconds(record.due_ns.saturating_sub(before_ns)).min(0.01);
-            before_ns = record.due_ns;
-            motion.peak_force_n = motion.peak_force_n.max(Vector3::from(record.force_on_hand_n).norm());
-            if record.flags & flags::IN_CONTACT == 0 {
-                turns = None;
-                continue;
-            }
-            motion.in_tissue_s += dt_s;
-            let along_m = Vector3::from(record.tip_in_scene_m).dot(&axis);
-            let turn = turns.get_or_insert_with(|| {
-                motion.insertions += 1;
-                Turns::at(along_m)
-            });
-            motion.reinsertions += usize::from(turn.goes_in_again(along_m));
-            if record.speed_m_per_s > RESTS_M_PER_S {
-                inwards_s += dt_s;
-                inwards_m += record.speed_m_per_s * dt_s;
-                motion.peak_insertion_m_per_s = motion.peak_insertion_m_per_s.max(record.speed_m_per_s);
-            }
+        let mut meter = MotionMeter::default();
+        records.iter().for_each(|record| meter.take(record, direction));
+        meter.motion()
+    }
+}
+
+/// Adds up a motion, record by record.
+#[derive(Clone, Debug, Default)]
+pub struct MotionMeter {
+    motion: Motion,
+    /// Of the first record and of the last.
+    due_ns: Option<[u64; 2]>,
+    inwards_s: f64,
+    inwards_m: f64,
+    turns: Option<Turns>,
+}
+
+impl MotionMeter {
+    /// `direction`: of the needle, into the body.
+    pub fn take(&mut self, record: &TickRecord, direction: [f64; 3]) {
+        let [first_ns, before_ns] = self.due_ns.unwrap_or([record.due_ns; 2]);
+        self.due_ns = Some([first_ns, record.due_ns]);
+        // A gap in the records is no time in tissue.
+        let dt_s = seconds(record.due_ns.saturating_sub(before_ns)).min(0.01);
+        let motion = &mut self.motion;
+        motion.duration_s = seconds(record.due_ns.saturating_sub(first_ns));
+        motion.peak_force_n = motion.peak_force_n.max(Vector3::from(record.force_on_hand_n).norm());
+        if record.flags & flags::IN_CONTACT == 0 {
+            self.turns = None;
+            return;
         }
-        if inwards_s > 0.0 {
-            motion.mean_insertion_m_per_s = inwards_m / inwards_s;
+        motion.in_tissue_s += dt_s;
+        let along_m = Vector3::from(record.tip_in_scene_m).dot(&Vector3::from(direction));
+        let turn = self.turns.get_or_insert_with(|| {
+            motion.insertions += 1;
+            Turns::at(along_m)
+        });
+        motion.reinsertions += usize::from(turn.goes_in_again(along_m));
+        if record.speed_m_per_s > RESTS_M_PER_S {
+            self.inwards_s += dt_s;
+            self.inwards_m += record.speed_m_per_s * dt_s;
+            motion.peak_insertion_m_per_s = motion.peak_insertion_m_per_s.max(record.speed_m_per_s);
+        }
+    }
+
+    pub fn motion(&self) -> Motion {
+        let mut motion = self.motion;
+        if self.inwards_s > 0.0 {
+            motion.mean_insertion_m_per_s = self.inwards_m / self.inwards_s;
         }
         motion
     }
@@ -70,6 +86,7 @@ fn seconds(ns: u64) -> f64 {
 }
 
 /// Turning points of the tip, with hysteresis.
+#[derive(Clone, Debug)]
 struct Turns {
     inwards: bool,
     /// The farthest place since the last turn.

@@ -74,7 +74,7 @@ pub fn page(score: &Score) -> Result<String, String> {
 
 fn cards(score: &Score) -> String {
     let [mean, worst] = score.errors_m();
-    let m = &score.motion;
+    let m = &score.implant.motion;
     let value = |name: &str, delivered: bool| {
         let verdict = if delivered { &score.delivered } else { &score.planned };
         let values = score.judge.values(verdict);

@@ -57,6 +57,7 @@ fn score<'a>(off: &[usize], anatomy: &'a Anatomy, kernel: &'a DoseKernel, record
         kernel,
         source: "6711".to_owned(),
         prescription_gy: 145.0,
+        motion: Motion::of(records, [0.0, 0.0, 1.0]),
         records,
     })
     .unwrap()

@@ -23,7 +23,7 @@ pub fn to_json(score: &Score) -> Value {
             },
         })
     };
-    let m = &score.motion;
+    let m = &score.implant.motion;
     json!({
         "title": i.title, "source": i.source, "prescription_gy": i.prescription_gy,
         "seeds_planned": i.pairs.len() + i.lost.len(), "seeds_lost": i.lost.len(),

@@ -64,6 +64,7 @@ pub struct LoopTiming {
     pub windows: Vec<Window>,
     pub worst: [LateTick; WORST_KEPT],
     pub first_due_ns: u64,
+    last_due_ns: u64,
     pub ticks: u64,
     pub missed: u64,
     /// Ticks that ended after the next one was due.
@@ -91,6 +92,7 @@ impl LoopTiming {
             windows: vec![Window::default(); plan.windows],
             worst: [LateTick::default(); WORST_KEPT],
             first_due_ns: 0,
+            last_due_ns: 0,
             ticks: 0,
             missed: 0,
             overruns: 0,
@@ -116,6 +118,14 @@ impl LoopTiming {
         }
     }
 
+    /// Of the grid that was served or missed, warm-up left out.
+    pub fn measured_ns(&self) -> u64 {
+        match self.ticks {
+            0 => 0,
+            _ => self.last_due_ns - self.first_due_ns + self.plan.period_ns,
+        }
+    }
+
     fn take(&mut self, tick: &TickTimes) {
         self.seen += 1;
         self.lost = u64::from(tick.lost);
@@ -132,6 +142,7 @@ impl LoopTiming {
         if self.ticks == 0 {
             self.first_due_ns = due_ns;
         }
+        self.last_due_ns = due_ns;
         self.ticks += 1;
         self.missed += u64::from(tick.missed);
         self.overruns += u64::from(done_ns > due_ns + self.plan.period_ns);

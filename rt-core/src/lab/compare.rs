@@ -1,10 +1,12 @@
-//! Our wake-up beside that of `cyclictest`, in turns: same core, priority and interval, one after the other.
+//! Our wake-up in turns with another: that of `cyclictest` on the same core with the same priority and interval, or our own without
+//! the load.
 
 use crate::core::Options;
 use crate::lab::collect::histogram;
-use crate::lab::load::Running;
+use crate::lab::load::{Load, Running};
 use crate::lab::measure::{Measured, Setup, measure};
 use crate::lab::summary::quantile_us;
+use clap::ValueEnum;
 use hdrhistogram::Histogram;
 use serde::Serialize;
 use std::path::Path;
@@ -18,50 +20,83 @@ const SHORTEST_TURN_NS: u64 = 11_000_000_000;
 const BINS: u64 = 1_000_000;
 const COMPARED: [(&str, f64); 4] = [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999), ("max", 1.0)];
 
+/// What our turns are compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Against {
+    /// `cyclictest` (Debian package rt-tests) under the same load: same core, priority and interval
+    Cyclictest,
+    /// The same loops without the load
+    Unloaded,
+}
+
+impl Against {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cyclictest => "cyclictest",
+            Self::Unloaded => "without the load",
+        }
+    }
+}
+
 /// Wake-up latency of one turn, microseconds, in the order of the comparison's `names`.
 pub type Turn = [Option<f64>; COMPARED.len()];
 
 #[derive(Clone, Debug, Serialize)]
 pub struct Round {
     pub ours_us: Turn,
-    pub cyclictest_us: Turn,
+    pub others_us: Turn,
     pub ratio: Turn,
 }
 
 /// What the turns showed, or why there were none.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
+    pub against: Against,
+    /// Version of the other program; empty where it is this one.
     pub tool: String,
     /// Why nothing could be compared.
     pub absent: Option<String>,
     pub names: [&'static str; COMPARED.len()],
     pub turn_s: f64,
     pub rounds: Vec<Round>,
-    /// Ours over cyclictest's; below 1 ours is earlier.
+    /// Ours over the other's; below 1 ours is earlier.
     pub median_ratio: Turn,
     /// All turns together, for the picture.
     #[serde(skip)]
     pub ours: Histogram<u64>,
     #[serde(skip)]
-    pub cyclictest: Histogram<u64>,
+    pub others: Histogram<u64>,
 }
 
-/// Turns of ours and of cyclictest's, `rounds` of each.
-pub fn compare(setup: &Setup, rounds: u32, interrupted: &AtomicBool) -> Result<Comparison, String> {
+/// Turns of ours and of the other's, `rounds` of each.
+pub fn compare(
+    setup: &Setup,
+    against: Against,
+    rounds: u32,
+    interrupted: &AtomicBool,
+) -> Result<Comparison, String> {
     let turn_ns = (setup.duration_ns / u64::from(rounds)).max(SHORTEST_TURN_NS);
+    let tool = match against {
+        Against::Cyclictest => version(),
+        Against::Unloaded => Some(String::new()),
+    };
     let mut comparison = Comparison {
-        tool: version().unwrap_or_default(),
-        absent: None,
+        against,
+        absent: match (against, &tool, setup.load) {
+            (_, None, _) => Some("cyclictest is not installed: sudo apt-get install rt-tests".to_owned()),
+            (Against::Unloaded, _, Load::None) => Some("there is no load to compare with; give --load".to_owned()),
+            _ => None,
+        },
+        tool: tool.unwrap_or_default(),
         names: COMPARED.map(|(name, _)| name),
         turn_s: turn_ns as f64 / 1e9,
         rounds: Vec::new(),
         median_ratio: [None; COMPARED.len()],
         ours: histogram(),
-        cyclictest: histogram(),
+        others: histogram(),
     };
-    if comparison.tool.is_empty() {
-        let why = "cyclictest is not installed: sudo apt-get install rt-tests";
-        comparison.absent = Some(why.to_owned());
+    if comparison.absent.is_some() {
         return Ok(comparison);
     }
     let setup = Setup {
@@ -71,15 +106,19 @@ pub fn compare(setup: &Setup, rounds: u32, interrupted: &AtomicBool) -> Result<C
     for _ in 0..rounds {
         let measured: Measured = measure(&setup, interrupted)?;
         let ours = &measured.haptic.wake;
-        let theirs = match cyclictest(&setup, interrupted) {
-            Ok(theirs) => theirs,
+        let others = match against {
+            Against::Cyclictest => cyclictest(&setup, interrupted),
+            Against::Unloaded => unloaded(&setup, interrupted),
+        };
+        let others = match others {
+            Ok(others) => others,
             Err(why) => {
                 comparison.absent = Some(why);
                 break;
             }
         };
-        comparison.rounds.push(round(ours, &theirs));
-        let joined = comparison.ours.add(ours).and(comparison.cyclictest.add(&theirs));
+        comparison.rounds.push(round(ours, &others));
+        let joined = comparison.ours.add(ours).and(comparison.others.add(&others));
         joined.map_err(|e| format!("histograms: {e:?}"))?;
         // SYNC: set by a signal handler; nothing but the flag is carried.
         if interrupted.load(Ordering::Acquire) {
@@ -88,6 +127,14 @@ pub fn compare(setup: &Setup, rounds: u32, interrupted: &AtomicBool) -> Result<C
     }
     comparison.median_ratio = std::array::from_fn(|i| median(comparison.rounds.iter().filter_map(|r| r.ratio[i])));
     Ok(comparison)
+}
+
+fn unloaded(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, String> {
+    let setup = Setup {
+        load: Load::None,
+        ..*setup
+    };
+    Ok(measure(&setup, interrupted)?.haptic.wake)
 }
 
 fn turn(histogram: &Histogram<u64>) -> Turn {
@@ -101,12 +148,12 @@ fn turn(histogram: &Histogram<u64>) -> Turn {
     })
 }
 
-fn round(ours: &Histogram<u64>, theirs: &Histogram<u64>) -> Round {
-    let (ours_us, cyclictest_us) = (turn(ours), turn(theirs));
-    let ratio = std::array::from_fn(|i| ours_us[i].zip(cyclictest_us[i]).map(|(a, b)| a / b));
+fn round(ours: &Histogram<u64>, others: &Histogram<u64>) -> Round {
+    let (ours_us, others_us) = (turn(ours), turn(others));
+    let ratio = std::array::from_fn(|i| ours_us[i].zip(others_us[i]).map(|(a, b)| a / b));
     Round {
         ours_us,
-        cyclictest_us,
+        others_us,
         ratio,
     }
 }

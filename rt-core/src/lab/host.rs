@@ -39,7 +39,6 @@ pub struct HostReport {
     pub records_missing: u64,
     pub faults: u64,
     pub insertions: u64,
-    pub measured_ns: u64,
 }
 
 /// Where the script takes the tip.
@@ -102,13 +101,20 @@ pub struct Host {
     pose_times: Arc<PoseTimes>,
     sent: u64,
     last_tick: u64,
+    warm_up_ticks: u64,
     step: u64,
     report: HostReport,
 }
 
 impl Host {
-    pub fn new(instance: &Instance, script: Script, pose_times: Arc<PoseTimes>) -> Result<Self, ServiceError> {
+    pub fn new(
+        instance: &Instance,
+        script: Script,
+        pose_times: Arc<PoseTimes>,
+        warm_up_ticks: u64,
+    ) -> Result<Self, ServiceError> {
         Ok(Self {
+            warm_up_ticks,
             ports: Ports::new(instance)?,
             script,
             pose_times,
@@ -123,12 +129,11 @@ impl Host {
                 records_missing: 0,
                 faults: 0,
                 insertions: 0,
-                measured_ns: 0,
             },
         })
     }
 
-    /// Watches until `duration_ns` after the first record, or until `interrupted` or `stop`.
+    /// Watches until `duration_ns` after the warm-up, or until `interrupted` or `stop`.
     pub fn run(
         mut self,
         duration_ns: u64,
@@ -141,14 +146,13 @@ impl Host {
         while !stop.load(Ordering::Acquire) && !interrupted() {
             let now_ns = clock::now_ns();
             self.look(now_ns);
-            if first_ns == 0 && self.report.records > 0 {
+            if first_ns == 0 && self.last_tick >= self.warm_up_ticks {
                 first_ns = now_ns;
             }
             if first_ns == 0 && now_ns - began_ns > PATIENCE_NS {
                 return Err("the loops published nothing for 15 s".to_owned());
             }
             if first_ns > 0 {
-                self.report.measured_ns = now_ns - first_ns;
                 self.follow_script(now_ns - first_ns);
                 if now_ns - first_ns >= duration_ns {
                     break;

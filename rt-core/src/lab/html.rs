@@ -1,5 +1,6 @@
 //! The report as one page that needs nothing else: light, system fonts, pictures inside.
 
+use crate::lab::compare::Against;
 use crate::lab::measure::Measured;
 use crate::lab::plots::{self, BLUE, ORANGE, Series};
 use crate::lab::report::{LoopSection, NO_DIGEST, Report};
@@ -220,11 +221,11 @@ fn pictures(r: &Report, m: &Measured) -> Result<String, String> {
             histogram: &c.ours,
         };
         let theirs = Series {
-            name: "cyclictest",
+            name: c.against.name(),
             color: ORANGE,
-            histogram: &c.cyclictest,
+            histogram: &c.others,
         };
-        [ours, theirs]
+        (c.against, [ours, theirs])
     });
     let own = Series {
         name: "own work",
@@ -242,7 +243,12 @@ fn pictures(r: &Report, m: &Measured) -> Result<String, String> {
         ("Where a tissue tick goes", plots::stages(&m.tissue)?),
     ];
     match &turns {
-        Some(turns) => figures.push(("Wake-up beside cyclictest, all turns", plots::wake_histogram(turns)?)),
+        Some((Against::Cyclictest, turns)) => {
+            figures.push(("Wake-up beside cyclictest, all turns", plots::wake_histogram(turns)?));
+        }
+        Some((Against::Unloaded, turns)) => {
+            figures.push(("Wake-up with and without the load, all turns", plots::wake_histogram(turns)?));
+        }
         None => {
             let seen = Series {
                 name: "tip moved to host saw it",
@@ -307,14 +313,17 @@ fn host(r: &Report) -> String {
 
 fn comparison(r: &Report) -> String {
     let Some(c) = &r.comparison else { return String::new() };
-    let title = "<h2>Beside cyclictest</h2>\n";
+    let (title, heads) = match c.against {
+        Against::Cyclictest => ("<h2>Beside cyclictest</h2>\n", ["ours", "theirs"]),
+        Against::Unloaded => ("<h2>With and without the load</h2>\n", ["with", "without"]),
+    };
     if let Some(why) = &c.absent {
         return format!("{title}<p>{}</p>\n", esc(why));
     }
     let mut rows: Vec<Vec<String>> = Vec::new();
     for (i, round) in c.rounds.iter().enumerate() {
         let cells =
-            (0..c.names.len()).flat_map(|k| [round.ours_us[k], round.cyclictest_us[k], round.ratio[k]].map(or_na));
+            (0..c.names.len()).flat_map(|k| [round.ours_us[k], round.others_us[k], round.ratio[k]].map(or_na));
         rows.push([(i + 1).to_string()].into_iter().chain(cells).collect());
     }
     let median = c
@@ -325,19 +334,25 @@ fn comparison(r: &Report) -> String {
     let mut head = vec!["round".to_owned()];
     for name in c.names {
         head.extend([
-            format!("{name}<br>ours"),
-            format!("{name}<br>theirs"),
+            format!("{name}<br>{}", heads[0]),
+            format!("{name}<br>{}", heads[1]),
             "ratio".to_owned(),
         ]);
     }
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
     let classes = vec!["n"; head.len()];
+    let turns = num(c.turn_s);
+    let how = match c.against {
+        Against::Cyclictest => format!(
+            "{}, in turns of {turns} s: same core, priority and interval, microseconds, both read right after the sleep. The force \
+             loop does all its work, cyclictest sleeps only.",
+            esc(&c.tool)
+        ),
+        Against::Unloaded => format!("The same loops in turns of {turns} s, microseconds."),
+    };
     format!(
-        "{title}{}<p class=faint>{}, in turns of {} s: same core, priority and interval, microseconds, both read right after the \
-         sleep. The force loop does all its work, cyclictest sleeps only. Values past 1 ms are left out of p99 and p99.9.</p>\n",
-        table(&head, &rows, &classes),
-        esc(&c.tool),
-        num(c.turn_s)
+        "{title}{}<p class=faint>{how} Values past 1 ms are left out of p99 and p99.9.</p>\n",
+        table(&head, &rows, &classes)
     )
 }
 

@@ -1,7 +1,7 @@
 //! `rt-core latency`: measure, judge, write the report, say the verdict.
 
 use crate::cli::LatencyArgs;
-use crate::lab::compare;
+use crate::lab::compare::{Against, compare};
 use crate::lab::machine::Machine;
 use crate::lab::measure::{Setup, measure};
 use crate::lab::report::{self, JSON, PAGE, Parts, Report};
@@ -26,11 +26,13 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
         options.scene
     );
     let measured = measure(&setup, interrupted)?;
-    let comparison = if args.compare {
-        eprintln!("rt-core: in turns with cyclictest, {} rounds", args.rounds);
-        Some(compare::compare(&setup, args.rounds, interrupted)?)
-    } else {
-        None
+    let comparison = match args.compare {
+        Some(against) => {
+            let ours = if against == Against::Unloaded { "with and " } else { "with " };
+            eprintln!("rt-core: in turns {ours}{}, {} rounds", against.name(), args.rounds);
+            Some(compare(&setup, against, args.rounds, interrupted)?)
+        }
+        None => None,
     };
     let machine = Machine::this();
     let mut report = report::report(&Parts {
@@ -71,8 +73,12 @@ fn say(report: &Report) {
                 let said: Vec<String> = ratios
                     .map(|(name, r)| format!("{name} {}", r.map_or("n/a".to_owned(), |r| format!("{r:.2}"))))
                     .collect();
+                let over = match comparison.against {
+                    Against::Cyclictest => "ours over cyclictest",
+                    Against::Unloaded => "with the load over without it",
+                };
                 println!(
-                    "ours over cyclictest, median of {} rounds: {}",
+                    "{over}, median of {} rounds: {}",
                     comparison.rounds.len(),
                     said.join(", ")
                 );

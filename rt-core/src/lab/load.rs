@@ -27,6 +27,8 @@ pub enum Load {
     Ui,
     /// All of the above
     All,
+    /// The operator's window, drawing without a pause: `host-ui` from the folder of this program; needs a display
+    Window,
 }
 
 /// One process of a load.
@@ -42,7 +44,7 @@ impl Load {
     fn work(self, cores: usize) -> Vec<Work> {
         let some = |work: Work, count: usize| std::iter::repeat_n(work, count);
         match self {
-            Self::None => Vec::new(),
+            Self::None | Self::Window => Vec::new(),
             Self::Cpu => some(Work::Cpu, cores).collect(),
             Self::Memory => some(Work::Memory, cores).collect(),
             Self::Io => some(Work::Io, 2).collect(),
@@ -56,6 +58,9 @@ impl Load {
     }
 
     pub fn describe(self, cores: usize) -> String {
+        if self == Self::Window {
+            return "the operator's window, drawing without a pause".to_owned();
+        }
         let all = self.work(cores);
         let count = |work: Work| all.iter().filter(|w| **w == work).count();
         let parts = [
@@ -96,8 +101,34 @@ impl Running {
                 .map_err(|e| format!("cannot start the load: {e}"))?;
             running.0.push(child);
         }
+        if load == Load::Window {
+            running.0.push(window(&program, instance)?);
+        }
         Ok(running)
     }
+
+    /// What of it has ended by itself, and how: then it was no load.
+    pub fn ended(&mut self) -> Result<(), String> {
+        for child in &mut self.0 {
+            if let Ok(Some(status)) = child.try_wait() {
+                return Err(format!("the load ended by itself ({status})"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The window that lies beside this program.
+fn window(program: &Path, instance: &Instance) -> Result<Child, String> {
+    if std::env::var_os("DISPLAY").is_none() && std::env::var_os("WAYLAND_DISPLAY").is_none() {
+        return Err("the window load needs a display; without one: xvfb-run -a rt-core latency ...".to_owned());
+    }
+    let window = program.with_file_name("host-ui");
+    Command::new(&window)
+        .args(["--instance", instance.name(), "--without-pause", "--no-controllers"])
+        .stdin(Stdio::null())
+        .spawn()
+        .map_err(|e| format!("cannot start {}: {e}; build it: cargo build --release -p host-ui", window.display()))
 }
 
 impl Drop for Running {

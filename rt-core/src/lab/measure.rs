@@ -55,11 +55,15 @@ pub fn window_ns(duration_ns: u64) -> u64 {
     (duration_ns / WINDOWS).max(SHORTEST_WINDOW_NS)
 }
 
+fn warm_up_ticks(period_ns: u64) -> u64 {
+    (WARM_UP_S * 1e9) as u64 / period_ns
+}
+
 fn plan(period_ns: u64, duration_ns: u64) -> Plan {
     let window_ns = window_ns(duration_ns);
     Plan {
         period_ns,
-        warm_up_ticks: (WARM_UP_S * 1e9) as u64 / period_ns,
+        warm_up_ticks: warm_up_ticks(period_ns),
         window_ns,
         windows: (duration_ns / window_ns + 1) as usize,
     }
@@ -98,11 +102,12 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Stri
     });
     let (core, watched) = (watch_core(options), [options.haptic_core, options.tissue_core]);
     let stop = Arc::new(AtomicBool::new(false));
-    let load = Running::start(setup.load, &options.instance, setup.folder)?;
+    let mut load = Running::start(setup.load, &options.instance, setup.folder)?;
     let (run, host, gaps, cores, haptic, tissue) = std::thread::scope(|threads| {
         let stop = &stop;
         let host = threads.spawn(|| {
-            let host = Host::new(&options.instance, script, pose_times).map_err(|e| e.to_string());
+            let warm_up = warm_up_ticks(options.haptic_period_ns);
+            let host = Host::new(&options.instance, script, pose_times, warm_up).map_err(|e| e.to_string());
             let report = host.and_then(|h| h.run(setup.duration_ns, || interrupted.load(Ordering::Acquire), stop));
             // SYNC: pairs with the acquire loads of bridge and watches; nothing but the flag is carried.
             stop.store(true, Ordering::Release);
@@ -122,8 +127,11 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Stri
         let cores: Vec<CoreWatch> = cores.into_iter().filter_map(|t| t.join().ok()).collect();
         (run, host.join(), gaps.join(), cores, haptic.join(), tissue.join())
     });
+    // A window that could not open draws nothing.
+    let loaded = load.ended();
     drop(load);
     options.instance.sweep();
+    loaded?;
     let gone = |_| "a measuring thread ended by itself".to_owned();
     // Why the loops did not run says more than that the host saw nothing.
     let run = run?;

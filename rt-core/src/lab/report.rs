@@ -200,7 +200,7 @@ pub fn report(parts: &Parts) -> Report {
             rate_hz,
             tissue_rate_hz,
             duration_s: parts.duration_ns as f64 / 1e9,
-            measured_s: host.measured_ns as f64 / 1e9,
+            measured_s: parts.measured.haptic.measured_ns() as f64 / 1e9,
             warm_up_s: WARM_UP_S,
             spin_us: options.spin_ns / 1_000,
             insertions: host.insertions,
@@ -423,7 +423,7 @@ fn raw_histograms(report: &Report, measured: &Measured) -> Result<Vec<u8>, Strin
     all.push(("gap_watch/wake".to_owned(), &measured.gaps.wake));
     if let Some(comparison) = &report.comparison {
         all.push(("comparison/ours".to_owned(), &comparison.ours));
-        all.push(("comparison/cyclictest".to_owned(), &comparison.cyclictest));
+        all.push(("comparison/other".to_owned(), &comparison.others));
     }
     let failed = |e: &dyn std::fmt::Debug| format!("the histograms cannot be written: {e:?}");
     let mut bytes = Vec::new();

@@ -5,7 +5,6 @@ use dicom_core::{DataElement, Length, Tag, VR};
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
 use std::hash::{BuildHasher, Hasher, RandomState};
-use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Names the program in the files it writes; under 2.25 as it has no root of its own.
 const IMPLEMENTATION: &str = "2.25.302416733929811471066208173541526011461";
@@ -118,25 +117,9 @@ pub fn common(sop_class: &str, modality: &str, of: &Identity) -> InMemDicomObjec
 
 /// UTC as DICOM writes date and time.
 pub fn now() -> (String, String) {
-    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
-    let (days, of_day) = (seconds / 86_400, seconds % 86_400);
-    // Civil date from a count of days (era of 400 years from 1 March).
-    let shifted = days + 719_468;
-    let (era, of_era) = (shifted / 146_097, shifted % 146_097);
-    let year_of_era = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
-    let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let from_march = (5 * of_year + 2) / 153;
-    let day = of_year - (153 * from_march + 2) / 5 + 1;
-    let month = if from_march < 10 {
-        from_march + 3
-    } else {
-        from_march - 9
-    };
-    let year = year_of_era + era * 400 + u64::from(month <= 2);
-    (
-        format!("{year:04}{month:02}{day:02}"),
-        format!("{:02}{:02}{:02}", of_day / 3600, of_day / 60 % 60, of_day % 60),
-    )
+    let now = jiff::Timestamp::now();
+    let of = |format: &str| now.strftime(format).to_string();
+    (of("%Y%m%d"), of("%H%M%S"))
 }
 
 pub fn bytes(object: InMemDicomObject) -> Result<Vec<u8>, String> {

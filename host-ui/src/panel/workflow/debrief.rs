@@ -1,7 +1,7 @@
 //! What came of it: the error of each seed, the dose against its limits, the histogram of the target.
 
 use crate::dose_desk::{DosePicture, Figure, Limit};
-use crate::panel::{SeedError, Shown, all_errors};
+use crate::panel::{Action, SeedError, Shown, all_errors};
 use crate::{format, theme};
 use egui::RichText;
 use egui_plot::{Line, Plot, PlotPoints, VLine};
@@ -9,9 +9,16 @@ use egui_plot::{Line, Plot, PlotPoints, VLine};
 /// Rows of the table of seeds at once; the rest is scrolled to.
 const TABLE_HEIGHT: f32 = 150.0;
 
-pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown) {
+pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     seeds_ui(ui, shown, &all_errors(shown));
     dose_ui(ui, shown, 80.0, "The dose is computed once seeds lie in the tissue.");
+    let save = ui.add_enabled(!shown.seeds.is_empty(), egui::Button::new("Save the debrief"));
+    if save
+        .on_hover_text("A page and its figures: debrief.html and score.json, in a folder of its own under out/")
+        .clicked()
+    {
+        actions.push(Action::SaveDebrief);
+    }
 }
 
 /// Figures and histogram, so high, of the seeds that lie in the tissue or are planned.

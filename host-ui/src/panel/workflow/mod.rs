@@ -183,7 +183,7 @@ fn step_ui(
             Progress::Insert => insert_ui(ui, shown, ready, actions),
             Progress::Drop => drop_ui(ui, shown, ready, actions),
             Progress::Retract => retract_ui(ui, shown, actions),
-            Progress::Debrief => debrief::debrief_ui(ui, shown),
+            Progress::Debrief => debrief::debrief_ui(ui, shown, actions),
         }
     });
 }

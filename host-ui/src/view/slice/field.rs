@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use stylet_shm_schema::GridInfo;
 
 /// A displacement smaller than this is not seen (m).
-const SEEN_M: f32 = 5e-6;
+pub const SEEN_M: f32 = 5e-6;
 /// Steps of the fixed point that finds the material point; with tissue stretched to 1.75 the last is a hundredth of the first.
 pub const STEPS: u32 = 8;
 

@@ -1,6 +1,6 @@
 //! The ultrasound pictures on the graphics card: three small volumes, and a texture for each slice.
 
-use super::field::{Field, STEPS};
+use super::field::{Field, SEEN_M, STEPS};
 use super::plane::Plane;
 use super::speckle::{self, GRAIN_M, GRAINS, LARGEST_AMPLITUDE};
 use crate::link::SceneModel;
@@ -220,7 +220,6 @@ fn uniform(body: &Body, plane: &Plane) -> SliceUniform {
     let padded = |v: [f32; 3], w: f32| [v[0], v[1], v[2], w];
     let half = |side: f32| f64::from(side) / 2.0 * plane.m_per_point;
     let nodes = &body.nodes_info;
-    let steps = if body.at_rest { 0.0 } else { STEPS as f32 };
     let grain = [0, 1, 2].map(|a| {
         let along = body.scene_from_patient.column(a) / (f64::from(GRAIN_M[a]) * GRAINS as f64);
         four(along, 0.0)
@@ -232,7 +231,7 @@ fn uniform(body: &Body, plane: &Plane) -> SliceUniform {
         volume_corner_m: padded(body.volume_corner_m, 0.0),
         volume_size_m: padded(body.volume_size_m, 0.0),
         nodes_corner_m: padded(nodes.origin_m.map(|c| (c - 0.5 * nodes.spacing_m) as f32), 0.0),
-        nodes_size_m: padded(nodes.dims.map(|d| (f64::from(d) * nodes.spacing_m) as f32), steps),
+        nodes_size_m: padded(nodes.dims.map(|d| (f64::from(d) * nodes.spacing_m) as f32), 0.0),
         grain,
     }
 }
@@ -374,7 +373,10 @@ fn pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::Rend
         fragment: Some(wgpu::FragmentState {
             module: &module,
             entry_point: Some("slice_fragment"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &[("STEPS", f64::from(STEPS)), ("SEEN_M", f64::from(SEEN_M))],
+                ..Default::default()
+            },
             targets: &[Some(COLOR.into())],
         }),
         multiview_mask: None,

@@ -1,5 +1,9 @@
 // One slice of simulated ultrasound: for each place the material point that lies there now, its brightness and its grain.
 
+// How often the fixed point is applied at most, and what it need not be followed for (m).
+override STEPS: i32;
+override SEEN_M: f32;
+
 struct Slice {
     // Middle of the picture, and the ways to its right and upper edge (m).
     middle_m: vec4<f32>,
@@ -9,7 +13,6 @@ struct Slice {
     volume_corner_m: vec4<f32>,
     volume_size_m: vec4<f32>,
     nodes_corner_m: vec4<f32>,
-    // w: how often the fixed point is applied.
     nodes_size_m: vec4<f32>,
     // Rows: patient right, anterior, superior in the scene, each over the edge of the cube of grain.
     grain_x: vec4<f32>,
@@ -31,8 +34,8 @@ struct Out {
 
 @vertex
 fn slice_vertex(@builtin(vertex_index) index: u32) -> Out {
-    // One triangle over the whole picture.
-    let at = vec2(f32(i32(index & 1u) * 4 - 1), f32(i32(index >> 1u) * 4 - 1));
+    // Two triangles that end where the picture does: Mesa's software driver keeps memory for ever for each one that it clips.
+    let at = vec2(f32(i32(index & 1u) * 2 - 1), f32(i32(index >> 1u) * 2 - 1));
     return Out(vec4(at, 0.0, 1.0), at);
 }
 
@@ -50,9 +53,14 @@ fn brightness_at(rest_m: vec3<f32>) -> f32 {
 fn slice_fragment(in: Out) -> @location(0) vec4<f32> {
     let place_m = slice.middle_m.xyz + in.at.x * slice.right_m.xyz + in.at.y * slice.up_m.xyz;
     var rest_m = place_m;
-    let steps = i32(slice.nodes_size_m.w);
-    for (var step = 0; step < steps; step++) {
-        rest_m = place_m - displacement_m(rest_m);
+    // No uniform decides how often: Mesa's software driver would compile the shader anew for each of its values, and keep them all.
+    for (var step = 0; step < STEPS; step++) {
+        let next_m = place_m - displacement_m(rest_m);
+        let moved_m = abs(next_m - rest_m);
+        rest_m = next_m;
+        if (max(moved_m.x, max(moved_m.y, moved_m.z)) < SEEN_M) {
+            break;
+        }
     }
     let here = brightness_at(rest_m);
     // Along the beam, where tissue meets other tissue, it shines.

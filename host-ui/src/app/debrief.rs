@@ -1,0 +1,150 @@
+//! The debrief as files: the same page as `host-ui procedure` writes, of what the window has seen.
+
+use super::{App, refusal};
+use crate::dose::decay::Interval;
+use crate::dose::{DoseKernel, Seed, Source};
+use crate::format;
+use crate::job::{Job, News};
+use crate::link::SceneModel;
+use crate::panel::{Note, SeedError, all_errors};
+use crate::plan::{Anatomy, exchange};
+use crate::score::{self, Implant, Motion, Score, SeedPair};
+use std::path::PathBuf;
+use std::sync::Arc;
+use stylet_shm_schema::{SeedPose, TickRecord};
+
+/// The folder of what was written, or why it could not be.
+pub(super) type Saved = Result<PathBuf, String>;
+
+/// Everything that a debrief is made of, as it was when it was asked for.
+struct Delivered {
+    scene: Arc<SceneModel>,
+    source: Source,
+    prescription_gy: f64,
+    pairs: Vec<SeedPair>,
+    lost: Vec<Seed>,
+    motion: Motion,
+    records: Vec<TickRecord>,
+}
+
+impl App {
+    /// Asks for the files; [`App::take_debrief`] says when they are there.
+    pub(super) fn save_debrief(&mut self) {
+        if self.debrief.is_some() {
+            return;
+        }
+        match self.delivered() {
+            Ok(delivered) => {
+                let folder = PathBuf::from(format!("out/debrief-{}", format::utc_now()));
+                self.debrief = Some(Job::begin("debrief", move |told, _| {
+                    // The window may be gone by now; then nobody wants the answer.
+                    let _ = told.send(write(&delivered, folder));
+                }));
+            }
+            Err(why) => self.shown.note = Some(refusal(why)),
+        }
+    }
+
+    pub(super) fn take_debrief(&mut self) {
+        let Some(job) = &self.debrief else { return };
+        let saved = match job.poll() {
+            News::None => return,
+            News::Told(saved) => saved,
+            News::Ended => Err("the debrief was not written: its thread has ended".to_owned()),
+        };
+        self.debrief = None;
+        self.shown.note = Some(match saved {
+            Ok(folder) => Note {
+                refused: false,
+                text: format!("Debrief saved as {}", folder.join("debrief.html").display()),
+            },
+            Err(why) => refusal(why),
+        });
+    }
+
+    fn delivered(&self) -> Result<Delivered, String> {
+        let scene = self.link.scene().ok_or("there is no scene yet")?.clone();
+        let implant = self.shown.planning.implant.as_ref();
+        let (source, prescription_gy) = match implant {
+            None => exchange::usual()?,
+            Some(implant) => {
+                let model = &implant.plan.source;
+                let source = Source::known(model).ok_or_else(|| format!("no source is known as \"{model}\""))?;
+                (source, implant.plan.prescription_gy)
+            }
+        };
+        let (mut pairs, mut lost) = (Vec::new(), Vec::new());
+        for (needle, row) in all_errors(&self.shown) {
+            let Some((pair, placed)) = self.pair(needle, &row) else { continue };
+            match placed {
+                Some(pose) => pairs.push(SeedPair {
+                    delivered: Seed {
+                        position_m: pose.position_m,
+                        axis: Some(pose.axis),
+                        ..pair.planned
+                    },
+                    ..pair
+                }),
+                None => lost.push(pair.planned),
+            }
+        }
+        Ok(Delivered {
+            scene,
+            source,
+            prescription_gy,
+            pairs,
+            lost,
+            motion: self.trace.motion(),
+            records: self.trace.records().to_vec(),
+        })
+    }
+
+    /// A planned seed, as if it lay on plan, and the one that was dropped for it.
+    fn pair(&self, needle: usize, row: &SeedError) -> Option<(SeedPair, Option<SeedPose>)> {
+        let shown = &self.shown;
+        let of_needle = |hole, position_m, direction: [f64; 3], strength_u| {
+            let planned = Seed {
+                position_m,
+                axis: Some(direction),
+                strength_u,
+            };
+            SeedPair {
+                needle,
+                hole,
+                planned,
+                delivered: planned,
+                direction,
+            }
+        };
+        let Some(implant) = &shown.planning.implant else {
+            let planned = shown.planned().get(row.planned)?;
+            let direction = shown.plan.as_ref()?.direction;
+            let pair = of_needle(None, planned.position_m, direction, self.settings.seed_strength_u);
+            return Some((pair, row.placed.and_then(|n| shown.seeds.get(n)).copied()));
+        };
+        let of = implant.plan.needles.get(needle)?;
+        let seed = of.seeds.get(row.planned)?;
+        let pair = of_needle(of.hole, of.at_m(seed.along_m), of.direction, seed.strength_u);
+        let own = shown.planning.course.seeds_of(needle, shown.seeds.len());
+        Some((pair, row.placed.and_then(|n| shown.seeds[own].get(n)).copied()))
+    }
+}
+
+fn write(delivered: &Delivered, folder: PathBuf) -> Saved {
+    let anatomy = Anatomy::of(&delivered.scene)?;
+    let kernel = DoseKernel::new(&delivered.source, Interval::ALL);
+    let score = Score::of(Implant {
+        title: format!("Scene {}", delivered.scene.header.name.read()),
+        pairs: delivered.pairs.clone(),
+        lost: delivered.lost.clone(),
+        anatomy: &anatomy,
+        kernel: &kernel,
+        source: format!("{} {}", delivered.source.nuclide, delivered.source.model),
+        prescription_gy: delivered.prescription_gy,
+        motion: delivered.motion,
+        records: &delivered.records,
+    })?;
+    std::fs::create_dir_all(&folder).map_err(|e| format!("{} cannot be made ({e})", folder.display()))?;
+    score::write(&score, &folder)?;
+    Ok(folder)
+}

@@ -1,0 +1,75 @@
+//! Which core a command speaks to, and which scene it is to run.
+
+use clap::Args;
+use std::path::{Path, PathBuf};
+use stylet_shm_schema::BUILTIN_SCENES;
+use stylet_shm_schema::service::Instance;
+
+#[derive(Args, Clone, Debug)]
+pub struct CoreArgs {
+    /// Name that rt-core was started under
+    #[arg(long, default_value = "main", value_parser = instance)]
+    pub instance: Instance,
+    /// What to run instead of rt-core's scene: paper, pelvis or full, which are built in, or a volume: NIfTI-1, NRRD, MetaImage,
+    /// DICOM RT Structure Set, or a scene file (.toml)
+    #[arg(long, value_name = "SCENE", value_parser = choice)]
+    pub scene: Option<SceneChoice>,
+    /// Which label of the volume is the gland [default: all but 0]
+    #[arg(long, value_name = "N", requires = "scene")]
+    pub label: Option<u8>,
+}
+
+impl CoreArgs {
+    /// Where the scene is to be read from.
+    pub fn file(&self) -> Option<&Path> {
+        self.scene.as_ref().and_then(SceneChoice::file)
+    }
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub enum SceneChoice {
+    /// By its place among [`BUILTIN_SCENES`].
+    BuiltIn(usize),
+    File(PathBuf),
+}
+
+impl SceneChoice {
+    /// A file wins over the built-in scene of its name.
+    pub fn named(name: &str) -> Self {
+        let path = PathBuf::from(name);
+        let number = BUILTIN_SCENES.iter().position(|scene| *scene == name);
+        match number.filter(|_| !path.exists()) {
+            Some(number) => Self::BuiltIn(number),
+            None => Self::File(path),
+        }
+    }
+
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::BuiltIn(_) => None,
+            Self::File(path) => Some(path),
+        }
+    }
+}
+
+/// For the command line.
+pub fn instance(name: &str) -> Result<Instance, String> {
+    Instance::new(name).map_err(|e| e.to_string())
+}
+
+fn choice(name: &str) -> Result<SceneChoice, String> {
+    Ok(SceneChoice::named(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_a_built_in_scene_and_a_path_a_file() {
+        assert_eq!(SceneChoice::named("pelvis"), SceneChoice::BuiltIn(1));
+        for path in ["./pelvis", "gland.nii", "pelvis.nii.gz"] {
+            assert_eq!(SceneChoice::named(path).file(), Some(Path::new(path)));
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! Force and speed of a whole procedure in bounded memory, and how the hand moved.
+
+use super::motion::{Motion, MotionMeter};
+use stylet_shm_schema::{TickRecord, flags};
+
+/// Records kept at most: ten of a second for twenty minutes; of a longer procedure fewer of a second.
+const MOST: usize = 12_000;
+/// Of so many ticks one is kept at first, at 1 kHz a hundred of a second.
+const FIRST_STRETCH: usize = 10;
+/// A tip that is outside for longer belongs to no procedure until it touches tissue again.
+const OUTSIDE_NS: u64 = 2_000_000_000;
+
+/// Which scene, in which run of the core: its session and generation.
+type SceneKey = (u64, u64);
+
+#[derive(Clone, Debug, Default)]
+pub struct Trace {
+    scene: Option<SceneKey>,
+    /// Of each stretch of ticks the one with the largest force.
+    records: Vec<TickRecord>,
+    stretch: usize,
+    strongest: Option<TickRecord>,
+    in_stretch: usize,
+    /// When the tip touched tissue last.
+    contact_ns: Option<u64>,
+    meter: MotionMeter,
+}
+
+impl Trace {
+    /// `direction`: of the needle, into the body. Another scene begins anew.
+    pub fn take(&mut self, records: &[TickRecord], scene: Option<SceneKey>, direction: [f64; 3]) {
+        if scene.is_some() && scene != self.scene {
+            *self = Self {
+                scene,
+                stretch: FIRST_STRETCH,
+                ..Self::default()
+            };
+        }
+        for record in records {
+            if record.flags & flags::IN_CONTACT != 0 {
+                self.contact_ns = Some(record.due_ns);
+            }
+            let Some(contact_ns) = self.contact_ns else { continue };
+            if record.due_ns.saturating_sub(contact_ns) <= OUTSIDE_NS {
+                self.meter.take(record, direction);
+                self.keep(record);
+            }
+        }
+    }
+
+    fn keep(&mut self, record: &TickRecord) {
+        if self.strongest.is_none_or(|kept| square(record) > square(&kept)) {
+            self.strongest = Some(*record);
+        }
+        self.in_stretch += 1;
+        if self.in_stretch < self.stretch {
+            return;
+        }
+        self.in_stretch = 0;
+        self.records.extend(self.strongest.take());
+        if self.records.len() >= MOST {
+            self.stretch *= 2;
+            let stronger = |pair: &[TickRecord]| match pair {
+                [a, b] if square(b) > square(a) => *b,
+                _ => pair[0],
+            };
+            self.records = self.records.chunks(2).map(stronger).collect();
+        }
+    }
+
+    pub fn records(&self) -> &[TickRecord] {
+        &self.records
+    }
+
+    pub fn motion(&self) -> Motion {
+        self.meter.motion()
+    }
+}
+
+fn square(record: &TickRecord) -> f64 {
+    record.force_on_hand_n.iter().map(|f| f * f).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    /// A millisecond apart; the force rises and falls once a second, with one tick of 9 N.
+    fn records(ticks: std::ops::Range<u64>, in_contact: bool) -> Vec<TickRecord> {
+        let record = |tick: u64| {
+            let mut r = TickRecord::zeroed();
+            r.due_ns = (tick + 1) * 1_000_000;
+            r.flags = if in_contact { flags::IN_CONTACT } else { 0 };
+            r.force_on_hand_n[2] = (tick as f64 / 159.0).sin();
+            if tick == 5_003 {
+                r.force_on_hand_n[2] = -9.0;
+            }
+            r
+        };
+        ticks.map(record).collect()
+    }
+
+    #[test]
+    fn an_hour_is_kept_in_bounded_memory_with_its_largest_force() {
+        let mut trace = Trace::default();
+        for minute in 0..60 {
+            trace.take(&records(minute * 60_000..(minute + 1) * 60_000, true), Some((1, 1)), [0.0, 0.0, 1.0]);
+        }
+        assert!((MOST / 2..MOST).contains(&trace.records().len()), "{}", trace.records().len());
+        let largest = trace.records().iter().map(square).fold(0.0, f64::max);
+        assert_eq!((largest, trace.motion().peak_force_n), (81.0, 9.0));
+        assert!(trace.records().is_sorted_by_key(|r| r.due_ns));
+        let last_ns = trace.records().last().map(|r| r.due_ns);
+        assert!(last_ns.is_some_and(|ns| ns > 3_599_000_000_000), "{last_ns:?}");
+        assert!((trace.motion().in_tissue_s - 3_599.999).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_comes_before_the_tissue_and_long_after_it_is_no_part_of_the_procedure() {
+        let mut trace = Trace::default();
+        trace.take(&records(0..10_000, false), Some((1, 1)), [0.0, 0.0, 1.0]);
+        assert!(trace.records().is_empty());
+        trace.take(&records(10_000..11_000, true), Some((1, 1)), [0.0, 0.0, 1.0]);
+        trace.take(&records(11_000..60_000, false), Some((1, 1)), [0.0, 0.0, 1.0]);
+        assert!((trace.motion().duration_s - 2.999).abs() < 1e-9, "{:?}", trace.motion());
+        assert_eq!(trace.records().len(), 300);
+        trace.take(&records(60_000..60_010, true), Some((1, 2)), [0.0, 0.0, 1.0]);
+        assert_eq!(trace.records().len(), 1, "another scene");
+    }
+}
