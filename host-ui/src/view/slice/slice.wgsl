@@ -34,8 +34,8 @@ struct Out {
 
 @vertex
 fn slice_vertex(@builtin(vertex_index) index: u32) -> Out {
-    // Two triangles that end where the picture does: Mesa's software driver keeps memory for ever for each one that it clips.
-    let at = vec2(f32(i32(index & 1u) * 2 - 1), f32(i32(index >> 1u) * 2 - 1));
+    // One triangle over the whole picture.
+    let at = vec2(f32(i32(index & 1u) * 4 - 1), f32(i32(index >> 1u) * 4 - 1));
     return Out(vec4(at, 0.0, 1.0), at);
 }
 
