@@ -56,7 +56,7 @@ impl App {
         self.shown.note = Some(match saved {
             Ok(folder) => Note {
                 refused: false,
-                text: format!("Debrief saved as {}", folder.join("debrief.html").display()),
+                text: format!("Debrief saved as {}", folder.display()),
             },
             Err(why) => refusal(why),
         });

@@ -22,7 +22,7 @@ use crate::score::Trace;
 use crate::settings::Settings;
 use crate::view::middle::Middle;
 use crate::workflow::{Pace, Run};
-use crate::{format, keyboard, theme};
+use crate::{cpu_time, format, keyboard, theme};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::service::Instance;
 
@@ -275,8 +275,8 @@ impl App {
 impl eframe::App for App {
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
-        let begun_ns = thread_cpu_ns();
-        let uploaded = self.middle.uploaded_bytes();
+        let begun_ns = cpu_time::thread_ns();
+        let driver = self.middle.driver();
         self.apply_settings(&ctx);
         self.shown.has_focus = ctx.input(|i| i.focused);
         self.take();
@@ -294,9 +294,13 @@ impl eframe::App for App {
         let wish = self.wish(&ctx, keys.drive_m_per_s);
         self.drive(wish, f64::from(ctx.input(|i| i.stable_dt)));
         self.send_parameters();
+        let asked = self.middle.driver();
+        let driver_ns = asked.cpu_ns - driver.cpu_ns;
+        let all_ns = cpu_time::thread_ns().saturating_sub(begun_ns);
         self.shown.cost = FrameCost {
-            cpu_us: format::us(thread_cpu_ns().saturating_sub(begun_ns)),
-            uploaded_bytes: self.middle.uploaded_bytes() - uploaded,
+            cpu_us: format::us(all_ns.saturating_sub(driver_ns)),
+            driver_us: format::us(driver_ns),
+            uploaded_bytes: asked.uploaded_bytes - driver.uploaded_bytes,
         };
         ctx.request_repaint_after(match self.shown.status {
             LinkStatus::Live if self.pause => LIVE_FRAME,
@@ -307,18 +311,6 @@ impl eframe::App for App {
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         self.settings.write(storage);
-    }
-}
-
-/// Processor time of this thread; 0 where the system does not tell.
-fn thread_cpu_ns() -> u64 {
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: `time` is valid for writes.
-    let told = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &mut time) };
-    if told == 0 {
-        time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
-    } else {
-        0
     }
 }
 

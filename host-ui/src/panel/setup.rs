@@ -93,8 +93,9 @@ fn axes(shown: &Shown) -> String {
 fn frame(shown: &Shown) -> String {
     let cost = shown.cost;
     format!(
-        "{:.1} ms a frame, {:.0} KiB to the card",
+        "{:.1} ms a frame, {:.1} in the driver, {:.0} KiB",
         cost.cpu_us * 1e-3,
+        cost.driver_us * 1e-3,
         cost.uploaded_bytes as f64 / 1024.0
     )
 }

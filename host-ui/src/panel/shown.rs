@@ -86,7 +86,10 @@ pub struct TipOnPath {
 /// What the last frame cost this program.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FrameCost {
+    /// Processor time without the driver's.
     pub cpu_us: f64,
+    /// Of the graphics library and its driver for the pictures in the middle.
+    pub driver_us: f64,
     pub uploaded_bytes: u64,
 }
 

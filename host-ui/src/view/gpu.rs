@@ -2,6 +2,7 @@
 //!
 //! The picture is drawn into a texture of its own and shown as an image, so that a window and a test see the same pixels.
 
+use super::driver::DriverCost;
 use super::marks::{MarkVertex, Marks};
 use super::mesh::SurfaceVertex;
 use crate::dose_desk;
@@ -124,8 +125,7 @@ pub struct Gpu {
     indices: Growing,
     shells: Vec<Shell>,
     targets: Option<Targets>,
-    /// Bytes sent to the card since the window opened.
-    pub uploaded_bytes: u64,
+    pub driver: DriverCost,
 }
 
 impl Gpu {
@@ -156,7 +156,7 @@ impl Gpu {
             indices: Growing::new(device, wgpu::BufferUsages::INDEX),
             shells: Vec::new(),
             targets: None,
-            uploaded_bytes: 0,
+            driver: DriverCost::default(),
             layout,
             state,
         }
@@ -164,8 +164,8 @@ impl Gpu {
 
     /// The indices of each surface, the body's first.
     pub fn set_scene(&mut self, rest: &[SurfaceVertex], surfaces: &[Vec<u32>]) {
-        self.uploaded_bytes += self.ghost_vertices.write(&self.state, rest);
-        self.uploaded_bytes += self.indices.write(&self.state, &surfaces.concat());
+        self.driver.send(|| self.ghost_vertices.write(&self.state, rest));
+        self.driver.send(|| self.indices.write(&self.state, &surfaces.concat()));
         let mut end = 0;
         self.surfaces.clear();
         for indices in surfaces {
@@ -179,7 +179,7 @@ impl Gpu {
     }
 
     pub fn set_surface(&mut self, vertices: &[SurfaceVertex]) {
-        self.uploaded_bytes += self.surface_vertices.write(&self.state, vertices);
+        self.driver.send(|| self.surface_vertices.write(&self.state, vertices));
     }
 
     /// Vertices and indices of each isodose surface.
@@ -194,15 +194,15 @@ impl Gpu {
         }
         self.shells.truncate(shells.len());
         for (shell, surface) in self.shells.iter_mut().zip(shells) {
-            self.uploaded_bytes += shell.vertices.write(&self.state, &surface.vertices);
-            self.uploaded_bytes += shell.indices.write(&self.state, &surface.indices);
+            self.driver.send(|| shell.vertices.write(&self.state, &surface.vertices));
+            self.driver.send(|| shell.indices.write(&self.state, &surface.indices));
         }
     }
 
     /// `which` is 0 for marks of the plan, 1 for those of the tick.
     pub fn set_marks(&mut self, which: usize, marks: &Marks) {
-        self.uploaded_bytes += self.solids[which].write(&self.state, &marks.triangles);
-        self.uploaded_bytes += self.lines[which].write(&self.state, &marks.lines);
+        self.driver.send(|| self.solids[which].write(&self.state, &marks.triangles));
+        self.driver.send(|| self.lines[which].write(&self.state, &marks.lines));
     }
 
     /// Sizes in pixels. True when the picture is new and has to be drawn.
@@ -229,7 +229,20 @@ impl Gpu {
         ghost: Option<&SceneUniform>,
         clear: [f64; 3],
     ) {
-        let Some(targets) = &self.targets else { return };
+        let mut driver = self.driver;
+        driver.send(|| self.send_picture(looks, shells, ghost, clear));
+        self.driver = driver;
+    }
+
+    /// Returns the bytes that it sent.
+    fn send_picture(
+        &self,
+        looks: &[SceneUniform],
+        shells: &[SceneUniform],
+        ghost: Option<&SceneUniform>,
+        clear: [f64; 3],
+    ) -> u64 {
+        let Some(targets) = &self.targets else { return 0 };
         let queue = &self.state.queue;
         for (surface, look) in self.surfaces.iter().zip(looks) {
             queue.write_buffer(&surface.material.uniform, 0, bytemuck::bytes_of(look));
@@ -237,8 +250,6 @@ impl Gpu {
         for (shell, look) in self.shells.iter().zip(shells) {
             queue.write_buffer(&shell.material.uniform, 0, bytemuck::bytes_of(look));
         }
-        let uniforms = looks.len() + shells.len() + 1;
-        self.uploaded_bytes += (uniforms * size_of::<SceneUniform>()) as u64;
         // Marks take the light and the eye from it.
         if let Some(ghost) = ghost.or(looks.first()) {
             queue.write_buffer(&self.ghost.uniform, 0, bytemuck::bytes_of(ghost));
@@ -274,6 +285,7 @@ impl Gpu {
             }
         }
         queue.submit([encoder.finish()]);
+        ((looks.len() + shells.len() + 1) * size_of::<SceneUniform>()) as u64
     }
 
     /// The highest dose is innermost and comes first.

@@ -1,5 +1,6 @@
 //! What stands in the middle of the window: the three-dimensional picture, the slices, and the tools over them.
 
+use super::driver::DriverCost;
 use super::scene3d::{Preset, Scene3d};
 use super::slice::{Orientation, Plane, Slices};
 use super::state::ViewState;
@@ -38,8 +39,8 @@ impl Middle {
     }
 
     /// Bytes sent to the graphics card since the window opened.
-    pub fn uploaded_bytes(&self) -> u64 {
-        self.solid.uploaded_bytes() + self.slices.uploaded_bytes()
+    pub fn driver(&self) -> DriverCost {
+        self.solid.driver().plus(self.slices.driver())
     }
 
     pub fn take(&mut self, shown: &Shown, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {

@@ -1,6 +1,7 @@
 //! What is drawn of the body: the deforming gland, the needle and the seeds, in three dimensions and in slices.
 
 pub mod camera;
+mod driver;
 mod gpu;
 mod kinds;
 mod legend;

@@ -1,6 +1,7 @@
 //! The three-dimensional picture: what it shows, and how the pointer turns it.
 
 use super::camera::Camera;
+use super::driver::DriverCost;
 use super::gpu::{Gpu, SceneUniform};
 use super::kinds::{kinds, surfaces};
 use super::legend::Legend;
@@ -133,8 +134,8 @@ impl Scene3d {
         }
     }
 
-    pub fn uploaded_bytes(&self) -> u64 {
-        self.gpu.as_ref().map_or(0, |gpu| gpu.uploaded_bytes)
+    pub fn driver(&self) -> DriverCost {
+        self.gpu.as_ref().map_or_else(DriverCost::default, |gpu| gpu.driver)
     }
 
     pub fn reset_view(&mut self, shown: &Shown) {

@@ -11,7 +11,7 @@ const TABLE_HEIGHT: f32 = 150.0;
 
 pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     seeds_ui(ui, shown, &all_errors(shown));
-    dose_ui(ui, shown, 80.0, "The dose is computed once seeds lie in the tissue.");
+    dose_ui(ui, shown, 60.0, "The dose is computed once seeds lie in the tissue.");
     let save = ui.add_enabled(!shown.seeds.is_empty(), egui::Button::new("Save the debrief"));
     if save
         .on_hover_text("A page and its figures: debrief.html and score.json, in a folder of its own under out/")
@@ -99,8 +99,16 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
         return;
     }
     let has_many = shown.planning.implant.is_some();
-    ui.label(theme::strong("Seed error, mm"))
-        .on_hover_text("Where the seed lies now against where it was planned; along is positive inwards");
+    ui.horizontal(|ui| {
+        ui.label(theme::strong("Seed error, mm"))
+            .on_hover_text("Where the seed lies now against where it was planned; along is positive inwards");
+        let placed = rows.iter().map(|(_, row)| row).filter(|r| r.placed.is_some());
+        let placed: Vec<f64> = placed.map(total_m).collect();
+        let mean = placed.iter().sum::<f64>() / placed.len().max(1) as f64;
+        let worst = placed.iter().copied().fold(0.0, f64::max);
+        let text = format!("mean {:.2}, worst {:.2}", format::mm(mean), format::mm(worst));
+        ui.label(theme::small(text));
+    });
     egui::ScrollArea::vertical()
         .id_salt("seed errors")
         .max_height(TABLE_HEIGHT)
@@ -120,12 +128,6 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
                         .for_each(|(needle, row)| seed_row_ui(ui, has_many.then_some(*needle), row));
                 });
         });
-    let placed = rows.iter().map(|(_, row)| row).filter(|r| r.placed.is_some());
-    let placed: Vec<f64> = placed.map(total_m).collect();
-    let mean = placed.iter().sum::<f64>() / placed.len().max(1) as f64;
-    let worst = placed.iter().copied().fold(0.0, f64::max);
-    let text = format!("mean {:.2}, worst {:.2}", format::mm(mean), format::mm(worst));
-    ui.label(theme::small(text));
 }
 
 fn total_m(row: &SeedError) -> f64 {

@@ -171,8 +171,9 @@ fn step_ui(
         let blocked = missing(shown, step);
         match &blocked {
             Some(why) => drop(ui.label(RichText::new(format!("Missing: {why}.")).color(tokens.warn))),
-            // The summary of the plan stands there.
+            // What there is to say stands below.
             None if step == Progress::Plan && shown.planning.implant.is_some() => {}
+            None if step == Progress::Debrief => {}
             None => drop(ui.label(theme::weak(what(step, shown)))),
         }
         let ready = blocked.is_none() && !shown.running;
@@ -202,7 +203,7 @@ fn what(step: Progress, shown: &Shown) -> String {
             format!("{dropped} of {planned} seeds dropped. Drop one at each place on the way out.")
         }
         Progress::Retract => "All seeds are dropped. Take the needle out.".to_owned(),
-        Progress::Debrief => "Where the seeds came to rest.".to_owned(),
+        Progress::Debrief => String::new(),
     }
 }
 

@@ -4,6 +4,7 @@ use super::field::{Field, SEEN_M, STEPS};
 use super::plane::Plane;
 use super::speckle::{self, GRAIN_M, GRAINS, LARGEST_AMPLITUDE};
 use crate::link::SceneModel;
+use crate::view::driver::DriverCost;
 use bytemuck::{Pod, Zeroable};
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
@@ -67,8 +68,7 @@ pub struct SliceGpu {
     /// Rises with each new content of the volumes.
     content: u64,
     texels: Vec<[u16; 4]>,
-    /// Bytes sent to the card since the window opened.
-    pub uploaded_bytes: u64,
+    pub driver: DriverCost,
 }
 
 impl SliceGpu {
@@ -88,7 +88,8 @@ impl SliceGpu {
         };
         let grain = volume(&state, wgpu::TextureFormat::R8Unorm, [GRAINS as u32; 3]);
         let grains = speckle::grain();
-        write(&state, &grain, &grains, 1);
+        let mut driver = DriverCost::default();
+        driver.send(|| write(&state, &grain, &grains, 1));
         Self {
             pipeline: pipeline(device, &layout),
             grain: grain.create_view(&wgpu::TextureViewDescriptor::default()),
@@ -100,7 +101,7 @@ impl SliceGpu {
             targets: Vec::new(),
             content: 0,
             texels: Vec::new(),
-            uploaded_bytes: grains.len() as u64,
+            driver,
             state,
         }
     }
@@ -118,8 +119,7 @@ impl SliceGpu {
         }
         let (dims, bytes) = speckle::brightness_volume(&model.header, &model.labels);
         let brightness = volume(&self.state, wgpu::TextureFormat::R8Unorm, dims.map(|d| d as u32));
-        write(&self.state, &brightness, &bytes, 1);
-        self.uploaded_bytes += bytes.len() as u64;
+        self.driver.send(|| write(&self.state, &brightness, &bytes, 1));
         let nodes = volume(&self.state, wgpu::TextureFormat::Rgba16Float, nodes_info.dims);
         self.body = Some(Body {
             brightness: brightness.create_view(&wgpu::TextureViewDescriptor::default()),
@@ -140,9 +140,8 @@ impl SliceGpu {
         }
         field.texels(&mut self.texels);
         let bytes: &[u8] = bytemuck::cast_slice(&self.texels);
-        write(&self.state, &body.nodes, bytes, 8);
+        self.driver.send(|| write(&self.state, &body.nodes, bytes, 8));
         body.at_rest = field.at_rest;
-        self.uploaded_bytes += bytes.len() as u64;
         self.content += 1;
     }
 
@@ -167,9 +166,11 @@ impl SliceGpu {
         if pane.drawn != Some((uniform, self.content)) {
             pane.drawn = Some((uniform, self.content));
             let bytes = bytemuck::bytes_of(&uniform);
-            self.state.queue.write_buffer(&pane.uniform, 0, bytes);
-            self.uploaded_bytes += bytes.len() as u64;
-            draw(&self.state, &self.pipeline, &pane.bind, &target.view);
+            self.driver.send(|| {
+                self.state.queue.write_buffer(&pane.uniform, 0, bytes);
+                draw(&self.state, &self.pipeline, &pane.bind, &target.view);
+                bytes.len() as u64
+            });
         }
         Some(target.id)
     }
@@ -257,7 +258,8 @@ fn volume(state: &RenderState, format: wgpu::TextureFormat, dims: [u32; 3]) -> w
     })
 }
 
-fn write(state: &RenderState, texture: &wgpu::Texture, bytes: &[u8], bytes_per_texel: u32) {
+/// Returns the bytes that it sent.
+fn write(state: &RenderState, texture: &wgpu::Texture, bytes: &[u8], bytes_per_texel: u32) -> u64 {
     let size = texture.size();
     let layout = wgpu::TexelCopyBufferLayout {
         offset: 0,
@@ -265,6 +267,7 @@ fn write(state: &RenderState, texture: &wgpu::Texture, bytes: &[u8], bytes_per_t
         rows_per_image: Some(size.height),
     };
     state.queue.write_texture(texture.as_image_copy(), bytes, layout, size);
+    bytes.len() as u64
 }
 
 fn target(state: &RenderState, size: [u32; 2], old: Option<egui::TextureId>) -> Target {

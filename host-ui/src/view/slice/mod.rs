@@ -7,6 +7,7 @@ mod overlay;
 mod plane;
 mod speckle;
 
+use super::driver::DriverCost;
 use super::state::ViewState;
 use crate::dose_desk::DosePicture;
 use crate::link::{SceneModel, Snapshot};
@@ -79,8 +80,8 @@ impl Slices {
         }
     }
 
-    pub fn uploaded_bytes(&self) -> u64 {
-        self.gpu.as_ref().map_or(0, |gpu| gpu.uploaded_bytes)
+    pub fn driver(&self) -> DriverCost {
+        self.gpu.as_ref().map_or_else(DriverCost::default, |gpu| gpu.driver)
     }
 
     /// Directions of the patient in the scene.

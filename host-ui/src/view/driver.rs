@@ -1,0 +1,32 @@
+//! What the graphics library and its driver are given by this program's own pictures, and the processor time they take for it.
+
+use crate::cpu_time::thread_ns;
+
+/// Since the window opened.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DriverCost {
+    pub uploaded_bytes: u64,
+    pub cpu_ns: u64,
+}
+
+impl DriverCost {
+    /// Does what the driver is asked for.
+    pub fn time<T>(&mut self, calls: impl FnOnce() -> T) -> T {
+        let begun_ns = thread_ns();
+        let result = calls();
+        self.cpu_ns += thread_ns().saturating_sub(begun_ns);
+        result
+    }
+
+    /// As [`DriverCost::time`], where what is done says how many bytes it sent.
+    pub fn send(&mut self, calls: impl FnOnce() -> u64) {
+        self.uploaded_bytes += self.time(calls);
+    }
+
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            uploaded_bytes: self.uploaded_bytes + other.uploaded_bytes,
+            cpu_ns: self.cpu_ns + other.cpu_ns,
+        }
+    }
+}
