@@ -35,6 +35,8 @@
 mod cg;
 mod coarsest;
 mod grid;
+mod grip;
+mod guess;
 mod hexahedron;
 mod lanes;
 mod level;
@@ -54,7 +56,7 @@ mod transfer;
 pub use material::{FemProblem, FemSettings, Integration, MAX_POISSON_RATIO, Material, Structure};
 pub use model::FemModel;
 pub use real::Real;
-pub use solve::{FemReport, REACH, SolveSettings, TipPatch, step};
+pub use solve::{FemReport, REACH, SolveSettings, TipPatch, prepare, step};
 pub use state::FemState;
 pub use tissue::FemTissue;
 
