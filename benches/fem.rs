@@ -7,7 +7,7 @@ use std::time::Instant;
 use rt_core::needle::{NeedleParameters, Phase, transmission};
 use rt_core::scene::{Lattice, Scene};
 use rt_core::tissue::fem::{self, FemModel, FemSettings, FemState, Integration, Material, SolveSettings, TipPatch};
-use rt_core::tissue::{ChainMail, Held, TissueParameters, TissueState};
+use rt_core::tissue::{ChainMail, Deformed, Held, TissueParameters, TissueState, element_ahead};
 
 const PERIOD_S: f64 = 5e-3;
 const PATCH_M: f64 = 4e-3;
@@ -61,12 +61,16 @@ fn insertion(lattice: &Lattice, way: Way, depth_m: f64) -> Vec<Tick> {
         position_m: at(by_m, lattice.rest_m(element)),
         edge_m: PATCH_M,
     };
-    // As the loop looks ahead: along the needle, not at what the script has later.
+    // What the loop would see ahead, not what the script has later. The body moves with the patch: seen from it, at rest.
+    let still = vec![0.0; lattice.element_count()];
+    let rest = Deformed {
+        lattice,
+        u: [&still, &still, &still],
+        scale: 1.0,
+        reach: 1.0,
+    };
     let ahead = |rest_m: f64, now: Option<u32>, by_m: f64| {
-        let stride = step_m.max(0.25 * lattice.spacing_m);
-        let places = (0..24).map(|n| rest_m + f64::from(n) * stride);
-        let elements = places.map(|along| element_at(lattice, at(along, entry)));
-        let next = elements.flatten().find(|&element| Some(element) != now);
+        let next = element_ahead(&rest, now, at(rest_m, entry), direction.map(|d| d * step_m));
         next.map(|element| patch(element, by_m))
     };
     let mut ticks = Vec::new();

@@ -2,11 +2,13 @@
 
 use super::{Deformed, MaterialPoint};
 
-/// Steps looked ahead from a held element, and from outside the body.
-const STEPS: usize = 12;
-const STEPS_OUTSIDE: usize = 24;
-/// A step is at least this part of an element.
-const SHORTEST: f64 = 0.25;
+/// Places looked at ahead of a held element, and from outside the body.
+const STEPS: usize = 24;
+const STEPS_OUTSIDE: usize = 40;
+/// A tip slower than this part of an element in each tick comes into every element on its way, if only for a moment: there
+/// the places are so close together.
+const SLOW: f64 = 0.25;
+const CLOSE: f64 = 0.1;
 
 /// The first element other than `held` on the way of a tip that goes on by `step_m` in each tick. Where nothing is held
 /// the body is taken to be at rest.
@@ -18,7 +20,8 @@ pub fn element_ahead(body: &Deformed, held: Option<u32>, tip_m: [f64; 3], step_m
         return None;
     }
     let spacing_m = body.lattice.spacing_m;
-    let stride = (SHORTEST * spacing_m / length).max(1.0);
+    let is_slow = length < SLOW * spacing_m;
+    let stride = if is_slow { CLOSE * spacing_m / length } else { 1.0 };
     let place_m = |n: usize| [0, 1, 2].map(|a| tip_m[a] + n as f64 * stride * step_m[a]);
     let Some(held) = held else {
         return (0..=STEPS_OUTSIDE).map(place_m).find_map(|place_m| {

@@ -101,21 +101,33 @@ pub(super) struct Course {
     alpha: f64,
 }
 
+/// How far a response is to be refined.
+pub(super) struct Goal {
+    /// Norm of the residual that is to be met.
+    pub residual: f64,
+    /// The one at which no second cycle is begun.
+    pub rough: f64,
+    pub cycles: u32,
+    /// Cycles that a step may take at most.
+    pub of: u32,
+}
+
 impl<T: Real> Grip<T> {
-    /// Refines response `n` until its residual norm is at most `target` or `cycles` of a step's `of` are used up; returns those used.
-    pub(super) fn refine(&mut self, model: &FemModel<T>, n: usize, target: f64, cycles: u32, of: u32) -> u32 {
+    /// Refines response `n` as far as the goal says; returns the cycles used.
+    pub(super) fn refine(&mut self, model: &FemModel<T>, n: usize, goal: &Goal) -> u32 {
         let going_on = self.course.take().filter(|c| c.response == n);
         let mut course = going_on.unwrap_or_else(|| self.begin(model, n));
         let mut used = 0;
         let mut is_sound = true;
-        while course.residual > target && used < cycles && is_sound {
+        let wanted = |used| if used == 0 { goal.residual } else { goal.rough };
+        while used < goal.cycles && is_sound && course.residual > wanted(used) {
             used += 1;
-            is_sound = self.advance(model, &mut course, of);
+            is_sound = self.advance(model, &mut course, goal.of);
         }
-        self.finish(model, n, course.residual, target);
+        self.finish(model, n, course.residual, goal.residual);
         // The cycles of few are not quite symmetric, which many in a row would mind.
-        let is_short = of > FEW_CYCLES || course.cycles < FEW_CYCLES;
-        let goes_on = is_sound && is_short && course.residual > target;
+        let is_short = goal.of > FEW_CYCLES || course.cycles < FEW_CYCLES;
+        let goes_on = is_sound && is_short && course.residual > goal.residual;
         self.course = goes_on.then_some(course);
         used
     }

@@ -1,7 +1,9 @@
 //! One step: take up the held patch, refine what it moves, superpose, report.
 
+use super::cg::Goal;
 use super::grip::{Grip, NEW_DIRECTION, dot};
 use super::model::FemModel;
+use super::multigrid::FEW_CYCLES;
 use super::output;
 use super::real::Real;
 use super::state::FemState;
@@ -11,6 +13,9 @@ use crate::tissue::HeldOutcome;
 pub const REACH: f64 = 2048.0;
 /// A direction that may come to be is prepared if this part of the displacement is outside those known.
 const EXPECTED_DIRECTION: f64 = 0.02;
+/// Where few cycles are allowed, those after the first are only for a residual above so many tolerances: what is left then
+/// is a few thousandths of the displacement, and can wait for the ticks after.
+const ROUGH: f64 = 10.0;
 
 /// A cube of tissue around an element that moves as one piece with the needle's tip: a single node would be ill-posed,
 /// as its force goes to zero with the lattice's spacing.
@@ -166,9 +171,8 @@ pub fn prepare<T: Real>(
     if dot(by_m, by_m) == 0.0 || state.grip.cells == Some(cells) {
         return;
     }
-    if !state.next.is_for(cells, by_m) {
-        // What cannot be held will be refused when it is.
-        state.next.take_up(model, cells, by_m, &state.grip);
+    // What cannot be held is refused when it is.
+    if !state.next.is_for(cells, by_m) && !state.next.take_up(model, cells, by_m, &state.grip) {
         return;
     }
     state.next.weigh(model, by_m, EXPECTED_DIRECTION);
@@ -177,6 +181,7 @@ pub fn prepare<T: Real>(
 
 /// Refines the response that has most left to do until all together meet the tolerance.
 fn refine<T: Real>(model: &FemModel<T>, grip: &mut Grip<T>, settings: &SolveSettings, max_cycles: u32) -> (u32, f64) {
+    let rough = if settings.max_cycles <= FEW_CYCLES { ROUGH } else { 1.0 };
     let mut cycles = 0;
     loop {
         let used = grip.used();
@@ -189,13 +194,20 @@ fn refine<T: Real>(model: &FemModel<T>, grip: &mut Grip<T>, settings: &SolveSett
         if load == 0.0 {
             return (cycles, 0.0);
         }
-        if residual <= settings.relative_tolerance || cycles >= max_cycles {
+        let is_enough = cycles > 0 && residual <= rough * settings.relative_tolerance;
+        if residual <= settings.relative_tolerance || cycles >= max_cycles || is_enough {
             return (cycles, residual);
         }
         let is_unknown = used[most].residual == f64::INFINITY;
         let share = settings.relative_tolerance * load / used.len() as f64;
         let target = 0.9 * share / used[most].weight_m.abs();
-        let spent = grip.refine(model, most, target, max_cycles - cycles, settings.max_cycles);
+        let goal = Goal {
+            residual: target,
+            rough: rough * target,
+            cycles: max_cycles - cycles,
+            of: settings.max_cycles,
+        };
+        let spent = grip.refine(model, most, &goal);
         if spent == 0 && !is_unknown {
             return (cycles, residual);
         }
