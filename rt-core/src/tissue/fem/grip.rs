@@ -173,8 +173,8 @@ impl<T: Real> Grip<T> {
         let mut rest = by_m;
         for response in &mut self.responses[..self.count] {
             response.weight_m = dot(rest, response.direction);
-            for axis in 0..3 {
-                rest[axis] -= response.weight_m * response.direction[axis];
+            for (rest, along) in rest.iter_mut().zip(response.direction) {
+                *rest -= response.weight_m * along;
             }
         }
         let left = dot(rest, rest).sqrt();
