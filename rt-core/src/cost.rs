@@ -3,7 +3,9 @@
 //! An insertion at clinical speed is played to the parts in turn, round by round, so that a noisy machine disturbs all alike.
 
 use crate::scene::{Scene, Structure};
-use crate::tissue::{ChainMailTissue, FemTissue, Held, MaterialPoint, TissueKind, TissueModel, TissueParameters};
+use crate::tissue::{
+    ChainMailTissue, FemTissue, Held, MaterialPoint, TissueKind, TissueModel, TissueParameters, element_ahead,
+};
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
@@ -121,11 +123,11 @@ fn keep_least(part: &mut Part) {
     }
 }
 
-/// A tissue model, and the patch that moves with the tip in it.
+/// A tissue model.
 struct Timed {
     name: String,
     model: Box<dyn TissueModel>,
-    patch_m: f64,
+    kind: TissueKind,
 }
 
 /// The scene as it is, and what single parts of it add.
@@ -137,7 +139,7 @@ fn models(scene: &Scene) -> Result<Vec<Timed>, String> {
         Ok(Timed {
             name,
             model: Box::new(ChainMailTissue::new(scene, limits)),
-            patch_m: TissueKind::ChainMail.tip_patch_m(),
+            kind: TissueKind::ChainMail,
         })
     };
     let plain = TissueParameters::default();
@@ -163,7 +165,7 @@ fn models(scene: &Scene) -> Result<Vec<Timed>, String> {
         models.push(Timed {
             name: "  FEM in its place (--tissue fem)".to_owned(),
             model: Box::new(fem),
-            patch_m: TissueKind::Fem.tip_patch_m(),
+            kind: TissueKind::Fem,
         });
     }
     Ok(models)
@@ -197,7 +199,7 @@ impl Script {
 
 /// As the loop does: the first element is held until the membrane gives, then the one at the tip.
 fn play(
-    Timed { model, patch_m, .. }: &mut Timed,
+    Timed { model, kind, .. }: &mut Timed,
     script: &Script,
     micros: &mut Vec<f64>,
     mut look: impl FnMut(&dyn TissueModel, [f64; 3]),
@@ -216,15 +218,25 @@ fn play(
             held = point.element;
             grip_m = model.deformed().position_m(held);
         }
-        grip_m = [0, 1, 2].map(|a| grip_m[a] + 0.5 * (tip[a] - last[a]));
+        let step_m = [0, 1, 2].map(|a| tip[a] - last[a]);
+        grip_m = [0, 1, 2].map(|a| grip_m[a] + 0.5 * step_m[a]);
         last = tip;
         let now = Held {
             element: held,
             position_m: grip_m,
-            patch_m: *patch_m,
+            patch_m: kind.tip_patch_m(),
         };
         let start = Instant::now();
         std::hint::black_box(model.step(Some(now), TICK_S));
+        if kind.prepares() {
+            let body = model.deformed();
+            let next = element_ahead(&body, Some(held), tip, step_m).map(|element| Held {
+                element,
+                position_m: [0, 1, 2].map(|a| body.position_m(element)[a] + 0.5 * step_m[a]),
+                patch_m: kind.tip_patch_m(),
+            });
+            model.prepare(next);
+        }
         micros.push(start.elapsed().as_secs_f64() * 1e6);
         look(&**model, tip);
         if begun.elapsed() > ROUND_LIMIT {

@@ -1,6 +1,7 @@
 //! Rehearsals against what must hold of them: the same bytes twice, seeds at rest where the tissue was, and errors in words.
 
 use super::*;
+use crate::tissue::{Deformed, Held, Limits, StepReport, TissueModel};
 use std::sync::atomic::AtomicBool;
 use stylet_shm_schema::ParameterId;
 
@@ -84,4 +85,101 @@ fn a_drop_outside_the_tissue_and_a_stop_are_told_and_leave_the_stage_usable() {
     assert!(stage.rehearse(&needle(), &set, &stop).is_err());
     stop.store(false, Ordering::Relaxed);
     assert!(stage.rehearse(&needle(), &set, &stop).is_ok());
+}
+
+/// FEM keeps answers from tick to tick and works ahead: a body at rest must have forgotten both.
+#[test]
+fn a_rehearsal_with_finite_elements_repeats_to_the_last_bit() {
+    let (mut stage, run, stop) = (fem_stage(), shallow(), AtomicBool::new(false));
+    let set = ParameterSet::default();
+    let first = stage.rehearse(&run, &set, &stop).expect("goes through");
+    assert_eq!(first, stage.rehearse(&run, &set, &stop).expect("goes through"));
+}
+
+fn fem_stage() -> Stage {
+    let source = SceneSource::Builtin("paper".to_owned());
+    Stage::build(&source, TissueKind::Fem, DeviceInfo::phantom_premium_1_5()).expect("built in")
+}
+
+/// One seed, where an elastic body still lets the tip come.
+fn shallow() -> NeedleRun {
+    let run = needle();
+    NeedleRun {
+        drops_m: run.drops_m[1..2].to_vec(),
+        ..run
+    }
+}
+
+/// What the loop asks of its tissue model.
+enum Asked {
+    Held(Option<u32>),
+    Prepared(Option<u32>),
+}
+
+struct Watched {
+    model: Box<dyn TissueModel>,
+    asked: std::sync::mpsc::Sender<Asked>,
+}
+
+impl TissueModel for Watched {
+    fn step(&mut self, held: Option<Held>, dt_s: f64) -> StepReport {
+        self.asked
+            .send(Asked::Held(held.map(|h| h.element)))
+            .expect("the test listens");
+        self.model.step(held, dt_s)
+    }
+
+    fn prepare(&mut self, next: Option<Held>) {
+        self.asked
+            .send(Asked::Prepared(next.map(|h| h.element)))
+            .expect("the test listens");
+        self.model.prepare(next);
+    }
+
+    fn may_be_felt(&self, report: &StepReport) -> bool {
+        self.model.may_be_felt(report)
+    }
+
+    fn deformed(&self) -> Deformed<'_> {
+        self.model.deformed()
+    }
+
+    fn return_to_rest(&mut self) {
+        self.model.return_to_rest();
+    }
+
+    fn set_limits(&mut self, limits: Limits) {
+        self.model.set_limits(limits);
+    }
+}
+
+/// On a straight way, in and out, the loop knows in the tick before which element it will hold.
+#[test]
+fn the_loop_prepares_what_it_holds_next() {
+    let (mut stage, run, stop) = (fem_stage(), shallow(), AtomicBool::new(false));
+    let world = stage.world.as_mut().expect("built");
+    let (asked, seen) = std::sync::mpsc::channel();
+    let fem = crate::tissue::FemTissue::<f32>::new(&world.scene).expect("valid");
+    world.tissue = Box::new(Watched {
+        model: Box::new(fem),
+        asked,
+    });
+    stage
+        .rehearse(&run, &ParameterSet::default(), &stop)
+        .expect("goes through");
+    let (mut held, mut prepared) = (None, None);
+    let (mut changes, mut foreseen) = (0, 0);
+    while let Ok(asked) = seen.try_recv() {
+        match asked {
+            Asked::Held(now) if now.is_some() && now != held => {
+                changes += 1;
+                foreseen += usize::from(now == prepared);
+                held = now;
+            }
+            Asked::Held(now) => held = now,
+            Asked::Prepared(next) => prepared = next,
+        }
+    }
+    println!("{foreseen} of {changes} patches were foreseen");
+    assert!(changes > 8 && foreseen == changes);
 }

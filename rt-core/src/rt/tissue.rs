@@ -1,4 +1,4 @@
-//! The tissue tick, 200 Hz: newest pose → contact → held element → constraints → seeds → response → snapshot.
+//! The tissue tick, 200 Hz: newest pose → contact → held element → constraints → seeds → response → work ahead → snapshot.
 
 use crate::force::LocalResponse;
 use crate::needle::LayerKind;
@@ -10,7 +10,7 @@ use crate::rt::recorder::Recorder;
 use crate::rt::timing::Probe;
 use crate::rt::tissue_tape::{TapedOrder, TissueTape};
 use crate::rt::world::World;
-use crate::tissue::{Held, MaterialPoint, StepReport};
+use crate::tissue::{Held, MaterialPoint, StepReport, element_ahead};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -78,6 +78,7 @@ pub const TISSUE_STAGES: &[&str] = &[
     "contact and hold",
     "constraints",
     "response",
+    "ahead",
     "snapshot",
 ];
 
@@ -171,6 +172,8 @@ impl TissueLoop {
         self.mark();
         self.respond(woke_ns, &report);
         self.tape(woke_ns, report.residual);
+        self.mark();
+        self.look_ahead(travel);
         self.mark();
         if let Some(probe) = &mut self.probe {
             probe.output_for_pose(self.response.tick, self.pose.time_ns);
@@ -363,6 +366,37 @@ impl TissueLoop {
             *coordinate += by;
         }
         self.held = Some(next);
+    }
+
+    /// The answer is out: time left over goes to what is held next if the needle goes on as it does.
+    fn look_ahead(&mut self, travel: Vector3<f64>) {
+        if self.world.scene.tissue.prepares() {
+            let next = self.next_held(travel);
+            self.world.tissue.prepare(next);
+        }
+    }
+
+    fn next_held(&self, travel: Vector3<f64>) -> Option<Held> {
+        let speed_m_per_s = self.pose.speed_along_m_per_s;
+        if speed_m_per_s.abs() < CONTACT_SPEED_M_PER_S {
+            return None;
+        }
+        let step_m = self.pose.direction * speed_m_per_s * self.period_s;
+        let (body, held) = (self.world.tissue.deformed(), self.held);
+        let element = element_ahead(
+            &body,
+            held.map(|h| h.element),
+            self.pose.tip_in_scene.into(),
+            step_m.into(),
+        )?;
+        // At the first contact there is no way yet that tells how tissue follows.
+        let by_m = if held.is_some() { travel } else { step_m };
+        let now_m = Vector3::from(body.position_m(element));
+        Some(Held {
+            element,
+            position_m: (now_m + by_m).into(),
+            patch_m: self.world.scene.tissue.tip_patch_m(),
+        })
     }
 
     fn drop_seed(&mut self, ticket: Ticket) {

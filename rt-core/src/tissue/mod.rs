@@ -20,6 +20,7 @@
 //! assert!((tissue.deformed().position_m(element)[2] - position_m[2]).abs() < 1e-8);
 //! ```
 
+mod ahead;
 pub mod chainmail;
 mod check;
 mod deformed;
@@ -28,6 +29,7 @@ mod limits;
 mod model;
 mod point;
 
+pub use ahead::element_ahead;
 pub use chainmail::{ChainMail, ChainMailTissue, TissueState, step};
 pub use check::largest_violation;
 pub use deformed::Deformed;

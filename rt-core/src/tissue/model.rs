@@ -22,6 +22,14 @@ impl TissueKind {
             TissueKind::Fem => 4e-3,
         }
     }
+
+    /// Whether `TissueModel::prepare` does anything: only then need the loop look where the tip goes.
+    pub fn prepares(self) -> bool {
+        match self {
+            TissueKind::ChainMail => false,
+            TissueKind::Fem => true,
+        }
+    }
 }
 use serde::{Deserialize, Serialize};
 
@@ -88,6 +96,11 @@ pub struct StepReport {
 pub trait TissueModel: Send {
     /// Advances by `dt_s` with `held` in place; a `dt_s` that is not above zero recovers nothing.
     fn step(&mut self, held: Option<Held>, dt_s: f64) -> StepReport;
+
+    /// Called when a step's answer is out, with what will be held next if the needle goes on as it does: a model that
+    /// has time left in this tick may work ahead, by a bounded piece. Obligations as for `step`. A wrong guess costs
+    /// this work and no more; answers stay what they are within the model's tolerance.
+    fn prepare(&mut self, _next: Option<Held>) {}
 
     /// Whether forces may go by this step: one that has not converged is for no hand, but where a model says otherwise.
     fn may_be_felt(&self, report: &StepReport) -> bool {

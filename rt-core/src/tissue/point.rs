@@ -23,13 +23,16 @@ impl MaterialPoint {
     ///
     /// Walks through the deformed lattice from `hint`, or else from the nearest of a bounded sample.
     pub fn locate(body: &Deformed, point_m: [f64; 3], hint: Option<u32>) -> Option<MaterialPoint> {
-        let p = point_m.map(|c| c / body.lattice.spacing_m);
-        if p.iter().any(|c| !c.is_finite()) || out_of_reach(body, p) {
-            return None;
-        }
-        let known = |&element: &u32| (element as usize) < body.lattice.element_count();
-        let from_hint = hint.filter(known).and_then(|e| walk(body, p, e));
+        let p = in_reach(body, point_m)?;
+        let from_hint = hint.and_then(|element| Self::locate_from(body, point_m, element));
         from_hint.or_else(|| walk(body, p, nearest_sample(body, p)))
+    }
+
+    /// The same by a walk from `element` alone: as cheap where there is no tissue.
+    pub fn locate_from(body: &Deformed, point_m: [f64; 3], element: u32) -> Option<MaterialPoint> {
+        let p = in_reach(body, point_m)?;
+        let is_known = (element as usize) < body.lattice.element_count();
+        is_known.then(|| walk(body, p, element)).flatten()
     }
 
     /// Where the point is now, in the scene frame.
@@ -107,6 +110,12 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
         a[2] * b[0] - a[0] * b[2],
         a[0] * b[1] - a[1] * b[0],
     ]
+}
+
+/// The place in elements, unless it is too far away for any element.
+fn in_reach(body: &Deformed, point_m: [f64; 3]) -> Option<[f64; 3]> {
+    let p = point_m.map(|c| c / body.lattice.spacing_m);
+    (p.iter().all(|c| c.is_finite()) && !out_of_reach(body, p)).then_some(p)
 }
 
 /// Farther from the body at rest than any element has moved, and its own size at the largest stretch.

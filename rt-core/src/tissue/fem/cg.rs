@@ -3,12 +3,14 @@
 use std::ops::Range;
 
 use super::grid::Grid;
+use super::grip::Grip;
+use super::guess::superpose;
 use super::lanes::{add_scaled, dot, keep_free, keep_opposite, scale_and_add};
 use super::model::FemModel;
+use super::multigrid::{FEW_CYCLES, Stage};
 use super::real::Real;
 use super::simd::{Simd, vectorised};
 use super::smooth::Product;
-use super::state::FemState;
 use super::sweep::{Field, LineOp, sweep};
 
 /// `b = -A u` where nodes are free, zero elsewhere: what is left to do from `u` on where nothing pushes free nodes.
@@ -89,34 +91,67 @@ fn advance_fields<T>(grid: &Grid, alpha: T, p: &Field<T>, q: &Field<T>, u: &mut 
 }
 }
 
-impl<T: Real> FemState<T> {
-    /// Refines response `n` until its residual norm is at most `target` or `cycles` of a step's `of` are used up; returns those used.
-    pub(super) fn refine(&mut self, model: &FemModel<T>, n: usize, target: f64, cycles: u32, of: u32) -> u32 {
+/// Where conjugate gradients on one response are: they go on from tick to tick. `r`, `p` and `q` are in the grip's fields.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Course {
+    response: usize,
+    cycles: u32,
+    residual: f64,
+    rz: f64,
+    alpha: f64,
+}
+
+/// How far a response is to be refined.
+pub(super) struct Goal {
+    /// Norm of the residual that is to be met.
+    pub residual: f64,
+    /// The one at which no second cycle is begun.
+    pub rough: f64,
+    pub cycles: u32,
+    /// Cycles that a step may take at most.
+    pub of: u32,
+}
+
+impl<T: Real> Grip<T> {
+    /// Refines response `n` as far as the goal says; returns the cycles used.
+    pub(super) fn refine(&mut self, model: &FemModel<T>, n: usize, goal: &Goal) -> u32 {
+        let going_on = self.course.take().filter(|c| c.response == n);
+        let mut course = going_on.unwrap_or_else(|| self.begin(model, n));
         let mut used = 0;
-        let mut residual = self.begin(model, n);
-        let mut rz_before = 0.0;
-        let mut alpha = 0.0;
-        while residual > target && used < cycles {
-            self.multigrid.cycle(&model.levels, of);
+        let mut is_sound = true;
+        let wanted = |used| if used == 0 { goal.residual } else { goal.rough };
+        while used < goal.cycles && is_sound && course.residual > wanted(used) {
             used += 1;
-            let (rz, zq) = self.products(model, used > 1);
-            // Polak and Ribière's form: the cycle is not quite symmetric, and this one does not mind.
-            let beta = if used > 1 { -alpha * zq / rz_before } else { 0.0 };
-            self.turn(model, beta);
-            let pq = self.product(model);
-            alpha = rz / pq;
-            rz_before = rz;
-            if !(alpha.is_finite() && alpha > 0.0) {
-                break;
-            }
-            residual = self.advance(model, n, alpha);
+            is_sound = self.advance(model, &mut course, goal.of);
         }
-        self.finish(model, n, residual, target);
+        self.finish(model, n, course.residual, goal.residual);
+        // The cycles of few are not quite symmetric, which many in a row would mind.
+        let is_short = goal.of > FEW_CYCLES || course.cycles < FEW_CYCLES;
+        let goes_on = is_sound && is_short && course.residual > goal.residual;
+        self.course = goes_on.then_some(course);
         used
     }
 
+    /// One cycle; false where the equations let it come no nearer.
+    fn advance(&mut self, model: &FemModel<T>, course: &mut Course, of: u32) -> bool {
+        self.multigrid.cycle(&model.levels, of);
+        let is_first = course.cycles == 0;
+        course.cycles += 1;
+        let (rz, zq) = self.products(model, !is_first);
+        // Polak and Ribière's form: the cycle is not quite symmetric, and this one does not mind.
+        let beta = if is_first { 0.0 } else { -course.alpha * zq / course.rz };
+        self.turn(model, beta);
+        let pq = self.product(model);
+        (course.rz, course.alpha) = (rz, rz / pq);
+        let is_sound = course.alpha.is_finite() && course.alpha > 0.0;
+        if is_sound {
+            course.residual = self.go_along(model, course.response, course.alpha);
+        }
+        is_sound
+    }
+
     /// The residual of response `n` becomes the right-hand side of the cycle.
-    fn begin(&mut self, model: &FemModel<T>, n: usize) -> f64 {
+    fn begin(&mut self, model: &FemModel<T>, n: usize) -> Course {
         let level = &model.levels[0];
         let stage = &mut self.multigrid.stages[0];
         let mut op = Opposite {
@@ -126,7 +161,13 @@ impl<T: Real> FemState<T> {
         };
         let (u, work) = (&mut self.responses[n].u, &mut self.multigrid.work);
         sweep(level, u, work, 0..level.grid.nodes[2], &mut op);
-        op.square.sqrt()
+        Course {
+            response: n,
+            cycles: 0,
+            residual: op.square.sqrt(),
+            rz: 0.0,
+            alpha: 0.0,
+        }
     }
 
     /// `r . z`, and `z . q` if there is a `q` yet.
@@ -164,7 +205,7 @@ impl<T: Real> FemState<T> {
     }
 
     /// `u += alpha p`, `r -= alpha q`; returns the norm of `r`.
-    fn advance(&mut self, model: &FemModel<T>, n: usize, alpha: f64) -> f64 {
+    fn go_along(&mut self, model: &FemModel<T>, n: usize, alpha: f64) -> f64 {
         let level = &model.levels[0];
         let (u, r) = (&mut self.responses[n].u, &mut self.multigrid.stages[0].b);
         let (p, q) = (&self.p, &self.q);
@@ -176,69 +217,76 @@ impl<T: Real> FemState<T> {
     fn finish(&mut self, model: &FemModel<T>, n: usize, recurred: f64, target: f64) {
         let level = &model.levels[0];
         let is_done = recurred <= target;
-        let all = 0..level.grid.nodes[2];
-        let planes = match self.patch {
-            Some(cells) if !is_done => cells[2][0].saturating_sub(1)..(cells[2][1] + 2).min(all.end),
-            _ => all,
+        let planes = if is_done {
+            0..level.grid.nodes[2]
+        } else {
+            self.planes(model)
         };
         let multigrid = &mut self.multigrid;
+        let stage = &mut multigrid.stages[0];
+        // `r` is the cycle's, which has no use for it between two: `q` goes on.
         let mut op = Answer {
-            forces: &mut self.q,
-            inverse_diagonal: &multigrid.stages[0].inverse_diagonal,
+            forces: &mut stage.r,
+            inverse_diagonal: &stage.inverse_diagonal,
             square: 0.0,
         };
+        sweep(level, &mut self.responses[n].u, &mut multigrid.work, planes, &mut op);
+        let residual = if is_done { op.square.sqrt() } else { recurred };
+        let force_n_per_m = self.patch_force();
         let response = &mut self.responses[n];
-        sweep(level, &mut response.u, &mut multigrid.work, planes, &mut op);
-        response.residual = if is_done { op.square.sqrt() } else { recurred };
-        let patch = &self.patch_nodes[..self.held];
-        response.force_n_per_m = [0, 1, 2].map(|c| patch.iter().map(|&node| self.q[c][node as usize].to_f64()).sum());
+        (response.residual, response.force_n_per_m) = (residual, force_n_per_m);
     }
 
-    /// The norm of the forces that the patch alone causes on free nodes when it is moved along `direction`.
-    pub(super) fn load(&mut self, model: &FemModel<T>, direction: [f64; 3], planes: Range<usize>) -> f64 {
-        let level = &model.levels[0];
-        self.p.iter_mut().for_each(|c| c.fill(T::ZERO));
-        for (p, part) in self.p.iter_mut().zip(direction) {
-            for &node in &self.patch_nodes[..self.held] {
-                p[node as usize] = T::of(part);
+    /// The planes of nodes that the elements around the patch touch.
+    fn planes(&self, model: &FemModel<T>) -> Range<usize> {
+        let end = model.levels[0].grid.nodes[2];
+        match self.cells {
+            Some([_, _, [low, high]]) => low.saturating_sub(1)..(high + 2).min(end),
+            None => 0..end,
+        }
+    }
+
+    /// Sum over the patch of the forces in `r`.
+    fn patch_force(&self) -> [f64; 3] {
+        let force = |c: &Vec<T>| self.nodes().iter().map(|&node| c[node as usize].to_f64()).sum();
+        self.multigrid.stages[0].r.each_ref().map(force)
+    }
+
+    /// What the patch alone, moved by one metre along `direction`, causes: the norm of the forces on free nodes, and
+    /// the force that moves it.
+    pub(super) fn load(&mut self, model: &FemModel<T>, direction: [f64; 3]) -> (f64, [f64; 3]) {
+        let planes = self.planes(model);
+        let x = &mut self.multigrid.stages[0].x;
+        for (x, part) in x.iter_mut().zip(direction) {
+            x.fill(T::ZERO);
+            for &node in &self.nodes[..self.held] {
+                x[node as usize] = T::of(part);
             }
         }
-        let multigrid = &mut self.multigrid;
-        let mut op = Product {
-            q: &mut self.q,
-            inverse_diagonal: &multigrid.stages[0].inverse_diagonal,
-            dot: 0.0,
+        let square = self.answer_to_x(model, planes);
+        (square.sqrt(), self.patch_force())
+    }
+
+    /// Leaves the forces that `x` causes in `r`; returns the square of those on free nodes.
+    fn answer_to_x(&mut self, model: &FemModel<T>, planes: Range<usize>) -> f64 {
+        let Stage {
+            x, r, inverse_diagonal, ..
+        } = &mut self.multigrid.stages[0];
+        let mut op = Answer {
+            forces: r,
+            inverse_diagonal,
             square: 0.0,
         };
-        sweep(level, &mut self.p, &mut multigrid.work, planes, &mut op);
-        op.square.sqrt()
+        sweep(&model.levels[0], x, &mut self.multigrid.work, planes, &mut op);
+        op.square
     }
 
     /// Half of displacement times force, over elements and springs: the elastic energy.
     pub fn strain_energy_j(&mut self, model: &FemModel<T>) -> f64 {
-        let level = &model.levels[0];
-        self.p.iter_mut().for_each(|c| c.fill(T::ZERO));
-        for response in &self.responses[..self.count] {
-            let weight = T::of(response.weight_m);
-            for (p, u) in self.p.iter_mut().zip(&response.u) {
-                p.iter_mut().zip(u).for_each(|(p, &u)| *p += weight * u);
-            }
-        }
-        let mut op = Answer {
-            forces: &mut self.q,
-            inverse_diagonal: &self.multigrid.stages[0].inverse_diagonal,
-            square: 0.0,
-        };
-        sweep(
-            level,
-            &mut self.p,
-            &mut self.multigrid.work,
-            0..level.grid.nodes[2],
-            &mut op,
-        );
-        let products = self.p.iter().zip(&self.q);
-        0.5 * products
-            .map(|(p, q)| p.iter().zip(q).map(|(&p, &q)| (p * q).to_f64()).sum::<f64>())
-            .sum::<f64>()
+        superpose(&self.responses[..self.count], 1.0, &mut self.multigrid.stages[0].x);
+        self.answer_to_x(model, 0..model.levels[0].grid.nodes[2]);
+        let Stage { x, r, .. } = &self.multigrid.stages[0];
+        let work = |(x, r): (&Vec<T>, &Vec<T>)| x.iter().zip(r).map(|(&x, &r)| (x * r).to_f64()).sum::<f64>();
+        0.5 * x.iter().zip(r).map(work).sum::<f64>()
     }
 }

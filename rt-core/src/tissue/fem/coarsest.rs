@@ -30,10 +30,14 @@ impl<T: Real> Coarsest<T> {
         }
     }
 
-    /// Assembles and factors; a direction without stiffness is left where it is.
+    /// Assembles and factors, unless the same nodes are free as before; a direction without stiffness is left where it is.
     pub fn refactor(&mut self, level: &Level<T>, inverse_diagonal: &[T], work: &mut Planes<T>) {
-        self.free = 0;
         let free = inverse_diagonal.iter().enumerate().filter(|(_, d)| **d != T::ZERO);
+        let known = self.nodes[..self.free].iter().map(|&node| node as usize);
+        if self.free > 0 && known.eq(free.clone().map(|(node, _)| node)) {
+            return;
+        }
+        self.free = 0;
         for (slot, (node, _)) in self.nodes.iter_mut().zip(free) {
             *slot = node as u32;
             self.free += 1;

@@ -10,7 +10,8 @@
 //!
 //! *From tick to tick.* The problem is linear in the displacement of the held patch. While the patch stays, the response to
 //! each direction it has moved in is kept, so that a displacement in known directions costs no cycle at all. When the patch
-//! changes, the present displacement is the first guess of the new response: that tick is the costly one.
+//! changes, the present displacement is the first guess of the new response: that tick is the costly one, unless idle ticks
+//! before have prepared the patch (`prepare`).
 //!
 //! *Surroundings.* Springs to rest on all free faces (`foundation_pa_per_m`), fixed structures. A part of the body that has
 //! neither stays at rest unless it is held.
@@ -35,6 +36,8 @@
 mod cg;
 mod coarsest;
 mod grid;
+mod grip;
+mod guess;
 mod hexahedron;
 mod lanes;
 mod level;
@@ -54,7 +57,7 @@ mod transfer;
 pub use material::{FemProblem, FemSettings, Integration, MAX_POISSON_RATIO, Material, Structure};
 pub use model::FemModel;
 pub use real::Real;
-pub use solve::{FemReport, REACH, SolveSettings, TipPatch, step};
+pub use solve::{FemReport, REACH, SolveSettings, TipPatch, prepare, step};
 pub use state::FemState;
 pub use tissue::FemTissue;
 

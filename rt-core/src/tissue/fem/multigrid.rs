@@ -13,7 +13,7 @@ use super::transfer::{prolong, restrict};
 const STEPS: u32 = 2;
 /// One step less after the correction spares a fifth of a cycle's sweeps. Where so few cycles are allowed they then leave as
 /// much error as symmetric ones (paper's gland, nu 0.45, two cycles: 0.53 % for 0.48 %); in many, hard bodies no longer converge.
-const FEW_CYCLES: u32 = 4;
+pub(super) const FEW_CYCLES: u32 = 4;
 
 /// What one level of a cycle works in.
 #[derive(Clone, Debug)]
@@ -23,7 +23,8 @@ pub(super) struct Stage<T> {
     pub x: Field<T>,
     pub b: Field<T>,
     d: Field<T>,
-    r: Field<T>,
+    /// Between two cycles for any use; so is `x`.
+    pub r: Field<T>,
 }
 
 #[derive(Clone, Debug)]

@@ -39,7 +39,7 @@ fn write_piece<T>(model: &FemModel<T>, state: &mut FemState<T>, piece: &CellRun)
     let mut same = [true; CHUNK];
     for (component, now) in now.iter_mut().enumerate() {
         let mut sums = [T::ZERO; CHUNK];
-        for response in state.responses[..state.count].iter().filter(|r| r.weight_m != 0.0) {
+        for response in state.grip.used().iter().filter(|r| r.weight_m != 0.0) {
             let weight = T::of(response.weight_m / (8.0 * model.lattice.spacing_m));
             let [a, b, c, d] = rows.map(|at| &response.u[component][at..=at + n]);
             for e in 0..n {

@@ -1,27 +1,9 @@
 //! Where the elastic body is, and everything that a step works in.
 
+use super::grip::Grip;
 use super::model::FemModel;
-use super::multigrid::Multigrid;
 use super::real::Real;
-use super::sweep::{Field, touched, zeros};
-
-/// Directions that a patch can be moved in and still answer by superposition.
-pub(super) const DIRECTIONS: usize = 3;
-
-/// How the body answers to the held patch moved by one metre along `direction`.
-#[derive(Clone, Debug)]
-pub(super) struct Response<T> {
-    pub direction: [f64; 3],
-    /// Displacement of the nodes per metre.
-    pub u: Field<T>,
-    /// Force that moves the patch.
-    pub force_n_per_m: [f64; 3],
-    /// Norm of what is left of the forces on free nodes, and of those that the moved patch alone would cause.
-    pub residual: f64,
-    pub load: f64,
-    /// Metres, in the present displacement.
-    pub weight_m: f64,
-}
+use super::sweep::touched;
 
 /// Displacements of all elements, and what the solver keeps from tick to tick.
 #[derive(Clone, Debug)]
@@ -29,42 +11,23 @@ pub struct FemState<T = f32> {
     /// Of the element centres, in elements.
     pub(super) displacement: [Vec<f32>; 3],
     pub(super) max_displacement: f32,
-    pub(super) responses: [Response<T>; DIRECTIONS],
-    /// Responses in use.
-    pub(super) count: usize,
-    /// Lowest and one past the highest cell of the held patch in the finest grid, along each axis.
-    pub(super) patch: Option<[[usize; 2]; 3]>,
-    /// Nodes of the patch, the first `held` in use.
-    pub(super) patch_nodes: Vec<u32>,
-    pub(super) held: usize,
-    pub(super) multigrid: Multigrid<T>,
-    pub(super) p: Field<T>,
-    pub(super) q: Field<T>,
+    /// The patch that is held.
+    pub(super) grip: Grip<T>,
+    /// The one that is prepared, or the one held before.
+    pub(super) next: Grip<T>,
+    /// The last step took no cycle, and nothing has been prepared since.
+    pub(super) has_time: bool,
 }
 
 impl<T: Real> FemState<T> {
-    /// The body at rest. Writes every page, so that no step is the first to touch one.
+    /// The body at rest.
     pub fn at_rest(model: &FemModel<T>) -> Self {
-        let nodes = model.levels[0].grid.len();
-        let response = || Response {
-            direction: [0.0; 3],
-            u: zeros(nodes),
-            force_n_per_m: [0.0; 3],
-            residual: 0.0,
-            load: 0.0,
-            weight_m: 0.0,
-        };
         FemState {
             displacement: std::array::from_fn(|_| touched(model.element_count(), 0.0)),
             max_displacement: 0.0,
-            responses: std::array::from_fn(|_| response()),
-            count: 0,
-            patch: None,
-            patch_nodes: touched(nodes, 0),
-            held: 0,
-            multigrid: Multigrid::new(&model.levels),
-            p: zeros(nodes),
-            q: zeros(nodes),
+            grip: Grip::new(model),
+            next: Grip::new(model),
+            has_time: false,
         }
     }
 
@@ -93,14 +56,29 @@ impl<T: Real> FemState<T> {
         }
         let node = grid.index(place);
         (model.part[node] != u32::MAX).then(|| {
-            let used = &self.responses[..self.count];
-            [0, 1, 2].map(|a| used.iter().map(|r| r.weight_m * r.u[a][node].to_f64()).sum())
+            [0, 1, 2].map(|a| {
+                self.grip
+                    .used()
+                    .iter()
+                    .map(|r| r.weight_m * r.u[a][node].to_f64())
+                    .sum()
+            })
         })
     }
 
+    /// The elastic energy, in body and springs.
+    pub fn strain_energy_j(&mut self, model: &FemModel<T>) -> f64 {
+        self.grip.strain_energy_j(model)
+    }
+
+    /// Drops the answers that are kept: steps from here on give the same bytes as those of a new state.
+    pub(super) fn forget(&mut self) {
+        self.grip.drop_patch();
+        self.next.drop_patch();
+    }
+
     pub(super) fn fits(&self, model: &FemModel<T>) -> bool {
-        let nodes = model.levels.iter().map(|level| level.grid.len());
-        let stages = self.multigrid.stages.iter().map(|stage| stage.inverse_diagonal.len());
-        nodes.eq(stages) && self.displacement[0].len() == model.element_count()
+        let grips = [&self.grip, &self.next];
+        grips.into_iter().all(|grip| grip.fits(model)) && self.displacement[0].len() == model.element_count()
     }
 }

@@ -9,6 +9,8 @@ use crate::scene::test_bodies::Random;
 use crate::scene::{Labels, Lattice, Scene, test_bodies};
 use crate::tissue::HeldOutcome;
 
+#[path = "tests_ahead.rs"]
+mod ahead;
 #[path = "tests_golden.rs"]
 mod golden;
 #[path = "tests_locking.rs"]

@@ -49,10 +49,10 @@ fn oedometer_has_the_modulus_of_the_closed_form() {
         // Confinement is a displacement field: u_z = strain z, which must carry the confined modulus' energy.
         let strain = 0.01;
         for node in 0..grid.len() {
-            state.responses[0].u[2][node] = strain * grid.place(node)[2] as f64 * lattice.spacing_m;
+            state.grip.responses[0].u[2][node] = strain * grid.place(node)[2] as f64 * lattice.spacing_m;
         }
-        state.responses[0].weight_m = 1.0;
-        state.count = 1;
+        state.grip.responses[0].weight_m = 1.0;
+        state.grip.count = 1;
         let energy_j = 0.5 * (lambda + 2.0 * mu) * strain * strain * lattice.volume_m3();
         assert!((state.strain_energy_j(&model) / energy_j - 1.0).abs() < 1e-10);
     }

@@ -58,7 +58,7 @@ fn step_finds_what_a_dense_solver_finds() {
     assert!(report.converged, "{report:?}");
 
     let (nodes, matrix) = dense(&model);
-    let held = &state.patch_nodes[..state.held];
+    let held = state.grip.nodes();
     let is_held: Vec<bool> = nodes.iter().map(|&n| held.contains(&(n as u32))).collect();
     let free: Vec<usize> = (0..3 * nodes.len()).filter(|&n| !is_held[n / 3]).collect();
     let known = DVector::from_fn(3 * nodes.len(), |n, _| if is_held[n / 3] { by_m[n % 3] } else { 0.0 });

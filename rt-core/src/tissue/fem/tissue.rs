@@ -3,7 +3,7 @@
 use super::material::{FemProblem, FemSettings, Integration, Material, Structure};
 use super::model::FemModel;
 use super::real::Real;
-use super::solve::{SolveSettings, TipPatch, step};
+use super::solve::{SolveSettings, TipPatch, prepare, step};
 use super::state::FemState;
 use crate::scene::Scene;
 use crate::tissue::{Deformed, Held, Limits, Solve, StepReport, TissueModel};
@@ -52,15 +52,18 @@ impl<T: Real> FemTissue<T> {
     }
 }
 
+fn patch(held: Held) -> TipPatch {
+    TipPatch {
+        element: held.element,
+        position_m: held.position_m,
+        edge_m: held.patch_m,
+    }
+}
+
 impl<T: Real> TissueModel for FemTissue<T> {
     /// Quasi-static: `dt_s` plays no part, and tissue that nothing holds is at rest at once.
     fn step(&mut self, held: Option<Held>, _dt_s: f64) -> StepReport {
-        let patch = held.map(|held| TipPatch {
-            element: held.element,
-            position_m: held.position_m,
-            edge_m: held.patch_m,
-        });
-        let report = step(&self.model, &mut self.state, patch, &self.settings);
+        let report = step(&self.model, &mut self.state, held.map(patch), &self.settings);
         StepReport {
             passes: report.cycles,
             residual: report.relative_residual,
@@ -78,6 +81,10 @@ impl<T: Real> TissueModel for FemTissue<T> {
         }
     }
 
+    fn prepare(&mut self, next: Option<Held>) {
+        prepare(&self.model, &mut self.state, next.map(patch), &self.settings);
+    }
+
     fn may_be_felt(&self, report: &StepReport) -> bool {
         report.residual <= FELT && report.max_displacement.is_finite()
     }
@@ -93,6 +100,7 @@ impl<T: Real> TissueModel for FemTissue<T> {
     }
 
     fn return_to_rest(&mut self) {
+        self.state.forget();
         step(&self.model, &mut self.state, None, &self.settings);
     }
 
