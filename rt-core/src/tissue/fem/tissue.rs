@@ -11,8 +11,9 @@ use crate::tissue::{Deformed, Held, Limits, Solve, StepReport, TissueModel};
 /// What surrounds a body: 20 mm of fat of 5 kPa, per surface area (assumed).
 pub const SURROUNDINGS_PA_PER_M: f64 = 5e3 / 20e-3;
 
-/// Cycles in one tick: as many as 5 ms have room for on the paper's gland. What is left is done in the ticks after.
-pub const LIVE_CYCLES: u32 = 2;
+/// Cycles in one tick. Two fit into 5 ms on the paper's gland only just; what is left is done in the ticks before, ahead of the
+/// tip, and in those after.
+pub const LIVE_CYCLES: u32 = 1;
 /// Residual force, over the tip's, up to which an answer that is still being refined may be felt.
 const FELT: f64 = 0.2;
 
