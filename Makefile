@@ -4,7 +4,7 @@ SHELL := /bin/bash
 CARGO ?= cargo
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: help run test build picture report fuzz force-pictures clean deps-run deps-test
+.PHONY: help run test build picture report fuzz soak force-pictures clean deps-run deps-soak deps-test
 
 help: ## This list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -30,6 +30,9 @@ report: ## Speed against error of every tissue model, into benches/runs/<date>-<
 fuzz: ## Feed each reader of files with what it does not expect for FUZZ_SECONDS (600) seconds
 	docs/tools/fuzz
 
+soak: deps-soak build ## Memory of the window over SOAK_SECONDS (3600) of procedures, on a screen of its own
+	docs/tools/soak "$(BIN)" $(SOAK_SECONDS)
+
 force-pictures: ## Measure the stiffness that the loop holds, and draw the pictures of force anew
 	$(CARGO) bench -p stylet-benches --bench force
 
@@ -38,6 +41,9 @@ clean: ## Remove what was built
 
 deps-run:
 	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers
+
+deps-soak:
+	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers xauth xvfb
 
 deps-test:
 	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers python3-nibabel python3-pydicom xvfb
