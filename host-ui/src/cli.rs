@@ -182,9 +182,7 @@ impl Cli {
                 ended
             }
             Some(Task::Export { recording, csv, motion }) => record::export(&record::Export { recording, csv, motion }),
-            Some(Task::Flight { instance }) => {
-                record::save_flight(&instance).map(|path| println!("written: {path}"))
-            }
+            Some(Task::Flight { instance }) => record::save_flight(&instance).map(|path| println!("written: {path}")),
             Some(Task::Convert(args)) => args.run(),
             Some(Task::Plan(args)) => args.run(),
             Some(Task::Dose(args)) => args.run(),

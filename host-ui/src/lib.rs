@@ -1,5 +1,6 @@
 //! The operator's program: what it reads from the core, the files it opens, the procedure it runs.
 
+mod affinity;
 pub mod app;
 pub mod cli;
 pub mod controller;

@@ -123,11 +123,16 @@ impl Driven {
     /// figures may differ.
     pub fn compare_live(&mut self, name: &str) {
         self.window.run_steps(3);
-        let slices = ["Axial slice", "Sagittal slice", "Coronal slice"].map(|label| self.window.get_by_label(label).rect());
+        let slices =
+            ["Axial slice", "Sagittal slice", "Coronal slice"].map(|label| self.window.get_by_label(label).rect());
         slices.into_iter().for_each(|rect| self.window.mask(rect));
         self.cover_figures();
         let picture = self.window.render().expect("a picture");
-        image_snapshot_options(&with_fewer_greys(&picture, 51), name, &tolerant().max_failed_pixels(LIVE_PIXELS));
+        image_snapshot_options(
+            &with_fewer_greys(&picture, 51),
+            name,
+            &tolerant().max_failed_pixels(LIVE_PIXELS),
+        );
     }
 
     /// Figures at the top, and the plots.

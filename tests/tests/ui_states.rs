@@ -132,7 +132,10 @@ fn debrief_is_saved(driven: &mut Driven) {
     assert_eq!(score["seeds"].as_array().map(Vec::len), Some(5));
     let worst_mm = score["worst_error_mm"].as_f64().expect("a number");
     driven.window.get_by_label_contains(&format!("worst {worst_mm:.2}"));
-    assert!(score["motion"]["peak_force_n"].as_f64().is_some_and(|n| n > 1.0), "{json}");
+    assert!(
+        score["motion"]["peak_force_n"].as_f64().is_some_and(|n| n > 1.0),
+        "{json}"
+    );
     assert_eq!(score["motion"]["insertions"], 1);
     std::fs::remove_dir_all(folder).expect("ours");
 }

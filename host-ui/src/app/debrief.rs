@@ -75,7 +75,9 @@ impl App {
         };
         let (mut pairs, mut lost) = (Vec::new(), Vec::new());
         for (needle, row) in all_errors(&self.shown) {
-            let Some((pair, placed)) = self.pair(needle, &row) else { continue };
+            let Some((pair, placed)) = self.pair(needle, &row) else {
+                continue;
+            };
             match placed {
                 Some(pose) => pairs.push(SeedPair {
                     delivered: Seed {

@@ -6,8 +6,8 @@ mod drive;
 mod plan;
 mod take;
 
-use crate::core_args::SceneChoice;
 use crate::controller::{Controllers, SLOW, System, Wish};
+use crate::core_args::SceneChoice;
 use crate::dose_desk::DoseDesk;
 use crate::job::Job;
 use crate::link::{Link, LinkStatus};
@@ -76,6 +76,8 @@ pub struct App {
     waiting: Vec<Waiting>,
     controllers: Controllers,
     pause: bool,
+    /// The core that was left to the force loop.
+    left_core: Option<u32>,
     drive: drive::Drive,
     /// Buttons of gamepads and 3D mice since the last frame.
     pressed: Vec<Action>,
@@ -164,6 +166,7 @@ impl App {
                 Controllers::none()
             },
             pause: options.pause,
+            left_core: None,
             drive: drive::Drive::default(),
             pressed: Vec::new(),
             pulled_to_m: None,

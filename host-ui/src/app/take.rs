@@ -2,6 +2,7 @@
 
 use super::drive::Drive;
 use super::{App, refusal};
+use crate::affinity;
 use crate::controller::Button;
 use crate::core_args::SceneChoice;
 use crate::dose_desk::{DoseOf, Wanted};
@@ -22,6 +23,7 @@ impl App {
         self.link.poll();
         let plan_before = self.shown.plan.map(|p| p.generation);
         self.shown.take(&self.link);
+        self.leave_core();
         if self.shown.plan.map(|p| p.generation) != plan_before {
             self.drive = Drive::default();
         }
@@ -46,6 +48,16 @@ impl App {
         self.take_pictures();
         self.take_debrief();
         self.middle.take(&self.shown, self.link.scene(), self.link.snapshot());
+    }
+
+    /// The force loop has its core to itself.
+    fn leave_core(&mut self) {
+        let haptic = self.shown.session.map(|s| s.haptic).filter(|h| h.is_fifo());
+        let core = haptic.map(|h| h.core).filter(|&core| core != u32::MAX);
+        if let Some(core) = core.filter(|_| core != self.left_core) {
+            self.left_core = Some(core);
+            affinity::keep_off(core as usize);
+        }
     }
 
     /// Of the plan while it is edited or nothing lies in the tissue; else of the seeds as they lie.

@@ -60,7 +60,9 @@ fn whole_strip(
     value: impl Fn(&TickRecord) -> f64,
 ) {
     let records = trace.records();
-    let Some((first, last)) = records.first().zip(records.last()) else { return };
+    let Some((first, last)) = records.first().zip(records.last()) else {
+        return;
+    };
     let seconds = |r: &TickRecord| format::seconds(r.due_ns.saturating_sub(first.due_ns));
     let end_s = seconds(last).max(1.0);
     let buckets = ui.available_width().max(50.0) as usize;

@@ -105,9 +105,17 @@ mod tests {
     fn an_hour_is_kept_in_bounded_memory_with_its_largest_force() {
         let mut trace = Trace::default();
         for minute in 0..60 {
-            trace.take(&records(minute * 60_000..(minute + 1) * 60_000, true), Some((1, 1)), [0.0, 0.0, 1.0]);
+            trace.take(
+                &records(minute * 60_000..(minute + 1) * 60_000, true),
+                Some((1, 1)),
+                [0.0, 0.0, 1.0],
+            );
         }
-        assert!((MOST / 2..MOST).contains(&trace.records().len()), "{}", trace.records().len());
+        assert!(
+            (MOST / 2..MOST).contains(&trace.records().len()),
+            "{}",
+            trace.records().len()
+        );
         let largest = trace.records().iter().map(square).fold(0.0, f64::max);
         assert_eq!((largest, trace.motion().peak_force_n), (81.0, 9.0));
         assert!(trace.records().is_sorted_by_key(|r| r.due_ns));

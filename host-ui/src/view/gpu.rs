@@ -194,14 +194,16 @@ impl Gpu {
         }
         self.shells.truncate(shells.len());
         for (shell, surface) in self.shells.iter_mut().zip(shells) {
-            self.driver.send(|| shell.vertices.write(&self.state, &surface.vertices));
+            self.driver
+                .send(|| shell.vertices.write(&self.state, &surface.vertices));
             self.driver.send(|| shell.indices.write(&self.state, &surface.indices));
         }
     }
 
     /// `which` is 0 for marks of the plan, 1 for those of the tick.
     pub fn set_marks(&mut self, which: usize, marks: &Marks) {
-        self.driver.send(|| self.solids[which].write(&self.state, &marks.triangles));
+        self.driver
+            .send(|| self.solids[which].write(&self.state, &marks.triangles));
         self.driver.send(|| self.lines[which].write(&self.state, &marks.lines));
     }
 

@@ -70,12 +70,7 @@ pub struct Comparison {
 }
 
 /// Turns of ours and of the other's, `rounds` of each.
-pub fn compare(
-    setup: &Setup,
-    against: Against,
-    rounds: u32,
-    interrupted: &AtomicBool,
-) -> Result<Comparison, String> {
+pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &AtomicBool) -> Result<Comparison, String> {
     let turn_ns = (setup.duration_ns / u64::from(rounds)).max(SHORTEST_TURN_NS);
     let tool = match against {
         Against::Cyclictest => version(),

@@ -247,7 +247,10 @@ fn pictures(r: &Report, m: &Measured) -> Result<String, String> {
             figures.push(("Wake-up beside cyclictest, all turns", plots::wake_histogram(turns)?));
         }
         Some((Against::Unloaded, turns)) => {
-            figures.push(("Wake-up with and without the load, all turns", plots::wake_histogram(turns)?));
+            figures.push((
+                "Wake-up with and without the load, all turns",
+                plots::wake_histogram(turns)?,
+            ));
         }
         None => {
             let seen = Series {
@@ -322,8 +325,7 @@ fn comparison(r: &Report) -> String {
     }
     let mut rows: Vec<Vec<String>> = Vec::new();
     for (i, round) in c.rounds.iter().enumerate() {
-        let cells =
-            (0..c.names.len()).flat_map(|k| [round.ours_us[k], round.others_us[k], round.ratio[k]].map(or_na));
+        let cells = (0..c.names.len()).flat_map(|k| [round.ours_us[k], round.others_us[k], round.ratio[k]].map(or_na));
         rows.push([(i + 1).to_string()].into_iter().chain(cells).collect());
     }
     let median = c

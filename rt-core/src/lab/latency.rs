@@ -28,7 +28,11 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
     let measured = measure(&setup, interrupted)?;
     let comparison = match args.compare {
         Some(against) => {
-            let ours = if against == Against::Unloaded { "with and " } else { "with " };
+            let ours = if against == Against::Unloaded {
+                "with and "
+            } else {
+                "with "
+            };
             eprintln!("rt-core: in turns {ours}{}, {} rounds", against.name(), args.rounds);
             Some(compare(&setup, against, args.rounds, interrupted)?)
         }

@@ -128,7 +128,12 @@ fn window(program: &Path, instance: &Instance) -> Result<Child, String> {
         .args(["--instance", instance.name(), "--without-pause", "--no-controllers"])
         .stdin(Stdio::null())
         .spawn()
-        .map_err(|e| format!("cannot start {}: {e}; build it: cargo build --release -p host-ui", window.display()))
+        .map_err(|e| {
+            format!(
+                "cannot start {}: {e}; build it: cargo build --release -p host-ui",
+                window.display()
+            )
+        })
 }
 
 impl Drop for Running {

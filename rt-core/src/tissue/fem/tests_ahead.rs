@@ -1,8 +1,8 @@
 //! Claims about work ahead: it answers what the converged solution is, and a wrong guess changes nothing.
 
 use super::*;
-use crate::tissue::fem::tissue::LIVE_CYCLES;
 use crate::rt::heap;
+use crate::tissue::fem::tissue::LIVE_CYCLES;
 use crate::tissue::{Held, TissueModel};
 
 const LIVE: SolveSettings = SolveSettings {
