@@ -80,6 +80,9 @@ pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &Atomi
         against,
         absent: match (against, &tool, setup.load) {
             (_, None, _) => Some("cyclictest is not installed: sudo apt-get install rt-tests".to_owned()),
+            (Against::Cyclictest, _, Load::Window) => {
+                Some("the window draws nothing without our loops; give --compare unloaded".to_owned())
+            }
             (Against::Unloaded, _, Load::None) => Some("there is no load to compare with; give --load".to_owned()),
             _ => None,
         },
