@@ -39,6 +39,9 @@ pub trait Device: Send {
 
     /// Where a simulated hand should take the tip. A device held by a real hand ignores it.
     fn set_hand_goal(&mut self, _goal: &HandGoal) {}
+
+    /// A simulated hand stops where it is, as fast as its last goal lets it. A device held by a real hand ignores it.
+    fn stop_hand(&mut self) {}
 }
 
 /// The figures of a device that limit what the force loop may ask of it.

@@ -158,6 +158,46 @@ fn a_passive_hand_yields_as_its_spring_says() {
     assert!((device.true_tip_in_world().x - 8.5 / 300.0).abs() < 1e-6);
 }
 
+/// As fast as the acceleration lets it and no way back; the last step of the discrete motion may be past it by a part of `a dt^2`.
+#[test]
+fn a_path_that_is_stopped_goes_on_by_its_stopping_distance_and_never_back() {
+    for (speed, acceleration, after_ticks) in [(0.05, 1.0, 300), (0.28, 2.0, 100), (0.05, 1.0, 20), (0.05, 1.0, 0)] {
+        let mut path = HandPath::at(Vector3::zeros(), Vector3::z());
+        path.set_goal(&HandGoal {
+            tip_in_world: Vector3::new(0.0, 0.0, 0.2),
+            direction: Vector3::z(),
+            speed_m_per_s: speed,
+            acceleration_m_per_s2: acceleration,
+        });
+        for _ in 0..after_ticks {
+            path.step(DT_S);
+        }
+        let (from, v) = (path.position_m().z, path.velocity_m_per_s().z);
+        path.stop();
+        let mut last = from;
+        let mut ticks = 0;
+        while !path.arrived() {
+            path.step(DT_S);
+            assert!(
+                path.position_m().z >= last - acceleration * DT_S * DT_S,
+                "{} after {last}",
+                path.position_m().z
+            );
+            last = path.position_m().z;
+            ticks += 1;
+            assert!(ticks < 1000, "it never stops");
+        }
+        assert!(
+            (last - from - v * v / (2.0 * acceleration)).abs() < 1e-9,
+            "{last} from {from} at {v} m/s"
+        );
+        assert!(
+            f64::from(ticks) * DT_S <= v / acceleration + 5.0 * DT_S,
+            "{ticks} ticks from {v} m/s"
+        );
+    }
+}
+
 #[test]
 fn the_push_of_an_operator_is_bounded() {
     let hand = Hand::steady();

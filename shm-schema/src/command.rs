@@ -65,6 +65,8 @@ pub enum CommandKind {
     /// Entry x y z (m), direction x y z, speeds of insertion, retraction and approach (m/s), acceleration (m/s^2), how far from the
     /// entry the tip is drawn back to (m), then x y z (m) of each drop in its order.
     Rehearse = 12,
+    /// The simulated hand stops as fast as it can; where that is only the core knows.
+    StopHand = 13,
 }
 
 impl CommandKind {
@@ -82,6 +84,7 @@ impl CommandKind {
             Self::Shutdown,
             Self::SaveFlight,
             Self::Rehearse,
+            Self::StopHand,
         ]
         .into_iter()
         .find(|k| *k as u32 == number)

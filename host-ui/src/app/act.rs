@@ -160,12 +160,10 @@ impl App {
         if let Some(tip) = self.shown.tip_on_path() {
             self.drive.stop(&tip);
         }
-        if let Some(depth) = self.shown.path_depth_m() {
-            self.move_to("Stop", depth, self.pace.insert_m_per_s);
-        }
+        self.send("Stop", CommandKind::StopHand, &[]);
     }
 
-    /// Held keys, a stick or a cap move the goal along the path; letting go stops it where the tip is. Without them a hand
+    /// Held keys, a stick or a cap move the goal along the path; letting go stops it there. Without them a hand
     /// may pull the tip.
     pub(super) fn drive(&mut self, wish: Wish, frame_s: f64) {
         if self.run.is_some() || !self.shown.is_live() {
@@ -187,8 +185,8 @@ impl App {
             if let Some(goal) = self.drive.step(&wish, &tip, frame_s) {
                 self.move_to("Needle", goal.depth_m, goal.speed_m_per_s);
             }
-        } else if let Some(depth_m) = self.drive.stop(&tip) {
-            self.move_to("Needle", depth_m, self.pace.insert_m_per_s);
+        } else if self.drive.stop(&tip) {
+            self.send("Needle", CommandKind::StopHand, &[]);
         } else {
             self.pull();
         }
@@ -223,5 +221,6 @@ fn command_name(kind: CommandKind) -> &'static str {
         CommandKind::Shutdown => "Shutdown",
         CommandKind::SaveFlight => "Flight recording",
         CommandKind::Rehearse => "Rehearsal",
+        CommandKind::StopHand => "Stop",
     }
 }

@@ -76,13 +76,13 @@ impl Drive {
         })
     }
 
-    /// The hand has let go: the needle stays where its tip is. Once after each drive.
-    pub fn stop(&mut self, tip: &TipOnPath) -> Option<f64> {
-        self.goal_m.take()?;
-        if is_outside(tip) {
+    /// Whether the hand has let go just now, so that the core is to stop the needle: the tip that is seen here is of the past.
+    pub fn stop(&mut self, tip: &TipOnPath) -> bool {
+        let was_on = self.goal_m.take().is_some();
+        if was_on && is_outside(tip) {
             self.beside_m = tip.beside_m;
         }
-        Some(tip.depth_m)
+        was_on
     }
 }
 
@@ -163,16 +163,18 @@ mod tests {
     }
 
     #[test]
-    fn letting_go_stops_the_tip_where_it_is_and_only_once() {
+    fn letting_go_is_told_once_and_the_next_drive_begins_at_the_tip() {
         let mut drive = Drive::default();
-        assert_eq!(drive.stop(&OUTSIDE), None, "nothing was driven");
+        assert!(!drive.stop(&OUTSIDE), "nothing was driven");
         drive.step(&along(0.04), &OUTSIDE, 0.016);
         let tip = TipOnPath {
             depth_m: 0.0123,
             ..OUTSIDE
         };
-        assert_eq!(drive.stop(&tip), Some(0.0123));
-        assert_eq!(drive.stop(&tip), None);
+        assert!(drive.stop(&tip));
+        assert!(!drive.stop(&tip));
+        let goal = drive.step(&along(0.04), &tip, 0.016).expect("a goal");
+        assert!((goal.depth_m - 0.0123 - 0.04 * 0.016).abs() < 1e-12);
     }
 
     #[test]

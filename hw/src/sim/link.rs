@@ -87,4 +87,8 @@ impl<D: Device> Device for BadLink<D> {
     fn set_hand_goal(&mut self, goal: &HandGoal) {
         self.device.set_hand_goal(goal);
     }
+
+    fn stop_hand(&mut self) {
+        self.device.stop_hand();
+    }
 }

@@ -39,6 +39,12 @@ impl HandPath {
         valid
     }
 
+    /// Ends the way with the acceleration of the last goal: `v^2 / 2a` ahead, never back.
+    pub fn stop(&mut self) {
+        let stopping_s = self.velocity_m_per_s.norm() / (2.0 * self.goal.acceleration_m_per_s2);
+        self.goal.tip_in_world = self.position_m + self.velocity_m_per_s * stopping_s;
+    }
+
     pub fn position_m(&self) -> &Vector3<f64> {
         &self.position_m
     }

@@ -211,6 +211,10 @@ impl Device for SimulatedPhantom {
     fn set_hand_goal(&mut self, goal: &HandGoal) {
         self.path.set_goal(goal);
     }
+
+    fn stop_hand(&mut self) {
+        self.path.stop();
+    }
 }
 
 fn unit_or_z(v: &Vector3<f64>) -> Vector3<f64> {

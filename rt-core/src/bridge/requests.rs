@@ -62,6 +62,7 @@ pub fn read(command: &Command, now: &ParameterSet, device: &DeviceInfo) -> Resul
         CommandKind::Shutdown => Ok(Request::Shutdown),
         CommandKind::SaveFlight => Ok(Request::SaveFlight),
         CommandKind::Rehearse => rehearsal(values).map(|run| Request::Rehearse(Box::new(run))),
+        CommandKind::StopHand => Ok(Request::Haptic(|ticket| HapticOrder::StopHand { ticket })),
     }
 }
 

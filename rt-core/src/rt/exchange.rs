@@ -136,6 +136,9 @@ pub enum HapticOrder {
     },
     /// Hand the flight recording over; the loop records anew once it has it back.
     HandOverTape,
+    StopHand {
+        ticket: Ticket,
+    },
 }
 
 /// Bridge to tissue.

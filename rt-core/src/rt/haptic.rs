@@ -200,6 +200,11 @@ impl HapticLoop {
                     ticket,
                     why: Refusal::BadGoal,
                 }),
+                HapticOrder::StopHand { ticket } => {
+                    self.device.stop_hand();
+                    self.goal = None;
+                    self.notify(Notice::Done { ticket, tick });
+                }
                 HapticOrder::Engage { ticket } => self.engage(ticket, tick),
                 HapticOrder::Disengage { ticket } => {
                     self.chain.gate.release();

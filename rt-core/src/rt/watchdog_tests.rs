@@ -75,6 +75,10 @@ impl Device for BreakingDevice {
     fn set_hand_goal(&mut self, goal: &HandGoal) {
         self.hand.set_hand_goal(goal);
     }
+
+    fn stop_hand(&mut self) {
+        self.hand.stop_hand();
+    }
 }
 
 /// The whole haptic loop against a membrane at z = 0, ticked by hand.
