@@ -11,6 +11,7 @@ pub mod dose;
 pub mod dose_desk;
 pub mod files;
 pub mod format;
+pub mod heap;
 pub mod interrupt;
 mod job;
 pub mod keyboard;

@@ -4,6 +4,7 @@ use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    host_ui::heap::keep_little();
     match host_ui::cli::Cli::parse().run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(why) => {
