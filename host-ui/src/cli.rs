@@ -16,6 +16,8 @@ A scene file is TOML; all but [volume] may be left out, and what is not said com
   name = \"phantom\"
   [volume]
   file = \"gland.seg.nrrd\"         # beside the scene file
+  [image]
+  file = \"trus.nrrd\"             # for the slices of the window; leave out for simulated ultrasound
   [[structure]]
   name = \"Prostate\"               # as the volume calls it; or label = 1, and called = \"Prostate\"
   role = \"target\"                 # or \"spare\", \"tissue\", \"leave out\"
@@ -44,6 +46,9 @@ Names that are known follow TG-263: Prostate, PTV, CTV (targets), Urethra, Rectu
 pub struct Cli {
     #[command(flatten)]
     window: CoreArgs,
+    /// Greys for the slices in place of simulated ultrasound, of the patient of --scene FILE: NIfTI-1, NRRD, MetaImage
+    #[arg(long, value_name = "FILE", requires = "scene")]
+    image: Option<PathBuf>,
     /// Leave gamepads and 3D mice alone: only keys and mouse move the needle
     #[arg(long)]
     no_controllers: bool,
@@ -149,11 +154,15 @@ impl Cli {
         }
         match self.task {
             None => {
+                if self.image.is_some() && self.window.file().is_none() {
+                    return Err("--image belongs to a patient: give the segmentation with --scene FILE".to_owned());
+                }
                 let instance = self.window.instance;
                 let ended = app::run(app::Options {
                     instance: instance.clone(),
                     scene: self.window.scene,
                     label: self.window.label,
+                    image: self.image,
                     controllers: !self.no_controllers,
                     pause: !self.without_pause,
                 });
@@ -218,7 +227,7 @@ impl Cli {
 }
 
 fn check(file: &Path, label: Option<u8>) -> Result<(), String> {
-    let v = files::read(file, label).map_err(|e| e.to_string())?;
+    let v = files::read(file, label, &files::Progress::default()).map_err(|e| e.to_string())?;
     println!("{}", v.name);
     if files::scene::is_scene(file) {
         check_scene_file(file)?;

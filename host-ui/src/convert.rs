@@ -5,7 +5,7 @@ use crate::dose::files::{Dosed, SeedDefaults, read_dose, read_seeds};
 use crate::files::convert::{can_hold_labels, write_labels, write_whole};
 use crate::files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
 use crate::files::dicom::{self, Identity};
-use crate::files::{self, open, scene};
+use crate::files::{self, Progress, open, scene};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -72,7 +72,7 @@ impl ConvertArgs {
                 self.from.display()
             ));
         }
-        let voxels = files::read_voxels(&self.from).map_err(|e| e.to_string())?;
+        let voxels = files::read_voxels(&self.from, &Progress::default()).map_err(|e| e.to_string())?;
         if let Some(note) = &voxels.frame.warning {
             eprintln!("note: {note}");
         }
@@ -184,7 +184,7 @@ impl ConvertArgs {
 /// A DICOM plan, its notes told.
 pub fn read_plan(path: &Path) -> Result<SeedPlan, String> {
     let told = |why: String| format!("{}: {why}", path.display());
-    let bytes = open::whole(path).map_err(told)?;
+    let bytes = open::whole(path, &Progress::default()).map_err(told)?;
     let plan = dicom::read(&bytes).and_then(|o| plan::of(&o)).map_err(told)?;
     plan.notes
         .iter()
@@ -202,7 +202,7 @@ fn has_ending(path: &Path, ending: &str) -> bool {
 }
 
 fn first_line(path: &Path) -> Result<String, String> {
-    let bytes = open::whole(path).map_err(|why| format!("{}: {why}", path.display()))?;
+    let bytes = open::whole(path, &Progress::default()).map_err(|why| format!("{}: {why}", path.display()))?;
     let line = bytes
         .split(|&b| b == b'\n')
         .find(|l| !l.starts_with(b"#"))

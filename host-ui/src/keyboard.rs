@@ -6,7 +6,7 @@ use egui::{Key, Modifiers};
 use stylet_shm_schema::CommandKind;
 
 /// Every key, for the overlay and the manual.
-pub const KEYS: [(&str, &str); 25] = [
+pub const KEYS: [(&str, &str); 26] = [
     ("W  or  Up", "advance the needle along its path while held"),
     ("S  or  Down", "retract the needle while held"),
     ("Shift with W, S", "four times slower"),
@@ -33,6 +33,7 @@ pub const KEYS: [(&str, &str); 25] = [
     ("F", "slices follow the tip"),
     ("M", "measure between two clicks"),
     ("I", "isodose lines and surfaces"),
+    ("G", "greys of the image in the slices, or simulated ultrasound"),
     ("T", "light or dark"),
     ("Ctrl and +, -, 0", "larger, smaller, usual words"),
     ("F12", "save the window as a picture"),
@@ -81,6 +82,7 @@ pub fn read(ctx: &egui::Context) -> Keys {
         (Modifiers::NONE, Key::F, Action::ToggleFollowTip),
         (Modifiers::NONE, Key::M, Action::ToggleMeasure),
         (Modifiers::NONE, Key::I, Action::ToggleIsodose),
+        (Modifiers::NONE, Key::G, Action::ToggleImage),
         (Modifiers::NONE, Key::T, Action::ToggleTheme),
         (Modifiers::NONE, Key::F12, Action::SavePicture),
         (Modifiers::NONE, Key::Num1, Action::LookFrom(Preset::Oblique)),

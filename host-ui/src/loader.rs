@@ -1,41 +1,96 @@
-//! Reads a segmented volume on a thread of its own, so that a large or broken file never holds up a frame.
+//! Reads scenes and images on a thread of its own, so that a large or broken file never holds up a frame.
 
-use crate::files::LabelVolume;
+use crate::files::{self, FileError, Image, LabelVolume, Progress, scene};
 use crate::job::{Job, News};
 use std::path::{Path, PathBuf};
 
-type Outcome = Result<LabelVolume, String>;
+/// What a file came to.
+pub enum Loaded {
+    /// A scene, and the image that its scene file names.
+    Scene(LabelVolume, Option<Image>),
+    Image(Image),
+}
+
+type Outcome = Result<Loaded, String>;
+
+struct Reading {
+    path: PathBuf,
+    progress: Progress,
+    job: Job<Outcome>,
+}
 
 /// One file at a time.
 #[derive(Default)]
 pub struct Loader {
-    reading: Option<(PathBuf, Job<Outcome>)>,
+    reading: Option<Reading>,
 }
 
 impl Loader {
-    pub fn begin(&mut self, path: &Path, label: Option<u8>) {
-        let owned = path.to_owned();
-        let job = Job::begin("scene reader", move |told, _| {
-            // The window may be gone by now; then nobody wants the answer.
-            let _ = told.send(crate::files::read(&owned, label).map_err(|e| e.to_string()));
-        });
-        self.reading = Some((path.to_owned(), job));
+    /// An image that is named here is taken instead of that of a scene file.
+    pub fn begin_scene(&mut self, path: &Path, label: Option<u8>, image: Option<PathBuf>) {
+        self.begin(path, move |path, progress| scene_of(path, label, image, progress));
     }
 
-    /// What is being read is no longer wanted; its thread ends by itself.
+    pub fn begin_image(&mut self, path: &Path) {
+        self.begin(path, |path, progress| Image::read(path, progress).map(Loaded::Image));
+    }
+
+    fn begin(
+        &mut self,
+        path: &Path,
+        read: impl FnOnce(&Path, &Progress) -> Result<Loaded, FileError> + Send + 'static,
+    ) {
+        let progress = Progress::default();
+        let (owned, told) = (path.to_owned(), progress.clone());
+        let job = Job::begin("file reader", move |answer, interrupt| {
+            let outcome = read(&owned, &told.ended_by(interrupt.clone()));
+            // The window may be gone by now; then nobody wants the answer.
+            let _ = answer.send(outcome.map_err(|e| e.to_string()));
+        });
+        let path = path.to_owned();
+        self.reading = Some(Reading { path, progress, job });
+    }
+
+    /// What is being read, what is done with it, and the share of that.
+    pub fn at(&self) -> Option<(String, f32)> {
+        let reading = self.reading.as_ref()?;
+        let (stage, share) = reading.progress.at();
+        Some((
+            format!("{}: {}", files::open::file_name(&reading.path), stage.name()),
+            share,
+        ))
+    }
+
+    /// What is being read is no longer wanted; its thread ends soon.
     pub fn cancel(&mut self) {
         self.reading = None;
     }
 
     /// Each outcome once; a reader that died is a refusal too.
     pub fn poll(&mut self) -> Option<Outcome> {
-        let (path, job) = self.reading.as_ref()?;
-        let outcome = match job.poll() {
+        let reading = self.reading.as_ref()?;
+        let outcome = match reading.job.poll() {
             News::None => return None,
             News::Told(outcome) => outcome,
-            News::Ended => Err(format!("{}: the reader stopped half-way", path.display())),
+            News::Ended => Err(format!("{}: the reader stopped half-way", reading.path.display())),
         };
         self.reading = None;
         Some(outcome)
     }
+}
+
+fn scene_of(path: &Path, label: Option<u8>, image: Option<PathBuf>, progress: &Progress) -> Result<Loaded, FileError> {
+    let volume = files::read(path, label, progress)?;
+    let named = match scene::is_scene(path) {
+        true => scene::read(path)?.image,
+        false => None,
+    };
+    let Some(file) = image.or_else(|| named.map(|file| path.with_file_name(file))) else {
+        return Ok(Loaded::Scene(volume, None));
+    };
+    let image = Image::read(&file, progress)?;
+    image
+        .covers(&volume.patient_from_scene, volume.middle_m())
+        .map_err(|why| FileError::of(&file, &why))?;
+    Ok(Loaded::Scene(volume, Some(image)))
 }

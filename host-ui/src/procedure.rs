@@ -44,7 +44,9 @@ pub struct Live {
 impl Live {
     pub fn connect(options: &Connect) -> Result<Self, String> {
         let asked = &options.asked;
-        let volume = asked.file().map(|path| files::read(path, asked.label));
+        let volume = asked
+            .file()
+            .map(|path| files::read(path, asked.label, &files::Progress::default()));
         let volume = volume.transpose().map_err(|e| e.to_string())?;
         let scene_file = asked.file().filter(|path| files::scene::is_scene(path));
         let said = scene_file.map(files::scene::read).transpose();

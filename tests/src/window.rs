@@ -32,6 +32,7 @@ impl Driven {
             instance: core.instance.clone(),
             scene: None,
             label: None,
+            image: None,
             controllers: false,
             pause: true,
         };

@@ -72,17 +72,23 @@ fn replay(reader: &str, read: fn(&[u8]) -> Option<String>) {
 
 #[test]
 fn nifti() {
-    replay("nifti", |b| files::nifti::read(b).err());
+    replay("nifti", |b| {
+        files::nifti::read(b, files::Sink::labels(&files::Progress::default())).err()
+    });
 }
 
 #[test]
 fn nrrd() {
-    replay("nrrd", |b| files::nrrd::read(b, &|_| Ok(b.to_vec())).err());
+    replay("nrrd", |b| {
+        files::nrrd::read(b, &|_| Ok(b.to_vec()), files::Sink::labels(&files::Progress::default())).err()
+    });
 }
 
 #[test]
 fn metaimage() {
-    replay("metaimage", |b| files::metaimage::read(b, &|_| Ok(b.to_vec())).err());
+    replay("metaimage", |b| {
+        files::metaimage::read(b, &|_| Ok(b.to_vec()), files::Sink::labels(&files::Progress::default())).err()
+    });
 }
 
 #[test]

@@ -88,7 +88,7 @@ fn compare_with_what_was_drawn(v: &Voxels) -> usize {
 #[test]
 fn a_structure_set_lies_on_the_grid_of_its_tilted_images() {
     for name in ["structures.dcm", "structures_implicit.dcm"] {
-        let v = files::read_voxels(&folder().join(name)).unwrap_or_else(|e| panic!("{e}"));
+        let v = files::read_voxels(&folder().join(name), &files::Progress::default()).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(v.dims, [40, 36, 6]);
         let side = v.frame.spacing_m.map(|s| (s * 1e9).round() / 1e6);
         assert_eq!(side, [0.5, 0.6, 2.0]);
@@ -113,7 +113,7 @@ fn a_structure_set_lies_on_the_grid_of_its_tilted_images() {
 fn a_structure_set_that_we_write_has_its_volumes_in_pydicom() {
     let out = scratch("dicom-structures");
     let (from, to) = (out.join("a.nrrd"), out.join("set.dcm"));
-    let v = files::read_voxels(&folder().join("structures.dcm")).expect("read");
+    let v = files::read_voxels(&folder().join("structures.dcm"), &files::Progress::default()).expect("read");
     files::convert::write_labels(&v, &from).expect("written");
     let (done, said) = host_ui(&["convert"], &[&from, &to]);
     assert!(done, "{said}");

@@ -63,7 +63,8 @@ fn volumes_of_other_programs_lie_where_they_say() {
     let expected = expected();
     assert!(expected.len() >= 17, "{}", expected.len());
     for (name, centres_mm) in &expected {
-        let voxels = files::read_voxels(&folder().join(name)).unwrap_or_else(|e| panic!("{e}"));
+        let voxels =
+            files::read_voxels(&folder().join(name), &files::Progress::default()).unwrap_or_else(|e| panic!("{e}"));
         assert_near(name, &centres(&voxels), centres_mm);
         assert_eq!(
             voxels.frame.warning.is_some(),
@@ -76,7 +77,7 @@ fn volumes_of_other_programs_lie_where_they_say() {
 
 #[test]
 fn segments_of_slicer_keep_their_names_and_what_overlaps_is_told() {
-    let voxels = files::read_voxels(&folder().join("layers.seg.nrrd")).expect("read");
+    let voxels = files::read_voxels(&folder().join("layers.seg.nrrd"), &files::Progress::default()).expect("read");
     let names: Vec<&str> = voxels.names.values().map(String::as_str).collect();
     assert_eq!(names, ["Prostate", "Rectum", "Urethra"]);
     let warning = voxels.frame.warning.expect("an overlap");
@@ -85,7 +86,7 @@ fn segments_of_slicer_keep_their_names_and_what_overlaps_is_told() {
 
 #[test]
 fn a_volume_without_orientation_says_so() {
-    let voxels = files::read_voxels(&folder().join("pynrrd_spacings.nrrd")).expect("read");
+    let voxels = files::read_voxels(&folder().join("pynrrd_spacings.nrrd"), &files::Progress::default()).expect("read");
     let off = [0.7e-3, 0.9e-3, 2.5e-3]
         .iter()
         .zip(voxels.frame.spacing_m)
@@ -99,11 +100,11 @@ fn a_volume_without_orientation_says_so() {
 fn what_is_written_is_read_back_the_same() {
     let folder_out = scratch("labels-written");
     for from in ["itk_mirrored.nrrd", "layers.seg.nrrd", "itk_u8.nii.gz"] {
-        let first = files::read_voxels(&folder().join(from)).expect("read");
+        let first = files::read_voxels(&folder().join(from), &files::Progress::default()).expect("read");
         for to in ["a.nrrd", "a.seg.nrrd", "a.mha", "a.nii.gz"] {
             let path = folder_out.join(to);
             files::convert::write_labels(&first, &path).expect("written");
-            let again = files::read_voxels(&path).expect("read again");
+            let again = files::read_voxels(&path, &files::Progress::default()).expect("read again");
             assert_eq!(again.labels, first.labels, "{from} to {to}");
             assert_near(&format!("{from} to {to}"), &centres(&again), &centres(&first));
             if to.ends_with("nrrd") {
@@ -120,11 +121,15 @@ fn a_header_reaches_no_file_outside_of_its_folder() {
     for name in ["/etc/passwd", "../itk_detached.raw", "a/b.raw", "..", "."] {
         let path = out.join("header.mhd");
         std::fs::write(&path, text.replace("itk_detached.raw", name)).expect("written");
-        let why = files::read_voxels(&path).expect_err(name).0;
+        let why = files::read_voxels(&path, &files::Progress::default())
+            .expect_err(name)
+            .0;
         assert!(why.contains("only a file in the same folder"), "{name}: {why}");
     }
     let path = out.join("header.mhd");
     std::fs::write(&path, text.replace("itk_detached.raw", "missing.raw")).expect("written");
-    let why = files::read_voxels(&path).expect_err("missing").0;
+    let why = files::read_voxels(&path, &files::Progress::default())
+        .expect_err("missing")
+        .0;
     assert!(why.contains("missing.raw: it cannot be opened"), "{why}");
 }

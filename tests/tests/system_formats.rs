@@ -96,7 +96,8 @@ fn every_format_gives_the_same_structures_at_the_same_place() {
     let mut link = core.host();
     for path in formats(&folder) {
         let name = path.file_name().expect("named").to_string_lossy().into_owned();
-        let volume = host_ui::files::read(&path, None).unwrap_or_else(|e| panic!("{e}"));
+        let volume =
+            host_ui::files::read(&path, None, &host_ui::files::Progress::default()).unwrap_or_else(|e| panic!("{e}"));
         let before = link.scene().expect("live").header.generation;
         let id = link.upload(&volume).expect("sent");
         let shown = until(Duration::from_secs(60), || {

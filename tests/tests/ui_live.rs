@@ -77,6 +77,7 @@ fn a_window_that_comes_moves_nothing_by_itself() {
         instance: driven.core.instance.clone(),
         scene: None,
         label: None,
+        image: None,
         controllers: false,
         pause: true,
     };

@@ -16,6 +16,7 @@ fn window_of(instance: &str, size: [f32; 2]) -> Harness<'static, App> {
         instance: Instance::new(instance).expect("a valid name"),
         scene: None,
         label: None,
+        image: None,
         controllers: false,
         pause: true,
     };

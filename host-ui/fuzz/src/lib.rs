@@ -2,3 +2,5 @@
 
 #[path = "../../src/files/mod.rs"]
 pub mod files;
+#[path = "../../src/interrupt.rs"]
+pub mod interrupt;

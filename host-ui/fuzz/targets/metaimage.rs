@@ -6,5 +6,5 @@ use host_ui_fuzz::files;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
-    let _answer = files::metaimage::read(data, &|_| Ok(data.to_vec()));
+    let _answer = files::metaimage::read(data, &|_| Ok(data.to_vec()), files::Sink::labels(&files::Progress::default()));
 });

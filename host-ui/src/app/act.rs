@@ -60,6 +60,7 @@ impl App {
             Action::ToggleFollowTip => self.middle.view.follow_tip = !self.middle.view.follow_tip,
             Action::ToggleMeasure => self.middle.view.measure.toggle(),
             Action::ToggleIsodose => self.middle.view.isodose = !self.middle.view.isodose,
+            Action::ToggleImage => self.middle.view.image = !self.middle.view.image,
             Action::ToggleTheme => {
                 self.settings.theme = match self.settings.theme {
                     ThemeChoice::Dark => ThemeChoice::Light,
@@ -74,7 +75,8 @@ impl App {
                     self.put_away = (session.session_id, session.refused);
                 }
             }
-            Action::LoadScene(path) => self.load(&path),
+            Action::LoadScene(path) => self.load(&path, None),
+            Action::LoadImage(path) => self.load_image(&path),
             Action::CancelLoad => self.cancel_load(),
             Action::StopRun => self.stop_run(),
             // While the script runs the needle is its own.
@@ -133,6 +135,7 @@ impl App {
     fn cancel_load(&mut self) {
         self.loader.cancel();
         self.uploading = None;
+        self.image_to_come = None;
         self.shown.load = LoadState::Idle;
     }
 

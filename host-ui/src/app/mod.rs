@@ -9,6 +9,7 @@ mod take;
 use crate::controller::{Controllers, SLOW, System, Wish};
 use crate::core_args::SceneChoice;
 use crate::dose_desk::DoseDesk;
+use crate::files::Image;
 use crate::job::Job;
 use crate::link::{Link, LinkStatus};
 use crate::loader::Loader;
@@ -23,6 +24,7 @@ use crate::settings::Settings;
 use crate::view::middle::Middle;
 use crate::workflow::{Pace, Run};
 use crate::{cpu_time, format, keyboard, theme};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::service::Instance;
 
@@ -36,6 +38,8 @@ pub struct Options {
     pub scene: Option<SceneChoice>,
     /// Which label of the file is the gland; all of them when none is given.
     pub label: Option<u8>,
+    /// Greys for the slices, of the patient of the scene file.
+    pub image: Option<PathBuf>,
     /// Whether gamepads and 3D mice may hold the needle.
     pub controllers: bool,
     /// Frames come no faster than a person sees; without, as fast as the machine can.
@@ -54,6 +58,7 @@ pub struct App {
     label: Option<u8>,
     /// From the command line, until it is read.
     first_scene: Option<SceneChoice>,
+    first_image: Option<PathBuf>,
     shown: Shown,
     middle: Middle,
     dose: DoseDesk,
@@ -68,6 +73,8 @@ pub struct App {
     summed_up: Instant,
     loader: Loader,
     uploading: Option<(u64, String)>,
+    /// Shown once the scene that it belongs to, by name, is taken.
+    image_to_come: Option<(Image, String)>,
     run: Option<Run>,
     /// Which needles of the plan the script goes through.
     run_needles: Vec<usize>,
@@ -144,6 +151,7 @@ impl App {
             link: Link::new(options.instance),
             label: options.label,
             first_scene: options.scene,
+            first_image: options.image,
             shown,
             middle: Middle::new(cc.wgpu_render_state.clone()),
             dose: DoseDesk::new(),
@@ -155,6 +163,7 @@ impl App {
             summed_up: Instant::now(),
             loader: Loader::default(),
             uploading: None,
+            image_to_come: None,
             run: None,
             run_needles: Vec::new(),
             planner: Planner::default(),

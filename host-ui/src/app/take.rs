@@ -6,10 +6,11 @@ use crate::affinity;
 use crate::controller::Button;
 use crate::core_args::SceneChoice;
 use crate::dose_desk::{DoseOf, Wanted};
-use crate::files::LabelVolume;
+use crate::files::{Image, LabelVolume};
+use crate::loader::Loaded;
 use crate::panel::{Action, LoadState, Note};
 use crate::workflow::RunStatus;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::CommandKind;
 
@@ -121,6 +122,7 @@ impl App {
             self.waiting.clear();
             self.drive.forget();
             if self.uploading.take().is_some() {
+                self.image_to_come = None;
                 self.shown.load = LoadState::Refused("rt-core went away before it answered".to_owned());
             }
             return;
@@ -151,10 +153,14 @@ impl App {
         let answer = self.uploading.as_ref().and_then(|(id, _)| self.link.reply(*id));
         if let (Some(answer), Some((_, name))) = (answer, self.uploading.clone()) {
             self.uploading = None;
+            let image = self.image_to_come.take();
             self.shown.load = match answer.accepted {
                 true => LoadState::Loaded(format!("{name} is the scene now")),
                 false => LoadState::Refused(format!("{name} refused: {}", answer.text)),
             };
+            if let (true, Some((image, scene))) = (answer.accepted, image) {
+                self.show_image(image, &scene);
+            }
         }
     }
 
@@ -163,24 +169,66 @@ impl App {
             && let Some(scene) = self.first_scene.take()
         {
             match scene {
-                SceneChoice::File(path) => self.load(&path),
+                SceneChoice::File(path) => {
+                    let image = self.first_image.take();
+                    self.load(&path, image);
+                }
                 SceneChoice::BuiltIn(number) => self.load_builtin(number),
             }
         }
         match self.loader.poll() {
             None => {}
             Some(Err(why)) => self.shown.load = LoadState::Refused(why),
-            Some(Ok(volume)) => self.upload(&volume),
+            Some(Ok(Loaded::Scene(volume, image))) => {
+                self.image_to_come = image.map(|image| (image, volume.name.clone()));
+                self.upload(&volume);
+            }
+            Some(Ok(Loaded::Image(image))) => self.take_image(image),
+        }
+        if let Some((what, share)) = self.loader.at() {
+            self.shown.load = LoadState::Reading(what, share);
         }
     }
 
-    pub(super) fn load(&mut self, path: &Path) {
-        if self.shown.load.is_busy() {
-            return;
+    pub(super) fn load(&mut self, path: &Path, image: Option<PathBuf>) {
+        if !self.shown.load.is_busy() {
+            self.settings.last_file = path.display().to_string();
+            self.loader.begin_scene(path, self.label, image);
         }
-        self.settings.last_file = path.display().to_string();
-        self.shown.load = LoadState::Reading(format!("reading {}", path.display()));
-        self.loader.begin(path, self.label);
+    }
+
+    pub(super) fn load_image(&mut self, path: &Path) {
+        if !self.shown.load.is_busy() {
+            self.loader.begin_image(path);
+        }
+    }
+
+    /// Of the patient of the present scene, if it can be.
+    fn take_image(&mut self, image: Image) {
+        let Some(scene) = &self.shown.scene else { return };
+        let [low, high] = [scene.target_lower_m, scene.target_upper_m];
+        let middle_m = [0, 1, 2].map(|a| (low[a] + high[a]) / 2.0);
+        match image.covers(&scene.patient_from_scene, middle_m) {
+            Ok(()) => {
+                let name = scene.name.read();
+                self.show_image(image, &name);
+            }
+            Err(why) => self.shown.load = LoadState::Refused(format!("{}: {why}", image.name)),
+        }
+    }
+
+    fn show_image(&mut self, image: Image, scene: &str) {
+        let mut said = format!(
+            "{} is in the slices now, black at {}, white at {}",
+            image.name, image.range[0], image.range[1]
+        );
+        if let Some(warning) = &image.frame.warning {
+            said = format!("{said} ({warning})");
+        }
+        self.shown.load = match self.middle.show_image(image, scene) {
+            Ok(()) => LoadState::Loaded(said),
+            Err(why) => LoadState::Refused(why),
+        };
     }
 
     fn upload(&mut self, volume: &LabelVolume) {

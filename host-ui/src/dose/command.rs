@@ -283,7 +283,7 @@ impl Common {
     }
 
     fn labelled(&self, file: &Path, given: BTreeMap<u8, String>, most_points: usize) -> Result<Vec<Structure>, String> {
-        let voxels = crate::files::read_voxels(file).map_err(|e| e.to_string())?;
+        let voxels = crate::files::read_voxels(file, &crate::files::Progress::default()).map_err(|e| e.to_string())?;
         if let Some((label, name)) = given.iter().find(|(label, _)| !voxels.labels.contains(label)) {
             return Err(format!(
                 "--name {label}={name}: {} has no voxel with label {label}",

@@ -24,7 +24,7 @@ type Drawn = (Vec<Structure>, Vec<String>);
 /// `None` for a file that is no DICOM.
 pub fn structures(path: &Path, most_points: usize) -> Result<Option<Drawn>, String> {
     let told = |why: String| format!("{}: {why}", path.display());
-    let bytes = crate::files::open::whole(path).map_err(told)?;
+    let bytes = crate::files::open::whole(path, &crate::files::Progress::default()).map_err(told)?;
     if !dicom::is_dicom(&bytes) {
         return Ok(None);
     }

@@ -1,5 +1,6 @@
-//! The numbers in a volume's data, as labels; only as much is held as the data really give.
+//! The numbers in a volume's data, as labels or greys; only as much is held as the data really give.
 
+use super::progress::{Progress, Stage};
 use std::io::Read;
 
 /// A volume with more voxels is not a prostate.
@@ -96,38 +97,65 @@ pub fn must_hold(needed: u64, have: u64, packed: bool) -> Result<(), String> {
     ))
 }
 
-/// Exactly `count` labels, each the stored number times `slope` plus `intercept`.
-pub fn read_labels(
+/// What a reader makes of each number, and whom it tells how far it is.
+#[derive(Clone, Copy, Debug)]
+pub struct Sink<'a, V> {
+    made_of: fn(f64) -> Result<V, String>,
+    progress: &'a Progress,
+}
+
+impl<'a> Sink<'a, u8> {
+    pub fn labels(progress: &'a Progress) -> Self {
+        Self {
+            made_of: label_of,
+            progress,
+        }
+    }
+}
+
+impl<'a> Sink<'a, f32> {
+    pub fn greys(progress: &'a Progress) -> Self {
+        Self {
+            made_of: |value| Ok(value as f32),
+            progress,
+        }
+    }
+}
+
+/// Exactly `count` values, each the stored number times `slope` plus `intercept`.
+pub fn read_values<V>(
     mut from: impl Read,
     element: Element,
     endian: Endian,
     count: usize,
     [slope, intercept]: [f64; 2],
-) -> Result<Vec<u8>, String> {
+    sink: Sink<V>,
+) -> Result<Vec<V>, String> {
     let size = element.bytes();
     // Grows with what is really there.
-    let mut labels = Vec::with_capacity(count.min(CHUNK_BYTES));
+    let mut values = Vec::with_capacity(count.min(CHUNK_BYTES));
     let mut chunk = vec![0_u8; CHUNK_BYTES];
-    while labels.len() < count {
-        let part = &mut chunk[..((count - labels.len()) * size).min(CHUNK_BYTES)];
+    while values.len() < count {
+        sink.progress.tell(Stage::Voxels, values.len(), count)?;
+        let part = &mut chunk[..((count - values.len()) * size).min(CHUNK_BYTES)];
         from.read_exact(part)
             .map_err(|e| format!("it is cut off or damaged ({e}); copy or export it again"))?;
         for bytes in part.chunks_exact(size) {
-            labels.push(label_of(element.value(bytes, endian) * slope + intercept)?);
+            values.push((sink.made_of)(element.value(bytes, endian) * slope + intercept)?);
         }
     }
-    Ok(labels)
+    Ok(values)
 }
 
-/// As [`read_labels`], from numbers written out.
-pub fn labels_from_text(text: &[u8], count: usize) -> Result<Vec<u8>, String> {
+/// As [`read_values`], from numbers written out.
+pub fn values_from_text<V>(text: &[u8], count: usize, sink: Sink<V>) -> Result<Vec<V>, String> {
     let text = std::str::from_utf8(text).map_err(|_| "its numbers are not text".to_owned())?;
     let words = text
         .split(|c: char| c.is_ascii_whitespace() || c == ',')
         .filter(|w| !w.is_empty());
-    let mut labels = Vec::with_capacity(count.min(text.len()));
+    let mut values = Vec::with_capacity(count.min(text.len()));
     for word in words {
-        if labels.len() == count {
+        if values.len() == count {
             return Err(format!(
                 "it holds more than the {count} values of its size; export it again"
             ));
@@ -135,14 +163,17 @@ pub fn labels_from_text(text: &[u8], count: usize) -> Result<Vec<u8>, String> {
         let value: f64 = word
             .parse()
             .map_err(|_| format!("it holds \"{}\" where a number must be", short(word)))?;
-        labels.push(label_of(value)?);
+        if values.len() % CHUNK_BYTES == 0 {
+            sink.progress.tell(Stage::Voxels, values.len(), count)?;
+        }
+        values.push((sink.made_of)(value)?);
     }
-    if labels.len() == count {
-        return Ok(labels);
+    if values.len() == count {
+        return Ok(values);
     }
     Err(format!(
         "it is cut off: {} of {count} values are there; copy or export it again",
-        labels.len()
+        values.len()
     ))
 }
 

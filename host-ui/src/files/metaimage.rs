@@ -1,17 +1,16 @@
-//! The labels of a MetaImage file (.mha, .mhd with its data beside it).
+//! The voxels of a MetaImage file (.mha, .mhd with its data beside it).
 
 mod header;
 pub mod write;
 
 use super::Beside;
-use super::element::{labels_from_text, must_hold, read_labels, voxel_count};
+use super::element::{Sink, must_hold, read_values, values_from_text, voxel_count};
 use super::frame::{VoxelFrame, ras_from_lps};
 use super::nrrd::nothing_left;
-use super::volume::Voxels;
+use super::volume::VoxelValues;
 use flate2::read::ZlibDecoder;
 use header::Header;
 use nalgebra::{Matrix3, Vector3};
-use std::collections::BTreeMap;
 
 /// What the first line of such a file may be.
 const FIRST: [&str; 8] = [
@@ -34,7 +33,7 @@ pub fn is_metaimage(bytes: &[u8]) -> bool {
 }
 
 /// The whole file; `beside` reads the data of a detached header.
-pub fn read(bytes: &[u8], beside: Beside) -> Result<Voxels, String> {
+pub fn read<V>(bytes: &[u8], beside: Beside, sink: Sink<V>) -> Result<VoxelValues<V>, String> {
     let (header, rest) = Header::parse(bytes)?;
     let frame = frame(&header)?;
     let count = voxel_count(&header.sizes)?;
@@ -45,20 +44,18 @@ pub fn read(bytes: &[u8], beside: Beside) -> Result<Voxels, String> {
         detached = beside(&header.data_file)?;
         &detached
     };
-    let labels = read_data(&header, data, count)?;
-    Ok(Voxels {
+    Ok(VoxelValues {
         dims: [0, 1, 2].map(|a| header.sizes[a] as usize),
-        labels,
+        values: read_data(&header, data, count, sink)?,
         frame,
-        names: BTreeMap::new(),
     })
 }
 
-fn read_data(h: &Header, data: &[u8], count: usize) -> Result<Vec<u8>, String> {
+fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<Vec<V>, String> {
     let size = (count * h.element.bytes()) as u64;
     if !h.binary {
         must_hold(count as u64, data.len() as u64, false)?;
-        return labels_from_text(data, count);
+        return values_from_text(data, count, sink);
     }
     if h.compressed {
         if h.header_bytes != 0 {
@@ -66,9 +63,9 @@ fn read_data(h: &Header, data: &[u8], count: usize) -> Result<Vec<u8>, String> {
         }
         must_hold(size, data.len() as u64, true)?;
         let mut from = ZlibDecoder::new(data);
-        let labels = read_labels(&mut from, h.element, h.endian, count, [1.0, 0.0])?;
+        let values = read_values(&mut from, h.element, h.endian, count, [1.0, 0.0], sink)?;
         nothing_left(from)?;
-        return Ok(labels);
+        return Ok(values);
     }
     let data = match h.header_bytes {
         // The data are the end of the file, whatever is before them.
@@ -82,7 +79,7 @@ fn read_data(h: &Header, data: &[u8], count: usize) -> Result<Vec<u8>, String> {
             data.len()
         ));
     }
-    read_labels(data, h.element, h.endian, count, [1.0, 0.0])
+    read_values(data, h.element, h.endian, count, [1.0, 0.0], sink)
 }
 
 /// RAS, m; the file is in LPS, mm.

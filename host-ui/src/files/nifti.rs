@@ -1,13 +1,12 @@
-//! The labels of a NIfTI-1 file (.nii, .nii.gz); believes nothing that its header says.
+//! The voxels of a NIfTI-1 file (.nii, .nii.gz); believes nothing that its header says.
 
 pub mod write;
 
 use super::affine::voxel_frame;
-use super::element::{Element, Endian, must_hold, read_labels, voxel_count};
-use super::volume::Voxels;
+use super::element::{Element, Endian, Sink, must_hold, read_values, voxel_count};
+use super::volume::VoxelValues;
 use flate2::read::MultiGzDecoder;
 use nifti::{Endianness, NiftiHeader, NiftiType};
-use std::collections::BTreeMap;
 use std::io::Read;
 
 const HEADER_BYTES: usize = 348;
@@ -26,7 +25,7 @@ fn declared_size(bytes: &[u8]) -> Option<i32> {
 }
 
 /// The whole file, packed or not.
-pub fn read(bytes: &[u8]) -> Result<Voxels, String> {
+pub fn read<V>(bytes: &[u8], sink: Sink<V>) -> Result<VoxelValues<V>, String> {
     let packed = bytes.starts_with(&GZIP);
     let mut from: Box<dyn Read + '_> = if packed {
         Box::new(MultiGzDecoder::new(bytes))
@@ -48,13 +47,8 @@ pub fn read(bytes: &[u8]) -> Result<Voxels, String> {
     } else {
         Endian::Little
     };
-    let labels = read_labels(from, element, endian, count, scale(&header))?;
-    Ok(Voxels {
-        dims,
-        labels,
-        frame,
-        names: BTreeMap::new(),
-    })
+    let values = read_values(from, element, endian, count, scale(&header), sink)?;
+    Ok(VoxelValues { dims, values, frame })
 }
 
 fn read_header(from: &mut dyn Read, file_bytes: usize) -> Result<NiftiHeader, String> {

@@ -1,13 +1,13 @@
-//! The labels of an NRRD file (.nrrd, .nhdr with its data beside it, Slicer's .seg.nrrd).
+//! The voxels of an NRRD file (.nrrd, .nhdr with its data beside it, Slicer's .seg.nrrd).
 
 mod header;
 pub mod segments;
 pub mod write;
 
 use super::Beside;
-use super::element::{Element, Endian, labels_from_text, must_hold, read_labels, voxel_count};
+use super::element::{Element, Endian, Sink, must_hold, read_values, values_from_text, voxel_count};
 use super::frame::VoxelFrame;
-use super::volume::Voxels;
+use super::volume::{VoxelValues, Voxels};
 use flate2::read::MultiGzDecoder;
 use header::{Axis, Header};
 use nalgebra::{Matrix3, Vector3};
@@ -21,8 +21,36 @@ pub fn is_nrrd(bytes: &[u8]) -> bool {
     bytes.starts_with(b"NRRD000")
 }
 
-/// The whole file; `beside` reads the data of a detached header.
-pub fn read(bytes: &[u8], beside: Beside) -> Result<Voxels, String> {
+/// A file as labels; `beside` reads the data of a detached header.
+pub fn read(bytes: &[u8], beside: Beside, sink: Sink<u8>) -> Result<Voxels, String> {
+    let (header, voxels) = open(bytes, beside, sink)?;
+    match list_axis(&header)? {
+        None => Ok(voxels.named(segments::names(&header.pairs)?)),
+        Some(list) => segments::flatten(&header, &voxels.values, list, voxels.frame, voxels.dims),
+    }
+}
+
+/// A file as an image.
+pub fn read_image(bytes: &[u8], beside: Beside, sink: Sink<f32>) -> Result<VoxelValues<f32>, String> {
+    let (header, voxels) = open(bytes, beside, sink)?;
+    match list_axis(&header)? {
+        None => Ok(voxels),
+        Some(list) => Err(format!(
+            "it holds {} values for each voxel; save one of them as a volume",
+            header.sizes[list]
+        )),
+    }
+}
+
+/// The axis along which a voxel holds several values.
+fn list_axis(h: &Header) -> Result<Option<usize>, String> {
+    let space = h.space_axes()?;
+    let list = (0..h.sizes.len()).find(|a| !space.contains(a));
+    Ok(list.filter(|&a| h.sizes[a] > 1))
+}
+
+/// The whole file, all values of all voxels.
+fn open<V>(bytes: &[u8], beside: Beside, sink: Sink<V>) -> Result<(Header, VoxelValues<V>), String> {
     let (header, rest) = Header::parse(bytes)?;
     let space = header.space_axes()?;
     let frame = frame(&header, space)?;
@@ -35,21 +63,12 @@ pub fn read(bytes: &[u8], beside: Beside) -> Result<Voxels, String> {
             &detached
         }
     };
-    let values = read_data(&header, data, count)?;
+    let values = read_data(&header, data, count, sink)?;
     let dims = space.map(|a| header.sizes[a] as usize);
-    let list = (0..header.sizes.len()).find(|a| !space.contains(a));
-    let Some(list) = list.filter(|&a| header.sizes[a] > 1) else {
-        return Ok(Voxels {
-            dims,
-            labels: values,
-            frame,
-            names: segments::names(&header.pairs)?,
-        });
-    };
-    segments::flatten(&header, &values, list, frame, dims)
+    Ok((header, VoxelValues { dims, values, frame }))
 }
 
-fn read_data(h: &Header, data: &[u8], count: usize) -> Result<Vec<u8>, String> {
+fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<Vec<V>, String> {
     let encoding = h.encoding.as_str();
     let endian = h.endian.unwrap_or(Endian::Little);
     if h.element.bytes() > 1 && h.endian.is_none() && ["raw", "gzip", "gz", "hex"].contains(&encoding) {
@@ -68,29 +87,29 @@ fn read_data(h: &Header, data: &[u8], count: usize) -> Result<Vec<u8>, String> {
                 n => skipped.get(n as usize..).unwrap_or_default(),
             };
             exactly(size, data.len() as u64)?;
-            read_labels(data, h.element, endian, count, identity)
+            read_values(data, h.element, endian, count, identity, sink)
         }
         "gzip" | "gz" => {
             if h.byte_skip == -1 {
                 let end = unpacked_end(skipped, size)?;
-                return read_labels(end.as_slice(), h.element, endian, count, identity);
+                return read_values(end.as_slice(), h.element, endian, count, identity, sink);
             }
             must_hold(size.saturating_add(h.byte_skip as u64), skipped.len() as u64, true)?;
             let mut from = MultiGzDecoder::new(skipped);
             std::io::copy(&mut from.by_ref().take(h.byte_skip as u64), &mut std::io::sink())
                 .map_err(|e| format!("it is cut off or damaged ({e}); copy or export it again"))?;
-            let labels = read_labels(&mut from, h.element, endian, count, identity)?;
+            let values = read_values(&mut from, h.element, endian, count, identity, sink)?;
             nothing_left(from)?;
-            Ok(labels)
+            Ok(values)
         }
         "ascii" | "text" | "txt" => {
             must_hold(count as u64, skipped.len() as u64, false)?;
-            labels_from_text(skipped, count)
+            values_from_text(skipped, count, sink)
         }
         "hex" => {
             let bytes = unhex(skipped)?;
             exactly(size, bytes.len() as u64)?;
-            read_labels(bytes.as_slice(), h.element, endian, count, identity)
+            read_values(bytes.as_slice(), h.element, endian, count, identity, sink)
         }
         "bzip2" | "bz2" => Err("its data are packed with bzip2; save it with gzip or raw encoding".to_owned()),
         other => Err(format!(

@@ -1,20 +1,25 @@
 //! Which format a file has, by what is in it; the formats' own readers do the rest.
 
+use super::element::Sink;
 use super::error::FileError;
+use super::progress::{Progress, Stage};
 use super::volume::{LabelVolume, Voxels};
 use super::{dicom, metaimage, nifti, nrrd, scene};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path};
 
 /// Larger than any segmentation of a pelvis.
 const MAX_FILE_BYTES: u64 = 1 << 30;
+/// Read between two words of how far it is.
+const PART_BYTES: u64 = 1 << 23;
 pub const FORMATS: &str =
     "NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr, .seg.nrrd), MetaImage (.mha, .mhd), DICOM RT Structure Set (.dcm)";
 
 /// The tissue of a label volume: its structures where it names them, otherwise every label but 0 or the one asked for.
 /// A scene file says itself what is what.
-pub fn read(path: &Path, label: Option<u8>) -> Result<LabelVolume, FileError> {
+pub fn read(path: &Path, label: Option<u8>, progress: &Progress) -> Result<LabelVolume, FileError> {
     if scene::is_scene(path) {
         if label.is_some() {
             return Err(FileError::of(
@@ -22,10 +27,10 @@ pub fn read(path: &Path, label: Option<u8>) -> Result<LabelVolume, FileError> {
                 "a scene file names its structures itself; leave --label out",
             ));
         }
-        return scene::load(path).map(|(_, volume)| volume);
+        return scene::load(path, progress).map(|(_, volume)| volume);
     }
-    let voxels = read_voxels(path)?;
-    LabelVolume::from_voxels(&voxels, label, file_name(path)).map_err(|why| FileError::of(path, &why))
+    let voxels = read_voxels(path, progress)?;
+    LabelVolume::from_voxels(&voxels, label, file_name(path), progress).map_err(|why| FileError::of(path, &why))
 }
 
 pub fn file_name(path: &Path) -> String {
@@ -34,33 +39,30 @@ pub fn file_name(path: &Path) -> String {
 }
 
 /// The labels as they lie in the file.
-pub fn read_voxels(path: &Path) -> Result<Voxels, FileError> {
+pub fn read_voxels(path: &Path, progress: &Progress) -> Result<Voxels, FileError> {
     let told = |why: String| FileError::of(path, &why);
-    let bytes = whole(path).map_err(told)?;
+    let bytes = whole(path, progress).map_err(told)?;
     if dicom::is_dicom(&bytes) {
         let object = dicom::read(&bytes).map_err(told)?;
         return dicom::structures::read(&object, path.parent()).map_err(told);
     }
-    voxels(&bytes, &|name| beside(path, name)).map_err(told)
-}
-
-/// As [`read_voxels`], from the bytes of the file and a way to read another one in its folder.
-pub fn voxels(bytes: &[u8], beside: super::Beside) -> Result<Voxels, String> {
-    if nrrd::is_nrrd(bytes) {
-        nrrd::read(bytes, beside)
-    } else if nifti::is_nifti(bytes) {
-        nifti::read(bytes)
-    } else if metaimage::is_metaimage(bytes) {
-        metaimage::read(bytes, beside)
+    let sink = Sink::labels(progress);
+    let voxels = if nrrd::is_nrrd(&bytes) {
+        nrrd::read(&bytes, &|name| beside(path, name, progress), sink)
+    } else if nifti::is_nifti(&bytes) {
+        nifti::read(&bytes, sink).map(|v| v.named(BTreeMap::new()))
+    } else if metaimage::is_metaimage(&bytes) {
+        metaimage::read(&bytes, &|name| beside(path, name, progress), sink).map(|v| v.named(BTreeMap::new()))
     } else {
         Err(format!(
             "it is none of the formats that are read: {FORMATS}; export the segmentation as one of them"
         ))
-    }
+    };
+    voxels.map_err(told)
 }
 
 /// All of a file that is not too large.
-pub fn whole(path: &Path) -> Result<Vec<u8>, String> {
+pub fn whole(path: &Path, progress: &Progress) -> Result<Vec<u8>, String> {
     let kind = std::fs::metadata(path).map_err(|e| format!("it cannot be opened ({e}); check the path"))?;
     if !kind.is_file() {
         return Err(format!("it is not a file; give the path of a file: {FORMATS}"));
@@ -68,10 +70,16 @@ pub fn whole(path: &Path) -> Result<Vec<u8>, String> {
     if kind.len() == 0 {
         return Err("it is empty; copy or export it again".to_owned());
     }
+    let unreadable = |e: std::io::Error| format!("it cannot be read ({e}); check its permissions");
     let mut bytes = Vec::new();
-    File::open(path)
-        .and_then(|f| f.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes))
-        .map_err(|e| format!("it cannot be read ({e}); check its permissions"))?;
+    let mut file = File::open(path).map_err(unreadable)?.take(MAX_FILE_BYTES + 1);
+    loop {
+        progress.tell(Stage::Bytes, bytes.len(), kind.len() as usize)?;
+        let part = file.by_ref().take(PART_BYTES).read_to_end(&mut bytes);
+        if part.map_err(unreadable)? == 0 {
+            break;
+        }
+    }
     if bytes.len() as u64 > MAX_FILE_BYTES {
         return Err(format!("it has more than {MAX_FILE_BYTES} bytes; crop it to the gland"));
     }
@@ -79,7 +87,7 @@ pub fn whole(path: &Path) -> Result<Vec<u8>, String> {
 }
 
 /// The data that a header names; a header from elsewhere must not reach outside of its folder.
-fn beside(header: &Path, name: &str) -> Result<Vec<u8>, String> {
+pub fn beside(header: &Path, name: &str, progress: &Progress) -> Result<Vec<u8>, String> {
     let mut parts = Path::new(name).components();
     let inside = matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None));
     if !inside {
@@ -89,5 +97,5 @@ fn beside(header: &Path, name: &str) -> Result<Vec<u8>, String> {
         ));
     }
     let path = header.with_file_name(name);
-    whole(&path).map_err(|why| format!("its data file {}: {why}", path.display()))
+    whole(&path, progress).map_err(|why| format!("its data file {}: {why}", path.display()))
 }

@@ -5,7 +5,7 @@ mod keys;
 use super::names::{Material, Role, known, unknown};
 use super::open::{file_name, read_voxels, whole};
 use super::volume::{LabelVolume, Tissue, Voxels};
-use super::{FileError, error};
+use super::{FileError, Progress, error};
 use keys::Keys;
 use std::path::{Path, PathBuf};
 
@@ -18,6 +18,8 @@ pub struct SceneFile {
     pub name: Option<String>,
     /// Beside the scene file, or from its folder on.
     pub volume: PathBuf,
+    /// Of the same patient, for the slices of the window; beside the scene file too.
+    pub image: Option<PathBuf>,
     /// Empty: as the names of the volume say.
     pub structures: Vec<Part>,
     pub insert_m_per_s: Option<f64>,
@@ -54,7 +56,7 @@ pub fn is_scene(path: &Path) -> bool {
 /// Reads a scene file.
 pub fn read(path: &Path) -> Result<SceneFile, FileError> {
     let told = |why: String| FileError::of(path, &why);
-    let bytes = whole(path).map_err(told)?;
+    let bytes = whole(path, &Progress::default()).map_err(told)?;
     if bytes.len() > MAX_BYTES {
         return Err(told(format!(
             "it has {} bytes; a scene file has a few thousand",
@@ -66,14 +68,14 @@ pub fn read(path: &Path) -> Result<SceneFile, FileError> {
 }
 
 /// The volume of a scene file, its structures made of what the file says.
-pub fn load(path: &Path) -> Result<(SceneFile, LabelVolume), FileError> {
+pub fn load(path: &Path, progress: &Progress) -> Result<(SceneFile, LabelVolume), FileError> {
     let scene = read(path)?;
     let beside = path.parent().unwrap_or(Path::new("")).join(&scene.volume);
-    let voxels = read_voxels(&beside)?;
+    let voxels = read_voxels(&beside, progress)?;
     let name = scene.name.clone().unwrap_or_else(|| file_name(path));
     let told = |why: String| FileError::of(path, &why);
     let tissues = scene.tissues(&voxels).map_err(told)?;
-    let volume = LabelVolume::from_tissues(&voxels, tissues, name).map_err(told)?;
+    let volume = LabelVolume::from_tissues(&voxels, tissues, name, progress).map_err(told)?;
     Ok((scene, volume))
 }
 
@@ -82,9 +84,13 @@ pub fn parse(text: &str) -> Result<SceneFile, String> {
     let root: toml::Table = text.parse().map_err(|e| format!("it is not TOML: {e}"))?;
     let mut problems = Vec::new();
     let mut top = Keys::new(&root, String::new(), &mut problems);
-    top.only(&["name", "volume", "structure", "needle", "device", "plan"]);
+    top.only(&["name", "volume", "image", "structure", "needle", "device", "plan"]);
     let name = top.text("name");
     let volume = top.table("volume", |k| {
+        k.only(&["file"]);
+        k.path("file")
+    });
+    let image = top.table("image", |k| {
         k.only(&["file"]);
         k.path("file")
     });
@@ -110,6 +116,7 @@ pub fn parse(text: &str) -> Result<SceneFile, String> {
     Ok(SceneFile {
         name,
         volume: volume.ok_or("[volume] file is missing")?,
+        image,
         structures,
         insert_m_per_s,
         retract_m_per_s,

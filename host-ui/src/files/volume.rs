@@ -2,6 +2,7 @@
 
 use super::frame::VoxelFrame;
 use super::names::{Material, Role, known, unknown};
+use super::progress::{Progress, Stage};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 
@@ -48,25 +49,52 @@ pub struct Voxels {
     pub names: BTreeMap<u8, String>,
 }
 
+/// What a file holds in its voxels, x fastest, whatever the numbers mean.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VoxelValues<V> {
+    pub dims: [usize; 3],
+    pub values: Vec<V>,
+    pub frame: VoxelFrame,
+}
+
+impl VoxelValues<u8> {
+    /// As labels, under the names that the file gives them.
+    pub fn named(self, names: BTreeMap<u8, String>) -> Voxels {
+        Voxels {
+            dims: self.dims,
+            labels: self.values,
+            frame: self.frame,
+            names,
+        }
+    }
+}
+
 /// First and last tissue voxel along each axis.
 type Bounds = ([usize; 3], [usize; 3]);
+/// Size, corner and cells.
+type Resampled = ([usize; 3], [f64; 3], Vec<u8>);
 
 impl LabelVolume {
     pub fn tissue_elements(&self) -> usize {
         self.cells.iter().filter(|&&c| c != 0).count()
     }
 
+    /// Of the lattice, in the scene.
+    pub fn middle_m(&self) -> [f64; 3] {
+        self.dims.map(|d| d as f64 * self.spacing_m / 2.0)
+    }
+
     /// The structures that the volume names, or all labels as one tissue, or only the one asked for.
-    pub fn from_voxels(voxels: &Voxels, label: Option<u8>, name: String) -> Result<Self, String> {
+    pub fn from_voxels(voxels: &Voxels, label: Option<u8>, name: String, progress: &Progress) -> Result<Self, String> {
         if label.is_none() && !voxels.names.is_empty() {
-            return Self::from_tissues(voxels, by_name(voxels), name);
+            return Self::from_tissues(voxels, by_name(voxels), name, progress);
         }
         let present = present(voxels);
         let mut keep = [0_u8; 256];
         (1..=255)
             .filter(|&l| label.is_none_or(|only| only == l))
             .for_each(|l| keep[usize::from(l)] = 1);
-        let mut volume = Self::resized(voxels, &keep, name, || no_tissue(label, &present))?;
+        let mut volume = Self::resized(voxels, &keep, name, progress, || no_tissue(label, &present))?;
         if label.is_none() && present.len() > 1 {
             volume
                 .warnings
@@ -76,12 +104,17 @@ impl LabelVolume {
     }
 
     /// Labels that none of the structures has are left out.
-    pub fn from_tissues(voxels: &Voxels, structures: Vec<Tissue>, name: String) -> Result<Self, String> {
+    pub fn from_tissues(
+        voxels: &Voxels,
+        structures: Vec<Tissue>,
+        name: String,
+        progress: &Progress,
+    ) -> Result<Self, String> {
         let mut keep = [0_u8; 256];
         structures.iter().for_each(|t| keep[usize::from(t.label)] = t.label);
         let present = present(voxels);
         let nothing = || "none of its structures has a voxel; export the segmentation again".to_owned();
-        let mut volume = Self::resized(voxels, &keep, name, nothing)?;
+        let mut volume = Self::resized(voxels, &keep, name, progress, nothing)?;
         let in_cells = |t: &Tissue| volume.cells.contains(&t.label);
         let (structures, lost): (Vec<Tissue>, Vec<Tissue>) = structures.into_iter().partition(in_cells);
         let notes = &mut volume.warnings;
@@ -117,12 +150,18 @@ impl LabelVolume {
     }
 
     /// With elements as large as the longest side of a voxel, or larger when that would be too many.
-    fn resized(voxels: &Voxels, keep: &[u8; 256], name: String, nothing: impl Fn() -> String) -> Result<Self, String> {
+    fn resized(
+        voxels: &Voxels,
+        keep: &[u8; 256],
+        name: String,
+        progress: &Progress,
+        nothing: impl Fn() -> String,
+    ) -> Result<Self, String> {
         let bounds = tissue_bounds(voxels, keep).ok_or_else(nothing)?;
         let finest = voxels.frame.spacing_m.iter().fold(0.0_f64, |a, &b| a.max(b));
         let mut h = finest;
         loop {
-            let volume = Self::resampled(voxels, keep, bounds, h);
+            let volume = Self::resampled(voxels, keep, bounds, h, progress)?;
             if let Some((dims, origin, cells)) = volume.filter(|v| tissue(&v.2) <= MAX_TISSUE) {
                 if tissue(&cells) == 0 {
                     return Err(format!("the tissue is thinner than its elements of {:.2} mm", h * 1e3));
@@ -151,7 +190,13 @@ impl LabelVolume {
     }
 
     /// Size, corner of the lattice in the upright voxel frame (m), and cells; `None` when it would be too large.
-    fn resampled(v: &Voxels, keep: &[u8; 256], bounds: Bounds, h: f64) -> Option<([usize; 3], [f64; 3], Vec<u8>)> {
+    fn resampled(
+        v: &Voxels,
+        keep: &[u8; 256],
+        bounds: Bounds,
+        h: f64,
+        progress: &Progress,
+    ) -> Result<Option<Resampled>, String> {
         let (low, high) = upright(bounds, mirrored(&v.frame), v.dims);
         let mut dims = [0; 3];
         let mut corner = [0.0; 3];
@@ -164,13 +209,14 @@ impl LabelVolume {
         }
         let count = dims.iter().product::<usize>();
         if dims.iter().any(|&d| d > MAX_DIM) || count > MAX_CELLS {
-            return None;
+            return Ok(None);
         }
         // Shares of each element that each voxel covers, per axis.
         let covers = [0, 1, 2].map(|a| covers(dims[a], corner[a], h, v.frame.spacing_m[a], v.dims[a]));
         let flip = mirrored(&v.frame);
         let mut cells = vec![0_u8; count];
         for k in 0..dims[2] {
+            progress.tell(Stage::Elements, k, dims[2])?;
             for j in 0..dims[1] {
                 for i in 0..dims[0] {
                     let label = covered(v, keep, flip, [&covers[0][i], &covers[1][j], &covers[2][k]]);
@@ -178,7 +224,7 @@ impl LabelVolume {
                 }
             }
         }
-        Some((dims, corner, cells))
+        Ok(Some((dims, corner, cells)))
     }
 }
 

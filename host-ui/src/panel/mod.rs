@@ -42,6 +42,8 @@ pub enum Action {
     RunAll,
     StopRun,
     LoadScene(PathBuf),
+    /// Of the patient of the present scene, for the slices.
+    LoadImage(PathBuf),
     CancelLoad,
     /// By its place among [`stylet_shm_schema::BUILTIN_SCENES`].
     LoadBuiltinScene(usize),
@@ -54,6 +56,7 @@ pub enum Action {
     ToggleFollowTip,
     ToggleMeasure,
     ToggleIsodose,
+    ToggleImage,
     ToggleTheme,
     /// The window as PNG.
     SavePicture,

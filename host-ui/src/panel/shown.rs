@@ -20,7 +20,8 @@ pub const PAST_LAST_SEED_M: f64 = 0.01;
 pub enum LoadState {
     #[default]
     Idle,
-    Reading(String),
+    /// What, and the share of it that is done.
+    Reading(String, f32),
     Sending(String),
     Loaded(String),
     Refused(String),
@@ -28,7 +29,7 @@ pub enum LoadState {
 
 impl LoadState {
     pub fn is_busy(&self) -> bool {
-        matches!(self, Self::Reading(_) | Self::Sending(_))
+        matches!(self, Self::Reading(..) | Self::Sending(_))
     }
 }
 

@@ -5,6 +5,7 @@ use super::scene3d::{Preset, Scene3d};
 use super::slice::{Orientation, Plane, Slices};
 use super::state::ViewState;
 use crate::dose_desk::DosePicture;
+use crate::files::Image;
 use crate::link::{SceneModel, Snapshot};
 use crate::panel::{Action, Shown};
 use crate::settings::Layout;
@@ -57,6 +58,12 @@ impl Middle {
     /// The plane that a slice at this place of the window shows.
     pub fn plane(&self, orientation: Orientation, rect: Rect) -> Plane {
         self.slices.plane(orientation, &self.view, rect)
+    }
+
+    /// Greys for the slices, of the patient of the scene of this name.
+    pub fn show_image(&mut self, image: Image, scene: &str) -> Result<(), String> {
+        self.view.image = true;
+        self.slices.show_image(image, scene)
     }
 
     pub fn reset_view(&mut self, shown: &Shown) {
@@ -120,6 +127,10 @@ impl Middle {
         }
         ui.toggle_value(&mut self.view.isodose, "Isodose")
             .on_hover_text("Key I: 50, 100, 150 and 200 % of the prescription, from the seeds as they lie now");
+        if let Some(name) = self.slices.image_name() {
+            ui.toggle_value(&mut self.view.image, "Image")
+                .on_hover_text(format!("Key G: {name} in the slices, or simulated ultrasound"));
+        }
         ui.menu_button("3D view", |ui| self.solid_menu(ui, shown, actions));
         if ui
             .button("Picture")

@@ -47,6 +47,8 @@ pub struct ViewState {
     /// Half of the body is cut away at this slice.
     pub section: Option<Orientation>,
     pub isodose: bool,
+    /// The slices show the image that was loaded, where there is one.
+    pub image: bool,
 }
 
 impl Default for ViewState {
@@ -57,6 +59,7 @@ impl Default for ViewState {
             measure: Measure::default(),
             section: None,
             isodose: true,
+            image: true,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::super::element::voxel_count;
 use super::super::frame::{VoxelFrame, ras_from_lps};
+use super::super::{Progress, open};
 use super::checked;
 use super::values::{exactly, needed, text};
 use dicom_dictionary_std::tags;
@@ -68,7 +69,7 @@ pub fn find(folder: &Path, series: &[String], named: &[String]) -> Result<Vec<Sl
         if !begins_as_dicom(&path) {
             continue;
         }
-        let Some(read) = super::super::open::whole(&path).ok().and_then(|b| slice(&b)) else {
+        let Some(read) = open::whole(&path, &Progress::default()).ok().and_then(|b| slice(&b)) else {
             continue;
         };
         let (of_series, slice) = read.map_err(|why| format!("the image {}: {why}", path.display()))?;

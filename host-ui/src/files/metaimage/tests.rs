@@ -1,6 +1,11 @@
 //! Headers written by hand, good and broken.
 
 use super::*;
+use crate::files::Progress;
+
+fn read(bytes: &[u8], beside: Beside) -> Result<VoxelValues<u8>, String> {
+    super::read(bytes, beside, Sink::labels(&Progress::default()))
+}
 
 fn no_file(name: &str) -> Result<Vec<u8>, String> {
     Err(format!("no file {name}"))
@@ -17,7 +22,7 @@ fn with(from: &str, to: &str) -> Vec<u8> {
 #[test]
 fn each_row_of_the_matrix_is_an_axis_and_the_patient_is_in_lps() {
     let v = read(GOOD.as_bytes(), &no_file).unwrap();
-    assert_eq!(v.labels, [0, 1, 2, 3]);
+    assert_eq!(v.values, [0, 1, 2, 3]);
     assert_eq!(v.frame.origin_m, Vector3::new(-1e-3, -2e-3, 3e-3));
     // The first axis goes to posterior: -y in RAS.
     let step = v.frame.columns_m().column(0) - Vector3::new(0.0, -1e-3, 0.0);
@@ -85,7 +90,7 @@ fn each_wrong_header_is_refused_with_its_reason() {
         ("ElementDataFile = LOCAL\n0 1 2 3", "", "no ElementDataFile"),
         ("0 1 2 3", "0 1 2 3 4", "more than the 4"),
     ] {
-        let why = read(&with(from, to), &no_file).map(|v| v.labels).expect_err(to);
+        let why = read(&with(from, to), &no_file).map(|v| v.values).expect_err(to);
         assert!(why.contains(expected), "{to}: {why}");
     }
 }

@@ -1,9 +1,12 @@
 //! Files written by hand, good and broken.
 
-use crate::files::read;
-
+use crate::files::{FileError, LabelVolume, Progress};
 use nalgebra::{Matrix3, Rotation3, Vector3};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+fn read(path: &Path, label: Option<u8>) -> Result<LabelVolume, FileError> {
+    crate::files::read(path, label, &Progress::default())
+}
 
 struct Temp(PathBuf);
 
@@ -98,7 +101,7 @@ fn every_broken_file_is_refused_with_its_reason() {
     image.extend([1.0_f32, 17.25].iter().flat_map(|v| v.to_le_bytes()));
     refused("image.nii", &image, "17.25");
     assert!(
-        read(std::path::Path::new("/no/such.nii"), None)
+        read(Path::new("/no/such.nii"), None)
             .unwrap_err()
             .0
             .contains("cannot be opened")

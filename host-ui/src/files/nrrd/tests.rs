@@ -1,6 +1,11 @@
 //! Headers written by hand, good and broken.
 
 use super::*;
+use crate::files::Progress;
+
+fn read(bytes: &[u8], beside: Beside) -> Result<Voxels, String> {
+    super::read(bytes, beside, Sink::labels(&Progress::default()))
+}
 
 fn no_file(name: &str) -> Result<Vec<u8>, String> {
     Err(format!("no file {name}"))

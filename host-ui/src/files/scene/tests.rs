@@ -7,6 +7,8 @@ const FULL: &str = r#"
 name = "phantom"
 [volume]
 file = "gland.nrrd"
+[image]
+file = "trus.nii.gz"
 [[structure]]
 name = "Prostate"
 young_kpa = 20
@@ -40,6 +42,7 @@ fn voxels() -> Voxels {
 fn structures_are_found_by_name_or_label_and_made_of_what_the_file_says() {
     let scene = parse(FULL).unwrap();
     assert_eq!(scene.insert_m_per_s, Some(5e-3));
+    assert_eq!(scene.image.as_deref(), Some(Path::new("trus.nii.gz")));
     assert_eq!((scene.device.as_deref(), scene.retract_m_per_s), (Some("sim"), None));
     let tissues = scene.tissues(&voxels()).unwrap();
     let names: Vec<(&str, Role)> = tissues.iter().map(|t| (t.name.as_str(), t.role)).collect();
@@ -48,7 +51,7 @@ fn structures_are_found_by_name_or_label_and_made_of_what_the_file_says() {
     let limits = tissues[0].material.limits.unwrap()[2];
     assert!((limits[2] - std::f64::consts::FRAC_PI_4).abs() < 1e-12 && limits[0] == 0.6);
     assert!(tissues[1].material.fixed);
-    let volume = LabelVolume::from_tissues(&voxels(), tissues, "v".to_owned()).unwrap();
+    let volume = LabelVolume::from_tissues(&voxels(), tissues, "v".to_owned(), &Progress::default()).unwrap();
     let cells = |label: u8| volume.cells.iter().filter(|&&c| c == label).count();
     assert_eq!([1, 2, 3, 4].map(cells), [16, 16, 0, 0]);
     assert!(

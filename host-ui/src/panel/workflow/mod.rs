@@ -4,6 +4,7 @@ mod debrief;
 mod plan;
 mod progress;
 mod scene;
+mod work;
 
 use super::{Action, SeedError, Shown, own_errors};
 use crate::workflow::Step;

@@ -1,6 +1,7 @@
 //! The first step: which body the needle goes into.
 
 use super::WorkflowState;
+use super::work::work_ui;
 use crate::panel::{Action, LoadState, Shown};
 use crate::{format, theme};
 use egui::{Button, RichText};
@@ -28,37 +29,43 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
             }
         }
     });
+    let edit = egui::TextEdit::singleline(&mut state.scene_path)
+        .hint_text("file, or drop one here")
+        .desired_width(f32::INFINITY);
+    let field = ui.add(edit).labelled_by(label.id);
+    let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
     ui.horizontal(|ui| {
-        let edit = egui::TextEdit::singleline(&mut state.scene_path)
-            .hint_text("file, or drop one here")
-            .desired_width(ui.available_width() - 106.0);
-        let field = ui.add(edit).labelled_by(label.id);
-        let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
         let path = state.scene_path.trim();
-        let clicked = ui
-            .add_enabled(free && !path.is_empty(), Button::new("Load scene…"))
-            .clicked();
-        if (clicked || entered) && free && !path.is_empty() {
+        let free = free && !path.is_empty();
+        let scene = ui
+            .add_enabled(free, Button::new("Load scene…"))
+            .on_hover_text("A segmentation or a scene file: the body that the needle goes into");
+        let image = ui
+            .add_enabled(free && shown.scene.is_some(), Button::new("Load image…"))
+            .on_hover_text(
+                "Greys of the same patient for the slices, in place of simulated ultrasound; they move with the tissue",
+            );
+        if (scene.clicked() || entered) && free {
             actions.push(Action::LoadScene(PathBuf::from(path)));
         }
+        if image.clicked() {
+            actions.push(Action::LoadImage(PathBuf::from(path)));
+        }
     });
+    let mut cancel = false;
     match &shown.load {
         LoadState::Idle => {}
-        LoadState::Reading(what) | LoadState::Sending(what) => {
-            ui.horizontal(|ui| {
-                ui.spinner();
-                ui.add(egui::Label::new(theme::small(what)).truncate());
-            });
-            if ui.button("Cancel").clicked() {
-                actions.push(Action::CancelLoad);
-            }
-        }
+        LoadState::Reading(what, share) => cancel = work_ui(ui, what, Some(*share)),
+        LoadState::Sending(what) => cancel = work_ui(ui, what, None),
         LoadState::Loaded(what) => {
             ui.label(RichText::new(what).small().color(tokens.good));
         }
         LoadState::Refused(why) => {
             ui.label(RichText::new(why).small().color(tokens.bad));
         }
+    }
+    if cancel {
+        actions.push(Action::CancelLoad);
     }
     if let Some(scene) = shown.scene.as_ref().filter(|s| s.structures().len() > 1) {
         structures_ui(ui, scene);

@@ -1,8 +1,9 @@
-//! The ultrasound pictures on the graphics card: three small volumes, and a texture for each slice.
+//! The slices on the graphics card: three small volumes, an image where there is one, and a texture for each slice.
 
 use super::field::{Field, SEEN_M, STEPS};
 use super::plane::Plane;
 use super::speckle::{self, GRAIN_M, GRAINS, LARGEST_AMPLITUDE};
+use crate::files::Image;
 use crate::link::SceneModel;
 use crate::view::driver::DriverCost;
 use bytemuck::{Pod, Zeroable};
@@ -13,6 +14,7 @@ use std::mem::size_of;
 use stylet_shm_schema::GridInfo;
 
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+const GREY: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
 const LARGEST_SIDE: u32 = 2048;
 
 /// As `Slice` in `slice.wgsl`.
@@ -27,6 +29,7 @@ struct SliceUniform {
     nodes_corner_m: [f32; 4],
     nodes_size_m: [f32; 4],
     grain: [[f32; 4]; 3],
+    image: [[f32; 4]; 3],
 }
 
 /// What belongs to one scene.
@@ -38,6 +41,13 @@ struct Body {
     volume_corner_m: [f32; 3],
     volume_size_m: [f32; 3],
     scene_from_patient: Matrix3<f64>,
+    patient_from_scene: [f64; 12],
+}
+
+/// Without its greys, which are on the card.
+struct OnCard {
+    image: Image,
+    view: wgpu::TextureView,
 }
 
 /// One picture.
@@ -61,6 +71,9 @@ pub struct SliceGpu {
     grain: wgpu::TextureView,
     clamped: wgpu::Sampler,
     repeated: wgpu::Sampler,
+    image: Option<OnCard>,
+    /// In its place where there is none.
+    no_image: wgpu::TextureView,
     body: Option<Body>,
     panes: Vec<Pane>,
     /// Textures of panes whose scene went, to be used again.
@@ -86,7 +99,7 @@ impl SliceGpu {
                 ..Default::default()
             })
         };
-        let grain = volume(&state, wgpu::TextureFormat::R8Unorm, [GRAINS as u32; 3]);
+        let grain = volume(&state, GREY, [GRAINS as u32; 3]);
         let grains = speckle::grain();
         let mut driver = DriverCost::default();
         driver.send(|| write(&state, &grain, &grains, 1));
@@ -95,6 +108,8 @@ impl SliceGpu {
             grain: grain.create_view(&wgpu::TextureViewDescriptor::default()),
             clamped: sampler(wgpu::AddressMode::ClampToEdge),
             repeated: sampler(wgpu::AddressMode::Repeat),
+            image: None,
+            no_image: volume(&state, GREY, [1; 3]).create_view(&wgpu::TextureViewDescriptor::default()),
             layout,
             body: None,
             panes: Vec::new(),
@@ -108,9 +123,8 @@ impl SliceGpu {
 
     /// Takes the tissues of a scene. A scene too large for the card has no slices.
     pub fn set_scene(&mut self, model: &SceneModel, scene_from_patient: Matrix3<f64>) {
-        self.targets = self.panes.drain(..).map(|pane| pane.target).collect();
+        self.put_panes_away();
         self.body = None;
-        self.content += 1;
         let (info, nodes_info) = (model.header.labels, model.header.nodes);
         let longest = self.state.device.limits().max_texture_dimension_3d;
         let has_cells = |grid: &GridInfo| grid.dims.iter().all(|&d| d > 0 && d + 2 <= longest);
@@ -118,7 +132,7 @@ impl SliceGpu {
             return;
         }
         let (dims, bytes) = speckle::brightness_volume(&model.header, &model.labels);
-        let brightness = volume(&self.state, wgpu::TextureFormat::R8Unorm, dims.map(|d| d as u32));
+        let brightness = volume(&self.state, GREY, dims.map(|d| d as u32));
         self.driver.send(|| write(&self.state, &brightness, &bytes, 1));
         let nodes = volume(&self.state, wgpu::TextureFormat::Rgba16Float, nodes_info.dims);
         self.body = Some(Body {
@@ -129,8 +143,38 @@ impl SliceGpu {
             volume_corner_m: info.origin_m.map(|c| (c - 1.5 * info.spacing_m) as f32),
             volume_size_m: dims.map(|d| (d as f64 * info.spacing_m) as f32),
             scene_from_patient,
+            patient_from_scene: model.header.patient_from_scene,
         });
         self.set_field(&Field::rest(nodes_info));
+    }
+
+    /// What they are bound to has gone; their textures are used again.
+    fn put_panes_away(&mut self) {
+        self.targets = self.panes.drain(..).map(|pane| pane.target).collect();
+        self.content += 1;
+    }
+
+    /// Takes an image, and its greys to the card.
+    pub fn set_image(&mut self, mut image: Image) -> Result<(), String> {
+        let longest = self.state.device.limits().max_texture_dimension_3d;
+        if let Some(side) = image.dims.iter().find(|&&side| side > longest as usize) {
+            return Err(format!(
+                "{} has {side} voxels along one side, and the graphics card takes {longest}; crop it to the gland",
+                image.name
+            ));
+        }
+        let greys = std::mem::take(&mut image.greys);
+        let texture = volume(&self.state, GREY, image.dims.map(|d| d as u32));
+        self.driver.send(|| write(&self.state, &texture, &greys, 1));
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        self.image = Some(OnCard { image, view });
+        self.put_panes_away();
+        Ok(())
+    }
+
+    pub fn forget_image(&mut self) {
+        self.image = None;
+        self.put_panes_away();
     }
 
     pub fn set_field(&mut self, field: &Field) {
@@ -146,9 +190,16 @@ impl SliceGpu {
     }
 
     /// The picture of a plane, drawn if anything in it has changed; `None` without a scene.
-    pub fn picture(&mut self, number: usize, plane: &Plane, pixels_per_point: f32) -> Option<egui::TextureId> {
+    pub fn picture(
+        &mut self,
+        number: usize,
+        plane: &Plane,
+        pixels_per_point: f32,
+        with_image: bool,
+    ) -> Option<egui::TextureId> {
         let body = self.body.as_ref()?;
-        let uniform = uniform(body, plane);
+        let image = self.image.as_ref().filter(|_| with_image).map(|on_card| &on_card.image);
+        let uniform = uniform(body, plane, image);
         while self.panes.len() <= number {
             let old = self.targets.get_mut(self.panes.len()).and_then(Option::take);
             let pane = self.pane(old)?;
@@ -191,6 +242,7 @@ impl SliceGpu {
             view(&body.brightness),
             view(&nodes),
             view(&self.grain),
+            view(self.image.as_ref().map_or(&self.no_image, |on_card| &on_card.view)),
             wgpu::BindingResource::Sampler(&self.clamped),
             wgpu::BindingResource::Sampler(&self.repeated),
         ];
@@ -216,7 +268,7 @@ impl SliceGpu {
     }
 }
 
-fn uniform(body: &Body, plane: &Plane) -> SliceUniform {
+fn uniform(body: &Body, plane: &Plane, image: Option<&Image>) -> SliceUniform {
     let four = |v: Vector3<f64>, w: f32| [v.x as f32, v.y as f32, v.z as f32, w];
     let padded = |v: [f32; 3], w: f32| [v[0], v[1], v[2], w];
     let half = |side: f32| f64::from(side) / 2.0 * plane.m_per_point;
@@ -227,13 +279,21 @@ fn uniform(body: &Body, plane: &Plane) -> SliceUniform {
     });
     SliceUniform {
         middle_m: four(plane.middle_m, LARGEST_AMPLITUDE),
-        right_m: four(plane.right * half(plane.rect.width()), 0.0),
+        right_m: four(
+            plane.right * half(plane.rect.width()),
+            f32::from(u8::from(image.is_some())),
+        ),
         up_m: four(plane.up * half(plane.rect.height()), 0.0),
         volume_corner_m: padded(body.volume_corner_m, 0.0),
         volume_size_m: padded(body.volume_size_m, 0.0),
         nodes_corner_m: padded(nodes.origin_m.map(|c| (c - 0.5 * nodes.spacing_m) as f32), 0.0),
         nodes_size_m: padded(nodes.dims.map(|d| (f64::from(d) * nodes.spacing_m) as f32), 0.0),
         grain,
+        image: image.map_or([[0.0; 4]; 3], |image| {
+            image
+                .texture_from_scene(&body.patient_from_scene)
+                .map(|row| row.map(|v| v as f32))
+        }),
     }
 }
 
@@ -335,7 +395,7 @@ fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         min_binding_size: None,
     };
     let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
-    let entries: Vec<wgpu::BindGroupLayoutEntry> = [uniform, volume, volume, volume, sampler, sampler]
+    let entries: Vec<wgpu::BindGroupLayoutEntry> = [uniform, volume, volume, volume, volume, sampler, sampler]
         .into_iter()
         .enumerate()
         .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {

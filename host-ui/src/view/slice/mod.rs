@@ -10,6 +10,7 @@ mod speckle;
 use super::driver::DriverCost;
 use super::state::ViewState;
 use crate::dose_desk::DosePicture;
+use crate::files::Image;
 use crate::link::{SceneModel, Snapshot};
 use crate::panel::{Action, Shown};
 use crate::theme::IMAGE;
@@ -21,7 +22,7 @@ use nalgebra::{Matrix3, Vector3};
 use overlay::{Lines, Overlay};
 pub use plane::{Orientation, Plane, scene_from_patient};
 use std::sync::Arc;
-use stylet_shm_schema::role;
+use stylet_shm_schema::{Text, role};
 
 /// Of the target, this much is seen at first.
 const MARGIN: f64 = 1.45;
@@ -53,6 +54,8 @@ pub struct Slices {
     extent_m: f64,
     zoom: f64,
     lines: [Lines; 3],
+    /// Its name, and that of the scene that it belongs to.
+    image: Option<(String, Text<64>)>,
     /// The frame in which a new dose was cut last.
     dose_cut_in: u64,
     /// The pointer holds the needle.
@@ -75,6 +78,7 @@ impl Slices {
             extent_m: 0.06,
             zoom: 1.0,
             lines: Default::default(),
+            image: None,
             dose_cut_in: 0,
             holds_needle: false,
         }
@@ -132,9 +136,29 @@ impl Slices {
         self.middle_m = (low + high) / 2.0;
         self.extent_m = ((high - low).max() * MARGIN).clamp(1e-3, 2.0);
         self.zoom = 1.0;
+        self.image
+            .take_if(|(_, scene)| scene.read() != model.header.name.read());
         if let Some(gpu) = &mut self.gpu {
+            if self.image.is_none() {
+                gpu.forget_image();
+            }
             gpu.set_scene(model, self.scene_from_patient);
         }
+    }
+
+    /// Greys of the patient of a scene, until another scene comes.
+    pub fn show_image(&mut self, image: Image, scene: &str) -> Result<(), String> {
+        let Some(gpu) = &mut self.gpu else {
+            return Err("there is no graphics device to show an image".to_owned());
+        };
+        let name = image.name.clone();
+        gpu.set_image(image)?;
+        self.image = Some((name, Text::new(scene)));
+        Ok(())
+    }
+
+    pub fn image_name(&self) -> Option<&str> {
+        self.image.as_ref().map(|(name, _)| name.as_str())
     }
 
     /// Back to the whole of the target.
@@ -180,7 +204,11 @@ impl Slices {
         }
         let scale = ui.ctx().pixels_per_point();
         let number = orientation as usize;
-        match self.gpu.as_mut().and_then(|gpu| gpu.picture(number, &plane, scale)) {
+        match self
+            .gpu
+            .as_mut()
+            .and_then(|gpu| gpu.picture(number, &plane, scale, view.image))
+        {
             Some(texture) => {
                 let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
                 painter.image(texture, rect, whole, Color32::WHITE);

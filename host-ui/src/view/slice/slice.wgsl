@@ -1,11 +1,11 @@
-// One slice of simulated ultrasound: for each place the material point that lies there now, its brightness and its grain.
+// One slice: for each place the material point that lies there now, and its grey in an image, or its brightness and grain as ultrasound.
 
 // How often the fixed point is applied at most, and what it need not be followed for (m).
 override STEPS: i32;
 override SEEN_M: f32;
 
 struct Slice {
-    // Middle of the picture, and the ways to its right and upper edge (m).
+    // Middle of the picture, and the ways to its right and upper edge (m); beside them the largest amplitude of grain, and 1 for an image.
     middle_m: vec4<f32>,
     right_m: vec4<f32>,
     up_m: vec4<f32>,
@@ -18,14 +18,19 @@ struct Slice {
     grain_x: vec4<f32>,
     grain_y: vec4<f32>,
     grain_z: vec4<f32>,
+    // Rows: from the scene (m) to the voxels of the image, 0 to 1 from face to face.
+    image_x: vec4<f32>,
+    image_y: vec4<f32>,
+    image_z: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> slice: Slice;
 @group(0) @binding(1) var brightness: texture_3d<f32>;
 @group(0) @binding(2) var nodes: texture_3d<f32>;
 @group(0) @binding(3) var grain: texture_3d<f32>;
-@group(0) @binding(4) var clamped: sampler;
-@group(0) @binding(5) var repeated: sampler;
+@group(0) @binding(4) var image: texture_3d<f32>;
+@group(0) @binding(5) var clamped: sampler;
+@group(0) @binding(6) var repeated: sampler;
 
 struct Out {
     @builtin(position) clip: vec4<f32>,
@@ -49,6 +54,14 @@ fn brightness_at(rest_m: vec3<f32>) -> f32 {
     return textureSampleLevel(brightness, clamped, at, 0.0).x;
 }
 
+// Black where the image does not reach.
+fn image_at(rest_m: vec3<f32>) -> f32 {
+    let place = vec4(rest_m, 1.0);
+    let at = vec3(dot(slice.image_x, place), dot(slice.image_y, place), dot(slice.image_z, place));
+    let inside = all(at >= vec3(0.0)) && all(at <= vec3(1.0));
+    return select(0.0, textureSampleLevel(image, clamped, at, 0.0).x, inside);
+}
+
 @fragment
 fn slice_fragment(in: Out) -> @location(0) vec4<f32> {
     let place_m = slice.middle_m.xyz + in.at.x * slice.right_m.xyz + in.at.y * slice.up_m.xyz;
@@ -61,6 +74,10 @@ fn slice_fragment(in: Out) -> @location(0) vec4<f32> {
         if (max(moved_m.x, max(moved_m.y, moved_m.z)) < SEEN_M) {
             break;
         }
+    }
+    if (slice.right_m.w > 0.5) {
+        let grey = image_at(rest_m);
+        return vec4(grey, grey, grey, 1.0);
     }
     let here = brightness_at(rest_m);
     // Along the beam, where tissue meets other tissue, it shines.

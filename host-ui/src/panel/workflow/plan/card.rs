@@ -4,9 +4,10 @@ use super::super::{WorkflowState, debrief, hinted, main_button, progress, undo_a
 use super::summary;
 use crate::format;
 use crate::panel::workflow::Undo;
+use crate::panel::workflow::work::work_ui;
 use crate::panel::{Action, PlanAction, Shown};
 use crate::plan::check::STRENGTHS_U;
-use crate::planner::{Implant, Progress};
+use crate::planner::Implant;
 use crate::theme;
 use egui::{Button, DragValue};
 use std::path::PathBuf;
@@ -19,7 +20,11 @@ pub fn plan_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, read
     }
     // What cannot be done meanwhile makes room for how far it is.
     match &shown.planning.work {
-        Some(work) => work_ui(ui, work, actions),
+        Some(work) => {
+            if work_ui(ui, &work.what, work.share) {
+                actions.push(Action::Plan(PlanAction::Cancel));
+            }
+        }
         None => file_ui(ui, shown, state, free, actions),
     }
     if shown.planning.implant.is_some() {
@@ -140,34 +145,6 @@ fn strength_ui(ui: &mut egui::Ui, implant: &Implant, free: bool, actions: &mut V
             actions.push(Action::Plan(PlanAction::FitStrength));
         }
     });
-}
-
-fn work_ui(ui: &mut egui::Ui, work: &Progress, actions: &mut Vec<Action>) {
-    match work.share {
-        Some(share) => {
-            ui.add(egui::Label::new(theme::small(&work.what)).truncate());
-            ui.horizontal(|ui| {
-                let bar = egui::ProgressBar::new(share)
-                    .desired_width(ui.available_width() - 80.0)
-                    .desired_height(12.0);
-                ui.add(bar);
-                cancel_ui(ui, actions);
-            });
-        }
-        None => {
-            ui.horizontal(|ui| {
-                ui.spinner();
-                ui.label(theme::small(&work.what));
-                cancel_ui(ui, actions);
-            });
-        }
-    }
-}
-
-fn cancel_ui(ui: &mut egui::Ui, actions: &mut Vec<Action>) {
-    if ui.button("Cancel").clicked() {
-        actions.push(Action::Plan(PlanAction::Cancel));
-    }
 }
 
 fn file_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bool, actions: &mut Vec<Action>) {
