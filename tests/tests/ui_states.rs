@@ -76,6 +76,29 @@ fn planned_state_is_in_place_and_as_it_was() {
     }
 }
 
+/// The membrane is pressed in and gives way a little farther on.
+#[test]
+fn insertion_is_in_place_and_as_it_was() {
+    for (size, theme) in [(SMALL, "dark_small"), (LARGE, "light_large")] {
+        let mut driven = Driven::open_plain(size);
+        driven.press(Key::E);
+        driven.until("force", |app| {
+            app.link().state().is_some_and(|s| s.flags & flags::ENGAGED != 0)
+        });
+        if theme.starts_with("light") {
+            driven.press(Key::T);
+        }
+        driven.plan_and_place();
+        driven.pull_tip(0.016);
+        let state = driven.window.state().link().state().expect("live");
+        assert_eq!(state.flags & flags::IN_CONTACT, flags::IN_CONTACT, "it touches the gland");
+        assert_eq!(state.flags & flags::PUNCTURED, 0, "it has not gone through");
+        assert_in_place(&mut driven, &format!("inserting, {theme}"));
+        driven.picture(&format!("inserting-{theme}"));
+        driven.compare_live(&format!("inserting_{theme}"));
+    }
+}
+
 #[test]
 fn the_whole_procedure_by_one_key_ends_in_a_debrief() {
     let mut driven = Driven::open_plain(SMALL);
