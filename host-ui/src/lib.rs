@@ -6,7 +6,7 @@ pub mod cli;
 pub mod controller;
 pub mod convert;
 pub mod core_args;
-mod cpu_time;
+pub mod cpu_time;
 pub mod dose;
 pub mod dose_desk;
 pub mod files;

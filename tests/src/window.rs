@@ -121,8 +121,8 @@ impl Driven {
     }
 
     /// As [`Driven::compare`] where tissue and seeds have moved, never to the same place twice: the slices are covered too, and
-    /// figures may differ.
-    pub fn compare_live(&mut self, name: &str) {
+    /// figures may differ by so many pixels.
+    pub fn compare_live(&mut self, name: &str, pixels: usize) {
         self.window.run_steps(3);
         let slices =
             ["Axial slice", "Sagittal slice", "Coronal slice"].map(|label| self.window.get_by_label(label).rect());
@@ -132,7 +132,7 @@ impl Driven {
         image_snapshot_options(
             &with_fewer_greys(&picture, 51),
             name,
-            &tolerant().max_failed_pixels(LIVE_PIXELS),
+            &tolerant().max_failed_pixels(pixels),
         );
     }
 
@@ -152,9 +152,6 @@ impl Driven {
         image_snapshot_options(&with_fewer_greys(&picture, 51), name, &tolerant());
     }
 }
-
-/// Of figures in the table and the histogram, and of seeds that rest elsewhere by less than a millimetre.
-const LIVE_PIXELS: usize = 4_000;
 
 /// Another version of the software driver may round a few edges otherwise; a moved or missing widget is thousands of pixels.
 pub fn tolerant() -> SnapshotOptions {
