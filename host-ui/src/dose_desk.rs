@@ -271,14 +271,12 @@ fn shell(grid: &DoseGrid, level: usize, prescription_gy: f64) -> Shell {
     let surface = isodose(grid, LEVELS[level] * prescription_gy);
     let points_m: Vec<[f32; 3]> = surface.points_m.iter().map(|p| p.map(|c| c as f32)).collect();
     let triangles: Vec<[u32; 3]> = surface.triangles.iter().map(|t| t.map(|i| i as u32)).collect();
-    let mut vertices = Vec::new();
-    mesh::surface(&points_m, &triangles, &mut vertices);
     Shell {
         level,
         indices: mesh::indices(&triangles, points_m.len()),
+        vertices: mesh::Surface::new(&points_m, &triangles).into_vertices(),
         points_m,
         triangles,
-        vertices,
     }
 }
 

@@ -66,6 +66,19 @@ impl Growing {
         self.len = items.len() as u32;
         size
     }
+
+    /// Only some of as many elements as were written last.
+    fn write_run<T: Pod>(&mut self, state: &RenderState, items: &[T], run: Range<usize>) -> u64 {
+        let part = items.get(run.clone()).unwrap_or_default();
+        if items.len() != self.len as usize || part.is_empty() {
+            return 0;
+        }
+        let bytes: &[u8] = bytemuck::cast_slice(part);
+        state
+            .queue
+            .write_buffer(&self.buffer, (run.start * size_of::<T>()) as u64, bytes);
+        bytes.len() as u64
+    }
 }
 
 fn allocate(device: &wgpu::Device, usage: wgpu::BufferUsages, size: u64) -> wgpu::Buffer {
@@ -180,6 +193,14 @@ impl Gpu {
 
     pub fn set_surface(&mut self, vertices: &[SurfaceVertex]) {
         self.driver.send(|| self.surface_vertices.write(&self.state, vertices));
+    }
+
+    /// Of the same surface, what has moved.
+    pub fn move_surface(&mut self, vertices: &[SurfaceVertex], runs: Vec<Range<usize>>) {
+        for run in runs {
+            self.driver
+                .send(|| self.surface_vertices.write_run(&self.state, vertices, run));
+        }
     }
 
     /// Vertices and indices of each isodose surface.

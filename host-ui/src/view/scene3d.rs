@@ -6,7 +6,7 @@ use super::gpu::{Gpu, SceneUniform};
 use super::kinds::{kinds, surfaces};
 use super::legend::Legend;
 use super::marks::Marks;
-use super::mesh::{self, SurfaceVertex};
+use super::mesh::Surface;
 use super::pick::pick;
 use super::slice::{Orientation, scene_from_patient};
 use super::state::ViewState;
@@ -82,7 +82,7 @@ struct Key {
     look: Look,
     view: ViewState,
     scene: (u64, u64),
-    surface: u64,
+    moved: u64,
     /// Of the needle at work, and of the plan of all.
     plan: (u64, u64, usize),
     tip: [f64; 3],
@@ -100,9 +100,9 @@ pub struct Scene3d {
     /// Session and generation of the surface that the card has.
     uploaded_scene: Option<(u64, u64)>,
     uploaded_snapshot: Option<(u64, u64)>,
-    positions_m: Vec<[f32; 3]>,
-    /// Rises whenever they change.
-    surface: u64,
+    surface: Surface,
+    /// Rises whenever it moves.
+    moved: u64,
     /// The dose that the card has.
     shells: u64,
     drawn: Option<Key>,
@@ -111,7 +111,6 @@ pub struct Scene3d {
     marks: Marks,
     /// Where the axes are drawn.
     corner_m: Option<[f32; 3]>,
-    vertices: Vec<SurfaceVertex>,
 }
 
 impl Scene3d {
@@ -123,14 +122,13 @@ impl Scene3d {
             model: None,
             uploaded_scene: None,
             uploaded_snapshot: None,
-            positions_m: Vec::new(),
-            surface: 0,
+            surface: Surface::default(),
+            moved: 0,
             shells: 0,
             drawn: None,
             fixed: None,
             marks: Marks::default(),
             corner_m: None,
-            vertices: Vec::new(),
         }
     }
 
@@ -176,11 +174,10 @@ impl Scene3d {
             self.drawn = None;
             self.model = Some(model.clone());
             self.reset_view(shown);
-            self.positions_m.clone_from(&model.rest_m);
-            mesh::surface(&model.rest_m, &model.triangles, &mut self.vertices);
+            self.surface = Surface::new(&model.rest_m, &model.triangles);
             if let Some(gpu) = &mut self.gpu {
-                gpu.set_scene(&self.vertices, &surfaces(model));
-                gpu.set_surface(&self.vertices);
+                gpu.set_scene(self.surface.vertices(), &surfaces(model));
+                gpu.set_surface(self.surface.vertices());
             }
         }
         let Some(snapshot) = snapshot else { return };
@@ -190,14 +187,13 @@ impl Scene3d {
         }
         self.uploaded_snapshot = Some(snapshot_key);
         // Tissue at rest is sent 200 times a second too.
-        if self.positions_m == snapshot.positions_m {
+        let runs = self.surface.move_to(&snapshot.positions_m);
+        if runs.is_empty() {
             return;
         }
-        self.positions_m.clone_from(&snapshot.positions_m);
-        self.surface += 1;
-        mesh::surface(&snapshot.positions_m, &model.triangles, &mut self.vertices);
+        self.moved += 1;
         if let Some(gpu) = &mut self.gpu {
-            gpu.set_surface(&self.vertices);
+            gpu.move_surface(self.surface.vertices(), runs);
         }
     }
 
@@ -260,7 +256,7 @@ impl Scene3d {
         {
             let at = (place - rect.min) / rect.size();
             let ray = self.camera.ray(rect.aspect_ratio(), [at.x, at.y]);
-            if let Some(met) = pick(&self.vertices, &model.triangles, self.camera.eye_m(), ray) {
+            if let Some(met) = pick(self.surface.vertices(), &model.triangles, self.camera.eye_m(), ray) {
                 view.measure.take(met.map(f64::from));
             }
         }
@@ -286,7 +282,7 @@ impl Scene3d {
             look: self.look,
             view: view.clone(),
             scene: self.uploaded_scene.unwrap_or_default(),
-            surface: self.surface,
+            moved: self.moved,
             plan: (
                 shown.plan.map_or(0, |p| p.generation),
                 shown.planning.implant.as_ref().map_or(0, |i| i.revision),

@@ -8,15 +8,19 @@ type Edge = (u32, u32);
 /// One line; closed when its first point is its last.
 pub type Line = Vec<[f32; 3]>;
 
-/// Cuts a mesh at `normal · p = offset`. Triangles with a vertex that is not there are left out.
-pub fn cut(points_m: &[[f32; 3]], triangles: &[[u32; 3]], normal: [f32; 3], offset_m: f32) -> Vec<Line> {
-    let side: Vec<f32> = points_m
+/// How far each point lies before the plane `normal · p = offset`.
+pub fn sides(points_m: &[[f32; 3]], normal: [f32; 3], offset_m: f32) -> Vec<f32> {
+    points_m
         .iter()
         .map(|p| p[0] * normal[0] + p[1] * normal[1] + p[2] * normal[2] - offset_m)
-        .collect();
+        .collect()
+}
+
+/// Cuts a mesh at the plane of these [`sides`]. Triangles with a vertex that is not there are left out.
+pub fn cut(points_m: &[[f32; 3]], triangles: &[[u32; 3]], side: &[f32]) -> Vec<Line> {
     let mut next: HashMap<Edge, Edge> = HashMap::new();
     for triangle in triangles {
-        if let Some((from, to)) = crossed(&side, triangle) {
+        if let Some((from, to)) = crossed(side, triangle) {
             next.insert(from, to);
         }
     }
@@ -97,7 +101,7 @@ mod tests {
     fn a_sphere_is_cut_in_one_closed_circle_of_the_right_length() {
         let (points, triangles) = sphere(1.0);
         for offset in [0.0, 0.3, -0.62] {
-            let lines = cut(&points, &triangles, [0.0, 0.6, 0.8], offset);
+            let lines = cut(&points, &triangles, &sides(&points, [0.0, 0.6, 0.8], offset));
             assert_eq!(lines.len(), 1, "one line at {offset}");
             let line = &lines[0];
             assert_eq!(line.first(), line.last(), "closed");
@@ -111,13 +115,13 @@ mod tests {
                 assert!((0.6 * p[1] + 0.8 * p[2] - offset).abs() < 1e-5, "{p:?} is in the plane");
             }
         }
-        assert!(cut(&points, &triangles, [0.0, 0.0, 1.0], 2.0).is_empty());
+        assert!(cut(&points, &triangles, &sides(&points, [0.0, 0.0, 1.0], 2.0)).is_empty());
     }
 
     #[test]
     fn a_triangle_with_a_corner_that_is_not_there_is_left_out() {
         let points = [[0.0, 0.0, -1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
-        let lines = cut(&points, &[[0, 1, 2], [0, 1, 9]], [0.0, 0.0, 1.0], 0.0);
+        let lines = cut(&points, &[[0, 1, 2], [0, 1, 9]], &sides(&points, [0.0, 0.0, 1.0], 0.0));
         assert_eq!(lines.len(), 1);
         assert_eq!(lines[0].len(), 2);
     }
