@@ -37,8 +37,8 @@ pub struct Timing {
     pub wake: Percentiles,
     pub work: Percentiles,
     /// Counts by [`bin_low_us`].
-    pub wake_histogram: Vec<u32>,
-    pub work_histogram: Vec<u32>,
+    pub wake_histogram: [u32; BINS],
+    pub work_histogram: [u32; BINS],
 }
 
 #[derive(Default)]
@@ -46,6 +46,8 @@ pub struct History {
     ticks: VecDeque<Tick>,
     /// Wake latency and work, ns, cut off at four seconds.
     timings: VecDeque<[u32; 2]>,
+    /// Of them, kept up as they come and go.
+    histograms: [[u32; BINS]; 2],
     session: u64,
     pub missed: u64,
     pub timing: Timing,
@@ -76,27 +78,29 @@ impl History {
                 },
             );
             let cut = |ns: u64| u32::try_from(ns).unwrap_or(u32::MAX);
-            push_bounded(
-                &mut self.timings,
-                KEPT_TIMINGS,
-                [cut(r.wake_latency_ns), cut(r.work_ns)],
-            );
+            let timing = [cut(r.wake_latency_ns), cut(r.work_ns)];
+            let gone = push_bounded(&mut self.timings, KEPT_TIMINGS, timing);
+            for (which, histogram) in self.histograms.iter_mut().enumerate() {
+                histogram[bin(timing[which])] += 1;
+                if let Some(gone) = gone {
+                    histogram[bin(gone[which])] -= 1;
+                }
+            }
         }
     }
 
-    /// Percentiles and histogram; some milliseconds of work, so not in each frame.
+    /// Percentiles and histogram; a good part of a millisecond, so not in each frame.
     pub fn sum_up(&mut self) {
         let mut of = |which: usize| {
             self.scratch.clear();
             self.scratch.extend(self.timings.iter().map(|t| t[which]));
-            self.scratch.sort_unstable();
-            (percentiles(&self.scratch), histogram(&self.scratch))
+            percentiles(&mut self.scratch)
         };
-        let ((work, work_histogram), (wake, wake_histogram)) = (of(1), of(0));
+        let [wake_histogram, work_histogram] = self.histograms;
         self.timing = Timing {
             samples: self.timings.len(),
-            wake,
-            work,
+            wake: of(0),
+            work: of(1),
             wake_histogram,
             work_histogram,
         };
@@ -111,7 +115,9 @@ impl History {
             let x = -format::seconds(newest.saturating_sub(tick.time_ns));
             [x, f64::from(value(tick))]
         };
-        let points = self.ticks.iter().map(point).filter(|[x, _]| *x >= -WINDOW_S);
+        let seen = |tick: &Tick| newest.saturating_sub(tick.time_ns) as f64 <= WINDOW_S * 1e9;
+        let first = self.ticks.partition_point(|tick| !seen(tick));
+        let points = self.ticks.range(first..).map(point);
         decimated(points, [-WINDOW_S, 0.0], buckets)
     }
 }
@@ -133,11 +139,11 @@ pub fn decimated(points: impl Iterator<Item = [f64; 2]>, [from, to]: [f64; 2], b
     kept
 }
 
-fn push_bounded<T>(queue: &mut VecDeque<T>, limit: usize, item: T) {
-    if queue.len() >= limit {
-        queue.pop_front();
-    }
+/// Gives what had to make room.
+fn push_bounded<T>(queue: &mut VecDeque<T>, limit: usize, item: T) -> Option<T> {
+    let gone = (queue.len() >= limit).then(|| queue.pop_front()).flatten();
     queue.push_back(item);
+    gone
 }
 
 #[derive(Default)]
@@ -171,23 +177,26 @@ impl Bucket {
     }
 }
 
-/// `sorted` in ns.
-fn percentiles(sorted: &[u32]) -> Percentiles {
-    let at = |share: f64| {
-        let beyond = sorted.len() as f64 * (1.0 - share);
+/// Of samples in ns, which lose their order.
+fn percentiles(samples: &mut [u32]) -> Percentiles {
+    let count = samples.len();
+    let us = |ns: u32| format::us(u64::from(ns));
+    // What lies before the last percentile need not be looked at for the next.
+    let mut before = 0;
+    let mut at = |share: f64| {
+        let beyond = count as f64 * (1.0 - share);
         // A hair below, because 1 - 0.999 is not exact.
         if beyond < SAMPLES_BEYOND - 1e-6 {
             return None;
         }
-        let rank = (sorted.len() as f64 * share).ceil() as usize;
-        sorted.get(rank.saturating_sub(1)).map(|&ns| format::us(u64::from(ns)))
+        let rank = ((count as f64 * share).ceil() as usize).saturating_sub(1);
+        let (_, ns, _) = samples[before..].select_nth_unstable(rank - before);
+        before = rank;
+        Some(us(*ns))
     };
-    Percentiles {
-        p50: at(0.5),
-        p99: at(0.99),
-        p999: at(0.999),
-        max: sorted.last().map(|&ns| format::us(u64::from(ns))),
-    }
+    let (p50, p99, p999) = (at(0.5), at(0.99), at(0.999));
+    let max = samples[before..].iter().max().map(|&ns| us(ns));
+    Percentiles { p50, p99, p999, max }
 }
 
 /// Bins from 1 us up, five for each decade; the last takes all above.
@@ -197,14 +206,9 @@ pub fn bin_low_us(bin: usize) -> f64 {
     10.0_f64.powf(bin as f64 / 5.0)
 }
 
-fn histogram(sorted: &[u32]) -> Vec<u32> {
-    let mut counts = vec![0; BINS];
-    for &ns in sorted {
-        let us = format::us(u64::from(ns)).max(1.0);
-        let bin = ((us.log10() * 5.0) as usize).min(BINS - 1);
-        counts[bin] += 1;
-    }
-    counts
+fn bin(ns: u32) -> usize {
+    let us = format::us(u64::from(ns)).max(1.0);
+    ((us.log10() * 5.0) as usize).min(BINS - 1)
 }
 
 #[cfg(test)]
@@ -245,6 +249,39 @@ mod tests {
         assert!(history.timing.wake.p999.is_some());
         history.take(&records(5), [0.0; 3]);
         assert_eq!(history.timing.samples, 10_000);
+    }
+
+    /// Against all of the last minute, sorted and counted.
+    #[test]
+    fn percentiles_and_histogram_are_those_of_what_is_kept() {
+        let mut history = History::default();
+        let mut given = Vec::new();
+        let mut wake_ns = 12_345_u64;
+        for count in [7, 1_500, 58_000, 30_000] {
+            let mut some = records(count);
+            for r in &mut some {
+                wake_ns = wake_ns
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                r.wake_latency_ns = (wake_ns >> 33) % [900, 80_000, 40_000_000][(wake_ns >> 20) as usize % 3];
+                given.push(r.wake_latency_ns);
+            }
+            history.take(&some, [0.0; 3]);
+            history.sum_up();
+            let mut kept = given[given.len().saturating_sub(KEPT_TIMINGS)..].to_vec();
+            kept.sort_unstable();
+            let rank = |share: f64| (kept.len() as f64 * share).ceil() as usize - 1;
+            let told = |share: f64| (kept.len() as f64 * (1.0 - share) >= 9.99).then(|| format::us(kept[rank(share)]));
+            let wake = history.timing.wake;
+            assert_eq!([wake.p50, wake.p99, wake.p999], [0.5, 0.99, 0.999].map(told), "{count}");
+            assert_eq!(wake.max, kept.last().map(|&ns| format::us(ns)));
+            for (n, count) in history.timing.wake_histogram.into_iter().enumerate() {
+                let low = if n == 0 { 0.0 } else { bin_low_us(n) };
+                let high = if n + 1 == BINS { f64::MAX } else { bin_low_us(n + 1) };
+                let inside = |ns: &&u64| (low..high).contains(&format::us(**ns));
+                assert_eq!(count as usize, kept.iter().filter(inside).count(), "bin {n}");
+            }
+        }
     }
 
     #[test]
