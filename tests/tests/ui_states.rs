@@ -133,6 +133,12 @@ fn the_whole_procedure_by_one_key_ends_in_a_debrief() {
     driven.press(Key::T);
     assert_in_place(&mut driven, "debrief, light");
     driven.picture("debrief-light");
+    driven.press(Key::V);
+    driven.press(Key::V);
+    driven.window.set_size(LARGE.into());
+    assert_in_place(&mut driven, "debrief, light, large");
+    driven.picture("debrief-light-large");
+    driven.compare_live("debrief_light_large", DEBRIEF_PIXELS);
     // Back to no seed, one by one, then no plan.
     for left in (0..5).rev() {
         driven.window.key_press_modifiers(egui::Modifiers::CTRL, Key::Z);
