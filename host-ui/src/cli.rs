@@ -296,6 +296,12 @@ fn check_scene_file(file: &Path) -> Result<(), String> {
         )?;
         println!("  plan: {} seeds in {}", seeds.len(), path.display());
     }
+    if let Some(named) = &scene.image {
+        let path = file.with_file_name(named);
+        let image = files::Image::read(&path, &files::Progress::default()).map_err(|e| e.to_string())?;
+        let [x, y, z] = image.dims;
+        println!("  image: {x} x {y} x {z} voxels in {}", path.display());
+    }
     if let Some(device) = &scene.device {
         println!("  device: {device}, for an rt-core that host-ui starts");
     }

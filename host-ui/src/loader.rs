@@ -80,10 +80,9 @@ impl Loader {
 }
 
 fn scene_of(path: &Path, label: Option<u8>, image: Option<PathBuf>, progress: &Progress) -> Result<Loaded, FileError> {
-    let volume = files::read(path, label, progress)?;
-    let named = match scene::is_scene(path) {
-        true => scene::read(path)?.image,
-        false => None,
+    let (volume, named) = match scene::is_scene(path) && label.is_none() {
+        true => scene::load(path, progress).map(|(said, volume)| (volume, said.image))?,
+        false => (files::read(path, label, progress)?, None),
     };
     let Some(file) = image.or_else(|| named.map(|file| path.with_file_name(file))) else {
         return Ok(Loaded::Scene(volume, None));

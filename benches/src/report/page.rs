@@ -126,7 +126,7 @@ fn choices(text: &mut String, found: &Findings) -> std::fmt::Result {
             "Relaxed ChainMail ({}) takes {:.2} times as long as FEM within 1 % ({}), {:.2} times as long as FEM at {}. \
              Springs are relaxed in every tick; FEM solves once for each patch of tissue that the tip holds, and adds up what it has in \
              between. The solution is in the times here, mostly in their p99; a live loop works it out ahead, in idle ticks \
-             (`docs/adr/0008-*`). That is why a twentieth of its time cannot be had with an error like this one.\n",
+             (`docs/adr/0008-two-tissue-models.md`). That is why a twentieth of its time cannot be had with an error like this one.\n",
             relaxed.setting,
             relaxed.mean_us / fem.mean_us,
             fem.setting,

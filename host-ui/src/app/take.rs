@@ -205,7 +205,10 @@ impl App {
 
     /// Of the patient of the present scene, if it can be.
     fn take_image(&mut self, image: Image) {
-        let Some(scene) = &self.shown.scene else { return };
+        let Some(scene) = &self.shown.scene else {
+            self.shown.load = LoadState::Refused(format!("{}: the scene that it belongs to has gone", image.name));
+            return;
+        };
         let [low, high] = [scene.target_lower_m, scene.target_upper_m];
         let middle_m = [0, 1, 2].map(|a| (low[a] + high[a]) / 2.0);
         match image.covers(&scene.patient_from_scene, middle_m) {

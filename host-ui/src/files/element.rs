@@ -5,6 +5,8 @@ use std::io::Read;
 
 /// A volume with more voxels is not a prostate.
 pub const MAX_VOXELS: u64 = 1 << 28;
+/// 512 x 512 x 512: the greys of an image are kept for as long as it is shown.
+const MAX_IMAGE_VOXELS: usize = 1 << 27;
 /// Nothing that deflate makes is larger than this many times what it was made from.
 pub const MAX_DEFLATE_RATIO: u64 = 1032;
 /// Read at a time; a whole number of elements of any type.
@@ -101,6 +103,7 @@ pub fn must_hold(needed: u64, have: u64, packed: bool) -> Result<(), String> {
 #[derive(Clone, Copy, Debug)]
 pub struct Sink<'a, V> {
     made_of: fn(f64) -> Result<V, String>,
+    most: usize,
     progress: &'a Progress,
 }
 
@@ -108,6 +111,7 @@ impl<'a> Sink<'a, u8> {
     pub fn labels(progress: &'a Progress) -> Self {
         Self {
             made_of: label_of,
+            most: MAX_VOXELS as usize,
             progress,
         }
     }
@@ -117,8 +121,22 @@ impl<'a> Sink<'a, f32> {
     pub fn greys(progress: &'a Progress) -> Self {
         Self {
             made_of: |value| Ok(value as f32),
+            most: MAX_IMAGE_VOXELS,
             progress,
         }
+    }
+}
+
+impl<V> Sink<'_, V> {
+    /// Empty; grows with what is really there.
+    fn values(&self, count: usize) -> Result<Vec<V>, String> {
+        if count > self.most {
+            return Err(format!(
+                "it has {count} voxels, more than {}; crop it to the gland",
+                self.most
+            ));
+        }
+        Ok(Vec::with_capacity(count.min(CHUNK_BYTES)))
     }
 }
 
@@ -132,8 +150,7 @@ pub fn read_values<V>(
     sink: Sink<V>,
 ) -> Result<Vec<V>, String> {
     let size = element.bytes();
-    // Grows with what is really there.
-    let mut values = Vec::with_capacity(count.min(CHUNK_BYTES));
+    let mut values = sink.values(count)?;
     let mut chunk = vec![0_u8; CHUNK_BYTES];
     while values.len() < count {
         sink.progress.tell(Stage::Voxels, values.len(), count)?;
@@ -153,7 +170,7 @@ pub fn values_from_text<V>(text: &[u8], count: usize, sink: Sink<V>) -> Result<V
     let words = text
         .split(|c: char| c.is_ascii_whitespace() || c == ',')
         .filter(|w| !w.is_empty());
-    let mut values = Vec::with_capacity(count.min(text.len()));
+    let mut values = sink.values(count)?;
     for word in words {
         if values.len() == count {
             return Err(format!(

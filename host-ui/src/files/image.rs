@@ -9,8 +9,6 @@ use super::{Progress, dicom, metaimage, nifti, nrrd};
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 
-/// A byte each; 512 x 512 x 512.
-const MAX_IMAGE_VOXELS: usize = 1 << 27;
 /// Shares of the voxels that are shown black and white: a few bright ones do not darken the rest.
 const BLACK_WHITE: [f64; 2] = [0.005, 0.995];
 /// Voxels that the range of greys is taken from.
@@ -52,12 +50,6 @@ impl Image {
     }
 
     fn of(voxels: VoxelValues<f32>, name: String) -> Result<Self, String> {
-        if voxels.values.len() > MAX_IMAGE_VOXELS {
-            return Err(format!(
-                "it has {} voxels, more than {MAX_IMAGE_VOXELS}; crop it to the gland",
-                voxels.values.len()
-            ));
-        }
         let [low, high] = range(&voxels.values)?;
         let grey = |value: &f32| ((value - low) / (high - low) * 255.0).round().clamp(0.0, 255.0) as u8;
         Ok(Self {

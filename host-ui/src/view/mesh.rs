@@ -255,7 +255,9 @@ mod tests {
                 .find(|v| !runs.iter().any(|run| run.contains(v)));
             assert_eq!(missed, None, "{runs:?}");
             let sent: usize = runs.iter().map(|run| run.len()).sum();
-            assert!(moved.len() > 3 || sent < 700, "{sent} are sent for {}", moved.len());
+            // Area and two smoothings reach one row farther each, either way.
+            let rows: std::collections::BTreeSet<usize> = moved.iter().map(|v| v / 40).collect();
+            assert!(sent <= rows.len() * 7 * 40, "{sent} are sent for {} rows", rows.len());
         }
     }
 }
