@@ -1,11 +1,12 @@
 //! Greys of an image in the slices of the real window: where they lie, that they move with the tissue, and when they go.
 
-use egui_kittest::kittest::{Queryable, by};
+use egui_kittest::kittest::{NodeT, Queryable, by};
 use host_ui::app::App;
 use host_ui::files::{Image, Progress};
 use host_ui::view::slice::Orientation;
 use host_ui::view::slice::field::Field;
 use nalgebra::{Rotation3, Vector3};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use stylet_tests::scratch;
 use stylet_tests::window::{Driven, misplaced};
@@ -203,4 +204,44 @@ fn an_image_of_elsewhere_and_a_file_that_is_none_are_refused_with_words() {
     load(&mut driven, &path);
     wait_for(&mut driven, "it is none of the formats");
     assert!(driven.window.query_by_label("Image").is_none());
+}
+
+/// A hundred million voxels of nothing take a second or two to unpack.
+#[test]
+fn a_long_load_tells_its_share_and_ends_when_it_is_cancelled() {
+    let mut driven = Driven::open_plain([1280.0, 800.0]);
+    let path = scratch("ui-image-long").join("long.nrrd");
+    let header = "NRRD0004\ntype: uint8\ndimension: 3\nspace: right-anterior-superior\nsizes: 500 500 500\n\
+                  space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\nencoding: gzip\n\n";
+    let mut file = std::fs::File::create(&path).expect("created");
+    file.write_all(header.as_bytes()).expect("written");
+    let mut packed = flate2::write::GzEncoder::new(file, flate2::Compression::fast());
+    let nothing = vec![0; 500 * 500];
+    (0..500).for_each(|_| packed.write_all(&nothing).expect("packed"));
+    packed.finish().expect("written");
+    load(&mut driven, &path);
+    let share = |driven: &Driven| {
+        let mut bars = driven.window.query_all_by_role(egui::accesskit::Role::ProgressIndicator);
+        bars.find_map(|bar| bar.accesskit_node().numeric_value())
+    };
+    let mut seen: Vec<f64> = Vec::new();
+    let start = std::time::Instant::now();
+    while seen.len() < 3 && start.elapsed().as_secs() < 30 {
+        driven.window.run_steps(1);
+        seen.extend(share(&driven).filter(|s| *s > 0.0 && seen.last().is_none_or(|last| s > last)));
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    assert_eq!(seen.len(), 3, "shares that rise: {seen:?}");
+    driven.window.get_by_label_contains("long.nrrd: reading voxels");
+    assert_eq!(misplaced(&driven.window), Vec::<String>::new());
+    driven.picture("loading");
+    driven.click("Cancel");
+    assert!(share(&driven).is_none(), "it is still told");
+    let readers = || {
+        let tasks = std::fs::read_dir("/proc/self/task").expect("threads").flatten();
+        let name = |task: std::fs::DirEntry| std::fs::read_to_string(task.path().join("comm")).unwrap_or_default();
+        tasks.map(name).filter(|name| name.trim() == "file reader").count()
+    };
+    let ended = stylet_tests::until(std::time::Duration::from_millis(500), || readers() == 0);
+    assert!(ended, "the reader goes on");
 }
