@@ -9,6 +9,7 @@ pub mod core_args;
 pub mod cpu_time;
 pub mod dose;
 pub mod dose_desk;
+mod envelope;
 pub mod files;
 pub mod format;
 pub mod heap;

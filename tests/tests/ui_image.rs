@@ -221,7 +221,9 @@ fn a_long_load_tells_its_share_and_ends_when_it_is_cancelled() {
     packed.finish().expect("written");
     load(&mut driven, &path);
     let share = |driven: &Driven| {
-        let mut bars = driven.window.query_all_by_role(egui::accesskit::Role::ProgressIndicator);
+        let mut bars = driven
+            .window
+            .query_all_by_role(egui::accesskit::Role::ProgressIndicator);
         bars.find_map(|bar| bar.accesskit_node().numeric_value())
     };
     let mut seen: Vec<f64> = Vec::new();

@@ -1,28 +1,32 @@
 //! The last seconds of the force loop, in bounded memory, and what can be said of its timing.
 
+use crate::envelope::Envelope;
 use crate::format;
+use hdrhistogram::Histogram;
 use std::collections::VecDeque;
 use stylet_shm_schema::TickRecord;
 
 /// Seconds that the plots show.
 pub const WINDOW_S: f64 = 10.0;
-/// Ticks kept for the plots: a loop that ran at 2 kHz would still fit.
-const KEPT_TICKS: usize = 20_000;
+const WINDOW_NS: u64 = 10_000_000_000;
+/// Ticks of this time are one place of a plot: 250 in its width.
+const SLOT_NS: u64 = WINDOW_NS / 250;
 /// Ticks that percentiles are taken over: one minute at 1 kHz, so that p99.9 has samples beyond it.
 const KEPT_TIMINGS: usize = 60_000;
 /// A percentile with fewer samples beyond it is a guess and is not told.
 const SAMPLES_BEYOND: f64 = 10.0;
+/// Digits of a percentile that hold.
+const DIGITS: u8 = 3;
 
+/// What is plotted over time.
 #[derive(Clone, Copy, Debug)]
-pub struct Tick {
-    pub time_ns: u64,
-    pub resistance_n: f32,
-    pub depth_mm: f32,
-    pub wake_us: f32,
-    pub work_us: f32,
+pub enum Quantity {
+    ResistanceN,
+    DepthMm,
+    WakeUs,
 }
 
-/// Of one quantity, in microseconds.
+/// Of one quantity, in microseconds, to three digits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Percentiles {
     pub p50: Option<f64>,
@@ -41,17 +45,27 @@ pub struct Timing {
     pub work_histogram: [u32; BINS],
 }
 
-#[derive(Default)]
 pub struct History {
-    ticks: VecDeque<Tick>,
+    curves: Envelope<3>,
     /// Wake latency and work, ns, cut off at four seconds.
     timings: VecDeque<[u32; 2]>,
-    /// Of them, kept up as they come and go.
-    histograms: [[u32; BINS]; 2],
+    counts: [LastMinute; 2],
     session: u64,
     pub missed: u64,
     pub timing: Timing,
-    scratch: Vec<u32>,
+}
+
+impl Default for History {
+    fn default() -> Self {
+        Self {
+            curves: Envelope::new(SLOT_NS),
+            timings: VecDeque::new(),
+            counts: [(); 2].map(|()| LastMinute::new()),
+            session: 0,
+            missed: 0,
+            timing: Timing::default(),
+        }
+    }
 }
 
 impl History {
@@ -66,137 +80,93 @@ impl History {
             }
             self.missed += u64::from(r.missed);
             let along: f64 = r.force_on_hand_n.iter().zip(direction).map(|(f, d)| f * d).sum();
-            push_bounded(
-                &mut self.ticks,
-                KEPT_TICKS,
-                Tick {
-                    time_ns: r.due_ns,
-                    resistance_n: -along as f32,
-                    depth_mm: format::mm(r.depth_m) as f32,
-                    wake_us: format::us(r.wake_latency_ns) as f32,
-                    work_us: format::us(r.work_ns) as f32,
-                },
-            );
-            let cut = |ns: u64| u32::try_from(ns).unwrap_or(u32::MAX);
-            let timing = [cut(r.wake_latency_ns), cut(r.work_ns)];
-            let gone = push_bounded(&mut self.timings, KEPT_TIMINGS, timing);
-            for (which, histogram) in self.histograms.iter_mut().enumerate() {
-                histogram[bin(timing[which])] += 1;
+            let plotted = [-along, format::mm(r.depth_m), format::us(r.wake_latency_ns)];
+            self.curves.add(r.due_ns, plotted.map(|v| v as f32));
+            let timing = [r.wake_latency_ns, r.work_ns].map(|ns| u32::try_from(ns).unwrap_or(u32::MAX));
+            self.timings.push_back(timing);
+            let gone = (self.timings.len() > KEPT_TIMINGS)
+                .then(|| self.timings.pop_front())
+                .flatten();
+            for (which, counts) in self.counts.iter_mut().enumerate() {
+                counts.add(timing[which]);
                 if let Some(gone) = gone {
-                    histogram[bin(gone[which])] -= 1;
+                    counts.drop(gone[which]);
                 }
             }
         }
+        if let Some(newest_ns) = self.curves.newest_ns() {
+            self.curves.forget_before(newest_ns.saturating_sub(WINDOW_NS));
+        }
     }
 
-    /// Percentiles and histogram; a good part of a millisecond, so not in each frame.
+    /// Percentiles, of tens of thousands of counts; words that change in each frame cannot be read either.
     pub fn sum_up(&mut self) {
-        let mut of = |which: usize| {
-            self.scratch.clear();
-            self.scratch.extend(self.timings.iter().map(|t| t[which]));
-            percentiles(&mut self.scratch)
-        };
-        let [wake_histogram, work_histogram] = self.histograms;
+        let [wake, work] = self.counts.each_mut().map(LastMinute::percentiles);
+        let [wake_histogram, work_histogram] = self.counts.each_ref().map(|c| c.bins);
         self.timing = Timing {
             samples: self.timings.len(),
-            wake: of(0),
-            work: of(1),
+            wake,
+            work,
             wake_histogram,
             work_histogram,
         };
     }
 
-    /// At most two points for each of `buckets`: its smallest and largest, in the order of time. x is seconds before the newest tick.
-    pub fn decimated(&self, buckets: usize, value: impl Fn(&Tick) -> f32) -> Vec<[f64; 2]> {
-        let Some(newest) = self.ticks.back().map(|t| t.time_ns) else {
-            return Vec::new();
+    /// Over seconds before the newest tick.
+    pub fn curve(&self, quantity: Quantity) -> Vec<[f64; 2]> {
+        let newest_ns = self.curves.newest_ns().unwrap_or(0);
+        let point =
+            |(time_ns, value): (u64, f32)| [-format::seconds(newest_ns.saturating_sub(time_ns)), f64::from(value)];
+        let points = self.curves.samples(quantity as usize).map(point);
+        points.filter(|[x, _]| *x >= -WINDOW_S).collect()
+    }
+}
+
+/// How often each time was among the ticks that are kept.
+struct LastMinute {
+    /// With what is in `gone`, which is taken out all at once.
+    all: Histogram<u32>,
+    gone: Histogram<u32>,
+    bins: [u32; BINS],
+}
+
+impl LastMinute {
+    fn new() -> Self {
+        let empty = || Histogram::new_with_bounds(1, u64::from(u32::MAX), DIGITS).expect("bounds that fit");
+        Self {
+            all: empty(),
+            gone: empty(),
+            bins: [0; BINS],
+        }
+    }
+
+    fn add(&mut self, ns: u32) {
+        self.all.saturating_record(u64::from(ns));
+        self.bins[bin(ns)] += 1;
+    }
+
+    fn drop(&mut self, ns: u32) {
+        self.gone.saturating_record(u64::from(ns));
+        self.bins[bin(ns)] -= 1;
+    }
+
+    fn percentiles(&mut self) -> Percentiles {
+        self.all.subtract(&self.gone).expect("what goes had come");
+        self.gone.reset();
+        let all = &self.all;
+        let us = |ns: u64| format::us(ns.min(u64::from(u32::MAX)));
+        let at = |share: f64| {
+            let beyond = all.len() as f64 * (1.0 - share);
+            // A hair below, because 1 - 0.999 is not exact.
+            (beyond >= SAMPLES_BEYOND - 1e-6).then(|| us(all.value_at_quantile(share)))
         };
-        let point = |tick: &Tick| {
-            let x = -format::seconds(newest.saturating_sub(tick.time_ns));
-            [x, f64::from(value(tick))]
-        };
-        let seen = |tick: &Tick| newest.saturating_sub(tick.time_ns) as f64 <= WINDOW_S * 1e9;
-        let first = self.ticks.partition_point(|tick| !seen(tick));
-        let points = self.ticks.range(first..).map(point);
-        decimated(points, [-WINDOW_S, 0.0], buckets)
-    }
-}
-
-/// At most two points for each of `buckets` between the ends: its smallest and largest, in the order of x.
-pub fn decimated(points: impl Iterator<Item = [f64; 2]>, [from, to]: [f64; 2], buckets: usize) -> Vec<[f64; 2]> {
-    let mut kept = Vec::with_capacity(2 * buckets + 2);
-    let mut bucket = Bucket::default();
-    let per_x = buckets as f64 / (to - from);
-    for [x, y] in points {
-        let index = ((x - from) * per_x) as usize;
-        if index != bucket.index {
-            bucket.flush(&mut kept);
-            bucket.index = index;
-        }
-        bucket.add([x, y]);
-    }
-    bucket.flush(&mut kept);
-    kept
-}
-
-/// Gives what had to make room.
-fn push_bounded<T>(queue: &mut VecDeque<T>, limit: usize, item: T) -> Option<T> {
-    let gone = (queue.len() >= limit).then(|| queue.pop_front()).flatten();
-    queue.push_back(item);
-    gone
-}
-
-#[derive(Default)]
-struct Bucket {
-    index: usize,
-    low: Option<[f64; 2]>,
-    high: Option<[f64; 2]>,
-}
-
-impl Bucket {
-    fn add(&mut self, point: [f64; 2]) {
-        if self.low.is_none_or(|p| point[1] < p[1]) {
-            self.low = Some(point);
-        }
-        if self.high.is_none_or(|p| point[1] > p[1]) {
-            self.high = Some(point);
+        Percentiles {
+            p50: at(0.5),
+            p99: at(0.99),
+            p999: at(0.999),
+            max: (!all.is_empty()).then(|| us(all.max())),
         }
     }
-
-    fn flush(&mut self, out: &mut Vec<[f64; 2]>) {
-        let (Some(low), Some(high)) = (self.low.take(), self.high.take()) else {
-            return;
-        };
-        if low == high {
-            out.push(low);
-        } else if low[0] <= high[0] {
-            out.extend([low, high]);
-        } else {
-            out.extend([high, low]);
-        }
-    }
-}
-
-/// Of samples in ns, which lose their order.
-fn percentiles(samples: &mut [u32]) -> Percentiles {
-    let count = samples.len();
-    let us = |ns: u32| format::us(u64::from(ns));
-    // What lies before the last percentile need not be looked at for the next.
-    let mut before = 0;
-    let mut at = |share: f64| {
-        let beyond = count as f64 * (1.0 - share);
-        // A hair below, because 1 - 0.999 is not exact.
-        if beyond < SAMPLES_BEYOND - 1e-6 {
-            return None;
-        }
-        let rank = ((count as f64 * share).ceil() as usize).saturating_sub(1);
-        let (_, ns, _) = samples[before..].select_nth_unstable(rank - before);
-        before = rank;
-        Some(us(*ns))
-    };
-    let (p50, p99, p999) = (at(0.5), at(0.99), at(0.999));
-    let max = samples[before..].iter().max().map(|&ns| us(ns));
-    Percentiles { p50, p99, p999, max }
 }
 
 /// Bins from 1 us up, five for each decade; the last takes all above.
@@ -229,12 +199,18 @@ mod tests {
     }
 
     #[test]
-    fn memory_is_bounded_and_drawing_is_decimated() {
+    fn memory_is_bounded_and_the_curves_reach_from_end_to_end() {
         let mut history = History::default();
         history.take(&records(100_000), [0.0, 0.0, 1.0]);
-        assert_eq!(history.ticks.len(), KEPT_TICKS);
         assert_eq!(history.timings.len(), KEPT_TIMINGS);
-        assert!(history.decimated(300, |t| t.wake_us).len() <= 602);
+        let curve = history.curve(Quantity::WakeUs);
+        assert!((500..=502).contains(&curve.len()), "{}", curve.len());
+        assert_eq!(curve.last(), Some(&[0.0, f64::from(99.999_f32)]));
+        assert!(
+            curve[0][0] >= -WINDOW_S && curve[0][0] < -WINDOW_S + 0.04,
+            "{:?}",
+            curve[0]
+        );
     }
 
     #[test]
@@ -273,8 +249,15 @@ mod tests {
             let rank = |share: f64| (kept.len() as f64 * share).ceil() as usize - 1;
             let told = |share: f64| (kept.len() as f64 * (1.0 - share) >= 9.99).then(|| format::us(kept[rank(share)]));
             let wake = history.timing.wake;
-            assert_eq!([wake.p50, wake.p99, wake.p999], [0.5, 0.99, 0.999].map(told), "{count}");
-            assert_eq!(wake.max, kept.last().map(|&ns| format::us(ns)));
+            let largest = kept.last().map(|&ns| format::us(ns));
+            let sorted = [told(0.5), told(0.99), told(0.999), largest];
+            for (told, sorted) in [wake.p50, wake.p99, wake.p999, wake.max].into_iter().zip(sorted) {
+                let off = told.zip(sorted).map_or(0.0, |(told, sorted)| (told - sorted) / sorted);
+                assert!(
+                    told.is_some() == sorted.is_some() && off.abs() <= 1e-3,
+                    "{told:?} {sorted:?}"
+                );
+            }
             for (n, count) in history.timing.wake_histogram.into_iter().enumerate() {
                 let low = if n == 0 { 0.0 } else { bin_low_us(n) };
                 let high = if n + 1 == BINS { f64::MAX } else { bin_low_us(n + 1) };
@@ -291,6 +274,7 @@ mod tests {
         let mut other = records(1);
         other[0].session_id = 2;
         history.take(&other, [0.0; 3]);
-        assert_eq!(history.ticks.len(), 1);
+        assert_eq!(history.timings.len(), 1);
+        assert_eq!(history.curve(Quantity::DepthMm).len(), 1);
     }
 }

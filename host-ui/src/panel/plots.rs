@@ -1,12 +1,11 @@
 //! The right panel: force and depth of the last seconds, or force and speed of the whole procedure, and the timing of the loop.
 
-use super::history::{BINS, History, Percentiles, Tick, WINDOW_S, bin_low_us, decimated};
+use super::history::{BINS, History, Percentiles, Quantity, WINDOW_S, bin_low_us};
 use super::{Shown, setup};
 use crate::score::Trace;
 use crate::{format, theme};
 use egui::{Color32, RichText};
 use egui_plot::{AxisHints, Bar, BarChart, GridMark, Line, Plot, PlotPoints};
-use stylet_shm_schema::TickRecord;
 
 /// What stands between and under the three plots over time.
 const BESIDE_PLOTS: f32 = 492.0;
@@ -15,26 +14,26 @@ const PLOT_HEIGHTS: [f32; 2] = [48.0, 150.0];
 /// The plots share what of `height` the rest leaves. With `whole` they look back on all of the procedure.
 pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, whole: Option<&Trace>, height: f32) {
     let each = ((height - BESIDE_PLOTS) / 3.0).clamp(PLOT_HEIGHTS[0], PLOT_HEIGHTS[1]);
-    let strip = |ui: &mut egui::Ui, style, value: fn(&Tick) -> f32| strip(ui, history, style, (each, value));
+    let strip = |ui: &mut egui::Ui, style, quantity| strip(ui, history.curve(quantity), style, each);
     let tokens = theme::of(ui);
     tension_ui(ui, shown);
     let now = |value: Option<String>| value.unwrap_or_else(|| "n/a".to_owned());
-    match whole.filter(|trace| !trace.records().is_empty()) {
+    match whole.filter(|trace| !trace.is_empty()) {
         Some(trace) => whole_ui(ui, trace, each),
         None => {
             let force = now(shown.resistance_n().map(format::force));
             title(ui, "Force along the needle, N", &force, tokens.force);
-            strip(ui, ("force", tokens.force, [-0.5, 2.0]), |t| t.resistance_n);
+            strip(ui, ("force", tokens.force, [-0.5, 2.0]), Quantity::ResistanceN);
             let depth = now(shown.state.map(|s| format::length(s.depth_m)));
             title(ui, "Depth, mm", &depth, tokens.depth);
-            strip(ui, ("depth", tokens.depth, [0.0, 10.0]), |t| t.depth_mm);
+            strip(ui, ("depth", tokens.depth, [0.0, 10.0]), Quantity::DepthMm);
         }
     }
     let worst = now(shown
         .state
         .map(|s| format::microseconds(Some(format::us(s.worst_wake_ns)))));
     title(ui, "Wake-up latency, us", &format!("worst {worst}"), tokens.wake);
-    strip(ui, ("wake-up latency", tokens.wake, [0.0, 50.0]), |t| t.wake_us);
+    strip(ui, ("wake-up latency", tokens.wake, [0.0, 50.0]), Quantity::WakeUs);
     histogram_ui(ui, history);
     timing_ui(ui, shown, history);
     setup::setup_ui(ui, shown);
@@ -45,28 +44,15 @@ fn whole_ui(ui: &mut egui::Ui, trace: &Trace, height: f32) {
     let (tokens, motion) = (theme::of(ui), trace.motion());
     let peak = format!("peak {}", format::force(motion.peak_force_n));
     title(ui, "Whole procedure: force, N", &peak, tokens.force);
-    let force = |r: &TickRecord| r.force_on_hand_n.iter().map(|f| f * f).sum::<f64>().sqrt();
-    whole_strip(ui, trace, ("whole force", tokens.force, height), force);
+    whole_strip(ui, trace.force_n(), ("whole force", tokens.force, height));
     let peak = format!("peak inwards {}", format::speed(motion.peak_insertion_m_per_s));
     title(ui, "Speed, mm/s", &peak, tokens.depth);
-    let speed = |r: &TickRecord| format::mm(r.speed_m_per_s);
-    whole_strip(ui, trace, ("whole speed", tokens.depth, height), speed);
+    whole_strip(ui, trace.speed_mm_per_s(), ("whole speed", tokens.depth, height));
 }
 
-fn whole_strip(
-    ui: &mut egui::Ui,
-    trace: &Trace,
-    (name, color, height): (&str, Color32, f32),
-    value: impl Fn(&TickRecord) -> f64,
-) {
-    let records = trace.records();
-    let Some((first, last)) = records.first().zip(records.last()) else {
-        return;
-    };
-    let seconds = |r: &TickRecord| format::seconds(r.due_ns.saturating_sub(first.due_ns));
-    let end_s = seconds(last).max(1.0);
-    let buckets = ui.available_width().max(50.0) as usize;
-    let points = decimated(records.iter().map(|r| [seconds(r), value(r)]), [0.0, end_s], buckets);
+/// `curve`: over seconds.
+fn whole_strip(ui: &mut egui::Ui, curve: Vec<[f64; 2]>, (name, color, height): (&str, Color32, f32)) {
+    let end_s = curve.last().map_or(1.0, |[seconds, _]| seconds.max(1.0));
     plot(name)
         .height(height)
         .include_x(0.0)
@@ -83,7 +69,7 @@ fn whole_strip(
             }
         })
         .show(ui, |plot| {
-            plot.line(Line::new(name, PlotPoints::new(points)).color(color).width(1.3))
+            plot.line(Line::new(name, PlotPoints::new(curve)).color(color).width(1.3))
         });
 }
 
@@ -124,14 +110,8 @@ fn title(ui: &mut egui::Ui, name: &str, value: &str, color: Color32) {
     });
 }
 
-fn strip(
-    ui: &mut egui::Ui,
-    history: &History,
-    (name, color, least): (&str, Color32, [f64; 2]),
-    (height, value): (f32, fn(&Tick) -> f32),
-) {
-    let buckets = ui.available_width().max(50.0) as usize;
-    let points = history.decimated(buckets, value);
+/// `curve`: over seconds before now.
+fn strip(ui: &mut egui::Ui, curve: Vec<[f64; 2]>, (name, color, least): (&str, Color32, [f64; 2]), height: f32) {
     plot(name)
         .height(height)
         .include_x(-WINDOW_S)
@@ -148,7 +128,7 @@ fn strip(
             }
         })
         .show(ui, |plot| {
-            plot.line(Line::new(name, PlotPoints::new(points)).color(color).width(1.3))
+            plot.line(Line::new(name, PlotPoints::new(curve)).color(color).width(1.3))
         });
 }
 

@@ -1,19 +1,24 @@
 //! Force and speed of a whole procedure in bounded memory, and how the hand moved.
 
 use super::motion::{Motion, MotionMeter};
+use crate::envelope::Envelope;
+use crate::format;
 use stylet_shm_schema::{TickRecord, flags};
 
 /// Records kept at most: ten of a second for twenty minutes; of a longer procedure fewer of a second.
 const MOST: usize = 12_000;
 /// Of so many ticks one is kept at first, at 1 kHz a hundred of a second.
 const FIRST_STRETCH: usize = 10;
+/// A plot of all of it has so many places at most, and at first each is of this time.
+const MOST_SLOTS: usize = 600;
+const FIRST_SLOT_NS: u64 = 10_000_000;
 /// A tip that is outside for longer belongs to no procedure until it touches tissue again.
 const OUTSIDE_NS: u64 = 2_000_000_000;
 
 /// Which scene, in which run of the core: its session and generation.
 type SceneKey = (u64, u64);
 
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Trace {
     scene: Option<SceneKey>,
     /// Of each stretch of ticks the one with the largest force.
@@ -21,9 +26,28 @@ pub struct Trace {
     stretch: usize,
     strongest: Option<TickRecord>,
     in_stretch: usize,
+    /// Force, N, and speed, mm/s.
+    curves: Envelope<2>,
+    began_ns: Option<u64>,
     /// When the tip touched tissue last.
     contact_ns: Option<u64>,
     meter: MotionMeter,
+}
+
+impl Default for Trace {
+    fn default() -> Self {
+        Self {
+            scene: None,
+            records: Vec::new(),
+            stretch: FIRST_STRETCH,
+            strongest: None,
+            in_stretch: 0,
+            curves: Envelope::new(FIRST_SLOT_NS),
+            began_ns: None,
+            contact_ns: None,
+            meter: MotionMeter::default(),
+        }
+    }
 }
 
 impl Trace {
@@ -32,7 +56,6 @@ impl Trace {
         if scene.is_some() && scene != self.scene {
             *self = Self {
                 scene,
-                stretch: FIRST_STRETCH,
                 ..Self::default()
             };
         }
@@ -44,8 +67,12 @@ impl Trace {
             if record.due_ns.saturating_sub(contact_ns) <= OUTSIDE_NS {
                 self.meter.take(record, direction);
                 self.keep(record);
+                self.began_ns.get_or_insert(record.due_ns);
+                let plotted = [square(record).sqrt(), format::mm(record.speed_m_per_s)];
+                self.curves.add(record.due_ns, plotted.map(|v| v as f32));
             }
         }
+        self.curves.widen_to(MOST_SLOTS);
     }
 
     fn keep(&mut self, record: &TickRecord) {
@@ -70,6 +97,29 @@ impl Trace {
 
     pub fn records(&self) -> &[TickRecord] {
         &self.records
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.curves.is_empty()
+    }
+
+    /// Over seconds since it began.
+    pub fn force_n(&self) -> Vec<[f64; 2]> {
+        self.curve(0)
+    }
+
+    /// Over seconds since it began.
+    pub fn speed_mm_per_s(&self) -> Vec<[f64; 2]> {
+        self.curve(1)
+    }
+
+    fn curve(&self, quantity: usize) -> Vec<[f64; 2]> {
+        let began_ns = self.began_ns.unwrap_or(0);
+        let seconds = |time_ns: u64| format::seconds(time_ns.saturating_sub(began_ns));
+        let samples = self.curves.samples(quantity);
+        samples
+            .map(|(time_ns, value)| [seconds(time_ns), f64::from(value)])
+            .collect()
     }
 
     pub fn motion(&self) -> Motion {
@@ -122,6 +172,14 @@ mod tests {
         let last_ns = trace.records().last().map(|r| r.due_ns);
         assert!(last_ns.is_some_and(|ns| ns > 3_599_000_000_000), "{last_ns:?}");
         assert!((trace.motion().in_tissue_s - 3_599.999).abs() < 1e-6);
+        let curve = trace.force_n();
+        assert!(
+            (MOST_SLOTS / 2..=2 * MOST_SLOTS).contains(&curve.len()),
+            "{}",
+            curve.len()
+        );
+        assert!(curve.contains(&[5.003, 9.0]) && curve.is_sorted_by_key(|[s, _]| *s));
+        assert!(curve[0][0] < 0.2 && curve.last().is_some_and(|[s, _]| *s > 3_599.5));
     }
 
     #[test]
