@@ -105,7 +105,7 @@ fn outlines(template: &Template, body: &Body, depth_m: f64) -> Vec<Outline> {
     let normal = Vector3::from(template.inwards);
     let (points_m, triangles) = body.surface();
     let offset_m = normal.dot(&middle) + depth_m;
-    let sides = cut::sides(points_m, template.inwards.map(|c| c as f32), offset_m as f32);
+    let sides = cut::Sides::of(points_m, template.inwards.map(|c| c as f32), offset_m as f32);
     let lines = cut::cut(points_m, triangles, &sides);
     let in_holes = |p: &[f32; 3]| {
         let off = Vector3::from(*p).map(f64::from) - middle;

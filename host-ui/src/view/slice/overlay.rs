@@ -47,7 +47,7 @@ impl Lines {
         if self.body != Some((at, moved)) {
             self.body = Some((at, moved));
             self.contours.clear();
-            let sides = cut::sides(positions_m, normal, offset_m as f32);
+            let sides = cut::Sides::of(positions_m, normal, offset_m as f32);
             for contour in contours {
                 let lines = cut::cut(positions_m, &contour.triangles, &sides);
                 self.contours
@@ -62,7 +62,7 @@ impl Lines {
         self.dose = Some(key);
         self.isodoses.clear();
         for shell in dose.iter().flat_map(|d| &d.shells) {
-            let sides = cut::sides(&shell.points_m, normal, offset_m as f32);
+            let sides = cut::Sides::of(&shell.points_m, normal, offset_m as f32);
             let lines = cut::cut(&shell.points_m, &shell.triangles, &sides);
             self.isodoses.extend(lines.into_iter().map(|line| (shell.level, line)));
         }
