@@ -39,6 +39,15 @@ pub fn fresh_instance() -> Instance {
     Instance::new(&format!("t{}-{number}", std::process::id())).expect("letters, digits and a hyphen")
 }
 
+/// A name without a core, whose files go when it is dropped: declare it before what uses it.
+pub struct Alone(pub Instance);
+
+impl Drop for Alone {
+    fn drop(&mut self) {
+        self.0.sweep();
+    }
+}
+
 /// A folder for one test's files, emptied first.
 pub fn scratch(name: &str) -> PathBuf {
     let folder = program("rt-core")

@@ -6,7 +6,7 @@ use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
 use std::time::Duration;
 use stylet_shm_schema::service::{self, create_state_board};
 use stylet_shm_schema::*;
-use stylet_tests::{Core, ask, fresh_instance, until};
+use stylet_tests::{Alone, Core, ask, fresh_instance, until};
 
 /// All ones, zeros, random bytes and huge counts, of any type.
 fn rubbish<T: Pod>() -> Vec<T> {
@@ -112,8 +112,8 @@ const ROUNDS_OF_RUBBISH: usize = 50;
 
 #[test]
 fn host_refuses_rubbish_from_a_core_and_goes_on() {
-    let instance = fresh_instance();
-    let node = instance.node().expect("shared memory");
+    let alone = Alone(fresh_instance());
+    let node = alone.0.node().expect("shared memory");
     let session_id = 7;
     let board = create_state_board(&node, session_id).expect("board");
     let writer = board.writer_builder().create().expect("writer");
@@ -145,7 +145,7 @@ fn host_refuses_rubbish_from_a_core_and_goes_on() {
     let snapshots = publisher!(service::snapshots(&node), slices);
     let scenes = publisher!(service::scene(&node), slices);
 
-    let mut link = Link::new(instance);
+    let mut link = Link::new(alone.0.clone());
     let mut good = Session::zeroed();
     (good.session_id, good.schema_version) = (session_id, SCHEMA_VERSION);
     let states = rubbish::<HapticState>();

@@ -3,27 +3,53 @@
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use host_ui::app::{App, Options};
+use std::ops::{Deref, DerefMut};
 use stylet_shm_schema::PARAMETERS;
 use stylet_shm_schema::service::Instance;
+use stylet_tests::Alone;
 use stylet_tests::window::{misplaced, tolerant};
 
-fn window(instance: &str) -> Harness<'static, App> {
+/// Closed before its files go.
+struct Window {
+    harness: Harness<'static, App>,
+    _alone: Alone,
+}
+
+impl Deref for Window {
+    type Target = Harness<'static, App>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.harness
+    }
+}
+
+impl DerefMut for Window {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.harness
+    }
+}
+
+fn window(instance: &str) -> Window {
     window_of(instance, [1280.0, 800.0])
 }
 
-fn window_of(instance: &str, size: [f32; 2]) -> Harness<'static, App> {
+fn window_of(instance: &str, size: [f32; 2]) -> Window {
+    let alone = Alone(Instance::new(instance).expect("a valid name"));
     let options = Options {
-        instance: Instance::new(instance).expect("a valid name"),
+        instance: alone.0.clone(),
         scene: None,
         label: None,
         image: None,
         controllers: false,
         pause: true,
     };
-    Harness::builder()
-        .with_size(size)
-        .wgpu()
-        .build_eframe(|cc| App::new(cc, options))
+    Window {
+        harness: Harness::builder()
+            .with_size(size)
+            .wgpu()
+            .build_eframe(|cc| App::new(cc, options)),
+        _alone: alone,
+    }
 }
 
 /// The window asks for frames for ever, so `run` would never end.
