@@ -2,42 +2,16 @@
 
 use std::collections::VecDeque;
 
-/// When, and how much.
-type Sample = (u64, f32);
-
-#[derive(Clone, Copy, Debug)]
-struct Extremes {
-    low: Sample,
-    high: Sample,
+/// The smallest and the largest of one quantity about a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Band {
+    pub time_ns: u64,
+    pub low: f32,
+    pub high: f32,
 }
 
-impl Extremes {
-    fn of(sample: Sample) -> Self {
-        Self {
-            low: sample,
-            high: sample,
-        }
-    }
-
-    fn join(&mut self, other: Self) {
-        if other.low.1 < self.low.1 {
-            self.low = other.low;
-        }
-        if other.high.1 > self.high.1 {
-            self.high = other.high;
-        }
-    }
-
-    /// In the order of time; one where they are the same.
-    fn samples(self) -> impl Iterator<Item = Sample> {
-        let [first, second] = if self.low.0 <= self.high.0 {
-            [self.low, self.high]
-        } else {
-            [self.high, self.low]
-        };
-        std::iter::once(first).chain((first != second).then_some(second))
-    }
-}
+/// Smallest and largest.
+type Extremes = [f32; 2];
 
 /// Of `N` quantities that are sampled together. The slots lie on the grid of time itself, so that a line that moves on keeps its shape.
 #[derive(Clone, Debug)]
@@ -59,7 +33,7 @@ impl<const N: usize> Envelope<N> {
     /// Times are to rise; one that does not is counted to the newest slot.
     pub fn add(&mut self, time_ns: u64, values: [f32; N]) {
         self.newest_ns = self.newest_ns.max(Some(time_ns));
-        let (number, extremes) = (time_ns / self.slot_ns, values.map(|v| Extremes::of((time_ns, v))));
+        let (number, extremes) = (time_ns / self.slot_ns, values.map(|v| [v, v]));
         match self.slots.back_mut() {
             Some((last, slot)) if number <= *last => join(slot, extremes),
             _ => self.slots.push_back((number, extremes)),
@@ -96,14 +70,26 @@ impl<const N: usize> Envelope<N> {
         self.newest_ns
     }
 
-    /// Of one quantity, at most two of a slot, in the order of time.
-    pub fn samples(&self, quantity: usize) -> impl Iterator<Item = Sample> {
-        self.slots.iter().flat_map(move |(_, slot)| slot[quantity].samples())
+    /// Of one quantity, one for each slot, about its middle.
+    pub fn bands(&self, quantity: usize) -> impl Iterator<Item = Band> {
+        let newest_ns = self.newest_ns.unwrap_or(0);
+        self.slots.iter().map(move |(number, slot)| {
+            let [low, high] = slot[quantity];
+            let middle_ns = number.saturating_mul(self.slot_ns).saturating_add(self.slot_ns / 2);
+            Band {
+                time_ns: middle_ns.min(newest_ns),
+                low,
+                high,
+            }
+        })
     }
 }
 
 fn join<const N: usize>(slot: &mut [Extremes; N], extremes: [Extremes; N]) {
-    slot.iter_mut().zip(extremes).for_each(|(kept, new)| kept.join(new));
+    for ([low, high], [other_low, other_high]) in slot.iter_mut().zip(extremes) {
+        *low = low.min(other_low);
+        *high = high.max(other_high);
+    }
 }
 
 #[cfg(test)]
@@ -115,35 +101,32 @@ mod tests {
     /// Two quantities at 1 kHz that never repeat.
     fn sample(tick: u64) -> (u64, [f32; 2]) {
         let angle = tick as f64 * 0.37;
-        (
-            tick * MS + 500,
-            [angle.sin(), (angle * 1.7).cos() * angle].map(|v| v as f32),
-        )
+        let values = [angle.sin(), (angle * 1.7).cos() * angle];
+        (tick * MS + 500, values.map(|v| v as f32))
     }
 
     /// Against the extremes of each slot among all samples, before and after it was widened.
     #[test]
-    fn each_slot_keeps_its_extremes_and_when_they_were() {
+    fn each_slot_keeps_its_extremes() {
         let mut envelope = Envelope::new(40 * MS);
         (0..10_000).map(sample).for_each(|(t, v)| envelope.add(t, v));
         for (slot_ns, most) in [(40 * MS, 250), (80 * MS, 249), (640 * MS, 16)] {
             envelope.widen_to(most);
             for quantity in [0, 1] {
-                let mut told = envelope.samples(quantity).peekable();
-                for slot in 0..(10_000 * MS).div_ceil(slot_ns) {
+                let bands: Vec<Band> = envelope.bands(quantity).collect();
+                assert_eq!(bands.len() as u64, (10_000 * MS).div_ceil(slot_ns));
+                for (band, slot) in bands.iter().zip(0..) {
                     let inside = (0..10_000).map(sample).filter(|(t, _)| t / slot_ns == slot);
-                    let all: Vec<Sample> = inside.map(|(t, v)| (t, v[quantity])).collect();
-                    let by_value = |a: &&Sample, b: &&Sample| a.1.total_cmp(&b.1);
-                    let mut ends =
-                        [all.iter().min_by(by_value), all.iter().max_by(by_value)].map(|s| *s.expect("some"));
-                    ends.sort_by_key(|s| s.0);
+                    let all: Vec<f32> = inside.map(|(_, v)| v[quantity]).collect();
+                    assert_eq!(band.low, all.iter().copied().fold(f32::MAX, f32::min));
+                    assert_eq!(band.high, all.iter().copied().fold(f32::MIN, f32::max));
+                    let middle_ns = slot * slot_ns + slot_ns / 2;
                     assert_eq!(
-                        [told.next(), told.next()],
-                        ends.map(Some),
+                        band.time_ns,
+                        middle_ns.min(sample(9_999).0),
                         "slot {slot} of {slot_ns} ns"
                     );
                 }
-                assert_eq!(told.peek(), None);
             }
         }
     }
@@ -153,19 +136,15 @@ mod tests {
         let mut envelope = Envelope::new(40 * MS);
         (0..1_000).map(sample).for_each(|(t, v)| envelope.add(t, v));
         envelope.forget_before(400 * MS);
-        assert_eq!(envelope.samples(0).next().map(|s| s.0 / (40 * MS)), Some(10));
+        assert_eq!(envelope.bands(0).next().map(|b| b.time_ns / (40 * MS)), Some(10));
         envelope.add(3, [9.0, 9.0]);
-        assert!(envelope.samples(0).any(|s| s == (3, 9.0)), "counted to the newest slot");
+        assert_eq!(
+            envelope.bands(0).last().map(|b| b.high),
+            Some(9.0),
+            "counted to the newest slot"
+        );
         assert_eq!(envelope.newest_ns(), Some(sample(999).0));
         envelope.forget_before(u64::MAX);
         assert!(envelope.is_empty());
-    }
-
-    #[test]
-    fn one_value_is_one_sample() {
-        let mut envelope = Envelope::new(MS);
-        envelope.add(5, [1.0]);
-        envelope.add(6, [1.0]);
-        assert_eq!(envelope.samples(0).collect::<Vec<_>>(), [(5, 1.0)]);
     }
 }

@@ -112,13 +112,13 @@ impl History {
         };
     }
 
-    /// Over seconds before the newest tick.
-    pub fn curve(&self, quantity: Quantity) -> Vec<[f64; 2]> {
+    /// Smallest and largest over seconds before the newest tick.
+    pub fn curve(&self, quantity: Quantity) -> Vec<[f64; 3]> {
         let newest_ns = self.curves.newest_ns().unwrap_or(0);
-        let point =
-            |(time_ns, value): (u64, f32)| [-format::seconds(newest_ns.saturating_sub(time_ns)), f64::from(value)];
-        let points = self.curves.samples(quantity as usize).map(point);
-        points.filter(|[x, _]| *x >= -WINDOW_S).collect()
+        let before = |time_ns: u64| -format::seconds(newest_ns.saturating_sub(time_ns));
+        let bands = self.curves.bands(quantity as usize);
+        let points = bands.map(|b| [before(b.time_ns), f64::from(b.low), f64::from(b.high)]);
+        points.filter(|[x, ..]| *x >= -WINDOW_S).collect()
     }
 }
 
@@ -204,8 +204,9 @@ mod tests {
         history.take(&records(100_000), [0.0, 0.0, 1.0]);
         assert_eq!(history.timings.len(), KEPT_TIMINGS);
         let curve = history.curve(Quantity::WakeUs);
-        assert!((500..=502).contains(&curve.len()), "{}", curve.len());
-        assert_eq!(curve.last(), Some(&[0.0, f64::from(99.999_f32)]));
+        assert!((249..=251).contains(&curve.len()), "{}", curve.len());
+        let [x, low, high] = curve[curve.len() - 1];
+        assert!((-0.02..=0.0).contains(&x) && low < high && high == f64::from(99.999_f32));
         assert!(
             curve[0][0] >= -WINDOW_S && curve[0][0] < -WINDOW_S + 0.04,
             "{:?}",

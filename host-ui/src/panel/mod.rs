@@ -1,5 +1,6 @@
 //! Panels: each a pure function of prepared data that draws and returns what the operator asked for.
 
+mod axis;
 pub mod help;
 pub mod history;
 pub mod parameters;

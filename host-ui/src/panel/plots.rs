@@ -1,11 +1,12 @@
 //! The right panel: force and depth of the last seconds, or force and speed of the whole procedure, and the timing of the loop.
 
+use super::axis::{LINES, grid, marks, number, upwards};
 use super::history::{BINS, History, Percentiles, Quantity, WINDOW_S, bin_low_us};
 use super::{Shown, setup};
 use crate::score::Trace;
 use crate::{format, theme};
 use egui::{Color32, RichText};
-use egui_plot::{AxisHints, Bar, BarChart, GridMark, Line, Plot, PlotPoints};
+use egui_plot::{AxisHints, Bar, BarChart, FilledArea, GridMark, Line, Plot, PlotPoints, PlotUi};
 
 /// What stands between and under the three plots over time.
 const BESIDE_PLOTS: f32 = 492.0;
@@ -14,7 +15,10 @@ const PLOT_HEIGHTS: [f32; 2] = [48.0, 150.0];
 /// The plots share what of `height` the rest leaves. With `whole` they look back on all of the procedure.
 pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, whole: Option<&Trace>, height: f32) {
     let each = ((height - BESIDE_PLOTS) / 3.0).clamp(PLOT_HEIGHTS[0], PLOT_HEIGHTS[1]);
-    let strip = |ui: &mut egui::Ui, style, quantity| strip(ui, history.curve(quantity), style, each);
+    let recent = |ui: &mut egui::Ui, (name, color), least, quantity| {
+        let points = history.curve(quantity);
+        strip(ui, (name, least), each, |plot| curve(plot, name, color, &points));
+    };
     let tokens = theme::of(ui);
     tension_ui(ui, shown);
     let now = |value: Option<String>| value.unwrap_or_else(|| "n/a".to_owned());
@@ -23,17 +27,22 @@ pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, whole: Opti
         None => {
             let force = now(shown.resistance_n().map(format::force));
             title(ui, "Force along the needle, N", &force, tokens.force);
-            strip(ui, ("force", tokens.force, [-0.5, 2.0]), Quantity::ResistanceN);
+            recent(ui, ("force", tokens.force), [-0.5, 2.0], Quantity::ResistanceN);
             let depth = now(shown.state.map(|s| format::length(s.depth_m)));
             title(ui, "Depth, mm", &depth, tokens.depth);
-            strip(ui, ("depth", tokens.depth, [0.0, 10.0]), Quantity::DepthMm);
+            recent(ui, ("depth", tokens.depth), [0.0, 10.0], Quantity::DepthMm);
         }
     }
     let worst = now(shown
         .state
         .map(|s| format::microseconds(Some(format::us(s.worst_wake_ns)))));
     title(ui, "Wake-up latency, us", &format!("worst {worst}"), tokens.wake);
-    strip(ui, ("wake-up latency", tokens.wake, [0.0, 50.0]), Quantity::WakeUs);
+    // Of latencies the worst counts.
+    let worst = history.curve(Quantity::WakeUs).into_iter();
+    let worst: Vec<[f64; 3]> = worst.map(|[x, _, high]| [x, 0.0, high]).collect();
+    strip(ui, ("wake-up latency", [0.0, 50.0]), each, |plot| {
+        plot.add(area("wake-up latency", tokens.wake, &worst));
+    });
     histogram_ui(ui, history);
     timing_ui(ui, shown, history);
     setup::setup_ui(ui, shown);
@@ -44,33 +53,44 @@ fn whole_ui(ui: &mut egui::Ui, trace: &Trace, height: f32) {
     let (tokens, motion) = (theme::of(ui), trace.motion());
     let peak = format!("peak {}", format::force(motion.peak_force_n));
     title(ui, "Whole procedure: force, N", &peak, tokens.force);
-    whole_strip(ui, trace.force_n(), ("whole force", tokens.force, height));
+    whole_strip(ui, &trace.force_n(), ("whole force", tokens.force, height));
     let peak = format!("peak inwards {}", format::speed(motion.peak_insertion_m_per_s));
     title(ui, "Speed, mm/s", &peak, tokens.depth);
-    whole_strip(ui, trace.speed_mm_per_s(), ("whole speed", tokens.depth, height));
+    whole_strip(ui, &trace.speed_mm_per_s(), ("whole speed", tokens.depth, height));
 }
 
-/// `curve`: over seconds.
-fn whole_strip(ui: &mut egui::Ui, curve: Vec<[f64; 2]>, (name, color, height): (&str, Color32, f32)) {
-    let end_s = curve.last().map_or(1.0, |[seconds, _]| seconds.max(1.0));
-    plot(name)
-        .height(height)
+/// `points`: smallest and largest over seconds.
+fn whole_strip(ui: &mut egui::Ui, points: &[[f64; 3]], (name, color, height): (&str, Color32, f32)) {
+    let end_s = points.last().map_or(1.0, |[seconds, ..]| seconds.max(1.0));
+    plot(name, height)
+        .y_grid_spacer(upwards)
+        .y_axis_formatter(|mark: GridMark, _: &_| number(mark))
         .include_x(0.0)
         .include_x(end_s)
         .include_y(0.0)
         .include_y(1.0)
-        .x_grid_spacer(move |_| marks(0.0, end_s / 4.0, 4))
+        .x_grid_spacer(move |_| grid([0.0, end_s], end_s / 5.0))
         .x_axis_formatter(move |mark: GridMark, _: &_| {
-            // The last mark lies on the edge, where a label would be cut off.
-            if mark.value > 0.99 * end_s {
+            // On the edge a label would be cut off.
+            if mark.value > 0.96 * end_s {
                 String::new()
             } else {
-                format!("{:.0} s", mark.value)
+                format!("{} s", number(mark))
             }
         })
-        .show(ui, |plot| {
-            plot.line(Line::new(name, PlotPoints::new(curve)).color(color).width(1.3))
-        });
+        .show(ui, |plot| curve(plot, name, color, points));
+}
+
+/// From smallest to largest, and a line through the middle where both are the same.
+fn curve(plot: &mut PlotUi<'_>, name: &str, color: Color32, points: &[[f64; 3]]) {
+    plot.add(area(name, color, points));
+    let middle = points.iter().map(|[x, low, high]| [*x, 0.5 * (low + high)]);
+    plot.line(Line::new(name, PlotPoints::from_iter(middle)).color(color).width(1.3));
+}
+
+fn area(name: &str, color: Color32, points: &[[f64; 3]]) -> FilledArea {
+    let [xs, lows, highs] = [0, 1, 2].map(|n| points.iter().map(|p| p[n]).collect::<Vec<f64>>());
+    FilledArea::new(name, &xs, &lows, &highs).fill_color(color)
 }
 
 /// What the membrane does before it gives way, which a mouse cannot let one feel.
@@ -110,10 +130,11 @@ fn title(ui: &mut egui::Ui, name: &str, value: &str, color: Color32) {
     });
 }
 
-/// `curve`: over seconds before now.
-fn strip(ui: &mut egui::Ui, curve: Vec<[f64; 2]>, (name, color, least): (&str, Color32, [f64; 2]), height: f32) {
-    plot(name)
-        .height(height)
+/// Over seconds before now; the axis that goes up shows at least `least`.
+fn strip(ui: &mut egui::Ui, (name, least): (&str, [f64; 2]), height: f32, draw: impl FnOnce(&mut PlotUi<'_>)) {
+    plot(name, height)
+        .y_grid_spacer(upwards)
+        .y_axis_formatter(|mark: GridMark, _: &_| number(mark))
         .include_x(-WINDOW_S)
         .include_x(0.0)
         .include_y(least[0])
@@ -127,21 +148,22 @@ fn strip(ui: &mut egui::Ui, curve: Vec<[f64; 2]>, (name, color, least): (&str, C
                 String::new()
             }
         })
-        .show(ui, |plot| {
-            plot.line(Line::new(name, PlotPoints::new(curve)).color(color).width(1.3))
-        });
+        .show(ui, draw);
 }
 
 /// Only to be looked at: a plot that moves must not be dragged by accident.
-fn plot(name: &str) -> Plot<'static> {
+fn plot(name: &str, height: f32) -> Plot<'static> {
     Plot::new(name.to_owned())
+        .height(height)
         .allow_drag(false)
         .allow_zoom(false)
         .allow_scroll(false)
         .allow_boxed_zoom(false)
         .allow_axis_zoom_drag(false)
         .show_x(false)
+        .custom_x_axes(vec![AxisHints::new_x().label_spacing(25.0..=35.0)])
         .custom_y_axes(vec![AxisHints::new_y().min_thickness(34.0).label_spacing(12.0..=20.0)])
+        .grid_spacing(LINES)
         .show_background(true)
         .set_margin_fraction(egui::vec2(0.0, 0.08))
 }
@@ -165,29 +187,26 @@ fn histogram_ui(ui: &mut egui::Ui, history: &History) {
             .collect()
     };
     let (wake, work) = (bars(&timing.wake_histogram, 0.25), bars(&timing.work_histogram, 0.75));
-    plot("wake-up histogram")
-        .height(66.0)
+    plot("wake-up histogram", 66.0)
         .include_x(0.0)
         .include_x(BINS as f64)
         .include_y(0.0)
         .include_y(4.8)
         .x_grid_spacer(|_| marks(0.0, 5.0, 5))
         .y_grid_spacer(|_| marks(0.0, 2.0, 2))
-        .x_axis_formatter(|mark: GridMark, _: &_| decade(bin_low_us(mark.value.max(0.0) as usize)))
+        .x_axis_formatter(|mark: GridMark, _: &_| {
+            // On the edge a label would be cut off.
+            if mark.value < BINS as f64 {
+                decade(bin_low_us(mark.value.max(0.0) as usize))
+            } else {
+                String::new()
+            }
+        })
         .y_axis_formatter(|mark: GridMark, _: &_| format!("{:.0}", 10.0_f64.powf(mark.value)))
         .show(ui, |plot| {
             plot.bar_chart(BarChart::new("wake-up", wake).color(tokens.wake));
             plot.bar_chart(BarChart::new("work", work).color(tokens.work));
         });
-}
-
-fn marks(first: f64, step: f64, count: usize) -> Vec<GridMark> {
-    (0..=count)
-        .map(|i| GridMark {
-            value: first + i as f64 * step,
-            step_size: step,
-        })
-        .collect()
 }
 
 fn decade(us: f64) -> String {

@@ -103,23 +103,22 @@ impl Trace {
         self.curves.is_empty()
     }
 
-    /// Over seconds since it began.
-    pub fn force_n(&self) -> Vec<[f64; 2]> {
+    /// Smallest and largest over seconds since it began.
+    pub fn force_n(&self) -> Vec<[f64; 3]> {
         self.curve(0)
     }
 
-    /// Over seconds since it began.
-    pub fn speed_mm_per_s(&self) -> Vec<[f64; 2]> {
+    /// Smallest and largest over seconds since it began.
+    pub fn speed_mm_per_s(&self) -> Vec<[f64; 3]> {
         self.curve(1)
     }
 
-    fn curve(&self, quantity: usize) -> Vec<[f64; 2]> {
+    fn curve(&self, quantity: usize) -> Vec<[f64; 3]> {
         let began_ns = self.began_ns.unwrap_or(0);
         let seconds = |time_ns: u64| format::seconds(time_ns.saturating_sub(began_ns));
-        let samples = self.curves.samples(quantity);
-        samples
-            .map(|(time_ns, value)| [seconds(time_ns), f64::from(value)])
-            .collect()
+        let bands = self.curves.bands(quantity);
+        let points = bands.map(|b| [seconds(b.time_ns), f64::from(b.low), f64::from(b.high)]);
+        points.collect()
     }
 
     pub fn motion(&self) -> Motion {
@@ -173,13 +172,14 @@ mod tests {
         assert!(last_ns.is_some_and(|ns| ns > 3_599_000_000_000), "{last_ns:?}");
         assert!((trace.motion().in_tissue_s - 3_599.999).abs() < 1e-6);
         let curve = trace.force_n();
+        assert!((MOST_SLOTS / 2..=MOST_SLOTS).contains(&curve.len()), "{}", curve.len());
+        assert!(curve.is_sorted_by_key(|[s, ..]| *s) && curve[0][0] < 5.2);
+        assert!(curve.last().is_some_and(|[s, ..]| *s > 3_594.0));
+        let [at_s, low, high] = *curve.iter().max_by(|a, b| a[2].total_cmp(&b[2])).expect("some");
         assert!(
-            (MOST_SLOTS / 2..=2 * MOST_SLOTS).contains(&curve.len()),
-            "{}",
-            curve.len()
+            (at_s - 5.003).abs() <= 5.13 && low < 0.1 && high == 9.0,
+            "{at_s} {low} {high}"
         );
-        assert!(curve.contains(&[5.003, 9.0]) && curve.is_sorted_by_key(|[s, _]| *s));
-        assert!(curve[0][0] < 0.2 && curve.last().is_some_and(|[s, _]| *s > 3_599.5));
     }
 
     #[test]

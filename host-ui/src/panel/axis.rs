@@ -1,0 +1,82 @@
+//! Marks on the axes of plots, and their words.
+
+use egui::Rangef;
+use egui_plot::{GridInput, GridMark};
+
+/// Between two values on an axis that goes up, points, so that each can be read.
+const BETWEEN_VALUES: f32 = 20.0;
+/// Lines of the grid nearer than the first are not seen, as far as the second are drawn in full. Plots must be given these.
+pub const LINES: Rangef = Rangef { min: 8.0, max: 300.0 };
+
+/// Marks at multiples of 1, 2 or 5 times a power of ten, at least so far apart.
+pub fn grid([from, to]: [f64; 2], at_least: f64) -> Vec<GridMark> {
+    if !(at_least > 0.0 && at_least.is_finite() && to >= from && (to - from) / at_least < 100.0) {
+        return Vec::new();
+    }
+    let power = 10.0_f64.powf(at_least.log10().floor());
+    let steps = [1.0, 2.0, 5.0].map(|n| n * power);
+    let step_size = steps.into_iter().find(|s| *s >= at_least * (1.0 - 1e-9));
+    let step_size = step_size.unwrap_or(10.0 * power);
+    let [first, last] = [(from / step_size).ceil(), (to / step_size).floor()].map(|n| n as i64);
+    let mark = |n: i64| GridMark {
+        value: n as f64 * step_size,
+        step_size,
+    };
+    (first..=last).map(mark).collect()
+}
+
+/// Of an axis that goes up.
+pub fn upwards(input: GridInput) -> Vec<GridMark> {
+    let (low, high) = input.bounds;
+    // The step that is offered is as wide as the nearest lines that are seen.
+    grid(
+        [low, high],
+        input.base_step_size * f64::from(BETWEEN_VALUES / LINES.min),
+    )
+}
+
+/// With as many decimals as the grid needs.
+pub fn number(mark: GridMark) -> String {
+    let decimals = (-mark.step_size.log10() - 1e-9).ceil().max(0.0) as usize;
+    format!("{:.decimals$}", mark.value)
+}
+
+/// From `first` on, evenly.
+pub fn marks(first: f64, step: f64, count: usize) -> Vec<GridMark> {
+    (0..=count)
+        .map(|i| GridMark {
+            value: first + i as f64 * step,
+            step_size: step,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_lie_on_round_numbers_and_no_nearer_than_asked() {
+        let told = |from, to, at_least| -> Vec<String> { grid([from, to], at_least).into_iter().map(number).collect() };
+        assert_eq!(told(0.0, 18.6, 18.6 / 5.0), ["0", "5", "10", "15"]);
+        assert_eq!(told(-0.7, 4.3, 5.0 / 2.4), ["0"]);
+        assert_eq!(told(-0.7, 4.3, 4.8 / 2.4), ["0", "2", "4"]);
+        assert_eq!(told(0.0, 1.0, 0.3), ["0.0", "0.5", "1.0"]);
+        assert_eq!(told(0.0, 0.35, 0.1), ["0.0", "0.1", "0.2", "0.3"]);
+        assert_eq!(told(-60.0, 110.0, 100.0), ["0", "100"]);
+        assert_eq!(told(0.0, 9_000.0, 3_001.0), ["0", "5000"]);
+        for bad in [[0.0, f64::NAN], [0.0, f64::INFINITY], [1.0, 0.0]] {
+            assert!(grid(bad, 0.1).is_empty(), "{bad:?}");
+        }
+        // A hundred points for 10 N, of which 20 between two values are 2 N.
+        let input = GridInput {
+            bounds: (-0.5, 9.5),
+            base_step_size: 0.1 * f64::from(LINES.min),
+        };
+        assert_eq!(
+            upwards(input).into_iter().map(number).collect::<Vec<_>>(),
+            ["0", "2", "4", "6", "8"]
+        );
+        assert!(grid([0.0, 1.0], 0.0).is_empty() && grid([0.0, 1.0], 1e-9).is_empty());
+    }
+}
