@@ -26,7 +26,7 @@ pub fn seconds(ns: u64) -> f64 {
 }
 
 pub fn length(metres: f64) -> String {
-    format!("{:.1} mm", unsigned_zero(mm(metres), 0.05))
+    format!("{} mm", decimal(mm(metres), 1))
 }
 
 /// With its sign, to be read as an error.
@@ -35,11 +35,11 @@ pub fn signed_mm(metres: f64) -> String {
 }
 
 pub fn speed(metres_per_second: f64) -> String {
-    format!("{:.1} mm/s", unsigned_zero(mm(metres_per_second), 0.05))
+    format!("{} mm/s", decimal(mm(metres_per_second), 1))
 }
 
 pub fn force(newton: f64) -> String {
-    format!("{:.2} N", unsigned_zero(newton, 0.005))
+    format!("{} N", decimal(newton, 2))
 }
 
 pub fn volume(cubic_metres: f64) -> String {
@@ -75,9 +75,10 @@ pub fn count(n: u64) -> String {
     out
 }
 
-/// Avoids "-0.0", which makes a figure at rest flicker.
-fn unsigned_zero(value: f64, half_digit: f64) -> f64 {
-    if value.abs() < half_digit { 0.0 } else { value }
+/// Without "-0.0", which makes a figure at rest flicker.
+pub fn decimal(value: f64, decimals: usize) -> String {
+    let is_zero = value.abs() < 0.5 * 10.0_f64.powi(-(decimals as i32));
+    format!("{:.decimals$}", if is_zero { 0.0 } else { value })
 }
 
 #[cfg(test)]

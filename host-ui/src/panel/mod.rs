@@ -2,6 +2,7 @@
 
 mod axis;
 pub mod help;
+mod histogram;
 pub mod history;
 pub mod parameters;
 pub mod plots;
@@ -9,6 +10,7 @@ mod seeds;
 pub mod setup;
 mod shown;
 pub mod status;
+mod strip;
 pub mod workflow;
 
 pub use seeds::{SeedError, all_errors, own_errors, seed_errors};

@@ -1,0 +1,125 @@
+//! A plot over time: smallest and largest as a band, and what it was where the pointer is.
+
+use super::axis::{LINES, grid, number, upwards};
+use crate::format;
+use egui::Color32;
+use egui_plot::{AxisHints, FilledArea, GridMark, Line, Plot, PlotPoints};
+
+pub struct Strip<'a> {
+    pub name: &'a str,
+    /// Unit and decimals of a value that is pointed at.
+    pub unit: (&'a str, usize),
+    pub color: Color32,
+    pub height: f32,
+    /// The ends of the axis of time.
+    pub seconds: [f64; 2],
+    /// The axis that goes up shows at least these.
+    pub least: [f64; 2],
+    /// Time, smallest and largest.
+    pub points: &'a [[f64; 3]],
+    /// From nothing up to the largest, where only that counts.
+    pub worst_only: bool,
+}
+
+impl Strip<'_> {
+    pub fn show(&self, ui: &mut egui::Ui) {
+        let [from_s, to_s] = self.seconds;
+        let length_s = to_s - from_s;
+        let shown = plot(self.name, self.height)
+            .y_grid_spacer(upwards)
+            .y_axis_formatter(|mark: GridMark, _: &_| number(mark))
+            .include_x(from_s)
+            .include_x(to_s)
+            .include_y(self.least[0])
+            .include_y(self.least[1])
+            .x_grid_spacer(move |_| grid([from_s, to_s], length_s / 5.0))
+            .x_axis_formatter(move |mark: GridMark, _: &_| {
+                // On the edge a label would be cut off.
+                if to_s - mark.value < 0.04 * length_s {
+                    String::new()
+                } else {
+                    format!("{} s", number(mark))
+                }
+            })
+            .show(ui, |plot| {
+                let [xs, lows, highs] = [0, 1, 2].map(|n| self.points.iter().map(|p| p[n]).collect::<Vec<f64>>());
+                let lows = if self.worst_only { vec![0.0; xs.len()] } else { lows };
+                let band = FilledArea::new(self.name, &xs, &lows, &highs).fill_color(self.color);
+                plot.add(band.allow_hover(false));
+                // Where both are the same a band has no width.
+                if !self.worst_only {
+                    let middle = self.points.iter().map(|[x, low, high]| [*x, 0.5 * (low + high)]);
+                    let line = Line::new(self.name, PlotPoints::from_iter(middle)).color(self.color);
+                    plot.line(line.width(1.3).allow_hover(false));
+                }
+            });
+        if let Some(place) = shown.response.hover_pos()
+            && let Some(text) = self.told_at(shown.transform.value_from_position(place).x)
+        {
+            shown.response.on_hover_text_at_pointer(text);
+        }
+    }
+
+    /// The value that is nearest in time.
+    fn told_at(&self, seconds: f64) -> Option<String> {
+        let after = self.points.partition_point(|[x, ..]| *x < seconds);
+        let near = [after.checked_sub(1), Some(after)].into_iter().flatten();
+        let near = near.filter_map(|n| self.points.get(n));
+        let [at_s, low, high] = near.min_by(|a, b| (a[0] - seconds).abs().total_cmp(&(b[0] - seconds).abs()))?;
+        let (unit, decimals) = self.unit;
+        let [low, high] = [low, high].map(|v| format::decimal(*v, decimals));
+        Some(if self.worst_only {
+            format!("{at_s:.1} s: at most {high} {unit}")
+        } else if low == high {
+            format!("{at_s:.1} s: {high} {unit}")
+        } else {
+            format!("{at_s:.1} s: {low} to {high} {unit}")
+        })
+    }
+}
+
+/// Only to be looked at: a plot that moves must not be dragged by accident.
+pub fn plot(name: &str, height: f32) -> Plot<'static> {
+    Plot::new(name.to_owned())
+        .height(height)
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .allow_axis_zoom_drag(false)
+        .show_x(false)
+        .show_y(false)
+        .custom_x_axes(vec![AxisHints::new_x().label_spacing(25.0..=35.0)])
+        .custom_y_axes(vec![AxisHints::new_y().min_thickness(34.0).label_spacing(12.0..=20.0)])
+        .grid_spacing(LINES)
+        .show_background(true)
+        .set_margin_fraction(egui::vec2(0.0, 0.08))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_pointed_at_is_told_with_its_time_and_unit() {
+        let points = [[-2.0, -1e-9, 0.0], [-1.96, 1.0, 3.456], [-1.92, 3.5, 3.5]];
+        let mut strip = Strip {
+            name: "force",
+            unit: ("N", 2),
+            color: Color32::WHITE,
+            height: 50.0,
+            seconds: [-10.0, 0.0],
+            least: [0.0, 1.0],
+            points: &points,
+            worst_only: false,
+        };
+        let told = |strip: &Strip<'_>, at_s| strip.told_at(at_s).expect("some");
+        assert_eq!(told(&strip, -9.0), "-2.0 s: 0.00 N");
+        assert_eq!(told(&strip, -1.97), "-2.0 s: 1.00 to 3.46 N");
+        assert_eq!(told(&strip, -1.0), "-1.9 s: 3.50 N");
+        strip.worst_only = true;
+        assert_eq!(told(&strip, -1.97), "-2.0 s: at most 3.46 N");
+        strip.points = &[];
+        assert_eq!(strip.told_at(0.0), None);
+    }
+}
