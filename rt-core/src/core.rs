@@ -328,15 +328,12 @@ fn missing_rights(options: &Options, unlocked: Option<&str>) -> String {
 type Started<R> = (JoinHandle<R>, ThreadReport);
 
 /// Starts a thread, arms it, and waits until it says what it got.
-fn spawn<R: Send + 'static>(
+fn spawn<R: Default + Send + 'static>(
     name: &str,
     ask: Ask,
     end: &Arc<AtomicBool>,
     body: impl FnOnce(&Armed, &AtomicBool) -> R + Send + 'static,
-) -> Result<Started<R>, String>
-where
-    R: Default,
-{
+) -> Result<Started<R>, String> {
     let (tell, told) = mpsc::channel();
     let end = Arc::clone(end);
     let thread = std::thread::Builder::new()

@@ -121,7 +121,7 @@ fn excess(ticks: &[Tick], from_j: f64) -> (f64, f64) {
     worst
 }
 
-fn worst<'a>(cases: &'a [Case], of: fn(&Case) -> f64) -> (f64, &'a str) {
+fn worst(cases: &[Case], of: fn(&Case) -> f64) -> (f64, &str) {
     let case = cases.iter().max_by(|a, b| of(a).total_cmp(&of(b))).expect("cases");
     (of(case), &case.name)
 }

@@ -295,7 +295,7 @@ impl eframe::App for App {
         let keys = keyboard::read(&ctx);
         let mut actions = self.frame_ui(ui);
         actions.extend(keys.actions);
-        actions.extend(self.pressed.drain(..));
+        actions.append(&mut self.pressed);
         actions.extend(self.dropped_file(&ctx));
         if ctx.input(|i| i.key_pressed(egui::Key::Escape)) {
             (self.help, self.parameters.open) = (false, false);

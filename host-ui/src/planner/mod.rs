@@ -349,11 +349,11 @@ impl Planner {
     fn step(&mut self, step: fn(&mut History) -> bool, back: fn(&mut History) -> bool) {
         let Some(mut history) = self.history.take() else { return };
         let before = history.plan().clone();
-        if step(&mut history) {
-            if let Err(why) = self.keeps(&before, history.plan()) {
-                back(&mut history);
-                self.said = Some(Err(why));
-            }
+        if step(&mut history)
+            && let Err(why) = self.keeps(&before, history.plan())
+        {
+            back(&mut history);
+            self.said = Some(Err(why));
         }
         self.history = Some(history);
         self.change();

@@ -109,7 +109,7 @@ fn plan(values: &[f64]) -> Result<PlanInForce, String> {
     if values.is_empty() {
         return Ok(plan);
     }
-    if values.len() < 6 || values.len() % 3 != 0 || values.len() / 3 - 2 > MAX_SEEDS {
+    if values.len() < 6 || !values.len().is_multiple_of(3) || values.len() / 3 - 2 > MAX_SEEDS {
         return Err(format!(
             "a plan is entry, direction and at most {MAX_SEEDS} seeds, three values each; {} values came",
             values.len()

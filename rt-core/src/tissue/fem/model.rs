@@ -145,7 +145,7 @@ impl Body {
                 .for_each(|node| self.cells.fixed[node] = true),
         }
         match self.runs.last_mut() {
-            Some(run) if run.cell + run.len == cell && cell % self.cells.grid.stride != 0 => run.len += 1,
+            Some(run) if run.cell + run.len == cell && !cell.is_multiple_of(self.cells.grid.stride) => run.len += 1,
             _ => self.runs.push(CellRun {
                 first: element as usize,
                 len: 1,
