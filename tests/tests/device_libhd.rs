@@ -398,6 +398,15 @@ fn unplugged_and_plugged_in_again_without_loading_the_library_anew() {
     fake.control.unplugged.store(0, Relaxed);
     assert!(drive(&mut device, &push(), LONG, |s| s.is_ok() && feels(&fake, 1.0)()));
     assert_eq!(fake.control.inits.load(Relaxed), 2);
+    // It is felt before it is told.
+    let is_told = || {
+        heard
+            .lock()
+            .unwrap()
+            .last()
+            .is_some_and(|t| t.contains("PHANTOM Premium"))
+    };
+    assert!(until(LONG, is_told), "{:#?}", heard.lock().unwrap());
     let told = heard.lock().unwrap().clone();
     assert!(
         told.windows(2).all(|pair| pair[0] != pair[1]),
