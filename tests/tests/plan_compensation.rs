@@ -38,7 +38,15 @@ fn first_plan(theatre: &Theatre) -> ImplantPlan {
     let kernel = DoseKernel::new(&source, Interval::ALL);
     let anatomy = Anatomy::of(&theatre.scene).expect("a closed target");
     let template = Template::before(&theatre.scene.header);
-    let plan = automatic::plan(template, &anatomy, &kernel, &source.model, &Aims::new(145.0)).expect("a plan");
+    let plan = automatic::plan(
+        template,
+        &anatomy,
+        &kernel,
+        &source.model,
+        &Aims::new(145.0),
+        |_| Ok(()),
+    )
+    .expect("a plan");
     let found = host_ui::plan::check::problems(&plan, &anatomy);
     assert!(found.is_empty(), "{found:?}");
     plan

@@ -3,9 +3,9 @@
 use super::element::Sink;
 use super::error::FileError;
 use super::frame::VoxelFrame;
-use super::open::{beside, file_name, whole};
+use super::open::{Format, beside, file_name, whole};
 use super::volume::VoxelValues;
-use super::{Progress, dicom, metaimage, nifti, nrrd};
+use super::{Progress, metaimage, nifti, nrrd};
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 
@@ -30,19 +30,18 @@ impl Image {
         let told = |why: String| FileError::of(path, &why);
         let bytes = whole(path, progress).map_err(told)?;
         let sink = Sink::greys(progress);
-        let values = if nrrd::is_nrrd(&bytes) {
-            nrrd::read_image(&bytes, &|name| beside(path, name, progress), sink)
-        } else if nifti::is_nifti(&bytes) {
-            nifti::read(&bytes, sink)
-        } else if metaimage::is_metaimage(&bytes) {
-            metaimage::read(&bytes, &|name| beside(path, name, progress), sink)
-        } else if dicom::is_dicom(&bytes) {
-            Err("images are not read from DICOM; convert the series, for example with dcm2niix".to_owned())
-        } else {
-            Err(
+        let data = |name: &str| beside(path, name, progress);
+        let values = match Format::of(&bytes) {
+            Some(Format::Nrrd) => nrrd::read_image(&bytes, &data, sink),
+            Some(Format::Nifti) => nifti::read(&bytes, sink),
+            Some(Format::MetaImage) => metaimage::read(&bytes, &data, sink),
+            Some(Format::Dicom) => {
+                Err("images are not read from DICOM; convert the series, for example with dcm2niix".to_owned())
+            }
+            None => Err(
                 "it is none of the formats that images are read from: NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd)"
                     .to_owned(),
-            )
+            ),
         };
         values
             .and_then(|values| Self::of(values, file_name(path)))

@@ -17,6 +17,28 @@ const PART_BYTES: u64 = 1 << 23;
 pub const FORMATS: &str =
     "NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr, .seg.nrrd), MetaImage (.mha, .mhd), DICOM RT Structure Set (.dcm)";
 
+/// What is in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    Dicom,
+    Nrrd,
+    Nifti,
+    MetaImage,
+}
+
+impl Format {
+    /// By its first bytes, whatever its name.
+    pub fn of(bytes: &[u8]) -> Option<Self> {
+        let tests: [(Self, fn(&[u8]) -> bool); 4] = [
+            (Self::Dicom, dicom::is_dicom),
+            (Self::Nrrd, nrrd::is_nrrd),
+            (Self::Nifti, nifti::is_nifti),
+            (Self::MetaImage, metaimage::is_metaimage),
+        ];
+        tests.into_iter().find(|(_, is)| is(bytes)).map(|(format, _)| format)
+    }
+}
+
 /// The tissue of a label volume: its structures where it names them, otherwise every label but 0 or the one asked for.
 /// A scene file says itself what is what.
 pub fn read(path: &Path, label: Option<u8>, progress: &Progress) -> Result<LabelVolume, FileError> {
@@ -42,21 +64,16 @@ pub fn file_name(path: &Path) -> String {
 pub fn read_voxels(path: &Path, progress: &Progress) -> Result<Voxels, FileError> {
     let told = |why: String| FileError::of(path, &why);
     let bytes = whole(path, progress).map_err(told)?;
-    if dicom::is_dicom(&bytes) {
-        let object = dicom::read(&bytes).map_err(told)?;
-        return dicom::structures::read(&object, path.parent()).map_err(told);
-    }
     let sink = Sink::labels(progress);
-    let voxels = if nrrd::is_nrrd(&bytes) {
-        nrrd::read(&bytes, &|name| beside(path, name, progress), sink)
-    } else if nifti::is_nifti(&bytes) {
-        nifti::read(&bytes, sink).map(|v| v.named(BTreeMap::new()))
-    } else if metaimage::is_metaimage(&bytes) {
-        metaimage::read(&bytes, &|name| beside(path, name, progress), sink).map(|v| v.named(BTreeMap::new()))
-    } else {
-        Err(format!(
+    let data = |name: &str| beside(path, name, progress);
+    let voxels = match Format::of(&bytes) {
+        Some(Format::Dicom) => dicom::read(&bytes).and_then(|object| dicom::structures::read(&object, path.parent())),
+        Some(Format::Nrrd) => nrrd::read(&bytes, &data, sink),
+        Some(Format::Nifti) => nifti::read(&bytes, sink).map(|v| v.named(BTreeMap::new())),
+        Some(Format::MetaImage) => metaimage::read(&bytes, &data, sink).map(|v| v.named(BTreeMap::new())),
+        None => Err(format!(
             "it is none of the formats that are read: {FORMATS}; export the segmentation as one of them"
-        ))
+        )),
     };
     voxels.map_err(told)
 }

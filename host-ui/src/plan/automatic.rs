@@ -89,25 +89,32 @@ struct Way {
     rim_m: f64,
 }
 
-/// Needles, seeds and their strength; an error when no needle fits.
+/// Needles, seeds and their strength; an error when no needle fits. `tell` hears the share that is done, and its error ends the search.
 pub fn plan(
     template: Template,
     anatomy: &Anatomy,
     kernel: &DoseKernel,
     source: &str,
     aims: &Aims,
+    tell: impl Fn(f32) -> Result<(), String>,
 ) -> Result<ImplantPlan, String> {
     let ways = ways(&template, anatomy, aims);
     let target = anatomy.target.structure(TRIAL_PITCH_M);
     let points = DosePoints::new(&target.points_m);
-    let tried = patterns().filter_map(|pattern| {
-        let plan = load(&template, &ways, &pattern, source, aims);
+    let patterns: Vec<Pattern> = patterns().collect();
+    let mut best: Option<(f64, ImplantPlan)> = None;
+    for (done, pattern) in patterns.iter().enumerate() {
+        tell(done as f32 / patterns.len() as f32)?;
+        let plan = load(&template, &ways, pattern, source, aims);
         let dose_gy = points.of_seeds_gy(kernel, &plan.seeds());
-        let dvh = Dvh::new(&dose_gy, &target.volumes_m3)?;
-        Some((shortfall(&plan, &dvh, aims)?, plan))
-    });
-    let best = tried.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, plan)| plan);
-    let plan =
+        let dvh = Dvh::new(&dose_gy, &target.volumes_m3);
+        if let Some(found) = dvh.and_then(|dvh| shortfall(&plan, &dvh, aims))
+            && best.as_ref().is_none_or(|(least, _)| found < *least)
+        {
+            best = Some((found, plan));
+        }
+    }
+    let (_, plan) =
         best.ok_or("no hole of the template leads through the target past what is to be spared; plan by hand")?;
     let strength_u = strength_u(&plan, anatomy, kernel, aims)?;
     Ok(plan.with_strength(strength_u))
@@ -279,30 +286,58 @@ mod tests {
     use crate::plan::anatomy::ball;
     use crate::plan::check::problems;
 
-    /// A gland of 49 cc and one of 25 cc: neither is the paper's.
-    #[test]
-    fn a_first_plan_covers_the_gland_and_has_no_problem() {
+    const TEMPLATE: Template = Template {
+        middle_m: [0.05, 0.05, -0.01],
+        columns: [-1.0, 0.0, 0.0],
+        rows: [0.0, 1.0, 0.0],
+        inwards: [0.0, 0.0, 1.0],
+        pitch_m: 5e-3,
+    };
+
+    fn iodine() -> (Source, DoseKernel) {
         let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../sources/i125_6711.toml");
         let source = Source::read(&file).unwrap();
         let kernel = DoseKernel::new(&source, Interval::ALL);
+        (source, kernel)
+    }
+
+    fn gland(half_m: [f64; 3]) -> Anatomy {
         let middle_m = [0.05, 0.05, 0.06];
+        Anatomy {
+            target: ball("gland", middle_m, half_m),
+            spared: vec![ball("urethra", middle_m, [0.003, 0.003, 0.03])],
+            lower_m: [0.0; 3],
+            upper_m: [0.1; 3],
+            patient_from_scene: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+        }
+    }
+
+    #[test]
+    fn a_search_tells_its_share_and_ends_when_it_is_told_to() {
+        let (source, kernel) = iodine();
+        let anatomy = gland([0.02, 0.0165, 0.018]);
+        let told = std::cell::RefCell::new(Vec::new());
+        let tell = |share: f32| {
+            told.borrow_mut().push(share);
+            match told.borrow().len() {
+                4 => Err("enough".to_owned()),
+                _ => Ok(()),
+            }
+        };
+        let ended = plan(TEMPLATE, &anatomy, &kernel, &source.model, &Aims::new(145.0), tell);
+        assert_eq!(ended.err().as_deref(), Some("enough"));
+        let all = patterns().count() as f32;
+        assert_eq!(*told.borrow(), [0.0, 1.0 / all, 2.0 / all, 3.0 / all]);
+    }
+
+    /// A gland of 49 cc and one of 25 cc: neither is the paper's.
+    #[test]
+    fn a_first_plan_covers_the_gland_and_has_no_problem() {
+        let (source, kernel) = iodine();
         for (half_m, most_v150) in [([0.0255, 0.0205, 0.0225], 65.0), ([0.02, 0.0165, 0.018], 65.0)] {
-            let anatomy = Anatomy {
-                target: ball("gland", middle_m, half_m),
-                spared: vec![ball("urethra", middle_m, [0.003, 0.003, 0.03])],
-                lower_m: [0.0; 3],
-                upper_m: [0.1; 3],
-                patient_from_scene: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
-            };
-            let template = Template {
-                middle_m: [0.05, 0.05, -0.01],
-                columns: [-1.0, 0.0, 0.0],
-                rows: [0.0, 1.0, 0.0],
-                inwards: [0.0, 0.0, 1.0],
-                pitch_m: 5e-3,
-            };
+            let anatomy = gland(half_m);
             let aims = Aims::new(145.0);
-            let plan = plan(template, &anatomy, &kernel, &source.model, &aims).unwrap();
+            let plan = plan(TEMPLATE, &anatomy, &kernel, &source.model, &aims, |_| Ok(())).unwrap();
             let found = problems(&plan, &anatomy);
             assert!(found.is_empty(), "{found:?}");
             let target = anatomy.target.structure(1e-3);

@@ -73,7 +73,20 @@ impl PlanArgs {
         let frames = Frames::new(&anatomy.patient_from_scene);
         let kernel = DoseKernel::new(&source, Interval::ALL);
         let plan = match &self.seeds {
-            None => automatic::plan(template, &anatomy, &kernel, &source.model, &Aims::new(prescription_gy))?,
+            None => {
+                let bar = indicatif::ProgressBar::new(100).with_style(
+                    indicatif::ProgressStyle::with_template("{bar:40} {percent} % of the patterns, {eta} left")
+                        .unwrap_or_else(|_| indicatif::ProgressStyle::default_bar()),
+                );
+                let tell = |share: f32| {
+                    bar.set_position((share * 100.0) as u64);
+                    Ok(())
+                };
+                let aims = Aims::new(prescription_gy);
+                let plan = automatic::plan(template, &anatomy, &kernel, &source.model, &aims, tell);
+                bar.finish_and_clear();
+                plan?
+            }
             Some(seeds) => {
                 let defaults = SeedDefaults {
                     strength_u: self.strength_u,

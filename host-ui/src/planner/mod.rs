@@ -190,9 +190,14 @@ impl Planner {
 
     fn take_work(&mut self) {
         let Some((job, progress)) = &mut self.work else { return };
-        match job.poll() {
-            News::None => {}
-            News::Told(Told::Progress(now)) => *progress = now,
+        let mut news = job.poll();
+        // Of several words the last is what is true.
+        while let News::Told(Told::Progress(now)) = news {
+            *progress = now;
+            news = job.poll();
+        }
+        match news {
+            News::None | News::Told(Told::Progress(_)) => {}
             News::Told(Told::Plan(plan)) => {
                 self.work = None;
                 match plan.and_then(|plan| self.can_be(plan)) {
@@ -238,7 +243,7 @@ impl Planner {
     }
 
     pub fn automatic(&mut self) {
-        self.begin_work("Looking for a first plan", |_, ground| Ok(work::automatic(ground)));
+        self.begin_work(work::FIRST_PLAN, |_, ground| Ok(work::automatic(ground)));
     }
 
     pub fn fit_strength(&mut self) {

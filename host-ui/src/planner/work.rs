@@ -18,6 +18,7 @@ use stylet_shm_schema::service::Instance;
 /// A second host finds the core within this time.
 const FIND_LIMIT: Duration = Duration::from_secs(10);
 const POLL_EVERY: Duration = Duration::from_millis(5);
+pub const FIRST_PLAN: &str = "Looking for a first plan";
 
 /// What is being done, for people.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,11 +37,22 @@ pub enum Told {
 }
 
 pub fn automatic(ground: Arc<Ground>) -> Job<Told> {
-    Job::begin("first plan", move |told, _| {
+    Job::begin("first plan", move |told, interrupt| {
+        let tell = |share: f32| {
+            let progress = Progress {
+                what: FIRST_PLAN.to_owned(),
+                share: Some(share),
+            };
+            let _ = told.send(Told::Progress(progress));
+            match interrupt.asked() {
+                true => Err("the search was ended".to_owned()),
+                false => Ok(()),
+            }
+        };
         let plan = exchange::usual().and_then(|(source, prescription_gy)| {
             let kernel = DoseKernel::new(&source, Interval::ALL);
             let aims = Aims::new(prescription_gy);
-            automatic::plan(ground.template, &ground.anatomy, &kernel, &source.model, &aims)
+            automatic::plan(ground.template, &ground.anatomy, &kernel, &source.model, &aims, tell)
         });
         // The window may be gone by now; then nobody wants the answer.
         let _ = told.send(Told::Plan(plan));
