@@ -23,6 +23,7 @@ mod picture;
 pub mod plan;
 pub mod planner;
 pub mod procedure;
+mod progress_bar;
 pub mod record;
 pub mod score;
 pub mod settings;

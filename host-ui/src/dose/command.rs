@@ -10,6 +10,7 @@ use super::source::Source;
 use super::structure::Structure;
 use super::{DoseGrid, DosePoints, contours, labels, perturb, picture, structure};
 use crate::interrupt::Interrupt;
+use crate::progress_bar::progress_bar;
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -181,10 +182,7 @@ impl PerturbArgs {
         let stop = Interrupt::on_signals()?;
         write::folder(&c.out)?;
         let planned = judge.values(&judge.judge(&kernel, &plan));
-        let bar = indicatif::ProgressBar::new(self.trials).with_style(
-            indicatif::ProgressStyle::with_template("{bar:40} {pos}/{len} trials, {eta} left")
-                .unwrap_or_else(|_| indicatif::ProgressStyle::default_bar()),
-        );
+        let bar = progress_bar(self.trials, "trials");
         let trials = perturb::trials(&judge, &kernel, &plan, how, &stop, || bar.inc(1));
         bar.finish_and_clear();
         if trials.is_empty() {

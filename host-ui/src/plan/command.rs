@@ -9,6 +9,7 @@ use crate::dose::files::SeedDefaults;
 use crate::dose::report::Judge;
 use crate::dose::{DoseKernel, Source};
 use crate::procedure::{Connect, Live};
+use crate::progress_bar::progress_bar;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -74,10 +75,7 @@ impl PlanArgs {
         let kernel = DoseKernel::new(&source, Interval::ALL);
         let plan = match &self.seeds {
             None => {
-                let bar = indicatif::ProgressBar::new(100).with_style(
-                    indicatif::ProgressStyle::with_template("{bar:40} {percent} % of the patterns, {eta} left")
-                        .unwrap_or_else(|_| indicatif::ProgressStyle::default_bar()),
-                );
+                let bar = progress_bar(100, "% of the patterns");
                 let tell = |share: f32| {
                     bar.set_position((share * 100.0) as u64);
                     Ok(())
