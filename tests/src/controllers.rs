@@ -1,11 +1,11 @@
 //! Gamepads and 3D mice that are not there: what they say is written by the test, in events of the kernel.
 
 use evdev::{AbsInfo, AbsoluteAxisCode, AttributeSet, EventType, InputEvent, KeyCode};
-use host_ui::controller::{Found, Ground, Kind, Opened, Whole};
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+use stylet_controllers::{Found, Ground, Kind, Opened, Whole};
 
 /// `ENODEV`: what the kernel says of a device that was pulled out.
 const NO_SUCH_DEVICE: i32 = 19;

@@ -8,11 +8,11 @@ pub mod stopped;
 pub mod window;
 pub mod window_process;
 
-use host_ui::link::{Link, LinkStatus};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
+use stylet_host::link::{Link, LinkStatus};
 use stylet_shm_schema::CommandKind;
 use stylet_shm_schema::service::Instance;
 

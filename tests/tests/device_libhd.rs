@@ -5,11 +5,11 @@ mod common;
 
 use fake_hd::control::{get, put};
 use nalgebra::Vector3;
-use rt_core::rt::heap;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicU32, AtomicU64};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+use stylet_heap as heap;
 use stylet_hw::libhd::session::Trouble;
 use stylet_hw::libhd::{Api, OpenError, diagnose};
 use stylet_hw::{Device, DeviceFault, Phantom, PhantomConfig, Wrench};

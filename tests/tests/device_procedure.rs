@@ -2,11 +2,11 @@
 
 use fake_hd::Control;
 use fake_hd::control::{VARIABLE, get};
-use host_ui::link::Link;
-use host_ui::workflow::{NeedlePlan, Pace, Run, RunStatus, Step, default_plan};
 use nalgebra::Vector3;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
+use stylet_host::link::Link;
+use stylet_implant::workflow::{NeedlePlan, Pace, Run, RunStatus, Step, default_plan};
 use stylet_shm_schema::{CommandKind, EventKind, Fault, TickRecord, flags};
 use stylet_tests::phantom::library;
 use stylet_tests::{Core, ask, scratch, until};

@@ -1,13 +1,13 @@
 //! Dose-volume histograms against closed forms: spheres and cylinders in fields that can be integrated by hand.
 
-use host_ui::dose::labels::structures;
-use host_ui::dose::mesh::Mesh;
-use host_ui::dose::metric::Value;
-use host_ui::dose::{DoseGrid, Dvh, Metric, Region, Structure};
-use host_ui::files::{VoxelFrame, Voxels};
 use nalgebra::{Rotation3, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
+use stylet_dose::labels::structures;
+use stylet_dose::mesh::Mesh;
+use stylet_dose::metric::Value;
+use stylet_dose::{DoseGrid, Dvh, Metric, Region, Structure};
+use stylet_files::{VoxelFrame, Voxels};
 
 const GRID_M: f64 = 1e-3;
 const MIDDLE: [f64; 3] = [0.0303, 0.0288, 0.0316];

@@ -1,10 +1,10 @@
 //! The dose grid against the straightforward loop over the formulae.
 
-use host_ui::dose::decay::Interval;
-use host_ui::dose::isodose::isodose;
-use host_ui::dose::mesh::Mesh;
-use host_ui::dose::{DoseGrid, DoseKernel, DosePoints, Seed, Source};
 use std::path::Path;
+use stylet_dose::decay::Interval;
+use stylet_dose::isodose::isodose;
+use stylet_dose::mesh::Mesh;
+use stylet_dose::{DoseGrid, DoseKernel, DosePoints, Seed, Source};
 
 fn kernel(name: &str) -> DoseKernel {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../sources/{name}.toml"));

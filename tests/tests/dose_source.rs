@@ -1,8 +1,8 @@
 //! Source files: ours are consistent in themselves, and a bad one is told all that is wrong in it.
 
-use host_ui::dose::Source;
-use host_ui::dose::tg43::Formalism;
 use std::path::Path;
+use stylet_dose::Source;
+use stylet_dose::tg43::Formalism;
 
 fn text(name: &str) -> String {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../sources/{name}.toml"));

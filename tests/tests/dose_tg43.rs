@@ -1,9 +1,9 @@
 //! TG-43 against an evaluation by another program, and its limits where the formulae have none.
 
-use host_ui::dose::decay::Interval;
-use host_ui::dose::tg43::Formalism;
-use host_ui::dose::{DoseKernel, DosePoints, Seed, Source};
 use std::path::Path;
+use stylet_dose::decay::Interval;
+use stylet_dose::tg43::Formalism;
+use stylet_dose::{DoseKernel, DosePoints, Seed, Source};
 
 struct Reference {
     source: String,

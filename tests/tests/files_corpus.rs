@@ -2,8 +2,8 @@
 //!
 //! The corpora hold what fuzzing started from and what it found (docs/tools/fuzz).
 
-use host_ui::files;
 use std::path::{Path, PathBuf};
+use stylet_files as files;
 
 /// What all readers together may take beside what the test has (KiB).
 const MAX_KIB: u64 = 1 << 20;

@@ -1,9 +1,9 @@
 //! DICOM of another program (pydicom) is read as it says, and what we write is the same to that program.
 
-use host_ui::files::dicom::{self, plan};
-use host_ui::files::{self, Voxels};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use stylet_files::dicom::{self, plan};
+use stylet_files::{self as files, Voxels};
 use stylet_tests::{program, scratch};
 
 fn folder() -> PathBuf {

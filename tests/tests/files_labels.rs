@@ -1,8 +1,8 @@
 //! Label volumes written by SimpleITK and pynrrd lie where those programs say, and each writer of ours is read back.
 
-use host_ui::files::{self, Voxels};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use stylet_files::{self as files, Voxels};
 use stylet_tests::scratch;
 
 fn folder() -> PathBuf {

@@ -1,11 +1,12 @@
 //! Coupled mode: the force from 200 Hz answers against the tissue solved at every tick, over one insertion.
 
 use nalgebra::Vector3;
-use rt_core::rt::world::World;
-use rt_core::scene::Scene;
-use rt_core::tissue::{TissueKind, TissueParameters};
 use stylet_benches::desk::{Desk, axis_start};
 use stylet_hw::Hand;
+use stylet_runtime::rt::world::World;
+use stylet_sim::limits::TissueParameters;
+use stylet_sim::scene::Scene;
+use stylet_sim::scene::TissueKind;
 
 /// Follows its path to a micrometre whatever the force, so that two sessions have one motion.
 const GUIDED: Hand = Hand {

@@ -1,8 +1,8 @@
 //! Every hand of the envelope, every lateness of the link, three places: does the loop sing?
 
-use rt_core::needle::LayerKind;
 use stylet_benches::rig::{Rig, Tick, hand_envelope};
 use stylet_hw::{Hand, LinkFaults};
+use stylet_sim::needle::LayerKind;
 
 /// Where the needle is brought to rest.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,8 @@
 //! The hard cases of force and needle, each with its figure: underflow, rest, quantisation, bad samples.
 
-use rt_core::needle::{LayerKind, NeedleInput, NeedleParameters, NeedleState, Phase, step, transmission};
 use stylet_benches::rig::{Rig, Tick};
 use stylet_hw::{Hand, LinkFaults};
+use stylet_sim::needle::{LayerKind, NeedleInput, NeedleParameters, NeedleState, Phase, step, transmission};
 
 const GLAND: &[(f64, LayerKind)] = &[(0.0, LayerKind::Gland)];
 

@@ -1,13 +1,13 @@
 //! Insertions at the speeds of the clinic: forces of each layer, what gives way, and how far the gland goes along.
 
-use host_ui::workflow::default_plan;
 use nalgebra::Vector3;
-use rt_core::needle::{LayerKind, Layers, Phase};
-use rt_core::rt::world::World;
-use rt_core::scene::Scene;
-use rt_core::tissue::TissueParameters;
 use stylet_benches::desk::{Desk, axis_start, gland_shift_m};
 use stylet_hw::Hand;
+use stylet_implant::workflow::default_plan;
+use stylet_runtime::rt::world::World;
+use stylet_sim::limits::TissueParameters;
+use stylet_sim::needle::{LayerKind, Layers, Phase};
+use stylet_sim::scene::Scene;
 use stylet_tests::rehearsal::Theatre;
 
 /// What an insertion was.

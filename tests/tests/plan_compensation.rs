@@ -1,15 +1,15 @@
 //! Compensation halves the mean seed error at least, on plans and glands that it was not tuned on; and the page that says so.
 
-use host_ui::dose::decay::Interval;
-use host_ui::dose::{DoseKernel, Source};
-use host_ui::plan::automatic::{self, Aims};
-use host_ui::plan::compensate::summary_m;
-use host_ui::plan::{Anatomy, ImplantPlan, Limits, Needle, Template, compensate};
-use host_ui::workflow::{Pace, plan_with_seeds};
-use rt_core::scene::Labels;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::Instant;
+use stylet_dose::decay::Interval;
+use stylet_dose::{DoseKernel, Source};
+use stylet_implant::plan::automatic::{self, Aims};
+use stylet_implant::plan::compensate::summary_m;
+use stylet_implant::plan::{Anatomy, ImplantPlan, Limits, Needle, Template, compensate};
+use stylet_implant::workflow::{Pace, plan_with_seeds};
+use stylet_sim::scene::Labels;
 use stylet_tests::rehearsal::Theatre;
 
 /// The default of the scripted hand, and the mean of the fastest in the clinic (design, section 9).
@@ -47,7 +47,7 @@ fn first_plan(theatre: &Theatre) -> ImplantPlan {
         |_| Ok(()),
     )
     .expect("a plan");
-    let found = host_ui::plan::check::problems(&plan, &anatomy);
+    let found = stylet_implant::plan::check::problems(&plan, &anatomy);
     assert!(found.is_empty(), "{found:?}");
     plan
 }
@@ -58,7 +58,7 @@ fn default_needle(theatre: &Theatre, seeds: usize) -> Needle {
     let mut needle = first_plan_needle(plan.entry_m, plan.direction);
     for place in &plan.seeds_m {
         let along_m = needle.along_m(*place);
-        needle.seeds.push(host_ui::plan::NeedleSeed {
+        needle.seeds.push(stylet_implant::plan::NeedleSeed {
             along_m,
             strength_u: 0.5,
         });
@@ -73,7 +73,7 @@ fn first_plan_needle(entry_m: [f64; 3], direction: [f64; 3]) -> Needle {
         direction,
         depth_m: 0.0,
         retract_to_m: 0.0,
-        loading: host_ui::plan::Loading::Loose,
+        loading: stylet_implant::plan::Loading::Loose,
         seeds: Vec::new(),
     }
 }

@@ -1,10 +1,10 @@
 //! A rehearsal says what the live run does: same scene, same needle, seeds within a stated bound; and it disturbs nothing.
 
-use host_ui::interrupt::Interrupt;
-use host_ui::link::Link;
-use host_ui::plan::rehearse::{Drops, LinkRehearser, Rehearser};
-use host_ui::workflow::{NeedleTask, Pace, Run, RunStatus, default_plan};
 use std::time::Duration;
+use stylet_base::interrupt::Interrupt;
+use stylet_host::link::Link;
+use stylet_implant::plan::rehearse::{Drops, LinkRehearser, Rehearser};
+use stylet_implant::workflow::{NeedleTask, Pace, Run, RunStatus, default_plan};
 use stylet_shm_schema::{CommandKind, Event, EventKind, Fault, flags};
 use stylet_tests::{Core, ask, until};
 

@@ -7,7 +7,7 @@ use stylet_tests::stopped::{StoppedThread, is_dead};
 use stylet_tests::{Core, ask, left_behind, until};
 
 /// Words that the operator reads about a fault.
-fn told(link: &host_ui::link::Link, fault: Fault) -> bool {
+fn told(link: &stylet_host::link::Link, fault: Fault) -> bool {
     let kind = EventKind::FaultRaised as u32;
     link.events()
         .iter()
@@ -103,13 +103,13 @@ fn a_core_that_is_stopped_whole_and_goes_on_turns_the_force_off_and_lives() {
     send(libc::SIGSTOP);
     let silent = until(Duration::from_secs(3), || {
         hand.take();
-        !matches!(hand.link.status(), host_ui::link::LinkStatus::Live)
+        !matches!(hand.link.status(), stylet_host::link::LinkStatus::Live)
     });
     assert!(silent, "the operator does not see that the core is silent");
     std::thread::sleep(Duration::from_millis(700));
     send(libc::SIGCONT);
     let back = hand.watch_until(Duration::from_secs(3), |link| {
-        link.status() == host_ui::link::LinkStatus::Live
+        link.status() == stylet_host::link::LinkStatus::Live
     });
     assert!(back && core.is_running(), "the core did not come back");
     hand.watch(Duration::from_millis(500));

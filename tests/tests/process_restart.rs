@@ -1,8 +1,8 @@
 //! Cores that are killed, restarted, doubled, or find no memory: what the operator reads, and what is left.
 
-use host_ui::link::{Link, LinkStatus};
 use std::process::{Command, Stdio};
 use std::time::Duration;
+use stylet_host::link::{Link, LinkStatus};
 use stylet_shm_schema::CommandKind;
 use stylet_shm_schema::service::Instance;
 use stylet_tests::hand::{Insertion, assert_undisturbed};

@@ -1,9 +1,9 @@
 //! Flight recordings of a running core, repeated in another process: every force and every element, bit for bit.
 
-use rt_core::replay::{file::Flight, repeat};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::Duration;
+use stylet_runtime::replay::{file::Flight, repeat};
 use stylet_shm_schema::{CommandKind, EventKind, ParameterId, TickRecord};
 use stylet_tests::hand::Insertion;
 use stylet_tests::stopped::StoppedThread;

@@ -113,7 +113,7 @@ fn a_recording_with_the_window_open_loses_no_tick_and_others_read_it() {
     drop(window);
 
     // What this program reads is what the host saw.
-    let recording = host_ui::record::read(&file).expect("readable");
+    let recording = stylet_host::record::read(&file).expect("readable");
     assert!(
         recording.ticks.len() as f64 > 900.0 * seconds(),
         "{} ticks",
@@ -181,7 +181,7 @@ fn a_recorded_hand_plays_again_and_the_forces_are_those_of_then() {
     println!("{}", text(&output));
     assert!(output.status.success());
     let rows = std::fs::read_to_string(&table).expect("written");
-    let ticks = host_ui::record::read(Path::new(&file)).expect("readable").ticks;
+    let ticks = stylet_host::record::read(Path::new(&file)).expect("readable").ticks;
     assert_eq!(rows.lines().count(), ticks.len() + 1, "one row a tick");
 
     let mut core = Core::start_with(&["--rt-if-allowed", "--device", &format!("replay:{motion}")]);

@@ -1,7 +1,7 @@
 //! After arming, neither real-time thread allocates or faults a page, over 10,000 ticks of each, with a procedure running.
 
-use host_ui::workflow::{Pace, Run, RunStatus, default_plan};
 use std::time::Duration;
+use stylet_implant::workflow::{Pace, Run, RunStatus, default_plan};
 use stylet_tests::{Core, until};
 
 #[test]

@@ -1,9 +1,9 @@
 //! Rubbish in shared memory neither crashes nor stops either side, and is refused with a reason.
 
 use bytemuck::{Pod, Zeroable, pod_read_unaligned};
-use host_ui::link::{Link, LinkStatus};
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
 use std::time::Duration;
+use stylet_host::link::{Link, LinkStatus};
 use stylet_shm_schema::service::{self, create_state_board};
 use stylet_shm_schema::*;
 use stylet_tests::{Alone, Core, ask, fresh_instance, until};

@@ -97,7 +97,7 @@ fn every_format_gives_the_same_structures_at_the_same_place() {
     for path in formats(&folder) {
         let name = path.file_name().expect("named").to_string_lossy().into_owned();
         let volume =
-            host_ui::files::read(&path, None, &host_ui::files::Progress::default()).unwrap_or_else(|e| panic!("{e}"));
+            stylet_files::read(&path, None, &stylet_files::Progress::default()).unwrap_or_else(|e| panic!("{e}"));
         let before = link.scene().expect("live").header.generation;
         let id = link.upload(&volume).expect("sent");
         let shown = until(Duration::from_secs(60), || {
@@ -145,7 +145,7 @@ fn every_format_gives_the_same_structures_at_the_same_place() {
     }
 }
 
-fn centre_of_cells(v: &host_ui::files::LabelVolume, label: u8) -> [f64; 3] {
+fn centre_of_cells(v: &stylet_files::LabelVolume, label: u8) -> [f64; 3] {
     let (mut sum, mut count) = ([0.0; 3], 0.0);
     for (index, _) in v.cells.iter().enumerate().filter(|(_, c)| **c == label) {
         let at = [

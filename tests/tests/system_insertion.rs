@@ -1,8 +1,8 @@
 //! One insertion through both processes: gland, force and seeds do what the paper describes.
 
-use host_ui::link::Link;
-use host_ui::workflow::{Pace, Run, RunStatus, default_plan};
 use std::time::Duration;
+use stylet_host::link::Link;
+use stylet_implant::workflow::{Pace, Run, RunStatus, default_plan};
 use stylet_shm_schema::{Phase, TickRecord, flags};
 use stylet_tests::{Core, until};
 

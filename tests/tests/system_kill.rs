@@ -1,8 +1,8 @@
 //! SIGKILL of the host in the middle of an insertion: the loop does not notice, and a new host sees the insertion.
 
-use host_ui::link::LinkStatus;
-use host_ui::workflow::{default_plan, move_values, plan_values};
 use std::time::Duration;
+use stylet_host::link::LinkStatus;
+use stylet_implant::workflow::{default_plan, move_values, plan_values};
 use stylet_shm_schema::{CommandKind, Phase, TickRecord};
 use stylet_tests::window_process::Window;
 use stylet_tests::{Core, Display, ask, until};

@@ -1,14 +1,14 @@
 //! Scenes of many structures, live: built in, sent by a host, and refused with every reason while the running one goes on.
 
 use bytemuck::Zeroable;
-use host_ui::link::Link;
-use host_ui::workflow::{Pace, Run, RunStatus, default_plan};
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
-use rt_core::scene::{Role, Scene};
 use std::process::Command;
 use std::time::Duration;
+use stylet_host::link::Link;
+use stylet_implant::workflow::{Pace, Run, RunStatus, default_plan};
 use stylet_shm_schema::service;
 use stylet_shm_schema::*;
+use stylet_sim::scene::{Role, Scene};
 use stylet_tests::{Core, ask, program, until};
 
 /// Waits until a host sees the scene and its surface move.

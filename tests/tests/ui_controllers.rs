@@ -3,8 +3,8 @@
 use egui_kittest::kittest::Queryable;
 use evdev::{AbsoluteAxisCode, KeyCode};
 use host_ui::app::App;
-use host_ui::controller::{Controllers, Kind};
 use std::time::Duration;
+use stylet_controllers::{Controllers, Kind};
 use stylet_shm_schema::flags;
 use stylet_tests::controllers::Table;
 use stylet_tests::window::{Driven, is_at_rest, misplaced};

@@ -2,12 +2,12 @@
 
 use egui_kittest::kittest::{NodeT, Queryable, by};
 use host_ui::app::App;
-use host_ui::files::{Image, Progress};
 use host_ui::view::slice::Orientation;
 use host_ui::view::slice::field::Field;
 use nalgebra::{Rotation3, Vector3};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use stylet_files::{Image, Progress};
 use stylet_tests::scratch;
 use stylet_tests::window::{Driven, misplaced};
 

@@ -3,10 +3,10 @@
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use host_ui::app::App;
-use host_ui::plan::{Hole, ImplantPlan, Loading, Row, Template, exchange};
 use host_ui::planner::NeedleState;
 use std::path::Path;
 use std::time::{Duration, Instant};
+use stylet_implant::plan::{Hole, ImplantPlan, Loading, Row, Template, exchange};
 use stylet_shm_schema::SceneHeader;
 use stylet_tests::scratch;
 use stylet_tests::window::{Driven, is_at_rest, keep_for_docs, misplaced};

@@ -2,9 +2,10 @@
 
 use super::axis::{marks, plot};
 use super::history::{BINS, Timing, bin_low_us};
-use crate::{format, theme};
+use crate::theme;
 use egui::RichText;
 use egui_plot::{Bar, BarChart, GridMark};
+use stylet_base::format;
 
 /// Height of a bar of one tick.
 const ONE_TICK: f64 = 0.4;

@@ -1,9 +1,9 @@
 //! The last seconds of the force loop, in bounded memory, and what can be said of its timing.
 
-use crate::envelope::Envelope;
-use crate::format;
 use hdrhistogram::Histogram;
 use std::collections::VecDeque;
+use stylet_base::envelope::Envelope;
+use stylet_base::format;
 use stylet_shm_schema::TickRecord;
 
 /// Seconds that the plots show.

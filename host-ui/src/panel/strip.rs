@@ -1,9 +1,9 @@
 //! A plot over time: smallest and largest as a band, and what it was where the pointer is.
 
 use super::axis::{grid, number, plot, upwards};
-use crate::format;
 use egui::Color32;
 use egui_plot::{FilledArea, GridMark, Line, PlotPoints};
+use stylet_base::format;
 
 pub struct Strip<'a> {
     pub name: &'a str,

@@ -3,8 +3,9 @@
 use crate::drive::{Seen, drive};
 use crate::models::{Kind, block, block_on_bone, body};
 use crate::table::Row;
-use rt_core::scene::{Scene, Structure};
-use rt_core::tissue::{Deformed, Held, TissueModel, TissueParameters};
+use stylet_sim::limits::TissueParameters;
+use stylet_sim::scene::{Scene, Structure};
+use stylet_sim::tissue::{Deformed, Held, TissueModel};
 
 const TICK_S: f64 = 5e-3;
 /// The tolerance of both models.

@@ -1,6 +1,6 @@
 //! Drives a tissue model through a script and looks at every tick: finite, unfolded, residual, still.
 
-use rt_core::tissue::{Deformed, Held, HeldOutcome, TissueModel};
+use stylet_sim::tissue::{Deformed, Held, HeldOutcome, TissueModel};
 
 /// What was seen over a whole run.
 #[derive(Clone, Debug)]

@@ -1,7 +1,8 @@
 //! The tissue models that every case is put to, and the bodies it is put to them on.
 
-use rt_core::scene::{Labels, Scene, Structure};
-use rt_core::tissue::{ChainMailTissue, FemTissue, Limits, TissueModel, TissueParameters};
+use stylet_sim::limits::{Limits, TissueParameters};
+use stylet_sim::scene::{Labels, Scene, Structure};
+use stylet_sim::tissue::{ChainMailTissue, FemTissue, TissueModel};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {

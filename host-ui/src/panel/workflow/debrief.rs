@@ -3,9 +3,10 @@
 use crate::dose_desk::{DosePicture, Figure, Limit};
 use crate::panel::axis::{plot, upwards};
 use crate::panel::{Action, SeedError, Shown, all_errors};
-use crate::{format, theme};
+use crate::theme;
 use egui::RichText;
 use egui_plot::{Line, PlotPoints, VLine};
+use stylet_base::format;
 
 /// Rows of the table of seeds at once; the rest is scrolled to.
 const TABLE_HEIGHT: f32 = 150.0;
