@@ -147,15 +147,17 @@ fn row(gland: &'static str, mut theatre: Theatre, needles: &[Needle], insert_m_p
 const HEAD: &str = "\
 # Compensation
 
-Error of seeds at rest against plan, dropped as planned and dropped where compensation says, as the core's rehearsal has it. The test
-that holds it writes this page: `UPDATE_DOCS=1 cargo test --release -p stylet-tests --test plan_compensation`. Nothing in
-`host-ui/src/plan/compensate.rs` was fitted to any of these glands: its limits come from tissues of known motion in its unit tests.
+Errors of seeds at rest relative to the plan, dropped as planned and dropped where compensation says, from rehearsals of the core.
+The test that checks these figures writes this page: `UPDATE_DOCS=1 cargo test --release -p stylet-tests --test plan_compensation`.
+Nothing in `plan/compensate.rs` was fitted to any of these glands: its limits come from tissues of known motion in its unit tests.
 
-Plans are the automatic ones (modified peripheral loading, I-125 6711, 145 Gy) but where it says otherwise. Strands keep their pitch,
-so one shift serves all their seeds. *Not as planned*: needles whose last drop, if dropped as planned, would leave the tip outside the
-tissue, which has moved ahead of it; they count after compensation
-only. *Not possible*: needles whose tissue, dragged along by a slow tip, leaves the last seeds outside whatever the drops; a faster tip
-drags less (eq. 6).
+Plans are the automatic ones (modified peripheral loading, I-125 6711, 145 Gy) unless stated otherwise. Strands keep their pitch, so
+one shift applies to all their seeds.
+
+- *Not as planned*: needles whose last drop, if dropped as planned, would leave the tip outside the tissue, which has moved ahead of
+  it. They count only after compensation.
+- *Not possible*: needles whose tissue, dragged along by a slow tip, leaves the last seeds outside wherever they are dropped. A
+  faster tip drags less (eq. 6).
 
 | gland | speed in | needles | not as planned | not possible | seeds | mean before | mean after | worst before | worst after | rehearsals | time |
 |---|---|---|---|---|---|---|---|---|---|---|---|

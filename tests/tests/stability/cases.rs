@@ -16,7 +16,7 @@ pub const SHORT: [(u32, Kind, &str); 4] = [
     (
         3,
         Kind::Fem,
-        "small strain knows no limit on a cell: pushed by more than an element or two in a body this small, cells beside the tip fold",
+        "small strain has no limit for a cell: when the tip moves by more than an element or two in a body this small, cells beside it fold",
     ),
     (
         5,
@@ -26,12 +26,12 @@ pub const SHORT: [(u32, Kind, &str); 4] = [
     (
         7,
         Kind::Fem,
-        "at 0.499 forty cycles do not always meet the tolerance within one tick; the answer follows a few ticks later",
+        "at 0.499, forty cycles do not always meet the tolerance within one tick; the answer follows a few ticks later",
     ),
     (
         14,
         Kind::Fem,
-        "as in (3), by a hundredth: the cells between hard and soft",
+        "as in (3), by a hundredth, in the cells between hard and soft",
     ),
 ];
 
@@ -70,7 +70,7 @@ const CASES: [Case; 15] = [
     Case {
         number: 4,
         name: "two held ends pulled apart",
-        should: "as far as the limits let it, and says so",
+        should: "as far as the limits permit, and reported",
         run: pulled_apart,
     },
     Case {
@@ -94,7 +94,7 @@ const CASES: [Case; 15] = [
     Case {
         number: 8,
         name: "load on one node",
-        should: "finite; said to depend on the spacing",
+        should: "finite; documented to depend on the spacing",
         run: one_node,
     },
     Case {
@@ -277,7 +277,7 @@ fn pulled_apart(kind: Kind) -> Option<(String, bool)> {
     });
     let reached = model.deformed().displacement(element)[2];
     let happened = format!(
-        "reached {reached:.1} of 29.5, told so in {} ticks, residual {:.0e}",
+        "reached {reached:.1} of 29.5, reported in {} ticks, residual {:.0e}",
         seen.limited, seen.worst_residual
     );
     // Twelve links, each up to 0.75 longer.
@@ -299,12 +299,12 @@ fn beside_bone(kind: Kind) -> Option<(String, bool)> {
         .iter()
         .fold(0.0_f64, |m, c| m.max(c.abs()));
     let happened = format!(
-        "{}, told so in {} ticks, bone moved {moved:.0e}",
+        "{}, reported in {} ticks, bone moved {moved:.0e}",
         words(&seen),
         seen.limited
     );
-    let told = (kind == Kind::Fem || seen.limited > 0) && seen.least_corner > -1e-3;
-    Some((happened, sound(&seen) && told && moved == 0.0))
+    let reported = (kind == Kind::Fem || seen.limited > 0) && seen.least_corner > -1e-3;
+    Some((happened, sound(&seen) && reported && moved == 0.0))
 }
 
 fn relaxation_bound(kind: Kind) -> Option<(String, bool)> {

@@ -19,13 +19,13 @@ pub struct Row {
 const HEAD: &str = "\
 # Numerical stability
 
-What every tissue model does with the hard cases: what should happen, what happened, with the figure. The suite that runs them
-writes this page: `UPDATE_DOCS=1 cargo test --release -p stylet-tests --test physics_stability`. Without `UPDATE_DOCS` it
-runs the same cases and fails where one is not met, or is missing here.
+How every tissue model handles the hard cases: what should happen and what happened, with figures. The suite that runs the cases
+writes this page: `UPDATE_DOCS=1 cargo test --release -p stylet-tests --test physics_stability`. Without `UPDATE_DOCS` it runs the
+same cases and fails if one is not met or is missing here.
 
-Lengths are in elements. *Corner* is the smallest volume that three links of an element span, over that at rest; a cell folds where
-it is not above zero. *Residual* is, for ChainMail, the largest violation of a limit; for FEM, the residual force over
-the tip's force.
+Lengths are in elements. *Corner* is the smallest volume that three links of an element span, relative to that at rest; a cell folds
+where it is not above zero. *Residual* is, for ChainMail, the largest violation of a limit; for FEM, the residual force relative to
+the force of the tip.
 
 ";
 
@@ -55,7 +55,7 @@ pub fn write_or_compare(rows: &[Row]) {
 
 /// Why rows are not met.
 fn shortfalls(rows: &[Row]) -> String {
-    let mut text = String::from("\nWhy what is not met is not:\n\n");
+    let mut text = String::from("\nWhy some cases are not met:\n\n");
     for (number, kind, why) in SHORT {
         if rows.iter().any(|row| is(row, number, kind) && !row.met) {
             writeln!(text, "- ({number}) {}: {why}.", kind.name()).expect("a string takes all");
