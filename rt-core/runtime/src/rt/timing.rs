@@ -143,7 +143,7 @@ pub struct Probes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stylet_heap;
+    use stylet_heap as heap;
 
     #[test]
     fn handing_over_makes_no_heap_call_and_counts_what_does_not_fit() {

@@ -241,7 +241,7 @@ fn shear_just_inside_equation_1_is_solved() {
         shear_vert_deg: 12.6,
         ..TissueParameters::default()
     };
-    assert!(super::super::folding([60.0, 12.6, 12.6]) > 0.99);
+    assert!(crate::limits::folding([60.0, 12.6, 12.6]) > 0.99);
     let run = wander(&test_bodies::with_hole(), &wide, 1.0, 300, 4);
     println!("smallest corner {}", run.smallest_corner);
 }

@@ -5,7 +5,7 @@ use crate::limits::TissueParameters;
 use crate::scene::test_bodies::{self, Random};
 use crate::tissue::chainmail::*;
 use crate::tissue::{HeldOutcome, largest_violation};
-use stylet_heap;
+use stylet_heap as heap;
 
 /// A random walk of one element after the other.
 pub(super) struct Walk {

@@ -3,7 +3,7 @@
 use super::*;
 use crate::tissue::fem::tissue::LIVE_CYCLES;
 use crate::tissue::{Held, TissueModel};
-use stylet_heap;
+use stylet_heap as heap;
 
 const LIVE: SolveSettings = SolveSettings {
     relative_tolerance: 1e-3,

@@ -2,7 +2,7 @@
 
 use super::*;
 use nalgebra::{DMatrix, DVector};
-use stylet_heap;
+use stylet_heap as heap;
 
 fn patch(lattice: &Lattice, element: u32, by_m: [f64; 3], edge_m: f64) -> TipPatch {
     let rest = lattice.rest_m(element);
