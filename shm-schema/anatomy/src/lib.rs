@@ -1,0 +1,10 @@
+//! Knowledge of the patient that every part shares: what an organ is by its name, what it is made of, and the patient's frame.
+#![warn(missing_docs)]
+
+mod frame;
+mod organ;
+mod tissue;
+
+pub use frame::{PatientFrame, ras_from_lps};
+pub use organ::{Organ, Part, target_among};
+pub use tissue::{Material, Role};

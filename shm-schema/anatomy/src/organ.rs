@@ -1,0 +1,222 @@
+//! The one classifier of structures by name: names of TG-263, and what people write instead.
+
+use crate::tissue::{Material, Role};
+
+/// An organ, or a volume that is drawn for the treatment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Organ {
+    /// PTV, CTV, GTV or ITV.
+    TargetVolume,
+    /// Where the prostate was before its removal.
+    ProstateBed,
+    /// The prostate.
+    Prostate,
+    /// A seminal vesicle.
+    SeminalVesicle,
+    /// The urethra.
+    Urethra,
+    /// The rectum as a whole.
+    Rectum,
+    /// The wall of the rectum, or another part of it.
+    RectalWall,
+    /// The urinary bladder.
+    Bladder,
+    /// Bowel, penile bulb, anal canal, neurovascular bundles.
+    OtherAtRisk,
+    /// The pelvis or another bone.
+    Bone,
+    /// Fat.
+    Fat,
+    /// The perineum.
+    Perineum,
+    /// Skin.
+    Skin,
+    /// Muscle, and what lies around everything else.
+    Surroundings,
+}
+
+/// How one organ is recognised, and what it is.
+struct Row {
+    organ: Organ,
+    /// Beginnings of the name in lower case, letters and digits only.
+    names: &'static [&'static str],
+    /// Words that may stand anywhere in the name.
+    words: &'static [&'static str],
+    role: Role,
+    material: Material,
+}
+
+const fn row(
+    organ: Organ,
+    names: &'static [&'static str],
+    words: &'static [&'static str],
+    role: Role,
+    material: Material,
+) -> Row {
+    Row {
+        organ,
+        names,
+        words,
+        role,
+        material,
+    }
+}
+
+const BOWEL_AND_NERVES: [&str; 8] = [
+    "penilebulb",
+    "bowel",
+    "colonsigmoid",
+    "sigmoid",
+    "analcanal",
+    "canalanal",
+    "nvb",
+    "neurovascular",
+];
+
+/// The longer name first where one begins with another.
+const TABLE: [Row; 14] = {
+    use Organ as O;
+    use Role::{Spare, Target, Tissue};
+    [
+        row(
+            O::TargetVolume,
+            &["ptv", "ctv", "gtv", "itv"],
+            &[],
+            Target,
+            Material::GLAND,
+        ),
+        row(O::ProstateBed, &["prostatebed"], &[], Target, Material::GLAND),
+        row(
+            O::Prostate,
+            &["prostate", "prostata", "gland"],
+            &[],
+            Target,
+            Material::GLAND,
+        ),
+        row(
+            O::SeminalVesicle,
+            &["semvesicle", "seminalves"],
+            &[],
+            Tissue,
+            Material::GLAND,
+        ),
+        row(O::Urethra, &["urethra"], &["urethra"], Spare, Material::URETHRA),
+        row(
+            O::Rectum,
+            &["rectum", "anorectum", "wallrectum"],
+            &["rectum"],
+            Spare,
+            Material::WALL,
+        ),
+        row(O::RectalWall, &["rectalwall"], &["rect"], Spare, Material::WALL),
+        row(O::Bladder, &["bladder"], &["bladder"], Spare, Material::WALL),
+        row(O::OtherAtRisk, &BOWEL_AND_NERVES, &[], Spare, Material::OTHER),
+        row(
+            O::Bone,
+            &["bone", "femur", "pubic", "symphys", "pelvis", "sacrum"],
+            &["arch", "bone"],
+            Tissue,
+            Material::BONE,
+        ),
+        row(O::Fat, &["fat"], &["fat"], Tissue, Material::OTHER),
+        row(O::Perineum, &["perineum"], &["perineum"], Tissue, Material::OTHER),
+        row(O::Skin, &["skin"], &["skin"], Tissue, Material::OTHER),
+        row(
+            O::Surroundings,
+            &["external", "body", "muscle", "levator"],
+            &[],
+            Tissue,
+            Material::OTHER,
+        ),
+    ]
+};
+
+impl Organ {
+    /// The organ whose name of TG-263 the name begins with; `None` for a name that is not in the table.
+    ///
+    /// ```
+    /// use stylet_anatomy::{Organ, Role};
+    /// assert_eq!(Organ::of_name("Wall_Rectum"), Some(Organ::Rectum));
+    /// assert_eq!(Organ::of_name("PTV 145").map(Organ::role), Some(Role::Target));
+    /// assert_eq!(Organ::of_name("helper 3"), None);
+    /// ```
+    pub fn of_name(name: &str) -> Option<Self> {
+        let plain: String = name
+            .to_ascii_lowercase()
+            .chars()
+            .filter(char::is_ascii_alphanumeric)
+            .collect();
+        TABLE
+            .iter()
+            .find(|row| row.names.iter().any(|n| plain.starts_with(n)))
+            .map(|row| row.organ)
+    }
+
+    /// Whether a word for the organ stands anywhere in the name, in upper or lower case: "wall of the urethra" mentions the
+    /// urethra, but does not begin with it.
+    pub fn is_mentioned_in(self, name: &str) -> bool {
+        let name = name.to_ascii_lowercase();
+        self.row().words.iter().any(|word| name.contains(word))
+    }
+
+    /// What the organ is in the procedure.
+    pub fn role(self) -> Role {
+        self.row().role
+    }
+
+    /// What the organ is made of where nothing else is known.
+    pub fn material(self) -> Material {
+        self.row().material
+    }
+
+    /// RT ROI Interpreted Type of DICOM.
+    pub fn dicom_type(self) -> &'static str {
+        match self.role() {
+            Role::Target => "CTV",
+            Role::Spare | Role::Tissue => "ORGAN",
+        }
+    }
+
+    fn row(self) -> &'static Row {
+        // In the order of the variants, which a test holds.
+        &TABLE[self as usize]
+    }
+}
+
+/// The part of an organ, where a name says so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// What fills a hollow organ.
+    Content,
+    /// The capsule of the prostate.
+    Capsule,
+    /// The wall of a hollow organ.
+    Wall,
+}
+
+impl Part {
+    const WORDS: [(Self, &str); 3] = [
+        (Self::Content, "content"),
+        (Self::Capsule, "capsule"),
+        (Self::Wall, "wall"),
+    ];
+
+    /// The first part that is mentioned in the name.
+    pub fn of_name(name: &str) -> Option<Self> {
+        let name = name.to_ascii_lowercase();
+        let mentioned = |(_, word): &&(Self, &str)| name.contains(word);
+        Self::WORDS.iter().find(mentioned).map(|(part, _)| *part)
+    }
+}
+
+/// Words for the target in the order of preference.
+const TARGET_WORDS: [&str; 7] = ["ptv", "ctv", "prostate", "prostata", "gland", "gtv", "target"];
+
+/// The place of the name that most likely is the target's; `None` if none of them sounds like one.
+pub fn target_among(names: &[&str]) -> Option<usize> {
+    let mentions = |word: &&str| names.iter().position(|n| n.to_ascii_lowercase().contains(*word));
+    TARGET_WORDS.iter().find_map(mentions)
+}
+
+#[cfg(test)]
+mod tests;
