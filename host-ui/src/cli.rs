@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use stylet_base::interrupt;
 use stylet_controllers as controller;
-use stylet_dose::files::{SeedDefaults, read_seeds};
 use stylet_files as files;
 use stylet_host::core_args::{self, CoreArgs};
 use stylet_host::record;
 use stylet_implant::procedure;
+use stylet_implant::readers::{SeedDefaults, read_seeds};
 use stylet_shm_schema::service::Instance;
 
 const SCENE_HELP: &str = "\
@@ -265,7 +265,7 @@ fn check(file: &Path, label: Option<u8>) -> Result<(), String> {
             if t.material.fixed { ", fixed" } else { "" }
         );
     }
-    let p = v.patient_from_scene;
+    let p = v.patient.to_wire();
     println!("  patient (RAS, mm) from scene:");
     for r in 0..3 {
         println!(

@@ -3,6 +3,7 @@
 use crate::view::mesh::{self, SurfaceVertex};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use stylet_anatomy::Organ;
 use stylet_dose::decay::Interval;
 use stylet_dose::isodose::isodose;
 use stylet_dose::{DoseGrid, DoseKernel, DosePoints, Dvh, Metric, Seed, Source};
@@ -292,13 +293,13 @@ enum Judged {
 impl Judged {
     fn of(scene: &SceneHeader, place: usize) -> Option<Self> {
         let structure = scene.structures().get(place)?;
-        let name = structure.name.read().to_lowercase();
+        let name = structure.name.read();
         if structure.role & role::TARGET != 0 {
             Some(Self::Target)
-        } else if name.contains("urethra") {
+        } else if Organ::Urethra.is_mentioned_in(&name) {
             Some(Self::Urethra)
         } else {
-            name.contains("rect").then_some(Self::Rectum)
+            Organ::RectalWall.is_mentioned_in(&name).then_some(Self::Rectum)
         }
     }
 

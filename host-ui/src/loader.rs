@@ -1,7 +1,7 @@
 //! Reads scenes and images on a thread of its own, so that a large or broken file never holds up a frame.
 
 use std::path::{Path, PathBuf};
-use stylet_base::job::{Job, News};
+use stylet_base::job::{Job, Update};
 use stylet_files::{self as files, FileError, Image, LabelVolume, Progress, scene};
 
 /// What a file came to.
@@ -56,7 +56,7 @@ impl Loader {
         let reading = self.reading.as_ref()?;
         let (stage, share) = reading.progress.at();
         Some((
-            format!("{}: {}", files::open::file_name(&reading.path), stage.name()),
+            format!("{}: {}", files::bytes::file_name(&reading.path), stage.name()),
             share,
         ))
     }
@@ -70,9 +70,9 @@ impl Loader {
     pub fn poll(&mut self) -> Option<Outcome> {
         let reading = self.reading.as_ref()?;
         let outcome = match reading.job.poll() {
-            News::None => return None,
-            News::Told(outcome) => outcome,
-            News::Ended => Err(format!("{}: the reader stopped half-way", reading.path.display())),
+            Update::Pending => return None,
+            Update::Value(outcome) => outcome,
+            Update::Ended => Err(format!("{}: the reader stopped half-way", reading.path.display())),
         };
         self.reading = None;
         Some(outcome)
@@ -89,7 +89,7 @@ fn scene_of(path: &Path, label: Option<u8>, image: Option<PathBuf>, progress: &P
     };
     let image = Image::read(&file, progress)?;
     image
-        .covers(&volume.patient_from_scene, volume.middle_m())
-        .map_err(|why| FileError::of(&file, &why))?;
+        .covers(&volume.patient, volume.middle_m())
+        .map_err(|why| FileError::of(&file, why))?;
     Ok(Loaded::Scene(volume, Some(image)))
 }

@@ -3,6 +3,7 @@
 use crate::Text;
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
+use stylet_anatomy::PatientFrame;
 
 /// Scenes that the core can draw without a file; [`crate::CommandKind::LoadBuiltinScene`] takes the place in this list.
 pub const BUILTIN_SCENES: [&str; 3] = ["paper", "pelvis", "full"];
@@ -106,6 +107,11 @@ pub struct SceneHeader {
 }
 
 impl SceneHeader {
+    /// Where the patient lies in the scene: the only reader of `patient_from_scene`.
+    pub fn patient(&self) -> PatientFrame {
+        PatientFrame::of_wire(&self.patient_from_scene)
+    }
+
     /// Those that count.
     pub fn structures(&self) -> &[StructureInfo] {
         &self.structures[..(self.structure_count as usize).min(MAX_STRUCTURES)]

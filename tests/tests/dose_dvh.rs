@@ -3,11 +3,11 @@
 use nalgebra::{Rotation3, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
-use stylet_dose::labels::structures;
 use stylet_dose::mesh::Mesh;
 use stylet_dose::metric::Value;
 use stylet_dose::{DoseGrid, Dvh, Metric, Region, Structure};
 use stylet_files::{VoxelFrame, Voxels};
+use stylet_implant::readers::labels::structures;
 
 const GRID_M: f64 = 1e-3;
 const MIDDLE: [f64; 3] = [0.0303, 0.0288, 0.0316];

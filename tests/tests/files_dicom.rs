@@ -158,7 +158,7 @@ fn plans_of_pydicom_are_read_with_place_direction_and_strength() {
             .iter()
             .map(|s| {
                 (
-                    s.needle.as_str(),
+                    s.hole.as_str(),
                     s.position_m.map(|v| (v * 1e6).round() / 1e3),
                     s.strength_u,
                 )

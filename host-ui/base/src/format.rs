@@ -81,6 +81,22 @@ pub fn decimal(value: f64, decimals: usize) -> String {
     format!("{:.decimals$}", if is_zero { 0.0 } else { value })
 }
 
+/// Characters of a text out of a file that are shown: a file chooses what it makes a message say, and how much.
+const MAX_SHOWN_CHARS: usize = 4000;
+
+/// Text out of a file for a terminal: without control characters but line feeds, and not endless.
+pub fn printable(text: &str) -> String {
+    let mut kept: String = text
+        .chars()
+        .filter(|c| !c.is_control() || *c == '\n')
+        .take(MAX_SHOWN_CHARS)
+        .collect();
+    if text.chars().nth(MAX_SHOWN_CHARS).is_some() {
+        kept.push_str("...");
+    }
+    kept
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

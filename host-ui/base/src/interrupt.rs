@@ -20,14 +20,15 @@ impl Interrupt {
         Ok(interrupt)
     }
 
-    /// Asks as a signal would.
-    pub fn ask(&self) {
-        // SYNC: read by `asked`; nothing but the flag is carried.
+    /// Requests the end of the work, as a signal does.
+    pub fn request(&self) {
+        // SYNC: read by `is_requested`; nothing but the flag is carried.
         self.0.store(true, Ordering::Relaxed);
     }
 
-    pub fn asked(&self) -> bool {
-        // SYNC: set by a signal handler or by `ask`; nothing but the flag is carried.
+    /// Whether the work is to end.
+    pub fn is_requested(&self) -> bool {
+        // SYNC: set by a signal handler or by `request`; nothing but the flag is carried.
         self.0.load(Ordering::Relaxed)
     }
 }

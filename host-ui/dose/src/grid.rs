@@ -1,5 +1,6 @@
 //! Dose on a regular grid, kept up to date seed by seed.
 
+use super::error::DoseError;
 use super::kernel::{BLOCK, Block, DoseKernel, Placed};
 use super::seed::Seed;
 use rayon::prelude::*;
@@ -17,10 +18,12 @@ pub struct DoseGrid {
 }
 
 impl DoseGrid {
-    pub fn new(origin_m: [f64; 3], spacing_m: [f64; 3], dims: [usize; 3]) -> Result<Self, String> {
+    pub fn new(origin_m: [f64; 3], spacing_m: [f64; 3], dims: [usize; 3]) -> Result<Self, DoseError> {
         let voxels = dims.iter().try_fold(1_usize, |n, &d| n.checked_mul(d));
         if !origin_m.iter().chain(&spacing_m).all(|v| v.is_finite()) || spacing_m.iter().any(|&h| h <= 0.0) {
-            return Err("the voxels of a dose grid need a side above 0".to_owned());
+            return Err(DoseError::Grid(
+                "the voxels of a dose grid need a side above 0".to_owned(),
+            ));
         }
         match voxels {
             Some(voxels @ 1..=MAX_VOXELS) => Ok(Self {
@@ -29,15 +32,15 @@ impl DoseGrid {
                 dims,
                 dose_gy: vec![0.0; voxels],
             }),
-            _ => Err(format!(
+            _ => Err(DoseError::Grid(format!(
                 "a dose grid of {} x {} x {} voxels; allowed are 1 to {MAX_VOXELS} in all: choose larger voxels",
                 dims[0], dims[1], dims[2]
-            )),
+            ))),
         }
     }
 
     /// Covers a box with cubes.
-    pub fn covering(low_m: [f64; 3], high_m: [f64; 3], spacing_m: f64) -> Result<Self, String> {
+    pub fn covering(low_m: [f64; 3], high_m: [f64; 3], spacing_m: f64) -> Result<Self, DoseError> {
         let dims = [0, 1, 2].map(|a| ((high_m[a] - low_m[a]) / spacing_m - 1e-9).ceil().max(0.0) as usize + 1);
         Self::new(low_m, [spacing_m; 3], dims)
     }

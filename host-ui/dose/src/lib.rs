@@ -2,16 +2,15 @@
 //!
 //! Lengths in m, time in s, dose in Gy, air kerma strength in U (1 U = 1 µGy m² h⁻¹); one frame for seeds, structures and
 //! grids, whichever the caller chooses. Water everywhere and no shielding of one seed by another, as TG-43 has it.
+#![warn(missing_docs)]
 
-pub mod contours;
 pub mod curve;
 pub mod decay;
 pub mod dvh;
-pub mod files;
+pub mod error;
 pub mod grid;
 pub mod isodose;
 pub mod kernel;
-pub mod labels;
 pub mod mesh;
 pub mod metric;
 pub mod perturb;
@@ -24,6 +23,7 @@ pub mod structure;
 pub mod tg43;
 
 pub use dvh::Dvh;
+pub use error::DoseError;
 pub use grid::DoseGrid;
 pub use kernel::DoseKernel;
 pub use metric::Metric;

@@ -1,5 +1,6 @@
 //! A closed triangle mesh as a region.
 
+use super::error::DoseError;
 use super::structure::{Region, bounds};
 
 /// Triangles, sorted into columns along x, so that a ray meets only those of its column.
@@ -13,7 +14,7 @@ pub struct Mesh {
 
 impl Mesh {
     /// The mesh must be closed: each edge of a triangle belongs to one other triangle too, which runs along it the other way.
-    pub fn new(points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Self, String> {
+    pub fn new(points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Self, DoseError> {
         check_closed(points_m, triangles)?;
         let (low_m, high_m) = bounds(points_m);
         let per_side = ((triangles.len() as f64).sqrt() as usize).clamp(1, 512);
@@ -74,12 +75,14 @@ fn is_before(p: [f64; 3], [a, b, c]: &[[f64; 3]; 3]) -> bool {
     same_side && all != 0.0 && (wa * a[0] + wb * b[0] + wc * c[0]) / all > p[0]
 }
 
-fn check_closed(points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<(), String> {
+fn check_closed(points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<(), DoseError> {
     if triangles.is_empty() || triangles.iter().flatten().any(|&i| i >= points_m.len()) {
-        return Err("the mesh has no triangles, or a triangle with a corner that is not there".to_owned());
+        return Err(DoseError::Mesh(
+            "the mesh has no triangles, or a triangle with a corner that is not there",
+        ));
     }
     if points_m.iter().flatten().any(|v| !v.is_finite()) {
-        return Err("the mesh has a corner that is not a number".to_owned());
+        return Err(DoseError::Mesh("the mesh has a corner that is not a number"));
     }
     let edges = triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
     let mut forward: Vec<(usize, usize)> = edges.clone().collect();
@@ -87,7 +90,9 @@ fn check_closed(points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<(), S
     forward.sort_unstable();
     backward.sort_unstable();
     if forward != backward {
-        return Err("the mesh is not closed, or some of its triangles are turned inside out".to_owned());
+        return Err(DoseError::Mesh(
+            "the mesh is not closed, or some of its triangles are turned inside out",
+        ));
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! Measures of a DVH by the names that clinics use: D90, D2cc, V150, V20Gy, Dmean.
 
 use super::Dvh;
+use super::error::DoseError;
 
 const M3_PER_CC: f64 = 1e-6;
 
@@ -54,7 +55,7 @@ impl Value {
 
 impl Metric {
     /// Reads a name such as `D90`, `D90%`, `D0.1cc`, `V150`, `V150%`, `V145Gy`, `Dmean`, `Dmax`, `Dmin`.
-    pub fn parse(name: &str) -> Result<Self, String> {
+    pub fn parse(name: &str) -> Result<Self, DoseError> {
         let lower = name.trim().to_ascii_lowercase();
         match lower.as_str() {
             "dmean" => return Ok(Self::Mean),
@@ -63,7 +64,9 @@ impl Metric {
             _ => {}
         }
         let wrong = || {
-            format!("\"{name}\" is no metric; write D90 (or D90%), D2cc, V150 (or V150%), V145Gy, Dmean, Dmax or Dmin")
+            DoseError::Metric(format!(
+                "\"{name}\" is no metric; write D90 (or D90%), D2cc, V150 (or V150%), V145Gy, Dmean, Dmax or Dmin"
+            ))
         };
         let number_before = |unit: &str| -> Option<f64> {
             let number: f64 = lower.get(1..)?.strip_suffix(unit)?.trim().parse().ok()?;

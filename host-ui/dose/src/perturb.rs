@@ -25,18 +25,20 @@ pub struct Spread {
     pub name: String,
     /// Of the plan as it is.
     pub planned: Option<f64>,
-    pub mean: f64,
-    /// Standard deviation of a sample.
-    pub deviation: f64,
-    /// The 5th, 25th, 50th, 75th and 95th percentile.
-    pub percentiles: [f64; 5],
+    /// `None` where the measure is defined in no trial.
+    pub mean: Option<f64>,
+    /// Standard deviation of a sample; `None` for fewer than two trials.
+    pub deviation: Option<f64>,
+    /// The 5th, 25th, 50th, 75th and 95th percentile; `None` where the measure is defined in no trial.
+    pub percentiles: Option<[f64; 5]>,
     /// Trials in which the measure is defined; the figures above are of these.
     pub defined: usize,
 }
 
+/// The percentiles of a [`Spread`].
 pub const PERCENTILES: [f64; 5] = [5.0, 25.0, 50.0, 75.0, 95.0];
 
-/// Values of every trial that was done, by its number; `stop` ends the work early, `done` is told of each trial.
+/// Values of every trial that was done, by its number; `stop` ends the work early, `done` is called after each trial.
 pub fn trials(
     judge: &Judge,
     kernel: &DoseKernel,
@@ -48,7 +50,7 @@ pub fn trials(
     (0..how.trials)
         .into_par_iter()
         .filter_map(|trial| {
-            if stop.asked() {
+            if stop.is_requested() {
                 return None;
             }
             let moved = moved(plan, how, trial);
@@ -86,23 +88,22 @@ pub fn spreads(planned: &[(String, Option<f64>)], trials: &[(usize, Vec<Option<f
             let count = values.len() as f64;
             let mean = values.iter().sum::<f64>() / count;
             let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+            let last = values.len().checked_sub(1);
             Spread {
                 name: name.clone(),
                 planned: *value,
-                mean,
-                deviation: (square / (count - 1.0)).sqrt(),
-                percentiles: PERCENTILES.map(|p| percentile(&values, p)),
+                mean: last.map(|_| mean),
+                deviation: last.filter(|&l| l > 0).map(|_| (square / (count - 1.0)).sqrt()),
+                percentiles: last.map(|_| PERCENTILES.map(|p| percentile(&values, p))),
                 defined: values.len(),
             }
         })
         .collect()
 }
 
-/// Linear between the sorted values (Hyndman and Fan's type 7); not a number when there are none.
+/// Linear between the sorted values (Hyndman and Fan's type 7), of which there is at least one.
 fn percentile(sorted: &[f64], percent: f64) -> f64 {
-    let Some(last) = sorted.len().checked_sub(1) else {
-        return f64::NAN;
-    };
+    let last = sorted.len() - 1;
     let at = percent / 100.0 * last as f64;
     let low = at as usize;
     let high = (low + 1).min(last);
@@ -127,8 +128,19 @@ mod tests {
         let planned = [("a".to_owned(), Some(1.0))];
         let trials = [(0, vec![Some(1.0)]), (1, vec![None]), (2, vec![Some(3.0)])];
         let spread = &spreads(&planned, &trials)[0];
-        assert_eq!((spread.mean, spread.defined), (2.0, 2));
-        assert!((spread.deviation - 2.0_f64.sqrt()).abs() < 1e-12);
+        assert_eq!((spread.mean, spread.defined), (Some(2.0), 2));
+        assert!(spread.deviation.is_some_and(|d| (d - 2.0_f64.sqrt()).abs() < 1e-12));
+    }
+
+    /// One trial printed NaN.
+    #[test]
+    fn one_trial_has_no_deviation_and_none_has_no_mean() {
+        let planned = [("a".to_owned(), Some(1.0))];
+        let one = &spreads(&planned, &[(0, vec![Some(3.0)])])[0];
+        assert_eq!((one.mean, one.deviation), (Some(3.0), None));
+        assert_eq!(one.percentiles, Some([3.0; 5]));
+        let none = &spreads(&planned, &[(0, vec![None])])[0];
+        assert_eq!((none.mean, none.deviation, none.percentiles), (None, None, None));
     }
 
     #[test]

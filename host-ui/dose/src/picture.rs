@@ -1,6 +1,7 @@
 //! Pictures of dose-volume histograms and of distributions, as SVG.
 
 use super::Dvh;
+use super::error::DoseError;
 use plotters::prelude::*;
 use std::path::Path;
 
@@ -18,7 +19,7 @@ const COLOURS: [RGBColor; 7] = [
 const STEPS: usize = 400;
 
 /// Cumulative histograms up to three times the prescription, which is marked.
-pub fn dvh(path: &Path, curves: &[(&str, &Dvh)], prescription_gy: f64) -> Result<(), String> {
+pub fn dvh(path: &Path, curves: &[(&str, &Dvh)], prescription_gy: f64) -> Result<(), DoseError> {
     let most_gy = 3.0 * prescription_gy;
     let lines: Vec<(String, Vec<(f64, f64)>)> = curves
         .iter()
@@ -28,7 +29,10 @@ pub fn dvh(path: &Path, curves: &[(&str, &Dvh)], prescription_gy: f64) -> Result
             ((*name).to_owned(), (0..=STEPS).map(|i| (at(i), share(at(i)))).collect())
         })
         .collect();
-    draw(path, &lines, prescription_gy, most_gy).map_err(|e| format!("{} cannot be written ({e})", path.display()))
+    draw(path, &lines, prescription_gy, most_gy).map_err(|e| DoseError::Picture {
+        path: path.to_owned(),
+        why: e.to_string(),
+    })
 }
 
 fn draw(

@@ -1,17 +1,17 @@
 //! What a plan is judged by: the measures of each structure, homogeneity and conformity of the target.
 
 use super::Dvh;
+use super::error::DoseError;
 use super::kernel::DoseKernel;
 use super::metric::{Metric, Value};
 use super::points::DosePoints;
 use super::seed::Seed;
 use super::structure::{Structure, bounds};
 use serde_json::{Value as Json, json};
+use stylet_anatomy::{Organ, target_among};
 
 /// Room around seeds and target in which the volume at the prescription is looked for.
 const MARGIN_M: f64 = 0.03;
-/// Parts of the names that people give to the target, in the order of preference.
-const TARGETS: [&str; 6] = ["ptv", "ctv", "prostate", "gland", "gtv", "target"];
 
 /// Structures, ready to be judged under any set of seeds.
 pub struct Judge {
@@ -63,7 +63,7 @@ impl Judge {
         prescription_gy: f64,
         seeds: &[Seed],
         most_points: usize,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, DoseError> {
         let names: Vec<&str> = structures.iter().map(|s| s.name.as_str()).collect();
         let target = choose_target(&names, target)?;
         let mut corners: Vec<[f64; 3]> = seeds.iter().map(|s| s.position_m).collect();
@@ -208,25 +208,26 @@ impl Around {
     }
 }
 
-fn choose_target(names: &[&str], wanted: Option<&str>) -> Result<usize, String> {
+fn choose_target(names: &[&str], wanted: Option<&str>) -> Result<usize, DoseError> {
     if let Some(wanted) = wanted {
         return names
             .iter()
             .position(|n| n.eq_ignore_ascii_case(wanted))
-            .ok_or_else(|| format!("no structure is called {wanted}; there are {}", names.join(", ")));
+            .ok_or_else(|| {
+                let there = names.join(", ");
+                DoseError::Target(format!("no structure is called {wanted}; there are {there}"))
+            });
     }
     if names.is_empty() {
-        return Err("there is no structure: every voxel is 0".to_owned());
+        return Err(DoseError::Target("there is no structure: every voxel is 0".to_owned()));
     }
-    let called = |part: &&str| names.iter().position(|n| n.to_ascii_lowercase().contains(*part));
-    Ok(TARGETS.iter().find_map(called).unwrap_or(0))
+    Ok(target_among(names).unwrap_or(0))
 }
 
 /// What is usually reported of a structure of that name (AAPM TG-137, GEC-ESTRO), then what was asked for.
 fn metrics(name: &str, is_target: bool, extra: &[Metric]) -> Vec<Metric> {
     use Metric::{DoseToShare, DoseToVolume, Mean, VolumeAtShare};
     let (cc2, cc01) = (DoseToVolume { m3: 2e-6 }, DoseToVolume { m3: 0.1e-6 });
-    let lower = name.to_ascii_lowercase();
     let mut all = match () {
         () if is_target => vec![
             DoseToShare(0.9),
@@ -234,8 +235,8 @@ fn metrics(name: &str, is_target: bool, extra: &[Metric]) -> Vec<Metric> {
             VolumeAtShare(1.5),
             VolumeAtShare(2.0),
         ],
-        () if lower.contains("urethra") => vec![DoseToShare(0.1), DoseToShare(0.3)],
-        () if lower.contains("rectum") => vec![cc2, cc01],
+        () if Organ::Urethra.is_mentioned_in(name) => vec![DoseToShare(0.1), DoseToShare(0.3)],
+        () if Organ::Rectum.is_mentioned_in(name) => vec![cc2, cc01],
         () => vec![Mean, cc2, cc01],
     };
     all.extend(extra.iter().filter(|m| !all.contains(m)).copied().collect::<Vec<_>>());

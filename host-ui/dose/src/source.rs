@@ -1,10 +1,12 @@
-//! A source file (TOML), checked; every problem is told at once.
+//! A source file (TOML), checked; all problems are reported at once.
 
 use super::curve::{Curve, Table};
 use super::decay::days_to_s;
+use super::error::DoseError;
 use super::tg43::{Capsule, Tables};
 use read::Reader;
 use std::path::Path;
+use stylet_base::input;
 
 mod read;
 
@@ -43,21 +45,20 @@ impl Source {
     }
 
     /// Reads and checks a file; the error names the file and lists all that is wrong in it.
-    pub fn read(path: &Path) -> Result<Self, String> {
-        let told = |why: String| format!("{}: {why}", path.display());
-        let size = std::fs::metadata(path)
-            .map_err(|e| told(format!("it cannot be opened ({e}); check the path")))?
-            .len();
-        if size > MAX_BYTES {
-            return Err(told(format!("it has {size} bytes; a source file has a few thousand")));
-        }
-        let text = std::fs::read_to_string(path).map_err(|e| told(format!("it cannot be read as text ({e})")))?;
-        Self::parse(&text).map_err(told)
+    pub fn read(path: &Path) -> Result<Self, DoseError> {
+        let refused = |why: String| DoseError::SourceFile {
+            path: path.to_owned(),
+            why,
+        };
+        let text = input::read_text(path, MAX_BYTES).map_err(|why| refused(why.to_string()))?;
+        Self::parse(&text).map_err(|why| refused(why.to_string()))
     }
 
     /// As [`Source::read`], from the text of the file.
-    pub fn parse(text: &str) -> Result<Self, String> {
-        let table: toml::Table = text.parse().map_err(|e| format!("it is not TOML: {e}"))?;
+    pub fn parse(text: &str) -> Result<Self, DoseError> {
+        let table: toml::Table = text
+            .parse()
+            .map_err(|e| DoseError::Source(format!("it is not TOML: {e}")))?;
         let mut reader = Reader::new(&table);
         let source = build(&mut reader);
         reader.finish().map(|()| source)

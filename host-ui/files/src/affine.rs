@@ -1,10 +1,11 @@
 //! The orientation that a NIfTI header gives.
 
 use super::frame::VoxelFrame;
+use crate::error::ContentError;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use nifti::NiftiHeader;
 
-pub fn voxel_frame(h: &NiftiHeader) -> Result<VoxelFrame, String> {
+pub fn voxel_frame(h: &NiftiHeader) -> Result<VoxelFrame, ContentError> {
     let (unit_m, unknown_unit) = match h.xyzt_units & 7 {
         1 => (1.0, false),
         2 => (1e-3, false),

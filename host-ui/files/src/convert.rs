@@ -1,14 +1,16 @@
 //! Label volumes from one format to another, by the name of the file to be written.
 
+use super::bytes::file_name;
+use super::error::{ContentError, FileError};
 use super::volume::Voxels;
 use super::{metaimage, nifti, nrrd};
 use std::path::Path;
 
 /// Ways to write a label volume.
-type Writer = fn(&Voxels) -> Result<Vec<u8>, String>;
+type Writer = fn(&Voxels) -> Result<Vec<u8>, ContentError>;
 
 fn writer(path: &Path) -> Option<Writer> {
-    let name = super::open::file_name(path).to_ascii_lowercase();
+    let name = file_name(path).to_ascii_lowercase();
     let ends = |e: &str| name.ends_with(e);
     if ends(".nrrd") {
         Some(nrrd::write::bytes)
@@ -21,26 +23,25 @@ fn writer(path: &Path) -> Option<Writer> {
     }
 }
 
+/// Whether a label volume can be written under that name.
 pub fn can_hold_labels(path: &Path) -> bool {
     writer(path).is_some()
 }
 
-pub fn write_labels(v: &Voxels, path: &Path) -> Result<(), String> {
-    let Some(writer) = writer(path) else {
-        return Err(format!(
-            "{}: label volumes are written as .nrrd, .seg.nrrd, .mha or .nii.gz",
-            path.display()
-        ));
-    };
-    write_whole(path, &writer(v)?)
+/// Writes a label volume in the format that the file's name says.
+pub fn write_labels(v: &Voxels, path: &Path) -> Result<(), FileError> {
+    let refused = |why: ContentError| FileError::of(path, why);
+    let writer =
+        writer(path).ok_or_else(|| refused("label volumes are written as .nrrd, .seg.nrrd, .mha or .nii.gz".into()))?;
+    write_whole(path, &writer(v).map_err(refused)?)
 }
 
-/// Under its name only once all of it is there.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), String> {
+/// Writes a file that has its name only once all of it is there.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     let mut beside = path.as_os_str().to_owned();
     beside.push(".part");
     let beside = Path::new(&beside);
     std::fs::write(beside, bytes)
         .and_then(|()| std::fs::rename(beside, path))
-        .map_err(|e| format!("{}: it cannot be written ({e}); check the folder", path.display()))
+        .map_err(|e| FileError::of(path, format!("it cannot be written ({e}); check the folder")))
 }

@@ -1,6 +1,7 @@
 //! The numbers in a volume's data, as labels or greys; only as much is held as the data really give.
 
 use super::progress::{Progress, Stage};
+use crate::error::ContentError;
 use std::io::Read;
 
 /// A volume with more voxels is not a prostate.
@@ -70,22 +71,25 @@ impl Element {
 }
 
 /// How many voxels a header claims, when that can be believed at all.
-pub fn voxel_count(dims: &[u64]) -> Result<usize, String> {
+pub fn voxel_count(dims: &[u64]) -> Result<usize, ContentError> {
     let size = || dims.iter().map(u64::to_string).collect::<Vec<_>>().join(" x ");
     if dims.contains(&0) {
-        return Err(format!("its size is {} voxels; each side must be at least 1", size()));
+        return Err(ContentError::Invalid(format!(
+            "its size is {} voxels; each side must be at least 1",
+            size()
+        )));
     }
     match dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(d)) {
         Some(n) if n <= MAX_VOXELS => Ok(n as usize),
-        _ => Err(format!(
+        _ => Err(ContentError::Invalid(format!(
             "its header claims {} voxels, more than {MAX_VOXELS} in all; crop it to the gland",
             size()
-        )),
+        ))),
     }
 }
 
 /// Whether data of so many bytes can hold what the header claims, before anything of that size is made.
-pub fn must_hold(needed: u64, have: u64, packed: bool) -> Result<(), String> {
+pub fn must_hold(needed: u64, have: u64, packed: bool) -> Result<(), ContentError> {
     let most = if packed {
         have.saturating_mul(MAX_DEFLATE_RATIO)
     } else {
@@ -94,15 +98,15 @@ pub fn must_hold(needed: u64, have: u64, packed: bool) -> Result<(), String> {
     if needed <= most {
         return Ok(());
     }
-    Err(format!(
+    Err(ContentError::Invalid(format!(
         "it is cut off or its header is wrong: the header asks for {needed} bytes and the {have} bytes there are cannot hold them; copy or export it again"
-    ))
+    )))
 }
 
 /// What a reader makes of each number, and whom it tells how far it is.
 #[derive(Clone, Copy, Debug)]
 pub struct Sink<'a, V> {
-    made_of: fn(f64) -> Result<V, String>,
+    made_of: fn(f64) -> Result<V, ContentError>,
     most: usize,
     progress: &'a Progress,
 }
@@ -129,12 +133,12 @@ impl<'a> Sink<'a, f32> {
 
 impl<V> Sink<'_, V> {
     /// Empty; grows with what is really there.
-    fn values(&self, count: usize) -> Result<Vec<V>, String> {
+    fn values(&self, count: usize) -> Result<Vec<V>, ContentError> {
         if count > self.most {
-            return Err(format!(
+            return Err(ContentError::Invalid(format!(
                 "it has {count} voxels, more than {}; crop it to the gland",
                 self.most
-            ));
+            )));
         }
         Ok(Vec::with_capacity(count.min(CHUNK_BYTES)))
     }
@@ -148,12 +152,12 @@ pub fn read_values<V>(
     count: usize,
     [slope, intercept]: [f64; 2],
     sink: Sink<V>,
-) -> Result<Vec<V>, String> {
+) -> Result<Vec<V>, ContentError> {
     let size = element.bytes();
     let mut values = sink.values(count)?;
     let mut chunk = vec![0_u8; CHUNK_BYTES];
     while values.len() < count {
-        sink.progress.tell(Stage::Voxels, values.len(), count)?;
+        sink.progress.report(Stage::Voxels, values.len(), count)?;
         let part = &mut chunk[..((count - values.len()) * size).min(CHUNK_BYTES)];
         from.read_exact(part)
             .map_err(|e| format!("it is cut off or damaged ({e}); copy or export it again"))?;
@@ -165,7 +169,7 @@ pub fn read_values<V>(
 }
 
 /// As [`read_values`], from numbers written out.
-pub fn values_from_text<V>(text: &[u8], count: usize, sink: Sink<V>) -> Result<Vec<V>, String> {
+pub fn values_from_text<V>(text: &[u8], count: usize, sink: Sink<V>) -> Result<Vec<V>, ContentError> {
     let text = std::str::from_utf8(text).map_err(|_| "its numbers are not text".to_owned())?;
     let words = text
         .split(|c: char| c.is_ascii_whitespace() || c == ',')
@@ -173,35 +177,35 @@ pub fn values_from_text<V>(text: &[u8], count: usize, sink: Sink<V>) -> Result<V
     let mut values = sink.values(count)?;
     for word in words {
         if values.len() == count {
-            return Err(format!(
+            return Err(ContentError::Invalid(format!(
                 "it holds more than the {count} values of its size; export it again"
-            ));
+            )));
         }
         let value: f64 = word
             .parse()
             .map_err(|_| format!("it holds \"{}\" where a number must be", short(word)))?;
         if values.len() % CHUNK_BYTES == 0 {
-            sink.progress.tell(Stage::Voxels, values.len(), count)?;
+            sink.progress.report(Stage::Voxels, values.len(), count)?;
         }
         values.push((sink.made_of)(value)?);
     }
     if values.len() == count {
         return Ok(values);
     }
-    Err(format!(
+    Err(ContentError::Invalid(format!(
         "it is cut off: {} of {count} values are there; copy or export it again",
         values.len()
-    ))
+    )))
 }
 
-pub fn label_of(value: f64) -> Result<u8, String> {
+pub fn label_of(value: f64) -> Result<u8, ContentError> {
     let whole = value.round();
     if (value - whole).abs() < 1e-3 && (0.0..=255.0).contains(&whole) {
         return Ok(whole as u8);
     }
-    Err(format!(
+    Err(ContentError::Invalid(format!(
         "it holds the value {value}; a segmentation holds whole numbers 0 to 255. Is this the image instead of its labels?"
-    ))
+    )))
 }
 
 /// Enough of a foreign text to recognise it.

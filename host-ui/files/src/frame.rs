@@ -1,5 +1,6 @@
 //! Where the voxels of a file lie in the patient (RAS, m), whatever the format.
 
+use crate::error::ContentError;
 use nalgebra::{Matrix3, Vector3};
 
 /// Axes whose cosine is larger are sheared.
@@ -18,25 +19,25 @@ pub struct VoxelFrame {
 impl VoxelFrame {
     /// From the steps between voxels along each axis, one a column, and the middle of the first voxel (RAS, m); `source` is what the
     /// file calls them.
-    pub fn new(columns_m: Matrix3<f64>, origin_m: Vector3<f64>, source: &str) -> Result<Self, String> {
+    pub fn new(columns_m: Matrix3<f64>, origin_m: Vector3<f64>, source: &str) -> Result<Self, ContentError> {
         if !columns_m.iter().chain(origin_m.iter()).all(|v| v.is_finite()) {
-            return Err(format!(
+            return Err(ContentError::Invalid(format!(
                 "its {source} holds a value that is not a number; write the file again with a valid orientation"
-            ));
+            )));
         }
         let spacing_m: [f64; 3] = [0, 1, 2].map(|a| columns_m.column(a).norm());
         if spacing_m.iter().any(|s| !(1e-5..=0.1).contains(s)) {
             let mm = spacing_m.map(|s| s * 1e3);
-            return Err(format!(
+            return Err(ContentError::Invalid(format!(
                 "its {source} gives voxels of {:.4} x {:.4} x {:.4} mm; each side must be 0.01 to 100 mm",
                 mm[0], mm[1], mm[2]
-            ));
+            )));
         }
         if origin_m.amax() > 10.0 {
-            return Err(format!(
-                "its {source} puts the first voxel {:.1} m from the origin; at most 10 m is believed",
+            return Err(ContentError::Invalid(format!(
+                "its {source} puts the first voxel {:.1} m from the origin; at most 10 m is accepted",
                 origin_m.amax()
-            ));
+            )));
         }
         let raw = Matrix3::from_columns(&[0, 1, 2].map(|a| columns_m.column(a) / spacing_m[a]));
         let worst = [(0, 1), (0, 2), (1, 2)]
@@ -44,10 +45,10 @@ impl VoxelFrame {
             .into_iter()
             .fold(0.0, f64::max);
         if worst > SHEAR {
-            return Err(format!(
+            return Err(ContentError::Invalid(format!(
                 "its {source} is sheared (axes {:.2} deg off a right angle); resample it to a rectangular grid first",
                 worst.min(1.0).asin().to_degrees()
-            ));
+            )));
         }
         Ok(Self {
             directions: nearest_orthonormal(raw),
@@ -82,9 +83,4 @@ fn nearest_orthonormal(m: Matrix3<f64>) -> Matrix3<f64> {
         (Some(u), Some(v_t)) => u * v_t,
         _ => m,
     }
-}
-
-/// RAS out of LPS and back: the first two axes turn round.
-pub fn ras_from_lps(v: Vector3<f64>) -> Vector3<f64> {
-    Vector3::new(-v.x, -v.y, v.z)
 }

@@ -1,13 +1,15 @@
 //! The image that a segmentation was drawn on, or another of the same patient: greys for the slices.
 
+use super::bytes::{beside, file_name, whole};
 use super::element::Sink;
-use super::error::FileError;
+use super::error::{ContentError, FileError};
 use super::frame::VoxelFrame;
-use super::open::{Format, beside, file_name, whole};
+use super::open::Format;
 use super::volume::VoxelValues;
 use super::{Progress, metaimage, nifti, nrrd};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use std::path::Path;
+use stylet_anatomy::PatientFrame;
 
 /// Shares of the voxels that are shown black and white: a few bright ones do not darken the rest.
 const BLACK_WHITE: [f64; 2] = [0.005, 0.995];
@@ -27,8 +29,8 @@ pub struct Image {
 
 impl Image {
     pub fn read(path: &Path, progress: &Progress) -> Result<Self, FileError> {
-        let told = |why: String| FileError::of(path, &why);
-        let bytes = whole(path, progress).map_err(told)?;
+        let refused = |why: ContentError| FileError::of(path, why);
+        let bytes = whole(path, progress).map_err(refused)?;
         let sink = Sink::greys(progress);
         let data = |name: &str| beside(path, name, progress);
         let values = match Format::of(&bytes) {
@@ -36,19 +38,19 @@ impl Image {
             Some(Format::Nifti) => nifti::read(&bytes, sink),
             Some(Format::MetaImage) => metaimage::read(&bytes, &data, sink),
             Some(Format::Dicom) => {
-                Err("images are not read from DICOM; convert the series, for example with dcm2niix".to_owned())
+                Err(ContentError::Invalid("images are not read from DICOM; convert the series, for example with dcm2niix".to_owned()))
             }
             None => Err(
                 "it is none of the formats that images are read from: NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd)"
-                    .to_owned(),
+                    .into(),
             ),
         };
         values
             .and_then(|values| Self::of(values, file_name(path)))
-            .map_err(told)
+            .map_err(refused)
     }
 
-    fn of(voxels: VoxelValues<f32>, name: String) -> Result<Self, String> {
+    fn of(voxels: VoxelValues<f32>, name: String) -> Result<Self, ContentError> {
         let [low, high] = range(&voxels.values)?;
         let grey = |value: &f32| ((value - low) / (high - low) * 255.0).round().clamp(0.0, 255.0) as u8;
         Ok(Self {
@@ -61,9 +63,9 @@ impl Image {
     }
 
     /// Rows that take a place in the scene (m) and 1 to the place in the voxels, 0 to 1 from face to face along each axis.
-    pub fn texture_from_scene(&self, patient_from_scene: &[f64; 12]) -> [[f64; 4]; 3] {
-        let turn = Matrix3::from_row_slice(&patient_from_scene[..9]);
-        let origin = Vector3::from_column_slice(&patient_from_scene[9..]) - self.frame.origin_m;
+    pub fn texture_from_scene(&self, patient: &PatientFrame) -> [[f64; 4]; 3] {
+        let turn = patient.rotation();
+        let origin = patient.translation_m() - self.frame.origin_m;
         [0, 1, 2].map(|a| {
             let along = self.frame.directions.column(a) / self.frame.spacing_m[a];
             let row = turn.transpose() * along;
@@ -77,21 +79,21 @@ impl Image {
         })
     }
 
-    /// Whether the gland, whose middle is told, is in the image at all.
-    pub fn covers(&self, patient_from_scene: &[f64; 12], middle_m: [f64; 3]) -> Result<(), String> {
-        let beside_m = self.distance_m(patient_from_scene, middle_m);
+    /// Whether the middle of the gland (scene, m) lies in the image; the error says how far outside it is.
+    pub fn covers(&self, patient: &PatientFrame, middle_m: [f64; 3]) -> Result<(), ContentError> {
+        let beside_m = self.distance_m(patient, middle_m);
         if beside_m == 0.0 {
             return Ok(());
         }
-        Err(format!(
+        Err(ContentError::Invalid(format!(
             "it ends {:.0} mm before the middle of the gland; is it of this patient, and in the same frame?",
             beside_m * 1e3
-        ))
+        )))
     }
 
     /// How far a place in the scene lies outside of the image (m); 0 inside.
-    fn distance_m(&self, patient_from_scene: &[f64; 12], place_m: [f64; 3]) -> f64 {
-        let rows = self.texture_from_scene(patient_from_scene);
+    fn distance_m(&self, patient: &PatientFrame, place_m: [f64; 3]) -> f64 {
+        let rows = self.texture_from_scene(patient);
         let beyond = Vector3::from([0, 1, 2].map(|a| {
             let at: f64 = (0..3).map(|i| rows[a][i] * place_m[i]).sum::<f64>() + rows[a][3];
             (at - at.clamp(0.0, 1.0)) * self.dims[a] as f64 * self.frame.spacing_m[a]
@@ -101,7 +103,7 @@ impl Image {
 }
 
 /// Values to be shown black and white; what is no number counts for nothing.
-fn range(values: &[f32]) -> Result<[f32; 2], String> {
+fn range(values: &[f32]) -> Result<[f32; 2], ContentError> {
     let every = values.len().div_ceil(SAMPLED).max(1);
     let mut some: Vec<f32> = values
         .iter()
@@ -121,12 +123,15 @@ fn range(values: &[f32]) -> Result<[f32; 2], String> {
             return Ok([low, high]);
         }
     }
-    Err("all its voxels hold the same value, so there is nothing to see".to_owned())
+    Err(ContentError::Invalid(
+        "all its voxels hold the same value, so there is nothing to see".to_owned(),
+    ))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Matrix3;
 
     fn oblique() -> VoxelFrame {
         let (s, c) = 0.4_f64.sin_cos();
@@ -149,10 +154,8 @@ mod tests {
         let (s, c) = (-1.1_f64).sin_cos();
         let turn = Matrix3::new(1.0, 0.0, 0.0, 0.0, c, -s, 0.0, s, c);
         let shift = Vector3::new(0.01, -0.2, 0.05);
-        let mut patient_from_scene = [0.0; 12];
-        patient_from_scene[..9].copy_from_slice(turn.transpose().as_slice());
-        patient_from_scene[9..].copy_from_slice(shift.as_slice());
-        let rows = image.texture_from_scene(&patient_from_scene);
+        let patient = PatientFrame::new(turn, shift);
+        let rows = image.texture_from_scene(&patient);
         for index in [[0, 0, 0], [6, 4, 3], [2, 3, 1], [5, 0, 2]] {
             let in_patient = image.frame.place_m(index.map(|i| i as f64));
             let in_scene = turn.transpose() * (in_patient - shift);
@@ -164,10 +167,10 @@ mod tests {
                     "{index:?}: {found} along {a}, not {expected}"
                 );
             }
-            assert_eq!(image.distance_m(&patient_from_scene, in_scene.into()), 0.0);
+            assert_eq!(image.distance_m(&patient, in_scene.into()), 0.0);
         }
         let above = image.frame.place_m([3.0, 2.0, 3.5 + 10.0]);
-        let far = image.distance_m(&patient_from_scene, (turn.transpose() * (above - shift)).into());
+        let far = image.distance_m(&patient, (turn.transpose() * (above - shift)).into());
         assert!((far - 10.0 * 0.9e-3).abs() < 1e-9, "{far}");
     }
 
@@ -199,7 +202,12 @@ mod tests {
                 values: vec![value; 8],
                 frame: oblique(),
             };
-            assert!(Image::of(voxels, String::new()).unwrap_err().contains("nothing to see"));
+            assert!(
+                Image::of(voxels, String::new())
+                    .unwrap_err()
+                    .to_string()
+                    .contains("nothing to see")
+            );
         }
     }
 }

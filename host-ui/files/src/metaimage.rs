@@ -5,12 +5,14 @@ pub mod write;
 
 use super::Beside;
 use super::element::{Sink, must_hold, read_values, values_from_text, voxel_count};
-use super::frame::{VoxelFrame, ras_from_lps};
+use super::frame::VoxelFrame;
 use super::nrrd::nothing_left;
 use super::volume::VoxelValues;
+use crate::error::ContentError;
 use flate2::read::ZlibDecoder;
 use header::Header;
 use nalgebra::{Matrix3, Vector3};
+use stylet_anatomy::ras_from_lps;
 
 /// What the first line of such a file may be.
 const FIRST: [&str; 8] = [
@@ -33,7 +35,7 @@ pub fn is_metaimage(bytes: &[u8]) -> bool {
 }
 
 /// The whole file; `beside` reads the data of a detached header.
-pub fn read<V>(bytes: &[u8], beside: Beside, sink: Sink<V>) -> Result<VoxelValues<V>, String> {
+pub fn read<V>(bytes: &[u8], beside: Beside, sink: Sink<V>) -> Result<VoxelValues<V>, ContentError> {
     let (header, rest) = Header::parse(bytes)?;
     let frame = frame(&header)?;
     let count = voxel_count(&header.sizes)?;
@@ -51,7 +53,7 @@ pub fn read<V>(bytes: &[u8], beside: Beside, sink: Sink<V>) -> Result<VoxelValue
     })
 }
 
-fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<Vec<V>, String> {
+fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<Vec<V>, ContentError> {
     let size = (count * h.element.bytes()) as u64;
     if !h.binary {
         must_hold(count as u64, data.len() as u64, false)?;
@@ -59,7 +61,9 @@ fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<
     }
     if h.compressed {
         if h.header_bytes != 0 {
-            return Err("its data are packed and yet have a HeaderSize; write it again".to_owned());
+            return Err(ContentError::Invalid(
+                "its data are packed and yet have a HeaderSize; write it again".to_owned(),
+            ));
         }
         must_hold(size, data.len() as u64, true)?;
         let mut from = ZlibDecoder::new(data);
@@ -74,23 +78,23 @@ fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<
     };
     must_hold(size, data.len() as u64, false)?;
     if data.len() as u64 > size {
-        return Err(format!(
+        return Err(ContentError::Invalid(format!(
             "the header asks for {size} bytes and {} are there: header and data do not belong together; write it again",
             data.len()
-        ));
+        )));
     }
     read_values(data, h.element, h.endian, count, [1.0, 0.0], sink)
 }
 
 /// RAS, m; the file is in LPS, mm.
-fn frame(h: &Header) -> Result<VoxelFrame, String> {
+fn frame(h: &Header) -> Result<VoxelFrame, ContentError> {
     let lettered = h.letters.as_deref().and_then(axes_of_letters);
     let mut warning = None;
     let directions = match (h.directions, lettered) {
         (Some(directions), lettered) => {
             if lettered.is_some_and(|l| !same_octants(&l, &directions)) {
                 warning = Some(format!(
-                    "AnatomicalOrientation = {} does not fit TransformMatrix, which is believed",
+                    "AnatomicalOrientation = {} contradicts TransformMatrix, which is used",
                     h.letters.as_deref().unwrap_or_default()
                 ));
             }
@@ -114,7 +118,9 @@ fn frame(h: &Header) -> Result<VoxelFrame, String> {
             (0..3).map(|a| (d.column(a).norm() - 1.0).abs()).fold(0.0, f64::max)
         });
         if off > 1e-3 {
-            return Err("its TransformMatrix scales as well as it turns; write it with unit vectors".to_owned());
+            return Err(ContentError::Invalid(
+                "its TransformMatrix scales as well as it turns; write it with unit vectors".to_owned(),
+            ));
         }
     }
     frame.warning = warning;

@@ -5,6 +5,7 @@ pub mod write;
 use super::affine::voxel_frame;
 use super::element::{Element, Endian, Sink, must_hold, read_values, voxel_count};
 use super::volume::VoxelValues;
+use crate::error::ContentError;
 use flate2::read::MultiGzDecoder;
 use nifti::{Endianness, NiftiHeader, NiftiType};
 use std::io::Read;
@@ -25,7 +26,7 @@ fn declared_size(bytes: &[u8]) -> Option<i32> {
 }
 
 /// The whole file, packed or not.
-pub fn read<V>(bytes: &[u8], sink: Sink<V>) -> Result<VoxelValues<V>, String> {
+pub fn read<V>(bytes: &[u8], sink: Sink<V>) -> Result<VoxelValues<V>, ContentError> {
     let packed = bytes.starts_with(&GZIP);
     let mut from: Box<dyn Read + '_> = if packed {
         Box::new(MultiGzDecoder::new(bytes))
@@ -51,54 +52,58 @@ pub fn read<V>(bytes: &[u8], sink: Sink<V>) -> Result<VoxelValues<V>, String> {
     Ok(VoxelValues { dims, values, frame })
 }
 
-fn read_header(from: &mut dyn Read, file_bytes: usize) -> Result<NiftiHeader, String> {
+fn read_header(from: &mut dyn Read, file_bytes: usize) -> Result<NiftiHeader, ContentError> {
     let mut start = Vec::with_capacity(HEADER_BYTES);
     from.take(HEADER_BYTES as u64)
         .read_to_end(&mut start)
         .map_err(|e| format!("it is gzip data that cannot be unpacked ({e}); copy or export it again"))?;
     if declared_size(&start) == Some(540) {
-        return Err("it is NIfTI-2; convert it to NIfTI-1".to_owned());
+        return Err(ContentError::Invalid("it is NIfTI-2; convert it to NIfTI-1".to_owned()));
     }
     if start.len() < HEADER_BYTES {
-        return Err(format!(
+        return Err(ContentError::Invalid(format!(
             "it is cut off: {file_bytes} bytes, and the header alone needs {HEADER_BYTES}; copy or export it again"
-        ));
+        )));
     }
     if start.ends_with(b"ni1\0") {
-        return Err("it is the header of a .hdr/.img pair; convert it to one .nii file".to_owned());
+        return Err(ContentError::Invalid(
+            "it is the header of a .hdr/.img pair; convert it to one .nii file".to_owned(),
+        ));
     }
     if !start.ends_with(b"n+1\0") {
         return Err(
             "its magic is not \"n+1\", so it is no NIfTI-1 file; export the segmentation as NIfTI-1 (.nii or .nii.gz)"
-                .to_owned(),
+                .into(),
         );
     }
     NiftiHeader::from_reader(start.as_slice())
-        .map_err(|e| format!("its header cannot be read ({e}); export the segmentation as NIfTI-1 again"))
+        .map_err(|e| format!("its header cannot be read ({e}); export the segmentation as NIfTI-1 again").into())
 }
 
-fn checked_dims(h: &NiftiHeader) -> Result<[usize; 3], String> {
+fn checked_dims(h: &NiftiHeader) -> Result<[usize; 3], ContentError> {
     let rank = usize::from(h.dim[0]);
     if !(3..=7).contains(&rank) {
-        return Err(format!("it has {rank} dimensions; a segmentation has 3"));
+        return Err(ContentError::Invalid(format!(
+            "it has {rank} dimensions; a segmentation has 3"
+        )));
     }
     let dims = [1, 2, 3].map(|a| usize::from(h.dim[a]));
     if dims.contains(&0) || dims.iter().any(|&d| d > 32767) {
-        return Err(format!(
+        return Err(ContentError::Invalid(format!(
             "its size is {} x {} x {} voxels; each must be 1 to 32767",
             dims[0], dims[1], dims[2]
-        ));
+        )));
     }
     if h.dim[4..=rank].iter().any(|&d| d != 1) {
-        return Err(format!(
+        return Err(ContentError::Invalid(format!(
             "it holds a series of volumes ({:?}); take one volume out of it",
             &h.dim[1..=rank]
-        ));
+        )));
     }
     Ok(dims)
 }
 
-fn element(h: &NiftiHeader) -> Result<Element, String> {
+fn element(h: &NiftiHeader) -> Result<Element, ContentError> {
     Ok(match h.data_type() {
         Ok(NiftiType::Uint8) => Element::U8,
         Ok(NiftiType::Int8) => Element::I8,
@@ -111,22 +116,22 @@ fn element(h: &NiftiHeader) -> Result<Element, String> {
         Ok(NiftiType::Float32) => Element::F32,
         Ok(NiftiType::Float64) => Element::F64,
         _ => {
-            return Err(format!(
+            return Err(ContentError::Invalid(format!(
                 "its data type is number {}; labels must be whole numbers (uint8 is best)",
                 h.datatype
-            ));
+            )));
         }
     })
 }
 
-fn data_at(h: &NiftiHeader) -> Result<usize, String> {
+fn data_at(h: &NiftiHeader) -> Result<usize, ContentError> {
     if (352.0..=MAX_VOX_OFFSET).contains(&h.vox_offset) {
         return Ok(h.vox_offset as usize);
     }
-    Err(format!(
+    Err(ContentError::Invalid(format!(
         "its voxels begin at byte {}; expected 352 or a little more",
         h.vox_offset
-    ))
+    )))
 }
 
 /// As the standard has it, a slope of 0 means that nothing is scaled.

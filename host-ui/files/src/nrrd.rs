@@ -8,6 +8,7 @@ use super::Beside;
 use super::element::{Element, Endian, Sink, must_hold, read_values, values_from_text, voxel_count};
 use super::frame::VoxelFrame;
 use super::volume::{VoxelValues, Voxels};
+use crate::error::ContentError;
 use flate2::read::MultiGzDecoder;
 use header::{Axis, Header};
 use nalgebra::{Matrix3, Vector3};
@@ -22,7 +23,7 @@ pub fn is_nrrd(bytes: &[u8]) -> bool {
 }
 
 /// A file as labels; `beside` reads the data of a detached header.
-pub fn read(bytes: &[u8], beside: Beside, sink: Sink<u8>) -> Result<Voxels, String> {
+pub fn read(bytes: &[u8], beside: Beside, sink: Sink<u8>) -> Result<Voxels, ContentError> {
     let (header, voxels) = open(bytes, beside, sink)?;
     match list_axis(&header)? {
         None => Ok(voxels.named(segments::names(&header.pairs)?)),
@@ -31,26 +32,26 @@ pub fn read(bytes: &[u8], beside: Beside, sink: Sink<u8>) -> Result<Voxels, Stri
 }
 
 /// A file as an image.
-pub fn read_image(bytes: &[u8], beside: Beside, sink: Sink<f32>) -> Result<VoxelValues<f32>, String> {
+pub fn read_image(bytes: &[u8], beside: Beside, sink: Sink<f32>) -> Result<VoxelValues<f32>, ContentError> {
     let (header, voxels) = open(bytes, beside, sink)?;
     match list_axis(&header)? {
         None => Ok(voxels),
-        Some(list) => Err(format!(
+        Some(list) => Err(ContentError::Invalid(format!(
             "it holds {} values for each voxel; save one of them as a volume",
             header.sizes[list]
-        )),
+        ))),
     }
 }
 
 /// The axis along which a voxel holds several values.
-fn list_axis(h: &Header) -> Result<Option<usize>, String> {
+fn list_axis(h: &Header) -> Result<Option<usize>, ContentError> {
     let space = h.space_axes()?;
     let list = (0..h.sizes.len()).find(|a| !space.contains(a));
     Ok(list.filter(|&a| h.sizes[a] > 1))
 }
 
 /// The whole file, all values of all voxels.
-fn open<V>(bytes: &[u8], beside: Beside, sink: Sink<V>) -> Result<(Header, VoxelValues<V>), String> {
+fn open<V>(bytes: &[u8], beside: Beside, sink: Sink<V>) -> Result<(Header, VoxelValues<V>), ContentError> {
     let (header, rest) = Header::parse(bytes)?;
     let space = header.space_axes()?;
     let frame = frame(&header, space)?;
@@ -68,13 +69,11 @@ fn open<V>(bytes: &[u8], beside: Beside, sink: Sink<V>) -> Result<(Header, Voxel
     Ok((header, VoxelValues { dims, values, frame }))
 }
 
-fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<Vec<V>, String> {
+fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<Vec<V>, ContentError> {
     let encoding = h.encoding.as_str();
     let endian = h.endian.unwrap_or(Endian::Little);
     if h.element.bytes() > 1 && h.endian.is_none() && ["raw", "gzip", "gz", "hex"].contains(&encoding) {
-        return Err(
-            "it does not say in which order the bytes of a number are: the field \"endian\" is missing".to_owned(),
-        );
+        return Err("it does not say in which order the bytes of a number are: the field \"endian\" is missing".into());
     }
     let skipped = skip_lines(data, h.line_skip)?;
     let size = (count * h.element.bytes()) as u64;
@@ -111,16 +110,18 @@ fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<
             exactly(size, bytes.len() as u64)?;
             read_values(bytes.as_slice(), h.element, endian, count, identity, sink)
         }
-        "bzip2" | "bz2" => Err("its data are packed with bzip2; save it with gzip or raw encoding".to_owned()),
-        other => Err(format!(
+        "bzip2" | "bz2" => Err(ContentError::Invalid(
+            "its data are packed with bzip2; save it with gzip or raw encoding".to_owned(),
+        )),
+        other => Err(ContentError::Invalid(format!(
             "its encoding \"{}\" is not known; save it with gzip, raw, text or hex encoding",
             super::element::short(other)
-        )),
+        ))),
     }
 }
 
 /// The last bytes of packed data; a header of another format may stand before them.
-fn unpacked_end(packed: &[u8], size: u64) -> Result<Vec<u8>, String> {
+fn unpacked_end(packed: &[u8], size: u64) -> Result<Vec<u8>, ContentError> {
     must_hold(size, packed.len() as u64, true)?;
     let mut all = Vec::new();
     MultiGzDecoder::new(packed)
@@ -130,36 +131,40 @@ fn unpacked_end(packed: &[u8], size: u64) -> Result<Vec<u8>, String> {
     let before = (all.len() as u64).checked_sub(size);
     match before {
         Some(before) if before <= MAX_BEFORE_END => Ok(all.split_off(before as usize)),
-        Some(_) => Err(format!(
+        Some(_) => Err(ContentError::Invalid(format!(
             "its data have more than {MAX_BEFORE_END} bytes before what its size asks for"
-        )),
-        None => Err(format!(
+        ))),
+        None => Err(ContentError::Invalid(format!(
             "it is cut off: {} of {size} bytes are there; copy or export it again",
             all.len()
-        )),
+        ))),
     }
 }
 
-fn exactly(needed: u64, have: u64) -> Result<(), String> {
+fn exactly(needed: u64, have: u64) -> Result<(), ContentError> {
     must_hold(needed, have, false)?;
     if have > needed {
-        return Err(format!(
+        return Err(ContentError::Invalid(format!(
             "the header asks for {needed} bytes and {have} are there: header and data do not belong together; export it again"
-        ));
+        )));
     }
     Ok(())
 }
 
 /// A longer stream than the header says is another volume's.
-pub(super) fn nothing_left(mut from: impl Read) -> Result<(), String> {
+pub(super) fn nothing_left(mut from: impl Read) -> Result<(), ContentError> {
     match from.read(&mut [0]) {
         Ok(0) => Ok(()),
-        Ok(_) => Err("its data go on behind what its size asks for: header and data do not belong together".to_owned()),
-        Err(e) => Err(format!("it is damaged ({e}); copy or export it again")),
+        Ok(_) => Err(ContentError::Invalid(
+            "its data go on behind what its size asks for: header and data do not belong together".to_owned(),
+        )),
+        Err(e) => Err(ContentError::Invalid(format!(
+            "it is damaged ({e}); copy or export it again"
+        ))),
     }
 }
 
-fn skip_lines(mut data: &[u8], lines: usize) -> Result<&[u8], String> {
+fn skip_lines(mut data: &[u8], lines: usize) -> Result<&[u8], ContentError> {
     for _ in 0..lines {
         let end = data
             .iter()
@@ -170,7 +175,7 @@ fn skip_lines(mut data: &[u8], lines: usize) -> Result<&[u8], String> {
     Ok(data)
 }
 
-fn unhex(text: &[u8]) -> Result<Vec<u8>, String> {
+fn unhex(text: &[u8]) -> Result<Vec<u8>, ContentError> {
     let digit = |b: u8| (b as char).to_digit(16).map(|d| d as u8);
     let digits: Option<Vec<u8>> = text
         .iter()
@@ -179,7 +184,7 @@ fn unhex(text: &[u8]) -> Result<Vec<u8>, String> {
         .collect();
     let digits = digits.ok_or("its data hold a character that is no hexadecimal digit")?;
     if digits.len() % 2 == 1 {
-        return Err("its data hold half a byte too many".to_owned());
+        return Err(ContentError::Invalid("its data hold half a byte too many".to_owned()));
     }
     Ok(digits.chunks_exact(2).map(|d| d[0] << 4 | d[1]).collect())
 }
@@ -187,17 +192,17 @@ fn unhex(text: &[u8]) -> Result<Vec<u8>, String> {
 const NO_SPACE: &str = "the file names no anatomical space; its axes are taken as right, anterior, superior";
 
 /// RAS, m.
-fn frame(h: &Header, space: [usize; 3]) -> Result<VoxelFrame, String> {
+fn frame(h: &Header, space: [usize; 3]) -> Result<VoxelFrame, ContentError> {
     let (flip, named) = match h.space.as_deref() {
         Some("right-anterior-superior" | "ras") => ([1.0, 1.0, 1.0], true),
         Some("left-anterior-superior" | "las") => ([-1.0, 1.0, 1.0], true),
         Some("left-posterior-superior" | "lps") => ([-1.0, -1.0, 1.0], true),
         Some("scanner-xyz" | "3d-right-handed" | "3d-left-handed") | None => ([1.0, 1.0, 1.0], false),
         Some(other) => {
-            return Err(format!(
+            return Err(ContentError::Invalid(format!(
                 "its space \"{}\" is none of an anatomical volume; save it as left-posterior-superior or right-anterior-superior",
                 super::element::short(other)
-            ));
+            )));
         }
     };
     let flip = Matrix3::from_diagonal(&Vector3::from(flip));
@@ -214,8 +219,7 @@ fn frame(h: &Header, space: [usize; 3]) -> Result<VoxelFrame, String> {
             }
             _ => {
                 return Err(
-                    "it says nothing of the size of its voxels: neither \"space directions\" nor \"spacings\""
-                        .to_owned(),
+                    "it says nothing of the size of its voxels: neither \"space directions\" nor \"spacings\"".into(),
                 );
             }
         };

@@ -51,8 +51,8 @@ pub fn smallest_wins(
     (labels, warning)
 }
 
-/// The volume with one more thing that the user should know.
-pub fn told(mut voxels: Voxels, warning: Option<String>) -> Voxels {
+/// The volume with one more warning for the user.
+pub fn with_warning(mut voxels: Voxels, warning: Option<String>) -> Voxels {
     voxels.frame.warning = match (voxels.frame.warning.take(), warning) {
         (Some(one), Some(other)) => Some(format!("{one}; {other}")),
         (one, other) => one.or(other),

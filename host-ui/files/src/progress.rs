@@ -1,5 +1,6 @@
 //! How far the reading of a file is, for another thread, which may also end it.
 
+use crate::error::ContentError;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use stylet_base::interrupt::Interrupt;
@@ -24,10 +25,10 @@ impl Stage {
     }
 }
 
-/// Steps in which a share is told.
+/// Steps in which a share is reported.
 const STEPS: u32 = 1000;
 
-/// Clones tell of the same reading.
+/// How far one reading is; clones share it.
 #[derive(Clone, Debug, Default)]
 pub struct Progress {
     at: Arc<AtomicU32>,
@@ -35,26 +36,26 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// The same reading, ended when this is asked for.
+    /// The same reading, which ends once `end` is requested.
     pub fn ended_by(self, end: Interrupt) -> Self {
         Self { end, ..self }
     }
 
-    /// From the reader, now and then; `Err` when it is to end.
-    pub fn tell(&self, stage: Stage, done: usize, of: usize) -> Result<(), String> {
+    /// From the reader, now and then; an error when the user ended the work.
+    pub fn report(&self, stage: Stage, done: usize, of: usize) -> Result<(), ContentError> {
         let steps = (done as f64 / of.max(1) as f64).min(1.0) * f64::from(STEPS);
         // SYNC: read by `at`; nothing but the number is carried.
         self.at
             .store(stage as u32 * (STEPS + 1) + steps as u32, Ordering::Relaxed);
-        if self.end.asked() {
-            return Err("it was cancelled".to_owned());
+        if self.end.is_requested() {
+            return Err(ContentError::Cancelled);
         }
         Ok(())
     }
 
     /// The stage, and the share of it that is done.
     pub fn at(&self) -> (Stage, f32) {
-        // SYNC: told by `tell`; nothing but the number is carried.
+        // SYNC: stored by `report`; nothing but the number is carried.
         let at = self.at.load(Ordering::Relaxed);
         let stage = Stage::ALL.get((at / (STEPS + 1)) as usize);
         let share = (at % (STEPS + 1)) as f32 / STEPS as f32;
@@ -67,21 +68,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_one_thread_tells_another_sees_and_what_it_asks_ends_the_work() {
+    fn one_thread_sees_the_progress_of_another_and_can_end_it() {
         let end = Interrupt::default();
         let seen = Progress::default();
         assert_eq!(seen.at(), (Stage::Bytes, 0.0));
-        let told = seen.clone().ended_by(end.clone());
+        let reader = seen.clone().ended_by(end.clone());
         for (stage, done, of, share) in [
             (Stage::Bytes, 7, 7, 1.0),
             (Stage::Voxels, 1, 4, 0.25),
             (Stage::Elements, 0, 0, 0.0),
             (Stage::Elements, 9, 3, 1.0),
         ] {
-            assert_eq!(told.tell(stage, done, of), Ok(()));
+            assert_eq!(reader.report(stage, done, of), Ok(()));
             assert_eq!(seen.at(), (stage, share));
         }
-        end.ask();
-        assert!(told.tell(Stage::Voxels, 1, 4).is_err());
+        end.request();
+        assert!(reader.report(Stage::Voxels, 1, 4).is_err());
     }
 }

@@ -2,12 +2,15 @@
 
 mod keys;
 
-use super::names::{Material, Role, known, unknown};
-use super::open::{file_name, read_voxels, whole};
-use super::volume::{LabelVolume, Tissue, Voxels};
-use super::{FileError, Progress, error};
+use super::bytes::{file_name, whole};
+use super::error::FileError;
+use super::open::read_voxels;
+use super::progress::Progress;
+use super::volume::{LabelVolume, Tissue, Voxels, role_and_material};
+use crate::error::ContentError;
 use keys::Keys;
 use std::path::{Path, PathBuf};
+use stylet_anatomy::{Material, Role};
 
 const MAX_BYTES: usize = 1 << 20;
 const MAX_STRUCTURES: usize = 255;
@@ -55,16 +58,15 @@ pub fn is_scene(path: &Path) -> bool {
 
 /// Reads a scene file.
 pub fn read(path: &Path) -> Result<SceneFile, FileError> {
-    let told = |why: String| FileError::of(path, &why);
-    let bytes = whole(path, &Progress::default()).map_err(told)?;
+    let refused = |why: ContentError| FileError::of(path, why);
+    let bytes = whole(path, &Progress::default()).map_err(refused)?;
     if bytes.len() > MAX_BYTES {
-        return Err(told(format!(
-            "it has {} bytes; a scene file has a few thousand",
-            bytes.len()
-        )));
+        return Err(refused(
+            format!("it has {} bytes; a scene file has a few thousand", bytes.len()).into(),
+        ));
     }
-    let text = std::str::from_utf8(&bytes).map_err(|_| told("it is not text (UTF-8)".to_owned()))?;
-    parse(text).map_err(told)
+    let text = std::str::from_utf8(&bytes).map_err(|_| refused("it is not text (UTF-8)".into()))?;
+    parse(text).map_err(refused)
 }
 
 /// The volume of a scene file, its structures made of what the file says.
@@ -73,14 +75,14 @@ pub fn load(path: &Path, progress: &Progress) -> Result<(SceneFile, LabelVolume)
     let beside = path.parent().unwrap_or(Path::new("")).join(&scene.volume);
     let voxels = read_voxels(&beside, progress)?;
     let name = scene.name.clone().unwrap_or_else(|| file_name(path));
-    let told = |why: String| FileError::of(path, &why);
-    let tissues = scene.tissues(&voxels).map_err(told)?;
-    let volume = LabelVolume::from_tissues(&voxels, tissues, name, progress).map_err(told)?;
+    let refused = |why: ContentError| FileError::of(path, why);
+    let tissues = scene.tissues(&voxels).map_err(refused)?;
+    let volume = LabelVolume::from_tissues(&voxels, tissues, name, progress).map_err(refused)?;
     Ok((scene, volume))
 }
 
 /// From the text of a scene file.
-pub fn parse(text: &str) -> Result<SceneFile, String> {
+pub fn parse(text: &str) -> Result<SceneFile, ContentError> {
     let root: toml::Table = text.parse().map_err(|e| format!("it is not TOML: {e}"))?;
     let mut problems = Vec::new();
     let mut top = Keys::new(&root, String::new(), &mut problems);
@@ -111,7 +113,7 @@ pub fn parse(text: &str) -> Result<SceneFile, String> {
     if absent || (volume.is_none() && problems.is_empty()) {
         problems.push("[volume] file is missing: the label volume to run".to_owned());
     }
-    error::all(problems)?;
+    ContentError::all(problems)?;
     let [insert_m_per_s, retract_m_per_s] = needle.unwrap_or_default();
     Ok(SceneFile {
         name,
@@ -197,7 +199,7 @@ fn part(k: &mut Keys) -> Option<Part> {
 
 impl SceneFile {
     /// What each label of the volume is made of; labels that no structure names are left out.
-    fn tissues(&self, voxels: &Voxels) -> Result<Vec<Tissue>, String> {
+    fn tissues(&self, voxels: &Voxels) -> Result<Vec<Tissue>, ContentError> {
         if self.structures.is_empty() {
             return Ok(super::volume::by_name(voxels));
         }
@@ -212,19 +214,21 @@ impl SceneFile {
                 Ok(label) => tissues.extend(part.tissue(label, voxels)),
             }
         }
-        error::all(problems)?;
+        ContentError::all(problems)?;
         if tissues.is_empty() {
-            return Err("all structures are left out".to_owned());
+            return Err(ContentError::Invalid("all structures are left out".to_owned()));
         }
         Ok(tissues)
     }
 }
 
 impl Part {
-    fn find(&self, voxels: &Voxels) -> Result<u8, String> {
+    fn find(&self, voxels: &Voxels) -> Result<u8, ContentError> {
         match &self.pick {
             Pick::Label(label) if voxels.labels.contains(label) => Ok(*label),
-            Pick::Label(label) => Err(format!("the volume has no voxel with label {label}")),
+            Pick::Label(label) => Err(ContentError::Invalid(format!(
+                "the volume has no voxel with label {label}"
+            ))),
             Pick::Name(name) => {
                 let found = voxels.names.iter().find(|(_, n)| n.eq_ignore_ascii_case(name));
                 found.map(|(label, _)| *label).ok_or_else(|| {
@@ -234,7 +238,7 @@ impl Part {
                     } else {
                         names.join(", ")
                     };
-                    format!("the volume has no structure \"{name}\"; it has {there}")
+                    format!("the volume has no structure \"{name}\"; it has {there}").into()
                 })
             }
         }
@@ -251,7 +255,7 @@ impl Part {
             .clone()
             .or(picked)
             .unwrap_or_else(|| format!("label {label}"));
-        let (role, material) = known(&name).unwrap_or_else(unknown);
+        let (role, material) = role_and_material(&name);
         let role = self.role.unwrap_or(Some(role))?;
         Some(Tissue {
             label,

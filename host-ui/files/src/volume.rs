@@ -1,10 +1,11 @@
 //! A segmented volume as the core takes it: cubic elements on the lattice of the scene frame.
 
 use super::frame::VoxelFrame;
-use super::names::{Material, Role, known, unknown};
 use super::progress::{Progress, Stage};
+use crate::error::ContentError;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
+use stylet_anatomy::{Material, Organ, PatientFrame, Role};
 
 /// Room around the tissue.
 const MARGIN_M: f64 = 0.020;
@@ -30,8 +31,7 @@ pub struct LabelVolume {
     pub cells: Vec<u8>,
     /// What the cells with each label are; empty: all tissue is one.
     pub structures: Vec<Tissue>,
-    /// Patient (RAS, m) from scene: row-major rotation, then translation.
-    pub patient_from_scene: [f64; 12],
+    pub patient: PatientFrame,
     pub name: String,
     /// Every label of the file with its number of voxels, by label.
     pub voxels_per_label: Vec<(u8, u64)>,
@@ -85,7 +85,12 @@ impl LabelVolume {
     }
 
     /// The structures that the volume names, or all labels as one tissue, or only the one asked for.
-    pub fn from_voxels(voxels: &Voxels, label: Option<u8>, name: String, progress: &Progress) -> Result<Self, String> {
+    pub fn from_voxels(
+        voxels: &Voxels,
+        label: Option<u8>,
+        name: String,
+        progress: &Progress,
+    ) -> Result<Self, ContentError> {
         if label.is_none() && !voxels.names.is_empty() {
             return Self::from_tissues(voxels, by_name(voxels), name, progress);
         }
@@ -109,7 +114,7 @@ impl LabelVolume {
         structures: Vec<Tissue>,
         name: String,
         progress: &Progress,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, ContentError> {
         let mut keep = [0_u8; 256];
         structures.iter().for_each(|t| keep[usize::from(t.label)] = t.label);
         let present = present(voxels);
@@ -129,7 +134,7 @@ impl LabelVolume {
         if !left_out.is_empty() {
             notes.push(format!("labels without a structure are left out: {}", list(&left_out)));
         }
-        for t in structures.iter().filter(|t| known(&t.name).is_none()) {
+        for t in structures.iter().filter(|t| Organ::of_name(&t.name).is_none()) {
             notes.push(format!(
                 "\"{}\" is no name of TG-263 that is known here (as Prostate, Urethra, Rectum, Bladder are); it is taken as {}",
                 t.name,
@@ -156,7 +161,7 @@ impl LabelVolume {
         name: String,
         progress: &Progress,
         nothing: impl Fn() -> String,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, ContentError> {
         let bounds = tissue_bounds(voxels, keep).ok_or_else(nothing)?;
         let finest = voxels.frame.spacing_m.iter().fold(0.0_f64, |a, &b| a.max(b));
         let mut h = finest;
@@ -164,7 +169,10 @@ impl LabelVolume {
             let volume = Self::resampled(voxels, keep, bounds, h, progress)?;
             if let Some((dims, origin, cells)) = volume.filter(|v| tissue(&v.2) <= MAX_TISSUE) {
                 if tissue(&cells) == 0 {
-                    return Err(format!("the tissue is thinner than its elements of {:.2} mm", h * 1e3));
+                    return Err(ContentError::Invalid(format!(
+                        "the tissue is thinner than its elements of {:.2} mm",
+                        h * 1e3
+                    )));
                 }
                 let mut warnings: Vec<String> = voxels.frame.warning.iter().cloned().collect();
                 if h > finest {
@@ -179,7 +187,7 @@ impl LabelVolume {
                     spacing_m: h,
                     cells,
                     structures: Vec::new(),
-                    patient_from_scene: transform(&voxels.frame, voxels.dims, origin),
+                    patient: patient_frame(&voxels.frame, voxels.dims, origin),
                     name,
                     voxels_per_label: present(voxels),
                     warnings,
@@ -196,7 +204,7 @@ impl LabelVolume {
         bounds: Bounds,
         h: f64,
         progress: &Progress,
-    ) -> Result<Option<Resampled>, String> {
+    ) -> Result<Option<Resampled>, ContentError> {
         let (low, high) = upright(bounds, mirrored(&v.frame), v.dims);
         let mut dims = [0; 3];
         let mut corner = [0.0; 3];
@@ -216,7 +224,7 @@ impl LabelVolume {
         let flip = mirrored(&v.frame);
         let mut cells = vec![0_u8; count];
         for k in 0..dims[2] {
-            progress.tell(Stage::Elements, k, dims[2])?;
+            progress.report(Stage::Elements, k, dims[2])?;
             for j in 0..dims[1] {
                 for i in 0..dims[0] {
                     let label = covered(v, keep, flip, [&covers[0][i], &covers[1][j], &covers[2][k]]);
@@ -294,11 +302,16 @@ fn present(v: &Voxels) -> Vec<(u8, u64)> {
         .collect()
 }
 
+/// What a structure is by its name; tissue of one kind where the name says nothing.
+pub fn role_and_material(name: &str) -> (Role, Material) {
+    Organ::of_name(name).map_or((Role::Tissue, Material::OTHER), |o| (o.role(), o.material()))
+}
+
 /// The labels that a volume has, each what its name says.
 pub fn by_name(v: &Voxels) -> Vec<Tissue> {
     let tissue = |(label, _)| {
         let name = v.names.get(&label).cloned().unwrap_or_else(|| format!("label {label}"));
-        let (role, material) = known(&name).unwrap_or_else(unknown);
+        let (role, material) = role_and_material(&name);
         Tissue {
             label,
             name,
@@ -342,7 +355,7 @@ fn no_tissue(label: Option<u8>, present: &[(u8, u64)]) -> String {
 }
 
 /// The corner of voxel 0 lies half a voxel before its centre, where the file puts the origin.
-fn transform(frame: &VoxelFrame, dims: [usize; 3], corner_m: [f64; 3]) -> [f64; 12] {
+fn patient_frame(frame: &VoxelFrame, dims: [usize; 3], corner_m: [f64; 3]) -> PatientFrame {
     let side = Vector3::from(frame.spacing_m);
     let mut rotation: Matrix3<f64> = frame.directions;
     let mut corner = frame.origin_m - rotation * (side / 2.0);
@@ -351,20 +364,5 @@ fn transform(frame: &VoxelFrame, dims: [usize; 3], corner_m: [f64; 3]) -> [f64; 
         let turned = -rotation.column(0);
         rotation.set_column(0, &turned);
     }
-    let t = corner + rotation * Vector3::from(corner_m);
-    let r = rotation;
-    [
-        r[(0, 0)],
-        r[(0, 1)],
-        r[(0, 2)],
-        r[(1, 0)],
-        r[(1, 1)],
-        r[(1, 2)],
-        r[(2, 0)],
-        r[(2, 1)],
-        r[(2, 2)],
-        t.x,
-        t.y,
-        t.z,
-    ]
+    PatientFrame::new(rotation, corner + rotation * Vector3::from(corner_m))
 }

@@ -8,7 +8,8 @@ use receive::Latest;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use stylet_files::{LabelVolume, Tissue, names};
+use stylet_anatomy::Role;
+use stylet_files::{LabelVolume, Tissue};
 use stylet_shm_schema::service::{Instance, MAX_HOSTS};
 use stylet_shm_schema::*;
 
@@ -300,7 +301,7 @@ impl Link {
             command_id: id,
             dims: volume.dims.map(|d| d as u32),
             spacing_m: volume.spacing_m,
-            patient_from_scene: volume.patient_from_scene,
+            patient_from_scene: volume.patient.to_wire(),
             name: Text::new(&volume.name),
             structure_count: volume.structures.len().min(MAX_STRUCTURES) as u32,
             ..UploadHeader::default()
@@ -447,9 +448,9 @@ mod tests;
 
 fn upload_structure(tissue: &Tissue) -> UploadStructure {
     let role = match tissue.role {
-        names::Role::Target => role::TARGET,
-        names::Role::Spare => role::SPARE,
-        names::Role::Tissue => 0,
+        Role::Target => role::TARGET,
+        Role::Spare => role::SPARE,
+        Role::Tissue => 0,
     };
     UploadStructure {
         label: u32::from(tissue.label),

@@ -2,5 +2,6 @@
 
 pub mod plan;
 pub mod procedure;
+pub mod readers;
 pub mod score;
 pub mod workflow;

@@ -165,7 +165,7 @@ fn wait(
 ) -> Result<bool, String> {
     let begun = Instant::now();
     while begun.elapsed() < limit {
-        if interrupted.asked() {
+        if interrupted.is_requested() {
             return Err("interrupted".to_owned());
         }
         link.poll();
@@ -240,7 +240,7 @@ fn perform(link: &mut Link, job: &Job, pace: Pace, interrupted: &Interrupt, seen
     seen.last_event = link.events().back().map(|e| e.sequence);
     link.take_records();
     loop {
-        if interrupted.asked() {
+        if interrupted.is_requested() {
             return Err("interrupted".to_owned());
         }
         link.poll();

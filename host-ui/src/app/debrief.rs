@@ -5,7 +5,7 @@ use crate::panel::{Note, SeedError, all_errors};
 use std::path::PathBuf;
 use std::sync::Arc;
 use stylet_base::format;
-use stylet_base::job::{Job, News};
+use stylet_base::job::{Job, Update};
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Seed, Source};
 use stylet_host::link::SceneModel;
@@ -48,9 +48,9 @@ impl App {
     pub(super) fn take_debrief(&mut self) {
         let Some(job) = &self.debrief else { return };
         let saved = match job.poll() {
-            News::None => return,
-            News::Told(saved) => saved,
-            News::Ended => Err("the debrief was not written: its thread has ended".to_owned()),
+            Update::Pending => return,
+            Update::Value(saved) => saved,
+            Update::Ended => Err("the debrief was not written: its thread has ended".to_owned()),
         };
         self.debrief = None;
         self.shown.note = Some(match saved {

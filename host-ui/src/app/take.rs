@@ -211,7 +211,7 @@ impl App {
         };
         let [low, high] = [scene.target_lower_m, scene.target_upper_m];
         let middle_m = [0, 1, 2].map(|a| (low[a] + high[a]) / 2.0);
-        match image.covers(&scene.patient_from_scene, middle_m) {
+        match image.covers(&scene.patient(), middle_m) {
             Ok(()) => {
                 let name = scene.name.read();
                 self.show_image(image, &name);

@@ -3,11 +3,11 @@
 use clap::Args;
 use std::path::{Path, PathBuf};
 use stylet_dose::Source;
-use stylet_dose::files::{Dosed, SeedDefaults, read_dose, read_seeds};
 use stylet_files::convert::{can_hold_labels, write_labels, write_whole};
 use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
 use stylet_files::dicom::{self, Identity};
-use stylet_files::{self as files, Progress, open, scene};
+use stylet_files::{self as files, FileError, Progress, bytes, scene};
+use stylet_implant::readers::{DoseFile, SeedDefaults, read_dose, read_seed_rows};
 
 const HELP: &str = "\
 What is converted into what:
@@ -17,7 +17,7 @@ What is converted into what:
   dose           .csv (dose_grid.csv of host-ui dose) into .dcm (RT Dose; needs --plan) or .nrrd
 
 Orientation and spacing are kept: NIfTI is in RAS, DICOM and MetaImage in LPS, NRRD says which.
-What is not taken over (overlaps, structures without volume) is told.
+What is lost (overlaps, structures without volume) is reported.
 
 Examples:
   host-ui convert rtstruct.dcm gland.seg.nrrd
@@ -29,7 +29,7 @@ Examples:
 #[derive(Args, Debug)]
 #[command(after_long_help = HELP)]
 pub struct ConvertArgs {
-    /// File to read; what it is is told by its content
+    /// File to read; its content says what it is
     from: PathBuf,
     /// File to write; its name says the format
     to: PathBuf,
@@ -77,8 +77,8 @@ impl ConvertArgs {
             eprintln!("note: {note}");
         }
         if to_dicom {
-            let told = |why: String| format!("{}: {why}", self.to.display());
-            let bytes = dicom::structures::write::bytes(&voxels, &Identity::new()).map_err(told)?;
+            let refused = |why| FileError::of(&self.to, why);
+            let bytes = dicom::structures::write::bytes(&voxels, &Identity::new()).map_err(refused)?;
             write_whole(&self.to, &bytes)?;
         } else {
             write_labels(&voxels, &self.to)?;
@@ -104,7 +104,7 @@ impl ConvertArgs {
             strength_u: self.strength_u,
             strength_per_activity_u_per_mci: source.strength_per_activity_u_per_mci,
         };
-        let seeds = read_seeds(&self.from, defaults)?;
+        let rows = read_seed_rows(&self.from, defaults)?.into_rows();
         let plan = SeedPlan {
             label: "Stylet".to_owned(),
             identity: Identity::new(),
@@ -117,13 +117,14 @@ impl ConvertArgs {
                 half_life_days: stylet_dose::decay::s_to_days(source.half_life_s),
                 active_length_m: source.tables.active_length_m,
             },
-            seeds: seeds
-                .iter()
-                .map(|s| PlanSeed {
-                    needle: String::new(),
-                    position_m: s.position_m,
-                    axis: s.axis,
-                    strength_u: s.strength_u,
+            seeds: rows
+                .into_iter()
+                .map(|row| PlanSeed {
+                    needle: row.needle,
+                    hole: row.hole.unwrap_or_default(),
+                    position_m: row.seed.position_m,
+                    axis: row.seed.axis,
+                    strength_u: row.seed.strength_u,
                 })
                 .collect(),
             notes: Vec::new(),
@@ -134,11 +135,14 @@ impl ConvertArgs {
 
     fn plan_to_csv(&self) -> Result<(), String> {
         let plan = plan::open(&self.from)?;
-        let mut out = String::from("x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u\n");
+        let mut out = String::from("x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,needle,hole\n");
         for seed in &plan.seeds {
             let [x, y, z] = seed.position_m.map(|v| v * 1e3);
             let axis = seed.axis.map_or(",,".to_owned(), |[a, b, c]| format!("{a},{b},{c}"));
-            out.push_str(&format!("{x},{y},{z},{axis},{}\n", seed.strength_u));
+            let needle = seed.needle.map_or_else(String::new, |n| n.to_string());
+            // The only characters that would end the field.
+            let hole = seed.hole.replace([',', '"', '\n', '\r'], " ");
+            out.push_str(&format!("{x},{y},{z},{axis},{},{needle},{hole}\n", seed.strength_u));
         }
         write_whole(&self.to, out.as_bytes())?;
         self.written()
@@ -191,7 +195,7 @@ fn has_ending(path: &Path, ending: &str) -> bool {
 }
 
 fn first_line(path: &Path) -> Result<String, String> {
-    let bytes = open::whole(path, &Progress::default()).map_err(|why| format!("{}: {why}", path.display()))?;
+    let bytes = bytes::whole(path, &Progress::default()).map_err(|why| FileError::of(path, why))?;
     let line = bytes
         .split(|&b| b == b'\n')
         .find(|l| !l.starts_with(b"#"))
@@ -200,7 +204,7 @@ fn first_line(path: &Path) -> Result<String, String> {
 }
 
 /// In double precision, so that nothing is lost.
-fn dose_nrrd(grid: &Dosed) -> Vec<u8> {
+fn dose_nrrd(grid: &DoseFile) -> Vec<u8> {
     let [x, y, z] = grid.origin_m.map(|v| v * 1e3);
     let [a, b, c] = grid.spacing_m.map(|v| v * 1e3);
     let [nx, ny, nz] = grid.dims;

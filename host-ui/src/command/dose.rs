@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 use stylet_base::interrupt::Interrupt;
 use stylet_base::progress_bar::progress_bar;
 use stylet_dose::decay::{Interval, days_to_s, left_after};
-use stylet_dose::files::{SeedDefaults, read_points, read_seeds};
 use stylet_dose::kernel::DoseKernel;
 use stylet_dose::metric::Metric;
 use stylet_dose::report::Judge;
 use stylet_dose::seed::Seed;
 use stylet_dose::source::Source;
 use stylet_dose::structure::Structure;
-use stylet_dose::{DoseGrid, DosePoints, contours, labels, perturb, picture, structure};
+use stylet_dose::{DoseGrid, DosePoints, perturb, picture, structure};
+use stylet_implant::readers::{SeedDefaults, contours, labels, read_points, read_seeds};
 
 mod write;
 
@@ -277,7 +277,14 @@ impl Common {
             None => self.labelled(file, given, most_points)?,
         };
         let target = self.target.as_deref();
-        Judge::new(structures, target, &extra, prescription_gy, seeds, most_points)
+        Ok(Judge::new(
+            structures,
+            target,
+            &extra,
+            prescription_gy,
+            seeds,
+            most_points,
+        )?)
     }
 
     fn labelled(&self, file: &Path, given: BTreeMap<u8, String>, most_points: usize) -> Result<Vec<Structure>, String> {

@@ -2,16 +2,17 @@
 
 use clap::Args;
 use std::path::PathBuf;
+use stylet_anatomy::PatientFrame;
 use stylet_base::progress_bar::progress_bar;
 use stylet_dose::decay::Interval;
-use stylet_dose::files::SeedDefaults;
 use stylet_dose::report::Judge;
 use stylet_dose::{DoseKernel, Source};
 use stylet_host::core_args::CoreArgs;
 use stylet_implant::plan::automatic::{self, Aims};
-use stylet_implant::plan::file::{self, Frames};
+use stylet_implant::plan::file;
 use stylet_implant::plan::{Anatomy, ImplantPlan, Template, check};
 use stylet_implant::procedure::{Connect, Live};
+use stylet_implant::readers::SeedDefaults;
 
 const DOSE_PITCH_M: f64 = 1e-3;
 const POINTS: usize = 100_000;
@@ -71,7 +72,7 @@ impl PlanArgs {
             core: self.core.clone(),
         })?;
         let (anatomy, template) = (Anatomy::of(&live.scene)?, Template::before(&live.scene.header));
-        let frames = Frames::new(&anatomy.patient_from_scene);
+        let frames = anatomy.patient;
         let kernel = DoseKernel::new(&source, Interval::ALL);
         let plan = match &self.seeds {
             None => {
@@ -102,7 +103,7 @@ impl PlanArgs {
         Ok(())
     }
 
-    fn write(&self, plan: &ImplantPlan, frames: &Frames) -> Result<(), String> {
+    fn write(&self, plan: &ImplantPlan, frames: &PatientFrame) -> Result<(), String> {
         file::write(&self.out, plan, frames)?;
         let Some(csv) = &self.csv else { return Ok(()) };
         let text = file::seeds_to_csv(plan, frames);

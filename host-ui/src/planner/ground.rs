@@ -2,9 +2,9 @@
 
 use crate::view::slice::cut;
 use nalgebra::Vector3;
+use stylet_anatomy::PatientFrame;
 use stylet_host::link::SceneModel;
 use stylet_implant::plan::anatomy::Body;
-use stylet_implant::plan::file::Frames;
 use stylet_implant::plan::{Anatomy, HOLES, Hole, Template};
 
 /// From one layer of outlines to the next.
@@ -27,7 +27,7 @@ pub struct Ground {
     pub scene: (u64, u64),
     pub template: Template,
     pub anatomy: Anatomy,
-    pub frames: Frames,
+    pub frames: PatientFrame,
     /// From the template's face to the near and the far end of the target.
     pub depths_m: [f64; 2],
     layers: Vec<Layer>,
@@ -67,7 +67,7 @@ impl Ground {
         Self {
             scene,
             template,
-            frames: Frames::new(&anatomy.patient_from_scene),
+            frames: anatomy.patient,
             layers: (0..=count).map(layer).collect(),
             pieces_m: Hole::all().map(piece).collect(),
             depths_m,
@@ -132,7 +132,7 @@ mod tests {
             spared: vec![ball("urethra", [0.05, 0.05, 0.06], [0.003, 0.003, 0.03])],
             lower_m: [0.0; 3],
             upper_m: [0.1; 3],
-            patient_from_scene: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+            patient: PatientFrame::default(),
         };
         let template = Template {
             middle_m: [0.05, 0.05, -0.01],

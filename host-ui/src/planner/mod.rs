@@ -14,7 +14,7 @@ pub use shown::{Implant, Planning};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use stylet_base::job::{Job, News};
+use stylet_base::job::{Job, Update};
 use stylet_host::link::SceneModel;
 use stylet_implant::plan::check::{Problem, problems};
 use stylet_implant::plan::{Compensation, Drops, History, Hole, ImplantPlan, Needle, Row, Template, exchange};
@@ -126,14 +126,14 @@ impl Planner {
         if let Some((session, generation, template, job)) = &self.grounding {
             let (key, template) = ((*session, *generation), *template);
             match job.poll() {
-                News::None => {}
-                News::Told(Ok(ground)) => {
+                Update::Pending => {}
+                Update::Value(Ok(ground)) => {
                     self.ground = Some(Arc::new(ground));
                     self.grounding = None;
                     self.change();
                 }
-                News::Told(Err(why)) => self.no_ground(key, template, why),
-                News::Ended => self.no_ground(key, template, "the scene's anatomy was not made out".to_owned()),
+                Update::Value(Err(why)) => self.no_ground(key, template, why),
+                Update::Ended => self.no_ground(key, template, "the scene's anatomy was not made out".to_owned()),
             }
             return;
         }
@@ -162,8 +162,8 @@ impl Planner {
     fn take_problems(&mut self) {
         if let Some((revision, job)) = &self.checking {
             match job.poll() {
-                News::None => return,
-                News::Told(found) => {
+                Update::Pending => return,
+                Update::Value(found) => {
                     self.problems = Some(Arc::new(found));
                     self.checked = *revision;
                     let is_new = *revision == self.revision;
@@ -172,7 +172,7 @@ impl Planner {
                         self.shown_revision = 0;
                     }
                 }
-                News::Ended => self.checking = None,
+                Update::Ended => self.checking = None,
             }
         }
         let (Some(ground), Some(plan)) = (&self.ground, self.plan()) else {
@@ -192,26 +192,26 @@ impl Planner {
         let Some((job, progress)) = &mut self.work else { return };
         let mut news = job.poll();
         // Of several words the last is what is true.
-        while let News::Told(Told::Progress(now)) = news {
+        while let Update::Value(Told::Progress(now)) = news {
             *progress = now;
             news = job.poll();
         }
         match news {
-            News::None | News::Told(Told::Progress(_)) => {}
-            News::Told(Told::Plan(plan)) => {
+            Update::Pending | Update::Value(Told::Progress(_)) => {}
+            Update::Value(Told::Plan(plan)) => {
                 self.work = None;
                 match plan.and_then(|plan| self.can_be(plan)) {
                     Ok(plan) => self.put(plan),
                     Err(why) => self.said = Some(Err(why)),
                 }
             }
-            News::Told(Told::Compensated(done)) => {
+            Update::Value(Told::Compensated(done)) => {
                 self.compensated.retain(|(needle, _)| *needle != done.0);
                 self.compensated.push(*done);
                 self.refresh();
             }
-            News::Told(Told::End(end)) => (self.work, self.said) = (None, Some(end)),
-            News::Ended => self.work = None,
+            Update::Value(Told::End(end)) => (self.work, self.said) = (None, Some(end)),
+            Update::Ended => self.work = None,
         }
     }
 

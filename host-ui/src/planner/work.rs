@@ -44,7 +44,7 @@ pub fn automatic(ground: Arc<Ground>) -> Job<Told> {
                 share: Some(share),
             };
             let _ = told.send(Told::Progress(progress));
-            match interrupt.asked() {
+            match interrupt.is_requested() {
                 true => Err("the search was ended".to_owned()),
                 false => Ok(()),
             }
@@ -104,7 +104,7 @@ fn all(
     let mut link = Link::new(instance);
     let begun = Instant::now();
     while link.scene().is_none() || link.state().is_none() {
-        if interrupt.asked() || begun.elapsed() > FIND_LIMIT {
+        if interrupt.is_requested() || begun.elapsed() > FIND_LIMIT {
             return Err("rt-core does not answer; see that it runs".to_owned());
         }
         link.poll();
@@ -124,7 +124,7 @@ fn all(
         };
         match compensate(needle, pace, &Limits::default(), &mut rehearser) {
             Ok(done) => drop(told.send(Told::Compensated(Box::new((needle.clone(), done))))),
-            Err(_) if interrupt.asked() => return Err("the compensation was ended".to_owned()),
+            Err(_) if interrupt.is_requested() => return Err("the compensation was ended".to_owned()),
             Err(why) => failed.push(format!("needle {name}: {why}")),
         }
     }

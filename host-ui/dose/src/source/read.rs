@@ -1,5 +1,6 @@
-//! Values out of a TOML table; problems are gathered and told together.
+//! Values out of a TOML table; all problems are reported together.
 
+use crate::error::DoseError;
 use toml::{Table, Value};
 
 /// Every table and key that a source file may have.
@@ -52,11 +53,15 @@ impl<'a> Reader<'a> {
     }
 
     /// One message with all problems.
-    pub fn finish(self) -> Result<(), String> {
+    pub fn finish(self) -> Result<(), DoseError> {
         match self.problems.as_slice() {
             [] => Ok(()),
-            [one] => Err(one.clone()),
-            many => Err(format!("{} problems\n  {}", many.len(), many.join("\n  "))),
+            [one] => Err(DoseError::Source(one.clone())),
+            many => Err(DoseError::Source(format!(
+                "{} problems\n  {}",
+                many.len(),
+                many.join("\n  ")
+            ))),
         }
     }
 

@@ -1,5 +1,6 @@
 //! A DICOM file as an object; its lengths and its depth are checked first, as the parser makes room for what an element claims.
 
+use crate::error::ContentError;
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::{Tag, VR};
 use dicom_dictionary_std::{StandardDataDictionary, tags, uids};
@@ -38,13 +39,15 @@ fn is_bare(bytes: &[u8]) -> bool {
 }
 
 /// Where the data set begins and how it is written; of a bare file two letters tell.
-fn syntax(bytes: &[u8]) -> Result<(Syntax, usize), String> {
+fn syntax(bytes: &[u8]) -> Result<(Syntax, usize), ContentError> {
     if has_preamble(bytes) {
         let (uid, from) = transfer_syntax(bytes)?;
         return Ok((Syntax::of(&uid)?, from));
     }
     if !is_bare(bytes) {
-        return Err("it has no DICM at byte 128, so it is no DICOM file; export it again".to_owned());
+        return Err(ContentError::Invalid(
+            "it has no DICM at byte 128, so it is no DICOM file; export it again".to_owned(),
+        ));
     }
     let letters = [bytes[4], bytes[5]];
     let explicit = VR::from_binary(letters).is_some();
@@ -59,12 +62,12 @@ fn syntax(bytes: &[u8]) -> Result<(Syntax, usize), String> {
 }
 
 /// Everything before the pixels.
-pub fn read(bytes: &[u8]) -> Result<Object, String> {
+pub fn read(bytes: &[u8]) -> Result<Object, ContentError> {
     let values = bytes.iter().filter(|&&b| b == b'\\').count();
     if values > MAX_VALUES {
-        return Err(format!(
+        return Err(ContentError::Invalid(format!(
             "it has {values} values in lists, more than {MAX_VALUES}; export fewer structures"
-        ));
+        )));
     }
     let (syntax, from) = syntax(bytes)?;
     let mut walk = Walk {
@@ -80,7 +83,7 @@ pub fn read(bytes: &[u8]) -> Result<Object, String> {
 }
 
 /// With a group 2 of our own in front, as that of the file has served.
-fn parse(syntax: Syntax, dataset: &[u8]) -> Result<InMemDicomObject, String> {
+fn parse(syntax: Syntax, dataset: &[u8]) -> Result<InMemDicomObject, ContentError> {
     let meta = FileMetaTableBuilder::new()
         .transfer_syntax(syntax.uid())
         .media_storage_sop_class_uid(uids::RAW_DATA_STORAGE)
@@ -91,7 +94,7 @@ fn parse(syntax: Syntax, dataset: &[u8]) -> Result<InMemDicomObject, String> {
     meta.write(&mut front).map_err(|e| e.to_string())?;
     dicom_object::from_reader(front.as_slice().chain(dataset))
         .map(|o| o.into_inner())
-        .map_err(|e| format!("it cannot be read ({e}); export it again"))
+        .map_err(|e| format!("it cannot be read ({e}); export it again").into())
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -110,7 +113,7 @@ impl Syntax {
         }
     }
 
-    fn of(uid: &str) -> Result<Self, String> {
+    fn of(uid: &str) -> Result<Self, ContentError> {
         match uid {
             uids::IMPLICIT_VR_LITTLE_ENDIAN => Ok(Self::ImplicitLittle),
             uids::EXPLICIT_VR_LITTLE_ENDIAN => Ok(Self::ExplicitLittle),
@@ -119,16 +122,16 @@ impl Syntax {
             packed if packed.starts_with("1.2.840.10008.1.2.4.") || packed == uids::RLE_LOSSLESS => {
                 Ok(Self::ExplicitLittle)
             }
-            other => Err(format!(
+            other => Err(ContentError::Invalid(format!(
                 "its transfer syntax {} is not read; export it as explicit VR little endian",
                 super::super::element::short(other)
-            )),
+            ))),
         }
     }
 }
 
 /// Group 2, always explicit and little: which syntax the rest has, and where that begins.
-fn transfer_syntax(bytes: &[u8]) -> Result<(String, usize), String> {
+fn transfer_syntax(bytes: &[u8]) -> Result<(String, usize), ContentError> {
     let mut walk = Walk {
         bytes,
         at: 132,
@@ -147,7 +150,7 @@ fn transfer_syntax(bytes: &[u8]) -> Result<(String, usize), String> {
     }
     found
         .map(|uid| (uid, walk.at))
-        .ok_or_else(|| "it does not say its transfer syntax; export it again".to_owned())
+        .ok_or_else(|| "it does not say its transfer syntax; export it again".into())
 }
 
 /// Bytes of one value of a kind that is written in binary.
@@ -175,7 +178,7 @@ struct Walk<'a> {
 
 impl<'a> Walk<'a> {
     /// Through the whole data set; gives where it ends or its pixels begin.
-    fn top(&mut self) -> Result<usize, String> {
+    fn top(&mut self) -> Result<usize, ContentError> {
         while self.at < self.bytes.len() {
             let begin = self.at;
             let head = self.head()?;
@@ -187,10 +190,12 @@ impl<'a> Walk<'a> {
         Ok(self.at)
     }
 
-    fn content(&mut self, head: &Head, end: usize, depth: usize) -> Result<(), String> {
+    fn content(&mut self, head: &Head, end: usize, depth: usize) -> Result<(), ContentError> {
         self.elements += 1;
         if self.elements > MAX_ELEMENTS {
-            return Err(format!("it has more than {MAX_ELEMENTS} elements"));
+            return Err(ContentError::Invalid(format!(
+                "it has more than {MAX_ELEMENTS} elements"
+            )));
         }
         let nested = head.vr == VR::SQ || (self.syntax == Syntax::ImplicitLittle && head.length == UNDEFINED);
         if nested {
@@ -199,9 +204,11 @@ impl<'a> Walk<'a> {
         self.value(head).and_then(|_| self.within(head.tag, end))
     }
 
-    fn sequence(&mut self, head: &Head, end: usize, depth: usize) -> Result<(), String> {
+    fn sequence(&mut self, head: &Head, end: usize, depth: usize) -> Result<(), ContentError> {
         if depth > MAX_DEPTH {
-            return Err(format!("its sequences lie more than {MAX_DEPTH} deep in one another"));
+            return Err(ContentError::Invalid(format!(
+                "its sequences lie more than {MAX_DEPTH} deep in one another"
+            )));
         }
         let sequence_end = self.end_of(head, end)?;
         while self.at < sequence_end.unwrap_or(end) {
@@ -210,20 +217,20 @@ impl<'a> Walk<'a> {
                 return Ok(());
             }
             if item.tag != ITEM {
-                return Err(format!(
+                return Err(ContentError::Invalid(format!(
                     "in the sequence {} there is {} where an item must be",
                     head.tag, item.tag
-                ));
+                )));
             }
             self.item(&item, sequence_end.unwrap_or(end), depth)?;
         }
         match sequence_end {
             Some(_) => self.within(head.tag, end),
-            None => Err(format!("the sequence {} has no end", head.tag)),
+            None => Err(ContentError::Invalid(format!("the sequence {} has no end", head.tag))),
         }
     }
 
-    fn item(&mut self, item: &Head, end: usize, depth: usize) -> Result<(), String> {
+    fn item(&mut self, item: &Head, end: usize, depth: usize) -> Result<(), ContentError> {
         let item_end = self.end_of(item, end)?;
         while self.at < item_end.unwrap_or(end) {
             let head = self.head()?;
@@ -234,18 +241,18 @@ impl<'a> Walk<'a> {
         }
         match item_end {
             Some(_) => self.within(item.tag, end),
-            None => Err("an item of a sequence has no end".to_owned()),
+            None => Err(ContentError::Invalid("an item of a sequence has no end".to_owned())),
         }
     }
 
     /// `None` for a length that is told by a mark at the end.
-    fn end_of(&self, head: &Head, end: usize) -> Result<Option<usize>, String> {
+    fn end_of(&self, head: &Head, end: usize) -> Result<Option<usize>, ContentError> {
         if head.length == UNDEFINED {
             return Ok(None);
         }
         let own = self.at + head.length as usize;
         if own > end {
-            return Err(self.too_long(head, end));
+            return Err(self.too_long(head, end).into());
         }
         Ok(Some(own))
     }
@@ -259,23 +266,28 @@ impl<'a> Walk<'a> {
         )
     }
 
-    fn within(&self, tag: Tag, end: usize) -> Result<(), String> {
+    fn within(&self, tag: Tag, end: usize) -> Result<(), ContentError> {
         if self.at <= end {
             return Ok(());
         }
-        Err(format!("it is damaged: the element {tag} is longer than what it is in"))
+        Err(ContentError::Invalid(format!(
+            "it is damaged: the element {tag} is longer than what it is in"
+        )))
     }
 
-    fn value(&mut self, head: &Head) -> Result<&'a [u8], String> {
+    fn value(&mut self, head: &Head) -> Result<&'a [u8], ContentError> {
         if head.length == UNDEFINED {
-            return Err(format!("the element {} ({}) has no length", head.tag, head.vr));
+            return Err(ContentError::Invalid(format!(
+                "the element {} ({}) has no length",
+                head.tag, head.vr
+            )));
         }
         // The parser takes whole numbers only, and would go on in the middle of the value.
         if !head.length.is_multiple_of(size_of_number(head.vr)) {
-            return Err(format!(
+            return Err(ContentError::Invalid(format!(
                 "it is damaged: the element {} ({}) has {} bytes, no whole number of values",
                 head.tag, head.vr, head.length
-            ));
+            )));
         }
         let value = self.bytes.get(self.at..self.at + head.length as usize);
         let value = value.ok_or_else(|| self.too_long(head, self.bytes.len()))?;
@@ -292,7 +304,7 @@ impl<'a> Walk<'a> {
         part.ok_or_else(|| "it is cut off in the middle of an element".to_owned())
     }
 
-    fn u16(&mut self) -> Result<u16, String> {
+    fn u16(&mut self) -> Result<u16, ContentError> {
         let bytes = self.take()?;
         Ok(match self.syntax {
             Syntax::ExplicitBig => u16::from_be_bytes(bytes),
@@ -300,7 +312,7 @@ impl<'a> Walk<'a> {
         })
     }
 
-    fn u32(&mut self) -> Result<u32, String> {
+    fn u32(&mut self) -> Result<u32, ContentError> {
         let bytes = self.take()?;
         Ok(match self.syntax {
             Syntax::ExplicitBig => u32::from_be_bytes(bytes),
@@ -308,14 +320,14 @@ impl<'a> Walk<'a> {
         })
     }
 
-    fn group(&mut self) -> Result<u16, String> {
+    fn group(&mut self) -> Result<u16, ContentError> {
         let at = self.at;
         let group = self.u16();
         self.at = at;
         group
     }
 
-    fn head(&mut self) -> Result<Head, String> {
+    fn head(&mut self) -> Result<Head, ContentError> {
         let tag = Tag(self.u16()?, self.u16()?);
         if tag.group() == ITEM.group() {
             let length = self.u32()?;

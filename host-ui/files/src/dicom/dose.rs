@@ -2,6 +2,7 @@
 
 use super::plan::SeedPlan;
 use super::write::{bytes as file_bytes, common, decimals, item, sequence, string};
+use crate::error::ContentError;
 use dicom_core::value::PrimitiveValue;
 use dicom_core::{DataElement, VR};
 use dicom_dictionary_std::{tags, uids};
@@ -15,20 +16,24 @@ pub struct DoseImage<'a> {
 }
 
 /// The whole file; the dose is that of a plan.
-pub fn bytes(image: &DoseImage, of: &SeedPlan) -> Result<Vec<u8>, String> {
+pub fn bytes(image: &DoseImage, of: &SeedPlan) -> Result<Vec<u8>, ContentError> {
     let [nx, ny, nz] = image.dims;
     if nx * ny * nz != image.dose_gy.len() || image.dims.iter().any(|&d| !(1..=65535).contains(&d)) {
-        return Err(format!(
+        return Err(ContentError::Invalid(format!(
             "a dose of {nx} x {ny} x {nz} voxels with {} values cannot be written; each side may have 1 to 65535",
             image.dose_gy.len()
-        ));
+        )));
     }
     if nx * ny * nz > (u32::MAX / 4) as usize {
-        return Err("the dose grid has more than 4 GiB; choose larger voxels".to_owned());
+        return Err(ContentError::Invalid(
+            "the dose grid has more than 4 GiB; choose larger voxels".to_owned(),
+        ));
     }
     let highest = image.dose_gy.iter().copied().fold(0.0, f64::max);
     if !image.dose_gy.iter().all(|d| d.is_finite() && *d >= 0.0) || highest == 0.0 {
-        return Err("the dose is nowhere above 0, or it is no number somewhere".to_owned());
+        return Err(ContentError::Invalid(
+            "the dose is nowhere above 0, or it is no number somewhere".to_owned(),
+        ));
     }
     let scaling = highest / f64::from(u32::MAX - 1);
     let scaling: f64 = format!("{scaling:.9e}").parse().unwrap_or(scaling);

@@ -1,13 +1,15 @@
 //! The grid of the image series that a structure set was drawn on.
 
 use super::super::element::voxel_count;
-use super::super::frame::{VoxelFrame, ras_from_lps};
-use super::super::{Progress, open};
+use super::super::frame::VoxelFrame;
+use super::super::{Progress, bytes};
 use super::checked;
 use super::values::{exactly, needed, text};
+use crate::error::ContentError;
 use dicom_dictionary_std::tags;
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
+use stylet_anatomy::ras_from_lps;
 
 /// A series has some hundreds.
 const MAX_FILES: usize = 4096;
@@ -33,8 +35,8 @@ pub struct Slice {
 }
 
 /// The slice that a file holds; `None` for anything that is not one.
-pub fn slice(bytes: &[u8]) -> Option<Result<(String, Slice), String>> {
-    let object = checked::is_dicom(bytes).then(|| checked::read(bytes).ok())??;
+pub fn slice(file: &[u8]) -> Option<Result<(String, Slice), ContentError>> {
+    let object = checked::is_dicom(file).then(|| checked::read(file).ok())??;
     let series = text(&object.data, tags::SERIES_INSTANCE_UID)?;
     object.data.get(tags::IMAGE_POSITION_PATIENT)?;
     object.data.get(tags::ROWS)?;
@@ -45,7 +47,7 @@ pub fn slice(bytes: &[u8]) -> Option<Result<(String, Slice), String>> {
         let [between_rows, between_columns] = exactly(data, tags::PIXEL_SPACING)?.ok_or("no pixel spacing")?;
         let size = [tags::COLUMNS, tags::ROWS].map(|t| needed(data, t, 1.0, 65535.0));
         let [columns, rows] = size;
-        Ok::<_, String>(Slice {
+        Ok::<_, ContentError>(Slice {
             uid: text(data, tags::SOP_INSTANCE_UID).unwrap_or_default(),
             corner: Vector3::new(x, y, z),
             steps: [
@@ -59,7 +61,7 @@ pub fn slice(bytes: &[u8]) -> Option<Result<(String, Slice), String>> {
 }
 
 /// The slices in a folder that belong to a series or are named one by one.
-pub fn find(folder: &Path, series: &[String], named: &[String]) -> Result<Vec<Slice>, String> {
+pub fn find(folder: &Path, series: &[String], named: &[String]) -> Result<Vec<Slice>, ContentError> {
     let Ok(entries) = std::fs::read_dir(folder) else {
         return Ok(Vec::new());
     };
@@ -69,7 +71,7 @@ pub fn find(folder: &Path, series: &[String], named: &[String]) -> Result<Vec<Sl
         if !begins_as_dicom(&path) {
             continue;
         }
-        let Some(read) = open::whole(&path, &Progress::default()).ok().and_then(|b| slice(&b)) else {
+        let Some(read) = bytes::whole(&path, &Progress::default()).ok().and_then(|b| slice(&b)) else {
             continue;
         };
         let (of_series, slice) = read.map_err(|why| format!("the image {}: {why}", path.display()))?;
@@ -80,16 +82,13 @@ pub fn find(folder: &Path, series: &[String], named: &[String]) -> Result<Vec<Sl
     Ok(found)
 }
 
-/// So that a folder with other large files is not read for nothing.
+/// Only the start is read, so that a folder with other large files costs little.
 fn begins_as_dicom(path: &Path) -> bool {
-    use std::io::Read;
-    let mut start = Vec::new();
-    let read = std::fs::File::open(path).and_then(|f| f.take(160).read_to_end(&mut start));
-    path.is_file() && read.is_ok() && checked::is_dicom(&start)
+    bytes::start(path, 160).is_some_and(|start| checked::is_dicom(&start))
 }
 
 /// `None` for fewer than two slices.
-pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, String> {
+pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, ContentError> {
     let Some(first) = slices.first().cloned() else {
         return Ok(None);
     };
@@ -102,7 +101,9 @@ pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, String> {
         s.size == first.size && near(first.steps[0], s.steps[0]) && near(first.steps[1], s.steps[1])
     };
     if !slices.iter().all(alike) {
-        return Err("the images of its series differ in size, spacing or orientation; export one series".to_owned());
+        return Err(ContentError::Invalid(
+            "the images of its series differ in size, spacing or orientation; export one series".to_owned(),
+        ));
     }
     slices.sort_by(|a, b| a.corner.dot(&normal).total_cmp(&b.corner.dot(&normal)));
     let heights: Vec<f64> = slices.iter().map(|s| s.corner.dot(&normal)).collect();
@@ -113,9 +114,9 @@ pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, String> {
     let step = (heights[count - 1] - heights[0]) / (count - 1) as f64;
     let uneven = |(i, h): (usize, &f64)| (h - heights[0] - step * i as f64).abs() > UNEVEN * step.abs().max(1e-3);
     if step < 1e-3 || heights.iter().enumerate().any(uneven) {
-        return Err(format!(
+        return Err(ContentError::Invalid(format!(
             "the {count} images of its series do not lie at even distances (on average {step:.3} mm): some are missing or there twice"
-        ));
+        )));
     }
     let across = (slices[count - 1].corner - slices[0].corner) / (count - 1) as f64;
     let columns = Matrix3::from_columns(&[first.steps[0], first.steps[1], across].map(|c| ras_from_lps(c) * 1e-3));

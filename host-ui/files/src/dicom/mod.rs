@@ -1,5 +1,7 @@
 //! DICOM of radiotherapy: structure sets and their images as label volumes, brachytherapy plans, dose grids.
 
+use crate::error::ContentError;
+
 mod checked;
 pub mod dose;
 mod images;
@@ -12,7 +14,7 @@ pub use checked::{Object, is_dicom, read};
 pub use write::{Identity, new_uid};
 
 /// The frame of an image series out of one of its files twice, one slice apart; for checking the reader by itself.
-pub fn image_geometry(bytes: &[u8]) -> Result<(), String> {
+pub fn image_geometry(bytes: &[u8]) -> Result<(), ContentError> {
     let Some(read) = images::slice(bytes) else {
         return Ok(());
     };

@@ -7,6 +7,10 @@ pub use read::of;
 pub use write::bytes;
 
 use super::Identity;
+use crate::error::FileError;
+use crate::progress::Progress;
+use std::path::Path;
+use stylet_base::format::printable;
 
 /// Patient frame (RAS, m); strengths in U at the time of the plan.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,8 +39,10 @@ pub struct PlanSource {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanSeed {
-    /// Which needle or hole brings it in.
-    pub needle: String,
+    /// Number of the needle that brings it in, from 1.
+    pub needle: Option<u32>,
+    /// The needle's hole in the template, or what else the plan calls it; empty where it has no name.
+    pub hole: String,
     pub position_m: [f64; 3],
     /// Unit vector.
     pub axis: Option<[f64; 3]>,
@@ -44,13 +50,13 @@ pub struct PlanSeed {
 }
 
 /// The DICOM plan in the file at `path`; its notes go to standard error.
-pub fn open(path: &std::path::Path) -> Result<SeedPlan, String> {
-    let told = |why: String| format!("{}: {why}", path.display());
-    let bytes = crate::open::whole(path, &crate::Progress::default()).map_err(told)?;
-    let plan = super::read(&bytes).and_then(|o| of(&o)).map_err(told)?;
-    plan.notes
-        .iter()
-        .for_each(|note| eprintln!("note: {}: {note}", path.display()));
+pub fn open(path: &Path) -> Result<SeedPlan, FileError> {
+    let refused = |why| FileError::of(path, why);
+    let bytes = crate::bytes::whole(path, &Progress::default()).map_err(refused)?;
+    let plan = super::read(&bytes).and_then(|o| of(&o)).map_err(refused)?;
+    for note in &plan.notes {
+        eprintln!("note: {}: {}", path.display(), printable(note));
+    }
     Ok(plan)
 }
 

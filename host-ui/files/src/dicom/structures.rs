@@ -6,18 +6,19 @@ mod solid;
 pub mod write;
 
 use super::super::element::{short, voxel_count};
-use super::super::error;
-use super::super::frame::{VoxelFrame, ras_from_lps};
-use super::super::overlap::told;
+use super::super::frame::VoxelFrame;
+use super::super::overlap::with_warning;
 use super::super::volume::Voxels;
 use super::checked::Object;
 use super::images::{self, Grid};
 use super::values::{items, name, needed, numbers, text};
+use crate::error::ContentError;
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::InMemDicomObject;
 use nalgebra::{Matrix3, Vector3};
 pub use solid::Solid;
 use std::path::Path;
+use stylet_anatomy::ras_from_lps;
 
 const MAX_STRUCTURES: usize = 255;
 const MAX_MM: f64 = 10_000.0;
@@ -44,19 +45,19 @@ pub struct StructureSet {
 }
 
 /// Of a file and the images beside it.
-pub fn read(object: &Object, folder: Option<&Path>) -> Result<Voxels, String> {
+pub fn read(object: &Object, folder: Option<&Path>) -> Result<Voxels, ContentError> {
     let set = StructureSet::of(object)?;
     let slices = folder.map_or(Ok(Vec::new()), |f| images::find(f, &set.series, &set.images))?;
     set.voxels(images::grid(slices)?)
 }
 
 impl StructureSet {
-    pub fn of(object: &Object) -> Result<Self, String> {
+    pub fn of(object: &Object) -> Result<Self, ContentError> {
         if object.sop_class != uids::RT_STRUCTURE_SET_STORAGE {
-            return Err(format!(
+            return Err(ContentError::Invalid(format!(
                 "it is DICOM of another kind (SOP class {}); a segmentation is an RT Structure Set",
                 short(&object.sop_class)
-            ));
+            )));
         }
         let data = &object.data;
         let mut names = Vec::new();
@@ -79,20 +80,22 @@ impl StructureSet {
                 Err(Unusable::Wrong(why)) => problems.push(format!("{}: {why}", short(&roi_name))),
             }
         }
-        error::all(problems)?;
+        ContentError::all(problems)?;
         if structures.is_empty() {
             let why = if notes.is_empty() {
                 "there are no contours".to_owned()
             } else {
                 notes.join("; ")
             };
-            return Err(format!("it holds no structure that has a volume: {why}"));
+            return Err(ContentError::Invalid(format!(
+                "it holds no structure that has a volume: {why}"
+            )));
         }
         if structures.len() > MAX_STRUCTURES {
-            return Err(format!(
-                "it holds {} structures; at most {MAX_STRUCTURES} can be told apart",
+            return Err(ContentError::Invalid(format!(
+                "it holds {} structures; at most {MAX_STRUCTURES} are supported",
                 structures.len()
-            ));
+            )));
         }
         let (series, images) = references(data);
         Ok(Self {
@@ -104,7 +107,7 @@ impl StructureSet {
     }
 
     /// On the grid of the images, or else on one around the contours.
-    pub fn voxels(self, grid: Option<Grid>) -> Result<Voxels, String> {
+    pub fn voxels(self, grid: Option<Grid>) -> Result<Voxels, ContentError> {
         let mut notes = self.notes.clone();
         let grid = match grid {
             Some(grid) => grid,
@@ -125,11 +128,11 @@ impl StructureSet {
             frame: grid.frame,
             names,
         };
-        Ok(told(voxels, (!notes.is_empty()).then(|| notes.join("; "))))
+        Ok(with_warning(voxels, (!notes.is_empty()).then(|| notes.join("; "))))
     }
 
     /// Two voxels larger than all contours on each side.
-    fn grid_around(&self) -> Result<Grid, String> {
+    fn grid_around(&self) -> Result<Grid, ContentError> {
         let points = || self.structures.iter().flat_map(|s| s.contours.iter().flatten());
         let largest = self
             .structures
@@ -166,7 +169,7 @@ impl StructureSet {
     }
 
     /// The smallest distance between two planes of one structure.
-    fn plane_distance_m(&self, normal: Vector3<f64>) -> Result<f64, String> {
+    fn plane_distance_m(&self, normal: Vector3<f64>) -> Result<f64, ContentError> {
         let mut smallest = f64::INFINITY;
         for structure in &self.structures {
             let mut heights: Vec<f64> = structure.contours.iter().map(|c| c[0].dot(&normal)).collect();
@@ -179,7 +182,7 @@ impl StructureSet {
         }
         Err(
             "each of its structures has contours in one plane only, so none has a thickness; put its images beside it"
-                .to_owned(),
+                .into(),
         )
     }
 }
@@ -201,7 +204,7 @@ fn contours(drawn: &InMemDicomObject) -> Result<Vec<Vec<Vector3<f64>>>, Unusable
                 if kind.is_empty() { "of no kind" } else { &kind }
             )));
         }
-        all.push(closed(contour).map_err(Unusable::Wrong)?);
+        all.push(closed(contour).map_err(|why| Unusable::Wrong(why.to_string()))?);
     }
     if all.is_empty() {
         return Err(Unusable::LeftOut("it has no contour".to_owned()));
@@ -209,17 +212,19 @@ fn contours(drawn: &InMemDicomObject) -> Result<Vec<Vec<Vector3<f64>>>, Unusable
     Ok(all)
 }
 
-fn closed(contour: &InMemDicomObject) -> Result<Vec<Vector3<f64>>, String> {
+fn closed(contour: &InMemDicomObject) -> Result<Vec<Vector3<f64>>, ContentError> {
     let values = numbers(contour, tags::CONTOUR_DATA)?.unwrap_or_default();
     if values.len() % 3 != 0 || values.len() < 9 {
-        return Err(format!(
+        return Err(ContentError::Invalid(format!(
             "{} has {} values; a closed contour has three for each of at least three corners",
             name(tags::CONTOUR_DATA),
             values.len()
-        ));
+        )));
     }
     if let Some(far) = values.iter().find(|v| v.abs() > MAX_MM) {
-        return Err(format!("a corner lies at {far} mm; at most {MAX_MM} mm is believed"));
+        return Err(ContentError::Invalid(format!(
+            "a corner lies at {far} mm; at most {MAX_MM} mm is accepted"
+        )));
     }
     let points: Vec<_> = values
         .chunks_exact(3)
@@ -231,7 +236,10 @@ fn closed(contour: &InMemDicomObject) -> Result<Vec<Vector3<f64>>, String> {
             .map(|p| (p - points[0]).dot(&normal).abs())
             .fold(0.0, f64::max);
         if off > 10.0 * SAME_PLANE_M {
-            return Err(format!("a contour called planar is {:.2} mm off its plane", off * 1e3));
+            return Err(ContentError::Invalid(format!(
+                "a contour called planar is {:.2} mm off its plane",
+                off * 1e3
+            )));
         }
     }
     Ok(points)

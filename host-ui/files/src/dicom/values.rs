@@ -1,6 +1,7 @@
 //! Values out of a DICOM object, as text and numbers that can be trusted.
 
 use super::super::element::short;
+use crate::error::ContentError;
 use dicom_core::Tag;
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::value::{PrimitiveValue, Value};
@@ -13,7 +14,7 @@ pub fn name(tag: Tag) -> String {
     format!("{alias} {tag}")
 }
 
-/// `None` where it is absent or empty.
+/// Without control characters, which a terminal would obey; `None` where it is absent or empty.
 pub fn text(object: &InMemDicomObject, tag: Tag) -> Option<String> {
     let element = object.get(tag)?;
     let value = match element.value() {
@@ -21,8 +22,9 @@ pub fn text(object: &InMemDicomObject, tag: Tag) -> Option<String> {
         Value::Primitive(PrimitiveValue::U8(bytes)) => String::from_utf8_lossy(bytes).into_owned(),
         _ => element.to_str().ok()?.into_owned(),
     };
-    let value = value.trim_matches(['\0', ' ']);
-    (!value.is_empty()).then(|| value.to_owned())
+    let shown: String = value.chars().filter(|c| !c.is_control()).collect();
+    let shown = shown.trim_matches(' ');
+    (!shown.is_empty()).then(|| shown.to_owned())
 }
 
 pub fn items(object: &InMemDicomObject, tag: Tag) -> &[InMemDicomObject] {
@@ -30,11 +32,14 @@ pub fn items(object: &InMemDicomObject, tag: Tag) -> &[InMemDicomObject] {
 }
 
 /// All finite; `None` where it is absent or empty.
-pub fn numbers(object: &InMemDicomObject, tag: Tag) -> Result<Option<Vec<f64>>, String> {
+pub fn numbers(object: &InMemDicomObject, tag: Tag) -> Result<Option<Vec<f64>>, ContentError> {
     let (Some(element), Some(shown)) = (object.get(tag), text(object, tag)) else {
         return Ok(None);
     };
-    let wrong = || format!("{} is \"{}\", which is no list of numbers", name(tag), short(&shown));
+    let wrong = || {
+        let shown = short(&shown);
+        ContentError::Invalid(format!("{} is \"{shown}\", which is no list of numbers", name(tag)))
+    };
     let values = element.to_multi_float64().map_err(|_| wrong())?;
     if values.iter().all(|v| v.is_finite()) {
         return Ok(Some(values));
@@ -42,7 +47,7 @@ pub fn numbers(object: &InMemDicomObject, tag: Tag) -> Result<Option<Vec<f64>>, 
     Err(wrong())
 }
 
-pub fn exactly<const N: usize>(object: &InMemDicomObject, tag: Tag) -> Result<Option<[f64; N]>, String> {
+pub fn exactly<const N: usize>(object: &InMemDicomObject, tag: Tag) -> Result<Option<[f64; N]>, ContentError> {
     let Some(values) = numbers(object, tag)? else {
         return Ok(None);
     };
@@ -50,18 +55,21 @@ pub fn exactly<const N: usize>(object: &InMemDicomObject, tag: Tag) -> Result<Op
     let values = <[f64; N]>::try_from(values);
     values
         .map(Some)
-        .map_err(|_| format!("{} has {count} values; it must have {N}", name(tag)))
+        .map_err(|_| format!("{} has {count} values; it must have {N}", name(tag)).into())
 }
 
-pub fn number(object: &InMemDicomObject, tag: Tag) -> Result<Option<f64>, String> {
+pub fn number(object: &InMemDicomObject, tag: Tag) -> Result<Option<f64>, ContentError> {
     Ok(exactly::<1>(object, tag)?.map(|[v]| v))
 }
 
 /// A number that there must be, within limits.
-pub fn needed(object: &InMemDicomObject, tag: Tag, least: f64, most: f64) -> Result<f64, String> {
+pub fn needed(object: &InMemDicomObject, tag: Tag, least: f64, most: f64) -> Result<f64, ContentError> {
     match number(object, tag)? {
         Some(v) if (least..=most).contains(&v) => Ok(v),
-        Some(v) => Err(format!("{} is {v}; allowed are {least} to {most}", name(tag))),
-        None => Err(format!("{} is missing", name(tag))),
+        Some(v) => Err(ContentError::Invalid(format!(
+            "{} is {v}; allowed are {least} to {most}",
+            name(tag)
+        ))),
+        None => Err(ContentError::Invalid(format!("{} is missing", name(tag)))),
     }
 }

@@ -1,5 +1,6 @@
 //! What all DICOM files of ours have in common: who, when, and numbers that nobody else uses.
 
+use crate::error::ContentError;
 use dicom_core::value::{DataSetSequence, PrimitiveValue};
 use dicom_core::{DataElement, Length, Tag, VR};
 use dicom_dictionary_std::{tags, uids};
@@ -122,7 +123,7 @@ pub fn now() -> (String, String) {
     (of("%Y%m%d"), of("%H%M%S"))
 }
 
-pub fn bytes(object: InMemDicomObject) -> Result<Vec<u8>, String> {
+pub fn bytes(object: InMemDicomObject) -> Result<Vec<u8>, ContentError> {
     let meta = FileMetaTableBuilder::new()
         .transfer_syntax(uids::EXPLICIT_VR_LITTLE_ENDIAN)
         .implementation_class_uid(IMPLEMENTATION)

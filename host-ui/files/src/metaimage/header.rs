@@ -1,7 +1,7 @@
 //! The lines before the data of a MetaImage file, checked; every problem is told.
 
 use super::super::element::{Element, Endian, short};
-use super::super::error;
+use crate::error::ContentError;
 use nalgebra::Matrix3;
 use std::collections::BTreeMap;
 
@@ -26,7 +26,7 @@ pub struct Header {
 
 impl Header {
     /// The header, and what lies behind it.
-    pub fn parse(bytes: &[u8]) -> Result<(Self, &[u8]), String> {
+    pub fn parse(bytes: &[u8]) -> Result<(Self, &[u8]), ContentError> {
         let mut fields: BTreeMap<&str, &str> = BTreeMap::new();
         let mut problems = Vec::new();
         let mut rest = bytes;
@@ -42,25 +42,27 @@ impl Header {
                 .trim();
             let Some((key, value)) = line.split_once('=') else {
                 return Err(if line.is_empty() && after.is_empty() {
-                    "it is cut off: its header has no ElementDataFile; copy or export it again".to_owned()
+                    "it is cut off: its header has no ElementDataFile; copy or export it again".into()
                 } else {
-                    format!("the line \"{}\" of its header has no \"=\"", short(line))
+                    format!("the line \"{}\" of its header has no \"=\"", short(line)).into()
                 });
             };
             if fields.insert(key.trim(), value.trim()).is_some() && key.trim() != "Comment" {
                 problems.push(format!("{} is there twice", short(key.trim())));
             }
             if bytes.len() - after.len() > MAX_HEADER_BYTES {
-                return Err("its header has no end; copy or export it again".to_owned());
+                return Err(ContentError::Invalid(
+                    "its header has no end; copy or export it again".to_owned(),
+                ));
             }
             rest = after;
         }
         let mut reader = Fields { fields, problems };
         let header = build(&mut reader);
-        error::all(reader.problems)?;
+        ContentError::all(reader.problems)?;
         header
             .map(|h| (h, rest))
-            .ok_or_else(|| "its header is not complete".to_owned())
+            .ok_or_else(|| "its header is not complete".into())
     }
 }
 

@@ -3,12 +3,12 @@
 use super::*;
 use crate::Progress;
 
-fn read(bytes: &[u8], beside: Beside) -> Result<VoxelValues<u8>, String> {
+fn read(bytes: &[u8], beside: Beside) -> Result<VoxelValues<u8>, ContentError> {
     super::read(bytes, beside, Sink::labels(&Progress::default()))
 }
 
-fn no_file(name: &str) -> Result<Vec<u8>, String> {
-    Err(format!("no file {name}"))
+fn no_file(name: &str) -> Result<Vec<u8>, ContentError> {
+    Err(format!("no file {name}").into())
 }
 
 const GOOD: &str = "ObjectType = Image\nNDims = 3\nBinaryData = False\nTransformMatrix = 0 1 0 -1 0 0 0 0 1\n\
@@ -54,7 +54,7 @@ fn letters_give_the_axes_where_there_is_no_matrix() {
             .contains("nothing of the patient's orientation")
     );
     let both = read(&with("Offset", "AnatomicalOrientation = RAI\nOffset"), &no_file).unwrap();
-    assert!(both.frame.warning.unwrap().contains("does not fit"));
+    assert!(both.frame.warning.unwrap().contains("contradicts"));
 }
 
 #[test]
@@ -91,6 +91,6 @@ fn each_wrong_header_is_refused_with_its_reason() {
         ("0 1 2 3", "0 1 2 3 4", "more than the 4"),
     ] {
         let why = read(&with(from, to), &no_file).map(|v| v.values).expect_err(to);
-        assert!(why.contains(expected), "{to}: {why}");
+        assert!(why.to_string().contains(expected), "{to}: {why}");
     }
 }

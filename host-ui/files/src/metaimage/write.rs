@@ -1,12 +1,13 @@
 //! A label volume as MetaImage; names of structures have no place in it.
 
-use super::super::frame::ras_from_lps;
 use super::super::volume::Voxels;
+use crate::error::ContentError;
 use flate2::{Compression, write::ZlibEncoder};
 use std::io::Write;
+use stylet_anatomy::ras_from_lps;
 
 /// The whole file, packed, in LPS.
-pub fn bytes(v: &Voxels) -> Result<Vec<u8>, String> {
+pub fn bytes(v: &Voxels) -> Result<Vec<u8>, ContentError> {
     let cannot = |e: std::io::Error| format!("the labels cannot be packed ({e})");
     let mut packed = ZlibEncoder::new(Vec::new(), Compression::default());
     packed.write_all(&v.labels).map_err(cannot)?;

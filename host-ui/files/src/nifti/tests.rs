@@ -56,7 +56,7 @@ fn small() -> Vec<u8> {
 
 fn refused(name: &str, bytes: &[u8], expected: &str) {
     let temp = file(name, bytes);
-    let why = read(&temp.0, None).expect_err(name).0;
+    let why = read(&temp.0, None).expect_err(name).to_string();
     assert!(why.contains(expected), "{name}: {why}");
 }
 
@@ -103,7 +103,7 @@ fn every_broken_file_is_refused_with_its_reason() {
     assert!(
         read(Path::new("/no/such.nii"), None)
             .unwrap_err()
-            .0
+            .to_string()
             .contains("cannot be opened")
     );
 }
@@ -128,7 +128,7 @@ fn a_label_is_picked_and_a_wrong_one_is_told_what_there_is() {
     assert_eq!(all.tissue_elements(), 48);
     assert_eq!(all.voxels_per_label, [(1, 32), (3, 16)]);
     assert_eq!(read(&temp.0, Some(3)).unwrap().tissue_elements(), 16);
-    let why = read(&temp.0, Some(2)).unwrap_err().0;
+    let why = read(&temp.0, Some(2)).unwrap_err().to_string();
     assert!(why.contains("1 (32 voxels), 3 (16 voxels)"), "{why}");
 }
 
@@ -169,7 +169,7 @@ fn an_oblique_gland_stays_where_it_is_in_the_patient() {
         }
         let temp = file("oblique.nii", &bytes);
         let v = read(&temp.0, None).unwrap();
-        let p = v.patient_from_scene;
+        let p = v.patient.to_wire();
         let r = Matrix3::from_row_slice(&p[..9]);
         assert!((r.determinant() - 1.0).abs() < 1e-9 && (r * r.transpose() - Matrix3::identity()).amax() < 1e-9);
         let (mut sum, mut count) = (Vector3::zeros(), 0.0);

@@ -1,6 +1,7 @@
 //! A label volume as NIfTI-1 (.nii.gz), with its sform and qform off; names of structures have no place in it.
 
 use super::super::volume::Voxels;
+use crate::error::ContentError;
 use flate2::{Compression, write::GzEncoder};
 use std::io::Write;
 
@@ -10,12 +11,12 @@ const MILLIMETRES: u8 = 2;
 const DATA_AT: usize = 352;
 
 /// The whole file, packed. Places in the header are the standard's.
-pub fn bytes(v: &Voxels) -> Result<Vec<u8>, String> {
+pub fn bytes(v: &Voxels) -> Result<Vec<u8>, ContentError> {
     if v.dims.iter().any(|&d| d > 32767) {
-        return Err(format!(
+        return Err(ContentError::Invalid(format!(
             "NIfTI-1 holds at most 32767 voxels along an axis, and there are {:?}",
             v.dims
-        ));
+        )));
     }
     let mut b = vec![0_u8; DATA_AT];
     let mut put = |at: usize, bytes: &[u8]| b[at..at + bytes.len()].copy_from_slice(bytes);
@@ -47,5 +48,5 @@ pub fn bytes(v: &Voxels) -> Result<Vec<u8>, String> {
         .write_all(&b)
         .and_then(|()| packed.write_all(&v.labels))
         .and_then(|()| packed.finish())
-        .map_err(|e| format!("the labels cannot be packed ({e})"))
+        .map_err(|e| format!("the labels cannot be packed ({e})").into())
 }

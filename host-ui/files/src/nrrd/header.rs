@@ -1,8 +1,8 @@
 //! The text before the data of an NRRD file, checked field by field; every problem is told.
 
 use super::super::element::{Element, Endian, short};
-use super::super::error;
 use super::{Pairs, element};
+use crate::error::ContentError;
 
 /// Slicer keeps much in its headers, but not more.
 const MAX_HEADER_BYTES: usize = 4 << 20;
@@ -60,7 +60,7 @@ pub struct Header {
 
 impl Header {
     /// The header, and what lies behind it.
-    pub fn parse(bytes: &[u8]) -> Result<(Self, &[u8]), String> {
+    pub fn parse(bytes: &[u8]) -> Result<(Self, &[u8]), ContentError> {
         let (lines, rest) = lines(bytes)?;
         let mut fields: Vec<(String, &str)> = Vec::new();
         let mut pairs = Pairs::new();
@@ -86,10 +86,10 @@ impl Header {
         }
         let mut reader = Fields { fields, problems };
         let header = build(&mut reader, pairs);
-        error::all(reader.problems)?;
+        ContentError::all(reader.problems)?;
         header
             .map(|h| (h, rest))
-            .ok_or_else(|| "its header is not complete".to_owned())
+            .ok_or_else(|| "its header is not complete".into())
     }
 
     /// Which of its axes are those of space.
@@ -111,7 +111,7 @@ impl Header {
 }
 
 /// Up to the first empty line.
-fn lines(bytes: &[u8]) -> Result<(Vec<&str>, &[u8]), String> {
+fn lines(bytes: &[u8]) -> Result<(Vec<&str>, &[u8]), ContentError> {
     let (mut lines, mut rest) = (Vec::new(), bytes);
     loop {
         let Some(end) = rest.iter().take(MAX_HEADER_BYTES).position(|&b| b == b'\n') else {
@@ -122,7 +122,9 @@ fn lines(bytes: &[u8]) -> Result<(Vec<&str>, &[u8]), String> {
                 }
                 return Ok((lines, &[]));
             }
-            return Err("its header has no end; copy or export it again".to_owned());
+            return Err(ContentError::Invalid(
+                "its header has no end; copy or export it again".to_owned(),
+            ));
         };
         let line = text(&rest[..end])?;
         rest = &rest[end + 1..];
@@ -131,15 +133,17 @@ fn lines(bytes: &[u8]) -> Result<(Vec<&str>, &[u8]), String> {
         }
         lines.push(line);
         if bytes.len() - rest.len() > MAX_HEADER_BYTES {
-            return Err("its header has no end; copy or export it again".to_owned());
+            return Err(ContentError::Invalid(
+                "its header has no end; copy or export it again".to_owned(),
+            ));
         }
     }
 }
 
-fn text(line: &[u8]) -> Result<&str, String> {
+fn text(line: &[u8]) -> Result<&str, ContentError> {
     std::str::from_utf8(line)
         .map(|l| l.trim_end_matches('\r'))
-        .map_err(|_| "its header is not text; copy or export it again".to_owned())
+        .map_err(|_| "its header is not text; copy or export it again".into())
 }
 
 struct Fields<'a> {

@@ -6,6 +6,7 @@ use super::super::overlap;
 use super::super::volume::Voxels;
 use super::Pairs;
 use super::header::Header;
+use crate::error::ContentError;
 use std::collections::BTreeMap;
 
 const MAX_SEGMENTS: usize = 255;
@@ -18,22 +19,22 @@ struct Segment {
 }
 
 /// Names by label of a volume without layers.
-pub fn names(pairs: &Pairs) -> Result<BTreeMap<u8, String>, String> {
+pub fn names(pairs: &Pairs) -> Result<BTreeMap<u8, String>, ContentError> {
     let mut names = BTreeMap::new();
     for segment in segments(pairs)? {
         if let Some(other) = names.insert(segment.value, segment.name.clone()) {
-            return Err(format!(
+            return Err(ContentError::Invalid(format!(
                 "its segments \"{}\" and \"{}\" both have label {}; save the segmentation again",
                 short(&other),
                 short(&segment.name),
                 segment.value
-            ));
+            )));
         }
     }
     Ok(names)
 }
 
-fn segments(pairs: &Pairs) -> Result<Vec<Segment>, String> {
+fn segments(pairs: &Pairs) -> Result<Vec<Segment>, ContentError> {
     let mut all = Vec::new();
     for n in 0..=MAX_SEGMENTS {
         let of = |what: &str| pairs.get(&format!("Segment{n}_{what}")).map(|v| v.trim());
@@ -42,8 +43,9 @@ fn segments(pairs: &Pairs) -> Result<Vec<Segment>, String> {
         }
         let name = of("Name")
             .or(of("ID"))
+            .map(|n| n.chars().filter(|c| !c.is_control()).collect::<String>())
             .filter(|n| !n.is_empty())
-            .map_or(format!("segment {n}"), str::to_owned);
+            .unwrap_or_else(|| format!("segment {n}"));
         let number = |what: &str, otherwise: usize, most: usize| match of(what) {
             None => Ok(otherwise),
             Some(text) => text.parse::<usize>().ok().filter(|v| *v <= most).ok_or_else(|| {
@@ -55,10 +57,10 @@ fn segments(pairs: &Pairs) -> Result<Vec<Segment>, String> {
         };
         let value = number("LabelValue", n + 1, 255)? as u8;
         if value == 0 {
-            return Err(format!(
+            return Err(ContentError::Invalid(format!(
                 "its segment \"{}\" has label 0, which is the background",
                 short(&name)
-            ));
+            )));
         }
         all.push(Segment {
             name,
@@ -66,35 +68,43 @@ fn segments(pairs: &Pairs) -> Result<Vec<Segment>, String> {
             layer: number("Layer", 0, MAX_SEGMENTS)?,
         });
     }
-    Err(format!("it has more than {MAX_SEGMENTS} segments"))
+    Err(ContentError::Invalid(format!(
+        "it has more than {MAX_SEGMENTS} segments"
+    )))
 }
 
 /// One label a segment; where segments overlap the smaller one has the voxel.
-pub fn flatten(h: &Header, values: &[u8], list: usize, frame: VoxelFrame, dims: [usize; 3]) -> Result<Voxels, String> {
+pub fn flatten(
+    h: &Header,
+    values: &[u8],
+    list: usize,
+    frame: VoxelFrame,
+    dims: [usize; 3],
+) -> Result<Voxels, ContentError> {
     let layers = h.sizes[list] as usize;
     let segments = segments(&h.pairs)?;
     let kind = h.kinds.get(list).map_or("?", String::as_str);
     if segments.is_empty() {
-        return Err(format!(
+        return Err(ContentError::Invalid(format!(
             "it holds {layers} volumes (an axis of kind {kind}) and no segments that would say what they are; save one volume of it"
-        ));
+        )));
     }
     if let Some(s) = segments.iter().find(|s| s.layer >= layers) {
-        return Err(format!(
+        return Err(ContentError::Invalid(format!(
             "its segment \"{}\" is in layer {} of {layers}",
             short(&s.name),
             s.layer
-        ));
+        )));
     }
     // The label of each value of each layer, counted from 1 in the order of the segments.
     let mut label_of = vec![[0_u8; 256]; layers];
     for (segment, label) in segments.iter().zip(1_u8..=255) {
         let place = &mut label_of[segment.layer][usize::from(segment.value)];
         if *place != 0 {
-            return Err(format!(
+            return Err(ContentError::Invalid(format!(
                 "two segments have label {} in layer {}",
                 segment.value, segment.layer
-            ));
+            )));
         }
         *place = label;
     }
@@ -113,7 +123,7 @@ pub fn flatten(h: &Header, values: &[u8], list: usize, frame: VoxelFrame, dims: 
     };
     let names: BTreeMap<u8, String> = (1_u8..=255).zip(segments.into_iter().map(|s| s.name)).collect();
     let (labels, warning) = overlap::smallest_wins(count, &names, of_voxel);
-    Ok(overlap::told(
+    Ok(overlap::with_warning(
         Voxels {
             dims,
             labels,

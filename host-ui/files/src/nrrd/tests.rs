@@ -3,12 +3,12 @@
 use super::*;
 use crate::Progress;
 
-fn read(bytes: &[u8], beside: Beside) -> Result<Voxels, String> {
+fn read(bytes: &[u8], beside: Beside) -> Result<Voxels, ContentError> {
     super::read(bytes, beside, Sink::labels(&Progress::default()))
 }
 
-fn no_file(name: &str) -> Result<Vec<u8>, String> {
-    Err(format!("no file {name}"))
+fn no_file(name: &str) -> Result<Vec<u8>, ContentError> {
+    Err(format!("no file {name}").into())
 }
 
 const GOOD: &str = "NRRD0004\ntype: uchar\ndimension: 3\nspace: RAS\nsizes: 2 2 1\n\
@@ -20,7 +20,7 @@ fn with(from: &str, to: &str) -> Vec<u8> {
 }
 
 fn why(bytes: &[u8]) -> String {
-    read(bytes, &no_file).map(|v| v.dims).expect_err("refused")
+    read(bytes, &no_file).map(|v| v.dims).expect_err("refused").to_string()
 }
 
 #[test]

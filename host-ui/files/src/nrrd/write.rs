@@ -1,16 +1,17 @@
 //! A label volume as NRRD, with Slicer's names of segments.
 
 use super::super::volume::Voxels;
+use crate::error::ContentError;
 use flate2::{Compression, write::GzEncoder};
 use nalgebra::Vector3;
 use std::io::Write;
 
 /// The whole file, packed.
-pub fn bytes(v: &Voxels) -> Result<Vec<u8>, String> {
+pub fn bytes(v: &Voxels) -> Result<Vec<u8>, ContentError> {
     let vector = |c: Vector3<f64>| format!("({},{},{})", c.x * 1e3, c.y * 1e3, c.z * 1e3);
     let columns = v.frame.columns_m();
     // The patient in LPS, as nearly all have it.
-    let lps = super::super::frame::ras_from_lps;
+    let lps = stylet_anatomy::ras_from_lps;
     let directions: Vec<String> = (0..3).map(|a| vector(lps(columns.column(a).into()))).collect();
     let mut out = format!(
         "NRRD0004\ntype: unsigned char\ndimension: 3\nspace: left-posterior-superior\nsizes: {} {} {}\n\
@@ -33,5 +34,5 @@ pub fn bytes(v: &Voxels) -> Result<Vec<u8>, String> {
     packed
         .write_all(&v.labels)
         .and_then(|()| packed.finish())
-        .map_err(|e| format!("the labels cannot be packed ({e})"))
+        .map_err(|e| format!("the labels cannot be packed ({e})").into())
 }

@@ -136,7 +136,7 @@ fn a_command_and_a_volume_arrive_and_are_answered_once() {
         spacing_m: 1e-3,
         structures: Vec::new(),
         cells: (0..24).collect(),
-        patient_from_scene: [0.0; 12],
+        patient: stylet_anatomy::PatientFrame::default(),
         name: "gland".to_owned(),
         voxels_per_label: Vec::new(),
         warnings: Vec::new(),

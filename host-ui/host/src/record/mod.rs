@@ -39,7 +39,7 @@ pub struct Options {
 /// Records until the time is over or it is interrupted; an error when a tick was lost on the way.
 pub fn run(options: &Options) -> Result<(), String> {
     let interrupted = Interrupt::on_signals()?;
-    let stop = || interrupted.asked();
+    let stop = || interrupted.is_requested();
     let mut link = Link::new(options.instance.clone());
     find_core(&mut link, stop)?;
     let (send, receive) = mpsc::channel();

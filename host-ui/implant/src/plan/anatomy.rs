@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
+use stylet_anatomy::PatientFrame;
 use stylet_dose::mesh::Mesh;
 use stylet_dose::structure::Region;
 use stylet_dose::{Structure, structure};
@@ -93,8 +94,8 @@ pub struct Anatomy {
     pub spared: Vec<Body>,
     pub lower_m: [f64; 3],
     pub upper_m: [f64; 3],
-    /// Patient (RAS, m) from scene: row-major rotation, then translation.
-    pub patient_from_scene: [f64; 12],
+    /// Where the patient lies in the scene.
+    pub patient: PatientFrame,
 }
 
 impl Anatomy {
@@ -125,7 +126,7 @@ impl Anatomy {
             spared: spared.collect::<Result<_, _>>()?,
             lower_m: header.lower_m,
             upper_m: header.upper_m,
-            patient_from_scene: header.patient_from_scene,
+            patient: header.patient(),
         })
     }
 

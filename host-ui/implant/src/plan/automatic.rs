@@ -283,6 +283,7 @@ mod tests {
     use super::*;
     use crate::plan::anatomy::ball;
     use crate::plan::check::problems;
+    use stylet_anatomy::PatientFrame;
     use stylet_dose::decay::Interval;
     use stylet_dose::{Metric, Source};
 
@@ -308,7 +309,7 @@ mod tests {
             spared: vec![ball("urethra", middle_m, [0.003, 0.003, 0.03])],
             lower_m: [0.0; 3],
             upper_m: [0.1; 3],
-            patient_from_scene: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+            patient: PatientFrame::default(),
         }
     }
 

@@ -1,10 +1,11 @@
 //! Plans in and out of files of any of the formats, by the file's ending.
 
-use super::file::{self, Frames};
+use super::file;
 use super::{ImplantPlan, Template};
+use crate::readers::SeedDefaults;
 use std::path::Path;
+use stylet_anatomy::PatientFrame;
 use stylet_dose::Source;
-use stylet_dose::files::SeedDefaults;
 use stylet_files::convert::write_whole;
 use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
 use stylet_files::dicom::{Identity, new_uid};
@@ -22,9 +23,9 @@ pub fn usual() -> Result<(Source, f64), String> {
 
 /// A plan file (.toml), a table of seeds (.csv) or an RT Plan (.dcm); the error names the file.
 pub fn read(path: &Path, scene: &SceneHeader) -> Result<ImplantPlan, String> {
-    let frames = Frames::new(&scene.patient_from_scene);
+    let patient = scene.patient();
     if has_ending(path, "toml") {
-        return file::read(path, &frames);
+        return file::read(path, &patient);
     }
     let (source, prescription_gy) = usual()?;
     let defaults = SeedDefaults {
@@ -32,37 +33,40 @@ pub fn read(path: &Path, scene: &SceneHeader) -> Result<ImplantPlan, String> {
         strength_per_activity_u_per_mci: source.strength_per_activity_u_per_mci,
     };
     let template = Template::before(scene);
-    file::import_csv(path, defaults, &frames, template, &source.model, prescription_gy)
+    file::import_csv(path, defaults, &patient, template, &source.model, prescription_gy)
 }
 
 /// All of the plan as .toml, its seeds as .csv or .dcm.
-pub fn write(path: &Path, plan: &ImplantPlan, frames: &Frames) -> Result<(), String> {
+pub fn write(path: &Path, plan: &ImplantPlan, patient: &PatientFrame) -> Result<(), String> {
     let told = |why: String| format!("{}: {why}", path.display());
     let bytes = if has_ending(path, "toml") {
-        file::to_text(plan, frames).map_err(told)?.into_bytes()
+        file::to_text(plan, patient).map_err(told)?.into_bytes()
     } else if has_ending(path, "csv") {
-        file::seeds_to_csv(plan, frames).into_bytes()
+        file::seeds_to_csv(plan, patient).into_bytes()
     } else if has_ending(path, "dcm") {
-        seed_plan(plan, frames).and_then(|p| plan::bytes(&p)).map_err(told)?
+        seed_plan(plan, patient)
+            .and_then(|p| Ok(plan::bytes(&p)?))
+            .map_err(told)?
     } else {
         return Err(told("its name must end in .toml, .csv or .dcm".to_owned()));
     };
-    write_whole(path, &bytes)
+    Ok(write_whole(path, &bytes)?)
 }
 
-fn seed_plan(plan: &ImplantPlan, frames: &Frames) -> Result<SeedPlan, String> {
+fn seed_plan(plan: &ImplantPlan, patient: &PatientFrame) -> Result<SeedPlan, String> {
     let source = Source::known(&plan.source).ok_or_else(|| {
         format!(
             "an RT Plan holds isotope and half-life, and those of source {} are not known; write .toml",
             plan.source
         )
     })?;
-    let of_needle = |needle: &super::Needle| {
+    let of_needle = |(number, needle): (u32, &super::Needle)| {
         let name = needle.hole.map_or_else(String::new, |h| h.to_string());
-        let axis = Some(frames.turned_to_patient(needle.direction));
+        let axis = Some(patient.patient_from_scene_direction(needle.direction));
         let seed = |(place, strength_u): ([f64; 3], f64)| PlanSeed {
-            needle: name.clone(),
-            position_m: frames.to_patient_m(place),
+            needle: Some(number),
+            hole: name.clone(),
+            position_m: patient.patient_from_scene(place),
             axis,
             strength_u,
         };
@@ -81,7 +85,7 @@ fn seed_plan(plan: &ImplantPlan, frames: &Frames) -> Result<SeedPlan, String> {
             half_life_days: stylet_dose::decay::s_to_days(source.half_life_s),
             active_length_m: source.tables.active_length_m,
         },
-        seeds: plan.needles.iter().flat_map(of_needle).collect(),
+        seeds: (1..).zip(&plan.needles).flat_map(of_needle).collect(),
         notes: Vec::new(),
     })
 }

@@ -1,10 +1,11 @@
 //! Plans in files: TOML with everything, CSV with the seeds alone; mm, patient frame (RAS).
 
 use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, Template};
-use nalgebra::{Matrix3, Vector3};
+use crate::readers::{SeedDefaults, SeedFile, read_seed_rows};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use stylet_dose::files::{SeedDefaults, read_seed_rows};
+use stylet_anatomy::PatientFrame;
 use stylet_shm_schema::MAX_SEEDS;
 
 const FORMAT: &str = "stylet plan, mm, RAS";
@@ -14,41 +15,6 @@ const MAX_MM: f64 = 10_000.0;
 /// Seeds whose lines are nearer than this are on one needle.
 const SAME_LINE_M: f64 = 0.5e-3;
 const HEADER: &str = "x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,needle,hole";
-
-/// The patient's frame and the scene's.
-#[derive(Clone, Copy, Debug)]
-pub struct Frames {
-    rotation: Matrix3<f64>,
-    origin_m: Vector3<f64>,
-}
-
-impl Frames {
-    /// Row-major rotation and translation of the scene (m); anything that is no rotation is taken as none.
-    pub fn new(patient_from_scene: &[f64; 12]) -> Self {
-        let rotation = Matrix3::from_row_slice(&patient_from_scene[..9]);
-        let is_rotation = (rotation * rotation.transpose() - Matrix3::identity()).norm() < 1e-3;
-        Self {
-            rotation: if is_rotation { rotation } else { Matrix3::identity() },
-            origin_m: Vector3::from_column_slice(&patient_from_scene[9..]),
-        }
-    }
-
-    pub fn to_patient_m(&self, in_scene_m: [f64; 3]) -> [f64; 3] {
-        (self.rotation * Vector3::from(in_scene_m) + self.origin_m).into()
-    }
-
-    pub fn to_scene_m(&self, in_patient_m: [f64; 3]) -> [f64; 3] {
-        (self.rotation.transpose() * (Vector3::from(in_patient_m) - self.origin_m)).into()
-    }
-
-    pub fn turned_to_patient(&self, direction: [f64; 3]) -> [f64; 3] {
-        (self.rotation * Vector3::from(direction)).into()
-    }
-
-    pub fn turned_to_scene(&self, direction: [f64; 3]) -> [f64; 3] {
-        (self.rotation.transpose() * Vector3::from(direction)).into()
-    }
-}
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -90,10 +56,10 @@ struct NeedleFile {
 }
 
 /// As TOML.
-pub fn to_text(plan: &ImplantPlan, frames: &Frames) -> Result<String, String> {
+pub fn to_text(plan: &ImplantPlan, patient: &PatientFrame) -> Result<String, String> {
     let (mm, turned) = (
-        |v: [f64; 3]| frames.to_patient_m(v).map(|c| c * 1e3),
-        |d| frames.turned_to_patient(d),
+        |v: [f64; 3]| patient.patient_from_scene(v).map(|c| c * 1e3),
+        |d| patient.patient_from_scene_direction(d),
     );
     let t = &plan.template;
     let needle = |n: &Needle| NeedleFile {
@@ -126,7 +92,7 @@ pub fn to_text(plan: &ImplantPlan, frames: &Frames) -> Result<String, String> {
 }
 
 /// From TOML; lists every problem.
-pub fn from_text(text: &str, frames: &Frames) -> Result<ImplantPlan, String> {
+pub fn from_text(text: &str, patient: &PatientFrame) -> Result<ImplantPlan, String> {
     let file: PlanFile = toml::from_str(text).map_err(|e| format!("it is no plan: {e}"))?;
     let mut problems = Vec::new();
     if file.format != FORMAT {
@@ -138,7 +104,7 @@ pub fn from_text(text: &str, frames: &Frames) -> Result<ImplantPlan, String> {
             file.prescription_gy
         ));
     }
-    let template = template(&file.template, frames, &mut problems);
+    let template = template(&file.template, patient, &mut problems);
     if file.needles.len() > MAX_NEEDLES {
         problems.push(format!("{} needles; at most {MAX_NEEDLES}", file.needles.len()));
     }
@@ -148,7 +114,7 @@ pub fn from_text(text: &str, frames: &Frames) -> Result<ImplantPlan, String> {
     }
     let needles = file.needles.iter().enumerate().map(|(number, n)| {
         let mut found = Vec::new();
-        let needle = needle(n, frames, &mut found);
+        let needle = needle(n, patient, &mut found);
         problems.extend(found.into_iter().map(|what| format!("needle {}: {what}", number + 1)));
         needle.in_order_of_file()
     });
@@ -175,7 +141,7 @@ impl Needle {
     }
 }
 
-fn template(file: &TemplateFile, frames: &Frames, problems: &mut Vec<String>) -> Template {
+fn template(file: &TemplateFile, patient: &PatientFrame, problems: &mut Vec<String>) -> Template {
     place("template: middle_hole_mm", file.middle_hole_mm, problems);
     for (name, axis) in [
         ("columns", file.columns),
@@ -186,15 +152,15 @@ fn template(file: &TemplateFile, frames: &Frames, problems: &mut Vec<String>) ->
     }
     within("template: pitch_mm", file.pitch_mm, 1.0, 20.0, problems);
     Template {
-        middle_m: frames.to_scene_m(file.middle_hole_mm.map(|c| c * 1e-3)),
-        columns: frames.turned_to_scene(file.columns),
-        rows: frames.turned_to_scene(file.rows),
-        inwards: frames.turned_to_scene(file.inwards),
+        middle_m: patient.scene_from_patient(file.middle_hole_mm.map(|c| c * 1e-3)),
+        columns: patient.scene_from_patient_direction(file.columns),
+        rows: patient.scene_from_patient_direction(file.rows),
+        inwards: patient.scene_from_patient_direction(file.inwards),
         pitch_m: file.pitch_mm * 1e-3,
     }
 }
 
-fn needle(file: &NeedleFile, frames: &Frames, problems: &mut Vec<String>) -> Needle {
+fn needle(file: &NeedleFile, patient: &PatientFrame, problems: &mut Vec<String>) -> Needle {
     let hole = file.hole.as_deref().map(str::parse::<Hole>).transpose();
     place("entry_mm", file.entry_mm, problems);
     unit("direction", file.direction, problems);
@@ -225,8 +191,8 @@ fn needle(file: &NeedleFile, frames: &Frames, problems: &mut Vec<String>) -> Nee
             problems.push(why);
             None
         }),
-        entry_m: frames.to_scene_m(file.entry_mm.map(|c| c * 1e-3)),
-        direction: frames.turned_to_scene(file.direction),
+        entry_m: patient.scene_from_patient(file.entry_mm.map(|c| c * 1e-3)),
+        direction: patient.scene_from_patient_direction(file.direction),
         depth_m: file.depth_mm * 1e-3,
         retract_to_m: file.retract_to_mm * 1e-3,
         loading: file
@@ -256,7 +222,7 @@ fn within(what: &str, value: f64, least: f64, most: f64, problems: &mut Vec<Stri
 }
 
 /// Reads a plan file; the error names it.
-pub fn read(path: &Path, frames: &Frames) -> Result<ImplantPlan, String> {
+pub fn read(path: &Path, patient: &PatientFrame) -> Result<ImplantPlan, String> {
     let told = |why: String| format!("{}: {why}", path.display());
     let opened = |e: std::io::Error| told(format!("it cannot be read ({e}); check the path"));
     let size = std::fs::metadata(path).map_err(opened)?.len();
@@ -264,22 +230,22 @@ pub fn read(path: &Path, frames: &Frames) -> Result<ImplantPlan, String> {
         return Err(told(format!("it has {size} bytes, more than {MAX_BYTES}")));
     }
     let text = std::fs::read_to_string(path).map_err(opened)?;
-    from_text(&text, frames).map_err(told)
+    from_text(&text, patient).map_err(told)
 }
 
-pub fn write(path: &Path, plan: &ImplantPlan, frames: &Frames) -> Result<(), String> {
-    let text = to_text(plan, frames)?;
+pub fn write(path: &Path, plan: &ImplantPlan, patient: &PatientFrame) -> Result<(), String> {
+    let text = to_text(plan, patient)?;
     std::fs::write(path, text).map_err(|e| format!("{} cannot be written ({e})", path.display()))
 }
 
 /// Seeds as `host-ui dose --seeds` reads them, with the number of their needle and its hole.
-pub fn seeds_to_csv(plan: &ImplantPlan, frames: &Frames) -> String {
+pub fn seeds_to_csv(plan: &ImplantPlan, patient: &PatientFrame) -> String {
     let mut text = format!("{HEADER}\n");
     for (number, needle) in (1..).zip(&plan.needles) {
-        let [a, b, c] = frames.turned_to_patient(needle.direction);
+        let [a, b, c] = patient.patient_from_scene_direction(needle.direction);
         let hole = needle.hole.map_or_else(String::new, |h| h.to_string());
         for (seed, place_m) in needle.seeds.iter().zip(needle.seeds_m()) {
-            let [x, y, z] = frames.to_patient_m(place_m).map(|c| c * 1e3);
+            let [x, y, z] = patient.patient_from_scene(place_m).map(|c| c * 1e3);
             let strength = seed.strength_u;
             text += &format!("{x:.6},{y:.6},{z:.6},{a:.9},{b:.9},{c:.9},{strength},{number},{hole}\n");
         }
@@ -292,13 +258,16 @@ pub fn seeds_to_csv(plan: &ImplantPlan, frames: &Frames) -> String {
 pub fn import_csv(
     path: &Path,
     defaults: SeedDefaults,
-    frames: &Frames,
+    patient: &PatientFrame,
     template: Template,
     source: &str,
     prescription_gy: f64,
 ) -> Result<ImplantPlan, String> {
     let told = |why: String| format!("{}: {why}", path.display());
-    let rows = read_seed_rows(path, defaults)?;
+    let file = read_seed_rows(path, defaults)?;
+    // A plan names holes of the template that it was made with, and its needles may be curved.
+    let is_table = matches!(file, SeedFile::Table(_));
+    let rows = file.into_rows();
     if rows.len() > MAX_SEEDS {
         let count = rows.len();
         return Err(told(format!("{count} seeds; at most {MAX_SEEDS} can be placed")));
@@ -306,20 +275,20 @@ pub fn import_csv(
     let mut needles: Vec<(Option<u32>, Needle)> = Vec::new();
     let mut problems = Vec::new();
     for row in &rows {
-        let place_m = frames.to_scene_m(row.seed.position_m);
-        let direction = row
-            .seed
-            .axis
-            .map_or(template.inwards, |a| inwards(&template, frames.turned_to_scene(a)));
+        let place_m = patient.scene_from_patient(row.seed.position_m);
+        let direction = row.seed.axis.map_or(template.inwards, |a| {
+            inwards(&template, patient.scene_from_patient_direction(a))
+        });
         let is_its = |(number, needle): &(Option<u32>, Needle)| {
-            *number == row.needle && (number.is_some() || is_on_line(needle, place_m, direction))
+            *number == row.needle && (is_table && number.is_some() || is_on_line(needle, place_m, direction))
         };
         let at = needles.iter().position(is_its).unwrap_or_else(|| {
             needles.push((row.needle, through(&template, place_m, direction)));
             needles.len() - 1
         });
         let (number, needle) = &mut needles[at];
-        if let Err(why) = fits(needle, row.hole.as_deref(), place_m, direction, &template) {
+        let hole = row.hole.as_deref().filter(|_| is_table);
+        if let Err(why) = fits(needle, hole, place_m, direction, &template) {
             let needle = number.map_or_else(String::new, |n| format!("needle {n}: "));
             problems.push(format!("{needle}{why}"));
         }

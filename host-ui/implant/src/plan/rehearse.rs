@@ -85,7 +85,7 @@ impl Rehearser for LinkRehearser<'_> {
         let id = link.send(CommandKind::Rehearse, &drops.values(pace)).map_err(|e| e.0)?;
         let begun = Instant::now();
         while begun.elapsed() < LONGEST {
-            if self.interrupted.asked() {
+            if self.interrupted.is_requested() {
                 return Err("interrupted".to_owned());
             }
             link.poll();

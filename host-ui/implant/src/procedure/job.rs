@@ -87,7 +87,7 @@ impl Job {
             let mut rehearser = LinkRehearser { link, interrupted };
             let done = match compensate(&needle, pace, &Limits::default(), &mut rehearser) {
                 Ok(done) => done,
-                Err(why) if interrupted.asked() => return Err(why),
+                Err(why) if interrupted.is_requested() => return Err(why),
                 Err(why) => {
                     println!("note: needle {} of {count} is not compensated: {why}", number + 1);
                     continue;

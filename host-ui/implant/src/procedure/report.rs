@@ -4,7 +4,7 @@ use super::Seen;
 use super::job::{Job, PlannedDrop, placed};
 use crate::plan::compensate::summary_m;
 use crate::workflow::Pace;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
@@ -65,17 +65,12 @@ fn mm(v: [f64; 3]) -> [f64; 3] {
     v.map(|c| c * 1e3)
 }
 
-fn patient_mm(patient_from_scene: &[f64; 12], v: [f64; 3]) -> [f64; 3] {
-    let p = patient_from_scene;
-    let at = Matrix3::from_row_slice(&p[..9]) * Vector3::from(v) + Vector3::new(p[9], p[10], p[11]);
-    mm(at.into())
-}
-
 fn seeds(link: &Link, planned: &[PlannedDrop], lost: &[usize]) -> Vec<Value> {
     let (Some(snapshot), Some(scene)) = (link.snapshot(), link.scene()) else {
         return Vec::new();
     };
-    let to_patient = |v| patient_mm(&scene.header.patient_from_scene, v);
+    let patient = scene.header.patient();
+    let to_patient = |v| mm(patient.patient_from_scene(v));
     let in_tissue = &snapshot.header.seeds[..snapshot.header.seed_count as usize];
     placed(planned, lost, in_tissue)
         .map(|(drop, seed)| {

@@ -1,5 +1,6 @@
 //! What each seed's error cost: the measures that the implant would have with this one seed on plan, less those that it has.
 
+use stylet_anatomy::Organ;
 use stylet_dose::{DoseKernel, DosePoints, Dvh, Metric, Seed, Structure};
 
 /// Gain if this seed alone lay on plan; positive D90 and V100 were lost, positive doses to the urethra were saved.
@@ -55,7 +56,7 @@ pub fn costs(
 ) -> Vec<Cost> {
     let field = |s| Field::new(s, kernel, delivered);
     let target = structures.first().map(field);
-    let is_urethra = |s: &&Structure| s.name.to_ascii_lowercase().contains("urethra");
+    let is_urethra = |s: &&Structure| Organ::Urethra.is_mentioned_in(&s.name);
     let urethra = structures.iter().skip(1).find(is_urethra).map(field);
     let value = |dvh: &Option<Dvh>, metric: Metric| dvh.as_ref().and_then(|d| metric.of(d, prescription_gy).main());
     let now = |f: &Option<Field>| f.as_ref().and_then(Field::as_delivered);

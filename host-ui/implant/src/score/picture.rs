@@ -48,8 +48,8 @@ struct View {
 /// The implant along the needles, from the side, and from the front; planned, delivered, and the way between them.
 pub fn views(score: &Score) -> Result<String, String> {
     let implant = &score.implant;
-    let frame = crate::plan::file::Frames::new(&implant.anatomy.patient_from_scene);
-    let axis = |patient: [f64; 3]| frame.turned_to_scene(patient);
+    let frame = implant.anatomy.patient;
+    let axis = |patient: [f64; 3]| frame.scene_from_patient_direction(patient);
     // As one looks at a patient: his right is on the left.
     let (left, anterior, superior) = (axis([-1.0, 0.0, 0.0]), axis([0.0, 1.0, 0.0]), axis([0.0, 0.0, 1.0]));
     let views = [

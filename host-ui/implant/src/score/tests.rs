@@ -3,6 +3,7 @@
 use super::*;
 use crate::plan::anatomy::ball;
 use bytemuck::Zeroable;
+use stylet_anatomy::PatientFrame;
 use stylet_dose::decay::Interval;
 use stylet_dose::{DosePoints, Dvh, Metric, Source};
 
@@ -14,7 +15,7 @@ fn anatomy() -> Anatomy {
         spared: vec![ball("urethra", MIDDLE_M, [0.003, 0.003, 0.02])],
         lower_m: [0.0; 3],
         upper_m: [0.1; 3],
-        patient_from_scene: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+        patient: PatientFrame::default(),
     }
 }
 

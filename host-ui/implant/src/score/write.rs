@@ -7,14 +7,14 @@ use std::path::Path;
 /// Every figure of a score; lengths in mm, patient frame (RAS) for places.
 pub fn to_json(score: &Score) -> Value {
     let i = &score.implant;
-    let frames = crate::plan::file::Frames::new(&i.anatomy.patient_from_scene);
-    let ras_mm = |p: [f64; 3]| frames.to_patient_m(p).map(|c| c * 1e3);
+    let frames = i.anatomy.patient;
+    let ras_mm = |p: [f64; 3]| frames.patient_from_scene(p).map(|c| c * 1e3);
     let [mean, worst] = score.errors_m();
     let seed = |(pair, cost): (&super::SeedPair, &super::Cost)| {
         json!({
             "needle": pair.needle + 1, "hole": pair.hole.map(|h| h.to_string()), "strength_u": pair.planned.strength_u,
             "planned_ras_mm": ras_mm(pair.planned.position_m), "delivered_ras_mm": ras_mm(pair.delivered.position_m),
-            "axis_ras": pair.delivered.axis.map(|a| frames.turned_to_patient(a)),
+            "axis_ras": pair.delivered.axis.map(|a| frames.patient_from_scene_direction(a)),
             "error_mm": pair.error_m() * 1e3, "error_along_mm": pair.error_along_m() * 1e3,
             "error_across_mm": pair.error_across_m() * 1e3,
             "cost": {

@@ -97,10 +97,11 @@ pub fn distribution(path: &Path, spreads: &[Spread]) -> Result<(), String> {
         .collect();
     let rows = spreads.iter().map(|s| {
         let planned = s.planned.map_or_else(String::new, |v| format!("{v:.6}"));
-        let figures = [s.mean, s.deviation].into_iter().chain(s.percentiles);
+        let percentiles = PERCENTILES.iter().enumerate().map(|(i, _)| s.percentiles.map(|p| p[i]));
+        let figures = [s.mean, s.deviation].into_iter().chain(percentiles);
         [s.name.clone(), planned]
             .into_iter()
-            .chain(figures.map(|v| format!("{v:.6}")))
+            .chain(figures.map(|v| v.map_or_else(String::new, |v| format!("{v:.6}"))))
             .chain([s.defined.to_string()])
             .collect()
     });
@@ -113,8 +114,8 @@ pub fn spreads_json(spreads: &[Spread]) -> Value {
         .map(|s| {
             let percentiles: serde_json::Map<String, Value> = PERCENTILES
                 .iter()
-                .zip(s.percentiles)
-                .map(|(p, v)| (format!("p{p}"), json!(v)))
+                .enumerate()
+                .map(|(i, p)| (format!("p{p}"), json!(s.percentiles.map(|all| all[i]))))
                 .collect();
             let value = json!({
                 "planned": s.planned, "mean": s.mean, "sd": s.deviation, "trials": s.defined, "percentiles": percentiles,
@@ -132,10 +133,17 @@ pub fn spread_table(spreads: &[Spread]) -> String {
         "", "planned", "mean", "sd", "p5", "p50", "p95"
     );
     for s in spreads {
-        let planned = s.planned.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+        let figure = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+        let percentile = |i: usize| figure(s.percentiles.map(|all| all[i]));
         text += &format!(
-            "{:wide$} {planned:>10} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>10.3}\n",
-            s.name, s.mean, s.deviation, s.percentiles[0], s.percentiles[2], s.percentiles[4]
+            "{:wide$} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}\n",
+            s.name,
+            figure(s.planned),
+            figure(s.mean),
+            figure(s.deviation),
+            percentile(0),
+            percentile(2),
+            percentile(4)
         );
     }
     text

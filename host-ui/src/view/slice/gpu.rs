@@ -9,6 +9,7 @@ use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
 use nalgebra::{Matrix3, Vector3};
 use std::mem::size_of;
+use stylet_anatomy::PatientFrame;
 use stylet_files::Image;
 use stylet_host::link::SceneModel;
 use stylet_shm_schema::GridInfo;
@@ -41,7 +42,7 @@ struct Body {
     volume_corner_m: [f32; 3],
     volume_size_m: [f32; 3],
     scene_from_patient: Matrix3<f64>,
-    patient_from_scene: [f64; 12],
+    patient: PatientFrame,
 }
 
 /// Without its greys, which are on the card.
@@ -143,7 +144,7 @@ impl SliceGpu {
             volume_corner_m: info.origin_m.map(|c| (c - 1.5 * info.spacing_m) as f32),
             volume_size_m: dims.map(|d| (d as f64 * info.spacing_m) as f32),
             scene_from_patient,
-            patient_from_scene: model.header.patient_from_scene,
+            patient: model.header.patient(),
         });
         self.set_field(&Field::rest(nodes_info));
     }
@@ -290,9 +291,7 @@ fn uniform(body: &Body, plane: &Plane, image: Option<&Image>) -> SliceUniform {
         nodes_size_m: padded(nodes.dims.map(|d| (f64::from(d) * nodes.spacing_m) as f32), 0.0),
         grain,
         image: image.map_or([[0.0; 4]; 3], |image| {
-            image
-                .texture_from_scene(&body.patient_from_scene)
-                .map(|row| row.map(|v| v as f32))
+            image.texture_from_scene(&body.patient).map(|row| row.map(|v| v as f32))
         }),
     }
 }

@@ -270,8 +270,7 @@ impl Overlay<'_> {
             Orientation::Sagittal => (0, "R"),
             Orientation::Coronal => (1, "A"),
         };
-        let in_patient =
-            self.scene_from_patient.column(axis).dot(&self.plane.middle_m) + scene.patient_from_scene[9 + axis];
+        let in_patient = scene.patient().patient_from_scene(self.plane.middle_m.into())[axis];
         format!("{letter} {}", format::length(in_patient))
     }
 

@@ -46,13 +46,7 @@ impl Orientation {
 
 /// Scene from patient directions; the scene's own axes where the transform is no rotation.
 pub fn scene_from_patient(scene: &SceneHeader) -> Matrix3<f64> {
-    let rotation = Matrix3::from_row_slice(&scene.patient_from_scene[..9]);
-    let is_rotation = (rotation * rotation.transpose() - Matrix3::identity()).norm() < 1e-3;
-    if is_rotation {
-        rotation.transpose()
-    } else {
-        Matrix3::identity()
-    }
+    scene.patient().rotation().transpose()
 }
 
 /// The plane of one picture: its middle, two unit vectors, and how large a point of the screen is.

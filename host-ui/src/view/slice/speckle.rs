@@ -3,6 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
+use stylet_anatomy::{Organ, Part};
 use stylet_shm_schema::{SceneHeader, StructureInfo, role};
 
 /// Side of the cube of grain, which repeats.
@@ -15,34 +16,36 @@ pub const GRAIN_M: [f32; 3] = [0.42e-3, 0.24e-3, 0.42e-3];
 
 /// Brightness of what is not tissue: jelly around a gland that stands alone.
 const OUTSIDE: f32 = 0.13;
-/// By words in a structure's name, as seen in transrectal ultrasound; the first that fits.
-const BY_NAME: [(&str, f32); 10] = [
-    ("content", 0.02),
-    ("urethra", 0.20),
-    ("capsule", 0.74),
-    ("wall", 0.62),
-    ("rect", 0.50),
-    ("bladder", 0.06),
-    ("arch", 0.92),
-    ("bone", 0.92),
-    ("fat", 0.54),
-    ("perineum", 0.48),
-];
-
-/// Brightness of a structure, 0 to 1.
+/// Brightness of a structure, 0 to 1, as seen in transrectal ultrasound: by its name, otherwise by its role.
 pub fn brightness(structure: &StructureInfo) -> f32 {
-    let name = structure.name.read().to_lowercase();
-    let by_name = BY_NAME.iter().find(|(word, _)| name.contains(word));
-    by_name.map_or_else(
-        || match structure.role {
-            bits if bits & role::TARGET != 0 => 0.40,
-            bits if bits & role::FIXED != 0 => 0.92,
-            bits if bits & role::SPARE != 0 => 0.24,
-            _ => 0.54,
-        },
-        |(_, brightness)| *brightness,
-    )
+    by_name(&structure.name.read()).unwrap_or(match structure.role {
+        bits if bits & role::TARGET != 0 => 0.40,
+        bits if bits & role::FIXED != 0 => 0.92,
+        bits if bits & role::SPARE != 0 => 0.24,
+        _ => 0.54,
+    })
 }
+
+fn by_name(name: &str) -> Option<f32> {
+    let part = Part::of_name(name);
+    let mentioned = |organ: Organ| organ.is_mentioned_in(name);
+    match part {
+        Some(Part::Content) => Some(0.02),
+        _ if mentioned(Organ::Urethra) => Some(0.20),
+        Some(Part::Capsule) => Some(0.74),
+        Some(Part::Wall) => Some(0.62),
+        None => BY_ORGAN.iter().find(|(organ, _)| mentioned(*organ)).map(|(_, b)| *b),
+    }
+}
+
+/// The first organ that a name mentions.
+const BY_ORGAN: [(Organ, f32); 5] = [
+    (Organ::RectalWall, 0.50),
+    (Organ::Bladder, 0.06),
+    (Organ::Bone, 0.92),
+    (Organ::Fat, 0.54),
+    (Organ::Perineum, 0.48),
+];
 
 /// Brightness of every cell of a scene's labels, with one cell of nothing around them, as bytes; and its size.
 pub fn brightness_volume(scene: &SceneHeader, labels: &[u8]) -> ([usize; 3], Vec<u8>) {

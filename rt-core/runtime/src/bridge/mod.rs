@@ -15,7 +15,6 @@ use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use flight::FlightDesk;
 use iceoryx2::node::Node;
-use picture::IDENTITY;
 pub use picture::ScenePicture;
 use ports::Ports;
 use rehearsals::RehearsalDesk;
@@ -25,6 +24,7 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
+use stylet_anatomy::PatientFrame;
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::service::{Ipc, MAX_BATCH};
 use stylet_shm_schema::*;
@@ -61,7 +61,7 @@ const TOO_MANY: &str = "too many requests at once; send fewer";
 struct Loaded {
     ticket: Ticket,
     name: String,
-    patient_from_scene: [f64; 12],
+    patient: PatientFrame,
     scene: Result<(Box<Scene>, SceneSource), String>,
 }
 
@@ -351,7 +351,7 @@ impl Bridge {
                     && self.loops.haptic_orders.push(HapticOrder::Reset { ticket }).is_ok()
             }
             Request::BuiltinScene(name) => {
-                self.load(ticket, name.to_owned(), IDENTITY, || {
+                self.load(ticket, name.to_owned(), PatientFrame::default(), || {
                     let source = SceneSource::Builtin(name.to_owned());
                     source.build().map(|scene| (scene, source))
                 });
@@ -393,7 +393,8 @@ impl Bridge {
             };
             drop(sample);
             let ticket = self.ticket(who.0, who.1);
-            self.load(ticket, name.clone(), header.patient_from_scene, move || {
+            let patient = PatientFrame::of_wire(&header.patient_from_scene);
+            self.load(ticket, name.clone(), patient, move || {
                 let source = SceneSource::of_labels(&name, &labels);
                 Scene::from_labels(&name, &labels)
                     .map(|scene| (scene, source))
@@ -407,7 +408,7 @@ impl Bridge {
         &mut self,
         ticket: Ticket,
         name: String,
-        patient_from_scene: [f64; 12],
+        patient: PatientFrame,
         build: impl FnOnce() -> Result<(Scene, SceneSource), String> + Send + 'static,
     ) {
         if self.loading || self.coming.is_some() {
@@ -423,7 +424,7 @@ impl Bridge {
                 let _ = sender.send(Loaded {
                     ticket,
                     name,
-                    patient_from_scene,
+                    patient,
                     scene,
                 });
             });
@@ -446,7 +447,7 @@ impl Bridge {
             Err(why) => return self.answer(loaded.ticket, Some(&why.join("\n")), 0),
         };
         let generation = self.picture.header.generation + 1;
-        let mut picture = ScenePicture::of(&scene, self.session.session_id, generation, loaded.patient_from_scene);
+        let mut picture = ScenePicture::of(&scene, self.session.session_id, generation, loaded.patient);
         picture.header.name = Text::new(&loaded.name);
         let world = match World::new(*scene, limits, generation) {
             Ok(world) => Box::new(world),

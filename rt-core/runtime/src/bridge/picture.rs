@@ -1,10 +1,9 @@
 //! What hosts need to draw a scene and to plan in it.
 
 use super::SnapshotSize;
+use stylet_anatomy::PatientFrame;
 use stylet_shm_schema::*;
 use stylet_sim::scene::{Role, Scene, Structure, label_grid};
-
-pub(super) const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
 /// Header and words of the scene service.
 pub struct ScenePicture {
@@ -15,7 +14,7 @@ pub struct ScenePicture {
 impl ScenePicture {
     /// Of a built-in scene, the first of a run.
     pub fn first(scene: &Scene, session_id: u64) -> Self {
-        Self::of(scene, session_id, 1, IDENTITY)
+        Self::of(scene, session_id, 1, PatientFrame::default())
     }
 
     /// As it is sent: rest positions and triangles behind the header.
@@ -35,7 +34,7 @@ impl ScenePicture {
         }
     }
 
-    pub(super) fn of(scene: &Scene, session_id: u64, generation: u64, patient_from_scene: [f64; 12]) -> Self {
+    pub(super) fn of(scene: &Scene, session_id: u64, generation: u64, patient: PatientFrame) -> Self {
         let (lattice, surface) = (&scene.lattice, &scene.surface);
         let (lower_m, upper_m) = lattice.bounds_m();
         let (target_lower_m, target_upper_m) = scene.target_bounds_m();
@@ -66,7 +65,7 @@ impl ScenePicture {
                 upper_m,
                 target_lower_m,
                 target_upper_m,
-                patient_from_scene,
+                patient_from_scene: patient.to_wire(),
                 labels: label_info,
                 nodes: scene.nodes.info,
                 name: Text::new(&scene.name),

@@ -3,6 +3,7 @@
 use crate::scene::{Role, Structure};
 use crate::settings::{Problem, Problems};
 use serde::{Deserialize, Serialize};
+use stylet_anatomy::Organ;
 
 /// What the tip is in. The numbers are stable: they index [`Layers`] and appear between the loops.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -22,7 +23,9 @@ pub enum LayerKind {
 impl LayerKind {
     /// What a structure of a scene is to the needle: by its role, and skin by its name.
     pub fn of_structure(structure: &Structure) -> LayerKind {
-        let is_skin = ["skin", "perineum"].iter().any(|word| structure.name.contains(word));
+        let is_skin = [Organ::Skin, Organ::Perineum]
+            .iter()
+            .any(|organ| organ.is_mentioned_in(&structure.name));
         match structure.role {
             Role::Target => Self::Gland,
             Role::Spare => Self::Wall,

@@ -2,6 +2,7 @@
 
 use crate::limits::AxisLimits;
 use serde::{Deserialize, Serialize};
+pub use stylet_anatomy::Role;
 
 /// One anatomical structure; its cells carry its label.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -10,17 +11,6 @@ pub struct Structure {
     pub label: u8,
     pub role: Role,
     pub material: Material,
-}
-
-/// What a structure is in the procedure.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Role {
-    /// What seeds are planned in.
-    Target,
-    /// To be kept from needles and dose.
-    Spare,
-    #[default]
-    Tissue,
 }
 
 /// What a structure does when pushed.

@@ -18,7 +18,8 @@ fn good() -> Vec<u8> {
             active_length_m: 3e-3,
         },
         seeds: vec![PlanSeed {
-            needle: "D4".to_owned(),
+            needle: Some(1),
+            hole: "D4".to_owned(),
             position_m: [0.01, 0.02, 0.03],
             axis: None,
             strength_u: 0.5,
@@ -29,7 +30,7 @@ fn good() -> Vec<u8> {
 }
 
 fn why(bytes: &[u8]) -> String {
-    read(bytes).map(|o| o.sop_class).expect_err("refused")
+    read(bytes).map(|o| o.sop_class).expect_err("refused").to_string()
 }
 
 #[test]

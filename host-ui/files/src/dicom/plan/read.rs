@@ -1,18 +1,19 @@
-//! A plan out of DICOM: seeds from the control points of every channel; every problem is told.
+//! A plan out of DICOM: seeds from the control points of every channel; every problem is listed.
 
 use super::super::super::element::short;
-use super::super::super::error;
-use super::super::super::frame::ras_from_lps;
 use super::super::Identity;
 use super::super::checked::Object;
 use super::super::values::{exactly, items, name, needed, number, text};
 use super::super::write::new_uid;
 use super::{PlanSeed, PlanSource, SeedPlan};
+use crate::error::ContentError;
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::InMemDicomObject;
 use nalgebra::Vector3;
+use stylet_anatomy::ras_from_lps;
 
 const MAX_SEEDS: usize = 10_000;
+const MAX_NEEDLE: f64 = 1e9;
 const MAX_PROBLEMS: usize = 8;
 const MAX_MM: f64 = 10_000.0;
 /// Control points nearer than this are one place.
@@ -20,12 +21,12 @@ const SAME_PLACE_MM: f64 = 1e-3;
 /// Half-lives of one isotope agree so well, as a share.
 const SAME_HALF_LIFE: f64 = 0.01;
 
-pub fn of(object: &Object) -> Result<SeedPlan, String> {
+pub fn of(object: &Object) -> Result<SeedPlan, ContentError> {
     if object.sop_class != uids::RT_PLAN_STORAGE {
-        return Err(format!(
+        return Err(ContentError::Invalid(format!(
             "it is DICOM of another kind (SOP class {}); a plan is an RT Plan",
             short(&object.sop_class)
-        ));
+        )));
     }
     let data = &object.data;
     permanent(data)?;
@@ -34,16 +35,18 @@ pub fn of(object: &Object) -> Result<SeedPlan, String> {
     for setup in items(data, tags::APPLICATION_SETUP_SEQUENCE) {
         for channel in items(setup, tags::CHANNEL_SEQUENCE) {
             if let Err(why) = of_channel(channel, &sources, &mut seeds) {
-                problems.push(why);
+                problems.push(why.to_string());
             }
             if problems.len() >= MAX_PROBLEMS {
                 break;
             }
         }
     }
-    error::all(problems)?;
+    ContentError::all(problems)?;
     if seeds.is_empty() {
-        return Err("it holds no seed: no channel has a control point with a place".to_owned());
+        return Err(ContentError::Invalid(
+            "it holds no seed: no channel has a control point with a place".to_owned(),
+        ));
     }
     let (source, notes) = one_model(sources)?;
     Ok(SeedPlan {
@@ -57,28 +60,28 @@ pub fn of(object: &Object) -> Result<SeedPlan, String> {
     })
 }
 
-fn permanent(data: &InMemDicomObject) -> Result<(), String> {
+fn permanent(data: &InMemDicomObject) -> Result<(), ContentError> {
     let beams = items(data, tags::BEAM_SEQUENCE).len();
     match text(data, tags::BRACHY_TREATMENT_TECHNIQUE) {
-        None if beams > 0 => Err(format!(
+        None if beams > 0 => Err(ContentError::Invalid(format!(
             "it is a plan of {beams} external beams; a seed plan is one of brachytherapy"
-        )),
-        None => Err(format!(
+        ))),
+        None => Err(ContentError::Invalid(format!(
             "{} is missing, so it is no plan of brachytherapy",
             name(tags::BRACHY_TREATMENT_TECHNIQUE)
-        )),
+        ))),
         Some(t) if t == "PERMANENT" => Ok(()),
         Some(t) => {
             let kind = text(data, tags::BRACHY_TREATMENT_TYPE).unwrap_or_default();
-            // Some programs call the way in the technique, and tell seeds by the type.
+            // Some programs give the approach as the technique, and seeds by the type.
             if kind == "MANUAL" || kind == "LDR" {
                 return Ok(());
             }
-            Err(format!(
+            Err(ContentError::Invalid(format!(
                 "its technique is {} and its type {}: sources that are taken out again; only permanent implants are read",
                 short(&t),
                 short(&kind)
-            ))
+            )))
         }
     }
 }
@@ -89,34 +92,38 @@ struct Source {
     strength_u: f64,
 }
 
-fn sources(data: &InMemDicomObject) -> Result<Vec<Source>, String> {
+fn sources(data: &InMemDicomObject) -> Result<Vec<Source>, ContentError> {
     let (mut all, mut problems) = (Vec::new(), Vec::new());
     for item in items(data, tags::SOURCE_SEQUENCE) {
         match source(item) {
             Ok(source) => all.push(source),
-            Err(why) => problems.push(why),
+            Err(why) => problems.push(why.to_string()),
         }
     }
-    error::all(problems)?;
+    ContentError::all(problems)?;
     if all.is_empty() {
-        return Err(format!("{} is missing or empty", name(tags::SOURCE_SEQUENCE)));
+        return Err(ContentError::Invalid(format!(
+            "{} is missing or empty",
+            name(tags::SOURCE_SEQUENCE)
+        )));
     }
     Ok(all)
 }
 
-fn source(item: &InMemDicomObject) -> Result<Source, String> {
+fn source(item: &InMemDicomObject) -> Result<Source, ContentError> {
     let number = needed(item, tags::SOURCE_NUMBER, 0.0, 1e9)?;
-    let told = |why: String| format!("source {number}: {why}");
+    let at = |why: ContentError| why.within(format_args!("source {number}"));
     if let Some(units) = text(item, tags::SOURCE_STRENGTH_UNITS).filter(|u| u != "AIR_KERMA_RATE") {
-        return Err(told(format!(
+        return Err(at(format!(
             "its strength is in {}; only air kerma strength is read",
             short(&units)
-        )));
+        )
+        .into()));
     }
-    let strength_u = needed(item, tags::REFERENCE_AIR_KERMA_RATE, 1e-6, 1e5).map_err(told)?;
-    let half_life_days = needed(item, tags::SOURCE_ISOTOPE_HALF_LIFE, 1e-3, 1e6).map_err(told)?;
-    let isotope = text(item, tags::SOURCE_ISOTOPE_NAME).ok_or_else(|| told("its isotope is missing".to_owned()))?;
-    let length_mm = number_within(item, 100.0).map_err(told)?;
+    let strength_u = needed(item, tags::REFERENCE_AIR_KERMA_RATE, 1e-6, 1e5).map_err(at)?;
+    let half_life_days = needed(item, tags::SOURCE_ISOTOPE_HALF_LIFE, 1e-3, 1e6).map_err(at)?;
+    let isotope = text(item, tags::SOURCE_ISOTOPE_NAME).ok_or_else(|| at("its isotope is missing".into()))?;
+    let length_mm = number_within(item, 100.0).map_err(at)?;
     Ok(Source {
         number,
         strength_u,
@@ -132,26 +139,29 @@ fn source(item: &InMemDicomObject) -> Result<Source, String> {
     })
 }
 
-fn number_within(item: &InMemDicomObject, most: f64) -> Result<f64, String> {
+fn number_within(item: &InMemDicomObject, most: f64) -> Result<f64, ContentError> {
     match number(item, tags::ACTIVE_SOURCE_LENGTH)? {
-        Some(v) if !(0.0..=most).contains(&v) => Err(format!("{} is {v}", name(tags::ACTIVE_SOURCE_LENGTH))),
+        Some(v) if !(0.0..=most).contains(&v) => Err(ContentError::Invalid(format!(
+            "{} is {v}",
+            name(tags::ACTIVE_SOURCE_LENGTH)
+        ))),
         v => Ok(v.unwrap_or_default()),
     }
 }
 
 /// Seeds of one plan are of one model; dose knows no other.
-fn one_model(sources: Vec<Source>) -> Result<(PlanSource, Vec<String>), String> {
+fn one_model(sources: Vec<Source>) -> Result<(PlanSource, Vec<String>), ContentError> {
     let mut all = sources.into_iter().map(|s| s.model);
     let first = all.next().ok_or("no source")?;
     let mut notes = Vec::new();
     for other in all {
         let as_long = (other.half_life_days / first.half_life_days - 1.0).abs() < SAME_HALF_LIFE;
         if other.isotope != first.isotope || !as_long {
-            return Err(format!(
+            return Err(ContentError::Invalid(format!(
                 "it mixes seeds of {} and {}; only plans of one isotope are read",
                 short(&first.isotope),
                 short(&other.isotope)
-            ));
+            )));
         }
         if other.model != first.model {
             notes.push(format!(
@@ -164,34 +174,39 @@ fn one_model(sources: Vec<Source>) -> Result<(PlanSource, Vec<String>), String> 
     Ok((first, notes))
 }
 
-fn of_channel(channel: &InMemDicomObject, sources: &[Source], seeds: &mut Vec<PlanSeed>) -> Result<(), String> {
+fn of_channel(channel: &InMemDicomObject, sources: &[Source], seeds: &mut Vec<PlanSeed>) -> Result<(), ContentError> {
     let channel_number = needed(channel, tags::CHANNEL_NUMBER, 0.0, 1e9)?;
-    let told = |why: String| format!("channel {channel_number}: {why}");
-    let referenced = needed(channel, tags::REFERENCED_SOURCE_NUMBER, 0.0, 1e9).map_err(told)?;
+    let at = |why: ContentError| why.within(format_args!("channel {channel_number}"));
+    let referenced = needed(channel, tags::REFERENCED_SOURCE_NUMBER, 0.0, 1e9).map_err(at)?;
     let source = sources.iter().find(|s| s.number == referenced);
-    let source = source.ok_or_else(|| told(format!("it refers to source {referenced}, which is not there")))?;
-    let needle = text(channel, tags::SOURCE_APPLICATOR_ID).unwrap_or_else(|| channel_number.to_string());
+    let source = source.ok_or_else(|| at(format!("it refers to source {referenced}, which is not there").into()))?;
+    let hole = text(channel, tags::SOURCE_APPLICATOR_ID).unwrap_or_default();
+    let applicator = number(channel, tags::SOURCE_APPLICATOR_NUMBER).map_err(at)?;
+    let is_number = |n: &f64| n.fract() == 0.0 && (1.0..=MAX_NEEDLE).contains(n);
+    let needle = applicator.filter(is_number).map(|n| n as u32);
     let mut last: Option<Vector3<f64>> = None;
     for point in items(channel, tags::BRACHY_CONTROL_POINT_SEQUENCE) {
-        let Some(place) = exactly::<3>(point, tags::CONTROL_POINT3_D_POSITION).map_err(told)? else {
-            return Err(told("a control point has no place in the patient".to_owned()));
+        let Some(place) = exactly::<3>(point, tags::CONTROL_POINT3_D_POSITION).map_err(at)? else {
+            return Err(at("a control point has no place in the patient".into()));
         };
         if place.iter().any(|v| v.abs() > MAX_MM) {
-            return Err(told(format!(
-                "a seed lies at {place:?} mm; at most {MAX_MM} mm is believed"
-            )));
+            return Err(at(format!(
+                "a seed lies at {place:?} mm; at most {MAX_MM} mm is accepted"
+            )
+            .into()));
         }
         let place = Vector3::from(place);
         // Two control points at one place are the beginning and the end of one seed.
         let stays = last.is_some_and(|p| (p - place).norm() < SAME_PLACE_MM);
         if !stays {
             if seeds.len() == MAX_SEEDS {
-                return Err(told(format!("there are more than {MAX_SEEDS} seeds")));
+                return Err(at(format!("there are more than {MAX_SEEDS} seeds").into()));
             }
             seeds.push(PlanSeed {
-                needle: needle.clone(),
+                needle,
+                hole: hole.clone(),
                 position_m: (ras_from_lps(place) * 1e-3).into(),
-                axis: axis(point).map_err(told)?,
+                axis: axis(point).map_err(at)?,
                 strength_u: source.strength_u,
             });
         }
@@ -200,16 +215,16 @@ fn of_channel(channel: &InMemDicomObject, sources: &[Source], seeds: &mut Vec<Pl
     Ok(())
 }
 
-fn axis(point: &InMemDicomObject) -> Result<Option<[f64; 3]>, String> {
+fn axis(point: &InMemDicomObject) -> Result<Option<[f64; 3]>, ContentError> {
     let Some(axis) = exactly::<3>(point, tags::CONTROL_POINT_ORIENTATION)? else {
         return Ok(None);
     };
     let axis = ras_from_lps(Vector3::from(axis)).try_normalize(1e-6);
     axis.map(|a| Some(a.into()))
-        .ok_or_else(|| format!("{} has no length", name(tags::CONTROL_POINT_ORIENTATION)))
+        .ok_or_else(|| format!("{} has no length", name(tags::CONTROL_POINT_ORIENTATION)).into())
 }
 
-fn prescription_gy(data: &InMemDicomObject) -> Result<Option<f64>, String> {
+fn prescription_gy(data: &InMemDicomObject) -> Result<Option<f64>, ContentError> {
     for reference in items(data, tags::DOSE_REFERENCE_SEQUENCE) {
         if text(reference, tags::DOSE_REFERENCE_TYPE).as_deref() == Some("TARGET") {
             let dose = number(reference, tags::TARGET_PRESCRIPTION_DOSE)?;

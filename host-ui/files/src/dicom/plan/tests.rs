@@ -3,13 +3,15 @@
 use super::super::checked;
 use super::super::new_uid;
 use super::*;
+use crate::ContentError;
 
 pub fn plan(count: usize) -> SeedPlan {
     let seed = |i: usize| {
         let t = i as f64;
         let axis = [t.sin() * t.cos(), t.sin() * t.sin(), t.cos()];
         PlanSeed {
-            needle: format!("{}{}", (b'A' + (i % 13) as u8) as char, i % 7 + 1),
+            needle: Some((i / 4) as u32 + 3),
+            hole: format!("{}{}", (b'A' + (i % 13) as u8) as char, i % 7 + 1),
             position_m: [t * 1.234567e-3 - 0.03, 0.0123456789 - t * 1e-4, -0.1 + t / 3e3],
             axis: (i % 5 != 4).then_some(axis),
             strength_u: [0.5, 0.4321, 0.62][i % 3],
@@ -32,7 +34,7 @@ pub fn plan(count: usize) -> SeedPlan {
     }
 }
 
-fn again(plan: &SeedPlan) -> Result<SeedPlan, String> {
+fn again(plan: &SeedPlan) -> Result<SeedPlan, ContentError> {
     checked::read(&bytes(plan).unwrap()).and_then(|o| of(&o))
 }
 
@@ -49,6 +51,26 @@ fn a_plan_that_is_written_is_the_same_plan_when_it_is_read() {
         (seed.position_m, seed.axis) = (was.position_m, was.axis);
     }
     assert_eq!(again, plan);
+}
+
+/// Needles without a hole were all one applicator, and a table's number of a needle was lost.
+#[test]
+fn needles_keep_their_number_and_those_without_one_get_one_for_each_hole() {
+    let mut plan = plan(6);
+    for (seed, (needle, hole)) in plan.seeds.iter_mut().zip([
+        (Some(7), ""),
+        (None, "C3"),
+        (Some(2), ""),
+        (None, "D4"),
+        (None, "C3"),
+        (Some(2), ""),
+    ]) {
+        (seed.needle, seed.hole) = (needle, hole.to_owned());
+    }
+    let found = again(&plan).unwrap().seeds.into_iter().map(|s| (s.needle, s.hole));
+    let numbers = [7, 8, 2, 9, 8, 2].map(Some);
+    let holes = ["", "C3", "", "D4", "C3", ""].map(str::to_owned);
+    assert!(found.eq(numbers.into_iter().zip(holes)));
 }
 
 #[test]
@@ -79,18 +101,31 @@ fn plans_that_mix_isotopes_or_refer_to_nothing_are_refused() {
     };
     let read = |data: &dicom_object::InMemDicomObject| {
         let bytes = super::super::write::bytes(data.clone()).unwrap();
-        checked::read(&bytes).and_then(|o| of(&o)).map(|p| p.label)
+        checked::read(&bytes)
+            .and_then(|o| of(&o))
+            .map(|p| p.label)
+            .map_err(|e| e.to_string())
     };
     let original = data.clone();
     set(&mut data, "300A0210[1].300A0226", "Pd-103");
-    assert!(read(&data).unwrap_err().contains("mixes seeds of I-125 and Pd-103"));
+    assert!(
+        read(&data)
+            .unwrap_err()
+            .to_string()
+            .contains("mixes seeds of I-125 and Pd-103")
+    );
     data = original.clone();
     set(&mut data, "300A0230[0].300A0280[2].300C000E", "77");
-    assert!(read(&data).unwrap_err().contains("channel 3: it refers to source 77"));
+    assert!(
+        read(&data)
+            .unwrap_err()
+            .to_string()
+            .contains("channel 3: it refers to source 77")
+    );
     data = original.clone();
     set(&mut data, "300A0230[0].300A0280[0].300A02D0[0].300A02D4", "1\\2");
     set(&mut data, "300A0230[0].300A0280[1].300A02D0[0].300A02D4", "1\\2\\x");
-    let both = read(&data).unwrap_err();
+    let both = read(&data).unwrap_err().to_string();
     assert!(
         both.contains("2 problems") && both.contains("channel 1") && both.contains("channel 2"),
         "{both}"
@@ -98,5 +133,5 @@ fn plans_that_mix_isotopes_or_refer_to_nothing_are_refused() {
     data = original;
     set(&mut data, "300A0200", "INTERSTITIAL");
     set(&mut data, "300A0202", "HDR");
-    assert!(read(&data).unwrap_err().contains("taken out again"));
+    assert!(read(&data).unwrap_err().to_string().contains("taken out again"));
 }

@@ -1,21 +1,25 @@
 //! A plan as DICOM: one source for each strength, one channel with a fixed source for each seed.
 
-use super::super::super::frame::ras_from_lps;
 use super::super::write::{common, decimals, item, now, sequence, string, whole};
 use super::{PlanSeed, SeedPlan};
+use crate::error::ContentError;
 use dicom_core::VR;
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::InMemDicomObject;
 use nalgebra::Vector3;
+use std::collections::BTreeMap;
+use stylet_anatomy::ras_from_lps;
 
 const SECONDS_PER_DAY: f64 = 86_400.0;
 const DOSE_REFERENCE: usize = 1;
 const SETUP: usize = 1;
 
 /// The whole file.
-pub fn bytes(plan: &SeedPlan) -> Result<Vec<u8>, String> {
+pub fn bytes(plan: &SeedPlan) -> Result<Vec<u8>, ContentError> {
     if plan.seeds.is_empty() {
-        return Err("a plan without seeds cannot be written".to_owned());
+        return Err(ContentError::Invalid(
+            "a plan without seeds cannot be written".to_owned(),
+        ));
     }
     let mut strengths: Vec<f64> = plan.seeds.iter().map(|s| s.strength_u).collect();
     strengths.sort_by(f64::total_cmp);
@@ -95,25 +99,21 @@ fn source(plan: &SeedPlan, number: usize, strength_u: f64, date: &str, time: &st
 }
 
 fn setup(plan: &SeedPlan, strengths: &[f64]) -> InMemDicomObject {
-    let mut needles: Vec<&str> = Vec::new();
+    let numbers = needle_numbers(plan);
     let mut channels = Vec::new();
     let mean_life_s = plan.source.half_life_days * SECONDS_PER_DAY / std::f64::consts::LN_2;
-    for (seed, number) in plan.seeds.iter().zip(1..) {
-        let needle = needles.iter().position(|n| *n == seed.needle).unwrap_or_else(|| {
-            needles.push(&seed.needle);
-            needles.len() - 1
-        });
+    for ((seed, needle), number) in plan.seeds.iter().zip(numbers).zip(1..) {
         let source = strengths.partition_point(|&u| u < seed.strength_u) + 1;
         channels.push(item([
             whole(tags::CHANNEL_NUMBER, number),
             string(tags::CHANNEL_LENGTH, VR::DS, ""),
             decimals(tags::CHANNEL_TOTAL_TIME, &[mean_life_s]),
             string(tags::SOURCE_MOVEMENT_TYPE, VR::CS, "FIXED"),
-            whole(tags::SOURCE_APPLICATOR_NUMBER, needle + 1),
+            whole(tags::SOURCE_APPLICATOR_NUMBER, needle as usize),
             string(
                 tags::SOURCE_APPLICATOR_ID,
                 VR::SH,
-                &seed.needle.chars().take(16).collect::<String>(),
+                &seed.hole.chars().take(16).collect::<String>(),
             ),
             string(tags::SOURCE_APPLICATOR_TYPE, VR::CS, "RIGID"),
             string(tags::SOURCE_APPLICATOR_LENGTH, VR::DS, ""),
@@ -134,6 +134,23 @@ fn setup(plan: &SeedPlan, strengths: &[f64]) -> InMemDicomObject {
         decimals(tags::TOTAL_REFERENCE_AIR_KERMA, &[total_kerma]),
         sequence(tags::CHANNEL_SEQUENCE, channels),
     ])
+}
+
+/// The number of each seed's needle: its own, or the next free one for each hole of needles without a number.
+fn needle_numbers(plan: &SeedPlan) -> Vec<u32> {
+    let mut last = plan.seeds.iter().filter_map(|s| s.needle).max().unwrap_or(0);
+    let mut by_hole = BTreeMap::new();
+    let mut numbers = Vec::with_capacity(plan.seeds.len());
+    for seed in &plan.seeds {
+        let of_hole = || {
+            *by_hole.entry(seed.hole.as_str()).or_insert_with(|| {
+                last += 1;
+                last
+            })
+        };
+        numbers.push(seed.needle.unwrap_or_else(of_hole));
+    }
+    numbers
 }
 
 /// A fixed source has two, at the same place (PS3.3 C.8.8.15.7, example b).

@@ -3,6 +3,7 @@
 use super::super::super::element::short;
 use super::super::images::Grid;
 use super::{Contoured, SAME_PLANE_M};
+use crate::error::ContentError;
 use std::ops::Range;
 
 /// Lines across each row of voxels along which coverage is measured.
@@ -32,19 +33,19 @@ struct Work {
 }
 
 impl Work {
-    fn check(&self) -> Result<(), String> {
+    fn check(&self) -> Result<(), ContentError> {
         if self.crossings <= MAX_CROSSINGS && self.voxels <= MAX_VOXELS_TOUCHED && self.runs <= MAX_RUNS {
             return Ok(());
         }
         Err(
             "its contours are too large or too many to be drawn; export fewer structures, or ones with fewer corners"
-                .to_owned(),
+                .into(),
         )
     }
 }
 
 /// The labels 1, 2, ... of the structures in their order, and what they took from each other in words.
-pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<String>), String> {
+pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<String>), ContentError> {
     let mut work = Work::default();
     let mut all = Vec::new();
     for structure in structures {
@@ -94,7 +95,7 @@ pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<Str
 /// Corners of polygons in columns and rows.
 type Polygons = Vec<Vec<[f64; 2]>>;
 
-fn runs(structure: &Contoured, grid: &Grid, work: &mut Work) -> Result<Vec<Run>, String> {
+fn runs(structure: &Contoured, grid: &Grid, work: &mut Work) -> Result<Vec<Run>, ContentError> {
     let planes = planes(structure, grid)?;
     let heights: Vec<f64> = planes.iter().map(|(h, _)| *h).collect();
     let mut runs = Vec::new();
@@ -124,7 +125,7 @@ fn runs(structure: &Contoured, grid: &Grid, work: &mut Work) -> Result<Vec<Run>,
 }
 
 /// The contours by the height of their plane, in slices.
-fn planes(structure: &Contoured, grid: &Grid) -> Result<Vec<(f64, Polygons)>, String> {
+fn planes(structure: &Contoured, grid: &Grid) -> Result<Vec<(f64, Polygons)>, ContentError> {
     let step_m = grid.frame.spacing_m[2];
     let mut placed = Vec::new();
     for contour in &structure.contours {
@@ -132,11 +133,11 @@ fn planes(structure: &Contoured, grid: &Grid) -> Result<Vec<(f64, Polygons)>, St
         let height = corners.iter().map(|c| c[2]).sum::<f64>() / corners.len() as f64;
         let off_m = corners.iter().map(|c| (c[2] - height).abs()).fold(0.0, f64::max) * step_m;
         if off_m > 10.0 * SAME_PLANE_M {
-            return Err(format!(
+            return Err(ContentError::Invalid(format!(
                 "{}: a contour is tilted {:.2} mm out of the slices of the images; export it in their planes",
                 short(&structure.name),
                 off_m * 1e3
-            ));
+            )));
         }
         placed.push((height, corners.into_iter().map(|[x, y, _]| [x, y]).collect::<Vec<_>>()));
     }
@@ -172,7 +173,7 @@ pub fn slabs(heights: &[f64], single: f64) -> Vec<[f64; 2]> {
 }
 
 /// Even and odd: what lies in two contours of a plane is a hole, and so is what a keyhole leads to.
-fn fill(polygons: &Polygons, [columns, rows]: [usize; 2], work: &mut Work) -> Result<Vec<Run>, String> {
+fn fill(polygons: &Polygons, [columns, rows]: [usize; 2], work: &mut Work) -> Result<Vec<Run>, ContentError> {
     let mut crossed: Vec<(u32, f64)> = Vec::new();
     for polygon in polygons {
         let next = polygon.iter().cycle().skip(1);
@@ -195,7 +196,13 @@ fn fill(polygons: &Polygons, [columns, rows]: [usize; 2], work: &mut Work) -> Re
 }
 
 /// Where an edge crosses the lines. A voxel reaches half a step to each side of its index.
-fn cross(a: [f64; 2], b: [f64; 2], rows: usize, crossed: &mut Vec<(u32, f64)>, work: &mut Work) -> Result<(), String> {
+fn cross(
+    a: [f64; 2],
+    b: [f64; 2],
+    rows: usize,
+    crossed: &mut Vec<(u32, f64)>,
+    work: &mut Work,
+) -> Result<(), ContentError> {
     let (low, high) = if a[1] <= b[1] { (a, b) } else { (b, a) };
     let line_of = |y: f64| (y + 0.5) * LINES as f64 - 0.5;
     let most = (rows * LINES) as f64;

@@ -2,6 +2,7 @@
 
 use super::raster::slabs;
 use super::{Contoured, SAME_PLANE_M, StructureSet, area_vector};
+use crate::error::ContentError;
 use nalgebra::{Matrix3, Vector3};
 
 /// RAS, m.
@@ -24,7 +25,7 @@ struct Plane {
 
 impl StructureSet {
     /// Every structure by itself.
-    pub fn solids(&self) -> Result<Vec<Solid>, String> {
+    pub fn solids(&self) -> Result<Vec<Solid>, ContentError> {
         let contours = self.structures.iter().flat_map(|s| &s.contours);
         let largest = contours
             .map(|c| area_vector(c))

@@ -220,7 +220,8 @@ fn contours_that_lie_in_no_slice_and_ones_beyond_all_measure_are_refused() {
         .for_each(|p| *p += normal * (*p - middle).dot(&along) * 0.5);
     let why = set(vec![("Prostate", vec![tilted])])
         .voxels(Some(grid.clone()))
-        .unwrap_err();
+        .unwrap_err()
+        .to_string();
     assert!(why.contains("tilted"), "{why}");
     // A saw from one end of the slice to the other, again and again.
     let saw: Vec<_> = (0..200_000)
@@ -229,6 +230,9 @@ fn contours_that_lie_in_no_slice_and_ones_beyond_all_measure_are_refused() {
                 .place_m([f64::from(i % 40), f64::from(i % 2) * 1e4 - 5e3, 2.0])
         })
         .collect();
-    let why = set(vec![("Prostate", vec![saw])]).voxels(Some(grid)).unwrap_err();
+    let why = set(vec![("Prostate", vec![saw])])
+        .voxels(Some(grid))
+        .unwrap_err()
+        .to_string();
     assert!(why.contains("too many to be drawn"), "{why}");
 }

@@ -1,16 +1,16 @@
 //! A label volume as RT Structure Set: one structure a label, outlined slice by slice along its voxels.
 
-use super::super::super::frame::ras_from_lps;
-use super::super::super::names;
 use super::super::super::volume::Voxels;
 use super::super::write::{Identity, common, decimals, item, now, sequence, string, whole};
 use super::outline;
+use crate::error::ContentError;
 use dicom_core::DataElement;
 use dicom_core::VR;
 use dicom_core::value::PrimitiveValue;
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::InMemDicomObject;
 use nalgebra::Vector3;
+use stylet_anatomy::{Organ, ras_from_lps};
 
 /// Told apart on a dark ground.
 const COLOURS: [[u8; 3]; 8] = [
@@ -25,12 +25,14 @@ const COLOURS: [[u8; 3]; 8] = [
 ];
 
 /// The whole file.
-pub fn bytes(v: &Voxels, of: &Identity) -> Result<Vec<u8>, String> {
+pub fn bytes(v: &Voxels, of: &Identity) -> Result<Vec<u8>, ContentError> {
     let mut present = [false; 256];
     v.labels.iter().for_each(|&l| present[usize::from(l)] = true);
     let labels: Vec<u8> = (1..=255).filter(|&l| present[usize::from(l)]).collect();
     if labels.is_empty() {
-        return Err("every voxel is 0, so there is no structure to write".to_owned());
+        return Err(ContentError::Invalid(
+            "every voxel is 0, so there is no structure to write".to_owned(),
+        ));
     }
     let name = |label: u8| v.names.get(&label).cloned().unwrap_or_else(|| format!("label {label}"));
     let numbered = || labels.iter().zip(1_usize..);
@@ -70,7 +72,11 @@ pub fn bytes(v: &Voxels, of: &Identity) -> Result<Vec<u8>, String> {
         item([
             whole(tags::OBSERVATION_NUMBER, number),
             whole(tags::REFERENCED_ROI_NUMBER, number),
-            string(tags::RTROI_INTERPRETED_TYPE, VR::CS, names::dicom_kind(&name(label))),
+            string(
+                tags::RTROI_INTERPRETED_TYPE,
+                VR::CS,
+                Organ::of_name(&name(label)).map_or("", Organ::dicom_type),
+            ),
             string(tags::ROI_INTERPRETER, VR::PN, ""),
         ])
     };

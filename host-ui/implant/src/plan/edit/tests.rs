@@ -4,6 +4,7 @@ use super::*;
 use crate::plan::anatomy::ball;
 use crate::plan::check::problems;
 use crate::plan::{Anatomy, Template};
+use stylet_anatomy::PatientFrame;
 
 const GLAND_M: [f64; 3] = [0.05, 0.05, 0.06];
 
@@ -13,7 +14,7 @@ fn anatomy() -> Anatomy {
         spared: vec![ball("urethra", GLAND_M, [0.003, 0.003, 0.025])],
         lower_m: [0.0; 3],
         upper_m: [0.1; 3],
-        patient_from_scene: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+        patient: PatientFrame::default(),
     }
 }
 

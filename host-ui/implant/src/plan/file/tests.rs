@@ -1,11 +1,11 @@
 //! A plan written and read is the same plan; a broken one is refused with everything that is wrong.
 
 use super::*;
-use stylet_dose::files::{SeedDefaults, read_seeds};
+use crate::readers::{SeedDefaults, read_seeds};
 
 /// A quarter turn about x, and a shift: patient y is the scene's -z.
-fn frames() -> Frames {
-    Frames::new(&[1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 0.01, -0.02, 0.03])
+fn frames() -> PatientFrame {
+    PatientFrame::of_wire(&[1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 0.01, -0.02, 0.03])
 }
 
 fn plan() -> ImplantPlan {
@@ -93,7 +93,7 @@ fn seeds_written_for_the_dose_command_are_the_same_seeds_when_they_are_read_and_
     std::fs::write(&file, seeds_to_csv(&plan(), &frames())).unwrap();
     let read = read_seeds(&file, SeedDefaults::default()).unwrap();
     for (a, b) in plan().seeds().iter().zip(&read) {
-        let there = frames().to_patient_m(a.position_m);
+        let there = frames().patient_from_scene(a.position_m);
         assert!(
             (0..3).all(|i| (there[i] - b.position_m[i]).abs() < 1e-9),
             "{there:?} {b:?}"

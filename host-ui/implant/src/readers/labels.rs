@@ -1,8 +1,9 @@
 //! Structures out of a label volume; a voxel belongs to its structure from wall to wall.
 
-use super::structure::{Scatter, Structure};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
+use stylet_dose::Structure;
+use stylet_dose::structure::Scatter;
 use stylet_files::Voxels;
 
 /// Finer than this only for structures too small to have [`FEWEST_POINTS`] otherwise.

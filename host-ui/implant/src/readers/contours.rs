@@ -1,35 +1,39 @@
 //! Structures out of a DICOM RT Structure Set as they are drawn: one that lies in another takes nothing from it.
 
-use super::structure::{Region, Structure};
 use std::path::Path;
-use stylet_files::dicom;
+use stylet_dose::{Region, Structure};
 use stylet_files::dicom::structures::{Solid, StructureSet};
+use stylet_files::{FileError, Progress, bytes, dicom};
 
 const PITCH_M: f64 = 0.5e-3;
 const FEWEST_POINTS: f64 = 20_000.0;
 
-impl Region for Solid {
+struct Drawing<'a>(&'a Solid);
+
+impl Region for Drawing<'_> {
     fn bounds_m(&self) -> ([f64; 3], [f64; 3]) {
-        (self.lower_m, self.upper_m)
+        (self.0.lower_m, self.0.upper_m)
     }
 
     fn contains(&self, point_m: [f64; 3]) -> bool {
-        Solid::contains(self, point_m)
+        self.0.contains(point_m)
     }
 }
 
 /// Structures, and what was left out of the file.
 type Drawn = (Vec<Structure>, Vec<String>);
 
-/// `None` for a file that is no DICOM.
-pub fn structures(path: &Path, most_points: usize) -> Result<Option<Drawn>, String> {
-    let told = |why: String| format!("{}: {why}", path.display());
-    let bytes = stylet_files::open::whole(path, &stylet_files::Progress::default()).map_err(told)?;
+/// The structures of an RT Structure Set, each of at most `most_points` points; `None` for a file that is no DICOM.
+pub fn structures(path: &Path, most_points: usize) -> Result<Option<Drawn>, FileError> {
+    let refused = |why| FileError::of(path, why);
+    let bytes = bytes::whole(path, &Progress::default()).map_err(refused)?;
     if !dicom::is_dicom(&bytes) {
         return Ok(None);
     }
-    let set = dicom::read(&bytes).and_then(|o| StructureSet::of(&o)).map_err(told)?;
-    let solids = set.solids().map_err(told)?;
+    let set = dicom::read(&bytes)
+        .and_then(|o| StructureSet::of(&o))
+        .map_err(refused)?;
+    let solids = set.solids().map_err(refused)?;
     let structures = solids.iter().map(|s| of_solid(s, most_points)).collect::<Vec<_>>();
     Ok(Some((
         structures.into_iter().filter(|s| !s.points_m.is_empty()).collect(),
@@ -42,5 +46,5 @@ fn of_solid(solid: &Solid, most_points: usize) -> Structure {
     let box_m3: f64 = (0..3).map(|a| (solid.upper_m[a] - solid.lower_m[a]).max(0.0)).product();
     let finest = (box_m3 / most_points as f64).cbrt();
     let pitch_m = PITCH_M.min((box_m3 / 2.0 / FEWEST_POINTS).cbrt()).max(finest).max(1e-5);
-    Structure::of_region(&solid.name, solid, pitch_m)
+    Structure::of_region(&solid.name, &Drawing(solid), pitch_m)
 }

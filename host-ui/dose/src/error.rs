@@ -1,0 +1,47 @@
+//! What dose cannot be computed from.
+
+use std::path::PathBuf;
+use stylet_base::format::printable;
+
+/// Why dose cannot be computed; the texts say what was found and what to do.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DoseError {
+    /// A triangle mesh that encloses no volume.
+    #[error("{0}")]
+    Mesh(&'static str),
+    /// A grid with voxels of no size, or with too many of them.
+    #[error("{0}")]
+    Grid(String),
+    /// The name of a metric that does not exist.
+    #[error("{0}")]
+    Metric(String),
+    /// Structures without the target.
+    #[error("{0}")]
+    Target(String),
+    /// Everything that is wrong in the text of a source.
+    #[error("{0}")]
+    Source(String),
+    /// A source file that cannot be read or is wrong.
+    #[error("{}: {}", .path.display(), printable(.why))]
+    SourceFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong in it.
+        why: String,
+    },
+    /// A picture that cannot be written.
+    #[error("{} cannot be written ({why})", .path.display())]
+    Picture {
+        /// The file.
+        path: PathBuf,
+        /// What the writer reported.
+        why: String,
+    },
+}
+
+/// For functions whose error is a text.
+impl From<DoseError> for String {
+    fn from(why: DoseError) -> Self {
+        why.to_string()
+    }
+}

@@ -1,0 +1,151 @@
+//! Seeds out of a table (CSV) or a DICOM RT Plan, which of both is found out from the content.
+
+use super::table::{self, LineError, PLACE, Row, shown};
+use std::path::Path;
+use stylet_dose::Seed;
+use stylet_files::dicom::{self, plan::PlanSeed};
+use stylet_files::{FileError, bytes};
+
+const MAX_U: f64 = 1e5;
+const AXIS: [&str; 3] = ["axis_x", "axis_y", "axis_z"];
+/// As many bytes as tell a DICOM file from a table.
+const START_BYTES: u64 = 160;
+
+/// What is assumed of seeds whose file does not say it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SeedDefaults {
+    /// Air kerma strength, in U.
+    pub strength_u: Option<f64>,
+    /// For a column `activity_mci`.
+    pub strength_per_activity_u_per_mci: Option<f64>,
+}
+
+/// A seed, and the needle that it belongs to where the file says so.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SeedRow {
+    /// The seed; patient frame (RAS) for an RT Plan.
+    pub seed: Seed,
+    /// Number of the needle, from 1.
+    pub needle: Option<u32>,
+    /// The needle's hole in the template, as the file has it.
+    pub hole: Option<String>,
+}
+
+/// Where seeds come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SeedFile {
+    /// A table.
+    Table(Vec<SeedRow>),
+    /// A DICOM RT Plan.
+    Plan(Vec<SeedRow>),
+}
+
+impl SeedFile {
+    /// The seeds with their needles.
+    pub fn into_rows(self) -> Vec<SeedRow> {
+        match self {
+            Self::Table(rows) | Self::Plan(rows) => rows,
+        }
+    }
+}
+
+/// As [`read_seed_rows`], the seeds alone.
+pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<Vec<Seed>, FileError> {
+    let rows = read_seed_rows(path, defaults)?.into_rows();
+    Ok(rows.into_iter().map(|row| row.seed).collect())
+}
+
+/// Seeds of a file with the columns `x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u|activity_mci][,needle][,hole]`,
+/// or those of a DICOM RT Plan, which gives their strength itself.
+pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, FileError> {
+    let is_plan = bytes::start(path, START_BYTES).is_some_and(|start| dicom::is_dicom(&start));
+    if is_plan {
+        let seeds = dicom::plan::open(path)?.seeds;
+        return Ok(SeedFile::Plan(seeds.into_iter().map(row_of_plan).collect()));
+    }
+    let known = [
+        PLACE.as_slice(),
+        &AXIS,
+        &["strength_u", "activity_mci", "needle", "hole"],
+    ]
+    .concat();
+    let row = |row: &Row| {
+        Ok(SeedRow {
+            seed: Seed {
+                position_m: row.position_m()?,
+                axis: axis(row)?,
+                strength_u: strength_u(row, defaults)?,
+            },
+            needle: needle(row)?,
+            hole: row.text("hole").map(str::to_owned),
+        })
+    };
+    table::read(path, &known, row).map(SeedFile::Table)
+}
+
+fn row_of_plan(seed: PlanSeed) -> SeedRow {
+    SeedRow {
+        seed: Seed {
+            position_m: seed.position_m,
+            axis: seed.axis,
+            strength_u: seed.strength_u,
+        },
+        needle: seed.needle,
+        hole: Some(seed.hole).filter(|hole| !hole.is_empty()),
+    }
+}
+
+fn axis(row: &Row) -> Result<Option<[f64; 3]>, LineError> {
+    match row.three(AXIS)? {
+        [None, None, None] => Ok(None),
+        [Some(x), Some(y), Some(z)] => {
+            let length = (x * x + y * y + z * z).sqrt();
+            if !(1e-6..1e6).contains(&length) {
+                return Err(LineError::new(format!(
+                    "the axis has the length {length}; give a direction, or leave it empty"
+                )));
+            }
+            Ok(Some([x, y, z].map(|v| v / length)))
+        }
+        _ => Err(LineError::new(
+            "the axis is not complete; give axis_x, axis_y and axis_z, or none of them",
+        )),
+    }
+}
+
+fn needle(row: &Row) -> Result<Option<u32>, LineError> {
+    let number = row.text("needle").map(|text| match text.parse() {
+        Ok(number @ 1..) => Ok(number),
+        _ => Err(LineError::new(format!(
+            "needle is \"{}\", not a whole number from 1",
+            shown(text)
+        ))),
+    });
+    number.transpose()
+}
+
+fn strength_u(row: &Row, defaults: SeedDefaults) -> Result<f64, LineError> {
+    let strength = match (row.number("strength_u")?, row.number("activity_mci")?) {
+        (Some(_), Some(_)) => return Err(LineError::new("both strength_u and activity_mci are given")),
+        (Some(u), None) => Some(u),
+        (None, Some(mci)) => {
+            let per_mci = defaults.strength_per_activity_u_per_mci.ok_or_else(|| {
+                LineError::new(
+                    "activity_mci needs strength_per_activity_u_per_mci in the source file; or give strength_u",
+                )
+            })?;
+            Some(mci * per_mci)
+        }
+        (None, None) => defaults.strength_u,
+    };
+    match strength {
+        Some(u) if (0.0..=MAX_U).contains(&u) => Ok(u),
+        Some(u) => Err(LineError::new(format!("a strength of {u} U; allowed are 0 to {MAX_U}"))),
+        None => Err(LineError::new(
+            "no strength: add a column strength_u or activity_mci, or give --strength-u",
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,60 @@
+//! Needles of a plan stay with its seeds.
+
+use super::*;
+use stylet_files::dicom::plan::{PlanSource, SeedPlan};
+use stylet_files::dicom::{Identity, new_uid};
+
+fn plan() -> Vec<u8> {
+    let seed = |(needle, hole, z_m): (Option<u32>, &str, f64)| PlanSeed {
+        needle,
+        hole: hole.to_owned(),
+        position_m: [0.0, 0.0, z_m],
+        axis: None,
+        strength_u: 0.5,
+    };
+    let seeds = [(Some(3), "D4", 0.01), (Some(3), "D4", 0.02), (Some(1), "", 0.03)];
+    let plan = SeedPlan {
+        label: "test".to_owned(),
+        identity: Identity::new(),
+        uid: new_uid(),
+        prescription_gy: Some(145.0),
+        source: PlanSource {
+            model: "6711".to_owned(),
+            manufacturer: String::new(),
+            isotope: "I-125".to_owned(),
+            half_life_days: 59.4,
+            active_length_m: 3e-3,
+        },
+        seeds: seeds.into_iter().map(seed).collect(),
+        notes: Vec::new(),
+    };
+    dicom::plan::bytes(&plan).unwrap()
+}
+
+/// The reader of plans found needle and hole, and the seeds lost them.
+#[test]
+fn seeds_of_a_plan_keep_needle_and_hole_whatever_the_file_is_called() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["plan.dcm", "plan", "PLAN.IMG"] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, plan()).unwrap();
+        let SeedFile::Plan(rows) = read_seed_rows(&path, SeedDefaults::default()).unwrap() else {
+            panic!("{name} is a plan");
+        };
+        let found: Vec<_> = rows.iter().map(|r| (r.needle, r.hole.as_deref())).collect();
+        assert_eq!(found, [(Some(3), Some("D4")), (Some(3), Some("D4")), (Some(1), None)]);
+    }
+}
+
+/// A pipe was waited for, and a device read until the memory ended.
+#[test]
+fn a_pipe_and_a_device_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("seeds.csv");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+    assert!(made.success());
+    for path in [pipe.as_path(), Path::new("/dev/zero")] {
+        let why = read_seeds(path, SeedDefaults::default()).unwrap_err().to_string();
+        assert!(why.contains("it is not a file"), "{why}");
+    }
+}
