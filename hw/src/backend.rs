@@ -105,6 +105,16 @@ pub fn forms() -> String {
     format!("{} or {last}", forms.join(", "))
 }
 
+/// The forms of every back end with their help, one per line.
+pub fn help() -> String {
+    let line = |b: &Backend| match b.argument {
+        Argument::None => format!("{}: {}", b.name, b.help),
+        Argument::Optional(shown) => format!("{0} or {0}:{shown}: {1}", b.name, b.help),
+        Argument::Required(shown) => format!("{}:{shown}: {}", b.name, b.help),
+    };
+    BACKENDS.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -131,6 +141,13 @@ mod tests {
     fn the_device_of_older_scene_files_is_the_simulated_one() {
         assert_eq!(parse("sim"), Ok((BackendKind::Simulated, None)));
         assert_eq!(parse("simulated"), Ok((BackendKind::Simulated, None)));
+    }
+
+    #[test]
+    fn the_help_has_a_line_for_every_back_end() {
+        let help = help();
+        assert_eq!(help.lines().count(), BACKENDS.len());
+        assert!(help.contains("phantom or phantom:NAME: a Phantom"), "{help}");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use fake_hd::control::{get, put};
 use nalgebra::Vector3;
 use rt_core::rt::heap;
 use std::sync::atomic::Ordering::Relaxed;
-use std::sync::atomic::{AtomicU32, AtomicU64};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use stylet_hw::libhd::{Api, Arm, ArmError, ConnectionError, OpenError, diagnose};
@@ -463,6 +463,33 @@ fn a_panic_in_the_callback_stays_in_it_and_leaves_zero_force() {
     assert!(opened.is_err());
     assert_eq!(fake.control.force(), [0.0; 3]);
     drop(fake.open());
+}
+
+/// The servo thread of a reconnected device used to exert the newest force until the connector saw that arming had failed.
+#[test]
+fn a_servo_thread_that_could_not_be_armed_exerts_no_force() {
+    let fake = Fake::new();
+    let first = AtomicBool::new(true);
+    let arm = move || match first.swap(false, Relaxed) {
+        true => Ok("armed".to_owned()),
+        false => Err(ArmError::new("no rights")),
+    };
+    let mut device = Phantom::open(config(), Box::new(arm), Box::new(|_| ())).expect("a device");
+    assert!(drive(&mut device, &push(), LONG, |s| s.is_ok() && feels(&fake, 1.0)()));
+    fake.control.unplugged.store(1, Relaxed);
+    assert!(drive(&mut device, &push(), LONG, Result::is_err));
+    assert!(drive(&mut device, &push(), LONG, |_| fake.control.force() == [0.0; 3]));
+    let begin = fake.control.ticks.load(Relaxed);
+    fake.control.unplugged.store(0, Relaxed);
+    assert!(drive(&mut device, &push(), LONG, |s| {
+        assert!(s.is_err());
+        fake.control.inits.load(Relaxed) > 3
+    }));
+    let end = fake.control.ticks.load(Relaxed);
+    assert!(end > begin, "the servo thread ran");
+    for tick in begin..end {
+        assert_eq!(fake.control.force_at(tick), [0.0; 3], "tick {tick} of {begin}..{end}");
+    }
 }
 
 /// Heap calls of the servo thread at the last end of a frame, and the most between two of them.

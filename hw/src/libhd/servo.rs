@@ -158,6 +158,10 @@ impl Inner {
         };
         // Before the thread is armed it may lock and allocate.
         let granted = (self.arm)();
+        if granted.is_err() {
+            // A thread without its rights exerts no force, until the connector stops it.
+            self.lose(&servo.shared, DeviceFault::Driver);
+        }
         *servo.armed.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(granted);
     }
 
