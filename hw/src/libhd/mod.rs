@@ -9,16 +9,16 @@
 //! 1 ms instead of none the stiffness that stays passive, `K = b / (T/2 + t_d)`, falls to a third; a servo rate of 2 kHz
 //! halves that delay, and the bound is then half. The gain: the watchdog and the ramps continue when the driver stops
 //! calling (the loop that must react to a pulled cable also detects it); every device has the same loop, time grid and
-//! record; only [`servo`] runs in a thread that is not ours.
+//! record; only `servo` runs in a thread that is not ours.
 //!
 //! The grids are not locked to each other: occasionally a sample is seen twice or one is skipped. A repeated sample
 //! keeps its `sequence`, which is what the force loop counts as silence.
 //!
 //! # Threads
 //!
-//! *Servo*, the driver's, armed by us in its first callback ([`servo`]); *force loop*, in [`Device::read`] and
+//! *Servo*, the driver's, armed by us in its first callback (`servo`); *force loop*, in [`Device::read`] and
 //! [`Device::write`](crate::Device::write); *connector*, normal priority, the only one that makes calls that may
-//! block ([`connector`]): it connects, calibrates, and after a loss releases and reconnects the device, without ever
+//! block (`connector`): it connects, calibrates, and after a loss releases and reconnects the device, without ever
 //! closing the library.
 //!
 //! [`Device::read`]: crate::Device::read

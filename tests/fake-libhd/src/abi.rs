@@ -228,7 +228,7 @@ unsafe extern "C" fn hdGetBooleanv(parameter: u32, values: *mut u8) {
     let mut d = driver();
     if !failed && count_of(&mut d, parameter, &[Kind::Bools], values.is_null()).is_some() {
         let inkwell = parameter == 0x2002 && control().in_inkwell.load(Relaxed) != 0;
-        // SAFETY: the caller gives room for as many as the interface states.
+        // SAFETY: the caller provides room for as many as the interface states.
         unsafe { give(values, &[u8::from(inkwell)]) };
     }
 }
@@ -238,7 +238,7 @@ unsafe extern "C" fn hdGetIntegerv(parameter: u32, values: *mut c_int) {
     let failed = fails("hdGetIntegerv");
     let mut d = driver();
     if !failed && count_of(&mut d, parameter, &[Kind::Ints], values.is_null()).is_some() {
-        // SAFETY: the caller gives room for as many as the interface states.
+        // SAFETY: the caller provides room for as many as the interface states.
         unsafe { give(values, &d.ints(parameter).unwrap_or_default()) };
     }
 }
@@ -249,7 +249,7 @@ unsafe extern "C" fn hdGetFloatv(parameter: u32, values: *mut f32) {
     let mut d = driver();
     if !failed && count_of(&mut d, parameter, &[Kind::Reals, Kind::Floats], values.is_null()).is_some() {
         let reals = d.reals(parameter).unwrap_or_default();
-        // SAFETY: the caller gives room for as many as the interface states.
+        // SAFETY: the caller provides room for as many as the interface states.
         unsafe { give(values, &reals.iter().map(|x| *x as f32).collect::<Vec<_>>()) };
     }
 }
@@ -259,7 +259,7 @@ unsafe extern "C" fn hdGetDoublev(parameter: u32, values: *mut f64) {
     let failed = fails("hdGetDoublev");
     let mut d = driver();
     if !failed && count_of(&mut d, parameter, &[Kind::Reals], values.is_null()).is_some() {
-        // SAFETY: the caller gives room for as many as the interface states.
+        // SAFETY: the caller provides room for as many as the interface states.
         unsafe { give(values, &d.reals(parameter).unwrap_or_default()) };
     }
 }
@@ -270,7 +270,7 @@ unsafe extern "C" fn hdGetLongv(parameter: u32, values: *mut c_long) {
     let mut d = driver();
     if !failed && let Some(count) = count_of(&mut d, parameter, &[Kind::Longs], values.is_null()) {
         let counts: Vec<c_long> = (1..=count as c_long).map(|i| 1000 * i).collect();
-        // SAFETY: the caller gives room for as many as the interface states.
+        // SAFETY: the caller provides room for as many as the interface states.
         unsafe { give(values, &counts) };
     }
 }
@@ -393,7 +393,7 @@ unsafe extern "C" fn hdScaleGimbalAngles(x: f64, y: f64, z: f64, transform: *mut
     if !fails("hdScaleGimbalAngles") {
         let mut scaled = [0.0; 16];
         (scaled[0], scaled[5], scaled[10], scaled[15]) = (x, y, z, 1.0);
-        // SAFETY: the caller gives room for as many as the interface states.
+        // SAFETY: the caller provides room for as many as the interface states.
         unsafe { give(transform, &scaled) };
     }
 }
