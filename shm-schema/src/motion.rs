@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 const MAGIC: &[u8; 8] = b"STYMOT\0\x01";
 const HEADER: usize = 24;
 
-/// All that a device says of one period.
+/// Everything that a device reports for one period.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct MotionSample {

@@ -1,4 +1,4 @@
-//! The plan that `rt-core` keeps for hosts that come and go.
+//! The plan that `rt-core` keeps, whichever hosts are connected.
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;

@@ -9,7 +9,7 @@ pub const AT_TARGET_M: f64 = 0.3e-3;
 pub const STALLED_M: f64 = 2e-3;
 /// How long a hand that is held back must rest to count as arrived.
 pub const STALLED_AFTER: Duration = Duration::from_millis(1500);
-/// Above the noise of the speed estimate, or chance says when a tip that creeps to its target is there.
+/// Above the noise of the speed estimate; below it, chance would decide when a slow tip counts as arrived.
 pub const REST_SPEED_M_PER_S: f64 = 3e-3;
 /// How long a tip at its target must rest to count as arrived.
 pub const REST_FOR: Duration = Duration::from_millis(60);

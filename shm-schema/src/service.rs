@@ -115,7 +115,7 @@ impl Instance {
             else {
                 continue;
             };
-            // One that has just gone needs no memory.
+            // One that was removed meanwhile needs no memory.
             let Ok(file) = std::fs::File::options().write(true).open(entry.path()) else {
                 continue;
             };
@@ -155,7 +155,7 @@ impl Instance {
         if used || listed.is_err() {
             return;
         }
-        // Files that another program removes at the same time are gone as well.
+        // Another program may remove the same files at the same time.
         let _ = std::fs::remove_dir_all(self.root());
         let prefix = self.prefix();
         for entry in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {

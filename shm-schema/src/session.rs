@@ -4,7 +4,7 @@ use crate::Text;
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// Announced once a second and to every host that comes.
+/// Announced five times a second, and to every new host.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.Session")]

@@ -27,7 +27,7 @@ pub struct SeedPose {
     pub dropped_at_m: [f64; 3],
 }
 
-/// What comes with the vertices of one tissue tick.
+/// Header of the vertices of one tissue tick, written by the tissue thread.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.SnapshotHeader")]

@@ -183,7 +183,7 @@ impl Fault {
                 "the force loop missed 20 deadlines in a row; lower the load on its core, then re-arm"
             }
             Self::LoopStopped => {
-                "the force loop has stopped; rt-core ended, so that the device lets go: start it again"
+                "the force loop has stopped; rt-core ended, so that the device is released: start it again"
             }
             Self::DeviceLost => {
                 "the device is not connected; check power and cable, wait until it is found again, then re-arm"

@@ -90,6 +90,17 @@ pub struct Answer {
     pub effective_tick: u64,
 }
 
+impl From<Refusal> for Answer {
+    fn from(refusal: Refusal) -> Self {
+        Self {
+            accepted: false,
+            text: refusal.text,
+            reasons: refusal.reasons,
+            effective_tick: 0,
+        }
+    }
+}
+
 impl Answer {
     /// Whether it was refused for this reason.
     pub fn is_refused_for(&self, code: RefusalCode) -> bool {

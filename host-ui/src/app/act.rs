@@ -8,7 +8,9 @@ use crate::settings::ThemeChoice;
 use std::time::Instant;
 use stylet_controllers::Wish;
 use stylet_implant::workflow::{default_plan, move_request, plan_request};
-use stylet_shm_schema::{PARAMETERS, ParameterChange, PlannedNeedle, Request};
+use stylet_shm_schema::{
+    PARAMETERS, ParameterChange, ParameterProblems, ParameterSet, PlannedNeedle, Refusal, Request,
+};
 
 /// A hand on the tip may pull it this far ahead.
 const PULLED_M: f64 = 0.02;
@@ -205,11 +207,26 @@ impl App {
             let spec = PARAMETERS.get(index)?;
             Some(ParameterChange { id: spec.id, value })
         };
-        let changes = pairs.iter().filter_map(change).collect();
+        let changes: Vec<_> = pairs.iter().filter_map(change).collect();
+        let in_force = self.shown.parameters.map(|p| p.set);
+        if let Err(problems) = changed(in_force.unwrap_or_default(), &changes) {
+            return self.parameters.refused(pairs, &Refusal::from(problems).into());
+        }
         match self.link.send(&Request::SetParameters(changes)) {
             Ok(id) => self.parameters.sent(id, pairs),
             Err(e) => self.parameters.not_sent(e.to_string()),
         }
+    }
+}
+
+/// By the rules that the core goes by, but for the stiffness that its device can hold.
+fn changed(mut set: ParameterSet, changes: &[ParameterChange]) -> Result<ParameterSet, ParameterProblems> {
+    for change in changes {
+        set.set(change.id, change.value);
+    }
+    match set.problems() {
+        problems if problems.is_empty() => Ok(set),
+        problems => Err(ParameterProblems(problems)),
     }
 }
 
@@ -228,5 +245,23 @@ fn request_name(request: &Request) -> &'static str {
         Request::SaveFlight => "Flight recording",
         Request::Rehearse(_) => "Rehearsal",
         Request::StopHand => "Stop",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stylet_shm_schema::ParameterId;
+
+    #[test]
+    fn the_window_refuses_what_the_core_would_refuse_and_names_both_angles() {
+        let change = |id, value| [ParameterChange { id, value }];
+        let set = ParameterSet::default();
+        let larger = changed(set, &change(ParameterId::PunctureDepth, 9e-3)).expect("within its limits");
+        assert_eq!(larger.get(ParameterId::PunctureDepth), 9e-3);
+        let problems = changed(set, &change(ParameterId::ShearVertical, 0.7)).expect_err("eq. 1");
+        let reasons = Refusal::from(problems).reasons;
+        let named: Vec<_> = reasons.iter().filter_map(|reason| reason.parameter()).collect();
+        assert_eq!(named, [ParameterId::ShearHorizontal, ParameterId::ShearVertical]);
     }
 }

@@ -80,9 +80,18 @@ impl ParametersState {
 
     /// A refusal names the parameters that are involved; the reasons in full stand at the foot.
     pub fn answered(&mut self, answer: &Answer) {
-        let Some((_, pairs)) = self.in_flight.take() else {
-            return;
-        };
+        if let Some((_, pairs)) = self.in_flight.take() {
+            self.note(pairs, answer);
+        }
+    }
+
+    /// Not sent, since the core would refuse it.
+    pub fn refused(&mut self, pairs: Vec<(usize, f64)>, answer: &Answer) {
+        self.unsent = false;
+        self.note(pairs, answer);
+    }
+
+    fn note(&mut self, pairs: Vec<(usize, f64)>, answer: &Answer) {
         for (index, value) in pairs {
             let (Some(spec), Some(draft)) = (PARAMETERS.get(index), self.drafts.get_mut(index)) else {
                 continue;
