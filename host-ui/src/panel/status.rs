@@ -256,7 +256,7 @@ fn link_ui(ui: &mut egui::Ui, shown: &Shown) {
     let response = badge(ui, word, color);
     if let Some(session) = &shown.session {
         response.on_hover_text(format!(
-            "instance {}, session {:016x}, process {}, version {}\nforce loop {}, tissue {}\nmessages not believed: {}",
+            "instance {}, session {:016x}, process {}, version {}\nforce loop {}, tissue {}\ninvalid messages dropped: {}",
             shown.instance,
             session.session_id,
             session.pid,
