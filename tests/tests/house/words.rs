@@ -20,8 +20,7 @@ pub struct Word {
 
 impl Word {
     fn is_allowed(&self, text: &Text, parts: &[Part], at: usize) -> bool {
-        self.files.iter().any(|file| *file == text.path)
-            || self.allowed.iter().any(|phrase| covers(phrase, &self.parts, parts, at))
+        self.files.contains(&text.path) || self.allowed.iter().any(|phrase| covers(phrase, &self.parts, parts, at))
     }
 }
 
