@@ -110,9 +110,9 @@ const LAYERS: &[Layer] = &[
     },
     Layer {
         folder: "host-ui/host",
-        may_use: &["host-ui/base", "shm-schema", "shm-schema/anatomy"],
-        never: &[WINDOW, DEVICES, DICOM],
-        not_itself: &[],
+        may_use: &["host-ui/base", "host-ui/files", "shm-schema", "shm-schema/anatomy"],
+        never: &[WINDOW, DEVICES],
+        not_itself: &[DICOM],
     },
     Layer {
         folder: "host-ui/implant",
@@ -130,8 +130,8 @@ const LAYERS: &[Layer] = &[
     Layer {
         folder: "host-ui/controllers",
         may_use: &["host-ui/base"],
-        never: &[WINDOW, PORTS, PROGRAM, DICOM],
-        not_itself: &[],
+        never: &[WINDOW, PORTS, DICOM],
+        not_itself: &[PROGRAM],
     },
     Layer {
         folder: "host-ui",
