@@ -314,7 +314,7 @@ impl Bridge {
         let taken = match request {
             Request::Parameters(set, active) => {
                 let generation = self.parameters.generation + 1 + self.waiting_parameters.len() as u64;
-                self.waiting_parameters.insert(generation, set);
+                self.waiting_parameters.insert(generation, *set);
                 let order = HapticOrder::Parameters {
                     ticket,
                     generation,

@@ -14,7 +14,7 @@ const ACCELERATION_RANGE_M_PER_S2: [f64; 2] = [1e-2, 100.0];
 
 /// A request that makes sense.
 pub enum Request {
-    Parameters(ParameterSet, Box<Active>),
+    Parameters(Box<ParameterSet>, Box<Active>),
     Plan(Box<PlanInForce>),
     Haptic(fn(Ticket) -> HapticOrder),
     Hand(HandGoal),
@@ -82,7 +82,7 @@ fn parameters(values: &[f64], now: &ParameterSet, device: &DeviceInfo) -> Result
         set.values[index] = *value;
     }
     activate(&set, device)
-        .map(|active| Request::Parameters(set, Box::new(active)))
+        .map(|active| Request::Parameters(Box::new(set), Box::new(active)))
         .map_err(|p| p.join("\n"))
 }
 
@@ -266,9 +266,7 @@ mod tests {
     fn a_rehearsal_tells_every_bad_value_and_keeps_its_drops_in_order() {
         let mut values = [0.0; 17];
         (values[5], values[9], values[11], values[16]) = (1.0, 2.0, 0.1, 0.2);
-        for speed in 6..9 {
-            values[speed] = 0.05;
-        }
+        values[6..9].fill(0.05);
         let Ok(Request::Rehearse(run)) = try_read(CommandKind::Rehearse, &values) else {
             panic!("refused")
         };
