@@ -18,7 +18,7 @@
 //!
 //! *Servo*, the driver's, armed by us in its first callback ([`servo`]); *force loop*, in [`Device::read`] and
 //! [`Device::write`](crate::Device::write); *keeper*, normal priority, the only one that makes calls that may block
-//! ([`keeper`]): it connects, calibrates, and after a loss lets the device go and takes it up again, without ever closing
+//! (`keeper`): it connects, calibrates, and after a loss lets the device go and takes it up again, without ever closing
 //! the library.
 //!
 //! [`Device::read`]: crate::Device::read
