@@ -6,37 +6,38 @@ BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
 .PHONY: help run test build picture report fuzz soak force-pictures clean deps-run deps-soak deps-test
 
-help: ## This list
+help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
 
-run: deps-run build ## Build, start rt-core and open the window; without a display run the procedure headless
+run: deps-run build ## Build, start rt-core and open the window; without a display, run the procedure without a window
 	@setpriv --pdeathsig TERM docs/tools/run "$(BIN)"
 
 build: ## Build both programs
-	$(CARGO) build --release -p rt-core -p host-ui
+# The workspace chooses the features, as for the tests, or both build every dependency for themselves.
+	$(CARGO) build --release --workspace --bin rt-core --bin host-ui
 
 test: deps-test ## Install what the tests need, build everything, run all tests
-# The same set of packages both times, or features differ and everything is built twice. One test at a time: each system
-# test has a real-time core of its own.
+# Both commands take the same packages: otherwise features differ and everything is built twice. Tests run one at a time,
+# because each system test starts its own real-time core.
 	$(CARGO) build --release --workspace --all-targets
 	$(CARGO) test --release --workspace -- --test-threads=1
 
-picture: deps-test build ## Draw the pictures of the README and the tour anew
-	UPDATE_SNAPSHOTS=1 $(CARGO) test --release -p stylet-tests --test ui_live --test ui_plan --test ui_states --test ui_window -- --test-threads=1
+picture: deps-test build ## Redraw the pictures of the README and the tour
+	UPDATE_SNAPSHOTS=1 $(CARGO) test --release -p stylet-tests-window -- --test-threads=1
 
-report: ## Speed against error of every tissue model, into benches/runs/<date>-<host> (some minutes)
+report: ## Measure speed against error of every tissue model; writes benches/runs/<date>-<host> (some minutes)
 	$(CARGO) run --release -p stylet-benches --bin report
 
-fuzz: ## Feed each reader of files with what it does not expect for FUZZ_SECONDS (600) seconds
+fuzz: ## Fuzz each file reader for FUZZ_SECONDS (600) seconds
 	docs/tools/fuzz
 
-soak: deps-soak build ## Memory of the window over SOAK_SECONDS (3600) of procedures, on a screen of its own
+soak: deps-soak build ## Measure the memory of the window during SOAK_SECONDS (3600) of procedures, on a virtual screen
 	docs/tools/soak "$(BIN)" $(SOAK_SECONDS)
 
-force-pictures: ## Measure the stiffness that the loop holds, and draw the pictures of force anew
+force-pictures: ## Measure the stiffness that the force loop holds, and redraw the pictures of force
 	$(CARGO) bench -p stylet-benches --bench force
 
-clean: ## Remove what was built
+clean: ## Remove the build output
 	$(CARGO) clean
 
 deps-run:

@@ -2,12 +2,12 @@
 //!
 //! `cargo bench -p stylet-benches --bench dose`. Rounds are interleaved, so that a noisy machine disturbs all rows alike.
 
-use host_ui::dose::decay::Interval;
-use host_ui::dose::{DoseGrid, DoseKernel, Dvh, Metric, Region, Seed, Source, Structure};
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
+use stylet_dose::decay::Interval;
+use stylet_dose::{DoseGrid, DoseKernel, Dvh, Metric, Region, Seed, Source, Structure};
 
 const ROUNDS: usize = 30;
 /// Gland and margin.

@@ -4,10 +4,11 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use rt_core::needle::{NeedleParameters, Phase, transmission};
-use rt_core::scene::{Lattice, Scene};
-use rt_core::tissue::fem::{self, FemModel, FemSettings, FemState, Integration, Material, SolveSettings, TipPatch};
-use rt_core::tissue::{ChainMail, Deformed, Held, TissueParameters, TissueState, element_ahead};
+use stylet_sim::limits::TissueParameters;
+use stylet_sim::needle::{NeedleParameters, Phase, transmission};
+use stylet_sim::scene::{Lattice, Scene};
+use stylet_sim::tissue::fem::{self, FemModel, FemSettings, FemState, Integration, Material, SolveSettings, TipPatch};
+use stylet_sim::tissue::{ChainMail, Deformed, Held, TissueState, element_ahead};
 
 const PERIOD_S: f64 = 5e-3;
 const PATCH_M: f64 = 4e-3;
@@ -182,7 +183,7 @@ fn chainmail(scene: &Scene, ticks: &[Tick], rounds: usize) -> Vec<u64> {
                 patch_m: held.edge_m,
             };
             let start = Instant::now();
-            let report = rt_core::tissue::step(&model, &mut state, Some(held), PERIOD_S);
+            let report = stylet_sim::tissue::step(&model, &mut state, Some(held), PERIOD_S);
             nanoseconds.push(start.elapsed().as_nanos() as u64);
             assert!(report.converged);
         }

@@ -5,14 +5,14 @@
 
 use nalgebra::Vector3;
 use plotters::prelude::*;
-use rt_core::needle::Phase;
-use rt_core::rt::world::World;
-use rt_core::scene::Scene;
-use rt_core::tissue::TissueParameters;
 use std::path::{Path, PathBuf};
 use stylet_benches::desk::{Desk, axis_start, gland_shift_m};
 use stylet_benches::wall::Wall;
 use stylet_hw::Hand;
+use stylet_runtime::rt::world::World;
+use stylet_sim::limits::TissueParameters;
+use stylet_sim::needle::Phase;
+use stylet_sim::scene::Scene;
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 

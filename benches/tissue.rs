@@ -2,11 +2,12 @@
 //!
 //! `cargo bench -p stylet-benches`. Rounds are interleaved, so that a noisy machine disturbs all rows alike.
 
-use rt_core::scene::Scene;
-use rt_core::tissue::chainmail::queue::QueuePass;
-use rt_core::tissue::chainmail::single_pass;
-use rt_core::tissue::{ChainMail, Held, MaterialPoint, TissueParameters, TissueState, largest_violation, step};
 use std::time::Instant;
+use stylet_sim::limits::TissueParameters;
+use stylet_sim::scene::Scene;
+use stylet_sim::tissue::chainmail::queue::QueuePass;
+use stylet_sim::tissue::chainmail::single_pass;
+use stylet_sim::tissue::{ChainMail, Held, MaterialPoint, TissueState, largest_violation, step};
 
 /// The loop's tick, and a needle at 50 mm/s.
 const TICK_S: f64 = 5e-3;

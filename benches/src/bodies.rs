@@ -1,7 +1,7 @@
 //! Bodies that are measured: the gland at any spacing, and the cube of the solved reference problem.
 
-use rt_core::scene::{Labels, Scene, Structure};
-use rt_core::tissue::AxisLimits;
+use stylet_sim::limits::AxisLimits;
+use stylet_sim::scene::{Labels, Scene, Structure};
 
 /// Edge of the tip patch. Odd numbers of elements of 2.5, 1.5 and 1.0714 mm fill it exactly.
 pub const PATCH_M: f64 = 7.5e-3;

@@ -1,17 +1,17 @@
 //! Hand, device, force chain and tissue loop on one thread and one clock: a session that can be repeated.
 
 use nalgebra::Vector3;
-use rt_core::force::ForceParameters;
-use rt_core::force::chain::{self, ChainOutput, ChainParameters, ChainState};
-use rt_core::needle::{LayerKind, NeedleParameters};
-use rt_core::rt::exchange::{TipPose, TissueResponse};
-use rt_core::rt::recorder::recorder;
-use rt_core::rt::tissue::{TissueLoop, TissuePorts};
-use rt_core::rt::tissue_tape::TissueTape;
-use rt_core::rt::world::World;
-use rt_core::scene::SceneSource;
 use std::sync::Arc;
 use stylet_hw::{Device, DeviceInfo, Hand, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
+use stylet_runtime::rt::exchange::{TipPose, TissueResponse};
+use stylet_runtime::rt::recorder::recorder;
+use stylet_runtime::rt::tissue::{TissueLoop, TissuePorts};
+use stylet_runtime::rt::tissue_tape::TissueTape;
+use stylet_runtime::rt::world::World;
+use stylet_sim::force::ForceParameters;
+use stylet_sim::force::chain::{self, ChainOutput, ChainParameters, ChainState};
+use stylet_sim::needle::{LayerKind, NeedleParameters};
+use stylet_sim::scene::SceneSource;
 
 /// Haptic ticks are 1 ms; the tissue answers every `tissue_every`th.
 pub struct Desk {

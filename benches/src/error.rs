@@ -1,6 +1,6 @@
 //! How far one model's tissue is from another's.
 
-use rt_core::tissue::Deformed;
+use stylet_sim::tissue::Deformed;
 
 /// Elements that the reference moves by less than this part of the tip's travel are not of the moved region.
 const MOVED: f64 = 0.01;

@@ -3,8 +3,8 @@
 //! The script knows nothing of the model, so every model gets the same.
 
 use crate::bodies::PATCH_M;
-use rt_core::scene::{Lattice, Scene};
-use rt_core::tissue::Held;
+use stylet_sim::scene::{Lattice, Scene};
+use stylet_sim::tissue::Held;
 
 /// 200 Hz.
 pub const TICK_S: f64 = 5e-3;

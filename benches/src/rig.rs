@@ -1,10 +1,10 @@
 //! A hand, a device, a link and the force chain, without processes or tissue: membranes are planes across the way.
 
 use nalgebra::Vector3;
-use rt_core::force::chain::{self, ChainOutput, ChainParameters, ChainState, Touch};
-use rt_core::force::{ForceParameters, LocalResponse, PassivityParameters};
-use rt_core::needle::{LayerKind, NeedleParameters};
 use stylet_hw::{BadLink, Device, DeviceInfo, Hand, HandGoal, LinkFaults, SimulatedPhantom, SimulatedPhantomConfig};
+use stylet_sim::force::chain::{self, ChainOutput, ChainParameters, ChainState, Touch};
+use stylet_sim::force::{ForceParameters, LocalResponse, PassivityParameters};
+use stylet_sim::needle::{LayerKind, NeedleParameters};
 
 /// A session along +z.
 #[derive(Clone)]

@@ -1,9 +1,9 @@
 //! A virtual wall behind the gate, against the simulated Phantom in a hand: how stiff before it sings?
 
 use nalgebra::Vector3;
-use rt_core::force::gate::{self, GateInput};
-use rt_core::force::{GateParameters, GateState, Motion, PassivityParameters, VelocityEstimator};
 use stylet_hw::{BadLink, Device, Hand, HandGoal, LinkFaults, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
+use stylet_sim::force::gate::{self, GateInput};
+use stylet_sim::force::{GateParameters, GateState, Motion, PassivityParameters, VelocityEstimator};
 
 #[derive(Clone, Copy, Debug)]
 pub struct Wall {

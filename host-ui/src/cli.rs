@@ -1,14 +1,19 @@
 //! The command line of `host-ui`.
 
-use crate::convert::ConvertArgs;
-use crate::core_args::{self, CoreArgs};
-use crate::dose::command::{DoseArgs, PerturbArgs};
-use crate::dose::files::{SeedDefaults, read_seeds};
-use crate::plan::command::PlanArgs;
-use crate::{app, controller, files, interrupt, procedure, record};
+use crate::app;
+use crate::command::convert::ConvertArgs;
+use crate::command::dose::{DoseArgs, PerturbArgs};
+use crate::command::plan::PlanArgs;
 use clap::{Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use stylet_base::interrupt;
+use stylet_controllers as controller;
+use stylet_dose::files::{SeedDefaults, read_seeds};
+use stylet_files as files;
+use stylet_host::core_args::{self, CoreArgs};
+use stylet_host::record;
+use stylet_implant::procedure;
 use stylet_shm_schema::service::Instance;
 
 const SCENE_HELP: &str = "\
@@ -30,7 +35,7 @@ A scene file is TOML; all but [volume] may be left out, and what is not said com
   insert_mm_per_s = 50
   retract_mm_per_s = 50
   [device]
-  name = \"sim\"                    # for an rt-core that host-ui starts (--core)
+  name = \"simulated\"              # for an rt-core that host-ui starts (--core)
   [plan]
   file = \"plan.dcm\"               # RT Plan or CSV
 

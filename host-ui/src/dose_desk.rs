@@ -1,13 +1,13 @@
 //! Dose of the seeds that lie in the tissue or are planned, computed on a thread of its own whenever they have changed.
 
-use crate::dose::decay::Interval;
-use crate::dose::isodose::isodose;
-use crate::dose::{DoseGrid, DoseKernel, DosePoints, Dvh, Metric, Seed, Source};
-use crate::link::SceneModel;
-use crate::plan::exchange::USUAL_SOURCE;
 use crate::view::mesh::{self, SurfaceVertex};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use stylet_dose::decay::Interval;
+use stylet_dose::isodose::isodose;
+use stylet_dose::{DoseGrid, DoseKernel, DosePoints, Dvh, Metric, Seed, Source};
+use stylet_host::link::SceneModel;
+use stylet_implant::plan::exchange::USUAL_SOURCE;
 use stylet_shm_schema::{SceneHeader, SeedPose, role};
 
 /// Doses that are drawn, as shares of the prescription.

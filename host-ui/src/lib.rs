@@ -1,31 +1,17 @@
-//! The operator's program: what it reads from the core, the files it opens, the procedure it runs.
+//! The operator's program: the window, and the command line over the same code.
 
 mod affinity;
 pub mod app;
 pub mod cli;
-pub mod controller;
-pub mod convert;
-pub mod core_args;
+pub mod command;
 pub mod cpu_time;
-pub mod dose;
 pub mod dose_desk;
-mod envelope;
-pub mod files;
-pub mod format;
 pub mod heap;
-pub mod interrupt;
-mod job;
 pub mod keyboard;
-pub mod link;
 mod loader;
 pub mod panel;
 mod picture;
-pub mod plan;
 pub mod planner;
-pub mod procedure;
-pub mod record;
-pub mod score;
 pub mod settings;
 pub mod theme;
 pub mod view;
-pub mod workflow;

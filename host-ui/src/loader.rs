@@ -1,8 +1,8 @@
 //! Reads scenes and images on a thread of its own, so that a large or broken file never holds up a frame.
 
-use crate::files::{self, FileError, Image, LabelVolume, Progress, scene};
-use crate::job::{Job, News};
 use std::path::{Path, PathBuf};
+use stylet_base::job::{Job, News};
+use stylet_files::{self as files, FileError, Image, LabelVolume, Progress, scene};
 
 /// What a file came to.
 pub enum Loaded {

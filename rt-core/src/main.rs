@@ -2,13 +2,13 @@
 
 use clap::Parser;
 use rt_core::cli::{Cli, RunArgs, Task};
-use rt_core::core::{LoopReport, RunReport};
-use rt_core::lab::{doctor, latency, load, verify};
-use rt_core::scene::Scene;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use stylet_lab::{doctor, latency, load, verify};
+use stylet_runtime::core::{LoopReport, RunReport};
 use stylet_shm_schema::service::Instance;
+use stylet_sim::scene::Scene;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -53,7 +53,7 @@ fn serve_as_load(work: load::Work, instance: &str, file: &std::path::Path) -> Re
 
 fn cost(scene: &str) -> Result<(), String> {
     let scene = Scene::builtin(scene).map_err(|e| e.to_string())?;
-    println!("{}", rt_core::cost::table(&scene)?);
+    println!("{}", stylet_lab::cost::table(&scene)?);
     Ok(())
 }
 
@@ -70,7 +70,7 @@ fn run(args: &RunArgs) -> Result<(), String> {
         options.scene,
         if options.no_rt { "NOT real-time" } else { "real-time" }
     );
-    let report = rt_core::core::run(&options, &stop);
+    let report = stylet_runtime::core::run(&options, &stop);
     options.instance.sweep_at_end();
     let report = report?;
     if let Some(path) = &args.report {

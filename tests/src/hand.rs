@@ -1,9 +1,9 @@
 //! What the hand feels: a slow insertion, and the force record that it leaves.
 
 use crate::{Core, ask, until};
-use host_ui::link::Link;
-use host_ui::workflow::{default_plan, move_values, plan_values};
 use std::time::Duration;
+use stylet_host::link::Link;
+use stylet_implant::workflow::{default_plan, move_values, plan_values};
 use stylet_shm_schema::{CommandKind, ParameterId, TickRecord, flags};
 
 /// A host that inserts slowly and keeps every record.

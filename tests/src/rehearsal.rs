@@ -1,16 +1,16 @@
 //! Rehearsals without processes: the core's own, called from the host's planner.
 
-use host_ui::link::SceneModel;
-use host_ui::plan::rehearse::{Drops, Rehearser, Rest};
-use host_ui::workflow::Pace;
 use nalgebra::Vector3;
-use rt_core::bridge::ScenePicture;
-use rt_core::rehearse::{NeedleRun, Stage};
-use rt_core::scene::{Labels, Scene, SceneSource};
-use rt_core::tissue::TissueKind;
 use std::sync::atomic::AtomicBool;
+use stylet_host::link::SceneModel;
 use stylet_hw::DeviceInfo;
+use stylet_implant::plan::rehearse::{Drops, Rehearser, Rest};
+use stylet_implant::workflow::Pace;
+use stylet_runtime::bridge::ScenePicture;
+use stylet_runtime::rehearse::{NeedleRun, Stage};
 use stylet_shm_schema::ParameterSet;
+use stylet_sim::scene::TissueKind;
+use stylet_sim::scene::{Labels, Scene, SceneSource};
 
 /// A scene with a body to rehearse in, and what a host would see of it.
 pub struct Theatre {

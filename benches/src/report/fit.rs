@@ -4,8 +4,9 @@ use crate::models::chainmail;
 use crate::runs::{Reference, run};
 use argmin::core::{CostFunction, Executor};
 use argmin::solver::neldermead::NelderMead;
-use rt_core::scene::Scene;
-use rt_core::tissue::{Held, TissueParameters};
+use stylet_sim::limits::TissueParameters;
+use stylet_sim::scene::Scene;
+use stylet_sim::tissue::Held;
 
 /// What the fit found.
 #[derive(Clone, Debug)]

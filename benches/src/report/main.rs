@@ -10,8 +10,6 @@ mod table;
 use clap::Parser;
 use fit::Lesson;
 use models::{converged, entries};
-use rt_core::scene::Scene;
-use rt_core::tissue::{Held, MaterialPoint, TissueModel};
 use runs::{Reference, run};
 use std::error::Error;
 use std::path::PathBuf;
@@ -20,6 +18,8 @@ use stylet_benches::bodies::{SPACINGS_M, gland};
 use stylet_benches::error::norm;
 use stylet_benches::insertions::{GLAND, Insertion, TICK_S};
 use stylet_benches::machine;
+use stylet_sim::scene::Scene;
+use stylet_sim::tissue::{Held, MaterialPoint, TissueModel};
 use table::{Row, Where, row};
 
 /// Runs every tissue model over the same needle insertions and writes speed, error and advice.

@@ -1,9 +1,10 @@
 //! The models that are compared, each under the settings that it is compared with.
 
 use crate::fit::Fitted;
-use rt_core::scene::Scene;
-use rt_core::tissue::chainmail::{OnePass, PassKind};
-use rt_core::tissue::{ChainMailTissue, FemTissue, TissueModel, TissueParameters};
+use stylet_sim::limits::TissueParameters;
+use stylet_sim::scene::Scene;
+use stylet_sim::tissue::chainmail::{OnePass, PassKind};
+use stylet_sim::tissue::{ChainMailTissue, FemTissue, TissueModel};
 
 /// Models that differ only in a setting belong to one family; the picture draws a family in one colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,9 +1,9 @@
 //! One model through one insertion: its time, and its error against the converged FEM on the same lattice.
 
-use rt_core::tissue::{Held, TissueModel};
 use std::time::Instant;
 use stylet_benches::error::{Error, Field, field};
 use stylet_benches::insertions::TICK_S;
+use stylet_sim::tissue::{Held, TissueModel};
 
 /// The converged answer to a script, at the ticks that are compared.
 pub struct Reference {

@@ -2,7 +2,7 @@
 
 #![no_main]
 
-use host_ui_fuzz::files;
+use stylet_files as files;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {

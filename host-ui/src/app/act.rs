@@ -2,12 +2,12 @@
 
 use super::drive::{BEFORE_ENTRY_M, Drive};
 use super::{App, Waiting, refusal};
-use crate::controller::Wish;
 use crate::panel::workflow::{Undo, next_action, undo_action};
 use crate::panel::{Action, LoadState};
 use crate::settings::ThemeChoice;
-use crate::workflow::{default_plan, move_values, plan_values};
 use std::time::Instant;
+use stylet_controllers::Wish;
+use stylet_implant::workflow::{default_plan, move_values, plan_values};
 use stylet_shm_schema::{CommandKind, PARAMETERS};
 
 /// A hand on the tip may pull it this far ahead.

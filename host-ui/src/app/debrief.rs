@@ -1,16 +1,16 @@
 //! The debrief as files: the same page as `host-ui procedure` writes, of what the window has seen.
 
 use super::{App, refusal};
-use crate::dose::decay::Interval;
-use crate::dose::{DoseKernel, Seed, Source};
-use crate::format;
-use crate::job::{Job, News};
-use crate::link::SceneModel;
 use crate::panel::{Note, SeedError, all_errors};
-use crate::plan::{Anatomy, exchange};
-use crate::score::{self, Implant, Motion, Score, SeedPair};
 use std::path::PathBuf;
 use std::sync::Arc;
+use stylet_base::format;
+use stylet_base::job::{Job, News};
+use stylet_dose::decay::Interval;
+use stylet_dose::{DoseKernel, Seed, Source};
+use stylet_host::link::SceneModel;
+use stylet_implant::plan::{Anatomy, exchange};
+use stylet_implant::score::{self, Implant, Motion, Score, SeedPair};
 use stylet_shm_schema::{SeedPose, TickRecord};
 
 /// The folder of what was written, or why it could not be.

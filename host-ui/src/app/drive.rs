@@ -1,8 +1,8 @@
 //! From how fast a hand on keys, stick or cap wants the tip to go, to goals for the simulated hand.
 
-use crate::controller::{SLOWEST_M_PER_S, Wish};
 use crate::panel::TipOnPath;
 use std::time::Duration;
+use stylet_controllers::{SLOWEST_M_PER_S, Wish};
 
 /// The goal of a driven needle runs ahead of the tip by no more than this, so that it stops when the hand lets go.
 const LEAD_M: f64 = 0.004;

@@ -4,8 +4,8 @@ use super::drive::Drive;
 use super::{App, refusal};
 use crate::panel::workflow::Progress;
 use crate::panel::{Note, PlanAction};
-use crate::workflow::{Run, default_plan, plan_values};
 use nalgebra::Vector3;
+use stylet_implant::workflow::{Run, default_plan, plan_values};
 use stylet_shm_schema::CommandKind;
 
 impl App {

@@ -3,15 +3,15 @@
 use super::drive::Drive;
 use super::{App, refusal};
 use crate::affinity;
-use crate::controller::Button;
-use crate::core_args::SceneChoice;
 use crate::dose_desk::{DoseOf, Wanted};
-use crate::files::{Image, LabelVolume};
 use crate::loader::Loaded;
 use crate::panel::{Action, LoadState, Note};
-use crate::workflow::RunStatus;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use stylet_controllers::Button;
+use stylet_files::{Image, LabelVolume};
+use stylet_host::core_args::SceneChoice;
+use stylet_implant::workflow::RunStatus;
 use stylet_shm_schema::CommandKind;
 
 const SUM_UP_EVERY: Duration = Duration::from_millis(500);

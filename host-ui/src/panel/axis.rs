@@ -1,12 +1,30 @@
-//! Marks on the axes of plots, and their words.
+//! Plots that are only looked at: their axes, the marks on them, and their words.
 
 use egui::Rangef;
-use egui_plot::{GridInput, GridMark};
+use egui_plot::{AxisHints, GridInput, GridMark, Plot};
 
 /// Between two values on an axis that goes up, points, so that each can be read.
 const BETWEEN_VALUES: f32 = 20.0;
-/// Lines of the grid nearer than the first are not seen, as far as the second are drawn in full. Plots must be given these.
-pub const LINES: Rangef = Rangef { min: 8.0, max: 300.0 };
+/// Lines of the grid nearer than the first are not seen, as far as the second are drawn in full.
+const LINES: Rangef = Rangef { min: 8.0, max: 300.0 };
+
+/// Only to be looked at: a plot that moves must not be dragged by accident.
+pub fn plot(name: &str, height: f32) -> Plot<'static> {
+    Plot::new(name.to_owned())
+        .height(height)
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .allow_axis_zoom_drag(false)
+        .show_x(false)
+        .show_y(false)
+        .custom_x_axes(vec![AxisHints::new_x().label_spacing(25.0..=35.0)])
+        .custom_y_axes(vec![AxisHints::new_y().min_thickness(34.0).label_spacing(12.0..=20.0)])
+        .grid_spacing(LINES)
+        .show_background(true)
+        .set_margin_fraction(egui::vec2(0.0, 0.08))
+}
 
 /// Marks at multiples of 1, 2 or 5 times a power of ten, at least so far apart.
 pub fn grid([from, to]: [f64; 2], at_least: f64) -> Vec<GridMark> {

@@ -1,8 +1,8 @@
 //! The overlay that lists every key, and what gamepads and 3D mice do.
 
 use super::Shown;
-use crate::controller::Kind;
 use crate::{keyboard, theme};
+use stylet_controllers::Kind;
 
 pub fn help_ui(ctx: &egui::Context, shown: &Shown, open: &mut bool) {
     egui::Window::new("Keys, mouse and controllers")

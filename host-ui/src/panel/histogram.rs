@@ -1,11 +1,11 @@
 //! How often the force loop woke up how late, and worked how long: both axes logarithmic, because one late tick in a minute must be seen.
 
-use super::axis::marks;
+use super::axis::{marks, plot};
 use super::history::{BINS, Timing, bin_low_us};
-use super::strip::plot;
-use crate::{format, theme};
+use crate::theme;
 use egui::RichText;
 use egui_plot::{Bar, BarChart, GridMark};
+use stylet_base::format;
 
 /// Height of a bar of one tick.
 const ONE_TICK: f64 = 0.4;
@@ -68,7 +68,7 @@ fn told(timing: &Timing, bin: usize) -> String {
         bin => format!("{} and more", us(bin)),
     };
     let [wake, work] = [timing.wake_histogram[bin], timing.work_histogram[bin]].map(|n| format::count(u64::from(n)));
-    format!("{range}\nwake-up: {wake} ticks\nwork: {work} ticks")
+    format!("{range}\nticks by wake-up: {wake}\nticks by work: {work}")
 }
 
 fn decade(us: f64) -> String {
@@ -90,7 +90,7 @@ mod tests {
         timing.work_histogram[5] = 1;
         assert_eq!(
             told(&timing, 5),
-            "10.0 us to 15.8 us\nwake-up: 1 234 ticks\nwork: 1 ticks"
+            "10.0 us to 15.8 us\nticks by wake-up: 1 234\nticks by work: 1"
         );
         assert!(told(&timing, 0).starts_with("Below 1.6 us"));
         assert!(told(&timing, BINS - 1).starts_with("63.1 ms and more"));

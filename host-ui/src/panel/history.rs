@@ -1,14 +1,14 @@
 //! The last seconds of the force loop, in bounded memory, and what can be said of its timing.
 
-use crate::envelope::Envelope;
-use crate::format;
 use hdrhistogram::Histogram;
 use std::collections::VecDeque;
+use stylet_base::envelope::Envelope;
+use stylet_base::format;
 use stylet_shm_schema::TickRecord;
 
 /// Seconds that the plots show.
 pub const WINDOW_S: f64 = 10.0;
-const WINDOW_NS: u64 = 10_000_000_000;
+const WINDOW_NS: u64 = WINDOW_S as u64 * 1_000_000_000;
 /// Ticks of this time are one place of a plot: 250 in its width.
 const SLOT_NS: u64 = WINDOW_NS / 250;
 /// Ticks that percentiles are taken over: one minute at 1 kHz, so that p99.9 has samples beyond it.

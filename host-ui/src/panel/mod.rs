@@ -16,10 +16,10 @@ pub mod workflow;
 pub use seeds::{SeedError, all_errors, own_errors, seed_errors};
 pub use shown::{FrameCost, LoadState, Note, Shown, TipOnPath};
 
-use crate::plan::{Hole, Row};
 use crate::settings::Layout;
 use crate::view::scene3d::Preset;
 use std::path::PathBuf;
+use stylet_implant::plan::{Hole, Row};
 use stylet_shm_schema::CommandKind;
 
 /// What the operator asked for. The window carries it out after all panels are drawn.

@@ -4,9 +4,10 @@ use super::histogram::histogram_ui;
 use super::history::{History, Percentiles, Quantity, WINDOW_S};
 use super::strip::Strip;
 use super::{Shown, setup};
-use crate::score::Trace;
-use crate::{format, theme};
+use crate::theme;
 use egui::{Color32, RichText};
+use stylet_base::format;
+use stylet_implant::score::Trace;
 
 /// What stands between and under the three plots over time.
 const BESIDE_PLOTS: f32 = 492.0;

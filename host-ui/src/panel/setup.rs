@@ -1,9 +1,10 @@
 //! What the loop got from the kernel, how the link is, and what a frame of this window costs.
 
 use super::Shown;
-use crate::link::LinkStatus;
-use crate::{format, theme};
+use crate::theme;
 use egui::RichText;
+use stylet_base::format;
+use stylet_host::link::LinkStatus;
 use stylet_shm_schema::ThreadReport;
 
 /// What there is room for beside the reason why it does not hold the needle.
@@ -103,7 +104,7 @@ fn frame(shown: &Shown) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::controller::{Device, Kind};
+    use stylet_controllers::{Device, Kind};
 
     #[test]
     fn the_controller_is_named_with_its_axes_and_why_it_does_not_move_the_needle() {

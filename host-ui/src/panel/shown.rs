@@ -1,13 +1,13 @@
 //! What one frame shows, taken from the link once, so that no panel touches shared memory.
 
-use crate::controller::Latest;
 use crate::dose_desk::DosePicture;
-use crate::link::{Link, LinkStatus};
-use crate::plan::{HOLES, Template};
 use crate::planner::Planning;
-use crate::workflow::Step;
 use nalgebra::Vector3;
 use std::sync::Arc;
+use stylet_controllers::Latest;
+use stylet_host::link::{Link, LinkStatus};
+use stylet_implant::plan::{HOLES, Template};
+use stylet_implant::workflow::Step;
 use stylet_shm_schema::{
     EventKind, Fault, HapticState, ParameterId, ParametersInForce, Phase, PlanInForce, PlannedSeed, SceneHeader,
     SeedPose, Session, flags,

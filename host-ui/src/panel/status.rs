@@ -1,11 +1,12 @@
 //! The bar at the top and the banners under it: is it alive, is it real time, is the force on.
 
 use super::{Action, Shown};
-use crate::link::LinkStatus;
 use crate::settings::{SCALES, STRENGTHS_U, Settings, ThemeChoice};
+use crate::theme;
 use crate::theme::Tokens;
-use crate::{format, theme};
 use egui::{Align, Color32, DragValue, Layout, RichText, Sense, Vec2};
+use stylet_base::format;
+use stylet_host::link::LinkStatus;
 use stylet_shm_schema::{CommandKind, Fault, ParameterId};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

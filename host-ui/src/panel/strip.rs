@@ -1,9 +1,9 @@
 //! A plot over time: smallest and largest as a band, and what it was where the pointer is.
 
-use super::axis::{LINES, grid, number, upwards};
-use crate::format;
+use super::axis::{grid, number, plot, upwards};
 use egui::Color32;
-use egui_plot::{AxisHints, FilledArea, GridMark, Line, Plot, PlotPoints};
+use egui_plot::{FilledArea, GridMark, Line, PlotPoints};
+use stylet_base::format;
 
 pub struct Strip<'a> {
     pub name: &'a str,
@@ -76,24 +76,6 @@ impl Strip<'_> {
             format!("{at_s:.1} s: {low} to {high} {unit}")
         })
     }
-}
-
-/// Only to be looked at: a plot that moves must not be dragged by accident.
-pub fn plot(name: &str, height: f32) -> Plot<'static> {
-    Plot::new(name.to_owned())
-        .height(height)
-        .allow_drag(false)
-        .allow_zoom(false)
-        .allow_scroll(false)
-        .allow_boxed_zoom(false)
-        .allow_axis_zoom_drag(false)
-        .show_x(false)
-        .show_y(false)
-        .custom_x_axes(vec![AxisHints::new_x().label_spacing(25.0..=35.0)])
-        .custom_y_axes(vec![AxisHints::new_y().min_thickness(34.0).label_spacing(12.0..=20.0)])
-        .grid_spacing(LINES)
-        .show_background(true)
-        .set_margin_fraction(egui::vec2(0.0, 0.08))
 }
 
 #[cfg(test)]

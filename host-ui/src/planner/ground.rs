@@ -1,11 +1,11 @@
 //! What a plan is drawn on: the scene's anatomy behind the holes of a template, made once a scene.
 
-use crate::link::SceneModel;
-use crate::plan::anatomy::Body;
-use crate::plan::file::Frames;
-use crate::plan::{Anatomy, HOLES, Hole, Template};
 use crate::view::slice::cut;
 use nalgebra::Vector3;
+use stylet_host::link::SceneModel;
+use stylet_implant::plan::anatomy::Body;
+use stylet_implant::plan::file::Frames;
+use stylet_implant::plan::{Anatomy, HOLES, Hole, Template};
 
 /// From one layer of outlines to the next.
 const LAYER_M: f64 = 1e-3;
@@ -121,7 +121,7 @@ fn outlines(template: &Template, body: &Body, depth_m: f64) -> Vec<Outline> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::anatomy::ball;
+    use stylet_implant::plan::anatomy::ball;
 
     /// Half axes of the gland; its middle lies before G7, 70 mm from the template.
     const HALF_M: [f64; 3] = [0.024, 0.018, 0.02];

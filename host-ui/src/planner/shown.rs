@@ -3,10 +3,10 @@
 use super::course::{Course, NeedleState};
 use super::ground::Ground;
 use super::work::Progress;
-use crate::dose::Seed;
-use crate::plan::check::Problem;
-use crate::plan::{Compensation, History, ImplantPlan, Needle};
 use std::sync::Arc;
+use stylet_dose::Seed;
+use stylet_implant::plan::check::Problem;
+use stylet_implant::plan::{Compensation, History, ImplantPlan, Needle};
 
 /// Everything about plans of many needles that a frame shows.
 #[derive(Clone, Default)]

@@ -1,10 +1,10 @@
 //! What may be changed of a plan that is being carried out, and which needle comes next.
 
 use super::*;
-use crate::link::LinkStatus;
 use crate::panel::workflow::{Progress as Stage, is_needle_done, next_action, progress};
 use crate::panel::{Action, PlanAction, Shown};
 use bytemuck::Zeroable;
+use stylet_host::link::LinkStatus;
 use stylet_shm_schema::{HapticState, PlanInForce, SceneHeader, SeedPose, flags};
 
 fn hole(name: &str) -> Hole {

@@ -1,18 +1,18 @@
 //! What takes longer than a frame: a first plan, compensation, files.
 
 use super::ground::Ground;
-use crate::dose::decay::Interval;
-use crate::dose::{DoseKernel, Source};
-use crate::interrupt::Interrupt;
-use crate::job::Job;
-use crate::link::{Link, SceneModel};
-use crate::plan::automatic::{self, Aims};
-use crate::plan::{Compensation, ImplantPlan, Limits, LinkRehearser, Needle, compensate, exchange};
-use crate::workflow::Pace;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
+use stylet_base::interrupt::Interrupt;
+use stylet_base::job::Job;
+use stylet_dose::decay::Interval;
+use stylet_dose::{DoseKernel, Source};
+use stylet_host::link::{Link, SceneModel};
+use stylet_implant::plan::automatic::{self, Aims};
+use stylet_implant::plan::{Compensation, ImplantPlan, Limits, LinkRehearser, Needle, compensate, exchange};
+use stylet_implant::workflow::Pace;
 use stylet_shm_schema::service::Instance;
 
 /// A second host finds the core within this time.

@@ -1,9 +1,9 @@
 //! What the surfaces of a scene are of, and how each is drawn.
 
 use super::mesh;
-use crate::link::SceneModel;
 use crate::theme::Tokens;
 use egui::Color32;
+use stylet_host::link::SceneModel;
 use stylet_shm_schema::{SceneHeader, StructureInfo, role};
 
 /// What a surface is of.

@@ -5,10 +5,10 @@ use super::kinds::{Kind, kinds};
 use super::scene3d::Look;
 use super::state::ViewState;
 use crate::dose_desk::{DosePicture, LEVELS};
-use crate::format;
 use crate::panel::Shown;
 use crate::theme::{IMAGE, Tokens};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Vec2};
+use stylet_base::format;
 
 pub struct Legend<'a> {
     pub painter: &'a Painter,

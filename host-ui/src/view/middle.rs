@@ -5,8 +5,6 @@ use super::scene3d::{Preset, Scene3d};
 use super::slice::{Orientation, Plane, Slices};
 use super::state::ViewState;
 use crate::dose_desk::DosePicture;
-use crate::files::Image;
-use crate::link::{SceneModel, Snapshot};
 use crate::panel::{Action, Shown};
 use crate::settings::Layout;
 use crate::theme;
@@ -14,6 +12,8 @@ use eframe::egui_wgpu::RenderState;
 use egui::{Pos2, Rect};
 use nalgebra::Vector3;
 use std::sync::Arc;
+use stylet_files::Image;
+use stylet_host::link::{SceneModel, Snapshot};
 
 /// Between two pictures.
 const GAP: f32 = 2.0;

@@ -11,13 +11,13 @@ use super::pick::pick;
 use super::slice::{Orientation, scene_from_patient};
 use super::state::ViewState;
 use crate::dose_desk::DosePicture;
-use crate::link::{SceneModel, Snapshot};
 use crate::panel::Shown;
 use crate::theme::{self, IMAGE, Tokens};
 use eframe::egui_wgpu::RenderState;
 use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense};
 use nalgebra::Vector3;
 use std::sync::Arc;
+use stylet_host::link::{SceneModel, Snapshot};
 
 const TURN_PER_POINT_RAD: f32 = 0.008;
 const LIGHT: [f32; 4] = [-0.48, 0.78, -0.40, 0.0];

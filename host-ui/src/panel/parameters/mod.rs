@@ -3,9 +3,10 @@
 mod preset;
 
 use super::Shown;
-use crate::{format, theme};
+use crate::theme;
 use egui::{Button, DragValue, RichText};
 use std::path::Path;
+use stylet_base::format;
 use stylet_shm_schema::{PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterSpec};
 
 /// What stands under a row.

@@ -1,10 +1,12 @@
 //! What came of it: the error of each seed, the dose against its limits, the histogram of the target.
 
 use crate::dose_desk::{DosePicture, Figure, Limit};
+use crate::panel::axis::{plot, upwards};
 use crate::panel::{Action, SeedError, Shown, all_errors};
-use crate::{format, theme};
+use crate::theme;
 use egui::RichText;
-use egui_plot::{Line, Plot, PlotPoints, VLine};
+use egui_plot::{Line, PlotPoints, VLine};
+use stylet_base::format;
 
 /// Rows of the table of seeds at once; the rest is scrolled to.
 const TABLE_HEIGHT: f32 = 150.0;
@@ -71,18 +73,14 @@ fn dvh_ui(ui: &mut egui::Ui, dose: &DosePicture, height: f32) {
     let tokens = theme::of(ui);
     ui.label(theme::small("Target: volume over dose, both in %"));
     let points: Vec<[f64; 2]> = dose.target_dvh.iter().map(|[x, y]| [x * 100.0, y * 100.0]).collect();
-    Plot::new("dvh")
-        .height(height)
-        .allow_drag(false)
-        .allow_zoom(false)
-        .allow_scroll(false)
-        .allow_boxed_zoom(false)
-        .allow_axis_zoom_drag(false)
+    plot("dvh", height)
         .include_x(0.0)
         .include_x(300.0)
         .include_y(0.0)
         .include_y(100.0)
-        .y_axis_min_width(30.0)
+        .show_x(true)
+        .show_y(true)
+        .y_grid_spacer(upwards)
         .show(ui, |plot| {
             plot.vline(VLine::new("prescription", 100.0).color(tokens.weak));
             plot.line(

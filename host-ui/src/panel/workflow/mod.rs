@@ -7,11 +7,12 @@ mod scene;
 mod work;
 
 use super::{Action, SeedError, Shown, own_errors};
-use crate::workflow::Step;
-use crate::{format, theme};
+use crate::theme;
 use egui::{Align2, Button, FontId, RichText, Sense, Stroke, Vec2};
 pub use plan::{PlanState, editor_ui};
 pub use progress::{Progress, Undo, is_at_next_seed, is_needle_done, missing, next_action, progress, undo_action};
+use stylet_base::format;
+use stylet_implant::workflow::Step;
 use stylet_shm_schema::CommandKind;
 
 /// What the panel keeps between frames: what a person is typing, and which step was opened by hand.

@@ -1,7 +1,7 @@
 //! How far the operator is, what each step lacks, and the one thing to do next.
 
-use crate::format;
 use crate::panel::{Action, PlanAction, Shown};
+use stylet_base::format;
 use stylet_shm_schema::CommandKind;
 
 /// Beside the path by less than this, the needle counts as placed.
@@ -197,8 +197,8 @@ pub enum Undo {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::LinkStatus;
     use bytemuck::Zeroable;
+    use stylet_host::link::LinkStatus;
     use stylet_shm_schema::{HapticState, PlanInForce, SceneHeader, SeedPose, flags};
 
     /// Seeds at 30 and 20 mm along z; the tip at a depth.

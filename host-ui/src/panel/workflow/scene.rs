@@ -3,9 +3,10 @@
 use super::WorkflowState;
 use super::work::work_ui;
 use crate::panel::{Action, LoadState, Shown};
-use crate::{format, theme};
+use crate::theme;
 use egui::{Button, RichText};
 use std::path::PathBuf;
+use stylet_base::format;
 use stylet_shm_schema::{BUILTIN_SCENES, SceneHeader, role};
 
 pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, actions: &mut Vec<Action>) {

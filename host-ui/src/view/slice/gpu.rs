@@ -3,14 +3,14 @@
 use super::field::{Field, SEEN_M, STEPS};
 use super::plane::Plane;
 use super::speckle::{self, GRAIN_M, GRAINS, LARGEST_AMPLITUDE};
-use crate::files::Image;
-use crate::link::SceneModel;
 use crate::view::driver::DriverCost;
 use bytemuck::{Pod, Zeroable};
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
 use nalgebra::{Matrix3, Vector3};
 use std::mem::size_of;
+use stylet_files::Image;
+use stylet_host::link::SceneModel;
 use stylet_shm_schema::GridInfo;
 
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;

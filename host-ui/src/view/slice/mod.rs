@@ -10,8 +10,6 @@ mod speckle;
 use super::driver::DriverCost;
 use super::state::ViewState;
 use crate::dose_desk::DosePicture;
-use crate::files::Image;
-use crate::link::{SceneModel, Snapshot};
 use crate::panel::{Action, Shown};
 use crate::theme::IMAGE;
 use eframe::egui_wgpu::RenderState;
@@ -22,6 +20,8 @@ use nalgebra::{Matrix3, Vector3};
 use overlay::{Lines, Overlay};
 pub use plane::{Orientation, Plane, scene_from_patient};
 use std::sync::Arc;
+use stylet_files::Image;
+use stylet_host::link::{SceneModel, Snapshot};
 use stylet_shm_schema::{Text, role};
 
 /// Of the target, this much is seen at first.

@@ -3,13 +3,13 @@
 use super::plane::{Orientation, Plane};
 use super::{Contour, cut};
 use crate::dose_desk::{DosePicture, LEVELS};
-use crate::format;
 use crate::panel::Shown;
 use crate::theme::IMAGE;
 use crate::view::state::ViewState;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2};
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
+use stylet_base::format;
 
 /// What lies nearer to the plane than this is in it.
 const IN_PLANE_M: f64 = 1.5e-3;

@@ -2,15 +2,15 @@
 
 use super::super::{WorkflowState, debrief, hinted, main_button, progress, undo_action};
 use super::summary;
-use crate::format;
 use crate::panel::workflow::Undo;
 use crate::panel::workflow::work::work_ui;
 use crate::panel::{Action, PlanAction, Shown};
-use crate::plan::check::STRENGTHS_U;
 use crate::planner::Implant;
 use crate::theme;
 use egui::{Button, DragValue};
 use std::path::PathBuf;
+use stylet_base::format;
+use stylet_implant::plan::check::STRENGTHS_U;
 
 pub fn plan_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, ready: bool, actions: &mut Vec<Action>) {
     let free = ready && shown.planning.work.is_none();

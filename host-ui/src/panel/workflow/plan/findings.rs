@@ -1,10 +1,10 @@
 //! What is wrong with the plan, in words; a click shows the needle.
 
 use super::{PlanState, name_of};
-use crate::plan::check::Problem;
 use crate::planner::Implant;
 use crate::theme;
 use egui::{FontId, RichText, Sense};
+use stylet_implant::plan::check::Problem;
 
 pub fn findings_ui(ui: &mut egui::Ui, implant: &Implant, state: &mut PlanState) {
     let tokens = theme::of(ui);

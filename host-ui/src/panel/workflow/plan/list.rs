@@ -2,10 +2,11 @@
 
 use super::template::needle_mark;
 use super::{PlanState, name_of};
-use crate::plan::Loading;
 use crate::planner::Implant;
-use crate::{format, theme};
+use crate::theme;
 use egui::{Align2, FontId, Pos2, Rect, Sense, Vec2};
+use stylet_base::format;
+use stylet_implant::plan::Loading;
 
 const ROW: f32 = 19.0;
 /// At least so many rows can be seen at once.

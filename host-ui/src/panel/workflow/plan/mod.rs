@@ -8,12 +8,12 @@ mod template;
 
 use super::progress;
 use crate::panel::{Action, PlanAction, Shown};
-use crate::plan::{Hole, ImplantPlan};
 use crate::planner::Implant;
 use crate::theme;
 use crate::view::scene3d::Preset;
 pub(super) use card::plan_ui;
 use egui::Button;
+use stylet_implant::plan::{Hole, ImplantPlan};
 
 /// What a person is looking at.
 pub struct PlanState {

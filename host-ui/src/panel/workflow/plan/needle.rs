@@ -3,11 +3,12 @@
 use super::template::move_needle;
 use super::{PlanState, name_of};
 use crate::panel::{Action, PlanAction, Shown};
-use crate::plan::check::{REACH_M, STRENGTHS_U};
-use crate::plan::{Row, SEED_LENGTH_M};
 use crate::planner::{Implant, NeedleState};
-use crate::{format, theme};
+use crate::theme;
 use egui::{Button, DragValue};
+use stylet_base::format;
+use stylet_implant::plan::check::{REACH_M, STRENGTHS_U};
+use stylet_implant::plan::{Row, SEED_LENGTH_M};
 
 const MOST_SEEDS: usize = 15;
 const LONGEST_PITCH_M: f64 = 0.05;

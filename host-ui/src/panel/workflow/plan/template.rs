@@ -2,13 +2,14 @@
 
 use super::PlanState;
 use crate::panel::{Action, PlanAction, Shown};
-use crate::plan::{HOLES, Hole, Loading};
 use crate::planner::{Implant, NeedleState, Outline};
+use crate::theme;
 use crate::theme::Tokens;
-use crate::{format, theme};
 use egui::{
     Align2, Color32, EventFilter, FontId, Key, Modifiers, Painter, Pos2, Rect, Response, Sense, Shape, Stroke, Vec2,
 };
+use stylet_base::format;
+use stylet_implant::plan::{HOLES, Hole, Loading};
 
 /// For letters under the holes and numbers beside them.
 const LETTERS: f32 = 16.0;

@@ -1,0 +1,218 @@
+//! What a device is by what the kernel says of it, and what its buttons do.
+
+use evdev::{AbsoluteAxisCode, KeyCode, PropType, RelativeAxisCode};
+use stylet_base::format;
+
+/// A device that can hold the needle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    Gamepad,
+    Mouse3d,
+}
+
+/// What a button asks for when it is pressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Button {
+    Drop,
+    Undo,
+    Stop,
+    Engage,
+}
+
+impl Button {
+    pub const ALL: [Self; 4] = [Self::Drop, Self::Undo, Self::Stop, Self::Engage];
+}
+
+/// A bitmap of the kernel, as sysfs writes it: words in hexadecimal, the most significant first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Bits(Vec<u64>);
+
+impl Bits {
+    /// Nothing where the text is not a bitmap.
+    pub fn read(text: &str) -> Self {
+        let words = text.split_whitespace().rev();
+        Self(words.map_while(|w| u64::from_str_radix(w, 16).ok()).collect())
+    }
+
+    pub fn has(&self, bit: u16) -> bool {
+        let word = self.0.get(usize::from(bit) / 64).copied().unwrap_or(0);
+        word >> (bit % 64) & 1 == 1
+    }
+}
+
+/// What a device can report.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Abilities {
+    pub keys: Bits,
+    pub absolute: Bits,
+    pub relative: Bits,
+    pub properties: Bits,
+    pub vendor: u16,
+}
+
+const VENDOR_3DCONNEXION: u16 = 0x256f;
+const SIX_ABSOLUTE: [AbsoluteAxisCode; 6] = [
+    AbsoluteAxisCode::ABS_X,
+    AbsoluteAxisCode::ABS_Y,
+    AbsoluteAxisCode::ABS_Z,
+    AbsoluteAxisCode::ABS_RX,
+    AbsoluteAxisCode::ABS_RY,
+    AbsoluteAxisCode::ABS_RZ,
+];
+const SIX_RELATIVE: [RelativeAxisCode; 6] = [
+    RelativeAxisCode::REL_X,
+    RelativeAxisCode::REL_Y,
+    RelativeAxisCode::REL_Z,
+    RelativeAxisCode::REL_RX,
+    RelativeAxisCode::REL_RY,
+    RelativeAxisCode::REL_RZ,
+];
+
+impl Kind {
+    pub fn of(can: &Abilities) -> Option<Self> {
+        let key = |key: KeyCode| can.keys.has(key.0);
+        // The motion sensor of a gamepad is a device of its own with six axes.
+        if can.properties.has(PropType::ACCELEROMETER.0) {
+            return None;
+        }
+        if key(KeyCode::BTN_SOUTH) {
+            let has_stick = can.absolute.has(AbsoluteAxisCode::ABS_X.0) && can.absolute.has(AbsoluteAxisCode::ABS_Y.0);
+            return has_stick.then_some(Self::Gamepad);
+        }
+        let six =
+            SIX_ABSOLUTE.iter().all(|a| can.absolute.has(a.0)) || SIX_RELATIVE.iter().all(|a| can.relative.has(a.0));
+        // Joysticks and wheels have six axes too, but not the buttons of a 3D mouse.
+        let is_cap = can.vendor == VENDOR_3DCONNEXION || key(KeyCode::BTN_0);
+        (six && is_cap && !key(KeyCode::BTN_TRIGGER)).then_some(Self::Mouse3d)
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gamepad => "gamepad",
+            Self::Mouse3d => "3D mouse",
+        }
+    }
+
+    /// By place, as drivers differ in what they call the upper and the left one.
+    pub fn button(self, key: KeyCode) -> Option<Button> {
+        match (self, key) {
+            (Self::Gamepad, KeyCode::BTN_SOUTH) | (Self::Mouse3d, KeyCode::BTN_0) => Some(Button::Drop),
+            (Self::Gamepad, KeyCode::BTN_EAST) | (Self::Mouse3d, KeyCode::BTN_1) => Some(Button::Stop),
+            (Self::Gamepad, KeyCode::BTN_SELECT) => Some(Button::Undo),
+            (Self::Gamepad, KeyCode::BTN_START) => Some(Button::Engage),
+            _ => None,
+        }
+    }
+
+    pub fn has_use_for(self, key: KeyCode) -> bool {
+        self.button(key).is_some() || self.slows(key)
+    }
+
+    pub fn slows(self, key: KeyCode) -> bool {
+        self == Self::Gamepad && [KeyCode::BTN_TL, KeyCode::BTN_TR].contains(&key)
+    }
+
+    /// In a few words, for a line of the window.
+    pub fn axes(self) -> &'static str {
+        match self {
+            Self::Gamepad => "left stick: away goes in, towards you out",
+            Self::Mouse3d => "press: in, lift: out; slide: across",
+        }
+    }
+
+    /// Every axis and button, for the help page and the manual.
+    pub fn uses(self) -> Vec<(&'static str, String)> {
+        let along = format::speed(super::ALONG_M_PER_S);
+        let across = format::speed(super::ACROSS_M_PER_S);
+        match self {
+            Self::Gamepad => vec![
+                ("Left stick", format!("away in, back out: up to {along}")),
+                ("Shoulder buttons, Shift", "four times slower".to_owned()),
+                ("Lower button (A, cross)", "drop a seed at the tip".to_owned()),
+                ("Right button (B, circle)", "stop the needle, and the script".to_owned()),
+                ("Back, Select", "last seed back, or else the plan".to_owned()),
+                ("Start", "force on; after a fault: re-arm".to_owned()),
+            ],
+            Self::Mouse3d => vec![
+                ("Press, lift the cap", format!("in, out: up to {along}")),
+                ("Slide the cap", format!("outside: across, up to {across}")),
+                ("Shift", "four times slower".to_owned()),
+                ("First button", "drop a seed at the tip".to_owned()),
+                ("Second button", "stop the needle, and the script".to_owned()),
+            ],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As `/sys/class/input/eventN/device` shows them; on a machine of 64 bits.
+    fn sysfs(keys: &str, absolute: &str, relative: &str, properties: &str, vendor: u16) -> Abilities {
+        Abilities {
+            keys: Bits::read(keys),
+            absolute: Bits::read(absolute),
+            relative: Bits::read(relative),
+            properties: Bits::read(properties),
+            vendor,
+        }
+    }
+
+    #[test]
+    fn bits_are_read_as_the_kernel_writes_them() {
+        let bits = Bits::read("7cdb000000000000 0 0 0 0\n");
+        // BTN_SOUTH is 0x130: word 4, bit 48.
+        assert!(bits.has(0x130) && bits.has(0x131) && !bits.has(0x132) && !bits.has(0x12f));
+        assert!(!bits.has(u16::MAX));
+        assert_eq!(Bits::read("no bitmap"), Bits::default());
+    }
+
+    #[test]
+    fn gamepads_and_3d_mice_are_known_from_mice_keyboards_sensors_and_joysticks() {
+        let pad = sysfs("7cdb000000000000 0 0 0 0", "3003f", "0", "0", 0x045e);
+        assert_eq!(Kind::of(&pad), Some(Kind::Gamepad));
+        let cap = sysfs("3 0 0 0 0", "3f", "0", "0", 0x256f);
+        assert_eq!(Kind::of(&cap), Some(Kind::Mouse3d));
+        let old_cap = sysfs("3 0 0 0 0", "0", "3f", "0", 0x046d);
+        assert_eq!(Kind::of(&old_cap), Some(Kind::Mouse3d));
+        for (what, device) in [
+            ("a mouse", sysfs("1f0000 0 0 0 0", "0", "903", "0", 0x046d)),
+            (
+                "a keyboard",
+                sysfs(
+                    "1000000000007 ff9f207ac14057ff febeffdfffefffff fffffffffffffffe",
+                    "0",
+                    "0",
+                    "0",
+                    1,
+                ),
+            ),
+            ("the motion sensor of a gamepad", sysfs("0", "3f", "0", "40", 0x054c)),
+            (
+                "the touchpad of a gamepad",
+                sysfs("2420 10000 0 0 0 0", "260800000000003", "0", "5", 0x054c),
+            ),
+            (
+                "a joystick with six axes",
+                sysfs("fff00000000 0 0 0 0", "3f", "0", "0", 0x046d),
+            ),
+            ("nothing", Abilities::default()),
+        ] {
+            assert_eq!(Kind::of(&device), None, "{what}");
+        }
+    }
+
+    #[test]
+    fn each_button_of_the_gamepad_can_be_pressed() {
+        let keys = [
+            KeyCode::BTN_SOUTH,
+            KeyCode::BTN_EAST,
+            KeyCode::BTN_SELECT,
+            KeyCode::BTN_START,
+        ];
+        let does: Vec<Button> = keys.into_iter().filter_map(|k| Kind::Gamepad.button(k)).collect();
+        assert!(Button::ALL.iter().all(|b| does.contains(b)));
+        assert!(keys.into_iter().all(|k| !Kind::Gamepad.slows(k)));
+    }
+}

@@ -1,0 +1,46 @@
+//! Structures out of a DICOM RT Structure Set as they are drawn: one that lies in another takes nothing from it.
+
+use super::structure::{Region, Structure};
+use std::path::Path;
+use stylet_files::dicom;
+use stylet_files::dicom::structures::{Solid, StructureSet};
+
+const PITCH_M: f64 = 0.5e-3;
+const FEWEST_POINTS: f64 = 20_000.0;
+
+impl Region for Solid {
+    fn bounds_m(&self) -> ([f64; 3], [f64; 3]) {
+        (self.lower_m, self.upper_m)
+    }
+
+    fn contains(&self, point_m: [f64; 3]) -> bool {
+        Solid::contains(self, point_m)
+    }
+}
+
+/// Structures, and what was left out of the file.
+type Drawn = (Vec<Structure>, Vec<String>);
+
+/// `None` for a file that is no DICOM.
+pub fn structures(path: &Path, most_points: usize) -> Result<Option<Drawn>, String> {
+    let told = |why: String| format!("{}: {why}", path.display());
+    let bytes = stylet_files::open::whole(path, &stylet_files::Progress::default()).map_err(told)?;
+    if !dicom::is_dicom(&bytes) {
+        return Ok(None);
+    }
+    let set = dicom::read(&bytes).and_then(|o| StructureSet::of(&o)).map_err(told)?;
+    let solids = set.solids().map_err(told)?;
+    let structures = solids.iter().map(|s| of_solid(s, most_points)).collect::<Vec<_>>();
+    Ok(Some((
+        structures.into_iter().filter(|s| !s.points_m.is_empty()).collect(),
+        set.notes,
+    )))
+}
+
+/// The box around it is filled at most half by a rounded body, and a pitch finer than wanted does no harm.
+fn of_solid(solid: &Solid, most_points: usize) -> Structure {
+    let box_m3: f64 = (0..3).map(|a| (solid.upper_m[a] - solid.lower_m[a]).max(0.0)).product();
+    let finest = (box_m3 / most_points as f64).cbrt();
+    let pitch_m = PITCH_M.min((box_m3 / 2.0 / FEWEST_POINTS).cbrt()).max(finest).max(1e-5);
+    Structure::of_region(&solid.name, solid, pitch_m)
+}

@@ -1,0 +1,119 @@
+//! Scene files, good and with everything wrong at once.
+
+use super::*;
+use nalgebra::{Matrix3, Vector3};
+
+const FULL: &str = r#"
+name = "phantom"
+[volume]
+file = "gland.nrrd"
+[image]
+file = "trus.nii.gz"
+[[structure]]
+name = "Prostate"
+young_kpa = 20
+stretch = [0.6, 1.5]
+shear_deg = 45
+[[structure]]
+label = 2
+called = "Rectum"
+fixed = true
+[[structure]]
+label = 3
+role = "leave out"
+[needle]
+insert_mm_per_s = 5
+[device]
+name = "sim"
+[plan]
+file = "plan.dcm"
+"#;
+
+fn voxels() -> Voxels {
+    Voxels {
+        dims: [4, 4, 4],
+        labels: (0..64).map(|i| [1, 2, 3, 4][i / 16]).collect(),
+        frame: crate::VoxelFrame::new(Matrix3::identity() * 2e-3, Vector3::zeros(), "test").unwrap(),
+        names: [(1, "Prostate".to_owned())].into(),
+    }
+}
+
+#[test]
+fn structures_are_found_by_name_or_label_and_made_of_what_the_file_says() {
+    let scene = parse(FULL).unwrap();
+    assert_eq!(scene.insert_m_per_s, Some(5e-3));
+    assert_eq!(scene.image.as_deref(), Some(Path::new("trus.nii.gz")));
+    assert_eq!((scene.device.as_deref(), scene.retract_m_per_s), (Some("sim"), None));
+    let tissues = scene.tissues(&voxels()).unwrap();
+    let names: Vec<(&str, Role)> = tissues.iter().map(|t| (t.name.as_str(), t.role)).collect();
+    assert_eq!(names, [("Prostate", Role::Target), ("Rectum", Role::Spare)]);
+    assert_eq!(tissues[0].material.young_pa, 20e3);
+    let limits = tissues[0].material.limits.unwrap()[2];
+    assert!((limits[2] - std::f64::consts::FRAC_PI_4).abs() < 1e-12 && limits[0] == 0.6);
+    assert!(tissues[1].material.fixed);
+    let volume = LabelVolume::from_tissues(&voxels(), tissues, "v".to_owned(), &Progress::default()).unwrap();
+    let cells = |label: u8| volume.cells.iter().filter(|&&c| c == label).count();
+    assert_eq!([1, 2, 3, 4].map(cells), [16, 16, 0, 0]);
+    assert!(
+        volume
+            .warnings
+            .iter()
+            .any(|w| w.contains("left out: 3 (16 voxels), 4 (16 voxels)")),
+        "{:?}",
+        volume.warnings
+    );
+}
+
+#[test]
+fn every_problem_of_a_scene_file_is_told_at_once() {
+    let wrong = r#"
+nmae = "x"
+[volume]
+[[structure]]
+role = "targte"
+[[structure]]
+label = 300
+young_kpa = "soft"
+stretch = [1.2, 0.8]
+[[structure]]
+label = 1
+name = "Prostate"
+poisson = 0.5
+[needle]
+speed = 3
+insert_mm_per_s = 9000
+[device]
+name = 7
+"#;
+    let why = parse(wrong).unwrap_err();
+    for expected in [
+        "nmae is not known",
+        "[volume] file is missing",
+        "[[structure]] 1: label or name is missing",
+        "[[structure]] 1: role must be",
+        "[[structure]] 2: label must be a number from 1 to 255",
+        "[[structure]] 2: young_kpa must be a number",
+        "[[structure]] 2: stretch and shear_deg belong together",
+        "[[structure]] 3: label and name are both there",
+        "[[structure]] 3: poisson must be",
+        "[needle] speed is not known",
+        "[needle] insert_mm_per_s must be a number from 0.1 to 500",
+        "[device] name must be a text",
+    ] {
+        assert!(why.contains(expected), "{expected}:\n{why}");
+    }
+    assert!(parse("").unwrap_err().contains("[volume] file is missing"));
+    assert!(parse("volume = 3").unwrap_err().contains("must be a table"));
+    assert!(parse("= 3").unwrap_err().contains("not TOML"));
+}
+
+#[test]
+fn structures_that_the_volume_has_not_are_told_together() {
+    let scene = parse("[volume]\nfile = \"a\"\n[[structure]]\nname = \"Bladder\"\n[[structure]]\nlabel = 9\n[[structure]]\nlabel = 1\n[[structure]]\nname = \"prostate\"").unwrap();
+    let why = scene.tissues(&voxels()).unwrap_err();
+    assert!(why.contains("no structure \"Bladder\"; it has Prostate"), "{why}");
+    assert!(
+        why.contains("no voxel with label 9") && why.contains("label 1 has a structure already"),
+        "{why}"
+    );
+}

@@ -1,0 +1,5 @@
+//! The host side of shared memory: the link to the core, which core and scene a command asks for, recordings.
+
+pub mod core_args;
+pub mod link;
+pub mod record;

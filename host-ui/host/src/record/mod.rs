@@ -1,0 +1,181 @@
+//! A session on disk: every record of the force loop, the tissue's snapshots and what happened, in MCAP; and what can be
+//! made of such a file.
+//!
+//! One thread takes what comes from shared memory, another encodes and writes it: the disk may be slow for as long as
+//! memory lasts. Every tick that is missing is counted.
+
+mod export;
+mod gaps;
+mod messages;
+mod read;
+mod writer;
+
+pub use export::{Export, export};
+pub use gaps::{Gap, Gaps};
+pub use read::{Recording, read};
+
+use crate::link::{Link, LinkStatus};
+use std::path::PathBuf;
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+use stylet_base::interrupt::Interrupt;
+use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::service::Instance;
+use writer::{Item, Totals};
+
+const POLL_EVERY: Duration = Duration::from_millis(2);
+const FIND_LIMIT: Duration = Duration::from_secs(3);
+const TELL_EVERY: Duration = Duration::from_secs(10);
+
+pub struct Options {
+    pub instance: Instance,
+    pub out: PathBuf,
+    /// Until interrupted, or until the core ends, when not given.
+    pub duration: Option<Duration>,
+    /// Snapshots of the gland kept in a second; 0 for none.
+    pub snapshots_hz: f64,
+}
+
+/// Records until the time is over or it is interrupted; an error when a tick was lost on the way.
+pub fn run(options: &Options) -> Result<(), String> {
+    let interrupted = Interrupt::on_signals()?;
+    let stop = || interrupted.asked();
+    let mut link = Link::new(options.instance.clone());
+    find_core(&mut link, stop)?;
+    let (send, receive) = mpsc::channel();
+    let path = options.out.clone();
+    let writer = std::thread::Builder::new()
+        .name("recording".to_owned())
+        .spawn(move || writer::write_all(&path, &receive))
+        .map_err(|e| format!("no thread could be started to write: {e}"))?;
+    take(&mut link, options, stop, &send);
+    drop(send);
+    let totals = writer
+        .join()
+        .map_err(|_| "the recording ended by itself".to_owned())??;
+    println!("{}: {}", options.out.display(), totals.words());
+    totals.verdict()
+}
+
+fn find_core(link: &mut Link, stop: impl Fn() -> bool) -> Result<(), String> {
+    let begun = Instant::now();
+    while begun.elapsed() < FIND_LIMIT && !stop() {
+        link.poll();
+        if link.status() == LinkStatus::Live && link.scene().is_some() {
+            // What came before the recording began is not part of it.
+            link.take_records();
+            return Ok(());
+        }
+        std::thread::sleep(POLL_EVERY);
+    }
+    match link.status() {
+        LinkStatus::Absent { why } => Err(why),
+        _ => Err("rt-core is there but does not answer; end it and start it again".to_owned()),
+    }
+}
+
+/// What was last handed to the writer.
+#[derive(Default)]
+struct Handed {
+    session: Option<u64>,
+    event: u64,
+    tissue_tick: u64,
+    snapshot_ns: u64,
+}
+
+/// Takes what comes and hands it to the writer, which never makes this thread wait.
+fn take(link: &mut Link, options: &Options, stop: impl Fn() -> bool, to: &mpsc::Sender<Item>) {
+    let begun = Instant::now();
+    let mut told = begun;
+    let mut handed = Handed::default();
+    let mut records = 0;
+    while !stop() && options.duration.is_none_or(|d| begun.elapsed() < d) {
+        link.poll();
+        let mut items = Vec::new();
+        handed.collect(link, options.snapshots_hz, &mut items);
+        for item in items {
+            if let Item::Records(new) = &item {
+                records += new.len();
+            }
+            // A writer that ended has its reason told at the end.
+            if to.send(item).is_err() {
+                return;
+            }
+        }
+        if matches!(link.status(), LinkStatus::Absent { .. }) && options.duration.is_none() {
+            return;
+        }
+        if told.elapsed() >= TELL_EVERY {
+            told = Instant::now();
+            println!("{:5.0} s  {records} ticks", begun.elapsed().as_secs_f64());
+        }
+        std::thread::sleep(POLL_EVERY);
+    }
+}
+
+impl Handed {
+    fn collect(&mut self, link: &mut Link, snapshots_hz: f64, items: &mut Vec<Item>) {
+        if let Some(session) = link.session().filter(|s| self.session != Some(s.session_id)) {
+            self.session = Some(session.session_id);
+            (self.event, self.tissue_tick, self.snapshot_ns) = (0, 0, 0);
+            items.push(Item::Session(Box::new(*session)));
+        }
+        let records = link.take_records();
+        if !records.is_empty() {
+            items.push(Item::Records(records));
+        }
+        for event in link.events().iter().filter(|e| e.sequence > self.event) {
+            items.push(Item::Event(Box::new(*event)));
+        }
+        self.event = link.events().back().map_or(self.event, |e| e.sequence);
+        if let Some(snapshot) = link.snapshot().filter(|s| s.header.tissue_tick != self.tissue_tick) {
+            self.tissue_tick = snapshot.header.tissue_tick;
+            let due = snapshots_hz > 0.0
+                && snapshot.header.time_ns.saturating_sub(self.snapshot_ns) as f64 * 1e-9 >= 0.999 / snapshots_hz;
+            if due {
+                self.snapshot_ns = snapshot.header.time_ns;
+                items.push(Item::Snapshot(Box::new(snapshot.clone())));
+            } else {
+                items.push(Item::SnapshotLeftOut);
+            }
+        }
+        if let Some(state) = link.state() {
+            items.push(Item::LostInCore(state.records_lost));
+        }
+    }
+}
+
+/// Asks the core for its flight recording; gives what the core says of it.
+pub fn save_flight(instance: &Instance) -> Result<String, String> {
+    let mut link = Link::new(instance.clone());
+    find_core(&mut link, || false)?;
+    let before = link.events().back().map_or(0, |e| e.sequence);
+    let id = link.send(CommandKind::SaveFlight, &[]).map_err(|e| e.0)?;
+    let begun = Instant::now();
+    let mut accepted = false;
+    while begun.elapsed() < Duration::from_secs(10) {
+        link.poll();
+        if let Some(answer) = link.reply(id) {
+            if !answer.accepted {
+                return Err(answer.text);
+            }
+            accepted = true;
+        }
+        let kind = stylet_shm_schema::EventKind::FlightSaved as u32;
+        let saved = link.events().iter().find(|e| e.sequence > before && e.kind == kind);
+        if let Some(event) = saved.filter(|_| accepted) {
+            return Ok(event.text.read());
+        }
+        std::thread::sleep(POLL_EVERY);
+    }
+    Err("the core did not write its flight recording in time".to_owned())
+}
+
+impl Totals {
+    fn verdict(&self) -> Result<(), String> {
+        match self.gaps.missing() {
+            0 => Ok(()),
+            n => Err(format!("{n} ticks are missing in {} gaps", self.gaps.gaps().len())),
+        }
+    }
+}

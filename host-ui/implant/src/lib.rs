@@ -1,0 +1,6 @@
+//! The implant: its plan, the procedure that carries it out, compensation by rehearsal, and its score.
+
+pub mod plan;
+pub mod procedure;
+pub mod score;
+pub mod workflow;

@@ -1,0 +1,252 @@
+//! What a plan must know of the body: the target and what is to be spared, as closed surfaces of the scene at rest.
+
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+use stylet_dose::mesh::Mesh;
+use stylet_dose::structure::Region;
+use stylet_dose::{Structure, structure};
+use stylet_host::link::SceneModel;
+use stylet_shm_schema::{StructureInfo, role};
+
+/// Steps in which a needle's way is looked at.
+const STEP_M: f64 = 0.5e-3;
+
+/// Lines of a template run along the planes on which corners of a mesh lie, where inside and outside are not told apart: a
+/// place is looked at this little beside itself.
+const BESIDE_M: [f64; 3] = [0.0, 1.37e-8, 2.71e-8];
+
+/// One structure, closed.
+pub struct Body {
+    pub name: String,
+    mesh: Mesh,
+    points_m: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Body {
+    /// The mesh must be closed.
+    fn new(name: &str, points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Self, String> {
+        Ok(Self {
+            name: name.to_owned(),
+            mesh: Mesh::new(points_m, triangles)?,
+            points_m: points_m.iter().map(|p| p.map(|c| c as f32)).collect(),
+            triangles: triangles.iter().map(|t| t.map(|i| i as u32)).collect(),
+        })
+    }
+
+    /// Its surface, as it is drawn.
+    pub fn surface(&self) -> (&[[f32; 3]], &[[u32; 3]]) {
+        (&self.points_m, &self.triangles)
+    }
+
+    pub fn contains(&self, point_m: [f64; 3]) -> bool {
+        self.mesh.contains([0, 1, 2].map(|a| point_m[a] + BESIDE_M[a]))
+    }
+
+    pub fn bounds_m(&self) -> ([f64; 3], [f64; 3]) {
+        self.mesh.bounds_m()
+    }
+
+    /// Points for dose, one a cell.
+    pub fn structure(&self, pitch_m: f64) -> Structure {
+        Structure::of_region(&self.name, &self.mesh, pitch_m)
+    }
+
+    /// The pieces of a line inside, as distances from its start; to half a step.
+    pub fn pieces_m(&self, from_m: [f64; 3], direction: [f64; 3], length_m: f64) -> Vec<[f64; 2]> {
+        let mut pieces: Vec<[f64; 2]> = Vec::new();
+        let mut was_inside = false;
+        for step in 0..=(length_m / STEP_M).max(0.0) as usize {
+            let along_m = step as f64 * STEP_M;
+            let inside = self.contains([0, 1, 2].map(|a| from_m[a] + direction[a] * along_m));
+            match pieces.last_mut() {
+                Some(piece) if inside && was_inside => piece[1] = along_m,
+                _ if inside => pieces.push([along_m, along_m]),
+                _ => {}
+            }
+            was_inside = inside;
+        }
+        pieces
+    }
+
+    /// Whether a point or one of eight around it, across `direction`, lies inside.
+    pub fn is_near(&self, point_m: [f64; 3], direction: [f64; 3], within_m: f64) -> bool {
+        let direction = Vector3::from(direction);
+        let helper = if direction.x.abs() < 0.7 {
+            Vector3::x()
+        } else {
+            Vector3::y()
+        };
+        let across = direction.cross(&helper).normalize();
+        let other = direction.cross(&across);
+        let around = (0..8).map(|i| {
+            let (sine, cosine) = (f64::from(i) * std::f64::consts::FRAC_PI_4).sin_cos();
+            (Vector3::from(point_m) + (across * cosine + other * sine) * within_m).into()
+        });
+        self.contains(point_m) || (within_m > 0.0 && around.into_iter().any(|p| self.contains(p)))
+    }
+}
+
+/// Target, what is spared, and the box of all tissue.
+pub struct Anatomy {
+    pub target: Body,
+    pub spared: Vec<Body>,
+    pub lower_m: [f64; 3],
+    pub upper_m: [f64; 3],
+    /// Patient (RAS, m) from scene: row-major rotation, then translation.
+    pub patient_from_scene: [f64; 12],
+}
+
+impl Anatomy {
+    /// From what the core sent; an error when the scene has no closed target.
+    pub fn of(scene: &SceneModel) -> Result<Self, String> {
+        let header = &scene.header;
+        let part = |s: &StructureInfo| {
+            let first = s.first_triangle as usize;
+            body(
+                scene,
+                &s.name.read(),
+                &scene.triangles[first..first + s.triangle_count as usize],
+            )
+        };
+        let drawn = |s: &&StructureInfo| s.triangle_count > 0;
+        let structures = || header.structures().iter().filter(drawn);
+        let target = match structures().find(|s| s.role & role::TARGET != 0) {
+            Some(target) => part(target),
+            // A body of one structure is the target as a whole.
+            None => {
+                let name = header.structures().first().map_or_else(String::new, |s| s.name.read());
+                body(scene, &name, &scene.triangles[..header.body_triangle_count as usize])
+            }
+        };
+        let spared = structures().filter(|s| s.role & role::SPARE != 0).map(part);
+        Ok(Self {
+            target: target?,
+            spared: spared.collect::<Result<_, _>>()?,
+            lower_m: header.lower_m,
+            upper_m: header.upper_m,
+            patient_from_scene: header.patient_from_scene,
+        })
+    }
+
+    /// The structures that dose is counted in, the target first.
+    pub fn structures(&self, pitch_m: f64) -> Vec<Structure> {
+        let bodies = std::iter::once(&self.target).chain(&self.spared);
+        bodies.map(|b| b.structure(pitch_m)).collect()
+    }
+
+    /// The first structure to be spared that the needle comes into within `margin_m` on its way to `depth_m`.
+    pub fn spared_in_the_way(
+        &self,
+        entry_m: [f64; 3],
+        direction: [f64; 3],
+        depth_m: f64,
+        margin_m: f64,
+    ) -> Option<&Body> {
+        let steps = (depth_m / STEP_M).max(0.0) as usize;
+        self.spared.iter().find(|body| {
+            (0..=steps).any(|step| {
+                let along_m = step as f64 * STEP_M;
+                body.is_near(
+                    [0, 1, 2].map(|a| entry_m[a] + direction[a] * along_m),
+                    direction,
+                    margin_m,
+                )
+            })
+        })
+    }
+}
+
+/// The surface that the core draws goes through the middles of the outermost elements: the body ends half an element further
+/// out.
+fn body(scene: &SceneModel, name: &str, triangles: &[[u32; 3]]) -> Result<Body, String> {
+    let mut numbers = BTreeMap::new();
+    let mut points_m: Vec<Vector3<f64>> = Vec::new();
+    let mut normals: Vec<Vector3<f64>> = Vec::new();
+    let mut corners = Vec::with_capacity(triangles.len());
+    for triangle in triangles {
+        let t = triangle.map(|vertex| {
+            *numbers.entry(vertex).or_insert_with(|| {
+                points_m.push(Vector3::from(scene.rest_m[vertex as usize].map(f64::from)));
+                normals.push(Vector3::zeros());
+                points_m.len() - 1
+            })
+        });
+        let [a, b, c] = t.map(|i| points_m[i]);
+        let area = (b - a).cross(&(c - a));
+        t.iter().for_each(|&i| normals[i] += area);
+        corners.push(t);
+    }
+    let half_m = scene.header.spacing_m / 2.0;
+    let out = |(p, n): (&Vector3<f64>, &Vector3<f64>)| (p + n.try_normalize(1e-30).unwrap_or_default() * half_m).into();
+    let moved: Vec<[f64; 3]> = points_m.iter().zip(&normals).map(out).collect();
+    Body::new(name, &moved, &corners).map_err(|why| format!("the surface of {name}: {why}"))
+}
+
+/// A body from a closed surface that is not the core's.
+pub fn body_of(name: &str, points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Body, String> {
+    Body::new(name, points_m, triangles)
+}
+
+/// A ball, drawn by triangles; for tests and for scenes without files.
+pub fn ball(name: &str, middle_m: [f64; 3], half_m: [f64; 3]) -> Body {
+    const ROWS: usize = 24;
+    const COLUMNS: usize = 48;
+    let mut points_m = vec![[0, 1, 2].map(|a| middle_m[a] - if a == 2 { half_m[a] } else { 0.0 })];
+    for row in 1..ROWS {
+        let (across, along) = (row as f64 / ROWS as f64 * std::f64::consts::PI).sin_cos();
+        for column in 0..COLUMNS {
+            let (sine, cosine) = (column as f64 / COLUMNS as f64 * std::f64::consts::TAU).sin_cos();
+            let unit = [across * cosine, across * sine, -along];
+            points_m.push([0, 1, 2].map(|a| middle_m[a] + half_m[a] * unit[a]));
+        }
+    }
+    points_m.push([0, 1, 2].map(|a| middle_m[a] + if a == 2 { half_m[a] } else { 0.0 }));
+    let last = points_m.len() - 1;
+    let at = |row: usize, column: usize| match row {
+        0 => 0,
+        ROWS => last,
+        _ => 1 + (row - 1) * COLUMNS + column % COLUMNS,
+    };
+    let mut triangles = Vec::new();
+    for (row, column) in (0..ROWS).flat_map(|r| (0..COLUMNS).map(move |c| (r, c))) {
+        let [a, b, c, d] = [
+            at(row, column),
+            at(row, column + 1),
+            at(row + 1, column + 1),
+            at(row + 1, column),
+        ];
+        if row > 0 {
+            triangles.push([a, b, c]);
+        }
+        if row + 1 < ROWS {
+            triangles.push([a, c, d]);
+        }
+    }
+    let body = Body::new(name, &points_m, &triangles);
+    body.unwrap_or_else(|why| unreachable!("the grid of a ball is closed: {why}"))
+}
+
+/// Box around points.
+pub fn bounds_of(points_m: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
+    structure::bounds(points_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ball_has_its_volume_and_a_needle_through_it_the_right_piece() {
+        let ball = ball("gland", [0.05, 0.04, 0.03], [0.02, 0.015, 0.01]);
+        let volume: f64 = ball.structure(1e-3).volumes_m3.iter().sum();
+        let exact = 4.0 / 3.0 * std::f64::consts::PI * 0.02 * 0.015 * 0.01;
+        assert!((volume / exact - 1.0).abs() < 0.01, "{volume} {exact}");
+        let pieces = ball.pieces_m([0.05, 0.04, 0.0], [0.0, 0.0, 1.0], 0.1);
+        assert_eq!(pieces.len(), 1);
+        assert!((pieces[0][0] - 0.02).abs() < 1e-3 && (pieces[0][1] - 0.04).abs() < 1e-3);
+        assert!(ball.is_near([0.0305, 0.04, 0.03], [0.0, 0.0, 1.0], 0.0));
+        assert!(!ball.is_near([0.0285, 0.04, 0.03], [0.0, 0.0, 1.0], 1e-3));
+        assert!(ball.is_near([0.0285, 0.04, 0.03], [0.0, 0.0, 1.0], 2e-3));
+    }
+}

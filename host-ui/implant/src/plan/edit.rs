@@ -1,0 +1,258 @@
+//! Edits of a plan: each gives a new one, so that undo is a stack of values.
+
+use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, SEED_LENGTH_M, SPACER_M};
+
+/// Steps that can be taken back.
+const STEPS: usize = 100;
+const NO_NEEDLE: &str = "there is no such needle";
+const NO_SEED: &str = "there is no such seed on the needle";
+
+/// The seeds of a needle, evenly apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    pub count: usize,
+    /// From the entry to the first one.
+    pub deepest_m: f64,
+    /// From middle to middle.
+    pub pitch_m: f64,
+    pub stranded: bool,
+    pub strength_u: f64,
+}
+
+impl Row {
+    /// As many seeds as fill a piece of a needle at the usual distance, in its middle.
+    pub fn filling([from_m, to_m]: [f64; 2], strength_u: f64) -> Self {
+        let pitch_m = SEED_LENGTH_M + SPACER_M;
+        let count = ((to_m - from_m) / pitch_m).max(0.0) as usize + 1;
+        Self {
+            count,
+            deepest_m: (from_m + to_m + (count - 1) as f64 * pitch_m) / 2.0,
+            pitch_m,
+            stranded: count > 1,
+            strength_u,
+        }
+    }
+
+    /// As the first two seeds of a needle have it; `None` without seeds.
+    pub fn of(needle: &Needle) -> Option<Self> {
+        let first = needle.seeds.first()?;
+        let pitch_m = match needle.seeds.get(1) {
+            Some(second) => first.along_m - second.along_m,
+            None => needle.loading.pitch_m().unwrap_or(SEED_LENGTH_M + SPACER_M),
+        };
+        Some(Self {
+            count: needle.seeds.len(),
+            deepest_m: first.along_m,
+            pitch_m,
+            stranded: needle.loading != Loading::Loose,
+            strength_u: first.strength_u,
+        })
+    }
+}
+
+impl ImplantPlan {
+    /// All seeds of a needle anew.
+    pub fn with_row(&self, needle: usize, row: Row) -> Result<Self, String> {
+        if row.count == 0 || row.pitch_m.is_nan() || row.pitch_m < SEED_LENGTH_M {
+            let length_mm = SEED_LENGTH_M * 1e3;
+            return Err(format!(
+                "a needle has at least one seed, and from one to the next it is {length_mm} mm or more; take the needle away instead"
+            ));
+        }
+        self.change(needle, |n| {
+            let spacer_m = row.pitch_m - SEED_LENGTH_M;
+            n.loading = match row.stranded {
+                true => Loading::Stranded { spacer_m },
+                false => Loading::Loose,
+            };
+            n.seeds = Needle::strand(row.count, row.deepest_m, spacer_m, row.strength_u);
+            Ok(())
+        })
+    }
+
+    /// A needle through a hole of the template, without seeds.
+    pub fn with_needle(&self, hole: Hole, depth_m: f64) -> Result<Self, String> {
+        if self.needles.iter().any(|n| n.hole == Some(hole)) {
+            return Err(format!("a needle goes through {hole} already"));
+        }
+        let mut plan = self.clone();
+        plan.needles.push(Needle {
+            hole: Some(hole),
+            entry_m: self.template.hole_m(hole),
+            direction: self.template.inwards,
+            depth_m,
+            retract_to_m: 0.0,
+            loading: Loading::Loose,
+            seeds: Vec::new(),
+        });
+        Ok(plan)
+    }
+
+    pub fn without_needle(&self, needle: usize) -> Result<Self, String> {
+        let mut plan = self.clone();
+        if needle >= plan.needles.len() {
+            return Err(NO_NEEDLE.to_owned());
+        }
+        plan.needles.remove(needle);
+        Ok(plan)
+    }
+
+    /// The needle and its seeds to another hole, as deep as before.
+    pub fn with_needle_at(&self, needle: usize, hole: Hole) -> Result<Self, String> {
+        if self
+            .needles
+            .iter()
+            .enumerate()
+            .any(|(n, other)| n != needle && other.hole == Some(hole))
+        {
+            return Err(format!("a needle goes through {hole} already"));
+        }
+        let entry_m = self.template.hole_m(hole);
+        self.change(needle, |n| {
+            (n.hole, n.entry_m) = (Some(hole), entry_m);
+            Ok(())
+        })
+    }
+
+    /// One more loose seed; a strand becomes loose.
+    pub fn with_seed(&self, needle: usize, along_m: f64, strength_u: f64) -> Result<Self, String> {
+        self.change(needle, |n| {
+            n.loading = Loading::Loose;
+            n.seeds.push(NeedleSeed { along_m, strength_u });
+            Ok(())
+        })
+    }
+
+    /// A strand loses the seed at its end only.
+    pub fn without_seed(&self, needle: usize, seed: usize) -> Result<Self, String> {
+        self.change(needle, |n| {
+            if seed >= n.seeds.len() {
+                return Err(NO_SEED.to_owned());
+            }
+            if n.loading != Loading::Loose && seed > 0 && seed + 1 < n.seeds.len() {
+                return Err(
+                    "a seed in the middle of a strand cannot be taken out; make the needle loose first".to_owned(),
+                );
+            }
+            n.seeds.remove(seed);
+            Ok(())
+        })
+    }
+
+    /// The whole strand moves with a seed of it.
+    pub fn with_seed_at(&self, needle: usize, seed: usize, along_m: f64) -> Result<Self, String> {
+        self.change(needle, |n| {
+            let by_m = along_m - n.seeds.get(seed).ok_or(NO_SEED)?.along_m;
+            let alone = n.loading == Loading::Loose;
+            for (number, s) in n.seeds.iter_mut().enumerate() {
+                s.along_m += if alone && number != seed { 0.0 } else { by_m };
+            }
+            Ok(())
+        })
+    }
+
+    /// All seeds of a needle anew, as a strand with the usual spacers.
+    pub fn with_strand(
+        &self,
+        needle: usize,
+        count: usize,
+        first_along_m: f64,
+        strength_u: f64,
+    ) -> Result<Self, String> {
+        self.change(needle, |n| {
+            n.loading = Loading::Stranded { spacer_m: SPACER_M };
+            n.seeds = Needle::strand(count, first_along_m, SPACER_M, strength_u);
+            Ok(())
+        })
+    }
+
+    /// The seeds stay where they are and are no longer joined.
+    pub fn with_loose_seeds(&self, needle: usize) -> Result<Self, String> {
+        self.change(needle, |n| {
+            n.loading = Loading::Loose;
+            Ok(())
+        })
+    }
+
+    /// Every seed gets this strength.
+    pub fn with_strength(&self, strength_u: f64) -> Self {
+        let mut plan = self.clone();
+        let seeds = plan.needles.iter_mut().flat_map(|n| &mut n.seeds);
+        seeds.for_each(|s| s.strength_u = strength_u);
+        plan
+    }
+
+    fn change(&self, needle: usize, edit: impl FnOnce(&mut Needle) -> Result<(), String>) -> Result<Self, String> {
+        let mut plan = self.clone();
+        let changed = plan.needles.get_mut(needle).ok_or(NO_NEEDLE)?;
+        edit(changed)?;
+        *changed = changed.clone().in_order();
+        Ok(plan)
+    }
+}
+
+/// A plan with the plans that it was before, and those that were taken back.
+#[derive(Clone, Debug, PartialEq)]
+pub struct History {
+    now: ImplantPlan,
+    before: Vec<ImplantPlan>,
+    taken_back: Vec<ImplantPlan>,
+}
+
+impl History {
+    pub fn new(plan: ImplantPlan) -> Self {
+        Self {
+            now: plan,
+            before: Vec::new(),
+            taken_back: Vec::new(),
+        }
+    }
+
+    pub fn plan(&self) -> &ImplantPlan {
+        &self.now
+    }
+
+    /// A plan that is the same is no step.
+    pub fn put(&mut self, plan: ImplantPlan) {
+        if plan == self.now {
+            return;
+        }
+        self.before.push(std::mem::replace(&mut self.now, plan));
+        self.taken_back.clear();
+        if self.before.len() > STEPS {
+            self.before.remove(0);
+        }
+    }
+
+    /// In place of the present plan, without a step: a value that is still being drawn.
+    pub fn replace(&mut self, plan: ImplantPlan) {
+        self.now = plan;
+        self.taken_back.clear();
+    }
+
+    pub fn can_undo(&self) -> bool {
+        !self.before.is_empty()
+    }
+
+    pub fn can_redo(&self) -> bool {
+        !self.taken_back.is_empty()
+    }
+
+    /// False when there is nothing to take back.
+    pub fn undo(&mut self) -> bool {
+        let Some(plan) = self.before.pop() else { return false };
+        self.taken_back.push(std::mem::replace(&mut self.now, plan));
+        true
+    }
+
+    pub fn redo(&mut self) -> bool {
+        let Some(plan) = self.taken_back.pop() else {
+            return false;
+        };
+        self.before.push(std::mem::replace(&mut self.now, plan));
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,91 @@
+//! Plans in and out of files of any of the formats, by the file's ending.
+
+use super::file::{self, Frames};
+use super::{ImplantPlan, Template};
+use std::path::Path;
+use stylet_dose::Source;
+use stylet_dose::files::SeedDefaults;
+use stylet_files::convert::write_whole;
+use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
+use stylet_files::dicom::{Identity, new_uid};
+use stylet_shm_schema::SceneHeader;
+
+/// Of seeds that do not say what they are.
+pub const USUAL_SOURCE: &str = "6711";
+
+/// What a plan's source and prescription are where nothing says so.
+pub fn usual() -> Result<(Source, f64), String> {
+    let source = Source::known(USUAL_SOURCE).ok_or("the usual source is not known")?;
+    let prescription_gy = source.prescription_gy.ok_or("the usual source has no prescription")?;
+    Ok((source, prescription_gy))
+}
+
+/// A plan file (.toml), a table of seeds (.csv) or an RT Plan (.dcm); the error names the file.
+pub fn read(path: &Path, scene: &SceneHeader) -> Result<ImplantPlan, String> {
+    let frames = Frames::new(&scene.patient_from_scene);
+    if has_ending(path, "toml") {
+        return file::read(path, &frames);
+    }
+    let (source, prescription_gy) = usual()?;
+    let defaults = SeedDefaults {
+        strength_u: None,
+        strength_per_activity_u_per_mci: source.strength_per_activity_u_per_mci,
+    };
+    let template = Template::before(scene);
+    file::import_csv(path, defaults, &frames, template, &source.model, prescription_gy)
+}
+
+/// All of the plan as .toml, its seeds as .csv or .dcm.
+pub fn write(path: &Path, plan: &ImplantPlan, frames: &Frames) -> Result<(), String> {
+    let told = |why: String| format!("{}: {why}", path.display());
+    let bytes = if has_ending(path, "toml") {
+        file::to_text(plan, frames).map_err(told)?.into_bytes()
+    } else if has_ending(path, "csv") {
+        file::seeds_to_csv(plan, frames).into_bytes()
+    } else if has_ending(path, "dcm") {
+        seed_plan(plan, frames).and_then(|p| plan::bytes(&p)).map_err(told)?
+    } else {
+        return Err(told("its name must end in .toml, .csv or .dcm".to_owned()));
+    };
+    write_whole(path, &bytes)
+}
+
+fn seed_plan(plan: &ImplantPlan, frames: &Frames) -> Result<SeedPlan, String> {
+    let source = Source::known(&plan.source).ok_or_else(|| {
+        format!(
+            "an RT Plan holds isotope and half-life, and those of source {} are not known; write .toml",
+            plan.source
+        )
+    })?;
+    let of_needle = |needle: &super::Needle| {
+        let name = needle.hole.map_or_else(String::new, |h| h.to_string());
+        let axis = Some(frames.turned_to_patient(needle.direction));
+        let seed = |(place, strength_u): ([f64; 3], f64)| PlanSeed {
+            needle: name.clone(),
+            position_m: frames.to_patient_m(place),
+            axis,
+            strength_u,
+        };
+        let strengths = needle.seeds.iter().map(|s| s.strength_u);
+        needle.seeds_m().zip(strengths).map(seed).collect::<Vec<_>>()
+    };
+    Ok(SeedPlan {
+        label: "Stylet".to_owned(),
+        identity: Identity::new(),
+        uid: new_uid(),
+        prescription_gy: Some(plan.prescription_gy),
+        source: PlanSource {
+            model: source.model.clone(),
+            manufacturer: String::new(),
+            isotope: source.nuclide.clone(),
+            half_life_days: stylet_dose::decay::s_to_days(source.half_life_s),
+            active_length_m: source.tables.active_length_m,
+        },
+        seeds: plan.needles.iter().flat_map(of_needle).collect(),
+        notes: Vec::new(),
+    })
+}
+
+fn has_ending(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
+}

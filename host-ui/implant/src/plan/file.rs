@@ -1,0 +1,400 @@
+//! Plans in files: TOML with everything, CSV with the seeds alone; mm, patient frame (RAS).
+
+use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, Template};
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use stylet_dose::files::{SeedDefaults, read_seed_rows};
+use stylet_shm_schema::MAX_SEEDS;
+
+const FORMAT: &str = "stylet plan, mm, RAS";
+const MAX_BYTES: u64 = 4 << 20;
+const MAX_NEEDLES: usize = 169;
+const MAX_MM: f64 = 10_000.0;
+/// Seeds whose lines are nearer than this are on one needle.
+const SAME_LINE_M: f64 = 0.5e-3;
+const HEADER: &str = "x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,needle,hole";
+
+/// The patient's frame and the scene's.
+#[derive(Clone, Copy, Debug)]
+pub struct Frames {
+    rotation: Matrix3<f64>,
+    origin_m: Vector3<f64>,
+}
+
+impl Frames {
+    /// Row-major rotation and translation of the scene (m); anything that is no rotation is taken as none.
+    pub fn new(patient_from_scene: &[f64; 12]) -> Self {
+        let rotation = Matrix3::from_row_slice(&patient_from_scene[..9]);
+        let is_rotation = (rotation * rotation.transpose() - Matrix3::identity()).norm() < 1e-3;
+        Self {
+            rotation: if is_rotation { rotation } else { Matrix3::identity() },
+            origin_m: Vector3::from_column_slice(&patient_from_scene[9..]),
+        }
+    }
+
+    pub fn to_patient_m(&self, in_scene_m: [f64; 3]) -> [f64; 3] {
+        (self.rotation * Vector3::from(in_scene_m) + self.origin_m).into()
+    }
+
+    pub fn to_scene_m(&self, in_patient_m: [f64; 3]) -> [f64; 3] {
+        (self.rotation.transpose() * (Vector3::from(in_patient_m) - self.origin_m)).into()
+    }
+
+    pub fn turned_to_patient(&self, direction: [f64; 3]) -> [f64; 3] {
+        (self.rotation * Vector3::from(direction)).into()
+    }
+
+    pub fn turned_to_scene(&self, direction: [f64; 3]) -> [f64; 3] {
+        (self.rotation.transpose() * Vector3::from(direction)).into()
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlanFile {
+    format: String,
+    source: String,
+    prescription_gy: f64,
+    template: TemplateFile,
+    #[serde(default, rename = "needle")]
+    needles: Vec<NeedleFile>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TemplateFile {
+    middle_hole_mm: [f64; 3],
+    columns: [f64; 3],
+    rows: [f64; 3],
+    inwards: [f64; 3],
+    pitch_mm: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct NeedleFile {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    hole: Option<String>,
+    entry_mm: [f64; 3],
+    direction: [f64; 3],
+    depth_mm: f64,
+    #[serde(default)]
+    retract_to_mm: f64,
+    /// Absent: the seeds are loose.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    spacer_mm: Option<f64>,
+    /// From the entry; deepest first.
+    seed_along_mm: Vec<f64>,
+    strength_u: Vec<f64>,
+}
+
+/// As TOML.
+pub fn to_text(plan: &ImplantPlan, frames: &Frames) -> Result<String, String> {
+    let (mm, turned) = (
+        |v: [f64; 3]| frames.to_patient_m(v).map(|c| c * 1e3),
+        |d| frames.turned_to_patient(d),
+    );
+    let t = &plan.template;
+    let needle = |n: &Needle| NeedleFile {
+        hole: n.hole.map(|h| h.to_string()),
+        entry_mm: mm(n.entry_m),
+        direction: turned(n.direction),
+        depth_mm: n.depth_m * 1e3,
+        retract_to_mm: n.retract_to_m * 1e3,
+        spacer_mm: match n.loading {
+            Loading::Loose => None,
+            Loading::Stranded { spacer_m } => Some(spacer_m * 1e3),
+        },
+        seed_along_mm: n.seeds.iter().map(|s| s.along_m * 1e3).collect(),
+        strength_u: n.seeds.iter().map(|s| s.strength_u).collect(),
+    };
+    let file = PlanFile {
+        format: FORMAT.to_owned(),
+        source: plan.source.clone(),
+        prescription_gy: plan.prescription_gy,
+        template: TemplateFile {
+            middle_hole_mm: mm(t.middle_m),
+            columns: turned(t.columns),
+            rows: turned(t.rows),
+            inwards: turned(t.inwards),
+            pitch_mm: t.pitch_m * 1e3,
+        },
+        needles: plan.needles.iter().map(needle).collect(),
+    };
+    toml::to_string(&file).map_err(|e| format!("the plan cannot be written as TOML: {e}"))
+}
+
+/// From TOML; lists every problem.
+pub fn from_text(text: &str, frames: &Frames) -> Result<ImplantPlan, String> {
+    let file: PlanFile = toml::from_str(text).map_err(|e| format!("it is no plan: {e}"))?;
+    let mut problems = Vec::new();
+    if file.format != FORMAT {
+        problems.push(format!("format is \"{}\"; it must be \"{FORMAT}\"", file.format));
+    }
+    if !(1e-3..=1e4).contains(&file.prescription_gy) {
+        problems.push(format!(
+            "prescription_gy is {}; it must be 0.001 to 10000",
+            file.prescription_gy
+        ));
+    }
+    let template = template(&file.template, frames, &mut problems);
+    if file.needles.len() > MAX_NEEDLES {
+        problems.push(format!("{} needles; at most {MAX_NEEDLES}", file.needles.len()));
+    }
+    let seeds: usize = file.needles.iter().map(|n| n.seed_along_mm.len()).sum();
+    if seeds > MAX_SEEDS {
+        problems.push(format!("{seeds} seeds; at most {MAX_SEEDS} can be placed"));
+    }
+    let needles = file.needles.iter().enumerate().map(|(number, n)| {
+        let mut found = Vec::new();
+        let needle = needle(n, frames, &mut found);
+        problems.extend(found.into_iter().map(|what| format!("needle {}: {what}", number + 1)));
+        needle.in_order_of_file()
+    });
+    let needles = needles.collect();
+    if !problems.is_empty() {
+        return Err(problems.join("\n"));
+    }
+    Ok(ImplantPlan {
+        template,
+        source: file.source,
+        prescription_gy: file.prescription_gy,
+        needles,
+    })
+}
+
+impl Needle {
+    /// Deepest first, with the depth that the file gives.
+    fn in_order_of_file(self) -> Self {
+        let depth_m = self.depth_m;
+        Self {
+            depth_m,
+            ..self.in_order()
+        }
+    }
+}
+
+fn template(file: &TemplateFile, frames: &Frames, problems: &mut Vec<String>) -> Template {
+    place("template: middle_hole_mm", file.middle_hole_mm, problems);
+    for (name, axis) in [
+        ("columns", file.columns),
+        ("rows", file.rows),
+        ("inwards", file.inwards),
+    ] {
+        unit(&format!("template: {name}"), axis, problems);
+    }
+    within("template: pitch_mm", file.pitch_mm, 1.0, 20.0, problems);
+    Template {
+        middle_m: frames.to_scene_m(file.middle_hole_mm.map(|c| c * 1e-3)),
+        columns: frames.turned_to_scene(file.columns),
+        rows: frames.turned_to_scene(file.rows),
+        inwards: frames.turned_to_scene(file.inwards),
+        pitch_m: file.pitch_mm * 1e-3,
+    }
+}
+
+fn needle(file: &NeedleFile, frames: &Frames, problems: &mut Vec<String>) -> Needle {
+    let hole = file.hole.as_deref().map(str::parse::<Hole>).transpose();
+    place("entry_mm", file.entry_mm, problems);
+    unit("direction", file.direction, problems);
+    within("depth_mm", file.depth_mm, 0.0, 500.0, problems);
+    within("retract_to_mm", file.retract_to_mm, 0.0, 500.0, problems);
+    if let Some(spacer) = file.spacer_mm {
+        within("spacer_mm", spacer, 0.1, 50.0, problems);
+    }
+    if file.seed_along_mm.len() != file.strength_u.len() {
+        problems.push(format!(
+            "{} seeds in seed_along_mm and {} in strength_u",
+            file.seed_along_mm.len(),
+            file.strength_u.len()
+        ));
+    }
+    for &along in &file.seed_along_mm {
+        within("seed_along_mm", along, 0.0, 500.0, problems);
+    }
+    for &strength in &file.strength_u {
+        within("strength_u", strength, 0.0, 1e5, problems);
+    }
+    let seed = |(along, &strength_u): (&f64, &f64)| NeedleSeed {
+        along_m: along * 1e-3,
+        strength_u,
+    };
+    Needle {
+        hole: hole.unwrap_or_else(|why| {
+            problems.push(why);
+            None
+        }),
+        entry_m: frames.to_scene_m(file.entry_mm.map(|c| c * 1e-3)),
+        direction: frames.turned_to_scene(file.direction),
+        depth_m: file.depth_mm * 1e-3,
+        retract_to_m: file.retract_to_mm * 1e-3,
+        loading: file
+            .spacer_mm
+            .map_or(Loading::Loose, |s| Loading::Stranded { spacer_m: s * 1e-3 }),
+        seeds: file.seed_along_mm.iter().zip(&file.strength_u).map(seed).collect(),
+    }
+}
+
+fn place(what: &str, mm: [f64; 3], problems: &mut Vec<String>) {
+    // NaN compares false.
+    if !mm.iter().all(|c| c.abs() <= MAX_MM) {
+        problems.push(format!("{what} is {mm:?}; coordinates must be within {MAX_MM} mm"));
+    }
+}
+
+fn unit(what: &str, axis: [f64; 3], problems: &mut Vec<String>) {
+    if !(0.999..1.001).contains(&Vector3::from(axis).norm()) {
+        problems.push(format!("{what} is {axis:?}, no unit vector"));
+    }
+}
+
+fn within(what: &str, value: f64, least: f64, most: f64, problems: &mut Vec<String>) {
+    if !(least..=most).contains(&value) {
+        problems.push(format!("{what} is {value}; it must be {least} to {most}"));
+    }
+}
+
+/// Reads a plan file; the error names it.
+pub fn read(path: &Path, frames: &Frames) -> Result<ImplantPlan, String> {
+    let told = |why: String| format!("{}: {why}", path.display());
+    let opened = |e: std::io::Error| told(format!("it cannot be read ({e}); check the path"));
+    let size = std::fs::metadata(path).map_err(opened)?.len();
+    if size > MAX_BYTES {
+        return Err(told(format!("it has {size} bytes, more than {MAX_BYTES}")));
+    }
+    let text = std::fs::read_to_string(path).map_err(opened)?;
+    from_text(&text, frames).map_err(told)
+}
+
+pub fn write(path: &Path, plan: &ImplantPlan, frames: &Frames) -> Result<(), String> {
+    let text = to_text(plan, frames)?;
+    std::fs::write(path, text).map_err(|e| format!("{} cannot be written ({e})", path.display()))
+}
+
+/// Seeds as `host-ui dose --seeds` reads them, with the number of their needle and its hole.
+pub fn seeds_to_csv(plan: &ImplantPlan, frames: &Frames) -> String {
+    let mut text = format!("{HEADER}\n");
+    for (number, needle) in (1..).zip(&plan.needles) {
+        let [a, b, c] = frames.turned_to_patient(needle.direction);
+        let hole = needle.hole.map_or_else(String::new, |h| h.to_string());
+        for (seed, place_m) in needle.seeds.iter().zip(needle.seeds_m()) {
+            let [x, y, z] = frames.to_patient_m(place_m).map(|c| c * 1e3);
+            let strength = seed.strength_u;
+            text += &format!("{x:.6},{y:.6},{z:.6},{a:.9},{b:.9},{c:.9},{strength},{number},{hole}\n");
+        }
+    }
+    text
+}
+
+/// Seeds of a CSV file as needles through a template: those of one number are on one needle, and those without one where they are
+/// on one line, which goes along their axis, or along the template's where they have none.
+pub fn import_csv(
+    path: &Path,
+    defaults: SeedDefaults,
+    frames: &Frames,
+    template: Template,
+    source: &str,
+    prescription_gy: f64,
+) -> Result<ImplantPlan, String> {
+    let told = |why: String| format!("{}: {why}", path.display());
+    let rows = read_seed_rows(path, defaults)?;
+    if rows.len() > MAX_SEEDS {
+        let count = rows.len();
+        return Err(told(format!("{count} seeds; at most {MAX_SEEDS} can be placed")));
+    }
+    let mut needles: Vec<(Option<u32>, Needle)> = Vec::new();
+    let mut problems = Vec::new();
+    for row in &rows {
+        let place_m = frames.to_scene_m(row.seed.position_m);
+        let direction = row
+            .seed
+            .axis
+            .map_or(template.inwards, |a| inwards(&template, frames.turned_to_scene(a)));
+        let is_its = |(number, needle): &(Option<u32>, Needle)| {
+            *number == row.needle && (number.is_some() || is_on_line(needle, place_m, direction))
+        };
+        let at = needles.iter().position(is_its).unwrap_or_else(|| {
+            needles.push((row.needle, through(&template, place_m, direction)));
+            needles.len() - 1
+        });
+        let (number, needle) = &mut needles[at];
+        if let Err(why) = fits(needle, row.hole.as_deref(), place_m, direction, &template) {
+            let needle = number.map_or_else(String::new, |n| format!("needle {n}: "));
+            problems.push(format!("{needle}{why}"));
+        }
+        let along_m = needle.along_m(place_m);
+        needle.seeds.push(NeedleSeed {
+            along_m,
+            strength_u: row.seed.strength_u,
+        });
+    }
+    problems.dedup();
+    if !problems.is_empty() {
+        return Err(told(problems.join("\n")));
+    }
+    Ok(ImplantPlan {
+        template,
+        source: source.to_owned(),
+        prescription_gy,
+        needles: needles.into_iter().map(|(_, needle)| needle.in_order()).collect(),
+    })
+}
+
+fn is_on_line(needle: &Needle, place_m: [f64; 3], direction: [f64; 3]) -> bool {
+    let off = Vector3::from(place_m) - Vector3::from(needle.at_m(needle.along_m(place_m)));
+    off.norm() < SAME_LINE_M && Vector3::from(needle.direction).dot(&Vector3::from(direction)) > 0.999
+}
+
+/// What a file says of a needle against where its seeds are.
+fn fits(
+    needle: &Needle,
+    hole: Option<&str>,
+    place_m: [f64; 3],
+    direction: [f64; 3],
+    template: &Template,
+) -> Result<(), String> {
+    if !is_on_line(needle, place_m, direction) {
+        return Err("its seeds are not on one line; correct them, or leave the column needle out".to_owned());
+    }
+    let Some(hole) = hole else { return Ok(()) };
+    let off = Vector3::from(template.hole_m(hole.parse()?)) - Vector3::from(needle.entry_m);
+    if off.norm() < SAME_LINE_M {
+        return Ok(());
+    }
+    Err(format!(
+        "its seeds are {:.1} mm beside hole {hole} of the template before this scene; correct them, or leave the column hole out",
+        off.norm() * 1e3
+    ))
+}
+
+/// A seed has no front: its axis is taken the way that needles go.
+fn inwards(template: &Template, axis: [f64; 3]) -> [f64; 3] {
+    let along = Vector3::from(axis).dot(&Vector3::from(template.inwards));
+    if along < 0.0 { axis.map(|c| -c) } else { axis }
+}
+
+/// The needle through a place, from the template's face; through a hole where it leads through one.
+fn through(template: &Template, place_m: [f64; 3], direction: [f64; 3]) -> Needle {
+    let (place, inwards, along) = (
+        Vector3::from(place_m),
+        Vector3::from(template.inwards),
+        Vector3::from(direction),
+    );
+    let face_m = (place - Vector3::from(template.middle_m)).dot(&inwards) / along.dot(&inwards).max(0.1);
+    let entry = place - along * face_m;
+    let hole = template.nearest(entry.into());
+    let is_through = |h: &Hole| (Vector3::from(template.hole_m(*h)) - entry).norm() < SAME_LINE_M;
+    Needle {
+        hole: hole.filter(is_through),
+        entry_m: entry.into(),
+        direction,
+        depth_m: 0.0,
+        retract_to_m: 0.0,
+        loading: Loading::Loose,
+        seeds: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

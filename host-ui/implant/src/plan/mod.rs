@@ -1,0 +1,53 @@
+//! The implant: template, needles and seeds as plain values, and what can be done with them. No window, no shared memory.
+//!
+//! Lengths in m, scene frame; strength in U; files are in mm, in the patient's frame (RAS).
+
+pub mod anatomy;
+pub mod automatic;
+pub mod check;
+pub mod compensate;
+pub mod edit;
+pub mod exchange;
+pub mod file;
+mod needle;
+pub mod rehearse;
+mod template;
+
+pub use anatomy::Anatomy;
+pub use compensate::{Compensation, Limits, compensate};
+pub use edit::{History, Row};
+pub use needle::{Loading, Needle, NeedleSeed, SEED_LENGTH_M, SPACER_M};
+pub use rehearse::{Drops, LinkRehearser, Rehearser};
+use stylet_dose as dose;
+pub use template::{HOLES, Hole, PITCH_M, Template};
+
+/// Everything that is decided before the first needle goes in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImplantPlan {
+    pub template: Template,
+    /// As the model of a source file names itself.
+    pub source: String,
+    pub prescription_gy: f64,
+    /// In the order in which they go in.
+    pub needles: Vec<Needle>,
+}
+
+impl ImplantPlan {
+    pub fn seed_count(&self) -> usize {
+        self.needles.iter().map(|n| n.seeds.len()).sum()
+    }
+
+    /// As dose takes them, needle by needle, deepest first.
+    pub fn seeds(&self) -> Vec<dose::Seed> {
+        let of_needle = |n: &Needle| {
+            let (axis, places) = (n.direction, n.seeds_m().collect::<Vec<_>>());
+            let seed = move |(s, position_m): (&NeedleSeed, [f64; 3])| dose::Seed {
+                position_m,
+                axis: Some(axis),
+                strength_u: s.strength_u,
+            };
+            n.seeds.iter().zip(places).map(seed).collect::<Vec<_>>()
+        };
+        self.needles.iter().flat_map(of_needle).collect()
+    }
+}

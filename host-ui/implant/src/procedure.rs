@@ -1,0 +1,290 @@
+//! The whole procedure without a window, with what happened written to files.
+
+mod child;
+mod debrief;
+pub mod job;
+mod report;
+
+use crate::workflow::{Pace, Run, RunStatus, Step};
+use child::Core;
+use job::Job;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use stylet_base::format;
+use stylet_base::interrupt::Interrupt;
+use stylet_files::{self as files, scene::SceneFile};
+use stylet_host::core_args::{CoreArgs, SceneChoice};
+use stylet_host::link::{Link, LinkStatus, SceneModel};
+use stylet_shm_schema::*;
+
+const POLL_EVERY: Duration = Duration::from_millis(5);
+const FIND_LIMIT: Duration = Duration::from_secs(3);
+const START_LIMIT: Duration = Duration::from_secs(20);
+const LOAD_LIMIT: Duration = Duration::from_secs(60);
+
+/// Which core, and which scene in it.
+pub struct Connect {
+    pub asked: CoreArgs,
+    /// To be started when none is running.
+    pub core: Option<PathBuf>,
+}
+
+/// A core that answers, with the scene that was asked for.
+pub struct Live {
+    pub link: Link,
+    /// The core that was started for this; ends with it.
+    core: Option<Core>,
+    pub scene: Arc<SceneModel>,
+    /// What the scene file says beside the scene.
+    said: Option<SceneFile>,
+    pub interrupted: Interrupt,
+}
+
+impl Live {
+    pub fn connect(options: &Connect) -> Result<Self, String> {
+        let asked = &options.asked;
+        let volume = asked
+            .file()
+            .map(|path| files::read(path, asked.label, &files::Progress::default()));
+        let volume = volume.transpose().map_err(|e| e.to_string())?;
+        let scene_file = asked.file().filter(|path| files::scene::is_scene(path));
+        let said = scene_file.map(files::scene::read).transpose();
+        let said = said.map_err(|e| e.to_string())?;
+        let interrupted = Interrupt::on_signals()?;
+        let mut link = Link::new(asked.instance.clone());
+        let mut core = None;
+        let device = said.as_ref().and_then(|s| s.device.as_deref());
+        find_core(&mut link, &mut core, options, device, &interrupted)?;
+        if let Some(volume) = &volume {
+            for note in &volume.warnings {
+                println!("note: {note}");
+            }
+            load(&mut link, |link| link.upload(volume).map_err(|e| e.0), &interrupted)?;
+        }
+        if let Some(SceneChoice::BuiltIn(number)) = asked.scene {
+            let send = |link: &mut Link| {
+                let sent = link.send(CommandKind::LoadBuiltinScene, &[number as f64]);
+                sent.map_err(|e| e.to_string())
+            };
+            load(&mut link, send, &interrupted)?;
+        }
+        let scene = link.scene().ok_or("the core sent no scene")?.clone();
+        Ok(Self {
+            link,
+            core,
+            scene,
+            said,
+            interrupted,
+        })
+    }
+}
+
+pub struct Options {
+    pub connect: Connect,
+    pub out: Option<PathBuf>,
+    /// Otherwise as the scene file says, or as usual.
+    pub insert_m_per_s: Option<f64>,
+    pub seeds: usize,
+    /// Many needles, from a file; else one through the middle.
+    pub plan: Option<PathBuf>,
+    /// Rehearse each needle first, and move its drops.
+    pub compensate: bool,
+    /// For the score; else the one that the plan names.
+    pub source: Option<PathBuf>,
+}
+
+/// What was seen while the script ran.
+#[derive(Default)]
+struct Seen {
+    records: Vec<TickRecord>,
+    punctured: bool,
+    displacement_before_puncture_m: f64,
+    last_event: Option<u64>,
+    events: Vec<Event>,
+    /// Numbers of planned drops that left no seed.
+    lost: Vec<usize>,
+}
+
+/// An error when not every step was completed.
+pub fn run(options: Options) -> Result<(), String> {
+    let Live {
+        mut link,
+        core,
+        scene,
+        said,
+        interrupted,
+    } = Live::connect(&options.connect)?;
+    let usual = Pace::default();
+    let of_file = |speed: fn(&SceneFile) -> Option<f64>| said.as_ref().and_then(speed);
+    let pace = Pace {
+        insert_m_per_s: options
+            .insert_m_per_s
+            .or(of_file(|s| s.insert_m_per_s))
+            .unwrap_or(usual.insert_m_per_s),
+        retract_m_per_s: of_file(|s| s.retract_m_per_s).unwrap_or(usual.retract_m_per_s),
+        ..usual
+    };
+    let beside = options.connect.asked.file().and_then(Path::parent);
+    let of_scene = said.as_ref().and_then(|s| s.plan.as_deref());
+    let of_scene = of_scene.map(|plan| beside.unwrap_or(Path::new("")).join(plan));
+    let mut job = match options.plan.as_deref().or(of_scene.as_deref()) {
+        Some(path) => Job::from_file(path, &scene)?,
+        None => Job::suggested(&scene, options.seeds),
+    };
+    println!(
+        "scene {}: {} elements of {:.2} mm",
+        scene.header.name.read(),
+        scene.header.element_count,
+        scene.header.spacing_m * 1e3
+    );
+    if options.compensate {
+        job.compensate(&mut link, &pace, &interrupted)?;
+    }
+    let mut seen = Seen::default();
+    let outcome = perform(&mut link, &job, pace, &interrupted, &mut seen);
+    if outcome.is_err() {
+        // The force must not stay on for nobody.
+        let _asked = link.send(CommandKind::Disengage, &[]);
+    }
+    let out = options
+        .out
+        .unwrap_or_else(|| PathBuf::from(format!("out/procedure-{}", format::utc_now())));
+    let written = report::write(&out, &link, &job, &pace, &seen, outcome.as_ref().err());
+    let scored = written.and_then(|()| debrief::write(&out, &link, &scene, &job, &seen, options.source.as_deref()));
+    drop(core);
+    outcome?;
+    scored
+}
+
+fn wait(
+    link: &mut Link,
+    interrupted: &Interrupt,
+    limit: Duration,
+    mut ready: impl FnMut(&mut Link) -> Result<bool, String>,
+) -> Result<bool, String> {
+    let begun = Instant::now();
+    while begun.elapsed() < limit {
+        if interrupted.asked() {
+            return Err("interrupted".to_owned());
+        }
+        link.poll();
+        if ready(link)? {
+            return Ok(true);
+        }
+        std::thread::sleep(POLL_EVERY);
+    }
+    Ok(false)
+}
+
+fn is_ready(link: &Link) -> bool {
+    link.status() == LinkStatus::Live && link.state().is_some() && link.scene().is_some() && link.snapshot().is_some()
+}
+
+fn find_core(
+    link: &mut Link,
+    core: &mut Option<Core>,
+    options: &Connect,
+    device: Option<&str>,
+    interrupted: &Interrupt,
+) -> Result<(), String> {
+    if wait(link, interrupted, FIND_LIMIT, |link| Ok(is_ready(link)))? {
+        return Ok(());
+    }
+    let missing = match link.status() {
+        LinkStatus::Absent { why } => why,
+        _ => return Err("rt-core is there but does not answer; end it and start it again".to_owned()),
+    };
+    let Some(path) = &options.core else {
+        return Err(format!("{missing}, or add --core PATH to have it started"));
+    };
+    let child = core.insert(Core::start(path, &options.asked.instance, device)?);
+    let found = wait(link, interrupted, START_LIMIT, |link| match child.ended() {
+        Some(why) => Err(why),
+        None => Ok(is_ready(link)),
+    })?;
+    if found {
+        return Ok(());
+    }
+    Err("the rt-core that was started does not answer".to_owned())
+}
+
+fn load(
+    link: &mut Link,
+    send: impl FnOnce(&mut Link) -> Result<u64, String>,
+    interrupted: &Interrupt,
+) -> Result<(), String> {
+    let before = link.scene().map(|s| s.header.generation);
+    let id = send(link)?;
+    let mut accepted = false;
+    let shown = wait(link, interrupted, LOAD_LIMIT, |link| {
+        if let Some(answer) = link.reply(id) {
+            if !answer.accepted {
+                return Err(format!("the core refused the scene: {}", answer.text));
+            }
+            accepted = true;
+        }
+        Ok(accepted && link.scene().map(|s| s.header.generation) != before && link.snapshot().is_some())
+    })?;
+    if shown {
+        Ok(())
+    } else {
+        Err("the core did not show the scene in time".to_owned())
+    }
+}
+
+fn perform(link: &mut Link, job: &Job, pace: Pace, interrupted: &Interrupt, seen: &mut Seen) -> Result<(), String> {
+    let mut run = Run::of_needles(job.tasks.clone(), pace);
+    let begun = Instant::now();
+    let mut step: Option<(usize, Step)> = None;
+    seen.last_event = link.events().back().map(|e| e.sequence);
+    link.take_records();
+    loop {
+        if interrupted.asked() {
+            return Err("interrupted".to_owned());
+        }
+        link.poll();
+        let status = run.advance(link);
+        if step != Some((run.needle(), run.step())) {
+            step = Some((run.needle(), run.step()));
+            let (number, count) = (run.needle() + 1, job.tasks.len());
+            let seconds = begun.elapsed().as_secs_f64();
+            println!(
+                "{seconds:7.2} s  needle {number} of {count}, step: {}",
+                run.step().name()
+            );
+        }
+        seen.take(link, begun);
+        for number in run.lost().iter().skip(seen.lost.len()) {
+            println!("note: seed {} is lost: the tip was outside the tissue", number + 1);
+        }
+        seen.lost = run.lost().to_vec();
+        match status {
+            RunStatus::Working => std::thread::sleep(POLL_EVERY),
+            RunStatus::Done => return Ok(()),
+            RunStatus::Failed(why) => return Err(why),
+        }
+    }
+}
+
+impl Seen {
+    fn take(&mut self, link: &mut Link, begun: Instant) {
+        self.records.extend(link.take_records());
+        for event in link
+            .events()
+            .iter()
+            .filter(|e| self.last_event.is_none_or(|last| e.sequence > last))
+        {
+            self.events.push(*event);
+            let kind = EventKind::from_number(event.kind);
+            self.punctured |= kind == Some(EventKind::Puncture);
+            let what = kind.map_or_else(String::new, |k| format!("{k:?}"));
+            println!("{:7.2} s  {what} {}", begun.elapsed().as_secs_f64(), event.text.read());
+        }
+        self.last_event = link.events().back().map(|e| e.sequence).or(self.last_event);
+        let snapshot = link.snapshot().filter(|_| !self.punctured);
+        if let Some(s) = snapshot {
+            self.displacement_before_puncture_m = self.displacement_before_puncture_m.max(s.header.max_displacement_m);
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! What a procedure is asked to do: needles with what is planned and what is done, from a plan file or as the scene suggests.
+
+use crate::plan::compensate::summary_m;
+use crate::plan::exchange;
+use crate::plan::rehearse::{Drops, LinkRehearser};
+use crate::plan::{Anatomy, Compensation, Hole, ImplantPlan, Limits, Needle, check, compensate};
+use crate::workflow::{NeedlePlan, NeedleTask, Pace, plan_with_seeds};
+use std::path::Path;
+use stylet_base::interrupt::Interrupt;
+use stylet_host::link::{Link, SceneModel};
+use stylet_shm_schema::{MAX_SEEDS, SeedPose};
+
+/// A seed as it is planned, in the order of the drops.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlannedDrop {
+    /// Counted from 0.
+    pub needle: usize,
+    pub hole: Option<Hole>,
+    pub planned_m: [f64; 3],
+    /// Of the needle, into the body.
+    pub direction: [f64; 3],
+    /// `None` where no plan file says.
+    pub strength_u: Option<f64>,
+}
+
+/// Each seed in the tissue with what was planned for it; `lost` are the numbers of drops that left none.
+pub fn placed<'a>(
+    planned: &'a [PlannedDrop],
+    lost: &'a [usize],
+    seeds: &'a [SeedPose],
+) -> impl Iterator<Item = (&'a PlannedDrop, &'a SeedPose)> {
+    let kept = planned.iter().enumerate().filter(|(number, _)| !lost.contains(number));
+    kept.map(|(_, drop)| drop).zip(seeds)
+}
+
+/// Everything that is done in one procedure.
+pub struct Job {
+    /// `None` without a plan file: one needle as the scene suggests.
+    pub implant: Option<ImplantPlan>,
+    pub tasks: Vec<NeedleTask>,
+    /// One a needle, where it was asked for.
+    pub compensations: Vec<Compensation>,
+}
+
+impl Job {
+    /// One needle through the middle of the target.
+    pub fn suggested(scene: &SceneModel, seeds: usize) -> Self {
+        let plan = plan_with_seeds(&scene.header, seeds);
+        Self {
+            implant: None,
+            tasks: vec![NeedleTask::as_planned(plan)],
+            compensations: Vec::new(),
+        }
+    }
+
+    /// From a plan file, a table of seeds or an RT Plan, in the patient's frame. What is doubtful in it is told and not
+    /// refused.
+    pub fn from_file(path: &Path, scene: &SceneModel) -> Result<Self, String> {
+        let plan = exchange::read(path, &scene.header)?;
+        let told = |why: String| format!("{}: {why}", path.display());
+        if plan.seed_count() == 0 || plan.seed_count() > MAX_SEEDS {
+            return Err(told(format!(
+                "{} seeds; 1 to {MAX_SEEDS} can be placed",
+                plan.seed_count()
+            )));
+        }
+        for problem in check::problems(&plan, &Anatomy::of(scene)?) {
+            println!("note: {}", told(problem.to_string()));
+        }
+        let loaded = plan.needles.iter().filter(|n| !n.seeds.is_empty());
+        Ok(Self {
+            tasks: loaded.map(|n| NeedleTask::of(n, Drops::as_planned(n))).collect(),
+            implant: Some(plan),
+            compensations: Vec::new(),
+        })
+    }
+
+    /// Rehearses every needle and moves its drops so that the seeds rest on plan.
+    pub fn compensate(&mut self, link: &mut Link, pace: &Pace, interrupted: &Interrupt) -> Result<(), String> {
+        let count = self.tasks.len();
+        for (number, task) in self.tasks.iter_mut().enumerate() {
+            let needle = match &self.implant {
+                Some(plan) => plan.needles.iter().filter(|n| !n.seeds.is_empty()).nth(number).cloned(),
+                None => None,
+            };
+            let needle = needle.unwrap_or_else(|| needle_of(&task.plan));
+            let mut rehearser = LinkRehearser { link, interrupted };
+            let done = match compensate(&needle, pace, &Limits::default(), &mut rehearser) {
+                Ok(done) => done,
+                Err(why) if interrupted.asked() => return Err(why),
+                Err(why) => {
+                    println!("note: needle {} of {count} is not compensated: {why}", number + 1);
+                    continue;
+                }
+            };
+            let [[before, _], [after, _]] = summary_m(std::slice::from_ref(&done));
+            let as_planned = match done.before_m {
+                Some(_) => format!("{:.2} mm", before * 1e3),
+                None => "not possible".to_owned(),
+            };
+            println!(
+                "needle {} of {count} rehearsed {} times: mean error as planned {as_planned}, compensated {:.2} mm",
+                number + 1,
+                done.rehearsals,
+                after * 1e3
+            );
+            task.drops.clone_from(&done.drops);
+            self.compensations.push(done);
+        }
+        Ok(())
+    }
+
+    /// In the order of the drops.
+    pub fn planned(&self) -> Vec<PlannedDrop> {
+        let needles = || {
+            self.implant
+                .iter()
+                .flat_map(|p| p.needles.iter().filter(|n| !n.seeds.is_empty()))
+        };
+        let of_task = |(number, task): (usize, &NeedleTask)| {
+            let needle = needles().nth(number);
+            let drop = |(i, planned_m): (usize, [f64; 3])| PlannedDrop {
+                needle: number,
+                hole: needle.and_then(|n| n.hole),
+                planned_m,
+                direction: task.plan.direction,
+                strength_u: needle.and_then(|n| n.seeds.get(i)).map(|s| s.strength_u),
+            };
+            task.plan
+                .deepest_first()
+                .into_iter()
+                .enumerate()
+                .map(drop)
+                .collect::<Vec<_>>()
+        };
+        self.tasks.iter().enumerate().flat_map(of_task).collect()
+    }
+}
+
+/// A needle without a template, as a plan has it.
+fn needle_of(plan: &NeedlePlan) -> Needle {
+    let along = plan.deepest_first().into_iter().map(|seed| plan.along_m(seed));
+    Needle {
+        hole: None,
+        entry_m: plan.entry_m,
+        direction: plan.direction,
+        depth_m: 0.0,
+        retract_to_m: 0.0,
+        loading: crate::plan::Loading::Loose,
+        seeds: along
+            .map(|along_m| crate::plan::NeedleSeed {
+                along_m,
+                strength_u: 0.0,
+            })
+            .collect(),
+    }
+    .in_order()
+}

@@ -1,0 +1,249 @@
+//! result.json, force.csv and the table on the terminal.
+
+use super::Seen;
+use super::job::{Job, PlannedDrop, placed};
+use crate::plan::compensate::summary_m;
+use crate::workflow::Pace;
+use nalgebra::{Matrix3, Vector3};
+use serde_json::{Value, json};
+use std::io::Write;
+use std::path::Path;
+use stylet_host::link::Link;
+use stylet_shm_schema::*;
+
+pub fn write(
+    out: &Path,
+    link: &Link,
+    job: &Job,
+    pace: &Pace,
+    seen: &Seen,
+    failure: Option<&String>,
+) -> Result<(), String> {
+    let told = |e: std::io::Error| {
+        format!(
+            "{} cannot be written ({e}); choose another folder with --out",
+            out.display()
+        )
+    };
+    std::fs::create_dir_all(out).map_err(told)?;
+    let first = job.tasks.first().ok_or("nothing was planned")?;
+    let direction = first.plan.direction;
+    let seeds = seeds(link, &job.planned(), &seen.lost);
+    let result = json!({
+        "completed": failure.is_none(),
+        "failure": failure,
+        "seeds": seeds, "lost_seeds": seen.lost.iter().map(|n| n + 1).collect::<Vec<_>>(),
+        "force": force(link, direction, seen),
+        "timing": timing(link, seen),
+        "plan": {
+            "entry_mm": mm(first.plan.entry_m), "direction": direction, "needles": needles(job),
+            "insert_speed_mm_s": pace.insert_m_per_s * 1e3, "retract_speed_mm_s": pace.retract_m_per_s * 1e3,
+        },
+        "compensation": compensation(job),
+        "largest_displacement_before_puncture_mm": seen.displacement_before_puncture_m * 1e3,
+        "parameters": parameters(link),
+        "scene": link.scene().map(|s| json!({
+            "name": s.header.name.read(), "elements": s.header.element_count, "spacing_mm": s.header.spacing_m * 1e3,
+            "volume_cm3": s.header.volume_m3 * 1e6,
+            "structures": s.header.structures().iter().map(|t| json!({
+                "name": t.name.read(), "label": t.label, "elements": t.element_count,
+                "volume_cm3": f64::from(t.element_count) * s.header.spacing_m.powi(3) * 1e6,
+            })).collect::<Vec<_>>(),
+        })),
+        "session": link.session().map(session),
+        "versions": { "host_ui": env!("CARGO_PKG_VERSION"), "schema": SCHEMA_VERSION },
+    });
+    let text = serde_json::to_string_pretty(&result).map_err(|e| e.to_string())?;
+    std::fs::write(out.join("result.json"), text + "\n").map_err(told)?;
+    force_csv(out, direction, seen).map_err(told)?;
+    table(&result);
+    println!("written: {}", out.display());
+    Ok(())
+}
+
+fn mm(v: [f64; 3]) -> [f64; 3] {
+    v.map(|c| c * 1e3)
+}
+
+fn patient_mm(patient_from_scene: &[f64; 12], v: [f64; 3]) -> [f64; 3] {
+    let p = patient_from_scene;
+    let at = Matrix3::from_row_slice(&p[..9]) * Vector3::from(v) + Vector3::new(p[9], p[10], p[11]);
+    mm(at.into())
+}
+
+fn seeds(link: &Link, planned: &[PlannedDrop], lost: &[usize]) -> Vec<Value> {
+    let (Some(snapshot), Some(scene)) = (link.snapshot(), link.scene()) else {
+        return Vec::new();
+    };
+    let to_patient = |v| patient_mm(&scene.header.patient_from_scene, v);
+    let in_tissue = &snapshot.header.seeds[..snapshot.header.seed_count as usize];
+    placed(planned, lost, in_tissue)
+        .map(|(drop, seed)| {
+            let (planned, direction) = (drop.planned_m, Vector3::from(drop.direction));
+            let off = Vector3::from(seed.position_m) - Vector3::from(planned);
+            let along = off.dot(&direction);
+            json!({
+                "needle": drop.needle + 1, "hole": drop.hole.map(|h| h.to_string()), "strength_u": drop.strength_u,
+                "axis": seed.axis,
+                "planned_mm": mm(planned), "dropped_at_mm": mm(seed.dropped_at_m), "placed_mm": mm(seed.position_m),
+                "planned_ras_mm": to_patient(planned), "dropped_at_ras_mm": to_patient(seed.dropped_at_m),
+                "placed_ras_mm": to_patient(seed.position_m),
+                "error_mm": off.norm() * 1e3, "error_along_mm": along * 1e3,
+                "error_across_mm": (off - direction * along).norm() * 1e3,
+            })
+        })
+        .collect()
+}
+
+fn needles(job: &Job) -> Vec<Value> {
+    let of_task = |task: &crate::workflow::NeedleTask| {
+        json!({
+            "entry_mm": mm(task.drops.entry_m), "direction": task.drops.direction,
+            "planned_along_mm": task.plan.deepest_first().into_iter().map(|s| task.plan.along_m(s) * 1e3).collect::<Vec<_>>(),
+            "dropped_along_mm": task.drops.along_m.iter().map(|a| a * 1e3).collect::<Vec<_>>(),
+        })
+    };
+    job.tasks.iter().map(of_task).collect()
+}
+
+/// As the rehearsals had it.
+fn compensation(job: &Job) -> Option<Value> {
+    let [[mean_before, worst_before], [mean_after, worst_after]] =
+        summary_m(&job.compensations).map(|e| e.map(|m| m * 1e3));
+    (!job.compensations.is_empty()).then(|| {
+        json!({
+            "mean_error_before_mm": mean_before, "mean_error_after_mm": mean_after,
+            "worst_error_before_mm": worst_before, "worst_error_after_mm": worst_after,
+            "rehearsals": job.compensations.iter().map(|c| c.rehearsals).sum::<usize>(),
+        })
+    })
+}
+
+fn along(direction: [f64; 3], r: &TickRecord) -> f64 {
+    Vector3::from(r.force_on_hand_n).dot(&Vector3::from(direction))
+}
+
+fn force(link: &Link, direction: [f64; 3], seen: &Seen) -> Value {
+    let puncture = seen
+        .events
+        .iter()
+        .find(|e| EventKind::from_number(e.kind) == Some(EventKind::Puncture));
+    let puncture_force = puncture.map(|p| {
+        let before = seen.records.iter().filter(|r| r.tick <= p.tick);
+        before.map(|r| along(direction, r).abs()).fold(0.0, f64::max)
+    });
+    let state = link.state();
+    json!({
+        "peak_n": state.map(|s| s.peak_force_n),
+        "puncture_n": puncture_force,
+        "puncture_depth_mm": puncture.map(|p| p.value * 1e3),
+        "device_limit_n": state.map(|s| s.device_limit_n),
+        "scale": state.map(|s| s.force_scale),
+        "gate_interventions": state.map(|s| s.gate_interventions),
+    })
+}
+
+fn timing(link: &Link, seen: &Seen) -> Value {
+    let advice = link.session().map(|s| s.advice.read()).filter(|a| !a.is_empty());
+    let span = match (seen.records.first(), seen.records.last()) {
+        (Some(first), Some(last)) => last.tick.saturating_sub(first.tick) + 1,
+        _ => 0,
+    };
+    let worst_wake_ns = seen.records.iter().map(|r| r.wake_latency_ns).max();
+    let state = link.state();
+    json!({
+        "real_time": state.is_some_and(|s| s.flags & flags::REAL_TIME != 0),
+        "not_real_time_because": advice,
+        "ticks": state.map(|s| s.tick),
+        "missed_deadlines": state.map(|s| s.missed_deadlines),
+        "worst_wake_us": state.map(|s| s.worst_wake_ns as f64 / 1e3),
+        "worst_wake_in_records_us": worst_wake_ns.map(|n| n as f64 / 1e3),
+        "worst_work_us": state.map(|s| s.worst_work_ns as f64 / 1e3),
+        "tissue_missed_deadlines": state.map(|s| s.tissue_missed_deadlines),
+        "tissue_worst_wake_us": state.map(|s| s.tissue_worst_wake_ns as f64 / 1e3),
+        "tissue_worst_work_us": state.map(|s| s.worst_tissue_work_ns as f64 / 1e3),
+        "worst_residual_elements": state.map(|s| s.worst_residual),
+        "records_received": seen.records.len(),
+        "records_not_received": span.saturating_sub(seen.records.len() as u64),
+        "records_lost_in_core": state.map(|s| s.records_lost),
+        "rubbish_refused": link.rubbish_refused(),
+    })
+}
+
+fn parameters(link: &Link) -> Value {
+    let Some(p) = link.parameters() else { return Value::Null };
+    PARAMETERS
+        .iter()
+        .zip(p.set.values)
+        .map(|(spec, value)| json!({ "key": spec.key, "value": value * spec.display_per_si, "unit": spec.unit }))
+        .collect()
+}
+
+fn session(s: &Session) -> Value {
+    let thread = |t: &ThreadReport| {
+        json!({
+            "scheduler": if t.is_fifo() { "SCHED_FIFO" } else { "SCHED_OTHER" },
+            "priority": t.priority, "asked_priority": t.asked_priority,
+            "core": (t.core != u32::MAX).then_some(t.core), "asked_core": (t.asked_core != u32::MAX).then_some(t.asked_core),
+        })
+    };
+    json!({
+        "id": format!("{:016x}", s.session_id), "core_version": s.version.read(), "device": s.device.read(),
+        "period_us": s.period_ns as f64 / 1e3, "tissue_period_us": s.tissue_period_ns as f64 / 1e3,
+        "haptic_thread": thread(&s.haptic), "tissue_thread": thread(&s.tissue),
+        "memory_locked": s.memory_locked == 1, "no_rt_asked": s.no_rt_asked == 1,
+    })
+}
+
+fn force_csv(out: &Path, direction: [f64; 3], seen: &Seen) -> std::io::Result<()> {
+    let mut file = std::io::BufWriter::new(std::fs::File::create(out.join("force.csv"))?);
+    writeln!(file, "time_s,tick,depth_mm,speed_mm_s,force_n,phase,tissue_tick")?;
+    let begin = seen.records.first().map_or(0, |r| r.due_ns);
+    for r in &seen.records {
+        writeln!(
+            file,
+            "{:.6},{},{:.4},{:.3},{:.5},{},{}",
+            r.due_ns.saturating_sub(begin) as f64 / 1e9,
+            r.tick,
+            r.depth_m * 1e3,
+            r.speed_m_per_s * 1e3,
+            along(direction, r),
+            Phase::from_number(r.phase).map_or("unknown", Phase::name),
+            r.tissue_tick
+        )?;
+    }
+    file.flush()
+}
+
+fn table(result: &Value) {
+    println!("seed  along the needle (mm)  across (mm)  total (mm)");
+    for (index, seed) in result["seeds"].as_array().into_iter().flatten().enumerate() {
+        let value = |key: &str| seed[key].as_f64().unwrap_or(f64::NAN);
+        println!(
+            "{:4}  {:21.3}  {:11.3}  {:10.3}",
+            index + 1,
+            value("error_along_mm"),
+            value("error_across_mm"),
+            value("error_mm")
+        );
+    }
+    let (force, timing) = (&result["force"], &result["timing"]);
+    let number = |v: &Value| v.as_f64().map_or_else(|| "-".to_owned(), |n| format!("{n:.3}"));
+    println!(
+        "force: peak {} N, at puncture {} N, device limit {} N",
+        number(&force["peak_n"]),
+        number(&force["puncture_n"]),
+        number(&force["device_limit_n"])
+    );
+    println!(
+        "timing: real time {}, {} deadlines missed, worst wake-up {} us; records received {}, not received {}",
+        timing["real_time"],
+        timing["missed_deadlines"],
+        number(&timing["worst_wake_us"]),
+        timing["records_received"],
+        timing["records_not_received"]
+    );
+    if let Some(why) = timing["not_real_time_because"].as_str() {
+        println!("{why}");
+    }
+}

@@ -1,0 +1,119 @@
+//! What an implant was worth: every seed's error and what it cost in dose, the measures of planned and delivered dose, and how the
+//! hand moved.
+
+mod dose_cost;
+mod motion;
+mod page;
+mod picture;
+mod trace;
+mod write;
+
+use crate::plan::{Anatomy, Hole};
+pub use dose_cost::{Cost, costs};
+pub use motion::Motion;
+use nalgebra::Vector3;
+use stylet_dose::report::{Judge, Verdict};
+use stylet_dose::{DoseKernel, Seed};
+use stylet_shm_schema::TickRecord;
+pub use trace::Trace;
+pub use write::{to_json, write};
+
+const DOSE_PITCH_M: f64 = 1e-3;
+const POINTS: usize = 100_000;
+
+/// One seed, planned and delivered, scene frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeedPair {
+    /// Counted from 0.
+    pub needle: usize,
+    pub hole: Option<Hole>,
+    pub planned: Seed,
+    pub delivered: Seed,
+    /// Of the needle, into the body.
+    pub direction: [f64; 3],
+}
+
+impl SeedPair {
+    fn off_m(&self) -> Vector3<f64> {
+        Vector3::from(self.delivered.position_m) - Vector3::from(self.planned.position_m)
+    }
+
+    pub fn error_m(&self) -> f64 {
+        self.off_m().norm()
+    }
+
+    /// Positive: deeper than planned.
+    pub fn error_along_m(&self) -> f64 {
+        self.off_m().dot(&Vector3::from(self.direction))
+    }
+
+    pub fn error_across_m(&self) -> f64 {
+        (self.off_m() - Vector3::from(self.direction) * self.error_along_m()).norm()
+    }
+}
+
+/// What is scored.
+pub struct Implant<'a> {
+    pub title: String,
+    pub pairs: Vec<SeedPair>,
+    /// Planned, and not delivered.
+    pub lost: Vec<Seed>,
+    pub anatomy: &'a Anatomy,
+    pub kernel: &'a DoseKernel,
+    /// As the source file names itself.
+    pub source: String,
+    pub prescription_gy: f64,
+    pub motion: Motion,
+    /// Force and speed over time; every tick or some of them.
+    pub records: &'a [TickRecord],
+}
+
+/// The result.
+pub struct Score<'a> {
+    pub implant: Implant<'a>,
+    pub judge: Judge,
+    pub planned: Verdict,
+    pub delivered: Verdict,
+    /// In the order of the pairs.
+    pub costs: Vec<Cost>,
+}
+
+impl<'a> Score<'a> {
+    /// An error when there is no seed, or no dose can be counted.
+    pub fn of(implant: Implant<'a>) -> Result<Self, String> {
+        if implant.pairs.is_empty() {
+            return Err("no seed was placed; there is nothing to score".to_owned());
+        }
+        let seeds = |one: fn(&SeedPair) -> Seed| implant.pairs.iter().map(one).collect::<Vec<_>>();
+        let (on_plan, delivered) = (seeds(|p| p.planned), seeds(|p| p.delivered));
+        let planned = [on_plan.clone(), implant.lost.clone()].concat();
+        let structures = implant.anatomy.structures(DOSE_PITCH_M);
+        let target = implant.anatomy.target.name.clone();
+        let costs = costs(
+            &structures,
+            implant.kernel,
+            implant.prescription_gy,
+            &on_plan,
+            &delivered,
+        );
+        let all = [planned.clone(), delivered.clone()].concat();
+        let judge = Judge::new(structures, Some(&target), &[], implant.prescription_gy, &all, POINTS)?;
+        Ok(Self {
+            planned: judge.judge(implant.kernel, &planned),
+            delivered: judge.judge(implant.kernel, &delivered),
+            judge,
+            costs,
+            implant,
+        })
+    }
+
+    /// Mean and worst error of the seeds.
+    pub fn errors_m(&self) -> [f64; 2] {
+        let errors = || self.implant.pairs.iter().map(SeedPair::error_m);
+        let mean = errors().sum::<f64>() / self.implant.pairs.len() as f64;
+        [mean, errors().fold(0.0, f64::max)]
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,295 @@
+//! Pictures of a debrief, as SVG: the implant from three sides, dose-volume histograms, force and speed over time.
+
+use super::{Score, SeedPair};
+use crate::plan::anatomy::Body;
+use nalgebra::Vector3;
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use stylet_dose::Dvh;
+use stylet_shm_schema::TickRecord;
+
+type Drawn<T> = Result<T, Box<dyn std::error::Error>>;
+type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+const BLUE: RGBColor = RGBColor(0, 114, 178);
+const ORANGE: RGBColor = RGBColor(213, 94, 0);
+/// Okabe-Ito, for structures.
+const COLOURS: [RGBColor; 6] = [
+    BLUE,
+    ORANGE,
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
+];
+const INK: RGBColor = RGBColor(70, 70, 70);
+const FAINT: RGBColor = RGBColor(225, 225, 225);
+const FONT: &str = "sans-serif";
+
+fn drawn(size: (u32, u32), draw: impl FnOnce(&Canvas) -> Drawn<()>) -> Result<String, String> {
+    let mut text = String::new();
+    {
+        let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
+        draw(&root)
+            .and_then(|()| root.present().map_err(Into::into))
+            .map_err(|e| format!("a picture of the debrief cannot be drawn ({e})"))?;
+    }
+    Ok(text)
+}
+
+/// Which two axes are seen, and what they are called.
+struct View {
+    title: &'static str,
+    across: [f64; 3],
+    up: [f64; 3],
+    labels: [&'static str; 2],
+}
+
+/// The implant along the needles, from the side, and from the front; planned, delivered, and the way between them.
+pub fn views(score: &Score) -> Result<String, String> {
+    let implant = &score.implant;
+    let frame = crate::plan::file::Frames::new(&implant.anatomy.patient_from_scene);
+    let axis = |patient: [f64; 3]| frame.turned_to_scene(patient);
+    // As one looks at a patient: his right is on the left.
+    let (left, anterior, superior) = (axis([-1.0, 0.0, 0.0]), axis([0.0, 1.0, 0.0]), axis([0.0, 0.0, 1.0]));
+    let views = [
+        View {
+            title: "Along the needles",
+            across: left,
+            up: anterior,
+            labels: ["right – left (mm)", "posterior – anterior (mm)"],
+        },
+        View {
+            title: "From the side",
+            across: superior,
+            up: anterior,
+            labels: ["apex – base (mm)", "posterior – anterior (mm)"],
+        },
+        View {
+            title: "From the front",
+            across: left,
+            up: superior,
+            labels: ["right – left (mm)", "apex – base (mm)"],
+        },
+    ];
+    drawn((1170, 430), |root| {
+        root.fill(&WHITE)?;
+        for (area, view) in root.split_evenly((1, 3)).iter().zip(&views) {
+            one_view(area, score, view)?;
+        }
+        Ok(())
+    })
+}
+
+fn one_view(area: &Canvas, score: &Score, view: &View) -> Drawn<()> {
+    let anatomy = score.implant.anatomy;
+    let (low, high) = anatomy.target.bounds_m();
+    let middle = (Vector3::from(low) + Vector3::from(high)) / 2.0;
+    let seen = |p: Vector3<f64>| {
+        let off = (p - middle) * 1e3;
+        (off.dot(&Vector3::from(view.across)), off.dot(&Vector3::from(view.up)))
+    };
+    let pairs = &score.implant.pairs;
+    let places = pairs
+        .iter()
+        .flat_map(|p| [p.planned.position_m, p.delivered.position_m]);
+    let corners = places
+        .map(|p| seen(Vector3::from(p)))
+        .chain([seen(Vector3::from(low)), seen(Vector3::from(high))]);
+    let reach = corners.fold(0.0_f64, |r, (x, y)| r.max(x.abs()).max(y.abs())) + 3.0;
+    let mut chart = ChartBuilder::on(area)
+        .caption(view.title, (FONT, 17).into_font().color(&INK))
+        .margin(8)
+        .x_label_area_size(38)
+        .y_label_area_size(48)
+        .build_cartesian_2d(-reach..reach, -reach..reach)?;
+    chart
+        .configure_mesh()
+        .x_desc(view.labels[0])
+        .y_desc(view.labels[1])
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(FAINT)
+        .axis_style(INK)
+        .x_labels(7)
+        .y_labels(7)
+        .label_style((FONT, 13))
+        .axis_desc_style((FONT, 14))
+        .draw()?;
+    for body in &anatomy.spared {
+        let line = outline(body, view, &seen)
+            .into_iter()
+            .filter(|(x, y)| x.abs() <= reach && y.abs() <= reach);
+        chart.draw_series(LineSeries::new(line, RGBColor(204, 121, 167).stroke_width(1)))?;
+    }
+    chart.draw_series(LineSeries::new(
+        outline(&anatomy.target, view, &seen),
+        INK.stroke_width(2),
+    ))?;
+    let ends = |p: &SeedPair| [p.planned, p.delivered].map(|s| seen(Vector3::from(s.position_m)));
+    let ways = pairs
+        .iter()
+        .map(|p| PathElement::new(ends(p), ORANGE.mix(0.6).stroke_width(1)));
+    chart.draw_series(ways)?;
+    chart.draw_series(pairs.iter().map(|p| Circle::new(ends(p)[0], 4, BLUE.stroke_width(1))))?;
+    chart.draw_series(pairs.iter().map(|p| Circle::new(ends(p)[1], 3, ORANGE.filled())))?;
+    Ok(())
+}
+
+/// The edge of a body in the plane of the view through its middle.
+fn outline(body: &Body, view: &View, seen: &impl Fn(Vector3<f64>) -> (f64, f64)) -> Vec<(f64, f64)> {
+    const RAYS: usize = 120;
+    const STEP_M: f64 = 0.25e-3;
+    let (low, high) = body.bounds_m();
+    let (low, high) = (Vector3::from(low), Vector3::from(high));
+    let (middle, farthest_m) = ((low + high) / 2.0, (high - low).norm() / 2.0);
+    let steps = (farthest_m / STEP_M) as usize;
+    (0..=RAYS)
+        .filter_map(|ray| {
+            let (sine, cosine) = (ray as f64 / RAYS as f64 * std::f64::consts::TAU).sin_cos();
+            let out = Vector3::from(view.across) * cosine + Vector3::from(view.up) * sine;
+            let at = |step: usize| middle + out * (step as f64 * STEP_M);
+            let last = (0..=steps).rev().find(|&step| body.contains(at(step).into()))?;
+            Some(seen(at(last)))
+        })
+        .collect()
+}
+
+/// Planned dashed, delivered drawn through.
+pub fn dvh(score: &Score) -> Result<String, String> {
+    let most_gy = 3.0 * score.implant.prescription_gy;
+    drawn((1170, 460), |root| {
+        root.fill(&WHITE)?;
+        let mut chart = ChartBuilder::on(root)
+            .margin(14)
+            .x_label_area_size(46)
+            .y_label_area_size(56)
+            .build_cartesian_2d(0.0..most_gy, 0.0..104.0)?;
+        chart
+            .configure_mesh()
+            .x_desc("Dose (Gy)")
+            .y_desc("Volume with at least this dose (%)")
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(FAINT)
+            .axis_style(INK)
+            .label_style((FONT, 14))
+            .axis_desc_style((FONT, 15))
+            .draw()?;
+        let prescription = score.implant.prescription_gy;
+        chart.draw_series(DashedLineSeries::new(
+            [(prescription, 0.0), (prescription, 100.0)],
+            3,
+            3,
+            INK.into(),
+        ))?;
+        let pairs = score.planned.dvhs.iter().zip(&score.delivered.dvhs);
+        for (i, (name, (planned, delivered))) in score.judge.names().zip(pairs).enumerate() {
+            let colour = COLOURS[i % COLOURS.len()];
+            chart.draw_series(DashedLineSeries::new(
+                curve(planned, most_gy),
+                6,
+                4,
+                colour.stroke_width(2),
+            ))?;
+            chart
+                .draw_series(LineSeries::new(curve(delivered, most_gy), colour.stroke_width(2)))?
+                .label(name)
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 22, y)], colour.stroke_width(3)));
+        }
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperRight)
+            .margin(12)
+            .legend_area_size(30)
+            .background_style(WHITE)
+            .border_style(FAINT)
+            .label_font((FONT, 15))
+            .draw()?;
+        Ok(())
+    })
+}
+
+fn curve(dvh: &Dvh, most_gy: f64) -> Vec<(f64, f64)> {
+    const STEPS: usize = 300;
+    let at = |i: usize| i as f64 * most_gy / STEPS as f64;
+    let share = |gy: f64| dvh.at_least_m3(gy) / dvh.volume_m3() * 100.0;
+    (0..=STEPS).map(|i| (at(i), share(at(i)))).collect()
+}
+
+/// Force above, speed along the needle below.
+pub fn over_time(records: &[TickRecord]) -> Result<String, String> {
+    let force = |r: &TickRecord| Vector3::from(r.force_on_hand_n).norm();
+    let speed = |r: &TickRecord| r.speed_m_per_s * 1e3;
+    drawn((1170, 420), |root| {
+        root.fill(&WHITE)?;
+        let (upper, lower) = root.split_vertically(200);
+        series(&upper, records, force, "Force on the hand (N)", "", BLUE)?;
+        series(
+            &lower,
+            records,
+            speed,
+            "Speed along the needle (mm/s)",
+            "Time (s)",
+            RGBColor(0, 158, 115),
+        )
+    })
+}
+
+fn series(
+    area: &Canvas,
+    records: &[TickRecord],
+    value: impl Fn(&TickRecord) -> f64,
+    label: &str,
+    time: &str,
+    colour: RGBColor,
+) -> Drawn<()> {
+    let begin_ns = records.first().map_or(0, |r| r.due_ns);
+    let seconds = |r: &TickRecord| r.due_ns.saturating_sub(begin_ns) as f64 / 1e9;
+    let last_s = records.last().map_or(1.0, seconds).max(1e-3);
+    let values = || records.iter().map(&value);
+    let (low, high) = values().fold((0.0_f64, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
+    let room = 0.08 * (high - low).max(1e-3);
+    let low = if low < 0.0 { low - room } else { 0.0 };
+    let mut chart = ChartBuilder::on(area)
+        .margin_left(14)
+        .margin_right(14)
+        .margin_top(8)
+        .x_label_area_size(if time.is_empty() { 22 } else { 40 })
+        .y_label_area_size(56)
+        .build_cartesian_2d(0.0..last_s, low..high + room)?;
+    chart
+        .configure_mesh()
+        .x_desc(time)
+        .y_desc(label)
+        .y_labels(5)
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(FAINT)
+        .axis_style(INK)
+        .label_style((FONT, 13))
+        .axis_desc_style((FONT, 14))
+        .draw()?;
+    chart.draw_series(LineSeries::new(
+        thinned(records, seconds, value),
+        colour.stroke_width(1),
+    ))?;
+    Ok(())
+}
+
+/// Lowest and highest of each stretch, so that no peak is lost.
+fn thinned(
+    records: &[TickRecord],
+    seconds: impl Fn(&TickRecord) -> f64,
+    value: impl Fn(&TickRecord) -> f64,
+) -> Vec<(f64, f64)> {
+    const STRETCHES: usize = 900;
+    let per_stretch = records.len().div_ceil(STRETCHES).max(1);
+    records
+        .chunks(per_stretch)
+        .flat_map(|stretch| {
+            let by_value = |a: &&TickRecord, b: &&TickRecord| value(a).total_cmp(&value(b));
+            let ends = [stretch.iter().min_by(by_value), stretch.iter().max_by(by_value)];
+            let mut points: Vec<(f64, f64)> = ends.into_iter().flatten().map(|r| (seconds(r), value(r))).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            points
+        })
+        .collect()
+}

@@ -1,0 +1,149 @@
+//! Scores of implants whose errors are known, against dose computed anew.
+
+use super::*;
+use crate::plan::anatomy::ball;
+use bytemuck::Zeroable;
+use stylet_dose::decay::Interval;
+use stylet_dose::{DosePoints, Dvh, Metric, Source};
+
+const MIDDLE_M: [f64; 3] = [0.05, 0.05, 0.06];
+
+fn anatomy() -> Anatomy {
+    Anatomy {
+        target: ball("gland", MIDDLE_M, [0.02, 0.018, 0.018]),
+        spared: vec![ball("urethra", MIDDLE_M, [0.003, 0.003, 0.02])],
+        lower_m: [0.0; 3],
+        upper_m: [0.1; 3],
+        patient_from_scene: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+    }
+}
+
+fn kernel() -> DoseKernel {
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../sources/i125_6711.toml");
+    DoseKernel::new(&Source::read(&file).unwrap(), Interval::ALL)
+}
+
+/// A grid of seeds, those named in `off` deeper by 6 mm.
+fn pairs(off: &[usize]) -> Vec<SeedPair> {
+    let places = (0..36).map(|i| [i % 3, i / 3 % 3, i / 9].map(f64::from));
+    let seed = |(i, at): (usize, [f64; 3])| {
+        let position_m = [0, 1, 2].map(|a| MIDDLE_M[a] + (at[a] - [1.0, 1.0, 1.5][a]) * 10e-3);
+        let planned = Seed {
+            position_m,
+            axis: Some([0.0, 0.0, 1.0]),
+            strength_u: 0.6,
+        };
+        let mut delivered = planned;
+        if off.contains(&i) {
+            delivered.position_m[2] += 6e-3;
+        }
+        SeedPair {
+            needle: i % 9,
+            hole: None,
+            planned,
+            delivered,
+            direction: [0.0, 0.0, 1.0],
+        }
+    };
+    places.enumerate().map(seed).collect()
+}
+
+fn score<'a>(off: &[usize], anatomy: &'a Anatomy, kernel: &'a DoseKernel, records: &'a [TickRecord]) -> Score<'a> {
+    Score::of(Implant {
+        title: "a <test>".to_owned(),
+        pairs: pairs(off),
+        lost: Vec::new(),
+        anatomy,
+        kernel,
+        source: "6711".to_owned(),
+        prescription_gy: 145.0,
+        motion: Motion::of(records, [0.0, 0.0, 1.0]),
+        records,
+    })
+    .unwrap()
+}
+
+#[test]
+fn an_implant_on_plan_has_no_error_and_no_seed_costs_anything() {
+    let (anatomy, kernel) = (anatomy(), kernel());
+    let score = score(&[], &anatomy, &kernel, &[]);
+    assert_eq!(score.errors_m(), [0.0, 0.0]);
+    assert_eq!(score.planned.dvhs, score.delivered.dvhs);
+    for cost in &score.costs {
+        assert!(
+            cost.target_d90_gy.abs() < 1e-6 && cost.target_v100_percent.abs() < 1e-6,
+            "{cost:?}"
+        );
+    }
+}
+
+#[test]
+fn the_cost_of_the_only_seed_off_plan_is_all_that_the_implant_lost() {
+    let (anatomy, kernel) = (anatomy(), kernel());
+    let score = score(&[4], &anatomy, &kernel, &[]);
+    assert!((score.implant.pairs[4].error_along_m() - 6e-3).abs() < 1e-12);
+    assert!(score.implant.pairs[4].error_across_m() < 1e-12);
+    let [mean, worst] = score.errors_m();
+    assert!((mean - 6e-3 / 36.0).abs() < 1e-12 && (worst - 6e-3).abs() < 1e-12);
+    // Dose of all seeds anew, with this one on plan: the plan itself.
+    let structures = anatomy.structures(DOSE_PITCH_M);
+    let value = |one: fn(&SeedPair) -> Seed, structure: usize, name: &str| {
+        let seeds: Vec<Seed> = score.implant.pairs.iter().map(one).collect();
+        let dose = DosePoints::new(&structures[structure].points_m).of_seeds_gy(&kernel, &seeds);
+        let dvh = Dvh::new(&dose, &structures[structure].volumes_m3).unwrap();
+        Metric::parse(name).unwrap().of(&dvh, 145.0).main().unwrap()
+    };
+    let lost = |structure, name| value(|p| p.planned, structure, name) - value(|p| p.delivered, structure, name);
+    let cost = score.costs[4];
+    println!("{cost:?}");
+    assert!((cost.target_d90_gy - lost(0, "D90")).abs() < 1e-6);
+    assert!((cost.target_v100_percent - lost(0, "V100")).abs() < 1e-6);
+    assert!((cost.urethra_d10_gy.unwrap() + lost(1, "D10")).abs() < 1e-6);
+    assert!((cost.urethra_d30_gy.unwrap() + lost(1, "D30")).abs() < 1e-6);
+    assert!(cost.target_d90_gy.abs() > 1e-3 && cost.urethra_d30_gy.unwrap().abs() > 1e-3);
+    assert!(score.costs[5].target_d90_gy.abs() < 1e-9);
+}
+
+#[test]
+fn a_lost_seed_is_missing_from_the_dose_delivered_and_not_from_the_plan() {
+    let (anatomy, kernel) = (anatomy(), kernel());
+    let mut pairs = pairs(&[]);
+    let lost = vec![pairs.remove(7).planned];
+    let all = score(&[], &anatomy, &kernel, &[]);
+    let less = Score::of(Implant {
+        pairs,
+        lost,
+        title: String::new(),
+        source: String::new(),
+        ..score(&[], &anatomy, &kernel, &[]).implant
+    });
+    let less = less.unwrap();
+    let d90 = |v: &Verdict| Metric::parse("D90").unwrap().of(&v.dvhs[0], 145.0).main().unwrap();
+    assert!((d90(&less.planned) - d90(&all.planned)).abs() < 1e-6);
+    assert!(d90(&less.delivered) < d90(&all.delivered) - 0.5);
+    assert_eq!(to_json(&less)["seeds_lost"], 1);
+}
+
+#[test]
+fn the_page_stands_by_itself_and_escapes_what_it_is_given() {
+    let (anatomy, kernel) = (anatomy(), kernel());
+    let mut record = TickRecord::zeroed();
+    let records: Vec<TickRecord> = (0..5000_u64)
+        .map(|i| {
+            record.due_ns = i * 1_000_000;
+            record.force_on_hand_n[2] = (i as f64 * 1e-3).sin();
+            record
+        })
+        .collect();
+    let score = score(&[4, 20], &anatomy, &kernel, &records);
+    let page = super::page::page(&score).unwrap();
+    assert_eq!(page.matches("<svg").count(), 3);
+    assert!(page.contains("a &lt;test&gt;") && !page.contains("<test>"));
+    for foreign in ["http://", "https://", "src=", "NaN"] {
+        let elsewhere = page.replace("http://www.w3.org/2000/svg", "");
+        assert!(!elsewhere.contains(foreign), "{foreign}");
+    }
+    let json = to_json(&score);
+    assert_eq!(json["seeds"].as_array().map(Vec::len), Some(36));
+    assert!((json["seeds"][4]["error_along_mm"].as_f64().unwrap() - 6.0).abs() < 1e-9);
+}

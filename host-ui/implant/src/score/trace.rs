@@ -1,0 +1,197 @@
+//! Force and speed of a whole procedure in bounded memory, and how the hand moved.
+
+use super::motion::{Motion, MotionMeter};
+use stylet_base::envelope::Envelope;
+use stylet_base::format;
+use stylet_shm_schema::{TickRecord, flags};
+
+/// Records kept at most: ten of a second for twenty minutes; of a longer procedure fewer of a second.
+const MOST: usize = 12_000;
+/// Of so many ticks one is kept at first, at 1 kHz a hundred of a second.
+const FIRST_STRETCH: usize = 10;
+/// A plot of all of it has so many places at most, and at first each is of this time.
+const MOST_SLOTS: usize = 600;
+const FIRST_SLOT_NS: u64 = 10_000_000;
+/// A tip that is outside for longer belongs to no procedure until it touches tissue again.
+const OUTSIDE_NS: u64 = 2_000_000_000;
+
+/// Which scene, in which run of the core: its session and generation.
+type SceneKey = (u64, u64);
+
+#[derive(Clone, Debug)]
+pub struct Trace {
+    scene: Option<SceneKey>,
+    /// Of each stretch of ticks the one with the largest force.
+    records: Vec<TickRecord>,
+    stretch: usize,
+    strongest: Option<TickRecord>,
+    in_stretch: usize,
+    /// Force, N, and speed, mm/s.
+    curves: Envelope<2>,
+    began_ns: Option<u64>,
+    /// When the tip touched tissue last.
+    contact_ns: Option<u64>,
+    meter: MotionMeter,
+}
+
+impl Default for Trace {
+    fn default() -> Self {
+        Self {
+            scene: None,
+            records: Vec::new(),
+            stretch: FIRST_STRETCH,
+            strongest: None,
+            in_stretch: 0,
+            curves: Envelope::new(FIRST_SLOT_NS),
+            began_ns: None,
+            contact_ns: None,
+            meter: MotionMeter::default(),
+        }
+    }
+}
+
+impl Trace {
+    /// `direction`: of the needle, into the body. Another scene begins anew.
+    pub fn take(&mut self, records: &[TickRecord], scene: Option<SceneKey>, direction: [f64; 3]) {
+        if scene.is_some() && scene != self.scene {
+            *self = Self {
+                scene,
+                ..Self::default()
+            };
+        }
+        for record in records {
+            if record.flags & flags::IN_CONTACT != 0 {
+                self.contact_ns = Some(record.due_ns);
+            }
+            let Some(contact_ns) = self.contact_ns else { continue };
+            if record.due_ns.saturating_sub(contact_ns) <= OUTSIDE_NS {
+                self.meter.take(record, direction);
+                self.keep(record);
+                self.began_ns.get_or_insert(record.due_ns);
+                let plotted = [square(record).sqrt(), format::mm(record.speed_m_per_s)];
+                self.curves.add(record.due_ns, plotted.map(|v| v as f32));
+            }
+        }
+        self.curves.widen_to(MOST_SLOTS);
+    }
+
+    fn keep(&mut self, record: &TickRecord) {
+        if self.strongest.is_none_or(|kept| square(record) > square(&kept)) {
+            self.strongest = Some(*record);
+        }
+        self.in_stretch += 1;
+        if self.in_stretch < self.stretch {
+            return;
+        }
+        self.in_stretch = 0;
+        self.records.extend(self.strongest.take());
+        if self.records.len() >= MOST {
+            self.stretch *= 2;
+            let stronger = |pair: &[TickRecord]| match pair {
+                [a, b] if square(b) > square(a) => *b,
+                _ => pair[0],
+            };
+            self.records = self.records.chunks(2).map(stronger).collect();
+        }
+    }
+
+    pub fn records(&self) -> &[TickRecord] {
+        &self.records
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.curves.is_empty()
+    }
+
+    /// Smallest and largest over seconds since it began.
+    pub fn force_n(&self) -> Vec<[f64; 3]> {
+        self.curve(0)
+    }
+
+    /// Smallest and largest over seconds since it began.
+    pub fn speed_mm_per_s(&self) -> Vec<[f64; 3]> {
+        self.curve(1)
+    }
+
+    fn curve(&self, quantity: usize) -> Vec<[f64; 3]> {
+        let began_ns = self.began_ns.unwrap_or(0);
+        let seconds = |time_ns: u64| format::seconds(time_ns.saturating_sub(began_ns));
+        let bands = self.curves.bands(quantity);
+        let points = bands.map(|b| [seconds(b.time_ns), f64::from(b.low), f64::from(b.high)]);
+        points.collect()
+    }
+
+    pub fn motion(&self) -> Motion {
+        self.meter.motion()
+    }
+}
+
+fn square(record: &TickRecord) -> f64 {
+    record.force_on_hand_n.iter().map(|f| f * f).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    /// A millisecond apart; the force rises and falls once a second, with one tick of 9 N.
+    fn records(ticks: std::ops::Range<u64>, in_contact: bool) -> Vec<TickRecord> {
+        let record = |tick: u64| {
+            let mut r = TickRecord::zeroed();
+            r.due_ns = (tick + 1) * 1_000_000;
+            r.flags = if in_contact { flags::IN_CONTACT } else { 0 };
+            r.force_on_hand_n[2] = (tick as f64 / 159.0).sin();
+            if tick == 5_003 {
+                r.force_on_hand_n[2] = -9.0;
+            }
+            r
+        };
+        ticks.map(record).collect()
+    }
+
+    #[test]
+    fn an_hour_is_kept_in_bounded_memory_with_its_largest_force() {
+        let mut trace = Trace::default();
+        for minute in 0..60 {
+            trace.take(
+                &records(minute * 60_000..(minute + 1) * 60_000, true),
+                Some((1, 1)),
+                [0.0, 0.0, 1.0],
+            );
+        }
+        assert!(
+            (MOST / 2..MOST).contains(&trace.records().len()),
+            "{}",
+            trace.records().len()
+        );
+        let largest = trace.records().iter().map(square).fold(0.0, f64::max);
+        assert_eq!((largest, trace.motion().peak_force_n), (81.0, 9.0));
+        assert!(trace.records().is_sorted_by_key(|r| r.due_ns));
+        let last_ns = trace.records().last().map(|r| r.due_ns);
+        assert!(last_ns.is_some_and(|ns| ns > 3_599_000_000_000), "{last_ns:?}");
+        assert!((trace.motion().in_tissue_s - 3_599.999).abs() < 1e-6);
+        let curve = trace.force_n();
+        assert!((MOST_SLOTS / 2..=MOST_SLOTS).contains(&curve.len()), "{}", curve.len());
+        assert!(curve.is_sorted_by_key(|[s, ..]| *s) && curve[0][0] < 5.2);
+        assert!(curve.last().is_some_and(|[s, ..]| *s > 3_594.0));
+        let [at_s, low, high] = *curve.iter().max_by(|a, b| a[2].total_cmp(&b[2])).expect("some");
+        assert!(
+            (at_s - 5.003).abs() <= 5.13 && low < 0.1 && high == 9.0,
+            "{at_s} {low} {high}"
+        );
+    }
+
+    #[test]
+    fn what_comes_before_the_tissue_and_long_after_it_is_no_part_of_the_procedure() {
+        let mut trace = Trace::default();
+        trace.take(&records(0..10_000, false), Some((1, 1)), [0.0, 0.0, 1.0]);
+        assert!(trace.records().is_empty());
+        trace.take(&records(10_000..11_000, true), Some((1, 1)), [0.0, 0.0, 1.0]);
+        trace.take(&records(11_000..60_000, false), Some((1, 1)), [0.0, 0.0, 1.0]);
+        assert!((trace.motion().duration_s - 2.999).abs() < 1e-9, "{:?}", trace.motion());
+        assert_eq!(trace.records().len(), 300);
+        trace.take(&records(60_000..60_010, true), Some((1, 2)), [0.0, 0.0, 1.0]);
+        assert_eq!(trace.records().len(), 1, "another scene");
+    }
+}

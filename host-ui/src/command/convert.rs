@@ -1,0 +1,215 @@
+//! `host-ui convert`: label volumes, seed plans and doses from one format to another, by the names of the two files.
+
+use clap::Args;
+use std::path::{Path, PathBuf};
+use stylet_dose::Source;
+use stylet_dose::files::{Dosed, SeedDefaults, read_dose, read_seeds};
+use stylet_files::convert::{can_hold_labels, write_labels, write_whole};
+use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
+use stylet_files::dicom::{self, Identity};
+use stylet_files::{self as files, Progress, open, scene};
+
+const HELP: &str = "\
+What is converted into what:
+  label volume   .nii .nii.gz .nrrd .nhdr .seg.nrrd .mha .mhd, .dcm (RT Structure Set, with its images beside it)
+                 into .nrrd .seg.nrrd .mha .nii.gz, .dcm (RT Structure Set)
+  seed plan      .csv (columns as for host-ui dose) into .dcm (RT Plan; needs --source), and back
+  dose           .csv (dose_grid.csv of host-ui dose) into .dcm (RT Dose; needs --plan) or .nrrd
+
+Orientation and spacing are kept: NIfTI is in RAS, DICOM and MetaImage in LPS, NRRD says which.
+What is not taken over (overlaps, structures without volume) is told.
+
+Examples:
+  host-ui convert rtstruct.dcm gland.seg.nrrd
+  host-ui convert gland.seg.nrrd rtstruct.dcm
+  host-ui convert seeds.csv plan.dcm --source sources/i125_6711.toml --strength-u 0.5
+  host-ui convert plan.dcm seeds.csv
+  host-ui convert dose/dose_grid.csv dose.dcm --plan plan.dcm";
+
+#[derive(Args, Debug)]
+#[command(after_long_help = HELP)]
+pub struct ConvertArgs {
+    /// File to read; what it is is told by its content
+    from: PathBuf,
+    /// File to write; its name says the format
+    to: PathBuf,
+    /// Source of the seeds (TOML), for a plan out of CSV
+    #[arg(long, value_name = "FILE")]
+    source: Option<PathBuf>,
+    /// Strength of seeds whose CSV does not say, in U
+    #[arg(long, value_name = "U")]
+    strength_u: Option<f64>,
+    /// RT Plan that a dose belongs to
+    #[arg(long, value_name = "FILE")]
+    plan: Option<PathBuf>,
+}
+
+impl ConvertArgs {
+    pub fn run(self) -> Result<(), String> {
+        if has_ending(&self.from, "csv") {
+            return match first_line(&self.from)?.contains("dose_gy") {
+                true => self.dose(),
+                false => self.plan_from_csv(),
+            };
+        }
+        if has_ending(&self.to, "csv") {
+            return self.plan_to_csv();
+        }
+        self.labels()
+    }
+
+    fn labels(&self) -> Result<(), String> {
+        let to_dicom = has_ending(&self.to, "dcm");
+        if !to_dicom && !can_hold_labels(&self.to) {
+            return Err(format!(
+                "{}: a label volume is written as .nrrd, .seg.nrrd, .mha, .nii.gz or .dcm; see host-ui convert --help",
+                self.to.display()
+            ));
+        }
+        if scene::is_scene(&self.from) {
+            return Err(format!(
+                "{}: give the volume that the scene file names",
+                self.from.display()
+            ));
+        }
+        let voxels = files::read_voxels(&self.from, &Progress::default()).map_err(|e| e.to_string())?;
+        if let Some(note) = &voxels.frame.warning {
+            eprintln!("note: {note}");
+        }
+        if to_dicom {
+            let told = |why: String| format!("{}: {why}", self.to.display());
+            let bytes = dicom::structures::write::bytes(&voxels, &Identity::new()).map_err(told)?;
+            write_whole(&self.to, &bytes)?;
+        } else {
+            write_labels(&voxels, &self.to)?;
+            let keeps_names = has_ending(&self.to, "nrrd");
+            if !keeps_names && !voxels.names.is_empty() {
+                eprintln!(
+                    "note: names of structures have no place in this format: {}",
+                    names(&voxels)
+                );
+            }
+        }
+        self.written()
+    }
+
+    fn plan_from_csv(&self) -> Result<(), String> {
+        self.needs_ending("dcm", "seeds out of CSV become an RT Plan")?;
+        let source = self
+            .source
+            .as_deref()
+            .ok_or("a plan needs --source FILE: DICOM has isotope and half-life in it")?;
+        let source = Source::read(source)?;
+        let defaults = SeedDefaults {
+            strength_u: self.strength_u,
+            strength_per_activity_u_per_mci: source.strength_per_activity_u_per_mci,
+        };
+        let seeds = read_seeds(&self.from, defaults)?;
+        let plan = SeedPlan {
+            label: "Stylet".to_owned(),
+            identity: Identity::new(),
+            uid: dicom::new_uid(),
+            prescription_gy: source.prescription_gy,
+            source: PlanSource {
+                model: source.model.clone(),
+                manufacturer: String::new(),
+                isotope: source.nuclide.clone(),
+                half_life_days: stylet_dose::decay::s_to_days(source.half_life_s),
+                active_length_m: source.tables.active_length_m,
+            },
+            seeds: seeds
+                .iter()
+                .map(|s| PlanSeed {
+                    needle: String::new(),
+                    position_m: s.position_m,
+                    axis: s.axis,
+                    strength_u: s.strength_u,
+                })
+                .collect(),
+            notes: Vec::new(),
+        };
+        write_whole(&self.to, &plan::bytes(&plan)?)?;
+        self.written()
+    }
+
+    fn plan_to_csv(&self) -> Result<(), String> {
+        let plan = plan::open(&self.from)?;
+        let mut out = String::from("x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u\n");
+        for seed in &plan.seeds {
+            let [x, y, z] = seed.position_m.map(|v| v * 1e3);
+            let axis = seed.axis.map_or(",,".to_owned(), |[a, b, c]| format!("{a},{b},{c}"));
+            out.push_str(&format!("{x},{y},{z},{axis},{}\n", seed.strength_u));
+        }
+        write_whole(&self.to, out.as_bytes())?;
+        self.written()
+    }
+
+    fn dose(&self) -> Result<(), String> {
+        let grid = read_dose(&self.from)?;
+        if has_ending(&self.to, "nrrd") {
+            write_whole(&self.to, &dose_nrrd(&grid))?;
+            return self.written();
+        }
+        self.needs_ending("dcm", "a dose out of CSV becomes an RT Dose or .nrrd")?;
+        let plan = self
+            .plan
+            .as_deref()
+            .ok_or("an RT Dose needs --plan FILE: the RT Plan that it is the dose of")?;
+        let image = dicom::dose::DoseImage {
+            dims: grid.dims,
+            origin_m: grid.origin_m,
+            spacing_m: grid.spacing_m,
+            dose_gy: &grid.dose_gy,
+        };
+        write_whole(&self.to, &dicom::dose::bytes(&image, &plan::open(plan)?)?)?;
+        self.written()
+    }
+
+    fn needs_ending(&self, ending: &str, why: &str) -> Result<(), String> {
+        if has_ending(&self.to, ending) {
+            return Ok(());
+        }
+        Err(format!(
+            "{}: {why}, so its name must end in .{ending}",
+            self.to.display()
+        ))
+    }
+
+    fn written(&self) -> Result<(), String> {
+        println!("written: {}", self.to.display());
+        Ok(())
+    }
+}
+
+fn names(voxels: &files::Voxels) -> String {
+    let each: Vec<String> = voxels.names.iter().map(|(l, n)| format!("{l}={n}")).collect();
+    each.join(", ")
+}
+
+fn has_ending(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
+}
+
+fn first_line(path: &Path) -> Result<String, String> {
+    let bytes = open::whole(path, &Progress::default()).map_err(|why| format!("{}: {why}", path.display()))?;
+    let line = bytes
+        .split(|&b| b == b'\n')
+        .find(|l| !l.starts_with(b"#"))
+        .unwrap_or_default();
+    Ok(String::from_utf8_lossy(line).to_ascii_lowercase())
+}
+
+/// In double precision, so that nothing is lost.
+fn dose_nrrd(grid: &Dosed) -> Vec<u8> {
+    let [x, y, z] = grid.origin_m.map(|v| v * 1e3);
+    let [a, b, c] = grid.spacing_m.map(|v| v * 1e3);
+    let [nx, ny, nz] = grid.dims;
+    let mut out = format!(
+        "NRRD0004\n# dose in Gy\ntype: double\ndimension: 3\nspace: right-anterior-superior\nsizes: {nx} {ny} {nz}\n\
+         space directions: ({a},0,0) (0,{b},0) (0,0,{c})\nkinds: domain domain domain\nendian: little\nencoding: raw\n\
+         space origin: ({x},{y},{z})\n\n"
+    )
+    .into_bytes();
+    grid.dose_gy.iter().for_each(|d| out.extend(d.to_le_bytes()));
+    out
+}

@@ -1,0 +1,142 @@
+//! Results as CSV, JSON and tables; the unit of each column stands in its header.
+
+use serde_json::{Value, json};
+use std::path::Path;
+use stylet_dose::Dvh;
+use stylet_dose::perturb::{PERCENTILES, Spread};
+
+pub fn folder(out: &Path) -> Result<(), String> {
+    std::fs::create_dir_all(out).map_err(|e| {
+        format!(
+            "{} cannot be made ({e}); choose another folder with --out",
+            out.display()
+        )
+    })
+}
+
+pub fn json(path: &Path, value: &Value) -> Result<(), String> {
+    let text = serde_json::to_string_pretty(value).map_err(|e| e.to_string())?;
+    std::fs::write(path, text + "\n").map_err(|e| format!("{} cannot be written ({e})", path.display()))
+}
+
+fn csv(path: &Path, header: &[String], rows: impl Iterator<Item = Vec<String>>) -> Result<(), String> {
+    let told = |e: csv::Error| format!("{} cannot be written ({e})", path.display());
+    let mut writer = csv::Writer::from_path(path).map_err(told)?;
+    writer.write_record(header).map_err(told)?;
+    for row in rows {
+        writer.write_record(&row).map_err(told)?;
+    }
+    writer.flush().map_err(|e| told(e.into()))
+}
+
+fn owned(header: &[&str]) -> Vec<String> {
+    header.iter().map(|&h| h.to_owned()).collect()
+}
+
+pub fn doses(path: &Path, points_m: impl Iterator<Item = [f64; 3]>, dose_gy: &[f64]) -> Result<(), String> {
+    let rows = points_m.zip(dose_gy).map(|(p, gy)| {
+        let [x, y, z] = p.map(|v| format!("{:.4}", v * 1e3));
+        vec![x, y, z, format!("{gy:.6}")]
+    });
+    csv(path, &owned(&["x_mm", "y_mm", "z_mm", "dose_gy"]), rows)
+}
+
+/// Differential and cumulative, up to the highest dose but not beyond ten times the prescription.
+pub fn dvh(path: &Path, curves: &[(&str, &Dvh)], prescription_gy: f64, bin_gy: f64) -> Result<(), String> {
+    let header = owned(&[
+        "structure",
+        "dose_from_gy",
+        "dose_to_gy",
+        "dose_from_percent",
+        "volume_in_bin_cc",
+        "volume_in_bin_percent",
+        "volume_at_least_cc",
+        "volume_at_least_percent",
+    ]);
+    let rows = curves.iter().flat_map(|(name, dvh)| {
+        let most_gy = dvh.highest_gy().min(10.0 * prescription_gy) + bin_gy;
+        let percent = |m3: f64| format!("{:.5}", m3 / dvh.volume_m3() * 100.0);
+        let cc = |m3: f64| format!("{:.6}", m3 * 1e6);
+        dvh.bins(bin_gy, most_gy).into_iter().map(move |b| {
+            vec![
+                (*name).to_owned(),
+                format!("{:.4}", b.from_gy),
+                format!("{:.4}", b.to_gy),
+                format!("{:.4}", b.from_gy / prescription_gy * 100.0),
+                cc(b.volume_m3),
+                percent(b.volume_m3),
+                cc(b.at_least_m3),
+                percent(b.at_least_m3),
+            ]
+        })
+    });
+    csv(path, &header, rows)
+}
+
+/// An empty field is a measure that is not defined in that trial.
+pub fn trials(
+    path: &Path,
+    measures: &[(String, Option<f64>)],
+    trials: &[(usize, Vec<Option<f64>>)],
+) -> Result<(), String> {
+    let names = measures.iter().map(|(name, _)| name.clone());
+    let header: Vec<String> = std::iter::once("trial".to_owned()).chain(names).collect();
+    let rows = trials.iter().map(|(trial, values)| {
+        let values = values.iter().map(|v| v.map_or_else(String::new, |v| format!("{v:.6}")));
+        std::iter::once(trial.to_string()).chain(values).collect()
+    });
+    csv(path, &header, rows)
+}
+
+pub fn distribution(path: &Path, spreads: &[Spread]) -> Result<(), String> {
+    let percentiles = PERCENTILES.map(|p| format!("p{p}"));
+    let header: Vec<String> = owned(&["measure [unit]", "planned", "mean", "sd"])
+        .into_iter()
+        .chain(percentiles)
+        .chain(["trials".to_owned()])
+        .collect();
+    let rows = spreads.iter().map(|s| {
+        let planned = s.planned.map_or_else(String::new, |v| format!("{v:.6}"));
+        let figures = [s.mean, s.deviation].into_iter().chain(s.percentiles);
+        [s.name.clone(), planned]
+            .into_iter()
+            .chain(figures.map(|v| format!("{v:.6}")))
+            .chain([s.defined.to_string()])
+            .collect()
+    });
+    csv(path, &header, rows)
+}
+
+pub fn spreads_json(spreads: &[Spread]) -> Value {
+    let measures: serde_json::Map<String, Value> = spreads
+        .iter()
+        .map(|s| {
+            let percentiles: serde_json::Map<String, Value> = PERCENTILES
+                .iter()
+                .zip(s.percentiles)
+                .map(|(p, v)| (format!("p{p}"), json!(v)))
+                .collect();
+            let value = json!({
+                "planned": s.planned, "mean": s.mean, "sd": s.deviation, "trials": s.defined, "percentiles": percentiles,
+            });
+            (s.name.clone(), value)
+        })
+        .collect();
+    json!({ "measures": measures })
+}
+
+pub fn spread_table(spreads: &[Spread]) -> String {
+    let wide = spreads.iter().map(|s| s.name.len()).max().unwrap_or(0);
+    let mut text = format!(
+        "{:wide$} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}\n",
+        "", "planned", "mean", "sd", "p5", "p50", "p95"
+    );
+    for s in spreads {
+        let planned = s.planned.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+        text += &format!(
+            "{:wide$} {planned:>10} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>10.3}\n",
+            s.name, s.mean, s.deviation, s.percentiles[0], s.percentiles[2], s.percentiles[4]
+        );
+    }
+    text
+}

@@ -1,0 +1,134 @@
+//! `host-ui plan`: a plan file for the scene of a running core.
+
+use clap::Args;
+use std::path::PathBuf;
+use stylet_base::progress_bar::progress_bar;
+use stylet_dose::decay::Interval;
+use stylet_dose::files::SeedDefaults;
+use stylet_dose::report::Judge;
+use stylet_dose::{DoseKernel, Source};
+use stylet_host::core_args::CoreArgs;
+use stylet_implant::plan::automatic::{self, Aims};
+use stylet_implant::plan::file::{self, Frames};
+use stylet_implant::plan::{Anatomy, ImplantPlan, Template, check};
+use stylet_implant::procedure::{Connect, Live};
+
+const DOSE_PITCH_M: f64 = 1e-3;
+const POINTS: usize = 100_000;
+
+const HELP: &str = "\
+Without --seeds the plan is modified peripheral loading: needles near the edge of the target, fewer inside, none near what is to
+be spared; the strength of a seed is the one with which 96 % of the target gets the prescription. With --seeds it is those of a
+table (columns as in 'host-ui dose --help'), put on needles by their numbers, or by their lines where it has none.
+
+Units: mm, patient frame (RAS); strength in U (1 U = 1 cGy cm2/h).
+
+Examples:
+  host-ui plan --core target/release/rt-core --source sources/i125_6711.toml --out plan.toml --csv seeds.csv
+  host-ui plan --source sources/i125_6711.toml --seeds seeds.csv --strength-u 0.5 --out plan.toml
+  host-ui procedure --plan plan.toml --compensate --insert-speed 120 --out out/implant";
+
+#[derive(Args, Debug)]
+#[command(after_long_help = HELP)]
+pub struct PlanArgs {
+    #[command(flatten)]
+    asked: CoreArgs,
+    /// Start this rt-core when none is running, and end it afterwards
+    #[arg(long, value_name = "PATH")]
+    core: Option<PathBuf>,
+    /// Source file (TOML) as those in sources/
+    #[arg(long, value_name = "FILE")]
+    source: PathBuf,
+    /// Prescribed dose in Gy [default: that of the source file]
+    #[arg(long, value_name = "GY")]
+    prescription_gy: Option<f64>,
+    /// Seeds to take instead (CSV)
+    #[arg(long, value_name = "FILE")]
+    seeds: Option<PathBuf>,
+    /// Strength of seeds whose table does not say, in U
+    #[arg(long, value_name = "U", requires = "seeds")]
+    strength_u: Option<f64>,
+    /// Plan file to write (TOML)
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Table of the seeds to write as well
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+}
+
+impl PlanArgs {
+    pub fn run(self) -> Result<(), String> {
+        let source = Source::read(&self.source)?;
+        let prescription_gy = self.prescription_gy.or(source.prescription_gy);
+        let prescription_gy = prescription_gy.filter(|gy| (1e-3..=1e4).contains(gy)).ok_or_else(|| {
+            let file = self.source.display();
+            format!(
+                "{file} names no prescription_gy, or --prescription-gy is not 0.001 to 10000; give --prescription-gy"
+            )
+        })?;
+        let live = Live::connect(&Connect {
+            asked: self.asked.clone(),
+            core: self.core.clone(),
+        })?;
+        let (anatomy, template) = (Anatomy::of(&live.scene)?, Template::before(&live.scene.header));
+        let frames = Frames::new(&anatomy.patient_from_scene);
+        let kernel = DoseKernel::new(&source, Interval::ALL);
+        let plan = match &self.seeds {
+            None => {
+                let bar = progress_bar(100, "% of the patterns");
+                let tell = |share: f32| {
+                    bar.set_position((share * 100.0) as u64);
+                    Ok(())
+                };
+                let aims = Aims::new(prescription_gy);
+                let plan = automatic::plan(template, &anatomy, &kernel, &source.model, &aims, tell);
+                bar.finish_and_clear();
+                plan?
+            }
+            Some(seeds) => {
+                let defaults = SeedDefaults {
+                    strength_u: self.strength_u,
+                    strength_per_activity_u_per_mci: source.strength_per_activity_u_per_mci,
+                };
+                file::import_csv(seeds, defaults, &frames, template, &source.model, prescription_gy)?
+            }
+        };
+        for problem in check::problems(&plan, &anatomy) {
+            println!("note: {problem}");
+        }
+        self.write(&plan, &frames)?;
+        print!("{}", figures(&plan, &anatomy, &kernel)?);
+        println!("written: {}", self.out.display());
+        Ok(())
+    }
+
+    fn write(&self, plan: &ImplantPlan, frames: &Frames) -> Result<(), String> {
+        file::write(&self.out, plan, frames)?;
+        let Some(csv) = &self.csv else { return Ok(()) };
+        let text = file::seeds_to_csv(plan, frames);
+        std::fs::write(csv, text).map_err(|e| format!("{} cannot be written ({e})", csv.display()))
+    }
+}
+
+fn figures(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel) -> Result<String, String> {
+    let seeds = plan.seeds();
+    let strengths = seeds.iter().map(|s| s.strength_u);
+    let total: f64 = strengths.clone().sum();
+    let structures = anatomy.structures(DOSE_PITCH_M);
+    let judge = Judge::new(
+        structures,
+        Some(&anatomy.target.name),
+        &[],
+        plan.prescription_gy,
+        &seeds,
+        POINTS,
+    )?;
+    Ok(format!(
+        "{} needles, {} seeds, {total:.2} U in all ({:.3} to {:.3} U a seed)\n{}",
+        plan.needles.len(),
+        seeds.len(),
+        strengths.clone().fold(f64::INFINITY, f64::min),
+        strengths.fold(0.0, f64::max),
+        judge.table(&judge.judge(kernel, &seeds))
+    ))
+}

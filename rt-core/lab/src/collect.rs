@@ -1,0 +1,276 @@
+//! Gathers what the loops say of each tick into histograms, windows and the latest wake-ups; at normal priority.
+
+use hdrhistogram::Histogram;
+use std::time::Duration;
+use stylet_runtime::rt::timing::{MAX_STAGES, TickTimes};
+
+/// Longest time that a histogram tells apart; longer ones count as this.
+const LONGEST_NS: u64 = 10_000_000_000;
+/// Three digits: a value is known to 0.1 %.
+const DIGITS: u8 = 3;
+/// Latest wake-ups that are kept one by one.
+pub const WORST_KEPT: usize = 16;
+/// How often the ring is emptied; it holds seconds.
+const PAUSE: Duration = Duration::from_millis(5);
+
+/// A histogram of nanoseconds with fixed bounds.
+pub fn histogram() -> Histogram<u64> {
+    Histogram::new_with_bounds(1, LONGEST_NS, DIGITS).expect("the bounds are constants that fit")
+}
+
+/// How ticks are gathered.
+#[derive(Clone, Copy, Debug)]
+pub struct Plan {
+    pub period_ns: u64,
+    /// Ticks at the start that count as warming up and are left out.
+    pub warm_up_ticks: u64,
+    pub window_ns: u64,
+    pub windows: usize,
+}
+
+/// The worst of a stretch of time.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Window {
+    pub worst_wake_ns: u64,
+    pub worst_work_ns: u64,
+    pub missed: u32,
+    pub ticks: u32,
+}
+
+/// One of the latest wake-ups.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LateTick {
+    pub due_ns: u64,
+    pub wake_ns: u64,
+    pub work_ns: u64,
+}
+
+/// Everything measured of one loop.
+pub struct LoopTiming {
+    /// Names of the stages, in the order of the tick.
+    pub stage_names: &'static [&'static str],
+    pub wake: Histogram<u64>,
+    pub stages: [Histogram<u64>; MAX_STAGES],
+    /// From wake-up to the end of the tick, without handing over what was measured.
+    pub work: Histogram<u64>,
+    /// Haptic: device read to force written. Tissue: tip read by the haptic loop to response published.
+    pub path: Histogram<u64>,
+    /// Due time to force written (haptic), or to response published (tissue).
+    pub due_to_output: Histogram<u64>,
+    /// Difference between the interval of two wake-ups and the period.
+    pub jitter: Histogram<u64>,
+    /// What measuring costs the loop in each tick.
+    pub recording: Histogram<u64>,
+    pub windows: Vec<Window>,
+    pub worst: [LateTick; WORST_KEPT],
+    pub first_due_ns: u64,
+    last_due_ns: u64,
+    pub ticks: u64,
+    pub missed: u64,
+    /// Ticks that ended after the next one was due.
+    pub overruns: u64,
+    /// Ticks of the whole run, warm-up included, that found their time already past: they did not sleep.
+    pub unslept: u64,
+    /// Ticks that did not fit into the ring.
+    pub lost: u64,
+    plan: Plan,
+    seen: u64,
+    last_woke_ns: u64,
+}
+
+impl LoopTiming {
+    pub fn new(stage_names: &'static [&'static str], plan: Plan) -> Self {
+        Self {
+            stage_names,
+            wake: histogram(),
+            stages: std::array::from_fn(|_| histogram()),
+            work: histogram(),
+            path: histogram(),
+            due_to_output: histogram(),
+            jitter: histogram(),
+            recording: histogram(),
+            windows: vec![Window::default(); plan.windows],
+            worst: [LateTick::default(); WORST_KEPT],
+            first_due_ns: 0,
+            last_due_ns: 0,
+            ticks: 0,
+            missed: 0,
+            overruns: 0,
+            unslept: 0,
+            lost: 0,
+            plan,
+            seen: 0,
+            last_woke_ns: 0,
+        }
+    }
+
+    /// Gathers until the loop is gone and the ring is empty.
+    pub fn gather(mut self, mut ring: rtrb::Consumer<TickTimes>) -> Self {
+        loop {
+            let last = ring.is_abandoned();
+            while let Ok(tick) = ring.pop() {
+                self.take(&tick);
+            }
+            if last {
+                return self;
+            }
+            std::thread::sleep(PAUSE);
+        }
+    }
+
+    /// Of the grid that was served or missed, warm-up left out.
+    pub fn measured_ns(&self) -> u64 {
+        match self.ticks {
+            0 => 0,
+            _ => self.last_due_ns - self.first_due_ns + self.plan.period_ns,
+        }
+    }
+
+    fn take(&mut self, tick: &TickTimes) {
+        self.seen += 1;
+        self.lost = u64::from(tick.lost);
+        self.unslept += u64::from(!tick.slept);
+        if self.seen > self.plan.warm_up_ticks {
+            self.record(tick);
+        }
+        self.last_woke_ns = tick.woke_ns;
+    }
+
+    fn record(&mut self, tick: &TickTimes) {
+        let (due_ns, woke_ns, done_ns) = (tick.due_ns, tick.woke_ns, tick.done_ns());
+        let (wake_ns, work_ns) = (woke_ns.saturating_sub(due_ns), done_ns - woke_ns);
+        if self.ticks == 0 {
+            self.first_due_ns = due_ns;
+        }
+        self.last_due_ns = due_ns;
+        self.ticks += 1;
+        self.missed += u64::from(tick.missed);
+        self.overruns += u64::from(done_ns > due_ns + self.plan.period_ns);
+        self.wake.saturating_record(wake_ns);
+        self.work.saturating_record(work_ns);
+        let mut before = woke_ns;
+        for (histogram, &mark) in self.stages.iter_mut().zip(tick.marks()) {
+            histogram.saturating_record(mark - before);
+            before = mark;
+        }
+        if let Some(path_ns) = tick.path_ns {
+            self.path.saturating_record(path_ns);
+        }
+        if let Some(output_ns) = tick.output_ns {
+            self.due_to_output.saturating_record(output_ns.saturating_sub(due_ns));
+        }
+        if self.last_woke_ns > 0 {
+            let interval_ns = woke_ns - self.last_woke_ns;
+            self.jitter.saturating_record(interval_ns.abs_diff(self.plan.period_ns));
+        }
+        self.recording.saturating_record(tick.recording_ns);
+        self.note_window(due_ns, wake_ns, work_ns, tick.missed);
+        self.note_worst(LateTick {
+            due_ns,
+            wake_ns,
+            work_ns,
+        });
+    }
+
+    fn note_window(&mut self, due_ns: u64, wake_ns: u64, work_ns: u64, missed: u32) {
+        let index = (due_ns.saturating_sub(self.first_due_ns) / self.plan.window_ns) as usize;
+        if let Some(window) = self.windows.get_mut(index) {
+            window.worst_wake_ns = window.worst_wake_ns.max(wake_ns);
+            window.worst_work_ns = window.worst_work_ns.max(work_ns);
+            window.missed += missed;
+            window.ticks += 1;
+        }
+    }
+
+    /// Keeps the latest wake-ups, latest first.
+    fn note_worst(&mut self, tick: LateTick) {
+        if tick.wake_ns <= self.worst[WORST_KEPT - 1].wake_ns {
+            return;
+        }
+        let place = self.worst.partition_point(|t| t.wake_ns >= tick.wake_ns);
+        self.worst[place..].rotate_right(1);
+        self.worst[place] = tick;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLAN: Plan = Plan {
+        period_ns: 1_000,
+        warm_up_ticks: 2,
+        window_ns: 10_000,
+        windows: 4,
+    };
+
+    fn timing() -> LoopTiming {
+        LoopTiming::new(&["a", "b"], PLAN)
+    }
+
+    /// A tick due at `due_ns` that wakes `wake_ns` late and has stages of 100 and 200 ns.
+    fn tick(due_ns: u64, wake_ns: u64, missed: u32) -> TickTimes {
+        let woke_ns = due_ns + wake_ns;
+        let mut tick = TickTimes::default();
+        (tick.due_ns, tick.woke_ns, tick.missed, tick.slept) = (due_ns, woke_ns, missed, true);
+        tick.push_mark(woke_ns + 100);
+        tick.push_mark(woke_ns + 300);
+        tick
+    }
+
+    #[test]
+    fn stages_add_up_to_the_tick_and_lateness_to_an_overrun() {
+        let mut timing = timing();
+        for i in 0..10_u64 {
+            timing.take(&tick(1_000 * i, if i == 7 { 800 } else { 10 }, 0));
+        }
+        assert_eq!(timing.ticks, 8);
+        assert_eq!(
+            [timing.stages[0].max(), timing.stages[1].max(), timing.work.max()],
+            [100, 200, 300]
+        );
+        assert_eq!(timing.overruns, 1);
+        // Woken 790 ns late, then 790 ns sooner again.
+        assert_eq!(timing.jitter.count_at(790), 2);
+        assert_eq!(timing.jitter.count_at(0), 6);
+    }
+
+    #[test]
+    fn latest_wake_ups_are_kept_in_order() {
+        let mut timing = timing();
+        let mut all = Vec::new();
+        for i in 0..200_u64 {
+            let wake_ns = i * 7919 % 1009;
+            timing.take(&tick(2_000 * i, wake_ns, 0));
+            if i >= PLAN.warm_up_ticks {
+                all.push(wake_ns);
+            }
+        }
+        all.sort_unstable_by(|a, b| b.cmp(a));
+        let kept: Vec<u64> = timing.worst.iter().map(|t| t.wake_ns).collect();
+        assert_eq!(kept, all[..WORST_KEPT]);
+        assert_eq!(timing.wake.max(), timing.wake.highest_equivalent(all[0]));
+    }
+
+    #[test]
+    fn windows_count_from_the_first_recorded_tick_and_end_with_their_number() {
+        let mut timing = timing();
+        for i in 0..100_u64 {
+            timing.take(&tick(1_000 * i, i, u32::from(i == 15)));
+        }
+        // Ticks 2 to 11 are the first window of 10 us.
+        assert_eq!(timing.windows[0].worst_wake_ns, 11);
+        assert_eq!(timing.windows[1].missed, 1);
+        assert_eq!(timing.windows.iter().map(|w| w.ticks).sum::<u32>(), 40);
+    }
+
+    #[test]
+    fn everything_in_the_ring_is_gathered_before_it_ends() {
+        let (mut into, ring) = rtrb::RingBuffer::new(64);
+        for i in 0..50 {
+            into.push(tick(1_000 * i, 5, 0)).expect("room");
+        }
+        drop(into);
+        assert_eq!(timing().gather(ring).ticks, 48);
+    }
+}

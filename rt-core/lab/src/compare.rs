@@ -1,0 +1,289 @@
+//! Our wake-up in turns with another: that of `cyclictest` on the same core with the same priority and interval, or our own without
+//! the load.
+
+use crate::collect::histogram;
+use crate::load::{Load, Running};
+use crate::measure::{Measured, Setup, measure};
+use crate::summary::quantile_us;
+use clap::ValueEnum;
+use hdrhistogram::Histogram;
+use serde::Serialize;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+use stylet_runtime::core::Options;
+
+/// Each turn brings p99.9 with ten samples beyond it at 1 kHz.
+const SHORTEST_TURN_NS: u64 = 11_000_000_000;
+/// Bins of 1 ns; what is later than a millisecond is known by its number and its maximum alone.
+const BINS: u64 = 1_000_000;
+const COMPARED: [(&str, f64); 4] = [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999), ("max", 1.0)];
+
+/// What our turns are compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Against {
+    /// `cyclictest` (Debian package rt-tests) under the same load: same core, priority and interval
+    Cyclictest,
+    /// The same loops without the load
+    Unloaded,
+}
+
+impl Against {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cyclictest => "cyclictest",
+            Self::Unloaded => "without the load",
+        }
+    }
+}
+
+/// Wake-up latency of one turn, microseconds, in the order of the comparison's `names`.
+pub type Turn = [Option<f64>; COMPARED.len()];
+
+#[derive(Clone, Debug, Serialize)]
+pub struct Round {
+    pub ours_us: Turn,
+    pub others_us: Turn,
+    pub ratio: Turn,
+}
+
+/// What the turns showed, or why there were none.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    pub against: Against,
+    /// Version of the other program; empty where it is this one.
+    pub tool: String,
+    /// Why nothing could be compared.
+    pub absent: Option<String>,
+    pub names: [&'static str; COMPARED.len()],
+    pub turn_s: f64,
+    pub rounds: Vec<Round>,
+    /// Ours over the other's; below 1 ours is earlier.
+    pub median_ratio: Turn,
+    /// All turns together, for the picture.
+    #[serde(skip)]
+    pub ours: Histogram<u64>,
+    #[serde(skip)]
+    pub others: Histogram<u64>,
+}
+
+/// Turns of ours and of the other's, `rounds` of each.
+pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &AtomicBool) -> Result<Comparison, String> {
+    let turn_ns = (setup.duration_ns / u64::from(rounds)).max(SHORTEST_TURN_NS);
+    let tool = match against {
+        Against::Cyclictest => version(),
+        Against::Unloaded => Some(String::new()),
+    };
+    let mut comparison = Comparison {
+        against,
+        absent: match (against, &tool, setup.load) {
+            (_, None, _) => Some("cyclictest is not installed: sudo apt-get install rt-tests".to_owned()),
+            (Against::Cyclictest, _, Load::Window) => {
+                Some("the window draws nothing without our loops; give --compare unloaded".to_owned())
+            }
+            (Against::Unloaded, _, Load::None) => Some("there is no load to compare with; give --load".to_owned()),
+            _ => None,
+        },
+        tool: tool.unwrap_or_default(),
+        names: COMPARED.map(|(name, _)| name),
+        turn_s: turn_ns as f64 / 1e9,
+        rounds: Vec::new(),
+        median_ratio: [None; COMPARED.len()],
+        ours: histogram(),
+        others: histogram(),
+    };
+    if comparison.absent.is_some() {
+        return Ok(comparison);
+    }
+    let setup = Setup {
+        duration_ns: turn_ns,
+        ..*setup
+    };
+    for _ in 0..rounds {
+        let measured: Measured = measure(&setup, interrupted)?;
+        let ours = &measured.haptic.wake;
+        let others = match against {
+            Against::Cyclictest => cyclictest(&setup, interrupted),
+            Against::Unloaded => unloaded(&setup, interrupted),
+        };
+        let others = match others {
+            Ok(others) => others,
+            Err(why) => {
+                comparison.absent = Some(why);
+                break;
+            }
+        };
+        comparison.rounds.push(round(ours, &others));
+        let joined = comparison.ours.add(ours).and(comparison.others.add(&others));
+        joined.map_err(|e| format!("histograms: {e:?}"))?;
+        // SYNC: set by a signal handler; nothing but the flag is carried.
+        if interrupted.load(Ordering::Acquire) {
+            break;
+        }
+    }
+    comparison.median_ratio = std::array::from_fn(|i| median(comparison.rounds.iter().filter_map(|r| r.ratio[i])));
+    Ok(comparison)
+}
+
+fn unloaded(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, String> {
+    let setup = Setup {
+        load: Load::None,
+        ..*setup
+    };
+    Ok(measure(&setup, interrupted)?.haptic.wake)
+}
+
+fn turn(histogram: &Histogram<u64>) -> Turn {
+    COMPARED.map(|(_, q)| {
+        if q < 1.0 {
+            // A value past the last bin of cyclictest is not one to compare with.
+            quantile_us(histogram, q).filter(|us| *us < BINS as f64 / 1e3)
+        } else {
+            (!histogram.is_empty()).then(|| histogram.max() as f64 / 1e3)
+        }
+    })
+}
+
+fn round(ours: &Histogram<u64>, others: &Histogram<u64>) -> Round {
+    let (ours_us, others_us) = (turn(ours), turn(others));
+    let ratio = std::array::from_fn(|i| ours_us[i].zip(others_us[i]).map(|(a, b)| a / b));
+    Round {
+        ours_us,
+        others_us,
+        ratio,
+    }
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut all: Vec<f64> = values.collect();
+    all.sort_by(f64::total_cmp);
+    let n = all.len();
+    match n {
+        0 => None,
+        _ if n % 2 == 1 => Some(all[n / 2]),
+        _ => Some((all[n / 2 - 1] + all[n / 2]) / 2.0),
+    }
+}
+
+/// First line of its help; `None` where it is not installed.
+fn version() -> Option<String> {
+    let output = Command::new("cyclictest").arg("--help").output().ok()?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    text.lines()
+        .find(|l| l.contains("cyclictest"))
+        .map(|l| l.trim().to_owned())
+}
+
+fn cyclictest(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, String> {
+    let load = Running::start(setup.load, &setup.options.instance, setup.folder)?;
+    let file = setup.folder.join("cyclictest.tmp");
+    let mut child = Command::new("cyclictest")
+        .args(arguments(setup.options, setup.duration_ns, &file))
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(|e| format!("cyclictest does not start: {e}"))?;
+    let ended = wait(&mut child, interrupted);
+    drop(load);
+    // The ui load was in shared memory, and there was no core to clean up after it.
+    setup.options.instance.sweep();
+    let text = std::fs::read_to_string(&file).unwrap_or_default();
+    let _ = std::fs::remove_file(&file);
+    match ended {
+        Ok(()) => read(&text).ok_or_else(|| "cyclictest wrote no histogram".to_owned()),
+        Err(why) => Err(why),
+    }
+}
+
+fn arguments(options: &Options, duration_ns: u64, file: &Path) -> Vec<String> {
+    let mut arguments: Vec<String> = ["-q", "-m", "-N", "-t", "1"].map(str::to_owned).to_vec();
+    let mut add = |flag: &str, value: u64| arguments.extend([flag.to_owned(), value.to_string()]);
+    add("-i", options.haptic_period_ns / 1_000);
+    add("-l", duration_ns / options.haptic_period_ns);
+    add("-h", BINS);
+    if !options.no_rt {
+        add("-p", u64::from(options.haptic_priority));
+    }
+    if let Some(core) = options.haptic_core {
+        add("-a", core as u64);
+    }
+    arguments.push(format!("--histfile={}", file.display()));
+    arguments
+}
+
+fn wait(child: &mut Child, interrupted: &AtomicBool) -> Result<(), String> {
+    loop {
+        match child.try_wait() {
+            Ok(Some(status)) if status.success() => return Ok(()),
+            Ok(Some(_)) => {
+                let mut said = String::new();
+                if let Some(mut pipe) = child.stderr.take() {
+                    let _ = std::io::Read::read_to_string(&mut pipe, &mut said);
+                }
+                let first = said.lines().next().unwrap_or("no reason given").to_owned();
+                return Err(format!("cyclictest failed: {first}"));
+            }
+            Ok(None) => {}
+            Err(e) => return Err(format!("cyclictest: {e}")),
+        }
+        // SYNC: set by a signal handler; nothing but the flag is carried.
+        if interrupted.load(Ordering::Acquire) {
+            let _ = child.kill();
+            let _ = child.wait();
+            return Err("interrupted".to_owned());
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// Bins of one nanosecond, then the maximum and what lies past the last bin.
+fn read(text: &str) -> Option<Histogram<u64>> {
+    let mut h = histogram();
+    let (mut max_ns, mut past) = (0, 0);
+    for line in text.lines() {
+        if let Some(value) = line.strip_prefix("# Max Latencies:") {
+            max_ns = value.trim().parse().ok()?;
+        } else if let Some(value) = line.strip_prefix("# Histogram Overflows:") {
+            past = value.trim().parse().ok()?;
+        } else if let Some((ns, count)) = line.split_once(char::is_whitespace)
+            && let (Ok(ns), Ok(count)) = (ns.parse::<u64>(), count.trim().parse::<u64>())
+            && count > 0
+        {
+            h.saturating_record_n(ns, count);
+        }
+    }
+    h.saturating_record_n(max_ns, past);
+    (!h.is_empty()).then_some(h)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn histogram_of_cyclictest_is_read_with_what_lies_past_its_end() {
+        let text = "# /dev/cpu_dma_latency set to 0us\n# Histogram\n000000 000000\n014000 000600\n020000 000399\n# Total: 000000999\n\
+                    # Min Latencies: 14000\n# Avg Latencies: 15000\n# Max Latencies: 4862000\n# Histogram Overflows: 00001\n";
+        let h = read(text).expect("a histogram");
+        assert_eq!(h.len(), 1_000);
+        assert_eq!(h.value_at_quantile(0.5), h.highest_equivalent(14_000));
+        assert_eq!(h.max(), h.highest_equivalent(4_862_000));
+        assert!(read("# no bins\n").is_none());
+    }
+
+    #[test]
+    fn ratio_is_ours_over_theirs_and_the_median_forgives_one_bad_round() {
+        let (mut ours, mut theirs) = (histogram(), histogram());
+        ours.record_n(12_000, 2_000).expect("in range");
+        theirs.record_n(10_000, 2_000).expect("in range");
+        let r = round(&ours, &theirs);
+        assert!(r.ratio[0].is_some_and(|x| (x - 1.2).abs() < 2e-3));
+        // 2,000 samples are too few for p99.9.
+        assert_eq!(r.ratio[2], None);
+        assert_eq!(median([1.0, 9.0, 1.1].into_iter()), Some(1.1));
+        assert_eq!(median([1.0, 2.0].into_iter()), Some(1.5));
+        assert_eq!(median(std::iter::empty()), None);
+    }
+}

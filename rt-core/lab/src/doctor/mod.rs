@@ -1,0 +1,131 @@
+//! `rt-core doctor`: is this PC fit for a 1 kHz force loop, and what to change, in words to type.
+//!
+//! Each check is a function of a [`Machine`] and the core of the force loop; all of them read below a root path,
+//! so that `tests` can show them machines that nobody has.
+
+mod cores;
+mod devices;
+mod kernel;
+mod memory;
+mod rights;
+mod shared;
+#[cfg(test)]
+mod tests;
+
+use crate::machine::Machine;
+use serde::Serialize;
+use stylet_hw::libhd::diagnose::Surroundings;
+
+/// How much a finding matters, least first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    Good,
+    /// Worth knowing; nothing to do.
+    Note,
+    /// The tail will be worse than it could be.
+    Warning,
+    /// The force loop does not run as it must, or its figures prove nothing.
+    Blocker,
+}
+
+impl Severity {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Note => "note",
+            Self::Warning => "warning",
+            Self::Blocker => "BLOCKER",
+        }
+    }
+}
+
+/// One line of the doctor.
+#[derive(Clone, Debug, Serialize)]
+pub struct Finding {
+    /// Stable.
+    pub check: &'static str,
+    pub severity: Severity,
+    pub what: String,
+    /// What to type or do; empty when nothing is wrong.
+    pub cure: String,
+}
+
+impl Finding {
+    fn new(check: &'static str, severity: Severity, what: impl Into<String>, cure: impl Into<String>) -> Self {
+        Self {
+            check,
+            severity,
+            what: what.into(),
+            cure: cure.into(),
+        }
+    }
+
+    fn good(check: &'static str, what: impl Into<String>) -> Self {
+        Self::new(check, Severity::Good, what, "")
+    }
+}
+
+/// All findings, in the order in which one would mend them.
+pub fn examine(machine: &Machine, haptic_core: usize, here: &Surroundings) -> Vec<Finding> {
+    let mut findings = vec![
+        kernel::hypervisor(machine),
+        kernel::preemption(machine),
+        rights::priority(machine),
+        rights::memory_lock(machine),
+        kernel::throttling(machine),
+        kernel::groups(machine),
+        kernel::time_source(machine),
+        cores::count(machine),
+        cores::isolation(machine, haptic_core),
+        cores::interrupts(machine, haptic_core),
+        cores::siblings(machine, haptic_core),
+        cores::governor(machine, haptic_core),
+        cores::sleep_states(machine, haptic_core),
+        memory::swap(machine),
+        memory::huge_pages(machine),
+        shared::space(machine, shared::free_bytes),
+        shared::stale_services(machine),
+        devices::haptic(machine),
+    ];
+    findings.extend(devices::driver(machine, here));
+    findings
+}
+
+/// What all findings together say.
+fn verdict(findings: &[Finding]) -> &'static str {
+    match findings.iter().map(|f| f.severity).max() {
+        Some(Severity::Blocker) => "not fit: mend the blockers first",
+        Some(Severity::Warning) => "usable; expect a longer tail until the warnings are mended",
+        _ => "fit",
+    }
+}
+
+/// Examines this PC and prints; 1 when there is a blocker.
+pub fn run(json: bool, haptic_core: Option<usize>) -> u8 {
+    let last = core_affinity::get_core_ids()
+        .unwrap_or_default()
+        .last()
+        .map_or(0, |c| c.id);
+    let core = haptic_core.unwrap_or(last);
+    let (here, _) = Surroundings::of_this_process(None);
+    let findings = examine(&Machine::this(), core, &here);
+    if json {
+        let all = serde_json::json!({ "haptic_core": core, "verdict": verdict(&findings), "findings": findings });
+        println!("{all:#}");
+    } else {
+        print!("{}", text(&findings, core));
+    }
+    u8::from(findings.iter().any(|f| f.severity == Severity::Blocker))
+}
+
+fn text(findings: &[Finding], core: usize) -> String {
+    let mut out = format!("Is this PC fit for a force loop of 1 kHz on core {core}?\n\n");
+    for f in findings {
+        out += &format!("{:<8} {:<16} {}\n", f.severity.word(), f.check, f.what);
+        for line in f.cure.lines() {
+            out += &format!("{:<25} -> {line}\n", "");
+        }
+    }
+    out + &format!("\n{}\n", verdict(findings))
+}

@@ -1,0 +1,103 @@
+//! Shared memory: room, and what dead programs left.
+
+use super::{Finding, Severity};
+use crate::machine::Machine;
+use std::collections::BTreeSet;
+use std::ffi::CString;
+use std::os::unix::ffi::OsStrExt;
+use std::path::Path;
+
+/// What one core with six hosts and a large scene uses, with a margin.
+const WANTED_BYTES: u64 = 256 << 20;
+
+/// Room that is left where `path` lies.
+pub fn free_bytes(path: &Path) -> Option<u64> {
+    let path = CString::new(path.as_os_str().as_bytes()).ok()?;
+    // SAFETY: an all-zero statvfs is valid.
+    let mut told: libc::statvfs = unsafe { std::mem::zeroed() };
+    // SAFETY: `path` ends with a zero, `told` is valid for writes.
+    let done = unsafe { libc::statvfs(path.as_ptr(), &mut told) } == 0;
+    done.then(|| told.f_bavail as u64 * told.f_frsize as u64)
+}
+
+pub fn space(machine: &Machine, free: impl Fn(&Path) -> Option<u64>) -> Finding {
+    match free(&machine.path("dev/shm")) {
+        Some(bytes) if bytes >= WANTED_BYTES => {
+            Finding::good("shared memory", format!("{} MiB free in /dev/shm", bytes >> 20))
+        }
+        Some(bytes) => Finding::new(
+            "shared memory",
+            Severity::Blocker,
+            format!(
+                "only {} MiB free in /dev/shm; {} MiB are wanted",
+                bytes >> 20,
+                WANTED_BYTES >> 20
+            ),
+            "look with: ls -lS /dev/shm   or make it larger: sudo mount -o remount,size=1G /dev/shm",
+        ),
+        None => Finding::new(
+            "shared memory",
+            Severity::Blocker,
+            "there is no /dev/shm",
+            "sudo mount -t tmpfs -o size=1G tmpfs /dev/shm",
+        ),
+    }
+}
+
+/// Instances with files in shared memory and no program that uses them.
+pub fn stale_services(machine: &Machine) -> Finding {
+    let found = instances(&machine.names("dev/shm"));
+    let used = maps(machine);
+    let stale: Vec<&String> = found
+        .iter()
+        .filter(|prefix| !used.iter().any(|m| m.contains(*prefix)))
+        .collect();
+    if stale.is_empty() {
+        return Finding::good(
+            "stale services",
+            format!("{} instances in /dev/shm, each used by a program", found.len()),
+        );
+    }
+    let first: Vec<&str> = stale.iter().take(3).map(|s| s.as_str()).collect();
+    let more = if stale.len() > first.len() { ", ..." } else { "" };
+    let remove: Vec<String> = stale
+        .iter()
+        .map(|s| format!("rm -r /dev/shm/{s} /dev/shm/{s}_*"))
+        .collect();
+    Finding::new(
+        "stale services",
+        Severity::Note,
+        format!(
+            "{} instances in /dev/shm that no program uses: {}{more}",
+            stale.len(),
+            first.join(", ")
+        ),
+        remove.join("\n"),
+    )
+}
+
+/// `stylet_<user>_<instance>` of each file.
+fn instances(names: &[String]) -> BTreeSet<String> {
+    let instance = |name: &String| {
+        let mut parts = name.splitn(4, '_');
+        let (first, user, instance) = (parts.next()?, parts.next()?, parts.next()?);
+        (first == "stylet").then(|| format!("{first}_{user}_{instance}"))
+    };
+    names.iter().filter_map(instance).collect()
+}
+
+/// Lines of memory maps that lie in shared memory, of each process that lets us look.
+fn maps(machine: &Machine) -> Vec<String> {
+    let processes = machine
+        .names("proc")
+        .into_iter()
+        .filter(|n| n.bytes().all(|b| b.is_ascii_digit()));
+    let texts = processes.filter_map(|p| machine.text(&format!("proc/{p}/maps")));
+    let ours = |text: String| {
+        let lines = text.lines().filter_map(|l| l.split_once("/dev/shm/stylet_"));
+        lines
+            .map(|(_, rest)| format!("stylet_{rest}_"))
+            .collect::<Vec<String>>()
+    };
+    texts.flat_map(ours).collect()
+}

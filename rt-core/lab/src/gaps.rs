@@ -1,0 +1,116 @@
+//! Looks for time that the kernel does not know to be missing: on a virtual machine its own count of it may stay 0.
+//!
+//! A thread on another core spins for a tenth of each millisecond and reads the clock. A gap during which the kernel
+//! switched no thread is an interrupt, firmware, or a hypervisor that ran something else.
+
+use crate::collect::histogram;
+use hdrhistogram::Histogram;
+use std::sync::atomic::{AtomicBool, Ordering};
+use stylet_runtime::rt::arm::{self, Ask, Usage};
+use stylet_runtime::rt::clock;
+
+const PERIOD_NS: u64 = 1_000_000;
+const SPIN_NS: u64 = 100_000;
+/// Two reads of the clock are farther apart than this only when something came between.
+const GAP_NS: u64 = 20_000;
+/// A wake-up later than this is kept: no tissue step lasts so long.
+const LATE_NS: u64 = 1_000_000;
+/// Gaps and late wake-ups that are kept one by one.
+const KEPT: usize = 4096;
+
+/// What was found.
+pub struct GapReport {
+    pub core: Option<usize>,
+    /// Time that was watched.
+    pub watched_ns: u64,
+    /// Gaps longer than 20 us without a switch.
+    pub gaps: Histogram<u64>,
+    /// How late the thread woke; nothing of normal priority can delay it.
+    pub wake: Histogram<u64>,
+    /// Begin and length of the first gaps.
+    pub found: Vec<(u64, u64)>,
+    /// Due time and lateness of the first wake-ups that were very late.
+    pub late: Vec<(u64, u64)>,
+}
+
+impl GapReport {
+    /// The longest gap that overlaps `[from_ns, to_ns]`.
+    pub fn gap_during(&self, from_ns: u64, to_ns: u64) -> Option<u64> {
+        longest_overlap(&self.found, from_ns, to_ns)
+    }
+
+    /// The latest wake-up of the watch that overlaps `[from_ns, to_ns]`.
+    pub fn late_during(&self, from_ns: u64, to_ns: u64) -> Option<u64> {
+        longest_overlap(&self.late, from_ns, to_ns)
+    }
+}
+
+fn longest_overlap(all: &[(u64, u64)], from_ns: u64, to_ns: u64) -> Option<u64> {
+    let overlap = all
+        .iter()
+        .filter(|(begin, length)| *begin < to_ns && begin + length > from_ns);
+    overlap.map(|(_, length)| *length).max()
+}
+
+/// Watches from `core` at `priority` until `stop`.
+pub fn watch(core: Option<usize>, priority: Option<u32>, stop: &AtomicBool) -> GapReport {
+    let mut report = GapReport {
+        core,
+        watched_ns: 0,
+        gaps: histogram(),
+        wake: histogram(),
+        found: Vec::with_capacity(KEPT),
+        late: Vec::with_capacity(KEPT),
+    };
+    // Without the right to a priority it watches at normal priority: switches are told apart either way.
+    let _armed = arm::arm(Ask { priority, core }).or_else(|_| arm::arm(Ask { priority: None, core }));
+    let mut grid = clock::Grid::from(clock::now_ns(), PERIOD_NS);
+    // SYNC: nothing but the flag is carried.
+    while !stop.load(Ordering::Acquire) {
+        clock::sleep_until(grid.due_ns);
+        let late_ns = clock::now_ns().saturating_sub(grid.due_ns);
+        report.wake.saturating_record(late_ns);
+        if late_ns > LATE_NS && report.late.len() < KEPT {
+            report.late.push((grid.due_ns, late_ns));
+        }
+        spin(&mut report);
+        grid.advance(clock::now_ns());
+    }
+    report
+}
+
+fn spin(report: &mut GapReport) {
+    let switches = |u: Usage| u.involuntary_switches + u.voluntary_switches;
+    let mut before = switches(Usage::now());
+    let begin_ns = clock::now_ns();
+    let mut last_ns = begin_ns;
+    while last_ns - begin_ns < SPIN_NS {
+        let now_ns = clock::now_ns();
+        let gap_ns = now_ns - last_ns;
+        if gap_ns > GAP_NS {
+            let after = switches(Usage::now());
+            if after == before {
+                report.gaps.saturating_record(gap_ns);
+                if report.found.len() < KEPT {
+                    report.found.push((last_ns, gap_ns));
+                }
+            }
+            before = after;
+        }
+        last_ns = now_ns;
+    }
+    report.watched_ns += last_ns - begin_ns;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_overlaps_is_named_and_the_longest_wins() {
+        let all = [(100, 50), (120, 10), (300, 5)];
+        assert_eq!(longest_overlap(&all, 140, 200), Some(50));
+        assert_eq!(longest_overlap(&all, 150, 300), None);
+        assert_eq!(longest_overlap(&all, 0, 1000), Some(50));
+    }
+}

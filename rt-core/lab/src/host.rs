@@ -1,0 +1,219 @@
+//! A host inside the measurement, at normal priority: it moves the hand, and notes when it sees the tissue answer.
+
+use crate::collect::histogram;
+use hdrhistogram::Histogram;
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::BackpressureStrategy;
+use std::fmt::Debug;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+use stylet_runtime::rt::clock;
+use stylet_runtime::rt::timing::PoseTimes;
+use stylet_shm_schema::service::{self, Instance, Ipc, ServiceError};
+use stylet_shm_schema::{Command, CommandKind, Event, EventKind, SnapshotHeader, TickRecord, Vertex};
+use stylet_sim::scene::Scene;
+
+/// One insertion and one retraction.
+const CYCLE_NS: u64 = 4_000_000_000;
+/// Mean tip speed of needle insertions (Podder 2006 and the U. Alberta data): 48 mm/s.
+const SPEED_M_PER_S: f64 = 0.048;
+const ACCELERATION_M_PER_S2: f64 = 1.0;
+/// Seeds that the script leaves in the gland; they move with it and cost the tissue tick their share.
+const SEEDS: u64 = 32;
+/// How often the host looks; part of what it measures.
+pub const LOOK: Duration = Duration::from_millis(1);
+/// The core must be seen within this time.
+const PATIENCE_NS: u64 = 15_000_000_000;
+
+/// What the host saw.
+pub struct HostReport {
+    /// Tip read by the haptic loop to snapshot seen here.
+    pub tip_to_host: Histogram<u64>,
+    /// Tissue tick woken to snapshot seen here.
+    pub tissue_to_host: Histogram<u64>,
+    pub snapshots: u64,
+    pub records: u64,
+    /// Ticks without a record among those seen.
+    pub records_missing: u64,
+    pub faults: u64,
+    pub insertions: u64,
+}
+
+/// Where the script takes the tip.
+#[derive(Clone, Copy, Debug)]
+pub struct Script {
+    outside_m: [f64; 3],
+    inside_m: [f64; 3],
+}
+
+impl Script {
+    /// Along the axis of the target, from 15 mm before the body to four fifths of the target.
+    pub fn of(scene: &Scene) -> Self {
+        let (lowest, _) = scene.lattice.bounds_m();
+        let (lower, upper) = scene.target_bounds_m();
+        let at = |z: f64| [(lower[0] + upper[0]) / 2.0, (lower[1] + upper[1]) / 2.0, z];
+        Self {
+            outside_m: at(lowest[2] - 0.015),
+            inside_m: at(lower[2] + 0.8 * (upper[2] - lower[2])),
+        }
+    }
+}
+
+struct Ports {
+    snapshots: Subscriber<Ipc, [Vertex], SnapshotHeader>,
+    records: Subscriber<Ipc, [TickRecord], u64>,
+    events: Subscriber<Ipc, Event, ()>,
+    commands: Publisher<Ipc, Command, ()>,
+}
+
+impl Ports {
+    fn new(instance: &Instance) -> Result<Self, ServiceError> {
+        let node = instance.node()?;
+        let failed = |e: &dyn Debug| ServiceError(format!("the measuring host cannot use shared memory: {e:?}"));
+        Ok(Self {
+            snapshots: service::snapshots(&node)?
+                .subscriber_builder()
+                .create()
+                .map_err(|e| failed(&e))?,
+            records: service::records(&node)?
+                .subscriber_builder()
+                .create()
+                .map_err(|e| failed(&e))?,
+            events: service::events(&node)?
+                .subscriber_builder()
+                .create()
+                .map_err(|e| failed(&e))?,
+            commands: service::commands(&node)?
+                .publisher_builder()
+                .backpressure_strategy(BackpressureStrategy::DiscardData)
+                .create()
+                .map_err(|e| failed(&e))?,
+        })
+    }
+}
+
+/// One host; its thread ends the run after `duration_ns` of measurement.
+pub struct Host {
+    ports: Ports,
+    script: Script,
+    pose_times: Arc<PoseTimes>,
+    sent: u64,
+    last_tick: u64,
+    warm_up_ticks: u64,
+    step: u64,
+    report: HostReport,
+}
+
+impl Host {
+    pub fn new(
+        instance: &Instance,
+        script: Script,
+        pose_times: Arc<PoseTimes>,
+        warm_up_ticks: u64,
+    ) -> Result<Self, ServiceError> {
+        Ok(Self {
+            warm_up_ticks,
+            ports: Ports::new(instance)?,
+            script,
+            pose_times,
+            sent: 0,
+            last_tick: 0,
+            step: 0,
+            report: HostReport {
+                tip_to_host: histogram(),
+                tissue_to_host: histogram(),
+                snapshots: 0,
+                records: 0,
+                records_missing: 0,
+                faults: 0,
+                insertions: 0,
+            },
+        })
+    }
+
+    /// Watches until `duration_ns` after the warm-up, or until `interrupted` or `stop`.
+    pub fn run(
+        mut self,
+        duration_ns: u64,
+        interrupted: impl Fn() -> bool,
+        stop: &AtomicBool,
+    ) -> Result<HostReport, String> {
+        let began_ns = clock::now_ns();
+        let mut first_ns = 0;
+        // SYNC: set by the run when it fails; nothing but the flag is carried.
+        while !stop.load(Ordering::Acquire) && !interrupted() {
+            let now_ns = clock::now_ns();
+            self.look(now_ns);
+            if first_ns == 0 && self.last_tick >= self.warm_up_ticks {
+                first_ns = now_ns;
+            }
+            if first_ns == 0 && now_ns - began_ns > PATIENCE_NS {
+                return Err("the loops published nothing for 15 s".to_owned());
+            }
+            if first_ns > 0 {
+                self.follow_script(now_ns - first_ns);
+                if now_ns - first_ns >= duration_ns {
+                    break;
+                }
+            }
+            std::thread::sleep(LOOK);
+        }
+        Ok(self.report)
+    }
+
+    fn look(&mut self, now_ns: u64) {
+        while let Ok(Some(sample)) = self.ports.snapshots.receive() {
+            let header = sample.user_header();
+            self.report.snapshots += 1;
+            let since = |time_ns: u64| now_ns.saturating_sub(time_ns);
+            self.report.tissue_to_host.saturating_record(since(header.time_ns));
+            if let Some(pose_ns) = self.pose_times.of(header.tissue_tick).filter(|&t| t > 0) {
+                self.report.tip_to_host.saturating_record(since(pose_ns));
+            }
+        }
+        while let Ok(Some(sample)) = self.ports.records.receive() {
+            for record in sample.payload() {
+                if self.last_tick > 0 {
+                    self.report.records_missing += record.tick.saturating_sub(self.last_tick + 1);
+                }
+                self.last_tick = record.tick;
+                self.report.records += 1;
+            }
+        }
+        while let Ok(Some(sample)) = self.ports.events.receive() {
+            self.report.faults += u64::from(sample.kind == EventKind::FaultRaised as u32);
+        }
+    }
+
+    /// Half a cycle in, half a cycle out; engaging anew each time re-arms after a fault.
+    fn follow_script(&mut self, time_ns: u64) {
+        let due = time_ns / (CYCLE_NS / 2) + 1;
+        if self.step >= due {
+            return;
+        }
+        self.step += 1;
+        if self.step % 2 == 1 {
+            self.send(CommandKind::Engage, &[]);
+            self.move_hand(self.script.inside_m);
+            self.report.insertions += 1;
+        } else {
+            if self.step / 2 <= SEEDS {
+                self.send(CommandKind::DropSeed, &[]);
+            }
+            self.move_hand(self.script.outside_m);
+        }
+    }
+
+    fn move_hand(&mut self, [x, y, z]: [f64; 3]) {
+        let values = [x, y, z, 0.0, 0.0, 1.0, SPEED_M_PER_S, ACCELERATION_M_PER_S2];
+        self.send(CommandKind::MoveHand, &values);
+    }
+
+    fn send(&mut self, kind: CommandKind, values: &[f64]) {
+        self.sent += 1;
+        // A command that is lost is made up for in the next cycle.
+        let _ = self.ports.commands.send_copy(Command::new(1, self.sent, kind, values));
+    }
+}

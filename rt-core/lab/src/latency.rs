@@ -1,0 +1,93 @@
+//! `rt-core latency`: measure, judge, write the report, say the verdict.
+
+use crate::args::LatencyArgs;
+use crate::compare::{Against, compare};
+use crate::machine::Machine;
+use crate::measure::{Setup, measure};
+use crate::report::{self, JSON, PAGE, Parts, Report};
+use crate::verdict::{self, Outcome};
+use std::sync::atomic::AtomicBool;
+
+/// The exit code is the verdict: 0 pass, 1 fail, 2 not measurable.
+pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
+    let options = args.options()?;
+    let limits = verdict::limits(options.haptic_period_ns, args.limits.as_deref(), &args.limit)?;
+    std::fs::create_dir_all(&args.out).map_err(|e| format!("cannot make {}: {e}", args.out.display()))?;
+    let setup = Setup {
+        options: &options,
+        duration_ns: args.duration,
+        load: args.load,
+        folder: &args.out,
+    };
+    eprintln!(
+        "rt-core: measuring for {:.0} s at {} Hz on scene '{}'",
+        args.duration as f64 / 1e9,
+        args.rate,
+        options.scene
+    );
+    let measured = measure(&setup, interrupted)?;
+    let comparison = match args.compare {
+        Some(against) => {
+            let ours = if against == Against::Unloaded {
+                "with and "
+            } else {
+                "with "
+            };
+            eprintln!("rt-core: in turns {ours}{}, {} rounds", against.name(), args.rounds);
+            Some(compare(&setup, against, args.rounds, interrupted)?)
+        }
+        None => None,
+    };
+    let machine = Machine::this();
+    let mut report = report::report(&Parts {
+        options: &options,
+        duration_ns: args.duration,
+        load: args.load,
+        limits: &limits,
+        measured: &measured,
+        comparison,
+        machine: &machine,
+    });
+    report::write(&args.out, &mut report, &measured)?;
+    say(&report);
+    println!("{}", args.out.join(PAGE).display());
+    println!("{}", args.out.join(JSON).display());
+    Ok(report.verdict.overall.exit_code())
+}
+
+/// The verdict on the terminal: one line for each limit, then all of them.
+fn say(report: &Report) {
+    for j in &report.verdict.limits {
+        let value = j.value.map_or("n/a".to_owned(), |v| format!("{v:.1}"));
+        let sign = if j.lower_bound { ">=" } else { "<=" };
+        let why = if j.outcome == Outcome::Pass { "" } else { &j.evidence };
+        println!(
+            "{:<14} {:<24} {value:>9} {sign} {:<8} {:<4} {why}",
+            j.outcome.words(),
+            j.name,
+            j.limit,
+            j.unit
+        );
+    }
+    if let Some(comparison) = &report.comparison {
+        match &comparison.absent {
+            Some(why) => println!("comparison: {why}"),
+            None => {
+                let ratios = comparison.names.iter().zip(comparison.median_ratio);
+                let said: Vec<String> = ratios
+                    .map(|(name, r)| format!("{name} {}", r.map_or("n/a".to_owned(), |r| format!("{r:.2}"))))
+                    .collect();
+                let over = match comparison.against {
+                    Against::Cyclictest => "ours over cyclictest",
+                    Against::Unloaded => "with the load over without it",
+                };
+                println!(
+                    "{over}, median of {} rounds: {}",
+                    comparison.rounds.len(),
+                    said.join(", ")
+                );
+            }
+        }
+    }
+    println!("verdict: {}", report.verdict.overall.words());
+}

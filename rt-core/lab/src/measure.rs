@@ -1,0 +1,185 @@
+//! One measurement: the run's own loops and bridge, a host, a load, and two threads that watch the machine.
+
+use crate::collect::{LoopTiming, Plan};
+use crate::gaps::{self, GapReport};
+use crate::host::{Host, HostReport, Script};
+use crate::load::{Load, Running};
+use crate::machine::Machine;
+use crate::watch::{self, CoreWatch};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use stylet_runtime::core::{self, HAPTIC_PERIOD_NS, LoopReport, Options, RunReport, TISSUE_PERIOD_NS};
+use stylet_runtime::rt::haptic::HAPTIC_STAGES;
+use stylet_runtime::rt::timing::{PoseTimes, Probe, Probes};
+use stylet_runtime::rt::tissue::TISSUE_STAGES;
+use stylet_sim::scene::Scene;
+
+/// Ticks of the first half second are not recorded: caches and pages are still coming in.
+pub const WARM_UP_S: f64 = 0.5;
+/// Windows of a report at most, none shorter than 100 ms.
+const WINDOWS: u64 = 240;
+const SHORTEST_WINDOW_NS: u64 = 100_000_000;
+/// Below both loops, above everything of normal priority.
+const WATCH_PRIORITY_BELOW_TISSUE: u32 = 10;
+
+/// What to run.
+pub struct Setup<'a> {
+    pub options: &'a Options,
+    pub duration_ns: u64,
+    pub load: Load,
+    /// Where the io load may write.
+    pub folder: &'a Path,
+}
+
+/// The ring to the gathering thread holds so much time of ticks.
+const RING_NS: u64 = 4_000_000_000;
+
+/// What came out.
+pub struct Measured {
+    pub run: RunReport,
+    pub haptic: LoopTiming,
+    pub tissue: LoopTiming,
+    pub host: HostReport,
+    pub gaps: GapReport,
+    pub cores: Vec<CoreWatch>,
+    pub window_ns: u64,
+}
+
+/// Voluntary switches beyond the one of each sleep. A sleep that was over before it began needs none.
+pub fn switches_beyond_sleep(report: &LoopReport, unslept: u64) -> i64 {
+    (report.usage.voluntary_switches - report.ticks.saturating_sub(unslept) as i64).max(0)
+}
+
+pub fn window_ns(duration_ns: u64) -> u64 {
+    (duration_ns / WINDOWS).max(SHORTEST_WINDOW_NS)
+}
+
+fn warm_up_ticks(period_ns: u64) -> u64 {
+    (WARM_UP_S * 1e9) as u64 / period_ns
+}
+
+fn plan(period_ns: u64, duration_ns: u64) -> Plan {
+    let window_ns = window_ns(duration_ns);
+    Plan {
+        period_ns,
+        warm_up_ticks: warm_up_ticks(period_ns),
+        window_ns,
+        windows: (duration_ns / window_ns + 1) as usize,
+    }
+}
+
+/// A core for the gap watch: one that no loop uses, else that of the tissue loop.
+fn watch_core(options: &Options) -> Option<usize> {
+    let cores = core_affinity::get_core_ids().unwrap_or_default();
+    let free = cores
+        .iter()
+        .map(|c| c.id)
+        .find(|&id| Some(id) != options.haptic_core && Some(id) != options.tissue_core);
+    free.or(options.tissue_core)
+}
+
+/// Runs for `setup.duration_ns` after the first tick that a host saw, or until `interrupted`.
+pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, String> {
+    let script = Script::of(&Scene::builtin(&setup.options.scene).map_err(|e| e.to_string())?);
+    let pose_times = Arc::new(PoseTimes::new());
+    let options = setup.options;
+    let ring = |period_ns| rtrb::RingBuffer::new((RING_NS / period_ns) as usize);
+    let (haptic_in, haptic_ring) = ring(options.haptic_period_ns);
+    let (tissue_in, tissue_ring) = ring(TISSUE_PERIOD_NS);
+    let probes = Probes {
+        haptic: Probe::new(haptic_in, Arc::clone(&pose_times)),
+        tissue: Probe::new(tissue_in, Arc::clone(&pose_times)),
+    };
+    let haptic = LoopTiming::new(HAPTIC_STAGES, plan(options.haptic_period_ns, setup.duration_ns));
+    let tissue = LoopTiming::new(TISSUE_STAGES, plan(TISSUE_PERIOD_NS, setup.duration_ns));
+    let machine = Machine::this();
+    let priority = (!options.no_rt).then(|| {
+        options
+            .tissue_priority
+            .saturating_sub(WATCH_PRIORITY_BELOW_TISSUE)
+            .max(1)
+    });
+    let (core, watched) = (watch_core(options), [options.haptic_core, options.tissue_core]);
+    let stop = Arc::new(AtomicBool::new(false));
+    let mut load = Running::start(setup.load, &options.instance, setup.folder)?;
+    let (run, host, gaps, cores, haptic, tissue) = std::thread::scope(|threads| {
+        let stop = &stop;
+        let host = threads.spawn(|| {
+            let warm_up = warm_up_ticks(options.haptic_period_ns);
+            let host = Host::new(&options.instance, script, pose_times, warm_up).map_err(|e| e.to_string());
+            let report = host.and_then(|h| h.run(setup.duration_ns, || interrupted.load(Ordering::Acquire), stop));
+            // SYNC: pairs with the acquire loads of bridge and watches; nothing but the flag is carried.
+            stop.store(true, Ordering::Release);
+            report
+        });
+        let haptic = threads.spawn(|| haptic.gather(haptic_ring));
+        let tissue = threads.spawn(|| tissue.gather(tissue_ring));
+        let gaps = threads.spawn(move || gaps::watch(core, priority, stop));
+        let machine = &machine;
+        let cores: Vec<_> = watched
+            .into_iter()
+            .flatten()
+            .map(|core| threads.spawn(move || watch::watch(machine, core, stop)))
+            .collect();
+        let run = core::run_with(options, Some(probes), stop);
+        stop.store(true, Ordering::Release);
+        let cores: Vec<CoreWatch> = cores.into_iter().filter_map(|t| t.join().ok()).collect();
+        (run, host.join(), gaps.join(), cores, haptic.join(), tissue.join())
+    });
+    // A window that could not open draws nothing.
+    let loaded = load.ended();
+    drop(load);
+    options.instance.sweep();
+    loaded?;
+    let gone = |_| "a measuring thread ended by itself".to_owned();
+    // Why the loops did not run says more than that the host saw nothing.
+    let run = run?;
+    Ok(Measured {
+        run,
+        haptic: haptic.map_err(gone)?,
+        tissue: tissue.map_err(gone)?,
+        host: host.map_err(gone)??,
+        gaps: gaps.map_err(gone)?,
+        cores,
+        window_ns: window_ns(setup.duration_ns),
+    })
+}
+
+/// The period of a loop at `rate_hz`.
+pub fn period_ns(rate_hz: u32) -> u64 {
+    HAPTIC_PERIOD_NS * 1_000 / u64::from(rate_hz)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stylet_runtime::rt::arm::Usage;
+
+    #[test]
+    fn windows_cover_the_run_and_are_few() {
+        for duration_s in [1, 10, 60, 3_600] {
+            let duration_ns = duration_s * 1_000_000_000;
+            let plan = plan(1_000_000, duration_ns);
+            assert!(plan.windows as u64 * plan.window_ns >= duration_ns);
+            assert!(plan.windows as u64 <= WINDOWS + 1);
+        }
+        assert_eq!(period_ns(5_000), 200_000);
+    }
+
+    #[test]
+    fn a_switch_for_each_sleep_is_not_counted() {
+        let report = |voluntary_switches| LoopReport {
+            ticks: 100,
+            usage: Usage {
+                voluntary_switches,
+                ..Usage::default()
+            },
+            ..LoopReport::default()
+        };
+        assert_eq!(switches_beyond_sleep(&report(98), 0), 0);
+        assert_eq!(switches_beyond_sleep(&report(100), 0), 0);
+        assert_eq!(switches_beyond_sleep(&report(103), 0), 3);
+        assert_eq!(switches_beyond_sleep(&report(103), 10), 13);
+    }
+}

@@ -1,0 +1,355 @@
+//! Limits, and whether a measurement meets them: pass, fail, or not measurable, each with its evidence.
+
+use crate::collect::LoopTiming;
+use crate::measure::{Measured, switches_beyond_sleep};
+use crate::provenance::stiffness_margin_n_per_m;
+use crate::summary::{needed, quantile_us};
+use hdrhistogram::Histogram;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+use stylet_runtime::core::LoopReport;
+
+/// What a limit looks at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Reading {
+    Wake(f64),
+    Work(f64),
+    Path(f64),
+    Jitter(f64),
+    Recording(f64),
+    TipToTissue(f64),
+    TipToHost(f64),
+    StiffnessMargin(f64),
+    Missed,
+    Overruns,
+    HeapCalls,
+    PageFaults,
+    ExtraSwitches,
+    RecordsMissing,
+    Faults,
+}
+
+/// One row of the table of limits.
+pub struct LimitSpec {
+    /// Stable; for the trace from requirement to evidence.
+    pub id: &'static str,
+    pub name: &'static str,
+    pub unit: &'static str,
+    /// For 1 kHz. Those that scale are multiplied by the period in milliseconds.
+    default: f64,
+    scales_with_period: bool,
+    pub reason: &'static str,
+    reading: Reading,
+}
+
+const MAX: f64 = 1.0;
+
+macro_rules! limits {
+    ($( $id:literal $name:literal $unit:literal $default:literal $scales:ident $reading:expr, $reason:literal; )*) => {
+        /// Every limit there is, with the default for a 1 kHz force loop and its reason.
+        pub const LIMITS: &[LimitSpec] = &[ $( LimitSpec {
+            id: $id, name: $name, unit: $unit, default: $default, scales_with_period: limits!(@ $scales), reason: $reason, reading: $reading,
+        } ),* ];
+    };
+    (@ period) => { true };
+    (@ fixed) => { false };
+}
+
+limits! {
+    "REQ-LAT-001" "wake_p50_us" "us" 50.0 period Reading::Wake(0.5), "Half of all ticks start within 5 % of the period: below the noise of the velocity estimate.";
+    "REQ-LAT-002" "wake_p99_us" "us" 200.0 period Reading::Wake(0.99), "One tick in a hundred may start a fifth of the period late; the force then is at most 1.2 periods old.";
+    "REQ-LAT-003" "wake_p999_us" "us" 500.0 period Reading::Wake(0.999), "Half a period late once a second doubles the delay that a sampled wall has anyway (T/2).";
+    "REQ-LAT-004" "wake_max_us" "us" 1000.0 period Reading::Wake(MAX), "A later wake-up is a missed deadline: the hand feels the old force for a tick more.";
+    "REQ-LAT-005" "jitter_p99_us" "us" 200.0 period Reading::Jitter(0.99), "Velocity is position over period: 20 % of jitter is 20 % of error in damping.";
+    "REQ-LAT-006" "work_p99_us" "us" 50.0 period Reading::Work(0.99), "The loop's own work stays under 5 % of the period, so that a late wake-up is all the lateness there is.";
+    "REQ-LAT-007" "work_p999_us" "us" 50.0 period Reading::Work(0.999), "The same in the tail.";
+    "REQ-LAT-008" "read_to_force_p999_us" "us" 50.0 period Reading::Path(0.999), "From device read to force written: delay that adds to T/2 in every tick.";
+    "REQ-LAT-009" "missed_deadlines" "" 0.0 fixed Reading::Missed, "Each is a tick in which the hand felt an old force.";
+    "REQ-LAT-010" "overruns" "" 0.0 fixed Reading::Overruns, "A tick that ends after the next one is due has used up its period.";
+    "REQ-LAT-011" "tip_to_tissue_p99_us" "us" 10000.0 fixed Reading::TipToTissue(0.99), "The gland answers within two tissue ticks of 5 ms.";
+    "REQ-LAT-012" "tip_to_host_p99_us" "us" 15000.0 fixed Reading::TipToHost(0.99), "Touch before sight is noticed from 15 ms on (Di Luca and Mahnan 2019); drawing comes on top.";
+    "REQ-LAT-013" "k_max_p999_n_per_m" "N/m" 800.0 fixed Reading::StiffnessMargin(0.999), "The stiffest wall that the device renders (Phantom Premium 1.5) must stay stable; a lower bound.";
+    "REQ-RT-001" "heap_calls" "" 0.0 fixed Reading::HeapCalls, "Both loops. The heap locks, and may ask the kernel for memory.";
+    "REQ-RT-002" "page_faults" "" 0.0 fixed Reading::PageFaults, "Both loops, after arming: memory is locked and touched before.";
+    "REQ-RT-003" "extra_switches" "" 0.0 fixed Reading::ExtraSwitches, "Both loops: voluntary context switches beyond the one sleep a tick show a wait for somebody else.";
+    "REQ-RT-004" "recording_p99_us" "us" 1.0 fixed Reading::Recording(0.99), "Measuring must not change what is measured.";
+    "REQ-REC-001" "records_missing" "" 0.0 fixed Reading::RecordsMissing, "Every tick has its record, as a host sees it.";
+    "REQ-SAFE-001" "faults" "" 0.0 fixed Reading::Faults, "Each is a force that was turned off by the watchdog.";
+}
+
+impl LimitSpec {
+    fn default_for(&self, period_ns: u64) -> f64 {
+        let scale = if self.scales_with_period {
+            period_ns as f64 / 1e6
+        } else {
+            1.0
+        };
+        self.default * scale
+    }
+
+    /// The one limit that must not be undercut.
+    fn is_lower_bound(&self) -> bool {
+        matches!(self.reading, Reading::StiffnessMargin(_))
+    }
+
+    /// What a virtual machine, or time taken by firmware, decides more than this program does.
+    fn is_tail(&self) -> bool {
+        match self.reading {
+            Reading::Wake(q) | Reading::Work(q) | Reading::Path(q) | Reading::StiffnessMargin(q) => q > 0.995,
+            Reading::Missed | Reading::Overruns => true,
+            _ => false,
+        }
+    }
+}
+
+/// A limit by its name, with the value in force.
+pub type Limits = BTreeMap<&'static str, f64>;
+
+/// Defaults, then the file, then what the command line says. Lists everything that is wrong.
+pub fn limits(period_ns: u64, file: Option<&Path>, given: &[String]) -> Result<Limits, String> {
+    let mut limits: Limits = LIMITS.iter().map(|l| (l.name, l.default_for(period_ns))).collect();
+    let mut problems = Vec::new();
+    let mut set = |name: &str, value: Option<f64>, place: &str| {
+        let known = LIMITS.iter().find(|l| l.name == name);
+        match (known, value.filter(|v| v.is_finite() && *v >= 0.0)) {
+            (Some(spec), Some(value)) => drop(limits.insert(spec.name, value)),
+            (Some(_), None) => problems.push(format!("{place}: {name} needs a number of 0 or more")),
+            (None, _) => problems.push(format!("{place}: no limit is called {name:?}")),
+        }
+    };
+    if let Some(path) = file {
+        let place = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|e| format!("{place}: {e}"))?;
+        let table: toml::Table = text.parse().map_err(|e| format!("{place}: {e}"))?;
+        for (name, value) in &table {
+            let number = value.as_float().or_else(|| value.as_integer().map(|i| i as f64));
+            set(name, number, &place);
+        }
+    }
+    for word in given {
+        let (name, value) = word.split_once('=').unwrap_or((word, ""));
+        set(name, value.parse().ok(), "--limit");
+    }
+    if problems.is_empty() {
+        return Ok(limits);
+    }
+    let names: Vec<&str> = LIMITS.iter().map(|l| l.name).collect();
+    problems.push(format!("the limits are: {}", names.join(", ")));
+    Err(problems.join("\n"))
+}
+
+/// How one limit, or all of them together, came out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub enum Outcome {
+    #[serde(rename = "PASS")]
+    Pass,
+    #[serde(rename = "FAIL")]
+    Fail,
+    #[serde(rename = "NOT MEASURABLE")]
+    NotMeasurable,
+}
+
+impl Outcome {
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Pass => "PASS",
+            Self::Fail => "FAIL",
+            Self::NotMeasurable => "NOT MEASURABLE",
+        }
+    }
+
+    /// For the shell: 0, 1, 2.
+    pub fn exit_code(self) -> u8 {
+        match self {
+            Self::Pass => 0,
+            Self::Fail => 1,
+            Self::NotMeasurable => 2,
+        }
+    }
+}
+
+/// One limit, judged.
+#[derive(Clone, Debug, Serialize)]
+pub struct Judged {
+    pub id: &'static str,
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub lower_bound: bool,
+    pub limit: f64,
+    pub value: Option<f64>,
+    pub outcome: Outcome,
+    pub evidence: String,
+    pub reason: &'static str,
+}
+
+/// Why the tail of a distribution says nothing about this program here; empty when it does.
+pub type Unqualified = [String];
+
+/// Judges every limit.
+pub fn judge(limits: &Limits, measured: &Measured, period_ns: u64, unqualified: &Unqualified) -> Vec<Judged> {
+    let judge_one = |spec: &LimitSpec| {
+        let limit = limits[spec.name];
+        let (value, evidence) = read(spec.reading, measured, period_ns);
+        let met = value.map(|v| if spec.is_lower_bound() { v >= limit } else { v <= limit });
+        let (outcome, evidence) = match met {
+            None => (Outcome::NotMeasurable, evidence),
+            Some(_) if spec.is_tail() && !unqualified.is_empty() => (
+                Outcome::NotMeasurable,
+                format!("environment not qualified: {}; {evidence}", unqualified.join("; ")),
+            ),
+            Some(true) => (Outcome::Pass, evidence),
+            Some(false) => (Outcome::Fail, evidence),
+        };
+        Judged {
+            id: spec.id,
+            name: spec.name,
+            unit: spec.unit,
+            lower_bound: spec.is_lower_bound(),
+            limit,
+            value,
+            outcome,
+            evidence,
+            reason: spec.reason,
+        }
+    };
+    LIMITS.iter().map(judge_one).collect()
+}
+
+/// One failure fails all; else one that could not be measured leaves it open.
+pub fn overall(judged: &[Judged]) -> Outcome {
+    let any = |outcome| judged.iter().any(|j| j.outcome == outcome);
+    if any(Outcome::Fail) {
+        Outcome::Fail
+    } else if any(Outcome::NotMeasurable) || judged.is_empty() {
+        Outcome::NotMeasurable
+    } else {
+        Outcome::Pass
+    }
+}
+
+type Read = (Option<f64>, String);
+
+/// A percentile with what it rests on; the largest value needs one sample.
+fn percentile(histogram: &Histogram<u64>, quantile: f64) -> Read {
+    let count = histogram.len();
+    if quantile >= MAX {
+        let max_us = (count > 0).then(|| histogram.max() as f64 / 1e3);
+        return (max_us, format!("largest of {count} samples"));
+    }
+    match quantile_us(histogram, quantile) {
+        Some(us) => (Some(us), format!("{count} samples")),
+        None => (None, format!("{count} samples, needs {}", needed(quantile))),
+    }
+}
+
+fn read(reading: Reading, m: &Measured, period_ns: u64) -> Read {
+    let (haptic, tissue) = (&m.haptic, &m.tissue);
+    let loops = [("haptic", &m.run.haptic, haptic), ("tissue", &m.run.tissue, tissue)];
+    let counted = |what: fn(&LoopReport, &LoopTiming) -> i64| -> Read {
+        let counts = loops.map(|(name, run, timing)| (name, what(run, timing), run.ticks));
+        let said = counts.map(|(name, n, ticks)| format!("{name} {n} in {ticks} ticks"));
+        (Some(counts.iter().map(|c| c.1 as f64).sum()), said.join(", "))
+    };
+    let of_ticks = |n: u64| (Some(n as f64), format!("{} ticks", haptic.ticks));
+    match reading {
+        Reading::Wake(q) => percentile(&haptic.wake, q),
+        Reading::Work(q) => percentile(&haptic.work, q),
+        Reading::Path(q) => percentile(&haptic.path, q),
+        Reading::Jitter(q) => percentile(&haptic.jitter, q),
+        Reading::Recording(q) => percentile(&haptic.recording, q),
+        Reading::TipToTissue(q) => percentile(&tissue.path, q),
+        Reading::TipToHost(q) => percentile(&m.host.tip_to_host, q),
+        Reading::StiffnessMargin(q) => {
+            let (delay_us, evidence) = percentile(&haptic.due_to_output, q);
+            let margin = delay_us.map(|us| stiffness_margin_n_per_m(period_ns, us * 1e3));
+            let delay = delay_us.map_or(String::new(), |us| format!(", delay {us:.1} us"));
+            (margin, format!("{evidence}{delay}"))
+        }
+        Reading::Missed => of_ticks(haptic.missed),
+        Reading::Overruns => of_ticks(haptic.overruns),
+        Reading::HeapCalls => counted(|r, _| r.usage.heap_calls as i64),
+        Reading::PageFaults => counted(|r, _| r.usage.minor_faults + r.usage.major_faults),
+        Reading::ExtraSwitches => counted(|r, t| switches_beyond_sleep(r, t.unslept)),
+        Reading::RecordsMissing => (
+            Some(m.host.records_missing as f64),
+            format!("{} records seen by the host", m.host.records),
+        ),
+        Reading::Faults => (Some(m.host.faults as f64), format!("{} insertions", m.host.insertions)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_ids_are_unique() {
+        for (i, a) in LIMITS.iter().enumerate() {
+            assert!(
+                LIMITS[i + 1..].iter().all(|b| b.name != a.name && b.id != a.id),
+                "{}",
+                a.name
+            );
+        }
+    }
+
+    #[test]
+    fn limits_scale_with_the_period_and_the_command_line_wins() {
+        let file = std::env::temp_dir().join(format!("stylet-limits-{}.toml", std::process::id()));
+        std::fs::write(&file, "wake_p50_us = 11\nwake_p99_us = 33.5\n").expect("written");
+        let given = ["wake_p50_us=7".to_owned()];
+        let l = limits(500_000, Some(&file), &given).expect("all are known");
+        std::fs::remove_file(&file).expect("removed");
+        assert_eq!((l["wake_p50_us"], l["wake_p99_us"]), (7.0, 33.5));
+        assert_eq!((l["wake_max_us"], l["recording_p99_us"]), (500.0, 1.0));
+    }
+
+    #[test]
+    fn every_bad_limit_is_named() {
+        let given = ["wake_p50=7", "wake_p99_us=-1", "faults", "wake_max_us=nan"].map(str::to_owned);
+        let why = limits(1_000_000, None, &given).expect_err("all four are wrong");
+        assert_eq!(why.lines().count(), 5);
+        assert!(
+            why.contains("\"wake_p50\"") && why.contains("wake_p99_us needs"),
+            "{why}"
+        );
+    }
+
+    fn judged(outcome: Outcome) -> Judged {
+        Judged {
+            id: "",
+            name: "",
+            unit: "",
+            lower_bound: false,
+            limit: 0.0,
+            value: None,
+            outcome,
+            evidence: String::new(),
+            reason: "",
+        }
+    }
+
+    #[test]
+    fn one_failure_fails_all_and_one_open_limit_leaves_it_open() {
+        use Outcome::*;
+        let of = |all: &[Outcome]| overall(&all.iter().map(|o| judged(*o)).collect::<Vec<_>>());
+        assert_eq!(of(&[Pass, Pass]), Pass);
+        assert_eq!(of(&[Pass, NotMeasurable]), NotMeasurable);
+        assert_eq!(of(&[NotMeasurable, Fail, Pass]), Fail);
+        assert_eq!(of(&[]), NotMeasurable);
+        assert_eq!([Pass, Fail, NotMeasurable].map(Outcome::exit_code), [0, 1, 2]);
+    }
+
+    #[test]
+    fn percentile_without_ten_samples_beyond_is_not_told() {
+        let mut h = crate::collect::histogram();
+        for ns in 1..=999_u64 {
+            h.record(ns * 1_000).expect("in range");
+        }
+        assert!(percentile(&h, 0.99).0.is_none());
+        h.record(1_000_000).expect("in range");
+        assert!(percentile(&h, 0.99).0.is_some());
+        assert!(percentile(&h, MAX).0.is_some_and(|us| (us - 1000.0).abs() < 1.0));
+    }
+}

@@ -1,0 +1,39 @@
+//! What the kernel tells about the cores while a measurement runs: frequency, steal time, interrupts served.
+
+use crate::machine::Machine;
+use serde::Serialize;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Of one core, over the run.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct CoreWatch {
+    pub core: usize,
+    pub lowest_mhz: Option<f64>,
+    pub highest_mhz: Option<f64>,
+    /// As `/proc/stat` tells; some hypervisors leave it at 0 whatever they take.
+    pub steal_s: Option<f64>,
+    pub interrupts: Option<u64>,
+}
+
+/// Looks four times a second until `stop`.
+pub fn watch(machine: &Machine, core: usize, stop: &AtomicBool) -> CoreWatch {
+    let count = || (machine.steal_s(core), machine.interrupts_served(core));
+    let (steal_before, served_before) = count();
+    let mut seen = CoreWatch {
+        core,
+        ..CoreWatch::default()
+    };
+    // SYNC: nothing but the flag is carried.
+    while !stop.load(Ordering::Acquire) {
+        if let Some(mhz) = machine.frequency_mhz(core) {
+            seen.lowest_mhz = Some(seen.lowest_mhz.map_or(mhz, |l| l.min(mhz)));
+            seen.highest_mhz = Some(seen.highest_mhz.map_or(mhz, |h| h.max(mhz)));
+        }
+        std::thread::sleep(Duration::from_millis(250));
+    }
+    let (steal_after, served_after) = count();
+    seen.steal_s = steal_after.zip(steal_before).map(|(a, b)| a - b);
+    seen.interrupts = served_after.zip(served_before).map(|(a, b)| a.saturating_sub(b));
+    seen
+}

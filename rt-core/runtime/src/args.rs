@@ -1,0 +1,107 @@
+//! What a run and a measurement take from the command line, and the settings of a run that follow from it.
+
+use crate::core::{HAPTIC_PERIOD_NS, Options};
+use crate::device::DeviceChoice;
+use crate::replay;
+use crate::rt::arm;
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser};
+use stylet_shm_schema::BUILTIN_SCENES;
+use stylet_shm_schema::service::Instance;
+use stylet_sim::scene::TissueKind;
+
+/// What a run and a measurement have in common.
+#[derive(Args, Debug)]
+pub struct RealTimeArgs {
+    /// Built-in scene to start with
+    #[arg(long, default_value = BUILTIN_SCENES[0], value_parser = scenes())]
+    pub scene: String,
+    /// Run without real-time scheduling; every record and screen then says so
+    #[arg(long)]
+    no_rt: bool,
+    /// Try real time first and go on without it when the rights are missing
+    #[arg(long, conflicts_with = "no_rt")]
+    rt_if_allowed: bool,
+    /// Core of the force loop [default: the last one]
+    #[arg(long, value_name = "N")]
+    haptic_core: Option<usize>,
+    /// Core of the tissue step [default: the one before]
+    #[arg(long, value_name = "N")]
+    tissue_core: Option<usize>,
+    /// SCHED_FIFO priority of the force loop
+    #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u32).range(1..=98), value_name = "1-98")]
+    haptic_priority: u32,
+    /// SCHED_FIFO priority of the tissue step
+    #[arg(long, default_value_t = 70, value_parser = clap::value_parser!(u32).range(1..=98), value_name = "1-98")]
+    tissue_priority: u32,
+}
+
+pub fn scenes() -> PossibleValuesParser {
+    let help = |name| match name {
+        "paper" => "the gland alone, one tissue, 19,307 elements",
+        "pelvis" => "the gland with capsule and urethra among rectum, bladder, pubic arch, fat and perineum",
+        "full" => "every cell of the grid, one tissue, 1,167,584 elements: for measuring",
+        _ => "",
+    };
+    PossibleValuesParser::new(BUILTIN_SCENES.map(|name| PossibleValue::new(name).help(help(name))))
+}
+
+impl RealTimeArgs {
+    /// Lists what is wrong with the settings.
+    pub fn options(&self, instance: &str) -> Result<Options, String> {
+        let cores: Vec<usize> = core_affinity::get_core_ids()
+            .unwrap_or_default()
+            .iter()
+            .map(|c| c.id)
+            .collect();
+        let mut problems = Vec::new();
+        for (option, core) in [("--haptic-core", self.haptic_core), ("--tissue-core", self.tissue_core)] {
+            if let Some(core) = core.filter(|c| !cores.contains(c)) {
+                problems.push(format!("{option} {core}: this process may use cores {cores:?}"));
+            }
+        }
+        let instance = Instance::new(instance).map_err(|e| problems.push(e.to_string()));
+        let refused = if self.rt_if_allowed {
+            may_be_real_time().err()
+        } else {
+            None
+        };
+        match instance {
+            Ok(instance) if problems.is_empty() => Ok(Options {
+                instance,
+                scene: self.scene.clone(),
+                no_rt: self.no_rt || refused.is_some(),
+                no_rt_asked: self.no_rt,
+                rights_missing: refused,
+                haptic_core: self.haptic_core.or(cores.last().copied()),
+                tissue_core: self.tissue_core.or(cores.iter().rev().nth(1).or(cores.last()).copied()),
+                haptic_priority: self.haptic_priority,
+                tissue_priority: self.tissue_priority,
+                haptic_period_ns: HAPTIC_PERIOD_NS,
+                spin_ns: 0,
+                flight_folder: replay::file::default_folder(),
+                tissue: TissueKind::default(),
+                device: DeviceChoice::Simulated,
+                libhd: None,
+            }),
+            _ => Err(problems.join("\n")),
+        }
+    }
+}
+
+/// Tries it in a thread of its own, which then ends; `Err` says how to grant what is missing.
+fn may_be_real_time() -> Result<(), String> {
+    let ask = arm::Ask {
+        priority: Some(1),
+        core: None,
+    };
+    let armed = std::thread::spawn(move || arm::arm(ask).map(drop).map_err(|e| e.to_string())).join();
+    armed.unwrap_or_else(|_| Err("the trial of real-time scheduling ended by itself".to_owned()))?;
+    // SAFETY: both calls have no preconditions; what is locked now is unlocked again.
+    let lockable = unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0 && libc::munlockall() == 0 };
+    if lockable {
+        Ok(())
+    } else {
+        Err(arm::advice("the kernel does not lock memory"))
+    }
+}

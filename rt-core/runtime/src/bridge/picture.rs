@@ -1,0 +1,119 @@
+//! What hosts need to draw a scene and to plan in it.
+
+use super::SnapshotSize;
+use stylet_shm_schema::*;
+use stylet_sim::scene::{Role, Scene, Structure, label_grid};
+
+pub(super) const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+
+/// Header and words of the scene service.
+pub struct ScenePicture {
+    pub(super) header: SceneHeader,
+    pub(super) words: Vec<u32>,
+}
+
+impl ScenePicture {
+    /// Of a built-in scene, the first of a run.
+    pub fn first(scene: &Scene, session_id: u64) -> Self {
+        Self::of(scene, session_id, 1, IDENTITY)
+    }
+
+    /// As it is sent: rest positions and triangles behind the header.
+    pub fn parts(&self) -> (&SceneHeader, &[u32]) {
+        (&self.header, &self.words)
+    }
+
+    pub fn word_count(&self) -> usize {
+        self.words.len()
+    }
+
+    /// How much each snapshot of the scene holds.
+    pub fn snapshot_size(&self) -> SnapshotSize {
+        SnapshotSize {
+            vertices: self.header.vertex_count as usize,
+            nodes: self.header.nodes.node_count().unwrap_or(0),
+        }
+    }
+
+    pub(super) fn of(scene: &Scene, session_id: u64, generation: u64, patient_from_scene: [f64; 12]) -> Self {
+        let (lattice, surface) = (&scene.lattice, &scene.surface);
+        let (lower_m, upper_m) = lattice.bounds_m();
+        let (target_lower_m, target_upper_m) = scene.target_bounds_m();
+        let vertices = &surface.vertex_elements;
+        let positions = vertices
+            .iter()
+            .flat_map(|&e| lattice.rest_m(e))
+            .map(|c| (c as f32).to_bits());
+        let indices = surface.triangles.iter().flatten().copied();
+        let (label_info, labels) = label_grid(lattice);
+        let labels = labels.chunks(4).map(packed);
+        Self {
+            words: positions.chain(indices).chain(labels).collect(),
+            header: SceneHeader {
+                session_id,
+                generation,
+                dims: lattice.dims.map(|d| d as u32),
+                element_count: lattice.element_count() as u32,
+                surface_element_count: surface.body_elements as u32,
+                vertex_count: vertices.len() as u32,
+                triangle_count: surface.triangles.len() as u32,
+                body_triangle_count: surface.body_triangles as u32,
+                structure_count: scene.structures.len() as u32,
+                reserved: 0,
+                spacing_m: lattice.spacing_m,
+                volume_m3: lattice.volume_m3(),
+                lower_m,
+                upper_m,
+                target_lower_m,
+                target_upper_m,
+                patient_from_scene,
+                labels: label_info,
+                nodes: scene.nodes.info,
+                name: Text::new(&scene.name),
+                structures: structures(scene),
+            },
+        }
+    }
+}
+
+/// Four cells in a word, lowest byte first; no tissue where there are fewer.
+fn packed(cells: &[u8]) -> u32 {
+    let mut bytes = [0; 4];
+    bytes[..cells.len()].copy_from_slice(cells);
+    u32::from_le_bytes(bytes)
+}
+
+fn structures(scene: &Scene) -> [StructureInfo; MAX_STRUCTURES] {
+    let mut infos = [bytemuck::Zeroable::zeroed(); MAX_STRUCTURES];
+    let extents = scene.lattice.extents(scene.structures.len());
+    for ((info, structure), extent) in infos.iter_mut().zip(&scene.structures).zip(extents) {
+        *info = StructureInfo {
+            label: u32::from(structure.label),
+            role: role_of(structure),
+            element_count: extent.elements,
+            first_triangle: 0,
+            triangle_count: 0,
+            reserved: 0,
+            lower_m: extent.lower_m,
+            upper_m: extent.upper_m,
+            name: Text::new(&structure.name),
+        };
+    }
+    for part in &scene.surface.parts {
+        if let Some(info) = infos.get_mut(part.structure as usize) {
+            info.first_triangle = part.triangles.start as u32;
+            info.triangle_count = part.triangles.len() as u32;
+        }
+    }
+    infos
+}
+
+fn role_of(structure: &Structure) -> u32 {
+    let fixed = if structure.material.fixed { role::FIXED } else { 0 };
+    fixed
+        | match structure.role {
+            Role::Target => role::TARGET,
+            Role::Spare => role::SPARE,
+            Role::Tissue => 0,
+        }
+}

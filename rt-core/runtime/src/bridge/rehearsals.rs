@@ -1,0 +1,141 @@
+//! Rehearsals that hosts ask for: one at a time, on a thread of normal priority, beside the running scene.
+
+use crate::rehearse::{NeedleRun, Rehearsed, Stage, timed};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use stylet_hw::DeviceInfo;
+use stylet_shm_schema::{MAX_SEEDS, ParameterSet, Rehearsal};
+use stylet_sim::scene::SceneSource;
+use stylet_sim::scene::TissueKind;
+
+use super::Ticket;
+
+const BUSY: &str = "another rehearsal runs; wait until it is done";
+const PANICKED: &str =
+    "the rehearsal stopped on a fault of its own; what rt-core printed says where. The next one starts afresh";
+
+/// What the thread gives back.
+struct Finished {
+    scene_generation: u64,
+    wall_ns: u64,
+    outcome: Result<Rehearsed, String>,
+    /// To be used again.
+    stage: Option<Stage>,
+}
+
+/// What a host is told.
+pub struct Told {
+    pub ticket: Ticket,
+    pub outcome: Result<Box<Rehearsal>, String>,
+}
+
+/// The bridge's side of rehearsals.
+pub struct RehearsalDesk {
+    source: Arc<SceneSource>,
+    tissue: TissueKind,
+    device: DeviceInfo,
+    /// Of the scene that runs; `None` until the first rehearsal in it, and while one is under way.
+    stage: Option<(u64, Stage)>,
+    under_way: Option<(Ticket, JoinHandle<Finished>)>,
+    stop: Arc<AtomicBool>,
+}
+
+impl RehearsalDesk {
+    pub fn new(source: Arc<SceneSource>, tissue: TissueKind, device: DeviceInfo) -> Self {
+        Self {
+            source,
+            tissue,
+            device,
+            stage: None,
+            under_way: None,
+            stop: Arc::new(AtomicBool::new(false)),
+        }
+    }
+
+    /// Another scene runs; a rehearsal under way ends in the one that it began in.
+    pub fn change_scene(&mut self, source: Arc<SceneSource>) {
+        self.source = source;
+        self.stage = None;
+    }
+
+    /// The reason when it cannot be begun now.
+    pub fn begin(
+        &mut self,
+        ticket: Ticket,
+        run: NeedleRun,
+        set: ParameterSet,
+        scene_generation: u64,
+    ) -> Result<(), &'static str> {
+        if self.under_way.is_some() {
+            return Err(BUSY);
+        }
+        let kept = self
+            .stage
+            .take()
+            .filter(|(generation, _)| *generation == scene_generation);
+        let (source, tissue, device) = (Arc::clone(&self.source), self.tissue, self.device);
+        let stop = Arc::clone(&self.stop);
+        let work = move || {
+            let stage = kept.map_or_else(|| Stage::build(&source, tissue, device), |(_, stage)| Ok(stage));
+            let (stage, outcome, wall_ns) = match stage {
+                Ok(mut stage) => {
+                    let (outcome, wall_ns) = timed(|| stage.rehearse(&run, &set, &stop));
+                    (Some(stage), outcome, wall_ns)
+                }
+                Err(why) => (None, Err(why), 0),
+            };
+            Finished {
+                scene_generation,
+                wall_ns,
+                outcome,
+                stage,
+            }
+        };
+        let thread = std::thread::Builder::new().name("rehearsal".to_owned()).spawn(work);
+        self.under_way = Some((ticket, thread.map_err(|_| "no thread could be started to rehearse")?));
+        Ok(())
+    }
+
+    /// One that has ended since the last call.
+    pub fn take(&mut self, scene_generation: u64) -> Option<Told> {
+        let (ticket, thread) = self.under_way.take_if(|(_, thread)| thread.is_finished())?;
+        let Ok(finished) = thread.join() else {
+            let outcome = Err(PANICKED.to_owned());
+            return Some(Told { ticket, outcome });
+        };
+        if finished.scene_generation == scene_generation {
+            self.stage = finished.stage.map(|stage| (scene_generation, stage));
+        }
+        Some(Told {
+            ticket,
+            outcome: finished
+                .outcome
+                .map(|r| message(&r, finished.scene_generation, finished.wall_ns)),
+        })
+    }
+}
+
+impl Drop for RehearsalDesk {
+    fn drop(&mut self) {
+        // SYNC: read by the rehearsal's thread; nothing but the flag is carried.
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+fn message(r: &Rehearsed, scene_generation: u64, wall_ns: u64) -> Box<Rehearsal> {
+    let mut message: Box<Rehearsal> = Box::new(bytemuck::Zeroable::zeroed());
+    message.scene_generation = scene_generation;
+    message.simulated_ns = (r.simulated_s * 1e9) as u64;
+    message.wall_ns = wall_ns;
+    message.peak_force_n = r.peak_force_n;
+    message.displacement_before_puncture_m = r.displacement_before_puncture_m;
+    message.seed_count = r.seeds.len().min(MAX_SEEDS) as u64;
+    for (slot, seed) in message.seeds.iter_mut().zip(&r.seeds) {
+        *slot = *seed;
+    }
+    for (slot, after_s) in message.dropped_after_ns.iter_mut().zip(&r.dropped_after_s) {
+        *slot = (after_s * 1e9) as u64;
+    }
+    message
+}

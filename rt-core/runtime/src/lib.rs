@@ -1,0 +1,9 @@
+//! The running core: two real-time loops, the bridge that owns every port, flight recordings and rehearsals.
+
+pub mod args;
+pub mod bridge;
+pub mod core;
+pub mod device;
+pub mod rehearse;
+pub mod replay;
+pub mod rt;

@@ -1,0 +1,186 @@
+//! Rehearsals against what must hold of them: the same bytes twice, seeds at rest where the tissue was, and errors in words.
+
+use super::*;
+use std::sync::atomic::AtomicBool;
+use stylet_shm_schema::ParameterId;
+use stylet_sim::limits::Limits;
+use stylet_sim::tissue::{Deformed, Held, StepReport, TissueModel};
+
+fn stage() -> Stage {
+    let source = SceneSource::Builtin("paper".to_owned());
+    Stage::build(&source, TissueKind::ChainMail, DeviceInfo::phantom_premium_1_5()).expect("built in")
+}
+
+/// Along the middle of the paper's gland.
+fn needle() -> NeedleRun {
+    let scene = stylet_sim::scene::Scene::builtin("paper").unwrap();
+    let (low, high) = scene.lattice.bounds_m();
+    let (x, y) = ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0);
+    let at = |share: f64| Vector3::new(x, y, low[2] + share * (high[2] - low[2]));
+    NeedleRun {
+        entry_m: Vector3::new(x, y, low[2] - 0.01),
+        direction: Vector3::z(),
+        insert_m_per_s: 0.05,
+        retract_m_per_s: 0.05,
+        approach_m_per_s: 0.1,
+        acceleration_m_per_s2: 2.0,
+        retract_to_m: 0.0,
+        drops_m: [0.8, 0.5, 0.2].map(at).to_vec(),
+    }
+}
+
+#[test]
+fn a_rehearsal_leaves_its_seeds_off_plan_and_repeats_to_the_last_bit() {
+    let (mut stage, run, stop) = (stage(), needle(), AtomicBool::new(false));
+    let set = ParameterSet::default();
+    let first = stage.rehearse(&run, &set, &stop).expect("goes through");
+    let (second, ns) = timed(|| stage.rehearse(&run, &set, &stop).expect("goes through"));
+    assert_eq!(first, second);
+    println!(
+        "{:.1} s in {:.3} s: {:?} N",
+        first.simulated_s,
+        ns as f64 * 1e-9,
+        first.peak_force_n
+    );
+    assert_eq!(first.seeds.len(), 3);
+    assert!(first.displacement_before_puncture_m > 2e-3 && first.peak_force_n > 3.0);
+    for (seed, drop) in first.seeds.iter().zip(&run.drops_m) {
+        let off = Vector3::from(seed.position_m) - drop;
+        println!("{:?} mm", off * 1e3);
+        assert!(off.norm() > 0.1e-3 && off.norm() < 10e-3, "{off:?}");
+        assert!((Vector3::from(seed.dropped_at_m) - drop).norm() < 0.5e-3);
+    }
+}
+
+#[test]
+fn tissue_that_sticks_less_leaves_seeds_nearer_to_plan() {
+    let (mut stage, run, stop) = (stage(), needle(), AtomicBool::new(false));
+    let mut loose = ParameterSet::default();
+    loose.set(ParameterId::DepthCoefficient, 1e-8);
+    loose.set(ParameterId::PunctureDepth, 1e-3);
+    loose.set(ParameterId::MembranePeak, 0.5);
+    let error = |r: &Rehearsed| {
+        let off = r
+            .seeds
+            .iter()
+            .zip(&run.drops_m)
+            .map(|(s, d)| (Vector3::from(s.position_m) - d).norm());
+        off.sum::<f64>() / 3.0
+    };
+    let usual = error(&stage.rehearse(&run, &ParameterSet::default(), &stop).unwrap());
+    let less = error(&stage.rehearse(&run, &loose, &stop).unwrap());
+    assert!(less < 0.5 * usual, "{less} {usual}");
+}
+
+#[test]
+fn a_drop_outside_the_tissue_and_a_stop_are_told_and_leave_the_stage_usable() {
+    let (mut stage, mut run, stop) = (stage(), needle(), AtomicBool::new(false));
+    let set = ParameterSet::default();
+    run.drops_m = vec![run.entry_m + run.direction * 1e-3];
+    assert!(
+        stage
+            .rehearse(&run, &set, &stop)
+            .is_err_and(|e| e.contains("outside the tissue"))
+    );
+    stop.store(true, Ordering::Relaxed);
+    assert!(stage.rehearse(&needle(), &set, &stop).is_err());
+    stop.store(false, Ordering::Relaxed);
+    assert!(stage.rehearse(&needle(), &set, &stop).is_ok());
+}
+
+/// FEM keeps answers from tick to tick and works ahead: a body at rest must have forgotten both.
+#[test]
+fn a_rehearsal_with_finite_elements_repeats_to_the_last_bit() {
+    let (mut stage, run, stop) = (fem_stage(), shallow(), AtomicBool::new(false));
+    let set = ParameterSet::default();
+    let first = stage.rehearse(&run, &set, &stop).expect("goes through");
+    assert_eq!(first, stage.rehearse(&run, &set, &stop).expect("goes through"));
+}
+
+fn fem_stage() -> Stage {
+    let source = SceneSource::Builtin("paper".to_owned());
+    Stage::build(&source, TissueKind::Fem, DeviceInfo::phantom_premium_1_5()).expect("built in")
+}
+
+/// One seed, where an elastic body still lets the tip come.
+fn shallow() -> NeedleRun {
+    let run = needle();
+    NeedleRun {
+        drops_m: run.drops_m[1..2].to_vec(),
+        ..run
+    }
+}
+
+/// What the loop asks of its tissue model.
+enum Asked {
+    Held(Option<u32>),
+    Prepared(Option<u32>),
+}
+
+struct Watched {
+    model: Box<dyn TissueModel>,
+    asked: std::sync::mpsc::Sender<Asked>,
+}
+
+impl TissueModel for Watched {
+    fn step(&mut self, held: Option<Held>, dt_s: f64) -> StepReport {
+        self.asked
+            .send(Asked::Held(held.map(|h| h.element)))
+            .expect("the test listens");
+        self.model.step(held, dt_s)
+    }
+
+    fn prepare(&mut self, next: Option<Held>) {
+        self.asked
+            .send(Asked::Prepared(next.map(|h| h.element)))
+            .expect("the test listens");
+        self.model.prepare(next);
+    }
+
+    fn may_be_felt(&self, report: &StepReport) -> bool {
+        self.model.may_be_felt(report)
+    }
+
+    fn deformed(&self) -> Deformed<'_> {
+        self.model.deformed()
+    }
+
+    fn return_to_rest(&mut self) {
+        self.model.return_to_rest();
+    }
+
+    fn set_limits(&mut self, limits: Limits) {
+        self.model.set_limits(limits);
+    }
+}
+
+/// On a straight way, in and out, the loop knows in the tick before which element it will hold.
+#[test]
+fn the_loop_prepares_what_it_holds_next() {
+    let (mut stage, run, stop) = (fem_stage(), shallow(), AtomicBool::new(false));
+    let world = stage.world.as_mut().expect("built");
+    let (asked, seen) = std::sync::mpsc::channel();
+    let fem = stylet_sim::tissue::FemTissue::<f32>::new(&world.scene).expect("valid");
+    world.tissue = Box::new(Watched {
+        model: Box::new(fem),
+        asked,
+    });
+    stage
+        .rehearse(&run, &ParameterSet::default(), &stop)
+        .expect("goes through");
+    let (mut held, mut prepared) = (None, None);
+    let (mut changes, mut foreseen) = (0, 0);
+    while let Ok(asked) = seen.try_recv() {
+        match asked {
+            Asked::Held(now) if now.is_some() && now != held => {
+                changes += 1;
+                foreseen += usize::from(now == prepared);
+                held = now;
+            }
+            Asked::Held(now) => held = now,
+            Asked::Prepared(next) => prepared = next,
+        }
+    }
+    println!("{foreseen} of {changes} patches were foreseen");
+    assert!(changes > 8 && foreseen == changes);
+}

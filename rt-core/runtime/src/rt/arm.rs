@@ -1,0 +1,198 @@
+//! Asks the kernel for what a real-time thread needs, and reads back what it granted.
+
+use std::marker::PhantomData;
+use stylet_shm_schema::ThreadReport;
+
+/// What a thread asks for.
+#[derive(Clone, Copy, Debug)]
+pub struct Ask {
+    /// `SCHED_FIFO` priority; `None` under `--no-rt`.
+    pub priority: Option<u32>,
+    pub core: Option<usize>,
+}
+
+/// Proof that this thread is armed; cannot leave it.
+pub struct Armed {
+    pub report: ThreadReport,
+    not_send: PhantomData<*const ()>,
+}
+
+/// The right that is missing, and how to grant it.
+#[derive(Debug)]
+pub struct Refused(pub String);
+
+impl std::fmt::Display for Refused {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// How to grant real-time rights, in words to type.
+pub fn advice(missing: &str) -> String {
+    let program = std::env::current_exe().map_or_else(|_| "rt-core".into(), |p| p.display().to_string());
+    format!(
+        "{missing}. Either: sudo setcap cap_sys_nice,cap_ipc_lock=ep {program}   or put these two lines into \
+         /etc/security/limits.d/stylet.conf and log in again: '@users - rtprio 90' and '@users - memlock unlimited'"
+    )
+}
+
+/// Arms the calling thread: core, policy, stack. Fails only when a priority was asked for and not granted.
+pub fn arm(ask: Ask) -> Result<Armed, Refused> {
+    if let Some(core) = ask.core {
+        core_affinity::set_for_current(core_affinity::CoreId { id: core });
+    }
+    if let Some(priority) = ask.priority {
+        let parameters = libc::sched_param {
+            sched_priority: priority as libc::c_int,
+        };
+        // SAFETY: `parameters` is valid for reads; 0 names the calling thread.
+        if unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &parameters) } != 0 {
+            let why = std::io::Error::last_os_error();
+            return Err(Refused(advice(&format!(
+                "the kernel does not grant SCHED_FIFO priority {priority} ({why})"
+            ))));
+        }
+    }
+    touch_stack();
+    flush_denormals();
+    Ok(Armed {
+        report: read_back(ask),
+        not_send: PhantomData,
+    })
+}
+
+/// Locks present and future pages; `Err` says which limit to raise.
+pub fn lock_memory() -> Result<(), Refused> {
+    // SAFETY: no preconditions.
+    if unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } == 0 {
+        // Keep freed memory, and serve large blocks from it: no page comes or goes later.
+        // SAFETY: both options take any value.
+        unsafe {
+            libc::mallopt(libc::M_TRIM_THRESHOLD, -1);
+            libc::mallopt(libc::M_MMAP_MAX, 0);
+        }
+        return Ok(());
+    }
+    let why = std::io::Error::last_os_error();
+    Err(Refused(advice(&format!("the kernel does not lock memory ({why})"))))
+}
+
+/// A request to the kernel, in force while it is kept.
+pub struct CoresAwake {
+    /// The longest exit from a sleep state that the kernel now allows, as read back, microseconds.
+    pub exit_latency_us: i32,
+    _request: std::fs::File,
+}
+
+/// Asks the kernel to keep the cores out of sleep states that take long to leave.
+/// `None` where the machine does not offer it or the right is missing.
+pub fn keep_cores_awake() -> Option<CoresAwake> {
+    use std::os::unix::fs::FileExt;
+    let request = std::fs::File::options()
+        .read(true)
+        .write(true)
+        .open("/dev/cpu_dma_latency")
+        .ok()?;
+    // The kernel takes and gives microseconds as a C int.
+    request.write_all_at(&0_i32.to_ne_bytes(), 0).ok()?;
+    let mut in_force = [0; 4];
+    request.read_exact_at(&mut in_force, 0).ok()?;
+    Some(CoresAwake {
+        exit_latency_us: i32::from_ne_bytes(in_force),
+        _request: request,
+    })
+}
+
+fn read_back(ask: Ask) -> ThreadReport {
+    let mut parameters = libc::sched_param { sched_priority: 0 };
+    // SAFETY: `parameters` is valid for writes; 0 names the calling thread.
+    let policy = unsafe {
+        libc::sched_getparam(0, &mut parameters);
+        libc::sched_getscheduler(0)
+    };
+    ThreadReport {
+        policy: u32::try_from(policy).unwrap_or(u32::MAX),
+        priority: parameters.sched_priority.max(0) as u32,
+        asked_priority: ask.priority.unwrap_or(0),
+        asked_core: ask.core.map_or(u32::MAX, |c| c as u32),
+        core: only_core().unwrap_or(u32::MAX),
+        reserved: 0,
+    }
+}
+
+/// The core, when the kernel leaves this thread exactly one.
+fn only_core() -> Option<u32> {
+    // SAFETY: an all-zero set is valid.
+    let mut set: libc::cpu_set_t = unsafe { std::mem::zeroed() };
+    // SAFETY: `set` is valid for writes of its size.
+    if unsafe { libc::sched_getaffinity(0, size_of::<libc::cpu_set_t>(), &mut set) } != 0 {
+        return None;
+    }
+    // SAFETY: the index stays below the size of the set.
+    let mut cores = (0..libc::CPU_SETSIZE as usize).filter(|&c| unsafe { libc::CPU_ISSET(c, &set) });
+    match (cores.next(), cores.next()) {
+        (Some(core), None) => Some(core as u32),
+        _ => None,
+    }
+}
+
+/// Writes 256 KiB of stack, more than any tick uses.
+#[inline(never)]
+fn touch_stack() {
+    let mut stack = [0_u8; 256 * 1024];
+    for page in stack.chunks_mut(4096) {
+        page[0] = 1;
+    }
+    std::hint::black_box(&stack);
+}
+
+/// Denormal numbers cost a hundred cycles each; the tissue's tail is full of them.
+fn flush_denormals() {
+    #[cfg(target_arch = "x86_64")]
+    {
+        let mut control: u32 = 0;
+        // SAFETY: reads and writes this thread's MXCSR; bits 15 and 6 are flush-to-zero and denormals-are-zero.
+        unsafe {
+            std::arch::asm!("stmxcsr [{}]", in(reg) &mut control);
+            control |= (1 << 15) | (1 << 6);
+            std::arch::asm!("ldmxcsr [{}]", in(reg) &control);
+        }
+    }
+}
+
+/// What a thread cost since it was armed.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Usage {
+    pub minor_faults: i64,
+    pub major_faults: i64,
+    pub voluntary_switches: i64,
+    pub involuntary_switches: i64,
+    pub heap_calls: u64,
+}
+
+impl Usage {
+    /// Of the calling thread, since it began.
+    pub fn now() -> Self {
+        // SAFETY: an all-zero rusage is valid.
+        let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
+        // SAFETY: `usage` is valid for writes.
+        unsafe { libc::getrusage(libc::RUSAGE_THREAD, &mut usage) };
+        Self {
+            minor_faults: usage.ru_minflt,
+            major_faults: usage.ru_majflt,
+            voluntary_switches: usage.ru_nvcsw,
+            involuntary_switches: usage.ru_nivcsw,
+            heap_calls: stylet_heap::calls_of_this_thread(),
+        }
+    }
+
+    pub fn since(self, start: Self) -> Self {
+        Self {
+            minor_faults: self.minor_faults - start.minor_faults,
+            major_faults: self.major_faults - start.major_faults,
+            voluntary_switches: self.voluntary_switches - start.voluntary_switches,
+            involuntary_switches: self.involuntary_switches - start.involuntary_switches,
+            heap_calls: self.heap_calls - start.heap_calls,
+        }
+    }
+}

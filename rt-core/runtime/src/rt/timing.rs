@@ -1,0 +1,189 @@
+//! What each tick of a loop cost, handed through a ring to whoever measures; a loop that nobody measures has no probe.
+
+use crate::rt::clock;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Stages of a tick at most.
+pub const MAX_STAGES: usize = 6;
+
+/// The places of one tick on the clock, `CLOCK_MONOTONIC`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TickTimes {
+    pub due_ns: u64,
+    pub woke_ns: u64,
+    marks: [u64; MAX_STAGES],
+    marked: usize,
+    /// From input to output; `None` where there was no input yet.
+    pub path_ns: Option<u64>,
+    /// When the output had left.
+    pub output_ns: Option<u64>,
+    /// What handing over the tick before cost.
+    pub recording_ns: u64,
+    /// Deadlines skipped just before this tick.
+    pub missed: u32,
+    /// Ticks so far that the ring had no room for.
+    pub lost: u32,
+    /// False when the tick was already due: there was no sleep.
+    pub slept: bool,
+}
+
+impl TickTimes {
+    /// Ends of the stages.
+    pub fn marks(&self) -> &[u64] {
+        &self.marks[..self.marked]
+    }
+
+    pub fn done_ns(&self) -> u64 {
+        self.marks().last().copied().unwrap_or(self.woke_ns)
+    }
+
+    /// Marks past [`MAX_STAGES`] are left out.
+    pub fn push_mark(&mut self, time_ns: u64) {
+        if let Some(mark) = self.marks.get_mut(self.marked) {
+            *mark = time_ns;
+            self.marked += 1;
+        }
+    }
+}
+
+/// When the pose that each of the last tissue ticks used was read; written by the tissue thread, read by a host thread.
+#[derive(Debug)]
+pub struct PoseTimes([(AtomicU64, AtomicU64); PoseTimes::KEPT]);
+
+impl PoseTimes {
+    const KEPT: usize = 1024;
+
+    pub fn new() -> Self {
+        Self(std::array::from_fn(|_| (AtomicU64::new(0), AtomicU64::new(0))))
+    }
+
+    fn note(&self, tick: u64, time_ns: u64) {
+        let (slot_tick, slot_time) = &self.0[tick as usize % Self::KEPT];
+        slot_time.store(time_ns, Ordering::Relaxed);
+        // SYNC: pairs with the acquire load in `of`: who sees the tick sees its time.
+        slot_tick.store(tick, Ordering::Release);
+    }
+
+    /// When the tip pose behind tissue tick `tick` was read; `None` once it is forgotten.
+    pub fn of(&self, tick: u64) -> Option<u64> {
+        let (slot_tick, slot_time) = &self.0[tick as usize % Self::KEPT];
+        // SYNC: pairs with the release store in `note`.
+        let same = slot_tick.load(Ordering::Acquire) == tick;
+        (same && tick > 0).then(|| slot_time.load(Ordering::Relaxed))
+    }
+}
+
+impl Default for PoseTimes {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Owned by a loop while it is measured.
+pub struct Probe {
+    ring: rtrb::Producer<TickTimes>,
+    tick: TickTimes,
+    pose_times: Arc<PoseTimes>,
+}
+
+impl Probe {
+    pub fn new(ring: rtrb::Producer<TickTimes>, pose_times: Arc<PoseTimes>) -> Self {
+        Self {
+            ring,
+            tick: TickTimes::default(),
+            pose_times,
+        }
+    }
+
+    /// Ends a stage; call at the same places of every tick.
+    pub fn mark(&mut self) {
+        self.tick.push_mark(clock::now_ns());
+    }
+
+    /// The tick's output left at the last mark; the way to it began at mark number `from`.
+    pub fn output_since_mark(&mut self, from: usize) {
+        let done_ns = self.tick.done_ns();
+        self.tick.output_ns = Some(done_ns);
+        self.tick.path_ns = self.tick.marks().get(from).map(|begin| done_ns - begin);
+    }
+
+    /// The output of tissue tick `tick` left at the last mark, and answers the tip read at `pose_ns`; 0 for no tip yet.
+    pub fn output_for_pose(&mut self, tick: u64, pose_ns: u64) {
+        let done_ns = self.tick.done_ns();
+        self.tick.output_ns = Some(done_ns);
+        self.tick.path_ns = (pose_ns > 0).then(|| done_ns.saturating_sub(pose_ns));
+        self.pose_times.note(tick, pose_ns);
+    }
+
+    /// Ends the last stage and hands the tick over.
+    pub fn finish(&mut self, due_ns: u64, woke_ns: u64, missed: u32, slept: bool) {
+        self.mark();
+        let done_ns = self.tick.done_ns();
+        self.tick.due_ns = due_ns;
+        self.tick.woke_ns = woke_ns;
+        self.tick.missed = missed;
+        self.tick.slept = slept;
+        let full = self.ring.push(self.tick).is_err();
+        let lost = self.tick.lost + u32::from(full);
+        self.tick = TickTimes {
+            recording_ns: clock::now_ns() - done_ns,
+            lost,
+            ..TickTimes::default()
+        };
+    }
+}
+
+/// Both loops' probes.
+pub struct Probes {
+    pub haptic: Probe,
+    pub tissue: Probe,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stylet_heap as heap;
+
+    #[test]
+    fn handing_over_makes_no_heap_call_and_counts_what_does_not_fit() {
+        let (into, mut ring) = rtrb::RingBuffer::new(8);
+        let mut probe = Probe::new(into, Arc::default());
+        let before = heap::calls_of_this_thread();
+        for tick in 1..=11 {
+            probe.mark();
+            probe.output_for_pose(tick, 0);
+            probe.finish(1, 1, 0, true);
+        }
+        assert_eq!(heap::calls_of_this_thread() - before, 0);
+        while ring.pop().is_ok() {}
+        probe.finish(1, 1, 0, true);
+        let last = ring.pop().expect("room again");
+        assert_eq!(last.lost, 3);
+        assert!(last.recording_ns > 0 && last.marks().len() == 1);
+    }
+
+    #[test]
+    fn path_runs_from_its_mark_to_the_last_one() {
+        let (into, mut ring) = rtrb::RingBuffer::new(2);
+        let mut probe = Probe::new(into, Arc::default());
+        for _ in 0..4 {
+            probe.mark();
+        }
+        probe.output_since_mark(1);
+        probe.finish(0, 0, 0, true);
+        let tick = ring.pop().expect("one tick");
+        assert_eq!(tick.path_ns, Some(tick.marks()[3] - tick.marks()[1]));
+        assert_eq!(tick.output_ns, Some(tick.marks()[3]));
+        assert_eq!(tick.done_ns(), tick.marks()[4]);
+    }
+
+    #[test]
+    fn pose_times_are_known_until_they_are_overwritten() {
+        let times = PoseTimes::new();
+        times.note(3, 77);
+        assert_eq!((times.of(3), times.of(4)), (Some(77), None));
+        times.note(3 + PoseTimes::KEPT as u64, 78);
+        assert_eq!(times.of(3), None);
+    }
+}

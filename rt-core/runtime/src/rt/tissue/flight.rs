@@ -1,0 +1,108 @@
+//! The tissue loop's side of the flight recorder: all that one tick leaves to the next, out and in.
+
+use super::TissueLoop;
+use crate::rt::tissue_tape::{TapedOrder, TissueEntry, TissueMemory, TissueTape};
+use stylet_sim::tissue::{Deformed, Held};
+
+impl TissueLoop {
+    /// Names every field, so that a new one is not forgotten. Allocates nothing: `to` was made for this body.
+    fn copy_memory(&self, to: &mut TissueMemory) {
+        let Self {
+            session_id: _,
+            ports: _,
+            world,
+            seeds,
+            contact,
+            contacts,
+            layers,
+            clear,
+            held,
+            pose,
+            report: _,
+            response,
+            probe: _,
+            period_s: _,
+        } = self;
+        to.seeds.clear();
+        to.seeds.extend_from_slice(seeds);
+        to.contact = *contact;
+        to.contacts = *contacts;
+        to.layers = *layers;
+        to.clear = *clear;
+        to.held = *held;
+        to.pose = *pose;
+        to.response = *response;
+        to.limits.clone_from(&world.limits);
+        world.tissue.save(&mut to.body);
+    }
+
+    /// Goes on from where another loop was.
+    pub fn remember(&mut self, memory: &TissueMemory) {
+        self.seeds.clear();
+        self.seeds.extend_from_slice(&memory.seeds);
+        self.contact = memory.contact;
+        self.contacts = memory.contacts;
+        self.layers = memory.layers;
+        self.clear = memory.clear;
+        self.held = memory.held;
+        self.pose = memory.pose;
+        self.response = memory.response;
+        self.world.set_limits(memory.limits.clone());
+        self.world.tissue.load(&memory.body);
+    }
+
+    pub fn body(&self) -> Deformed<'_> {
+        self.world.tissue.deformed()
+    }
+
+    /// What the last tick left to be compared: the held element and the residual.
+    pub fn last_step(&self) -> (Option<Held>, f64) {
+        (self.held, self.report.map_or(0.0, |r| r.residual))
+    }
+
+    pub(super) fn checkpoint(&mut self) {
+        let generation = self.world.generation;
+        self.ports.flight.begin_tick(generation);
+        self.with_tape(|this, tape| {
+            if let Some(memory) = tape.checkpoint_due() {
+                this.copy_memory(memory);
+            }
+        });
+    }
+
+    pub(super) fn tape_order(&mut self, order: TapedOrder) {
+        if let Some(tape) = self.ports.flight.tape() {
+            tape.order(order);
+        }
+    }
+
+    pub(super) fn tape(&mut self, woke_ns: u64, residual: f64) {
+        let (pose, held, response) = (self.pose, self.held, self.response);
+        if let Some(tape) = self.ports.flight.tape() {
+            tape.ticks.push(TissueEntry {
+                woke_ns,
+                pose,
+                held,
+                residual,
+                response,
+            });
+        }
+    }
+
+    pub(super) fn hand_over_tape(&mut self) {
+        self.with_tape(|this, tape| {
+            if let Some(memory) = tape.end() {
+                this.copy_memory(memory);
+            }
+        });
+        self.ports.flight.hand_over();
+    }
+
+    /// The tape is taken out meanwhile, so that it can be written to from this loop's own memory.
+    fn with_tape(&mut self, write: impl FnOnce(&Self, &mut TissueTape)) {
+        if let Some(mut tape) = self.ports.flight.take() {
+            write(self, &mut tape);
+            self.ports.flight.put(tape);
+        }
+    }
+}

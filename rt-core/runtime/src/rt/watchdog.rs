@@ -1,0 +1,120 @@
+//! Watches the device and both loops: says which tick must begin to ramp the force out, and why.
+//!
+//! [`RAMP_OUT_TICKS`](stylet_sim::force::gate::RAMP_OUT_TICKS) ticks after the one that raises a fault the force is zero, on a straight ramp. The first
+//! fault is kept until the operator re-arms. A haptic loop that stops altogether cannot watch itself: that is seen
+//! by `bridge/supervisor.rs`.
+
+use crate::rt::taped::fault_code;
+use serde::{Deserialize, Serialize};
+use stylet_shm_schema::Fault;
+use stylet_sim::force::ForceFault;
+
+/// Tissue older than this turns the force off.
+pub const STALE_TISSUE_NS: u64 = 100_000_000;
+/// So many ticks in a row with a missed deadline turn the force off.
+pub const OVERRUN_STREAK: u32 = 20;
+/// So many repeated samples in a row turn the force off.
+pub const SILENT_SAMPLES: u32 = 20;
+
+/// What a tick knows of the other thread and of its own punctuality.
+#[derive(Clone, Copy, Debug)]
+pub struct Watched {
+    pub woke_ns: u64,
+    /// Deadlines skipped just before this tick.
+    pub missed: u32,
+    /// When the newest tissue response was made.
+    pub tissue_ns: u64,
+    pub tissue_unsolved: bool,
+    /// The force is on: only then do late tissue and late ticks matter.
+    pub engaged: bool,
+}
+
+/// One for a haptic loop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Watchdog {
+    #[serde(with = "fault_code")]
+    fault: Fault,
+    silent: u32,
+    streak: u32,
+}
+
+impl Default for Watchdog {
+    fn default() -> Self {
+        Self {
+            fault: Fault::None,
+            silent: 0,
+            streak: 0,
+        }
+    }
+}
+
+impl Watchdog {
+    /// The first fault since the last re-arming.
+    pub fn fault(&self) -> Fault {
+        self.fault
+    }
+
+    /// Keeps `fault` if it is the first; true then.
+    pub fn raise(&mut self, fault: Fault) -> bool {
+        let first = self.fault == Fault::None;
+        if first {
+            self.fault = fault;
+        }
+        first
+    }
+
+    /// Forgets the fault and what led to it; true if there was one.
+    pub fn rearm(&mut self) -> bool {
+        let had_fault = self.fault != Fault::None;
+        if had_fault {
+            *self = Self::default();
+        }
+        had_fault
+    }
+
+    /// One sample of the device; `repeated` when it is the last one again.
+    pub fn sample(&mut self, repeated: bool) -> Option<Fault> {
+        self.silent = if repeated { self.silent.saturating_add(1) } else { 0 };
+        (self.silent >= SILENT_SAMPLES).then_some(Fault::DeviceSilent)
+    }
+
+    /// Both loops, once a tick.
+    pub fn tick(&mut self, seen: &Watched) -> Option<Fault> {
+        self.streak = if seen.missed > 0 {
+            self.streak.saturating_add(1)
+        } else {
+            0
+        };
+        if !seen.engaged {
+            None
+        } else if seen.woke_ns.saturating_sub(seen.tissue_ns) > STALE_TISSUE_NS {
+            Some(Fault::TissueStale)
+        } else if seen.tissue_unsolved {
+            Some(Fault::TissueUnsolved)
+        } else if self.streak >= OVERRUN_STREAK {
+            Some(Fault::OverrunStreak)
+        } else {
+            None
+        }
+    }
+}
+
+/// The gate's word for a fault.
+pub fn at_gate(fault: Fault) -> ForceFault {
+    match fault {
+        Fault::None => ForceFault::Stopped,
+        Fault::DeviceSilent => ForceFault::StaleDevice,
+        Fault::DeviceError
+        | Fault::NonFiniteInput
+        | Fault::DeviceLost
+        | Fault::DeviceNotCalibrated
+        | Fault::DeviceWarm
+        | Fault::DeviceStopped => ForceFault::DeviceFault,
+        Fault::NonFiniteForce => ForceFault::NonFiniteForce,
+        Fault::TissueStale | Fault::TissueUnsolved => ForceFault::StaleTissue,
+        Fault::OverrunStreak | Fault::LoopStopped => ForceFault::Overrun,
+    }
+}
+
+#[cfg(test)]
+mod tests;

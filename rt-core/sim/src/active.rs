@@ -1,0 +1,176 @@
+//! Parameters as the loops own them: the raw set of shared memory, validated as a whole.
+
+use crate::force::ForceParameters;
+use crate::limits::{Limits, TissueParameters};
+use crate::needle::{Layer, Layers, NeedleParameters};
+use stylet_hw::DeviceInfo;
+use stylet_shm_schema::{ParameterId, ParameterSet};
+
+/// Everything that a change of parameters brings to both threads.
+#[derive(Clone, Debug)]
+pub struct Active {
+    pub needle: NeedleParameters,
+    pub force: ForceParameters,
+    pub limits: Limits,
+}
+
+/// Validates `set` for `device`; lists every problem.
+pub fn activate(set: &ParameterSet, device: &DeviceInfo) -> Result<Active, Vec<String>> {
+    let mut problems = set.problems();
+    if !problems.is_empty() {
+        return Err(problems);
+    }
+    let needle = needle(set);
+    let force = force(set, device);
+    let limits = tissue(set).validate();
+    problems.extend(needle.validate().err().into_iter().flatten().map(|p| p.to_string()));
+    problems.extend(
+        force
+            .validate_for(device)
+            .err()
+            .into_iter()
+            .flatten()
+            .map(|p| p.to_string()),
+    );
+    match limits {
+        Ok(limits) if problems.is_empty() => Ok(Active { needle, force, limits }),
+        Ok(_) => Err(problems),
+        Err(more) => {
+            problems.extend(more.into_iter().map(|p| p.to_string()));
+            Err(problems)
+        }
+    }
+}
+
+fn tissue(set: &ParameterSet) -> TissueParameters {
+    use ParameterId as P;
+    TissueParameters {
+        min_stretch: set.get(P::MinStretch),
+        max_stretch: set.get(P::MaxStretch),
+        shear_deg: set.get(P::ShearHorizontal).to_degrees(),
+        shear_vert_deg: set.get(P::ShearVertical).to_degrees(),
+        recovery_time_s: set.get(P::RecoveryTime),
+        residual_tolerance: set.get(P::ResidualTolerance),
+        ..TissueParameters::default()
+    }
+}
+
+fn needle(set: &ParameterSet) -> NeedleParameters {
+    use ParameterId as P;
+    NeedleParameters {
+        puncture_depth_m: set.get(P::PunctureDepth),
+        speed_coefficient_m2_per_s2: set.get(P::SpeedCoefficient),
+        depth_coefficient_m2: set.get(P::DepthCoefficient),
+        static_speed_m_per_s: set.get(P::StaticSpeed),
+        retraction_ratio: set.get(P::RetractionRatio),
+        hysteresis_m: set.get(P::PunctureHysteresis),
+        hold_speed_m_per_s: set.get(P::HoldSpeed),
+    }
+}
+
+fn force(set: &ParameterSet, device: &DeviceInfo) -> ForceParameters {
+    use ParameterId as P;
+    let mut force = ForceParameters {
+        layers: layers(set),
+        membrane_gain: set.get(P::MembraneGain),
+        cutting_gain: set.get(P::CuttingGain),
+        shaft_gain: set.get(P::ShaftGain),
+        coupling: set.get(P::Coupling),
+        tissue_stiffness_n_per_m: set.get(P::TissueStiffness),
+        guide_stiffness_n_per_m: set.get(P::GuideStiffness),
+        guide_gain: set.get(P::GuideGain),
+        damping_n_s_per_m: set.get(P::Damping),
+        guide_torque_nm_per_rad: set.get(P::GuideTorque),
+        stick_stiffness_n_per_m: set.get(P::StickStiffness),
+        stick_damping_n_s_per_m: set.get(P::StickDamping),
+        compensated_mass_kg: set.get(P::HandleMass),
+        ..ForceParameters::default()
+    };
+    force.gate.force_scale = set.get(P::ForceScale);
+    force.gate.slew_n_per_s = set.get(P::SlewLimit);
+    force.gate.max_force_n = device.peak_force_n;
+    force
+}
+
+/// In the order of `LayerKind`.
+fn layers(set: &ParameterSet) -> Layers {
+    use ParameterId as P;
+    let layer = |depth: Option<P>, peak: Option<P>, cutting, friction| Layer {
+        puncture_depth_m: depth.map_or(0.0, |id| set.get(id)),
+        puncture_force_n: peak.map_or(0.0, |id| set.get(id)),
+        cutting_force_n: set.get(cutting),
+        shaft_friction_n_per_m: set.get(friction),
+    };
+    Layers([
+        layer(
+            Some(P::PunctureDepth),
+            Some(P::MembranePeak),
+            P::CuttingForce,
+            P::ShaftFriction,
+        ),
+        layer(
+            Some(P::SkinPunctureDepth),
+            Some(P::SkinPeak),
+            P::SkinCutting,
+            P::SkinFriction,
+        ),
+        layer(None, None, P::SurroundingsCutting, P::SurroundingsFriction),
+        layer(
+            Some(P::WallPunctureDepth),
+            Some(P::WallPeak),
+            P::WallCutting,
+            P::WallFriction,
+        ),
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn device() -> DeviceInfo {
+        DeviceInfo::phantom_premium_1_5()
+    }
+
+    #[test]
+    fn defaults_of_the_table_are_the_defaults_of_the_models() {
+        let set = ParameterSet::default();
+        let active = activate(&set, &device()).expect("defaults are valid");
+        let close = |a: f64, b: f64| assert!((a - b).abs() <= 1e-9 * b.abs().max(1e-9), "{a} {b}");
+        let n = NeedleParameters::default();
+        close(active.needle.puncture_depth_m, n.puncture_depth_m);
+        close(active.needle.speed_coefficient_m2_per_s2, n.speed_coefficient_m2_per_s2);
+        close(active.needle.depth_coefficient_m2, n.depth_coefficient_m2);
+        close(active.needle.static_speed_m_per_s, n.static_speed_m_per_s);
+        close(active.needle.hysteresis_m, n.hysteresis_m);
+        close(active.needle.hold_speed_m_per_s, n.hold_speed_m_per_s);
+        let f = ForceParameters::default();
+        for (ours, default) in active.force.layers.0.iter().zip(f.layers.0) {
+            close(ours.puncture_depth_m, default.puncture_depth_m);
+            close(ours.puncture_force_n, default.puncture_force_n);
+            close(ours.cutting_force_n, default.cutting_force_n);
+            close(ours.shaft_friction_n_per_m, default.shaft_friction_n_per_m);
+        }
+        close(active.force.gate.force_scale, f.gate.force_scale);
+        close(active.force.stick_stiffness_n_per_m, f.stick_stiffness_n_per_m);
+        close(active.force.stick_damping_n_s_per_m, f.stick_damping_n_s_per_m);
+        close(active.force.guide_torque_nm_per_rad, f.guide_torque_nm_per_rad);
+        close(active.force.coupling, f.coupling);
+        close(active.force.tissue_stiffness_n_per_m, f.tissue_stiffness_n_per_m);
+        close(active.force.damping_n_s_per_m, f.damping_n_s_per_m);
+        close(active.force.gate.slew_n_per_s, f.gate.slew_n_per_s);
+        let t = TissueParameters::default();
+        close(tissue(&set).shear_deg, t.shear_deg);
+        close(tissue(&set).recovery_time_s, t.recovery_time_s);
+    }
+
+    #[test]
+    fn values_that_forbid_each_other_are_all_listed() {
+        let mut set = ParameterSet::default();
+        set.set(ParameterId::ShearHorizontal, 50_f64.to_radians());
+        set.set(ParameterId::ShearVertical, 45_f64.to_radians());
+        set.set(ParameterId::MembranePeak, 20.0);
+        let problems = activate(&set, &device()).expect_err("eq. 1 is broken, the membrane too stiff");
+        assert_eq!(problems.len(), 2, "{problems:?}");
+    }
+}

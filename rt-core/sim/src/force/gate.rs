@@ -1,0 +1,370 @@
+//! The last thing before the device: nothing else may write a force.
+//!
+//! Order: finite → force scale and ramp → passivity → slew → magnitude → continuous (thermal) → the device's own
+//! limit. The slew limit comes before the magnitudes: each of those is a pull towards zero onto a ball that the
+//! last force is in, which makes no step longer. So all limits hold at once. The device's own limit comes
+//! last, whatever the settings are. A fault ramps to zero from the last force and latches until
+//! [`GateState::engage`].
+
+use core::fmt;
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use stylet_hw::{DeviceInfo, Wrench};
+
+use super::passivity::{self, Motion, PassivityParameters, PassivityState};
+use super::thermal::Warmth;
+use crate::settings::{Problem, Problems};
+
+/// Ticks of the ramp to zero.
+pub const RAMP_OUT_TICKS: u32 = 20;
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GateParameters {
+    /// Force of the device for each newton of the model: real needles reach 9 to 16 N. Shown to the operator.
+    pub force_scale: f64,
+    pub max_force_n: f64,
+    pub slew_n_per_s: f64,
+    pub torque_slew_nm_per_s: f64,
+    /// Engaging waits until the model asks for no more than this, so that nothing kicks.
+    pub engage_below_n: f64,
+    pub ramp_in_ticks: u32,
+    /// The ramp out keeps to its ticks even where that is steeper than the slew limit.
+    pub ramp_out_ticks: u32,
+    /// Time constant of the motors' warming, for the limit on continuous force.
+    pub thermal_time_s: f64,
+    pub passivity: PassivityParameters,
+}
+
+impl Default for GateParameters {
+    fn default() -> Self {
+        Self {
+            force_scale: 0.9,
+            max_force_n: 8.5,
+            slew_n_per_s: 500.0,
+            torque_slew_nm_per_s: 10.0,
+            engage_below_n: 1.0,
+            ramp_in_ticks: 200,
+            ramp_out_ticks: RAMP_OUT_TICKS,
+            thermal_time_s: 600.0,
+            passivity: PassivityParameters::default(),
+        }
+    }
+}
+
+impl GateParameters {
+    pub fn validate(&self) -> Result<(), Vec<Problem>> {
+        let mut problems = Problems::default();
+        problems.range("gate.force_scale", self.force_scale, 0.0, 2.0);
+        problems.range("gate.max_force_n", self.max_force_n, 0.0, 40.0);
+        problems.range("gate.slew_n_per_s", self.slew_n_per_s, 1.0, 1e5);
+        problems.range("gate.torque_slew_nm_per_s", self.torque_slew_nm_per_s, 1e-3, 1e3);
+        problems.range("gate.engage_below_n", self.engage_below_n, 0.0, 10.0);
+        problems.range("gate.ramp_in_ticks", f64::from(self.ramp_in_ticks), 1.0, 1e4);
+        problems.range("gate.ramp_out_ticks", f64::from(self.ramp_out_ticks), 1.0, 100.0);
+        problems.range("gate.thermal_time_s", self.thermal_time_s, 1.0, 1e5);
+        problems.extend(self.passivity.validate());
+        problems.finish()
+    }
+}
+
+/// Why the force goes to zero. The numbers are stable: they appear in records.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(u32)]
+pub enum ForceFault {
+    NonFiniteForce = 1,
+    DeviceFault = 2,
+    StaleDevice = 3,
+    StaleTissue = 4,
+    Overrun = 5,
+    Stopped = 6,
+}
+
+impl ForceFault {
+    pub const fn code(self) -> u32 {
+        self as u32
+    }
+}
+
+impl fmt::Display for ForceFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NonFiniteForce => "the force law gave a force that is not a number",
+            Self::DeviceFault => "the device reported a fault",
+            Self::StaleDevice => "the device repeats an old sample",
+            Self::StaleTissue => "the tissue has not answered in time",
+            Self::Overrun => "the force loop missed its deadlines",
+            Self::Stopped => "the operator stopped the force",
+        })
+    }
+}
+
+/// How often each limit had a say, in the order of the gate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct GateCounts {
+    pub non_finite: u64,
+    pub passivity: u64,
+    pub slew_limited: u64,
+    pub magnitude_limited: u64,
+    pub thermal_limited: u64,
+    pub device_limited: u64,
+    pub torque_limited: u64,
+    pub faults: u64,
+}
+
+impl GateCounts {
+    /// In the order of the fields.
+    pub fn all(&self) -> [u64; 8] {
+        let c = self;
+        [
+            c.non_finite,
+            c.passivity,
+            c.slew_limited,
+            c.magnitude_limited,
+            c.thermal_limited,
+            c.device_limited,
+            c.torque_limited,
+            c.faults,
+        ]
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+enum Mode {
+    /// Zero force, or on the way there from `from`.
+    RampOut {
+        from: Wrench,
+        ticks: u32,
+    },
+    /// Asked to engage; the model still asks for too much.
+    Waiting,
+    Engaged {
+        ticks: u32,
+    },
+}
+
+/// One for a device. Begins disengaged, at zero force.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GateState {
+    mode: Mode,
+    fault: Option<ForceFault>,
+    output: Wrench,
+    warmth: Warmth,
+    passivity: PassivityState,
+    counts: GateCounts,
+}
+
+/// What the model asks for, and the motion that it was asked over.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GateInput {
+    pub wanted: Wrench,
+    /// Energy in the springs of the model.
+    pub stored_j: f64,
+    pub motion: Motion,
+}
+
+/// What goes to the device.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GateOutput {
+    pub wrench: Wrench,
+    pub engaged: bool,
+    pub fault: Option<ForceFault>,
+}
+
+impl Default for GateState {
+    fn default() -> Self {
+        Self {
+            mode: Mode::RampOut {
+                from: Wrench::zero(),
+                ticks: 0,
+            },
+            fault: None,
+            output: Wrench::zero(),
+            warmth: Warmth::default(),
+            passivity: PassivityState::default(),
+            counts: GateCounts::default(),
+        }
+    }
+}
+
+impl GateState {
+    /// Ramps the force in as soon as it is small, and forgets the last fault.
+    pub fn engage(&mut self) {
+        if !self.engaged() {
+            self.mode = Mode::Waiting;
+        }
+        self.fault = None;
+    }
+
+    /// Ramps the force out.
+    pub fn release(&mut self) {
+        match self.mode {
+            Mode::RampOut { .. } => {}
+            Mode::Waiting | Mode::Engaged { .. } => {
+                self.mode = Mode::RampOut {
+                    from: self.output,
+                    ticks: 0,
+                }
+            }
+        }
+    }
+
+    /// Ramps the force out because of `fault`. The first fault is kept.
+    pub fn trip(&mut self, fault: ForceFault) {
+        if self.fault.is_none() {
+            self.fault = Some(fault);
+            self.counts.faults = self.counts.faults.wrapping_add(1);
+        }
+        self.release();
+    }
+
+    /// Engaged, or to be as soon as the force is small.
+    pub fn engaged(&self) -> bool {
+        !matches!(self.mode, Mode::RampOut { .. })
+    }
+
+    /// Asked to engage, and the model still asks for too much.
+    pub fn waiting(&self) -> bool {
+        matches!(self.mode, Mode::Waiting)
+    }
+
+    pub fn fault(&self) -> Option<ForceFault> {
+        self.fault
+    }
+
+    /// What the last tick gave the device.
+    pub fn output(&self) -> &Wrench {
+        &self.output
+    }
+
+    pub fn counts(&self) -> &GateCounts {
+        &self.counts
+    }
+
+    pub fn passivity(&self) -> &PassivityState {
+        &self.passivity
+    }
+
+    /// Root mean square of the force over the thermal time, to show beside the continuous limit.
+    pub fn warmth_n(&self) -> f64 {
+        self.warmth.rms_n()
+    }
+}
+
+/// One tick.
+pub fn step(parameters: &GateParameters, device: &DeviceInfo, state: &mut GateState, input: &GateInput) -> GateOutput {
+    if !input.wanted.is_finite() {
+        state.counts.non_finite = state.counts.non_finite.wrapping_add(1);
+        state.trip(ForceFault::NonFiniteForce);
+    }
+    let small = input.wanted.force_n.norm() * parameters.force_scale <= parameters.engage_below_n;
+    if state.waiting() && small {
+        state.mode = Mode::Engaged { ticks: 0 };
+        state.passivity = PassivityState::default();
+    }
+    let ramp_out = parameters.ramp_out_ticks.max(1);
+    let next = match &mut state.mode {
+        Mode::Engaged { ticks } => {
+            *ticks = ticks.saturating_add(1).min(parameters.ramp_in_ticks);
+            let ramp = f64::from(*ticks) / f64::from(parameters.ramp_in_ticks.max(1));
+            let share = parameters.force_scale * ramp.min(1.0);
+            within_limits(parameters, device, state, input, share)
+        }
+        Mode::Waiting => Wrench::zero(),
+        Mode::RampOut { from, ticks } => {
+            *ticks = ticks.saturating_add(1).min(ramp_out);
+            scaled(from, 1.0 - f64::from(*ticks) / f64::from(ramp_out))
+        }
+    };
+    let (force_n, cut) = limited(next.force_n, device.peak_force_n);
+    let (torque_nm, turned) = limited(next.torque_nm, device.peak_torque_nm);
+    count(&mut state.counts.device_limited, cut || turned);
+    let next = Wrench { force_n, torque_nm };
+    // Settings that are not numbers end here.
+    state.output = if next.is_finite() {
+        next
+    } else {
+        state.trip(ForceFault::NonFiniteForce);
+        Wrench::zero()
+    };
+    state.passivity.book(&state.output.force_n);
+    let dt_s = input.motion.dt_s;
+    state
+        .warmth
+        .add(state.output.force_n.norm(), dt_s, parameters.thermal_time_s);
+    GateOutput {
+        wrench: state.output,
+        engaged: state.engaged() && !state.waiting(),
+        fault: state.fault,
+    }
+}
+
+/// Passivity → slew → magnitude → continuous; the torque has slew and magnitude.
+fn within_limits(
+    parameters: &GateParameters,
+    device: &DeviceInfo,
+    state: &mut GateState,
+    input: &GateInput,
+    share: f64,
+) -> Wrench {
+    let (dt_s, counts) = (input.motion.dt_s, &mut state.counts);
+    let wanted_n = input.wanted.force_n * share;
+    let stored_j = input.stored_j * share;
+    let passive_n = passivity::step(
+        &parameters.passivity,
+        &mut state.passivity,
+        &input.motion,
+        stored_j,
+        &wanted_n,
+    );
+    count(&mut counts.passivity, state.passivity.in_debt());
+    let (slewed_n, cut) = within_slew(&state.output.force_n, &passive_n, parameters.slew_n_per_s * dt_s);
+    count(&mut counts.slew_limited, cut);
+    let (force_n, cut) = limited(slewed_n, parameters.max_force_n);
+    count(&mut counts.magnitude_limited, cut);
+    let warm_limit_n = state.warmth.limit_n(device.peak_force_n, device.continuous_force_n);
+    // Cold motors leave this to the device's own limit.
+    let (force_n, cut) = warm_limit_n.map_or((force_n, false), |limit_n| limited(force_n, limit_n));
+    count(&mut counts.thermal_limited, cut);
+    let wanted_nm = input.wanted.torque_nm * share;
+    let longest_nm = parameters.torque_slew_nm_per_s * dt_s;
+    let (slewed_nm, cut) = within_slew(&state.output.torque_nm, &wanted_nm, longest_nm);
+    let (torque_nm, too_large) = limited(slewed_nm, device.peak_torque_nm);
+    count(&mut counts.torque_limited, cut || too_large);
+    Wrench { force_n, torque_nm }
+}
+
+fn count(counter: &mut u64, acted: bool) {
+    *counter = counter.wrapping_add(u64::from(acted));
+}
+
+fn scaled(wrench: &Wrench, share: f64) -> Wrench {
+    Wrench {
+        force_n: wrench.force_n * share,
+        torque_nm: wrench.torque_nm * share,
+    }
+}
+
+fn within_slew(from: &Vector3<f64>, to: &Vector3<f64>, longest: f64) -> (Vector3<f64>, bool) {
+    let (change, cut) = limited(to - from, longest.max(0.0));
+    (from + change, cut)
+}
+
+/// The same direction, no longer than `limit`; and whether that cut anything.
+fn limited(v: Vector3<f64>, limit: f64) -> (Vector3<f64>, bool) {
+    // Scaled first: the square of a huge length is not finite.
+    let largest = v.amax();
+    if largest <= 0.0 {
+        return (v, false);
+    }
+    let scaled = v / largest;
+    let size = scaled.norm();
+    if size * largest <= limit {
+        (v, false)
+    } else {
+        (scaled * (limit / size), true)
+    }
+}
+
+#[cfg(test)]
+mod tests;

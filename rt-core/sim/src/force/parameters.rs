@@ -1,0 +1,148 @@
+//! The settings of the force law, and which of them can be used.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use stylet_hw::DeviceInfo;
+
+use super::gate::GateParameters;
+use crate::needle::Layers;
+use crate::needle::layers::STIFFNESS_KEYS;
+use crate::settings::{Problem, Problems};
+
+/// Beyond it a stuck shaft sings at 1 kHz in the lightest hand, without any delay (`tests/force_envelope.rs`).
+pub const MAX_STICK_STIFFNESS_N_PER_M: f64 = 8000.0;
+
+/// Coefficients of eq. 8-10, and the gate behind them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ForceParameters {
+    /// What the needle goes through: membranes, cutting and friction of each.
+    pub layers: Layers,
+    /// Scales `F_R` of every layer; 0 turns the term off. The next two as well.
+    pub membrane_gain: f64,
+    pub cutting_gain: f64,
+    pub shaft_gain: f64,
+    /// Share of membrane, cutting and friction that the tissue's own answer takes the place of: 0 for eq. 8-10
+    /// alone, 1 for coupled mode.
+    pub coupling: f64,
+    /// How stiffly tissue without forces of its own (ChainMail) answers the displacement of the held element.
+    pub tissue_stiffness_n_per_m: f64,
+    /// `K` of eq. 9, across the path.
+    pub guide_stiffness_n_per_m: f64,
+    /// `K_C` of eq. 9, without a unit.
+    pub guide_gain: f64,
+    /// `K_V` of eq. 9; not the coefficient of eq. 6, which has the same symbol.
+    pub damping_n_s_per_m: f64,
+    /// Turns the needle's axis to the path, with `K_C`.
+    pub guide_torque_nm_per_rad: f64,
+    /// How stiffly the tissue holds a needle that sticks to it.
+    pub stick_stiffness_n_per_m: f64,
+    /// Beside that spring: takes what sampling leaks into it.
+    pub stick_damping_n_s_per_m: f64,
+    /// Mass whose weight `F_G` (eq. 8) takes off the operator's hand.
+    pub compensated_mass_kg: f64,
+    pub gravity_in_world_m_per_s2: Vector3<f64>,
+    pub gate: GateParameters,
+}
+
+impl Default for ForceParameters {
+    fn default() -> Self {
+        Self {
+            layers: Layers::default(),
+            membrane_gain: 1.0,
+            cutting_gain: 1.0,
+            shaft_gain: 1.0,
+            coupling: 0.0,
+            tissue_stiffness_n_per_m: 700.0,
+            guide_stiffness_n_per_m: 400.0,
+            guide_gain: 1.0,
+            damping_n_s_per_m: 5.0,
+            guide_torque_nm_per_rad: 0.5,
+            stick_stiffness_n_per_m: 6000.0,
+            stick_damping_n_s_per_m: 10.0,
+            compensated_mass_kg: 0.0,
+            gravity_in_world_m_per_s2: Vector3::new(0.0, 0.0, -9.81),
+            gate: GateParameters::default(),
+        }
+    }
+}
+
+impl ForceParameters {
+    /// Every setting that cannot be used on any device, or `Ok`.
+    pub fn validate(&self) -> Result<(), Vec<Problem>> {
+        let mut problems = Problems::default();
+        problems.extend(self.layers.validate());
+        problems.range("force.membrane_gain", self.membrane_gain, 0.0, 2.0);
+        problems.range("force.cutting_gain", self.cutting_gain, 0.0, 2.0);
+        problems.range("force.shaft_gain", self.shaft_gain, 0.0, 2.0);
+        problems.range("force.coupling", self.coupling, 0.0, 1.0);
+        problems.range(
+            "force.tissue_stiffness_n_per_m",
+            self.tissue_stiffness_n_per_m,
+            0.0,
+            1e4,
+        );
+        problems.range("force.guide_stiffness_n_per_m", self.guide_stiffness_n_per_m, 0.0, 1e4);
+        problems.range("force.guide_gain", self.guide_gain, 0.0, 10.0);
+        problems.range("force.damping_n_s_per_m", self.damping_n_s_per_m, 0.0, 50.0);
+        problems.range("force.guide_torque_nm_per_rad", self.guide_torque_nm_per_rad, 0.0, 5.0);
+        problems.range(
+            "force.stick_stiffness_n_per_m",
+            self.stick_stiffness_n_per_m,
+            1.0,
+            MAX_STICK_STIFFNESS_N_PER_M,
+        );
+        problems.range("force.stick_damping_n_s_per_m", self.stick_damping_n_s_per_m, 0.0, 50.0);
+        problems.range("force.compensated_mass_kg", self.compensated_mass_kg, 0.0, 1.0);
+        for (key, value) in [
+            ("force.gravity_in_world_m_per_s2.x", self.gravity_in_world_m_per_s2.x),
+            ("force.gravity_in_world_m_per_s2.y", self.gravity_in_world_m_per_s2.y),
+            ("force.gravity_in_world_m_per_s2.z", self.gravity_in_world_m_per_s2.z),
+        ] {
+            problems.range(key, value, -20.0, 20.0);
+        }
+        problems.extend(self.gate.validate());
+        problems.finish()
+    }
+
+    /// As [`validate`](Self::validate), and that `device` can render it: no spring stiffer than it can hold. The
+    /// spring of stuck friction is not among them: its force is bounded, so what it can be is found by trial
+    /// (`docs/stability.md`), and the passivity controller softens it.
+    pub fn validate_for(&self, device: &DeviceInfo) -> Result<(), Vec<Problem>> {
+        let mut problems = Problems::default();
+        problems.extend(self.validate());
+        let scale = self.gate.force_scale;
+        let limit = device.max_stiffness_n_per_m;
+        let membranes = self.layers.0.iter().zip(STIFFNESS_KEYS).map(|(layer, key)| {
+            let stiffness = layer.membrane_stiffness_n_per_m() * self.membrane_gain;
+            (key, stiffness)
+        });
+        let guide = self.guide_stiffness_n_per_m * self.guide_gain;
+        let others = [
+            ("force.guide_stiffness_n_per_m * force.guide_gain", guide),
+            (
+                "force.tissue_stiffness_n_per_m * force.coupling",
+                self.tissue_stiffness_n_per_m * self.coupling,
+            ),
+        ];
+        for (key, stiffness) in membranes.chain(others) {
+            // Not a number fails as well.
+            if (stiffness * scale).is_nan() || stiffness * scale > limit {
+                problems.add(
+                    key,
+                    stiffness,
+                    format!(
+                        "at most {} N/m at force scale {scale} on {}",
+                        limit / scale,
+                        device.name
+                    ),
+                );
+            }
+        }
+        problems.finish()
+    }
+
+    /// The largest force scale with which `device` gives every membrane its full force.
+    pub fn fitting_scale(&self, device: &DeviceInfo) -> f64 {
+        device.peak_force_n / (self.layers.largest_puncture_force_n() * self.membrane_gain).max(1e-9)
+    }
+}

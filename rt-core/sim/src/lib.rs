@@ -1,0 +1,11 @@
+//! The simulation: a body of labelled cells, tissue that gives way, a needle in it, and the force on the hand.
+//!
+//! Pure: the same input gives the same bytes. No thread, no clock, no port; the loops that call it are in `stylet-runtime`.
+
+pub mod active;
+pub mod force;
+pub mod limits;
+pub mod needle;
+pub mod scene;
+pub mod settings;
+pub mod tissue;

@@ -1,0 +1,175 @@
+//! The layers that a needle goes through: each with its own membrane, cutting force and shaft friction.
+
+use crate::scene::{Role, Structure};
+use crate::settings::{Problem, Problems};
+use serde::{Deserialize, Serialize};
+
+/// What the tip is in. The numbers are stable: they index [`Layers`] and appear between the loops.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[repr(u32)]
+pub enum LayerKind {
+    /// Prostate, in its capsule.
+    #[default]
+    Gland = 0,
+    /// Skin and perineum.
+    Perineum = 1,
+    /// Fat and whatever else has no membrane of its own.
+    Surroundings = 2,
+    /// Wall of a hollow organ: urethra, bladder, rectum.
+    Wall = 3,
+}
+
+impl LayerKind {
+    /// What a structure of a scene is to the needle: by its role, and skin by its name.
+    pub fn of_structure(structure: &Structure) -> LayerKind {
+        let is_skin = ["skin", "perineum"].iter().any(|word| structure.name.contains(word));
+        match structure.role {
+            Role::Target => Self::Gland,
+            Role::Spare => Self::Wall,
+            Role::Tissue if is_skin => Self::Perineum,
+            Role::Tissue => Self::Surroundings,
+        }
+    }
+}
+
+pub const LAYER_COUNT: usize = 4;
+
+/// One kind of tissue, as the needle feels it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Layer {
+    /// `u_cri` of its membrane; 0 for tissue without one.
+    pub puncture_depth_m: f64,
+    /// Height of `F_R` (eq. 10): what the membrane resists with when it gives way.
+    pub puncture_force_n: f64,
+    /// What the tip resists with while it cuts.
+    pub cutting_force_n: f64,
+    /// `K_f` of eq. 9: friction for each metre of shaft in this layer.
+    pub shaft_friction_n_per_m: f64,
+}
+
+impl Layer {
+    /// In order of [`LayerKind`]; sources in `docs/physics.md`.
+    pub const DEFAULTS: [Layer; LAYER_COUNT] = [
+        Layer {
+            puncture_depth_m: 8e-3,
+            puncture_force_n: 5.6,
+            cutting_force_n: 1.5,
+            shaft_friction_n_per_m: 80.0,
+        },
+        Layer {
+            puncture_depth_m: 12e-3,
+            puncture_force_n: 9.0,
+            cutting_force_n: 1.0,
+            shaft_friction_n_per_m: 40.0,
+        },
+        Layer {
+            puncture_depth_m: 0.0,
+            puncture_force_n: 0.0,
+            cutting_force_n: 0.3,
+            shaft_friction_n_per_m: 15.0,
+        },
+        Layer {
+            puncture_depth_m: 4e-3,
+            puncture_force_n: 2.0,
+            cutting_force_n: 0.8,
+            shaft_friction_n_per_m: 40.0,
+        },
+    ];
+
+    pub fn has_membrane(&self) -> bool {
+        self.puncture_depth_m > 0.0
+    }
+
+    /// Of the membrane before it gives way; 0 without one.
+    pub fn membrane_stiffness_n_per_m(&self) -> f64 {
+        if self.has_membrane() {
+            self.puncture_force_n / self.puncture_depth_m
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Every kind, in order of [`LayerKind`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Layers(pub [Layer; LAYER_COUNT]);
+
+impl Default for Layers {
+    fn default() -> Self {
+        Self(Layer::DEFAULTS)
+    }
+}
+
+/// Key of each limit, so that a problem names its layer.
+const KEYS: [[&str; 4]; LAYER_COUNT] = [
+    [
+        "gland.puncture_depth_m",
+        "gland.puncture_force_n",
+        "gland.cutting_force_n",
+        "gland.shaft_friction_n_per_m",
+    ],
+    [
+        "perineum.puncture_depth_m",
+        "perineum.puncture_force_n",
+        "perineum.cutting_force_n",
+        "perineum.shaft_friction_n_per_m",
+    ],
+    [
+        "surroundings.puncture_depth_m",
+        "surroundings.puncture_force_n",
+        "surroundings.cutting_force_n",
+        "surroundings.shaft_friction_n_per_m",
+    ],
+    [
+        "wall.puncture_depth_m",
+        "wall.puncture_force_n",
+        "wall.cutting_force_n",
+        "wall.shaft_friction_n_per_m",
+    ],
+];
+
+/// Names of the membranes' stiffnesses, for a device that cannot hold them.
+pub const STIFFNESS_KEYS: [&str; LAYER_COUNT] = [
+    "gland.puncture_force_n / puncture_depth_m",
+    "perineum.puncture_force_n / puncture_depth_m",
+    "surroundings.puncture_force_n / puncture_depth_m",
+    "wall.puncture_force_n / puncture_depth_m",
+];
+
+impl Layers {
+    pub fn of(&self, kind: LayerKind) -> Layer {
+        self.0.get(kind as usize).copied().unwrap_or(Layer::DEFAULTS[0])
+    }
+
+    /// Every setting that cannot be used, or `Ok`.
+    pub fn validate(&self) -> Result<(), Vec<Problem>> {
+        let mut problems = Problems::default();
+        for (layer, keys) in self.0.iter().zip(KEYS) {
+            problems.range(keys[0], layer.puncture_depth_m, 0.0, 0.05);
+            problems.range(keys[1], layer.puncture_force_n, 0.0, 30.0);
+            problems.range(keys[2], layer.cutting_force_n, 0.0, 20.0);
+            problems.range(keys[3], layer.shaft_friction_n_per_m, 0.0, 1e3);
+        }
+        problems.finish()
+    }
+
+    /// The largest force that any membrane gives, which a force scale has to fit to the device.
+    pub fn largest_puncture_force_n(&self) -> f64 {
+        self.0.iter().map(|layer| layer.puncture_force_n).fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_valid_and_every_problem_names_its_layer() {
+        assert_eq!(Layers::default().validate(), Ok(()));
+        let mut broken = Layers::default();
+        broken.0[1].puncture_force_n = f64::NAN;
+        broken.0[3].shaft_friction_n_per_m = -1.0;
+        let keys: Vec<_> = broken.validate().unwrap_err().iter().map(|p| p.key).collect();
+        assert_eq!(keys, ["perineum.puncture_force_n", "wall.shaft_friction_n_per_m"]);
+    }
+}

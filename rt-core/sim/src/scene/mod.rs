@@ -1,0 +1,112 @@
+//! What a session runs on: a body of cubic elements and its surface, from labels or built in.
+//!
+//! Scene frame: axes along the lattice, metres; the centre of cell (i, j, k) is at
+//! ((i + 0.5) h, (j + 0.5) h, (k + 0.5) h).
+
+use std::sync::Arc;
+
+mod builtin;
+mod grids;
+mod lattice;
+mod material;
+mod memory;
+mod problem;
+mod source;
+mod structure;
+mod surface;
+#[cfg(test)]
+pub(crate) mod test_bodies;
+mod tissue_kind;
+
+pub use grids::{NodeGrid, label_grid};
+pub(crate) use lattice::Run;
+pub use lattice::{Extent, Lattice};
+pub use problem::{SceneError, SceneProblem};
+pub use source::SceneSource;
+pub use structure::{Material, Role, Structure};
+pub use stylet_shm_schema::MAX_STRUCTURES;
+pub use surface::{Surface, SurfacePart, surface_elements};
+pub use tissue_kind::TissueKind;
+
+/// Most cells along one axis.
+pub const MAX_CELLS_PER_AXIS: usize = 1024;
+/// Most elements in a scene.
+pub const MAX_ELEMENTS: usize = 4_000_000;
+/// Smallest and largest edge of an element.
+pub const SPACING_RANGE_M: [f64; 2] = [1e-4, 1e-2];
+
+/// A label volume of cubic cells, x fastest; any label but zero is tissue, of the structure with that label.
+#[derive(Clone, Debug)]
+pub struct Labels {
+    pub dims: [usize; 3],
+    pub spacing_m: f64,
+    pub cells: Vec<u8>,
+    /// Empty: all tissue is one structure.
+    pub structures: Vec<Structure>,
+}
+
+/// A body at rest.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    pub name: String,
+    /// At least one; elements know theirs by its place here (`Lattice::structure`).
+    pub structures: Vec<Structure>,
+    /// Shared with the tissue model, which would otherwise hold a copy.
+    pub lattice: Arc<Lattice>,
+    pub surface: Surface,
+    /// Where its displacements are told to the hosts.
+    pub nodes: NodeGrid,
+    /// What computes where its elements are.
+    pub tissue: TissueKind,
+}
+
+impl Scene {
+    /// A scene that needs no file, one of [`stylet_shm_schema::BUILTIN_SCENES`].
+    pub fn builtin(name: &str) -> Result<Scene, SceneError> {
+        let labels = builtin::labels(name).ok_or_else(|| SceneError::Unknown(name.to_owned()))?;
+        labels
+            .and_then(|labels| Scene::from_labels(name, &labels))
+            .map_err(SceneError::Invalid)
+    }
+
+    /// Cuts the lattice from labels, or lists every problem with them. Disconnected parts are allowed.
+    pub fn from_labels(name: &str, labels: &Labels) -> Result<Scene, Vec<SceneProblem>> {
+        let problems = problem::problems_of(labels);
+        if !problems.is_empty() {
+            return Err(problems);
+        }
+        let structures = match labels.structures.as_slice() {
+            [] => vec![Structure::soft("tissue", 1)],
+            several => several.to_vec(),
+        };
+        let lattice = Lattice::from_checked_labels(labels);
+        let surface = Surface::of(&lattice, &structures);
+        Ok(Scene {
+            name: name.to_owned(),
+            structures,
+            nodes: NodeGrid::of(&lattice),
+            lattice: Arc::new(lattice),
+            surface,
+            tissue: TissueKind::default(),
+        })
+    }
+    /// Box around the targets at rest; around the whole body where there is none.
+    pub fn target_bounds_m(&self) -> ([f64; 3], [f64; 3]) {
+        let extents = self.lattice.extents(self.structures.len());
+        let targets = self
+            .structures
+            .iter()
+            .zip(&extents)
+            .filter(|(s, _)| s.role == Role::Target);
+        targets
+            .map(|(_, extent)| (extent.lower_m, extent.upper_m))
+            .reduce(|(low, high), (lower, upper)| {
+                let corner = [0, 1, 2];
+                (
+                    corner.map(|a| low[a].min(lower[a])),
+                    corner.map(|a| high[a].max(upper[a])),
+                )
+            })
+            .unwrap_or(self.lattice.bounds_m())
+    }
+}

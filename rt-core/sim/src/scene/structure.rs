@@ -1,0 +1,55 @@
+//! What a scene is made of: named structures, each with its own material.
+
+use crate::limits::AxisLimits;
+use serde::{Deserialize, Serialize};
+
+/// One anatomical structure; its cells carry its label.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Structure {
+    pub name: String,
+    pub label: u8,
+    pub role: Role,
+    pub material: Material,
+}
+
+/// What a structure is in the procedure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Role {
+    /// What seeds are planned in.
+    Target,
+    /// To be kept from needles and dose.
+    Spare,
+    #[default]
+    Tissue,
+}
+
+/// What a structure does when pushed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Material {
+    /// Limits of ChainMail for links along x, y, z; `None` for those that the operator has set.
+    pub limits: Option<[AxisLimits; 3]>,
+    /// Bone, or a probe: never moves.
+    pub fixed: bool,
+    /// Young's modulus (FEM).
+    pub young_pa: f64,
+    /// Poisson's ratio (FEM).
+    pub poisson: f64,
+}
+
+impl Structure {
+    /// Tissue of one kind under the limits that the operator sets; modulus of the prostate: 17 kPa, Ahn 2010.
+    pub fn soft(name: &str, label: u8) -> Structure {
+        let material = Material {
+            limits: None,
+            fixed: false,
+            young_pa: 17e3,
+            poisson: 0.49,
+        };
+        Structure {
+            name: name.to_owned(),
+            label,
+            role: Role::Target,
+            material,
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! What a ChainMail body is: topology and limits, built once.
+
+use super::classes::Classes;
+use super::segments::Segments;
+use super::spans::{Links, Rows, links_along};
+use crate::limits::Limits;
+use crate::scene::{Lattice, Scene};
+use std::sync::Arc;
+
+/// Topology and limits; only the limits ever change.
+#[derive(Clone, Debug)]
+pub struct ChainMail {
+    pub(crate) lattice: Arc<Lattice>,
+    limits: Limits,
+    pub(crate) classes: Classes,
+    pub(crate) rows: Rows,
+    pub(crate) segments: Segments,
+    /// Links along x, y and z.
+    pub(crate) links: [Links; 3],
+    /// First and one past the last occupied row j of each plane k.
+    pub(crate) rows_of_plane: Vec<[usize; 2]>,
+    /// Part of the body that each run belongs to; no link joins two parts.
+    part_of_run: Vec<u32>,
+    /// Each part, whether something in it is fixed.
+    part_is_fixed: Vec<bool>,
+    /// The processor has AVX2.
+    pub(crate) vectors: bool,
+}
+
+impl ChainMail {
+    pub fn new(scene: &Scene, limits: Limits) -> Self {
+        let lattice = scene.lattice.clone();
+        let rows = Rows::of(&lattice);
+        let [_, ny, nz] = lattice.dims;
+        let rows_of_plane = (0..nz).map(|k| {
+            let occupied = || (0..ny).filter(|&j| !rows.numbers(j + ny * k).is_empty());
+            match (occupied().next(), occupied().next_back()) {
+                (Some(first), Some(last)) => [first, last + 1],
+                _ => [0, 0],
+            }
+        });
+        let classes = Classes::new(&scene.structures, &limits);
+        let class_of = |_axis: usize, lo, hi| classes.of_link(lattice.structure(lo), lattice.structure(hi));
+        let links = [0, 1, 2].map(|axis| links_along(axis, &lattice, &rows, &class_of));
+        let part_of_run = parts(&lattice, &rows);
+        let mut part_is_fixed = vec![false; part_of_run.iter().map(|&p| p as usize + 1).max().unwrap_or(0)];
+        for (run, &part) in rows.runs.iter().zip(&part_of_run) {
+            part_is_fixed[part as usize] |= (run.first..run.end()).any(|e| classes.is_fixed(lattice.structure(e)));
+        }
+        ChainMail {
+            segments: Segments::of(scene, &rows, &classes),
+            limits,
+            links,
+            rows_of_plane: rows_of_plane.collect(),
+            part_of_run,
+            part_is_fixed,
+            vectors: vectors(),
+            classes,
+            rows,
+            lattice,
+        }
+    }
+
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    pub fn element_count(&self) -> usize {
+        self.lattice.element_count()
+    }
+
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Takes new limits; states that ran with others must hear of it (`TissueState::disturb`).
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.classes.set_limits(&limits);
+        self.limits = limits;
+    }
+
+    /// Memory that the model takes beside the scene's lattice.
+    pub fn bytes(&self) -> usize {
+        let links = self.links.iter().map(Links::bytes).sum::<usize>();
+        let parts = size_of::<u32>() * self.part_of_run.capacity() + self.part_is_fixed.capacity();
+        let planes = size_of::<[usize; 2]>() * self.rows_of_plane.capacity();
+        links + self.rows.bytes() + self.segments.bytes() + parts + planes
+    }
+
+    /// Runs the portable kernels, whatever the processor has: they give the same bytes.
+    pub fn without_vectors(mut self) -> Self {
+        self.vectors = false;
+        self
+    }
+
+    pub(crate) fn is_fixed(&self, element: u32) -> bool {
+        self.classes.any_fixed() && self.classes.is_fixed(self.lattice.structure(element))
+    }
+
+    pub(crate) fn part(&self, element: u32) -> u32 {
+        self.part_of_run[self.rows.run_of(element)]
+    }
+
+    pub(crate) fn part_of_run(&self, run: usize) -> u32 {
+        self.part_of_run[run]
+    }
+
+    pub(crate) fn part_is_fixed(&self, part: u32) -> bool {
+        self.part_is_fixed[part as usize]
+    }
+}
+
+fn vectors() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return is_x86_feature_detected!("avx2");
+    #[cfg(not(target_arch = "x86_64"))]
+    false
+}
+
+/// Numbers the connected parts of a body, for each run: all elements of a run are connected.
+fn parts(lattice: &Lattice, rows: &Rows) -> Vec<u32> {
+    const UNSEEN: u32 = u32::MAX;
+    let mut neighbours = vec![Vec::new(); rows.runs.len()];
+    for axis in [1, 2] {
+        for span in links_along(axis, lattice, rows, &|_, _, _| Some((0, super::kernels::Pin::None))).all() {
+            neighbours[span.lo_run as usize].push(span.hi_run);
+            neighbours[span.hi_run as usize].push(span.lo_run);
+        }
+    }
+    let mut part = vec![UNSEEN; rows.runs.len()];
+    let mut open = Vec::new();
+    let mut count = 0;
+    for start in 0..part.len() {
+        if part[start] != UNSEEN {
+            continue;
+        }
+        part[start] = count;
+        open.push(start as u32);
+        while let Some(run) = open.pop() {
+            for &next in &neighbours[run as usize] {
+                if part[next as usize] == UNSEEN {
+                    part[next as usize] = count;
+                    open.push(next);
+                }
+            }
+        }
+        count += 1;
+    }
+    part
+}

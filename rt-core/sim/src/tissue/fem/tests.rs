@@ -1,0 +1,60 @@
+//! What the tests of the elastic body share.
+
+use std::sync::Arc;
+
+use super::solve::hold_cells;
+use super::*;
+use crate::scene::test_bodies::Random;
+
+use crate::scene::{Labels, Lattice, Scene, test_bodies};
+use crate::tissue::HeldOutcome;
+
+mod ahead;
+mod golden;
+mod locking;
+mod operator;
+mod step;
+
+const EXACT: SolveSettings = SolveSettings {
+    relative_tolerance: 1e-9,
+    max_cycles: 400,
+};
+
+fn lattice_of(labels: &Labels) -> Arc<Lattice> {
+    Scene::from_labels("test", labels).expect("valid labels").lattice
+}
+
+fn block(dims: [usize; 3], spacing_m: f64) -> Arc<Lattice> {
+    lattice_of(&Labels {
+        dims,
+        spacing_m,
+        cells: vec![1; dims.iter().product()],
+        structures: Vec::new(),
+    })
+}
+
+fn material(poisson_ratio: f64, integration: Integration) -> Material {
+    Material {
+        youngs_modulus_pa: 20e3,
+        poisson_ratio,
+        integration,
+    }
+}
+
+const FULL: Integration = Integration::Full;
+const MEAN: Integration = Integration::MeanDilatation;
+
+/// Two materials by turns of cells, stiffness 1 to `contrast`.
+fn two_materials(lattice: &Lattice, contrast: f64, foundation_pa_per_m: f64) -> FemSettings {
+    let soft = material(0.3, FULL);
+    let stiff = Material {
+        youngs_modulus_pa: contrast * soft.youngs_modulus_pa,
+        ..material(0.45, MEAN)
+    };
+    let structure = |element| u8::from(lattice.cell(element).iter().map(|c| c / 2).sum::<usize>() % 2 == 1);
+    FemSettings {
+        structures: vec![Structure::Elastic(soft), Structure::Elastic(stiff)],
+        structure_of: (0..lattice.element_count() as u32).map(structure).collect(),
+        foundation_pa_per_m,
+    }
+}

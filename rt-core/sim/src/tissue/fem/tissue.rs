@@ -1,0 +1,111 @@
+//! FEM as a tissue model.
+
+use super::material::{FemProblem, FemSettings, Integration, Material, Structure};
+use super::model::FemModel;
+use super::real::Real;
+use super::solve::{SolveSettings, TipPatch, prepare, step};
+use super::state::FemState;
+use crate::limits::Limits;
+use crate::scene::Scene;
+use crate::tissue::{Deformed, Held, Solve, StepReport, TissueModel};
+
+/// What surrounds a body: 20 mm of fat of 5 kPa, per surface area (assumed).
+pub const SURROUNDINGS_PA_PER_M: f64 = 5e3 / 20e-3;
+
+/// Cycles in one tick. Two fit into 5 ms on the paper's gland only just; what is left is done in the ticks before, ahead of the
+/// tip, and in those after.
+pub const LIVE_CYCLES: u32 = 1;
+/// Residual force, over the tip's, up to which an answer that is still being refined may be felt.
+const FELT: f64 = 0.2;
+
+/// Linear elasticity, quasi-static, on a scene's lattice.
+#[derive(Clone)]
+pub struct FemTissue<T = f32> {
+    pub model: FemModel<T>,
+    pub state: FemState<T>,
+    pub settings: SolveSettings,
+}
+
+impl<T: Real> FemTissue<T> {
+    /// The scene's materials in its surroundings, solved as far as the loop has time for.
+    pub fn new(scene: &Scene) -> Result<Self, Vec<FemProblem>> {
+        let structures = scene.structures.iter().map(|s| match s.material.fixed {
+            true => Structure::Fixed,
+            false => Structure::Elastic(Material {
+                youngs_modulus_pa: s.material.young_pa,
+                poisson_ratio: s.material.poisson,
+                integration: Integration::MeanDilatation,
+            }),
+        });
+        let settings = FemSettings {
+            structures: structures.collect(),
+            structure_of: scene.lattice.structures().to_vec(),
+            foundation_pa_per_m: SURROUNDINGS_PA_PER_M,
+        };
+        let model = FemModel::new(&scene.lattice, &settings)?;
+        Ok(FemTissue {
+            state: FemState::at_rest(&model),
+            model,
+            settings: SolveSettings {
+                relative_tolerance: 1e-3,
+                max_cycles: LIVE_CYCLES,
+            },
+        })
+    }
+}
+
+fn patch(held: Held) -> TipPatch {
+    TipPatch {
+        element: held.element,
+        position_m: held.position_m,
+        edge_m: held.patch_m,
+    }
+}
+
+impl<T: Real> TissueModel for FemTissue<T> {
+    /// Quasi-static: `dt_s` plays no part, and tissue that nothing holds is at rest at once.
+    fn step(&mut self, held: Option<Held>, _dt_s: f64) -> StepReport {
+        let report = step(&self.model, &mut self.state, held.map(patch), &self.settings);
+        StepReport {
+            passes: report.cycles,
+            residual: report.relative_residual,
+            moved: report.moved,
+            converged: report.converged,
+            max_displacement: report.max_displacement,
+            held: report.held,
+            solve: if report.cycles > 0 {
+                Solve::Cycles
+            } else {
+                Solve::Nothing
+            },
+            // The tissue pushes the tip with the opposite of what moves the patch.
+            tip_force_n: Some(report.tip_force_n.map(|f| -f)),
+        }
+    }
+
+    fn prepare(&mut self, next: Option<Held>) {
+        prepare(&self.model, &mut self.state, next.map(patch), &self.settings);
+    }
+
+    fn may_be_felt(&self, report: &StepReport) -> bool {
+        report.residual <= FELT && report.max_displacement.is_finite()
+    }
+
+    fn deformed(&self) -> Deformed<'_> {
+        Deformed {
+            lattice: self.model.lattice(),
+            u: [0, 1, 2].map(|axis| self.state.displacement(axis)),
+            scale: 1.0,
+            // Corners move with their neighbours; a cell is not stretched beyond what both move.
+            reach: 1.0 + 3.0 * self.state.max_displacement,
+        }
+    }
+
+    fn return_to_rest(&mut self) {
+        self.state.forget();
+        step(&self.model, &mut self.state, None, &self.settings);
+    }
+
+    /// Elasticity has no limits.
+    fn set_limits(&mut self, _limits: Limits) {}
+}

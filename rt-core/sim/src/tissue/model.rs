@@ -1,0 +1,101 @@
+//! What every tissue model is: a body that takes steps and can be read.
+
+use super::Deformed;
+use crate::limits::Limits;
+
+use serde::{Deserialize, Serialize};
+
+/// An element kept at a position of the scene frame during a step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Held {
+    pub element: u32,
+    pub position_m: [f64; 3],
+    /// Edge of the cube around the element at rest whose elements go along with it; 0 for the element alone.
+    pub patch_m: f64,
+}
+
+/// What became of the held element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeldOutcome {
+    /// None was given.
+    None,
+    /// It is where it was asked to be.
+    Followed,
+    /// Fixed tissue let it go only part of the way.
+    Limited,
+    /// Not finite, out of reach, or no such element; the step only recovered.
+    Refused,
+}
+
+/// How far the solver had to go, in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Solve {
+    /// Nothing had to move.
+    Nothing,
+    Sweeps,
+    Projections,
+    /// Pulled toward the body at rest moved as a whole.
+    Reanchored,
+    /// Cycles of multigrid (FEM).
+    Cycles,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepReport {
+    /// Passes over the links (sweeps, projections, re-anchoring), or cycles of multigrid.
+    pub passes: u32,
+    /// ChainMail: largest violation over all links, in elements. FEM: residual force over the tip's force.
+    pub residual: f64,
+    /// Elements that the solver moved, besides recovery; the held one counts. ChainMail counts whole stretches of a
+    /// run, from the first that moved to the last.
+    pub moved: u32,
+    /// The residual is within the model's tolerance.
+    pub converged: bool,
+    /// No element is farther from rest, in elements.
+    pub max_displacement: f32,
+    pub held: HeldOutcome,
+    pub solve: Solve,
+    /// Force of the tissue on the tip, where the model knows forces.
+    pub tip_force_n: Option<[f64; 3]>,
+}
+
+/// A body of tissue, as the loop and the laboratory use it.
+///
+/// Obligations: `step` does not allocate, lock or panic, whatever it is given; its work is bounded by a number
+/// of passes; the same calls give the same bytes; a held element that is `Followed` is where it was asked to
+/// be; positions stay finite. One suite holds every model to
+/// them: `tests/tests/physics_stability.rs`.
+pub trait TissueModel: Send {
+    /// Advances by `dt_s` with `held` in place; a `dt_s` that is not above zero recovers nothing.
+    fn step(&mut self, held: Option<Held>, dt_s: f64) -> StepReport;
+
+    /// Called when a step's answer is out, with what will be held next if the needle goes on as it does: a model that
+    /// has time left in this tick may work ahead, by a bounded piece. Obligations as for `step`. A wrong guess costs
+    /// this work and no more; answers stay what they are within the model's tolerance.
+    fn prepare(&mut self, _next: Option<Held>) {}
+
+    /// Whether forces may go by this step: one that has not converged is for no hand, but where a model says otherwise.
+    fn may_be_felt(&self, report: &StepReport) -> bool {
+        report.converged
+    }
+
+    /// The body after the last step.
+    fn deformed(&self) -> Deformed<'_>;
+
+    /// Every element to its place at rest, at once.
+    fn return_to_rest(&mut self);
+
+    /// Takes new limits, where the model has such; without allocating.
+    fn set_limits(&mut self, limits: Limits);
+
+    /// Bytes of all that one step leaves to the next; constant for the life of the model. 0: it cannot be saved.
+    fn memory_len(&self) -> usize {
+        0
+    }
+
+    /// Writes those bytes, without allocating; nothing where `to` has another length.
+    fn save(&self, _to: &mut [u8]) {}
+
+    /// Takes up what a model of the same body saved; nothing where `from` has another length.
+    fn load(&mut self, _from: &[u8]) {}
+}

@@ -1,0 +1,175 @@
+//! A point of the tissue: the element it belongs to and where in that element; moves and turns with it.
+
+use super::Deformed;
+use serde::{Deserialize, Serialize};
+
+/// `local` runs from -0.5 to 0.5 across an element, along the deformed links.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MaterialPoint {
+    pub element: u32,
+    pub local: [f32; 3],
+}
+
+/// Elements visited by one walk, at most.
+const MAX_WALK: usize = 512;
+/// Elements looked at to find a start for a walk without a hint, at most.
+const MAX_STARTS: usize = 32_768;
+/// Cells of a sheared lattice do not quite fill space: so far outside a cell still counts as in it, where
+/// there is a neighbour on that side.
+const GAP: f64 = 0.3;
+
+impl MaterialPoint {
+    /// The material point at a place of the scene frame; `None` outside the tissue.
+    ///
+    /// Walks through the deformed lattice from `hint`, or else from the nearest of a bounded sample.
+    pub fn locate(body: &Deformed, point_m: [f64; 3], hint: Option<u32>) -> Option<MaterialPoint> {
+        let p = in_reach(body, point_m)?;
+        let from_hint = hint.and_then(|element| Self::locate_from(body, point_m, element));
+        from_hint.or_else(|| walk(body, p, nearest_sample(body, p)))
+    }
+
+    /// The same by a walk from `element` alone: as cheap where there is no tissue.
+    pub fn locate_from(body: &Deformed, point_m: [f64; 3], element: u32) -> Option<MaterialPoint> {
+        let p = in_reach(body, point_m)?;
+        let is_known = (element as usize) < body.lattice.element_count();
+        is_known.then(|| walk(body, p, element)).flatten()
+    }
+
+    /// Where the point is now, in the scene frame.
+    pub fn position_m(&self, body: &Deformed) -> [f64; 3] {
+        let links = link_vectors(body, self.element);
+        let mut p = centre(body, self.element);
+        for (link, local) in links.iter().zip(self.local) {
+            for axis in 0..3 {
+                p[axis] += f64::from(local) * link[axis];
+            }
+        }
+        p.map(|c| c * body.lattice.spacing_m)
+    }
+
+    /// Where a direction of the tissue at rest points now, as a unit vector; unchanged if it has no length.
+    pub fn direction(&self, body: &Deformed, rest_dir: [f64; 3]) -> [f64; 3] {
+        let links = link_vectors(body, self.element);
+        let mut now = [0.0; 3];
+        for (link, part) in links.iter().zip(rest_dir) {
+            for axis in 0..3 {
+                now[axis] += part * link[axis];
+            }
+        }
+        let length = now.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if length > 1e-12 && length.is_finite() {
+            now.map(|c| c / length)
+        } else {
+            rest_dir
+        }
+    }
+}
+
+/// Centre of an element, in elements.
+fn centre(body: &Deformed, element: u32) -> [f64; 3] {
+    let cell = body.lattice.cell(element);
+    let u = body.displacement(element);
+    [0, 1, 2].map(|a| cell[a] as f64 + 0.5 + u[a])
+}
+
+/// Links through an element along each axis: central differences, one-sided at the surface, as at rest
+/// where there is no neighbour.
+fn link_vectors(body: &Deformed, element: u32) -> [[f64; 3]; 3] {
+    let around = body.lattice.neighbours(element);
+    [0, 1, 2].map(|axis| {
+        let (below, above) = (around[2 * axis], around[2 * axis + 1]);
+        let steps = f64::from(u8::from(below.is_some()) + u8::from(above.is_some()));
+        let lo = body.displacement(below.unwrap_or(element));
+        let hi = body.displacement(above.unwrap_or(element));
+        let mut link = [0, 1, 2].map(|a| (hi[a] - lo[a]) / steps.max(1.0));
+        link[axis] += 1.0;
+        link
+    })
+}
+
+/// Coefficients of `p - centre` in the links of an element; `None` for a flat cell.
+fn local_of(body: &Deformed, p: [f64; 3], element: u32) -> Option<[f64; 3]> {
+    let [a, b, c] = link_vectors(body, element);
+    let x = centre(body, element);
+    let r = [0, 1, 2].map(|axis| p[axis] - x[axis]);
+    let volume = dot(a, cross(b, c));
+    if volume.abs() < 1e-9 {
+        return None;
+    }
+    let parts = [dot(r, cross(b, c)), dot(r, cross(c, a)), dot(r, cross(a, b))];
+    Some(parts.map(|part| part / volume))
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// The place in elements, unless it is too far away for any element.
+fn in_reach(body: &Deformed, point_m: [f64; 3]) -> Option<[f64; 3]> {
+    let p = point_m.map(|c| c / body.lattice.spacing_m);
+    (p.iter().all(|c| c.is_finite()) && !out_of_reach(body, p)).then_some(p)
+}
+
+/// Farther from the body at rest than any element has moved, and its own size at the largest stretch.
+fn out_of_reach(body: &Deformed, p: [f64; 3]) -> bool {
+    let (low, high) = body.lattice.bounds_m();
+    let [low, high] = [low, high].map(|corner| corner.map(|c| c / body.lattice.spacing_m));
+    let margin = f64::from(body.reach);
+    (0..3).any(|a| p[a] < low[a] - margin || p[a] > high[a] + margin)
+}
+
+/// Steps to the neighbour on the side where the point is farthest out, until it is inside a cell.
+fn walk(body: &Deformed, p: [f64; 3], start: u32) -> Option<MaterialPoint> {
+    let mut element = start;
+    let mut best: Option<(f64, MaterialPoint)> = None;
+    for _ in 0..MAX_WALK {
+        let local = local_of(body, p, element)?;
+        let around = body.lattice.neighbours(element);
+        let outside = |axis: usize| local[axis].abs() - 0.5;
+        let beyond = |axis: usize| around[2 * axis + usize::from(local[axis] > 0.0)];
+        let worst = (0..3).map(outside).fold(f64::MIN, f64::max);
+        let in_tissue = (0..3).all(|a| outside(a) <= 1e-6 || beyond(a).is_some());
+        let found = MaterialPoint {
+            element,
+            local: local.map(|c| c as f32),
+        };
+        if worst <= 1e-6 {
+            return Some(found);
+        }
+        if in_tissue && worst <= GAP && best.is_none_or(|(least, _)| worst < least) {
+            best = Some((worst, found));
+        }
+        let ways = (0..3).filter(|&a| outside(a) > 1e-6 && beyond(a).is_some());
+        let way = ways.max_by(|&a, &b| outside(a).total_cmp(&outside(b)));
+        let Some(next) = way.and_then(beyond) else {
+            break;
+        };
+        element = next;
+    }
+    best.map(|(_, found)| found)
+}
+
+/// The element nearest to `p` now, among a sample.
+fn nearest_sample(body: &Deformed, p: [f64; 3]) -> u32 {
+    let stride = body.lattice.element_count().div_ceil(MAX_STARTS).max(1);
+    let mut nearest = (f64::INFINITY, 0);
+    for element in (0..body.lattice.element_count() as u32).step_by(stride) {
+        let x = centre(body, element);
+        let square = (0..3).map(|a| (p[a] - x[a]).powi(2)).sum::<f64>();
+        if square < nearest.0 {
+            nearest = (square, element);
+        }
+    }
+    nearest.1
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,71 @@
+//! The tissue models that every case is put to, and the bodies it is put to them on.
+
+use stylet_sim::limits::{Limits, TissueParameters};
+use stylet_sim::scene::{Labels, Scene, Structure};
+use stylet_sim::tissue::{ChainMailTissue, FemTissue, TissueModel};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    ChainMail,
+    Relaxed,
+    Fem,
+}
+
+impl Kind {
+    pub const ALL: [Kind; 3] = [Kind::ChainMail, Kind::Relaxed, Kind::Fem];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::ChainMail => "ChainMail",
+            Kind::Relaxed => "ChainMail, relaxed",
+            Kind::Fem => "FEM",
+        }
+    }
+
+    /// Limits of the model, from settings that are the model's own but for what the case sets.
+    pub fn limits(self, parameters: &TissueParameters) -> Limits {
+        let mut parameters = parameters.clone();
+        if self == Kind::Relaxed {
+            parameters.relaxation_iterations = 8;
+        }
+        parameters.validate().expect("the case gives valid settings")
+    }
+
+    pub fn on(self, scene: &Scene, parameters: &TissueParameters) -> Box<dyn TissueModel> {
+        match self {
+            Kind::Fem => {
+                let mut fem = FemTissue::<f32>::new(scene).expect("the case gives valid materials");
+                // What the solver can do, not what it has time for in the loop.
+                fem.settings.max_cycles = 40;
+                Box::new(fem)
+            }
+            Kind::ChainMail | Kind::Relaxed => Box::new(ChainMailTissue::new(scene, self.limits(parameters))),
+        }
+    }
+}
+
+/// A body cut by formula; its label numbers the structure, 0 is no tissue.
+pub fn body(dims: [usize; 3], structures: Vec<Structure>, label: impl Fn([usize; 3]) -> u8) -> Scene {
+    let [nx, ny, _] = dims;
+    let cell = |n: usize| [n % nx, n / nx % ny, n / (nx * ny)];
+    let labels = Labels {
+        dims,
+        spacing_m: 1.5e-3,
+        cells: (0..dims.iter().product()).map(|n| label(cell(n))).collect(),
+        structures,
+    };
+    Scene::from_labels("case", &labels).expect("the case gives a valid body")
+}
+
+pub fn block(dims: [usize; 3]) -> Scene {
+    body(dims, Vec::new(), |_| 1)
+}
+
+/// A block whose lowest layer is fixed.
+pub fn block_on_bone(dims: [usize; 3]) -> Scene {
+    let mut bone = Structure::soft("bone", 2);
+    bone.material.fixed = true;
+    body(dims, vec![Structure::soft("tissue", 1), bone], |[_, _, k]| {
+        if k == 0 { 2 } else { 1 }
+    })
+}
