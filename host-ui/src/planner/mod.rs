@@ -30,11 +30,13 @@ const ONE_STEP: Duration = Duration::from_millis(800);
 const STRENGTH_U: f64 = 0.5;
 
 type Checked = Job<Vec<Problem>>;
+/// Session and generation of the scene and the template, with the work for them.
+type AnatomyJob = (u64, u64, Template, Job<Result<Ground, String>>);
 
 #[derive(Default)]
 pub struct Planner {
     ground: Option<Arc<Ground>>,
-    grounding: Option<(u64, u64, Template, Job<Result<Ground, String>>)>,
+    grounding: Option<AnatomyJob>,
     /// What no ground could be made of.
     failed: Option<((u64, u64), Template)>,
     /// The scene that the plan is for: its name and box.
