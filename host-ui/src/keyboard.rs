@@ -1,7 +1,6 @@
 //! Keys: which there are, and what is held or pressed in this frame.
 
-use crate::panel::Action;
-use crate::view::scene3d::Preset;
+use crate::action::{Action, Viewpoint};
 use egui::{Key, Modifiers};
 use stylet_shm_schema::CommandKind;
 
@@ -85,11 +84,11 @@ pub fn read(ctx: &egui::Context) -> Keys {
         (Modifiers::NONE, Key::G, Action::ToggleImage),
         (Modifiers::NONE, Key::T, Action::ToggleTheme),
         (Modifiers::NONE, Key::F12, Action::SavePicture),
-        (Modifiers::NONE, Key::Num1, Action::LookFrom(Preset::Oblique)),
-        (Modifiers::NONE, Key::Num2, Action::LookFrom(Preset::Perineum)),
-        (Modifiers::NONE, Key::Num3, Action::LookFrom(Preset::Side)),
-        (Modifiers::NONE, Key::Num4, Action::LookFrom(Preset::Above)),
-        (Modifiers::NONE, Key::Num5, Action::LookFrom(Preset::Needle)),
+        (Modifiers::NONE, Key::Num1, Action::LookFrom(Viewpoint::Oblique)),
+        (Modifiers::NONE, Key::Num2, Action::LookFrom(Viewpoint::Perineum)),
+        (Modifiers::NONE, Key::Num3, Action::LookFrom(Viewpoint::Side)),
+        (Modifiers::NONE, Key::Num4, Action::LookFrom(Viewpoint::Above)),
+        (Modifiers::NONE, Key::Num5, Action::LookFrom(Viewpoint::Needle)),
         (Modifiers::NONE, Key::Space, Action::Send(CommandKind::DropSeed)),
         (Modifiers::NONE, Key::E, Action::Send(CommandKind::Engage)),
         (Modifiers::NONE, Key::D, Action::Send(CommandKind::Disengage)),

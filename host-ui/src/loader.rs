@@ -1,7 +1,7 @@
 //! Reads scenes and images on a thread of its own, so that a large or broken file never holds up a frame.
 
 use std::path::{Path, PathBuf};
-use stylet_base::job::{Job, News};
+use stylet_base::job::{Job, JobUpdate};
 use stylet_files::{self as files, FileError, Image, LabelVolume, Progress, scene};
 
 /// What a file came to.
@@ -70,9 +70,9 @@ impl Loader {
     pub fn poll(&mut self) -> Option<Outcome> {
         let reading = self.reading.as_ref()?;
         let outcome = match reading.job.poll() {
-            News::None => return None,
-            News::Told(outcome) => outcome,
-            News::Ended => Err(format!("{}: the reader stopped half-way", reading.path.display())),
+            JobUpdate::Pending => return None,
+            JobUpdate::Message(outcome) => outcome,
+            JobUpdate::Ended => Err(format!("{}: the reader stopped half-way", reading.path.display())),
         };
         self.reading = None;
         Some(outcome)

@@ -2,9 +2,10 @@
 
 use super::drive::{BEFORE_ENTRY_M, Drive};
 use super::{App, Waiting, refusal};
+use crate::action::Action;
 use crate::panel::workflow::{Undo, next_action, undo_action};
-use crate::panel::{Action, LoadState};
 use crate::settings::ThemeChoice;
+use crate::shown::LoadState;
 use std::time::Instant;
 use stylet_controllers::Wish;
 use stylet_implant::workflow::{default_plan, move_values, plan_values};
@@ -69,10 +70,10 @@ impl App {
             }
             Action::SavePicture => self.pictures.request(ctx),
             Action::SaveDebrief => self.save_debrief(),
-            Action::PutGoneAway => self.shown.gone = None,
-            Action::PutRefusalsAway => {
+            Action::DismissDisconnected => self.shown.disconnected = None,
+            Action::DismissRefusals => {
                 if let Some(session) = &self.shown.session {
-                    self.put_away = (session.session_id, session.refused);
+                    self.dismissed = (session.session_id, session.refused);
                 }
             }
             Action::LoadScene(path) => self.load(&path, None),

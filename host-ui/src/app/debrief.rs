@@ -1,11 +1,11 @@
 //! The debrief as files: the same page as `host-ui procedure` writes, of what the window has seen.
 
 use super::{App, refusal};
-use crate::panel::{Note, SeedError, all_errors};
+use crate::shown::{Note, SeedError, all_errors};
 use std::path::PathBuf;
 use std::sync::Arc;
 use stylet_base::format;
-use stylet_base::job::{Job, News};
+use stylet_base::job::{Job, JobUpdate};
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Seed, Source};
 use stylet_host::link::SceneModel;
@@ -48,9 +48,9 @@ impl App {
     pub(super) fn take_debrief(&mut self) {
         let Some(job) = &self.debrief else { return };
         let saved = match job.poll() {
-            News::None => return,
-            News::Told(saved) => saved,
-            News::Ended => Err("the debrief was not written: its thread has ended".to_owned()),
+            JobUpdate::Pending => return,
+            JobUpdate::Message(saved) => saved,
+            JobUpdate::Ended => Err("the debrief was not written: its thread has ended".to_owned()),
         };
         self.debrief = None;
         self.shown.note = Some(match saved {
@@ -127,7 +127,7 @@ impl App {
         let of = implant.plan.needles.get(needle)?;
         let seed = of.seeds.get(row.planned)?;
         let pair = of_needle(of.hole, of.at_m(seed.along_m), of.direction, seed.strength_u);
-        let own = shown.planning.course.seeds_of(needle, shown.seeds.len());
+        let own = shown.planning.progress.seeds_of(needle, shown.seeds.len());
         Some((pair, row.placed.and_then(|n| shown.seeds[own].get(n)).copied()))
     }
 }

@@ -1,6 +1,6 @@
 //! From how fast a hand on keys, stick or cap wants the tip to go, to goals for the simulated hand.
 
-use crate::panel::TipOnPath;
+use crate::shown::TipOnPath;
 use std::time::Duration;
 use stylet_controllers::{SLOWEST_M_PER_S, Wish};
 

@@ -6,15 +6,17 @@ mod drive;
 mod plan;
 mod take;
 
-use crate::dose_desk::DoseDesk;
+use crate::action::{Action, PlanAction};
+use crate::dose_worker::DoseWorker;
 use crate::loader::Loader;
 use crate::panel::history::History;
 use crate::panel::parameters::{ParametersState, parameters_ui};
 use crate::panel::workflow::{Progress, WorkflowState, editor_ui, workflow_ui};
-use crate::panel::{Action, FrameCost, Note, PlanAction, Shown, help, plots, status};
+use crate::panel::{help, plots, status};
 use crate::picture::Pictures;
 use crate::planner::Planner;
 use crate::settings::Settings;
+use crate::shown::{FrameCost, Note, Shown};
 use crate::view::middle::Middle;
 use crate::{cpu_time, keyboard, theme};
 use std::path::PathBuf;
@@ -62,7 +64,7 @@ pub struct App {
     first_image: Option<PathBuf>,
     shown: Shown,
     middle: Middle,
-    dose: DoseDesk,
+    dose: DoseWorker,
     pictures: Pictures,
     settings: Settings,
     /// As they were when they were last brought into force.
@@ -93,7 +95,7 @@ pub struct App {
     pulled_to_m: Option<f64>,
     pulled_goal_m: Option<f64>,
     /// The run of the core, and how many of its refusals were put away.
-    put_away: (u64, u64),
+    dismissed: (u64, u64),
     workflow: WorkflowState,
     parameters: ParametersState,
     help: bool,
@@ -155,7 +157,7 @@ impl App {
             first_image: options.image,
             shown,
             middle: Middle::new(cc.wgpu_render_state.clone()),
-            dose: DoseDesk::new(),
+            dose: DoseWorker::new(),
             pictures: Pictures::default(),
             applied: None,
             history: History::default(),
@@ -181,7 +183,7 @@ impl App {
             pressed: Vec::new(),
             pulled_to_m: None,
             pulled_goal_m: None,
-            put_away: (0, 0),
+            dismissed: (0, 0),
             workflow: WorkflowState::with_file(&settings.last_file),
             settings,
             parameters: ParametersState::default(),
@@ -190,7 +192,7 @@ impl App {
     }
 
     /// Other devices than those of the system.
-    pub fn hold_by(&mut self, controllers: Controllers) {
+    pub fn use_controllers(&mut self, controllers: Controllers) {
         self.controllers = controllers;
     }
 

@@ -2,8 +2,9 @@
 
 use super::drive::Drive;
 use super::{App, refusal};
+use crate::action::PlanAction;
 use crate::panel::workflow::Progress;
-use crate::panel::{Note, PlanAction};
+use crate::shown::Note;
 use nalgebra::Vector3;
 use stylet_implant::workflow::{Run, default_plan, plan_values};
 use stylet_shm_schema::CommandKind;
@@ -16,8 +17,8 @@ impl App {
 
     pub(super) fn take_plan(&mut self) {
         self.planner.take(self.link.scene(), self.shown.seeds.len());
-        if let Some(said) = self.planner.said() {
-            self.shown.note = Some(match said {
+        if let Some(message) = self.planner.take_message() {
+            self.shown.note = Some(match message {
                 Ok(text) => Note { refused: false, text },
                 Err(why) => refusal(why),
             });
@@ -70,12 +71,12 @@ impl App {
 
     /// The axial slice shows what the template does.
     fn look_at(&mut self, depth_m: f64) {
-        let Some(ground) = &self.shown.planning.ground else {
+        let Some(outlines) = &self.shown.planning.outlines else {
             return;
         };
-        let inwards = Vector3::from(ground.template.inwards);
+        let inwards = Vector3::from(outlines.template.inwards);
         let view = &mut self.middle.view;
-        let off_m = (view.cursor_m - Vector3::from(ground.template.middle_m)).dot(&inwards);
+        let off_m = (view.cursor_m - Vector3::from(outlines.template.middle_m)).dot(&inwards);
         view.follow_tip = false;
         view.cursor_m += inwards * (depth_m - off_m);
     }
@@ -102,13 +103,13 @@ impl App {
         }
     }
 
-    /// The plan's course goes with the script's.
+    /// The plan's progress goes with the script's.
     pub(super) fn follow_run(&mut self, at: usize, is_done: bool) {
         let Some(&number) = self.run_needles.get(at) else {
             return;
         };
-        let course = self.planner.course();
-        if course.begun() != number + 1 {
+        let progress = self.planner.progress();
+        if progress.begun() != number + 1 {
             let seeds = if at == 0 { 0 } else { self.shown.seeds.len() };
             self.planner.begin_needle(number, seeds);
         }

@@ -2,10 +2,11 @@
 
 use super::drive::Drive;
 use super::{App, refusal};
+use crate::action::Action;
 use crate::affinity;
-use crate::dose_desk::{DoseOf, Wanted};
+use crate::dose_worker::{DoseOf, DoseRequest};
 use crate::loader::Loaded;
-use crate::panel::{Action, LoadState, Note};
+use crate::shown::{LoadState, Note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use stylet_controllers::Button;
@@ -42,7 +43,7 @@ impl App {
         self.take_scene_file();
         self.advance_run();
         self.take_plan();
-        self.dose.take(self.link.scene(), &self.wanted_dose());
+        self.dose.take(self.link.scene(), &self.dose_request());
         self.shown.dose = self.dose.latest().cloned();
         self.shown.dose_trouble = self.dose.trouble();
         self.count_refusals();
@@ -62,10 +63,10 @@ impl App {
     }
 
     /// Of the plan while it is edited or nothing lies in the tissue; else of the seeds as they lie.
-    fn wanted_dose(&self) -> Wanted {
+    fn dose_request(&self) -> DoseRequest {
         let implant = self.shown.planning.implant.as_ref();
         match implant.filter(|_| self.edits_plan() || self.shown.seeds.is_empty()) {
-            Some(implant) => Wanted {
+            Some(implant) => DoseRequest {
                 of: DoseOf::Plan,
                 source: implant.plan.source.clone(),
                 prescription_gy: Some(implant.plan.prescription_gy),
@@ -74,7 +75,7 @@ impl App {
             None => {
                 let planned = implant.and_then(|i| i.seeds.first());
                 let strength_u = planned.map_or(self.settings.seed_strength_u, |s| s.strength_u);
-                Wanted::in_tissue(&self.shown.seeds, strength_u)
+                DoseRequest::in_tissue(&self.shown.seeds, strength_u)
             }
         }
     }
@@ -83,10 +84,10 @@ impl App {
         let (latest, pressed) = self.controllers.take();
         let before = std::mem::replace(&mut self.shown.controllers, latest);
         let now = &self.shown.controllers;
-        if now.times_gone != before.times_gone {
-            self.shown.gone = Some(now.gone.clone());
+        if now.disconnections != before.disconnections {
+            self.shown.disconnected = Some(now.disconnected.clone());
         } else if before.holder.is_none() && now.holder.is_some() {
-            self.shown.gone = None;
+            self.shown.disconnected = None;
         }
         // What is pressed while another window has the focus is meant for that one.
         if self.shown.has_focus {
@@ -97,10 +98,10 @@ impl App {
     /// Those of this run of the core that were not put away.
     fn count_refusals(&mut self) {
         let Some(session) = &self.shown.session else { return };
-        if self.put_away.0 != session.session_id {
-            self.put_away = (session.session_id, session.refused);
+        if self.dismissed.0 != session.session_id {
+            self.dismissed = (session.session_id, session.refused);
         }
-        self.shown.refusals = session.refused.saturating_sub(self.put_away.1);
+        self.shown.refusals = session.refused.saturating_sub(self.dismissed.1);
     }
 
     fn take_pictures(&mut self) {

@@ -1,6 +1,6 @@
 //! The overlay that lists every key, and what gamepads and 3D mice do.
 
-use super::Shown;
+use crate::shown::Shown;
 use crate::{keyboard, theme};
 use stylet_controllers::Kind;
 

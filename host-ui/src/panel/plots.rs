@@ -2,8 +2,9 @@
 
 use super::histogram::histogram_ui;
 use super::history::{History, Percentiles, Quantity, WINDOW_S};
+use super::setup;
 use super::strip::Strip;
-use super::{Shown, setup};
+use crate::shown::Shown;
 use crate::theme;
 use egui::{Color32, RichText};
 use stylet_base::format;

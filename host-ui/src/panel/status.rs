@@ -1,7 +1,8 @@
 //! The bar at the top and the banners under it: is it alive, is it real time, is the force on.
 
-use super::{Action, Shown};
+use crate::action::Action;
 use crate::settings::{SCALES, STRENGTHS_U, Settings, ThemeChoice};
+use crate::shown::Shown;
 use crate::theme;
 use crate::theme::Tokens;
 use egui::{Align, Color32, DragValue, Layout, RichText, Sense, Vec2};
@@ -10,13 +11,13 @@ use stylet_host::link::LinkStatus;
 use stylet_shm_schema::{CommandKind, Fault, ParameterId};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Severity {
+pub enum BannerLevel {
     Bad,
     Warn,
     Info,
 }
 
-impl Severity {
+impl BannerLevel {
     fn color(self, tokens: &Tokens) -> Color32 {
         match self {
             Self::Bad => tokens.bad,
@@ -28,7 +29,7 @@ impl Severity {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Banner {
-    pub severity: Severity,
+    pub level: BannerLevel,
     pub title: &'static str,
     pub text: String,
     /// The one thing to do about it, where a click can do it.
@@ -45,14 +46,14 @@ pub fn banners(shown: &Shown) -> Vec<Banner> {
 /// What went, and what may not be read.
 fn of_controllers(shown: &Shown) -> Vec<Banner> {
     let banner = |title, text, remedy| Banner {
-        severity: Severity::Warn,
+        level: BannerLevel::Warn,
         title,
         text,
         remedy,
     };
-    let gone = shown.gone.as_ref().map(|name| {
+    let gone = shown.disconnected.as_ref().map(|name| {
         let text = format!("{name}. The needle stays where it is; keys and mouse still move it.");
-        banner("Unplugged", text, Some(("Put away", Action::PutGoneAway)))
+        banner("Unplugged", text, Some(("Put away", Action::DismissDisconnected)))
     });
     let denied = shown.controllers.denied.iter();
     let denied = denied.map(|why| banner("A controller is not read", why.clone(), None));
@@ -64,7 +65,7 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
         LinkStatus::Absent { why } => return vec![absent(shown, why)],
         LinkStatus::Silent { since } => {
             return vec![Banner {
-                severity: Severity::Bad,
+                level: BannerLevel::Bad,
                 title: "rt-core is silent",
                 text: format!(
                     "Nothing came for {:.1} s. What you see is old. If it stays so, look at the terminal where rt-core runs.",
@@ -79,7 +80,7 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
     let fault = shown.fault();
     if fault != Some(Fault::None) {
         list.push(Banner {
-            severity: Severity::Bad,
+            level: BannerLevel::Bad,
             title: "Fault: the force is off",
             text: fault.map_or(
                 "rt-core reports a fault that this program does not know".to_owned(),
@@ -101,14 +102,14 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
 fn force_is_off(shown: &Shown) -> Option<Banner> {
     if !shown.is_engaged() {
         return Some(Banner {
-            severity: Severity::Warn,
+            level: BannerLevel::Warn,
             title: "The force is off",
             text: "The device is moved but not felt. Key E turns it on.".to_owned(),
             remedy: Some(("Turn it on", Action::Send(CommandKind::Engage))),
         });
     }
     shown.is_waiting().then(|| Banner {
-        severity: Severity::Warn,
+        level: BannerLevel::Warn,
         title: "The force waits",
         text: "It would begin with a jump. Move the needle until it is small: out of the tissue is surest.".to_owned(),
         remedy: None,
@@ -118,13 +119,13 @@ fn force_is_off(shown: &Shown) -> Option<Banner> {
 /// Until they are put away: what was refused may have been asked by another host.
 fn refused(shown: &Shown) -> Option<Banner> {
     (shown.refusals > 0).then(|| Banner {
-        severity: Severity::Info,
+        level: BannerLevel::Info,
         title: "rt-core refused",
         text: match shown.last_refusal.as_str() {
             "" => format!("{} requests", shown.refusals),
             why => format!("{} requests; the last: {}", shown.refusals, why.replace('\n', "; ")),
         },
-        remedy: Some(("Put away", Action::PutRefusalsAway)),
+        remedy: Some(("Put away", Action::DismissRefusals)),
     })
 }
 
@@ -135,7 +136,7 @@ fn absent(shown: &Shown, why: &str) -> Banner {
         sentence(why)
     };
     Banner {
-        severity: Severity::Bad,
+        level: BannerLevel::Bad,
         title: "rt-core is absent",
         text,
         remedy: None,
@@ -151,7 +152,7 @@ fn not_real_time(shown: &Shown) -> Banner {
         (advice, _) => advice.replace('\n', "  "),
     };
     Banner {
-        severity: Severity::Warn,
+        level: BannerLevel::Warn,
         title: "Not real-time",
         text,
         remedy: None,
@@ -171,7 +172,7 @@ pub fn banners_ui(ui: &mut egui::Ui, list: &[Banner]) -> Option<Action> {
     let tokens = theme::of(ui);
     let ink = tokens.on_signal;
     for banner in list {
-        let fill = banner.severity.color(tokens);
+        let fill = banner.level.color(tokens);
         egui::Frame::new()
             .fill(fill)
             .inner_margin(egui::Margin::symmetric(10, 5))
@@ -263,7 +264,7 @@ fn link_ui(ui: &mut egui::Ui, shown: &Shown) {
             session.version.read(),
             format::rate(session.period_ns),
             format::rate(session.tissue_period_ns),
-            shown.rubbish_refused
+            shown.invalid_dropped
         ));
     }
     if shown.is_absent() {
@@ -405,7 +406,7 @@ mod tests {
     fn a_controller_that_went_and_one_without_rights_are_told_with_or_without_a_core() {
         for mut shown in [live(), Shown::empty("lab")] {
             let before = banners(&shown).len();
-            shown.gone = Some("Pad".to_owned());
+            shown.disconnected = Some("Pad".to_owned());
             shown
                 .controllers
                 .denied
@@ -413,7 +414,7 @@ mod tests {
             let list = banners(&shown);
             assert_eq!(list.len(), before + 2);
             assert!(list[before].text.contains("Pad. The needle stays where it is"));
-            assert_eq!(list[before].remedy, Some(("Put away", Action::PutGoneAway)));
+            assert_eq!(list[before].remedy, Some(("Put away", Action::DismissDisconnected)));
             assert!(list[before + 1].text.contains("Run: that"));
         }
     }
@@ -425,7 +426,7 @@ mod tests {
             (state.fault, state.flags) = (999, 0);
         }
         let list = banners(&shown);
-        assert_eq!(list[0].severity, Severity::Bad);
+        assert_eq!(list[0].level, BannerLevel::Bad);
         assert_eq!(list[1].title, "Not real-time");
     }
 }

@@ -1,8 +1,8 @@
 //! What a frame shows of the plan, made once a change.
 
-use super::course::{Course, NeedleState};
-use super::ground::Ground;
-use super::work::Progress;
+use super::jobs::JobProgress;
+use super::needles::{NeedleProgress, NeedleState};
+use super::outlines::AnatomyOutlines;
 use std::sync::Arc;
 use stylet_dose::Seed;
 use stylet_implant::plan::check::Problem;
@@ -12,30 +12,30 @@ use stylet_implant::plan::{Compensation, History, ImplantPlan, Needle};
 #[derive(Clone, Default)]
 pub struct Planning {
     /// `None` until the scene's anatomy is made out.
-    pub ground: Option<Arc<Ground>>,
+    pub outlines: Option<Arc<AnatomyOutlines>>,
     /// `None` without a plan of many needles.
     pub implant: Option<Arc<Implant>>,
     /// While something is done for it.
-    pub work: Option<Progress>,
-    pub course: Course,
+    pub job: Option<JobProgress>,
+    pub progress: NeedleProgress,
 }
 
 impl Planning {
     /// The next needle that has seeds.
     pub fn next_needle(&self) -> Option<usize> {
         let needles = self.implant.as_ref()?.plan.needles.iter().enumerate();
-        let mut left = needles.skip(self.course.begun()).filter(|(_, n)| !n.seeds.is_empty());
+        let mut left = needles.skip(self.progress.begun()).filter(|(_, n)| !n.seeds.is_empty());
         left.next().map(|(number, _)| number)
     }
 
     /// There is a plan, and none of its needles has gone in.
     pub fn waits(&self) -> bool {
-        self.implant.is_some() && self.course.begun() == 0
+        self.implant.is_some() && self.progress.begun() == 0
     }
 
     /// The needle at work, or the last one that was.
     pub fn at_work(&self) -> Option<(usize, &Needle)> {
-        let number = self.course.begun().checked_sub(1)?;
+        let number = self.progress.begun().checked_sub(1)?;
         Some((number, self.implant.as_ref()?.plan.needles.get(number)?))
     }
 
@@ -68,7 +68,7 @@ impl Implant {
         revision: u64,
         history: &History,
         problems: Option<Arc<Vec<Problem>>>,
-        course: &Course,
+        progress: &NeedleProgress,
         compensated: &[(Needle, Compensation)],
     ) -> Self {
         let plan = history.plan().clone();
@@ -85,7 +85,7 @@ impl Implant {
             revision,
             seeds: plan.seeds(),
             problems,
-            states: (0..plan.needles.len()).map(|n| course.state(n)).collect(),
+            states: (0..plan.needles.len()).map(|n| progress.state(n)).collect(),
             rest_errors_m: plan.needles.iter().map(rest_error_m).collect(),
             drops_m: plan.needles.iter().map(drops_m).collect(),
             can_undo: history.can_undo(),

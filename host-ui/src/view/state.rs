@@ -1,6 +1,6 @@
 //! What all pictures in the middle share: where they cut, what is measured, what is shown.
 
-use super::slice::Orientation;
+use super::orientation::Orientation;
 use nalgebra::Vector3;
 
 /// A distance between two places, taken by two clicks.

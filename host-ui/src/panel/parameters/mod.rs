@@ -2,7 +2,7 @@
 
 mod preset;
 
-use super::Shown;
+use crate::shown::Shown;
 use crate::theme;
 use egui::{Button, DragValue, RichText};
 use std::path::Path;

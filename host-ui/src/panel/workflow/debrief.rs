@@ -1,8 +1,9 @@
 //! What came of it: the error of each seed, the dose against its limits, the histogram of the target.
 
-use crate::dose_desk::{DosePicture, Figure, Limit};
+use crate::action::Action;
+use crate::dose_worker::{DoseResult, Figure, Limit};
 use crate::panel::axis::{plot, upwards};
-use crate::panel::{Action, SeedError, Shown, all_errors};
+use crate::shown::{SeedError, Shown, all_errors};
 use crate::theme;
 use egui::RichText;
 use egui_plot::{Line, PlotPoints, VLine};
@@ -69,7 +70,7 @@ fn figure_ui(ui: &mut egui::Ui, figure: &Figure) {
     ui.end_row();
 }
 
-fn dvh_ui(ui: &mut egui::Ui, dose: &DosePicture, height: f32) {
+fn dvh_ui(ui: &mut egui::Ui, dose: &DoseResult, height: f32) {
     let tokens = theme::of(ui);
     ui.label(theme::small("Target: volume over dose, both in %"));
     let points: Vec<[f64; 2]> = dose.target_dvh.iter().map(|[x, y]| [x * 100.0, y * 100.0]).collect();

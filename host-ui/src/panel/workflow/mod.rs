@@ -1,12 +1,13 @@
 //! The left panel: the steps of the procedure, one of them open, with the one thing to do and what it lacks.
 
 mod debrief;
+mod job;
 mod plan;
 mod progress;
 mod scene;
-mod work;
 
-use super::{Action, SeedError, Shown, own_errors};
+use crate::action::Action;
+use crate::shown::{SeedError, Shown, own_errors};
 use crate::theme;
 use egui::{Align2, Button, FontId, RichText, Sense, Stroke, Vec2};
 pub use plan::{PlanState, editor_ui};
@@ -321,3 +322,6 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         }
     });
 }
+
+#[cfg(test)]
+mod tests;

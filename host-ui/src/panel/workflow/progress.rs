@@ -1,6 +1,7 @@
 //! How far the operator is, what each step lacks, and the one thing to do next.
 
-use crate::panel::{Action, PlanAction, Shown};
+use crate::action::{Action, PlanAction};
+use crate::shown::Shown;
 use stylet_base::format;
 use stylet_shm_schema::CommandKind;
 
@@ -99,14 +100,14 @@ pub fn next_needle(shown: &Shown) -> Option<usize> {
 
 /// Nothing of a plan has gone in yet, so that another one may take its place.
 pub fn is_before_needles(shown: &Shown) -> bool {
-    shown.planning.course.begun() == 0
+    shown.planning.progress.begun() == 0
 }
 
 /// All its seeds are dropped and its tip is outside.
 pub fn is_needle_done(shown: &Shown) -> bool {
     let is_out = shown.path_depth_m().is_some_and(is_out_at);
     // One that was taken back leaves no path, and those before it are done.
-    shown.planning.course.is_done() || (shown.planning.at_work().is_some() && shown.next_seed_m().is_none() && is_out)
+    shown.planning.progress.is_done() || (shown.planning.at_work().is_some() && shown.next_seed_m().is_none() && is_out)
 }
 
 /// The needle at work is outside, whatever it has dropped.

@@ -1,8 +1,9 @@
 //! The first step: which body the needle goes into.
 
 use super::WorkflowState;
-use super::work::work_ui;
-use crate::panel::{Action, LoadState, Shown};
+use super::job::job_ui;
+use crate::action::Action;
+use crate::shown::{LoadState, Shown};
 use crate::theme;
 use egui::{Button, RichText};
 use std::path::PathBuf;
@@ -56,8 +57,8 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
     let mut cancel = false;
     match &shown.load {
         LoadState::Idle => {}
-        LoadState::Reading(what, share) => cancel = work_ui(ui, what, Some(*share)),
-        LoadState::Sending(what) => cancel = work_ui(ui, what, None),
+        LoadState::Reading(what, share) => cancel = job_ui(ui, what, Some(*share)),
+        LoadState::Sending(what) => cancel = job_ui(ui, what, None),
         LoadState::Loaded(what) => {
             ui.label(RichText::new(what).small().color(tokens.good));
         }

@@ -1,10 +1,12 @@
 //! What is drawn over a slice: contours, isodose lines, needle, seeds, planned places, letters and scale.
 
-use super::plane::{Orientation, Plane};
-use super::{Contour, cut};
-use crate::dose_desk::{DosePicture, LEVELS};
-use crate::panel::Shown;
+use super::Contour;
+use super::plane::Plane;
+use crate::dose_worker::{DoseResult, LEVELS};
+use crate::mesh::cut;
+use crate::shown::Shown;
 use crate::theme::IMAGE;
+use crate::view::orientation::Orientation;
 use crate::view::state::ViewState;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2};
 use nalgebra::{Matrix3, Vector3};
@@ -37,7 +39,7 @@ impl Lines {
         plane: &Plane,
         (positions_m, moved): (&[[f32; 3]], u64),
         contours: &[Contour],
-        dose: Option<&Arc<DosePicture>>,
+        dose: Option<&Arc<DoseResult>>,
         may_cut_dose: bool,
     ) -> bool {
         let normal = plane.normal();
@@ -165,7 +167,8 @@ impl Overlay<'_> {
                 continue;
             }
             let ends = [-1.0, 1.0].map(|end| self.plane.on_screen(place + axis * (SEED_HALF_M * end)));
-            self.painter.line_segment(ends, Stroke::new(width + 2.0, IMAGE.ground));
+            self.painter
+                .line_segment(ends, Stroke::new(width + 2.0, IMAGE.background));
             self.painter.line_segment(ends, Stroke::new(width, IMAGE.seed_placed));
             self.painter
                 .circle_filled(self.plane.on_screen(place), width * 0.8, IMAGE.seed_placed);
@@ -201,7 +204,7 @@ impl Overlay<'_> {
                 .circle_stroke(middle, width + 3.0, Stroke::new(1.0, IMAGE.needle.gamma_multiply(0.5)));
         } else {
             self.painter
-                .line_segment(ends, Stroke::new(width + 2.0, IMAGE.ground.gamma_multiply(0.6)));
+                .line_segment(ends, Stroke::new(width + 2.0, IMAGE.background.gamma_multiply(0.6)));
             self.painter
                 .line_segment(ends, Stroke::new(width, IMAGE.needle.gamma_multiply(0.85)));
         }
@@ -236,7 +239,7 @@ impl Overlay<'_> {
             .painter
             .layout_no_wrap(text.to_owned(), FontId::proportional(size), color);
         let rect = anchor.anchor_size(at, galley.size());
-        let ground = IMAGE.ground.gamma_multiply(0.66);
+        let ground = IMAGE.background.gamma_multiply(0.66);
         self.painter.rect_filled(rect.expand2(Vec2::new(3.0, 0.0)), 2.0, ground);
         self.painter.galley(rect.min, galley, color);
         rect

@@ -2,8 +2,9 @@
 
 use super::template::move_needle;
 use super::{PlanState, name_of};
-use crate::panel::{Action, PlanAction, Shown};
+use crate::action::{Action, PlanAction};
 use crate::planner::{Implant, NeedleState};
+use crate::shown::Shown;
 use crate::theme;
 use egui::{Button, DragValue};
 use stylet_base::format;
@@ -34,8 +35,8 @@ pub fn needle_ui(
 }
 
 fn empty_ui(ui: &mut egui::Ui, shown: &Shown, state: &PlanState, actions: &mut Vec<Action>) {
-    let ground = shown.planning.ground.as_ref();
-    let piece_m = ground.and_then(|g| g.piece_m(state.hole));
+    let outlines = shown.planning.outlines.as_ref();
+    let piece_m = outlines.and_then(|g| g.piece_m(state.hole));
     ui.horizontal(|ui| {
         ui.label(theme::strong(format!("Hole {}", state.hole)));
         let add = ui.add_enabled(piece_m.is_some(), Button::new("Add needle"));

@@ -1,8 +1,9 @@
 //! The template as the operator sees it from the perineum: patient's right at the left, anterior at the top.
 
 use super::PlanState;
-use crate::panel::{Action, PlanAction, Shown};
+use crate::action::{Action, PlanAction};
 use crate::planner::{Implant, NeedleState, Outline};
+use crate::shown::Shown;
 use crate::theme;
 use crate::theme::Tokens;
 use egui::{
@@ -53,11 +54,11 @@ pub fn template_ui(
         board: &board,
         tokens: theme::of(ui),
     };
-    look.ground(&response);
-    if let Some(ground) = &shown.planning.ground {
-        let middle_m = (ground.depths_m[0] + ground.depths_m[1]) / 2.0;
+    look.background(&response);
+    if let Some(outlines) = &shown.planning.outlines {
+        let middle_m = (outlines.depths_m[0] + outlines.depths_m[1]) / 2.0;
         let depth_m = *state.depth_m.get_or_insert(middle_m);
-        let layer = ground.layer(depth_m);
+        let layer = outlines.layer(depth_m);
         look.outlines(&layer.spared, look.tokens.spared, 1.2);
         look.outlines(&layer.target, look.tokens.gland, 2.0);
     }
@@ -169,13 +170,13 @@ fn holes_ui(
 
 /// Which plane the outlines are cut in; the axial slice goes there too.
 fn depth_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut PlanState, actions: &mut Vec<Action>) {
-    let (Some(ground), Some(depth_m)) = (&shown.planning.ground, &mut state.depth_m) else {
+    let (Some(outlines), Some(depth_m)) = (&shown.planning.outlines, &mut state.depth_m) else {
         return;
     };
     ui.horizontal(|ui| {
         let label = ui.label(theme::small("Outline at depth"));
         let mut depth_mm = format::mm(*depth_m);
-        let [near, far] = ground.depths_m.map(format::mm);
+        let [near, far] = outlines.depths_m.map(format::mm);
         ui.spacing_mut().slider_width = ui.available_width() - 78.0;
         let slider = egui::Slider::new(&mut depth_mm, near.ceil()..=far.floor())
             .step_by(1.0)
@@ -215,7 +216,7 @@ struct Look<'a> {
 }
 
 impl Look<'_> {
-    fn ground(&self, response: &Response) {
+    fn background(&self, response: &Response) {
         let color = match response.has_focus() {
             true => self.tokens.accent,
             false => self.tokens.line,

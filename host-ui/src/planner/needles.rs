@@ -21,13 +21,13 @@ impl NeedleState {
 
 /// Needles go in one after the other, in the order of the plan.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Course {
+pub struct NeedleProgress {
     /// One a needle that has begun: the seeds that lay in the tissue before it.
     first_seed: Vec<usize>,
     is_done: bool,
 }
 
-impl Course {
+impl NeedleProgress {
     pub fn begun(&self) -> usize {
         self.first_seed.len()
     }
@@ -96,23 +96,23 @@ mod tests {
 
     #[test]
     fn needles_go_in_one_after_the_other_and_each_has_its_own_seeds() {
-        let mut course = Course::default();
-        assert_eq!((course.own_seeds(3), course.done()), (0..3, 0));
-        course.begin(0, 0);
-        assert_eq!(course.state(0), NeedleState::Inserted);
-        assert_eq!(course.own_seeds(4), 0..4);
-        course.finish();
-        assert_eq!((course.state(0), course.done()), (NeedleState::Done, 1));
+        let mut progress = NeedleProgress::default();
+        assert_eq!((progress.own_seeds(3), progress.done()), (0..3, 0));
+        progress.begin(0, 0);
+        assert_eq!(progress.state(0), NeedleState::Inserted);
+        assert_eq!(progress.own_seeds(4), 0..4);
+        progress.finish();
+        assert_eq!((progress.state(0), progress.done()), (NeedleState::Done, 1));
         // The second has no seeds and is passed over.
-        course.begin(2, 4);
-        assert_eq!(course.own_seeds(6), 4..6);
-        assert_eq!([0, 1, 2].map(|n| course.seeds_of(n, 6)), [0..4, 4..4, 4..6]);
+        progress.begin(2, 4);
+        assert_eq!(progress.own_seeds(6), 4..6);
+        assert_eq!([0, 1, 2].map(|n| progress.seeds_of(n, 6)), [0..4, 4..4, 4..6]);
         assert_eq!(
-            [1, 2, 3].map(|n| course.state(n).name()),
+            [1, 2, 3].map(|n| progress.state(n).name()),
             ["done", "inserted", "planned"]
         );
-        assert!(!course.is_undone(4) && course.is_undone(3));
-        course.step_back();
-        assert_eq!((course.begun(), course.done()), (2, 2));
+        assert!(!progress.is_undone(4) && progress.is_undone(3));
+        progress.step_back();
+        assert_eq!((progress.begun(), progress.done()), (2, 2));
     }
 }

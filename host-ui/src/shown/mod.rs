@@ -1,8 +1,11 @@
 //! What one frame shows, taken from the link once, so that no panel touches shared memory.
 
-use crate::dose_desk::DosePicture;
+mod seeds;
+
+use crate::dose_worker::DoseResult;
 use crate::planner::Planning;
 use nalgebra::Vector3;
+pub use seeds::{SeedError, all_errors, own_errors, seed_errors};
 use std::sync::Arc;
 use stylet_controllers::Latest;
 use stylet_host::link::{Link, LinkStatus};
@@ -45,7 +48,7 @@ pub struct Shown {
     pub parameters: Option<ParametersInForce>,
     pub seeds: Vec<SeedPose>,
     pub snapshot_residual: Option<f64>,
-    pub rubbish_refused: u64,
+    pub invalid_dropped: u64,
     /// Step of the scripted procedure while it runs or after it ran.
     pub running: bool,
     pub run_step: Option<Step>,
@@ -55,7 +58,7 @@ pub struct Shown {
     pub note: Option<Note>,
     pub load: LoadState,
     /// Of the seeds as they lie now, or of those of the plan.
-    pub dose: Option<Arc<DosePicture>>,
+    pub dose: Option<Arc<DoseResult>>,
     /// Why the dose is not known, where that is so.
     pub dose_trouble: Option<&'static str>,
     pub planning: Planning,
@@ -66,7 +69,7 @@ pub struct Shown {
     pub controllers: Latest,
     pub has_focus: bool,
     /// The device that was unplugged, until that is put away or a device comes.
-    pub gone: Option<String>,
+    pub disconnected: Option<String>,
     pub cost: FrameCost,
 }
 
@@ -112,7 +115,7 @@ impl Shown {
             parameters: None,
             seeds: Vec::new(),
             snapshot_residual: None,
-            rubbish_refused: 0,
+            invalid_dropped: 0,
             running: false,
             run_step: None,
             run_needle: None,
@@ -125,7 +128,7 @@ impl Shown {
             last_refusal: String::new(),
             controllers: Latest::default(),
             has_focus: true,
-            gone: None,
+            disconnected: None,
             cost: FrameCost::default(),
         }
     }
@@ -137,7 +140,7 @@ impl Shown {
         self.scene = link.scene().map(|s| s.header);
         self.plan = link.plan().filter(|p| p.generation > 0 && p.seed_count > 0).copied();
         self.parameters = link.parameters().copied();
-        self.rubbish_refused = link.rubbish_refused();
+        self.invalid_dropped = link.rubbish_refused();
         let refusals = link.events().iter().rev();
         let last = refusals.clone().find(|e| e.kind == EventKind::RubbishRefused as u32);
         self.last_refusal = last.map_or_else(String::new, |e| e.text.read());
@@ -216,7 +219,7 @@ impl Shown {
 
     /// Seeds of the needle at work, in the order in which they were dropped.
     pub fn own_seeds(&self) -> &[SeedPose] {
-        let own = self.planning.course.own_seeds(self.seeds.len());
+        let own = self.planning.progress.own_seeds(self.seeds.len());
         &self.seeds[own]
     }
 
@@ -243,7 +246,7 @@ impl Shown {
     /// Depth of the deepest planned seed that no seed was dropped for; `None` when all are.
     pub fn next_seed_m(&self) -> Option<f64> {
         let plan = self.plan.as_ref()?;
-        let rows = super::seeds::own_errors(self);
+        let rows = own_errors(self);
         let missing = rows.iter().filter(|row| row.placed.is_none());
         missing
             .map(|row| self.drop_depth_m(plan, row.planned))

@@ -1,6 +1,6 @@
 //! What takes longer than a frame: a first plan, compensation, files.
 
-use super::ground::Ground;
+use super::outlines::AnatomyOutlines;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
@@ -22,28 +22,28 @@ pub const FIRST_PLAN: &str = "Looking for a first plan";
 
 /// What is being done, for people.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Progress {
+pub struct JobProgress {
     pub what: String,
     /// 0 to 1, where that is known.
     pub share: Option<f32>,
 }
 
-pub enum Told {
-    Progress(Progress),
+pub enum JobMessage {
+    Progress(JobProgress),
     Plan(Result<ImplantPlan, String>),
     Compensated(Box<(Needle, Compensation)>),
     /// Nothing follows; in words.
     End(Result<String, String>),
 }
 
-pub fn automatic(ground: Arc<Ground>) -> Job<Told> {
+pub fn automatic(outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
     Job::begin("first plan", move |told, interrupt| {
         let tell = |share: f32| {
-            let progress = Progress {
+            let progress = JobProgress {
                 what: FIRST_PLAN.to_owned(),
                 share: Some(share),
             };
-            let _ = told.send(Told::Progress(progress));
+            let _ = told.send(JobMessage::Progress(progress));
             match interrupt.asked() {
                 true => Err("the search was ended".to_owned()),
                 false => Ok(()),
@@ -52,45 +52,54 @@ pub fn automatic(ground: Arc<Ground>) -> Job<Told> {
         let plan = exchange::usual().and_then(|(source, prescription_gy)| {
             let kernel = DoseKernel::new(&source, Interval::ALL);
             let aims = Aims::new(prescription_gy);
-            automatic::plan(ground.template, &ground.anatomy, &kernel, &source.model, &aims, tell)
+            automatic::plan(
+                outlines.template,
+                &outlines.anatomy,
+                &kernel,
+                &source.model,
+                &aims,
+                tell,
+            )
         });
         // The window may be gone by now; then nobody wants the answer.
-        let _ = told.send(Told::Plan(plan));
+        let _ = told.send(JobMessage::Plan(plan));
     })
 }
 
 /// The strength with which the plan covers the target as a first plan does.
-pub fn strength(ground: Arc<Ground>, plan: Arc<ImplantPlan>) -> Job<Told> {
+pub fn strength(outlines: Arc<AnatomyOutlines>, plan: Arc<ImplantPlan>) -> Job<JobMessage> {
     Job::begin("strength", move |told, _| {
         let source = Source::known(&plan.source)
             .ok_or_else(|| format!("source {} is not known; set the strength by hand", plan.source));
         let scaled = source.and_then(|source| {
             let kernel = DoseKernel::new(&source, Interval::ALL);
             let aims = Aims::new(plan.prescription_gy);
-            automatic::strength_u(&plan, &ground.anatomy, &kernel, &aims)
+            automatic::strength_u(&plan, &outlines.anatomy, &kernel, &aims)
         });
-        let _ = told.send(Told::Plan(scaled.map(|u| plan.with_strength(u))));
+        let _ = told.send(JobMessage::Plan(scaled.map(|u| plan.with_strength(u))));
     })
 }
 
-pub fn import(path: PathBuf, scene: Arc<SceneModel>) -> Job<Told> {
+pub fn import(path: PathBuf, scene: Arc<SceneModel>) -> Job<JobMessage> {
     Job::begin("plan reader", move |told, _| {
-        let _ = told.send(Told::Plan(exchange::read(&path, &scene.header)));
+        let _ = told.send(JobMessage::Plan(exchange::read(&path, &scene.header)));
     })
 }
 
-pub fn export(path: PathBuf, plan: Arc<ImplantPlan>, ground: Arc<Ground>) -> Job<Told> {
+pub fn export(path: PathBuf, plan: Arc<ImplantPlan>, outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
     Job::begin("plan writer", move |told, _| {
-        let written = exchange::write(&path, &plan, &ground.frames);
-        let _ = told.send(Told::End(written.map(|()| format!("Plan saved as {}", path.display()))));
+        let written = exchange::write(&path, &plan, &outlines.frames);
+        let _ = told.send(JobMessage::End(
+            written.map(|()| format!("Plan saved as {}", path.display())),
+        ));
     })
 }
 
 /// Every needle in its turn, through a link of its own: the window's goes on meanwhile.
-pub fn compensation(instance: Instance, needles: Vec<Needle>, pace: Pace) -> Job<Told> {
+pub fn compensation(instance: Instance, needles: Vec<Needle>, pace: Pace) -> Job<JobMessage> {
     Job::begin("compensation", move |told, interrupt| {
         let end = all(instance, &needles, &pace, told, interrupt);
-        let _ = told.send(Told::End(end));
+        let _ = told.send(JobMessage::End(end));
     })
 }
 
@@ -98,7 +107,7 @@ fn all(
     instance: Instance,
     needles: &[Needle],
     pace: &Pace,
-    told: &Sender<Told>,
+    told: &Sender<JobMessage>,
     interrupt: &Interrupt,
 ) -> Result<String, String> {
     let mut link = Link::new(instance);
@@ -113,17 +122,17 @@ fn all(
     let mut failed = Vec::new();
     for (number, needle) in needles.iter().enumerate() {
         let name = needle.hole.map_or_else(|| format!("{}", number + 1), |h| h.to_string());
-        let progress = Progress {
+        let progress = JobProgress {
             what: format!("Rehearsing needle {} of {}, {name}", number + 1, needles.len()),
             share: Some(number as f32 / needles.len() as f32),
         };
-        let _ = told.send(Told::Progress(progress));
+        let _ = told.send(JobMessage::Progress(progress));
         let mut rehearser = LinkRehearser {
             link: &mut link,
             interrupted: interrupt,
         };
         match compensate(needle, pace, &Limits::default(), &mut rehearser) {
-            Ok(done) => drop(told.send(Told::Compensated(Box::new((needle.clone(), done))))),
+            Ok(done) => drop(told.send(JobMessage::Compensated(Box::new((needle.clone(), done))))),
             Err(_) if interrupt.asked() => return Err("the compensation was ended".to_owned()),
             Err(why) => failed.push(format!("needle {name}: {why}")),
         }

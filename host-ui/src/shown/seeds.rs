@@ -53,15 +53,15 @@ pub fn all_errors(shown: &Shown) -> Vec<(usize, SeedError)> {
     let Some(implant) = &shown.planning.implant else {
         return own_errors(shown).into_iter().map(|row| (0, row)).collect();
     };
-    let course = &shown.planning.course;
+    let progress = &shown.planning.progress;
     let of_needle = |number: usize| {
         let needle = &implant.plan.needles[number];
         let planned: Vec<PlannedSeed> = needle.seeds_m().map(|position_m| PlannedSeed { position_m }).collect();
-        let placed = &shown.seeds[course.seeds_of(number, shown.seeds.len())];
+        let placed = &shown.seeds[progress.seeds_of(number, shown.seeds.len())];
         let rows = in_order(&planned, placed, needle.direction);
         rows.into_iter().map(move |row| (number, row)).collect::<Vec<_>>()
     };
-    (0..course.begun().min(implant.plan.needles.len()))
+    (0..progress.begun().min(implant.plan.needles.len()))
         .flat_map(of_needle)
         .collect()
 }

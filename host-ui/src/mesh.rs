@@ -1,5 +1,7 @@
 //! The gland's surface as the graphics card takes it: positions with smooth normals, indices. Only what moves is made anew.
 
+pub mod cut;
+
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 use std::ops::Range;
