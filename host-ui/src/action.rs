@@ -18,20 +18,20 @@ pub enum Action {
     MoveTo(f64),
     /// A hand on the needle: depth along the path, m. Carried out once a frame at most.
     DriveTo(f64),
-    /// The one thing to do in the step that is next.
+    /// The main action of the present step.
     Next,
-    /// Takes back the last step, where it can be.
+    /// Undoes the last step, where that is possible.
     Undo,
-    /// Puts back what was taken back of a plan.
+    /// Redoes the change of the plan that was undone last.
     Redo,
     Plan(PlanAction),
     RunAll,
     StopRun,
     LoadScene(PathBuf),
-    /// Of the patient of the present scene, for the slices.
+    /// Loads an image of the patient of the present scene for the slices.
     LoadImage(PathBuf),
     CancelLoad,
-    /// By its place among [`stylet_shm_schema::BUILTIN_SCENES`].
+    /// Loads the scene of this index in [`stylet_shm_schema::BUILTIN_SCENES`].
     LoadBuiltinScene(usize),
     OpenParameters,
     ToggleHelp,
@@ -44,20 +44,20 @@ pub enum Action {
     ToggleIsodose,
     ToggleImage,
     ToggleTheme,
-    /// The window as PNG.
+    /// Saves the window as PNG.
     SavePicture,
-    /// What the implant was worth, as files.
+    /// Saves the debrief as files.
     SaveDebrief,
-    /// The refusals told so far were read.
+    /// The refusals shown so far were read.
     DismissRefusals,
-    /// That a device was unplugged was read.
+    /// The message that a device was unplugged was read.
     DismissDisconnected,
 }
 
-/// What is asked of a plan of many needles; those are counted from 0.
+/// What the operator asks for in a plan of many needles; needles are counted from 0.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlanAction {
-    /// An empty one.
+    /// Begins an empty plan.
     Begin,
     Automatic,
     Discard,
@@ -65,16 +65,16 @@ pub enum PlanAction {
     Remove(usize),
     Move(usize, Hole),
     SetRow(usize, Row),
-    /// Of every seed, U.
+    /// Strength of every seed, U.
     SetStrength(f64),
     FitStrength,
     Compensate,
     Cancel,
     Import(PathBuf),
     Export(PathBuf),
-    /// The next one with seeds is set as the one to go in.
+    /// The next needle with seeds becomes the one to insert.
     NextNeedle,
-    /// Slices go to this depth from the template's face, m.
+    /// Moves the slices to this depth from the template's face, m.
     LookAt(f64),
 }
 

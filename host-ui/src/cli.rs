@@ -17,7 +17,7 @@ use stylet_implant::procedure;
 use stylet_shm_schema::service::Instance;
 
 const SCENE_HELP: &str = "\
-A scene file is TOML; all but [volume] may be left out, and what is not said comes from the name of the structure:
+A scene file is TOML; all but [volume] may be left out. Omitted fields are inferred from the name of the structure (scenes/README.md):
   name = \"phantom\"
   [volume]
   file = \"gland.seg.nrrd\"         # beside the scene file
@@ -35,7 +35,7 @@ A scene file is TOML; all but [volume] may be left out, and what is not said com
   insert_mm_per_s = 50
   retract_mm_per_s = 50
   [device]
-  name = \"sim\"                    # for an rt-core that host-ui starts (--core)
+  name = \"simulated\"              # for an rt-core that host-ui starts (--core)
   [plan]
   file = \"plan.dcm\"               # RT Plan or CSV
 
@@ -51,13 +51,13 @@ Names that are known follow TG-263: Prostate, PTV, CTV (targets), Urethra, Rectu
 pub struct Cli {
     #[command(flatten)]
     window: CoreArgs,
-    /// Greys for the slices in place of simulated ultrasound, of the patient of --scene FILE: NIfTI-1, NRRD, MetaImage
+    /// Image for the slices instead of simulated ultrasound, of the patient of --scene FILE: NIfTI-1, NRRD, MetaImage
     #[arg(long, value_name = "FILE", requires = "scene")]
     image: Option<PathBuf>,
-    /// Leave gamepads and 3D mice alone: only keys and mouse move the needle
+    /// Ignore gamepads and 3D mice: only keys and mouse move the needle
     #[arg(long)]
     no_controllers: bool,
-    /// Draw frame after frame, as fast as the machine can: for measuring
+    /// Draw frames without a pause, for measurements
     #[arg(long)]
     without_pause: bool,
     #[command(subcommand)]
@@ -66,7 +66,7 @@ pub struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Task {
-    /// Which gamepads and 3D mice are there to hold the needle, whether they can be read, and what their axes and buttons do
+    /// List the connected gamepads and 3D mice, whether they can be read, and what their axes and buttons do
     Controllers,
     /// Plan, place the needles, insert, drop the seeds while retracting; write result.json, force.csv and, of a plan, a debrief
     Procedure {
@@ -84,7 +84,7 @@ enum Task {
         /// Plan of many needles (TOML), as 'host-ui plan' writes it [default: that of the scene file, or one needle through the middle]
         #[arg(long, value_name = "FILE")]
         plan: Option<PathBuf>,
-        /// Rehearse every needle first, and drop each seed so that it comes to rest on plan
+        /// Rehearse every needle first, and drop each seed so that it rests on plan
         #[arg(long)]
         compensate: bool,
         /// Source file for the score [default: the source that the plan names, 6711 or 200]
@@ -94,7 +94,7 @@ enum Task {
         #[arg(long, default_value_t = 5, conflicts_with = "plan", value_parser = clap::value_parser!(u16).range(1..=128))]
         seeds: u16,
     },
-    /// Keep every tick of the force loop and the tissue's snapshots in an MCAP file, and count what is missing
+    /// Record every tick of the force loop and the tissue's snapshots in an MCAP file, and count what is missing
     Record {
         /// Name that rt-core was started under
         #[arg(long, default_value = "main", value_parser = core_args::instance)]
@@ -105,22 +105,22 @@ enum Task {
         /// Seconds to record [default: until interrupted or until rt-core ends]
         #[arg(long, value_name = "S")]
         duration: Option<f64>,
-        /// Snapshots of the gland kept in a second, 0 to 200
+        /// Snapshots of the gland per second, 0 to 200
         #[arg(long, default_value_t = 20.0, value_name = "HZ")]
         snapshot_rate: f64,
     },
-    /// Make a table or a motion for rt-core's replay device from a recording
+    /// Convert a recording into a table, or into a motion for rt-core's replay device
     Export {
         /// Recording made by 'host-ui record'
         recording: PathBuf,
-        /// Table with one row a tick
+        /// Table with one row per tick
         #[arg(long, value_name = "FILE.csv", required_unless_present = "motion")]
         csv: Option<PathBuf>,
         /// The hand's motion, for 'rt-core --device replay:FILE'
         #[arg(long, value_name = "FILE")]
         motion: Option<PathBuf>,
     },
-    /// Have rt-core write its flight recording: the last seconds of both loops, to be repeated with 'rt-core replay'
+    /// Let rt-core write its flight recording: the last seconds of both loops, for 'rt-core replay'
     Flight {
         /// Name that rt-core was started under
         #[arg(long, default_value = "main", value_parser = core_args::instance)]
@@ -135,13 +135,13 @@ enum Task {
     Plan(PlanArgs),
     /// Dose of seeds (TG-43U1) at points, in structures, or on a grid
     Dose(DoseArgs),
-    /// What becomes of a plan's dose when every seed misses its place at random
+    /// Dose of a plan under random seed errors
     Perturb(PerturbArgs),
 }
 
 #[derive(Subcommand, Debug)]
 enum SceneTask {
-    /// Read a volume or a scene file and say what would be sent to rt-core
+    /// Read a volume or a scene file and print what would be sent to rt-core
     #[command(after_long_help = SCENE_HELP)]
     Check {
         /// NIfTI-1, NRRD (also Slicer's .seg.nrrd), MetaImage, DICOM RT Structure Set, or a scene file (.toml)
@@ -282,7 +282,7 @@ fn check(file: &Path, label: Option<u8>) -> Result<(), String> {
     Ok(())
 }
 
-/// What a scene file says besides its volume; its plan is read.
+/// Prints what a scene file holds besides its volume; its plan is read.
 fn check_scene_file(file: &Path) -> Result<(), String> {
     let scene = files::scene::read(file).map_err(|e| e.to_string())?;
     let plan = scene

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use stylet_base::job::{Job, JobUpdate};
 use stylet_files::{self as files, FileError, Image, LabelVolume, Progress, scene};
 
-/// What a file came to.
+/// What was read from a file.
 pub enum Loaded {
     /// A scene, and the image that its scene file names.
     Scene(LabelVolume, Option<Image>),
@@ -26,7 +26,7 @@ pub struct Loader {
 }
 
 impl Loader {
-    /// An image that is named here is taken instead of that of a scene file.
+    /// Begins to read a scene. `image` replaces the image that a scene file names.
     pub fn begin_scene(&mut self, path: &Path, label: Option<u8>, image: Option<PathBuf>) {
         self.begin(path, move |path, progress| scene_of(path, label, image, progress));
     }
@@ -41,17 +41,17 @@ impl Loader {
         read: impl FnOnce(&Path, &Progress) -> Result<Loaded, FileError> + Send + 'static,
     ) {
         let progress = Progress::default();
-        let (owned, told) = (path.to_owned(), progress.clone());
+        let (owned, reported) = (path.to_owned(), progress.clone());
         let job = Job::begin("file reader", move |answer, interrupt| {
-            let outcome = read(&owned, &told.ended_by(interrupt.clone()));
-            // The window may be gone by now; then nobody wants the answer.
+            let outcome = read(&owned, &reported.ended_by(interrupt.clone()));
+            // The window may be closed by now; then nobody reads the answer.
             let _ = answer.send(outcome.map_err(|e| e.to_string()));
         });
         let path = path.to_owned();
         self.reading = Some(Reading { path, progress, job });
     }
 
-    /// What is being read, what is done with it, and the share of that.
+    /// File and stage of the reading, and the share of the stage that is done.
     pub fn at(&self) -> Option<(String, f32)> {
         let reading = self.reading.as_ref()?;
         let (stage, share) = reading.progress.at();
@@ -61,18 +61,21 @@ impl Loader {
         ))
     }
 
-    /// What is being read is no longer wanted; its thread ends soon.
+    /// Cancels the reading; its thread ends soon.
     pub fn cancel(&mut self) {
         self.reading = None;
     }
 
-    /// Each outcome once; a reader that died is a refusal too.
+    /// Reports each outcome once; a reader that ended without one is an error too.
     pub fn poll(&mut self) -> Option<Outcome> {
         let reading = self.reading.as_ref()?;
         let outcome = match reading.job.poll() {
             JobUpdate::Pending => return None,
             JobUpdate::Message(outcome) => outcome,
-            JobUpdate::Ended => Err(format!("{}: the reader stopped half-way", reading.path.display())),
+            JobUpdate::Ended => Err(format!(
+                "{}: the reader ended before the file was read",
+                reading.path.display()
+            )),
         };
         self.reading = None;
         Some(outcome)
@@ -81,7 +84,7 @@ impl Loader {
 
 fn scene_of(path: &Path, label: Option<u8>, image: Option<PathBuf>, progress: &Progress) -> Result<Loaded, FileError> {
     let (volume, named) = match scene::is_scene(path) && label.is_none() {
-        true => scene::load(path, progress).map(|(said, volume)| (volume, said.image))?,
+        true => scene::load(path, progress).map(|(scene, volume)| (volume, scene.image))?,
         false => (files::read(path, label, progress)?, None),
     };
     let Some(file) = image.or_else(|| named.map(|file| path.with_file_name(file))) else {

@@ -9,7 +9,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Under the folder that the program was started in.
 const FOLDER: &str = "out/pictures";
 
-/// What became of a picture: its file, or why there is none.
+/// The file of a picture, or why there is none.
 type Saved = Result<PathBuf, String>;
 
 pub struct Pictures {
@@ -30,13 +30,13 @@ impl Pictures {
         let done = self.done.clone();
         ctx.request_screenshot(move |image| {
             let writer = std::thread::Builder::new().name("picture".to_owned());
-            let told = done.clone();
+            let failed = done.clone();
             let spawned = writer.spawn(move || {
-                // The window may be gone by now; then nobody wants to know.
+                // The window may be closed by now; then nobody reads the answer.
                 let _ = done.send(save(&image, Path::new(FOLDER)));
             });
             if let Err(e) = spawned {
-                let _ = told.send(Err(format!("no thread to write a picture: {e}")));
+                let _ = failed.send(Err(format!("no thread to write a picture: {e}")));
             }
         });
     }

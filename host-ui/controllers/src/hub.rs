@@ -1,4 +1,4 @@
-//! All devices together: who came, who went, who may not be read, and which one holds the needle.
+//! All devices together: which are plugged in, which may not be read, and which one controls the needle.
 
 use super::found::Found;
 use super::kind::{Button, Kind};
@@ -8,7 +8,7 @@ use std::io::{self, ErrorKind};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// A node comes before its rights do: what cannot be opened is told when it could not be so often.
+/// A node appears before its rights are set: a device is reported only after it could not be opened this often.
 const REPORTED_AFTER: u32 = 2;
 
 /// The system's devices, or those of a test.
@@ -16,13 +16,13 @@ pub trait DeviceSource {
     type Device: OpenDevice;
     fn list(&mut self) -> Vec<Found>;
     fn open(&mut self, found: &Found) -> io::Result<Self::Device>;
-    /// Until one of them has something to say, or a time has passed.
+    /// Waits until one of them has events, at most for this time.
     fn wait(&mut self, opened: &[&Self::Device], at_most: Duration);
 }
 
 /// A device that is being read. Neither call may block.
 pub trait OpenDevice {
-    /// Adds what came; `WouldBlock` for nothing.
+    /// Appends new events; `WouldBlock` where there are none.
     fn fetch(&mut self, into: &mut Vec<InputEvent>) -> io::Result<()>;
     fn state(&self) -> io::Result<DeviceState>;
 }
@@ -46,7 +46,7 @@ pub struct Latest {
     pub presses: [u32; Button::ALL.len()],
     /// Devices that are there and cannot be read, each with the reason and what to do.
     pub denied: Vec<String>,
-    /// The device that went last, and how many have gone.
+    /// Name of the device that was unplugged last.
     pub disconnected: String,
     pub disconnections: u32,
 }
@@ -79,17 +79,17 @@ impl<G: DeviceSource> DeviceHub<G> {
         }
     }
 
-    /// Devices that came and went since the last look.
+    /// Adds devices that were plugged in since the last call, and removes unplugged ones.
     pub fn look(&mut self) {
         let list = self.source.list();
         let is_there = |path: &PathBuf| list.iter().any(|f| f.path == *path);
-        let gone: Vec<PathBuf> = self
+        let unplugged: Vec<PathBuf> = self
             .held
             .iter()
             .map(|h| h.found.path.clone())
             .filter(|p| !is_there(p))
             .collect();
-        for path in gone {
+        for path in unplugged {
             self.remove(&path);
         }
         self.refused.retain(|(path, ..)| is_there(path));
@@ -98,8 +98,8 @@ impl<G: DeviceSource> DeviceHub<G> {
                 self.add(found);
             }
         }
-        let told = self.refused.iter().filter(|(_, times, _)| *times >= REPORTED_AFTER);
-        self.latest.denied = told.map(|(.., why)| why.clone()).collect();
+        let reported = self.refused.iter().filter(|(_, times, _)| *times >= REPORTED_AFTER);
+        self.latest.denied = reported.map(|(.., why)| why.clone()).collect();
     }
 
     fn add(&mut self, found: Found) {
@@ -134,7 +134,7 @@ impl<G: DeviceSource> DeviceHub<G> {
         }
     }
 
-    /// What came from all devices; a device that fails has gone.
+    /// Reads all devices at this time (s, of any clock that does not jump); a device that fails counts as unplugged.
     pub fn read(&mut self, now_s: f64) -> &Latest {
         let mut failed = Vec::new();
         for held in &mut self.held {
@@ -226,7 +226,7 @@ mod tests {
 
     type Queue = Rc<RefCell<VecDeque<io::Result<InputEvent>>>>;
 
-    /// Two gamepads at most, with what they are to say.
+    /// Two gamepads at most, with the events that they are to send.
     #[derive(Clone, Default)]
     struct Table {
         there: Rc<RefCell<Vec<&'static str>>>,
@@ -283,7 +283,7 @@ mod tests {
             (table, hub)
         }
 
-        fn says(&self, pad: usize, kind: EventType, code: u16, value: i32) {
+        fn sends(&self, pad: usize, kind: EventType, code: u16, value: i32) {
             let mut queue = self.queues[pad].borrow_mut();
             queue.push_back(Ok(InputEvent::new(kind.0, code, value)));
             queue.push_back(Ok(InputEvent::new(EventType::SYNCHRONIZATION.0, 0, 0)));
@@ -291,7 +291,7 @@ mod tests {
 
         /// Away from the operator by so many of 100.
         fn pushes(&self, pad: usize, by: i32) {
-            self.says(pad, EventType::ABSOLUTE, AbsoluteAxisCode::ABS_Y.0, -by);
+            self.sends(pad, EventType::ABSOLUTE, AbsoluteAxisCode::ABS_Y.0, -by);
         }
     }
 
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_comes_holds_the_needle_and_one_that_goes_leaves_it_at_rest_and_is_told() {
+    fn a_plugged_in_device_controls_the_needle_and_an_unplugged_one_leaves_it_at_rest_and_is_reported() {
         let (table, mut hub) = Table::with(&[]);
         assert_eq!(holder(hub.read(0.0)), "n/a");
         table.there.borrow_mut().push("a");
@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_fails_while_it_is_read_has_gone_at_once() {
+    fn a_device_that_fails_while_it_is_read_is_unplugged_at_once() {
         let (table, mut hub) = Table::with(&["a"]);
         table.pushes(0, 100);
         assert!(hub.read(0.0).wish != Wish::REST);
@@ -351,9 +351,9 @@ mod tests {
     fn buttons_of_every_device_are_counted() {
         let (table, mut hub) = Table::with(&["a", "b"]);
         for pad in [0, 1] {
-            table.says(pad, EventType::KEY, KeyCode::BTN_SOUTH.0, 1);
+            table.sends(pad, EventType::KEY, KeyCode::BTN_SOUTH.0, 1);
         }
-        table.says(0, EventType::KEY, KeyCode::BTN_START.0, 1);
+        table.sends(0, EventType::KEY, KeyCode::BTN_START.0, 1);
         let latest = hub.read(0.0);
         let pressed = |button: Button| latest.presses[button as usize];
         assert_eq!(
@@ -363,22 +363,22 @@ mod tests {
     }
 
     #[test]
-    fn lost_events_have_the_state_read_anew() {
+    fn lost_events_have_the_state_read_again() {
         let (table, mut hub) = Table::with(&["a"]);
         table.pushes(0, 100);
         hub.read(0.0);
-        table.says(0, EventType::SYNCHRONIZATION, 3, 0);
-        // The device says that its stick is in the middle.
+        table.sends(0, EventType::SYNCHRONIZATION, 3, 0);
+        // The stick of the device is in the middle.
         assert_eq!(hub.read(0.0).wish, Wish::REST);
     }
 
     #[test]
-    fn a_device_without_permission_is_told_with_its_cure_until_it_can_be_read() {
+    fn a_device_without_permission_is_reported_with_its_cure_until_it_can_be_read() {
         let (table, mut hub) = Table::with(&[]);
         *table.locked.borrow_mut() = true;
         table.there.borrow_mut().push("a");
         hub.look();
-        assert!(hub.read(0.0).denied.is_empty(), "rights come after the node");
+        assert!(hub.read(0.0).denied.is_empty(), "rights follow the node");
         hub.look();
         let denied = hub.read(0.0).denied.clone();
         assert_eq!(denied.len(), 1);

@@ -1,4 +1,4 @@
-//! The thread that reads the devices, of usual priority, and what the window takes from it without waiting.
+//! The thread that reads the devices, of normal priority, and the window's end of it, which never waits.
 
 use super::found::{Found, Places, find};
 use super::hub::{DeviceHub, DeviceSource, Latest, OpenDevice};
@@ -14,11 +14,11 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use triple_buffer::{Input, Output, triple_buffer};
 
-/// How often it is looked for devices that came or went.
+/// Period of the search for devices that were plugged in or unplugged.
 const LOOK_EVERY: Duration = Duration::from_millis(1500);
 /// A device is read no more often, whatever it sends.
 const READ_EVERY: Duration = Duration::from_millis(4);
-/// While the needle is moved the thread tells so often that it lives.
+/// While the needle is moved the thread publishes at least this often.
 const MOVING_EVERY: Duration = Duration::from_millis(20);
 /// A wish that is older than this is no longer one: the thread stands still.
 const WISH_LASTS: Duration = Duration::from_millis(250);
@@ -54,7 +54,7 @@ impl DeviceSource for System {
         let ms = at_most.as_millis().min(10_000) as libc::c_int;
         // SAFETY: `polled` is valid for reads and writes of its length, and the devices stay open meanwhile.
         unsafe { libc::poll(polled.as_mut_ptr(), polled.len() as libc::nfds_t, ms) };
-        // Whatever woke it, all devices are read next; one that has gone says so there.
+        // Whatever woke it, all devices are read next; an unplugged one fails there.
     }
 }
 
@@ -76,7 +76,7 @@ impl OpenDevice for RawDevice {
 pub struct Controllers {
     latest: Output<(Instant, Latest)>,
     thread: Option<JoinHandle<()>>,
-    /// The thread ends when this is gone.
+    /// The thread ends when this is dropped.
     open: Option<Sender<()>>,
     counted: [u32; Button::ALL.len()],
 }
@@ -156,7 +156,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_device_that_is_no_event_device_is_told_and_never_read() {
+    fn a_device_that_is_no_event_device_is_reported_and_never_read() {
         let folder = std::env::temp_dir().join(format!("stylet-reader-{}", std::process::id()));
         let places = Places {
             class: folder.join("class"),
@@ -172,7 +172,7 @@ mod tests {
         std::fs::write(places.nodes.join("event1"), "no device").unwrap();
         let mut hub = DeviceHub::new(System { places });
         hub.look();
-        assert_eq!(hub.read(0.0).denied, [""; 0], "its rights may still come");
+        assert_eq!(hub.read(0.0).denied, [""; 0], "its rights may follow");
         hub.look();
         let latest = hub.read(0.0);
         assert_eq!((latest.holder.clone(), latest.denied.len()), (None, 1));
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thread_that_has_ended_leaves_no_wish_and_says_so() {
+    fn a_thread_that_has_ended_leaves_no_wish_and_is_reported() {
         struct Broken;
         impl DeviceSource for Broken {
             type Device = RawDevice;

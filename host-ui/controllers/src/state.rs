@@ -1,4 +1,4 @@
-//! The state of one device from its events, and what the hand on it wishes. No device is needed for it.
+//! The state of one device from its events, and the speed that it asks for. Needs no device.
 
 use super::axis::Axis;
 use super::kind::{Button, Kind};
@@ -7,7 +7,7 @@ use evdev::{
     AbsInfo, AbsoluteAxisCode, AttributeSet, EventSummary, InputEvent, KeyCode, RelativeAxisCode, SynchronizationCode,
 };
 
-/// A driver with relative axes sends no zero when the cap is let go: an axis that says nothing for so long is at rest.
+/// A driver with relative axes sends no zero when the cap is released: an axis without events for so long is at rest.
 const RELATIVE_SILENCE_S: f64 = 0.1;
 
 /// How fast the hand wants the tip to go.
@@ -15,7 +15,7 @@ const RELATIVE_SILENCE_S: f64 = 0.1;
 pub struct Wish {
     /// Along the needle, positive inwards.
     pub along_m_per_s: f64,
-    /// Across the template, as one sees it: to the right, and up.
+    /// Across the template, as seen from the perineum: to the right, and up.
     pub across_m_per_s: [f64; 2],
 }
 
@@ -62,7 +62,7 @@ pub struct State {
 }
 
 impl State {
-    /// A device that was just opened. What is held now was not pressed for this program, and must first be let go.
+    /// A device that was just opened. What is held now was not pressed for this program, and must first be released.
     pub fn new(kind: Kind, whole: &DeviceState) -> Self {
         let mut state = Self {
             kind,
@@ -83,7 +83,7 @@ impl State {
         state
     }
 
-    /// Whether the stick or the cap has been at rest since the device came, or since it was stopped.
+    /// Whether the stick or the cap has been at rest since the device was plugged in, or since it was stopped.
     pub fn was_released(&self) -> bool {
         self.was_released
     }
@@ -194,7 +194,7 @@ impl State {
         Some(button)
     }
 
-    /// By itself too, as relative axes come to rest by saying nothing.
+    /// To be called without events too: relative axes rest by being silent.
     pub fn note_rest(&mut self, now_s: f64) {
         self.was_released |= (0..3).all(|axis| self.ignores(axis) || self.share(axis, now_s) == 0.0);
     }
@@ -232,9 +232,9 @@ mod tests {
     fn feed(state: &mut State, now_s: f64, events: &[(EventType, u16, i32)]) -> Vec<Taken> {
         let events = events.iter().map(|(kind, code, value)| event(*kind, *code, *value));
         let taken = events.chain([report()]).map(|e| state.take(e, now_s));
-        let told = taken.filter(|t| *t != Taken::Nothing).collect();
+        let relevant = taken.filter(|t| *t != Taken::Nothing).collect();
         state.note_rest(now_s);
-        told
+        relevant
     }
 
     fn stick(value: i32) -> DeviceState {
@@ -289,8 +289,8 @@ mod tests {
     fn stop_holds_until_the_stick_was_let_go() {
         let mut state = State::new(Kind::Gamepad, &stick(0));
         feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, -32768)]);
-        let told = feed(&mut state, 0.0, &[(EventType::KEY, KeyCode::BTN_EAST.0, 1)]);
-        assert_eq!(told, [Taken::Pressed(Button::Stop)]);
+        let taken = feed(&mut state, 0.0, &[(EventType::KEY, KeyCode::BTN_EAST.0, 1)]);
+        assert_eq!(taken, [Taken::Pressed(Button::Stop)]);
         assert_eq!(state.wish(0.0), Wish::REST);
         feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, 0)]);
         feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, -32768)]);
@@ -318,8 +318,8 @@ mod tests {
         let mut state = State::new(Kind::Gamepad, &stick(0));
         feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, -32768)]);
         let dropped = (EventType::SYNCHRONIZATION, SynchronizationCode::SYN_DROPPED.0, 0);
-        // What comes between the loss and the report is not believed.
-        let told = feed(
+        // Events between the loss and the report are ignored.
+        let taken = feed(
             &mut state,
             0.0,
             &[
@@ -328,7 +328,7 @@ mod tests {
                 (EventType::KEY, KeyCode::BTN_SOUTH.0, 1),
             ],
         );
-        assert_eq!(told, [Taken::Lost]);
+        assert_eq!(taken, [Taken::Lost]);
         assert!(state.wish(0.0).along_m_per_s > 0.0);
         let mut now = stick(0);
         now.keys.insert(KeyCode::BTN_EAST);
@@ -350,7 +350,7 @@ mod tests {
         let down = push(&mut state, [100, 60, 350]);
         assert!((down.along_m_per_s - 0.04).abs() < 1e-9 && down.across_m_per_s == [0.0; 2]);
         assert!(push(&mut state, [0, 0, -350]).along_m_per_s < -0.039);
-        // To the right and away: right and up as one sees the template.
+        // To the right and away: right and up as seen from the perineum.
         let slid = push(&mut state, [350, -350, 40]);
         assert_eq!((slid.along_m_per_s, slid.across_m_per_s), (0.0, [0.01, 0.01]));
         assert_eq!(push(&mut state, [0; 3]), Wish::REST);

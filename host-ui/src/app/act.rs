@@ -1,4 +1,4 @@
-//! What the operator asked for, carried out after all panels are drawn.
+//! Carries out what the operator asked for, after all panels are drawn.
 
 use super::drive::{BEFORE_ENTRY_M, Drive};
 use super::{App, Waiting, refusal};
@@ -15,7 +15,7 @@ use stylet_shm_schema::{CommandKind, PARAMETERS};
 const PULLED_M: f64 = 0.02;
 /// A goal nearer than this to the last one is the same.
 const SAME_GOAL_M: f64 = 0.1e-3;
-/// Answers that are waited for at once; an older one is no longer told.
+/// Requests that wait for their answer at once; the answer of an older one is not shown.
 const WAITING_AT_MOST: usize = 64;
 
 impl App {
@@ -132,7 +132,7 @@ impl App {
         }
     }
 
-    /// A file that is being read is let go; one that is being sent is the core's to answer, and its answer is not waited for.
+    /// Cancels the reading of a file. One that is being sent is left to the core, and its answer is ignored.
     fn cancel_load(&mut self) {
         self.loader.cancel();
         self.uploading = None;

@@ -1,4 +1,4 @@
-//! The debrief as files: the same page as `host-ui procedure` writes, of what the window has seen.
+//! The debrief as files: the same page as `host-ui procedure` writes, from the data of the window.
 
 use super::{App, refusal};
 use crate::shown::{Note, SeedError, all_errors};
@@ -28,7 +28,7 @@ struct Delivered {
 }
 
 impl App {
-    /// Asks for the files; [`App::take_debrief`] says when they are there.
+    /// Begins to write the files; [`App::take_debrief`] reports when they are written.
     pub(super) fn save_debrief(&mut self) {
         if self.debrief.is_some() {
             return;
@@ -36,9 +36,9 @@ impl App {
         match self.delivered() {
             Ok(delivered) => {
                 let folder = PathBuf::from(format!("out/debrief-{}", format::utc_now()));
-                self.debrief = Some(Job::begin("debrief", move |told, _| {
-                    // The window may be gone by now; then nobody wants the answer.
-                    let _ = told.send(write(&delivered, folder));
+                self.debrief = Some(Job::begin("debrief", move |messages, _| {
+                    // The window may be closed by now; then nobody reads the answer.
+                    let _ = messages.send(write(&delivered, folder));
                 }));
             }
             Err(why) => self.shown.note = Some(refusal(why)),
@@ -50,7 +50,7 @@ impl App {
         let saved = match job.poll() {
             JobUpdate::Pending => return,
             JobUpdate::Message(saved) => saved,
-            JobUpdate::Ended => Err("the debrief was not written: its thread has ended".to_owned()),
+            JobUpdate::Ended => Err("the debrief was not written: its thread ended before it replied".to_owned()),
         };
         self.debrief = None;
         self.shown.note = Some(match saved {

@@ -1,4 +1,4 @@
-//! The window: takes what is new, draws the panels, carries out what they ask for. A frame never waits.
+//! The window: takes new data, draws the panels, carries out what they ask for. A frame never waits.
 
 mod act;
 mod debrief;
@@ -45,7 +45,7 @@ pub struct Options {
     pub image: Option<PathBuf>,
     /// Whether gamepads and 3D mice may hold the needle.
     pub controllers: bool,
-    /// Frames come no faster than a person sees; without, as fast as the machine can.
+    /// Limits the frame rate to what the eye needs; without it frames follow at once.
     pub pause: bool,
 }
 
@@ -94,7 +94,7 @@ pub struct App {
     /// Where a hand on the tip has drawn it in this frame, and where it was last sent to.
     pulled_to_m: Option<f64>,
     pulled_goal_m: Option<f64>,
-    /// The run of the core, and how many of its refusals were put away.
+    /// The run of the core, and how many of its refusals were dismissed.
     dismissed: (u64, u64),
     workflow: WorkflowState,
     parameters: ParametersState,
@@ -253,7 +253,7 @@ impl App {
         }
     }
 
-    /// Keys come before a stick or a cap, which moves nothing while another window has the focus.
+    /// Keys take precedence over a stick or a cap, which moves nothing while another window has the focus.
     fn wish(&self, ctx: &egui::Context, keys_m_per_s: f64) -> Wish {
         if keys_m_per_s != 0.0 {
             return Wish {
@@ -268,7 +268,7 @@ impl App {
         }
     }
 
-    /// While the plan's step is open what is no volume is a plan.
+    /// While the plan's step is open, a file that is no volume is a plan.
     fn dropped_file(&self, ctx: &egui::Context) -> Option<Action> {
         let path = ctx.input(|i| {
             i.raw

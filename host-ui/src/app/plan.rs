@@ -1,4 +1,4 @@
-//! What the operator asked for of a plan of many needles.
+//! Carries out what the operator asked for in a plan of many needles.
 
 use super::drive::Drive;
 use super::{App, refusal};
@@ -84,9 +84,7 @@ impl App {
     /// All needles of the plan; without one, one through the middle.
     pub(super) fn run_all(&mut self) {
         if self.planner.is_busy() {
-            self.shown.note = Some(refusal(
-                "Wait for what is done for the plan, or cancel it first.".to_owned(),
-            ));
+            self.shown.note = Some(refusal("Wait for the running task, or cancel it first.".to_owned()));
             return;
         }
         let tasks = self.planner.tasks();

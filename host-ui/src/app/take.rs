@@ -1,4 +1,4 @@
-//! What came since the last frame: records, answers, files that were read, the script's next action.
+//! Takes what is new since the last frame: records, answers, files that were read, the script's next action.
 
 use super::drive::Drive;
 use super::{App, refusal};
@@ -16,11 +16,11 @@ use stylet_implant::workflow::RunStatus;
 use stylet_shm_schema::CommandKind;
 
 const SUM_UP_EVERY: Duration = Duration::from_millis(500);
-/// No answer within this time is told as such.
+/// A request without an answer within this time is reported.
 const ANSWER_WITHIN: Duration = Duration::from_secs(3);
 
 impl App {
-    /// All that came since the last frame.
+    /// Takes all that is new since the last frame.
     pub(super) fn take(&mut self) {
         self.link.poll();
         let plan_before = self.shown.plan.map(|p| p.generation);
@@ -89,13 +89,13 @@ impl App {
         } else if before.holder.is_none() && now.holder.is_some() {
             self.shown.disconnected = None;
         }
-        // What is pressed while another window has the focus is meant for that one.
+        // What is pressed while another window has the focus is meant for that window.
         if self.shown.has_focus {
             self.pressed.extend(pressed.into_iter().map(asked_by));
         }
     }
 
-    /// Those of this run of the core that were not put away.
+    /// Refusals of this run of the core that were not dismissed.
     fn count_refusals(&mut self) {
         let Some(session) = &self.shown.session else { return };
         if self.dismissed.0 != session.session_id {
@@ -207,7 +207,10 @@ impl App {
     /// Of the patient of the present scene, if it can be.
     fn take_image(&mut self, image: Image) {
         let Some(scene) = &self.shown.scene else {
-            self.shown.load = LoadState::Refused(format!("{}: the scene that it belongs to has gone", image.name));
+            self.shown.load = LoadState::Refused(format!(
+                "{}: the scene that it belongs to is no longer loaded",
+                image.name
+            ));
             return;
         };
         let [low, high] = [scene.target_lower_m, scene.target_upper_m];
@@ -222,15 +225,15 @@ impl App {
     }
 
     fn show_image(&mut self, image: Image, scene: &str) {
-        let mut said = format!(
-            "{} is in the slices now, black at {}, white at {}",
+        let mut text = format!(
+            "{} is shown in the slices, black at {}, white at {}",
             image.name, image.range[0], image.range[1]
         );
         if let Some(warning) = &image.frame.warning {
-            said = format!("{said} ({warning})");
+            text = format!("{text} ({warning})");
         }
         self.shown.load = match self.middle.show_image(image, scene) {
-            Ok(()) => LoadState::Loaded(said),
+            Ok(()) => LoadState::Loaded(text),
             Err(why) => LoadState::Refused(why),
         };
     }

@@ -16,8 +16,8 @@ What is converted into what:
   seed plan      .csv (columns as for host-ui dose) into .dcm (RT Plan; needs --source), and back
   dose           .csv (dose_grid.csv of host-ui dose) into .dcm (RT Dose; needs --plan) or .nrrd
 
-Orientation and spacing are kept: NIfTI is in RAS, DICOM and MetaImage in LPS, NRRD says which.
-What is not taken over (overlaps, structures without volume) is told.
+Orientation and spacing are kept: NIfTI is in RAS, DICOM and MetaImage in LPS, NRRD names its own.
+Losses (overlaps, structures without volume) are reported.
 
 Examples:
   host-ui convert rtstruct.dcm gland.seg.nrrd
@@ -29,14 +29,14 @@ Examples:
 #[derive(Args, Debug)]
 #[command(after_long_help = HELP)]
 pub struct ConvertArgs {
-    /// File to read; what it is is told by its content
+    /// File to read; its content decides the format
     from: PathBuf,
-    /// File to write; its name says the format
+    /// File to write; its name decides the format
     to: PathBuf,
     /// Source of the seeds (TOML), for a plan out of CSV
     #[arg(long, value_name = "FILE")]
     source: Option<PathBuf>,
-    /// Strength of seeds whose CSV does not say, in U
+    /// Strength in U of seeds whose CSV gives none
     #[arg(long, value_name = "U")]
     strength_u: Option<f64>,
     /// RT Plan that a dose belongs to
@@ -77,8 +77,8 @@ impl ConvertArgs {
             eprintln!("note: {note}");
         }
         if to_dicom {
-            let told = |why: String| format!("{}: {why}", self.to.display());
-            let bytes = dicom::structures::write::bytes(&voxels, &Identity::new()).map_err(told)?;
+            let named = |why: String| format!("{}: {why}", self.to.display());
+            let bytes = dicom::structures::write::bytes(&voxels, &Identity::new()).map_err(named)?;
             write_whole(&self.to, &bytes)?;
         } else {
             write_labels(&voxels, &self.to)?;

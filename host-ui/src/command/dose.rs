@@ -41,8 +41,8 @@ Examples:
 Written to --out: dose_points.csv; dvh.csv, dvh.svg and metrics.json; dose_grid.csv when neither points nor structures are given.";
 
 const PERTURB_HELP: &str = "\
-Every trial moves each seed by a normal error of --sigma-mm along x, y and z, keeps its axis and strength, and takes all metrics
-anew. The same --seed gives the same trials on any number of cores. Ctrl-C ends early and writes the trials done so far.
+Every trial moves each seed by a normal error of --sigma-mm along x, y and z, keeps its axis and strength, and computes all metrics
+again. The same --seed gives the same trials on any number of cores. Ctrl-C ends early and writes the trials done so far.
 
 Example, as published (4 mm, 1000 trials):
   host-ui perturb --source sources/i125_6711.toml --plan seeds.csv --strength-u 0.5 --structures gland.nii.gz \\
@@ -55,7 +55,7 @@ struct Common {
     /// Source file (TOML) as those in sources/
     #[arg(long, value_name = "FILE")]
     source: PathBuf,
-    /// Strength of seeds whose file does not say, in U
+    /// Strength in U of seeds whose file gives none
     #[arg(long, value_name = "U")]
     strength_u: Option<f64>,
     /// The strengths were measured this many days before the implant, and have decayed since
@@ -64,7 +64,7 @@ struct Common {
     /// Count dose from this day after the implant
     #[arg(long, value_name = "DAYS", default_value_t = 0.0)]
     from_days: f64,
-    /// Count dose up to this day after the implant [default: for ever]
+    /// Count dose up to this day after the implant [default: without end]
     #[arg(allow_negative_numbers = true, long, value_name = "DAYS")]
     to_days: Option<f64>,
     /// Prescribed dose in Gy [default: that of the source file]
@@ -120,7 +120,7 @@ pub struct PerturbArgs {
     /// Standard deviation of a seed's error along each axis
     #[arg(long, value_name = "MM", default_value_t = 4.0)]
     sigma_mm: f64,
-    /// How often the seeds are moved
+    /// Number of trials, each with its own random errors
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=MAX_TRIALS))]
     trials: u64,
     /// Seed of the random numbers
@@ -291,7 +291,7 @@ impl Common {
         if let Some(warning) = &voxels.frame.warning {
             eprintln!("note: {}: {warning}", file.display());
         }
-        // What the file calls its labels counts where nothing else is said.
+        // The names in the file count where none are given.
         let mut names = voxels.names.clone();
         names.extend(given);
         Ok(labels::structures(&voxels, &names, most_points))

@@ -45,7 +45,7 @@ pub struct PlanArgs {
     /// Seeds to take instead (CSV)
     #[arg(long, value_name = "FILE")]
     seeds: Option<PathBuf>,
-    /// Strength of seeds whose table does not say, in U
+    /// Strength in U of seeds whose table gives none
     #[arg(long, value_name = "U", requires = "seeds")]
     strength_u: Option<f64>,
     /// Plan file to write (TOML)
@@ -76,12 +76,12 @@ impl PlanArgs {
         let plan = match &self.seeds {
             None => {
                 let bar = progress_bar(100, "% of the patterns");
-                let tell = |share: f32| {
+                let report = |share: f32| {
                     bar.set_position((share * 100.0) as u64);
                     Ok(())
                 };
                 let aims = Aims::new(prescription_gy);
-                let plan = automatic::plan(template, &anatomy, &kernel, &source.model, &aims, tell);
+                let plan = automatic::plan(template, &anatomy, &kernel, &source.model, &aims, report);
                 bar.finish_and_clear();
                 plan?
             }

@@ -1,4 +1,4 @@
-//! What the loop got from the kernel, how the link is, and what a frame of this window costs.
+//! What the loop got from the kernel, the state of the link, and the cost of a frame.
 
 use crate::shown::Shown;
 use crate::theme;
@@ -63,9 +63,9 @@ fn link(shown: &Shown) -> (String, bool) {
         LinkStatus::Silent { since } => (format!("silent for {:.1} s", since.as_secs_f64()), false),
         LinkStatus::Absent { .. } => ("absent".to_owned(), false),
     };
-    let rubbish = shown.invalid_dropped;
-    let text = format!("{word}, {} messages not believed", format::count(rubbish));
-    (text, fine && rubbish == 0)
+    let dropped = shown.invalid_dropped;
+    let text = format!("{word}, {} invalid messages dropped", format::count(dropped));
+    (text, fine && dropped == 0)
 }
 
 /// Which device holds the needle, and why it does not where that is so.
@@ -80,7 +80,7 @@ fn controller(shown: &Shown) -> (String, bool) {
     if !shown.has_focus {
         (format!("{name}: not the focus"), false)
     } else if !device.was_released {
-        (format!("{name}: let it go first"), false)
+        (format!("{name}: release it first"), false)
     } else {
         (name, true)
     }
@@ -124,7 +124,7 @@ mod tests {
         assert_eq!(controller(&shown), ("A gamepad with a name th".to_owned(), true));
         assert!(axes(&shown).contains("left stick"));
         shown.controllers.holder = Some(holder(false));
-        assert!(controller(&shown).0.ends_with("let it go first"));
+        assert!(controller(&shown).0.ends_with("release it first"));
         shown.has_focus = false;
         assert!(controller(&shown).0.ends_with("not the focus"));
     }

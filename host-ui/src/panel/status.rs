@@ -36,14 +36,14 @@ pub struct Banner {
     pub remedy: Option<(&'static str, Action)>,
 }
 
-/// Worst first. What cannot be known is not claimed: without a core nothing is said about its force.
+/// Worst first. Without a core there is no banner about its force.
 pub fn banners(shown: &Shown) -> Vec<Banner> {
     let mut list = of_core(shown);
     list.extend(of_controllers(shown));
     list
 }
 
-/// What went, and what may not be read.
+/// Devices that were unplugged, and devices that may not be read.
 fn of_controllers(shown: &Shown) -> Vec<Banner> {
     let banner = |title, text, remedy| Banner {
         level: BannerLevel::Warn,
@@ -51,13 +51,13 @@ fn of_controllers(shown: &Shown) -> Vec<Banner> {
         text,
         remedy,
     };
-    let gone = shown.disconnected.as_ref().map(|name| {
+    let unplugged = shown.disconnected.as_ref().map(|name| {
         let text = format!("{name}. The needle stays where it is; keys and mouse still move it.");
-        banner("Unplugged", text, Some(("Put away", Action::DismissDisconnected)))
+        banner("Unplugged", text, Some(("Dismiss", Action::DismissDisconnected)))
     });
     let denied = shown.controllers.denied.iter();
     let denied = denied.map(|why| banner("A controller is not read", why.clone(), None));
-    gone.into_iter().chain(denied).collect()
+    unplugged.into_iter().chain(denied).collect()
 }
 
 fn of_core(shown: &Shown) -> Vec<Banner> {
@@ -68,7 +68,7 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
                 level: BannerLevel::Bad,
                 title: "rt-core is silent",
                 text: format!(
-                    "Nothing came for {:.1} s. What you see is old. If it stays so, look at the terminal where rt-core runs.",
+                    "No data for {:.1} s. The display is out of date. If this persists, check the terminal where rt-core runs.",
                     since.as_secs_f64()
                 ),
                 remedy: None,
@@ -111,12 +111,12 @@ fn force_is_off(shown: &Shown) -> Option<Banner> {
     shown.is_waiting().then(|| Banner {
         level: BannerLevel::Warn,
         title: "The force waits",
-        text: "It would begin with a jump. Move the needle until it is small: out of the tissue is surest.".to_owned(),
+        text: "It would begin with a jump. Move the needle until it is small, best outside the tissue.".to_owned(),
         remedy: None,
     })
 }
 
-/// Until they are put away: what was refused may have been asked by another host.
+/// Until they are dismissed: the refused request may be that of another host.
 fn refused(shown: &Shown) -> Option<Banner> {
     (shown.refusals > 0).then(|| Banner {
         level: BannerLevel::Info,
@@ -125,7 +125,7 @@ fn refused(shown: &Shown) -> Option<Banner> {
             "" => format!("{} requests", shown.refusals),
             why => format!("{} requests; the last: {}", shown.refusals, why.replace('\n', "; ")),
         },
-        remedy: Some(("Put away", Action::DismissRefusals)),
+        remedy: Some(("Dismiss", Action::DismissRefusals)),
     })
 }
 
@@ -147,7 +147,7 @@ fn not_real_time(shown: &Shown) -> Banner {
     let advice = shown.session.map(|s| s.advice.read()).unwrap_or_default();
     let asked = shown.session.is_some_and(|s| s.no_rt_asked != 0);
     let text = match (advice.trim(), asked) {
-        ("", true) => "rt-core was started with --no-rt: timing here says nothing about this machine.".to_owned(),
+        ("", true) => "rt-core was started with --no-rt: timing measured here is not that of a real-time run.".to_owned(),
         ("", false) => "Run setcap cap_sys_nice,cap_ipc_lock=ep on rt-core, or allow rtprio and memlock in /etc/security/limits.d, then start it again.".to_owned(),
         (advice, _) => advice.replace('\n', "  "),
     };
@@ -226,7 +226,7 @@ fn settings_ui(ui: &mut egui::Ui, settings: &mut Settings) {
         ui.radio_value(&mut settings.theme, ThemeChoice::Dark, "Dark");
         ui.radio_value(&mut settings.theme, ThemeChoice::Light, "Light");
     });
-    let label = ui.label(theme::weak("Size of words"));
+    let label = ui.label(theme::weak("Text size"));
     let mut percent = settings.scale * 100.0;
     let drag = DragValue::new(&mut percent)
         .range(SCALES[0] * 100.0..=SCALES[1] * 100.0)
@@ -257,7 +257,7 @@ fn link_ui(ui: &mut egui::Ui, shown: &Shown) {
     let response = badge(ui, word, color);
     if let Some(session) = &shown.session {
         response.on_hover_text(format!(
-            "instance {}, session {:016x}, process {}, version {}\nforce loop {}, tissue {}\nmessages not believed: {}",
+            "instance {}, session {:016x}, process {}, version {}\nforce loop {}, tissue {}\ninvalid messages dropped: {}",
             shown.instance,
             session.session_id,
             session.pid,
@@ -379,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn all_well_needs_no_banner_and_absence_says_what_to_type() {
+    fn no_banner_without_a_problem_and_absence_shows_what_to_type() {
         assert!(banners(&live()).is_empty());
         let list = banners(&Shown::empty("lab"));
         assert!(list[0].text.contains("rt-core --instance lab"), "{}", list[0].text);
@@ -403,7 +403,7 @@ mod tests {
     }
 
     #[test]
-    fn a_controller_that_went_and_one_without_rights_are_told_with_or_without_a_core() {
+    fn an_unplugged_controller_and_one_without_rights_are_shown_with_or_without_a_core() {
         for mut shown in [live(), Shown::empty("lab")] {
             let before = banners(&shown).len();
             shown.disconnected = Some("Pad".to_owned());
@@ -414,7 +414,7 @@ mod tests {
             let list = banners(&shown);
             assert_eq!(list.len(), before + 2);
             assert!(list[before].text.contains("Pad. The needle stays where it is"));
-            assert_eq!(list[before].remedy, Some(("Put away", Action::DismissDisconnected)));
+            assert_eq!(list[before].remedy, Some(("Dismiss", Action::DismissDisconnected)));
             assert!(list[before + 1].text.contains("Run: that"));
         }
     }

@@ -1,4 +1,4 @@
-//! What takes longer than a frame: a first plan, compensation, files.
+//! Background jobs of the planner: a first plan, its strength, compensation, files.
 
 use super::outlines::AnatomyOutlines;
 use std::path::PathBuf;
@@ -20,9 +20,10 @@ const FIND_LIMIT: Duration = Duration::from_secs(10);
 const POLL_EVERY: Duration = Duration::from_millis(5);
 pub const FIRST_PLAN: &str = "Looking for a first plan";
 
-/// What is being done, for people.
+/// What a job does, for people.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobProgress {
+    /// Its name.
     pub what: String,
     /// 0 to 1, where that is known.
     pub share: Option<f32>,
@@ -32,20 +33,20 @@ pub enum JobMessage {
     Progress(JobProgress),
     Plan(Result<ImplantPlan, String>),
     Compensated(Box<(Needle, Compensation)>),
-    /// Nothing follows; in words.
+    /// The last message, in words.
     End(Result<String, String>),
 }
 
 pub fn automatic(outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
-    Job::begin("first plan", move |told, interrupt| {
-        let tell = |share: f32| {
+    Job::begin("first plan", move |messages, interrupt| {
+        let report = |share: f32| {
             let progress = JobProgress {
                 what: FIRST_PLAN.to_owned(),
                 share: Some(share),
             };
-            let _ = told.send(JobMessage::Progress(progress));
+            let _ = messages.send(JobMessage::Progress(progress));
             match interrupt.asked() {
-                true => Err("the search was ended".to_owned()),
+                true => Err("the search was cancelled".to_owned()),
                 false => Ok(()),
             }
         };
@@ -58,17 +59,17 @@ pub fn automatic(outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
                 &kernel,
                 &source.model,
                 &aims,
-                tell,
+                report,
             )
         });
-        // The window may be gone by now; then nobody wants the answer.
-        let _ = told.send(JobMessage::Plan(plan));
+        // The window may be closed by now; then nobody reads the answer.
+        let _ = messages.send(JobMessage::Plan(plan));
     })
 }
 
 /// The strength with which the plan covers the target as a first plan does.
 pub fn strength(outlines: Arc<AnatomyOutlines>, plan: Arc<ImplantPlan>) -> Job<JobMessage> {
-    Job::begin("strength", move |told, _| {
+    Job::begin("strength", move |messages, _| {
         let source = Source::known(&plan.source)
             .ok_or_else(|| format!("source {} is not known; set the strength by hand", plan.source));
         let scaled = source.and_then(|source| {
@@ -76,30 +77,30 @@ pub fn strength(outlines: Arc<AnatomyOutlines>, plan: Arc<ImplantPlan>) -> Job<J
             let aims = Aims::new(plan.prescription_gy);
             automatic::strength_u(&plan, &outlines.anatomy, &kernel, &aims)
         });
-        let _ = told.send(JobMessage::Plan(scaled.map(|u| plan.with_strength(u))));
+        let _ = messages.send(JobMessage::Plan(scaled.map(|u| plan.with_strength(u))));
     })
 }
 
 pub fn import(path: PathBuf, scene: Arc<SceneModel>) -> Job<JobMessage> {
-    Job::begin("plan reader", move |told, _| {
-        let _ = told.send(JobMessage::Plan(exchange::read(&path, &scene.header)));
+    Job::begin("plan reader", move |messages, _| {
+        let _ = messages.send(JobMessage::Plan(exchange::read(&path, &scene.header)));
     })
 }
 
 pub fn export(path: PathBuf, plan: Arc<ImplantPlan>, outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
-    Job::begin("plan writer", move |told, _| {
+    Job::begin("plan writer", move |messages, _| {
         let written = exchange::write(&path, &plan, &outlines.frames);
-        let _ = told.send(JobMessage::End(
+        let _ = messages.send(JobMessage::End(
             written.map(|()| format!("Plan saved as {}", path.display())),
         ));
     })
 }
 
-/// Every needle in its turn, through a link of its own: the window's goes on meanwhile.
+/// Compensates one needle after the other, through a link of its own: the window keeps its own.
 pub fn compensation(instance: Instance, needles: Vec<Needle>, pace: Pace) -> Job<JobMessage> {
-    Job::begin("compensation", move |told, interrupt| {
-        let end = all(instance, &needles, &pace, told, interrupt);
-        let _ = told.send(JobMessage::End(end));
+    Job::begin("compensation", move |messages, interrupt| {
+        let end = all(instance, &needles, &pace, messages, interrupt);
+        let _ = messages.send(JobMessage::End(end));
     })
 }
 
@@ -107,14 +108,14 @@ fn all(
     instance: Instance,
     needles: &[Needle],
     pace: &Pace,
-    told: &Sender<JobMessage>,
+    messages: &Sender<JobMessage>,
     interrupt: &Interrupt,
 ) -> Result<String, String> {
     let mut link = Link::new(instance);
     let begun = Instant::now();
     while link.scene().is_none() || link.state().is_none() {
         if interrupt.asked() || begun.elapsed() > FIND_LIMIT {
-            return Err("rt-core does not answer; see that it runs".to_owned());
+            return Err("rt-core does not answer; check that it is running".to_owned());
         }
         link.poll();
         std::thread::sleep(POLL_EVERY);
@@ -126,19 +127,19 @@ fn all(
             what: format!("Rehearsing needle {} of {}, {name}", number + 1, needles.len()),
             share: Some(number as f32 / needles.len() as f32),
         };
-        let _ = told.send(JobMessage::Progress(progress));
+        let _ = messages.send(JobMessage::Progress(progress));
         let mut rehearser = LinkRehearser {
             link: &mut link,
             interrupted: interrupt,
         };
         match compensate(needle, pace, &Limits::default(), &mut rehearser) {
-            Ok(done) => drop(told.send(JobMessage::Compensated(Box::new((needle.clone(), done))))),
-            Err(_) if interrupt.asked() => return Err("the compensation was ended".to_owned()),
+            Ok(done) => drop(messages.send(JobMessage::Compensated(Box::new((needle.clone(), done))))),
+            Err(_) if interrupt.asked() => return Err("the compensation was cancelled".to_owned()),
             Err(why) => failed.push(format!("needle {name}: {why}")),
         }
     }
     match failed.as_slice() {
-        [] => Ok(format!("{} needles are compensated.", needles.len())),
+        [] => Ok(format!("{} needles compensated.", needles.len())),
         _ => Err(format!("Not compensated: {}", failed.join("; "))),
     }
 }

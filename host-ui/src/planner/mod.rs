@@ -1,7 +1,6 @@
-//! The plan that is edited in the window: its history, what is wrong with it, the work that is done for it, how far it is
-//! carried out.
+//! The plan that is edited in the window: its history, its problems, the background jobs for it, and the progress of its needles.
 //!
-//! A frame gives it what came and takes what is shown; nothing here takes longer than a copy of the plan.
+//! Each frame hands over new data and takes what is shown; nothing here takes longer than a copy of the plan.
 
 mod jobs;
 mod needles;
@@ -24,9 +23,9 @@ use stylet_implant::workflow::{NeedleTask, Pace};
 use stylet_shm_schema::MAX_SEEDS;
 use stylet_shm_schema::service::Instance;
 
-/// Changes of one needle that follow each other faster are one step to take back.
+/// Changes of one needle that follow each other faster are one step to undo.
 const ONE_STEP: Duration = Duration::from_millis(800);
-/// Of seeds of a plan that has none yet.
+/// Strength of the seeds of a plan that has none yet.
 const STRENGTH_U: f64 = 0.5;
 
 type Checked = Job<Vec<Problem>>;
@@ -35,7 +34,7 @@ type Checked = Job<Vec<Problem>>;
 pub struct Planner {
     outlines: Option<Arc<AnatomyOutlines>>,
     outlining: Option<(u64, u64, Template, Job<Result<AnatomyOutlines, String>>)>,
-    /// What no outlines could be made of.
+    /// Scene and template that no outlines could be made of.
     failed: Option<((u64, u64), Template)>,
     /// The scene that the plan is for: its name and box.
     of_scene: Option<(String, [f64; 3])>,
@@ -53,7 +52,7 @@ pub struct Planner {
     drawn: Option<(usize, Instant)>,
     implant: Option<Arc<Implant>>,
     shown_revision: u64,
-    /// What the person should read, once.
+    /// A message for the operator, reported once.
     message: Option<Result<String, String>>,
 }
 
@@ -66,7 +65,7 @@ impl Planner {
         &self.progress
     }
 
-    /// What the person should read, once.
+    /// A message for the operator, reported once.
     pub fn take_message(&mut self) -> Option<Result<String, String>> {
         self.message.take()
     }
@@ -80,7 +79,7 @@ impl Planner {
         }
     }
 
-    /// What came since the last frame.
+    /// Takes what is new since the last frame.
     pub fn take(&mut self, scene: Option<&Arc<SceneModel>>, seeds: usize) {
         let Some(scene) = scene else { return };
         self.take_scene(scene);
@@ -114,7 +113,7 @@ impl Planner {
         let of_scene = (scene.header.name.read(), scene.header.upper_m);
         if self.of_scene.as_ref() != Some(&of_scene) {
             if self.history.is_some() {
-                self.message = Some(Err("The plan was for another scene and is put away.".to_owned()));
+                self.message = Some(Err("The plan was for another scene and was discarded.".to_owned()));
             }
             *self = Self {
                 of_scene: Some(of_scene),
@@ -133,7 +132,9 @@ impl Planner {
                     self.change();
                 }
                 JobUpdate::Message(Err(why)) => self.no_outlines(key, template, why),
-                JobUpdate::Ended => self.no_outlines(key, template, "the scene's anatomy was not made out".to_owned()),
+                JobUpdate::Ended => {
+                    self.no_outlines(key, template, "the scene's anatomy could not be determined".to_owned())
+                }
             }
             return;
         }
@@ -147,8 +148,8 @@ impl Planner {
                 self.compensated.clear();
             }
             let model = scene.clone();
-            let job = Job::begin("anatomy", move |told, _| {
-                let _ = told.send(AnatomyOutlines::of(&model, template));
+            let job = Job::begin("anatomy", move |messages, _| {
+                let _ = messages.send(AnatomyOutlines::of(&model, template));
             });
             self.outlining = Some((key.0, key.1, template, job));
         }
@@ -182,8 +183,8 @@ impl Planner {
             return;
         }
         let (outlines, plan) = (outlines.clone(), plan.clone());
-        let job = Job::begin("plan check", move |told, _| {
-            let _ = told.send(problems(&plan, &outlines.anatomy));
+        let job = Job::begin("plan check", move |messages, _| {
+            let _ = messages.send(problems(&plan, &outlines.anatomy));
         });
         self.checking = Some((self.revision, job));
     }
@@ -191,7 +192,7 @@ impl Planner {
     fn take_job(&mut self) {
         let Some((job, progress)) = &mut self.job else { return };
         let mut news = job.poll();
-        // Of several words the last is what is true.
+        // Of several messages on the progress the last one counts.
         while let JobUpdate::Message(JobMessage::Progress(now)) = news {
             *progress = now;
             news = job.poll();
@@ -219,7 +220,7 @@ impl Planner {
         self.job.is_some()
     }
 
-    /// What is being done is no longer wanted.
+    /// Cancels the job.
     pub fn cancel(&mut self) {
         self.job = None;
     }
@@ -231,7 +232,7 @@ impl Planner {
     ) {
         let job = match (&self.outlines, self.is_busy()) {
             (_, true) => return,
-            (None, _) => Err("the scene's anatomy is not known yet; wait a moment".to_owned()),
+            (None, _) => Err("the scene's anatomy is not known yet; try again in a moment".to_owned()),
             (Some(outlines), false) => begin(self, outlines.clone()),
         };
         match job {
@@ -251,7 +252,7 @@ impl Planner {
     }
 
     pub fn fit_strength(&mut self) {
-        self.begin_job("Looking for the strength", |planner, outlines| {
+        self.begin_job("Fitting the strength", |planner, outlines| {
             Ok(jobs::strength(outlines, Arc::new(planner.planned()?.clone())))
         });
     }
@@ -266,7 +267,7 @@ impl Planner {
         });
     }
 
-    /// Of the needles that are still to come.
+    /// Compensates the needles that are not inserted yet.
     pub fn compensate(&mut self, instance: Instance, pace: Pace) {
         self.begin_job("Rehearsing", |planner, _| {
             let begun = planner.progress.begun();
@@ -283,7 +284,7 @@ impl Planner {
         self.plan().ok_or_else(|| "there is no plan yet; make one".to_owned())
     }
 
-    /// An empty one.
+    /// Begins an empty plan.
     pub fn begin(&mut self) {
         let (Some(outlines), None) = (&self.outlines, &self.history) else {
             return;
@@ -300,7 +301,7 @@ impl Planner {
         }
     }
 
-    /// Back to one needle.
+    /// Discards the plan; one needle is left.
     pub fn discard(&mut self) {
         (self.history, self.job, self.problems) = (None, None, None);
         self.compensated.clear();
@@ -308,7 +309,7 @@ impl Planner {
         self.change();
     }
 
-    /// A needle through the hole, with as many seeds as fill the target behind it.
+    /// Adds a needle through the hole, with as many seeds as fill the target behind it.
     pub fn add(&mut self, hole: Hole) {
         let piece = self.outlines.as_ref().and_then(|g| g.piece_m(hole));
         let strength_u = |plan: &ImplantPlan| {
@@ -376,11 +377,13 @@ impl Planner {
         self.change();
     }
 
-    /// A plan that leaves what is in the tissue as it is and is not too much for the core.
+    /// The plan, if it keeps the inserted needles and the core can hold it.
     fn can_be(&self, plan: ImplantPlan) -> Result<ImplantPlan, String> {
         if plan.seed_count() > MAX_SEEDS {
             let count = plan.seed_count();
-            return Err(format!("that makes {count} seeds; at most {MAX_SEEDS} can be placed"));
+            return Err(format!(
+                "that would be {count} seeds; at most {MAX_SEEDS} can be placed"
+            ));
         }
         match self.plan() {
             Some(before) => self.keeps(before, &plan).map(|()| plan),
@@ -393,13 +396,13 @@ impl Planner {
         let first = |plan: &ImplantPlan| plan.needles.iter().take(begun).cloned().collect::<Vec<_>>();
         if begun > 0 && first(before) != first(after) {
             return Err(format!(
-                "{begun} needles have gone in already; only those after them can be changed"
+                "{begun} needles are already inserted; only those after them can be changed"
             ));
         }
         Ok(())
     }
 
-    /// The plan or what it lies on has changed.
+    /// The plan or its anatomy has changed.
     fn change(&mut self) {
         self.revision += 1;
         let plan = self.history.as_ref().map(History::plan);
@@ -419,7 +422,7 @@ impl Planner {
         }
     }
 
-    /// What is done with a needle.
+    /// Path and drops of a needle.
     pub fn task(&self, number: usize) -> Option<NeedleTask> {
         let needle = self.plan()?.needles.get(number)?;
         let found = self.compensated.iter().find(|(n, _)| n == needle);
@@ -441,7 +444,7 @@ impl Planner {
             .collect()
     }
 
-    /// The needle goes in now; so many seeds lie in the tissue.
+    /// A needle is inserted now, with so many seeds in the tissue.
     pub fn begin_needle(&mut self, number: usize, seeds: usize) {
         let mut progress = self.progress.clone();
         progress.begin(number, seeds);

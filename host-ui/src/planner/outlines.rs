@@ -1,4 +1,4 @@
-//! What a plan is drawn on: the scene's anatomy behind the holes of a template, made once a scene.
+//! Outlines of the scene's anatomy behind the holes of a template, made once per scene.
 
 use crate::mesh::cut;
 use nalgebra::Vector3;

@@ -62,13 +62,13 @@ pub struct Shown {
     /// Why the dose is not known, where that is so.
     pub dose_trouble: Option<&'static str>,
     pub planning: Planning,
-    /// Refusals of requests that the operator has not yet put away, and the last reason.
+    /// Refusals of requests that the operator has not yet dismissed, and the last reason.
     pub refusals: u64,
     pub last_refusal: String,
     /// Gamepads and 3D mice, and whether this window has the focus that they need.
     pub controllers: Latest,
     pub has_focus: bool,
-    /// The device that was unplugged, until that is put away or a device comes.
+    /// The device that was unplugged, until the message is dismissed or a device is plugged in.
     pub disconnected: Option<String>,
     pub cost: FrameCost,
 }
@@ -79,7 +79,7 @@ pub struct TipOnPath {
     /// From the entry along the path, and how far the path goes.
     pub depth_m: f64,
     pub length_m: f64,
-    /// Beside the path: to the right and up, as one sees the template.
+    /// Beside the path: to the right and up, as seen from the perineum.
     pub beside_m: [f64; 2],
     /// How far beside the path there are holes.
     pub room_m: [[f64; 2]; 2],
@@ -253,7 +253,7 @@ impl Shown {
             .max_by(f64::total_cmp)
     }
 
-    /// Share of the way to the puncture that the membrane in front of the tip has gone; `None` where there is none.
+    /// Depth of the membrane in front of the tip as a share of the depth at which it is punctured; `None` where there is none.
     pub fn membrane_tension(&self) -> Option<f64> {
         let is_pressed = |s: &&HapticState| s.flags & flags::IN_CONTACT != 0 && s.flags & flags::PUNCTURED == 0;
         let state = self.state.as_ref().filter(is_pressed)?;
@@ -266,7 +266,7 @@ impl Shown {
         Some([0, 1, 2].map(|i| plan.entry_m[i] + plan.direction[i] * depth_m))
     }
 
-    /// A place at a depth along the planned path and beside it: to the right and up, as one sees the template.
+    /// A place at a depth along the planned path and beside it: to the right and up, as seen from the perineum.
     pub fn beside_path_m(&self, depth_m: f64, beside_m: [f64; 2]) -> Option<[f64; 3]> {
         let on_path = self.on_path_m(depth_m)?;
         let Some((_, axes)) = self.across() else {

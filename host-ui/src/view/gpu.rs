@@ -311,7 +311,7 @@ impl Gpu {
         ((looks.len() + shells.len() + 1) * size_of::<SceneUniform>()) as u64
     }
 
-    /// The highest dose is innermost and comes first.
+    /// The highest dose is innermost and is drawn first.
     fn draw_shells(&self, pass: &mut wgpu::RenderPass<'_>, count: usize) {
         for shell in self.shells.iter().take(count).rev().filter(|s| s.indices.len > 0) {
             for pipeline in [&self.pipelines.surface_back, &self.pipelines.surface_front] {

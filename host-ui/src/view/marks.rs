@@ -49,7 +49,7 @@ fn single(v: [f64; 3]) -> V {
     V::new(v[0] as f32, v[1] as f32, v[2] as f32)
 }
 
-/// A unit vector, whatever came.
+/// A unit vector, also of a vector without direction.
 fn unit_or_z(v: V) -> V {
     v.try_normalize(1e-6).unwrap_or_else(V::z)
 }

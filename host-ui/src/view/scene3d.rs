@@ -202,7 +202,7 @@ impl Scene3d {
                 };
                 legend.landmarks(self.corner_m, view);
                 legend.scale_bar();
-                // Beside the slices these tell the levels already.
+                // Beside the slices, these show the levels already.
                 let alone = dose.filter(|_| rect.width() > ALONE);
                 legend.rows(self.look, alone.map(|d| &**d));
             }

@@ -20,13 +20,13 @@ pub fn json(path: &Path, value: &Value) -> Result<(), String> {
 }
 
 fn csv(path: &Path, header: &[String], rows: impl Iterator<Item = Vec<String>>) -> Result<(), String> {
-    let told = |e: csv::Error| format!("{} cannot be written ({e})", path.display());
-    let mut writer = csv::Writer::from_path(path).map_err(told)?;
-    writer.write_record(header).map_err(told)?;
+    let failed = |e: csv::Error| format!("{} cannot be written ({e})", path.display());
+    let mut writer = csv::Writer::from_path(path).map_err(failed)?;
+    writer.write_record(header).map_err(failed)?;
     for row in rows {
-        writer.write_record(&row).map_err(told)?;
+        writer.write_record(&row).map_err(failed)?;
     }
-    writer.flush().map_err(|e| told(e.into()))
+    writer.flush().map_err(|e| failed(e.into()))
 }
 
 fn owned(header: &[&str]) -> Vec<String> {

@@ -116,7 +116,7 @@ impl ParametersState {
         });
     }
 
-    /// Takes every value of a file, or none and says all that is wrong with it.
+    /// Takes every value of a file, or none and shows everything that is wrong with it.
     fn load_preset(&mut self) {
         match preset::load(Path::new(self.preset_path.trim())) {
             Ok(values) => values.into_iter().for_each(|(index, value)| self.edit(index, value)),
@@ -148,7 +148,7 @@ pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersS
         .show(ctx, |ui| {
             if shown.parameters.is_none() {
                 ui.label(
-                    RichText::new("rt-core has not told its parameters yet; these are the defaults.")
+                    RichText::new("rt-core has not reported its parameters yet; these are the defaults.")
                         .color(theme::of(ui).warn),
                 );
             }
@@ -163,7 +163,7 @@ pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersS
                         group_ui(ui, shown, state, (group, &found));
                     }
                     if found.is_empty() {
-                        ui.label(theme::weak("No parameter has these words."));
+                        ui.label(theme::weak("No parameter matches."));
                     }
                 });
             ui.separator();
@@ -335,7 +335,7 @@ fn foot_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState) {
     }
 }
 
-/// As few digits as say it.
+/// As few digits as needed.
 fn plain(value: f64) -> String {
     let text = format!("{value:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

@@ -13,18 +13,18 @@ pub fn save(path: &Path, set: &ParameterSet) -> Result<(), String> {
 
 /// Place in the table and SI value of each parameter in the file.
 pub fn load(path: &Path) -> Result<Vec<(usize, f64)>, String> {
-    let told = |why: String| format!("{}: {why}", path.display());
-    let about = std::fs::metadata(path).map_err(|e| told(format!("it cannot be opened: {e}")))?;
+    let named = |why: String| format!("{}: {why}", path.display());
+    let about = std::fs::metadata(path).map_err(|e| named(format!("it cannot be opened: {e}")))?;
     // A device would never end.
     if !about.is_file() {
-        return Err(told("it is no file".to_owned()));
+        return Err(named("it is not a regular file".to_owned()));
     }
     let size = about.len();
     if size > MAX_BYTES {
-        return Err(told(format!("it has {size} bytes; a preset has a few thousand")));
+        return Err(named(format!("it has {size} bytes; a preset has a few thousand")));
     }
-    let text = std::fs::read_to_string(path).map_err(|e| told(format!("it cannot be read: {e}")))?;
-    read(&text).map_err(told)
+    let text = std::fs::read_to_string(path).map_err(|e| named(format!("it cannot be read: {e}")))?;
+    read(&text).map_err(named)
 }
 
 fn text(set: &ParameterSet) -> String {

@@ -1,4 +1,4 @@
-//! What came of it: the error of each seed, the dose against its limits, the histogram of the target.
+//! The debrief: the error of each seed, the dose against its limits, the histogram of the target.
 
 use crate::action::Action;
 use crate::dose_worker::{DoseResult, Figure, Limit};
@@ -60,7 +60,7 @@ fn figure_ui(ui: &mut egui::Ui, figure: &Figure) {
         ui.label("");
         return ui.end_row();
     };
-    // The word says it as well as the colour.
+    // The word repeats what the colour shows.
     let (word, color) = match (limit.is_met(figure.value), limit) {
         (true, _) => ("met".to_owned(), tokens.good),
         (false, Limit::AtLeast(value)) => (format!("below {value:.0}"), tokens.bad),
@@ -92,7 +92,7 @@ fn dvh_ui(ui: &mut egui::Ui, dose: &DoseResult, height: f32) {
         });
 }
 
-/// Nothing until the first seed is placed: an empty table tells nothing.
+/// Nothing until the first seed is placed.
 pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
     if shown.seeds.is_empty() || rows.is_empty() {
         return;

@@ -1,4 +1,4 @@
-//! The first step: which body the needle goes into.
+//! The first step: the scene.
 
 use super::WorkflowState;
 use super::job::job_ui;
@@ -45,7 +45,7 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
         let image = ui
             .add_enabled(free && shown.scene.is_some(), Button::new("Load image…"))
             .on_hover_text(
-                "Greys of the same patient for the slices, in place of simulated ultrasound; they move with the tissue",
+                "Image of the same patient for the slices, instead of simulated ultrasound; it moves with the tissue",
             );
         if (scene.clicked() || entered) && free {
             actions.push(Action::LoadScene(PathBuf::from(path)));

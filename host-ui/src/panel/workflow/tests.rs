@@ -1,4 +1,4 @@
-//! Which needle of a plan comes next.
+//! Which needle of a plan is next.
 
 use super::{Progress, is_needle_done, next_action, progress};
 use crate::action::{Action, PlanAction};

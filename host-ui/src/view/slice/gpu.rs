@@ -148,7 +148,7 @@ impl SliceGpu {
         self.set_field(&Field::rest(nodes_info));
     }
 
-    /// What they are bound to has gone; their textures are used again.
+    /// Drops what they are bound to; their textures are used again.
     fn put_panes_away(&mut self) {
         self.targets = self.panes.drain(..).map(|pane| pane.target).collect();
         self.content += 1;

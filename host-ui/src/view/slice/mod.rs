@@ -147,7 +147,7 @@ impl Slices {
         }
     }
 
-    /// Greys of the patient of a scene, until another scene comes.
+    /// Shows an image of the patient of a scene, until another scene is loaded.
     pub fn show_image(&mut self, image: Image, scene: &str) -> Result<(), String> {
         let Some(gpu) = &mut self.gpu else {
             return Err("there is no graphics device to show an image".to_owned());

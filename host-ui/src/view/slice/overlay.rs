@@ -21,7 +21,7 @@ const NEEDLE_M: f64 = 0.12;
 /// Drawn and blank points of an isodose line; one that is never blank is solid.
 const DASHES: [[f32; 2]; 4] = [[2.0, 3.0], [1.0, 0.0], [8.0, 3.0], [3.0, 2.0]];
 
-/// Lines of one slice, cut anew only when the plane or what it cuts has changed.
+/// Lines of one slice, cut again only when the plane or what it cuts has changed.
 #[derive(Default)]
 pub struct Lines {
     /// Plane and surface of the contours; plane and dose of the isodose lines.
@@ -233,14 +233,15 @@ impl Overlay<'_> {
         }
     }
 
-    /// Words on a dark ground, so that they can be read on any tissue.
+    /// Words on a dark background, so that they can be read on any tissue.
     fn word(&self, at: Pos2, anchor: Align2, text: &str, size: f32, color: Color32) -> Rect {
         let galley = self
             .painter
             .layout_no_wrap(text.to_owned(), FontId::proportional(size), color);
         let rect = anchor.anchor_size(at, galley.size());
-        let ground = IMAGE.background.gamma_multiply(0.66);
-        self.painter.rect_filled(rect.expand2(Vec2::new(3.0, 0.0)), 2.0, ground);
+        let background = IMAGE.background.gamma_multiply(0.66);
+        self.painter
+            .rect_filled(rect.expand2(Vec2::new(3.0, 0.0)), 2.0, background);
         self.painter.galley(rect.min, galley, color);
         rect
     }

@@ -1,4 +1,4 @@
-//! In the step: make a plan, compensate it, keep it in a file, and what dose it gives.
+//! The step of the plan: make one, compensate it, save it, and its dose.
 
 use super::super::{WorkflowState, debrief, hinted, main_button, progress, undo_action};
 use super::summary;
@@ -58,7 +58,7 @@ fn begin_ui(ui: &mut egui::Ui, shown: &Shown, (ready, free): (bool, bool), actio
 fn automatic_ui(ui: &mut egui::Ui, shown: &Shown, free: bool, actions: &mut Vec<Action>) {
     let can = free && shown.planning.outlines.is_some();
     let response = ui.add_enabled(can, Button::new("Automatic plan"));
-    let hint = "Needles near the edge of the target, fewer inside, none near what is to be spared";
+    let hint = "Needles near the edge of the target, fewer inside, none near spared structures";
     if response.on_hover_text(hint).clicked() {
         actions.push(Action::Plan(PlanAction::Automatic));
     }
@@ -82,7 +82,7 @@ fn implant_ui(ui: &mut egui::Ui, shown: &Shown, implant: &Implant, free: bool, a
         } else {
             super::next_needle_ui(ui, shown, actions);
         }
-        let discard = ui.add_enabled(free, Button::new("Put the plan away"));
+        let discard = ui.add_enabled(free, Button::new("Discard the plan"));
         if discard
             .on_hover_text("Back to one needle; save it first to keep it")
             .clicked()

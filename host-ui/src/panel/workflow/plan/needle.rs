@@ -77,7 +77,7 @@ fn head_ui(ui: &mut egui::Ui, implant: &Implant, number: usize, can: bool, actio
 fn row_ui(ui: &mut egui::Ui, implant: &Implant, number: usize, actions: &mut Vec<Action>) {
     let needle = &implant.plan.needles[number];
     let Some(was) = Row::of(needle) else {
-        ui.label(theme::small("It has no seeds; take it away and add it anew."));
+        ui.label(theme::small("It has no seeds; remove it and add it again."));
         return;
     };
     let mut row = was;
@@ -126,7 +126,7 @@ fn millimetres(value: &mut f64, range: std::ops::RangeInclusive<f64>) -> DragVal
 
 fn labelled(ui: &mut egui::Ui, name: &str, value: DragValue<'_>) {
     let label = ui.label(theme::small(name));
-    // What a file says stays as it is until a hand changes it.
+    // A value from a file is kept until the operator changes it.
     let value = value.clamp_existing_to_range(false).update_while_editing(false);
     ui.add(value).labelled_by(label.id);
 }

@@ -1,4 +1,4 @@
-//! The template as the operator sees it from the perineum: patient's right at the left, anterior at the top.
+//! The template as seen from the perineum: patient's right at the left, anterior at the top.
 
 use super::PlanState;
 use crate::action::{Action, PlanAction};
@@ -42,7 +42,7 @@ pub fn template_ui(
     steer(ui, &response, implant, state, actions);
     let hovered = holes_ui(ui, &response, &board, implant, state);
     response.widget_info(|| {
-        let what = told(implant, state.hole);
+        let what = hole_text(implant, state.hole);
         egui::WidgetInfo::labeled(
             egui::accesskit::Role::Grid,
             ui.is_enabled(),
@@ -66,13 +66,13 @@ pub fn template_ui(
     look.holes(implant);
     look.chosen(state.hole);
     if let Some(hole) = hovered {
-        response.on_hover_text_at_pointer(told(implant, hole));
+        response.on_hover_text_at_pointer(hole_text(implant, hole));
     }
     depth_ui(ui, shown, state, actions);
 }
 
 /// Hole, depth, seeds, in words.
-fn told(implant: &Implant, hole: Hole) -> String {
+fn hole_text(implant: &Implant, hole: Hole) -> String {
     let number = implant.plan.needles.iter().position(|n| n.hole == Some(hole));
     let Some(number) = number else {
         return format!("{hole}: no needle");
@@ -91,7 +91,7 @@ fn told(implant: &Implant, hole: Hole) -> String {
     )
 }
 
-/// Arrows go from hole to hole, with Shift they take the needle along; Enter adds one, Delete takes it away.
+/// Arrows go from hole to hole, with Shift they move the needle; Enter adds one, Delete removes it.
 fn steer(ui: &egui::Ui, response: &Response, implant: &Implant, state: &mut PlanState, actions: &mut Vec<Action>) {
     if !response.has_focus() || !ui.is_enabled() {
         return;
@@ -155,7 +155,7 @@ fn holes_ui(
         let rect = Rect::from_center_size(board.at(hole), Vec2::splat(board.pitch));
         let response = ui.interact(rect, template.id.with(hole), Sense::CLICK);
         response.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::accesskit::Role::Button, ui.is_enabled(), told(implant, hole))
+            egui::WidgetInfo::labeled(egui::accesskit::Role::Button, ui.is_enabled(), hole_text(implant, hole))
         });
         if response.hovered() {
             hovered = Some(hole);
