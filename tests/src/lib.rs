@@ -1,11 +1,9 @@
 //! Fixtures for whole-system tests: a core process of its own for each test, and a host that talks to it.
 
-pub mod controllers;
 pub mod hand;
 pub mod phantom;
 pub mod rehearsal;
 pub mod stopped;
-pub mod window;
 pub mod window_process;
 
 use std::path::PathBuf;
@@ -15,22 +13,7 @@ use std::time::{Duration, Instant};
 use stylet_host::link::{Link, LinkStatus};
 use stylet_shm_schema::CommandKind;
 use stylet_shm_schema::service::Instance;
-
-/// A built program of the workspace; `make test` builds them first.
-pub fn program(name: &str) -> PathBuf {
-    let test = std::env::current_exe().expect("a test knows its own file");
-    let folder = test
-        .parent()
-        .and_then(|deps| deps.parent())
-        .expect("tests live in <target>/<profile>/deps");
-    let path = folder.join(name);
-    assert!(
-        path.exists(),
-        "{} is missing: run `cargo build --release --workspace` first",
-        path.display()
-    );
-    path
-}
+pub use stylet_test_kit::{program, scratch};
 
 /// An instance name that no other test uses.
 pub fn fresh_instance() -> Instance {
@@ -46,18 +29,6 @@ impl Drop for Alone {
     fn drop(&mut self) {
         self.0.sweep();
     }
-}
-
-/// A folder for one test's files, emptied first.
-pub fn scratch(name: &str) -> PathBuf {
-    let folder = program("rt-core")
-        .parent()
-        .expect("has a folder")
-        .join("test-out")
-        .join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).expect("the target folder can be written");
-    folder
 }
 
 /// A running `rt-core`; ended when dropped.
