@@ -2,7 +2,7 @@
 
 use crate::action::{Action, Viewpoint};
 use egui::{Key, Modifiers};
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::Request;
 
 /// Every key, for the overlay and the manual.
 pub const KEYS: [(&str, &str); 26] = [
@@ -86,9 +86,9 @@ pub fn read(ctx: &egui::Context) -> Keys {
         (Modifiers::NONE, Key::Num3, Action::LookFrom(Viewpoint::Side)),
         (Modifiers::NONE, Key::Num4, Action::LookFrom(Viewpoint::Above)),
         (Modifiers::NONE, Key::Num5, Action::LookFrom(Viewpoint::Needle)),
-        (Modifiers::NONE, Key::Space, Action::Send(CommandKind::DropSeed)),
-        (Modifiers::NONE, Key::E, Action::Send(CommandKind::Engage)),
-        (Modifiers::NONE, Key::D, Action::Send(CommandKind::Disengage)),
+        (Modifiers::NONE, Key::Space, Action::Send(Request::DropSeed)),
+        (Modifiers::NONE, Key::E, Action::Send(Request::Engage)),
+        (Modifiers::NONE, Key::D, Action::Send(Request::Disengage)),
         (Modifiers::NONE, Key::P, Action::OpenParameters),
         (Modifiers::NONE, Key::R, Action::ResetView),
     ];

@@ -140,9 +140,9 @@ impl Shown {
         self.scene = link.scene().map(|s| s.header);
         self.plan = link.plan().filter(|p| p.generation > 0 && p.seed_count > 0).copied();
         self.parameters = link.parameters().copied();
-        self.invalid_dropped = link.rubbish_refused();
+        self.invalid_dropped = link.invalid_dropped();
         let refusals = link.events().iter().rev();
-        let last = refusals.clone().find(|e| e.kind == EventKind::RubbishRefused as u32);
+        let last = refusals.clone().find(|e| e.kind == EventKind::InvalidRefused as u32);
         self.last_refusal = last.map_or_else(String::new, |e| e.text.read());
         self.seeds.clear();
         self.snapshot_residual = None;
