@@ -1,6 +1,7 @@
 //! The command line of `host-ui`.
 
 use crate::app;
+use crate::command::CommandError;
 use crate::command::convert::ConvertArgs;
 use crate::command::dose::{DoseArgs, PerturbArgs};
 use crate::command::plan::PlanArgs;
@@ -153,14 +154,14 @@ enum SceneTask {
 }
 
 impl Cli {
-    pub fn run(self) -> Result<(), String> {
+    pub fn run(self) -> Result<(), CommandError> {
         if self.task.is_some() {
             interrupt::end_with_reader();
         }
         match self.task {
             None => {
                 if self.image.is_some() && self.window.file().is_none() {
-                    return Err("--image belongs to a patient: give the segmentation with --scene FILE".to_owned());
+                    return Err("--image belongs to a patient: give the segmentation with --scene FILE".into());
                 }
                 let instance = self.window.instance;
                 let ended = app::run(app::Options {
@@ -172,9 +173,9 @@ impl Cli {
                     pause: !self.without_pause,
                 });
                 instance.sweep();
-                ended
+                Ok(ended?)
             }
-            Some(Task::Controllers) => controller::list(),
+            Some(Task::Controllers) => Ok(controller::list()?),
             Some(Task::Scene(SceneTask::Check { file, label })) => check(&file, label),
             Some(Task::Record {
                 instance,
@@ -184,7 +185,7 @@ impl Cli {
             }) => {
                 let fits = duration.is_none_or(|s| s > 0.0 && s < 1e6) && (0.0..=200.0).contains(&snapshot_rate);
                 if !fits {
-                    return Err("--duration needs seconds above 0, --snapshot-rate 0 to 200 Hz".to_owned());
+                    return Err("--duration needs seconds above 0, --snapshot-rate 0 to 200 Hz".into());
                 }
                 let ended = record::run(&record::Options {
                     instance: instance.clone(),
@@ -193,10 +194,15 @@ impl Cli {
                     snapshots_hz: snapshot_rate,
                 });
                 instance.sweep();
-                ended
+                Ok(ended?)
             }
-            Some(Task::Export { recording, csv, motion }) => record::export(&record::Export { recording, csv, motion }),
-            Some(Task::Flight { instance }) => record::save_flight(&instance).map(|path| println!("written: {path}")),
+            Some(Task::Export { recording, csv, motion }) => {
+                Ok(record::export(&record::Export { recording, csv, motion })?)
+            }
+            Some(Task::Flight { instance }) => {
+                println!("written: {}", record::save_flight(&instance)?);
+                Ok(())
+            }
             Some(Task::Convert(args)) => args.run(),
             Some(Task::Plan(args)) => args.run(),
             Some(Task::Dose(args)) => args.run(),
@@ -212,7 +218,7 @@ impl Cli {
                 seeds,
             }) => {
                 if let Some(speed) = insert_speed.filter(|s| !(0.1..=500.0).contains(s)) {
-                    return Err(format!("--insert-speed {speed}: give 0.1 to 500 mm/s"));
+                    return Err(format!("--insert-speed {speed}: give 0.1 to 500 mm/s").into());
                 }
                 let instance = common.instance.clone();
                 let ended = procedure::run(procedure::Options {
@@ -225,14 +231,14 @@ impl Cli {
                     source,
                 });
                 instance.sweep();
-                ended
+                Ok(ended?)
             }
         }
     }
 }
 
-fn check(file: &Path, label: Option<u8>) -> Result<(), String> {
-    let v = files::read(file, label, &files::Progress::default()).map_err(|e| e.to_string())?;
+fn check(file: &Path, label: Option<u8>) -> Result<(), CommandError> {
+    let v = files::read(file, label, &files::Progress::default())?;
     println!("{}", v.name);
     if files::scene::is_scene(file) {
         check_scene_file(file)?;
@@ -283,8 +289,8 @@ fn check(file: &Path, label: Option<u8>) -> Result<(), String> {
 }
 
 /// Prints what a scene file holds besides its volume; its plan is read.
-fn check_scene_file(file: &Path) -> Result<(), String> {
-    let scene = files::scene::read(file).map_err(|e| e.to_string())?;
+fn check_scene_file(file: &Path) -> Result<(), CommandError> {
+    let scene = files::scene::read(file)?;
     let plan = scene
         .plan
         .as_ref()
@@ -303,7 +309,7 @@ fn check_scene_file(file: &Path) -> Result<(), String> {
     }
     if let Some(named) = &scene.image {
         let path = file.with_file_name(named);
-        let image = files::Image::read(&path, &files::Progress::default()).map_err(|e| e.to_string())?;
+        let image = files::Image::read(&path, &files::Progress::default())?;
         let [x, y, z] = image.dims;
         println!("  image: {x} x {y} x {z} voxels in {}", path.display());
     }

@@ -11,7 +11,18 @@ pub enum Loaded {
     Image(Image),
 }
 
-type Outcome = Result<Loaded, String>;
+/// A file that could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    /// The file was refused, with the reason.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The thread ended without an outcome.
+    #[error("{}: the reader ended before the file was read", .0.display())]
+    Ended(PathBuf),
+}
+
+type Outcome = Result<Loaded, LoadError>;
 
 struct Reading {
     path: PathBuf,
@@ -45,7 +56,7 @@ impl Loader {
         let job = Job::begin("file reader", move |answer, interrupt| {
             let outcome = read(&owned, &reported.ended_by(interrupt.clone()));
             // The window may be closed by now; then nobody reads the answer.
-            let _ = answer.send(outcome.map_err(|e| e.to_string()));
+            let _ = answer.send(outcome.map_err(LoadError::from));
         });
         let path = path.to_owned();
         self.reading = Some(Reading { path, progress, job });
@@ -72,10 +83,7 @@ impl Loader {
         let outcome = match reading.job.poll() {
             JobUpdate::Pending => return None,
             JobUpdate::Message(outcome) => outcome,
-            JobUpdate::Ended => Err(format!(
-                "{}: the reader ended before the file was read",
-                reading.path.display()
-            )),
+            JobUpdate::Ended => Err(LoadError::Ended(reading.path.clone())),
         };
         self.reading = None;
         Some(outcome)

@@ -3,6 +3,8 @@
 //! Events go one way: `found` (which devices there are) → `state` (events to a [`Wish`]) → `hub` (which device holds
 //! the needle) → `reader` (the thread) → the window, which asks the core to move the hand as it does for the mouse.
 
+#![warn(missing_docs)]
+
 mod axis;
 mod found;
 mod hub;

@@ -14,7 +14,9 @@ use stylet_implant::score::{self, Implant, Motion, Score, SeedPair};
 use stylet_shm_schema::{SeedPose, TickRecord};
 
 /// The folder of what was written, or why it could not be.
-pub(super) type Saved = Result<PathBuf, String>;
+pub(super) type Saved = Result<PathBuf, Failure>;
+/// Whatever was wrong, to be shown as text.
+type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 /// Everything that a debrief is made of, as it was when it was asked for.
 struct Delivered {
@@ -41,7 +43,7 @@ impl App {
                     let _ = messages.send(write(&delivered, folder));
                 }));
             }
-            Err(why) => self.shown.note = Some(refusal(why)),
+            Err(why) => self.shown.note = Some(refusal(why.to_string())),
         }
     }
 
@@ -50,7 +52,7 @@ impl App {
         let saved = match job.poll() {
             JobUpdate::Pending => return,
             JobUpdate::Message(saved) => saved,
-            JobUpdate::Ended => Err("the debrief was not written: its thread ended before it replied".to_owned()),
+            JobUpdate::Ended => Err("the debrief was not written: its thread ended before it replied".into()),
         };
         self.debrief = None;
         self.shown.note = Some(match saved {
@@ -58,11 +60,11 @@ impl App {
                 refused: false,
                 text: format!("Debrief saved as {}", folder.display()),
             },
-            Err(why) => refusal(why),
+            Err(why) => refusal(why.to_string()),
         });
     }
 
-    fn delivered(&self) -> Result<Delivered, String> {
+    fn delivered(&self) -> Result<Delivered, Failure> {
         let scene = self.link.scene().ok_or("there is no scene yet")?.clone();
         let implant = self.shown.planning.implant.as_ref();
         let (source, prescription_gy) = match implant {
@@ -132,7 +134,7 @@ impl App {
     }
 }
 
-fn write(delivered: &Delivered, folder: PathBuf) -> Saved {
+fn write(delivered: &Delivered, folder: PathBuf) -> Result<PathBuf, Failure> {
     let anatomy = Anatomy::of(&delivered.scene)?;
     let kernel = DoseKernel::new(&delivered.source, Interval::ALL);
     let score = Score::of(Implant {
@@ -146,7 +148,7 @@ fn write(delivered: &Delivered, folder: PathBuf) -> Saved {
         motion: delivered.motion,
         records: &delivered.records,
     })?;
-    std::fs::create_dir_all(&folder).map_err(|e| format!("{} cannot be made ({e})", folder.display()))?;
+    std::fs::create_dir_all(&folder).map_err(|e| format!("{} cannot be created ({e})", folder.display()))?;
     score::write(&score, &folder)?;
     Ok(folder)
 }

@@ -102,7 +102,7 @@ pub struct App {
 }
 
 /// Opens the window and returns when it is closed.
-pub fn run(options: Options) -> Result<(), String> {
+pub fn run(options: Options) -> Result<(), WindowError> {
     let mut native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("Stylet")
@@ -117,13 +117,16 @@ pub fn run(options: Options) -> Result<(), String> {
         native.wgpu_options.surface.present_mode = eframe::wgpu::PresentMode::AutoNoVsync;
     }
     let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::new(cc, options))));
-    eframe::run_native("Stylet", native, create).map_err(|e| {
-        format!(
-            "cannot open a window: {e}. It needs a display (DISPLAY or WAYLAND_DISPLAY) and a graphics driver (mesa-vulkan-drivers); \
-             without them use `host-ui procedure`"
-        )
-    })
+    Ok(eframe::run_native("Stylet", native, create)?)
 }
+
+/// The window could not be opened.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "cannot open a window: {0}. It needs a display (DISPLAY or WAYLAND_DISPLAY) and a graphics driver (mesa-vulkan-drivers); \
+     without them use `host-ui procedure`"
+)]
+pub struct WindowError(#[from] eframe::Error);
 
 impl App {
     /// What the window knows of the core.

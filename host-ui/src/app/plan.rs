@@ -4,6 +4,7 @@ use super::drive::Drive;
 use super::{App, refusal};
 use crate::action::PlanAction;
 use crate::panel::workflow::Progress;
+use crate::planner::Message;
 use crate::shown::Note;
 use nalgebra::Vector3;
 use stylet_implant::workflow::{Run, default_plan, plan_request};
@@ -18,8 +19,8 @@ impl App {
         self.planner.take(self.link.scene(), self.shown.seeds.len());
         if let Some(message) = self.planner.take_message() {
             self.shown.note = Some(match message {
-                Ok(text) => Note { refused: false, text },
-                Err(why) => refusal(why),
+                Message::Done(text) => Note { refused: false, text },
+                Message::Refused(why) => refusal(why),
             });
         }
         self.shown.planning = self.planner.planning();
@@ -41,7 +42,7 @@ impl App {
             PlanAction::Remove(needle) => planner.edit(|plan| plan.without_needle(needle)),
             PlanAction::Move(needle, hole) => planner.edit(|plan| plan.with_needle_at(needle, hole)),
             PlanAction::SetRow(needle, row) => planner.set_row(needle, row),
-            PlanAction::SetStrength(strength_u) => planner.edit(|plan| Ok(plan.with_strength(strength_u))),
+            PlanAction::SetStrength(strength_u) => planner.edit(|plan| Ok::<_, String>(plan.with_strength(strength_u))),
             PlanAction::FitStrength => planner.fit_strength(),
             PlanAction::Compensate => planner.compensate(self.link.instance().clone(), self.pace),
             PlanAction::Cancel => planner.cancel(),

@@ -113,7 +113,7 @@ impl App {
                     text: format!("Picture saved as {}", path.display()),
                 });
             }
-            Some(Err(why)) => self.shown.note = Some(refusal(why)),
+            Some(Err(why)) => self.shown.note = Some(refusal(why.to_string())),
         }
     }
 
@@ -124,7 +124,7 @@ impl App {
             self.drive.forget();
             if self.uploading.take().is_some() {
                 self.image_to_come = None;
-                self.shown.load = LoadState::Refused("rt-core went away before it answered".to_owned());
+                self.shown.load = LoadState::Refused("rt-core ended before it replied".to_owned());
             }
             return;
         }
@@ -178,7 +178,7 @@ impl App {
         }
         match self.loader.poll() {
             None => {}
-            Some(Err(why)) => self.shown.load = LoadState::Refused(why),
+            Some(Err(why)) => self.shown.load = LoadState::Refused(why.to_string()),
             Some(Ok(Loaded::Scene(volume, image))) => {
                 self.image_to_come = image.map(|image| (image, volume.name.clone()));
                 self.upload(&volume);
@@ -233,7 +233,7 @@ impl App {
         }
         self.shown.load = match self.middle.show_image(image, scene) {
             Ok(()) => LoadState::Loaded(text),
-            Err(why) => LoadState::Refused(why),
+            Err(why) => LoadState::Refused(why.to_string()),
         };
     }
 

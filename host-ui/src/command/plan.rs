@@ -1,8 +1,10 @@
 //! `host-ui plan`: a plan file for the scene of a running core.
 
+use super::CommandError;
 use clap::Args;
 use std::path::PathBuf;
 use stylet_base::progress_bar::progress_bar;
+use stylet_base::write_whole;
 use stylet_dose::decay::Interval;
 use stylet_dose::files::SeedDefaults;
 use stylet_dose::report::Judge;
@@ -57,7 +59,7 @@ pub struct PlanArgs {
 }
 
 impl PlanArgs {
-    pub fn run(self) -> Result<(), String> {
+    pub fn run(self) -> Result<(), CommandError> {
         let source = Source::read(&self.source)?;
         let prescription_gy = self.prescription_gy.or(source.prescription_gy);
         let prescription_gy = prescription_gy.filter(|gy| (1e-3..=1e4).contains(gy)).ok_or_else(|| {
@@ -102,15 +104,15 @@ impl PlanArgs {
         Ok(())
     }
 
-    fn write(&self, plan: &ImplantPlan, frames: &Frames) -> Result<(), String> {
+    fn write(&self, plan: &ImplantPlan, frames: &Frames) -> Result<(), CommandError> {
         file::write(&self.out, plan, frames)?;
         let Some(csv) = &self.csv else { return Ok(()) };
         let text = file::seeds_to_csv(plan, frames);
-        std::fs::write(csv, text).map_err(|e| format!("{} cannot be written ({e})", csv.display()))
+        Ok(write_whole(csv, text.as_bytes())?)
     }
 }
 
-fn figures(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel) -> Result<String, String> {
+fn figures(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel) -> Result<String, CommandError> {
     let seeds = plan.seeds();
     let strengths = seeds.iter().map(|s| s.strength_u);
     let total: f64 = strengths.clone().sum();

@@ -147,8 +147,10 @@ fn not_real_time(shown: &Shown) -> Banner {
     let advice = shown.session.map(|s| s.advice.read()).unwrap_or_default();
     let asked = shown.session.is_some_and(|s| s.no_rt_asked != 0);
     let text = match (advice.trim(), asked) {
-        ("", true) => "rt-core was started with --no-rt: timing measured here is not that of a real-time run.".to_owned(),
-        ("", false) => "Run setcap cap_sys_nice,cap_ipc_lock=ep on rt-core, or allow rtprio and memlock in /etc/security/limits.d, then start it again.".to_owned(),
+        ("", true) => {
+            "rt-core was started with --no-rt: timing measured here is not that of a real-time run.".to_owned()
+        }
+        ("", false) => "Run rt-core doctor: it shows what is missing and what to do.".to_owned(),
         (advice, _) => advice.replace('\n', "  "),
     };
     Banner {

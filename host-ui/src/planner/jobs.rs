@@ -1,5 +1,6 @@
 //! Background jobs of the planner: a first plan, its strength, compensation, files.
 
+use super::Failure;
 use super::outlines::AnatomyOutlines;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -18,7 +19,7 @@ use stylet_shm_schema::service::Instance;
 /// A second host finds the core within this time.
 const FIND_LIMIT: Duration = Duration::from_secs(10);
 const POLL_EVERY: Duration = Duration::from_millis(5);
-pub const FIRST_PLAN: &str = "Looking for a first plan";
+pub(super) const FIRST_PLAN: &str = "Looking for a first plan";
 
 /// What a job does, for people.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,15 +30,16 @@ pub struct JobProgress {
     pub share: Option<f32>,
 }
 
-pub enum JobMessage {
+/// What a job sends.
+pub(super) enum JobMessage {
     Progress(JobProgress),
-    Plan(Result<ImplantPlan, String>),
+    Plan(Result<ImplantPlan, Failure>),
     Compensated(Box<(Needle, Compensation)>),
     /// The last message, in words.
-    End(Result<String, String>),
+    End(Result<String, Failure>),
 }
 
-pub fn automatic(outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
+pub(super) fn automatic(outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
     Job::begin("first plan", move |messages, interrupt| {
         let report = |share: f32| {
             let progress = JobProgress {
@@ -50,54 +52,56 @@ pub fn automatic(outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
                 false => Ok(()),
             }
         };
-        let plan = exchange::usual().and_then(|(source, prescription_gy)| {
+        let plan = || -> Result<ImplantPlan, Failure> {
+            let (source, prescription_gy) = exchange::usual()?;
             let kernel = DoseKernel::new(&source, Interval::ALL);
             let aims = Aims::new(prescription_gy);
-            automatic::plan(
+            Ok(automatic::plan(
                 outlines.template,
                 &outlines.anatomy,
                 &kernel,
                 &source.model,
                 &aims,
                 report,
-            )
-        });
+            )?)
+        };
         // The window may be closed by now; then nobody reads the answer.
-        let _ = messages.send(JobMessage::Plan(plan));
+        let _ = messages.send(JobMessage::Plan(plan()));
     })
 }
 
 /// The strength with which the plan covers the target as a first plan does.
-pub fn strength(outlines: Arc<AnatomyOutlines>, plan: Arc<ImplantPlan>) -> Job<JobMessage> {
+pub(super) fn strength(outlines: Arc<AnatomyOutlines>, plan: Arc<ImplantPlan>) -> Job<JobMessage> {
     Job::begin("strength", move |messages, _| {
-        let source = Source::known(&plan.source)
-            .ok_or_else(|| format!("source {} is not known; set the strength by hand", plan.source));
-        let scaled = source.and_then(|source| {
+        let scaled = || -> Result<ImplantPlan, Failure> {
+            let source = Source::known(&plan.source)
+                .ok_or_else(|| format!("source {} is not known; set the strength by hand", plan.source))?;
             let kernel = DoseKernel::new(&source, Interval::ALL);
             let aims = Aims::new(plan.prescription_gy);
-            automatic::strength_u(&plan, &outlines.anatomy, &kernel, &aims)
-        });
-        let _ = messages.send(JobMessage::Plan(scaled.map(|u| plan.with_strength(u))));
+            let strength_u = automatic::strength_u(&plan, &outlines.anatomy, &kernel, &aims)?;
+            Ok(plan.with_strength(strength_u))
+        };
+        let _ = messages.send(JobMessage::Plan(scaled()));
     })
 }
 
-pub fn import(path: PathBuf, scene: Arc<SceneModel>) -> Job<JobMessage> {
+pub(super) fn import(path: PathBuf, scene: Arc<SceneModel>) -> Job<JobMessage> {
     Job::begin("plan reader", move |messages, _| {
-        let _ = messages.send(JobMessage::Plan(exchange::read(&path, &scene.header)));
+        let plan = exchange::read(&path, &scene.header).map_err(Failure::from);
+        let _ = messages.send(JobMessage::Plan(plan));
     })
 }
 
-pub fn export(path: PathBuf, plan: Arc<ImplantPlan>, outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
+pub(super) fn export(path: PathBuf, plan: Arc<ImplantPlan>, outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
     Job::begin("plan writer", move |messages, _| {
         let written = exchange::write(&path, &plan, &outlines.frames);
-        let _ = messages.send(JobMessage::End(
-            written.map(|()| format!("Plan saved as {}", path.display())),
-        ));
+        let saved = written.map(|()| format!("Plan saved as {}", path.display()));
+        let _ = messages.send(JobMessage::End(saved.map_err(Failure::from)));
     })
 }
 
 /// Compensates one needle after the other, through a link of its own: the window keeps its own.
-pub fn compensation(instance: Instance, needles: Vec<Needle>, pace: Pace) -> Job<JobMessage> {
+pub(super) fn compensation(instance: Instance, needles: Vec<Needle>, pace: Pace) -> Job<JobMessage> {
     Job::begin("compensation", move |messages, interrupt| {
         let end = all(instance, &needles, &pace, messages, interrupt);
         let _ = messages.send(JobMessage::End(end));
@@ -110,12 +114,12 @@ fn all(
     pace: &Pace,
     messages: &Sender<JobMessage>,
     interrupt: &Interrupt,
-) -> Result<String, String> {
+) -> Result<String, Failure> {
     let mut link = Link::new(instance);
     let begun = Instant::now();
     while link.scene().is_none() || link.state().is_none() {
         if interrupt.asked() || begun.elapsed() > FIND_LIMIT {
-            return Err("rt-core does not answer; check that it is running".to_owned());
+            return Err("rt-core does not answer; check that it is running".into());
         }
         link.poll();
         std::thread::sleep(POLL_EVERY);
@@ -134,12 +138,12 @@ fn all(
         };
         match compensate(needle, pace, &Limits::default(), &mut rehearser) {
             Ok(done) => drop(messages.send(JobMessage::Compensated(Box::new((needle.clone(), done))))),
-            Err(_) if interrupt.asked() => return Err("the compensation was cancelled".to_owned()),
+            Err(_) if interrupt.asked() => return Err("the compensation was cancelled".into()),
             Err(why) => failed.push(format!("needle {name}: {why}")),
         }
     }
     match failed.as_slice() {
         [] => Ok(format!("{} needles compensated.", needles.len())),
-        _ => Err(format!("Not compensated: {}", failed.join("; "))),
+        _ => Err(format!("Not compensated: {}", failed.join("; ")).into()),
     }
 }

@@ -28,12 +28,23 @@ const ONE_STEP: Duration = Duration::from_millis(800);
 /// Strength of the seeds of a plan that has none yet.
 const STRENGTH_U: f64 = 0.5;
 
+/// Whatever was wrong, to be shown as text.
+type Failure = Box<dyn std::error::Error + Send + Sync>;
 type Checked = Job<Vec<Problem>>;
+
+/// A message for the operator.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Message {
+    /// Something was done.
+    Done(String),
+    /// Something was refused or failed, with the reason.
+    Refused(String),
+}
 
 #[derive(Default)]
 pub struct Planner {
     outlines: Option<Arc<AnatomyOutlines>>,
-    outlining: Option<(u64, u64, Template, Job<Result<AnatomyOutlines, String>>)>,
+    outlining: Option<(u64, u64, Template, Job<Result<AnatomyOutlines, Failure>>)>,
     /// Scene and template that no outlines could be made of.
     failed: Option<((u64, u64), Template)>,
     /// The scene that the plan is for: its name and box.
@@ -53,7 +64,7 @@ pub struct Planner {
     implant: Option<Arc<Implant>>,
     shown_revision: u64,
     /// A message for the operator, reported once.
-    message: Option<Result<String, String>>,
+    message: Option<Message>,
 }
 
 impl Planner {
@@ -66,7 +77,7 @@ impl Planner {
     }
 
     /// A message for the operator, reported once.
-    pub fn take_message(&mut self) -> Option<Result<String, String>> {
+    pub fn take_message(&mut self) -> Option<Message> {
         self.message.take()
     }
 
@@ -113,7 +124,9 @@ impl Planner {
         let of_scene = (scene.header.name.read(), scene.header.upper_m);
         if self.of_scene.as_ref() != Some(&of_scene) {
             if self.history.is_some() {
-                self.message = Some(Err("The plan was for another scene and was discarded.".to_owned()));
+                self.message = Some(Message::Refused(
+                    "The plan was for another scene and was discarded.".to_owned(),
+                ));
             }
             *self = Self {
                 of_scene: Some(of_scene),
@@ -131,10 +144,8 @@ impl Planner {
                     self.outlining = None;
                     self.change();
                 }
-                JobUpdate::Message(Err(why)) => self.no_outlines(key, template, why),
-                JobUpdate::Ended => {
-                    self.no_outlines(key, template, "the scene's anatomy could not be determined".to_owned())
-                }
+                JobUpdate::Message(Err(why)) => self.no_outlines(key, template, &why.to_string()),
+                JobUpdate::Ended => self.no_outlines(key, template, "the scene's anatomy could not be determined"),
             }
             return;
         }
@@ -155,9 +166,9 @@ impl Planner {
         }
     }
 
-    fn no_outlines(&mut self, key: (u64, u64), template: Template, why: String) {
+    fn no_outlines(&mut self, key: (u64, u64), template: Template, why: &str) {
         (self.outlines, self.outlining, self.failed) = (None, None, Some((key, template)));
-        self.message = Some(Err(format!("No plan can be made for this scene: {why}")));
+        self.message = Some(Message::Refused(format!("No plan can be made for this scene: {why}")));
     }
 
     fn take_problems(&mut self) {
@@ -203,7 +214,7 @@ impl Planner {
                 self.job = None;
                 match plan.and_then(|plan| self.can_be(plan)) {
                     Ok(plan) => self.put(plan),
-                    Err(why) => self.message = Some(Err(why)),
+                    Err(why) => self.message = Some(Message::Refused(why.to_string())),
                 }
             }
             JobUpdate::Message(JobMessage::Compensated(done)) => {
@@ -211,7 +222,13 @@ impl Planner {
                 self.compensated.push(*done);
                 self.refresh();
             }
-            JobUpdate::Message(JobMessage::End(end)) => (self.job, self.message) = (None, Some(end)),
+            JobUpdate::Message(JobMessage::End(end)) => {
+                self.job = None;
+                self.message = Some(match end {
+                    Ok(text) => Message::Done(text),
+                    Err(why) => Message::Refused(why.to_string()),
+                });
+            }
             JobUpdate::Ended => self.job = None,
         }
     }
@@ -228,11 +245,11 @@ impl Planner {
     fn begin_job(
         &mut self,
         what: &str,
-        begin: impl FnOnce(&Self, Arc<AnatomyOutlines>) -> Result<Job<JobMessage>, String>,
+        begin: impl FnOnce(&Self, Arc<AnatomyOutlines>) -> Result<Job<JobMessage>, Failure>,
     ) {
         let job = match (&self.outlines, self.is_busy()) {
             (_, true) => return,
-            (None, _) => Err("the scene's anatomy is not known yet; try again in a moment".to_owned()),
+            (None, _) => Err("the scene's anatomy is not known yet; try again in a moment".into()),
             (Some(outlines), false) => begin(self, outlines.clone()),
         };
         match job {
@@ -243,7 +260,7 @@ impl Planner {
                 };
                 self.job = Some((job, progress));
             }
-            Err(why) => self.message = Some(Err(why)),
+            Err(why) => self.message = Some(Message::Refused(why.to_string())),
         }
     }
 
@@ -274,14 +291,14 @@ impl Planner {
             let left = planner.planned()?.needles.iter().skip(begun);
             let needles: Vec<Needle> = left.filter(|n| !n.seeds.is_empty()).cloned().collect();
             if needles.is_empty() {
-                return Err("no needle with seeds is left to rehearse".to_owned());
+                return Err("no needle with seeds is left to rehearse".into());
             }
             Ok(jobs::compensation(instance, needles, pace))
         });
     }
 
-    fn planned(&self) -> Result<&ImplantPlan, String> {
-        self.plan().ok_or_else(|| "there is no plan yet; make one".to_owned())
+    fn planned(&self) -> Result<&ImplantPlan, Failure> {
+        self.plan().ok_or_else(|| "there is no plan yet; make one".into())
     }
 
     /// Begins an empty plan.
@@ -297,7 +314,7 @@ impl Planner {
         });
         match plan {
             Ok(plan) => self.put(plan),
-            Err(why) => self.message = Some(Err(why)),
+            Err(why) => self.message = Some(Message::Refused(why.to_string())),
         }
     }
 
@@ -326,7 +343,7 @@ impl Planner {
 
     pub fn set_row(&mut self, needle: usize, row: Row) {
         let last = self.drawn.filter(|(n, at)| *n == needle && at.elapsed() < ONE_STEP);
-        let changed = self.planned().and_then(|plan| plan.with_row(needle, row));
+        let changed = self.planned().and_then(|plan| Ok(plan.with_row(needle, row)?));
         match changed.and_then(|plan| self.can_be(plan)) {
             Ok(plan) => {
                 match &mut self.history {
@@ -337,14 +354,18 @@ impl Planner {
                 self.drawn = Some((needle, Instant::now()));
                 self.change();
             }
-            Err(why) => self.message = Some(Err(why)),
+            Err(why) => self.message = Some(Message::Refused(why.to_string())),
         }
     }
 
-    pub fn edit(&mut self, edit: impl FnOnce(&ImplantPlan) -> Result<ImplantPlan, String>) {
-        match self.planned().and_then(edit).and_then(|plan| self.can_be(plan)) {
+    pub fn edit<E: Into<Failure>>(&mut self, edit: impl FnOnce(&ImplantPlan) -> Result<ImplantPlan, E>) {
+        match self
+            .planned()
+            .and_then(|plan| edit(plan).map_err(E::into))
+            .and_then(|plan| self.can_be(plan))
+        {
             Ok(plan) => self.put(plan),
-            Err(why) => self.message = Some(Err(why)),
+            Err(why) => self.message = Some(Message::Refused(why.to_string())),
         }
     }
 
@@ -363,7 +384,7 @@ impl Planner {
             && let Err(why) = self.keeps(&before, history.plan())
         {
             back(&mut history);
-            self.message = Some(Err(why));
+            self.message = Some(Message::Refused(why.to_string()));
         }
         self.history = Some(history);
         self.change();
@@ -378,12 +399,10 @@ impl Planner {
     }
 
     /// The plan, if it keeps the inserted needles and the core can hold it.
-    fn can_be(&self, plan: ImplantPlan) -> Result<ImplantPlan, String> {
+    fn can_be(&self, plan: ImplantPlan) -> Result<ImplantPlan, Failure> {
         if plan.seed_count() > MAX_SEEDS {
             let count = plan.seed_count();
-            return Err(format!(
-                "that would be {count} seeds; at most {MAX_SEEDS} can be placed"
-            ));
+            return Err(format!("that would be {count} seeds; at most {MAX_SEEDS} can be placed").into());
         }
         match self.plan() {
             Some(before) => self.keeps(before, &plan).map(|()| plan),
@@ -391,13 +410,11 @@ impl Planner {
         }
     }
 
-    fn keeps(&self, before: &ImplantPlan, after: &ImplantPlan) -> Result<(), String> {
+    fn keeps(&self, before: &ImplantPlan, after: &ImplantPlan) -> Result<(), Failure> {
         let begun = self.progress.begun();
         let first = |plan: &ImplantPlan| plan.needles.iter().take(begun).cloned().collect::<Vec<_>>();
         if begun > 0 && first(before) != first(after) {
-            return Err(format!(
-                "{begun} needles are already inserted; only those after them can be changed"
-            ));
+            return Err(format!("{begun} needles are already inserted; only those after them can be changed").into());
         }
         Ok(())
     }

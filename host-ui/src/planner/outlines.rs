@@ -1,5 +1,6 @@
 //! Outlines of the scene's anatomy behind the holes of a template, made once per scene.
 
+use super::Failure;
 use crate::mesh::cut;
 use nalgebra::Vector3;
 use stylet_host::link::SceneModel;
@@ -35,7 +36,7 @@ pub struct AnatomyOutlines {
 }
 
 impl AnatomyOutlines {
-    pub fn of(scene: &SceneModel, template: Template) -> Result<Self, String> {
+    pub(super) fn of(scene: &SceneModel, template: Template) -> Result<Self, Failure> {
         let key = (scene.header.session_id, scene.header.generation);
         Ok(Self::on(Anatomy::of(scene)?, key, template))
     }

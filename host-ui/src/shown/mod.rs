@@ -12,8 +12,8 @@ use stylet_host::link::{Link, LinkStatus};
 use stylet_implant::plan::{HOLES, Template};
 use stylet_implant::workflow::Step;
 use stylet_shm_schema::{
-    EventKind, Fault, HapticState, ParameterId, ParametersInForce, Phase, PlanInForce, PlannedSeed, SceneHeader,
-    SeedPose, Session, flags,
+    EventKind, Fault, HapticState, ParametersInForce, Phase, PlanInForce, PlannedSeed, SceneHeader, SeedPose, Session,
+    flags,
 };
 
 /// Past the deepest seed the needle may go this far, and the path is drawn this far.
@@ -257,8 +257,7 @@ impl Shown {
     pub fn membrane_tension(&self) -> Option<f64> {
         let is_pressed = |s: &&HapticState| s.flags & flags::IN_CONTACT != 0 && s.flags & flags::PUNCTURED == 0;
         let state = self.state.as_ref().filter(is_pressed)?;
-        let at_m = self.parameters.map_or(8e-3, |p| p.set.get(ParameterId::PunctureDepth));
-        Some((state.depth_m / at_m.max(1e-6)).clamp(0.0, 1.0))
+        (state.puncture_depth_m > 0.0).then(|| (state.depth_m / state.puncture_depth_m).clamp(0.0, 1.0))
     }
 
     pub fn on_path_m(&self, depth_m: f64) -> Option<[f64; 3]> {
@@ -327,4 +326,28 @@ fn along(plan: &PlanInForce, place_m: [f64; 3]) -> f64 {
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    /// The depth of the gland's membrane was taken for every membrane: skin of 12 mm seemed punctured at 8 mm.
+    #[test]
+    fn the_tension_is_that_of_the_membrane_in_front_of_the_tip() {
+        let mut shown = Shown::empty("lab");
+        let mut state = HapticState::zeroed();
+        (state.flags, state.depth_m, state.puncture_depth_m) = (flags::IN_CONTACT, 6e-3, 12e-3);
+        shown.state = Some(state);
+        shown.parameters = Some(ParametersInForce::zeroed());
+        let tension = shown.membrane_tension().expect("a membrane");
+        assert!((tension - 0.5).abs() < 1e-12, "{tension}");
+        state.puncture_depth_m = 0.0;
+        shown.state = Some(state);
+        assert_eq!(shown.membrane_tension(), None, "tissue without a membrane");
+        (state.puncture_depth_m, state.flags) = (12e-3, flags::IN_CONTACT | flags::PUNCTURED);
+        shown.state = Some(state);
+        assert_eq!(shown.membrane_tension(), None);
+    }
 }

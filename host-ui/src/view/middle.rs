@@ -3,7 +3,7 @@
 use super::driver::DriverCost;
 use super::orientation::Orientation;
 use super::scene3d::Scene3d;
-use super::slice::{Plane, Slices};
+use super::slice::{ImageError, Plane, Slices};
 use super::state::ViewState;
 use crate::action::{Action, Viewpoint};
 use crate::dose_worker::DoseResult;
@@ -62,8 +62,8 @@ impl Middle {
         self.slices.plane(orientation, &self.view, rect)
     }
 
-    /// Greys for the slices, of the patient of the scene of this name.
-    pub fn show_image(&mut self, image: Image, scene: &str) -> Result<(), String> {
+    /// Shows an image in the slices, of the patient of the scene of this name.
+    pub fn show_image(&mut self, image: Image, scene: &str) -> Result<(), ImageError> {
         self.view.image = true;
         self.slices.show_image(image, scene)
     }

@@ -125,7 +125,7 @@ impl ParametersState {
         let set = shown.parameters.map(|p| p.set).unwrap_or_default();
         self.foot = Some(match preset::save(Path::new(self.preset_path.trim()), &set) {
             Ok(()) => (false, format!("Saved to {}", self.preset_path.trim())),
-            Err(why) => (true, why),
+            Err(why) => (true, why.to_string()),
         });
     }
 
@@ -133,7 +133,7 @@ impl ParametersState {
     fn load_preset(&mut self) {
         match preset::load(Path::new(self.preset_path.trim())) {
             Ok(values) => values.into_iter().for_each(|(index, value)| self.edit(index, value)),
-            Err(why) => self.foot = Some((true, why)),
+            Err(why) => self.foot = Some((true, why.to_string())),
         }
     }
 

@@ -16,6 +16,7 @@ use crate::theme::IMAGE;
 use eframe::egui_wgpu::RenderState;
 use egui::{Color32, PointerButton, Pos2, Rect, Sense};
 use field::Field;
+pub use gpu::ImageError;
 use gpu::SliceGpu;
 use nalgebra::{Matrix3, Vector3};
 use overlay::{Lines, Overlay};
@@ -148,9 +149,9 @@ impl Slices {
     }
 
     /// Shows an image of the patient of a scene, until another scene is loaded.
-    pub fn show_image(&mut self, image: Image, scene: &str) -> Result<(), String> {
+    pub fn show_image(&mut self, image: Image, scene: &str) -> Result<(), ImageError> {
         let Some(gpu) = &mut self.gpu else {
-            return Err("there is no graphics device to show an image".to_owned());
+            return Err(ImageError::NoDevice);
         };
         let name = image.name.clone();
         gpu.set_image(image)?;
