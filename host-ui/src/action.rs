@@ -65,7 +65,7 @@ pub enum PlanAction {
     Remove(usize),
     Move(usize, Hole),
     SetRow(usize, Row),
-    /// Strength of every seed, U.
+    /// Strength of each seed, U.
     SetStrength(f64),
     FitStrength,
     Compensate,

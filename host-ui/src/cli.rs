@@ -154,6 +154,10 @@ enum SceneTask {
 }
 
 impl Cli {
+    /// Carries out the command.
+    ///
+    /// # Errors
+    /// The text for the terminal: what failed and what to do.
     pub fn run(self) -> Result<(), CommandError> {
         if self.task.is_some() {
             interrupt::end_with_reader();

@@ -46,6 +46,7 @@ pub const KEYS: [(&str, &str); 26] = [
 /// What the keys ask for in one frame.
 #[derive(Debug, Default, PartialEq)]
 pub struct Keys {
+    /// Actions of the keys that were pressed.
     pub actions: Vec<Action>,
     /// Metres per second along the path, positive inwards; 0 when no key is held.
     pub drive_m_per_s: f64,

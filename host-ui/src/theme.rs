@@ -5,7 +5,7 @@
 mod tokens;
 
 use egui::{CornerRadius, FontFamily, FontId, Margin, RichText, Stroke, TextStyle, Theme, Visuals};
-pub use tokens::{DARK, IMAGE, ImageTokens, LIGHT, Tokens};
+pub use tokens::{DARK, IMAGE, LIGHT, Tokens};
 
 pub const LEFT_WIDTH: f32 = 286.0;
 pub const RIGHT_WIDTH: f32 = 330.0;

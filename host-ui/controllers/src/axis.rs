@@ -32,6 +32,7 @@ impl Axis {
         })
     }
 
+    /// An axis without a range: full speed at the counts that such a device reports at most.
     pub fn relative() -> Self {
         Self {
             middle: 0.0,

@@ -9,7 +9,9 @@ const LONGEST_NAME: usize = 60;
 /// Where the kernel shows devices, and where they are opened.
 #[derive(Clone, Debug)]
 pub struct Places {
+    /// Folder in which sysfs lists input devices.
     pub class: PathBuf,
+    /// Folder of the device nodes.
     pub nodes: PathBuf,
 }
 
@@ -25,8 +27,11 @@ impl Default for Places {
 /// A device that can hold the needle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Found {
+    /// Its device node.
     pub path: PathBuf,
+    /// Its name, for people.
     pub name: String,
+    /// What it is.
     pub kind: Kind,
 }
 

@@ -1,5 +1,6 @@
 //! All devices together: which are plugged in, which may not be read, and which one controls the needle.
 
+use super::error::OpenError;
 use super::found::Found;
 use super::kind::{Button, Kind};
 use super::state::{DeviceState, State, Taken, Wish};
@@ -11,26 +12,32 @@ use std::time::Duration;
 /// A node appears before its rights are set: a device is reported only after it could not be opened this often.
 const REPORTED_AFTER: u32 = 2;
 
-/// The system's devices, or those of a test.
+/// Where devices are found: the system, or a test.
 pub trait DeviceSource {
+    /// An open device.
     type Device: OpenDevice;
+    /// The devices that are plugged in now.
     fn list(&mut self) -> Vec<Found>;
+    /// Opens one of them.
     fn open(&mut self, found: &Found) -> io::Result<Self::Device>;
     /// Waits until one of them has events, at most for this time.
     fn wait(&mut self, opened: &[&Self::Device], at_most: Duration);
 }
 
-/// A device that is being read. Neither call may block.
+/// An open device. Neither call may block.
 pub trait OpenDevice {
     /// Appends new events; `WouldBlock` where there are none.
     fn fetch(&mut self, into: &mut Vec<InputEvent>) -> io::Result<()>;
+    /// All of its axes and keys now.
     fn state(&self) -> io::Result<DeviceState>;
 }
 
 /// A device, as the window shows it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Device {
+    /// Its name, for people.
     pub name: String,
+    /// What it is.
     pub kind: Kind,
     /// The stick or the cap must be at rest once before the needle follows it.
     pub was_released: bool,
@@ -39,8 +46,9 @@ pub struct Device {
 /// What the window needs to know, as of the last reading.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Latest {
-    /// The device that holds the needle, or would: the one that was moved last.
+    /// The device that controls the needle: the one that was moved last.
     pub holder: Option<Device>,
+    /// Speed that it asks for.
     pub wish: Wish,
     /// How often each of [`Button::ALL`] was pressed since the start.
     pub presses: [u32; Button::ALL.len()],
@@ -48,6 +56,7 @@ pub struct Latest {
     pub denied: Vec<String>,
     /// Name of the device that was unplugged last.
     pub disconnected: String,
+    /// Number of devices that were unplugged since the start.
     pub disconnections: u32,
 }
 
@@ -68,6 +77,7 @@ pub struct DeviceHub<G: DeviceSource> {
 }
 
 impl<G: DeviceSource> DeviceHub<G> {
+    /// A hub without devices.
     pub fn new(source: G) -> Self {
         Self {
             source,
@@ -114,7 +124,7 @@ impl<G: DeviceSource> DeviceHub<G> {
                 self.held.push(Held { found, opened, state });
             }
             Err(e) => {
-                let why = reason(&found, &e);
+                let why = OpenError::of(&found, e).to_string();
                 match self.refused.iter_mut().find(|(path, ..)| *path == found.path) {
                     Some((_, times, text)) => (*times, *text) = (times.saturating_add(1), why),
                     None => self.refused.push((found.path, 1, why)),
@@ -170,6 +180,7 @@ impl<G: DeviceSource> DeviceHub<G> {
         self.holder = holder.map(|h| h.found.path.clone());
     }
 
+    /// Waits until a device has events, at most for this time.
     pub fn wait(&mut self, at_most: Duration) {
         let opened: Vec<&G::Device> = self.held.iter().map(|h| &h.opened).collect();
         self.source.wait(&opened, at_most);
@@ -202,18 +213,6 @@ fn read_one<O: OpenDevice>(
     }
     held.state.note_rest(now_s);
     Ok(())
-}
-
-/// With the command that cures it.
-pub(super) fn reason(found: &Found, error: &io::Error) -> String {
-    let (name, path) = (&found.name, found.path.display());
-    if error.kind() == ErrorKind::PermissionDenied {
-        format!(
-            "{name} ({path}) may not be read. Run: sudo usermod -aG input $USER and log in again, or add a udev rule (docs/controllers.md)."
-        )
-    } else {
-        format!("{name} ({path}) cannot be read: {error}. Unplug it and plug it in again.")
-    }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 #![warn(missing_docs)]
 
 mod axis;
+mod error;
 mod found;
 mod hub;
 mod kind;
@@ -14,6 +15,7 @@ mod reader;
 mod state;
 
 pub use axis::{Axis, SLOWEST_M_PER_S};
+pub use error::{ListError, OpenError};
 pub use found::{Found, Places, find};
 pub use hub::{Device, DeviceHub, DeviceSource, Latest, OpenDevice};
 pub use kind::{Button, Kind};

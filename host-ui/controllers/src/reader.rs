@@ -26,6 +26,7 @@ const WISH_LASTS: Duration = Duration::from_millis(250);
 /// The devices of this machine.
 #[derive(Default)]
 pub struct System {
+    /// Folders in which it looks.
     pub places: Places,
 }
 

@@ -20,11 +20,13 @@ pub struct Wish {
 }
 
 impl Wish {
+    /// The needle stays where it is.
     pub const REST: Self = Self {
         along_m_per_s: 0.0,
         across_m_per_s: [0.0; 2],
     };
 
+    /// The same direction at a share of the speed.
     pub fn slower(self, by: f64) -> Self {
         Self {
             along_m_per_s: self.along_m_per_s * by,
@@ -36,7 +38,9 @@ impl Wish {
 /// All that the kernel knows of a device at one moment.
 #[derive(Debug, Default)]
 pub struct DeviceState {
+    /// Absolute axes with their range and position.
     pub axes: Vec<(AbsoluteAxisCode, AbsInfo)>,
+    /// Keys that are down.
     pub keys: AttributeSet<KeyCode>,
 }
 

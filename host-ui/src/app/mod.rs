@@ -34,14 +34,16 @@ use stylet_shm_schema::service::Instance;
 const LIVE_FRAME: Duration = Duration::from_millis(16);
 const ABSENT_FRAME: Duration = Duration::from_millis(250);
 
+/// Options of the window.
 #[derive(Clone, Debug)]
 pub struct Options {
+    /// Name that rt-core was started under.
     pub instance: Instance,
-    /// Read and sent as soon as a core is there.
+    /// Scene to read and send as soon as a core is found.
     pub scene: Option<SceneChoice>,
     /// Which label of the file is the gland; all of them when none is given.
     pub label: Option<u8>,
-    /// Greys for the slices, of the patient of the scene file.
+    /// Image for the slices, of the patient of the scene file.
     pub image: Option<PathBuf>,
     /// Whether gamepads and 3D mice may hold the needle.
     pub controllers: bool,
@@ -56,6 +58,7 @@ struct Waiting {
     since: Instant,
 }
 
+/// The window.
 pub struct App {
     link: Link,
     label: Option<u8>,
@@ -102,6 +105,9 @@ pub struct App {
 }
 
 /// Opens the window and returns when it is closed.
+///
+/// # Errors
+/// Where there is no display or no graphics driver.
 pub fn run(options: Options) -> Result<(), WindowError> {
     let mut native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
@@ -149,6 +155,7 @@ impl App {
         self.shown.cost
     }
 
+    /// The window with these options, before its first frame.
     pub fn new(cc: &eframe::CreationContext<'_>, options: Options) -> Self {
         theme::apply(&cc.egui_ctx);
         let settings = Settings::read(cc.storage);
@@ -194,7 +201,7 @@ impl App {
         }
     }
 
-    /// Other devices than those of the system.
+    /// Replaces the devices of the system.
     pub fn use_controllers(&mut self, controllers: Controllers) {
         self.controllers = controllers;
     }

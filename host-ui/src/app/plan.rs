@@ -89,7 +89,7 @@ impl App {
         }
         let tasks = self.planner.tasks();
         if !tasks.is_empty() {
-            self.planner.begin_anew();
+            self.planner.restart();
             let (numbers, tasks) = tasks.into_iter().unzip();
             self.run_needles = numbers;
             self.run = Some(Run::of_needles(tasks, self.pace));

@@ -143,7 +143,8 @@ impl DoseWorker {
     }
 
     /// Whether a dose is being computed.
-    pub fn is_computing(&self) -> bool {
+    #[cfg(test)]
+    fn is_computing(&self) -> bool {
         self.computing
     }
 

@@ -8,10 +8,11 @@ mod outlines;
 mod shown;
 
 use jobs::JobMessage;
-pub use jobs::JobProgress;
-pub use needles::{NeedleProgress, NeedleState};
-pub use outlines::{AnatomyOutlines, Layer, Outline};
-pub use shown::{Implant, Planning};
+pub(crate) use jobs::JobProgress;
+pub(crate) use needles::NeedleProgress;
+pub use needles::NeedleState;
+pub(crate) use outlines::{AnatomyOutlines, Outline};
+pub(crate) use shown::{Implant, Planning};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -41,6 +42,7 @@ pub enum Message {
     Refused(String),
 }
 
+/// The plan of many needles and the background jobs for it.
 #[derive(Default)]
 pub struct Planner {
     outlines: Option<Arc<AnatomyOutlines>>,
@@ -68,10 +70,12 @@ pub struct Planner {
 }
 
 impl Planner {
+    /// The plan, where there is one.
     pub fn plan(&self) -> Option<&ImplantPlan> {
         self.history.as_ref().map(History::plan)
     }
 
+    /// Progress of its needles.
     pub fn progress(&self) -> &NeedleProgress {
         &self.progress
     }
@@ -81,6 +85,7 @@ impl Planner {
         self.message.take()
     }
 
+    /// What a frame shows of it.
     pub fn planning(&self) -> Planning {
         Planning {
             outlines: self.outlines.clone(),
@@ -233,6 +238,7 @@ impl Planner {
         }
     }
 
+    /// Whether a job runs.
     pub fn is_busy(&self) -> bool {
         self.job.is_some()
     }
@@ -264,20 +270,24 @@ impl Planner {
         }
     }
 
+    /// Begins a search for a first plan.
     pub fn automatic(&mut self) {
         self.begin_job(jobs::FIRST_PLAN, |_, outlines| Ok(jobs::automatic(outlines)));
     }
 
+    /// Begins to fit the strength of the seeds to the dose of the target.
     pub fn fit_strength(&mut self) {
         self.begin_job("Fitting the strength", |planner, outlines| {
             Ok(jobs::strength(outlines, Arc::new(planner.planned()?.clone())))
         });
     }
 
+    /// Begins to read a plan from a file.
     pub fn import(&mut self, path: PathBuf, scene: Arc<SceneModel>) {
         self.begin_job("Reading the plan", |_, _| Ok(jobs::import(path, scene)));
     }
 
+    /// Begins to write the plan to a file.
     pub fn export(&mut self, path: PathBuf) {
         self.begin_job("Writing the plan", |planner, outlines| {
             Ok(jobs::export(path, Arc::new(planner.planned()?.clone()), outlines))
@@ -341,6 +351,7 @@ impl Planner {
         });
     }
 
+    /// Replaces the seeds of a needle; quick changes of one needle are one step to undo.
     pub fn set_row(&mut self, needle: usize, row: Row) {
         let last = self.drawn.filter(|(n, at)| *n == needle && at.elapsed() < ONE_STEP);
         let changed = self.planned().and_then(|plan| Ok(plan.with_row(needle, row)?));
@@ -358,6 +369,7 @@ impl Planner {
         }
     }
 
+    /// Changes the plan, or reports why it cannot be changed.
     pub fn edit<E: Into<Failure>>(&mut self, edit: impl FnOnce(&ImplantPlan) -> Result<ImplantPlan, E>) {
         match self
             .planned()
@@ -369,10 +381,12 @@ impl Planner {
         }
     }
 
+    /// Undoes the last change.
     pub fn undo(&mut self) {
         self.step(History::undo, History::redo);
     }
 
+    /// Redoes the change that was undone last.
     pub fn redo(&mut self) {
         self.step(History::redo, History::undo);
     }
@@ -468,19 +482,22 @@ impl Planner {
         self.set_progress(progress);
     }
 
+    /// The inserted needle is done.
     pub fn finish_needle(&mut self) {
         let mut progress = self.progress.clone();
         progress.finish();
         self.set_progress(progress);
     }
 
+    /// Counts the inserted needle as planned again.
     pub fn step_back(&mut self) {
         let mut progress = self.progress.clone();
         progress.step_back();
         self.set_progress(progress);
     }
 
-    pub fn begin_anew(&mut self) {
+    /// Begins the implantation again: no needle is inserted.
+    pub fn restart(&mut self) {
         self.set_progress(NeedleProgress::default());
     }
 }

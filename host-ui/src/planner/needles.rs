@@ -2,14 +2,19 @@
 
 use std::ops::Range;
 
+/// How far one needle is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NeedleState {
+    /// Not inserted yet.
     Planned,
+    /// In the tissue.
     Inserted,
+    /// Out again, with all its seeds dropped.
     Done,
 }
 
 impl NeedleState {
+    /// Its name, for people.
     pub fn name(self) -> &'static str {
         match self {
             Self::Planned => "planned",
@@ -28,6 +33,7 @@ pub struct NeedleProgress {
 }
 
 impl NeedleProgress {
+    /// Number of needles that were inserted, those that are done included.
     pub fn begun(&self) -> usize {
         self.first_seed.len()
     }
@@ -42,6 +48,7 @@ impl NeedleProgress {
         self.begun() - usize::from(self.begun() > 0 && !self.is_done)
     }
 
+    /// State of one needle.
     pub fn state(&self, needle: usize) -> NeedleState {
         if needle < self.done() {
             NeedleState::Done
@@ -59,6 +66,7 @@ impl NeedleProgress {
         self.is_done = false;
     }
 
+    /// The inserted needle is done.
     pub fn finish(&mut self) {
         self.is_done = true;
     }

@@ -19,17 +19,23 @@ pub type Outline = Vec<[f32; 2]>;
 /// What a plane parallel to the template cuts.
 #[derive(Default)]
 pub struct Layer {
+    /// Outlines of the target.
     pub target: Vec<Outline>,
+    /// Outlines of the spared structures.
     pub spared: Vec<Outline>,
 }
 
+/// The anatomy of a scene, cut in layers parallel to a template.
 pub struct AnatomyOutlines {
     /// Session and generation of the scene.
     pub scene: (u64, u64),
+    /// The template.
     pub template: Template,
+    /// Surfaces of target and spared structures.
     pub anatomy: Anatomy,
+    /// Between scene and patient.
     pub frames: Frames,
-    /// From the template's face to the near and the far end of the target.
+    /// Distances from the template's face to the near and the far end of the target, m.
     pub depths_m: [f64; 2],
     layers: Vec<Layer>,
     pieces_m: Vec<Option<[f64; 2]>>,
@@ -82,7 +88,7 @@ impl AnatomyOutlines {
         &self.layers[number.min(self.layers.len() - 1)]
     }
 
-    /// Where seeds of a needle through the hole can lie, from the template's face; `None` where it misses the target.
+    /// Near and far depth of seeds of a needle through the hole, from the template's face, m; `None` where it misses the target.
     pub fn piece_m(&self, hole: Hole) -> Option<[f64; 2]> {
         let number = usize::from(hole.row()) * usize::from(HOLES) + usize::from(hole.column());
         *self.pieces_m.get(number)?

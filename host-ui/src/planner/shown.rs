@@ -17,6 +17,7 @@ pub struct Planning {
     pub implant: Option<Arc<Implant>>,
     /// The background job for it, if one runs.
     pub job: Option<JobProgress>,
+    /// Progress of its needles.
     pub progress: NeedleProgress,
 }
 
@@ -48,8 +49,11 @@ impl Planning {
 
 /// A plan as it is shown.
 pub struct Implant {
+    /// Rises with every change.
     pub revision: u64,
+    /// The plan.
     pub plan: ImplantPlan,
+    /// All its seeds.
     pub seeds: Vec<Seed>,
     /// `None` until the plan was checked; while it is checked again, those of the plan before.
     pub problems: Option<Arc<Vec<Problem>>>,
@@ -59,7 +63,9 @@ pub struct Implant {
     pub rest_errors_m: Vec<Option<f64>>,
     /// Depths of the drops of each needle, by rehearsal or as planned, m.
     pub drops_m: Vec<Vec<f64>>,
+    /// Whether a change can be undone.
     pub can_undo: bool,
+    /// Whether a change can be redone.
     pub can_redo: bool,
 }
 

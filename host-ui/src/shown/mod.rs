@@ -5,7 +5,7 @@ mod seeds;
 use crate::dose_worker::DoseResult;
 use crate::planner::Planning;
 use nalgebra::Vector3;
-pub use seeds::{SeedError, all_errors, own_errors, seed_errors};
+pub use seeds::{SeedError, all_errors, own_errors};
 use std::sync::Arc;
 use stylet_controllers::Latest;
 use stylet_host::link::{Link, LinkStatus};

@@ -20,10 +20,13 @@ use stylet_host::link::{SceneModel, Snapshot};
 /// Between two pictures.
 const GAP: f32 = 2.0;
 
+/// The three-dimensional picture and the slices.
 pub struct Middle {
-    pub solid: Scene3d,
+    /// The three-dimensional picture.
+    pub(crate) solid: Scene3d,
     slices: Slices,
-    pub view: ViewState,
+    /// What all pictures share.
+    pub(crate) view: ViewState,
 }
 
 /// Where each picture stands.
@@ -33,7 +36,8 @@ struct Places {
 }
 
 impl Middle {
-    pub fn new(state: Option<RenderState>) -> Self {
+    /// Pictures on this graphics device; without one they are empty.
+    pub(crate) fn new(state: Option<RenderState>) -> Self {
         Self {
             solid: Scene3d::new(state.clone()),
             slices: Slices::new(state),
@@ -42,11 +46,12 @@ impl Middle {
     }
 
     /// Bytes sent to the graphics card since the window opened.
-    pub fn driver(&self) -> DriverCost {
+    pub(crate) fn driver(&self) -> DriverCost {
         self.solid.driver().plus(self.slices.driver())
     }
 
-    pub fn take(&mut self, shown: &Shown, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
+    /// Takes what is new since the last frame.
+    pub(crate) fn take(&mut self, shown: &Shown, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
         self.solid.take(shown, model, snapshot);
         self.slices.take(model, snapshot, &mut self.view);
         if let Some(tip) = shown
@@ -63,17 +68,19 @@ impl Middle {
     }
 
     /// Shows an image in the slices, of the patient of the scene of this name.
-    pub fn show_image(&mut self, image: Image, scene: &str) -> Result<(), ImageError> {
+    pub(crate) fn show_image(&mut self, image: Image, scene: &str) -> Result<(), ImageError> {
         self.view.image = true;
         self.slices.show_image(image, scene)
     }
 
-    pub fn reset_view(&mut self, shown: &Shown) {
+    /// Shows all of the target again.
+    pub(crate) fn reset_view(&mut self, shown: &Shown) {
         self.solid.reset_view(shown);
         self.slices.reset_view(shown);
     }
 
-    pub fn middle_ui(
+    /// Draws the tools and the pictures of the layout.
+    pub(crate) fn middle_ui(
         &mut self,
         ui: &mut egui::Ui,
         layout: Layout,

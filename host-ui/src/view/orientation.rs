@@ -6,14 +6,19 @@ use stylet_shm_schema::SceneHeader;
 /// The three ways to cut a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Orientation {
+    /// Across the body.
     Axial,
+    /// From front to back.
     Sagittal,
+    /// From side to side.
     Coronal,
 }
 
 impl Orientation {
+    /// All of them.
     pub const ALL: [Self; 3] = [Self::Axial, Self::Sagittal, Self::Coronal];
 
+    /// Its name, for people.
     pub fn name(self) -> &'static str {
         match self {
             Self::Axial => "Axial",
@@ -33,7 +38,7 @@ impl Orientation {
         }
     }
 
-    /// What lies left, right, above and below.
+    /// Letters of what lies left, right, above and below.
     pub fn letters(self) -> [&'static str; 4] {
         match self {
             Self::Axial => ["R", "L", "A", "P"],

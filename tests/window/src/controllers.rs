@@ -85,7 +85,7 @@ fn a_stick_that_is_unplugged_while_it_is_pushed_leaves_the_needle_where_it_is_an
     assert_stays(&mut driven, "unplugged");
     assert_eq!(misplaced(&driven.window), Vec::<String>::new());
     driven.picture("unplugged");
-    driven.click("Put away");
+    driven.click("Dismiss");
     assert!(driven.window.query_by_label("Unplugged").is_none());
 }
 

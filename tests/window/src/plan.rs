@@ -114,7 +114,7 @@ fn needles_are_added_moved_and_taken_away_and_each_step_can_be_taken_back() {
     assert_eq!(plan(&driven).needles[0].hole, Some(hole("G7")));
     assert!(!plan(&driven).needles[0].seeds.is_empty());
     until_checked(&mut driven);
-    driven.window.get_by_label("Nothing is wrong with the plan.");
+    driven.window.get_by_label("The plan has no problems.");
     // Two to the patient's left, one up.
     for key in [Key::ArrowRight, Key::ArrowRight, Key::ArrowUp, Key::Enter] {
         driven.press(key);
@@ -168,7 +168,7 @@ fn a_plan_goes_to_a_file_and_comes_back_and_a_wrong_file_is_told_in_one_message(
         driven.until("the file", |app| !app.planner().is_busy());
         driven.window.run_steps(2);
         driven.window.get_by_label_contains("Plan saved as");
-        driven.click("Put the plan away");
+        driven.click("Discard the plan");
         driven.click("Import");
         driven.until("the plan", |app| app.planner().plan().is_some());
         driven.window.run_steps(2);
@@ -246,7 +246,7 @@ fn an_automatic_plan_covers_the_target_and_nothing_is_wrong_with_it() {
     driven.click("Automatic plan");
     wait_long(&mut driven, "the plan", |app| app.planner().plan().is_some());
     until_checked(&mut driven);
-    driven.window.get_by_label("Nothing is wrong with the plan.");
+    driven.window.get_by_label("The plan has no problems.");
     let planned = plan(&driven);
     assert!(planned.needles.iter().all(|n| n.hole.is_some() && !n.seeds.is_empty()));
     let prescription = format!("{} seeds of I-125 6711, 145 Gy", planned.seed_count());

@@ -13,7 +13,9 @@ pub const STEPS: u32 = 8;
 /// Displacements on a grid over the body at rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Field {
+    /// The grid.
     pub info: GridInfo,
+    /// Displacement of each node, x fastest.
     pub displacements_m: Vec<[f32; 3]>,
     /// None of them can be seen.
     pub at_rest: bool,

@@ -39,7 +39,8 @@ struct Contour {
     triangles: Vec<[u32; 3]>,
 }
 
-pub struct Slices {
+/// The three slices.
+pub(super) struct Slices {
     gpu: Option<SliceGpu>,
     scene: Option<(u64, u64)>,
     snapshot: Option<(u64, u64)>,
@@ -65,6 +66,7 @@ pub struct Slices {
 }
 
 impl Slices {
+    /// Slices on this graphics device; without one they show no tissue.
     pub fn new(state: Option<RenderState>) -> Self {
         Self {
             gpu: state.map(SliceGpu::new),
@@ -86,15 +88,12 @@ impl Slices {
         }
     }
 
+    /// Cost of the pictures since the window opened.
     pub fn driver(&self) -> DriverCost {
         self.gpu.as_ref().map_or_else(DriverCost::default, |gpu| gpu.driver)
     }
 
-    /// Directions of the patient in the scene.
-    pub fn scene_from_patient(&self) -> &Matrix3<f64> {
-        &self.scene_from_patient
-    }
-
+    /// Takes what is new since the last frame.
     pub fn take(&mut self, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>, view: &mut ViewState) {
         let Some(model) = model else { return };
         let key = (model.header.session_id, model.header.generation);
@@ -159,6 +158,7 @@ impl Slices {
         Ok(())
     }
 
+    /// Name of the image that was loaded.
     pub fn image_name(&self) -> Option<&str> {
         self.image.as_ref().map(|(name, _)| name.as_str())
     }
@@ -179,6 +179,7 @@ impl Slices {
         plane
     }
 
+    /// Draws one slice and returns what the pointer asks for.
     pub fn slice_ui(
         &mut self,
         ui: &mut egui::Ui,

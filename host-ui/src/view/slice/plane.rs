@@ -7,15 +7,20 @@ use nalgebra::{Matrix3, Vector3};
 /// The plane of one picture: its middle, two unit vectors, and how large a point of the screen is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// In the middle of the picture, scene frame.
+    /// Middle of the picture, scene frame.
     pub middle_m: Vector3<f64>,
+    /// Unit vector to the right of the picture.
     pub right: Vector3<f64>,
+    /// Unit vector to the top of the picture.
     pub up: Vector3<f64>,
+    /// Length of a point of the screen.
     pub m_per_point: f64,
+    /// Where the picture is in the window.
     pub rect: Rect,
 }
 
 impl Plane {
+    /// The plane of this orientation through a middle (scene frame).
     pub fn new(
         orientation: Orientation,
         scene_from_patient: &Matrix3<f64>,
@@ -33,12 +38,12 @@ impl Plane {
         }
     }
 
-    /// Towards the one who looks.
+    /// Unit vector towards the eye.
     pub fn normal(&self) -> Vector3<f64> {
         self.right.cross(&self.up)
     }
 
-    /// Positive in front of the plane.
+    /// Distance of a point from the plane, positive in front of it.
     pub fn distance_m(&self, point: Vector3<f64>) -> f64 {
         (point - self.middle_m).dot(&self.normal())
     }
@@ -50,6 +55,7 @@ impl Plane {
         self.rect.center() + Vec2::new(x as f32, -y as f32)
     }
 
+    /// Place in the scene under a place on the screen.
     pub fn in_scene(&self, place: Pos2) -> Vector3<f64> {
         let from_middle = place - self.rect.center();
         let (x, y) = (f64::from(from_middle.x), f64::from(-from_middle.y));
