@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::io::{self, ErrorKind};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
-use stylet_controllers::{Found, DeviceSource, Kind, OpenDevice, DeviceState};
+use stylet_controllers::{DeviceSource, DeviceState, Found, Kind, OpenDevice};
 
 /// `ENODEV`: what the kernel says of a device that was pulled out.
 const NO_SUCH_DEVICE: i32 = 19;
