@@ -51,7 +51,7 @@ impl Live {
         let scene_file = asked.file().filter(|path| files::scene::is_scene(path));
         let said = scene_file.map(files::scene::read).transpose();
         let said = said.map_err(|e| e.to_string())?;
-        let interrupted = Interrupt::on_signals()?;
+        let interrupted = Interrupt::on_signals().map_err(|e| e.to_string())?;
         let mut link = Link::new(asked.instance.clone());
         let mut core = None;
         let device = said.as_ref().and_then(|s| s.device.as_deref());

@@ -16,7 +16,10 @@ fn tip(app: &App) -> [f64; 3] {
 fn with(kind: Kind) -> (Driven, Table) {
     let mut driven = Driven::open_plain([1280.0, 800.0]);
     let table = Table::default();
-    driven.window.state_mut().hold_by(Controllers::start(table.clone()));
+    driven
+        .window
+        .state_mut()
+        .use_controllers(Controllers::start(table.clone()));
     driven.plan_and_place();
     table.plug(kind);
     let name = format!("Test {}", kind.name());
@@ -85,7 +88,7 @@ fn a_stick_that_is_unplugged_while_it_is_pushed_leaves_the_needle_where_it_is_an
     assert_stays(&mut driven, "unplugged");
     assert_eq!(misplaced(&driven.window), Vec::<String>::new());
     driven.picture("unplugged");
-    driven.click("Put away");
+    driven.click("Dismiss");
     assert!(driven.window.query_by_label("Unplugged").is_none());
 }
 

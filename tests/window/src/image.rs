@@ -3,7 +3,7 @@
 use crate::driven::{Driven, misplaced};
 use egui_kittest::kittest::{NodeT, Queryable, by};
 use host_ui::app::App;
-use host_ui::view::slice::Orientation;
+use host_ui::view::orientation::Orientation;
 use host_ui::view::slice::field::Field;
 use nalgebra::{Rotation3, Vector3};
 use std::io::Write;
@@ -155,7 +155,7 @@ fn an_image_lies_where_its_file_says_and_moves_with_the_tissue() {
     let [speckle, _] = agreement(&mut driven, &image);
     assert!(speckle.now() < 0.2, "without the image: {speckle:?}");
     load(&mut driven, &path);
-    wait_for(&mut driven, "is in the slices now");
+    wait_for(&mut driven, "is shown in the slices");
     let [all, _] = agreement(&mut driven, &image);
     driven.picture("image-at-rest");
     assert!(all.now() > 0.97, "at rest: {all:?}");
@@ -175,7 +175,7 @@ fn an_image_lies_where_its_file_says_and_moves_with_the_tissue() {
     assert_eq!(misplaced(&driven.window), Vec::<String>::new());
     driven.press(egui::Key::G);
     let [speckle, _] = agreement(&mut driven, &image);
-    assert!(speckle.now() < 0.2, "put away: {speckle:?}");
+    assert!(speckle.now() < 0.2, "hidden: {speckle:?}");
     driven.press(egui::Key::G);
     let [all, _] = agreement(&mut driven, &image);
     assert!(all.now() > 0.95, "and back: {all:?}");

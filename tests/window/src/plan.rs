@@ -17,7 +17,7 @@ const PATH: &str = "Plan file: .toml, .csv or .dcm";
 
 fn open(size: [f32; 2]) -> Driven {
     let mut driven = Driven::open_plain(size);
-    driven.until("the anatomy", |app| app.planner().planning().ground.is_some());
+    driven.until("the anatomy", |app| app.planner().planning().outlines.is_some());
     driven.window.run_steps(2);
     driven
 }
@@ -81,7 +81,14 @@ fn import(driven: &mut Driven, path: &Path) {
 
 fn put(driven: &mut Driven, name: &str, plan: &ImplantPlan) {
     let path = scratch(name).join("plan.toml");
-    let frames = driven.window.state().planner().planning().ground.expect("known").frames;
+    let frames = driven
+        .window
+        .state()
+        .planner()
+        .planning()
+        .outlines
+        .expect("known")
+        .frames;
     exchange::write(&path, plan, &frames).expect("written");
     import(driven, &path);
     assert_eq!(
@@ -114,7 +121,7 @@ fn needles_are_added_moved_and_taken_away_and_each_step_can_be_taken_back() {
     assert_eq!(plan(&driven).needles[0].hole, Some(hole("G7")));
     assert!(!plan(&driven).needles[0].seeds.is_empty());
     until_checked(&mut driven);
-    driven.window.get_by_label("Nothing is wrong with the plan.");
+    driven.window.get_by_label("The plan has no problems.");
     // Two to the patient's left, one up.
     for key in [Key::ArrowRight, Key::ArrowRight, Key::ArrowUp, Key::Enter] {
         driven.press(key);
@@ -168,7 +175,7 @@ fn a_plan_goes_to_a_file_and_comes_back_and_a_wrong_file_is_told_in_one_message(
         driven.until("the file", |app| !app.planner().is_busy());
         driven.window.run_steps(2);
         driven.window.get_by_label_contains("Plan saved as");
-        driven.click("Put the plan away");
+        driven.click("Discard the plan");
         driven.click("Import");
         driven.until("the plan", |app| app.planner().plan().is_some());
         driven.window.run_steps(2);
@@ -199,7 +206,7 @@ fn needles_go_in_one_after_the_other_by_one_key() {
     put(&mut driven, "ui-plan-run", &planned);
     driven.click("Engage force");
     let start = Instant::now();
-    let done = |app: &App| app.planner().course().done() == 2;
+    let done = |app: &App| app.planner().progress().done() == 2;
     while !done(driven.window.state()) {
         assert!(start.elapsed() < Duration::from_secs(180), "the procedure does not end");
         driven.press(Key::Enter);
@@ -208,26 +215,26 @@ fn needles_go_in_one_after_the_other_by_one_key() {
             std::thread::sleep(Duration::from_millis(10));
         }
         driven.until("rest", is_at_rest);
-        if driven.window.state().planner().course().begun() == 1 && seeds(driven.window.state()) == 2 {
+        if driven.window.state().planner().progress().begun() == 1 && seeds(driven.window.state()) == 2 {
             driven.picture("plan-first-needle");
         }
     }
     assert_eq!(seeds(driven.window.state()), 4);
-    let course = driven.window.state().planner().course().clone();
-    assert_eq!([0, 1].map(|n| course.seeds_of(n, 4)), [0..2, 2..4]);
-    assert_eq!(course.state(1), NeedleState::Done);
+    let progress = driven.window.state().planner().progress().clone();
+    assert_eq!([0, 1].map(|n| progress.seeds_of(n, 4)), [0..2, 2..4]);
+    assert_eq!(progress.state(1), NeedleState::Done);
     driven.window.run_steps(5);
     driven.window.get_by_label("2.2");
     driven.picture("plan-debrief");
     // The scripted hand does the same, from the beginning.
     driven.click("Run all 2 needles");
-    driven.until("the first needle", |app| app.planner().course().begun() == 1);
+    driven.until("the first needle", |app| app.planner().progress().begun() == 1);
     wait_long(&mut driven, "the scripted hand", done);
     driven.window.run_steps(3);
     driven.window.get_by_label("All 2 needles are done.");
     assert_eq!(seeds(driven.window.state()), 4);
-    let course = driven.window.state().planner().course().clone();
-    assert_eq!([0, 1].map(|n| course.seeds_of(n, 4)), [0..2, 2..4]);
+    let progress = driven.window.state().planner().progress().clone();
+    assert_eq!([0, 1].map(|n| progress.seeds_of(n, 4)), [0..2, 2..4]);
 }
 
 /// As [`Driven::until`], for what takes minutes on a busy machine.
@@ -246,7 +253,7 @@ fn an_automatic_plan_covers_the_target_and_nothing_is_wrong_with_it() {
     driven.click("Automatic plan");
     wait_long(&mut driven, "the plan", |app| app.planner().plan().is_some());
     until_checked(&mut driven);
-    driven.window.get_by_label("Nothing is wrong with the plan.");
+    driven.window.get_by_label("The plan has no problems.");
     let planned = plan(&driven);
     assert!(planned.needles.iter().all(|n| n.hole.is_some() && !n.seeds.is_empty()));
     let prescription = format!("{} seeds of I-125 6711, 145 Gy", planned.seed_count());

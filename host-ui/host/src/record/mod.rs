@@ -38,7 +38,7 @@ pub struct Options {
 
 /// Records until the time is over or it is interrupted; an error when a tick was lost on the way.
 pub fn run(options: &Options) -> Result<(), String> {
-    let interrupted = Interrupt::on_signals()?;
+    let interrupted = Interrupt::on_signals().map_err(|e| e.to_string())?;
     let stop = || interrupted.asked();
     let mut link = Link::new(options.instance.clone());
     find_core(&mut link, stop)?;

@@ -1,6 +1,7 @@
-//! What a plan is drawn on: the scene's anatomy behind the holes of a template, made once a scene.
+//! Outlines of the scene's anatomy behind the holes of a template, made once per scene.
 
-use crate::view::slice::cut;
+use super::Failure;
+use crate::mesh::cut;
 use nalgebra::Vector3;
 use stylet_host::link::SceneModel;
 use stylet_implant::plan::anatomy::Body;
@@ -18,24 +19,30 @@ pub type Outline = Vec<[f32; 2]>;
 /// What a plane parallel to the template cuts.
 #[derive(Default)]
 pub struct Layer {
+    /// Outlines of the target.
     pub target: Vec<Outline>,
+    /// Outlines of the spared structures.
     pub spared: Vec<Outline>,
 }
 
-pub struct Ground {
+/// The anatomy of a scene, cut in layers parallel to a template.
+pub struct AnatomyOutlines {
     /// Session and generation of the scene.
     pub scene: (u64, u64),
+    /// The template.
     pub template: Template,
+    /// Surfaces of target and spared structures.
     pub anatomy: Anatomy,
+    /// Between scene and patient.
     pub frames: Frames,
-    /// From the template's face to the near and the far end of the target.
+    /// Distances from the template's face to the near and the far end of the target, m.
     pub depths_m: [f64; 2],
     layers: Vec<Layer>,
     pieces_m: Vec<Option<[f64; 2]>>,
 }
 
-impl Ground {
-    pub fn of(scene: &SceneModel, template: Template) -> Result<Self, String> {
+impl AnatomyOutlines {
+    pub(super) fn of(scene: &SceneModel, template: Template) -> Result<Self, Failure> {
         let key = (scene.header.session_id, scene.header.generation);
         Ok(Self::on(Anatomy::of(scene)?, key, template))
     }
@@ -81,7 +88,7 @@ impl Ground {
         &self.layers[number.min(self.layers.len() - 1)]
     }
 
-    /// Where seeds of a needle through the hole can lie, from the template's face; `None` where it misses the target.
+    /// Near and far depth of seeds of a needle through the hole, from the template's face, m; `None` where it misses the target.
     pub fn piece_m(&self, hole: Hole) -> Option<[f64; 2]> {
         let number = usize::from(hole.row()) * usize::from(HOLES) + usize::from(hole.column());
         *self.pieces_m.get(number)?
@@ -126,7 +133,7 @@ mod tests {
     /// Half axes of the gland; its middle lies before G7, 70 mm from the template.
     const HALF_M: [f64; 3] = [0.024, 0.018, 0.02];
 
-    fn ground() -> Ground {
+    fn outlines() -> AnatomyOutlines {
         let anatomy = Anatomy {
             target: ball("gland", [0.05, 0.05, 0.06], HALF_M),
             spared: vec![ball("urethra", [0.05, 0.05, 0.06], [0.003, 0.003, 0.03])],
@@ -141,14 +148,14 @@ mod tests {
             inwards: [0.0, 0.0, 1.0],
             pitch_m: 5e-3,
         };
-        Ground::on(anatomy, (1, 1), template)
+        AnatomyOutlines::on(anatomy, (1, 1), template)
     }
 
     #[test]
     fn outlines_are_the_ellipse_that_the_plane_cuts_in_holes() {
-        let ground = ground();
+        let outlines = outlines();
         for depth_m in [0.055, 0.07, 0.08] {
-            let layer = ground.layer(depth_m);
+            let layer = outlines.layer(depth_m);
             assert_eq!((layer.target.len(), layer.spared.len()), (1, 1));
             let off = (depth_m - 0.07) / HALF_M[2];
             let share = (1.0 - off * off).sqrt();
@@ -163,8 +170,8 @@ mod tests {
 
     #[test]
     fn a_hole_leads_through_the_piece_of_the_target_behind_it_or_none() {
-        let ground = ground();
-        let piece = |name: &str| ground.piece_m(name.parse().expect("a hole"));
+        let outlines = outlines();
+        let piece = |name: &str| outlines.piece_m(name.parse().expect("a hole"));
         for (name, across_m) in [("G7", 0.0), ("J7", 0.015), ("E7", 0.010)] {
             let half_m = HALF_M[2] * (1.0 - (across_m / HALF_M[0]).powi(2)).sqrt() - INSET_M;
             let [from, to] = piece(name).expect("it leads through");
