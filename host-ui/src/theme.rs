@@ -1,6 +1,6 @@
 //! Colours, sizes and spacings as tokens; nothing else in the window names a colour.
 //!
-//! Hues come from the Okabe-Ito set, which people with any common colour blindness can tell apart; no meaning rests on hue alone.
+//! Hues come from the Okabe-Ito set, whose colours stay distinct with any common colour blindness; no meaning rests on hue alone.
 
 mod tokens;
 

@@ -29,7 +29,7 @@ pub fn state(s: &HapticState) -> Result<(), Invalid> {
     ensure(within(&s.tip_in_scene_m, MAX_COORDINATE_M), "tip position")?;
     ensure(within(&s.contact_in_scene_m, MAX_COORDINATE_M), "contact position")?;
     ensure(within(&s.needle_direction, 1.001), "needle direction")?;
-    ensure(within(&[s.depth_m], MAX_COORDINATE_M), "depth")?;
+    ensure(within(&[s.depth_m, s.puncture_depth_m], MAX_COORDINATE_M), "depth")?;
     ensure(within(&[s.speed_m_per_s], MAX_SPEED_M_PER_S), "speed")?;
     ensure(within(&s.force_on_hand_n, MAX_FORCE_N), "force")?;
     ensure(within(&s.torque_on_hand_nm, MAX_FORCE_N), "torque")?;

@@ -21,6 +21,8 @@ pub struct HapticState {
     pub contact_in_scene_m: [f64; 3],
     /// Depth since the tip met the membrane (u_tip of paper eq. 6).
     pub depth_m: f64,
+    /// Depth at which that membrane is punctured (u_cri of paper eq. 6); 0 outside and in tissue without a membrane.
+    pub puncture_depth_m: f64,
     /// Speed along the path, positive inwards (paper eq. 7), filtered.
     pub speed_m_per_s: f64,
     /// Force on the operator, after the safety gate.

@@ -46,7 +46,7 @@ pub fn volume(cubic_metres: f64) -> String {
     format!("{:.1} cc", cubic_metres * 1e6)
 }
 
-/// `n/a` where there is nothing to tell.
+/// `n/a` where there is no value.
 pub fn microseconds(value: Option<f64>) -> String {
     match value {
         None => "n/a".to_owned(),

@@ -1,7 +1,13 @@
-//! What every part of the host program uses: units for people, long work that can be interrupted, curves in slots of time.
+//! What every part of the host program uses: units for people, long work that can be interrupted, files that are written
+//! whole, curves in slots of time.
+
+#![warn(missing_docs)]
 
 pub mod envelope;
 pub mod format;
 pub mod interrupt;
 pub mod job;
 pub mod progress_bar;
+mod write;
+
+pub use write::{WriteError, write_streamed, write_whole};

@@ -1,4 +1,4 @@
-//! What a device is by what the kernel says of it, and what its buttons do.
+//! The kind of a device, from the abilities that the kernel reports, and what its buttons do.
 
 use evdev::{AbsoluteAxisCode, KeyCode, PropType, RelativeAxisCode};
 use stylet_base::format;
@@ -115,7 +115,7 @@ impl Kind {
     /// In a few words, for a line of the window.
     pub fn axes(self) -> &'static str {
         match self {
-            Self::Gamepad => "left stick: away goes in, towards you out",
+            Self::Gamepad => "left stick: forwards in, backwards out",
             Self::Mouse3d => "press: in, lift: out; slide: across",
         }
     }
@@ -130,7 +130,7 @@ impl Kind {
                 ("Shoulder buttons, Shift", "four times slower".to_owned()),
                 ("Lower button (A, cross)", "drop a seed at the tip".to_owned()),
                 ("Right button (B, circle)", "stop the needle, and the script".to_owned()),
-                ("Back, Select", "last seed back, or else the plan".to_owned()),
+                ("Back, Select", "undo the last seed, or else the plan".to_owned()),
                 ("Start", "force on; after a fault: re-arm".to_owned()),
             ],
             Self::Mouse3d => vec![

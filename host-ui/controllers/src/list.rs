@@ -1,10 +1,10 @@
-//! What `host-ui controllers` prints: each device, whether it can be read, and what it does.
+//! `host-ui controllers`: each device, whether it can be read, and what it does.
 
 use super::found::{Found, Places, find};
 use super::kind::Kind;
-use super::{Ground, Opened, System};
+use super::{DeviceSource, OpenDevice, System};
 
-/// Tells what there is; `Err` where a device cannot be read, with what to do about it.
+/// Prints the devices; `Err` where one cannot be read, with what to do about it.
 pub fn list() -> Result<(), String> {
     let found = find(&Places::default());
     if found.is_empty() {
@@ -36,7 +36,7 @@ pub fn list() -> Result<(), String> {
 fn try_one(found: &Found) -> Result<(), String> {
     let opened = System::default().open(found);
     opened
-        .and_then(|o| o.whole())
+        .and_then(|o| o.state())
         .map(|_| ())
-        .map_err(|e| super::desk::reason(found, &e))
+        .map_err(|e| super::hub::reason(found, &e))
 }

@@ -32,15 +32,5 @@ pub fn write_labels(v: &Voxels, path: &Path) -> Result<(), String> {
             path.display()
         ));
     };
-    write_whole(path, &writer(v)?)
-}
-
-/// Under its name only once all of it is there.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), String> {
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".part");
-    let beside = Path::new(&beside);
-    std::fs::write(beside, bytes)
-        .and_then(|()| std::fs::rename(beside, path))
-        .map_err(|e| format!("{}: it cannot be written ({e}); check the folder", path.display()))
+    stylet_base::write_whole(path, &writer(v)?).map_err(|e| e.to_string())
 }

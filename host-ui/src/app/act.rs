@@ -1,10 +1,11 @@
-//! What the operator asked for, carried out after all panels are drawn.
+//! Carries out what the operator asked for, after all panels are drawn.
 
 use super::drive::{BEFORE_ENTRY_M, Drive};
 use super::{App, Waiting, refusal};
+use crate::action::Action;
 use crate::panel::workflow::{Undo, next_action, undo_action};
-use crate::panel::{Action, LoadState};
 use crate::settings::ThemeChoice;
+use crate::shown::LoadState;
 use std::time::Instant;
 use stylet_controllers::Wish;
 use stylet_implant::workflow::{default_plan, move_request, plan_request};
@@ -16,7 +17,7 @@ use stylet_shm_schema::{
 const PULLED_M: f64 = 0.02;
 /// A goal nearer than this to the last one is the same.
 const SAME_GOAL_M: f64 = 0.1e-3;
-/// Answers that are waited for at once; an older one is no longer told.
+/// Requests that wait for their answer at once; the answer of an older one is not shown.
 const WAITING_AT_MOST: usize = 64;
 
 impl App {
@@ -71,10 +72,10 @@ impl App {
             }
             Action::SavePicture => self.pictures.request(ctx),
             Action::SaveDebrief => self.save_debrief(),
-            Action::PutGoneAway => self.shown.gone = None,
-            Action::PutRefusalsAway => {
+            Action::DismissDisconnected => self.shown.disconnected = None,
+            Action::DismissRefusals => {
                 if let Some(session) = &self.shown.session {
-                    self.put_away = (session.session_id, session.refused);
+                    self.dismissed = (session.session_id, session.refused);
                 }
             }
             Action::LoadScene(path) => self.load(&path, None),
@@ -137,7 +138,7 @@ impl App {
         }
     }
 
-    /// A file that is being read is let go; one that is being sent is the core's to answer, and its answer is not waited for.
+    /// Cancels the reading of a file. One that is being sent is left to the core, and its answer is ignored.
     fn cancel_load(&mut self) {
         self.loader.cancel();
         self.uploading = None;

@@ -1,4 +1,4 @@
-//! The window: takes what is new, draws the panels, carries out what they ask for. A frame never waits.
+//! The window: takes new data, draws the panels, carries out what they ask for. A frame never waits.
 
 mod act;
 mod debrief;
@@ -6,15 +6,17 @@ mod drive;
 mod plan;
 mod take;
 
-use crate::dose_desk::DoseDesk;
+use crate::action::{Action, PlanAction};
+use crate::dose_worker::DoseWorker;
 use crate::loader::Loader;
 use crate::panel::history::History;
 use crate::panel::parameters::{ParametersState, parameters_ui};
 use crate::panel::workflow::{Progress, WorkflowState, editor_ui, workflow_ui};
-use crate::panel::{Action, FrameCost, Note, PlanAction, Shown, help, plots, status};
+use crate::panel::{help, plots, status};
 use crate::picture::Pictures;
 use crate::planner::Planner;
 use crate::settings::Settings;
+use crate::shown::{FrameCost, Note, Shown};
 use crate::view::middle::Middle;
 use crate::{cpu_time, keyboard, theme};
 use std::path::PathBuf;
@@ -43,7 +45,7 @@ pub struct Options {
     pub image: Option<PathBuf>,
     /// Whether gamepads and 3D mice may hold the needle.
     pub controllers: bool,
-    /// Frames come no faster than a person sees; without, as fast as the machine can.
+    /// Limits the frame rate to what the eye needs; without it frames follow at once.
     pub pause: bool,
 }
 
@@ -62,7 +64,7 @@ pub struct App {
     first_image: Option<PathBuf>,
     shown: Shown,
     middle: Middle,
-    dose: DoseDesk,
+    dose: DoseWorker,
     pictures: Pictures,
     settings: Settings,
     /// As they were when they were last brought into force.
@@ -92,15 +94,15 @@ pub struct App {
     /// Where a hand on the tip has drawn it in this frame, and where it was last sent to.
     pulled_to_m: Option<f64>,
     pulled_goal_m: Option<f64>,
-    /// The run of the core, and how many of its refusals were put away.
-    put_away: (u64, u64),
+    /// The run of the core, and how many of its refusals were dismissed.
+    dismissed: (u64, u64),
     workflow: WorkflowState,
     parameters: ParametersState,
     help: bool,
 }
 
 /// Opens the window and returns when it is closed.
-pub fn run(options: Options) -> Result<(), String> {
+pub fn run(options: Options) -> Result<(), WindowError> {
     let mut native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("Stylet")
@@ -115,13 +117,16 @@ pub fn run(options: Options) -> Result<(), String> {
         native.wgpu_options.surface.present_mode = eframe::wgpu::PresentMode::AutoNoVsync;
     }
     let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::new(cc, options))));
-    eframe::run_native("Stylet", native, create).map_err(|e| {
-        format!(
-            "cannot open a window: {e}. It needs a display (DISPLAY or WAYLAND_DISPLAY) and a graphics driver (mesa-vulkan-drivers); \
-             without them use `host-ui procedure`"
-        )
-    })
+    Ok(eframe::run_native("Stylet", native, create)?)
 }
+
+/// The window could not be opened.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "cannot open a window: {0}. It needs a display (DISPLAY or WAYLAND_DISPLAY) and a graphics driver (mesa-vulkan-drivers); \
+     without them use `host-ui procedure`"
+)]
+pub struct WindowError(#[from] eframe::Error);
 
 impl App {
     /// What the window knows of the core.
@@ -155,7 +160,7 @@ impl App {
             first_image: options.image,
             shown,
             middle: Middle::new(cc.wgpu_render_state.clone()),
-            dose: DoseDesk::new(),
+            dose: DoseWorker::new(),
             pictures: Pictures::default(),
             applied: None,
             history: History::default(),
@@ -181,7 +186,7 @@ impl App {
             pressed: Vec::new(),
             pulled_to_m: None,
             pulled_goal_m: None,
-            put_away: (0, 0),
+            dismissed: (0, 0),
             workflow: WorkflowState::with_file(&settings.last_file),
             settings,
             parameters: ParametersState::default(),
@@ -190,7 +195,7 @@ impl App {
     }
 
     /// Other devices than those of the system.
-    pub fn hold_by(&mut self, controllers: Controllers) {
+    pub fn use_controllers(&mut self, controllers: Controllers) {
         self.controllers = controllers;
     }
 
@@ -251,7 +256,7 @@ impl App {
         }
     }
 
-    /// Keys come before a stick or a cap, which moves nothing while another window has the focus.
+    /// Keys take precedence over a stick or a cap, which moves nothing while another window has the focus.
     fn wish(&self, ctx: &egui::Context, keys_m_per_s: f64) -> Wish {
         if keys_m_per_s != 0.0 {
             return Wish {
@@ -266,7 +271,7 @@ impl App {
         }
     }
 
-    /// While the plan's step is open what is no volume is a plan.
+    /// While the plan's step is open, a file that is no volume is a plan.
     fn dropped_file(&self, ctx: &egui::Context) -> Option<Action> {
         let path = ctx.input(|i| {
             i.raw

@@ -1,7 +1,8 @@
 //! The bar at the top and the banners under it: is it alive, is it real time, is the force on.
 
-use super::{Action, Shown};
+use crate::action::Action;
 use crate::settings::{SCALES, STRENGTHS_U, Settings, ThemeChoice};
+use crate::shown::Shown;
 use crate::theme;
 use crate::theme::Tokens;
 use egui::{Align, Color32, DragValue, Layout, RichText, Sense, Vec2};
@@ -10,13 +11,13 @@ use stylet_host::link::LinkStatus;
 use stylet_shm_schema::{Fault, ParameterId, Request};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Severity {
+pub enum BannerLevel {
     Bad,
     Warn,
     Info,
 }
 
-impl Severity {
+impl BannerLevel {
     fn color(self, tokens: &Tokens) -> Color32 {
         match self {
             Self::Bad => tokens.bad,
@@ -28,35 +29,35 @@ impl Severity {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Banner {
-    pub severity: Severity,
+    pub level: BannerLevel,
     pub title: &'static str,
     pub text: String,
     /// The one thing to do about it, where a click can do it.
     pub remedy: Option<(&'static str, Action)>,
 }
 
-/// Worst first. What cannot be known is not claimed: without a core nothing is said about its force.
+/// Worst first. Without a core there is no banner about its force.
 pub fn banners(shown: &Shown) -> Vec<Banner> {
     let mut list = of_core(shown);
     list.extend(of_controllers(shown));
     list
 }
 
-/// What went, and what may not be read.
+/// Devices that were unplugged, and devices that may not be read.
 fn of_controllers(shown: &Shown) -> Vec<Banner> {
     let banner = |title, text, remedy| Banner {
-        severity: Severity::Warn,
+        level: BannerLevel::Warn,
         title,
         text,
         remedy,
     };
-    let gone = shown.gone.as_ref().map(|name| {
+    let unplugged = shown.disconnected.as_ref().map(|name| {
         let text = format!("{name}. The needle stays where it is; keys and mouse still move it.");
-        banner("Unplugged", text, Some(("Put away", Action::PutGoneAway)))
+        banner("Unplugged", text, Some(("Dismiss", Action::DismissDisconnected)))
     });
     let denied = shown.controllers.denied.iter();
     let denied = denied.map(|why| banner("A controller is not read", why.clone(), None));
-    gone.into_iter().chain(denied).collect()
+    unplugged.into_iter().chain(denied).collect()
 }
 
 fn of_core(shown: &Shown) -> Vec<Banner> {
@@ -64,10 +65,10 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
         LinkStatus::Absent { why } => return vec![absent(shown, why)],
         LinkStatus::Silent { since } => {
             return vec![Banner {
-                severity: Severity::Bad,
+                level: BannerLevel::Bad,
                 title: "rt-core is silent",
                 text: format!(
-                    "Nothing came for {:.1} s. What you see is old. If it stays so, look at the terminal where rt-core runs.",
+                    "No data for {:.1} s. The display is out of date. If this persists, check the terminal where rt-core runs.",
                     since.as_secs_f64()
                 ),
                 remedy: None,
@@ -79,7 +80,7 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
     let fault = shown.fault();
     if fault != Some(Fault::None) {
         list.push(Banner {
-            severity: Severity::Bad,
+            level: BannerLevel::Bad,
             title: "Fault: the force is off",
             text: fault.map_or(
                 "rt-core reports a fault that this program does not know".to_owned(),
@@ -101,30 +102,30 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
 fn force_is_off(shown: &Shown) -> Option<Banner> {
     if !shown.is_engaged() {
         return Some(Banner {
-            severity: Severity::Warn,
+            level: BannerLevel::Warn,
             title: "The force is off",
             text: "The device is moved but not felt. Key E turns it on.".to_owned(),
             remedy: Some(("Turn it on", Action::Send(Request::Engage))),
         });
     }
     shown.is_waiting().then(|| Banner {
-        severity: Severity::Warn,
+        level: BannerLevel::Warn,
         title: "The force waits",
-        text: "It would begin with a jump. Move the needle until it is small: out of the tissue is surest.".to_owned(),
+        text: "It would begin with a jump. Move the needle until it is small, best outside the tissue.".to_owned(),
         remedy: None,
     })
 }
 
-/// Until they are put away: what was refused may have been asked by another host.
+/// Until they are dismissed: the refused request may be that of another host.
 fn refused(shown: &Shown) -> Option<Banner> {
     (shown.refusals > 0).then(|| Banner {
-        severity: Severity::Info,
+        level: BannerLevel::Info,
         title: "rt-core refused",
         text: match shown.last_refusal.as_str() {
             "" => format!("{} requests", shown.refusals),
             why => format!("{} requests; the last: {}", shown.refusals, why.replace('\n', "; ")),
         },
-        remedy: Some(("Put away", Action::PutRefusalsAway)),
+        remedy: Some(("Dismiss", Action::DismissRefusals)),
     })
 }
 
@@ -135,7 +136,7 @@ fn absent(shown: &Shown, why: &str) -> Banner {
         sentence(why)
     };
     Banner {
-        severity: Severity::Bad,
+        level: BannerLevel::Bad,
         title: "rt-core is absent",
         text,
         remedy: None,
@@ -146,12 +147,14 @@ fn not_real_time(shown: &Shown) -> Banner {
     let advice = shown.session.map(|s| s.advice.read()).unwrap_or_default();
     let asked = shown.session.is_some_and(|s| s.no_rt_asked != 0);
     let text = match (advice.trim(), asked) {
-        ("", true) => "rt-core was started with --no-rt: timing here says nothing about this machine.".to_owned(),
-        ("", false) => "Run setcap cap_sys_nice,cap_ipc_lock=ep on rt-core, or allow rtprio and memlock in /etc/security/limits.d, then start it again.".to_owned(),
+        ("", true) => {
+            "rt-core was started with --no-rt: timing measured here is not that of a real-time run.".to_owned()
+        }
+        ("", false) => "Run rt-core doctor: it shows what is missing and what to do.".to_owned(),
         (advice, _) => advice.replace('\n', "  "),
     };
     Banner {
-        severity: Severity::Warn,
+        level: BannerLevel::Warn,
         title: "Not real-time",
         text,
         remedy: None,
@@ -171,7 +174,7 @@ pub fn banners_ui(ui: &mut egui::Ui, list: &[Banner]) -> Option<Action> {
     let tokens = theme::of(ui);
     let ink = tokens.on_signal;
     for banner in list {
-        let fill = banner.severity.color(tokens);
+        let fill = banner.level.color(tokens);
         egui::Frame::new()
             .fill(fill)
             .inner_margin(egui::Margin::symmetric(10, 5))
@@ -225,7 +228,7 @@ fn settings_ui(ui: &mut egui::Ui, settings: &mut Settings) {
         ui.radio_value(&mut settings.theme, ThemeChoice::Dark, "Dark");
         ui.radio_value(&mut settings.theme, ThemeChoice::Light, "Light");
     });
-    let label = ui.label(theme::weak("Size of words"));
+    let label = ui.label(theme::weak("Text size"));
     let mut percent = settings.scale * 100.0;
     let drag = DragValue::new(&mut percent)
         .range(SCALES[0] * 100.0..=SCALES[1] * 100.0)
@@ -378,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn all_well_needs_no_banner_and_absence_says_what_to_type() {
+    fn no_banner_without_a_problem_and_absence_shows_what_to_type() {
         assert!(banners(&live()).is_empty());
         let list = banners(&Shown::empty("lab"));
         assert!(list[0].text.contains("rt-core --instance lab"), "{}", list[0].text);
@@ -402,10 +405,10 @@ mod tests {
     }
 
     #[test]
-    fn a_controller_that_went_and_one_without_rights_are_told_with_or_without_a_core() {
+    fn an_unplugged_controller_and_one_without_rights_are_shown_with_or_without_a_core() {
         for mut shown in [live(), Shown::empty("lab")] {
             let before = banners(&shown).len();
-            shown.gone = Some("Pad".to_owned());
+            shown.disconnected = Some("Pad".to_owned());
             shown
                 .controllers
                 .denied
@@ -413,7 +416,7 @@ mod tests {
             let list = banners(&shown);
             assert_eq!(list.len(), before + 2);
             assert!(list[before].text.contains("Pad. The needle stays where it is"));
-            assert_eq!(list[before].remedy, Some(("Put away", Action::PutGoneAway)));
+            assert_eq!(list[before].remedy, Some(("Dismiss", Action::DismissDisconnected)));
             assert!(list[before + 1].text.contains("Run: that"));
         }
     }
@@ -425,7 +428,7 @@ mod tests {
             (state.fault, state.flags) = (999, 0);
         }
         let list = banners(&shown);
-        assert_eq!(list[0].severity, Severity::Bad);
+        assert_eq!(list[0].level, BannerLevel::Bad);
         assert_eq!(list[1].title, "Not real-time");
     }
 }

@@ -1,41 +1,51 @@
-//! The plan that is edited in the window: its history, what is wrong with it, the work that is done for it, how far it is
-//! carried out.
+//! The plan that is edited in the window: its history, its problems, the background jobs for it, and the progress of its needles.
 //!
-//! A frame gives it what came and takes what is shown; nothing here takes longer than a copy of the plan.
+//! Each frame hands over new data and takes what is shown; nothing here takes longer than a copy of the plan.
 
-mod course;
-mod ground;
+mod jobs;
+mod needles;
+mod outlines;
 mod shown;
-mod work;
 
-pub use course::{Course, NeedleState};
-pub use ground::{Ground, Layer, Outline};
+use jobs::JobMessage;
+pub use jobs::JobProgress;
+pub use needles::{NeedleProgress, NeedleState};
+pub use outlines::{AnatomyOutlines, Layer, Outline};
 pub use shown::{Implant, Planning};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use stylet_base::job::{Job, News};
+use stylet_base::job::{Job, JobUpdate};
 use stylet_host::link::SceneModel;
 use stylet_implant::plan::check::{Problem, problems};
 use stylet_implant::plan::{Compensation, Drops, History, Hole, ImplantPlan, Needle, Row, Template, exchange};
 use stylet_implant::workflow::{NeedleTask, Pace};
 use stylet_shm_schema::MAX_SEEDS;
 use stylet_shm_schema::service::Instance;
-pub use work::Progress;
-use work::Told;
 
-/// Changes of one needle that follow each other faster are one step to take back.
+/// Changes of one needle that follow each other faster are one step to undo.
 const ONE_STEP: Duration = Duration::from_millis(800);
-/// Of seeds of a plan that has none yet.
+/// Strength of the seeds of a plan that has none yet.
 const STRENGTH_U: f64 = 0.5;
 
+/// Whatever was wrong, to be shown as text.
+type Failure = Box<dyn std::error::Error + Send + Sync>;
 type Checked = Job<Vec<Problem>>;
+
+/// A message for the operator.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Message {
+    /// Something was done.
+    Done(String),
+    /// Something was refused or failed, with the reason.
+    Refused(String),
+}
 
 #[derive(Default)]
 pub struct Planner {
-    ground: Option<Arc<Ground>>,
-    grounding: Option<(u64, u64, Template, Job<Result<Ground, String>>)>,
-    /// What no ground could be made of.
+    outlines: Option<Arc<AnatomyOutlines>>,
+    outlining: Option<(u64, u64, Template, Job<Result<AnatomyOutlines, Failure>>)>,
+    /// Scene and template that no outlines could be made of.
     failed: Option<((u64, u64), Template)>,
     /// The scene that the plan is for: its name and box.
     of_scene: Option<(String, [f64; 3])>,
@@ -45,16 +55,16 @@ pub struct Planner {
     problems: Option<Arc<Vec<Problem>>>,
     checking: Option<(u64, Checked)>,
     checked: u64,
-    work: Option<(Job<Told>, Progress)>,
+    job: Option<(Job<JobMessage>, JobProgress)>,
     /// With the needles as they were when they were rehearsed.
     compensated: Vec<(Needle, Compensation)>,
-    course: Course,
+    progress: NeedleProgress,
     /// The needle whose seeds were changed last, and when.
     drawn: Option<(usize, Instant)>,
     implant: Option<Arc<Implant>>,
     shown_revision: u64,
-    /// What the person should read, once.
-    said: Option<Result<String, String>>,
+    /// A message for the operator, reported once.
+    message: Option<Message>,
 }
 
 impl Planner {
@@ -62,32 +72,32 @@ impl Planner {
         self.history.as_ref().map(History::plan)
     }
 
-    pub fn course(&self) -> &Course {
-        &self.course
+    pub fn progress(&self) -> &NeedleProgress {
+        &self.progress
     }
 
-    /// What the person should read, once.
-    pub fn said(&mut self) -> Option<Result<String, String>> {
-        self.said.take()
+    /// A message for the operator, reported once.
+    pub fn take_message(&mut self) -> Option<Message> {
+        self.message.take()
     }
 
     pub fn planning(&self) -> Planning {
         Planning {
-            ground: self.ground.clone(),
+            outlines: self.outlines.clone(),
             implant: self.implant.clone(),
-            work: self.work.as_ref().map(|(_, progress)| progress.clone()),
-            course: self.course.clone(),
+            job: self.job.as_ref().map(|(_, progress)| progress.clone()),
+            progress: self.progress.clone(),
         }
     }
 
-    /// What came since the last frame.
+    /// Takes what is new since the last frame.
     pub fn take(&mut self, scene: Option<&Arc<SceneModel>>, seeds: usize) {
         let Some(scene) = scene else { return };
         self.take_scene(scene);
-        self.take_work();
+        self.take_job();
         self.take_problems();
-        if self.course.is_undone(seeds) {
-            self.set_course(Course::default());
+        if self.progress.is_undone(seeds) {
+            self.set_progress(NeedleProgress::default());
         }
         self.show();
     }
@@ -102,7 +112,7 @@ impl Planner {
                     self.revision,
                     history,
                     checked.or(old),
-                    &self.course,
+                    &self.progress,
                     &self.compensated,
                 ))
             });
@@ -114,56 +124,58 @@ impl Planner {
         let of_scene = (scene.header.name.read(), scene.header.upper_m);
         if self.of_scene.as_ref() != Some(&of_scene) {
             if self.history.is_some() {
-                self.said = Some(Err("The plan was for another scene and is put away.".to_owned()));
+                self.message = Some(Message::Refused(
+                    "The plan was for another scene and was discarded.".to_owned(),
+                ));
             }
             *self = Self {
                 of_scene: Some(of_scene),
-                said: self.said.take(),
+                message: self.message.take(),
                 revision: self.revision + 1,
                 ..Self::default()
             };
         }
-        if let Some((session, generation, template, job)) = &self.grounding {
+        if let Some((session, generation, template, job)) = &self.outlining {
             let (key, template) = ((*session, *generation), *template);
             match job.poll() {
-                News::None => {}
-                News::Told(Ok(ground)) => {
-                    self.ground = Some(Arc::new(ground));
-                    self.grounding = None;
+                JobUpdate::Pending => {}
+                JobUpdate::Message(Ok(outlines)) => {
+                    self.outlines = Some(Arc::new(outlines));
+                    self.outlining = None;
                     self.change();
                 }
-                News::Told(Err(why)) => self.no_ground(key, template, why),
-                News::Ended => self.no_ground(key, template, "the scene's anatomy was not made out".to_owned()),
+                JobUpdate::Message(Err(why)) => self.no_outlines(key, template, &why.to_string()),
+                JobUpdate::Ended => self.no_outlines(key, template, "the scene's anatomy could not be determined"),
             }
             return;
         }
         let template = self
             .plan()
             .map_or_else(|| Template::before(&scene.header), |p| p.template);
-        let is_known = |g: &Arc<Ground>| g.scene == key && g.template == template;
-        if !self.ground.as_ref().is_some_and(is_known) && self.failed != Some((key, template)) {
-            if self.ground.as_ref().is_some_and(|g| g.scene != key) {
-                self.set_course(Course::default());
+        let is_known = |g: &Arc<AnatomyOutlines>| g.scene == key && g.template == template;
+        if !self.outlines.as_ref().is_some_and(is_known) && self.failed != Some((key, template)) {
+            if self.outlines.as_ref().is_some_and(|g| g.scene != key) {
+                self.set_progress(NeedleProgress::default());
                 self.compensated.clear();
             }
             let model = scene.clone();
-            let job = Job::begin("anatomy", move |told, _| {
-                let _ = told.send(Ground::of(&model, template));
+            let job = Job::begin("anatomy", move |messages, _| {
+                let _ = messages.send(AnatomyOutlines::of(&model, template));
             });
-            self.grounding = Some((key.0, key.1, template, job));
+            self.outlining = Some((key.0, key.1, template, job));
         }
     }
 
-    fn no_ground(&mut self, key: (u64, u64), template: Template, why: String) {
-        (self.ground, self.grounding, self.failed) = (None, None, Some((key, template)));
-        self.said = Some(Err(format!("No plan can be made for this scene: {why}")));
+    fn no_outlines(&mut self, key: (u64, u64), template: Template, why: &str) {
+        (self.outlines, self.outlining, self.failed) = (None, None, Some((key, template)));
+        self.message = Some(Message::Refused(format!("No plan can be made for this scene: {why}")));
     }
 
     fn take_problems(&mut self) {
         if let Some((revision, job)) = &self.checking {
             match job.poll() {
-                News::None => return,
-                News::Told(found) => {
+                JobUpdate::Pending => return,
+                JobUpdate::Message(found) => {
                     self.problems = Some(Arc::new(found));
                     self.checked = *revision;
                     let is_new = *revision == self.revision;
@@ -172,141 +184,151 @@ impl Planner {
                         self.shown_revision = 0;
                     }
                 }
-                News::Ended => self.checking = None,
+                JobUpdate::Ended => self.checking = None,
             }
         }
-        let (Some(ground), Some(plan)) = (&self.ground, self.plan()) else {
+        let (Some(outlines), Some(plan)) = (&self.outlines, self.plan()) else {
             return;
         };
         if self.checked == self.revision || self.checking.is_some() {
             return;
         }
-        let (ground, plan) = (ground.clone(), plan.clone());
-        let job = Job::begin("plan check", move |told, _| {
-            let _ = told.send(problems(&plan, &ground.anatomy));
+        let (outlines, plan) = (outlines.clone(), plan.clone());
+        let job = Job::begin("plan check", move |messages, _| {
+            let _ = messages.send(problems(&plan, &outlines.anatomy));
         });
         self.checking = Some((self.revision, job));
     }
 
-    fn take_work(&mut self) {
-        let Some((job, progress)) = &mut self.work else { return };
+    fn take_job(&mut self) {
+        let Some((job, progress)) = &mut self.job else { return };
         let mut news = job.poll();
-        // Of several words the last is what is true.
-        while let News::Told(Told::Progress(now)) = news {
+        // Of several messages on the progress the last one counts.
+        while let JobUpdate::Message(JobMessage::Progress(now)) = news {
             *progress = now;
             news = job.poll();
         }
         match news {
-            News::None | News::Told(Told::Progress(_)) => {}
-            News::Told(Told::Plan(plan)) => {
-                self.work = None;
+            JobUpdate::Pending | JobUpdate::Message(JobMessage::Progress(_)) => {}
+            JobUpdate::Message(JobMessage::Plan(plan)) => {
+                self.job = None;
                 match plan.and_then(|plan| self.can_be(plan)) {
                     Ok(plan) => self.put(plan),
-                    Err(why) => self.said = Some(Err(why)),
+                    Err(why) => self.message = Some(Message::Refused(why.to_string())),
                 }
             }
-            News::Told(Told::Compensated(done)) => {
+            JobUpdate::Message(JobMessage::Compensated(done)) => {
                 self.compensated.retain(|(needle, _)| *needle != done.0);
                 self.compensated.push(*done);
                 self.refresh();
             }
-            News::Told(Told::End(end)) => (self.work, self.said) = (None, Some(end)),
-            News::Ended => self.work = None,
+            JobUpdate::Message(JobMessage::End(end)) => {
+                self.job = None;
+                self.message = Some(match end {
+                    Ok(text) => Message::Done(text),
+                    Err(why) => Message::Refused(why.to_string()),
+                });
+            }
+            JobUpdate::Ended => self.job = None,
         }
     }
 
     pub fn is_busy(&self) -> bool {
-        self.work.is_some()
+        self.job.is_some()
     }
 
-    /// What is being done is no longer wanted.
+    /// Cancels the job.
     pub fn cancel(&mut self) {
-        self.work = None;
+        self.job = None;
     }
 
-    fn begin_work(&mut self, what: &str, begin: impl FnOnce(&Self, Arc<Ground>) -> Result<Job<Told>, String>) {
-        let job = match (&self.ground, self.is_busy()) {
+    fn begin_job(
+        &mut self,
+        what: &str,
+        begin: impl FnOnce(&Self, Arc<AnatomyOutlines>) -> Result<Job<JobMessage>, Failure>,
+    ) {
+        let job = match (&self.outlines, self.is_busy()) {
             (_, true) => return,
-            (None, _) => Err("the scene's anatomy is not known yet; wait a moment".to_owned()),
-            (Some(ground), false) => begin(self, ground.clone()),
+            (None, _) => Err("the scene's anatomy is not known yet; try again in a moment".into()),
+            (Some(outlines), false) => begin(self, outlines.clone()),
         };
         match job {
             Ok(job) => {
-                let progress = Progress {
+                let progress = JobProgress {
                     what: what.to_owned(),
                     share: None,
                 };
-                self.work = Some((job, progress));
+                self.job = Some((job, progress));
             }
-            Err(why) => self.said = Some(Err(why)),
+            Err(why) => self.message = Some(Message::Refused(why.to_string())),
         }
     }
 
     pub fn automatic(&mut self) {
-        self.begin_work(work::FIRST_PLAN, |_, ground| Ok(work::automatic(ground)));
+        self.begin_job(jobs::FIRST_PLAN, |_, outlines| Ok(jobs::automatic(outlines)));
     }
 
     pub fn fit_strength(&mut self) {
-        self.begin_work("Looking for the strength", |planner, ground| {
-            Ok(work::strength(ground, Arc::new(planner.planned()?.clone())))
+        self.begin_job("Fitting the strength", |planner, outlines| {
+            Ok(jobs::strength(outlines, Arc::new(planner.planned()?.clone())))
         });
     }
 
     pub fn import(&mut self, path: PathBuf, scene: Arc<SceneModel>) {
-        self.begin_work("Reading the plan", |_, _| Ok(work::import(path, scene)));
+        self.begin_job("Reading the plan", |_, _| Ok(jobs::import(path, scene)));
     }
 
     pub fn export(&mut self, path: PathBuf) {
-        self.begin_work("Writing the plan", |planner, ground| {
-            Ok(work::export(path, Arc::new(planner.planned()?.clone()), ground))
+        self.begin_job("Writing the plan", |planner, outlines| {
+            Ok(jobs::export(path, Arc::new(planner.planned()?.clone()), outlines))
         });
     }
 
-    /// Of the needles that are still to come.
+    /// Compensates the needles that are not inserted yet.
     pub fn compensate(&mut self, instance: Instance, pace: Pace) {
-        self.begin_work("Rehearsing", |planner, _| {
-            let begun = planner.course.begun();
+        self.begin_job("Rehearsing", |planner, _| {
+            let begun = planner.progress.begun();
             let left = planner.planned()?.needles.iter().skip(begun);
             let needles: Vec<Needle> = left.filter(|n| !n.seeds.is_empty()).cloned().collect();
             if needles.is_empty() {
-                return Err("no needle with seeds is left to rehearse".to_owned());
+                return Err("no needle with seeds is left to rehearse".into());
             }
-            Ok(work::compensation(instance, needles, pace))
+            Ok(jobs::compensation(instance, needles, pace))
         });
     }
 
-    fn planned(&self) -> Result<&ImplantPlan, String> {
-        self.plan().ok_or_else(|| "there is no plan yet; make one".to_owned())
+    fn planned(&self) -> Result<&ImplantPlan, Failure> {
+        self.plan().ok_or_else(|| "there is no plan yet; make one".into())
     }
 
-    /// An empty one.
+    /// Begins an empty plan.
     pub fn begin(&mut self) {
-        let (Some(ground), None) = (&self.ground, &self.history) else {
+        let (Some(outlines), None) = (&self.outlines, &self.history) else {
             return;
         };
         let plan = exchange::usual().map(|(source, prescription_gy)| ImplantPlan {
-            template: ground.template,
+            template: outlines.template,
             source: source.model,
             prescription_gy,
             needles: Vec::new(),
         });
         match plan {
             Ok(plan) => self.put(plan),
-            Err(why) => self.said = Some(Err(why)),
+            Err(why) => self.message = Some(Message::Refused(why.to_string())),
         }
     }
 
-    /// Back to one needle.
+    /// Discards the plan; one needle is left.
     pub fn discard(&mut self) {
-        (self.history, self.work, self.problems) = (None, None, None);
+        (self.history, self.job, self.problems) = (None, None, None);
         self.compensated.clear();
-        self.course = Course::default();
+        self.progress = NeedleProgress::default();
         self.change();
     }
 
-    /// A needle through the hole, with as many seeds as fill the target behind it.
+    /// Adds a needle through the hole, with as many seeds as fill the target behind it.
     pub fn add(&mut self, hole: Hole) {
-        let piece = self.ground.as_ref().and_then(|g| g.piece_m(hole));
+        let piece = self.outlines.as_ref().and_then(|g| g.piece_m(hole));
         let strength_u = |plan: &ImplantPlan| {
             let seeds = plan.needles.iter().flat_map(|n| &n.seeds);
             seeds.map(|s| s.strength_u).next().unwrap_or(STRENGTH_U)
@@ -321,7 +343,7 @@ impl Planner {
 
     pub fn set_row(&mut self, needle: usize, row: Row) {
         let last = self.drawn.filter(|(n, at)| *n == needle && at.elapsed() < ONE_STEP);
-        let changed = self.planned().and_then(|plan| plan.with_row(needle, row));
+        let changed = self.planned().and_then(|plan| Ok(plan.with_row(needle, row)?));
         match changed.and_then(|plan| self.can_be(plan)) {
             Ok(plan) => {
                 match &mut self.history {
@@ -332,14 +354,18 @@ impl Planner {
                 self.drawn = Some((needle, Instant::now()));
                 self.change();
             }
-            Err(why) => self.said = Some(Err(why)),
+            Err(why) => self.message = Some(Message::Refused(why.to_string())),
         }
     }
 
-    pub fn edit(&mut self, edit: impl FnOnce(&ImplantPlan) -> Result<ImplantPlan, String>) {
-        match self.planned().and_then(edit).and_then(|plan| self.can_be(plan)) {
+    pub fn edit<E: Into<Failure>>(&mut self, edit: impl FnOnce(&ImplantPlan) -> Result<ImplantPlan, E>) {
+        match self
+            .planned()
+            .and_then(|plan| edit(plan).map_err(E::into))
+            .and_then(|plan| self.can_be(plan))
+        {
             Ok(plan) => self.put(plan),
-            Err(why) => self.said = Some(Err(why)),
+            Err(why) => self.message = Some(Message::Refused(why.to_string())),
         }
     }
 
@@ -358,7 +384,7 @@ impl Planner {
             && let Err(why) = self.keeps(&before, history.plan())
         {
             back(&mut history);
-            self.said = Some(Err(why));
+            self.message = Some(Message::Refused(why.to_string()));
         }
         self.history = Some(history);
         self.change();
@@ -372,11 +398,11 @@ impl Planner {
         self.change();
     }
 
-    /// A plan that leaves what is in the tissue as it is and is not too much for the core.
-    fn can_be(&self, plan: ImplantPlan) -> Result<ImplantPlan, String> {
+    /// The plan, if it keeps the inserted needles and the core can hold it.
+    fn can_be(&self, plan: ImplantPlan) -> Result<ImplantPlan, Failure> {
         if plan.seed_count() > MAX_SEEDS {
             let count = plan.seed_count();
-            return Err(format!("that makes {count} seeds; at most {MAX_SEEDS} can be placed"));
+            return Err(format!("that would be {count} seeds; at most {MAX_SEEDS} can be placed").into());
         }
         match self.plan() {
             Some(before) => self.keeps(before, &plan).map(|()| plan),
@@ -384,18 +410,16 @@ impl Planner {
         }
     }
 
-    fn keeps(&self, before: &ImplantPlan, after: &ImplantPlan) -> Result<(), String> {
-        let begun = self.course.begun();
+    fn keeps(&self, before: &ImplantPlan, after: &ImplantPlan) -> Result<(), Failure> {
+        let begun = self.progress.begun();
         let first = |plan: &ImplantPlan| plan.needles.iter().take(begun).cloned().collect::<Vec<_>>();
         if begun > 0 && first(before) != first(after) {
-            return Err(format!(
-                "{begun} needles have gone in already; only those after them can be changed"
-            ));
+            return Err(format!("{begun} needles are already inserted; only those after them can be changed").into());
         }
         Ok(())
     }
 
-    /// The plan or what it lies on has changed.
+    /// The plan or its anatomy has changed.
     fn change(&mut self) {
         self.revision += 1;
         let plan = self.history.as_ref().map(History::plan);
@@ -408,14 +432,14 @@ impl Planner {
         self.shown_revision = 0;
     }
 
-    fn set_course(&mut self, course: Course) {
-        if self.course != course {
-            self.course = course;
+    fn set_progress(&mut self, progress: NeedleProgress) {
+        if self.progress != progress {
+            self.progress = progress;
             self.refresh();
         }
     }
 
-    /// What is done with a needle.
+    /// Path and drops of a needle.
     pub fn task(&self, number: usize) -> Option<NeedleTask> {
         let needle = self.plan()?.needles.get(number)?;
         let found = self.compensated.iter().find(|(n, _)| n == needle);
@@ -437,29 +461,29 @@ impl Planner {
             .collect()
     }
 
-    /// The needle goes in now; so many seeds lie in the tissue.
+    /// A needle is inserted now, with so many seeds in the tissue.
     pub fn begin_needle(&mut self, number: usize, seeds: usize) {
-        let mut course = self.course.clone();
-        course.begin(number, seeds);
-        self.set_course(course);
+        let mut progress = self.progress.clone();
+        progress.begin(number, seeds);
+        self.set_progress(progress);
     }
 
     pub fn finish_needle(&mut self) {
-        let mut course = self.course.clone();
-        course.finish();
-        self.set_course(course);
+        let mut progress = self.progress.clone();
+        progress.finish();
+        self.set_progress(progress);
     }
 
     pub fn step_back(&mut self) {
-        let mut course = self.course.clone();
-        course.step_back();
-        self.set_course(course);
+        let mut progress = self.progress.clone();
+        progress.step_back();
+        self.set_progress(progress);
     }
 
     pub fn begin_anew(&mut self) {
-        self.set_course(Course::default());
+        self.set_progress(NeedleProgress::default());
     }
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

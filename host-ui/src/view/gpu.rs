@@ -4,8 +4,8 @@
 
 use super::driver::DriverCost;
 use super::marks::{MarkVertex, Marks};
-use super::mesh::SurfaceVertex;
-use crate::dose_desk;
+use crate::dose_worker::IsodoseShell;
+use crate::mesh::SurfaceVertex;
 use bytemuck::{Pod, Zeroable};
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
@@ -204,7 +204,7 @@ impl Gpu {
     }
 
     /// Vertices and indices of each isodose surface.
-    pub fn set_shells(&mut self, shells: &[dose_desk::Shell]) {
+    pub fn set_shells(&mut self, shells: &[IsodoseShell]) {
         let device = &self.state.device;
         while self.shells.len() < shells.len() {
             self.shells.push(Shell {
@@ -311,7 +311,7 @@ impl Gpu {
         ((looks.len() + shells.len() + 1) * size_of::<SceneUniform>()) as u64
     }
 
-    /// The highest dose is innermost and comes first.
+    /// The highest dose is innermost and is drawn first.
     fn draw_shells(&self, pass: &mut wgpu::RenderPass<'_>, count: usize) {
         for shell in self.shells.iter().take(count).rev().filter(|s| s.indices.len > 0) {
             for pipeline in [&self.pipelines.surface_back, &self.pipelines.surface_front] {

@@ -1,12 +1,14 @@
 //! What stands in the middle of the window: the three-dimensional picture, the slices, and the tools over them.
 
 use super::driver::DriverCost;
-use super::scene3d::{Preset, Scene3d};
-use super::slice::{Orientation, Plane, Slices};
+use super::orientation::Orientation;
+use super::scene3d::Scene3d;
+use super::slice::{ImageError, Plane, Slices};
 use super::state::ViewState;
-use crate::dose_desk::DosePicture;
-use crate::panel::{Action, Shown};
+use crate::action::{Action, Viewpoint};
+use crate::dose_worker::DoseResult;
 use crate::settings::Layout;
+use crate::shown::Shown;
 use crate::theme;
 use eframe::egui_wgpu::RenderState;
 use egui::{Pos2, Rect};
@@ -60,8 +62,8 @@ impl Middle {
         self.slices.plane(orientation, &self.view, rect)
     }
 
-    /// Greys for the slices, of the patient of the scene of this name.
-    pub fn show_image(&mut self, image: Image, scene: &str) -> Result<(), String> {
+    /// Shows an image in the slices, of the patient of the scene of this name.
+    pub fn show_image(&mut self, image: Image, scene: &str) -> Result<(), ImageError> {
         self.view.image = true;
         self.slices.show_image(image, scene)
     }
@@ -76,7 +78,7 @@ impl Middle {
         ui: &mut egui::Ui,
         layout: Layout,
         shown: &Shown,
-        dose: Option<&Arc<DosePicture>>,
+        dose: Option<&Arc<DoseResult>>,
     ) -> Vec<Action> {
         let mut actions = Vec::new();
         let tokens = theme::of(ui);
@@ -145,7 +147,7 @@ impl Middle {
         if ui.button("Reset view").on_hover_text("Key R").clicked() {
             actions.push(Action::ResetView);
         }
-        for (number, preset) in Preset::ALL.into_iter().enumerate() {
+        for (number, preset) in Viewpoint::ALL.into_iter().enumerate() {
             let text = format!("{}  {}", number + 1, preset.name());
             if ui.button(text).clicked() {
                 self.solid.look_from(preset, shown);

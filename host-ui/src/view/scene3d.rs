@@ -6,12 +6,13 @@ use super::gpu::{Gpu, SceneUniform};
 use super::kinds::{kinds, surfaces};
 use super::legend::Legend;
 use super::marks::Marks;
-use super::mesh::Surface;
+use super::orientation::{Orientation, scene_from_patient};
 use super::pick::pick;
-use super::slice::{Orientation, scene_from_patient};
 use super::state::ViewState;
-use crate::dose_desk::DosePicture;
-use crate::panel::Shown;
+use crate::action::Viewpoint;
+use crate::dose_worker::DoseResult;
+use crate::mesh::Surface;
+use crate::shown::Shown;
 use crate::theme::{self, IMAGE, Tokens};
 use eframe::egui_wgpu::RenderState;
 use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense};
@@ -47,30 +48,6 @@ impl Default for Look {
             rest_shape: false,
             force: true,
             template: false,
-        }
-    }
-}
-
-/// Places to look from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Preset {
-    Oblique,
-    Perineum,
-    Side,
-    Above,
-    Needle,
-}
-
-impl Preset {
-    pub const ALL: [Self; 5] = [Self::Oblique, Self::Perineum, Self::Side, Self::Above, Self::Needle];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Oblique => "Oblique",
-            Self::Perineum => "From the perineum",
-            Self::Side => "From the side",
-            Self::Above => "From above",
-            Self::Needle => "Along the needle",
         }
     }
 }
@@ -145,17 +122,17 @@ impl Scene3d {
         }
     }
 
-    pub fn look_from(&mut self, preset: Preset, shown: &Shown) {
+    pub fn look_from(&mut self, viewpoint: Viewpoint, shown: &Shown) {
         self.reset_view(shown);
         let Some(scene) = &shown.scene else { return };
         let patient = scene_from_patient(scene);
         let along = |axis: Vector3<f64>| (patient * axis).map(|c| c as f32);
-        match preset {
-            Preset::Oblique => {}
-            Preset::Perineum => self.camera.look_along(along(Vector3::z())),
-            Preset::Side => self.camera.look_along(along(Vector3::x())),
-            Preset::Above => self.camera.look_along(along(-Vector3::y())),
-            Preset::Needle => {
+        match viewpoint {
+            Viewpoint::Oblique => {}
+            Viewpoint::Perineum => self.camera.look_along(along(Vector3::z())),
+            Viewpoint::Side => self.camera.look_along(along(Vector3::x())),
+            Viewpoint::Above => self.camera.look_along(along(-Vector3::y())),
+            Viewpoint::Needle => {
                 if let (Some(tip), Some(state)) = (shown.tip_m(), &shown.state) {
                     self.camera.target_m = tip.map(|c| c as f32);
                     self.camera.distance_m = NEEDLE_VIEW_M;
@@ -201,7 +178,7 @@ impl Scene3d {
         &mut self,
         ui: &mut egui::Ui,
         rect: Rect,
-        (shown, dose): (&Shown, Option<&Arc<DosePicture>>),
+        (shown, dose): (&Shown, Option<&Arc<DoseResult>>),
         view: &mut ViewState,
     ) {
         let tokens = theme::of(ui);
@@ -225,7 +202,7 @@ impl Scene3d {
                 };
                 legend.landmarks(self.corner_m, view);
                 legend.scale_bar();
-                // Beside the slices these tell the levels already.
+                // Beside the slices, these show the levels already.
                 let alone = dose.filter(|_| rect.width() > ALONE);
                 legend.rows(self.look, alone.map(|d| &**d));
             }
@@ -266,7 +243,7 @@ impl Scene3d {
         &mut self,
         scale: f32,
         rect: Rect,
-        (shown, dose, view): (&Shown, Option<&Arc<DosePicture>>, &ViewState),
+        (shown, dose, view): (&Shown, Option<&Arc<DoseResult>>, &ViewState),
         tokens: &'static Tokens,
     ) -> Option<egui::TextureId> {
         let gpu = self.gpu.as_mut()?;
@@ -286,7 +263,7 @@ impl Scene3d {
             plan: (
                 shown.plan.map_or(0, |p| p.generation),
                 shown.planning.implant.as_ref().map_or(0, |i| i.revision),
-                shown.planning.course.begun(),
+                shown.planning.progress.begun(),
             ),
             tip: shown.tip_m().unwrap_or_default(),
             force: shown.state.map_or([0.0; 3], |s| s.force_on_hand_n),
@@ -370,8 +347,10 @@ fn tint(whole: SceneUniform, color: Color32, opacity: f32, section: [f32; 4]) ->
 /// What changes with the scene and the plan only. Gives the corner where the axes are drawn.
 fn collect_fixed(marks: &mut Marks, shown: &Shown, look: Look, tokens: &'static Tokens) -> Option<[f32; 3]> {
     marks.begin(tokens);
-    let corner = shown.scene.map(|scene| marks.ground(scene.lower_m, scene.upper_m));
-    let at_work = shown.planning.course.begun().checked_sub(1);
+    let corner = shown
+        .scene
+        .map(|scene| marks.grid_and_axes(scene.lower_m, scene.upper_m));
+    let at_work = shown.planning.progress.begun().checked_sub(1);
     for (number, needle) in shown
         .planning
         .implant

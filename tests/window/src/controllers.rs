@@ -16,7 +16,7 @@ fn tip(app: &App) -> [f64; 3] {
 fn with(kind: Kind) -> (Driven, Table) {
     let mut driven = Driven::open_plain([1280.0, 800.0]);
     let table = Table::default();
-    driven.window.state_mut().hold_by(Controllers::start(table.clone()));
+    driven.window.state_mut().use_controllers(Controllers::start(table.clone()));
     driven.plan_and_place();
     table.plug(kind);
     let name = format!("Test {}", kind.name());

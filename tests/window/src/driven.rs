@@ -3,7 +3,7 @@
 use egui_kittest::kittest::{NodeT, Queryable, by};
 use egui_kittest::{Harness, SnapshotOptions, image_snapshot_options};
 use host_ui::app::{App, Options};
-use host_ui::view::slice::Orientation;
+use host_ui::view::orientation::Orientation;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::flags;
 use stylet_test_kit::scratch;

@@ -3,7 +3,7 @@
 use crate::driven::{Driven, misplaced};
 use egui_kittest::kittest::{NodeT, Queryable, by};
 use host_ui::app::App;
-use host_ui::view::slice::Orientation;
+use host_ui::view::orientation::Orientation;
 use host_ui::view::slice::field::Field;
 use nalgebra::{Rotation3, Vector3};
 use std::io::Write;

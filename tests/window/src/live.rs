@@ -6,7 +6,7 @@ use crate::driven::{Driven, keep_for_docs};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use host_ui::app::{App, Options};
-use host_ui::view::slice::Orientation;
+use host_ui::view::orientation::Orientation;
 use host_ui::view::slice::field::Field;
 use nalgebra::Vector3;
 use std::time::Duration;

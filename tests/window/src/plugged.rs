@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::io::{self, ErrorKind};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
-use stylet_controllers::{Found, Ground, Kind, Opened, Whole};
+use stylet_controllers::{Found, DeviceSource, Kind, OpenDevice, DeviceState};
 
 /// `ENODEV`: what the kernel says of a device that was pulled out.
 const NO_SUCH_DEVICE: i32 = 19;
@@ -51,8 +51,8 @@ impl Table {
     }
 }
 
-impl Ground for Table {
-    type Opened = Plugged;
+impl DeviceSource for Table {
+    type Device = Plugged;
 
     fn list(&mut self) -> Vec<Found> {
         let there = self.there.lock().unwrap();
@@ -75,7 +75,7 @@ impl Ground for Table {
     }
 }
 
-impl Opened for Plugged {
+impl OpenDevice for Plugged {
     fn fetch(&mut self, into: &mut Vec<InputEvent>) -> io::Result<()> {
         while let Some(event) = self.queue.lock().unwrap().pop_front() {
             into.push(event?);
@@ -83,13 +83,13 @@ impl Opened for Plugged {
         Err(ErrorKind::WouldBlock.into())
     }
 
-    fn whole(&self) -> io::Result<Whole> {
+    fn state(&self) -> io::Result<DeviceState> {
         let axes = [
             AbsoluteAxisCode::ABS_X,
             AbsoluteAxisCode::ABS_Y,
             AbsoluteAxisCode::ABS_Z,
         ];
-        Ok(Whole {
+        Ok(DeviceState {
             axes: axes.map(|a| (a, AbsInfo::new(0, -350, 350, 0, 0, 0))).to_vec(),
             keys: AttributeSet::new(),
         })

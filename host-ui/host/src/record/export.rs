@@ -2,7 +2,9 @@
 
 use super::messages::Tick;
 use super::read::{Recording, read};
-use std::path::{Path, PathBuf};
+use std::io::Write;
+use std::path::PathBuf;
+use stylet_base::{write_streamed, write_whole};
 use stylet_shm_schema::motion::{Motion, MotionSample};
 
 /// The period of the force loop's ideal grid.
@@ -28,12 +30,12 @@ pub fn export(options: &Export) -> Result<(), String> {
         println!("note: the recording was cut off ({why}); what came before is used");
     }
     if let Some(path) = &options.csv {
-        csv(&recording.ticks, path).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_streamed(path, |file| csv(&recording.ticks, file)).map_err(|e| e.to_string())?;
         println!("written: {}", path.display());
     }
     if let Some(path) = &options.motion {
         let (motion, filled) = motion(&recording);
-        std::fs::write(path, motion.to_bytes()).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(path, &motion.to_bytes()).map_err(|e| e.to_string())?;
         println!(
             "written: {}, {} samples, {filled} of them held where the recording has none; play it with: rt-core --device replay:{}",
             path.display(),
@@ -78,8 +80,8 @@ const COLUMNS: [&str; 31] = [
     "session_begins",
 ];
 
-fn csv(ticks: &[Tick], path: &Path) -> Result<(), csv::Error> {
-    let mut table = csv::Writer::from_path(path)?;
+fn csv(ticks: &[Tick], file: &mut impl Write) -> std::io::Result<()> {
+    let mut table = csv::Writer::from_writer(file);
     table.write_record(COLUMNS)?;
     let mut before: Option<&Tick> = None;
     for t in ticks {
@@ -117,8 +119,7 @@ fn csv(ticks: &[Tick], path: &Path) -> Result<(), csv::Error> {
         table.write_record(&row)?;
         before = Some(t);
     }
-    table.flush()?;
-    Ok(())
+    table.flush()
 }
 
 /// The hand's motion in the first session, on the grid of the force loop; and how many samples had to be held, because

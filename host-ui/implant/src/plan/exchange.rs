@@ -5,7 +5,6 @@ use super::{ImplantPlan, Template};
 use std::path::Path;
 use stylet_dose::Source;
 use stylet_dose::files::SeedDefaults;
-use stylet_files::convert::write_whole;
 use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
 use stylet_files::dicom::{Identity, new_uid};
 use stylet_shm_schema::SceneHeader;
@@ -47,7 +46,7 @@ pub fn write(path: &Path, plan: &ImplantPlan, frames: &Frames) -> Result<(), Str
     } else {
         return Err(told("its name must end in .toml, .csv or .dcm".to_owned()));
     };
-    write_whole(path, &bytes)
+    stylet_base::write_whole(path, &bytes).map_err(|e| e.to_string())
 }
 
 fn seed_plan(plan: &ImplantPlan, frames: &Frames) -> Result<SeedPlan, String> {

@@ -269,7 +269,7 @@ pub fn read(path: &Path, frames: &Frames) -> Result<ImplantPlan, String> {
 
 pub fn write(path: &Path, plan: &ImplantPlan, frames: &Frames) -> Result<(), String> {
     let text = to_text(plan, frames)?;
-    std::fs::write(path, text).map_err(|e| format!("{} cannot be written ({e})", path.display()))
+    stylet_base::write_whole(path, text.as_bytes()).map_err(|e| e.to_string())
 }
 
 /// Seeds as `host-ui dose --seeds` reads them, with the number of their needle and its hole.

@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
+use stylet_base::{write_streamed, write_whole};
 use stylet_host::link::Link;
 use stylet_shm_schema::*;
 
@@ -55,8 +56,8 @@ pub fn write(
         "versions": { "host_ui": env!("CARGO_PKG_VERSION"), "schema": SCHEMA_VERSION },
     });
     let text = serde_json::to_string_pretty(&result).map_err(|e| e.to_string())?;
-    std::fs::write(out.join("result.json"), text + "\n").map_err(told)?;
-    force_csv(out, direction, seen).map_err(told)?;
+    write_whole(&out.join("result.json"), (text + "\n").as_bytes()).map_err(|e| e.to_string())?;
+    write_streamed(&out.join("force.csv"), |file| force_csv(file, direction, seen)).map_err(|e| e.to_string())?;
     table(&result);
     println!("written: {}", out.display());
     Ok(())
@@ -195,8 +196,7 @@ fn session(s: &Session) -> Value {
     })
 }
 
-fn force_csv(out: &Path, direction: [f64; 3], seen: &Seen) -> std::io::Result<()> {
-    let mut file = std::io::BufWriter::new(std::fs::File::create(out.join("force.csv"))?);
+fn force_csv(file: &mut impl Write, direction: [f64; 3], seen: &Seen) -> std::io::Result<()> {
     writeln!(file, "time_s,tick,depth_mm,speed_mm_s,force_n,phase,tissue_tick")?;
     let begin = seen.records.first().map_or(0, |r| r.due_ns);
     for r in &seen.records {
@@ -212,7 +212,7 @@ fn force_csv(out: &Path, direction: [f64; 3], seen: &Seen) -> std::io::Result<()
             r.tissue_tick
         )?;
     }
-    file.flush()
+    Ok(())
 }
 
 fn table(result: &Value) {

@@ -3,6 +3,7 @@
 use super::{Score, page};
 use serde_json::{Value, json};
 use std::path::Path;
+use stylet_base::write_whole;
 
 /// Every figure of a score; lengths in mm, patient frame (RAS) for places.
 pub fn to_json(score: &Score) -> Value {
@@ -42,8 +43,8 @@ pub fn to_json(score: &Score) -> Value {
 
 /// `score.json` and `debrief.html` in a folder that is there.
 pub fn write(score: &Score, folder: &Path) -> Result<(), String> {
-    let told = |e: std::io::Error| format!("{} cannot be written ({e})", folder.display());
     let json = serde_json::to_string_pretty(&to_json(score)).map_err(|e| e.to_string())?;
-    std::fs::write(folder.join("score.json"), json + "\n").map_err(told)?;
-    std::fs::write(folder.join("debrief.html"), page::page(score)?).map_err(told)
+    let write = |name: &str, text: String| write_whole(&folder.join(name), text.as_bytes()).map_err(|e| e.to_string());
+    write("score.json", json + "\n")?;
+    write("debrief.html", page::page(score)?)
 }

@@ -2,7 +2,7 @@
 
 mod preset;
 
-use super::Shown;
+use crate::shown::Shown;
 use crate::theme;
 use egui::{Button, DragValue, RichText};
 use std::path::Path;
@@ -125,15 +125,15 @@ impl ParametersState {
         let set = shown.parameters.map(|p| p.set).unwrap_or_default();
         self.foot = Some(match preset::save(Path::new(self.preset_path.trim()), &set) {
             Ok(()) => (false, format!("Saved to {}", self.preset_path.trim())),
-            Err(why) => (true, why),
+            Err(why) => (true, why.to_string()),
         });
     }
 
-    /// Takes every value of a file, or none and says all that is wrong with it.
+    /// Takes every value of a file, or none and shows everything that is wrong with it.
     fn load_preset(&mut self) {
         match preset::load(Path::new(self.preset_path.trim())) {
             Ok(values) => values.into_iter().for_each(|(index, value)| self.edit(index, value)),
-            Err(why) => self.foot = Some((true, why)),
+            Err(why) => self.foot = Some((true, why.to_string())),
         }
     }
 
@@ -160,7 +160,8 @@ pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersS
         .show(ctx, |ui| {
             if shown.parameters.is_none() {
                 ui.label(
-                    RichText::new("No parameters from rt-core yet; these are the defaults.").color(theme::of(ui).warn),
+                    RichText::new("rt-core has not reported its parameters yet; these are the defaults.")
+                        .color(theme::of(ui).warn),
                 );
             }
             search_ui(ui, state);
@@ -174,7 +175,7 @@ pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersS
                         group_ui(ui, shown, state, (group, &found));
                     }
                     if found.is_empty() {
-                        ui.label(theme::weak("No parameter has these words."));
+                        ui.label(theme::weak("No parameter matches."));
                     }
                 });
             ui.separator();
@@ -346,7 +347,7 @@ fn foot_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState) {
     }
 }
 
-/// As few digits as say it.
+/// As few digits as needed.
 fn plain(value: f64) -> String {
     let text = format!("{value:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

@@ -1,12 +1,13 @@
-//! The left panel: the steps of the procedure, one of them open, with the one thing to do and what it lacks.
+//! The left panel: the steps of the procedure, one of them open, with its main action and what is missing.
 
 mod debrief;
+mod job;
 mod plan;
 mod progress;
 mod scene;
-mod work;
 
-use super::{Action, SeedError, Shown, own_errors};
+use crate::action::Action;
+use crate::shown::{SeedError, Shown, own_errors};
 use crate::theme;
 use egui::{Align2, Button, FontId, RichText, Sense, Stroke, Vec2};
 pub use plan::{PlanState, editor_ui};
@@ -115,7 +116,7 @@ fn hinted(response: egui::Response, blocked: Option<String>) -> egui::Response {
     }
 }
 
-/// One line: the step's number in a dot that says how far it is, its name, and the same in a word.
+/// One line: the step's number in a dot that shows its progress, its name, and the progress in a word.
 fn head_ui(ui: &mut egui::Ui, (step, now): (Progress, Progress), shown: &Shown) -> egui::Response {
     let tokens = theme::of(ui);
     let size = Vec2::new(ui.available_width(), 24.0);
@@ -175,7 +176,7 @@ fn step_ui(
         let blocked = missing(shown, step);
         match &blocked {
             Some(why) => drop(ui.label(RichText::new(format!("Missing: {why}.")).color(tokens.warn))),
-            // What there is to say stands below.
+            // Details stand below.
             None if step == Progress::Plan && shown.planning.implant.is_some() => {}
             None if step == Progress::Debrief => {}
             None => drop(ui.label(theme::weak(what(step, shown)))),
@@ -211,7 +212,7 @@ fn what(step: Progress, shown: &Shown) -> String {
     }
 }
 
-/// The one thing to do in a step.
+/// The button of the main action of a step.
 fn main_button(ui: &mut egui::Ui, (name, action): (&str, Action), ready: bool, actions: &mut Vec<Action>) {
     if ui
         .add_enabled(ready, Button::new(name))
@@ -323,3 +324,6 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         }
     });
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,7 @@
 //! How far the operator is, what each step lacks, and the one thing to do next.
 
-use crate::panel::{Action, PlanAction, Shown};
+use crate::action::{Action, PlanAction};
+use crate::shown::Shown;
 use stylet_base::format;
 use stylet_procedure::{AtHand, Operation, Step};
 use stylet_shm_schema::Request;
@@ -45,7 +46,7 @@ impl Progress {
     }
 }
 
-/// From what the core says alone, so that it survives a restart of this program.
+/// From the state of the core alone, so that it survives a restart of this program.
 pub fn progress(shown: &Shown) -> Progress {
     if shown.scene.is_none() {
         return Progress::Scene;
@@ -76,23 +77,23 @@ fn at_hand(shown: &Shown) -> Option<AtHand> {
     })
 }
 
-/// The needle of a plan that is to go in now: the first one, or the one after a needle whose seeds are all dropped.
+/// The needle of a plan that is to be inserted now: the first one, or the one after a needle whose seeds are all dropped.
 pub fn next_needle(shown: &Shown) -> Option<usize> {
     let next = shown.planning.next_needle()?;
     let is_free = shown.planning.waits() || is_needle_done(shown);
     is_free.then_some(next)
 }
 
-/// Nothing of a plan has gone in yet, so that another one may take its place.
+/// No needle of a plan was inserted yet, so that another plan may replace it.
 pub fn is_before_needles(shown: &Shown) -> bool {
-    shown.planning.course.begun() == 0
+    shown.planning.progress.begun() == 0
 }
 
 /// All its seeds are dropped and its tip is outside.
 pub fn is_needle_done(shown: &Shown) -> bool {
     let is_out = at_hand(shown).is_some_and(|needle| needle.is_outside());
-    // One that was taken back leaves no path, and those before it are done.
-    shown.planning.course.is_done() || (shown.planning.at_work().is_some() && shown.next_seed_m().is_none() && is_out)
+    // A needle that was withdrawn leaves no path, and those before it are done.
+    shown.planning.progress.is_done() || (shown.planning.at_work().is_some() && shown.next_seed_m().is_none() && is_out)
 }
 
 /// The needle at work is outside, whatever it has dropped.
@@ -161,7 +162,7 @@ pub fn is_at_next_seed(shown: &Shown) -> bool {
     at_hand(shown).is_some_and(|needle| needle.is_at_next_drop())
 }
 
-/// What Ctrl+Z takes back: the last seed, or else the plan while the needle is outside.
+/// What Ctrl+Z undoes: the last seed, or else the plan while the needle is outside.
 pub fn undo_action(shown: &Shown) -> Option<Undo> {
     if !shown.is_live() {
         None

@@ -81,7 +81,7 @@ impl Field {
     }
 }
 
-/// A displacement as a texture takes it; one that cannot be told is none.
+/// A displacement for a texture; one that is not a number is none.
 fn texel(metres: f32) -> f16 {
     if metres.is_nan() {
         return f16::ZERO;
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn a_linear_field_is_told_exactly_and_undone() {
+    fn a_linear_field_is_interpolated_exactly_and_undone() {
         for stretch in [-0.45, 0.1, 0.6] {
             let field = linear(stretch);
             let rest = Vector3::new(0.021, 0.013, 0.008);

@@ -32,6 +32,24 @@ struct SliceUniform {
     image: [[f32; 4]; 3],
 }
 
+/// An image that cannot be shown in the slices.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The window runs without a graphics device.
+    #[error("there is no graphics device to show an image")]
+    NoDevice,
+    /// One side has more voxels than a texture can have.
+    #[error("{name} has {side} voxels along one side, and the graphics card takes {longest}; crop it to the gland")]
+    TooLarge {
+        /// Name of the image.
+        name: String,
+        /// Voxels along the longest side.
+        side: usize,
+        /// Voxels that the card takes.
+        longest: u32,
+    },
+}
+
 /// What belongs to one scene.
 struct Body {
     brightness: wgpu::TextureView,
@@ -123,7 +141,7 @@ impl SliceGpu {
 
     /// Takes the tissues of a scene. A scene too large for the card has no slices.
     pub fn set_scene(&mut self, model: &SceneModel, scene_from_patient: Matrix3<f64>) {
-        self.put_panes_away();
+        self.drop_panes();
         self.body = None;
         let (info, nodes_info) = (model.header.labels, model.header.nodes);
         let longest = self.state.device.limits().max_texture_dimension_3d;
@@ -148,33 +166,34 @@ impl SliceGpu {
         self.set_field(&Field::rest(nodes_info));
     }
 
-    /// What they are bound to has gone; their textures are used again.
-    fn put_panes_away(&mut self) {
+    /// Drops what they are bound to; their textures are used again.
+    fn drop_panes(&mut self) {
         self.targets = self.panes.drain(..).map(|pane| pane.target).collect();
         self.content += 1;
     }
 
     /// Takes an image, and its greys to the card.
-    pub fn set_image(&mut self, mut image: Image) -> Result<(), String> {
+    pub fn set_image(&mut self, mut image: Image) -> Result<(), ImageError> {
         let longest = self.state.device.limits().max_texture_dimension_3d;
         if let Some(side) = image.dims.iter().find(|&&side| side > longest as usize) {
-            return Err(format!(
-                "{} has {side} voxels along one side, and the graphics card takes {longest}; crop it to the gland",
-                image.name
-            ));
+            return Err(ImageError::TooLarge {
+                name: image.name,
+                side: *side,
+                longest,
+            });
         }
         let greys = std::mem::take(&mut image.greys);
         let texture = volume(&self.state, GREY, image.dims.map(|d| d as u32));
         self.driver.send(|| write(&self.state, &texture, &greys, 1));
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         self.image = Some(OnCard { image, view });
-        self.put_panes_away();
+        self.drop_panes();
         Ok(())
     }
 
     pub fn forget_image(&mut self) {
         self.image = None;
-        self.put_panes_away();
+        self.drop_panes();
     }
 
     pub fn set_field(&mut self, field: &Field) {

@@ -1,6 +1,5 @@
 //! Three orthogonal slices through the deformed body that look like ultrasound, and what is drawn over them.
 
-pub(crate) mod cut;
 pub mod field;
 mod gpu;
 mod overlay;
@@ -8,17 +7,20 @@ mod plane;
 mod speckle;
 
 use super::driver::DriverCost;
+use super::orientation::{Orientation, scene_from_patient};
 use super::state::ViewState;
-use crate::dose_desk::DosePicture;
-use crate::panel::{Action, Shown};
+use crate::action::Action;
+use crate::dose_worker::DoseResult;
+use crate::shown::Shown;
 use crate::theme::IMAGE;
 use eframe::egui_wgpu::RenderState;
 use egui::{Color32, PointerButton, Pos2, Rect, Sense};
 use field::Field;
+pub use gpu::ImageError;
 use gpu::SliceGpu;
 use nalgebra::{Matrix3, Vector3};
 use overlay::{Lines, Overlay};
-pub use plane::{Orientation, Plane, scene_from_patient};
+pub use plane::Plane;
 use std::sync::Arc;
 use stylet_files::Image;
 use stylet_host::link::{SceneModel, Snapshot};
@@ -146,10 +148,10 @@ impl Slices {
         }
     }
 
-    /// Greys of the patient of a scene, until another scene comes.
-    pub fn show_image(&mut self, image: Image, scene: &str) -> Result<(), String> {
+    /// Shows an image of the patient of a scene, until another scene is loaded.
+    pub fn show_image(&mut self, image: Image, scene: &str) -> Result<(), ImageError> {
         let Some(gpu) = &mut self.gpu else {
-            return Err("there is no graphics device to show an image".to_owned());
+            return Err(ImageError::NoDevice);
         };
         let name = image.name.clone();
         gpu.set_image(image)?;
@@ -182,7 +184,7 @@ impl Slices {
         ui: &mut egui::Ui,
         rect: Rect,
         orientation: Orientation,
-        (shown, dose): (&Shown, Option<&Arc<DosePicture>>),
+        (shown, dose): (&Shown, Option<&Arc<DoseResult>>),
         view: &mut ViewState,
     ) -> Option<Action> {
         let id = ui.scope_id().with(orientation.name());
@@ -197,7 +199,7 @@ impl Slices {
         let plane = self.plane(orientation, view, rect);
         let action = self.steer(&response, &plane, shown, view);
         let painter = ui.painter_at(rect);
-        painter.rect_filled(rect, 0.0, IMAGE.ground);
+        painter.rect_filled(rect, 0.0, IMAGE.background);
         if shown.scene.is_none() {
             overlay::words(&painter, rect, &format!("{}: no scene yet", orientation.name()));
             return None;

@@ -383,6 +383,7 @@ impl HapticLoop {
         s.needle_direction = self.pose.direction.into();
         s.contact_in_scene_m = tissue.contact_in_scene.into();
         s.depth_m = response.depth_m;
+        s.puncture_depth_m = response.puncture_depth_m;
         s.speed_m_per_s = response.speed_along_m_per_s;
         s.force_on_hand_n = response.wrench.force_n.into();
         s.torque_on_hand_nm = response.wrench.torque_nm.into();

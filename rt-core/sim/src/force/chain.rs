@@ -59,6 +59,8 @@ pub struct ChainOutput {
     pub phase: Phase,
     /// `u_tip` of the membrane in front; 0 outside.
     pub depth_m: f64,
+    /// `u_cri` of that membrane; 0 outside and where the tissue has none.
+    pub puncture_depth_m: f64,
     pub speed_along_m_per_s: f64,
     pub terms: ForceTerms,
     /// Insertion direction: of the path in contact, else of the needle.
@@ -165,6 +167,7 @@ pub fn step(
     ChainOutput {
         phase: needle_out.phase,
         depth_m,
+        puncture_depth_m: front.map_or(0.0, |f| f.membrane.puncture_depth_m),
         speed_along_m_per_s: velocity_m_per_s.dot(&axis),
         terms,
         axis,

@@ -1,6 +1,7 @@
-//! What a plan is drawn on: the scene's anatomy behind the holes of a template, made once a scene.
+//! Outlines of the scene's anatomy behind the holes of a template, made once per scene.
 
-use crate::view::slice::cut;
+use super::Failure;
+use crate::mesh::cut;
 use nalgebra::Vector3;
 use stylet_host::link::SceneModel;
 use stylet_implant::plan::anatomy::Body;
@@ -22,7 +23,7 @@ pub struct Layer {
     pub spared: Vec<Outline>,
 }
 
-pub struct Ground {
+pub struct AnatomyOutlines {
     /// Session and generation of the scene.
     pub scene: (u64, u64),
     pub template: Template,
@@ -34,8 +35,8 @@ pub struct Ground {
     pieces_m: Vec<Option<[f64; 2]>>,
 }
 
-impl Ground {
-    pub fn of(scene: &SceneModel, template: Template) -> Result<Self, String> {
+impl AnatomyOutlines {
+    pub(super) fn of(scene: &SceneModel, template: Template) -> Result<Self, Failure> {
         let key = (scene.header.session_id, scene.header.generation);
         Ok(Self::on(Anatomy::of(scene)?, key, template))
     }
@@ -126,7 +127,7 @@ mod tests {
     /// Half axes of the gland; its middle lies before G7, 70 mm from the template.
     const HALF_M: [f64; 3] = [0.024, 0.018, 0.02];
 
-    fn ground() -> Ground {
+    fn outlines() -> AnatomyOutlines {
         let anatomy = Anatomy {
             target: ball("gland", [0.05, 0.05, 0.06], HALF_M),
             spared: vec![ball("urethra", [0.05, 0.05, 0.06], [0.003, 0.003, 0.03])],
@@ -141,14 +142,14 @@ mod tests {
             inwards: [0.0, 0.0, 1.0],
             pitch_m: 5e-3,
         };
-        Ground::on(anatomy, (1, 1), template)
+        AnatomyOutlines::on(anatomy, (1, 1), template)
     }
 
     #[test]
     fn outlines_are_the_ellipse_that_the_plane_cuts_in_holes() {
-        let ground = ground();
+        let outlines = outlines();
         for depth_m in [0.055, 0.07, 0.08] {
-            let layer = ground.layer(depth_m);
+            let layer = outlines.layer(depth_m);
             assert_eq!((layer.target.len(), layer.spared.len()), (1, 1));
             let off = (depth_m - 0.07) / HALF_M[2];
             let share = (1.0 - off * off).sqrt();
@@ -163,8 +164,8 @@ mod tests {
 
     #[test]
     fn a_hole_leads_through_the_piece_of_the_target_behind_it_or_none() {
-        let ground = ground();
-        let piece = |name: &str| ground.piece_m(name.parse().expect("a hole"));
+        let outlines = outlines();
+        let piece = |name: &str| outlines.piece_m(name.parse().expect("a hole"));
         for (name, across_m) in [("G7", 0.0), ("J7", 0.015), ("E7", 0.010)] {
             let half_m = HALF_M[2] * (1.0 - (across_m / HALF_M[0]).powi(2)).sqrt() - INSET_M;
             let [from, to] = piece(name).expect("it leads through");

@@ -1,4 +1,4 @@
-//! How far the implantation is: which needles are done, and which seeds belong to which.
+//! Progress of the needles: which are done, and which seeds belong to which.
 
 use std::ops::Range;
 
@@ -19,25 +19,25 @@ impl NeedleState {
     }
 }
 
-/// Needles go in one after the other, in the order of the plan.
+/// Progress of the needles, which are inserted one after the other in the order of the plan.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Course {
-    /// One a needle that has begun: the seeds that lay in the tissue before it.
+pub struct NeedleProgress {
+    /// For each needle that has begun, the number of seeds in the tissue before it.
     first_seed: Vec<usize>,
     is_done: bool,
 }
 
-impl Course {
+impl NeedleProgress {
     pub fn begun(&self) -> usize {
         self.first_seed.len()
     }
 
-    /// All that have begun are done.
+    /// Whether all needles that have begun are done.
     pub fn is_done(&self) -> bool {
         self.begun() > 0 && self.is_done
     }
 
-    /// Needles that are done.
+    /// Number of needles that are done.
     pub fn done(&self) -> usize {
         self.begun() - usize::from(self.begun() > 0 && !self.is_done)
     }
@@ -52,7 +52,7 @@ impl Course {
         }
     }
 
-    /// The needles up to this one are at work or done; those that were passed over have no seeds.
+    /// This needle is inserted now, with so many seeds in the tissue; needles that were skipped have no seeds.
     pub fn begin(&mut self, needle: usize, seeds: usize) {
         self.first_seed.resize(needle + 1, seeds);
         self.first_seed[needle] = seeds;
@@ -63,20 +63,20 @@ impl Course {
         self.is_done = true;
     }
 
-    /// The needle at work is taken back.
+    /// The inserted needle is withdrawn from the plan again.
     pub fn step_back(&mut self) {
         self.first_seed.pop();
         self.is_done = true;
     }
 
-    /// Of a needle, among the seeds in the order in which they were dropped.
+    /// Seeds of a needle, as a range of all seeds in the order in which they were dropped.
     pub fn seeds_of(&self, needle: usize, seeds: usize) -> Range<usize> {
         let from = self.first_seed.get(needle).copied().unwrap_or(seeds).min(seeds);
         let to = self.first_seed.get(needle + 1).copied().unwrap_or(seeds).min(seeds);
         from..to.max(from)
     }
 
-    /// Of the needle at work; all where none is.
+    /// Seeds of the inserted needle, as [`Self::seeds_of`]; all where none is inserted.
     pub fn own_seeds(&self, seeds: usize) -> Range<usize> {
         match self.begun() {
             0 => 0..seeds,
@@ -84,7 +84,7 @@ impl Course {
         }
     }
 
-    /// The seeds of earlier needles are gone: it begins anew.
+    /// Whether seeds of earlier needles were removed, so that the implantation begins again.
     pub fn is_undone(&self, seeds: usize) -> bool {
         self.first_seed.last().is_some_and(|&first| seeds < first)
     }
@@ -95,24 +95,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn needles_go_in_one_after_the_other_and_each_has_its_own_seeds() {
-        let mut course = Course::default();
-        assert_eq!((course.own_seeds(3), course.done()), (0..3, 0));
-        course.begin(0, 0);
-        assert_eq!(course.state(0), NeedleState::Inserted);
-        assert_eq!(course.own_seeds(4), 0..4);
-        course.finish();
-        assert_eq!((course.state(0), course.done()), (NeedleState::Done, 1));
-        // The second has no seeds and is passed over.
-        course.begin(2, 4);
-        assert_eq!(course.own_seeds(6), 4..6);
-        assert_eq!([0, 1, 2].map(|n| course.seeds_of(n, 6)), [0..4, 4..4, 4..6]);
+    fn needles_are_inserted_one_after_the_other_and_each_has_its_own_seeds() {
+        let mut progress = NeedleProgress::default();
+        assert_eq!((progress.own_seeds(3), progress.done()), (0..3, 0));
+        progress.begin(0, 0);
+        assert_eq!(progress.state(0), NeedleState::Inserted);
+        assert_eq!(progress.own_seeds(4), 0..4);
+        progress.finish();
+        assert_eq!((progress.state(0), progress.done()), (NeedleState::Done, 1));
+        // The second has no seeds and is skipped.
+        progress.begin(2, 4);
+        assert_eq!(progress.own_seeds(6), 4..6);
+        assert_eq!([0, 1, 2].map(|n| progress.seeds_of(n, 6)), [0..4, 4..4, 4..6]);
         assert_eq!(
-            [1, 2, 3].map(|n| course.state(n).name()),
+            [1, 2, 3].map(|n| progress.state(n).name()),
             ["done", "inserted", "planned"]
         );
-        assert!(!course.is_undone(4) && course.is_undone(3));
-        course.step_back();
-        assert_eq!((course.begun(), course.done()), (2, 2));
+        assert!(!progress.is_undone(4) && progress.is_undone(3));
+        progress.step_back();
+        assert_eq!((progress.begun(), progress.done()), (2, 2));
     }
 }

@@ -3,7 +3,7 @@
 use crate::theme;
 
 /// Whether it is to be cancelled.
-pub fn work_ui(ui: &mut egui::Ui, what: &str, share: Option<f32>) -> bool {
+pub fn job_ui(ui: &mut egui::Ui, what: &str, share: Option<f32>) -> bool {
     let cancel = |ui: &mut egui::Ui| ui.button("Cancel").clicked();
     let Some(share) = share else {
         return ui

@@ -1,4 +1,4 @@
-//! How far each seed came to rest from the place it was planned for.
+//! Distance of each seed at rest from the place that it was planned for.
 
 use super::Shown;
 use nalgebra::Vector3;
@@ -17,7 +17,7 @@ pub struct SeedError {
 }
 
 /// One row for each planned seed. A seed belongs to the nearest planned one from where it was *dropped*, nearest pairs first:
-/// where it drifted later must not change whom it was meant for.
+/// where it drifted later does not change which planned seed it was meant for.
 pub fn seed_errors(planned: &[PlannedSeed], placed: &[SeedPose], direction: [f64; 3]) -> Vec<SeedError> {
     let mut pairs: Vec<(f64, usize, usize)> = Vec::with_capacity(planned.len() * placed.len());
     for (i, target) in planned.iter().enumerate() {
@@ -38,8 +38,8 @@ pub fn seed_errors(planned: &[PlannedSeed], placed: &[SeedPose], direction: [f64
     rows
 }
 
-/// Of the needle at work. Those of a plan of many needles are dropped in its order, which tells them apart where compensation drops
-/// one where another is planned.
+/// Errors of the inserted needle. Seeds of a plan of many needles are dropped in its order, which identifies them where compensation drops
+/// one at the place of another.
 pub fn own_errors(shown: &Shown) -> Vec<SeedError> {
     let Some(plan) = &shown.plan else { return Vec::new() };
     if shown.planning.at_work().is_none() {
@@ -48,20 +48,20 @@ pub fn own_errors(shown: &Shown) -> Vec<SeedError> {
     in_order(shown.planned(), shown.own_seeds(), plan.direction)
 }
 
-/// Of all needles that have begun, each with its number.
+/// Errors of all needles that have begun, each with the number of its needle.
 pub fn all_errors(shown: &Shown) -> Vec<(usize, SeedError)> {
     let Some(implant) = &shown.planning.implant else {
         return own_errors(shown).into_iter().map(|row| (0, row)).collect();
     };
-    let course = &shown.planning.course;
+    let progress = &shown.planning.progress;
     let of_needle = |number: usize| {
         let needle = &implant.plan.needles[number];
         let planned: Vec<PlannedSeed> = needle.seeds_m().map(|position_m| PlannedSeed { position_m }).collect();
-        let placed = &shown.seeds[course.seeds_of(number, shown.seeds.len())];
+        let placed = &shown.seeds[progress.seeds_of(number, shown.seeds.len())];
         let rows = in_order(&planned, placed, needle.direction);
         rows.into_iter().map(move |row| (number, row)).collect::<Vec<_>>()
     };
-    (0..course.begun().min(implant.plan.needles.len()))
+    (0..progress.begun().min(implant.plan.needles.len()))
         .flat_map(of_needle)
         .collect()
 }

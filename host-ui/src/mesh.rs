@@ -1,4 +1,6 @@
-//! The gland's surface as the graphics card takes it: positions with smooth normals, indices. Only what moves is made anew.
+//! The gland's surface for the graphics card: positions with smooth normals, indices. Only what moves is computed again.
+
+pub mod cut;
 
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
@@ -229,9 +231,9 @@ mod tests {
         (positions, triangles)
     }
 
-    /// Against a surface that is made anew, bit by bit; and the runs hold all that is another.
+    /// Against a new surface, bit by bit; and the runs hold everything that changed.
     #[test]
-    fn what_moves_a_little_is_what_is_made_anew() {
+    fn a_surface_that_moved_is_that_of_a_new_one() {
         let (mut positions, triangles) = sheet(40);
         let mut surface = Surface::new(&positions, &triangles);
         assert_eq!(surface.move_to(&positions), Vec::new());
@@ -247,8 +249,8 @@ mod tests {
                 positions[v][2] += 0.3;
             }
             let runs = surface.move_to(&positions);
-            let anew = Surface::new(&positions, &triangles);
-            assert_eq!(surface.vertices(), anew.vertices(), "{} moved", moved.len());
+            let rebuilt = Surface::new(&positions, &triangles);
+            assert_eq!(surface.vertices(), rebuilt.vertices(), "{} moved", moved.len());
             let is_other = |v: &usize| before[*v] != surface.vertices()[*v];
             let missed = (0..before.len())
                 .filter(is_other)

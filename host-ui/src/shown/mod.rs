@@ -1,16 +1,19 @@
 //! What one frame shows, taken from the link once, so that no panel touches shared memory.
 
-use crate::dose_desk::DosePicture;
+mod seeds;
+
+use crate::dose_worker::DoseResult;
 use crate::planner::Planning;
 use nalgebra::Vector3;
+pub use seeds::{SeedError, all_errors, own_errors, seed_errors};
 use std::sync::Arc;
 use stylet_controllers::Latest;
 use stylet_host::link::{Link, LinkStatus};
 use stylet_implant::plan::{HOLES, Template};
 use stylet_implant::workflow::Step;
 use stylet_shm_schema::{
-    EventKind, Fault, HapticState, ParameterId, ParametersInForce, Phase, PlanInForce, PlannedSeed, SceneHeader,
-    SeedPose, Session, flags,
+    EventKind, Fault, HapticState, ParametersInForce, Phase, PlanInForce, PlannedSeed, SceneHeader, SeedPose, Session,
+    flags,
 };
 
 /// Past the deepest seed the needle may go this far, and the path is drawn this far.
@@ -55,18 +58,18 @@ pub struct Shown {
     pub note: Option<Note>,
     pub load: LoadState,
     /// Of the seeds as they lie now, or of those of the plan.
-    pub dose: Option<Arc<DosePicture>>,
+    pub dose: Option<Arc<DoseResult>>,
     /// Why the dose is not known, where that is so.
     pub dose_trouble: Option<&'static str>,
     pub planning: Planning,
-    /// Refusals of requests that the operator has not yet put away, and the last reason.
+    /// Refusals of requests that the operator has not yet dismissed, and the last reason.
     pub refusals: u64,
     pub last_refusal: String,
     /// Gamepads and 3D mice, and whether this window has the focus that they need.
     pub controllers: Latest,
     pub has_focus: bool,
-    /// The device that was unplugged, until that is put away or a device comes.
-    pub gone: Option<String>,
+    /// The device that was unplugged, until the message is dismissed or a device is plugged in.
+    pub disconnected: Option<String>,
     pub cost: FrameCost,
 }
 
@@ -76,7 +79,7 @@ pub struct TipOnPath {
     /// From the entry along the path, and how far the path goes.
     pub depth_m: f64,
     pub length_m: f64,
-    /// Beside the path: to the right and up, as one sees the template.
+    /// Beside the path: to the right and up, as seen from the perineum.
     pub beside_m: [f64; 2],
     /// How far beside the path there are holes.
     pub room_m: [[f64; 2]; 2],
@@ -125,7 +128,7 @@ impl Shown {
             last_refusal: String::new(),
             controllers: Latest::default(),
             has_focus: true,
-            gone: None,
+            disconnected: None,
             cost: FrameCost::default(),
         }
     }
@@ -216,7 +219,7 @@ impl Shown {
 
     /// Seeds of the needle at work, in the order in which they were dropped.
     pub fn own_seeds(&self) -> &[SeedPose] {
-        let own = self.planning.course.own_seeds(self.seeds.len());
+        let own = self.planning.progress.own_seeds(self.seeds.len());
         &self.seeds[own]
     }
 
@@ -243,19 +246,18 @@ impl Shown {
     /// Depth of the deepest planned seed that no seed was dropped for; `None` when all are.
     pub fn next_seed_m(&self) -> Option<f64> {
         let plan = self.plan.as_ref()?;
-        let rows = super::seeds::own_errors(self);
+        let rows = own_errors(self);
         let missing = rows.iter().filter(|row| row.placed.is_none());
         missing
             .map(|row| self.drop_depth_m(plan, row.planned))
             .max_by(f64::total_cmp)
     }
 
-    /// Share of the way to the puncture that the membrane in front of the tip has gone; `None` where there is none.
+    /// Depth of the membrane in front of the tip as a share of the depth at which it is punctured; `None` where there is none.
     pub fn membrane_tension(&self) -> Option<f64> {
         let is_pressed = |s: &&HapticState| s.flags & flags::IN_CONTACT != 0 && s.flags & flags::PUNCTURED == 0;
         let state = self.state.as_ref().filter(is_pressed)?;
-        let at_m = self.parameters.map_or(8e-3, |p| p.set.get(ParameterId::PunctureDepth));
-        Some((state.depth_m / at_m.max(1e-6)).clamp(0.0, 1.0))
+        (state.puncture_depth_m > 0.0).then(|| (state.depth_m / state.puncture_depth_m).clamp(0.0, 1.0))
     }
 
     pub fn on_path_m(&self, depth_m: f64) -> Option<[f64; 3]> {
@@ -263,7 +265,7 @@ impl Shown {
         Some([0, 1, 2].map(|i| plan.entry_m[i] + plan.direction[i] * depth_m))
     }
 
-    /// A place at a depth along the planned path and beside it: to the right and up, as one sees the template.
+    /// A place at a depth along the planned path and beside it: to the right and up, as seen from the perineum.
     pub fn beside_path_m(&self, depth_m: f64, beside_m: [f64; 2]) -> Option<[f64; 3]> {
         let on_path = self.on_path_m(depth_m)?;
         let Some((_, axes)) = self.across() else {
@@ -324,4 +326,28 @@ fn along(plan: &PlanInForce, place_m: [f64; 3]) -> f64 {
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    /// The depth of the gland's membrane was taken for every membrane: skin of 12 mm seemed punctured at 8 mm.
+    #[test]
+    fn the_tension_is_that_of_the_membrane_in_front_of_the_tip() {
+        let mut shown = Shown::empty("lab");
+        let mut state = HapticState::zeroed();
+        (state.flags, state.depth_m, state.puncture_depth_m) = (flags::IN_CONTACT, 6e-3, 12e-3);
+        shown.state = Some(state);
+        shown.parameters = Some(ParametersInForce::zeroed());
+        let tension = shown.membrane_tension().expect("a membrane");
+        assert!((tension - 0.5).abs() < 1e-12, "{tension}");
+        state.puncture_depth_m = 0.0;
+        shown.state = Some(state);
+        assert_eq!(shown.membrane_tension(), None, "tissue without a membrane");
+        (state.puncture_depth_m, state.flags) = (12e-3, flags::IN_CONTACT | flags::PUNCTURED);
+        shown.state = Some(state);
+        assert_eq!(shown.membrane_tension(), None);
+    }
 }

@@ -1,30 +1,30 @@
-//! All devices together: who came, who went, who may not be read, and which one holds the needle.
+//! All devices together: which are plugged in, which may not be read, and which one controls the needle.
 
 use super::found::Found;
 use super::kind::{Button, Kind};
-use super::state::{State, Taken, Whole, Wish};
+use super::state::{DeviceState, State, Taken, Wish};
 use evdev::InputEvent;
 use std::io::{self, ErrorKind};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// A node comes before its rights do: what cannot be opened is told when it could not be so often.
-const TOLD_AFTER: u32 = 2;
+/// A node appears before its rights are set: a device is reported only after it could not be opened this often.
+const REPORTED_AFTER: u32 = 2;
 
 /// The system's devices, or those of a test.
-pub trait Ground {
-    type Opened: Opened;
+pub trait DeviceSource {
+    type Device: OpenDevice;
     fn list(&mut self) -> Vec<Found>;
-    fn open(&mut self, found: &Found) -> io::Result<Self::Opened>;
-    /// Until one of them has something to say, or a time has passed.
-    fn wait(&mut self, opened: &[&Self::Opened], at_most: Duration);
+    fn open(&mut self, found: &Found) -> io::Result<Self::Device>;
+    /// Waits until one of them has events, at most for this time.
+    fn wait(&mut self, opened: &[&Self::Device], at_most: Duration);
 }
 
 /// A device that is being read. Neither call may block.
-pub trait Opened {
-    /// Adds what came; `WouldBlock` for nothing.
+pub trait OpenDevice {
+    /// Appends new events; `WouldBlock` where there are none.
     fn fetch(&mut self, into: &mut Vec<InputEvent>) -> io::Result<()>;
-    fn whole(&self) -> io::Result<Whole>;
+    fn state(&self) -> io::Result<DeviceState>;
 }
 
 /// A device, as the window shows it.
@@ -33,7 +33,7 @@ pub struct Device {
     pub name: String,
     pub kind: Kind,
     /// The stick or the cap must be at rest once before the needle follows it.
-    pub was_let_go: bool,
+    pub was_released: bool,
 }
 
 /// What the window needs to know, as of the last reading.
@@ -46,9 +46,9 @@ pub struct Latest {
     pub presses: [u32; Button::ALL.len()],
     /// Devices that are there and cannot be read, each with the reason and what to do.
     pub denied: Vec<String>,
-    /// The device that went last, and how many have gone.
-    pub gone: String,
-    pub times_gone: u32,
+    /// Name of the device that was unplugged last.
+    pub disconnected: String,
+    pub disconnections: u32,
 }
 
 struct Held<O> {
@@ -58,19 +58,19 @@ struct Held<O> {
 }
 
 /// Devices that are there, and what they asked for.
-pub struct Desk<G: Ground> {
-    ground: G,
-    held: Vec<Held<G::Opened>>,
+pub struct DeviceHub<G: DeviceSource> {
+    source: G,
+    held: Vec<Held<G::Device>>,
     refused: Vec<(PathBuf, u32, String)>,
     holder: Option<PathBuf>,
     latest: Latest,
     events: Vec<InputEvent>,
 }
 
-impl<G: Ground> Desk<G> {
-    pub fn new(ground: G) -> Self {
+impl<G: DeviceSource> DeviceHub<G> {
+    pub fn new(source: G) -> Self {
         Self {
-            ground,
+            source,
             held: Vec::new(),
             refused: Vec::new(),
             holder: None,
@@ -79,34 +79,34 @@ impl<G: Ground> Desk<G> {
         }
     }
 
-    /// Devices that came and went since the last look.
+    /// Adds devices that were plugged in since the last call, and removes unplugged ones.
     pub fn look(&mut self) {
-        let list = self.ground.list();
+        let list = self.source.list();
         let is_there = |path: &PathBuf| list.iter().any(|f| f.path == *path);
-        let gone: Vec<PathBuf> = self
+        let unplugged: Vec<PathBuf> = self
             .held
             .iter()
             .map(|h| h.found.path.clone())
             .filter(|p| !is_there(p))
             .collect();
-        for path in gone {
-            self.let_go(&path);
+        for path in unplugged {
+            self.remove(&path);
         }
         self.refused.retain(|(path, ..)| is_there(path));
         for found in list {
             if !self.held.iter().any(|h| h.found.path == found.path) {
-                self.come(found);
+                self.add(found);
             }
         }
-        let told = self.refused.iter().filter(|(_, times, _)| *times >= TOLD_AFTER);
-        self.latest.denied = told.map(|(.., why)| why.clone()).collect();
+        let reported = self.refused.iter().filter(|(_, times, _)| *times >= REPORTED_AFTER);
+        self.latest.denied = reported.map(|(.., why)| why.clone()).collect();
     }
 
-    fn come(&mut self, found: Found) {
+    fn add(&mut self, found: Found) {
         let opened = self
-            .ground
+            .source
             .open(&found)
-            .and_then(|opened| Ok((opened.whole()?, opened)));
+            .and_then(|opened| Ok((opened.state()?, opened)));
         match opened {
             Ok((whole, opened)) => {
                 self.refused.retain(|(path, ..)| *path != found.path);
@@ -123,18 +123,18 @@ impl<G: Ground> Desk<G> {
         }
     }
 
-    fn let_go(&mut self, path: &PathBuf) {
+    fn remove(&mut self, path: &PathBuf) {
         if let Some(at) = self.held.iter().position(|h| h.found.path == *path) {
             let held = self.held.remove(at);
-            self.latest.gone = held.found.name;
-            self.latest.times_gone = self.latest.times_gone.wrapping_add(1);
+            self.latest.disconnected = held.found.name;
+            self.latest.disconnections = self.latest.disconnections.wrapping_add(1);
         }
         if self.holder.as_ref() == Some(path) {
             self.holder = None;
         }
     }
 
-    /// What came from all devices; a device that fails has gone.
+    /// Reads all devices at this time (s, of any clock that does not jump); a device that fails counts as unplugged.
     pub fn read(&mut self, now_s: f64) -> &Latest {
         let mut failed = Vec::new();
         for held in &mut self.held {
@@ -145,7 +145,7 @@ impl<G: Ground> Desk<G> {
             }
         }
         for path in failed {
-            self.let_go(&path);
+            self.remove(&path);
         }
         self.choose(now_s);
         &self.latest
@@ -153,8 +153,8 @@ impl<G: Ground> Desk<G> {
 
     /// One device at a time: another takes over only while the needle is at rest.
     fn choose(&mut self, now_s: f64) {
-        let wish = |h: &Held<G::Opened>| h.state.wish(now_s);
-        let holds = |h: &&Held<G::Opened>| Some(&h.found.path) == self.holder.as_ref();
+        let wish = |h: &Held<G::Device>| h.state.wish(now_s);
+        let holds = |h: &&Held<G::Device>| Some(&h.found.path) == self.holder.as_ref();
         let present = self.held.iter().find(holds);
         let holder = present
             .filter(|h| wish(h) != Wish::REST)
@@ -165,18 +165,18 @@ impl<G: Ground> Desk<G> {
         self.latest.holder = holder.map(|h| Device {
             name: h.found.name.clone(),
             kind: h.found.kind,
-            was_let_go: h.state.was_let_go(),
+            was_released: h.state.was_released(),
         });
         self.holder = holder.map(|h| h.found.path.clone());
     }
 
     pub fn wait(&mut self, at_most: Duration) {
-        let opened: Vec<&G::Opened> = self.held.iter().map(|h| &h.opened).collect();
-        self.ground.wait(&opened, at_most);
+        let opened: Vec<&G::Device> = self.held.iter().map(|h| &h.opened).collect();
+        self.source.wait(&opened, at_most);
     }
 }
 
-fn read_one<O: Opened>(
+fn read_one<O: OpenDevice>(
     held: &mut Held<O>,
     events: &mut Vec<InputEvent>,
     now_s: f64,
@@ -195,8 +195,8 @@ fn read_one<O: Opened>(
             Taken::Nothing => {}
             Taken::Pressed(button) => count(button),
             Taken::Lost => {
-                let whole = held.opened.whole()?;
-                held.state.read_anew(&whole).into_iter().for_each(&mut count);
+                let whole = held.opened.state()?;
+                held.state.resync(&whole).into_iter().for_each(&mut count);
             }
         }
     }
@@ -226,7 +226,7 @@ mod tests {
 
     type Queue = Rc<RefCell<VecDeque<io::Result<InputEvent>>>>;
 
-    /// Two gamepads at most, with what they are to say.
+    /// Two gamepads at most, with the events that they are to send.
     #[derive(Clone, Default)]
     struct Table {
         there: Rc<RefCell<Vec<&'static str>>>,
@@ -236,8 +236,8 @@ mod tests {
 
     struct Pad(Queue);
 
-    impl Ground for Table {
-        type Opened = Pad;
+    impl DeviceSource for Table {
+        type Device = Pad;
 
         fn list(&mut self) -> Vec<Found> {
             let found = |name: &&str| Found {
@@ -258,7 +258,7 @@ mod tests {
         fn wait(&mut self, _: &[&Pad], _: Duration) {}
     }
 
-    impl Opened for Pad {
+    impl OpenDevice for Pad {
         fn fetch(&mut self, into: &mut Vec<InputEvent>) -> io::Result<()> {
             while let Some(event) = self.0.borrow_mut().pop_front() {
                 into.push(event?);
@@ -266,8 +266,8 @@ mod tests {
             Err(ErrorKind::WouldBlock.into())
         }
 
-        fn whole(&self) -> io::Result<Whole> {
-            Ok(Whole {
+        fn state(&self) -> io::Result<DeviceState> {
+            Ok(DeviceState {
                 axes: vec![(AbsoluteAxisCode::ABS_Y, AbsInfo::new(0, -100, 100, 0, 0, 0))],
                 keys: AttributeSet::new(),
             })
@@ -275,15 +275,15 @@ mod tests {
     }
 
     impl Table {
-        fn with(there: &[&'static str]) -> (Self, Desk<Self>) {
+        fn with(there: &[&'static str]) -> (Self, DeviceHub<Self>) {
             let table = Self::default();
             *table.there.borrow_mut() = there.to_vec();
-            let mut desk = Desk::new(table.clone());
-            desk.look();
-            (table, desk)
+            let mut hub = DeviceHub::new(table.clone());
+            hub.look();
+            (table, hub)
         }
 
-        fn says(&self, pad: usize, kind: EventType, code: u16, value: i32) {
+        fn sends(&self, pad: usize, kind: EventType, code: u16, value: i32) {
             let mut queue = self.queues[pad].borrow_mut();
             queue.push_back(Ok(InputEvent::new(kind.0, code, value)));
             queue.push_back(Ok(InputEvent::new(EventType::SYNCHRONIZATION.0, 0, 0)));
@@ -291,7 +291,7 @@ mod tests {
 
         /// Away from the operator by so many of 100.
         fn pushes(&self, pad: usize, by: i32) {
-            self.says(pad, EventType::ABSOLUTE, AbsoluteAxisCode::ABS_Y.0, -by);
+            self.sends(pad, EventType::ABSOLUTE, AbsoluteAxisCode::ABS_Y.0, -by);
         }
     }
 
@@ -300,58 +300,61 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_comes_holds_the_needle_and_one_that_goes_leaves_it_at_rest_and_is_told() {
-        let (table, mut desk) = Table::with(&[]);
-        assert_eq!(holder(desk.read(0.0)), "n/a");
+    fn a_plugged_in_device_controls_the_needle_and_an_unplugged_one_leaves_it_at_rest_and_is_reported() {
+        let (table, mut hub) = Table::with(&[]);
+        assert_eq!(holder(hub.read(0.0)), "n/a");
         table.there.borrow_mut().push("a");
-        desk.look();
-        assert_eq!(holder(desk.read(0.0)), "pad a");
+        hub.look();
+        assert_eq!(holder(hub.read(0.0)), "pad a");
         table.pushes(0, 100);
-        assert!(desk.read(0.0).wish.along_m_per_s > 0.039);
+        assert!(hub.read(0.0).wish.along_m_per_s > 0.039);
         table.there.borrow_mut().clear();
-        desk.look();
-        let latest = desk.read(0.0);
+        hub.look();
+        let latest = hub.read(0.0);
         assert_eq!((holder(latest), latest.wish), ("n/a", Wish::REST));
-        assert_eq!((latest.gone.as_str(), latest.times_gone), ("pad a", 1));
+        assert_eq!((latest.disconnected.as_str(), latest.disconnections), ("pad a", 1));
     }
 
     #[test]
-    fn a_device_that_fails_while_it_is_read_has_gone_at_once() {
-        let (table, mut desk) = Table::with(&["a"]);
+    fn a_device_that_fails_while_it_is_read_is_unplugged_at_once() {
+        let (table, mut hub) = Table::with(&["a"]);
         table.pushes(0, 100);
-        assert!(desk.read(0.0).wish != Wish::REST);
+        assert!(hub.read(0.0).wish != Wish::REST);
         // ENODEV, what the kernel says of a device that was pulled out.
         table.queues[0]
             .borrow_mut()
             .push_back(Err(io::Error::from_raw_os_error(19)));
-        let latest = desk.read(0.0);
-        assert_eq!((latest.wish, latest.times_gone, holder(latest)), (Wish::REST, 1, "n/a"));
+        let latest = hub.read(0.0);
+        assert_eq!(
+            (latest.wish, latest.disconnections, holder(latest)),
+            (Wish::REST, 1, "n/a")
+        );
     }
 
     #[test]
     fn another_device_takes_over_only_while_the_needle_is_at_rest() {
-        let (table, mut desk) = Table::with(&["a", "b"]);
-        assert_eq!(holder(desk.read(0.0)), "pad a");
+        let (table, mut hub) = Table::with(&["a", "b"]);
+        assert_eq!(holder(hub.read(0.0)), "pad a");
         table.pushes(1, 50);
-        assert_eq!(holder(desk.read(0.0)), "pad b");
+        assert_eq!(holder(hub.read(0.0)), "pad b");
         table.pushes(0, -100);
-        let latest = desk.read(0.0);
+        let latest = hub.read(0.0);
         assert_eq!(holder(latest), "pad b");
         assert!(latest.wish.along_m_per_s > 0.0, "the other one pulls in vain");
         table.pushes(1, 0);
-        let latest = desk.read(0.0);
+        let latest = hub.read(0.0);
         assert_eq!(holder(latest), "pad a");
         assert!(latest.wish.along_m_per_s < 0.0);
     }
 
     #[test]
     fn buttons_of_every_device_are_counted() {
-        let (table, mut desk) = Table::with(&["a", "b"]);
+        let (table, mut hub) = Table::with(&["a", "b"]);
         for pad in [0, 1] {
-            table.says(pad, EventType::KEY, KeyCode::BTN_SOUTH.0, 1);
+            table.sends(pad, EventType::KEY, KeyCode::BTN_SOUTH.0, 1);
         }
-        table.says(0, EventType::KEY, KeyCode::BTN_START.0, 1);
-        let latest = desk.read(0.0);
+        table.sends(0, EventType::KEY, KeyCode::BTN_START.0, 1);
+        let latest = hub.read(0.0);
         let pressed = |button: Button| latest.presses[button as usize];
         assert_eq!(
             (pressed(Button::Drop), pressed(Button::Engage), pressed(Button::Undo)),
@@ -360,29 +363,29 @@ mod tests {
     }
 
     #[test]
-    fn lost_events_have_the_state_read_anew() {
-        let (table, mut desk) = Table::with(&["a"]);
+    fn lost_events_have_the_state_read_again() {
+        let (table, mut hub) = Table::with(&["a"]);
         table.pushes(0, 100);
-        desk.read(0.0);
-        table.says(0, EventType::SYNCHRONIZATION, 3, 0);
-        // The device says that its stick is in the middle.
-        assert_eq!(desk.read(0.0).wish, Wish::REST);
+        hub.read(0.0);
+        table.sends(0, EventType::SYNCHRONIZATION, 3, 0);
+        // The stick of the device is in the middle.
+        assert_eq!(hub.read(0.0).wish, Wish::REST);
     }
 
     #[test]
-    fn a_device_without_permission_is_told_with_its_cure_until_it_can_be_read() {
-        let (table, mut desk) = Table::with(&[]);
+    fn a_device_without_permission_is_reported_with_its_cure_until_it_can_be_read() {
+        let (table, mut hub) = Table::with(&[]);
         *table.locked.borrow_mut() = true;
         table.there.borrow_mut().push("a");
-        desk.look();
-        assert!(desk.read(0.0).denied.is_empty(), "rights come after the node");
-        desk.look();
-        let denied = desk.read(0.0).denied.clone();
+        hub.look();
+        assert!(hub.read(0.0).denied.is_empty(), "rights follow the node");
+        hub.look();
+        let denied = hub.read(0.0).denied.clone();
         assert_eq!(denied.len(), 1);
         assert!(denied[0].contains("usermod -aG input"), "{denied:?}");
         *table.locked.borrow_mut() = false;
-        desk.look();
-        let latest = desk.read(0.0);
+        hub.look();
+        let latest = hub.read(0.0);
         assert_eq!((holder(latest), latest.denied.len()), ("pad a", 0));
     }
 }
