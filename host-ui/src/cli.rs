@@ -35,7 +35,7 @@ A scene file is TOML; all but [volume] may be left out, and what is not said com
   insert_mm_per_s = 50
   retract_mm_per_s = 50
   [device]
-  name = \"sim\"                    # for an rt-core that host-ui starts (--core)
+  name = \"simulated\"              # for an rt-core that host-ui starts (--core)
   [plan]
   file = \"plan.dcm\"               # RT Plan or CSV
 
