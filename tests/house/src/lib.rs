@@ -1,0 +1,4 @@
+//! Rules of the repository that a program can check.
+
+#[cfg(test)]
+mod docs_names;
