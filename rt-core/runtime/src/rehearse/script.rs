@@ -92,7 +92,7 @@ impl Script {
         self.ordered = true;
     }
 
-    fn is_done(&mut self, rig: &Rig, action: Action) -> Result<bool, String> {
+    fn is_done(&mut self, rig: &Rig, action: Action) -> Result<bool, RehearseError> {
         let now_s = rig.seconds();
         match action {
             Action::Engage => Ok(true),
@@ -102,10 +102,7 @@ impl Script {
                 let off_m = along(Vector3::from(state.tip_in_scene_m)) - along(to_m);
                 let limit_s = move_limit(speed_m_per_s).as_secs_f64();
                 if now_s - self.begun_s > limit_s {
-                    return Err(format!(
-                        "the tip did not arrive; it is {:.2} mm from its target",
-                        off_m * 1e3
-                    ));
+                    return Err(RehearseError::NotArrived { off_mm: off_m * 1e3 });
                 }
                 let long = arrived_after(state, off_m);
                 Ok(self.held_for(long.is_some(), long.map_or(0.0, |d| d.as_secs_f64()), now_s))
