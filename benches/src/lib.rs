@@ -1,9 +1,9 @@
 //! What the measurements share: bodies, insertions, and the error of one run against another.
 
 pub mod bodies;
-pub mod desk;
 pub mod error;
 pub mod insertions;
 pub mod machine;
 pub mod rig;
+pub mod session;
 pub mod wall;

@@ -18,7 +18,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::path::Path;
 use std::time::Duration;
-use stylet_runtime::core::{LoopReport, Options};
+use stylet_runtime::process::{LoopReport, Options};
 
 /// Rises when a field changes its meaning or goes.
 pub const SCHEMA: &str = "stylet.latency/1";
@@ -179,7 +179,7 @@ pub fn report(parts: &Parts) -> Report {
     let Parts { options, measured, .. } = parts;
     let period_ns = options.haptic_period_ns;
     let rate_hz = 1e9 / period_ns as f64;
-    let tissue_rate_hz = 1e9 / stylet_runtime::core::TISSUE_PERIOD_NS as f64;
+    let tissue_rate_hz = 1e9 / stylet_runtime::rt::clock::TISSUE_PERIOD_NS as f64;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let unqualified = provenance::unqualified(parts.machine, &measured.run);
     let limits = verdict::judge(parts.limits, measured, period_ns, &unqualified);

@@ -2,8 +2,9 @@
 
 pub mod args;
 pub mod bridge;
-pub mod core;
 pub mod device;
+pub mod process;
 pub mod rehearse;
 pub mod replay;
 pub mod rt;
+pub mod stepped;

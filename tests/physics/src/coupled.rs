@@ -1,9 +1,10 @@
 //! Coupled mode: the force from 200 Hz answers against the tissue solved at every tick, over one insertion.
 
 use nalgebra::Vector3;
-use stylet_benches::desk::{Desk, axis_start};
+use stylet_benches::session::{Session, axis_start};
 use stylet_hw::Hand;
 use stylet_runtime::rt::world::World;
+use stylet_sim::force::ForceParameters;
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::Scene;
 use stylet_sim::scene::TissueKind;
@@ -29,14 +30,17 @@ fn world(fem: bool) -> World {
 fn forces(fem: bool, tissue_every: u64, seconds: f64) -> Vec<(f64, f64, f64)> {
     let world = world(fem);
     let (start, stiffness) = (axis_start(&world), 700.0);
-    let mut desk = Desk::new(world, start, GUIDED, tissue_every);
-    desk.parameters.force.coupling = 1.0;
-    desk.go_to(start + Vector3::z() * 0.04, 0.048);
+    let coupled = ForceParameters {
+        coupling: 1.0,
+        ..ForceParameters::default()
+    };
+    let mut session = Session::with_force(world, start, GUIDED, tissue_every, coupled);
+    session.go_to(start + Vector3::z() * 0.04, 0.048);
     let ticks = (seconds * 1e3) as usize;
     (0..ticks)
         .map(|_| {
-            let output = desk.step();
-            let local = desk.tissue.response().local;
+            let output = session.step();
+            let local = session.response().local;
             let answer = local.force_n.unwrap_or(local.displacement_m * -stiffness);
             (output.terms.tissue_n.z, answer.z, output.wrench.force_n.z)
         })

@@ -1,7 +1,7 @@
 //! Insertions at the speeds of the clinic: forces of each layer, what gives way, and how far the gland goes along.
 
 use nalgebra::Vector3;
-use stylet_benches::desk::{Desk, axis_start, gland_shift_m};
+use stylet_benches::session::{Session, axis_start, gland_shift_m};
 use stylet_hw::Hand;
 use stylet_implant::workflow::default_plan;
 use stylet_runtime::rt::world::World;
@@ -32,25 +32,25 @@ fn insertion(scene: &str, depth_m: f64, speed_m_per_s: f64) -> Insertion {
 
 /// Along z.
 fn insertion_from(world: World, start: Vector3<f64>, depth_m: f64, speed_m_per_s: f64) -> Insertion {
-    let mut desk = Desk::new(world, start, Hand::steady(), 5);
-    desk.go_to(start + Vector3::z() * depth_m, speed_m_per_s);
+    let mut session = Session::new(world, start, Hand::steady(), 5);
+    session.go_to(start + Vector3::z() * depth_m, speed_m_per_s);
     let (mut force_n, mut shift_m) = (0.0f64, 0.0f64);
     let (mut phases, mut gave_way, mut contact_m) = (vec![Phase::Outside], Vec::new(), 0.0);
     for tick in 0..((depth_m / speed_m_per_s + 1.0) * 1e3) as u64 {
-        let output = desk.step();
+        let output = session.step();
         force_n = force_n.max(-output.wrench.force_n.z);
-        let tip_m = desk.chain.tip_in_world.map_or(0.0, |tip| tip.z - start.z);
+        let tip_m = session.chain().tip_in_world.map_or(0.0, |tip| tip.z - start.z);
         if phases == [Phase::Outside] {
             contact_m = tip_m;
         }
         if tick % 5 == 0 {
-            shift_m = shift_m.max(gland_shift_m(desk.tissue.world()));
+            shift_m = shift_m.max(gland_shift_m(session.world()));
         }
         if phases.last() != Some(&output.phase) {
             phases.push(output.phase);
         }
-        if gave_way.len() < desk.chain.needle.punctures as usize {
-            let section = desk.chain.path.sections().last().expect("what gave way was met");
+        if gave_way.len() < session.chain().needle.punctures as usize {
+            let section = session.chain().path.sections().last().expect("what gave way was met");
             println!(
                 "  {:?} met at {:.1} mm",
                 section.kind,

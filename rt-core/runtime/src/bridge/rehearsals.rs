@@ -1,6 +1,7 @@
 //! Rehearsals that hosts ask for: one at a time, on a thread of normal priority, beside the running scene.
 
 use crate::rehearse::{NeedleRun, RehearseError, Rehearsed, Stage, timed};
+use crate::rt::exchange::Ticket;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -9,17 +10,14 @@ use stylet_shm_schema::{MAX_SEEDS, ParameterSet, Refusal, RefusalCode, Rehearsal
 use stylet_sim::scene::SceneSource;
 use stylet_sim::scene::TissueKind;
 
-use super::Ticket;
+const PANICKED: &str = "the rehearsal stopped with an internal fault; the output of rt-core says where. The next one starts with a new state";
 
-const PANICKED: &str =
-    "the rehearsal stopped on a fault of its own; what rt-core printed says where. The next one starts afresh";
-
-/// What the thread gives back.
+/// What the thread returns.
 struct Finished {
     scene_generation: u64,
     wall_ns: u64,
     outcome: Result<Rehearsed, RehearseError>,
-    /// To be used again.
+    /// Kept for the next rehearsal.
     stage: Option<Stage>,
 }
 
@@ -30,17 +28,17 @@ pub struct Ended {
 }
 
 /// The bridge's side of rehearsals.
-pub struct RehearsalDesk {
+pub struct RehearsalRunner {
     source: Arc<SceneSource>,
     tissue: TissueKind,
     device: DeviceInfo,
-    /// Of the scene that runs; `None` until the first rehearsal in it, and while one is under way.
+    /// Body of the scene that runs; `None` until the first rehearsal in it, and while one is under way.
     stage: Option<(u64, Stage)>,
     under_way: Option<(Ticket, JoinHandle<Finished>)>,
     stop: Arc<AtomicBool>,
 }
 
-impl RehearsalDesk {
+impl RehearsalRunner {
     pub fn new(source: Arc<SceneSource>, tissue: TissueKind, device: DeviceInfo) -> Self {
         Self {
             source,
@@ -82,7 +80,7 @@ impl RehearsalDesk {
                     let (outcome, wall_ns) = timed(|| stage.rehearse(&run, &set, &stop));
                     (Some(stage), outcome, wall_ns)
                 }
-                Err(why) => (None, Err(RehearseError::Other(why)), 0),
+                Err(why) => (None, Err(why), 0),
             };
             Finished {
                 scene_generation,
@@ -117,7 +115,7 @@ impl RehearsalDesk {
     }
 }
 
-impl Drop for RehearsalDesk {
+impl Drop for RehearsalRunner {
     fn drop(&mut self) {
         // SYNC: read by the rehearsal's thread; nothing but the flag is carried.
         self.stop.store(true, Ordering::Relaxed);

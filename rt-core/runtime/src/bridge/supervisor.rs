@@ -1,4 +1,4 @@
-//! Sees that the haptic loop itself has stopped: the one fault that the loop cannot see.
+//! Detects that the haptic loop itself has stopped: the one fault that the loop cannot detect.
 //!
 //! It runs in the bridge, at normal priority. A loop that stands still leaves its last force on the device; so the
 //! process ends, and the device's own watchdog, or the closing of its port, takes the force away.

@@ -30,7 +30,7 @@ fn needle() -> NeedleRun {
 }
 
 #[test]
-fn a_rehearsal_leaves_its_seeds_off_plan_and_repeats_to_the_last_bit() {
+fn a_rehearsal_leaves_its_seeds_off_plan_and_repeats_bit_by_bit() {
     let (mut stage, run, stop) = (stage(), needle(), AtomicBool::new(false));
     let set = ParameterSet::default();
     let first = stage.rehearse(&run, &set, &stop).expect("goes through");
@@ -73,7 +73,7 @@ fn tissue_that_sticks_less_leaves_seeds_nearer_to_plan() {
 }
 
 #[test]
-fn a_drop_outside_the_tissue_and_a_stop_are_told_and_leave_the_stage_usable() {
+fn a_drop_outside_the_tissue_and_a_stop_are_reported_and_leave_the_stage_usable() {
     let (mut stage, mut run, stop) = (stage(), needle(), AtomicBool::new(false));
     let set = ParameterSet::default();
     run.drops_m = vec![run.entry_m + run.direction * 1e-3];
@@ -92,7 +92,7 @@ fn a_drop_outside_the_tissue_and_a_stop_are_told_and_leave_the_stage_usable() {
 
 /// FEM keeps answers from tick to tick and works ahead: a body at rest must have forgotten both.
 #[test]
-fn a_rehearsal_with_finite_elements_repeats_to_the_last_bit() {
+fn a_rehearsal_with_finite_elements_repeats_bit_by_bit() {
     let (mut stage, run, stop) = (fem_stage(), shallow(), AtomicBool::new(false));
     let set = ParameterSet::default();
     let first = stage.rehearse(&run, &set, &stop).expect("goes through");

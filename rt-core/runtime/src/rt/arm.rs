@@ -18,14 +18,9 @@ pub struct Armed {
 }
 
 /// The right that is missing, and how to grant it.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
 pub struct Refused(pub String);
-
-impl std::fmt::Display for Refused {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
-    }
-}
 
 /// How to grant real-time rights, in words to type.
 pub fn advice(missing: &str) -> String {

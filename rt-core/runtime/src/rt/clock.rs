@@ -1,5 +1,10 @@
 //! `CLOCK_MONOTONIC`, and a sleep until an absolute time on it.
 
+/// Period of the force loop: 1 kHz.
+pub const HAPTIC_PERIOD_NS: u64 = 1_000_000;
+/// Period of the tissue loop: 200 Hz.
+pub const TISSUE_PERIOD_NS: u64 = 5_000_000;
+
 /// Nanoseconds of `CLOCK_MONOTONIC`.
 pub fn now_ns() -> u64 {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
@@ -22,7 +27,7 @@ pub fn sleep_until(time_ns: u64) {
 
 /// Sleeps until `spin_ns` before `time_ns`, then spins; true when the thread had reason to sleep.
 pub fn wait_until(time_ns: u64, spin_ns: u64) -> bool {
-    let sleep_ns = time_ns - spin_ns;
+    let sleep_ns = time_ns.saturating_sub(spin_ns);
     let ahead = now_ns() < sleep_ns;
     sleep_until(sleep_ns);
     while spin_ns > 0 && now_ns() < time_ns {
@@ -39,8 +44,9 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// The first point is one period after `start_ns`.
+    /// The first point is one period, at least 1 ns, after `start_ns`.
     pub fn from(start_ns: u64, period_ns: u64) -> Self {
+        let period_ns = period_ns.max(1);
         Self {
             period_ns,
             due_ns: start_ns + period_ns,

@@ -1,111 +1,14 @@
-//! What the two loops and the bridge hand each other: plain data through wait-free rings and triple buffers.
+//! What the bridge and the loops hand each other: orders, notices and snapshot slots, through wait-free rings.
 
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use stylet_hw::HandGoal;
-use stylet_shm_schema::{Fault, RefusalCode, SnapshotHeader, TickRecord, Vertex};
-use stylet_sim::force::chain::Touch;
-use stylet_sim::force::{ForceParameters, LocalResponse};
+use stylet_shm_schema::{Fault, RefusalCode, SnapshotHeader, Vertex};
+use stylet_sim::force::ForceParameters;
 use stylet_sim::limits::Limits;
-use stylet_sim::needle::{LayerKind, NeedleParameters, Phase};
-
-/// Haptic to tissue, each tick: the newest pose.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct TipPose {
-    pub time_ns: u64,
-    pub tip_in_scene: Vector3<f64>,
-    pub direction: Vector3<f64>,
-    /// Inwards along the needle, filtered.
-    pub speed_along_m_per_s: f64,
-    pub phase: Phase,
-    pub punctured: bool,
-    /// Sum of the held element's steps (eq. 6) since the loop began; its differences drive the tissue.
-    pub held_travel_m: Vector3<f64>,
-    /// The last contact that the haptic loop has ended.
-    pub released_contact: u64,
-    /// Number of the innermost layer that the shaft is in, and the largest number taken up so far.
-    pub innermost_layer: u64,
-    pub seen_layer: u64,
-}
-
-impl Default for TipPose {
-    fn default() -> Self {
-        Self {
-            time_ns: 0,
-            tip_in_scene: Vector3::zeros(),
-            direction: Vector3::z(),
-            speed_along_m_per_s: 0.0,
-            phase: Phase::Outside,
-            punctured: false,
-            held_travel_m: Vector3::zeros(),
-            released_contact: 0,
-            innermost_layer: 0,
-            seen_layer: 0,
-        }
-    }
-}
-
-/// Tissue to haptic, each tissue tick.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct TissueResponse {
-    pub time_ns: u64,
-    pub tick: u64,
-    /// Number of the contact that lasts; 0 for none.
-    pub contact: u64,
-    pub contact_in_scene: Vector3<f64>,
-    /// r of eq. 6, kept for the whole contact.
-    pub path_direction: Vector3<f64>,
-    /// The innermost layer met, under a number that rises over the run, and where.
-    pub layer: LayerKind,
-    pub layer_number: u64,
-    pub layer_in_scene: Vector3<f64>,
-    /// What the body answers at the tip.
-    pub local: LocalResponse,
-    pub worst_residual: f64,
-    pub worst_work_ns: u64,
-    pub worst_wake_ns: u64,
-    pub missed: u64,
-    pub seed_count: u32,
-    pub unsolved: bool,
-}
-
-impl TissueResponse {
-    /// Where the tip meets tissue; means something while there is contact.
-    pub fn touch(&self) -> Touch {
-        Touch {
-            contact_in_world: self.contact_in_scene,
-            path_direction: self.path_direction,
-            layer: self.layer,
-            layer_number: self.layer_number,
-            layer_in_world: self.layer_in_scene,
-            local: self.local,
-        }
-    }
-}
-
-impl Default for TissueResponse {
-    fn default() -> Self {
-        Self {
-            time_ns: 0,
-            tick: 0,
-            contact: 0,
-            contact_in_scene: Vector3::zeros(),
-            path_direction: Vector3::z(),
-            layer: LayerKind::default(),
-            layer_number: 0,
-            layer_in_scene: Vector3::zeros(),
-            local: LocalResponse::default(),
-            worst_residual: 0.0,
-            worst_work_ns: 0,
-            worst_wake_ns: 0,
-            missed: 0,
-            seed_count: 0,
-            unsolved: false,
-        }
-    }
-}
+use stylet_sim::needle::NeedleParameters;
 
 /// Number that joins an order to the host's request; 0 when nobody waits.
 pub type Ticket = u64;
@@ -234,6 +137,3 @@ pub struct SnapshotReturn {
     /// False when the slot no longer fits the scene.
     pub filled: bool,
 }
-
-// SYNC: every ring and triple buffer is single-producer single-consumer; their crates pair release with acquire.
-pub type RecordRing = rtrb::Producer<TickRecord>;

@@ -1,7 +1,9 @@
 //! What the haptic loop writes to its flight recording, each tick.
 
-use crate::rt::exchange::{HapticOrder, TipPose, TissueResponse};
+use crate::rt::exchange::HapticOrder;
+use crate::rt::pose::TipPose;
 use crate::rt::recorder::{FLIGHT_TICKS, Last, Tape, complete_from};
+use crate::rt::response::TissueResponse;
 use crate::rt::taped::pod;
 use crate::rt::watchdog::Watchdog;
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! Which layers the tip has met on its way in: the tissue loop's half of `needle::path`.
 
-use crate::rt::exchange::TipPose;
+use crate::rt::pose::TipPose;
 use serde::{Deserialize, Serialize};
 use stylet_sim::needle::LayerKind;
 use stylet_sim::needle::path::MAX_SECTIONS;

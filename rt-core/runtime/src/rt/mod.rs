@@ -14,14 +14,19 @@
 
 pub mod arm;
 pub mod clock;
+pub mod contact;
 pub mod exchange;
 pub mod haptic;
 pub mod haptic_tape;
 pub mod layers_met;
+pub mod pose;
 pub mod recorder;
+pub mod response;
+pub mod seed;
 pub mod taped;
 pub mod timing;
 pub mod tissue;
 pub mod tissue_tape;
 pub mod watchdog;
+pub mod wiring;
 pub mod world;

@@ -31,7 +31,7 @@ pub struct TickTimes {
 impl TickTimes {
     /// Ends of the stages.
     pub fn marks(&self) -> &[u64] {
-        &self.marks[..self.marked]
+        self.marks.get(..self.marked).unwrap_or_default()
     }
 
     pub fn done_ns(&self) -> u64 {
@@ -105,7 +105,7 @@ impl Probe {
     pub fn output_since_mark(&mut self, from: usize) {
         let done_ns = self.tick.done_ns();
         self.tick.output_ns = Some(done_ns);
-        self.tick.path_ns = self.tick.marks().get(from).map(|begin| done_ns - begin);
+        self.tick.path_ns = self.tick.marks().get(from).map(|begin| done_ns.saturating_sub(*begin));
     }
 
     /// The output of tissue tick `tick` left at the last mark, and answers the tip read at `pose_ns`; 0 for no tip yet.
@@ -127,7 +127,7 @@ impl Probe {
         let full = self.ring.push(self.tick).is_err();
         let lost = self.tick.lost + u32::from(full);
         self.tick = TickTimes {
-            recording_ns: clock::now_ns() - done_ns,
+            recording_ns: clock::now_ns().saturating_sub(done_ns),
             lost,
             ..TickTimes::default()
         };

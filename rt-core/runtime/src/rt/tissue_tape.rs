@@ -1,9 +1,11 @@
 //! What the tissue loop writes to its flight recording, each tick.
 
-use crate::rt::exchange::{TipPose, TissueResponse};
+use crate::rt::contact::Contact;
 use crate::rt::layers_met::LayersMet;
+use crate::rt::pose::TipPose;
 use crate::rt::recorder::{Last, Tape, complete_from};
-use crate::rt::tissue::{Contact, Seed};
+use crate::rt::response::TissueResponse;
+use crate::rt::seed::Seed;
 use crate::rt::world::World;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -107,7 +109,12 @@ impl TissueTape {
         if self.not_kept || !tick.is_multiple_of(CHECKPOINT_EVERY) {
             return None;
         }
-        let slot = &mut self.checkpoints[(tick / CHECKPOINT_EVERY % 2) as usize];
+        let [even, odd] = &mut self.checkpoints;
+        let slot = if (tick / CHECKPOINT_EVERY).is_multiple_of(2) {
+            even
+        } else {
+            odd
+        };
         slot.0 = tick;
         Some(&mut slot.1)
     }

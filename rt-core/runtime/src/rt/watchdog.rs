@@ -6,6 +6,7 @@
 
 use crate::rt::taped::fault_code;
 use serde::{Deserialize, Serialize};
+use stylet_hw::DeviceFault;
 use stylet_shm_schema::Fault;
 use stylet_sim::force::ForceFault;
 
@@ -99,7 +100,21 @@ impl Watchdog {
     }
 }
 
-/// The gate's word for a fault.
+/// The fault of a run that a fault of the device is.
+pub fn device_fault(fault: DeviceFault) -> Fault {
+    match fault {
+        DeviceFault::NotConnected => Fault::DeviceLost,
+        DeviceFault::NotCalibrated => Fault::DeviceNotCalibrated,
+        DeviceFault::Overheated => Fault::DeviceWarm,
+        DeviceFault::SafetyStop => Fault::DeviceStopped,
+        DeviceFault::NonFiniteSample => Fault::NonFiniteInput,
+        DeviceFault::TimedOut | DeviceFault::NonFiniteWrench | DeviceFault::InvalidPeriod | DeviceFault::Driver => {
+            Fault::DeviceError
+        }
+    }
+}
+
+/// The gate's name for a fault.
 pub fn at_gate(fault: Fault) -> ForceFault {
     match fault {
         Fault::None => ForceFault::Stopped,

@@ -51,6 +51,7 @@ impl TissueLoop {
         self.world.tissue.load(&memory.body);
     }
 
+    /// The deformed body.
     pub fn body(&self) -> Deformed<'_> {
         self.world.tissue.deformed()
     }
