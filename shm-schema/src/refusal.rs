@@ -4,8 +4,6 @@ use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 use num_enum::TryFromPrimitive;
 
-use crate::{ParameterId, ParameterProblems, RequestErrors};
-
 /// Why a request was refused, by stable number. Where nothing is said of it, the subject is [`Reason::NO_SUBJECT`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive)]
 #[repr(u32)]
@@ -127,17 +125,6 @@ impl Reason {
     pub fn code(&self) -> Option<RefusalCode> {
         RefusalCode::from_number(self.code)
     }
-
-    /// The parameter that it is about.
-    pub fn parameter(&self) -> Option<ParameterId> {
-        let of_parameter = [
-            RefusalCode::ParameterOutOfLimits,
-            RefusalCode::CellsFold,
-            RefusalCode::TooStiff,
-        ];
-        let code = self.code().filter(|code| of_parameter.contains(code));
-        code.and_then(|_| ParameterId::try_from(self.subject).ok())
-    }
 }
 
 /// A refusal as the core makes it.
@@ -163,34 +150,6 @@ impl Refusal {
 impl From<RefusalCode> for Refusal {
     fn from(code: RefusalCode) -> Self {
         Self::new(code, code.message())
-    }
-}
-
-impl From<RequestErrors> for Refusal {
-    fn from(errors: RequestErrors) -> Self {
-        let reasons = errors.0.iter().map(|error| {
-            let (code, subject) = error.reason();
-            Reason::new(code, subject)
-        });
-        Self {
-            reasons: reasons.collect(),
-            text: errors.to_string(),
-        }
-    }
-}
-
-impl From<ParameterProblems> for Refusal {
-    fn from(problems: ParameterProblems) -> Self {
-        let reasons = problems.0.iter().flat_map(|problem| {
-            let code = problem.code();
-            let subjects = problem.parameters().iter().map(|&id| id as u32);
-            let none = problem.parameters().is_empty().then_some(Reason::NO_SUBJECT);
-            subjects.chain(none).map(move |subject| Reason::new(code, subject))
-        });
-        Self {
-            reasons: reasons.collect(),
-            text: problems.to_string(),
-        }
     }
 }
 

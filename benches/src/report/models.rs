@@ -1,10 +1,18 @@
 //! The models that are compared, each under the settings that it is compared with.
 
-use crate::fit::Fitted;
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::Scene;
 use stylet_sim::tissue::chainmail::{OnePass, PassKind};
 use stylet_sim::tissue::{ChainMailTissue, FemTissue, TissueModel};
+
+/// What the fit found.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// Limits and recovery, without relaxation.
+    pub limits: TissueParameters,
+    /// Stiffness of links and surroundings, with relaxation.
+    pub relaxed: TissueParameters,
+}
 
 /// Models that differ only in a setting belong to one family; the picture draws a family in one colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,7 +1,6 @@
 //! The page that says in words what was measured, and which model to pick for what.
 
-use crate::fit::Fitted;
-use crate::models::Family;
+use crate::models::{Family, Fitted};
 use crate::table::{Point, Row, pareto};
 use std::fmt::Write as _;
 use stylet_benches::insertions::{GLAND, TICK_S};

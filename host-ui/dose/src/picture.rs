@@ -28,7 +28,8 @@ pub fn dvh(path: &Path, curves: &[(&str, &Dvh)], prescription_gy: f64) -> Result
             ((*name).to_owned(), (0..=STEPS).map(|i| (at(i), share(at(i)))).collect())
         })
         .collect();
-    let picture = draw(&lines, prescription_gy, most_gy).map_err(|e| format!("{} cannot be drawn ({e})", path.display()))?;
+    let picture =
+        draw(&lines, prescription_gy, most_gy).map_err(|e| format!("{} cannot be drawn ({e})", path.display()))?;
     stylet_base::write_whole(path, picture.as_bytes()).map_err(|e| e.to_string())
 }
 

@@ -1,7 +1,7 @@
 //! What makes a set of parameters invalid: one function for the core and for the window.
 
 use super::{PARAMETERS, ParameterId, ParameterSet};
-use crate::RefusalCode;
+use crate::{Reason, Refusal, RefusalCode};
 use ParameterId as P;
 
 /// What is wrong with a set of parameters; each names the parameters that are involved.
@@ -158,4 +158,32 @@ fn out_of_limits(id: ParameterId, value: f64) -> String {
 fn keys(parameters: &[ParameterId]) -> String {
     let keys: Vec<_> = parameters.iter().map(|id| id.spec().key).collect();
     keys.join(", ")
+}
+
+impl From<ParameterProblems> for Refusal {
+    fn from(problems: ParameterProblems) -> Self {
+        let reasons = problems.0.iter().flat_map(|problem| {
+            let code = problem.code();
+            let subjects = problem.parameters().iter().map(|&id| id as u32);
+            let none = problem.parameters().is_empty().then_some(Reason::NO_SUBJECT);
+            subjects.chain(none).map(move |subject| Reason::new(code, subject))
+        });
+        Self {
+            reasons: reasons.collect(),
+            text: problems.to_string(),
+        }
+    }
+}
+
+impl Reason {
+    /// The parameter that it is about.
+    pub fn parameter(&self) -> Option<ParameterId> {
+        let of_parameter = [
+            RefusalCode::ParameterOutOfLimits,
+            RefusalCode::CellsFold,
+            RefusalCode::TooStiff,
+        ];
+        let code = self.code().filter(|code| of_parameter.contains(code));
+        code.and_then(|_| ParameterId::try_from(self.subject).ok())
+    }
 }

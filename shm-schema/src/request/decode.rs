@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::check::{MAX_COORDINATE_M, is_unit};
-use crate::{MAX_COMMAND_VALUES, RefusalCode};
+use crate::{MAX_COMMAND_VALUES, Reason, Refusal, RefusalCode};
 
 /// What is wrong with one record. `at` is the place of the first value concerned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -274,4 +274,17 @@ impl<'a> Reader<'a> {
 fn whole(number: f64) -> Option<u32> {
     let n = number as u32;
     (f64::from(n) == number).then_some(n)
+}
+
+impl From<RequestErrors> for Refusal {
+    fn from(errors: RequestErrors) -> Self {
+        let reasons = errors.0.iter().map(|error| {
+            let (code, subject) = error.reason();
+            Reason::new(code, subject)
+        });
+        Self {
+            reasons: reasons.collect(),
+            text: errors.to_string(),
+        }
+    }
 }

@@ -14,9 +14,7 @@ use script::Script;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use stylet_hw::DeviceInfo;
-use stylet_shm_schema::{
-    MAX_SEEDS, ParameterProblems, ParameterSet, Reason, Refusal, RefusalCode, SeedPose, flags,
-};
+use stylet_shm_schema::{MAX_SEEDS, ParameterProblems, ParameterSet, Reason, Refusal, RefusalCode, SeedPose, flags};
 use stylet_sim::active::activate;
 use stylet_sim::scene::{SceneSource, TissueKind};
 

@@ -33,7 +33,6 @@ pub const LONGER: &[(&str, &str)] = &[
         "slice/gpu.rs",
         "not split yet: pipelines, textures and drawing of the slices",
     ),
-    ("view/scene3d.rs", "not split yet"),
     ("dose_desk.rs", "not split yet"),
     ("src/link.rs", "not split yet"),
     ("panel/status.rs", "not split yet"),
@@ -43,9 +42,6 @@ pub const LONGER: &[(&str, &str)] = &[
         "not split yet: a writer of HTML that a template replaces",
     ),
     ("lab/src/report.rs", "not split yet"),
-    ("bridge/mod.rs", "not split yet"),
-    ("rt/haptic.rs", "not split yet"),
-    ("rt/tissue.rs", "not split yet"),
 ];
 
 /// Public functions that may still return their error as prose: only ever lowered.
