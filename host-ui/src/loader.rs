@@ -7,7 +7,7 @@ use stylet_files::{self as files, FileError, Image, LabelVolume, Progress, scene
 /// What was read from a file.
 pub enum Loaded {
     /// A scene, and the image that its scene file names.
-    Scene(LabelVolume, Option<Image>),
+    Scene(Box<LabelVolume>, Option<Image>),
     Image(Image),
 }
 
@@ -96,11 +96,11 @@ fn scene_of(path: &Path, label: Option<u8>, image: Option<PathBuf>, progress: &P
         false => (files::read(path, label, progress)?, None),
     };
     let Some(file) = image.or_else(|| named.map(|file| path.with_file_name(file))) else {
-        return Ok(Loaded::Scene(volume, None));
+        return Ok(Loaded::Scene(Box::new(volume), None));
     };
     let image = Image::read(&file, progress)?;
     image
         .covers(&volume.patient_from_scene, volume.middle_m())
         .map_err(|why| FileError::of(&file, &why))?;
-    Ok(Loaded::Scene(volume, Some(image)))
+    Ok(Loaded::Scene(Box::new(volume), Some(image)))
 }

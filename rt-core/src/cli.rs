@@ -78,8 +78,8 @@ pub struct RunArgs {
     /// What computes the tissue
     #[arg(long, value_enum, default_value_t)]
     tissue: TissueKind,
-    /// simulated, phantom (the driver's default device), phantom:NAME, or replay:FILE (from 'host-ui export --motion')
-    #[arg(long, default_value = "simulated", value_name = "DEVICE")]
+    // The table of back ends has the help.
+    #[arg(long, default_value = "simulated", value_name = "DEVICE", help = stylet_hw::backend::help())]
     device: DeviceChoice,
     /// The driver's library libHD.so [default: STYLET_LIBHD, else where the system has it]
     #[arg(long, value_name = "PATH")]

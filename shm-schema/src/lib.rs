@@ -32,7 +32,6 @@ mod refusal;
 mod rehearsal;
 mod request;
 mod scene;
-pub mod script;
 pub mod service;
 mod session;
 mod snapshot;
@@ -54,8 +53,8 @@ pub use request::{
     RETRACT_RANGE_M, Request, RequestError, RequestErrors, SPEED_RANGE_M_PER_S,
 };
 pub use scene::{
-    BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, StructureInfo, UploadHeader,
-    UploadStructure, role,
+    BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, SceneId, StructureInfo,
+    UploadHeader, UploadStructure, role,
 };
 pub use session::{Session, ThreadReport};
 pub use snapshot::{SeedPose, SnapshotHeader, Vertex};

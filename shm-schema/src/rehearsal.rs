@@ -1,6 +1,6 @@
 //! What came of a needle that the core went through ahead of time.
 
-use crate::{MAX_SEEDS, SeedPose};
+use crate::{MAX_SEEDS, SceneId, SeedPose};
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -31,4 +31,14 @@ pub struct Rehearsal {
     pub seeds: [SeedPose; MAX_SEEDS],
     /// When each was dropped, after the tip's first contact with tissue.
     pub dropped_after_ns: [u64; MAX_SEEDS],
+}
+
+impl Rehearsal {
+    /// Identity of the scene that it was done in.
+    pub fn scene_id(&self) -> SceneId {
+        SceneId {
+            session_id: self.session_id,
+            generation: self.scene_generation,
+        }
+    }
 }

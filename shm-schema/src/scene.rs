@@ -128,7 +128,24 @@ pub struct SceneHeader {
     pub structures: [StructureInfo; MAX_STRUCTURES],
 }
 
+/// Identity of a scene: which run of the core, and which scene in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct SceneId {
+    /// The run of the core.
+    pub session_id: u64,
+    /// Rises with each scene of a run, from 1.
+    pub generation: u64,
+}
+
 impl SceneHeader {
+    /// Identity of this scene.
+    pub fn id(&self) -> SceneId {
+        SceneId {
+            session_id: self.session_id,
+            generation: self.generation,
+        }
+    }
+
     /// Those that count.
     pub fn structures(&self) -> &[StructureInfo] {
         &self.structures[..(self.structure_count as usize).min(MAX_STRUCTURES)]

@@ -1,6 +1,6 @@
 //! The deformed gland at 200 Hz, filled straight into memory that the bridge loaned ahead.
 
-use crate::MAX_SEEDS;
+use crate::{MAX_SEEDS, SceneId};
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -70,6 +70,16 @@ pub struct SnapshotHeader {
     pub reserved: u32,
     /// In the order of the drops.
     pub seeds: [SeedPose; MAX_SEEDS],
+}
+
+impl SnapshotHeader {
+    /// Identity of the scene that the vertices belong to.
+    pub fn scene_id(&self) -> SceneId {
+        SceneId {
+            session_id: self.session_id,
+            generation: self.scene_generation,
+        }
+    }
 }
 
 impl Default for SnapshotHeader {

@@ -25,7 +25,7 @@ use table::{Row, Where, row};
 /// Runs every tissue model over the same needle insertions and writes speed, error and advice.
 #[derive(Parser)]
 struct Options {
-    /// Folder to write into; the default is benches/runs/<date>-<host>
+    /// Folder to write into; the default is benches/runs/DATE-HOST
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Equal runs of each model, of which the least time of each tick counts

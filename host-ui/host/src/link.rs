@@ -241,7 +241,7 @@ impl Link {
         self.latest
             .snapshot
             .get()
-            .filter(|s| s.header.scene_generation == scene.header.generation)
+            .filter(|s| s.header.scene_id() == scene.header.id())
     }
 
     pub fn parameters(&self) -> Option<&ParametersInForce> {

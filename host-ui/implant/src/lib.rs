@@ -1,5 +1,7 @@
 //! The implant: its plan, the procedure that carries it out, compensation by rehearsal, and its score.
 
+pub mod pairing;
+mod patient;
 pub mod plan;
 pub mod procedure;
 pub mod score;

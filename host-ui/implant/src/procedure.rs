@@ -214,7 +214,7 @@ fn load(
     send: impl FnOnce(&mut Link) -> Result<u64, String>,
     interrupted: &Interrupt,
 ) -> Result<(), String> {
-    let before = link.scene().map(|s| s.header.generation);
+    let before = link.scene().map(|s| s.header.id());
     let id = send(link)?;
     let mut accepted = false;
     let shown = wait(link, interrupted, LOAD_LIMIT, |link| {
@@ -224,7 +224,7 @@ fn load(
             }
             accepted = true;
         }
-        Ok(accepted && link.scene().map(|s| s.header.generation) != before && link.snapshot().is_some())
+        Ok(accepted && link.scene().map(|s| s.header.id()) != before && link.snapshot().is_some())
     })?;
     if shown {
         Ok(())
@@ -262,7 +262,7 @@ fn perform(link: &mut Link, job: &Job, pace: Pace, interrupted: &Interrupt, seen
         match status {
             RunStatus::Working => std::thread::sleep(POLL_EVERY),
             RunStatus::Done => return Ok(()),
-            RunStatus::Failed(why) => return Err(why),
+            RunStatus::Failed(why) => return Err(why.to_string()),
         }
     }
 }

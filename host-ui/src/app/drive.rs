@@ -62,8 +62,8 @@ impl Drive {
         self.goal_m = Some(depth_m);
         let across = wish.across_m_per_s;
         if across != [0.0; 2] && is_outside(tip) {
-            for axis in 0..2 {
-                let ahead_m = self.beside_m[axis] + across[axis] * step_s;
+            for (axis, across) in across.into_iter().enumerate() {
+                let ahead_m = self.beside_m[axis] + across * step_s;
                 let near_m = ahead_m.clamp(tip.beside_m[axis] - LEAD_M, tip.beside_m[axis] + LEAD_M);
                 let [low, high] = tip.room_m[axis];
                 self.beside_m[axis] = near_m.clamp(low.min(high), high.max(low));

@@ -27,6 +27,8 @@ use stylet_shm_schema::service::Instance;
 /// Whatever was wrong, to be shown as text.
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 type Checked = Job<Vec<Problem>>;
+/// Session and generation of the scene and the template, with the work for them.
+type OutlinesJob = (u64, u64, Template, Job<Result<AnatomyOutlines, Failure>>);
 
 /// A message for the operator.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,7 +43,7 @@ pub enum Message {
 #[derive(Default)]
 pub struct Planner {
     outlines: Option<Arc<AnatomyOutlines>>,
-    outlining: Option<(u64, u64, Template, Job<Result<AnatomyOutlines, Failure>>)>,
+    outlining: Option<OutlinesJob>,
     /// Scene and template that no outlines could be made of.
     failed: Option<((u64, u64), Template)>,
     /// The scene that the plan is for: its name and box.

@@ -69,6 +69,9 @@ struct Key {
     dark: bool,
 }
 
+/// Scene, plans, template shown, dark colours.
+type PlanMarksKey = ((u64, u64), (u64, u64, usize), bool, bool);
+
 pub struct Scene3d {
     gpu: Option<Gpu>,
     pub camera: Camera,
@@ -83,8 +86,8 @@ pub struct Scene3d {
     /// The dose that the card has.
     shells: u64,
     drawn: Option<Key>,
-    /// What the marks of the plan were made for: scene, plans, template, colours.
-    fixed: Option<((u64, u64), (u64, u64, usize), bool, bool)>,
+    /// What the marks of the plan were made for.
+    fixed: Option<PlanMarksKey>,
     marks: Marks,
     /// Where the axes are drawn.
     corner_m: Option<[f32; 3]>,

@@ -5,7 +5,8 @@ use crate::rt::arm::{self, Ask};
 use nalgebra::Vector3;
 use std::path::PathBuf;
 use std::str::FromStr;
-use stylet_hw::libhd::Placement;
+use stylet_hw::backend::{self, BackendKind, UnknownBackend};
+use stylet_hw::libhd::{ArmError, Placement};
 use stylet_hw::{Device, DeviceFault, Phantom, PhantomConfig, SimulatedPhantom, SimulatedPhantomConfig};
 use stylet_shm_schema::{Fault, ThreadReport};
 use stylet_sim::scene::Scene;
@@ -27,16 +28,15 @@ pub enum DeviceChoice {
 }
 
 impl FromStr for DeviceChoice {
-    type Err = String;
+    type Err = UnknownBackend;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.split_once(':') {
-            None if text == "simulated" => Ok(Self::Simulated),
-            None if text == "phantom" => Ok(Self::Phantom(None)),
-            Some(("phantom", name)) if !name.is_empty() => Ok(Self::Phantom(Some(name.to_owned()))),
-            Some(("replay", file)) if !file.is_empty() => Ok(Self::Replay(PathBuf::from(file))),
-            _ => Err("give simulated, phantom, phantom:NAME or replay:FILE".to_owned()),
-        }
+    fn from_str(text: &str) -> Result<Self, UnknownBackend> {
+        let (kind, argument) = backend::parse(text)?;
+        Ok(match kind {
+            BackendKind::Simulated => Self::Simulated,
+            BackendKind::Phantom => Self::Phantom(argument.map(str::to_owned)),
+            BackendKind::Replay => Self::Replay(argument.map(PathBuf::from).unwrap_or_default()),
+        })
     }
 }
 
@@ -76,11 +76,7 @@ pub fn open(
         priority: force_loop.priority.map(|p| (p + SERVO_AHEAD).min(98)),
         core: servo_core,
     };
-    let arm = move || {
-        arm::arm(ask)
-            .map(|armed| words(&armed.report))
-            .map_err(|e| e.to_string())
-    };
+    let arm = move || arm::arm(ask).map(|armed| words(&armed.report)).map_err(ArmError::new);
     let phantom = Phantom::open(
         config,
         Box::new(arm),
@@ -126,6 +122,11 @@ mod tests {
     #[test]
     fn a_device_is_named_as_the_help_says_and_not_otherwise() {
         assert_eq!("simulated".parse(), Ok(DeviceChoice::Simulated));
+        assert_eq!(
+            "sim".parse(),
+            Ok(DeviceChoice::Simulated),
+            "the name in older scene files"
+        );
         assert_eq!("phantom".parse(), Ok(DeviceChoice::Phantom(None)));
         assert_eq!(
             "phantom:Left arm".parse(),

@@ -2,3 +2,5 @@
 
 #[cfg(test)]
 mod docs_names;
+#[cfg(test)]
+mod walls;

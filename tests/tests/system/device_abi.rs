@@ -6,7 +6,7 @@ use fake_hd::table::{ERRORS, FUNCTIONS};
 use nalgebra::Vector3;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
-use stylet_hw::libhd::errors::{self, Severity};
+use stylet_hw::libhd::errors::{self, Response};
 use stylet_hw::libhd::{Api, ffi};
 use stylet_hw::{Device, Wrench};
 use stylet_tests::phantom::{Fake, drive, library};
@@ -168,10 +168,10 @@ fn every_error_of_the_interface_turns_the_force_off_and_the_device_comes_back() 
         let anew = fake.control.inits.load(Relaxed) - inits;
         assert_eq!(
             anew > 0,
-            known.severity == Severity::Reconnect,
+            known.response == Response::Reconnect,
             "{name}: initialised anew {anew} times"
         );
-        println!("0x{code:04x} {name:30} -> {:?}, {:?}", known.fault, known.severity);
+        println!("0x{code:04x} {name:30} -> {:?}, {:?}", known.fault, known.response);
     }
     assert_eq!(ERRORS.len(), errors::KNOWN.len() + 1, "all but success");
     assert!(device.readings().errors >= 21);

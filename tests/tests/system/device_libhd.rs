@@ -1,18 +1,14 @@
 //! The Phantom over a driver that misbehaves: what the force loop sees, what the motors get, and how it ends.
 
-#[path = "../../../hw/tests/common/mod.rs"]
-mod common;
-
 use fake_hd::control::{get, put};
 use nalgebra::Vector3;
 use std::sync::atomic::Ordering::Relaxed;
-use std::sync::atomic::{AtomicU32, AtomicU64};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use stylet_heap as heap;
-use stylet_hw::libhd::session::Trouble;
-use stylet_hw::libhd::{Api, OpenError, diagnose};
-use stylet_hw::{Device, DeviceFault, Phantom, PhantomConfig, Wrench};
+use stylet_hw::libhd::{Api, Arm, ArmError, ConnectionError, OpenError, diagnose};
+use stylet_hw::{Device, DeviceFault, Phantom, PhantomConfig, Wrench, conformance};
 use stylet_tests::phantom::{Fake, config, drive, library};
 use stylet_tests::until;
 
@@ -22,7 +18,7 @@ fn push() -> Wrench {
     Wrench::from_force(Vector3::new(0.0, 1.0, 0.0))
 }
 
-fn quiet_arm() -> stylet_hw::libhd::servo::Arm {
+fn quiet_arm() -> Arm {
     Box::new(|| Ok("not armed".to_owned()))
 }
 
@@ -52,7 +48,7 @@ fn the_phantom_meets_the_contract() {
     let fake = Fake::new();
     let mut device = fake.open();
     assert!(drive(&mut device, &Wrench::zero(), LONG, Result::is_ok));
-    common::conformance(&mut device);
+    conformance::check(&mut device);
     assert!(until(LONG, || fake.control.force() == [0.0; 3]));
     let far_too_much = Wrench::from_force(Vector3::repeat(1e300));
     let size = || Vector3::from(fake.control.force()).norm();
@@ -166,7 +162,9 @@ fn the_names_are_tried_in_order_and_one_that_was_asked_for_alone() {
         assert_eq!(fake.control.calls_of("hdInitDevice"), inits);
     }
     let name = Some("Left".to_owned());
-    let Err(OpenError::Trouble(Trouble::NoDevice(tried))) = open(PhantomConfig { name, ..config() }).map(drop) else {
+    let Err(OpenError::Connection(ConnectionError::NoDevice(tried))) =
+        open(PhantomConfig { name, ..config() }).map(drop)
+    else {
         panic!("only the name that was asked for counts");
     };
     assert_eq!(tried, [("Left".to_owned(), 0x0300)]);
@@ -219,7 +217,7 @@ fn what_is_missing_is_said_in_words_that_help() {
     let why = open(config()).map(drop).unwrap_err().to_string();
     assert!(why.contains("servo loop does not run"), "{why}");
     fake.control.reset();
-    let refused = Phantom::open(config(), Box::new(|| Err("no rights".to_owned())), Box::new(|_| ()));
+    let refused = Phantom::open(config(), Box::new(|| Err(ArmError::new("no rights"))), Box::new(|_| ()));
     let why = refused.map(drop).unwrap_err().to_string();
     assert!(why.contains("no rights"), "{why}");
     fake.control.reset();
@@ -465,6 +463,33 @@ fn a_panic_in_the_callback_stays_in_it_and_leaves_zero_force() {
     assert!(opened.is_err());
     assert_eq!(fake.control.force(), [0.0; 3]);
     drop(fake.open());
+}
+
+/// The servo thread of a reconnected device used to exert the newest force until the connector saw that arming had failed.
+#[test]
+fn a_servo_thread_that_could_not_be_armed_exerts_no_force() {
+    let fake = Fake::new();
+    let first = AtomicBool::new(true);
+    let arm = move || match first.swap(false, Relaxed) {
+        true => Ok("armed".to_owned()),
+        false => Err(ArmError::new("no rights")),
+    };
+    let mut device = Phantom::open(config(), Box::new(arm), Box::new(|_| ())).expect("a device");
+    assert!(drive(&mut device, &push(), LONG, |s| s.is_ok() && feels(&fake, 1.0)()));
+    fake.control.unplugged.store(1, Relaxed);
+    assert!(drive(&mut device, &push(), LONG, Result::is_err));
+    assert!(drive(&mut device, &push(), LONG, |_| fake.control.force() == [0.0; 3]));
+    let begin = fake.control.ticks.load(Relaxed);
+    fake.control.unplugged.store(0, Relaxed);
+    assert!(drive(&mut device, &push(), LONG, |s| {
+        assert!(s.is_err());
+        fake.control.inits.load(Relaxed) > 3
+    }));
+    let end = fake.control.ticks.load(Relaxed);
+    assert!(end > begin, "the servo thread ran");
+    for tick in begin..end {
+        assert_eq!(fake.control.force_at(tick), [0.0; 3], "tick {tick} of {begin}..{end}");
+    }
 }
 
 /// Heap calls of the servo thread at the last end of a frame, and the most between two of them.

@@ -76,9 +76,10 @@ impl Rig {
 fn goal(run: &Run, plan: &NeedlePlan, seeds_dropped: usize) -> Option<[f64; 3]> {
     match run.step() {
         Step::Plan | Step::Done => None,
-        Step::PlaceNeedle => Some(plan.entry_m),
+        Step::Place => Some(plan.entry_m),
         Step::Insert => plan.deepest_first().first().copied(),
-        Step::DropAndRetract => plan.deepest_first().get(seeds_dropped).copied().or(Some(plan.entry_m)),
+        Step::Drop => plan.deepest_first().get(seeds_dropped).copied(),
+        Step::Retract | Step::Settle => Some(plan.entry_m),
     }
 }
 

@@ -10,8 +10,8 @@
 
 use super::rehearse::{Drops, Rehearser, Rest};
 use super::{Loading, Needle};
-use crate::workflow::Pace;
 use nalgebra::Vector3;
+use stylet_procedure::Pace;
 
 /// What compensation may do.
 #[derive(Clone, Copy, Debug, PartialEq)]

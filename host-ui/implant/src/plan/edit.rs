@@ -53,7 +53,7 @@ impl Row {
 impl ImplantPlan {
     /// All seeds of a needle anew.
     pub fn with_row(&self, needle: usize, row: Row) -> Result<Self, String> {
-        if row.count == 0 || !(row.pitch_m >= SEED_LENGTH_M) {
+        if row.count == 0 || row.pitch_m.is_nan() || row.pitch_m < SEED_LENGTH_M {
             let length_mm = SEED_LENGTH_M * 1e3;
             return Err(format!(
                 "a needle has at least one seed, and from one to the next it is {length_mm} mm or more; take the needle away instead"

@@ -1,10 +1,10 @@
 //! One needle gone through ahead of time: what the operator would do, and where the seeds would rest.
 
 use super::Needle;
-use crate::workflow::Pace;
 use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Link, LinkStatus};
+use stylet_procedure::{NeedleWay, Pace};
 use stylet_shm_schema::{NeedleRehearsal, Request};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);
@@ -38,6 +38,16 @@ impl Drops {
 
     pub fn drops_m(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         self.along_m.iter().map(|&along| self.at_m(along))
+    }
+
+    /// Where the tip goes.
+    pub fn way(&self) -> NeedleWay {
+        NeedleWay {
+            entry_m: self.entry_m.into(),
+            direction: self.direction.into(),
+            drops_m: self.drops_m().map(Into::into).collect(),
+            retract_to_m: self.retract_to_m,
+        }
     }
 
     /// Has the core rehearse them.
@@ -81,7 +91,7 @@ pub struct LinkRehearser<'a> {
 impl Rehearser for LinkRehearser<'_> {
     fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, String> {
         let link = &mut *self.link;
-        let generation = link.scene().map(|s| s.header.generation);
+        let scene = link.scene().map(|s| s.header.id());
         let request = Request::Rehearse(drops.rehearsal(pace));
         let id = link.send(&request).map_err(|e| e.0)?;
         let begun = Instant::now();
@@ -97,9 +107,7 @@ impl Rehearser for LinkRehearser<'_> {
                 Some(answer) if !answer.accepted => return Err(format!("the rehearsal failed: {}", answer.text)),
                 Some(_) => {
                     let rehearsal = link.rehearsal(id).ok_or("the core sent no result of the rehearsal")?;
-                    if Some(rehearsal.scene_generation) != generation
-                        || rehearsal.seed_count as usize != drops.along_m.len()
-                    {
+                    if Some(rehearsal.scene_id()) != scene || rehearsal.seed_count as usize != drops.along_m.len() {
                         return Err("another scene was loaded during the rehearsal; rehearse again".to_owned());
                     }
                     let count = rehearsal.seed_count as usize;

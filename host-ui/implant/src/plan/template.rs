@@ -1,6 +1,6 @@
 //! The template: 13 x 13 holes through which needles go, columns A to M, rows 1 to 13.
 
-use crate::workflow::patient_axis;
+use crate::patient::patient_axis;
 use nalgebra::Vector3;
 use stylet_shm_schema::SceneHeader;
 

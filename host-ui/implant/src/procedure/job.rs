@@ -1,5 +1,6 @@
 //! What a procedure is asked to do: needles with what is planned and what is done, from a plan file or as the scene suggests.
 
+use crate::pairing;
 use crate::plan::compensate::summary_m;
 use crate::plan::exchange;
 use crate::plan::rehearse::{Drops, LinkRehearser};
@@ -29,8 +30,9 @@ pub fn placed<'a>(
     lost: &'a [usize],
     seeds: &'a [SeedPose],
 ) -> impl Iterator<Item = (&'a PlannedDrop, &'a SeedPose)> {
-    let kept = planned.iter().enumerate().filter(|(number, _)| !lost.contains(number));
-    kept.map(|(_, drop)| drop).zip(seeds)
+    let pairs = pairing::in_order(planned.len(), lost, seeds.len());
+    let pair = |(drop, place): (&'a PlannedDrop, Option<usize>)| Some((drop, &seeds[place?]));
+    planned.iter().zip(pairs).filter_map(pair)
 }
 
 /// Everything that is done in one procedure.

@@ -2,6 +2,7 @@
 
 use super::Seen;
 use super::job::{Job, PlannedDrop, placed};
+use crate::pairing::SeedOffset;
 use crate::plan::compensate::summary_m;
 use crate::workflow::Pace;
 use nalgebra::{Matrix3, Vector3};
@@ -80,17 +81,16 @@ fn seeds(link: &Link, planned: &[PlannedDrop], lost: &[usize]) -> Vec<Value> {
     let in_tissue = &snapshot.header.seeds[..snapshot.header.seed_count as usize];
     placed(planned, lost, in_tissue)
         .map(|(drop, seed)| {
-            let (planned, direction) = (drop.planned_m, Vector3::from(drop.direction));
-            let off = Vector3::from(seed.position_m) - Vector3::from(planned);
-            let along = off.dot(&direction);
+            let planned = drop.planned_m;
+            let off = SeedOffset::of(planned, seed.position_m, drop.direction);
             json!({
                 "needle": drop.needle + 1, "hole": drop.hole.map(|h| h.to_string()), "strength_u": drop.strength_u,
                 "axis": seed.axis,
                 "planned_mm": mm(planned), "dropped_at_mm": mm(seed.dropped_at_m), "placed_mm": mm(seed.position_m),
                 "planned_ras_mm": to_patient(planned), "dropped_at_ras_mm": to_patient(seed.dropped_at_m),
                 "placed_ras_mm": to_patient(seed.position_m),
-                "error_mm": off.norm() * 1e3, "error_along_mm": along * 1e3,
-                "error_across_mm": (off - direction * along).norm() * 1e3,
+                "error_mm": off.distance_m() * 1e3, "error_along_mm": off.along_m * 1e3,
+                "error_across_mm": off.across_m * 1e3,
             })
         })
         .collect()

@@ -8,10 +8,10 @@ mod picture;
 mod trace;
 mod write;
 
+use crate::pairing::SeedOffset;
 use crate::plan::{Anatomy, Hole};
 pub use dose_cost::{Cost, costs};
 pub use motion::Motion;
-use nalgebra::Vector3;
 use stylet_dose::report::{Judge, Verdict};
 use stylet_dose::{DoseKernel, Seed};
 use stylet_shm_schema::TickRecord;
@@ -34,21 +34,24 @@ pub struct SeedPair {
 }
 
 impl SeedPair {
-    fn off_m(&self) -> Vector3<f64> {
-        Vector3::from(self.delivered.position_m) - Vector3::from(self.planned.position_m)
+    /// How far the delivered seed rests from the planned one.
+    pub fn offset(&self) -> SeedOffset {
+        SeedOffset::of(self.planned.position_m, self.delivered.position_m, self.direction)
     }
 
+    /// Distance from plan, m.
     pub fn error_m(&self) -> f64 {
-        self.off_m().norm()
+        self.offset().distance_m()
     }
 
-    /// Positive: deeper than planned.
+    /// Distance along the needle, m; positive: deeper than planned.
     pub fn error_along_m(&self) -> f64 {
-        self.off_m().dot(&Vector3::from(self.direction))
+        self.offset().along_m
     }
 
+    /// Distance across the needle, m.
     pub fn error_across_m(&self) -> f64 {
-        (self.off_m() - Vector3::from(self.direction) * self.error_along_m()).norm()
+        self.offset().across_m
     }
 }
 

@@ -1,5 +1,6 @@
 //! One needle through the gland and the seeds along it (paper fig. 6).
 
+use crate::patient::patient_axis;
 use nalgebra::Vector3;
 use stylet_shm_schema::{HandMove, MAX_SEEDS, PlannedNeedle, Request, SceneHeader, StructureInfo, role};
 
@@ -35,35 +36,6 @@ impl NeedlePlan {
         seeds.sort_by(|a, b| self.along_m(*b).total_cmp(&self.along_m(*a)));
         seeds
     }
-}
-
-/// How the scripted hand moves.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pace {
-    pub insert_m_per_s: f64,
-    pub retract_m_per_s: f64,
-    pub approach_m_per_s: f64,
-    pub acceleration_m_per_s2: f64,
-}
-
-impl Default for Pace {
-    fn default() -> Self {
-        Self {
-            insert_m_per_s: 0.05,
-            retract_m_per_s: 0.05,
-            approach_m_per_s: 0.1,
-            acceleration_m_per_s2: 2.0,
-        }
-    }
-}
-
-/// An axis of the patient (0 right, 2 superior) in the scene; `otherwise` when the transform is not one.
-pub fn patient_axis(scene: &SceneHeader, axis: usize, otherwise: Vector3<f64>) -> Vector3<f64> {
-    // A row of the rotation is its transpose times that axis.
-    let row = Vector3::from_column_slice(&scene.patient_from_scene[3 * axis..3 * axis + 3]);
-    row.try_normalize(0.5)
-        .filter(|d| d.iter().all(|c| c.is_finite()))
-        .unwrap_or(otherwise)
 }
 
 /// Five seeds along one needle through the middle of the target.

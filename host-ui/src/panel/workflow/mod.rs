@@ -76,9 +76,11 @@ fn run_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     if shown.running {
         let step = match shown.run_step {
             Some(Step::Plan) => "planning",
-            Some(Step::PlaceNeedle) => "placing the needle",
+            Some(Step::Place) => "placing the needle",
             Some(Step::Insert) => "inserting",
-            Some(Step::DropAndRetract) => "dropping and retracting",
+            Some(Step::Drop) => "dropping the seeds",
+            Some(Step::Retract) => "retracting",
+            Some(Step::Settle) => "waiting for the tissue to rest",
             Some(Step::Done) | None => "finishing",
         };
         ui.horizontal(|ui| {

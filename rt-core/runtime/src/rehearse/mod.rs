@@ -14,8 +14,7 @@ use script::Script;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use stylet_hw::DeviceInfo;
-use stylet_shm_schema::script::{TISSUE_REST_FOR, TISSUE_REST_LIMIT, TISSUE_REST_M};
-use stylet_shm_schema::{Fault, MAX_SEEDS, ParameterSet, Reason, Refusal, RefusalCode, SeedPose, flags};
+use stylet_shm_schema::{MAX_SEEDS, ParameterSet, Reason, Refusal, RefusalCode, SeedPose, flags};
 use stylet_sim::active::activate;
 use stylet_sim::scene::SceneSource;
 use stylet_sim::scene::TissueKind;
@@ -60,6 +59,9 @@ pub enum RehearseError {
         /// Number of the drop, from 0, that was refused or was to come next.
         drop: u32,
     },
+    /// The procedure could not go on.
+    #[error("in the rehearsal: {0}")]
+    Procedure(#[from] stylet_procedure::Failure),
     #[error("{0}")]
     Other(String),
 }
@@ -74,7 +76,7 @@ impl From<RehearseError> for Refusal {
     fn from(error: RehearseError) -> Self {
         let (code, subject) = match error {
             RehearseError::Refused { why, drop } => (why, drop),
-            RehearseError::Other(_) => (RefusalCode::RehearsalFailed, Reason::NO_SUBJECT),
+            RehearseError::Procedure(_) | RehearseError::Other(_) => (RefusalCode::RehearsalFailed, Reason::NO_SUBJECT),
         };
         Refusal {
             reasons: vec![Reason::new(code, subject)],
@@ -147,10 +149,6 @@ fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearse
         punctured |= state.flags & flags::PUNCTURED != 0;
         if !punctured {
             displacement_before_puncture_m = displacement_before_puncture_m.max(rig.displacement_m());
-        }
-        let fault = Fault::from_number(state.fault).unwrap_or(Fault::None);
-        if fault != Fault::None {
-            return Err(format!("in the rehearsal the force went off: {}", fault.message()).into());
         }
         if script.advance(rig)? {
             let simulated_s = rig.seconds();

@@ -8,9 +8,8 @@ use crate::rt::haptic_tape::HapticMemory;
 use crate::rt::recorder::Recorder;
 use crate::rt::tissue::{TissueLoop, TissuePorts};
 use crate::rt::world::World;
-use nalgebra::Vector3;
 use stylet_hw::{DeviceInfo, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
-use stylet_shm_schema::{HapticState, RefusalCode, SeedPose, TickRecord};
+use stylet_shm_schema::{HandMove, HapticState, RefusalCode, SeedPose, TickRecord};
 use stylet_sim::active::Active;
 
 /// The tip begins so far before the entry, and comes to it as in a run.
@@ -122,12 +121,12 @@ impl Rig {
         let _ = self.haptic_orders.push(HapticOrder::Engage { ticket: 0 });
     }
 
-    pub fn go(&mut self, to_m: Vector3<f64>, direction: Vector3<f64>, speed_m_per_s: f64, acceleration_m_per_s2: f64) {
+    pub fn move_hand(&mut self, hand: &HandMove) {
         let goal = HandGoal {
-            tip_in_world: to_m,
-            direction,
-            speed_m_per_s,
-            acceleration_m_per_s2,
+            tip_in_world: hand.tip_m.into(),
+            direction: hand.direction.into(),
+            speed_m_per_s: hand.speed_m_per_s,
+            acceleration_m_per_s2: hand.acceleration_m_per_s2,
         };
         let _ = self.haptic_orders.push(HapticOrder::Hand { ticket: 0, goal });
     }

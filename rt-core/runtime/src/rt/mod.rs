@@ -6,6 +6,12 @@
 //! ([`exchange`]), and through the one blackboard entry that the haptic thread owns.
 //! `tests/tests/rt_contract.rs` holds this over 10,000 ticks.
 
+// What the lists of clippy.toml name has no place in a tick; tests may.
+#![cfg_attr(
+    not(test),
+    deny(clippy::disallowed_macros, clippy::disallowed_methods, clippy::disallowed_types)
+)]
+
 pub mod arm;
 pub mod clock;
 pub mod exchange;

@@ -134,9 +134,12 @@ fn each_term_is_off_at_gain_zero_and_the_rest_stays() {
         at.velocity_m_per_s = Vector3::z() * 0.01;
         at
     };
-    let with = |change: fn(&mut ForceParameters)| {
-        let mut parameters = ForceParameters::default();
-        parameters.compensated_mass_kg = 0.05;
+    type Change = fn(&mut ForceParameters);
+    let with = |change: Change| {
+        let mut parameters = ForceParameters {
+            compensated_mass_kg: 0.05,
+            ..ForceParameters::default()
+        };
         change(&mut parameters);
         let before = force(&parameters, &mut ForceState::default(), &moving(false));
         let after = force(&parameters, &mut ForceState::default(), &moving(true));
@@ -151,7 +154,7 @@ fn each_term_is_off_at_gain_zero_and_the_rest_stays() {
         sizes.map(|v| v.norm())
     };
     let all = with(|_| {});
-    let cases: [(usize, fn(&mut ForceParameters)); 5] = [
+    let cases: [(usize, Change); 5] = [
         (0, |p| p.membrane_gain = 0.0),
         (1, |p| p.guide_gain = 0.0),
         (2, |p| p.damping_n_s_per_m = 0.0),

@@ -41,10 +41,10 @@ pub(super) fn half_pass<K: Rows>(
     for (k, &[first, end]) in model.rows_of_plane.iter().enumerate() {
         for j in (first..end).filter(|j| (j + k) % 2 == parity) {
             for segment in model.segments.of_row(j + ny * k) {
-                for component in 0..3 {
+                for (component, uniform) in uniform.iter().enumerate() {
                     let u = &mut state.u[component];
                     match model.segments.weights(segment) {
-                        None => K::relax(u, segment, &uniform[component]),
+                        None => K::relax(u, segment, uniform),
                         Some(weights) => K::relax(u, segment, &shares(relaxation, component, weights)),
                     }
                 }

@@ -93,8 +93,8 @@ fn body_held_still_comes_to_the_equilibrium_of_its_springs() {
             assert!(report.converged && report.held == HeldOutcome::Followed);
         }
         let mut worst = 0.0_f64;
-        for component in 0..3 {
-            let at_rest = equilibrium(&scene, &p, component, |e| (e == element).then_some(way[component]));
+        for (component, way) in way.into_iter().enumerate() {
+            let at_rest = equilibrium(&scene, &p, component, |e| (e == element).then_some(way));
             for (e, expected) in at_rest.iter().enumerate() {
                 let now = state.deformed(&model).displacement(e as u32)[component];
                 worst = worst.max((now - expected).abs());

@@ -1,13 +1,14 @@
-//! A recorded hand, played back.
+//! The replay of a recorded hand.
 
-mod common;
-
-use common::{DT_S, conformance};
 use nalgebra::Vector3;
-use stylet_hw::{Device, DeviceInfo, HandGoal, ReplayDevice, Sample, SimulatedPhantom, SimulatedPhantomConfig};
+use stylet_hw::{
+    Device, DeviceInfo, HandGoal, ReplayDevice, Sample, SimulatedPhantom, SimulatedPhantomConfig, conformance,
+};
 
-/// A hand on its way.
-fn taken(count: usize) -> Vec<Sample> {
+use crate::DT_S;
+
+/// Samples of a moving hand.
+fn recorded(count: usize) -> Vec<Sample> {
     let mut hand = SimulatedPhantom::new(SimulatedPhantomConfig::default());
     hand.set_hand_goal(&HandGoal {
         tip_in_world: Vector3::new(0.01, 0.0, 0.05),
@@ -24,12 +25,12 @@ fn played(samples: Vec<Sample>) -> ReplayDevice {
 
 #[test]
 fn a_recorded_hand_meets_the_contract() {
-    conformance(&mut played(taken(500)));
+    conformance::check(&mut played(recorded(500)));
 }
 
 #[test]
-fn every_sample_is_played_once_bit_for_bit_and_the_last_one_repeats() {
-    let samples = taken(300);
+fn every_sample_is_played_once_bit_identical_and_the_last_one_repeats() {
+    let samples = recorded(300);
     let mut device = played(samples.clone());
     let mut last = 0;
     for sample in &samples {
@@ -45,29 +46,29 @@ fn every_sample_is_played_once_bit_for_bit_and_the_last_one_repeats() {
         assert_eq!(
             device.read(DT_S).unwrap().sequence,
             last,
-            "silence is told by a number that stays"
+            "a number that stays reports silence"
         );
     }
 }
 
 #[test]
 fn a_faster_loop_sees_each_sample_more_than_once() {
-    let mut device = played(taken(100));
+    let mut device = played(recorded(100));
     let numbers: Vec<u64> = (0..200).map(|_| device.read(DT_S / 2.0).unwrap().sequence).collect();
     assert_eq!((numbers[0], numbers[199]), (1, 100));
     assert!(numbers.windows(2).all(|n| n[1] == n[0] || n[1] == n[0] + 1));
 }
 
 #[test]
-fn what_cannot_be_played_is_refused() {
+fn an_invalid_recording_is_refused() {
     let info = DeviceInfo::phantom_premium_1_5();
-    let mut broken = taken(3);
+    let mut broken = recorded(3);
     broken[1].tip_in_world.y = f64::NAN;
     for (samples, period_s) in [
         (Vec::new(), DT_S),
         (broken, DT_S),
-        (taken(3), 0.0),
-        (taken(3), f64::NAN),
+        (recorded(3), 0.0),
+        (recorded(3), f64::NAN),
     ] {
         assert!(ReplayDevice::new(info, samples, period_s).is_none());
     }

@@ -1,12 +1,11 @@
-//! The simulated operator: where the hand means to go, and that a needle goes in under resistance.
+//! The simulated operator: the path of the hand, and the insertion of a needle against resistance.
 
-mod common;
-
-use common::DT_S;
 use nalgebra::Vector3;
 use stylet_hw::{
     Device, Hand, HandGoal, HandPath, ScriptedPath, SimulatedPhantom, SimulatedPhantomConfig, Waypoint, Wrench,
 };
+
+use crate::DT_S;
 
 fn goal(x: f64, y: f64, z: f64) -> HandGoal {
     HandGoal {
@@ -65,7 +64,7 @@ fn a_new_goal_at_any_time_never_makes_the_velocity_jump() {
 }
 
 #[test]
-fn a_goal_that_makes_no_sense_changes_nothing() {
+fn an_invalid_goal_changes_nothing() {
     let mut path = HandPath::at(Vector3::zeros(), Vector3::z());
     for bad in [
         HandGoal {
@@ -103,7 +102,7 @@ fn the_tool_turns_to_the_needle_axis() {
     }
 }
 
-/// Steady resistance that opposes motion towards +z, with a membrane that lets go at 8 mm.
+/// Steady resistance that opposes motion towards +z, with a membrane that is punctured at 8 mm.
 fn tissue(depth_m: f64, punctured: &mut bool, held_at_m: &mut f64) -> f64 {
     if depth_m <= 0.0 {
         return 0.0;
@@ -158,9 +157,9 @@ fn a_passive_hand_yields_as_its_spring_says() {
     assert!((device.true_tip_in_world().x - 8.5 / 300.0).abs() < 1e-6);
 }
 
-/// As fast as the acceleration lets it and no way back; the last step of the discrete motion may be past it by a part of `a dt^2`.
+/// The acceleration limits the deceleration; the last step of the discrete motion may overshoot by a part of `a dt^2`.
 #[test]
-fn a_path_that_is_stopped_goes_on_by_its_stopping_distance_and_never_back() {
+fn a_path_that_is_stopped_continues_by_its_stopping_distance_and_never_reverses() {
     for (speed, acceleration, after_ticks) in [(0.05, 1.0, 300), (0.28, 2.0, 100), (0.05, 1.0, 20), (0.05, 1.0, 0)] {
         let mut path = HandPath::at(Vector3::zeros(), Vector3::z());
         path.set_goal(&HandGoal {
@@ -228,7 +227,7 @@ fn a_script_visits_its_waypoints_in_order_and_ends() {
     assert_eq!(goals, [0.01, 0.03, 0.0]);
     assert!(script.finished());
 
-    // One that cannot be reached is given up.
+    // A goal that cannot be reached is given up.
     let mut script = ScriptedPath::new(vec![stop(1.0)], 3e-4);
     let ticks = (0..10_000)
         .take_while(|_| {

@@ -1,10 +1,11 @@
 //! The simulated Phantom against closed forms: what a mass, a spring, dry friction and an amplifier do.
 
-mod common;
-
-use common::{DT_S, conformance};
 use nalgebra::Vector3;
-use stylet_hw::{BadLink, Device, DeviceFault, Hand, LinkFaults, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
+use stylet_hw::{
+    BadLink, Device, DeviceFault, Hand, LinkFaults, SimulatedPhantom, SimulatedPhantomConfig, Wrench, conformance,
+};
+
+use crate::DT_S;
 
 fn config(hand: Hand) -> SimulatedPhantomConfig {
     SimulatedPhantomConfig {
@@ -27,7 +28,7 @@ fn push(device: &mut SimulatedPhantom, force_n: Vector3<f64>) {
 #[test]
 fn the_phantom_meets_the_contract_in_any_hand() {
     for hand in [Hand::passive(), Hand::steady(), Hand::absent()] {
-        conformance(&mut SimulatedPhantom::new(config(hand)));
+        conformance::check(&mut SimulatedPhantom::new(config(hand)));
     }
 }
 
@@ -227,7 +228,7 @@ fn a_bad_link_delays_loses_and_repeats_as_asked() {
         (900..1100).contains(&lost) && (400..600).contains(&repeated),
         "{lost} {repeated}"
     );
-    conformance(&mut BadLink::new(phantom(), LinkFaults::default()));
+    conformance::check(&mut BadLink::new(phantom(), LinkFaults::default()));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The thread of normal priority that connects a device, calibrates it, watches it, and takes it up again after a loss.
+//! The thread of normal priority that connects a device, calibrates it, watches it, and reconnects it after a loss.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -9,63 +9,65 @@ use std::time::Instant;
 use crate::device::{DeviceFault, DeviceInfo};
 use crate::libhd::calibrate::{self, Calibration};
 use crate::libhd::device::PhantomConfig;
+use crate::libhd::exchange::Served;
 use crate::libhd::ffi::Api;
 use crate::libhd::servo::Servo;
-use crate::libhd::session::{Description, Session, Trouble};
+use crate::libhd::session::{ConnectionError, Description, Session};
 
 /// Takes a message for the operator.
-pub type Tell = Box<dyn Fn(&str) + Send>;
+pub type Report = Box<dyn Fn(&str) + Send>;
 
-/// Between two looks at a running device.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
-/// A servo loop that does not call for so long is stopped and started anew.
+/// Between two checks of a running device.
+const CHECK_EVERY: Duration = Duration::from_millis(20);
+/// A servo loop that does not call for this long is stopped and restarted.
 const SILENT_FOR: Duration = Duration::from_millis(250);
-/// Between two tries to connect.
+/// Between two attempts to connect.
 const RETRY_EVERY: Duration = Duration::from_millis(500);
 const CALIBRATION_EVERY: Duration = Duration::from_millis(50);
 const FIRST_CALL_LIMIT: Duration = Duration::from_secs(2);
 const FIRST_SAMPLE_LIMIT: Duration = Duration::from_millis(100);
-/// For the callback to write its zero before the scheduler stops.
+/// Longest wait for the callback to write zero before the scheduler stops.
 const RELEASE_LIMIT: Duration = Duration::from_millis(50);
-/// A driver that hangs is left alone after this.
+/// Longest wait for the thread to end; a driver that hangs is abandoned.
 const END_LIMIT: Duration = Duration::from_secs(3);
 
-pub struct Keeper {
+/// Owns the connection; see the module.
+pub struct Connector {
     api: Api,
     servo: &'static Servo,
     config: PhantomConfig,
-    tell: Tell,
+    report: Report,
     stop: Arc<AtomicBool>,
-    /// Told last, so that a retry does not repeat it.
-    told: String,
-    /// The limits that the force loop was given.
-    promised: Option<DeviceInfo>,
+    /// The last message, so that a retry does not repeat it.
+    last_message: String,
+    /// The limits that the force loop uses, fixed by the first connection.
+    info: Option<DeviceInfo>,
 }
 
-/// A running keeper; dropped, it lets the device go and waits until that is done.
-pub struct KeeperThread {
+/// A running connector. Dropping it releases the device and waits until that is done.
+pub struct ConnectorThread {
     stop: Arc<AtomicBool>,
     thread: Option<Thread>,
     ended: mpsc::Receiver<()>,
 }
 
-type First = Option<mpsc::Sender<Result<Description, Trouble>>>;
+type First = Option<mpsc::Sender<Result<Description, ConnectionError>>>;
 
-impl Keeper {
-    pub fn new(api: Api, servo: &'static Servo, config: PhantomConfig, tell: Tell) -> Self {
+impl Connector {
+    pub fn new(api: Api, servo: &'static Servo, config: PhantomConfig, report: Report) -> Self {
         Self {
             api,
             servo,
             config,
-            tell,
+            report,
             stop: Arc::default(),
-            told: String::new(),
-            promised: None,
+            last_message: String::new(),
+            info: None,
         }
     }
 
-    /// `first` hears whether there is a device; without one the thread ends.
-    pub fn spawn(self, first: mpsc::Sender<Result<Description, Trouble>>) -> KeeperThread {
+    /// Starts the thread. `first` receives the result of the first attempt; when it fails, the thread ends.
+    pub fn spawn(self, first: mpsc::Sender<Result<Description, ConnectionError>>) -> ConnectorThread {
         let stop = Arc::clone(&self.stop);
         let (end, ended) = mpsc::channel();
         let spawned = thread::Builder::new()
@@ -77,7 +79,7 @@ impl Keeper {
                 let _ = end.send(());
             });
         let thread = spawned.ok().map(|handle| handle.thread().clone());
-        KeeperThread { stop, thread, ended }
+        ConnectorThread { stop, thread, ended }
     }
 
     fn run(mut self, mut first: First) {
@@ -86,85 +88,90 @@ impl Keeper {
             let lost = match self.connect(&api, &mut first) {
                 Ok(Some(session)) => {
                     let lost = self.watch(&session);
-                    self.let_go(session);
+                    self.release(session);
                     lost
                 }
                 Ok(None) => None,
-                Err(trouble) => {
+                Err(error) => {
                     self.servo.shared.set_fault(Some(DeviceFault::NotConnected));
                     if let Some(first) = first.take() {
-                        let _ = first.send(Err(trouble));
+                        let _ = first.send(Err(error));
                         return;
                     }
-                    Some(trouble.to_string())
+                    Some(error.to_string())
                 }
             };
             if let Some(why) = lost {
-                self.say(&why);
+                self.report(&why);
                 thread::park_timeout(RETRY_EVERY);
             }
         }
     }
 
     fn stopped(&self) -> bool {
-        // SYNC: nothing but the flag is carried.
+        // SYNC: relaxed; the flag carries nothing with it. Its partner is the store in `drop`.
         self.stop.load(Ordering::Relaxed)
     }
 
-    fn say(&mut self, message: &str) {
-        if self.told != message {
-            (self.tell)(message);
-            message.clone_into(&mut self.told);
+    fn report(&mut self, message: &str) {
+        if self.last_message != message {
+            (self.report)(message);
+            message.clone_into(&mut self.last_message);
         }
     }
 
-    /// `None` when told to stop on the way.
-    fn connect<'a>(&mut self, api: &'a Api, first: &mut First) -> Result<Option<Session<'a>>, Trouble> {
+    /// `None` when the thread is to end.
+    fn connect<'a>(&mut self, api: &'a Api, first: &mut First) -> Result<Option<Session<'a>>, ConnectionError> {
         let mut session = Session::open(api, self.config.name.as_deref())?;
         match self.prepare(&mut session, first) {
             Ok(true) => Ok(Some(session)),
             Ok(false) => {
-                self.let_go(session);
+                self.release(session);
                 Ok(None)
             }
-            Err(trouble) => {
-                self.let_go(session);
-                Err(trouble)
+            Err(error) => {
+                self.release(session);
+                Err(error)
             }
         }
     }
 
-    fn prepare(&mut self, session: &mut Session, first: &mut First) -> Result<bool, Trouble> {
+    fn prepare(&mut self, session: &mut Session, first: &mut First) -> Result<bool, ConnectionError> {
         let description = session.describe()?;
-        match &self.promised {
+        match &self.info {
             Some(info) if *info != description.info => {
-                return Err(Trouble::OtherModel {
+                return Err(ConnectionError::OtherModel {
                     was: info.name,
                     is: description.model,
                 });
             }
-            _ => self.promised = Some(description.info),
+            _ => self.info = Some(description.info),
         }
         if !self.calibrate(session, &description, first)? {
             return Ok(false);
         }
         let granted = self.start(session)?;
-        self.say(&format!("{description}; servo thread: {granted}"));
+        self.report(&format!("{description}; servo thread: {granted}"));
         if let Some(first) = first.take() {
             let _ = first.send(Ok(description));
         }
         Ok(true)
     }
 
-    /// Until the device is calibrated; false when told to stop.
-    fn calibrate(&mut self, session: &Session, description: &Description, first: &mut First) -> Result<bool, Trouble> {
+    /// Waits until the device is calibrated; false when the thread is to end.
+    fn calibrate(
+        &mut self,
+        session: &Session,
+        description: &Description,
+        first: &mut First,
+    ) -> Result<bool, ConnectionError> {
         while !self.stopped() {
             match calibrate::step(&self.api, session.handle)? {
                 Calibration::Done => return Ok(true),
                 Calibration::Updated => {}
-                Calibration::Waits(what_to_do) => {
+                Calibration::NeedsOperator(what_to_do) => {
                     self.servo.shared.set_fault(Some(DeviceFault::NotCalibrated));
-                    self.say(what_to_do);
+                    self.report(what_to_do);
                     if let Some(first) = first.take() {
                         let _ = first.send(Ok(description.clone()));
                     }
@@ -175,71 +182,73 @@ impl Keeper {
         Ok(false)
     }
 
-    /// Starts the servo loop and waits for its first callback; says what its thread was granted.
-    fn start(&self, session: &mut Session) -> Result<String, Trouble> {
+    /// Starts the servo loop and waits for its first callback; returns what its thread was granted.
+    fn start(&self, session: &mut Session) -> Result<String, ConnectionError> {
         let shared = &self.servo.shared;
         let armed = || self.servo.armed.lock().unwrap_or_else(PoisonError::into_inner).take();
         let _ = armed();
-        let torques = self.promised.is_some_and(|info| info.peak_torque_nm > 0.0);
-        shared.torques.store(torques, Ordering::Relaxed);
-        shared.handle.store(session.handle, Ordering::Relaxed);
-        shared.lost.store(false, Ordering::Relaxed);
-        shared.release.store(false, Ordering::Relaxed);
-        shared.arm.store(true, Ordering::Relaxed);
+        let torques = self.info.is_some_and(|info| info.peak_torque_nm > 0.0);
+        shared.serve(Served {
+            handle: session.handle,
+            torques,
+        });
         let context = core::ptr::from_ref(self.servo).cast_mut().cast();
-        // SAFETY: the servo is never freed, and lets one thread in at a time.
+        // SAFETY: the servo is never freed, and admits one thread at a time.
         unsafe { session.start(Servo::callback, context, self.config.servo_hz) }?;
-        let begun = Instant::now();
-        while begun.elapsed() < FIRST_CALL_LIMIT {
+        let start = Instant::now();
+        while start.elapsed() < FIRST_CALL_LIMIT {
             if let Some(granted) = armed() {
-                let granted = granted.map_err(Trouble::NotArmed)?;
+                let granted = granted.map_err(ConnectionError::NotArmed)?;
                 self.wait_for_sample();
                 return Ok(granted);
             }
             thread::park_timeout(Duration::from_millis(1));
         }
-        Err(Trouble::NoCallback)
+        Err(ConnectionError::NoCallback)
     }
 
-    /// The first callback has begun; whoever opened the device finds a sample, unless something is wrong.
+    /// The first callback has begun: waits for its sample, so that whoever opened the device finds one, unless there is a fault.
     fn wait_for_sample(&self) {
-        let begun = Instant::now();
-        while self.servo.shared.fault().is_some() && begun.elapsed() < FIRST_SAMPLE_LIMIT {
+        let start = Instant::now();
+        while self.servo.shared.fault().is_some() && start.elapsed() < FIRST_SAMPLE_LIMIT {
             thread::park_timeout(Duration::from_millis(1));
         }
     }
 
-    /// Until the device is lost, with the reason, or the end is asked for.
+    /// Returns when the device is lost, with the reason, or when the thread is to end.
     fn watch(&self, session: &Session) -> Option<String> {
         let shared = &self.servo.shared;
         let (mut calls, mut since) = (0, Instant::now());
         while !self.stopped() {
-            let now = shared.calls.load(Ordering::Relaxed);
+            let now = shared.calls();
             if now != calls {
                 (calls, since) = (now, Instant::now());
             }
-            if shared.lost.load(Ordering::Relaxed) {
-                let code = shared.error.load(Ordering::Relaxed);
-                return Some(format!("the device is lost: {}", Trouble::Call("the servo loop", code)));
+            if let Some(code) = shared.lost() {
+                return Some(format!(
+                    "the device is lost: {}",
+                    ConnectionError::Call("the servo loop", code)
+                ));
             }
             if since.elapsed() > SILENT_FOR || !session.is_scheduled() {
-                shared.lost.store(true, Ordering::Relaxed);
+                shared.set_lost();
                 shared.set_fault(Some(DeviceFault::TimedOut));
-                return Some("the driver's servo loop has stopped; it is started anew".to_owned());
+                return Some("the driver's servo loop has stopped; restarting it".to_owned());
             }
-            thread::park_timeout(LOOK_EVERY);
+            thread::park_timeout(CHECK_EVERY);
         }
         None
     }
 
-    /// Zero force first, as far as callbacks still come; then the scheduler and the device.
-    fn let_go(&self, session: Session) {
+    /// Writes zero force, if callbacks still arrive; then stops the scheduler and disables the device.
+    fn release(&self, session: Session) {
         let shared = &self.servo.shared;
-        let before = shared.released.load(Ordering::Relaxed);
-        shared.release.store(true, Ordering::Relaxed);
-        let begun = Instant::now();
-        while session.is_running() && begun.elapsed() < RELEASE_LIMIT {
-            if shared.released.load(Ordering::Relaxed) > before + 1 {
+        let before = shared.released();
+        shared.request_release();
+        let start = Instant::now();
+        while session.is_running() && start.elapsed() < RELEASE_LIMIT {
+            // The first of them may have begun before the request.
+            if shared.released() > before + 1 {
                 break;
             }
             thread::park_timeout(Duration::from_millis(1));
@@ -251,8 +260,9 @@ impl Keeper {
     }
 }
 
-impl Drop for KeeperThread {
+impl Drop for ConnectorThread {
     fn drop(&mut self) {
+        // SYNC: relaxed; its partner is the load in `stopped`, and `unpark` orders the two.
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = &self.thread {
             thread.unpark();

@@ -1,14 +1,21 @@
-//! What every device must do, whoever made it: call [`conformance`] with yours.
+//! The conformance test that every back end must pass.
 
+use crate::device::{Device, DeviceFault, HandGoal, Wrench};
 use nalgebra::Vector3;
-use stylet_hw::{Device, DeviceFault, HandGoal, Wrench};
 
-#[allow(dead_code)]
-pub const DT_S: f64 = 1e-3;
+const DT_S: f64 = 1e-3;
 
-/// The obligations in the words of the `Device` trait. Leaves the device at zero force.
-#[allow(dead_code)]
-pub fn conformance(device: &mut dyn Device) {
+/// Checks the obligations of the [`Device`] trait on a device at rest. Leaves the device at zero force.
+///
+/// # Panics
+///
+/// When the device breaks an obligation.
+///
+/// ```
+/// use stylet_hw::{SimulatedPhantom, SimulatedPhantomConfig, conformance};
+/// conformance::check(&mut SimulatedPhantom::new(SimulatedPhantomConfig::default()));
+/// ```
+pub fn check(device: &mut dyn Device) {
     let info = device.info();
     assert!(!info.name.is_empty());
     assert!(info.peak_force_n > 0.0 && info.continuous_force_n <= info.peak_force_n);
