@@ -12,7 +12,7 @@ use crate::loader::Loader;
 use crate::panel::history::History;
 use crate::panel::parameters::{ParametersState, parameters_ui};
 use crate::panel::workflow::{Progress, WorkflowState, editor_ui, workflow_ui};
-use crate::panel::{help, plots, status};
+use crate::panel::{banners, help, plots, status};
 use crate::picture::Pictures;
 use crate::planner::Planner;
 use crate::settings::Settings;
@@ -214,11 +214,11 @@ impl App {
         egui::Panel::top("status").frame(bar).show(ui, |ui| {
             actions.extend(status::status_ui(ui, &self.shown, &mut self.settings));
         });
-        let banners = status::banners(&self.shown);
-        if !banners.is_empty() {
+        let shown_banners = banners::banners(&self.shown);
+        if !shown_banners.is_empty() {
             egui::Panel::top("banners").frame(egui::Frame::new()).show(ui, |ui| {
                 ui.spacing_mut().item_spacing.y = 1.0;
-                actions.extend(status::banners_ui(ui, &banners));
+                actions.extend(banners::banners_ui(ui, &shown_banners));
             });
         }
         let left = egui::Panel::left("workflow")

@@ -1,6 +1,7 @@
 //! Panels: each a pure function of prepared data that draws and returns what the operator asked for.
 
 mod axis;
+pub mod banners;
 pub mod help;
 mod histogram;
 pub mod history;

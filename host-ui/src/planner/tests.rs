@@ -1,6 +1,8 @@
 //! What may be changed of a plan that is being carried out.
 
 use super::*;
+use stylet_implant::plan::{Hole, Row};
+use stylet_shm_schema::MAX_SEEDS;
 
 fn hole(name: &str) -> Hole {
     name.parse().expect("a hole")
