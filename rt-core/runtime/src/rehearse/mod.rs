@@ -53,7 +53,7 @@ pub enum RehearseError {
     Refused {
         /// The loop's reason.
         why: RefusalCode,
-        /// Number of the drop, from 0, that was refused or was to come next.
+        /// Number of the drop, from 0, that was refused or was due next.
         drop: u32,
     },
     /// The tip stopped short of its goal.
@@ -63,7 +63,7 @@ pub enum RehearseError {
         off_mm: f64,
     },
     /// The script did not end.
-    #[error("the needle was not through after {LONGEST_S} s of its own time")]
+    #[error("the needle had not finished after {LONGEST_S} s of simulated time")]
     TooLong,
 }
 
