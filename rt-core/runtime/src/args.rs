@@ -1,4 +1,4 @@
-//! What a run and a measurement take from the command line, and the settings of a run that follow from it.
+//! Options that a run and a measurement share on the command line, and the settings of a run that they give.
 
 use crate::device::DeviceChoice;
 use crate::process::Options;
@@ -11,16 +11,16 @@ use stylet_shm_schema::BUILTIN_SCENES;
 use stylet_shm_schema::service::Instance;
 use stylet_sim::scene::TissueKind;
 
-/// What a run and a measurement have in common.
+/// Options that a run and a measurement share.
 #[derive(Args, Debug)]
 pub struct RealTimeArgs {
     /// Built-in scene to start with
     #[arg(long, default_value = BUILTIN_SCENES[0], value_parser = scenes())]
     pub scene: String,
-    /// Run without real-time scheduling; every record and screen then says so
+    /// Run without real-time scheduling; every record and screen then shows it
     #[arg(long)]
     no_rt: bool,
-    /// Try real time first and go on without it when the rights are missing
+    /// Try real time first and run without it when the rights are missing
     #[arg(long, conflicts_with = "no_rt")]
     rt_if_allowed: bool,
     /// Core of the force loop [default: the last one]
@@ -96,7 +96,7 @@ impl RealTimeArgs {
     }
 }
 
-/// Tries real-time scheduling in a thread of its own, which then ends; `Err` says how to grant what is missing.
+/// Tries real-time scheduling in a thread of its own, which then ends; the error explains how to grant what is missing.
 fn try_real_time() -> Result<(), Refused> {
     let ask = arm::Ask {
         priority: Some(1),

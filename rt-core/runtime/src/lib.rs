@@ -1,5 +1,7 @@
 //! The running core: two real-time loops, the bridge that owns every port, flight recordings and rehearsals.
 
+#![warn(missing_docs)]
+
 pub mod args;
 pub mod bridge;
 pub mod device;

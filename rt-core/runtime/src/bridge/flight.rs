@@ -1,4 +1,4 @@
-//! Asks both loops for their tapes, gives them back, and has a thread of its own write the recording to disk.
+//! Collects the tapes of both loops, returns them, and writes the recording to disk on a separate thread.
 
 use crate::replay::file::{Flight, FlightError};
 use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
@@ -51,7 +51,7 @@ pub struct Saved {
 }
 
 struct Wanted {
-    /// Goes into the name of the file.
+    /// Part of the name of the file.
     kind: &'static str,
     reason: String,
     due: Instant,

@@ -1,4 +1,4 @@
-//! Builds scenes on a thread of its own; the running scene goes on until the next one is ready.
+//! Builds scenes on a separate thread; the running scene stays until the next one is ready.
 
 use crate::rt::exchange::Ticket;
 use std::sync::mpsc;

@@ -1,4 +1,4 @@
-//! Changes of parameters on their way to the loops: each starts from the one before it, and goes to both loops or to none.
+//! Changes of parameters on their way to the loops: each starts from the one before it, and reaches both loops or none.
 
 use crate::rt::exchange::{HapticOrder, TissueOrder};
 use std::collections::BTreeMap;

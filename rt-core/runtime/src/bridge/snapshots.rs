@@ -40,7 +40,7 @@ impl SnapshotLoans {
         }
     }
 
-    /// Sends what came back filled, then loans anew for the scene that runs.
+    /// Sends the slots that returned filled, then loans new ones for the scene that runs.
     pub fn pass(&mut self, ports: &Ports, scene_generation: u64, size: SnapshotSize) {
         while let Ok(back) = self.filled.pop() {
             let loan = self.out.get_mut(back.index as usize).and_then(Option::take);

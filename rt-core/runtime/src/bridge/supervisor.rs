@@ -5,7 +5,7 @@
 
 /// Passes of the bridge without one tick of the loop; 2 ms and more each.
 ///
-/// Passes, not time: when the whole process was stopped, neither went on.
+/// Passes, not time: while the whole process is stopped, neither advances.
 pub const PATIENCE_PASSES: u32 = 125;
 
 /// One for a bridge.

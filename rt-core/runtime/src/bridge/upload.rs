@@ -12,8 +12,8 @@ pub struct InvalidUpload(Vec<String>);
 /// Lists every problem with the header. Labels, materials and how they go together are checked by the scene.
 pub fn labels(header: &UploadHeader, cells: &[u8]) -> Result<Labels, InvalidUpload> {
     let mut problems = Vec::new();
-    let said = header.dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(u64::from(d)));
-    if said != Some(cells.len() as u64) {
+    let expected = header.dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(u64::from(d)));
+    if expected != Some(cells.len() as u64) {
         problems.push(format!(
             "the volume has {:?} cells by its header but {} were received",
             header.dims,

@@ -14,7 +14,7 @@ use stylet_sim::scene::Scene;
 
 /// Rate of the driver's servo loop.
 const SERVO_HZ: u32 = 1000;
-/// The servo thread goes before the force loop, which waits for what it brings.
+/// The servo thread has priority over the force loop, which waits for its samples.
 const SERVO_AHEAD: u32 = 5;
 
 /// A back end of [`backend::BACKENDS`] as the operator named it, with what followed the colon: the name of a Phantom in the

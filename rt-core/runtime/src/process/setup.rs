@@ -129,7 +129,7 @@ impl Body {
     }
 }
 
-/// Locks the memory of the process and keeps its cores out of deep sleep; only `--no-rt` goes on without locked memory.
+/// Locks the memory of the process and keeps its cores out of deep sleep; only `--no-rt` runs without locked memory.
 pub(super) fn lock_memory(options: &Options) -> Result<KernelGrants, RunError> {
     let unlocked = match arm::lock_memory() {
         Ok(()) => None,

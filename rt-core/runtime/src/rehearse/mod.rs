@@ -47,14 +47,14 @@ pub enum RehearseError {
     Refused {
         /// The loop's reason.
         why: RefusalCode,
-        /// Number of the drop, from 0, that was refused or was to come next.
+        /// Number of the drop, from 0, that was refused or was due next.
         drop: u32,
     },
     /// The procedure could not go on.
     #[error("in the rehearsal: {0}")]
     Procedure(#[from] stylet_procedure::Failure),
     /// The script did not end.
-    #[error("the needle was not through after {LONGEST_S} s of its own time")]
+    #[error("the needle had not finished after {LONGEST_S} s of simulated time")]
     TooLong,
 }
 

@@ -1,4 +1,4 @@
-//! Rehearsals against what must hold of them: the same bytes twice, seeds at rest where the tissue was, and errors in words.
+//! What holds for rehearsals: the same bytes twice, seeds at rest where the tissue was, and typed errors.
 
 use super::*;
 use std::sync::atomic::AtomicBool;
@@ -104,7 +104,7 @@ fn fem_stage() -> Stage {
     Stage::build(&source, TissueKind::Fem, DeviceInfo::phantom_premium_1_5()).expect("built in")
 }
 
-/// One seed, where an elastic body still lets the tip come.
+/// One seed, within reach of the tip in an elastic body.
 fn shallow() -> NeedleRun {
     let run = needle();
     NeedleRun {

@@ -8,11 +8,13 @@ use stylet_shm_schema::ThreadReport;
 pub struct Ask {
     /// `SCHED_FIFO` priority; `None` under `--no-rt`.
     pub priority: Option<u32>,
+    /// Processor; `None` for any.
     pub core: Option<usize>,
 }
 
 /// Proof that this thread is armed; cannot leave it.
 pub struct Armed {
+    /// What the kernel granted, as read back.
     pub report: ThreadReport,
     not_send: PhantomData<*const ()>,
 }
@@ -22,7 +24,7 @@ pub struct Armed {
 #[error("{0}")]
 pub struct Refused(pub String);
 
-/// How to grant real-time rights, in words to type.
+/// How to grant real-time rights: the commands to type.
 pub fn advice(missing: &str) -> String {
     let program = std::env::current_exe().map_or_else(|_| "rt-core".into(), |p| p.display().to_string());
     format!(
@@ -58,11 +60,11 @@ pub fn arm(ask: Ask) -> Result<Armed, Refused> {
     })
 }
 
-/// Locks present and future pages; `Err` says which limit to raise.
+/// Locks present and future pages; the error names the limit to raise.
 pub fn lock_memory() -> Result<(), Refused> {
     // SAFETY: no preconditions.
     if unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } == 0 {
-        // Keep freed memory, and serve large blocks from it: no page comes or goes later.
+        // Keep freed memory, and serve large blocks from it: no page is mapped or unmapped later.
         // SAFETY: both options take any value.
         unsafe {
             libc::mallopt(libc::M_TRIM_THRESHOLD, -1);
@@ -172,10 +174,15 @@ fn flush_denormals() {
 /// What a thread cost since it was armed.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Usage {
+    /// Page faults without a disk.
     pub minor_faults: i64,
+    /// Page faults that read a disk.
     pub major_faults: i64,
+    /// Context switches because the thread waited.
     pub voluntary_switches: i64,
+    /// Context switches because another thread was preferred.
     pub involuntary_switches: i64,
+    /// Allocations, frees and reallocations.
     pub heap_calls: u64,
 }
 
@@ -195,6 +202,7 @@ impl Usage {
         }
     }
 
+    /// The cost since `start`.
     pub fn since(self, start: Self) -> Self {
         Self {
             minor_faults: self.minor_faults - start.minor_faults,

@@ -13,7 +13,7 @@ pub fn now_ns() -> u64 {
     time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
 }
 
-/// Returns at `time_ns` or later; goes on after a signal.
+/// Returns at `time_ns` or later; continues to sleep after a signal.
 pub fn sleep_until(time_ns: u64) {
     let time = libc::timespec {
         tv_sec: (time_ns / 1_000_000_000) as libc::time_t,
@@ -39,7 +39,9 @@ pub fn wait_until(time_ns: u64, spin_ns: u64) -> bool {
 /// The ideal grid of a periodic loop: late wake-ups skip grid points and count them, none is made up for.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid {
+    /// Time between two points, ns.
     pub period_ns: u64,
+    /// The point that comes next, `CLOCK_MONOTONIC`, ns.
     pub due_ns: u64,
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// The contact that lasts.
+/// A contact that has not ended.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Contact {
     /// Rises with each contact of a run; the first is 1.

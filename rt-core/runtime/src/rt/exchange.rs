@@ -10,7 +10,7 @@ use stylet_sim::force::ForceParameters;
 use stylet_sim::limits::Limits;
 use stylet_sim::needle::NeedleParameters;
 
-/// Number that joins an order to the host's request; 0 when nobody waits.
+/// Number that joins an order to the host's request; 0 when nobody waits for an answer.
 pub type Ticket = u64;
 
 /// Bridge to haptic.
@@ -18,45 +18,71 @@ pub type Ticket = u64;
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub enum HapticOrder {
+    /// Use these parameters from this tick on.
     Parameters {
+        /// Number of the request.
         ticket: Ticket,
+        /// Rises with each change of a run.
         generation: u64,
+        /// The needle and what it does to tissue.
         needle: NeedleParameters,
+        /// The terms of the force.
         force: ForceParameters,
     },
+    /// Bring the simulated hand to a goal.
     Hand {
+        /// Number of the request.
         ticket: Ticket,
+        /// Place, direction, speed and acceleration.
         goal: HandGoal,
     },
+    /// Turn the force on; re-arms after a fault.
     Engage {
+        /// Number of the request.
         ticket: Ticket,
     },
+    /// Ramp the force out.
     Disengage {
+        /// Number of the request.
         ticket: Ticket,
     },
+    /// End the contact and clear peaks and counters.
     Reset {
+        /// Number of the request.
         ticket: Ticket,
     },
     /// Hand the flight recording over; the loop records anew once it has it back.
     HandOverTape,
+    /// Hold the simulated hand where it is.
     StopHand {
+        /// Number of the request.
         ticket: Ticket,
     },
 }
 
 /// Bridge to tissue.
 pub enum TissueOrder {
+    /// Keep these limits from this tick on.
     Limits(Limits),
+    /// Leave a seed at the tip.
     DropSeed {
+        /// Number of the request.
         ticket: Ticket,
     },
+    /// Remove the seed that was dropped last.
     UndoSeed {
+        /// Number of the request.
         ticket: Ticket,
     },
+    /// Return the tissue to rest and remove every seed.
     Reset,
+    /// Run another scene from this tick on.
     World {
+        /// Number of the request.
         ticket: Ticket,
+        /// The scene with its tissue at rest.
         world: Box<World>,
+        /// A blank flight recording for it.
         tape: Box<TissueTape>,
     },
     /// Hand the flight recording over; the loop records anew once it has it back.
@@ -66,64 +92,107 @@ pub enum TissueOrder {
 /// Either loop to the bridge: what happened, once each.
 #[derive(Clone, Copy, Debug)]
 pub enum Notice {
+    /// An order was carried out.
     Done {
+        /// Number of the request.
         ticket: Ticket,
+        /// Tick of the loop, from 1.
         tick: u64,
     },
+    /// An order was refused.
     Refused {
+        /// Number of the request.
         ticket: Ticket,
+        /// The loop's reason.
         why: RefusalCode,
     },
+    /// Parameters are in use.
     ParametersActive {
+        /// Number of the request.
         ticket: Ticket,
+        /// Rises with each change of a run.
         generation: u64,
+        /// Tick of the loop, from 1.
         tick: u64,
     },
+    /// The tip has met the body.
     Contact {
+        /// Tick of the loop, from 1.
         tick: u64,
+        /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
+        /// Place of the tip, scene frame, m.
         position_m: Vector3<f64>,
     },
+    /// A membrane gave way.
     Puncture {
+        /// Tick of the loop, from 1.
         tick: u64,
+        /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
+        /// Depth of the tip behind the membrane at rest, m.
         depth_m: f64,
+        /// Place of the tip, scene frame, m.
         position_m: Vector3<f64>,
     },
+    /// The tip has left the body.
     LeftTissue {
+        /// Tick of the loop, from 1.
         tick: u64,
+        /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
     },
+    /// A seed was dropped.
     Seed {
+        /// Tick of the loop, from 1.
         tick: u64,
+        /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
+        /// Number of the seed, from 0.
         index: u32,
+        /// Place of the tip, scene frame, m.
         position_m: Vector3<f64>,
     },
+    /// The first fault since the force was armed.
     Fault {
+        /// Tick of the loop, from 1.
         tick: u64,
+        /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
+        /// The cause.
         fault: Fault,
     },
+    /// The force was armed again after a fault.
     Rearmed {
+        /// Tick of the loop, from 1.
         tick: u64,
+        /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
     },
+    /// Another scene runs.
     WorldSwapped {
+        /// Number of the request.
         ticket: Ticket,
+        /// Rises with each change of a run.
         generation: u64,
+        /// Tick of the loop, from 1.
         tick: u64,
     },
 }
 
 /// Memory that the bridge loaned from shared memory for one snapshot.
 pub struct SnapshotSlot {
+    /// Number under which the slot goes back.
     pub index: u32,
+    /// Scene that the slot was sized for.
     pub scene_generation: u64,
+    /// Where the header goes.
     pub header: *mut SnapshotHeader,
+    /// Where `vertex_count + node_count` vertices go.
     pub vertices: *mut Vertex,
+    /// Vertices of the surface.
     pub vertex_count: usize,
-    /// Nodes of the displacement grid, behind the vertices.
+    /// Nodes of the displacement grid, whose displacements follow the vertices.
     pub node_count: usize,
 }
 
@@ -131,8 +200,9 @@ pub struct SnapshotSlot {
 // ring, so exactly one thread uses it at a time.
 unsafe impl Send for SnapshotSlot {}
 
-/// A slot that comes back.
+/// A slot on its way back to the bridge.
 pub struct SnapshotReturn {
+    /// Number of the slot.
     pub index: u32,
     /// False when the slot no longer fits the scene.
     pub filled: bool,

@@ -105,7 +105,7 @@ impl HapticLoop {
         }
     }
 
-    /// Runs on the ideal grid until `stop`, then ramps the force to zero and leaves.
+    /// Runs on the ideal grid until `stop`, then ramps the force to zero and ends.
     pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool, mut publish: impl FnMut(&HapticState)) {
         let mut grid = Grid::from(clock::now_ns(), (self.period_s * 1e9) as u64);
         let mut missed = 0;

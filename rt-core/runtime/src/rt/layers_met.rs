@@ -23,6 +23,7 @@ impl LayersMet {
         self.announce(kind)
     }
 
+    /// The contact has ended.
     pub fn end(&mut self) {
         self.count = 0;
         self.before = None;

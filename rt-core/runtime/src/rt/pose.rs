@@ -4,22 +4,28 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use stylet_sim::needle::Phase;
 
-/// Haptic to tissue, each tick: the newest pose.
+/// The newest pose of the needle, once in each tick of the force loop.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct TipPose {
+    /// When the pose was read, `CLOCK_MONOTONIC`, ns; 0 for no pose yet.
     pub time_ns: u64,
+    /// Place of the tip, scene frame, m.
     pub tip_in_scene: Vector3<f64>,
+    /// Direction of the needle, unit vector.
     pub direction: Vector3<f64>,
-    /// Inwards along the needle, filtered.
+    /// Speed inwards along the needle, filtered, m/s.
     pub speed_along_m_per_s: f64,
+    /// Phase of eq. 6.
     pub phase: Phase,
+    /// The innermost membrane met is open.
     pub punctured: bool,
-    /// Sum of the held element's steps (eq. 6) since the loop began; its differences drive the tissue.
+    /// Sum of the held element's steps (eq. 6) since the loop began, m; its differences drive the tissue.
     pub held_travel_m: Vector3<f64>,
-    /// The last contact that the haptic loop has ended.
+    /// Number of the last contact that the force loop has ended.
     pub released_contact: u64,
-    /// Number of the innermost layer that the shaft is in, and the largest number taken up so far.
+    /// Number of the innermost layer that the shaft is in.
     pub innermost_layer: u64,
+    /// Largest number of a layer that the force loop has taken up so far.
     pub seen_layer: u64,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! A loop writes to a tape that it owns: no lock, no heap call, no system call. A tape holds the inputs and outputs of
 //! each tick, the orders taken, and now and then a checkpoint of all that one tick leaves to the next. When asked, the
-//! loop hands the whole tape to the bridge through a ring, goes on without, and records anew when it comes back.
+//! loop hands the whole tape to the bridge through a ring, continues without one, and records again when it returns.
 
 /// Ticks of the haptic loop that a recording reaches back, at least.
 pub const FLIGHT_TICKS: usize = 4000;
@@ -22,6 +22,7 @@ impl<T: Clone> Last<T> {
         }
     }
 
+    /// Keeps `value`; the oldest one is dropped when there is no room.
     pub fn push(&mut self, value: T) {
         let at = self.place(self.next);
         // There is a slot at every place; a loop has no room for a panic all the same.
@@ -31,6 +32,7 @@ impl<T: Clone> Last<T> {
         self.next += 1;
     }
 
+    /// Forgets every value; the next number is 0.
     pub fn clear(&mut self) {
         self.next = 0;
     }
@@ -45,6 +47,7 @@ impl<T: Clone> Last<T> {
         self.next.saturating_sub(self.slots.len() as u64)
     }
 
+    /// The value of that number, while it is held.
     pub fn get(&self, number: u64) -> Option<&T> {
         let held = (self.first()..self.next).contains(&number);
         held.then(|| self.slots.get(self.place(number))).flatten()
@@ -69,7 +72,7 @@ pub fn complete_from<T: Clone>(orders: &Last<(u64, T)>) -> u64 {
     orders.get(orders.first()).map_or(0, |(tick, _)| tick + 1)
 }
 
-/// A tape that goes to and fro between a loop and the bridge.
+/// A tape that a loop and the bridge pass to each other.
 pub trait Tape {
     /// Forgets what it holds. Allocates nothing.
     fn clear(&mut self);
@@ -103,8 +106,8 @@ pub fn recorder<T>(tape: Option<Box<T>>) -> (Recorder<T>, TapePort<T>) {
 }
 
 impl<T: Tape> Recorder<T> {
-    /// The tape for the tick that begins now, only then: one that came back is blank and begins with a whole tick. One
-    /// of an earlier scene goes out again.
+    /// The tape for the tick that begins now. A returned tape is cleared and begins with a whole tick; one of an earlier
+    /// scene is sent to the bridge again.
     pub fn begin_tick(&mut self, scene_generation: u64) -> Option<&mut T> {
         if self.tape.is_none()
             && let Ok(mut tape) = self.back.pop()

@@ -129,7 +129,7 @@ impl TissueLoop {
         self.held = Some(next);
     }
 
-    /// The answer is out: time left over goes to what is held next if the needle goes on as it does.
+    /// The response has been sent: the rest of the tick prepares what the tip holds next if the needle keeps its speed.
     pub(super) fn look_ahead(&mut self, travel: Vector3<f64>) {
         if self.world.scene.tissue.prepares() {
             let next = self.next_held(travel);

@@ -23,6 +23,7 @@ impl TissueLoop {
                 why: RefusalCode::NoSeedLeft,
             },
             Some(tip) => {
+                let index = self.seeds.len() as u32;
                 let tail = self.locate(&(tip_m - self.pose.direction * SEED_LENGTH_M), Some(tip.element));
                 // Room for MAX_SEEDS was reserved: this push does not allocate.
                 self.seeds.push(Seed {
@@ -31,9 +32,8 @@ impl TissueLoop {
                     axis: self.pose.direction.into(),
                     dropped_at_m: tip_m.into(),
                 });
-                self.response.seed_count = self.seeds.len() as u32;
                 let tick = self.response.tick;
-                let index = self.seeds.len() as u32 - 1;
+                self.response.seed_count = self.seeds.len() as u32;
                 self.notify(Notice::Seed {
                     tick,
                     time_ns: self.pose.time_ns,

@@ -32,11 +32,14 @@ impl TissueLoop {
         // SAFETY: the bridge loaned `vertex_count + node_count` vertices at this address to us alone and keeps them mapped
         // until the slot is returned; they were zeroed, and Vertex is valid for every bit pattern.
         let vertices = unsafe { std::slice::from_raw_parts_mut(slot.vertices, sent) };
-        let positions: &mut [[f32; 3]] = bytemuck::cast_slice_mut::<Vertex, [f32; 3]>(vertices);
         let body = self.world.tissue.deformed();
-        let (surface, inside) = positions.split_at_mut(slot.vertex_count);
-        body.write_surface(&self.world.scene.surface, surface);
-        body.write_displacements(&self.world.scene.nodes.elements, inside);
+        // Both always succeed: a vertex is three f32, and there are at least `vertex_count`.
+        if let Ok(positions) = bytemuck::try_cast_slice_mut::<Vertex, [f32; 3]>(vertices)
+            && let Some((surface, inside)) = positions.split_at_mut_checked(slot.vertex_count)
+        {
+            body.write_surface(&self.world.scene.surface, surface);
+            body.write_displacements(&self.world.scene.nodes.elements, inside);
+        }
         // SAFETY: as above, for the header.
         let header = unsafe { &mut *slot.header };
         let spacing_m = self.world.scene.lattice.spacing_m;

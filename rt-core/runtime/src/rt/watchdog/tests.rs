@@ -1,4 +1,4 @@
-//! Every cause against the force record of the whole loop: the force goes, smoothly and in time, and comes back.
+//! Every cause against the force record of the whole loop: the force ramps out, smoothly and in time, and returns after re-arming.
 
 use super::*;
 use crate::rt::exchange::{HapticOrder, Notice};
@@ -256,7 +256,7 @@ fn every_cause_ramps_the_force_out_in_time_and_the_operator_can_rearm() {
         );
         assert!(
             record[zero..].iter().all(|r| force_n(r) == 0.0),
-            "{cause:?}: the force came back by itself"
+            "{cause:?}: the force returned by itself"
         );
         assert!(
             record[zero..]
