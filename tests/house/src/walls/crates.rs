@@ -52,6 +52,12 @@ const LAYERS: &[Layer] = &[
         never: &[WINDOW, ARGUMENTS, PROGRAM, DEVICES, DICOM],
         not_itself: &[],
     },
+    Layer {
+        folder: "shm-schema/procedure",
+        may_use: &["shm-schema", "shm-schema/anatomy"],
+        never: &[WINDOW, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[PORTS],
+    },
     // The real-time side.
     Layer {
         folder: "rt-core/heap",
@@ -67,7 +73,14 @@ const LAYERS: &[Layer] = &[
     },
     Layer {
         folder: "rt-core/runtime",
-        may_use: &["rt-core/heap", "hw", "rt-core/sim", "shm-schema", "shm-schema/anatomy"],
+        may_use: &[
+            "shm-schema/procedure",
+            "rt-core/heap",
+            "hw",
+            "rt-core/sim",
+            "shm-schema",
+            "shm-schema/anatomy",
+        ],
         never: &[WINDOW, PROGRAM, DICOM],
         not_itself: &[],
     },
@@ -126,6 +139,7 @@ const LAYERS: &[Layer] = &[
     Layer {
         folder: "host-ui/implant",
         may_use: &[
+            "shm-schema/procedure",
             "host-ui/base",
             "host-ui/dose",
             "host-ui/files",
@@ -145,6 +159,7 @@ const LAYERS: &[Layer] = &[
     Layer {
         folder: "host-ui",
         may_use: &[
+            "shm-schema/procedure",
             "host-ui/base",
             "host-ui/controllers",
             "host-ui/dose",

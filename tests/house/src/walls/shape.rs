@@ -25,23 +25,11 @@ pub const LONGER: &[(&str, &str)] = &[
         "chainmail/avx2.rs",
         "vector kernels that share their lanes and constants",
     ),
-    (
-        "view/gpu.rs",
-        "not split yet: pipelines, buffers and drawing of the 3D view",
-    ),
-    (
-        "slice/gpu.rs",
-        "not split yet: pipelines, textures and drawing of the slices",
-    ),
-    ("dose_desk.rs", "not split yet"),
     ("src/link.rs", "not split yet"),
-    ("panel/status.rs", "not split yet"),
-    ("planner/mod.rs", "not split yet"),
     (
         "lab/src/html.rs",
         "not split yet: a writer of HTML that a template replaces",
     ),
-    ("lab/src/report.rs", "not split yet"),
 ];
 
 /// Public functions that may still return their error as prose: only ever lowered.
