@@ -7,6 +7,7 @@ use stylet_host::link::SceneModel;
 use stylet_implant::plan::anatomy::Body;
 use stylet_implant::plan::file::Frames;
 use stylet_implant::plan::{Anatomy, HOLES, Hole, Template};
+use stylet_shm_schema::SceneId;
 
 /// From one layer of outlines to the next.
 const LAYER_M: f64 = 1e-3;
@@ -25,7 +26,7 @@ pub struct Layer {
 
 pub struct AnatomyOutlines {
     /// Session and generation of the scene.
-    pub scene: (u64, u64),
+    pub scene: SceneId,
     pub template: Template,
     pub anatomy: Anatomy,
     pub frames: Frames,
@@ -37,11 +38,11 @@ pub struct AnatomyOutlines {
 
 impl AnatomyOutlines {
     pub(super) fn of(scene: &SceneModel, template: Template) -> Result<Self, Failure> {
-        let key = (scene.header.session_id, scene.header.generation);
+        let key = scene.header.id();
         Ok(Self::on(Anatomy::of(scene)?, key, template))
     }
 
-    fn on(anatomy: Anatomy, scene: (u64, u64), template: Template) -> Self {
+    fn on(anatomy: Anatomy, scene: SceneId, template: Template) -> Self {
         let depths_m = ends_m(&template, &anatomy.target);
         let count = ((depths_m[1] - depths_m[0]) / LAYER_M).clamp(0.0, 500.0) as usize;
         let layer = |number: usize| {
@@ -142,7 +143,7 @@ mod tests {
             inwards: [0.0, 0.0, 1.0],
             pitch_m: 5e-3,
         };
-        AnatomyOutlines::on(anatomy, (1, 1), template)
+        AnatomyOutlines::on(anatomy, SceneId::default(), template)
     }
 
     #[test]

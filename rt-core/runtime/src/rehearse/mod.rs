@@ -61,7 +61,7 @@ pub enum RehearseError {
     },
     /// The procedure could not go on.
     #[error("in the rehearsal: {0}")]
-    Procedure(#[from] stylet_procedure::Failure),
+    Procedure(#[from] stylet_procedure::StepFailure),
     #[error("{0}")]
     Other(String),
 }
