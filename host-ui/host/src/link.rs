@@ -1,4 +1,4 @@
-//! The only place that meets shared memory: takes what the core says, checked, and sends what the operator asks.
+//! The only place of the host that uses shared memory: receives what the core publishes, checked, and sends requests.
 
 mod ports;
 mod receive;
@@ -26,18 +26,22 @@ const EVENTS_KEPT: usize = 256;
 const ANSWERS_KEPT: usize = 256;
 const REHEARSALS_KEPT: usize = 8;
 const RECORDS_KEPT: usize = 300_000;
-/// The core takes no larger volume.
+/// Largest volume that the core accepts, in cells.
 pub const MAX_UPLOAD_CELLS: usize = 64 << 20;
 
+/// Whether the core runs.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LinkStatus {
     /// No core has announced itself, or it has been silent for long; `why` says what to do.
     Absent {
+        /// What to do.
         why: String,
     },
+    /// The heartbeat moves.
     Live,
     /// The heartbeat has not moved.
     Silent {
+        /// For how long.
         since: Duration,
     },
 }
@@ -45,8 +49,11 @@ pub enum LinkStatus {
 /// The rest surface of the scene that runs.
 #[derive(Clone, Debug)]
 pub struct SceneModel {
+    /// Counts, boxes, structures.
     pub header: SceneHeader,
+    /// Vertices at rest, m.
     pub rest_m: Vec<[f32; 3]>,
+    /// Vertices of each triangle.
     pub triangles: Vec<[u32; 3]>,
     /// One for each cell of `header.labels`: 0 outside, else one more than the place among the header's structures.
     pub labels: Vec<u8>,
@@ -73,7 +80,9 @@ impl SceneModel {
 /// The deformed body of one tissue tick.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
+    /// Tick, needle, seeds.
     pub header: SnapshotHeader,
+    /// Vertices of the surface, m.
     pub positions_m: Vec<[f32; 3]>,
     /// Displacement from rest at each node of the scene's grid.
     pub displacements_m: Vec<[f32; 3]>,
@@ -82,11 +91,13 @@ pub struct Snapshot {
 /// What the core said to a command or an upload.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Answer {
+    /// Whether it was carried out.
     pub accepted: bool,
     /// For people.
     pub text: String,
     /// For programs; empty when accepted.
     pub reasons: Vec<Reason>,
+    /// First tick of the force loop that ran with the change.
     pub effective_tick: u64,
 }
 
@@ -181,10 +192,12 @@ impl Link {
         self.tidy();
     }
 
+    /// The instance that this link is for.
     pub fn instance(&self) -> &Instance {
         &self.instance
     }
 
+    /// Whether the core runs.
     pub fn status(&self) -> LinkStatus {
         let Some(moved) = self.beat_moved else {
             return LinkStatus::Absent { why: self.why_absent() };
@@ -222,6 +235,7 @@ impl Link {
         format!("{what} (instance \"{name}\"). Start it in another terminal: rt-core{flag}")
     }
 
+    /// The present run of the core.
     pub fn session(&self) -> Option<&Session> {
         self.latest.session.as_ref()
     }
@@ -231,6 +245,7 @@ impl Link {
         self.state.as_ref()
     }
 
+    /// The scene that runs.
     pub fn scene(&self) -> Option<&Arc<SceneModel>> {
         self.latest.scene.get()
     }
@@ -244,10 +259,12 @@ impl Link {
             .filter(|s| s.header.scene_id() == scene.header.id())
     }
 
+    /// The parameters in force.
     pub fn parameters(&self) -> Option<&ParametersInForce> {
         self.latest.parameters.get()
     }
 
+    /// The plan in force.
     pub fn plan(&self) -> Option<&PlanInForce> {
         self.latest.plan.get()
     }
@@ -287,7 +304,7 @@ impl Link {
         };
         match ports.commands.send_copy(command) {
             Ok(0) => Err(LinkError(
-                "the core did not take the command: its queue is full or it has just ended".to_owned(),
+                "the core did not accept the command: its queue is full or it has just ended".to_owned(),
             )),
             Ok(_) => Ok(id),
             Err(e) => Err(LinkError(format!("the command could not be sent: {e:?}"))),
@@ -331,7 +348,7 @@ impl Link {
         self.upload_port = Some(port);
         match taken {
             Ok(0) => Err(LinkError(format!(
-                "the core did not take the volume; at most {MAX_HOSTS} hosts can be connected"
+                "the core did not accept the volume; at most {MAX_HOSTS} hosts can be connected"
             ))),
             Ok(_) => Ok(id),
             Err(e) => Err(LinkError(format!("the volume could not be sent: {e:?}"))),
@@ -389,7 +406,7 @@ impl Link {
         }
     }
 
-    /// Drops what a dead core left: nobody else does it in the background.
+    /// Removes what a dead core left: nobody else does it in the background.
     fn tidy(&mut self) {
         let silent = match self.status() {
             LinkStatus::Live => return,

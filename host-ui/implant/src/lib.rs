@@ -1,5 +1,7 @@
 //! The implant: its plan, the procedure that carries it out, compensation by rehearsal, and its score.
 
+#![warn(missing_docs)]
+
 pub mod pairing;
 mod patient;
 pub mod plan;

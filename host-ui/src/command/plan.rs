@@ -2,6 +2,7 @@
 
 use super::CommandError;
 use clap::Args;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use stylet_base::progress_bar::progress_bar;
 use stylet_base::write_whole;
@@ -80,7 +81,7 @@ impl PlanArgs {
                 let bar = progress_bar(100, "% of the patterns");
                 let report = |share: f32| {
                     bar.set_position((share * 100.0) as u64);
-                    Ok(())
+                    ControlFlow::Continue(())
                 };
                 let aims = Aims::new(prescription_gy);
                 let plan = automatic::plan(template, &anatomy, &kernel, &source.model, &aims, report);

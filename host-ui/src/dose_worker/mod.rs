@@ -11,7 +11,7 @@ use stylet_dose::isodose::isodose;
 use stylet_dose::{DoseGrid, DoseKernel, Seed, Source};
 use stylet_host::link::SceneModel;
 use stylet_implant::plan::exchange::USUAL_SOURCE;
-use stylet_shm_schema::SeedPose;
+use stylet_shm_schema::{SceneId, SeedPose};
 
 /// Doses that are drawn, as shares of the prescription.
 pub const LEVELS: [f64; 4] = [0.5, 1.0, 1.5, 2.0];
@@ -111,7 +111,7 @@ pub struct DoseWorker {
     results: Receiver<DoseResult>,
     computing: bool,
     /// Session, generation of the scene, and what was requested last.
-    requested: Option<(u64, u64, DoseRequest)>,
+    requested: Option<(SceneId, DoseRequest)>,
     number: u64,
     latest: Option<Arc<DoseResult>>,
     /// The thread has ended.
@@ -171,11 +171,11 @@ impl DoseWorker {
             (self.latest, self.requested) = (None, None);
             return;
         }
-        let key = (scene.header.session_id, scene.header.generation);
+        let key = scene.header.id();
         let known = self
             .requested
             .as_ref()
-            .is_some_and(|(session, generation, last)| (*session, *generation) == key && last.is_same(request));
+            .is_some_and(|(scene, last)| *scene == key && last.is_same(request));
         if known || self.computing || self.lost {
             return;
         }
@@ -186,7 +186,7 @@ impl DoseWorker {
             scene: scene.clone(),
         };
         self.computing = self.tasks.send(task).is_ok();
-        self.requested = Some((key.0, key.1, request.clone()));
+        self.requested = Some((key, request.clone()));
     }
 }
 

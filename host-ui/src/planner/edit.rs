@@ -51,7 +51,7 @@ impl Planner {
             let piece_m =
                 piece.ok_or_else(|| format!("a needle through {hole} would miss the target; choose another hole"))?;
             let added = plan.with_needle(hole, piece_m[1])?;
-            added.with_row(plan.needles.len(), Row::filling(piece_m, strength_u(plan)))
+            Ok::<_, Failure>(added.with_row(plan.needles.len(), Row::filling(piece_m, strength_u(plan)))?)
         });
     }
 

@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::outlines::AnatomyOutlines;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
@@ -48,8 +49,8 @@ pub(super) fn automatic(outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
             };
             let _ = messages.send(JobMessage::Progress(progress));
             match interrupt.asked() {
-                true => Err("the search was cancelled".to_owned()),
-                false => Ok(()),
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
             }
         };
         let plan = || -> Result<ImplantPlan, Failure> {

@@ -23,12 +23,13 @@ use stylet_implant::plan::check::{Problem, problems};
 use stylet_implant::plan::{Compensation, Drops, History, ImplantPlan, Needle, Template};
 use stylet_implant::workflow::{NeedleTask, Pace};
 use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::SceneId;
 
 /// Whatever was wrong, to be shown as text.
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 type Checked = Job<Vec<Problem>>;
 /// Session and generation of the scene and the template, with the work for them.
-type OutlinesJob = (u64, u64, Template, Job<Result<AnatomyOutlines, Failure>>);
+type OutlinesJob = (SceneId, Template, Job<Result<AnatomyOutlines, Failure>>);
 
 /// A message for the operator.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -45,7 +46,7 @@ pub struct Planner {
     outlines: Option<Arc<AnatomyOutlines>>,
     outlining: Option<OutlinesJob>,
     /// Scene and template that no outlines could be made of.
-    failed: Option<((u64, u64), Template)>,
+    failed: Option<(SceneId, Template)>,
     /// The scene that the plan is for: its name and box.
     of_scene: Option<(String, [f64; 3])>,
     history: Option<History>,
@@ -122,7 +123,7 @@ impl Planner {
     }
 
     fn take_scene(&mut self, scene: &Arc<SceneModel>) {
-        let key = (scene.header.session_id, scene.header.generation);
+        let key = scene.header.id();
         let of_scene = (scene.header.name.read(), scene.header.upper_m);
         if self.of_scene.as_ref() != Some(&of_scene) {
             if self.history.is_some() {
@@ -137,8 +138,8 @@ impl Planner {
                 ..Self::default()
             };
         }
-        if let Some((session, generation, template, job)) = &self.outlining {
-            let (key, template) = ((*session, *generation), *template);
+        if let Some((key, template, job)) = &self.outlining {
+            let (key, template) = (*key, *template);
             match job.poll() {
                 JobUpdate::Pending => {}
                 JobUpdate::Message(Ok(outlines)) => {
@@ -164,11 +165,11 @@ impl Planner {
             let job = Job::begin("anatomy", move |messages, _| {
                 let _ = messages.send(AnatomyOutlines::of(&model, template));
             });
-            self.outlining = Some((key.0, key.1, template, job));
+            self.outlining = Some((key, template, job));
         }
     }
 
-    fn no_outlines(&mut self, key: (u64, u64), template: Template, why: &str) {
+    fn no_outlines(&mut self, key: SceneId, template: Template, why: &str) {
         (self.outlines, self.outlining, self.failed) = (None, None, Some((key, template)));
         self.message = Some(Message::Refused(format!("No plan can be made for this scene: {why}")));
     }

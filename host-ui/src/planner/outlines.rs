@@ -7,6 +7,7 @@ use stylet_host::link::SceneModel;
 use stylet_implant::plan::anatomy::Body;
 use stylet_implant::plan::file::Frames;
 use stylet_implant::plan::{Anatomy, HOLES, Hole, Template};
+use stylet_shm_schema::SceneId;
 
 /// From one layer of outlines to the next.
 const LAYER_M: f64 = 1e-3;
@@ -27,8 +28,8 @@ pub struct Layer {
 
 /// The anatomy of a scene, cut in layers parallel to a template.
 pub struct AnatomyOutlines {
-    /// Session and generation of the scene.
-    pub scene: (u64, u64),
+    /// The scene.
+    pub scene: SceneId,
     /// The template.
     pub template: Template,
     /// Surfaces of target and spared structures.
@@ -43,11 +44,11 @@ pub struct AnatomyOutlines {
 
 impl AnatomyOutlines {
     pub(super) fn of(scene: &SceneModel, template: Template) -> Result<Self, Failure> {
-        let key = (scene.header.session_id, scene.header.generation);
+        let key = scene.header.id();
         Ok(Self::on(Anatomy::of(scene)?, key, template))
     }
 
-    fn on(anatomy: Anatomy, scene: (u64, u64), template: Template) -> Self {
+    fn on(anatomy: Anatomy, scene: SceneId, template: Template) -> Self {
         let depths_m = ends_m(&template, &anatomy.target);
         let count = ((depths_m[1] - depths_m[0]) / LAYER_M).clamp(0.0, 500.0) as usize;
         let layer = |number: usize| {
@@ -148,7 +149,7 @@ mod tests {
             inwards: [0.0, 0.0, 1.0],
             pitch_m: 5e-3,
         };
-        AnatomyOutlines::on(anatomy, (1, 1), template)
+        AnatomyOutlines::on(anatomy, SceneId::default(), template)
     }
 
     #[test]

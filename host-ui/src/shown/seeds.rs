@@ -1,7 +1,7 @@
 //! Distance of each seed at rest from the place that it was planned for.
 
 use super::Shown;
-use nalgebra::Vector3;
+use stylet_implant::pairing::{self, SeedOffset};
 use stylet_shm_schema::{PlannedSeed, SeedPose};
 
 /// Where a placed seed lies, seen from the planned one it was dropped for.
@@ -16,26 +16,11 @@ pub struct SeedError {
     pub across_m: f64,
 }
 
-/// One row for each planned seed. A seed belongs to the nearest planned one from where it was *dropped*, nearest pairs first:
-/// where it drifted later does not change which planned seed it was meant for.
+/// One row for each planned seed, paired with the nearest drop.
 pub fn seed_errors(planned: &[PlannedSeed], placed: &[SeedPose], direction: [f64; 3]) -> Vec<SeedError> {
-    let mut pairs: Vec<(f64, usize, usize)> = Vec::with_capacity(planned.len() * placed.len());
-    for (i, target) in planned.iter().enumerate() {
-        for (j, seed) in placed.iter().enumerate() {
-            let gap = Vector3::from(seed.dropped_at_m) - Vector3::from(target.position_m);
-            pairs.push((gap.norm(), i, j));
-        }
-    }
-    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut rows: Vec<SeedError> = (0..planned.len()).map(missing).collect();
-    let mut used = vec![false; placed.len()];
-    for (_, i, j) in pairs {
-        if rows[i].placed.is_none() && !used[j] {
-            used[j] = true;
-            rows[i] = error(i, j, &planned[i], &placed[j], Vector3::from(direction));
-        }
-    }
-    rows
+    let planned_m: Vec<_> = planned.iter().map(|p| p.position_m).collect();
+    let dropped_at_m: Vec<_> = placed.iter().map(|p| p.dropped_at_m).collect();
+    rows(planned, placed, direction, pairing::nearest(&planned_m, &dropped_at_m))
 }
 
 /// Errors of the inserted needle. Seeds of a plan of many needles are dropped in its order, which identifies them where compensation drops
@@ -66,32 +51,29 @@ pub fn all_errors(shown: &Shown) -> Vec<(usize, SeedError)> {
         .collect()
 }
 
+/// Seeds in the order of the drops; planned seeds that are still missing come last.
 fn in_order(planned: &[PlannedSeed], placed: &[SeedPose], direction: [f64; 3]) -> Vec<SeedError> {
-    let row = |(i, target): (usize, &PlannedSeed)| match placed.get(i) {
-        Some(seed) => error(i, i, target, seed, Vector3::from(direction)),
-        None => missing(i),
+    let pairs = pairing::in_order(planned.len(), &[], placed.len());
+    rows(planned, placed, direction, pairs)
+}
+
+fn rows(
+    planned: &[PlannedSeed],
+    placed: &[SeedPose],
+    direction: [f64; 3],
+    pairs: Vec<Option<usize>>,
+) -> Vec<SeedError> {
+    let row = |(number, (target, pair)): (usize, (&PlannedSeed, Option<usize>))| {
+        let seed = pair.and_then(|n| placed.get(n));
+        let offset = seed.map(|seed| SeedOffset::of(target.position_m, seed.position_m, direction));
+        SeedError {
+            planned: number,
+            placed: pair,
+            along_m: offset.map_or(0.0, |o| o.along_m),
+            across_m: offset.map_or(0.0, |o| o.across_m),
+        }
     };
-    planned.iter().enumerate().map(row).collect()
-}
-
-fn missing(planned: usize) -> SeedError {
-    SeedError {
-        planned,
-        placed: None,
-        along_m: 0.0,
-        across_m: 0.0,
-    }
-}
-
-fn error(planned: usize, placed: usize, target: &PlannedSeed, seed: &SeedPose, direction: Vector3<f64>) -> SeedError {
-    let gap = Vector3::from(seed.position_m) - Vector3::from(target.position_m);
-    let along_m = gap.dot(&direction);
-    SeedError {
-        planned,
-        placed: Some(placed),
-        along_m,
-        across_m: (gap - direction * along_m).norm(),
-    }
+    planned.iter().zip(pairs).enumerate().map(row).collect()
 }
 
 #[cfg(test)]

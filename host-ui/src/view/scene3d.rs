@@ -19,6 +19,7 @@ use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense};
 use nalgebra::Vector3;
 use std::sync::Arc;
 use stylet_host::link::{SceneModel, Snapshot};
+use stylet_shm_schema::SceneId;
 
 const TURN_PER_POINT_RAD: f32 = 0.008;
 const LIGHT: [f32; 4] = [-0.48, 0.78, -0.40, 0.0];
@@ -58,7 +59,7 @@ struct Key {
     camera: Camera,
     look: Look,
     view: ViewState,
-    scene: (u64, u64),
+    scene: SceneId,
     moved: u64,
     /// Of the needle at work, and of the plan of all.
     plan: (u64, u64, usize),
@@ -70,15 +71,15 @@ struct Key {
 }
 
 /// Scene, plans, template shown, dark colours.
-type PlanMarksKey = ((u64, u64), (u64, u64, usize), bool, bool);
+type PlanMarksKey = (SceneId, (u64, u64, usize), bool, bool);
 
 pub struct Scene3d {
     gpu: Option<Gpu>,
     pub camera: Camera,
     pub look: Look,
     model: Option<Arc<SceneModel>>,
-    /// Session and generation of the surface that the card has.
-    uploaded_scene: Option<(u64, u64)>,
+    /// Scene of the surface that the card has.
+    uploaded_scene: Option<SceneId>,
     uploaded_snapshot: Option<(u64, u64)>,
     surface: Surface,
     /// Rises whenever it moves.
@@ -147,7 +148,7 @@ impl Scene3d {
 
     pub fn take(&mut self, shown: &Shown, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
         let Some(model) = model else { return };
-        let scene_key = (model.header.session_id, model.header.generation);
+        let scene_key = model.header.id();
         if self.uploaded_scene != Some(scene_key) {
             self.uploaded_scene = Some(scene_key);
             self.uploaded_snapshot = None;

@@ -15,4 +15,4 @@ pub mod tolerance;
 
 pub use at_hand::AtHand;
 pub use operation::{NeedleWay, Operation, Pace, Step};
-pub use script::{Failure, HandRequest, Next, Observed, Procedure, Reply};
+pub use script::{HandRequest, Next, Observed, Procedure, Reply, StepFailure};

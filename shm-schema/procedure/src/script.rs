@@ -79,7 +79,7 @@ pub enum Next {
 
 /// Why the procedure cannot go on. Times are those that were waited, s.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Failure {
+pub enum StepFailure {
     /// The force loop shows nothing.
     #[error("waited {REPLY_LIMIT_S:.1} s for the state of the force loop")]
     NoState,
@@ -194,17 +194,17 @@ impl Procedure {
 
     /// What to do at `now_s`, in seconds since the procedure began; `reply` is what became of the last request. `observed` is
     /// `None` while the force loop shows nothing. After a failure the procedure must not go on.
-    pub fn advance(&mut self, now_s: f64, observed: Option<&Observed>, reply: Reply) -> Result<Next, Failure> {
+    pub fn advance(&mut self, now_s: f64, observed: Option<&Observed>, reply: Reply) -> Result<Next, StepFailure> {
         let Some(&(needle, operation)) = self.ahead.front() else {
             return Ok(Next::Done);
         };
         let Some(observed) = observed else {
-            self.in_time(now_s, Failure::NoState)?;
+            self.in_time(now_s, StepFailure::NoState)?;
             return Ok(Next::Wait);
         };
         let fault = Fault::from_number(observed.state.fault).unwrap_or(Fault::None);
         if self.is_engaged && fault != Fault::None {
-            return Err(Failure::ForceOff(fault));
+            return Err(StepFailure::ForceOff(fault));
         }
         if !self.is_sent {
             self.is_sent = true;
@@ -253,7 +253,7 @@ impl Procedure {
         observed: &Observed,
         reply: Reply,
         (needle, operation): (usize, Operation),
-    ) -> Result<bool, Failure> {
+    ) -> Result<bool, StepFailure> {
         if let (Operation::Drop(number), Reply::TipOutsideTissue) = (operation, &reply) {
             self.lost.push(number);
             return Ok(true);
@@ -266,7 +266,7 @@ impl Procedure {
         match operation {
             Operation::Reset | Operation::PublishPlan | Operation::Engage => Ok(true),
             Operation::Drop(number) => {
-                self.in_time(now_s, Failure::NoSeed)?;
+                self.in_time(now_s, StepFailure::NoSeed)?;
                 Ok(observed.state.seed_count as usize + self.lost.len() > number)
             }
             Operation::Settle => {
@@ -280,17 +280,17 @@ impl Procedure {
         }
     }
 
-    fn is_in_effect(&self, now_s: f64, request: &HandRequest, reply: Reply) -> Result<bool, Failure> {
+    fn is_in_effect(&self, now_s: f64, request: &HandRequest, reply: Reply) -> Result<bool, StepFailure> {
         let request = request.name();
         match reply {
             Reply::InEffect => return Ok(true),
-            Reply::Pending => self.in_time(now_s, Failure::NoReply(request))?,
-            Reply::Accepted => self.in_time(now_s, Failure::NoEffect(request))?,
+            Reply::Pending => self.in_time(now_s, StepFailure::NoReply(request))?,
+            Reply::Accepted => self.in_time(now_s, StepFailure::NoEffect(request))?,
             Reply::TipOutsideTissue => {
                 let why = "the tip is outside the tissue".to_owned();
-                return Err(Failure::Refused { request, why });
+                return Err(StepFailure::Refused { request, why });
             }
-            Reply::Refused(why) => return Err(Failure::Refused { request, why }),
+            Reply::Refused(why) => return Err(StepFailure::Refused { request, why }),
         }
         Ok(false)
     }
@@ -300,7 +300,7 @@ impl Procedure {
         now_s: f64,
         state: &HapticState,
         (needle, operation): (usize, Operation),
-    ) -> Result<bool, Failure> {
+    ) -> Result<bool, StepFailure> {
         let (Some(goal), Some(way)) = (self.goal(needle, operation), self.ways.get(needle)) else {
             return Ok(true);
         };
@@ -308,7 +308,7 @@ impl Procedure {
         let off_along_m = along_m(Vector3::from(state.tip_in_scene_m)) - along_m(Vector3::from(goal.tip_m));
         let limit_s = move_limit_s(goal.speed_m_per_s);
         if now_s - self.begun_s > limit_s {
-            return Err(Failure::NotArrived { limit_s, off_along_m });
+            return Err(StepFailure::NotArrived { limit_s, off_along_m });
         }
         let after_s = arrived_after_s(state, off_along_m);
         Ok(self.holds_for(after_s.is_some(), after_s.unwrap_or(0.0), now_s))
@@ -322,7 +322,7 @@ impl Procedure {
         now_s - *self.holds_since_s.get_or_insert(now_s) >= least_s
     }
 
-    fn in_time(&self, now_s: f64, failure: Failure) -> Result<(), Failure> {
+    fn in_time(&self, now_s: f64, failure: StepFailure) -> Result<(), StepFailure> {
         if now_s - self.begun_s <= REPLY_LIMIT_S {
             return Ok(());
         }

@@ -44,7 +44,7 @@ fn first_plan(theatre: &Theatre) -> ImplantPlan {
         &kernel,
         &source.model,
         &Aims::new(145.0),
-        |_| Ok(()),
+        |_| std::ops::ControlFlow::Continue(()),
     )
     .expect("a plan");
     let found = stylet_implant::plan::check::problems(&plan, &anatomy);

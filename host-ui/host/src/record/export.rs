@@ -1,5 +1,6 @@
 //! What can be made of a recording: a table, and a motion for the core's replay device.
 
+use super::error::RecordError;
 use super::messages::Tick;
 use super::read::{Recording, read};
 use std::io::Write;
@@ -10,14 +11,18 @@ use stylet_shm_schema::motion::{Motion, MotionSample};
 /// The period of the force loop's ideal grid.
 const PERIOD_NS: u64 = 1_000_000;
 
+/// What to export from a recording.
 pub struct Export {
+    /// The recording, MCAP.
     pub recording: PathBuf,
+    /// Table of the ticks.
     pub csv: Option<PathBuf>,
+    /// Motion for the core's replay device.
     pub motion: Option<PathBuf>,
 }
 
-/// Writes what was asked for, and tells what the recording holds.
-pub fn export(options: &Export) -> Result<(), String> {
+/// Writes what was asked for, and prints what the recording holds.
+pub fn export(options: &Export) -> Result<(), RecordError> {
     let recording = read(&options.recording)?;
     println!(
         "{} ticks of {} session(s), {} missing in {} gaps",
@@ -30,12 +35,12 @@ pub fn export(options: &Export) -> Result<(), String> {
         println!("note: the recording was cut off ({why}); what came before is used");
     }
     if let Some(path) = &options.csv {
-        write_streamed(path, |file| csv(&recording.ticks, file)).map_err(|e| e.to_string())?;
+        write_streamed(path, |file| csv(&recording.ticks, file))?;
         println!("written: {}", path.display());
     }
     if let Some(path) = &options.motion {
         let (motion, filled) = motion(&recording);
-        write_whole(path, &motion.to_bytes()).map_err(|e| e.to_string())?;
+        write_whole(path, &motion.to_bytes())?;
         println!(
             "written: {}, {} samples, {filled} of them held where the recording has none; play it with: rt-core --device replay:{}",
             path.display(),

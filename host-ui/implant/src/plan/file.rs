@@ -1,6 +1,6 @@
 //! Plans in files: TOML with everything, CSV with the seeds alone; mm, patient frame (RAS).
 
-use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, Template};
+use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, NotAHole, PlanError, Template};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -33,18 +33,22 @@ impl Frames {
         }
     }
 
+    /// A place of the scene in the patient frame, m.
     pub fn to_patient_m(&self, in_scene_m: [f64; 3]) -> [f64; 3] {
         (self.rotation * Vector3::from(in_scene_m) + self.origin_m).into()
     }
 
+    /// A place of the patient in the scene frame, m.
     pub fn to_scene_m(&self, in_patient_m: [f64; 3]) -> [f64; 3] {
         (self.rotation.transpose() * (Vector3::from(in_patient_m) - self.origin_m)).into()
     }
 
+    /// A direction of the scene in the patient frame.
     pub fn turned_to_patient(&self, direction: [f64; 3]) -> [f64; 3] {
         (self.rotation * Vector3::from(direction)).into()
     }
 
+    /// A direction of the patient in the scene frame.
     pub fn turned_to_scene(&self, direction: [f64; 3]) -> [f64; 3] {
         (self.rotation.transpose() * Vector3::from(direction)).into()
     }
@@ -90,7 +94,7 @@ struct NeedleFile {
 }
 
 /// As TOML.
-pub fn to_text(plan: &ImplantPlan, frames: &Frames) -> Result<String, String> {
+pub fn to_text(plan: &ImplantPlan, frames: &Frames) -> Result<String, PlanError> {
     let (mm, turned) = (
         |v: [f64; 3]| frames.to_patient_m(v).map(|c| c * 1e3),
         |d| frames.turned_to_patient(d),
@@ -122,12 +126,12 @@ pub fn to_text(plan: &ImplantPlan, frames: &Frames) -> Result<String, String> {
         },
         needles: plan.needles.iter().map(needle).collect(),
     };
-    toml::to_string(&file).map_err(|e| format!("the plan cannot be written as TOML: {e}"))
+    toml::to_string(&file).map_err(|e| PlanError::Invalid(vec![format!("the plan cannot be written as TOML: {e}")]))
 }
 
 /// From TOML; lists every problem.
-pub fn from_text(text: &str, frames: &Frames) -> Result<ImplantPlan, String> {
-    let file: PlanFile = toml::from_str(text).map_err(|e| format!("it is no plan: {e}"))?;
+pub fn from_text(text: &str, frames: &Frames) -> Result<ImplantPlan, PlanError> {
+    let file: PlanFile = toml::from_str(text).map_err(|e| PlanError::Invalid(vec![format!("it is no plan: {e}")]))?;
     let mut problems = Vec::new();
     if file.format != FORMAT {
         problems.push(format!("format is \"{}\"; it must be \"{FORMAT}\"", file.format));
@@ -154,7 +158,7 @@ pub fn from_text(text: &str, frames: &Frames) -> Result<ImplantPlan, String> {
     });
     let needles = needles.collect();
     if !problems.is_empty() {
-        return Err(problems.join("\n"));
+        return Err(PlanError::Invalid(problems));
     }
     Ok(ImplantPlan {
         template,
@@ -222,7 +226,7 @@ fn needle(file: &NeedleFile, frames: &Frames, problems: &mut Vec<String>) -> Nee
     };
     Needle {
         hole: hole.unwrap_or_else(|why| {
-            problems.push(why);
+            problems.push(why.to_string());
             None
         }),
         entry_m: frames.to_scene_m(file.entry_mm.map(|c| c * 1e-3)),
@@ -256,20 +260,23 @@ fn within(what: &str, value: f64, least: f64, most: f64, problems: &mut Vec<Stri
 }
 
 /// Reads a plan file; the error names it.
-pub fn read(path: &Path, frames: &Frames) -> Result<ImplantPlan, String> {
-    let told = |why: String| format!("{}: {why}", path.display());
-    let opened = |e: std::io::Error| told(format!("it cannot be read ({e}); check the path"));
+pub fn read(path: &Path, frames: &Frames) -> Result<ImplantPlan, PlanError> {
+    let opened = |e: std::io::Error| PlanError::of_file(path, format!("it cannot be read ({e}); check the path"));
     let size = std::fs::metadata(path).map_err(opened)?.len();
     if size > MAX_BYTES {
-        return Err(told(format!("it has {size} bytes, more than {MAX_BYTES}")));
+        return Err(PlanError::of_file(
+            path,
+            format!("it has {size} bytes, more than {MAX_BYTES}"),
+        ));
     }
     let text = std::fs::read_to_string(path).map_err(opened)?;
-    from_text(&text, frames).map_err(told)
+    from_text(&text, frames).map_err(|e| PlanError::of_file(path, e))
 }
 
-pub fn write(path: &Path, plan: &ImplantPlan, frames: &Frames) -> Result<(), String> {
+/// Writes a plan as TOML, in one step.
+pub fn write(path: &Path, plan: &ImplantPlan, frames: &Frames) -> Result<(), PlanError> {
     let text = to_text(plan, frames)?;
-    stylet_base::write_whole(path, text.as_bytes()).map_err(|e| e.to_string())
+    Ok(stylet_base::write_whole(path, text.as_bytes())?)
 }
 
 /// Seeds as `host-ui dose --seeds` reads them, with the number of their needle and its hole.
@@ -296,12 +303,14 @@ pub fn import_csv(
     template: Template,
     source: &str,
     prescription_gy: f64,
-) -> Result<ImplantPlan, String> {
-    let told = |why: String| format!("{}: {why}", path.display());
-    let rows = read_seed_rows(path, defaults)?;
+) -> Result<ImplantPlan, PlanError> {
+    let rows = read_seed_rows(path, defaults).map_err(|e| PlanError::Invalid(vec![e.to_string()]))?;
     if rows.len() > MAX_SEEDS {
         let count = rows.len();
-        return Err(told(format!("{count} seeds; at most {MAX_SEEDS} can be placed")));
+        return Err(PlanError::of_file(
+            path,
+            format!("{count} seeds; at most {MAX_SEEDS} can be placed"),
+        ));
     }
     let mut needles: Vec<(Option<u32>, Needle)> = Vec::new();
     let mut problems = Vec::new();
@@ -331,7 +340,7 @@ pub fn import_csv(
     }
     problems.dedup();
     if !problems.is_empty() {
-        return Err(told(problems.join("\n")));
+        return Err(PlanError::of_file(path, problems.join("\n")));
     }
     Ok(ImplantPlan {
         template,
@@ -358,7 +367,8 @@ fn fits(
         return Err("its seeds are not on one line; correct them, or leave the column needle out".to_owned());
     }
     let Some(hole) = hole else { return Ok(()) };
-    let off = Vector3::from(template.hole_m(hole.parse()?)) - Vector3::from(needle.entry_m);
+    let off = Vector3::from(template.hole_m(hole.parse().map_err(|e: NotAHole| e.to_string())?))
+        - Vector3::from(needle.entry_m);
     if off.norm() < SAME_LINE_M {
         return Ok(());
     }

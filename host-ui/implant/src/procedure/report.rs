@@ -1,6 +1,7 @@
 //! result.json, force.csv and the table on the terminal.
 
 use super::Seen;
+use super::error::ProcedureError;
 use super::job::{Job, PlannedDrop, placed};
 use crate::pairing::SeedOffset;
 use crate::plan::compensate::summary_m;
@@ -20,15 +21,15 @@ pub fn write(
     pace: &Pace,
     seen: &Seen,
     failure: Option<&String>,
-) -> Result<(), String> {
-    let told = |e: std::io::Error| {
-        format!(
-            "{} cannot be written ({e}); choose another folder with --out",
-            out.display()
-        )
-    };
-    std::fs::create_dir_all(out).map_err(told)?;
-    let first = job.tasks.first().ok_or("nothing was planned")?;
+) -> Result<(), ProcedureError> {
+    std::fs::create_dir_all(out).map_err(|why| ProcedureError::Folder {
+        folder: out.to_owned(),
+        why,
+    })?;
+    let first = job
+        .tasks
+        .first()
+        .ok_or(ProcedureError::NothingReceived("nothing was planned"))?;
     let direction = first.plan.direction;
     let seeds = seeds(link, &job.planned(), &seen.lost);
     let result = json!({
@@ -55,9 +56,9 @@ pub fn write(
         "session": link.session().map(session),
         "versions": { "host_ui": env!("CARGO_PKG_VERSION"), "schema": SCHEMA_VERSION },
     });
-    let text = serde_json::to_string_pretty(&result).map_err(|e| e.to_string())?;
-    write_whole(&out.join("result.json"), (text + "\n").as_bytes()).map_err(|e| e.to_string())?;
-    write_streamed(&out.join("force.csv"), |file| force_csv(file, direction, seen)).map_err(|e| e.to_string())?;
+    let text = serde_json::to_string_pretty(&result)?;
+    write_whole(&out.join("result.json"), (text + "\n").as_bytes())?;
+    write_streamed(&out.join("force.csv"), |file| force_csv(file, direction, seen))?;
     table(&result);
     println!("written: {}", out.display());
     Ok(())

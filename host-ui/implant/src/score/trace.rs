@@ -15,6 +15,7 @@ const FIRST_SLOT_NS: u64 = 10_000_000;
 /// A tip that is outside for longer belongs to no procedure until it touches tissue again.
 const OUTSIDE_NS: u64 = 2_000_000_000;
 
+/// Force and speed of one procedure, in bounded memory.
 #[derive(Clone, Debug)]
 pub struct Trace {
     scene: Option<SceneId>,
@@ -92,10 +93,12 @@ impl Trace {
         }
     }
 
+    /// The records that were kept, in their order.
     pub fn records(&self) -> &[TickRecord] {
         &self.records
     }
 
+    /// Whether the tip has not touched tissue yet.
     pub fn is_empty(&self) -> bool {
         self.curves.is_empty()
     }
@@ -118,6 +121,7 @@ impl Trace {
         points.collect()
     }
 
+    /// How the hand has moved so far.
     pub fn motion(&self) -> Motion {
         self.meter.motion()
     }

@@ -1,6 +1,6 @@
 //! A score as JSON and as a page.
 
-use super::{Score, page};
+use super::{Score, ScoreError, page};
 use serde_json::{Value, json};
 use std::path::Path;
 use stylet_base::write_whole;
@@ -42,9 +42,11 @@ pub fn to_json(score: &Score) -> Value {
 }
 
 /// `score.json` and `debrief.html` in a folder that is there.
-pub fn write(score: &Score, folder: &Path) -> Result<(), String> {
-    let json = serde_json::to_string_pretty(&to_json(score)).map_err(|e| e.to_string())?;
-    let write = |name: &str, text: String| write_whole(&folder.join(name), text.as_bytes()).map_err(|e| e.to_string());
-    write("score.json", json + "\n")?;
-    write("debrief.html", page::page(score)?)
+pub fn write(score: &Score, folder: &Path) -> Result<(), ScoreError> {
+    let json = serde_json::to_string_pretty(&to_json(score))?
+        + "
+";
+    write_whole(&folder.join("score.json"), json.as_bytes())?;
+    write_whole(&folder.join("debrief.html"), page::page(score)?.as_bytes())?;
+    Ok(())
 }

@@ -17,6 +17,7 @@ const ASIDE_M: f64 = 0.0025;
 /// The needle's path and the seeds along it, scene frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NeedlePlan {
+    /// Where the tip starts, outside the body, m.
     pub entry_m: [f64; 3],
     /// Unit vector from the entry into the gland.
     pub direction: [f64; 3],

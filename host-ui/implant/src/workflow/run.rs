@@ -4,7 +4,7 @@ use super::{NeedlePlan, plan_request};
 use crate::plan::{Drops, Needle};
 use std::time::Instant;
 use stylet_host::link::{Link, LinkError, LinkStatus};
-use stylet_procedure::{Failure, HandRequest, Next, Observed, Pace, Procedure, Reply, Step};
+use stylet_procedure::{HandRequest, Next, Observed, Pace, Procedure, Reply, Step, StepFailure};
 use stylet_shm_schema::{HapticState, RefusalCode, Request};
 
 /// How a run ended, or that it has not.
@@ -42,13 +42,15 @@ pub enum RunFailure {
     Link(#[from] LinkError),
     /// The procedure itself cannot go on.
     #[error(transparent)]
-    Procedure(#[from] Failure),
+    Procedure(#[from] StepFailure),
 }
 
 /// One needle of a script: what is planned, and what is done for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NeedleTask {
+    /// What is planned.
     pub plan: NeedlePlan,
+    /// Where the seeds are dropped for it.
     pub drops: Drops,
 }
 

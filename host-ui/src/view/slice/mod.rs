@@ -24,7 +24,7 @@ pub use plane::Plane;
 use std::sync::Arc;
 use stylet_files::Image;
 use stylet_host::link::{SceneModel, Snapshot};
-use stylet_shm_schema::{Text, role};
+use stylet_shm_schema::{SceneId, Text, role};
 
 /// Of the target, this much is seen at first.
 const MARGIN: f64 = 1.45;
@@ -42,7 +42,7 @@ struct Contour {
 /// The three slices.
 pub(super) struct Slices {
     gpu: Option<SliceGpu>,
-    scene: Option<(u64, u64)>,
+    scene: Option<SceneId>,
     snapshot: Option<(u64, u64)>,
     scene_from_patient: Matrix3<f64>,
     model: Option<Arc<SceneModel>>,
@@ -96,7 +96,7 @@ impl Slices {
     /// Takes what is new since the last frame.
     pub fn take(&mut self, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>, view: &mut ViewState) {
         let Some(model) = model else { return };
-        let key = (model.header.session_id, model.header.generation);
+        let key = model.header.id();
         if self.scene != Some(key) {
             self.scene = Some(key);
             self.take_scene(model);

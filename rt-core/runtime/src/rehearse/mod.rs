@@ -52,7 +52,7 @@ pub enum RehearseError {
     },
     /// The procedure could not go on.
     #[error("in the rehearsal: {0}")]
-    Procedure(#[from] stylet_procedure::Failure),
+    Procedure(#[from] stylet_procedure::StepFailure),
     /// The script did not end.
     #[error("the needle had not finished after {LONGEST_S} s of simulated time")]
     TooLong,

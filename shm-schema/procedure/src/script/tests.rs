@@ -33,7 +33,7 @@ impl Obedient {
     }
 
     /// One millisecond; drops after `lost` are refused.
-    fn step(&mut self, procedure: &mut Procedure, lost: &[usize]) -> Result<Next, Failure> {
+    fn step(&mut self, procedure: &mut Procedure, lost: &[usize]) -> Result<Next, StepFailure> {
         self.now_s += 1e-3;
         let drops = self.sent.iter().filter(|r| matches!(r, HandRequest::DropSeed)).count();
         let is_lost =
@@ -191,13 +191,13 @@ fn what_is_not_answered_refused_or_without_effect_ends_the_procedure() {
     };
     assert_eq!(fails(Reply::Pending, 2.9), Ok(Next::Wait));
     assert_eq!(fails(Reply::Accepted, 2.9), Ok(Next::Wait));
-    assert_eq!(fails(Reply::Pending, 3.1), Err(Failure::NoReply("Reset")));
-    assert_eq!(fails(Reply::Accepted, 3.1), Err(Failure::NoEffect("Reset")));
+    assert_eq!(fails(Reply::Pending, 3.1), Err(StepFailure::NoReply("Reset")));
+    assert_eq!(fails(Reply::Accepted, 3.1), Err(StepFailure::NoEffect("Reset")));
     let refused = fails(Reply::Refused("no".to_owned()), 0.1).map_err(|e| e.to_string());
     assert_eq!(refused, Err("Reset was refused: no".to_owned()));
     let mut unseen = Procedure::of_needles(vec![way()], Pace::default());
     assert_eq!(unseen.advance(0.0, None, Reply::Pending), Ok(Next::Wait));
-    assert_eq!(unseen.advance(3.1, None, Reply::Pending), Err(Failure::NoState));
+    assert_eq!(unseen.advance(3.1, None, Reply::Pending), Err(StepFailure::NoState));
 }
 
 #[test]
@@ -207,6 +207,6 @@ fn a_fault_ends_the_procedure_only_once_the_force_was_turned_on() {
     assert!(hand.step(&mut procedure, &[]).is_ok() && hand.step(&mut procedure, &[]).is_ok());
     assert_eq!(
         hand.step(&mut procedure, &[]),
-        Err(Failure::ForceOff(Fault::DeviceError))
+        Err(StepFailure::ForceOff(Fault::DeviceError))
     );
 }
