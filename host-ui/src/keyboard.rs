@@ -3,7 +3,7 @@
 use crate::panel::Action;
 use crate::view::scene3d::Preset;
 use egui::{Key, Modifiers};
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::Request;
 
 /// Every key, for the overlay and the manual.
 pub const KEYS: [(&str, &str); 26] = [
@@ -90,9 +90,9 @@ pub fn read(ctx: &egui::Context) -> Keys {
         (Modifiers::NONE, Key::Num3, Action::LookFrom(Preset::Side)),
         (Modifiers::NONE, Key::Num4, Action::LookFrom(Preset::Above)),
         (Modifiers::NONE, Key::Num5, Action::LookFrom(Preset::Needle)),
-        (Modifiers::NONE, Key::Space, Action::Send(CommandKind::DropSeed)),
-        (Modifiers::NONE, Key::E, Action::Send(CommandKind::Engage)),
-        (Modifiers::NONE, Key::D, Action::Send(CommandKind::Disengage)),
+        (Modifiers::NONE, Key::Space, Action::Send(Request::DropSeed)),
+        (Modifiers::NONE, Key::E, Action::Send(Request::Engage)),
+        (Modifiers::NONE, Key::D, Action::Send(Request::Disengage)),
         (Modifiers::NONE, Key::P, Action::OpenParameters),
         (Modifiers::NONE, Key::R, Action::ResetView),
     ];

@@ -7,12 +7,15 @@ use std::time::Duration;
 pub const AT_TARGET_M: f64 = 0.3e-3;
 /// A hand that the force holds back from its goal is taken as arrived within this distance.
 pub const STALLED_M: f64 = 2e-3;
+/// How long a hand that is held back must rest to count as arrived.
 pub const STALLED_AFTER: Duration = Duration::from_millis(1500);
-/// Above the noise of the speed estimate, or chance says when a tip that creeps to its target is there.
+/// Above the noise of the speed estimate; below it, chance would decide when a slow tip counts as arrived.
 pub const REST_SPEED_M_PER_S: f64 = 3e-3;
+/// How long a tip at its target must rest to count as arrived.
 pub const REST_FOR: Duration = Duration::from_millis(60);
 /// No element is farther from its place at rest.
 pub const TISSUE_REST_M: f64 = 0.05e-3;
+/// How long the tissue must stay at rest.
 pub const TISSUE_REST_FOR: Duration = Duration::from_millis(200);
 /// Tissue that takes longer to come back is left to do so.
 pub const TISSUE_REST_LIMIT: Duration = Duration::from_secs(10);

@@ -11,7 +11,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 use stylet_host::link::{Link, LinkStatus};
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::Request;
 use stylet_shm_schema::service::Instance;
 pub use stylet_test_kit::{program, scratch};
 
@@ -167,15 +167,15 @@ pub fn until(limit: Duration, mut ready: impl FnMut() -> bool) -> bool {
 }
 
 /// Sends one command and waits for its answer: `Ok` with the first tick that knew it, or the reasons against it.
-pub fn ask(link: &mut Link, kind: CommandKind, values: &[f64]) -> Result<u64, String> {
-    let id = link.send(kind, values).map_err(|e| e.to_string())?;
+pub fn ask(link: &mut Link, request: &Request) -> Result<u64, String> {
+    let id = link.send(request).map_err(|e| e.to_string())?;
     let mut answer = None;
     until(Duration::from_secs(5), || {
         link.poll();
         answer = link.reply(id);
         answer.is_some()
     });
-    let answer = answer.ok_or_else(|| format!("no answer to {kind:?}"))?;
+    let answer = answer.ok_or_else(|| format!("no answer to {:?}", request.kind()))?;
     if answer.accepted {
         Ok(answer.effective_tick)
     } else {

@@ -57,7 +57,8 @@ impl Rehearser for Theatre {
         };
         let done = self
             .stage
-            .rehearse(&run, &ParameterSet::default(), &AtomicBool::new(false))?;
+            .rehearse(&run, &ParameterSet::default(), &AtomicBool::new(false))
+            .map_err(|e| e.to_string())?;
         Ok(Rest {
             seeds_m: done.seeds.iter().map(|s| s.position_m).collect(),
             dropped_after_s: done.dropped_after_s,

@@ -83,21 +83,35 @@ pub struct Snapshot {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Answer {
     pub accepted: bool,
+    /// For people.
     pub text: String,
+    /// For programs; empty when accepted.
+    pub reasons: Vec<Reason>,
     pub effective_tick: u64,
 }
 
-/// Why something could not be sent.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LinkError(pub String);
-
-impl std::fmt::Display for LinkError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
+impl From<Refusal> for Answer {
+    fn from(refusal: Refusal) -> Self {
+        Self {
+            accepted: false,
+            text: refusal.text,
+            reasons: refusal.reasons,
+            effective_tick: 0,
+        }
     }
 }
 
-impl std::error::Error for LinkError {}
+impl Answer {
+    /// Whether it was refused for this reason.
+    pub fn is_refused_for(&self, code: RefusalCode) -> bool {
+        self.reasons.iter().any(|reason| reason.code() == Some(code))
+    }
+}
+
+/// Why something could not be sent.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct LinkError(pub String);
 
 /// One host's connection to the core of one instance.
 pub struct Link {
@@ -119,7 +133,7 @@ pub struct Link {
     answers: BTreeMap<u64, Answer>,
     rehearsals: BTreeMap<u64, Box<Rehearsal>>,
     records: Vec<TickRecord>,
-    rubbish_refused: u64,
+    invalid_dropped: u64,
 }
 
 /// Two hosts must not take each other's answers.
@@ -151,7 +165,7 @@ impl Link {
             answers: BTreeMap::new(),
             rehearsals: BTreeMap::new(),
             records: Vec::new(),
-            rubbish_refused: 0,
+            invalid_dropped: 0,
         }
     }
 
@@ -212,7 +226,7 @@ impl Link {
         self.latest.session.as_ref()
     }
 
-    /// The last one believed.
+    /// The last valid one.
     pub fn state(&self) -> Option<&HapticState> {
         self.state.as_ref()
     }
@@ -253,26 +267,21 @@ impl Link {
         self.answers.remove(&command_id)
     }
 
-    /// What a [`CommandKind::Rehearse`] came to, once its reply says that it was carried out.
+    /// What a [`Request::Rehearse`] came to, once its reply says that it was carried out.
     pub fn rehearsal(&mut self, command_id: u64) -> Option<Box<Rehearsal>> {
         self.rehearsals.remove(&command_id)
     }
 
-    /// Messages from shared memory that were not believed.
-    pub fn rubbish_refused(&self) -> u64 {
-        self.rubbish_refused
+    /// Invalid messages from shared memory that were dropped.
+    pub fn invalid_dropped(&self) -> u64 {
+        self.invalid_dropped
     }
 
     /// The id of the command; its [`Answer`] comes later.
-    pub fn send(&mut self, kind: CommandKind, values: &[f64]) -> Result<u64, LinkError> {
-        if values.len() > MAX_COMMAND_VALUES {
-            return Err(LinkError(format!(
-                "{} values in one command; at most {MAX_COMMAND_VALUES} fit",
-                values.len()
-            )));
-        }
+    pub fn send(&mut self, request: &Request) -> Result<u64, LinkError> {
         let id = self.next_id()?;
-        let command = Command::new(self.host_id, id, kind, values);
+        let command = request.encode(self.host_id, id);
+        let command = command.map_err(|errors| LinkError(errors.to_string()))?;
         let Some(ports) = &self.ports else {
             return Err(LinkError(self.why_absent()));
         };
@@ -367,7 +376,7 @@ impl Link {
         let state = board.read();
         match check::state(&state) {
             Ok(()) => self.state = Some(state),
-            Err(_) => self.rubbish_refused += 1,
+            Err(_) => self.invalid_dropped += 1,
         }
     }
 
@@ -427,12 +436,13 @@ impl Link {
             return;
         }
         let Some(status) = ReplyStatus::from_number(reply.status) else {
-            self.rubbish_refused += 1;
+            self.invalid_dropped += 1;
             return;
         };
         let answer = Answer {
             accepted: status == ReplyStatus::Accepted,
             text: reply.text.read(),
+            reasons: reply.reasons().to_vec(),
             effective_tick: reply.effective_tick,
         };
         self.answers.insert(reply.command_id, answer);

@@ -64,7 +64,7 @@ impl Live {
         }
         if let Some(SceneChoice::BuiltIn(number)) = asked.scene {
             let send = |link: &mut Link| {
-                let sent = link.send(CommandKind::LoadBuiltinScene, &[number as f64]);
+                let sent = link.send(&Request::LoadBuiltinScene(number as u32));
                 sent.map_err(|e| e.to_string())
             };
             load(&mut link, send, &interrupted)?;
@@ -145,7 +145,7 @@ pub fn run(options: Options) -> Result<(), String> {
     let outcome = perform(&mut link, &job, pace, &interrupted, &mut seen);
     if outcome.is_err() {
         // The force must not stay on for nobody.
-        let _asked = link.send(CommandKind::Disengage, &[]);
+        let _asked = link.send(&Request::Disengage);
     }
     let out = options
         .out

@@ -3,5 +3,5 @@
 mod plan;
 mod run;
 
-pub use plan::{NeedlePlan, Pace, default_plan, move_values, patient_axis, plan_values, plan_with_seeds};
+pub use plan::{NeedlePlan, Pace, default_plan, move_request, patient_axis, plan_request, plan_with_seeds};
 pub use run::{NeedleTask, Run, RunStatus, Step};

@@ -5,8 +5,7 @@ use super::{App, refusal};
 use crate::panel::workflow::Progress;
 use crate::panel::{Note, PlanAction};
 use nalgebra::Vector3;
-use stylet_implant::workflow::{Run, default_plan, plan_values};
-use stylet_shm_schema::CommandKind;
+use stylet_implant::workflow::{Run, default_plan, plan_request};
 
 impl App {
     /// Undo is for the plan while it is edited.
@@ -65,7 +64,7 @@ impl App {
         // Compensation may go in a little beside the hole.
         plan.entry_m = task.drops.entry_m;
         self.planner.begin_needle(number, self.shown.seeds.len());
-        self.send("Next needle", CommandKind::SetPlan, &plan_values(&plan));
+        self.send("Next needle", &plan_request(&plan));
     }
 
     /// The axial slice shows what the template does.

@@ -12,7 +12,7 @@ use stylet_controllers::Button;
 use stylet_files::{Image, LabelVolume};
 use stylet_host::core_args::SceneChoice;
 use stylet_implant::workflow::RunStatus;
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::Request;
 
 const SUM_UP_EVERY: Duration = Duration::from_millis(500);
 /// No answer within this time is told as such.
@@ -130,8 +130,7 @@ impl App {
         if let Some(id) = self.parameters.waiting_for()
             && let Some(answer) = self.link.reply(id)
         {
-            self.parameters
-                .answered(answer.accepted, &answer.text, answer.effective_tick);
+            self.parameters.answered(&answer);
         }
         let (link, note) = (&mut self.link, &mut self.shown.note);
         self.waiting.retain(|w| match link.reply(w.id) {
@@ -277,9 +276,9 @@ impl App {
 
 fn asked_by(button: Button) -> Action {
     match button {
-        Button::Drop => Action::Send(CommandKind::DropSeed),
+        Button::Drop => Action::Send(Request::DropSeed),
         Button::Undo => Action::Undo,
         Button::Stop => Action::StopRun,
-        Button::Engage => Action::Send(CommandKind::Engage),
+        Button::Engage => Action::Send(Request::Engage),
     }
 }

@@ -20,13 +20,13 @@ use crate::settings::Layout;
 use crate::view::scene3d::Preset;
 use std::path::PathBuf;
 use stylet_implant::plan::{Hole, Row};
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::Request;
 
 /// What the operator asked for. The window carries it out after all panels are drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
-    /// A command without values.
-    Send(CommandKind),
+    /// A request without a payload.
+    Send(Request),
     PlanSeeds,
     PlaceNeedle,
     Insert,

@@ -63,9 +63,9 @@ fn link(shown: &Shown) -> (String, bool) {
         LinkStatus::Silent { since } => (format!("silent for {:.1} s", since.as_secs_f64()), false),
         LinkStatus::Absent { .. } => ("absent".to_owned(), false),
     };
-    let rubbish = shown.rubbish_refused;
-    let text = format!("{word}, {} messages not believed", format::count(rubbish));
-    (text, fine && rubbish == 0)
+    let dropped = shown.invalid_dropped;
+    let text = format!("{word}, {} invalid messages dropped", format::count(dropped));
+    (text, fine && dropped == 0)
 }
 
 /// Which device holds the needle, and why it does not where that is so.

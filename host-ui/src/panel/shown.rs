@@ -45,7 +45,7 @@ pub struct Shown {
     pub parameters: Option<ParametersInForce>,
     pub seeds: Vec<SeedPose>,
     pub snapshot_residual: Option<f64>,
-    pub rubbish_refused: u64,
+    pub invalid_dropped: u64,
     /// Step of the scripted procedure while it runs or after it ran.
     pub running: bool,
     pub run_step: Option<Step>,
@@ -112,7 +112,7 @@ impl Shown {
             parameters: None,
             seeds: Vec::new(),
             snapshot_residual: None,
-            rubbish_refused: 0,
+            invalid_dropped: 0,
             running: false,
             run_step: None,
             run_needle: None,
@@ -137,9 +137,9 @@ impl Shown {
         self.scene = link.scene().map(|s| s.header);
         self.plan = link.plan().filter(|p| p.generation > 0 && p.seed_count > 0).copied();
         self.parameters = link.parameters().copied();
-        self.rubbish_refused = link.rubbish_refused();
+        self.invalid_dropped = link.invalid_dropped();
         let refusals = link.events().iter().rev();
-        let last = refusals.clone().find(|e| e.kind == EventKind::RubbishRefused as u32);
+        let last = refusals.clone().find(|e| e.kind == EventKind::InvalidRefused as u32);
         self.last_refusal = last.map_or_else(String::new, |e| e.text.read());
         self.seeds.clear();
         self.snapshot_residual = None;

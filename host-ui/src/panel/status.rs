@@ -7,7 +7,7 @@ use crate::theme::Tokens;
 use egui::{Align, Color32, DragValue, Layout, RichText, Sense, Vec2};
 use stylet_base::format;
 use stylet_host::link::LinkStatus;
-use stylet_shm_schema::{CommandKind, Fault, ParameterId};
+use stylet_shm_schema::{Fault, ParameterId, Request};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
@@ -85,7 +85,7 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
                 "rt-core reports a fault that this program does not know".to_owned(),
                 |f| sentence(f.message()),
             ),
-            remedy: Some(("Re-arm", Action::Send(CommandKind::Engage))),
+            remedy: Some(("Re-arm", Action::Send(Request::Engage))),
         });
     }
     if shown.state.is_some() && !shown.is_real_time() {
@@ -104,7 +104,7 @@ fn force_is_off(shown: &Shown) -> Option<Banner> {
             severity: Severity::Warn,
             title: "The force is off",
             text: "The device is moved but not felt. Key E turns it on.".to_owned(),
-            remedy: Some(("Turn it on", Action::Send(CommandKind::Engage))),
+            remedy: Some(("Turn it on", Action::Send(Request::Engage))),
         });
     }
     shown.is_waiting().then(|| Banner {
@@ -256,14 +256,14 @@ fn link_ui(ui: &mut egui::Ui, shown: &Shown) {
     let response = badge(ui, word, color);
     if let Some(session) = &shown.session {
         response.on_hover_text(format!(
-            "instance {}, session {:016x}, process {}, version {}\nforce loop {}, tissue {}\nmessages not believed: {}",
+            "instance {}, session {:016x}, process {}, version {}\nforce loop {}, tissue {}\ninvalid messages dropped: {}",
             shown.instance,
             session.session_id,
             session.pid,
             session.version.read(),
             format::rate(session.period_ns),
             format::rate(session.tissue_period_ns),
-            shown.rubbish_refused
+            shown.invalid_dropped
         ));
     }
     if shown.is_absent() {

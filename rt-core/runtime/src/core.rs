@@ -104,7 +104,7 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
         options.tissue_core,
     )?;
     let info = device.info();
-    let active = activate(&ParameterSet::default(), &info).map_err(|p| p.join("\n"))?;
+    let active = activate(&ParameterSet::default(), &info).map_err(|p| p.to_string())?;
     let session_id = clock::now_ns() ^ (u64::from(std::process::id()) << 40);
     let picture = ScenePicture::first(&scene, session_id);
     let node = options.instance.node().map_err(|e| e.to_string())?;

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use stylet_shm_schema::ParameterId;
+pub use stylet_shm_schema::folding;
 
 /// Settings as read. Paper eq. 3-5, Table 1.
 #[derive(Clone, Debug, PartialEq)]
@@ -145,10 +147,10 @@ impl TissueParameters {
             "large values recover slowly, infinite not at all",
         );
         problems.check(
-            (1e-4..=0.1).contains(&self.residual_tolerance),
+            ParameterId::ResidualTolerance.spec().allows(self.residual_tolerance),
             "residual_tolerance",
             self.residual_tolerance,
-            "from 0.0001 to 0.1 elements",
+            "from 0.0001 to 0.01 elements",
             "less is below what f32 can resolve",
         );
         self.check_relaxation(&mut problems);
@@ -209,13 +211,6 @@ impl TissueParameters {
             }),
         }
     }
-}
-
-/// How close a corner of three links with these shear angles can come to folding: at 1 its volume can be zero,
-/// above it negative (`docs/physics.md`).
-pub fn folding(shear_deg: [f64; 3]) -> f64 {
-    let [x, y, z] = shear_deg.map(|angle| angle.to_radians().tan());
-    x * y + y * z + z * x + 2.0 * x * y * z
 }
 
 #[derive(Default)]

@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 use stylet_host::link::Link;
 use stylet_implant::workflow::{NeedlePlan, Pace, Run, RunStatus, Step, default_plan};
-use stylet_shm_schema::{CommandKind, EventKind, Fault, TickRecord, flags};
+use stylet_shm_schema::{EventKind, Fault, Request, TickRecord, flags};
 use stylet_tests::phantom::library;
 use stylet_tests::{Core, ask, scratch, until};
 
@@ -146,7 +146,7 @@ fn the_whole_procedure_runs_with_a_phantom_and_its_motors_get_the_force() {
 fn unplugged_in_mid_insertion_the_force_is_off_the_screen_says_why_and_it_goes_on_after_a_re_plug() {
     let mut rig = Rig::start("phantom-unplugged", false);
     let plan = default_plan(&rig.link.scene().expect("live").header);
-    ask(&mut rig.link, CommandKind::Engage, &[]).expect("engages");
+    ask(&mut rig.link, &Request::Engage).expect("engages");
     rig.lead(plan.entry_m, 0.1);
     let entry = Vector3::from(plan.entry_m);
     let tip = |link: &Link| Vector3::from(link.state().expect("live").tip_in_scene_m);
@@ -211,7 +211,7 @@ fn unplugged_in_mid_insertion_the_force_is_off_the_screen_says_why_and_it_goes_o
     let late = records.iter().skip(lost + 21).find(|r| r.force_on_hand_n != [0.0; 3]);
     assert!(late.is_none(), "{late:?}");
     // Arming again without a device is of no use.
-    ask(&mut rig.link, CommandKind::Engage, &[]).expect("answered");
+    ask(&mut rig.link, &Request::Engage).expect("answered");
     assert!(until(LONG, || {
         rig.link.poll();
         rig.fault() == Fault::DeviceLost && at_zero(&rig.link)
@@ -238,7 +238,7 @@ fn unplugged_in_mid_insertion_the_force_is_off_the_screen_says_why_and_it_goes_o
     let mut armed = false;
     assert!(
         until(LONG, || {
-            armed |= ask(&mut rig.link, CommandKind::Engage, &[]).is_ok();
+            armed |= ask(&mut rig.link, &Request::Engage).is_ok();
             rig.link.poll();
             rig.fault() == Fault::None
         }),

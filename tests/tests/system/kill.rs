@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 use stylet_host::link::LinkStatus;
-use stylet_implant::workflow::{default_plan, move_values, plan_values};
-use stylet_shm_schema::{CommandKind, Phase, TickRecord};
+use stylet_implant::workflow::{default_plan, move_request, plan_request};
+use stylet_shm_schema::{Phase, Request, TickRecord};
 use stylet_tests::window_process::Window;
 use stylet_tests::{Core, Display, ask, until};
 
@@ -16,23 +16,13 @@ fn insertion(display: &Display, kill: bool) -> Vec<TickRecord> {
     let mut core = Core::start();
     let mut link = core.host();
     let plan = default_plan(&link.scene().expect("live").header);
-    ask(&mut link, CommandKind::SetPlan, &plan_values(&plan)).expect("planned");
-    ask(&mut link, CommandKind::Engage, &[]).expect("engaged");
-    ask(
-        &mut link,
-        CommandKind::MoveHand,
-        &move_values(plan.entry_m, plan.direction, 0.2, 2.0),
-    )
-    .expect("moved");
+    ask(&mut link, &plan_request(&plan)).expect("planned");
+    ask(&mut link, &Request::Engage).expect("engaged");
+    ask(&mut link, &move_request(plan.entry_m, plan.direction, 0.2, 2.0)).expect("moved");
     std::thread::sleep(Duration::from_millis(800));
     link.poll();
     link.take_records();
-    ask(
-        &mut link,
-        CommandKind::MoveHand,
-        &move_values(plan.seeds_m[0], plan.direction, 0.005, 2.0),
-    )
-    .expect("moved");
+    ask(&mut link, &move_request(plan.seeds_m[0], plan.direction, 0.005, 2.0)).expect("moved");
 
     let mut records = Vec::new();
     let mut window = Window::open_on(display, &core);

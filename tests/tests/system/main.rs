@@ -18,5 +18,5 @@ mod recorder_flight;
 mod recorder_mcap;
 mod rt_contract;
 mod scenes;
-mod shm_rubbish;
+mod shm_invalid;
 mod volume;

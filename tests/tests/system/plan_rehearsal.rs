@@ -5,7 +5,7 @@ use stylet_base::interrupt::Interrupt;
 use stylet_host::link::Link;
 use stylet_implant::plan::rehearse::{Drops, LinkRehearser, Rehearser};
 use stylet_implant::workflow::{NeedleTask, Pace, Run, RunStatus, default_plan};
-use stylet_shm_schema::{CommandKind, Event, EventKind, Fault, flags};
+use stylet_shm_schema::{Event, EventKind, Fault, NeedleRehearsal, RefusalCode, Request, flags};
 use stylet_tests::{Core, ask, until};
 
 /// Live and rehearsed seeds agree within this, and what two live runs differ by themselves.
@@ -121,9 +121,10 @@ fn one_rehearsal_at_a_time_and_the_run_does_not_notice() {
     let mut link = core.host();
     let plan = default_plan(&link.scene().expect("live").header);
     let drops: Drops = NeedleTask::as_planned(plan).drops;
-    let values = drops.values(&Pace::default());
-    let first = link.send(CommandKind::Rehearse, &values).expect("sent");
-    let second = link.send(CommandKind::Rehearse, &values).expect("sent");
+    let rehearsal = drops.rehearsal(&Pace::default());
+    let request = Request::Rehearse(rehearsal.clone());
+    let first = link.send(&request).expect("sent");
+    let second = link.send(&request).expect("sent");
     let (mut one, mut other) = (None, None);
     until(Duration::from_secs(30), || {
         link.poll();
@@ -134,7 +135,7 @@ fn one_rehearsal_at_a_time_and_the_run_does_not_notice() {
     let (one, other) = (one.expect("answered"), other.expect("answered"));
     assert!(one.accepted, "{}", one.text);
     assert!(
-        !other.accepted && other.text.contains("another rehearsal"),
+        !other.accepted && other.is_refused_for(RefusalCode::RehearsalRunning),
         "{}",
         other.text
     );
@@ -147,10 +148,14 @@ fn one_rehearsal_at_a_time_and_the_run_does_not_notice() {
         (Fault::None as u32, 0),
         "the live tissue has no seed"
     );
-    let mut outside = values.clone();
-    outside[13] = outside[2] - 0.05;
-    let why = ask(&mut link, CommandKind::Rehearse, &outside).expect_err("nothing to drop a seed into");
+    let mut outside = rehearsal.clone();
+    outside.drops_m[0][2] = outside.entry_m[2] - 0.05;
+    let why = ask(&mut link, &Request::Rehearse(outside)).expect_err("nothing to drop a seed into");
     assert!(why.contains("outside the tissue"), "{why}");
-    assert!(ask(&mut link, CommandKind::Rehearse, &values[..9]).is_err());
-    ask(&mut link, CommandKind::Rehearse, &values).expect("the next one goes");
+    let without_drops = NeedleRehearsal {
+        drops_m: Vec::new(),
+        ..rehearsal
+    };
+    assert!(ask(&mut link, &Request::Rehearse(without_drops)).is_err());
+    ask(&mut link, &request).expect("the next one goes");
 }

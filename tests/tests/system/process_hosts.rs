@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use stylet_shm_schema::service::{self, Instance};
 use stylet_shm_schema::*;
 use stylet_tests::hand::{Insertion, assert_undisturbed, missed};
-use stylet_tests::{Core, ask, left_behind, program, scratch};
+use stylet_tests::{Core, ask, left_behind, program, scratch, until};
 
 /// A host without a window, which attaches to everything and reads it; killed with SIGKILL when dropped.
 struct Host(Child);
@@ -174,16 +174,18 @@ fn a_flood_of_good_commands_reaches_neither_hand_nor_loop_and_the_operator_can_s
     hand.press();
     let instance = core.instance.clone();
     let plan = move |id: u64| {
-        let mut command = Command::new(77, id, CommandKind::SetParameters, &[]);
-        command.value_count = 2;
-        let membrane = 5.0 + (id % 10) as f64 * 0.01;
-        (command.values[0], command.values[1]) = (f64::from(ParameterId::MembranePeak as u32), membrane);
-        command
+        let id_of_change = ParameterId::MembranePeak;
+        let value = 5.0 + (id % 10) as f64 * 0.01;
+        let change = ParameterChange {
+            id: id_of_change,
+            value,
+        };
+        Request::SetParameters(vec![change]).encode(77, id).expect("fits")
     };
     let flooder = std::thread::spawn(move || flood(&instance, Duration::from_secs(3), plan));
     hand.watch(Duration::from_millis(2000));
     let asked = Instant::now();
-    ask(&mut hand.link, CommandKind::Disengage, &[]).expect("letting go is never refused");
+    ask(&mut hand.link, &Request::Disengage).expect("letting go is never refused");
     println!("let go {:?} after it was asked, under a flood", asked.elapsed());
     assert!(hand.watch_until(Duration::from_secs(10), |_| flooder.is_finished()));
     let sent = flooder.join().expect("ours");
@@ -199,7 +201,7 @@ fn a_flood_of_good_commands_reaches_neither_hand_nor_loop_and_the_operator_can_s
 }
 
 #[test]
-fn ten_thousand_rubbish_commands_are_all_refused_and_counted() {
+fn ten_thousand_invalid_commands_are_all_refused_and_counted() {
     const COUNT: u64 = 10_000;
     let mut core = Core::start();
     let mut hand = Insertion::begin(&mut core, 0.003);
@@ -241,9 +243,42 @@ fn ten_thousand_rubbish_commands_are_all_refused_and_counted() {
     assert_eq!(
         hand.link.parameters().expect("live").generation,
         parameters,
-        "rubbish changed a parameter"
+        "an invalid command changed a parameter"
     );
     assert_undisturbed(&hand.records);
     drop((port, commands, node));
     finish(core, hand);
+}
+
+/// The second of two changes in flight used to start from the set in force, and undid the first.
+#[test]
+fn two_changes_of_parameters_sent_at_once_are_both_in_force() {
+    let mut core = Core::start();
+    let mut link = core.host();
+    let changes = [(ParameterId::MembranePeak, 4.5), (ParameterId::CuttingForce, 1.25)];
+    let sent = changes.map(|(id, value)| {
+        let request = Request::SetParameters(vec![ParameterChange { id, value }]);
+        link.send(&request).expect("sent")
+    });
+    let mut accepted = Vec::new();
+    until(Duration::from_secs(5), || {
+        link.poll();
+        accepted.extend(
+            sent.iter()
+                .filter_map(|&id| link.reply(id))
+                .map(|answer| answer.accepted),
+        );
+        accepted.len() == 2
+    });
+    assert_eq!(accepted, [true, true]);
+    until(Duration::from_secs(1), || {
+        link.poll();
+        link.parameters().is_some_and(|p| p.generation == 3)
+    });
+    let set = link.parameters().expect("live").set;
+    for (id, value) in changes {
+        assert_eq!(set.get(id), value, "{}", id.spec().key);
+    }
+    drop(link);
+    core.finish();
 }

@@ -1,7 +1,7 @@
 //! A loop that stops, alone or with the whole process: the force goes, the operator is told, and it can go on.
 
 use std::time::Duration;
-use stylet_shm_schema::{CommandKind, EventKind, Fault, flags};
+use stylet_shm_schema::{EventKind, Fault, Request, flags};
 use stylet_tests::hand::{Insertion, assert_smooth, force_n};
 use stylet_tests::stopped::{StoppedThread, is_dead};
 use stylet_tests::{Core, ask, left_behind, until};
@@ -39,7 +39,7 @@ fn tissue_that_stops_takes_the_force_off_and_the_operator_rearms() {
     assert!(ramp <= 20, "{ramp} ticks to zero");
 
     // Still stopped: arming it again ends in the same fault, not in a force.
-    ask(&mut hand.link, CommandKind::Engage, &[]).expect("taken");
+    ask(&mut hand.link, &Request::Engage).expect("taken");
     hand.watch(Duration::from_millis(100));
     let state = hand.link.state().expect("live");
     assert_eq!(
@@ -49,7 +49,7 @@ fn tissue_that_stops_takes_the_force_off_and_the_operator_rearms() {
 
     drop(stopped);
     hand.watch(Duration::from_millis(200));
-    ask(&mut hand.link, CommandKind::Engage, &[]).expect("re-armed");
+    ask(&mut hand.link, &Request::Engage).expect("re-armed");
     hand.watch(Duration::from_secs(1));
     let last = hand.records.last().expect("records");
     assert!(

@@ -3,7 +3,7 @@
 use std::process::{Command, Stdio};
 use std::time::Duration;
 use stylet_host::link::{Link, LinkStatus};
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::Request;
 use stylet_shm_schema::service::Instance;
 use stylet_tests::hand::{Insertion, assert_undisturbed};
 use stylet_tests::{Core, ask, fresh_instance, left_behind, program, scratch, until};
@@ -59,7 +59,7 @@ fn a_killed_core_is_seen_and_its_successor_is_found_by_the_same_host() {
         assert!(found && next.is_running(), "not found again: {:?}", hand.link.status());
         last = hand.link.session().expect("live").session_id;
         hand.watch(Duration::from_millis(300));
-        ask(&mut hand.link, CommandKind::Engage, &[]).expect("a host that was there before commands the new core");
+        ask(&mut hand.link, &Request::Engage).expect("a host that was there before commands the new core");
         instance = next.kill();
     }
     let end = Core::start_as(instance.clone(), &["--rt-if-allowed"]);
@@ -128,7 +128,7 @@ fn what_killed_cores_and_hosts_left_is_gone_after_the_next_run() {
     assert!(!left_behind(&instance).is_empty());
     let mut core = Core::start_as(instance.clone(), &["--rt-if-allowed"]);
     let mut link = core.host();
-    ask(&mut link, CommandKind::Engage, &[]).expect("works as on a clean machine");
+    ask(&mut link, &Request::Engage).expect("works as on a clean machine");
     drop(link);
     core.finish();
     assert_eq!(left_behind(&instance), [""; 0]);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::Duration;
 use stylet_runtime::replay::{file::Flight, repeat};
-use stylet_shm_schema::{CommandKind, EventKind, ParameterId, TickRecord};
+use stylet_shm_schema::{EventKind, ParameterChange, ParameterId, Request, TickRecord};
 use stylet_tests::hand::Insertion;
 use stylet_tests::stopped::StoppedThread;
 use stylet_tests::{Core, ask, program, until};
@@ -28,7 +28,7 @@ fn assert_identical(file: &Path) -> Flight {
 
 /// Asks for a recording and gives its file.
 fn request(core: &Core, hand: &mut Insertion) -> PathBuf {
-    ask(&mut hand.link, CommandKind::SaveFlight, &[]).expect("saved");
+    ask(&mut hand.link, &Request::SaveFlight).expect("saved");
     hand.take();
     let kind = EventKind::FlightSaved as u32;
     let event = hand.link.events().iter().rfind(|e| e.kind == kind).expect("told where");
@@ -48,15 +48,14 @@ fn a_request_a_fault_and_the_end_each_leave_a_recording_that_repeats_bit_for_bit
     let mut hand = Insertion::begin(&mut core, 0.006);
     // Parameters, seeds and a turn on the way, and longer than the distance of two checkpoints of the tissue.
     hand.watch(Duration::from_secs(5));
-    let membrane = [
-        f64::from(ParameterId::MembranePeak as u32),
-        4.5,
-        f64::from(ParameterId::ShearHorizontal as u32),
-        0.4,
+    let change = |id, value| ParameterChange { id, value };
+    let changes = vec![
+        change(ParameterId::MembranePeak, 4.5),
+        change(ParameterId::ShearHorizontal, 0.4),
     ];
-    ask(&mut hand.link, CommandKind::SetParameters, &membrane).expect("set");
+    ask(&mut hand.link, &Request::SetParameters(changes)).expect("set");
     hand.watch(Duration::from_secs(3));
-    ask(&mut hand.link, CommandKind::DropSeed, &[]).expect("dropped");
+    ask(&mut hand.link, &Request::DropSeed).expect("dropped");
     hand.go(0.02, 0.02);
     hand.watch(Duration::from_secs(2));
     let requested = assert_identical(&request(&core, &mut hand));
@@ -111,7 +110,7 @@ fn a_request_a_fault_and_the_end_each_leave_a_recording_that_repeats_bit_for_bit
     );
 
     // The end, with the force on.
-    ask(&mut hand.link, CommandKind::Engage, &[]).expect("re-armed");
+    ask(&mut hand.link, &Request::Engage).expect("re-armed");
     hand.watch(Duration::from_secs(1));
     drop(hand);
     let folder = core.flights()[0].parent().expect("in a folder").to_owned();

@@ -186,7 +186,7 @@ fn a_recorded_hand_plays_again_and_the_forces_are_those_of_then() {
 
     let mut core = Core::start_with(&["--rt-if-allowed", "--device", &format!("replay:{motion}")]);
     let mut link = core.host();
-    stylet_tests::ask(&mut link, stylet_shm_schema::CommandKind::Engage, &[]).expect("engaged");
+    stylet_tests::ask(&mut link, &stylet_shm_schema::Request::Engage).expect("engaged");
     let mut played = Vec::new();
     until(Duration::from_millis(5500), || {
         link.poll();

@@ -25,7 +25,7 @@ fn every_built_in_scene_runs_by_its_number_and_says_what_it_is_made_of() {
     let mut core = Core::start();
     let mut link = core.host();
     for (number, name) in BUILTIN_SCENES.iter().enumerate() {
-        ask(&mut link, CommandKind::LoadBuiltinScene, &[number as f64]).expect("built in");
+        ask(&mut link, &Request::LoadBuiltinScene(number as u32)).expect("built in");
         wait_for(&mut link, name);
         let expected = Scene::builtin(name).expect("built in");
         let scene = link.scene().expect("live").clone();
@@ -47,7 +47,7 @@ fn every_built_in_scene_runs_by_its_number_and_says_what_it_is_made_of() {
         });
         assert!(goes_on, "{name} does not run");
     }
-    let why = ask(&mut link, CommandKind::LoadBuiltinScene, &[3.0]).expect_err("no such scene");
+    let why = ask(&mut link, &Request::LoadBuiltinScene(3)).expect_err("no such scene");
     assert!(why.contains("paper, pelvis, full"), "{why}");
     drop(link);
     core.finish();

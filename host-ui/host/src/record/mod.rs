@@ -19,7 +19,7 @@ use std::path::PathBuf;
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::Request;
 use stylet_shm_schema::service::Instance;
 use writer::{Item, Totals};
 
@@ -150,7 +150,7 @@ pub fn save_flight(instance: &Instance) -> Result<String, String> {
     let mut link = Link::new(instance.clone());
     find_core(&mut link, || false)?;
     let before = link.events().back().map_or(0, |e| e.sequence);
-    let id = link.send(CommandKind::SaveFlight, &[]).map_err(|e| e.0)?;
+    let id = link.send(&Request::SaveFlight).map_err(|e| e.0)?;
     let begun = Instant::now();
     let mut accepted = false;
     while begun.elapsed() < Duration::from_secs(10) {

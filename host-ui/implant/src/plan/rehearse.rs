@@ -5,7 +5,7 @@ use crate::workflow::Pace;
 use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Link, LinkStatus};
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::{NeedleRehearsal, Request};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);
 /// The largest scene takes a second for a second.
@@ -40,18 +40,18 @@ impl Drops {
         self.along_m.iter().map(|&along| self.at_m(along))
     }
 
-    /// For [`CommandKind::Rehearse`].
-    pub fn values(&self, pace: &Pace) -> Vec<f64> {
-        let mut values = [self.entry_m, self.direction].concat();
-        values.extend([
-            pace.insert_m_per_s,
-            pace.retract_m_per_s,
-            pace.approach_m_per_s,
-            pace.acceleration_m_per_s2,
-            self.retract_to_m,
-        ]);
-        values.extend(self.drops_m().flatten());
-        values
+    /// Has the core rehearse them.
+    pub fn rehearsal(&self, pace: &Pace) -> NeedleRehearsal {
+        NeedleRehearsal {
+            entry_m: self.entry_m,
+            direction: self.direction,
+            insert_m_per_s: pace.insert_m_per_s,
+            retract_m_per_s: pace.retract_m_per_s,
+            approach_m_per_s: pace.approach_m_per_s,
+            acceleration_m_per_s2: pace.acceleration_m_per_s2,
+            retract_to_m: self.retract_to_m,
+            drops_m: self.drops_m().collect(),
+        }
     }
 }
 
@@ -82,7 +82,8 @@ impl Rehearser for LinkRehearser<'_> {
     fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, String> {
         let link = &mut *self.link;
         let generation = link.scene().map(|s| s.header.generation);
-        let id = link.send(CommandKind::Rehearse, &drops.values(pace)).map_err(|e| e.0)?;
+        let request = Request::Rehearse(drops.rehearsal(pace));
+        let id = link.send(&request).map_err(|e| e.0)?;
         let begun = Instant::now();
         while begun.elapsed() < LONGEST {
             if self.interrupted.asked() {

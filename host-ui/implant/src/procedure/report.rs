@@ -166,7 +166,7 @@ fn timing(link: &Link, seen: &Seen) -> Value {
         "records_received": seen.records.len(),
         "records_not_received": span.saturating_sub(seen.records.len() as u64),
         "records_lost_in_core": state.map(|s| s.records_lost),
-        "rubbish_refused": link.rubbish_refused(),
+        "invalid_dropped": link.invalid_dropped(),
     })
 }
 

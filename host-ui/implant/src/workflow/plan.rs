@@ -1,7 +1,7 @@
 //! One needle through the gland and the seeds along it (paper fig. 6).
 
 use nalgebra::Vector3;
-use stylet_shm_schema::{MAX_SEEDS, SceneHeader, StructureInfo, role};
+use stylet_shm_schema::{HandMove, MAX_SEEDS, PlannedNeedle, Request, SceneHeader, StructureInfo, role};
 
 /// The needle begins this far outside the body.
 const ENTRY_CLEARANCE_M: f64 = 0.010;
@@ -187,18 +187,23 @@ impl Box3 {
     }
 }
 
-/// For [`stylet_shm_schema::CommandKind::SetPlan`].
-pub fn plan_values(plan: &NeedlePlan) -> Vec<f64> {
-    let mut values = [plan.entry_m, plan.direction].concat();
-    values.extend(plan.seeds_m.iter().flatten());
-    values
+/// Publishes the plan to all hosts.
+pub fn plan_request(plan: &NeedlePlan) -> Request {
+    Request::SetPlan(Some(PlannedNeedle {
+        entry_m: plan.entry_m,
+        direction: plan.direction,
+        seeds_m: plan.seeds_m.clone(),
+    }))
 }
 
-/// For [`stylet_shm_schema::CommandKind::MoveHand`].
-pub fn move_values(target_m: [f64; 3], direction: [f64; 3], speed: f64, acceleration: f64) -> Vec<f64> {
-    let mut values = [target_m, direction].concat();
-    values.extend([speed, acceleration]);
-    values
+/// Moves the simulated hand to `tip_m`; m/s and m/s².
+pub fn move_request(tip_m: [f64; 3], direction: [f64; 3], speed: f64, acceleration: f64) -> Request {
+    Request::MoveHand(HandMove {
+        tip_m,
+        direction,
+        speed_m_per_s: speed,
+        acceleration_m_per_s2: acceleration,
+    })
 }
 
 #[cfg(test)]
@@ -226,7 +231,6 @@ mod tests {
         assert!(near(plan.seeds_m[0], [0.04, 0.04, 0.062]));
         assert!(near(plan.seeds_m[4], [0.04, 0.04, 0.038]));
         assert!(near(plan.deepest_first()[0], plan.seeds_m[0]));
-        assert_eq!(plan_values(&plan).len(), 21);
     }
 
     #[test]

@@ -1,16 +1,14 @@
 //! The scripted procedure as a list of actions, each with its own time limit.
 
-use super::{NeedlePlan, Pace, move_values, plan_values};
+use super::{NeedlePlan, Pace, move_request, plan_request};
 use crate::plan::{Drops, Needle};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
-use stylet_host::link::{Link, LinkStatus};
+use stylet_host::link::{Answer, Link, LinkStatus};
 use stylet_shm_schema::script::{TISSUE_REST_FOR, TISSUE_REST_LIMIT, TISSUE_REST_M, arrived_after, move_limit};
-use stylet_shm_schema::{CommandKind, Fault, HapticState};
+use stylet_shm_schema::{CommandKind, Fault, HapticState, RefusalCode, Request};
 
-/// In the core's refusal of a drop that leaves the procedure as it is.
-const TIP_OUTSIDE: &str = "outside the tissue";
 const REPLY_LIMIT: Duration = Duration::from_secs(3);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,7 +41,7 @@ pub enum RunStatus {
 
 #[derive(Clone, Debug)]
 enum Action {
-    Command(CommandKind, Vec<f64>),
+    Command(Request),
     Move {
         to_m: [f64; 3],
         direction: [f64; 3],
@@ -52,6 +50,27 @@ enum Action {
     /// With its number, counted from 0 over all needles.
     Drop(usize),
     TissueRest,
+}
+
+/// Why a command was not carried out.
+#[derive(Debug, thiserror::Error)]
+enum CommandError {
+    #[error("{kind:?} was refused: {}", answer.text)]
+    Refused { kind: CommandKind, answer: Answer },
+    #[error("{0}")]
+    Other(String),
+}
+
+impl From<String> for CommandError {
+    fn from(why: String) -> Self {
+        Self::Other(why)
+    }
+}
+
+impl From<CommandError> for String {
+    fn from(error: CommandError) -> Self {
+        error.to_string()
+    }
 }
 
 /// One needle of a script: what is planned, and what is done for it.
@@ -172,7 +191,7 @@ impl Run {
     }
 
     fn next(&mut self, finished: &Action) {
-        self.armed |= matches!(finished, Action::Command(CommandKind::Engage, _));
+        self.armed |= matches!(finished, Action::Command(Request::Engage));
         self.actions.pop_front();
         (self.sent, self.effective_tick, self.condition_since) = (None, None, None);
         self.begun = Instant::now();
@@ -188,15 +207,15 @@ impl Run {
             return Err(format!("the force is off: {}", fault.message()));
         }
         match action {
-            Action::Command(kind, values) => self.command(link, &state, *kind, values),
+            Action::Command(request) => Ok(self.command(link, &state, request)?),
             Action::Move {
                 to_m,
                 direction,
                 speed_m_per_s,
             } => {
                 let acceleration = self.pace.acceleration_m_per_s2;
-                let values = move_values(*to_m, *direction, *speed_m_per_s, acceleration);
-                if !self.command(link, &state, CommandKind::MoveHand, &values)? {
+                let request = move_request(*to_m, *direction, *speed_m_per_s, acceleration);
+                if !self.command(link, &state, &request)? {
                     return Ok(false);
                 }
                 let off = Vector3::from(state.tip_in_scene_m) - Vector3::from(*to_m);
@@ -225,39 +244,33 @@ impl Run {
 
     /// True once the seed lies in the tissue, or is lost because the tip is not in it.
     fn dropped(&mut self, link: &mut Link, state: &HapticState, number: usize) -> Result<bool, String> {
-        match self.command(link, state, CommandKind::DropSeed, &[]) {
+        match self.command(link, state, &Request::DropSeed) {
             Ok(false) => return Ok(false),
             Ok(true) => {}
-            Err(why) if why.contains(TIP_OUTSIDE) => {
+            Err(CommandError::Refused { answer, .. }) if answer.is_refused_for(RefusalCode::TipOutsideTissue) => {
                 self.lost.push(number);
                 return Ok(true);
             }
-            Err(why) => return Err(why),
+            Err(error) => return Err(error.into()),
         }
         self.in_time("the seed in the tissue", REPLY_LIMIT)?;
         Ok(state.seed_count as usize + self.lost.len() > number)
     }
 
     /// True once the command was accepted and the state shows it.
-    fn command(
-        &mut self,
-        link: &mut Link,
-        state: &HapticState,
-        kind: CommandKind,
-        values: &[f64],
-    ) -> Result<bool, String> {
+    fn command(&mut self, link: &mut Link, state: &HapticState, request: &Request) -> Result<bool, CommandError> {
+        let kind = request.kind();
         let Some(id) = self.sent else {
-            self.sent = Some(link.send(kind, values).map_err(|e| e.0)?);
+            self.sent = Some(link.send(request).map_err(|e| e.0)?);
             return Ok(false);
         };
         if self.effective_tick.is_none() {
             match link.reply(id) {
                 Some(answer) if answer.accepted => self.effective_tick = Some(answer.effective_tick),
-                Some(answer) => return Err(format!("{kind:?} was refused: {}", answer.text)),
+                Some(answer) => return Err(CommandError::Refused { kind, answer }),
                 None => {
-                    return self
-                        .in_time(&format!("an answer to {kind:?}"), REPLY_LIMIT)
-                        .map(|()| false);
+                    self.in_time(&format!("an answer to {kind:?}"), REPLY_LIMIT)?;
+                    return Ok(false);
                 }
             }
         }
@@ -301,7 +314,7 @@ impl Run {
 }
 
 fn script(tasks: &[NeedleTask], pace: &Pace) -> VecDeque<(usize, Step, Action)> {
-    let command = |kind| Action::Command(kind, Vec::new());
+    let command = Action::Command;
     let mut actions = VecDeque::new();
     let mut seeds = 0;
     for (number, task) in tasks.iter().enumerate() {
@@ -313,14 +326,11 @@ fn script(tasks: &[NeedleTask], pace: &Pace) -> VecDeque<(usize, Step, Action)> 
         };
         let mut then = |step, action| actions.push_back((number, step, action));
         if number == 0 {
-            then(Step::Plan, command(CommandKind::Reset));
+            then(Step::Plan, command(Request::Reset));
         }
-        then(
-            Step::Plan,
-            Action::Command(CommandKind::SetPlan, plan_values(&task.plan)),
-        );
+        then(Step::Plan, Action::Command(plan_request(&task.plan)));
         if number == 0 {
-            then(Step::PlaceNeedle, command(CommandKind::Engage));
+            then(Step::PlaceNeedle, command(Request::Engage));
         }
         then(Step::PlaceNeedle, go(0.0, pace.approach_m_per_s));
         for (index, &along_m) in drops.along_m.iter().enumerate() {

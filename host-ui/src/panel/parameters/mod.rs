@@ -7,6 +7,7 @@ use crate::theme;
 use egui::{Button, DragValue, RichText};
 use std::path::Path;
 use stylet_base::format;
+use stylet_host::link::Answer;
 use stylet_shm_schema::{PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterSpec};
 
 /// What stands under a row.
@@ -15,7 +16,7 @@ enum RowNote {
     #[default]
     None,
     InForce(u64),
-    Refused(String),
+    Refused(&'static str),
 }
 
 /// One change at a time is on its way; what is edited meanwhile waits and goes with the next.
@@ -77,11 +78,20 @@ impl ParametersState {
         self.in_flight.as_ref().map(|(id, _)| *id)
     }
 
-    /// A refusal names every reason by key; what names no row stands at the foot only.
-    pub fn answered(&mut self, accepted: bool, text: &str, effective_tick: u64) {
-        let Some((_, pairs)) = self.in_flight.take() else {
-            return;
-        };
+    /// A refusal names the parameters that are involved; the reasons in full stand at the foot.
+    pub fn answered(&mut self, answer: &Answer) {
+        if let Some((_, pairs)) = self.in_flight.take() {
+            self.note(pairs, answer);
+        }
+    }
+
+    /// Not sent, since the core would refuse it.
+    pub fn refused(&mut self, pairs: Vec<(usize, f64)>, answer: &Answer) {
+        self.unsent = false;
+        self.note(pairs, answer);
+    }
+
+    fn note(&mut self, pairs: Vec<(usize, f64)>, answer: &Answer) {
         for (index, value) in pairs {
             let (Some(spec), Some(draft)) = (PARAMETERS.get(index), self.drafts.get_mut(index)) else {
                 continue;
@@ -89,14 +99,17 @@ impl ParametersState {
             if *draft == Some(value) {
                 *draft = None;
             }
-            self.notes[index] = match accepted {
-                true => RowNote::InForce(effective_tick),
-                false => RowNote::Refused(reason_for(spec, text)),
+            self.notes[index] = match answer.accepted {
+                true => RowNote::InForce(answer.effective_tick),
+                false => RowNote::Refused(reason_for(spec, answer)),
             };
         }
-        self.foot = Some(match accepted {
-            true => (false, format!("In force since tick {}", format::count(effective_tick))),
-            false => (true, format!("Refused, nothing changed: {text}")),
+        self.foot = Some(match answer.accepted {
+            true => (
+                false,
+                format!("In force since tick {}", format::count(answer.effective_tick)),
+            ),
+            false => (true, format!("Refused, nothing changed: {}", answer.text)),
         });
     }
 
@@ -131,11 +144,10 @@ impl ParametersState {
     }
 }
 
-fn reason_for(spec: &ParameterSpec, text: &str) -> String {
-    text.lines()
-        .find(|line| line.contains(spec.key))
-        .unwrap_or("refused with others, see below")
-        .to_owned()
+fn reason_for(spec: &ParameterSpec, answer: &Answer) -> &'static str {
+    let own = answer.reasons.iter().find(|reason| reason.parameter() == Some(spec.id));
+    own.and_then(|reason| reason.code())
+        .map_or("refused with others, see below", |code| code.message())
 }
 
 pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersState) {
@@ -148,8 +160,7 @@ pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersS
         .show(ctx, |ui| {
             if shown.parameters.is_none() {
                 ui.label(
-                    RichText::new("rt-core has not told its parameters yet; these are the defaults.")
-                        .color(theme::of(ui).warn),
+                    RichText::new("No parameters from rt-core yet; these are the defaults.").color(theme::of(ui).warn),
                 );
             }
             search_ui(ui, state);
@@ -289,7 +300,7 @@ fn note_ui(ui: &mut egui::Ui, state: &ParametersState, index: usize) {
         }
         RowNote::Refused(why) => {
             let text = RichText::new("refused").small().color(theme::of(ui).bad);
-            ui.label(text).on_hover_text(why);
+            ui.label(text).on_hover_text(*why);
         }
     }
 }
@@ -344,6 +355,26 @@ fn plain(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stylet_shm_schema::{ParameterId, Reason, RefusalCode};
+
+    fn accepted(effective_tick: u64) -> Answer {
+        Answer {
+            accepted: true,
+            text: String::new(),
+            reasons: Vec::new(),
+            effective_tick,
+        }
+    }
+
+    fn refused(reasons: &[(RefusalCode, ParameterId)]) -> Answer {
+        let reason = |&(code, id): &(RefusalCode, ParameterId)| Reason::new(code, id as u32);
+        Answer {
+            accepted: false,
+            text: "force.cutting_gain = 3.000000; it must be 0.000000 to 1.000000".to_owned(),
+            reasons: reasons.iter().map(reason).collect(),
+            effective_tick: 0,
+        }
+    }
 
     #[test]
     fn a_search_finds_by_name_key_and_source_and_all_words_count() {
@@ -362,7 +393,7 @@ mod tests {
         state.sent(7, pairs);
         state.edit(0, 0.7);
         assert_eq!(state.request(), None);
-        state.answered(true, "", 100);
+        state.answered(&accepted(100));
         assert_eq!(state.request(), Some(vec![(0, 0.7)]));
     }
 
@@ -372,11 +403,30 @@ mod tests {
         state.edit(6, 0.01);
         let pairs = state.request().expect("something to send");
         state.sent(7, pairs);
-        state.answered(false, "other\nneedle.puncture_depth is too large", 0);
-        assert_eq!(
-            state.notes[6],
-            RowNote::Refused("needle.puncture_depth is too large".to_owned())
-        );
+        state.answered(&refused(&[(
+            RefusalCode::ParameterOutOfLimits,
+            ParameterId::PunctureDepth,
+        )]));
+        let why = RefusalCode::ParameterOutOfLimits.message();
+        assert_eq!(state.notes[6], RowNote::Refused(why));
         assert_eq!(state.drafts[6], None);
+    }
+
+    /// The reason was searched for by the key, and `force.cutting` is a part of `force.cutting_gain`.
+    #[test]
+    fn a_refusal_of_the_cutting_gain_is_not_one_of_the_cutting_force() {
+        let mut state = ParametersState::default();
+        let (force, gain) = (ParameterId::CuttingForce as usize, ParameterId::CuttingGain as usize);
+        state.edit(force, 2.0);
+        state.edit(gain, 3.0);
+        let pairs = state.request().expect("something to send");
+        state.sent(7, pairs);
+        state.answered(&refused(&[(
+            RefusalCode::ParameterOutOfLimits,
+            ParameterId::CuttingGain,
+        )]));
+        assert_eq!(state.notes[force], RowNote::Refused("refused with others, see below"));
+        let why = RefusalCode::ParameterOutOfLimits.message();
+        assert_eq!(state.notes[gain], RowNote::Refused(why));
     }
 }

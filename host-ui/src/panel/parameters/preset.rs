@@ -80,7 +80,7 @@ fn take(prefix: &str, table: &toml::Table, values: &mut Vec<(usize, f64)>, probl
             continue;
         };
         match spec.problem(si) {
-            Some(problem) => problems.push(problem),
+            Some(problem) => problems.push(problem.to_string()),
             None => values.push((index, si)),
         }
     }

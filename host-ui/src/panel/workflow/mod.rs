@@ -13,7 +13,7 @@ pub use plan::{PlanState, editor_ui};
 pub use progress::{Progress, Undo, is_at_next_seed, is_needle_done, missing, next_action, progress, undo_action};
 use stylet_base::format;
 use stylet_implant::workflow::Step;
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::Request;
 
 /// What the panel keeps between frames: what a person is typing, and which step was opened by hand.
 #[derive(Default)]
@@ -259,7 +259,7 @@ fn drop_ui(ui: &mut egui::Ui, shown: &Shown, ready: bool, actions: &mut Vec<Acti
             .on_hover_text("Space")
             .clicked()
         {
-            actions.push(Action::Send(CommandKind::DropSeed));
+            actions.push(Action::Send(Request::DropSeed));
         }
         let next = shown.next_seed_m().filter(|_| !is_at_next_seed(shown));
         let to_next = ui.add_enabled(live && next.is_some(), Button::new("To the next place"));
@@ -289,7 +289,7 @@ fn retract_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         }
         let undo = ui.add_enabled(live && !shown.seeds.is_empty(), Button::new("Undo seed"));
         if undo.on_hover_text("Ctrl+Z").clicked() {
-            actions.push(Action::Send(CommandKind::UndoSeed));
+            actions.push(Action::Send(Request::UndoSeed));
         }
     });
 }
@@ -303,21 +303,21 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
             .on_hover_text("Key E")
             .clicked()
         {
-            actions.push(Action::Send(CommandKind::Engage));
+            actions.push(Action::Send(Request::Engage));
         }
         if ui
             .add_enabled(live && engaged, Button::new("Disengage"))
             .on_hover_text("Key D")
             .clicked()
         {
-            actions.push(Action::Send(CommandKind::Disengage));
+            actions.push(Action::Send(Request::Disengage));
         }
         let reset = ui.add_enabled(live, Button::new("Reset"));
         if reset
             .on_hover_text("Tissue to rest, seeds removed, peaks and worst cases forgotten")
             .clicked()
         {
-            actions.push(Action::Send(CommandKind::Reset));
+            actions.push(Action::Send(Request::Reset));
         }
     });
 }

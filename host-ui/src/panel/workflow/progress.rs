@@ -2,7 +2,7 @@
 
 use crate::panel::{Action, PlanAction, Shown};
 use stylet_base::format;
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::Request;
 
 /// Beside the path by less than this, the needle counts as placed.
 const PLACED_WITHIN_M: f64 = 1.5e-3;
@@ -158,7 +158,7 @@ pub fn next_action(shown: &Shown) -> Option<Action> {
         Progress::Plan => Some(Action::PlanSeeds),
         Progress::Place => Some(Action::PlaceNeedle),
         Progress::Insert => Some(Action::Insert),
-        Progress::Drop if is_at_next_seed(shown) => Some(Action::Send(CommandKind::DropSeed)),
+        Progress::Drop if is_at_next_seed(shown) => Some(Action::Send(Request::DropSeed)),
         Progress::Drop => shown.next_seed_m().map(Action::MoveTo),
         Progress::Retract => Some(Action::Retract),
     }
@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn the_procedure_goes_through_its_steps_one_thing_at_a_time() {
-        let drop = Action::Send(CommandKind::DropSeed);
+        let drop = Action::Send(Request::DropSeed);
         let way: [(f64, &[f64], Progress, Option<Action>); 7] = [
             (-0.05, &[], Progress::Place, Some(Action::PlaceNeedle)),
             (0.0, &[], Progress::Insert, Some(Action::Insert)),

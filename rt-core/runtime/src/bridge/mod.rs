@@ -1,6 +1,7 @@
 //! The normal-priority thread that owns every port: hosts come and go here, and the loops do not notice.
 
 pub mod flight;
+mod parameters;
 mod picture;
 pub mod ports;
 mod rehearsals;
@@ -15,11 +16,12 @@ use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use flight::FlightDesk;
 use iceoryx2::node::Node;
+use parameters::{ParameterChanges, order_from_both};
 use picture::IDENTITY;
 pub use picture::ScenePicture;
 use ports::Ports;
 use rehearsals::RehearsalDesk;
-use requests::Request;
+use requests::{hand_goal, needle_run, plan_in_force};
 pub use snapshots::{SnapshotLoans, SnapshotSize};
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -55,14 +57,12 @@ pub struct LoopPorts {
 #[derive(Debug)]
 pub struct LoopStopped;
 
-const TOO_MANY: &str = "too many requests at once; send fewer";
-
 /// A scene that a loader thread has built, or why it could not.
 struct Loaded {
     ticket: Ticket,
     name: String,
     patient_from_scene: [f64; 12],
-    scene: Result<(Box<Scene>, SceneSource), String>,
+    scene: Result<(Box<Scene>, SceneSource), Refusal>,
 }
 
 /// Everything that the bridge thread owns.
@@ -72,7 +72,7 @@ pub struct Bridge {
     loops: LoopPorts,
     device: DeviceInfo,
     session: Session,
-    parameters: ParametersInForce,
+    parameters: ParameterChanges,
     plan: PlanInForce,
     /// The scene that runs, and the one handed to the tissue loop but not yet taken up.
     picture: ScenePicture,
@@ -83,7 +83,6 @@ pub struct Bridge {
     rehearsals: RehearsalDesk,
     /// Who waits for what: host and command behind each ticket.
     waiting: HashMap<Ticket, (u64, u64)>,
-    waiting_parameters: HashMap<u64, ParameterSet>,
     tickets: Ticket,
     events: u64,
     loading: bool,
@@ -106,12 +105,7 @@ impl Bridge {
     ) -> Self {
         let mut plan: PlanInForce = bytemuck::Zeroable::zeroed();
         plan.session_id = session.session_id;
-        let parameters = ParametersInForce {
-            session_id: session.session_id,
-            generation: 1,
-            effective_tick: 0,
-            set: ParameterSet::default(),
-        };
+        let parameters = ParameterChanges::new(session.session_id);
         let bridge = Self {
             node,
             ports,
@@ -126,7 +120,6 @@ impl Bridge {
             coming: None,
             rehearsals: RehearsalDesk::new(source, tissue, device),
             waiting: HashMap::new(),
-            waiting_parameters: HashMap::new(),
             tickets: 0,
             events: 0,
             loading: false,
@@ -136,7 +129,7 @@ impl Bridge {
             batch: Vec::with_capacity(MAX_BATCH),
             supervisor: Supervisor::default(),
         };
-        let _ = bridge.ports.parameters.send_copy(bridge.parameters);
+        let _ = bridge.ports.parameters.send_copy(bridge.parameters.in_force);
         let _ = bridge.ports.plan.send_copy(bridge.plan);
         bridge
     }
@@ -176,13 +169,13 @@ impl Bridge {
         let (generation, size) = (self.picture.header.generation, self.picture.snapshot_size());
         self.loops.loans.pass(&self.ports, generation, size);
         if self.supervisor.pass(made_a_tick) {
-            self.tell_loop_stopped();
+            self.report_loop_stopped();
             return Err(LoopStopped);
         }
         Ok(end)
     }
 
-    fn tell_loop_stopped(&mut self) {
+    fn report_loop_stopped(&mut self) {
         let fault = Fault::LoopStopped;
         let now_ns = clock::now_ns();
         self.event(
@@ -208,7 +201,11 @@ impl Bridge {
         };
         self.event(EventKind::FlightSaved, code, 0.0, [0.0; 3], (0, clock::now_ns()), &text);
         if let Some(ticket) = saved.ticket {
-            self.answer(ticket, saved.result.as_ref().err().map(String::as_str), 0);
+            let refused = saved
+                .result
+                .err()
+                .map(|why| Refusal::new(RefusalCode::FlightNotSaved, why));
+            self.answer(ticket, refused.as_ref().map_or(Ok(0), Err));
         }
     }
 
@@ -260,26 +257,15 @@ impl Bridge {
         self.tickets
     }
 
-    fn reply(&self, (host_id, command_id): (u64, u64), refused: Option<&str>, effective_tick: u64) {
-        let status = if refused.is_some() {
-            ReplyStatus::Refused
-        } else {
-            ReplyStatus::Accepted
-        };
-        let _ = self.ports.replies.send_copy(Reply {
-            session_id: self.session.session_id,
-            host_id,
-            command_id,
-            effective_tick,
-            status: status as u32,
-            reserved: 0,
-            text: Text::new(refused.unwrap_or("")),
-        });
+    fn reply(&self, who: (u64, u64), result: Result<u64, &Refusal>) {
+        let reply = Reply::new(self.session.session_id, who, result);
+        let _ = self.ports.replies.send_copy(reply);
     }
 
-    fn answer(&mut self, ticket: Ticket, refused: Option<&str>, tick: u64) {
+    /// `Ok` with the first tick that ran with the change.
+    fn answer(&mut self, ticket: Ticket, result: Result<u64, &Refusal>) {
         if let Some(who) = self.waiting.remove(&ticket) {
-            self.reply(who, refused, tick);
+            self.reply(who, result);
         }
     }
 
@@ -289,93 +275,127 @@ impl Bridge {
             let command = *sample.payload();
             drop(sample);
             let who = (command.host_id, command.command_id);
-            match requests::read(&command, &self.parameters.set, &self.device) {
+            match Request::decode(&command) {
                 Ok(Request::Shutdown) => {
-                    self.reply(who, None, 0);
+                    self.reply(who, Ok(0));
                     return true;
                 }
-                // A request to let go is never too much.
-                Ok(request) if carried_out < MAX_REQUESTS_PER_PASS || request.lets_go() => {
+                // A request that takes the force off is never too much.
+                Ok(request) if carried_out < MAX_REQUESTS_PER_PASS || request == Request::Disengage => {
                     carried_out += 1;
-                    self.carry_out(request, who);
+                    let ticket = self.ticket(who.0, who.1);
+                    if let Err(refusal) = self.carry_out(ticket, request) {
+                        self.session.refused += 1;
+                        self.answer(ticket, Err(&refusal));
+                    }
                 }
-                Ok(_) => self.refuse(who, TOO_MANY),
-                Err(why) => {
-                    self.event(EventKind::RubbishRefused, 0, 0.0, [0.0; 3], (0, clock::now_ns()), &why);
-                    self.refuse(who, &why);
-                }
+                Ok(_) => self.refuse(who, &RefusalCode::TooManyRequests.into()),
+                Err(errors) => self.refuse_invalid(who, &errors.into()),
             }
         }
         false
     }
 
-    fn carry_out(&mut self, request: Request, who: (u64, u64)) {
-        let ticket = self.ticket(who.0, who.1);
+    /// An order for a loop or work beside it. What fails later is answered later.
+    fn carry_out(&mut self, ticket: Ticket, request: Request) -> Result<(), Refusal> {
+        let loops = &mut self.loops;
         let taken = match request {
-            Request::Parameters(set, active) => {
-                let generation = self.parameters.generation + 1 + self.waiting_parameters.len() as u64;
-                self.waiting_parameters.insert(generation, set);
-                let order = HapticOrder::Parameters {
-                    ticket,
-                    generation,
-                    needle: active.needle,
-                    force: active.force,
-                };
-                self.loops
-                    .tissue_orders
-                    .push(TissueOrder::Limits(active.limits))
-                    .is_ok()
-                    && self.loops.haptic_orders.push(order).is_ok()
-            }
-            Request::Plan(plan) => {
-                let generation = self.plan.generation + 1;
-                let empty = plan.generation == 0;
-                self.plan = *plan;
-                self.plan.generation = if empty { 0 } else { generation };
-                self.plan.session_id = self.session.session_id;
-                self.plan.scene_generation = self.picture.header.generation;
-                let _ = self.ports.plan.send_copy(self.plan);
-                self.answer(ticket, None, 0);
+            Request::SetParameters(changes) => return self.change_parameters(ticket, &changes),
+            Request::SetPlan(plan) => {
+                self.set_plan(plan.as_ref());
+                self.answer(ticket, Ok(0));
                 true
             }
-            Request::Haptic(order) => self.loops.haptic_orders.push(order(ticket)).is_ok(),
-            Request::Hand(goal) => self
-                .loops
-                .haptic_orders
-                .push(HapticOrder::Hand { ticket, goal })
-                .is_ok(),
-            Request::Tissue(order) => self.loops.tissue_orders.push(order(ticket)).is_ok(),
-            Request::Reset => {
-                self.event(EventKind::Reset, 0, 0.0, [0.0; 3], (0, clock::now_ns()), "");
-                self.loops.tissue_orders.push(TissueOrder::Reset).is_ok()
-                    && self.loops.haptic_orders.push(HapticOrder::Reset { ticket }).is_ok()
+            Request::MoveHand(hand) => {
+                let goal = hand_goal(&hand);
+                loops.haptic_orders.push(HapticOrder::Hand { ticket, goal }).is_ok()
             }
-            Request::BuiltinScene(name) => {
+            Request::StopHand => loops.haptic_orders.push(HapticOrder::StopHand { ticket }).is_ok(),
+            Request::Engage => loops.haptic_orders.push(HapticOrder::Engage { ticket }).is_ok(),
+            Request::Disengage => loops.haptic_orders.push(HapticOrder::Disengage { ticket }).is_ok(),
+            Request::DropSeed => loops.tissue_orders.push(TissueOrder::DropSeed { ticket }).is_ok(),
+            Request::UndoSeed => loops.tissue_orders.push(TissueOrder::UndoSeed { ticket }).is_ok(),
+            Request::Reset => self.reset(ticket),
+            Request::LoadBuiltinScene(number) => {
+                let name = BUILTIN_SCENES[number as usize];
                 self.load(ticket, name.to_owned(), IDENTITY, || {
                     let source = SceneSource::Builtin(name.to_owned());
-                    source.build().map(|scene| (scene, source))
+                    let scene = source
+                        .build()
+                        .map_err(|why| Refusal::new(RefusalCode::SceneNotBuilt, why))?;
+                    Ok((scene, source))
                 });
                 true
             }
             Request::Rehearse(run) => {
-                let (set, generation) = (self.parameters.set, self.picture.header.generation);
-                if let Err(why) = self.rehearsals.begin(ticket, *run, set, generation) {
-                    self.answer(ticket, Some(why), 0);
+                let (set, generation) = (self.parameters.in_force.set, self.picture.header.generation);
+                if let Err(refusal) = self.rehearsals.begin(ticket, needle_run(&run), set, generation) {
+                    self.answer(ticket, Err(&refusal));
                 }
                 true
             }
-            Request::SaveFlight => self.loops.flight.request(ticket),
+            Request::SaveFlight => loops.flight.request(ticket),
             Request::Shutdown => true,
         };
-        if !taken {
-            self.session.refused += 1;
-            self.answer(ticket, Some(TOO_MANY), 0);
-        }
+        taken.then_some(()).ok_or(RefusalCode::TooManyRequests.into())
     }
 
-    fn refuse(&mut self, who: (u64, u64), why: &str) {
+    /// Verified as a whole, then ordered from both loops or from none.
+    fn change_parameters(&mut self, ticket: Ticket, changes: &[ParameterChange]) -> Result<(), Refusal> {
+        let set = self.parameters.with(changes);
+        let active = activate(&set, &self.device).map_err(|problems| {
+            let refusal = Refusal::from(problems);
+            self.report_invalid(&refusal);
+            refusal
+        })?;
+        let generation = self.parameters.next_generation();
+        let haptic = HapticOrder::Parameters {
+            ticket,
+            generation,
+            needle: active.needle,
+            force: active.force,
+        };
+        let orders = (haptic, TissueOrder::Limits(active.limits));
+        let loops = &mut self.loops;
+        if !order_from_both(&mut loops.haptic_orders, &mut loops.tissue_orders, orders) {
+            return Err(RefusalCode::TooManyRequests.into());
+        }
+        self.parameters.ordered(generation, set);
+        Ok(())
+    }
+
+    fn set_plan(&mut self, plan: Option<&PlannedNeedle>) {
+        let generation = self.plan.generation + 1;
+        self.plan = plan_in_force(plan);
+        self.plan.generation = if plan.is_some() { generation } else { 0 };
+        self.plan.session_id = self.session.session_id;
+        self.plan.scene_generation = self.picture.header.generation;
+        let _ = self.ports.plan.send_copy(self.plan);
+    }
+
+    fn reset(&mut self, ticket: Ticket) -> bool {
+        let orders = (HapticOrder::Reset { ticket }, TissueOrder::Reset);
+        let loops = &mut self.loops;
+        let taken = order_from_both(&mut loops.haptic_orders, &mut loops.tissue_orders, orders);
+        if taken {
+            self.event(EventKind::Reset, 0, 0.0, [0.0; 3], (0, clock::now_ns()), "");
+        }
+        taken
+    }
+
+    fn refuse(&mut self, who: (u64, u64), refusal: &Refusal) {
         self.session.refused += 1;
-        self.reply(who, Some(why), 0);
+        self.reply(who, Err(refusal));
+    }
+
+    fn refuse_invalid(&mut self, who: (u64, u64), refusal: &Refusal) {
+        self.report_invalid(refusal);
+        self.refuse(who, refusal);
+    }
+
+    fn report_invalid(&mut self, refusal: &Refusal) {
+        let now_ns = clock::now_ns();
+        self.event(EventKind::InvalidRefused, 0, 0.0, [0.0; 3], (0, now_ns), &refusal.text);
     }
 
     fn take_uploads(&mut self) {
@@ -386,8 +406,7 @@ impl Bridge {
             let labels = match upload::labels(&header, sample.payload()) {
                 Ok(labels) => labels,
                 Err(why) => {
-                    self.event(EventKind::RubbishRefused, 0, 0.0, [0.0; 3], (0, clock::now_ns()), &why);
-                    self.refuse(who, &why);
+                    self.refuse_invalid(who, &Refusal::new(RefusalCode::InvalidVolume, why));
                     continue;
                 }
             };
@@ -397,7 +416,10 @@ impl Bridge {
                 let source = SceneSource::of_labels(&name, &labels);
                 Scene::from_labels(&name, &labels)
                     .map(|scene| (scene, source))
-                    .map_err(|problems| problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))
+                    .map_err(|problems| {
+                        let lines: Vec<_> = problems.iter().map(ToString::to_string).collect();
+                        Refusal::new(RefusalCode::InvalidVolume, lines.join("\n"))
+                    })
             });
         }
     }
@@ -408,10 +430,10 @@ impl Bridge {
         ticket: Ticket,
         name: String,
         patient_from_scene: [f64; 12],
-        build: impl FnOnce() -> Result<(Scene, SceneSource), String> + Send + 'static,
+        build: impl FnOnce() -> Result<(Scene, SceneSource), Refusal> + Send + 'static,
     ) {
         if self.loading || self.coming.is_some() {
-            self.answer(ticket, Some("another scene is being loaded; wait until it is ready"), 0);
+            self.answer(ticket, Err(&RefusalCode::SceneLoading.into()));
             return;
         }
         self.loading = true;
@@ -429,7 +451,8 @@ impl Bridge {
             });
         if built.is_err() {
             self.loading = false;
-            self.answer(ticket, Some("no thread could be started to load the scene"), 0);
+            let why = "no thread could be started to load the scene";
+            self.answer(ticket, Err(&Refusal::new(RefusalCode::Internal, why)));
         }
     }
 
@@ -438,19 +461,23 @@ impl Bridge {
         self.loading = false;
         let (mut scene, source) = match loaded.scene {
             Ok(built) => built,
-            Err(why) => return self.answer(loaded.ticket, Some(&why), 0),
+            Err(refusal) => return self.answer(loaded.ticket, Err(&refusal)),
         };
         scene.tissue = self.tissue;
-        let limits = match activate(&self.parameters.set, &self.device) {
+        // Changes on their way to the tissue loop reach it before the scene does.
+        let limits = match activate(&self.parameters.with(&[]), &self.device) {
             Ok(active) => active.limits,
-            Err(why) => return self.answer(loaded.ticket, Some(&why.join("\n")), 0),
+            Err(problems) => return self.answer(loaded.ticket, Err(&problems.into())),
         };
         let generation = self.picture.header.generation + 1;
         let mut picture = ScenePicture::of(&scene, self.session.session_id, generation, loaded.patient_from_scene);
         picture.header.name = Text::new(&loaded.name);
         let world = match World::new(*scene, limits, generation) {
             Ok(world) => Box::new(world),
-            Err(why) => return self.answer(loaded.ticket, Some(&why), 0),
+            Err(why) => {
+                let refusal = Refusal::new(RefusalCode::SceneNotBuilt, why);
+                return self.answer(loaded.ticket, Err(&refusal));
+            }
         };
         let source = Arc::new(source);
         let tape = Box::new(TissueTape::new(&world, Arc::clone(&source)));
@@ -464,22 +491,20 @@ impl Bridge {
             })
             .is_err()
         {
-            return self.answer(
-                loaded.ticket,
-                Some("too many requests at once; load the scene again"),
-                0,
-            );
+            let why = "too many requests at once; load the scene again";
+            let refusal = Refusal::new(RefusalCode::TooManyRequests, why);
+            return self.answer(loaded.ticket, Err(&refusal));
         }
         self.coming = Some((picture, source));
     }
 
     /// The result goes out before the reply, so that a host that has its reply has all.
     fn take_rehearsed(&mut self) {
-        let Some(told) = self.rehearsals.take(self.picture.header.generation) else {
+        let Some(ended) = self.rehearsals.take(self.picture.header.generation) else {
             return;
         };
-        let who = self.waiting.get(&told.ticket).copied();
-        if let (Ok(result), Some((host_id, command_id))) = (&told.outcome, who) {
+        let who = self.waiting.get(&ended.ticket).copied();
+        if let (Ok(result), Some((host_id, command_id))) = (&ended.outcome, who) {
             let _ = self.ports.rehearsals.send_copy(Rehearsal {
                 session_id: self.session.session_id,
                 host_id,
@@ -487,7 +512,7 @@ impl Bridge {
                 ..**result
             });
         }
-        self.answer(told.ticket, told.outcome.as_ref().err().map(String::as_str), 0);
+        self.answer(ended.ticket, ended.outcome.as_ref().map(|_| 0));
     }
 
     fn take_notices(&mut self) {
@@ -501,23 +526,17 @@ impl Bridge {
 
     fn take_notice(&mut self, notice: Notice) {
         match notice {
-            Notice::Done { ticket, tick } => self.answer(ticket, None, tick),
-            Notice::Refused { ticket, why } => self.answer(ticket, Some(why.message()), 0),
+            Notice::Done { ticket, tick } => self.answer(ticket, Ok(tick)),
+            Notice::Refused { ticket, why } => self.answer(ticket, Err(&why.into())),
             Notice::ParametersActive {
                 ticket,
                 generation,
                 tick,
             } => {
-                if let Some(set) = self.waiting_parameters.remove(&generation) {
-                    self.parameters = ParametersInForce {
-                        session_id: self.session.session_id,
-                        generation,
-                        effective_tick: tick,
-                        set,
-                    };
-                    let _ = self.ports.parameters.send_copy(self.parameters);
+                if self.parameters.take_effect(generation, tick) {
+                    let _ = self.ports.parameters.send_copy(self.parameters.in_force);
                 }
-                self.answer(ticket, None, tick);
+                self.answer(ticket, Ok(tick));
             }
             Notice::WorldSwapped {
                 ticket,
@@ -542,7 +561,7 @@ impl Bridge {
                     (tick, clock::now_ns()),
                     &name,
                 );
-                self.answer(ticket, None, tick);
+                self.answer(ticket, Ok(tick));
             }
             Notice::Contact {
                 tick,

@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::script::{TISSUE_REST_FOR, TISSUE_REST_LIMIT, TISSUE_REST_M};
-use stylet_shm_schema::{Fault, MAX_SEEDS, ParameterSet, SeedPose, flags};
+use stylet_shm_schema::{Fault, MAX_SEEDS, ParameterSet, Reason, Refusal, RefusalCode, SeedPose, flags};
 use stylet_sim::active::activate;
 use stylet_sim::scene::SceneSource;
 use stylet_sim::scene::TissueKind;
@@ -50,6 +50,39 @@ pub struct Rehearsed {
     pub simulated_s: f64,
 }
 
+/// Why a rehearsal did not come to its end.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RehearseError {
+    /// A loop refused an order.
+    #[error("{}", why.message())]
+    Refused {
+        why: RefusalCode,
+        /// Number of the drop, from 0, that was refused or was to come next.
+        drop: u32,
+    },
+    #[error("{0}")]
+    Other(String),
+}
+
+impl From<String> for RehearseError {
+    fn from(why: String) -> Self {
+        Self::Other(why)
+    }
+}
+
+impl From<RehearseError> for Refusal {
+    fn from(error: RehearseError) -> Self {
+        let (code, subject) = match error {
+            RehearseError::Refused { why, drop } => (why, drop),
+            RehearseError::Other(_) => (RefusalCode::RehearsalFailed, Reason::NO_SUBJECT),
+        };
+        Refusal {
+            reasons: vec![Reason::new(code, subject)],
+            text: error.to_string(),
+        }
+    }
+}
+
 /// A body to rehearse in; kept from one rehearsal to the next.
 pub struct Stage {
     world: Option<Box<World>>,
@@ -61,7 +94,7 @@ impl Stage {
     pub fn build(source: &SceneSource, tissue: TissueKind, device: DeviceInfo) -> Result<Self, String> {
         let mut scene = source.build()?;
         scene.tissue = tissue;
-        let active = activate(&ParameterSet::default(), &device).map_err(|p| p.join("\n"))?;
+        let active = activate(&ParameterSet::default(), &device).map_err(|p| p.to_string())?;
         let world = World::new(scene, active.limits, 1)?;
         Ok(Self {
             world: Some(Box::new(world)),
@@ -70,12 +103,20 @@ impl Stage {
     }
 
     /// From rest, under these parameters; ends early, with an error, when `stop` is set.
-    pub fn rehearse(&mut self, run: &NeedleRun, set: &ParameterSet, stop: &AtomicBool) -> Result<Rehearsed, String> {
+    pub fn rehearse(
+        &mut self,
+        run: &NeedleRun,
+        set: &ParameterSet,
+        stop: &AtomicBool,
+    ) -> Result<Rehearsed, RehearseError> {
         if run.drops_m.len() > MAX_SEEDS {
-            return Err(format!("{} drops; at most {MAX_SEEDS}", run.drops_m.len()));
+            return Err(format!("{} drops; at most {MAX_SEEDS}", run.drops_m.len()).into());
         }
-        let active = activate(set, &self.device).map_err(|p| p.join("\n"))?;
-        let mut world = self.world.take().ok_or("the last rehearsal lost its body")?;
+        let active = activate(set, &self.device).map_err(|p| p.to_string())?;
+        let mut world = self
+            .world
+            .take()
+            .ok_or_else(|| "the last rehearsal lost its body".to_owned())?;
         world.tissue.return_to_rest();
         world.set_limits(active.limits.clone());
         let mut rig = Rig::new(world, &active, &self.device, run);
@@ -85,7 +126,7 @@ impl Stage {
     }
 }
 
-fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearsed, String> {
+fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearsed, RehearseError> {
     let mut script = Script::new(run);
     let mut displacement_before_puncture_m = 0.0_f64;
     let (mut punctured, mut contact_s) = (false, None);
@@ -93,7 +134,7 @@ fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearse
     while rig.seconds() < LONGEST_S {
         // SYNC: set by the bridge when it ends; nothing but the flag is carried.
         if stop.load(Ordering::Relaxed) {
-            return Err("rt-core ended during the rehearsal".to_owned());
+            return Err("rt-core ended during the rehearsal".to_owned().into());
         }
         rig.tick();
         let state = rig.state();
@@ -109,7 +150,7 @@ fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearse
         }
         let fault = Fault::from_number(state.fault).unwrap_or(Fault::None);
         if fault != Fault::None {
-            return Err(format!("in the rehearsal the force went off: {}", fault.message()));
+            return Err(format!("in the rehearsal the force went off: {}", fault.message()).into());
         }
         if script.advance(rig)? {
             let simulated_s = rig.seconds();
@@ -122,9 +163,7 @@ fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearse
             });
         }
     }
-    Err(format!(
-        "the needle was not through after {LONGEST_S} s of its own time"
-    ))
+    Err(format!("the needle was not through after {LONGEST_S} s of its own time").into())
 }
 
 /// Wall-clock beside the result, for the host.

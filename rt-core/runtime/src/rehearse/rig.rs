@@ -10,7 +10,7 @@ use crate::rt::tissue::{TissueLoop, TissuePorts};
 use crate::rt::world::World;
 use nalgebra::Vector3;
 use stylet_hw::{DeviceInfo, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
-use stylet_shm_schema::{HapticState, SeedPose, TickRecord};
+use stylet_shm_schema::{HapticState, RefusalCode, SeedPose, TickRecord};
 use stylet_sim::active::Active;
 
 /// The tip begins so far before the entry, and comes to it as in a run.
@@ -31,7 +31,7 @@ pub struct Rig {
         rtrb::Producer<crate::rt::exchange::SnapshotSlot>,
     ),
     now_ns: u64,
-    refusal: Option<&'static str>,
+    refusal: Option<RefusalCode>,
 }
 
 impl Rig {
@@ -108,12 +108,12 @@ impl Rig {
 
     fn hear(&mut self, notice: &Notice) {
         if let Notice::Refused { why, .. } = notice {
-            self.refusal = Some(why.message());
+            self.refusal = Some(*why);
         }
     }
 
     /// What a loop refused since the last call.
-    pub fn refusal(&mut self) -> Option<&'static str> {
+    pub fn refusal(&mut self) -> Option<RefusalCode> {
         self.refusal.take()
     }
 

@@ -1,7 +1,7 @@
 //! What the operator does, step by step, in the rehearsal's own time; the same rules as the host's run.
 
 use super::rig::Rig;
-use super::{NeedleRun, TISSUE_REST_FOR, TISSUE_REST_LIMIT, TISSUE_REST_M};
+use super::{NeedleRun, RehearseError, TISSUE_REST_FOR, TISSUE_REST_LIMIT, TISSUE_REST_M};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
 use stylet_shm_schema::script::{arrived_after, move_limit};
@@ -61,9 +61,10 @@ impl Script {
     }
 
     /// After each tick of the force; true when all is done.
-    pub fn advance(&mut self, rig: &mut Rig) -> Result<bool, String> {
+    pub fn advance(&mut self, rig: &mut Rig) -> Result<bool, RehearseError> {
         if let Some(why) = rig.refusal() {
-            return Err(why.to_owned());
+            let drop = rig.state().seed_count;
+            return Err(RehearseError::Refused { why, drop });
         }
         let Some(&action) = self.actions.front() else {
             return Ok(true);

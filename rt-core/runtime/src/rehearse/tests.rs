@@ -77,11 +77,13 @@ fn a_drop_outside_the_tissue_and_a_stop_are_told_and_leave_the_stage_usable() {
     let (mut stage, mut run, stop) = (stage(), needle(), AtomicBool::new(false));
     let set = ParameterSet::default();
     run.drops_m = vec![run.entry_m + run.direction * 1e-3];
-    assert!(
-        stage
-            .rehearse(&run, &set, &stop)
-            .is_err_and(|e| e.contains("outside the tissue"))
-    );
+    assert!(stage.rehearse(&run, &set, &stop).is_err_and(|e| matches!(
+        e,
+        RehearseError::Refused {
+            why: RefusalCode::TipOutsideTissue,
+            ..
+        }
+    )));
     stop.store(true, Ordering::Relaxed);
     assert!(stage.rehearse(&needle(), &set, &stop).is_err());
     stop.store(false, Ordering::Relaxed);

@@ -53,10 +53,12 @@ pub fn arm(ask: Ask) -> Result<Armed, Refused> {
             ))));
         }
     }
+    let report = read_back(ask);
+    confirm(&report).map_err(Refused)?;
     touch_stack();
     flush_denormals();
     Ok(Armed {
-        report: read_back(ask),
+        report,
         not_send: PhantomData,
     })
 }
@@ -101,6 +103,18 @@ pub fn keep_cores_awake() -> Option<CoresAwake> {
         exit_latency_us: i32::from_ne_bytes(in_force),
         _request: request,
     })
+}
+
+/// What was asked for must be what the kernel says that the thread has: [`stylet_shm_schema::flags::REAL_TIME`] rests on it.
+fn confirm(report: &ThreadReport) -> Result<(), String> {
+    let asked = report.asked_priority;
+    if asked == 0 || (report.is_fifo() && report.priority == asked) {
+        return Ok(());
+    }
+    Err(format!(
+        "the kernel granted SCHED_FIFO priority {asked}, but reports policy {} and priority {}",
+        report.policy, report.priority
+    ))
 }
 
 fn read_back(ask: Ask) -> ThreadReport {
@@ -194,5 +208,25 @@ impl Usage {
             involuntary_switches: self.involuntary_switches - start.involuntary_switches,
             heap_calls: self.heap_calls - start.heap_calls,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The state used to report what was asked for as what the kernel had granted.
+    #[test]
+    fn a_thread_that_the_kernel_does_not_confirm_is_not_armed() {
+        let report = |policy, priority, asked_priority| ThreadReport {
+            policy,
+            priority,
+            asked_priority,
+            ..ThreadReport::default()
+        };
+        assert!(confirm(&report(0, 0, 0)).is_ok(), "nothing was asked for");
+        assert!(confirm(&report(1, 80, 80)).is_ok());
+        assert!(confirm(&report(0, 0, 80)).is_err());
+        assert!(confirm(&report(1, 79, 80)).is_err());
     }
 }

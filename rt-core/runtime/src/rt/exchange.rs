@@ -5,7 +5,7 @@ use crate::rt::world::World;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use stylet_hw::HandGoal;
-use stylet_shm_schema::{Fault, SnapshotHeader, TickRecord, Vertex};
+use stylet_shm_schema::{Fault, RefusalCode, SnapshotHeader, TickRecord, Vertex};
 use stylet_sim::force::chain::Touch;
 use stylet_sim::force::{ForceParameters, LocalResponse};
 use stylet_sim::limits::Limits;
@@ -169,7 +169,7 @@ pub enum Notice {
     },
     Refused {
         ticket: Ticket,
-        why: Refusal,
+        why: RefusalCode,
     },
     ParametersActive {
         ticket: Ticket,
@@ -211,30 +211,6 @@ pub enum Notice {
         generation: u64,
         tick: u64,
     },
-}
-
-/// Why a loop would not do as asked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refusal {
-    TipOutsideTissue,
-    NoSeedLeft,
-    NoSeedToUndo,
-    NeedleInTissue,
-    BadGoal,
-}
-
-impl Refusal {
-    pub fn message(self) -> &'static str {
-        match self {
-            Self::TipOutsideTissue => "the tip is outside the tissue: move it in before dropping a seed",
-            Self::NoSeedLeft => "128 seeds are placed already; undo one first",
-            Self::NoSeedToUndo => "no seed has been placed",
-            Self::NeedleInTissue => "the needle is in the tissue: retract it first",
-            Self::BadGoal => {
-                "the goal for the hand needs a finite place, a direction, and a speed and acceleration above zero"
-            }
-        }
-    }
 }
 
 /// Memory that the bridge loaned from shared memory for one snapshot.

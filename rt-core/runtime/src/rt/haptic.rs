@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_hw::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
 use stylet_shm_schema::service::Ipc;
-use stylet_shm_schema::{Fault, HapticState, TickRecord, flags};
+use stylet_shm_schema::{Fault, HapticState, RefusalCode, TickRecord, flags};
 use stylet_sim::force::ForceFault;
 use stylet_sim::force::chain::{self, ChainOutput, ChainParameters, ChainState, Touch};
 use stylet_sim::needle::Phase;
@@ -198,7 +198,7 @@ impl HapticLoop {
                 }
                 HapticOrder::Hand { ticket, .. } => self.notify(Notice::Refused {
                     ticket,
-                    why: Refusal::BadGoal,
+                    why: RefusalCode::BadGoal,
                 }),
                 HapticOrder::StopHand { ticket } => {
                     self.device.stop_hand();

@@ -11,7 +11,7 @@ use crate::rt::world::World;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicBool, Ordering};
-use stylet_shm_schema::{MAX_SEEDS, SeedPose, SnapshotHeader, Vertex};
+use stylet_shm_schema::{MAX_SEEDS, RefusalCode, SeedPose, SnapshotHeader, Vertex};
 use stylet_sim::force::LocalResponse;
 use stylet_sim::needle::LayerKind;
 use stylet_sim::tissue::{Held, MaterialPoint, StepReport, element_ahead};
@@ -406,11 +406,11 @@ impl TissueLoop {
         let notice = match found {
             None => Notice::Refused {
                 ticket,
-                why: Refusal::TipOutsideTissue,
+                why: RefusalCode::TipOutsideTissue,
             },
             Some(_) if self.seeds.len() >= MAX_SEEDS => Notice::Refused {
                 ticket,
-                why: Refusal::NoSeedLeft,
+                why: RefusalCode::NoSeedLeft,
             },
             Some(tip) => {
                 let tail = self.locate(&(tip_m - self.pose.direction * SEED_LENGTH_M), Some(tip.element));
@@ -442,7 +442,7 @@ impl TissueLoop {
             Some(_) => Notice::Done { ticket, tick },
             None => Notice::Refused {
                 ticket,
-                why: Refusal::NoSeedToUndo,
+                why: RefusalCode::NoSeedToUndo,
             },
         };
         self.response.seed_count = self.seeds.len() as u32;

@@ -128,14 +128,6 @@ const KEYS: [[&str; 4]; LAYER_COUNT] = [
     ],
 ];
 
-/// Names of the membranes' stiffnesses, for a device that cannot hold them.
-pub const STIFFNESS_KEYS: [&str; LAYER_COUNT] = [
-    "gland.puncture_force_n / puncture_depth_m",
-    "perineum.puncture_force_n / puncture_depth_m",
-    "surroundings.puncture_force_n / puncture_depth_m",
-    "wall.puncture_force_n / puncture_depth_m",
-];
-
 impl Layers {
     pub fn of(&self, kind: LayerKind) -> Layer {
         self.0.get(kind as usize).copied().unwrap_or(Layer::DEFAULTS[0])

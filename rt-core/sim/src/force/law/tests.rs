@@ -3,6 +3,7 @@
 use super::*;
 use crate::needle::{LayerKind, Layers};
 use stylet_hw::DeviceInfo;
+use stylet_shm_schema::ParameterSet;
 
 /// In the gland alone.
 fn input(depth_m: f64, punctured: bool, phase: Phase) -> ForceInput {
@@ -35,18 +36,18 @@ fn fresh(input: &ForceInput) -> ForceTerms {
 fn defaults_can_be_rendered_by_the_phantom_and_their_scale_fits() {
     let device = DeviceInfo::phantom_premium_1_5();
     let defaults = ForceParameters::default();
-    assert_eq!(defaults.validate_for(&device), Ok(()));
+    assert_eq!(defaults.validate(), Ok(()));
     // 8.5 N of the device for the 9 N of the skin.
     let fitting = defaults.fitting_scale(&device);
     assert!((fitting - 8.5 / 9.0).abs() < 1e-12 && defaults.gate.force_scale <= fitting);
-    let mut stiff = ForceParameters {
-        guide_gain: 3.0,
+    assert_eq!(ParameterSet::default().problems_on(device.max_stiffness_n_per_m), []);
+    let broken = ForceParameters {
+        guide_gain: -1.0,
         damping_n_s_per_m: f64::NAN,
         ..defaults
     };
-    stiff.layers.0[0].puncture_force_n = 8.0;
-    let problems = stiff.validate_for(&device).unwrap_err();
-    assert_eq!(problems.len(), 3, "{problems:?}");
+    let problems = broken.validate().unwrap_err();
+    assert_eq!(problems.len(), 2, "{problems:?}");
 }
 
 #[test]

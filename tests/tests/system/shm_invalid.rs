@@ -1,4 +1,4 @@
-//! Rubbish in shared memory neither crashes nor stops either side, and is refused with a reason.
+//! Invalid records in shared memory neither crash nor stop either side, and are refused with a reason.
 
 use bytemuck::{Pod, Zeroable, pod_read_unaligned};
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
@@ -9,7 +9,7 @@ use stylet_shm_schema::*;
 use stylet_tests::{Alone, Core, ask, fresh_instance, until};
 
 /// All ones, zeros, random bytes and huge counts, of any type.
-fn rubbish<T: Pod>() -> Vec<T> {
+fn invalid<T: Pod>() -> Vec<T> {
     let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
     let mut random = move || {
         seed ^= seed << 13;
@@ -31,7 +31,7 @@ fn rubbish<T: Pod>() -> Vec<T> {
 }
 
 #[test]
-fn core_refuses_rubbish_from_hosts_and_runs_on() {
+fn core_refuses_invalid_records_of_hosts_and_runs_on() {
     let mut core = Core::start();
     let mut link = core.host();
     let before = *link.state().expect("live");
@@ -43,8 +43,8 @@ fn core_refuses_rubbish_from_hosts_and_runs_on() {
         .create();
     let commands = commands.expect("a free place");
     let mut sent = 0;
-    for mut command in rubbish::<Command>() {
-        // Rubbish that happens to say "end" would be obeyed, as it must be.
+    for mut command in invalid::<Command>() {
+        // A record that happens to be a valid request to end is obeyed, as it must be.
         if command.kind == CommandKind::Shutdown as u32 {
             command.kind = u32::MAX;
         }
@@ -71,7 +71,7 @@ fn core_refuses_rubbish_from_hosts_and_runs_on() {
         .initial_max_slice_len(64)
         .create()
         .expect("a free place");
-    for header in rubbish::<UploadHeader>() {
+    for header in invalid::<UploadHeader>() {
         let mut sample = uploads.loan_slice_uninit(64).expect("loaned");
         *sample.user_header_mut() = header;
         sample.write_from_fn(|i| i as u8).send().expect("sent");
@@ -87,31 +87,33 @@ fn core_refuses_rubbish_from_hosts_and_runs_on() {
     assert_eq!(
         link.parameters().expect("live").set,
         ParameterSet::default(),
-        "rubbish changed a parameter"
+        "an invalid record changed a parameter"
     );
     let refused = link
         .events()
         .iter()
-        .filter(|e| e.kind == EventKind::RubbishRefused as u32)
+        .filter(|e| e.kind == EventKind::InvalidRefused as u32)
         .count();
-    assert!(refused > 50, "{refused} refusals were told");
+    assert!(refused > 50, "{refused} refusals were reported");
     let why = ask(
         &mut link,
-        CommandKind::SetParameters,
-        &[f64::from(ParameterId::ShearVertical as u32), 0.7],
+        &Request::SetParameters(vec![ParameterChange {
+            id: ParameterId::ShearVertical,
+            value: 0.7,
+        }]),
     );
     assert!(
         why.as_ref().is_err_and(|w| w.contains("eq. 1 in three dimensions")),
         "eq. 1 is not enforced: {why:?}"
     );
-    ask(&mut link, CommandKind::Engage, &[]).expect("a good command is still carried out");
+    ask(&mut link, &Request::Engage).expect("a good command is still carried out");
 }
 
 /// More than 10,000 values of each kind of message.
-const ROUNDS_OF_RUBBISH: usize = 50;
+const ROUNDS: usize = 50;
 
 #[test]
-fn host_refuses_rubbish_from_a_core_and_goes_on() {
+fn host_drops_invalid_records_of_a_core_and_goes_on() {
     let alone = Alone(fresh_instance());
     let node = alone.0.node().expect("shared memory");
     let session_id = 7;
@@ -148,20 +150,20 @@ fn host_refuses_rubbish_from_a_core_and_goes_on() {
     let mut link = Link::new(alone.0.clone());
     let mut good = Session::zeroed();
     (good.session_id, good.schema_version) = (session_id, SCHEMA_VERSION);
-    let states = rubbish::<HapticState>();
+    let states = invalid::<HapticState>();
     let (bad_events, bad_parameters, bad_plans) = (
-        rubbish::<Event>(),
-        rubbish::<ParametersInForce>(),
-        rubbish::<PlanInForce>(),
+        invalid::<Event>(),
+        invalid::<ParametersInForce>(),
+        invalid::<PlanInForce>(),
     );
-    let (bad_replies, bad_records) = (rubbish::<Reply>(), rubbish::<TickRecord>());
+    let (bad_replies, bad_records) = (invalid::<Reply>(), invalid::<TickRecord>());
     let (bad_snapshots, bad_vertices, bad_scenes) = (
-        rubbish::<SnapshotHeader>(),
-        rubbish::<Vertex>(),
-        rubbish::<SceneHeader>(),
+        invalid::<SnapshotHeader>(),
+        invalid::<Vertex>(),
+        invalid::<SceneHeader>(),
     );
     let mut sent = 0;
-    for i in (0..states.len()).cycle().take(ROUNDS_OF_RUBBISH * states.len()) {
+    for i in (0..states.len()).cycle().take(ROUNDS * states.len()) {
         good.time_ns += 1;
         sessions.send_copy(good).expect("sent");
         entry.update_with_copy(states[i]);
@@ -182,17 +184,17 @@ fn host_refuses_rubbish_from_a_core_and_goes_on() {
         link.poll();
         link.take_records();
     }
-    println!("{sent} messages of rubbish, {} values refused", link.rubbish_refused());
-    // And rubbish that says it is a session of its own.
-    for session in rubbish::<Session>() {
+    println!("{sent} invalid messages, {} dropped", link.invalid_dropped());
+    // And invalid sessions.
+    for session in invalid::<Session>() {
         sessions.send_copy(session).expect("sent");
         link.poll();
     }
     assert!(
-        link.rubbish_refused() > 10_000,
-        "{} values were refused",
-        link.rubbish_refused()
+        link.invalid_dropped() > 10_000,
+        "{} values were dropped",
+        link.invalid_dropped()
     );
-    assert!(link.scene().is_none(), "a scene of rubbish was believed");
+    assert!(link.scene().is_none(), "an invalid scene was used");
     let _: LinkStatus = link.status();
 }

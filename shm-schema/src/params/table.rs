@@ -1,122 +1,23 @@
-//! Every parameter of tissue, needle and force: name, unit, limits, default and source, in one table.
+//! The table: number, name, unit, limits, default and source of every parameter. A new parameter is one row.
 
-use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
-
-/// Number of a parameter; its place in [`PARAMETERS`] and in [`ParameterSet`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum ParameterId {
-    MinStretch,
-    MaxStretch,
-    ShearHorizontal,
-    ShearVertical,
-    RecoveryTime,
-    ResidualTolerance,
-    PunctureDepth,
-    SpeedCoefficient,
-    DepthCoefficient,
-    StaticSpeed,
-    RetractionRatio,
-    PunctureHysteresis,
-    MembranePeak,
-    CuttingForce,
-    GuideStiffness,
-    GuideGain,
-    Damping,
-    ShaftFriction,
-    HandleMass,
-    ForceScale,
-    SlewLimit,
-    HoldSpeed,
-    StickStiffness,
-    MembraneGain,
-    CuttingGain,
-    ShaftGain,
-    Coupling,
-    TissueStiffness,
-    GuideTorque,
-    StickDamping,
-    SkinPunctureDepth,
-    SkinPeak,
-    SkinCutting,
-    SkinFriction,
-    SurroundingsCutting,
-    SurroundingsFriction,
-    WallPunctureDepth,
-    WallPeak,
-    WallCutting,
-    WallFriction,
-}
-
-pub const PARAMETER_COUNT: usize = 40;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ParameterGroup {
-    Tissue,
-    Needle,
-    Force,
-    /// What the needle goes through besides the gland.
-    Layers,
-}
-
-impl ParameterGroup {
-    /// In the order of the dialog.
-    pub const ALL: [Self; 4] = [Self::Tissue, Self::Needle, Self::Force, Self::Layers];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Tissue => "Tissue",
-            Self::Needle => "Needle",
-            Self::Force => "Force",
-            Self::Layers => "Layers",
-        }
-    }
-}
-
-/// One row of the table. `min`, `max`, `default` are SI; a person reads `value * display_per_si` in `unit`.
-#[derive(Clone, Copy, Debug)]
-pub struct ParameterSpec {
-    pub id: ParameterId,
-    pub key: &'static str,
-    pub label: &'static str,
-    pub group: ParameterGroup,
-    pub unit: &'static str,
-    pub display_per_si: f64,
-    pub min: f64,
-    pub max: f64,
-    pub default: f64,
-    pub source: &'static str,
-    pub help: &'static str,
-}
-
-impl ParameterSpec {
-    /// `None` when `value` may be used, else what is wrong with it, in the unit that a person reads.
-    pub fn problem(&self, value: f64) -> Option<String> {
-        let (low, high) = (self.min * self.display_per_si, self.max * self.display_per_si);
-        if !value.is_finite() {
-            return Some(format!(
-                "{} is not a number; it must be {low:.6} to {high:.6} {}",
-                self.key, self.unit
-            ));
-        }
-        (value < self.min || value > self.max).then(|| {
-            format!(
-                "{} = {:.6} {}; it must be {low:.6} to {high:.6} {}",
-                self.key,
-                value * self.display_per_si,
-                self.unit,
-                self.unit
-            )
-        })
-    }
-}
+use super::{ParameterGroup, ParameterSpec};
+use num_enum::TryFromPrimitive;
 
 const RAD: f64 = std::f64::consts::PI / 180.0;
 
 macro_rules! parameters {
     ($( $id:ident $key:literal $label:literal $group:ident $unit:literal $per_si:expr, $min:expr, $max:expr, $default:expr, $source:literal, $help:literal; )*) => {
-        /// In the order of [`ParameterId`].
+        /// Number of a parameter; its place in [`PARAMETERS`] and in [`ParameterSet`](crate::ParameterSet).
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive)]
+        #[repr(u32)]
+        pub enum ParameterId {
+            $( #[doc = concat!("`", $key, "`: ", $help)] $id ),*
+        }
+
+        /// Rows of the table.
+        pub const PARAMETER_COUNT: usize = [$( $key ),*].len();
+
+        /// Every parameter, in the order of [`ParameterId`].
         pub const PARAMETERS: [ParameterSpec; PARAMETER_COUNT] = [ $( ParameterSpec {
             id: ParameterId::$id, key: $key, label: $label, group: ParameterGroup::$group, unit: $unit, display_per_si: $per_si,
             min: $min / $per_si, max: $max / $per_si, default: $default / $per_si, source: $source, help: $help,
@@ -131,13 +32,13 @@ parameters! {
     ShearHorizontal "tissue.shear_horizontal" "Shear, horizontal" Tissue "deg" (1.0 / RAD), 0.0, 85.0, 26.565, "paper eq. 5", "Largest shear angle of links along x (maxHoriRx). No cell may fold (eq. 1 in three dimensions): 26.565 with the same vertically, 60 with 12.";
     ShearVertical "tissue.shear_vertical" "Shear, vertical" Tissue "deg" (1.0 / RAD), 0.0, 45.0, 26.565, "paper eq. 5", "Largest shear angle of links along y and z (maxVertRy). No cell may fold (eq. 1 in three dimensions): 26.565 with the same horizontally, 44 with 0.";
     RecoveryTime "tissue.recovery_time" "Recovery time" Tissue "ms" 1e3, 5.0, 10000.0, 1000.0, "ours", "Time in which the surroundings bring the gland back by 63 %.";
-    ResidualTolerance "tissue.residual_tolerance" "Residual tolerance" Tissue "elements" 1.0, 1e-4, 1e-2, 1e-3, "design section 3", "Largest constraint violation that a tissue step may leave.";
+    ResidualTolerance "tissue.residual_tolerance" "Residual tolerance" Tissue "elements" 1.0, 1e-4, 1e-2, 1e-3, "ours, physics.md", "Largest constraint violation that a tissue step may leave (docs/physics.md, Tissue: constraints).";
     PunctureDepth "needle.puncture_depth" "Puncture depth u_cri" Needle "mm" 1e3, 0.5, 20.0, 8.0, "paper eq. 6", "Depth at which the needle goes through the membrane.";
     SpeedCoefficient "needle.speed_coefficient" "Speed coefficient K_V" Needle "mm2/s2" 1e6, 1.0, 1e6, 10000.0, "paper eq. 6", "The larger, the more a fast needle drags the tissue along.";
     DepthCoefficient "needle.depth_coefficient" "Depth coefficient K_s" Needle "mm2" 1e6, 0.01, 1000.0, 200.0, "paper eq. 6", "The larger, the longer the tissue follows the tip after puncture.";
     StaticSpeed "needle.static_speed" "Static friction speed V_0" Needle "mm/s" 1e3, 0.0, 200.0, 20.0, "paper eq. 6", "Below this speed the tissue sticks to the needle.";
     RetractionRatio "needle.retraction_ratio" "Retraction ratio K_ret" Needle "" 1.0, 0.0, 1.0, 0.3, "paper eq. 6", "Share of the tip's step that the tissue follows on the way out.";
-    PunctureHysteresis "needle.puncture_hysteresis" "Puncture hysteresis" Needle "mm" 1e3, 0.0, 5.0, 0.5, "design section 4", "How far the tip must come back out before the membrane counts as closed.";
+    PunctureHysteresis "needle.puncture_hysteresis" "Puncture hysteresis" Needle "mm" 1e3, 0.0, 5.0, 0.5, "ours, physics.md", "How far the tip must come back out before the membrane counts as closed (docs/physics.md, Needle and tissue).";
     MembranePeak "force.membrane_peak" "Membrane force F_R" Force "N" 1.0, 0.0, 20.0, 5.6, "Podder 2006", "Force of the capsule at the moment of puncture (paper eq. 10).";
     CuttingForce "force.cutting" "Cutting force" Force "N" 1.0, 0.0, 10.0, 1.5, "ours", "Force at the tip while it cuts the gland.";
     GuideStiffness "force.guide_stiffness" "Guide stiffness K" Force "N/m" 1.0, 0.0, 800.0, 400.0, "paper eq. 9", "Spring towards the straight path.";
@@ -146,7 +47,7 @@ parameters! {
     ShaftFriction "force.shaft_friction" "Shaft friction K_f" Force "N/m" 1.0, 0.0, 500.0, 80.0, "paper eq. 9", "Friction along the shaft for each metre inside the gland.";
     HandleMass "force.handle_mass" "Handle mass for F_G" Force "g" 1e3, 0.0, 200.0, 0.0, "paper eq. 8", "Mass whose weight F_G takes off the hand; the simulated device has none to carry.";
     ForceScale "force.scale" "Force scale" Force "" 1.0, 0.0, 2.0, 0.9, "ours", "Fits the force of a real needle to the device; always shown. The Phantom gives the skin's 9 N up to 0.94.";
-    SlewLimit "force.slew_limit" "Slew limit" Force "N/ms" 1e-3, 0.05, 10.0, 0.5, "design section 5", "Largest change of force from tick to tick.";
+    SlewLimit "force.slew_limit" "Slew limit" Force "N/ms" 1e-3, 0.05, 10.0, 0.5, "ours, physics.md", "Largest change of force from tick to tick (docs/physics.md, Gate).";
     HoldSpeed "needle.hold_speed" "Hold speed" Needle "mm/s" 1e3, 0.0, 50.0, 2.0, "ours", "Below this speed along the path the needle is at rest; above the noise of the velocity estimate.";
     StickStiffness "force.stick_stiffness" "Stick stiffness" Force "N/m" 1.0, 1.0, 8000.0, 6000.0, "ours", "How stiffly the tissue holds a needle that sticks to it: friction over this is the way before it slips.";
     MembraneGain "force.membrane_gain" "Membrane gain" Force "" 1.0, 0.0, 1.0, 1.0, "ours", "Scales F_R of every layer; 0 turns it off.";
@@ -166,79 +67,4 @@ parameters! {
     WallPeak "layers.wall_peak" "Organ wall: puncture force" Layers "N" 1.0, 0.0, 20.0, 2.0, "ours", "Force of the wall at the moment of puncture.";
     WallCutting "layers.wall_cutting" "Organ wall: cutting force" Layers "N" 1.0, 0.0, 10.0, 0.8, "ours", "Force at the tip while it cuts the wall.";
     WallFriction "layers.wall_friction" "Organ wall: shaft friction" Layers "N/m" 1.0, 0.0, 500.0, 40.0, "ours", "Friction along the shaft for each metre in the wall.";
-}
-
-/// One value for every row of [`PARAMETERS`], SI.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.ParameterSet")]
-pub struct ParameterSet {
-    pub values: [f64; PARAMETER_COUNT],
-}
-
-impl Default for ParameterSet {
-    fn default() -> Self {
-        Self {
-            values: PARAMETERS.map(|p| p.default),
-        }
-    }
-}
-
-impl ParameterSet {
-    pub fn get(&self, id: ParameterId) -> f64 {
-        self.values[id as usize]
-    }
-
-    pub fn set(&mut self, id: ParameterId, value: f64) {
-        self.values[id as usize] = value;
-    }
-
-    /// Every value outside its own limits. What values forbid each other is for `rt-core` to say.
-    pub fn problems(&self) -> Vec<String> {
-        PARAMETERS
-            .iter()
-            .zip(self.values)
-            .filter_map(|(p, v)| p.problem(v))
-            .collect()
-    }
-}
-
-/// What runs now.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.ParametersInForce")]
-pub struct ParametersInForce {
-    pub session_id: u64,
-    /// Rises with each change that took effect.
-    pub generation: u64,
-    /// First tick of the force loop that ran with them.
-    pub effective_tick: u64,
-    pub set: ParameterSet,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn table_is_in_the_order_of_the_numbers_and_defaults_are_inside_their_limits() {
-        for (index, p) in PARAMETERS.iter().enumerate() {
-            assert_eq!(p.id as usize, index, "{}", p.key);
-            assert_eq!(p.problem(p.default), None);
-        }
-    }
-
-    #[test]
-    fn every_bad_value_is_named() {
-        let mut set = ParameterSet::default();
-        set.set(ParameterId::MinStretch, f64::NAN);
-        set.set(ParameterId::PunctureDepth, 1.0);
-        let problems = set.problems();
-        assert_eq!(problems.len(), 2);
-        assert!(
-            problems[1].contains("needle.puncture_depth = 1000.000000 mm"),
-            "{}",
-            problems[1]
-        );
-    }
 }
