@@ -17,6 +17,7 @@ mod surface;
 #[cfg(test)]
 pub(crate) mod test_bodies;
 mod tissue_kind;
+mod validate;
 
 pub use grids::{NodeGrid, label_grid};
 pub(crate) use lattice::Run;
@@ -71,7 +72,7 @@ impl Scene {
 
     /// Cuts the lattice from labels, or lists every problem with them. Disconnected parts are allowed.
     pub fn from_labels(name: &str, labels: &Labels) -> Result<Scene, Vec<SceneProblem>> {
-        let problems = problem::problems_of(labels);
+        let problems = validate::problems_of(labels);
         if !problems.is_empty() {
             return Err(problems);
         }

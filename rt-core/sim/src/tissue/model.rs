@@ -5,6 +5,9 @@ use crate::limits::Limits;
 
 use serde::{Deserialize, Serialize};
 
+/// Farthest from rest that a held element is followed, in elements; f32 resolves the tolerance up to here.
+pub const REACH: f64 = 2048.0;
+
 /// An element kept at a position of the scene frame during a step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Held {

@@ -1,8 +1,9 @@
 //! What an elastic body is: built once, never changed.
 
-use super::grid::Grid;
+use super::grid::{Grid, corners};
 use super::hexahedron::Stiffness;
-use super::level::{Cells, Level, coarser, corners};
+use super::level::Level;
+use super::levels::{Cells, coarser};
 use super::material::{FemProblem, FemSettings, Structure, problems_of};
 use super::real::Real;
 use super::sweep::Planes;

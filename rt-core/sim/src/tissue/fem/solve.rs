@@ -7,10 +7,8 @@ use super::multigrid::FEW_CYCLES;
 use super::output;
 use super::real::Real;
 use super::state::FemState;
-use crate::tissue::HeldOutcome;
+use crate::tissue::{HeldOutcome, REACH};
 
-/// Farthest from rest that a held element is followed, in elements.
-pub const REACH: f64 = 2048.0;
 /// A direction that may come to be is prepared if this part of the displacement is outside those known.
 const EXPECTED_DIRECTION: f64 = 0.02;
 /// Where few cycles are allowed, those after the first are only for a residual above so many tolerances: what is left then
