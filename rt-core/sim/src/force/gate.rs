@@ -47,17 +47,22 @@ pub struct GateState {
 /// What the model asks for, and the motion that it was asked over.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GateInput {
+    /// Wrench of the force law, before the force scale.
     pub wanted: Wrench,
     /// Energy in the springs of the model.
     pub stored_j: f64,
+    /// Motion in the last tick.
     pub motion: Motion,
 }
 
 /// What goes to the device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GateOutput {
+    /// Within every limit.
     pub wrench: Wrench,
+    /// Whether the force law has a say.
     pub engaged: bool,
+    /// Why the force goes to zero.
     pub fault: Option<ForceFault>,
 }
 
@@ -118,6 +123,7 @@ impl GateState {
         matches!(self.mode, Mode::Waiting)
     }
 
+    /// Why the force went to zero, until it is engaged again.
     pub fn fault(&self) -> Option<ForceFault> {
         self.fault
     }
@@ -127,10 +133,12 @@ impl GateState {
         &self.output
     }
 
+    /// How often each limit acted.
     pub fn counts(&self) -> &GateCounts {
         &self.counts
     }
 
+    /// The energy account.
     pub fn passivity(&self) -> &PassivityState {
         &self.passivity
     }

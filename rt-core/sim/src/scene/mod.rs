@@ -39,8 +39,11 @@ pub const SPACING_RANGE_M: [f64; 2] = [1e-4, 1e-2];
 /// A label volume of cubic cells, x fastest; any label but zero is tissue, of the structure with that label.
 #[derive(Clone, Debug)]
 pub struct Labels {
+    /// Cells along x, y, z.
     pub dims: [usize; 3],
+    /// Edge of a cell, m.
     pub spacing_m: f64,
+    /// One label for each cell.
     pub cells: Vec<u8>,
     /// Empty: all tissue is one structure.
     pub structures: Vec<Structure>,
@@ -49,11 +52,13 @@ pub struct Labels {
 /// A body at rest.
 #[derive(Clone, Debug)]
 pub struct Scene {
+    /// Name, as the session announces it.
     pub name: String,
     /// At least one; elements know theirs by its place here (`Lattice::structure`).
     pub structures: Vec<Structure>,
     /// Shared with the tissue model, which would otherwise hold a copy.
     pub lattice: Arc<Lattice>,
+    /// Triangles over the body and its parts.
     pub surface: Surface,
     /// Where its displacements are told to the hosts.
     pub nodes: NodeGrid,

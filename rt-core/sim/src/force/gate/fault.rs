@@ -27,6 +27,7 @@ pub enum ForceFault {
 }
 
 impl ForceFault {
+    /// Its number in records.
     pub const fn code(self) -> u32 {
         self as u32
     }
@@ -35,13 +36,21 @@ impl ForceFault {
 /// How often each limit had a say, in the order of the gate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct GateCounts {
+    /// Forces that were not finite.
     pub non_finite: u64,
+    /// Ticks in debt of energy.
     pub passivity: u64,
+    /// Ticks with a force cut by the slew limit.
     pub slew_limited: u64,
+    /// Ticks with a force cut by the limit of the settings.
     pub magnitude_limited: u64,
+    /// Ticks with a force cut since the motors are warm.
     pub thermal_limited: u64,
+    /// Ticks with a force or torque cut by the device's own limit.
     pub device_limited: u64,
+    /// Ticks with a torque cut by slew or size.
     pub torque_limited: u64,
+    /// Faults, each counted once until it is cleared.
     pub faults: u64,
 }
 

@@ -8,20 +8,26 @@ use crate::settings::{Problem, Problems};
 /// Ticks of the ramp to zero.
 pub const RAMP_OUT_TICKS: u32 = 20;
 
+/// Settings of the gate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GateParameters {
     /// Force of the device for each newton of the model: real needles reach 9 to 16 N. Shown to the operator.
     pub force_scale: f64,
+    /// Largest force, N.
     pub max_force_n: f64,
+    /// Largest change of the force, N/s.
     pub slew_n_per_s: f64,
+    /// Largest change of the torque, Nm/s.
     pub torque_slew_nm_per_s: f64,
     /// Engaging waits until the model asks for no more than this, so that nothing kicks.
     pub engage_below_n: f64,
+    /// Ticks over which the force comes in.
     pub ramp_in_ticks: u32,
     /// The ramp out keeps to its ticks even where that is steeper than the slew limit.
     pub ramp_out_ticks: u32,
     /// Time constant of the motors' warming, for the limit on continuous force.
     pub thermal_time_s: f64,
+    /// The energy account and its damping.
     pub passivity: PassivityParameters,
 }
 
@@ -42,6 +48,7 @@ impl Default for GateParameters {
 }
 
 impl GateParameters {
+    /// Every setting that cannot be used, or `Ok`.
     pub fn validate(&self) -> Result<(), Vec<Problem>> {
         let mut problems = Problems::default();
         problems.range("gate.force_scale", self.force_scale, 0.0, 2.0);

@@ -45,11 +45,14 @@ use crate::tissue::{Deformed, Held, StepReport, TissueModel};
 /// Restricted ChainMail as a tissue model.
 #[derive(Clone)]
 pub struct ChainMailTissue {
+    /// Topology and limits.
     pub model: ChainMail,
+    /// Where every element is.
     pub state: TissueState,
 }
 
 impl ChainMailTissue {
+    /// The body of a scene at rest.
     pub fn new(scene: &Scene, limits: Limits) -> Self {
         let model = ChainMail::new(scene, limits);
         let state = TissueState::at_rest(&model);

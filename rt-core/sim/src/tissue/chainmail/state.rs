@@ -90,6 +90,7 @@ impl TissueState {
         self.u.get(axis).map_or(&[], Vec::as_slice)
     }
 
+    /// Elements for each unit of `displacement`.
     pub fn scale(&self) -> f32 {
         self.scale as f32
     }

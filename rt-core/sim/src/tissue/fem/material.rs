@@ -12,8 +12,11 @@ pub enum Integration {
 /// Isotropic and linear elastic.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
+    /// Young's modulus, Pa.
     pub youngs_modulus_pa: f64,
+    /// Poisson's ratio, up to [`MAX_POISSON_RATIO`].
     pub poisson_ratio: f64,
+    /// How the volumetric energy is integrated.
     pub integration: Integration,
 }
 
@@ -31,8 +34,10 @@ impl Material {
     }
 }
 
+/// What a structure does when pushed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Structure {
+    /// Tissue.
     Elastic(Material),
     /// Bone, a probe: its nodes do not move.
     Fixed,
@@ -41,6 +46,7 @@ pub enum Structure {
 /// What a model is made from, besides the lattice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FemSettings {
+    /// At least one.
     pub structures: Vec<Structure>,
     /// Structure of each element; empty if there is one structure only.
     pub structure_of: Vec<u8>,

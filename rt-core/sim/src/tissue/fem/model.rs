@@ -75,10 +75,12 @@ impl<T: Real> FemModel<T> {
         })
     }
 
+    /// Elements and their neighbours.
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
     }
 
+    /// Number of elements.
     pub fn element_count(&self) -> usize {
         self.lattice.element_count()
     }
@@ -88,6 +90,7 @@ impl<T: Real> FemModel<T> {
         self.part.iter().filter(|&&part| part != NO_PART).count()
     }
 
+    /// Levels of the multigrid.
     pub fn level_count(&self) -> usize {
         self.levels.len()
     }

@@ -19,6 +19,7 @@ const ROUGH: f64 = 10.0;
 /// as its force goes to zero with the lattice's spacing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipPatch {
+    /// The element in the middle.
     pub element: u32,
     /// Where the element's centre is held, in the scene frame.
     pub position_m: [f64; 3],
@@ -26,6 +27,7 @@ pub struct TipPatch {
     pub edge_m: f64,
 }
 
+/// When a step ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolveSettings {
     /// Forces left on free nodes, relative to those that the moved patch would cause in a body at rest.
@@ -34,12 +36,16 @@ pub struct SolveSettings {
     pub max_cycles: u32,
 }
 
+/// What came of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FemReport {
+    /// What became of the held patch.
     pub held: HeldOutcome,
+    /// Multigrid cycles that the step took.
     pub cycles: u32,
     /// As in `SolveSettings::relative_tolerance`, measured after the step.
     pub relative_residual: f64,
+    /// Within the tolerance, and finite.
     pub converged: bool,
     /// Force with which the tip moves the patch; the tissue pushes the tip with the opposite.
     pub tip_force_n: [f64; 3],
