@@ -60,7 +60,7 @@ fn relaxed_of(p: &[f64]) -> TissueParameters {
     TissueParameters {
         relaxation_iterations: FIT_ITERATIONS,
         shear_to_axial: p[0].exp(),
-        ground_stiffness: p[1].exp(),
+        foundation_to_axial: p[1].exp(),
         ..TissueParameters::default()
     }
 }

@@ -169,7 +169,7 @@ fn fit(text: &mut String, found: &Findings) -> std::fmt::Result {
         text,
         "## The fit\n\nMade at 1.5 mm. Limits: stretch {:.3} to {:.3}, shear {:.1} deg, recovery {:.3} s. Relaxation: shear stiffness {:.3} of axial, \
          surroundings {:.4} of axial.\n\nRMS error in % of the travel, fitted to and held back:\n",
-        l.min_stretch, l.max_stretch, l.shear_deg, l.recovery_time_s, r.shear_to_axial, r.ground_stiffness
+        l.min_stretch, l.max_stretch, l.shear_deg, l.recovery_time_s, r.shear_to_axial, r.foundation_to_axial
     )?;
     text.push_str("| insertion | fitted to | solved, fitted limits | relaxed, 16 iterations |\n|---|---|---|---|\n");
     let at = |insertion: &str, family: Family, setting: &str| {

@@ -9,8 +9,11 @@ use stylet_shm_schema::{ParameterId, ParameterProblem, ParameterProblems, Parame
 /// Everything that a change of parameters brings to both threads.
 #[derive(Clone, Debug)]
 pub struct Active {
+    /// Coefficients of eq. 6.
     pub needle: NeedleParameters,
+    /// Coefficients of eq. 8 to 10, and the gate.
     pub force: ForceParameters,
+    /// Limits of the tissue, eq. 3 to 5.
     pub limits: Limits,
 }
 

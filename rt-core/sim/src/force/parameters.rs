@@ -18,7 +18,9 @@ pub struct ForceParameters {
     pub layers: Layers,
     /// Scales `F_R` of every layer; 0 turns the term off. The next two as well.
     pub membrane_gain: f64,
+    /// Scales the cutting force of every layer.
     pub cutting_gain: f64,
+    /// Scales `K_f u` (eq. 9) of every layer.
     pub shaft_gain: f64,
     /// Share of membrane, cutting and friction that the tissue's own answer takes the place of: 0 for eq. 8-10
     /// alone, 1 for coupled mode.
@@ -39,7 +41,9 @@ pub struct ForceParameters {
     pub stick_damping_n_s_per_m: f64,
     /// Mass whose weight `F_G` (eq. 8) takes off the operator's hand.
     pub compensated_mass_kg: f64,
+    /// Acceleration of gravity in world, m/s^2.
     pub gravity_in_world_m_per_s2: Vector3<f64>,
+    /// Settings of the gate.
     pub gate: GateParameters,
 }
 

@@ -39,6 +39,7 @@ impl VelocityEstimator {
         }
     }
 
+    /// The last estimate, m/s.
     pub fn velocity_m_per_s(&self) -> &Vector3<f64> {
         &self.velocity_m_per_s
     }
@@ -53,6 +54,7 @@ impl VelocityEstimator {
         self.window_s.map(|window_s| self.step_m / window_s)
     }
 
+    /// Forgets every sample.
     pub fn reset(&mut self) {
         self.filled = 0;
         self.velocity_m_per_s = Vector3::zeros();

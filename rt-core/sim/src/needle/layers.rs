@@ -32,6 +32,7 @@ impl LayerKind {
     }
 }
 
+/// Kinds of tissue.
 pub const LAYER_COUNT: usize = 4;
 
 /// One kind of tissue, as the needle feels it.
@@ -76,6 +77,7 @@ impl Layer {
         },
     ];
 
+    /// Whether there is a membrane to puncture.
     pub fn has_membrane(&self) -> bool {
         self.puncture_depth_m > 0.0
     }
@@ -129,6 +131,7 @@ const KEYS: [[&str; 4]; LAYER_COUNT] = [
 ];
 
 impl Layers {
+    /// The layer of one kind.
     pub fn of(&self, kind: LayerKind) -> Layer {
         self.0.get(kind as usize).copied().unwrap_or(Layer::DEFAULTS[0])
     }

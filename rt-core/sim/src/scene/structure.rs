@@ -6,9 +6,13 @@ use serde::{Deserialize, Serialize};
 /// One anatomical structure; its cells carry its label.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Structure {
+    /// Name, as people read it.
     pub name: String,
+    /// Label of its cells, 1 to 255.
     pub label: u8,
+    /// What it is in the procedure.
     pub role: Role,
+    /// What it is made of.
     pub material: Material,
 }
 
@@ -19,6 +23,7 @@ pub enum Role {
     Target,
     /// To be kept from needles and dose.
     Spare,
+    /// Any other tissue.
     #[default]
     Tissue,
 }

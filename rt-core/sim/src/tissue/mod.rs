@@ -29,16 +29,16 @@
 
 mod ahead;
 pub mod chainmail;
-mod check;
 mod deformed;
 pub mod fem;
 mod model;
 mod point;
+mod violation;
 
 pub use ahead::element_ahead;
 pub use chainmail::{ChainMail, ChainMailTissue, TissueState, step};
-pub use check::largest_violation;
 pub use deformed::Deformed;
 pub use fem::FemTissue;
-pub use model::{Held, HeldOutcome, Solve, StepReport, TissueModel};
+pub use model::{Held, HeldOutcome, REACH, Solve, StepReport, TissueModel};
 pub use point::MaterialPoint;
+pub use violation::largest_violation;

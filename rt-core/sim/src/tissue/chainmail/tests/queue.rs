@@ -1,13 +1,9 @@
-//! The textbook's propagation, first moved first processed: one pass, as the reference for tests and benches.
-//!
-//! It leaves violations behind (see `sweep`); nothing in the loop uses it.
+//! The textbook's propagation, first moved first processed: one pass, which leaves violations behind.
 
 use std::collections::VecDeque;
 
-use super::kernels::{self, LOWER, Scaled, UPPER, ordered};
-use super::model::ChainMail;
-use super::state::TissueState;
-use crate::tissue::Held;
+use crate::tissue::chainmail::kernels::{self, LOWER, Scaled, UPPER, ordered};
+use crate::tissue::chainmail::{ChainMail, Held, TissueState};
 
 /// Neighbour table and scratch, allocated once.
 pub struct QueuePass {

@@ -1,9 +1,9 @@
 //! The same sweeps and relaxation over every element in f64, plainly written: what f32, the scale and looking only
-//! at what moves cost in error. Slow; nothing in the loop uses it.
+//! at what moves cost in error. Slow.
 
-use super::model::ChainMail;
-use super::segments::{LEFT, RIGHT};
 use crate::tissue::Held;
+use crate::tissue::chainmail::ChainMail;
+use crate::tissue::chainmail::segments::{LEFT, RIGHT};
 
 /// Sweeps of one step, at most.
 const MAX_SWEEPS: usize = 50;
@@ -117,7 +117,7 @@ impl Reference {
         };
         let at = self.u[held as usize];
         let [_, ny, nz] = model.lattice.dims;
-        let (shear, ground) = (f64::from(relaxation.shear), f64::from(relaxation.ground));
+        let (shear, foundation) = (f64::from(relaxation.shear), f64::from(relaxation.foundation));
         for (j, k) in (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k))) {
             if (j + k) % 2 != parity {
                 continue;
@@ -136,7 +136,7 @@ impl Reference {
                     let beside = segment.beside.map(|b| self.u[b as usize + n]);
                     for c in 0..3 {
                         let k = [0, 1, 2].map(|axis| if axis == c { 1.0 } else { shear });
-                        let springs = 2.0 * (k[0] + k[1] + k[2]) + ground;
+                        let springs = 2.0 * (k[0] + k[1] + k[2]) + foundation;
                         let pull = k[0] * (left[c] + right[c])
                             + k[1] * (beside[0][c] + beside[1][c])
                             + k[2] * (beside[2][c] + beside[3][c]);

@@ -1,4 +1,4 @@
-//! What a state is worth: its largest violation over all links.
+//! The largest violation of a state over all links.
 
 use super::chainmail::{ChainMail, Scaled, TissueState, link_violation, ordered};
 

@@ -2,10 +2,9 @@
 
 use std::arch::x86_64::*;
 
-use super::relax::{NONE, Shares};
-use super::segments::{LEFT, RIGHT, Segment};
-
-const LANES: usize = 8;
+use super::lanes::{LANES, first_lanes};
+use crate::tissue::chainmail::segments::{LEFT, RIGHT, Segment};
+use crate::tissue::chainmail::springs::{NEGLIGIBLE, Shares};
 
 /// # Safety
 /// The segment and the four beside it must be inside `u`, and so must the elements before and after it in its row
@@ -41,14 +40,6 @@ pub(super) unsafe fn relax(u: *mut f32, segment: &Segment, shares: &Shares) {
     }
 }
 
-/// The first `n` of eight lanes.
-#[target_feature(enable = "avx2")]
-#[inline]
-fn first_lanes(n: usize) -> __m256i {
-    let number = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-    _mm256_cmpgt_epi32(_mm256_set1_epi32(n.min(LANES) as i32), number)
-}
-
 #[target_feature(enable = "avx2")]
 #[inline]
 fn combine(shares: &Shares, own: __m256, n: [__m256; 6]) -> __m256 {
@@ -57,7 +48,7 @@ fn combine(shares: &Shares, own: __m256, n: [__m256; 6]) -> __m256 {
     let row = _mm256_add_ps(_mm256_mul_ps(_mm256_set1_ps(shares.own), own), along(0));
     let new = _mm256_add_ps(row, _mm256_add_ps(along(1), along(2)));
     let size = _mm256_andnot_ps(_mm256_set1_ps(-0.0), new);
-    _mm256_and_ps(new, _mm256_cmp_ps::<_CMP_GT_OQ>(size, _mm256_set1_ps(NONE)))
+    _mm256_and_ps(new, _mm256_cmp_ps::<_CMP_GT_OQ>(size, _mm256_set1_ps(NEGLIGIBLE)))
 }
 
 /// # Safety
