@@ -13,7 +13,8 @@ run: deps-run build ## Build, start rt-core and open the window; without a displ
 	@setpriv --pdeathsig TERM docs/tools/run "$(BIN)"
 
 build: ## Build both programs
-	$(CARGO) build --release -p rt-core -p host-ui
+# The workspace chooses the features, as for the tests, or both build every dependency for themselves.
+	$(CARGO) build --release --workspace --bin rt-core --bin host-ui
 
 test: deps-test ## Install what the tests need, build everything, run all tests
 # Both commands take the same packages: otherwise features differ and everything is built twice. Tests run one at a time,
@@ -22,7 +23,7 @@ test: deps-test ## Install what the tests need, build everything, run all tests
 	$(CARGO) test --release --workspace -- --test-threads=1
 
 picture: deps-test build ## Redraw the pictures of the README and the tour
-	UPDATE_SNAPSHOTS=1 $(CARGO) test --release -p stylet-tests --test ui_live --test ui_plan --test ui_states --test ui_window -- --test-threads=1
+	UPDATE_SNAPSHOTS=1 $(CARGO) test --release -p stylet-tests-window -- --test-threads=1
 
 report: ## Measure speed against error of every tissue model; writes benches/runs/<date>-<host> (some minutes)
 	$(CARGO) run --release -p stylet-benches --bin report

@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 use plotters::prelude::*;
 use std::path::{Path, PathBuf};
-use stylet_benches::desk::{Desk, axis_start, gland_shift_m};
+use stylet_benches::session::{Session, axis_start, gland_shift_m};
 use stylet_benches::wall::Wall;
 use stylet_hw::Hand;
 use stylet_runtime::rt::world::World;
@@ -119,17 +119,17 @@ fn insertion(speed_m_per_s: f64) -> Vec<Sample> {
     let limits = TissueParameters::default().validate().expect("the defaults are valid");
     let world = World::new(scene, limits, 1).expect("ChainMail takes every scene");
     let start = axis_start(&world);
-    let mut desk = Desk::new(world, start, Hand::steady(), 5);
-    desk.go_to(start + Vector3::z() * 0.085, speed_m_per_s);
+    let mut session = Session::new(world, start, Hand::steady(), 5);
+    session.go_to(start + Vector3::z() * 0.085, speed_m_per_s);
     let mut shift_mm = 0.0;
     (0..((0.085 / speed_m_per_s + 0.6) * 1e3) as u64)
         .map(|tick| {
-            let output = desk.step();
+            let output = session.step();
             if tick % 5 == 0 {
-                shift_mm = gland_shift_m(desk.tissue.world()) * 1e3;
+                shift_mm = gland_shift_m(session.world()) * 1e3;
             }
             Sample {
-                depth_mm: (desk.device.true_tip_in_world().z - start.z) * 1e3 - 5.0,
+                depth_mm: (session.true_tip_in_world().z - start.z) * 1e3 - 5.0,
                 force_n: -output.wrench.force_n.z,
                 shift_mm,
                 phase: output.phase,

@@ -3,10 +3,9 @@
 //! `cargo bench -p stylet-benches`. Rounds are interleaved, so that a noisy machine disturbs all rows alike.
 
 use std::time::Instant;
+use stylet_benches::solvers::{Body, PlainQueue, PlainSweep};
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::Scene;
-use stylet_sim::tissue::chainmail::queue::QueuePass;
-use stylet_sim::tissue::chainmail::single_pass;
 use stylet_sim::tissue::{ChainMail, Held, MaterialPoint, TissueState, largest_violation, step};
 
 /// The loop's tick, and a needle at 50 mm/s.
@@ -35,6 +34,14 @@ impl Row {
         let looks = model.element_count() < 100_000 || self.micros.len() % 20 == 1;
         if looks {
             self.violation = self.violation.max(largest_violation(model, state));
+        }
+    }
+
+    /// As `add`, for a textbook's pass.
+    fn add_plain(&mut self, start: Instant, body: &Body) {
+        self.micros.push(start.elapsed().as_secs_f64() * 1e6);
+        if self.micros.len() % 20 == 1 {
+            self.violation = self.violation.max(body.largest_violation());
         }
     }
 
@@ -140,10 +147,19 @@ fn bench(scene: &Scene, rounds: usize, ticks_a_round: usize, with_queue: bool) {
         patch_m: 0.0,
     };
 
-    let mut queue = QueuePass::new(&model);
+    let at = way.map(|c| c as f32);
+    let limits = model.limits().clone();
+    let mut plain = with_queue.then(|| {
+        let lattice = &scene.lattice;
+        (
+            Body::at_rest(scene, &limits),
+            PlainQueue::new(lattice),
+            PlainSweep::new(lattice),
+        )
+    });
     let mut rows = [
-        Row::new("queue, one pass, everything moved"),
-        Row::new("sweep, one pass, everything moved"),
+        Row::new("plain queue, one pass, everything moved"),
+        Row::new("plain sweep, one pass, everything moved"),
         Row::new("step to the residual, everything moved"),
         Row::new("step to the residual, 50 mm/s needle"),
         Row::new("step with nothing held, at rest"),
@@ -162,17 +178,15 @@ fn bench(scene: &Scene, rounds: usize, ticks_a_round: usize, with_queue: bool) {
     let (mut passes, mut moved) = (0, 0);
     let (mut most_passes, mut moved_sum) = (0, 0);
     for _ in 0..rounds {
-        if with_queue {
-            state.copy_from(&at_rest);
+        if let Some((body, queue, sweep)) = &mut plain {
+            body.return_to_rest();
             let start = Instant::now();
-            queue.run(&model, &mut state, far);
-            rows[0].add(start, &model, &state);
-        }
-        if with_queue {
-            state.copy_from(&at_rest);
+            queue.run(body, element, at);
+            rows[0].add_plain(start, body);
+            body.return_to_rest();
             let start = Instant::now();
-            single_pass(&model, &mut state, far);
-            rows[1].add(start, &model, &state);
+            sweep.run(body, element, at);
+            rows[1].add_plain(start, body);
         }
 
         state.copy_from(&at_rest);

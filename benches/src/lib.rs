@@ -1,9 +1,10 @@
-//! What the measurements share: bodies, insertions, and the error of one run against another.
+//! What the measurements share: bodies, insertions, solvers to compare with, and the error of one run against another.
 
 pub mod bodies;
-pub mod desk;
 pub mod error;
 pub mod insertions;
 pub mod machine;
 pub mod rig;
+pub mod session;
+pub mod solvers;
 pub mod wall;

@@ -1,6 +1,7 @@
 //! The command line of `host-ui`.
 
 use crate::app;
+use crate::command::CommandError;
 use crate::command::convert::ConvertArgs;
 use crate::command::dose::{DoseArgs, PerturbArgs};
 use crate::command::plan::PlanArgs;
@@ -17,7 +18,7 @@ use stylet_implant::readers::{SeedDefaults, read_seeds};
 use stylet_shm_schema::service::Instance;
 
 const SCENE_HELP: &str = "\
-A scene file is TOML; all but [volume] may be left out, and what is not said comes from the name of the structure:
+A scene file is TOML; all but [volume] may be left out. Omitted fields are inferred from the name of the structure (scenes/README.md):
   name = \"phantom\"
   [volume]
   file = \"gland.seg.nrrd\"         # beside the scene file
@@ -35,7 +36,7 @@ A scene file is TOML; all but [volume] may be left out, and what is not said com
   insert_mm_per_s = 50
   retract_mm_per_s = 50
   [device]
-  name = \"sim\"                    # for an rt-core that host-ui starts (--core)
+  name = \"simulated\"              # for an rt-core that host-ui starts (--core)
   [plan]
   file = \"plan.dcm\"               # RT Plan or CSV
 
@@ -51,13 +52,13 @@ Names that are known follow TG-263: Prostate, PTV, CTV (targets), Urethra, Rectu
 pub struct Cli {
     #[command(flatten)]
     window: CoreArgs,
-    /// Greys for the slices in place of simulated ultrasound, of the patient of --scene FILE: NIfTI-1, NRRD, MetaImage
+    /// Image for the slices instead of simulated ultrasound, of the patient of --scene FILE: NIfTI-1, NRRD, MetaImage
     #[arg(long, value_name = "FILE", requires = "scene")]
     image: Option<PathBuf>,
-    /// Leave gamepads and 3D mice alone: only keys and mouse move the needle
+    /// Ignore gamepads and 3D mice: only keys and mouse move the needle
     #[arg(long)]
     no_controllers: bool,
-    /// Draw frame after frame, as fast as the machine can: for measuring
+    /// Draw frames without a pause, for measurements
     #[arg(long)]
     without_pause: bool,
     #[command(subcommand)]
@@ -66,7 +67,7 @@ pub struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Task {
-    /// Which gamepads and 3D mice are there to hold the needle, whether they can be read, and what their axes and buttons do
+    /// List the connected gamepads and 3D mice, whether they can be read, and what their axes and buttons do
     Controllers,
     /// Plan, place the needles, insert, drop the seeds while retracting; write result.json, force.csv and, of a plan, a debrief
     Procedure {
@@ -84,7 +85,7 @@ enum Task {
         /// Plan of many needles (TOML), as 'host-ui plan' writes it [default: that of the scene file, or one needle through the middle]
         #[arg(long, value_name = "FILE")]
         plan: Option<PathBuf>,
-        /// Rehearse every needle first, and drop each seed so that it comes to rest on plan
+        /// Rehearse every needle first, and drop each seed so that it rests on plan
         #[arg(long)]
         compensate: bool,
         /// Source file for the score [default: the source that the plan names, 6711 or 200]
@@ -94,7 +95,7 @@ enum Task {
         #[arg(long, default_value_t = 5, conflicts_with = "plan", value_parser = clap::value_parser!(u16).range(1..=128))]
         seeds: u16,
     },
-    /// Keep every tick of the force loop and the tissue's snapshots in an MCAP file, and count what is missing
+    /// Record every tick of the force loop and the tissue's snapshots in an MCAP file, and count what is missing
     Record {
         /// Name that rt-core was started under
         #[arg(long, default_value = "main", value_parser = core_args::instance)]
@@ -105,22 +106,22 @@ enum Task {
         /// Seconds to record [default: until interrupted or until rt-core ends]
         #[arg(long, value_name = "S")]
         duration: Option<f64>,
-        /// Snapshots of the gland kept in a second, 0 to 200
+        /// Snapshots of the gland per second, 0 to 200
         #[arg(long, default_value_t = 20.0, value_name = "HZ")]
         snapshot_rate: f64,
     },
-    /// Make a table or a motion for rt-core's replay device from a recording
+    /// Convert a recording into a table, or into a motion for rt-core's replay device
     Export {
         /// Recording made by 'host-ui record'
         recording: PathBuf,
-        /// Table with one row a tick
+        /// Table with one row per tick
         #[arg(long, value_name = "FILE.csv", required_unless_present = "motion")]
         csv: Option<PathBuf>,
         /// The hand's motion, for 'rt-core --device replay:FILE'
         #[arg(long, value_name = "FILE")]
         motion: Option<PathBuf>,
     },
-    /// Have rt-core write its flight recording: the last seconds of both loops, to be repeated with 'rt-core replay'
+    /// Let rt-core write its flight recording: the last seconds of both loops, for 'rt-core replay'
     Flight {
         /// Name that rt-core was started under
         #[arg(long, default_value = "main", value_parser = core_args::instance)]
@@ -135,13 +136,13 @@ enum Task {
     Plan(PlanArgs),
     /// Dose of seeds (TG-43U1) at points, in structures, or on a grid
     Dose(DoseArgs),
-    /// What becomes of a plan's dose when every seed misses its place at random
+    /// Dose of a plan under random seed errors
     Perturb(PerturbArgs),
 }
 
 #[derive(Subcommand, Debug)]
 enum SceneTask {
-    /// Read a volume or a scene file and say what would be sent to rt-core
+    /// Read a volume or a scene file and print what would be sent to rt-core
     #[command(after_long_help = SCENE_HELP)]
     Check {
         /// NIfTI-1, NRRD (also Slicer's .seg.nrrd), MetaImage, DICOM RT Structure Set, or a scene file (.toml)
@@ -153,14 +154,18 @@ enum SceneTask {
 }
 
 impl Cli {
-    pub fn run(self) -> Result<(), String> {
+    /// Carries out the command.
+    ///
+    /// # Errors
+    /// The text for the terminal: what failed and what to do.
+    pub fn run(self) -> Result<(), CommandError> {
         if self.task.is_some() {
             interrupt::end_with_reader();
         }
         match self.task {
             None => {
                 if self.image.is_some() && self.window.file().is_none() {
-                    return Err("--image belongs to a patient: give the segmentation with --scene FILE".to_owned());
+                    return Err("--image belongs to a patient: give the segmentation with --scene FILE".into());
                 }
                 let instance = self.window.instance;
                 let ended = app::run(app::Options {
@@ -172,9 +177,9 @@ impl Cli {
                     pause: !self.without_pause,
                 });
                 instance.sweep();
-                ended
+                Ok(ended?)
             }
-            Some(Task::Controllers) => controller::list(),
+            Some(Task::Controllers) => Ok(controller::list()?),
             Some(Task::Scene(SceneTask::Check { file, label })) => check(&file, label),
             Some(Task::Record {
                 instance,
@@ -184,7 +189,7 @@ impl Cli {
             }) => {
                 let fits = duration.is_none_or(|s| s > 0.0 && s < 1e6) && (0.0..=200.0).contains(&snapshot_rate);
                 if !fits {
-                    return Err("--duration needs seconds above 0, --snapshot-rate 0 to 200 Hz".to_owned());
+                    return Err("--duration needs seconds above 0, --snapshot-rate 0 to 200 Hz".into());
                 }
                 let ended = record::run(&record::Options {
                     instance: instance.clone(),
@@ -193,10 +198,15 @@ impl Cli {
                     snapshots_hz: snapshot_rate,
                 });
                 instance.sweep();
-                ended
+                Ok(ended?)
             }
-            Some(Task::Export { recording, csv, motion }) => record::export(&record::Export { recording, csv, motion }),
-            Some(Task::Flight { instance }) => record::save_flight(&instance).map(|path| println!("written: {path}")),
+            Some(Task::Export { recording, csv, motion }) => {
+                Ok(record::export(&record::Export { recording, csv, motion })?)
+            }
+            Some(Task::Flight { instance }) => {
+                println!("written: {}", record::save_flight(&instance)?);
+                Ok(())
+            }
             Some(Task::Convert(args)) => args.run(),
             Some(Task::Plan(args)) => args.run(),
             Some(Task::Dose(args)) => args.run(),
@@ -212,7 +222,7 @@ impl Cli {
                 seeds,
             }) => {
                 if let Some(speed) = insert_speed.filter(|s| !(0.1..=500.0).contains(s)) {
-                    return Err(format!("--insert-speed {speed}: give 0.1 to 500 mm/s"));
+                    return Err(format!("--insert-speed {speed}: give 0.1 to 500 mm/s").into());
                 }
                 let instance = common.instance.clone();
                 let ended = procedure::run(procedure::Options {
@@ -225,14 +235,14 @@ impl Cli {
                     source,
                 });
                 instance.sweep();
-                ended
+                Ok(ended?)
             }
         }
     }
 }
 
-fn check(file: &Path, label: Option<u8>) -> Result<(), String> {
-    let v = files::read(file, label, &files::Progress::default()).map_err(|e| e.to_string())?;
+fn check(file: &Path, label: Option<u8>) -> Result<(), CommandError> {
+    let v = files::read(file, label, &files::Progress::default())?;
     println!("{}", v.name);
     if files::scene::is_scene(file) {
         check_scene_file(file)?;
@@ -282,9 +292,9 @@ fn check(file: &Path, label: Option<u8>) -> Result<(), String> {
     Ok(())
 }
 
-/// What a scene file says besides its volume; its plan is read.
-fn check_scene_file(file: &Path) -> Result<(), String> {
-    let scene = files::scene::read(file).map_err(|e| e.to_string())?;
+/// Prints what a scene file holds besides its volume; its plan is read.
+fn check_scene_file(file: &Path) -> Result<(), CommandError> {
+    let scene = files::scene::read(file)?;
     let plan = scene
         .plan
         .as_ref()
@@ -303,7 +313,7 @@ fn check_scene_file(file: &Path) -> Result<(), String> {
     }
     if let Some(named) = &scene.image {
         let path = file.with_file_name(named);
-        let image = files::Image::read(&path, &files::Progress::default()).map_err(|e| e.to_string())?;
+        let image = files::Image::read(&path, &files::Progress::default())?;
         let [x, y, z] = image.dims;
         println!("  image: {x} x {y} x {z} voxels in {}", path.display());
     }

@@ -1,26 +1,22 @@
 //! Keys: which there are, and what is held or pressed in this frame.
 
-use crate::panel::Action;
-use crate::view::scene3d::Preset;
+use crate::action::{Action, Viewpoint};
 use egui::{Key, Modifiers};
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::Request;
 
 /// Every key, for the overlay and the manual.
 pub const KEYS: [(&str, &str); 26] = [
     ("W  or  Up", "advance the needle along its path while held"),
     ("S  or  Down", "retract the needle while held"),
     ("Shift with W, S", "four times slower"),
-    ("Enter", "the one thing to do in the present step"),
+    ("Enter", "the main action of the present step"),
     ("Space", "drop a seed at the tip"),
-    (
-        "Ctrl+Z",
-        "take the last seed or change of the plan back; with Shift put it back",
-    ),
+    ("Ctrl+Z", "undo the last seed or plan change; with Shift redo it"),
     (
         "Arrows, Enter",
         "in the template: choose a hole, add or show its needle",
     ),
-    ("Shift+arrows, Del", "in the template: move the needle, take it away"),
+    ("Shift+arrows, Del", "in the template: move the needle, remove it"),
     ("E", "force on; after a fault: re-arm"),
     ("D", "force off"),
     ("P", "parameters"),
@@ -33,23 +29,24 @@ pub const KEYS: [(&str, &str); 26] = [
     ("F", "slices follow the tip"),
     ("M", "measure between two clicks"),
     ("I", "isodose lines and surfaces"),
-    ("G", "greys of the image in the slices, or simulated ultrasound"),
+    ("G", "image or simulated ultrasound in the slices"),
     ("T", "light or dark"),
-    ("Ctrl and +, -, 0", "larger, smaller, usual words"),
+    ("Ctrl and +, -, 0", "larger, smaller, default text size"),
     ("F12", "save the window as a picture"),
     ("F1", "this help"),
-    ("Esc", "close a dialog, give the keys back to the needle"),
-    ("Drag in 3D", "left turns, right shifts, wheel goes nearer"),
+    ("Esc", "close a dialog, return the keys to the needle"),
+    ("Drag in 3D", "left button rotates, right button pans, wheel zooms"),
     (
         "Drag in a slice",
-        "left moves the cross, or the needle by its tip; right shifts",
+        "left button moves the cross, or the needle by its tip; right button pans",
     ),
-    ("Wheel in a slice", "through the slices; with Ctrl nearer"),
+    ("Wheel in a slice", "through the slices; with Ctrl zooms"),
 ];
 
-/// What the keys say in one frame.
+/// What the keys ask for in one frame.
 #[derive(Debug, Default, PartialEq)]
 pub struct Keys {
+    /// Actions of the keys that were pressed.
     pub actions: Vec<Action>,
     /// Metres per second along the path, positive inwards; 0 when no key is held.
     pub drive_m_per_s: f64,
@@ -85,14 +82,14 @@ pub fn read(ctx: &egui::Context) -> Keys {
         (Modifiers::NONE, Key::G, Action::ToggleImage),
         (Modifiers::NONE, Key::T, Action::ToggleTheme),
         (Modifiers::NONE, Key::F12, Action::SavePicture),
-        (Modifiers::NONE, Key::Num1, Action::LookFrom(Preset::Oblique)),
-        (Modifiers::NONE, Key::Num2, Action::LookFrom(Preset::Perineum)),
-        (Modifiers::NONE, Key::Num3, Action::LookFrom(Preset::Side)),
-        (Modifiers::NONE, Key::Num4, Action::LookFrom(Preset::Above)),
-        (Modifiers::NONE, Key::Num5, Action::LookFrom(Preset::Needle)),
-        (Modifiers::NONE, Key::Space, Action::Send(CommandKind::DropSeed)),
-        (Modifiers::NONE, Key::E, Action::Send(CommandKind::Engage)),
-        (Modifiers::NONE, Key::D, Action::Send(CommandKind::Disengage)),
+        (Modifiers::NONE, Key::Num1, Action::LookFrom(Viewpoint::Oblique)),
+        (Modifiers::NONE, Key::Num2, Action::LookFrom(Viewpoint::Perineum)),
+        (Modifiers::NONE, Key::Num3, Action::LookFrom(Viewpoint::Side)),
+        (Modifiers::NONE, Key::Num4, Action::LookFrom(Viewpoint::Above)),
+        (Modifiers::NONE, Key::Num5, Action::LookFrom(Viewpoint::Needle)),
+        (Modifiers::NONE, Key::Space, Action::Send(Request::DropSeed)),
+        (Modifiers::NONE, Key::E, Action::Send(Request::Engage)),
+        (Modifiers::NONE, Key::D, Action::Send(Request::Disengage)),
         (Modifiers::NONE, Key::P, Action::OpenParameters),
         (Modifiers::NONE, Key::R, Action::ResetView),
     ];

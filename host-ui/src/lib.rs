@@ -1,17 +1,25 @@
 //! The operator's program: the window, and the command line over the same code.
+//!
+//! The modules of the window depend on each other in one direction:
+//! `app` → `panel` → `view`, `keyboard` → `shown`, `action` → `planner`, `dose_worker`, `loader` → `mesh`, `theme`, `settings`.
 
+#![warn(missing_docs)]
+
+mod action;
 mod affinity;
 pub mod app;
 pub mod cli;
-pub mod command;
+mod command;
 pub mod cpu_time;
-pub mod dose_desk;
+mod dose_worker;
 pub mod heap;
 pub mod keyboard;
 mod loader;
-pub mod panel;
+mod mesh;
+mod panel;
 mod picture;
 pub mod planner;
-pub mod settings;
-pub mod theme;
+mod settings;
+mod shown;
+mod theme;
 pub mod view;

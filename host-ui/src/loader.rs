@@ -1,17 +1,28 @@
 //! Reads scenes and images on a thread of its own, so that a large or broken file never holds up a frame.
 
 use std::path::{Path, PathBuf};
-use stylet_base::job::{Job, Update};
+use stylet_base::job::{Job, JobUpdate};
 use stylet_files::{self as files, FileError, Image, LabelVolume, Progress, scene};
 
-/// What a file came to.
+/// What was read from a file.
 pub enum Loaded {
     /// A scene, and the image that its scene file names.
-    Scene(LabelVolume, Option<Image>),
+    Scene(Box<LabelVolume>, Option<Image>),
     Image(Image),
 }
 
-type Outcome = Result<Loaded, String>;
+/// A file that could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    /// The file was refused, with the reason.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The thread ended without an outcome.
+    #[error("{}: the reader ended before the file was read", .0.display())]
+    Ended(PathBuf),
+}
+
+type Outcome = Result<Loaded, LoadError>;
 
 struct Reading {
     path: PathBuf,
@@ -26,7 +37,7 @@ pub struct Loader {
 }
 
 impl Loader {
-    /// An image that is named here is taken instead of that of a scene file.
+    /// Begins to read a scene. `image` replaces the image that a scene file names.
     pub fn begin_scene(&mut self, path: &Path, label: Option<u8>, image: Option<PathBuf>) {
         self.begin(path, move |path, progress| scene_of(path, label, image, progress));
     }
@@ -41,17 +52,17 @@ impl Loader {
         read: impl FnOnce(&Path, &Progress) -> Result<Loaded, FileError> + Send + 'static,
     ) {
         let progress = Progress::default();
-        let (owned, told) = (path.to_owned(), progress.clone());
+        let (owned, reported) = (path.to_owned(), progress.clone());
         let job = Job::begin("file reader", move |answer, interrupt| {
-            let outcome = read(&owned, &told.ended_by(interrupt.clone()));
-            // The window may be gone by now; then nobody wants the answer.
-            let _ = answer.send(outcome.map_err(|e| e.to_string()));
+            let outcome = read(&owned, &reported.ended_by(interrupt.clone()));
+            // The window may be closed by now; then nobody reads the answer.
+            let _ = answer.send(outcome.map_err(LoadError::from));
         });
         let path = path.to_owned();
         self.reading = Some(Reading { path, progress, job });
     }
 
-    /// What is being read, what is done with it, and the share of that.
+    /// File and stage of the reading, and the share of the stage that is done.
     pub fn at(&self) -> Option<(String, f32)> {
         let reading = self.reading.as_ref()?;
         let (stage, share) = reading.progress.at();
@@ -61,18 +72,18 @@ impl Loader {
         ))
     }
 
-    /// What is being read is no longer wanted; its thread ends soon.
+    /// Cancels the reading; its thread ends soon.
     pub fn cancel(&mut self) {
         self.reading = None;
     }
 
-    /// Each outcome once; a reader that died is a refusal too.
+    /// Reports each outcome once; a reader that ended without one is an error too.
     pub fn poll(&mut self) -> Option<Outcome> {
         let reading = self.reading.as_ref()?;
         let outcome = match reading.job.poll() {
-            Update::Pending => return None,
-            Update::Value(outcome) => outcome,
-            Update::Ended => Err(format!("{}: the reader stopped half-way", reading.path.display())),
+            JobUpdate::Pending => return None,
+            JobUpdate::Message(outcome) => outcome,
+            JobUpdate::Ended => Err(LoadError::Ended(reading.path.clone())),
         };
         self.reading = None;
         Some(outcome)
@@ -81,15 +92,15 @@ impl Loader {
 
 fn scene_of(path: &Path, label: Option<u8>, image: Option<PathBuf>, progress: &Progress) -> Result<Loaded, FileError> {
     let (volume, named) = match scene::is_scene(path) && label.is_none() {
-        true => scene::load(path, progress).map(|(said, volume)| (volume, said.image))?,
+        true => scene::load(path, progress).map(|(scene, volume)| (volume, scene.image))?,
         false => (files::read(path, label, progress)?, None),
     };
     let Some(file) = image.or_else(|| named.map(|file| path.with_file_name(file))) else {
-        return Ok(Loaded::Scene(volume, None));
+        return Ok(Loaded::Scene(Box::new(volume), None));
     };
     let image = Image::read(&file, progress)?;
     image
         .covers(&volume.patient, volume.middle_m())
         .map_err(|why| FileError::of(&file, why))?;
-    Ok(Loaded::Scene(volume, Some(image)))
+    Ok(Loaded::Scene(Box::new(volume), Some(image)))
 }

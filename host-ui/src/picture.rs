@@ -2,16 +2,36 @@
 
 use eframe::icon_data::IconDataExt;
 use egui::{ColorImage, IconData};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{SystemTime, UNIX_EPOCH};
+use stylet_base::{WriteError, write_whole};
 
 /// Under the folder that the program was started in.
 const FOLDER: &str = "out/pictures";
 
-/// What became of a picture: its file, or why there is none.
-type Saved = Result<PathBuf, String>;
+/// A picture that could not be saved.
+#[derive(Debug, thiserror::Error)]
+pub enum PictureError {
+    /// No thread could be started to write it.
+    #[error("no thread to write a picture: {0}")]
+    NoThread(io::Error),
+    /// The pixels could not be encoded as PNG.
+    #[error("the picture cannot be encoded: {0}")]
+    Encode(String),
+    /// The folder of the pictures could not be created.
+    #[error("{FOLDER}: the folder for pictures cannot be created: {0}")]
+    Folder(io::Error),
+    /// The file could not be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
 
+/// The file of a picture, or why there is none.
+type Saved = Result<PathBuf, PictureError>;
+
+/// Pictures that are being written.
 pub struct Pictures {
     done: Sender<Saved>,
     saved: Receiver<Saved>,
@@ -30,13 +50,13 @@ impl Pictures {
         let done = self.done.clone();
         ctx.request_screenshot(move |image| {
             let writer = std::thread::Builder::new().name("picture".to_owned());
-            let told = done.clone();
+            let failed = done.clone();
             let spawned = writer.spawn(move || {
-                // The window may be gone by now; then nobody wants to know.
+                // The window may be closed by now; then nobody reads the answer.
                 let _ = done.send(save(&image, Path::new(FOLDER)));
             });
             if let Err(e) = spawned {
-                let _ = told.send(Err(format!("no thread to write a picture: {e}")));
+                let _ = failed.send(Err(PictureError::NoThread(e)));
             }
         });
     }
@@ -48,17 +68,16 @@ impl Pictures {
 }
 
 fn save(image: &ColorImage, folder: &Path) -> Saved {
-    let told = |why: String| format!("{}: the picture cannot be written: {why}", folder.display());
     let icon = IconData {
         rgba: image.pixels.iter().flat_map(|p| p.to_array()).collect(),
         width: image.size[0] as u32,
         height: image.size[1] as u32,
     };
-    let png = icon.to_png_bytes().map_err(told)?;
-    std::fs::create_dir_all(folder).map_err(|e| told(e.to_string()))?;
+    let png = icon.to_png_bytes().map_err(PictureError::Encode)?;
+    std::fs::create_dir_all(folder).map_err(PictureError::Folder)?;
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let path = folder.join(format!("stylet-{}.png", now.as_millis()));
-    std::fs::write(&path, png).map_err(|e| told(e.to_string()))?;
+    write_whole(&path, &png)?;
     Ok(path)
 }
 

@@ -1,11 +1,11 @@
 //! Colours, sizes and spacings as tokens; nothing else in the window names a colour.
 //!
-//! Hues come from the Okabe-Ito set, which people with any common colour blindness can tell apart; no meaning rests on hue alone.
+//! Hues come from the Okabe-Ito set, whose colours stay distinct with any common colour blindness; no meaning rests on hue alone.
 
 mod tokens;
 
 use egui::{CornerRadius, FontFamily, FontId, Margin, RichText, Stroke, TextStyle, Theme, Visuals};
-pub use tokens::{DARK, IMAGE, ImageTokens, LIGHT, Tokens};
+pub use tokens::{DARK, IMAGE, LIGHT, Tokens};
 
 pub const LEFT_WIDTH: f32 = 286.0;
 pub const RIGHT_WIDTH: f32 = 330.0;

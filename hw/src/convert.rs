@@ -1,9 +1,9 @@
-//! Encoder counts and driver units to SI and back: the only place in the program that knows them.
+//! Conversion of encoder counts and driver units to SI and back.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-/// Counts of an encoder whose step is `step`; half a step rounds away from zero. Saturates, and gives
-/// zero for what is not a number or a step that is not positive.
+/// Counts of an encoder whose step is `step`; half a step rounds away from zero. Saturates, and returns zero for a value
+/// that is not a number or a step that is not positive.
 pub fn counts_from_si(value: f64, step: f64) -> i64 {
     if step > 0.0 { (value / step).round() as i64 } else { 0 }
 }
@@ -13,7 +13,7 @@ pub fn si_from_counts(counts: i64, step: f64) -> f64 {
     counts as f64 * step
 }
 
-/// The nearest position that encoders of `step_m` can show; the position itself when the step is zero.
+/// The nearest position that encoders of `step_m` resolve; the position itself when the step is zero.
 pub fn quantise(position_m: &Vector3<f64>, step_m: f64) -> Vector3<f64> {
     if step_m > 0.0 {
         position_m.map(|x| si_from_counts(counts_from_si(x, step_m), step_m))
@@ -22,18 +22,18 @@ pub fn quantise(position_m: &Vector3<f64>, step_m: f64) -> Vector3<f64> {
     }
 }
 
-/// Metres from the millimetres of a driver.
+/// Metres from a driver's millimetres.
 pub fn metres_from_millimetres(position_mm: &Vector3<f64>) -> Vector3<f64> {
     position_mm * 1e-3
 }
 
-/// Newton metres to the milli newton metres of a driver.
+/// A driver's millinewton metres from newton metres.
 pub fn millinewton_metres_from_newton_metres(torque_nm: &Vector3<f64>) -> Vector3<f64> {
     torque_nm * 1e3
 }
 
 /// Position (m) and orientation from a driver's homogeneous transform: column-major, in millimetres.
-/// `None` where it is not finite or its upper block is not close to a rotation.
+/// `None` if it is not finite or its upper block is not close to a rotation.
 pub fn pose_from_column_major_mm(transform: &[f64; 16]) -> Option<(Vector3<f64>, UnitQuaternion<f64>)> {
     if transform.iter().any(|x| !x.is_finite()) {
         return None;

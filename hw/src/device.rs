@@ -1,13 +1,11 @@
-//! What the force loop asks of a haptic device, and what it may rely on.
-
-use core::fmt;
+//! The contract between the force loop and a haptic device.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// A haptic device of six degrees of freedom, called once a tick from the force loop.
 ///
-/// Obligations of every back end, each held by the conformance tests:
+/// Obligations of every back end, checked by [`conformance`](crate::conformance):
 ///
 /// - after construction nothing allocates, locks, logs or panics, whatever the arguments are;
 /// - [`read`](Device::read) returns within a quarter of a millisecond. A device that has nothing new
@@ -16,8 +14,8 @@ use serde::{Deserialize, Serialize};
 /// - [`write`](Device::write) of [`Wrench::zero`] is accepted at any time, also after a fault;
 /// - a wrench that is not finite is refused with [`DeviceFault::NonFiniteWrench`] and leaves zero force;
 /// - a wrench past what the device can give keeps its direction and loses magnitude;
-/// - the wrench holds until the next `write`, and a dropped device leaves zero force. A real device also lets go of
-///   a wrench that was not renewed for a tenth of a second.
+/// - the wrench holds until the next `write`, and a dropped device leaves zero force. A real device also
+///   sets a wrench to zero that was not renewed for a tenth of a second.
 ///
 /// ```
 /// use stylet_hw::{Device, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
@@ -27,7 +25,7 @@ use serde::{Deserialize, Serialize};
 /// assert!(sample.is_finite() && device.info().simulated);
 /// ```
 pub trait Device: Send {
-    /// What the device is and how far it can be trusted. Constant for the life of the device.
+    /// Name and limits of the device. Constant for the life of the device.
     fn info(&self) -> DeviceInfo;
 
     /// The newest pose. `dt_s` is the time since the last call; a simulated device advances by it, a real
@@ -37,23 +35,29 @@ pub trait Device: Send {
     /// The wrench that the device exerts on the operator, in the world frame, until the next call.
     fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceFault>;
 
-    /// Where a simulated hand should take the tip. A device held by a real hand ignores it.
+    /// Sets the goal to which a simulated hand moves the tip. A device held by a real hand ignores it.
     fn set_hand_goal(&mut self, _goal: &HandGoal) {}
 
-    /// A simulated hand stops where it is, as fast as its last goal lets it. A device held by a real hand ignores it.
+    /// Stops a simulated hand with the acceleration of its last goal. A device held by a real hand ignores it.
     fn stop_hand(&mut self) {}
 }
 
-/// The figures of a device that limit what the force loop may ask of it.
+/// Name and limits of a device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeviceInfo {
+    /// Name for display and records.
     pub name: &'static str,
+    /// Largest force for a short time.
     pub peak_force_n: f64,
+    /// Largest force for any time.
     pub continuous_force_n: f64,
+    /// Largest torque; zero for a device without torques.
     pub peak_torque_nm: f64,
+    /// Largest stiffness that the device can render.
     pub max_stiffness_n_per_m: f64,
-    /// The smallest change of position that the encoders can show, at the nominal pose.
+    /// Smallest change of position that the encoders resolve, at the nominal pose.
     pub position_step_m: f64,
+    /// No real hand holds the device.
     pub simulated: bool,
 }
 
@@ -75,16 +79,18 @@ impl DeviceInfo {
 /// One reading of the device.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
+    /// Position of the tip, m.
     pub tip_in_world: Vector3<f64>,
     /// The needle lies along +z of the tool frame, pointing out of the handle towards the tip.
     pub world_from_tool: UnitQuaternion<f64>,
-    /// One bit a button, bit 0 the first.
+    /// One bit per button, bit 0 for the first.
     pub buttons: u32,
     /// Grows with each new reading: the same number twice means a repeated sample.
     pub sequence: u64,
 }
 
 impl Sample {
+    /// Whether position and orientation are finite.
     pub fn is_finite(&self) -> bool {
         self.tip_in_world.iter().all(|x| x.is_finite()) && self.world_from_tool.coords.iter().all(|x| x.is_finite())
     }
@@ -98,11 +104,14 @@ impl Sample {
 /// Force and torque on the operator's hand, in the world frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Wrench {
+    /// Force, N.
     pub force_n: Vector3<f64>,
+    /// Torque, N m.
     pub torque_nm: Vector3<f64>,
 }
 
 impl Wrench {
+    /// No force and no torque.
     pub fn zero() -> Self {
         Self {
             force_n: Vector3::zeros(),
@@ -110,6 +119,7 @@ impl Wrench {
         }
     }
 
+    /// A force without torque.
     pub fn from_force(force_n: Vector3<f64>) -> Self {
         Self {
             force_n,
@@ -117,7 +127,7 @@ impl Wrench {
         }
     }
 
-    /// The same directions, with no more force and torque than the device can give.
+    /// The same directions, with force and torque limited to the peaks of the device.
     pub fn within(&self, info: &DeviceInfo) -> Self {
         Self {
             force_n: saturated(&self.force_n, info.peak_force_n),
@@ -125,6 +135,7 @@ impl Wrench {
         }
     }
 
+    /// Whether force and torque are finite.
     pub fn is_finite(&self) -> bool {
         self.force_n.iter().chain(self.torque_nm.iter()).all(|x| x.is_finite())
     }
@@ -136,7 +147,7 @@ impl Default for Wrench {
     }
 }
 
-/// The same direction, no longer than `limit`. Finite also where the square of the length is not.
+/// The same direction, with the length limited to `limit`. Finite even if the square of the length is not.
 fn saturated(v: &Vector3<f64>, limit: f64) -> Vector3<f64> {
     let largest = v.amax();
     if largest <= 0.0 {
@@ -151,18 +162,21 @@ fn saturated(v: &Vector3<f64>, limit: f64) -> Vector3<f64> {
     }
 }
 
-/// Where the simulated hand should go, and how.
+/// Goal of the simulated hand, and its limits on the way.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HandGoal {
+    /// Where the tip should be, m.
     pub tip_in_world: Vector3<f64>,
-    /// Needle axis towards the tip; any length but zero.
+    /// Needle axis towards the tip, of any length but zero.
     pub direction: Vector3<f64>,
+    /// Largest speed.
     pub speed_m_per_s: f64,
+    /// Largest acceleration.
     pub acceleration_m_per_s2: f64,
 }
 
 impl HandGoal {
-    /// Finite, a direction to speak of, and a speed and an acceleration above zero.
+    /// Whether all values are finite, the direction is longer than 1e-9, and speed and acceleration are above zero.
     pub fn is_valid(&self) -> bool {
         let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
         let positive = |x: f64| x.is_finite() && x > 0.0;
@@ -174,41 +188,42 @@ impl HandGoal {
     }
 }
 
-/// Why a device could not do what it was asked. The numbers are stable: they appear in records.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// Why a device could not read or write. The numbers are stable, because they appear in records.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error, num_enum::TryFromPrimitive)]
 #[repr(u32)]
 pub enum DeviceFault {
+    /// No device is connected.
+    #[error("no device is connected")]
     NotConnected = 1,
+    /// The device or the force loop is silent.
+    #[error("the device did not answer in time")]
     TimedOut = 2,
+    /// The pose is invalid.
+    #[error("the device gave a position that is not a number")]
     NonFiniteSample = 3,
+    /// The wrench is invalid.
+    #[error("the requested force is not a number")]
     NonFiniteWrench = 4,
+    /// The time since the last call is invalid.
+    #[error("the requested period is not a positive number")]
     InvalidPeriod = 5,
+    /// The operator has to calibrate the device.
+    #[error("the device is not calibrated")]
     NotCalibrated = 6,
+    /// The force is off until the motors have cooled.
+    #[error("the motors of the device are too warm")]
     Overheated = 7,
+    /// The driver turned the force off.
+    #[error("the safety stop of the device is engaged")]
     SafetyStop = 8,
+    /// Any other error of the driver.
+    #[error("the driver of the device reports an error")]
     Driver = 9,
 }
 
 impl DeviceFault {
+    /// Its stable number; `DeviceFault::try_from` is the inverse.
     pub const fn code(self) -> u32 {
         self as u32
     }
 }
-
-impl fmt::Display for DeviceFault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::NotConnected => "no device is connected",
-            Self::TimedOut => "the device did not answer in time",
-            Self::NonFiniteSample => "the device gave a position that is not a number",
-            Self::NonFiniteWrench => "the force asked for is not a number",
-            Self::InvalidPeriod => "the period asked for is not a positive number",
-            Self::NotCalibrated => "the device is not calibrated",
-            Self::Overheated => "the motors of the device are too warm",
-            Self::SafetyStop => "the safety stop of the device is engaged",
-            Self::Driver => "the driver of the device reports an error",
-        })
-    }
-}
-
-impl core::error::Error for DeviceFault {}

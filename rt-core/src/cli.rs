@@ -5,35 +5,38 @@ use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use stylet_lab::args::LatencyArgs;
 use stylet_lab::load::Work;
-use stylet_runtime::args::{RealTimeArgs, scenes};
-use stylet_runtime::core::Options;
-use stylet_runtime::device::DeviceChoice;
+use stylet_runtime::args::{OptionsError, RealTimeArgs, scenes};
+use stylet_runtime::device::{self, DeviceChoice};
+use stylet_runtime::process::Options;
 use stylet_shm_schema::BUILTIN_SCENES;
 use stylet_sim::scene::TissueKind;
 
 /// Real-time process of Stylet: owns the haptic device, the 1 kHz force loop and the 200 Hz tissue step.
 ///
-/// Start it first; any number of `host-ui` windows may come and go. It asks for SCHED_FIFO and locked memory and
-/// refuses to run without them, unless told --no-rt. With a subcommand it does not run but answers a question.
+/// Start it first; any number of hosts may connect and disconnect. It asks for SCHED_FIFO and locked memory and refuses to
+/// run without them, unless started with --no-rt. With a subcommand it carries out that task instead.
 #[derive(Parser, Debug)]
 #[command(name = "rt-core", version, args_conflicts_with_subcommands = true)]
 pub struct Cli {
+    /// Carried out instead of a run.
     #[command(subcommand)]
     pub task: Option<Task>,
+    /// Settings of a run.
     #[command(flatten)]
     pub run: RunArgs,
 }
 
+/// What `rt-core` does instead of a run.
 #[derive(Subcommand, Debug)]
 pub enum Task {
     /// Measure how late the loops are on this machine, and write a report with a verdict
     Latency(Box<LatencyArgs>),
-    /// Check that a filed latency report is as it was written
+    /// Verify that a saved latency report is unaltered
     Verify {
         /// The folder of the report, or its report.json
         report: PathBuf,
     },
-    /// Say whether this PC is fit for the force loop, and what to change
+    /// Check whether this PC is fit for the force loop, and what to change
     Doctor {
         /// As JSON
         #[arg(long)]
@@ -42,7 +45,7 @@ pub enum Task {
         #[arg(long, value_name = "N")]
         haptic_core: Option<usize>,
     },
-    /// Show a flight recording, repeat it, and say whether every force and position is the same in every bit
+    /// Show a flight recording, repeat it, and check that all forces and positions are bit-identical
     Replay(Replay),
     /// Measure what each part of a scene costs in a tissue tick
     Cost {
@@ -53,9 +56,12 @@ pub enum Task {
     /// One process of a load; started by `latency`
     #[command(hide = true)]
     Load {
+        /// What to do
         work: Work,
+        /// Instance under measurement
         #[arg(long)]
         instance: String,
+        /// File that the load may write
         #[arg(long)]
         file: PathBuf,
     },
@@ -75,23 +81,23 @@ pub struct RunArgs {
     /// Folder of the flight recordings [default: $XDG_STATE_HOME/stylet/flights or ~/.local/state/stylet/flights]
     #[arg(long, value_name = "DIR")]
     flight_dir: Option<PathBuf>,
-    /// What computes the tissue
+    /// Tissue model
     #[arg(long, value_enum, default_value_t)]
     tissue: TissueKind,
-    /// simulated, phantom (the driver's default device), phantom:NAME, or replay:FILE (from 'host-ui export --motion')
-    #[arg(long, default_value = "simulated", value_name = "DEVICE")]
+    // The table of back ends has the help.
+    #[arg(long, default_value = "simulated", value_name = "DEVICE", help = device::help())]
     device: DeviceChoice,
     /// The driver's library libHD.so [default: STYLET_LIBHD, else where the system has it]
     #[arg(long, value_name = "PATH")]
     libhd: Option<PathBuf>,
-    /// On exit write what each loop cost to FILE, as JSON
+    /// On exit write to FILE, as JSON, what each loop cost
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
 }
 
 impl RunArgs {
-    /// Lists what is wrong with the settings.
-    pub fn options(&self) -> Result<Options, String> {
+    /// The settings of the run, or every problem with them.
+    pub fn options(&self) -> Result<Options, OptionsError> {
         let mut options = self.real_time.options(&self.instance)?;
         options.tissue = self.tissue;
         options.device = self.device.clone();

@@ -2,26 +2,18 @@
 
 use clap::Parser;
 use rt_core::cli::{Cli, RunArgs, Task};
+use rt_core::report::Report;
+use std::error::Error;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_lab::{doctor, latency, load, verify};
-use stylet_runtime::core::{LoopReport, RunReport};
 use stylet_shm_schema::service::Instance;
 use stylet_sim::scene::Scene;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let ended = match &cli.task {
-        None => run(&cli.run).map(|()| 0),
-        Some(Task::Latency(args)) => stop_on_signal().and_then(|stop| latency::run(args, &stop)),
-        Some(Task::Verify { report }) => verify::run(report),
-        Some(Task::Doctor { json, haptic_core }) => Ok(doctor::run(*json, *haptic_core)),
-        Some(Task::Replay(replay)) => replay.run().map(|same| u8::from(!same)),
-        Some(Task::Cost { scene }) => cost(scene).map(|()| 0),
-        Some(Task::Load { work, instance, file }) => serve_as_load(*work, instance, file).map(|()| 0),
-    };
-    match ended {
+    match carry_out(&cli) {
         Ok(code) => ExitCode::from(code),
         Err(why) => {
             eprintln!("rt-core: {why}");
@@ -30,8 +22,21 @@ fn main() -> ExitCode {
     }
 }
 
+/// The exit code of the run or of its task.
+fn carry_out(cli: &Cli) -> Result<u8, Box<dyn Error>> {
+    Ok(match &cli.task {
+        None => run(&cli.run).map(|()| 0)?,
+        Some(Task::Latency(args)) => latency::run(args, &*stop_on_signal()?)?,
+        Some(Task::Verify { report }) => verify::run(report)?,
+        Some(Task::Doctor { json, haptic_core }) => doctor::run(*json, *haptic_core),
+        Some(Task::Replay(replay)) => u8::from(!replay.run()?),
+        Some(Task::Cost { scene }) => cost(scene).map(|()| 0)?,
+        Some(Task::Load { work, instance, file }) => serve_as_load(*work, instance, file).map(|()| 0)?,
+    })
+}
+
 /// Set by the first signal that asks this program to end.
-fn stop_on_signal() -> Result<Arc<AtomicBool>, String> {
+fn stop_on_signal() -> Result<Arc<AtomicBool>, Box<dyn Error>> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [
         signal_hook::consts::SIGINT,
@@ -43,21 +48,21 @@ fn stop_on_signal() -> Result<Arc<AtomicBool>, String> {
     Ok(stop)
 }
 
-fn serve_as_load(work: load::Work, instance: &str, file: &std::path::Path) -> Result<(), String> {
+fn serve_as_load(work: load::Work, instance: &str, file: &std::path::Path) -> Result<(), Box<dyn Error>> {
     follow_parent();
-    let instance = Instance::new(instance).map_err(|e| e.to_string())?;
+    let instance = Instance::new(instance)?;
     let stop = stop_on_signal()?;
     // SYNC: set by a signal handler; nothing but the flag is carried.
-    load::work(work, &instance, file, || stop.load(Ordering::Acquire))
+    Ok(load::work(work, &instance, file, || stop.load(Ordering::Acquire))?)
 }
 
-fn cost(scene: &str) -> Result<(), String> {
-    let scene = Scene::builtin(scene).map_err(|e| e.to_string())?;
+fn cost(scene: &str) -> Result<(), Box<dyn Error>> {
+    let scene = Scene::builtin(scene)?;
     println!("{}", stylet_lab::cost::table(&scene)?);
     Ok(())
 }
 
-fn run(args: &RunArgs) -> Result<(), String> {
+fn run(args: &RunArgs) -> Result<(), Box<dyn Error>> {
     abort_on_panic();
     if args.exit_with_parent {
         follow_parent();
@@ -70,11 +75,12 @@ fn run(args: &RunArgs) -> Result<(), String> {
         options.scene,
         if options.no_rt { "NOT real-time" } else { "real-time" }
     );
-    let report = stylet_runtime::core::run(&options, &stop);
+    let report = stylet_runtime::process::run(&options, &stop);
     options.instance.sweep_at_end();
     let report = report?;
     if let Some(path) = &args.report {
-        std::fs::write(path, to_json(&report)).map_err(|e| format!("cannot write {}: {e}", path.display()))?;
+        let json = serde_json::to_string_pretty(&Report::from(&report))? + "\n";
+        std::fs::write(path, json).map_err(|e| format!("cannot write {}: {e}", path.display()))?;
     }
     Ok(())
 }
@@ -98,30 +104,4 @@ fn follow_parent() {
     if orphan {
         std::process::exit(0);
     }
-}
-
-fn to_json(report: &RunReport) -> String {
-    let one = |r: &LoopReport| {
-        format!(
-            "{{\"policy\": {}, \"priority\": {}, \"core\": {}, \"ticks\": {}, \"missed_deadlines\": {}, \
-             \"worst_wake_us\": {:.1}, \"heap_calls\": {}, \"minor_faults\": {}, \"major_faults\": {}, \
-             \"voluntary_switches\": {}, \"involuntary_switches\": {}}}",
-            r.thread.policy,
-            r.thread.priority,
-            r.thread.core,
-            r.ticks,
-            r.missed,
-            r.worst_wake_ns as f64 / 1e3,
-            r.usage.heap_calls,
-            r.usage.minor_faults,
-            r.usage.major_faults,
-            r.usage.voluntary_switches,
-            r.usage.involuntary_switches
-        )
-    };
-    format!(
-        "{{\n  \"haptic\": {},\n  \"tissue\": {}\n}}\n",
-        one(&report.haptic),
-        one(&report.tissue)
-    )
 }

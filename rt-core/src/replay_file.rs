@@ -1,14 +1,29 @@
-//! `rt-core replay FILE`: what a flight recording holds, and whether it can be repeated bit by bit.
+//! `rt-core replay FILE`: what a flight recording holds, and whether its repetition is bit-identical.
 
 use clap::Args;
 use std::path::PathBuf;
-use stylet_runtime::replay::file::Flight;
-use stylet_runtime::replay::repeat::{self, Repeated};
-use stylet_runtime::rt::arm::{self, Ask};
+use stylet_runtime::replay::file::{Flight, FlightError};
+use stylet_runtime::replay::repeat::{self, RepeatError, Repeated};
+use stylet_runtime::rt::arm::{self, Ask, Refused};
 use stylet_runtime::rt::haptic_tape::HapticFlight;
 use stylet_runtime::rt::tissue_tape::TissueFlight;
 use stylet_shm_schema::{Fault, flags};
 
+/// Why a recording could not be repeated.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// The recording cannot be read.
+    #[error(transparent)]
+    File(#[from] FlightError),
+    /// The thread cannot be set up as the loops were.
+    #[error(transparent)]
+    Thread(#[from] Refused),
+    /// The tissue cannot be repeated.
+    #[error(transparent)]
+    Tissue(#[from] RepeatError),
+}
+
+/// The command.
 #[derive(Args, Debug)]
 pub struct Replay {
     /// Flight recording that rt-core wrote (*.flight)
@@ -16,8 +31,8 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// True when everything came out the same in every bit.
-    pub fn run(&self) -> Result<bool, String> {
+    /// Prints what it finds; true when every force and position is bit-identical.
+    pub fn run(&self) -> Result<bool, ReplayError> {
         let flight = Flight::read(&self.file)?;
         if flight.version != env!("CARGO_PKG_VERSION") {
             println!(
@@ -32,25 +47,24 @@ impl Replay {
         arm::arm(Ask {
             priority: None,
             core: None,
-        })
-        .map_err(|e| e.to_string())?;
+        })?;
         let haptic = flight.haptic.as_ref().map(|recorded| {
-            tell_haptic(recorded);
+            print_haptic(recorded);
             repeat::haptic(&flight, recorded)
         });
         let tissue = flight
             .tissue
             .as_ref()
             .map(|recorded| {
-                tell_tissue(recorded);
+                print_tissue(recorded);
                 repeat::tissue(&flight, recorded)
             })
             .transpose()?;
-        Ok(tell("forces", haptic.as_ref()) & tell("tissue", tissue.as_ref()))
+        Ok(print_result("forces", haptic.as_ref()) & print_result("tissue", tissue.as_ref()))
     }
 }
 
-fn tell_haptic(recorded: &HapticFlight) {
+fn print_haptic(recorded: &HapticFlight) {
     let records = recorded.ticks.iter().map(|e| &e.record);
     let peak_n = records
         .clone()
@@ -77,14 +91,14 @@ fn tell_haptic(recorded: &HapticFlight) {
     let mut before = None;
     for record in records {
         if before.is_some_and(|fault| fault != record.fault) || (before.is_none() && record.fault != 0) {
-            let words = Fault::from_number(record.fault).map_or("a fault that is not known", Fault::message);
-            println!("         tick {}: {words}", record.tick);
+            let text = Fault::from_number(record.fault).map_or("a fault that is not known", Fault::message);
+            println!("         tick {}: {text}", record.tick);
         }
         before = Some(record.fault);
     }
 }
 
-fn tell_tissue(recorded: &TissueFlight) {
+fn print_tissue(recorded: &TissueFlight) {
     if let (Some(first), Some(last)) = (recorded.ticks.first(), recorded.ticks.last()) {
         println!(
             "tissue   ticks {} to {}, {:.3} s, {} seeds, {} orders",
@@ -97,7 +111,7 @@ fn tell_tissue(recorded: &TissueFlight) {
     }
 }
 
-fn tell(what: &str, found: Option<&Repeated>) -> bool {
+fn print_result(what: &str, found: Option<&Repeated>) -> bool {
     let Some(r) = found else {
         println!("{what}   not in the recording");
         return true;

@@ -5,17 +5,10 @@ use crate::{
     Rehearsal, SceneHeader, SeedPose, SnapshotHeader, TickRecord, Vertex,
 };
 
-/// Why a value was not believed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Rubbish(pub &'static str);
-
-impl std::fmt::Display for Rubbish {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "not believed: {}", self.0)
-    }
-}
-
-impl std::error::Error for Rubbish {}
+/// What is invalid in a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("invalid: {0}")]
+pub struct Invalid(pub &'static str);
 
 /// No scene is larger than this, so no coordinate is.
 pub const MAX_COORDINATE_M: f64 = 20.0;
@@ -27,15 +20,16 @@ fn within(values: &[f64], limit: f64) -> bool {
     values.iter().all(|v| v.abs() <= limit)
 }
 
-fn ensure(holds: bool, what: &'static str) -> Result<(), Rubbish> {
-    if holds { Ok(()) } else { Err(Rubbish(what)) }
+fn ensure(holds: bool, what: &'static str) -> Result<(), Invalid> {
+    if holds { Ok(()) } else { Err(Invalid(what)) }
 }
 
-pub fn state(s: &HapticState) -> Result<(), Rubbish> {
+/// Verifies a state read from the board.
+pub fn state(s: &HapticState) -> Result<(), Invalid> {
     ensure(within(&s.tip_in_scene_m, MAX_COORDINATE_M), "tip position")?;
     ensure(within(&s.contact_in_scene_m, MAX_COORDINATE_M), "contact position")?;
     ensure(within(&s.needle_direction, 1.001), "needle direction")?;
-    ensure(within(&[s.depth_m], MAX_COORDINATE_M), "depth")?;
+    ensure(within(&[s.depth_m, s.puncture_depth_m], MAX_COORDINATE_M), "depth")?;
     ensure(within(&[s.speed_m_per_s], MAX_SPEED_M_PER_S), "speed")?;
     ensure(within(&s.force_on_hand_n, MAX_FORCE_N), "force")?;
     ensure(within(&s.torque_on_hand_nm, MAX_FORCE_N), "torque")?;
@@ -49,7 +43,8 @@ pub fn state(s: &HapticState) -> Result<(), Rubbish> {
     ensure(s.seed_count as usize <= MAX_SEEDS, "seed count")
 }
 
-pub fn record(r: &TickRecord) -> Result<(), Rubbish> {
+/// Verifies one record of a tick.
+pub fn record(r: &TickRecord) -> Result<(), Invalid> {
     ensure(within(&r.tip_in_scene_m, MAX_COORDINATE_M), "tip position")?;
     ensure(within(&r.force_on_hand_n, MAX_FORCE_N), "force")?;
     ensure(within(&[r.depth_m], MAX_COORDINATE_M), "depth")?;
@@ -63,7 +58,7 @@ pub fn record(r: &TickRecord) -> Result<(), Rubbish> {
 }
 
 /// `vertices` are those that came with the header, displacements of nodes included.
-pub fn snapshot(h: &SnapshotHeader, vertices: &[Vertex]) -> Result<(), Rubbish> {
+pub fn snapshot(h: &SnapshotHeader, vertices: &[Vertex]) -> Result<(), Invalid> {
     let sent = u64::from(h.vertex_count) + u64::from(h.node_count);
     ensure(sent == vertices.len() as u64, "vertex or node count")?;
     ensure(h.seed_count as usize <= MAX_SEEDS, "seed count")?;
@@ -80,7 +75,7 @@ pub fn snapshot(h: &SnapshotHeader, vertices: &[Vertex]) -> Result<(), Rubbish> 
 }
 
 /// `words` are those that came with the header.
-pub fn scene(h: &SceneHeader, words: &[u32]) -> Result<(), Rubbish> {
+pub fn scene(h: &SceneHeader, words: &[u32]) -> Result<(), Invalid> {
     ensure(h.word_count() == Some(words.len()), "vertex or triangle count")?;
     ensure(h.spacing_m > 0.0 && h.spacing_m < 1.0, "spacing")?;
     ensure(h.volume_m3.is_finite(), "volume")?;
@@ -120,17 +115,19 @@ pub fn scene(h: &SceneHeader, words: &[u32]) -> Result<(), Rubbish> {
     ensure(labels.iter().all(known), "label of a cell")
 }
 
-fn grid(g: &GridInfo, most: usize, what: &'static str) -> Result<(), Rubbish> {
+fn grid(g: &GridInfo, most: usize, what: &'static str) -> Result<(), Invalid> {
     ensure(g.node_count().is_some_and(|n| n <= most), what)?;
     ensure(within(&g.origin_m, MAX_COORDINATE_M), what)?;
     ensure(g.dims == [0; 3] || (g.spacing_m > 0.0 && g.spacing_m < 1.0), what)
 }
 
-pub fn parameters(p: &ParametersInForce) -> Result<(), Rubbish> {
-    ensure(p.set.problems().is_empty(), "parameter outside its limits")
+/// Verifies the parameters in force: the limits of the table, and eq. 1.
+pub fn parameters(p: &ParametersInForce) -> Result<(), Invalid> {
+    ensure(p.set.problems().is_empty(), "parameters")
 }
 
-pub fn plan(p: &PlanInForce) -> Result<(), Rubbish> {
+/// Verifies the plan in force.
+pub fn plan(p: &PlanInForce) -> Result<(), Invalid> {
     ensure(p.seed_count as usize <= MAX_SEEDS, "seed count")?;
     ensure(within(&p.entry_m, MAX_COORDINATE_M), "entry")?;
     ensure(p.generation == 0 || is_unit(&p.direction), "direction")?;
@@ -142,7 +139,8 @@ pub fn plan(p: &PlanInForce) -> Result<(), Rubbish> {
     )
 }
 
-pub fn rehearsal(r: &Rehearsal) -> Result<(), Rubbish> {
+/// Verifies the result of a rehearsal.
+pub fn rehearsal(r: &Rehearsal) -> Result<(), Invalid> {
     ensure(r.seed_count as usize <= MAX_SEEDS, "seed count")?;
     ensure(within(&[r.peak_force_n], MAX_FORCE_N), "peak force")?;
     ensure(
@@ -152,7 +150,7 @@ pub fn rehearsal(r: &Rehearsal) -> Result<(), Rubbish> {
     seeds(&r.seeds[..r.seed_count as usize])
 }
 
-fn seeds(seeds: &[SeedPose]) -> Result<(), Rubbish> {
+fn seeds(seeds: &[SeedPose]) -> Result<(), Invalid> {
     for seed in seeds {
         ensure(within(&seed.position_m, MAX_COORDINATE_M), "seed position")?;
         ensure(within(&seed.dropped_at_m, MAX_COORDINATE_M), "seed drop position")?;
@@ -161,6 +159,7 @@ fn seeds(seeds: &[SeedPose]) -> Result<(), Rubbish> {
     Ok(())
 }
 
+/// Whether the length of `v` is 1 within 0.0005.
 pub fn is_unit(v: &[f64; 3]) -> bool {
     let norm2 = v.iter().map(|c| c * c).sum::<f64>();
     (norm2 - 1.0).abs() < 1e-3
@@ -172,7 +171,7 @@ mod tests {
     use bytemuck::Zeroable;
 
     #[test]
-    fn all_ones_and_not_a_number_are_not_believed() {
+    fn all_ones_and_not_a_number_are_invalid() {
         let ones = |size: usize| vec![0xff_u8; size];
         let s: HapticState = bytemuck::pod_read_unaligned(&ones(size_of::<HapticState>()));
         assert!(state(&s).is_err());
@@ -183,7 +182,7 @@ mod tests {
         let mut r = Rehearsal::zeroed();
         assert!(rehearsal(&r).is_ok());
         (r.seed_count, r.seeds[1].position_m[2]) = (2, f64::NAN);
-        assert_eq!(rehearsal(&r), Err(Rubbish("seed position")));
+        assert_eq!(rehearsal(&r), Err(Invalid("seed position")));
         let h: SnapshotHeader = bytemuck::pod_read_unaligned(&ones(size_of::<SnapshotHeader>()));
         assert!(snapshot(&h, &[]).is_err());
         let h: SceneHeader = bytemuck::pod_read_unaligned(&ones(size_of::<SceneHeader>()));
@@ -197,32 +196,32 @@ mod tests {
         (h.vertex_count, h.triangle_count, h.spacing_m) = (1, 1, 1e-3);
         let word = 1.0_f32.to_bits();
         assert!(scene(&h, &[word, word, word, 0, 0, 0]).is_ok());
-        assert_eq!(scene(&h, &[word, word, word, 0, 1, 0]), Err(Rubbish("triangle index")));
+        assert_eq!(scene(&h, &[word, word, word, 0, 1, 0]), Err(Invalid("triangle index")));
         assert_eq!(
             scene(&h, &[word, u32::MAX, word, 0, 0, 0]),
-            Err(Rubbish("vertex position"))
+            Err(Invalid("vertex position"))
         );
         let words = [word, word, word, 0, 0, 0];
         (h.structure_count, h.structures[0].triangle_count) = (1, 1);
         assert!(scene(&h, &words).is_ok());
         h.structures[0].first_triangle = 1;
-        assert_eq!(scene(&h, &words), Err(Rubbish("triangles of a structure")));
+        assert_eq!(scene(&h, &words), Err(Invalid("triangles of a structure")));
         (h.structures[0].first_triangle, h.structures[0].upper_m[1]) = (0, f64::NAN);
-        assert_eq!(scene(&h, &words), Err(Rubbish("bounding box of a structure")));
+        assert_eq!(scene(&h, &words), Err(Invalid("bounding box of a structure")));
         h.structures[0].upper_m[1] = 0.0;
         (h.labels.dims, h.labels.spacing_m) = ([5, 1, 1], 1e-3);
         let labelled = |cells: [u32; 2]| [&words[..], &cells[..]].concat();
         assert!(scene(&h, &labelled([0x0100_0001, 1])).is_ok());
-        assert_eq!(scene(&h, &labelled([0x0200_0001, 1])), Err(Rubbish("label of a cell")));
-        assert_eq!(scene(&h, &words), Err(Rubbish("vertex or triangle count")));
+        assert_eq!(scene(&h, &labelled([0x0200_0001, 1])), Err(Invalid("label of a cell")));
+        assert_eq!(scene(&h, &words), Err(Invalid("vertex or triangle count")));
         h.nodes.dims = [64, 64, 3];
         assert_eq!(
             scene(&h, &labelled([0, 0])),
-            Err(Rubbish("grid of displacements")),
+            Err(Invalid("grid of displacements")),
             "more nodes than a tick may fill"
         );
         h.nodes.dims = [0; 3];
         h.structure_count = MAX_STRUCTURES as u32 + 1;
-        assert_eq!(scene(&h, &labelled([0, 0])), Err(Rubbish("structure count")));
+        assert_eq!(scene(&h, &labelled([0, 0])), Err(Invalid("structure count")));
     }
 }

@@ -1,125 +1,96 @@
-//! What a host may ask for, and the answer it gets.
+//! The records of a request and of its answer, as they lie in shared memory.
 
-use crate::Text;
+use crate::{Reason, Refusal, Text};
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
+use num_enum::TryFromPrimitive;
 
-/// A plan of 128 seeds and its path fits.
+/// Values of one command at most: a plan of 128 seeds and its path fits.
 pub const MAX_COMMAND_VALUES: usize = 400;
 
-/// A request. Answered by one [`Reply`] with the same `host_id` and `command_id`.
+/// A [`crate::Request`] as plain old data, written by a host. Answered by one [`Reply`] with the same `host_id` and
+/// `command_id`. Made and read by [`crate::Request::encode`] and [`crate::Request::decode`] only.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.Command")]
 pub struct Command {
+    /// The host that asks.
     pub host_id: u64,
+    /// Number of the command, given by the host.
     pub command_id: u64,
-    /// [`CommandKind`] by number.
+    /// [`crate::CommandKind`] by number.
     pub kind: u32,
     /// How many of `values` count.
     pub value_count: u32,
+    /// The payload.
     pub values: [f64; MAX_COMMAND_VALUES],
 }
 
-impl Command {
-    /// `values` past [`MAX_COMMAND_VALUES`] are not sent.
-    pub fn new(host_id: u64, command_id: u64, kind: CommandKind, values: &[f64]) -> Self {
-        let mut command = Self::zeroed();
-        command.host_id = host_id;
-        command.command_id = command_id;
-        command.kind = kind as u32;
-        let count = values.len().min(MAX_COMMAND_VALUES);
-        command.value_count = count as u32;
-        command.values[..count].copy_from_slice(&values[..count]);
-        command
-    }
-}
+/// Reasons in one reply at most; a refusal with more names the others in its text only.
+pub const MAX_REASONS: usize = 48;
 
-/// By stable number; behind each, its values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum CommandKind {
-    /// Pairs of parameter number and value in SI; all take effect at one tick, or none.
-    SetParameters = 1,
-    /// Entry x y z (m), direction x y z, then x y z (m) of each seed. An empty list withdraws the plan.
-    SetPlan = 2,
-    /// Tip goal x y z (m), direction x y z, speed (m/s), acceleration (m/s^2) for the simulated hand.
-    MoveHand = 3,
-    /// Leave a seed at the tip.
-    DropSeed = 4,
-    /// Turn the force on; also re-arms after a fault.
-    Engage = 5,
-    /// Ramp the force to zero.
-    Disengage = 6,
-    /// Tissue to rest, seeds removed, peaks and worst cases forgotten.
-    Reset = 7,
-    /// Run a built-in scene: its place in [`crate::BUILTIN_SCENES`]; the first one without a value.
-    LoadBuiltinScene = 8,
-    /// Remove the last seed.
-    UndoSeed = 9,
-    /// End `rt-core`.
-    Shutdown = 10,
-    /// Write the flight recording of both loops to disk.
-    SaveFlight = 11,
-    /// Go through one needle ahead of time, in a body of its own, from rest, and send a [`crate::Rehearsal`] before the reply.
-    /// Entry x y z (m), direction x y z, speeds of insertion, retraction and approach (m/s), acceleration (m/s^2), how far from the
-    /// entry the tip is drawn back to (m), then x y z (m) of each drop in its order.
-    Rehearse = 12,
-    /// The simulated hand stops as fast as it can; where that is only the core knows.
-    StopHand = 13,
-}
-
-impl CommandKind {
-    pub fn from_number(number: u32) -> Option<Self> {
-        [
-            Self::SetParameters,
-            Self::SetPlan,
-            Self::MoveHand,
-            Self::DropSeed,
-            Self::Engage,
-            Self::Disengage,
-            Self::Reset,
-            Self::LoadBuiltinScene,
-            Self::UndoSeed,
-            Self::Shutdown,
-            Self::SaveFlight,
-            Self::Rehearse,
-            Self::StopHand,
-        ]
-        .into_iter()
-        .find(|k| *k as u32 == number)
-    }
-}
-
-/// The answer to a command or an upload.
+/// The answer to a command or an upload, written by the bridge.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.Reply")]
 pub struct Reply {
+    /// The run of the core that answers.
     pub session_id: u64,
+    /// The host that asked.
     pub host_id: u64,
+    /// Its number for the command.
     pub command_id: u64,
-    /// First tick of the force loop that ran with the change.
+    /// First tick of the force loop that ran with the change. Of parameters it holds for needle and force; the limits of
+    /// the tissue were ordered together with them and hold from the next tick of the tissue loop on.
     pub effective_tick: u64,
     /// [`ReplyStatus`] by number.
     pub status: u32,
-    pub reserved: u32,
-    /// Every reason for a refusal, one a line; empty when accepted.
+    /// How many of `reasons` count; 0 when accepted.
+    pub reason_count: u32,
+    /// Why it was refused, for programs.
+    pub reasons: [Reason; MAX_REASONS],
+    /// Every reason for a refusal, for people, one a line; empty when accepted.
     pub text: Text<1024>,
 }
 
-/// By stable number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+impl Reply {
+    /// The answer to command `command_id` of host `host_id`.
+    pub fn new(session_id: u64, (host_id, command_id): (u64, u64), result: Result<u64, &Refusal>) -> Self {
+        let mut reply = Self::zeroed();
+        (reply.session_id, reply.host_id, reply.command_id) = (session_id, host_id, command_id);
+        match result {
+            Ok(effective_tick) => (reply.status, reply.effective_tick) = (ReplyStatus::Accepted as u32, effective_tick),
+            Err(refusal) => {
+                reply.status = ReplyStatus::Refused as u32;
+                reply.text = Text::new(&refusal.text);
+                reply.reason_count = refusal.reasons.len().min(MAX_REASONS) as u32;
+                for (slot, reason) in reply.reasons.iter_mut().zip(&refusal.reasons) {
+                    *slot = *reason;
+                }
+            }
+        }
+        reply
+    }
+
+    /// Those that count.
+    pub fn reasons(&self) -> &[Reason] {
+        &self.reasons[..(self.reason_count as usize).min(MAX_REASONS)]
+    }
+}
+
+/// What came of a request, by stable number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive)]
 #[repr(u32)]
 pub enum ReplyStatus {
+    /// It was carried out.
     Accepted = 1,
+    /// Nothing changed.
     Refused = 2,
 }
 
 impl ReplyStatus {
+    /// `None` when this build does not know the number.
     pub fn from_number(number: u32) -> Option<Self> {
-        [Self::Accepted, Self::Refused]
-            .into_iter()
-            .find(|s| *s as u32 == number)
+        Self::try_from(number).ok()
     }
 }

@@ -3,14 +3,20 @@
 use crate::Text;
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
+use num_enum::TryFromPrimitive;
 
+/// One thing that happened, written by the bridge.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.Event")]
 pub struct Event {
+    /// The run of the core.
     pub session_id: u64,
+    /// Rises by one with each event of a run.
     pub sequence: u64,
+    /// `CLOCK_MONOTONIC` when it happened.
     pub time_ns: u64,
+    /// Tick of the loop that saw it; 0 when it was the bridge.
     pub tick: u64,
     /// [`EventKind`] by number.
     pub kind: u32,
@@ -18,12 +24,14 @@ pub struct Event {
     pub code: u32,
     /// Depth, force, or nothing, by kind.
     pub value: f64,
+    /// Where it happened, scene frame, m; zero for kinds without a place.
     pub position_m: [f64; 3],
+    /// What a person reads; empty for most kinds.
     pub text: Text<128>,
 }
 
 /// By stable number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive)]
 #[repr(u32)]
 pub enum EventKind {
     /// `value`: nothing.
@@ -36,30 +44,21 @@ pub enum EventKind {
     LeftTissue = 4,
     /// `code`: fault number.
     FaultRaised = 5,
+    /// The force was armed again after a fault.
     Rearmed = 6,
+    /// Another scene runs. `code`: its generation; `text`: its name.
     SceneLoaded = 7,
+    /// Tissue, seeds and counters were reset.
     Reset = 8,
-    /// A message from shared memory was not believed; `text` says why.
-    RubbishRefused = 9,
+    /// An invalid message from a host was refused; `text` says why.
+    InvalidRefused = 9,
     /// `text`: the file, or why none could be written.
     FlightSaved = 10,
 }
 
 impl EventKind {
+    /// `None` when this build does not know the number.
     pub fn from_number(number: u32) -> Option<Self> {
-        [
-            Self::Contact,
-            Self::Puncture,
-            Self::SeedDropped,
-            Self::LeftTissue,
-            Self::FaultRaised,
-            Self::Rearmed,
-            Self::SceneLoaded,
-            Self::Reset,
-            Self::RubbishRefused,
-            Self::FlightSaved,
-        ]
-        .into_iter()
-        .find(|k| *k as u32 == number)
+        Self::try_from(number).ok()
     }
 }

@@ -10,14 +10,16 @@
 //! | `events` | [`Event`], last 64 kept | bridge | hosts | what happened, once each |
 //! | `parameters` | [`ParametersInForce`], newest one kept | bridge | hosts | the parameters that took effect, and when |
 //! | `plan` | [`PlanInForce`], newest one kept | bridge | hosts | planned seeds and needle path |
-//! | `commands` | [`Command`] | hosts | bridge | requests |
+//! | `commands` | [`Command`] | hosts | bridge | a [`Request`] as plain data |
 //! | `replies` | [`Reply`] | bridge | hosts | accepted, or refused and why |
 //! | `rehearsals` | [`Rehearsal`] | bridge | hosts | where the seeds of a needle would end |
 //! | `uploads` | label cells under an [`UploadHeader`] | hosts | bridge | a segmented volume |
 //!
 //! Every type is plain old data, valid for every bit pattern: no `bool`, `enum` or `char`, no padding, no pointer.
-//! A reader believes nothing: [`check`] says what is verified before a value is used.
+//! A reader verifies everything: [`check`] before a value is used, [`Request::decode`] before a request is carried out.
 //! Quantities are SI (m, s, N, rad) in the *scene frame*: origin at the corner of the lattice, axes along it, needle along +z by default.
+
+#![warn(missing_docs)]
 
 pub mod check;
 mod command;
@@ -26,26 +28,33 @@ pub mod motion;
 mod params;
 mod plan;
 mod record;
+mod refusal;
 mod rehearsal;
+mod request;
 mod scene;
-pub mod script;
 pub mod service;
 mod session;
 mod snapshot;
 mod state;
 mod text;
 
-pub use command::{Command, CommandKind, MAX_COMMAND_VALUES, Reply, ReplyStatus};
+pub use command::{Command, MAX_COMMAND_VALUES, MAX_REASONS, Reply, ReplyStatus};
 pub use event::{Event, EventKind};
 pub use params::{
-    PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterId, ParameterSet, ParameterSpec, ParametersInForce,
+    PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet,
+    ParameterSpec, ParametersInForce, folding,
 };
 pub use plan::{MAX_SEEDS, PlanInForce, PlannedSeed};
 pub use record::TickRecord;
-pub use rehearsal::{REHEARSAL_HEAD, Rehearsal};
+pub use refusal::{Reason, Refusal, RefusalCode};
+pub use rehearsal::Rehearsal;
+pub use request::{
+    ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, NeedleRehearsal, ParameterChange, PlannedNeedle,
+    RETRACT_RANGE_M, Request, RequestError, RequestErrors, SPEED_RANGE_M_PER_S,
+};
 pub use scene::{
-    BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, StructureInfo, UploadHeader,
-    UploadStructure, role,
+    BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, SceneId, StructureInfo,
+    UploadHeader, UploadStructure, role,
 };
 pub use session::{Session, ThreadReport};
 pub use snapshot::{SeedPose, SnapshotHeader, Vertex};
@@ -53,4 +62,4 @@ pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.
-pub const SCHEMA_VERSION: u32 = 5;
+pub const SCHEMA_VERSION: u32 = 6;

@@ -3,32 +3,38 @@
 //! Layout, little-endian: 8 bytes of magic, period in ns and number of samples as `u64`, then the samples as
 //! [`MotionSample`]. The host makes it, so that the core need not read a foreign file.
 
-use crate::check::{MAX_COORDINATE_M, Rubbish};
+use crate::check::{Invalid, MAX_COORDINATE_M};
 use bytemuck::{Pod, Zeroable};
 
 /// Ends in the version of the layout.
 const MAGIC: &[u8; 8] = b"STYMOT\0\x01";
 const HEADER: usize = 24;
 
-/// All that a device says of one period.
+/// Everything that a device reports for one period.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct MotionSample {
+    /// Tip, scene frame, m.
     pub tip_in_scene_m: [f64; 3],
     /// Quaternion i, j, k, w.
     pub world_from_tool: [f64; 4],
+    /// Bits of the buttons that are pressed.
     pub buttons: u32,
+    /// Zero.
     pub reserved: u32,
 }
 
 /// Samples that were taken one period apart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
+    /// Time from one sample to the next, ns.
     pub period_ns: u64,
+    /// In the order of time; at least one.
     pub samples: Vec<MotionSample>,
 }
 
 impl Motion {
+    /// The whole file.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = MAGIC.to_vec();
         bytes.extend(self.period_ns.to_le_bytes());
@@ -37,21 +43,21 @@ impl Motion {
         bytes
     }
 
-    /// Believes nothing: sizes, places and orientations are checked.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Rubbish> {
+    /// Verifies sizes, positions and orientations.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Invalid> {
         let (header, body) = bytes
             .split_at_checked(HEADER)
-            .ok_or(Rubbish("shorter than its header"))?;
+            .ok_or(Invalid("shorter than its header"))?;
         let word = |at: usize| u64::from_le_bytes(std::array::from_fn(|i| header[at + i]));
         let (period_ns, count) = (word(8), word(16));
         if !header.starts_with(MAGIC) {
-            return Err(Rubbish("not a motion of this version"));
+            return Err(Invalid("not a motion of this version"));
         }
         if !(10_000..=1_000_000_000).contains(&period_ns) {
-            return Err(Rubbish("period"));
+            return Err(Invalid("period"));
         }
         if count == 0 || count.checked_mul(size_of::<MotionSample>() as u64) != Some(body.len() as u64) {
-            return Err(Rubbish("number of samples"));
+            return Err(Invalid("number of samples"));
         }
         let samples: Vec<MotionSample> = body
             .chunks_exact(size_of::<MotionSample>())
@@ -59,7 +65,7 @@ impl Motion {
             .collect();
         match samples.iter().all(is_sound) {
             true => Ok(Self { period_ns, samples }),
-            false => Err(Rubbish("a sample that is no place or no rotation")),
+            false => Err(Invalid("position or orientation of a sample")),
         }
     }
 }
@@ -75,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_motion_survives_and_rubbish_is_refused() {
+    fn a_motion_survives_and_invalid_bytes_are_refused() {
         let sample = |i: i32| MotionSample {
             tip_in_scene_m: [0.1, -0.2, 1e-3 * f64::from(i)],
             world_from_tool: [0.0, 0.6, 0.0, 0.8],

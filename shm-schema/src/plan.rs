@@ -1,4 +1,4 @@
-//! The plan that `rt-core` keeps for hosts that come and go.
+//! The plan that `rt-core` keeps, whichever hosts are connected.
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
@@ -6,10 +6,12 @@ use iceoryx2::prelude::ZeroCopySend;
 /// Seeds planned or placed at most.
 pub const MAX_SEEDS: usize = 128;
 
+/// One seed of a plan.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.PlannedSeed")]
 pub struct PlannedSeed {
+    /// Position at rest, scene frame, m.
     pub position_m: [f64; 3],
 }
 
@@ -18,14 +20,18 @@ pub struct PlannedSeed {
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.PlanInForce")]
 pub struct PlanInForce {
+    /// The run of the core.
     pub session_id: u64,
     /// Rises with each change; 0 means that there is no plan.
     pub generation: u64,
+    /// The scene that was running when the plan came.
     pub scene_generation: u64,
     /// Where the needle starts, outside the gland.
     pub entry_m: [f64; 3],
     /// Unit vector of the trajectory (r of paper eq. 6).
     pub direction: [f64; 3],
+    /// How many of `seeds` count.
     pub seed_count: u64,
+    /// In the order in which the host sent them.
     pub seeds: [PlannedSeed; MAX_SEEDS],
 }

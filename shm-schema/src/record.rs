@@ -8,10 +8,13 @@ use iceoryx2::prelude::ZeroCopySend;
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.TickRecord")]
 pub struct TickRecord {
+    /// The run of the core.
     pub session_id: u64,
+    /// Number of the tick.
     pub tick: u64,
     /// When the tick was due on the ideal grid, `CLOCK_MONOTONIC`.
     pub due_ns: u64,
+    /// From the time at which the tick was due until the thread ran.
     pub wake_latency_ns: u64,
     /// From wake-up until the force was written.
     pub force_written_ns: u64,
@@ -19,18 +22,28 @@ pub struct TickRecord {
     pub work_ns: u64,
     /// Deadlines skipped just before this tick.
     pub missed: u32,
+    /// [`crate::Phase`] by number.
     pub phase: u32,
+    /// [`crate::Fault`] by number.
     pub fault: u32,
+    /// Bits of [`crate::flags`].
     pub flags: u32,
+    /// Tip, scene frame, m.
     pub tip_in_scene_m: [f64; 3],
+    /// Force on the operator, after the safety gate, N.
     pub force_on_hand_n: [f64; 3],
+    /// Depth since the tip met the membrane (u_tip of paper eq. 6), m.
     pub depth_m: f64,
+    /// Speed along the path, positive inwards (paper eq. 7), filtered.
     pub speed_m_per_s: f64,
     /// F_R, guide, damping, shaft friction, F_G before the gate.
     pub force_terms_n: [f64; 5],
+    /// The tissue tick whose answer was used.
     pub tissue_tick: u64,
     /// Quaternion i, j, k, w; with the tip all that the device said.
     pub world_from_tool: [f64; 4],
+    /// Bits of the buttons that are pressed.
     pub buttons: u32,
+    /// Zero.
     pub reserved: u32,
 }

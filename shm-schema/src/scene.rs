@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 use stylet_anatomy::PatientFrame;
 
-/// Scenes that the core can draw without a file; [`crate::CommandKind::LoadBuiltinScene`] takes the place in this list.
+/// Scenes that the core can draw without a file; [`crate::Request::LoadBuiltinScene`] takes the place in this list.
 pub const BUILTIN_SCENES: [&str; 3] = ["paper", "pelvis", "full"];
 
 /// Nodes of the displacement grid at most: what a tissue tick may spend on it.
@@ -19,9 +19,13 @@ pub const MAX_LABEL_CELLS: usize = 2 << 20;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.GridInfo")]
 pub struct GridInfo {
+    /// Nodes along x, y, z; all zero for no grid.
     pub dims: [u32; 3],
+    /// Zero.
     pub reserved: u32,
+    /// Place of node (0, 0, 0), scene frame, m.
     pub origin_m: [f64; 3],
+    /// Distance between neighbouring nodes, m.
     pub spacing_m: f64,
 }
 
@@ -54,18 +58,24 @@ pub mod role {
 #[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.StructureInfo")]
 pub struct StructureInfo {
+    /// Label of its cells in the volume, 1 to 255.
     pub label: u32,
     /// Bits of [`role`].
     pub role: u32,
+    /// Elements that belong to it.
     pub element_count: u32,
     /// The triangles of its own surface; none where it is not drawn by itself. The targets together are drawn under the
     /// first of them.
     pub first_triangle: u32,
+    /// Number of triangles of its own surface.
     pub triangle_count: u32,
+    /// Zero.
     pub reserved: u32,
     /// Bounding box at rest.
     pub lower_m: [f64; 3],
+    /// Largest corner of the bounding box, m.
     pub upper_m: [f64; 3],
+    /// Name as the file or the built-in scene gives it.
     pub name: Text<32>,
 }
 
@@ -75,41 +85,71 @@ pub struct StructureInfo {
 #[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.SceneHeader")]
 pub struct SceneHeader {
+    /// The run of the core.
     pub session_id: u64,
+    /// Rises with each scene of a run, from 1.
     pub generation: u64,
     /// Elements along x, y, z.
     pub dims: [u32; 3],
+    /// Elements of the body.
     pub element_count: u32,
+    /// Elements at the surface of the body.
     pub surface_element_count: u32,
+    /// Vertices of the surface.
     pub vertex_count: u32,
+    /// Triangles of all surfaces.
     pub triangle_count: u32,
     /// The first triangles are the body's; after them come those of the structures in it.
     pub body_triangle_count: u32,
     /// How many of `structures` count; at least one.
     pub structure_count: u32,
+    /// Zero.
     pub reserved: u32,
+    /// Edge of an element, m.
     pub spacing_m: f64,
+    /// Volume of the tissue, m³.
     pub volume_m3: f64,
     /// Bounding box of the tissue.
     pub lower_m: [f64; 3],
+    /// Largest corner of that box, m.
     pub upper_m: [f64; 3],
     /// Bounding box of the targets: what a plan aims at.
     pub target_lower_m: [f64; 3],
+    /// Largest corner of that box, m.
     pub target_upper_m: [f64; 3],
     /// Patient (RAS, m) from scene: row-major rotation, then translation. Identity for built-in scenes.
     pub patient_from_scene: [f64; 12],
     /// What is where in the body at rest.
     pub labels: GridInfo,
-    /// Where displacements are told with each snapshot.
+    /// Where each snapshot gives displacements.
     pub nodes: GridInfo,
+    /// Name of the scene.
     pub name: Text<64>,
+    /// The first `structure_count` of them count.
     pub structures: [StructureInfo; MAX_STRUCTURES],
+}
+
+/// Identity of a scene: which run of the core, and which scene in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct SceneId {
+    /// The run of the core.
+    pub session_id: u64,
+    /// Rises with each scene of a run, from 1.
+    pub generation: u64,
 }
 
 impl SceneHeader {
     /// Where the patient lies in the scene: the only reader of `patient_from_scene`.
     pub fn patient(&self) -> PatientFrame {
         PatientFrame::of_wire(&self.patient_from_scene)
+    }
+
+    /// Identity of this scene.
+    pub fn id(&self) -> SceneId {
+        SceneId {
+            session_id: self.session_id,
+            generation: self.generation,
+        }
     }
 
     /// Those that count.
@@ -136,11 +176,15 @@ pub struct UploadStructure {
     pub role: u32,
     /// 1: `limits` count; 0: the structure takes the limits that the operator sets.
     pub own_limits: u32,
+    /// Zero.
     pub reserved: u32,
+    /// Young's modulus, Pa.
     pub young_pa: f64,
+    /// Poisson's ratio.
     pub poisson: f64,
     /// For links along x, y, z: shortest and longest as a share of their length at rest, and shear (rad).
     pub limits: [[f64; 3]; 3],
+    /// Name for people.
     pub name: Text<32>,
 }
 
@@ -149,15 +193,21 @@ pub struct UploadStructure {
 #[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.UploadHeader")]
 pub struct UploadHeader {
+    /// The host that sends it.
     pub host_id: u64,
     /// The reply carries it back.
     pub command_id: u64,
+    /// Cells along x, y, z.
     pub dims: [u32; 3],
     /// How many of `structures` count; 0: all tissue is one structure.
     pub structure_count: u32,
+    /// Edge of a cell, m.
     pub spacing_m: f64,
+    /// Patient (RAS, m) from scene: row-major rotation, then translation.
     pub patient_from_scene: [f64; 12],
+    /// Name of the volume.
     pub name: Text<64>,
+    /// The first `structure_count` of them count.
     pub structures: [UploadStructure; MAX_STRUCTURES],
 }
 

@@ -12,8 +12,11 @@ use std::time::Duration;
 
 /// The form of service that both programs use.
 pub type Ipc = ipc::Service;
+/// A service of single values.
 pub type Plain<T> = publish_subscribe::PortFactory<Ipc, T, ()>;
+/// A service of slices under a header.
 pub type Slices<T, H> = publish_subscribe::PortFactory<Ipc, [T], H>;
+/// The board that holds the latest state.
 pub type StateBoard = blackboard::PortFactory<Ipc, u64>;
 
 /// The only key on the board.
@@ -29,16 +32,9 @@ pub const SNAPSHOTS_AHEAD: usize = 4;
 pub const MAX_HOSTS: usize = 6;
 
 /// Why shared memory could not be used; the text says what to do.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
 pub struct ServiceError(pub String);
-
-impl std::fmt::Display for ServiceError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for ServiceError {}
 
 fn failed(what: &str, why: impl std::fmt::Debug) -> ServiceError {
     ServiceError(format!(
@@ -63,6 +59,7 @@ impl Instance {
         }
     }
 
+    /// The name as typed.
     pub fn name(&self) -> &str {
         &self.0
     }
@@ -118,7 +115,7 @@ impl Instance {
             else {
                 continue;
             };
-            // One that has just gone needs no memory.
+            // One that was removed meanwhile needs no memory.
             let Ok(file) = std::fs::File::options().write(true).open(entry.path()) else {
                 continue;
             };
@@ -142,7 +139,7 @@ impl Instance {
         self.sweep_unless(|pid| pid != Some(me));
     }
 
-    /// `counts` tells whether a node of that process is in use.
+    /// `counts` says whether a node of that process is in use.
     fn sweep_unless(&self, counts: impl Fn(Option<u32>) -> bool) {
         let Ok(config) = self.config() else { return };
         let mut used = false;
@@ -150,7 +147,7 @@ impl Instance {
             used |= match &state {
                 NodeState::Dead(_) => false,
                 NodeState::Alive(view) => counts(view.id().pid::<Ipc>().ok().map(|pid| pid.value() as u32)),
-                // What cannot be told is taken as alive.
+                // An unknown state is taken as alive.
                 _ => true,
             };
             CallbackProgression::Continue
@@ -158,7 +155,7 @@ impl Instance {
         if used || listed.is_err() {
             return;
         }
-        // Files that another program removes at the same time are gone as well.
+        // Another program may remove the same files at the same time.
         let _ = std::fs::remove_dir_all(self.root());
         let prefix = self.prefix();
         for entry in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
@@ -177,8 +174,8 @@ fn free_bytes() -> u64 {
     // SAFETY: an all-zero statvfs is valid.
     let mut stat: libc::statvfs = unsafe { std::mem::zeroed() };
     // SAFETY: the path ends in a zero byte and `stat` is valid for writes.
-    let told = unsafe { libc::statvfs(c"/dev/shm".as_ptr(), &mut stat) };
-    if told == 0 {
+    let failed = unsafe { libc::statvfs(c"/dev/shm".as_ptr(), &mut stat) };
+    if failed == 0 {
         stat.f_bavail * stat.f_frsize
     } else {
         u64::MAX
@@ -230,19 +227,39 @@ macro_rules! slices {
     };
 }
 
-plain!(session, Session, "session", publishers 1, history 1, buffer 2);
-plain!(events, Event, "events", publishers 1, history 64, buffer 128);
-plain!(parameters, ParametersInForce, "parameters", publishers 1, history 1, buffer 2);
-plain!(plan, PlanInForce, "plan", publishers 1, history 1, buffer 2);
-plain!(commands, Command, "commands", publishers MAX_HOSTS, history 0, buffer 64);
-plain!(replies, Reply, "replies", publishers 1, history 0, buffer 64);
-plain!(rehearsals, Rehearsal, "rehearsals", publishers 1, history 0, buffer 8);
-slices!(records, TickRecord, u64, "records", publishers 1, history 0, buffer RECORD_BUFFER);
-slices!(snapshots, Vertex, SnapshotHeader, "snapshots", publishers 1, history 1, buffer 2);
+plain!(
+    /// Which run this is: [`Session`].
+    session, Session, "session", publishers 1, history 1, buffer 2);
+plain!(
+    /// What happened: [`Event`].
+    events, Event, "events", publishers 1, history 64, buffer 128);
+plain!(
+    /// Parameters that took effect: [`ParametersInForce`].
+    parameters, ParametersInForce, "parameters", publishers 1, history 1, buffer 2);
+plain!(
+    /// The plan: [`PlanInForce`].
+    plan, PlanInForce, "plan", publishers 1, history 1, buffer 2);
+plain!(
+    /// Requests of hosts: [`Command`].
+    commands, Command, "commands", publishers MAX_HOSTS, history 0, buffer 64);
+plain!(
+    /// Answers to them: [`Reply`].
+    replies, Reply, "replies", publishers 1, history 0, buffer 64);
+plain!(
+    /// Results of rehearsals: [`Rehearsal`].
+    rehearsals, Rehearsal, "rehearsals", publishers 1, history 0, buffer 8);
 slices!(
-    /// Sent again under a new generation when the scene changes.
+    /// Every tick of the force loop; the header is the run of the core.
+    records, TickRecord, u64, "records", publishers 1, history 0, buffer RECORD_BUFFER);
+slices!(
+    /// The deformed surface and displacements inside.
+    snapshots, Vertex, SnapshotHeader, "snapshots", publishers 1, history 1, buffer 2);
+slices!(
+    /// Rest surface, structures and labels; sent again under a new generation when the scene changes.
     scene, u32, SceneHeader, "scene", publishers 1, history 1, buffer 2);
-slices!(uploads, u8, UploadHeader, "uploads", publishers MAX_HOSTS, history 0, buffer 2);
+slices!(
+    /// Volumes that hosts send.
+    uploads, u8, UploadHeader, "uploads", publishers MAX_HOSTS, history 0, buffer 2);
 
 fn board_name(session_id: u64) -> Result<ServiceName, ServiceError> {
     name(&format!("state/{session_id:016x}"))
@@ -259,6 +276,7 @@ pub fn create_state_board(node: &Node<Ipc>, session_id: u64) -> Result<StateBoar
         .map_err(|e| failed("state board", e))
 }
 
+/// Opens the board of the run `session_id`, read-only.
 pub fn open_state_board(node: &Node<Ipc>, session_id: u64) -> Result<StateBoard, ServiceError> {
     node.service_builder(&board_name(session_id)?)
         .blackboard_opener::<u64>()

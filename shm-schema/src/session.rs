@@ -4,20 +4,28 @@ use crate::Text;
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// Announced once a second and to every host that comes.
+/// Announced five times a second, and to every new host.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.Session")]
 pub struct Session {
+    /// Number of the run; differs from every other run.
     pub session_id: u64,
+    /// [`crate::SCHEMA_VERSION`] of the core.
     pub schema_version: u32,
+    /// Process of the core.
     pub pid: u32,
     /// `CLOCK_MONOTONIC` of this announcement: the heartbeat of the bridge.
     pub time_ns: u64,
+    /// `CLOCK_MONOTONIC` at the start of the run.
     pub started_ns: u64,
+    /// Period of the force loop.
     pub period_ns: u64,
+    /// Period of the tissue loop.
     pub tissue_period_ns: u64,
+    /// Thread of the force loop.
     pub haptic: ThreadReport,
+    /// Thread of the tissue loop.
     pub tissue: ThreadReport,
     /// 1 when `mlockall` succeeded.
     pub memory_locked: u32,
@@ -25,7 +33,9 @@ pub struct Session {
     pub no_rt_asked: u32,
     /// Messages from hosts that were refused in this run.
     pub refused: u64,
+    /// Name of the device.
     pub device: Text<64>,
+    /// Version of the core.
     pub version: Text<32>,
     /// What was asked for and not granted, and what to do about it; empty when nothing is missing.
     pub advice: Text<512>,
@@ -36,18 +46,22 @@ pub struct Session {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.ThreadReport")]
 pub struct ThreadReport {
-    /// As `sched_getscheduler` tells: 0 `SCHED_OTHER`, 1 `SCHED_FIFO`.
+    /// As `sched_getscheduler` reports it: 0 `SCHED_OTHER`, 1 `SCHED_FIFO`.
     pub policy: u32,
+    /// Priority in force; 0 outside `SCHED_FIFO`.
     pub priority: u32,
+    /// Priority that was requested; 0 for none.
     pub asked_priority: u32,
     /// Core asked for; `u32::MAX` for none.
     pub asked_core: u32,
     /// The one core that `sched_getaffinity` leaves it, or `u32::MAX` when it may run on several.
     pub core: u32,
+    /// Zero.
     pub reserved: u32,
 }
 
 impl ThreadReport {
+    /// Whether the kernel reports `SCHED_FIFO`.
     pub fn is_fifo(&self) -> bool {
         self.policy == 1
     }

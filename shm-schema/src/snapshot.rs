@@ -1,6 +1,6 @@
 //! The deformed gland at 200 Hz, filled straight into memory that the bridge loaned ahead.
 
-use crate::MAX_SEEDS;
+use crate::{MAX_SEEDS, SceneId};
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -10,6 +10,7 @@ use iceoryx2::prelude::ZeroCopySend;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.Vertex")]
 pub struct Vertex {
+    /// Position of a vertex or displacement of a node, m.
     pub position_m: [f32; 3],
 }
 
@@ -18,6 +19,7 @@ pub struct Vertex {
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.SeedPose")]
 pub struct SeedPose {
+    /// Centre of the seed, scene frame, m.
     pub position_m: [f64; 3],
     /// Unit vector along the seed; it turns with the tissue.
     pub axis: [f64; 3],
@@ -25,34 +27,59 @@ pub struct SeedPose {
     pub dropped_at_m: [f64; 3],
 }
 
-/// What comes with the vertices of one tissue tick.
+/// Header of the vertices of one tissue tick, written by the tissue thread.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.SnapshotHeader")]
 pub struct SnapshotHeader {
+    /// The run of the core.
     pub session_id: u64,
     /// Which [`crate::SceneHeader`] the vertices belong to.
     pub scene_generation: u64,
+    /// Number of the tissue tick.
     pub tissue_tick: u64,
+    /// `CLOCK_MONOTONIC` at its end.
     pub time_ns: u64,
+    /// Tip that the tick used, scene frame, m.
     pub tip_in_scene_m: [f64; 3],
+    /// Unit vector from hub to tip.
     pub needle_direction: [f64; 3],
+    /// Where the held element is, scene frame, m.
     pub held_in_scene_m: [f64; 3],
     /// Largest constraint violation after this tick, in elements.
     pub residual: f64,
+    /// Largest displacement of any element from rest, m.
     pub max_displacement_m: f64,
+    /// Time that the tick took.
     pub work_ns: u64,
+    /// Passes of the solver.
     pub passes: u32,
+    /// Elements that the tick moved.
     pub moved_elements: u32,
     /// `u32::MAX` when the needle holds nothing.
     pub held_element: u32,
+    /// [`crate::Phase`] by number.
     pub phase: u32,
+    /// Vertices of the surface; they come first.
     pub vertex_count: u32,
     /// Nodes of the displacement grid; they follow the vertices.
     pub node_count: u32,
+    /// How many of `seeds` count.
     pub seed_count: u32,
+    /// Zero.
     pub reserved: u32,
+    /// In the order of the drops.
     pub seeds: [SeedPose; MAX_SEEDS],
+}
+
+impl SnapshotHeader {
+    /// Identity of the scene that the vertices belong to.
+    pub fn scene_id(&self) -> SceneId {
+        SceneId {
+            session_id: self.session_id,
+            generation: self.scene_generation,
+        }
+    }
 }
 
 impl Default for SnapshotHeader {

@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
+use num_enum::TryFromPrimitive;
 
 /// One tick, as the operator's program sees it. Written by the haptic thread only.
 #[repr(C)]
@@ -12,6 +13,7 @@ pub struct HapticState {
     pub tick: u64,
     /// `CLOCK_MONOTONIC` at the wake-up of this tick.
     pub time_ns: u64,
+    /// Tip, scene frame, m.
     pub tip_in_scene_m: [f64; 3],
     /// Unit vector from hub to tip.
     pub needle_direction: [f64; 3],
@@ -19,25 +21,37 @@ pub struct HapticState {
     pub contact_in_scene_m: [f64; 3],
     /// Depth since the tip met the membrane (u_tip of paper eq. 6).
     pub depth_m: f64,
+    /// Depth at which that membrane is punctured (u_cri of paper eq. 6); 0 outside and in tissue without a membrane.
+    pub puncture_depth_m: f64,
     /// Speed along the path, positive inwards (paper eq. 7), filtered.
     pub speed_m_per_s: f64,
     /// Force on the operator, after the safety gate.
     pub force_on_hand_n: [f64; 3],
+    /// Torque on the operator, after the safety gate, N m.
     pub torque_on_hand_nm: [f64; 3],
     /// Signed along the insertion direction, before the gate: F_R, guide (magnitude), damping, shaft friction, F_G.
     pub force_terms_n: [f64; 5],
     /// Largest magnitude written to the device since the last reset.
     pub peak_force_n: f64,
+    /// Factor on the force of the law, as the operator set it.
     pub force_scale: f64,
+    /// Peak force of the device, N.
     pub device_limit_n: f64,
+    /// Deadlines of the force loop that were missed.
     pub missed_deadlines: u64,
+    /// Longest wake-up latency of the force loop since the last reset.
     pub worst_wake_ns: u64,
+    /// Longest tick of the force loop since the last reset.
     pub worst_work_ns: u64,
+    /// The tissue tick whose answer was used.
     pub tissue_tick: u64,
+    /// Deadlines of the tissue loop that were missed.
     pub tissue_missed_deadlines: u64,
+    /// Longest wake-up latency of the tissue loop since the last reset.
     pub tissue_worst_wake_ns: u64,
     /// Largest constraint violation left by any tissue tick since the last reset, in elements.
     pub worst_residual: f64,
+    /// Longest tick of the tissue loop since the last reset.
     pub worst_tissue_work_ns: u64,
     /// Records that the ring could not take because the bridge was late.
     pub records_lost: u64,
@@ -51,6 +65,7 @@ pub struct HapticState {
     pub warmth_n: f64,
     /// Coupled mode: the tissue's answer along the insertion direction, before the gate.
     pub tissue_force_n: f64,
+    /// [`crate::ParametersInForce::generation`] that the tick ran with.
     pub parameters_generation: u64,
     /// [`Phase`] by number.
     pub phase: u32,
@@ -58,16 +73,19 @@ pub struct HapticState {
     pub fault: u32,
     /// Bits of [`flags`].
     pub flags: u32,
+    /// Seeds in the tissue.
     pub seed_count: u32,
 }
 
 /// Bits of [`HapticState::flags`] and [`crate::TickRecord::flags`].
 pub mod flags {
-    /// Both threads run under `SCHED_FIFO`, as read back from the kernel.
+    /// Both threads run under `SCHED_FIFO`: it was asked for, and the kernel confirmed it before the loops began.
     pub const REAL_TIME: u32 = 1;
     /// The operator has armed the force.
     pub const ENGAGED: u32 = 1 << 1;
+    /// The tip is in contact with tissue.
     pub const IN_CONTACT: u32 = 1 << 2;
+    /// The membrane has given way.
     pub const PUNCTURED: u32 = 1 << 3;
     /// The device is a simulation.
     pub const SIMULATED_DEVICE: u32 = 1 << 4;
@@ -80,29 +98,28 @@ pub mod flags {
 }
 
 /// Phase of needle and tissue (paper eq. 6), by stable number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive)]
 #[repr(u32)]
 pub enum Phase {
+    /// No contact.
     Outside = 0,
+    /// The membrane is pushed in and holds.
     Contraction = 1,
+    /// The needle goes in through the tissue.
     Penetration = 2,
+    /// The needle comes out.
     Retraction = 3,
+    /// The needle is at rest in the tissue.
     Hold = 4,
 }
 
 impl Phase {
+    /// `None` when this build does not know the number.
     pub fn from_number(number: u32) -> Option<Self> {
-        [
-            Self::Outside,
-            Self::Contraction,
-            Self::Penetration,
-            Self::Retraction,
-            Self::Hold,
-        ]
-        .into_iter()
-        .find(|p| *p as u32 == number)
+        Self::try_from(number).ok()
     }
 
+    /// What a person reads.
     pub fn name(self) -> &'static str {
         match self {
             Self::Outside => "outside",
@@ -115,43 +132,41 @@ impl Phase {
 }
 
 /// Why the force is off, by stable number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive)]
 #[repr(u32)]
 pub enum Fault {
+    /// The force may be on.
     None = 0,
+    /// The device does not answer.
     DeviceSilent = 1,
+    /// The device reported an error.
     DeviceError = 2,
+    /// The device sent a position that is not a number.
     NonFiniteInput = 3,
+    /// The force law gave a value that is not a number.
     NonFiniteForce = 4,
+    /// No answer of the tissue loop for 100 ms.
     TissueStale = 5,
+    /// The tissue's constraints were not met.
     TissueUnsolved = 6,
+    /// 20 deadlines missed in a row.
     OverrunStreak = 7,
+    /// The force loop has stopped by itself.
     LoopStopped = 8,
+    /// The device is disconnected.
     DeviceLost = 9,
+    /// The device is not calibrated.
     DeviceNotCalibrated = 10,
+    /// The motors are too warm.
     DeviceWarm = 11,
+    /// The device stopped at a limit of its own.
     DeviceStopped = 12,
 }
 
 impl Fault {
+    /// `None` when this build does not know the number.
     pub fn from_number(number: u32) -> Option<Self> {
-        [
-            Self::None,
-            Self::DeviceSilent,
-            Self::DeviceError,
-            Self::NonFiniteInput,
-            Self::NonFiniteForce,
-            Self::TissueStale,
-            Self::TissueUnsolved,
-            Self::OverrunStreak,
-            Self::LoopStopped,
-            Self::DeviceLost,
-            Self::DeviceNotCalibrated,
-            Self::DeviceWarm,
-            Self::DeviceStopped,
-        ]
-        .into_iter()
-        .find(|f| *f as u32 == number)
+        Self::try_from(number).ok()
     }
 
     /// What a person reads.
@@ -170,7 +185,7 @@ impl Fault {
                 "the force loop missed 20 deadlines in a row; lower the load on its core, then re-arm"
             }
             Self::LoopStopped => {
-                "the force loop has stopped; rt-core ended, so that the device lets go: start it again"
+                "the force loop has stopped; rt-core ended, so that the device is released: start it again"
             }
             Self::DeviceLost => {
                 "the device is not connected; check power and cable, wait until it is found again, then re-arm"

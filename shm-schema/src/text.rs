@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_survives_the_field_and_rubbish_is_readable() {
+    fn text_survives_the_field_and_invalid_bytes_are_readable() {
         assert_eq!(Text::<8>::new("gland").read(), "gland");
         assert_eq!(Text::<4>::new("aé€").read(), "aé");
         assert_eq!(Text::<3> { bytes: [0xff; 3] }.read(), "\u{fffd}\u{fffd}\u{fffd}");

@@ -3,8 +3,8 @@
 use crate::{Core, ask, until};
 use std::time::Duration;
 use stylet_host::link::Link;
-use stylet_implant::workflow::{default_plan, move_values, plan_values};
-use stylet_shm_schema::{CommandKind, ParameterId, TickRecord, flags};
+use stylet_implant::workflow::{default_plan, move_request, plan_request};
+use stylet_shm_schema::{ParameterId, Request, TickRecord, flags};
 
 /// A host that inserts slowly and keeps every record.
 pub struct Insertion {
@@ -19,10 +19,10 @@ impl Insertion {
     pub fn begin(core: &mut Core, speed_m_per_s: f64) -> Self {
         let mut link = core.host();
         let plan = default_plan(&link.scene().expect("live").header);
-        ask(&mut link, CommandKind::SetPlan, &plan_values(&plan)).expect("planned");
-        ask(&mut link, CommandKind::Engage, &[]).expect("engaged");
-        let to = move_values(plan.entry_m, plan.direction, 0.2, 2.0);
-        ask(&mut link, CommandKind::MoveHand, &to).expect("moved");
+        ask(&mut link, &plan_request(&plan)).expect("planned");
+        ask(&mut link, &Request::Engage).expect("engaged");
+        let to = move_request(plan.entry_m, plan.direction, 0.2, 2.0);
+        ask(&mut link, &to).expect("moved");
         std::thread::sleep(Duration::from_millis(800));
         link.poll();
         link.take_records();
@@ -40,8 +40,8 @@ impl Insertion {
     /// To `depth_m` behind the entry.
     pub fn go(&mut self, depth_m: f64, speed_m_per_s: f64) {
         let to = std::array::from_fn(|a| self.entry_m[a] + self.direction[a] * depth_m);
-        let values = move_values(to, self.direction, speed_m_per_s, 2.0);
-        ask(&mut self.link, CommandKind::MoveHand, &values).expect("moved");
+        let to = move_request(to, self.direction, speed_m_per_s, 2.0);
+        ask(&mut self.link, &to).expect("moved");
         self.take();
     }
 

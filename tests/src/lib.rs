@@ -1,11 +1,9 @@
 //! Fixtures for whole-system tests: a core process of its own for each test, and a host that talks to it.
 
-pub mod controllers;
 pub mod hand;
 pub mod phantom;
 pub mod rehearsal;
 pub mod stopped;
-pub mod window;
 pub mod window_process;
 
 use std::path::PathBuf;
@@ -13,24 +11,9 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 use stylet_host::link::{Link, LinkStatus};
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::Request;
 use stylet_shm_schema::service::Instance;
-
-/// A built program of the workspace; `make test` builds them first.
-pub fn program(name: &str) -> PathBuf {
-    let test = std::env::current_exe().expect("a test knows its own file");
-    let folder = test
-        .parent()
-        .and_then(|deps| deps.parent())
-        .expect("tests live in <target>/<profile>/deps");
-    let path = folder.join(name);
-    assert!(
-        path.exists(),
-        "{} is missing: run `cargo build --release --workspace` first",
-        path.display()
-    );
-    path
-}
+pub use stylet_test_kit::{program, scratch};
 
 /// An instance name that no other test uses.
 pub fn fresh_instance() -> Instance {
@@ -46,18 +29,6 @@ impl Drop for Alone {
     fn drop(&mut self) {
         self.0.sweep();
     }
-}
-
-/// A folder for one test's files, emptied first.
-pub fn scratch(name: &str) -> PathBuf {
-    let folder = program("rt-core")
-        .parent()
-        .expect("has a folder")
-        .join("test-out")
-        .join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).expect("the target folder can be written");
-    folder
 }
 
 /// A running `rt-core`; ended when dropped.
@@ -196,15 +167,15 @@ pub fn until(limit: Duration, mut ready: impl FnMut() -> bool) -> bool {
 }
 
 /// Sends one command and waits for its answer: `Ok` with the first tick that knew it, or the reasons against it.
-pub fn ask(link: &mut Link, kind: CommandKind, values: &[f64]) -> Result<u64, String> {
-    let id = link.send(kind, values).map_err(|e| e.to_string())?;
+pub fn ask(link: &mut Link, request: &Request) -> Result<u64, String> {
+    let id = link.send(request).map_err(|e| e.to_string())?;
     let mut answer = None;
     until(Duration::from_secs(5), || {
         link.poll();
         answer = link.reply(id);
         answer.is_some()
     });
-    let answer = answer.ok_or_else(|| format!("no answer to {kind:?}"))?;
+    let answer = answer.ok_or_else(|| format!("no answer to {:?}", request.kind()))?;
     if answer.accepted {
         Ok(answer.effective_tick)
     } else {

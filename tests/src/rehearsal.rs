@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use std::sync::atomic::AtomicBool;
 use stylet_host::link::SceneModel;
 use stylet_hw::DeviceInfo;
-use stylet_implant::plan::rehearse::{Drops, Rehearser, Rest};
+use stylet_implant::plan::rehearse::{Drops, RehearsalError, Rehearser, Rest};
 use stylet_implant::workflow::Pace;
 use stylet_runtime::bridge::ScenePicture;
 use stylet_runtime::rehearse::{NeedleRun, Stage};
@@ -43,7 +43,7 @@ impl Theatre {
 }
 
 impl Rehearser for Theatre {
-    fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, String> {
+    fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError> {
         self.rehearsals += 1;
         let run = NeedleRun {
             entry_m: drops.entry_m.into(),
@@ -57,7 +57,8 @@ impl Rehearser for Theatre {
         };
         let done = self
             .stage
-            .rehearse(&run, &ParameterSet::default(), &AtomicBool::new(false))?;
+            .rehearse(&run, &ParameterSet::default(), &AtomicBool::new(false))
+            .map_err(|e| RehearsalError::Refused(e.to_string()))?;
         Ok(Rest {
             seeds_m: done.seeds.iter().map(|s| s.position_m).collect(),
             dropped_after_s: done.dropped_after_s,

@@ -1,21 +1,12 @@
 //! ChainMail's settings fitted to the converged FEM, on the insertions that are meant for it.
 
-use crate::models::chainmail;
+use crate::models::{Fitted, chainmail};
 use crate::runs::{Reference, run};
 use argmin::core::{CostFunction, Executor};
 use argmin::solver::neldermead::NelderMead;
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::Scene;
 use stylet_sim::tissue::Held;
-
-/// What the fit found.
-#[derive(Clone, Debug)]
-pub struct Fitted {
-    /// Limits and recovery, without relaxation.
-    pub limits: TissueParameters,
-    /// Stiffness of links and surroundings, with relaxation.
-    pub relaxed: TissueParameters,
-}
 
 /// An insertion with its answer.
 pub struct Lesson {
@@ -69,7 +60,7 @@ fn relaxed_of(p: &[f64]) -> TissueParameters {
     TissueParameters {
         relaxation_iterations: FIT_ITERATIONS,
         shear_to_axial: p[0].exp(),
-        ground_stiffness: p[1].exp(),
+        foundation_to_axial: p[1].exp(),
         ..TissueParameters::default()
     }
 }

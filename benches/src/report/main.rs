@@ -25,7 +25,7 @@ use table::{Row, Where, row};
 /// Runs every tissue model over the same needle insertions and writes speed, error and advice.
 #[derive(Parser)]
 struct Options {
-    /// Folder to write into; the default is benches/runs/<date>-<host>
+    /// Folder to write into; the default is benches/runs/DATE-HOST
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Equal runs of each model, of which the least time of each tick counts
@@ -67,7 +67,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn fit_at(spacing_m: f64) -> fit::Fitted {
+fn fit_at(spacing_m: f64) -> models::Fitted {
     let scene = gland(spacing_m);
     let lessons = GLAND.iter().filter(|i| i.fitted).map(|insertion| {
         let script = insertion.script(&scene);
@@ -81,7 +81,7 @@ fn fit_at(spacing_m: f64) -> fit::Fitted {
 }
 
 /// Every model through one insertion, round by round, so that a noisy machine disturbs all alike.
-fn measure(scene: &Scene, insertion: &Insertion, fitted: &fit::Fitted, rounds: usize) -> Vec<Row> {
+fn measure(scene: &Scene, insertion: &Insertion, fitted: &models::Fitted, rounds: usize) -> Vec<Row> {
     let script: Vec<Held> = insertion.script(scene);
     let seeds = insertion.seeds(scene);
     let reference = Reference::of(&mut converged(scene), &script);

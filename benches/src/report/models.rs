@@ -1,10 +1,18 @@
 //! The models that are compared, each under the settings that it is compared with.
 
-use crate::fit::Fitted;
+use stylet_benches::solvers::{OnePass, PassKind};
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::Scene;
-use stylet_sim::tissue::chainmail::{OnePass, PassKind};
 use stylet_sim::tissue::{ChainMailTissue, FemTissue, TissueModel};
+
+/// What the fit found.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// Limits and recovery, without relaxation.
+    pub limits: TissueParameters,
+    /// Stiffness of links and surroundings, with relaxation.
+    pub relaxed: TissueParameters,
+}
 
 /// Models that differ only in a setting belong to one family; the picture draws a family in one colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -70,7 +78,7 @@ pub fn entries(scene: &Scene, fitted: &Fitted) -> Vec<Entry> {
     let mut add = |family, setting: String, model: Box<dyn TissueModel>| {
         entries.push(Entry { family, setting, model });
     };
-    let pass = |kind| Box::new(OnePass::new(scene, limits.clone(), kind));
+    let pass = |kind| Box::new(OnePass::new(scene, &limits, kind));
     add(Family::Queue, "fitted limits".to_owned(), pass(PassKind::Queue));
     add(Family::OnePass, "fitted limits".to_owned(), pass(PassKind::Sweep));
     let paper = TissueParameters::default();

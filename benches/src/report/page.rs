@@ -1,7 +1,6 @@
 //! The page that says in words what was measured, and which model to pick for what.
 
-use crate::fit::Fitted;
-use crate::models::Family;
+use crate::models::{Family, Fitted};
 use crate::table::{Point, Row, pareto};
 use std::fmt::Write as _;
 use stylet_benches::insertions::{GLAND, TICK_S};
@@ -120,7 +119,7 @@ fn choices(text: &mut String, found: &Findings) -> std::fmt::Result {
         fastest_within(Family::Relaxed, ASKED_PERCENT).or(best(Family::Relaxed)),
         fastest_within(Family::Fem, 1.0),
     ) {
-        let tightest = of(Family::Fem).last().unwrap_or(fem);
+        let tightest = of(Family::Fem).next_back().unwrap_or(fem);
         writeln!(
             text,
             "Relaxed ChainMail ({}) takes {:.2} times as long as FEM within 1 % ({}), {:.2} times as long as FEM at {}. \
@@ -170,7 +169,7 @@ fn fit(text: &mut String, found: &Findings) -> std::fmt::Result {
         text,
         "## The fit\n\nMade at 1.5 mm. Limits: stretch {:.3} to {:.3}, shear {:.1} deg, recovery {:.3} s. Relaxation: shear stiffness {:.3} of axial, \
          surroundings {:.4} of axial.\n\nRMS error in % of the travel, fitted to and held back:\n",
-        l.min_stretch, l.max_stretch, l.shear_deg, l.recovery_time_s, r.shear_to_axial, r.ground_stiffness
+        l.min_stretch, l.max_stretch, l.shear_deg, l.recovery_time_s, r.shear_to_axial, r.foundation_to_axial
     )?;
     text.push_str("| insertion | fitted to | solved, fitted limits | relaxed, 16 iterations |\n|---|---|---|---|\n");
     let at = |insertion: &str, family: Family, setting: &str| {

@@ -5,15 +5,18 @@ use std::collections::VecDeque;
 /// The smallest and the largest of one quantity about a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Band {
+    /// Middle of the slot, ns.
     pub time_ns: u64,
+    /// Smallest value in the slot.
     pub low: f32,
+    /// Largest value in the slot.
     pub high: f32,
 }
 
 /// Smallest and largest.
 type Extremes = [f32; 2];
 
-/// Of `N` quantities that are sampled together. The slots lie on the grid of time itself, so that a line that moves on keeps its shape.
+/// Envelope of `N` quantities that are sampled together. The slots lie on the grid of time itself, so that a line that moves on keeps its shape.
 #[derive(Clone, Debug)]
 pub struct Envelope<const N: usize> {
     slot_ns: u64,
@@ -22,6 +25,7 @@ pub struct Envelope<const N: usize> {
 }
 
 impl<const N: usize> Envelope<N> {
+    /// An empty envelope with slots of this width.
     pub fn new(slot_ns: u64) -> Self {
         Self {
             slot_ns: slot_ns.max(1),
@@ -30,7 +34,7 @@ impl<const N: usize> Envelope<N> {
         }
     }
 
-    /// Times are to rise; one that does not is counted to the newest slot.
+    /// Adds a sample. Times must rise; a sample with an older one is counted to the newest slot.
     pub fn add(&mut self, time_ns: u64, values: [f32; N]) {
         self.newest_ns = self.newest_ns.max(Some(time_ns));
         let (number, extremes) = (time_ns / self.slot_ns, values.map(|v| [v, v]));
@@ -40,7 +44,7 @@ impl<const N: usize> Envelope<N> {
         }
     }
 
-    /// What ended before that time goes.
+    /// Drops the slots that ended before that time.
     pub fn forget_before(&mut self, time_ns: u64) {
         let first = time_ns / self.slot_ns;
         while self.slots.front().is_some_and(|(number, _)| *number < first) {
@@ -48,7 +52,7 @@ impl<const N: usize> Envelope<N> {
         }
     }
 
-    /// With slots twice as wide, again and again, until there are at most `most`.
+    /// Doubles the width of the slots until there are at most `most`.
     pub fn widen_to(&mut self, most: usize) {
         while self.slots.len() > most.max(1) {
             self.slot_ns = self.slot_ns.saturating_mul(2);
@@ -62,15 +66,17 @@ impl<const N: usize> Envelope<N> {
         }
     }
 
+    /// Whether nothing was added, or all of it was dropped.
     pub fn is_empty(&self) -> bool {
         self.slots.is_empty()
     }
 
+    /// Time of the newest sample, ns.
     pub fn newest_ns(&self) -> Option<u64> {
         self.newest_ns
     }
 
-    /// Of one quantity, one for each slot, about its middle.
+    /// Bands of one quantity, one for each slot, at its middle.
     pub fn bands(&self, quantity: usize) -> impl Iterator<Item = Band> {
         let newest_ns = self.newest_ns.unwrap_or(0);
         self.slots.iter().map(move |(number, slot)| {

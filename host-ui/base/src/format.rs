@@ -25,6 +25,7 @@ pub fn seconds(ns: u64) -> f64 {
     ns as f64 * 1e-9
 }
 
+/// Length with its unit, to 0.1 mm.
 pub fn length(metres: f64) -> String {
     format!("{} mm", decimal(mm(metres), 1))
 }
@@ -34,19 +35,22 @@ pub fn signed_mm(metres: f64) -> String {
     format!("{:+.2}", mm(metres))
 }
 
+/// Speed with its unit, to 0.1 mm/s.
 pub fn speed(metres_per_second: f64) -> String {
     format!("{} mm/s", decimal(mm(metres_per_second), 1))
 }
 
+/// Force with its unit, to 0.01 N.
 pub fn force(newton: f64) -> String {
     format!("{} N", decimal(newton, 2))
 }
 
+/// Volume with its unit, to 0.1 cc.
 pub fn volume(cubic_metres: f64) -> String {
     format!("{:.1} cc", cubic_metres * 1e6)
 }
 
-/// `n/a` where there is nothing to tell.
+/// `n/a` where there is no value.
 pub fn microseconds(value: Option<f64>) -> String {
     match value {
         None => "n/a".to_owned(),
@@ -55,6 +59,7 @@ pub fn microseconds(value: Option<f64>) -> String {
     }
 }
 
+/// Rate of a loop with its unit, from its period; `n/a` for a period of 0.
 pub fn rate(period_ns: u64) -> String {
     match period_ns {
         0 => "n/a".to_owned(),

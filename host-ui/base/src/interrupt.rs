@@ -1,39 +1,48 @@
-//! Ctrl-C, or a request to terminate: the first asks for an end in good order, the second ends at once. And an end of output.
+//! Ctrl-C and requests to terminate: the first asks for an orderly end, the second ends at once. And the end of output.
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Long work asks now and then whether it is to end.
+/// A request to end, which long work checks now and then.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt(Arc<AtomicBool>);
 
+/// Ctrl-C cannot be caught.
+#[derive(Debug, thiserror::Error)]
+#[error("Ctrl-C cannot be caught ({0})")]
+pub struct InterruptError(std::io::Error);
+
 impl Interrupt {
-    pub fn on_signals() -> Result<Self, String> {
+    /// An interrupt that SIGINT and SIGTERM set; a second signal ends the program at once.
+    ///
+    /// # Errors
+    /// Where the handlers cannot be installed.
+    pub fn on_signals() -> Result<Self, InterruptError> {
         let interrupt = Self::default();
         for signal in [SIGINT, SIGTERM] {
             flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&interrupt.0))
                 .and_then(|_| flag::register(signal, Arc::clone(&interrupt.0)))
-                .map_err(|e| format!("Ctrl-C cannot be caught ({e})"))?;
+                .map_err(InterruptError)?;
         }
         Ok(interrupt)
     }
 
-    /// Requests the end of the work, as a signal does.
-    pub fn request(&self) {
-        // SYNC: read by `is_requested`; nothing but the flag is carried.
+    /// Requests an end, as a signal would.
+    pub fn ask(&self) {
+        // SYNC: read by `asked`; nothing but the flag is carried.
         self.0.store(true, Ordering::Relaxed);
     }
 
     /// Whether the work is to end.
-    pub fn is_requested(&self) -> bool {
-        // SYNC: set by a signal handler or by `request`; nothing but the flag is carried.
+    pub fn asked(&self) -> bool {
+        // SYNC: set by a signal handler or by `ask`; nothing but the flag is carried.
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// A command whose output nobody reads any more ends without a word, as `head` expects of it; Rust would have it panic.
+/// Lets a command whose output nobody reads any more end silently, as `head` expects; by default Rust panics.
 pub fn end_with_reader() {
     // SAFETY: the default action of a signal is no code of ours, and no thread has been started that could mind.
     unsafe { libc::signal(libc::SIGPIPE, libc::SIG_DFL) };

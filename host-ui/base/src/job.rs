@@ -1,51 +1,51 @@
-//! Work on a thread of its own that sends its results as it goes and can be ended.
+//! Work on a thread of its own that reports what it finds as it goes and can be asked to end.
 
 use crate::interrupt::Interrupt;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 
-/// Work that runs on its own thread. Dropping it requests its end.
+/// Work on a thread of its own. Dropping it asks the thread to end.
 pub struct Job<T> {
-    results: Receiver<T>,
+    messages: Receiver<T>,
     interrupt: Interrupt,
 }
 
-/// What a job has sent since it was last polled.
-pub enum Update<T> {
-    /// Nothing yet.
+/// What a job reports when it is polled.
+pub enum JobUpdate<T> {
+    /// Nothing new; its thread is still at work.
     Pending,
-    /// The next result.
-    Value(T),
+    /// The next message, in the order in which they were sent.
+    Message(T),
     /// Its thread has ended.
     Ended,
 }
 
 impl<T: Send + 'static> Job<T> {
-    /// Starts `work`, which sends its results and looks now and then whether it is to end.
+    /// Starts `work` on a thread of this name; it sends its messages and watches the interrupt.
     pub fn begin(name: &str, work: impl FnOnce(&Sender<T>, &Interrupt) + Send + 'static) -> Self {
-        let (sender, results) = channel();
+        let (sender, messages) = channel();
         let interrupt = Interrupt::default();
-        let end = interrupt.clone();
+        let asked = interrupt.clone();
         let spawned = std::thread::Builder::new()
             .name(name.to_owned())
-            .spawn(move || work(&sender, &end));
+            .spawn(move || work(&sender, &asked));
         // Without a thread the sender is dropped, and `poll` reports the end.
         drop(spawned);
-        Self { results, interrupt }
+        Self { messages, interrupt }
     }
 
-    /// The next result without waiting for it.
-    pub fn poll(&self) -> Update<T> {
-        match self.results.try_recv() {
-            Ok(value) => Update::Value(value),
-            Err(TryRecvError::Empty) => Update::Pending,
-            Err(TryRecvError::Disconnected) => Update::Ended,
+    /// The next message, if there is one. Never waits.
+    pub fn poll(&self) -> JobUpdate<T> {
+        match self.messages.try_recv() {
+            Ok(message) => JobUpdate::Message(message),
+            Err(TryRecvError::Empty) => JobUpdate::Pending,
+            Err(TryRecvError::Disconnected) => JobUpdate::Ended,
         }
     }
 }
 
-/// Nobody receives its results any more.
+/// Nobody reads its messages any more.
 impl<T> Drop for Job<T> {
     fn drop(&mut self) {
-        self.interrupt.request();
+        self.interrupt.ask();
     }
 }

@@ -1,4 +1,6 @@
-//! What every part of the host program uses: units for people, long work that can be interrupted, curves in slots of time.
+//! What every part of the host program uses: units for people, long work that can be interrupted, files that are written
+//! whole, curves in slots of time.
+
 #![warn(missing_docs)]
 
 pub mod envelope;
@@ -7,3 +9,6 @@ pub mod input;
 pub mod interrupt;
 pub mod job;
 pub mod progress_bar;
+mod write;
+
+pub use write::{WriteError, write_streamed, write_whole};

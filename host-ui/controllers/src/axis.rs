@@ -6,7 +6,7 @@ use evdev::AbsInfo;
 pub const SLOWEST_M_PER_S: f64 = 1e-4;
 /// Many drivers give no dead zone (`flat`), or one that a worn stick does not keep to: it is at least this share of the way.
 const LEAST_DEAD: f64 = 0.08;
-/// A driver that says that nearly all is dead zone is not believed.
+/// A larger dead zone is a driver's mistake.
 const MOST_DEAD: f64 = 0.5;
 /// Full deflection of a 3D mouse in counts, where its driver reports relative axes, which have no range.
 const RELATIVE_FULL: f64 = 350.0;
@@ -32,6 +32,7 @@ impl Axis {
         })
     }
 
+    /// An axis without a range: full speed at the counts that such a device reports at most.
     pub fn relative() -> Self {
         Self {
             middle: 0.0,

@@ -1,4 +1,4 @@
-//! Which gamepads and 3D mice there are, by what sysfs says: no device has to be opened for it, nor any right.
+//! Finds gamepads and 3D mice through sysfs, without opening a device and without rights.
 
 use super::kind::{Abilities, Bits, Kind};
 use std::path::{Path, PathBuf};
@@ -9,7 +9,9 @@ const LONGEST_NAME: usize = 60;
 /// Where the kernel shows devices, and where they are opened.
 #[derive(Clone, Debug)]
 pub struct Places {
+    /// Folder in which sysfs lists input devices.
     pub class: PathBuf,
+    /// Folder of the device nodes.
     pub nodes: PathBuf,
 }
 
@@ -25,12 +27,15 @@ impl Default for Places {
 /// A device that can hold the needle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Found {
+    /// Its device node.
     pub path: PathBuf,
+    /// Its name, for people.
     pub name: String,
+    /// What it is.
     pub kind: Kind,
 }
 
-/// In the order in which they came.
+/// In the order in which they were plugged in.
 pub fn find(places: &Places) -> Vec<Found> {
     let Ok(entries) = std::fs::read_dir(&places.class) else {
         return Vec::new();
@@ -86,13 +91,16 @@ pub mod tests {
         std::fs::create_dir_all(device.join("capabilities")).unwrap();
         std::fs::create_dir_all(device.join("id")).unwrap();
         let [vendor, key, abs, rel] = files;
-        let said = [
+        let attributes = [
             ("name", name),
             ("id/vendor", vendor),
             ("capabilities/key", key),
             ("capabilities/abs", abs),
         ];
-        for (file, text) in said.into_iter().chain([("capabilities/rel", rel), ("properties", "0")]) {
+        for (file, text) in attributes
+            .into_iter()
+            .chain([("capabilities/rel", rel), ("properties", "0")])
+        {
             std::fs::write(device.join(file), format!("{text}\n")).unwrap();
         }
     }
@@ -126,12 +134,12 @@ pub mod tests {
             nodes: "/nodes".into(),
         };
         let found = find(&places);
-        let told: Vec<_> = found
+        let listed: Vec<_> = found
             .iter()
             .map(|f| (f.path.to_str().unwrap(), f.name.as_str(), f.kind))
             .collect();
         assert_eq!(
-            told,
+            listed,
             [
                 ("/nodes/event2", "Pad", Kind::Gamepad),
                 ("/nodes/event10", "3Dconnexion SpaceMouse", Kind::Mouse3d)

@@ -1,25 +1,32 @@
-//! What a device is by what the kernel says of it, and what its buttons do.
+//! The kind of a device, from the abilities that the kernel reports, and what its buttons do.
 
 use evdev::{AbsoluteAxisCode, KeyCode, PropType, RelativeAxisCode};
 use stylet_base::format;
 
-/// A device that can hold the needle.
+/// A device that can control the needle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
+    /// A gamepad with a stick.
     Gamepad,
+    /// A 3D mouse with six axes.
     Mouse3d,
 }
 
 /// What a button asks for when it is pressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Button {
+    /// Drops a seed.
     Drop,
+    /// Undoes the last seed, or else the plan.
     Undo,
+    /// Stops needle and script.
     Stop,
+    /// Turns the force on.
     Engage,
 }
 
 impl Button {
+    /// All of them, in the order of [`Latest::presses`](crate::Latest::presses).
     pub const ALL: [Self; 4] = [Self::Drop, Self::Undo, Self::Stop, Self::Engage];
 }
 
@@ -34,6 +41,7 @@ impl Bits {
         Self(words.map_while(|w| u64::from_str_radix(w, 16).ok()).collect())
     }
 
+    /// Whether the bit is set.
     pub fn has(&self, bit: u16) -> bool {
         let word = self.0.get(usize::from(bit) / 64).copied().unwrap_or(0);
         word >> (bit % 64) & 1 == 1
@@ -43,10 +51,15 @@ impl Bits {
 /// What a device can report.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Abilities {
+    /// Keys and buttons.
     pub keys: Bits,
+    /// Absolute axes.
     pub absolute: Bits,
+    /// Relative axes.
     pub relative: Bits,
+    /// Properties, as accelerometer.
     pub properties: Bits,
+    /// USB number of the vendor.
     pub vendor: u16,
 }
 
@@ -69,6 +82,7 @@ const SIX_RELATIVE: [RelativeAxisCode; 6] = [
 ];
 
 impl Kind {
+    /// The kind of a device with these abilities; `None` for any other device.
     pub fn of(can: &Abilities) -> Option<Self> {
         let key = |key: KeyCode| can.keys.has(key.0);
         // The motion sensor of a gamepad is a device of its own with six axes.
@@ -86,6 +100,7 @@ impl Kind {
         (six && is_cap && !key(KeyCode::BTN_TRIGGER)).then_some(Self::Mouse3d)
     }
 
+    /// Its name, for people.
     pub fn name(self) -> &'static str {
         match self {
             Self::Gamepad => "gamepad",
@@ -93,7 +108,7 @@ impl Kind {
         }
     }
 
-    /// By place, as drivers differ in what they call the upper and the left one.
+    /// What a key asks for, by its place: drivers name the upper and the left one differently.
     pub fn button(self, key: KeyCode) -> Option<Button> {
         match (self, key) {
             (Self::Gamepad, KeyCode::BTN_SOUTH) | (Self::Mouse3d, KeyCode::BTN_0) => Some(Button::Drop),
@@ -104,18 +119,20 @@ impl Kind {
         }
     }
 
+    /// Whether the key does anything.
     pub fn has_use_for(self, key: KeyCode) -> bool {
         self.button(key).is_some() || self.slows(key)
     }
 
+    /// Whether the key slows the needle while it is held.
     pub fn slows(self, key: KeyCode) -> bool {
         self == Self::Gamepad && [KeyCode::BTN_TL, KeyCode::BTN_TR].contains(&key)
     }
 
-    /// In a few words, for a line of the window.
+    /// Its axes in a few words, for a line of the window.
     pub fn axes(self) -> &'static str {
         match self {
-            Self::Gamepad => "left stick: away goes in, towards you out",
+            Self::Gamepad => "left stick: forwards in, backwards out",
             Self::Mouse3d => "press: in, lift: out; slide: across",
         }
     }
@@ -130,7 +147,7 @@ impl Kind {
                 ("Shoulder buttons, Shift", "four times slower".to_owned()),
                 ("Lower button (A, cross)", "drop a seed at the tip".to_owned()),
                 ("Right button (B, circle)", "stop the needle, and the script".to_owned()),
-                ("Back, Select", "last seed back, or else the plan".to_owned()),
+                ("Back, Select", "undo the last seed, or else the plan".to_owned()),
                 ("Start", "force on; after a fault: re-arm".to_owned()),
             ],
             Self::Mouse3d => vec![

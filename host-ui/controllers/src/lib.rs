@@ -1,23 +1,27 @@
 //! Gamepads and 3D mice that hold the needle: found, read and understood on a thread of their own.
 //!
-//! Events go one way: `found` (which devices there are) → `state` (events to a [`Wish`]) → `desk` (which device holds
+//! Events go one way: `found` (which devices there are) → `state` (events to a [`Wish`]) → `hub` (which device holds
 //! the needle) → `reader` (the thread) → the window, which asks the core to move the hand as it does for the mouse.
 
+#![warn(missing_docs)]
+
 mod axis;
-mod desk;
+mod error;
 mod found;
+mod hub;
 mod kind;
 mod list;
 mod reader;
 mod state;
 
 pub use axis::{Axis, SLOWEST_M_PER_S};
-pub use desk::{Desk, Device, Ground, Latest, Opened};
+pub use error::{ListError, OpenError};
 pub use found::{Found, Places, find};
+pub use hub::{Device, DeviceHub, DeviceSource, Latest, OpenDevice};
 pub use kind::{Button, Kind};
 pub use list::list;
 pub use reader::{Controllers, System};
-pub use state::{Whole, Wish};
+pub use state::{DeviceState, Wish};
 
 /// Speed of the tip along the needle with the stick or the cap as far as it goes; that of the keys.
 pub const ALONG_M_PER_S: f64 = 0.04;

@@ -1,11 +1,12 @@
-//! What `host-ui controllers` prints: each device, whether it can be read, and what it does.
+//! `host-ui controllers`: each device, whether it can be read, and what it does.
 
+use super::error::{ListError, OpenError};
 use super::found::{Found, Places, find};
 use super::kind::Kind;
-use super::{Ground, Opened, System};
+use super::{DeviceSource, OpenDevice, System};
 
-/// Tells what there is; `Err` where a device cannot be read, with what to do about it.
-pub fn list() -> Result<(), String> {
+/// Prints the devices; `Err` where one cannot be read, with what to do about it.
+pub fn list() -> Result<(), ListError> {
     let found = find(&Places::default());
     if found.is_empty() {
         println!("n/a: no gamepad and no 3D mouse is plugged in");
@@ -29,14 +30,14 @@ pub fn list() -> Result<(), String> {
     if troubles.is_empty() {
         Ok(())
     } else {
-        Err(troubles.join("\n"))
+        Err(ListError(troubles))
     }
 }
 
-fn try_one(found: &Found) -> Result<(), String> {
+fn try_one(found: &Found) -> Result<(), OpenError> {
     let opened = System::default().open(found);
     opened
-        .and_then(|o| o.whole())
+        .and_then(|o| o.state())
         .map(|_| ())
-        .map_err(|e| super::desk::reason(found, &e))
+        .map_err(|e| OpenError::of(found, e))
 }

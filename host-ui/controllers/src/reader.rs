@@ -1,9 +1,9 @@
-//! The thread that reads the devices, of usual priority, and what the window takes from it without waiting.
+//! The thread that reads the devices, of normal priority, and the window's end of it, which never waits.
 
-use super::desk::{Desk, Ground, Latest, Opened};
 use super::found::{Found, Places, find};
+use super::hub::{DeviceHub, DeviceSource, Latest, OpenDevice};
 use super::kind::Button;
-use super::state::{Whole, Wish};
+use super::state::{DeviceState, Wish};
 use evdev::InputEvent;
 use evdev::raw_stream::RawDevice;
 use std::io;
@@ -14,11 +14,11 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use triple_buffer::{Input, Output, triple_buffer};
 
-/// How often it is looked for devices that came or went.
+/// Period of the search for devices that were plugged in or unplugged.
 const LOOK_EVERY: Duration = Duration::from_millis(1500);
 /// A device is read no more often, whatever it sends.
 const READ_EVERY: Duration = Duration::from_millis(4);
-/// While the needle is moved the thread tells so often that it lives.
+/// While the needle is moved the thread publishes at least this often.
 const MOVING_EVERY: Duration = Duration::from_millis(20);
 /// A wish that is older than this is no longer one: the thread stands still.
 const WISH_LASTS: Duration = Duration::from_millis(250);
@@ -26,11 +26,12 @@ const WISH_LASTS: Duration = Duration::from_millis(250);
 /// The devices of this machine.
 #[derive(Default)]
 pub struct System {
+    /// Folders in which it looks.
     pub places: Places,
 }
 
-impl Ground for System {
-    type Opened = RawDevice;
+impl DeviceSource for System {
+    type Device = RawDevice;
 
     fn list(&mut self) -> Vec<Found> {
         find(&self.places)
@@ -54,18 +55,18 @@ impl Ground for System {
         let ms = at_most.as_millis().min(10_000) as libc::c_int;
         // SAFETY: `polled` is valid for reads and writes of its length, and the devices stay open meanwhile.
         unsafe { libc::poll(polled.as_mut_ptr(), polled.len() as libc::nfds_t, ms) };
-        // Whatever woke it, all devices are read next; one that has gone says so there.
+        // Whatever woke it, all devices are read next; an unplugged one fails there.
     }
 }
 
-impl Opened for RawDevice {
+impl OpenDevice for RawDevice {
     fn fetch(&mut self, into: &mut Vec<InputEvent>) -> io::Result<()> {
         into.extend(self.fetch_events()?);
         Ok(())
     }
 
-    fn whole(&self) -> io::Result<Whole> {
-        Ok(Whole {
+    fn state(&self) -> io::Result<DeviceState> {
+        Ok(DeviceState {
             axes: self.get_absinfo()?.collect(),
             keys: self.get_key_state()?,
         })
@@ -76,22 +77,22 @@ impl Opened for RawDevice {
 pub struct Controllers {
     latest: Output<(Instant, Latest)>,
     thread: Option<JoinHandle<()>>,
-    /// The thread ends when this is gone.
+    /// The thread ends when this is dropped.
     open: Option<Sender<()>>,
     counted: [u32; Button::ALL.len()],
 }
 
 impl Controllers {
     /// Begins to look for devices.
-    pub fn start<G: Ground + Send + 'static>(ground: G) -> Self
+    pub fn start<G: DeviceSource + Send + 'static>(source: G) -> Self
     where
-        G::Opened: Send,
+        G::Device: Send,
     {
         let (input, latest) = triple_buffer(&(Instant::now(), Latest::default()));
         let (open, window) = channel();
         let thread = std::thread::Builder::new()
             .name("controllers".to_owned())
-            .spawn(move || read_all(Desk::new(ground), input, &window));
+            .spawn(move || read_all(DeviceHub::new(source), input, &window));
         Self {
             latest,
             thread: thread.ok(),
@@ -133,20 +134,20 @@ impl Controllers {
     }
 }
 
-fn read_all<G: Ground>(mut desk: Desk<G>, mut latest: Input<(Instant, Latest)>, window: &Receiver<()>) {
+fn read_all<G: DeviceSource>(mut hub: DeviceHub<G>, mut latest: Input<(Instant, Latest)>, window: &Receiver<()>) {
     let begun = Instant::now();
     let mut looked: Option<Instant> = None;
     while window.try_recv() == Err(TryRecvError::Empty) {
         if looked.is_none_or(|at| at.elapsed() >= LOOK_EVERY) {
             looked = Some(Instant::now());
-            desk.look();
+            hub.look();
         }
-        let read = desk.read(begun.elapsed().as_secs_f64()).clone();
+        let read = hub.read(begun.elapsed().as_secs_f64()).clone();
         let is_moving = read.wish != Wish::REST;
         latest.write((Instant::now(), read));
         std::thread::sleep(READ_EVERY);
         let until_look = LOOK_EVERY.saturating_sub(looked.map_or(LOOK_EVERY, |at| at.elapsed()));
-        desk.wait(if is_moving { MOVING_EVERY } else { until_look });
+        hub.wait(if is_moving { MOVING_EVERY } else { until_look });
     }
 }
 
@@ -156,7 +157,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_device_that_is_no_event_device_is_told_and_never_read() {
+    fn a_device_that_is_no_event_device_is_reported_and_never_read() {
         let folder = std::env::temp_dir().join(format!("stylet-reader-{}", std::process::id()));
         let places = Places {
             class: folder.join("class"),
@@ -170,21 +171,21 @@ mod tests {
         );
         std::fs::create_dir_all(&places.nodes).unwrap();
         std::fs::write(places.nodes.join("event1"), "no device").unwrap();
-        let mut desk = Desk::new(System { places });
-        desk.look();
-        assert_eq!(desk.read(0.0).denied, [""; 0], "its rights may still come");
-        desk.look();
-        let latest = desk.read(0.0);
+        let mut hub = DeviceHub::new(System { places });
+        hub.look();
+        assert_eq!(hub.read(0.0).denied, [""; 0], "its rights may follow");
+        hub.look();
+        let latest = hub.read(0.0);
         assert_eq!((latest.holder.clone(), latest.denied.len()), (None, 1));
         assert!(latest.denied[0].starts_with("Pad ("), "{:?}", latest.denied);
         std::fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]
-    fn a_thread_that_has_ended_leaves_no_wish_and_says_so() {
+    fn a_thread_that_has_ended_leaves_no_wish_and_is_reported() {
         struct Broken;
-        impl Ground for Broken {
-            type Opened = RawDevice;
+        impl DeviceSource for Broken {
+            type Device = RawDevice;
             fn list(&mut self) -> Vec<Found> {
                 panic!("on purpose")
             }

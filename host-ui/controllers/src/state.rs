@@ -1,4 +1,4 @@
-//! The state of one device from its events, and what the hand on it wishes. No device is needed for it.
+//! The state of one device from its events, and the speed that it asks for. Needs no device.
 
 use super::axis::Axis;
 use super::kind::{Button, Kind};
@@ -7,7 +7,7 @@ use evdev::{
     AbsInfo, AbsoluteAxisCode, AttributeSet, EventSummary, InputEvent, KeyCode, RelativeAxisCode, SynchronizationCode,
 };
 
-/// A driver with relative axes sends no zero when the cap is let go: an axis that says nothing for so long is at rest.
+/// A driver with relative axes sends no zero when the cap is released: an axis without events for so long is at rest.
 const RELATIVE_SILENCE_S: f64 = 0.1;
 
 /// How fast the hand wants the tip to go.
@@ -15,16 +15,18 @@ const RELATIVE_SILENCE_S: f64 = 0.1;
 pub struct Wish {
     /// Along the needle, positive inwards.
     pub along_m_per_s: f64,
-    /// Across the template, as one sees it: to the right, and up.
+    /// Across the template, as seen from the perineum: to the right, and up.
     pub across_m_per_s: [f64; 2],
 }
 
 impl Wish {
+    /// The needle stays where it is.
     pub const REST: Self = Self {
         along_m_per_s: 0.0,
         across_m_per_s: [0.0; 2],
     };
 
+    /// The same direction at a share of the speed.
     pub fn slower(self, by: f64) -> Self {
         Self {
             along_m_per_s: self.along_m_per_s * by,
@@ -35,8 +37,10 @@ impl Wish {
 
 /// All that the kernel knows of a device at one moment.
 #[derive(Debug, Default)]
-pub struct Whole {
+pub struct DeviceState {
+    /// Absolute axes with their range and position.
     pub axes: Vec<(AbsoluteAxisCode, AbsInfo)>,
+    /// Keys that are down.
     pub keys: AttributeSet<KeyCode>,
 }
 
@@ -58,12 +62,12 @@ pub struct State {
     spoke_s: [Option<f64>; 3],
     keys: AttributeSet<KeyCode>,
     is_losing: bool,
-    was_let_go: bool,
+    was_released: bool,
 }
 
 impl State {
-    /// A device that was just opened. What is held now was not pressed for this program, and must first be let go.
-    pub fn new(kind: Kind, whole: &Whole) -> Self {
+    /// A device that was just opened. What is held now was not pressed for this program, and must first be released.
+    pub fn new(kind: Kind, whole: &DeviceState) -> Self {
         let mut state = Self {
             kind,
             axes: [None; 3],
@@ -71,7 +75,7 @@ impl State {
             spoke_s: [None; 3],
             keys: AttributeSet::new(),
             is_losing: false,
-            was_let_go: false,
+            was_released: false,
         };
         state.take_whole(whole);
         for (axis, counts) in state.axes.iter_mut().zip(&mut state.counts) {
@@ -83,9 +87,9 @@ impl State {
         state
     }
 
-    /// Whether the stick or the cap has been at rest since the device came, or since it was stopped.
-    pub fn was_let_go(&self) -> bool {
-        self.was_let_go
+    /// Whether the stick or the cap has been at rest since the device was plugged in, or since it was stopped.
+    pub fn was_released(&self) -> bool {
+        self.was_released
     }
 
     pub fn take(&mut self, event: InputEvent, now_s: f64) -> Taken {
@@ -126,7 +130,7 @@ impl State {
     }
 
     /// After a loss. Buttons that are down now and were not before were pressed in between.
-    pub fn read_anew(&mut self, whole: &Whole) -> Vec<Button> {
+    pub fn resync(&mut self, whole: &DeviceState) -> Vec<Button> {
         let before = std::mem::replace(&mut self.keys, AttributeSet::new());
         self.take_whole(whole);
         // Of relative axes the kernel keeps no state.
@@ -141,7 +145,7 @@ impl State {
 
     /// What the hand on the device wants at this time.
     pub fn wish(&self, now_s: f64) -> Wish {
-        if !self.was_let_go {
+        if !self.was_released {
             return Wish::REST;
         }
         let [right, back, down] = [0, 1, 2].map(|axis| self.share(axis, now_s));
@@ -171,7 +175,7 @@ impl State {
         }
     }
 
-    fn take_whole(&mut self, whole: &Whole) {
+    fn take_whole(&mut self, whole: &DeviceState) {
         for (code, info) in &whole.axes {
             if let Some(slot) = self.axes.get_mut(usize::from(code.0)) {
                 (*slot, self.counts[usize::from(code.0)]) = (Axis::absolute(info), info.value());
@@ -189,14 +193,14 @@ impl State {
     fn pressed(&mut self, key: KeyCode) -> Option<Button> {
         let button = self.kind.button(key)?;
         if button == Button::Stop {
-            self.was_let_go = false;
+            self.was_released = false;
         }
         Some(button)
     }
 
-    /// By itself too, as relative axes come to rest by saying nothing.
+    /// To be called without events too: relative axes rest by being silent.
     pub fn note_rest(&mut self, now_s: f64) {
-        self.was_let_go |= (0..3).all(|axis| self.ignores(axis) || self.share(axis, now_s) == 0.0);
+        self.was_released |= (0..3).all(|axis| self.ignores(axis) || self.share(axis, now_s) == 0.0);
     }
 
     /// The second stick and the triggers of a gamepad rest where they like.
@@ -214,185 +218,4 @@ impl State {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use evdev::EventType;
-
-    const Y: u16 = AbsoluteAxisCode::ABS_Y.0;
-
-    fn event(kind: EventType, code: u16, value: i32) -> InputEvent {
-        InputEvent::new(kind.0, code, value)
-    }
-
-    fn report() -> InputEvent {
-        event(EventType::SYNCHRONIZATION, SynchronizationCode::SYN_REPORT.0, 0)
-    }
-
-    /// Events in one report, then what they were; `None` for those that were nothing.
-    fn feed(state: &mut State, now_s: f64, events: &[(EventType, u16, i32)]) -> Vec<Taken> {
-        let events = events.iter().map(|(kind, code, value)| event(*kind, *code, *value));
-        let taken = events.chain([report()]).map(|e| state.take(e, now_s));
-        let told = taken.filter(|t| *t != Taken::Nothing).collect();
-        state.note_rest(now_s);
-        told
-    }
-
-    fn stick(value: i32) -> Whole {
-        let axis = |code, value| (code, AbsInfo::new(value, -32768, 32767, 16, 128, 0));
-        Whole {
-            axes: vec![axis(AbsoluteAxisCode::ABS_X, 0), axis(AbsoluteAxisCode::ABS_Y, value)],
-            keys: AttributeSet::new(),
-        }
-    }
-
-    fn cap() -> Whole {
-        let axes = [
-            AbsoluteAxisCode::ABS_X,
-            AbsoluteAxisCode::ABS_Y,
-            AbsoluteAxisCode::ABS_Z,
-        ];
-        Whole {
-            axes: axes.map(|code| (code, AbsInfo::new(0, -350, 350, 0, 0, 0))).to_vec(),
-            keys: AttributeSet::new(),
-        }
-    }
-
-    #[test]
-    fn a_stick_pushed_away_advances_at_full_speed_and_a_shoulder_button_makes_it_slow() {
-        let mut state = State::new(Kind::Gamepad, &stick(0));
-        feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, -32768)]);
-        assert!((state.wish(0.0).along_m_per_s - 0.04).abs() < 1e-6);
-        feed(&mut state, 0.0, &[(EventType::KEY, KeyCode::BTN_TL.0, 1)]);
-        assert!((state.wish(0.0).along_m_per_s - 0.01).abs() < 1e-6);
-        feed(
-            &mut state,
-            0.0,
-            &[(EventType::KEY, KeyCode::BTN_TL.0, 0), (EventType::ABSOLUTE, Y, 32767)],
-        );
-        assert!((state.wish(0.0).along_m_per_s + 0.04).abs() < 1e-6);
-        feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, 2000)]);
-        assert_eq!(state.wish(0.0), Wish::REST);
-    }
-
-    #[test]
-    fn the_needle_does_not_move_until_a_stick_that_came_deflected_was_let_go() {
-        let mut state = State::new(Kind::Gamepad, &stick(-32768));
-        assert_eq!(state.wish(0.0), Wish::REST);
-        feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, -30000)]);
-        assert_eq!(state.wish(0.0), Wish::REST);
-        feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, 0)]);
-        feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, -30000)]);
-        assert!(state.wish(0.0).along_m_per_s > 0.0);
-    }
-
-    #[test]
-    fn stop_holds_until_the_stick_was_let_go() {
-        let mut state = State::new(Kind::Gamepad, &stick(0));
-        feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, -32768)]);
-        let told = feed(&mut state, 0.0, &[(EventType::KEY, KeyCode::BTN_EAST.0, 1)]);
-        assert_eq!(told, [Taken::Pressed(Button::Stop)]);
-        assert_eq!(state.wish(0.0), Wish::REST);
-        feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, 0)]);
-        feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, -32768)]);
-        assert!(state.wish(0.0).along_m_per_s > 0.0);
-    }
-
-    #[test]
-    fn a_button_counts_once_and_not_when_it_was_held_before() {
-        let mut whole = stick(0);
-        whole.keys.insert(KeyCode::BTN_START);
-        let mut state = State::new(Kind::Gamepad, &whole);
-        let press = [
-            (EventType::KEY, KeyCode::BTN_SOUTH.0, 1),
-            (EventType::KEY, KeyCode::BTN_SOUTH.0, 2),
-        ];
-        assert_eq!(feed(&mut state, 0.0, &press), [Taken::Pressed(Button::Drop)]);
-        assert_eq!(feed(&mut state, 0.0, &[(EventType::KEY, KeyCode::BTN_START.0, 1)]), []);
-        feed(&mut state, 0.0, &[(EventType::KEY, KeyCode::BTN_START.0, 0)]);
-        let again = feed(&mut state, 0.0, &[(EventType::KEY, KeyCode::BTN_START.0, 1)]);
-        assert_eq!(again, [Taken::Pressed(Button::Engage)]);
-    }
-
-    #[test]
-    fn after_lost_events_the_state_is_that_of_the_device() {
-        let mut state = State::new(Kind::Gamepad, &stick(0));
-        feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, -32768)]);
-        let dropped = (EventType::SYNCHRONIZATION, SynchronizationCode::SYN_DROPPED.0, 0);
-        // What comes between the loss and the report is not believed.
-        let told = feed(
-            &mut state,
-            0.0,
-            &[
-                dropped,
-                (EventType::ABSOLUTE, Y, 32767),
-                (EventType::KEY, KeyCode::BTN_SOUTH.0, 1),
-            ],
-        );
-        assert_eq!(told, [Taken::Lost]);
-        assert!(state.wish(0.0).along_m_per_s > 0.0);
-        let mut now = stick(0);
-        now.keys.insert(KeyCode::BTN_EAST);
-        assert_eq!(state.read_anew(&now), [Button::Stop]);
-        state.note_rest(0.0);
-        assert_eq!(state.wish(0.0), Wish::REST);
-        feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, -32768)]);
-        assert!(state.wish(0.0).along_m_per_s > 0.0, "events count again");
-    }
-
-    #[test]
-    fn of_a_cap_only_the_direction_that_is_meant_counts() {
-        let mut state = State::new(Kind::Mouse3d, &cap());
-        let push = |state: &mut State, xyz: [i32; 3]| {
-            let events: Vec<_> = (0..3).map(|a| (EventType::ABSOLUTE, a, xyz[usize::from(a)])).collect();
-            feed(state, 0.0, &events);
-            state.wish(0.0)
-        };
-        let down = push(&mut state, [100, 60, 350]);
-        assert!((down.along_m_per_s - 0.04).abs() < 1e-9 && down.across_m_per_s == [0.0; 2]);
-        assert!(push(&mut state, [0, 0, -350]).along_m_per_s < -0.039);
-        // To the right and away: right and up as one sees the template.
-        let slid = push(&mut state, [350, -350, 40]);
-        assert_eq!((slid.along_m_per_s, slid.across_m_per_s), (0.0, [0.01, 0.01]));
-        assert_eq!(push(&mut state, [0; 3]), Wish::REST);
-    }
-
-    #[test]
-    fn a_relative_cap_that_falls_silent_is_at_rest() {
-        let mut state = State::new(Kind::Mouse3d, &Whole::default());
-        let press = [(EventType::RELATIVE, RelativeAxisCode::REL_Z.0, 350)];
-        feed(&mut state, 1.0, &press);
-        assert!((state.wish(1.05).along_m_per_s - 0.04).abs() < 1e-9);
-        assert_eq!(state.wish(1.2), Wish::REST);
-        // Turning the cap moves nothing.
-        feed(
-            &mut state,
-            2.0,
-            &[(EventType::RELATIVE, RelativeAxisCode::REL_RZ.0, 350)],
-        );
-        assert_eq!(state.wish(2.0), Wish::REST);
-        // Stopped while pressed: silence is letting go.
-        feed(&mut state, 3.0, &press);
-        feed(&mut state, 3.0, &[(EventType::KEY, KeyCode::BTN_1.0, 1)]);
-        assert!(!state.was_let_go());
-        state.note_rest(3.2);
-        feed(&mut state, 3.3, &press);
-        assert!(state.wish(3.3).along_m_per_s > 0.0);
-    }
-
-    #[test]
-    fn any_event_gives_a_wish_that_the_core_takes() {
-        let mut state = State::new(Kind::Mouse3d, &cap());
-        let values = [i32::MIN, -351, -30, -1, 0, 29, 31, 40, 350, i32::MAX];
-        for code in [0, 1, 2, 3, 40, u16::MAX] {
-            for value in values {
-                for kind in [EventType::ABSOLUTE, EventType::RELATIVE, EventType::KEY] {
-                    feed(&mut state, 0.0, &[(kind, code, value)]);
-                    let wish = state.wish(0.0);
-                    for speed in [wish.along_m_per_s, wish.across_m_per_s[0], wish.across_m_per_s[1]] {
-                        assert!(speed == 0.0 || (1e-4..=0.04).contains(&speed.abs()), "{speed}");
-                    }
-                }
-            }
-        }
-    }
-}
+mod tests;

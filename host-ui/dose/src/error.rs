@@ -1,10 +1,11 @@
 //! What dose cannot be computed from.
 
 use std::path::PathBuf;
+use stylet_base::WriteError;
 use stylet_base::format::printable;
 
 /// Why dose cannot be computed; the texts say what was found and what to do.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum DoseError {
     /// A triangle mesh that encloses no volume.
     #[error("{0}")]
@@ -29,19 +30,15 @@ pub enum DoseError {
         /// What is wrong in it.
         why: String,
     },
-    /// A picture that cannot be written.
-    #[error("{} cannot be written ({why})", .path.display())]
+    /// A picture that cannot be drawn.
+    #[error("{} cannot be drawn ({why})", .path.display())]
     Picture {
         /// The file.
         path: PathBuf,
-        /// What the writer reported.
+        /// What the drawing library reported.
         why: String,
     },
-}
-
-/// For functions whose error is a text.
-impl From<DoseError> for String {
-    fn from(why: DoseError) -> Self {
-        why.to_string()
-    }
+    /// A file that cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
 }

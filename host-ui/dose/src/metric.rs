@@ -159,7 +159,7 @@ mod tests {
             ("Dmean", "Dmean"),
             ("D99.9", "D99.9"),
         ] {
-            assert_eq!(Metric::parse(name).map(|m| m.to_string()), Ok(written.to_owned()));
+            assert_eq!(Metric::parse(name).unwrap().to_string(), written);
         }
         for wrong in [
             "", "D", "D101", "V-1", "X90", "D2ml", "V100cc", "Dnan", "Vinf", "D2cc%", "ä90",

@@ -50,7 +50,7 @@ pub fn trials(
     (0..how.trials)
         .into_par_iter()
         .filter_map(|trial| {
-            if stop.is_requested() {
+            if stop.asked() {
                 return None;
             }
             let moved = moved(plan, how, trial);

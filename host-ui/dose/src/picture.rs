@@ -29,19 +29,20 @@ pub fn dvh(path: &Path, curves: &[(&str, &Dvh)], prescription_gy: f64) -> Result
             ((*name).to_owned(), (0..=STEPS).map(|i| (at(i), share(at(i)))).collect())
         })
         .collect();
-    draw(path, &lines, prescription_gy, most_gy).map_err(|e| DoseError::Picture {
+    let picture = draw(&lines, prescription_gy, most_gy).map_err(|e| DoseError::Picture {
         path: path.to_owned(),
         why: e.to_string(),
-    })
+    })?;
+    Ok(stylet_base::write_whole(path, picture.as_bytes())?)
 }
 
 fn draw(
-    path: &Path,
     lines: &[(String, Vec<(f64, f64)>)],
     prescription_gy: f64,
     most_gy: f64,
-) -> Result<(), Box<dyn std::error::Error>> {
-    let root = SVGBackend::new(path, SIZE).into_drawing_area();
+) -> Result<String, Box<dyn std::error::Error>> {
+    let mut picture = String::new();
+    let root = SVGBackend::with_string(&mut picture, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&root)
         .margin(20)
@@ -85,5 +86,7 @@ fn draw(
         .label_font(("sans-serif", 16))
         .draw()?;
     root.present()?;
-    Ok(())
+    drop(chart);
+    drop(root);
+    Ok(picture)
 }

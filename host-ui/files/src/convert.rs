@@ -33,15 +33,6 @@ pub fn write_labels(v: &Voxels, path: &Path) -> Result<(), FileError> {
     let refused = |why: ContentError| FileError::of(path, why);
     let writer =
         writer(path).ok_or_else(|| refused("label volumes are written as .nrrd, .seg.nrrd, .mha or .nii.gz".into()))?;
-    write_whole(path, &writer(v).map_err(refused)?)
-}
-
-/// Writes a file that has its name only once all of it is there.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".part");
-    let beside = Path::new(&beside);
-    std::fs::write(beside, bytes)
-        .and_then(|()| std::fs::rename(beside, path))
-        .map_err(|e| FileError::of(path, format!("it cannot be written ({e}); check the folder")))
+    stylet_base::write_whole(path, &writer(v).map_err(refused)?)
+        .map_err(|e| refused(ContentError::Unwritable(e.source.to_string())))
 }

@@ -22,6 +22,9 @@ pub enum ContentError {
     /// The file cannot be opened or read at all.
     #[error("{0}")]
     Unreadable(String),
+    /// The file cannot be written.
+    #[error("it cannot be written ({0}); check the folder and the space on the disk")]
+    Unwritable(String),
     /// The content is not what it must be.
     #[error("{0}")]
     Invalid(String),
@@ -65,20 +68,6 @@ impl ContentError {
                 many.join("\n  ")
             ))),
         }
-    }
-}
-
-/// For functions whose error is a text.
-impl From<ContentError> for String {
-    fn from(why: ContentError) -> Self {
-        why.to_string()
-    }
-}
-
-/// For functions whose error is a text.
-impl From<FileError> for String {
-    fn from(why: FileError) -> Self {
-        why.to_string()
     }
 }
 

@@ -25,7 +25,8 @@ pub enum Format {
 impl Format {
     /// By its first bytes, whatever its name.
     pub fn of(bytes: &[u8]) -> Option<Self> {
-        let tests: [(Self, fn(&[u8]) -> bool); 4] = [
+        type Test = fn(&[u8]) -> bool;
+        let tests: [(Self, Test); 4] = [
             (Self::Dicom, dicom::is_dicom),
             (Self::Nrrd, nrrd::is_nrrd),
             (Self::Nifti, nifti::is_nifti),

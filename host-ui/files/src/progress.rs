@@ -47,7 +47,7 @@ impl Progress {
         // SYNC: read by `at`; nothing but the number is carried.
         self.at
             .store(stage as u32 * (STEPS + 1) + steps as u32, Ordering::Relaxed);
-        if self.end.is_requested() {
+        if self.end.asked() {
             return Err(ContentError::Cancelled);
         }
         Ok(())
@@ -82,7 +82,7 @@ mod tests {
             assert_eq!(reader.report(stage, done, of), Ok(()));
             assert_eq!(seen.at(), (stage, share));
         }
-        end.request();
+        end.ask();
         assert!(reader.report(Stage::Voxels, 1, 4).is_err());
     }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use stylet_shm_schema::BUILTIN_SCENES;
 use stylet_shm_schema::service::Instance;
 
+/// Options of every command that uses a core.
 #[derive(Args, Clone, Debug)]
 pub struct CoreArgs {
     /// Name that rt-core was started under
@@ -26,10 +27,12 @@ impl CoreArgs {
     }
 }
 
+/// A scene that a user names.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SceneChoice {
     /// By its place among [`BUILTIN_SCENES`].
     BuiltIn(usize),
+    /// A file that is read and uploaded.
     File(PathBuf),
 }
 
@@ -44,6 +47,7 @@ impl SceneChoice {
         }
     }
 
+    /// Where the scene is read from; `None` for a built-in one.
     pub fn file(&self) -> Option<&Path> {
         match self {
             Self::BuiltIn(_) => None,

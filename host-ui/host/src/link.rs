@@ -1,4 +1,4 @@
-//! The only place that meets shared memory: takes what the core says, checked, and sends what the operator asks.
+//! The only place of the host that uses shared memory: receives what the core publishes, checked, and sends requests.
 
 mod ports;
 mod receive;
@@ -27,18 +27,22 @@ const EVENTS_KEPT: usize = 256;
 const ANSWERS_KEPT: usize = 256;
 const REHEARSALS_KEPT: usize = 8;
 const RECORDS_KEPT: usize = 300_000;
-/// The core takes no larger volume.
+/// Largest volume that the core accepts, in cells.
 pub const MAX_UPLOAD_CELLS: usize = 64 << 20;
 
+/// Whether the core runs.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LinkStatus {
     /// No core has announced itself, or it has been silent for long; `why` says what to do.
     Absent {
+        /// What to do.
         why: String,
     },
+    /// The heartbeat moves.
     Live,
     /// The heartbeat has not moved.
     Silent {
+        /// For how long.
         since: Duration,
     },
 }
@@ -46,8 +50,11 @@ pub enum LinkStatus {
 /// The rest surface of the scene that runs.
 #[derive(Clone, Debug)]
 pub struct SceneModel {
+    /// Counts, boxes, structures.
     pub header: SceneHeader,
+    /// Vertices at rest, m.
     pub rest_m: Vec<[f32; 3]>,
+    /// Vertices of each triangle.
     pub triangles: Vec<[u32; 3]>,
     /// One for each cell of `header.labels`: 0 outside, else one more than the place among the header's structures.
     pub labels: Vec<u8>,
@@ -74,7 +81,9 @@ impl SceneModel {
 /// The deformed body of one tissue tick.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
+    /// Tick, needle, seeds.
     pub header: SnapshotHeader,
+    /// Vertices of the surface, m.
     pub positions_m: Vec<[f32; 3]>,
     /// Displacement from rest at each node of the scene's grid.
     pub displacements_m: Vec<[f32; 3]>,
@@ -83,22 +92,38 @@ pub struct Snapshot {
 /// What the core said to a command or an upload.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Answer {
+    /// Whether it was carried out.
     pub accepted: bool,
+    /// For people.
     pub text: String,
+    /// For programs; empty when accepted.
+    pub reasons: Vec<Reason>,
+    /// First tick of the force loop that ran with the change.
     pub effective_tick: u64,
 }
 
-/// Why something could not be sent.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LinkError(pub String);
-
-impl std::fmt::Display for LinkError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
+impl From<Refusal> for Answer {
+    fn from(refusal: Refusal) -> Self {
+        Self {
+            accepted: false,
+            text: refusal.text,
+            reasons: refusal.reasons,
+            effective_tick: 0,
+        }
     }
 }
 
-impl std::error::Error for LinkError {}
+impl Answer {
+    /// Whether it was refused for this reason.
+    pub fn is_refused_for(&self, code: RefusalCode) -> bool {
+        self.reasons.iter().any(|reason| reason.code() == Some(code))
+    }
+}
+
+/// Why something could not be sent.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct LinkError(pub String);
 
 /// One host's connection to the core of one instance.
 pub struct Link {
@@ -120,7 +145,7 @@ pub struct Link {
     answers: BTreeMap<u64, Answer>,
     rehearsals: BTreeMap<u64, Box<Rehearsal>>,
     records: Vec<TickRecord>,
-    rubbish_refused: u64,
+    invalid_dropped: u64,
 }
 
 /// Two hosts must not take each other's answers.
@@ -152,7 +177,7 @@ impl Link {
             answers: BTreeMap::new(),
             rehearsals: BTreeMap::new(),
             records: Vec::new(),
-            rubbish_refused: 0,
+            invalid_dropped: 0,
         }
     }
 
@@ -168,10 +193,12 @@ impl Link {
         self.tidy();
     }
 
+    /// The instance that this link is for.
     pub fn instance(&self) -> &Instance {
         &self.instance
     }
 
+    /// Whether the core runs.
     pub fn status(&self) -> LinkStatus {
         let Some(moved) = self.beat_moved else {
             return LinkStatus::Absent { why: self.why_absent() };
@@ -209,15 +236,17 @@ impl Link {
         format!("{what} (instance \"{name}\"). Start it in another terminal: rt-core{flag}")
     }
 
+    /// The present run of the core.
     pub fn session(&self) -> Option<&Session> {
         self.latest.session.as_ref()
     }
 
-    /// The last one believed.
+    /// The last valid one.
     pub fn state(&self) -> Option<&HapticState> {
         self.state.as_ref()
     }
 
+    /// The scene that runs.
     pub fn scene(&self) -> Option<&Arc<SceneModel>> {
         self.latest.scene.get()
     }
@@ -228,13 +257,15 @@ impl Link {
         self.latest
             .snapshot
             .get()
-            .filter(|s| s.header.scene_generation == scene.header.generation)
+            .filter(|s| s.header.scene_id() == scene.header.id())
     }
 
+    /// The parameters in force.
     pub fn parameters(&self) -> Option<&ParametersInForce> {
         self.latest.parameters.get()
     }
 
+    /// The plan in force.
     pub fn plan(&self) -> Option<&PlanInForce> {
         self.latest.plan.get()
     }
@@ -254,32 +285,27 @@ impl Link {
         self.answers.remove(&command_id)
     }
 
-    /// What a [`CommandKind::Rehearse`] came to, once its reply says that it was carried out.
+    /// What a [`Request::Rehearse`] came to, once its reply says that it was carried out.
     pub fn rehearsal(&mut self, command_id: u64) -> Option<Box<Rehearsal>> {
         self.rehearsals.remove(&command_id)
     }
 
-    /// Messages from shared memory that were not believed.
-    pub fn rubbish_refused(&self) -> u64 {
-        self.rubbish_refused
+    /// Invalid messages from shared memory that were dropped.
+    pub fn invalid_dropped(&self) -> u64 {
+        self.invalid_dropped
     }
 
     /// The id of the command; its [`Answer`] comes later.
-    pub fn send(&mut self, kind: CommandKind, values: &[f64]) -> Result<u64, LinkError> {
-        if values.len() > MAX_COMMAND_VALUES {
-            return Err(LinkError(format!(
-                "{} values in one command; at most {MAX_COMMAND_VALUES} fit",
-                values.len()
-            )));
-        }
+    pub fn send(&mut self, request: &Request) -> Result<u64, LinkError> {
         let id = self.next_id()?;
-        let command = Command::new(self.host_id, id, kind, values);
+        let command = request.encode(self.host_id, id);
+        let command = command.map_err(|errors| LinkError(errors.to_string()))?;
         let Some(ports) = &self.ports else {
             return Err(LinkError(self.why_absent()));
         };
         match ports.commands.send_copy(command) {
             Ok(0) => Err(LinkError(
-                "the core did not take the command: its queue is full or it has just ended".to_owned(),
+                "the core did not accept the command: its queue is full or it has just ended".to_owned(),
             )),
             Ok(_) => Ok(id),
             Err(e) => Err(LinkError(format!("the command could not be sent: {e:?}"))),
@@ -323,7 +349,7 @@ impl Link {
         self.upload_port = Some(port);
         match taken {
             Ok(0) => Err(LinkError(format!(
-                "the core did not take the volume; at most {MAX_HOSTS} hosts can be connected"
+                "the core did not accept the volume; at most {MAX_HOSTS} hosts can be connected"
             ))),
             Ok(_) => Ok(id),
             Err(e) => Err(LinkError(format!("the volume could not be sent: {e:?}"))),
@@ -368,7 +394,7 @@ impl Link {
         let state = board.read();
         match check::state(&state) {
             Ok(()) => self.state = Some(state),
-            Err(_) => self.rubbish_refused += 1,
+            Err(_) => self.invalid_dropped += 1,
         }
     }
 
@@ -381,7 +407,7 @@ impl Link {
         }
     }
 
-    /// Drops what a dead core left: nobody else does it in the background.
+    /// Removes what a dead core left: nobody else does it in the background.
     fn tidy(&mut self) {
         let silent = match self.status() {
             LinkStatus::Live => return,
@@ -428,12 +454,13 @@ impl Link {
             return;
         }
         let Some(status) = ReplyStatus::from_number(reply.status) else {
-            self.rubbish_refused += 1;
+            self.invalid_dropped += 1;
             return;
         };
         let answer = Answer {
             accepted: status == ReplyStatus::Accepted,
             text: reply.text.read(),
+            reasons: reply.reasons().to_vec(),
             effective_tick: reply.effective_tick,
         };
         self.answers.insert(reply.command_id, answer);

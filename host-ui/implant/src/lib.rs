@@ -1,5 +1,9 @@
 //! The implant: its plan, the procedure that carries it out, compensation by rehearsal, and its score.
 
+#![warn(missing_docs)]
+
+pub mod pairing;
+mod patient;
 pub mod plan;
 pub mod procedure;
 pub mod readers;

@@ -1,12 +1,15 @@
-//! The whole procedure without a window, with what happened written to files.
+//! The whole procedure without a window; its results are written to files.
 
 mod child;
 mod debrief;
+mod error;
+/// What a procedure does: its needles, planned and dropped.
 pub mod job;
 mod report;
 
 use crate::workflow::{Pace, Run, RunStatus, Step};
 use child::Core;
+pub use error::ProcedureError;
 use job::Job;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -25,6 +28,7 @@ const LOAD_LIMIT: Duration = Duration::from_secs(60);
 
 /// Which core, and which scene in it.
 pub struct Connect {
+    /// Which core and which scene.
     pub asked: CoreArgs,
     /// To be started when none is running.
     pub core: Option<PathBuf>,
@@ -32,26 +36,30 @@ pub struct Connect {
 
 /// A core that answers, with the scene that was asked for.
 pub struct Live {
+    /// The link to the core.
     pub link: Link,
     /// The core that was started for this; ends with it.
     core: Option<Core>,
+    /// The scene that runs.
     pub scene: Arc<SceneModel>,
     /// What the scene file says beside the scene.
     said: Option<SceneFile>,
+    /// Set when the user ends the program.
     pub interrupted: Interrupt,
 }
 
 impl Live {
-    pub fn connect(options: &Connect) -> Result<Self, String> {
+    /// Finds or starts the core and loads the scene; an error where one of them fails.
+    pub fn connect(options: &Connect) -> Result<Self, ProcedureError> {
         let asked = &options.asked;
         let volume = asked
             .file()
             .map(|path| files::read(path, asked.label, &files::Progress::default()));
-        let volume = volume.transpose().map_err(|e| e.to_string())?;
+        let volume = volume.transpose().map_err(|e| ProcedureError::Input(e.to_string()))?;
         let scene_file = asked.file().filter(|path| files::scene::is_scene(path));
         let said = scene_file.map(files::scene::read).transpose();
-        let said = said.map_err(|e| e.to_string())?;
-        let interrupted = Interrupt::on_signals()?;
+        let said = said.map_err(|e| ProcedureError::Input(e.to_string()))?;
+        let interrupted = Interrupt::on_signals().map_err(|e| ProcedureError::Input(e.to_string()))?;
         let mut link = Link::new(asked.instance.clone());
         let mut core = None;
         let device = said.as_ref().and_then(|s| s.device.as_deref());
@@ -60,16 +68,19 @@ impl Live {
             for note in &volume.warnings {
                 println!("note: {note}");
             }
-            load(&mut link, |link| link.upload(volume).map_err(|e| e.0), &interrupted)?;
+            load(&mut link, |link| Ok(link.upload(volume)?), &interrupted)?;
         }
         if let Some(SceneChoice::BuiltIn(number)) = asked.scene {
             let send = |link: &mut Link| {
-                let sent = link.send(CommandKind::LoadBuiltinScene, &[number as f64]);
-                sent.map_err(|e| e.to_string())
+                let sent = link.send(&Request::LoadBuiltinScene(number as u32));
+                Ok(sent?)
             };
             load(&mut link, send, &interrupted)?;
         }
-        let scene = link.scene().ok_or("the core sent no scene")?.clone();
+        let scene = link
+            .scene()
+            .ok_or(ProcedureError::NothingReceived("the core sent no scene"))?
+            .clone();
         Ok(Self {
             link,
             core,
@@ -80,11 +91,15 @@ impl Live {
     }
 }
 
+/// What a headless procedure does.
 pub struct Options {
+    /// Which core and which scene.
     pub connect: Connect,
+    /// Folder of the results; otherwise one named for the time.
     pub out: Option<PathBuf>,
     /// Otherwise as the scene file says, or as usual.
     pub insert_m_per_s: Option<f64>,
+    /// Seeds of the suggested needle, where there is no plan.
     pub seeds: usize,
     /// Many needles, from a file; else one through the middle.
     pub plan: Option<PathBuf>,
@@ -107,7 +122,7 @@ struct Seen {
 }
 
 /// An error when not every step was completed.
-pub fn run(options: Options) -> Result<(), String> {
+pub fn run(options: Options) -> Result<(), ProcedureError> {
     let Live {
         mut link,
         core,
@@ -144,13 +159,14 @@ pub fn run(options: Options) -> Result<(), String> {
     let mut seen = Seen::default();
     let outcome = perform(&mut link, &job, pace, &interrupted, &mut seen);
     if outcome.is_err() {
-        // The force must not stay on for nobody.
-        let _asked = link.send(CommandKind::Disengage, &[]);
+        // Nobody holds the device any more: the force must go off.
+        let _asked = link.send(&Request::Disengage);
     }
     let out = options
         .out
         .unwrap_or_else(|| PathBuf::from(format!("out/procedure-{}", format::utc_now())));
-    let written = report::write(&out, &link, &job, &pace, &seen, outcome.as_ref().err());
+    let failure = outcome.as_ref().err().map(ToString::to_string);
+    let written = report::write(&out, &link, &job, &pace, &seen, failure.as_ref());
     let scored = written.and_then(|()| debrief::write(&out, &link, &scene, &job, &seen, options.source.as_deref()));
     drop(core);
     outcome?;
@@ -161,12 +177,12 @@ fn wait(
     link: &mut Link,
     interrupted: &Interrupt,
     limit: Duration,
-    mut ready: impl FnMut(&mut Link) -> Result<bool, String>,
-) -> Result<bool, String> {
+    mut ready: impl FnMut(&mut Link) -> Result<bool, ProcedureError>,
+) -> Result<bool, ProcedureError> {
     let begun = Instant::now();
     while begun.elapsed() < limit {
-        if interrupted.is_requested() {
-            return Err("interrupted".to_owned());
+        if interrupted.asked() {
+            return Err(ProcedureError::Interrupted);
         }
         link.poll();
         if ready(link)? {
@@ -187,61 +203,75 @@ fn find_core(
     options: &Connect,
     device: Option<&str>,
     interrupted: &Interrupt,
-) -> Result<(), String> {
+) -> Result<(), ProcedureError> {
     if wait(link, interrupted, FIND_LIMIT, |link| Ok(is_ready(link)))? {
         return Ok(());
     }
     let missing = match link.status() {
         LinkStatus::Absent { why } => why,
-        _ => return Err("rt-core is there but does not answer; end it and start it again".to_owned()),
+        _ => {
+            let why = "rt-core runs but does not answer; end it and start it again";
+            return Err(ProcedureError::NoCore(why.to_owned()));
+        }
     };
     let Some(path) = &options.core else {
-        return Err(format!("{missing}, or add --core PATH to have it started"));
+        let why = format!("{missing}, or add --core PATH to have it started");
+        return Err(ProcedureError::NoCore(why));
     };
     let child = core.insert(Core::start(path, &options.asked.instance, device)?);
     let found = wait(link, interrupted, START_LIMIT, |link| match child.ended() {
-        Some(why) => Err(why),
+        Some(status) => Err(ProcedureError::CoreEnded(status)),
         None => Ok(is_ready(link)),
     })?;
     if found {
         return Ok(());
     }
-    Err("the rt-core that was started does not answer".to_owned())
+    Err(ProcedureError::NoCore(
+        "the rt-core that was started does not answer".to_owned(),
+    ))
 }
 
 fn load(
     link: &mut Link,
-    send: impl FnOnce(&mut Link) -> Result<u64, String>,
+    send: impl FnOnce(&mut Link) -> Result<u64, ProcedureError>,
     interrupted: &Interrupt,
-) -> Result<(), String> {
-    let before = link.scene().map(|s| s.header.generation);
+) -> Result<(), ProcedureError> {
+    let before = link.scene().map(|s| s.header.id());
     let id = send(link)?;
     let mut accepted = false;
     let shown = wait(link, interrupted, LOAD_LIMIT, |link| {
         if let Some(answer) = link.reply(id) {
             if !answer.accepted {
-                return Err(format!("the core refused the scene: {}", answer.text));
+                return Err(ProcedureError::SceneRefused(answer.text));
             }
             accepted = true;
         }
-        Ok(accepted && link.scene().map(|s| s.header.generation) != before && link.snapshot().is_some())
+        Ok(accepted && link.scene().map(|s| s.header.id()) != before && link.snapshot().is_some())
     })?;
     if shown {
         Ok(())
     } else {
-        Err("the core did not show the scene in time".to_owned())
+        Err(ProcedureError::NothingReceived(
+            "the core did not show the scene in time",
+        ))
     }
 }
 
-fn perform(link: &mut Link, job: &Job, pace: Pace, interrupted: &Interrupt, seen: &mut Seen) -> Result<(), String> {
+fn perform(
+    link: &mut Link,
+    job: &Job,
+    pace: Pace,
+    interrupted: &Interrupt,
+    seen: &mut Seen,
+) -> Result<(), ProcedureError> {
     let mut run = Run::of_needles(job.tasks.clone(), pace);
     let begun = Instant::now();
     let mut step: Option<(usize, Step)> = None;
     seen.last_event = link.events().back().map(|e| e.sequence);
     link.take_records();
     loop {
-        if interrupted.is_requested() {
-            return Err("interrupted".to_owned());
+        if interrupted.asked() {
+            return Err(ProcedureError::Interrupted);
         }
         link.poll();
         let status = run.advance(link);
@@ -262,7 +292,7 @@ fn perform(link: &mut Link, job: &Job, pace: Pace, interrupted: &Interrupt, seen
         match status {
             RunStatus::Working => std::thread::sleep(POLL_EVERY),
             RunStatus::Done => return Ok(()),
-            RunStatus::Failed(why) => return Err(why),
+            RunStatus::Failed(why) => return Err(why.into()),
         }
     }
 }

@@ -1,7 +1,8 @@
-//! The four steps of an implantation: plan, place the needle, insert, drop seeds while retracting.
+//! The plan of one needle, and the procedure driven over the link.
 
 mod plan;
 mod run;
 
-pub use plan::{NeedlePlan, Pace, default_plan, move_values, patient_axis, plan_values, plan_with_seeds};
-pub use run::{NeedleTask, Run, RunStatus, Step};
+pub use plan::{NeedlePlan, default_plan, move_request, plan_request, plan_with_seeds};
+pub use run::{NeedleTask, Run, RunError, RunFailure, RunStatus};
+pub use stylet_procedure::{Pace, Step};

@@ -1,25 +1,28 @@
-//! What the operator asked for, carried out after all panels are drawn.
+//! Carries out what the operator asked for, after all panels are drawn.
 
 use super::drive::{BEFORE_ENTRY_M, Drive};
 use super::{App, Waiting, refusal};
+use crate::action::Action;
 use crate::panel::workflow::{Undo, next_action, undo_action};
-use crate::panel::{Action, LoadState};
 use crate::settings::ThemeChoice;
+use crate::shown::LoadState;
 use std::time::Instant;
 use stylet_controllers::Wish;
-use stylet_implant::workflow::{default_plan, move_values, plan_values};
-use stylet_shm_schema::{CommandKind, PARAMETERS};
+use stylet_implant::workflow::{default_plan, move_request, plan_request};
+use stylet_shm_schema::{
+    PARAMETERS, ParameterChange, ParameterProblems, ParameterSet, PlannedNeedle, Refusal, Request,
+};
 
 /// A hand on the tip may pull it this far ahead.
 const PULLED_M: f64 = 0.02;
 /// A goal nearer than this to the last one is the same.
 const SAME_GOAL_M: f64 = 0.1e-3;
-/// Answers that are waited for at once; an older one is no longer told.
+/// Requests that wait for their answer at once; the answer of an older one is not shown.
 const WAITING_AT_MOST: usize = 64;
 
 impl App {
-    pub(super) fn send(&mut self, what: &'static str, kind: CommandKind, values: &[f64]) {
-        match self.link.send(kind, values) {
+    pub(super) fn send(&mut self, what: &'static str, request: &Request) {
+        match self.link.send(request) {
             Ok(id) => {
                 if self.waiting.len() >= WAITING_AT_MOST {
                     self.waiting.remove(0);
@@ -35,7 +38,7 @@ impl App {
     }
 
     pub(super) fn load_builtin(&mut self, number: usize) {
-        self.send("Built-in scene", CommandKind::LoadBuiltinScene, &[number as f64]);
+        self.send("Built-in scene", &Request::LoadBuiltinScene(number as u32));
     }
 
     /// Sends the hand to a depth along the planned path, or along the line beside it where the needle is.
@@ -45,8 +48,8 @@ impl App {
             self.shown.note = Some(refusal(format!("{what}: plan the seeds first")));
             return;
         };
-        let values = move_values(goal, plan.direction, speed_m_per_s, self.pace.acceleration_m_per_s2);
-        self.send(what, CommandKind::MoveHand, &values);
+        let request = move_request(goal, plan.direction, speed_m_per_s, self.pace.acceleration_m_per_s2);
+        self.send(what, &request);
     }
 
     pub(super) fn act(&mut self, action: Action, ctx: &egui::Context) {
@@ -69,10 +72,10 @@ impl App {
             }
             Action::SavePicture => self.pictures.request(ctx),
             Action::SaveDebrief => self.save_debrief(),
-            Action::PutGoneAway => self.shown.gone = None,
-            Action::PutRefusalsAway => {
+            Action::DismissDisconnected => self.shown.disconnected = None,
+            Action::DismissRefusals => {
                 if let Some(session) = &self.shown.session {
-                    self.put_away = (session.session_id, session.refused);
+                    self.dismissed = (session.session_id, session.refused);
                 }
             }
             Action::LoadScene(path) => self.load(&path, None),
@@ -80,7 +83,7 @@ impl App {
             Action::CancelLoad => self.cancel_load(),
             Action::StopRun => self.stop_run(),
             // While the script runs the needle is its own.
-            _ if self.run.is_some() && action != Action::Send(CommandKind::Disengage) => {}
+            _ if self.run.is_some() && action != Action::Send(Request::Disengage) => {}
             Action::Next => {
                 // An action that is carried out names what it does itself.
                 if let Some(action) = next_action(&self.shown) {
@@ -91,7 +94,7 @@ impl App {
             Action::Redo if self.edits_plan() => self.planner.redo(),
             Action::Redo => {}
             Action::Undo => match undo_action(&self.shown) {
-                Some(Undo::Seed) => self.send("Undo seed", CommandKind::UndoSeed, &[]),
+                Some(Undo::Seed) => self.send("Undo seed", &Request::UndoSeed),
                 Some(Undo::Plan) => self.withdraw_plan(),
                 None => {}
             },
@@ -99,8 +102,8 @@ impl App {
             Action::RunAll => self.run_all(),
             Action::PlanSeeds => {
                 if let Some(scene) = &self.shown.scene {
-                    let values = plan_values(&default_plan(scene));
-                    self.send("Plan five seeds", CommandKind::SetPlan, &values);
+                    let request = plan_request(&default_plan(scene));
+                    self.send("Plan five seeds", &request);
                 }
             }
             Action::LoadBuiltinScene(number) => self.load_builtin(number),
@@ -118,20 +121,24 @@ impl App {
             Action::Retract => self.move_to("Retract", 0.0, self.pace.retract_m_per_s),
             Action::DriveTo(depth) => self.pulled_to_m = Some(depth),
             Action::MoveTo(depth) => self.move_to("Depth", depth, self.pace.insert_m_per_s),
-            Action::Send(kind) => self.send(command_name(kind), kind, &[]),
+            Action::Send(request) => self.send(request_name(&request), &request),
         }
     }
 
     /// An empty list of seeds: there is no plan any more.
     fn withdraw_plan(&mut self) {
         if let Some(plan) = &self.shown.plan {
-            let values = [plan.entry_m, plan.direction].concat();
+            let withdrawn = PlannedNeedle {
+                entry_m: plan.entry_m,
+                direction: plan.direction,
+                seeds_m: Vec::new(),
+            };
             self.planner.step_back();
-            self.send("Withdraw the plan", CommandKind::SetPlan, &values);
+            self.send("Withdraw the plan", &Request::SetPlan(Some(withdrawn)));
         }
     }
 
-    /// A file that is being read is let go; one that is being sent is the core's to answer, and its answer is not waited for.
+    /// Cancels the reading of a file. One that is being sent is left to the core, and its answer is ignored.
     fn cancel_load(&mut self) {
         self.loader.cancel();
         self.uploading = None;
@@ -163,7 +170,7 @@ impl App {
         if let Some(tip) = self.shown.tip_on_path() {
             self.drive.stop(&tip);
         }
-        self.send("Stop", CommandKind::StopHand, &[]);
+        self.send("Stop", &Request::StopHand);
     }
 
     /// Held keys, a stick or a cap move the goal along the path; letting go stops it there. Without them a hand
@@ -189,7 +196,7 @@ impl App {
                 self.move_to("Needle", goal.depth_m, goal.speed_m_per_s);
             }
         } else if self.drive.stop(&tip) {
-            self.send("Needle", CommandKind::StopHand, &[]);
+            self.send("Needle", &Request::StopHand);
         } else {
             self.pull();
         }
@@ -197,33 +204,65 @@ impl App {
 
     pub(super) fn send_parameters(&mut self) {
         let Some(pairs) = self.parameters.request() else { return };
-        let mut values = Vec::with_capacity(2 * pairs.len());
-        for (index, value) in &pairs {
-            if let Some(spec) = PARAMETERS.get(*index) {
-                values.extend([f64::from(spec.id as u32), *value]);
-            }
+        let change = |&(index, value): &(usize, f64)| {
+            let spec = PARAMETERS.get(index)?;
+            Some(ParameterChange { id: spec.id, value })
+        };
+        let changes: Vec<_> = pairs.iter().filter_map(change).collect();
+        let in_force = self.shown.parameters.map(|p| p.set);
+        if let Err(problems) = changed(in_force.unwrap_or_default(), &changes) {
+            return self.parameters.refused(pairs, &Refusal::from(problems).into());
         }
-        match self.link.send(CommandKind::SetParameters, &values) {
+        match self.link.send(&Request::SetParameters(changes)) {
             Ok(id) => self.parameters.sent(id, pairs),
             Err(e) => self.parameters.not_sent(e.to_string()),
         }
     }
 }
 
-fn command_name(kind: CommandKind) -> &'static str {
-    match kind {
-        CommandKind::SetParameters => "Parameters",
-        CommandKind::SetPlan => "Plan",
-        CommandKind::MoveHand => "Needle",
-        CommandKind::DropSeed => "Drop seed",
-        CommandKind::Engage => "Engage force",
-        CommandKind::Disengage => "Disengage",
-        CommandKind::Reset => "Reset",
-        CommandKind::LoadBuiltinScene => "Built-in scene",
-        CommandKind::UndoSeed => "Undo seed",
-        CommandKind::Shutdown => "Shutdown",
-        CommandKind::SaveFlight => "Flight recording",
-        CommandKind::Rehearse => "Rehearsal",
-        CommandKind::StopHand => "Stop",
+/// By the rules that the core goes by, but for the stiffness that its device can hold.
+fn changed(mut set: ParameterSet, changes: &[ParameterChange]) -> Result<ParameterSet, ParameterProblems> {
+    for change in changes {
+        set.set(change.id, change.value);
+    }
+    match set.problems() {
+        problems if problems.is_empty() => Ok(set),
+        problems => Err(ParameterProblems(problems)),
+    }
+}
+
+fn request_name(request: &Request) -> &'static str {
+    match request {
+        Request::SetParameters(_) => "Parameters",
+        Request::SetPlan(_) => "Plan",
+        Request::MoveHand(_) => "Needle",
+        Request::DropSeed => "Drop seed",
+        Request::Engage => "Engage force",
+        Request::Disengage => "Disengage",
+        Request::Reset => "Reset",
+        Request::LoadBuiltinScene(_) => "Built-in scene",
+        Request::UndoSeed => "Undo seed",
+        Request::Shutdown => "Shutdown",
+        Request::SaveFlight => "Flight recording",
+        Request::Rehearse(_) => "Rehearsal",
+        Request::StopHand => "Stop",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stylet_shm_schema::ParameterId;
+
+    #[test]
+    fn the_window_refuses_what_the_core_would_refuse_and_names_both_angles() {
+        let change = |id, value| [ParameterChange { id, value }];
+        let set = ParameterSet::default();
+        let larger = changed(set, &change(ParameterId::PunctureDepth, 9e-3)).expect("within its limits");
+        assert_eq!(larger.get(ParameterId::PunctureDepth), 9e-3);
+        let problems = changed(set, &change(ParameterId::ShearVertical, 0.7)).expect_err("eq. 1");
+        let reasons = Refusal::from(problems).reasons;
+        let named: Vec<_> = reasons.iter().filter_map(|reason| reason.parameter()).collect();
+        assert_eq!(named, [ParameterId::ShearHorizontal, ParameterId::ShearVertical]);
     }
 }

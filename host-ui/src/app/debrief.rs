@@ -1,11 +1,11 @@
-//! The debrief as files: the same page as `host-ui procedure` writes, of what the window has seen.
+//! The debrief as files: the same page as `host-ui procedure` writes, from the data of the window.
 
 use super::{App, refusal};
-use crate::panel::{Note, SeedError, all_errors};
+use crate::shown::{Note, SeedError, all_errors};
 use std::path::PathBuf;
 use std::sync::Arc;
 use stylet_base::format;
-use stylet_base::job::{Job, Update};
+use stylet_base::job::{Job, JobUpdate};
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Seed, Source};
 use stylet_host::link::SceneModel;
@@ -14,7 +14,9 @@ use stylet_implant::score::{self, Implant, Motion, Score, SeedPair};
 use stylet_shm_schema::{SeedPose, TickRecord};
 
 /// The folder of what was written, or why it could not be.
-pub(super) type Saved = Result<PathBuf, String>;
+pub(super) type Saved = Result<PathBuf, Failure>;
+/// Whatever was wrong, to be shown as text.
+type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 /// Everything that a debrief is made of, as it was when it was asked for.
 struct Delivered {
@@ -28,7 +30,7 @@ struct Delivered {
 }
 
 impl App {
-    /// Asks for the files; [`App::take_debrief`] says when they are there.
+    /// Begins to write the files; [`App::take_debrief`] reports when they are written.
     pub(super) fn save_debrief(&mut self) {
         if self.debrief.is_some() {
             return;
@@ -36,21 +38,21 @@ impl App {
         match self.delivered() {
             Ok(delivered) => {
                 let folder = PathBuf::from(format!("out/debrief-{}", format::utc_now()));
-                self.debrief = Some(Job::begin("debrief", move |told, _| {
-                    // The window may be gone by now; then nobody wants the answer.
-                    let _ = told.send(write(&delivered, folder));
+                self.debrief = Some(Job::begin("debrief", move |messages, _| {
+                    // The window may be closed by now; then nobody reads the answer.
+                    let _ = messages.send(write(&delivered, folder));
                 }));
             }
-            Err(why) => self.shown.note = Some(refusal(why)),
+            Err(why) => self.shown.note = Some(refusal(why.to_string())),
         }
     }
 
     pub(super) fn take_debrief(&mut self) {
         let Some(job) = &self.debrief else { return };
         let saved = match job.poll() {
-            Update::Pending => return,
-            Update::Value(saved) => saved,
-            Update::Ended => Err("the debrief was not written: its thread has ended".to_owned()),
+            JobUpdate::Pending => return,
+            JobUpdate::Message(saved) => saved,
+            JobUpdate::Ended => Err("the debrief was not written: its thread ended before it replied".into()),
         };
         self.debrief = None;
         self.shown.note = Some(match saved {
@@ -58,11 +60,11 @@ impl App {
                 refused: false,
                 text: format!("Debrief saved as {}", folder.display()),
             },
-            Err(why) => refusal(why),
+            Err(why) => refusal(why.to_string()),
         });
     }
 
-    fn delivered(&self) -> Result<Delivered, String> {
+    fn delivered(&self) -> Result<Delivered, Failure> {
         let scene = self.link.scene().ok_or("there is no scene yet")?.clone();
         let implant = self.shown.planning.implant.as_ref();
         let (source, prescription_gy) = match implant {
@@ -127,12 +129,12 @@ impl App {
         let of = implant.plan.needles.get(needle)?;
         let seed = of.seeds.get(row.planned)?;
         let pair = of_needle(of.hole, of.at_m(seed.along_m), of.direction, seed.strength_u);
-        let own = shown.planning.course.seeds_of(needle, shown.seeds.len());
+        let own = shown.planning.progress.seeds_of(needle, shown.seeds.len());
         Some((pair, row.placed.and_then(|n| shown.seeds[own].get(n)).copied()))
     }
 }
 
-fn write(delivered: &Delivered, folder: PathBuf) -> Saved {
+fn write(delivered: &Delivered, folder: PathBuf) -> Result<PathBuf, Failure> {
     let anatomy = Anatomy::of(&delivered.scene)?;
     let kernel = DoseKernel::new(&delivered.source, Interval::ALL);
     let score = Score::of(Implant {
@@ -146,7 +148,7 @@ fn write(delivered: &Delivered, folder: PathBuf) -> Saved {
         motion: delivered.motion,
         records: &delivered.records,
     })?;
-    std::fs::create_dir_all(&folder).map_err(|e| format!("{} cannot be made ({e})", folder.display()))?;
+    std::fs::create_dir_all(&folder).map_err(|e| format!("{} cannot be created ({e})", folder.display()))?;
     score::write(&score, &folder)?;
     Ok(folder)
 }

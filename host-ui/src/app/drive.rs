@@ -1,16 +1,16 @@
-//! From how fast a hand on keys, stick or cap wants the tip to go, to goals for the simulated hand.
+//! Goals for the simulated hand, from the speed that keys, stick or cap ask for.
 
-use crate::panel::TipOnPath;
+use crate::shown::TipOnPath;
 use std::time::Duration;
 use stylet_controllers::{SLOWEST_M_PER_S, Wish};
 
-/// The goal of a driven needle runs ahead of the tip by no more than this, so that it stops when the hand lets go.
+/// The goal of a driven needle runs ahead of the tip by no more than this, so that it stops when the keys or the device are released.
 const LEAD_M: f64 = 0.004;
 /// The needle may be drawn back so far before the entry.
 pub const BEFORE_ENTRY_M: f64 = 0.02;
 /// A longer frame counts as this long, so that a hiccup is not a jump of the needle.
 const LONGEST_S: f64 = 0.05;
-/// Goals go out no more often, however fast the frames come.
+/// Goals are sent no more often, whatever the frame rate.
 const GOALS_EVERY: Duration = Duration::from_millis(10);
 /// The needle goes across the template only with its tip before this depth.
 const OUTSIDE_M: f64 = 1e-3;
@@ -62,8 +62,8 @@ impl Drive {
         self.goal_m = Some(depth_m);
         let across = wish.across_m_per_s;
         if across != [0.0; 2] && is_outside(tip) {
-            for axis in 0..2 {
-                let ahead_m = self.beside_m[axis] + across[axis] * step_s;
+            for (axis, across) in across.into_iter().enumerate() {
+                let ahead_m = self.beside_m[axis] + across * step_s;
                 let near_m = ahead_m.clamp(tip.beside_m[axis] - LEAD_M, tip.beside_m[axis] + LEAD_M);
                 let [low, high] = tip.room_m[axis];
                 self.beside_m[axis] = near_m.clamp(low.min(high), high.max(low));
@@ -76,7 +76,7 @@ impl Drive {
         })
     }
 
-    /// Whether the hand has let go just now, so that the core is to stop the needle: the tip that is seen here is of the past.
+    /// Whether the keys or the device were released just now, so that the core must stop the needle itself: the tip known here is delayed.
     pub fn stop(&mut self, tip: &TipOnPath) -> bool {
         let was_on = self.goal_m.take().is_some();
         if was_on && is_outside(tip) {
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn letting_go_is_told_once_and_the_next_drive_begins_at_the_tip() {
+    fn a_release_is_reported_once_and_the_next_drive_begins_at_the_tip() {
         let mut drive = Drive::default();
         assert!(!drive.stop(&OUTSIDE), "nothing was driven");
         drive.step(&along(0.04), &OUTSIDE, 0.016);

@@ -1,4 +1,4 @@
-//! The window: takes what is new, draws the panels, carries out what they ask for. A frame never waits.
+//! The window: takes new data, draws the panels, carries out what they ask for. A frame never waits.
 
 mod act;
 mod debrief;
@@ -6,15 +6,17 @@ mod drive;
 mod plan;
 mod take;
 
-use crate::dose_desk::DoseDesk;
+use crate::action::{Action, PlanAction};
+use crate::dose_worker::DoseWorker;
 use crate::loader::Loader;
 use crate::panel::history::History;
 use crate::panel::parameters::{ParametersState, parameters_ui};
 use crate::panel::workflow::{Progress, WorkflowState, editor_ui, workflow_ui};
-use crate::panel::{Action, FrameCost, Note, PlanAction, Shown, help, plots, status};
+use crate::panel::{banners, help, plots, status};
 use crate::picture::Pictures;
 use crate::planner::Planner;
 use crate::settings::Settings;
+use crate::shown::{FrameCost, Note, Shown};
 use crate::view::middle::Middle;
 use crate::{cpu_time, keyboard, theme};
 use std::path::PathBuf;
@@ -32,18 +34,20 @@ use stylet_shm_schema::service::Instance;
 const LIVE_FRAME: Duration = Duration::from_millis(16);
 const ABSENT_FRAME: Duration = Duration::from_millis(250);
 
+/// Options of the window.
 #[derive(Clone, Debug)]
 pub struct Options {
+    /// Name that rt-core was started under.
     pub instance: Instance,
-    /// Read and sent as soon as a core is there.
+    /// Scene to read and send as soon as a core is found.
     pub scene: Option<SceneChoice>,
     /// Which label of the file is the gland; all of them when none is given.
     pub label: Option<u8>,
-    /// Greys for the slices, of the patient of the scene file.
+    /// Image for the slices, of the patient of the scene file.
     pub image: Option<PathBuf>,
     /// Whether gamepads and 3D mice may hold the needle.
     pub controllers: bool,
-    /// Frames come no faster than a person sees; without, as fast as the machine can.
+    /// Limits the frame rate to what the eye needs; without it frames follow at once.
     pub pause: bool,
 }
 
@@ -54,6 +58,7 @@ struct Waiting {
     since: Instant,
 }
 
+/// The window.
 pub struct App {
     link: Link,
     label: Option<u8>,
@@ -62,7 +67,7 @@ pub struct App {
     first_image: Option<PathBuf>,
     shown: Shown,
     middle: Middle,
-    dose: DoseDesk,
+    dose: DoseWorker,
     pictures: Pictures,
     settings: Settings,
     /// As they were when they were last brought into force.
@@ -92,15 +97,18 @@ pub struct App {
     /// Where a hand on the tip has drawn it in this frame, and where it was last sent to.
     pulled_to_m: Option<f64>,
     pulled_goal_m: Option<f64>,
-    /// The run of the core, and how many of its refusals were put away.
-    put_away: (u64, u64),
+    /// The run of the core, and how many of its refusals were dismissed.
+    dismissed: (u64, u64),
     workflow: WorkflowState,
     parameters: ParametersState,
     help: bool,
 }
 
 /// Opens the window and returns when it is closed.
-pub fn run(options: Options) -> Result<(), String> {
+///
+/// # Errors
+/// Where there is no display or no graphics driver.
+pub fn run(options: Options) -> Result<(), WindowError> {
     let mut native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("Stylet")
@@ -115,13 +123,16 @@ pub fn run(options: Options) -> Result<(), String> {
         native.wgpu_options.surface.present_mode = eframe::wgpu::PresentMode::AutoNoVsync;
     }
     let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::new(cc, options))));
-    eframe::run_native("Stylet", native, create).map_err(|e| {
-        format!(
-            "cannot open a window: {e}. It needs a display (DISPLAY or WAYLAND_DISPLAY) and a graphics driver (mesa-vulkan-drivers); \
-             without them use `host-ui procedure`"
-        )
-    })
+    Ok(eframe::run_native("Stylet", native, create)?)
 }
+
+/// The window could not be opened.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "cannot open a window: {0}. It needs a display (DISPLAY or WAYLAND_DISPLAY) and a graphics driver (mesa-vulkan-drivers); \
+     without them use `host-ui procedure`"
+)]
+pub struct WindowError(#[from] eframe::Error);
 
 impl App {
     /// What the window knows of the core.
@@ -144,6 +155,7 @@ impl App {
         self.shown.cost
     }
 
+    /// The window with these options, before its first frame.
     pub fn new(cc: &eframe::CreationContext<'_>, options: Options) -> Self {
         theme::apply(&cc.egui_ctx);
         let settings = Settings::read(cc.storage);
@@ -155,7 +167,7 @@ impl App {
             first_image: options.image,
             shown,
             middle: Middle::new(cc.wgpu_render_state.clone()),
-            dose: DoseDesk::new(),
+            dose: DoseWorker::new(),
             pictures: Pictures::default(),
             applied: None,
             history: History::default(),
@@ -181,7 +193,7 @@ impl App {
             pressed: Vec::new(),
             pulled_to_m: None,
             pulled_goal_m: None,
-            put_away: (0, 0),
+            dismissed: (0, 0),
             workflow: WorkflowState::with_file(&settings.last_file),
             settings,
             parameters: ParametersState::default(),
@@ -189,8 +201,8 @@ impl App {
         }
     }
 
-    /// Other devices than those of the system.
-    pub fn hold_by(&mut self, controllers: Controllers) {
+    /// Replaces the devices of the system.
+    pub fn use_controllers(&mut self, controllers: Controllers) {
         self.controllers = controllers;
     }
 
@@ -202,11 +214,11 @@ impl App {
         egui::Panel::top("status").frame(bar).show(ui, |ui| {
             actions.extend(status::status_ui(ui, &self.shown, &mut self.settings));
         });
-        let banners = status::banners(&self.shown);
-        if !banners.is_empty() {
+        let shown_banners = banners::banners(&self.shown);
+        if !shown_banners.is_empty() {
             egui::Panel::top("banners").frame(egui::Frame::new()).show(ui, |ui| {
                 ui.spacing_mut().item_spacing.y = 1.0;
-                actions.extend(status::banners_ui(ui, &banners));
+                actions.extend(banners::banners_ui(ui, &shown_banners));
             });
         }
         let left = egui::Panel::left("workflow")
@@ -251,7 +263,7 @@ impl App {
         }
     }
 
-    /// Keys come before a stick or a cap, which moves nothing while another window has the focus.
+    /// Keys take precedence over a stick or a cap, which moves nothing while another window has the focus.
     fn wish(&self, ctx: &egui::Context, keys_m_per_s: f64) -> Wish {
         if keys_m_per_s != 0.0 {
             return Wish {
@@ -266,7 +278,7 @@ impl App {
         }
     }
 
-    /// While the plan's step is open what is no volume is a plan.
+    /// While the plan's step is open, a file that is no volume is a plan.
     fn dropped_file(&self, ctx: &egui::Context) -> Option<Action> {
         let path = ctx.input(|i| {
             i.raw

@@ -1,12 +1,13 @@
-//! What the operator asked for of a plan of many needles.
+//! Carries out what the operator asked for in a plan of many needles.
 
 use super::drive::Drive;
 use super::{App, refusal};
+use crate::action::PlanAction;
 use crate::panel::workflow::Progress;
-use crate::panel::{Note, PlanAction};
+use crate::planner::Message;
+use crate::shown::Note;
 use nalgebra::Vector3;
-use stylet_implant::workflow::{Run, default_plan, plan_values};
-use stylet_shm_schema::CommandKind;
+use stylet_implant::workflow::{Run, default_plan, plan_request};
 
 impl App {
     /// Undo is for the plan while it is edited.
@@ -16,10 +17,10 @@ impl App {
 
     pub(super) fn take_plan(&mut self) {
         self.planner.take(self.link.scene(), self.shown.seeds.len());
-        if let Some(said) = self.planner.said() {
-            self.shown.note = Some(match said {
-                Ok(text) => Note { refused: false, text },
-                Err(why) => refusal(why),
+        if let Some(message) = self.planner.take_message() {
+            self.shown.note = Some(match message {
+                Message::Done(text) => Note { refused: false, text },
+                Message::Refused(why) => refusal(why),
             });
         }
         self.shown.planning = self.planner.planning();
@@ -41,7 +42,7 @@ impl App {
             PlanAction::Remove(needle) => planner.edit(|plan| plan.without_needle(needle)),
             PlanAction::Move(needle, hole) => planner.edit(|plan| plan.with_needle_at(needle, hole)),
             PlanAction::SetRow(needle, row) => planner.set_row(needle, row),
-            PlanAction::SetStrength(strength_u) => planner.edit(|plan| Ok(plan.with_strength(strength_u))),
+            PlanAction::SetStrength(strength_u) => planner.edit(|plan| Ok::<_, String>(plan.with_strength(strength_u))),
             PlanAction::FitStrength => planner.fit_strength(),
             PlanAction::Compensate => planner.compensate(self.link.instance().clone(), self.pace),
             PlanAction::Cancel => planner.cancel(),
@@ -65,17 +66,17 @@ impl App {
         // Compensation may go in a little beside the hole.
         plan.entry_m = task.drops.entry_m;
         self.planner.begin_needle(number, self.shown.seeds.len());
-        self.send("Next needle", CommandKind::SetPlan, &plan_values(&plan));
+        self.send("Next needle", &plan_request(&plan));
     }
 
     /// The axial slice shows what the template does.
     fn look_at(&mut self, depth_m: f64) {
-        let Some(ground) = &self.shown.planning.ground else {
+        let Some(outlines) = &self.shown.planning.outlines else {
             return;
         };
-        let inwards = Vector3::from(ground.template.inwards);
+        let inwards = Vector3::from(outlines.template.inwards);
         let view = &mut self.middle.view;
-        let off_m = (view.cursor_m - Vector3::from(ground.template.middle_m)).dot(&inwards);
+        let off_m = (view.cursor_m - Vector3::from(outlines.template.middle_m)).dot(&inwards);
         view.follow_tip = false;
         view.cursor_m += inwards * (depth_m - off_m);
     }
@@ -83,14 +84,12 @@ impl App {
     /// All needles of the plan; without one, one through the middle.
     pub(super) fn run_all(&mut self) {
         if self.planner.is_busy() {
-            self.shown.note = Some(refusal(
-                "Wait for what is done for the plan, or cancel it first.".to_owned(),
-            ));
+            self.shown.note = Some(refusal("Wait for the running task, or cancel it first.".to_owned()));
             return;
         }
         let tasks = self.planner.tasks();
         if !tasks.is_empty() {
-            self.planner.begin_anew();
+            self.planner.restart();
             let (numbers, tasks) = tasks.into_iter().unzip();
             self.run_needles = numbers;
             self.run = Some(Run::of_needles(tasks, self.pace));
@@ -102,13 +101,13 @@ impl App {
         }
     }
 
-    /// The plan's course goes with the script's.
+    /// The plan's progress goes with the script's.
     pub(super) fn follow_run(&mut self, at: usize, is_done: bool) {
         let Some(&number) = self.run_needles.get(at) else {
             return;
         };
-        let course = self.planner.course();
-        if course.begun() != number + 1 {
+        let progress = self.planner.progress();
+        if progress.begun() != number + 1 {
             let seeds = if at == 0 { 0 } else { self.shown.seeds.len() };
             self.planner.begin_needle(number, seeds);
         }

@@ -1,25 +1,26 @@
-//! What came since the last frame: records, answers, files that were read, the script's next action.
+//! Takes what is new since the last frame: records, answers, files that were read, the script's next action.
 
 use super::drive::Drive;
 use super::{App, refusal};
+use crate::action::Action;
 use crate::affinity;
-use crate::dose_desk::{DoseOf, Wanted};
+use crate::dose_worker::{DoseOf, DoseRequest};
 use crate::loader::Loaded;
-use crate::panel::{Action, LoadState, Note};
+use crate::shown::{LoadState, Note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use stylet_controllers::Button;
 use stylet_files::{Image, LabelVolume};
 use stylet_host::core_args::SceneChoice;
 use stylet_implant::workflow::RunStatus;
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::Request;
 
 const SUM_UP_EVERY: Duration = Duration::from_millis(500);
-/// No answer within this time is told as such.
+/// A request without an answer within this time is reported.
 const ANSWER_WITHIN: Duration = Duration::from_secs(3);
 
 impl App {
-    /// All that came since the last frame.
+    /// Takes all that is new since the last frame.
     pub(super) fn take(&mut self) {
         self.link.poll();
         let plan_before = self.shown.plan.map(|p| p.generation);
@@ -31,7 +32,7 @@ impl App {
         let direction = self.shown.state.map_or([0.0, 0.0, 1.0], |s| s.needle_direction);
         let records = self.link.take_records();
         self.history.take(&records, direction);
-        let scene = self.shown.scene.map(|s| (s.session_id, s.generation));
+        let scene = self.shown.scene.map(|s| s.id());
         self.trace.take(&records, scene, direction);
         if self.summed_up.elapsed() >= SUM_UP_EVERY {
             self.summed_up = Instant::now();
@@ -42,7 +43,7 @@ impl App {
         self.take_scene_file();
         self.advance_run();
         self.take_plan();
-        self.dose.take(self.link.scene(), &self.wanted_dose());
+        self.dose.take(self.link.scene(), &self.dose_request());
         self.shown.dose = self.dose.latest().cloned();
         self.shown.dose_trouble = self.dose.trouble();
         self.count_refusals();
@@ -62,10 +63,10 @@ impl App {
     }
 
     /// Of the plan while it is edited or nothing lies in the tissue; else of the seeds as they lie.
-    fn wanted_dose(&self) -> Wanted {
+    fn dose_request(&self) -> DoseRequest {
         let implant = self.shown.planning.implant.as_ref();
         match implant.filter(|_| self.edits_plan() || self.shown.seeds.is_empty()) {
-            Some(implant) => Wanted {
+            Some(implant) => DoseRequest {
                 of: DoseOf::Plan,
                 source: implant.plan.source.clone(),
                 prescription_gy: Some(implant.plan.prescription_gy),
@@ -74,7 +75,7 @@ impl App {
             None => {
                 let planned = implant.and_then(|i| i.seeds.first());
                 let strength_u = planned.map_or(self.settings.seed_strength_u, |s| s.strength_u);
-                Wanted::in_tissue(&self.shown.seeds, strength_u)
+                DoseRequest::in_tissue(&self.shown.seeds, strength_u)
             }
         }
     }
@@ -83,24 +84,24 @@ impl App {
         let (latest, pressed) = self.controllers.take();
         let before = std::mem::replace(&mut self.shown.controllers, latest);
         let now = &self.shown.controllers;
-        if now.times_gone != before.times_gone {
-            self.shown.gone = Some(now.gone.clone());
+        if now.disconnections != before.disconnections {
+            self.shown.disconnected = Some(now.disconnected.clone());
         } else if before.holder.is_none() && now.holder.is_some() {
-            self.shown.gone = None;
+            self.shown.disconnected = None;
         }
-        // What is pressed while another window has the focus is meant for that one.
+        // What is pressed while another window has the focus is meant for that window.
         if self.shown.has_focus {
             self.pressed.extend(pressed.into_iter().map(asked_by));
         }
     }
 
-    /// Those of this run of the core that were not put away.
+    /// Refusals of this run of the core that were not dismissed.
     fn count_refusals(&mut self) {
         let Some(session) = &self.shown.session else { return };
-        if self.put_away.0 != session.session_id {
-            self.put_away = (session.session_id, session.refused);
+        if self.dismissed.0 != session.session_id {
+            self.dismissed = (session.session_id, session.refused);
         }
-        self.shown.refusals = session.refused.saturating_sub(self.put_away.1);
+        self.shown.refusals = session.refused.saturating_sub(self.dismissed.1);
     }
 
     fn take_pictures(&mut self) {
@@ -112,7 +113,7 @@ impl App {
                     text: format!("Picture saved as {}", path.display()),
                 });
             }
-            Some(Err(why)) => self.shown.note = Some(refusal(why)),
+            Some(Err(why)) => self.shown.note = Some(refusal(why.to_string())),
         }
     }
 
@@ -123,15 +124,14 @@ impl App {
             self.drive.forget();
             if self.uploading.take().is_some() {
                 self.image_to_come = None;
-                self.shown.load = LoadState::Refused("rt-core went away before it answered".to_owned());
+                self.shown.load = LoadState::Refused("rt-core ended before it replied".to_owned());
             }
             return;
         }
         if let Some(id) = self.parameters.waiting_for()
             && let Some(answer) = self.link.reply(id)
         {
-            self.parameters
-                .answered(answer.accepted, &answer.text, answer.effective_tick);
+            self.parameters.answered(&answer);
         }
         let (link, note) = (&mut self.link, &mut self.shown.note);
         self.waiting.retain(|w| match link.reply(w.id) {
@@ -178,7 +178,7 @@ impl App {
         }
         match self.loader.poll() {
             None => {}
-            Some(Err(why)) => self.shown.load = LoadState::Refused(why),
+            Some(Err(why)) => self.shown.load = LoadState::Refused(why.to_string()),
             Some(Ok(Loaded::Scene(volume, image))) => {
                 self.image_to_come = image.map(|image| (image, volume.name.clone()));
                 self.upload(&volume);
@@ -206,7 +206,10 @@ impl App {
     /// Of the patient of the present scene, if it can be.
     fn take_image(&mut self, image: Image) {
         let Some(scene) = &self.shown.scene else {
-            self.shown.load = LoadState::Refused(format!("{}: the scene that it belongs to has gone", image.name));
+            self.shown.load = LoadState::Refused(format!(
+                "{}: the scene that it belongs to is no longer loaded",
+                image.name
+            ));
             return;
         };
         let [low, high] = [scene.target_lower_m, scene.target_upper_m];
@@ -221,16 +224,16 @@ impl App {
     }
 
     fn show_image(&mut self, image: Image, scene: &str) {
-        let mut said = format!(
-            "{} is in the slices now, black at {}, white at {}",
+        let mut text = format!(
+            "{} is shown in the slices, black at {}, white at {}",
             image.name, image.range[0], image.range[1]
         );
         if let Some(warning) = &image.frame.warning {
-            said = format!("{said} ({warning})");
+            text = format!("{text} ({warning})");
         }
         self.shown.load = match self.middle.show_image(image, scene) {
-            Ok(()) => LoadState::Loaded(said),
-            Err(why) => LoadState::Refused(why),
+            Ok(()) => LoadState::Loaded(text),
+            Err(why) => LoadState::Refused(why.to_string()),
         };
     }
 
@@ -277,9 +280,9 @@ impl App {
 
 fn asked_by(button: Button) -> Action {
     match button {
-        Button::Drop => Action::Send(CommandKind::DropSeed),
+        Button::Drop => Action::Send(Request::DropSeed),
         Button::Undo => Action::Undo,
         Button::Stop => Action::StopRun,
-        Button::Engage => Action::Send(CommandKind::Engage),
+        Button::Engage => Action::Send(Request::Engage),
     }
 }

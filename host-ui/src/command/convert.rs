@@ -1,9 +1,11 @@
 //! `host-ui convert`: label volumes, seed plans and doses from one format to another, by the names of the two files.
 
+use super::CommandError;
 use clap::Args;
 use std::path::{Path, PathBuf};
+use stylet_base::write_whole;
 use stylet_dose::Source;
-use stylet_files::convert::{can_hold_labels, write_labels, write_whole};
+use stylet_files::convert::{can_hold_labels, write_labels};
 use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
 use stylet_files::dicom::{self, Identity};
 use stylet_files::{self as files, FileError, Progress, bytes, scene};
@@ -16,8 +18,8 @@ What is converted into what:
   seed plan      .csv (columns as for host-ui dose) into .dcm (RT Plan; needs --source), and back
   dose           .csv (dose_grid.csv of host-ui dose) into .dcm (RT Dose; needs --plan) or .nrrd
 
-Orientation and spacing are kept: NIfTI is in RAS, DICOM and MetaImage in LPS, NRRD says which.
-What is lost (overlaps, structures without volume) is reported.
+Orientation and spacing are kept: NIfTI is in RAS, DICOM and MetaImage in LPS, NRRD names its own.
+Losses (overlaps, structures without volume) are reported.
 
 Examples:
   host-ui convert rtstruct.dcm gland.seg.nrrd
@@ -29,14 +31,14 @@ Examples:
 #[derive(Args, Debug)]
 #[command(after_long_help = HELP)]
 pub struct ConvertArgs {
-    /// File to read; its content says what it is
+    /// File to read; its content decides the format
     from: PathBuf,
-    /// File to write; its name says the format
+    /// File to write; its name decides the format
     to: PathBuf,
     /// Source of the seeds (TOML), for a plan out of CSV
     #[arg(long, value_name = "FILE")]
     source: Option<PathBuf>,
-    /// Strength of seeds whose CSV does not say, in U
+    /// Strength in U of seeds whose CSV gives none
     #[arg(long, value_name = "U")]
     strength_u: Option<f64>,
     /// RT Plan that a dose belongs to
@@ -45,7 +47,7 @@ pub struct ConvertArgs {
 }
 
 impl ConvertArgs {
-    pub fn run(self) -> Result<(), String> {
+    pub fn run(self) -> Result<(), CommandError> {
         if has_ending(&self.from, "csv") {
             return match first_line(&self.from)?.contains("dose_gy") {
                 true => self.dose(),
@@ -58,27 +60,25 @@ impl ConvertArgs {
         self.labels()
     }
 
-    fn labels(&self) -> Result<(), String> {
+    fn labels(&self) -> Result<(), CommandError> {
         let to_dicom = has_ending(&self.to, "dcm");
         if !to_dicom && !can_hold_labels(&self.to) {
             return Err(format!(
                 "{}: a label volume is written as .nrrd, .seg.nrrd, .mha, .nii.gz or .dcm; see host-ui convert --help",
                 self.to.display()
-            ));
+            )
+            .into());
         }
         if scene::is_scene(&self.from) {
-            return Err(format!(
-                "{}: give the volume that the scene file names",
-                self.from.display()
-            ));
+            return Err(format!("{}: give the volume that the scene file names", self.from.display()).into());
         }
-        let voxels = files::read_voxels(&self.from, &Progress::default()).map_err(|e| e.to_string())?;
+        let voxels = files::read_voxels(&self.from, &Progress::default())?;
         if let Some(note) = &voxels.frame.warning {
             eprintln!("note: {note}");
         }
         if to_dicom {
-            let refused = |why| FileError::of(&self.to, why);
-            let bytes = dicom::structures::write::bytes(&voxels, &Identity::new()).map_err(refused)?;
+            let bytes = dicom::structures::write::bytes(&voxels, &Identity::new())
+                .map_err(|why| FileError::of(&self.to, why))?;
             write_whole(&self.to, &bytes)?;
         } else {
             write_labels(&voxels, &self.to)?;
@@ -93,7 +93,7 @@ impl ConvertArgs {
         self.written()
     }
 
-    fn plan_from_csv(&self) -> Result<(), String> {
+    fn plan_from_csv(&self) -> Result<(), CommandError> {
         self.needs_ending("dcm", "seeds out of CSV become an RT Plan")?;
         let source = self
             .source
@@ -133,7 +133,7 @@ impl ConvertArgs {
         self.written()
     }
 
-    fn plan_to_csv(&self) -> Result<(), String> {
+    fn plan_to_csv(&self) -> Result<(), CommandError> {
         let plan = plan::open(&self.from)?;
         let mut out = String::from("x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,needle,hole\n");
         for seed in &plan.seeds {
@@ -148,7 +148,7 @@ impl ConvertArgs {
         self.written()
     }
 
-    fn dose(&self) -> Result<(), String> {
+    fn dose(&self) -> Result<(), CommandError> {
         let grid = read_dose(&self.from)?;
         if has_ending(&self.to, "nrrd") {
             write_whole(&self.to, &dose_nrrd(&grid))?;
@@ -169,17 +169,14 @@ impl ConvertArgs {
         self.written()
     }
 
-    fn needs_ending(&self, ending: &str, why: &str) -> Result<(), String> {
+    fn needs_ending(&self, ending: &str, why: &str) -> Result<(), CommandError> {
         if has_ending(&self.to, ending) {
             return Ok(());
         }
-        Err(format!(
-            "{}: {why}, so its name must end in .{ending}",
-            self.to.display()
-        ))
+        Err(format!("{}: {why}, so its name must end in .{ending}", self.to.display()).into())
     }
 
-    fn written(&self) -> Result<(), String> {
+    fn written(&self) -> Result<(), CommandError> {
         println!("written: {}", self.to.display());
         Ok(())
     }
@@ -194,7 +191,7 @@ fn has_ending(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
 }
 
-fn first_line(path: &Path) -> Result<String, String> {
+fn first_line(path: &Path) -> Result<String, CommandError> {
     let bytes = bytes::whole(path, &Progress::default()).map_err(|why| FileError::of(path, why))?;
     let line = bytes
         .split(|&b| b == b'\n')

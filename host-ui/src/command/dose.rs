@@ -1,5 +1,6 @@
 //! `host-ui dose` and `host-ui perturb`.
 
+use super::CommandError;
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -41,8 +42,8 @@ Examples:
 Written to --out: dose_points.csv; dvh.csv, dvh.svg and metrics.json; dose_grid.csv when neither points nor structures are given.";
 
 const PERTURB_HELP: &str = "\
-Every trial moves each seed by a normal error of --sigma-mm along x, y and z, keeps its axis and strength, and takes all metrics
-anew. The same --seed gives the same trials on any number of cores. Ctrl-C ends early and writes the trials done so far.
+Every trial moves each seed by a normal error of --sigma-mm along x, y and z, keeps its axis and strength, and computes all metrics
+again. The same --seed gives the same trials on any number of cores. Ctrl-C ends early and writes the trials done so far.
 
 Example, as published (4 mm, 1000 trials):
   host-ui perturb --source sources/i125_6711.toml --plan seeds.csv --strength-u 0.5 --structures gland.nii.gz \\
@@ -55,7 +56,7 @@ struct Common {
     /// Source file (TOML) as those in sources/
     #[arg(long, value_name = "FILE")]
     source: PathBuf,
-    /// Strength of seeds whose file does not say, in U
+    /// Strength in U of seeds whose file gives none
     #[arg(long, value_name = "U")]
     strength_u: Option<f64>,
     /// The strengths were measured this many days before the implant, and have decayed since
@@ -64,7 +65,7 @@ struct Common {
     /// Count dose from this day after the implant
     #[arg(long, value_name = "DAYS", default_value_t = 0.0)]
     from_days: f64,
-    /// Count dose up to this day after the implant [default: for ever]
+    /// Count dose up to this day after the implant [default: without end]
     #[arg(allow_negative_numbers = true, long, value_name = "DAYS")]
     to_days: Option<f64>,
     /// Prescribed dose in Gy [default: that of the source file]
@@ -120,7 +121,7 @@ pub struct PerturbArgs {
     /// Standard deviation of a seed's error along each axis
     #[arg(long, value_name = "MM", default_value_t = 4.0)]
     sigma_mm: f64,
-    /// How often the seeds are moved
+    /// Number of trials, each with its own random errors
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=MAX_TRIALS))]
     trials: u64,
     /// Seed of the random numbers
@@ -129,7 +130,7 @@ pub struct PerturbArgs {
 }
 
 impl DoseArgs {
-    pub fn run(self) -> Result<(), String> {
+    pub fn run(self) -> Result<(), CommandError> {
         let c = &self.common;
         within("--spacing-mm", self.spacing_mm, 0.05, 100.0)?;
         within("--bin-gy", self.bin_gy, 1e-3, 1e4)?;
@@ -137,7 +138,7 @@ impl DoseArgs {
         let judged = self.structures.as_ref().map(|file| {
             let judge = c.judge(file, &source, &seeds, POINTS_FOR_DOSE)?;
             let verdict = judge.judge(&kernel, &seeds);
-            Ok::<_, String>((judge, verdict))
+            Ok::<_, CommandError>((judge, verdict))
         });
         let judged = judged.transpose()?;
         let points = self.points.as_deref().map(read_points).transpose()?;
@@ -169,7 +170,7 @@ impl DoseArgs {
 }
 
 impl PerturbArgs {
-    pub fn run(self) -> Result<(), String> {
+    pub fn run(self) -> Result<(), CommandError> {
         let c = &self.common;
         within("--sigma-mm", self.sigma_mm, 0.0, 100.0)?;
         let (source, kernel, plan) = c.load(&self.plan)?;
@@ -186,7 +187,7 @@ impl PerturbArgs {
         let trials = perturb::trials(&judge, &kernel, &plan, how, &stop, || bar.inc(1));
         bar.finish_and_clear();
         if trials.is_empty() {
-            return Err("stopped before the first trial was done; nothing is written".to_owned());
+            return Err("stopped before the first trial was done; nothing is written".into());
         }
         let spreads = perturb::spreads(&planned, &trials);
         write::trials(&c.out.join("trials.csv"), &planned, &trials)?;
@@ -209,7 +210,7 @@ impl PerturbArgs {
 
 impl Common {
     /// Source, dose of a seed of 1 U over the time asked for, and seeds with their strength at the implant.
-    fn load(&self, seeds: &Path) -> Result<(Source, DoseKernel, Vec<Seed>), String> {
+    fn load(&self, seeds: &Path) -> Result<(Source, DoseKernel, Vec<Seed>), CommandError> {
         within("--measured-days-before", self.measured_days_before, 0.0, 1e6)?;
         within("--from-days", self.from_days, 0.0, 1e6)?;
         if let Some(to) = self.to_days {
@@ -228,13 +229,15 @@ impl Common {
             return Err(format!(
                 "{} has no [anisotropy_2d], which seeds with an axis need; leave the axis columns out",
                 self.source.display()
-            ));
+            )
+            .into());
         }
         if source.tables.anisotropy_1d.is_none() && all.iter().any(|s| s.axis.is_none()) {
             return Err(format!(
                 "{} has no [anisotropy_1d], which seeds without an axis need; give every seed its axis",
                 self.source.display()
-            ));
+            )
+            .into());
         }
         let left = left_after(days_to_s(self.measured_days_before), source.half_life_s);
         for seed in &mut all {
@@ -245,7 +248,7 @@ impl Common {
         Ok((source, kernel, all))
     }
 
-    fn prescription_gy(&self, source: &Source) -> Result<f64, String> {
+    fn prescription_gy(&self, source: &Source) -> Result<f64, CommandError> {
         let gy = self.prescription_gy.or(source.prescription_gy).ok_or_else(|| {
             format!(
                 "{} names no prescription_gy; give --prescription-gy",
@@ -256,7 +259,7 @@ impl Common {
         Ok(gy)
     }
 
-    fn judge(&self, file: &Path, source: &Source, seeds: &[Seed], most_points: usize) -> Result<Judge, String> {
+    fn judge(&self, file: &Path, source: &Source, seeds: &[Seed], most_points: usize) -> Result<Judge, CommandError> {
         let extra = self
             .metrics
             .iter()
@@ -266,7 +269,7 @@ impl Common {
         let prescription_gy = self.prescription_gy(source)?;
         let structures = match contours::structures(file, most_points)? {
             Some((_, _)) if !given.is_empty() => {
-                return Err(format!("--name: {} names its structures itself", file.display()));
+                return Err(format!("--name: {} names its structures itself", file.display()).into());
             }
             Some((structures, notes)) => {
                 notes
@@ -287,24 +290,30 @@ impl Common {
         )?)
     }
 
-    fn labelled(&self, file: &Path, given: BTreeMap<u8, String>, most_points: usize) -> Result<Vec<Structure>, String> {
-        let voxels = stylet_files::read_voxels(file, &stylet_files::Progress::default()).map_err(|e| e.to_string())?;
+    fn labelled(
+        &self,
+        file: &Path,
+        given: BTreeMap<u8, String>,
+        most_points: usize,
+    ) -> Result<Vec<Structure>, CommandError> {
+        let voxels = stylet_files::read_voxels(file, &stylet_files::Progress::default())?;
         if let Some((label, name)) = given.iter().find(|(label, _)| !voxels.labels.contains(label)) {
             return Err(format!(
                 "--name {label}={name}: {} has no voxel with label {label}",
                 file.display()
-            ));
+            )
+            .into());
         }
         if let Some(warning) = &voxels.frame.warning {
             eprintln!("note: {}: {warning}", file.display());
         }
-        // What the file calls its labels counts where nothing else is said.
+        // The names in the file count where none are given.
         let mut names = voxels.names.clone();
         names.extend(given);
         Ok(labels::structures(&voxels, &names, most_points))
     }
 
-    fn label_names(&self) -> Result<BTreeMap<u8, String>, String> {
+    fn label_names(&self) -> Result<BTreeMap<u8, String>, CommandError> {
         let mut names = BTreeMap::new();
         for text in &self.names {
             let wrong = || format!("--name {text}: write LABEL=NAME with a label from 1 to 255, as in 1=Prostate");
@@ -312,10 +321,10 @@ impl Common {
             let label: u8 = label.trim().parse().ok().filter(|&l| l > 0).ok_or_else(wrong)?;
             let name = name.trim();
             if name.is_empty() || names.values().any(|n| n == name) {
-                return Err(format!("--name {text}: the name is empty or there twice"));
+                return Err(format!("--name {text}: the name is empty or there twice").into());
             }
             if names.insert(label, name.to_owned()).is_some() {
-                return Err(format!("--name {text}: label {label} has two names"));
+                return Err(format!("--name {text}: label {label} has two names").into());
             }
         }
         Ok(names)
@@ -334,7 +343,7 @@ impl Common {
     }
 }
 
-fn grid(seeds: &[Seed], kernel: &DoseKernel, spacing_m: f64) -> Result<DoseGrid, String> {
+fn grid(seeds: &[Seed], kernel: &DoseKernel, spacing_m: f64) -> Result<DoseGrid, CommandError> {
     let places: Vec<[f64; 3]> = seeds.iter().map(|s| s.position_m).collect();
     let (low, high) = structure::bounds(&places);
     let (low, high) = (low.map(|v| v - GRID_MARGIN_M), high.map(|v| v + GRID_MARGIN_M));
@@ -343,9 +352,9 @@ fn grid(seeds: &[Seed], kernel: &DoseKernel, spacing_m: f64) -> Result<DoseGrid,
     Ok(grid)
 }
 
-fn within(option: &str, value: f64, least: f64, most: f64) -> Result<(), String> {
+fn within(option: &str, value: f64, least: f64, most: f64) -> Result<(), CommandError> {
     if (least..=most).contains(&value) {
         return Ok(());
     }
-    Err(format!("{option} {value}: give {least} to {most}"))
+    Err(format!("{option} {value}: give {least} to {most}").into())
 }

@@ -1,5 +1,8 @@
 //! Tasks of the command line that open no window.
 
+/// An error of a command, whatever its type: it is printed for the person at the terminal.
+pub type CommandError = Box<dyn std::error::Error>;
+
 pub mod convert;
 pub mod dose;
 pub mod plan;

@@ -1,9 +1,12 @@
 //! `host-ui plan`: a plan file for the scene of a running core.
 
+use super::CommandError;
 use clap::Args;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use stylet_anatomy::PatientFrame;
 use stylet_base::progress_bar::progress_bar;
+use stylet_base::write_whole;
 use stylet_dose::decay::Interval;
 use stylet_dose::report::Judge;
 use stylet_dose::{DoseKernel, Source};
@@ -46,7 +49,7 @@ pub struct PlanArgs {
     /// Seeds to take instead (CSV)
     #[arg(long, value_name = "FILE")]
     seeds: Option<PathBuf>,
-    /// Strength of seeds whose table does not say, in U
+    /// Strength in U of seeds whose table gives none
     #[arg(long, value_name = "U", requires = "seeds")]
     strength_u: Option<f64>,
     /// Plan file to write (TOML)
@@ -58,7 +61,7 @@ pub struct PlanArgs {
 }
 
 impl PlanArgs {
-    pub fn run(self) -> Result<(), String> {
+    pub fn run(self) -> Result<(), CommandError> {
         let source = Source::read(&self.source)?;
         let prescription_gy = self.prescription_gy.or(source.prescription_gy);
         let prescription_gy = prescription_gy.filter(|gy| (1e-3..=1e4).contains(gy)).ok_or_else(|| {
@@ -77,12 +80,12 @@ impl PlanArgs {
         let plan = match &self.seeds {
             None => {
                 let bar = progress_bar(100, "% of the patterns");
-                let tell = |share: f32| {
+                let report = |share: f32| {
                     bar.set_position((share * 100.0) as u64);
-                    Ok(())
+                    ControlFlow::Continue(())
                 };
                 let aims = Aims::new(prescription_gy);
-                let plan = automatic::plan(template, &anatomy, &kernel, &source.model, &aims, tell);
+                let plan = automatic::plan(template, &anatomy, &kernel, &source.model, &aims, report);
                 bar.finish_and_clear();
                 plan?
             }
@@ -103,15 +106,15 @@ impl PlanArgs {
         Ok(())
     }
 
-    fn write(&self, plan: &ImplantPlan, frames: &PatientFrame) -> Result<(), String> {
+    fn write(&self, plan: &ImplantPlan, frames: &PatientFrame) -> Result<(), CommandError> {
         file::write(&self.out, plan, frames)?;
         let Some(csv) = &self.csv else { return Ok(()) };
         let text = file::seeds_to_csv(plan, frames);
-        std::fs::write(csv, text).map_err(|e| format!("{} cannot be written ({e})", csv.display()))
+        Ok(write_whole(csv, text.as_bytes())?)
     }
 }
 
-fn figures(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel) -> Result<String, String> {
+fn figures(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel) -> Result<String, CommandError> {
     let seeds = plan.seeds();
     let strengths = seeds.iter().map(|s| s.strength_u);
     let total: f64 = strengths.clone().sum();

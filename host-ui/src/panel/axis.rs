@@ -8,7 +8,7 @@ const BETWEEN_VALUES: f32 = 20.0;
 /// Lines of the grid nearer than the first are not seen, as far as the second are drawn in full.
 const LINES: Rangef = Rangef { min: 8.0, max: 300.0 };
 
-/// Only to be looked at: a plot that moves must not be dragged by accident.
+/// A plot without interaction, so that a plot that moves is not dragged by accident.
 pub fn plot(name: &str, height: f32) -> Plot<'static> {
     Plot::new(name.to_owned())
         .height(height)
@@ -75,14 +75,15 @@ mod tests {
 
     #[test]
     fn marks_lie_on_round_numbers_and_no_nearer_than_asked() {
-        let told = |from, to, at_least| -> Vec<String> { grid([from, to], at_least).into_iter().map(number).collect() };
-        assert_eq!(told(0.0, 18.6, 18.6 / 5.0), ["0", "5", "10", "15"]);
-        assert_eq!(told(-0.7, 4.3, 5.0 / 2.4), ["0"]);
-        assert_eq!(told(-0.7, 4.3, 4.8 / 2.4), ["0", "2", "4"]);
-        assert_eq!(told(0.0, 1.0, 0.3), ["0.0", "0.5", "1.0"]);
-        assert_eq!(told(0.0, 0.35, 0.1), ["0.0", "0.1", "0.2", "0.3"]);
-        assert_eq!(told(-60.0, 110.0, 100.0), ["0", "100"]);
-        assert_eq!(told(0.0, 9_000.0, 3_001.0), ["0", "5000"]);
+        let labels =
+            |from, to, at_least| -> Vec<String> { grid([from, to], at_least).into_iter().map(number).collect() };
+        assert_eq!(labels(0.0, 18.6, 18.6 / 5.0), ["0", "5", "10", "15"]);
+        assert_eq!(labels(-0.7, 4.3, 5.0 / 2.4), ["0"]);
+        assert_eq!(labels(-0.7, 4.3, 4.8 / 2.4), ["0", "2", "4"]);
+        assert_eq!(labels(0.0, 1.0, 0.3), ["0.0", "0.5", "1.0"]);
+        assert_eq!(labels(0.0, 0.35, 0.1), ["0.0", "0.1", "0.2", "0.3"]);
+        assert_eq!(labels(-60.0, 110.0, 100.0), ["0", "100"]);
+        assert_eq!(labels(0.0, 9_000.0, 3_001.0), ["0", "5000"]);
         for bad in [[0.0, f64::NAN], [0.0, f64::INFINITY], [1.0, 0.0]] {
             assert!(grid(bad, 0.1).is_empty(), "{bad:?}");
         }

@@ -1,6 +1,6 @@
 //! The overlay that lists every key, and what gamepads and 3D mice do.
 
-use super::Shown;
+use crate::shown::Shown;
 use crate::{keyboard, theme};
 use stylet_controllers::Kind;
 
@@ -15,7 +15,7 @@ pub fn help_ui(ctx: &egui::Context, shown: &Shown, open: &mut bool) {
                 ui.vertical(|ui| {
                     rows_ui(ui, "keys", keyboard::KEYS);
                     ui.label(theme::small(
-                        "Keys move the needle unless a field has the focus; Esc gives them back.",
+                        "Keys move the needle unless a field has the focus; Esc returns them.",
                     ));
                 });
                 ui.add_space(12.0);
@@ -30,13 +30,13 @@ fn controllers_ui(ui: &mut egui::Ui, shown: &Shown) {
         rows_ui(ui, title, kind.uses());
         ui.add_space(8.0);
     }
-    ui.heading("Holds the needle");
+    ui.heading("Controls the needle");
     let holder = shown.controllers.holder.as_ref();
     ui.label(holder.map_or("n/a", |device| device.name.as_str()));
     for words in [
         "Devices may be plugged in at any time.",
-        "The one that was moved last holds the needle.",
-        "It must be let go once before the needle follows it.",
+        "The one that was moved last controls the needle.",
+        "It must be released once before the needle follows it.",
     ] {
         ui.label(theme::small(words));
     }

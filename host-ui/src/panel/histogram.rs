@@ -49,7 +49,9 @@ pub fn histogram_ui(ui: &mut egui::Ui, timing: &Timing) {
         });
     if let Some(place) = shown.response.hover_pos() {
         let bin = shown.transform.value_from_position(place).x.max(0.0) as usize;
-        shown.response.on_hover_text_at_pointer(told(timing, bin.min(BINS - 1)));
+        shown
+            .response
+            .on_hover_text_at_pointer(bin_text(timing, bin.min(BINS - 1)));
     }
 }
 
@@ -60,7 +62,7 @@ fn bars(counts: &[u32; BINS], beside: f64) -> Vec<Bar> {
 }
 
 /// What a bin stands for.
-fn told(timing: &Timing, bin: usize) -> String {
+fn bin_text(timing: &Timing, bin: usize) -> String {
     let us = |bin: usize| format::microseconds(Some(bin_low_us(bin)));
     let range = match bin {
         0 => format!("Below {}", us(1)),
@@ -89,14 +91,14 @@ mod tests {
         timing.wake_histogram[5] = 1_234;
         timing.work_histogram[5] = 1;
         assert_eq!(
-            told(&timing, 5),
+            bin_text(&timing, 5),
             "10.0 us to 15.8 us\nticks by wake-up: 1 234\nticks by work: 1"
         );
-        assert!(told(&timing, 0).starts_with("Below 1.6 us"));
-        assert!(told(&timing, BINS - 1).starts_with("63.1 ms and more"));
+        assert!(bin_text(&timing, 0).starts_with("Below 1.6 us"));
+        assert!(bin_text(&timing, BINS - 1).starts_with("63.1 ms and more"));
     }
 
-    /// A bar of as many ticks as a mark tells reaches to that mark.
+    /// A bar of as many ticks as a mark stands for reaches that mark.
     #[test]
     fn bars_end_where_the_axis_says() {
         let mut counts = [0; BINS];

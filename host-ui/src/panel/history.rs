@@ -1,4 +1,4 @@
-//! The last seconds of the force loop, in bounded memory, and what can be said of its timing.
+//! The last seconds of the force loop, in bounded memory, and statistics of its timing.
 
 use hdrhistogram::Histogram;
 use std::collections::VecDeque;
@@ -13,7 +13,7 @@ const WINDOW_NS: u64 = WINDOW_S as u64 * 1_000_000_000;
 const SLOT_NS: u64 = WINDOW_NS / 250;
 /// Ticks that percentiles are taken over: one minute at 1 kHz, so that p99.9 has samples beyond it.
 const KEPT_TIMINGS: usize = 60_000;
-/// A percentile with fewer samples beyond it is a guess and is not told.
+/// A percentile with fewer samples beyond it is a guess and is not shown.
 const SAMPLES_BEYOND: f64 = 10.0;
 /// Digits of a percentile that hold.
 const DIGITS: u8 = 3;
@@ -84,13 +84,13 @@ impl History {
             self.curves.add(r.due_ns, plotted.map(|v| v as f32));
             let timing = [r.wake_latency_ns, r.work_ns].map(|ns| u32::try_from(ns).unwrap_or(u32::MAX));
             self.timings.push_back(timing);
-            let gone = (self.timings.len() > KEPT_TIMINGS)
+            let expired = (self.timings.len() > KEPT_TIMINGS)
                 .then(|| self.timings.pop_front())
                 .flatten();
             for (which, counts) in self.counts.iter_mut().enumerate() {
                 counts.add(timing[which]);
-                if let Some(gone) = gone {
-                    counts.drop(gone[which]);
+                if let Some(expired) = expired {
+                    counts.drop(expired[which]);
                 }
             }
         }
@@ -124,9 +124,9 @@ impl History {
 
 /// How often each time was among the ticks that are kept.
 struct LastMinute {
-    /// With what is in `gone`, which is taken out all at once.
+    /// Still with what is in `expired`, which is subtracted all at once.
     all: Histogram<u32>,
-    gone: Histogram<u32>,
+    expired: Histogram<u32>,
     bins: [u32; BINS],
 }
 
@@ -135,7 +135,7 @@ impl LastMinute {
         let empty = || Histogram::new_with_bounds(1, u64::from(u32::MAX), DIGITS).expect("bounds that fit");
         Self {
             all: empty(),
-            gone: empty(),
+            expired: empty(),
             bins: [0; BINS],
         }
     }
@@ -146,13 +146,15 @@ impl LastMinute {
     }
 
     fn drop(&mut self, ns: u32) {
-        self.gone.saturating_record(u64::from(ns));
+        self.expired.saturating_record(u64::from(ns));
         self.bins[bin(ns)] -= 1;
     }
 
     fn percentiles(&mut self) -> Percentiles {
-        self.all.subtract(&self.gone).expect("what goes had come");
-        self.gone.reset();
+        self.all
+            .subtract(&self.expired)
+            .expect("every expired sample was recorded");
+        self.expired.reset();
         let all = &self.all;
         let us = |ns: u64| format::us(ns.min(u64::from(u32::MAX)));
         let at = |share: f64| {
@@ -248,15 +250,18 @@ mod tests {
             let mut kept = given[given.len().saturating_sub(KEPT_TIMINGS)..].to_vec();
             kept.sort_unstable();
             let rank = |share: f64| (kept.len() as f64 * share).ceil() as usize - 1;
-            let told = |share: f64| (kept.len() as f64 * (1.0 - share) >= 9.99).then(|| format::us(kept[rank(share)]));
+            let rank_value =
+                |share: f64| (kept.len() as f64 * (1.0 - share) >= 9.99).then(|| format::us(kept[rank(share)]));
             let wake = history.timing.wake;
             let largest = kept.last().map(|&ns| format::us(ns));
-            let sorted = [told(0.5), told(0.99), told(0.999), largest];
-            for (told, sorted) in [wake.p50, wake.p99, wake.p999, wake.max].into_iter().zip(sorted) {
-                let off = told.zip(sorted).map_or(0.0, |(told, sorted)| (told - sorted) / sorted);
+            let sorted = [rank_value(0.5), rank_value(0.99), rank_value(0.999), largest];
+            for (shown, sorted) in [wake.p50, wake.p99, wake.p999, wake.max].into_iter().zip(sorted) {
+                let off = shown
+                    .zip(sorted)
+                    .map_or(0.0, |(shown, sorted)| (shown - sorted) / sorted);
                 assert!(
-                    told.is_some() == sorted.is_some() && off.abs() <= 1e-3,
-                    "{told:?} {sorted:?}"
+                    shown.is_some() == sorted.is_some() && off.abs() <= 1e-3,
+                    "{shown:?} {sorted:?}"
                 );
             }
             for (n, count) in history.timing.wake_histogram.into_iter().enumerate() {

@@ -2,8 +2,9 @@
 
 use super::histogram::histogram_ui;
 use super::history::{History, Percentiles, Quantity, WINDOW_S};
+use super::setup;
 use super::strip::Strip;
-use super::{Shown, setup};
+use crate::shown::Shown;
 use crate::theme;
 use egui::{Color32, RichText};
 use stylet_base::format;
@@ -166,7 +167,7 @@ fn percentile_row(ui: &mut egui::Ui, name: &str, p: &Percentiles) {
         let text = RichText::new(format::microseconds(value)).monospace().size(11.0);
         let response = ui.label(text);
         if value.is_none() {
-            response.on_hover_text("Told only with at least ten samples beyond it");
+            response.on_hover_text("Shown only when at least ten samples lie beyond it");
         }
     }
     ui.end_row();

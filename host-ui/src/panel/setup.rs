@@ -1,6 +1,6 @@
-//! What the loop got from the kernel, how the link is, and what a frame of this window costs.
+//! What the loop got from the kernel, the state of the link, and the cost of a frame.
 
-use super::Shown;
+use crate::shown::Shown;
 use crate::theme;
 use egui::RichText;
 use stylet_base::format;
@@ -63,9 +63,9 @@ fn link(shown: &Shown) -> (String, bool) {
         LinkStatus::Silent { since } => (format!("silent for {:.1} s", since.as_secs_f64()), false),
         LinkStatus::Absent { .. } => ("absent".to_owned(), false),
     };
-    let rubbish = shown.rubbish_refused;
-    let text = format!("{word}, {} messages not believed", format::count(rubbish));
-    (text, fine && rubbish == 0)
+    let dropped = shown.invalid_dropped;
+    let text = format!("{word}, {} invalid messages dropped", format::count(dropped));
+    (text, fine && dropped == 0)
 }
 
 /// Which device holds the needle, and why it does not where that is so.
@@ -79,8 +79,8 @@ fn controller(shown: &Shown) -> (String, bool) {
     let name: String = device.name.chars().take(LONGEST_CONTROLLER).collect();
     if !shown.has_focus {
         (format!("{name}: not the focus"), false)
-    } else if !device.was_let_go {
-        (format!("{name}: let it go first"), false)
+    } else if !device.was_released {
+        (format!("{name}: release it first"), false)
     } else {
         (name, true)
     }
@@ -115,16 +115,16 @@ mod tests {
         );
         shown.controllers.denied.push("Pad may not be read".to_owned());
         assert!(!controller(&shown).1);
-        let holder = |was_let_go| Device {
+        let holder = |was_released| Device {
             name: "A gamepad with a name that is long".to_owned(),
             kind: Kind::Gamepad,
-            was_let_go,
+            was_released,
         };
         shown.controllers.holder = Some(holder(true));
         assert_eq!(controller(&shown), ("A gamepad with a name th".to_owned(), true));
         assert!(axes(&shown).contains("left stick"));
         shown.controllers.holder = Some(holder(false));
-        assert!(controller(&shown).0.ends_with("let it go first"));
+        assert!(controller(&shown).0.ends_with("release it first"));
         shown.has_focus = false;
         assert!(controller(&shown).0.ends_with("not the focus"));
     }

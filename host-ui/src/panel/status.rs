@@ -1,202 +1,13 @@
-//! The bar at the top and the banners under it: is it alive, is it real time, is the force on.
+//! The bar at the top: link, figures, force and settings.
 
-use super::{Action, Shown};
+use crate::action::Action;
 use crate::settings::{SCALES, STRENGTHS_U, Settings, ThemeChoice};
+use crate::shown::Shown;
 use crate::theme;
-use crate::theme::Tokens;
 use egui::{Align, Color32, DragValue, Layout, RichText, Sense, Vec2};
 use stylet_base::format;
 use stylet_host::link::LinkStatus;
-use stylet_shm_schema::{CommandKind, Fault, ParameterId};
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Severity {
-    Bad,
-    Warn,
-    Info,
-}
-
-impl Severity {
-    fn color(self, tokens: &Tokens) -> Color32 {
-        match self {
-            Self::Bad => tokens.bad,
-            Self::Warn => tokens.warn,
-            Self::Info => tokens.accent,
-        }
-    }
-}
-
-#[derive(Clone, Debug, PartialEq)]
-pub struct Banner {
-    pub severity: Severity,
-    pub title: &'static str,
-    pub text: String,
-    /// The one thing to do about it, where a click can do it.
-    pub remedy: Option<(&'static str, Action)>,
-}
-
-/// Worst first. What cannot be known is not claimed: without a core nothing is said about its force.
-pub fn banners(shown: &Shown) -> Vec<Banner> {
-    let mut list = of_core(shown);
-    list.extend(of_controllers(shown));
-    list
-}
-
-/// What went, and what may not be read.
-fn of_controllers(shown: &Shown) -> Vec<Banner> {
-    let banner = |title, text, remedy| Banner {
-        severity: Severity::Warn,
-        title,
-        text,
-        remedy,
-    };
-    let gone = shown.gone.as_ref().map(|name| {
-        let text = format!("{name}. The needle stays where it is; keys and mouse still move it.");
-        banner("Unplugged", text, Some(("Put away", Action::PutGoneAway)))
-    });
-    let denied = shown.controllers.denied.iter();
-    let denied = denied.map(|why| banner("A controller is not read", why.clone(), None));
-    gone.into_iter().chain(denied).collect()
-}
-
-fn of_core(shown: &Shown) -> Vec<Banner> {
-    match &shown.status {
-        LinkStatus::Absent { why } => return vec![absent(shown, why)],
-        LinkStatus::Silent { since } => {
-            return vec![Banner {
-                severity: Severity::Bad,
-                title: "rt-core is silent",
-                text: format!(
-                    "Nothing came for {:.1} s. What you see is old. If it stays so, look at the terminal where rt-core runs.",
-                    since.as_secs_f64()
-                ),
-                remedy: None,
-            }];
-        }
-        LinkStatus::Live => {}
-    }
-    let mut list = Vec::new();
-    let fault = shown.fault();
-    if fault != Some(Fault::None) {
-        list.push(Banner {
-            severity: Severity::Bad,
-            title: "Fault: the force is off",
-            text: fault.map_or(
-                "rt-core reports a fault that this program does not know".to_owned(),
-                |f| sentence(f.message()),
-            ),
-            remedy: Some(("Re-arm", Action::Send(CommandKind::Engage))),
-        });
-    }
-    if shown.state.is_some() && !shown.is_real_time() {
-        list.push(not_real_time(shown));
-    }
-    if shown.state.is_some() && fault == Some(Fault::None) {
-        list.extend(force_is_off(shown));
-    }
-    list.extend(refused(shown));
-    list
-}
-
-fn force_is_off(shown: &Shown) -> Option<Banner> {
-    if !shown.is_engaged() {
-        return Some(Banner {
-            severity: Severity::Warn,
-            title: "The force is off",
-            text: "The device is moved but not felt. Key E turns it on.".to_owned(),
-            remedy: Some(("Turn it on", Action::Send(CommandKind::Engage))),
-        });
-    }
-    shown.is_waiting().then(|| Banner {
-        severity: Severity::Warn,
-        title: "The force waits",
-        text: "It would begin with a jump. Move the needle until it is small: out of the tissue is surest.".to_owned(),
-        remedy: None,
-    })
-}
-
-/// Until they are put away: what was refused may have been asked by another host.
-fn refused(shown: &Shown) -> Option<Banner> {
-    (shown.refusals > 0).then(|| Banner {
-        severity: Severity::Info,
-        title: "rt-core refused",
-        text: match shown.last_refusal.as_str() {
-            "" => format!("{} requests", shown.refusals),
-            why => format!("{} requests; the last: {}", shown.refusals, why.replace('\n', "; ")),
-        },
-        remedy: Some(("Put away", Action::PutRefusalsAway)),
-    })
-}
-
-fn absent(shown: &Shown, why: &str) -> Banner {
-    let text = if why.is_empty() {
-        format!("Start it in another terminal: rt-core --instance {}", shown.instance)
-    } else {
-        sentence(why)
-    };
-    Banner {
-        severity: Severity::Bad,
-        title: "rt-core is absent",
-        text,
-        remedy: None,
-    }
-}
-
-fn not_real_time(shown: &Shown) -> Banner {
-    let advice = shown.session.map(|s| s.advice.read()).unwrap_or_default();
-    let asked = shown.session.is_some_and(|s| s.no_rt_asked != 0);
-    let text = match (advice.trim(), asked) {
-        ("", true) => "rt-core was started with --no-rt: timing here says nothing about this machine.".to_owned(),
-        ("", false) => "Run setcap cap_sys_nice,cap_ipc_lock=ep on rt-core, or allow rtprio and memlock in /etc/security/limits.d, then start it again.".to_owned(),
-        (advice, _) => advice.replace('\n', "  "),
-    };
-    Banner {
-        severity: Severity::Warn,
-        title: "Not real-time",
-        text,
-        remedy: None,
-    }
-}
-
-fn sentence(text: &str) -> String {
-    let mut chars = text.chars();
-    chars
-        .next()
-        .map(|first| format!("{}{}.", first.to_uppercase(), chars.as_str()))
-        .unwrap_or_default()
-}
-
-pub fn banners_ui(ui: &mut egui::Ui, list: &[Banner]) -> Option<Action> {
-    let mut action = None;
-    let tokens = theme::of(ui);
-    let ink = tokens.on_signal;
-    for banner in list {
-        let fill = banner.severity.color(tokens);
-        egui::Frame::new()
-            .fill(fill)
-            .inner_margin(egui::Margin::symmetric(10, 5))
-            .show(ui, |ui| {
-                ui.set_min_width(ui.available_width());
-                ui.horizontal(|ui| {
-                    ui.label(RichText::new(banner.title).strong().size(15.0).color(ink));
-                    if let Some((name, remedy)) = &banner.remedy
-                        && ui.button(*name).clicked()
-                    {
-                        action = Some(remedy.clone());
-                    }
-                    let body = RichText::new(&banner.text).color(ink);
-                    // Two hyphens of a command must not look like one dash.
-                    let body = if banner.text.contains("--") {
-                        body.monospace()
-                    } else {
-                        body
-                    };
-                    ui.add(egui::Label::new(body).wrap()).on_hover_text(&banner.text);
-                });
-            });
-    }
-    action
-}
+use stylet_shm_schema::ParameterId;
 
 pub fn status_ui(ui: &mut egui::Ui, shown: &Shown, settings: &mut Settings) -> Option<Action> {
     let mut action = None;
@@ -225,7 +36,7 @@ fn settings_ui(ui: &mut egui::Ui, settings: &mut Settings) {
         ui.radio_value(&mut settings.theme, ThemeChoice::Dark, "Dark");
         ui.radio_value(&mut settings.theme, ThemeChoice::Light, "Light");
     });
-    let label = ui.label(theme::weak("Size of words"));
+    let label = ui.label(theme::weak("Text size"));
     let mut percent = settings.scale * 100.0;
     let drag = DragValue::new(&mut percent)
         .range(SCALES[0] * 100.0..=SCALES[1] * 100.0)
@@ -256,14 +67,14 @@ fn link_ui(ui: &mut egui::Ui, shown: &Shown) {
     let response = badge(ui, word, color);
     if let Some(session) = &shown.session {
         response.on_hover_text(format!(
-            "instance {}, session {:016x}, process {}, version {}\nforce loop {}, tissue {}\nmessages not believed: {}",
+            "instance {}, session {:016x}, process {}, version {}\nforce loop {}, tissue {}\ninvalid messages dropped: {}",
             shown.instance,
             session.session_id,
             session.pid,
             session.version.read(),
             format::rate(session.period_ns),
             format::rate(session.tissue_period_ns),
-            shown.rubbish_refused
+            shown.invalid_dropped
         ));
     }
     if shown.is_absent() {
@@ -360,72 +171,4 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown) {
         ui.add(egui::Label::new(theme::strong(&label)).truncate());
     });
     ui.label(theme::small("force"));
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use bytemuck::Zeroable;
-    use stylet_shm_schema::{HapticState, flags};
-
-    fn live() -> Shown {
-        let mut shown = Shown::empty("lab");
-        shown.status = LinkStatus::Live;
-        let mut state = HapticState::zeroed();
-        state.flags = flags::REAL_TIME | flags::ENGAGED;
-        shown.state = Some(state);
-        shown
-    }
-
-    #[test]
-    fn all_well_needs_no_banner_and_absence_says_what_to_type() {
-        assert!(banners(&live()).is_empty());
-        let list = banners(&Shown::empty("lab"));
-        assert!(list[0].text.contains("rt-core --instance lab"), "{}", list[0].text);
-    }
-
-    #[test]
-    fn a_force_that_is_off_or_waits_and_a_refusal_each_have_their_banner() {
-        let titles = |shown: &Shown| banners(shown).iter().map(|b| b.title).collect::<Vec<_>>();
-        let mut shown = live();
-        if let Some(state) = &mut shown.state {
-            state.flags |= flags::WAITING;
-        }
-        assert_eq!(titles(&shown), ["The force waits"]);
-        if let Some(state) = &mut shown.state {
-            state.flags = flags::REAL_TIME;
-        }
-        shown.refusals = 2;
-        shown.last_refusal = "needle.puncture_depth = 1000 mm".to_owned();
-        assert_eq!(titles(&shown), ["The force is off", "rt-core refused"]);
-        assert!(banners(&shown)[1].text.contains("puncture_depth"));
-    }
-
-    #[test]
-    fn a_controller_that_went_and_one_without_rights_are_told_with_or_without_a_core() {
-        for mut shown in [live(), Shown::empty("lab")] {
-            let before = banners(&shown).len();
-            shown.gone = Some("Pad".to_owned());
-            shown
-                .controllers
-                .denied
-                .push("Cap may not be read. Run: that".to_owned());
-            let list = banners(&shown);
-            assert_eq!(list.len(), before + 2);
-            assert!(list[before].text.contains("Pad. The needle stays where it is"));
-            assert_eq!(list[before].remedy, Some(("Put away", Action::PutGoneAway)));
-            assert!(list[before + 1].text.contains("Run: that"));
-        }
-    }
-
-    #[test]
-    fn fault_comes_first_and_an_unknown_one_is_a_fault() {
-        let mut shown = live();
-        if let Some(state) = &mut shown.state {
-            (state.fault, state.flags) = (999, 0);
-        }
-        let list = banners(&shown);
-        assert_eq!(list[0].severity, Severity::Bad);
-        assert_eq!(list[1].title, "Not real-time");
-    }
 }

@@ -1,4 +1,4 @@
-//! A plot over time: smallest and largest as a band, and what it was where the pointer is.
+//! A plot over time: smallest and largest as a band, and the value under the pointer.
 
 use super::axis::{grid, number, plot, upwards};
 use egui::Color32;
@@ -54,14 +54,14 @@ impl Strip<'_> {
                 }
             });
         if let Some(place) = shown.response.hover_pos()
-            && let Some(text) = self.told_at(shown.transform.value_from_position(place).x)
+            && let Some(text) = self.value_at(shown.transform.value_from_position(place).x)
         {
             shown.response.on_hover_text_at_pointer(text);
         }
     }
 
     /// The value that is nearest in time.
-    fn told_at(&self, seconds: f64) -> Option<String> {
+    fn value_at(&self, seconds: f64) -> Option<String> {
         let after = self.points.partition_point(|[x, ..]| *x < seconds);
         let near = [after.checked_sub(1), Some(after)].into_iter().flatten();
         let near = near.filter_map(|n| self.points.get(n));
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_pointed_at_is_told_with_its_time_and_unit() {
+    fn the_value_under_the_pointer_is_shown_with_its_time_and_unit() {
         let points = [[-2.0, -1e-9, 0.0], [-1.96, 1.0, 3.456], [-1.92, 3.5, 3.5]];
         let mut strip = Strip {
             name: "force",
@@ -95,13 +95,13 @@ mod tests {
             points: &points,
             worst_only: false,
         };
-        let told = |strip: &Strip<'_>, at_s| strip.told_at(at_s).expect("some");
-        assert_eq!(told(&strip, -9.0), "-2.0 s: 0.00 N");
-        assert_eq!(told(&strip, -1.97), "-2.0 s: 1.00 to 3.46 N");
-        assert_eq!(told(&strip, -1.0), "-1.9 s: 3.50 N");
+        let value = |strip: &Strip<'_>, at_s| strip.value_at(at_s).expect("some");
+        assert_eq!(value(&strip, -9.0), "-2.0 s: 0.00 N");
+        assert_eq!(value(&strip, -1.97), "-2.0 s: 1.00 to 3.46 N");
+        assert_eq!(value(&strip, -1.0), "-1.9 s: 3.50 N");
         strip.worst_only = true;
-        assert_eq!(told(&strip, -1.97), "-2.0 s: at most 3.46 N");
+        assert_eq!(value(&strip, -1.97), "-2.0 s: at most 3.46 N");
         strip.points = &[];
-        assert_eq!(strip.told_at(0.0), None);
+        assert_eq!(strip.value_at(0.0), None);
     }
 }

@@ -1,42 +1,52 @@
-//! The plan that is edited in the window: its history, what is wrong with it, the work that is done for it, how far it is
-//! carried out.
+//! The plan that is edited in the window: its history, its problems, the background jobs for it, and the progress of its needles.
 //!
-//! A frame gives it what came and takes what is shown; nothing here takes longer than a copy of the plan.
+//! Each frame hands over new data and takes what is shown; nothing here takes longer than a copy of the plan.
 
-mod course;
-mod ground;
+mod edit;
+mod jobs;
+mod needles;
+mod outlines;
 mod shown;
-mod work;
 
-pub use course::{Course, NeedleState};
-pub use ground::{Ground, Layer, Outline};
-pub use shown::{Implant, Planning};
+use jobs::JobMessage;
+pub(crate) use jobs::JobProgress;
+pub(crate) use needles::NeedleProgress;
+pub use needles::NeedleState;
+pub(crate) use outlines::{AnatomyOutlines, Outline};
+pub(crate) use shown::{Implant, Planning};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
-use stylet_base::job::{Job, Update};
+use std::time::Instant;
+use stylet_base::job::{Job, JobUpdate};
 use stylet_host::link::SceneModel;
 use stylet_implant::plan::check::{Problem, problems};
-use stylet_implant::plan::{Compensation, Drops, History, Hole, ImplantPlan, Needle, Row, Template, exchange};
+use stylet_implant::plan::{Compensation, Drops, History, ImplantPlan, Needle, Template};
 use stylet_implant::workflow::{NeedleTask, Pace};
-use stylet_shm_schema::MAX_SEEDS;
+use stylet_shm_schema::SceneId;
 use stylet_shm_schema::service::Instance;
-pub use work::Progress;
-use work::Told;
 
-/// Changes of one needle that follow each other faster are one step to take back.
-const ONE_STEP: Duration = Duration::from_millis(800);
-/// Of seeds of a plan that has none yet.
-const STRENGTH_U: f64 = 0.5;
-
+/// Whatever was wrong, to be shown as text.
+type Failure = Box<dyn std::error::Error + Send + Sync>;
 type Checked = Job<Vec<Problem>>;
+/// Session and generation of the scene and the template, with the work for them.
+type OutlinesJob = (SceneId, Template, Job<Result<AnatomyOutlines, Failure>>);
 
+/// A message for the operator.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Message {
+    /// Something was done.
+    Done(String),
+    /// Something was refused or failed, with the reason.
+    Refused(String),
+}
+
+/// The plan of many needles and the background jobs for it.
 #[derive(Default)]
 pub struct Planner {
-    ground: Option<Arc<Ground>>,
-    grounding: Option<(u64, u64, Template, Job<Result<Ground, String>>)>,
-    /// What no ground could be made of.
-    failed: Option<((u64, u64), Template)>,
+    outlines: Option<Arc<AnatomyOutlines>>,
+    outlining: Option<OutlinesJob>,
+    /// Scene and template that no outlines could be made of.
+    failed: Option<(SceneId, Template)>,
     /// The scene that the plan is for: its name and box.
     of_scene: Option<(String, [f64; 3])>,
     history: Option<History>,
@@ -45,49 +55,52 @@ pub struct Planner {
     problems: Option<Arc<Vec<Problem>>>,
     checking: Option<(u64, Checked)>,
     checked: u64,
-    work: Option<(Job<Told>, Progress)>,
+    job: Option<(Job<JobMessage>, JobProgress)>,
     /// With the needles as they were when they were rehearsed.
     compensated: Vec<(Needle, Compensation)>,
-    course: Course,
+    progress: NeedleProgress,
     /// The needle whose seeds were changed last, and when.
     drawn: Option<(usize, Instant)>,
     implant: Option<Arc<Implant>>,
     shown_revision: u64,
-    /// What the person should read, once.
-    said: Option<Result<String, String>>,
+    /// A message for the operator, reported once.
+    message: Option<Message>,
 }
 
 impl Planner {
+    /// The plan, where there is one.
     pub fn plan(&self) -> Option<&ImplantPlan> {
         self.history.as_ref().map(History::plan)
     }
 
-    pub fn course(&self) -> &Course {
-        &self.course
+    /// Progress of its needles.
+    pub fn progress(&self) -> &NeedleProgress {
+        &self.progress
     }
 
-    /// What the person should read, once.
-    pub fn said(&mut self) -> Option<Result<String, String>> {
-        self.said.take()
+    /// A message for the operator, reported once.
+    pub fn take_message(&mut self) -> Option<Message> {
+        self.message.take()
     }
 
+    /// What a frame shows of it.
     pub fn planning(&self) -> Planning {
         Planning {
-            ground: self.ground.clone(),
+            outlines: self.outlines.clone(),
             implant: self.implant.clone(),
-            work: self.work.as_ref().map(|(_, progress)| progress.clone()),
-            course: self.course.clone(),
+            job: self.job.as_ref().map(|(_, progress)| progress.clone()),
+            progress: self.progress.clone(),
         }
     }
 
-    /// What came since the last frame.
+    /// Takes what is new since the last frame.
     pub fn take(&mut self, scene: Option<&Arc<SceneModel>>, seeds: usize) {
         let Some(scene) = scene else { return };
         self.take_scene(scene);
-        self.take_work();
+        self.take_job();
         self.take_problems();
-        if self.course.is_undone(seeds) {
-            self.set_course(Course::default());
+        if self.progress.is_undone(seeds) {
+            self.set_progress(NeedleProgress::default());
         }
         self.show();
     }
@@ -102,7 +115,7 @@ impl Planner {
                     self.revision,
                     history,
                     checked.or(old),
-                    &self.course,
+                    &self.progress,
                     &self.compensated,
                 ))
             });
@@ -110,60 +123,62 @@ impl Planner {
     }
 
     fn take_scene(&mut self, scene: &Arc<SceneModel>) {
-        let key = (scene.header.session_id, scene.header.generation);
+        let key = scene.header.id();
         let of_scene = (scene.header.name.read(), scene.header.upper_m);
         if self.of_scene.as_ref() != Some(&of_scene) {
             if self.history.is_some() {
-                self.said = Some(Err("The plan was for another scene and is put away.".to_owned()));
+                self.message = Some(Message::Refused(
+                    "The plan was for another scene and was discarded.".to_owned(),
+                ));
             }
             *self = Self {
                 of_scene: Some(of_scene),
-                said: self.said.take(),
+                message: self.message.take(),
                 revision: self.revision + 1,
                 ..Self::default()
             };
         }
-        if let Some((session, generation, template, job)) = &self.grounding {
-            let (key, template) = ((*session, *generation), *template);
+        if let Some((key, template, job)) = &self.outlining {
+            let (key, template) = (*key, *template);
             match job.poll() {
-                Update::Pending => {}
-                Update::Value(Ok(ground)) => {
-                    self.ground = Some(Arc::new(ground));
-                    self.grounding = None;
+                JobUpdate::Pending => {}
+                JobUpdate::Message(Ok(outlines)) => {
+                    self.outlines = Some(Arc::new(outlines));
+                    self.outlining = None;
                     self.change();
                 }
-                Update::Value(Err(why)) => self.no_ground(key, template, why),
-                Update::Ended => self.no_ground(key, template, "the scene's anatomy was not made out".to_owned()),
+                JobUpdate::Message(Err(why)) => self.no_outlines(key, template, &why.to_string()),
+                JobUpdate::Ended => self.no_outlines(key, template, "the scene's anatomy could not be determined"),
             }
             return;
         }
         let template = self
             .plan()
             .map_or_else(|| Template::before(&scene.header), |p| p.template);
-        let is_known = |g: &Arc<Ground>| g.scene == key && g.template == template;
-        if !self.ground.as_ref().is_some_and(is_known) && self.failed != Some((key, template)) {
-            if self.ground.as_ref().is_some_and(|g| g.scene != key) {
-                self.set_course(Course::default());
+        let is_known = |g: &Arc<AnatomyOutlines>| g.scene == key && g.template == template;
+        if !self.outlines.as_ref().is_some_and(is_known) && self.failed != Some((key, template)) {
+            if self.outlines.as_ref().is_some_and(|g| g.scene != key) {
+                self.set_progress(NeedleProgress::default());
                 self.compensated.clear();
             }
             let model = scene.clone();
-            let job = Job::begin("anatomy", move |told, _| {
-                let _ = told.send(Ground::of(&model, template));
+            let job = Job::begin("anatomy", move |messages, _| {
+                let _ = messages.send(AnatomyOutlines::of(&model, template));
             });
-            self.grounding = Some((key.0, key.1, template, job));
+            self.outlining = Some((key, template, job));
         }
     }
 
-    fn no_ground(&mut self, key: (u64, u64), template: Template, why: String) {
-        (self.ground, self.grounding, self.failed) = (None, None, Some((key, template)));
-        self.said = Some(Err(format!("No plan can be made for this scene: {why}")));
+    fn no_outlines(&mut self, key: SceneId, template: Template, why: &str) {
+        (self.outlines, self.outlining, self.failed) = (None, None, Some((key, template)));
+        self.message = Some(Message::Refused(format!("No plan can be made for this scene: {why}")));
     }
 
     fn take_problems(&mut self) {
         if let Some((revision, job)) = &self.checking {
             match job.poll() {
-                Update::Pending => return,
-                Update::Value(found) => {
+                JobUpdate::Pending => return,
+                JobUpdate::Message(found) => {
                     self.problems = Some(Arc::new(found));
                     self.checked = *revision;
                     let is_new = *revision == self.revision;
@@ -172,235 +187,122 @@ impl Planner {
                         self.shown_revision = 0;
                     }
                 }
-                Update::Ended => self.checking = None,
+                JobUpdate::Ended => self.checking = None,
             }
         }
-        let (Some(ground), Some(plan)) = (&self.ground, self.plan()) else {
+        let (Some(outlines), Some(plan)) = (&self.outlines, self.plan()) else {
             return;
         };
         if self.checked == self.revision || self.checking.is_some() {
             return;
         }
-        let (ground, plan) = (ground.clone(), plan.clone());
-        let job = Job::begin("plan check", move |told, _| {
-            let _ = told.send(problems(&plan, &ground.anatomy));
+        let (outlines, plan) = (outlines.clone(), plan.clone());
+        let job = Job::begin("plan check", move |messages, _| {
+            let _ = messages.send(problems(&plan, &outlines.anatomy));
         });
         self.checking = Some((self.revision, job));
     }
 
-    fn take_work(&mut self) {
-        let Some((job, progress)) = &mut self.work else { return };
+    fn take_job(&mut self) {
+        let Some((job, progress)) = &mut self.job else { return };
         let mut news = job.poll();
-        // Of several words the last is what is true.
-        while let Update::Value(Told::Progress(now)) = news {
+        // Of several messages on the progress the last one counts.
+        while let JobUpdate::Message(JobMessage::Progress(now)) = news {
             *progress = now;
             news = job.poll();
         }
         match news {
-            Update::Pending | Update::Value(Told::Progress(_)) => {}
-            Update::Value(Told::Plan(plan)) => {
-                self.work = None;
+            JobUpdate::Pending | JobUpdate::Message(JobMessage::Progress(_)) => {}
+            JobUpdate::Message(JobMessage::Plan(plan)) => {
+                self.job = None;
                 match plan.and_then(|plan| self.can_be(plan)) {
                     Ok(plan) => self.put(plan),
-                    Err(why) => self.said = Some(Err(why)),
+                    Err(why) => self.message = Some(Message::Refused(why.to_string())),
                 }
             }
-            Update::Value(Told::Compensated(done)) => {
+            JobUpdate::Message(JobMessage::Compensated(done)) => {
                 self.compensated.retain(|(needle, _)| *needle != done.0);
                 self.compensated.push(*done);
                 self.refresh();
             }
-            Update::Value(Told::End(end)) => (self.work, self.said) = (None, Some(end)),
-            Update::Ended => self.work = None,
+            JobUpdate::Message(JobMessage::End(end)) => {
+                self.job = None;
+                self.message = Some(match end {
+                    Ok(text) => Message::Done(text),
+                    Err(why) => Message::Refused(why.to_string()),
+                });
+            }
+            JobUpdate::Ended => self.job = None,
         }
     }
 
+    /// Whether a job runs.
     pub fn is_busy(&self) -> bool {
-        self.work.is_some()
+        self.job.is_some()
     }
 
-    /// What is being done is no longer wanted.
+    /// Cancels the job.
     pub fn cancel(&mut self) {
-        self.work = None;
+        self.job = None;
     }
 
-    fn begin_work(&mut self, what: &str, begin: impl FnOnce(&Self, Arc<Ground>) -> Result<Job<Told>, String>) {
-        let job = match (&self.ground, self.is_busy()) {
+    fn begin_job(
+        &mut self,
+        what: &str,
+        begin: impl FnOnce(&Self, Arc<AnatomyOutlines>) -> Result<Job<JobMessage>, Failure>,
+    ) {
+        let job = match (&self.outlines, self.is_busy()) {
             (_, true) => return,
-            (None, _) => Err("the scene's anatomy is not known yet; wait a moment".to_owned()),
-            (Some(ground), false) => begin(self, ground.clone()),
+            (None, _) => Err("the scene's anatomy is not known yet; try again in a moment".into()),
+            (Some(outlines), false) => begin(self, outlines.clone()),
         };
         match job {
             Ok(job) => {
-                let progress = Progress {
+                let progress = JobProgress {
                     what: what.to_owned(),
                     share: None,
                 };
-                self.work = Some((job, progress));
+                self.job = Some((job, progress));
             }
-            Err(why) => self.said = Some(Err(why)),
+            Err(why) => self.message = Some(Message::Refused(why.to_string())),
         }
     }
 
+    /// Begins a search for a first plan.
     pub fn automatic(&mut self) {
-        self.begin_work(work::FIRST_PLAN, |_, ground| Ok(work::automatic(ground)));
+        self.begin_job(jobs::FIRST_PLAN, |_, outlines| Ok(jobs::automatic(outlines)));
     }
 
+    /// Begins to fit the strength of the seeds to the dose of the target.
     pub fn fit_strength(&mut self) {
-        self.begin_work("Looking for the strength", |planner, ground| {
-            Ok(work::strength(ground, Arc::new(planner.planned()?.clone())))
+        self.begin_job("Fitting the strength", |planner, outlines| {
+            Ok(jobs::strength(outlines, Arc::new(planner.planned()?.clone())))
         });
     }
 
+    /// Begins to read a plan from a file.
     pub fn import(&mut self, path: PathBuf, scene: Arc<SceneModel>) {
-        self.begin_work("Reading the plan", |_, _| Ok(work::import(path, scene)));
+        self.begin_job("Reading the plan", |_, _| Ok(jobs::import(path, scene)));
     }
 
+    /// Begins to write the plan to a file.
     pub fn export(&mut self, path: PathBuf) {
-        self.begin_work("Writing the plan", |planner, ground| {
-            Ok(work::export(path, Arc::new(planner.planned()?.clone()), ground))
+        self.begin_job("Writing the plan", |planner, outlines| {
+            Ok(jobs::export(path, Arc::new(planner.planned()?.clone()), outlines))
         });
     }
 
-    /// Of the needles that are still to come.
+    /// Compensates the needles that are not inserted yet.
     pub fn compensate(&mut self, instance: Instance, pace: Pace) {
-        self.begin_work("Rehearsing", |planner, _| {
-            let begun = planner.course.begun();
+        self.begin_job("Rehearsing", |planner, _| {
+            let begun = planner.progress.begun();
             let left = planner.planned()?.needles.iter().skip(begun);
             let needles: Vec<Needle> = left.filter(|n| !n.seeds.is_empty()).cloned().collect();
             if needles.is_empty() {
-                return Err("no needle with seeds is left to rehearse".to_owned());
+                return Err("no needle with seeds is left to rehearse".into());
             }
-            Ok(work::compensation(instance, needles, pace))
+            Ok(jobs::compensation(instance, needles, pace))
         });
-    }
-
-    fn planned(&self) -> Result<&ImplantPlan, String> {
-        self.plan().ok_or_else(|| "there is no plan yet; make one".to_owned())
-    }
-
-    /// An empty one.
-    pub fn begin(&mut self) {
-        let (Some(ground), None) = (&self.ground, &self.history) else {
-            return;
-        };
-        let plan = exchange::usual().map(|(source, prescription_gy)| ImplantPlan {
-            template: ground.template,
-            source: source.model,
-            prescription_gy,
-            needles: Vec::new(),
-        });
-        match plan {
-            Ok(plan) => self.put(plan),
-            Err(why) => self.said = Some(Err(why)),
-        }
-    }
-
-    /// Back to one needle.
-    pub fn discard(&mut self) {
-        (self.history, self.work, self.problems) = (None, None, None);
-        self.compensated.clear();
-        self.course = Course::default();
-        self.change();
-    }
-
-    /// A needle through the hole, with as many seeds as fill the target behind it.
-    pub fn add(&mut self, hole: Hole) {
-        let piece = self.ground.as_ref().and_then(|g| g.piece_m(hole));
-        let strength_u = |plan: &ImplantPlan| {
-            let seeds = plan.needles.iter().flat_map(|n| &n.seeds);
-            seeds.map(|s| s.strength_u).next().unwrap_or(STRENGTH_U)
-        };
-        self.edit(|plan| {
-            let piece_m =
-                piece.ok_or_else(|| format!("a needle through {hole} would miss the target; choose another hole"))?;
-            let added = plan.with_needle(hole, piece_m[1])?;
-            added.with_row(plan.needles.len(), Row::filling(piece_m, strength_u(plan)))
-        });
-    }
-
-    pub fn set_row(&mut self, needle: usize, row: Row) {
-        let last = self.drawn.filter(|(n, at)| *n == needle && at.elapsed() < ONE_STEP);
-        let changed = self.planned().and_then(|plan| plan.with_row(needle, row));
-        match changed.and_then(|plan| self.can_be(plan)) {
-            Ok(plan) => {
-                match &mut self.history {
-                    Some(history) if last.is_some() => history.replace(plan),
-                    Some(history) => history.put(plan),
-                    None => {}
-                }
-                self.drawn = Some((needle, Instant::now()));
-                self.change();
-            }
-            Err(why) => self.said = Some(Err(why)),
-        }
-    }
-
-    pub fn edit(&mut self, edit: impl FnOnce(&ImplantPlan) -> Result<ImplantPlan, String>) {
-        match self.planned().and_then(edit).and_then(|plan| self.can_be(plan)) {
-            Ok(plan) => self.put(plan),
-            Err(why) => self.said = Some(Err(why)),
-        }
-    }
-
-    pub fn undo(&mut self) {
-        self.step(History::undo, History::redo);
-    }
-
-    pub fn redo(&mut self) {
-        self.step(History::redo, History::undo);
-    }
-
-    fn step(&mut self, step: fn(&mut History) -> bool, back: fn(&mut History) -> bool) {
-        let Some(mut history) = self.history.take() else { return };
-        let before = history.plan().clone();
-        if step(&mut history)
-            && let Err(why) = self.keeps(&before, history.plan())
-        {
-            back(&mut history);
-            self.said = Some(Err(why));
-        }
-        self.history = Some(history);
-        self.change();
-    }
-
-    fn put(&mut self, plan: ImplantPlan) {
-        match &mut self.history {
-            Some(history) => history.put(plan),
-            None => self.history = Some(History::new(plan)),
-        }
-        self.change();
-    }
-
-    /// A plan that leaves what is in the tissue as it is and is not too much for the core.
-    fn can_be(&self, plan: ImplantPlan) -> Result<ImplantPlan, String> {
-        if plan.seed_count() > MAX_SEEDS {
-            let count = plan.seed_count();
-            return Err(format!("that makes {count} seeds; at most {MAX_SEEDS} can be placed"));
-        }
-        match self.plan() {
-            Some(before) => self.keeps(before, &plan).map(|()| plan),
-            None => Ok(plan),
-        }
-    }
-
-    fn keeps(&self, before: &ImplantPlan, after: &ImplantPlan) -> Result<(), String> {
-        let begun = self.course.begun();
-        let first = |plan: &ImplantPlan| plan.needles.iter().take(begun).cloned().collect::<Vec<_>>();
-        if begun > 0 && first(before) != first(after) {
-            return Err(format!(
-                "{begun} needles have gone in already; only those after them can be changed"
-            ));
-        }
-        Ok(())
-    }
-
-    /// The plan or what it lies on has changed.
-    fn change(&mut self) {
-        self.revision += 1;
-        let plan = self.history.as_ref().map(History::plan);
-        let needles = plan.map_or(&[][..], |p| &p.needles[..]);
-        self.compensated.retain(|(needle, _)| needles.contains(needle));
     }
 
     /// What is shown of it has changed.
@@ -408,14 +310,14 @@ impl Planner {
         self.shown_revision = 0;
     }
 
-    fn set_course(&mut self, course: Course) {
-        if self.course != course {
-            self.course = course;
+    fn set_progress(&mut self, progress: NeedleProgress) {
+        if self.progress != progress {
+            self.progress = progress;
             self.refresh();
         }
     }
 
-    /// What is done with a needle.
+    /// Path and drops of a needle.
     pub fn task(&self, number: usize) -> Option<NeedleTask> {
         let needle = self.plan()?.needles.get(number)?;
         let found = self.compensated.iter().find(|(n, _)| n == needle);
@@ -437,29 +339,32 @@ impl Planner {
             .collect()
     }
 
-    /// The needle goes in now; so many seeds lie in the tissue.
+    /// A needle is inserted now, with so many seeds in the tissue.
     pub fn begin_needle(&mut self, number: usize, seeds: usize) {
-        let mut course = self.course.clone();
-        course.begin(number, seeds);
-        self.set_course(course);
+        let mut progress = self.progress.clone();
+        progress.begin(number, seeds);
+        self.set_progress(progress);
     }
 
+    /// The inserted needle is done.
     pub fn finish_needle(&mut self) {
-        let mut course = self.course.clone();
-        course.finish();
-        self.set_course(course);
+        let mut progress = self.progress.clone();
+        progress.finish();
+        self.set_progress(progress);
     }
 
+    /// Counts the inserted needle as planned again.
     pub fn step_back(&mut self) {
-        let mut course = self.course.clone();
-        course.step_back();
-        self.set_course(course);
+        let mut progress = self.progress.clone();
+        progress.step_back();
+        self.set_progress(progress);
     }
 
-    pub fn begin_anew(&mut self) {
-        self.set_course(Course::default());
+    /// Begins the implantation again: no needle is inserted.
+    pub fn restart(&mut self) {
+        self.set_progress(NeedleProgress::default());
     }
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

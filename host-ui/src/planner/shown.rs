@@ -1,8 +1,8 @@
-//! What a frame shows of the plan, made once a change.
+//! The plan as a frame shows it, made once per change.
 
-use super::course::{Course, NeedleState};
-use super::ground::Ground;
-use super::work::Progress;
+use super::jobs::JobProgress;
+use super::needles::{NeedleProgress, NeedleState};
+use super::outlines::AnatomyOutlines;
 use std::sync::Arc;
 use stylet_dose::Seed;
 use stylet_implant::plan::check::Problem;
@@ -11,35 +11,36 @@ use stylet_implant::plan::{Compensation, History, ImplantPlan, Needle};
 /// Everything about plans of many needles that a frame shows.
 #[derive(Clone, Default)]
 pub struct Planning {
-    /// `None` until the scene's anatomy is made out.
-    pub ground: Option<Arc<Ground>>,
+    /// `None` until the scene's anatomy is known.
+    pub outlines: Option<Arc<AnatomyOutlines>>,
     /// `None` without a plan of many needles.
     pub implant: Option<Arc<Implant>>,
-    /// While something is done for it.
-    pub work: Option<Progress>,
-    pub course: Course,
+    /// The background job for it, if one runs.
+    pub job: Option<JobProgress>,
+    /// Progress of its needles.
+    pub progress: NeedleProgress,
 }
 
 impl Planning {
     /// The next needle that has seeds.
     pub fn next_needle(&self) -> Option<usize> {
         let needles = self.implant.as_ref()?.plan.needles.iter().enumerate();
-        let mut left = needles.skip(self.course.begun()).filter(|(_, n)| !n.seeds.is_empty());
+        let mut left = needles.skip(self.progress.begun()).filter(|(_, n)| !n.seeds.is_empty());
         left.next().map(|(number, _)| number)
     }
 
-    /// There is a plan, and none of its needles has gone in.
+    /// Whether there is a plan and none of its needles was inserted.
     pub fn waits(&self) -> bool {
-        self.implant.is_some() && self.course.begun() == 0
+        self.implant.is_some() && self.progress.begun() == 0
     }
 
-    /// The needle at work, or the last one that was.
+    /// The inserted needle, or the last one that was.
     pub fn at_work(&self) -> Option<(usize, &Needle)> {
-        let number = self.course.begun().checked_sub(1)?;
+        let number = self.progress.begun().checked_sub(1)?;
         Some((number, self.implant.as_ref()?.plan.needles.get(number)?))
     }
 
-    /// Where its tip is when each seed leaves it, deepest first; empty where no needle of a plan is at work.
+    /// Depth of its tip when each seed leaves it, deepest first, m; empty where no needle of a plan is inserted.
     pub fn drops_m(&self) -> &[f64] {
         let drops = self.at_work().and_then(|(n, _)| self.implant.as_ref()?.drops_m.get(n));
         drops.map_or(&[], |d| d)
@@ -48,18 +49,23 @@ impl Planning {
 
 /// A plan as it is shown.
 pub struct Implant {
+    /// Rises with every change.
     pub revision: u64,
+    /// The plan.
     pub plan: ImplantPlan,
+    /// All its seeds.
     pub seeds: Vec<Seed>,
-    /// `None` until it has been looked at; while it is looked at again, those of the plan before.
+    /// `None` until the plan was checked; while it is checked again, those of the plan before.
     pub problems: Option<Arc<Vec<Problem>>>,
-    /// One a needle.
+    /// One for each needle.
     pub states: Vec<NeedleState>,
-    /// One a needle: how far its seeds rest from plan on average, where that was rehearsed.
+    /// Mean distance of the seeds of each needle from plan at rest, where that was rehearsed, m.
     pub rest_errors_m: Vec<Option<f64>>,
-    /// One a needle, by rehearsal or as planned.
+    /// Depths of the drops of each needle, by rehearsal or as planned, m.
     pub drops_m: Vec<Vec<f64>>,
+    /// Whether a change can be undone.
     pub can_undo: bool,
+    /// Whether a change can be redone.
     pub can_redo: bool,
 }
 
@@ -68,7 +74,7 @@ impl Implant {
         revision: u64,
         history: &History,
         problems: Option<Arc<Vec<Problem>>>,
-        course: &Course,
+        progress: &NeedleProgress,
         compensated: &[(Needle, Compensation)],
     ) -> Self {
         let plan = history.plan().clone();
@@ -85,7 +91,7 @@ impl Implant {
             revision,
             seeds: plan.seeds(),
             problems,
-            states: (0..plan.needles.len()).map(|n| course.state(n)).collect(),
+            states: (0..plan.needles.len()).map(|n| progress.state(n)).collect(),
             rest_errors_m: plan.needles.iter().map(rest_error_m).collect(),
             drops_m: plan.needles.iter().map(drops_m).collect(),
             can_undo: history.can_undo(),

@@ -119,7 +119,7 @@ pub const LIGHT: Tokens = Tokens {
 #[derive(Debug)]
 pub struct ImageTokens {
     /// Around the picture, and behind words on it.
-    pub ground: Color32,
+    pub background: Color32,
     pub text: Color32,
     pub crosshair: Color32,
     pub needle: Color32,
@@ -134,7 +134,7 @@ pub struct ImageTokens {
 }
 
 pub const IMAGE: ImageTokens = ImageTokens {
-    ground: Color32::from_rgb(6, 8, 10),
+    background: Color32::from_rgb(6, 8, 10),
     text: Color32::from_rgb(226, 232, 238),
     crosshair: Color32::from_rgb(118, 134, 150),
     needle: Color32::from_rgb(255, 255, 255),
@@ -202,13 +202,13 @@ mod tests {
             // What is drawn needs 3:1.
             for mark in [t.entry, t.path, t.seed_planned, t.needle_tip, t.measure] {
                 let c = contrast(mark, t.background);
-                assert!(c >= 3.0, "{mark:?} on the ground of the picture: {c:.2}");
+                assert!(c >= 3.0, "{mark:?} on the background of the picture: {c:.2}");
             }
         }
     }
 
     #[test]
-    fn lines_over_an_ultrasound_picture_stand_out_from_its_ground() {
+    fn lines_over_an_ultrasound_picture_stand_out_from_its_background() {
         let i = &IMAGE;
         let lines = [
             i.text,
@@ -221,7 +221,7 @@ mod tests {
             i.measure,
         ];
         for ink in lines.into_iter().chain(i.isodose) {
-            assert!(contrast(ink, i.ground) >= 4.5, "{ink:?}");
+            assert!(contrast(ink, i.background) >= 4.5, "{ink:?}");
         }
     }
 }

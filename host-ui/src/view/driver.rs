@@ -1,4 +1,4 @@
-//! What the graphics library and its driver are given by this program's own pictures, and the processor time they take for it.
+//! Cost of this program's own pictures in the graphics library and its driver: bytes and processor time.
 
 use crate::cpu_time::thread_ns;
 
@@ -18,7 +18,7 @@ impl DriverCost {
         result
     }
 
-    /// As [`DriverCost::time`], where what is done says how many bytes it sent.
+    /// As [`DriverCost::time`], for calls that return the number of bytes they sent.
     pub fn send(&mut self, calls: impl FnOnce() -> u64) {
         self.uploaded_bytes += self.time(calls);
     }

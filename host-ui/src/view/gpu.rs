@@ -2,13 +2,18 @@
 //!
 //! The picture is drawn into a texture of its own and shown as an image, so that a window and a test see the same pixels.
 
+mod growing;
+mod pipelines;
+
 use super::driver::DriverCost;
-use super::marks::{MarkVertex, Marks};
-use super::mesh::SurfaceVertex;
-use crate::dose_desk;
+use super::marks::Marks;
+use crate::dose_worker::IsodoseShell;
+use crate::mesh::SurfaceVertex;
 use bytemuck::{Pod, Zeroable};
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
+use growing::{Growing, allocate};
+use pipelines::{Pipelines, pipelines};
 use std::mem::size_of;
 use std::ops::Range;
 
@@ -31,78 +36,12 @@ pub struct SceneUniform {
     pub section: [f32; 4],
 }
 
-/// A buffer that grows by doubling and is otherwise reused.
-struct Growing {
-    buffer: wgpu::Buffer,
-    usage: wgpu::BufferUsages,
-    /// Elements that count, not bytes.
-    len: u32,
-}
-
-impl Growing {
-    fn new(device: &wgpu::Device, usage: wgpu::BufferUsages) -> Self {
-        Self {
-            buffer: allocate(device, usage, 1024),
-            usage,
-            len: 0,
-        }
-    }
-
-    /// Gives the number of bytes sent.
-    fn write<T: Pod>(&mut self, state: &RenderState, items: &[T]) -> u64 {
-        let bytes: &[u8] = bytemuck::cast_slice(items);
-        let size = bytes.len() as u64;
-        if size > state.device.limits().max_buffer_size {
-            // A scene that does not fit is not drawn; the rest of the window goes on.
-            self.len = 0;
-            return 0;
-        }
-        if size > self.buffer.size() {
-            self.buffer = allocate(&state.device, self.usage, size.next_power_of_two());
-        }
-        if size > 0 {
-            state.queue.write_buffer(&self.buffer, 0, bytes);
-        }
-        self.len = items.len() as u32;
-        size
-    }
-
-    /// Only some of as many elements as were written last.
-    fn write_run<T: Pod>(&mut self, state: &RenderState, items: &[T], run: Range<usize>) -> u64 {
-        let part = items.get(run.clone()).unwrap_or_default();
-        if items.len() != self.len as usize || part.is_empty() {
-            return 0;
-        }
-        let bytes: &[u8] = bytemuck::cast_slice(part);
-        state
-            .queue
-            .write_buffer(&self.buffer, (run.start * size_of::<T>()) as u64, bytes);
-        bytes.len() as u64
-    }
-}
-
-fn allocate(device: &wgpu::Device, usage: wgpu::BufferUsages, size: u64) -> wgpu::Buffer {
-    device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("stylet view"),
-        size,
-        usage: usage | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    })
-}
-
 struct Targets {
     size: [u32; 2],
     resolved: wgpu::TextureView,
     color: wgpu::TextureView,
     depth: wgpu::TextureView,
     id: egui::TextureId,
-}
-
-struct Pipelines {
-    solid: wgpu::RenderPipeline,
-    line: wgpu::RenderPipeline,
-    surface_back: wgpu::RenderPipeline,
-    surface_front: wgpu::RenderPipeline,
 }
 
 struct Material {
@@ -204,7 +143,7 @@ impl Gpu {
     }
 
     /// Vertices and indices of each isodose surface.
-    pub fn set_shells(&mut self, shells: &[dose_desk::Shell]) {
+    pub fn set_shells(&mut self, shells: &[IsodoseShell]) {
         let device = &self.state.device;
         while self.shells.len() < shells.len() {
             self.shells.push(Shell {
@@ -311,7 +250,7 @@ impl Gpu {
         ((looks.len() + shells.len() + 1) * size_of::<SceneUniform>()) as u64
     }
 
-    /// The highest dose is innermost and comes first.
+    /// The highest dose is innermost and is drawn first.
     fn draw_shells(&self, pass: &mut wgpu::RenderPass<'_>, count: usize) {
         for shell in self.shells.iter().take(count).rev().filter(|s| s.indices.len > 0) {
             for pipeline in [&self.pipelines.surface_back, &self.pipelines.surface_front] {
@@ -429,110 +368,4 @@ fn material(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> Material {
         }],
     });
     Material { uniform, bind }
-}
-
-fn pipelines(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> Pipelines {
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("stylet scene"),
-        source: wgpu::ShaderSource::Wgsl(include_str!("scene.wgsl").into()),
-    });
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("stylet scene"),
-        bind_group_layouts: &[Some(layout)],
-        immediate_size: 0,
-    });
-    let mark = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4];
-    let surface = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
-    let solid = Kind {
-        stage: "mark",
-        stride: size_of::<MarkVertex>(),
-        attributes: &mark,
-        topology: wgpu::PrimitiveTopology::TriangleList,
-        cull: None,
-        opaque: true,
-    };
-    let front = Kind {
-        stage: "surface",
-        stride: size_of::<SurfaceVertex>(),
-        attributes: &surface,
-        topology: wgpu::PrimitiveTopology::TriangleList,
-        cull: Some(wgpu::Face::Back),
-        opaque: false,
-    };
-    let line = Kind {
-        topology: wgpu::PrimitiveTopology::LineList,
-        ..solid
-    };
-    let back = Kind {
-        cull: Some(wgpu::Face::Front),
-        ..front
-    };
-    Pipelines {
-        solid: pipeline(device, &layout, &module, &solid),
-        line: pipeline(device, &layout, &module, &line),
-        surface_back: pipeline(device, &layout, &module, &back),
-        surface_front: pipeline(device, &layout, &module, &front),
-    }
-}
-
-/// In what the four pipelines differ.
-#[derive(Clone, Copy)]
-struct Kind<'a> {
-    stage: &'static str,
-    stride: usize,
-    attributes: &'a [wgpu::VertexAttribute],
-    topology: wgpu::PrimitiveTopology,
-    cull: Option<wgpu::Face>,
-    opaque: bool,
-}
-
-fn pipeline(
-    device: &wgpu::Device,
-    layout: &wgpu::PipelineLayout,
-    module: &wgpu::ShaderModule,
-    kind: &Kind<'_>,
-) -> wgpu::RenderPipeline {
-    let blend = (!kind.opaque).then_some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(kind.stage),
-        layout: Some(layout),
-        vertex: wgpu::VertexState {
-            module,
-            entry_point: Some(&format!("{}_vertex", kind.stage)),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            buffers: &[Some(wgpu::VertexBufferLayout {
-                array_stride: kind.stride as u64,
-                step_mode: wgpu::VertexStepMode::Vertex,
-                attributes: kind.attributes,
-            })],
-        },
-        primitive: wgpu::PrimitiveState {
-            topology: kind.topology,
-            cull_mode: kind.cull,
-            ..Default::default()
-        },
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: DEPTH,
-            depth_write_enabled: Some(kind.opaque),
-            depth_compare: Some(wgpu::CompareFunction::Less),
-            stencil: wgpu::StencilState::default(),
-            bias: wgpu::DepthBiasState::default(),
-        }),
-        multisample: wgpu::MultisampleState {
-            count: SAMPLES,
-            ..Default::default()
-        },
-        fragment: Some(wgpu::FragmentState {
-            module,
-            entry_point: Some(&format!("{}_fragment", kind.stage)),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            targets: &[Some(wgpu::ColorTargetState {
-                format: COLOR,
-                blend,
-                write_mask: wgpu::ColorWrites::ALL,
-            })],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
 }

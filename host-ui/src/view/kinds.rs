@@ -1,6 +1,6 @@
 //! What the surfaces of a scene are of, and how each is drawn.
 
-use super::mesh;
+use crate::mesh;
 use crate::theme::Tokens;
 use egui::Color32;
 use stylet_host::link::SceneModel;

@@ -4,8 +4,8 @@ use super::camera::Camera;
 use super::kinds::{Kind, kinds};
 use super::scene3d::Look;
 use super::state::ViewState;
-use crate::dose_desk::{DosePicture, LEVELS};
-use crate::panel::Shown;
+use crate::dose_worker::{DoseResult, LEVELS};
+use crate::shown::Shown;
 use crate::theme::{IMAGE, Tokens};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Vec2};
 use stylet_base::format;
@@ -89,7 +89,7 @@ impl Legend<'_> {
     }
 
     /// From below upwards; a filled dot is a surface, a ring a mark that is only planned.
-    pub fn rows(&self, look: Look, dose: Option<&DosePicture>) {
+    pub fn rows(&self, look: Look, dose: Option<&DoseResult>) {
         let mut rows: Vec<(String, Color32, bool)> = Vec::new();
         let t = self.tokens;
         if let Some(scene) = &self.shown.scene {

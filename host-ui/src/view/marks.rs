@@ -49,7 +49,7 @@ fn single(v: [f64; 3]) -> V {
     V::new(v[0] as f32, v[1] as f32, v[2] as f32)
 }
 
-/// A unit vector, whatever came.
+/// A unit vector, also of a vector without direction.
 fn unit_or_z(v: V) -> V {
     v.try_normalize(1e-6).unwrap_or_else(V::z)
 }
@@ -203,7 +203,7 @@ impl Marks {
     }
 
     /// Lines each 10 mm under the body, and the three axes from a far corner, which is returned.
-    pub fn ground(&mut self, lower_m: [f64; 3], upper_m: [f64; 3]) -> [f32; 3] {
+    pub fn grid_and_axes(&mut self, lower_m: [f64; 3], upper_m: [f64; 3]) -> [f32; 3] {
         const STEP_M: f32 = 0.01;
         let (lower, upper) = (single(lower_m), single(upper_m));
         let y = lower.y - STEP_M;
@@ -327,7 +327,7 @@ mod tests {
         marks.path([0.0; 3], [0.0; 3]);
         marks.planned_seeds_thin([[0.0; 3]].into_iter(), [0.0; 3]);
         marks.path_thin([0.0; 3], [0.0; 3]);
-        marks.ground([-20.0; 3], [20.0; 3]);
+        marks.grid_and_axes([-20.0; 3], [20.0; 3]);
         marks.force([0.0; 3], [f64::NAN; 3]);
         marks.force([0.0; 3], [100.0, 0.0, 0.0]);
         marks.template([0.0; 3], [0.0; 3], 5e-3);

@@ -1,12 +1,14 @@
 //! What stands in the middle of the window: the three-dimensional picture, the slices, and the tools over them.
 
 use super::driver::DriverCost;
-use super::scene3d::{Preset, Scene3d};
-use super::slice::{Orientation, Plane, Slices};
+use super::orientation::Orientation;
+use super::scene3d::Scene3d;
+use super::slice::{ImageError, Plane, Slices};
 use super::state::ViewState;
-use crate::dose_desk::DosePicture;
-use crate::panel::{Action, Shown};
+use crate::action::{Action, Viewpoint};
+use crate::dose_worker::DoseResult;
 use crate::settings::Layout;
+use crate::shown::Shown;
 use crate::theme;
 use eframe::egui_wgpu::RenderState;
 use egui::{Pos2, Rect};
@@ -18,10 +20,13 @@ use stylet_host::link::{SceneModel, Snapshot};
 /// Between two pictures.
 const GAP: f32 = 2.0;
 
+/// The three-dimensional picture and the slices.
 pub struct Middle {
-    pub solid: Scene3d,
+    /// The three-dimensional picture.
+    pub(crate) solid: Scene3d,
     slices: Slices,
-    pub view: ViewState,
+    /// What all pictures share.
+    pub(crate) view: ViewState,
 }
 
 /// Where each picture stands.
@@ -31,7 +36,8 @@ struct Places {
 }
 
 impl Middle {
-    pub fn new(state: Option<RenderState>) -> Self {
+    /// Pictures on this graphics device; without one they are empty.
+    pub(crate) fn new(state: Option<RenderState>) -> Self {
         Self {
             solid: Scene3d::new(state.clone()),
             slices: Slices::new(state),
@@ -40,11 +46,12 @@ impl Middle {
     }
 
     /// Bytes sent to the graphics card since the window opened.
-    pub fn driver(&self) -> DriverCost {
+    pub(crate) fn driver(&self) -> DriverCost {
         self.solid.driver().plus(self.slices.driver())
     }
 
-    pub fn take(&mut self, shown: &Shown, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
+    /// Takes what is new since the last frame.
+    pub(crate) fn take(&mut self, shown: &Shown, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
         self.solid.take(shown, model, snapshot);
         self.slices.take(model, snapshot, &mut self.view);
         if let Some(tip) = shown
@@ -60,23 +67,25 @@ impl Middle {
         self.slices.plane(orientation, &self.view, rect)
     }
 
-    /// Greys for the slices, of the patient of the scene of this name.
-    pub fn show_image(&mut self, image: Image, scene: &str) -> Result<(), String> {
+    /// Shows an image in the slices, of the patient of the scene of this name.
+    pub(crate) fn show_image(&mut self, image: Image, scene: &str) -> Result<(), ImageError> {
         self.view.image = true;
         self.slices.show_image(image, scene)
     }
 
-    pub fn reset_view(&mut self, shown: &Shown) {
+    /// Shows all of the target again.
+    pub(crate) fn reset_view(&mut self, shown: &Shown) {
         self.solid.reset_view(shown);
         self.slices.reset_view(shown);
     }
 
-    pub fn middle_ui(
+    /// Draws the tools and the pictures of the layout.
+    pub(crate) fn middle_ui(
         &mut self,
         ui: &mut egui::Ui,
         layout: Layout,
         shown: &Shown,
-        dose: Option<&Arc<DosePicture>>,
+        dose: Option<&Arc<DoseResult>>,
     ) -> Vec<Action> {
         let mut actions = Vec::new();
         let tokens = theme::of(ui);
@@ -145,7 +154,7 @@ impl Middle {
         if ui.button("Reset view").on_hover_text("Key R").clicked() {
             actions.push(Action::ResetView);
         }
-        for (number, preset) in Preset::ALL.into_iter().enumerate() {
+        for (number, preset) in Viewpoint::ALL.into_iter().enumerate() {
             let text = format!("{}  {}", number + 1, preset.name());
             if ui.button(text).clicked() {
                 self.solid.look_from(preset, shown);

@@ -1,14 +1,14 @@
 //! What is drawn of the body: the deforming gland, the needle and the seeds, in three dimensions and in slices.
 
-pub mod camera;
+mod camera;
 mod driver;
 mod gpu;
 mod kinds;
 mod legend;
 mod marks;
-pub mod mesh;
 pub mod middle;
+pub mod orientation;
 mod pick;
-pub mod scene3d;
+mod scene3d;
 pub mod slice;
-pub mod state;
+mod state;

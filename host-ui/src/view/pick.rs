@@ -1,6 +1,6 @@
 //! Which place of a surface the pointer is on.
 
-use super::mesh::SurfaceVertex;
+use crate::mesh::SurfaceVertex;
 use nalgebra::Vector3;
 
 /// The nearest place where a ray meets a triangle, from in front or from behind (Möller and Trumbore).

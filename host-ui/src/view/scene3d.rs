@@ -6,18 +6,20 @@ use super::gpu::{Gpu, SceneUniform};
 use super::kinds::{kinds, surfaces};
 use super::legend::Legend;
 use super::marks::Marks;
-use super::mesh::Surface;
+use super::orientation::{Orientation, scene_from_patient};
 use super::pick::pick;
-use super::slice::{Orientation, scene_from_patient};
 use super::state::ViewState;
-use crate::dose_desk::DosePicture;
-use crate::panel::Shown;
+use crate::action::Viewpoint;
+use crate::dose_worker::DoseResult;
+use crate::mesh::Surface;
+use crate::shown::Shown;
 use crate::theme::{self, IMAGE, Tokens};
 use eframe::egui_wgpu::RenderState;
 use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense};
 use nalgebra::Vector3;
 use std::sync::Arc;
 use stylet_host::link::{SceneModel, Snapshot};
+use stylet_shm_schema::SceneId;
 
 const TURN_PER_POINT_RAD: f32 = 0.008;
 const LIGHT: [f32; 4] = [-0.48, 0.78, -0.40, 0.0];
@@ -51,37 +53,13 @@ impl Default for Look {
     }
 }
 
-/// Places to look from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Preset {
-    Oblique,
-    Perineum,
-    Side,
-    Above,
-    Needle,
-}
-
-impl Preset {
-    pub const ALL: [Self; 5] = [Self::Oblique, Self::Perineum, Self::Side, Self::Above, Self::Needle];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Oblique => "Oblique",
-            Self::Perineum => "From the perineum",
-            Self::Side => "From the side",
-            Self::Above => "From above",
-            Self::Needle => "Along the needle",
-        }
-    }
-}
-
 /// Everything a picture depends on: drawn again only when one of them changed.
 #[derive(Clone, PartialEq)]
 struct Key {
     camera: Camera,
     look: Look,
     view: ViewState,
-    scene: (u64, u64),
+    scene: SceneId,
     moved: u64,
     /// Of the needle at work, and of the plan of all.
     plan: (u64, u64, usize),
@@ -92,13 +70,16 @@ struct Key {
     dark: bool,
 }
 
+/// Scene, plans, template shown, dark colours.
+type PlanMarksKey = (SceneId, (u64, u64, usize), bool, bool);
+
 pub struct Scene3d {
     gpu: Option<Gpu>,
     pub camera: Camera,
     pub look: Look,
     model: Option<Arc<SceneModel>>,
-    /// Session and generation of the surface that the card has.
-    uploaded_scene: Option<(u64, u64)>,
+    /// Scene of the surface that the card has.
+    uploaded_scene: Option<SceneId>,
     uploaded_snapshot: Option<(u64, u64)>,
     surface: Surface,
     /// Rises whenever it moves.
@@ -106,8 +87,8 @@ pub struct Scene3d {
     /// The dose that the card has.
     shells: u64,
     drawn: Option<Key>,
-    /// What the marks of the plan were made for: scene, plans, template, colours.
-    fixed: Option<((u64, u64), (u64, u64, usize), bool, bool)>,
+    /// What the marks of the plan were made for.
+    fixed: Option<PlanMarksKey>,
     marks: Marks,
     /// Where the axes are drawn.
     corner_m: Option<[f32; 3]>,
@@ -145,17 +126,17 @@ impl Scene3d {
         }
     }
 
-    pub fn look_from(&mut self, preset: Preset, shown: &Shown) {
+    pub fn look_from(&mut self, viewpoint: Viewpoint, shown: &Shown) {
         self.reset_view(shown);
         let Some(scene) = &shown.scene else { return };
         let patient = scene_from_patient(scene);
         let along = |axis: Vector3<f64>| (patient * axis).map(|c| c as f32);
-        match preset {
-            Preset::Oblique => {}
-            Preset::Perineum => self.camera.look_along(along(Vector3::z())),
-            Preset::Side => self.camera.look_along(along(Vector3::x())),
-            Preset::Above => self.camera.look_along(along(-Vector3::y())),
-            Preset::Needle => {
+        match viewpoint {
+            Viewpoint::Oblique => {}
+            Viewpoint::Perineum => self.camera.look_along(along(Vector3::z())),
+            Viewpoint::Side => self.camera.look_along(along(Vector3::x())),
+            Viewpoint::Above => self.camera.look_along(along(-Vector3::y())),
+            Viewpoint::Needle => {
                 if let (Some(tip), Some(state)) = (shown.tip_m(), &shown.state) {
                     self.camera.target_m = tip.map(|c| c as f32);
                     self.camera.distance_m = NEEDLE_VIEW_M;
@@ -167,7 +148,7 @@ impl Scene3d {
 
     pub fn take(&mut self, shown: &Shown, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
         let Some(model) = model else { return };
-        let scene_key = (model.header.session_id, model.header.generation);
+        let scene_key = model.header.id();
         if self.uploaded_scene != Some(scene_key) {
             self.uploaded_scene = Some(scene_key);
             self.uploaded_snapshot = None;
@@ -201,7 +182,7 @@ impl Scene3d {
         &mut self,
         ui: &mut egui::Ui,
         rect: Rect,
-        (shown, dose): (&Shown, Option<&Arc<DosePicture>>),
+        (shown, dose): (&Shown, Option<&Arc<DoseResult>>),
         view: &mut ViewState,
     ) {
         let tokens = theme::of(ui);
@@ -225,7 +206,7 @@ impl Scene3d {
                 };
                 legend.landmarks(self.corner_m, view);
                 legend.scale_bar();
-                // Beside the slices these tell the levels already.
+                // Beside the slices, these show the levels already.
                 let alone = dose.filter(|_| rect.width() > ALONE);
                 legend.rows(self.look, alone.map(|d| &**d));
             }
@@ -266,7 +247,7 @@ impl Scene3d {
         &mut self,
         scale: f32,
         rect: Rect,
-        (shown, dose, view): (&Shown, Option<&Arc<DosePicture>>, &ViewState),
+        (shown, dose, view): (&Shown, Option<&Arc<DoseResult>>, &ViewState),
         tokens: &'static Tokens,
     ) -> Option<egui::TextureId> {
         let gpu = self.gpu.as_mut()?;
@@ -286,7 +267,7 @@ impl Scene3d {
             plan: (
                 shown.plan.map_or(0, |p| p.generation),
                 shown.planning.implant.as_ref().map_or(0, |i| i.revision),
-                shown.planning.course.begun(),
+                shown.planning.progress.begun(),
             ),
             tip: shown.tip_m().unwrap_or_default(),
             force: shown.state.map_or([0.0; 3], |s| s.force_on_hand_n),
@@ -370,8 +351,10 @@ fn tint(whole: SceneUniform, color: Color32, opacity: f32, section: [f32; 4]) ->
 /// What changes with the scene and the plan only. Gives the corner where the axes are drawn.
 fn collect_fixed(marks: &mut Marks, shown: &Shown, look: Look, tokens: &'static Tokens) -> Option<[f32; 3]> {
     marks.begin(tokens);
-    let corner = shown.scene.map(|scene| marks.ground(scene.lower_m, scene.upper_m));
-    let at_work = shown.planning.course.begun().checked_sub(1);
+    let corner = shown
+        .scene
+        .map(|scene| marks.grid_and_axes(scene.lower_m, scene.upper_m));
+    let at_work = shown.planning.progress.begun().checked_sub(1);
     for (number, needle) in shown
         .planning
         .implant

@@ -1,6 +1,6 @@
 //! What all pictures in the middle share: where they cut, what is measured, what is shown.
 
-use super::slice::Orientation;
+use super::orientation::Orientation;
 use nalgebra::Vector3;
 
 /// A distance between two places, taken by two clicks.
@@ -17,7 +17,7 @@ impl Measure {
         self.points_m.clear();
     }
 
-    /// A third place begins anew.
+    /// A third place begins a new distance.
     pub fn take(&mut self, point_m: Vector3<f64>) {
         if self.points_m.len() >= 2 {
             self.points_m.clear();
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_clicks_measure_and_a_third_begins_anew() {
+    fn two_clicks_measure_and_a_third_begins_a_new_distance() {
         let mut measure = Measure::default();
         measure.toggle();
         measure.take(Vector3::zeros());

@@ -1,30 +1,32 @@
-//! Calibration, one step at a time, with what the operator has to do.
+//! Calibration, one step at a time, with instructions for the operator.
 
 use core::ffi::c_int;
 
 use crate::libhd::ffi::{Api, Handle, calibration, parameter, style};
-use crate::libhd::session::{Trouble, last_error};
+use crate::libhd::session::{ConnectionError, last_error};
 
 /// Where calibration stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Calibration {
+    /// The device is calibrated.
     Done,
-    /// Something was updated; ask again.
+    /// The calibration was updated; check again.
     Updated,
-    /// The operator has to do this first.
-    Waits(&'static str),
+    /// The operator has to follow this instruction first.
+    NeedsOperator(&'static str),
 }
 
 const INKWELL: &str =
-    "The device is not calibrated. Put the stylus into the inkwell and leave it there until this message goes.";
+    "The device is not calibrated. Put the stylus into the inkwell and leave it there until this message disappears.";
 const NEUTRAL: &str = "The device is not calibrated. Hold the arm in its neutral pose, upper link level, lower link \
                        upright, stylus straight ahead, and press the button of the stylus.";
-const MOVE: &str = "The device is not calibrated. Move the arm slowly through its whole range until this message goes.";
+const MOVE: &str =
+    "The device is not calibrated. Move the arm slowly through its whole range until this message disappears.";
 
-/// Asks, and updates what can be updated. The scheduler does not run.
+/// Checks the calibration, and updates it if that is possible now. The scheduler must not run.
 ///
-/// A reset of the encoders takes the pose of that moment for the neutral one: so it waits for the button.
-pub fn step(api: &Api, handle: Handle) -> Result<Calibration, Trouble> {
+/// A reset of the encoders takes the present pose as the neutral one, so it waits for the button.
+pub fn step(api: &Api, handle: Handle) -> Result<Calibration, ConnectionError> {
     // SAFETY: no preconditions.
     let state = unsafe { (api.hdCheckCalibration)() };
     check(api, "hdCheckCalibration")?;
@@ -42,20 +44,20 @@ pub fn step(api: &Api, handle: Handle) -> Result<Calibration, Trouble> {
         check(api, "hdUpdateCalibration")?;
         return Ok(Calibration::Updated);
     }
-    Ok(Calibration::Waits(match style {
+    Ok(Calibration::NeedsOperator(match style {
         style::INKWELL => INKWELL,
         style::AUTO => MOVE,
         _ => NEUTRAL,
     }))
 }
 
-/// The inkwell is the surest; a device that names none is reset, as the Premium is.
+/// The inkwell is the most reliable style; a device that reports none is reset, as the Premium is.
 fn chosen_style(api: &Api) -> u32 {
     let mut styles: c_int = 0;
     // SAFETY: one number, as the interface states.
     unsafe { (api.hdGetIntegerv)(parameter::CALIBRATION_STYLE, &mut styles) };
     if last_error(api) != 0 || styles == 0 {
-        // Newer libraries tell it here.
+        // Newer libraries report it here.
         // SAFETY: no preconditions.
         styles = unsafe { (api.hdCheckCalibrationStyle)() } as c_int;
         let _ = last_error(api);
@@ -67,7 +69,7 @@ fn chosen_style(api: &Api) -> u32 {
         .unwrap_or(style::ENCODER_RESET)
 }
 
-fn button_pressed(api: &Api, handle: Handle) -> Result<bool, Trouble> {
+fn button_pressed(api: &Api, handle: Handle) -> Result<bool, ConnectionError> {
     let mut buttons: c_int = 0;
     // SAFETY: the handle is the driver's own; one number, as the interface states.
     unsafe {
@@ -79,9 +81,9 @@ fn button_pressed(api: &Api, handle: Handle) -> Result<bool, Trouble> {
     Ok(buttons != 0)
 }
 
-fn check(api: &Api, call: &'static str) -> Result<(), Trouble> {
+fn check(api: &Api, call: &'static str) -> Result<(), ConnectionError> {
     match last_error(api) {
         0 => Ok(()),
-        code => Err(Trouble::Call(call, code)),
+        code => Err(ConnectionError::Call(call, code)),
     }
 }

@@ -1,78 +1,70 @@
 //! A Phantom as a [`Device`]: wait-free ends for the force loop.
 
-use core::fmt;
 use core::time::Duration;
 use std::path::PathBuf;
 use std::sync::mpsc;
 
 use crate::device::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
+use crate::libhd::connector::{Connector, ConnectorThread, Report};
 use crate::libhd::exchange::{Command, Readings};
 use crate::libhd::ffi::{Api, LoadError};
 use crate::libhd::frame::Placement;
-use crate::libhd::keeper::{Keeper, KeeperThread, Tell};
 use crate::libhd::servo::{Arm, Inner, Servo, State};
-use crate::libhd::session::{Description, Trouble};
+use crate::libhd::session::{ConnectionError, Description};
 
-/// Which device, and where it stands.
+/// Which device to open, and its place in the world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhantomConfig {
     /// The driver's library; `None` tries its usual names.
     pub library: Option<PathBuf>,
     /// The device's name in the driver's set-up; `None` takes the default one.
     pub name: Option<String>,
+    /// Place of the device in the world.
     pub placement: Placement,
-    /// Of the driver's servo loop: 500, 1000 or 2000 on a parallel port. See the module's documentation on delay.
+    /// Rate of the driver's servo loop, Hz: 500, 1000 or 2000 on a parallel port. The module's documentation explains the
+    /// delay that follows from it.
     pub servo_hz: u32,
 }
 
-/// Why there is no device.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Why a Phantom could not be opened; the text says what to do.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum OpenError {
-    Load(LoadError),
-    Trouble(Trouble),
+    /// The driver's library cannot be loaded.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// There is no connection to a device.
+    #[error(transparent)]
+    Connection(#[from] ConnectionError),
     /// The driver does not return from initialisation.
+    #[error("the driver does not answer: check the device's power and cable, then try again")]
     NoAnswer,
 }
 
-impl fmt::Display for OpenError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Load(why) => why.fmt(f),
-            Self::Trouble(why) => why.fmt(f),
-            Self::NoAnswer => {
-                f.write_str("the driver does not answer: check the device's power and cable, then try again")
-            }
-        }
-    }
-}
-
-impl core::error::Error for OpenError {}
-
 const OPEN_LIMIT: Duration = Duration::from_secs(15);
 
-/// See the module. Dropped, it leaves zero force and a disabled device.
+/// A Phantom; see the module [`libhd`](crate::libhd). Dropping it leaves zero force and a disabled device.
 pub struct Phantom {
     description: Description,
     servo: &'static Servo,
     samples: triple_buffer::Output<Option<Sample>>,
     commands: triple_buffer::Input<Command>,
     number: u64,
-    _keeper: KeeperThread,
+    _connector: ConnectorThread,
 }
 
 impl Phantom {
     /// Loads the driver and finds the device. `arm` runs once in each servo thread, before its first tick is served;
-    /// `tell` gets, from a thread of normal priority, what the operator has to know or do.
+    /// `report` receives messages for the operator, from a thread of normal priority.
     ///
-    /// A device that is not calibrated is opened: it reads [`DeviceFault::NotCalibrated`] until the operator has done
-    /// what `tell` said.
-    pub fn open(config: PhantomConfig, arm: Arm, tell: Tell) -> Result<Self, OpenError> {
-        let api = Api::load(config.library.as_deref()).map_err(OpenError::Load)?;
-        Self::open_with(api, config, arm, tell)
+    /// A device that is not calibrated is opened: it reads [`DeviceFault::NotCalibrated`] until the operator has followed
+    /// the reported instruction.
+    pub fn open(config: PhantomConfig, arm: Arm, report: Report) -> Result<Self, OpenError> {
+        let api = Api::load(config.library.as_deref())?;
+        Self::open_with(api, config, arm, report)
     }
 
-    /// As [`open`](Self::open), with a library that is loaded already.
-    pub fn open_with(api: Api, config: PhantomConfig, arm: Arm, tell: Tell) -> Result<Self, OpenError> {
+    /// As [`open`](Self::open), with a library that is already loaded.
+    pub fn open_with(api: Api, config: PhantomConfig, arm: Arm, report: Report) -> Result<Self, OpenError> {
         let (sample_in, samples) = triple_buffer::triple_buffer(&None);
         let (commands, command_out) = triple_buffer::triple_buffer(&Command::default());
         // Never freed, see `Servo`.
@@ -86,9 +78,9 @@ impl Phantom {
             state: State::default(),
         })));
         let (first, opened) = mpsc::channel();
-        let keeper = Keeper::new(api, servo, config, tell).spawn(first);
+        let connector = Connector::new(api, servo, config, report).spawn(first);
         let description = match opened.recv_timeout(OPEN_LIMIT) {
-            Ok(description) => description.map_err(OpenError::Trouble)?,
+            Ok(description) => description?,
             Err(_) => return Err(OpenError::NoAnswer),
         };
         Ok(Self {
@@ -97,15 +89,16 @@ impl Phantom {
             samples,
             commands,
             number: 0,
-            _keeper: keeper,
+            _connector: connector,
         })
     }
 
+    /// Properties of the device at the first connection.
     pub fn description(&self) -> &Description {
         &self.description
     }
 
-    /// What the driver says beside the pose.
+    /// State of the driver beside the pose.
     pub fn readings(&self) -> Readings {
         self.servo.shared.readings()
     }
@@ -136,7 +129,7 @@ impl Device for Phantom {
             self.command(Wrench::zero());
             return Err(DeviceFault::NonFiniteWrench);
         }
-        // While there is a fault, which `read` tells, the servo thread exerts nothing.
+        // While there is a fault, which `read` reports, the servo thread exerts no force.
         self.command(wrench.within(&self.description.info));
         Ok(())
     }

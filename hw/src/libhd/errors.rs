@@ -2,49 +2,53 @@
 
 use crate::device::DeviceFault;
 
-/// What an error asks of the servo loop.
+/// How the servo loop responds to an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Severity {
-    /// The force is off until the error has stayed away for a while; the connection holds.
+pub enum Response {
+    /// Turn the force off until the error has not returned for a while; the connection holds.
     Pause,
-    /// The connection is gone: stop, disable, initialise anew.
+    /// The connection is lost: stop, disable, initialise again.
     Reconnect,
 }
 
-/// A known error.
+/// An error of the interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Known {
+pub struct KnownError {
+    /// Its number.
     pub code: u32,
+    /// Its name in the vendor's documentation.
     pub name: &'static str,
+    /// The fault that the force loop sees.
     pub fault: DeviceFault,
-    pub severity: Severity,
+    /// How the servo loop responds.
+    pub response: Response,
 }
 
-const fn pause(code: u32, name: &'static str, fault: DeviceFault) -> Known {
-    let severity = Severity::Pause;
-    Known {
+const fn pause(code: u32, name: &'static str, fault: DeviceFault) -> KnownError {
+    KnownError {
         code,
         name,
         fault,
-        severity,
+        response: Response::Pause,
     }
 }
 
-const fn reconnect(code: u32, name: &'static str, fault: DeviceFault) -> Known {
-    let severity = Severity::Reconnect;
-    Known {
+const fn reconnect(code: u32, name: &'static str, fault: DeviceFault) -> KnownError {
+    KnownError {
         code,
         name,
         fault,
-        severity,
+        response: Response::Reconnect,
     }
 }
 
+/// No error.
 pub const SUCCESS: u32 = 0;
+/// The device is in use.
 pub const DEVICE_ALREADY_INITIATED: u32 = 0x0301;
 
 /// Every error of the interface but success.
-pub const KNOWN: &[Known] = &[
+pub const KNOWN: &[KnownError] = &[
     pause(0x0100, "HD_INVALID_ENUM", DeviceFault::Driver),
     pause(0x0101, "HD_INVALID_VALUE", DeviceFault::Driver),
     pause(0x0102, "HD_INVALID_OPERATION", DeviceFault::Driver),
@@ -72,25 +76,25 @@ pub const KNOWN: &[Known] = &[
     reconnect(0x0600, "HD_INVALID_LICENSE", DeviceFault::Driver),
 ];
 
-/// The entry of `code`; a number that the interface does not have pauses the force as a driver's error.
-pub fn known(code: u32) -> Known {
+/// The entry of `code`; an unknown number pauses the force as a driver's error.
+pub fn known(code: u32) -> KnownError {
     let found = KNOWN.iter().find(|k| k.code == code);
     found
         .copied()
         .unwrap_or(pause(code, "unknown error", DeviceFault::Driver))
 }
 
-/// What a person can do about it.
+/// What the operator can do about the error.
 pub fn cure(code: u32) -> &'static str {
     match code {
         0x0200 => "let the motors cool for some minutes; lower the force scale",
-        0x0201..=0x0204 => "move slower and re-arm; lower the force limits if it comes back",
-        0x0104 | 0x0300 | 0x0302 => "check power and cable of the device; it is taken up again by itself",
+        0x0201..=0x0204 => "move slower and re-arm; lower the force limits if it returns",
+        0x0104 | 0x0300 | 0x0302 => "check power and cable of the device; it is reconnected automatically",
         0x0303 => "check the parallel port: mode EPP in the BIOS, and that no other program uses it",
-        0x0301 => "another program uses the device; end it",
+        0x0301 => "another program uses the device; close it",
         0x0304 => "the driver has no timer; check that its kernel interface is loaded",
         0x0600 => "install the OpenHaptics licence of this PC",
-        _ => "end and start rt-core anew; if it comes back, report it with this number",
+        _ => "restart rt-core; if the error returns, report it with this number",
     }
 }
 
@@ -99,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_error_has_one_entry_and_only_a_lost_connection_asks_for_a_new_one() {
+    fn every_error_has_one_entry_and_only_a_lost_connection_reconnects() {
         for (i, k) in KNOWN.iter().enumerate() {
             assert!(
                 KNOWN[i + 1..]
@@ -109,8 +113,8 @@ mod tests {
             assert_eq!(known(k.code), *k);
         }
         assert_eq!(KNOWN.len(), 21);
-        assert_eq!(known(0x0302).severity, Severity::Reconnect);
+        assert_eq!(known(0x0302).response, Response::Reconnect);
         assert_eq!(known(0x0200).fault, DeviceFault::Overheated);
-        assert_eq!(known(0xBEEF).severity, Severity::Pause);
+        assert_eq!(known(0xBEEF).response, Response::Pause);
     }
 }

@@ -1,9 +1,12 @@
-//! What the servo thread, the force loop and the keeper hand each other without waiting.
+//! State that the servo thread, the force loop and the connector thread share without waiting.
+//!
+//! All atomics of the back end and their orderings stand here, except the two flags that guard a thread's entry and end
+//! ([`servo`](super::servo), [`connector`](super::connector)).
 
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
 use crate::device::{DeviceFault, Wrench};
-use crate::libhd::ffi::INVALID_HANDLE;
+use crate::libhd::ffi::{Handle, INVALID_HANDLE};
 
 /// The newest wrench, and how many have been written.
 #[derive(Debug, Clone, Copy, Default)]
@@ -12,30 +15,38 @@ pub struct Command {
     pub number: u64,
 }
 
-/// Written by one side each, as named; every value stands for itself, so the order between them does not matter
-/// but where a comment says so.
+/// The device that a callback serves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Served {
+    pub handle: Handle,
+    /// The device has motors in its gimbal.
+    pub torques: bool,
+}
+
+/// Each field has one writer, which its comment names, unless it says otherwise.
 #[derive(Debug)]
 pub struct Shared {
-    /// Keeper: the device that callbacks serve.
-    pub handle: AtomicU32,
-    /// Keeper: the device has motors in its gimbal.
-    pub torques: AtomicBool,
-    /// Keeper: every callback writes zero force.
-    pub release: AtomicBool,
-    /// Keeper sets it before it starts a scheduler; the first callback takes it and arms its thread.
-    pub arm: AtomicBool,
+    /// Connector: the device that callbacks serve, published by `release`.
+    handle: AtomicU32,
+    /// Connector: as `handle`.
+    torques: AtomicBool,
+    /// Connector: every callback writes zero force.
+    release: AtomicBool,
+    /// The connector sets it before a scheduler starts; the first callback clears it and arms its thread.
+    arm: AtomicBool,
     /// Servo: callbacks so far.
-    pub calls: AtomicU64,
-    /// Servo: callbacks that wrote zero because of `release`.
-    pub released: AtomicU64,
-    /// Servo, and keeper while no callback runs: a [`DeviceFault`] by number, 0 for none.
+    calls: AtomicU64,
+    /// Servo: callbacks that wrote zero because of `release` or `lost`.
+    released: AtomicU64,
+    /// Servo, and the connector while no callback runs: a [`DeviceFault`] by number, 0 for none.
     fault: AtomicU32,
-    /// Servo: the connection is lost; taken by the keeper.
-    pub lost: AtomicBool,
-    /// Servo: the driver's last error, 0 for none, and how many there were.
-    pub error: AtomicU32,
-    pub errors: AtomicU64,
-    /// Servo: `f64` bits.
+    /// Servo sets it when the connection is lost, and the connector when the servo loop is silent; the connector clears it.
+    lost: AtomicBool,
+    /// Servo: the driver's last error, 0 for none.
+    error: AtomicU32,
+    /// Servo: number of errors.
+    errors: AtomicU64,
+    /// Servo: `f64` bits, as the two that follow.
     temperature: AtomicU64,
     speed: AtomicU64,
     worst_callback: AtomicU64,
@@ -61,58 +72,165 @@ impl Default for Shared {
     }
 }
 
-/// What the driver says of itself beside the pose.
+/// State of the driver beside the pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Readings {
+    /// Servo callbacks so far.
     pub calls: u64,
+    /// Present fault.
     pub fault: Option<DeviceFault>,
     /// The driver's last error by number, 0 for none.
     pub error: u32,
+    /// Number of errors that the driver reported so far.
     pub errors: u64,
-    /// Of the warmest motor, 0 to 1, as the driver predicts it.
+    /// Temperature of the warmest motor as a share of its limit, 0 to 1, as the driver predicts it.
     pub temperature: f64,
-    /// The driver's own estimate, smoothed.
+    /// Speed of the tip, m/s: the driver's own smoothed estimate.
     pub speed_m_per_s: f64,
-    /// The longest that a callback ended after its servo tick began.
+    /// Longest time from the start of a servo tick to the end of its callback, s.
     pub worst_callback_s: f64,
 }
 
-// SYNC: relaxed throughout; no other memory is handed over through these values. Samples and commands go through
-// triple buffers, which pair release with acquire by themselves.
-const ORDER: Ordering = Ordering::Relaxed;
-
+/// Calls of the connector thread.
 impl Shared {
-    pub fn fault(&self) -> Option<DeviceFault> {
-        let code = self.fault.load(ORDER);
-        FAULTS.iter().copied().find(|f| f.code() == code)
+    /// Lets the next callback arm its thread and serve `served`.
+    pub fn serve(&self, served: Served) {
+        // SYNC: relaxed; the release store below publishes these four.
+        self.torques.store(served.torques, Ordering::Relaxed);
+        self.handle.store(served.handle, Ordering::Relaxed);
+        self.lost.store(false, Ordering::Relaxed);
+        self.arm.store(true, Ordering::Relaxed);
+        // SYNC: release pairs with the acquire load in `served`: a callback that may exert a force sees the four above.
+        self.release.store(false, Ordering::Release);
     }
 
-    pub fn set_fault(&self, fault: Option<DeviceFault>) {
-        self.fault.store(fault.map_or(0, DeviceFault::code), ORDER);
+    /// Makes every callback that begins after this write zero force.
+    pub fn request_release(&self) {
+        // SYNC: relaxed; the flag carries nothing with it. `released` confirms it.
+        self.release.store(true, Ordering::Relaxed);
     }
 
-    pub fn set_temperature(&self, share: f64) {
-        self.temperature.store(share.to_bits(), ORDER);
+    /// Number of callbacks that wrote zero force because of `release` or `lost`.
+    pub fn released(&self) -> u64 {
+        // SYNC: acquire pairs with the release in `count_released`: the driver has the zero of every counted callback.
+        self.released.load(Ordering::Acquire)
     }
 
-    pub fn set_speed_m_per_s(&self, speed: f64) {
-        self.speed.store(speed.to_bits(), ORDER);
+    /// Number of callbacks that have begun.
+    pub fn calls(&self) -> u64 {
+        // SYNC: relaxed; only a change of the number is looked for. Its partner is `count_call`.
+        self.calls.load(Ordering::Relaxed)
     }
 
-    pub fn note_callback_s(&self, time_s: f64) {
-        // The bits of positive numbers are in the order of the numbers.
-        if time_s > 0.0 {
-            self.worst_callback.fetch_max(time_s.to_bits(), ORDER);
+    /// The driver's error behind a lost connection, if the connection is lost.
+    pub fn lost(&self) -> Option<u32> {
+        // SYNC: acquire pairs with the release in `set_lost`: the error that caused the loss is visible.
+        self.lost
+            .load(Ordering::Acquire)
+            .then(|| self.error.load(Ordering::Relaxed))
+    }
+}
+
+/// Calls of the servo thread.
+impl Shared {
+    /// Counts a callback; returns how many came before.
+    pub fn count_call(&self) -> u64 {
+        // SYNC: relaxed; a counter. Its partner is `calls`.
+        self.calls.fetch_add(1, Ordering::Relaxed)
+    }
+
+    /// The device to serve, or `None` when this callback has to write zero.
+    pub fn served(&self) -> Option<Served> {
+        // SYNC: acquire pairs with the release store in `serve`; it comes before every other load of this function and
+        // before `take_arm`.
+        let release = self.release.load(Ordering::Acquire);
+        // SYNC: relaxed; set by this thread, or by the connector, which then needs no more than that it arrives.
+        let lost = self.lost.load(Ordering::Relaxed);
+        (!release && !lost).then(|| self.last_served())
+    }
+
+    /// The device that was served last, whether it is released or not.
+    pub fn last_served(&self) -> Served {
+        // SYNC: relaxed; `served` has acquired them, and a callback that only writes zero may see the device before.
+        Served {
+            handle: self.handle.load(Ordering::Relaxed),
+            torques: self.torques.load(Ordering::Relaxed),
         }
     }
 
+    /// True once after each `serve`.
+    pub fn take_arm(&self) -> bool {
+        // SYNC: relaxed; a callback that saw `release` cleared (acquire in `served`) sees this flag set.
+        self.arm.swap(false, Ordering::Relaxed)
+    }
+
+    /// Counts a callback whose zero force the driver has.
+    pub fn count_released(&self) {
+        // SYNC: release pairs with the acquire in `released`.
+        self.released.fetch_add(1, Ordering::Release);
+    }
+
+    /// Notes an error of the driver.
+    pub fn note_error(&self, code: u32) {
+        // SYNC: relaxed; `set_lost` publishes the code where that matters, the count is for display.
+        self.error.store(code, Ordering::Relaxed);
+        self.errors.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Notes the temperature of the warmest motor, 0 to 1.
+    pub fn note_temperature(&self, share: f64) {
+        // SYNC: relaxed; one value for display. Its partner is `readings`.
+        self.temperature.store(share.to_bits(), Ordering::Relaxed);
+    }
+
+    /// Notes the driver's estimate of the speed.
+    pub fn note_speed_m_per_s(&self, speed: f64) {
+        // SYNC: relaxed; one value for display. Its partner is `readings`.
+        self.speed.store(speed.to_bits(), Ordering::Relaxed);
+    }
+
+    /// Notes when a callback ended, counted from the start of its servo tick.
+    pub fn note_callback_s(&self, time_s: f64) {
+        if time_s > 0.0 {
+            // The bits of positive numbers are in the order of the numbers.
+            // SYNC: relaxed; one value for display. Its partner is `readings`.
+            self.worst_callback.fetch_max(time_s.to_bits(), Ordering::Relaxed);
+        }
+    }
+}
+
+/// Calls of more than one thread.
+impl Shared {
+    /// Declares the connection lost. Servo thread, or the connector when the servo loop is silent.
+    pub fn set_lost(&self) {
+        // SYNC: release pairs with the acquire in `lost`.
+        self.lost.store(true, Ordering::Release);
+    }
+
+    /// Present fault, for the force loop and the connector.
+    pub fn fault(&self) -> Option<DeviceFault> {
+        // SYNC: acquire pairs with the release in `set_fault`: without a fault, the sample taken before is visible.
+        match self.fault.load(Ordering::Acquire) {
+            0 => None,
+            code => Some(DeviceFault::try_from(code).unwrap_or(DeviceFault::Driver)),
+        }
+    }
+
+    /// Sets or clears the fault. Servo thread, or the connector while no callback runs.
+    pub fn set_fault(&self, fault: Option<DeviceFault>) {
+        // SYNC: release pairs with the acquire in `fault`.
+        self.fault.store(fault.map_or(0, DeviceFault::code), Ordering::Release);
+    }
+
+    /// Everything for display. The values may stem from different ticks.
     pub fn readings(&self) -> Readings {
-        let number = |bits: &AtomicU64| f64::from_bits(bits.load(ORDER));
+        // SYNC: relaxed; every value stands for itself. The partners are the `note_` functions.
+        let number = |bits: &AtomicU64| f64::from_bits(bits.load(Ordering::Relaxed));
         Readings {
-            calls: self.calls.load(ORDER),
+            calls: self.calls(),
             fault: self.fault(),
-            error: self.error.load(ORDER),
-            errors: self.errors.load(ORDER),
+            error: self.error.load(Ordering::Relaxed),
+            errors: self.errors.load(Ordering::Relaxed),
             temperature: number(&self.temperature),
             speed_m_per_s: number(&self.speed),
             worst_callback_s: number(&self.worst_callback),
@@ -120,14 +238,41 @@ impl Shared {
     }
 }
 
-const FAULTS: [DeviceFault; 9] = [
-    DeviceFault::NotConnected,
-    DeviceFault::TimedOut,
-    DeviceFault::NonFiniteSample,
-    DeviceFault::NonFiniteWrench,
-    DeviceFault::InvalidPeriod,
-    DeviceFault::NotCalibrated,
-    DeviceFault::Overheated,
-    DeviceFault::SafetyStop,
-    DeviceFault::Driver,
-];
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_fault_survives_the_way_through_its_number() {
+        let shared = Shared::default();
+        assert_eq!(shared.fault(), Some(DeviceFault::NotConnected));
+        for code in 1..=9 {
+            let fault = DeviceFault::try_from(code).expect("numbers 1 to 9 are faults");
+            shared.set_fault(Some(fault));
+            assert_eq!(shared.fault(), Some(fault));
+        }
+        shared.set_fault(None);
+        assert_eq!(shared.fault(), None);
+        assert!(DeviceFault::try_from(0).is_err() && DeviceFault::try_from(10).is_err());
+    }
+
+    #[test]
+    fn a_callback_serves_only_between_serve_and_release_or_loss() {
+        let shared = Shared::default();
+        let served = Served {
+            handle: 7,
+            torques: true,
+        };
+        assert_eq!((shared.served(), shared.take_arm()), (None, false));
+        shared.serve(served);
+        assert_eq!(shared.served(), Some(served));
+        assert_eq!((shared.take_arm(), shared.take_arm()), (true, false), "armed once");
+        shared.note_error(0x0302);
+        shared.set_lost();
+        assert_eq!((shared.served(), shared.lost()), (None, Some(0x0302)));
+        shared.serve(served);
+        assert_eq!((shared.served(), shared.lost()), (Some(served), None));
+        shared.request_release();
+        assert_eq!((shared.served(), shared.last_served()), (None, served));
+    }
+}

@@ -11,31 +11,39 @@ use std::path::{Path, PathBuf};
 
 use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_LAZY};
 
-/// A device; [`INVALID_HANDLE`] for none.
+/// Handle of a device; [`INVALID_HANDLE`] for none.
 pub type Handle = u32;
 /// A number of [`parameter`], [`capability`], [`calibration`] or [`style`].
 pub type Enum = u32;
-/// What the scheduler gives for a callback.
+/// The scheduler's handle of a callback.
 pub type Schedule = c_ulong;
+/// A function that the scheduler runs each servo tick with its context; returns [`CALLBACK_DONE`] or [`CALLBACK_CONTINUE`].
 pub type Callback = unsafe extern "system" fn(*mut c_void) -> u32;
 
 /// One entry of the driver's error stack; returned by value.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ErrorInfo {
+    /// Number of the error, 0 for none.
     pub code: u32,
+    /// The driver's internal number.
     pub internal: c_int,
+    /// The device that caused it.
     pub device: Handle,
 }
 
+/// No device.
 pub const INVALID_HANDLE: Handle = 0xFFFF_FFFF;
+/// The scheduler removes the callback.
 pub const CALLBACK_DONE: u32 = 0;
+/// The scheduler calls again in the next tick.
 pub const CALLBACK_CONTINUE: u32 = 1;
+/// `hdWaitForCompletion` returns at once.
 pub const WAIT_CHECK_STATUS: u32 = 0;
 /// Order among the callbacks of one tick, not a thread priority.
 pub const PRIORITY_MAX: c_ushort = 0xFFFF;
 
-/// What can be read and set; behind each, count and unit.
+/// Parameters that can be read and set: count and unit of each.
 pub mod parameter {
     /// 1 int, a bit mask.
     pub const BUTTONS: u32 = 0x2000;
@@ -47,10 +55,13 @@ pub mod parameter {
     pub const TRANSFORM: u32 = 0x2052;
     /// 3, rad: right +, up -, clockwise +.
     pub const GIMBAL_ANGLES: u32 = 0x2150;
-    /// Strings.
+    /// String: version of OpenHaptics.
     pub const VERSION: u32 = 0x2500;
+    /// String: model of the device.
     pub const MODEL: u32 = 0x2501;
+    /// String: version of the device driver.
     pub const DRIVER_VERSION: u32 = 0x2502;
+    /// String: serial number.
     pub const SERIAL: u32 = 0x2504;
     /// 1 int; 6 means torques.
     pub const OUTPUT_DOF: u32 = 0x2554;
@@ -68,23 +79,37 @@ pub mod parameter {
     pub const GIMBAL_TORQUE: u32 = 0x2704;
 }
 
+/// Capabilities that can be enabled.
 pub mod capability {
+    /// Forces.
     pub const FORCE_OUTPUT: u32 = 0x4000;
+    /// The driver clamps forces to the maximum of the device.
     pub const MAX_FORCE_CLAMPING: u32 = 0x4001;
+    /// The driver raises the force gradually after the start.
     pub const FORCE_RAMPING: u32 = 0x4002;
+    /// The driver turns forces off that exceed the limit of the software.
     pub const SOFTWARE_FORCE_LIMIT: u32 = 0x4003;
+    /// All that a session enables, in this order.
+    pub const AT_START: [u32; 4] = [FORCE_OUTPUT, MAX_FORCE_CLAMPING, FORCE_RAMPING, SOFTWARE_FORCE_LIMIT];
 }
 
+/// Answers of `hdCheckCalibration`.
 pub mod calibration {
+    /// The device is calibrated.
     pub const OK: u32 = 0x5000;
+    /// `hdUpdateCalibration` completes the calibration.
     pub const NEEDS_UPDATE: u32 = 0x5001;
+    /// The operator has to act first.
     pub const NEEDS_MANUAL_INPUT: u32 = 0x5002;
 }
 
 /// How a device is calibrated, a bit each.
 pub mod style {
+    /// The present pose becomes the neutral one.
     pub const ENCODER_RESET: u32 = 1;
+    /// The driver calibrates while the arm moves.
     pub const AUTO: u32 = 2;
+    /// The stylus stands in the inkwell.
     pub const INKWELL: u32 = 4;
 }
 
@@ -93,17 +118,20 @@ macro_rules! functions {
         /// Every function of the library.
         #[derive(Clone, Copy)]
         pub struct Api {
-            $(pub $name: unsafe extern "system" fn($($argument),*) $(-> $result)?,)*
+            $(
+                #[doc = concat!("`", stringify!($name), "` of the HDAPI reference.")]
+                pub $name: unsafe extern "system" fn($($argument),*) $(-> $result)?,
+            )*
         }
 
-        /// Their names, in the order of [`Api`].
+        /// Names of the functions, in the order of [`Api`].
         pub const FUNCTIONS: &[&str] = &[$(stringify!($name)),*];
 
         impl Api {
-            /// Every name that the library lacks, when it lacks one.
+            /// All functions, or every name that the library lacks.
             fn from_library(library: &Library) -> Result<Self, Vec<&'static str>> {
                 let missing: Vec<_> = FUNCTIONS.iter().copied().filter(|name| {
-                    // SAFETY: only the presence of the symbol is asked for; it is not used.
+                    // SAFETY: only the presence of the symbol is checked; it is not used.
                     unsafe { library.get::<*mut c_void>(name.as_bytes()) }.is_err()
                 }).collect();
                 $(
@@ -163,21 +191,26 @@ functions! {
 /// Names under which the library is installed, in the order in which they are tried.
 pub const LIBRARY_NAMES: &[&str] = &["libHD.so", "libHD.so.3.0", "libHD.so.3.4"];
 
-/// Why no library could be loaded: each name that was tried, with what the loader said.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LoadError(pub Vec<(PathBuf, String)>);
+/// Why no library could be loaded: each name that was tried, with the reason.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("OpenHaptics (libHD.so) cannot be loaded{}", attempts(.0))]
+pub struct LoadError(pub Vec<(PathBuf, LoadFailure)>);
 
-impl core::fmt::Display for LoadError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("OpenHaptics (libHD.so) cannot be loaded")?;
-        for (name, why) in &self.0 {
-            write!(f, "\n  {}: {why}", name.display())?;
-        }
-        Ok(())
-    }
+/// Why one library could not be loaded.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LoadFailure {
+    /// The message of the dynamic loader, unaltered.
+    #[error("{0}")]
+    Loader(String),
+    /// The library lacks these functions.
+    #[error("not OpenHaptics 3: it lacks {}", .0.join(", "))]
+    Incomplete(Vec<&'static str>),
 }
 
-impl core::error::Error for LoadError {}
+fn attempts(tried: &[(PathBuf, LoadFailure)]) -> String {
+    let line = |(name, why): &(PathBuf, LoadFailure)| format!("\n  {}: {why}", name.display());
+    tried.iter().map(line).collect()
+}
 
 impl Api {
     /// Loads the library at `path`, or the first of [`LIBRARY_NAMES`] that can be loaded, and never closes it.
@@ -196,18 +229,18 @@ impl Api {
         Err(LoadError(tried))
     }
 
-    fn load_one(name: &Path) -> Result<Self, String> {
+    fn load_one(name: &Path) -> Result<Self, LoadFailure> {
         // SAFETY: runs the constructors of a library that the operator installed for this purpose.
-        let library = unsafe { Library::open(Some(name), RTLD_LAZY | RTLD_GLOBAL) }.map_err(|e| spoken(&e))?;
-        let api = Self::from_library(&library)
-            .map_err(|missing| format!("not OpenHaptics 3: it lacks {}", missing.join(", ")));
+        let library = unsafe { Library::open(Some(name), RTLD_LAZY | RTLD_GLOBAL) }
+            .map_err(|e| LoadFailure::Loader(message(&e)))?;
+        let api = Self::from_library(&library).map_err(LoadFailure::Incomplete);
         core::mem::forget(library);
         api
     }
 }
 
-/// The loader's own words.
-fn spoken(error: &libloading::Error) -> String {
+/// The message of the dynamic loader.
+fn message(error: &libloading::Error) -> String {
     match error {
         libloading::Error::DlOpen { desc } => format!("{desc:?}").trim_matches('"').to_owned(),
         other => other.to_string(),

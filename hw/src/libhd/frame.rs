@@ -1,13 +1,15 @@
-//! Where the device stands in the world, and which torque of its gimbal joints makes a torque in space.
+//! Place of the device in the world, and the torques of its gimbal joints that make a torque in space.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::convert::pose_from_column_major_mm;
 
-/// The device's frame in the world. The driver's frame has x to the operator's right, y up, z towards the operator.
+/// Pose of the device's frame in the world. The driver's frame has x to the operator's right, y up, z towards the operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
+    /// Origin of the device's frame, m.
     pub origin_in_world: Vector3<f64>,
+    /// Rotation from the device's frame to the world.
     pub world_from_device: UnitQuaternion<f64>,
 }
 
@@ -22,7 +24,7 @@ impl Placement {
     }
 
     /// Tip (m) and tool of a driver's transform. The stylus points along -z of its own frame, the needle along +z of
-    /// the tool frame. `None` for what is not a pose.
+    /// the tool frame. `None` for an invalid transform.
     pub fn pose(&self, transform: &[f64; 16]) -> Option<(Vector3<f64>, UnitQuaternion<f64>)> {
         let (tip_in_device, device_from_stylus) = pose_from_column_major_mm(transform)?;
         let tip_in_world = self.origin_in_world + self.world_from_device * tip_in_device;
@@ -32,7 +34,7 @@ impl Placement {
         ))
     }
 
-    /// A force or a torque of the world in the device's frame.
+    /// Rotates a force or a torque from the world into the device's frame.
     pub fn to_device(&self, vector_in_world: &Vector3<f64>) -> Vector3<f64> {
         self.world_from_device.inverse_transform_vector(vector_in_world)
     }
@@ -42,9 +44,9 @@ fn half_turn_about_y() -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(0.0, 0.0, 1.0, 0.0))
 }
 
-/// Torques of the gimbal joints (turn, lift, roll; N m) that together are `torque_nm` in the device's frame.
+/// Torques of the gimbal joints (turn, lift, roll; N m) that add up to `torque_nm` in the device's frame.
 ///
-/// Each joint gives the part of the torque that lies along its axis: so the power at the joints is the power in space.
+/// Each joint gives the part of the torque that lies along its axis, so that the power at the joints equals the power in space.
 /// The joints turn about -y, -x and -z of the frames they carry, as the driver counts their angles: right, down and
 /// clockwise are positive. That torques have the sign of the angles is inferred, not stated by the vendor.
 pub fn gimbal_torque_nm(

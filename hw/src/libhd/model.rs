@@ -1,9 +1,9 @@
-//! What the driver's model names mean: limits and encoder steps that the driver does not tell.
+//! Limits and encoder steps of each model name, which the driver does not report.
 
 use crate::device::DeviceInfo;
 
 /// Forces, stiffness and torque as CHAI3D 3.3 uses them, continuous force and position step from the vendor's data
-/// sheets. What the driver reports of a force takes the place of a figure here when it is smaller.
+/// sheets. A smaller force that the driver reports replaces the figure here.
 const MODELS: &[DeviceInfo] = &[
     DeviceInfo::phantom_premium_1_5(),
     DeviceInfo {
@@ -36,10 +36,10 @@ const fn small(name: &'static str, peak_n: f64, continuous_n: f64, stiffness_n_p
     }
 }
 
-/// What each gimbal joint can give, N m: turn, lift, roll (the vendor's example for torques).
+/// Largest torque of each gimbal joint, N m: turn, lift, roll (the vendor's example for torques).
 pub const GIMBAL_TORQUE_LIMITS_NM: [f64; 3] = [0.188, 0.188, 0.048];
 
-/// The figures of the model that the driver names, in any case; `None` for a model that is not known.
+/// Figures of the model that the driver names, in upper or lower case; `None` for an unknown model.
 pub fn figures(model: &str) -> Option<DeviceInfo> {
     MODELS
         .iter()
@@ -47,12 +47,12 @@ pub fn figures(model: &str) -> Option<DeviceInfo> {
         .copied()
 }
 
-/// For people.
+/// Names of all known models, for messages.
 pub fn known_models() -> String {
     MODELS.iter().map(|m| m.name).collect::<Vec<_>>().join(", ")
 }
 
-/// The smaller of figure and report; a report that is not a positive number says nothing.
+/// The smaller of figure and report; a report that is not a positive number is ignored.
 pub fn with_reported(mut info: DeviceInfo, peak_n: f64, continuous_n: f64, output_dof: i32) -> DeviceInfo {
     let smaller = |figure: f64, reported: f64| if reported > 0.0 { figure.min(reported) } else { figure };
     info.peak_force_n = smaller(info.peak_force_n, peak_n);

@@ -1,10 +1,11 @@
-//! The callback that the driver runs each servo tick: pose out, force in, errors drained.
+//! The callback that the driver runs each servo tick: reads the pose, writes the force, drains the errors.
 //!
 //! It runs in a thread that the driver makes. It allocates, locks and logs nothing once that thread is armed, and never
 //! unwinds into the driver.
 
 use core::cell::UnsafeCell;
 use core::ffi::c_void;
+use core::fmt;
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -12,39 +13,52 @@ use nalgebra::Vector3;
 
 use crate::convert::{metres_from_millimetres, millinewton_metres_from_newton_metres, pose_from_column_major_mm};
 use crate::device::{DeviceFault, Sample, Wrench};
-use crate::libhd::errors::{self, Severity};
-use crate::libhd::exchange::{Command, Shared};
+use crate::libhd::errors::{self, Response};
+use crate::libhd::exchange::{Command, Served, Shared};
 use crate::libhd::ffi::{Api, CALLBACK_CONTINUE, CALLBACK_DONE, parameter};
 use crate::libhd::frame::{Placement, gimbal_torque_nm, within_joint_limits};
 use crate::libhd::model::GIMBAL_TORQUE_LIMITS_NM;
 
-/// A force that nobody renewed for so long is let go: whoever wrote it has stopped.
-pub const DEAD_TIME_S: f64 = 0.1;
-/// After a fault the force stays off until all has gone well for so long.
-pub const QUIET_TIME_S: f64 = 0.5;
-/// Motors at this share of what they bear turn the force off, until they are back at the lower one.
-pub const HOT: f64 = 0.95;
-pub const COOL: f64 = 0.80;
-const TEMPERATURE_EVERY: u64 = 100;
+/// A force that nobody renews for this long becomes zero: its writer has stopped.
+const DEAD_TIME_S: f64 = 0.1;
+/// After a fault the force stays off until there was none for this long.
+const QUIET_TIME_S: f64 = 0.5;
+/// Motors at this share of their temperature limit turn the force off, until they are below `COOL`.
+const HOT: f64 = 0.95;
+const COOL: f64 = 0.80;
+const TICKS_BETWEEN_TEMPERATURES: u64 = 100;
 /// More errors than this in one tick are left for the next.
-const ERRORS_A_TICK: usize = 16;
+const MAX_ERRORS_PER_TICK: usize = 16;
 
-/// Arms the calling thread; says what the kernel granted, or why it would not.
-pub type Arm = Box<dyn Fn() -> Result<String, String> + Send + Sync>;
+/// Arms the calling thread; returns a description of what the kernel granted.
+pub type Arm = Box<dyn Fn() -> Result<String, ArmError> + Send + Sync>;
 
-/// The callback and all that it owns. Lives until the process ends: a driver that calls once more after it was told
-/// to stop still finds it.
+/// Why a thread could not be armed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct ArmError(String);
+
+impl ArmError {
+    /// With the reason, in words for the operator.
+    pub fn new(reason: impl fmt::Display) -> Self {
+        Self(reason.to_string())
+    }
+}
+
+/// The callback and all that it owns. Lives until the process ends, because a driver may call once more after it was
+/// stopped.
 pub struct Servo {
     pub shared: Shared,
-    pub armed: std::sync::Mutex<Option<Result<String, String>>>,
+    /// Result of arming the newest servo thread, until the connector takes it.
+    pub armed: std::sync::Mutex<Option<Result<String, ArmError>>>,
     busy: AtomicBool,
     inner: UnsafeCell<Inner>,
 }
 
-// SAFETY: `inner` is used only by the one thread that has set `busy`; all else is made for sharing.
+// SAFETY: `inner`, which is `Send`, is used only by the one thread that has set `busy`; all other fields are `Sync`.
 unsafe impl Sync for Servo {}
 
-/// What a servo tick works with.
+/// Ports and settings of a servo tick, and its state.
 pub struct Inner {
     pub api: Api,
     pub placement: Placement,
@@ -59,9 +73,11 @@ pub struct Inner {
 #[derive(Default)]
 pub struct State {
     sequence: u64,
-    trouble: Option<DeviceFault>,
+    fault: Option<DeviceFault>,
+    /// Ticks since the last fault.
     quiet: u32,
     command_number: u64,
+    /// Ticks since the last new command.
     unrenewed: u32,
     hot: bool,
 }
@@ -76,7 +92,7 @@ impl Servo {
         }
     }
 
-    /// For the scheduler; its context is a `&'static Servo`.
+    /// Callback for the scheduler; its context is a `&'static Servo`.
     ///
     /// # Safety
     ///
@@ -84,19 +100,21 @@ impl Servo {
     pub unsafe extern "system" fn callback(context: *mut c_void) -> u32 {
         // SAFETY: by the function's contract.
         let servo = unsafe { &*context.cast::<Self>() };
-        // SYNC: acquire pairs with the release below: one callback sees what the last one left.
+        // SYNC: acquire pairs with the release store at the end of this function: a callback sees what the last one left,
+        // whichever thread ran it.
         if servo.busy.swap(true, Ordering::Acquire) {
             return CALLBACK_DONE;
         }
         // SAFETY: `busy` was clear, so no other thread is in here.
         let inner = unsafe { &mut *servo.inner.get() };
-        let ended = catch_unwind(AssertUnwindSafe(|| inner.tick(servo)));
-        if let Err(payload) = ended {
+        let result = catch_unwind(AssertUnwindSafe(|| inner.tick(servo)));
+        if let Err(payload) = result {
             // Dropping the payload could unwind once more.
             core::mem::forget(payload);
             inner.lose(&servo.shared, DeviceFault::Driver);
-            inner.let_go(&servo.shared);
+            inner.write_zero(&servo.shared);
         }
+        // SYNC: release pairs with the acquire swap above.
         servo.busy.store(false, Ordering::Release);
         CALLBACK_CONTINUE
     }
@@ -106,27 +124,28 @@ impl Inner {
     /// One servo tick; in the order of the data.
     fn tick(&mut self, servo: &Servo) {
         let shared = &servo.shared;
-        let handle = shared.handle.load(Ordering::Relaxed);
-        let calls = shared.calls.fetch_add(1, Ordering::Relaxed);
-        if shared.arm.swap(false, Ordering::Relaxed) {
+        let calls = shared.count_call();
+        // Asked before `take_arm`, so that only an armed thread serves, and again after arming, which takes its time.
+        let may_serve = shared.served().is_some();
+        if shared.take_arm() {
             self.begin(servo);
         }
-        if shared.release.load(Ordering::Relaxed) || shared.lost.load(Ordering::Relaxed) {
-            self.let_go(shared);
+        let Some(served) = shared.served().filter(|_| may_serve) else {
+            self.write_zero(shared);
             self.discard_errors();
-            shared.released.fetch_add(1, Ordering::Relaxed);
+            shared.count_released();
             return;
-        }
+        };
         // SAFETY: the handle is the driver's own.
-        unsafe { (self.api.hdBeginFrame)(handle) };
-        let transform = self.take_pose(shared);
-        self.take_temperature(shared, calls);
-        let wrench = self.wrench();
-        self.exert(shared, &wrench, &transform);
-        // SAFETY: as above.
-        unsafe { (self.api.hdEndFrame)(handle) };
+        unsafe { (self.api.hdBeginFrame)(served.handle) };
+        let transform = self.read_pose(shared);
+        self.read_temperature(shared, calls);
+        let wrench = self.newest_wrench();
+        self.exert(served, &wrench, &transform);
+        // SAFETY: the handle is the driver's own.
+        unsafe { (self.api.hdEndFrame)(served.handle) };
         self.drain_errors(shared);
-        self.settle(shared);
+        self.publish_fault(shared);
         // SAFETY: no preconditions.
         shared.note_callback_s(unsafe { (self.api.hdGetSchedulerTimeStamp)() });
     }
@@ -139,10 +158,14 @@ impl Inner {
         };
         // Before the thread is armed it may lock and allocate.
         let granted = (self.arm)();
+        if granted.is_err() {
+            // A thread without its rights exerts no force, until the connector stops it.
+            self.lose(&servo.shared, DeviceFault::Driver);
+        }
         *servo.armed.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(granted);
     }
 
-    fn take_pose(&mut self, shared: &Shared) -> [f64; 16] {
+    fn read_pose(&mut self, shared: &Shared) -> [f64; 16] {
         let (mut transform, mut velocity, mut buttons) = ([0.0; 16], [0.0; 3], 0);
         // SAFETY: each buffer has the size that the interface states for its parameter.
         unsafe {
@@ -154,7 +177,7 @@ impl Inner {
         match self.placement.pose(&transform) {
             Some((tip_in_world, world_from_tool)) if speed.is_finite() => {
                 self.state.sequence += 1;
-                shared.set_speed_m_per_s(speed);
+                shared.note_speed_m_per_s(speed);
                 self.samples.write(Some(Sample {
                     tip_in_world,
                     world_from_tool,
@@ -167,13 +190,13 @@ impl Inner {
         transform
     }
 
-    fn take_temperature(&mut self, shared: &Shared, calls: u64) {
-        if calls.is_multiple_of(TEMPERATURE_EVERY) {
+    fn read_temperature(&mut self, shared: &Shared, calls: u64) {
+        if calls.is_multiple_of(TICKS_BETWEEN_TEMPERATURES) {
             let mut motors = [0.0; 6];
-            // SAFETY: the driver writes three or six.
+            // SAFETY: the driver writes three or six numbers.
             unsafe { (self.api.hdGetDoublev)(parameter::MOTOR_TEMPERATURE, motors.as_mut_ptr()) };
             let warmest = motors.iter().copied().fold(0.0, f64::max);
-            shared.set_temperature(warmest);
+            shared.note_temperature(warmest);
             self.state.hot = warmest >= if self.state.hot { COOL } else { HOT };
         }
         if self.state.hot {
@@ -181,8 +204,8 @@ impl Inner {
         }
     }
 
-    /// The newest command, as long as it is renewed and nothing is wrong.
-    fn wrench(&mut self) -> Wrench {
+    /// The newest command; zero when it is not renewed or there is a fault.
+    fn newest_wrench(&mut self) -> Wrench {
         let command = *self.commands.read();
         let renewed = command.number != self.state.command_number;
         self.state.command_number = command.number;
@@ -194,18 +217,18 @@ impl Inner {
         if self.lasts(self.state.unrenewed, DEAD_TIME_S) && command.wrench != Wrench::zero() {
             self.pause(DeviceFault::TimedOut);
         }
-        if self.state.trouble.is_some() {
+        if self.state.fault.is_some() {
             Wrench::zero()
         } else {
             command.wrench
         }
     }
 
-    fn exert(&self, shared: &Shared, wrench: &Wrench, transform: &[f64; 16]) {
+    fn exert(&self, served: Served, wrench: &Wrench, transform: &[f64; 16]) {
         let force_n = self.placement.to_device(&wrench.force_n);
         // SAFETY: three numbers, as the interface states.
         unsafe { (self.api.hdSetDoublev)(parameter::FORCE, force_n.as_ptr()) };
-        if shared.torques.load(Ordering::Relaxed) {
+        if served.torques {
             self.exert_torque(&self.placement.to_device(&wrench.torque_nm), transform);
         }
     }
@@ -229,25 +252,24 @@ impl Inner {
     }
 
     fn drain_errors(&mut self, shared: &Shared) {
-        for _ in 0..ERRORS_A_TICK {
+        for _ in 0..MAX_ERRORS_PER_TICK {
             // SAFETY: no preconditions.
             let error = unsafe { (self.api.hdGetError)() };
             if error.code == errors::SUCCESS {
                 return;
             }
-            shared.error.store(error.code, Ordering::Relaxed);
-            shared.errors.fetch_add(1, Ordering::Relaxed);
+            shared.note_error(error.code);
             let known = errors::known(error.code);
-            match known.severity {
-                Severity::Pause => self.pause(known.fault),
-                Severity::Reconnect => self.lose(shared, known.fault),
+            match known.response {
+                Response::Pause => self.pause(known.fault),
+                Response::Reconnect => self.lose(shared, known.fault),
             }
         }
     }
 
-    /// Of a device that is let go: they say nothing new.
+    /// Errors of a released device report nothing new.
     fn discard_errors(&self) {
-        for _ in 0..ERRORS_A_TICK {
+        for _ in 0..MAX_ERRORS_PER_TICK {
             // SAFETY: no preconditions.
             if unsafe { (self.api.hdGetError)() }.code == errors::SUCCESS {
                 return;
@@ -255,44 +277,45 @@ impl Inner {
         }
     }
 
-    /// The first fault is the one that is told, until all has been quiet.
+    /// Turns the force off. The first fault stays the reported one until there was none for `QUIET_TIME_S`.
     fn pause(&mut self, fault: DeviceFault) {
-        self.state.trouble.get_or_insert(fault);
+        self.state.fault.get_or_insert(fault);
         self.state.quiet = 0;
     }
 
-    /// Before any other fault: without a connection the pose is no pose either.
+    /// Declares the connection lost. This fault replaces any other: without a connection the pose is invalid as well.
     fn lose(&mut self, shared: &Shared, fault: DeviceFault) {
-        self.state.trouble = Some(fault);
+        self.state.fault = Some(fault);
         self.state.quiet = 0;
-        shared.set_fault(self.state.trouble);
-        shared.lost.store(true, Ordering::Relaxed);
+        shared.set_fault(self.state.fault);
+        shared.set_lost();
     }
 
     fn lasts(&self, ticks: u32, time_s: f64) -> bool {
         f64::from(ticks) >= time_s * f64::from(self.servo_hz)
     }
 
-    fn settle(&mut self, shared: &Shared) {
+    /// Clears a fault that has not returned for `QUIET_TIME_S`, and shows the force loop what is left.
+    fn publish_fault(&mut self, shared: &Shared) {
         self.state.quiet = self.state.quiet.saturating_add(1);
         if self.lasts(self.state.quiet, QUIET_TIME_S) {
-            self.state.trouble = None;
+            self.state.fault = None;
         }
-        shared.set_fault(self.state.trouble);
+        shared.set_fault(self.state.fault);
     }
 
     /// Zero force and torque, whatever the state of the device.
-    fn let_go(&self, shared: &Shared) {
-        let handle = shared.handle.load(Ordering::Relaxed);
+    fn write_zero(&self, shared: &Shared) {
+        let served = shared.last_served();
         let zero = [0.0; 3];
         // SAFETY: the handle is the driver's own, three numbers each.
         unsafe {
-            (self.api.hdBeginFrame)(handle);
+            (self.api.hdBeginFrame)(served.handle);
             (self.api.hdSetDoublev)(parameter::FORCE, zero.as_ptr());
-            if shared.torques.load(Ordering::Relaxed) {
+            if served.torques {
                 (self.api.hdSetDoublev)(parameter::GIMBAL_TORQUE, zero.as_ptr());
             }
-            (self.api.hdEndFrame)(handle);
+            (self.api.hdEndFrame)(served.handle);
         }
     }
 }

@@ -10,76 +10,64 @@ use crate::libhd::ffi::{
     Api, Callback, Enum, Handle, INVALID_HANDLE, PRIORITY_MAX, Schedule, WAIT_CHECK_STATUS, capability, parameter,
 };
 use crate::libhd::model;
+use crate::libhd::servo::ArmError;
 
-/// Names that the driver's set-up programs give the first device, old and new; no name at all fails on some systems.
+/// Names that the driver's old and new set-up programs give the first device; no name at all fails on some systems.
 const DEVICE_NAMES: &[&CStr] = &[c"Default PHANToM", c"Default Device"];
 
-/// Why there is no connection, in words that say what to do.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Trouble {
-    /// No name could be initialised; each with the driver's answer.
+/// Why there is no connection; the text says what to do.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ConnectionError {
+    /// No name could be initialised; each with the driver's error code.
+    #[error("the driver finds no device{}", attempts(.0))]
     NoDevice(Vec<(String, u32)>),
+    /// No limits are known for this model.
+    #[error("the device is a \"{0}\", of which no limits are known; known are: {known}", known = model::known_models())]
     WrongModel(String),
-    /// The device that came back is another one: limits were set for `was`.
+    /// Another device answers after a reconnection: the force loop has the limits of `was`.
+    #[error("a \"{is}\" came back in place of the {was}: plug that in, or restart rt-core")]
     OtherModel {
+        /// Model of the first connection.
         was: &'static str,
+        /// Model that answers now.
         is: String,
     },
-    /// A call failed with this error.
+    /// The named call failed with this error code.
+    #[error("{0} failed with {error} (0x{1:04x}): {cure}", error = errors::known(*.1).name, cure = errors::cure(*.1))]
     Call(&'static str, u32),
-    /// The driver would not switch forces on.
+    /// The driver does not switch forces on.
+    #[error("the driver does not switch forces on: check the power of the amplifiers")]
     NoForce,
-    /// The scheduler runs, but no callback came.
+    /// The scheduler runs, but no callback arrived.
+    #[error("the driver's servo loop does not run: check the device's power, its cable and the port's mode")]
     NoCallback,
-    /// The servo thread was not granted what it must have.
-    NotArmed(String),
+    /// The servo thread was not granted the rights that it needs.
+    #[error("the driver's servo thread is not real-time: {0}")]
+    NotArmed(#[source] ArmError),
 }
 
-impl fmt::Display for Trouble {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoDevice(tried) => {
-                f.write_str("the driver finds no device")?;
-                for (name, code) in tried {
-                    let error = errors::known(*code).name;
-                    write!(f, "\n  {name}: {error} (0x{code:04x}): {}", errors::cure(*code))?;
-                }
-                Ok(())
-            }
-            Self::WrongModel(model) => write!(
-                f,
-                "the device is a \"{model}\", of which no limits are known; known are: {}",
-                model::known_models()
-            ),
-            Self::OtherModel { was, is } => {
-                write!(
-                    f,
-                    "a \"{is}\" came back in place of the {was}: plug that in, or start rt-core anew"
-                )
-            }
-            Self::Call(call, code) => {
-                let error = errors::known(*code).name;
-                write!(f, "{call} failed with {error} (0x{code:04x}): {}", errors::cure(*code))
-            }
-            Self::NoForce => f.write_str("the driver does not switch forces on: check the power of the amplifiers"),
-            Self::NoCallback => f.write_str(
-                "the driver's servo loop does not run: check the device's power, its cable and the port's mode",
-            ),
-            Self::NotArmed(why) => write!(f, "the driver's servo thread is not real-time: {why}"),
-        }
-    }
+fn attempts(tried: &[(String, u32)]) -> String {
+    let line = |(name, code): &(String, u32)| {
+        let error = errors::known(*code).name;
+        format!("\n  {name}: {error} (0x{code:04x}): {}", errors::cure(*code))
+    };
+    tried.iter().map(line).collect()
 }
 
-impl core::error::Error for Trouble {}
-
-/// What the driver tells of the device.
+/// Properties of the device as the driver reports them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Description {
+    /// Limits and encoder step: the known figures of the model, lowered by the driver's report.
     pub info: DeviceInfo,
+    /// Model name as the driver spells it.
     pub model: String,
+    /// Serial number.
     pub serial: String,
+    /// Version of the device driver.
     pub driver: String,
+    /// Version of OpenHaptics.
     pub library: String,
+    /// Number of axes with a motor: 6 means torques.
     pub output_dof: c_int,
 }
 
@@ -102,6 +90,7 @@ impl fmt::Display for Description {
 /// An initialised device.
 pub struct Session<'a> {
     api: &'a Api,
+    /// The driver's handle of the device.
     pub handle: Handle,
     schedule: Option<Schedule>,
     started: bool,
@@ -109,7 +98,7 @@ pub struct Session<'a> {
 
 impl<'a> Session<'a> {
     /// Tries `name`, or the usual names and then the first device.
-    pub fn open(api: &'a Api, name: Option<&str>) -> Result<Self, Trouble> {
+    pub fn open(api: &'a Api, name: Option<&str>) -> Result<Self, ConnectionError> {
         discard_errors(api);
         let mut names: Vec<Option<CString>> = Vec::new();
         match name {
@@ -138,14 +127,14 @@ impl<'a> Session<'a> {
             let shown = name.map_or("(first device)".to_owned(), |n| n.to_string_lossy().into_owned());
             tried.push((shown, error));
         }
-        Err(Trouble::NoDevice(tried))
+        Err(ConnectionError::NoDevice(tried))
     }
 
     /// Model, versions and limits.
-    pub fn describe(&self) -> Result<Description, Trouble> {
+    pub fn describe(&self) -> Result<Description, ConnectionError> {
         let model = self.string(parameter::MODEL);
         self.check("hdGetString")?;
-        let figures = model::figures(&model).ok_or_else(|| Trouble::WrongModel(model.clone()))?;
+        let figures = model::figures(&model).ok_or_else(|| ConnectionError::WrongModel(model.clone()))?;
         let (mut output_dof, mut peak_n, mut continuous_n) = (0, 0.0, 0.0);
         // SAFETY: one number each, as the interface states.
         unsafe {
@@ -162,7 +151,7 @@ impl<'a> Session<'a> {
             model,
             output_dof,
         };
-        // An old driver may not know all of the strings.
+        // An old driver may lack some of the strings.
         discard_errors(self.api);
         Ok(description)
     }
@@ -178,16 +167,15 @@ impl<'a> Session<'a> {
         callback: Callback,
         context: *mut core::ffi::c_void,
         rate_hz: u32,
-    ) -> Result<(), Trouble> {
-        use capability::*;
-        for capability in [FORCE_OUTPUT, MAX_FORCE_CLAMPING, FORCE_RAMPING, SOFTWARE_FORCE_LIMIT] {
+    ) -> Result<(), ConnectionError> {
+        for capability in capability::AT_START {
             // SAFETY: no preconditions.
             unsafe { (self.api.hdEnable)(capability) };
             self.check("hdEnable")?;
         }
         // SAFETY: no preconditions.
-        if unsafe { (self.api.hdIsEnabled)(FORCE_OUTPUT) } == 0 {
-            return Err(Trouble::NoForce);
+        if unsafe { (self.api.hdIsEnabled)(capability::FORCE_OUTPUT) } == 0 {
+            return Err(ConnectionError::NoForce);
         }
         // SAFETY: by the contract of this function.
         let schedule = unsafe { (self.api.hdScheduleAsynchronous)(callback, context, PRIORITY_MAX) };
@@ -202,18 +190,19 @@ impl<'a> Session<'a> {
         self.check("hdStartScheduler")
     }
 
-    /// Does the driver still run the callback?
+    /// Whether the driver still runs the callback.
     pub fn is_scheduled(&self) -> bool {
-        // SAFETY: the schedule is the driver's own; asking does not wait.
+        // SAFETY: the schedule is the driver's own; the status check does not wait.
         self.schedule
             .is_some_and(|s| unsafe { (self.api.hdWaitForCompletion)(s, WAIT_CHECK_STATUS) } != 0)
     }
 
+    /// Whether the scheduler was started.
     pub fn is_running(&self) -> bool {
         self.started
     }
 
-    /// Stops, unschedules and disables; the callbacks have written zero before.
+    /// Stops, unschedules and disables; call it after the callbacks have written zero.
     pub fn close(self) {
         // SAFETY: handles are the driver's own, each used for the last time.
         unsafe {
@@ -229,10 +218,10 @@ impl<'a> Session<'a> {
         discard_errors(self.api);
     }
 
-    fn check(&self, call: &'static str) -> Result<(), Trouble> {
+    fn check(&self, call: &'static str) -> Result<(), ConnectionError> {
         match last_error(self.api) {
             errors::SUCCESS => Ok(()),
-            code => Err(Trouble::Call(call, code)),
+            code => Err(ConnectionError::Call(call, code)),
         }
     }
 
@@ -242,7 +231,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// The oldest error that the driver holds; it is then forgotten with all that came after.
+/// Empties the error stack of the driver; returns the oldest error.
 pub fn last_error(api: &Api) -> u32 {
     let mut oldest = errors::SUCCESS;
     // The driver's stack has its newest on top. It is bounded; so is this.
@@ -256,6 +245,7 @@ pub fn last_error(api: &Api) -> u32 {
     oldest
 }
 
+/// Empties the error stack of the driver.
 pub fn discard_errors(api: &Api) {
     let _ = last_error(api);
 }

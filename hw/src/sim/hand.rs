@@ -1,29 +1,32 @@
-//! The hand that holds the device: a mass on a spring and a damper, and an operator who pushes harder.
+//! The hand that holds the device: a mass on a spring and a damper, and the effort of the operator.
 
 use nalgebra::Vector3;
 
-/// Passive impedance of a hand, and what its owner adds to it.
+/// Passive impedance of a hand, and the effort of the operator.
 ///
 /// The spring and the damper act between the [`HandPath`](crate::HandPath) and the device; the mass is
-/// carried by the device. People lie within 0.1-1 kg, 2-20 N s/m and 50-1000 N/m.
+/// carried by the device. Human hands lie within 0.1-1 kg, 2-20 N s/m and 50-1000 N/m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hand {
+    /// Mass that moves with the device.
     pub mass_kg: f64,
+    /// Passive damping.
     pub damping_n_s_per_m: f64,
+    /// Passive stiffness.
     pub stiffness_n_per_m: f64,
-    /// `None`: the hand is passive and yields to what it feels.
+    /// `None`: the hand is passive and yields to the force.
     pub effort: Option<Effort>,
 }
 
-/// What an operator does about a needle that lags behind: braces the arm, and pushes harder until it
-/// follows. Not passive, and meant for scripted insertions, not for tests of stability.
+/// How an operator responds to a needle that lags behind: braces the arm, and pushes harder until the needle follows.
+/// Not passive; for scripted insertions, not for tests of stability.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
-    /// Push gained per second and metre of lag.
+    /// Growth of the push per second and metre of lag.
     pub gain_n_per_m_s: f64,
-    /// The push never grows past this.
+    /// Largest push.
     pub limit_n: f64,
-    /// Lag that the operator does not notice. Without it the push hunts against dry friction.
+    /// Lag that the operator does not notice. Without it the push oscillates against dry friction.
     pub unnoticed_m: f64,
     /// Stiffness that bracing adds to the passive one.
     pub bracing_stiffness_n_per_m: f64,
@@ -32,7 +35,7 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// An operator who places a needle with care.
+    /// An operator who inserts a needle carefully.
     pub const fn steady() -> Self {
         Self {
             gain_n_per_m_s: 6000.0,
@@ -45,7 +48,7 @@ impl Effort {
 }
 
 impl Hand {
-    /// A hand in the middle of the envelope, that yields.
+    /// A yielding hand in the middle of the envelope.
     pub const fn passive() -> Self {
         Self {
             mass_kg: 0.5,
@@ -55,7 +58,7 @@ impl Hand {
         }
     }
 
-    /// The same hand, with an operator who sees to it that the needle goes in.
+    /// The same hand, with an operator who pushes until the needle reaches its goal.
     pub const fn steady() -> Self {
         Self {
             effort: Some(Effort::steady()),
@@ -73,10 +76,12 @@ impl Hand {
         }
     }
 
+    /// Stiffness of the hand with bracing.
     pub fn total_stiffness_n_per_m(&self) -> f64 {
         self.stiffness_n_per_m + self.effort.map_or(0.0, |e| e.bracing_stiffness_n_per_m)
     }
 
+    /// Damping of the hand with bracing.
     pub fn total_damping_n_s_per_m(&self) -> f64 {
         self.damping_n_s_per_m + self.effort.map_or(0.0, |e| e.bracing_damping_n_s_per_m)
     }

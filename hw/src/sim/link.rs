@@ -5,53 +5,55 @@ use nalgebra::Vector3;
 
 use crate::device::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
 
-/// Wrenches that can be under way.
+/// Largest delay of a wrench, in ticks.
 pub const MAX_LATE: usize = 8;
 
-/// What the link does. The default is a good one.
+/// Faults of the link. The default has none.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LinkFaults {
-    /// Ticks that each wrench takes to arrive, at most `MAX_LATE`.
+    /// Delay of each wrench in ticks, at most `MAX_LATE`.
     pub late_ticks: usize,
-    /// Of a thousand wrenches so many are lost: the device goes on with the one before.
+    /// Number of wrenches in a thousand that are lost: the device continues with the previous one.
     pub lost_per_thousand: u32,
-    /// Of a thousand samples so many are repeated, with their old sequence number.
+    /// Number of samples in a thousand that are repeated, with their old sequence number.
     pub repeated_per_thousand: u32,
 }
 
 /// A device behind a bad link. The same calls give the same faults.
 #[derive(Debug, Clone)]
 pub struct BadLink<D> {
+    /// The device behind the link.
     pub device: D,
     faults: LinkFaults,
     /// Newest first.
-    under_way: [Wrench; MAX_LATE + 1],
+    in_flight: [Wrench; MAX_LATE + 1],
     last: Sample,
-    dice: u32,
+    random_state: u32,
 }
 
 impl<D: Device> BadLink<D> {
+    /// Puts `device` behind a link with these faults.
     pub fn new(device: D, faults: LinkFaults) -> Self {
         Self {
             device,
             faults,
-            under_way: [Wrench::zero(); MAX_LATE + 1],
+            in_flight: [Wrench::zero(); MAX_LATE + 1],
             last: Sample {
                 tip_in_world: Vector3::zeros(),
                 world_from_tool: UnitQuaternion::identity(),
                 buttons: 0,
                 sequence: 0,
             },
-            dice: 1,
+            random_state: 1,
         }
     }
 
     fn happens(&mut self, per_thousand: u32) -> bool {
         // xorshift32: fixed seed, so that a session can be repeated.
-        self.dice ^= self.dice << 13;
-        self.dice ^= self.dice >> 17;
-        self.dice ^= self.dice << 5;
-        self.dice % 1000 < per_thousand
+        self.random_state ^= self.random_state << 13;
+        self.random_state ^= self.random_state >> 17;
+        self.random_state ^= self.random_state << 5;
+        self.random_state % 1000 < per_thousand
     }
 }
 
@@ -71,13 +73,13 @@ impl<D: Device> Device for BadLink<D> {
 
     fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceFault> {
         if !wrench.is_finite() {
-            // Refused at once, and nothing of what was under way arrives.
-            self.under_way = [Wrench::zero(); MAX_LATE + 1];
+            // The device refuses it at once, and no wrench in flight arrives.
+            self.in_flight = [Wrench::zero(); MAX_LATE + 1];
             return self.device.write(wrench);
         }
-        self.under_way.rotate_right(1);
-        self.under_way[0] = *wrench;
-        let arrived = self.under_way[self.faults.late_ticks.min(MAX_LATE)];
+        self.in_flight.rotate_right(1);
+        self.in_flight[0] = *wrench;
+        let arrived = self.in_flight[self.faults.late_ticks.min(MAX_LATE)];
         if self.happens(self.faults.lost_per_thousand) {
             return Ok(());
         }

@@ -1,4 +1,4 @@
-//! A Phantom and the hand that holds it, simulated.
+//! A simulated Phantom and the simulated hand that holds it.
 
 pub mod hand;
 pub mod link;

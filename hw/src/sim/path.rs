@@ -1,4 +1,4 @@
-//! Where the simulated hand means to be: a straight way to the goal with a trapezoidal speed.
+//! Path of the simulated hand: a straight line to the goal with a trapezoidal speed.
 
 use nalgebra::Vector3;
 
@@ -6,8 +6,7 @@ use crate::device::HandGoal;
 
 /// The moving equilibrium of the hand.
 ///
-/// From rest it follows a straight line to its goal. A new goal takes over from the present position and
-/// velocity, so that the velocity never changes by more than acceleration times period.
+/// From rest it follows a straight line to its goal. A new goal starts from the present position and velocity, so that the velocity never changes by more than acceleration times period.
 #[derive(Debug, Clone)]
 pub struct HandPath {
     position_m: Vector3<f64>,
@@ -30,7 +29,7 @@ impl HandPath {
         }
     }
 
-    /// Takes a new goal; one that is not valid is ignored and gives `false`.
+    /// Takes a new goal; an invalid one is ignored and returns `false`.
     pub fn set_goal(&mut self, goal: &HandGoal) -> bool {
         let valid = goal.is_valid();
         if valid {
@@ -39,32 +38,36 @@ impl HandPath {
         valid
     }
 
-    /// Ends the way with the acceleration of the last goal: `v^2 / 2a` ahead, never back.
+    /// Stops with the acceleration of the last goal, `v^2 / 2a` ahead, without reversing.
     pub fn stop(&mut self) {
         let stopping_s = self.velocity_m_per_s.norm() / (2.0 * self.goal.acceleration_m_per_s2);
         self.goal.tip_in_world = self.position_m + self.velocity_m_per_s * stopping_s;
     }
 
+    /// Present position of the equilibrium.
     pub fn position_m(&self) -> &Vector3<f64> {
         &self.position_m
     }
 
+    /// Present velocity of the equilibrium.
     pub fn velocity_m_per_s(&self) -> &Vector3<f64> {
         &self.velocity_m_per_s
     }
 
+    /// The present goal.
     pub fn goal(&self) -> &HandGoal {
         &self.goal
     }
 
+    /// Whether the path is at rest at its goal.
     pub fn arrived(&self) -> bool {
         self.velocity_m_per_s == Vector3::zeros() && self.position_m == self.goal.tip_in_world
     }
 
     /// Advances by `dt_s`, which the caller has checked to be positive.
     pub fn step(&mut self, dt_s: f64) {
-        let way = self.goal.tip_in_world - self.position_m;
-        let distance = way.norm();
+        let to_goal = self.goal.tip_in_world - self.position_m;
+        let distance = to_goal.norm();
         let speed_step = self.goal.acceleration_m_per_s2 * dt_s;
         let close = distance <= 0.5 * speed_step * dt_s || distance < 1e-12;
         if close && self.velocity_m_per_s.norm() <= speed_step {
@@ -73,7 +76,7 @@ impl HandPath {
             return;
         }
         let wanted = if distance > 1e-12 {
-            way * (self.approach_speed(distance, speed_step, dt_s) / distance)
+            to_goal * (self.approach_speed(distance, speed_step, dt_s) / distance)
         } else {
             Vector3::zeros()
         };
@@ -89,21 +92,22 @@ impl HandPath {
     }
 
     /// The fastest speed from which steps of `speed_step` still stop at the goal: the solution of
-    /// `v^2 / 2a + v dt / 2 = distance`, as the discrete motion has it. The last
-    /// step may end past the goal by a small part of `a dt^2`; the next one is on it.
+    /// `v^2 / 2a + v dt / 2 = distance`, for the discrete motion. The last step may
+    /// overshoot the goal by a small part of `a dt^2`; the next one is at the goal.
     fn approach_speed(&self, distance: f64, speed_step: f64, dt_s: f64) -> f64 {
         let stopping = speed_step * ((0.25 + 2.0 * distance / (speed_step * dt_s)).sqrt() - 0.5);
         stopping.min(self.goal.speed_m_per_s).min(distance / dt_s)
     }
 }
 
-/// One stop of a script: go there, stay there, go on.
+/// One stop of a script.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Waypoint {
+    /// Where to go.
     pub goal: HandGoal,
     /// How long to stay after arriving.
     pub dwell_s: f64,
-    /// How long to try at most, dwell included; the script goes on after it in any case.
+    /// Longest time for this stop, dwell included; the script continues after it in any case.
     pub timeout_s: f64,
 }
 
@@ -119,7 +123,7 @@ pub struct ScriptedPath {
 }
 
 impl ScriptedPath {
-    /// Owns its waypoints: nothing is allocated later.
+    /// A script at its first waypoint. `step` allocates nothing.
     pub fn new(waypoints: Vec<Waypoint>, arrival_tolerance_m: f64) -> Self {
         Self {
             waypoints,
@@ -131,7 +135,7 @@ impl ScriptedPath {
         }
     }
 
-    /// Call once a tick with the tip of the newest sample. Gives a goal in the tick in which it changes.
+    /// Advances by one tick, with the tip of the newest sample. Returns the goal in the tick in which it changes.
     pub fn step(&mut self, dt_s: f64, tip_in_world: &Vector3<f64>) -> Option<HandGoal> {
         let waypoint = *self.waypoints.get(self.index)?;
         if !self.announced {
@@ -152,15 +156,17 @@ impl ScriptedPath {
         None
     }
 
-    /// Index of the present waypoint, or their number when the script has ended.
+    /// Index of the present waypoint, or the number of waypoints when the script has ended.
     pub fn index(&self) -> usize {
         self.index
     }
 
+    /// Whether the script has ended.
     pub fn finished(&self) -> bool {
         self.index >= self.waypoints.len()
     }
 
+    /// Returns to the first waypoint.
     pub fn restart(&mut self) {
         self.index = 0;
         self.announced = false;

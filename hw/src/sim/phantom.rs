@@ -7,24 +7,29 @@ use crate::device::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
 use crate::sim::hand::Hand;
 use crate::sim::path::HandPath;
 
-/// The dynamics advance in steps no longer than this, so that their error does not show at the tick.
+/// Longest step of the dynamics; keeps their error small at the period of the force loop.
 const LONGEST_STEP_S: f64 = 5e-5;
-/// A late caller advances the simulated device by no more than this, so that a read stays short.
+/// Longest time by which one read advances the device, so that a read after a delay stays short.
 const LONGEST_ADVANCE_S: f64 = 0.02;
 
-/// What a simulated device is made of.
+/// Properties of a simulated device and its hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SimulatedPhantomConfig {
+    /// Name and limits.
     pub info: DeviceInfo,
-    /// What the device weighs at its tip.
+    /// Inertia of the device at its tip.
     pub apparent_mass_kg: f64,
-    /// Dry friction of its joints, felt at the tip.
+    /// Dry friction of its joints, as a force at the tip.
     pub coulomb_friction_n: f64,
+    /// The hand that holds the device.
     pub hand: Hand,
+    /// Position of the tip at the start, m.
     pub start_tip_in_world: Vector3<f64>,
+    /// Needle axis at the start, of any length.
     pub start_direction: Vector3<f64>,
+    /// Rate at which the tool turns to the direction of the goal.
     pub turn_rate_rad_per_s: f64,
-    /// Lower and upper corner that the tip cannot leave.
+    /// Lower and upper corner of the box that the tip cannot leave.
     pub workspace_m: Option<(Vector3<f64>, Vector3<f64>)>,
 }
 
@@ -47,7 +52,7 @@ impl Default for SimulatedPhantomConfig {
     }
 }
 
-/// See the module. Reads advance it; what is written acts during the next read.
+/// A simulated Phantom in the grip of a hand. A read advances it; a written wrench acts during the next read.
 #[derive(Debug, Clone)]
 pub struct SimulatedPhantom {
     config: SimulatedPhantomConfig,
@@ -63,6 +68,7 @@ pub struct SimulatedPhantom {
 }
 
 impl SimulatedPhantom {
+    /// At rest at the start.
     pub fn new(config: SimulatedPhantomConfig) -> Self {
         let direction = unit_or_z(&config.start_direction);
         Self {
@@ -79,20 +85,22 @@ impl SimulatedPhantom {
         }
     }
 
-    /// Where the tip is before the encoders round it.
+    /// Position of the tip before the encoders quantise it.
     pub fn true_tip_in_world(&self) -> &Vector3<f64> {
         &self.tip_in_world
     }
 
+    /// Velocity of the tip.
     pub fn true_velocity_m_per_s(&self) -> &Vector3<f64> {
         &self.velocity_m_per_s
     }
 
+    /// Path of the hand.
     pub fn path(&self) -> &HandPath {
         &self.path
     }
 
-    /// The wrench that acts, after the amplifiers have had their say.
+    /// The wrench that acts, limited by the amplifiers.
     pub fn applied_wrench(&self) -> &Wrench {
         &self.wrench
     }
@@ -102,19 +110,20 @@ impl SimulatedPhantom {
         self.work_j
     }
 
-    /// Kinetic energy of device and hand, and what the hand's spring holds.
+    /// Kinetic energy of device and hand, and the energy in the spring of the hand.
     pub fn energy_j(&self) -> f64 {
         let lag_m = self.path.position_m() - self.tip_in_world;
         0.5 * self.moving_mass_kg() * self.velocity_m_per_s.norm_squared()
             + 0.5 * self.config.hand.total_stiffness_n_per_m() * lag_m.norm_squared()
     }
 
-    /// Another hand takes over, with no push of its own yet.
+    /// Replaces the hand; the new one starts without a push.
     pub fn set_hand(&mut self, hand: Hand) {
         self.config.hand = hand;
         self.push_n = Vector3::zeros();
     }
 
+    /// Sets the buttons of the following samples, one bit each.
     pub fn set_buttons(&mut self, buttons: u32) {
         self.buttons = buttons;
     }
@@ -124,7 +133,7 @@ impl SimulatedPhantom {
     }
 
     /// One step, implicit in spring, damper and friction: `(m + h b + h^2 k) v' = p` without friction, and
-    /// friction takes from the impulse `p` what it can, at most all of it. Stable at any stiffness.
+    /// friction reduces the impulse `p`, at most to zero. Stable at any stiffness.
     fn advance(&mut self, h: f64) {
         self.path.step(h);
         let hand = &self.config.hand;
@@ -226,7 +235,7 @@ fn turn(from: &Vector3<f64>, to: &Vector3<f64>, limit_rad: f64) -> UnitQuaternio
     let normal = from.cross(to);
     let angle = normal.norm().atan2(from.dot(to));
     let axis = Unit::try_new(normal, 1e-12).unwrap_or_else(|| {
-        // Parallel: nothing to turn. Opposite: any axis across the needle will do.
+        // Parallel: the angle is zero. Opposite: any axis perpendicular to the needle is right.
         let helper = if from.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
         Unit::new_normalize(from.cross(&helper))
     });

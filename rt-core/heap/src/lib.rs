@@ -1,5 +1,7 @@
 //! Counts each thread's heap calls, so that a loop can prove that it makes none.
 
+#![warn(missing_docs)]
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 

@@ -7,7 +7,7 @@ use crate::measure;
 use clap::Args;
 use std::path::PathBuf;
 use stylet_runtime::args::RealTimeArgs;
-use stylet_runtime::core::Options;
+use stylet_runtime::process::Options;
 
 /// A measurement.
 #[derive(Args, Debug)]
@@ -46,7 +46,8 @@ pub struct LatencyArgs {
 impl LatencyArgs {
     /// An instance of its own, so that a running simulator is not disturbed in its shared memory.
     pub fn options(&self) -> Result<Options, String> {
-        let mut options = self.real_time.options(&format!("lab-{}", std::process::id()))?;
+        let instance = format!("lab-{}", std::process::id());
+        let mut options = self.real_time.options(&instance).map_err(|e| e.to_string())?;
         options.haptic_period_ns = measure::period_ns(self.rate);
         options.spin_ns = self.spin_us * 1_000;
         let longest_us = longest_spin_ns(options.haptic_period_ns, Machine::this().throttle()) / 1_000;

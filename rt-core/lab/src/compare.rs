@@ -12,7 +12,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-use stylet_runtime::core::Options;
+use stylet_runtime::process::Options;
 
 /// Each turn brings p99.9 with ten samples beyond it at 1 kHz.
 const SHORTEST_TURN_NS: u64 = 11_000_000_000;

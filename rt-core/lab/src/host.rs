@@ -12,7 +12,7 @@ use std::time::Duration;
 use stylet_runtime::rt::clock;
 use stylet_runtime::rt::timing::PoseTimes;
 use stylet_shm_schema::service::{self, Instance, Ipc, ServiceError};
-use stylet_shm_schema::{Command, CommandKind, Event, EventKind, SnapshotHeader, TickRecord, Vertex};
+use stylet_shm_schema::{Command, Event, EventKind, HandMove, Request, SnapshotHeader, TickRecord, Vertex};
 use stylet_sim::scene::Scene;
 
 /// One insertion and one retraction.
@@ -195,25 +195,31 @@ impl Host {
         }
         self.step += 1;
         if self.step % 2 == 1 {
-            self.send(CommandKind::Engage, &[]);
+            self.send(&Request::Engage);
             self.move_hand(self.script.inside_m);
             self.report.insertions += 1;
         } else {
             if self.step / 2 <= SEEDS {
-                self.send(CommandKind::DropSeed, &[]);
+                self.send(&Request::DropSeed);
             }
             self.move_hand(self.script.outside_m);
         }
     }
 
-    fn move_hand(&mut self, [x, y, z]: [f64; 3]) {
-        let values = [x, y, z, 0.0, 0.0, 1.0, SPEED_M_PER_S, ACCELERATION_M_PER_S2];
-        self.send(CommandKind::MoveHand, &values);
+    fn move_hand(&mut self, tip_m: [f64; 3]) {
+        self.send(&Request::MoveHand(HandMove {
+            tip_m,
+            direction: [0.0, 0.0, 1.0],
+            speed_m_per_s: SPEED_M_PER_S,
+            acceleration_m_per_s2: ACCELERATION_M_PER_S2,
+        }));
     }
 
-    fn send(&mut self, kind: CommandKind, values: &[f64]) {
+    fn send(&mut self, request: &Request) {
         self.sent += 1;
-        // A command that is lost is made up for in the next cycle.
-        let _ = self.ports.commands.send_copy(Command::new(1, self.sent, kind, values));
+        if let Ok(command) = request.encode(1, self.sent) {
+            // A command that is lost is made up for in the next cycle.
+            let _ = self.ports.commands.send_copy(command);
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::args::LatencyArgs;
 use crate::compare::{Against, compare};
+use crate::files;
 use crate::machine::Machine;
 use crate::measure::{Setup, measure};
 use crate::report::{self, JSON, PAGE, Parts, Report};
@@ -48,7 +49,7 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
         comparison,
         machine: &machine,
     });
-    report::write(&args.out, &mut report, &measured)?;
+    files::write(&args.out, &mut report, &measured)?;
     say(&report);
     println!("{}", args.out.join(PAGE).display());
     println!("{}", args.out.join(JSON).display());

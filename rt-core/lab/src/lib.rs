@@ -8,6 +8,7 @@ pub mod collect;
 pub mod compare;
 pub mod cost;
 pub mod doctor;
+pub mod files;
 pub mod gaps;
 pub mod host;
 pub mod html;

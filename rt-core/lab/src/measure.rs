@@ -9,7 +9,8 @@ use crate::watch::{self, CoreWatch};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stylet_runtime::core::{self, HAPTIC_PERIOD_NS, LoopReport, Options, RunReport, TISSUE_PERIOD_NS};
+use stylet_runtime::process::{self, LoopReport, Options, RunReport};
+use stylet_runtime::rt::clock::{HAPTIC_PERIOD_NS, TISSUE_PERIOD_NS};
 use stylet_runtime::rt::haptic::HAPTIC_STAGES;
 use stylet_runtime::rt::timing::{PoseTimes, Probe, Probes};
 use stylet_runtime::rt::tissue::TISSUE_STAGES;
@@ -122,7 +123,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Stri
             .flatten()
             .map(|core| threads.spawn(move || watch::watch(machine, core, stop)))
             .collect();
-        let run = core::run_with(options, Some(probes), stop);
+        let run = process::run_with(options, Some(probes), stop);
         stop.store(true, Ordering::Release);
         let cores: Vec<CoreWatch> = cores.into_iter().filter_map(|t| t.join().ok()).collect();
         (run, host.join(), gaps.join(), cores, haptic.join(), tissue.join())
@@ -134,7 +135,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Stri
     loaded?;
     let gone = |_| "a measuring thread ended by itself".to_owned();
     // Why the loops did not run says more than that the host saw nothing.
-    let run = run?;
+    let run = run.map_err(|e| e.to_string())?;
     Ok(Measured {
         run,
         haptic: haptic.map_err(gone)?,

@@ -3,7 +3,7 @@
 use crate::machine::{Machine, Throttle, core_list};
 use serde::Serialize;
 use stylet_hw::sim::hand::Hand;
-use stylet_runtime::core::{LoopReport, Options, RunReport};
+use stylet_runtime::process::{LoopReport, Options, RunReport};
 use stylet_shm_schema::{ParameterId, ParameterSet};
 
 /// Commit of the sources, `unknown` where they came without git.

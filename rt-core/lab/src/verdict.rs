@@ -8,7 +8,7 @@ use hdrhistogram::Histogram;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
-use stylet_runtime::core::LoopReport;
+use stylet_runtime::process::LoopReport;
 
 /// What a limit looks at.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,7 @@
 //! Checks that a filed report is as it was written. It finds damage and careless edits; it is not a signature.
 
-use crate::report::{JSON, NO_DIGEST, sha256};
+use crate::files::sha256;
+use crate::report::{JSON, NO_DIGEST};
 use std::path::Path;
 
 /// Checks the report at `place`, its folder or its `report.json`, and says what it found: 0 when all is as written.

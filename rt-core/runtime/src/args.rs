@@ -1,25 +1,26 @@
-//! What a run and a measurement take from the command line, and the settings of a run that follow from it.
+//! Options that a run and a measurement share on the command line, and the settings of a run that they give.
 
-use crate::core::{HAPTIC_PERIOD_NS, Options};
 use crate::device::DeviceChoice;
+use crate::process::Options;
 use crate::replay;
-use crate::rt::arm;
+use crate::rt::arm::{self, Refused};
+use crate::rt::clock::HAPTIC_PERIOD_NS;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use stylet_shm_schema::BUILTIN_SCENES;
 use stylet_shm_schema::service::Instance;
 use stylet_sim::scene::TissueKind;
 
-/// What a run and a measurement have in common.
+/// Options that a run and a measurement share.
 #[derive(Args, Debug)]
 pub struct RealTimeArgs {
     /// Built-in scene to start with
     #[arg(long, default_value = BUILTIN_SCENES[0], value_parser = scenes())]
     pub scene: String,
-    /// Run without real-time scheduling; every record and screen then says so
+    /// Run without real-time scheduling; every record and screen then shows it
     #[arg(long)]
     no_rt: bool,
-    /// Try real time first and go on without it when the rights are missing
+    /// Try real time first and run without it when the rights are missing
     #[arg(long, conflicts_with = "no_rt")]
     rt_if_allowed: bool,
     /// Core of the force loop [default: the last one]
@@ -36,6 +37,12 @@ pub struct RealTimeArgs {
     tissue_priority: u32,
 }
 
+/// Settings that cannot be used: every problem, one a line.
+#[derive(Debug, thiserror::Error)]
+#[error("{}", .0.join("\n"))]
+pub struct OptionsError(pub Vec<String>);
+
+/// Names of the built-in scenes, with a line of help for each.
 pub fn scenes() -> PossibleValuesParser {
     let help = |name| match name {
         "paper" => "the gland alone, one tissue, 19,307 elements",
@@ -47,8 +54,8 @@ pub fn scenes() -> PossibleValuesParser {
 }
 
 impl RealTimeArgs {
-    /// Lists what is wrong with the settings.
-    pub fn options(&self, instance: &str) -> Result<Options, String> {
+    /// The settings of a run, or every problem with them.
+    pub fn options(&self, instance: &str) -> Result<Options, OptionsError> {
         let cores: Vec<usize> = core_affinity::get_core_ids()
             .unwrap_or_default()
             .iter()
@@ -62,7 +69,7 @@ impl RealTimeArgs {
         }
         let instance = Instance::new(instance).map_err(|e| problems.push(e.to_string()));
         let refused = if self.rt_if_allowed {
-            may_be_real_time().err()
+            try_real_time().err().map(|why| why.to_string())
         } else {
             None
         };
@@ -81,27 +88,27 @@ impl RealTimeArgs {
                 spin_ns: 0,
                 flight_folder: replay::file::default_folder(),
                 tissue: TissueKind::default(),
-                device: DeviceChoice::Simulated,
+                device: DeviceChoice::default(),
                 libhd: None,
             }),
-            _ => Err(problems.join("\n")),
+            _ => Err(OptionsError(problems)),
         }
     }
 }
 
-/// Tries it in a thread of its own, which then ends; `Err` says how to grant what is missing.
-fn may_be_real_time() -> Result<(), String> {
+/// Tries real-time scheduling in a thread of its own, which then ends; the error explains how to grant what is missing.
+fn try_real_time() -> Result<(), Refused> {
     let ask = arm::Ask {
         priority: Some(1),
         core: None,
     };
-    let armed = std::thread::spawn(move || arm::arm(ask).map(drop).map_err(|e| e.to_string())).join();
-    armed.unwrap_or_else(|_| Err("the trial of real-time scheduling ended by itself".to_owned()))?;
+    let armed = std::thread::spawn(move || arm::arm(ask).map(drop)).join();
+    armed.unwrap_or_else(|_| Err(Refused("the trial of real-time scheduling ended by itself".to_owned())))?;
     // SAFETY: both calls have no preconditions; what is locked now is unlocked again.
     let lockable = unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0 && libc::munlockall() == 0 };
     if lockable {
         Ok(())
     } else {
-        Err(arm::advice("the kernel does not lock memory"))
+        Err(Refused(arm::advice("the kernel does not lock memory")))
     }
 }

@@ -1,9 +1,12 @@
 //! The running core: two real-time loops, the bridge that owns every port, flight recordings and rehearsals.
 
+#![warn(missing_docs)]
+
 pub mod args;
 pub mod bridge;
-pub mod core;
 pub mod device;
+pub mod process;
 pub mod rehearse;
 pub mod replay;
 pub mod rt;
+pub mod stepped;

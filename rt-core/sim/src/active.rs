@@ -4,42 +4,36 @@ use crate::force::ForceParameters;
 use crate::limits::{Limits, TissueParameters};
 use crate::needle::{Layer, Layers, NeedleParameters};
 use stylet_hw::DeviceInfo;
-use stylet_shm_schema::{ParameterId, ParameterSet};
+use stylet_shm_schema::{ParameterId, ParameterProblem, ParameterProblems, ParameterSet};
 
 /// Everything that a change of parameters brings to both threads.
 #[derive(Clone, Debug)]
 pub struct Active {
+    /// Coefficients of eq. 6.
     pub needle: NeedleParameters,
+    /// Coefficients of eq. 8 to 10, and the gate.
     pub force: ForceParameters,
+    /// Limits of the tissue, eq. 3 to 5.
     pub limits: Limits,
 }
 
-/// Validates `set` for `device`; lists every problem.
-pub fn activate(set: &ParameterSet, device: &DeviceInfo) -> Result<Active, Vec<String>> {
-    let mut problems = set.problems();
+/// Validates `set` for `device` by the table of parameters; lists every problem. The models verify their own structures
+/// once more, which a set that passed the table never fails.
+pub fn activate(set: &ParameterSet, device: &DeviceInfo) -> Result<Active, ParameterProblems> {
+    let problems = set.problems_on(device.max_stiffness_n_per_m);
     if !problems.is_empty() {
-        return Err(problems);
+        return Err(ParameterProblems(problems));
     }
-    let needle = needle(set);
-    let force = force(set, device);
-    let limits = tissue(set).validate();
-    problems.extend(needle.validate().err().into_iter().flatten().map(|p| p.to_string()));
-    problems.extend(
-        force
-            .validate_for(device)
-            .err()
-            .into_iter()
-            .flatten()
-            .map(|p| p.to_string()),
-    );
-    match limits {
-        Ok(limits) if problems.is_empty() => Ok(Active { needle, force, limits }),
-        Ok(_) => Err(problems),
-        Err(more) => {
-            problems.extend(more.into_iter().map(|p| p.to_string()));
-            Err(problems)
-        }
-    }
+    let (needle, force) = (needle(set), force(set, device));
+    let limits = tissue(set).validate().map_err(unusable)?;
+    needle.validate().map_err(unusable)?;
+    force.validate().map_err(unusable)?;
+    Ok(Active { needle, force, limits })
+}
+
+fn unusable(problems: Vec<impl ToString>) -> ParameterProblems {
+    let all = problems.iter().map(|p| ParameterProblem::Unusable(p.to_string()));
+    ParameterProblems(all.collect())
 }
 
 fn tissue(set: &ParameterSet) -> TissueParameters {
@@ -127,6 +121,7 @@ fn layers(set: &ParameterSet) -> Layers {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stylet_shm_schema::PARAMETERS;
 
     fn device() -> DeviceInfo {
         DeviceInfo::phantom_premium_1_5()
@@ -171,6 +166,53 @@ mod tests {
         set.set(ParameterId::ShearVertical, 45_f64.to_radians());
         set.set(ParameterId::MembranePeak, 20.0);
         let problems = activate(&set, &device()).expect_err("eq. 1 is broken, the membrane too stiff");
-        assert_eq!(problems.len(), 2, "{problems:?}");
+        assert_eq!(problems.0.len(), 2, "{problems:?}");
+    }
+
+    /// The table and the models used to disagree on the tolerance of the tissue.
+    #[test]
+    fn what_the_table_allows_no_model_refuses() {
+        let usable = |set: &ParameterSet| {
+            let active = activate(set, &device());
+            let refused_by_a_model = |p: &ParameterProblem| matches!(p, ParameterProblem::Unusable(_));
+            assert!(
+                !active.as_ref().is_err_and(|p| p.0.iter().any(refused_by_a_model)),
+                "{active:?}"
+            );
+            active.is_ok()
+        };
+        for p in &PARAMETERS {
+            for value in [p.min, p.max] {
+                let mut set = ParameterSet::default();
+                set.set(p.id, value);
+                usable(&set);
+            }
+        }
+        // Ends and inner values of all at once, by a small generator.
+        let (mut seed, mut accepted) = (0x9e37_79b9_7f4a_7c15_u64, 0);
+        for _ in 0..20_000 {
+            let mut set = ParameterSet::default();
+            for p in &PARAMETERS {
+                seed ^= seed << 13;
+                seed ^= seed >> 7;
+                seed ^= seed << 17;
+                let share = (seed % 5) as f64 / 4.0;
+                set.set(p.id, p.min + share * (p.max - p.min));
+            }
+            accepted += u32::from(usable(&set));
+        }
+        assert!(accepted > 100, "{accepted}");
+    }
+
+    #[test]
+    fn the_tolerance_has_one_limit() {
+        let spec = ParameterId::ResidualTolerance.spec();
+        for (tolerance, ok) in [(spec.max, true), (1.01 * spec.max, false), (spec.min, true)] {
+            let parameters = TissueParameters {
+                residual_tolerance: tolerance,
+                ..TissueParameters::default()
+            };
+            assert_eq!(parameters.validate().is_ok(), ok, "{tolerance}");
+        }
     }
 }

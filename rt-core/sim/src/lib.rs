@@ -2,6 +2,8 @@
 //!
 //! Pure: the same input gives the same bytes. No thread, no clock, no port; the loops that call it are in `stylet-runtime`.
 
+#![warn(missing_docs)]
+
 pub mod active;
 pub mod force;
 pub mod limits;

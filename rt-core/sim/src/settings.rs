@@ -3,34 +3,52 @@
 use core::fmt;
 
 /// One setting that cannot be used.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{key} = {value}: must be {limit}{}", Advice(.advice))]
 pub struct Problem {
+    /// Name of the setting.
     pub key: &'static str,
+    /// Its value, in the unit that the key names.
     pub value: f64,
     /// What would be accepted, in words.
     pub limit: String,
+    /// What to do, or what the limit means; may be empty.
+    pub advice: &'static str,
 }
 
-impl fmt::Display for Problem {
+/// Written behind a problem, in parentheses; nothing where there is none.
+struct Advice<'a>(&'a str);
+
+impl fmt::Display for Advice<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} = {}: must be {}", self.key, self.value, self.limit)
+        match self.0 {
+            "" => Ok(()),
+            advice => write!(f, " ({advice})"),
+        }
     }
 }
 
 /// Collects problems. Start-up only: it allocates.
 #[derive(Debug, Default)]
-pub struct Problems(Vec<Problem>);
+pub(crate) struct Problems(Vec<Problem>);
 
 impl Problems {
     /// `value` must be finite and within `low..=high`.
     pub fn range(&mut self, key: &'static str, value: f64, low: f64, high: f64) {
-        if !(low..=high).contains(&value) {
-            self.add(key, value, format!("within {low} to {high}"));
-        }
+        let is_inside = (low..=high).contains(&value);
+        self.unless(is_inside, key, value, &format!("within {low} to {high}"), "");
     }
 
-    pub fn add(&mut self, key: &'static str, value: f64, limit: String) {
-        self.0.push(Problem { key, value, limit });
+    /// A problem with `key`, unless `holds`.
+    pub fn unless(&mut self, holds: bool, key: &'static str, value: f64, limit: &str, advice: &'static str) {
+        if !holds {
+            self.0.push(Problem {
+                key,
+                value,
+                limit: limit.to_owned(),
+                advice,
+            });
+        }
     }
 
     pub fn extend(&mut self, other: Result<(), Vec<Problem>>) {

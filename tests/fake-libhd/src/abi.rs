@@ -1,8 +1,11 @@
 //! The exported functions.
+//!
+//! Pointers must be null where the interface allows it, or point to as many values as it states. A panic aborts the
+//! process: it cannot unwind out of a C function.
 #![allow(non_snake_case)]
-#![allow(clippy::missing_safety_doc, clippy::not_unsafe_ptr_arg_deref)]
 
 use core::ffi::{CStr, c_char, c_int, c_long, c_ulong, c_ushort, c_void};
+// SYNC: relaxed throughout; see `Control`.
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Duration, Instant};
 
@@ -22,11 +25,11 @@ pub struct ErrorInfo {
 
 /// The block of this library.
 #[unsafe(no_mangle)]
-pub extern "C" fn fake_control() -> *const Control {
+extern "C" fn fake_control() -> *const Control {
     control()
 }
 
-/// Counts the call; true when it was told to fail.
+/// Counts the call; true when the test makes it fail.
 fn fails(function: &str) -> bool {
     let (c, index) = (control(), index_of(function));
     c.calls[index].fetch_add(1, Relaxed);
@@ -43,12 +46,12 @@ fn fails(function: &str) -> bool {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdInitDevice(name: *const c_char) -> u32 {
+unsafe extern "C" fn hdInitDevice(name: *const c_char) -> u32 {
     const NONE: u32 = 0xFFFF_FFFF;
     if fails("hdInitDevice") {
         return NONE;
     }
-    // SAFETY: null or a string that ends with zero, says the interface.
+    // SAFETY: null or a string that ends with zero, as the interface states.
     let name = (!name.is_null()).then(|| unsafe { CStr::from_ptr(name) });
     let known = match control().only_name.load(Relaxed) {
         1 => name == Some(c"Default PHANToM"),
@@ -70,7 +73,7 @@ pub extern "C" fn hdInitDevice(name: *const c_char) -> u32 {
     }
 }
 
-/// The device that a call means.
+/// Whether `handle` is the open device; raises an error otherwise.
 fn checked(d: &mut Driver, handle: u32) -> bool {
     let right = d.open && handle == HANDLE;
     if !right {
@@ -80,7 +83,7 @@ fn checked(d: &mut Driver, handle: u32) -> bool {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdDisableDevice(handle: u32) {
+extern "C" fn hdDisableDevice(handle: u32) {
     let failed = fails("hdDisableDevice");
     let mut d = driver();
     if !failed && checked(&mut d, handle) {
@@ -91,14 +94,14 @@ pub extern "C" fn hdDisableDevice(handle: u32) {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdMakeCurrentDevice(handle: u32) {
+extern "C" fn hdMakeCurrentDevice(handle: u32) {
     if !fails("hdMakeCurrentDevice") {
         checked(&mut driver(), handle);
     }
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdGetCurrentDevice() -> u32 {
+extern "C" fn hdGetCurrentDevice() -> u32 {
     if fails("hdGetCurrentDevice") {
         0xFFFF_FFFF
     } else {
@@ -107,7 +110,7 @@ pub extern "C" fn hdGetCurrentDevice() -> u32 {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdBeginFrame(handle: u32) {
+extern "C" fn hdBeginFrame(handle: u32) {
     let failed = fails("hdBeginFrame");
     let mut d = driver();
     if failed || !checked(&mut d, handle) {
@@ -124,7 +127,7 @@ pub extern "C" fn hdBeginFrame(handle: u32) {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdEndFrame(handle: u32) {
+extern "C" fn hdEndFrame(handle: u32) {
     let failed = fails("hdEndFrame");
     let mut d = driver();
     if !d.in_frame {
@@ -145,7 +148,7 @@ pub extern "C" fn hdEndFrame(handle: u32) {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdGetError() -> ErrorInfo {
+extern "C" fn hdGetError() -> ErrorInfo {
     fails("hdGetError");
     let code = driver().errors.pop().unwrap_or(0);
     ErrorInfo {
@@ -156,7 +159,7 @@ pub extern "C" fn hdGetError() -> ErrorInfo {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdGetErrorString(code: u32) -> *const c_char {
+extern "C" fn hdGetErrorString(code: u32) -> *const c_char {
     fails("hdGetErrorString");
     match code {
         0 => c"Success".as_ptr(),
@@ -168,7 +171,7 @@ pub extern "C" fn hdGetErrorString(code: u32) -> *const c_char {
 const CAPABILITIES: [u32; 7] = [0x4000, 0x4001, 0x4002, 0x4003, 0x4004, 0x2606, 0x2607];
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdEnable(capability: u32) {
+extern "C" fn hdEnable(capability: u32) {
     if fails("hdEnable") {
         return;
     }
@@ -181,7 +184,7 @@ pub extern "C" fn hdEnable(capability: u32) {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdDisable(capability: u32) {
+extern "C" fn hdDisable(capability: u32) {
     if fails("hdDisable") {
         return;
     }
@@ -194,13 +197,13 @@ pub extern "C" fn hdDisable(capability: u32) {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdIsEnabled(capability: u32) -> u8 {
+extern "C" fn hdIsEnabled(capability: u32) -> u8 {
     let off = fails("hdIsEnabled") || control().no_force.load(Relaxed) != 0;
     u8::from(!off && driver().enabled.contains(&capability))
 }
 
-/// `kinds` of the asked type; how many values, or an error.
-fn asked(d: &mut Driver, parameter: u32, kinds: &[Kind], null: bool) -> Option<usize> {
+/// Number of values of a parameter of one of `kinds`; raises an error and returns `None` otherwise.
+fn count_of(d: &mut Driver, parameter: u32, kinds: &[Kind], null: bool) -> Option<usize> {
     let found = PARAMETERS.iter().find(|(number, ..)| *number == parameter);
     match found {
         None => d.raise(0x0100),
@@ -211,63 +214,71 @@ fn asked(d: &mut Driver, parameter: u32, kinds: &[Kind], null: bool) -> Option<u
     None
 }
 
-fn give<T: Copy>(to: *mut T, values: &[T]) {
-    // SAFETY: the caller gives room for as many as the interface states.
+/// # Safety
+///
+/// `to` has room for all `values`.
+unsafe fn give<T: Copy>(to: *mut T, values: &[T]) {
+    // SAFETY: by the contract of this function.
     unsafe { core::ptr::copy_nonoverlapping(values.as_ptr(), to, values.len()) };
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdGetBooleanv(parameter: u32, values: *mut u8) {
+unsafe extern "C" fn hdGetBooleanv(parameter: u32, values: *mut u8) {
     let failed = fails("hdGetBooleanv");
     let mut d = driver();
-    if !failed && asked(&mut d, parameter, &[Kind::Bools], values.is_null()).is_some() {
+    if !failed && count_of(&mut d, parameter, &[Kind::Bools], values.is_null()).is_some() {
         let inkwell = parameter == 0x2002 && control().in_inkwell.load(Relaxed) != 0;
-        give(values, &[u8::from(inkwell)]);
+        // SAFETY: the caller provides room for as many as the interface states.
+        unsafe { give(values, &[u8::from(inkwell)]) };
     }
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdGetIntegerv(parameter: u32, values: *mut c_int) {
+unsafe extern "C" fn hdGetIntegerv(parameter: u32, values: *mut c_int) {
     let failed = fails("hdGetIntegerv");
     let mut d = driver();
-    if !failed && asked(&mut d, parameter, &[Kind::Ints], values.is_null()).is_some() {
-        give(values, &d.ints(parameter).unwrap_or_default());
+    if !failed && count_of(&mut d, parameter, &[Kind::Ints], values.is_null()).is_some() {
+        // SAFETY: the caller provides room for as many as the interface states.
+        unsafe { give(values, &d.ints(parameter).unwrap_or_default()) };
     }
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdGetFloatv(parameter: u32, values: *mut f32) {
+unsafe extern "C" fn hdGetFloatv(parameter: u32, values: *mut f32) {
     let failed = fails("hdGetFloatv");
     let mut d = driver();
-    if !failed && asked(&mut d, parameter, &[Kind::Reals, Kind::Floats], values.is_null()).is_some() {
+    if !failed && count_of(&mut d, parameter, &[Kind::Reals, Kind::Floats], values.is_null()).is_some() {
         let reals = d.reals(parameter).unwrap_or_default();
-        give(values, &reals.iter().map(|x| *x as f32).collect::<Vec<_>>());
+        // SAFETY: the caller provides room for as many as the interface states.
+        unsafe { give(values, &reals.iter().map(|x| *x as f32).collect::<Vec<_>>()) };
     }
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdGetDoublev(parameter: u32, values: *mut f64) {
+unsafe extern "C" fn hdGetDoublev(parameter: u32, values: *mut f64) {
     let failed = fails("hdGetDoublev");
     let mut d = driver();
-    if !failed && asked(&mut d, parameter, &[Kind::Reals], values.is_null()).is_some() {
-        give(values, &d.reals(parameter).unwrap_or_default());
+    if !failed && count_of(&mut d, parameter, &[Kind::Reals], values.is_null()).is_some() {
+        // SAFETY: the caller provides room for as many as the interface states.
+        unsafe { give(values, &d.reals(parameter).unwrap_or_default()) };
     }
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdGetLongv(parameter: u32, values: *mut c_long) {
+unsafe extern "C" fn hdGetLongv(parameter: u32, values: *mut c_long) {
     let failed = fails("hdGetLongv");
     let mut d = driver();
-    if !failed && let Some(count) = asked(&mut d, parameter, &[Kind::Longs], values.is_null()) {
+    if !failed && let Some(count) = count_of(&mut d, parameter, &[Kind::Longs], values.is_null()) {
         let counts: Vec<c_long> = (1..=count as c_long).map(|i| 1000 * i).collect();
-        give(values, &counts);
+        // SAFETY: the caller provides room for as many as the interface states.
+        unsafe { give(values, &counts) };
     }
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdGetString(parameter: u32) -> *const c_char {
+extern "C" fn hdGetString(parameter: u32) -> *const c_char {
     let failed = fails("hdGetString");
-    if failed || asked(&mut driver(), parameter, &[Kind::Text], false).is_none() {
+    if failed || count_of(&mut driver(), parameter, &[Kind::Text], false).is_none() {
         return core::ptr::null();
     }
     let text = match (parameter, control().model.load(Relaxed)) {
@@ -284,7 +295,7 @@ pub extern "C" fn hdGetString(parameter: u32) -> *const c_char {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdSetBooleanv(_parameter: u32, _values: *const u8) {
+unsafe extern "C" fn hdSetBooleanv(_parameter: u32, _values: *const u8) {
     if !fails("hdSetBooleanv") {
         // The interface has no bool that can be set.
         driver().raise(0x0100);
@@ -292,7 +303,7 @@ pub extern "C" fn hdSetBooleanv(_parameter: u32, _values: *const u8) {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdSetIntegerv(parameter: u32, _values: *const c_int) {
+unsafe extern "C" fn hdSetIntegerv(parameter: u32, _values: *const c_int) {
     if !fails("hdSetIntegerv") && parameter != 0x2900 {
         driver().raise(0x0100);
     }
@@ -312,23 +323,23 @@ fn set_reals(parameter: u32, values: [f64; 3]) {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdSetFloatv(parameter: u32, values: *const f32) {
+unsafe extern "C" fn hdSetFloatv(parameter: u32, values: *const f32) {
     if !fails("hdSetFloatv") {
-        // SAFETY: three numbers, says the interface.
+        // SAFETY: three numbers, as the interface states.
         set_reals(parameter, [0, 1, 2].map(|i| f64::from(unsafe { *values.add(i) })));
     }
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdSetDoublev(parameter: u32, values: *const f64) {
+unsafe extern "C" fn hdSetDoublev(parameter: u32, values: *const f64) {
     if !fails("hdSetDoublev") {
-        // SAFETY: three numbers, says the interface.
+        // SAFETY: three numbers, as the interface states.
         set_reals(parameter, [0, 1, 2].map(|i| unsafe { *values.add(i) }));
     }
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdSetLongv(parameter: u32, _values: *const c_long) {
+unsafe extern "C" fn hdSetLongv(parameter: u32, _values: *const c_long) {
     if !fails("hdSetLongv") {
         // Motor values and Cartesian forces do not go together.
         driver().raise(if parameter == 0x2750 { 0x0204 } else { 0x0100 });
@@ -336,7 +347,7 @@ pub extern "C" fn hdSetLongv(parameter: u32, _values: *const c_long) {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdCheckCalibration() -> u32 {
+extern "C" fn hdCheckCalibration() -> u32 {
     if fails("hdCheckCalibration") || control().uncalibrated.load(Relaxed) == 0 {
         return 0x5000;
     }
@@ -346,31 +357,31 @@ pub extern "C" fn hdCheckCalibration() -> u32 {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdCheckCalibrationStyle() -> u32 {
+extern "C" fn hdCheckCalibrationStyle() -> u32 {
     fails("hdCheckCalibrationStyle");
     style()
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdUpdateCalibrationMessage(_style: u32) {
+extern "C" fn hdUpdateCalibrationMessage(_style: u32) {
     fails("hdUpdateCalibrationMessage");
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdUpdateCalibration(style_asked: u32) {
+extern "C" fn hdUpdateCalibration(requested: u32) {
     if fails("hdUpdateCalibration") {
         return;
     }
     let c = control();
-    if style_asked & style() == 0 {
+    if requested & style() == 0 {
         driver().raise(0x0101);
         return;
     }
-    if style_asked == 4 && c.in_inkwell.load(Relaxed) == 0 {
+    if requested == 4 && c.in_inkwell.load(Relaxed) == 0 {
         driver().raise(0x0102);
         return;
     }
-    if style_asked == 1 {
+    if requested == 1 {
         c.miscalibrated
             .store(u32::from(c.in_neutral_pose.load(Relaxed) == 0), Relaxed);
     }
@@ -378,16 +389,17 @@ pub extern "C" fn hdUpdateCalibration(style_asked: u32) {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdScaleGimbalAngles(x: f64, y: f64, z: f64, transform: *mut f64) {
+unsafe extern "C" fn hdScaleGimbalAngles(x: f64, y: f64, z: f64, transform: *mut f64) {
     if !fails("hdScaleGimbalAngles") {
         let mut scaled = [0.0; 16];
         (scaled[0], scaled[5], scaled[10], scaled[15]) = (x, y, z, 1.0);
-        give(transform, &scaled);
+        // SAFETY: the caller provides room for as many as the interface states.
+        unsafe { give(transform, &scaled) };
     }
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdDeploymentLicense(vendor: *const c_char, product: *const c_char, key: *const c_char) -> u8 {
+unsafe extern "C" fn hdDeploymentLicense(vendor: *const c_char, product: *const c_char, key: *const c_char) -> u8 {
     if fails("hdDeploymentLicense") {
         return 0;
     }
@@ -399,21 +411,21 @@ pub extern "C" fn hdDeploymentLicense(vendor: *const c_char, product: *const c_c
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdStartScheduler() {
+extern "C" fn hdStartScheduler() {
     if !fails("hdStartScheduler") {
         scheduler::start();
     }
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdStopScheduler() {
+extern "C" fn hdStopScheduler() {
     if !fails("hdStopScheduler") {
         scheduler::stop();
     }
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdSetSchedulerRate(rate_hz: c_ulong) {
+extern "C" fn hdSetSchedulerRate(rate_hz: c_ulong) {
     if fails("hdSetSchedulerRate") {
         return;
     }
@@ -426,7 +438,7 @@ pub extern "C" fn hdSetSchedulerRate(rate_hz: c_ulong) {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdScheduleSynchronous(function: ServoFunction, context: *mut c_void, _priority: c_ushort) {
+unsafe extern "C" fn hdScheduleSynchronous(function: ServoFunction, context: *mut c_void, _priority: c_ushort) {
     if fails("hdScheduleSynchronous") {
         return;
     }
@@ -434,13 +446,13 @@ pub extern "C" fn hdScheduleSynchronous(function: ServoFunction, context: *mut c
         let id = driver().schedule(function, context as usize);
         wait_for(id);
     } else {
-        // SAFETY: the caller vouches for both.
+        // SAFETY: the caller promises that both are valid.
         unsafe { function(context) };
     }
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdScheduleAsynchronous(
+unsafe extern "C" fn hdScheduleAsynchronous(
     function: ServoFunction,
     context: *mut c_void,
     _priority: c_ushort,
@@ -452,7 +464,7 @@ pub extern "C" fn hdScheduleAsynchronous(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdUnschedule(id: c_ulong) {
+extern "C" fn hdUnschedule(id: c_ulong) {
     if fails("hdUnschedule") {
         return;
     }
@@ -469,14 +481,14 @@ fn is_scheduled(id: c_ulong) -> bool {
 }
 
 fn wait_for(id: c_ulong) {
-    let begun = Instant::now();
-    while is_scheduled(id) && begun.elapsed() < Duration::from_secs(1) {
+    let start = Instant::now();
+    while is_scheduled(id) && start.elapsed() < Duration::from_secs(1) {
         std::thread::sleep(Duration::from_micros(200));
     }
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdWaitForCompletion(id: c_ulong, code: u32) -> u8 {
+extern "C" fn hdWaitForCompletion(id: c_ulong, code: u32) -> u8 {
     if fails("hdWaitForCompletion") {
         return 0;
     }
@@ -487,7 +499,7 @@ pub extern "C" fn hdWaitForCompletion(id: c_ulong, code: u32) -> u8 {
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn hdGetSchedulerTimeStamp() -> f64 {
+extern "C" fn hdGetSchedulerTimeStamp() -> f64 {
     fails("hdGetSchedulerTimeStamp");
     driver().tick_began.elapsed().as_secs_f64()
 }

@@ -7,6 +7,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use stylet_hw::{Device, HandGoal, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
 
 use crate::control::{Control, FORCES_KEPT, VARIABLE, get, put};
+// SYNC: relaxed where nothing else is said; see `Control`.
 use std::sync::atomic::Ordering::{Acquire, Relaxed};
 
 pub const HANDLE: u32 = 7;
@@ -20,7 +21,7 @@ pub struct Callback {
 
 pub struct Driver {
     pub open: bool,
-    /// Lost its cable; only disabling and initialising helps.
+    /// The cable was unplugged; only disabling and initialising repairs it.
     pub broken: bool,
     pub in_frame: bool,
     pub errors: Vec<u32>,
@@ -70,7 +71,7 @@ impl Driver {
         }
     }
 
-    /// Newest on top; a full stack forgets the oldest.
+    /// Puts an error on the stack; a full stack drops the oldest.
     pub fn raise(&mut self, code: u32) {
         if self.errors.len() == 32 {
             self.errors.remove(0);
@@ -89,7 +90,7 @@ impl Driver {
         id
     }
 
-    /// The hand moves on by one tick under the force of the last one.
+    /// Moves the hand by one tick under the force of the previous tick.
     pub fn advance(&mut self) {
         let c = control();
         let tick = c.ticks.fetch_add(1, Relaxed);
@@ -98,7 +99,7 @@ impl Driver {
             put(&c.torque_mnm[axis], self.torque_mnm[axis]);
             put(&c.forces_n[tick as usize % FORCES_KEPT][axis], self.force_n[axis]);
         }
-        // SYNC: pairs with the release of `send_hand`.
+        // SYNC: acquire pairs with the release in `send_hand`.
         let number = c.goal_number.load(Acquire);
         if number != self.goal_number {
             self.goal_number = number;
@@ -125,7 +126,7 @@ impl Driver {
         self.enabled.contains(&0x4000) && control().no_force.load(Relaxed) == 0
     }
 
-    /// What the motors have to say about this frame's force.
+    /// Raises the error of a force that the motors refuse, and records the largest one.
     pub fn check_force(&mut self) {
         let size = Vector3::from(self.force_n).norm();
         if size > get(&control().peak_force_n) {
@@ -211,7 +212,7 @@ impl Driver {
     }
 }
 
-/// How the device wants to be calibrated.
+/// Calibration style of the device.
 pub fn style() -> u32 {
     match control().calibration_style.load(Relaxed) {
         0 => 1,

@@ -1,10 +1,12 @@
 //! A `libHD.so` for tests: the 36 functions of the driver's ABI over a simulated Phantom, with errors on command.
 //!
-//! Numbers and units are typed here a second time ([`table`]), so that a slip in the code under test shows. The test and
+//! Numbers and units are typed here a second time ([`table`]), which reveals a wrong number in the code under test. The test and
 //! the fake share a [`Control`] block: in one process through `fake_control`, in two through the file that the variable
 //! [`control::VARIABLE`] names.
 
-pub mod abi;
+#![warn(missing_docs)]
+
+mod abi;
 pub mod control;
 mod driver;
 mod scheduler;

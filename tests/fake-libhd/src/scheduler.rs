@@ -1,4 +1,4 @@
-//! The servo thread of the fake: one tick a period on an absolute grid, unless it is told to be late or silent.
+//! The servo thread of the fake: one tick per period on an absolute grid, unless the test makes it late or silent.
 
 use std::cell::Cell;
 use std::sync::atomic::Ordering::Relaxed;
@@ -19,6 +19,7 @@ thread_local! {
 static THREAD: Mutex<Option<JoinHandle<()>>> = Mutex::new(None);
 
 pub fn is_running() -> bool {
+    // SYNC: acquire pairs with the release of `start` and `stop`.
     RUNNING.load(Ordering::Acquire)
 }
 
@@ -27,6 +28,7 @@ pub fn is_this_thread() -> bool {
 }
 
 pub fn start() {
+    // SYNC: release pairs with the acquire in `is_running`, acquire with the release in `stop`.
     if RUNNING.swap(true, Ordering::AcqRel) {
         return;
     }
@@ -35,6 +37,7 @@ pub fn start() {
 }
 
 pub fn stop() {
+    // SYNC: release pairs with the acquire in `is_running`, by which the servo thread ends; the join orders the rest.
     RUNNING.store(false, Ordering::Release);
     let thread = THREAD.lock().unwrap_or_else(PoisonError::into_inner).take();
     if let Some(thread) = thread {
@@ -49,9 +52,10 @@ fn run() {
     let mut due = Instant::now();
     while is_running() {
         due += Duration::from_secs(1) / driver().rate_hz.max(1) as u32;
+        // SYNC: relaxed; see `Control`.
         let late = Duration::from_micros(control().late_us.load(Relaxed).into());
         std::thread::sleep((due + late).saturating_duration_since(Instant::now()));
-        // Like a driver that waits for an interrupt: what was missed is not made up for.
+        // Like a driver that waits for an interrupt: missed ticks are not repeated.
         due = due.max(Instant::now() - Duration::from_millis(2));
         if control().stalled.load(Relaxed) == 0 {
             tick();
@@ -67,7 +71,7 @@ fn tick() {
         driver.callbacks.iter().map(|c| (c.id, c.function, c.context)).collect()
     };
     for (id, function, context) in scheduled {
-        // SAFETY: whoever scheduled it vouches for both.
+        // SAFETY: the caller of `hdSchedule...` promises that both stay valid.
         let again = unsafe { function(context as *mut core::ffi::c_void) };
         if again == 0 {
             driver().callbacks.retain(|c| c.id != id);

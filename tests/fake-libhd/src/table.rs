@@ -1,4 +1,4 @@
-//! The interface as the vendor documents it, typed apart from the code under test: so a wrong number there fails here.
+//! The interface as the vendor documents it, typed independently of the code under test, so that a wrong number fails.
 
 /// Every exported function.
 pub const FUNCTIONS: [&str; 36] = [
@@ -40,7 +40,7 @@ pub const FUNCTIONS: [&str; 36] = [
     "hdGetSchedulerTimeStamp",
 ];
 
-/// Every error by number and name.
+/// Number and name of every error.
 pub const ERRORS: [(u32, &str); 22] = [
     (0x0000, "HD_SUCCESS"),
     (0x0100, "HD_INVALID_ENUM"),
@@ -66,20 +66,24 @@ pub const ERRORS: [(u32, &str); 22] = [
     (0x0600, "HD_INVALID_LICENSE"),
 ];
 
-/// What a parameter holds.
+/// Type of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
+    /// `int`.
     Ints,
+    /// `unsigned char`.
     Bools,
+    /// `long`.
     Longs,
-    /// Floats and doubles.
+    /// `float` or `double`.
     Reals,
-    /// Floats alone.
+    /// `float` only.
     Floats,
+    /// String.
     Text,
 }
 
-/// Readable parameters: number, kind, how many.
+/// Readable parameters: number, kind, count.
 pub const PARAMETERS: &[(u32, Kind, usize)] = &[
     (0x2000, Kind::Ints, 1),
     (0x2001, Kind::Bools, 1),

@@ -100,14 +100,14 @@ impl Link {
             let p = *sample.payload();
             match check::parameters(&p) {
                 Ok(()) => self.latest.parameters.put(id, p.session_id, p),
-                Err(_) => self.rubbish_refused += 1,
+                Err(_) => self.invalid_dropped += 1,
             }
         }
         while let Ok(Some(sample)) = ports.plan.receive() {
             let p = *sample.payload();
             match check::plan(&p) {
                 Ok(()) => self.latest.plan.put(id, p.session_id, p),
-                Err(_) => self.rubbish_refused += 1,
+                Err(_) => self.invalid_dropped += 1,
             }
         }
         while let Ok(Some(sample)) = ports.events.receive() {
@@ -116,7 +116,7 @@ impl Link {
             if finite && EventKind::from_number(event.kind).is_some() {
                 self.latest.put_event(event);
             } else {
-                self.rubbish_refused += 1;
+                self.invalid_dropped += 1;
             }
         }
         // Before the replies: whoever has the reply to a rehearsal has its result.
@@ -124,7 +124,7 @@ impl Link {
             let rehearsal = *sample.payload();
             match check::rehearsal(&rehearsal) {
                 Ok(()) => self.take_rehearsal(rehearsal),
-                Err(_) => self.rubbish_refused += 1,
+                Err(_) => self.invalid_dropped += 1,
             }
         }
         while let Ok(Some(sample)) = ports.replies.receive() {
@@ -144,7 +144,7 @@ impl Link {
                     newest = Some(session);
                 }
             } else {
-                self.rubbish_refused += 1;
+                self.invalid_dropped += 1;
             }
         }
         let Some(session) = newest else { return };
@@ -159,7 +159,7 @@ impl Link {
         while let Ok(Some(sample)) = ports.scene.receive() {
             let (header, words) = (*sample.user_header(), sample.payload());
             let Some(model) = SceneModel::of_words(&header, words) else {
-                self.rubbish_refused += 1;
+                self.invalid_dropped += 1;
                 continue;
             };
             self.latest
@@ -176,7 +176,7 @@ impl Link {
         let Some(sample) = newest else { return };
         let (header, vertices) = (*sample.user_header(), sample.payload());
         if check::snapshot(&header, vertices).is_err() {
-            self.rubbish_refused += 1;
+            self.invalid_dropped += 1;
             return;
         }
         let (surface, inside) = vertices.split_at(header.vertex_count as usize);
@@ -196,7 +196,7 @@ impl Link {
                 match check::record(record) {
                     Ok(()) if id == Some(record.session_id) => self.records.push(*record),
                     Ok(()) => {}
-                    Err(_) => self.rubbish_refused += 1,
+                    Err(_) => self.invalid_dropped += 1,
                 }
             }
         }

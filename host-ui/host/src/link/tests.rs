@@ -40,7 +40,7 @@ fn no_core_says_what_to_type() {
         panic!("{:?}", link.status())
     };
     assert!(why.contains("rt-core --instance absent-"), "{why}");
-    assert!(link.send(CommandKind::Engage, &[]).is_err());
+    assert!(link.send(&Request::Engage).is_err());
 }
 
 #[test]
@@ -82,8 +82,8 @@ fn a_restarted_core_is_found_and_nothing_of_the_first_run_is_left() {
 }
 
 #[test]
-fn rubbish_is_counted_and_not_used() {
-    let instance = instance("rubbish");
+fn invalid_messages_are_counted_and_not_used() {
+    let instance = instance("invalid");
     let mut link = Link::new(instance.0.clone());
     link.poll();
     let node = instance.node().unwrap();
@@ -99,7 +99,7 @@ fn rubbish_is_counted_and_not_used() {
         .unwrap();
     link.poll();
     assert!(link.plan().is_none() && link.events().is_empty());
-    assert_eq!(link.rubbish_refused(), 2);
+    assert_eq!(link.invalid_dropped(), 2);
 }
 
 #[test]
@@ -115,20 +115,18 @@ fn a_command_and_a_volume_arrive_and_are_answered_once() {
     sessions.send_copy(announce(9, 1)).unwrap();
     link.poll();
 
-    let id = link.send(CommandKind::MoveHand, &[1.0, 2.0]).unwrap();
+    let request = Request::LoadBuiltinScene(2);
+    let id = link.send(&request).unwrap();
     let command = *commands.receive().unwrap().unwrap();
-    assert_eq!(
-        (command.command_id, command.value_count, command.values[1]),
-        (id, 2, 2.0)
-    );
+    assert_eq!((command.command_id, Request::decode(&command)), (id, Ok(request)));
     for (host_id, text) in [(command.host_id, "mine"), (command.host_id ^ 1, "another's")] {
-        let mut reply = Reply::zeroed();
-        (reply.session_id, reply.host_id, reply.command_id) = (9, host_id, id);
-        (reply.status, reply.text) = (ReplyStatus::Refused as u32, Text::new(text));
-        replies.send_copy(reply).unwrap();
+        let refusal = Refusal::new(RefusalCode::SceneLoading, text);
+        replies.send_copy(Reply::new(9, (host_id, id), Err(&refusal))).unwrap();
     }
     link.poll();
-    assert_eq!(link.reply(id).unwrap().text, "mine");
+    let answer = link.reply(id).unwrap();
+    assert_eq!(answer.text, "mine");
+    assert!(answer.is_refused_for(RefusalCode::SceneLoading) && !answer.accepted);
     assert_eq!(link.reply(id), None);
 
     let volume = LabelVolume {

@@ -1,21 +1,28 @@
 //! What can be made of a recording: a table, and a motion for the core's replay device.
 
+use super::error::RecordError;
 use super::messages::Tick;
 use super::read::{Recording, read};
-use std::path::{Path, PathBuf};
+use std::io::Write;
+use std::path::PathBuf;
+use stylet_base::{write_streamed, write_whole};
 use stylet_shm_schema::motion::{Motion, MotionSample};
 
 /// The period of the force loop's ideal grid.
 const PERIOD_NS: u64 = 1_000_000;
 
+/// What to export from a recording.
 pub struct Export {
+    /// The recording, MCAP.
     pub recording: PathBuf,
+    /// Table of the ticks.
     pub csv: Option<PathBuf>,
+    /// Motion for the core's replay device.
     pub motion: Option<PathBuf>,
 }
 
-/// Writes what was asked for, and tells what the recording holds.
-pub fn export(options: &Export) -> Result<(), String> {
+/// Writes what was asked for, and prints what the recording holds.
+pub fn export(options: &Export) -> Result<(), RecordError> {
     let recording = read(&options.recording)?;
     println!(
         "{} ticks of {} session(s), {} missing in {} gaps",
@@ -28,12 +35,12 @@ pub fn export(options: &Export) -> Result<(), String> {
         println!("note: the recording was cut off ({why}); what came before is used");
     }
     if let Some(path) = &options.csv {
-        csv(&recording.ticks, path).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_streamed(path, |file| csv(&recording.ticks, file))?;
         println!("written: {}", path.display());
     }
     if let Some(path) = &options.motion {
         let (motion, filled) = motion(&recording);
-        std::fs::write(path, motion.to_bytes()).map_err(|e| format!("{}: {e}", path.display()))?;
+        write_whole(path, &motion.to_bytes())?;
         println!(
             "written: {}, {} samples, {filled} of them held where the recording has none; play it with: rt-core --device replay:{}",
             path.display(),
@@ -78,8 +85,8 @@ const COLUMNS: [&str; 31] = [
     "session_begins",
 ];
 
-fn csv(ticks: &[Tick], path: &Path) -> Result<(), csv::Error> {
-    let mut table = csv::Writer::from_path(path)?;
+fn csv(ticks: &[Tick], file: &mut impl Write) -> std::io::Result<()> {
+    let mut table = csv::Writer::from_writer(file);
     table.write_record(COLUMNS)?;
     let mut before: Option<&Tick> = None;
     for t in ticks {
@@ -117,8 +124,7 @@ fn csv(ticks: &[Tick], path: &Path) -> Result<(), csv::Error> {
         table.write_record(&row)?;
         before = Some(t);
     }
-    table.flush()?;
-    Ok(())
+    table.flush()
 }
 
 /// The hand's motion in the first session, on the grid of the force loop; and how many samples had to be held, because

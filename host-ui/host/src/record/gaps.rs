@@ -5,13 +5,15 @@ use std::collections::BTreeSet;
 /// Ticks that are missing in a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gap {
+    /// The run of the core.
     pub session_id: u64,
     /// The first that is missing.
     pub tick: u64,
+    /// Ticks that are missing.
     pub missing: u64,
 }
 
-/// Counts what comes and what does not.
+/// Counts the ticks that arrive and those that are missing.
 #[derive(Clone, Debug, Default)]
 pub struct Gaps {
     records: u64,
@@ -45,18 +47,22 @@ impl Gaps {
         true
     }
 
+    /// Ticks that arrived.
     pub fn records(&self) -> u64 {
         self.records
     }
 
+    /// Ticks that arrived more than once.
     pub fn repeated(&self) -> u64 {
         self.repeated
     }
 
+    /// Runs of the core.
     pub fn sessions(&self) -> usize {
         self.sessions.len()
     }
 
+    /// The gaps, in their order.
     pub fn gaps(&self) -> &[Gap] {
         &self.gaps
     }

@@ -125,7 +125,7 @@ fn event_schema() -> Value {
     object(
         EVENT.schema,
         json!({
-            "session_id": whole("run of rt-core"), "sequence": whole("of the event"), "tick": whole("of the loop that told it"),
+            "session_id": whole("run of rt-core"), "sequence": whole("of the event"), "tick": whole("of the loop that reported it"),
             "time_ns": whole("CLOCK_MONOTONIC"), "kind": { "type": "string" }, "code": whole("seed, fault or nothing, by kind"),
             "value": number("m or nothing, by kind"), "position_m": vector(3, "m"), "text": { "type": "string" },
         }),

@@ -1,15 +1,17 @@
 //! A session on disk: every record of the force loop, the tissue's snapshots and what happened, in MCAP; and what can be
 //! made of such a file.
 //!
-//! One thread takes what comes from shared memory, another encodes and writes it: the disk may be slow for as long as
+//! One thread takes what arrives in shared memory, another encodes and writes it: the disk may be slow for as long as
 //! memory lasts. Every tick that is missing is counted.
 
+mod error;
 mod export;
 mod gaps;
 mod messages;
 mod read;
 mod writer;
 
+pub use error::RecordError;
 pub use export::{Export, export};
 pub use gaps::{Gap, Gaps};
 pub use read::{Recording, read};
@@ -19,16 +21,19 @@ use std::path::PathBuf;
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::Request;
 use stylet_shm_schema::service::Instance;
 use writer::{Item, Totals};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);
 const FIND_LIMIT: Duration = Duration::from_secs(3);
-const TELL_EVERY: Duration = Duration::from_secs(10);
+const PRINT_EVERY: Duration = Duration::from_secs(10);
 
+/// What to record.
 pub struct Options {
+    /// Which core.
     pub instance: Instance,
+    /// The file, MCAP.
     pub out: PathBuf,
     /// Until interrupted, or until the core ends, when not given.
     pub duration: Option<Duration>,
@@ -37,9 +42,9 @@ pub struct Options {
 }
 
 /// Records until the time is over or it is interrupted; an error when a tick was lost on the way.
-pub fn run(options: &Options) -> Result<(), String> {
-    let interrupted = Interrupt::on_signals()?;
-    let stop = || interrupted.is_requested();
+pub fn run(options: &Options) -> Result<(), RecordError> {
+    let interrupted = Interrupt::on_signals().map_err(|e| RecordError::Signals(e.to_string()))?;
+    let stop = || interrupted.asked();
     let mut link = Link::new(options.instance.clone());
     find_core(&mut link, stop)?;
     let (send, receive) = mpsc::channel();
@@ -47,30 +52,30 @@ pub fn run(options: &Options) -> Result<(), String> {
     let writer = std::thread::Builder::new()
         .name("recording".to_owned())
         .spawn(move || writer::write_all(&path, &receive))
-        .map_err(|e| format!("no thread could be started to write: {e}"))?;
+        .map_err(RecordError::NoThread)?;
     take(&mut link, options, stop, &send);
     drop(send);
-    let totals = writer
-        .join()
-        .map_err(|_| "the recording ended by itself".to_owned())??;
+    let totals = writer.join().map_err(|_| RecordError::Panicked)??;
     println!("{}: {}", options.out.display(), totals.words());
     totals.verdict()
 }
 
-fn find_core(link: &mut Link, stop: impl Fn() -> bool) -> Result<(), String> {
+fn find_core(link: &mut Link, stop: impl Fn() -> bool) -> Result<(), RecordError> {
     let begun = Instant::now();
     while begun.elapsed() < FIND_LIMIT && !stop() {
         link.poll();
         if link.status() == LinkStatus::Live && link.scene().is_some() {
-            // What came before the recording began is not part of it.
+            // Records from before the recording began are not part of it.
             link.take_records();
             return Ok(());
         }
         std::thread::sleep(POLL_EVERY);
     }
     match link.status() {
-        LinkStatus::Absent { why } => Err(why),
-        _ => Err("rt-core is there but does not answer; end it and start it again".to_owned()),
+        LinkStatus::Absent { why } => Err(RecordError::NoCore(why)),
+        _ => Err(RecordError::NoCore(
+            "rt-core runs but does not answer; end it and start it again".to_owned(),
+        )),
     }
 }
 
@@ -83,10 +88,10 @@ struct Handed {
     snapshot_ns: u64,
 }
 
-/// Takes what comes and hands it to the writer, which never makes this thread wait.
+/// Takes what arrives and hands it to the writer, which never makes this thread wait.
 fn take(link: &mut Link, options: &Options, stop: impl Fn() -> bool, to: &mpsc::Sender<Item>) {
     let begun = Instant::now();
-    let mut told = begun;
+    let mut printed = begun;
     let mut handed = Handed::default();
     let mut records = 0;
     while !stop() && options.duration.is_none_or(|d| begun.elapsed() < d) {
@@ -97,7 +102,7 @@ fn take(link: &mut Link, options: &Options, stop: impl Fn() -> bool, to: &mpsc::
             if let Item::Records(new) = &item {
                 records += new.len();
             }
-            // A writer that ended has its reason told at the end.
+            // A writer that ended early returns its reason at the end.
             if to.send(item).is_err() {
                 return;
             }
@@ -105,8 +110,8 @@ fn take(link: &mut Link, options: &Options, stop: impl Fn() -> bool, to: &mpsc::
         if matches!(link.status(), LinkStatus::Absent { .. }) && options.duration.is_none() {
             return;
         }
-        if told.elapsed() >= TELL_EVERY {
-            told = Instant::now();
+        if printed.elapsed() >= PRINT_EVERY {
+            printed = Instant::now();
             println!("{:5.0} s  {records} ticks", begun.elapsed().as_secs_f64());
         }
         std::thread::sleep(POLL_EVERY);
@@ -145,19 +150,19 @@ impl Handed {
     }
 }
 
-/// Asks the core for its flight recording; gives what the core says of it.
-pub fn save_flight(instance: &Instance) -> Result<String, String> {
+/// Asks the core to write its flight recording; the core's message about it.
+pub fn save_flight(instance: &Instance) -> Result<String, RecordError> {
     let mut link = Link::new(instance.clone());
     find_core(&mut link, || false)?;
     let before = link.events().back().map_or(0, |e| e.sequence);
-    let id = link.send(CommandKind::SaveFlight, &[]).map_err(|e| e.0)?;
+    let id = link.send(&Request::SaveFlight)?;
     let begun = Instant::now();
     let mut accepted = false;
     while begun.elapsed() < Duration::from_secs(10) {
         link.poll();
         if let Some(answer) = link.reply(id) {
             if !answer.accepted {
-                return Err(answer.text);
+                return Err(RecordError::Refused(answer.text));
             }
             accepted = true;
         }
@@ -168,14 +173,17 @@ pub fn save_flight(instance: &Instance) -> Result<String, String> {
         }
         std::thread::sleep(POLL_EVERY);
     }
-    Err("the core did not write its flight recording in time".to_owned())
+    Err(RecordError::NoFlight)
 }
 
 impl Totals {
-    fn verdict(&self) -> Result<(), String> {
+    fn verdict(&self) -> Result<(), RecordError> {
         match self.gaps.missing() {
             0 => Ok(()),
-            n => Err(format!("{n} ticks are missing in {} gaps", self.gaps.gaps().len())),
+            ticks => Err(RecordError::Missing {
+                ticks,
+                gaps: self.gaps.gaps().len(),
+            }),
         }
     }
 }

@@ -1,24 +1,27 @@
 //! A recording read again, as far as an export needs it.
 
+use super::error::RecordError;
 use super::gaps::Gaps;
 use super::messages::{TICK, Tick};
 use std::path::Path;
 
-/// The ticks of a recording, in the order in which they came.
+/// The ticks of a recording, in the order in which they arrived.
 pub struct Recording {
+    /// The ticks, without repetitions.
     pub ticks: Vec<Tick>,
+    /// Which ticks are missing.
     pub gaps: Gaps,
     /// Why reading ended before the end of the file, if it did: a recording that was cut off is still of use.
     pub cut_off: Option<String>,
 }
 
 /// Reads the ticks; refuses a file that holds none.
-pub fn read(path: &Path) -> Result<Recording, String> {
-    let told = |why: String| format!("{}: {why}", path.display());
-    let bytes = std::fs::read(path).map_err(|e| told(e.to_string()))?;
+pub fn read(path: &Path) -> Result<Recording, RecordError> {
+    let invalid = |why: String| RecordError::of_file(path, why);
+    let bytes = std::fs::read(path).map_err(|e| invalid(e.to_string()))?;
     let options = enumset::EnumSet::only(mcap::read::Options::IgnoreEndMagic);
-    let messages =
-        mcap::MessageStream::new_with_options(&bytes, options).map_err(|e| told(format!("not an MCAP file ({e})")))?;
+    let messages = mcap::MessageStream::new_with_options(&bytes, options)
+        .map_err(|e| invalid(format!("not an MCAP file ({e})")))?;
     let mut recording = Recording {
         ticks: Vec::new(),
         gaps: Gaps::default(),
@@ -35,14 +38,13 @@ pub fn read(path: &Path) -> Result<Recording, String> {
         if message.channel.topic != TICK.topic {
             continue;
         }
-        let tick: Tick =
-            serde_json::from_slice(&message.data).map_err(|e| told(format!("a tick that is none: {e}")))?;
+        let tick: Tick = serde_json::from_slice(&message.data).map_err(|e| invalid(format!("invalid tick: {e}")))?;
         if recording.gaps.record(tick.session_id, tick.tick) {
             recording.ticks.push(tick);
         }
     }
     if recording.ticks.is_empty() {
-        return Err(told("holds no tick of Stylet".to_owned()));
+        return Err(invalid("holds no tick of Stylet".to_owned()));
     }
     Ok(recording)
 }

@@ -1,5 +1,6 @@
 //! The thread that encodes and writes.
 
+use super::error::RecordError;
 use super::gaps::Gaps;
 use super::messages::{self, Channel, EVENT, GLAND, TICK, TISSUE, Tick};
 use crate::link::Snapshot;
@@ -85,14 +86,15 @@ struct Writer {
 }
 
 /// Writes until nobody sends any more; the file is whole then.
-pub fn write_all(path: &Path, from: &mpsc::Receiver<Item>) -> Result<Totals, String> {
-    let told = |e: mcap::McapError| format!("{}: {e}", path.display());
-    let file = File::create(path).map_err(|e| format!("{}: {e}; choose another file with --out", path.display()))?;
-    let mut writer = Writer::new(file).map_err(told)?;
+pub fn write_all(path: &Path, from: &mpsc::Receiver<Item>) -> Result<Totals, RecordError> {
+    let failed = |e: mcap::McapError| RecordError::of_file(path, e);
+    let file =
+        File::create(path).map_err(|e| RecordError::of_file(path, format!("{e}; choose another file with --out")))?;
+    let mut writer = Writer::new(file).map_err(failed)?;
     for item in from {
-        writer.item(item).map_err(told)?;
+        writer.item(item).map_err(failed)?;
     }
-    writer.finish(path).map_err(told)
+    writer.finish(path).map_err(failed)
 }
 
 impl Writer {

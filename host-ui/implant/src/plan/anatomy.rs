@@ -1,5 +1,6 @@
 //! What a plan must know of the body: the target and what is to be spared, as closed surfaces of the scene at rest.
 
+use super::PlanError;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use stylet_anatomy::PatientFrame;
@@ -12,12 +13,13 @@ use stylet_shm_schema::{StructureInfo, role};
 /// Steps in which a needle's way is looked at.
 const STEP_M: f64 = 0.5e-3;
 
-/// Lines of a template run along the planes on which corners of a mesh lie, where inside and outside are not told apart: a
-/// place is looked at this little beside itself.
+/// Lines of a template run along the planes on which corners of a mesh lie, where inside and outside cannot be
+/// distinguished: a place is tested at this small distance from itself.
 const BESIDE_M: [f64; 3] = [0.0, 1.37e-8, 2.71e-8];
 
 /// One structure, closed.
 pub struct Body {
+    /// Name as the scene gives it.
     pub name: String,
     mesh: Mesh,
     points_m: Vec<[f32; 3]>,
@@ -26,10 +28,13 @@ pub struct Body {
 
 impl Body {
     /// The mesh must be closed.
-    fn new(name: &str, points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Self, String> {
+    fn new(name: &str, points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Self, PlanError> {
         Ok(Self {
             name: name.to_owned(),
-            mesh: Mesh::new(points_m, triangles)?,
+            mesh: Mesh::new(points_m, triangles).map_err(|why| PlanError::Surface {
+                name: name.to_owned(),
+                why: why.to_string(),
+            })?,
             points_m: points_m.iter().map(|p| p.map(|c| c as f32)).collect(),
             triangles: triangles.iter().map(|t| t.map(|i| i as u32)).collect(),
         })
@@ -40,10 +45,12 @@ impl Body {
         (&self.points_m, &self.triangles)
     }
 
+    /// Whether a point, scene frame, m, lies inside.
     pub fn contains(&self, point_m: [f64; 3]) -> bool {
         self.mesh.contains([0, 1, 2].map(|a| point_m[a] + BESIDE_M[a]))
     }
 
+    /// Bounding box: smallest and largest corner, m.
     pub fn bounds_m(&self) -> ([f64; 3], [f64; 3]) {
         self.mesh.bounds_m()
     }
@@ -90,9 +97,13 @@ impl Body {
 
 /// Target, what is spared, and the box of all tissue.
 pub struct Anatomy {
+    /// What seeds are planned in.
     pub target: Body,
+    /// What needles and dose are kept from.
     pub spared: Vec<Body>,
+    /// Smallest corner of the box of all tissue, m.
     pub lower_m: [f64; 3],
+    /// Largest corner of that box, m.
     pub upper_m: [f64; 3],
     /// Where the patient lies in the scene.
     pub patient: PatientFrame,
@@ -100,7 +111,7 @@ pub struct Anatomy {
 
 impl Anatomy {
     /// From what the core sent; an error when the scene has no closed target.
-    pub fn of(scene: &SceneModel) -> Result<Self, String> {
+    pub fn of(scene: &SceneModel) -> Result<Self, PlanError> {
         let header = &scene.header;
         let part = |s: &StructureInfo| {
             let first = s.first_triangle as usize;
@@ -136,7 +147,7 @@ impl Anatomy {
         bodies.map(|b| b.structure(pitch_m)).collect()
     }
 
-    /// The first structure to be spared that the needle comes into within `margin_m` on its way to `depth_m`.
+    /// The first structure to be spared that the needle enters within `margin_m` on its way to `depth_m`.
     pub fn spared_in_the_way(
         &self,
         entry_m: [f64; 3],
@@ -160,7 +171,7 @@ impl Anatomy {
 
 /// The surface that the core draws goes through the middles of the outermost elements: the body ends half an element further
 /// out.
-fn body(scene: &SceneModel, name: &str, triangles: &[[u32; 3]]) -> Result<Body, String> {
+fn body(scene: &SceneModel, name: &str, triangles: &[[u32; 3]]) -> Result<Body, PlanError> {
     let mut numbers = BTreeMap::new();
     let mut points_m: Vec<Vector3<f64>> = Vec::new();
     let mut normals: Vec<Vector3<f64>> = Vec::new();
@@ -181,11 +192,11 @@ fn body(scene: &SceneModel, name: &str, triangles: &[[u32; 3]]) -> Result<Body, 
     let half_m = scene.header.spacing_m / 2.0;
     let out = |(p, n): (&Vector3<f64>, &Vector3<f64>)| (p + n.try_normalize(1e-30).unwrap_or_default() * half_m).into();
     let moved: Vec<[f64; 3]> = points_m.iter().zip(&normals).map(out).collect();
-    Body::new(name, &moved, &corners).map_err(|why| format!("the surface of {name}: {why}"))
+    Body::new(name, &moved, &corners)
 }
 
 /// A body from a closed surface that is not the core's.
-pub fn body_of(name: &str, points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Body, String> {
+pub fn body_of(name: &str, points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Body, PlanError> {
     Body::new(name, points_m, triangles)
 }
 

@@ -4,12 +4,14 @@
 //! prescription to the share of the gland that is asked for.
 
 use super::check::SPARED_MARGIN_M;
-use super::{Anatomy, Hole, ImplantPlan, Loading, Needle, NeedleSeed, SEED_LENGTH_M, SPACER_M, Template};
+use super::{Anatomy, Hole, ImplantPlan, Loading, Needle, NeedleSeed, PlanError, SEED_LENGTH_M, SPACER_M, Template};
+use std::ops::ControlFlow;
 use stylet_dose::{DoseKernel, DosePoints, Dvh, Seed};
 
 /// What a first plan aims at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aims {
+    /// Prescribed dose, Gy.
     pub prescription_gy: f64,
     /// Share of the target that gets the prescription.
     pub covered: f64,
@@ -22,6 +24,7 @@ pub struct Aims {
 }
 
 impl Aims {
+    /// The usual aims for a prescription, Gy.
     pub fn new(prescription_gy: f64) -> Self {
         Self {
             prescription_gy,
@@ -70,15 +73,15 @@ fn patterns() -> impl Iterator<Item = Pattern> {
 
 const UNIT_U: f64 = 1.0;
 const PITCH_M: f64 = SEED_LENGTH_M + SPACER_M;
-/// Seeds that would lie so nearly as far apart as those of a strand come as one.
+/// Seeds whose distance is within this of a strand's are ordered as a strand.
 const NEARLY_M: f64 = 1e-3;
 /// Shorter pieces of target get no needle, nor do those nearer to its edge: tissue there gives way before it is pierced.
 const SHORTEST_M: f64 = 15e-3;
 const NEAREST_RIM_M: f64 = 2.5e-3;
 const DOSE_PITCH_M: f64 = 1e-3;
-/// Coarse is enough to tell patterns apart.
+/// Coarse is enough to compare patterns.
 const TRIAL_PITCH_M: f64 = 2e-3;
-/// Of a thinned needle only so many seeds nearest to each end are kept.
+/// Seeds that a thinned needle keeps at each end.
 const KEPT_AT_END: usize = 1;
 
 /// A hole that a needle can use, and the piece of target behind it.
@@ -89,22 +92,25 @@ struct Way {
     rim_m: f64,
 }
 
-/// Needles, seeds and their strength; an error when no needle fits. `tell` hears the share that is done, and its error ends the search.
+/// Needles, seeds and their strength; an error when no needle fits. `report` gets the share that is done; where it breaks, the
+/// search is cancelled.
 pub fn plan(
     template: Template,
     anatomy: &Anatomy,
     kernel: &DoseKernel,
     source: &str,
     aims: &Aims,
-    tell: impl Fn(f32) -> Result<(), String>,
-) -> Result<ImplantPlan, String> {
+    report: impl Fn(f32) -> ControlFlow<()>,
+) -> Result<ImplantPlan, PlanError> {
     let ways = ways(&template, anatomy, aims);
     let target = anatomy.target.structure(TRIAL_PITCH_M);
     let points = DosePoints::new(&target.points_m);
     let patterns: Vec<Pattern> = patterns().collect();
     let mut best: Option<(f64, ImplantPlan)> = None;
     for (done, pattern) in patterns.iter().enumerate() {
-        tell(done as f32 / patterns.len() as f32)?;
+        if report(done as f32 / patterns.len() as f32).is_break() {
+            return Err(PlanError::Cancelled);
+        }
         let plan = load(&template, &ways, pattern, source, aims);
         let dose_gy = points.of_seeds_gy(kernel, &plan.seeds());
         let dvh = Dvh::new(&dose_gy, &target.volumes_m3);
@@ -114,8 +120,7 @@ pub fn plan(
             best = Some((found, plan));
         }
     }
-    let (_, plan) =
-        best.ok_or("no hole of the template leads through the target past what is to be spared; plan by hand")?;
+    let (_, plan) = best.ok_or(PlanError::NoWay)?;
     let strength_u = strength_u(&plan, anatomy, kernel, aims)?;
     Ok(plan.with_strength(strength_u))
 }
@@ -158,15 +163,13 @@ fn shortfall(plan: &ImplantPlan, of_one_u: &Dvh, aims: &Aims) -> Option<f64> {
 }
 
 /// The strength with which `aims.covered` of the target gets the prescription.
-pub fn strength_u(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel, aims: &Aims) -> Result<f64, String> {
+pub fn strength_u(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel, aims: &Aims) -> Result<f64, PlanError> {
     let target = anatomy.target.structure(DOSE_PITCH_M);
     let of_one_u: Vec<Seed> = plan.with_strength(UNIT_U).seeds();
     let dose_gy = DosePoints::new(&target.points_m).of_seeds_gy(kernel, &of_one_u);
     let dvh = Dvh::new(&dose_gy, &target.volumes_m3);
     let reached = dvh.and_then(|d| d.dose_of_gy(aims.covered * d.volume_m3()));
-    let reached_gy = reached
-        .filter(|gy| *gy > 0.0)
-        .ok_or("the seeds give the target no dose")?;
+    let reached_gy = reached.filter(|gy| *gy > 0.0).ok_or(PlanError::NoDose)?;
     Ok(aims.prescription_gy / reached_gy * UNIT_U)
 }
 
@@ -314,21 +317,21 @@ mod tests {
     }
 
     #[test]
-    fn a_search_tells_its_share_and_ends_when_it_is_told_to() {
+    fn a_search_reports_its_share_and_ends_when_it_is_cancelled() {
         let (source, kernel) = iodine();
         let anatomy = gland([0.02, 0.0165, 0.018]);
-        let told = std::cell::RefCell::new(Vec::new());
-        let tell = |share: f32| {
-            told.borrow_mut().push(share);
-            match told.borrow().len() {
-                4 => Err("enough".to_owned()),
-                _ => Ok(()),
+        let reported = std::cell::RefCell::new(Vec::new());
+        let report = |share: f32| {
+            reported.borrow_mut().push(share);
+            match reported.borrow().len() {
+                4 => ControlFlow::Break(()),
+                _ => ControlFlow::Continue(()),
             }
         };
-        let ended = plan(TEMPLATE, &anatomy, &kernel, &source.model, &Aims::new(145.0), tell);
-        assert_eq!(ended.err().as_deref(), Some("enough"));
+        let ended = plan(TEMPLATE, &anatomy, &kernel, &source.model, &Aims::new(145.0), report);
+        assert!(matches!(ended, Err(PlanError::Cancelled)));
         let all = patterns().count() as f32;
-        assert_eq!(*told.borrow(), [0.0, 1.0 / all, 2.0 / all, 3.0 / all]);
+        assert_eq!(*reported.borrow(), [0.0, 1.0 / all, 2.0 / all, 3.0 / all]);
     }
 
     /// A gland of 49 cc and one of 25 cc: neither is the paper's.
@@ -338,7 +341,10 @@ mod tests {
         for (half_m, most_v150) in [([0.0255, 0.0205, 0.0225], 65.0), ([0.02, 0.0165, 0.018], 65.0)] {
             let anatomy = gland(half_m);
             let aims = Aims::new(145.0);
-            let plan = plan(TEMPLATE, &anatomy, &kernel, &source.model, &aims, |_| Ok(())).unwrap();
+            let plan = plan(TEMPLATE, &anatomy, &kernel, &source.model, &aims, |_| {
+                ControlFlow::Continue(())
+            })
+            .unwrap();
             let found = problems(&plan, &anatomy);
             assert!(found.is_empty(), "{found:?}");
             let target = anatomy.target.structure(1e-3);

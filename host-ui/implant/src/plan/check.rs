@@ -4,9 +4,9 @@ use super::{Anatomy, ImplantPlan, Loading, Needle, NeedleSeed, SEED_LENGTH_M};
 use nalgebra::Vector3;
 use stylet_shm_schema::MAX_SEEDS;
 
-/// The tip of a needle of 20 cm gets so far beyond the template's face.
+/// How far beyond the template's face the tip of a needle of 20 cm reaches.
 pub const REACH_M: f64 = 0.20;
-/// A needle may come so near to what is spared.
+/// Least distance of a needle from what is spared.
 pub const SPARED_MARGIN_M: f64 = 1e-3;
 /// A seed may lie so far outside the target: seeds at its edge are planned there.
 const EDGE_M: f64 = 1e-3;
@@ -22,6 +22,7 @@ pub struct Problem {
     pub needle: Option<usize>,
     /// On its needle, deepest first.
     pub seed: Option<usize>,
+    /// What is wrong, and what to do.
     pub what: String,
 }
 
@@ -39,18 +40,18 @@ impl std::fmt::Display for Problem {
 pub fn problems(plan: &ImplantPlan, anatomy: &Anatomy) -> Vec<Problem> {
     let mut found = Found::default();
     if plan.needles.is_empty() {
-        found.tell("the plan has no needle; add one");
+        found.add("the plan has no needle; add one");
     }
     if plan.seed_count() > MAX_SEEDS {
         let what = format!("{} seeds; at most {MAX_SEEDS} can be placed", plan.seed_count());
-        found.tell(&what);
+        found.add(&what);
     }
     for (number, needle) in plan.needles.iter().enumerate() {
         found.needle = Some(number);
         way(&mut found, needle, anatomy);
         if let Some(other) = same_hole(plan, number) {
             let what = format!("it goes through the hole of needle {}; move one of them", other + 1);
-            found.tell(&what);
+            found.add(&what);
         }
         for (seed, place) in needle.seeds_m().enumerate() {
             found.seed = Some(seed);
@@ -72,7 +73,7 @@ struct Found {
 }
 
 impl Found {
-    fn tell(&mut self, what: &str) {
+    fn add(&mut self, what: &str) {
         self.problems.push(Problem {
             needle: self.needle,
             seed: self.seed,
@@ -88,22 +89,22 @@ fn way(found: &mut Found, needle: &Needle, anatomy: &Anatomy) {
         .chain([&needle.depth_m, &needle.retract_to_m])
         .all(|v| v.is_finite());
     if !finite || (Vector3::from(needle.direction).norm() - 1.0).abs() > 1e-3 {
-        return found.tell("its entry, direction or depth is no number, or the direction is no unit vector");
+        return found.add("its entry, direction or depth is no number, or the direction is no unit vector");
     }
     if needle.seeds.is_empty() {
-        found.tell("it has no seed; load it or take it away");
+        found.add("it has no seed; load or remove it");
     }
     if needle.depth_m > REACH_M {
         let (depth, reach) = (needle.depth_m * 1e3, REACH_M * 1e3);
-        found.tell(&format!("it goes {depth:.1} mm deep; the needle reaches {reach:.0} mm"));
+        found.add(&format!("it goes {depth:.1} mm deep; the needle reaches {reach:.0} mm"));
     }
     if !(needle.depth_m >= 0.0 && (0.0..=needle.depth_m).contains(&needle.retract_to_m)) {
-        found.tell("its depth is negative, or it is drawn back to a place that is not between entry and depth");
+        found.add("its depth is negative, or it is drawn back to a place that is not between entry and depth");
         return;
     }
     let depth_m = needle.depth_m.min(REACH_M);
     if let Some(body) = anatomy.spared_in_the_way(needle.entry_m, needle.direction, depth_m, SPARED_MARGIN_M) {
-        found.tell(&format!("it goes through {}, which is to be spared", body.name));
+        found.add(&format!("it goes through {}, which is to be spared", body.name));
     }
 }
 
@@ -117,15 +118,15 @@ fn seed_alone(found: &mut Found, needle: &Needle, seed: usize, place_m: [f64; 3]
     let NeedleSeed { along_m, strength_u } = needle.seeds[seed];
     if !along_m.is_finite() || along_m < 0.0 || along_m > needle.depth_m + SAME_M {
         let (along, depth) = (along_m * 1e3, needle.depth_m * 1e3);
-        found.tell(&format!(
+        found.add(&format!(
             "it lies {along:.1} mm along its needle, which goes from 0 to {depth:.1} mm"
         ));
     } else if !is_in_target(anatomy, place_m, needle.direction) {
-        found.tell(&format!("it lies outside {}", anatomy.target.name));
+        found.add(&format!("it lies outside {}", anatomy.target.name));
     }
     let [least, most] = STRENGTHS_U;
     if !(least..=most).contains(&strength_u) {
-        found.tell(&format!(
+        found.add(&format!(
             "its strength is {strength_u} U; seeds have {least} to {most} U"
         ));
     }
@@ -135,7 +136,7 @@ fn seed_alone(found: &mut Found, needle: &Needle, seed: usize, place_m: [f64; 3]
     {
         let apart = (deeper_m - along_m) * 1e3;
         let length = SEED_LENGTH_M * 1e3;
-        found.tell(&format!(
+        found.add(&format!(
             "it lies {apart:.1} mm behind the one before, nearer than its length of {length} mm"
         ));
     }
@@ -153,14 +154,14 @@ fn strand(found: &mut Found, needle: &Needle) {
         return;
     };
     if !(spacer_m > 0.0 && spacer_m <= 0.05) {
-        return found.tell("the spacer of its strand must be above 0 and at most 50 mm");
+        return found.add("the spacer of its strand must be above 0 and at most 50 mm");
     }
     let pitch_m = SEED_LENGTH_M + spacer_m;
     let off = |pair: &[NeedleSeed]| (pair[0].along_m - pair[1].along_m - pitch_m).abs();
     if needle.seeds.windows(2).any(|pair| !(..=SAME_M).contains(&off(pair))) {
         let pitch = pitch_m * 1e3;
-        found.tell(&format!(
-            "the seeds of its strand must lie {pitch:.1} mm apart; make it loose or load it anew"
+        found.add(&format!(
+            "the seeds of its strand must lie {pitch:.1} mm apart; make it loose or load it again"
         ));
     }
 }
@@ -180,7 +181,7 @@ fn too_close(found: &mut Found, plan: &ImplantPlan) {
             let apart_m = (Vector3::from(*place) - Vector3::from(*there)).norm();
             if apart_m < SEED_LENGTH_M / 2.0 {
                 (found.needle, found.seed) = (Some(*needle), Some(*seed));
-                found.tell(&format!(
+                found.add(&format!(
                     "it lies {:.1} mm from seed {} of needle {}",
                     apart_m * 1e3,
                     other_seed + 1,

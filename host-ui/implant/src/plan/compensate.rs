@@ -8,10 +8,10 @@
 //! the best drops of the single seeds are tried together. What half of the rehearsals do not bring home is looked for around
 //! each seed's best drop.
 
-use super::rehearse::{Drops, Rehearser, Rest};
+use super::rehearse::{Drops, RehearsalError, Rehearser, Rest};
 use super::{Loading, Needle};
-use crate::workflow::Pace;
 use nalgebra::Vector3;
+use stylet_procedure::Pace;
 
 /// What compensation may do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,26 +59,30 @@ const DEEPER_M: f64 = 1e-3;
 /// One needle, before and after.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compensation {
+    /// The drops that leave the smallest errors.
     pub drops: Drops,
     /// Rest minus plan of each seed, deepest first, when dropped as planned; `None` where that cannot be done: the tip would be
     /// outside the tissue, which has moved ahead.
     pub before_m: Option<Vec<[f64; 3]>>,
     /// The same when dropped as `drops` says.
     pub after_m: Vec<[f64; 3]>,
+    /// Rehearsals that it took.
     pub rehearsals: usize,
 }
 
 impl Compensation {
+    /// Distance of each seed from plan when dropped as planned, m.
     pub fn errors_before_m(&self) -> impl Iterator<Item = f64> + '_ {
         self.before_m.iter().flatten().map(|e| Vector3::from(*e).norm())
     }
 
+    /// Distance of each seed from plan with the compensated drops, m.
     pub fn errors_after_m(&self) -> impl Iterator<Item = f64> + '_ {
         self.after_m.iter().map(|e| Vector3::from(*e).norm())
     }
 }
 
-/// A way to go about the needle, and what it comes to.
+/// Drops that were rehearsed, and the errors of their seeds.
 #[derive(Clone)]
 struct Tried {
     drops: Drops,
@@ -141,7 +145,7 @@ pub fn compensate(
     pace: &Pace,
     limits: &Limits,
     rehearser: &mut dyn Rehearser,
-) -> Result<Compensation, String> {
+) -> Result<Compensation, RehearsalError> {
     let (start, is_as_planned) = start(needle, pace, limits, rehearser)?;
     let mut best = start.clone();
     let mut tried = vec![start.clone()];
@@ -198,7 +202,7 @@ fn start(
     pace: &Pace,
     limits: &Limits,
     rehearser: &mut dyn Rehearser,
-) -> Result<(Tried, bool), String> {
+) -> Result<(Tried, bool), RehearsalError> {
     let planned = Drops::as_planned(needle);
     let why = match try_it(needle, planned.clone(), pace, rehearser) {
         Ok(tried) => return Ok((tried, true)),
@@ -223,7 +227,7 @@ fn start(
     Err(why)
 }
 
-fn try_it(needle: &Needle, drops: Drops, pace: &Pace, rehearser: &mut dyn Rehearser) -> Result<Tried, String> {
+fn try_it(needle: &Needle, drops: Drops, pace: &Pace, rehearser: &mut dyn Rehearser) -> Result<Tried, RehearsalError> {
     let Rest { seeds_m, .. } = rehearser.rehearse(&drops, pace)?;
     let off = |(rest, planned): (&[f64; 3], [f64; 3])| Vector3::from(*rest) - Vector3::from(planned);
     Ok(Tried {

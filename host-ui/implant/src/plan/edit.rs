@@ -1,21 +1,22 @@
 //! Edits of a plan: each gives a new one, so that undo is a stack of values.
 
-use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, SEED_LENGTH_M, SPACER_M};
+use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, PlanError, SEED_LENGTH_M, SPACER_M};
 
 /// Steps that can be taken back.
 const STEPS: usize = 100;
-const NO_NEEDLE: &str = "there is no such needle";
-const NO_SEED: &str = "there is no such seed on the needle";
 
 /// The seeds of a needle, evenly apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
+    /// Number of seeds, at least 1.
     pub count: usize,
     /// From the entry to the first one.
     pub deepest_m: f64,
     /// From middle to middle.
     pub pitch_m: f64,
+    /// Whether they are joined to a strand.
     pub stranded: bool,
+    /// Strength of each seed, U.
     pub strength_u: f64,
 }
 
@@ -51,13 +52,10 @@ impl Row {
 }
 
 impl ImplantPlan {
-    /// All seeds of a needle anew.
-    pub fn with_row(&self, needle: usize, row: Row) -> Result<Self, String> {
-        if row.count == 0 || !(row.pitch_m >= SEED_LENGTH_M) {
-            let length_mm = SEED_LENGTH_M * 1e3;
-            return Err(format!(
-                "a needle has at least one seed, and from one to the next it is {length_mm} mm or more; take the needle away instead"
-            ));
+    /// Replaces all seeds of a needle.
+    pub fn with_row(&self, needle: usize, row: Row) -> Result<Self, PlanError> {
+        if row.count == 0 || row.pitch_m.is_nan() || row.pitch_m < SEED_LENGTH_M {
+            return Err(PlanError::BadRow);
         }
         self.change(needle, |n| {
             let spacer_m = row.pitch_m - SEED_LENGTH_M;
@@ -71,9 +69,9 @@ impl ImplantPlan {
     }
 
     /// A needle through a hole of the template, without seeds.
-    pub fn with_needle(&self, hole: Hole, depth_m: f64) -> Result<Self, String> {
+    pub fn with_needle(&self, hole: Hole, depth_m: f64) -> Result<Self, PlanError> {
         if self.needles.iter().any(|n| n.hole == Some(hole)) {
-            return Err(format!("a needle goes through {hole} already"));
+            return Err(PlanError::HoleTaken(hole));
         }
         let mut plan = self.clone();
         plan.needles.push(Needle {
@@ -88,24 +86,25 @@ impl ImplantPlan {
         Ok(plan)
     }
 
-    pub fn without_needle(&self, needle: usize) -> Result<Self, String> {
+    /// The plan without one of its needles.
+    pub fn without_needle(&self, needle: usize) -> Result<Self, PlanError> {
         let mut plan = self.clone();
         if needle >= plan.needles.len() {
-            return Err(NO_NEEDLE.to_owned());
+            return Err(PlanError::NoNeedle);
         }
         plan.needles.remove(needle);
         Ok(plan)
     }
 
     /// The needle and its seeds to another hole, as deep as before.
-    pub fn with_needle_at(&self, needle: usize, hole: Hole) -> Result<Self, String> {
+    pub fn with_needle_at(&self, needle: usize, hole: Hole) -> Result<Self, PlanError> {
         if self
             .needles
             .iter()
             .enumerate()
             .any(|(n, other)| n != needle && other.hole == Some(hole))
         {
-            return Err(format!("a needle goes through {hole} already"));
+            return Err(PlanError::HoleTaken(hole));
         }
         let entry_m = self.template.hole_m(hole);
         self.change(needle, |n| {
@@ -115,7 +114,7 @@ impl ImplantPlan {
     }
 
     /// One more loose seed; a strand becomes loose.
-    pub fn with_seed(&self, needle: usize, along_m: f64, strength_u: f64) -> Result<Self, String> {
+    pub fn with_seed(&self, needle: usize, along_m: f64, strength_u: f64) -> Result<Self, PlanError> {
         self.change(needle, |n| {
             n.loading = Loading::Loose;
             n.seeds.push(NeedleSeed { along_m, strength_u });
@@ -124,15 +123,13 @@ impl ImplantPlan {
     }
 
     /// A strand loses the seed at its end only.
-    pub fn without_seed(&self, needle: usize, seed: usize) -> Result<Self, String> {
+    pub fn without_seed(&self, needle: usize, seed: usize) -> Result<Self, PlanError> {
         self.change(needle, |n| {
             if seed >= n.seeds.len() {
-                return Err(NO_SEED.to_owned());
+                return Err(PlanError::NoSeed);
             }
             if n.loading != Loading::Loose && seed > 0 && seed + 1 < n.seeds.len() {
-                return Err(
-                    "a seed in the middle of a strand cannot be taken out; make the needle loose first".to_owned(),
-                );
+                return Err(PlanError::InsideStrand);
             }
             n.seeds.remove(seed);
             Ok(())
@@ -140,9 +137,9 @@ impl ImplantPlan {
     }
 
     /// The whole strand moves with a seed of it.
-    pub fn with_seed_at(&self, needle: usize, seed: usize, along_m: f64) -> Result<Self, String> {
+    pub fn with_seed_at(&self, needle: usize, seed: usize, along_m: f64) -> Result<Self, PlanError> {
         self.change(needle, |n| {
-            let by_m = along_m - n.seeds.get(seed).ok_or(NO_SEED)?.along_m;
+            let by_m = along_m - n.seeds.get(seed).ok_or(PlanError::NoSeed)?.along_m;
             let alone = n.loading == Loading::Loose;
             for (number, s) in n.seeds.iter_mut().enumerate() {
                 s.along_m += if alone && number != seed { 0.0 } else { by_m };
@@ -151,14 +148,14 @@ impl ImplantPlan {
         })
     }
 
-    /// All seeds of a needle anew, as a strand with the usual spacers.
+    /// Replaces all seeds of a needle by a strand with the usual spacers.
     pub fn with_strand(
         &self,
         needle: usize,
         count: usize,
         first_along_m: f64,
         strength_u: f64,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, PlanError> {
         self.change(needle, |n| {
             n.loading = Loading::Stranded { spacer_m: SPACER_M };
             n.seeds = Needle::strand(count, first_along_m, SPACER_M, strength_u);
@@ -167,7 +164,7 @@ impl ImplantPlan {
     }
 
     /// The seeds stay where they are and are no longer joined.
-    pub fn with_loose_seeds(&self, needle: usize) -> Result<Self, String> {
+    pub fn with_loose_seeds(&self, needle: usize) -> Result<Self, PlanError> {
         self.change(needle, |n| {
             n.loading = Loading::Loose;
             Ok(())
@@ -182,9 +179,13 @@ impl ImplantPlan {
         plan
     }
 
-    fn change(&self, needle: usize, edit: impl FnOnce(&mut Needle) -> Result<(), String>) -> Result<Self, String> {
+    fn change(
+        &self,
+        needle: usize,
+        edit: impl FnOnce(&mut Needle) -> Result<(), PlanError>,
+    ) -> Result<Self, PlanError> {
         let mut plan = self.clone();
-        let changed = plan.needles.get_mut(needle).ok_or(NO_NEEDLE)?;
+        let changed = plan.needles.get_mut(needle).ok_or(PlanError::NoNeedle)?;
         edit(changed)?;
         *changed = changed.clone().in_order();
         Ok(plan)
@@ -200,6 +201,7 @@ pub struct History {
 }
 
 impl History {
+    /// A history that begins with this plan.
     pub fn new(plan: ImplantPlan) -> Self {
         Self {
             now: plan,
@@ -208,6 +210,7 @@ impl History {
         }
     }
 
+    /// The present plan.
     pub fn plan(&self) -> &ImplantPlan {
         &self.now
     }
@@ -230,10 +233,12 @@ impl History {
         self.taken_back.clear();
     }
 
+    /// Whether there is a step to undo.
     pub fn can_undo(&self) -> bool {
         !self.before.is_empty()
     }
 
+    /// Whether there is a step to redo.
     pub fn can_redo(&self) -> bool {
         !self.taken_back.is_empty()
     }
@@ -245,6 +250,7 @@ impl History {
         true
     }
 
+    /// False when there is nothing to redo.
     pub fn redo(&mut self) -> bool {
         let Some(plan) = self.taken_back.pop() else {
             return false;

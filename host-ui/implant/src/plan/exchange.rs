@@ -1,28 +1,30 @@
 //! Plans in and out of files of any of the formats, by the file's ending.
 
 use super::file;
-use super::{ImplantPlan, Template};
+use super::{ImplantPlan, PlanError, Template};
 use crate::readers::SeedDefaults;
 use std::path::Path;
 use stylet_anatomy::PatientFrame;
 use stylet_dose::Source;
-use stylet_files::convert::write_whole;
 use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
 use stylet_files::dicom::{Identity, new_uid};
 use stylet_shm_schema::SceneHeader;
 
-/// Of seeds that do not say what they are.
+/// Model of the source where a file names none.
 pub const USUAL_SOURCE: &str = "6711";
 
-/// What a plan's source and prescription are where nothing says so.
-pub fn usual() -> Result<(Source, f64), String> {
-    let source = Source::known(USUAL_SOURCE).ok_or("the usual source is not known")?;
-    let prescription_gy = source.prescription_gy.ok_or("the usual source has no prescription")?;
+/// The usual source and its prescription, Gy, for plans that name none.
+pub fn usual() -> Result<(Source, f64), PlanError> {
+    let missing = |what: &str| PlanError::Source(what.to_owned());
+    let source = Source::known(USUAL_SOURCE).ok_or_else(|| missing("the usual source is not known"))?;
+    let prescription_gy = source
+        .prescription_gy
+        .ok_or_else(|| missing("the usual source has no prescription"))?;
     Ok((source, prescription_gy))
 }
 
 /// A plan file (.toml), a table of seeds (.csv) or an RT Plan (.dcm); the error names the file.
-pub fn read(path: &Path, scene: &SceneHeader) -> Result<ImplantPlan, String> {
+pub fn read(path: &Path, scene: &SceneHeader) -> Result<ImplantPlan, PlanError> {
     let patient = scene.patient();
     if has_ending(path, "toml") {
         return file::read(path, &patient);
@@ -37,28 +39,29 @@ pub fn read(path: &Path, scene: &SceneHeader) -> Result<ImplantPlan, String> {
 }
 
 /// All of the plan as .toml, its seeds as .csv or .dcm.
-pub fn write(path: &Path, plan: &ImplantPlan, patient: &PatientFrame) -> Result<(), String> {
-    let told = |why: String| format!("{}: {why}", path.display());
+pub fn write(path: &Path, plan: &ImplantPlan, patient: &PatientFrame) -> Result<(), PlanError> {
     let bytes = if has_ending(path, "toml") {
-        file::to_text(plan, patient).map_err(told)?.into_bytes()
+        file::to_text(plan, patient)
+            .map_err(|e| PlanError::of_file(path, e))?
+            .into_bytes()
     } else if has_ending(path, "csv") {
         file::seeds_to_csv(plan, patient).into_bytes()
     } else if has_ending(path, "dcm") {
-        seed_plan(plan, patient)
-            .and_then(|p| Ok(plan::bytes(&p)?))
-            .map_err(told)?
+        let of_file = |why: String| PlanError::of_file(path, why);
+        let seeds = seed_plan(plan, patient).map_err(|e| of_file(e.to_string()))?;
+        plan::bytes(&seeds).map_err(|e| of_file(e.to_string()))?
     } else {
-        return Err(told("its name must end in .toml, .csv or .dcm".to_owned()));
+        return Err(PlanError::of_file(path, "its name must end in .toml, .csv or .dcm"));
     };
-    Ok(write_whole(path, &bytes)?)
+    Ok(stylet_base::write_whole(path, &bytes)?)
 }
 
-fn seed_plan(plan: &ImplantPlan, patient: &PatientFrame) -> Result<SeedPlan, String> {
+fn seed_plan(plan: &ImplantPlan, patient: &PatientFrame) -> Result<SeedPlan, PlanError> {
     let source = Source::known(&plan.source).ok_or_else(|| {
-        format!(
+        PlanError::Source(format!(
             "an RT Plan holds isotope and half-life, and those of source {} are not known; write .toml",
             plan.source
-        )
+        ))
     })?;
     let of_needle = |(number, needle): (u32, &super::Needle)| {
         let name = needle.hole.map_or_else(String::new, |h| h.to_string());

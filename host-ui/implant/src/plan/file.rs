@@ -1,11 +1,12 @@
 //! Plans in files: TOML with everything, CSV with the seeds alone; mm, patient frame (RAS).
 
-use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, Template};
+use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, NotAHole, PlanError, Template};
 use crate::readers::{SeedDefaults, SeedFile, read_seed_rows};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use stylet_anatomy::PatientFrame;
+use stylet_base::input;
 use stylet_shm_schema::MAX_SEEDS;
 
 const FORMAT: &str = "stylet plan, mm, RAS";
@@ -56,7 +57,7 @@ struct NeedleFile {
 }
 
 /// As TOML.
-pub fn to_text(plan: &ImplantPlan, patient: &PatientFrame) -> Result<String, String> {
+pub fn to_text(plan: &ImplantPlan, patient: &PatientFrame) -> Result<String, PlanError> {
     let (mm, turned) = (
         |v: [f64; 3]| patient.patient_from_scene(v).map(|c| c * 1e3),
         |d| patient.patient_from_scene_direction(d),
@@ -88,12 +89,12 @@ pub fn to_text(plan: &ImplantPlan, patient: &PatientFrame) -> Result<String, Str
         },
         needles: plan.needles.iter().map(needle).collect(),
     };
-    toml::to_string(&file).map_err(|e| format!("the plan cannot be written as TOML: {e}"))
+    toml::to_string(&file).map_err(|e| PlanError::Invalid(vec![format!("the plan cannot be written as TOML: {e}")]))
 }
 
 /// From TOML; lists every problem.
-pub fn from_text(text: &str, patient: &PatientFrame) -> Result<ImplantPlan, String> {
-    let file: PlanFile = toml::from_str(text).map_err(|e| format!("it is no plan: {e}"))?;
+pub fn from_text(text: &str, patient: &PatientFrame) -> Result<ImplantPlan, PlanError> {
+    let file: PlanFile = toml::from_str(text).map_err(|e| PlanError::Invalid(vec![format!("it is no plan: {e}")]))?;
     let mut problems = Vec::new();
     if file.format != FORMAT {
         problems.push(format!("format is \"{}\"; it must be \"{FORMAT}\"", file.format));
@@ -120,7 +121,7 @@ pub fn from_text(text: &str, patient: &PatientFrame) -> Result<ImplantPlan, Stri
     });
     let needles = needles.collect();
     if !problems.is_empty() {
-        return Err(problems.join("\n"));
+        return Err(PlanError::Invalid(problems));
     }
     Ok(ImplantPlan {
         template,
@@ -188,7 +189,7 @@ fn needle(file: &NeedleFile, patient: &PatientFrame, problems: &mut Vec<String>)
     };
     Needle {
         hole: hole.unwrap_or_else(|why| {
-            problems.push(why);
+            problems.push(why.to_string());
             None
         }),
         entry_m: patient.scene_from_patient(file.entry_mm.map(|c| c * 1e-3)),
@@ -222,20 +223,15 @@ fn within(what: &str, value: f64, least: f64, most: f64, problems: &mut Vec<Stri
 }
 
 /// Reads a plan file; the error names it.
-pub fn read(path: &Path, patient: &PatientFrame) -> Result<ImplantPlan, String> {
-    let told = |why: String| format!("{}: {why}", path.display());
-    let opened = |e: std::io::Error| told(format!("it cannot be read ({e}); check the path"));
-    let size = std::fs::metadata(path).map_err(opened)?.len();
-    if size > MAX_BYTES {
-        return Err(told(format!("it has {size} bytes, more than {MAX_BYTES}")));
-    }
-    let text = std::fs::read_to_string(path).map_err(opened)?;
-    from_text(&text, patient).map_err(told)
+pub fn read(path: &Path, patient: &PatientFrame) -> Result<ImplantPlan, PlanError> {
+    let text = input::read_text(path, MAX_BYTES).map_err(|e| PlanError::of_file(path, e))?;
+    from_text(&text, patient).map_err(|e| PlanError::of_file(path, e))
 }
 
-pub fn write(path: &Path, plan: &ImplantPlan, patient: &PatientFrame) -> Result<(), String> {
+/// Writes a plan as TOML, in one step.
+pub fn write(path: &Path, plan: &ImplantPlan, patient: &PatientFrame) -> Result<(), PlanError> {
     let text = to_text(plan, patient)?;
-    std::fs::write(path, text).map_err(|e| format!("{} cannot be written ({e})", path.display()))
+    Ok(stylet_base::write_whole(path, text.as_bytes())?)
 }
 
 /// Seeds as `host-ui dose --seeds` reads them, with the number of their needle and its hole.
@@ -262,15 +258,17 @@ pub fn import_csv(
     template: Template,
     source: &str,
     prescription_gy: f64,
-) -> Result<ImplantPlan, String> {
-    let told = |why: String| format!("{}: {why}", path.display());
-    let file = read_seed_rows(path, defaults)?;
+) -> Result<ImplantPlan, PlanError> {
+    let file = read_seed_rows(path, defaults).map_err(|e| PlanError::Invalid(vec![e.to_string()]))?;
     // A plan names holes of the template that it was made with, and its needles may be curved.
     let is_table = matches!(file, SeedFile::Table(_));
     let rows = file.into_rows();
     if rows.len() > MAX_SEEDS {
         let count = rows.len();
-        return Err(told(format!("{count} seeds; at most {MAX_SEEDS} can be placed")));
+        return Err(PlanError::of_file(
+            path,
+            format!("{count} seeds; at most {MAX_SEEDS} can be placed"),
+        ));
     }
     let mut needles: Vec<(Option<u32>, Needle)> = Vec::new();
     let mut problems = Vec::new();
@@ -300,7 +298,7 @@ pub fn import_csv(
     }
     problems.dedup();
     if !problems.is_empty() {
-        return Err(told(problems.join("\n")));
+        return Err(PlanError::of_file(path, problems.join("\n")));
     }
     Ok(ImplantPlan {
         template,
@@ -327,7 +325,8 @@ fn fits(
         return Err("its seeds are not on one line; correct them, or leave the column needle out".to_owned());
     }
     let Some(hole) = hole else { return Ok(()) };
-    let off = Vector3::from(template.hole_m(hole.parse()?)) - Vector3::from(needle.entry_m);
+    let off = Vector3::from(template.hole_m(hole.parse().map_err(|e: NotAHole| e.to_string())?))
+        - Vector3::from(needle.entry_m);
     if off.norm() < SAME_LINE_M {
         return Ok(());
     }

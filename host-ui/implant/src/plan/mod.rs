@@ -7,6 +7,7 @@ pub mod automatic;
 pub mod check;
 pub mod compensate;
 pub mod edit;
+mod error;
 pub mod exchange;
 pub mod file;
 mod needle;
@@ -16,23 +17,27 @@ mod template;
 pub use anatomy::Anatomy;
 pub use compensate::{Compensation, Limits, compensate};
 pub use edit::{History, Row};
+pub use error::PlanError;
 pub use needle::{Loading, Needle, NeedleSeed, SEED_LENGTH_M, SPACER_M};
-pub use rehearse::{Drops, LinkRehearser, Rehearser};
+pub use rehearse::{Drops, LinkRehearser, RehearsalError, Rehearser};
 use stylet_dose as dose;
-pub use template::{HOLES, Hole, PITCH_M, Template};
+pub use template::{HOLES, Hole, NotAHole, PITCH_M, Template};
 
 /// Everything that is decided before the first needle goes in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImplantPlan {
+    /// The template that its needles go through.
     pub template: Template,
     /// As the model of a source file names itself.
     pub source: String,
+    /// Prescribed dose, Gy.
     pub prescription_gy: f64,
     /// In the order in which they go in.
     pub needles: Vec<Needle>,
 }
 
 impl ImplantPlan {
+    /// Seeds of all needles.
     pub fn seed_count(&self) -> usize {
         self.needles.iter().map(|n| n.seeds.len()).sum()
     }

@@ -14,7 +14,10 @@ pub enum Loading {
     /// Each by itself.
     Loose,
     /// In one strand, with spacers of one length between them: they move together.
-    Stranded { spacer_m: f64 },
+    Stranded {
+        /// From the end of a seed to the next one, m.
+        spacer_m: f64,
+    },
 }
 
 impl Loading {
@@ -49,16 +52,19 @@ pub struct Needle {
     pub depth_m: f64,
     /// How far from the entry the tip is drawn back to when its seeds are out; 0: to the entry.
     pub retract_to_m: f64,
+    /// Whether its seeds are loose or stranded.
     pub loading: Loading,
     /// Deepest first: the order in which they are dropped.
     pub seeds: Vec<NeedleSeed>,
 }
 
 impl Needle {
+    /// The place at a distance from the entry, m.
     pub fn at_m(&self, along_m: f64) -> [f64; 3] {
         [0, 1, 2].map(|a| self.entry_m[a] + self.direction[a] * along_m)
     }
 
+    /// Distance of a point from the entry, along the needle, m.
     pub fn along_m(&self, point_m: [f64; 3]) -> f64 {
         (Vector3::from(point_m) - Vector3::from(self.entry_m)).dot(&Vector3::from(self.direction))
     }

@@ -1,11 +1,11 @@
-//! One needle gone through ahead of time: what the operator would do, and where the seeds would rest.
+//! One needle rehearsed: what the operator would do, and where the seeds would rest.
 
 use super::Needle;
-use crate::workflow::Pace;
 use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
-use stylet_host::link::{Link, LinkStatus};
-use stylet_shm_schema::CommandKind;
+use stylet_host::link::{Link, LinkError, LinkStatus};
+use stylet_procedure::{NeedleWay, Pace};
+use stylet_shm_schema::{NeedleRehearsal, Request};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);
 /// The largest scene takes a second for a second.
@@ -14,10 +14,13 @@ const LONGEST: Duration = Duration::from_secs(300);
 /// What is done with one needle; the plan says what for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drops {
+    /// Where the tip starts, outside the body, scene frame, m.
     pub entry_m: [f64; 3],
+    /// Unit vector into the body.
     pub direction: [f64; 3],
     /// How far from the entry the tip is when each seed leaves it, deepest first.
     pub along_m: Vec<f64>,
+    /// How far from the entry the tip is drawn back to after the last drop, m.
     pub retract_to_m: f64,
 }
 
@@ -32,26 +35,38 @@ impl Drops {
         }
     }
 
+    /// The place at a distance from the entry, m.
     pub fn at_m(&self, along_m: f64) -> [f64; 3] {
         [0, 1, 2].map(|a| self.entry_m[a] + self.direction[a] * along_m)
     }
 
+    /// Where the tip leaves each seed, m, in the order of the drops.
     pub fn drops_m(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         self.along_m.iter().map(|&along| self.at_m(along))
     }
 
-    /// For [`CommandKind::Rehearse`].
-    pub fn values(&self, pace: &Pace) -> Vec<f64> {
-        let mut values = [self.entry_m, self.direction].concat();
-        values.extend([
-            pace.insert_m_per_s,
-            pace.retract_m_per_s,
-            pace.approach_m_per_s,
-            pace.acceleration_m_per_s2,
-            self.retract_to_m,
-        ]);
-        values.extend(self.drops_m().flatten());
-        values
+    /// Where the tip goes.
+    pub fn way(&self) -> NeedleWay {
+        NeedleWay {
+            entry_m: self.entry_m.into(),
+            direction: self.direction.into(),
+            drops_m: self.drops_m().map(Into::into).collect(),
+            retract_to_m: self.retract_to_m,
+        }
+    }
+
+    /// Has the core rehearse them.
+    pub fn rehearsal(&self, pace: &Pace) -> NeedleRehearsal {
+        NeedleRehearsal {
+            entry_m: self.entry_m,
+            direction: self.direction,
+            insert_m_per_s: pace.insert_m_per_s,
+            retract_m_per_s: pace.retract_m_per_s,
+            approach_m_per_s: pace.approach_m_per_s,
+            acceleration_m_per_s2: pace.acceleration_m_per_s2,
+            retract_to_m: self.retract_to_m,
+            drops_m: self.drops_m().collect(),
+        }
     }
 }
 
@@ -62,44 +77,73 @@ pub struct Rest {
     pub seeds_m: Vec<[f64; 3]>,
     /// When each was dropped, after the tip's first contact with tissue.
     pub dropped_after_s: Vec<f64>,
+    /// Largest force on the hand, N.
     pub peak_force_n: f64,
+    /// Largest displacement of tissue before the first puncture, m.
     pub displacement_before_puncture_m: f64,
 }
 
-/// Whoever can go through a needle ahead of time.
+/// Why a needle could not be rehearsed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RehearsalError {
+    /// The user ended it.
+    #[error("interrupted")]
+    Interrupted,
+    /// The core is absent; the text says what to do.
+    #[error("{0}")]
+    Absent(String),
+    /// The request could not be sent.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The core refused, or the rehearsal did not come to its end; the text says why.
+    #[error("the rehearsal failed: {0}")]
+    Refused(String),
+    /// A reply came without its result.
+    #[error("the core sent no result of the rehearsal")]
+    NoResult,
+    /// The scene changed meanwhile.
+    #[error("another scene was loaded during the rehearsal; rehearse again")]
+    OtherScene,
+    /// It took too long.
+    #[error("the rehearsal was not done after {} s", LONGEST.as_secs())]
+    TooLong,
+}
+
+/// Simulates a needle ahead of time.
 pub trait Rehearser {
-    /// Errors are for people.
-    fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, String>;
+    /// Where the seeds of these drops come to rest.
+    fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError>;
 }
 
 /// The core that runs, under the parameters in force.
 pub struct LinkRehearser<'a> {
+    /// The link to the core.
     pub link: &'a mut Link,
+    /// Ends a rehearsal early.
     pub interrupted: &'a Interrupt,
 }
 
 impl Rehearser for LinkRehearser<'_> {
-    fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, String> {
+    fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError> {
         let link = &mut *self.link;
-        let generation = link.scene().map(|s| s.header.generation);
-        let id = link.send(CommandKind::Rehearse, &drops.values(pace)).map_err(|e| e.0)?;
+        let scene = link.scene().map(|s| s.header.id());
+        let request = Request::Rehearse(drops.rehearsal(pace));
+        let id = link.send(&request)?;
         let begun = Instant::now();
         while begun.elapsed() < LONGEST {
-            if self.interrupted.is_requested() {
-                return Err("interrupted".to_owned());
+            if self.interrupted.asked() {
+                return Err(RehearsalError::Interrupted);
             }
             link.poll();
             if let LinkStatus::Absent { why } = link.status() {
-                return Err(why);
+                return Err(RehearsalError::Absent(why));
             }
             match link.reply(id) {
-                Some(answer) if !answer.accepted => return Err(format!("the rehearsal failed: {}", answer.text)),
+                Some(answer) if !answer.accepted => return Err(RehearsalError::Refused(answer.text)),
                 Some(_) => {
-                    let rehearsal = link.rehearsal(id).ok_or("the core sent no result of the rehearsal")?;
-                    if Some(rehearsal.scene_generation) != generation
-                        || rehearsal.seed_count as usize != drops.along_m.len()
-                    {
-                        return Err("another scene was loaded during the rehearsal; rehearse again".to_owned());
+                    let rehearsal = link.rehearsal(id).ok_or(RehearsalError::NoResult)?;
+                    if Some(rehearsal.scene_id()) != scene || rehearsal.seed_count as usize != drops.along_m.len() {
+                        return Err(RehearsalError::OtherScene);
                     }
                     let count = rehearsal.seed_count as usize;
                     let after_ns = &rehearsal.dropped_after_ns[..count];
@@ -113,6 +157,6 @@ impl Rehearser for LinkRehearser<'_> {
                 None => std::thread::sleep(POLL_EVERY),
             }
         }
-        Err(format!("the rehearsal was not done after {} s", LONGEST.as_secs()))
+        Err(RehearsalError::TooLong)
     }
 }

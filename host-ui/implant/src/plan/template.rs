@@ -1,11 +1,12 @@
 //! The template: 13 x 13 holes through which needles go, columns A to M, rows 1 to 13.
 
-use crate::workflow::patient_axis;
+use crate::patient::patient_axis;
 use nalgebra::Vector3;
 use stylet_shm_schema::SceneHeader;
 
 /// Holes along a side.
 pub const HOLES: u8 = 13;
+/// Distance between two holes, m.
 pub const PITCH_M: f64 = 5e-3;
 /// The template stands this far outside the body.
 const CLEARANCE_M: f64 = 0.010;
@@ -43,10 +44,12 @@ impl Hole {
         (0..HOLES).flat_map(|row| (0..HOLES).map(move |column| Self { column, row }))
     }
 
+    /// Column, counted from 0 at A.
     pub fn column(self) -> u8 {
         self.column
     }
 
+    /// Row, counted from 0.
     pub fn row(self) -> u8 {
         self.row
     }
@@ -58,28 +61,36 @@ impl std::fmt::Display for Hole {
     }
 }
 
-impl std::str::FromStr for Hole {
-    type Err = String;
+/// A text that names no hole.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("\"{0}\" is no hole; they go from A1 to M13")]
+pub struct NotAHole(String);
 
-    fn from_str(text: &str) -> Result<Self, String> {
+impl std::str::FromStr for Hole {
+    type Err = NotAHole;
+
+    fn from_str(text: &str) -> Result<Self, NotAHole> {
         let mut letters = text.trim().chars();
         let column = letters.next().map(|c| c.to_ascii_uppercase()).filter(char::is_ascii);
         let column = column.and_then(|c| (c as u8).checked_sub(b'A'));
         let row = letters.as_str().parse::<u8>().ok().and_then(|r| r.checked_sub(1));
         let hole = column.zip(row).and_then(|(c, r)| Self::new(c, r));
-        hole.ok_or_else(|| format!("\"{text}\" is no hole; they go from A1 to M13"))
+        hole.ok_or_else(|| NotAHole(text.to_owned()))
     }
 }
 
 /// Where the holes are, scene frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Template {
-    /// The middle hole, G7.
+    /// The middle hole, G7, scene frame, m.
     pub middle_m: [f64; 3],
-    /// Unit vectors: along the columns from A to M, along the rows from 1 to 13, and into the patient.
+    /// Unit vector along the columns, from A to M.
     pub columns: [f64; 3],
+    /// Unit vector along the rows, from 1 to 13.
     pub rows: [f64; 3],
+    /// Unit vector into the patient.
     pub inwards: [f64; 3],
+    /// Distance between two holes, m.
     pub pitch_m: f64,
 }
 
@@ -113,6 +124,7 @@ impl Template {
         }
     }
 
+    /// Where a hole is, scene frame, m.
     pub fn hole_m(&self, hole: Hole) -> [f64; 3] {
         let middle = f64::from(HOLES / 2);
         let [u, v] = [hole.column, hole.row].map(|n| (f64::from(n) - middle) * self.pitch_m);

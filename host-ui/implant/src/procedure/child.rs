@@ -1,7 +1,8 @@
 //! An `rt-core` that the procedure started and ends.
 
+use super::error::ProcedureError;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::service::Instance;
 
@@ -10,7 +11,7 @@ const END_LIMIT: Duration = Duration::from_secs(4);
 pub struct Core(Child);
 
 impl Core {
-    pub fn start(path: &Path, instance: &Instance, device: Option<&str>) -> Result<Self, String> {
+    pub fn start(path: &Path, instance: &Instance, device: Option<&str>) -> Result<Self, ProcedureError> {
         let device = device.iter().flat_map(|name| ["--device", name]);
         Command::new(path)
             .args(device)
@@ -18,15 +19,15 @@ impl Core {
             .stdin(Stdio::null())
             .spawn()
             .map(Self)
-            .map_err(|e| format!("{} cannot be started ({e}); check --core", path.display()))
+            .map_err(|why| ProcedureError::CoreNotStarted {
+                path: path.to_owned(),
+                why,
+            })
     }
 
-    /// Why it is no longer there.
-    pub fn ended(&mut self) -> Option<String> {
-        let status = self.0.try_wait().ok()??;
-        Some(format!(
-            "the rt-core that was started has ended ({status}); its message stands above"
-        ))
+    /// How it ended; `None` while it runs.
+    pub fn ended(&mut self) -> Option<ExitStatus> {
+        self.0.try_wait().ok()?
     }
 }
 

@@ -1,6 +1,7 @@
 //! After the last needle: what the implant was worth, written beside the other results.
 
 use super::Seen;
+use super::error::ProcedureError;
 use super::job::{self, Job, PlannedDrop};
 use crate::plan::Anatomy;
 use crate::score::{self, Implant, Motion, Score, SeedPair};
@@ -19,14 +20,19 @@ pub fn write(
     job: &Job,
     seen: &Seen,
     source: Option<&Path>,
-) -> Result<(), String> {
+) -> Result<(), ProcedureError> {
     let Some(implant) = &job.implant else { return Ok(()) };
     let source = match source {
-        Some(path) => Source::read(path)?,
-        None => Source::known(&implant.source)
-            .ok_or_else(|| format!("no source is known as \"{}\"; give --source FILE", implant.source))?,
+        Some(path) => Source::read(path).map_err(|e| ProcedureError::Input(e.to_string()))?,
+        None => Source::known(&implant.source).ok_or_else(|| {
+            let model = &implant.source;
+            ProcedureError::Input(format!("no source is known as \"{model}\"; give --source FILE"))
+        })?,
     };
-    let header = &link.snapshot().ok_or("the core sent no tissue")?.header;
+    let header = &link
+        .snapshot()
+        .ok_or(ProcedureError::NothingReceived("the core sent no tissue"))?
+        .header;
     let placed = &header.seeds[..header.seed_count as usize];
     let drops = job.planned();
     let planned = |drop: &PlannedDrop| {

@@ -1,5 +1,7 @@
 //! What a procedure is asked to do: needles with what is planned and what is done, from a plan file or as the scene suggests.
 
+use super::error::ProcedureError;
+use crate::pairing;
 use crate::plan::compensate::summary_m;
 use crate::plan::exchange;
 use crate::plan::rehearse::{Drops, LinkRehearser};
@@ -15,7 +17,9 @@ use stylet_shm_schema::{MAX_SEEDS, SeedPose};
 pub struct PlannedDrop {
     /// Counted from 0.
     pub needle: usize,
+    /// Hole of the needle; `None` for one that is held by hand.
     pub hole: Option<Hole>,
+    /// Where it is planned, scene frame, m.
     pub planned_m: [f64; 3],
     /// Of the needle, into the body.
     pub direction: [f64; 3],
@@ -29,14 +33,16 @@ pub fn placed<'a>(
     lost: &'a [usize],
     seeds: &'a [SeedPose],
 ) -> impl Iterator<Item = (&'a PlannedDrop, &'a SeedPose)> {
-    let kept = planned.iter().enumerate().filter(|(number, _)| !lost.contains(number));
-    kept.map(|(_, drop)| drop).zip(seeds)
+    let pairs = pairing::in_order(planned.len(), lost, seeds.len());
+    let pair = |(drop, place): (&'a PlannedDrop, Option<usize>)| Some((drop, &seeds[place?]));
+    planned.iter().zip(pairs).filter_map(pair)
 }
 
 /// Everything that is done in one procedure.
 pub struct Job {
     /// `None` without a plan file: one needle as the scene suggests.
     pub implant: Option<ImplantPlan>,
+    /// Its needles, in their order.
     pub tasks: Vec<NeedleTask>,
     /// One a needle, where it was asked for.
     pub compensations: Vec<Compensation>,
@@ -53,19 +59,19 @@ impl Job {
         }
     }
 
-    /// From a plan file, a table of seeds or an RT Plan, in the patient's frame. What is doubtful in it is told and not
-    /// refused.
-    pub fn from_file(path: &Path, scene: &SceneModel) -> Result<Self, String> {
+    /// From a plan file, a table of seeds or an RT Plan, in the patient's frame. What is doubtful in it is reported and
+    /// not refused.
+    pub fn from_file(path: &Path, scene: &SceneModel) -> Result<Self, ProcedureError> {
         let plan = exchange::read(path, &scene.header)?;
-        let told = |why: String| format!("{}: {why}", path.display());
         if plan.seed_count() == 0 || plan.seed_count() > MAX_SEEDS {
-            return Err(told(format!(
-                "{} seeds; 1 to {MAX_SEEDS} can be placed",
+            return Err(ProcedureError::Input(format!(
+                "{}: {} seeds; 1 to {MAX_SEEDS} can be placed",
+                path.display(),
                 plan.seed_count()
             )));
         }
         for problem in check::problems(&plan, &Anatomy::of(scene)?) {
-            println!("note: {}", told(problem.to_string()));
+            println!("note: {}: {problem}", path.display());
         }
         let loaded = plan.needles.iter().filter(|n| !n.seeds.is_empty());
         Ok(Self {
@@ -76,7 +82,7 @@ impl Job {
     }
 
     /// Rehearses every needle and moves its drops so that the seeds rest on plan.
-    pub fn compensate(&mut self, link: &mut Link, pace: &Pace, interrupted: &Interrupt) -> Result<(), String> {
+    pub fn compensate(&mut self, link: &mut Link, pace: &Pace, interrupted: &Interrupt) -> Result<(), ProcedureError> {
         let count = self.tasks.len();
         for (number, task) in self.tasks.iter_mut().enumerate() {
             let needle = match &self.implant {
@@ -87,7 +93,7 @@ impl Job {
             let mut rehearser = LinkRehearser { link, interrupted };
             let done = match compensate(&needle, pace, &Limits::default(), &mut rehearser) {
                 Ok(done) => done,
-                Err(why) if interrupted.is_requested() => return Err(why),
+                Err(why) if interrupted.asked() => return Err(why.into()),
                 Err(why) => {
                     println!("note: needle {} of {count} is not compensated: {why}", number + 1);
                     continue;

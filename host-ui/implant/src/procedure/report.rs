@@ -1,13 +1,16 @@
 //! result.json, force.csv and the table on the terminal.
 
 use super::Seen;
+use super::error::ProcedureError;
 use super::job::{Job, PlannedDrop, placed};
+use crate::pairing::SeedOffset;
 use crate::plan::compensate::summary_m;
 use crate::workflow::Pace;
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
+use stylet_base::{write_streamed, write_whole};
 use stylet_host::link::Link;
 use stylet_shm_schema::*;
 
@@ -18,15 +21,15 @@ pub fn write(
     pace: &Pace,
     seen: &Seen,
     failure: Option<&String>,
-) -> Result<(), String> {
-    let told = |e: std::io::Error| {
-        format!(
-            "{} cannot be written ({e}); choose another folder with --out",
-            out.display()
-        )
-    };
-    std::fs::create_dir_all(out).map_err(told)?;
-    let first = job.tasks.first().ok_or("nothing was planned")?;
+) -> Result<(), ProcedureError> {
+    std::fs::create_dir_all(out).map_err(|why| ProcedureError::Folder {
+        folder: out.to_owned(),
+        why,
+    })?;
+    let first = job
+        .tasks
+        .first()
+        .ok_or(ProcedureError::NothingReceived("nothing was planned"))?;
     let direction = first.plan.direction;
     let seeds = seeds(link, &job.planned(), &seen.lost);
     let result = json!({
@@ -53,9 +56,9 @@ pub fn write(
         "session": link.session().map(session),
         "versions": { "host_ui": env!("CARGO_PKG_VERSION"), "schema": SCHEMA_VERSION },
     });
-    let text = serde_json::to_string_pretty(&result).map_err(|e| e.to_string())?;
-    std::fs::write(out.join("result.json"), text + "\n").map_err(told)?;
-    force_csv(out, direction, seen).map_err(told)?;
+    let text = serde_json::to_string_pretty(&result)?;
+    write_whole(&out.join("result.json"), (text + "\n").as_bytes())?;
+    write_streamed(&out.join("force.csv"), |file| force_csv(file, direction, seen))?;
     table(&result);
     println!("written: {}", out.display());
     Ok(())
@@ -74,17 +77,16 @@ fn seeds(link: &Link, planned: &[PlannedDrop], lost: &[usize]) -> Vec<Value> {
     let in_tissue = &snapshot.header.seeds[..snapshot.header.seed_count as usize];
     placed(planned, lost, in_tissue)
         .map(|(drop, seed)| {
-            let (planned, direction) = (drop.planned_m, Vector3::from(drop.direction));
-            let off = Vector3::from(seed.position_m) - Vector3::from(planned);
-            let along = off.dot(&direction);
+            let planned = drop.planned_m;
+            let off = SeedOffset::of(planned, seed.position_m, drop.direction);
             json!({
                 "needle": drop.needle + 1, "hole": drop.hole.map(|h| h.to_string()), "strength_u": drop.strength_u,
                 "axis": seed.axis,
                 "planned_mm": mm(planned), "dropped_at_mm": mm(seed.dropped_at_m), "placed_mm": mm(seed.position_m),
                 "planned_ras_mm": to_patient(planned), "dropped_at_ras_mm": to_patient(seed.dropped_at_m),
                 "placed_ras_mm": to_patient(seed.position_m),
-                "error_mm": off.norm() * 1e3, "error_along_mm": along * 1e3,
-                "error_across_mm": (off - direction * along).norm() * 1e3,
+                "error_mm": off.distance_m() * 1e3, "error_along_mm": off.along_m * 1e3,
+                "error_across_mm": off.across_m * 1e3,
             })
         })
         .collect()
@@ -161,7 +163,7 @@ fn timing(link: &Link, seen: &Seen) -> Value {
         "records_received": seen.records.len(),
         "records_not_received": span.saturating_sub(seen.records.len() as u64),
         "records_lost_in_core": state.map(|s| s.records_lost),
-        "rubbish_refused": link.rubbish_refused(),
+        "invalid_dropped": link.invalid_dropped(),
     })
 }
 
@@ -190,8 +192,7 @@ fn session(s: &Session) -> Value {
     })
 }
 
-fn force_csv(out: &Path, direction: [f64; 3], seen: &Seen) -> std::io::Result<()> {
-    let mut file = std::io::BufWriter::new(std::fs::File::create(out.join("force.csv"))?);
+fn force_csv(file: &mut impl Write, direction: [f64; 3], seen: &Seen) -> std::io::Result<()> {
     writeln!(file, "time_s,tick,depth_mm,speed_mm_s,force_n,phase,tissue_tick")?;
     let begin = seen.records.first().map_or(0, |r| r.due_ns);
     for r in &seen.records {
@@ -207,7 +208,7 @@ fn force_csv(out: &Path, direction: [f64; 3], seen: &Seen) -> std::io::Result<()
             r.tissue_tick
         )?;
     }
-    file.flush()
+    Ok(())
 }
 
 fn table(result: &Value) {

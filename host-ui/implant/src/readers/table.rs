@@ -1,8 +1,8 @@
 //! Tables of numbers (CSV): columns by name, and every problem listed with its line.
 
 use std::path::Path;
-use stylet_base::input;
 use stylet_base::format::printable;
+use stylet_base::input;
 use stylet_files::FileError;
 
 const MAX_ROWS: usize = 1_000_000;

@@ -6,10 +6,13 @@ use stylet_dose::{DoseKernel, DosePoints, Dvh, Metric, Seed, Structure};
 /// Gain if this seed alone lay on plan; positive D90 and V100 were lost, positive doses to the urethra were saved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
+    /// D90 of the target, Gy.
     pub target_d90_gy: f64,
+    /// V100 of the target, %.
     pub target_v100_percent: f64,
     /// `None` without a urethra.
     pub urethra_d10_gy: Option<f64>,
+    /// D30 of the urethra, Gy; `None` without a urethra.
     pub urethra_d30_gy: Option<f64>,
 }
 

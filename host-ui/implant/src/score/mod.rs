@@ -8,10 +8,10 @@ mod picture;
 mod trace;
 mod write;
 
+use crate::pairing::SeedOffset;
 use crate::plan::{Anatomy, Hole};
 pub use dose_cost::{Cost, costs};
 pub use motion::Motion;
-use nalgebra::Vector3;
 use stylet_dose::report::{Judge, Verdict};
 use stylet_dose::{DoseKernel, Seed};
 use stylet_shm_schema::TickRecord;
@@ -26,43 +26,75 @@ const POINTS: usize = 100_000;
 pub struct SeedPair {
     /// Counted from 0.
     pub needle: usize,
+    /// Hole of the needle; `None` for one that is held by hand.
     pub hole: Option<Hole>,
+    /// The seed as planned.
     pub planned: Seed,
+    /// The seed as it rests in the tissue.
     pub delivered: Seed,
     /// Of the needle, into the body.
     pub direction: [f64; 3],
 }
 
 impl SeedPair {
-    fn off_m(&self) -> Vector3<f64> {
-        Vector3::from(self.delivered.position_m) - Vector3::from(self.planned.position_m)
+    /// How far the delivered seed rests from the planned one.
+    pub fn offset(&self) -> SeedOffset {
+        SeedOffset::of(self.planned.position_m, self.delivered.position_m, self.direction)
     }
 
+    /// Distance from plan, m.
     pub fn error_m(&self) -> f64 {
-        self.off_m().norm()
+        self.offset().distance_m()
     }
 
-    /// Positive: deeper than planned.
+    /// Distance along the needle, m; positive: deeper than planned.
     pub fn error_along_m(&self) -> f64 {
-        self.off_m().dot(&Vector3::from(self.direction))
+        self.offset().along_m
     }
 
+    /// Distance across the needle, m.
     pub fn error_across_m(&self) -> f64 {
-        (self.off_m() - Vector3::from(self.direction) * self.error_along_m()).norm()
+        self.offset().across_m
     }
+}
+
+/// Why an implant cannot be scored, or its score not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ScoreError {
+    /// There is nothing to score.
+    #[error("no seed was placed; there is nothing to score")]
+    NoSeed,
+    /// The dose cannot be counted; the text says why.
+    #[error("{0}")]
+    Dose(String),
+    /// The drawing library failed.
+    #[error("a picture of the debrief cannot be drawn ({0})")]
+    Picture(String),
+    /// A figure is not representable in JSON.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(#[from] stylet_base::WriteError),
 }
 
 /// What is scored.
 pub struct Implant<'a> {
+    /// Heading of the page.
     pub title: String,
+    /// The seeds that were delivered.
     pub pairs: Vec<SeedPair>,
     /// Planned, and not delivered.
     pub lost: Vec<Seed>,
+    /// Target and what is spared.
     pub anatomy: &'a Anatomy,
+    /// Dose of one seed.
     pub kernel: &'a DoseKernel,
     /// As the source file names itself.
     pub source: String,
+    /// Prescribed dose, Gy.
     pub prescription_gy: f64,
+    /// How the hand moved.
     pub motion: Motion,
     /// Force and speed over time; every tick or some of them.
     pub records: &'a [TickRecord],
@@ -70,19 +102,23 @@ pub struct Implant<'a> {
 
 /// The result.
 pub struct Score<'a> {
+    /// What was scored.
     pub implant: Implant<'a>,
+    /// The structures that dose was counted in.
     pub judge: Judge,
+    /// Measures of the plan.
     pub planned: Verdict,
+    /// Measures of the implant as delivered.
     pub delivered: Verdict,
     /// In the order of the pairs.
     pub costs: Vec<Cost>,
 }
 
 impl<'a> Score<'a> {
-    /// An error when there is no seed, or no dose can be counted.
-    pub fn of(implant: Implant<'a>) -> Result<Self, String> {
+    /// Scores an implant; an error when there is no seed, or no dose can be counted.
+    pub fn of(implant: Implant<'a>) -> Result<Self, ScoreError> {
         if implant.pairs.is_empty() {
-            return Err("no seed was placed; there is nothing to score".to_owned());
+            return Err(ScoreError::NoSeed);
         }
         let seeds = |one: fn(&SeedPair) -> Seed| implant.pairs.iter().map(one).collect::<Vec<_>>();
         let (on_plan, delivered) = (seeds(|p| p.planned), seeds(|p| p.delivered));
@@ -97,7 +133,8 @@ impl<'a> Score<'a> {
             &delivered,
         );
         let all = [planned.clone(), delivered.clone()].concat();
-        let judge = Judge::new(structures, Some(&target), &[], implant.prescription_gy, &all, POINTS)?;
+        let judge = Judge::new(structures, Some(&target), &[], implant.prescription_gy, &all, POINTS)
+            .map_err(|e| ScoreError::Dose(e.to_string()))?;
         Ok(Self {
             planned: judge.judge(implant.kernel, &planned),
             delivered: judge.judge(implant.kernel, &delivered),

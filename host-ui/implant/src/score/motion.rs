@@ -8,6 +8,7 @@ const RESTS_M_PER_S: f64 = 2e-3;
 /// A needle that came back by this much and goes in by as much again was inserted again.
 const AGAIN_M: f64 = 2e-3;
 
+/// Summary of how the hand moved.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion {
     /// From the first record to the last.
@@ -16,7 +17,9 @@ pub struct Motion {
     pub in_tissue_s: f64,
     /// Of the tip while it moves inwards in tissue, along the needle.
     pub mean_insertion_m_per_s: f64,
+    /// Largest speed inwards, m/s.
     pub peak_insertion_m_per_s: f64,
+    /// Largest force on the hand, N.
     pub peak_force_n: f64,
     /// Times that the tip came into tissue.
     pub insertions: usize,

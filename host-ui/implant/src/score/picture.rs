@@ -1,6 +1,6 @@
 //! Pictures of a debrief, as SVG: the implant from three sides, dose-volume histograms, force and speed over time.
 
-use super::{Score, SeedPair};
+use super::{Score, ScoreError, SeedPair};
 use crate::plan::anatomy::Body;
 use nalgebra::Vector3;
 use plotters::coord::Shift;
@@ -26,13 +26,13 @@ const INK: RGBColor = RGBColor(70, 70, 70);
 const FAINT: RGBColor = RGBColor(225, 225, 225);
 const FONT: &str = "sans-serif";
 
-fn drawn(size: (u32, u32), draw: impl FnOnce(&Canvas) -> Drawn<()>) -> Result<String, String> {
+fn drawn(size: (u32, u32), draw: impl FnOnce(&Canvas) -> Drawn<()>) -> Result<String, ScoreError> {
     let mut text = String::new();
     {
         let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
         draw(&root)
             .and_then(|()| root.present().map_err(Into::into))
-            .map_err(|e| format!("a picture of the debrief cannot be drawn ({e})"))?;
+            .map_err(|e| ScoreError::Picture(e.to_string()))?;
     }
     Ok(text)
 }
@@ -46,7 +46,7 @@ struct View {
 }
 
 /// The implant along the needles, from the side, and from the front; planned, delivered, and the way between them.
-pub fn views(score: &Score) -> Result<String, String> {
+pub fn views(score: &Score) -> Result<String, ScoreError> {
     let implant = &score.implant;
     let frame = implant.anatomy.patient;
     let axis = |patient: [f64; 3]| frame.scene_from_patient_direction(patient);
@@ -155,7 +155,7 @@ fn outline(body: &Body, view: &View, seen: &impl Fn(Vector3<f64>) -> (f64, f64))
 }
 
 /// Planned dashed, delivered drawn through.
-pub fn dvh(score: &Score) -> Result<String, String> {
+pub fn dvh(score: &Score) -> Result<String, ScoreError> {
     let most_gy = 3.0 * score.implant.prescription_gy;
     drawn((1170, 460), |root| {
         root.fill(&WHITE)?;
@@ -216,7 +216,7 @@ fn curve(dvh: &Dvh, most_gy: f64) -> Vec<(f64, f64)> {
 }
 
 /// Force above, speed along the needle below.
-pub fn over_time(records: &[TickRecord]) -> Result<String, String> {
+pub fn over_time(records: &[TickRecord]) -> Result<String, ScoreError> {
     let force = |r: &TickRecord| Vector3::from(r.force_on_hand_n).norm();
     let speed = |r: &TickRecord| r.speed_m_per_s * 1e3;
     drawn((1170, 420), |root| {

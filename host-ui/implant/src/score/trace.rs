@@ -3,7 +3,7 @@
 use super::motion::{Motion, MotionMeter};
 use stylet_base::envelope::Envelope;
 use stylet_base::format;
-use stylet_shm_schema::{TickRecord, flags};
+use stylet_shm_schema::{SceneId, TickRecord, flags};
 
 /// Records kept at most: ten of a second for twenty minutes; of a longer procedure fewer of a second.
 const MOST: usize = 12_000;
@@ -15,12 +15,10 @@ const FIRST_SLOT_NS: u64 = 10_000_000;
 /// A tip that is outside for longer belongs to no procedure until it touches tissue again.
 const OUTSIDE_NS: u64 = 2_000_000_000;
 
-/// Which scene, in which run of the core: its session and generation.
-type SceneKey = (u64, u64);
-
+/// Force and speed of one procedure, in bounded memory.
 #[derive(Clone, Debug)]
 pub struct Trace {
-    scene: Option<SceneKey>,
+    scene: Option<SceneId>,
     /// Of each stretch of ticks the one with the largest force.
     records: Vec<TickRecord>,
     stretch: usize,
@@ -51,8 +49,8 @@ impl Default for Trace {
 }
 
 impl Trace {
-    /// `direction`: of the needle, into the body. Another scene begins anew.
-    pub fn take(&mut self, records: &[TickRecord], scene: Option<SceneKey>, direction: [f64; 3]) {
+    /// `direction`: of the needle, into the body. Another scene starts a new trace.
+    pub fn take(&mut self, records: &[TickRecord], scene: Option<SceneId>, direction: [f64; 3]) {
         if scene.is_some() && scene != self.scene {
             *self = Self {
                 scene,
@@ -95,10 +93,12 @@ impl Trace {
         }
     }
 
+    /// The records that were kept, in their order.
     pub fn records(&self) -> &[TickRecord] {
         &self.records
     }
 
+    /// Whether the tip has not touched tissue yet.
     pub fn is_empty(&self) -> bool {
         self.curves.is_empty()
     }
@@ -121,6 +121,7 @@ impl Trace {
         points.collect()
     }
 
+    /// How the hand has moved so far.
     pub fn motion(&self) -> Motion {
         self.meter.motion()
     }
@@ -134,6 +135,13 @@ fn square(record: &TickRecord) -> f64 {
 mod tests {
     use super::*;
     use bytemuck::Zeroable;
+
+    fn scene(generation: u64) -> SceneId {
+        SceneId {
+            session_id: 1,
+            generation,
+        }
+    }
 
     /// A millisecond apart; the force rises and falls once a second, with one tick of 9 N.
     fn records(ticks: std::ops::Range<u64>, in_contact: bool) -> Vec<TickRecord> {
@@ -156,7 +164,7 @@ mod tests {
         for minute in 0..60 {
             trace.take(
                 &records(minute * 60_000..(minute + 1) * 60_000, true),
-                Some((1, 1)),
+                Some(scene(1)),
                 [0.0, 0.0, 1.0],
             );
         }
@@ -185,13 +193,13 @@ mod tests {
     #[test]
     fn what_comes_before_the_tissue_and_long_after_it_is_no_part_of_the_procedure() {
         let mut trace = Trace::default();
-        trace.take(&records(0..10_000, false), Some((1, 1)), [0.0, 0.0, 1.0]);
+        trace.take(&records(0..10_000, false), Some(scene(1)), [0.0, 0.0, 1.0]);
         assert!(trace.records().is_empty());
-        trace.take(&records(10_000..11_000, true), Some((1, 1)), [0.0, 0.0, 1.0]);
-        trace.take(&records(11_000..60_000, false), Some((1, 1)), [0.0, 0.0, 1.0]);
+        trace.take(&records(10_000..11_000, true), Some(scene(1)), [0.0, 0.0, 1.0]);
+        trace.take(&records(11_000..60_000, false), Some(scene(1)), [0.0, 0.0, 1.0]);
         assert!((trace.motion().duration_s - 2.999).abs() < 1e-9, "{:?}", trace.motion());
         assert_eq!(trace.records().len(), 300);
-        trace.take(&records(60_000..60_010, true), Some((1, 2)), [0.0, 0.0, 1.0]);
+        trace.take(&records(60_000..60_010, true), Some(scene(2)), [0.0, 0.0, 1.0]);
         assert_eq!(trace.records().len(), 1, "another scene");
     }
 }

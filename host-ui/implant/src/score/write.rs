@@ -1,8 +1,9 @@
 //! A score as JSON and as a page.
 
-use super::{Score, page};
+use super::{Score, ScoreError, page};
 use serde_json::{Value, json};
 use std::path::Path;
+use stylet_base::write_whole;
 
 /// Every figure of a score; lengths in mm, patient frame (RAS) for places.
 pub fn to_json(score: &Score) -> Value {
@@ -41,9 +42,11 @@ pub fn to_json(score: &Score) -> Value {
 }
 
 /// `score.json` and `debrief.html` in a folder that is there.
-pub fn write(score: &Score, folder: &Path) -> Result<(), String> {
-    let told = |e: std::io::Error| format!("{} cannot be written ({e})", folder.display());
-    let json = serde_json::to_string_pretty(&to_json(score)).map_err(|e| e.to_string())?;
-    std::fs::write(folder.join("score.json"), json + "\n").map_err(told)?;
-    std::fs::write(folder.join("debrief.html"), page::page(score)?).map_err(told)
+pub fn write(score: &Score, folder: &Path) -> Result<(), ScoreError> {
+    let json = serde_json::to_string_pretty(&to_json(score))?
+        + "
+";
+    write_whole(&folder.join("score.json"), json.as_bytes())?;
+    write_whole(&folder.join("debrief.html"), page::page(score)?.as_bytes())?;
+    Ok(())
 }

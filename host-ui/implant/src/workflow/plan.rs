@@ -1,7 +1,8 @@
 //! One needle through the gland and the seeds along it (paper fig. 6).
 
+use crate::patient::patient_axis;
 use nalgebra::Vector3;
-use stylet_shm_schema::{MAX_SEEDS, SceneHeader, StructureInfo, role};
+use stylet_shm_schema::{HandMove, MAX_SEEDS, PlannedNeedle, Request, SceneHeader, StructureInfo, role};
 
 /// The needle begins this far outside the body.
 const ENTRY_CLEARANCE_M: f64 = 0.010;
@@ -16,6 +17,7 @@ const ASIDE_M: f64 = 0.0025;
 /// The needle's path and the seeds along it, scene frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NeedlePlan {
+    /// Where the tip starts, outside the body, m.
     pub entry_m: [f64; 3],
     /// Unit vector from the entry into the gland.
     pub direction: [f64; 3],
@@ -35,36 +37,6 @@ impl NeedlePlan {
         seeds.sort_by(|a, b| self.along_m(*b).total_cmp(&self.along_m(*a)));
         seeds
     }
-}
-
-/// How the scripted hand moves.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pace {
-    pub insert_m_per_s: f64,
-    pub retract_m_per_s: f64,
-    pub approach_m_per_s: f64,
-    pub acceleration_m_per_s2: f64,
-}
-
-impl Default for Pace {
-    fn default() -> Self {
-        Self {
-            insert_m_per_s: 0.05,
-            retract_m_per_s: 0.05,
-            approach_m_per_s: 0.1,
-            acceleration_m_per_s2: 2.0,
-        }
-    }
-}
-
-/// An axis of the patient (0 right, 2 superior) in the scene; `otherwise` when the transform is not one.
-pub fn patient_axis(scene: &SceneHeader, axis: usize, otherwise: Vector3<f64>) -> Vector3<f64> {
-    let mut in_patient = [0.0; 3];
-    in_patient[axis] = 1.0;
-    Vector3::from(scene.patient().scene_from_patient_direction(in_patient))
-        .try_normalize(0.5)
-        .filter(|d| d.iter().all(|c| c.is_finite()))
-        .unwrap_or(otherwise)
 }
 
 /// Five seeds along one needle through the middle of the target.
@@ -188,18 +160,23 @@ impl Box3 {
     }
 }
 
-/// For [`stylet_shm_schema::CommandKind::SetPlan`].
-pub fn plan_values(plan: &NeedlePlan) -> Vec<f64> {
-    let mut values = [plan.entry_m, plan.direction].concat();
-    values.extend(plan.seeds_m.iter().flatten());
-    values
+/// Publishes the plan to all hosts.
+pub fn plan_request(plan: &NeedlePlan) -> Request {
+    Request::SetPlan(Some(PlannedNeedle {
+        entry_m: plan.entry_m,
+        direction: plan.direction,
+        seeds_m: plan.seeds_m.clone(),
+    }))
 }
 
-/// For [`stylet_shm_schema::CommandKind::MoveHand`].
-pub fn move_values(target_m: [f64; 3], direction: [f64; 3], speed: f64, acceleration: f64) -> Vec<f64> {
-    let mut values = [target_m, direction].concat();
-    values.extend([speed, acceleration]);
-    values
+/// Moves the simulated hand to `tip_m`; m/s and m/s².
+pub fn move_request(tip_m: [f64; 3], direction: [f64; 3], speed: f64, acceleration: f64) -> Request {
+    Request::MoveHand(HandMove {
+        tip_m,
+        direction,
+        speed_m_per_s: speed,
+        acceleration_m_per_s2: acceleration,
+    })
 }
 
 #[cfg(test)]
@@ -227,7 +204,6 @@ mod tests {
         assert!(near(plan.seeds_m[0], [0.04, 0.04, 0.062]));
         assert!(near(plan.seeds_m[4], [0.04, 0.04, 0.038]));
         assert!(near(plan.deepest_first()[0], plan.seeds_m[0]));
-        assert_eq!(plan_values(&plan).len(), 21);
     }
 
     #[test]

@@ -1,63 +1,56 @@
-//! The scripted procedure as a list of actions, each with its own time limit.
+//! The procedure driven over the link: requests out, replies and the state of the force loop in.
 
-use super::{NeedlePlan, Pace, move_values, plan_values};
+use super::{NeedlePlan, plan_request};
 use crate::plan::{Drops, Needle};
-use nalgebra::Vector3;
-use std::collections::VecDeque;
-use std::time::{Duration, Instant};
-use stylet_host::link::{Link, LinkStatus};
-use stylet_shm_schema::script::{TISSUE_REST_FOR, TISSUE_REST_LIMIT, TISSUE_REST_M, arrived_after, move_limit};
-use stylet_shm_schema::{CommandKind, Fault, HapticState};
+use std::time::Instant;
+use stylet_host::link::{Link, LinkError, LinkStatus};
+use stylet_procedure::{HandRequest, Next, Observed, Pace, Procedure, Reply, Step, StepFailure};
+use stylet_shm_schema::{HapticState, RefusalCode, Request};
 
-/// In the core's refusal of a drop that leaves the procedure as it is.
-const TIP_OUTSIDE: &str = "outside the tissue";
-const REPLY_LIMIT: Duration = Duration::from_secs(3);
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
-    Plan,
-    PlaceNeedle,
-    Insert,
-    DropAndRetract,
-    Done,
-}
-
-impl Step {
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Plan => "plan the needle and the seeds",
-            Self::PlaceNeedle => "place the needle",
-            Self::Insert => "insert",
-            Self::DropAndRetract => "drop seeds and retract",
-            Self::Done => "done",
-        }
-    }
-}
-
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// How a run ended, or that it has not.
+#[derive(Clone, Debug, PartialEq)]
 pub enum RunStatus {
+    /// Not done yet.
     Working,
+    /// Every step was completed.
     Done,
-    Failed(String),
+    /// A step could not be completed; nothing more is sent.
+    Failed(RunError),
 }
 
-#[derive(Clone, Debug)]
-enum Action {
-    Command(CommandKind, Vec<f64>),
-    Move {
-        to_m: [f64; 3],
-        direction: [f64; 3],
-        speed_m_per_s: f64,
-    },
-    /// With its number, counted from 0 over all needles.
-    Drop(usize),
-    TissueRest,
+/// The step that could not be completed, and why.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("step \"{}\" failed: {why}", step.name())]
+pub struct RunError {
+    /// The step at that time.
+    pub step: Step,
+    /// What went wrong.
+    pub why: RunFailure,
+}
+
+/// Why a step could not be completed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RunFailure {
+    /// The core is absent; the text says what to do.
+    #[error("{0}")]
+    Absent(String),
+    /// Another run of the core has begun.
+    #[error("rt-core was restarted during the procedure; start the procedure again")]
+    Restarted,
+    /// A request could not be sent.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The procedure itself cannot go on.
+    #[error(transparent)]
+    Procedure(#[from] StepFailure),
 }
 
 /// One needle of a script: what is planned, and what is done for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NeedleTask {
+    /// What is planned.
     pub plan: NeedlePlan,
+    /// Where the seeds are dropped for it.
     pub drops: Drops,
 }
 
@@ -93,20 +86,13 @@ impl NeedleTask {
 /// One scripted implantation. Call [`Run::advance`] after each [`Link::poll`].
 pub struct Run {
     tasks: Vec<NeedleTask>,
-    pace: Pace,
-    /// Each with the number of its needle.
-    actions: VecDeque<(usize, Step, Action)>,
-    /// Drops that the core refused because the tip was outside the tissue.
-    lost: Vec<usize>,
+    procedure: Procedure,
     status: RunStatus,
     session_id: Option<u64>,
-    /// The armed force may fault from here on.
-    armed: bool,
-    begun: Instant,
+    started: Instant,
     sent: Option<u64>,
-    /// The tick from which the state shows the command.
+    /// The tick from which the state shows the request.
     effective_tick: Option<u64>,
-    condition_since: Option<Instant>,
 }
 
 impl Run {
@@ -117,37 +103,34 @@ impl Run {
 
     /// One needle after another; between two of them the tissue comes to rest.
     pub fn of_needles(tasks: Vec<NeedleTask>, pace: Pace) -> Self {
+        let ways = tasks.iter().map(|task| task.drops.way()).collect();
         Self {
-            actions: script(&tasks, &pace),
             tasks,
-            lost: Vec::new(),
-            pace,
+            procedure: Procedure::of_needles(ways, pace),
             status: RunStatus::Working,
             session_id: None,
-            armed: false,
-            begun: Instant::now(),
+            started: Instant::now(),
             sent: None,
             effective_tick: None,
-            condition_since: None,
         }
     }
 
+    /// The step at present.
     pub fn step(&self) -> Step {
-        self.actions.front().map_or(Step::Done, |(_, step, _)| *step)
+        self.procedure.step()
     }
 
     /// Which needle is at work, counted from 0; the last one when all are done.
     pub fn needle(&self) -> usize {
-        let last = self.tasks.len().saturating_sub(1);
-        self.actions.front().map_or(last, |(needle, _, _)| *needle)
+        self.procedure.needle()
     }
 
     /// Numbers of the drops that left no seed, counted from 0 over all needles: the tip was outside the tissue.
     pub fn lost(&self) -> &[usize] {
-        &self.lost
+        self.procedure.lost()
     }
 
-    /// Of the needle at work.
+    /// Plan of the needle at work.
     pub fn plan(&self) -> Option<&NeedlePlan> {
         self.tasks.get(self.needle()).map(|task| &task.plan)
     }
@@ -155,188 +138,70 @@ impl Run {
     /// Does what can be done now.
     pub fn advance(&mut self, link: &mut Link) -> RunStatus {
         while self.status == RunStatus::Working {
-            let Some((_, step, action)) = self.actions.front().cloned() else {
-                self.status = RunStatus::Done;
-                break;
-            };
-            match self.try_finish(link, &action) {
-                Ok(true) => self.next(&action),
-                Ok(false) => break,
+            match self.try_advance(link) {
+                Ok(Next::Continue) => (self.sent, self.effective_tick) = (None, None),
+                Ok(Next::Done) => self.status = RunStatus::Done,
+                Ok(Next::Send(_) | Next::Wait) => break,
                 Err(why) => {
-                    let failed = format!("step \"{}\" failed: {why}", step.name());
-                    self.status = RunStatus::Failed(failed);
+                    let step = self.step();
+                    self.status = RunStatus::Failed(RunError { step, why });
                 }
             }
         }
         self.status.clone()
     }
 
-    fn next(&mut self, finished: &Action) {
-        self.armed |= matches!(finished, Action::Command(CommandKind::Engage, _));
-        self.actions.pop_front();
-        (self.sent, self.effective_tick, self.condition_since) = (None, None, None);
-        self.begun = Instant::now();
-    }
-
-    fn try_finish(&mut self, link: &mut Link, action: &Action) -> Result<bool, String> {
+    fn try_advance(&mut self, link: &mut Link) -> Result<Next, RunFailure> {
         self.check_core(link)?;
-        let Some(state) = link.state().copied() else {
-            return self.in_time("the state of the force loop", REPLY_LIMIT).map(|()| false);
-        };
-        let fault = Fault::from_number(state.fault).unwrap_or(Fault::None);
-        if self.armed && fault != Fault::None {
-            return Err(format!("the force is off: {}", fault.message()));
+        let now_s = self.started.elapsed().as_secs_f64();
+        let state = link.state().copied();
+        let reply = state.as_ref().map_or(Reply::Pending, |state| self.reply(link, state));
+        let displacement_m = link.snapshot().map(|s| s.header.max_displacement_m);
+        let observed = state.as_ref().map(|state| Observed { state, displacement_m });
+        let next = self.procedure.advance(now_s, observed.as_ref(), reply)?;
+        if let Next::Send(request) = next {
+            self.sent = Some(self.send(link, request)?);
         }
-        match action {
-            Action::Command(kind, values) => self.command(link, &state, *kind, values),
-            Action::Move {
-                to_m,
-                direction,
-                speed_m_per_s,
-            } => {
-                let acceleration = self.pace.acceleration_m_per_s2;
-                let values = move_values(*to_m, *direction, *speed_m_per_s, acceleration);
-                if !self.command(link, &state, CommandKind::MoveHand, &values)? {
-                    return Ok(false);
-                }
-                let off = Vector3::from(state.tip_in_scene_m) - Vector3::from(*to_m);
-                self.arrived(&state, off.dot(&Vector3::from(*direction)), *speed_m_per_s)
-            }
-            Action::Drop(number) => self.dropped(link, &state, *number),
-            Action::TissueRest => {
-                let moved = link.snapshot().map(|s| s.header.max_displacement_m);
-                let at_rest = moved.is_some_and(|d| d < TISSUE_REST_M);
-                Ok(self.held_for(at_rest, TISSUE_REST_FOR) || self.begun.elapsed() > TISSUE_REST_LIMIT)
-            }
-        }
+        Ok(next)
     }
 
-    fn check_core(&mut self, link: &Link) -> Result<(), String> {
+    fn check_core(&mut self, link: &Link) -> Result<(), RunFailure> {
         if let LinkStatus::Absent { why } = link.status() {
-            return Err(why);
+            return Err(RunFailure::Absent(why));
         }
         let id = link.session().map(|s| s.session_id);
         if self.session_id.is_some() && id != self.session_id {
-            return Err("rt-core was started anew during the procedure; start the procedure again".to_owned());
+            return Err(RunFailure::Restarted);
         }
         self.session_id = id;
         Ok(())
     }
 
-    /// True once the seed lies in the tissue, or is lost because the tip is not in it.
-    fn dropped(&mut self, link: &mut Link, state: &HapticState, number: usize) -> Result<bool, String> {
-        match self.command(link, state, CommandKind::DropSeed, &[]) {
-            Ok(false) => return Ok(false),
-            Ok(true) => {}
-            Err(why) if why.contains(TIP_OUTSIDE) => {
-                self.lost.push(number);
-                return Ok(true);
-            }
-            Err(why) => return Err(why),
-        }
-        self.in_time("the seed in the tissue", REPLY_LIMIT)?;
-        Ok(state.seed_count as usize + self.lost.len() > number)
+    fn send(&self, link: &mut Link, request: HandRequest) -> Result<u64, LinkError> {
+        link.send(&match request {
+            HandRequest::Reset => Request::Reset,
+            HandRequest::PublishPlan { needle } => plan_request(&self.tasks[needle].plan),
+            HandRequest::Engage => Request::Engage,
+            HandRequest::MoveHand(goal) => Request::MoveHand(goal),
+            HandRequest::DropSeed => Request::DropSeed,
+        })
     }
 
-    /// True once the command was accepted and the state shows it.
-    fn command(
-        &mut self,
-        link: &mut Link,
-        state: &HapticState,
-        kind: CommandKind,
-        values: &[f64],
-    ) -> Result<bool, String> {
-        let Some(id) = self.sent else {
-            self.sent = Some(link.send(kind, values).map_err(|e| e.0)?);
-            return Ok(false);
-        };
+    /// What became of the request that was sent last.
+    fn reply(&mut self, link: &mut Link, state: &HapticState) -> Reply {
+        let Some(id) = self.sent else { return Reply::Pending };
         if self.effective_tick.is_none() {
             match link.reply(id) {
+                None => return Reply::Pending,
                 Some(answer) if answer.accepted => self.effective_tick = Some(answer.effective_tick),
-                Some(answer) => return Err(format!("{kind:?} was refused: {}", answer.text)),
-                None => {
-                    return self
-                        .in_time(&format!("an answer to {kind:?}"), REPLY_LIMIT)
-                        .map(|()| false);
-                }
+                Some(answer) if answer.is_refused_for(RefusalCode::TipOutsideTissue) => return Reply::TipOutsideTissue,
+                Some(answer) => return Reply::Refused(answer.text),
             }
         }
-        let shown = self.effective_tick.is_some_and(|tick| state.tick > tick);
-        if !shown {
-            self.in_time(&format!("{kind:?} to take effect"), REPLY_LIMIT)?;
+        if self.effective_tick.is_some_and(|tick| state.tick > tick) {
+            Reply::InEffect
+        } else {
+            Reply::Accepted
         }
-        Ok(shown)
     }
-
-    fn arrived(&mut self, state: &HapticState, off_m: f64, speed_m_per_s: f64) -> Result<bool, String> {
-        match arrived_after(state, off_m) {
-            None => self.condition_since = None,
-            Some(long) if self.held_for(true, long) => return Ok(true),
-            Some(_) => {}
-        }
-        self.in_time(
-            &format!(
-                "the tip at its target; it is {:.2} mm from it along the needle",
-                off_m * 1e3
-            ),
-            move_limit(speed_m_per_s),
-        )?;
-        Ok(false)
-    }
-
-    fn held_for(&mut self, holds: bool, long: Duration) -> bool {
-        if !holds {
-            self.condition_since = None;
-            return false;
-        }
-        self.condition_since.get_or_insert_with(Instant::now).elapsed() >= long
-    }
-
-    fn in_time(&self, awaited: &str, limit: Duration) -> Result<(), String> {
-        if self.begun.elapsed() <= limit {
-            return Ok(());
-        }
-        Err(format!("waited {:.1} s for {awaited}", limit.as_secs_f64()))
-    }
-}
-
-fn script(tasks: &[NeedleTask], pace: &Pace) -> VecDeque<(usize, Step, Action)> {
-    let command = |kind| Action::Command(kind, Vec::new());
-    let mut actions = VecDeque::new();
-    let mut seeds = 0;
-    for (number, task) in tasks.iter().enumerate() {
-        let drops = &task.drops;
-        let go = |along_m: f64, speed_m_per_s| Action::Move {
-            to_m: drops.at_m(along_m),
-            direction: drops.direction,
-            speed_m_per_s,
-        };
-        let mut then = |step, action| actions.push_back((number, step, action));
-        if number == 0 {
-            then(Step::Plan, command(CommandKind::Reset));
-        }
-        then(
-            Step::Plan,
-            Action::Command(CommandKind::SetPlan, plan_values(&task.plan)),
-        );
-        if number == 0 {
-            then(Step::PlaceNeedle, command(CommandKind::Engage));
-        }
-        then(Step::PlaceNeedle, go(0.0, pace.approach_m_per_s));
-        for (index, &along_m) in drops.along_m.iter().enumerate() {
-            if index == 0 {
-                then(Step::Insert, go(along_m, pace.insert_m_per_s));
-            } else {
-                then(Step::DropAndRetract, go(along_m, pace.retract_m_per_s));
-            }
-            then(Step::DropAndRetract, Action::Drop(seeds));
-            seeds += 1;
-        }
-        if drops.retract_to_m > 0.0 {
-            then(Step::DropAndRetract, go(drops.retract_to_m, pace.retract_m_per_s));
-        }
-        then(Step::DropAndRetract, go(0.0, pace.retract_m_per_s));
-        then(Step::DropAndRetract, Action::TissueRest);
-    }
-    actions
 }

@@ -1,39 +1,43 @@
 //! Results as CSV, JSON and tables; the unit of each column stands in its header.
 
+use crate::command::CommandError;
 use serde_json::{Value, json};
 use std::path::Path;
+use stylet_base::{write_streamed, write_whole};
 use stylet_dose::Dvh;
 use stylet_dose::perturb::{PERCENTILES, Spread};
 
-pub fn folder(out: &Path) -> Result<(), String> {
-    std::fs::create_dir_all(out).map_err(|e| {
+pub fn folder(out: &Path) -> Result<(), CommandError> {
+    Ok(std::fs::create_dir_all(out).map_err(|e| {
         format!(
-            "{} cannot be made ({e}); choose another folder with --out",
+            "{} cannot be created ({e}); choose another folder with --out",
             out.display()
         )
-    })
+    })?)
 }
 
-pub fn json(path: &Path, value: &Value) -> Result<(), String> {
-    let text = serde_json::to_string_pretty(value).map_err(|e| e.to_string())?;
-    std::fs::write(path, text + "\n").map_err(|e| format!("{} cannot be written ({e})", path.display()))
+pub fn json(path: &Path, value: &Value) -> Result<(), CommandError> {
+    let text = serde_json::to_string_pretty(value)?;
+    Ok(write_whole(path, (text + "\n").as_bytes())?)
 }
 
-fn csv(path: &Path, header: &[String], rows: impl Iterator<Item = Vec<String>>) -> Result<(), String> {
-    let told = |e: csv::Error| format!("{} cannot be written ({e})", path.display());
-    let mut writer = csv::Writer::from_path(path).map_err(told)?;
-    writer.write_record(header).map_err(told)?;
-    for row in rows {
-        writer.write_record(&row).map_err(told)?;
-    }
-    writer.flush().map_err(|e| told(e.into()))
+fn csv(path: &Path, header: &[String], rows: impl Iterator<Item = Vec<String>>) -> Result<(), CommandError> {
+    let table = |file: &mut dyn std::io::Write| -> std::io::Result<()> {
+        let mut writer = csv::Writer::from_writer(file);
+        writer.write_record(header)?;
+        for row in rows {
+            writer.write_record(&row)?;
+        }
+        writer.flush()
+    };
+    Ok(write_streamed(path, |file| table(file))?)
 }
 
 fn owned(header: &[&str]) -> Vec<String> {
     header.iter().map(|&h| h.to_owned()).collect()
 }
 
-pub fn doses(path: &Path, points_m: impl Iterator<Item = [f64; 3]>, dose_gy: &[f64]) -> Result<(), String> {
+pub fn doses(path: &Path, points_m: impl Iterator<Item = [f64; 3]>, dose_gy: &[f64]) -> Result<(), CommandError> {
     let rows = points_m.zip(dose_gy).map(|(p, gy)| {
         let [x, y, z] = p.map(|v| format!("{:.4}", v * 1e3));
         vec![x, y, z, format!("{gy:.6}")]
@@ -42,7 +46,7 @@ pub fn doses(path: &Path, points_m: impl Iterator<Item = [f64; 3]>, dose_gy: &[f
 }
 
 /// Differential and cumulative, up to the highest dose but not beyond ten times the prescription.
-pub fn dvh(path: &Path, curves: &[(&str, &Dvh)], prescription_gy: f64, bin_gy: f64) -> Result<(), String> {
+pub fn dvh(path: &Path, curves: &[(&str, &Dvh)], prescription_gy: f64, bin_gy: f64) -> Result<(), CommandError> {
     let header = owned(&[
         "structure",
         "dose_from_gy",
@@ -78,7 +82,7 @@ pub fn trials(
     path: &Path,
     measures: &[(String, Option<f64>)],
     trials: &[(usize, Vec<Option<f64>>)],
-) -> Result<(), String> {
+) -> Result<(), CommandError> {
     let names = measures.iter().map(|(name, _)| name.clone());
     let header: Vec<String> = std::iter::once("trial".to_owned()).chain(names).collect();
     let rows = trials.iter().map(|(trial, values)| {
@@ -88,7 +92,7 @@ pub fn trials(
     csv(path, &header, rows)
 }
 
-pub fn distribution(path: &Path, spreads: &[Spread]) -> Result<(), String> {
+pub fn distribution(path: &Path, spreads: &[Spread]) -> Result<(), CommandError> {
     let percentiles = PERCENTILES.map(|p| format!("p{p}"));
     let header: Vec<String> = owned(&["measure [unit]", "planned", "mean", "sd"])
         .into_iter()

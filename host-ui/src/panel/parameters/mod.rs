@@ -2,11 +2,12 @@
 
 mod preset;
 
-use super::Shown;
+use crate::shown::Shown;
 use crate::theme;
 use egui::{Button, DragValue, RichText};
 use std::path::Path;
 use stylet_base::format;
+use stylet_host::link::Answer;
 use stylet_shm_schema::{PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterSpec};
 
 /// What stands under a row.
@@ -15,7 +16,7 @@ enum RowNote {
     #[default]
     None,
     InForce(u64),
-    Refused(String),
+    Refused(&'static str),
 }
 
 /// One change at a time is on its way; what is edited meanwhile waits and goes with the next.
@@ -77,11 +78,20 @@ impl ParametersState {
         self.in_flight.as_ref().map(|(id, _)| *id)
     }
 
-    /// A refusal names every reason by key; what names no row stands at the foot only.
-    pub fn answered(&mut self, accepted: bool, text: &str, effective_tick: u64) {
-        let Some((_, pairs)) = self.in_flight.take() else {
-            return;
-        };
+    /// A refusal names the parameters that are involved; the reasons in full stand at the foot.
+    pub fn answered(&mut self, answer: &Answer) {
+        if let Some((_, pairs)) = self.in_flight.take() {
+            self.note(pairs, answer);
+        }
+    }
+
+    /// Not sent, since the core would refuse it.
+    pub fn refused(&mut self, pairs: Vec<(usize, f64)>, answer: &Answer) {
+        self.unsent = false;
+        self.note(pairs, answer);
+    }
+
+    fn note(&mut self, pairs: Vec<(usize, f64)>, answer: &Answer) {
         for (index, value) in pairs {
             let (Some(spec), Some(draft)) = (PARAMETERS.get(index), self.drafts.get_mut(index)) else {
                 continue;
@@ -89,14 +99,17 @@ impl ParametersState {
             if *draft == Some(value) {
                 *draft = None;
             }
-            self.notes[index] = match accepted {
-                true => RowNote::InForce(effective_tick),
-                false => RowNote::Refused(reason_for(spec, text)),
+            self.notes[index] = match answer.accepted {
+                true => RowNote::InForce(answer.effective_tick),
+                false => RowNote::Refused(reason_for(spec, answer)),
             };
         }
-        self.foot = Some(match accepted {
-            true => (false, format!("In force since tick {}", format::count(effective_tick))),
-            false => (true, format!("Refused, nothing changed: {text}")),
+        self.foot = Some(match answer.accepted {
+            true => (
+                false,
+                format!("In force since tick {}", format::count(answer.effective_tick)),
+            ),
+            false => (true, format!("Refused, nothing changed: {}", answer.text)),
         });
     }
 
@@ -112,15 +125,15 @@ impl ParametersState {
         let set = shown.parameters.map(|p| p.set).unwrap_or_default();
         self.foot = Some(match preset::save(Path::new(self.preset_path.trim()), &set) {
             Ok(()) => (false, format!("Saved to {}", self.preset_path.trim())),
-            Err(why) => (true, why),
+            Err(why) => (true, why.to_string()),
         });
     }
 
-    /// Takes every value of a file, or none and says all that is wrong with it.
+    /// Takes every value of a file, or none and shows everything that is wrong with it.
     fn load_preset(&mut self) {
         match preset::load(Path::new(self.preset_path.trim())) {
             Ok(values) => values.into_iter().for_each(|(index, value)| self.edit(index, value)),
-            Err(why) => self.foot = Some((true, why)),
+            Err(why) => self.foot = Some((true, why.to_string())),
         }
     }
 
@@ -131,11 +144,10 @@ impl ParametersState {
     }
 }
 
-fn reason_for(spec: &ParameterSpec, text: &str) -> String {
-    text.lines()
-        .find(|line| line.contains(spec.key))
-        .unwrap_or("refused with others, see below")
-        .to_owned()
+fn reason_for(spec: &ParameterSpec, answer: &Answer) -> &'static str {
+    let own = answer.reasons.iter().find(|reason| reason.parameter() == Some(spec.id));
+    own.and_then(|reason| reason.code())
+        .map_or("refused with others, see below", |code| code.message())
 }
 
 pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersState) {
@@ -148,7 +160,7 @@ pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersS
         .show(ctx, |ui| {
             if shown.parameters.is_none() {
                 ui.label(
-                    RichText::new("rt-core has not told its parameters yet; these are the defaults.")
+                    RichText::new("rt-core has not reported its parameters yet; these are the defaults.")
                         .color(theme::of(ui).warn),
                 );
             }
@@ -163,7 +175,7 @@ pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersS
                         group_ui(ui, shown, state, (group, &found));
                     }
                     if found.is_empty() {
-                        ui.label(theme::weak("No parameter has these words."));
+                        ui.label(theme::weak("No parameter matches."));
                     }
                 });
             ui.separator();
@@ -289,7 +301,7 @@ fn note_ui(ui: &mut egui::Ui, state: &ParametersState, index: usize) {
         }
         RowNote::Refused(why) => {
             let text = RichText::new("refused").small().color(theme::of(ui).bad);
-            ui.label(text).on_hover_text(why);
+            ui.label(text).on_hover_text(*why);
         }
     }
 }
@@ -335,48 +347,11 @@ fn foot_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState) {
     }
 }
 
-/// As few digits as say it.
+/// As few digits as needed.
 fn plain(value: f64) -> String {
     let text = format!("{value:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_search_finds_by_name_key_and_source_and_all_words_count() {
-        assert_eq!(found("").len(), PARAMETER_COUNT);
-        let keys = |search| found(search).iter().map(|&i| PARAMETERS[i].key).collect::<Vec<_>>();
-        assert_eq!(keys("PUNCTURE depth u_cri"), ["needle.puncture_depth"]);
-        assert_eq!(keys("podder capsule"), ["force.membrane_peak"]);
-        assert!(keys("no such thing").is_empty());
-    }
-
-    #[test]
-    fn edits_made_while_a_change_is_on_its_way_are_sent_after_it() {
-        let mut state = ParametersState::default();
-        state.edit(0, 0.6);
-        let pairs = state.request().expect("something to send");
-        state.sent(7, pairs);
-        state.edit(0, 0.7);
-        assert_eq!(state.request(), None);
-        state.answered(true, "", 100);
-        assert_eq!(state.request(), Some(vec![(0, 0.7)]));
-    }
-
-    #[test]
-    fn a_refusal_stands_at_its_row_and_the_draft_is_gone() {
-        let mut state = ParametersState::default();
-        state.edit(6, 0.01);
-        let pairs = state.request().expect("something to send");
-        state.sent(7, pairs);
-        state.answered(false, "other\nneedle.puncture_depth is too large", 0);
-        assert_eq!(
-            state.notes[6],
-            RowNote::Refused("needle.puncture_depth is too large".to_owned())
-        );
-        assert_eq!(state.drafts[6], None);
-    }
-}
+mod tests;

@@ -1,30 +1,77 @@
 //! Parameters as a file (TOML) in the units that a person reads.
 
 use std::fmt::Write;
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
+use stylet_base::{WriteError, write_whole};
 use stylet_shm_schema::{PARAMETERS, ParameterSet};
 
 /// A larger file is no preset.
 const MAX_BYTES: u64 = 64 << 10;
 
-pub fn save(path: &Path, set: &ParameterSet) -> Result<(), String> {
-    std::fs::write(path, text(set)).map_err(|e| format!("{}: it cannot be written: {e}", path.display()))
+/// A preset that could not be saved or loaded.
+#[derive(Debug, thiserror::Error)]
+pub enum PresetError {
+    /// The file could not be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// The file could not be read.
+    #[error("{}: it cannot be read: {source}", .path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system reported.
+        source: io::Error,
+    },
+    /// A folder or a device, which might never end.
+    #[error("{}: it is not a regular file", .0.display())]
+    NotAFile(PathBuf),
+    /// Far larger than any preset.
+    #[error("{}: it has {bytes} bytes; a preset has a few thousand", .path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its size.
+        bytes: u64,
+    },
+    /// What is wrong with its content, one problem a line.
+    #[error("{}: {problems}", .path.display())]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// Every problem.
+        problems: String,
+    },
+}
+
+/// Writes a set of parameters.
+pub fn save(path: &Path, set: &ParameterSet) -> Result<(), PresetError> {
+    Ok(write_whole(path, text(set).as_bytes())?)
 }
 
 /// Place in the table and SI value of each parameter in the file.
-pub fn load(path: &Path) -> Result<Vec<(usize, f64)>, String> {
-    let told = |why: String| format!("{}: {why}", path.display());
-    let about = std::fs::metadata(path).map_err(|e| told(format!("it cannot be opened: {e}")))?;
-    // A device would never end.
+pub fn load(path: &Path) -> Result<Vec<(usize, f64)>, PresetError> {
+    let path_buf = || path.to_owned();
+    let unread = |source| PresetError::Read {
+        path: path_buf(),
+        source,
+    };
+    let about = std::fs::metadata(path).map_err(unread)?;
     if !about.is_file() {
-        return Err(told("it is no file".to_owned()));
+        return Err(PresetError::NotAFile(path_buf()));
     }
-    let size = about.len();
-    if size > MAX_BYTES {
-        return Err(told(format!("it has {size} bytes; a preset has a few thousand")));
+    let bytes = about.len();
+    if bytes > MAX_BYTES {
+        return Err(PresetError::TooLarge {
+            path: path_buf(),
+            bytes,
+        });
     }
-    let text = std::fs::read_to_string(path).map_err(|e| told(format!("it cannot be read: {e}")))?;
-    read(&text).map_err(told)
+    let text = std::fs::read_to_string(path).map_err(unread)?;
+    read(&text).map_err(|problems| PresetError::Invalid {
+        path: path_buf(),
+        problems,
+    })
 }
 
 fn text(set: &ParameterSet) -> String {
@@ -80,7 +127,7 @@ fn take(prefix: &str, table: &toml::Table, values: &mut Vec<(usize, f64)>, probl
             continue;
         };
         match spec.problem(si) {
-            Some(problem) => problems.push(problem),
+            Some(problem) => problems.push(problem.to_string()),
             None => values.push((index, si)),
         }
     }

@@ -1,8 +1,9 @@
-//! What came of it: the error of each seed, the dose against its limits, the histogram of the target.
+//! The debrief: the error of each seed, the dose against its limits, the histogram of the target.
 
-use crate::dose_desk::{DosePicture, Figure, Limit};
+use crate::action::Action;
+use crate::dose_worker::{DoseResult, Figure, Limit};
 use crate::panel::axis::{plot, upwards};
-use crate::panel::{Action, SeedError, Shown, all_errors};
+use crate::shown::{SeedError, Shown, all_errors};
 use crate::theme;
 use egui::RichText;
 use egui_plot::{Line, PlotPoints, VLine};
@@ -59,7 +60,7 @@ fn figure_ui(ui: &mut egui::Ui, figure: &Figure) {
         ui.label("");
         return ui.end_row();
     };
-    // The word says it as well as the colour.
+    // The word repeats what the colour shows.
     let (word, color) = match (limit.is_met(figure.value), limit) {
         (true, _) => ("met".to_owned(), tokens.good),
         (false, Limit::AtLeast(value)) => (format!("below {value:.0}"), tokens.bad),
@@ -69,7 +70,7 @@ fn figure_ui(ui: &mut egui::Ui, figure: &Figure) {
     ui.end_row();
 }
 
-fn dvh_ui(ui: &mut egui::Ui, dose: &DosePicture, height: f32) {
+fn dvh_ui(ui: &mut egui::Ui, dose: &DoseResult, height: f32) {
     let tokens = theme::of(ui);
     ui.label(theme::small("Target: volume over dose, both in %"));
     let points: Vec<[f64; 2]> = dose.target_dvh.iter().map(|[x, y]| [x * 100.0, y * 100.0]).collect();
@@ -91,7 +92,7 @@ fn dvh_ui(ui: &mut egui::Ui, dose: &DosePicture, height: f32) {
         });
 }
 
-/// Nothing until the first seed is placed: an empty table tells nothing.
+/// Nothing until the first seed is placed.
 pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
     if shown.seeds.is_empty() || rows.is_empty() {
         return;

@@ -1,19 +1,20 @@
-//! The left panel: the steps of the procedure, one of them open, with the one thing to do and what it lacks.
+//! The left panel: the steps of the procedure, one of them open, with its main action and what is missing.
 
 mod debrief;
+mod job;
 mod plan;
 mod progress;
 mod scene;
-mod work;
 
-use super::{Action, SeedError, Shown, own_errors};
+use crate::action::Action;
+use crate::shown::{SeedError, Shown, own_errors};
 use crate::theme;
 use egui::{Align2, Button, FontId, RichText, Sense, Stroke, Vec2};
 pub use plan::{PlanState, editor_ui};
 pub use progress::{Progress, Undo, is_at_next_seed, is_needle_done, missing, next_action, progress, undo_action};
 use stylet_base::format;
 use stylet_implant::workflow::Step;
-use stylet_shm_schema::CommandKind;
+use stylet_shm_schema::Request;
 
 /// What the panel keeps between frames: what a person is typing, and which step was opened by hand.
 #[derive(Default)]
@@ -75,9 +76,11 @@ fn run_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     if shown.running {
         let step = match shown.run_step {
             Some(Step::Plan) => "planning",
-            Some(Step::PlaceNeedle) => "placing the needle",
+            Some(Step::Place) => "placing the needle",
             Some(Step::Insert) => "inserting",
-            Some(Step::DropAndRetract) => "dropping and retracting",
+            Some(Step::Drop) => "dropping the seeds",
+            Some(Step::Retract) => "retracting",
+            Some(Step::Settle) => "waiting for the tissue to rest",
             Some(Step::Done) | None => "finishing",
         };
         ui.horizontal(|ui| {
@@ -113,7 +116,7 @@ fn hinted(response: egui::Response, blocked: Option<String>) -> egui::Response {
     }
 }
 
-/// One line: the step's number in a dot that says how far it is, its name, and the same in a word.
+/// One line: the step's number in a dot that shows its progress, its name, and the progress in a word.
 fn head_ui(ui: &mut egui::Ui, (step, now): (Progress, Progress), shown: &Shown) -> egui::Response {
     let tokens = theme::of(ui);
     let size = Vec2::new(ui.available_width(), 24.0);
@@ -173,7 +176,7 @@ fn step_ui(
         let blocked = missing(shown, step);
         match &blocked {
             Some(why) => drop(ui.label(RichText::new(format!("Missing: {why}.")).color(tokens.warn))),
-            // What there is to say stands below.
+            // Details stand below.
             None if step == Progress::Plan && shown.planning.implant.is_some() => {}
             None if step == Progress::Debrief => {}
             None => drop(ui.label(theme::weak(what(step, shown)))),
@@ -209,7 +212,7 @@ fn what(step: Progress, shown: &Shown) -> String {
     }
 }
 
-/// The one thing to do in a step.
+/// The button of the main action of a step.
 fn main_button(ui: &mut egui::Ui, (name, action): (&str, Action), ready: bool, actions: &mut Vec<Action>) {
     if ui
         .add_enabled(ready, Button::new(name))
@@ -259,7 +262,7 @@ fn drop_ui(ui: &mut egui::Ui, shown: &Shown, ready: bool, actions: &mut Vec<Acti
             .on_hover_text("Space")
             .clicked()
         {
-            actions.push(Action::Send(CommandKind::DropSeed));
+            actions.push(Action::Send(Request::DropSeed));
         }
         let next = shown.next_seed_m().filter(|_| !is_at_next_seed(shown));
         let to_next = ui.add_enabled(live && next.is_some(), Button::new("To the next place"));
@@ -289,7 +292,7 @@ fn retract_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         }
         let undo = ui.add_enabled(live && !shown.seeds.is_empty(), Button::new("Undo seed"));
         if undo.on_hover_text("Ctrl+Z").clicked() {
-            actions.push(Action::Send(CommandKind::UndoSeed));
+            actions.push(Action::Send(Request::UndoSeed));
         }
     });
 }
@@ -303,21 +306,24 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
             .on_hover_text("Key E")
             .clicked()
         {
-            actions.push(Action::Send(CommandKind::Engage));
+            actions.push(Action::Send(Request::Engage));
         }
         if ui
             .add_enabled(live && engaged, Button::new("Disengage"))
             .on_hover_text("Key D")
             .clicked()
         {
-            actions.push(Action::Send(CommandKind::Disengage));
+            actions.push(Action::Send(Request::Disengage));
         }
         let reset = ui.add_enabled(live, Button::new("Reset"));
         if reset
             .on_hover_text("Tissue to rest, seeds removed, peaks and worst cases forgotten")
             .clicked()
         {
-            actions.push(Action::Send(CommandKind::Reset));
+            actions.push(Action::Send(Request::Reset));
         }
     });
 }
+
+#[cfg(test)]
+mod tests;

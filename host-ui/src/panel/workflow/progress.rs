@@ -1,17 +1,10 @@
 //! How far the operator is, what each step lacks, and the one thing to do next.
 
-use crate::panel::{Action, PlanAction, Shown};
+use crate::action::{Action, PlanAction};
+use crate::shown::Shown;
 use stylet_base::format;
-use stylet_shm_schema::CommandKind;
-
-/// Beside the path by less than this, the needle counts as placed.
-const PLACED_WITHIN_M: f64 = 1.5e-3;
-/// The tip is at a goal when it is this near.
-const REACHED_WITHIN_M: f64 = 1.0e-3;
-
-/// A hand that the force holds back from its goal is there when it rests this near.
-const HELD_BACK_M: f64 = 2.0e-3;
-const REST_M_PER_S: f64 = 1e-3;
+use stylet_procedure::{AtHand, Operation, Step};
+use stylet_shm_schema::Request;
 
 /// A step of the procedure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -53,7 +46,7 @@ impl Progress {
     }
 }
 
-/// From what the core says alone, so that it survives a restart of this program.
+/// From the state of the core alone, so that it survives a restart of this program.
 pub fn progress(shown: &Shown) -> Progress {
     if shown.scene.is_none() {
         return Progress::Scene;
@@ -61,57 +54,51 @@ pub fn progress(shown: &Shown) -> Progress {
     if shown.planning.waits() {
         return Progress::Plan;
     }
-    let (Some(depth), Some(beside)) = (shown.path_depth_m(), shown.off_path_m()) else {
-        return Progress::Plan;
-    };
-    let dropped = shown.own_seeds().len();
-    if shown.next_seed_m().is_none() {
-        return if !is_out_at(depth) {
-            Progress::Retract
-        } else if next_needle(shown).is_some() {
-            Progress::Place
-        } else {
-            Progress::Debrief
-        };
-    }
-    let is_deep = shown
-        .deepest_seed_m()
-        .is_some_and(|deepest| depth >= deepest - HELD_BACK_M);
-    if dropped > 0 || is_deep {
-        Progress::Drop
-    } else if beside > PLACED_WITHIN_M || depth < -REACHED_WITHIN_M * 5.0 {
-        Progress::Place
-    } else {
-        Progress::Insert
+    match at_hand(shown).map(|needle| needle.step()) {
+        None | Some(Step::Plan) => Progress::Plan,
+        Some(Step::Place) => Progress::Place,
+        Some(Step::Insert) => Progress::Insert,
+        Some(Step::Drop) => Progress::Drop,
+        Some(Step::Retract | Step::Settle) => Progress::Retract,
+        Some(Step::Done) if next_needle(shown).is_some() => Progress::Place,
+        Some(Step::Done) => Progress::Debrief,
     }
 }
 
-fn is_out_at(depth_m: f64) -> bool {
-    depth_m < REACHED_WITHIN_M + 0.002
+/// The needle at work; `None` without a plan or a tip.
+fn at_hand(shown: &Shown) -> Option<AtHand> {
+    Some(AtHand {
+        depth_m: shown.path_depth_m()?,
+        beside_m: shown.off_path_m()?,
+        speed_m_per_s: shown.state.map(|s| s.speed_m_per_s),
+        dropped: shown.own_seeds().len(),
+        deepest_drop_m: shown.deepest_seed_m(),
+        next_drop_m: shown.next_seed_m(),
+    })
 }
 
-/// The needle of a plan that is to go in now: the first one, or the one after a needle whose seeds are all dropped.
+/// The needle of a plan that is to be inserted now: the first one, or the one after a needle whose seeds are all dropped.
 pub fn next_needle(shown: &Shown) -> Option<usize> {
     let next = shown.planning.next_needle()?;
     let is_free = shown.planning.waits() || is_needle_done(shown);
     is_free.then_some(next)
 }
 
-/// Nothing of a plan has gone in yet, so that another one may take its place.
+/// No needle of a plan was inserted yet, so that another plan may replace it.
 pub fn is_before_needles(shown: &Shown) -> bool {
-    shown.planning.course.begun() == 0
+    shown.planning.progress.begun() == 0
 }
 
 /// All its seeds are dropped and its tip is outside.
 pub fn is_needle_done(shown: &Shown) -> bool {
-    let is_out = shown.path_depth_m().is_some_and(is_out_at);
-    // One that was taken back leaves no path, and those before it are done.
-    shown.planning.course.is_done() || (shown.planning.at_work().is_some() && shown.next_seed_m().is_none() && is_out)
+    let is_out = at_hand(shown).is_some_and(|needle| needle.is_outside());
+    // A needle that was withdrawn leaves no path, and those before it are done.
+    shown.planning.progress.is_done() || (shown.planning.at_work().is_some() && shown.next_seed_m().is_none() && is_out)
 }
 
 /// The needle at work is outside, whatever it has dropped.
 pub fn can_leave_needle(shown: &Shown) -> bool {
-    shown.planning.next_needle().is_some() && shown.path_depth_m().is_none_or(is_out_at)
+    shown.planning.next_needle().is_some() && at_hand(shown).is_none_or(|needle| needle.is_outside())
 }
 
 /// What is missing before `step` can be done; `None` when nothing is.
@@ -131,10 +118,10 @@ pub fn missing(shown: &Shown, step: Progress) -> Option<String> {
     if shown.plan.is_none() {
         return Some("plan the seeds first".to_owned());
     }
-    match (step, shown.off_path_m()) {
-        (Progress::Insert, Some(beside)) if beside > PLACED_WITHIN_M => Some(format!(
+    match (step, at_hand(shown)) {
+        (Progress::Insert, Some(needle)) if !needle.is_on_path() => Some(format!(
             "place the needle first: it is {} beside the path",
-            format::length(beside)
+            format::length(needle.beside_m)
         )),
         (Progress::Drop, _) if !shown.has_punctured() && shown.seeds.is_empty() => {
             Some("insert the needle first: the tip is not in the tissue".to_owned())
@@ -156,26 +143,26 @@ pub fn next_action(shown: &Shown) -> Option<Action> {
         // An empty plan of many needles waits for its first one.
         Progress::Plan if shown.planning.implant.is_some() => None,
         Progress::Plan => Some(Action::PlanSeeds),
-        Progress::Place => Some(Action::PlaceNeedle),
-        Progress::Insert => Some(Action::Insert),
-        Progress::Drop if is_at_next_seed(shown) => Some(Action::Send(CommandKind::DropSeed)),
-        Progress::Drop => shown.next_seed_m().map(Action::MoveTo),
-        Progress::Retract => Some(Action::Retract),
-    }
-}
-
-pub fn is_at_next_seed(shown: &Shown) -> bool {
-    match (shown.path_depth_m(), shown.next_seed_m()) {
-        (Some(depth), Some(next)) => {
-            let off = (depth - next).abs();
-            let at_rest = shown.state.is_some_and(|s| s.speed_m_per_s.abs() < REST_M_PER_S);
-            off <= REACHED_WITHIN_M || (off <= HELD_BACK_M && at_rest)
+        Progress::Place | Progress::Insert | Progress::Drop | Progress::Retract => {
+            let needle = at_hand(shown)?;
+            match needle.next()? {
+                Operation::Place => Some(Action::PlaceNeedle),
+                Operation::Insert => Some(Action::Insert),
+                Operation::Drop(_) => Some(Action::Send(Request::DropSeed)),
+                Operation::DrawBack(_) => needle.next_drop_m.map(Action::MoveTo),
+                Operation::Retract | Operation::TakeOut => Some(Action::Retract),
+                Operation::Reset | Operation::PublishPlan | Operation::Engage | Operation::Settle => None,
+            }
         }
-        _ => false,
     }
 }
 
-/// What Ctrl+Z takes back: the last seed, or else the plan while the needle is outside.
+/// Whether the next seed may be dropped where the tip is.
+pub fn is_at_next_seed(shown: &Shown) -> bool {
+    at_hand(shown).is_some_and(|needle| needle.is_at_next_drop())
+}
+
+/// What Ctrl+Z undoes: the last seed, or else the plan while the needle is outside.
 pub fn undo_action(shown: &Shown) -> Option<Undo> {
     if !shown.is_live() {
         None
@@ -228,7 +215,7 @@ mod tests {
 
     #[test]
     fn the_procedure_goes_through_its_steps_one_thing_at_a_time() {
-        let drop = Action::Send(CommandKind::DropSeed);
+        let drop = Action::Send(Request::DropSeed);
         let way: [(f64, &[f64], Progress, Option<Action>); 7] = [
             (-0.05, &[], Progress::Place, Some(Action::PlaceNeedle)),
             (0.0, &[], Progress::Insert, Some(Action::Insert)),

@@ -1,8 +1,9 @@
-//! The first step: which body the needle goes into.
+//! The first step: the scene.
 
 use super::WorkflowState;
-use super::work::work_ui;
-use crate::panel::{Action, LoadState, Shown};
+use super::job::job_ui;
+use crate::action::Action;
+use crate::shown::{LoadState, Shown};
 use crate::theme;
 use egui::{Button, RichText};
 use std::path::PathBuf;
@@ -44,7 +45,7 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
         let image = ui
             .add_enabled(free && shown.scene.is_some(), Button::new("Load image…"))
             .on_hover_text(
-                "Greys of the same patient for the slices, in place of simulated ultrasound; they move with the tissue",
+                "Image of the same patient for the slices, instead of simulated ultrasound; it moves with the tissue",
             );
         if (scene.clicked() || entered) && free {
             actions.push(Action::LoadScene(PathBuf::from(path)));
@@ -56,8 +57,8 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
     let mut cancel = false;
     match &shown.load {
         LoadState::Idle => {}
-        LoadState::Reading(what, share) => cancel = work_ui(ui, what, Some(*share)),
-        LoadState::Sending(what) => cancel = work_ui(ui, what, None),
+        LoadState::Reading(what, share) => cancel = job_ui(ui, what, Some(*share)),
+        LoadState::Sending(what) => cancel = job_ui(ui, what, None),
         LoadState::Loaded(what) => {
             ui.label(RichText::new(what).small().color(tokens.good));
         }

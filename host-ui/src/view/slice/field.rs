@@ -13,7 +13,9 @@ pub const STEPS: u32 = 8;
 /// Displacements on a grid over the body at rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Field {
+    /// The grid.
     pub info: GridInfo,
+    /// Displacement of each node, x fastest.
     pub displacements_m: Vec<[f32; 3]>,
     /// None of them can be seen.
     pub at_rest: bool,
@@ -81,7 +83,7 @@ impl Field {
     }
 }
 
-/// A displacement as a texture takes it; one that cannot be told is none.
+/// A displacement for a texture; one that is not a number is none.
 fn texel(metres: f32) -> f16 {
     if metres.is_nan() {
         return f16::ZERO;
@@ -121,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_linear_field_is_told_exactly_and_undone() {
+    fn a_linear_field_is_interpolated_exactly_and_undone() {
         for stretch in [-0.45, 0.1, 0.6] {
             let field = linear(stretch);
             let rest = Vector3::new(0.021, 0.013, 0.008);

@@ -1,6 +1,9 @@
 //! The slices on the graphics card: three small volumes, an image where there is one, and a texture for each slice.
 
-use super::field::{Field, SEEN_M, STEPS};
+mod pipeline;
+mod texture;
+
+use super::field::Field;
 use super::plane::Plane;
 use super::speckle::{self, GRAIN_M, GRAINS, LARGEST_AMPLITUDE};
 use crate::view::driver::DriverCost;
@@ -8,11 +11,13 @@ use bytemuck::{Pod, Zeroable};
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
 use nalgebra::{Matrix3, Vector3};
+use pipeline::{layout, pipeline};
 use std::mem::size_of;
 use stylet_anatomy::PatientFrame;
 use stylet_files::Image;
 use stylet_host::link::SceneModel;
 use stylet_shm_schema::GridInfo;
+use texture::{extent, volume, write};
 
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const GREY: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
@@ -31,6 +36,24 @@ struct SliceUniform {
     nodes_size_m: [f32; 4],
     grain: [[f32; 4]; 3],
     image: [[f32; 4]; 3],
+}
+
+/// An image that cannot be shown in the slices.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The window runs without a graphics device.
+    #[error("there is no graphics device to show an image")]
+    NoDevice,
+    /// One side has more voxels than a texture can have.
+    #[error("{name} has {side} voxels along one side, and the graphics card takes {longest}; crop it to the gland")]
+    TooLarge {
+        /// Name of the image.
+        name: String,
+        /// Voxels along the longest side.
+        side: usize,
+        /// Voxels that the card takes.
+        longest: u32,
+    },
 }
 
 /// What belongs to one scene.
@@ -124,7 +147,7 @@ impl SliceGpu {
 
     /// Takes the tissues of a scene. A scene too large for the card has no slices.
     pub fn set_scene(&mut self, model: &SceneModel, scene_from_patient: Matrix3<f64>) {
-        self.put_panes_away();
+        self.drop_panes();
         self.body = None;
         let (info, nodes_info) = (model.header.labels, model.header.nodes);
         let longest = self.state.device.limits().max_texture_dimension_3d;
@@ -149,33 +172,34 @@ impl SliceGpu {
         self.set_field(&Field::rest(nodes_info));
     }
 
-    /// What they are bound to has gone; their textures are used again.
-    fn put_panes_away(&mut self) {
+    /// Drops what they are bound to; their textures are used again.
+    fn drop_panes(&mut self) {
         self.targets = self.panes.drain(..).map(|pane| pane.target).collect();
         self.content += 1;
     }
 
     /// Takes an image, and its greys to the card.
-    pub fn set_image(&mut self, mut image: Image) -> Result<(), String> {
+    pub fn set_image(&mut self, mut image: Image) -> Result<(), ImageError> {
         let longest = self.state.device.limits().max_texture_dimension_3d;
         if let Some(side) = image.dims.iter().find(|&&side| side > longest as usize) {
-            return Err(format!(
-                "{} has {side} voxels along one side, and the graphics card takes {longest}; crop it to the gland",
-                image.name
-            ));
+            return Err(ImageError::TooLarge {
+                name: image.name,
+                side: *side,
+                longest,
+            });
         }
         let greys = std::mem::take(&mut image.greys);
         let texture = volume(&self.state, GREY, image.dims.map(|d| d as u32));
         self.driver.send(|| write(&self.state, &texture, &greys, 1));
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         self.image = Some(OnCard { image, view });
-        self.put_panes_away();
+        self.drop_panes();
         Ok(())
     }
 
     pub fn forget_image(&mut self) {
         self.image = None;
-        self.put_panes_away();
+        self.drop_panes();
     }
 
     pub fn set_field(&mut self, field: &Field) {
@@ -296,39 +320,6 @@ fn uniform(body: &Body, plane: &Plane, image: Option<&Image>) -> SliceUniform {
     }
 }
 
-fn extent([width, height, depth_or_array_layers]: [u32; 3]) -> wgpu::Extent3d {
-    wgpu::Extent3d {
-        width,
-        height,
-        depth_or_array_layers,
-    }
-}
-
-fn volume(state: &RenderState, format: wgpu::TextureFormat, dims: [u32; 3]) -> wgpu::Texture {
-    state.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("stylet slice"),
-        size: extent(dims),
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D3,
-        format,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-        view_formats: &[],
-    })
-}
-
-/// Returns the bytes that it sent.
-fn write(state: &RenderState, texture: &wgpu::Texture, bytes: &[u8], bytes_per_texel: u32) -> u64 {
-    let size = texture.size();
-    let layout = wgpu::TexelCopyBufferLayout {
-        offset: 0,
-        bytes_per_row: Some(size.width * bytes_per_texel),
-        rows_per_image: Some(size.height),
-    };
-    state.queue.write_texture(texture.as_image_copy(), bytes, layout, size);
-    bytes.len() as u64
-}
-
 fn target(state: &RenderState, size: [u32; 2], old: Option<egui::TextureId>) -> Target {
     let texture = state.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("stylet slice"),
@@ -380,68 +371,4 @@ fn draw(state: &RenderState, pipeline: &wgpu::RenderPipeline, bind: &wgpu::BindG
         pass.draw(0..3, 0..1);
     }
     state.queue.submit([encoder.finish()]);
-}
-
-fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let volume = wgpu::BindingType::Texture {
-        sample_type: wgpu::TextureSampleType::Float { filterable: true },
-        view_dimension: wgpu::TextureViewDimension::D3,
-        multisampled: false,
-    };
-    let uniform = wgpu::BindingType::Buffer {
-        ty: wgpu::BufferBindingType::Uniform,
-        has_dynamic_offset: false,
-        min_binding_size: None,
-    };
-    let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
-    let entries: Vec<wgpu::BindGroupLayoutEntry> = [uniform, volume, volume, volume, volume, sampler, sampler]
-        .into_iter()
-        .enumerate()
-        .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
-            binding: binding as u32,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty,
-            count: None,
-        })
-        .collect();
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("stylet slice"),
-        entries: &entries,
-    })
-}
-
-fn pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::RenderPipeline {
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("stylet slice"),
-        source: wgpu::ShaderSource::Wgsl(include_str!("slice.wgsl").into()),
-    });
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("stylet slice"),
-        bind_group_layouts: &[Some(layout)],
-        immediate_size: 0,
-    });
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("stylet slice"),
-        layout: Some(&layout),
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("slice_vertex"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            buffers: &[],
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: None,
-        multisample: wgpu::MultisampleState::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("slice_fragment"),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &[("STEPS", f64::from(STEPS)), ("SEEN_M", f64::from(SEEN_M))],
-                ..Default::default()
-            },
-            targets: &[Some(COLOR.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
 }

@@ -1,6 +1,5 @@
 //! Three orthogonal slices through the deformed body that look like ultrasound, and what is drawn over them.
 
-pub(crate) mod cut;
 pub mod field;
 mod gpu;
 mod overlay;
@@ -8,21 +7,24 @@ mod plane;
 mod speckle;
 
 use super::driver::DriverCost;
+use super::orientation::{Orientation, scene_from_patient};
 use super::state::ViewState;
-use crate::dose_desk::DosePicture;
-use crate::panel::{Action, Shown};
+use crate::action::Action;
+use crate::dose_worker::DoseResult;
+use crate::shown::Shown;
 use crate::theme::IMAGE;
 use eframe::egui_wgpu::RenderState;
 use egui::{Color32, PointerButton, Pos2, Rect, Sense};
 use field::Field;
+pub use gpu::ImageError;
 use gpu::SliceGpu;
 use nalgebra::{Matrix3, Vector3};
 use overlay::{Lines, Overlay};
-pub use plane::{Orientation, Plane, scene_from_patient};
+pub use plane::Plane;
 use std::sync::Arc;
 use stylet_files::Image;
 use stylet_host::link::{SceneModel, Snapshot};
-use stylet_shm_schema::{Text, role};
+use stylet_shm_schema::{SceneId, Text, role};
 
 /// Of the target, this much is seen at first.
 const MARGIN: f64 = 1.45;
@@ -37,9 +39,10 @@ struct Contour {
     triangles: Vec<[u32; 3]>,
 }
 
-pub struct Slices {
+/// The three slices.
+pub(super) struct Slices {
     gpu: Option<SliceGpu>,
-    scene: Option<(u64, u64)>,
+    scene: Option<SceneId>,
     snapshot: Option<(u64, u64)>,
     scene_from_patient: Matrix3<f64>,
     model: Option<Arc<SceneModel>>,
@@ -63,6 +66,7 @@ pub struct Slices {
 }
 
 impl Slices {
+    /// Slices on this graphics device; without one they show no tissue.
     pub fn new(state: Option<RenderState>) -> Self {
         Self {
             gpu: state.map(SliceGpu::new),
@@ -84,18 +88,15 @@ impl Slices {
         }
     }
 
+    /// Cost of the pictures since the window opened.
     pub fn driver(&self) -> DriverCost {
         self.gpu.as_ref().map_or_else(DriverCost::default, |gpu| gpu.driver)
     }
 
-    /// Directions of the patient in the scene.
-    pub fn scene_from_patient(&self) -> &Matrix3<f64> {
-        &self.scene_from_patient
-    }
-
+    /// Takes what is new since the last frame.
     pub fn take(&mut self, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>, view: &mut ViewState) {
         let Some(model) = model else { return };
-        let key = (model.header.session_id, model.header.generation);
+        let key = model.header.id();
         if self.scene != Some(key) {
             self.scene = Some(key);
             self.take_scene(model);
@@ -146,10 +147,10 @@ impl Slices {
         }
     }
 
-    /// Greys of the patient of a scene, until another scene comes.
-    pub fn show_image(&mut self, image: Image, scene: &str) -> Result<(), String> {
+    /// Shows an image of the patient of a scene, until another scene is loaded.
+    pub fn show_image(&mut self, image: Image, scene: &str) -> Result<(), ImageError> {
         let Some(gpu) = &mut self.gpu else {
-            return Err("there is no graphics device to show an image".to_owned());
+            return Err(ImageError::NoDevice);
         };
         let name = image.name.clone();
         gpu.set_image(image)?;
@@ -157,6 +158,7 @@ impl Slices {
         Ok(())
     }
 
+    /// Name of the image that was loaded.
     pub fn image_name(&self) -> Option<&str> {
         self.image.as_ref().map(|(name, _)| name.as_str())
     }
@@ -177,12 +179,13 @@ impl Slices {
         plane
     }
 
+    /// Draws one slice and returns what the pointer asks for.
     pub fn slice_ui(
         &mut self,
         ui: &mut egui::Ui,
         rect: Rect,
         orientation: Orientation,
-        (shown, dose): (&Shown, Option<&Arc<DosePicture>>),
+        (shown, dose): (&Shown, Option<&Arc<DoseResult>>),
         view: &mut ViewState,
     ) -> Option<Action> {
         let id = ui.scope_id().with(orientation.name());
@@ -197,7 +200,7 @@ impl Slices {
         let plane = self.plane(orientation, view, rect);
         let action = self.steer(&response, &plane, shown, view);
         let painter = ui.painter_at(rect);
-        painter.rect_filled(rect, 0.0, IMAGE.ground);
+        painter.rect_filled(rect, 0.0, IMAGE.background);
         if shown.scene.is_none() {
             overlay::words(&painter, rect, &format!("{}: no scene yet", orientation.name()));
             return None;

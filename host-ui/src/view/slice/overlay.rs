@@ -1,10 +1,12 @@
 //! What is drawn over a slice: contours, isodose lines, needle, seeds, planned places, letters and scale.
 
-use super::plane::{Orientation, Plane};
-use super::{Contour, cut};
-use crate::dose_desk::{DosePicture, LEVELS};
-use crate::panel::Shown;
+use super::Contour;
+use super::plane::Plane;
+use crate::dose_worker::{DoseResult, LEVELS};
+use crate::mesh::cut;
+use crate::shown::Shown;
 use crate::theme::IMAGE;
+use crate::view::orientation::Orientation;
 use crate::view::state::ViewState;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2};
 use nalgebra::{Matrix3, Vector3};
@@ -19,7 +21,7 @@ const NEEDLE_M: f64 = 0.12;
 /// Drawn and blank points of an isodose line; one that is never blank is solid.
 const DASHES: [[f32; 2]; 4] = [[2.0, 3.0], [1.0, 0.0], [8.0, 3.0], [3.0, 2.0]];
 
-/// Lines of one slice, cut anew only when the plane or what it cuts has changed.
+/// Lines of one slice, cut again only when the plane or what it cuts has changed.
 #[derive(Default)]
 pub struct Lines {
     /// Plane and surface of the contours; plane and dose of the isodose lines.
@@ -37,7 +39,7 @@ impl Lines {
         plane: &Plane,
         (positions_m, moved): (&[[f32; 3]], u64),
         contours: &[Contour],
-        dose: Option<&Arc<DosePicture>>,
+        dose: Option<&Arc<DoseResult>>,
         may_cut_dose: bool,
     ) -> bool {
         let normal = plane.normal();
@@ -165,7 +167,8 @@ impl Overlay<'_> {
                 continue;
             }
             let ends = [-1.0, 1.0].map(|end| self.plane.on_screen(place + axis * (SEED_HALF_M * end)));
-            self.painter.line_segment(ends, Stroke::new(width + 2.0, IMAGE.ground));
+            self.painter
+                .line_segment(ends, Stroke::new(width + 2.0, IMAGE.background));
             self.painter.line_segment(ends, Stroke::new(width, IMAGE.seed_placed));
             self.painter
                 .circle_filled(self.plane.on_screen(place), width * 0.8, IMAGE.seed_placed);
@@ -201,7 +204,7 @@ impl Overlay<'_> {
                 .circle_stroke(middle, width + 3.0, Stroke::new(1.0, IMAGE.needle.gamma_multiply(0.5)));
         } else {
             self.painter
-                .line_segment(ends, Stroke::new(width + 2.0, IMAGE.ground.gamma_multiply(0.6)));
+                .line_segment(ends, Stroke::new(width + 2.0, IMAGE.background.gamma_multiply(0.6)));
             self.painter
                 .line_segment(ends, Stroke::new(width, IMAGE.needle.gamma_multiply(0.85)));
         }
@@ -230,14 +233,15 @@ impl Overlay<'_> {
         }
     }
 
-    /// Words on a dark ground, so that they can be read on any tissue.
+    /// Words on a dark background, so that they can be read on any tissue.
     fn word(&self, at: Pos2, anchor: Align2, text: &str, size: f32, color: Color32) -> Rect {
         let galley = self
             .painter
             .layout_no_wrap(text.to_owned(), FontId::proportional(size), color);
         let rect = anchor.anchor_size(at, galley.size());
-        let ground = IMAGE.ground.gamma_multiply(0.66);
-        self.painter.rect_filled(rect.expand2(Vec2::new(3.0, 0.0)), 2.0, ground);
+        let background = IMAGE.background.gamma_multiply(0.66);
+        self.painter
+            .rect_filled(rect.expand2(Vec2::new(3.0, 0.0)), 2.0, background);
         self.painter.galley(rect.min, galley, color);
         rect
     }

@@ -1,66 +1,26 @@
 //! A plane through the body in the patient's directions, and where its points lie on the screen.
 
+use crate::view::orientation::Orientation;
 use egui::{Pos2, Rect, Vec2};
 use nalgebra::{Matrix3, Vector3};
-use stylet_shm_schema::SceneHeader;
-
-/// The three ways to cut a body.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Orientation {
-    Axial,
-    Sagittal,
-    Coronal,
-}
-
-impl Orientation {
-    pub const ALL: [Self; 3] = [Self::Axial, Self::Sagittal, Self::Coronal];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Axial => "Axial",
-            Self::Sagittal => "Sagittal",
-            Self::Coronal => "Coronal",
-        }
-    }
-
-    /// To the right and up on the screen, in patient axes (right, anterior, superior). Axial and coronal are seen as by
-    /// one who faces the patient: the patient's right is on the left.
-    fn axes(self) -> [Vector3<f64>; 2] {
-        let (right, anterior, superior) = (Vector3::x(), Vector3::y(), Vector3::z());
-        match self {
-            Self::Axial => [-right, anterior],
-            Self::Sagittal => [superior, anterior],
-            Self::Coronal => [-right, superior],
-        }
-    }
-
-    /// What lies left, right, above and below.
-    pub fn letters(self) -> [&'static str; 4] {
-        match self {
-            Self::Axial => ["R", "L", "A", "P"],
-            Self::Sagittal => ["I", "S", "A", "P"],
-            Self::Coronal => ["R", "L", "S", "I"],
-        }
-    }
-}
-
-/// Scene from patient directions; the scene's own axes where the transform is no rotation.
-pub fn scene_from_patient(scene: &SceneHeader) -> Matrix3<f64> {
-    scene.patient().rotation().transpose()
-}
 
 /// The plane of one picture: its middle, two unit vectors, and how large a point of the screen is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// In the middle of the picture, scene frame.
+    /// Middle of the picture, scene frame.
     pub middle_m: Vector3<f64>,
+    /// Unit vector to the right of the picture.
     pub right: Vector3<f64>,
+    /// Unit vector to the top of the picture.
     pub up: Vector3<f64>,
+    /// Length of a point of the screen.
     pub m_per_point: f64,
+    /// Where the picture is in the window.
     pub rect: Rect,
 }
 
 impl Plane {
+    /// The plane of this orientation through a middle (scene frame).
     pub fn new(
         orientation: Orientation,
         scene_from_patient: &Matrix3<f64>,
@@ -78,12 +38,12 @@ impl Plane {
         }
     }
 
-    /// Towards the one who looks.
+    /// Unit vector towards the eye.
     pub fn normal(&self) -> Vector3<f64> {
         self.right.cross(&self.up)
     }
 
-    /// Positive in front of the plane.
+    /// Distance of a point from the plane, positive in front of it.
     pub fn distance_m(&self, point: Vector3<f64>) -> f64 {
         (point - self.middle_m).dot(&self.normal())
     }
@@ -95,6 +55,7 @@ impl Plane {
         self.rect.center() + Vec2::new(x as f32, -y as f32)
     }
 
+    /// Place in the scene under a place on the screen.
     pub fn in_scene(&self, place: Pos2) -> Vector3<f64> {
         let from_middle = place - self.rect.center();
         let (x, y) = (f64::from(from_middle.x), f64::from(-from_middle.y));
@@ -105,7 +66,6 @@ impl Plane {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bytemuck::Zeroable;
 
     fn plane(orientation: Orientation) -> Plane {
         let rect = Rect::from_min_size(Pos2::new(10.0, 20.0), Vec2::new(300.0, 200.0));
@@ -135,16 +95,5 @@ mod tests {
         assert!(more(Vector3::y(), Orientation::Axial).y < 0.0, "anterior is up");
         assert!(more(Vector3::z(), Orientation::Sagittal).x > 0.0);
         assert!(more(Vector3::z(), Orientation::Coronal).y < 0.0, "superior is up");
-    }
-
-    #[test]
-    fn a_turned_patient_is_cut_in_his_own_directions() {
-        let mut scene = SceneHeader::zeroed();
-        // Superior is -y of the scene, anterior is z.
-        scene.patient_from_scene = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0];
-        let turned = scene_from_patient(&scene);
-        assert!((turned * Vector3::z() + Vector3::y()).norm() < 1e-12);
-        scene.patient_from_scene = [0.0; 12];
-        assert_eq!(scene_from_patient(&scene), Matrix3::identity());
     }
 }

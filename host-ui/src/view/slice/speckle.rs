@@ -10,7 +10,7 @@ use stylet_shm_schema::{SceneHeader, StructureInfo, role};
 pub const GRAINS: usize = 64;
 /// The amplitude that the brightest texel stands for; the mean is 1.
 pub const LARGEST_AMPLITUDE: f32 = 4.0;
-/// Edges of a texel of grain along patient right, anterior and superior: finer along the beam, which comes from the
+/// Edges of a texel of grain along patient right, anterior and superior: finer along the beam, which starts in the
 /// rectum, as ultrasound resolves.
 pub const GRAIN_M: [f32; 3] = [0.42e-3, 0.24e-3, 0.42e-3];
 

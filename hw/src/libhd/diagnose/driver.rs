@@ -1,4 +1,4 @@
-//! Library, licence and configuration of the vendor's software, and the device as it shows itself through them.
+//! Library, licence and configuration of the vendor's software, and the device as they report it.
 
 use std::fs;
 use std::path::Path;
@@ -6,10 +6,10 @@ use std::path::Path;
 use super::{Finding, Severity, Surroundings};
 use crate::libhd::calibrate::{self, Calibration};
 use crate::libhd::errors;
-use crate::libhd::ffi::{Api, LoadError};
-use crate::libhd::session::{Session, Trouble};
+use crate::libhd::ffi::{Api, LoadError, LoadFailure};
+use crate::libhd::session::{ConnectionError, Session};
 
-/// Libraries that `libHD.so` needs, by a part of their name, and where they come from.
+/// Libraries that `libHD.so` needs: a part of the name, and how to install it.
 const NEEDED: &[(&str, &str)] = &[
     (
         "libPHANToMIO",
@@ -53,12 +53,12 @@ pub fn of_library(library: &Result<(), LoadError>) -> Vec<Finding> {
     findings.collect()
 }
 
-fn library_cure(why: &str) -> &'static str {
+fn library_cure(why: &LoadFailure) -> &'static str {
+    let LoadFailure::Loader(why) = why else {
+        return "another library has this name, or a part of it is missing: install OpenHaptics again";
+    };
     if why.contains("wrong ELF class") {
         return "this is a library for another processor: install the 64 bit one";
-    }
-    if why.contains("not OpenHaptics") {
-        return "another library has this name, or a part of it is missing: install OpenHaptics anew";
     }
     if why.contains("cannot open shared object file: Permission denied") {
         return "make the file readable: sudo chmod a+rx on it and its folder";
@@ -67,7 +67,7 @@ fn library_cure(why: &str) -> &'static str {
     found.map_or("install what the message names, then sudo ldconfig", |(_, cure)| cure)
 }
 
-/// Where the Touch drivers keep the devices that were paired; a Premium needs none of it.
+/// Folder in which the Touch drivers keep the paired devices; a Premium needs none of it.
 pub fn of_configuration(root: &Path, here: &Surroundings) -> Vec<Finding> {
     let inside = |path: &Path| root.join(path.strip_prefix("/").unwrap_or(path));
     let touch_driver = ["usr/lib", "usr/lib64", "lib"]
@@ -105,11 +105,11 @@ pub fn of_configuration(root: &Path, here: &Surroundings) -> Vec<Finding> {
     }]
 }
 
-/// Asks the driver. Initialises the device and lets it go again: not while `rt-core` uses it.
+/// Checks the device itself: initialises it and releases it again. Do not call it while `rt-core` uses the device.
 pub fn of_device(api: &Api, name: Option<&str>) -> Vec<Finding> {
     let session = match Session::open(api, name) {
         Ok(session) => session,
-        Err(why) => return vec![trouble(&why)],
+        Err(why) => return vec![problem(&why)],
     };
     let mut findings = Vec::new();
     match session.describe() {
@@ -124,23 +124,23 @@ pub fn of_device(api: &Api, name: Option<&str>) -> Vec<Finding> {
             }
             findings.push(match calibrate::step(api, session.handle) {
                 Ok(Calibration::Done | Calibration::Updated) => Finding::good("the device is calibrated"),
-                Ok(Calibration::Waits(what_to_do)) => {
+                Ok(Calibration::NeedsOperator(what_to_do)) => {
                     Finding::new(Severity::Warning, "the device is not calibrated", what_to_do)
                 }
-                Err(why) => trouble(&why),
+                Err(why) => problem(&why),
             });
         }
-        Err(why) => findings.push(trouble(&why)),
+        Err(why) => findings.push(problem(&why)),
     }
     session.close();
     findings
 }
 
-fn trouble(why: &Trouble) -> Finding {
+fn problem(why: &ConnectionError) -> Finding {
     let cure = match why {
-        Trouble::NoDevice(tried) => tried.first().map_or("", |(_, code)| errors::cure(*code)),
-        Trouble::Call(_, code) => errors::cure(*code),
-        Trouble::WrongModel(_) => "use a device of a known model",
+        ConnectionError::NoDevice(tried) => tried.first().map_or("", |(_, code)| errors::cure(*code)),
+        ConnectionError::Call(_, code) => errors::cure(*code),
+        ConnectionError::WrongModel(_) => "use a device of a known model",
         _ => "",
     };
     let what = why.to_string();

@@ -1,6 +1,6 @@
 //! Why a Phantom is not found, and what to do about each reason.
 //!
-//! Reads files through a root folder and asks for nothing else that a test could not fake.
+//! Reads files through a root folder and takes everything else as an argument, so that a test can fake all of it.
 
 mod driver;
 mod port;
@@ -16,7 +16,7 @@ pub use driver::of_device;
 /// How much a finding matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
-    /// As it should be.
+    /// Nothing to do.
     Good,
     /// Matters for some devices only.
     Note,
@@ -26,10 +26,12 @@ pub enum Severity {
     Problem,
 }
 
-/// One thing that was looked at.
+/// Result of one check.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finding {
+    /// How much it matters.
     pub severity: Severity,
+    /// What was found.
     pub what: String,
     /// What to do, with the command to type; empty when there is nothing to do.
     pub cure: String,
@@ -49,11 +51,14 @@ impl Finding {
     }
 }
 
-/// Who asks, and what the loader said; everything else is in files.
+/// The user and the result of loading the library; everything else is in files.
 #[derive(Clone, Debug)]
 pub struct Surroundings {
+    /// Effective user.
     pub user: u32,
+    /// Effective and supplementary groups.
     pub groups: Vec<u32>,
+    /// The user's home folder.
     pub home: Option<PathBuf>,
     /// The variable `GTDD_HOME` of the Touch drivers.
     pub gtdd_home: Option<PathBuf>,
@@ -62,12 +67,11 @@ pub struct Surroundings {
 }
 
 impl Surroundings {
-    /// Those of this process. Also gives the library, for [`of_device`].
+    /// Surroundings of this process. Also returns the library, for [`of_device`].
     pub fn of_this_process(library: Option<&Path>) -> (Self, Option<Api>) {
         let loaded = Api::load(library);
         let here = Self {
-            // SAFETY: no preconditions.
-            user: unsafe { libc::geteuid() },
+            user: rustix::process::geteuid().as_raw(),
             groups: groups(),
             home: std::env::var_os("HOME").map(PathBuf::from),
             gtdd_home: std::env::var_os("GTDD_HOME").map(PathBuf::from),
@@ -78,16 +82,16 @@ impl Surroundings {
 }
 
 fn groups() -> Vec<u32> {
-    let mut found = vec![0; 256];
-    // SAFETY: room for as many as are asked for.
-    let count = unsafe { libc::getgroups(found.len() as libc::c_int, found.as_mut_ptr()) };
-    found.truncate(usize::try_from(count).unwrap_or(0));
-    // SAFETY: no preconditions.
-    found.push(unsafe { libc::getegid() });
-    found
+    let supplementary = rustix::process::getgroups().unwrap_or_default();
+    let effective = rustix::process::getegid();
+    supplementary
+        .into_iter()
+        .chain([effective])
+        .map(|group| group.as_raw())
+        .collect()
 }
 
-/// Everything that can be said without touching a device. `root` is `/`, or a folder that stands for it.
+/// Every check that needs no device. `root` is `/`, or a folder that stands for it.
 pub fn diagnose(root: &Path, surroundings: &Surroundings) -> Vec<Finding> {
     let mut findings = driver::of_library(&surroundings.library);
     findings.extend(port::of_parallel_port(root, surroundings));

@@ -11,13 +11,13 @@ const LINKS: [(&str, &str); 2] = [
     ("dev/phnepp_modes", "/proc/sys/dev/parport/parport0/modes"),
 ];
 
-/// In the order in which things are put right.
+/// Parallel port of a Premium: the findings are in the order in which to cure them.
 pub fn of_parallel_port(root: &Path, here: &Surroundings) -> Vec<Finding> {
     let Ok(modes) = fs::read_to_string(root.join("proc/sys/dev/parport/parport0/modes")) else {
         return vec![Finding::new(
             Severity::Note,
             "no parallel port is known to the kernel; a Phantom Premium needs one on the mainboard",
-            "for a Premium: switch the port on in the BIOS, mode EPP, then sudo modprobe parport_pc; ports on add-in \
+            "for a Premium: enable the port in the BIOS, mode EPP, then sudo modprobe parport_pc; ports on add-in \
              cards are not known to work",
         )];
     };
@@ -52,14 +52,14 @@ fn printer(root: &Path) -> Option<Finding> {
         Finding::new(
             Severity::Warning,
             "the printer driver lp is loaded and may take the parallel port",
-            "sudo rmmod lp; to keep it away: echo 'blacklist lp' | sudo tee /etc/modprobe.d/phantom.conf",
+            "sudo rmmod lp; to keep it unloaded: echo 'blacklist lp' | sudo tee /etc/modprobe.d/phantom.conf",
         )
     })
 }
 
 fn linked(root: &Path, link: &str, target: &str) -> Finding {
     let make = format!(
-        "sudo ln -sfn {target} /{link}; to keep it after a restart, put 'L+ /{link} - - - - {target}' into \
+        "sudo ln -sfn {target} /{link}; to keep it after a restart, write 'L+ /{link} - - - - {target}' into \
          /etc/tmpfiles.d/phantom.conf"
     );
     match fs::read_link(root.join(link)) {
@@ -118,7 +118,7 @@ fn group_name(root: &Path, number: u32) -> String {
     found.unwrap_or_else(|| number.to_string())
 }
 
-/// FireWire (Omni, Desktop) and USB (Touch): silent where there are none.
+/// FireWire (Omni, Desktop) and USB (Touch): no finding where there are none.
 pub fn of_other_ports(root: &Path, here: &Surroundings) -> Vec<Finding> {
     let mut names: Vec<PathBuf> = fs::read_dir(root.join("dev"))
         .map(|entries| entries.flatten().map(|e| PathBuf::from(e.file_name())).collect())

@@ -5,6 +5,7 @@ use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 
 use super::*;
+use crate::libhd::ffi::LoadFailure;
 
 const MODES: &str = "proc/sys/dev/parport/parport0/modes";
 
@@ -64,7 +65,7 @@ impl Faked {
         diagnose(self.root.path(), &self.here)
     }
 
-    /// The one finding worse than good that speaks of `word`.
+    /// The one finding worse than good that contains `word`.
     #[track_caller]
     fn bad(&self, severity: Severity, word: &str, cure: &str) {
         let all = self.findings();
@@ -79,7 +80,7 @@ impl Faked {
 }
 
 fn load_error(why: &str) -> LoadError {
-    LoadError(vec![(PathBuf::from("libHD.so"), why.to_owned())])
+    LoadError(vec![(PathBuf::from("libHD.so"), LoadFailure::Loader(why.to_owned()))])
 }
 
 #[test]
@@ -104,7 +105,7 @@ fn the_port_s_mode_must_be_epp_alone() {
 }
 
 #[test]
-fn without_a_parallel_port_nothing_is_said_of_its_links() {
+fn without_a_parallel_port_its_links_are_not_reported() {
     let faked = Faked::fit();
     faked.remove(MODES);
     faked.bad(Severity::Note, "no parallel port", "modprobe parport_pc");
@@ -147,7 +148,7 @@ fn a_port_that_this_user_may_not_use_names_its_group() {
     let group = fs::metadata(faked.path("dev/parport0")).unwrap().gid();
     faked.write("etc/group", &format!("other:x:{}:\nlp:x:{group}:\n", group + 1));
     faked.mode("dev/parport0", 0o660);
-    // The file is this test's own, whoever runs it: so the faked user must be another.
+    // The user who runs the test owns the file, so the faked user must be another.
     faked.here.user = fs::metadata(faked.path("dev/parport0")).unwrap().uid() + 1;
     faked.bad(Severity::Problem, "cannot be read and written", "usermod -aG lp");
     faked.mode("dev/parport0", 0o640);
@@ -160,7 +161,7 @@ fn a_port_that_this_user_may_not_use_names_its_group() {
 }
 
 #[test]
-fn usb_and_firewire_ports_are_looked_at_where_there_are_any() {
+fn usb_and_firewire_ports_are_checked_where_there_are_any() {
     let mut faked = Faked::fit();
     for name in ["raw1394", "fw0", "ttyACM0"] {
         faked.write(&format!("dev/{name}"), "");
@@ -173,7 +174,7 @@ fn usb_and_firewire_ports_are_looked_at_where_there_are_any() {
 }
 
 #[test]
-fn the_loader_s_words_and_the_cure_for_each_library() {
+fn each_missing_library_is_named_with_its_cure() {
     let missing = |name: &str| format!("{name}: cannot open shared object file: No such file or directory");
     for (why, cure) in [
         (missing("libHD.so"), "install OpenHaptics"),
@@ -186,7 +187,6 @@ fn the_loader_s_words_and_the_cure_for_each_library() {
         (missing("libuuid.so.1"), "libuuid1"),
         (missing("libsomething.so.9"), "install what the message names"),
         ("libHD.so: wrong ELF class: ELFCLASS32".to_owned(), "64 bit"),
-        ("not OpenHaptics 3: it lacks hdInitDevice".to_owned(), "anew"),
         (
             "libHD.so: cannot open shared object file: Permission denied".to_owned(),
             "chmod",
@@ -196,6 +196,18 @@ fn the_loader_s_words_and_the_cure_for_each_library() {
         faked.here.library = Err(load_error(&why));
         faked.bad(Severity::Problem, &why, cure);
     }
+}
+
+#[test]
+fn a_library_without_a_function_is_not_openhaptics() {
+    let mut faked = Faked::fit();
+    let failure = LoadFailure::Incomplete(vec!["hdInitDevice", "hdGetError"]);
+    faked.here.library = Err(LoadError(vec![(PathBuf::from("libHD.so"), failure)]));
+    faked.bad(
+        Severity::Problem,
+        "libHD.so: not OpenHaptics 3: it lacks hdInitDevice, hdGetError",
+        "again",
+    );
 }
 
 #[test]
@@ -217,7 +229,7 @@ fn the_touch_driver_needs_its_folder_and_a_paired_device() {
 }
 
 #[test]
-fn a_library_that_is_not_there_is_told_in_the_loader_s_words() {
+fn a_missing_library_is_reported_in_the_words_of_the_loader() {
     let (here, api) = Surroundings::of_this_process(Some(Path::new("/nonexistent/libHD.so")));
     assert!(api.is_none());
     let text = here.library.unwrap_err().to_string();

@@ -1,16 +1,16 @@
-//! Asks both loops for their tapes, gives them back, and has a thread of its own write the recording to disk.
+//! Collects the tapes of both loops, returns them, and writes the recording to disk on a separate thread.
 
-use crate::replay::file::Flight;
+use crate::replay::file::{Flight, FlightError};
 use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
 use crate::rt::haptic_tape::{HapticFlight, HapticTape};
-use crate::rt::recorder::{Tape, TapeDesk};
+use crate::rt::recorder::{Tape, TapePort};
 use crate::rt::tissue_tape::{TissueFlight, TissueTape};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-/// After a fault the recording goes on for so long, so that it shows how the force went.
+/// The recording goes on for this time after a fault, so that it shows how the force ramps out.
 const AFTER_FAULT: Duration = Duration::from_millis(300);
 /// A loop that does not hand its tape over in this time is left out.
 const GATHER_LIMIT: Duration = Duration::from_secs(1);
@@ -20,14 +20,38 @@ const QUEUE: usize = 4;
 const KEPT_EXITS: usize = 20;
 const KEPT_OTHERS: usize = 100;
 
-/// What came of one request.
+/// Why a recording was not saved; the text says what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum SaveError {
+    /// The folder cannot be made.
+    #[error("{}: {why}; choose another folder with --flight-dir", folder.display())]
+    Folder {
+        /// The folder of the recordings.
+        folder: PathBuf,
+        /// What the system reports.
+        why: std::io::Error,
+    },
+    /// The file cannot be written.
+    #[error(transparent)]
+    File(#[from] FlightError),
+    /// There is no thread to write it.
+    #[error("no thread could be started to write it: {0}")]
+    Thread(std::io::Error),
+    /// The force loop handed nothing over.
+    #[error("the force loop left no recording")]
+    NothingRecorded,
+}
+
+/// The result of one request.
 pub struct Saved {
+    /// The request of a host, where it was one.
     pub ticket: Option<Ticket>,
-    pub result: Result<PathBuf, String>,
+    /// The file.
+    pub result: Result<PathBuf, SaveError>,
 }
 
 struct Wanted {
-    /// Goes into the name of the file.
+    /// Part of the name of the file.
     kind: &'static str,
     reason: String,
     due: Instant,
@@ -42,9 +66,9 @@ struct Gathering {
 }
 
 /// Everything that the bridge needs for flight recordings.
-pub struct FlightDesk {
-    haptic: TapeDesk<HapticTape>,
-    tissue: TapeDesk<TissueTape>,
+pub struct FlightKeeper {
+    haptic: TapePort<HapticTape>,
+    tissue: TapePort<TissueTape>,
     folder: PathBuf,
     /// What is the same in every recording of this run.
     common: Flight,
@@ -54,8 +78,12 @@ pub struct FlightDesk {
     files: u32,
 }
 
-impl FlightDesk {
-    pub fn new(haptic: TapeDesk<HapticTape>, tissue: TapeDesk<TissueTape>, folder: PathBuf, common: Flight) -> Self {
+impl FlightKeeper {
+    pub fn new(
+        (haptic, tissue): (TapePort<HapticTape>, TapePort<TissueTape>),
+        folder: PathBuf,
+        common: Flight,
+    ) -> Self {
         Self {
             haptic,
             tissue,
@@ -99,7 +127,7 @@ impl FlightDesk {
         room
     }
 
-    /// One pass of the bridge; gives what was written since the last.
+    /// One pass of the bridge; returns what was written since the last.
     pub fn pass(
         &mut self,
         scene_generation: u64,
@@ -134,7 +162,7 @@ impl FlightDesk {
             let _ = self.haptic.back.push(tape);
         }
         while let Ok(tape) = self.tissue.taken.pop() {
-            // That of an earlier scene ends here.
+            // A tape of an earlier scene is dropped here.
             if tape.is_for(scene_generation) {
                 if let Some(gathering) = &mut self.gathering {
                     gathering.tissue = Some(tape.flight());
@@ -156,13 +184,13 @@ impl FlightDesk {
                 let _ = sender.send(Saved { ticket, result });
             });
         if let Err(why) = spawned {
-            let result = Err(format!("no thread could be started to write it: {why}"));
+            let result = Err(SaveError::Thread(why));
             let _ = self.written.0.send(Saved { ticket, result });
         }
     }
 
-    /// Both loops have ended and handed their tapes over.
-    pub fn save_at_end(&mut self, scene_generation: u64) -> Result<PathBuf, String> {
+    /// After both loops have ended and handed their tapes over.
+    pub fn save_at_end(&mut self, scene_generation: u64) -> Result<PathBuf, SaveError> {
         let reason = "rt-core ended".to_owned();
         self.gathering = Some(Gathering::new(Wanted {
             kind: "exit",
@@ -174,7 +202,7 @@ impl FlightDesk {
         let path = self.next_path("exit");
         match self.gathering.take() {
             Some(gathering) if gathering.haptic.is_some() => save(&gathering.into_flight(&self.common), &path),
-            _ => Err("the force loop left no recording".to_owned()),
+            _ => Err(SaveError::NothingRecorded),
         }
     }
 
@@ -213,13 +241,15 @@ impl Gathering {
     }
 }
 
-fn save(flight: &Flight, path: &Path) -> Result<PathBuf, String> {
+fn save(flight: &Flight, path: &Path) -> Result<PathBuf, SaveError> {
     let folder = path.parent().unwrap_or(Path::new("."));
-    std::fs::create_dir_all(folder)
-        .map_err(|e| format!("{}: {e}; choose another folder with --flight-dir", folder.display()))?;
+    std::fs::create_dir_all(folder).map_err(|why| SaveError::Folder {
+        folder: folder.to_owned(),
+        why,
+    })?;
     flight.write(path)?;
-    forget_oldest(folder, |name| name.ends_with("-exit.flight"), KEPT_EXITS);
-    forget_oldest(
+    remove_oldest(folder, |name| name.ends_with("-exit.flight"), KEPT_EXITS);
+    remove_oldest(
         folder,
         |name| name.ends_with(".flight") && !name.ends_with("-exit.flight"),
         KEPT_OTHERS,
@@ -228,7 +258,7 @@ fn save(flight: &Flight, path: &Path) -> Result<PathBuf, String> {
 }
 
 /// Names begin with the time, so their order is that of time.
-fn forget_oldest(folder: &Path, of_kind: impl Fn(&str) -> bool, kept: usize) {
+fn remove_oldest(folder: &Path, of_kind: impl Fn(&str) -> bool, kept: usize) {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let names = entries.map(|e| e.file_name().to_string_lossy().into_owned());
     let mut names: Vec<String> = names.filter(|n| n.starts_with("flight-") && of_kind(n)).collect();
@@ -244,8 +274,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_the_oldest_of_its_kind_are_forgotten() {
-        let folder = std::env::temp_dir().join(format!("stylet-forget-{}", std::process::id()));
+    fn only_the_oldest_of_its_kind_are_removed() {
+        let folder = std::env::temp_dir().join(format!("stylet-remove-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         let names = [
             "flight-1-exit.flight",
@@ -257,7 +287,7 @@ mod tests {
         for name in names {
             std::fs::write(folder.join(name), "").unwrap();
         }
-        forget_oldest(&folder, |name| name.ends_with("-exit.flight"), 2);
+        remove_oldest(&folder, |name| name.ends_with("-exit.flight"), 2);
         let left = names.map(|name| folder.join(name).exists());
         std::fs::remove_dir_all(&folder).unwrap();
         assert_eq!(left, [false, true, true, true, true]);

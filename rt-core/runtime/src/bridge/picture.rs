@@ -1,6 +1,6 @@
 //! What hosts need to draw a scene and to plan in it.
 
-use super::SnapshotSize;
+use super::snapshots::SnapshotSize;
 use stylet_anatomy::PatientFrame;
 use stylet_shm_schema::*;
 use stylet_sim::scene::{Role, Scene, Structure, label_grid};
@@ -12,7 +12,7 @@ pub struct ScenePicture {
 }
 
 impl ScenePicture {
-    /// Of a built-in scene, the first of a run.
+    /// The first scene of a run, which is built in.
     pub fn first(scene: &Scene, session_id: u64) -> Self {
         Self::of(scene, session_id, 1, PatientFrame::default())
     }
@@ -22,6 +22,7 @@ impl ScenePicture {
         (&self.header, &self.words)
     }
 
+    /// Words behind the header.
     pub fn word_count(&self) -> usize {
         self.words.len()
     }

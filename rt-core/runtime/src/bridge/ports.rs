@@ -8,18 +8,19 @@ use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
 use stylet_shm_schema::service::{self, Ipc, MAX_BATCH, SNAPSHOTS_AHEAD, ServiceError};
 use stylet_shm_schema::*;
 
+/// One port for each service of the core; [`service`] says what each holds.
 pub struct Ports {
-    pub session: Publisher<Ipc, Session, ()>,
-    pub events: Publisher<Ipc, Event, ()>,
-    pub parameters: Publisher<Ipc, ParametersInForce, ()>,
-    pub plan: Publisher<Ipc, PlanInForce, ()>,
-    pub replies: Publisher<Ipc, Reply, ()>,
-    pub rehearsals: Publisher<Ipc, Rehearsal, ()>,
-    pub records: Publisher<Ipc, [TickRecord], u64>,
-    pub snapshots: Publisher<Ipc, [Vertex], SnapshotHeader>,
-    pub scene: Publisher<Ipc, [u32], SceneHeader>,
-    pub commands: Subscriber<Ipc, Command, ()>,
-    pub uploads: Subscriber<Ipc, [u8], UploadHeader>,
+    pub(super) session: Publisher<Ipc, Session, ()>,
+    pub(super) events: Publisher<Ipc, Event, ()>,
+    pub(super) parameters: Publisher<Ipc, ParametersInForce, ()>,
+    pub(super) plan: Publisher<Ipc, PlanInForce, ()>,
+    pub(super) replies: Publisher<Ipc, Reply, ()>,
+    pub(super) rehearsals: Publisher<Ipc, Rehearsal, ()>,
+    pub(super) records: Publisher<Ipc, [TickRecord], u64>,
+    pub(super) snapshots: Publisher<Ipc, [Vertex], SnapshotHeader>,
+    pub(super) scene: Publisher<Ipc, [u32], SceneHeader>,
+    pub(super) commands: Subscriber<Ipc, Command, ()>,
+    pub(super) uploads: Subscriber<Ipc, [u8], UploadHeader>,
 }
 
 fn failed(why: impl std::fmt::Debug) -> ServiceError {
@@ -55,7 +56,7 @@ const SNAPSHOTS_KEPT: usize = 4 * SNAPSHOTS_AHEAD;
 const SCENES_KEPT: usize = 3;
 
 impl Ports {
-    /// For a scene of so many words whose snapshots have so many vertices and nodes.
+    /// Creates every port, for a scene of `word_count` words whose snapshots hold `snapshot_len` vertices and nodes.
     pub fn new(node: &Node<Ipc>, snapshot_len: usize, word_count: usize) -> Result<Self, ServiceError> {
         Ok(Self {
             session: publisher!(service::session(node)),
@@ -76,9 +77,9 @@ impl Ports {
         })
     }
 
-    /// Meets hosts that came, forgets those that went.
+    /// Connects new hosts and drops those that have disconnected.
     pub fn update_connections(&self) {
-        // A host that cannot be met now is met at the next pass.
+        // A host that cannot be connected now is connected at the next pass.
         let _ = self.session.update_connections();
         let _ = self.events.update_connections();
         let _ = self.parameters.update_connections();

@@ -1,47 +1,44 @@
 //! Rehearsals that hosts ask for: one at a time, on a thread of normal priority, beside the running scene.
 
-use crate::rehearse::{NeedleRun, Rehearsed, Stage, timed};
+use crate::rehearse::{NeedleRun, RehearseError, Rehearsed, Stage, timed};
+use crate::rt::exchange::Ticket;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use stylet_hw::DeviceInfo;
-use stylet_shm_schema::{MAX_SEEDS, ParameterSet, Rehearsal};
+use stylet_shm_schema::{MAX_SEEDS, ParameterSet, Refusal, RefusalCode, Rehearsal};
 use stylet_sim::scene::SceneSource;
 use stylet_sim::scene::TissueKind;
 
-use super::Ticket;
+const PANICKED: &str = "the rehearsal stopped with an internal fault; the output of rt-core says where. The next one starts with a new state";
 
-const BUSY: &str = "another rehearsal runs; wait until it is done";
-const PANICKED: &str =
-    "the rehearsal stopped on a fault of its own; what rt-core printed says where. The next one starts afresh";
-
-/// What the thread gives back.
+/// What the thread returns.
 struct Finished {
     scene_generation: u64,
     wall_ns: u64,
-    outcome: Result<Rehearsed, String>,
-    /// To be used again.
+    outcome: Result<Rehearsed, RehearseError>,
+    /// Kept for the next rehearsal.
     stage: Option<Stage>,
 }
 
-/// What a host is told.
-pub struct Told {
+/// A rehearsal that has ended.
+pub struct Ended {
     pub ticket: Ticket,
-    pub outcome: Result<Box<Rehearsal>, String>,
+    pub outcome: Result<Box<Rehearsal>, Refusal>,
 }
 
 /// The bridge's side of rehearsals.
-pub struct RehearsalDesk {
+pub struct RehearsalRunner {
     source: Arc<SceneSource>,
     tissue: TissueKind,
     device: DeviceInfo,
-    /// Of the scene that runs; `None` until the first rehearsal in it, and while one is under way.
+    /// Body of the scene that runs; `None` until the first rehearsal in it, and while one is under way.
     stage: Option<(u64, Stage)>,
     under_way: Option<(Ticket, JoinHandle<Finished>)>,
     stop: Arc<AtomicBool>,
 }
 
-impl RehearsalDesk {
+impl RehearsalRunner {
     pub fn new(source: Arc<SceneSource>, tissue: TissueKind, device: DeviceInfo) -> Self {
         Self {
             source,
@@ -59,16 +56,16 @@ impl RehearsalDesk {
         self.stage = None;
     }
 
-    /// The reason when it cannot be begun now.
+    /// Begins one, unless another is under way.
     pub fn begin(
         &mut self,
         ticket: Ticket,
         run: NeedleRun,
         set: ParameterSet,
         scene_generation: u64,
-    ) -> Result<(), &'static str> {
+    ) -> Result<(), Refusal> {
         if self.under_way.is_some() {
-            return Err(BUSY);
+            return Err(RefusalCode::RehearsalRunning.into());
         }
         let kept = self
             .stage
@@ -93,30 +90,32 @@ impl RehearsalDesk {
             }
         };
         let thread = std::thread::Builder::new().name("rehearsal".to_owned()).spawn(work);
-        self.under_way = Some((ticket, thread.map_err(|_| "no thread could be started to rehearse")?));
+        let failed = |_| Refusal::new(RefusalCode::Internal, "no thread could be started to rehearse");
+        self.under_way = Some((ticket, thread.map_err(failed)?));
         Ok(())
     }
 
     /// One that has ended since the last call.
-    pub fn take(&mut self, scene_generation: u64) -> Option<Told> {
+    pub fn take(&mut self, scene_generation: u64) -> Option<Ended> {
         let (ticket, thread) = self.under_way.take_if(|(_, thread)| thread.is_finished())?;
         let Ok(finished) = thread.join() else {
-            let outcome = Err(PANICKED.to_owned());
-            return Some(Told { ticket, outcome });
+            let outcome = Err(Refusal::new(RefusalCode::Internal, PANICKED));
+            return Some(Ended { ticket, outcome });
         };
         if finished.scene_generation == scene_generation {
             self.stage = finished.stage.map(|stage| (scene_generation, stage));
         }
-        Some(Told {
+        Some(Ended {
             ticket,
             outcome: finished
                 .outcome
-                .map(|r| message(&r, finished.scene_generation, finished.wall_ns)),
+                .map(|r| message(&r, finished.scene_generation, finished.wall_ns))
+                .map_err(Refusal::from),
         })
     }
 }
 
-impl Drop for RehearsalDesk {
+impl Drop for RehearsalRunner {
     fn drop(&mut self) {
         // SYNC: read by the rehearsal's thread; nothing but the flag is carried.
         self.stop.store(true, Ordering::Relaxed);

@@ -11,11 +11,14 @@ type Loan = SampleMut<Ipc, [Vertex], SnapshotHeader>;
 /// How much one snapshot of a scene holds.
 #[derive(Clone, Copy)]
 pub struct SnapshotSize {
+    /// Vertices of the surface.
     pub vertices: usize,
+    /// Nodes of the displacement grid.
     pub nodes: usize,
 }
 
 impl SnapshotSize {
+    /// Vertices and nodes together.
     pub fn total(self) -> usize {
         self.vertices + self.nodes
     }
@@ -37,7 +40,7 @@ impl SnapshotLoans {
         }
     }
 
-    /// Sends what came back filled, then loans anew for the scene that runs.
+    /// Sends the slots that returned filled, then loans new ones for the scene that runs.
     pub fn pass(&mut self, ports: &Ports, scene_generation: u64, size: SnapshotSize) {
         while let Ok(back) = self.filled.pop() {
             let loan = self.out.get_mut(back.index as usize).and_then(Option::take);
@@ -70,11 +73,8 @@ impl SnapshotLoans {
             vertex_count: size.vertices,
             node_count: size.nodes,
         };
-        self.out[index] = Some(loan);
-        if self.slots.push(slot).is_err() {
-            self.out[index] = None;
-            return false;
-        }
-        true
+        let pushed = self.slots.push(slot).is_ok();
+        self.out[index] = pushed.then_some(loan);
+        pushed
     }
 }

@@ -1,11 +1,11 @@
-//! Sees that the haptic loop itself has stopped: the one fault that the loop cannot see.
+//! Detects that the haptic loop itself has stopped: the one fault that the loop cannot detect.
 //!
 //! It runs in the bridge, at normal priority. A loop that stands still leaves its last force on the device; so the
 //! process ends, and the device's own watchdog, or the closing of its port, takes the force away.
 
 /// Passes of the bridge without one tick of the loop; 2 ms and more each.
 ///
-/// Passes, not time: when the whole process was stopped, neither went on.
+/// Passes, not time: while the whole process is stopped, neither advances.
 pub const PATIENCE_PASSES: u32 = 125;
 
 /// One for a bridge.

@@ -1,16 +1,21 @@
-//! A volume that a host sends: what its header says, checked, as labels for a scene.
+//! A volume that a host sends: its header, validated, as labels for a scene.
 
 use stylet_shm_schema::{MAX_STRUCTURES, UploadHeader, UploadStructure, check, role};
 use stylet_sim::limits::AxisLimits;
 use stylet_sim::scene::{Labels, Material, Role, Structure};
 
-/// Lists everything that is wrong with the header; labels, materials and what they are together are checked by the scene.
-pub fn labels(header: &UploadHeader, cells: &[u8]) -> Result<Labels, String> {
+/// Every problem with the header of an upload, one a line.
+#[derive(Debug, thiserror::Error)]
+#[error("{}", .0.join("\n"))]
+pub struct InvalidUpload(Vec<String>);
+
+/// Lists every problem with the header. Labels, materials and how they go together are checked by the scene.
+pub fn labels(header: &UploadHeader, cells: &[u8]) -> Result<Labels, InvalidUpload> {
     let mut problems = Vec::new();
-    let said = header.dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(u64::from(d)));
-    if said != Some(cells.len() as u64) {
+    let expected = header.dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(u64::from(d)));
+    if expected != Some(cells.len() as u64) {
         problems.push(format!(
-            "the volume says {:?} cells but {} came",
+            "the volume has {:?} cells by its header but {} were received",
             header.dims,
             cells.len()
         ));
@@ -35,7 +40,7 @@ pub fn labels(header: &UploadHeader, cells: &[u8]) -> Result<Labels, String> {
         }
     }
     if !problems.is_empty() {
-        return Err(problems.join("\n"));
+        return Err(InvalidUpload(problems));
     }
     Ok(Labels {
         dims: header.dims.map(|d| d as usize),

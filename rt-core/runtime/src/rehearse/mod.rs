@@ -1,4 +1,4 @@
-//! A needle gone through ahead of time: the two loops of the run, in a body of their own, as fast as they can.
+//! Rehearsals: one needle ahead of time, by the two loops of the run, in a body of their own, as fast as they can.
 //!
 //! Nothing is modelled anew: the simulated hand and device, `HapticLoop::tick` and `TissueLoop::tick` are those of the live
 //! run, fed with a time that does not wait. Each rehearsal begins with tissue at rest, and the same needle gives the same bytes.
@@ -7,46 +7,103 @@
 mod rig;
 mod script;
 
-use crate::rt::world::World;
+use crate::rt::world::{World, WorldError};
 use nalgebra::Vector3;
 use rig::Rig;
 use script::Script;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use stylet_hw::DeviceInfo;
-use stylet_shm_schema::script::{TISSUE_REST_FOR, TISSUE_REST_LIMIT, TISSUE_REST_M};
-use stylet_shm_schema::{Fault, MAX_SEEDS, ParameterSet, SeedPose, flags};
+use stylet_shm_schema::{MAX_SEEDS, ParameterProblems, ParameterSet, Reason, Refusal, RefusalCode, SeedPose, flags};
 use stylet_sim::active::activate;
-use stylet_sim::scene::SceneSource;
-use stylet_sim::scene::TissueKind;
+use stylet_sim::scene::{SceneSource, TissueKind};
 
 /// A rehearsal that takes longer than this, in its own time, has failed.
 const LONGEST_S: f64 = 900.0;
 
+/// Why there is no result; the text is for people.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RehearseError {
+    /// The scene cannot be built again.
+    #[error("{0}")]
+    Scene(String),
+    /// Its tissue cannot be set up.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// Every parameter that is out of its range, one a line.
+    #[error(transparent)]
+    Parameters(#[from] ParameterProblems),
+    /// More drops than there are seeds.
+    #[error("{0} drops; at most {MAX_SEEDS}")]
+    TooManyDrops(usize),
+    /// An earlier rehearsal ended without returning its body.
+    #[error("the last rehearsal lost its body")]
+    BodyLost,
+    /// `stop` was set.
+    #[error("rt-core ended during the rehearsal")]
+    Stopped,
+    /// A loop refused an order.
+    #[error("{}", why.message())]
+    Refused {
+        /// The loop's reason.
+        why: RefusalCode,
+        /// Number of the drop, from 0, that was refused or was due next.
+        drop: u32,
+    },
+    /// The procedure could not go on.
+    #[error("in the rehearsal: {0}")]
+    Procedure(#[from] stylet_procedure::StepFailure),
+    /// The script did not end.
+    #[error("the needle had not finished after {LONGEST_S} s of simulated time")]
+    TooLong,
+}
+
+impl From<RehearseError> for Refusal {
+    fn from(error: RehearseError) -> Self {
+        let (code, subject) = match error {
+            RehearseError::Refused { why, drop } => (why, drop),
+            _ => (RefusalCode::RehearsalFailed, Reason::NO_SUBJECT),
+        };
+        Refusal {
+            reasons: vec![Reason::new(code, subject)],
+            text: error.to_string(),
+        }
+    }
+}
+
 /// One needle, scene frame, checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NeedleRun {
+    /// Where the needle enters the body, m.
     pub entry_m: Vector3<f64>,
+    /// Direction of the needle, unit vector.
     pub direction: Vector3<f64>,
+    /// Speed of the hand to the first drop, m/s.
     pub insert_m_per_s: f64,
+    /// Speed of the hand after it, m/s.
     pub retract_m_per_s: f64,
+    /// Speed of the hand to the entry, m/s.
     pub approach_m_per_s: f64,
+    /// Acceleration of the hand, m/s².
     pub acceleration_m_per_s2: f64,
-    /// How far from the entry the tip is drawn back to.
+    /// Where the tip is drawn back to, from the entry along the needle, m.
     pub retract_to_m: f64,
-    /// In the order of the drops.
+    /// Places of the drops in their order, m.
     pub drops_m: Vec<Vector3<f64>>,
 }
 
-/// What came of it.
+/// The result of a rehearsal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rehearsed {
-    /// In the order of the drops, after the tissue has come to rest.
+    /// Seeds in the order of the drops, after the tissue has come to rest.
     pub seeds: Vec<SeedPose>,
-    /// When each was dropped, after the tip's first contact with tissue.
+    /// When each was dropped, after the tip's first contact with tissue, s.
     pub dropped_after_s: Vec<f64>,
+    /// Largest force on the hand, N.
     pub peak_force_n: f64,
+    /// Largest displacement of tissue before the first puncture, m.
     pub displacement_before_puncture_m: f64,
+    /// Time of the rehearsal on its own clock, s.
     pub simulated_s: f64,
 }
 
@@ -58,10 +115,10 @@ pub struct Stage {
 
 impl Stage {
     /// Builds the scene anew, apart from the one that runs.
-    pub fn build(source: &SceneSource, tissue: TissueKind, device: DeviceInfo) -> Result<Self, String> {
-        let mut scene = source.build()?;
+    pub fn build(source: &SceneSource, tissue: TissueKind, device: DeviceInfo) -> Result<Self, RehearseError> {
+        let mut scene = source.build().map_err(|e| RehearseError::Scene(e.to_string()))?;
         scene.tissue = tissue;
-        let active = activate(&ParameterSet::default(), &device).map_err(|p| p.join("\n"))?;
+        let active = activate(&ParameterSet::default(), &device)?;
         let world = World::new(scene, active.limits, 1)?;
         Ok(Self {
             world: Some(Box::new(world)),
@@ -70,12 +127,17 @@ impl Stage {
     }
 
     /// From rest, under these parameters; ends early, with an error, when `stop` is set.
-    pub fn rehearse(&mut self, run: &NeedleRun, set: &ParameterSet, stop: &AtomicBool) -> Result<Rehearsed, String> {
+    pub fn rehearse(
+        &mut self,
+        run: &NeedleRun,
+        set: &ParameterSet,
+        stop: &AtomicBool,
+    ) -> Result<Rehearsed, RehearseError> {
         if run.drops_m.len() > MAX_SEEDS {
-            return Err(format!("{} drops; at most {MAX_SEEDS}", run.drops_m.len()));
+            return Err(RehearseError::TooManyDrops(run.drops_m.len()));
         }
-        let active = activate(set, &self.device).map_err(|p| p.join("\n"))?;
-        let mut world = self.world.take().ok_or("the last rehearsal lost its body")?;
+        let active = activate(set, &self.device)?;
+        let mut world = self.world.take().ok_or(RehearseError::BodyLost)?;
         world.tissue.return_to_rest();
         world.set_limits(active.limits.clone());
         let mut rig = Rig::new(world, &active, &self.device, run);
@@ -85,7 +147,7 @@ impl Stage {
     }
 }
 
-fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearsed, String> {
+fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearsed, RehearseError> {
     let mut script = Script::new(run);
     let mut displacement_before_puncture_m = 0.0_f64;
     let (mut punctured, mut contact_s) = (false, None);
@@ -93,7 +155,7 @@ fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearse
     while rig.seconds() < LONGEST_S {
         // SYNC: set by the bridge when it ends; nothing but the flag is carried.
         if stop.load(Ordering::Relaxed) {
-            return Err("rt-core ended during the rehearsal".to_owned());
+            return Err(RehearseError::Stopped);
         }
         rig.tick();
         let state = rig.state();
@@ -107,10 +169,6 @@ fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearse
         if !punctured {
             displacement_before_puncture_m = displacement_before_puncture_m.max(rig.displacement_m());
         }
-        let fault = Fault::from_number(state.fault).unwrap_or(Fault::None);
-        if fault != Fault::None {
-            return Err(format!("in the rehearsal the force went off: {}", fault.message()));
-        }
         if script.advance(rig)? {
             let simulated_s = rig.seconds();
             return Ok(Rehearsed {
@@ -122,9 +180,7 @@ fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearse
             });
         }
     }
-    Err(format!(
-        "the needle was not through after {LONGEST_S} s of its own time"
-    ))
+    Err(RehearseError::TooLong)
 }
 
 /// Wall-clock beside the result, for the host.

@@ -1,4 +1,4 @@
-//! Rehearsals against what must hold of them: the same bytes twice, seeds at rest where the tissue was, and errors in words.
+//! What holds for rehearsals: the same bytes twice, seeds at rest where the tissue was, and typed errors.
 
 use super::*;
 use std::sync::atomic::AtomicBool;
@@ -30,7 +30,7 @@ fn needle() -> NeedleRun {
 }
 
 #[test]
-fn a_rehearsal_leaves_its_seeds_off_plan_and_repeats_to_the_last_bit() {
+fn a_rehearsal_leaves_its_seeds_off_plan_and_repeats_bit_by_bit() {
     let (mut stage, run, stop) = (stage(), needle(), AtomicBool::new(false));
     let set = ParameterSet::default();
     let first = stage.rehearse(&run, &set, &stop).expect("goes through");
@@ -73,15 +73,17 @@ fn tissue_that_sticks_less_leaves_seeds_nearer_to_plan() {
 }
 
 #[test]
-fn a_drop_outside_the_tissue_and_a_stop_are_told_and_leave_the_stage_usable() {
+fn a_drop_outside_the_tissue_and_a_stop_are_reported_and_leave_the_stage_usable() {
     let (mut stage, mut run, stop) = (stage(), needle(), AtomicBool::new(false));
     let set = ParameterSet::default();
     run.drops_m = vec![run.entry_m + run.direction * 1e-3];
-    assert!(
-        stage
-            .rehearse(&run, &set, &stop)
-            .is_err_and(|e| e.contains("outside the tissue"))
-    );
+    assert!(stage.rehearse(&run, &set, &stop).is_err_and(|e| matches!(
+        e,
+        RehearseError::Refused {
+            why: RefusalCode::TipOutsideTissue,
+            ..
+        }
+    )));
     stop.store(true, Ordering::Relaxed);
     assert!(stage.rehearse(&needle(), &set, &stop).is_err());
     stop.store(false, Ordering::Relaxed);
@@ -90,7 +92,7 @@ fn a_drop_outside_the_tissue_and_a_stop_are_told_and_leave_the_stage_usable() {
 
 /// FEM keeps answers from tick to tick and works ahead: a body at rest must have forgotten both.
 #[test]
-fn a_rehearsal_with_finite_elements_repeats_to_the_last_bit() {
+fn a_rehearsal_with_finite_elements_repeats_bit_by_bit() {
     let (mut stage, run, stop) = (fem_stage(), shallow(), AtomicBool::new(false));
     let set = ParameterSet::default();
     let first = stage.rehearse(&run, &set, &stop).expect("goes through");
@@ -102,7 +104,7 @@ fn fem_stage() -> Stage {
     Stage::build(&source, TissueKind::Fem, DeviceInfo::phantom_premium_1_5()).expect("built in")
 }
 
-/// One seed, where an elastic body still lets the tip come.
+/// One seed, within reach of the tip in an elastic body.
 fn shallow() -> NeedleRun {
     let run = needle();
     NeedleRun {

@@ -14,14 +14,55 @@ const DIGEST: usize = 32;
 /// No recording is larger: two bodies of 8 MiB and the ticks.
 const MAX_BYTES: u64 = 256 << 20;
 
-/// Figures of the device that the gate and the estimator use.
+/// A flight recording that cannot be written or read; the text names the file.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {problem}", path.display())]
+pub struct FlightError {
+    path: PathBuf,
+    problem: Problem,
+}
+
+impl FlightError {
+    fn new(path: &Path, problem: Problem) -> Self {
+        Self {
+            path: path.to_owned(),
+            problem,
+        }
+    }
+}
+
+#[derive(Debug, thiserror::Error)]
+enum Problem {
+    #[error(transparent)]
+    Io(std::io::Error),
+    #[error("cannot be encoded: {0}")]
+    Encoding(postcard::Error),
+    #[error("too large for a flight recording")]
+    TooLarge,
+    #[error("not a flight recording of this version of rt-core")]
+    OtherFormat,
+    #[error("cut short")]
+    CutShort,
+    #[error("damaged: its digest does not match")]
+    Damaged,
+    #[error("cannot be read: {0}")]
+    Decoding(postcard::Error),
+}
+
+/// Figures of the device that the gate and the estimator use; fields as in [`DeviceInfo`].
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct DeviceFigures {
+    /// Largest force, N.
     pub peak_force_n: f64,
+    /// Force that can be held for ever, N.
     pub continuous_force_n: f64,
+    /// Largest torque, N m.
     pub peak_torque_nm: f64,
+    /// Stiffness up to which the device is stable, N/m.
     pub max_stiffness_n_per_m: f64,
+    /// Step of the position sensors at the tip, m.
     pub position_step_m: f64,
+    /// No hardware.
     pub simulated: bool,
 }
 
@@ -39,6 +80,7 @@ impl From<&DeviceInfo> for DeviceFigures {
 }
 
 impl DeviceFigures {
+    /// The device's properties as the loops use them.
     pub fn info(&self) -> DeviceInfo {
         DeviceInfo {
             name: "device of the recording",
@@ -55,26 +97,31 @@ impl DeviceFigures {
 /// The last ticks of both loops.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Flight {
-    /// Of the program that recorded it: another build may round otherwise.
+    /// Version of the program that recorded it: another build may round otherwise.
     pub version: String,
+    /// Number of the run.
     pub session_id: u64,
     /// Why it was written: a fault, the end, or a request.
     pub reason: String,
+    /// Name of the device.
     pub device_name: String,
+    /// Its figures.
     pub device: DeviceFigures,
+    /// Time between two ticks of the force loop, s.
     pub haptic_period_s: f64,
+    /// Time between two ticks of the tissue loop, s.
     pub tissue_period_s: f64,
-    /// `None`: the loop did not hand its tape over in time.
+    /// The force loop. `None`: it did not hand its tape over in time.
     pub haptic: Option<HapticFlight>,
-    /// `None`: as above, or the body is too large to be recorded.
+    /// The tissue loop. `None`: as above, or the body is too large to be recorded.
     pub tissue: Option<TissueFlight>,
 }
 
 impl Flight {
     /// Writes to a file of that name, whole or not at all.
-    pub fn write(&self, path: &Path) -> Result<(), String> {
-        let told = |e: std::io::Error| format!("{}: {e}", path.display());
-        let body = postcard::to_stdvec(self).map_err(|e| e.to_string())?;
+    pub fn write(&self, path: &Path) -> Result<(), FlightError> {
+        let failed = |e: std::io::Error| FlightError::new(path, Problem::Io(e));
+        let body = postcard::to_stdvec(self).map_err(|e| FlightError::new(path, Problem::Encoding(e)))?;
         let unfinished = path.with_extension("part");
         let written = std::fs::File::create(&unfinished).and_then(|mut file| {
             file.write_all(MAGIC)?;
@@ -83,33 +130,34 @@ impl Flight {
             file.sync_all()
         });
         if let Err(why) = written {
-            // What is half written helps nobody.
+            // An incomplete file is of no use.
             let _ = std::fs::remove_file(&unfinished);
-            return Err(told(why));
+            return Err(failed(why));
         }
-        std::fs::rename(&unfinished, path).map_err(told)
+        std::fs::rename(&unfinished, path).map_err(failed)
     }
 
     /// Reads what [`Flight::write`] wrote; anything else is refused with a reason.
-    pub fn read(path: &Path) -> Result<Self, String> {
-        let told = |why: &str| format!("{}: {why}", path.display());
-        let size = std::fs::metadata(path).map_err(|e| told(&e.to_string()))?.len();
+    pub fn read(path: &Path) -> Result<Self, FlightError> {
+        let failed = |problem| FlightError::new(path, problem);
+        let io = |e| failed(Problem::Io(e));
+        let size = std::fs::metadata(path).map_err(io)?.len();
         if size > MAX_BYTES {
-            return Err(told("too large for a flight recording"));
+            return Err(failed(Problem::TooLarge));
         }
-        let bytes = std::fs::read(path).map_err(|e| told(&e.to_string()))?;
+        let bytes = std::fs::read(path).map_err(io)?;
         let rest = bytes
             .strip_prefix(MAGIC.as_slice())
-            .ok_or_else(|| told("not a flight recording of this version of rt-core"))?;
-        let (digest, body) = rest.split_at_checked(DIGEST).ok_or_else(|| told("cut short"))?;
+            .ok_or_else(|| failed(Problem::OtherFormat))?;
+        let (digest, body) = rest.split_at_checked(DIGEST).ok_or_else(|| failed(Problem::CutShort))?;
         if Sha256::digest(body).as_slice() != digest {
-            return Err(told("damaged: its digest does not match"));
+            return Err(failed(Problem::Damaged));
         }
-        postcard::from_bytes(body).map_err(|e| told(&format!("cannot be read: {e}")))
+        postcard::from_bytes(body).map_err(|e| failed(Problem::Decoding(e)))
     }
 }
 
-/// Where recordings go unless told otherwise: `$XDG_STATE_HOME/stylet/flights`, by default under `~/.local/state`.
+/// Default folder of the recordings: `$XDG_STATE_HOME/stylet/flights`, by default under `~/.local/state`.
 pub fn default_folder() -> PathBuf {
     let from = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     let state = from("XDG_STATE_HOME")

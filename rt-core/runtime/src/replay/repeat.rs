@@ -1,31 +1,35 @@
-//! Runs both loops again from a recording, and says where they come out differently.
+//! Runs both loops again from a recording, and reports where their outputs differ.
 
 use super::file::Flight;
-use crate::rt::exchange::{HapticOrder, TipPose, TissueOrder, TissueResponse};
-use crate::rt::haptic::{HapticLoop, HapticPorts};
+use crate::rt::exchange::{HapticOrder, TissueOrder};
+use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticEntry, HapticFlight, HapticTape};
-use crate::rt::recorder::recorder;
-use crate::rt::tissue::{TissueLoop, TissuePorts};
+use crate::rt::response::TissueResponse;
+use crate::rt::tissue::TissueLoop;
 use crate::rt::tissue_tape::{TapedOrder, TissueEntry, TissueFlight, TissueMemory, TissueTape};
-use crate::rt::world::World;
+use crate::rt::wiring::{Capacities, Wiring};
+use crate::rt::world::{World, WorldError};
 use std::sync::Arc;
 use stylet_hw::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
 use stylet_shm_schema::TickRecord;
 
-/// What one loop's repetition gave.
+/// The result of repeating one loop.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Repeated {
+    /// Ticks repeated.
     pub ticks: usize,
     /// Ticks whose output differs in any bit.
     pub different: usize,
     /// The first of them, counted from the start of the recording.
     pub first_different: Option<usize>,
-    /// Positions compared, and how many differ in any bit: each element at each checkpoint and at the end.
+    /// Positions compared: each element at each checkpoint and at the end.
     pub positions: usize,
+    /// How many of `positions` differ.
     pub different_positions: usize,
 }
 
 impl Repeated {
+    /// Something was repeated and every bit is the same.
     pub fn is_identical(&self) -> bool {
         self.ticks > 0 && self.different == 0 && self.different_positions == 0
     }
@@ -39,7 +43,7 @@ impl Repeated {
     }
 }
 
-/// Answers as the device answered then.
+/// A device that gives the recorded answers.
 struct RecordedDevice {
     info: DeviceInfo,
     answers: std::vec::IntoIter<(Result<Sample, DeviceFault>, bool)>,
@@ -77,25 +81,17 @@ fn without_times(record: &TickRecord) -> TickRecord {
 
 /// The haptic chain: forces, phases, faults and flags of each tick.
 pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Repeated {
-    let (mut tissue_in, response) = triple_buffer::triple_buffer(&TissueResponse::default());
-    let (pose, _pose_out) = triple_buffer::triple_buffer(&TipPose::default());
-    let (mut orders_in, orders) = rtrb::RingBuffer::new(recorded.orders.len().max(1));
-    let (notices, mut notices_out) = rtrb::RingBuffer::new(1024);
-    let (records, mut records_out) = rtrb::RingBuffer::new(4);
-    let (tape, _desk) = recorder(Box::new(HapticTape::new(&recorded.memory)));
+    let tape = Box::new(HapticTape::new(&recorded.memory));
+    let Wiring {
+        haptic: ports,
+        mut tissue,
+        mut bridge,
+    } = Wiring::new(capacities(recorded.orders.len()), Some(tape), None);
     let answers: Vec<_> = recorded.ticks.iter().map(|e| (e.read, e.write_failed)).collect();
     let device = RecordedDevice {
         info: flight.device.info(),
         answers: answers.into_iter(),
         write_failed: false,
-    };
-    let ports = HapticPorts {
-        pose,
-        response,
-        orders,
-        notices,
-        records,
-        flight: tape,
     };
     let (session_id, period_s) = (flight.session_id, flight.haptic_period_s);
     let mut again = HapticLoop::new(session_id, Box::new(device), ports, &recorded.memory, period_s);
@@ -105,47 +101,58 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Repeated {
         while let Some((_, order)) = orders.next_if(|(tick, _)| *tick == index as u64) {
             // A tape that is handed over changes nothing of what the loop does.
             if !matches!(order, HapticOrder::HandOverTape) {
-                let _ = orders_in.push(*order);
+                let _ = bridge.haptic_orders.push(*order);
             }
         }
-        tissue_in.write(entry.tissue);
+        tissue.response.write(entry.tissue);
         again.tick(entry.record.due_ns, entry.woke_ns, entry.record.missed);
-        while notices_out.pop().is_ok() {}
-        found.count(index, records_out.pop().is_ok_and(|record| is_same(&record, entry)));
+        while bridge.haptic_notices.pop().is_ok() {}
+        found.count(index, bridge.records.pop().is_ok_and(|record| is_same(&record, entry)));
     }
     found
+}
+
+/// All orders of the recording may come in one tick.
+fn capacities(orders: usize) -> Capacities {
+    Capacities {
+        orders: orders.max(1),
+        notices: 1024,
+        ..Capacities::STEPPED
+    }
 }
 
 fn is_same(record: &TickRecord, entry: &HapticEntry) -> bool {
     bytemuck::bytes_of(&without_times(record)) == bytemuck::bytes_of(&without_times(&entry.record))
 }
 
+/// Why recorded tissue cannot be repeated.
+#[derive(Debug, thiserror::Error)]
+pub enum RepeatError {
+    /// The scene of the recording cannot be built again.
+    #[error("{0}")]
+    Scene(String),
+    /// Its tissue cannot be set up.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// The recorded body has another size than the scene gives.
+    #[error("the recorded tissue is not that of its scene: another version recorded it")]
+    OtherBody,
+}
+
 /// The tissue chain: response and held element of each tick, and every element's position at each checkpoint.
-pub fn tissue(flight: &Flight, recorded: &TissueFlight) -> Result<Repeated, String> {
-    let scene = recorded.scene.build()?;
+pub fn tissue(flight: &Flight, recorded: &TissueFlight) -> Result<Repeated, RepeatError> {
+    let scene = recorded.scene.build().map_err(|e| RepeatError::Scene(e.to_string()))?;
     let world = || World::new(scene.clone(), recorded.memory.limits.clone(), 1).map(Box::new);
     let reference = world()?;
     if reference.tissue.memory_len() != recorded.memory.body.len() {
-        return Err("the recorded tissue is not that of its scene: another version recorded it".to_owned());
+        return Err(RepeatError::OtherBody);
     }
-    let (mut pose_in, pose) = triple_buffer::triple_buffer(&TipPose::default());
-    let (response, _response_out) = triple_buffer::triple_buffer(&TissueResponse::default());
-    let (mut orders_in, orders) = rtrb::RingBuffer::new(recorded.orders.len().max(1));
-    let (notices, mut notices_out) = rtrb::RingBuffer::new(1024);
-    let (old_worlds, _old) = rtrb::RingBuffer::new(1);
-    let (_slots_in, slots) = rtrb::RingBuffer::new(1);
-    let (filled, _filled_out) = rtrb::RingBuffer::new(1);
-    let (tape, _desk) = recorder(Box::new(TissueTape::new(&reference, Arc::new(recorded.scene.clone()))));
-    let ports = TissuePorts {
-        pose,
-        response,
-        orders,
-        notices,
-        old_worlds,
-        slots,
-        filled,
-        flight: tape,
-    };
+    let tape = Box::new(TissueTape::new(&reference, Arc::new(recorded.scene.clone())));
+    let Wiring {
+        mut haptic,
+        tissue: ports,
+        mut bridge,
+    } = Wiring::new(capacities(recorded.orders.len()), None, Some(tape));
     let mut again = TissueLoop::new(flight.session_id, ports, world()?, flight.tissue_period_s);
     again.remember(&recorded.memory);
     let mut compare = Bodies {
@@ -158,11 +165,11 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight) -> Result<Repeated, Stri
             compare.positions(&again, memory);
         }
         while let Some((_, order)) = orders.next_if(|(tick, _)| *tick == index as u64) {
-            let _ = orders_in.push(order_of(order));
+            let _ = bridge.tissue_orders.push(order_of(order));
         }
-        pose_in.write(entry.pose);
+        haptic.pose.write(entry.pose);
         again.tick(entry.woke_ns);
-        while notices_out.pop().is_ok() {}
+        while bridge.tissue_notices.pop().is_ok() {}
         compare.found.count(index, same_step(&again, entry));
     }
     compare.positions(&again, &recorded.end);
@@ -178,7 +185,7 @@ fn order_of(order: &TapedOrder) -> TissueOrder {
     }
 }
 
-/// In every bit, but for how long things took.
+/// The same in every bit, except the times that work took.
 fn same_step(again: &TissueLoop, entry: &TissueEntry) -> bool {
     let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
     let response = |r: &TissueResponse| {
@@ -196,7 +203,7 @@ fn same_step(again: &TissueLoop, entry: &TissueEntry) -> bool {
 
 /// Compares whole bodies.
 struct Bodies {
-    /// Takes up what was recorded.
+    /// Loads the recorded bodies.
     reference: Box<World>,
     found: Repeated,
 }

@@ -8,26 +8,23 @@ use stylet_shm_schema::ThreadReport;
 pub struct Ask {
     /// `SCHED_FIFO` priority; `None` under `--no-rt`.
     pub priority: Option<u32>,
+    /// Processor; `None` for any.
     pub core: Option<usize>,
 }
 
 /// Proof that this thread is armed; cannot leave it.
 pub struct Armed {
+    /// What the kernel granted, as read back.
     pub report: ThreadReport,
     not_send: PhantomData<*const ()>,
 }
 
 /// The right that is missing, and how to grant it.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
 pub struct Refused(pub String);
 
-impl std::fmt::Display for Refused {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-/// How to grant real-time rights, in words to type.
+/// How to grant real-time rights: the commands to type.
 pub fn advice(missing: &str) -> String {
     let program = std::env::current_exe().map_or_else(|_| "rt-core".into(), |p| p.display().to_string());
     format!(
@@ -53,19 +50,21 @@ pub fn arm(ask: Ask) -> Result<Armed, Refused> {
             ))));
         }
     }
+    let report = read_back(ask);
+    confirm(&report).map_err(Refused)?;
     touch_stack();
     flush_denormals();
     Ok(Armed {
-        report: read_back(ask),
+        report,
         not_send: PhantomData,
     })
 }
 
-/// Locks present and future pages; `Err` says which limit to raise.
+/// Locks present and future pages; the error names the limit to raise.
 pub fn lock_memory() -> Result<(), Refused> {
     // SAFETY: no preconditions.
     if unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } == 0 {
-        // Keep freed memory, and serve large blocks from it: no page comes or goes later.
+        // Keep freed memory, and serve large blocks from it: no page is mapped or unmapped later.
         // SAFETY: both options take any value.
         unsafe {
             libc::mallopt(libc::M_TRIM_THRESHOLD, -1);
@@ -101,6 +100,18 @@ pub fn keep_cores_awake() -> Option<CoresAwake> {
         exit_latency_us: i32::from_ne_bytes(in_force),
         _request: request,
     })
+}
+
+/// What was asked for must be what the kernel says that the thread has: [`stylet_shm_schema::flags::REAL_TIME`] rests on it.
+fn confirm(report: &ThreadReport) -> Result<(), String> {
+    let asked = report.asked_priority;
+    if asked == 0 || (report.is_fifo() && report.priority == asked) {
+        return Ok(());
+    }
+    Err(format!(
+        "the kernel granted SCHED_FIFO priority {asked}, but reports policy {} and priority {}",
+        report.policy, report.priority
+    ))
 }
 
 fn read_back(ask: Ask) -> ThreadReport {
@@ -163,10 +174,15 @@ fn flush_denormals() {
 /// What a thread cost since it was armed.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Usage {
+    /// Page faults without a disk.
     pub minor_faults: i64,
+    /// Page faults that read a disk.
     pub major_faults: i64,
+    /// Context switches because the thread waited.
     pub voluntary_switches: i64,
+    /// Context switches because another thread was preferred.
     pub involuntary_switches: i64,
+    /// Allocations, frees and reallocations.
     pub heap_calls: u64,
 }
 
@@ -186,6 +202,7 @@ impl Usage {
         }
     }
 
+    /// The cost since `start`.
     pub fn since(self, start: Self) -> Self {
         Self {
             minor_faults: self.minor_faults - start.minor_faults,
@@ -194,5 +211,25 @@ impl Usage {
             involuntary_switches: self.involuntary_switches - start.involuntary_switches,
             heap_calls: self.heap_calls - start.heap_calls,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The state used to report what was asked for as what the kernel had granted.
+    #[test]
+    fn a_thread_that_the_kernel_does_not_confirm_is_not_armed() {
+        let report = |policy, priority, asked_priority| ThreadReport {
+            policy,
+            priority,
+            asked_priority,
+            ..ThreadReport::default()
+        };
+        assert!(confirm(&report(0, 0, 0)).is_ok(), "nothing was asked for");
+        assert!(confirm(&report(1, 80, 80)).is_ok());
+        assert!(confirm(&report(0, 0, 80)).is_err());
+        assert!(confirm(&report(1, 79, 80)).is_err());
     }
 }

@@ -1,5 +1,10 @@
 //! `CLOCK_MONOTONIC`, and a sleep until an absolute time on it.
 
+/// Period of the force loop: 1 kHz.
+pub const HAPTIC_PERIOD_NS: u64 = 1_000_000;
+/// Period of the tissue loop: 200 Hz.
+pub const TISSUE_PERIOD_NS: u64 = 5_000_000;
+
 /// Nanoseconds of `CLOCK_MONOTONIC`.
 pub fn now_ns() -> u64 {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
@@ -8,7 +13,7 @@ pub fn now_ns() -> u64 {
     time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
 }
 
-/// Returns at `time_ns` or later; goes on after a signal.
+/// Returns at `time_ns` or later; continues to sleep after a signal.
 pub fn sleep_until(time_ns: u64) {
     let time = libc::timespec {
         tv_sec: (time_ns / 1_000_000_000) as libc::time_t,
@@ -22,7 +27,7 @@ pub fn sleep_until(time_ns: u64) {
 
 /// Sleeps until `spin_ns` before `time_ns`, then spins; true when the thread had reason to sleep.
 pub fn wait_until(time_ns: u64, spin_ns: u64) -> bool {
-    let sleep_ns = time_ns - spin_ns;
+    let sleep_ns = time_ns.saturating_sub(spin_ns);
     let ahead = now_ns() < sleep_ns;
     sleep_until(sleep_ns);
     while spin_ns > 0 && now_ns() < time_ns {
@@ -34,13 +39,16 @@ pub fn wait_until(time_ns: u64, spin_ns: u64) -> bool {
 /// The ideal grid of a periodic loop: late wake-ups skip grid points and count them, none is made up for.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid {
+    /// Time between two points, ns.
     pub period_ns: u64,
+    /// The point that comes next, `CLOCK_MONOTONIC`, ns.
     pub due_ns: u64,
 }
 
 impl Grid {
-    /// The first point is one period after `start_ns`.
+    /// The first point is one period, at least 1 ns, after `start_ns`.
     pub fn from(start_ns: u64, period_ns: u64) -> Self {
+        let period_ns = period_ns.max(1);
         Self {
             period_ns,
             due_ns: start_ns + period_ns,

@@ -1,113 +1,16 @@
-//! What the two loops and the bridge hand each other: plain data through wait-free rings and triple buffers.
+//! What the bridge and the loops hand each other: orders, notices and snapshot slots, through wait-free rings.
 
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use stylet_hw::HandGoal;
-use stylet_shm_schema::{Fault, SnapshotHeader, TickRecord, Vertex};
-use stylet_sim::force::chain::Touch;
-use stylet_sim::force::{ForceParameters, LocalResponse};
+use stylet_shm_schema::{Fault, RefusalCode, SnapshotHeader, Vertex};
+use stylet_sim::force::ForceParameters;
 use stylet_sim::limits::Limits;
-use stylet_sim::needle::{LayerKind, NeedleParameters, Phase};
+use stylet_sim::needle::NeedleParameters;
 
-/// Haptic to tissue, each tick: the newest pose.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct TipPose {
-    pub time_ns: u64,
-    pub tip_in_scene: Vector3<f64>,
-    pub direction: Vector3<f64>,
-    /// Inwards along the needle, filtered.
-    pub speed_along_m_per_s: f64,
-    pub phase: Phase,
-    pub punctured: bool,
-    /// Sum of the held element's steps (eq. 6) since the loop began; its differences drive the tissue.
-    pub held_travel_m: Vector3<f64>,
-    /// The last contact that the haptic loop has ended.
-    pub released_contact: u64,
-    /// Number of the innermost layer that the shaft is in, and the largest number taken up so far.
-    pub innermost_layer: u64,
-    pub seen_layer: u64,
-}
-
-impl Default for TipPose {
-    fn default() -> Self {
-        Self {
-            time_ns: 0,
-            tip_in_scene: Vector3::zeros(),
-            direction: Vector3::z(),
-            speed_along_m_per_s: 0.0,
-            phase: Phase::Outside,
-            punctured: false,
-            held_travel_m: Vector3::zeros(),
-            released_contact: 0,
-            innermost_layer: 0,
-            seen_layer: 0,
-        }
-    }
-}
-
-/// Tissue to haptic, each tissue tick.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct TissueResponse {
-    pub time_ns: u64,
-    pub tick: u64,
-    /// Number of the contact that lasts; 0 for none.
-    pub contact: u64,
-    pub contact_in_scene: Vector3<f64>,
-    /// r of eq. 6, kept for the whole contact.
-    pub path_direction: Vector3<f64>,
-    /// The innermost layer met, under a number that rises over the run, and where.
-    pub layer: LayerKind,
-    pub layer_number: u64,
-    pub layer_in_scene: Vector3<f64>,
-    /// What the body answers at the tip.
-    pub local: LocalResponse,
-    pub worst_residual: f64,
-    pub worst_work_ns: u64,
-    pub worst_wake_ns: u64,
-    pub missed: u64,
-    pub seed_count: u32,
-    pub unsolved: bool,
-}
-
-impl TissueResponse {
-    /// Where the tip meets tissue; means something while there is contact.
-    pub fn touch(&self) -> Touch {
-        Touch {
-            contact_in_world: self.contact_in_scene,
-            path_direction: self.path_direction,
-            layer: self.layer,
-            layer_number: self.layer_number,
-            layer_in_world: self.layer_in_scene,
-            local: self.local,
-        }
-    }
-}
-
-impl Default for TissueResponse {
-    fn default() -> Self {
-        Self {
-            time_ns: 0,
-            tick: 0,
-            contact: 0,
-            contact_in_scene: Vector3::zeros(),
-            path_direction: Vector3::z(),
-            layer: LayerKind::default(),
-            layer_number: 0,
-            layer_in_scene: Vector3::zeros(),
-            local: LocalResponse::default(),
-            worst_residual: 0.0,
-            worst_work_ns: 0,
-            worst_wake_ns: 0,
-            missed: 0,
-            seed_count: 0,
-            unsolved: false,
-        }
-    }
-}
-
-/// Number that joins an order to the host's request; 0 when nobody waits.
+/// Number that joins an order to the host's request; 0 when nobody waits for an answer.
 pub type Ticket = u64;
 
 /// Bridge to haptic.
@@ -115,45 +18,71 @@ pub type Ticket = u64;
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub enum HapticOrder {
+    /// Use these parameters from this tick on.
     Parameters {
+        /// Number of the request.
         ticket: Ticket,
+        /// Rises with each change of a run.
         generation: u64,
+        /// The needle and what it does to tissue.
         needle: NeedleParameters,
+        /// The terms of the force.
         force: ForceParameters,
     },
+    /// Bring the simulated hand to a goal.
     Hand {
+        /// Number of the request.
         ticket: Ticket,
+        /// Place, direction, speed and acceleration.
         goal: HandGoal,
     },
+    /// Turn the force on; re-arms after a fault.
     Engage {
+        /// Number of the request.
         ticket: Ticket,
     },
+    /// Ramp the force out.
     Disengage {
+        /// Number of the request.
         ticket: Ticket,
     },
+    /// End the contact and clear peaks and counters.
     Reset {
+        /// Number of the request.
         ticket: Ticket,
     },
     /// Hand the flight recording over; the loop records anew once it has it back.
     HandOverTape,
+    /// Hold the simulated hand where it is.
     StopHand {
+        /// Number of the request.
         ticket: Ticket,
     },
 }
 
 /// Bridge to tissue.
 pub enum TissueOrder {
+    /// Keep these limits from this tick on.
     Limits(Limits),
+    /// Leave a seed at the tip.
     DropSeed {
+        /// Number of the request.
         ticket: Ticket,
     },
+    /// Remove the seed that was dropped last.
     UndoSeed {
+        /// Number of the request.
         ticket: Ticket,
     },
+    /// Return the tissue to rest and remove every seed.
     Reset,
+    /// Run another scene from this tick on.
     World {
+        /// Number of the request.
         ticket: Ticket,
+        /// The scene with its tissue at rest.
         world: Box<World>,
+        /// A blank flight recording for it.
         tape: Box<TissueTape>,
     },
     /// Hand the flight recording over; the loop records anew once it has it back.
@@ -163,88 +92,107 @@ pub enum TissueOrder {
 /// Either loop to the bridge: what happened, once each.
 #[derive(Clone, Copy, Debug)]
 pub enum Notice {
+    /// An order was carried out.
     Done {
+        /// Number of the request.
         ticket: Ticket,
+        /// Tick of the loop, from 1.
         tick: u64,
     },
+    /// An order was refused.
     Refused {
+        /// Number of the request.
         ticket: Ticket,
-        why: Refusal,
+        /// The loop's reason.
+        why: RefusalCode,
     },
+    /// Parameters are in use.
     ParametersActive {
+        /// Number of the request.
         ticket: Ticket,
+        /// Rises with each change of a run.
         generation: u64,
+        /// Tick of the loop, from 1.
         tick: u64,
     },
+    /// The tip has met the body.
     Contact {
+        /// Tick of the loop, from 1.
         tick: u64,
+        /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
+        /// Place of the tip, scene frame, m.
         position_m: Vector3<f64>,
     },
+    /// A membrane gave way.
     Puncture {
+        /// Tick of the loop, from 1.
         tick: u64,
+        /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
+        /// Depth of the tip behind the membrane at rest, m.
         depth_m: f64,
+        /// Place of the tip, scene frame, m.
         position_m: Vector3<f64>,
     },
+    /// The tip has left the body.
     LeftTissue {
+        /// Tick of the loop, from 1.
         tick: u64,
+        /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
     },
+    /// A seed was dropped.
     Seed {
+        /// Tick of the loop, from 1.
         tick: u64,
+        /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
+        /// Number of the seed, from 0.
         index: u32,
+        /// Place of the tip, scene frame, m.
         position_m: Vector3<f64>,
     },
+    /// The first fault since the force was armed.
     Fault {
+        /// Tick of the loop, from 1.
         tick: u64,
+        /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
+        /// The cause.
         fault: Fault,
     },
+    /// The force was armed again after a fault.
     Rearmed {
+        /// Tick of the loop, from 1.
         tick: u64,
+        /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
     },
+    /// Another scene runs.
     WorldSwapped {
+        /// Number of the request.
         ticket: Ticket,
+        /// Rises with each change of a run.
         generation: u64,
+        /// Tick of the loop, from 1.
         tick: u64,
     },
-}
-
-/// Why a loop would not do as asked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refusal {
-    TipOutsideTissue,
-    NoSeedLeft,
-    NoSeedToUndo,
-    NeedleInTissue,
-    BadGoal,
-}
-
-impl Refusal {
-    pub fn message(self) -> &'static str {
-        match self {
-            Self::TipOutsideTissue => "the tip is outside the tissue: move it in before dropping a seed",
-            Self::NoSeedLeft => "128 seeds are placed already; undo one first",
-            Self::NoSeedToUndo => "no seed has been placed",
-            Self::NeedleInTissue => "the needle is in the tissue: retract it first",
-            Self::BadGoal => {
-                "the goal for the hand needs a finite place, a direction, and a speed and acceleration above zero"
-            }
-        }
-    }
 }
 
 /// Memory that the bridge loaned from shared memory for one snapshot.
 pub struct SnapshotSlot {
+    /// Number under which the slot goes back.
     pub index: u32,
+    /// Scene that the slot was sized for.
     pub scene_generation: u64,
+    /// Where the header goes.
     pub header: *mut SnapshotHeader,
+    /// Where `vertex_count + node_count` vertices go.
     pub vertices: *mut Vertex,
+    /// Vertices of the surface.
     pub vertex_count: usize,
-    /// Nodes of the displacement grid, behind the vertices.
+    /// Nodes of the displacement grid, whose displacements follow the vertices.
     pub node_count: usize,
 }
 
@@ -252,12 +200,10 @@ pub struct SnapshotSlot {
 // ring, so exactly one thread uses it at a time.
 unsafe impl Send for SnapshotSlot {}
 
-/// A slot that comes back.
+/// A slot on its way back to the bridge.
 pub struct SnapshotReturn {
+    /// Number of the slot.
     pub index: u32,
     /// False when the slot no longer fits the scene.
     pub filled: bool,
 }
-
-// SYNC: every ring and triple buffer is single-producer single-consumer; their crates pair release with acquire.
-pub type RecordRing = rtrb::Producer<TickRecord>;

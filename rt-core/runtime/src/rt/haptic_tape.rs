@@ -1,7 +1,9 @@
 //! What the haptic loop writes to its flight recording, each tick.
 
-use crate::rt::exchange::{HapticOrder, TipPose, TissueResponse};
+use crate::rt::exchange::HapticOrder;
+use crate::rt::pose::TipPose;
 use crate::rt::recorder::{FLIGHT_TICKS, Last, Tape, complete_from};
+use crate::rt::response::TissueResponse;
 use crate::rt::taped::pod;
 use crate::rt::watchdog::Watchdog;
 use serde::{Deserialize, Serialize};
@@ -19,13 +21,21 @@ const ORDERS: usize = 4096;
 /// Everything that one tick of the haptic loop leaves to the next.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct HapticMemory {
+    /// Parameters of the force chain.
     pub parameters: ChainParameters,
+    /// State of the force chain.
     pub chain: ChainState,
+    /// Last good sample of the device.
     pub sample: Option<Sample>,
+    /// Number of the contact that the loop has taken up.
     pub contact: u64,
+    /// Last pose handed to the tissue loop.
     pub pose: TipPose,
+    /// Goal of the simulated hand.
     pub goal: Option<HandGoal>,
+    /// Watchdog with the fault that it keeps.
     pub watchdog: Watchdog,
+    /// State as hosts see it.
     #[serde(with = "pod")]
     pub state: HapticState,
 }
@@ -50,25 +60,34 @@ impl HapticMemory {
     }
 }
 
-/// What went into one tick and what came out.
+/// Input and output of one tick.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct HapticEntry {
+    /// When the tick began, `CLOCK_MONOTONIC`, ns.
     pub woke_ns: u64,
+    /// What the device answered to the read.
     pub read: Result<Sample, DeviceFault>,
+    /// The device did not take the force.
     pub write_failed: bool,
+    /// Response of the tissue loop that the tick used.
     pub tissue: TissueResponse,
+    /// The record that the tick made.
     #[serde(with = "pod")]
     pub record: TickRecord,
 }
 
 /// The last ticks of the haptic loop. Numbers count from the first tick on the tape.
 pub struct HapticTape {
+    /// The last ticks.
     pub ticks: Last<HapticEntry>,
+    /// Orders, each with the number of the tick that took it up.
     pub orders: Last<(u64, HapticOrder)>,
+    /// Checkpoints, each with the number of the tick that it comes before.
     pub checkpoints: Last<(u64, HapticMemory)>,
 }
 
 impl HapticTape {
+    /// A blank tape for a loop that begins with `memory`.
     pub fn new(memory: &HapticMemory) -> Self {
         let blank = HapticEntry {
             woke_ns: 0,
@@ -89,10 +108,12 @@ impl HapticTape {
         self.ticks.next().is_multiple_of(CHECKPOINT_EVERY)
     }
 
+    /// Keeps what the tick that begins now starts from.
     pub fn checkpoint(&mut self, memory: HapticMemory) {
         self.checkpoints.push((self.ticks.next(), memory));
     }
 
+    /// Keeps an order of the tick that runs.
     pub fn order(&mut self, order: HapticOrder) {
         self.orders.push((self.ticks.next(), order));
     }
@@ -130,6 +151,7 @@ impl Tape for HapticTape {
 pub struct HapticFlight {
     /// Before the first of `ticks`.
     pub memory: HapticMemory,
+    /// The ticks.
     pub ticks: Vec<HapticEntry>,
     /// Each with the index of the tick that took it up.
     pub orders: Vec<(u64, HapticOrder)>,

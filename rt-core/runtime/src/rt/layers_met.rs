@@ -1,6 +1,6 @@
 //! Which layers the tip has met on its way in: the tissue loop's half of `needle::path`.
 
-use crate::rt::exchange::TipPose;
+use crate::rt::pose::TipPose;
 use serde::{Deserialize, Serialize};
 use stylet_sim::needle::LayerKind;
 use stylet_sim::needle::path::MAX_SECTIONS;
@@ -23,6 +23,7 @@ impl LayersMet {
         self.announce(kind)
     }
 
+    /// The contact has ended.
     pub fn end(&mut self) {
         self.count = 0;
         self.before = None;

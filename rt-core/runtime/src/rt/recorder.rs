@@ -2,7 +2,7 @@
 //!
 //! A loop writes to a tape that it owns: no lock, no heap call, no system call. A tape holds the inputs and outputs of
 //! each tick, the orders taken, and now and then a checkpoint of all that one tick leaves to the next. When asked, the
-//! loop hands the whole tape to the bridge through a ring, goes on without, and records anew when it comes back.
+//! loop hands the whole tape to the bridge through a ring, continues without one, and records again when it returns.
 
 /// Ticks of the haptic loop that a recording reaches back, at least.
 pub const FLIGHT_TICKS: usize = 4000;
@@ -22,12 +22,17 @@ impl<T: Clone> Last<T> {
         }
     }
 
+    /// Keeps `value`; the oldest one is dropped when there is no room.
     pub fn push(&mut self, value: T) {
-        let slot = (self.next % self.slots.len() as u64) as usize;
-        self.slots[slot] = value;
+        let at = self.place(self.next);
+        // There is a slot at every place; a loop has no room for a panic all the same.
+        if let Some(slot) = self.slots.get_mut(at) {
+            *slot = value;
+        }
         self.next += 1;
     }
 
+    /// Forgets every value; the next number is 0.
     pub fn clear(&mut self) {
         self.next = 0;
     }
@@ -42,9 +47,14 @@ impl<T: Clone> Last<T> {
         self.next.saturating_sub(self.slots.len() as u64)
     }
 
+    /// The value of that number, while it is held.
     pub fn get(&self, number: u64) -> Option<&T> {
         let held = (self.first()..self.next).contains(&number);
-        held.then(|| &self.slots[(number % self.slots.len() as u64) as usize])
+        held.then(|| self.slots.get(self.place(number))).flatten()
+    }
+
+    fn place(&self, number: u64) -> usize {
+        (number % self.slots.len().max(1) as u64) as usize
     }
 
     /// Those held from `number` on, oldest first.
@@ -62,7 +72,7 @@ pub fn complete_from<T: Clone>(orders: &Last<(u64, T)>) -> u64 {
     orders.get(orders.first()).map_or(0, |(tick, _)| tick + 1)
 }
 
-/// A tape that goes to and fro between a loop and the bridge.
+/// A tape that a loop and the bridge pass to each other.
 pub trait Tape {
     /// Forgets what it holds. Allocates nothing.
     fn clear(&mut self);
@@ -78,36 +88,26 @@ pub struct Recorder<T> {
 }
 
 /// The bridge's end.
-pub struct TapeDesk<T> {
+pub struct TapePort<T> {
+    /// Tapes that the loop has handed over.
     pub taken: rtrb::Consumer<Box<T>>,
+    /// Tapes that go back to the loop.
     pub back: rtrb::Producer<Box<T>>,
 }
 
 /// Tapes that can be under way at once.
 const UNDER_WAY: usize = 8;
 
-/// Both ends of one loop's recorder, with its first tape.
-pub fn recorder<T>(tape: Box<T>) -> (Recorder<T>, TapeDesk<T>) {
+/// Both ends of one loop's recorder, with its first tape; without one the loop is not recorded.
+pub fn recorder<T>(tape: Option<Box<T>>) -> (Recorder<T>, TapePort<T>) {
     let (out, taken) = rtrb::RingBuffer::new(UNDER_WAY);
     let (give_back, back) = rtrb::RingBuffer::new(UNDER_WAY);
-    let recorder = Recorder {
-        tape: Some(tape),
-        out,
-        back,
-    };
-    (recorder, TapeDesk { taken, back: give_back })
+    (Recorder { tape, out, back }, TapePort { taken, back: give_back })
 }
 
 impl<T: Tape> Recorder<T> {
-    /// For a loop that is not recorded.
-    pub fn without_tape() -> Self {
-        let (out, _taken) = rtrb::RingBuffer::new(1);
-        let (_give_back, back) = rtrb::RingBuffer::new(1);
-        Self { tape: None, out, back }
-    }
-
-    /// The tape for the tick that begins now, only then: one that came back is blank and begins with a whole tick. One
-    /// of an earlier scene goes out again.
+    /// The tape for the tick that begins now. A returned tape is cleared and begins with a whole tick; one of an earlier
+    /// scene is sent to the bridge again.
     pub fn begin_tick(&mut self, scene_generation: u64) -> Option<&mut T> {
         if self.tape.is_none()
             && let Ok(mut tape) = self.back.pop()
@@ -190,20 +190,20 @@ mod tests {
 
     #[test]
     fn a_tape_comes_back_blank_and_one_of_an_earlier_scene_not_at_all() {
-        let (mut recorder, mut desk) = recorder(Box::new(Blank(1, true)));
+        let (mut recorder, mut port) = recorder(Some(Box::new(Blank(1, true))));
         recorder.hand_over();
         assert!(recorder.begin_tick(1).is_none());
-        let tape = desk.taken.pop().unwrap();
+        let tape = port.taken.pop().unwrap();
         assert!(tape.1, "what it holds travels with it");
-        desk.back.push(tape).ok().unwrap();
+        port.back.push(tape).ok().unwrap();
         assert!(!recorder.begin_tick(1).unwrap().1);
 
         recorder.hand_over();
         recorder.replace(Box::new(Blank(2, false)));
-        desk.back.push(desk.taken.pop().unwrap()).ok().unwrap();
+        port.back.push(port.taken.pop().unwrap()).ok().unwrap();
         assert_eq!(recorder.begin_tick(2).unwrap().0, 2);
         recorder.hand_over();
         assert!(recorder.begin_tick(2).is_none());
-        assert!(desk.taken.pop().is_ok() && desk.taken.pop().is_ok(), "both went out");
+        assert!(port.taken.pop().is_ok() && port.taken.pop().is_ok(), "both went out");
     }
 }

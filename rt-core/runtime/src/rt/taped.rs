@@ -6,10 +6,12 @@ pub mod pod {
     use serde::de::Error;
     use serde::{Deserialize, Deserializer, Serializer};
 
+    /// The bytes of `value`.
     pub fn serialize<T: Pod, S: Serializer>(value: &T, to: S) -> Result<S::Ok, S::Error> {
         to.serialize_bytes(bytemuck::bytes_of(value))
     }
 
+    /// Fails where the number of bytes is another.
     pub fn deserialize<'de, T: Pod, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
         let bytes = <&[u8]>::deserialize(from)?;
         bytemuck::try_pod_read_unaligned(bytes)
@@ -23,10 +25,12 @@ pub mod fault_code {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
     use stylet_shm_schema::Fault;
 
+    /// The number of `fault`.
     pub fn serialize<S: Serializer>(fault: &Fault, to: S) -> Result<S::Ok, S::Error> {
         (*fault as u32).serialize(to)
     }
 
+    /// Fails where the number is not known.
     pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Fault, D::Error> {
         let number = u32::deserialize(from)?;
         Fault::from_number(number).ok_or_else(|| D::Error::custom("a fault that is not known"))

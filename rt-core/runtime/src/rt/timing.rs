@@ -1,4 +1,4 @@
-//! What each tick of a loop cost, handed through a ring to whoever measures; a loop that nobody measures has no probe.
+//! What each tick of a loop cost, sent through a ring to a measurement; a loop that is not measured has no probe.
 
 use crate::rt::clock;
 use std::sync::Arc;
@@ -7,10 +7,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Stages of a tick at most.
 pub const MAX_STAGES: usize = 6;
 
-/// The places of one tick on the clock, `CLOCK_MONOTONIC`.
+/// When one tick did what, `CLOCK_MONOTONIC`, ns.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TickTimes {
+    /// When the tick was due.
     pub due_ns: u64,
+    /// When its thread woke.
     pub woke_ns: u64,
     marks: [u64; MAX_STAGES],
     marked: usize,
@@ -31,9 +33,10 @@ pub struct TickTimes {
 impl TickTimes {
     /// Ends of the stages.
     pub fn marks(&self) -> &[u64] {
-        &self.marks[..self.marked]
+        self.marks.get(..self.marked).unwrap_or_default()
     }
 
+    /// End of the last stage, or the wake-up where none has ended.
     pub fn done_ns(&self) -> u64 {
         self.marks().last().copied().unwrap_or(self.woke_ns)
     }
@@ -54,6 +57,7 @@ pub struct PoseTimes([(AtomicU64, AtomicU64); PoseTimes::KEPT]);
 impl PoseTimes {
     const KEPT: usize = 1024;
 
+    /// Nothing known yet.
     pub fn new() -> Self {
         Self(std::array::from_fn(|_| (AtomicU64::new(0), AtomicU64::new(0))))
     }
@@ -88,6 +92,7 @@ pub struct Probe {
 }
 
 impl Probe {
+    /// `ring` takes the ticks, `pose_times` the poses behind tissue ticks.
     pub fn new(ring: rtrb::Producer<TickTimes>, pose_times: Arc<PoseTimes>) -> Self {
         Self {
             ring,
@@ -105,7 +110,7 @@ impl Probe {
     pub fn output_since_mark(&mut self, from: usize) {
         let done_ns = self.tick.done_ns();
         self.tick.output_ns = Some(done_ns);
-        self.tick.path_ns = self.tick.marks().get(from).map(|begin| done_ns - begin);
+        self.tick.path_ns = self.tick.marks().get(from).map(|begin| done_ns.saturating_sub(*begin));
     }
 
     /// The output of tissue tick `tick` left at the last mark, and answers the tip read at `pose_ns`; 0 for no tip yet.
@@ -127,7 +132,7 @@ impl Probe {
         let full = self.ring.push(self.tick).is_err();
         let lost = self.tick.lost + u32::from(full);
         self.tick = TickTimes {
-            recording_ns: clock::now_ns() - done_ns,
+            recording_ns: clock::now_ns().saturating_sub(done_ns),
             lost,
             ..TickTimes::default()
         };
@@ -136,7 +141,9 @@ impl Probe {
 
 /// Both loops' probes.
 pub struct Probes {
+    /// For the force loop.
     pub haptic: Probe,
+    /// For the tissue loop.
     pub tissue: Probe,
 }
 

@@ -1,9 +1,11 @@
 //! What the tissue loop writes to its flight recording, each tick.
 
-use crate::rt::exchange::{TipPose, TissueResponse};
+use crate::rt::contact::Contact;
 use crate::rt::layers_met::LayersMet;
+use crate::rt::pose::TipPose;
 use crate::rt::recorder::{Last, Tape, complete_from};
-use crate::rt::tissue::{Contact, Seed};
+use crate::rt::response::TissueResponse;
+use crate::rt::seed::Seed;
 use crate::rt::world::World;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -12,7 +14,7 @@ use stylet_sim::limits::Limits;
 use stylet_sim::scene::SceneSource;
 use stylet_sim::tissue::Held;
 
-/// Ticks between two checkpoints: 5 s at 200 Hz. Two are kept, so that a tape reaches back at least so far.
+/// Ticks between two checkpoints: 5 s at 200 Hz. Two are kept, so that a tape reaches back at least 5 s.
 const CHECKPOINT_EVERY: u64 = 1000;
 const ORDERS: usize = 1024;
 /// Larger bodies are not recorded: a copy of one would take too much of a tick.
@@ -21,35 +23,53 @@ pub const MAX_BODY_BYTES: usize = 8 << 20;
 /// An order to the tissue loop, as far as it can be written down. A new scene begins a new tape instead.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum TapedOrder {
+    /// See [`TissueOrder::Limits`](crate::rt::exchange::TissueOrder).
     Limits(Limits),
+    /// See [`TissueOrder::DropSeed`](crate::rt::exchange::TissueOrder).
     DropSeed,
+    /// See [`TissueOrder::UndoSeed`](crate::rt::exchange::TissueOrder).
     UndoSeed,
+    /// See [`TissueOrder::Reset`](crate::rt::exchange::TissueOrder).
     Reset,
 }
 
 /// Everything that one tick of the tissue loop leaves to the next.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TissueMemory {
+    /// Seeds in the tissue.
     pub seeds: Vec<Seed>,
+    /// The present contact.
     pub contact: Option<Contact>,
+    /// Contacts so far.
     pub contacts: u64,
+    /// Layers on the path of the needle.
     pub layers: LayersMet,
+    /// The tip has been outside since the last contact.
     pub clear: bool,
+    /// The element that the tip holds.
     pub held: Option<Held>,
+    /// Pose that the last tick used.
     pub pose: TipPose,
+    /// Response of the last tick.
     pub response: TissueResponse,
+    /// Limits in use.
     pub limits: Limits,
     /// As the tissue model saves it.
     pub body: Vec<u8>,
 }
 
-/// What went into one tick and what came out.
+/// Input and output of one tick.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct TissueEntry {
+    /// When the tick began, `CLOCK_MONOTONIC`, ns.
     pub woke_ns: u64,
+    /// Pose that the tick used.
     pub pose: TipPose,
+    /// The element that the tick held.
     pub held: Option<Held>,
+    /// Largest violation of a limit after the step, in elements.
     pub residual: f64,
+    /// Response of the tick.
     pub response: TissueResponse,
 }
 
@@ -57,7 +77,9 @@ pub struct TissueEntry {
 pub struct TissueTape {
     scene_generation: u64,
     scene: Arc<SceneSource>,
+    /// The last ticks.
     pub ticks: Last<TissueEntry>,
+    /// Orders, each with the number of the tick that took it up.
     pub orders: Last<(u64, TapedOrder)>,
     /// Written in turn, each with the tick that it comes before.
     checkpoints: [(u64, TissueMemory); 2],
@@ -107,11 +129,17 @@ impl TissueTape {
         if self.not_kept || !tick.is_multiple_of(CHECKPOINT_EVERY) {
             return None;
         }
-        let slot = &mut self.checkpoints[(tick / CHECKPOINT_EVERY % 2) as usize];
+        let [even, odd] = &mut self.checkpoints;
+        let slot = if (tick / CHECKPOINT_EVERY).is_multiple_of(2) {
+            even
+        } else {
+            odd
+        };
         slot.0 = tick;
         Some(&mut slot.1)
     }
 
+    /// Keeps an order of the tick that runs.
     pub fn order(&mut self, order: TapedOrder) {
         self.orders.push((self.ticks.next(), order));
     }
@@ -161,6 +189,7 @@ impl Tape for TissueTape {
 /// A stretch of the tissue loop that can be repeated.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TissueFlight {
+    /// What the scene was built from.
     pub scene: SceneSource,
     /// Before the first of `ticks`.
     pub memory: TissueMemory,
@@ -168,6 +197,7 @@ pub struct TissueFlight {
     pub middle: Option<(u64, TissueMemory)>,
     /// After the last of `ticks`.
     pub end: TissueMemory,
+    /// The ticks.
     pub ticks: Vec<TissueEntry>,
     /// Each with the index of the tick that took it up.
     pub orders: Vec<(u64, TapedOrder)>,

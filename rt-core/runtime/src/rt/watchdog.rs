@@ -1,4 +1,4 @@
-//! Watches the device and both loops: says which tick must begin to ramp the force out, and why.
+//! Watches the device and both loops: decides which tick begins to ramp the force out, and why.
 //!
 //! [`RAMP_OUT_TICKS`](stylet_sim::force::gate::RAMP_OUT_TICKS) ticks after the one that raises a fault the force is zero, on a straight ramp. The first
 //! fault is kept until the operator re-arms. A haptic loop that stops altogether cannot watch itself: that is seen
@@ -6,24 +6,27 @@
 
 use crate::rt::taped::fault_code;
 use serde::{Deserialize, Serialize};
+use stylet_hw::DeviceFault;
 use stylet_shm_schema::Fault;
 use stylet_sim::force::ForceFault;
 
 /// Tissue older than this turns the force off.
 pub const STALE_TISSUE_NS: u64 = 100_000_000;
-/// So many ticks in a row with a missed deadline turn the force off.
+/// This number of ticks in a row with a missed deadline turn the force off.
 pub const OVERRUN_STREAK: u32 = 20;
-/// So many repeated samples in a row turn the force off.
+/// This number of repeated samples in a row turn the force off.
 pub const SILENT_SAMPLES: u32 = 20;
 
-/// What a tick knows of the other thread and of its own punctuality.
+/// What a tick knows about the other thread and about its own deadlines.
 #[derive(Clone, Copy, Debug)]
 pub struct Watched {
+    /// When the tick began, `CLOCK_MONOTONIC`, ns.
     pub woke_ns: u64,
     /// Deadlines skipped just before this tick.
     pub missed: u32,
     /// When the newest tissue response was made.
     pub tissue_ns: u64,
+    /// The newest tissue response did not converge.
     pub tissue_unsolved: bool,
     /// The force is on: only then do late tissue and late ticks matter.
     pub engaged: bool,
@@ -99,7 +102,21 @@ impl Watchdog {
     }
 }
 
-/// The gate's word for a fault.
+/// The fault of a run that a fault of the device is.
+pub fn device_fault(fault: DeviceFault) -> Fault {
+    match fault {
+        DeviceFault::NotConnected => Fault::DeviceLost,
+        DeviceFault::NotCalibrated => Fault::DeviceNotCalibrated,
+        DeviceFault::Overheated => Fault::DeviceWarm,
+        DeviceFault::SafetyStop => Fault::DeviceStopped,
+        DeviceFault::NonFiniteSample => Fault::NonFiniteInput,
+        DeviceFault::TimedOut | DeviceFault::NonFiniteWrench | DeviceFault::InvalidPeriod | DeviceFault::Driver => {
+            Fault::DeviceError
+        }
+    }
+}
+
+/// The gate's name for a fault.
 pub fn at_gate(fault: Fault) -> ForceFault {
     match fault {
         Fault::None => ForceFault::Stopped,

@@ -2,31 +2,36 @@
 
 use stylet_sim::limits::Limits;
 use stylet_sim::needle::LayerKind;
-use stylet_sim::scene::Scene;
-use stylet_sim::scene::TissueKind;
+use stylet_sim::scene::{Scene, TissueKind};
 use stylet_sim::tissue::{ChainMailTissue, FemTissue, TissueModel};
+
+/// Why a tissue model cannot be set up: every problem, one a line.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}", .0.join("\n"))]
+pub struct WorldError(pub Vec<String>);
 
 /// Body, tissue and surface of one scene.
 pub struct World {
     /// Rises with each scene of a run.
     pub generation: u64,
+    /// Lattice, surface and structures.
     pub scene: Scene,
     /// What each structure of the scene is to the needle.
     pub layers: Vec<LayerKind>,
+    /// The body as it deforms.
     pub tissue: Box<dyn TissueModel>,
-    /// As the tissue was last given them.
+    /// Limits that the tissue keeps now.
     pub limits: Limits,
 }
 
 impl World {
-    /// Errors are for people.
-    pub fn new(scene: Scene, limits: Limits, generation: u64) -> Result<Self, String> {
+    /// Sets up the tissue model that `scene` asks for, at rest.
+    pub fn new(scene: Scene, limits: Limits, generation: u64) -> Result<Self, WorldError> {
         let tissue: Box<dyn TissueModel> = match scene.tissue {
             TissueKind::ChainMail => Box::new(ChainMailTissue::new(&scene, limits.clone())),
             TissueKind::Fem => {
-                let words = |problems: Vec<_>| problems.iter().map(ToString::to_string).collect::<Vec<_>>();
-                let fem = FemTissue::<f32>::new(&scene).map_err(|p| words(p).join("\n"))?;
-                Box::new(fem)
+                let texts = |problems: Vec<_>| problems.iter().map(ToString::to_string).collect();
+                Box::new(FemTissue::<f32>::new(&scene).map_err(|p| WorldError(texts(p)))?)
             }
         };
         Ok(Self {
@@ -38,6 +43,7 @@ impl World {
         })
     }
 
+    /// Limits from the next step on.
     pub fn set_limits(&mut self, limits: Limits) {
         self.limits.clone_from(&limits);
         self.tissue.set_limits(limits);

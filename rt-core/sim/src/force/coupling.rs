@@ -58,6 +58,7 @@ pub struct CouplingState {
 }
 
 impl CouplingState {
+    /// Forgets the answers: the tip holds no tissue.
     pub fn release(&mut self) {
         *self = Self::default();
     }

@@ -13,7 +13,9 @@ const RESTORE_M: f64 = 0.02;
 /// What friction can hold, on either side, and how.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionLimits {
+    /// Spring between shaft and anchor, N/m.
     pub stiffness_n_per_m: f64,
+    /// Damper beside it, N s/m.
     pub damping_n_s_per_m: f64,
     /// Against motion towards larger positions.
     pub forward_n: f64,
@@ -24,6 +26,7 @@ pub struct FrictionLimits {
 /// Where the shaft is held. `None`: not in touch.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FrictionState {
+    /// Place of the anchor along the axis, m.
     pub anchor_m: Option<f64>,
     /// Part of the stiffness that the loop has been able to hold, in 0..=1.
     pub softness: f64,

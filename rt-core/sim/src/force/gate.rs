@@ -6,128 +6,18 @@
 //! last, whatever the settings are. A fault ramps to zero from the last force and latches until
 //! [`GateState::engage`].
 
-use core::fmt;
-
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use stylet_hw::{DeviceInfo, Wrench};
 
-use super::passivity::{self, Motion, PassivityParameters, PassivityState};
+use super::passivity::{self, Motion, PassivityState};
 use super::thermal::Warmth;
-use crate::settings::{Problem, Problems};
 
-/// Ticks of the ramp to zero.
-pub const RAMP_OUT_TICKS: u32 = 20;
+mod fault;
+mod parameters;
 
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct GateParameters {
-    /// Force of the device for each newton of the model: real needles reach 9 to 16 N. Shown to the operator.
-    pub force_scale: f64,
-    pub max_force_n: f64,
-    pub slew_n_per_s: f64,
-    pub torque_slew_nm_per_s: f64,
-    /// Engaging waits until the model asks for no more than this, so that nothing kicks.
-    pub engage_below_n: f64,
-    pub ramp_in_ticks: u32,
-    /// The ramp out keeps to its ticks even where that is steeper than the slew limit.
-    pub ramp_out_ticks: u32,
-    /// Time constant of the motors' warming, for the limit on continuous force.
-    pub thermal_time_s: f64,
-    pub passivity: PassivityParameters,
-}
-
-impl Default for GateParameters {
-    fn default() -> Self {
-        Self {
-            force_scale: 0.9,
-            max_force_n: 8.5,
-            slew_n_per_s: 500.0,
-            torque_slew_nm_per_s: 10.0,
-            engage_below_n: 1.0,
-            ramp_in_ticks: 200,
-            ramp_out_ticks: RAMP_OUT_TICKS,
-            thermal_time_s: 600.0,
-            passivity: PassivityParameters::default(),
-        }
-    }
-}
-
-impl GateParameters {
-    pub fn validate(&self) -> Result<(), Vec<Problem>> {
-        let mut problems = Problems::default();
-        problems.range("gate.force_scale", self.force_scale, 0.0, 2.0);
-        problems.range("gate.max_force_n", self.max_force_n, 0.0, 40.0);
-        problems.range("gate.slew_n_per_s", self.slew_n_per_s, 1.0, 1e5);
-        problems.range("gate.torque_slew_nm_per_s", self.torque_slew_nm_per_s, 1e-3, 1e3);
-        problems.range("gate.engage_below_n", self.engage_below_n, 0.0, 10.0);
-        problems.range("gate.ramp_in_ticks", f64::from(self.ramp_in_ticks), 1.0, 1e4);
-        problems.range("gate.ramp_out_ticks", f64::from(self.ramp_out_ticks), 1.0, 100.0);
-        problems.range("gate.thermal_time_s", self.thermal_time_s, 1.0, 1e5);
-        problems.extend(self.passivity.validate());
-        problems.finish()
-    }
-}
-
-/// Why the force goes to zero. The numbers are stable: they appear in records.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[repr(u32)]
-pub enum ForceFault {
-    NonFiniteForce = 1,
-    DeviceFault = 2,
-    StaleDevice = 3,
-    StaleTissue = 4,
-    Overrun = 5,
-    Stopped = 6,
-}
-
-impl ForceFault {
-    pub const fn code(self) -> u32 {
-        self as u32
-    }
-}
-
-impl fmt::Display for ForceFault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::NonFiniteForce => "the force law gave a force that is not a number",
-            Self::DeviceFault => "the device reported a fault",
-            Self::StaleDevice => "the device repeats an old sample",
-            Self::StaleTissue => "the tissue has not answered in time",
-            Self::Overrun => "the force loop missed its deadlines",
-            Self::Stopped => "the operator stopped the force",
-        })
-    }
-}
-
-/// How often each limit had a say, in the order of the gate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct GateCounts {
-    pub non_finite: u64,
-    pub passivity: u64,
-    pub slew_limited: u64,
-    pub magnitude_limited: u64,
-    pub thermal_limited: u64,
-    pub device_limited: u64,
-    pub torque_limited: u64,
-    pub faults: u64,
-}
-
-impl GateCounts {
-    /// In the order of the fields.
-    pub fn all(&self) -> [u64; 8] {
-        let c = self;
-        [
-            c.non_finite,
-            c.passivity,
-            c.slew_limited,
-            c.magnitude_limited,
-            c.thermal_limited,
-            c.device_limited,
-            c.torque_limited,
-            c.faults,
-        ]
-    }
-}
+pub use fault::{ForceFault, GateCounts};
+pub use parameters::{GateParameters, RAMP_OUT_TICKS};
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 enum Mode {
@@ -157,17 +47,22 @@ pub struct GateState {
 /// What the model asks for, and the motion that it was asked over.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GateInput {
+    /// Wrench of the force law, before the force scale.
     pub wanted: Wrench,
     /// Energy in the springs of the model.
     pub stored_j: f64,
+    /// Motion in the last tick.
     pub motion: Motion,
 }
 
 /// What goes to the device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GateOutput {
+    /// Within every limit.
     pub wrench: Wrench,
+    /// Whether the force law has a say.
     pub engaged: bool,
+    /// Why the force goes to zero.
     pub fault: Option<ForceFault>,
 }
 
@@ -228,6 +123,7 @@ impl GateState {
         matches!(self.mode, Mode::Waiting)
     }
 
+    /// Why the force went to zero, until it is engaged again.
     pub fn fault(&self) -> Option<ForceFault> {
         self.fault
     }
@@ -237,10 +133,12 @@ impl GateState {
         &self.output
     }
 
+    /// How often each limit acted.
     pub fn counts(&self) -> &GateCounts {
         &self.counts
     }
 
+    /// The energy account.
     pub fn passivity(&self) -> &PassivityState {
         &self.passivity
     }

@@ -10,6 +10,7 @@ use crate::needle::{Layer, Phase};
 /// The tip against the layers of one path, in world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ForceInput {
+    /// Place of the tip, m.
     pub tip_in_world: Vector3<f64>,
     /// Filtered.
     pub velocity_m_per_s: Vector3<f64>,
@@ -29,6 +30,7 @@ pub struct ForceInput {
     pub tissue: Layer,
     /// Size of `K_f u`, summed over the layers that the shaft is in.
     pub shaft_friction_n: f64,
+    /// Phase of eq. 6.
     pub phase: Phase,
     /// The membrane in front is open.
     pub punctured: bool,
@@ -53,6 +55,7 @@ pub struct ForceTerms {
     pub gravity_n: Vector3<f64>,
     /// Coupled mode: the tissue's answer, in place of its share of membrane and friction.
     pub tissue_n: Vector3<f64>,
+    /// Sum of all terms (eq. 8).
     pub total_n: Vector3<f64>,
     /// Keeps the needle's axis along the path.
     pub torque_nm: Vector3<f64>,
@@ -61,6 +64,7 @@ pub struct ForceTerms {
 }
 
 impl ForceTerms {
+    /// No force at all.
     pub fn zero() -> Self {
         let zero = Vector3::zeros();
         Self {
@@ -80,6 +84,7 @@ impl ForceTerms {
 /// What the law remembers: where the tissue holds the shaft.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ForceState {
+    /// Anchor of the stuck shaft.
     pub friction: FrictionState,
 }
 

@@ -4,6 +4,12 @@
 //! [`gate`] (with [`passivity`] and [`thermal`]) → device. Every force here acts on the operator's hand. Nothing called
 //! in a tick allocates or panics.
 
+// What the lists of clippy.toml name has no place in a tick; tests may.
+#![cfg_attr(
+    not(test),
+    deny(clippy::disallowed_macros, clippy::disallowed_methods, clippy::disallowed_types)
+)]
+
 pub mod chain;
 pub mod chatter;
 pub mod coupling;

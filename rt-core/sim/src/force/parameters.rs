@@ -6,7 +6,6 @@ use stylet_hw::DeviceInfo;
 
 use super::gate::GateParameters;
 use crate::needle::Layers;
-use crate::needle::layers::STIFFNESS_KEYS;
 use crate::settings::{Problem, Problems};
 
 /// Beyond it a stuck shaft sings at 1 kHz in the lightest hand, without any delay (`tests/force_envelope.rs`).
@@ -19,7 +18,9 @@ pub struct ForceParameters {
     pub layers: Layers,
     /// Scales `F_R` of every layer; 0 turns the term off. The next two as well.
     pub membrane_gain: f64,
+    /// Scales the cutting force of every layer.
     pub cutting_gain: f64,
+    /// Scales `K_f u` (eq. 9) of every layer.
     pub shaft_gain: f64,
     /// Share of membrane, cutting and friction that the tissue's own answer takes the place of: 0 for eq. 8-10
     /// alone, 1 for coupled mode.
@@ -40,7 +41,9 @@ pub struct ForceParameters {
     pub stick_damping_n_s_per_m: f64,
     /// Mass whose weight `F_G` (eq. 8) takes off the operator's hand.
     pub compensated_mass_kg: f64,
+    /// Acceleration of gravity in world, m/s^2.
     pub gravity_in_world_m_per_s2: Vector3<f64>,
+    /// Settings of the gate.
     pub gate: GateParameters,
 }
 
@@ -67,7 +70,8 @@ impl Default for ForceParameters {
 }
 
 impl ForceParameters {
-    /// Every setting that cannot be used on any device, or `Ok`.
+    /// Every setting that cannot be used on any device, or `Ok`. What a device cannot hold is refused before:
+    /// [`stylet_shm_schema::ParameterSet::problems_on`].
     pub fn validate(&self) -> Result<(), Vec<Problem>> {
         let mut problems = Problems::default();
         problems.extend(self.layers.validate());
@@ -101,43 +105,6 @@ impl ForceParameters {
             problems.range(key, value, -20.0, 20.0);
         }
         problems.extend(self.gate.validate());
-        problems.finish()
-    }
-
-    /// As [`validate`](Self::validate), and that `device` can render it: no spring stiffer than it can hold. The
-    /// spring of stuck friction is not among them: its force is bounded, so what it can be is found by trial
-    /// (`docs/stability.md`), and the passivity controller softens it.
-    pub fn validate_for(&self, device: &DeviceInfo) -> Result<(), Vec<Problem>> {
-        let mut problems = Problems::default();
-        problems.extend(self.validate());
-        let scale = self.gate.force_scale;
-        let limit = device.max_stiffness_n_per_m;
-        let membranes = self.layers.0.iter().zip(STIFFNESS_KEYS).map(|(layer, key)| {
-            let stiffness = layer.membrane_stiffness_n_per_m() * self.membrane_gain;
-            (key, stiffness)
-        });
-        let guide = self.guide_stiffness_n_per_m * self.guide_gain;
-        let others = [
-            ("force.guide_stiffness_n_per_m * force.guide_gain", guide),
-            (
-                "force.tissue_stiffness_n_per_m * force.coupling",
-                self.tissue_stiffness_n_per_m * self.coupling,
-            ),
-        ];
-        for (key, stiffness) in membranes.chain(others) {
-            // Not a number fails as well.
-            if (stiffness * scale).is_nan() || stiffness * scale > limit {
-                problems.add(
-                    key,
-                    stiffness,
-                    format!(
-                        "at most {} N/m at force scale {scale} on {}",
-                        limit / scale,
-                        device.name
-                    ),
-                );
-            }
-        }
         problems.finish()
     }
 

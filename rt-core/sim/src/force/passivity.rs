@@ -15,6 +15,7 @@ use crate::settings::{Problem, Problems};
 /// Latenesses that are booked: 0 to 3 ticks.
 pub const DELAYS: usize = 4;
 
+/// Settings of the energy account.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PassivityParameters {
     /// Energy that may be held in credit beyond what the springs hold.
@@ -39,6 +40,7 @@ impl PassivityParameters {
         max_damping_n_s_per_m: 0.0,
     };
 
+    /// Every setting that cannot be used, or `Ok`.
     pub fn validate(&self) -> Result<(), Vec<Problem>> {
         let mut problems = Problems::default();
         problems.range("passivity.margin_j", self.margin_j, 0.0, 10.0);
@@ -47,6 +49,7 @@ impl PassivityParameters {
     }
 }
 
+/// The energy accounts of one device.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PassivityState {
     /// Taken from the hand minus given to it, by lateness. Below zero the simulator is a source of energy.
@@ -63,6 +66,7 @@ impl PassivityState {
         self.accounts_j.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
+    /// Whether the worst account was below zero in the last tick, with the controller on.
     pub fn in_debt(&self) -> bool {
         self.in_debt
     }
@@ -85,6 +89,7 @@ pub struct Motion {
     pub velocity_m_per_s: Vector3<f64>,
     /// Of the encoders.
     pub position_step_m: f64,
+    /// Time since the last tick, s.
     pub dt_s: f64,
 }
 

@@ -9,6 +9,7 @@ pub struct Warmth {
 }
 
 impl Warmth {
+    /// Takes a force that was given for `dt_s`.
     pub fn add(&mut self, force_n: f64, dt_s: f64, thermal_time_s: f64) {
         let share = (dt_s / thermal_time_s).clamp(0.0, 1.0);
         if share.is_finite() && force_n.is_finite() {

@@ -39,6 +39,7 @@ impl VelocityEstimator {
         }
     }
 
+    /// The last estimate, m/s.
     pub fn velocity_m_per_s(&self) -> &Vector3<f64> {
         &self.velocity_m_per_s
     }
@@ -53,6 +54,7 @@ impl VelocityEstimator {
         self.window_s.map(|window_s| self.step_m / window_s)
     }
 
+    /// Forgets every sample.
     pub fn reset(&mut self) {
         self.filled = 0;
         self.velocity_m_per_s = Vector3::zeros();
@@ -137,7 +139,7 @@ mod tests {
     fn the_estimate_is_the_velocity_of_its_stated_delay_within_its_stated_noise() {
         let mut estimator = VelocityEstimator::new(STEP_M);
         // Most of 0.15 m/s, 0.94 m/s2 and 5.9 m/s3.
-        let omega = 6.28;
+        let omega = std::f64::consts::TAU;
         let (mut longest, mut loudest, mut worst) = (0.0f64, 0.0f64, 0.0f64);
         for i in 0..5000 {
             let t = f64::from(i) * 1e-3;

@@ -35,6 +35,7 @@ impl LayerKind {
     }
 }
 
+/// Kinds of tissue.
 pub const LAYER_COUNT: usize = 4;
 
 /// One kind of tissue, as the needle feels it.
@@ -79,6 +80,7 @@ impl Layer {
         },
     ];
 
+    /// Whether there is a membrane to puncture.
     pub fn has_membrane(&self) -> bool {
         self.puncture_depth_m > 0.0
     }
@@ -131,15 +133,8 @@ const KEYS: [[&str; 4]; LAYER_COUNT] = [
     ],
 ];
 
-/// Names of the membranes' stiffnesses, for a device that cannot hold them.
-pub const STIFFNESS_KEYS: [&str; LAYER_COUNT] = [
-    "gland.puncture_force_n / puncture_depth_m",
-    "perineum.puncture_force_n / puncture_depth_m",
-    "surroundings.puncture_force_n / puncture_depth_m",
-    "wall.puncture_force_n / puncture_depth_m",
-];
-
 impl Layers {
+    /// The layer of one kind.
     pub fn of(&self, kind: LayerKind) -> Layer {
         self.0.get(kind as usize).copied().unwrap_or(Layer::DEFAULTS[0])
     }

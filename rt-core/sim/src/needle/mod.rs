@@ -1,5 +1,11 @@
 //! The needle and what it does to the tissue it holds.
 
+// What the lists of clippy.toml name has no place in a tick; tests may.
+#![cfg_attr(
+    not(test),
+    deny(clippy::disallowed_macros, clippy::disallowed_methods, clippy::disallowed_types)
+)]
+
 pub mod layers;
 pub mod path;
 pub mod phase;

@@ -9,6 +9,7 @@ pub const MAX_SECTIONS: usize = 8;
 /// A stretch of the path in one layer.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Section {
+    /// What the layer is.
     pub kind: LayerKind,
     /// Number under which the tissue loop announced it.
     pub number: u64,
@@ -36,6 +37,7 @@ pub struct Front {
     pub membrane: Layer,
     /// The layer that the tip cuts.
     pub tissue: Layer,
+    /// The innermost membrane is open, or there is none.
     pub open: bool,
 }
 
@@ -45,6 +47,7 @@ impl NeedlePath {
         self.count = 0;
     }
 
+    /// Sections met and not left, outermost first.
     pub fn sections(&self) -> &[Section] {
         self.sections.get(..self.count).unwrap_or(&[])
     }

@@ -79,10 +79,12 @@ pub enum Phase {
 }
 
 impl Phase {
+    /// Its number in records.
     pub const fn code(self) -> u32 {
         self as u32
     }
 
+    /// The phase of a number in records.
     pub const fn from_code(code: u32) -> Option<Self> {
         match code {
             0 => Some(Self::Outside),
@@ -111,6 +113,7 @@ pub struct NeedleInput {
 /// What follows from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NeedleOutput {
+    /// What the needle does to the tissue.
     pub phase: Phase,
     /// The membrane gave way in this tick.
     pub puncture: bool,
@@ -123,8 +126,11 @@ pub struct NeedleOutput {
 /// What one membrane remembers.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct NeedleState {
+    /// Phase of the last tick.
     pub phase: Phase,
+    /// The membrane is open.
     pub punctured: bool,
+    /// How many membranes gave way.
     pub punctures: u32,
 }
 

@@ -6,6 +6,7 @@ use stylet_shm_schema::{GridInfo, MAX_LABEL_CELLS, MAX_NODES};
 /// Nodes at which displacements are told, each with the element that speaks for it.
 #[derive(Clone, Debug)]
 pub struct NodeGrid {
+    /// Place and size of the grid.
     pub info: GridInfo,
     /// One for each node, x fastest: the element there, or one near where there is no tissue, so that a host can
     /// interpolate up to the surface.
@@ -56,6 +57,7 @@ impl Steps {
 }
 
 impl NodeGrid {
+    /// The grid over a body at rest.
     pub fn of(lattice: &Lattice) -> Self {
         let steps = Steps::over(lattice, MAX_NODES);
         let mut elements: Vec<Option<u32>> = steps

@@ -83,6 +83,7 @@ impl Lattice {
         }
     }
 
+    /// Number of elements.
     pub fn element_count(&self) -> usize {
         self.cells.len()
     }
@@ -99,6 +100,7 @@ impl Lattice {
         self.cell(element).map(|c| (c as f64 + 0.5) * self.spacing_m)
     }
 
+    /// The element in a cell; `None` where there is no tissue.
     pub fn element_of_cell(&self, i: usize, j: usize, k: usize) -> Option<u32> {
         if j >= self.dims[1] || k >= self.dims[2] {
             return None;
@@ -148,6 +150,7 @@ impl Lattice {
         }
     }
 
+    /// Volume of all elements at rest, m^3.
     pub fn volume_m3(&self) -> f64 {
         self.element_count() as f64 * self.spacing_m.powi(3)
     }
@@ -193,8 +196,11 @@ impl Lattice {
 /// How large a structure is: its elements, and the box around them at rest (faces, not centres).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
+    /// Number of elements.
     pub elements: u32,
+    /// Lowest corner, m.
     pub lower_m: [f64; 3],
+    /// Highest corner, m.
     pub upper_m: [f64; 3],
 }
 

@@ -1,6 +1,7 @@
 //! What a structure may be made of: stiffness that exists, and limits under which no cell folds over.
 
-use super::{SceneProblem, Structure};
+use super::problem::SceneProblem;
+use super::structure::Structure;
 use crate::limits::{AxisLimits, folding};
 
 /// Largest Poisson's ratio that the solvers take: 0.5 would need a pressure of its own.
@@ -47,10 +48,10 @@ pub(super) fn folding_between(structures: &[Structure]) -> Option<SceneProblem> 
         .filter_map(|s| s.material.limits.as_ref());
     let angles: Vec<[f64; 3]> = own.map(|l| l.each_ref().map(|axis| axis.shear_deg)).collect();
     let widest = [0, 1, 2].map(|a| angles.iter().map(|angle| angle[a]).fold(0.0, f64::max));
-    let each_is_told = angles
+    let is_reported_already = angles
         .iter()
         .any(|&angle| folding(angle).is_nan() || folding(angle) > 1.0);
-    (!each_is_told && folding(widest) > 1.0).then(|| SceneProblem::Material {
+    (!is_reported_already && folding(widest) > 1.0).then(|| SceneProblem::Material {
         structure: "all structures together".to_owned(),
         what: "tx ty + ty tz + tz tx + 2 tx ty tz of the widest shear_deg along each axis".to_owned(),
         value: folding(widest),

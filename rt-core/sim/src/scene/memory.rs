@@ -1,6 +1,6 @@
 //! Whether a scene fits into the memory that there is.
 
-use super::SceneProblem;
+use super::problem::SceneProblem;
 
 /// What `rt-core` takes for each element of a large scene: lattice, tissue, surface and the slices of shared memory.
 /// Measured as resident memory of `rt-core --scene full` above that of `--scene paper`, rounded up.

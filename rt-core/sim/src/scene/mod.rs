@@ -17,6 +17,7 @@ mod surface;
 #[cfg(test)]
 pub(crate) mod test_bodies;
 mod tissue_kind;
+mod validate;
 
 pub use grids::{NodeGrid, label_grid};
 pub(crate) use lattice::Run;
@@ -38,8 +39,11 @@ pub const SPACING_RANGE_M: [f64; 2] = [1e-4, 1e-2];
 /// A label volume of cubic cells, x fastest; any label but zero is tissue, of the structure with that label.
 #[derive(Clone, Debug)]
 pub struct Labels {
+    /// Cells along x, y, z.
     pub dims: [usize; 3],
+    /// Edge of a cell, m.
     pub spacing_m: f64,
+    /// One label for each cell.
     pub cells: Vec<u8>,
     /// Empty: all tissue is one structure.
     pub structures: Vec<Structure>,
@@ -48,11 +52,13 @@ pub struct Labels {
 /// A body at rest.
 #[derive(Clone, Debug)]
 pub struct Scene {
+    /// Name, as the session announces it.
     pub name: String,
     /// At least one; elements know theirs by its place here (`Lattice::structure`).
     pub structures: Vec<Structure>,
     /// Shared with the tissue model, which would otherwise hold a copy.
     pub lattice: Arc<Lattice>,
+    /// Triangles over the body and its parts.
     pub surface: Surface,
     /// Where its displacements are told to the hosts.
     pub nodes: NodeGrid,
@@ -71,7 +77,7 @@ impl Scene {
 
     /// Cuts the lattice from labels, or lists every problem with them. Disconnected parts are allowed.
     pub fn from_labels(name: &str, labels: &Labels) -> Result<Scene, Vec<SceneProblem>> {
-        let problems = problem::problems_of(labels);
+        let problems = validate::problems_of(labels);
         if !problems.is_empty() {
             return Err(problems);
         }

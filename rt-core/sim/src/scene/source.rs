@@ -1,23 +1,30 @@
 //! Where a scene came from, small enough to be kept beside a recording.
 
-use super::{Labels, Scene, Structure};
+use super::{Labels, Scene, SceneError, Structure};
 use serde::{Deserialize, Serialize};
 
 /// What a scene can be built from again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum SceneSource {
+    /// A built-in scene, by name.
     Builtin(String),
+    /// A label volume.
     Labels {
+        /// Name of the scene.
         name: String,
+        /// Cells along x, y, z.
         dims: [usize; 3],
+        /// Edge of a cell, m.
         spacing_m: f64,
         /// Label and number of cells, x fastest.
         runs: Vec<(u8, u32)>,
+        /// As in [`Labels`].
         structures: Vec<Structure>,
     },
 }
 
 impl SceneSource {
+    /// The labels in runs.
     pub fn of_labels(name: &str, labels: &Labels) -> Self {
         let mut runs: Vec<(u8, u32)> = Vec::new();
         for &cell in &labels.cells {
@@ -35,10 +42,14 @@ impl SceneSource {
         }
     }
 
-    /// The same scene again; lists every problem.
-    pub fn build(&self) -> Result<Scene, String> {
+    /// The same scene again.
+    ///
+    /// # Errors
+    ///
+    /// Every problem with it.
+    pub fn build(&self) -> Result<Scene, SceneError> {
         match self {
-            Self::Builtin(name) => Scene::builtin(name).map_err(|e| e.to_string()),
+            Self::Builtin(name) => Scene::builtin(name),
             Self::Labels {
                 name,
                 dims,
@@ -50,7 +61,7 @@ impl SceneSource {
                 let wanted = dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(d as u64));
                 // Checked before anything of that size is allocated.
                 if wanted != Some(cells) || dims.iter().any(|&d| d > super::MAX_CELLS_PER_AXIS) {
-                    return Err(format!("the scene says {dims:?} cells but holds {cells}"));
+                    return Err(SceneError::RunCount { dims: *dims, cells });
                 }
                 let labels = Labels {
                     dims: *dims,
@@ -61,8 +72,7 @@ impl SceneSource {
                         .collect(),
                     structures: structures.clone(),
                 };
-                Scene::from_labels(name, &labels)
-                    .map_err(|problems| problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))
+                Scene::from_labels(name, &labels).map_err(SceneError::Invalid)
             }
         }
     }
@@ -104,6 +114,6 @@ mod tests {
             runs,
             structures,
         };
-        assert!(short.build().is_err_and(|why| why.contains("120")));
+        assert!(short.build().is_err_and(|why| why.to_string().contains("120")));
     }
 }

@@ -7,9 +7,13 @@ pub use stylet_anatomy::Role;
 /// One anatomical structure; its cells carry its label.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Structure {
+    /// Name, as people read it.
     pub name: String,
+    /// Label of its cells, 1 to 255.
     pub label: u8,
+    /// What it is in the procedure.
     pub role: Role,
+    /// What it is made of.
     pub material: Material,
 }
 

@@ -29,6 +29,7 @@ pub struct Surface {
 pub struct SurfacePart {
     /// Number of the structure in the scene's list; the first one where several are one part.
     pub structure: u8,
+    /// Its triangles, as indices into [`Surface::triangles`].
     pub triangles: Range<usize>,
 }
 
@@ -58,6 +59,7 @@ const FACES: [[usize; 4]; 6] = [
 const NONE: u32 = u32::MAX;
 
 impl Surface {
+    /// Surfaces of a body and of the structures in it that are shown by themselves.
     pub fn of(lattice: &Lattice, structures: &[Structure]) -> Self {
         let mut meshes = vec![(0, Mesh::of(lattice, |_| true))];
         for (first, members) in parts_of(structures) {

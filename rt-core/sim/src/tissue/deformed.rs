@@ -5,9 +5,11 @@ use crate::scene::{Lattice, Surface};
 /// A lattice and the displacement of each of its elements.
 #[derive(Clone, Copy)]
 pub struct Deformed<'a> {
+    /// Elements and their neighbours.
     pub lattice: &'a Lattice,
     /// Along x, y, z; `scale` times these is in elements.
     pub u: [&'a [f32]; 3],
+    /// Elements for each unit of `u`.
     pub scale: f32,
     /// No corner of an element is farther from the element's box at rest, in elements.
     pub reach: f32,

@@ -5,10 +5,15 @@ use crate::limits::Limits;
 
 use serde::{Deserialize, Serialize};
 
+/// Farthest from rest that a held element is followed, in elements; f32 resolves the tolerance up to here.
+pub const REACH: f64 = 2048.0;
+
 /// An element kept at a position of the scene frame during a step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Held {
+    /// Number of the element.
     pub element: u32,
+    /// Where its centre is kept, in the scene frame, m.
     pub position_m: [f64; 3],
     /// Edge of the cube around the element at rest whose elements go along with it; 0 for the element alone.
     pub patch_m: f64,
@@ -32,7 +37,9 @@ pub enum HeldOutcome {
 pub enum Solve {
     /// Nothing had to move.
     Nothing,
+    /// Outward sweeps over what moves.
     Sweeps,
+    /// Orthogonal projections over all links.
     Projections,
     /// Pulled toward the body at rest moved as a whole.
     Reanchored,
@@ -40,6 +47,7 @@ pub enum Solve {
     Cycles,
 }
 
+/// What came of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepReport {
     /// Passes over the links (sweeps, projections, re-anchoring), or cycles of multigrid.
@@ -53,7 +61,9 @@ pub struct StepReport {
     pub converged: bool,
     /// No element is farther from rest, in elements.
     pub max_displacement: f32,
+    /// What became of the held element.
     pub held: HeldOutcome,
+    /// How far the solver had to go.
     pub solve: Solve,
     /// Force of the tissue on the tip, where the model knows forces.
     pub tip_force_n: Option<[f64; 3]>,

@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 /// `local` runs from -0.5 to 0.5 across an element, along the deformed links.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MaterialPoint {
+    /// Number of the element.
     pub element: u32,
+    /// Place in it, in elements.
     pub local: [f32; 3],
 }
 

@@ -14,14 +14,14 @@ struct Known<F> {
 }
 
 impl<F: Fn(f64) -> f64> Rehearser for Known<F> {
-    fn rehearse(&mut self, drops: &Drops, _: &Pace) -> Result<Rest, String> {
+    fn rehearse(&mut self, drops: &Drops, _: &Pace) -> Result<Rest, RehearsalError> {
         self.asked += 1;
         if drops
             .along_m
             .iter()
             .any(|&z| z > self.tissue_to_m || z < self.tissue_from_m)
         {
-            return Err("the tip is outside the tissue".to_owned());
+            return Err(RehearsalError::Refused("the tip is outside the tissue".to_owned()));
         }
         let rest = |&z: &f64| {
             let p = drops.at_m(z - (self.ahead_m)(z));

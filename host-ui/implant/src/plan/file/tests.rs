@@ -76,7 +76,7 @@ fn a_broken_plan_is_refused_with_all_that_is_wrong() {
     let mut wrong = good.replace("\"E7\"", "\"Z7\"").replace("0.45", "nan");
     wrong = wrong.replace("prescription_gy = 145.0", "prescription_gy = 0.0");
     wrong = wrong.replacen("direction = [0.0, -1.0, 0.0]", "direction = [0.0, -2.0, 0.0]", 1);
-    let why = from_text(&wrong, &frames()).unwrap_err();
+    let why = from_text(&wrong, &frames()).unwrap_err().to_string();
     for words in ["prescription_gy is 0", "needle 1: direction", "Z7", "strength_u is NaN"] {
         assert!(why.contains(words), "{words}: {why}");
     }
@@ -119,7 +119,7 @@ fn imported(name: &str, csv: &str) -> Result<ImplantPlan, String> {
         145.0,
     );
     std::fs::remove_file(&file).unwrap();
-    plan
+    plan.map_err(|why| why.to_string())
 }
 
 #[test]
@@ -150,7 +150,7 @@ fn a_table_whose_needles_contradict_its_places_is_refused() {
         (",2,I9", ",0,I9", "needle is \"0\", not a whole number from 1"),
         (",2,I9", ",two,I9", "needle is \"two\""),
     ] {
-        let why = imported("wrong", &csv.replace(from, to)).unwrap_err();
+        let why = imported("wrong", &csv.replace(from, to)).unwrap_err().to_string();
         assert!(why.contains(told), "{told}: {why}");
     }
 }

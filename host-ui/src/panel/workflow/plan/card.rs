@@ -1,11 +1,12 @@
-//! In the step: make a plan, compensate it, keep it in a file, and what dose it gives.
+//! The step of the plan: make one, compensate it, save it, and its dose.
 
 use super::super::{WorkflowState, debrief, hinted, main_button, progress, undo_action};
 use super::summary;
+use crate::action::{Action, PlanAction};
 use crate::panel::workflow::Undo;
-use crate::panel::workflow::work::work_ui;
-use crate::panel::{Action, PlanAction, Shown};
+use crate::panel::workflow::job::job_ui;
 use crate::planner::Implant;
+use crate::shown::Shown;
 use crate::theme;
 use egui::{Button, DragValue};
 use std::path::PathBuf;
@@ -13,15 +14,15 @@ use stylet_base::format;
 use stylet_implant::plan::check::STRENGTHS_U;
 
 pub fn plan_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, ready: bool, actions: &mut Vec<Action>) {
-    let free = ready && shown.planning.work.is_none();
+    let free = ready && shown.planning.job.is_none();
     match &shown.planning.implant {
         None => begin_ui(ui, shown, (ready, free), actions),
         Some(implant) => implant_ui(ui, shown, implant, free, actions),
     }
     // What cannot be done meanwhile makes room for how far it is.
-    match &shown.planning.work {
+    match &shown.planning.job {
         Some(work) => {
-            if work_ui(ui, &work.what, work.share) {
+            if job_ui(ui, &work.what, work.share) {
                 actions.push(Action::Plan(PlanAction::Cancel));
             }
         }
@@ -47,7 +48,7 @@ fn begin_ui(ui: &mut egui::Ui, shown: &Shown, (ready, free): (bool, bool), actio
     ui.label(theme::small("Or many needles through the template:"));
     ui.horizontal(|ui| {
         automatic_ui(ui, shown, free, actions);
-        let empty = ui.add_enabled(free && shown.planning.ground.is_some(), Button::new("Empty plan"));
+        let empty = ui.add_enabled(free && shown.planning.outlines.is_some(), Button::new("Empty plan"));
         if empty.on_hover_text("Choose the holes yourself").clicked() {
             actions.push(Action::Plan(PlanAction::Begin));
         }
@@ -55,9 +56,9 @@ fn begin_ui(ui: &mut egui::Ui, shown: &Shown, (ready, free): (bool, bool), actio
 }
 
 fn automatic_ui(ui: &mut egui::Ui, shown: &Shown, free: bool, actions: &mut Vec<Action>) {
-    let can = free && shown.planning.ground.is_some();
+    let can = free && shown.planning.outlines.is_some();
     let response = ui.add_enabled(can, Button::new("Automatic plan"));
-    let hint = "Needles near the edge of the target, fewer inside, none near what is to be spared";
+    let hint = "Needles near the edge of the target, fewer inside, none near spared structures";
     if response.on_hover_text(hint).clicked() {
         actions.push(Action::Plan(PlanAction::Automatic));
     }
@@ -81,7 +82,7 @@ fn implant_ui(ui: &mut egui::Ui, shown: &Shown, implant: &Implant, free: bool, a
         } else {
             super::next_needle_ui(ui, shown, actions);
         }
-        let discard = ui.add_enabled(free, Button::new("Put the plan away"));
+        let discard = ui.add_enabled(free, Button::new("Discard the plan"));
         if discard
             .on_hover_text("Back to one needle; save it first to keep it")
             .clicked()
@@ -101,7 +102,7 @@ fn implant_ui(ui: &mut egui::Ui, shown: &Shown, implant: &Implant, free: bool, a
         }
     });
     compensated_ui(ui, implant);
-    if shown.planning.work.is_none() {
+    if shown.planning.job.is_none() {
         strength_ui(ui, implant, free && waits, actions);
     }
 }

@@ -1,4 +1,4 @@
-//! What is wrong with the plan, in words; a click shows the needle.
+//! Problems of the plan, in words; a click shows the needle.
 
 use super::{PlanState, name_of};
 use crate::planner::Implant;
@@ -9,16 +9,16 @@ use stylet_implant::plan::check::Problem;
 pub fn findings_ui(ui: &mut egui::Ui, implant: &Implant, state: &mut PlanState) {
     let tokens = theme::of(ui);
     let Some(problems) = &implant.problems else {
-        ui.label(theme::small("The plan is being looked at."));
+        ui.label(theme::small("Checking the plan."));
         return;
     };
     if problems.is_empty() {
-        ui.label(RichText::new("Nothing is wrong with the plan.").color(tokens.good));
+        ui.label(RichText::new("The plan has no problems.").color(tokens.good));
         return;
     }
     let what = match problems.len() {
-        1 => "1 thing to look at".to_owned(),
-        n => format!("{n} things to look at"),
+        1 => "1 problem".to_owned(),
+        n => format!("{n} problems"),
     };
     ui.label(RichText::new(what).color(tokens.warn));
     ui.spacing_mut().item_spacing.y = 2.0;

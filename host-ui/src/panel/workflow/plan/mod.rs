@@ -7,10 +7,10 @@ mod needle;
 mod template;
 
 use super::progress;
-use crate::panel::{Action, PlanAction, Shown};
+use crate::action::{Action, PlanAction, Viewpoint};
 use crate::planner::Implant;
+use crate::shown::Shown;
 use crate::theme;
-use crate::view::scene3d::Preset;
 pub(super) use card::plan_ui;
 use egui::Button;
 use stylet_implant::plan::{Hole, ImplantPlan};
@@ -97,7 +97,7 @@ fn head_ui(ui: &mut egui::Ui, implant: &Implant, actions: &mut Vec<Action>) {
                 .on_hover_text("The 3D view looks through the template, as this panel does")
                 .clicked()
             {
-                actions.push(Action::LookFrom(Preset::Perineum));
+                actions.push(Action::LookFrom(Viewpoint::Perineum));
             }
         });
     });

@@ -2,8 +2,9 @@
 
 use super::template::move_needle;
 use super::{PlanState, name_of};
-use crate::panel::{Action, PlanAction, Shown};
+use crate::action::{Action, PlanAction};
 use crate::planner::{Implant, NeedleState};
+use crate::shown::Shown;
 use crate::theme;
 use egui::{Button, DragValue};
 use stylet_base::format;
@@ -34,8 +35,8 @@ pub fn needle_ui(
 }
 
 fn empty_ui(ui: &mut egui::Ui, shown: &Shown, state: &PlanState, actions: &mut Vec<Action>) {
-    let ground = shown.planning.ground.as_ref();
-    let piece_m = ground.and_then(|g| g.piece_m(state.hole));
+    let outlines = shown.planning.outlines.as_ref();
+    let piece_m = outlines.and_then(|g| g.piece_m(state.hole));
     ui.horizontal(|ui| {
         ui.label(theme::strong(format!("Hole {}", state.hole)));
         let add = ui.add_enabled(piece_m.is_some(), Button::new("Add needle"));
@@ -76,7 +77,7 @@ fn head_ui(ui: &mut egui::Ui, implant: &Implant, number: usize, can: bool, actio
 fn row_ui(ui: &mut egui::Ui, implant: &Implant, number: usize, actions: &mut Vec<Action>) {
     let needle = &implant.plan.needles[number];
     let Some(was) = Row::of(needle) else {
-        ui.label(theme::small("It has no seeds; take it away and add it anew."));
+        ui.label(theme::small("It has no seeds; remove it and add it again."));
         return;
     };
     let mut row = was;
@@ -125,7 +126,7 @@ fn millimetres(value: &mut f64, range: std::ops::RangeInclusive<f64>) -> DragVal
 
 fn labelled(ui: &mut egui::Ui, name: &str, value: DragValue<'_>) {
     let label = ui.label(theme::small(name));
-    // What a file says stays as it is until a hand changes it.
+    // A value from a file is kept until the operator changes it.
     let value = value.clamp_existing_to_range(false).update_while_editing(false);
     ui.add(value).labelled_by(label.id);
 }

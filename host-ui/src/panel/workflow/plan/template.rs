@@ -1,8 +1,9 @@
-//! The template as the operator sees it from the perineum: patient's right at the left, anterior at the top.
+//! The template as seen from the perineum: patient's right at the left, anterior at the top.
 
 use super::PlanState;
-use crate::panel::{Action, PlanAction, Shown};
+use crate::action::{Action, PlanAction};
 use crate::planner::{Implant, NeedleState, Outline};
+use crate::shown::Shown;
 use crate::theme;
 use crate::theme::Tokens;
 use egui::{
@@ -41,7 +42,7 @@ pub fn template_ui(
     steer(ui, &response, implant, state, actions);
     let hovered = holes_ui(ui, &response, &board, implant, state);
     response.widget_info(|| {
-        let what = told(implant, state.hole);
+        let what = hole_text(implant, state.hole);
         egui::WidgetInfo::labeled(
             egui::accesskit::Role::Grid,
             ui.is_enabled(),
@@ -53,11 +54,11 @@ pub fn template_ui(
         board: &board,
         tokens: theme::of(ui),
     };
-    look.ground(&response);
-    if let Some(ground) = &shown.planning.ground {
-        let middle_m = (ground.depths_m[0] + ground.depths_m[1]) / 2.0;
+    look.background(&response);
+    if let Some(outlines) = &shown.planning.outlines {
+        let middle_m = (outlines.depths_m[0] + outlines.depths_m[1]) / 2.0;
         let depth_m = *state.depth_m.get_or_insert(middle_m);
-        let layer = ground.layer(depth_m);
+        let layer = outlines.layer(depth_m);
         look.outlines(&layer.spared, look.tokens.spared, 1.2);
         look.outlines(&layer.target, look.tokens.gland, 2.0);
     }
@@ -65,13 +66,13 @@ pub fn template_ui(
     look.holes(implant);
     look.chosen(state.hole);
     if let Some(hole) = hovered {
-        response.on_hover_text_at_pointer(told(implant, hole));
+        response.on_hover_text_at_pointer(hole_text(implant, hole));
     }
     depth_ui(ui, shown, state, actions);
 }
 
 /// Hole, depth, seeds, in words.
-fn told(implant: &Implant, hole: Hole) -> String {
+fn hole_text(implant: &Implant, hole: Hole) -> String {
     let number = implant.plan.needles.iter().position(|n| n.hole == Some(hole));
     let Some(number) = number else {
         return format!("{hole}: no needle");
@@ -90,7 +91,7 @@ fn told(implant: &Implant, hole: Hole) -> String {
     )
 }
 
-/// Arrows go from hole to hole, with Shift they take the needle along; Enter adds one, Delete takes it away.
+/// Arrows go from hole to hole, with Shift they move the needle; Enter adds one, Delete removes it.
 fn steer(ui: &egui::Ui, response: &Response, implant: &Implant, state: &mut PlanState, actions: &mut Vec<Action>) {
     if !response.has_focus() || !ui.is_enabled() {
         return;
@@ -154,7 +155,7 @@ fn holes_ui(
         let rect = Rect::from_center_size(board.at(hole), Vec2::splat(board.pitch));
         let response = ui.interact(rect, template.id.with(hole), Sense::CLICK);
         response.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::accesskit::Role::Button, ui.is_enabled(), told(implant, hole))
+            egui::WidgetInfo::labeled(egui::accesskit::Role::Button, ui.is_enabled(), hole_text(implant, hole))
         });
         if response.hovered() {
             hovered = Some(hole);
@@ -169,13 +170,13 @@ fn holes_ui(
 
 /// Which plane the outlines are cut in; the axial slice goes there too.
 fn depth_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut PlanState, actions: &mut Vec<Action>) {
-    let (Some(ground), Some(depth_m)) = (&shown.planning.ground, &mut state.depth_m) else {
+    let (Some(outlines), Some(depth_m)) = (&shown.planning.outlines, &mut state.depth_m) else {
         return;
     };
     ui.horizontal(|ui| {
         let label = ui.label(theme::small("Outline at depth"));
         let mut depth_mm = format::mm(*depth_m);
-        let [near, far] = ground.depths_m.map(format::mm);
+        let [near, far] = outlines.depths_m.map(format::mm);
         ui.spacing_mut().slider_width = ui.available_width() - 78.0;
         let slider = egui::Slider::new(&mut depth_mm, near.ceil()..=far.floor())
             .step_by(1.0)
@@ -215,7 +216,7 @@ struct Look<'a> {
 }
 
 impl Look<'_> {
-    fn ground(&self, response: &Response) {
+    fn background(&self, response: &Response) {
         let color = match response.has_focus() {
             true => self.tokens.accent,
             false => self.tokens.line,

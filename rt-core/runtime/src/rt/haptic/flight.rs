@@ -1,8 +1,9 @@
 //! The haptic loop's side of the flight recorder: all that one tick leaves to the next, out and in.
 
 use super::HapticLoop;
-use crate::rt::exchange::{HapticOrder, TissueResponse};
+use crate::rt::exchange::HapticOrder;
 use crate::rt::haptic_tape::{HapticEntry, HapticMemory};
+use crate::rt::response::TissueResponse;
 use stylet_shm_schema::TickRecord;
 
 impl HapticLoop {

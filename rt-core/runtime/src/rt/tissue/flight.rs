@@ -36,7 +36,7 @@ impl TissueLoop {
         world.tissue.save(&mut to.body);
     }
 
-    /// Goes on from where another loop was.
+    /// Continues from the memory of another loop.
     pub fn remember(&mut self, memory: &TissueMemory) {
         self.seeds.clear();
         self.seeds.extend_from_slice(&memory.seeds);
@@ -51,6 +51,7 @@ impl TissueLoop {
         self.world.tissue.load(&memory.body);
     }
 
+    /// The deformed body.
     pub fn body(&self) -> Deformed<'_> {
         self.world.tissue.deformed()
     }

@@ -1,10 +1,11 @@
-//! Every cause against the force record of the whole loop: the force goes, smoothly and in time, and comes back.
+//! Every cause against the force record of the whole loop: the force ramps out, smoothly and in time, and returns after re-arming.
 
 use super::*;
-use crate::rt::exchange::{HapticOrder, Notice, TissueResponse};
-use crate::rt::haptic::{HapticLoop, HapticPorts};
+use crate::rt::exchange::{HapticOrder, Notice};
+use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticMemory, HapticTape};
-use crate::rt::recorder::recorder;
+use crate::rt::response::TissueResponse;
+use crate::rt::wiring::{BridgePorts, Capacities, TissuePorts, Wiring};
 use nalgebra::Vector3;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -30,7 +31,7 @@ enum Cause {
     ForceNotANumber,
 }
 
-/// A simulated hand on a device that breaks when told to.
+/// A simulated hand on a device that breaks on command.
 struct BreakingDevice {
     hand: SimulatedPhantom,
     cause: Arc<AtomicU32>,
@@ -87,10 +88,8 @@ struct Rig {
     cause: Arc<AtomicU32>,
     now_ns: u64,
     tissue: TissueResponse,
-    response: triple_buffer::Input<TissueResponse>,
-    orders: rtrb::Producer<HapticOrder>,
-    notices: rtrb::Consumer<Notice>,
-    records: rtrb::Consumer<TickRecord>,
+    tissue_ports: TissuePorts,
+    bridge: BridgePorts,
     seen: Vec<Notice>,
     contacts: u64,
 }
@@ -112,29 +111,15 @@ impl Rig {
             (NeedleParameters::default(), ForceParameters::default()),
             0,
         );
-        let (pose, _) = triple_buffer::triple_buffer(&Default::default());
-        let (response, response_out) = triple_buffer::triple_buffer(&TissueResponse::default());
-        let (orders, orders_out) = rtrb::RingBuffer::new(16);
-        let (notices_in, notices) = rtrb::RingBuffer::new(64);
-        let (records_in, records) = rtrb::RingBuffer::new(16);
-        let (flight, _) = recorder(Box::new(HapticTape::new(&memory)));
-        let ports = HapticPorts {
-            pose,
-            response: response_out,
-            orders: orders_out,
-            notices: notices_in,
-            records: records_in,
-            flight,
-        };
+        let tape = Box::new(HapticTape::new(&memory));
+        let wiring = Wiring::new(Capacities::STEPPED, Some(tape), None);
         Self {
-            haptic: HapticLoop::new(1, Box::new(device), ports, &memory, 1e-3),
+            haptic: HapticLoop::new(1, Box::new(device), wiring.haptic, &memory, 1e-3),
             cause,
             now_ns: 1_000_000_000,
             tissue: TissueResponse::default(),
-            response,
-            orders,
-            notices,
-            records,
+            tissue_ports: wiring.tissue,
+            bridge: wiring.bridge,
             seen: Vec::new(),
             contacts: 0,
         }
@@ -156,7 +141,7 @@ impl Rig {
     }
 
     fn order(&mut self, order: HapticOrder) {
-        self.orders.push(order).expect("room");
+        self.bridge.haptic_orders.push(order).expect("room");
     }
 
     fn tick(&mut self) -> TickRecord {
@@ -164,13 +149,13 @@ impl Rig {
         if self.cause.load(Ordering::Relaxed) != Cause::TissueStops as u32 {
             self.tissue.time_ns = self.now_ns;
         }
-        self.response.write(self.tissue);
+        self.tissue_ports.response.write(self.tissue);
         let late = u32::from(self.cause.load(Ordering::Relaxed) == Cause::Late as u32);
         self.haptic.tick(self.now_ns, self.now_ns, late);
-        while let Ok(notice) = self.notices.pop() {
+        while let Ok(notice) = self.bridge.haptic_notices.pop() {
             self.seen.push(notice);
         }
-        let record = self.records.pop().expect("a record for each tick");
+        let record = self.bridge.records.pop().expect("a record for each tick");
         // The membrane is met where the tip passes it, and left where it is well outside.
         let depth_m = record.tip_in_scene_m[2];
         if depth_m > 0.0 && self.tissue.contact == 0 {
@@ -271,19 +256,19 @@ fn every_cause_ramps_the_force_out_in_time_and_the_operator_can_rearm() {
         );
         assert!(
             record[zero..].iter().all(|r| force_n(r) == 0.0),
-            "{cause:?}: the force came back by itself"
+            "{cause:?}: the force returned by itself"
         );
         assert!(
             record[zero..]
                 .iter()
                 .all(|r| r.fault == fault as u32 && r.flags & flags::ENGAGED == 0)
         );
-        let told = rig
+        let reported = rig
             .seen
             .iter()
             .filter(|n| matches!(n, Notice::Fault { fault: f, .. } if *f == fault))
             .count();
-        assert_eq!(told, 1, "{cause:?} is told once");
+        assert_eq!(reported, 1, "{cause:?} is reported once");
 
         rig.set(Cause::Nothing);
         record.extend(rig.run(50));

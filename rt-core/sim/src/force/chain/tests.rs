@@ -105,3 +105,38 @@ fn the_same_session_gives_the_same_bytes() {
     };
     assert_eq!(bits(), bits());
 }
+
+/// Hosts need it to show how far a membrane is from its puncture.
+#[test]
+fn the_output_has_the_puncture_depth_of_the_membrane_in_front() {
+    let mut device = SimulatedPhantom::new(SimulatedPhantomConfig {
+        start_tip_in_world: Vector3::new(0.0, 0.0, 0.001),
+        ..SimulatedPhantomConfig::default()
+    });
+    let info = device.info();
+    let parameters = ChainParameters {
+        needle: NeedleParameters::default(),
+        force: ForceParameters::default(),
+    };
+    let sample = device.read(DT_S).unwrap();
+    for (layer, puncture_depth_m) in [
+        (LayerKind::Gland, 8e-3),
+        (LayerKind::Perineum, 12e-3),
+        (LayerKind::Surroundings, 0.0),
+        (LayerKind::Wall, 4e-3),
+    ] {
+        let touch = Touch {
+            contact_in_world: Vector3::zeros(),
+            path_direction: Vector3::z(),
+            layer,
+            layer_number: 1,
+            layer_in_world: Vector3::zeros(),
+            local: LocalResponse::default(),
+        };
+        let mut state = ChainState::new(&info);
+        let out = step(&parameters, &info, &mut state, &sample, Some(&touch), DT_S);
+        assert_eq!(out.puncture_depth_m, puncture_depth_m, "{layer:?}");
+        let outside = step(&parameters, &info, &mut ChainState::new(&info), &sample, None, DT_S);
+        assert_eq!(outside.puncture_depth_m, 0.0);
+    }
+}

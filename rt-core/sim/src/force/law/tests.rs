@@ -3,6 +3,7 @@
 use super::*;
 use crate::needle::{LayerKind, Layers};
 use stylet_hw::DeviceInfo;
+use stylet_shm_schema::ParameterSet;
 
 /// In the gland alone.
 fn input(depth_m: f64, punctured: bool, phase: Phase) -> ForceInput {
@@ -35,18 +36,18 @@ fn fresh(input: &ForceInput) -> ForceTerms {
 fn defaults_can_be_rendered_by_the_phantom_and_their_scale_fits() {
     let device = DeviceInfo::phantom_premium_1_5();
     let defaults = ForceParameters::default();
-    assert_eq!(defaults.validate_for(&device), Ok(()));
+    assert_eq!(defaults.validate(), Ok(()));
     // 8.5 N of the device for the 9 N of the skin.
     let fitting = defaults.fitting_scale(&device);
     assert!((fitting - 8.5 / 9.0).abs() < 1e-12 && defaults.gate.force_scale <= fitting);
-    let mut stiff = ForceParameters {
-        guide_gain: 3.0,
+    assert_eq!(ParameterSet::default().problems_on(device.max_stiffness_n_per_m), []);
+    let broken = ForceParameters {
+        guide_gain: -1.0,
         damping_n_s_per_m: f64::NAN,
         ..defaults
     };
-    stiff.layers.0[0].puncture_force_n = 8.0;
-    let problems = stiff.validate_for(&device).unwrap_err();
-    assert_eq!(problems.len(), 3, "{problems:?}");
+    let problems = broken.validate().unwrap_err();
+    assert_eq!(problems.len(), 2, "{problems:?}");
 }
 
 #[test]
@@ -133,9 +134,12 @@ fn each_term_is_off_at_gain_zero_and_the_rest_stays() {
         at.velocity_m_per_s = Vector3::z() * 0.01;
         at
     };
-    let with = |change: fn(&mut ForceParameters)| {
-        let mut parameters = ForceParameters::default();
-        parameters.compensated_mass_kg = 0.05;
+    type Change = fn(&mut ForceParameters);
+    let with = |change: Change| {
+        let mut parameters = ForceParameters {
+            compensated_mass_kg: 0.05,
+            ..ForceParameters::default()
+        };
         change(&mut parameters);
         let before = force(&parameters, &mut ForceState::default(), &moving(false));
         let after = force(&parameters, &mut ForceState::default(), &moving(true));
@@ -150,7 +154,7 @@ fn each_term_is_off_at_gain_zero_and_the_rest_stays() {
         sizes.map(|v| v.norm())
     };
     let all = with(|_| {});
-    let cases: [(usize, fn(&mut ForceParameters)); 5] = [
+    let cases: [(usize, Change); 5] = [
         (0, |p| p.membrane_gain = 0.0),
         (1, |p| p.guide_gain = 0.0),
         (2, |p| p.damping_n_s_per_m = 0.0),

@@ -5,7 +5,7 @@ use crate::limits::Limits;
 use crate::limits::LinkLimits;
 use crate::scene::Structure;
 
-/// A link between two structures has of each limit the tighter one. A fixed structure has no say: it is the
+/// A link between two structures has the tighter of each limit. A fixed structure does not count: it is the
 /// other end that gives.
 #[derive(Clone, Debug)]
 pub(crate) struct Classes {
@@ -52,6 +52,7 @@ impl Classes {
         }
     }
 
+    #[cfg(test)]
     pub fn count(&self) -> usize {
         self.table.len()
     }

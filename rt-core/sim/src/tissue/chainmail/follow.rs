@@ -5,7 +5,7 @@
 use super::held::{self, Grip};
 use super::kernels::{self, Kernels};
 use super::model::ChainMail;
-use super::solve::{Patience, sweep};
+use super::propagate::{Patience, sweep};
 use super::state::TissueState;
 use super::sweep::Pass;
 use crate::tissue::{HeldOutcome, StepReport};
@@ -15,7 +15,7 @@ const SHORTER_TRIES: i32 = 3;
 /// The first of them goes half of what was asked, and no farther than this, in elements.
 const FIRST_SHORTER: f32 = 1.0;
 
-/// Moves what is held toward where it is asked to be, as far as sweeps can follow; `grip` tells how far that was.
+/// Moves what is held toward where it is asked to be, as far as sweeps can follow; `grip` says how far that was.
 #[inline(always)]
 pub(super) fn follow<K: Kernels>(
     model: &ChainMail,

@@ -2,9 +2,8 @@
 
 use super::kernels::Stretch;
 use super::model::ChainMail;
-use super::solve::REACH;
 use super::state::TissueState;
-use crate::tissue::{Held, HeldOutcome};
+use crate::tissue::{Held, HeldOutcome, REACH};
 
 /// A held element and where it goes, in elements from rest.
 #[derive(Clone, Copy, Debug)]

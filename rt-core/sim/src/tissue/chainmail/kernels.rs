@@ -24,7 +24,7 @@ pub(crate) struct Scaled {
 impl LinkLimits {
     /// `rest` is one element, `slack` a length, both in the state's unit.
     #[inline(always)]
-    pub fn scaled(&self, rest: f32, slack: f32) -> Scaled {
+    pub(crate) fn scaled(&self, rest: f32, slack: f32) -> Scaled {
         Scaled {
             low: self.low * rest,
             high: self.high * rest,
@@ -150,10 +150,12 @@ pub(crate) fn at(u: &[&mut [f32]; 3], e: usize) -> [f32; 3] {
     [u[0][e], u[1][e], u[2][e]]
 }
 
-/// The passes' loops over links, here one link at a time.
+/// The passes' loops over links.
+///
+/// Called inside a tick with the stretches of a model on a state that fits it, so that all lie inside the components.
 ///
 /// `u` has the component along the links first. Links join element `inner + n` to `outer + n` (or `lo + n` to
-/// `hi + n`); the two stretches do not overlap unless told otherwise.
+/// `hi + n`); the two stretches do not overlap unless stated.
 pub(crate) trait Kernels {
     /// Moves the outer end of each link into its limits; says which, counted from 0.
     fn clamp<const OUTER: bool>(l: &Scaled, u: &mut [&mut [f32]; 3], inner: usize, outer: usize, n: usize) -> Stretch;

@@ -7,29 +7,27 @@
 //! to a state without violations.
 //!
 //! A step works on what moves: `activity` remembers which stretches those are, `sweep` follows them outward,
-//! `project` is for what sweeps do not solve, `follow` for what fixed tissue does not let happen, `relax` makes the body elastic where that is asked for.
+//! `residual` verifies what a pass leaves, `project` is for what sweeps do not solve, `follow` for what fixed tissue does
+//! not let happen, `relax` makes the body elastic where that is asked for.
 
 mod activity;
+mod along_x;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
-#[cfg(target_arch = "x86_64")]
-mod avx2_relax;
 mod classes;
 mod follow;
 mod held;
 mod kernels;
-mod look;
 mod memory;
 mod model;
-mod one_pass;
 mod project;
-pub mod queue;
-pub mod reference;
+mod propagate;
 mod relax;
+mod residual;
 mod segments;
-mod single;
 mod solve;
 mod spans;
+mod springs;
 mod state;
 mod sweep;
 #[cfg(test)]
@@ -37,8 +35,6 @@ mod tests;
 
 pub(crate) use kernels::{Scaled, link_violation, ordered};
 pub use model::ChainMail;
-pub use one_pass::{OnePass, PassKind};
-pub use single::single_pass;
 pub use solve::step;
 pub use state::TissueState;
 
@@ -49,11 +45,14 @@ use crate::tissue::{Deformed, Held, StepReport, TissueModel};
 /// Restricted ChainMail as a tissue model.
 #[derive(Clone)]
 pub struct ChainMailTissue {
+    /// Topology and limits.
     pub model: ChainMail,
+    /// Where every element is.
     pub state: TissueState,
 }
 
 impl ChainMailTissue {
+    /// The body of a scene at rest.
     pub fn new(scene: &Scene, limits: Limits) -> Self {
         let model = ChainMail::new(scene, limits);
         let state = TissueState::at_rest(&model);

@@ -28,6 +28,7 @@ pub struct ChainMail {
 }
 
 impl ChainMail {
+    /// The body of a scene.
     pub fn new(scene: &Scene, limits: Limits) -> Self {
         let lattice = scene.lattice.clone();
         let rows = Rows::of(&lattice);
@@ -61,14 +62,17 @@ impl ChainMail {
         }
     }
 
+    /// Elements and their neighbours.
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
     }
 
+    /// Number of elements.
     pub fn element_count(&self) -> usize {
         self.lattice.element_count()
     }
 
+    /// The limits in force, but for structures with their own.
     pub fn limits(&self) -> &Limits {
         &self.limits
     }

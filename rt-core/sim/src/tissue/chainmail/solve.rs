@@ -4,17 +4,12 @@ use super::follow::follow;
 use super::held::{self, Grip};
 use super::kernels::{Kernels, Portable};
 use super::model::ChainMail;
+use super::propagate::{MAX_SWEEPS, propagate};
 use super::relax;
+use super::springs::RowSprings;
 use super::state::TissueState;
 use super::sweep::Pass;
-use crate::tissue::{Held, HeldOutcome, Solve, StepReport};
-
-/// Outward sweeps tried first.
-pub const MAX_SWEEPS: u32 = 6;
-/// Passes of projections tried after that.
-pub const MAX_PROJECTIONS: u32 = 12;
-/// Farthest from rest that a held element is followed, in elements; f32 resolves the tolerance up to here.
-pub const REACH: f64 = 2048.0;
+use crate::tissue::{Held, Solve, StepReport};
 
 /// Advances the tissue by `dt_s`; a `dt_s` that is not above zero recovers nothing.
 ///
@@ -44,7 +39,7 @@ pub fn step(model: &ChainMail, state: &mut TissueState, held: Option<Held>, dt_s
     report
 }
 
-pub(super) fn kept_fraction(model: &ChainMail, dt_s: f64) -> f64 {
+fn kept_fraction(model: &ChainMail, dt_s: f64) -> f64 {
     if dt_s > 0.0 {
         (-dt_s / model.limits().recovery_time_s).exp()
     } else {
@@ -69,7 +64,7 @@ fn solve_avx2(model: &ChainMail, state: &mut TissueState, grip: Option<Grip>, re
 
 /// Puts the held element in place, brings the body into its limits, relaxes it and brings it there again.
 #[inline(always)]
-fn solve<K: Kernels + relax::Rows>(
+fn solve<K: Kernels + RowSprings>(
     model: &ChainMail,
     state: &mut TissueState,
     mut grip: Option<Grip>,
@@ -130,98 +125,6 @@ fn settle<K: Kernels>(
     for _ in 0..MAX_SWEEPS {
         residual = Pass::new(model, state, centre, slack).outward::<K>();
         report.passes += 1;
-        if residual <= model.limits().tolerance {
-            break;
-        }
-    }
-    residual
-}
-
-/// Sweeps, then projects, then re-anchors, until the residual is within tolerance.
-#[inline(always)]
-fn propagate<K: Kernels>(
-    model: &ChainMail,
-    state: &mut TissueState,
-    grip: &Grip,
-    slack: f32,
-    report: &mut StepReport,
-) -> f32 {
-    let tolerance = model.limits().tolerance;
-    let mut residual = sweep::<K>(model, state, grip, slack, Patience::ToTheLast, report);
-    if residual > tolerance {
-        residual = project::<K>(model, state, grip, slack, report);
-    }
-    if residual > tolerance {
-        if model.part_is_fixed(model.part(grip.element)) {
-            report.held = HeldOutcome::Limited;
-        }
-        let mut pass = Pass::new(model, state, model.lattice.cell(grip.element), slack);
-        pass.reanchor(grip.element as usize);
-        residual = pass.check_all::<K>();
-        report.passes += 1;
-        report.solve = Solve::Reanchored;
-    }
-    residual
-}
-
-/// When sweeps are given up.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Patience {
-    ToTheLast,
-    /// Once one does not halve what is left.
-    WhileItHelps,
-}
-
-#[inline(always)]
-pub(super) fn sweep<K: Kernels>(
-    model: &ChainMail,
-    state: &mut TissueState,
-    grip: &Grip,
-    slack: f32,
-    patience: Patience,
-    report: &mut StepReport,
-) -> f32 {
-    let held_cell = model.lattice.cell(grip.element);
-    let mut residual = 0.0;
-    // A sweep of what little is left costs little: go on to the last that f32 can do, within their number.
-    for number in 0..MAX_SWEEPS {
-        if state.active.is_empty() {
-            break;
-        }
-        let before = residual;
-        residual = Pass::new(model, state, held_cell, slack).outward::<K>();
-        // A patch with holes in it can be reached from outside, and bone pushes back; put back, it is active again.
-        let may_be_reached = grip.beside > 0 || model.classes.any_fixed();
-        if may_be_reached && held::put(model, state, grip) {
-            residual = f32::INFINITY;
-        }
-        report.passes += 1;
-        report.solve = report.solve.max(Solve::Sweeps);
-        let helps = number == 0 || residual < 0.5 * before || residual <= model.limits().tolerance;
-        if patience == Patience::WhileItHelps && !helps {
-            break;
-        }
-    }
-    residual
-}
-
-/// Passes of projections over the whole body.
-#[inline(always)]
-fn project<K: Kernels>(
-    model: &ChainMail,
-    state: &mut TissueState,
-    grip: &Grip,
-    slack: f32,
-    report: &mut StepReport,
-) -> f32 {
-    let mut residual = f32::INFINITY;
-    for number in 0..MAX_PROJECTIONS {
-        let mut pass = Pass::new(model, state, [0; 3], slack);
-        pass.project(number.is_multiple_of(2));
-        held::put(model, pass.state, grip);
-        residual = pass.check_all::<K>();
-        report.passes += 1;
-        report.solve = report.solve.max(Solve::Projections);
         if residual <= model.limits().tolerance {
             break;
         }

@@ -90,6 +90,7 @@ impl TissueState {
         self.u.get(axis).map_or(&[], Vec::as_slice)
     }
 
+    /// Elements for each unit of `displacement`.
     pub fn scale(&self) -> f32 {
         self.scale as f32
     }
@@ -218,9 +219,14 @@ impl TissueState {
         moved
     }
 
+    /// Whether every index of `model` lies inside this state: nothing in a step goes out of bounds then.
     pub(crate) fn fits(&self, model: &ChainMail) -> bool {
-        let n = model.element_count();
-        self.u.iter().all(|c| c.len() == n) && self.run_square.len() == model.rows.runs.len()
+        let (n, planes) = (model.element_count(), model.lattice.dims[2]);
+        let kept = if model.classes.any_fixed() { n } else { 0 };
+        self.u.iter().all(|c| c.len() == n)
+            && self.run_square.len() == model.rows.runs.len()
+            && self.plane_square.len() == planes
+            && self.trial.before.iter().all(|c| c.len() == kept)
     }
 
     /// Recovery by the surroundings: differences shrink in proportion, so no limit is broken.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::grid::Grid;
-use super::grip::Grip;
+use super::grip::{Grip, Iteration};
 use super::guess::superpose;
 use super::lanes::{add_scaled, dot, keep_free, keep_opposite, scale_and_add};
 use super::model::FemModel;
@@ -91,16 +91,6 @@ fn advance_fields<T>(grid: &Grid, alpha: T, p: &Field<T>, q: &Field<T>, u: &mut 
 }
 }
 
-/// Where conjugate gradients on one response are: they go on from tick to tick. `r`, `p` and `q` are in the grip's fields.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Course {
-    response: usize,
-    cycles: u32,
-    residual: f64,
-    rz: f64,
-    alpha: f64,
-}
-
 /// How far a response is to be refined.
 pub(super) struct Goal {
     /// Norm of the residual that is to be met.
@@ -115,43 +105,47 @@ pub(super) struct Goal {
 impl<T: Real> Grip<T> {
     /// Refines response `n` as far as the goal says; returns the cycles used.
     pub(super) fn refine(&mut self, model: &FemModel<T>, n: usize, goal: &Goal) -> u32 {
-        let going_on = self.course.take().filter(|c| c.response == n);
-        let mut course = going_on.unwrap_or_else(|| self.begin(model, n));
+        let going_on = self.iteration.take().filter(|c| c.response == n);
+        let mut iteration = going_on.unwrap_or_else(|| self.begin(model, n));
         let mut used = 0;
         let mut is_sound = true;
         let wanted = |used| if used == 0 { goal.residual } else { goal.rough };
-        while used < goal.cycles && is_sound && course.residual > wanted(used) {
+        while used < goal.cycles && is_sound && iteration.residual > wanted(used) {
             used += 1;
-            is_sound = self.advance(model, &mut course, goal.of);
+            is_sound = self.advance(model, &mut iteration, goal.of);
         }
-        self.finish(model, n, course.residual, goal.residual);
+        self.finish(model, n, iteration.residual, goal.residual);
         // The cycles of few are not quite symmetric, which many in a row would mind.
-        let is_short = goal.of > FEW_CYCLES || course.cycles < FEW_CYCLES;
-        let goes_on = is_sound && is_short && course.residual > goal.residual;
-        self.course = goes_on.then_some(course);
+        let is_short = goal.of > FEW_CYCLES || iteration.cycles < FEW_CYCLES;
+        let goes_on = is_sound && is_short && iteration.residual > goal.residual;
+        self.iteration = goes_on.then_some(iteration);
         used
     }
 
     /// One cycle; false where the equations let it come no nearer.
-    fn advance(&mut self, model: &FemModel<T>, course: &mut Course, of: u32) -> bool {
+    fn advance(&mut self, model: &FemModel<T>, iteration: &mut Iteration, of: u32) -> bool {
         self.multigrid.cycle(&model.levels, of);
-        let is_first = course.cycles == 0;
-        course.cycles += 1;
+        let is_first = iteration.cycles == 0;
+        iteration.cycles += 1;
         let (rz, zq) = self.products(model, !is_first);
         // Polak and Ribière's form: the cycle is not quite symmetric, and this one does not mind.
-        let beta = if is_first { 0.0 } else { -course.alpha * zq / course.rz };
+        let beta = if is_first {
+            0.0
+        } else {
+            -iteration.alpha * zq / iteration.rz
+        };
         self.turn(model, beta);
         let pq = self.product(model);
-        (course.rz, course.alpha) = (rz, rz / pq);
-        let is_sound = course.alpha.is_finite() && course.alpha > 0.0;
+        (iteration.rz, iteration.alpha) = (rz, rz / pq);
+        let is_sound = iteration.alpha.is_finite() && iteration.alpha > 0.0;
         if is_sound {
-            course.residual = self.go_along(model, course.response, course.alpha);
+            iteration.residual = self.go_along(model, iteration.response, iteration.alpha);
         }
         is_sound
     }
 
     /// The residual of response `n` becomes the right-hand side of the cycle.
-    fn begin(&mut self, model: &FemModel<T>, n: usize) -> Course {
+    fn begin(&mut self, model: &FemModel<T>, n: usize) -> Iteration {
         let level = &model.levels[0];
         let stage = &mut self.multigrid.stages[0];
         let mut op = Opposite {
@@ -161,7 +155,7 @@ impl<T: Real> Grip<T> {
         };
         let (u, work) = (&mut self.responses[n].u, &mut self.multigrid.work);
         sweep(level, u, work, 0..level.grid.nodes[2], &mut op);
-        Course {
+        Iteration {
             response: n,
             cycles: 0,
             residual: op.square.sqrt(),

@@ -67,3 +67,9 @@ impl Grid {
         spans.map(|(row, &[first, end])| row * self.stride + first as usize..row * self.stride + end as usize)
     }
 }
+
+/// The eight nodes of a cell.
+pub(super) fn corners(grid: &Grid, cell: usize) -> [usize; 8] {
+    let (nx, ny) = (grid.stride, grid.nodes[1]);
+    std::array::from_fn(|c| cell + (c & 1) + nx * (c >> 1 & 1) + nx * ny * (c >> 2))
+}

@@ -1,7 +1,5 @@
 //! What a structure is made of, and what that makes of one hexahedron.
 
-use std::fmt;
-
 /// How the volumetric part of an element's energy is integrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integration {
@@ -14,8 +12,11 @@ pub enum Integration {
 /// Isotropic and linear elastic.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
+    /// Young's modulus, Pa.
     pub youngs_modulus_pa: f64,
+    /// Poisson's ratio, up to [`MAX_POISSON_RATIO`].
     pub poisson_ratio: f64,
+    /// How the volumetric energy is integrated.
     pub integration: Integration,
 }
 
@@ -33,8 +34,10 @@ impl Material {
     }
 }
 
+/// What a structure does when pushed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Structure {
+    /// Tissue.
     Elastic(Material),
     /// Bone, a probe: its nodes do not move.
     Fixed,
@@ -43,6 +46,7 @@ pub enum Structure {
 /// What a model is made from, besides the lattice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FemSettings {
+    /// At least one.
     pub structures: Vec<Structure>,
     /// Structure of each element; empty if there is one structure only.
     pub structure_of: Vec<u8>,
@@ -64,50 +68,51 @@ impl FemSettings {
 /// Largest Poisson ratio; multigrid needs ever more cycles towards 0.5.
 pub const MAX_POISSON_RATIO: f64 = 0.499;
 
-#[derive(Clone, Debug, PartialEq)]
+/// Why settings make no model.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FemProblem {
+    /// Nothing to be made of.
+    #[error("0 structures, at least 1 needed")]
     NoStructures,
-    Modulus { structure: usize, youngs_modulus_pa: f64 },
-    PoissonRatio { structure: usize, poisson_ratio: f64 },
-    Foundation { foundation_pa_per_m: f64 },
-    StructureCount { elements: usize, given: usize },
-    UnknownStructure { element: usize, structure: u8 },
+    /// A modulus that no tissue has.
+    #[error("Young's modulus {youngs_modulus_pa} Pa of structure {structure}, must be from 1 Pa to 1e12 Pa")]
+    Modulus {
+        /// Its place in the list.
+        structure: usize,
+        /// Its modulus, Pa.
+        youngs_modulus_pa: f64,
+    },
+    /// A Poisson ratio beyond what the solver takes.
+    #[error("Poisson ratio {poisson_ratio} of structure {structure}, must be from 0 to {MAX_POISSON_RATIO}")]
+    PoissonRatio {
+        /// Its place in the list.
+        structure: usize,
+        /// Its ratio.
+        poisson_ratio: f64,
+    },
+    /// A foundation that no surroundings have.
+    #[error("stiffness of the surroundings {foundation_pa_per_m} Pa/m, must be from 0 to 1e15 Pa/m")]
+    Foundation {
+        /// Stiffness per surface area, Pa/m.
+        foundation_pa_per_m: f64,
+    },
+    /// Not one structure for each element.
+    #[error("{given} structure numbers for {elements} elements: give one for each element, or none")]
+    StructureCount {
+        /// Elements of the lattice.
+        elements: usize,
+        /// Numbers given.
+        given: usize,
+    },
+    /// A number beyond the list.
+    #[error("element {element} is of structure {structure}, which is not given")]
+    UnknownStructure {
+        /// The first such element.
+        element: usize,
+        /// Its structure.
+        structure: u8,
+    },
 }
-
-impl fmt::Display for FemProblem {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::NoStructures => write!(f, "0 structures, at least 1 needed"),
-            Self::Modulus {
-                structure,
-                youngs_modulus_pa,
-            } => write!(
-                f,
-                "Young's modulus {youngs_modulus_pa} Pa of structure {structure}, must be from 1 Pa to 1e12 Pa"
-            ),
-            Self::PoissonRatio {
-                structure,
-                poisson_ratio,
-            } => write!(
-                f,
-                "Poisson ratio {poisson_ratio} of structure {structure}, must be from 0 to {MAX_POISSON_RATIO}"
-            ),
-            Self::Foundation { foundation_pa_per_m } => write!(
-                f,
-                "stiffness of the surroundings {foundation_pa_per_m} Pa/m, must be from 0 to 1e15 Pa/m"
-            ),
-            Self::StructureCount { elements, given } => write!(
-                f,
-                "{given} structure numbers for {elements} elements: give one for each element, or none"
-            ),
-            Self::UnknownStructure { element, structure } => {
-                write!(f, "element {element} is of structure {structure}, which is not given")
-            }
-        }
-    }
-}
-
-impl std::error::Error for FemProblem {}
 
 /// Every problem; of elements with an unknown structure, the first.
 pub(super) fn problems_of(settings: &FemSettings, elements: usize) -> Vec<FemProblem> {

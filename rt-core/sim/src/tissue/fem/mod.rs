@@ -13,7 +13,7 @@
 //! changes, the present displacement is the first guess of the new response: that tick is the costly one, unless idle ticks
 //! before have prepared the patch (`prepare`).
 //!
-//! *Surroundings.* Springs to rest on all free faces (`foundation_pa_per_m`), fixed structures. A part of the body that has
+//! *Foundation.* The surroundings are springs to rest on all free faces (`foundation_pa_per_m`), fixed structures. A part of the body that has
 //! neither stays at rest unless it is held.
 //!
 //! ```
@@ -41,6 +41,7 @@ mod guess;
 mod hexahedron;
 mod lanes;
 mod level;
+mod levels;
 mod material;
 mod model;
 mod multigrid;
@@ -51,13 +52,14 @@ mod smooth;
 mod solve;
 mod state;
 mod sweep;
+mod take_up;
 mod tissue;
 mod transfer;
 
 pub use material::{FemProblem, FemSettings, Integration, MAX_POISSON_RATIO, Material, Structure};
 pub use model::FemModel;
 pub use real::Real;
-pub use solve::{FemReport, REACH, SolveSettings, TipPatch, prepare, step};
+pub use solve::{FemReport, SolveSettings, TipPatch, prepare, step};
 pub use state::FemState;
 pub use tissue::FemTissue;
 

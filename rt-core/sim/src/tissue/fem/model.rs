@@ -1,8 +1,9 @@
 //! What an elastic body is: built once, never changed.
 
-use super::grid::Grid;
+use super::grid::{Grid, corners};
 use super::hexahedron::Stiffness;
-use super::level::{Cells, Level, coarser, corners};
+use super::level::Level;
+use super::levels::{Cells, coarser};
 use super::material::{FemProblem, FemSettings, Structure, problems_of};
 use super::real::Real;
 use super::sweep::Planes;
@@ -74,10 +75,12 @@ impl<T: Real> FemModel<T> {
         })
     }
 
+    /// Elements and their neighbours.
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
     }
 
+    /// Number of elements.
     pub fn element_count(&self) -> usize {
         self.lattice.element_count()
     }
@@ -87,6 +90,7 @@ impl<T: Real> FemModel<T> {
         self.part.iter().filter(|&&part| part != NO_PART).count()
     }
 
+    /// Levels of the multigrid.
     pub fn level_count(&self) -> usize {
         self.levels.len()
     }

@@ -29,6 +29,8 @@ pub(super) struct Stage<T> {
 
 #[derive(Clone, Debug)]
 pub(super) struct Multigrid<T> {
+    /// Nodes of the finest grid along x, y, z.
+    pub nodes: [usize; 3],
     pub stages: Vec<Stage<T>>,
     pub work: Planes<T>,
     line: Vec<T>,
@@ -46,6 +48,7 @@ impl<T: Real> Multigrid<T> {
             r: zeros(level.grid.len()),
         };
         Multigrid {
+            nodes: levels[0].grid.nodes,
             stages: levels.iter().map(stage).collect(),
             work: Planes::new(levels[0].grid.stride * levels[0].grid.nodes[1]),
             line: vec![T::of(1.0); 2 * levels[0].grid.stride + 2 * LANES],

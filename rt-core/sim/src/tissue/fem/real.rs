@@ -20,9 +20,13 @@ pub trait Real:
     + std::fmt::Debug
     + 'static
 {
+    /// 0.
     const ZERO: Self;
+    /// Distance from 1 to the next larger number.
     const EPSILON: f64;
+    /// The nearest number of this type.
     fn of(value: f64) -> Self;
+    /// The same number in f64.
     fn to_f64(self) -> f64;
 }
 

@@ -95,9 +95,9 @@ impl<T: Real> LineOp<T> for Residual<'_, T> {
     #[inline(always)]
     fn line(&mut self, at: Range<usize>, forces: [&[T]; 3], _: [&mut [T]; 3]) {
         let inverse = &self.inverse_diagonal[at.clone()];
-        for c in 0..3 {
+        for (c, forces) in forces.into_iter().enumerate() {
             let r = &mut self.r[c][at.clone()];
-            difference_where_free(inverse, &self.b[c][at.clone()], forces[c], r);
+            difference_where_free(inverse, &self.b[c][at.clone()], forces, r);
             self.square += dot(r, r);
         }
     }

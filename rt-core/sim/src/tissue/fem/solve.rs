@@ -7,10 +7,8 @@ use super::multigrid::FEW_CYCLES;
 use super::output;
 use super::real::Real;
 use super::state::FemState;
-use crate::tissue::HeldOutcome;
+use crate::tissue::{HeldOutcome, REACH};
 
-/// Farthest from rest that a held element is followed, in elements.
-pub const REACH: f64 = 2048.0;
 /// A direction that may come to be is prepared if this part of the displacement is outside those known.
 const EXPECTED_DIRECTION: f64 = 0.02;
 /// Where few cycles are allowed, those after the first are only for a residual above so many tolerances: what is left then
@@ -21,6 +19,7 @@ const ROUGH: f64 = 10.0;
 /// as its force goes to zero with the lattice's spacing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipPatch {
+    /// The element in the middle.
     pub element: u32,
     /// Where the element's centre is held, in the scene frame.
     pub position_m: [f64; 3],
@@ -28,6 +27,7 @@ pub struct TipPatch {
     pub edge_m: f64,
 }
 
+/// When a step ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolveSettings {
     /// Forces left on free nodes, relative to those that the moved patch would cause in a body at rest.
@@ -36,12 +36,16 @@ pub struct SolveSettings {
     pub max_cycles: u32,
 }
 
+/// What came of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FemReport {
+    /// What became of the held patch.
     pub held: HeldOutcome,
+    /// Multigrid cycles that the step took.
     pub cycles: u32,
     /// As in `SolveSettings::relative_tolerance`, measured after the step.
     pub relative_residual: f64,
+    /// Within the tolerance, and finite.
     pub converged: bool,
     /// Force with which the tip moves the patch; the tissue pushes the tip with the opposite.
     pub tip_force_n: [f64; 3],

@@ -21,8 +21,11 @@ const FELT: f64 = 0.2;
 /// Linear elasticity, quasi-static, on a scene's lattice.
 #[derive(Clone)]
 pub struct FemTissue<T = f32> {
+    /// Topology, materials and multigrid.
     pub model: FemModel<T>,
+    /// Where every element is.
     pub state: FemState<T>,
+    /// When a step ends.
     pub settings: SolveSettings,
 }
 

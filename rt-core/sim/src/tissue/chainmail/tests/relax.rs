@@ -17,7 +17,7 @@ fn elastic() -> TissueParameters {
         relaxation_iterations: 10,
         relaxation_weight: 1.7,
         shear_to_axial: 0.25,
-        ground_stiffness: 0.02,
+        foundation_to_axial: 0.02,
         ..TissueParameters::default()
     }
 }
@@ -43,7 +43,7 @@ fn equilibrium(scene: &Scene, p: &TissueParameters, component: usize, held: impl
             (a[(row, row)], b[row]) = (1.0, value);
             continue;
         }
-        a[(row, row)] = p.ground_stiffness;
+        a[(row, row)] = p.foundation_to_axial;
         for (direction, neighbour) in scene.lattice.neighbours(e).into_iter().enumerate() {
             let Some(other) = neighbour else { continue };
             let stiffness = if direction / 2 == component {
@@ -93,8 +93,8 @@ fn body_held_still_comes_to_the_equilibrium_of_its_springs() {
             assert!(report.converged && report.held == HeldOutcome::Followed);
         }
         let mut worst = 0.0_f64;
-        for component in 0..3 {
-            let at_rest = equilibrium(&scene, &p, component, |e| (e == element).then_some(way[component]));
+        for (component, way) in way.into_iter().enumerate() {
+            let at_rest = equilibrium(&scene, &p, component, |e| (e == element).then_some(way));
             for (e, expected) in at_rest.iter().enumerate() {
                 let now = state.deformed(&model).displacement(e as u32)[component];
                 worst = worst.max((now - expected).abs());
@@ -113,7 +113,7 @@ fn size_after(weight: f32, passes: u32) -> f32 {
         iterations: 1,
         weight,
         shear: 0.25,
-        ground: 0.0,
+        foundation: 0.0,
     };
     limits.relaxation = Some(relaxation);
     model.set_limits(limits);
@@ -182,7 +182,7 @@ fn relaxed_body_keeps_its_limits_and_reports_them_honestly() {
 #[test]
 fn relaxation_alone_brings_a_body_home_and_to_exact_rest() {
     let p = TissueParameters {
-        ground_stiffness: 0.5,
+        foundation_to_axial: 0.5,
         ..elastic()
     };
     let model = model_with(&test_bodies::with_hole(), &p);

@@ -1,6 +1,6 @@
 //! Claims about the state: same bytes, no heap, copies, scale, new limits.
 
-use super::{held_at, model_of, model_with, paper};
+use super::{held_at, model_of, model_with, paper, reference::Reference};
 use crate::limits::TissueParameters;
 use crate::scene::test_bodies::{self, Random};
 use crate::tissue::chainmail::*;
@@ -119,6 +119,33 @@ fn steps_copies_and_new_limits_do_not_touch_the_heap() {
     }
 }
 
+/// Such a state used to be followed out of its bounds.
+#[test]
+fn state_of_another_body_with_as_many_elements_and_runs_is_refused() {
+    let other = |labels| {
+        let model = model_of(&labels);
+        TissueState::at_rest(&model)
+    };
+    let upright = model_of(&test_bodies::block([2, 2, 3]));
+    let mut flat = other(test_bodies::block([2, 3, 2]));
+    let held = Some(held_at(&upright, 9, [0.5, 0.0, 0.0]));
+    assert!(!step(&upright, &mut flat, held, 5e-3).converged);
+
+    let bony = model_of(&test_bodies::bone());
+    let mut soft_labels = test_bodies::bone();
+    soft_labels.structures.clear();
+    soft_labels
+        .cells
+        .iter_mut()
+        .for_each(|label| *label = u8::from(*label != 0));
+    let mut soft = other(soft_labels);
+    let free = (0..bony.element_count() as u32)
+        .find(|&e| !bony.is_fixed(e))
+        .expect("tissue");
+    let report = step(&bony, &mut soft, Some(held_at(&bony, free, [0.5, 0.0, 0.0])), 5e-3);
+    assert!(!report.converged);
+}
+
 #[test]
 fn recovery_follows_the_exponential_however_long_it_goes_on() {
     let model = model_of(&test_bodies::block([6, 6, 6]));
@@ -157,7 +184,7 @@ fn tighter_limits_are_met_by_the_next_step_that_holds() {
         ..TissueParameters::default()
     };
     tissue.set_limits(tight.validate().expect("valid"));
-    // With nothing held the violation is told, not mended.
+    // With nothing held the violation is reported, not mended.
     let mut free = tissue.clone();
     let report = free.step(None, 0.0);
     assert!(!report.converged && report.residual > 0.1, "{report:?}");
@@ -206,7 +233,7 @@ fn f32_and_looking_only_at_what_moves_cost_next_to_nothing() {
     };
     for parameters in [TissueParameters::default(), relaxed] {
         let model = model_with(&test_bodies::block([15, 13, 14]), &parameters);
-        let (mut state, mut reference) = (TissueState::at_rest(&model), reference::Reference::at_rest(&model));
+        let (mut state, mut reference) = (TissueState::at_rest(&model), Reference::at_rest(&model));
         let element = model.lattice().element_of_cell(7, 6, 2).expect("inside");
         let mut worst = 0.0_f64;
         for tick in 0..200 {

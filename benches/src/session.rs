@@ -1,0 +1,163 @@
+//! The real loops under a simulated hand, on one thread and one clock: a session that can be repeated.
+
+use nalgebra::Vector3;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use stylet_hw::{
+    Device, DeviceFault, DeviceInfo, Hand, HandGoal, Sample, SimulatedPhantom, SimulatedPhantomConfig, Wrench,
+};
+use stylet_runtime::rt::exchange::HapticOrder;
+use stylet_runtime::rt::haptic_tape::HapticMemory;
+use stylet_runtime::rt::response::TissueResponse;
+use stylet_runtime::rt::world::World;
+use stylet_runtime::stepped::SteppedLoops;
+use stylet_sim::force::ForceParameters;
+use stylet_sim::force::chain::{ChainOutput, ChainState};
+use stylet_sim::needle::{LayerKind, NeedleParameters};
+
+/// A simulated Phantom that the force loop owns and the measurement looks into.
+#[derive(Clone)]
+struct SharedPhantom(Arc<Mutex<SimulatedPhantom>>);
+
+impl SharedPhantom {
+    fn phantom(&self) -> MutexGuard<'_, SimulatedPhantom> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Device for SharedPhantom {
+    fn info(&self) -> DeviceInfo {
+        self.phantom().info()
+    }
+
+    fn read(&mut self, dt_s: f64) -> Result<Sample, DeviceFault> {
+        self.phantom().read(dt_s)
+    }
+
+    fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceFault> {
+        self.phantom().write(wrench)
+    }
+
+    fn set_hand_goal(&mut self, goal: &HandGoal) {
+        self.phantom().set_hand_goal(goal);
+    }
+
+    fn stop_hand(&mut self) {
+        self.phantom().stop_hand();
+    }
+}
+
+/// An insertion along z. Ticks of the force loop are 1 ms apart.
+pub struct Session {
+    loops: SteppedLoops,
+    device: SharedPhantom,
+}
+
+impl Session {
+    /// Engaged, the tip at `start`, the needle along +z; the tissue answers every `tissue_every`th tick.
+    pub fn new(world: World, start: Vector3<f64>, hand: Hand, tissue_every: u64) -> Self {
+        Self::with_force(world, start, hand, tissue_every, ForceParameters::default())
+    }
+
+    /// As [`new`](Self::new), with other parameters of the force.
+    pub fn with_force(
+        world: World,
+        start: Vector3<f64>,
+        hand: Hand,
+        tissue_every: u64,
+        force: ForceParameters,
+    ) -> Self {
+        let device = SharedPhantom(Arc::new(Mutex::new(SimulatedPhantom::new(SimulatedPhantomConfig {
+            hand,
+            start_tip_in_world: start,
+            ..SimulatedPhantomConfig::default()
+        }))));
+        let mut memory = HapticMemory::new(&device.info(), (NeedleParameters::default(), force), 0);
+        memory.chain.gate.engage();
+        Self {
+            loops: SteppedLoops::new(Box::new(world), Box::new(device.clone()), &memory, tissue_every),
+            device,
+        }
+    }
+
+    /// Orders the hand to bring the tip there.
+    pub fn go_to(&mut self, tip: Vector3<f64>, speed_m_per_s: f64) {
+        let goal = HandGoal {
+            tip_in_world: tip,
+            direction: Vector3::z(),
+            speed_m_per_s,
+            acceleration_m_per_s2: 20.0 * speed_m_per_s.max(0.05),
+        };
+        let order = HapticOrder::Hand { ticket: 0, goal };
+        let _ = self.loops.bridge.haptic_orders.push(order);
+    }
+
+    /// One tick of the force loop, and one of the tissue loop where it is due.
+    ///
+    /// # Panics
+    /// When a fault turned the force off: what is measured then is no insertion.
+    pub fn step(&mut self) -> ChainOutput {
+        let output = self.loops.step();
+        let bridge = &mut self.loops.bridge;
+        for notices in [&mut bridge.haptic_notices, &mut bridge.tissue_notices] {
+            while notices.pop().is_ok() {}
+        }
+        assert_eq!(self.loops.haptic.state.fault, 0, "the force loop raised a fault");
+        output
+    }
+
+    /// Ticks for so long.
+    pub fn run(&mut self, seconds: f64) -> Vec<ChainOutput> {
+        (0..(seconds * 1e3).round() as u64).map(|_| self.step()).collect()
+    }
+
+    /// What the force chain keeps from tick to tick.
+    pub fn chain(&self) -> &ChainState {
+        self.loops.haptic.chain()
+    }
+
+    /// The newest answer of the tissue.
+    pub fn response(&self) -> &TissueResponse {
+        self.loops.tissue.response()
+    }
+
+    /// The body as it is deformed now.
+    pub fn world(&self) -> &World {
+        self.loops.tissue.world()
+    }
+
+    /// Place of the tip, without the error of the encoders, m.
+    pub fn true_tip_in_world(&self) -> Vector3<f64> {
+        *self.device.phantom().true_tip_in_world()
+    }
+}
+
+/// 5 mm before the tissue, on the axis of the gland.
+pub fn axis_start(world: &World) -> Vector3<f64> {
+    let lattice = &world.scene.lattice;
+    let elements = 0..lattice.element_count() as u32;
+    let (mut sum, mut count) = (Vector3::zeros(), 0.0);
+    for element in elements.filter(|&e| world.layer(e) == LayerKind::Gland) {
+        sum += Vector3::from(lattice.rest_m(element));
+        count += 1.0;
+    }
+    let mut start = sum / count;
+    let on_axis = |e: &u32| {
+        let at = lattice.rest_m(*e);
+        (0..2).all(|a| (at[a] - start[a]).abs() <= lattice.spacing_m)
+    };
+    let first_m = (0..lattice.element_count() as u32)
+        .filter(on_axis)
+        .map(|e| lattice.rest_m(e)[2]);
+    start.z = first_m.fold(f64::INFINITY, f64::min) - 0.5 * lattice.spacing_m - 5e-3;
+    start
+}
+
+/// How far the gland as a whole has moved along z.
+pub fn gland_shift_m(world: &World) -> f64 {
+    let body = world.tissue.deformed();
+    let gland = (0..body.lattice.element_count() as u32).filter(|&e| world.layer(e) == LayerKind::Gland);
+    let (sum, count) = gland.fold((0.0, 0.0), |(sum, count), e| {
+        (sum + body.displacement(e)[2], count + 1.0)
+    });
+    sum / count * body.lattice.spacing_m
+}

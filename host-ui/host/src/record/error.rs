@@ -1,0 +1,60 @@
+//! Why a session cannot be recorded, or a recording not be used.
+
+use crate::link::LinkError;
+use std::path::{Path, PathBuf};
+use stylet_base::WriteError;
+
+/// Why a session cannot be recorded, or a recording not be used; each text says what to do where something can be done.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// No core was found, or it does not answer; the text says what to do.
+    #[error("{0}")]
+    NoCore(String),
+    /// A request could not be sent.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The core refused to save its flight recording; the text says why.
+    #[error("{0}")]
+    Refused(String),
+    /// The core did not do what it accepted.
+    #[error("the core did not write its flight recording in time")]
+    NoFlight,
+    /// The signals that end a recording cannot be caught.
+    #[error("{0}")]
+    Signals(String),
+    /// No thread could be started.
+    #[error("no thread could be started to write: {0}")]
+    NoThread(std::io::Error),
+    /// The thread that writes failed by itself.
+    #[error("the recording ended by itself")]
+    Panicked,
+    /// The recording lacks ticks.
+    #[error("{ticks} ticks are missing in {gaps} gaps")]
+    Missing {
+        /// Ticks that are missing.
+        ticks: u64,
+        /// Gaps that they are missing in.
+        gaps: usize,
+    },
+    /// A file cannot be created, read or written; the text says why.
+    #[error("{}: {why}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// An exported file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+impl RecordError {
+    /// An error about a file, which it names.
+    pub(super) fn of_file(path: &Path, why: impl ToString) -> Self {
+        Self::File {
+            path: path.to_owned(),
+            why: why.to_string(),
+        }
+    }
+}

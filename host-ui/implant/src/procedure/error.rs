@@ -1,0 +1,68 @@
+//! Why a headless procedure ends early.
+
+use crate::plan::{PlanError, RehearsalError};
+use crate::score::ScoreError;
+use crate::workflow::RunError;
+use std::path::PathBuf;
+use stylet_base::WriteError;
+use stylet_host::link::LinkError;
+
+/// Why a procedure ends early; each text says what to do where something can be done.
+#[derive(Debug, thiserror::Error)]
+pub enum ProcedureError {
+    /// The user ended it.
+    #[error("interrupted")]
+    Interrupted,
+    /// No core was found, or it does not answer; the text says what to do.
+    #[error("{0}")]
+    NoCore(String),
+    /// The core cannot be started.
+    #[error("{} cannot be started ({why}); check --core", path.display())]
+    CoreNotStarted {
+        /// The program.
+        path: PathBuf,
+        /// What the system reported.
+        why: std::io::Error,
+    },
+    /// The core that was started has ended.
+    #[error("the rt-core that was started has ended ({0}); its message stands above")]
+    CoreEnded(std::process::ExitStatus),
+    /// The core refused the scene; the text says why.
+    #[error("the core refused the scene: {0}")]
+    SceneRefused(String),
+    /// The core did not send what the procedure needs.
+    #[error("{0}")]
+    NothingReceived(&'static str),
+    /// A file of the scene, the plan's seeds or the source cannot be used; the text names it.
+    #[error("{0}")]
+    Input(String),
+    /// A request could not be sent.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The plan cannot be used.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// A needle could not be rehearsed.
+    #[error(transparent)]
+    Rehearsal(#[from] RehearsalError),
+    /// A step could not be completed.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The implant cannot be scored.
+    #[error(transparent)]
+    Score(#[from] ScoreError),
+    /// The folder of the results cannot be made.
+    #[error("{} cannot be written ({why}); choose another folder with --out", folder.display())]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// What the system reported.
+        why: std::io::Error,
+    },
+    /// A result cannot be put into JSON.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+    /// A file of the results cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}

@@ -1,0 +1,103 @@
+//! What the operator asks for, as plain data: pictures, panels and keys return it, the window carries it out.
+
+use crate::settings::Layout;
+use std::path::PathBuf;
+use stylet_implant::plan::{Hole, Row};
+use stylet_shm_schema::Request;
+
+/// What the operator asked for. The window carries it out after all panels are drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Action {
+    /// Sends a request without a payload.
+    Send(Request),
+    PlanSeeds,
+    PlaceNeedle,
+    Insert,
+    Retract,
+    /// Depth along the path from the entry, m.
+    MoveTo(f64),
+    /// A hand on the needle: depth along the path, m. Carried out once a frame at most.
+    DriveTo(f64),
+    /// The main action of the present step.
+    Next,
+    /// Undoes the last step, where that is possible.
+    Undo,
+    /// Redoes the change of the plan that was undone last.
+    Redo,
+    Plan(PlanAction),
+    RunAll,
+    StopRun,
+    LoadScene(PathBuf),
+    /// Loads an image of the patient of the present scene for the slices.
+    LoadImage(PathBuf),
+    CancelLoad,
+    /// Loads the scene of this index in [`stylet_shm_schema::BUILTIN_SCENES`].
+    LoadBuiltinScene(usize),
+    OpenParameters,
+    ToggleHelp,
+    ResetView,
+    LookFrom(Viewpoint),
+    SetLayout(Layout),
+    NextLayout,
+    ToggleFollowTip,
+    ToggleMeasure,
+    ToggleIsodose,
+    ToggleImage,
+    ToggleTheme,
+    /// Saves the window as PNG.
+    SavePicture,
+    /// Saves the debrief as files.
+    SaveDebrief,
+    /// The refusals shown so far were read.
+    DismissRefusals,
+    /// The message that a device was unplugged was read.
+    DismissDisconnected,
+}
+
+/// What the operator asks for in a plan of many needles; needles are counted from 0.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PlanAction {
+    /// Begins an empty plan.
+    Begin,
+    Automatic,
+    Discard,
+    Add(Hole),
+    Remove(usize),
+    Move(usize, Hole),
+    SetRow(usize, Row),
+    /// Strength of each seed, U.
+    SetStrength(f64),
+    FitStrength,
+    Compensate,
+    Cancel,
+    Import(PathBuf),
+    Export(PathBuf),
+    /// The next needle with seeds becomes the one to insert.
+    NextNeedle,
+    /// Moves the slices to this depth from the template's face, m.
+    LookAt(f64),
+}
+
+/// A place that the three-dimensional picture is looked at from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Viewpoint {
+    Oblique,
+    Perineum,
+    Side,
+    Above,
+    Needle,
+}
+
+impl Viewpoint {
+    pub const ALL: [Self; 5] = [Self::Oblique, Self::Perineum, Self::Side, Self::Above, Self::Needle];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Oblique => "Oblique",
+            Self::Perineum => "From the perineum",
+            Self::Side => "From the side",
+            Self::Above => "From above",
+            Self::Needle => "Along the needle",
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! The dose that is computed in the background, against the formula.
+
+use super::*;
+use bytemuck::Zeroable;
+use std::time::{Duration, Instant};
+use stylet_shm_schema::{SceneHeader, role};
+
+fn pose(z_m: f64) -> SeedPose {
+    SeedPose {
+        position_m: [0.02, 0.02, z_m],
+        axis: [0.0, 0.0, 1.0],
+        dropped_at_m: [0.02, 0.02, z_m],
+    }
+}
+
+fn scene() -> Arc<SceneModel> {
+    let mut header = SceneHeader::zeroed();
+    header.labels.dims = [20, 20, 20];
+    (header.labels.origin_m, header.labels.spacing_m) = ([1e-3; 3], 2e-3);
+    (header.target_lower_m, header.target_upper_m) = ([0.0; 3], [0.04; 3]);
+    header.structure_count = 1;
+    header.structures[0].role = role::TARGET;
+    let model = SceneModel {
+        header,
+        rest_m: Vec::new(),
+        triangles: Vec::new(),
+        labels: vec![1; 8000],
+    };
+    Arc::new(model)
+}
+
+fn wait(worker: &mut DoseWorker, scene: &Arc<SceneModel>, poses: &[SeedPose]) -> Arc<DoseResult> {
+    let start = Instant::now();
+    loop {
+        worker.take(Some(scene), &DoseRequest::in_tissue(poses, 0.5));
+        if let Some(picture) = worker.latest()
+            && picture.seeds == poses.len()
+            && !worker.is_computing()
+        {
+            return picture.clone();
+        }
+        assert!(start.elapsed() < Duration::from_secs(20), "no dose arrived");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+#[test]
+fn the_shell_of_a_seed_lies_where_the_formula_gives_that_dose() {
+    let (scene, poses) = (scene(), [pose(0.02)]);
+    let mut worker = DoseWorker::new();
+    let picture = wait(&mut worker, &scene, &poses);
+    let source = Source::parse(include_str!("../../../sources/i125_6711.toml")).expect("checked in");
+    let kernel = DoseKernel::new(&source, Interval::ALL);
+    let shell = &picture.shells[0];
+    assert!(!shell.points_m.is_empty());
+    // No farther from the formula's surface than a voxel: one voxel nearer to the seed there is more, one farther less.
+    let level_gy = 0.5 * 145.0;
+    for p in &shell.points_m {
+        let out: Vec<f64> = (0..3).map(|a| f64::from(p[a]) - poses[0].position_m[a]).collect();
+        let r = out.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let dose_at = |r_m: f64| {
+            let place = [0, 1, 2].map(|a| poses[0].position_m[a] + out[a] / r * r_m);
+            kernel.exact_at_gy(&seed(&poses[0], 0.5), place)
+        };
+        let (nearer, farther) = (dose_at(r - SPACING_M), dose_at(r + SPACING_M));
+        assert!(
+            nearer > level_gy && farther < level_gy,
+            "{nearer} to {farther} Gy about {p:?}"
+        );
+    }
+    assert_eq!(picture.figures.len(), 3, "{:?}", picture.figures);
+    assert!(picture.figures.iter().all(|f| f.structure == "target"));
+}
+
+#[test]
+fn it_is_computed_again_only_when_a_seed_was_moved_added_or_removed() {
+    let scene = scene();
+    let mut worker = DoseWorker::new();
+    let first = wait(&mut worker, &scene, &[pose(0.02)]).number;
+    let same = wait(&mut worker, &scene, &[pose(0.0201)]).number;
+    assert_eq!(first, same, "a tenth of a millimetre");
+    worker.take(Some(&scene), &DoseRequest::in_tissue(&[pose(0.023)], 0.5));
+    assert!(worker.is_computing());
+    let two = wait(&mut worker, &scene, &[pose(0.023), pose(0.03)]);
+    assert_eq!(two.seeds, 2);
+    worker.take(Some(&scene), &DoseRequest::in_tissue(&[], 0.5));
+    assert!(worker.latest().is_none(), "no seeds, no dose");
+}

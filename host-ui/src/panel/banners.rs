@@ -1,0 +1,268 @@
+//! The banners under the bar: what is wrong with the core, the force and the controllers, and what to do.
+
+use crate::action::Action;
+use crate::shown::Shown;
+use crate::theme;
+use crate::theme::Tokens;
+use egui::{Color32, RichText};
+use stylet_host::link::LinkStatus;
+use stylet_shm_schema::{Fault, Request};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BannerLevel {
+    Bad,
+    Warn,
+    Info,
+}
+
+impl BannerLevel {
+    fn color(self, tokens: &Tokens) -> Color32 {
+        match self {
+            Self::Bad => tokens.bad,
+            Self::Warn => tokens.warn,
+            Self::Info => tokens.accent,
+        }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct Banner {
+    pub level: BannerLevel,
+    pub title: &'static str,
+    pub text: String,
+    /// The one thing to do about it, where a click can do it.
+    pub remedy: Option<(&'static str, Action)>,
+}
+
+/// Worst first. Without a core there is no banner about its force.
+pub fn banners(shown: &Shown) -> Vec<Banner> {
+    let mut list = of_core(shown);
+    list.extend(of_controllers(shown));
+    list
+}
+
+/// Devices that were unplugged, and devices that may not be read.
+fn of_controllers(shown: &Shown) -> Vec<Banner> {
+    let banner = |title, text, remedy| Banner {
+        level: BannerLevel::Warn,
+        title,
+        text,
+        remedy,
+    };
+    let unplugged = shown.disconnected.as_ref().map(|name| {
+        let text = format!("{name}. The needle stays where it is; keys and mouse still move it.");
+        banner("Unplugged", text, Some(("Dismiss", Action::DismissDisconnected)))
+    });
+    let denied = shown.controllers.denied.iter();
+    let denied = denied.map(|why| banner("A controller is not read", why.clone(), None));
+    unplugged.into_iter().chain(denied).collect()
+}
+
+fn of_core(shown: &Shown) -> Vec<Banner> {
+    match &shown.status {
+        LinkStatus::Absent { why } => return vec![absent(shown, why)],
+        LinkStatus::Silent { since } => {
+            return vec![Banner {
+                level: BannerLevel::Bad,
+                title: "rt-core is silent",
+                text: format!(
+                    "No data for {:.1} s. The display is out of date. If this persists, check the terminal where rt-core runs.",
+                    since.as_secs_f64()
+                ),
+                remedy: None,
+            }];
+        }
+        LinkStatus::Live => {}
+    }
+    let mut list = Vec::new();
+    let fault = shown.fault();
+    if fault != Some(Fault::None) {
+        list.push(Banner {
+            level: BannerLevel::Bad,
+            title: "Fault: the force is off",
+            text: fault.map_or(
+                "rt-core reports a fault that this program does not know".to_owned(),
+                |f| sentence(f.message()),
+            ),
+            remedy: Some(("Re-arm", Action::Send(Request::Engage))),
+        });
+    }
+    if shown.state.is_some() && !shown.is_real_time() {
+        list.push(not_real_time(shown));
+    }
+    if shown.state.is_some() && fault == Some(Fault::None) {
+        list.extend(force_is_off(shown));
+    }
+    list.extend(refused(shown));
+    list
+}
+
+fn force_is_off(shown: &Shown) -> Option<Banner> {
+    if !shown.is_engaged() {
+        return Some(Banner {
+            level: BannerLevel::Warn,
+            title: "The force is off",
+            text: "The device is moved but not felt. Key E turns it on.".to_owned(),
+            remedy: Some(("Turn it on", Action::Send(Request::Engage))),
+        });
+    }
+    shown.is_waiting().then(|| Banner {
+        level: BannerLevel::Warn,
+        title: "The force waits",
+        text: "It would begin with a jump. Move the needle until it is small, best outside the tissue.".to_owned(),
+        remedy: None,
+    })
+}
+
+/// Until they are dismissed: the refused request may be that of another host.
+fn refused(shown: &Shown) -> Option<Banner> {
+    (shown.refusals > 0).then(|| Banner {
+        level: BannerLevel::Info,
+        title: "rt-core refused",
+        text: match shown.last_refusal.as_str() {
+            "" => format!("{} requests", shown.refusals),
+            why => format!("{} requests; the last: {}", shown.refusals, why.replace('\n', "; ")),
+        },
+        remedy: Some(("Dismiss", Action::DismissRefusals)),
+    })
+}
+
+fn absent(shown: &Shown, why: &str) -> Banner {
+    let text = if why.is_empty() {
+        format!("Start it in another terminal: rt-core --instance {}", shown.instance)
+    } else {
+        sentence(why)
+    };
+    Banner {
+        level: BannerLevel::Bad,
+        title: "rt-core is absent",
+        text,
+        remedy: None,
+    }
+}
+
+fn not_real_time(shown: &Shown) -> Banner {
+    let advice = shown.session.map(|s| s.advice.read()).unwrap_or_default();
+    let asked = shown.session.is_some_and(|s| s.no_rt_asked != 0);
+    let text = match (advice.trim(), asked) {
+        ("", true) => {
+            "rt-core was started with --no-rt: timing measured here is not that of a real-time run.".to_owned()
+        }
+        ("", false) => "Run rt-core doctor: it shows what is missing and what to do.".to_owned(),
+        (advice, _) => advice.replace('\n', "  "),
+    };
+    Banner {
+        level: BannerLevel::Warn,
+        title: "Not real-time",
+        text,
+        remedy: None,
+    }
+}
+
+fn sentence(text: &str) -> String {
+    let mut chars = text.chars();
+    chars
+        .next()
+        .map(|first| format!("{}{}.", first.to_uppercase(), chars.as_str()))
+        .unwrap_or_default()
+}
+
+pub fn banners_ui(ui: &mut egui::Ui, list: &[Banner]) -> Option<Action> {
+    let mut action = None;
+    let tokens = theme::of(ui);
+    let ink = tokens.on_signal;
+    for banner in list {
+        let fill = banner.level.color(tokens);
+        egui::Frame::new()
+            .fill(fill)
+            .inner_margin(egui::Margin::symmetric(10, 5))
+            .show(ui, |ui| {
+                ui.set_min_width(ui.available_width());
+                ui.horizontal(|ui| {
+                    ui.label(RichText::new(banner.title).strong().size(15.0).color(ink));
+                    if let Some((name, remedy)) = &banner.remedy
+                        && ui.button(*name).clicked()
+                    {
+                        action = Some(remedy.clone());
+                    }
+                    let body = RichText::new(&banner.text).color(ink);
+                    // Two hyphens of a command must not look like one dash.
+                    let body = if banner.text.contains("--") {
+                        body.monospace()
+                    } else {
+                        body
+                    };
+                    ui.add(egui::Label::new(body).wrap()).on_hover_text(&banner.text);
+                });
+            });
+    }
+    action
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+    use stylet_shm_schema::{HapticState, flags};
+
+    fn live() -> Shown {
+        let mut shown = Shown::empty("lab");
+        shown.status = LinkStatus::Live;
+        let mut state = HapticState::zeroed();
+        state.flags = flags::REAL_TIME | flags::ENGAGED;
+        shown.state = Some(state);
+        shown
+    }
+
+    #[test]
+    fn no_banner_without_a_problem_and_absence_shows_what_to_type() {
+        assert!(banners(&live()).is_empty());
+        let list = banners(&Shown::empty("lab"));
+        assert!(list[0].text.contains("rt-core --instance lab"), "{}", list[0].text);
+    }
+
+    #[test]
+    fn a_force_that_is_off_or_waits_and_a_refusal_each_have_their_banner() {
+        let titles = |shown: &Shown| banners(shown).iter().map(|b| b.title).collect::<Vec<_>>();
+        let mut shown = live();
+        if let Some(state) = &mut shown.state {
+            state.flags |= flags::WAITING;
+        }
+        assert_eq!(titles(&shown), ["The force waits"]);
+        if let Some(state) = &mut shown.state {
+            state.flags = flags::REAL_TIME;
+        }
+        shown.refusals = 2;
+        shown.last_refusal = "needle.puncture_depth = 1000 mm".to_owned();
+        assert_eq!(titles(&shown), ["The force is off", "rt-core refused"]);
+        assert!(banners(&shown)[1].text.contains("puncture_depth"));
+    }
+
+    #[test]
+    fn an_unplugged_controller_and_one_without_rights_are_shown_with_or_without_a_core() {
+        for mut shown in [live(), Shown::empty("lab")] {
+            let before = banners(&shown).len();
+            shown.disconnected = Some("Pad".to_owned());
+            shown
+                .controllers
+                .denied
+                .push("Cap may not be read. Run: that".to_owned());
+            let list = banners(&shown);
+            assert_eq!(list.len(), before + 2);
+            assert!(list[before].text.contains("Pad. The needle stays where it is"));
+            assert_eq!(list[before].remedy, Some(("Dismiss", Action::DismissDisconnected)));
+            assert!(list[before + 1].text.contains("Run: that"));
+        }
+    }
+
+    #[test]
+    fn fault_comes_first_and_an_unknown_one_is_a_fault() {
+        let mut shown = live();
+        if let Some(state) = &mut shown.state {
+            (state.fault, state.flags) = (999, 0);
+        }
+        let list = banners(&shown);
+        assert_eq!(list[0].level, BannerLevel::Bad);
+        assert_eq!(list[1].title, "Not real-time");
+    }
+}

@@ -1,0 +1,70 @@
+//! Which needle of a plan is next.
+
+use super::{Progress, is_needle_done, next_action, progress};
+use crate::action::{Action, PlanAction};
+use crate::planner::Planner;
+use crate::planner::tests::{planned, planner, planning};
+use crate::shown::Shown;
+use bytemuck::Zeroable;
+use stylet_host::link::LinkStatus;
+use stylet_shm_schema::{HapticState, PlanInForce, SceneHeader, SeedPose, flags};
+
+/// The needle at work in force, its tip at a depth, seeds dropped so far along their needles.
+fn shown(planner: &mut Planner, depth_m: f64, dropped_m: &[f64]) -> Shown {
+    let mut shown = Shown::empty("lab");
+    shown.status = LinkStatus::Live;
+    shown.scene = Some(SceneHeader::zeroed());
+    shown.planning = planning(planner);
+    let mut state = HapticState::zeroed();
+    let at_work = shown.planning.at_work().map(|(_, needle)| needle.clone());
+    if let Some(needle) = &at_work {
+        let mut plan = PlanInForce::zeroed();
+        (plan.generation, plan.seed_count) = (1, 2);
+        (plan.entry_m, plan.direction) = (needle.entry_m, needle.direction);
+        for (seed, place_m) in plan.seeds.iter_mut().zip(needle.seeds_m()) {
+            seed.position_m = place_m;
+        }
+        shown.plan = Some(plan);
+        (state.tick, state.tip_in_scene_m) = (1, needle.at_m(depth_m));
+        state.flags = if depth_m > 0.02 { flags::PUNCTURED } else { 0 };
+    }
+    shown.state = Some(state);
+    let pose = |(number, &along_m): (usize, &f64)| {
+        let position_m = planned().needles[number / 2].at_m(along_m);
+        SeedPose {
+            position_m,
+            axis: [0.0, 0.0, 1.0],
+            dropped_at_m: position_m,
+        }
+    };
+    shown.seeds = dropped_m.iter().enumerate().map(pose).collect();
+    shown
+}
+
+#[test]
+fn the_next_needle_is_the_thing_to_do_once_one_is_outside_and_its_seeds_are_dropped() {
+    let mut planner = planner();
+    let next = Some(Action::Plan(PlanAction::NextNeedle));
+    let before = shown(&mut planner, 0.0, &[]);
+    assert_eq!(
+        (progress(&before), next_action(&before)),
+        (Progress::Plan, next.clone())
+    );
+    planner.begin_needle(0, 0);
+    let placed = shown(&mut planner, 0.0, &[]);
+    assert_eq!(next_action(&placed), Some(Action::Insert));
+    let dropped = shown(&mut planner, 0.07, &[0.08, 0.07]);
+    assert_eq!(next_action(&dropped), Some(Action::Retract));
+    let out = shown(&mut planner, 0.0, &[0.08, 0.07]);
+    assert!(is_needle_done(&out));
+    assert_eq!((progress(&out), next_action(&out)), (Progress::Place, next));
+    planner.finish_needle();
+    planner.begin_needle(1, 2);
+    // Those of the first needle are not its own.
+    let second = shown(&mut planner, 0.0, &[0.08, 0.07]);
+    assert!(!is_needle_done(&second));
+    assert_eq!(next_action(&second), Some(Action::Insert));
+    let last = shown(&mut planner, 0.0, &[0.08, 0.07, 0.08, 0.07]);
+    assert!(is_needle_done(&last));
+    assert_eq!((progress(&last), next_action(&last)), (Progress::Debrief, None));
+}

@@ -1,0 +1,147 @@
+//! Changes of the plan, each one step to undo, and what may not be changed.
+
+use super::{Failure, Message, NeedleProgress, Planner};
+use std::time::{Duration, Instant};
+use stylet_implant::plan::{History, Hole, ImplantPlan, Row, exchange};
+use stylet_shm_schema::MAX_SEEDS;
+
+/// Changes of one needle that follow each other faster are one step to undo.
+const ONE_STEP: Duration = Duration::from_millis(800);
+/// Strength of the seeds of a plan that has none yet.
+const STRENGTH_U: f64 = 0.5;
+
+impl Planner {
+    pub(super) fn planned(&self) -> Result<&ImplantPlan, Failure> {
+        self.plan().ok_or_else(|| "there is no plan yet; make one".into())
+    }
+
+    /// Begins an empty plan.
+    pub fn begin(&mut self) {
+        let (Some(outlines), None) = (&self.outlines, &self.history) else {
+            return;
+        };
+        let plan = exchange::usual().map(|(source, prescription_gy)| ImplantPlan {
+            template: outlines.template,
+            source: source.model,
+            prescription_gy,
+            needles: Vec::new(),
+        });
+        match plan {
+            Ok(plan) => self.put(plan),
+            Err(why) => self.message = Some(Message::Refused(why.to_string())),
+        }
+    }
+
+    /// Discards the plan; one needle is left.
+    pub fn discard(&mut self) {
+        (self.history, self.job, self.problems) = (None, None, None);
+        self.compensated.clear();
+        self.progress = NeedleProgress::default();
+        self.change();
+    }
+
+    /// Adds a needle through the hole, with as many seeds as fill the target behind it.
+    pub fn add(&mut self, hole: Hole) {
+        let piece = self.outlines.as_ref().and_then(|g| g.piece_m(hole));
+        let strength_u = |plan: &ImplantPlan| {
+            let seeds = plan.needles.iter().flat_map(|n| &n.seeds);
+            seeds.map(|s| s.strength_u).next().unwrap_or(STRENGTH_U)
+        };
+        self.edit(|plan| {
+            let piece_m =
+                piece.ok_or_else(|| format!("a needle through {hole} would miss the target; choose another hole"))?;
+            let added = plan.with_needle(hole, piece_m[1])?;
+            Ok::<_, Failure>(added.with_row(plan.needles.len(), Row::filling(piece_m, strength_u(plan)))?)
+        });
+    }
+
+    /// Replaces the seeds of a needle; quick changes of one needle are one step to undo.
+    pub fn set_row(&mut self, needle: usize, row: Row) {
+        let last = self.drawn.filter(|(n, at)| *n == needle && at.elapsed() < ONE_STEP);
+        let changed = self.planned().and_then(|plan| Ok(plan.with_row(needle, row)?));
+        match changed.and_then(|plan| self.can_be(plan)) {
+            Ok(plan) => {
+                match &mut self.history {
+                    Some(history) if last.is_some() => history.replace(plan),
+                    Some(history) => history.put(plan),
+                    None => {}
+                }
+                self.drawn = Some((needle, Instant::now()));
+                self.change();
+            }
+            Err(why) => self.message = Some(Message::Refused(why.to_string())),
+        }
+    }
+
+    /// Changes the plan, or reports why it cannot be changed.
+    pub fn edit<E: Into<Failure>>(&mut self, edit: impl FnOnce(&ImplantPlan) -> Result<ImplantPlan, E>) {
+        match self
+            .planned()
+            .and_then(|plan| edit(plan).map_err(E::into))
+            .and_then(|plan| self.can_be(plan))
+        {
+            Ok(plan) => self.put(plan),
+            Err(why) => self.message = Some(Message::Refused(why.to_string())),
+        }
+    }
+
+    /// Undoes the last change.
+    pub fn undo(&mut self) {
+        self.step(History::undo, History::redo);
+    }
+
+    /// Redoes the change that was undone last.
+    pub fn redo(&mut self) {
+        self.step(History::redo, History::undo);
+    }
+
+    fn step(&mut self, step: fn(&mut History) -> bool, back: fn(&mut History) -> bool) {
+        let Some(mut history) = self.history.take() else { return };
+        let before = history.plan().clone();
+        if step(&mut history)
+            && let Err(why) = self.keeps(&before, history.plan())
+        {
+            back(&mut history);
+            self.message = Some(Message::Refused(why.to_string()));
+        }
+        self.history = Some(history);
+        self.change();
+    }
+
+    pub(super) fn put(&mut self, plan: ImplantPlan) {
+        match &mut self.history {
+            Some(history) => history.put(plan),
+            None => self.history = Some(History::new(plan)),
+        }
+        self.change();
+    }
+
+    /// The plan, if it keeps the inserted needles and the core can hold it.
+    pub(super) fn can_be(&self, plan: ImplantPlan) -> Result<ImplantPlan, Failure> {
+        if plan.seed_count() > MAX_SEEDS {
+            let count = plan.seed_count();
+            return Err(format!("that would be {count} seeds; at most {MAX_SEEDS} can be placed").into());
+        }
+        match self.plan() {
+            Some(before) => self.keeps(before, &plan).map(|()| plan),
+            None => Ok(plan),
+        }
+    }
+
+    fn keeps(&self, before: &ImplantPlan, after: &ImplantPlan) -> Result<(), Failure> {
+        let begun = self.progress.begun();
+        let first = |plan: &ImplantPlan| plan.needles.iter().take(begun).cloned().collect::<Vec<_>>();
+        if begun > 0 && first(before) != first(after) {
+            return Err(format!("{begun} needles are already inserted; only those after them can be changed").into());
+        }
+        Ok(())
+    }
+
+    /// The plan or its anatomy has changed.
+    pub(super) fn change(&mut self) {
+        self.revision += 1;
+        let plan = self.history.as_ref().map(History::plan);
+        let needles = plan.map_or(&[][..], |p| &p.needles[..]);
+        self.compensated.retain(|(needle, _)| needles.contains(needle));
+    }
+}

@@ -1,0 +1,150 @@
+//! Background jobs of the planner: a first plan, its strength, compensation, files.
+
+use super::Failure;
+use super::outlines::AnatomyOutlines;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
+use std::time::{Duration, Instant};
+use stylet_base::interrupt::Interrupt;
+use stylet_base::job::Job;
+use stylet_dose::decay::Interval;
+use stylet_dose::{DoseKernel, Source};
+use stylet_host::link::{Link, SceneModel};
+use stylet_implant::plan::automatic::{self, Aims};
+use stylet_implant::plan::{Compensation, ImplantPlan, Limits, LinkRehearser, Needle, compensate, exchange};
+use stylet_implant::workflow::Pace;
+use stylet_shm_schema::service::Instance;
+
+/// A second host finds the core within this time.
+const FIND_LIMIT: Duration = Duration::from_secs(10);
+const POLL_EVERY: Duration = Duration::from_millis(5);
+pub(super) const FIRST_PLAN: &str = "Looking for a first plan";
+
+/// What a job does, for people.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JobProgress {
+    /// Its name.
+    pub what: String,
+    /// 0 to 1, where that is known.
+    pub share: Option<f32>,
+}
+
+/// What a job sends.
+pub(super) enum JobMessage {
+    Progress(JobProgress),
+    Plan(Result<ImplantPlan, Failure>),
+    Compensated(Box<(Needle, Compensation)>),
+    /// The last message, in words.
+    End(Result<String, Failure>),
+}
+
+pub(super) fn automatic(outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
+    Job::begin("first plan", move |messages, interrupt| {
+        let report = |share: f32| {
+            let progress = JobProgress {
+                what: FIRST_PLAN.to_owned(),
+                share: Some(share),
+            };
+            let _ = messages.send(JobMessage::Progress(progress));
+            match interrupt.asked() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        };
+        let plan = || -> Result<ImplantPlan, Failure> {
+            let (source, prescription_gy) = exchange::usual()?;
+            let kernel = DoseKernel::new(&source, Interval::ALL);
+            let aims = Aims::new(prescription_gy);
+            Ok(automatic::plan(
+                outlines.template,
+                &outlines.anatomy,
+                &kernel,
+                &source.model,
+                &aims,
+                report,
+            )?)
+        };
+        // The window may be closed by now; then nobody reads the answer.
+        let _ = messages.send(JobMessage::Plan(plan()));
+    })
+}
+
+/// The strength with which the plan covers the target as a first plan does.
+pub(super) fn strength(outlines: Arc<AnatomyOutlines>, plan: Arc<ImplantPlan>) -> Job<JobMessage> {
+    Job::begin("strength", move |messages, _| {
+        let scaled = || -> Result<ImplantPlan, Failure> {
+            let source = Source::known(&plan.source)
+                .ok_or_else(|| format!("source {} is not known; set the strength by hand", plan.source))?;
+            let kernel = DoseKernel::new(&source, Interval::ALL);
+            let aims = Aims::new(plan.prescription_gy);
+            let strength_u = automatic::strength_u(&plan, &outlines.anatomy, &kernel, &aims)?;
+            Ok(plan.with_strength(strength_u))
+        };
+        let _ = messages.send(JobMessage::Plan(scaled()));
+    })
+}
+
+pub(super) fn import(path: PathBuf, scene: Arc<SceneModel>) -> Job<JobMessage> {
+    Job::begin("plan reader", move |messages, _| {
+        let plan = exchange::read(&path, &scene.header).map_err(Failure::from);
+        let _ = messages.send(JobMessage::Plan(plan));
+    })
+}
+
+pub(super) fn export(path: PathBuf, plan: Arc<ImplantPlan>, outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
+    Job::begin("plan writer", move |messages, _| {
+        let written = exchange::write(&path, &plan, &outlines.frames);
+        let saved = written.map(|()| format!("Plan saved as {}", path.display()));
+        let _ = messages.send(JobMessage::End(saved.map_err(Failure::from)));
+    })
+}
+
+/// Compensates one needle after the other, through a link of its own: the window keeps its own.
+pub(super) fn compensation(instance: Instance, needles: Vec<Needle>, pace: Pace) -> Job<JobMessage> {
+    Job::begin("compensation", move |messages, interrupt| {
+        let end = all(instance, &needles, &pace, messages, interrupt);
+        let _ = messages.send(JobMessage::End(end));
+    })
+}
+
+fn all(
+    instance: Instance,
+    needles: &[Needle],
+    pace: &Pace,
+    messages: &Sender<JobMessage>,
+    interrupt: &Interrupt,
+) -> Result<String, Failure> {
+    let mut link = Link::new(instance);
+    let begun = Instant::now();
+    while link.scene().is_none() || link.state().is_none() {
+        if interrupt.asked() || begun.elapsed() > FIND_LIMIT {
+            return Err("rt-core does not answer; check that it is running".into());
+        }
+        link.poll();
+        std::thread::sleep(POLL_EVERY);
+    }
+    let mut failed = Vec::new();
+    for (number, needle) in needles.iter().enumerate() {
+        let name = needle.hole.map_or_else(|| format!("{}", number + 1), |h| h.to_string());
+        let progress = JobProgress {
+            what: format!("Rehearsing needle {} of {}, {name}", number + 1, needles.len()),
+            share: Some(number as f32 / needles.len() as f32),
+        };
+        let _ = messages.send(JobMessage::Progress(progress));
+        let mut rehearser = LinkRehearser {
+            link: &mut link,
+            interrupted: interrupt,
+        };
+        match compensate(needle, pace, &Limits::default(), &mut rehearser) {
+            Ok(done) => drop(messages.send(JobMessage::Compensated(Box::new((needle.clone(), done))))),
+            Err(_) if interrupt.asked() => return Err("the compensation was cancelled".into()),
+            Err(why) => failed.push(format!("needle {name}: {why}")),
+        }
+    }
+    match failed.as_slice() {
+        [] => Ok(format!("{} needles compensated.", needles.len())),
+        _ => Err(format!("Not compensated: {}", failed.join("; ")).into()),
+    }
+}

@@ -1,0 +1,126 @@
+//! Progress of the needles: which are done, and which seeds belong to which.
+
+use std::ops::Range;
+
+/// How far one needle is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NeedleState {
+    /// Not inserted yet.
+    Planned,
+    /// In the tissue.
+    Inserted,
+    /// Out again, with all its seeds dropped.
+    Done,
+}
+
+impl NeedleState {
+    /// Its name, for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Planned => "planned",
+            Self::Inserted => "inserted",
+            Self::Done => "done",
+        }
+    }
+}
+
+/// Progress of the needles, which are inserted one after the other in the order of the plan.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct NeedleProgress {
+    /// For each needle that has begun, the number of seeds in the tissue before it.
+    first_seed: Vec<usize>,
+    is_done: bool,
+}
+
+impl NeedleProgress {
+    /// Number of needles that were inserted, those that are done included.
+    pub fn begun(&self) -> usize {
+        self.first_seed.len()
+    }
+
+    /// Whether all needles that have begun are done.
+    pub fn is_done(&self) -> bool {
+        self.begun() > 0 && self.is_done
+    }
+
+    /// Number of needles that are done.
+    pub fn done(&self) -> usize {
+        self.begun() - usize::from(self.begun() > 0 && !self.is_done)
+    }
+
+    /// State of one needle.
+    pub fn state(&self, needle: usize) -> NeedleState {
+        if needle < self.done() {
+            NeedleState::Done
+        } else if needle < self.begun() {
+            NeedleState::Inserted
+        } else {
+            NeedleState::Planned
+        }
+    }
+
+    /// This needle is inserted now, with so many seeds in the tissue; needles that were skipped have no seeds.
+    pub fn begin(&mut self, needle: usize, seeds: usize) {
+        self.first_seed.resize(needle + 1, seeds);
+        self.first_seed[needle] = seeds;
+        self.is_done = false;
+    }
+
+    /// The inserted needle is done.
+    pub fn finish(&mut self) {
+        self.is_done = true;
+    }
+
+    /// The inserted needle is withdrawn from the plan again.
+    pub fn step_back(&mut self) {
+        self.first_seed.pop();
+        self.is_done = true;
+    }
+
+    /// Seeds of a needle, as a range of all seeds in the order in which they were dropped.
+    pub fn seeds_of(&self, needle: usize, seeds: usize) -> Range<usize> {
+        let from = self.first_seed.get(needle).copied().unwrap_or(seeds).min(seeds);
+        let to = self.first_seed.get(needle + 1).copied().unwrap_or(seeds).min(seeds);
+        from..to.max(from)
+    }
+
+    /// Seeds of the inserted needle, as [`Self::seeds_of`]; all where none is inserted.
+    pub fn own_seeds(&self, seeds: usize) -> Range<usize> {
+        match self.begun() {
+            0 => 0..seeds,
+            n => self.seeds_of(n - 1, seeds),
+        }
+    }
+
+    /// Whether seeds of earlier needles were removed, so that the implantation begins again.
+    pub fn is_undone(&self, seeds: usize) -> bool {
+        self.first_seed.last().is_some_and(|&first| seeds < first)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn needles_are_inserted_one_after_the_other_and_each_has_its_own_seeds() {
+        let mut progress = NeedleProgress::default();
+        assert_eq!((progress.own_seeds(3), progress.done()), (0..3, 0));
+        progress.begin(0, 0);
+        assert_eq!(progress.state(0), NeedleState::Inserted);
+        assert_eq!(progress.own_seeds(4), 0..4);
+        progress.finish();
+        assert_eq!((progress.state(0), progress.done()), (NeedleState::Done, 1));
+        // The second has no seeds and is skipped.
+        progress.begin(2, 4);
+        assert_eq!(progress.own_seeds(6), 4..6);
+        assert_eq!([0, 1, 2].map(|n| progress.seeds_of(n, 6)), [0..4, 4..4, 4..6]);
+        assert_eq!(
+            [1, 2, 3].map(|n| progress.state(n).name()),
+            ["done", "inserted", "planned"]
+        );
+        assert!(!progress.is_undone(4) && progress.is_undone(3));
+        progress.step_back();
+        assert_eq!((progress.begun(), progress.done()), (2, 2));
+    }
+}

@@ -1,0 +1,353 @@
+//! What one frame shows, taken from the link once, so that no panel touches shared memory.
+
+mod seeds;
+
+use crate::dose_worker::DoseResult;
+use crate::planner::Planning;
+use nalgebra::Vector3;
+pub use seeds::{SeedError, all_errors, own_errors};
+use std::sync::Arc;
+use stylet_controllers::Latest;
+use stylet_host::link::{Link, LinkStatus};
+use stylet_implant::plan::{HOLES, Template};
+use stylet_implant::workflow::Step;
+use stylet_shm_schema::{
+    EventKind, Fault, HapticState, ParametersInForce, Phase, PlanInForce, PlannedSeed, SceneHeader, SeedPose, Session,
+    flags,
+};
+
+/// Past the deepest seed the needle may go this far, and the path is drawn this far.
+pub const PAST_LAST_SEED_M: f64 = 0.01;
+
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum LoadState {
+    #[default]
+    Idle,
+    /// What, and the share of it that is done.
+    Reading(String, f32),
+    Sending(String),
+    Loaded(String),
+    Refused(String),
+}
+
+impl LoadState {
+    pub fn is_busy(&self) -> bool {
+        matches!(self, Self::Reading(..) | Self::Sending(_))
+    }
+}
+
+#[derive(Clone)]
+pub struct Shown {
+    pub instance: String,
+    pub status: LinkStatus,
+    pub session: Option<Session>,
+    pub state: Option<HapticState>,
+    pub scene: Option<SceneHeader>,
+    /// Only a plan with at least one seed.
+    pub plan: Option<PlanInForce>,
+    pub parameters: Option<ParametersInForce>,
+    pub seeds: Vec<SeedPose>,
+    pub snapshot_residual: Option<f64>,
+    pub invalid_dropped: u64,
+    /// Step of the scripted procedure while it runs or after it ran.
+    pub running: bool,
+    pub run_step: Option<Step>,
+    /// Which of how many needles the script is at, counted from 0; `None` for one needle.
+    pub run_needle: Option<(usize, usize)>,
+    /// The last answer that the operator should read.
+    pub note: Option<Note>,
+    pub load: LoadState,
+    /// Of the seeds as they lie now, or of those of the plan.
+    pub dose: Option<Arc<DoseResult>>,
+    /// Why the dose is not known, where that is so.
+    pub dose_trouble: Option<&'static str>,
+    pub planning: Planning,
+    /// Refusals of requests that the operator has not yet dismissed, and the last reason.
+    pub refusals: u64,
+    pub last_refusal: String,
+    /// Gamepads and 3D mice, and whether this window has the focus that they need.
+    pub controllers: Latest,
+    pub has_focus: bool,
+    /// The device that was unplugged, until the message is dismissed or a device is plugged in.
+    pub disconnected: Option<String>,
+    pub cost: FrameCost,
+}
+
+/// Where the tip is against the planned path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TipOnPath {
+    /// From the entry along the path, and how far the path goes.
+    pub depth_m: f64,
+    pub length_m: f64,
+    /// Beside the path: to the right and up, as seen from the perineum.
+    pub beside_m: [f64; 2],
+    /// How far beside the path there are holes.
+    pub room_m: [[f64; 2]; 2],
+    /// The tip touches nothing.
+    pub is_free: bool,
+}
+
+/// What the last frame cost this program.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FrameCost {
+    /// Processor time without the driver's.
+    pub cpu_us: f64,
+    /// Of the graphics library and its driver for the pictures in the middle.
+    pub driver_us: f64,
+    pub uploaded_bytes: u64,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct Note {
+    pub refused: bool,
+    pub text: String,
+}
+
+impl Shown {
+    pub fn empty(instance: &str) -> Self {
+        Self {
+            instance: instance.to_owned(),
+            status: LinkStatus::Absent { why: String::new() },
+            session: None,
+            state: None,
+            scene: None,
+            plan: None,
+            parameters: None,
+            seeds: Vec::new(),
+            snapshot_residual: None,
+            invalid_dropped: 0,
+            running: false,
+            run_step: None,
+            run_needle: None,
+            note: None,
+            load: LoadState::Idle,
+            dose: None,
+            dose_trouble: None,
+            planning: Planning::default(),
+            refusals: 0,
+            last_refusal: String::new(),
+            controllers: Latest::default(),
+            has_focus: true,
+            disconnected: None,
+            cost: FrameCost::default(),
+        }
+    }
+
+    pub fn take(&mut self, link: &Link) {
+        self.status = link.status();
+        self.session = link.session().copied();
+        self.state = link.state().copied();
+        self.scene = link.scene().map(|s| s.header);
+        self.plan = link.plan().filter(|p| p.generation > 0 && p.seed_count > 0).copied();
+        self.parameters = link.parameters().copied();
+        self.invalid_dropped = link.invalid_dropped();
+        let refusals = link.events().iter().rev();
+        let last = refusals.clone().find(|e| e.kind == EventKind::InvalidRefused as u32);
+        self.last_refusal = last.map_or_else(String::new, |e| e.text.read());
+        self.seeds.clear();
+        self.snapshot_residual = None;
+        if let Some(snapshot) = link.snapshot() {
+            let count = snapshot.header.seed_count as usize;
+            self.seeds.extend(snapshot.header.seeds.iter().take(count).copied());
+            self.snapshot_residual = Some(snapshot.header.residual);
+        }
+    }
+
+    pub fn is_live(&self) -> bool {
+        matches!(self.status, LinkStatus::Live)
+    }
+
+    pub fn is_absent(&self) -> bool {
+        matches!(self.status, LinkStatus::Absent { .. })
+    }
+
+    fn has_flag(&self, flag: u32) -> bool {
+        self.state.is_some_and(|s| s.flags & flag != 0)
+    }
+
+    pub fn is_engaged(&self) -> bool {
+        self.has_flag(flags::ENGAGED)
+    }
+
+    /// Engaged, but the force would begin with a jump.
+    pub fn is_waiting(&self) -> bool {
+        self.has_flag(flags::WAITING)
+    }
+
+    pub fn is_real_time(&self) -> bool {
+        self.has_flag(flags::REAL_TIME)
+    }
+
+    pub fn has_punctured(&self) -> bool {
+        self.has_flag(flags::PUNCTURED)
+    }
+
+    /// `None` for a number that this program does not know, which is a fault too.
+    pub fn fault(&self) -> Option<Fault> {
+        Fault::from_number(self.state.map_or(0, |s| s.fault))
+    }
+
+    pub fn phase(&self) -> &'static str {
+        match self.state.map(|s| Phase::from_number(s.phase)) {
+            None => "n/a",
+            Some(None) => "unknown",
+            Some(Some(phase)) => phase.name(),
+        }
+    }
+
+    pub fn tip_m(&self) -> Option<[f64; 3]> {
+        self.state.filter(|s| s.tick > 0).map(|s| s.tip_in_scene_m)
+    }
+
+    pub fn planned(&self) -> &[PlannedSeed] {
+        self.plan.as_ref().map_or(&[], |plan| {
+            let count = (plan.seed_count as usize).min(plan.seeds.len());
+            &plan.seeds[..count]
+        })
+    }
+
+    /// Depth of the tip along the planned path, from the entry.
+    pub fn path_depth_m(&self) -> Option<f64> {
+        let (plan, tip) = (self.plan.as_ref()?, self.tip_m()?);
+        Some(along(plan, tip))
+    }
+
+    /// How deep along the planned path a place is.
+    pub fn depth_of_m(&self, place_m: [f64; 3]) -> Option<f64> {
+        Some(along(self.plan.as_ref()?, place_m))
+    }
+
+    /// Seeds of the needle at work, in the order in which they were dropped.
+    pub fn own_seeds(&self) -> &[SeedPose] {
+        let own = self.planning.progress.own_seeds(self.seeds.len());
+        &self.seeds[own]
+    }
+
+    /// How deep the tip is when the planned seed leaves it; compensation may have moved that.
+    fn drop_depth_m(&self, plan: &PlanInForce, number: usize) -> f64 {
+        let planned_m = || along(plan, self.planned()[number].position_m);
+        self.planning.drops_m().get(number).copied().unwrap_or_else(planned_m)
+    }
+
+    /// How far the needle may go along the path.
+    pub fn path_length_m(&self) -> Option<f64> {
+        let plan = self.plan.as_ref()?;
+        let deepest = (0..self.planned().len())
+            .map(|number| self.drop_depth_m(plan, number))
+            .fold(0.0, f64::max);
+        Some((deepest + PAST_LAST_SEED_M).min(0.3))
+    }
+
+    /// Depth of the deepest planned seed.
+    pub fn deepest_seed_m(&self) -> Option<f64> {
+        Some(self.path_length_m()? - PAST_LAST_SEED_M)
+    }
+
+    /// Depth of the deepest planned seed that no seed was dropped for; `None` when all are.
+    pub fn next_seed_m(&self) -> Option<f64> {
+        let plan = self.plan.as_ref()?;
+        let rows = own_errors(self);
+        let missing = rows.iter().filter(|row| row.placed.is_none());
+        missing
+            .map(|row| self.drop_depth_m(plan, row.planned))
+            .max_by(f64::total_cmp)
+    }
+
+    /// Depth of the membrane in front of the tip as a share of the depth at which it is punctured; `None` where there is none.
+    pub fn membrane_tension(&self) -> Option<f64> {
+        let is_pressed = |s: &&HapticState| s.flags & flags::IN_CONTACT != 0 && s.flags & flags::PUNCTURED == 0;
+        let state = self.state.as_ref().filter(is_pressed)?;
+        (state.puncture_depth_m > 0.0).then(|| (state.depth_m / state.puncture_depth_m).clamp(0.0, 1.0))
+    }
+
+    pub fn on_path_m(&self, depth_m: f64) -> Option<[f64; 3]> {
+        let plan = self.plan.as_ref()?;
+        Some([0, 1, 2].map(|i| plan.entry_m[i] + plan.direction[i] * depth_m))
+    }
+
+    /// A place at a depth along the planned path and beside it: to the right and up, as seen from the perineum.
+    pub fn beside_path_m(&self, depth_m: f64, beside_m: [f64; 2]) -> Option<[f64; 3]> {
+        let on_path = self.on_path_m(depth_m)?;
+        let Some((_, axes)) = self.across() else {
+            return Some(on_path);
+        };
+        Some([0, 1, 2].map(|a| on_path[a] + axes[0][a] * beside_m[0] + axes[1][a] * beside_m[1]))
+    }
+
+    /// The template, and its columns and rows made square to the planned path.
+    fn across(&self) -> Option<(Template, [Vector3<f64>; 2])> {
+        let template = Template::before(self.scene.as_ref()?);
+        let direction = Vector3::from(self.plan.as_ref()?.direction);
+        let columns = Vector3::from(template.columns);
+        let right = (columns - direction * direction.dot(&columns)).try_normalize(1e-3)?;
+        Some((template, [right, right.cross(&direction)]))
+    }
+
+    pub fn tip_on_path(&self) -> Option<TipOnPath> {
+        let (plan, tip) = (self.plan.as_ref()?, self.tip_m()?);
+        let off = |from: [f64; 3], to: [f64; 3]| Vector3::from(to) - Vector3::from(from);
+        let (beside_m, room_m) = self.across().map_or(([0.0; 2], [[0.0; 2]; 2]), |(template, axes)| {
+            let half_m = f64::from(HOLES / 2) * template.pitch_m;
+            let to_middle = off(plan.entry_m, template.middle_m);
+            (
+                axes.map(|axis| off(plan.entry_m, tip).dot(&axis)),
+                axes.map(|axis| [-1.0, 1.0].map(|side| to_middle.dot(&axis) + side * half_m)),
+            )
+        });
+        Some(TipOnPath {
+            depth_m: along(plan, tip),
+            length_m: self.path_length_m()?,
+            beside_m,
+            room_m,
+            is_free: !self.has_punctured() && !self.has_flag(flags::IN_CONTACT),
+        })
+    }
+
+    pub fn path_end_m(&self) -> Option<[f64; 3]> {
+        self.on_path_m(self.path_length_m()?)
+    }
+
+    /// How far the tip is beside the planned path.
+    pub fn off_path_m(&self) -> Option<f64> {
+        let (tip, foot) = (self.tip_m()?, self.on_path_m(self.path_depth_m()?)?);
+        Some([0, 1, 2].map(|i| (tip[i] - foot[i]).powi(2)).iter().sum::<f64>().sqrt())
+    }
+
+    /// Force that resists the insertion: against the needle's direction.
+    pub fn resistance_n(&self) -> Option<f64> {
+        let s = self.state.as_ref()?;
+        Some(-dot(s.force_on_hand_n, s.needle_direction))
+    }
+}
+
+fn along(plan: &PlanInForce, place_m: [f64; 3]) -> f64 {
+    dot([0, 1, 2].map(|i| place_m[i] - plan.entry_m[i]), plan.direction)
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    /// The depth of the gland's membrane was taken for every membrane: skin of 12 mm seemed punctured at 8 mm.
+    #[test]
+    fn the_tension_is_that_of_the_membrane_in_front_of_the_tip() {
+        let mut shown = Shown::empty("lab");
+        let mut state = HapticState::zeroed();
+        (state.flags, state.depth_m, state.puncture_depth_m) = (flags::IN_CONTACT, 6e-3, 12e-3);
+        shown.state = Some(state);
+        shown.parameters = Some(ParametersInForce::zeroed());
+        let tension = shown.membrane_tension().expect("a membrane");
+        assert!((tension - 0.5).abs() < 1e-12, "{tension}");
+        state.puncture_depth_m = 0.0;
+        shown.state = Some(state);
+        assert_eq!(shown.membrane_tension(), None, "tissue without a membrane");
+        (state.puncture_depth_m, state.flags) = (12e-3, flags::IN_CONTACT | flags::PUNCTURED);
+        shown.state = Some(state);
+        assert_eq!(shown.membrane_tension(), None);
+    }
+}

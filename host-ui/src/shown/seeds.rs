@@ -1,0 +1,99 @@
+//! Distance of each seed at rest from the place that it was planned for.
+
+use super::Shown;
+use stylet_implant::pairing::{self, SeedOffset};
+use stylet_shm_schema::{PlannedSeed, SeedPose};
+
+/// Where a placed seed lies, seen from the planned one it was dropped for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeedError {
+    /// Index in the plan.
+    pub planned: usize,
+    /// Index in the order of dropping; `None` while it is missing.
+    pub placed: Option<usize>,
+    /// Positive in the direction of insertion.
+    pub along_m: f64,
+    pub across_m: f64,
+}
+
+/// One row for each planned seed, paired with the nearest drop.
+pub fn seed_errors(planned: &[PlannedSeed], placed: &[SeedPose], direction: [f64; 3]) -> Vec<SeedError> {
+    let planned_m: Vec<_> = planned.iter().map(|p| p.position_m).collect();
+    let dropped_at_m: Vec<_> = placed.iter().map(|p| p.dropped_at_m).collect();
+    rows(planned, placed, direction, pairing::nearest(&planned_m, &dropped_at_m))
+}
+
+/// Errors of the inserted needle. Seeds of a plan of many needles are dropped in its order, which identifies them where compensation drops
+/// one at the place of another.
+pub fn own_errors(shown: &Shown) -> Vec<SeedError> {
+    let Some(plan) = &shown.plan else { return Vec::new() };
+    if shown.planning.at_work().is_none() {
+        return seed_errors(shown.planned(), &shown.seeds, plan.direction);
+    }
+    in_order(shown.planned(), shown.own_seeds(), plan.direction)
+}
+
+/// Errors of all needles that have begun, each with the number of its needle.
+pub fn all_errors(shown: &Shown) -> Vec<(usize, SeedError)> {
+    let Some(implant) = &shown.planning.implant else {
+        return own_errors(shown).into_iter().map(|row| (0, row)).collect();
+    };
+    let progress = &shown.planning.progress;
+    let of_needle = |number: usize| {
+        let needle = &implant.plan.needles[number];
+        let planned: Vec<PlannedSeed> = needle.seeds_m().map(|position_m| PlannedSeed { position_m }).collect();
+        let placed = &shown.seeds[progress.seeds_of(number, shown.seeds.len())];
+        let rows = in_order(&planned, placed, needle.direction);
+        rows.into_iter().map(move |row| (number, row)).collect::<Vec<_>>()
+    };
+    (0..progress.begun().min(implant.plan.needles.len()))
+        .flat_map(of_needle)
+        .collect()
+}
+
+/// Seeds in the order of the drops; planned seeds that are still missing come last.
+fn in_order(planned: &[PlannedSeed], placed: &[SeedPose], direction: [f64; 3]) -> Vec<SeedError> {
+    let pairs = pairing::in_order(planned.len(), &[], placed.len());
+    rows(planned, placed, direction, pairs)
+}
+
+fn rows(
+    planned: &[PlannedSeed],
+    placed: &[SeedPose],
+    direction: [f64; 3],
+    pairs: Vec<Option<usize>>,
+) -> Vec<SeedError> {
+    let row = |(number, (target, pair)): (usize, (&PlannedSeed, Option<usize>))| {
+        let seed = pair.and_then(|n| placed.get(n));
+        let offset = seed.map(|seed| SeedOffset::of(target.position_m, seed.position_m, direction));
+        SeedError {
+            planned: number,
+            placed: pair,
+            along_m: offset.map_or(0.0, |o| o.along_m),
+            across_m: offset.map_or(0.0, |o| o.across_m),
+        }
+    };
+    planned.iter().zip(pairs).enumerate().map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seeds_dropped_in_reverse_find_their_plan_and_drift_is_split() {
+        let planned = [0.01, 0.02].map(|z| PlannedSeed {
+            position_m: [0.0, 0.0, z],
+        });
+        let placed = [0.02, 0.01].map(|z| SeedPose {
+            position_m: [0.003, 0.0, z + 0.001],
+            axis: [0.0, 0.0, 1.0],
+            dropped_at_m: [0.0, 0.0, z],
+        });
+        let rows = seed_errors(&planned, &placed, [0.0, 0.0, 1.0]);
+        assert_eq!(rows[0].placed, Some(1));
+        assert_eq!(rows[1].placed, Some(0));
+        assert!((rows[0].along_m - 0.001).abs() < 1e-12 && (rows[0].across_m - 0.003).abs() < 1e-12);
+        assert_eq!(seed_errors(&planned, &placed[..1], [0.0, 0.0, 1.0])[0].placed, None);
+    }
+}

@@ -1,0 +1,173 @@
+//! Names of the back ends: the one table that command lines, scene files and help texts share.
+
+/// A kind of device that can be chosen by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BackendKind {
+    /// A simulated Phantom in the grip of a simulated hand.
+    Simulated,
+    /// A Phantom through OpenHaptics.
+    Phantom,
+    /// A recorded motion.
+    Replay,
+}
+
+/// What may follow the name, behind a colon.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Argument {
+    /// Nothing.
+    None,
+    /// A text, shown under this name in help texts, or nothing.
+    Optional(&'static str),
+    /// A text, shown under this name in help texts.
+    Required(&'static str),
+}
+
+/// One row of the table.
+#[derive(Debug, Clone, Copy)]
+pub struct Backend {
+    /// Which back end this is.
+    pub kind: BackendKind,
+    /// The name that is written. Stable: it stands in scene files.
+    pub name: &'static str,
+    /// Older names, accepted on reading.
+    pub aliases: &'static [&'static str],
+    /// What may follow the name.
+    pub argument: Argument,
+    /// One line for help texts.
+    pub help: &'static str,
+}
+
+/// Every back end, the default first.
+pub const BACKENDS: &[Backend] = &[
+    Backend {
+        kind: BackendKind::Simulated,
+        name: "simulated",
+        aliases: &["sim"],
+        argument: Argument::None,
+        help: "a simulated Phantom Premium 1.5 in the grip of a simulated hand",
+    },
+    Backend {
+        kind: BackendKind::Phantom,
+        name: "phantom",
+        aliases: &[],
+        argument: Argument::Optional("NAME"),
+        help: "a Phantom through OpenHaptics: the driver's default device, or the one called NAME",
+    },
+    Backend {
+        kind: BackendKind::Replay,
+        name: "replay",
+        aliases: &[],
+        argument: Argument::Required("FILE"),
+        help: "a recorded motion (from 'host-ui export --motion')",
+    },
+];
+
+/// A text that names no back end.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("\"{0}\" is not a device; give {forms}", forms = forms())]
+pub struct UnknownBackend(pub String);
+
+/// The back end that `text` names, and the argument behind the colon.
+///
+/// ```
+/// use stylet_hw::backend::{BackendKind, parse};
+/// assert_eq!(parse("phantom:Left arm"), Ok((BackendKind::Phantom, Some("Left arm"))));
+/// assert!(parse("replay").is_err(), "a file is missing");
+/// ```
+pub fn parse(text: &str) -> Result<(BackendKind, Option<&str>), UnknownBackend> {
+    let (name, argument) = text
+        .split_once(':')
+        .map_or((text, None), |(name, argument)| (name, Some(argument)));
+    let found = BACKENDS
+        .iter()
+        .find(|b| b.name == name || b.aliases.contains(&name))
+        .filter(|b| match b.argument {
+            Argument::None => argument.is_none(),
+            Argument::Optional(_) => argument != Some(""),
+            Argument::Required(_) => argument.is_some_and(|a| !a.is_empty()),
+        });
+    found
+        .map(|b| (b.kind, argument))
+        .ok_or_else(|| UnknownBackend(text.to_owned()))
+}
+
+/// Every accepted form, for messages: `simulated, phantom, phantom:NAME or replay:FILE`.
+pub fn forms() -> String {
+    let mut forms = Vec::new();
+    for b in BACKENDS {
+        match b.argument {
+            Argument::None => forms.push(b.name.to_owned()),
+            Argument::Optional(shown) => forms.extend([b.name.to_owned(), format!("{}:{shown}", b.name)]),
+            Argument::Required(shown) => forms.push(format!("{}:{shown}", b.name)),
+        }
+    }
+    let last = forms.pop().unwrap_or_default();
+    format!("{} or {last}", forms.join(", "))
+}
+
+/// The forms of every back end with their help, one per line.
+pub fn help() -> String {
+    let line = |b: &Backend| match b.argument {
+        Argument::None => format!("{}: {}", b.name, b.help),
+        Argument::Optional(shown) => format!("{0} or {0}:{shown}: {1}", b.name, b.help),
+        Argument::Required(shown) => format!("{}:{shown}: {}", b.name, b.help),
+    };
+    BACKENDS.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_aliases_are_unique_and_each_is_read_back() {
+        let mut names: Vec<_> = BACKENDS
+            .iter()
+            .flat_map(|b| b.aliases.iter().chain([&b.name]))
+            .collect();
+        names.sort_unstable();
+        assert!(names.windows(2).all(|pair| pair[0] != pair[1]), "{names:?}");
+        for b in BACKENDS {
+            let argument = (b.argument != Argument::None).then_some("something");
+            let suffix = argument.map_or(String::new(), |a| format!(":{a}"));
+            for name in b.aliases.iter().chain([&b.name]) {
+                assert_eq!(parse(&format!("{name}{suffix}")), Ok((b.kind, argument)));
+            }
+        }
+    }
+
+    /// Scene files said `sim` where the force loop's process accepted only `simulated`.
+    #[test]
+    fn the_device_of_older_scene_files_is_the_simulated_one() {
+        assert_eq!(parse("sim"), Ok((BackendKind::Simulated, None)));
+        assert_eq!(parse("simulated"), Ok((BackendKind::Simulated, None)));
+    }
+
+    #[test]
+    fn the_help_has_a_line_for_every_back_end() {
+        let help = help();
+        assert_eq!(help.lines().count(), BACKENDS.len());
+        assert!(help.contains("phantom or phantom:NAME: a Phantom"), "{help}");
+    }
+
+    #[test]
+    fn other_texts_are_refused_with_every_accepted_form() {
+        for wrong in [
+            "",
+            ":",
+            "phantom:",
+            "Phantom",
+            "simulated:x",
+            "replay",
+            "replay:",
+            "falcon",
+        ] {
+            assert_eq!(parse(wrong), Err(UnknownBackend(wrong.to_owned())));
+        }
+        let text = UnknownBackend("falcon".to_owned()).to_string();
+        assert!(
+            text.contains("simulated, phantom, phantom:NAME or replay:FILE"),
+            "{text}"
+        );
+    }
+}

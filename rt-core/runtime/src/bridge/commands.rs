@@ -1,0 +1,139 @@
+//! Requests of hosts, carried out: an order for a loop, or work beside it.
+
+use super::Bridge;
+use super::link::EventDetails;
+use super::parameters::order_from_both;
+use super::requests::{hand_goal, needle_run, plan_in_force};
+use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
+use stylet_shm_schema::{EventKind, ParameterChange, PlannedNeedle, Refusal, RefusalCode, Request};
+use stylet_sim::active::activate;
+
+/// Requests carried out in one pass. More are refused, so that a flood reaches neither loop.
+const MAX_REQUESTS_PER_PASS: u32 = 16;
+
+impl Bridge {
+    /// True when a host asked to end.
+    pub(super) fn take_commands(&mut self) -> bool {
+        let mut carried_out = 0;
+        while let Ok(Some(sample)) = self.link.ports.commands.receive() {
+            let command = *sample.payload();
+            drop(sample);
+            let asker = (command.host_id, command.command_id);
+            match Request::decode(&command) {
+                Ok(Request::Shutdown) => {
+                    self.link.reply(asker, Ok(0));
+                    return true;
+                }
+                // A request that takes the force off is never too much.
+                Ok(request) if carried_out < MAX_REQUESTS_PER_PASS || request == Request::Disengage => {
+                    carried_out += 1;
+                    let ticket = self.link.ticket(asker);
+                    if let Err(refusal) = self.carry_out(ticket, request) {
+                        self.link.session.refused += 1;
+                        self.link.answer(ticket, Err(&refusal));
+                    }
+                }
+                Ok(_) => self.link.refuse(asker, &RefusalCode::TooManyRequests.into()),
+                Err(errors) => self.link.refuse_invalid(asker, &errors.into()),
+            }
+        }
+        false
+    }
+
+    /// What fails later is answered later.
+    fn carry_out(&mut self, ticket: Ticket, request: Request) -> Result<(), Refusal> {
+        match request {
+            Request::SetParameters(changes) => self.change_parameters(ticket, &changes),
+            Request::SetPlan(plan) => {
+                self.set_plan(plan.as_ref());
+                self.link.answer(ticket, Ok(0));
+                Ok(())
+            }
+            Request::MoveHand(hand) => {
+                let goal = hand_goal(&hand);
+                self.order_haptic(HapticOrder::Hand { ticket, goal })
+            }
+            Request::StopHand => self.order_haptic(HapticOrder::StopHand { ticket }),
+            Request::Engage => self.order_haptic(HapticOrder::Engage { ticket }),
+            Request::Disengage => self.order_haptic(HapticOrder::Disengage { ticket }),
+            Request::DropSeed => self.order_tissue(TissueOrder::DropSeed { ticket }),
+            Request::UndoSeed => self.order_tissue(TissueOrder::UndoSeed { ticket }),
+            Request::Reset => self.reset(ticket),
+            Request::LoadBuiltinScene(number) => {
+                self.refuse_uncounted(ticket, |this| this.load_builtin(ticket, number))
+            }
+            Request::Rehearse(run) => self.refuse_uncounted(ticket, |this| {
+                let (set, generation) = (this.parameters.in_force.set, this.scene.generation());
+                this.rehearsals.begin(ticket, needle_run(&run), set, generation)
+            }),
+            Request::SaveFlight => {
+                let taken = self.flights.request(ticket);
+                taken.then_some(()).ok_or(RefusalCode::TooManyRequests.into())
+            }
+            Request::Shutdown => Ok(()),
+        }
+    }
+
+    /// Work beside the loops that is busy refuses without counting as a refused request of the session.
+    fn refuse_uncounted(
+        &mut self,
+        ticket: Ticket,
+        begin: impl FnOnce(&mut Self) -> Result<(), Refusal>,
+    ) -> Result<(), Refusal> {
+        if let Err(refusal) = begin(self) {
+            self.link.answer(ticket, Err(&refusal));
+        }
+        Ok(())
+    }
+
+    fn order_haptic(&mut self, order: HapticOrder) -> Result<(), Refusal> {
+        let pushed = self.loops.haptic_orders.push(order);
+        pushed.map_err(|_| RefusalCode::TooManyRequests.into())
+    }
+
+    fn order_tissue(&mut self, order: TissueOrder) -> Result<(), Refusal> {
+        let pushed = self.loops.tissue_orders.push(order);
+        pushed.map_err(|_| RefusalCode::TooManyRequests.into())
+    }
+
+    fn order_both(&mut self, orders: (HapticOrder, TissueOrder)) -> Result<(), Refusal> {
+        let loops = &mut self.loops;
+        let taken = order_from_both(&mut loops.haptic_orders, &mut loops.tissue_orders, orders);
+        taken.then_some(()).ok_or(RefusalCode::TooManyRequests.into())
+    }
+
+    /// Verified as a whole, then ordered from both loops or from none.
+    fn change_parameters(&mut self, ticket: Ticket, changes: &[ParameterChange]) -> Result<(), Refusal> {
+        let set = self.parameters.with(changes);
+        let active = activate(&set, &self.device).map_err(|problems| {
+            let refusal = Refusal::from(problems);
+            self.link.report_invalid(&refusal);
+            refusal
+        })?;
+        let generation = self.parameters.next_generation();
+        let haptic = HapticOrder::Parameters {
+            ticket,
+            generation,
+            needle: active.needle,
+            force: active.force,
+        };
+        self.order_both((haptic, TissueOrder::Limits(active.limits)))?;
+        self.parameters.ordered(generation, set);
+        Ok(())
+    }
+
+    fn set_plan(&mut self, plan: Option<&PlannedNeedle>) {
+        let generation = self.plan.generation + 1;
+        self.plan = plan_in_force(plan);
+        self.plan.generation = if plan.is_some() { generation } else { 0 };
+        self.plan.session_id = self.link.session.session_id;
+        self.plan.scene_generation = self.scene.generation();
+        let _ = self.link.ports.plan.send_copy(self.plan);
+    }
+
+    fn reset(&mut self, ticket: Ticket) -> Result<(), Refusal> {
+        self.order_both((HapticOrder::Reset { ticket }, TissueOrder::Reset))?;
+        self.link.event(EventKind::Reset, EventDetails::now());
+        Ok(())
+    }
+}

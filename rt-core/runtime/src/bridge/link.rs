@@ -1,0 +1,171 @@
+//! The link to the hosts: announcements, events, records, and the answers to their requests.
+
+use super::ports::Ports;
+use crate::rt::clock;
+use crate::rt::exchange::Ticket;
+use iceoryx2::node::Node;
+use std::collections::HashMap;
+use stylet_shm_schema::service::{Ipc, MAX_BATCH};
+use stylet_shm_schema::{Event, EventKind, Refusal, Reply, Session, Text, TickRecord};
+
+const ANNOUNCE_NS: u64 = 200_000_000;
+const CLEAN_UP_NS: u64 = 1_000_000_000;
+
+/// Numbers of a host and of its command.
+pub type Asker = (u64, u64);
+
+/// Everything that hosts hear.
+pub struct Link {
+    node: Node<Ipc>,
+    pub ports: Ports,
+    pub session: Session,
+    /// Who waits for an answer, behind each ticket.
+    waiting: HashMap<Ticket, Asker>,
+    tickets: Ticket,
+    events: u64,
+    batch: Vec<TickRecord>,
+    announced_ns: u64,
+    cleaned_ns: u64,
+}
+
+/// The fields of an event that depend on its kind.
+pub struct EventDetails<'a> {
+    pub code: u32,
+    pub value: f64,
+    pub position_m: [f64; 3],
+    pub tick: u64,
+    pub time_ns: u64,
+    pub text: &'a str,
+}
+
+impl EventDetails<'_> {
+    /// Nothing but the time; seen by the bridge.
+    pub fn now() -> Self {
+        Self::at(0, clock::now_ns())
+    }
+
+    /// Nothing but the tick of the loop that saw it, and its time.
+    pub fn at(tick: u64, time_ns: u64) -> Self {
+        Self {
+            code: 0,
+            value: 0.0,
+            position_m: [0.0; 3],
+            tick,
+            time_ns,
+            text: "",
+        }
+    }
+}
+
+impl Link {
+    pub fn new(node: Node<Ipc>, ports: Ports, session: Session) -> Self {
+        Self {
+            node,
+            ports,
+            session,
+            waiting: HashMap::new(),
+            tickets: 0,
+            events: 0,
+            batch: Vec::with_capacity(MAX_BATCH),
+            announced_ns: 0,
+            cleaned_ns: 0,
+        }
+    }
+
+    /// Connects hosts, sends the heartbeat, and frees what hosts that died have left.
+    pub fn announce(&mut self) {
+        self.ports.update_connections();
+        let now_ns = clock::now_ns();
+        if now_ns - self.announced_ns >= ANNOUNCE_NS {
+            self.announced_ns = now_ns;
+            self.session.time_ns = now_ns;
+            let _ = self.ports.session.send_copy(self.session);
+        }
+        if now_ns - self.cleaned_ns >= CLEAN_UP_NS {
+            self.cleaned_ns = now_ns;
+            self.node.try_cleanup_dead_nodes();
+        }
+    }
+
+    /// True when the force loop has made a tick.
+    pub fn send_records(&mut self, records: &mut rtrb::Consumer<TickRecord>) -> bool {
+        let mut any = false;
+        loop {
+            while self.batch.len() < MAX_BATCH
+                && let Ok(record) = records.pop()
+            {
+                self.batch.push(record);
+            }
+            if self.batch.is_empty() {
+                return any;
+            }
+            any = true;
+            if let Ok(mut sample) = self.ports.records.loan_slice_uninit(self.batch.len()) {
+                *sample.user_header_mut() = self.session.session_id;
+                let _ = sample.write_from_slice(&self.batch).send();
+            }
+            self.batch.clear();
+        }
+    }
+
+    pub fn event(&mut self, kind: EventKind, details: EventDetails<'_>) {
+        self.events += 1;
+        let _ = self.ports.events.send_copy(Event {
+            session_id: self.session.session_id,
+            sequence: self.events,
+            time_ns: details.time_ns,
+            tick: details.tick,
+            kind: kind as u32,
+            code: details.code,
+            value: details.value,
+            position_m: details.position_m,
+            text: Text::new(details.text),
+        });
+    }
+
+    /// A ticket under which `asker` waits for its answer.
+    pub fn ticket(&mut self, asker: Asker) -> Ticket {
+        self.tickets += 1;
+        self.waiting.insert(self.tickets, asker);
+        self.tickets
+    }
+
+    /// Who waits behind `ticket`.
+    pub fn asker(&self, ticket: Ticket) -> Option<Asker> {
+        self.waiting.get(&ticket).copied()
+    }
+
+    /// `Ok` with the first tick that ran with the change.
+    pub fn answer(&mut self, ticket: Ticket, result: Result<u64, &Refusal>) {
+        if let Some(asker) = self.waiting.remove(&ticket) {
+            self.reply(asker, result);
+        }
+    }
+
+    pub fn reply(&self, asker: Asker, result: Result<u64, &Refusal>) {
+        let reply = Reply::new(self.session.session_id, asker, result);
+        let _ = self.ports.replies.send_copy(reply);
+    }
+
+    /// A refusal before there was a ticket.
+    pub fn refuse(&mut self, asker: Asker, refusal: &Refusal) {
+        self.session.refused += 1;
+        self.reply(asker, Err(refusal));
+    }
+
+    /// A refusal of a message that is invalid, which every host learns.
+    pub fn refuse_invalid(&mut self, asker: Asker, refusal: &Refusal) {
+        self.report_invalid(refusal);
+        self.refuse(asker, refusal);
+    }
+
+    pub fn report_invalid(&mut self, refusal: &Refusal) {
+        self.event(
+            EventKind::InvalidRefused,
+            EventDetails {
+                text: &refusal.text,
+                ..EventDetails::now()
+            },
+        );
+    }
+}

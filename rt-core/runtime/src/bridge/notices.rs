@@ -1,0 +1,116 @@
+//! What the loops report, as answers and events for hosts.
+
+use super::Bridge;
+use super::link::EventDetails;
+use crate::rt::exchange::{HapticOrder, Notice, TissueOrder};
+use crate::rt::world::World;
+use stylet_shm_schema::{EventKind, TickRecord};
+
+/// Ends of the rings to and from both loops.
+pub(super) struct LoopRings {
+    pub records: rtrb::Consumer<TickRecord>,
+    pub haptic_orders: rtrb::Producer<HapticOrder>,
+    pub haptic_notices: rtrb::Consumer<Notice>,
+    pub tissue_orders: rtrb::Producer<TissueOrder>,
+    pub tissue_notices: rtrb::Consumer<Notice>,
+    pub old_worlds: rtrb::Consumer<Box<World>>,
+}
+
+impl Bridge {
+    pub(super) fn take_notices(&mut self) {
+        while let Ok(notice) = self.loops.haptic_notices.pop() {
+            self.take_notice(notice);
+        }
+        while let Ok(notice) = self.loops.tissue_notices.pop() {
+            self.take_notice(notice);
+        }
+    }
+
+    fn take_notice(&mut self, notice: Notice) {
+        match notice {
+            Notice::Done { ticket, tick } => self.link.answer(ticket, Ok(tick)),
+            Notice::Refused { ticket, why } => self.link.answer(ticket, Err(&why.into())),
+            Notice::ParametersActive {
+                ticket,
+                generation,
+                tick,
+            } => {
+                if self.parameters.take_effect(generation, tick) {
+                    let _ = self.link.ports.parameters.send_copy(self.parameters.in_force);
+                }
+                self.link.answer(ticket, Ok(tick));
+            }
+            Notice::WorldSwapped {
+                ticket,
+                generation,
+                tick,
+            } => {
+                self.scene_taken_up(generation, tick);
+                self.link.answer(ticket, Ok(tick));
+            }
+            Notice::Fault { fault, .. } => {
+                self.flights.fault(fault.message());
+                self.report(&notice);
+            }
+            _ => self.report(&notice),
+        }
+    }
+
+    /// Notices that are events and nothing else.
+    fn report(&mut self, notice: &Notice) {
+        let (kind, details) = match *notice {
+            Notice::Contact {
+                tick,
+                time_ns,
+                position_m,
+            } => (
+                EventKind::Contact,
+                EventDetails {
+                    position_m: position_m.into(),
+                    ..EventDetails::at(tick, time_ns)
+                },
+            ),
+            Notice::Puncture {
+                tick,
+                time_ns,
+                depth_m,
+                position_m,
+            } => (
+                EventKind::Puncture,
+                EventDetails {
+                    value: depth_m,
+                    position_m: position_m.into(),
+                    ..EventDetails::at(tick, time_ns)
+                },
+            ),
+            Notice::LeftTissue { tick, time_ns } => (EventKind::LeftTissue, EventDetails::at(tick, time_ns)),
+            Notice::Seed {
+                tick,
+                time_ns,
+                index,
+                position_m,
+            } => (
+                EventKind::SeedDropped,
+                EventDetails {
+                    code: index,
+                    position_m: position_m.into(),
+                    ..EventDetails::at(tick, time_ns)
+                },
+            ),
+            Notice::Fault { tick, time_ns, fault } => (
+                EventKind::FaultRaised,
+                EventDetails {
+                    code: fault as u32,
+                    text: fault.message(),
+                    ..EventDetails::at(tick, time_ns)
+                },
+            ),
+            Notice::Rearmed { tick, time_ns } => (EventKind::Rearmed, EventDetails::at(tick, time_ns)),
+            Notice::Done { .. }
+            | Notice::Refused { .. }
+            | Notice::ParametersActive { .. }
+            | Notice::WorldSwapped { .. } => return,
+        };
+        self.link.event(kind, details);
+    }
+}

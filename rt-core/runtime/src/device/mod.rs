@@ -1,0 +1,154 @@
+//! Which haptic device a run uses: from the name that the operator gives to a device that is open.
+
+mod motion;
+
+use crate::rt::arm::{self, Ask};
+use nalgebra::Vector3;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use stylet_hw::backend::{self, BackendKind, UnknownBackend};
+use stylet_hw::libhd::{ArmError, OpenError, Placement};
+use stylet_hw::{Device, Phantom, PhantomConfig, SimulatedPhantom, SimulatedPhantomConfig};
+use stylet_shm_schema::ThreadReport;
+use stylet_sim::scene::Scene;
+
+/// Rate of the driver's servo loop.
+const SERVO_HZ: u32 = 1000;
+/// The servo thread has priority over the force loop, which waits for its samples.
+const SERVO_AHEAD: u32 = 5;
+
+/// A back end of [`backend::BACKENDS`] as the operator named it, with what followed the colon: the name of a Phantom in the
+/// driver's set-up, or the file of a recorded motion.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DeviceChoice {
+    kind: BackendKind,
+    argument: Option<String>,
+}
+
+impl Default for DeviceChoice {
+    fn default() -> Self {
+        Self {
+            kind: BackendKind::Simulated,
+            argument: None,
+        }
+    }
+}
+
+impl FromStr for DeviceChoice {
+    type Err = UnknownBackend;
+
+    fn from_str(text: &str) -> Result<Self, UnknownBackend> {
+        let (kind, argument) = backend::parse(text)?;
+        let argument = argument.map(str::to_owned);
+        Ok(Self { kind, argument })
+    }
+}
+
+/// Every name that [`DeviceChoice`] accepts, with its help.
+pub fn help() -> String {
+    backend::help()
+}
+
+/// Why a device could not be opened; the text says what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum DeviceError {
+    /// The Phantom.
+    #[error("{0}\nOr start with --device simulated.")]
+    Phantom(#[from] OpenError),
+    /// The recorded motion.
+    #[error(transparent)]
+    Motion(#[from] motion::MotionError),
+}
+
+/// Opens the device with its tip, or the origin of its frame, outside the body and below the target. `force_loop` is what
+/// the force loop's thread asks for, `servo_core` the processor of the driver's own thread.
+pub fn open(
+    choice: &DeviceChoice,
+    library: Option<PathBuf>,
+    scene: &Scene,
+    force_loop: Ask,
+    servo_core: Option<usize>,
+) -> Result<Box<dyn Device>, DeviceError> {
+    let (lowest, _) = scene.lattice.bounds_m();
+    let (lower, upper) = scene.target_bounds_m();
+    let start = Vector3::new(
+        (lower[0] + upper[0]) / 2.0,
+        (lower[1] + upper[1]) / 2.0,
+        lowest[2] - 0.03,
+    );
+    match choice.kind {
+        BackendKind::Simulated => Ok(Box::new(SimulatedPhantom::new(SimulatedPhantomConfig {
+            start_tip_in_world: start,
+            ..SimulatedPhantomConfig::default()
+        }))),
+        BackendKind::Replay => {
+            let path = choice.argument.as_deref().unwrap_or_default();
+            Ok(Box::new(motion::device(Path::new(path))?))
+        }
+        BackendKind::Phantom => {
+            let config = PhantomConfig {
+                library,
+                name: choice.argument.clone(),
+                placement: Placement::facing_patient(start),
+                servo_hz: SERVO_HZ,
+            };
+            let ask = Ask {
+                priority: force_loop.priority.map(|p| (p + SERVO_AHEAD).min(98)),
+                core: servo_core,
+            };
+            Ok(Box::new(open_phantom(config, ask)?))
+        }
+    }
+}
+
+/// `ask` is for the driver's servo thread.
+fn open_phantom(config: PhantomConfig, ask: Ask) -> Result<Phantom, OpenError> {
+    let arm = move || {
+        arm::arm(ask)
+            .map(|armed| granted_text(&armed.report))
+            .map_err(ArmError::new)
+    };
+    let report = |text: &str| eprintln!("rt-core: device: {text}");
+    Phantom::open(config, Box::new(arm), Box::new(report))
+}
+
+/// What a thread was granted.
+fn granted_text(granted: &ThreadReport) -> String {
+    let policy = if granted.is_fifo() {
+        format!("SCHED_FIFO {}", granted.priority)
+    } else {
+        "no real-time scheduling".to_owned()
+    };
+    match granted.core {
+        u32::MAX => format!("{policy} on any core"),
+        core => format!("{policy} on core {core}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_device_is_named_as_the_help_says_and_not_otherwise() {
+        let choice = |kind, argument: Option<&str>| {
+            let argument = argument.map(str::to_owned);
+            Ok(DeviceChoice { kind, argument })
+        };
+        assert_eq!("simulated".parse(), Ok(DeviceChoice::default()));
+        assert_eq!(
+            "sim".parse(),
+            Ok(DeviceChoice::default()),
+            "the name in older scene files"
+        );
+        assert_eq!("phantom".parse(), choice(BackendKind::Phantom, None));
+        assert_eq!(
+            "phantom:Left arm".parse(),
+            choice(BackendKind::Phantom, Some("Left arm"))
+        );
+        assert_eq!("replay:a.motion".parse(), choice(BackendKind::Replay, Some("a.motion")));
+        for wrong in ["", "phantom:", "Phantom", "simulated:x", "falcon"] {
+            assert!(wrong.parse::<DeviceChoice>().is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! Puts the process together: scene and device, shared memory, two armed threads, and the bridge on the calling thread.
+
+mod session;
+mod setup;
+mod threads;
+
+use crate::bridge::{Bridge, BridgeSetup};
+use crate::device::{DeviceChoice, DeviceError};
+use crate::rt::arm::{Refused, Usage};
+use crate::rt::timing::Probes;
+use crate::rt::world::WorldError;
+use setup::Setup;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use stylet_shm_schema::service::{Instance, ServiceError};
+use stylet_shm_schema::{Fault, ParameterProblems, ThreadReport};
+use stylet_sim::scene::TissueKind;
+use threads::Threads;
+
+/// Settings of a run.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Name under which hosts find the run.
+    pub instance: Instance,
+    /// Built-in scene to start with.
+    pub scene: String,
+    /// Run without real-time scheduling.
+    pub no_rt: bool,
+    /// The operator asked for `no_rt`.
+    pub no_rt_asked: bool,
+    /// Why real time was tried and not granted, and how to grant it.
+    pub rights_missing: Option<String>,
+    /// Processor of the force loop; `None` for any.
+    pub haptic_core: Option<usize>,
+    /// Processor of the tissue loop; `None` for any.
+    pub tissue_core: Option<usize>,
+    /// `SCHED_FIFO` priority of the force loop.
+    pub haptic_priority: u32,
+    /// `SCHED_FIFO` priority of the tissue loop.
+    pub tissue_priority: u32,
+    /// Time between two ticks of the force loop, ns.
+    pub haptic_period_ns: u64,
+    /// Spinning before each deadline of the force loop, ns; 0 for none.
+    pub spin_ns: u64,
+    /// Folder of the flight recordings.
+    pub flight_folder: PathBuf,
+    /// Tissue model of every scene of the run.
+    pub tissue: TissueKind,
+    /// Haptic device.
+    pub device: DeviceChoice,
+    /// Library of the Phantom's driver; `None` tries its usual names.
+    pub libhd: Option<PathBuf>,
+}
+
+/// What a run cost.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RunReport {
+    /// The force loop.
+    pub haptic: LoopReport,
+    /// The tissue loop.
+    pub tissue: LoopReport,
+    /// All memory of the process was locked.
+    pub memory_locked: bool,
+    /// Longest exit from a core's sleep state that the kernel allowed, as read back, µs; `None` when it was not asked or
+    /// refused.
+    pub exit_latency_us: Option<i32>,
+}
+
+/// What one loop cost, from arming to its end.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LoopReport {
+    /// What the kernel granted the thread.
+    pub thread: ThreadReport,
+    /// Ticks made.
+    pub ticks: u64,
+    /// Deadlines missed.
+    pub missed: u64,
+    /// Latest wake-up after a deadline, ns.
+    pub worst_wake_ns: u64,
+    /// Page faults, context switches and heap calls.
+    pub usage: Usage,
+}
+
+/// Why a run did not start, or ended by itself. The texts are for people: they say what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// There is no such scene.
+    #[error("{0}")]
+    Scene(String),
+    /// The device could not be opened.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// Every parameter that does not suit the device, one a line.
+    #[error(transparent)]
+    Parameters(#[from] ParameterProblems),
+    /// The tissue model could not be set up.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// Shared memory could not be used.
+    #[error(transparent)]
+    Service(#[from] ServiceError),
+    /// Real time was asked for and not granted.
+    #[error("{0}\nOr start with --no-rt to run without real-time scheduling.")]
+    NotGranted(#[from] Refused),
+    /// The operating system started no thread.
+    #[error("cannot start the {name} thread: {why}")]
+    Spawn {
+        /// Which loop.
+        name: &'static str,
+        /// What the system reports.
+        why: std::io::Error,
+    },
+    /// A thread ended before its loop began.
+    #[error("the {0} thread ended before it began")]
+    EndedEarly(&'static str),
+    /// The force loop stopped making ticks.
+    #[error("{}", Fault::LoopStopped.message())]
+    LoopStopped,
+    /// A loop's thread ended before it was asked to.
+    #[error("a real-time thread ended by itself")]
+    ThreadEnded,
+}
+
+/// Runs until `stop` is set by a signal, or a host asks to end.
+pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, RunError> {
+    run_with(options, None, stop)
+}
+
+/// The same run, with a probe in each loop.
+pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool>) -> Result<RunReport, RunError> {
+    let setup = Setup::new(options)?;
+    let shared = setup.open_shared_memory(options)?;
+    let kernel = setup::lock_memory(options)?;
+    let (session_id, info) = (setup.session_id, setup.info);
+    let loops = setup.body.into_loops(options, session_id, &setup.source, probes);
+    let threads = Threads::start(options, loops.haptic, loops.tissue, shared.board)?;
+    let session = session::session(options, session_id, &info, &threads, kernel.unlocked.as_deref());
+    let mut bridge = Bridge::new(
+        shared.node,
+        shared.ports,
+        loops.bridge,
+        BridgeSetup {
+            device: info,
+            session,
+            picture: setup.picture,
+            tissue: options.tissue,
+            source: setup.source,
+            flight_folder: options.flight_folder.clone(),
+            flight: session::flight(&info, session_id, options.haptic_period_ns),
+        },
+    );
+    // SYNC: set by a signal handler; nothing but the flag is carried.
+    let served = bridge.run(|| stop.load(Ordering::Acquire));
+    threads.end();
+    if served.is_err() {
+        // Not joined: a loop that stands still would be waited for in vain.
+        return Err(RunError::LoopStopped);
+    }
+    let (haptic, tissue) = threads.join()?;
+    if let Err(why) = bridge.save_last_flight() {
+        eprintln!("rt-core: the flight recording was not saved: {why}");
+    }
+    Ok(RunReport {
+        haptic,
+        tissue,
+        memory_locked: kernel.unlocked.is_none(),
+        exit_latency_us: kernel.awake.map(|a| a.exit_latency_us),
+    })
+}

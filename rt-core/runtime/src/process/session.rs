@@ -1,0 +1,59 @@
+//! What hosts and flight recordings learn about the run.
+
+use super::Options;
+use super::threads::Threads;
+use crate::replay::file::Flight;
+use crate::rt::clock::{self, TISSUE_PERIOD_NS};
+use stylet_hw::DeviceInfo;
+use stylet_shm_schema::{Session, Text};
+
+/// The announcement of the run.
+pub(super) fn session(
+    options: &Options,
+    session_id: u64,
+    device: &DeviceInfo,
+    threads: &Threads,
+    unlocked: Option<&str>,
+) -> Session {
+    Session {
+        session_id,
+        schema_version: stylet_shm_schema::SCHEMA_VERSION,
+        pid: std::process::id(),
+        time_ns: 0,
+        started_ns: clock::now_ns(),
+        period_ns: options.haptic_period_ns,
+        tissue_period_ns: TISSUE_PERIOD_NS,
+        haptic: threads.haptic_grant(),
+        tissue: threads.tissue_grant(),
+        memory_locked: u32::from(unlocked.is_none()),
+        no_rt_asked: u32::from(options.no_rt_asked),
+        refused: 0,
+        device: Text::new(device.name),
+        version: Text::new(env!("CARGO_PKG_VERSION")),
+        advice: Text::new(&missing_rights(options, unlocked)),
+    }
+}
+
+/// The part that is the same in every flight recording of the run.
+pub(super) fn flight(device: &DeviceInfo, session_id: u64, haptic_period_ns: u64) -> Flight {
+    Flight {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        session_id,
+        reason: String::new(),
+        device_name: device.name.to_owned(),
+        device: device.into(),
+        haptic_period_s: haptic_period_ns as f64 / 1e9,
+        tissue_period_s: TISSUE_PERIOD_NS as f64 / 1e9,
+        haptic: None,
+        tissue: None,
+    }
+}
+
+fn missing_rights(options: &Options, unlocked: Option<&str>) -> String {
+    match (&options.rights_missing, unlocked) {
+        (Some(why), _) => why.clone(),
+        (None, Some(why)) => why.to_owned(),
+        (None, None) if !options.no_rt => String::new(),
+        (None, None) => "started with --no-rt: real-time scheduling was not asked for. Restart without it".to_owned(),
+    }
+}

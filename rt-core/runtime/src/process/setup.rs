@@ -1,0 +1,141 @@
+//! What a run needs before its threads start: scene, device, shared memory, locked memory, and both loops.
+
+use super::{Options, RunError};
+use crate::bridge::ScenePicture;
+use crate::bridge::ports::Ports;
+use crate::device;
+use crate::rt::arm::{self, Ask, CoresAwake};
+use crate::rt::clock::{self, TISSUE_PERIOD_NS};
+use crate::rt::haptic::HapticLoop;
+use crate::rt::haptic_tape::{HapticMemory, HapticTape};
+use crate::rt::timing::Probes;
+use crate::rt::tissue::TissueLoop;
+use crate::rt::tissue_tape::TissueTape;
+use crate::rt::wiring::{BridgePorts, Capacities, Wiring};
+use crate::rt::world::World;
+use iceoryx2::node::Node;
+use std::sync::Arc;
+use stylet_hw::{Device, DeviceInfo};
+use stylet_shm_schema::service::{self, Ipc, StateBoard};
+use stylet_shm_schema::{ParameterSet, flags};
+use stylet_sim::active::{Active, activate};
+use stylet_sim::scene::{Scene, SceneSource};
+
+/// Scene, device and their figures.
+pub(super) struct Setup {
+    pub session_id: u64,
+    pub info: DeviceInfo,
+    pub picture: ScenePicture,
+    pub source: Arc<SceneSource>,
+    pub body: Body,
+}
+
+/// What the loops will own.
+pub(super) struct Body {
+    device: Box<dyn Device>,
+    active: Active,
+    world: Box<World>,
+}
+
+/// Both loops and the bridge's ends of their rings.
+pub(super) struct Loops {
+    pub haptic: HapticLoop,
+    pub tissue: TissueLoop,
+    pub bridge: BridgePorts,
+}
+
+/// The process's place in shared memory.
+pub(super) struct SharedMemory {
+    pub node: Node<Ipc>,
+    pub ports: Ports,
+    pub board: StateBoard,
+}
+
+/// What the kernel granted the whole process.
+pub(super) struct KernelGrants {
+    /// Why memory is not locked; `None` when it is.
+    pub unlocked: Option<String>,
+    /// In force while it is kept.
+    pub awake: Option<CoresAwake>,
+}
+
+impl Setup {
+    pub fn new(options: &Options) -> Result<Self, RunError> {
+        let mut scene = Scene::builtin(&options.scene).map_err(|e| RunError::Scene(e.to_string()))?;
+        scene.tissue = options.tissue;
+        let force_loop = Ask {
+            priority: (!options.no_rt).then_some(options.haptic_priority),
+            core: options.haptic_core,
+        };
+        // The driver's servo thread goes to the core of the tissue loop, which can wait for it longer than the force loop.
+        let library = options.libhd.clone();
+        let device = device::open(&options.device, library, &scene, force_loop, options.tissue_core)?;
+        let info = device.info();
+        let active = activate(&ParameterSet::default(), &info)?;
+        let session_id = clock::now_ns() ^ (u64::from(std::process::id()) << 40);
+        Ok(Self {
+            session_id,
+            info,
+            picture: ScenePicture::first(&scene, session_id),
+            source: Arc::new(SceneSource::Builtin(options.scene.clone())),
+            body: Body {
+                device,
+                world: Box::new(World::new(scene, active.limits.clone(), 1)?),
+                active,
+            },
+        })
+    }
+
+    pub fn open_shared_memory(&self, options: &Options) -> Result<SharedMemory, RunError> {
+        let node = options.instance.node()?;
+        let (snapshot_len, words) = (self.picture.snapshot_size().total(), self.picture.word_count());
+        let ports = Ports::new(&node, snapshot_len, words)?;
+        let board = service::create_state_board(&node, self.session_id)?;
+        options.instance.secure_room()?;
+        Ok(SharedMemory { node, ports, board })
+    }
+}
+
+impl Body {
+    /// `source` is what the scene was built from.
+    pub fn into_loops(
+        self,
+        options: &Options,
+        session_id: u64,
+        source: &Arc<SceneSource>,
+        probes: Option<Probes>,
+    ) -> Loops {
+        let info = self.device.info();
+        let real_time = if options.no_rt { 0 } else { flags::REAL_TIME };
+        let memory = HapticMemory::new(&info, (self.active.needle, self.active.force), real_time);
+        let haptic_tape = Box::new(HapticTape::new(&memory));
+        let tissue_tape = Box::new(TissueTape::new(&self.world, Arc::clone(source)));
+        let wiring = Wiring::new(Capacities::RUN, Some(haptic_tape), Some(tissue_tape));
+        let seconds = |ns: u64| ns as f64 / 1e9;
+        let period_s = seconds(options.haptic_period_ns);
+        let mut haptic = HapticLoop::new(session_id, self.device, wiring.haptic, &memory, period_s);
+        haptic.spin_ns = options.spin_ns;
+        let period_s = seconds(TISSUE_PERIOD_NS);
+        let mut tissue = TissueLoop::new(session_id, wiring.tissue, self.world, period_s);
+        if let Some(probes) = probes {
+            haptic.probe = Some(Box::new(probes.haptic));
+            tissue.probe = Some(Box::new(probes.tissue));
+        }
+        Loops {
+            haptic,
+            tissue,
+            bridge: wiring.bridge,
+        }
+    }
+}
+
+/// Locks the memory of the process and keeps its cores out of deep sleep; only `--no-rt` runs without locked memory.
+pub(super) fn lock_memory(options: &Options) -> Result<KernelGrants, RunError> {
+    let unlocked = match arm::lock_memory() {
+        Ok(()) => None,
+        Err(why) if options.no_rt => Some(why.to_string()),
+        Err(why) => return Err(why.into()),
+    };
+    let awake = (!options.no_rt).then(arm::keep_cores_awake).flatten();
+    Ok(KernelGrants { unlocked, awake })
+}

@@ -1,0 +1,142 @@
+//! The two real-time threads: started, armed, ended.
+
+use super::{LoopReport, Options, RunError};
+use crate::rt::arm::{self, Armed, Ask, Usage};
+use crate::rt::haptic::HapticLoop;
+use crate::rt::tissue::TissueLoop;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+use std::thread::JoinHandle;
+use stylet_shm_schema::service::{STATE_KEY, StateBoard};
+use stylet_shm_schema::{HapticState, ThreadReport};
+
+/// A loop's thread, and what the kernel granted it.
+struct Started {
+    thread: JoinHandle<LoopReport>,
+    granted: ThreadReport,
+}
+
+/// Both threads. The loops have a flag of their own: the bridge must be able to end them when a host asks.
+pub(super) struct Threads {
+    haptic: Started,
+    tissue: Started,
+    end: Arc<AtomicBool>,
+}
+
+impl Threads {
+    /// Starts and arms both; neither runs when one is refused.
+    pub fn start(
+        options: &Options,
+        haptic: HapticLoop,
+        tissue: TissueLoop,
+        board: StateBoard,
+    ) -> Result<Self, RunError> {
+        let ask = |priority, core| Ask {
+            priority: (!options.no_rt).then_some(priority),
+            core,
+        };
+        let end = Arc::new(AtomicBool::new(false));
+        let tissue_ask = ask(options.tissue_priority, options.tissue_core);
+        let tissue = spawn("tissue", tissue_ask, &end, |armed, end| run_tissue(tissue, armed, end))?;
+        let haptic_ask = ask(options.haptic_priority, options.haptic_core);
+        let started = spawn("haptic", haptic_ask, &end, move |armed, end| {
+            run_haptic(haptic, board, armed, end)
+        });
+        match started {
+            Ok(haptic) => Ok(Self { haptic, tissue, end }),
+            Err(why) => {
+                // SYNC: pairs with the acquire load in the tissue loop.
+                end.store(true, Ordering::Release);
+                Err(why)
+            }
+        }
+    }
+
+    /// What the kernel granted the force loop.
+    pub fn haptic_grant(&self) -> ThreadReport {
+        self.haptic.granted
+    }
+
+    /// What the kernel granted the tissue loop.
+    pub fn tissue_grant(&self) -> ThreadReport {
+        self.tissue.granted
+    }
+
+    /// Asks both loops to end.
+    pub fn end(&self) {
+        // SYNC: pairs with the acquire loads in both loops.
+        self.end.store(true, Ordering::Release);
+    }
+
+    /// Waits for both loops; force loop and tissue loop.
+    pub fn join(self) -> Result<(LoopReport, LoopReport), RunError> {
+        let haptic = self.haptic.thread.join().map_err(|_| RunError::ThreadEnded)?;
+        let tissue = self.tissue.thread.join().map_err(|_| RunError::ThreadEnded)?;
+        Ok((haptic, tissue))
+    }
+}
+
+fn run_tissue(mut tissue: TissueLoop, armed: &Armed, end: &AtomicBool) -> LoopReport {
+    let start = Usage::now();
+    tissue.run(armed, end);
+    let usage = Usage::now().since(start);
+    let r = tissue.response();
+    LoopReport {
+        thread: armed.report,
+        ticks: r.tick,
+        missed: r.missed,
+        worst_wake_ns: r.worst_wake_ns,
+        usage,
+    }
+}
+
+fn run_haptic(mut haptic: HapticLoop, board: StateBoard, armed: &Armed, end: &AtomicBool) -> LoopReport {
+    // The entry is made in the thread that uses it; making it allocates, so it comes before the loop.
+    let writer = board.writer_builder().create().ok();
+    let entry = writer.as_ref().and_then(|w| w.entry::<HapticState>(&STATE_KEY).ok());
+    let publish = |state: &HapticState| {
+        if let Some(entry) = &entry {
+            entry.update_with_copy(*state);
+        }
+    };
+    publish(&haptic.state);
+    let start = Usage::now();
+    haptic.run(armed, end, publish);
+    let usage = Usage::now().since(start);
+    let s = &haptic.state;
+    LoopReport {
+        thread: armed.report,
+        ticks: s.tick,
+        missed: s.missed_deadlines,
+        worst_wake_ns: s.worst_wake_ns,
+        usage,
+    }
+}
+
+/// Starts a thread, arms it, and waits for what the kernel granted.
+fn spawn(
+    name: &'static str,
+    ask: Ask,
+    end: &Arc<AtomicBool>,
+    body: impl FnOnce(&Armed, &AtomicBool) -> LoopReport + Send + 'static,
+) -> Result<Started, RunError> {
+    let (report, reported) = mpsc::channel();
+    let end = Arc::clone(end);
+    let thread = std::thread::Builder::new()
+        .name(name.to_owned())
+        .spawn(move || match arm::arm(ask) {
+            Ok(armed) => {
+                let _ = report.send(Ok(armed.report));
+                drop(report);
+                body(&armed, &end)
+            }
+            Err(why) => {
+                let _ = report.send(Err(why));
+                LoopReport::default()
+            }
+        })
+        .map_err(|why| RunError::Spawn { name, why })?;
+    let granted = reported.recv().map_err(|_| RunError::EndedEarly(name))??;
+    Ok(Started { thread, granted })
+}

@@ -1,0 +1,74 @@
+//! Orders to the force loop, taken at the start of a tick.
+
+use super::HapticLoop;
+use crate::rt::exchange::{HapticOrder, Notice, Ticket};
+use stylet_shm_schema::RefusalCode;
+use stylet_sim::force::chain::ChainParameters;
+
+impl HapticLoop {
+    pub(super) fn take_orders(&mut self) {
+        while let Ok(order) = self.ports.orders.pop() {
+            let tick = self.state.tick + 1;
+            if let Some(tape) = self.ports.flight.tape() {
+                tape.order(order);
+            }
+            match order {
+                HapticOrder::Parameters {
+                    ticket,
+                    generation,
+                    needle,
+                    force,
+                } => {
+                    self.parameters = ChainParameters { needle, force };
+                    self.state.parameters_generation = generation;
+                    self.notify(Notice::ParametersActive {
+                        ticket,
+                        generation,
+                        tick,
+                    });
+                }
+                HapticOrder::Hand { ticket, goal } if goal.is_valid() => {
+                    self.device.set_hand_goal(&goal);
+                    self.goal = Some(goal);
+                    self.notify(Notice::Done { ticket, tick });
+                }
+                HapticOrder::Hand { ticket, .. } => self.notify(Notice::Refused {
+                    ticket,
+                    why: RefusalCode::BadGoal,
+                }),
+                HapticOrder::StopHand { ticket } => {
+                    self.device.stop_hand();
+                    self.goal = None;
+                    self.notify(Notice::Done { ticket, tick });
+                }
+                HapticOrder::Engage { ticket } => self.engage(ticket, tick),
+                HapticOrder::Disengage { ticket } => {
+                    self.chain.gate.release();
+                    self.notify(Notice::Done { ticket, tick });
+                }
+                HapticOrder::Reset { ticket } => self.reset(ticket, tick),
+                HapticOrder::HandOverTape => self.ports.flight.hand_over(),
+            }
+        }
+    }
+
+    fn engage(&mut self, ticket: Ticket, tick: u64) {
+        if self.watchdog.rearm() {
+            let time_ns = self.state.time_ns;
+            self.notify(Notice::Rearmed { tick, time_ns });
+        }
+        self.chain.gate.engage();
+        self.notify(Notice::Done { ticket, tick });
+    }
+
+    fn reset(&mut self, ticket: Ticket, tick: u64) {
+        self.end_contact();
+        self.state.peak_force_n = 0.0;
+        self.state.missed_deadlines = 0;
+        self.state.worst_wake_ns = 0;
+        self.state.worst_work_ns = 0;
+        self.state.worst_residual = 0.0;
+        self.state.worst_tissue_work_ns = 0;
+        self.notify(Notice::Done { ticket, tick });
+    }
+}

@@ -1,0 +1,116 @@
+//! What a tick of the force loop leaves: the state that hosts see, and its record.
+
+use super::HapticLoop;
+use crate::rt::clock;
+use crate::rt::response::TissueResponse;
+use nalgebra::Vector3;
+use stylet_shm_schema::{TickRecord, flags};
+use stylet_sim::force::chain::ChainOutput;
+use stylet_sim::needle::Phase;
+
+/// The hand is at its goal within this distance, at rest.
+const AT_GOAL_M: f64 = 4e-4;
+const AT_REST_M_PER_S: f64 = 3e-3;
+
+impl HapticLoop {
+    fn flags(&self, response: &ChainOutput) -> u32 {
+        let always = flags::REAL_TIME | flags::SIMULATED_DEVICE;
+        let speed = self.chain.estimator.velocity_m_per_s().norm();
+        let at_goal = self.goal.is_some_and(|goal| {
+            (self.pose.tip_in_scene - goal.tip_in_world).norm() < AT_GOAL_M && speed < AT_REST_M_PER_S
+        });
+        let bit = |set: bool, flag: u32| if set { flag } else { 0 };
+        (self.state.flags & always)
+            | bit(self.chain.gate.engaged(), flags::ENGAGED)
+            | bit(self.chain.gate.waiting(), flags::WAITING)
+            | bit(response.phase != Phase::Outside, flags::IN_CONTACT)
+            | bit(self.chain.needle.punctured, flags::PUNCTURED)
+            | bit(at_goal, flags::AT_GOAL)
+    }
+
+    pub(super) fn record(
+        &mut self,
+        due_ns: u64,
+        [woke_ns, written_ns]: [u64; 2],
+        missed: u32,
+        tissue: &TissueResponse,
+        response: &ChainOutput,
+    ) {
+        let t = &response.terms;
+        let along = |v: &Vector3<f64>| v.dot(&response.axis);
+        let gate = &self.chain.gate;
+        let gate_counts = gate.counts().all();
+        let interventions = gate_counts.iter().sum();
+        let (energy_j, warmth_n) = (gate.passivity().energy_j(), gate.warmth_n());
+        let mut now_flags = self.flags(response);
+        if interventions > self.state.gate_interventions {
+            now_flags |= flags::GATE_ACTED;
+        }
+        let wake_latency_ns = woke_ns.saturating_sub(due_ns);
+        let s = &mut self.state;
+        s.tick += 1;
+        s.time_ns = woke_ns;
+        s.tip_in_scene_m = self.pose.tip_in_scene.into();
+        s.needle_direction = self.pose.direction.into();
+        s.contact_in_scene_m = tissue.contact_in_scene.into();
+        s.depth_m = response.depth_m;
+        s.puncture_depth_m = response.puncture_depth_m;
+        s.speed_m_per_s = response.speed_along_m_per_s;
+        s.force_on_hand_n = response.wrench.force_n.into();
+        s.torque_on_hand_nm = response.wrench.torque_nm.into();
+        s.force_terms_n = [
+            along(&t.membrane_n),
+            t.guide_n.norm(),
+            along(&t.damping_n),
+            along(&t.friction_n),
+            along(&t.gravity_n),
+        ];
+        s.peak_force_n = s.peak_force_n.max(response.wrench.force_n.norm());
+        s.force_scale = self.parameters.force.gate.force_scale;
+        s.missed_deadlines += u64::from(missed);
+        s.worst_wake_ns = s.worst_wake_ns.max(wake_latency_ns);
+        s.tissue_tick = tissue.tick;
+        s.tissue_missed_deadlines = tissue.missed;
+        s.tissue_worst_wake_ns = tissue.worst_wake_ns;
+        s.worst_residual = tissue.worst_residual;
+        s.worst_tissue_work_ns = tissue.worst_work_ns;
+        s.gate_interventions = interventions;
+        s.gate_counts = gate_counts;
+        s.energy_j = energy_j;
+        s.warmth_n = warmth_n;
+        s.tissue_force_n = along(&t.tissue_n);
+        s.phase = response.phase.code();
+        s.fault = self.watchdog.fault() as u32;
+        s.flags = now_flags;
+        s.seed_count = tissue.seed_count;
+        let work_ns = clock::now_ns().saturating_sub(woke_ns);
+        s.worst_work_ns = s.worst_work_ns.max(work_ns);
+        let record = TickRecord {
+            session_id: self.session_id,
+            tick: s.tick,
+            due_ns,
+            wake_latency_ns,
+            force_written_ns: written_ns.saturating_sub(woke_ns),
+            work_ns,
+            missed,
+            phase: s.phase,
+            fault: s.fault,
+            flags: s.flags,
+            tip_in_scene_m: s.tip_in_scene_m,
+            force_on_hand_n: s.force_on_hand_n,
+            depth_m: s.depth_m,
+            speed_m_per_s: s.speed_m_per_s,
+            force_terms_n: s.force_terms_n,
+            tissue_tick: s.tissue_tick,
+            world_from_tool: self
+                .sample
+                .map_or([0.0; 4], |sample| sample.world_from_tool.coords.into()),
+            buttons: self.sample.map_or(0, |sample| sample.buttons),
+            reserved: 0,
+        };
+        if self.ports.records.push(record).is_err() {
+            s.records_lost += 1;
+        }
+        self.tape(woke_ns, tissue, record);
+    }
+}

@@ -1,0 +1,78 @@
+//! What the tissue loop hands to the force loop.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use stylet_sim::force::LocalResponse;
+use stylet_sim::force::chain::Touch;
+use stylet_sim::needle::LayerKind;
+
+/// Where the tip meets tissue and what the body answers, once in each tick of the tissue loop.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct TissueResponse {
+    /// When the tick began, `CLOCK_MONOTONIC`, ns.
+    pub time_ns: u64,
+    /// Ticks made so far.
+    pub tick: u64,
+    /// Number of the present contact; 0 for none.
+    pub contact: u64,
+    /// Where the tip entered the body, scene frame, m.
+    pub contact_in_scene: Vector3<f64>,
+    /// r of eq. 6, kept for the whole contact; unit vector.
+    pub path_direction: Vector3<f64>,
+    /// The innermost layer met.
+    pub layer: LayerKind,
+    /// Number of that layer; rises over the run.
+    pub layer_number: u64,
+    /// Where its membrane was met, scene frame, m.
+    pub layer_in_scene: Vector3<f64>,
+    /// What the body answers at the tip.
+    pub local: LocalResponse,
+    /// Largest violation of a limit so far, in elements.
+    pub worst_residual: f64,
+    /// Longest tick so far, ns.
+    pub worst_work_ns: u64,
+    /// Latest wake-up so far, ns.
+    pub worst_wake_ns: u64,
+    /// Deadlines missed so far.
+    pub missed: u64,
+    /// Seeds in the tissue.
+    pub seed_count: u32,
+    /// The step has not converged and the needle would feel it.
+    pub unsolved: bool,
+}
+
+impl TissueResponse {
+    /// Where the tip meets tissue; valid while there is contact.
+    pub fn touch(&self) -> Touch {
+        Touch {
+            contact_in_world: self.contact_in_scene,
+            path_direction: self.path_direction,
+            layer: self.layer,
+            layer_number: self.layer_number,
+            layer_in_world: self.layer_in_scene,
+            local: self.local,
+        }
+    }
+}
+
+impl Default for TissueResponse {
+    fn default() -> Self {
+        Self {
+            time_ns: 0,
+            tick: 0,
+            contact: 0,
+            contact_in_scene: Vector3::zeros(),
+            path_direction: Vector3::z(),
+            layer: LayerKind::default(),
+            layer_number: 0,
+            layer_in_scene: Vector3::zeros(),
+            local: LocalResponse::default(),
+            worst_residual: 0.0,
+            worst_work_ns: 0,
+            worst_wake_ns: 0,
+            missed: 0,
+            seed_count: 0,
+            unsolved: false,
+        }
+    }
+}

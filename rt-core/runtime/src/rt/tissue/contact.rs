@@ -1,0 +1,162 @@
+//! Where the needle meets tissue: contact, layers, and the element that the tip holds.
+
+use super::TissueLoop;
+use crate::rt::contact::Contact;
+use crate::rt::exchange::Notice;
+use crate::rt::pose::TipPose;
+use nalgebra::Vector3;
+use stylet_sim::needle::LayerKind;
+use stylet_sim::tissue::{Held, MaterialPoint, element_ahead};
+
+/// The needle must move inwards at least this fast to meet a membrane.
+const CONTACT_SPEED_M_PER_S: f64 = 1e-3;
+
+impl TissueLoop {
+    pub(super) fn locate(&self, place: &Vector3<f64>, hint: Option<u32>) -> Option<MaterialPoint> {
+        MaterialPoint::locate(&self.world.tissue.deformed(), (*place).into(), hint)
+    }
+
+    pub(super) fn end_contact_if_released(&mut self) {
+        if let Some(contact) = self.contact
+            && self.pose.released_contact >= contact.number
+        {
+            self.end_contact();
+            let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
+            self.notify(Notice::LeftTissue { tick, time_ns });
+        }
+    }
+
+    /// The membrane is met where the tip's way since the last tick enters the deformed body.
+    pub(super) fn begin_contact_if_met(&mut self, before: &TipPose) {
+        if self.contact.is_some() || self.pose.time_ns == 0 {
+            return;
+        }
+        let inside = self.locate(&self.pose.tip_in_scene, None);
+        let Some(point) = inside else {
+            self.clear = true;
+            return;
+        };
+        if !self.clear || self.pose.speed_along_m_per_s < CONTACT_SPEED_M_PER_S {
+            return;
+        }
+        let place = self.entry_between(before.tip_in_scene, self.pose.tip_in_scene, point.element, |_| true);
+        self.contacts += 1;
+        self.contact = Some(Contact {
+            number: self.contacts,
+            place,
+            direction: self.pose.direction,
+        });
+        let layer = self.world.layer(point.element);
+        let number = self.layers.begin(layer);
+        self.take_hold_at(layer, number, place, point.element);
+        let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
+        self.notify(Notice::Contact {
+            tick,
+            time_ns,
+            position_m: place,
+        });
+    }
+
+    /// The tip has moved from one layer into another: a membrane of its own, and a new held element.
+    pub(super) fn meet_next_layer(&mut self, before: &TipPose) {
+        let (Some(_), Some(held)) = (self.contact, self.held) else {
+            return;
+        };
+        let Some(point) = self.locate(&self.pose.tip_in_scene, Some(held.element)) else {
+            return;
+        };
+        let layer = self.world.layer(point.element);
+        let inwards = self.pose.speed_along_m_per_s > CONTACT_SPEED_M_PER_S;
+        if let Some(number) = self.layers.enter(layer, inwards, &self.pose) {
+            let (from, to) = (before.tip_in_scene, self.pose.tip_in_scene);
+            let place = self.entry_between(from, to, point.element, |e| self.world.layer(e) == layer);
+            self.take_hold_at(layer, number, place, point.element);
+        }
+    }
+
+    fn take_hold_at(&mut self, layer: LayerKind, number: u64, place: Vector3<f64>, element: u32) {
+        self.response.layer = layer;
+        self.response.layer_number = number;
+        self.response.layer_in_scene = place;
+        self.held = Some(Held {
+            element,
+            position_m: self.world.tissue.deformed().position_m(element),
+            patch_m: self.world.scene.tissue.tip_patch_m(),
+        });
+    }
+
+    /// Bisection between a place outside and one inside; the inner one where even the start is inside.
+    fn entry_between(
+        &self,
+        mut outside: Vector3<f64>,
+        mut inside: Vector3<f64>,
+        hint: u32,
+        is_inside: impl Fn(u32) -> bool,
+    ) -> Vector3<f64> {
+        for _ in 0..8 {
+            let middle = (outside + inside) / 2.0;
+            if self
+                .locate(&middle, Some(hint))
+                .is_some_and(|point| is_inside(point.element))
+            {
+                inside = middle;
+            } else {
+                outside = middle;
+            }
+        }
+        inside
+    }
+
+    /// The held element is the one at the tip, found by walking from the last one; it takes the eq. 6 step.
+    pub(super) fn hold(&mut self, travel: Vector3<f64>) {
+        let Some(held) = self.held else { return };
+        let mut next = held;
+        // Before puncture the membrane keeps its element; after it the tip passes from one to the next.
+        if self.pose.punctured
+            && let Some(at_tip) = self.locate(&self.pose.tip_in_scene, Some(held.element))
+            && at_tip.element != held.element
+        {
+            let position_m = self.world.tissue.deformed().position_m(at_tip.element);
+            next = Held {
+                element: at_tip.element,
+                position_m,
+                patch_m: self.world.scene.tissue.tip_patch_m(),
+            };
+        }
+        for (coordinate, by) in next.position_m.iter_mut().zip(travel.iter()) {
+            *coordinate += by;
+        }
+        self.held = Some(next);
+    }
+
+    /// The response has been sent: the rest of the tick prepares what the tip holds next if the needle keeps its speed.
+    pub(super) fn look_ahead(&mut self, travel: Vector3<f64>) {
+        if self.world.scene.tissue.prepares() {
+            let next = self.next_held(travel);
+            self.world.tissue.prepare(next);
+        }
+    }
+
+    fn next_held(&self, travel: Vector3<f64>) -> Option<Held> {
+        let speed_m_per_s = self.pose.speed_along_m_per_s;
+        if speed_m_per_s.abs() < CONTACT_SPEED_M_PER_S {
+            return None;
+        }
+        let step_m = self.pose.direction * speed_m_per_s * self.period_s;
+        let (body, held) = (self.world.tissue.deformed(), self.held);
+        let element = element_ahead(
+            &body,
+            held.map(|h| h.element),
+            self.pose.tip_in_scene.into(),
+            step_m.into(),
+        )?;
+        // At the first contact there is no travel yet that shows how tissue follows.
+        let by_m = if held.is_some() { travel } else { step_m };
+        let now_m = Vector3::from(body.position_m(element));
+        Some(Held {
+            element,
+            position_m: (now_m + by_m).into(),
+            patch_m: self.world.scene.tissue.tip_patch_m(),
+        })
+    }
+}

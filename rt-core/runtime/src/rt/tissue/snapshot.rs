@@ -1,0 +1,71 @@
+//! Snapshots of the deformed body, written straight into the shared memory that the bridge has loaned.
+
+use super::TissueLoop;
+use crate::rt::clock;
+use crate::rt::exchange::{SnapshotReturn, SnapshotSlot};
+use stylet_shm_schema::{MAX_SEEDS, SnapshotHeader, Vertex};
+use stylet_sim::tissue::StepReport;
+
+impl TissueLoop {
+    pub(super) fn publish_snapshot(&mut self, woke_ns: u64, report: &StepReport) {
+        let work_ns = clock::now_ns().saturating_sub(woke_ns);
+        self.response.worst_work_ns = self.response.worst_work_ns.max(work_ns);
+        while let Ok(slot) = self.ports.slots.pop() {
+            let filled = slot.scene_generation == self.world.generation
+                && slot.vertex_count == self.world.scene.surface.vertex_elements.len()
+                && slot.node_count == self.world.scene.nodes.elements.len();
+            if filled {
+                self.fill(&slot, woke_ns, work_ns, report);
+            }
+            let _ = self.ports.filled.push(SnapshotReturn {
+                index: slot.index,
+                filled,
+            });
+            if filled {
+                return;
+            }
+        }
+    }
+
+    fn fill(&self, slot: &SnapshotSlot, woke_ns: u64, work_ns: u64, report: &StepReport) {
+        let sent = slot.vertex_count + slot.node_count;
+        // SAFETY: the bridge loaned `vertex_count + node_count` vertices at this address to us alone and keeps them mapped
+        // until the slot is returned; they were zeroed, and Vertex is valid for every bit pattern.
+        let vertices = unsafe { std::slice::from_raw_parts_mut(slot.vertices, sent) };
+        let body = self.world.tissue.deformed();
+        // Both always succeed: a vertex is three f32, and there are at least `vertex_count`.
+        if let Ok(positions) = bytemuck::try_cast_slice_mut::<Vertex, [f32; 3]>(vertices)
+            && let Some((surface, inside)) = positions.split_at_mut_checked(slot.vertex_count)
+        {
+            body.write_surface(&self.world.scene.surface, surface);
+            body.write_displacements(&self.world.scene.nodes.elements, inside);
+        }
+        // SAFETY: as above, for the header.
+        let header = unsafe { &mut *slot.header };
+        let spacing_m = self.world.scene.lattice.spacing_m;
+        *header = SnapshotHeader {
+            session_id: self.session_id,
+            scene_generation: self.world.generation,
+            tissue_tick: self.response.tick,
+            time_ns: woke_ns,
+            tip_in_scene_m: self.pose.tip_in_scene.into(),
+            needle_direction: self.pose.direction.into(),
+            held_in_scene_m: self.held.map_or([0.0; 3], |h| h.position_m),
+            residual: report.residual,
+            max_displacement_m: f64::from(report.max_displacement) * spacing_m,
+            work_ns,
+            passes: report.passes,
+            moved_elements: report.moved,
+            held_element: self.held.map_or(u32::MAX, |h| h.element),
+            phase: self.pose.phase.code(),
+            vertex_count: slot.vertex_count as u32,
+            node_count: slot.node_count as u32,
+            reserved: 0,
+            seed_count: self.seeds.len() as u32,
+            seeds: [bytemuck::Zeroable::zeroed(); MAX_SEEDS],
+        };
+        for (slot, seed) in header.seeds.iter_mut().zip(&self.seeds) {
+            *slot = seed.pose(&body);
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! Every ring and triple buffer between the two loops and the bridge: made here, in one call, and nowhere else.
+
+use crate::rt::exchange::{HapticOrder, Notice, SnapshotReturn, SnapshotSlot, TissueOrder};
+use crate::rt::haptic_tape::HapticTape;
+use crate::rt::pose::TipPose;
+use crate::rt::recorder::{Recorder, TapePort, recorder};
+use crate::rt::response::TissueResponse;
+use crate::rt::tissue_tape::TissueTape;
+use crate::rt::world::World;
+use stylet_shm_schema::TickRecord;
+
+/// Places in each ring, all at least one.
+#[derive(Clone, Copy, Debug)]
+pub struct Capacities {
+    /// Records of the force loop.
+    pub records: usize,
+    /// Orders to each loop.
+    pub orders: usize,
+    /// Notices from each loop.
+    pub notices: usize,
+    /// Scenes that the tissue loop has replaced.
+    pub old_worlds: usize,
+    /// Snapshot slots in each direction.
+    pub snapshots: usize,
+}
+
+impl Capacities {
+    /// A run: the bridge may be late by four seconds of records.
+    pub const RUN: Self = Self {
+        records: 4096,
+        orders: 256,
+        notices: 1024,
+        old_worlds: 8,
+        snapshots: 32,
+    };
+    /// Loops that are stepped on one thread: whoever steps them empties the rings after each tick.
+    pub const STEPPED: Self = Self {
+        records: 16,
+        orders: 16,
+        notices: 64,
+        old_worlds: 1,
+        snapshots: 1,
+    };
+}
+
+/// Ends that the force loop owns.
+pub struct HapticPorts {
+    /// Newest pose, to the tissue loop.
+    pub pose: triple_buffer::Input<TipPose>,
+    /// Newest response of the tissue loop.
+    pub response: triple_buffer::Output<TissueResponse>,
+    /// Orders of the bridge.
+    pub orders: rtrb::Consumer<HapticOrder>,
+    /// What happened, to the bridge.
+    pub notices: rtrb::Producer<Notice>,
+    /// One record for each tick, to the bridge.
+    pub records: rtrb::Producer<TickRecord>,
+    /// Flight recording.
+    pub flight: Recorder<HapticTape>,
+}
+
+/// Ends that the tissue loop owns.
+pub struct TissuePorts {
+    /// Newest pose of the force loop.
+    pub pose: triple_buffer::Output<TipPose>,
+    /// Newest response, to the force loop.
+    pub response: triple_buffer::Input<TissueResponse>,
+    /// Orders of the bridge.
+    pub orders: rtrb::Consumer<TissueOrder>,
+    /// What happened, to the bridge.
+    pub notices: rtrb::Producer<Notice>,
+    /// Replaced scenes, to the bridge, which frees them.
+    pub old_worlds: rtrb::Producer<Box<World>>,
+    /// Loaned snapshot memory.
+    pub slots: rtrb::Consumer<SnapshotSlot>,
+    /// Loaned memory that goes back to the bridge.
+    pub filled: rtrb::Producer<SnapshotReturn>,
+    /// Flight recording.
+    pub flight: Recorder<TissueTape>,
+}
+
+/// Ends that the bridge owns, or whoever steps the loops in its place.
+pub struct BridgePorts {
+    /// Records of the force loop.
+    pub records: rtrb::Consumer<TickRecord>,
+    /// Orders to the force loop.
+    pub haptic_orders: rtrb::Producer<HapticOrder>,
+    /// What the force loop reports.
+    pub haptic_notices: rtrb::Consumer<Notice>,
+    /// Orders to the tissue loop.
+    pub tissue_orders: rtrb::Producer<TissueOrder>,
+    /// What the tissue loop reports.
+    pub tissue_notices: rtrb::Consumer<Notice>,
+    /// Scenes to be freed.
+    pub old_worlds: rtrb::Consumer<Box<World>>,
+    /// Snapshot memory for the tissue loop.
+    pub slots: rtrb::Producer<SnapshotSlot>,
+    /// Snapshot memory that the tissue loop has returned.
+    pub filled: rtrb::Consumer<SnapshotReturn>,
+    /// The force loop's tapes.
+    pub haptic_tapes: TapePort<HapticTape>,
+    /// The tissue loop's tapes.
+    pub tissue_tapes: TapePort<TissueTape>,
+}
+
+/// All ends of one wiring; each side takes its own.
+pub struct Wiring {
+    /// For the force loop.
+    pub haptic: HapticPorts,
+    /// For the tissue loop.
+    pub tissue: TissuePorts,
+    /// For the bridge.
+    pub bridge: BridgePorts,
+}
+
+impl Wiring {
+    /// Joins two loops and a bridge. A loop without a tape is not recorded.
+    // SYNC: every ring and triple buffer is single-producer single-consumer; their crates pair release with acquire.
+    pub fn new(
+        capacities: Capacities,
+        haptic_tape: Option<Box<HapticTape>>,
+        tissue_tape: Option<Box<TissueTape>>,
+    ) -> Self {
+        let (pose_in, pose_out) = triple_buffer::triple_buffer(&TipPose::default());
+        let (response_in, response_out) = triple_buffer::triple_buffer(&TissueResponse::default());
+        let (record_in, records) = rtrb::RingBuffer::new(capacities.records);
+        let (haptic_orders, haptic_order_out) = rtrb::RingBuffer::new(capacities.orders);
+        let (haptic_notice_in, haptic_notices) = rtrb::RingBuffer::new(capacities.notices);
+        let (tissue_orders, tissue_order_out) = rtrb::RingBuffer::new(capacities.orders);
+        let (tissue_notice_in, tissue_notices) = rtrb::RingBuffer::new(capacities.notices);
+        let (old_world_in, old_worlds) = rtrb::RingBuffer::new(capacities.old_worlds);
+        let (slots, slot_out) = rtrb::RingBuffer::new(capacities.snapshots);
+        let (filled_in, filled) = rtrb::RingBuffer::new(capacities.snapshots);
+        let (haptic_flight, haptic_tapes) = recorder(haptic_tape);
+        let (tissue_flight, tissue_tapes) = recorder(tissue_tape);
+        Self {
+            haptic: HapticPorts {
+                pose: pose_in,
+                response: response_out,
+                orders: haptic_order_out,
+                notices: haptic_notice_in,
+                records: record_in,
+                flight: haptic_flight,
+            },
+            tissue: TissuePorts {
+                pose: pose_out,
+                response: response_in,
+                orders: tissue_order_out,
+                notices: tissue_notice_in,
+                old_worlds: old_world_in,
+                slots: slot_out,
+                filled: filled_in,
+                flight: tissue_flight,
+            },
+            bridge: BridgePorts {
+                records,
+                haptic_orders,
+                haptic_notices,
+                tissue_orders,
+                tissue_notices,
+                old_worlds,
+                slots,
+                filled,
+                haptic_tapes,
+                tissue_tapes,
+            },
+        }
+    }
+}

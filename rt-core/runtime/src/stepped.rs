@@ -1,0 +1,65 @@
+//! Both loops on one thread and one clock: the ticks of a run, in the order that the clock would give them.
+//!
+//! Rehearsals, measurements and tests step the same `HapticLoop` and `TissueLoop` that a run drives from two threads.
+
+use crate::rt::clock::{HAPTIC_PERIOD_NS, TISSUE_PERIOD_NS};
+use crate::rt::haptic::HapticLoop;
+use crate::rt::haptic_tape::HapticMemory;
+use crate::rt::tissue::TissueLoop;
+use crate::rt::wiring::{BridgePorts, Capacities, Wiring};
+use crate::rt::world::World;
+use stylet_hw::Device;
+use stylet_sim::force::chain::ChainOutput;
+
+/// Ticks of the force loop for each tick of the tissue loop, in a run.
+pub const HAPTIC_TICKS_PER_TISSUE_TICK: u64 = TISSUE_PERIOD_NS / HAPTIC_PERIOD_NS;
+
+/// Two loops without threads, and the bridge's ends of their rings.
+pub struct SteppedLoops {
+    /// The force loop.
+    pub haptic: HapticLoop,
+    /// The tissue loop.
+    pub tissue: TissueLoop,
+    /// Orders go in here, notices come out. Records are dropped after each step.
+    pub bridge: BridgePorts,
+    tissue_period_ns: u64,
+    now_ns: u64,
+}
+
+impl SteppedLoops {
+    /// Begins at time 0 with `memory`. The tissue loop ticks after every `haptic_ticks_per_tissue_tick`-th tick of the
+    /// force loop, at least one. Nothing is recorded.
+    pub fn new(
+        world: Box<World>,
+        device: Box<dyn Device>,
+        memory: &HapticMemory,
+        haptic_ticks_per_tissue_tick: u64,
+    ) -> Self {
+        let Wiring { haptic, tissue, bridge } = Wiring::new(Capacities::STEPPED, None, None);
+        let tissue_period_ns = haptic_ticks_per_tissue_tick.max(1) * HAPTIC_PERIOD_NS;
+        let seconds = |ns: u64| ns as f64 / 1e9;
+        Self {
+            haptic: HapticLoop::new(0, device, haptic, memory, seconds(HAPTIC_PERIOD_NS)),
+            tissue: TissueLoop::new(0, tissue, world, seconds(tissue_period_ns)),
+            bridge,
+            tissue_period_ns,
+            now_ns: 0,
+        }
+    }
+
+    /// One tick of the force loop, and the tissue loop's where one is due. Returns what the force chain gave.
+    pub fn step(&mut self) -> ChainOutput {
+        self.now_ns += HAPTIC_PERIOD_NS;
+        let output = self.haptic.tick(self.now_ns, self.now_ns, 0);
+        while self.bridge.records.pop().is_ok() {}
+        if self.now_ns.is_multiple_of(self.tissue_period_ns) {
+            self.tissue.tick(self.now_ns);
+        }
+        output
+    }
+
+    /// Simulated time since the start, s.
+    pub fn seconds(&self) -> f64 {
+        self.now_ns as f64 / 1e9
+    }
+}

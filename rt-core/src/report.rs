@@ -1,0 +1,88 @@
+//! What the loops of a run cost, as `rt-core --report` writes it.
+
+use serde::Serialize;
+use stylet_runtime::process::{LoopReport, RunReport};
+
+/// Both loops.
+#[derive(Serialize)]
+pub struct Report {
+    haptic: Loop,
+    tissue: Loop,
+}
+
+#[derive(Serialize)]
+struct Loop {
+    /// Scheduling policy by the kernel's number.
+    policy: u32,
+    priority: u32,
+    /// `u32::MAX` for any core.
+    core: u32,
+    ticks: u64,
+    missed_deadlines: u64,
+    /// To a tenth.
+    worst_wake_us: f64,
+    heap_calls: u64,
+    minor_faults: i64,
+    major_faults: i64,
+    voluntary_switches: i64,
+    involuntary_switches: i64,
+}
+
+impl From<&RunReport> for Report {
+    fn from(run: &RunReport) -> Self {
+        Self {
+            haptic: (&run.haptic).into(),
+            tissue: (&run.tissue).into(),
+        }
+    }
+}
+
+impl From<&LoopReport> for Loop {
+    fn from(r: &LoopReport) -> Self {
+        Self {
+            policy: r.thread.policy,
+            priority: r.thread.priority,
+            core: r.thread.core,
+            ticks: r.ticks,
+            missed_deadlines: r.missed,
+            worst_wake_us: (r.worst_wake_ns as f64 / 1e2).round() / 1e1,
+            heap_calls: r.usage.heap_calls,
+            minor_faults: r.usage.minor_faults,
+            major_faults: r.usage.major_faults,
+            voluntary_switches: r.usage.voluntary_switches,
+            involuntary_switches: r.usage.involuntary_switches,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Scripts read these names.
+    #[test]
+    fn the_names_of_the_fields_are_kept() {
+        let mut run = RunReport::default();
+        run.haptic.worst_wake_ns = 12_340;
+        let json = serde_json::to_value(Report::from(&run)).expect("numbers");
+        assert_eq!(json["haptic"]["worst_wake_us"], 12.3);
+        let names: Vec<_> = json["tissue"].as_object().expect("an object").keys().cloned().collect();
+        let mut expected = [
+            "policy",
+            "priority",
+            "core",
+            "ticks",
+            "missed_deadlines",
+            "worst_wake_us",
+            "heap_calls",
+            "minor_faults",
+            "major_faults",
+            "voluntary_switches",
+            "involuntary_switches",
+        ];
+        expected.sort_unstable();
+        let mut names = names;
+        names.sort_unstable();
+        assert_eq!(names, expected);
+    }
+}

@@ -1,0 +1,18 @@
+//! The procedure: what a hand does for one needle after another, and when each part of it is done.
+//!
+//! Everything here is pure: no link, no device, no clock. The host drives [`Procedure`] over the link, the core drives it over
+//! the two ticks of a rehearsal, and the window asks [`AtHand`] what comes next for a hand that follows no script.
+//! All three share the operations, their order, and the tolerances in [`tolerance`].
+//!
+//! Lengths in m, speeds in m/s, times in s, scene frame.
+
+#![warn(missing_docs)]
+
+mod at_hand;
+mod operation;
+mod script;
+pub mod tolerance;
+
+pub use at_hand::AtHand;
+pub use operation::{NeedleWay, Operation, Pace, Step};
+pub use script::{HandRequest, Next, Observed, Procedure, Reply, StepFailure};

@@ -1,0 +1,334 @@
+//! The scripted procedure: which request comes next, and when each operation is done.
+
+use crate::tolerance::{TISSUE_REST_FOR_S, TISSUE_REST_LIMIT_S, TISSUE_REST_M, arrived_after_s, move_limit_s};
+use crate::{NeedleWay, Operation, Pace, Step};
+use nalgebra::Vector3;
+use std::collections::VecDeque;
+use stylet_shm_schema::{Fault, HandMove, HapticState};
+
+/// A request that is not answered, or does not take effect, within this time has failed, s.
+const REPLY_LIMIT_S: f64 = 3.0;
+
+/// What the procedure asks of whoever drives it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum HandRequest {
+    /// Bring tissue, seeds and peaks back to their start.
+    Reset,
+    /// Publish the plan of a needle, counted from 0.
+    PublishPlan {
+        /// Which needle.
+        needle: usize,
+    },
+    /// Turn the force on.
+    Engage,
+    /// Move the hand.
+    MoveHand(HandMove),
+    /// Leave a seed at the tip.
+    DropSeed,
+}
+
+impl HandRequest {
+    /// The request in a message to people.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Reset => "Reset",
+            Self::PublishPlan { .. } => "SetPlan",
+            Self::Engage => "Engage",
+            Self::MoveHand(_) => "MoveHand",
+            Self::DropSeed => "DropSeed",
+        }
+    }
+}
+
+/// What became of the last request.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Reply {
+    /// Not answered yet.
+    Pending,
+    /// Accepted, but the state does not show it yet.
+    Accepted,
+    /// Accepted and in effect.
+    InEffect,
+    /// A seed was refused since the tip is outside the tissue.
+    TipOutsideTissue,
+    /// Refused for another reason, in words.
+    Refused(String),
+}
+
+/// What is seen of needle and tissue.
+#[derive(Clone, Copy, Debug)]
+pub struct Observed<'a> {
+    /// The latest tick of the force.
+    pub state: &'a HapticState,
+    /// How far any element is from its place at rest, m; `None` while it is not known.
+    pub displacement_m: Option<f64>,
+}
+
+/// What to do now.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Next {
+    /// Send this.
+    Send(HandRequest),
+    /// Nothing until something new is seen.
+    Wait,
+    /// An operation is done, and another follows.
+    Continue,
+    /// All is done.
+    Done,
+}
+
+/// Why the procedure cannot go on. Times are those that were waited, s.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StepFailure {
+    /// The force loop shows nothing.
+    #[error("waited {REPLY_LIMIT_S:.1} s for the state of the force loop")]
+    NoState,
+    /// The force went off after it was turned on.
+    #[error("the force is off: {}", .0.message())]
+    ForceOff(Fault),
+    /// A request was refused.
+    #[error("{request} was refused: {why}")]
+    Refused {
+        /// Which one.
+        request: &'static str,
+        /// The reasons, in words.
+        why: String,
+    },
+    /// A request was not answered.
+    #[error("waited {REPLY_LIMIT_S:.1} s for a reply to {0}")]
+    NoReply(&'static str),
+    /// A request was accepted and nothing came of it.
+    #[error("waited {REPLY_LIMIT_S:.1} s for {0} to take effect")]
+    NoEffect(&'static str),
+    /// A seed was dropped and is not in the tissue.
+    #[error("waited {REPLY_LIMIT_S:.1} s for the seed in the tissue")]
+    NoSeed,
+    /// The tip did not arrive.
+    #[error("waited {limit_s:.1} s for the tip at its target; it is {:.2} mm from it along the needle", off_along_m * 1e3)]
+    NotArrived {
+        /// The time that the move was given, s.
+        limit_s: f64,
+        /// How far the tip is beyond its target along the needle, m.
+        off_along_m: f64,
+    },
+}
+
+/// Needles in sequence. Call [`Procedure::advance`] whenever something new is seen.
+#[derive(Clone, Debug)]
+pub struct Procedure {
+    ways: Vec<NeedleWay>,
+    pace: Pace,
+    /// What is still to be done, each with the number of its needle.
+    ahead: VecDeque<(usize, Operation)>,
+    /// Drops that were refused because the tip was outside the tissue.
+    lost: Vec<usize>,
+    /// From here on a fault ends the procedure.
+    is_engaged: bool,
+    is_sent: bool,
+    begun_s: f64,
+    holds_since_s: Option<f64>,
+}
+
+impl Procedure {
+    /// The whole procedure from a reset: each needle is planned, goes in, and is taken out; between two of them the tissue
+    /// comes to rest.
+    pub fn of_needles(ways: Vec<NeedleWay>, pace: Pace) -> Self {
+        let mut ahead = VecDeque::new();
+        let mut drops = 0;
+        for (needle, way) in ways.iter().enumerate() {
+            let mut then = |operation| ahead.push_back((needle, operation));
+            if needle == 0 {
+                then(Operation::Reset);
+            }
+            then(Operation::PublishPlan);
+            if needle == 0 {
+                then(Operation::Engage);
+            }
+            way.to_the_last_drop(drops).for_each(&mut then);
+            drops += way.drops_m.len();
+            if way.retract_to_m > 0.0 {
+                then(Operation::Retract);
+            }
+            then(Operation::TakeOut);
+            then(Operation::Settle);
+        }
+        Self::new(ways, pace, ahead)
+    }
+
+    /// One needle in tissue at rest, until the tissue has come to rest again with the needle drawn back.
+    pub fn rehearsal(way: NeedleWay, pace: Pace) -> Self {
+        let mut ahead = VecDeque::from([(0, Operation::Engage)]);
+        ahead.extend(way.to_the_last_drop(0).map(|operation| (0, operation)));
+        ahead.extend([(0, Operation::Retract), (0, Operation::Settle)]);
+        Self::new(vec![way], pace, ahead)
+    }
+
+    fn new(ways: Vec<NeedleWay>, pace: Pace, ahead: VecDeque<(usize, Operation)>) -> Self {
+        Self {
+            ways,
+            pace,
+            ahead,
+            lost: Vec::new(),
+            is_engaged: false,
+            is_sent: false,
+            begun_s: 0.0,
+            holds_since_s: None,
+        }
+    }
+
+    /// The step at present.
+    pub fn step(&self) -> Step {
+        self.ahead.front().map_or(Step::Done, |(_, operation)| operation.step())
+    }
+
+    /// Which needle is at work, counted from 0; the last one when all are done.
+    pub fn needle(&self) -> usize {
+        let last = self.ways.len().saturating_sub(1);
+        self.ahead.front().map_or(last, |(needle, _)| *needle)
+    }
+
+    /// Numbers of the drops that left no seed, counted from 0 over all needles: the tip was outside the tissue.
+    pub fn lost(&self) -> &[usize] {
+        &self.lost
+    }
+
+    /// What to do at `now_s`, in seconds since the procedure began; `reply` is what became of the last request. `observed` is
+    /// `None` while the force loop shows nothing. After a failure the procedure must not go on.
+    pub fn advance(&mut self, now_s: f64, observed: Option<&Observed>, reply: Reply) -> Result<Next, StepFailure> {
+        let Some(&(needle, operation)) = self.ahead.front() else {
+            return Ok(Next::Done);
+        };
+        let Some(observed) = observed else {
+            self.in_time(now_s, StepFailure::NoState)?;
+            return Ok(Next::Wait);
+        };
+        let fault = Fault::from_number(observed.state.fault).unwrap_or(Fault::None);
+        if self.is_engaged && fault != Fault::None {
+            return Err(StepFailure::ForceOff(fault));
+        }
+        if !self.is_sent {
+            self.is_sent = true;
+            return Ok(self.request(needle, operation).map_or(Next::Wait, Next::Send));
+        }
+        if !self.is_over(now_s, observed, reply, (needle, operation))? {
+            return Ok(Next::Wait);
+        }
+        self.is_engaged |= operation == Operation::Engage;
+        self.ahead.pop_front();
+        (self.is_sent, self.holds_since_s, self.begun_s) = (false, None, now_s);
+        Ok(if self.ahead.is_empty() {
+            Next::Done
+        } else {
+            Next::Continue
+        })
+    }
+
+    fn goal(&self, needle: usize, operation: Operation) -> Option<HandMove> {
+        let way = self.ways.get(needle)?;
+        let (tip_m, speed_m_per_s) = operation.target(way, &self.pace)?;
+        Some(HandMove {
+            tip_m: tip_m.into(),
+            direction: way.direction.into(),
+            speed_m_per_s,
+            acceleration_m_per_s2: self.pace.acceleration_m_per_s2,
+        })
+    }
+
+    fn request(&self, needle: usize, operation: Operation) -> Option<HandRequest> {
+        match operation {
+            Operation::Reset => Some(HandRequest::Reset),
+            Operation::PublishPlan => Some(HandRequest::PublishPlan { needle }),
+            Operation::Engage => Some(HandRequest::Engage),
+            Operation::Drop(_) => Some(HandRequest::DropSeed),
+            Operation::Settle => None,
+            Operation::Place | Operation::Insert | Operation::DrawBack(_) | Operation::Retract | Operation::TakeOut => {
+                self.goal(needle, operation).map(HandRequest::MoveHand)
+            }
+        }
+    }
+
+    fn is_over(
+        &mut self,
+        now_s: f64,
+        observed: &Observed,
+        reply: Reply,
+        (needle, operation): (usize, Operation),
+    ) -> Result<bool, StepFailure> {
+        if let (Operation::Drop(number), Reply::TipOutsideTissue) = (operation, &reply) {
+            self.lost.push(number);
+            return Ok(true);
+        }
+        if let Some(request) = self.request(needle, operation)
+            && !self.is_in_effect(now_s, &request, reply)?
+        {
+            return Ok(false);
+        }
+        match operation {
+            Operation::Reset | Operation::PublishPlan | Operation::Engage => Ok(true),
+            Operation::Drop(number) => {
+                self.in_time(now_s, StepFailure::NoSeed)?;
+                Ok(observed.state.seed_count as usize + self.lost.len() > number)
+            }
+            Operation::Settle => {
+                let at_rest = observed.displacement_m.is_some_and(|d| d < TISSUE_REST_M);
+                let waited = now_s - self.begun_s > TISSUE_REST_LIMIT_S;
+                Ok(self.holds_for(at_rest, TISSUE_REST_FOR_S, now_s) || waited)
+            }
+            Operation::Place | Operation::Insert | Operation::DrawBack(_) | Operation::Retract | Operation::TakeOut => {
+                self.has_arrived(now_s, observed.state, (needle, operation))
+            }
+        }
+    }
+
+    fn is_in_effect(&self, now_s: f64, request: &HandRequest, reply: Reply) -> Result<bool, StepFailure> {
+        let request = request.name();
+        match reply {
+            Reply::InEffect => return Ok(true),
+            Reply::Pending => self.in_time(now_s, StepFailure::NoReply(request))?,
+            Reply::Accepted => self.in_time(now_s, StepFailure::NoEffect(request))?,
+            Reply::TipOutsideTissue => {
+                let why = "the tip is outside the tissue".to_owned();
+                return Err(StepFailure::Refused { request, why });
+            }
+            Reply::Refused(why) => return Err(StepFailure::Refused { request, why }),
+        }
+        Ok(false)
+    }
+
+    fn has_arrived(
+        &mut self,
+        now_s: f64,
+        state: &HapticState,
+        (needle, operation): (usize, Operation),
+    ) -> Result<bool, StepFailure> {
+        let (Some(goal), Some(way)) = (self.goal(needle, operation), self.ways.get(needle)) else {
+            return Ok(true);
+        };
+        let along_m = |place_m: Vector3<f64>| (place_m - way.entry_m).dot(&way.direction);
+        let off_along_m = along_m(Vector3::from(state.tip_in_scene_m)) - along_m(Vector3::from(goal.tip_m));
+        let limit_s = move_limit_s(goal.speed_m_per_s);
+        if now_s - self.begun_s > limit_s {
+            return Err(StepFailure::NotArrived { limit_s, off_along_m });
+        }
+        let after_s = arrived_after_s(state, off_along_m);
+        Ok(self.holds_for(after_s.is_some(), after_s.unwrap_or(0.0), now_s))
+    }
+
+    fn holds_for(&mut self, holds: bool, least_s: f64, now_s: f64) -> bool {
+        if !holds {
+            self.holds_since_s = None;
+            return false;
+        }
+        now_s - *self.holds_since_s.get_or_insert(now_s) >= least_s
+    }
+
+    fn in_time(&self, now_s: f64, failure: StepFailure) -> Result<(), StepFailure> {
+        if now_s - self.begun_s <= REPLY_LIMIT_S {
+            return Ok(());
+        }
+        Err(failure)
+    }
+}
+
+#[cfg(test)]
+mod tests;

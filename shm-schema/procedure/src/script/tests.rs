@@ -1,0 +1,212 @@
+//! The machine against a hand that follows each request, and against each way in which it may fail to.
+
+use super::*;
+use bytemuck::Zeroable;
+use stylet_shm_schema::flags;
+
+/// Two drops along z, 30 and 20 mm from the entry.
+fn way() -> NeedleWay {
+    NeedleWay {
+        entry_m: Vector3::new(0.01, 0.0, 0.0),
+        direction: Vector3::z(),
+        drops_m: [0.03, 0.02].map(|z| Vector3::new(0.01, 0.0, z)).to_vec(),
+        retract_to_m: 0.0,
+    }
+}
+
+/// A hand that is at its goal at once, and tissue at rest.
+struct Obedient {
+    state: HapticState,
+    now_s: f64,
+    sent: Vec<HandRequest>,
+}
+
+impl Obedient {
+    fn new() -> Self {
+        let mut state = HapticState::zeroed();
+        state.flags = flags::AT_GOAL;
+        Self {
+            state,
+            now_s: 0.0,
+            sent: Vec::new(),
+        }
+    }
+
+    /// One millisecond; drops after `lost` are refused.
+    fn step(&mut self, procedure: &mut Procedure, lost: &[usize]) -> Result<Next, StepFailure> {
+        self.now_s += 1e-3;
+        let drops = self.sent.iter().filter(|r| matches!(r, HandRequest::DropSeed)).count();
+        let is_lost =
+            matches!(self.sent.last(), Some(HandRequest::DropSeed)) && lost.contains(&(drops.saturating_sub(1)));
+        let reply = if is_lost {
+            Reply::TipOutsideTissue
+        } else {
+            Reply::InEffect
+        };
+        let observed = Observed {
+            state: &self.state,
+            displacement_m: Some(0.0),
+        };
+        let next = procedure.advance(self.now_s, Some(&observed), reply)?;
+        if let Next::Send(request) = next {
+            match request {
+                HandRequest::MoveHand(goal) => self.state.tip_in_scene_m = goal.tip_m,
+                HandRequest::DropSeed if !lost.contains(&drops) => self.state.seed_count += 1,
+                _ => {}
+            }
+            self.sent.push(request);
+        }
+        Ok(next)
+    }
+
+    fn go_through(&mut self, procedure: &mut Procedure, lost: &[usize]) -> Vec<Step> {
+        let mut steps = vec![procedure.step()];
+        while self.step(procedure, lost).expect("obeys") != Next::Done {
+            assert!(self.now_s < 60.0, "hangs in {:?}", procedure.step());
+            if steps.last() != Some(&procedure.step()) {
+                steps.push(procedure.step());
+            }
+        }
+        steps
+    }
+}
+
+/// Depth of each move from the entry, mm, and "drop" of each drop.
+fn words(sent: &[HandRequest]) -> Vec<String> {
+    let word = |request: &HandRequest| match request {
+        HandRequest::MoveHand(goal) => format!("{:.0} mm at {:.0} mm/s", goal.tip_m[2] * 1e3, goal.speed_m_per_s * 1e3),
+        HandRequest::PublishPlan { needle } => format!("plan {needle}"),
+        other => other.name().to_owned(),
+    };
+    sent.iter().map(word).collect()
+}
+
+#[test]
+fn a_procedure_goes_through_each_needle_step_by_step() {
+    let (mut hand, mut procedure) = (
+        Obedient::new(),
+        Procedure::of_needles(vec![way(), way()], Pace::default()),
+    );
+    let steps = hand.go_through(&mut procedure, &[]);
+    let of_needle = [
+        Step::Plan,
+        Step::Place,
+        Step::Insert,
+        Step::Drop,
+        Step::Retract,
+        Step::Settle,
+    ];
+    assert_eq!(steps, [of_needle, of_needle].concat());
+    let in_and_out = [
+        "0 mm at 100 mm/s",
+        "30 mm at 50 mm/s",
+        "DropSeed",
+        "20 mm at 50 mm/s",
+        "DropSeed",
+        "0 mm at 50 mm/s",
+    ];
+    let expected = [
+        &["Reset", "plan 0", "Engage"][..],
+        &in_and_out,
+        &["plan 1"],
+        &in_and_out,
+    ]
+    .concat();
+    assert_eq!(words(&hand.sent), expected);
+    assert_eq!((procedure.step(), procedure.needle()), (Step::Done, 1));
+}
+
+#[test]
+fn a_needle_that_is_drawn_back_first_is_then_taken_out_but_not_in_a_rehearsal() {
+    let way = NeedleWay {
+        retract_to_m: 0.01,
+        ..way()
+    };
+    let mut hand = Obedient::new();
+    hand.go_through(&mut Procedure::of_needles(vec![way.clone()], Pace::default()), &[]);
+    assert!(words(&hand.sent).ends_with(&["10 mm at 50 mm/s".to_owned(), "0 mm at 50 mm/s".to_owned()]));
+    let mut hand = Obedient::new();
+    hand.go_through(&mut Procedure::rehearsal(way, Pace::default()), &[]);
+    let sent = words(&hand.sent);
+    assert_eq!(
+        (sent[0].as_str(), sent.last().map(String::as_str)),
+        ("Engage", Some("10 mm at 50 mm/s"))
+    );
+}
+
+#[test]
+fn a_drop_outside_the_tissue_is_lost_and_the_next_one_is_dropped() {
+    let (mut hand, mut procedure) = (Obedient::new(), Procedure::of_needles(vec![way()], Pace::default()));
+    hand.go_through(&mut procedure, &[0]);
+    assert_eq!((procedure.lost(), hand.state.seed_count), (&[0][..], 1));
+}
+
+#[test]
+fn a_tip_that_rests_short_of_its_target_arrives_later_and_one_too_far_away_not_at_all() {
+    let mut after_s = Vec::new();
+    for short_m in [0.0, 1.5e-3] {
+        let (mut hand, mut procedure) = (Obedient::new(), Procedure::rehearsal(way(), Pace::default()));
+        while procedure.step() != Step::Insert {
+            hand.step(&mut procedure, &[]).expect("obeys");
+        }
+        let begun_s = hand.now_s;
+        while procedure.step() == Step::Insert {
+            hand.step(&mut procedure, &[]).expect("obeys");
+            hand.state.tip_in_scene_m[2] = 0.03 - short_m;
+        }
+        after_s.push(hand.now_s - begun_s);
+    }
+    assert!(
+        (after_s[0] - 0.06).abs() < 5e-3 && (after_s[1] - 1.5).abs() < 5e-3,
+        "{after_s:?}"
+    );
+    let (mut hand, mut procedure) = (Obedient::new(), Procedure::rehearsal(way(), Pace::default()));
+    let failure = loop {
+        match hand.step(&mut procedure, &[]) {
+            Ok(_) => hand.state.tip_in_scene_m[2] = -0.05,
+            Err(failure) => break failure,
+        }
+    };
+    let failure = failure.to_string();
+    assert!(
+        failure.starts_with("waited 11.0 s for the tip at its target; it is -50.00 mm"),
+        "{failure}"
+    );
+}
+
+#[test]
+fn what_is_not_answered_refused_or_without_effect_ends_the_procedure() {
+    let state = HapticState::zeroed();
+    let observed = Observed {
+        state: &state,
+        displacement_m: None,
+    };
+    let fails = |reply: Reply, now_s: f64| {
+        let mut procedure = Procedure::of_needles(vec![way()], Pace::default());
+        assert_eq!(
+            procedure.advance(0.0, Some(&observed), Reply::Pending),
+            Ok(Next::Send(HandRequest::Reset))
+        );
+        procedure.advance(now_s, Some(&observed), reply)
+    };
+    assert_eq!(fails(Reply::Pending, 2.9), Ok(Next::Wait));
+    assert_eq!(fails(Reply::Accepted, 2.9), Ok(Next::Wait));
+    assert_eq!(fails(Reply::Pending, 3.1), Err(StepFailure::NoReply("Reset")));
+    assert_eq!(fails(Reply::Accepted, 3.1), Err(StepFailure::NoEffect("Reset")));
+    let refused = fails(Reply::Refused("no".to_owned()), 0.1).map_err(|e| e.to_string());
+    assert_eq!(refused, Err("Reset was refused: no".to_owned()));
+    let mut unseen = Procedure::of_needles(vec![way()], Pace::default());
+    assert_eq!(unseen.advance(0.0, None, Reply::Pending), Ok(Next::Wait));
+    assert_eq!(unseen.advance(3.1, None, Reply::Pending), Err(StepFailure::NoState));
+}
+
+#[test]
+fn a_fault_ends_the_procedure_only_once_the_force_was_turned_on() {
+    let (mut hand, mut procedure) = (Obedient::new(), Procedure::rehearsal(way(), Pace::default()));
+    hand.state.fault = Fault::DeviceError as u32;
+    assert!(hand.step(&mut procedure, &[]).is_ok() && hand.step(&mut procedure, &[]).is_ok());
+    assert_eq!(
+        hand.step(&mut procedure, &[]),
+        Err(StepFailure::ForceOff(Fault::DeviceError))
+    );
+}

@@ -1,0 +1,159 @@
+//! Why a request is refused: reason codes for programs, a text for people.
+
+use bytemuck::{Pod, Zeroable};
+use iceoryx2::prelude::ZeroCopySend;
+use num_enum::TryFromPrimitive;
+
+/// Why a request was refused, by stable number. Where nothing is said of it, the subject is [`Reason::NO_SUBJECT`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive)]
+#[repr(u32)]
+pub enum RefusalCode {
+    /// The number of the command is not known. Subject: that number.
+    UnknownCommand = 1,
+    /// The payload has more or fewer values than it must. Subject: how many came.
+    ValueCount = 2,
+    /// A value is not a finite number. Subject: its place in the payload.
+    NotFinite = 3,
+    /// The number of a parameter is not known. Subject: its place in the payload.
+    UnknownParameter = 4,
+    /// A coordinate is too far from the origin. Subject: place of the first coordinate in the payload.
+    PlaceTooFar = 5,
+    /// A direction is not a unit vector. Subject: place of its first value in the payload.
+    NotUnitDirection = 6,
+    /// A speed, an acceleration or a distance is outside its limits. Subject: its place in the payload.
+    ValueOutOfLimits = 7,
+    /// There is no built-in scene of that number.
+    UnknownScene = 8,
+    /// A parameter is outside its limits. Subject: the parameter.
+    ParameterOutOfLimits = 20,
+    /// With these shear angles a cell of tissue could fold (paper eq. 1). Subject: one of the parameters involved.
+    CellsFold = 21,
+    /// The device cannot hold a spring of that stiffness. Subject: one of the parameters involved.
+    TooStiff = 22,
+    /// A model refuses values that the table allows.
+    ParametersUnusable = 23,
+    /// More requests than the core carries out at once.
+    TooManyRequests = 40,
+    /// The tip is outside the tissue.
+    TipOutsideTissue = 41,
+    /// Every seed has been placed.
+    NoSeedLeft = 42,
+    /// There is no seed to remove.
+    NoSeedToUndo = 43,
+    /// The needle is in the tissue.
+    NeedleInTissue = 44,
+    /// The simulated hand cannot reach the goal.
+    BadGoal = 45,
+    /// Another scene is being loaded.
+    SceneLoading = 60,
+    /// The uploaded volume is invalid.
+    InvalidVolume = 61,
+    /// The scene could not be built.
+    SceneNotBuilt = 62,
+    /// Another rehearsal is running.
+    RehearsalRunning = 70,
+    /// The rehearsal did not come to its end.
+    RehearsalFailed = 71,
+    /// The flight recording was not written.
+    FlightNotSaved = 80,
+    /// A fault of the core itself.
+    Internal = 90,
+}
+
+impl RefusalCode {
+    /// `None` when this build does not know the number.
+    pub fn from_number(number: u32) -> Option<Self> {
+        Self::try_from(number).ok()
+    }
+
+    /// What a person reads where nothing more is known.
+    pub fn message(self) -> &'static str {
+        match self {
+            Self::UnknownCommand => "the command is not known; host and core differ",
+            Self::ValueCount => "the command has too many or too few values",
+            Self::NotFinite => "a value is not a finite number",
+            Self::UnknownParameter => "the parameter is not known; host and core differ",
+            Self::PlaceTooFar => "a place is too far away",
+            Self::NotUnitDirection => "a direction is not a unit vector",
+            Self::ValueOutOfLimits => "a speed, an acceleration or a distance is outside its limits",
+            Self::UnknownScene => "there is no such built-in scene",
+            Self::ParameterOutOfLimits => "outside its limits",
+            Self::CellsFold => "with these shear angles cells fold over (eq. 1); lower one of them",
+            Self::TooStiff => "stiffer than the device can hold",
+            Self::ParametersUnusable => "the models cannot use these values together",
+            Self::TooManyRequests => "too many requests at once; send fewer",
+            Self::TipOutsideTissue => "the tip is outside the tissue: move it in before dropping a seed",
+            Self::NoSeedLeft => "128 seeds are placed already; undo one first",
+            Self::NoSeedToUndo => "no seed has been placed",
+            Self::NeedleInTissue => "the needle is in the tissue: retract it first",
+            Self::BadGoal => {
+                "the goal for the hand needs a finite place, a direction, and a speed and acceleration above zero"
+            }
+            Self::SceneLoading => "another scene is being loaded; wait until it is ready",
+            Self::InvalidVolume => "the volume is invalid",
+            Self::SceneNotBuilt => "the scene could not be built",
+            Self::RehearsalRunning => "another rehearsal runs; wait until it is done",
+            Self::RehearsalFailed => "the rehearsal failed",
+            Self::FlightNotSaved => "the flight recording was not written",
+            Self::Internal => "rt-core failed; what it printed says where",
+        }
+    }
+}
+
+/// One reason of a refusal, as a [`crate::Reply`] carries it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
+#[type_name("stylet.Reason")]
+pub struct Reason {
+    /// [`RefusalCode`] by number.
+    pub code: u32,
+    /// What it is about; its meaning depends on the code.
+    pub subject: u32,
+}
+
+impl Reason {
+    /// The subject of a reason that has none.
+    pub const NO_SUBJECT: u32 = u32::MAX;
+
+    /// A reason with its subject.
+    pub fn new(code: RefusalCode, subject: u32) -> Self {
+        let code = code as u32;
+        Self { code, subject }
+    }
+
+    /// `None` when this build does not know the number.
+    pub fn code(&self) -> Option<RefusalCode> {
+        RefusalCode::from_number(self.code)
+    }
+}
+
+/// A refusal as the core makes it.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{text}")]
+pub struct Refusal {
+    /// At least one.
+    pub reasons: Vec<Reason>,
+    /// Every reason in words, one a line.
+    pub text: String,
+}
+
+impl Refusal {
+    /// A reason without a subject, explained by `text`.
+    pub fn new(code: RefusalCode, text: impl Into<String>) -> Self {
+        Self {
+            reasons: vec![Reason::new(code, Reason::NO_SUBJECT)],
+            text: text.into(),
+        }
+    }
+}
+
+impl From<RefusalCode> for Refusal {
+    fn from(code: RefusalCode) -> Self {
+        Self::new(code, code.message())
+    }
+}
+
+pub(crate) fn lines(problems: &[impl std::fmt::Display]) -> String {
+    let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+    lines.join("\n")
+}

@@ -1,0 +1,290 @@
+//! From a [`Command`] of any bytes to a [`Request`], or every reason against it.
+
+use super::*;
+use crate::check::{MAX_COORDINATE_M, is_unit};
+use crate::{MAX_COMMAND_VALUES, Reason, Refusal, RefusalCode};
+
+/// What is wrong with one record. `at` is the place of the first value concerned.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RequestError {
+    /// No request has this number.
+    #[error("command number {0} is not known; host and core differ")]
+    UnknownCommand(u32),
+    /// More or fewer values than the payload has.
+    #[error("{kind:?} takes {}; {count} values came", takes(*kind))]
+    Count {
+        /// The request.
+        kind: CommandKind,
+        /// Values that came.
+        count: u32,
+    },
+    /// A value is infinite or not a number.
+    #[error("value {at} is not a finite number")]
+    NotFinite {
+        /// Place of the value.
+        at: u32,
+    },
+    /// No parameter has this number.
+    #[error("parameter number {number} is not known; there are {}", crate::PARAMETER_COUNT)]
+    UnknownParameter {
+        /// Place of the value.
+        at: u32,
+        /// The number that came.
+        number: f64,
+    },
+    /// A coordinate is farther than [`MAX_COORDINATE_M`].
+    #[error("the place {place_m:?} must be within {} m", MAX_COORDINATE_M)]
+    TooFar {
+        /// Place of its first value.
+        at: u32,
+        /// The place that came, m.
+        place_m: [f64; 3],
+    },
+    /// A direction that is not a unit vector.
+    #[error("the direction {direction:?} is not a unit vector")]
+    NotUnit {
+        /// Place of its first value.
+        at: u32,
+        /// The direction that came.
+        direction: [f64; 3],
+    },
+    /// A speed, an acceleration or a distance outside its limits.
+    #[error("{what} is {value}; it must be {low} to {high}")]
+    OutOfLimits {
+        /// Place of the value.
+        at: u32,
+        /// Name of the quantity with its unit.
+        what: &'static str,
+        /// The value that came.
+        value: f64,
+        /// Least value.
+        low: f64,
+        /// Largest value.
+        high: f64,
+    },
+    /// No built-in scene has this number.
+    #[error("there is no built-in scene number {number}; from 0 they are {}", BUILTIN_SCENES.join(", "))]
+    UnknownScene {
+        /// The number that came.
+        number: f64,
+    },
+}
+
+/// Everything that is wrong with one record; at least one problem.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{}", crate::refusal::lines(.0))]
+pub struct RequestErrors(pub Vec<RequestError>);
+
+impl From<RequestError> for RequestErrors {
+    fn from(error: RequestError) -> Self {
+        Self(vec![error])
+    }
+}
+
+impl RequestError {
+    pub(super) fn count(kind: CommandKind, count: usize) -> Self {
+        let count = u32::try_from(count).unwrap_or(u32::MAX);
+        Self::Count { kind, count }
+    }
+
+    /// Reason code of a reply, and what it is about.
+    pub fn reason(&self) -> (RefusalCode, u32) {
+        match *self {
+            Self::UnknownCommand(number) => (RefusalCode::UnknownCommand, number),
+            Self::Count { count, .. } => (RefusalCode::ValueCount, count),
+            Self::NotFinite { at } => (RefusalCode::NotFinite, at),
+            Self::UnknownParameter { at, .. } => (RefusalCode::UnknownParameter, at),
+            Self::TooFar { at, .. } => (RefusalCode::PlaceTooFar, at),
+            Self::NotUnit { at, .. } => (RefusalCode::NotUnitDirection, at),
+            Self::OutOfLimits { at, .. } => (RefusalCode::ValueOutOfLimits, at),
+            Self::UnknownScene { .. } => (RefusalCode::UnknownScene, 0),
+        }
+    }
+}
+
+fn takes(kind: CommandKind) -> String {
+    match kind {
+        CommandKind::SetParameters => "pairs of number and value".to_owned(),
+        CommandKind::SetPlan => {
+            format!("nothing, or entry, direction and at most {MAX_SEEDS} seeds, three values each")
+        }
+        CommandKind::MoveHand => "8 values".to_owned(),
+        CommandKind::LoadBuiltinScene => "one number".to_owned(),
+        CommandKind::Rehearse => format!("11 values and 1 to {MAX_SEEDS} drops of three values each"),
+        _ => "no values".to_owned(),
+    }
+}
+
+impl Request {
+    /// Verifies kind, count and every value. The limits of a parameter are those of [`crate::ParameterSet::problems`],
+    /// which needs the other parameters.
+    pub fn decode(command: &Command) -> Result<Self, RequestErrors> {
+        let number = command.kind;
+        let kind = CommandKind::try_from(number).map_err(|_| RequestError::UnknownCommand(number))?;
+        let count = command.value_count as usize;
+        let values = command.values.get(..count);
+        let values = values.filter(|v| count_fits(kind, v.len()));
+        let values = values.ok_or_else(|| RequestError::count(kind, count))?;
+        if let Some(at) = values.iter().position(|v| !v.is_finite()) {
+            return Err(RequestError::NotFinite { at: at as u32 }.into());
+        }
+        let mut reader = Reader::new(values);
+        let request = reader.request(kind);
+        match reader.errors.is_empty() {
+            true => Ok(request),
+            false => Err(RequestErrors(reader.errors)),
+        }
+    }
+}
+
+const PLAN_HEAD: usize = 6;
+const REHEARSAL_HEAD: usize = 11;
+
+fn count_fits(kind: CommandKind, count: usize) -> bool {
+    let places_after = |head: usize| count.checked_sub(head).filter(|n| n % 3 == 0).map(|n| n / 3);
+    match kind {
+        CommandKind::SetParameters => count > 0 && count.is_multiple_of(2),
+        CommandKind::SetPlan => count == 0 || places_after(PLAN_HEAD).is_some_and(|n| n <= MAX_SEEDS),
+        CommandKind::MoveHand => count == 8,
+        // Without a value: the first scene.
+        CommandKind::LoadBuiltinScene => count <= 1,
+        CommandKind::Rehearse => places_after(REHEARSAL_HEAD).is_some_and(|n| (1..=MAX_SEEDS).contains(&n)),
+        // A payload where there is none has always been ignored.
+        _ => count <= MAX_COMMAND_VALUES,
+    }
+}
+
+/// Takes values in their order; what is wrong with one is noted, and reading goes on.
+struct Reader<'a> {
+    values: &'a [f64],
+    at: usize,
+    errors: Vec<RequestError>,
+}
+
+impl<'a> Reader<'a> {
+    fn new(values: &'a [f64]) -> Self {
+        let errors = Vec::new();
+        Self { values, at: 0, errors }
+    }
+
+    fn request(&mut self, kind: CommandKind) -> Request {
+        match kind {
+            CommandKind::SetParameters => Request::SetParameters(self.rest(Self::change)),
+            CommandKind::SetPlan if self.values.is_empty() => Request::SetPlan(None),
+            CommandKind::SetPlan => Request::SetPlan(Some(PlannedNeedle {
+                entry_m: self.place(),
+                direction: self.direction(),
+                seeds_m: self.rest(Self::place),
+            })),
+            CommandKind::MoveHand => Request::MoveHand(HandMove {
+                tip_m: self.place(),
+                direction: self.direction(),
+                speed_m_per_s: self.within("speed in m/s", SPEED_RANGE_M_PER_S),
+                acceleration_m_per_s2: self.within("acceleration in m/s2", ACCELERATION_RANGE_M_PER_S2),
+            }),
+            CommandKind::DropSeed => Request::DropSeed,
+            CommandKind::Engage => Request::Engage,
+            CommandKind::Disengage => Request::Disengage,
+            CommandKind::Reset => Request::Reset,
+            CommandKind::LoadBuiltinScene => Request::LoadBuiltinScene(self.scene()),
+            CommandKind::UndoSeed => Request::UndoSeed,
+            CommandKind::Shutdown => Request::Shutdown,
+            CommandKind::SaveFlight => Request::SaveFlight,
+            CommandKind::Rehearse => Request::Rehearse(NeedleRehearsal {
+                entry_m: self.place(),
+                direction: self.direction(),
+                insert_m_per_s: self.within("insertion in m/s", SPEED_RANGE_M_PER_S),
+                retract_m_per_s: self.within("retraction in m/s", SPEED_RANGE_M_PER_S),
+                approach_m_per_s: self.within("approach in m/s", SPEED_RANGE_M_PER_S),
+                acceleration_m_per_s2: self.within("acceleration in m/s2", ACCELERATION_RANGE_M_PER_S2),
+                retract_to_m: self.within("place drawn back to, in m from the entry,", RETRACT_RANGE_M),
+                drops_m: self.rest(Self::place),
+            }),
+            CommandKind::StopHand => Request::StopHand,
+        }
+    }
+
+    /// 0 past the end, which the count forbids.
+    fn next(&mut self) -> f64 {
+        self.at += 1;
+        self.values.get(self.at - 1).copied().unwrap_or_default()
+    }
+
+    fn rest<T>(&mut self, mut read: impl FnMut(&mut Self) -> T) -> Vec<T> {
+        let mut all = Vec::new();
+        while self.at < self.values.len() {
+            all.push(read(self));
+        }
+        all
+    }
+
+    fn place(&mut self) -> [f64; 3] {
+        let at = self.at as u32;
+        let place_m = [self.next(), self.next(), self.next()];
+        if !place_m.iter().all(|c| c.abs() <= MAX_COORDINATE_M) {
+            self.errors.push(RequestError::TooFar { at, place_m });
+        }
+        place_m
+    }
+
+    fn direction(&mut self) -> [f64; 3] {
+        let at = self.at as u32;
+        let direction = [self.next(), self.next(), self.next()];
+        if !is_unit(&direction) {
+            self.errors.push(RequestError::NotUnit { at, direction });
+        }
+        direction
+    }
+
+    fn within(&mut self, what: &'static str, [low, high]: [f64; 2]) -> f64 {
+        let (at, value) = (self.at as u32, self.next());
+        if !(low..=high).contains(&value) {
+            self.errors.push(RequestError::OutOfLimits {
+                at,
+                what,
+                value,
+                low,
+                high,
+            });
+        }
+        value
+    }
+
+    fn change(&mut self) -> ParameterChange {
+        let (at, number, value) = (self.at as u32, self.next(), self.next());
+        let id = whole(number).and_then(|n| ParameterId::try_from(n).ok());
+        let id = id.unwrap_or_else(|| {
+            self.errors.push(RequestError::UnknownParameter { at, number });
+            ParameterId::MinStretch
+        });
+        ParameterChange { id, value }
+    }
+
+    fn scene(&mut self) -> u32 {
+        let number = self.next();
+        let known = whole(number).filter(|&n| (n as usize) < BUILTIN_SCENES.len());
+        known.unwrap_or_else(|| {
+            self.errors.push(RequestError::UnknownScene { number });
+            0
+        })
+    }
+}
+
+/// The number when it is a whole one.
+fn whole(number: f64) -> Option<u32> {
+    let n = number as u32;
+    (f64::from(n) == number).then_some(n)
+}
+
+impl From<RequestErrors> for Refusal {
+    fn from(errors: RequestErrors) -> Self {
+        let reasons = errors.0.iter().map(|error| {
+            let (code, subject) = error.reason();
+            Reason::new(code, subject)
+        });
+        Self {
+            reasons: reasons.collect(),
+            text: errors.to_string(),
+        }
+    }
+}

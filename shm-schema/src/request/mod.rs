@@ -1,0 +1,180 @@
+//! What a host may ask for, typed; [`Request::encode`] and [`Request::decode`] are the only way to and from a [`Command`].
+
+mod decode;
+
+pub use decode::{RequestError, RequestErrors};
+
+use crate::{BUILTIN_SCENES, Command, MAX_SEEDS, ParameterId};
+use bytemuck::Zeroable;
+use num_enum::TryFromPrimitive;
+use strum::EnumDiscriminants;
+
+/// Slowest and fastest speed of the simulated hand, m/s.
+pub const SPEED_RANGE_M_PER_S: [f64; 2] = [1e-4, 1.0];
+/// Smallest and largest acceleration of the simulated hand, m/s².
+pub const ACCELERATION_RANGE_M_PER_S2: [f64; 2] = [1e-2, 100.0];
+/// How far from the entry a rehearsed needle may be drawn back to, along the needle, m.
+pub const RETRACT_RANGE_M: [f64; 2] = [-0.5, 0.5];
+
+/// One request of a host. The numbers are stable: [`CommandKind`] is made from them, and [`Command::kind`] carries them.
+#[derive(Clone, Debug, PartialEq, EnumDiscriminants)]
+#[strum_discriminants(name(CommandKind), derive(TryFromPrimitive))]
+#[strum_discriminants(doc = "Kind of a [`Request`] by stable number, as [`Command::kind`] carries it.")]
+#[repr(u32)]
+pub enum Request {
+    /// Change parameters. All are in force with the reply, or none.
+    #[strum_discriminants(doc = "[`Request::SetParameters`]")]
+    SetParameters(Vec<ParameterChange>) = 1,
+    /// Publish a plan to all hosts; `None` withdraws it.
+    #[strum_discriminants(doc = "[`Request::SetPlan`]")]
+    SetPlan(Option<PlannedNeedle>) = 2,
+    /// Set the goal of the simulated hand.
+    #[strum_discriminants(doc = "[`Request::MoveHand`]")]
+    MoveHand(HandMove) = 3,
+    /// Leave a seed at the tip.
+    #[strum_discriminants(doc = "[`Request::DropSeed`]")]
+    DropSeed = 4,
+    /// Turn the force on; also re-arms after a fault.
+    #[strum_discriminants(doc = "[`Request::Engage`]")]
+    Engage = 5,
+    /// Ramp the force to zero.
+    #[strum_discriminants(doc = "[`Request::Disengage`]")]
+    Disengage = 6,
+    /// Bring the tissue to rest, remove the seeds, clear peaks and worst cases.
+    #[strum_discriminants(doc = "[`Request::Reset`]")]
+    Reset = 7,
+    /// Run a built-in scene, by its place in [`BUILTIN_SCENES`].
+    #[strum_discriminants(doc = "[`Request::LoadBuiltinScene`]")]
+    LoadBuiltinScene(u32) = 8,
+    /// Remove the last seed.
+    #[strum_discriminants(doc = "[`Request::UndoSeed`]")]
+    UndoSeed = 9,
+    /// End `rt-core`.
+    #[strum_discriminants(doc = "[`Request::Shutdown`]")]
+    Shutdown = 10,
+    /// Write the flight recording of both loops to disk.
+    #[strum_discriminants(doc = "[`Request::SaveFlight`]")]
+    SaveFlight = 11,
+    /// Simulate one needle ahead of time, in a body of its own, from rest; a [`crate::Rehearsal`] is sent before the reply.
+    #[strum_discriminants(doc = "[`Request::Rehearse`]")]
+    Rehearse(NeedleRehearsal) = 12,
+    /// Stop the simulated hand as fast as it can; only the core knows where that is.
+    #[strum_discriminants(doc = "[`Request::StopHand`]")]
+    StopHand = 13,
+}
+
+/// New value of one parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParameterChange {
+    /// Which parameter.
+    pub id: ParameterId,
+    /// The value, SI.
+    pub value: f64,
+}
+
+/// A needle and the seeds along it, scene frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlannedNeedle {
+    /// Where the needle enters, m.
+    pub entry_m: [f64; 3],
+    /// Unit vector from the entry into the body.
+    pub direction: [f64; 3],
+    /// Positions of at most [`MAX_SEEDS`] seeds, m.
+    pub seeds_m: Vec<[f64; 3]>,
+}
+
+/// Goal of the simulated hand, scene frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HandMove {
+    /// Where the tip goes, m.
+    pub tip_m: [f64; 3],
+    /// Unit vector from hub to tip.
+    pub direction: [f64; 3],
+    /// Largest speed, m/s, within [`SPEED_RANGE_M_PER_S`].
+    pub speed_m_per_s: f64,
+    /// Largest acceleration, m/s², within [`ACCELERATION_RANGE_M_PER_S2`].
+    pub acceleration_m_per_s2: f64,
+}
+
+/// One needle to rehearse, scene frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NeedleRehearsal {
+    /// Where the needle enters, m.
+    pub entry_m: [f64; 3],
+    /// Unit vector from the entry into the body.
+    pub direction: [f64; 3],
+    /// Speed to the first drop, m/s.
+    pub insert_m_per_s: f64,
+    /// Speed between drops and out, m/s.
+    pub retract_m_per_s: f64,
+    /// Speed to the entry, m/s.
+    pub approach_m_per_s: f64,
+    /// Acceleration of the hand, m/s².
+    pub acceleration_m_per_s2: f64,
+    /// How far from the entry the tip is drawn back to at the end, m, within [`RETRACT_RANGE_M`].
+    pub retract_to_m: f64,
+    /// Where the tip leaves each seed, m, in the order of the drops: 1 to [`MAX_SEEDS`].
+    pub drops_m: Vec<[f64; 3]>,
+}
+
+impl Request {
+    /// Kind of the request, without its payload.
+    pub fn kind(&self) -> CommandKind {
+        self.into()
+    }
+
+    /// The record that crosses the process. [`RequestErrors`] when the payload does not fit into it; nothing else is
+    /// verified here, since [`Request::decode`] verifies everything.
+    pub fn encode(&self, host_id: u64, command_id: u64) -> Result<Command, RequestErrors> {
+        let mut command = Command::zeroed();
+        (command.host_id, command.command_id, command.kind) = (host_id, command_id, self.kind() as u32);
+        let values = self.values();
+        let Some(place) = command.values.get_mut(..values.len()) else {
+            return Err(RequestError::count(self.kind(), values.len()).into());
+        };
+        place.copy_from_slice(&values);
+        command.value_count = values.len() as u32;
+        Ok(command)
+    }
+
+    fn values(&self) -> Vec<f64> {
+        match self {
+            Self::SetParameters(changes) => changes
+                .iter()
+                .flat_map(|change| [f64::from(change.id as u32), change.value])
+                .collect(),
+            Self::SetPlan(None) => Vec::new(),
+            Self::SetPlan(Some(plan)) => joined(&[&plan.entry_m, &plan.direction], &plan.seeds_m),
+            Self::MoveHand(hand) => {
+                let pace = [hand.speed_m_per_s, hand.acceleration_m_per_s2];
+                joined(&[&hand.tip_m, &hand.direction, &pace], &[])
+            }
+            Self::LoadBuiltinScene(number) => vec![f64::from(*number)],
+            Self::Rehearse(run) => {
+                let pace = [
+                    run.insert_m_per_s,
+                    run.retract_m_per_s,
+                    run.approach_m_per_s,
+                    run.acceleration_m_per_s2,
+                    run.retract_to_m,
+                ];
+                joined(&[&run.entry_m, &run.direction, &pace], &run.drops_m)
+            }
+            Self::DropSeed
+            | Self::Engage
+            | Self::Disengage
+            | Self::Reset
+            | Self::UndoSeed
+            | Self::Shutdown
+            | Self::SaveFlight
+            | Self::StopHand => Vec::new(),
+        }
+    }
+}
+
+fn joined(head: &[&[f64]], places: &[[f64; 3]]) -> Vec<f64> {
+    [&head.concat(), places.as_flattened()].concat()
+}
+
+#[cfg(test)]
+mod tests;

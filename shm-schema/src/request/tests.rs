@@ -1,0 +1,214 @@
+//! Every request survives the record, and no record of any bytes is taken for what it is not.
+
+use super::*;
+use crate::{MAX_COMMAND_VALUES, PARAMETERS, RefusalCode};
+
+fn needle(seeds: usize) -> PlannedNeedle {
+    PlannedNeedle {
+        entry_m: [0.01, -0.02, 0.03],
+        direction: [0.0, 0.6, 0.8],
+        seeds_m: (0..seeds).map(|i| [1e-3 * i as f64, 0.5, -0.25]).collect(),
+    }
+}
+
+fn rehearsal(drops: usize) -> NeedleRehearsal {
+    NeedleRehearsal {
+        entry_m: [0.01, -0.02, 0.03],
+        direction: [0.0, 0.6, 0.8],
+        insert_m_per_s: 0.05,
+        retract_m_per_s: 0.06,
+        approach_m_per_s: 0.1,
+        acceleration_m_per_s2: 2.0,
+        retract_to_m: -0.01,
+        drops_m: needle(drops).seeds_m,
+    }
+}
+
+fn all() -> Vec<Request> {
+    let change = |p: &crate::ParameterSpec| ParameterChange {
+        id: p.id,
+        value: p.default,
+    };
+    vec![
+        Request::SetParameters(PARAMETERS.iter().map(change).collect()),
+        Request::SetPlan(None),
+        Request::SetPlan(Some(needle(0))),
+        Request::SetPlan(Some(needle(MAX_SEEDS))),
+        Request::MoveHand(HandMove {
+            tip_m: [0.1, 0.2, -0.3],
+            direction: [1.0, 0.0, 0.0],
+            speed_m_per_s: 1e-4,
+            acceleration_m_per_s2: 100.0,
+        }),
+        Request::DropSeed,
+        Request::Engage,
+        Request::Disengage,
+        Request::Reset,
+        Request::LoadBuiltinScene(0),
+        Request::LoadBuiltinScene(BUILTIN_SCENES.len() as u32 - 1),
+        Request::UndoSeed,
+        Request::Shutdown,
+        Request::SaveFlight,
+        Request::Rehearse(rehearsal(1)),
+        Request::Rehearse(rehearsal(MAX_SEEDS)),
+        Request::StopHand,
+    ]
+}
+
+fn record(kind: CommandKind, values: &[f64]) -> Command {
+    let mut command = Command::zeroed();
+    (command.kind, command.value_count) = (kind as u32, values.len() as u32);
+    command.values[..values.len()].copy_from_slice(values);
+    command
+}
+
+fn refused(kind: CommandKind, values: &[f64]) -> Vec<RequestError> {
+    Request::decode(&record(kind, values)).expect_err("malformed").0
+}
+
+#[test]
+fn every_request_survives_its_record() {
+    let mut numbers: Vec<u32> = Vec::new();
+    for request in all() {
+        let command = request.encode(3, 4).expect("fits");
+        assert_eq!((command.host_id, command.command_id), (3, 4));
+        assert_eq!(Request::decode(&command).as_ref(), Ok(&request));
+        numbers.push(command.kind);
+    }
+    numbers.dedup();
+    // The wire values of schema 5.
+    assert_eq!(numbers, (1..=13).collect::<Vec<u32>>());
+}
+
+#[test]
+fn a_payload_that_does_not_fit_is_not_sent() {
+    let long = Request::SetPlan(Some(needle(MAX_SEEDS + 5)));
+    assert!(long.encode(1, 1).is_err());
+    // One that fits but is too long is refused by the reader.
+    let command = Request::SetPlan(Some(needle(MAX_SEEDS + 1)))
+        .encode(1, 1)
+        .expect("fits");
+    assert!(Request::decode(&command).is_err());
+}
+
+/// A small generator, so that every run sees the same records.
+fn xorshift(state: &mut u64) -> u64 {
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    *state
+}
+
+#[test]
+fn ten_thousand_random_records_never_panic_and_what_is_accepted_survives() {
+    let mut seed = 0x9e37_79b9_7f4a_7c15;
+    let (mut accepted, mut refused) = (0, 0);
+    for round in 0..10_000 {
+        let mut command = Command::zeroed();
+        // Half of them of a known kind and a possible count, so that the payload is looked at.
+        if round % 2 == 0 {
+            command.kind = (xorshift(&mut seed) % 15) as u32;
+            command.value_count = (xorshift(&mut seed) % 410) as u32;
+        } else {
+            (command.kind, command.value_count) = (xorshift(&mut seed) as u32, xorshift(&mut seed) as u32);
+        }
+        for value in &mut command.values {
+            let bits = xorshift(&mut seed);
+            *value = match round % 4 {
+                0 => (bits % 50) as f64,
+                2 => (bits as f64 / u64::MAX as f64) - 0.5,
+                _ => f64::from_bits(bits),
+            };
+        }
+        match Request::decode(&command) {
+            Ok(request) => {
+                accepted += 1;
+                let again = request.encode(0, 0).expect("came out of a record");
+                assert_eq!(Request::decode(&again), Ok(request));
+            }
+            Err(errors) => {
+                refused += 1;
+                assert!(!errors.0.is_empty() && !errors.to_string().is_empty());
+                assert!(!crate::Refusal::from(errors).reasons.is_empty());
+            }
+        }
+    }
+    assert!(accepted > 100 && refused > 1000, "{accepted} {refused}");
+}
+
+#[test]
+fn all_ones_and_counts_beyond_the_record_are_refused() {
+    let ones: Command = bytemuck::pod_read_unaligned(&[0xff; size_of::<Command>()]);
+    assert_eq!(
+        Request::decode(&ones),
+        Err(RequestError::UnknownCommand(u32::MAX).into())
+    );
+    let mut long = record(CommandKind::DropSeed, &[]);
+    long.value_count = MAX_COMMAND_VALUES as u32 + 1;
+    let reason = Request::decode(&long).expect_err("too long").0[0].reason();
+    assert_eq!(reason, (RefusalCode::ValueCount, MAX_COMMAND_VALUES as u32 + 1));
+}
+
+#[test]
+fn every_malformed_payload_is_refused_with_its_reason() {
+    use CommandKind as K;
+    use RefusalCode as C;
+    for (kind, values, code) in [
+        (K::SetParameters, &[1e9, 1.0][..], C::UnknownParameter),
+        (K::SetParameters, &[0.5, 1.0], C::UnknownParameter),
+        (K::SetParameters, &[-1.0, 1.0], C::UnknownParameter),
+        (K::SetParameters, &[40.0, 1.0], C::UnknownParameter),
+        (K::SetParameters, &[1.0], C::ValueCount),
+        (K::SetParameters, &[], C::ValueCount),
+        (K::SetParameters, &[0.0, f64::NAN], C::NotFinite),
+        (K::SetParameters, &[0.0, f64::INFINITY], C::NotFinite),
+        (K::SetPlan, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.5], C::NotUnitDirection),
+        (K::SetPlan, &[0.0; 5], C::ValueCount),
+        (K::SetPlan, &[0.0; 396], C::ValueCount),
+        (K::SetPlan, &[21.0, 0.0, 0.0, 0.0, 0.0, 1.0], C::PlaceTooFar),
+        (K::MoveHand, &[0.0, 0.0, 1e30, 0.0, 0.0, 1.0, 0.1, 1.0], C::PlaceTooFar),
+        (
+            K::MoveHand,
+            &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1e9, 1.0],
+            C::ValueOutOfLimits,
+        ),
+        (K::MoveHand, &[], C::ValueCount),
+        (K::Rehearse, &[0.0; 11], C::ValueCount),
+        (K::Rehearse, &[0.0; 15], C::ValueCount),
+        (K::Rehearse, &[0.0; 14], C::NotUnitDirection),
+        (K::LoadBuiltinScene, &[3.0], C::UnknownScene),
+        (K::LoadBuiltinScene, &[0.5], C::UnknownScene),
+        (K::LoadBuiltinScene, &[-1.0], C::UnknownScene),
+        (K::LoadBuiltinScene, &[0.0, 1.0], C::ValueCount),
+    ] {
+        assert_eq!(refused(kind, values)[0].reason().0, code, "{kind:?} {values:?}");
+    }
+}
+
+#[test]
+fn a_rehearsal_lists_every_bad_value() {
+    let mut bad = rehearsal(2);
+    bad.direction[2] = 0.9;
+    (bad.insert_m_per_s, bad.acceleration_m_per_s2) = (0.0, 1e9);
+    bad.drops_m[1][2] = 30.0;
+    let command = Request::Rehearse(bad).encode(1, 1).expect("fits");
+    let reasons: Vec<_> = Request::decode(&command)
+        .expect_err("bad")
+        .0
+        .iter()
+        .map(RequestError::reason)
+        .collect();
+    let expected = [
+        (RefusalCode::NotUnitDirection, 3),
+        (RefusalCode::ValueOutOfLimits, 6),
+        (RefusalCode::ValueOutOfLimits, 9),
+        (RefusalCode::PlaceTooFar, 14),
+    ];
+    assert_eq!(reasons, expected);
+}
+
+#[test]
+fn a_built_in_scene_without_a_number_is_the_first() {
+    let command = record(CommandKind::LoadBuiltinScene, &[]);
+    assert_eq!(Request::decode(&command), Ok(Request::LoadBuiltinScene(0)));
+}

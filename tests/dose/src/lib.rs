@@ -1,0 +1,10 @@
+//! Dose against published tables, closed forms and independent code.
+
+#[cfg(test)]
+mod dvh;
+#[cfg(test)]
+mod grid;
+#[cfg(test)]
+mod source;
+#[cfg(test)]
+mod tg43;

@@ -1,0 +1,125 @@
+//! Every file of the corpora, cut and bent, is answered by its reader; memory stays in bounds.
+//!
+//! The corpora hold what fuzzing started from and what it found (docs/tools/fuzz).
+
+use std::path::PathBuf;
+use stylet_files as files;
+
+/// What all readers together may take beside what the test has (KiB).
+const MAX_KIB: u64 = 1 << 20;
+
+fn corpus(reader: &str) -> Vec<(PathBuf, Vec<u8>)> {
+    let folder = stylet_test_kit::repository("tests/files/corpus").join(reader);
+    let entries = std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let mut files: Vec<_> = entries.map(|e| e.expect("an entry").path()).collect();
+    files.sort();
+    assert!(!files.is_empty(), "{reader} has no corpus");
+    let bytes = |path: PathBuf| (path.clone(), std::fs::read(path).expect("a file"));
+    files.into_iter().map(bytes).collect()
+}
+
+/// The most that this process has held since the last time this was asked (KiB).
+fn peak_kib() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").expect("status");
+    let line = status.lines().find(|l| l.starts_with("VmHWM")).expect("VmHWM");
+    line.split_whitespace()
+        .nth(1)
+        .and_then(|n| n.parse().ok())
+        .expect("a number")
+}
+
+/// Each file as it is, cut at every 64th, with bytes turned and with runs of ones as sizes are.
+fn replay(reader: &str, read: fn(&[u8]) -> Option<String>) {
+    let before = peak_kib();
+    let (mut runs, mut refused) = (0, 0);
+    let mut take = |bytes: &[u8]| {
+        runs += 1;
+        if let Some(why) = read(bytes) {
+            refused += 1;
+            assert!(
+                !why.trim().is_empty() && why.len() < 20_000,
+                "{} bytes of message",
+                why.len()
+            );
+        }
+    };
+    for (path, bytes) in corpus(reader) {
+        take(&bytes);
+        (0..64).for_each(|n| take(&bytes[..bytes.len() * n / 64]));
+        // What was found is slow by nature; bent it only takes long.
+        if path
+            .file_name()
+            .is_some_and(|n| n.to_string_lossy().starts_with("found"))
+        {
+            continue;
+        }
+        let step = (bytes.len() / 192).max(1);
+        for at in (0..bytes.len()).step_by(step) {
+            for change in [0x01, 0x80, 0xff] {
+                let mut bent = bytes.clone();
+                bent[at] ^= change;
+                take(&bent);
+            }
+            let mut large = bytes.clone();
+            large.iter_mut().skip(at).take(4).for_each(|b| *b = 0xff);
+            take(&large);
+        }
+    }
+    let grown = peak_kib().saturating_sub(before);
+    println!("{reader}: {runs} runs, {refused} refused, {grown} KiB more");
+    assert!(refused > 0 && grown < MAX_KIB, "{reader}: {grown} KiB");
+}
+
+#[test]
+fn nifti() {
+    replay("nifti", |b| {
+        files::nifti::read(b, files::Sink::labels(&files::Progress::default())).err()
+    });
+}
+
+#[test]
+fn nrrd() {
+    replay("nrrd", |b| {
+        files::nrrd::read(b, &|_| Ok(b.to_vec()), files::Sink::labels(&files::Progress::default())).err()
+    });
+}
+
+#[test]
+fn metaimage() {
+    replay("metaimage", |b| {
+        files::metaimage::read(b, &|_| Ok(b.to_vec()), files::Sink::labels(&files::Progress::default())).err()
+    });
+}
+
+#[test]
+fn structures() {
+    replay("structures", |b| {
+        files::dicom::read(b)
+            .and_then(|o| files::dicom::structures::read(&o, None))
+            .err()
+    });
+}
+
+#[test]
+fn plan() {
+    replay("plan", |b| {
+        files::dicom::read(b).and_then(|o| files::dicom::plan::of(&o)).err()
+    });
+}
+
+#[test]
+fn image() {
+    replay("image", |b| {
+        files::dicom::read(b).err().or(files::dicom::image_geometry(b).err())
+    });
+}
+
+#[test]
+fn scene() {
+    replay("scene", |b| {
+        std::str::from_utf8(b)
+            .map_err(|e| e.to_string())
+            .and_then(files::scene::parse)
+            .err()
+    });
+}

@@ -1,0 +1,8 @@
+//! Readers of files against what other programs wrote, and against hostile input.
+
+#[cfg(test)]
+mod corpus;
+#[cfg(test)]
+mod dicom;
+#[cfg(test)]
+mod labels;

@@ -1,0 +1,6 @@
+//! Rules of the repository that a program can check.
+
+#[cfg(test)]
+mod docs_names;
+#[cfg(test)]
+mod walls;

@@ -1,0 +1,134 @@
+//! The house rules that no compiler holds: walls between crates and folders, words, layout of tests, sizes.
+
+mod circles;
+mod crates;
+mod imports;
+mod lexer;
+mod shape;
+mod tree;
+mod words;
+
+const WORDS: &str = "tests/house/words.toml";
+
+fn assert_none(found: &[String]) {
+    assert!(found.is_empty(), "{} found:\n{}", found.len(), found.join("\n"));
+}
+
+/// Every file with one of the endings, with its text.
+fn sources(endings: &[&str]) -> Vec<(String, String)> {
+    tree::files(endings)
+        .into_iter()
+        .map(|path| (path.clone(), tree::read(&path)))
+        .collect()
+}
+
+#[test]
+fn no_folders_of_a_crate_import_each_other_in_a_circle() {
+    let read = |path: &str| std::fs::read_to_string(tree::root().join(path)).ok();
+    let mut found = Vec::new();
+    for root in tree::members().iter().flat_map(|member| tree::crate_roots(member)) {
+        let circles = circles::circles(&imports::read_crate(&root, &read));
+        found.extend(circles.into_iter().map(|line| format!("{root}: {line}")));
+    }
+    assert_none(&found);
+}
+
+#[test]
+fn no_crate_depends_on_what_its_layer_may_not_know() {
+    let members = tree::members().into_iter();
+    let manifests = members.map(|folder| (folder.clone(), tree::manifest(&format!("{folder}/Cargo.toml"))));
+    assert_none(&crates::forbidden(&tree::manifest("Cargo.toml"), &manifests.collect()));
+}
+
+#[test]
+fn no_word_that_went_stands_in_the_tree() {
+    let list = words::list(&tree::manifest(WORDS), "gone");
+    let mut found = Vec::new();
+    for file in searched() {
+        let places = words::places(&list, &file).into_iter();
+        found.extend(
+            places.map(|(word, line)| format!("{}:{line}: {} (instead: {})", file.path, word.text, word.instead)),
+        );
+    }
+    assert_none(&found);
+}
+
+/// Shows where the words stand that still have to go; asserts only that no word is in both lists.
+#[test]
+fn words_that_have_to_go_are_counted() {
+    let table = tree::manifest(WORDS);
+    let pending = words::list(&table, "pending");
+    for (word, files) in words::counts(&pending, &searched()) {
+        println!("{word}: {}", files.values().sum::<usize>());
+        files.iter().for_each(|(path, count)| println!("  {count:>4} {path}"));
+    }
+    assert!(!pending.iter().any(|word| table["gone"].get(&word.text).is_some()));
+}
+
+fn searched() -> Vec<words::Text> {
+    // Without the list itself and the tests of its reader.
+    let files = sources(&[".rs", ".md", ".toml"])
+        .into_iter()
+        .filter(|(path, _)| path != WORDS && path != "tests/house/src/walls/words.rs");
+    files.map(|(path, source)| words::Text::of(&path, &source)).collect()
+}
+
+#[test]
+fn unit_tests_stand_where_the_house_puts_them() {
+    let found: Vec<_> = sources(&[".rs"])
+        .iter()
+        .flat_map(|(path, source)| shape::test_layout(path, source))
+        .collect();
+    assert_none(&found);
+}
+
+#[test]
+fn no_source_file_is_longer_than_the_house_allows() {
+    let lines = |source: &String| source.lines().count();
+    let files = sources(&[".rs"]);
+    assert_none(
+        &files
+            .iter()
+            .filter_map(|(path, source)| shape::too_long(path, lines(source), shape::LONGER))
+            .collect::<Vec<_>>(),
+    );
+}
+
+#[test]
+fn no_more_public_functions_return_their_error_as_prose() {
+    let members = tree::members();
+    let product = |path: &str| !path.starts_with("tests/") && !path.starts_with("benches/") && path.contains("/src/");
+    let of_member = |path: &str| members.iter().any(|member| path.starts_with(&format!("{member}/src/")));
+    let files = sources(&[".rs"]);
+    let found: Vec<_> = files
+        .iter()
+        .filter(|(path, _)| product(path) && of_member(path))
+        .flat_map(|(path, source)| shape::prose_errors(path, source))
+        .collect();
+    println!(
+        "{} public functions return their error as prose; the limit is {}",
+        found.len(),
+        shape::PROSE_ERRORS
+    );
+    assert!(
+        found.len() <= shape::PROSE_ERRORS,
+        "{} found:\n{}",
+        found.len(),
+        found.join("\n")
+    );
+}
+
+#[test]
+fn no_file_names_a_folder_of_one_machine() {
+    let files = sources(&[
+        ".rs", ".md", ".toml", ".sh", ".py", ".html", ".json", ".csv", "Makefile", ".ci/run",
+    ]);
+    let kept = |path: &str| !path.starts_with("tests/house/src/walls/shape.rs");
+    assert_none(
+        &files
+            .iter()
+            .filter(|(path, _)| kept(path))
+            .flat_map(|(path, source)| shape::machine_paths(path, source))
+            .collect::<Vec<_>>(),
+    );
+}

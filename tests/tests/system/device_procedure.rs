@@ -1,0 +1,280 @@
+//! The whole procedure with a Phantom: the fake driver in the core's process, its hand led from here.
+
+use fake_hd::Control;
+use fake_hd::control::{VARIABLE, get};
+use nalgebra::Vector3;
+use std::sync::atomic::Ordering::Relaxed;
+use std::time::Duration;
+use stylet_host::link::Link;
+use stylet_implant::workflow::{NeedlePlan, Pace, Run, RunStatus, Step, default_plan};
+use stylet_shm_schema::{EventKind, Fault, Request, TickRecord, flags};
+use stylet_tests::phantom::library;
+use stylet_tests::{Core, ask, scratch, until};
+
+const LONG: Duration = Duration::from_secs(20);
+
+struct Rig {
+    core: Core,
+    link: Link,
+    control: &'static Control,
+    /// Where the device's origin lies in the scene.
+    origin_m: Vector3<f64>,
+}
+
+impl Rig {
+    /// The driver comes from the variable or from the option, as an operator would give it.
+    fn start(name: &str, by_variable: bool) -> Self {
+        let file = scratch(name).join("control");
+        let control = Control::in_file(&file);
+        let path = library();
+        let path = path.to_str().expect("a path in UTF-8");
+        let variables = [
+            (VARIABLE, file.to_str().expect("a path in UTF-8")),
+            ("STYLET_LIBHD", path),
+        ];
+        let mut options = vec!["--rt-if-allowed", "--device", "phantom"];
+        let given = if by_variable {
+            &variables[..]
+        } else {
+            options.extend(["--libhd", path]);
+            &variables[..1]
+        };
+        let mut core = Core::start_in(&options, given);
+        let mut link = core.host();
+        assert!(until(LONG, || {
+            link.poll();
+            link.state().is_some_and(|s| s.tick > 10)
+        }));
+        let state = *link.state().expect("live");
+        assert_eq!(state.fault, 0, "{:?}", Fault::from_number(state.fault));
+        let origin_m = Vector3::from(state.tip_in_scene_m);
+        Self {
+            core,
+            link,
+            control,
+            origin_m,
+        }
+    }
+
+    /// Leads the hand there: scene z is away from the operator, scene x to the left.
+    fn lead(&self, to_m: [f64; 3], speed_m_per_s: f64) {
+        let from_origin = Vector3::from(to_m) - self.origin_m;
+        self.control
+            .send_hand([-from_origin.x, from_origin.y, -from_origin.z], speed_m_per_s);
+    }
+
+    fn fault(&self) -> Fault {
+        Fault::from_number(self.link.state().expect("live").fault).expect("a known fault")
+    }
+
+    fn felt_n(&self) -> f64 {
+        Vector3::from(self.control.force()).norm()
+    }
+}
+
+/// Where the operator's hand has to be for what the script does now.
+fn goal(run: &Run, plan: &NeedlePlan, seeds_dropped: usize) -> Option<[f64; 3]> {
+    match run.step() {
+        Step::Plan | Step::Done => None,
+        Step::Place => Some(plan.entry_m),
+        Step::Insert => plan.deepest_first().first().copied(),
+        Step::Drop => plan.deepest_first().get(seeds_dropped).copied(),
+        Step::Retract | Step::Settle => Some(plan.entry_m),
+    }
+}
+
+#[test]
+fn the_whole_procedure_runs_with_a_phantom_and_its_motors_get_the_force() {
+    let mut rig = Rig::start("phantom-procedure", true);
+    assert!(
+        rig.link
+            .session()
+            .expect("live")
+            .device
+            .read()
+            .contains("Phantom Premium 1.5 6DOF")
+    );
+    assert_eq!(rig.link.state().expect("live").flags & flags::SIMULATED_DEVICE, 0);
+    let plan = default_plan(&rig.link.scene().expect("live").header);
+    let mut run = Run::new(plan.clone(), Pace::default());
+    let (mut status, mut led, mut records) = (RunStatus::Working, None, Vec::<TickRecord>::new());
+    let ended = until(Duration::from_secs(120), || {
+        rig.link.poll();
+        records.append(&mut rig.link.take_records());
+        let dropped = rig.link.state().map_or(0, |s| s.seed_count as usize);
+        let goal = goal(&run, &plan, dropped);
+        if goal != led
+            && let Some(to_m) = goal
+        {
+            rig.lead(to_m, 0.05);
+            led = goal;
+        }
+        status = run.advance(&mut rig.link);
+        status != RunStatus::Working
+    });
+    assert!(ended && status == RunStatus::Done, "{status:?}");
+    let largest = records
+        .iter()
+        .map(|r| Vector3::from(r.force_on_hand_n).norm())
+        .fold(0.0, f64::max);
+    let told = get(&rig.control.peak_force_n);
+    println!("largest force: {largest:.3} N in the records, {told:.3} N told to the driver");
+    assert!(
+        records.iter().any(|r| r.flags & flags::PUNCTURED != 0),
+        "the membrane gave way"
+    );
+    assert!(largest > 3.0, "{largest} N");
+    // Two grids of 1 kHz: the very tick of the peak may be passed over.
+    assert!(
+        (told - largest).abs() < 0.1 * largest,
+        "{told} N told, {largest} N meant"
+    );
+    assert_eq!(rig.control.non_finite_forces.load(Relaxed), 0);
+    assert_eq!(rig.link.snapshot().expect("live").header.seed_count, 5);
+    let control = rig.control;
+    drop(rig.link);
+    rig.core.finish();
+    assert_eq!(get(&control.force_at_stop_n), 0.0);
+    let order = control.order();
+    assert_eq!(
+        order.iter().rfind(|call| **call != "hdGetError"),
+        Some(&"hdDisableDevice"),
+        "let go at the end"
+    );
+}
+
+#[test]
+fn unplugged_in_mid_insertion_the_force_is_off_the_screen_says_why_and_it_goes_on_after_a_re_plug() {
+    let mut rig = Rig::start("phantom-unplugged", false);
+    let plan = default_plan(&rig.link.scene().expect("live").header);
+    ask(&mut rig.link, &Request::Engage).expect("engages");
+    rig.lead(plan.entry_m, 0.1);
+    let entry = Vector3::from(plan.entry_m);
+    let tip = |link: &Link| Vector3::from(link.state().expect("live").tip_in_scene_m);
+    assert!(until(LONG, || {
+        rig.link.poll();
+        (tip(&rig.link) - entry).norm() < 2e-3
+    }));
+    rig.lead(plan.deepest_first()[0], 0.02);
+    assert!(
+        until(LONG, || {
+            rig.link.poll();
+            rig.felt_n() > 1.0
+        }),
+        "in the membrane"
+    );
+    rig.link.take_records();
+
+    rig.control.unplugged.store(1, Relaxed);
+    assert!(
+        until(LONG, || {
+            rig.link.poll();
+            rig.fault() == Fault::DeviceLost
+        }),
+        "{:?}",
+        rig.fault()
+    );
+    assert!(
+        until(LONG, || {
+            rig.link.poll();
+            rig.felt_n() == 0.0
+        }),
+        "the motors are let go"
+    );
+    let at_zero = |link: &Link| {
+        link.state()
+            .is_some_and(|s| s.force_on_hand_n == [0.0; 3] && s.flags & flags::ENGAGED == 0)
+    };
+    assert!(
+        until(LONG, || {
+            rig.link.poll();
+            at_zero(&rig.link)
+        }),
+        "zero in the loop's own state"
+    );
+    let said = |link: &Link| {
+        link.events()
+            .iter()
+            .rev()
+            .find(|e| e.kind == EventKind::FaultRaised as u32)
+            .map(|e| e.text.read())
+    };
+    assert!(until(LONG, || {
+        rig.link.poll();
+        said(&rig.link).is_some_and(|t| t.contains("power and cable"))
+    }));
+    // The force of the loop goes to zero in the ticks of the ramp, and stays there.
+    let records = rig.link.take_records();
+    let lost = records
+        .iter()
+        .position(|r| r.fault == Fault::DeviceLost as u32)
+        .expect("in the records");
+    let late = records.iter().skip(lost + 21).find(|r| r.force_on_hand_n != [0.0; 3]);
+    assert!(late.is_none(), "{late:?}");
+    // Arming again without a device is of no use.
+    ask(&mut rig.link, &Request::Engage).expect("answered");
+    assert!(until(LONG, || {
+        rig.link.poll();
+        rig.fault() == Fault::DeviceLost && at_zero(&rig.link)
+    }));
+
+    rig.control.unplugged.store(0, Relaxed);
+    assert!(until(LONG, || rig.control.inits.load(Relaxed) == 2), "initialised anew");
+    let moving = |link: &Link, from: Vector3<f64>| (tip(link) - from).norm() > 1e-3;
+    let before = tip(&rig.link);
+    rig.lead(plan.entry_m, 0.05);
+    assert!(
+        until(LONG, || {
+            rig.link.poll();
+            moving(&rig.link, before)
+        }),
+        "the pose comes again"
+    );
+    // In the membrane the gate would wait for a small force.
+    assert!(until(LONG, || {
+        rig.link.poll();
+        (tip(&rig.link) - entry).norm() < 2e-3
+    }));
+    assert_eq!(rig.felt_n(), 0.0, "no force before it is armed again");
+    let mut armed = false;
+    assert!(
+        until(LONG, || {
+            armed |= ask(&mut rig.link, &Request::Engage).is_ok();
+            rig.link.poll();
+            rig.fault() == Fault::None
+        }),
+        "{armed} {:?}",
+        rig.fault()
+    );
+    rig.lead(plan.deepest_first()[0], 0.02);
+    assert!(
+        until(LONG, || {
+            rig.link.poll();
+            rig.felt_n() > 0.5
+        }),
+        "felt again"
+    );
+    drop(rig.link);
+    rig.core.finish();
+}
+
+#[test]
+fn without_a_driver_the_core_says_so_and_does_not_run() {
+    let output = std::process::Command::new(stylet_tests::program("rt-core"))
+        .args([
+            "--instance",
+            stylet_tests::fresh_instance().name(),
+            "--rt-if-allowed",
+            "--device",
+            "phantom",
+        ])
+        .args(["--libhd", "/nonexistent/libHD.so"])
+        .output()
+        .expect("rt-core starts");
+    assert!(!output.status.success());
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        text.contains("cannot open shared object file") && text.contains("--device simulated"),
+        "{text}"
+    );
+}

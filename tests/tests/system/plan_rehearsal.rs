@@ -1,0 +1,161 @@
+//! A rehearsal says what the live run does: same scene, same needle, seeds within a stated bound; and it disturbs nothing.
+
+use std::time::Duration;
+use stylet_base::interrupt::Interrupt;
+use stylet_host::link::Link;
+use stylet_implant::plan::rehearse::{Drops, LinkRehearser, Rehearser};
+use stylet_implant::workflow::{NeedleTask, Pace, Run, RunStatus, default_plan};
+use stylet_shm_schema::{Event, EventKind, Fault, NeedleRehearsal, RefusalCode, Request, flags};
+use stylet_tests::{Core, ask, until};
+
+/// Live and rehearsed seeds agree within this, and what two live runs differ by themselves.
+const AGREE_M: f64 = 0.1e-3;
+/// The tissue looks where the tip is every 5 ms and takes hold then: at which moment between two looks the tip meets it is chance.
+const TISSUE_PERIOD_S: f64 = 5e-3;
+/// A hand that comes later finds tissue that has recovered: in this time by 63 % (`tissue.recovery_time`) of at most what it gave
+/// before puncture.
+const RECOVERY_S: f64 = 1.0;
+
+/// Where each seed came to rest, and when it was dropped after the tip's first contact, by the clock and by the tissue's own.
+struct Live {
+    seeds_m: Vec<[f64; 3]>,
+    dropped_after_s: Vec<[f64; 2]>,
+}
+
+fn live(link: &mut Link, task: &NeedleTask) -> Live {
+    let mut run = Run::of_needles(vec![task.clone()], Pace::default());
+    let (mut status, mut records) = (RunStatus::Working, Vec::new());
+    let ended = until(Duration::from_secs(120), || {
+        link.poll();
+        records.append(&mut link.take_records());
+        status = run.advance(link);
+        status != RunStatus::Working
+    });
+    assert!(ended && status == RunStatus::Done, "{status:?}");
+    let header = &link.snapshot().expect("live").header;
+    let placed = &header.seeds[..header.seed_count as usize];
+    let contact = records.iter().find(|r| r.flags & flags::IN_CONTACT != 0).expect("met");
+    let after = |drop: &Event| {
+        let at_drop = records.iter().rfind(|r| r.due_ns <= drop.time_ns).expect("recorded");
+        let tissue_ticks = at_drop.tissue_tick - contact.tissue_tick;
+        [
+            (drop.time_ns - contact.due_ns) as f64 * 1e-9,
+            tissue_ticks as f64 * TISSUE_PERIOD_S,
+        ]
+    };
+    let is_drop = |e: &&Event| e.kind == EventKind::SeedDropped as u32;
+    Live {
+        seeds_m: placed.iter().map(|s| s.position_m).collect(),
+        dropped_after_s: link.events().iter().filter(is_drop).map(after).collect(),
+    }
+}
+
+fn apart_m(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// The default needle of the host: rehearsed, then done.
+fn rehearsed_is_live(scene: &str) {
+    let mut core = Core::start_with(&["--rt-if-allowed", "--scene", scene]);
+    let mut link = core.host();
+    let plan = default_plan(&link.scene().expect("live").header);
+    let task = NeedleTask::as_planned(plan);
+    let mut rehearser = LinkRehearser {
+        link: &mut link,
+        interrupted: &Interrupt::default(),
+    };
+    let rest = rehearser.rehearse(&task.drops, &Pace::default()).expect("goes through");
+    let placed = live(&mut link, &task);
+    assert_eq!(
+        (placed.seeds_m.len(), placed.dropped_after_s.len()),
+        (rest.seeds_m.len(), rest.dropped_after_s.len())
+    );
+    let element_m = link.scene().expect("live").header.spacing_m;
+    let planned = task.plan.deepest_first();
+    let mut typical = 0;
+    for (i, (live, rehearsed)) in placed.seeds_m.iter().zip(&rest.seeds_m).enumerate() {
+        let (off_m, error_m) = (apart_m(live, rehearsed), apart_m(live, &planned[i]));
+        // A host that waits for a processor orders each move and drop later; a loop that does stands still meanwhile.
+        let late_s = placed.dropped_after_s[i].map(|s| (s - rest.dropped_after_s[i]).abs());
+        let bound_m = AGREE_M
+            + Pace::default().insert_m_per_s * TISSUE_PERIOD_S
+            + rest.displacement_before_puncture_m * late_s[0].max(late_s[1]) / RECOVERY_S;
+        println!(
+            "{scene}, seed {}: {:.3} mm from plan, rehearsal off by {:.3} mm, bound {:.3} mm; dropped after {:.3} s ({:.3} s of the tissue), rehearsed {:.3} s",
+            i + 1,
+            error_m * 1e3,
+            off_m * 1e3,
+            bound_m * 1e3,
+            placed.dropped_after_s[i][0],
+            placed.dropped_after_s[i][1],
+            rest.dropped_after_s[i]
+        );
+        typical += usize::from(off_m < bound_m);
+        // A tip that stops halfway between two elements takes hold of either.
+        assert!(
+            off_m < bound_m + element_m,
+            "seed {}: {live:?} live, {rehearsed:?} rehearsed",
+            i + 1
+        );
+    }
+    assert!(
+        2 * typical > rest.seeds_m.len(),
+        "only {typical} seeds within the bound"
+    );
+    let peak = link.state().expect("live").peak_force_n;
+    println!(
+        "{scene}: peak force {peak:.3} N live, {:.3} N rehearsed",
+        rest.peak_force_n
+    );
+    assert!((peak - rest.peak_force_n).abs() < 0.1 * peak);
+}
+
+#[test]
+fn the_default_needle_of_the_paper_s_gland_ends_where_it_was_rehearsed() {
+    rehearsed_is_live("paper");
+}
+
+#[test]
+fn one_rehearsal_at_a_time_and_the_run_does_not_notice() {
+    let mut core = Core::start();
+    let mut link = core.host();
+    let plan = default_plan(&link.scene().expect("live").header);
+    let drops: Drops = NeedleTask::as_planned(plan).drops;
+    let rehearsal = drops.rehearsal(&Pace::default());
+    let request = Request::Rehearse(rehearsal.clone());
+    let first = link.send(&request).expect("sent");
+    let second = link.send(&request).expect("sent");
+    let (mut one, mut other) = (None, None);
+    until(Duration::from_secs(30), || {
+        link.poll();
+        one = one.take().or_else(|| link.reply(first));
+        other = other.take().or_else(|| link.reply(second));
+        one.is_some() && other.is_some()
+    });
+    let (one, other) = (one.expect("answered"), other.expect("answered"));
+    assert!(one.accepted, "{}", one.text);
+    assert!(
+        !other.accepted && other.is_refused_for(RefusalCode::RehearsalRunning),
+        "{}",
+        other.text
+    );
+    assert_eq!(link.rehearsal(first).map(|r| r.seed_count), Some(5));
+    assert!(link.rehearsal(second).is_none());
+
+    let state = *link.state().expect("live");
+    assert_eq!(
+        (state.fault, state.seed_count),
+        (Fault::None as u32, 0),
+        "the live tissue has no seed"
+    );
+    let mut outside = rehearsal.clone();
+    outside.drops_m[0][2] = outside.entry_m[2] - 0.05;
+    let why = ask(&mut link, &Request::Rehearse(outside)).expect_err("nothing to drop a seed into");
+    assert!(why.contains("outside the tissue"), "{why}");
+    let without_drops = NeedleRehearsal {
+        drops_m: Vec::new(),
+        ..rehearsal
+    };
+    assert!(ask(&mut link, &Request::Rehearse(without_drops)).is_err());
+    ask(&mut link, &request).expect("the next one goes");
+}

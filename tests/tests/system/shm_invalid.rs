@@ -1,0 +1,200 @@
+//! Invalid records in shared memory neither crash nor stop either side, and are refused with a reason.
+
+use bytemuck::{Pod, Zeroable, pod_read_unaligned};
+use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
+use std::time::Duration;
+use stylet_host::link::{Link, LinkStatus};
+use stylet_shm_schema::service::{self, create_state_board};
+use stylet_shm_schema::*;
+use stylet_tests::{Alone, Core, ask, fresh_instance, until};
+
+/// All ones, zeros, random bytes and huge counts, of any type.
+fn invalid<T: Pod>() -> Vec<T> {
+    let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
+    let mut random = move || {
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        seed as u8
+    };
+    let mut all = vec![pod_read_unaligned(&vec![0xff; size_of::<T>()]), T::zeroed()];
+    for _ in 0..200 {
+        let bytes: Vec<u8> = (0..size_of::<T>()).map(|_| random()).collect();
+        all.push(pod_read_unaligned(&bytes));
+    }
+    // Doubles that are not numbers, in every place.
+    let nan = f64::NAN.to_ne_bytes();
+    all.push(pod_read_unaligned(
+        &nan.iter().copied().cycle().take(size_of::<T>()).collect::<Vec<u8>>(),
+    ));
+    all
+}
+
+#[test]
+fn core_refuses_invalid_records_of_hosts_and_runs_on() {
+    let mut core = Core::start();
+    let mut link = core.host();
+    let before = *link.state().expect("live");
+    let node = core.instance.node().expect("same user");
+    let commands = service::commands(&node).expect("service");
+    let commands = commands
+        .publisher_builder()
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .create();
+    let commands = commands.expect("a free place");
+    let mut sent = 0;
+    for mut command in invalid::<Command>() {
+        // A record that happens to be a valid request to end is obeyed, as it must be.
+        if command.kind == CommandKind::Shutdown as u32 {
+            command.kind = u32::MAX;
+        }
+        commands.send_copy(command).expect("sent");
+        sent += 1;
+        if sent % 16 == 0 {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+    for kind in 1..=9_u32 {
+        for bad in [f64::NAN, f64::INFINITY, 1e300, -1e300] {
+            let mut command = Command::zeroed();
+            (command.kind, command.value_count) = (kind, 8);
+            command.values = [bad; MAX_COMMAND_VALUES];
+            commands.send_copy(command).expect("sent");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+    let uploads = service::uploads(&node).expect("service");
+    let uploads = uploads
+        .publisher_builder()
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .allocation_strategy(AllocationStrategy::PowerOfTwo)
+        .initial_max_slice_len(64)
+        .create()
+        .expect("a free place");
+    for header in invalid::<UploadHeader>() {
+        let mut sample = uploads.loan_slice_uninit(64).expect("loaned");
+        *sample.user_header_mut() = header;
+        sample.write_from_fn(|i| i as u8).send().expect("sent");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let went_on = until(Duration::from_secs(5), || {
+        link.poll();
+        link.state().is_some_and(|s| s.tick > before.tick + 1000)
+    });
+    assert!(went_on && core.is_running(), "the core stopped");
+    let state = *link.state().expect("live");
+    assert_eq!(state.fault, Fault::None as u32);
+    assert_eq!(
+        link.parameters().expect("live").set,
+        ParameterSet::default(),
+        "an invalid record changed a parameter"
+    );
+    let refused = link
+        .events()
+        .iter()
+        .filter(|e| e.kind == EventKind::InvalidRefused as u32)
+        .count();
+    assert!(refused > 50, "{refused} refusals were reported");
+    let why = ask(
+        &mut link,
+        &Request::SetParameters(vec![ParameterChange {
+            id: ParameterId::ShearVertical,
+            value: 0.7,
+        }]),
+    );
+    assert!(
+        why.as_ref().is_err_and(|w| w.contains("eq. 1 in three dimensions")),
+        "eq. 1 is not enforced: {why:?}"
+    );
+    ask(&mut link, &Request::Engage).expect("a good command is still carried out");
+}
+
+/// More than 10,000 values of each kind of message.
+const ROUNDS: usize = 50;
+
+#[test]
+fn host_drops_invalid_records_of_a_core_and_goes_on() {
+    let alone = Alone(fresh_instance());
+    let node = alone.0.node().expect("shared memory");
+    let session_id = 7;
+    let board = create_state_board(&node, session_id).expect("board");
+    let writer = board.writer_builder().create().expect("writer");
+    let entry = writer.entry::<HapticState>(&service::STATE_KEY).expect("entry");
+    macro_rules! publisher {
+        ($factory:expr) => {
+            $factory
+                .expect("service")
+                .publisher_builder()
+                .create()
+                .expect("publisher")
+        };
+        ($factory:expr, slices) => {
+            $factory
+                .expect("service")
+                .publisher_builder()
+                .allocation_strategy(AllocationStrategy::PowerOfTwo)
+                .initial_max_slice_len(64)
+                .create()
+                .expect("publisher")
+        };
+    }
+    let sessions = publisher!(service::session(&node));
+    let events = publisher!(service::events(&node));
+    let parameters = publisher!(service::parameters(&node));
+    let plans = publisher!(service::plan(&node));
+    let replies = publisher!(service::replies(&node));
+    let records = publisher!(service::records(&node), slices);
+    let snapshots = publisher!(service::snapshots(&node), slices);
+    let scenes = publisher!(service::scene(&node), slices);
+
+    let mut link = Link::new(alone.0.clone());
+    let mut good = Session::zeroed();
+    (good.session_id, good.schema_version) = (session_id, SCHEMA_VERSION);
+    let states = invalid::<HapticState>();
+    let (bad_events, bad_parameters, bad_plans) = (
+        invalid::<Event>(),
+        invalid::<ParametersInForce>(),
+        invalid::<PlanInForce>(),
+    );
+    let (bad_replies, bad_records) = (invalid::<Reply>(), invalid::<TickRecord>());
+    let (bad_snapshots, bad_vertices, bad_scenes) = (
+        invalid::<SnapshotHeader>(),
+        invalid::<Vertex>(),
+        invalid::<SceneHeader>(),
+    );
+    let mut sent = 0;
+    for i in (0..states.len()).cycle().take(ROUNDS * states.len()) {
+        good.time_ns += 1;
+        sessions.send_copy(good).expect("sent");
+        entry.update_with_copy(states[i]);
+        events.send_copy(bad_events[i]).expect("sent");
+        parameters.send_copy(bad_parameters[i]).expect("sent");
+        plans.send_copy(bad_plans[i]).expect("sent");
+        replies.send_copy(bad_replies[i]).expect("sent");
+        let mut sample = records.loan_slice_uninit(4).expect("loaned");
+        *sample.user_header_mut() = session_id;
+        sample.write_from_fn(|_| bad_records[i]).send().expect("sent");
+        let mut sample = snapshots.loan_slice_uninit(8).expect("loaned");
+        *sample.user_header_mut() = bad_snapshots[i];
+        sample.write_from_fn(|_| bad_vertices[i]).send().expect("sent");
+        let mut sample = scenes.loan_slice_uninit(9).expect("loaned");
+        *sample.user_header_mut() = bad_scenes[i];
+        sample.write_from_fn(|_| u32::MAX).send().expect("sent");
+        sent += 8;
+        link.poll();
+        link.take_records();
+    }
+    println!("{sent} invalid messages, {} dropped", link.invalid_dropped());
+    // And invalid sessions.
+    for session in invalid::<Session>() {
+        sessions.send_copy(session).expect("sent");
+        link.poll();
+    }
+    assert!(
+        link.invalid_dropped() > 10_000,
+        "{} values were dropped",
+        link.invalid_dropped()
+    );
+    assert!(link.scene().is_none(), "an invalid scene was used");
+    let _: LinkStatus = link.status();
+}

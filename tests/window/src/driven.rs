@@ -1,0 +1,225 @@
+//! The real window on a core of its own, drawn by the software driver and driven as a person would.
+
+use egui_kittest::kittest::{NodeT, Queryable, by};
+use egui_kittest::{Harness, SnapshotOptions, image_snapshot_options};
+use host_ui::app::{App, Options};
+use host_ui::view::orientation::Orientation;
+use std::time::{Duration, Instant};
+use stylet_shm_schema::flags;
+use stylet_test_kit::scratch;
+use stylet_tests::Core;
+
+pub fn is_at_rest(app: &App) -> bool {
+    app.link().state().is_some_and(|s| s.speed_m_per_s.abs() < 1e-3)
+}
+
+pub struct Driven {
+    pub window: Harness<'static, App>,
+    pub core: Core,
+}
+
+impl Driven {
+    pub fn open(size: [f32; 2]) -> Self {
+        Self::on(Core::start(), size)
+    }
+
+    /// On a machine of any rights the same: the core does not ask for real time.
+    pub fn open_plain(size: [f32; 2]) -> Self {
+        Self::on(Core::start_with(&["--no-rt"]), size)
+    }
+
+    pub fn on(core: Core, size: [f32; 2]) -> Self {
+        let options = Options {
+            instance: core.instance.clone(),
+            scene: None,
+            label: None,
+            image: None,
+            controllers: false,
+            pause: true,
+        };
+        let window = Harness::builder()
+            .with_size(size)
+            .wgpu()
+            .build_eframe(|cc| App::new(cc, options));
+        let mut driven = Self { window, core };
+        driven.until("a live core", |app| {
+            app.link().state().is_some() && app.link().scene().is_some()
+        });
+        driven
+    }
+
+    /// Draws frames until the window knows what is waited for.
+    pub fn until(&mut self, what: &str, ready: impl Fn(&App) -> bool) {
+        let start = Instant::now();
+        while !ready(self.window.state()) {
+            assert!(start.elapsed() < Duration::from_secs(30), "waited in vain for {what}");
+            self.window.run_steps(1);
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    pub fn click(&mut self, label: &str) {
+        self.window.get_by_label(label).click();
+        self.window.run_steps(2);
+    }
+
+    pub fn press(&mut self, key: egui::Key) {
+        self.window.key_press(key);
+        self.window.run_steps(2);
+    }
+
+    pub fn plan_and_place(&mut self) {
+        self.click("Plan five seeds");
+        self.until("the plan", |app| app.link().plan().is_some_and(|p| p.seed_count == 5));
+        self.window.run_steps(2);
+        self.click("Place needle");
+        self.until("the needle at its entry", |app| {
+            app.link().state().is_some_and(|s| s.flags & flags::AT_GOAL != 0)
+        });
+        self.window.run_steps(2);
+    }
+
+    /// A hand takes the tip in the sagittal slice and draws it on.
+    pub fn pull_tip(&mut self, ahead_m: f64) {
+        let at = |driven: &Self, ahead_m: f64| {
+            let app = driven.window.state();
+            let rect = driven.window.get_by_label("Sagittal slice").rect();
+            let plane = app.middle().plane(Orientation::Sagittal, rect);
+            let state = app.link().state().expect("live");
+            let place = [0, 1, 2].map(|a| state.tip_in_scene_m[a] + state.needle_direction[a] * ahead_m);
+            plane.on_screen(place.into())
+        };
+        let (from, to) = (at(self, 0.0), at(self, ahead_m));
+        self.window.drag_at(from);
+        self.window.run_steps(2);
+        for _ in 0..80 {
+            self.window.hover_at(to);
+            self.window.run_steps(1);
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        self.window.drop_at(to);
+        self.window.run_steps(2);
+        self.until("rest", is_at_rest);
+    }
+
+    pub fn picture(&mut self, name: &str) -> image::RgbaImage {
+        self.window.run_steps(3);
+        let picture = self.window.render().expect("a picture");
+        picture
+            .save(scratch(&format!("picture-{name}")).join(format!("{name}.png")))
+            .expect("saved");
+        picture
+    }
+
+    /// As [`Driven::compare`], where the plan stands in place of the plots.
+    pub fn compare_plan(&mut self, name: &str) {
+        self.window.run_steps(3);
+        let size = self.window.ctx.content_rect().size();
+        let status = egui::Rect::from_min_max([120.0, 0.0].into(), [size.x - 250.0, 33.0].into());
+        self.window.mask(status);
+        let picture = self.window.render().expect("a picture");
+        image_snapshot_options(&with_fewer_greys(&picture, 51), name, &tolerant());
+    }
+
+    /// As [`Driven::compare`] where tissue and seeds have moved, never to the same place twice: the slices are covered too, and
+    /// figures may differ by so many pixels.
+    pub fn compare_live(&mut self, name: &str, pixels: usize) {
+        self.window.run_steps(3);
+        let slices =
+            ["Axial slice", "Sagittal slice", "Coronal slice"].map(|label| self.window.get_by_label(label).rect());
+        slices.into_iter().for_each(|rect| self.window.mask(rect));
+        self.cover_figures();
+        let picture = self.window.render().expect("a picture");
+        image_snapshot_options(
+            &with_fewer_greys(&picture, 51),
+            name,
+            &tolerant().max_failed_pixels(pixels),
+        );
+    }
+
+    /// Figures at the top, and the plots.
+    fn cover_figures(&mut self) {
+        let size = self.window.ctx.content_rect().size();
+        let cover = |from: [f32; 2], to: [f32; 2]| egui::Rect::from_min_max(from.into(), to.into());
+        self.window.mask(cover([120.0, 0.0], [size.x - 250.0, 33.0]));
+        self.window.mask(cover([size.x - 330.0, 40.0], [size.x, size.y]));
+    }
+
+    /// Compares with the picture that is kept; what lives is covered: figures at the top and the plots.
+    pub fn compare(&mut self, name: &str) {
+        self.window.run_steps(3);
+        self.cover_figures();
+        let picture = self.window.render().expect("a picture");
+        image_snapshot_options(&with_fewer_greys(&picture, 51), name, &tolerant());
+    }
+}
+
+/// Another version of the software driver may round a few edges otherwise; a moved or missing widget is thousands of pixels.
+pub fn tolerant() -> SnapshotOptions {
+    SnapshotOptions::new().max_failed_pixels(500)
+}
+
+/// Grain does not compress: with fewer levels of grey a picture is a third as large and looks the same.
+pub fn with_fewer_greys(picture: &image::RgbaImage, step: u16) -> image::RgbaImage {
+    let mut fewer = picture.clone();
+    for pixel in fewer.pixels_mut() {
+        let [r, g, b, _] = pixel.0;
+        if r.max(g).max(b) - r.min(g).min(b) <= 8 {
+            let level = ((u16::from(g) + step / 2) / step * step).min(255) as u8;
+            pixel.0[..3].fill(level);
+        }
+    }
+    fewer
+}
+
+/// Written only by `make picture`.
+pub fn keep_for_docs(picture: &image::RgbaImage, name: &str) {
+    if std::env::var_os("UPDATE_SNAPSHOTS").is_none() {
+        return;
+    }
+    let place = format!("{}/../../docs/pictures/{name}.png", env!("CARGO_MANIFEST_DIR"));
+    let file = std::fs::File::create(place).expect("docs/pictures can be written");
+    let encoder = image::codecs::png::PngEncoder::new_with_quality(
+        file,
+        image::codecs::png::CompressionType::Best,
+        image::codecs::png::FilterType::Adaptive,
+    );
+    let rgb = image::DynamicImage::from(with_fewer_greys(picture, 12)).into_rgb8();
+    rgb.write_with_encoder(encoder).expect("a PNG");
+}
+
+/// Words and widgets that lie outside the window, and pairs that lie over each other.
+pub fn misplaced(window: &Harness<'_, App>) -> Vec<String> {
+    use egui::accesskit::Role;
+    let screen = window.ctx.content_rect();
+    let roles = [
+        Role::Label,
+        Role::Button,
+        Role::CheckBox,
+        Role::RadioButton,
+        Role::TextInput,
+    ];
+    let all = window.query_all(by().predicate(move |node| roles.contains(&node.role())));
+    let nodes: Vec<(String, egui::Rect)> = all
+        .map(|node| {
+            let inner = node.accesskit_node();
+            let name = inner.label().or(inner.value()).unwrap_or_default();
+            (name, node.rect())
+        })
+        .filter(|(name, rect)| !name.is_empty() && rect.is_positive())
+        .collect();
+    let mut problems = Vec::new();
+    for (i, (name, rect)) in nodes.iter().enumerate() {
+        if !screen.expand(0.5).contains_rect(*rect) {
+            problems.push(format!("{name:?} at {rect} leaves the window"));
+        }
+        for (other, beside) in &nodes[i + 1..] {
+            let common = rect.intersect(*beside);
+            // Neighbours may share an edge.
+            if common.width() > 1.5 && common.height() > 1.5 {
+                problems.push(format!("{name:?} at {rect} lies over {other:?} at {beside}"));
+            }
+        }
+    }
+    problems
+}

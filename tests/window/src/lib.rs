@@ -1,0 +1,18 @@
+//! The window by its labels, its kept pictures, and what is clipped or overlaps.
+
+#[cfg(test)]
+mod controllers;
+#[cfg(test)]
+mod driven;
+#[cfg(test)]
+mod image;
+#[cfg(test)]
+mod live;
+#[cfg(test)]
+mod plan;
+#[cfg(test)]
+mod plugged;
+#[cfg(test)]
+mod states;
+#[cfg(test)]
+mod whole;

@@ -1,0 +1,176 @@
+//! The real window on a running core, driven by label through the steps.
+//!
+//! The picture that it draws is the README's; `make picture` keeps it.
+
+use crate::driven::{Driven, keep_for_docs};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use host_ui::app::{App, Options};
+use host_ui::view::orientation::Orientation;
+use host_ui::view::slice::field::Field;
+use nalgebra::Vector3;
+use std::time::Duration;
+use stylet_shm_schema::{Phase, flags};
+
+fn phase(app: &App) -> u32 {
+    app.link().state().map_or(0, |s| s.phase)
+}
+
+#[test]
+fn four_steps_by_label_move_the_gland_and_drop_a_seed() {
+    let mut driven = Driven::open([1280.0, 800.0]);
+    driven.plan_and_place();
+    driven.click("Engage force");
+    driven.until("force", |app| {
+        app.link().state().is_some_and(|s| s.flags & flags::ENGAGED != 0)
+    });
+    let before = driven.picture("placed");
+    // From the entry, 10 mm before the gland, to 6 mm into it: the membrane gives way at 8 mm.
+    driven.pull_tip(0.016);
+    assert_eq!(phase(driven.window.state()), Phase::Hold as u32, "the hand has stopped");
+    driven.until("the gland to move before the puncture", |app| {
+        app.link()
+            .snapshot()
+            .is_some_and(|s| s.header.max_displacement_m > 4e-3)
+    });
+    let state = driven.window.state().link().state().copied().expect("live");
+    assert_eq!(state.flags & flags::PUNCTURED, 0, "punctured already");
+    let during = driven.picture("contraction");
+    keep_for_docs(&during, "contraction");
+    assert!(differing_pixels(&before, &during) > 2_000, "the picture did not change");
+    assert_inside_moves_as_the_surface_does(driven.window.state());
+    assert_slice_shows_the_dent(&driven, &before, &during);
+    driven.click("Insert");
+    driven.until("the deepest seed", |app| {
+        app.link()
+            .state()
+            .is_some_and(|s| s.flags & flags::PUNCTURED != 0 && s.flags & flags::AT_GOAL != 0)
+    });
+    driven.click("Drop seed");
+    driven.until("a seed", |app| {
+        app.link().snapshot().is_some_and(|s| s.header.seed_count == 1)
+    });
+    keep_for_docs(&driven.picture("window"), "window");
+    driven.click("Retract");
+    driven.until("the needle outside", |app| phase(app) == Phase::Outside as u32);
+    let generation = driven.window.state().link().parameters().map(|p| p.generation);
+    driven.click("Parameters");
+    driven.window.run_steps(10);
+    assert_eq!(
+        driven.window.state().link().parameters().map(|p| p.generation),
+        generation,
+        "opening the dialog changed a parameter"
+    );
+    driven.picture("parameters");
+    assert!(driven.core.is_running());
+}
+
+#[test]
+fn a_window_that_comes_moves_nothing_by_itself() {
+    let mut driven = Driven::open([1280.0, 800.0]);
+    driven.plan_and_place();
+    let tip = |app: &App| app.link().state().map(|s| s.tip_in_scene_m).expect("live");
+    // A tip between two marks of the depth slider once made a new window pull it to the nearest mark.
+    driven.click("Insert");
+    driven.until("contact", |app| phase(app) != Phase::Outside as u32);
+    let options = Options {
+        instance: driven.core.instance.clone(),
+        scene: None,
+        label: None,
+        image: None,
+        controllers: false,
+        pause: true,
+    };
+    let mut second = Harness::builder()
+        .with_size([1280.0, 800.0])
+        .wgpu()
+        .build_eframe(|cc| App::new(cc, options));
+    let start = tip(driven.window.state());
+    for _ in 0..100 {
+        second.run_steps(1);
+        driven.window.run_steps(1);
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let end = tip(driven.window.state());
+    assert!(
+        end[2] - start[2] > 0.01,
+        "the insertion stopped when a window came: {start:?} to {end:?}"
+    );
+}
+
+#[test]
+fn keys_drive_the_needle_and_letting_go_stops_it() {
+    let mut driven = Driven::open([1280.0, 800.0]);
+    driven.plan_and_place();
+    let z = |app: &App| app.link().state().map_or(0.0, |s| s.tip_in_scene_m[2]);
+    let start = z(driven.window.state());
+    driven.window.key_down(egui::Key::W);
+    driven.until("the needle to go in", |app| z(app) > start + 5e-3);
+    driven.window.key_up(egui::Key::W);
+    driven.until("rest", |app| {
+        app.link().state().is_some_and(|s| s.speed_m_per_s.abs() < 1e-3)
+    });
+    let stopped = z(driven.window.state());
+    for _ in 0..50 {
+        driven.window.run_steps(1);
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    assert!(
+        (z(driven.window.state()) - stopped).abs() < 2e-3,
+        "the needle went on by itself"
+    );
+}
+
+/// Vertices of the surface are sent in full, displacements inside on a coarse grid: both must say the same of a vertex.
+fn assert_inside_moves_as_the_surface_does(app: &App) {
+    let (scene, snapshot) = (app.link().scene().expect("live"), app.link().snapshot().expect("live"));
+    let field = Field::of(scene, snapshot).expect("the snapshot is the scene's");
+    let errors_m: Vec<f64> = scene
+        .rest_m
+        .iter()
+        .zip(&snapshot.positions_m)
+        .map(|(rest, now)| {
+            let (rest, now) = (Vector3::from(*rest).map(f64::from), Vector3::from(*now).map(f64::from));
+            (field.displacement_m(rest) - (now - rest)).norm()
+        })
+        .collect();
+    let rms_m = (errors_m.iter().map(|e| e * e).sum::<f64>() / errors_m.len() as f64).sqrt();
+    let worst_m = errors_m.iter().copied().fold(0.0, f64::max);
+    let moved_m = snapshot.header.max_displacement_m;
+    println!("moved {moved_m:.4} m; grid against surface: rms {rms_m:.6} m, worst {worst_m:.6} m");
+    // A link stretches by three quarters at most, and a vertex is no farther from a node than the grid is wide.
+    assert!(worst_m < 0.75 * field.info.spacing_m, "{worst_m} m");
+    assert!(rms_m < 0.1 * moved_m, "{rms_m} m of {moved_m} m");
+}
+
+/// Beside the shaft, behind the tip, lay tissue at rest: now the dent is there, and the picture is as dark as outside.
+fn assert_slice_shows_the_dent(driven: &Driven, before: &image::RgbaImage, during: &image::RgbaImage) {
+    let app = driven.window.state();
+    let rect = driven.window.get_by_label("Sagittal slice").rect();
+    let plane = app.middle().plane(Orientation::Sagittal, rect);
+    let state = app.link().state().expect("live");
+    let (tip, ahead) = (
+        Vector3::from(state.tip_in_scene_m),
+        Vector3::from(state.needle_direction),
+    );
+    let mean = |picture: &image::RgbaImage, middle: Vector3<f64>| {
+        let at = plane.on_screen(middle);
+        let (x, y) = (at.x.round() as u32, at.y.round() as u32);
+        let patch = (x - 4..=x + 4).flat_map(|x| (y - 4..=y + 4).map(move |y| (x, y)));
+        patch.map(|(x, y)| f64::from(picture.get_pixel(x, y).0[1])).sum::<f64>() / 81.0
+    };
+    let in_dent = tip - ahead * 4e-3 + plane.up * 2.5e-3;
+    let in_tissue = tip + ahead * 6e-3 + plane.up * 6e-3;
+    let [was, now] = [before, during].map(|picture| mean(picture, in_dent));
+    let inside = mean(during, in_tissue);
+    println!("brightness in the dent: {was:.0} at rest, {now:.0} now; in the tissue {inside:.0}");
+    assert!(was > 0.6 * inside, "at rest there is tissue: {was} of {inside}");
+    assert!(now < 0.6 * inside, "now there is none: {now} of {inside}");
+}
+
+fn differing_pixels(a: &image::RgbaImage, b: &image::RgbaImage) -> usize {
+    a.pixels()
+        .zip(b.pixels())
+        .filter(|(a, b)| a.0.iter().zip(b.0).any(|(x, y)| x.abs_diff(y) > 24))
+        .count()
+}

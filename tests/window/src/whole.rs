@@ -1,0 +1,130 @@
+//! The window without a core: it says what to type, and its dialogs open.
+
+use crate::driven::{misplaced, tolerant};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use host_ui::app::{App, Options};
+use std::ops::{Deref, DerefMut};
+use stylet_shm_schema::PARAMETERS;
+use stylet_shm_schema::service::Instance;
+use stylet_tests::Alone;
+
+/// Closed before its files go.
+struct Window {
+    harness: Harness<'static, App>,
+    _alone: Alone,
+}
+
+impl Deref for Window {
+    type Target = Harness<'static, App>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.harness
+    }
+}
+
+impl DerefMut for Window {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.harness
+    }
+}
+
+fn window(instance: &str) -> Window {
+    window_of(instance, [1280.0, 800.0])
+}
+
+fn window_of(instance: &str, size: [f32; 2]) -> Window {
+    let alone = Alone(Instance::new(instance).expect("a valid name"));
+    let options = Options {
+        instance: alone.0.clone(),
+        scene: None,
+        label: None,
+        image: None,
+        controllers: false,
+        pause: true,
+    };
+    Window {
+        harness: Harness::builder()
+            .with_size(size)
+            .wgpu()
+            .build_eframe(|cc| App::new(cc, options)),
+        _alone: alone,
+    }
+}
+
+/// The window asks for frames for ever, so `run` would never end.
+fn settle(window: &mut Harness<'_, App>) {
+    window.run_steps(5);
+}
+
+#[test]
+fn without_a_core_the_window_says_what_to_type() {
+    let mut window = window("ui-window-absent");
+    settle(&mut window);
+    window.get_by_label("rt-core is absent");
+    window.get_by_label_contains("rt-core --instance ui-window-absent");
+    assert!(
+        window.query_by_label("The force is off").is_none(),
+        "nothing is known of the force"
+    );
+    window.snapshot_options("window_absent", &tolerant());
+}
+
+#[test]
+fn nothing_is_misplaced_without_a_core_in_any_theme_or_size() {
+    for size in [[1280.0, 800.0], [1920.0, 1080.0]] {
+        let mut window = window_of("ui-window-places", size);
+        settle(&mut window);
+        assert_eq!(misplaced(&window), Vec::<String>::new(), "dark, {size:?}");
+        window.key_press(egui::Key::T);
+        settle(&mut window);
+        assert_eq!(misplaced(&window), Vec::<String>::new(), "light, {size:?}");
+        if size[0] > 1900.0 {
+            window.snapshot_options("window_absent_light_large", &tolerant());
+        }
+    }
+}
+
+#[test]
+fn help_lists_every_key() {
+    let mut window = window("ui-window-help");
+    settle(&mut window);
+    window.key_press(egui::Key::F1);
+    settle(&mut window);
+    for (key, _) in host_ui::keyboard::KEYS {
+        window.get_by_label(key);
+    }
+    window.snapshot_options("window_help", &tolerant());
+}
+
+#[test]
+fn a_search_leaves_only_what_was_asked_for() {
+    let mut window = window("ui-window-search");
+    settle(&mut window);
+    window.get_by_label("Parameters").click();
+    settle(&mut window);
+    window.get_by_label("Search").click();
+    settle(&mut window);
+    let field = window.get_by_role_and_label(egui::accesskit::Role::TextInput, "Search");
+    field.focus();
+    field.type_text("u_cri");
+    settle(&mut window);
+    window.get_by_label("Puncture depth u_cri");
+    assert!(window.query_by_label("Smallest link").is_none(), "not asked for");
+}
+
+#[test]
+fn parameters_dialog_opens_and_lists_every_parameter() {
+    let mut window = window("ui-window-parameters");
+    settle(&mut window);
+    window.get_by_label("Parameters").click();
+    settle(&mut window);
+    for parameter in &PARAMETERS {
+        assert!(
+            window.query_all_by_label(parameter.label).next().is_some(),
+            "{} is not listed",
+            parameter.label
+        );
+    }
+    window.snapshot_options("window_parameters", &tolerant());
+}
