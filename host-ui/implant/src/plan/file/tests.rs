@@ -119,7 +119,7 @@ fn imported(name: &str, csv: &str) -> Result<ImplantPlan, String> {
         145.0,
     );
     std::fs::remove_file(&file).unwrap();
-    plan
+    plan.map_err(|why| why.to_string())
 }
 
 #[test]
