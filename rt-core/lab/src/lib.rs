@@ -1,7 +1,7 @@
-//! The latency laboratory: runs the real loops under load, and says with evidence how late they are.
+//! The latency laboratory: runs the real loops under load, and reports with evidence how late they are.
 //!
-//! [`latency`] runs a measurement and writes a report; [`verify`] checks that a filed report is as it was
-//! written; [`doctor`] says whether this PC is fit. Nothing in here claims that a standard is met.
+//! [`latency`] runs a measurement and writes a report; [`verify`] verifies that a saved report is
+//! unaltered; [`doctor`] checks whether this PC is fit. No report claims conformity with a standard.
 
 pub mod args;
 pub mod collect;

@@ -107,7 +107,7 @@ impl Running {
         Ok(running)
     }
 
-    /// What of it has ended by itself, and how: then it was no load.
+    /// Fails if a process of the load has ended before its time: then there was no load.
     pub fn ended(&mut self) -> Result<(), String> {
         for child in &mut self.0 {
             if let Ok(Some(status)) = child.try_wait() {
@@ -207,11 +207,11 @@ fn listen(instance: &Instance) -> Result<(Snapshots, Records), ServiceError> {
     Ok((snapshots.map_err(|e| failed(&e))?, records.map_err(|e| failed(&e))?))
 }
 
-/// Services come and go as a core starts beside it; past this many tries there is another reason.
+/// Services appear and disappear while a core starts; after this many tries the cause is another.
 const TRIES: u32 = 200;
 const BETWEEN_TRIES: Duration = Duration::from_millis(25);
 
-/// A host that never rests: the worst neighbour that a window could be.
+/// A host that never pauses: more load than any window.
 fn copy_all(instance: &Instance, stopped: impl Fn() -> bool) -> Result<(), ServiceError> {
     let mut tries = 0;
     let (snapshots, records) = loop {
