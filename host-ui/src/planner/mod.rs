@@ -22,8 +22,8 @@ use stylet_host::link::SceneModel;
 use stylet_implant::plan::check::{Problem, problems};
 use stylet_implant::plan::{Compensation, Drops, History, ImplantPlan, Needle, Template};
 use stylet_implant::workflow::{NeedleTask, Pace};
-use stylet_shm_schema::service::Instance;
 use stylet_shm_schema::SceneId;
+use stylet_shm_schema::service::Instance;
 
 /// Whatever was wrong, to be shown as text.
 type Failure = Box<dyn std::error::Error + Send + Sync>;
