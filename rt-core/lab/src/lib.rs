@@ -3,23 +3,25 @@
 //! [`latency`] runs a measurement and writes a report; [`verify`] verifies that a saved report is
 //! unaltered; [`doctor`] checks whether this PC is fit. No report claims conformity with a standard.
 
+#![warn(missing_docs)]
+
 pub mod args;
-pub mod collect;
-pub mod compare;
+mod collect;
+mod compare;
 pub mod cost;
 pub mod doctor;
-pub mod files;
-pub mod gaps;
-pub mod host;
-pub mod html;
+mod files;
+mod gaps;
+mod host;
+mod html;
 pub mod latency;
 pub mod load;
-pub mod machine;
-pub mod measure;
-pub mod plots;
-pub mod provenance;
-pub mod report;
-pub mod summary;
-pub mod verdict;
+mod machine;
+mod measure;
+mod plots;
+mod provenance;
+mod report;
+mod summary;
+mod verdict;
 pub mod verify;
-pub mod watch;
+mod watch;

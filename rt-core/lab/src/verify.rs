@@ -2,16 +2,34 @@
 
 use crate::files::sha256;
 use crate::report::{JSON, NO_DIGEST};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Checks the report at `place`, its folder or its `report.json`, and prints every problem. Returns 0 when the report is unaltered, else 1.
-pub fn run(place: &Path) -> Result<u8, String> {
+/// The report cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot read {}: {source}", .path.display())]
+pub struct ReadError {
+    /// `report.json` of the report.
+    pub path: PathBuf,
+    /// What the system reports.
+    pub source: std::io::Error,
+}
+
+/// Checks the report at `place`, its folder or its `report.json`, and prints every problem.
+///
+/// Returns 0 when the report is unaltered, else 1.
+///
+/// # Errors
+/// `report.json` cannot be read.
+pub fn run(place: &Path) -> Result<u8, ReadError> {
     let file = if place.is_dir() {
         place.join(JSON)
     } else {
         place.to_owned()
     };
-    let text = std::fs::read_to_string(&file).map_err(|e| format!("cannot read {}: {e}", file.display()))?;
+    let text = std::fs::read_to_string(&file).map_err(|source| ReadError {
+        path: file.clone(),
+        source,
+    })?;
     let folder = file.parent().unwrap_or(Path::new("."));
     let problems = problems(&text, |name| std::fs::read(folder.join(name)).ok());
     for problem in &problems {

@@ -20,6 +20,7 @@ use stylet_hw::libhd::diagnose::Surroundings;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FindingLevel {
+    /// Nothing to do.
     Good,
     /// Worth knowing; nothing to do.
     Note,
@@ -45,7 +46,9 @@ impl FindingLevel {
 pub struct Finding {
     /// Stable.
     pub check: &'static str,
+    /// How much it matters.
     pub severity: FindingLevel,
+    /// What was found, for people.
     pub what: String,
     /// What to type or do; empty when nothing is wrong.
     pub cure: String,
