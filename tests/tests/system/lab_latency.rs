@@ -78,7 +78,7 @@ fn report_holds_the_whole_path_and_the_loops_stayed_clean() {
         assert_eq!(counts["unmeasured"], 0, "{section}: {counts}");
     }
     assert_eq!(report["host"]["records_missing"], 0);
-    // 1500 ticks cannot tell p99.99, and say how long it takes.
+    // 1500 ticks cannot resolve p99.99, and say how long it takes.
     let p9999 = &times(&report, "haptic", "wake-up")["quantiles"][4];
     assert_eq!((&p9999["us"], &p9999["needs_s"]), (&Value::Null, &Value::from(100.0)));
     // The exit code is the verdict.
@@ -208,7 +208,7 @@ fn comparison_with_cyclictest_says_when_it_is_not_installed() {
 }
 
 #[test]
-fn doctor_tells_the_same_in_words_and_in_json() {
+fn doctor_reports_the_same_in_words_and_in_json() {
     let doctor = |more: &[&str]| {
         let output = Command::new(program("rt-core"))
             .arg("doctor")
