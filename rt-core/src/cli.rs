@@ -1,6 +1,7 @@
 //! The command line of `rt-core`.
 
 use crate::replay_file::Replay;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use stylet_lab::args::LatencyArgs;
@@ -82,7 +83,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "DIR")]
     flight_dir: Option<PathBuf>,
     /// Tissue model
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, default_value = TissueKind::default().name(), value_parser = tissue_kinds())]
     tissue: TissueKind,
     // The table of back ends has the help.
     #[arg(long, default_value = "simulated", value_name = "DEVICE", help = device::help())]
@@ -93,6 +94,12 @@ pub struct RunArgs {
     /// On exit write to FILE, as JSON, what each loop cost
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
+}
+
+/// Names of the tissue models, with a line of help for each.
+fn tissue_kinds() -> impl TypedValueParser<Value = TissueKind> {
+    let kinds = TissueKind::ALL.map(|kind| PossibleValue::new(kind.name()).help(kind.help()));
+    PossibleValuesParser::new(kinds).map(|name| TissueKind::of_name(&name).unwrap_or_default())
 }
 
 impl RunArgs {

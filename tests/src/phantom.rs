@@ -46,10 +46,10 @@ impl Fake {
         Self { control, _alone: alone }
     }
 
-    /// A Phantom over it whose servo thread needs no rights; what it tells is printed.
+    /// A Phantom over it whose servo thread needs no rights; what it reports is printed.
     pub fn open(&self) -> Phantom {
         let arm = Box::new(|| Ok("not armed".to_owned()));
-        Phantom::open(config(), arm, Box::new(|text| println!("told: {text}"))).expect("a healthy device")
+        Phantom::open(config(), arm, Box::new(|text| println!("reported: {text}"))).expect("a healthy device")
     }
 }
 

@@ -33,7 +33,7 @@ impl StoppedThread {
     }
 }
 
-/// All threads of the process have ended but those that are traced, or it is gone.
+/// All threads of the process have ended but those that are traced, or it no longer exists.
 pub fn is_dead(process: u32) -> bool {
     let stat = std::fs::read_to_string(format!("/proc/{process}/stat"));
     stat.map_or(true, |s| s.contains(") Z "))

@@ -14,7 +14,7 @@ const TEXT: RGBColor = RGBColor(40, 44, 52);
 const GRID: RGBColor = RGBColor(225, 228, 232);
 const FONT: &str = "sans-serif";
 
-/// Okabe and Ito's colours, told apart by the colour-blind; each with a shape of its own.
+/// Okabe and Ito's colours, which the colour-blind can distinguish; each with a shape of its own.
 fn colour(family: Family) -> RGBColor {
     match family {
         Family::Queue => RGBColor(90, 90, 90),

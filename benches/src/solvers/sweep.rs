@@ -44,10 +44,10 @@ impl PlainSweep {
             let [i, j, k] = lattice.cell(element as u32);
             let row = &mut sweep.rows[j + ny * k];
             match sweep.runs.last_mut() {
-                Some(run) if !row.is_empty() && run.start_i + (run.end - run.first) == i => run.end += 1,
+                Some(run) if !(*row).is_empty() && run.start_i + (run.end - run.first) == i => run.end += 1,
                 _ => {
                     let (first, number) = (element, sweep.runs.len());
-                    let start = if row.is_empty() { number } else { row.start };
+                    let start = if (*row).is_empty() { number } else { row.start };
                     *row = start..number + 1;
                     let end = first + 1;
                     sweep.runs.push(Run { first, end, start_i: i });

@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_forgotten_is_gone_and_time_that_goes_back_does_no_harm() {
+    fn what_is_forgotten_is_removed_and_time_that_goes_back_does_no_harm() {
         let mut envelope = Envelope::new(40 * MS);
         (0..1_000).map(sample).for_each(|(t, v)| envelope.add(t, v));
         envelope.forget_before(400 * MS);

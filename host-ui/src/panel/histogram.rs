@@ -86,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bin_tells_how_many_ticks_took_how_long() {
+    fn a_bin_shows_how_many_ticks_took_how_long() {
         let mut timing = Timing::default();
         timing.wake_histogram[5] = 1_234;
         timing.work_histogram[5] = 1;

@@ -24,10 +24,10 @@ pub struct LatencyArgs {
     /// Spin for the last N microseconds before each deadline
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub spin_us: u64,
-    /// Then measure in turns with something else
+    /// Then measure again, alternating with something else
     #[arg(long, value_enum, num_args = 0..=1, default_missing_value = "cyclictest", value_name = "WITH")]
     pub compare: Option<Against>,
-    /// Pairs of turns of the comparison
+    /// Rounds of the comparison; each measures both sides once
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100), value_name = "N")]
     pub rounds: u32,
     /// Limits in a TOML file, one `name = value` a line
@@ -44,7 +44,7 @@ pub struct LatencyArgs {
 }
 
 impl LatencyArgs {
-    /// An instance of its own, so that a running simulator is not disturbed in its shared memory.
+    /// Settings of the loops, with an instance of its own, so that a running simulator is not disturbed in its shared memory.
     pub fn options(&self) -> Result<Options, String> {
         let instance = format!("lab-{}", std::process::id());
         let mut options = self.real_time.options(&instance).map_err(|e| e.to_string())?;

@@ -1,10 +1,10 @@
-//! Gathers what the loops say of each tick into histograms, windows and the latest wake-ups; at normal priority.
+//! Collects the times of each tick into histograms, windows and the latest wake-ups; at normal priority.
 
 use hdrhistogram::Histogram;
 use std::time::Duration;
 use stylet_runtime::rt::timing::{MAX_STAGES, TickTimes};
 
-/// Longest time that a histogram tells apart; longer ones count as this.
+/// Longest time that a histogram resolves; longer ones count as this.
 const LONGEST_NS: u64 = 10_000_000_000;
 /// Three digits: a value is known to 0.1 %.
 const DIGITS: u8 = 3;
@@ -104,7 +104,7 @@ impl LoopTiming {
         }
     }
 
-    /// Gathers until the loop is gone and the ring is empty.
+    /// Gathers until the loop has ended and the ring is empty.
     pub fn gather(mut self, mut ring: rtrb::Consumer<TickTimes>) -> Self {
         loop {
             let last = ring.is_abandoned();
@@ -118,7 +118,7 @@ impl LoopTiming {
         }
     }
 
-    /// Of the grid that was served or missed, warm-up left out.
+    /// Length of the grid that was served or missed, without the warm-up, in nanoseconds.
     pub fn measured_ns(&self) -> u64 {
         match self.ticks {
             0 => 0,

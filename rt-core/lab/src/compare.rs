@@ -1,4 +1,4 @@
-//! Our wake-up in turns with another: that of `cyclictest` on the same core with the same priority and interval, or our own without
+//! Our wake-up latency, alternating with another one: that of `cyclictest` on the same core with the same priority and interval, or our own without
 //! the load.
 
 use crate::collect::histogram;
@@ -20,7 +20,7 @@ const SHORTEST_TURN_NS: u64 = 11_000_000_000;
 const BINS: u64 = 1_000_000;
 const COMPARED: [(&str, f64); 4] = [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999), ("max", 1.0)];
 
-/// What our turns are compared with.
+/// What our loops are compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Against {
@@ -69,7 +69,7 @@ pub struct Comparison {
     pub others: Histogram<u64>,
 }
 
-/// Turns of ours and of the other's, `rounds` of each.
+/// Measures our loops and the other side alternately, `rounds` times each.
 pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &AtomicBool) -> Result<Comparison, String> {
     let turn_ns = (setup.duration_ns / u64::from(rounds)).max(SHORTEST_TURN_NS);
     let tool = match against {

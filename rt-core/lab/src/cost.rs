@@ -1,6 +1,6 @@
 //! What each part of a scene costs in a tick, measured on this machine: `rt-core cost --scene NAME`.
 //!
-//! An insertion at clinical speed is played to the parts in turn, round by round, so that a noisy machine disturbs all alike.
+//! An insertion at clinical speed is replayed to each part, round by round, so that a noisy machine disturbs all parts alike.
 
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};

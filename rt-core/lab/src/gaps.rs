@@ -1,4 +1,4 @@
-//! Looks for time that the kernel does not know to be missing: on a virtual machine its own count of it may stay 0.
+//! Detects lost time that the kernel does not account for: on a virtual machine its own count of it may stay 0.
 //!
 //! A thread on another core spins for a tenth of each millisecond and reads the clock. A gap during which the kernel
 //! switched no thread is an interrupt, firmware, or a hypervisor that ran something else.
@@ -11,7 +11,7 @@ use stylet_runtime::rt::clock;
 
 const PERIOD_NS: u64 = 1_000_000;
 const SPIN_NS: u64 = 100_000;
-/// Two reads of the clock are farther apart than this only when something came between.
+/// Two reads of the clock are farther apart than this only when the thread was interrupted.
 const GAP_NS: u64 = 20_000;
 /// A wake-up later than this is kept: no tissue step lasts so long.
 const LATE_NS: u64 = 1_000_000;
@@ -62,7 +62,7 @@ pub fn watch(core: Option<usize>, priority: Option<u32>, stop: &AtomicBool) -> G
         found: Vec::with_capacity(KEPT),
         late: Vec::with_capacity(KEPT),
     };
-    // Without the right to a priority it watches at normal priority: switches are told apart either way.
+    // Without the right to a priority it watches at normal priority: it distinguishes gaps from switches either way.
     let _armed = arm::arm(Ask { priority, core }).or_else(|_| arm::arm(Ask { priority: None, core }));
     let mut grid = clock::Grid::from(clock::now_ns(), PERIOD_NS);
     // SYNC: nothing but the flag is carried.

@@ -1,4 +1,4 @@
-//! A host inside the measurement, at normal priority: it moves the hand, and notes when it sees the tissue answer.
+//! A host inside the measurement, at normal priority: it moves the hand, and records when it sees the tissue respond.
 
 use crate::collect::histogram;
 use hdrhistogram::Histogram;
@@ -218,7 +218,7 @@ impl Host {
     fn send(&mut self, request: &Request) {
         self.sent += 1;
         if let Ok(command) = request.encode(1, self.sent) {
-            // A command that is lost is made up for in the next cycle.
+            // The next cycle sends the commands again.
             let _ = self.ports.commands.send_copy(command);
         }
     }

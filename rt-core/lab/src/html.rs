@@ -106,7 +106,7 @@ fn header(r: &Report) -> String {
             .collect();
         format!(
             "<div class=warning><strong>Environment not qualified.</strong> Percentiles above p99.5, maxima and missed \
-             deadlines are shown but not judged: here they say more about the machine below than about this program.\
+             deadlines are shown but not compared with their limits: here they say more about the machine below than about this program.\
              <ul>{items}</ul></div>"
         )
     };
@@ -346,11 +346,11 @@ fn comparison(r: &Report) -> String {
     let turns = num(c.turn_s);
     let how = match c.against {
         Against::Cyclictest => format!(
-            "{}, in turns of {turns} s: same core, priority and interval, microseconds, both read right after the sleep. The force \
+            "{}, alternating (turns of {turns} s): same core, priority and interval, microseconds, both read right after the sleep. The force \
              loop does all its work, cyclictest sleeps only.",
             esc(&c.tool)
         ),
-        Against::Unloaded => format!("The same loops in turns of {turns} s, microseconds."),
+        Against::Unloaded => format!("The same loops, alternating (turns of {turns} s), microseconds."),
     };
     format!(
         "{title}{}<p class=faint>{how} Values past 1 ms are left out of p99 and p99.9.</p>\n",
@@ -477,7 +477,7 @@ fn provenance(r: &Report) -> String {
         "<h2>Settings, asked and read back</h2>\n{}<h2>Machine</h2>\n{}\
          <details><summary>{} packages that rt-core is built from, with what we know to be wrong with them</summary>\n{}</details>\n",
         table(&["setting", "asked", "got", "met"], &settings, &["", "", "", ""]),
-        table(&["", "what", "as told"], &facts, &["", "", "wide"]),
+        table(&["", "what", "reported value"], &facts, &["", "", "wide"]),
         r.dependencies.len(),
         table(
             &["package", "version", "known anomalies"],

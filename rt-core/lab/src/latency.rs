@@ -1,4 +1,4 @@
-//! `rt-core latency`: measure, judge, write the report, say the verdict.
+//! `rt-core latency`: measure, compare with the limits, write the report, print the verdict.
 
 use crate::args::LatencyArgs;
 use crate::compare::{Against, compare};
@@ -34,7 +34,7 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
             } else {
                 "with "
             };
-            eprintln!("rt-core: in turns {ours}{}, {} rounds", against.name(), args.rounds);
+            eprintln!("rt-core: alternating {ours}{}, {} rounds", against.name(), args.rounds);
             Some(compare(&setup, against, args.rounds, interrupted)?)
         }
         None => None,
@@ -50,14 +50,14 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
         machine: &machine,
     });
     files::write(&args.out, &mut report, &measured)?;
-    say(&report);
+    print_verdict(&report);
     println!("{}", args.out.join(PAGE).display());
     println!("{}", args.out.join(JSON).display());
     Ok(report.verdict.overall.exit_code())
 }
 
 /// The verdict on the terminal: one line for each limit, then all of them.
-fn say(report: &Report) {
+fn print_verdict(report: &Report) {
     for j in &report.verdict.limits {
         let value = j.value.map_or("n/a".to_owned(), |v| format!("{v:.1}"));
         let sign = if j.lower_bound { ">=" } else { "<=" };

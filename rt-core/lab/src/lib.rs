@@ -1,25 +1,27 @@
-//! The latency laboratory: runs the real loops under load, and says with evidence how late they are.
+//! The latency laboratory: runs the real loops under load, and reports with evidence how late they are.
 //!
-//! [`latency`] runs a measurement and writes a report; [`verify`] checks that a filed report is as it was
-//! written; [`doctor`] says whether this PC is fit. Nothing in here claims that a standard is met.
+//! [`latency`] runs a measurement and writes a report; [`verify`] verifies that a saved report is
+//! unaltered; [`doctor`] checks whether this PC is fit. No report claims conformity with a standard.
+
+#![warn(missing_docs)]
 
 pub mod args;
-pub mod collect;
-pub mod compare;
+mod collect;
+mod compare;
 pub mod cost;
 pub mod doctor;
-pub mod files;
-pub mod gaps;
-pub mod host;
-pub mod html;
+mod files;
+mod gaps;
+mod host;
+mod html;
 pub mod latency;
 pub mod load;
-pub mod machine;
-pub mod measure;
-pub mod plots;
-pub mod provenance;
-pub mod report;
-pub mod summary;
-pub mod verdict;
+mod machine;
+mod measure;
+mod plots;
+mod provenance;
+mod report;
+mod summary;
+mod verdict;
 pub mod verify;
-pub mod watch;
+mod watch;

@@ -34,9 +34,13 @@ pub enum Load {
 /// One process of a load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Work {
+    /// Computes in registers
     Cpu,
+    /// Streams 64 MiB through memory
     Memory,
+    /// Writes 4 MiB and syncs them to disk
     Io,
+    /// Copies everything that the core publishes
     Ui,
 }
 
@@ -57,7 +61,8 @@ impl Load {
         }
     }
 
-    pub fn describe(self, cores: usize) -> String {
+    /// The load in words, for a machine with `cores` cores.
+    pub(crate) fn describe(self, cores: usize) -> String {
         if self == Self::Window {
             return "the operator's window, drawing without a pause".to_owned();
         }
@@ -83,11 +88,11 @@ impl Load {
 }
 
 /// The processes of a load; ended when dropped.
-pub struct Running(Vec<Child>);
+pub(crate) struct Running(Vec<Child>);
 
 impl Running {
     /// `folder`: where the io load may write.
-    pub fn start(load: Load, instance: &Instance, folder: &Path) -> Result<Self, String> {
+    pub(crate) fn start(load: Load, instance: &Instance, folder: &Path) -> Result<Self, String> {
         let program = std::env::current_exe().map_err(|e| format!("cannot find this program: {e}"))?;
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let mut running = Self(Vec::new());
@@ -107,8 +112,8 @@ impl Running {
         Ok(running)
     }
 
-    /// What of it has ended by itself, and how: then it was no load.
-    pub fn ended(&mut self) -> Result<(), String> {
+    /// Fails if a process of the load has ended before its time: then there was no load.
+    pub(crate) fn ended(&mut self) -> Result<(), String> {
         for child in &mut self.0 {
             if let Ok(Some(status)) = child.try_wait() {
                 return Err(format!("the load ended by itself ({status})"));
@@ -150,6 +155,9 @@ impl Drop for Running {
 }
 
 /// The body of one such process; ends when `stopped`.
+///
+/// # Errors
+/// `file` cannot be written, or the shared memory of `instance` cannot be opened; the text is for people.
 pub fn work(kind: Work, instance: &Instance, file: &Path, stopped: impl Fn() -> bool) -> Result<(), String> {
     match kind {
         Work::Cpu => compute(stopped),
@@ -207,11 +215,11 @@ fn listen(instance: &Instance) -> Result<(Snapshots, Records), ServiceError> {
     Ok((snapshots.map_err(|e| failed(&e))?, records.map_err(|e| failed(&e))?))
 }
 
-/// Services come and go as a core starts beside it; past this many tries there is another reason.
+/// Services appear and disappear while a core starts; after this many tries the cause is another.
 const TRIES: u32 = 200;
 const BETWEEN_TRIES: Duration = Duration::from_millis(25);
 
-/// A host that never rests: the worst neighbour that a window could be.
+/// A host that never pauses: more load than any window.
 fn copy_all(instance: &Instance, stopped: impl Fn() -> bool) -> Result<(), ServiceError> {
     let mut tries = 0;
     let (snapshots, records) = loop {

@@ -1,4 +1,4 @@
-//! What the kernel tells about this PC, read below a root path so that tests can show it another machine.
+//! What the kernel reports about this PC, read below a root path so that tests can show it another machine.
 
 use flate2::read::GzDecoder;
 use std::collections::BTreeSet;
@@ -40,7 +40,7 @@ impl Preemption {
             Self::Lazy => "lazy (PREEMPT_LAZY)",
             Self::Voluntary => "voluntary (PREEMPT_VOLUNTARY)",
             Self::None => "none (PREEMPT_NONE)",
-            Self::Unknown => "not told by the kernel",
+            Self::Unknown => "not reported by the kernel",
         }
     }
 }
@@ -232,7 +232,7 @@ impl Machine {
         Some(lines.filter_map(count).sum())
     }
 
-    /// Time that the hypervisor kept from `core`, as the kernel tells it, in seconds.
+    /// Steal time of `core` as the kernel reports it, in seconds: time in which the hypervisor ran something else.
     pub fn steal_s(&self, core: usize) -> Option<f64> {
         let text = self.text("proc/stat")?;
         let start = format!("cpu{core} ");
@@ -252,7 +252,7 @@ impl Machine {
         })
     }
 
-    /// The hypervisor by name, as far as it can be told; `None` on bare metal.
+    /// The hypervisor by name, as far as it can be identified; `None` on bare metal.
     pub fn hypervisor(&self) -> Option<String> {
         if let Some(kind) = self.text("sys/hypervisor/type").filter(|t| !t.is_empty()) {
             return Some(kind);
@@ -290,7 +290,7 @@ impl Machine {
         self.text("sys/devices/system/clocksource/clocksource0/current_clocksource")
     }
 
-    /// Soft limit of this process from `/proc/self/limits`; `None` for unlimited or not told.
+    /// Soft limit of this process from `/proc/self/limits`; `None` for unlimited or not reported.
     pub fn limit(&self, name: &str) -> Option<u64> {
         let text = self.text("proc/self/limits")?;
         let line = text.lines().find_map(|l| l.strip_prefix(name))?;

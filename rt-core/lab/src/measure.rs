@@ -16,7 +16,7 @@ use stylet_runtime::rt::timing::{PoseTimes, Probe, Probes};
 use stylet_runtime::rt::tissue::TISSUE_STAGES;
 use stylet_sim::scene::Scene;
 
-/// Ticks of the first half second are not recorded: caches and pages are still coming in.
+/// Ticks of the first half second are not recorded: caches and page tables are still being filled.
 pub const WARM_UP_S: f64 = 0.5;
 /// Windows of a report at most, none shorter than 100 ms.
 const WINDOWS: u64 = 240;
@@ -36,7 +36,7 @@ pub struct Setup<'a> {
 /// The ring to the gathering thread holds so much time of ticks.
 const RING_NS: u64 = 4_000_000_000;
 
-/// What came out.
+/// Results of one measurement.
 pub struct Measured {
     pub run: RunReport,
     pub haptic: LoopTiming,
@@ -133,15 +133,15 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Stri
     drop(load);
     options.instance.sweep();
     loaded?;
-    let gone = |_| "a measuring thread ended by itself".to_owned();
-    // Why the loops did not run says more than that the host saw nothing.
+    let panicked = |_| "a measuring thread panicked".to_owned();
+    // The reason why the loops did not run is more useful than that the host saw nothing.
     let run = run.map_err(|e| e.to_string())?;
     Ok(Measured {
         run,
-        haptic: haptic.map_err(gone)?,
-        tissue: tissue.map_err(gone)?,
-        host: host.map_err(gone)??,
-        gaps: gaps.map_err(gone)?,
+        haptic: haptic.map_err(panicked)?,
+        tissue: tissue.map_err(panicked)?,
+        host: host.map_err(panicked)??,
+        gaps: gaps.map_err(panicked)?,
         cores,
         window_ns: window_ns(setup.duration_ns),
     })

@@ -11,9 +11,9 @@ const SIZE: (u32, u32) = (560, 300);
 const FONT: &str = "system-ui, sans-serif";
 const INK: RGBColor = RGBColor(0x33, 0x3d, 0x47);
 const FAINT: RGBColor = RGBColor(0xe3, 0xe7, 0xeb);
-/// Ours.
+/// Color of our loop.
 pub const BLUE: RGBColor = RGBColor(0x1f, 0x6f, 0xb2);
-/// The other one: cyclictest, or the loop's own work.
+/// Color of the second series: cyclictest, or the work of the loop.
 pub const ORANGE: RGBColor = RGBColor(0xd9, 0x7a, 0x1a);
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -109,7 +109,7 @@ pub struct Series<'a> {
     pub histogram: &'a Histogram<u64>,
 }
 
-/// How many wake-ups came how late; linear microseconds, logarithmic count. Says how many lie past the right edge.
+/// Histogram of the wake-up latency: linear microseconds, logarithmic count. The legend has the number past the right edge.
 pub fn wake_histogram(series: &[Series]) -> Result<String, String> {
     picture(|root| {
         // Wide enough for the body; a long tail would press it into a line, and has a picture of its own.

@@ -6,10 +6,10 @@ use stylet_hw::sim::hand::Hand;
 use stylet_runtime::process::{LoopReport, Options, RunReport};
 use stylet_shm_schema::{ParameterId, ParameterSet};
 
-/// Commit of the sources, `unknown` where they came without git.
+/// Commit of the sources, `unknown` where they were built without git.
 pub const COMMIT: &str = env!("STYLET_COMMIT");
 
-/// One thing that the machine or the program told.
+/// One property of the machine or of the program, as reported by it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Fact {
     pub group: &'static str,
@@ -17,7 +17,7 @@ pub struct Fact {
     pub value: String,
 }
 
-/// A real-time setting: what was asked for, and what the kernel says there is.
+/// A real-time setting: what was asked for, and what the kernel reports.
 #[derive(Clone, Debug, Serialize)]
 pub struct Setting {
     pub name: String,
@@ -83,11 +83,13 @@ pub fn stiffness_margin_n_per_m(period_ns: u64, delay_ns: f64) -> f64 {
     (hand + law) / ((period_ns as f64 / 2.0 + delay_ns) * 1e-9)
 }
 
-fn or_untold(value: Option<String>) -> String {
-    value.filter(|v| !v.is_empty()).unwrap_or_else(|| "not told".to_owned())
+fn or_not_reported(value: Option<String>) -> String {
+    value
+        .filter(|v| !v.is_empty())
+        .unwrap_or_else(|| "not reported".to_owned())
 }
 
-/// What the machine tells about itself.
+/// Properties that the machine reports about itself.
 pub fn facts(machine: &Machine, options: &Options) -> Vec<Fact> {
     let mut facts = Vec::new();
     let mut add = |group, name: &str, value: String| {
@@ -97,7 +99,7 @@ pub fn facts(machine: &Machine, options: &Options) -> Vec<Fact> {
             value,
         });
     };
-    let text = |path: &str| or_untold(machine.text(path));
+    let text = |path: &str| or_not_reported(machine.text(path));
     add("Kernel", "version", text("proc/version"));
     add("Kernel", "preemption", machine.preemption().name().to_owned());
     add("Kernel", "command line", text("proc/cmdline"));
@@ -105,14 +107,14 @@ pub fn facts(machine: &Machine, options: &Options) -> Vec<Fact> {
     add(
         "Kernel",
         "real-time groups",
-        or_untold(machine.build_option("RT_GROUP_SCHED")),
+        or_not_reported(machine.build_option("RT_GROUP_SCHED")),
     );
     add(
         "Kernel",
         "timer",
-        format!("CONFIG_HZ={}", or_untold(machine.build_option("HZ"))),
+        format!("CONFIG_HZ={}", or_not_reported(machine.build_option("HZ"))),
     );
-    let cpu = |key| or_untold(machine.cpuinfo(0, key));
+    let cpu = |key| or_not_reported(machine.cpuinfo(0, key));
     add("Processor", "model", cpu("model name"));
     add("Processor", "microcode", cpu("microcode"));
     add("Processor", "cores online", core_list(&machine.online_cores()));
@@ -122,7 +124,7 @@ pub fn facts(machine: &Machine, options: &Options) -> Vec<Fact> {
     let governor = text("sys/devices/system/cpu/cpuidle/current_governor");
     let driver = text("sys/devices/system/cpu/cpuidle/current_driver");
     add("Processor", "idle driver", format!("{driver}, governor {governor}"));
-    add("Processor", "clock source", or_untold(machine.clock_source()));
+    add("Processor", "clock source", or_not_reported(machine.clock_source()));
     let hypervisor = machine.hypervisor().unwrap_or_else(|| "none found".to_owned());
     add("Processor", "hypervisor", hypervisor);
     add("Processor", "firmware", text("sys/class/dmi/id/bios_version"));
@@ -151,7 +153,7 @@ pub fn facts(machine: &Machine, options: &Options) -> Vec<Fact> {
     add(
         "Memory",
         "installed",
-        or_untold(total.map(|l| l.trim_start_matches("MemTotal:").trim().to_owned())),
+        or_not_reported(total.map(|l| l.trim_start_matches("MemTotal:").trim().to_owned())),
     );
     let swaps = machine
         .text("proc/swaps")
@@ -172,7 +174,7 @@ fn core_facts(machine: &Machine, core: usize) -> String {
     let states = machine.idle_states(core);
     let states: Vec<String> = states.iter().map(|(name, us)| format!("{name} {us} us")).collect();
     let states = if states.is_empty() {
-        "not told".to_owned()
+        "not reported".to_owned()
     } else {
         states.join(", ")
     };
@@ -182,7 +184,7 @@ fn core_facts(machine: &Machine, core: usize) -> String {
 
 fn share(machine: &Machine) -> String {
     match machine.throttle() {
-        None => "not told".to_owned(),
+        None => "not reported".to_owned(),
         Some(Throttle::Off) => "all of the time (throttling off)".to_owned(),
         Some(Throttle::Share(share)) => format!("{:.0} % of the time, then throttled", share * 100.0),
     }
@@ -212,9 +214,9 @@ pub fn settings(machine: &Machine, options: &Options, run: &RunReport) -> Vec<Se
     let mut thread = |name: &str, report: &LoopReport| {
         let t = &report.thread;
         let asked = if t.asked_priority > 0 { 1 } else { 0 };
-        let told = |policy, priority| format!("{} {priority}", policy_name(policy));
+        let scheduling = |policy, priority| format!("{} {priority}", policy_name(policy));
         let met = (t.policy, t.priority) == (asked, t.asked_priority);
-        let (wanted, got) = (told(asked, t.asked_priority), told(t.policy, t.priority));
+        let (wanted, got) = (scheduling(asked, t.asked_priority), scheduling(t.policy, t.priority));
         add(
             &format!("{name} thread: policy and priority"),
             wanted,
@@ -235,7 +237,7 @@ pub fn settings(machine: &Machine, options: &Options, run: &RunReport) -> Vec<Se
     let locked = status
         .lines()
         .find_map(|l| l.strip_prefix("VmLck:"))
-        .unwrap_or("not told")
+        .unwrap_or("not reported")
         .trim();
     add(
         "memory lock",

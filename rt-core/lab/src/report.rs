@@ -8,13 +8,13 @@ use crate::machine::Machine;
 use crate::measure::{Measured, WARM_UP_S, switches_beyond_sleep};
 use crate::provenance::{self, Dependency, Fact, Setting};
 use crate::summary::{Summary, quantile_us, summary};
-use crate::verdict::{self, Judged, Limits, Outcome};
+use crate::verdict::{self, LimitResult, Limits, Outcome};
 use crate::watch::CoreWatch;
 use hdrhistogram::Histogram;
 use serde::Serialize;
 use stylet_runtime::process::{LoopReport, Options};
 
-/// Rises when a field changes its meaning or goes.
+/// Version of the format: it rises when a field changes its meaning or is removed.
 pub const SCHEMA: &str = "stylet.latency/1";
 pub const JSON: &str = "report.json";
 pub const PAGE: &str = "report.html";
@@ -126,7 +126,7 @@ pub struct Environment {
 #[derive(Clone, Debug, Serialize)]
 pub struct Verdict {
     pub overall: Outcome,
-    pub limits: Vec<Judged>,
+    pub limits: Vec<LimitResult>,
 }
 
 /// The whole report. Declared in the order in which it is read.
@@ -176,7 +176,7 @@ pub fn report(parts: &Parts) -> Report {
     let tissue_rate_hz = 1e9 / stylet_runtime::rt::clock::TISSUE_PERIOD_NS as f64;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let unqualified = provenance::unqualified(parts.machine, &measured.run);
-    let limits = verdict::judge(parts.limits, measured, period_ns, &unqualified);
+    let limits = verdict::evaluate(parts.limits, measured, period_ns, &unqualified);
     let host = &measured.host;
     Report {
         schema: SCHEMA,
@@ -283,11 +283,13 @@ fn environment(unqualified: &[String], measured: &Measured) -> Environment {
     ));
     if !gaps.wake.is_empty() {
         evidence.push(format!(
-            "gap watch: its own timer came up to {:.0} us late",
+            "gap watch: its own timer fired up to {:.0} us late",
             gaps.wake.max() as f64 / 1e3
         ));
     }
-    evidence.push(format!("steal time on our cores as /proc/stat tells it: {steal:.2} s"));
+    evidence.push(format!(
+        "steal time on our cores as reported by /proc/stat: {steal:.2} s"
+    ));
     Environment {
         qualified: unqualified.is_empty(),
         evidence,

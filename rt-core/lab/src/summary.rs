@@ -11,7 +11,7 @@ pub const QUANTILES: [(&str, f64); 5] = [
     ("p99.9", 0.999),
     ("p99.99", 0.9999),
 ];
-/// Samples that must lie beyond a percentile before it is told.
+/// Samples that must lie beyond a percentile before it is reported.
 const BEYOND: f64 = 10.0;
 
 #[derive(Clone, Debug, Serialize)]

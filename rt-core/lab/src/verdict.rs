@@ -68,7 +68,7 @@ limits! {
     "REQ-LAT-009" "missed_deadlines" "" 0.0 fixed Reading::Missed, "Each is a tick in which the hand felt an old force.";
     "REQ-LAT-010" "overruns" "" 0.0 fixed Reading::Overruns, "A tick that ends after the next one is due has used up its period.";
     "REQ-LAT-011" "tip_to_tissue_p99_us" "us" 10000.0 fixed Reading::TipToTissue(0.99), "The gland answers within two tissue ticks of 5 ms.";
-    "REQ-LAT-012" "tip_to_host_p99_us" "us" 15000.0 fixed Reading::TipToHost(0.99), "Touch before sight is noticed from 15 ms on (Di Luca and Mahnan 2019); drawing comes on top.";
+    "REQ-LAT-012" "tip_to_host_p99_us" "us" 15000.0 fixed Reading::TipToHost(0.99), "Touch before sight is noticed from 15 ms on (Di Luca and Mahnan 2019); drawing adds to it.";
     "REQ-LAT-013" "k_max_p999_n_per_m" "N/m" 800.0 fixed Reading::StiffnessMargin(0.999), "The stiffest wall that the device renders (Phantom Premium 1.5) must stay stable; a lower bound.";
     "REQ-RT-001" "heap_calls" "" 0.0 fixed Reading::HeapCalls, "Both loops. The heap locks, and may ask the kernel for memory.";
     "REQ-RT-002" "page_faults" "" 0.0 fixed Reading::PageFaults, "Both loops, after arming: memory is locked and touched before.";
@@ -106,7 +106,7 @@ impl LimitSpec {
 /// A limit by its name, with the value in force.
 pub type Limits = BTreeMap<&'static str, f64>;
 
-/// Defaults, then the file, then what the command line says. Lists everything that is wrong.
+/// Defaults, then the file, then what the command line sets.
 pub fn limits(period_ns: u64, file: Option<&Path>, given: &[String]) -> Result<Limits, String> {
     let mut limits: Limits = LIMITS.iter().map(|l| (l.name, l.default_for(period_ns))).collect();
     let mut problems = Vec::new();
@@ -139,7 +139,7 @@ pub fn limits(period_ns: u64, file: Option<&Path>, given: &[String]) -> Result<L
     Err(problems.join("\n"))
 }
 
-/// How one limit, or all of them together, came out.
+/// Result of one limit, or of all together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Outcome {
     #[serde(rename = "PASS")]
@@ -169,9 +169,9 @@ impl Outcome {
     }
 }
 
-/// One limit, judged.
+/// One limit compared with the measured value.
 #[derive(Clone, Debug, Serialize)]
-pub struct Judged {
+pub struct LimitResult {
     pub id: &'static str,
     pub name: &'static str,
     pub unit: &'static str,
@@ -186,9 +186,9 @@ pub struct Judged {
 /// Why the tail of a distribution says nothing about this program here; empty when it does.
 pub type Unqualified = [String];
 
-/// Judges every limit.
-pub fn judge(limits: &Limits, measured: &Measured, period_ns: u64, unqualified: &Unqualified) -> Vec<Judged> {
-    let judge_one = |spec: &LimitSpec| {
+/// Compares every limit with the measurement.
+pub fn evaluate(limits: &Limits, measured: &Measured, period_ns: u64, unqualified: &Unqualified) -> Vec<LimitResult> {
+    let evaluate_one = |spec: &LimitSpec| {
         let limit = limits[spec.name];
         let (value, evidence) = read(spec.reading, measured, period_ns);
         let met = value.map(|v| if spec.is_lower_bound() { v >= limit } else { v <= limit });
@@ -201,7 +201,7 @@ pub fn judge(limits: &Limits, measured: &Measured, period_ns: u64, unqualified: 
             Some(true) => (Outcome::Pass, evidence),
             Some(false) => (Outcome::Fail, evidence),
         };
-        Judged {
+        LimitResult {
             id: spec.id,
             name: spec.name,
             unit: spec.unit,
@@ -213,15 +213,15 @@ pub fn judge(limits: &Limits, measured: &Measured, period_ns: u64, unqualified: 
             reason: spec.reason,
         }
     };
-    LIMITS.iter().map(judge_one).collect()
+    LIMITS.iter().map(evaluate_one).collect()
 }
 
 /// One failure fails all; else one that could not be measured leaves it open.
-pub fn overall(judged: &[Judged]) -> Outcome {
-    let any = |outcome| judged.iter().any(|j| j.outcome == outcome);
+pub fn overall(results: &[LimitResult]) -> Outcome {
+    let any = |outcome| results.iter().any(|j| j.outcome == outcome);
     if any(Outcome::Fail) {
         Outcome::Fail
-    } else if any(Outcome::NotMeasurable) || judged.is_empty() {
+    } else if any(Outcome::NotMeasurable) || results.is_empty() {
         Outcome::NotMeasurable
     } else {
         Outcome::Pass
@@ -316,8 +316,8 @@ mod tests {
         );
     }
 
-    fn judged(outcome: Outcome) -> Judged {
-        Judged {
+    fn result(outcome: Outcome) -> LimitResult {
+        LimitResult {
             id: "",
             name: "",
             unit: "",
@@ -333,7 +333,7 @@ mod tests {
     #[test]
     fn one_failure_fails_all_and_one_open_limit_leaves_it_open() {
         use Outcome::*;
-        let of = |all: &[Outcome]| overall(&all.iter().map(|o| judged(*o)).collect::<Vec<_>>());
+        let of = |all: &[Outcome]| overall(&all.iter().map(|o| result(*o)).collect::<Vec<_>>());
         assert_eq!(of(&[Pass, Pass]), Pass);
         assert_eq!(of(&[Pass, NotMeasurable]), NotMeasurable);
         assert_eq!(of(&[NotMeasurable, Fail, Pass]), Fail);
@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn percentile_without_ten_samples_beyond_is_not_told() {
+    fn percentile_without_ten_samples_beyond_is_not_reported() {
         let mut h = crate::collect::histogram();
         for ns in 1..=999_u64 {
             h.record(ns * 1_000).expect("in range");

@@ -1,29 +1,47 @@
-//! Checks that a filed report is as it was written. It finds damage and careless edits; it is not a signature.
+//! Verifies that a saved report is unaltered. It finds damage and careless edits; it is not a signature.
 
 use crate::files::sha256;
 use crate::report::{JSON, NO_DIGEST};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Checks the report at `place`, its folder or its `report.json`, and says what it found: 0 when all is as written.
-pub fn run(place: &Path) -> Result<u8, String> {
+/// The report cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot read {}: {source}", .path.display())]
+pub struct ReadError {
+    /// `report.json` of the report.
+    pub path: PathBuf,
+    /// What the system reports.
+    pub source: std::io::Error,
+}
+
+/// Checks the report at `place`, its folder or its `report.json`, and prints every problem.
+///
+/// Returns 0 when the report is unaltered, else 1.
+///
+/// # Errors
+/// `report.json` cannot be read.
+pub fn run(place: &Path) -> Result<u8, ReadError> {
     let file = if place.is_dir() {
         place.join(JSON)
     } else {
         place.to_owned()
     };
-    let text = std::fs::read_to_string(&file).map_err(|e| format!("cannot read {}: {e}", file.display()))?;
+    let text = std::fs::read_to_string(&file).map_err(|source| ReadError {
+        path: file.clone(),
+        source,
+    })?;
     let folder = file.parent().unwrap_or(Path::new("."));
     let problems = problems(&text, |name| std::fs::read(folder.join(name)).ok());
     for problem in &problems {
         println!("{problem}");
     }
     if problems.is_empty() {
-        println!("{}: as it was written", file.display());
+        println!("{}: unaltered", file.display());
     }
     Ok(u8::from(!problems.is_empty()))
 }
 
-/// Everything that is not as it was written; `read` brings a file beside the report.
+/// Everything that was altered; `read` returns the content of a file beside the report.
 fn problems(text: &str, read: impl Fn(&str) -> Option<Vec<u8>>) -> Vec<String> {
     let Ok(report) = serde_json::from_str::<serde_json::Value>(text) else {
         return vec![format!("{JSON}: tampered with or damaged, it is not JSON")];
@@ -93,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn untouched_report_is_as_written_and_every_change_is_found() {
+    fn unaltered_report_passes_and_every_change_is_found() {
         let (text, page) = written();
         assert_eq!(check(&text, Some(RAW), &page), Vec::<String>::new());
         let better = text.replace("48.5", "18.5");

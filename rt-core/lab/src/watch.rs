@@ -1,17 +1,17 @@
-//! What the kernel tells about the cores while a measurement runs: frequency, steal time, interrupts served.
+//! What the kernel reports about the cores while a measurement runs: frequency, steal time, interrupts served.
 
 use crate::machine::Machine;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Of one core, over the run.
+/// Observations of one core over the run.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct CoreWatch {
     pub core: usize,
     pub lowest_mhz: Option<f64>,
     pub highest_mhz: Option<f64>,
-    /// As `/proc/stat` tells; some hypervisors leave it at 0 whatever they take.
+    /// Steal time as `/proc/stat` reports it, s; some hypervisors leave it at 0 whatever they take.
     pub steal_s: Option<f64>,
     pub interrupts: Option<u64>,
 }

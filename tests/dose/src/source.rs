@@ -1,4 +1,4 @@
-//! Source files: ours are consistent in themselves, and a bad one is told all that is wrong in it.
+//! Source files: ours are consistent in themselves, and a bad one is refused with everything that is wrong in it.
 
 use std::path::Path;
 use stylet_dose::Source;
@@ -61,7 +61,7 @@ fn the_mean_over_directions_of_f_is_phi_an() {
 }
 
 #[test]
-fn every_problem_of_a_file_is_told_at_once() {
+fn every_problem_of_a_file_is_reported_at_once() {
     let bad = text("i125_6711")
         .replace("half_life_days = 59.40", "half_life_days = -3")
         .replace("dose_rate_constant", "dose_rate_constand")
@@ -69,8 +69,8 @@ fn every_problem_of_a_file_is_told_at_once() {
         .replace("g_line = [1.055, 1.078", "g_line = [1.055, \"x\"")
         .replace("theta_deg = [0, 5", "theta_deg = [5, 5")
         .replace("r0_cm = 1.0", "r0_cm = 2.0");
-    let told = Source::parse(&bad).expect_err("it is bad");
-    println!("{told}");
+    let reported = Source::parse(&bad).expect_err("it is bad");
+    println!("{reported}");
     for part in [
         "half_life_days = -3",
         "dose_rate_constand is not known",
@@ -80,7 +80,7 @@ fn every_problem_of_a_file_is_told_at_once() {
         "theta_deg must rise; 5 is followed by 5",
         "r0_cm = 2",
     ] {
-        assert!(told.contains(part), "{part} is not told in: {told}");
+        assert!(reported.contains(part), "{part} is not reported in: {reported}");
     }
 }
 

@@ -76,7 +76,7 @@ fn volumes_of_other_programs_lie_where_they_say() {
 }
 
 #[test]
-fn segments_of_slicer_keep_their_names_and_what_overlaps_is_told() {
+fn segments_of_slicer_keep_their_names_and_what_overlaps_is_reported() {
     let voxels = files::read_voxels(&folder().join("layers.seg.nrrd"), &files::Progress::default()).expect("read");
     let names: Vec<&str> = voxels.names.values().map(String::as_str).collect();
     assert_eq!(names, ["Prostate", "Rectum", "Urethra"]);

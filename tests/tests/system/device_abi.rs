@@ -155,7 +155,7 @@ fn every_error_of_the_interface_turns_the_force_off_and_the_device_comes_back() 
         fake.control.error_in_frame.store(code, Relaxed);
         assert!(
             drive(&mut device, &push, long, |s| *s == Err(known.fault)),
-            "{name} was not told"
+            "{name} was not reported"
         );
         assert!(
             drive(&mut device, &push, long, |_| fake.control.force() == [0.0; 3]),

@@ -23,10 +23,10 @@ fn quiet_arm() -> Arm {
 }
 
 fn open(config: PhantomConfig) -> Result<Phantom, OpenError> {
-    Phantom::open(config, quiet_arm(), Box::new(|text| println!("told: {text}")))
+    Phantom::open(config, quiet_arm(), Box::new(|text| println!("reported: {text}")))
 }
 
-/// With what it told so far.
+/// With the messages that it has reported so far.
 fn open_listening(config: PhantomConfig) -> (Phantom, Arc<Mutex<Vec<String>>>) {
     let heard = Arc::new(Mutex::new(Vec::new()));
     let ear = Arc::clone(&heard);
@@ -80,7 +80,7 @@ fn pose_and_force_change_frames_and_units_as_stated() {
             .force()
             .iter()
             .zip(expected)
-            .all(|(told, want)| (told - want).abs() < 1e-12)
+            .all(|(sent, want)| (sent - want).abs() < 1e-12)
     }));
     assert!(device.readings().speed_m_per_s.is_finite());
 }
@@ -93,39 +93,39 @@ fn torque_about_the_needle_turns_the_roll_joint_and_keeps_to_the_joints_limits()
         torque_nm,
         ..Wrench::zero()
     };
-    let told = || fake.control.torque_mnm.each_ref().map(get);
-    let near = |want: [f64; 3]| move |told: [f64; 3]| told.iter().zip(want).all(|(a, b)| (a - b).abs() < 1e-9);
+    let torque = || fake.control.torque_mnm.each_ref().map(get);
+    let near = |want: [f64; 3]| move |torque: [f64; 3]| torque.iter().zip(want).all(|(a, b)| (a - b).abs() < 1e-9);
     // World +z is away from the operator: clockwise as the operator sees it, which the roll joint counts as positive.
     let roll = near([0.0, 0.0, 40.0]);
     assert!(
-        drive(&mut device, &about(Vector3::z() * 0.04), LONG, |_| roll(told())),
+        drive(&mut device, &about(Vector3::z() * 0.04), LONG, |_| roll(torque())),
         "{:?}",
-        told()
+        torque()
     );
     // About world +x, the operator's left: the tip goes down, which the lift joint counts as positive.
     let lift = near([0.0, 100.0, 0.0]);
     assert!(
-        drive(&mut device, &about(Vector3::x() * 0.1), LONG, |_| lift(told())),
+        drive(&mut device, &about(Vector3::x() * 0.1), LONG, |_| lift(torque())),
         "{:?}",
-        told()
+        torque()
     );
     let limited = near([0.0, 0.0, 48.0]);
     assert!(
-        drive(&mut device, &about(Vector3::z() * 0.1), LONG, |_| limited(told())),
+        drive(&mut device, &about(Vector3::z() * 0.1), LONG, |_| limited(torque())),
         "{:?}",
-        told()
+        torque()
     );
     // With the stylus rolled by a quarter the lift joint has turned under it, not with it.
     put(&fake.control.gimbal_rad[2], std::f64::consts::FRAC_PI_2);
     assert!(
-        drive(&mut device, &about(Vector3::x() * 0.1), LONG, |_| lift(told())),
+        drive(&mut device, &about(Vector3::x() * 0.1), LONG, |_| lift(torque())),
         "{:?}",
-        told()
+        torque()
     );
     fake.control.nan.store(3, Relaxed);
     let none = near([0.0; 3]);
     assert!(
-        drive(&mut device, &about(Vector3::x() * 0.1), LONG, |_| none(told())),
+        drive(&mut device, &about(Vector3::x() * 0.1), LONG, |_| none(torque())),
         "angles that are not numbers"
     );
 }
@@ -244,8 +244,9 @@ fn an_error_in_any_call_of_the_start_is_named_and_leaves_nothing_open() {
         fake.control.fail(call, 0x0302, 3);
         let why = open(config()).map(drop).expect_err(call).to_string();
         println!("{call}: {why}");
-        let told = why.contains("HD_COMM_ERROR") || why.contains("\"unknown\"") || why.contains("amplifiers");
-        assert!(told, "{call}: {why}");
+        let names_the_cause =
+            why.contains("HD_COMM_ERROR") || why.contains("\"unknown\"") || why.contains("amplifiers");
+        assert!(names_the_cause, "{call}: {why}");
         fake.control.reset();
         drop(open(config()).unwrap_or_else(|e| panic!("after {call}: {e}")));
     }
@@ -354,7 +355,7 @@ fn warm_motors_turn_the_force_off_until_they_have_cooled() {
 }
 
 #[test]
-fn a_force_that_nobody_renews_is_let_go() {
+fn a_force_that_nobody_renews_is_released() {
     let fake = Fake::new();
     let mut device = fake.open();
     assert!(drive(&mut device, &push(), LONG, |s| s.is_ok() && feels(&fake, 1.0)()));
@@ -396,21 +397,24 @@ fn unplugged_and_plugged_in_again_without_loading_the_library_anew() {
     fake.control.unplugged.store(0, Relaxed);
     assert!(drive(&mut device, &push(), LONG, |s| s.is_ok() && feels(&fake, 1.0)()));
     assert_eq!(fake.control.inits.load(Relaxed), 2);
-    // It is felt before it is told.
-    let is_told = || {
+    // It is felt before it is reported.
+    let is_reported = || {
         heard
             .lock()
             .unwrap()
             .last()
             .is_some_and(|t| t.contains("PHANTOM Premium"))
     };
-    assert!(until(LONG, is_told), "{:#?}", heard.lock().unwrap());
-    let told = heard.lock().unwrap().clone();
+    assert!(until(LONG, is_reported), "{:#?}", heard.lock().unwrap());
+    let reported = heard.lock().unwrap().clone();
     assert!(
-        told.windows(2).all(|pair| pair[0] != pair[1]),
-        "no message twice in a row: {told:#?}"
+        reported.windows(2).all(|pair| pair[0] != pair[1]),
+        "no message twice in a row: {reported:#?}"
     );
-    assert!(told.last().unwrap().contains("PHANTOM Premium 1.5 6DOF"), "{told:#?}");
+    assert!(
+        reported.last().unwrap().contains("PHANTOM Premium 1.5 6DOF"),
+        "{reported:#?}"
+    );
 }
 
 #[test]
@@ -457,7 +461,7 @@ fn a_dropped_device_has_zero_force_and_is_stopped_unscheduled_and_disabled_in_th
 #[test]
 fn a_panic_in_the_callback_stays_in_it_and_leaves_zero_force() {
     let fake = Fake::new();
-    // The hook prints; the driver must not be unwound.
+    // The panic hook prints; the unwinding ends inside the callback.
     let arm = Box::new(|| panic!("a fault of ours, on purpose"));
     let opened = Phantom::open(config(), arm, Box::new(|_| ()));
     assert!(opened.is_err());
@@ -547,10 +551,10 @@ fn a_force_reaches_the_motors_one_servo_tick_after_its_pose() {
         }
         ticks.len() > 500
     }));
-    let told = |tick: u64, answer: f64| (fake.control.force_at(tick)[1] - answer).abs() < 1e-9;
+    let is_sent = |tick: u64, answer: f64| (fake.control.force_at(tick)[1] - answer).abs() < 1e-9;
     let answered = ticks.iter().filter_map(|&t| {
         (t..t + 50)
-            .find(|&later| told(later, answer_n(t)))
+            .find(|&later| is_sent(later, answer_n(t)))
             .map(|later| later - t)
     });
     let mut delays: Vec<u64> = answered.collect();

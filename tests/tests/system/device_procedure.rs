@@ -117,8 +117,8 @@ fn the_whole_procedure_runs_with_a_phantom_and_its_motors_get_the_force() {
         .iter()
         .map(|r| Vector3::from(r.force_on_hand_n).norm())
         .fold(0.0, f64::max);
-    let told = get(&rig.control.peak_force_n);
-    println!("largest force: {largest:.3} N in the records, {told:.3} N told to the driver");
+    let commanded = get(&rig.control.peak_force_n);
+    println!("largest force: {largest:.3} N in the records, {commanded:.3} N commanded to the driver");
     assert!(
         records.iter().any(|r| r.flags & flags::PUNCTURED != 0),
         "the membrane gave way"
@@ -126,8 +126,8 @@ fn the_whole_procedure_runs_with_a_phantom_and_its_motors_get_the_force() {
     assert!(largest > 3.0, "{largest} N");
     // Two grids of 1 kHz: the very tick of the peak may be passed over.
     assert!(
-        (told - largest).abs() < 0.1 * largest,
-        "{told} N told, {largest} N meant"
+        (commanded - largest).abs() < 0.1 * largest,
+        "{commanded} N commanded, {largest} N meant"
     );
     assert_eq!(rig.control.non_finite_forces.load(Relaxed), 0);
     assert_eq!(rig.link.snapshot().expect("live").header.seed_count, 5);
@@ -139,7 +139,7 @@ fn the_whole_procedure_runs_with_a_phantom_and_its_motors_get_the_force() {
     assert_eq!(
         order.iter().rfind(|call| **call != "hdGetError"),
         Some(&"hdDisableDevice"),
-        "let go at the end"
+        "released at the end"
     );
 }
 
@@ -179,7 +179,7 @@ fn unplugged_in_mid_insertion_the_force_is_off_the_screen_says_why_and_it_goes_o
             rig.link.poll();
             rig.felt_n() == 0.0
         }),
-        "the motors are let go"
+        "the motors are released"
     );
     let at_zero = |link: &Link| {
         link.state()

@@ -287,7 +287,7 @@ fn ctrl_c_ends_early_and_writes_what_was_done() {
 }
 
 #[test]
-fn what_is_wrong_is_told_once_with_its_file_and_line() {
+fn what_is_wrong_is_reported_once_with_its_file_and_line() {
     let folder = scratch("dose-wrong");
     let good = "x_mm,y_mm,z_mm,strength_u\n1,2,3,0.5\n";
     let run_with = |seeds: &str, more: &[&str]| {
@@ -299,7 +299,7 @@ fn what_is_wrong_is_told_once_with_its_file_and_line() {
         assert!(!said.contains("panicked"), "{said}");
         (ended.status.success(), said)
     };
-    for (seeds, more, told) in [
+    for (seeds, more, reported) in [
         ("", [].as_slice(), "line 1: the header lacks x_mm, y_mm, z_mm"),
         ("x_mm,y_mm\n1,2\n", &[], "line 1: the header lacks z_mm"),
         ("x_mm,y_mm,z_mm,colour\n", &[], "\"colour\" is not known"),
@@ -358,7 +358,7 @@ fn what_is_wrong_is_told_once_with_its_file_and_line() {
     ] {
         let (went_well, said) = run_with(seeds, more);
         assert!(!went_well, "{seeds:?} {more:?} was taken");
-        assert!(said.contains(told), "{told} is not in: {said}");
+        assert!(said.contains(reported), "{reported} is not in: {said}");
         assert_eq!(said.matches("host-ui:").count(), 1, "{said}");
     }
     let (_, said) = run_with("x_mm,y_mm,z_mm,strength_u\n1,2,a,1\n1,b,3,1\n", &[]);

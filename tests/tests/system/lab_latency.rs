@@ -1,4 +1,4 @@
-//! The latency laboratory as a user meets it: report, verdict in the exit code, a report that was changed, a second rate.
+//! The latency laboratory as a user runs it: report, verdict in the exit code, a report that was altered, a second rate.
 
 use serde_json::Value;
 use std::path::Path;
@@ -78,7 +78,7 @@ fn report_holds_the_whole_path_and_the_loops_stayed_clean() {
         assert_eq!(counts["unmeasured"], 0, "{section}: {counts}");
     }
     assert_eq!(report["host"]["records_missing"], 0);
-    // 1500 ticks cannot tell p99.99, and say how long it takes.
+    // 1500 ticks are too few for p99.99; the report has the length that it needs.
     let p9999 = &times(&report, "haptic", "wake-up")["quantiles"][4];
     assert_eq!((&p9999["us"], &p9999["needs_s"]), (&Value::Null, &Value::from(100.0)));
     // The exit code is the verdict.
@@ -129,7 +129,7 @@ fn changed_report_is_found() {
     let out = scratch("lab-verify");
     latency(&out, &[]);
     let (code, said) = verify(&out);
-    assert_eq!((code, said.contains("as it was written")), (Some(0), true), "{said}");
+    assert_eq!((code, said.contains("unaltered")), (Some(0), true), "{said}");
     let json = out.join("report.json");
     let text = std::fs::read_to_string(&json).expect("a report");
     std::fs::write(&json, text.replacen("\"limit\": 50.0", "\"limit\": 90.0", 1)).expect("written");
@@ -208,7 +208,7 @@ fn comparison_with_cyclictest_says_when_it_is_not_installed() {
 }
 
 #[test]
-fn doctor_tells_the_same_in_words_and_in_json() {
+fn doctor_reports_the_same_in_words_and_in_json() {
     let doctor = |more: &[&str]| {
         let output = Command::new(program("rt-core"))
             .arg("doctor")

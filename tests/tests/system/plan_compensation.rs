@@ -38,14 +38,9 @@ fn first_plan(theatre: &Theatre) -> ImplantPlan {
     let kernel = DoseKernel::new(&source, Interval::ALL);
     let anatomy = Anatomy::of(&theatre.scene).expect("a closed target");
     let template = Template::before(&theatre.scene.header);
-    let plan = automatic::plan(
-        template,
-        &anatomy,
-        &kernel,
-        &source.model,
-        &Aims::new(145.0),
-        |_| std::ops::ControlFlow::Continue(()),
-    )
+    let plan = automatic::plan(template, &anatomy, &kernel, &source.model, &Aims::new(145.0), |_| {
+        std::ops::ControlFlow::Continue(())
+    })
     .expect("a plan");
     let found = stylet_implant::plan::check::problems(&plan, &anatomy);
     assert!(found.is_empty(), "{found:?}");

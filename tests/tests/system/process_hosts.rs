@@ -108,7 +108,7 @@ fn is_worse(a: &[u64], b: &[u64]) -> bool {
 }
 
 #[test]
-fn the_rank_test_tells_worse_from_chance() {
+fn the_rank_test_separates_worse_from_chance() {
     assert!(is_worse(
         &[0, 1, 2, 1, 0, 3, 1, 0, 2, 1],
         &[5, 4, 6, 9, 4, 5, 7, 8, 6, 4]
@@ -168,7 +168,7 @@ fn flood(instance: &Instance, time: Duration, mut next: impl FnMut(u64) -> Comma
 }
 
 #[test]
-fn a_flood_of_good_commands_reaches_neither_hand_nor_loop_and_the_operator_can_still_let_go() {
+fn a_flood_of_good_commands_reaches_neither_hand_nor_loop_and_the_operator_can_still_release() {
     let mut core = Core::start();
     let mut hand = Insertion::begin(&mut core, 0.004);
     hand.press();
@@ -185,8 +185,8 @@ fn a_flood_of_good_commands_reaches_neither_hand_nor_loop_and_the_operator_can_s
     let flooder = std::thread::spawn(move || flood(&instance, Duration::from_secs(3), plan));
     hand.watch(Duration::from_millis(2000));
     let asked = Instant::now();
-    ask(&mut hand.link, &Request::Disengage).expect("letting go is never refused");
-    println!("let go {:?} after it was asked, under a flood", asked.elapsed());
+    ask(&mut hand.link, &Request::Disengage).expect("a release is never refused");
+    println!("released {:?} after it was asked, under a flood", asked.elapsed());
     assert!(hand.watch_until(Duration::from_secs(10), |_| flooder.is_finished()));
     let sent = flooder.join().expect("ours");
     hand.watch(Duration::from_millis(500));

@@ -1,4 +1,4 @@
-//! A loop that stops, alone or with the whole process: the force goes, the operator is told, and it can go on.
+//! A loop that stops, alone or with the whole process: the force goes, the operator gets a message, and it can go on.
 
 use std::time::Duration;
 use stylet_shm_schema::{EventKind, Fault, Request, flags};
@@ -7,7 +7,7 @@ use stylet_tests::stopped::{StoppedThread, is_dead};
 use stylet_tests::{Core, ask, left_behind, until};
 
 /// Words that the operator reads about a fault.
-fn told(link: &stylet_host::link::Link, fault: Fault) -> bool {
+fn is_reported(link: &stylet_host::link::Link, fault: Fault) -> bool {
     let kind = EventKind::FaultRaised as u32;
     link.events()
         .iter()
@@ -25,7 +25,10 @@ fn tissue_that_stops_takes_the_force_off_and_the_operator_rearms() {
     });
     assert!(faulted, "no fault without tissue");
     hand.watch(Duration::from_millis(100));
-    assert!(told(&hand.link, Fault::TissueStale), "the operator is not told");
+    assert!(
+        is_reported(&hand.link, Fault::TissueStale),
+        "the operator has no message"
+    );
     let raised = hand
         .records
         .iter()
@@ -82,8 +85,8 @@ fn a_force_loop_that_stops_ends_the_process_and_leaves_nothing() {
     assert_eq!(status.code(), Some(1), "it ends with an error, not by a signal");
     hand.watch(Duration::from_millis(200));
     assert!(
-        told(&hand.link, Fault::LoopStopped),
-        "the operator is not told: {:?}",
+        is_reported(&hand.link, Fault::LoopStopped),
+        "the operator has no message: {:?}",
         hand.link.events().back()
     );
     drop(hand);

@@ -108,7 +108,7 @@ fn a_second_core_is_refused_under_the_same_name_and_runs_under_another() {
 }
 
 #[test]
-fn what_killed_cores_and_hosts_left_is_gone_after_the_next_run() {
+fn what_killed_cores_and_hosts_left_is_removed_by_the_next_run() {
     let mut instance = fresh_instance();
     for _ in 0..3 {
         let mut core = Core::start_as(instance.clone(), &["--rt-if-allowed"]);
@@ -157,7 +157,7 @@ echo "left: $(ls /dev/shm)"
 "#;
 
 #[test]
-fn full_shared_memory_is_told_in_words_and_who_runs_already_goes_on() {
+fn full_shared_memory_is_reported_in_words_and_who_runs_already_goes_on() {
     let folder = scratch("full");
     let mut namespace = Command::new("unshare");
     // Without root, in a user namespace.
@@ -173,9 +173,9 @@ fn full_shared_memory_is_told_in_words_and_who_runs_already_goes_on() {
         .args([&programs, &folder])
         .output()
         .expect("unshare runs");
-    let told = String::from_utf8_lossy(&output.stdout).into_owned();
-    println!("{told}{}", String::from_utf8_lossy(&output.stderr));
-    if output.status.code() == Some(77) || told.is_empty() {
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    println!("{printed}{}", String::from_utf8_lossy(&output.stderr));
+    if output.status.code() == Some(77) || printed.is_empty() {
         println!("SKIPPED: this machine does not allow a mount namespace");
         return;
     }
@@ -187,9 +187,9 @@ fn full_shared_memory_is_told_in_words_and_who_runs_already_goes_on() {
         "host after 0",
         "core 0",
     ] {
-        assert!(told.lines().any(|l| l == line), "not {line:?}:\n{told}");
+        assert!(printed.lines().any(|l| l == line), "not {line:?}:\n{printed}");
     }
-    assert!(told.ends_with("left: \n"), "something is left:\n{told}");
+    assert!(printed.ends_with("left: \n"), "something is left:\n{printed}");
     for words in ["new", "second", "third"] {
         let text = std::fs::read_to_string(folder.join(format!("{words}.words"))).expect("written");
         assert!(text.contains("/dev/shm needs room"), "{words}: {text}");

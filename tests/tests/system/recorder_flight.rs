@@ -31,7 +31,12 @@ fn request(core: &Core, hand: &mut Insertion) -> PathBuf {
     ask(&mut hand.link, &Request::SaveFlight).expect("saved");
     hand.take();
     let kind = EventKind::FlightSaved as u32;
-    let event = hand.link.events().iter().rfind(|e| e.kind == kind).expect("told where");
+    let event = hand
+        .link
+        .events()
+        .iter()
+        .rfind(|e| e.kind == kind)
+        .expect("an event with the place");
     let file = core.flights().pop().expect("a file");
     assert!(
         file.display().to_string().starts_with(&event.text.read()),

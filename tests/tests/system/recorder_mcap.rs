@@ -207,7 +207,7 @@ fn a_recorded_hand_plays_again_and_the_forces_are_those_of_then() {
         played
             .iter()
             .any(|r| r.fault == stylet_shm_schema::Fault::DeviceSilent as u32),
-        "the end is told as silence"
+        "the end is reported as silence"
     );
     drop(link);
     core.finish();

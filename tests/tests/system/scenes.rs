@@ -224,14 +224,14 @@ fn a_volume_with_structures_runs_and_its_target_is_planned_in() {
     Sender::new(&core).send(&header, &cells).expect("a good volume");
     wait_for(&mut link, "phantom");
     let scene = link.scene().expect("live").header;
-    let told: Vec<_> = scene
+    let structures: Vec<_> = scene
         .structures()
         .iter()
         .map(|s| (s.name.read(), s.role, s.element_count))
         .collect();
     let gland = 10 * 8 * 6;
     assert_eq!(
-        told,
+        structures,
         [
             ("gland".to_owned(), role::TARGET, gland),
             ("fat".to_owned(), 0, 20 * 18 * 16 - gland)

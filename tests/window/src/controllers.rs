@@ -36,7 +36,7 @@ fn wait(driven: &mut Driven, frames: usize) {
     }
 }
 
-/// A hand that outran slow frames rests at its last goal too, so the window must have seen first that it was let go.
+/// A hand that outran slow frames rests at its last goal too, so the window must have seen first that it was released.
 fn rest(driven: &mut Driven) {
     wait(driven, 20);
     driven.until("rest", is_at_rest);
@@ -62,7 +62,7 @@ fn a_stick_moves_the_needle_while_it_is_held_and_no_longer() {
     pad.axis(AbsoluteAxisCode::ABS_Y, -1.0);
     driven.until("the needle to go in", |app| tip(app)[2] > start + 5e-3);
     pad.axis(AbsoluteAxisCode::ABS_Y, 0.0);
-    assert_stays(&mut driven, "let go");
+    assert_stays(&mut driven, "released");
     let deep = tip(driven.window.state())[2];
     pad.axis(AbsoluteAxisCode::ABS_Y, 0.7);
     driven.until("the needle to come out", |app| tip(app)[2] < deep - 3e-3);
@@ -77,7 +77,7 @@ fn a_stick_moves_the_needle_while_it_is_held_and_no_longer() {
 }
 
 #[test]
-fn a_stick_that_is_unplugged_while_it_is_pushed_leaves_the_needle_where_it_is_and_is_told() {
+fn a_stick_that_is_unplugged_while_it_is_pushed_leaves_the_needle_where_it_is_and_is_reported() {
     let (mut driven, pad) = with(Kind::Gamepad);
     let start = tip(driven.window.state())[2];
     pad.axis(AbsoluteAxisCode::ABS_Y, -1.0);
@@ -100,7 +100,7 @@ fn a_cap_moves_the_needle_across_outside_only_and_it_keeps_its_line_in_the_tissu
     cap.axis(AbsoluteAxisCode::ABS_X, 1.0);
     driven.until("the needle to go across", |app| side(app) > 4e-3);
     cap.axis(AbsoluteAxisCode::ABS_X, 0.0);
-    assert_stays(&mut driven, "let go");
+    assert_stays(&mut driven, "released");
     let beside = side(driven.window.state());
     assert!((tip(driven.window.state())[2] - start[2]).abs() < 1e-3, "along as well");
     cap.axis(AbsoluteAxisCode::ABS_Z, 1.0);
@@ -117,13 +117,13 @@ fn a_cap_moves_the_needle_across_outside_only_and_it_keeps_its_line_in_the_tissu
     driven.window.key_down(egui::Key::W);
     driven.until("the keys to go on", |app| tip(app)[2] > deep + 3e-3);
     driven.window.key_up(egui::Key::W);
-    let let_go = tip(driven.window.state())[2];
+    let released = tip(driven.window.state())[2];
     rest(&mut driven);
     let rests = tip(driven.window.state())[2];
     assert!(
         // What the hand's spring gives as it comes to rest.
-        rests > let_go - 0.2e-3,
-        "let go at {let_go} m, it went back to {rests} m"
+        rests > released - 0.2e-3,
+        "released at {released} m, it went back to {rests} m"
     );
     let after = side(driven.window.state());
     assert!((after - beside).abs() < 1.5e-3, "{after} m beside, {beside} m before");

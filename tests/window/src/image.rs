@@ -208,7 +208,7 @@ fn an_image_of_elsewhere_and_a_file_that_is_none_are_refused_with_words() {
 
 /// A hundred million voxels of nothing take a second or two to unpack.
 #[test]
-fn a_long_load_tells_its_share_and_ends_when_it_is_cancelled() {
+fn a_long_load_reports_its_share_and_ends_when_it_is_cancelled() {
     let mut driven = Driven::open_plain([1280.0, 800.0]);
     let path = scratch("ui-image-long").join("long.nrrd");
     let header = "NRRD0004\ntype: uint8\ndimension: 3\nspace: right-anterior-superior\nsizes: 500 500 500\n\
@@ -238,7 +238,7 @@ fn a_long_load_tells_its_share_and_ends_when_it_is_cancelled() {
     assert_eq!(misplaced(&driven.window), Vec::<String>::new());
     driven.picture("loading");
     driven.click("Cancel");
-    assert!(share(&driven).is_none(), "it is still told");
+    assert!(share(&driven).is_none(), "it is still shown");
     let readers = || {
         let tasks = std::fs::read_dir("/proc/self/task").expect("threads").flatten();
         let name = |task: std::fs::DirEntry| std::fs::read_to_string(task.path().join("comm")).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! A plan of many needles in the window: edited by label and by key, kept in files, gone through needle by needle.
+//! A plan of many needles in the window: edited by label and by key, kept in files, stepped through needle by needle.
 
 use crate::driven::{Driven, is_at_rest, keep_for_docs, misplaced};
 use egui::{Key, Modifiers};
@@ -155,7 +155,7 @@ fn needles_are_added_moved_and_taken_away_and_each_step_can_be_taken_back() {
 }
 
 #[test]
-fn a_plan_goes_to_a_file_and_comes_back_and_a_wrong_file_is_told_in_one_message() {
+fn a_plan_goes_to_a_file_and_comes_back_and_a_wrong_file_is_reported_in_one_message() {
     let mut driven = open(SMALL);
     let folder = scratch("ui-plan-files");
     let planned = plan_through(&header(&driven), &["F6", "G8", "H6"], 3);
@@ -271,7 +271,7 @@ fn an_automatic_plan_covers_the_target_and_nothing_is_wrong_with_it() {
 }
 
 #[test]
-fn compensation_tells_how_far_it_is_and_can_be_ended() {
+fn compensation_reports_how_far_it_is_and_can_be_ended() {
     let mut driven = open(SMALL);
     let planned = plan_through(&header(&driven), &["F7", "H7", "G8"], 1);
     put(&mut driven, "ui-plan-compensate", &planned);

@@ -30,8 +30,8 @@ impl Table {
 
     pub fn unplug(&self) {
         *self.there.lock().unwrap() = None;
-        let gone = io::Error::from_raw_os_error(NO_SUCH_DEVICE);
-        self.queue.lock().unwrap().push_back(Err(gone));
+        let unplugged = io::Error::from_raw_os_error(NO_SUCH_DEVICE);
+        self.queue.lock().unwrap().push_back(Err(unplugged));
     }
 
     /// To a share of its way, -1 to 1.

@@ -101,7 +101,7 @@ fn insertion_is_in_place_and_as_it_was() {
             flags::IN_CONTACT,
             "it touches the gland"
         );
-        assert_eq!(state.flags & flags::PUNCTURED, 0, "it has not gone through");
+        assert_eq!(state.flags & flags::PUNCTURED, 0, "it has not passed through");
         assert_in_place(&mut driven, &format!("inserting, {theme}"));
         driven.picture(&format!("inserting-{theme}"));
         driven.compare_live(&format!("inserting_{theme}"), INSERTING_PIXELS);

@@ -60,7 +60,7 @@ fn a_stick_pushed_away_advances_at_full_speed_and_a_shoulder_button_makes_it_slo
 }
 
 #[test]
-fn the_needle_does_not_move_until_a_stick_that_came_deflected_was_let_go() {
+fn the_needle_does_not_move_until_a_stick_that_came_deflected_was_released() {
     let mut state = State::new(Kind::Gamepad, &stick(-32768));
     assert_eq!(state.wish(0.0), Wish::REST);
     feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, -30000)]);
@@ -71,7 +71,7 @@ fn the_needle_does_not_move_until_a_stick_that_came_deflected_was_let_go() {
 }
 
 #[test]
-fn stop_holds_until_the_stick_was_let_go() {
+fn stop_holds_until_the_stick_was_released() {
     let mut state = State::new(Kind::Gamepad, &stick(0));
     feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, -32768)]);
     let taken = feed(&mut state, 0.0, &[(EventType::KEY, KeyCode::BTN_EAST.0, 1)]);

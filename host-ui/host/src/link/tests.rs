@@ -67,7 +67,7 @@ fn a_restarted_core_is_found_and_nothing_of_the_first_run_is_left() {
             effective_tick: 1,
             set: ParameterSet::default(),
         };
-        // Before the announcement: it must not be lost.
+        // Before the announcement: the link keeps it.
         parameters.send_copy(in_force).unwrap();
         link.poll();
         assert!(link.parameters().is_none_or(|p| p.session_id == run - 1));

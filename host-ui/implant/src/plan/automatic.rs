@@ -299,7 +299,7 @@ mod tests {
     };
 
     fn iodine() -> (Source, DoseKernel) {
-        let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../sources/i125_6711.toml");
+        let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sources/i125_6711.toml");
         let source = Source::read(&file).unwrap();
         let kernel = DoseKernel::new(&source, Interval::ALL);
         (source, kernel)

@@ -20,7 +20,7 @@ fn anatomy() -> Anatomy {
 }
 
 fn kernel() -> DoseKernel {
-    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../sources/i125_6711.toml");
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sources/i125_6711.toml");
     DoseKernel::new(&Source::read(&file).unwrap(), Interval::ALL)
 }
 

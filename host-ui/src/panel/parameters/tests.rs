@@ -44,7 +44,7 @@ fn edits_made_while_a_change_is_on_its_way_are_sent_after_it() {
 }
 
 #[test]
-fn a_refusal_stands_at_its_row_and_the_draft_is_gone() {
+fn a_refusal_stands_at_its_row_and_the_draft_is_cleared() {
     let mut state = ParametersState::default();
     state.edit(6, 0.01);
     let pairs = state.request().expect("something to send");

@@ -1,6 +1,6 @@
 //! Cores: how many, who else uses the one of the force loop, and how deep they sleep.
 
-use super::{Finding, Severity};
+use super::{Finding, FindingLevel};
 use crate::machine::{Machine, core_list};
 
 /// Waking from a deeper sleep than this is seen in the wake-up latency.
@@ -8,16 +8,16 @@ const DEEP_US: u64 = 20;
 
 pub fn count(machine: &Machine) -> Finding {
     match machine.online_cores().len() {
-        0 => Finding::new("cores", Severity::Note, "the kernel does not tell its cores", ""),
+        0 => Finding::new("cores", FindingLevel::Note, "the kernel does not report its cores", ""),
         1 => Finding::new(
             "cores",
-            Severity::Blocker,
+            FindingLevel::Blocker,
             "one core: force loop, tissue and everything else share it",
             "use a PC with two cores or more",
         ),
         n @ (2 | 3) => Finding::new(
             "cores",
-            Severity::Note,
+            FindingLevel::Note,
             format!("{n} cores: the tissue step shares its core with everything else"),
             "four or more leave a core to each loop",
         ),
@@ -34,7 +34,7 @@ pub fn isolation(machine: &Machine, core: usize) -> Finding {
     }
     Finding::new(
         "isolation",
-        Severity::Warning,
+        FindingLevel::Warning,
         format!(
             "core {core} is open to all threads (isolated cores: {})",
             core_list(&isolated)
@@ -86,7 +86,7 @@ pub fn interrupts(machine: &Machine, core: usize) -> Finding {
              the kernel command line keeps it so)"
         ));
     }
-    Finding::new("interrupts", Severity::Warning, what, cure.join("\n"))
+    Finding::new("interrupts", FindingLevel::Warning, what, cure.join("\n"))
 }
 
 pub fn siblings(machine: &Machine, core: usize) -> Finding {
@@ -96,7 +96,7 @@ pub fn siblings(machine: &Machine, core: usize) -> Finding {
     }
     Finding::new(
         "SMT",
-        Severity::Warning,
+        FindingLevel::Warning,
         format!("core {core} shares its execution units with {}", core_list(&siblings)),
         "echo off | sudo tee /sys/devices/system/cpu/smt/control   (nosmt on the kernel command line keeps it so)",
     )
@@ -104,11 +104,16 @@ pub fn siblings(machine: &Machine, core: usize) -> Finding {
 
 pub fn governor(machine: &Machine, core: usize) -> Finding {
     match machine.governor(core).as_deref() {
-        None => Finding::new("governor", Severity::Note, "the kernel shows no frequency scaling", ""),
+        None => Finding::new(
+            "governor",
+            FindingLevel::Note,
+            "the kernel shows no frequency scaling",
+            "",
+        ),
         Some("performance") => Finding::good("governor", format!("core {core} runs at full speed (performance)")),
         Some(other) => Finding::new(
             "governor",
-            Severity::Warning,
+            FindingLevel::Warning,
             format!("core {core} changes its speed ({other})"),
             "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor",
         ),
@@ -126,7 +131,7 @@ pub fn sleep_states(machine: &Machine, core: usize) -> Finding {
     match (deep.is_empty(), can_ask) {
         (false, true) => Finding::new(
             "sleep states",
-            Severity::Note,
+            FindingLevel::Note,
             format!(
                 "core {core} may sleep deeply ({}); rt-core forbids it through /dev/cpu_dma_latency while it runs as root",
                 deep.join(", ")
@@ -135,7 +140,7 @@ pub fn sleep_states(machine: &Machine, core: usize) -> Finding {
         ),
         (false, false) => Finding::new(
             "sleep states",
-            Severity::Warning,
+            FindingLevel::Warning,
             format!(
                 "core {core} may sleep deeply ({}), and there is no /dev/cpu_dma_latency to forbid it",
                 deep.join(", ")
@@ -150,7 +155,7 @@ pub fn sleep_states(machine: &Machine, core: usize) -> Finding {
         ),
         (true, false) => Finding::new(
             "sleep states",
-            Severity::Note,
+            FindingLevel::Note,
             format!("no deep sleep state is seen on core {core}; there is no /dev/cpu_dma_latency"),
             "",
         ),

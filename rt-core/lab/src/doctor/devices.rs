@@ -1,6 +1,6 @@
 //! Haptic devices: what is connected, and whether their driver would find it.
 
-use super::{Finding, Severity};
+use super::{Finding, FindingLevel};
 use crate::machine::Machine;
 use stylet_hw::libhd::diagnose::{self, Surroundings};
 
@@ -9,7 +9,7 @@ const USB_VENDOR: &str = "2988";
 /// IEEE 1394 vendor of SensAble, the maker of the Phantoms, as registered (OUI 00-0B-99).
 const FIREWIRE_VENDOR: &str = "0x000b99";
 
-/// Devices on buses that tell their vendor; a Premium on a parallel port does not.
+/// Devices on buses that report their vendor; a Premium on a parallel port does not.
 fn connected(machine: &Machine) -> Vec<String> {
     let mut found = Vec::new();
     for (bus, file, vendor, name_of_bus) in [
@@ -31,7 +31,7 @@ pub fn haptic(machine: &Machine) -> Finding {
     if found.is_empty() {
         return Finding::new(
             "devices",
-            Severity::Note,
+            FindingLevel::Note,
             "no haptic device is seen on FireWire or USB; without a Premium on a parallel port the simulated one is there",
             "",
         );
@@ -42,16 +42,16 @@ pub fn haptic(machine: &Machine) -> Finding {
 /// What stands between a Phantom and `--device phantom`. It matters less where no device is connected.
 pub fn driver(machine: &Machine, here: &Surroundings) -> Vec<Finding> {
     let worst = if connected(machine).is_empty() {
-        Severity::Note
+        FindingLevel::Note
     } else {
-        Severity::Warning
+        FindingLevel::Warning
     };
     let findings = diagnose::diagnose(&machine.path(""), here).into_iter();
     findings
         .map(|f| {
             let severity = match f.severity {
-                diagnose::Severity::Good => Severity::Good,
-                diagnose::Severity::Note => Severity::Note,
+                diagnose::Severity::Good => FindingLevel::Good,
+                diagnose::Severity::Note => FindingLevel::Note,
                 diagnose::Severity::Warning | diagnose::Severity::Problem => worst,
             };
             Finding::new(PHANTOM, severity, f.what, f.cure)

@@ -1,6 +1,6 @@
 //! Kernel: hypervisor, preemption, throttling, time source.
 
-use super::{Finding, Severity};
+use super::{Finding, FindingLevel};
 use crate::machine::{Machine, Preemption, Throttle};
 
 pub fn hypervisor(machine: &Machine) -> Finding {
@@ -8,7 +8,7 @@ pub fn hypervisor(machine: &Machine) -> Finding {
         None => Finding::good("hypervisor", "runs on bare metal"),
         Some(name) => Finding::new(
             "hypervisor",
-            Severity::Blocker,
+            FindingLevel::Blocker,
             format!(
                 "this is a virtual machine ({name}): the host takes the core away for milliseconds, and steal time may not show it"
             ),
@@ -23,14 +23,14 @@ pub fn preemption(machine: &Machine) -> Finding {
     let real_time = "for a bounded tail, a PREEMPT_RT kernel: sudo apt-get install linux-image-rt-amd64, then restart";
     match model {
         Preemption::RealTime => Finding::good("preemption", what),
-        Preemption::Full => Finding::new("preemption", Severity::Warning, what, real_time),
+        Preemption::Full => Finding::new("preemption", FindingLevel::Warning, what, real_time),
         _ => {
             let dynamic = machine
                 .text("proc/version")
                 .is_some_and(|v| v.contains("PREEMPT_DYNAMIC"));
             let now = "\nuntil then: echo full | sudo tee /sys/kernel/debug/sched/preempt   (or preempt=full on the kernel command line)";
             let cure = format!("{real_time}{}", if dynamic { now } else { "" });
-            Finding::new("preemption", Severity::Warning, what, cure)
+            Finding::new("preemption", FindingLevel::Warning, what, cure)
         }
     }
 }
@@ -46,7 +46,7 @@ pub fn throttling(machine: &Machine) -> Finding {
         ),
         Some(Throttle::Share(share)) => Finding::new(
             "throttling",
-            Severity::Warning,
+            FindingLevel::Warning,
             format!(
                 "real-time threads are stopped after {:.0} % of each period",
                 share * 100.0
@@ -55,14 +55,14 @@ pub fn throttling(machine: &Machine) -> Finding {
         ),
         Some(Throttle::Off) => Finding::new(
             "throttling",
-            Severity::Note,
+            FindingLevel::Note,
             "throttling is off: a real-time thread that never sleeps hangs its core",
             "sudo sysctl kernel.sched_rt_runtime_us=950000",
         ),
         None => Finding::new(
             "throttling",
-            Severity::Note,
-            "the kernel does not tell the share of real-time threads",
+            FindingLevel::Note,
+            "the kernel does not report the share of real-time threads",
             "",
         ),
     }
@@ -94,7 +94,7 @@ pub fn groups(machine: &Machine) -> Finding {
     match runtime.as_deref() {
         Some("0") => Finding::new(
             "control group",
-            Severity::Blocker,
+            FindingLevel::Blocker,
             "the control group of this shell has no share for real-time threads, so SCHED_FIFO is refused even to root",
             "echo $$ | sudo tee /sys/fs/cgroup/cpu/cgroup.procs   (moves this shell to the root group)",
         ),
@@ -117,15 +117,15 @@ pub fn time_source(machine: &Machine) -> Finding {
         }
         Some(slow) => Finding::new(
             "time source",
-            Severity::Warning,
+            FindingLevel::Warning,
             format!("{slow}: each look at the clock costs about a microsecond or more"),
             "echo tsc | sudo tee /sys/devices/system/clocksource/clocksource0/current_clocksource   (if it is refused, the \
              kernel does not trust this processor's tsc: see dmesg | grep -i tsc)",
         ),
         None => Finding::new(
             "time source",
-            Severity::Note,
-            "the kernel does not tell its time source",
+            FindingLevel::Note,
+            "the kernel does not report its time source",
             "",
         ),
     }

@@ -1,6 +1,6 @@
 //! Memory: swap, and huge pages that are made while a loop runs.
 
-use super::{Finding, Severity};
+use super::{Finding, FindingLevel};
 use crate::machine::Machine;
 
 pub fn swap(machine: &Machine) -> Finding {
@@ -15,7 +15,7 @@ pub fn swap(machine: &Machine) -> Finding {
     }
     Finding::new(
         "swap",
-        Severity::Note,
+        FindingLevel::Note,
         format!(
             "swap is on ({}); rt-core locks its own pages, the window may still stall",
             areas.join(", ")
@@ -31,7 +31,7 @@ pub fn huge_pages(machine: &Machine) -> Finding {
     if mode.contains("[always]") {
         return Finding::new(
             "huge pages",
-            Severity::Note,
+            FindingLevel::Note,
             "the kernel joins pages into huge ones by itself, and stops threads for it",
             "echo madvise | sudo tee /sys/kernel/mm/transparent_hugepage/enabled",
         );

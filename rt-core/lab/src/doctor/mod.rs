@@ -1,7 +1,7 @@
-//! `rt-core doctor`: is this PC fit for a 1 kHz force loop, and what to change, in words to type.
+//! `rt-core doctor`: is this PC fit for a 1 kHz force loop, and what to change, as commands to type.
 //!
 //! Each check is a function of a [`Machine`] and the core of the force loop; all of them read below a root path,
-//! so that `tests` can show them machines that nobody has.
+//! so that tests can present any machine to them.
 
 mod cores;
 mod devices;
@@ -19,7 +19,8 @@ use stylet_hw::libhd::diagnose::Surroundings;
 /// How much a finding matters, least first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Severity {
+pub enum FindingLevel {
+    /// Nothing to do.
     Good,
     /// Worth knowing; nothing to do.
     Note,
@@ -29,7 +30,7 @@ pub enum Severity {
     Blocker,
 }
 
-impl Severity {
+impl FindingLevel {
     fn word(self) -> &'static str {
         match self {
             Self::Good => "good",
@@ -45,14 +46,16 @@ impl Severity {
 pub struct Finding {
     /// Stable.
     pub check: &'static str,
-    pub severity: Severity,
+    /// How much it matters.
+    pub severity: FindingLevel,
+    /// What was found, for people.
     pub what: String,
     /// What to type or do; empty when nothing is wrong.
     pub cure: String,
 }
 
 impl Finding {
-    fn new(check: &'static str, severity: Severity, what: impl Into<String>, cure: impl Into<String>) -> Self {
+    fn new(check: &'static str, severity: FindingLevel, what: impl Into<String>, cure: impl Into<String>) -> Self {
         Self {
             check,
             severity,
@@ -62,11 +65,11 @@ impl Finding {
     }
 
     fn good(check: &'static str, what: impl Into<String>) -> Self {
-        Self::new(check, Severity::Good, what, "")
+        Self::new(check, FindingLevel::Good, what, "")
     }
 }
 
-/// All findings, in the order in which one would mend them.
+/// All findings, in the order in which one would fix them.
 pub fn examine(machine: &Machine, haptic_core: usize, here: &Surroundings) -> Vec<Finding> {
     let mut findings = vec![
         kernel::hypervisor(machine),
@@ -92,11 +95,11 @@ pub fn examine(machine: &Machine, haptic_core: usize, here: &Surroundings) -> Ve
     findings
 }
 
-/// What all findings together say.
+/// Summary of all findings.
 fn verdict(findings: &[Finding]) -> &'static str {
     match findings.iter().map(|f| f.severity).max() {
-        Some(Severity::Blocker) => "not fit: mend the blockers first",
-        Some(Severity::Warning) => "usable; expect a longer tail until the warnings are mended",
+        Some(FindingLevel::Blocker) => "not fit: fix the blockers first",
+        Some(FindingLevel::Warning) => "usable; expect a longer tail until the warnings are fixed",
         _ => "fit",
     }
 }
@@ -116,7 +119,7 @@ pub fn run(json: bool, haptic_core: Option<usize>) -> u8 {
     } else {
         print!("{}", text(&findings, core));
     }
-    u8::from(findings.iter().any(|f| f.severity == Severity::Blocker))
+    u8::from(findings.iter().any(|f| f.severity == FindingLevel::Blocker))
 }
 
 fn text(findings: &[Finding], core: usize) -> String {

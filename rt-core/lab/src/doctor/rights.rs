@@ -1,13 +1,13 @@
 //! Rights: real-time priority and locked memory.
 
-use super::{Finding, Severity};
+use super::{Finding, FindingLevel};
 use crate::machine::Machine;
 use stylet_runtime::rt::arm;
 
 /// Numbers of capabilities, `linux/capability.h`.
 const CAP_IPC_LOCK: u32 = 14;
 const CAP_SYS_NICE: u32 = 23;
-/// Priority of the force loop unless told otherwise.
+/// Priority of the force loop by default.
 const WANTED_PRIORITY: u64 = 80;
 /// What the process locks, with a margin: code, stacks, one scene, shared memory of a few hosts.
 const WANTED_LOCK_BYTES: u64 = 512 << 20;
@@ -24,7 +24,7 @@ pub fn priority(machine: &Machine) -> Finding {
             let limit = limit.unwrap_or(0);
             let what =
                 format!("real-time priorities up to {limit} are allowed, the force loop asks for {WANTED_PRIORITY}");
-            Finding::new("priority", Severity::Blocker, what, arm::advice("grant it"))
+            Finding::new("priority", FindingLevel::Blocker, what, arm::advice("grant it"))
         }
     }
 }
@@ -48,7 +48,7 @@ pub fn memory_lock(machine: &Machine) -> Finding {
                 "only {} MiB may be locked; a page that is not locked can be taken away mid tick",
                 bytes.unwrap_or(0) >> 20
             );
-            Finding::new("memory lock", Severity::Blocker, what, arm::advice("grant it"))
+            Finding::new("memory lock", FindingLevel::Blocker, what, arm::advice("grant it"))
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Shared memory: room, and what dead programs left.
 
-use super::{Finding, Severity};
+use super::{Finding, FindingLevel};
 use crate::machine::Machine;
 use std::collections::BTreeSet;
 use std::ffi::CString;
@@ -14,10 +14,10 @@ const WANTED_BYTES: u64 = 256 << 20;
 pub fn free_bytes(path: &Path) -> Option<u64> {
     let path = CString::new(path.as_os_str().as_bytes()).ok()?;
     // SAFETY: an all-zero statvfs is valid.
-    let mut told: libc::statvfs = unsafe { std::mem::zeroed() };
-    // SAFETY: `path` ends with a zero, `told` is valid for writes.
-    let done = unsafe { libc::statvfs(path.as_ptr(), &mut told) } == 0;
-    done.then(|| told.f_bavail as u64 * told.f_frsize as u64)
+    let mut space: libc::statvfs = unsafe { std::mem::zeroed() };
+    // SAFETY: `path` ends with a zero, `space` is valid for writes.
+    let done = unsafe { libc::statvfs(path.as_ptr(), &mut space) } == 0;
+    done.then(|| space.f_bavail as u64 * space.f_frsize as u64)
 }
 
 pub fn space(machine: &Machine, free: impl Fn(&Path) -> Option<u64>) -> Finding {
@@ -27,7 +27,7 @@ pub fn space(machine: &Machine, free: impl Fn(&Path) -> Option<u64>) -> Finding 
         }
         Some(bytes) => Finding::new(
             "shared memory",
-            Severity::Blocker,
+            FindingLevel::Blocker,
             format!(
                 "only {} MiB free in /dev/shm; {} MiB are wanted",
                 bytes >> 20,
@@ -37,7 +37,7 @@ pub fn space(machine: &Machine, free: impl Fn(&Path) -> Option<u64>) -> Finding 
         ),
         None => Finding::new(
             "shared memory",
-            Severity::Blocker,
+            FindingLevel::Blocker,
             "there is no /dev/shm",
             "sudo mount -t tmpfs -o size=1G tmpfs /dev/shm",
         ),
@@ -66,7 +66,7 @@ pub fn stale_services(machine: &Machine) -> Finding {
         .collect();
     Finding::new(
         "stale services",
-        Severity::Note,
+        FindingLevel::Note,
         format!(
             "{} instances in /dev/shm that no program uses: {}{more}",
             stale.len(),

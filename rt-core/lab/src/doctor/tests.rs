@@ -40,15 +40,15 @@ const CLOCKS: &str = "sys/devices/system/clocksource/clocksource0/available_cloc
 const CLOCK: &str = "sys/devices/system/clocksource/clocksource0/current_clocksource";
 const RELEASE: &str = "proc/sys/kernel/osrelease";
 
-/// Severity as expected, and a cure exactly where something is to be done.
+/// FindingLevel as expected, and a cure exactly where something is to be done.
 #[track_caller]
-fn expect(finding: &Finding, severity: Severity, says: &str) {
+fn expect(finding: &Finding, severity: FindingLevel, says: &str) {
     assert_eq!(finding.severity, severity, "{finding:?}");
     assert!(finding.what.contains(says), "{finding:?}");
-    if severity >= Severity::Warning {
+    if severity >= FindingLevel::Warning {
         assert!(!finding.cure.is_empty(), "no cure: {finding:?}");
     }
-    if severity == Severity::Good {
+    if severity == FindingLevel::Good {
         assert!(finding.cure.is_empty(), "a cure for what is well: {finding:?}");
     }
 }
@@ -56,45 +56,45 @@ fn expect(finding: &Finding, severity: Severity, says: &str) {
 #[test]
 fn hypervisor_is_known_by_flag_vendor_or_kernel_and_bare_metal_is_bare() {
     let bare = Fake::new().with("proc/cpuinfo", CPUINFO);
-    expect(&bare.see(kernel::hypervisor), Severity::Good, "bare metal");
+    expect(&bare.see(kernel::hypervisor), FindingLevel::Good, "bare metal");
     let flagged = CPUINFO.replace("sse2", "sse2 hypervisor");
     let kvm = Fake::new()
         .with("proc/cpuinfo", &flagged)
         .with(CLOCKS, "tsc kvm-clock\n");
-    expect(&kvm.see(kernel::hypervisor), Severity::Blocker, "KVM");
+    expect(&kvm.see(kernel::hypervisor), FindingLevel::Blocker, "KVM");
     let unknown = Fake::new().with("proc/cpuinfo", &flagged);
-    expect(&unknown.see(kernel::hypervisor), Severity::Blocker, "unknown make");
+    expect(&unknown.see(kernel::hypervisor), FindingLevel::Blocker, "unknown make");
     let xen = Fake::new().with("sys/hypervisor/type", "xen\n");
-    expect(&xen.see(kernel::hypervisor), Severity::Blocker, "xen");
+    expect(&xen.see(kernel::hypervisor), FindingLevel::Blocker, "xen");
     let vendor = Fake::new()
         .with("sys/class/dmi/id/sys_vendor", "VMware, Inc.\n")
         .with("sys/class/dmi/id/product_name", "VMware7,1\n");
-    expect(&vendor.see(kernel::hypervisor), Severity::Blocker, "VMware");
+    expect(&vendor.see(kernel::hypervisor), FindingLevel::Blocker, "VMware");
     let laptop = Fake::new()
         .with("sys/class/dmi/id/sys_vendor", "Microsoft Corporation\n")
         .with("sys/class/dmi/id/product_name", "Surface Laptop\n");
-    expect(&laptop.see(kernel::hypervisor), Severity::Good, "bare metal");
+    expect(&laptop.see(kernel::hypervisor), FindingLevel::Good, "bare metal");
     // A host that can run guests names kvm-clock nowhere, and lacks the flag.
     let host = Fake::new()
         .with("proc/cpuinfo", CPUINFO)
         .with(CLOCKS, "tsc hpet acpi_pm\n");
-    expect(&host.see(kernel::hypervisor), Severity::Good, "bare metal");
+    expect(&host.see(kernel::hypervisor), FindingLevel::Good, "bare metal");
 }
 
 #[test]
-fn preemption_model_is_read_where_the_kernel_tells_it() {
+fn preemption_model_is_read_where_the_kernel_reports_it() {
     let version = |words: &str| format!("Linux version 6.12 (x@y) #1 SMP {words} @0\n");
     let real = Fake::new().with("sys/kernel/realtime", "1\n");
-    expect(&real.see(kernel::preemption), Severity::Good, "PREEMPT_RT");
+    expect(&real.see(kernel::preemption), FindingLevel::Good, "PREEMPT_RT");
     let named = Fake::new().with("proc/version", &version("PREEMPT_RT"));
-    expect(&named.see(kernel::preemption), Severity::Good, "PREEMPT_RT");
+    expect(&named.see(kernel::preemption), FindingLevel::Good, "PREEMPT_RT");
     // The debug file wins over how the kernel was built.
     let running = Fake::new()
         .with("proc/version", &version("PREEMPT_DYNAMIC"))
         .with(RELEASE, "6.12-x\n")
         .with("boot/config-6.12-x", "CONFIG_PREEMPT_NONE=y\n")
         .with("sys/kernel/debug/sched/preempt", "none voluntary (full) lazy\n");
-    expect(&running.see(kernel::preemption), Severity::Warning, "full");
+    expect(&running.see(kernel::preemption), FindingLevel::Warning, "full");
     let built = Fake::new()
         .with("proc/version", &version("PREEMPT_DYNAMIC"))
         .with(RELEASE, "6.12-x\n")
@@ -103,15 +103,15 @@ fn preemption_model_is_read_where_the_kernel_tells_it() {
             "# CONFIG_PREEMPT is not set\nCONFIG_PREEMPT_NONE=y\n",
         );
     let finding = built.see(kernel::preemption);
-    expect(&finding, Severity::Warning, "PREEMPT_NONE");
+    expect(&finding, FindingLevel::Warning, "PREEMPT_NONE");
     assert!(finding.cure.contains("linux-image-rt-amd64") && finding.cure.contains("echo full"));
     let asked = Fake::new()
         .with("proc/version", &version("PREEMPT_DYNAMIC"))
         .with("proc/cmdline", "quiet preempt=voluntary\n");
-    expect(&asked.see(kernel::preemption), Severity::Warning, "voluntary");
+    expect(&asked.see(kernel::preemption), FindingLevel::Warning, "voluntary");
     let silent = Fake::new().with("proc/version", &version(""));
     let finding = silent.see(kernel::preemption);
-    expect(&finding, Severity::Warning, "not told");
+    expect(&finding, FindingLevel::Warning, "not reported");
     assert!(
         !finding.cure.contains("echo full"),
         "a kernel that cannot be switched: {}",
@@ -126,10 +126,14 @@ fn throttling_is_well_near_the_default_only() {
             .with("proc/sys/kernel/sched_rt_runtime_us", runtime)
             .with("proc/sys/kernel/sched_rt_period_us", "1000000\n")
     };
-    expect(&with("950000\n").see(kernel::throttling), Severity::Good, "95 %");
-    expect(&with("300000\n").see(kernel::throttling), Severity::Warning, "30 %");
-    expect(&with("-1\n").see(kernel::throttling), Severity::Note, "off");
-    expect(&Fake::new().see(kernel::throttling), Severity::Note, "does not tell");
+    expect(&with("950000\n").see(kernel::throttling), FindingLevel::Good, "95 %");
+    expect(&with("300000\n").see(kernel::throttling), FindingLevel::Warning, "30 %");
+    expect(&with("-1\n").see(kernel::throttling), FindingLevel::Note, "off");
+    expect(
+        &Fake::new().see(kernel::throttling),
+        FindingLevel::Note,
+        "does not report",
+    );
 }
 
 #[test]
@@ -141,29 +145,37 @@ fn control_group_without_a_share_blocks_real_time() {
             .with("proc/self/cgroup", "4:memory:/\n3:cpu,cpuacct:/user.slice\n")
             .with("sys/fs/cgroup/cpu/user.slice/cpu.rt_runtime_us", share)
     };
-    expect(&grouped("0\n").see(kernel::groups), Severity::Blocker, "no share");
-    expect(&grouped("950000\n").see(kernel::groups), Severity::Good, "950000 us");
+    expect(&grouped("0\n").see(kernel::groups), FindingLevel::Blocker, "no share");
+    expect(
+        &grouped("950000\n").see(kernel::groups),
+        FindingLevel::Good,
+        "950000 us",
+    );
     let plain = Fake::new()
         .with(RELEASE, "6.12-x\n")
         .with("boot/config-6.12-x", "CONFIG_SMP=y\n");
-    expect(&plain.see(kernel::groups), Severity::Good, "no share of its own");
+    expect(&plain.see(kernel::groups), FindingLevel::Good, "no share of its own");
     let unified = grouped("0\n").with("proc/self/cgroup", "0::/user.slice\n");
-    expect(&unified.see(kernel::groups), Severity::Good, "no control group");
+    expect(&unified.see(kernel::groups), FindingLevel::Good, "no control group");
 }
 
 #[test]
 fn slow_time_source_is_named() {
     expect(
         &Fake::new().with(CLOCK, "tsc\n").see(kernel::time_source),
-        Severity::Good,
+        FindingLevel::Good,
         "tsc",
     );
     expect(
         &Fake::new().with(CLOCK, "hpet\n").see(kernel::time_source),
-        Severity::Warning,
+        FindingLevel::Warning,
         "hpet",
     );
-    expect(&Fake::new().see(kernel::time_source), Severity::Note, "does not tell");
+    expect(
+        &Fake::new().see(kernel::time_source),
+        FindingLevel::Note,
+        "does not report",
+    );
 }
 
 /// `/proc/self/limits` with these values.
@@ -185,22 +197,22 @@ fn user(priority: &str, lock: &str, capabilities: &str) -> Fake {
 fn priority_comes_from_the_limit_or_the_capability() {
     let none = "0000000000000000";
     let finding = user("0", "8388608", none).see(rights::priority);
-    expect(&finding, Severity::Blocker, "up to 0");
+    expect(&finding, FindingLevel::Blocker, "up to 0");
     assert!(finding.cure.contains("limits.d/stylet.conf") && finding.cure.contains("setcap"));
     expect(
         &user("79", "8388608", none).see(rights::priority),
-        Severity::Blocker,
+        FindingLevel::Blocker,
         "up to 79",
     );
     expect(
         &user("90", "8388608", none).see(rights::priority),
-        Severity::Good,
+        FindingLevel::Good,
         "up to 90",
     );
     // Bit 23 alone.
     expect(
         &user("0", "0", "0000000000800000").see(rights::priority),
-        Severity::Good,
+        FindingLevel::Good,
         "CAP_SYS_NICE",
     );
 }
@@ -210,23 +222,23 @@ fn memory_lock_comes_from_the_limit_or_the_capability() {
     let none = "0000000000000000";
     expect(
         &user("90", "8388608", none).see(rights::memory_lock),
-        Severity::Blocker,
+        FindingLevel::Blocker,
         "only 8 MiB",
     );
     expect(
         &user("90", "unlimited", none).see(rights::memory_lock),
-        Severity::Good,
+        FindingLevel::Good,
         "all memory",
     );
     expect(
         &user("90", "1073741824", none).see(rights::memory_lock),
-        Severity::Good,
+        FindingLevel::Good,
         "1024 MiB",
     );
     // Bit 14 alone.
     expect(
         &user("0", "0", "0000000000004000").see(rights::memory_lock),
-        Severity::Good,
+        FindingLevel::Good,
         "CAP_IPC_LOCK",
     );
 }
@@ -234,28 +246,28 @@ fn memory_lock_comes_from_the_limit_or_the_capability() {
 #[test]
 fn one_core_is_too_few() {
     let with = |list: &str| Fake::new().with("sys/devices/system/cpu/online", list);
-    expect(&with("0\n").see(cores::count), Severity::Blocker, "one core");
-    expect(&with("0-1\n").see(cores::count), Severity::Note, "2 cores");
-    expect(&with("0-3,8-11\n").see(cores::count), Severity::Good, "8 cores");
-    expect(&Fake::new().see(cores::count), Severity::Note, "does not tell");
+    expect(&with("0\n").see(cores::count), FindingLevel::Blocker, "one core");
+    expect(&with("0-1\n").see(cores::count), FindingLevel::Note, "2 cores");
+    expect(&with("0-3,8-11\n").see(cores::count), FindingLevel::Good, "8 cores");
+    expect(&Fake::new().see(cores::count), FindingLevel::Note, "does not report");
 }
 
 #[test]
 fn isolation_names_the_core_and_the_boot_options() {
     let open = Fake::new().with("sys/devices/system/cpu/isolated", "\n");
     let finding = open.see(|m| cores::isolation(m, 3));
-    expect(&finding, Severity::Warning, "core 3 is open");
+    expect(&finding, FindingLevel::Warning, "core 3 is open");
     assert!(finding.cure.contains("isolcpus=managed_irq,domain,3 nohz_full=3"));
     let isolated = Fake::new()
         .with("sys/devices/system/cpu/isolated", "2-3\n")
         .with("sys/devices/system/cpu/nohz_full", "3\n");
     expect(
         &isolated.see(|m| cores::isolation(m, 3)),
-        Severity::Good,
+        FindingLevel::Good,
         "without a periodic tick",
     );
     let ticking = isolated.see(|m| cores::isolation(m, 2));
-    expect(&ticking, Severity::Good, "core 2");
+    expect(&ticking, FindingLevel::Good, "core 2");
     assert!(!ticking.what.contains("periodic"));
 }
 
@@ -270,7 +282,7 @@ fn interrupts_on_our_core_are_named_and_irqbalance_is_seen() {
             .with("proc/irq/25/smp_affinity_list", "0-1\n")
     };
     let finding = machine().see(|m| cores::interrupts(m, 1));
-    expect(&finding, Severity::Warning, "25 eth0");
+    expect(&finding, FindingLevel::Warning, "25 eth0");
     assert!(
         !finding.what.contains("acpi") && finding.cure.contains("echo 0 "),
         "{finding:?}"
@@ -279,14 +291,14 @@ fn interrupts_on_our_core_are_named_and_irqbalance_is_seen() {
     let moved = machine().with("proc/irq/25/effective_affinity_list", "0\n");
     expect(
         &moved.see(|m| cores::interrupts(m, 1)),
-        Severity::Good,
+        FindingLevel::Good,
         "no device interrupt",
     );
     let balanced = machine()
         .with("proc/irq/25/effective_affinity_list", "0\n")
         .with("proc/812/comm", "irqbalance\n");
     let finding = balanced.see(|m| cores::interrupts(m, 1));
-    expect(&finding, Severity::Warning, "irqbalance");
+    expect(&finding, FindingLevel::Warning, "irqbalance");
     assert!(finding.cure.contains("disable --now irqbalance"));
 }
 
@@ -294,20 +306,20 @@ fn interrupts_on_our_core_are_named_and_irqbalance_is_seen() {
 fn sibling_threads_are_named() {
     let path = "sys/devices/system/cpu/cpu1/topology/thread_siblings_list";
     let alone = Fake::new().with(path, "1\n");
-    expect(&alone.see(|m| cores::siblings(m, 1)), Severity::Good, "no other");
+    expect(&alone.see(|m| cores::siblings(m, 1)), FindingLevel::Good, "no other");
     let shared = Fake::new().with(path, "1,5\n");
-    expect(&shared.see(|m| cores::siblings(m, 1)), Severity::Warning, "with 5");
+    expect(&shared.see(|m| cores::siblings(m, 1)), FindingLevel::Warning, "with 5");
 }
 
 #[test]
 fn governor_must_be_performance() {
     let path = "sys/devices/system/cpu/cpu1/cpufreq/scaling_governor";
     let with = |governor: &str| Fake::new().with(path, governor).see(|m| cores::governor(m, 1));
-    expect(&with("performance\n"), Severity::Good, "full speed");
-    expect(&with("powersave\n"), Severity::Warning, "powersave");
+    expect(&with("performance\n"), FindingLevel::Good, "full speed");
+    expect(&with("powersave\n"), FindingLevel::Warning, "powersave");
     expect(
         &Fake::new().see(|m| cores::governor(m, 1)),
-        Severity::Note,
+        FindingLevel::Note,
         "no frequency scaling",
     );
 }
@@ -322,13 +334,17 @@ fn deep_sleep_states_matter_where_nothing_forbids_them() {
     };
     let deep = || state(state(Fake::new(), 0, "POLL\n", "0\n", "0\n"), 1, "C6\n", "133\n", "0\n");
     let see = |fake: Fake| fake.see(|m| cores::sleep_states(m, 1));
-    expect(&see(deep()), Severity::Warning, "C6 133 us");
+    expect(&see(deep()), FindingLevel::Warning, "C6 133 us");
     let forbidden = see(deep().with("dev/cpu_dma_latency", ""));
-    expect(&forbidden, Severity::Note, "rt-core forbids it");
+    expect(&forbidden, FindingLevel::Note, "rt-core forbids it");
     assert!(!forbidden.what.contains("POLL"));
     let off = state(Fake::new().with("dev/cpu_dma_latency", ""), 1, "C6\n", "133\n", "1\n");
-    expect(&see(off), Severity::Good, "no deep sleep state");
-    expect(&see(Fake::new()), Severity::Note, "there is no /dev/cpu_dma_latency");
+    expect(&see(off), FindingLevel::Good, "no deep sleep state");
+    expect(
+        &see(Fake::new()),
+        FindingLevel::Note,
+        "there is no /dev/cpu_dma_latency",
+    );
 }
 
 #[test]
@@ -336,12 +352,12 @@ fn swap_areas_are_named() {
     let head = "Filename\t\t\t\tType\t\tSize\t\tUsed\t\tPriority\n";
     expect(
         &Fake::new().with("proc/swaps", head).see(memory::swap),
-        Severity::Good,
+        FindingLevel::Good,
         "no swap",
     );
     let on = Fake::new().with("proc/swaps", &format!("{head}/dev/sda3  partition\t8388604\t0\t-2\n"));
     let finding = on.see(memory::swap);
-    expect(&finding, Severity::Note, "/dev/sda3");
+    expect(&finding, FindingLevel::Note, "/dev/sda3");
     assert!(finding.cure.contains("swapoff"));
 }
 
@@ -349,18 +365,18 @@ fn swap_areas_are_named() {
 fn huge_pages_without_asking_are_noted() {
     let path = "sys/kernel/mm/transparent_hugepage/enabled";
     let always = Fake::new().with(path, "[always] madvise never\n");
-    expect(&always.see(memory::huge_pages), Severity::Note, "by itself");
+    expect(&always.see(memory::huge_pages), FindingLevel::Note, "by itself");
     let asked = Fake::new().with(path, "always [madvise] never\n");
-    expect(&asked.see(memory::huge_pages), Severity::Good, "only where");
+    expect(&asked.see(memory::huge_pages), FindingLevel::Good, "only where");
 }
 
 #[test]
 fn full_shared_memory_blocks() {
     let here = Fake::new();
     let see = |free: Option<u64>| here.see(|m| shared::space(m, |_: &Path| free));
-    expect(&see(Some(300 << 20)), Severity::Good, "300 MiB");
-    expect(&see(Some(10 << 20)), Severity::Blocker, "only 10 MiB");
-    expect(&see(None), Severity::Blocker, "no /dev/shm");
+    expect(&see(Some(300 << 20)), FindingLevel::Good, "300 MiB");
+    expect(&see(Some(10 << 20)), FindingLevel::Blocker, "only 10 MiB");
+    expect(&see(None), FindingLevel::Blocker, "no /dev/shm");
     assert!(shared::free_bytes(&here.0).is_some_and(|bytes| bytes > 0));
     assert!(shared::free_bytes(&here.0.join("absent")).is_none());
 }
@@ -379,7 +395,7 @@ fn instance_without_a_program_is_stale() {
     let finding = one.see(shared::stale_services);
     expect(
         &finding,
-        Severity::Note,
+        FindingLevel::Note,
         "1 instances in /dev/shm that no program uses: stylet_0_main-2",
     );
     assert_eq!(
@@ -389,8 +405,12 @@ fn instance_without_a_program_is_stale() {
     let both = machine()
         .with("proc/77/maps", &maps("stylet_0_main_9204_x"))
         .with("proc/78/maps", &maps("stylet_0_main-2_9204_x"));
-    expect(&both.see(shared::stale_services), Severity::Good, "2 instances");
-    expect(&Fake::new().see(shared::stale_services), Severity::Good, "0 instances");
+    expect(&both.see(shared::stale_services), FindingLevel::Good, "2 instances");
+    expect(
+        &Fake::new().see(shared::stale_services),
+        FindingLevel::Good,
+        "0 instances",
+    );
 }
 
 fn nobody() -> Surroundings {
@@ -405,28 +425,28 @@ fn nobody() -> Surroundings {
 
 #[test]
 fn devices_are_known_by_their_vendor() {
-    expect(&Fake::new().see(devices::haptic), Severity::Note, "simulated");
+    expect(&Fake::new().see(devices::haptic), FindingLevel::Note, "simulated");
     let touch = Fake::new().with("sys/bus/usb/devices/1-2/idVendor", "2988\n");
-    expect(&touch.see(devices::haptic), Severity::Good, "USB 1-2");
+    expect(&touch.see(devices::haptic), FindingLevel::Good, "USB 1-2");
     let omni = Fake::new().with("sys/bus/firewire/devices/fw1/vendor", "0x000b99\n");
-    expect(&omni.see(devices::haptic), Severity::Good, "FireWire fw1");
+    expect(&omni.see(devices::haptic), FindingLevel::Good, "FireWire fw1");
     let mouse = Fake::new().with("sys/bus/usb/devices/1-2/idVendor", "046d\n");
-    expect(&mouse.see(devices::haptic), Severity::Note, "simulated");
+    expect(&mouse.see(devices::haptic), FindingLevel::Note, "simulated");
 }
 
 #[test]
-fn what_the_driver_lacks_is_told_and_weighs_more_where_a_device_is_connected() {
+fn what_the_driver_lacks_is_reported_and_weighs_more_where_a_device_is_connected() {
     let ecp = || Fake::new().with("proc/sys/dev/parport/parport0/modes", "PCSPP,TRISTATE,ECP\n");
     let port = |fake: &Fake| {
         let found = devices::driver(&Machine::at(&fake.0), &nobody());
         found
             .into_iter()
             .find(|f| f.what.contains("without EPP"))
-            .expect("told")
+            .expect("reported")
     };
-    expect(&port(&ecp()), Severity::Note, "without EPP");
+    expect(&port(&ecp()), FindingLevel::Note, "without EPP");
     let connected = ecp().with("sys/bus/usb/devices/1-2/idVendor", "2988\n");
-    expect(&port(&connected), Severity::Warning, "without EPP");
+    expect(&port(&connected), FindingLevel::Warning, "without EPP");
     assert!(port(&connected).cure.contains("BIOS"));
 }
 
@@ -438,7 +458,7 @@ fn worst_finding_decides_and_every_check_has_its_own_name() {
         assert!(findings[i + 1..].iter().all(|g| g.check != f.check), "{}", f.check);
     }
     assert!(verdict(&findings).starts_with("not fit"));
-    let well = [Finding::good("a", ""), Finding::new("b", Severity::Note, "", "")];
+    let well = [Finding::good("a", ""), Finding::new("b", FindingLevel::Note, "", "")];
     assert_eq!(verdict(&well), "fit");
     let text = text(&findings, 1);
     assert!(text.contains("BLOCKER  priority") && text.contains("-> "));

@@ -1,17 +1,42 @@
 //! Which tissue model a scene takes.
 
 /// The tissue models that a scene can choose.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TissueKind {
-    /// Restricted ChainMail: microseconds a tick, limits that always hold, no forces
+    /// Restricted ChainMail.
     #[default]
-    #[value(name = "chainmail")]
     ChainMail,
-    /// Linear elastic finite elements: millimetres and forces to be believed, for bodies of some 20,000 elements
+    /// Linear elastic finite elements.
     Fem,
 }
 
 impl TissueKind {
+    /// In the order of the help.
+    pub const ALL: [Self; 2] = [Self::ChainMail, Self::Fem];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            TissueKind::ChainMail => "chainmail",
+            TissueKind::Fem => "fem",
+        }
+    }
+
+    /// What it is good for, in one line.
+    pub fn help(self) -> &'static str {
+        match self {
+            TissueKind::ChainMail => "Restricted ChainMail: microseconds a tick, limits that always hold, no forces",
+            TissueKind::Fem => {
+                "Linear elastic finite elements: displacements and forces of the material, for bodies of up to 20,000 elements"
+            }
+        }
+    }
+
+    /// The model of that name.
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
     /// Edge of the tissue that moves as one piece with the tip. FEM needs one: the force on a single node goes to
     /// zero with the spacing.
     pub fn tip_patch_m(self) -> f64 {

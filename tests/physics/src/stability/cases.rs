@@ -406,11 +406,11 @@ fn not_a_number(kind: Kind) -> Option<(String, bool)> {
     let scene = block([8, 8, 8]);
     let element = middle(&scene);
     let mut model = kind.on(&scene, &TissueParameters::default());
-    let rubbish = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e30, -1e300];
+    let invalid = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e30, -1e300];
     let seen = drive(&mut *model, 50, TICK_S, |tick, body| {
         let mut held = held_at(body, element, [0.0, 0.0, 0.5]);
         if tick % 2 == 1 {
-            held.position_m[tick as usize % 3] = rubbish[tick as usize / 2 % rubbish.len()];
+            held.position_m[tick as usize % 3] = invalid[tick as usize / 2 % invalid.len()];
         }
         if tick == 48 {
             held.element = u32::MAX;

@@ -60,7 +60,7 @@ fn a_good_plan_has_no_problem_and_its_seeds_are_where_they_were_put() {
 }
 
 #[test]
-fn each_fault_is_told_once_and_all_together() {
+fn each_fault_is_reported_once_and_all_together() {
     let anatomy = anatomy();
     let one = |plan: ImplantPlan, words: &str| {
         let found = problems(&plan, &anatomy);

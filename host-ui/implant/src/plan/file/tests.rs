@@ -143,7 +143,7 @@ fn two_needles_through_one_hole_stay_two_in_a_table() {
 #[test]
 fn a_table_whose_needles_contradict_its_places_is_refused() {
     let csv = seeds_to_csv(&plan(), &frames());
-    for (from, to, told) in [
+    for (from, to, reported) in [
         (",2,I9", ",1,E7", "needle 1: its seeds are not on one line"),
         (",2,I9", ",2,J9", "needle 2: its seeds are 5.0 mm beside hole J9"),
         (",2,I9", ",2,Z9", "needle 2: \"Z9\" is no hole"),
@@ -151,6 +151,6 @@ fn a_table_whose_needles_contradict_its_places_is_refused() {
         (",2,I9", ",two,I9", "needle is \"two\""),
     ] {
         let why = imported("wrong", &csv.replace(from, to)).unwrap_err().to_string();
-        assert!(why.contains(told), "{told}: {why}");
+        assert!(why.contains(reported), "{reported}: {why}");
     }
 }
