@@ -255,7 +255,7 @@ fn a_closed_mesh_is_the_same_body_as_its_formula() {
     assert!((half - 0.5).abs() < 1e-3, "{half}");
 
     triangles.pop();
-    assert!(Mesh::new(&points, &triangles).is_err_and(|e| e.contains("not closed")));
+    assert!(Mesh::new(&points, &triangles).is_err_and(|e| e.to_string().contains("not closed")));
     assert!(Mesh::new(&points, &[[0, 1, 9_999_999]]).is_err());
 }
 

@@ -199,7 +199,7 @@ fn phase(parameters: &NeedleParameters, state: &NeedleState, input: &NeedleInput
 /// trembling tip then sum to nothing. The depth past `u_cri` does not count below zero.
 ///
 /// ```
-/// use crate::needle::{NeedleParameters, Phase, transmission};
+/// use stylet_sim::needle::{NeedleParameters, Phase, transmission};
 /// let p = NeedleParameters::default();
 /// let deep = p.puncture_depth_m + p.depth_coefficient_m2.sqrt();
 /// assert_eq!(transmission(Phase::Contraction, 0.5, 1e-3, &p), 1.0);

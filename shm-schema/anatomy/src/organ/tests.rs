@@ -134,7 +134,7 @@ fn dicom_writers_get_the_type_that_they_got() {
     }
 }
 
-/// `dose/report.rs`, `metrics`; `dose_desk.rs`, `Judged::of`; `score/dose_cost.rs`, `is_urethra`.
+/// `dose/report.rs`, `metrics`; the dose in the window; `score/dose_cost.rs`, `is_urethra`.
 #[test]
 fn dose_finds_urethra_and_rectum_where_it_did() {
     for name in NAMES {

@@ -17,8 +17,8 @@
 //! neither stays at rest unless it is held.
 //!
 //! ```
-//! use crate::scene::Scene;
-//! use crate::tissue::fem::{FemModel, FemSettings, FemState, Material, SolveSettings, TipPatch, step};
+//! use stylet_sim::scene::Scene;
+//! use stylet_sim::tissue::fem::{FemModel, FemSettings, FemState, Material, SolveSettings, TipPatch, step};
 //!
 //! let lattice = Scene::builtin("paper").unwrap().lattice;
 //! let model = FemModel::<f32>::new(&lattice, &FemSettings::homogeneous(Material::PROSTATE, 3e5)).unwrap();
