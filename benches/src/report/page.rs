@@ -103,7 +103,7 @@ fn choices(text: &mut String, found: &Findings) -> std::fmt::Result {
     if let Some(p) = fastest_within(Family::Fem, 1.0) {
         writeln!(
             text,
-            "- **Forces and millimetres that are to be believed:** FEM, f32, {}: {:.0} us a tick on average, p99 {:.0} us, {:.2} % off in the \
+            "- **Accurate forces and displacements:** FEM, f32, {}: {:.0} us a tick on average, p99 {:.0} us, {:.2} % off in the \
              worst insertion.",
             p.setting, p.mean_us, p.worst_p99_us, p.worst_rms_percent
         )?;

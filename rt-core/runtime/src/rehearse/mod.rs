@@ -92,7 +92,7 @@ pub struct Stage {
 impl Stage {
     /// Builds the scene anew, apart from the one that runs.
     pub fn build(source: &SceneSource, tissue: TissueKind, device: DeviceInfo) -> Result<Self, String> {
-        let mut scene = source.build()?;
+        let mut scene = source.build().map_err(|e| e.to_string())?;
         scene.tissue = tissue;
         let active = activate(&ParameterSet::default(), &device).map_err(|p| p.to_string())?;
         let world = World::new(scene, active.limits, 1)?;

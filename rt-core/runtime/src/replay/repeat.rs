@@ -122,7 +122,7 @@ fn is_same(record: &TickRecord, entry: &HapticEntry) -> bool {
 
 /// The tissue chain: response and held element of each tick, and every element's position at each checkpoint.
 pub fn tissue(flight: &Flight, recorded: &TissueFlight) -> Result<Repeated, String> {
-    let scene = recorded.scene.build()?;
+    let scene = recorded.scene.build().map_err(|e| e.to_string())?;
     let world = || World::new(scene.clone(), recorded.memory.limits.clone(), 1).map(Box::new);
     let reference = world()?;
     if reference.tissue.memory_len() != recorded.memory.body.len() {

@@ -7,7 +7,7 @@ pub enum TissueKind {
     #[default]
     #[value(name = "chainmail")]
     ChainMail,
-    /// Linear elastic finite elements: millimetres and forces to be believed, for bodies of some 20,000 elements
+    /// Linear elastic finite elements: displacements and forces of the material, for bodies of up to 20,000 elements
     Fem,
 }
 
