@@ -73,21 +73,27 @@ fn replay(reader: &str, read: fn(&[u8]) -> Option<String>) {
 #[test]
 fn nifti() {
     replay("nifti", |b| {
-        files::nifti::read(b, files::Sink::labels(&files::Progress::default())).err()
+        files::nifti::read(b, files::Sink::labels(&files::Progress::default()))
+            .err()
+            .map(|why| why.to_string())
     });
 }
 
 #[test]
 fn nrrd() {
     replay("nrrd", |b| {
-        files::nrrd::read(b, &|_| Ok(b.to_vec()), files::Sink::labels(&files::Progress::default())).err()
+        files::nrrd::read(b, &|_| Ok(b.to_vec()), files::Sink::labels(&files::Progress::default()))
+            .err()
+            .map(|why| why.to_string())
     });
 }
 
 #[test]
 fn metaimage() {
     replay("metaimage", |b| {
-        files::metaimage::read(b, &|_| Ok(b.to_vec()), files::Sink::labels(&files::Progress::default())).err()
+        files::metaimage::read(b, &|_| Ok(b.to_vec()), files::Sink::labels(&files::Progress::default()))
+            .err()
+            .map(|why| why.to_string())
     });
 }
 
@@ -97,20 +103,28 @@ fn structures() {
         files::dicom::read(b)
             .and_then(|o| files::dicom::structures::read(&o, None))
             .err()
+            .map(|why| why.to_string())
     });
 }
 
 #[test]
 fn plan() {
     replay("plan", |b| {
-        files::dicom::read(b).and_then(|o| files::dicom::plan::of(&o)).err()
+        files::dicom::read(b)
+            .and_then(|o| files::dicom::plan::of(&o))
+            .err()
+            .map(|why| why.to_string())
+            .map(|why| why.to_string())
     });
 }
 
 #[test]
 fn image() {
     replay("image", |b| {
-        files::dicom::read(b).err().or(files::dicom::image_geometry(b).err())
+        files::dicom::read(b)
+            .err()
+            .or(files::dicom::image_geometry(b).err())
+            .map(|why| why.to_string())
     });
 }
 
@@ -119,7 +133,7 @@ fn scene() {
     replay("scene", |b| {
         std::str::from_utf8(b)
             .map_err(|e| e.to_string())
-            .and_then(files::scene::parse)
+            .and_then(|text| files::scene::parse(text).map_err(|e| e.to_string()))
             .err()
     });
 }

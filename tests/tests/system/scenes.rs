@@ -257,7 +257,10 @@ fn volumes_that_cannot_be_used_get_one_refusal_with_every_reason_and_the_scene_g
     let before = link.scene().expect("live").header;
     let mut sender = Sender::new(&core);
     let cases: &[Case<'_>] = &[
-        (&["[20, 18, 16] cells by its header but 5759 were received"], &|_, cells| cells.truncate(5759)),
+        (
+            &["[20, 18, 16] cells by its header but 5759 were received"],
+            &|_, cells| cells.truncate(5759),
+        ),
         (&["300 structures, at most 255", "transform to the patient"], &|h, _| {
             (h.structure_count, h.patient_from_scene[3]) = (300, f64::NAN);
         }),

@@ -1,6 +1,6 @@
 //! Sees a tip that shakes: turns that follow each other more quickly than a hand means to turn.
 //!
-//! A loop whose link is later than it should be shakes a stuck shaft between its limits. No energy account tells
+//! A loop whose link is later than it should be shakes a stuck shaft between its limits. No energy account shows it
 //! at once, since the lateness is not known; the turns do.
 
 use serde::{Deserialize, Serialize};
@@ -13,7 +13,7 @@ const TURNS: u32 = 3;
 /// A turn is a way back of so many encoder steps.
 const STEPS: f64 = 1.5;
 
-/// Of one tip along its path.
+/// Turns of one tip along its path.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ChatterState {
     /// Farthest place since the last turn; `None` before the first sample.

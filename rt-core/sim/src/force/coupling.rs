@@ -1,6 +1,6 @@
 //! Coupled mode: the tissue's answer of 200 Hz, carried on at 1 kHz.
 //!
-//! The tissue loop says what force its body answered with, to which travel of the held element, and how
+//! The tissue loop reports the force of its body, the travel of the held element that it answers to, and how
 //! stiffly it would answer more. The haptic loop knows that travel at 1 kHz, so the force between two answers
 //! follows to first order. What an answer then corrects is blended in over one tissue period: no staircase.
 
@@ -14,7 +14,7 @@ pub struct LocalResponse {
     pub tick: u64,
     /// Travel of the held element since the loop began that the body has answered to.
     pub travel_m: Vector3<f64>,
-    /// Of the held element from rest.
+    /// Displacement of the held element from rest, m.
     pub displacement_m: Vector3<f64>,
     /// Force on the needle, before the force scale, where the body knows forces.
     pub force_n: Option<Vector3<f64>>,

@@ -60,7 +60,7 @@ pub struct GateInput {
 pub struct GateOutput {
     /// Within every limit.
     pub wrench: Wrench,
-    /// Whether the force law has a say.
+    /// Whether the device gives the force of the law.
     pub engaged: bool,
     /// Why the force goes to zero.
     pub fault: Option<ForceFault>,

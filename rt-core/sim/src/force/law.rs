@@ -164,7 +164,7 @@ pub fn guide_torque(parameters: &ForceParameters, input: &ForceInput, axis: &Vec
     input.needle_direction.cross(axis) * (parameters.guide_torque_nm_per_rad * parameters.guide_gain)
 }
 
-/// Second part of eq. 9, `K_V V`: against the velocity. A whole membrane lets go of a tip that leaves it
+/// Second part of eq. 9, `K_V V`: against the velocity. A whole membrane releases a tip that leaves it
 /// rather than hold it back, so there the damping takes no more than the membrane gives.
 pub fn damping(
     parameters: &ForceParameters,

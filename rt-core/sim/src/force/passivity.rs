@@ -4,7 +4,7 @@
 //! measured displacement is exact, if it is known when the force began to act. A link may be late by some
 //! ticks and does not say so: the work is booked for each possible lateness, and the worst account counts.
 //! An account holds no more than what the springs of the force law hold now, and a margin: what was
-//! dissipated is gone, and cannot pay for a later instability. What rounding the position may have hidden is not
+//! dissipated cannot pay for a later instability. What rounding the position may have hidden is not
 //! held against the simulator: half an encoder step times the change of the force.
 
 use nalgebra::Vector3;
@@ -87,7 +87,7 @@ pub struct Motion {
     pub moved_m: Vector3<f64>,
     /// Filtered.
     pub velocity_m_per_s: Vector3<f64>,
-    /// Of the encoders.
+    /// Step of the encoders, m.
     pub position_step_m: f64,
     /// Time since the last tick, s.
     pub dt_s: f64,

@@ -85,7 +85,7 @@ impl Layer {
         self.puncture_depth_m > 0.0
     }
 
-    /// Of the membrane before it gives way; 0 without one.
+    /// Stiffness of the membrane before it gives way; 0 without one.
     pub fn membrane_stiffness_n_per_m(&self) -> f64 {
         if self.has_membrane() {
             self.puncture_force_n / self.puncture_depth_m

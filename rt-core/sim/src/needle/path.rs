@@ -42,7 +42,7 @@ pub struct Front {
 }
 
 impl NeedlePath {
-    /// Out of all of them; what was announced before stays old news.
+    /// Leaves all sections; numbers announced before stay known.
     pub fn clear(&mut self) {
         self.count = 0;
     }
@@ -63,7 +63,7 @@ impl NeedlePath {
     }
 
     /// The tip has met `kind` at `entry_m`. Numbers rise; an old one changes nothing.
-    /// Gives whether it was news.
+    /// Returns whether the number is new.
     pub fn meet(&mut self, layers: &Layers, kind: LayerKind, number: u64, entry_m: f64) -> bool {
         if number <= self.seen || !entry_m.is_finite() {
             return false;

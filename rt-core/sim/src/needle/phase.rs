@@ -27,7 +27,7 @@ pub struct NeedleParameters {
 
 impl Default for NeedleParameters {
     /// A capsule that gives way at 8 mm, tissue that follows for about 14 mm behind it, and the mean clinical tip
-    /// speed (48 mm/s) well below where haste shows.
+    /// speed (48 mm/s) well below the speed at which the tissue follows less.
     fn default() -> Self {
         Self {
             puncture_depth_m: 8e-3,
@@ -210,10 +210,10 @@ pub fn transmission(phase: Phase, speed_m_per_s: f64, depth_m: f64, parameters: 
         Phase::Outside => 0.0,
         Phase::Contraction => 1.0,
         Phase::Penetration => {
-            let haste = (speed_m_per_s - parameters.static_speed_m_per_s).max(0.0);
+            let excess = (speed_m_per_s - parameters.static_speed_m_per_s).max(0.0);
             let past = (depth_m - parameters.puncture_depth_m).max(0.0);
-            let exponent =
-                haste * haste / parameters.speed_coefficient_m2_per_s2 + past * past / parameters.depth_coefficient_m2;
+            let exponent = excess * excess / parameters.speed_coefficient_m2_per_s2
+                + past * past / parameters.depth_coefficient_m2;
             (-exponent).exp()
         }
         Phase::Retraction => parameters.retraction_ratio,

@@ -1,9 +1,9 @@
-//! Two coarse grids over a body at rest: what is where, and where its displacements are told to the hosts.
+//! Two coarse grids over a body at rest: labels of its cells, and nodes at which hosts get its displacements.
 
 use super::Lattice;
 use stylet_shm_schema::{GridInfo, MAX_LABEL_CELLS, MAX_NODES};
 
-/// Nodes at which displacements are told, each with the element that speaks for it.
+/// Nodes at which displacements are published, each with the element that stands for it.
 #[derive(Clone, Debug)]
 pub struct NodeGrid {
     /// Place and size of the grid.
@@ -131,7 +131,7 @@ mod tests {
     use crate::tissue::{ChainMailTissue, Held, TissueModel};
 
     #[test]
-    fn every_node_speaks_for_the_nearest_element_and_bounds_hold() {
+    fn every_node_stands_for_the_nearest_element_and_bounds_hold() {
         for name in stylet_shm_schema::BUILTIN_SCENES {
             let lattice = Scene::builtin(name).expect("built in").lattice;
             let grid = NodeGrid::of(&lattice);
@@ -153,14 +153,14 @@ mod tests {
                     .collect();
                 let cell = [0, 1, 2].map(|a| (place[a] / lattice.spacing_m) as usize);
                 if let Some(here) = lattice.element_of_cell(cell[0], cell[1], cell[2]) {
-                    assert_eq!(element, here, "a node in tissue speaks for the element it lies in");
+                    assert_eq!(element, here, "a node in tissue stands for the element it lies in");
                 }
             }
         }
     }
 
     #[test]
-    fn nodes_tell_how_far_their_elements_have_moved() {
+    fn displacements_at_nodes_are_those_of_their_elements() {
         let scene = Scene::builtin("paper").expect("built in");
         let limits = TissueParameters::default().validate().expect("defaults");
         let mut tissue = ChainMailTissue::new(&scene, limits);
@@ -173,40 +173,40 @@ mod tests {
         };
         tissue.step(Some(held), 5e-3);
         let body = tissue.deformed();
-        let mut told = vec![[f32::NAN; 3]; scene.nodes.elements.len()];
-        body.write_displacements(&scene.nodes.elements, &mut told);
-        for (told, &element) in told.iter().zip(&scene.nodes.elements) {
+        let mut displacements_m = vec![[f32::NAN; 3]; scene.nodes.elements.len()];
+        body.write_displacements(&scene.nodes.elements, &mut displacements_m);
+        for (displacements_m, &element) in displacements_m.iter().zip(&scene.nodes.elements) {
             let (now, rest) = (body.position_m(element), scene.lattice.rest_m(element));
             for a in 0..3 {
-                assert!((f64::from(told[a]) - (now[a] - rest[a])).abs() < 1e-8);
+                assert!((f64::from(displacements_m[a]) - (now[a] - rest[a])).abs() < 1e-8);
             }
         }
-        assert!(told.iter().any(|u| u[2] > 4e-3), "the body has moved");
+        assert!(displacements_m.iter().any(|u| u[2] > 4e-3), "the body has moved");
     }
 
-    /// `cargo test --release -p rt-core --lib times_of_telling -- --ignored --nocapture`
+    /// `cargo test --release -p stylet-sim --lib time_to_write_displacements -- --ignored --nocapture`
     #[test]
     #[ignore = "a measurement"]
-    fn times_of_telling() {
+    fn time_to_write_displacements() {
         for name in stylet_shm_schema::BUILTIN_SCENES {
             let scene = Scene::builtin(name).expect("built in");
             let limits = TissueParameters::default().validate().expect("defaults");
             let mut tissue = ChainMailTissue::new(&scene, limits);
-            let mut told = vec![[0.0; 3]; scene.nodes.elements.len()];
+            let mut displacements_m = vec![[0.0; 3]; scene.nodes.elements.len()];
             let mut times_us: Vec<f64> = (0..1000)
                 .map(|_| {
                     // As in the loop, other memory is touched in between.
                     tissue.step(None, 5e-3);
                     let body = tissue.deformed();
                     let start = std::time::Instant::now();
-                    body.write_displacements(&scene.nodes.elements, &mut told);
+                    body.write_displacements(&scene.nodes.elements, &mut displacements_m);
                     start.elapsed().as_secs_f64() * 1e6
                 })
                 .collect();
             times_us.sort_by(f64::total_cmp);
             println!(
                 "{name}: {} nodes, p50 {:.1} us, p99 {:.1} us",
-                told.len(),
+                displacements_m.len(),
                 times_us[500],
                 times_us[990]
             );

@@ -60,7 +60,7 @@ pub struct Scene {
     pub lattice: Arc<Lattice>,
     /// Triangles over the body and its parts.
     pub surface: Surface,
-    /// Where its displacements are told to the hosts.
+    /// Nodes at which hosts get its displacements.
     pub nodes: NodeGrid,
     /// What computes where its elements are.
     pub tissue: TissueKind,
@@ -96,6 +96,7 @@ impl Scene {
             tissue: TissueKind::default(),
         })
     }
+
     /// Box around the targets at rest; around the whole body where there is none.
     pub fn target_bounds_m(&self) -> ([f64; 3], [f64; 3]) {
         let extents = self.lattice.extents(self.structures.len());

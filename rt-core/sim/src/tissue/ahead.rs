@@ -13,7 +13,7 @@ const CLOSE: f64 = 0.1;
 /// The first element other than `held` on the way of a tip that goes on by `step_m` in each tick. Where nothing is held
 /// the body is taken to be at rest.
 ///
-/// Bounded: it looks at a few places, from each of which it walks a few elements.
+/// Bounded: it tries a few places, and walks a few elements from each.
 pub fn element_ahead(body: &Deformed, held: Option<u32>, tip_m: [f64; 3], step_m: [f64; 3]) -> Option<u32> {
     let length = step_m.iter().map(|c| c * c).sum::<f64>().sqrt();
     if !(length > 0.0 && length.is_finite()) {

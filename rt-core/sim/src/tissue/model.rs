@@ -26,7 +26,7 @@ pub enum HeldOutcome {
     None,
     /// It is where it was asked to be.
     Followed,
-    /// Fixed tissue let it go only part of the way.
+    /// Fixed tissue stopped it part of the way.
     Limited,
     /// Not finite, out of reach, or no such element; the step only recovered.
     Refused,

@@ -3,6 +3,7 @@
 use stylet_hw::{Device, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
 
 use super::*;
+use crate::force::{ForceParameters, LocalResponse};
 
 const DT_S: f64 = 1e-3;
 

@@ -33,7 +33,7 @@ impl ForceFault {
     }
 }
 
-/// How often each limit had a say, in the order of the gate.
+/// How often each limit acted, in the order of the gate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct GateCounts {
     /// Forces that were not finite.

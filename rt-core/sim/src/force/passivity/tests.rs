@@ -93,7 +93,7 @@ fn credit_is_no_more_than_springs_hold_and_nonsense_books_nothing() {
     step(&parameters, &mut state, &motion(f64::NAN), f64::NAN, &Vector3::zeros());
     assert_eq!(state.accounts_j[0], 0.015);
     step(&parameters, &mut state, &motion(0.0), 0.0, &Vector3::zeros());
-    assert_eq!(state.accounts_j[0], parameters.margin_j, "the springs let go");
+    assert_eq!(state.accounts_j[0], parameters.margin_j, "the springs hold nothing");
 }
 
 #[test]

@@ -53,10 +53,10 @@ mod times {
     use crate::scene::{Lattice, Scene, Surface};
     use std::time::Instant;
 
-    /// `cargo test --release -p rt-core --lib times_of_cutting -- --ignored --nocapture`
+    /// `cargo test --release -p stylet-sim --lib time_to_cut -- --ignored --nocapture`
     #[test]
     #[ignore = "a measurement"]
-    fn times_of_cutting() {
+    fn time_to_cut() {
         for name in stylet_shm_schema::BUILTIN_SCENES {
             for _ in 0..3 {
                 let start = Instant::now();

@@ -33,7 +33,7 @@ impl Pass<'_> {
         moved
     }
 
-    /// Sees to links `from..end` of a run upward, from `from` to `reach` or as far as something moves.
+    /// Handles links `from..end` of a run upward, from `from` to `reach` or as far as something moves.
     #[inline(always)]
     fn up<K: Kernels>(&mut self, span: &Span, [from, end, reach]: [usize; 3]) -> Stretch {
         let l = self.limits(span.class, 0);
@@ -65,7 +65,7 @@ impl Pass<'_> {
         moved
     }
 
-    /// Sees to links `start..end` of a run downward, from `end` to `reach` or as far as something moves.
+    /// Handles links `start..end` of a run downward, from `end` to `reach` or as far as something moves.
     #[inline(always)]
     fn down<K: Kernels>(&mut self, span: &Span, [start, end, reach]: [usize; 3]) -> Stretch {
         let l = self.limits(span.class, 0);

@@ -22,7 +22,7 @@ pub(super) fn grip(model: &ChainMail, held: Option<Held>) -> (Option<Grip>, Held
     let (rest, h) = (model.lattice.rest_m(held.element), model.lattice.spacing_m);
     let at = [0, 1, 2].map(|a| (held.position_m[a] - rest[a]) / h);
     let known = (held.element as usize) < model.element_count();
-    // Centres within half the edge; a hair more, as the quotient may be a whole number.
+    // Centres within half the edge; slightly more, as the quotient may be a whole number.
     let beside = 0.5 * held.patch_m / h + 1e-6;
     if !known || !at.iter().all(|c| c.abs() <= REACH) || !(0.0..=REACH).contains(&beside) {
         return (None, HeldOutcome::Refused);

@@ -136,10 +136,10 @@ mod tests {
         let mut body = ChainMailTissue::new(&scene, limits);
         // Stretches of one element each, none of them in its own run.
         let words: Vec<u32> = (0..body.memory_len() as u32 / 4).collect();
-        let rubbish: &[u8] = bytemuck::cast_slice(&words);
-        body.load(rubbish);
+        let invalid: &[u8] = bytemuck::cast_slice(&words);
+        body.load(invalid);
         assert!(body.step(None, 5e-3).converged);
-        body.load(&rubbish[4..]);
+        body.load(&invalid[4..]);
         assert!(body.step(None, 5e-3).converged);
     }
 }

@@ -32,7 +32,7 @@ pub(super) fn half_pass<K: RowSprings>(
                         Some(weights) => K::relax(u, segment, &shares(relaxation, component, weights)),
                     }
                 }
-                // At once, before the next segment of the row looks at it.
+                // At once, before the next segment of the row reads it.
                 if let Some(grip) = grip {
                     held::put_row(model, state, grip, [j, k]);
                 }

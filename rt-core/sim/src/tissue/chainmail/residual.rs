@@ -1,4 +1,4 @@
-//! What a pass leaves outside the limits: looks at links that moved, and says what stays active.
+//! What a pass leaves outside the limits: verifies links that moved, and finds what stays active.
 
 use super::kernels::{self, Kernels, Stretch};
 use super::spans::Span;
@@ -83,7 +83,7 @@ impl Pass<'_> {
         self.worst / self.rest
     }
 
-    /// Checks the links along z that moved after they were seen to, and those along y.
+    /// Checks the links along z that moved after they were handled, and those along y.
     #[inline(always)]
     pub fn check_late<K: Kernels>(&mut self, [y, z]: [(&[Span], Option<Inner>); 2], row: usize) {
         let mut worst = 0.0_f32;

@@ -7,7 +7,7 @@ use super::segments::{LEFT, RIGHT, Segment};
 #[derive(Clone, Copy)]
 pub(super) struct Shares {
     pub own: f32,
-    /// Of the neighbours below and above along x, y, z.
+    /// Shares of the neighbours below and above along x, y, z.
     pub of: [[f32; 2]; 3],
 }
 

@@ -19,7 +19,7 @@ pub struct TissueState {
     pub(crate) next: Active,
     /// What the solver has moved in this step.
     pub(crate) moved: Active,
-    /// Moved in a row after its links along z, and after those along y, were seen to; for the row under way.
+    /// Moved in a row after its links along z, and after those along y, were handled; for the row under way.
     pub(crate) late: [Vec<Stretch>; 2],
     /// Largest square of a displacement in each run and each plane, in the unit of `u`.
     pub(super) run_square: Vec<f32>,
@@ -27,7 +27,7 @@ pub struct TissueState {
     pub(crate) max_displacement: f32,
     /// Largest violation of a link that is not active, at most, in elements.
     pub(crate) settled: f32,
-    /// What the last step left violated, in elements; infinite where nobody knows.
+    /// What the last step left violated, in elements; infinite where it is unknown.
     pub(super) residual: f32,
     trial: Trial,
 }

@@ -68,7 +68,7 @@ impl<'a> Pass<'a> {
             self.plane::<K>(k, Some(Inner::Above));
         }
         if self.model.classes.any_fixed() {
-            // Inner elements have moved too, whose links were already seen to.
+            // Inner elements have moved too, whose links were already handled.
             self.check::<K>()
         } else {
             self.finish()
@@ -108,7 +108,7 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// Sees to the links of a row with its inner neighbours and in itself; whether anything in it is active.
+    /// Handles the links of a row with its inner neighbours and in itself; returns whether anything in it is active.
     #[inline(always)]
     fn row<K: Kernels>(&mut self, j: usize, k: usize, inner_y: Option<Inner>, inner_z: Option<Inner>) -> bool {
         let model = self.model;

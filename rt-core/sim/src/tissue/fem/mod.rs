@@ -13,7 +13,7 @@
 //! changes, the present displacement is the first guess of the new response: that tick is the costly one, unless idle ticks
 //! before have prepared the patch (`prepare`).
 //!
-//! *Foundation.* The surroundings are springs to rest on all free faces (`foundation_pa_per_m`), fixed structures. A part of the body that has
+//! *Foundation.* The surroundings are springs to rest on all free faces (`foundation_pa_per_m`) and fixed structures. A part of the body that has
 //! neither stays at rest unless it is held.
 //!
 //! ```

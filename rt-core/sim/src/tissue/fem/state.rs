@@ -8,7 +8,7 @@ use super::sweep::touched;
 /// Displacements of all elements, and what the solver keeps from tick to tick.
 #[derive(Clone, Debug)]
 pub struct FemState<T = f32> {
-    /// Of the element centres, in elements.
+    /// Displacement of the element centres, in elements.
     pub(super) displacement: [Vec<f32>; 3],
     pub(super) max_displacement: f32,
     /// The patch that is held.

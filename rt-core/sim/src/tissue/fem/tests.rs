@@ -13,6 +13,7 @@ mod ahead;
 mod golden;
 mod locking;
 mod operator;
+mod refusals;
 mod step;
 
 const EXACT: SolveSettings = SolveSettings {
@@ -56,5 +57,14 @@ fn two_materials(lattice: &Lattice, contrast: f64, foundation_pa_per_m: f64) -> 
         structures: vec![Structure::Elastic(soft), Structure::Elastic(stiff)],
         structure_of: (0..lattice.element_count() as u32).map(structure).collect(),
         foundation_pa_per_m,
+    }
+}
+
+fn patch(lattice: &Lattice, element: u32, by_m: [f64; 3], edge_m: f64) -> TipPatch {
+    let rest = lattice.rest_m(element);
+    TipPatch {
+        element,
+        position_m: [0, 1, 2].map(|a| rest[a] + by_m[a]),
+        edge_m,
     }
 }

@@ -76,7 +76,7 @@ fn body_held_still_comes_to_the_equilibrium_of_its_springs() {
         ("stiff layer", stiff_layer),
         ("bone", test_bodies::bone()),
     ];
-    // The stiff layer rests on soft ground: its slowest mode needs tens of thousands of passes.
+    // The stiff layer rests on a soft foundation: its slowest mode needs tens of thousands of passes.
     let p = TissueParameters {
         relaxation_iterations: 200,
         ..elastic()

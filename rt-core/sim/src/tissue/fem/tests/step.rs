@@ -4,15 +4,6 @@ use super::*;
 use nalgebra::{DMatrix, DVector};
 use stylet_heap as heap;
 
-fn patch(lattice: &Lattice, element: u32, by_m: [f64; 3], edge_m: f64) -> TipPatch {
-    let rest = lattice.rest_m(element);
-    TipPatch {
-        element,
-        position_m: [0, 1, 2].map(|a| rest[a] + by_m[a]),
-        edge_m,
-    }
-}
-
 /// Nodes by place, and the dense matrix of a model with springs, column by column from unit displacements.
 fn dense(model: &FemModel<f64>) -> (Vec<usize>, DMatrix<f64>) {
     use crate::tissue::fem::smooth::Product;
@@ -295,79 +286,4 @@ fn steps_make_no_heap_calls_and_give_the_same_bytes() {
         [0, 1, 2].map(|a| state.displacement(a).iter().map(|v| v.to_bits()).collect::<Vec<_>>())
     };
     assert!(run() == run());
-}
-
-#[test]
-fn what_cannot_be_followed_is_refused_and_changes_nothing() {
-    let lattice = block([6, 6, 6], 1.5e-3);
-    let model = FemModel::<f32>::new(&lattice, &two_materials(&lattice, 2.0, 1e5)).expect("valid");
-    let mut state = FemState::at_rest(&model);
-    let settings = SolveSettings {
-        relative_tolerance: 1e-4,
-        max_cycles: 40,
-    };
-    let good = patch(&lattice, 100, [0.0, 0.0, 1e-3], 2e-3);
-    assert!(step(&model, &mut state, Some(good), &settings).converged);
-    let before: Vec<Vec<f32>> = (0..3).map(|a| state.displacement(a).to_vec()).collect();
-    let bad = [
-        TipPatch { element: 216, ..good },
-        TipPatch {
-            edge_m: f64::NAN,
-            ..good
-        },
-        TipPatch { edge_m: -1.0, ..good },
-        TipPatch {
-            edge_m: f64::INFINITY,
-            ..good
-        },
-        TipPatch {
-            position_m: [f64::NAN, 0.0, 0.0],
-            ..good
-        },
-        TipPatch {
-            position_m: [0.0, f64::INFINITY, 0.0],
-            ..good
-        },
-        TipPatch {
-            position_m: [0.0, 0.0, 10.0],
-            ..good
-        },
-    ];
-    for held in bad {
-        let report = step(&model, &mut state, Some(held), &settings);
-        assert_eq!(report.held, HeldOutcome::Refused, "{held:?}");
-        assert!(!report.converged);
-        assert!((0..3).all(|a| state.displacement(a) == before[a]));
-    }
-    let other = FemModel::<f32>::new(
-        &block([5, 5, 5], 1.5e-3),
-        &FemSettings::homogeneous(Material::PROSTATE, 1e5),
-    );
-    let report = step(&other.expect("valid"), &mut state, Some(good), &settings);
-    assert_eq!(report.held, HeldOutcome::Refused);
-    assert!(step(&model, &mut state, Some(good), &settings).converged);
-}
-
-#[test]
-fn every_problem_with_the_settings_is_listed() {
-    let lattice = block([2, 2, 2], 1.5e-3);
-    let bad = Material {
-        youngs_modulus_pa: f64::NAN,
-        poisson_ratio: 0.5,
-        integration: FULL,
-    };
-    let settings = FemSettings {
-        structures: vec![Structure::Elastic(bad)],
-        structure_of: vec![0, 0, 1],
-        foundation_pa_per_m: -1.0,
-    };
-    let problems = FemModel::<f32>::new(&lattice, &settings).expect_err("five problems");
-    assert_eq!(problems.len(), 5, "{problems:?}");
-    let none = FemSettings {
-        structures: Vec::new(),
-        ..FemSettings::homogeneous(Material::PROSTATE, 0.0)
-    };
-    let problems = FemModel::<f32>::new(&lattice, &none).expect_err("no structure");
-    assert_eq!(problems, [FemProblem::NoStructures]);
-    assert!(problems[0].to_string().contains("at least 1"));
 }
