@@ -5,7 +5,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use stylet_lab::args::LatencyArgs;
-use stylet_lab::load::Work;
+use stylet_lab::load::LoadProcess;
 use stylet_runtime::args::{OptionsError, RealTimeArgs, scenes};
 use stylet_runtime::device::{self, DeviceChoice};
 use stylet_runtime::process::Options;
@@ -58,7 +58,7 @@ pub enum Task {
     #[command(hide = true)]
     Load {
         /// What to do
-        work: Work,
+        work: LoadProcess,
         /// Instance under measurement
         #[arg(long)]
         instance: String,

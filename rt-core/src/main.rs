@@ -48,7 +48,7 @@ fn stop_on_signal() -> Result<Arc<AtomicBool>, Box<dyn Error>> {
     Ok(stop)
 }
 
-fn serve_as_load(work: load::Work, instance: &str, file: &std::path::Path) -> Result<(), Box<dyn Error>> {
+fn serve_as_load(work: load::LoadProcess, instance: &str, file: &std::path::Path) -> Result<(), Box<dyn Error>> {
     follow_parent();
     let instance = Instance::new(instance)?;
     let stop = stop_on_signal()?;

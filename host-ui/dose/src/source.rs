@@ -169,7 +169,7 @@ fn in_m(cm: &[f64]) -> Vec<f64> {
     cm.iter().map(|r| r * M_PER_CM).collect()
 }
 
-/// `None` when the two do not fit, which the reader has told already.
+/// `None` when the two do not fit, which the reader has reported already.
 fn curve(radii_cm: &[f64], values: Vec<f64>) -> Option<Curve> {
     (!values.is_empty() && values.len() == radii_cm.len()).then(|| Curve {
         at: in_m(radii_cm),

@@ -70,7 +70,7 @@ impl Element {
     }
 }
 
-/// How many voxels a header claims, when that can be believed at all.
+/// How many voxels a header claims, when that is plausible at all.
 pub fn voxel_count(dims: &[u64]) -> Result<usize, ContentError> {
     let size = || dims.iter().map(u64::to_string).collect::<Vec<_>>().join(" x ");
     if dims.contains(&0) {
@@ -103,7 +103,7 @@ pub fn must_hold(needed: u64, have: u64, packed: bool) -> Result<(), ContentErro
     )))
 }
 
-/// What a reader makes of each number, and whom it tells how far it is.
+/// What a reader makes of each number, and to whom it reports its progress.
 #[derive(Clone, Copy, Debug)]
 pub struct Sink<'a, V> {
     made_of: fn(f64) -> Result<V, ContentError>,

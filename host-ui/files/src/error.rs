@@ -100,12 +100,12 @@ mod tests {
     #[test]
     fn messages_are_bounded_and_hold_no_escape_sequence() {
         let long = format!("\u{1b}[31mred\u{9b}2J {}", "x".repeat(50_000_000));
-        let told = FileError::of(Path::new("a.csv"), long).to_string();
+        let shown = FileError::of(Path::new("a.csv"), long).to_string();
         assert!(
-            told.starts_with("a.csv: [31mred2J xx") && told.len() < 5000,
+            shown.starts_with("a.csv: [31mred2J xx") && shown.len() < 5000,
             "{}",
-            told.len()
+            shown.len()
         );
-        assert!(told.ends_with("xx..."));
+        assert!(shown.ends_with("xx..."));
     }
 }

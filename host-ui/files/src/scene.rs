@@ -1,4 +1,4 @@
-//! Scene files (TOML): a volume, what its structures are made of, needle, device and plan; every problem is told at once.
+//! Scene files (TOML): a volume, what its structures are made of, needle, device and plan; all problems are reported at once.
 
 mod keys;
 
@@ -38,7 +38,7 @@ pub enum Pick {
     Name(String),
 }
 
-/// One structure of the scene; what is not said comes from its name.
+/// One structure of the scene; omitted fields are inferred from its name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
     pub pick: Pick,

@@ -33,7 +33,7 @@ pub enum Load {
 
 /// One process of a load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Work {
+pub enum LoadProcess {
     /// Computes in registers
     Cpu,
     /// Streams 64 MiB through memory
@@ -45,18 +45,18 @@ pub enum Work {
 }
 
 impl Load {
-    fn work(self, cores: usize) -> Vec<Work> {
-        let some = |work: Work, count: usize| std::iter::repeat_n(work, count);
+    fn work(self, cores: usize) -> Vec<LoadProcess> {
+        let some = |work: LoadProcess, count: usize| std::iter::repeat_n(work, count);
         match self {
             Self::None | Self::Window => Vec::new(),
-            Self::Cpu => some(Work::Cpu, cores).collect(),
-            Self::Memory => some(Work::Memory, cores).collect(),
-            Self::Io => some(Work::Io, 2).collect(),
-            Self::Ui => vec![Work::Ui],
-            Self::All => some(Work::Cpu, cores)
-                .chain(some(Work::Memory, cores))
-                .chain(some(Work::Io, 2))
-                .chain([Work::Ui])
+            Self::Cpu => some(LoadProcess::Cpu, cores).collect(),
+            Self::Memory => some(LoadProcess::Memory, cores).collect(),
+            Self::Io => some(LoadProcess::Io, 2).collect(),
+            Self::Ui => vec![LoadProcess::Ui],
+            Self::All => some(LoadProcess::Cpu, cores)
+                .chain(some(LoadProcess::Memory, cores))
+                .chain(some(LoadProcess::Io, 2))
+                .chain([LoadProcess::Ui])
                 .collect(),
         }
     }
@@ -67,12 +67,12 @@ impl Load {
             return "the operator's window, drawing without a pause".to_owned();
         }
         let all = self.work(cores);
-        let count = |work: Work| all.iter().filter(|w| **w == work).count();
+        let count = |work: LoadProcess| all.iter().filter(|w| **w == work).count();
         let parts = [
-            (count(Work::Cpu), "computing"),
-            (count(Work::Memory), "streaming 64 MiB through memory"),
-            (count(Work::Io), "writing 4 MiB and syncing"),
-            (count(Work::Ui), "copying all that is published"),
+            (count(LoadProcess::Cpu), "computing"),
+            (count(LoadProcess::Memory), "streaming 64 MiB through memory"),
+            (count(LoadProcess::Io), "writing 4 MiB and syncing"),
+            (count(LoadProcess::Ui), "copying all that is published"),
         ];
         let said: Vec<String> = parts
             .iter()
@@ -158,16 +158,16 @@ impl Drop for Running {
 ///
 /// # Errors
 /// `file` cannot be written, or the shared memory of `instance` cannot be opened; the text is for people.
-pub fn work(kind: Work, instance: &Instance, file: &Path, stopped: impl Fn() -> bool) -> Result<(), String> {
+pub fn work(kind: LoadProcess, instance: &Instance, file: &Path, stopped: impl Fn() -> bool) -> Result<(), String> {
     match kind {
-        Work::Cpu => compute(stopped),
-        Work::Memory => stream(stopped),
-        Work::Io => {
+        LoadProcess::Cpu => compute(stopped),
+        LoadProcess::Memory => stream(stopped),
+        LoadProcess::Io => {
             let ended = write_and_sync(file, stopped).map_err(|e| format!("{}: {e}", file.display()));
             let _ = std::fs::remove_file(file);
             ended?;
         }
-        Work::Ui => copy_all(instance, stopped).map_err(|e| e.to_string())?,
+        LoadProcess::Ui => copy_all(instance, stopped).map_err(|e| e.to_string())?,
     }
     Ok(())
 }
@@ -281,7 +281,7 @@ mod tests {
             passes.get() > 2
         };
         let instance = Instance::default();
-        work(Work::Io, &instance, &file, stopped).expect("the temporary folder can be written");
+        work(LoadProcess::Io, &instance, &file, stopped).expect("the temporary folder can be written");
         assert_eq!(seen.get(), 4 << 20);
         assert!(!file.exists());
     }

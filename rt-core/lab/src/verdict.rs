@@ -88,7 +88,7 @@ impl LimitSpec {
         self.default * scale
     }
 
-    /// The one limit that must not be undercut.
+    /// The one limit that is a lower bound.
     fn is_lower_bound(&self) -> bool {
         matches!(self.reading, Reading::StiffnessMargin(_))
     }

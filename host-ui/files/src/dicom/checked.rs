@@ -38,7 +38,7 @@ fn is_bare(bytes: &[u8]) -> bool {
     bytes.len() > 132 && bytes[..2] == [8, 0] && matches!(bytes[2..4], [0x00 | 0x01 | 0x05 | 0x08 | 0x12 | 0x16, 0])
 }
 
-/// Where the data set begins and how it is written; of a bare file two letters tell.
+/// Where the data set begins and how it is written; in a bare file two letters show which.
 fn syntax(bytes: &[u8]) -> Result<(Syntax, usize), ContentError> {
     if has_preamble(bytes) {
         let (uid, from) = transfer_syntax(bytes)?;
@@ -245,7 +245,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// `None` for a length that is told by a mark at the end.
+    /// `None` for a length that a mark at the end gives.
     fn end_of(&self, head: &Head, end: usize) -> Result<Option<usize>, ContentError> {
         if head.length == UNDEFINED {
             return Ok(None);

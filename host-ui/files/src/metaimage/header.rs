@@ -1,4 +1,4 @@
-//! The lines before the data of a MetaImage file, checked; every problem is told.
+//! The lines before the data of a MetaImage file, checked; every problem is reported.
 
 use super::super::element::{Element, Endian, short};
 use crate::error::ContentError;

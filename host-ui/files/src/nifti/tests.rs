@@ -12,7 +12,7 @@ struct Temp(PathBuf);
 
 impl Drop for Temp {
     fn drop(&mut self) {
-        let _gone = std::fs::remove_file(&self.0);
+        let _removed = std::fs::remove_file(&self.0);
     }
 }
 
@@ -122,7 +122,7 @@ fn any_cut_and_any_flipped_byte_is_an_answer_and_no_panic() {
 }
 
 #[test]
-fn a_label_is_picked_and_a_wrong_one_is_told_what_there_is() {
+fn a_label_is_picked_and_a_wrong_one_is_answered_with_what_there_is() {
     let temp = file("labels.nii", &small());
     let all = read(&temp.0, None).unwrap();
     assert_eq!(all.tissue_elements(), 48);

@@ -1,4 +1,4 @@
-//! The text before the data of an NRRD file, checked field by field; every problem is told.
+//! The text before the data of an NRRD file, checked field by field; every problem is reported.
 
 use super::super::element::{Element, Endian, short};
 use super::{Pairs, element};

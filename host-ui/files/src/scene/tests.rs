@@ -65,7 +65,7 @@ fn structures_are_found_by_name_or_label_and_made_of_what_the_file_says() {
 }
 
 #[test]
-fn every_problem_of_a_scene_file_is_told_at_once() {
+fn every_problem_of_a_scene_file_is_reported_at_once() {
     let wrong = r#"
 nmae = "x"
 [volume]
@@ -108,7 +108,7 @@ name = 7
 }
 
 #[test]
-fn structures_that_the_volume_has_not_are_told_together() {
+fn structures_that_the_volume_has_not_are_reported_together() {
     let scene = parse("[volume]\nfile = \"a\"\n[[structure]]\nname = \"Bladder\"\n[[structure]]\nlabel = 9\n[[structure]]\nlabel = 1\n[[structure]]\nname = \"prostate\"").unwrap();
     let why = scene.tissues(&voxels()).unwrap_err().to_string();
     assert!(why.contains("no structure \"Bladder\"; it has Prostate"), "{why}");

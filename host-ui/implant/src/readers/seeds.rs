@@ -8,7 +8,7 @@ use stylet_files::{FileError, bytes};
 
 const MAX_U: f64 = 1e5;
 const AXIS: [&str; 3] = ["axis_x", "axis_y", "axis_z"];
-/// As many bytes as tell a DICOM file from a table.
+/// Number of bytes that distinguish a DICOM file from a table.
 const START_BYTES: u64 = 160;
 
 /// What is assumed of seeds whose file does not say it.

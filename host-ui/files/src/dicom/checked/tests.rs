@@ -34,7 +34,7 @@ fn why(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn a_cut_anywhere_is_an_answer_and_a_cut_inside_of_an_element_is_told() {
+fn a_cut_anywhere_is_an_answer_and_a_cut_inside_of_an_element_is_reported() {
     let good = good();
     assert!(read(&good).and_then(|o| of(&o)).is_ok());
     let refused = (0..good.len()).filter(|&n| read(&good[..n]).is_err()).count();
@@ -80,7 +80,7 @@ fn an_old_file_that_begins_with_its_first_element_is_read_too() {
 }
 
 #[test]
-fn a_kind_of_value_that_there_is_not_and_a_foreign_syntax_are_told() {
+fn a_kind_of_value_that_there_is_not_and_a_foreign_syntax_are_reported() {
     let good = good();
     let mut bent = good.clone();
     let at = good.windows(2).rposition(|w| w == b"DS").unwrap();

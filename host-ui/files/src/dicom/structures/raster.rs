@@ -26,13 +26,13 @@ struct Run {
 
 /// What was done so far; a file may not ask for any amount.
 #[derive(Default)]
-struct Work {
+struct Scratch {
     crossings: f64,
     voxels: usize,
     runs: usize,
 }
 
-impl Work {
+impl Scratch {
     fn check(&self) -> Result<(), ContentError> {
         if self.crossings <= MAX_CROSSINGS && self.voxels <= MAX_VOXELS_TOUCHED && self.runs <= MAX_RUNS {
             return Ok(());
@@ -46,13 +46,13 @@ impl Work {
 
 /// The labels 1, 2, ... of the structures in their order, and what they took from each other in words.
 pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<String>), ContentError> {
-    let mut work = Work::default();
+    let mut scratch = Scratch::default();
     let mut all = Vec::new();
     for structure in structures {
-        all.push(runs(structure, grid, &mut work)?);
+        all.push(runs(structure, grid, &mut scratch)?);
     }
-    work.voxels += all.iter().flatten().map(|r| (r.to - r.from) as usize).sum::<usize>();
-    work.check()?;
+    scratch.voxels += all.iter().flatten().map(|r| (r.to - r.from) as usize).sum::<usize>();
+    scratch.check()?;
     let sizes: Vec<usize> = all
         .iter()
         .map(|runs| runs.iter().map(|r| (r.to - r.from) as usize).sum())
@@ -95,7 +95,7 @@ pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<Str
 /// Corners of polygons in columns and rows.
 type Polygons = Vec<Vec<[f64; 2]>>;
 
-fn runs(structure: &Contoured, grid: &Grid, work: &mut Work) -> Result<Vec<Run>, ContentError> {
+fn runs(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec<Run>, ContentError> {
     let planes = planes(structure, grid)?;
     let heights: Vec<f64> = planes.iter().map(|(h, _)| *h).collect();
     let mut runs = Vec::new();
@@ -109,11 +109,11 @@ fn runs(structure: &Contoured, grid: &Grid, work: &mut Work) -> Result<Vec<Run>,
         );
         for slice in first as usize..last.max(0.0) as usize {
             if covered.is_none() {
-                covered = Some(fill(&plane.1, [grid.dims[0], grid.dims[1]], work)?);
+                covered = Some(fill(&plane.1, [grid.dims[0], grid.dims[1]], scratch)?);
             }
             let covered = covered.as_deref().unwrap_or_default();
-            work.runs += covered.len();
-            work.check()?;
+            scratch.runs += covered.len();
+            scratch.check()?;
             let base = (slice * grid.dims[1]) as u32;
             runs.extend(covered.iter().map(|r| Run {
                 row: base + r.row,
@@ -173,12 +173,12 @@ pub fn slabs(heights: &[f64], single: f64) -> Vec<[f64; 2]> {
 }
 
 /// Even and odd: what lies in two contours of a plane is a hole, and so is what a keyhole leads to.
-fn fill(polygons: &Polygons, [columns, rows]: [usize; 2], work: &mut Work) -> Result<Vec<Run>, ContentError> {
+fn fill(polygons: &Polygons, [columns, rows]: [usize; 2], scratch: &mut Scratch) -> Result<Vec<Run>, ContentError> {
     let mut crossed: Vec<(u32, f64)> = Vec::new();
     for polygon in polygons {
         let next = polygon.iter().cycle().skip(1);
         for (a, b) in polygon.iter().zip(next) {
-            cross(*a, *b, rows, &mut crossed, work)?;
+            cross(*a, *b, rows, &mut crossed, scratch)?;
         }
     }
     crossed.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
@@ -188,8 +188,8 @@ fn fill(polygons: &Polygons, [columns, rows]: [usize; 2], work: &mut Work) -> Re
         for line in of_row.chunk_by(|a, b| a.0 == b.0) {
             covered.add_line(line);
         }
-        work.voxels += covered.touched.len();
-        work.check()?;
+        scratch.voxels += covered.touched.len();
+        scratch.check()?;
         covered.take_row(of_row[0].0 / LINES as u32, &mut runs);
     }
     Ok(runs)
@@ -201,15 +201,15 @@ fn cross(
     b: [f64; 2],
     rows: usize,
     crossed: &mut Vec<(u32, f64)>,
-    work: &mut Work,
+    scratch: &mut Scratch,
 ) -> Result<(), ContentError> {
     let (low, high) = if a[1] <= b[1] { (a, b) } else { (b, a) };
     let line_of = |y: f64| (y + 0.5) * LINES as f64 - 0.5;
     let most = (rows * LINES) as f64;
     let first = line_of(low[1]).ceil().clamp(0.0, most);
     let last = line_of(high[1]).ceil().clamp(0.0, most);
-    work.crossings += last - first;
-    work.check()?;
+    scratch.crossings += last - first;
+    scratch.check()?;
     for line in first as usize..last as usize {
         let y = (line as f64 + 0.5) / LINES as f64 - 0.5;
         let share = (y - low[1]) / (high[1] - low[1]);

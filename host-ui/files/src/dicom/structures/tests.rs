@@ -98,7 +98,7 @@ fn a_cylinder_has_its_volume_and_its_hole_is_no_part_of_it() {
 }
 
 #[test]
-fn what_lies_inside_of_a_structure_has_its_own_label_and_the_user_is_told() {
+fn what_lies_inside_of_a_structure_has_its_own_label_and_the_user_is_reported() {
     let grid = grid([60, 60, 5], [0.5, 0.5, 2.0]);
     let gland: Vec<_> = (0..5)
         .map(|k| circle(&grid, f64::from(k), [15.0, 15.0], 10.0))

@@ -12,7 +12,7 @@ use dicom_object::InMemDicomObject;
 use nalgebra::Vector3;
 use stylet_anatomy::{Organ, ras_from_lps};
 
-/// Told apart on a dark ground.
+/// Distinct on a dark background.
 const COLOURS: [[u8; 3]; 8] = [
     [230, 75, 60],
     [240, 200, 60],
