@@ -29,12 +29,12 @@ fn peak_kib() -> u64 {
 }
 
 /// Each file as it is, cut at every 64th, with bytes turned and with runs of ones as sizes are.
-fn replay(reader: &str, read: fn(&[u8]) -> Option<String>) {
+fn replay(reader: &str, read: fn(&[u8]) -> Option<files::ContentError>) {
     let before = peak_kib();
     let (mut runs, mut refused) = (0, 0);
     let mut take = |bytes: &[u8]| {
         runs += 1;
-        if let Some(why) = read(bytes) {
+        if let Some(why) = read(bytes).map(|why| why.to_string()) {
             refused += 1;
             assert!(
                 !why.trim().is_empty() && why.len() < 20_000,
@@ -118,7 +118,7 @@ fn image() {
 fn scene() {
     replay("scene", |b| {
         std::str::from_utf8(b)
-            .map_err(|e| e.to_string())
+            .map_err(|e| e.to_string().into())
             .and_then(files::scene::parse)
             .err()
     });

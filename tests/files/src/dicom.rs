@@ -180,7 +180,8 @@ fn plans_of_pydicom_are_read_with_place_direction_and_strength() {
     let why = dicom::read(&bytes)
         .and_then(|o| plan::of(&o))
         .map(|p| p.label)
-        .expect_err("refused");
+        .expect_err("refused")
+        .to_string();
     assert!(why.contains("only permanent implants are read"), "{why}");
 }
 

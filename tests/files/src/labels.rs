@@ -123,13 +123,13 @@ fn a_header_reaches_no_file_outside_of_its_folder() {
         std::fs::write(&path, text.replace("itk_detached.raw", name)).expect("written");
         let why = files::read_voxels(&path, &files::Progress::default())
             .expect_err(name)
-            .0;
+            .to_string();
         assert!(why.contains("only a file in the same folder"), "{name}: {why}");
     }
     let path = out.join("header.mhd");
     std::fs::write(&path, text.replace("itk_detached.raw", "missing.raw")).expect("written");
     let why = files::read_voxels(&path, &files::Progress::default())
         .expect_err("missing")
-        .0;
+        .to_string();
     assert!(why.contains("missing.raw: it cannot be opened"), "{why}");
 }
