@@ -3,7 +3,9 @@
 /// Values over rising arguments.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
+    /// Places, rising.
     pub at: Vec<f64>,
+    /// Values at these places.
     pub values: Vec<f64>,
 }
 
@@ -31,7 +33,9 @@ impl Curve {
 /// A table over two rising arguments, rows by the first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
+    /// Places of the rows, rising.
     pub rows_at: Vec<f64>,
+    /// Places of the columns, rising.
     pub columns_at: Vec<f64>,
     /// Row by row.
     pub values: Vec<f64>,

@@ -5,6 +5,7 @@ const SECONDS_PER_DAY: f64 = 86_400.0;
 /// When dose is counted, from the time to which the strength refers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
+    /// Begin after the implant, in s.
     pub from_s: f64,
     /// Infinite for all that a permanent seed ever gives.
     pub to_s: f64,
@@ -17,6 +18,7 @@ impl Interval {
         to_s: f64::INFINITY,
     };
 
+    /// From one day after the implant to another.
     pub fn days(from: f64, to: f64) -> Self {
         Self {
             from_s: from * SECONDS_PER_DAY,
@@ -37,10 +39,12 @@ pub fn left_after(elapsed_s: f64, half_life_s: f64) -> f64 {
     (-elapsed_s / half_life_s).exp2()
 }
 
+/// Seconds from days.
 pub fn days_to_s(days: f64) -> f64 {
     days * SECONDS_PER_DAY
 }
 
+/// Days from seconds.
 pub fn s_to_days(s: f64) -> f64 {
     s / days_to_s(1.0)
 }

@@ -17,7 +17,9 @@ pub struct Dvh {
 /// One line of a differential histogram.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bin {
+    /// Lower edge of the bin, in Gy.
     pub from_gy: f64,
+    /// Upper edge of the bin, in Gy.
     pub to_gy: f64,
     /// Volume with a dose in the bin.
     pub volume_m3: f64,
@@ -45,18 +47,22 @@ impl Dvh {
         })
     }
 
+    /// Volume of the structure, in m³.
     pub fn volume_m3(&self) -> f64 {
         self.volume_m3
     }
 
+    /// Mean dose, in Gy.
     pub fn mean_gy(&self) -> f64 {
         self.mean_gy
     }
 
+    /// Highest dose, in Gy.
     pub fn highest_gy(&self) -> f64 {
         self.dose_gy[0]
     }
 
+    /// Lowest dose, in Gy.
     pub fn lowest_gy(&self) -> f64 {
         self.dose_gy[self.dose_gy.len() - 1]
     }

@@ -18,6 +18,7 @@ pub struct DoseGrid {
 }
 
 impl DoseGrid {
+    /// A grid without dose; an error for voxels without a size or for too many of them.
     pub fn new(origin_m: [f64; 3], spacing_m: [f64; 3], dims: [usize; 3]) -> Result<Self, DoseError> {
         let voxels = dims.iter().try_fold(1_usize, |n, &d| n.checked_mul(d));
         if !origin_m.iter().chain(&spacing_m).all(|v| v.is_finite()) || spacing_m.iter().any(|&h| h <= 0.0) {
@@ -45,10 +46,12 @@ impl DoseGrid {
         Self::new(low_m, [spacing_m; 3], dims)
     }
 
+    /// Voxels along x, y, z.
     pub fn dims(&self) -> [usize; 3] {
         self.dims
     }
 
+    /// Sides of a voxel, in m.
     pub fn spacing_m(&self) -> [f64; 3] {
         self.spacing_m
     }
@@ -72,11 +75,13 @@ impl DoseGrid {
             });
     }
 
+    /// Centre of a voxel, in m.
     pub fn centre_m(&self, [i, j, k]: [usize; 3]) -> [f64; 3] {
         let at = [i as f64, j as f64, k as f64];
         [0, 1, 2].map(|a| self.origin_m[a] + at[a] * self.spacing_m[a])
     }
 
+    /// Adds the dose of seeds.
     pub fn add(&mut self, kernel: &DoseKernel, seeds: &[Seed]) {
         self.change(kernel, seeds, 1.0);
     }

@@ -8,7 +8,9 @@ use rayon::prelude::*;
 /// A surface in the frame of the grid (m), normals outwards by the order of the corners.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Isodose {
+    /// Corners, in m.
     pub points_m: Vec<[f64; 3]>,
+    /// Three corners each, by their place in `points_m`.
     pub triangles: Vec<[usize; 3]>,
 }
 

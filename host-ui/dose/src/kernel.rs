@@ -37,12 +37,16 @@ pub struct Placed {
 
 /// Coordinates of up to [`BLOCK`] points (m), from the place that seeds are placed about.
 pub struct Block {
+    /// Places along x, in m.
     pub x_m: [f32; BLOCK],
+    /// Places along y, in m.
     pub y_m: [f32; BLOCK],
+    /// Places along z, in m.
     pub z_m: [f32; BLOCK],
 }
 
 impl Block {
+    /// Points that all lie at the origin.
     pub const ORIGIN: Self = Self {
         x_m: [0.0; BLOCK],
         y_m: [0.0; BLOCK],
@@ -51,6 +55,7 @@ impl Block {
 }
 
 impl DoseKernel {
+    /// The kernel of a source over an interval of time.
     pub fn new(source: &Source, interval: Interval) -> Self {
         let tables = source.tables.clone();
         let equivalent_s = interval.equivalent_s(source.half_life_s);

@@ -12,32 +12,44 @@ pub enum Metric {
     DoseToShare(f64),
     /// Dose to the hottest volume: D2cc.
     DoseToVolume {
+        /// The volume, in m³.
         m3: f64,
     },
     /// Volume with at least a share of the prescription: V150.
     VolumeAtShare(f64),
     /// Volume with at least a dose: V20Gy.
     VolumeAtDose {
+        /// The dose, in Gy.
         gy: f64,
     },
+    /// Mean dose.
     Mean,
+    /// Highest dose.
     Highest,
+    /// Lowest dose.
     Lowest,
 }
 
 /// A measure, in the units that people read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
+    /// A dose.
     Dose {
+        /// In Gy.
         gy: f64,
+        /// In percent of the prescription.
         percent: f64,
     },
+    /// A volume.
     Volume {
+        /// In cm³.
         cc: f64,
+        /// In percent of the structure.
         percent: f64,
     },
     /// The structure is smaller than the volume asked for.
     TooSmall {
+        /// Volume of the structure, in cm³.
         cc: f64,
     },
 }
@@ -88,6 +100,7 @@ impl Metric {
         }
     }
 
+    /// The value in a histogram; `prescription_gy` in Gy.
     pub fn of(self, dvh: &Dvh, prescription_gy: f64) -> Value {
         let dose = |gy: f64| Value::Dose {
             gy,

@@ -14,6 +14,7 @@ use stylet_base::interrupt::Interrupt;
 pub struct Perturbation {
     /// Standard deviation of each seed along each of the three axes.
     pub sigma_m: f64,
+    /// Number of trials.
     pub trials: usize,
     /// The same number gives the same trials, on any number of threads.
     pub random_seed: u64,
@@ -22,6 +23,7 @@ pub struct Perturbation {
 /// One measure over all trials, in its unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spread {
+    /// Name and unit of the measure.
     pub name: String,
     /// Of the plan as it is.
     pub planned: Option<f64>,

@@ -14,6 +14,7 @@ pub struct DosePoints {
 }
 
 impl DosePoints {
+    /// Points without dose; places in m.
     pub fn new(points_m: &[[f64; 3]]) -> Self {
         let count = points_m.len().max(1) as f64;
         let anchor_m = [0, 1, 2].map(|a| points_m.iter().map(|p| p[a]).sum::<f64>() / count);
@@ -33,6 +34,7 @@ impl DosePoints {
         &self.dose_gy
     }
 
+    /// Adds the dose of seeds.
     pub fn add(&mut self, kernel: &DoseKernel, seeds: &[Seed]) {
         self.change(kernel, seeds, 1.0);
     }

@@ -50,7 +50,9 @@ pub struct Fit {
 
 /// Everything known under one set of seeds.
 pub struct Verdict {
+    /// One histogram for each structure.
     pub dvhs: Vec<Dvh>,
+    /// How well the dose fits the target.
     pub fit: Fit,
 }
 
@@ -87,6 +89,7 @@ impl Judge {
         })
     }
 
+    /// Evaluates one set of seeds.
     pub fn judge(&self, kernel: &DoseKernel, seeds: &[Seed]) -> Verdict {
         let dvhs: Vec<Dvh> = self
             .structures
@@ -135,10 +138,12 @@ impl Judge {
         all
     }
 
+    /// Names of the structures, in the order of the histograms.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.structures.iter().map(|s| s.name.as_str())
     }
 
+    /// The measures as JSON; doses in Gy, volumes in cm³.
     pub fn to_json(&self, verdict: &Verdict) -> Json {
         let structures: Vec<Json> = self
             .structures
@@ -168,6 +173,7 @@ impl Judge {
         })
     }
 
+    /// The measures as a table for people.
     pub fn table(&self, verdict: &Verdict) -> String {
         let mut text = String::new();
         for (s, dvh) in self.structures.iter().zip(&verdict.dvhs) {

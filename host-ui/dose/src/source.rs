@@ -21,9 +21,13 @@ const MAX_BYTES: u64 = 1 << 20;
 /// A model of seed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Source {
+    /// Name of the model.
     pub model: String,
+    /// Isotope, as in I-125.
     pub nuclide: String,
+    /// Half-life, in s.
     pub half_life_s: f64,
+    /// The tables of TG-43.
     pub tables: Tables,
     /// Air kerma strength for an apparent activity of 1 mCi.
     pub strength_per_activity_u_per_mci: Option<f64>,

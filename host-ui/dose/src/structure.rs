@@ -8,14 +8,18 @@ use rayon::prelude::*;
 pub trait Region: Sync {
     /// Lower and upper corner of a box around it (m).
     fn bounds_m(&self) -> ([f64; 3], [f64; 3]);
+    /// Whether a place lies inside.
     fn contains(&self, point_m: [f64; 3]) -> bool;
 }
 
 /// Points with the volume that each stands for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Structure {
+    /// Name of the structure.
     pub name: String,
+    /// Points, in m.
     pub points_m: Vec<[f64; 3]>,
+    /// Volume that each point stands for, in m³.
     pub volumes_m3: Vec<f64>,
 }
 
@@ -65,6 +69,7 @@ impl Structure {
         }
     }
 
+    /// Volume of the structure, in m³.
     pub fn volume_m3(&self) -> f64 {
         self.volumes_m3.iter().sum()
     }
@@ -116,6 +121,7 @@ fn probe(region: &dyn Region, corner: [f64; 3], pitch: f64, random: &mut Scatter
 pub struct Scatter(u64);
 
 impl Scatter {
+    /// The numbers of one cell, always the same.
     pub fn of_cell(at: [usize; 3]) -> Self {
         let mut seed = Self(0);
         for index in at {
@@ -132,10 +138,12 @@ impl Scatter {
         z ^ (z >> 31)
     }
 
+    /// The next number, from 0 to 1.
     pub fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
+    /// The next three numbers, from 0 to 1.
     pub fn point(&mut self) -> [f64; 3] {
         [self.unit(), self.unit(), self.unit()]
     }

@@ -23,7 +23,9 @@ pub enum Formalism {
 /// The capsule, a cylinder about the axis of the source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
+    /// Radius, in m.
     pub radius_m: f64,
+    /// Half its length, in m.
     pub half_length_m: f64,
 }
 
@@ -34,9 +36,11 @@ pub struct Tables {
     pub dose_rate_constant_gy_per_s: f64,
     /// 0 for a point source.
     pub active_length_m: f64,
+    /// Outer size; no dose is computed inside.
     pub capsule: Capsule,
     /// ln g over r.
     pub ln_radial: Curve,
+    /// Anisotropy factor over the distance.
     pub anisotropy_1d: Option<Curve>,
     /// 0 to 90 deg (symmetric) or 0 to 180 deg.
     pub anisotropy_2d: Option<Table>,

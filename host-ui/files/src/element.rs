@@ -16,25 +16,39 @@ const CHUNK_BYTES: usize = 1 << 16;
 /// What one voxel is stored as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Element {
+    /// Unsigned, 8 bits.
     U8,
+    /// Signed, 8 bits.
     I8,
+    /// Unsigned, 16 bits.
     U16,
+    /// Signed, 16 bits.
     I16,
+    /// Unsigned, 32 bits.
     U32,
+    /// Signed, 32 bits.
     I32,
+    /// Unsigned, 64 bits.
     U64,
+    /// Signed, 64 bits.
     I64,
+    /// Single precision.
     F32,
+    /// Double precision.
     F64,
 }
 
+/// Order of the bytes of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Endian {
+    /// Lowest byte first.
     Little,
+    /// Highest byte first.
     Big,
 }
 
 impl Element {
+    /// Bytes of one element.
     pub fn bytes(self) -> usize {
         match self {
             Self::U8 | Self::I8 => 1,
@@ -112,6 +126,7 @@ pub struct Sink<'a, V> {
 }
 
 impl<'a> Sink<'a, u8> {
+    /// Takes numbers as labels.
     pub fn labels(progress: &'a Progress) -> Self {
         Self {
             made_of: label_of,
@@ -122,6 +137,7 @@ impl<'a> Sink<'a, u8> {
 }
 
 impl<'a> Sink<'a, f32> {
+    /// Takes numbers as greys.
     pub fn greys(progress: &'a Progress) -> Self {
         Self {
             made_of: |value| Ok(value as f32),
@@ -198,6 +214,7 @@ pub fn values_from_text<V>(text: &[u8], count: usize, sink: Sink<V>) -> Result<V
     )))
 }
 
+/// A label from a number; an error unless it is a whole number from 0 to 255.
 pub fn label_of(value: f64) -> Result<u8, ContentError> {
     let whole = value.round();
     if (value - whole).abs() < 1e-3 && (0.0..=255.0).contains(&whole) {

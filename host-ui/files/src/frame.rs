@@ -11,8 +11,11 @@ const SHEAR: f64 = 1e-3;
 pub struct VoxelFrame {
     /// Orthonormal; mirrored when its determinant is negative.
     pub directions: Matrix3<f64>,
+    /// Distance between voxels along each axis, in m.
     pub spacing_m: [f64; 3],
+    /// Middle of the first voxel, in m.
     pub origin_m: Vector3<f64>,
+    /// What the user should know about how the frame was found.
     pub warning: Option<String>,
 }
 

@@ -19,15 +19,20 @@ const SAMPLED: usize = 1 << 20;
 /// Greys on the voxels of a file, x fastest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
+    /// Name of the file.
     pub name: String,
+    /// Voxels along each axis.
     pub dims: [usize; 3],
+    /// One grey for each voxel, 0 black to 255 white.
     pub greys: Vec<u8>,
     /// Values that are shown black and white.
     pub range: [f32; 2],
+    /// Where the voxels lie in the patient.
     pub frame: VoxelFrame,
 }
 
 impl Image {
+    /// Reads an image of any format; the error names the file.
     pub fn read(path: &Path, progress: &Progress) -> Result<Self, FileError> {
         let refused = |why: ContentError| FileError::of(path, why);
         let bytes = whole(path, progress).map_err(refused)?;

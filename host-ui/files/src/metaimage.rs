@@ -26,6 +26,7 @@ const FIRST: [&str; 8] = [
     "BinaryData",
 ];
 
+/// Whether the bytes begin as a MetaImage header does.
 pub fn is_metaimage(bytes: &[u8]) -> bool {
     let line = bytes.split(|&b| b == b'\n').next().unwrap_or_default();
     let Ok(line) = std::str::from_utf8(line) else {

@@ -18,6 +18,7 @@ use std::io::Read;
 /// A "byte skip" of -1 stands for at most so much.
 const MAX_BEFORE_END: u64 = 1 << 20;
 
+/// Whether the bytes begin as an NRRD file does.
 pub fn is_nrrd(bytes: &[u8]) -> bool {
     bytes.starts_with(b"NRRD000")
 }

@@ -16,9 +16,13 @@ pub const FORMATS: &str =
 /// What is in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
+    /// DICOM, with or without a preamble.
     Dicom,
+    /// NRRD.
     Nrrd,
+    /// NIfTI-1, packed or not.
     Nifti,
+    /// MetaImage.
     MetaImage,
 }
 

@@ -8,14 +8,18 @@ use stylet_base::interrupt::Interrupt;
 /// What is being done with a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
+    /// The bytes of the file are read.
     Bytes,
+    /// Voxels are read out of the bytes.
     Voxels,
+    /// Elements are made from the voxels.
     Elements,
 }
 
 impl Stage {
     const ALL: [Self; 3] = [Self::Bytes, Self::Voxels, Self::Elements];
 
+    /// The stage, for people.
     pub fn name(self) -> &'static str {
         match self {
             Self::Bytes => "reading the file",

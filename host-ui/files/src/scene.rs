@@ -18,6 +18,7 @@ const MAX_STRUCTURES: usize = 255;
 /// What a scene file says.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneFile {
+    /// Name of the scene.
     pub name: Option<String>,
     /// Beside the scene file, or from its folder on.
     pub volume: PathBuf,
@@ -25,29 +26,41 @@ pub struct SceneFile {
     pub image: Option<PathBuf>,
     /// Empty: as the names of the volume say.
     pub structures: Vec<Part>,
+    /// Speed of insertion, in m/s.
     pub insert_m_per_s: Option<f64>,
+    /// Speed of retraction, in m/s.
     pub retract_m_per_s: Option<f64>,
+    /// Name of the haptic device.
     pub device: Option<String>,
+    /// Plan file, beside the scene file.
     pub plan: Option<PathBuf>,
 }
 
 /// How a structure is picked in the volume.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pick {
+    /// By its label.
     Label(u8),
+    /// By its name.
     Name(String),
 }
 
 /// One structure of the scene; omitted fields are inferred from its name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
+    /// Which structure of the volume it is.
     pub pick: Pick,
+    /// Name in the scene instead of that in the volume.
     pub called: Option<String>,
     /// `None` within: the structure is left out.
     pub role: Option<Option<Role>>,
+    /// Young's modulus, in Pa.
     pub young_pa: Option<f64>,
+    /// Poisson's ratio.
     pub poisson: Option<f64>,
+    /// For links along x, y, z: shortest and longest as a share of the rest length, and shear in rad.
     pub limits: Option<[[f64; 3]; 3]>,
+    /// Whether it never moves.
     pub fixed: Option<bool>,
 }
 

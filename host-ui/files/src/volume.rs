@@ -17,21 +17,30 @@ const COARSER: f64 = 1.1;
 /// One structure of a volume and what it is made of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tissue {
+    /// Label of its cells.
     pub label: u8,
+    /// Name of the structure.
     pub name: String,
+    /// What it is in the procedure.
     pub role: Role,
+    /// How it yields.
     pub material: Material,
 }
 
 /// Element (i, j, k) has its centre at ((i + 0.5) h, (j + 0.5) h, (k + 0.5) h), x fastest; every cell but 0 is tissue.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelVolume {
+    /// Elements along x, y, z.
     pub dims: [usize; 3],
+    /// Side of an element, in m.
     pub spacing_m: f64,
+    /// Label of each element, x fastest.
     pub cells: Vec<u8>,
     /// What the cells with each label are; empty: all tissue is one.
     pub structures: Vec<Tissue>,
+    /// Where the patient lies in the scene.
     pub patient: PatientFrame,
+    /// Name of the volume.
     pub name: String,
     /// Every label of the file with its number of voxels, by label.
     pub voxels_per_label: Vec<(u8, u64)>,
@@ -42,8 +51,11 @@ pub struct LabelVolume {
 /// The voxels of a file as they lie in it, x fastest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Voxels {
+    /// Voxels along each axis.
     pub dims: [usize; 3],
+    /// Label of each voxel.
     pub labels: Vec<u8>,
+    /// Where the voxels lie in the patient.
     pub frame: VoxelFrame,
     /// What the file calls its labels, where it says so.
     pub names: BTreeMap<u8, String>,
@@ -52,8 +64,11 @@ pub struct Voxels {
 /// What a file holds in its voxels, x fastest, whatever the numbers mean.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VoxelValues<V> {
+    /// Voxels along each axis.
     pub dims: [usize; 3],
+    /// Value of each voxel.
     pub values: Vec<V>,
+    /// Where the voxels lie in the patient.
     pub frame: VoxelFrame,
 }
 
@@ -75,6 +90,7 @@ type Bounds = ([usize; 3], [usize; 3]);
 type Resampled = ([usize; 3], [f64; 3], Vec<u8>);
 
 impl LabelVolume {
+    /// Number of elements that are tissue.
     pub fn tissue_elements(&self) -> usize {
         self.cells.iter().filter(|&&c| c != 0).count()
     }

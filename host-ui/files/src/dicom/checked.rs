@@ -20,11 +20,15 @@ const SEQUENCE_END: Tag = Tag(0xfffe, 0xe0dd);
 /// Pixels of any kind begin here; they are not read.
 const FIRST_PIXELS: Tag = Tag(0x7fe0, 0x0008);
 
+/// A DICOM data set without its pixels.
 pub struct Object {
+    /// SOP class UID.
     pub sop_class: String,
+    /// The elements.
     pub data: InMemDicomObject,
 }
 
+/// Whether the bytes begin as a DICOM file does.
 pub fn is_dicom(bytes: &[u8]) -> bool {
     has_preamble(bytes) || is_bare(bytes)
 }

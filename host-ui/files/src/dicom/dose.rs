@@ -9,9 +9,13 @@ use dicom_dictionary_std::{tags, uids};
 
 /// Dose of x fastest; the middle of the first voxel and the steps between them (RAS, m).
 pub struct DoseImage<'a> {
+    /// Voxels along x, y, z.
     pub dims: [usize; 3],
+    /// Middle of the first voxel (RAS), in m.
     pub origin_m: [f64; 3],
+    /// Sides of a voxel, in m.
     pub spacing_m: [f64; 3],
+    /// Dose of each voxel, in Gy, x fastest.
     pub dose_gy: &'a [f64],
 }
 

@@ -15,12 +15,17 @@ use stylet_base::format::printable;
 /// Patient frame (RAS, m); strengths in U at the time of the plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeedPlan {
+    /// Label of the plan.
     pub label: String,
+    /// Patient, study and frame of reference.
     pub identity: Identity,
     /// Of the file itself; a dose refers to it.
     pub uid: String,
+    /// Prescribed dose, in Gy.
     pub prescription_gy: Option<f64>,
+    /// The model of all seeds.
     pub source: PlanSource,
+    /// The seeds.
     pub seeds: Vec<PlanSeed>,
     /// What the user should know about how it was read.
     pub notes: Vec<String>,
@@ -29,23 +34,30 @@ pub struct SeedPlan {
 /// The model that all seeds are of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanSource {
+    /// Name of the model.
     pub model: String,
+    /// Who makes it.
     pub manufacturer: String,
     /// As DICOM has it: I-125.
     pub isotope: String,
+    /// Half-life, in days.
     pub half_life_days: f64,
+    /// Active length, in m.
     pub active_length_m: f64,
 }
 
+/// One seed of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanSeed {
     /// Number of the needle that brings it in, from 1.
     pub needle: Option<u32>,
     /// The needle's hole in the template, or what else the plan calls it; empty where it has no name.
     pub hole: String,
+    /// Place (RAS), in m.
     pub position_m: [f64; 3],
     /// Unit vector.
     pub axis: Option<[f64; 3]>,
+    /// Air kerma strength, in U.
     pub strength_u: f64,
 }
 

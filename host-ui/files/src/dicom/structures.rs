@@ -30,15 +30,20 @@ const SAME_PLANE_M: f64 = 0.05e-3;
 /// The closed contours of one structure; corners in RAS, m.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contoured {
+    /// Name of the structure.
     pub name: String,
+    /// Contours, each a closed polygon.
     pub contours: Vec<Vec<Vector3<f64>>>,
 }
 
+/// The contours of an RT Structure Set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StructureSet {
+    /// Structures that have a volume.
     pub structures: Vec<Contoured>,
     /// Series and single images that it was drawn on.
     pub series: Vec<String>,
+    /// SOP instance UIDs of single images that it was drawn on.
     pub images: Vec<String>,
     /// What was left out, and why.
     pub notes: Vec<String>,
@@ -52,6 +57,7 @@ pub fn read(object: &Object, folder: Option<&Path>) -> Result<Voxels, ContentErr
 }
 
 impl StructureSet {
+    /// The structures of a DICOM object; the error lists every problem.
     pub fn of(object: &Object) -> Result<Self, ContentError> {
         if object.sop_class != uids::RT_STRUCTURE_SET_STORAGE {
             return Err(ContentError::Invalid(format!(

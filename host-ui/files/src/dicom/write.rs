@@ -13,9 +13,13 @@ const IMPLEMENTATION: &str = "2.25.302416733929811471066208173541526011461";
 /// To whom and to which frame a file belongs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identity {
+    /// Name of the patient.
     pub patient_name: String,
+    /// Identifier of the patient.
     pub patient_id: String,
+    /// Study instance UID.
     pub study: String,
+    /// Frame of reference UID.
     pub frame_of_reference: String,
 }
 

@@ -21,6 +21,7 @@ const SAME_PLACE_MM: f64 = 1e-3;
 /// Half-lives of one isotope agree so well, as a share.
 const SAME_HALF_LIFE: f64 = 0.01;
 
+/// The plan of an RT Plan of permanent seeds; the error lists every problem.
 pub fn of(object: &Object) -> Result<SeedPlan, ContentError> {
     if object.sop_class != uids::RT_PLAN_STORAGE {
         return Err(ContentError::Invalid(format!(

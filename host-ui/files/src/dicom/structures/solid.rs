@@ -8,11 +8,14 @@ use nalgebra::{Matrix3, Vector3};
 /// RAS, m.
 #[derive(Clone, Debug)]
 pub struct Solid {
+    /// Name of the structure.
     pub name: String,
     /// One axis a column; the third is across the planes.
     axes: Matrix3<f64>,
     planes: Vec<Plane>,
+    /// Lower corner of a box around it.
     pub lower_m: [f64; 3],
+    /// Upper corner of a box around it.
     pub upper_m: [f64; 3],
 }
 
@@ -79,6 +82,7 @@ impl Solid {
         }
     }
 
+    /// Whether a place (RAS, m) lies inside.
     pub fn contains(&self, place_m: [f64; 3]) -> bool {
         let at = self.axes.transpose() * Vector3::from(place_m);
         // The last plane that begins below.
