@@ -110,7 +110,11 @@ impl PlainSweep {
     fn row(&self, body: &mut Body, row: usize, held_i: usize, z: Option<usize>, y: Option<usize>) {
         for number in self.rows[row].clone() {
             let run = &self.runs[number];
-            let mut reached = usize::MAX..0;
+            // Empty until the first links are met.
+            let mut reached = Range {
+                start: usize::MAX,
+                end: 0,
+            };
             for (axis, side) in [(2, z), (1, y)] {
                 let done = reached.clone();
                 for links in side.map_or(&[][..], |side| &self.beside[number][side]) {

@@ -91,7 +91,7 @@ impl ParameterSet {
         let [horizontal, vertical] = SHEARS.map(|id| self.get(id).to_degrees());
         let folding = folding([horizontal, vertical, vertical]);
         // Not a number is a problem as well.
-        let folds = !(folding <= 1.0);
+        let folds = folding.is_nan() || folding > 1.0;
         folds
             .then_some(ParameterProblem::CellsFold { folding })
             .into_iter()
@@ -120,7 +120,8 @@ impl ParameterSet {
         ];
         for (parameters, stiffness_n_per_m) in springs {
             // Not a number fails as well.
-            if !(stiffness_n_per_m * scale <= max_stiffness_n_per_m) {
+            let felt_n_per_m = stiffness_n_per_m * scale;
+            if felt_n_per_m.is_nan() || felt_n_per_m > max_stiffness_n_per_m {
                 problems.push(ParameterProblem::TooStiff {
                     parameters,
                     stiffness_n_per_m,

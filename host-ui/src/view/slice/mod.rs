@@ -237,7 +237,6 @@ impl Slices {
             orientation,
             shown,
             view,
-            scene_from_patient: &self.scene_from_patient,
         };
         overlay.draw(&self.lines[number], dose.is_some());
         if let Some(place) = response.hover_pos() {

@@ -9,7 +9,7 @@ use crate::theme::IMAGE;
 use crate::view::orientation::Orientation;
 use crate::view::state::ViewState;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use std::sync::Arc;
 use stylet_base::format;
 
@@ -88,7 +88,6 @@ pub struct Overlay<'a> {
     pub orientation: Orientation,
     pub shown: &'a Shown,
     pub view: &'a ViewState,
-    pub scene_from_patient: &'a Matrix3<f64>,
 }
 
 impl Overlay<'_> {
