@@ -1,6 +1,6 @@
 //! `rt-core doctor`: is this PC fit for a 1 kHz force loop, and what to change, as commands to type.
 //!
-//! Each check is a function of a [`Machine`] and the core of the force loop; all of them read below a root path,
+//! Each check is a function of a `Machine` and the core of the force loop; all of them read below a root path,
 //! so that tests can present any machine to them.
 
 mod cores;
