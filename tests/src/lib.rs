@@ -6,6 +6,7 @@ pub mod rehearsal;
 pub mod stopped;
 pub mod window_process;
 
+use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -59,7 +60,10 @@ impl Core {
 
     fn launch(instance: Instance, options: &[&str], variables: &[(&str, &str)]) -> Self {
         let report = scratch(&format!("core-{}", instance.name())).join("report.json");
-        let child = Command::new(program("rt-core"))
+        let mut command = Command::new(program("rt-core"));
+        // SAFETY: between fork and exec it only makes a system call.
+        unsafe { command.pre_exec(use_every_core) };
+        let child = command
             .args(["--instance", instance.name(), "--exit-with-parent", "--report"])
             .arg(&report)
             .arg("--flight-dir")
@@ -143,6 +147,19 @@ impl Drop for Core {
         let _ = self.child.kill();
         let _ = self.child.wait();
         self.instance.sweep();
+    }
+}
+
+/// A window in this process may have left a core to the force loop; a core that is started next would inherit that.
+fn use_every_core() -> std::io::Result<()> {
+    // SAFETY: the set is plain data that lives through the call; cores that do not exist are left out by the kernel.
+    unsafe {
+        let mut all: libc::cpu_set_t = std::mem::zeroed();
+        (0..libc::CPU_SETSIZE as usize).for_each(|core| libc::CPU_SET(core, &mut all));
+        match libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &all) {
+            0 => Ok(()),
+            _ => Err(std::io::Error::last_os_error()),
+        }
     }
 }
 
