@@ -128,3 +128,18 @@ pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, ContentError> {
         frame,
     }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A pipe beside a structure set was opened and waited for without an end.
+    #[test]
+    fn a_pipe_beside_a_structure_set_is_passed_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe.dcm");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+        assert!(made.success());
+        assert_eq!(find(folder.path(), &["series".to_owned()], &[]).unwrap().len(), 0);
+    }
+}
