@@ -8,6 +8,7 @@ pub mod cost;
 pub mod device;
 pub mod force;
 pub mod lab;
+pub mod line;
 pub mod needle;
 pub mod rehearse;
 pub mod replay;
