@@ -4,9 +4,9 @@ use super::stations::Stations;
 use crate::tissue::fem::Real;
 use crate::tissue::fem::batch::{BatchModel, BatchState, ElementField, LOADS, NodeWeight};
 
-/// Residual over load down to which columns are solved: the compliance then is right to 3e-4 and the field to 2e-3 (paper's
+/// Residual over load down to which columns are solved: the compliance then is right to 6e-4 and the field to 7e-3 (paper's
 /// gland, nu 0.49; `docs/adr/0010-condensed-needle-line.md`).
-pub const TOLERANCE: f64 = 2e-2;
+pub const TOLERANCE: f64 = 4.5e-2;
 const MOST_ITERATIONS: u32 = 60;
 
 /// What a column answers to.

@@ -11,7 +11,7 @@ use super::rows::{add_scaled, dot};
 use super::tip::{TipState, follow};
 
 /// Solutions in one tick at most: the tip goes on, a membrane gives way, the tip goes on again.
-const MAX_PASSES: u32 = 8;
+const MAX_PASSES: u32 = 24;
 /// A gap at the tip that another pass would be wasted on.
 const CLOSED_M: f64 = 1e-8;
 /// The line is not followed further than this from its entry.
@@ -158,7 +158,7 @@ pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> Line
         let gap_m = solve(model, state, tip_m, front.limit_n, input.dt_s, &mut output);
         output.held_by = front.membrane;
         let is_pushed = state.tip.force_n >= front.limit_n;
-        if let (Some(layer), true) = (front.membrane, gap_m > 0.0 || is_pushed) {
+        if let (Some(layer), true) = (front.membrane, state.tip.force_n > 0.0) {
             let pushed_m = tip_m - gap_m - state.tip.material_m;
             if is_pushed || pushed_m >= model.layers[layer].puncture_depth_m {
                 state.tip.opened |= 1 << layer;
@@ -172,8 +172,18 @@ pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> Line
             break;
         }
     }
+    slip(model, state, tip_m);
     finish(model, state, &mut output);
     output
+}
+
+/// Stations that reached their friction stick to where they are now.
+fn slip(model: &LineModel, state: &mut LineState, tip_m: f64) {
+    for n in 0..state.in_contact {
+        if state.shaft_n[n].abs() >= limit_n(model, state.tip.material_m, n) {
+            state.anchor_m[n] = tip_m - state.u_m[n];
+        }
+    }
 }
 
 /// Which stations the shaft touches, and where the tip loads. A station that is new sticks to where it is.
@@ -235,13 +245,13 @@ fn solve(
     let place_m = state.tip.material_m;
     let LineState {
         ref mut shaft_n,
-        ref mut anchor_m,
+        ref anchor_m,
         ref mut u_m,
         ref tip_column,
         ref memory,
         ..
     } = *state;
-    let (shaft_n, anchor_m, u_m) = (&mut shaft_n[..count], &mut anchor_m[..count], &mut u_m[..count]);
+    let (shaft_n, anchor_m, u_m) = (&mut shaft_n[..count], &anchor_m[..count], &mut u_m[..count]);
     let tip_column = &tip_column[..count];
     let offset: f64 = state
         .tip_range
@@ -290,11 +300,6 @@ fn solve(
         output.residual_m = largest_m;
         if largest_m <= model.settings.tolerance_m {
             break;
-        }
-    }
-    for n in 0..count {
-        if shaft_n[n].abs() >= limit_n(model, place_m, n) {
-            anchor_m[n] = tip_m - u_m[n];
         }
     }
     state.tip.force_n = tip_n;

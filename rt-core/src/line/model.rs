@@ -59,7 +59,7 @@ impl Default for LineSettings {
             viscous_n_s_per_m2: 0.0,
             prony: [PronyTerm::default(); 2],
             sweeps: 60,
-            tolerance_m: 1e-10,
+            tolerance_m: 2e-9,
         }
     }
 }

@@ -92,12 +92,14 @@ impl LineModel {
     }
 }
 
-/// The displacement of the material around the tip under the present loads.
+/// The displacement of the material around the tip under the present loads of the shaft; the tip's own goes with it.
 struct Around<'a> {
     model: &'a LineModel,
     first: usize,
     count: usize,
     u_m: [f64; WINDOW],
+    /// Force of the tip, times what a tick of memory adds to the displacement.
+    tip_n: f64,
 }
 
 impl<'a> Around<'a> {
@@ -113,17 +115,12 @@ impl<'a> Around<'a> {
             first,
             count: end.saturating_sub(first).min(WINDOW),
             u_m: [0.0; WINDOW],
+            tip_n: state.memory.gain * state.tip.force_n,
         };
         for (u, n) in around.u_m.iter_mut().zip(first..first + around.count) {
-            let row = c.rows.row(c.stations + n);
-            let (shaft, tip) = (&row[..state.in_contact], &row[c.stations + state.tip_range.start..]);
-            let tip: f64 = tip
-                .iter()
-                .zip(&state.tip_weights[..state.tip_range.len()])
-                .map(|(r, w)| r * w)
-                .sum();
-            let force = dot(shaft, &state.shaft_n[..state.in_contact]) + tip * state.tip.force_n;
-            *u = state.memory.gain * force + state.memory.offset_m[c.stations + n];
+            let shaft = &c.rows.row(c.stations + n)[..state.in_contact];
+            *u = state.memory.gain * dot(shaft, &state.shaft_n[..state.in_contact])
+                + state.memory.offset_m[c.stations + n];
         }
         around
     }
@@ -132,11 +129,15 @@ impl<'a> Around<'a> {
     fn beyond_m(&self, place_m: f64, tip_m: f64) -> f64 {
         let mut weights = [0.0; WINDOW];
         let range = self.model.tip_weights(place_m, &mut weights);
-        let u = range.zip(weights).map(|(n, weight)| {
+        let c = &self.model.compliance;
+        let mut u_m = 0.0;
+        for (n, weight) in range.clone().zip(&weights) {
             let at = n.saturating_sub(self.first).min(self.count.saturating_sub(1));
-            weight * self.u_m[at]
-        });
-        place_m + u.sum::<f64>() - tip_m
+            let row = &c.rows.row(c.stations + n)[c.stations + range.start..];
+            let own: f64 = row.iter().zip(&weights[..range.len()]).map(|(r, w)| r * w).sum();
+            u_m += weight * (self.u_m[at] + self.tip_n * own);
+        }
+        place_m + u_m - tip_m
     }
 }
 

@@ -52,3 +52,58 @@ fn answers_are_reciprocal_and_balance_their_loads() {
         }
     }
 }
+
+/// A gland on its foundation under a point load: CalculiX on the same mesh (`tests/oracles/gland_ccx.py`).
+#[test]
+fn a_loaded_gland_is_where_calculix_has_it() {
+    let half = [10.0, 8.0, 11.0];
+    let (dims, h) = ([20, 16, 22], 2.2e-3);
+    let cell = |n: usize| [n % 20, n / 20 % 16, n / 320];
+    let inside = |n: usize| {
+        let square = |a: usize| ((cell(n)[a] as f64 + 0.5 - half[a]) / half[a]).powi(2);
+        square(0) + square(1) + square(2) <= 1.0
+    };
+    let labels = Labels {
+        dims,
+        spacing_m: h,
+        cells: (0..dims.iter().product()).map(|n| u8::from(inside(n))).collect(),
+        structures: Vec::new(),
+    };
+    let lattice = lattice_of(&labels);
+    let fem = FemModel::<f64>::new(&lattice, &FemSettings::homogeneous(material(0.49), 250e3)).expect("valid");
+    let model = BatchModel::new(&fem);
+    let middle = [10.5, 8.5, 2.5].map(|c| c * h);
+    let load = model.trilinear(middle).expect("inside").map(|(node, w)| NodeWeight {
+        node,
+        weight: [0.0, 0.0, w],
+    });
+    let mut state = BatchState::new(&model);
+    state.begin(&model, &[&load]);
+    assert!(state.solve(&model, 1e-11, 200).residual <= 1e-11);
+    let (mut worst_mm, mut rows) = (0.0_f64, 0);
+    for line in include_str!("golden/gland_linear.csv")
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+    {
+        let numbers: Vec<f64> = line.split(',').map(|n| n.parse().expect("a number")).collect();
+        let point = [0, 1, 2].map(|a| numbers[a] * h);
+        // A node is read by the weights of any cell beside it that is there.
+        let beside = (0..8).find_map(|c: usize| {
+            model.trilinear([0, 1, 2].map(|a| point[a] + if c >> a & 1 == 1 { -1e-12 } else { 1e-12 }))
+        });
+        for axis in 0..3 {
+            let weights = beside.expect("beside a cell").map(|(node, w)| {
+                let mut weight = [0.0; 3];
+                weight[axis] = w;
+                NodeWeight { node, weight }
+            });
+            worst_mm = worst_mm.max((state.sample(0, &weights) * 1e3 - numbers[3 + axis]).abs());
+        }
+        rows += 1;
+    }
+    println!(
+        "{rows} nodes, {} elements: worst {worst_mm:.2e} mm of 1.9 mm",
+        model.element_count()
+    );
+    assert!(rows > 60 && worst_mm < 1e-6, "{worst_mm}");
+}
