@@ -32,7 +32,7 @@ impl Rows {
     }
 
     /// Row `n`, with the zeros past its end; nothing for a row that is not there.
-    #[inline]
+    #[inline(always)]
     pub fn row(&self, n: usize) -> &[f64] {
         self.values.get(n * self.stride..(n + 1) * self.stride).unwrap_or(&[])
     }
@@ -45,7 +45,7 @@ impl Rows {
 }
 
 /// `y += a x` over the first `y.len()` entries.
-#[inline]
+#[inline(always)]
 pub(super) fn add_scaled(a: f64, x: &[f64], y: &mut [f64]) {
     for (y, x) in y.iter_mut().zip(x) {
         *y += a * x;
@@ -53,7 +53,7 @@ pub(super) fn add_scaled(a: f64, x: &[f64], y: &mut [f64]) {
 }
 
 /// Sum of products, in four sums side by side.
-#[inline]
+#[inline(always)]
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (a4, b4) = (a.as_chunks::<4>(), b.as_chunks::<4>());

@@ -100,6 +100,8 @@ struct Around<'a> {
     u_m: [f64; WINDOW],
     /// Force of the tip, times what a tick of memory adds to the displacement.
     tip_n: f64,
+    from_m: f64,
+    gain: f64,
 }
 
 impl<'a> Around<'a> {
@@ -116,6 +118,8 @@ impl<'a> Around<'a> {
             count: end.saturating_sub(first).min(WINDOW),
             u_m: [0.0; WINDOW],
             tip_n: state.memory.gain * state.tip.force_n,
+            from_m: state.tip.material_m.max(0.0),
+            gain: state.memory.gain,
         };
         for (u, n) in around.u_m.iter_mut().zip(first..first + around.count) {
             let shaft = &c.rows.row(c.stations + n)[..state.in_contact];
@@ -131,11 +135,14 @@ impl<'a> Around<'a> {
         let range = self.model.tip_weights(place_m, &mut weights);
         let c = &self.model.compliance;
         let mut u_m = 0.0;
+        // On the way in the shaft follows with friction of its own.
+        let last = ((place_m / c.spacing_m) as usize).min(c.stations - 1);
+        let friction = self.gain * self.model.friction_n_per_m[last] * (place_m - self.from_m).max(0.0);
         for (n, weight) in range.clone().zip(&weights) {
             let at = n.saturating_sub(self.first).min(self.count.saturating_sub(1));
             let row = &c.rows.row(c.stations + n)[c.stations + range.start..];
             let own: f64 = row.iter().zip(&weights[..range.len()]).map(|(r, w)| r * w).sum();
-            u_m += weight * (self.u_m[at] + self.tip_n * own);
+            u_m += weight * (self.u_m[at] + self.tip_n * own + friction * c.rows.row(c.stations + n)[last]);
         }
         place_m + u_m - tip_m
     }
