@@ -1,4 +1,4 @@
-"""A gland on its foundation, solved by CalculiX (Debian: calculix-ccx; its C3D8 is a B-bar element).
+"""A gland on its foundation, solved by CalculiX (Debian: calculix-ccx 2.20; its C3D8 is fully integrated, see gland_bbar.py).
 
     python3 gland_ccx.py [folder for the results, by default that of the tests that read them]
 

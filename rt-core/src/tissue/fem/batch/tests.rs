@@ -53,9 +53,18 @@ fn answers_are_reciprocal_and_balance_their_loads() {
     }
 }
 
-/// A gland on its foundation under a point load: CalculiX on the same mesh (`tests/oracles/gland_ccx.py`).
+/// A gland on its foundation under a point load, on the same mesh: CalculiX (`tests/oracles/gland_ccx.py`), whose C3D8 is fully
+/// integrated, and B-bar elements assembled and factored by SciPy (`gland_bbar.py`).
 #[test]
-fn a_loaded_gland_is_where_calculix_has_it() {
+fn a_loaded_gland_is_where_two_other_solvers_have_it() {
+    assert_agrees(Integration::Full, include_str!("golden/gland_linear.csv"));
+    assert_agrees(
+        Integration::MeanDilatation,
+        include_str!("golden/gland_linear_bbar.csv"),
+    );
+}
+
+fn assert_agrees(integration: Integration, golden: &str) {
     let half = [10.0, 8.0, 11.0];
     let (dims, h) = ([20, 16, 22], 2.2e-3);
     let cell = |n: usize| [n % 20, n / 20 % 16, n / 320];
@@ -70,7 +79,11 @@ fn a_loaded_gland_is_where_calculix_has_it() {
         structures: Vec::new(),
     };
     let lattice = lattice_of(&labels);
-    let fem = FemModel::<f64>::new(&lattice, &FemSettings::homogeneous(material(0.49), 250e3)).expect("valid");
+    let material = Material {
+        integration,
+        ..material(0.49)
+    };
+    let fem = FemModel::<f64>::new(&lattice, &FemSettings::homogeneous(material, 250e3)).expect("valid");
     let model = BatchModel::new(&fem);
     let middle = [10.5, 8.5, 2.5].map(|c| c * h);
     let load = model.trilinear(middle).expect("inside").map(|(node, w)| NodeWeight {
@@ -81,10 +94,7 @@ fn a_loaded_gland_is_where_calculix_has_it() {
     state.begin(&model, &[&load]);
     assert!(state.solve(&model, 1e-11, 200).residual <= 1e-11);
     let (mut worst_mm, mut rows) = (0.0_f64, 0);
-    for line in include_str!("golden/gland_linear.csv")
-        .lines()
-        .filter(|line| !line.starts_with('#'))
-    {
+    for line in golden.lines().filter(|line| !line.starts_with('#')) {
         let numbers: Vec<f64> = line.split(',').map(|n| n.parse().expect("a number")).collect();
         let point = [0, 1, 2].map(|a| numbers[a] * h);
         // A node is read by the weights of any cell beside it that is there.
