@@ -1,4 +1,4 @@
-"""Table `GREEN` of rt-core/src/line/compliance.rs: a line load on a lattice of trilinear elements.
+"""Table `GREEN` of rt-core/sim/src/line/compliance.rs: a line load on a lattice of trilinear elements.
 
 A load that is uniform along z on the nodes of a square lattice (bilinear elements, spacing 1, shear modulus 1) moves the nodes
 along z by the lattice's Green function. This prints

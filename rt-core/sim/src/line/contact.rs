@@ -47,7 +47,7 @@ pub struct LineOutput {
     pub sweeps: u32,
     /// Largest correction of the last sweep.
     pub residual_m: f64,
-    /// The input was not finite: what was before is told again.
+    /// The input was not finite: the output before it is repeated.
     pub is_refused: bool,
 }
 
@@ -219,8 +219,8 @@ fn touch(model: &LineModel, state: &mut LineState, tip_m: f64) {
         state.tip_own += weight * tips.take(state.tip_range.len()).map(|(r, w)| r * w).sum::<f64>();
     }
     let (gain, force_n) = (state.memory.gain, state.tip.force_n);
-    for n in 0..now {
-        let force = dot(&c.rows.row(n)[..now], &state.shaft_n[..now]) + column[n] * force_n;
+    for (n, &of_tip) in column.iter().enumerate().take(now) {
+        let force = dot(&c.rows.row(n)[..now], &state.shaft_n[..now]) + of_tip * force_n;
         state.u_m[n] = gain * force + state.memory.offset_m[n];
         if n >= before {
             state.anchor_m[n] = tip_m - state.u_m[n];

@@ -88,7 +88,6 @@ fn the_hole_of_the_template_does_not_move() {
         hand_m: [1e-3, 0.0],
         hand_slope: [0.01, 0.0],
         tip_force_n: [0.1, 0.1],
-        ..BeamInput::default()
     };
     let beam = Beam::new(&model, input.tip_m);
     assert!(beam.alone(-0.15, input.tip_m, &input, 0).abs() < 1e-15);
