@@ -7,6 +7,7 @@
 pub mod active;
 pub mod force;
 pub mod limits;
+pub mod line;
 pub mod needle;
 pub mod scene;
 pub mod settings;

@@ -33,6 +33,7 @@
 //! assert!(report.converged && report.tip_force_n[2] > 0.0);
 //! ```
 
+pub mod batch;
 mod cg;
 mod coarsest;
 mod grid;

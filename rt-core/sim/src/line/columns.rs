@@ -1,0 +1,173 @@
+//! A queue of columns: the body's answer to one newton at each station, eight at once, in slices of bounded work.
+
+use super::stations::Stations;
+use crate::tissue::fem::Real;
+use crate::tissue::fem::batch::{BatchModel, BatchState, ElementField, LOADS, NodeWeight};
+
+/// Residual over load down to which columns are solved: the compliance then is right to 6e-4 and the field to 7e-3 (paper's
+/// gland, nu 0.49; `docs/adr/0010-condensed-needle-line.md`).
+pub const TOLERANCE: f64 = 4.5e-2;
+const MOST_ITERATIONS: u32 = 60;
+
+/// What a column answers to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Load {
+    /// Along the line, on the shaft of a station.
+    Shaft(usize),
+    /// Along the line, on the tip's patch at a station.
+    Tip(usize),
+    /// Across the line (0 or 1), on the shaft of a station.
+    Across(usize, usize),
+}
+
+/// The answer to one newton.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// The load that it answers.
+    pub load: Load,
+    /// Displacement of the element centres, m/N.
+    pub field: ElementField,
+    /// Displacement at the stations, m/N: of shaft and tip along the line, or of the shaft across it.
+    pub samples_m: Vec<f64>,
+    /// Force of the foundation on the body.
+    pub foundation_n: [f64; 3],
+    /// Of the solver, over the load.
+    pub residual: f64,
+}
+
+/// How far the queue is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct QueueProgress {
+    /// Columns that are solved.
+    pub ready: usize,
+    /// Columns in all.
+    pub of: usize,
+}
+
+impl QueueProgress {
+    /// Whether nothing is left to solve.
+    pub fn is_done(&self) -> bool {
+        self.ready == self.of
+    }
+}
+
+/// Columns of one line, ready ones first. Nothing is allocated after `new`.
+#[derive(Clone, Debug)]
+pub struct ColumnQueue<T = f32> {
+    columns: Vec<Column>,
+    /// Loads in order of the columns.
+    loads: Vec<Vec<NodeWeight>>,
+    /// What columns are sampled with: `2 m` along the line, then m along each direction across.
+    ready: usize,
+    stations: usize,
+    state: BatchState<T>,
+    is_begun: bool,
+    tolerance: f64,
+}
+
+impl<T: Real> ColumnQueue<T> {
+    /// Along the line, shaft then tip; with `is_flexible` those across it as well.
+    pub fn new(model: &BatchModel<T>, stations: &Stations, is_flexible: bool, tolerance: f64) -> Self {
+        let m = stations.count();
+        let mut wanted: Vec<Load> = (0..m).map(Load::Shaft).chain((0..m).map(Load::Tip)).collect();
+        if is_flexible {
+            wanted.extend((0..2 * m).map(|n| Load::Across(n / m, n % m)));
+        }
+        let weights = |load: &Load| match *load {
+            Load::Shaft(n) => stations.load(&stations.shaft[n], 0),
+            Load::Tip(n) => stations.load(&stations.tip[n], 0),
+            Load::Across(side, n) => stations.load(&stations.shaft[n], 1 + side),
+        };
+        let column = |&load: &Load| Column {
+            load,
+            field: ElementField::zeros(model.element_count()),
+            samples_m: vec![0.0; if matches!(load, Load::Across(..)) { m } else { 2 * m }],
+            foundation_n: [0.0; 3],
+            residual: f64::INFINITY,
+        };
+        ColumnQueue {
+            loads: wanted.iter().map(weights).collect(),
+            columns: wanted.iter().map(column).collect(),
+            ready: 0,
+            stations: m,
+            state: BatchState::new(model),
+            is_begun: false,
+            tolerance,
+        }
+    }
+
+    /// How far the queue is.
+    pub fn progress(&self) -> QueueProgress {
+        QueueProgress {
+            ready: self.ready,
+            of: self.columns.len(),
+        }
+    }
+
+    /// Those that are ready.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns[..self.ready]
+    }
+
+    /// Bytes of the columns, and of what they are solved in.
+    pub fn bytes(&self) -> [usize; 2] {
+        let column = |c: &Column| c.field.bytes() + 8 * c.samples_m.len();
+        [self.columns.iter().map(column).sum(), self.state.bytes()]
+    }
+
+    /// At most so many slices of work, each one pass over one level of the body.
+    pub fn prepare(&mut self, model: &BatchModel<T>, slices: usize) -> QueueProgress {
+        for _ in 0..slices {
+            if self.progress().is_done() {
+                break;
+            }
+            self.slice(model);
+        }
+        self.progress()
+    }
+
+    /// All that is left.
+    pub fn prepare_all(&mut self, model: &BatchModel<T>) {
+        while !self.progress().is_done() {
+            self.slice(model);
+        }
+    }
+
+    fn slice(&mut self, model: &BatchModel<T>) {
+        if !self.is_begun {
+            let mut loads: [&[NodeWeight]; LOADS] = [&[]; LOADS];
+            let next = self.loads[self.ready..].iter();
+            let count = loads.iter_mut().zip(next).map(|(slot, load)| *slot = load).count();
+            self.state.begin(model, &loads[..count]);
+            self.is_begun = true;
+            return;
+        }
+        let progress = self.state.advance(model);
+        let is_done = progress.residual <= self.tolerance || progress.iterations >= MOST_ITERATIONS;
+        if self.state.is_whole() && is_done {
+            self.keep(model, progress.residual);
+        }
+    }
+
+    fn keep(&mut self, model: &BatchModel<T>, residual: f64) {
+        let end = self.columns.len().min(self.ready + LOADS);
+        let m = self.stations;
+        for (lane, column) in self.columns[self.ready..end].iter_mut().enumerate() {
+            let sampled = match column.load {
+                Load::Across(side, _) => &self.loads[(2 + side) * m..(3 + side) * m],
+                _ => &self.loads[..2 * m],
+            };
+            for (value, weights) in column.samples_m.iter_mut().zip(sampled) {
+                *value = self.state.sample(lane, weights);
+            }
+            self.state.write(model, lane, &mut column.field);
+            column.foundation_n = self.state.foundation_n(model, lane);
+            column.residual = residual;
+        }
+        self.ready = end;
+        self.is_begun = false;
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests;

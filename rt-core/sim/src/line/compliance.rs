@@ -1,0 +1,168 @@
+//! How each station moves with the force at each: `W = B K^-1 B^T`, and what a lattice cannot know of a thin needle.
+
+use super::columns::Column;
+use super::rows::Rows;
+use super::stations::Stations;
+use crate::tissue::fem::Real;
+use crate::tissue::fem::batch::BatchModel;
+
+/// Stations that were all solved for: symmetric, positive definite. Rows 0 to m - 1 are the shaft's stations, m to 2m - 1
+/// the tip's patch at the same places.
+#[derive(Clone, Debug)]
+pub struct Compliance {
+    /// Stations m.
+    pub stations: usize,
+    /// Distance of stations, m.
+    pub spacing_m: f64,
+    /// Length over which the tip's load is spread along the line.
+    pub tip_length_m: f64,
+    /// m/N, 2m x 2m.
+    pub(super) rows: Rows,
+    /// The same along the two directions across, m x m each; empty where they were not solved for.
+    pub across: [Rows; 2],
+    /// Force of the foundation on the body along the line for each newton on it, for each row.
+    pub foundation: Vec<f64>,
+}
+
+impl Compliance {
+    /// From the answers to each station's load along the line: those of the shaft, then those of the tip.
+    pub fn of_columns<T: Real>(model: &BatchModel<T>, stations: &Stations, columns: &[Column]) -> Option<Compliance> {
+        let m = stations.count();
+        let (axial, across) = columns.split_at_checked(2 * m)?;
+        let mut rows = symmetric(axial);
+        for (n, missing) in stations.missing_m_per_n.iter().enumerate() {
+            rows.row_mut(n)[n] += missing;
+        }
+        let direction = stations.line.axes[0];
+        let foundation = |c: &Column| (0..3).map(|a| c.foundation_n[a] * direction[a]).sum();
+        let mut sides = [Rows::default(), Rows::default()];
+        for (side, columns) in sides.iter_mut().zip(across.chunks_exact(m.max(1))) {
+            *side = symmetric(columns);
+            // The mean over all directions across is in effect that along, times (3 - 4 nu) / (4 (1 - nu)); see `physics.md`.
+            for (n, missing) in stations.missing_m_per_n.iter().enumerate() {
+                let middle_m = (n as f64 + 0.5) * stations.settings.spacing_m;
+                let nu = model
+                    .material(stations.line.point_m(middle_m, [0.0; 2]))
+                    .map_or(0.49, |m| m[1]);
+                side.row_mut(n)[n] += missing * (3.0 - 4.0 * nu) / (4.0 * (1.0 - nu));
+            }
+        }
+        Some(Compliance {
+            stations: m,
+            spacing_m: stations.settings.spacing_m,
+            tip_length_m: stations.patch_edge_m(model.spacing_m()),
+            rows,
+            across: sides,
+            foundation: axial.iter().map(foundation).collect(),
+        })
+    }
+
+    /// Stations that do not know each other, for tests and examples: `each_m_per_n` at shaft and tip.
+    pub fn diagonal(stations: usize, spacing_m: f64, each_m_per_n: f64) -> Compliance {
+        let entry = |i: usize, j: usize| {
+            if i % stations.max(1) == j % stations.max(1) {
+                each_m_per_n
+            } else {
+                0.0
+            }
+        };
+        Self::from_rows(stations, spacing_m, spacing_m, entry)
+    }
+
+    /// From a function of two rows.
+    pub fn from_rows(
+        stations: usize,
+        spacing_m: f64,
+        tip_length_m: f64,
+        entry: impl Fn(usize, usize) -> f64,
+    ) -> Compliance {
+        Compliance {
+            stations,
+            spacing_m,
+            tip_length_m,
+            rows: Rows::new(2 * stations, entry),
+            across: [Rows::default(), Rows::default()],
+            foundation: vec![-1.0; 2 * stations],
+        }
+    }
+
+    /// How row `i` moves with a newton at row `j`, m/N.
+    pub fn at(&self, i: usize, j: usize) -> f64 {
+        self.rows.row(i).get(j).copied().unwrap_or(f64::NAN)
+    }
+
+    /// Smallest eigenvalue over largest, of the shaft's part.
+    pub fn conditioning(&self) -> f64 {
+        let matrix = nalgebra::DMatrix::from_fn(self.stations, self.stations, |i, j| self.at(i, j));
+        let eigenvalues = matrix.symmetric_eigenvalues();
+        eigenvalues.min() / eigenvalues.max()
+    }
+}
+
+/// Half of each pair: what columns that are not quite solved leave.
+fn symmetric(columns: &[Column]) -> Rows {
+    let entry = |i: usize, j: usize| columns[j].samples_m.get(i).copied().unwrap_or(0.0);
+    Rows::new(columns.len(), |i, j| 0.5 * (entry(i, j) + entry(j, i)))
+}
+
+/// Green function of a line load on a square lattice of bilinear elements, spacing and shear modulus 1; for large distances
+/// `-ln(r) / (2 pi)`. Made by `tests/oracles/lattice_green.py`.
+const GREEN: [[f64; 5]; 5] = [
+    [0.344768214, -0.018270257, -0.112937218, -0.176345437, -0.221452078],
+    [-0.018270257, -0.042193314, -0.128532955, -0.183714754, -0.225939389],
+    [-0.112937218, -0.128532955, -0.162833870, -0.203435836, -0.238241251],
+    [-0.176345437, -0.183714754, -0.203435836, -0.229110558, -0.255678072],
+    [-0.221452078, -0.225939389, -0.238241251, -0.255678072, -0.275340275],
+];
+
+fn green(i: i64, j: i64) -> f64 {
+    let [i, j] = [i, j].map(|n| n.unsigned_abs() as usize);
+    match GREEN.get(i).and_then(|row| row.get(j)) {
+        Some(value) => *value,
+        None => -(i as f64).hypot(j as f64).ln() / std::f64::consts::TAU,
+    }
+}
+
+/// Radius of the cylinder that an even load would move as far as the lattice moves a station's shaft with it.
+pub(super) fn lattice_radius_m<T: Real>(model: &BatchModel<T>, stations: &Stations, along_m: f64) -> f64 {
+    let h = model.spacing_m();
+    let direction = stations.line.axes[0];
+    let main = (0..3)
+        .max_by(|&a, &b| direction[a].abs().total_cmp(&direction[b].abs()))
+        .unwrap_or(2);
+    let [first, second] = [(main + 1) % 3, (main + 2) % 3];
+    let mut log = 0.0;
+    const PLACES: usize = 4;
+    for n in 0..PLACES {
+        let place_m = along_m + ((n as f64 + 0.5) / PLACES as f64 - 0.5) * stations.settings.spacing_m;
+        let mut weights: Vec<([i64; 2], f64)> = Vec::new();
+        let around = stations.around_m();
+        for across_m in around {
+            let point = stations.line.point_m(place_m, across_m).map(|c| c / h);
+            let (low, part) = (
+                [point[first], point[second]].map(f64::floor),
+                [first, second].map(|a| point[a] - point[a].floor()),
+            );
+            for corner in 0..4 {
+                let step = [corner & 1, corner >> 1];
+                let weight: f64 = (0..2)
+                    .map(|a| if step[a] == 1 { part[a] } else { 1.0 - part[a] })
+                    .product();
+                weights.push((
+                    [0, 1].map(|a| low[a] as i64 + step[a] as i64),
+                    weight / around.len() as f64,
+                ));
+            }
+        }
+        for (p, w) in &weights {
+            log -= weights
+                .iter()
+                .map(|(q, v)| w * v * green(p[0] - q[0], p[1] - q[1]))
+                .sum::<f64>();
+        }
+    }
+    h * (std::f64::consts::TAU * log / PLACES as f64).exp()
+}
+
+#[cfg(test)]
+mod tests;

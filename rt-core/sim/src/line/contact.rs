@@ -1,0 +1,356 @@
+//! The needle against the tissue on its line, once a tick: Coulomb friction with anchors in the tissue, membranes, cutting.
+//!
+//! Each station of the shaft sticks to the tissue until the force between them reaches the friction of its length, and slips
+//! with that force from then on. The tip pushes, and never pulls: against a membrane up to the force at which it gives way, in tissue up
+//! to the cutting force. All at once this is a convex problem with one solution, which projected Gauss-Seidel finds from that of the last
+//! tick. Nothing depends on speed unless a rate term is asked for.
+
+use super::model::LineModel;
+use super::prony::Memory;
+use super::rows::{add_scaled, dot};
+use super::tip::{TipState, follow};
+
+/// Solutions in one tick at most: the tip goes on, a membrane gives way, the tip goes on again.
+const MAX_PASSES: u32 = 12;
+/// A gap at the tip that another pass would be wasted on.
+const CLOSED_M: f64 = 1e-7;
+/// The line is not followed further than this from its entry.
+const FURTHEST_M: f64 = 10.0;
+
+/// Where the needle is in one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LineInput {
+    /// How far the needle's tip is along the line from the place of entry at rest, in the world.
+    pub tip_m: f64,
+    /// Only rate terms and relaxation use it.
+    pub dt_s: f64,
+}
+
+/// Forces of one tick, N.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LineOutput {
+    /// Along the line, positive inwards: the needle is pushed out by what is negative.
+    pub force_on_hand_n: f64,
+    /// Force of the tip on the tissue.
+    pub tip_n: f64,
+    /// Force of the shaft on the tissue.
+    pub shaft_n: f64,
+    /// Place at rest of the material that the tip is in; a seed dropped now belongs there.
+    pub tip_material_m: f64,
+    /// Layer whose membrane gave way in this tick.
+    pub punctured: Option<usize>,
+    /// Layer whose membrane holds the tip.
+    pub held_by: Option<usize>,
+    /// Least length of a stretch of the line between two stations, over that at rest; below 0 the linear answer is folded.
+    pub least_stretch: f64,
+    /// Of the solver, all passes together.
+    pub sweeps: u32,
+    /// Largest correction of the last sweep.
+    pub residual_m: f64,
+    /// The input was not finite: the output before it is repeated.
+    pub is_refused: bool,
+}
+
+/// Forces, anchors and the track: everything that the line remembers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LineState {
+    /// Force of each station of the shaft on the tissue.
+    pub(super) shaft_n: Vec<f64>,
+    /// Where on the needle each station sticks: tip's place in the world less displacement of the station.
+    pub(super) anchor_m: Vec<f64>,
+    /// Displacement of the stations in contact.
+    u_m: Vec<f64>,
+    pub(super) tip: TipState,
+    /// Stations that the shaft touches: the first so many.
+    pub(super) in_contact: usize,
+    pub(super) tip_range: std::ops::Range<usize>,
+    pub(super) tip_weights: [f64; 64],
+    /// How each station in contact moves with the tip's force, and how the tip does.
+    tip_column: Vec<f64>,
+    tip_own: f64,
+    pub(super) memory: Memory,
+    loads_n: Vec<f64>,
+    last: LineOutput,
+}
+
+impl LineState {
+    /// Tissue at rest that no needle has touched.
+    pub fn new(model: &LineModel) -> Self {
+        let m = model.compliance.stations;
+        let outside = TipState {
+            material_m: f64::NEG_INFINITY,
+            ..TipState::default()
+        };
+        LineState {
+            shaft_n: vec![0.0; m],
+            anchor_m: vec![0.0; m],
+            u_m: vec![0.0; m],
+            tip: outside,
+            in_contact: 0,
+            tip_range: 0..0,
+            tip_weights: [0.0; 64],
+            tip_column: vec![0.0; m],
+            tip_own: 0.0,
+            memory: Memory::new(2 * m),
+            loads_n: vec![0.0; 2 * m],
+            last: LineOutput::default(),
+        }
+    }
+
+    /// What the columns are multiplied with: newtons of each shaft station, then of the tip at each.
+    pub fn loads_n(&self) -> &[f64] {
+        &self.loads_n
+    }
+
+    /// The tip: membrane, cutting, track.
+    pub fn tip(&self) -> &TipState {
+        &self.tip
+    }
+
+    /// Force of each shaft station on the tissue.
+    pub fn shaft_n(&self) -> &[f64] {
+        &self.shaft_n
+    }
+
+    /// Places in the tissue that stick to the shaft, along the line, m.
+    pub fn anchors_m(&self) -> &[f64] {
+        &self.anchor_m
+    }
+
+    /// Elastic energy of the tissue, in joules.
+    pub fn stored_j(&self, model: &LineModel) -> f64 {
+        let m = model.compliance.stations;
+        let rows = &model.compliance.rows;
+        let mut f = vec![0.0; 2 * m];
+        f[..m].copy_from_slice(&self.shaft_n);
+        for (n, weight) in self.tip_range.clone().zip(self.tip_weights) {
+            f[m + n] = weight * self.tip.force_n;
+        }
+        let at_once: f64 = f
+            .iter()
+            .enumerate()
+            .map(|(n, force)| 0.5 * force * dot(rows.row(n), &f))
+            .sum();
+        at_once + self.memory.stored_j(rows, &model.settings.prony)
+    }
+
+    fn fits(&self, model: &LineModel) -> bool {
+        self.shaft_n.len() == model.compliance.stations
+    }
+}
+
+/// One tick. Its work is bounded, it does not allocate, and every finite input gives finite forces. A state of another model
+/// is left as it is.
+pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> LineOutput {
+    if !(input.tip_m.is_finite() && input.dt_s.is_finite() && input.dt_s > 0.0 && state.fits(model)) {
+        return LineOutput {
+            is_refused: true,
+            ..state.last
+        };
+    }
+    let tip_m = input.tip_m.clamp(-FURTHEST_M, FURTHEST_M);
+    if state.tip.material_m == f64::NEG_INFINITY {
+        state.tip.material_m = tip_m.min(0.0);
+    }
+    state
+        .memory
+        .begin(&model.compliance.rows, &model.settings.prony, input.dt_s);
+    let mut output = LineOutput::default();
+    for _ in 0..MAX_PASSES {
+        touch(model, state, tip_m);
+        let front = model.front(&state.tip);
+        let gap_m = solve_vectorised(model, state, tip_m, front.limit_n, input.dt_s, &mut output);
+        output.held_by = front.membrane;
+        let is_pushed = state.tip.force_n >= front.limit_n;
+        if let (Some(layer), true) = (front.membrane, state.tip.force_n > 0.0) {
+            let pushed_m = tip_m - gap_m - state.tip.material_m;
+            if is_pushed || pushed_m >= model.layers[layer].puncture_depth_m {
+                state.tip.opened |= 1 << layer;
+                output.punctured = output.punctured.or(Some(layer));
+                continue;
+            }
+        }
+        let goes_on = gap_m > CLOSED_M && is_pushed && front.membrane.is_none();
+        let goes_back = gap_m < -CLOSED_M && state.tip.force_n <= 0.0;
+        if !(goes_on || goes_back) || !follow(model, state, tip_m, gap_m, front.to_m) {
+            break;
+        }
+    }
+    slip(model, state, tip_m);
+    finish(model, state, &mut output);
+    output
+}
+
+/// Stations that reached their friction stick to where they are now.
+fn slip(model: &LineModel, state: &mut LineState, tip_m: f64) {
+    for n in 0..state.in_contact {
+        if state.shaft_n[n].abs() >= limit_n(model, state.tip.material_m, n) {
+            state.anchor_m[n] = tip_m - state.u_m[n];
+        }
+    }
+}
+
+/// Which stations the shaft touches, and where the tip loads. A station that is new sticks to where it is.
+fn touch(model: &LineModel, state: &mut LineState, tip_m: f64) {
+    let c = &model.compliance;
+    let depth = state.tip.material_m / c.spacing_m;
+    let now = if depth > 0.0 {
+        (depth.ceil() as usize).min(c.stations)
+    } else {
+        0
+    };
+    let before = state.in_contact;
+    if now < before {
+        state.shaft_n[now..before].fill(0.0);
+    }
+    state.in_contact = now;
+    state.tip_range = model.tip_weights(state.tip.material_m, &mut state.tip_weights);
+    if state.tip_range.is_empty() {
+        state.tip.force_n = 0.0;
+    }
+    let m = c.stations;
+    let column = &mut state.tip_column[..now];
+    column.fill(0.0);
+    state.tip_own = 0.0;
+    for (n, &weight) in state.tip_range.clone().zip(&state.tip_weights) {
+        let row = c.rows.row(m + n);
+        add_scaled(weight, &row[..now], column);
+        let tips = row[m..].iter().skip(state.tip_range.start).zip(&state.tip_weights);
+        state.tip_own += weight * tips.take(state.tip_range.len()).map(|(r, w)| r * w).sum::<f64>();
+    }
+    let (gain, force_n) = (state.memory.gain, state.tip.force_n);
+    for (n, &of_tip) in column.iter().enumerate().take(now) {
+        let force = dot(&c.rows.row(n)[..now], &state.shaft_n[..now]) + of_tip * force_n;
+        state.u_m[n] = gain * force + state.memory.offset_m[n];
+        if n >= before {
+            state.anchor_m[n] = tip_m - state.u_m[n];
+        }
+    }
+}
+
+/// Friction that each station can have, by how much of it the shaft is in.
+#[inline]
+fn limit_n(model: &LineModel, place_m: f64, n: usize) -> f64 {
+    let ds = model.compliance.spacing_m;
+    model.friction_n_per_m[n] * (place_m - n as f64 * ds).clamp(0.0, ds)
+}
+
+/// [`solve`] for the instructions that the processor has; the same bits with all of them.
+fn solve_vectorised(
+    model: &LineModel,
+    state: &mut LineState,
+    tip_m: f64,
+    tip_limit_n: f64,
+    dt_s: f64,
+    output: &mut LineOutput,
+) -> f64 {
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn avx2(m: &LineModel, s: &mut LineState, tip_m: f64, limit_n: f64, dt_s: f64, o: &mut LineOutput) -> f64 {
+            solve(m, s, tip_m, limit_n, dt_s, o)
+        }
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { avx2(model, state, tip_m, tip_limit_n, dt_s, output) };
+        }
+    }
+    solve(model, state, tip_m, tip_limit_n, dt_s, output)
+}
+
+/// Forces of shaft and tip; returns how far the tip is beyond where the material has it.
+#[inline(always)]
+fn solve(
+    model: &LineModel,
+    state: &mut LineState,
+    tip_m: f64,
+    tip_limit_n: f64,
+    dt_s: f64,
+    output: &mut LineOutput,
+) -> f64 {
+    let rows = &model.compliance.rows;
+    let (m, count, gain) = (model.compliance.stations, state.in_contact, state.memory.gain);
+    let place_m = state.tip.material_m;
+    let LineState {
+        ref mut shaft_n,
+        ref anchor_m,
+        ref mut u_m,
+        ref tip_column,
+        ref memory,
+        ..
+    } = *state;
+    let (shaft_n, anchor_m, u_m) = (&mut shaft_n[..count], &anchor_m[..count], &mut u_m[..count]);
+    let tip_column = &tip_column[..count];
+    let offset: f64 = state
+        .tip_range
+        .clone()
+        .zip(state.tip_weights)
+        .map(|(n, w)| w * memory.offset_m[m + n])
+        .sum();
+    let mut tip_u_m = gain * (dot(tip_column, shaft_n) + state.tip_own * state.tip.force_n) + offset;
+    let mut tip_n = state.tip.force_n;
+    let tip_gain = gain * state.tip_own;
+    let slowness = model.settings.viscous_n_s_per_m2 / dt_s;
+    for sweep in 0..model.settings.sweeps {
+        let mut largest_m = 0.0_f64;
+        for step in 0..count {
+            let n = if sweep % 2 == 0 { count - 1 - step } else { step };
+            let row = &rows.row(n)[..count];
+            let own = gain * row[n];
+            let limit = limit_n(model, place_m, n);
+            let free_n = shaft_n[n] + (tip_m - anchor_m[n] - u_m[n]) / own;
+            let mut wanted = free_n.clamp(-limit, limit);
+            if slowness > 0.0 && wanted != free_n {
+                // Beyond the limit by what the slip of this tick adds.
+                let drag =
+                    slowness * (place_m - n as f64 * model.compliance.spacing_m).clamp(0.0, model.compliance.spacing_m);
+                wanted += (free_n - wanted) * drag * own / (1.0 + drag * own);
+            }
+            let change = wanted - shaft_n[n];
+            if change != 0.0 {
+                shaft_n[n] = wanted;
+                add_scaled(gain * change, row, u_m);
+                tip_u_m += gain * change * tip_column[n];
+                largest_m = largest_m.max((change * own).abs());
+            }
+        }
+        if tip_gain > 0.0 {
+            let wanted = (tip_n + (tip_m - place_m - tip_u_m) / tip_gain).clamp(0.0, tip_limit_n);
+            let change = wanted - tip_n;
+            if change != 0.0 {
+                tip_n = wanted;
+                add_scaled(gain * change, tip_column, u_m);
+                tip_u_m += tip_gain * change;
+                largest_m = largest_m.max((change * tip_gain).abs());
+            }
+        }
+        output.sweeps += 1;
+        output.residual_m = largest_m;
+        if largest_m <= model.settings.tolerance_m {
+            break;
+        }
+    }
+    state.tip.force_n = tip_n;
+    tip_m - place_m - tip_u_m
+}
+
+fn finish(model: &LineModel, state: &mut LineState, output: &mut LineOutput) {
+    let m = model.compliance.stations;
+    let count = state.in_contact;
+    state.loads_n.fill(0.0);
+    state.loads_n[..count].copy_from_slice(&state.shaft_n[..count]);
+    for (n, weight) in state.tip_range.clone().zip(state.tip_weights) {
+        state.loads_n[m + n] = weight * state.tip.force_n;
+    }
+    output.shaft_n = state.shaft_n[..count].iter().sum();
+    output.tip_n = state.tip.force_n;
+    output.force_on_hand_n = -(output.shaft_n + output.tip_n);
+    output.tip_material_m = state.tip.material_m;
+    let stretch = |pair: &[f64]| 1.0 + (pair[1] - pair[0]) / model.compliance.spacing_m;
+    output.least_stretch = state.u_m[..count].windows(2).map(stretch).fold(1.0, f64::min);
+    state.memory.finish(&mut state.loads_n);
+    state.last = *output;
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,40 @@
+//! The condensed needle line: what the needle does to the tissue along its way, and what the hand feels of it.
+//!
+//! *Before the needle moves*: [`Line`] and [`Stations`] lie along the way; [`ColumnQueue`] solves for the body's answer to a unit
+//! force at each of them, in slices that fit into idle ticks; [`Compliance`] is how each station moves with each.
+//! *At 1 kHz*: [`step`] finds the forces of shaft and tip from friction, membranes and that compliance, with one slip state.
+//! *At the rate of the tissue*: the body is the sum of `loads_n` times columns.
+//!
+//! Derivations are in `docs/physics.md`, measurements in `docs/adr/0010-condensed-needle-line.md`.
+//!
+//! ```
+//! use stylet_sim::line::{LineInput, LineLayer, LineModel, LineSettings, LineState, step};
+//!
+//! // Two stations, 1 mm apart, that do not know each other: 1 mm of displacement for each newton.
+//! let compliance = stylet_sim::line::Compliance::diagonal(2, 1e-3, 1e-3);
+//! let layers = [LineLayer { shaft_friction_n_per_m: 100.0, ..LineLayer::default() }];
+//! let model = LineModel::new(compliance, &layers, LineSettings::default()).unwrap();
+//! let mut state = LineState::new(&model);
+//! let output = step(&model, &mut state, &LineInput { tip_m: 2e-3, dt_s: 1e-3 });
+//! // Both stations slip: 100 N/m of friction over 2 mm of shaft.
+//! assert!((output.force_on_hand_n + 0.2).abs() < 1e-9);
+//! ```
+
+pub mod beam;
+mod columns;
+mod compliance;
+mod contact;
+mod model;
+pub mod prony;
+mod rows;
+mod stations;
+mod tip;
+
+pub use columns::{Column, ColumnQueue, Load, QueueProgress, TOLERANCE};
+pub use compliance::Compliance;
+pub use contact::{LineInput, LineOutput, LineState, step};
+pub use model::{LineLayer, LineModel, LineProblem, LineSettings, MAX_LAYERS, MAX_STATIONS};
+pub use prony::PronyTerm;
+pub use rows::Rows;
+pub use stations::{Line, StationSettings, Stations};
+pub use tip::TipState;

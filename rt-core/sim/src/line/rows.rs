@@ -1,0 +1,71 @@
+//! A square matrix in rows of whole lanes, for loops without a remainder.
+
+const LANES: usize = 8;
+
+/// Rows with zeros past their end.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Rows {
+    size: usize,
+    stride: usize,
+    values: Vec<f64>,
+}
+
+impl Rows {
+    /// A square matrix of that size, entry by entry.
+    pub fn new(size: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
+        let stride = size.next_multiple_of(LANES);
+        let at = |n: usize| {
+            if n % stride < size {
+                entry(n / stride, n % stride)
+            } else {
+                0.0
+            }
+        };
+        Rows {
+            size,
+            stride,
+            values: (0..size * stride).map(at).collect(),
+        }
+    }
+
+    /// Rows, and columns.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Row `n`, with the zeros past its end; nothing for a row that is not there.
+    #[inline(always)]
+    pub fn row(&self, n: usize) -> &[f64] {
+        self.values.get(n * self.stride..(n + 1) * self.stride).unwrap_or(&[])
+    }
+
+    /// One row, to be changed; empty beyond the last.
+    pub fn row_mut(&mut self, n: usize) -> &mut [f64] {
+        self.values
+            .get_mut(n * self.stride..(n + 1) * self.stride)
+            .unwrap_or(&mut [])
+    }
+}
+
+/// `y += a x` over the first `y.len()` entries.
+#[inline(always)]
+pub(super) fn add_scaled(a: f64, x: &[f64], y: &mut [f64]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += a * x;
+    }
+}
+
+/// Sum of products, in four sums side by side.
+#[inline(always)]
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (a4, b4) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    for (a, b) in a4.0.iter().zip(b4.0) {
+        for n in 0..4 {
+            sums[n] += a[n] * b[n];
+        }
+    }
+    let whole = 4 * a4.0.len().min(b4.0.len());
+    let rest: f64 = a[whole..].iter().zip(&b[whole..]).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
+}

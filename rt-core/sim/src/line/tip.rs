@@ -1,0 +1,208 @@
+//! The tip: what stops it, and where it is in the material.
+
+use super::contact::LineState;
+use super::model::{LineLayer, LineModel};
+use super::rows::dot;
+
+/// Places closer than this are the same.
+const SAME_M: f64 = 1e-9;
+/// The tip's place is found to this.
+const PLACE_M: f64 = 1e-13;
+/// Where tissue in front is pressed together so far, a step through it counts at most so many times its length.
+const MOST_PRESSED: f64 = 10.0;
+/// Stations around the tip that a pass can reach.
+const WINDOW: usize = 64;
+
+/// The tip in the material of the line.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TipState {
+    /// Force on the tissue, inwards.
+    pub force_n: f64,
+    /// Its place at rest; negative outside.
+    pub material_m: f64,
+    /// End of the track that was cut.
+    pub track_m: f64,
+    /// One bit for each layer whose membrane has given way.
+    pub opened: u32,
+}
+
+/// What is in front of the tip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Front {
+    /// Force at which the tip goes on.
+    pub limit_n: f64,
+    /// How far it may go on with that.
+    pub to_m: f64,
+    /// Layer whose membrane holds it.
+    pub membrane: Option<usize>,
+}
+
+impl LineModel {
+    pub(super) fn front(&self, tip: &TipState) -> Front {
+        let place_m = tip.material_m;
+        let is_closed = |&(n, l): &(usize, &LineLayer)| {
+            l.puncture_force_n > 0.0 && tip.opened >> n & 1 == 0 && l.from_m >= place_m - SAME_M
+        };
+        let closed = self.layers.iter().enumerate().find(is_closed);
+        if let Some((n, layer)) = closed.filter(|(_, l)| l.from_m <= place_m + SAME_M) {
+            return Front {
+                limit_n: layer.puncture_force_n,
+                to_m: place_m,
+                membrane: Some(n),
+            };
+        }
+        let membrane_m = closed.map_or(f64::INFINITY, |(_, l)| l.from_m);
+        let is_in_track = place_m < tip.track_m - SAME_M;
+        let ratio = if is_in_track {
+            self.settings.track_cutting_ratio
+        } else {
+            1.0
+        };
+        // The next place at which the force may be another.
+        let places = self
+            .layers
+            .iter()
+            .map(|l| l.from_m)
+            .chain([0.0, self.length_m(), tip.track_m]);
+        let next_m = places.filter(|&m| m > place_m + SAME_M).fold(membrane_m, f64::min);
+        Front {
+            limit_n: ratio * self.layer_at(place_m + SAME_M).map_or(0.0, |l| l.cutting_force_n),
+            to_m: next_m,
+            membrane: None,
+        }
+    }
+
+    /// First station and weights of the tip's load where it is; they add up to 1, or to 0 outside.
+    pub(super) fn tip_weights(&self, place_m: f64, weights: &mut [f64; WINDOW]) -> std::ops::Range<usize> {
+        let (ds, m) = (self.compliance.spacing_m, self.compliance.stations);
+        if !(0.0..=self.length_m()).contains(&place_m) {
+            return 0..0;
+        }
+        let half_m = 0.5 * self.compliance.tip_length_m.max(ds);
+        let (low, high) = (
+            (place_m - half_m).max(0.0) / ds,
+            ((place_m + half_m) / ds).min(m as f64),
+        );
+        let (first, end) = (low as usize, (high.ceil() as usize).min(m));
+        let whole = high - low;
+        for (weight, n) in weights.iter_mut().zip(first..end) {
+            *weight = (high.min((n + 1) as f64) - low.max(n as f64)).max(0.0) / whole;
+        }
+        first..end.min(first + WINDOW)
+    }
+}
+
+/// The displacement of the material around the tip under the present loads of the shaft; the tip's own goes with it.
+struct Around<'a> {
+    model: &'a LineModel,
+    first: usize,
+    count: usize,
+    u_m: [f64; WINDOW],
+    /// Force of the tip, times what a tick of memory adds to the displacement.
+    tip_n: f64,
+    from_m: f64,
+    gain: f64,
+}
+
+impl<'a> Around<'a> {
+    /// So far before and behind the tip.
+    fn new(model: &'a LineModel, state: &LineState, reach_m: f64) -> Self {
+        let c = &model.compliance;
+        let half_m = 0.5 * c.tip_length_m.max(c.spacing_m) + reach_m;
+        let place_m = state.tip.material_m.clamp(0.0, model.length_m());
+        let first = ((place_m - half_m).max(0.0) / c.spacing_m) as usize;
+        let end = (((place_m + half_m) / c.spacing_m).ceil() as usize + 1).min(c.stations);
+        let mut around = Around {
+            model,
+            first,
+            count: end.saturating_sub(first).min(WINDOW),
+            u_m: [0.0; WINDOW],
+            tip_n: state.memory.gain * state.tip.force_n,
+            from_m: state.tip.material_m.max(0.0),
+            gain: state.memory.gain,
+        };
+        for (u, n) in around.u_m.iter_mut().zip(first..first + around.count) {
+            let shaft = &c.rows.row(c.stations + n)[..state.in_contact];
+            *u = state.memory.gain * dot(shaft, &state.shaft_n[..state.in_contact])
+                + state.memory.offset_m[c.stations + n];
+        }
+        around
+    }
+
+    /// Where a tip at this place of the material is in the world, less `tip_m`.
+    fn beyond_m(&self, place_m: f64, tip_m: f64) -> f64 {
+        let mut weights = [0.0; WINDOW];
+        let range = self.model.tip_weights(place_m, &mut weights);
+        let c = &self.model.compliance;
+        let mut u_m = 0.0;
+        // On the way in the shaft follows with friction of its own.
+        let last = ((place_m / c.spacing_m) as usize).min(c.stations - 1);
+        let friction = self.gain * self.model.friction_n_per_m[last] * (place_m - self.from_m).max(0.0);
+        for (n, weight) in range.clone().zip(&weights) {
+            let at = n.saturating_sub(self.first).min(self.count.saturating_sub(1));
+            let row = &c.rows.row(c.stations + n)[c.stations + range.start..];
+            let own: f64 = row.iter().zip(&weights[..range.len()]).map(|(r, w)| r * w).sum();
+            u_m += weight * (self.u_m[at] + self.tip_n * own + friction * c.rows.row(c.stations + n)[last]);
+        }
+        place_m + u_m - tip_m
+    }
+}
+
+/// Moves the tip through the material to where the world has it, but not past `to_m`; returns whether it moved.
+pub(super) fn follow(model: &LineModel, state: &mut LineState, tip_m: f64, gap_m: f64, to_m: f64) -> bool {
+    let from_m = state.tip.material_m;
+    let spacing_m = model.compliance.spacing_m;
+    // One pass goes no further than some stations; the next goes on.
+    let reach_m = (MOST_PRESSED * gap_m.abs()).min(8.0 * spacing_m);
+    let around = Around::new(model, state, reach_m);
+    let furthest_m = if gap_m > 0.0 {
+        (from_m + reach_m).min(to_m)
+    } else {
+        from_m - reach_m
+    };
+    let place_m = root(&around, tip_m, from_m, gap_m, furthest_m);
+    state.tip.material_m = place_m;
+    state.tip.track_m = state.tip.track_m.max(place_m.min(model.length_m()));
+    place_m != from_m
+}
+
+/// Place between `from_m` and `furthest_m` that is at `tip_m` in the world, the nearest found; or `furthest_m`.
+fn root(around: &Around, tip_m: f64, from_m: f64, gap_m: f64, furthest_m: f64) -> f64 {
+    let sign = gap_m.signum();
+    let short = |place_m: f64| -sign * around.beyond_m(place_m, tip_m);
+    let span_m = (furthest_m - from_m).abs();
+    let (mut near, mut near_short) = (0.0, short(from_m));
+    if near_short <= 0.0 {
+        return from_m;
+    }
+    let mut far = near_short.min(span_m);
+    let mut far_short = short(from_m + sign * far);
+    while far_short > 0.0 && far < span_m {
+        (near, near_short) = (far, far_short);
+        far = (2.0 * far).min(span_m);
+        far_short = short(from_m + sign * far);
+    }
+    if far_short > 0.0 {
+        return furthest_m;
+    }
+    for _ in 0..24 {
+        if far - near <= PLACE_M || far_short == 0.0 {
+            break;
+        }
+        // Regula falsi, kept away from both ends.
+        let part = (near_short / (near_short - far_short)).clamp(0.0, 1.0);
+        let middle = near + part * (far - near);
+        let value = short(from_m + sign * middle);
+        if value.abs() <= PLACE_M {
+            return from_m + sign * middle;
+        }
+        if value > 0.0 {
+            (near, near_short) = (middle, value);
+            far_short *= 0.5;
+        } else {
+            (far, far_short) = (middle, value);
+            near_short *= 0.5;
+        }
+    }
+    from_m + sign * 0.5 * (near + far)
+}

@@ -1,0 +1,59 @@
+//! What is read from an answer: displacements of element centres, values under weights, and the force of the foundation.
+
+use super::level::{BatchModel, NodeWeight};
+use super::solve::{BatchState, finest};
+use crate::tissue::fem::real::Real;
+
+/// Displacement of every element's centre, along x, y, z: per newton, in metres.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ElementField(pub [Vec<f32>; 3]);
+
+impl ElementField {
+    /// Zeros for that many elements.
+    pub fn zeros(elements: usize) -> Self {
+        ElementField(std::array::from_fn(|_| vec![0.0; elements]))
+    }
+
+    /// Bytes of the displacements.
+    pub fn bytes(&self) -> usize {
+        self.0.iter().map(|c| c.len() * size_of::<f32>()).sum()
+    }
+}
+
+impl<T: Real> BatchState<T> {
+    /// Sum of weight times displacement of answer `load`, in metres.
+    pub fn sample(&self, load: usize, weights: &[NodeWeight]) -> f64 {
+        let at = |entry: &NodeWeight| {
+            let node = self.u.get(entry.node as usize)?;
+            Some((0..3).map(|c| entry.weight[c] * node[c][load].to_f64()).sum::<f64>())
+        };
+        weights.iter().filter_map(at).sum()
+    }
+
+    /// What the springs to rest answer with: force of the foundation on the body, N.
+    pub fn foundation_n(&self, model: &BatchModel<T>, load: usize) -> [f64; 3] {
+        let mut force = [0.0; 3];
+        for (u, &spring) in self.u.iter().zip(&finest(model).springs) {
+            for c in 0..3 {
+                force[c] -= spring.to_f64() * u[c][load].to_f64();
+            }
+        }
+        force
+    }
+
+    /// Writes answer `load` to `field`: the mean of its eight corners is the displacement of an element's centre.
+    pub fn write(&self, model: &BatchModel<T>, load: usize, field: &mut ElementField) {
+        for (element, lines) in model.corners.iter().enumerate() {
+            for c in 0..3 {
+                let line = |&at: &u32| {
+                    let value = |n: usize| self.u.get(n).map_or(T::ZERO, |u| u[c][load]);
+                    value(at as usize) + value((at as usize).saturating_add(1))
+                };
+                let sum = lines.iter().map(line).fold(T::ZERO, |sum, v| sum + v);
+                if let Some(slot) = field.0[c].get_mut(element) {
+                    *slot = (0.125 * sum.to_f64()) as f32;
+                }
+            }
+        }
+    }
+}
