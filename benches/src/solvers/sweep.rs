@@ -87,6 +87,23 @@ impl PlainSweep {
 
     /// Puts `held` in place, `at` elements from rest, and moves the others outward from it, each at most once.
     pub fn run(&self, body: &mut Body, held: u32, at: [f32; 3]) {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.run_avx2(body, held, at) };
+        }
+        self.run_portable(body, held, at);
+    }
+
+    /// The same loops, compiled for wider vectors: the shipped solver has them too.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn run_avx2(&self, body: &mut Body, held: u32, at: [f32; 3]) {
+        self.run_portable(body, held, at);
+    }
+
+    #[inline(always)]
+    fn run_portable(&self, body: &mut Body, held: u32, at: [f32; 3]) {
         body.put(held, at);
         let [_, ny, nz] = self.dims;
         let [i, j, k] = body.lattice.cell(held);
@@ -107,6 +124,7 @@ impl PlainSweep {
     }
 
     /// Moves a row after its inner plane, what that does not reach after its inner row, and the rest along the row.
+    #[inline(always)]
     fn row(&self, body: &mut Body, row: usize, held_i: usize, z: Option<usize>, y: Option<usize>) {
         for number in self.rows[row].clone() {
             let run = &self.runs[number];
@@ -133,6 +151,7 @@ impl PlainSweep {
 }
 
 /// Moves the outer ends of links that are not in `done`.
+#[inline(always)]
 fn outside(body: &mut Body, axis: usize, up: bool, links: &Links, done: &Range<usize>) {
     let all = links.outer..links.outer + links.len;
     let pieces = if done.start >= all.end || done.end <= all.start {
@@ -153,6 +172,7 @@ fn outside(body: &mut Body, axis: usize, up: bool, links: &Links, done: &Range<u
 }
 
 /// Inner and outer ends of links, which do not overlap.
+#[inline(always)]
 fn ends(component: &mut [f32], inner: usize, outer: Range<usize>) -> (&[f32], &mut [f32]) {
     if inner < outer.start {
         let (below, above) = component.split_at_mut(outer.start);
@@ -163,7 +183,7 @@ fn ends(component: &mut [f32], inner: usize, outer: Range<usize>) -> (&[f32], &m
     }
 }
 
-#[inline(never)]
+#[inline(always)]
 fn clamp_links<const UP: bool>(l: &LinkLimits, [a, b, c]: [(&[f32], &mut [f32]); 3]) {
     let n = a.0.len();
     let (ia, ib, ic) = (&a.0[..n], &b.0[..n], &c.0[..n]);
@@ -174,6 +194,7 @@ fn clamp_links<const UP: bool>(l: &LinkLimits, [a, b, c]: [(&[f32], &mut [f32]);
 }
 
 /// Moves the elements of a run before and behind those of `reached` after them.
+#[inline(always)]
 fn along_x(body: &mut Body, run: &Run, reached: Range<usize>) {
     let l = body.limits[0];
     let [x, y, z] = body.u.each_mut().map(Vec::as_mut_slice);
