@@ -15,9 +15,11 @@
 //! let layers = [LineLayer { shaft_friction_n_per_m: 100.0, ..LineLayer::default() }];
 //! let model = LineModel::new(compliance, &layers, LineSettings::default()).unwrap();
 //! let mut state = LineState::new(&model);
-//! let output = step(&model, &mut state, &LineInput { tip_m: 2e-3, dt_s: 1e-3 });
-//! // Both stations slip: 100 N/m of friction over 2 mm of shaft.
-//! assert!((output.force_on_hand_n + 0.2).abs() < 1e-9);
+//! // Shaft that has just come in sticks where it is, without a force.
+//! assert_eq!(step(&model, &mut state, &LineInput { tip_m: 2e-3, dt_s: 1e-3 }).force_on_hand_n, 0.0);
+//! // Half a millimetre on both stations slip: 100 N/m of friction over 2 mm of shaft.
+//! let output = step(&model, &mut state, &LineInput { tip_m: 2.5e-3, dt_s: 1e-3 });
+//! assert!((output.force_on_hand_n + 0.2).abs() < 1e-9, "{output:?}");
 //! ```
 
 pub mod beam;
