@@ -3,7 +3,8 @@
 //! The state before the step meets every limit, so the worst that happens is that the tissue stays where it is.
 
 use super::held::{self, Grip};
-use super::kernels::{self, Kernels};
+use super::kernels;
+use super::loops::Loops;
 use super::model::ChainMail;
 use super::propagate::{Patience, sweep};
 use super::state::TissueState;
@@ -16,8 +17,7 @@ const SHORTER_TRIES: i32 = 3;
 const FIRST_SHORTER: f32 = 1.0;
 
 /// Moves what is held toward where it is asked to be, as far as sweeps can follow; `grip` says how far that was.
-#[inline(always)]
-pub(super) fn follow<K: Kernels>(
+pub(super) fn follow<K: Loops>(
     model: &ChainMail,
     state: &mut TissueState,
     grip: &mut Grip,

@@ -18,6 +18,7 @@ mod classes;
 mod follow;
 mod held;
 mod kernels;
+mod loops;
 mod memory;
 mod model;
 mod project;

@@ -1,7 +1,7 @@
 //! Brings a body back into its limits around what is held: sweeps, then projections, then re-anchoring.
 
 use super::held::{self, Grip};
-use super::kernels::Kernels;
+use super::loops::Loops;
 use super::model::ChainMail;
 use super::state::TissueState;
 use super::sweep::Pass;
@@ -12,8 +12,7 @@ pub(super) const MAX_SWEEPS: u32 = 6;
 /// Passes of projections tried after that.
 pub(super) const MAX_PROJECTIONS: u32 = 12;
 /// Sweeps, then projects, then re-anchors, until the residual is within tolerance.
-#[inline(always)]
-pub(super) fn propagate<K: Kernels>(
+pub(super) fn propagate<K: Loops>(
     model: &ChainMail,
     state: &mut TissueState,
     grip: &Grip,
@@ -46,8 +45,7 @@ pub(super) enum Patience {
     WhileItHelps,
 }
 
-#[inline(always)]
-pub(super) fn sweep<K: Kernels>(
+pub(super) fn sweep<K: Loops>(
     model: &ChainMail,
     state: &mut TissueState,
     grip: &Grip,
@@ -80,8 +78,7 @@ pub(super) fn sweep<K: Kernels>(
 }
 
 /// Passes of projections over the whole body.
-#[inline(always)]
-fn project<K: Kernels>(
+fn project<K: Loops>(
     model: &ChainMail,
     state: &mut TissueState,
     grip: &Grip,

@@ -12,7 +12,6 @@ use super::state::TissueState;
 use crate::limits::Relaxation;
 
 /// One pass over the rows whose j + k is even (`parity` 0) or odd (1); what is held stays.
-#[inline(always)]
 pub(super) fn half_pass<K: RowSprings>(
     model: &ChainMail,
     state: &mut TissueState,

@@ -1,6 +1,7 @@
 //! What a pass leaves outside the limits: verifies links that moved, and finds what stays active.
 
 use super::kernels::{self, Kernels, Stretch};
+use super::loops::Loops;
 use super::spans::Span;
 use super::sweep::{Inner, Pass};
 
@@ -9,8 +10,7 @@ const CLEAN: f32 = 2.0;
 
 impl Pass<'_> {
     /// Checks every link, as after a pass that may have moved any element.
-    #[inline(always)]
-    pub fn check_all<K: Kernels>(&mut self) -> f32 {
+    pub fn check_all<K: Loops>(&mut self) -> f32 {
         let (rows, ny) = (&self.model.rows, self.model.lattice.dims[1]);
         self.state.active.add_all(rows, ny);
         self.state.moved.add_all(rows, ny);
@@ -19,8 +19,7 @@ impl Pass<'_> {
     }
 
     /// Checks every link at an active stretch; only what is outside its limits stays active.
-    #[inline(always)]
-    pub fn check<K: Kernels>(&mut self) -> f32 {
+    pub fn check<K: Loops>(&mut self) -> f32 {
         let ny = self.model.lattice.dims[1];
         let planes = self.state.active.planes();
         for k in planes.start..planes.end.max(planes.start) {
@@ -28,7 +27,7 @@ impl Pass<'_> {
             for j in rows.start..rows.end.max(rows.start) {
                 let row = j as usize + ny * k as usize;
                 for run in self.model.rows.numbers(row) {
-                    self.check_run::<K>(run, j as usize, k as usize);
+                    K::check_run(self, run, j as usize, k as usize);
                 }
             }
         }
@@ -36,7 +35,7 @@ impl Pass<'_> {
     }
 
     #[inline(always)]
-    fn check_run<K: Kernels>(&mut self, run: usize, j: usize, k: usize) {
+    pub(super) fn check_run<K: Kernels>(&mut self, run: usize, j: usize, k: usize) {
         let active = self.state.active.of_run(run);
         if active.is_empty() {
             return;

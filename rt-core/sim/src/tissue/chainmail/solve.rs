@@ -2,11 +2,11 @@
 
 use super::follow::follow;
 use super::held::{self, Grip};
-use super::kernels::{Kernels, Portable};
+use super::kernels::Portable;
+use super::loops::Loops;
 use super::model::ChainMail;
 use super::propagate::{MAX_SWEEPS, propagate};
 use super::relax;
-use super::springs::RowSprings;
 use super::state::TissueState;
 use super::sweep::Pass;
 use crate::tissue::{Held, Solve, StepReport};
@@ -50,26 +50,13 @@ fn kept_fraction(model: &ChainMail, dt_s: f64) -> f64 {
 fn dispatch(model: &ChainMail, state: &mut TissueState, grip: Option<Grip>, report: &mut StepReport) -> f32 {
     #[cfg(target_arch = "x86_64")]
     if model.vectors {
-        // SAFETY: `vectors` says that the processor has AVX2.
-        return unsafe { solve_avx2(model, state, grip, report) };
+        return solve::<super::avx2::Avx2>(model, state, grip, report);
     }
     solve::<Portable>(model, state, grip, report)
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn solve_avx2(model: &ChainMail, state: &mut TissueState, grip: Option<Grip>, report: &mut StepReport) -> f32 {
-    solve::<super::avx2::Avx2>(model, state, grip, report)
-}
-
 /// Puts the held element in place, brings the body into its limits, relaxes it and brings it there again.
-#[inline(always)]
-fn solve<K: Kernels + RowSprings>(
-    model: &ChainMail,
-    state: &mut TissueState,
-    mut grip: Option<Grip>,
-    report: &mut StepReport,
-) -> f32 {
+fn solve<K: Loops>(model: &ChainMail, state: &mut TissueState, mut grip: Option<Grip>, report: &mut StepReport) -> f32 {
     let farthest = grip.map_or(0.0, |g| g.at.iter().fold(0.0, |a: f32, c| a.max(c.abs())));
     let slack = slack(model, farthest.max(state.max_displacement));
     let mut residual = match &mut grip {
@@ -105,8 +92,7 @@ fn slack(model: &ChainMail, farthest: f32) -> f32 {
 }
 
 /// Brings a body that is relaxed back into its limits.
-#[inline(always)]
-fn settle<K: Kernels>(
+fn settle<K: Loops>(
     model: &ChainMail,
     state: &mut TissueState,
     grip: Option<&Grip>,

@@ -5,6 +5,7 @@
 //! for those that come after it: a sweep goes as far as something moves. A fixed element is always the inner end.
 
 use super::kernels::{self, Kernels, LOWER, Pin, Scaled, Stretch, UPPER};
+use super::loops::Loops;
 use super::model::ChainMail;
 use super::spans::Span;
 use super::state::TissueState;
@@ -47,25 +48,24 @@ impl<'a> Pass<'a> {
     }
 
     /// One outward sweep. Leaves active what is still violated; says how far, in elements.
-    #[inline(always)]
-    pub fn outward<K: Kernels>(&mut self) -> f32 {
+    pub fn outward<K: Loops>(&mut self) -> f32 {
         let nz = self.model.lattice.dims[2];
         let held_k = self.held_cell[2];
         let planes = self.state.active.planes();
         if planes.start as usize <= held_k && held_k < planes.end as usize {
-            self.plane::<K>(held_k, None);
+            K::plane(self, held_k, None);
         }
         for k in (held_k + 1).max(planes.start as usize)..nz {
             if k >= planes.end as usize && self.state.active.rows(k - 1).is_empty() {
                 break;
             }
-            self.plane::<K>(k, Some(Inner::Below));
+            K::plane(self, k, Some(Inner::Below));
         }
         for k in (0..held_k.min(planes.end as usize)).rev() {
             if k < planes.start as usize && self.state.active.rows(k + 1).is_empty() {
                 break;
             }
-            self.plane::<K>(k, Some(Inner::Above));
+            K::plane(self, k, Some(Inner::Above));
         }
         if self.model.classes.any_fixed() {
             // Inner elements have moved too, whose links were already handled.
@@ -76,7 +76,7 @@ impl<'a> Pass<'a> {
     }
 
     #[inline(always)]
-    fn plane<K: Kernels>(&mut self, k: usize, inner_z: Option<Inner>) {
+    pub(super) fn plane<K: Kernels>(&mut self, k: usize, inner_z: Option<Inner>) {
         let held_j = self.held_cell[1];
         let [first, end] = self.model.rows_of_plane[k];
         let own = self.state.active.rows(k);

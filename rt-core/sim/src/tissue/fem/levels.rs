@@ -8,6 +8,9 @@ use super::real::Real;
 use super::simd::Simd;
 use super::sweep::{Field, LineOp, Planes, sweep, zeros};
 
+/// Below so many free nodes the coarsest level is solved directly.
+const DIRECT_NODES: usize = 30;
+
 /// What a level is made from, in f64.
 pub(super) struct Cells {
     pub grid: Grid,
@@ -31,6 +34,22 @@ impl<T: Real> Level<T> {
         };
         level.largest_eigenvalue = largest_eigenvalue(&level, work).min(bound(cells));
         level
+    }
+}
+
+/// From the finest to the coarsest, which is factored.
+pub(super) fn levels<T: Real>(cells: &Cells) -> Vec<Level<T>> {
+    let mut work = Planes::new(cells.grid.stride * cells.grid.nodes[1]);
+    let mut levels: Vec<Level<T>> = vec![Level::new(cells, &mut work)];
+    let mut last = coarser(cells);
+    loop {
+        let finest = &levels[levels.len() - 1];
+        let free = finest.inverse_diagonal.iter().filter(|&&d| d != T::ZERO).count();
+        if free <= DIRECT_NODES || last.grid.nodes == finest.grid.nodes {
+            return levels;
+        }
+        levels.push(Level::new(&last, &mut work));
+        last = coarser(&last);
     }
 }
 

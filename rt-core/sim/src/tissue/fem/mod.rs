@@ -36,6 +36,7 @@
 pub mod batch;
 mod cg;
 mod coarsest;
+mod compiled;
 mod grid;
 mod grip;
 mod guess;

@@ -3,15 +3,12 @@
 use super::grid::{Grid, corners};
 use super::hexahedron::Stiffness;
 use super::level::Level;
-use super::levels::{Cells, coarser};
+use super::levels::{Cells, levels};
 use super::material::{FemProblem, FemSettings, Structure, problems_of};
 use super::real::Real;
-use super::sweep::Planes;
 use crate::scene::Lattice;
 use std::sync::Arc;
 
-/// Below so many free nodes the coarsest level is solved directly.
-const DIRECT_NODES: usize = 30;
 /// A node that touches no element.
 const NO_PART: u32 = u32::MAX;
 
@@ -50,6 +47,14 @@ impl<T: Real> FemModel<T> {
         lattice: &Arc<Lattice>,
         settings: &FemSettings,
         is_fixed: impl Fn([f64; 3]) -> bool,
+    ) -> Result<Self, Vec<FemProblem>> {
+        T::model(lattice, settings, &is_fixed)
+    }
+
+    pub(super) fn of_lattice(
+        lattice: &Arc<Lattice>,
+        settings: &FemSettings,
+        is_fixed: &dyn Fn([f64; 3]) -> bool,
     ) -> Result<Self, Vec<FemProblem>> {
         let problems = problems_of(settings, lattice.element_count());
         if !problems.is_empty() {
@@ -182,21 +187,6 @@ impl Body {
                 }
             }
         }
-    }
-}
-
-fn levels<T: Real>(cells: &Cells) -> Vec<Level<T>> {
-    let mut work = Planes::new(cells.grid.stride * cells.grid.nodes[1]);
-    let mut levels: Vec<Level<T>> = vec![Level::new(cells, &mut work)];
-    let mut last = coarser(cells);
-    loop {
-        let finest = &levels[levels.len() - 1];
-        let free = finest.inverse_diagonal.iter().filter(|&&d| d != T::ZERO).count();
-        if free <= DIRECT_NODES || last.grid.nodes == finest.grid.nodes {
-            return levels;
-        }
-        levels.push(Level::new(&last, &mut work));
-        last = coarser(&last);
     }
 }
 

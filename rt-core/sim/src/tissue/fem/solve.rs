@@ -64,6 +64,15 @@ pub fn step<T: Real>(
     held: Option<TipPatch>,
     settings: &SolveSettings,
 ) -> FemReport {
+    T::step(model, state, held, settings)
+}
+
+pub(super) fn step_held<T: Real>(
+    model: &FemModel<T>,
+    state: &mut FemState<T>,
+    held: Option<TipPatch>,
+    settings: &SolveSettings,
+) -> FemReport {
     if !state.fits(model) {
         return report(state, HeldOutcome::Refused, 0, f64::INFINITY, settings);
     }
@@ -161,6 +170,15 @@ pub(super) fn hold_cells<T: Real>(
 /// A piece of work on the answer to a patch that may be held soon, where the last step took no cycle: so much that both
 /// together cost no more than a step with one cycle. Changes no answer.
 pub fn prepare<T: Real>(
+    model: &FemModel<T>,
+    state: &mut FemState<T>,
+    next: Option<TipPatch>,
+    settings: &SolveSettings,
+) {
+    T::prepare(model, state, next, settings);
+}
+
+pub(super) fn prepare_next<T: Real>(
     model: &FemModel<T>,
     state: &mut FemState<T>,
     next: Option<TipPatch>,

@@ -22,6 +22,10 @@ pub struct FemState<T = f32> {
 impl<T: Real> FemState<T> {
     /// The body at rest.
     pub fn at_rest(model: &FemModel<T>) -> Self {
+        T::at_rest(model)
+    }
+
+    pub(super) fn of_model(model: &FemModel<T>) -> Self {
         FemState {
             displacement: std::array::from_fn(|_| touched(model.element_count(), 0.0)),
             max_displacement: 0.0,
@@ -68,7 +72,7 @@ impl<T: Real> FemState<T> {
 
     /// The elastic energy, in body and springs.
     pub fn strain_energy_j(&mut self, model: &FemModel<T>) -> f64 {
-        self.grip.strain_energy_j(model)
+        T::strain_energy_j(self, model)
     }
 
     /// Drops the answers that are kept: steps from here on give the same bytes as those of a new state.

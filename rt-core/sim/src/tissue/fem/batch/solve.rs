@@ -52,6 +52,10 @@ pub struct BatchState<T = f32> {
 impl<T: Real> BatchState<T> {
     /// Room for eight answers.
     pub fn new(model: &BatchModel<T>) -> Self {
+        T::batch_state(model)
+    }
+
+    pub(in super::super) fn of_model(model: &BatchModel<T>) -> Self {
         let zeros = || vec![[[T::ZERO; LOADS]; 3]; model.node_count()];
         let last = model.levels.len() - 1;
         let mut slices = Vec::new();
@@ -91,6 +95,10 @@ impl<T: Real> BatchState<T> {
 
     /// Takes up at most eight loads; those past the eighth are ignored, as are nodes that do not move.
     pub fn begin(&mut self, model: &BatchModel<T>, loads: &[&[NodeWeight]]) {
+        T::begin(self, model, loads);
+    }
+
+    pub(in super::super) fn take_up(&mut self, model: &BatchModel<T>, loads: &[&[NodeWeight]]) {
         for field in [&mut self.u, &mut self.r, &mut self.p, &mut self.q] {
             field.fill([[T::ZERO; LOADS]; 3]);
         }
@@ -109,6 +117,10 @@ impl<T: Real> BatchState<T> {
 
     /// Does one slice of work; its cost is that of one pass over one level.
     pub fn advance(&mut self, model: &BatchModel<T>) -> Progress {
+        T::advance(self, model)
+    }
+
+    pub(in super::super) fn do_slice(&mut self, model: &BatchModel<T>) -> Progress {
         let levels = &model.levels;
         match self.slices[self.next] {
             Slice::Down(n) => {
