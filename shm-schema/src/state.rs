@@ -95,6 +95,11 @@ pub mod flags {
     pub const GATE_ACTED: u32 = 1 << 6;
     /// Engaged, but the force is still too large to begin with: move the needle until it is small.
     pub const WAITING: u32 = 1 << 7;
+    /// The tissue answers along lines that are prepared while the needle is outside: before it goes in, [`LINE_READY`]
+    /// should be set, or it goes in as without a line.
+    pub const LINE_NEEDED: u32 = 1 << 8;
+    /// The needle is on a line that is ready.
+    pub const LINE_READY: u32 = 1 << 9;
 }
 
 /// Phase of needle and tissue (paper eq. 6), by stable number.

@@ -4,10 +4,13 @@ use crate::tolerance::{TISSUE_REST_FOR_S, TISSUE_REST_LIMIT_S, TISSUE_REST_M, ar
 use crate::{NeedleWay, Operation, Pace, Step};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
-use stylet_shm_schema::{Fault, HandMove, HapticState};
+use stylet_shm_schema::{Fault, HandMove, HapticState, flags};
 
 /// A request that is not answered, or does not take effect, within this time has failed, s.
 const REPLY_LIMIT_S: f64 = 3.0;
+
+/// Preparing the tissue for a needle takes seconds, on a busy machine many.
+const LINE_LIMIT_S: f64 = 120.0;
 
 /// What the procedure asks of whoever drives it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,6 +106,12 @@ pub enum StepFailure {
     /// A seed was dropped and is not in the tissue.
     #[error("waited {REPLY_LIMIT_S:.1} s for the seed in the tissue")]
     NoSeed,
+    /// The tissue did not come to be ready for the needle.
+    #[error(
+        "waited {LINE_LIMIT_S:.0} s for the tissue to be ready for the needle where it is placed; rt-core prepares that beside \
+         its loops, so give it a processor, or run with --tissue chainmail"
+    )]
+    NoLine,
     /// The tip did not arrive.
     #[error("waited {limit_s:.1} s for the tip at its target; it is {:.2} mm from it along the needle", off_along_m * 1e3)]
     NotArrived {
@@ -126,7 +135,13 @@ pub struct Procedure {
     is_engaged: bool,
     is_sent: bool,
     begun_s: f64,
+    /// When the tissue was last not ready for the needle.
+    ready_s: f64,
     holds_since_s: Option<f64>,
+}
+
+fn waits_for_line(state: &HapticState) -> bool {
+    state.flags & flags::LINE_NEEDED != 0 && state.flags & flags::LINE_READY == 0
 }
 
 impl Procedure {
@@ -172,6 +187,7 @@ impl Procedure {
             is_engaged: false,
             is_sent: false,
             begun_s: 0.0,
+            ready_s: 0.0,
             holds_since_s: None,
         }
     }
@@ -274,6 +290,14 @@ impl Procedure {
                 let waited = now_s - self.begun_s > TISSUE_REST_LIMIT_S;
                 Ok(self.holds_for(at_rest, TISSUE_REST_FOR_S, now_s) || waited)
             }
+            Operation::Place if waits_for_line(observed.state) => {
+                if now_s - self.begun_s > LINE_LIMIT_S {
+                    return Err(StepFailure::NoLine);
+                }
+                // The time to arrive counts from when the line is ready.
+                self.ready_s = now_s;
+                Ok(false)
+            }
             Operation::Place | Operation::Insert | Operation::DrawBack(_) | Operation::Retract | Operation::TakeOut => {
                 self.has_arrived(now_s, observed.state, (needle, operation))
             }
@@ -307,7 +331,7 @@ impl Procedure {
         let along_m = |place_m: Vector3<f64>| (place_m - way.entry_m).dot(&way.direction);
         let off_along_m = along_m(Vector3::from(state.tip_in_scene_m)) - along_m(Vector3::from(goal.tip_m));
         let limit_s = move_limit_s(goal.speed_m_per_s);
-        if now_s - self.begun_s > limit_s {
+        if now_s - self.begun_s.max(self.ready_s) > limit_s {
             return Err(StepFailure::NotArrived { limit_s, off_along_m });
         }
         let after_s = arrived_after_s(state, off_along_m);

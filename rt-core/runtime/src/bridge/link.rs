@@ -24,6 +24,7 @@ pub struct Link {
     tickets: Ticket,
     events: u64,
     batch: Vec<TickRecord>,
+    newest: Option<TickRecord>,
     announced_ns: u64,
     cleaned_ns: u64,
 }
@@ -66,6 +67,7 @@ impl Link {
             waiting: HashMap::new(),
             tickets: 0,
             events: 0,
+            newest: None,
             batch: Vec::with_capacity(MAX_BATCH),
             announced_ns: 0,
             cleaned_ns: 0,
@@ -88,6 +90,11 @@ impl Link {
     }
 
     /// True when the force loop has made a tick.
+    /// The last record that was sent.
+    pub fn newest_record(&self) -> Option<&TickRecord> {
+        self.newest.as_ref()
+    }
+
     pub fn send_records(&mut self, records: &mut rtrb::Consumer<TickRecord>) -> bool {
         let mut any = false;
         loop {
@@ -100,6 +107,7 @@ impl Link {
                 return any;
             }
             any = true;
+            self.newest = self.batch.last().copied();
             if let Ok(mut sample) = self.ports.records.loan_slice_uninit(self.batch.len()) {
                 *sample.user_header_mut() = self.session.session_id;
                 let _ = sample.write_from_slice(&self.batch).send();

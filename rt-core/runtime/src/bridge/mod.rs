@@ -2,6 +2,7 @@
 
 mod commands;
 mod flight;
+mod lines;
 mod link;
 mod loader;
 mod notices;
@@ -20,6 +21,7 @@ use crate::rt::wiring::BridgePorts;
 use flight::FlightKeeper;
 pub use flight::SaveError;
 use iceoryx2::node::Node;
+use lines::LinePreparer;
 use link::{EventDetails, Link};
 use loader::SceneLoader;
 use notices::LoopRings;
@@ -86,6 +88,7 @@ pub struct Bridge {
     scene: RunningScene,
     loader: SceneLoader,
     rehearsals: RehearsalRunner,
+    lines: LinePreparer,
     supervisor: Supervisor,
 }
 
@@ -111,6 +114,9 @@ impl Bridge {
                 tissue_orders: loops.tissue_orders,
                 tissue_notices: loops.tissue_notices,
                 old_worlds: loops.old_worlds,
+                lines: loops.lines,
+                old_hand_lines: loops.old_hand_lines,
+                old_body_lines: loops.old_body_lines,
             },
             device: setup.device,
             tissue: setup.tissue,
@@ -122,6 +128,7 @@ impl Bridge {
                 next: None,
             },
             loader: SceneLoader::default(),
+            lines: LinePreparer::new(Arc::clone(&setup.source), setup.tissue),
             rehearsals: RehearsalRunner::new(setup.source, setup.tissue, setup.device),
             supervisor: Supervisor::default(),
         }
@@ -156,6 +163,8 @@ impl Bridge {
         while self.loops.old_worlds.pop().is_ok() {}
         let made_a_tick = self.link.send_records(&mut self.loops.records);
         self.serve_flights();
+        let generation = self.scene.generation();
+        self.lines.pass(self.link.newest_record(), generation, &mut self.loops);
         let (generation, size) = (self.scene.generation(), self.scene.picture.snapshot_size());
         self.loans.pass(&self.link.ports, generation, size);
         if self.supervisor.pass(made_a_tick) {

@@ -5,6 +5,7 @@ use super::link::EventDetails;
 use crate::rt::exchange::{HapticOrder, Notice, TissueOrder};
 use crate::rt::world::World;
 use stylet_shm_schema::{EventKind, TickRecord};
+use stylet_sim::line::{BodyLine, HandLine};
 
 /// Ends of the rings to and from both loops.
 pub(super) struct LoopRings {
@@ -14,6 +15,9 @@ pub(super) struct LoopRings {
     pub tissue_orders: rtrb::Producer<TissueOrder>,
     pub tissue_notices: rtrb::Consumer<Notice>,
     pub old_worlds: rtrb::Consumer<Box<World>>,
+    pub lines: rtrb::Producer<Box<HandLine>>,
+    pub old_hand_lines: rtrb::Consumer<Box<HandLine>>,
+    pub old_body_lines: rtrb::Consumer<Box<BodyLine>>,
 }
 
 impl Bridge {

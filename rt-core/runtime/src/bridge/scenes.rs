@@ -128,6 +128,7 @@ impl Bridge {
     pub(super) fn scene_taken_up(&mut self, generation: u64, tick: u64) {
         if let Some((picture, source)) = self.scene.next.take() {
             self.scene.picture = picture;
+            self.lines.change_scene(Arc::clone(&source));
             self.rehearsals.change_scene(source);
             self.scene.sent = false;
             self.scene.send(&self.link);

@@ -7,6 +7,7 @@
 mod rig;
 mod script;
 
+use crate::lines::{LineBody, NoLine};
 use crate::rt::world::{World, WorldError};
 use nalgebra::Vector3;
 use rig::Rig;
@@ -16,6 +17,7 @@ use std::time::Instant;
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::{MAX_SEEDS, ParameterProblems, ParameterSet, Reason, Refusal, RefusalCode, SeedPose, flags};
 use stylet_sim::active::activate;
+use stylet_sim::line::LineError;
 use stylet_sim::scene::{SceneSource, TissueKind};
 
 /// A rehearsal that takes longer than this, in its own time, has failed.
@@ -30,6 +32,9 @@ pub enum RehearseError {
     /// Its tissue cannot be set up.
     #[error(transparent)]
     World(#[from] WorldError),
+    /// The needle's line cannot be prepared.
+    #[error(transparent)]
+    Line(#[from] NoLine),
     /// Every parameter that is out of its range, one a line.
     #[error(transparent)]
     Parameters(#[from] ParameterProblems),
@@ -110,6 +115,8 @@ pub struct Rehearsed {
 /// A body to rehearse in; kept from one rehearsal to the next.
 pub struct Stage {
     world: Option<Box<World>>,
+    /// Where needles have lines: bodies of finite elements.
+    lines: Option<LineBody>,
     device: DeviceInfo,
 }
 
@@ -118,10 +125,15 @@ impl Stage {
     pub fn build(source: &SceneSource, tissue: TissueKind, device: DeviceInfo) -> Result<Self, RehearseError> {
         let mut scene = source.build().map_err(|e| RehearseError::Scene(e.to_string()))?;
         scene.tissue = tissue;
+        let lines = match tissue {
+            TissueKind::Fem => Some(LineBody::of_source(source)?),
+            TissueKind::ChainMail => None,
+        };
         let active = activate(&ParameterSet::default(), &device)?;
         let world = World::new(scene, active.limits, 1)?;
         Ok(Self {
             world: Some(Box::new(world)),
+            lines,
             device,
         })
     }
@@ -137,10 +149,23 @@ impl Stage {
             return Err(RehearseError::TooManyDrops(run.drops_m.len()));
         }
         let active = activate(set, &self.device)?;
+        // SYNC: set by the bridge when it ends; nothing but the flag is carried.
+        let mut goes_on = || !stop.load(Ordering::Relaxed);
+        let line = self.lines.as_ref().map(|body| {
+            let line = body.prepare(1, run.entry_m.into(), run.direction.into(), &mut goes_on);
+            line.map_err(|why| match why {
+                NoLine::Line(LineError::Stopped) => RehearseError::Stopped,
+                why => RehearseError::Line(why),
+            })
+        });
+        let line = line.transpose()?;
         let mut world = self.world.take().ok_or(RehearseError::BodyLost)?;
         world.tissue.return_to_rest();
         world.set_limits(active.limits.clone());
         let mut rig = Rig::new(world, &active, &self.device, run);
+        if let Some(line) = line {
+            rig.take_line(line);
+        }
         let outcome = perform(&mut rig, run, stop);
         self.world = Some(rig.into_world());
         outcome

@@ -8,6 +8,7 @@ use crate::stepped::{HAPTIC_TICKS_PER_TISSUE_TICK, SteppedLoops};
 use stylet_hw::{DeviceInfo, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
 use stylet_shm_schema::{HandMove, HapticState, RefusalCode, SeedPose};
 use stylet_sim::active::Active;
+use stylet_sim::line::ReadyLine;
 
 /// The tip begins at this distance before the entry, and comes to it as in a run.
 const RUN_UP_M: f64 = 0.01;
@@ -33,6 +34,13 @@ impl Rig {
             loops: SteppedLoops::new(world, Box::new(phantom), &memory, HAPTIC_TICKS_PER_TISSUE_TICK),
             refusal: None,
         }
+    }
+
+    /// Before the needle begins.
+    pub fn take_line(&mut self, line: ReadyLine) {
+        // Both rings are empty.
+        let _ = self.loops.bridge.lines.push(line.hand);
+        let _ = self.loops.bridge.tissue_orders.push(TissueOrder::Line(line.body));
     }
 
     /// One tick of the force loop, and of the tissue loop where one is due.

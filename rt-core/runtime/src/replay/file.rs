@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use stylet_hw::DeviceInfo;
 
 /// Ends in the version of the layout.
-const MAGIC: &[u8; 8] = b"STYFLT\0\x02";
+const MAGIC: &[u8; 8] = b"STYFLT\0\x03";
 const DIGEST: usize = 32;
 /// No recording is larger: two bodies of 8 MiB and the ticks.
 const MAX_BYTES: u64 = 256 << 20;

@@ -8,6 +8,7 @@ use stylet_hw::HandGoal;
 use stylet_shm_schema::{Fault, RefusalCode, SnapshotHeader, Vertex};
 use stylet_sim::force::ForceParameters;
 use stylet_sim::limits::Limits;
+use stylet_sim::line::BodyLine;
 use stylet_sim::needle::NeedleParameters;
 
 /// Number that joins an order to the host's request; 0 when nobody waits for an answer.
@@ -87,6 +88,8 @@ pub enum TissueOrder {
     },
     /// Hand the flight recording over; the loop records anew once it has it back.
     HandOverTape,
+    /// Columns for a needle that goes in where they were made; the force loop gets its half beside them.
+    Line(Box<BodyLine>),
 }
 
 /// Either loop to the bridge: what happened, once each.

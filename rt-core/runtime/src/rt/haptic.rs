@@ -17,8 +17,10 @@ use stylet_shm_schema::service::Ipc;
 use stylet_shm_schema::{Fault, HapticState};
 use stylet_sim::force::ForceFault;
 use stylet_sim::force::chain::{self, ChainOutput, ChainParameters, ChainState, Touch};
+use stylet_sim::line::HandLine;
 
 mod flight;
+mod line;
 mod orders;
 mod record;
 
@@ -37,6 +39,10 @@ pub struct HapticLoop {
     contact: u64,
     pose: TipPose,
     goal: Option<HandGoal>,
+    /// Ready for a needle that goes in where it lies.
+    line: Option<Box<HandLine>>,
+    /// The last tick was one on it.
+    on_line: bool,
     watchdog: Watchdog,
     /// What the device answered in this tick, for the recording.
     answer: DeviceAnswer,
@@ -89,6 +95,8 @@ impl HapticLoop {
             contact: memory.contact,
             pose: memory.pose,
             goal: memory.goal,
+            line: None,
+            on_line: false,
             watchdog: memory.watchdog,
             answer: DeviceAnswer::default(),
             state: memory.state,
@@ -133,6 +141,7 @@ impl HapticLoop {
     pub fn tick(&mut self, due_ns: u64, woke_ns: u64, missed: u32) -> ChainOutput {
         self.checkpoint();
         self.take_orders();
+        self.take_line();
         self.mark();
         let sample = self.read();
         self.mark();
@@ -216,6 +225,9 @@ impl HapticLoop {
     fn end_contact(&mut self) {
         self.pose.released_contact = self.contact;
         self.chain.end_contact();
+        if let Some(line) = &mut self.line {
+            line.reset();
+        }
     }
 
     /// Where the tip meets tissue, unless this loop has ended that contact already.
@@ -229,15 +241,7 @@ impl HapticLoop {
 
     /// Eq. 6-10 for this sample, and the gate.
     fn respond(&mut self, sample: &Sample, tissue: &TissueResponse) -> ChainOutput {
-        let touch = self.touch(tissue);
-        let output = chain::step(
-            &self.parameters,
-            &self.info,
-            &mut self.chain,
-            sample,
-            touch.as_ref(),
-            self.period_s,
-        );
+        let output = self.respond_to_needle(sample, tissue);
         if output.puncture {
             let (tick, time_ns) = (self.state.tick + 1, self.state.time_ns);
             self.notify(Notice::Puncture {
@@ -255,6 +259,25 @@ impl HapticLoop {
         }
         self.sample = Some(*sample);
         output
+    }
+
+    /// On its line where there is one, else against what the tissue loop has met.
+    fn respond_to_needle(&mut self, sample: &Sample, tissue: &TissueResponse) -> ChainOutput {
+        if self.is_on_line(sample, tissue)
+            && let Some(output) = self.respond_on_line(sample)
+        {
+            return output;
+        }
+        self.leave_line();
+        let touch = self.touch(tissue);
+        chain::step(
+            &self.parameters,
+            &self.info,
+            &mut self.chain,
+            sample,
+            touch.as_ref(),
+            self.period_s,
+        )
     }
 
     fn hand_over_pose(&mut self, woke_ns: u64, sample: &Sample, response: &ChainOutput) {

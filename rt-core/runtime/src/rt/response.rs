@@ -37,6 +37,8 @@ pub struct TissueResponse {
     pub missed: u64,
     /// Seeds in the tissue.
     pub seed_count: u32,
+    /// Generation of the line whose columns the tissue loop has; 0 for none.
+    pub line: u64,
     /// The step has not converged and the needle would feel it.
     pub unsolved: bool,
 }
@@ -72,6 +74,7 @@ impl Default for TissueResponse {
             worst_wake_ns: 0,
             missed: 0,
             seed_count: 0,
+            line: 0,
             unsolved: false,
         }
     }

@@ -16,10 +16,12 @@ use nalgebra::Vector3;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_shm_schema::{MAX_SEEDS, SeedPose};
 use stylet_sim::force::LocalResponse;
+use stylet_sim::line::BodyLine;
 use stylet_sim::tissue::{Held, StepReport};
 
 mod contact;
 mod flight;
+mod line;
 mod seeds;
 mod snapshot;
 
@@ -31,6 +33,10 @@ pub struct TissueLoop {
     seeds: Vec<Seed>,
     contact: Option<Contact>,
     contacts: u64,
+    /// Columns for a needle that goes in where they were made.
+    line: Option<Box<BodyLine>>,
+    /// The needle is in tissue by them.
+    in_by_line: bool,
     layers: LayersMet,
     /// The tip has been outside since the last contact.
     clear: bool,
@@ -63,6 +69,8 @@ impl TissueLoop {
             seeds: Vec::with_capacity(MAX_SEEDS),
             contact: None,
             contacts: 0,
+            line: None,
+            in_by_line: false,
             layers: LayersMet::default(),
             clear: true,
             held: None,
@@ -134,13 +142,17 @@ impl TissueLoop {
         let before = self.pose;
         self.pose = *self.ports.pose.read();
         self.mark();
-        self.end_contact_if_released();
-        self.begin_contact_if_met(&before);
-        self.meet_next_layer(&before);
         let travel = self.pose.held_travel_m - before.held_travel_m;
-        self.hold(travel);
+        let on_line = self.step_on_line();
+        if on_line.is_none() {
+            self.leave_line();
+            self.end_contact_if_released();
+            self.begin_contact_if_met(&before);
+            self.meet_next_layer(&before);
+            self.hold(travel);
+        }
         self.mark();
-        let report = self.world.tissue.step(self.held, self.period_s);
+        let report = on_line.unwrap_or_else(|| self.world.tissue.step(self.held, self.period_s));
         self.report = Some(report);
         self.mark();
         self.respond(woke_ns, &report);
@@ -179,6 +191,7 @@ impl TissueLoop {
                     self.checkpoint();
                 }
                 TissueOrder::HandOverTape => self.hand_over_tape(),
+                TissueOrder::Line(line) => self.take_line(line),
             }
         }
     }
@@ -213,6 +226,8 @@ impl TissueLoop {
         if let Err(rtrb::PushError::Full(old)) = self.ports.old_worlds.push(old) {
             std::mem::forget(old);
         }
+        self.drop_line();
+        self.leave_line();
         self.seeds.clear();
         self.response.seed_count = 0;
         self.end_contact();

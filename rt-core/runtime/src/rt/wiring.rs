@@ -2,12 +2,14 @@
 
 use crate::rt::exchange::{HapticOrder, Notice, SnapshotReturn, SnapshotSlot, TissueOrder};
 use crate::rt::haptic_tape::HapticTape;
+use crate::rt::line_loads::LineLoads;
 use crate::rt::pose::TipPose;
 use crate::rt::recorder::{Recorder, TapePort, recorder};
 use crate::rt::response::TissueResponse;
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use stylet_shm_schema::TickRecord;
+use stylet_sim::line::{BodyLine, HandLine};
 
 /// Places in each ring, all at least one.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +45,9 @@ impl Capacities {
     };
 }
 
+/// Lines on their way in each direction; the bridge frees what has come back before it sends another.
+const LINES: usize = 2;
+
 /// Ends that the force loop owns.
 pub struct HapticPorts {
     /// Newest pose, to the tissue loop.
@@ -55,6 +60,12 @@ pub struct HapticPorts {
     pub notices: rtrb::Producer<Notice>,
     /// One record for each tick, to the bridge.
     pub records: rtrb::Producer<TickRecord>,
+    /// Lines that are ready for the needle.
+    pub lines: rtrb::Consumer<Box<HandLine>>,
+    /// Replaced ones, to the bridge, which frees them.
+    pub old_lines: rtrb::Producer<Box<HandLine>>,
+    /// Forces on the line, to the tissue loop.
+    pub loads: triple_buffer::Input<LineLoads>,
     /// Flight recording.
     pub flight: Recorder<HapticTape>,
 }
@@ -71,6 +82,10 @@ pub struct TissuePorts {
     pub notices: rtrb::Producer<Notice>,
     /// Replaced scenes, to the bridge, which frees them.
     pub old_worlds: rtrb::Producer<Box<World>>,
+    /// Replaced columns of a line, to the bridge, which frees them.
+    pub old_lines: rtrb::Producer<Box<BodyLine>>,
+    /// Forces on the line, of the force loop.
+    pub loads: triple_buffer::Output<LineLoads>,
     /// Loaned snapshot memory.
     pub slots: rtrb::Consumer<SnapshotSlot>,
     /// Loaned memory that goes back to the bridge.
@@ -93,6 +108,12 @@ pub struct BridgePorts {
     pub tissue_notices: rtrb::Consumer<Notice>,
     /// Scenes to be freed.
     pub old_worlds: rtrb::Consumer<Box<World>>,
+    /// Lines that are ready, to the force loop; their columns go with an order to the tissue loop.
+    pub lines: rtrb::Producer<Box<HandLine>>,
+    /// Lines to be freed.
+    pub old_hand_lines: rtrb::Consumer<Box<HandLine>>,
+    /// Columns to be freed.
+    pub old_body_lines: rtrb::Consumer<Box<BodyLine>>,
     /// Snapshot memory for the tissue loop.
     pub slots: rtrb::Producer<SnapshotSlot>,
     /// Snapshot memory that the tissue loop has returned.
@@ -129,6 +150,10 @@ impl Wiring {
         let (tissue_orders, tissue_order_out) = rtrb::RingBuffer::new(capacities.orders);
         let (tissue_notice_in, tissue_notices) = rtrb::RingBuffer::new(capacities.notices);
         let (old_world_in, old_worlds) = rtrb::RingBuffer::new(capacities.old_worlds);
+        let (lines, line_out) = rtrb::RingBuffer::new(LINES);
+        let (old_hand_line_in, old_hand_lines) = rtrb::RingBuffer::new(LINES);
+        let (old_body_line_in, old_body_lines) = rtrb::RingBuffer::new(LINES);
+        let (loads_in, loads_out) = triple_buffer::triple_buffer(&LineLoads::default());
         let (slots, slot_out) = rtrb::RingBuffer::new(capacities.snapshots);
         let (filled_in, filled) = rtrb::RingBuffer::new(capacities.snapshots);
         let (haptic_flight, haptic_tapes) = recorder(haptic_tape);
@@ -140,6 +165,9 @@ impl Wiring {
                 orders: haptic_order_out,
                 notices: haptic_notice_in,
                 records: record_in,
+                lines: line_out,
+                old_lines: old_hand_line_in,
+                loads: loads_in,
                 flight: haptic_flight,
             },
             tissue: TissuePorts {
@@ -148,6 +176,8 @@ impl Wiring {
                 orders: tissue_order_out,
                 notices: tissue_notice_in,
                 old_worlds: old_world_in,
+                old_lines: old_body_line_in,
+                loads: loads_out,
                 slots: slot_out,
                 filled: filled_in,
                 flight: tissue_flight,
@@ -159,6 +189,9 @@ impl Wiring {
                 tissue_orders,
                 tissue_notices,
                 old_worlds,
+                lines,
+                old_hand_lines,
+                old_body_lines,
                 slots,
                 filled,
                 haptic_tapes,

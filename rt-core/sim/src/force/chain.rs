@@ -10,8 +10,10 @@ use super::law::{ForceInput, ForceTerms, force};
 use super::passivity::Motion;
 use crate::needle::{self, Front, LayerKind, NeedleInput, NeedleParameters, Phase};
 
+mod on_line;
 mod state;
 
+pub use on_line::step_on_line;
 pub use state::{ChainOutput, ChainParameters, ChainState, Touch};
 
 /// A stuck shaft is never softer than this, unless the operator set it so: the stiffest that every hand holds

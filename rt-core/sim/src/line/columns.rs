@@ -109,6 +109,12 @@ impl<T: Real> ColumnQueue<T> {
         &self.columns[..self.ready]
     }
 
+    /// The displacement fields of those that are ready, in order.
+    pub fn into_fields(mut self) -> Vec<ElementField> {
+        self.columns.truncate(self.ready);
+        self.columns.into_iter().map(|column| column.field).collect()
+    }
+
     /// Bytes of the columns, and of what they are solved in.
     pub fn bytes(&self) -> [usize; 2] {
         let column = |c: &Column| c.field.bytes() + 8 * c.samples_m.len();

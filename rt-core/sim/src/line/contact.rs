@@ -58,8 +58,9 @@ pub struct LineState {
     pub(super) shaft_n: Vec<f64>,
     /// Where on the needle each station sticks: tip's place in the world less displacement of the station.
     pub(super) anchor_m: Vec<f64>,
-    /// Displacement of the stations in contact.
+    /// Displacement of the stations in contact, and of the material at the tip.
     u_m: Vec<f64>,
+    tip_u_m: f64,
     pub(super) tip: TipState,
     /// Stations that the shaft touches: the first so many.
     pub(super) in_contact: usize,
@@ -85,6 +86,7 @@ impl LineState {
             shaft_n: vec![0.0; m],
             anchor_m: vec![0.0; m],
             u_m: vec![0.0; m],
+            tip_u_m: 0.0,
             tip: outside,
             in_contact: 0,
             tip_range: 0..0,
@@ -132,6 +134,41 @@ impl LineState {
             .map(|(n, force)| 0.5 * force * dot(rows.row(n), &f))
             .sum();
         at_once + self.memory.stored_j(rows, &model.settings.prony)
+    }
+
+    /// The tip presses on tissue or is in it.
+    pub fn is_in_contact(&self) -> bool {
+        self.in_contact > 0 || self.tip.force_n > 0.0
+    }
+
+    /// Half of force times displacement: the elastic energy without what relaxation holds, J. Does not allocate.
+    pub fn elastic_j(&self) -> f64 {
+        let shaft = self.shaft_n.iter().zip(&self.u_m).take(self.in_contact);
+        0.5 * (shaft.map(|(f, u)| f * u).sum::<f64>() + self.tip.force_n * self.tip_u_m)
+    }
+
+    /// Tissue at rest that no needle has touched, as [`LineState::new`]; does not allocate.
+    pub fn reset(&mut self) {
+        for field in [
+            &mut self.shaft_n,
+            &mut self.anchor_m,
+            &mut self.u_m,
+            &mut self.tip_column,
+            &mut self.loads_n,
+        ] {
+            field.fill(0.0);
+        }
+        self.tip = TipState {
+            material_m: f64::NEG_INFINITY,
+            ..TipState::default()
+        };
+        self.tip_u_m = 0.0;
+        self.in_contact = 0;
+        self.tip_range = 0..0;
+        self.tip_weights.fill(0.0);
+        self.tip_own = 0.0;
+        self.memory.reset();
+        self.last = LineOutput::default();
     }
 
     fn fits(&self, model: &LineModel) -> bool {
@@ -331,6 +368,7 @@ fn solve(
         }
     }
     state.tip.force_n = tip_n;
+    state.tip_u_m = tip_u_m;
     tip_m - place_m - tip_u_m
 }
 

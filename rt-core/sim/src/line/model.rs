@@ -127,6 +127,22 @@ impl LineModel {
         })
     }
 
+    /// Takes up other forces for the layers that `layer` knows, by number; where they begin stays. Does not allocate.
+    pub fn set_layers(&mut self, layer: impl Fn(usize) -> Option<LineLayer>) {
+        for (n, slot) in self.layers.iter_mut().enumerate() {
+            if let Some(new) = layer(n) {
+                *slot = LineLayer {
+                    from_m: slot.from_m,
+                    ..new
+                };
+            }
+        }
+        let spacing_m = self.compliance.spacing_m;
+        for (n, friction) in self.friction_n_per_m.iter_mut().enumerate() {
+            *friction = mean_friction(&self.layers, n as f64 * spacing_m, (n + 1) as f64 * spacing_m);
+        }
+    }
+
     /// How stations move with the loads on them.
     pub fn compliance(&self) -> &Compliance {
         &self.compliance

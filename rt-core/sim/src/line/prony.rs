@@ -52,6 +52,16 @@ impl Memory {
         }
     }
 
+    /// Forgets every load; does not allocate.
+    pub fn reset(&mut self) {
+        for field in self.loads_n.iter_mut().chain([&mut self.offset_m, &mut self.sum]) {
+            field.fill(0.0);
+        }
+        self.gain = 1.0;
+        self.parts = [0.0; 2];
+        self.is_on = false;
+    }
+
     /// What is known of this tick before its loads are.
     pub fn begin(&mut self, rows: &Rows, terms: &[PronyTerm; 2], dt_s: f64) {
         self.is_on = terms.iter().any(|t| t.strength > 0.0);

@@ -2,6 +2,7 @@
 
 use super::Deformed;
 use crate::limits::Limits;
+use crate::tissue::fem::batch::ElementField;
 
 use serde::{Deserialize, Serialize};
 
@@ -83,6 +84,12 @@ pub trait TissueModel: Send {
     /// has time left in this tick may work ahead, by a bounded piece. Obligations as for `step`. A wrong guess costs
     /// this work and no more; answers stay what they are within the model's tolerance.
     fn prepare(&mut self, _next: Option<Held>) {}
+
+    /// Displaces the body by the answers `columns` (m/N) to `loads_n`, in place of a step; what is held is let loose.
+    /// Obligations as for `step`. `None` from a model whose answers do not add up.
+    fn displace(&mut self, _columns: &[ElementField], _loads_n: &[f64]) -> Option<StepReport> {
+        None
+    }
 
     /// Whether forces may go by this step: one that has not converged is for no hand, but where a model says otherwise.
     fn may_be_felt(&self, report: &StepReport) -> bool {

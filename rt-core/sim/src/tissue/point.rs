@@ -1,6 +1,7 @@
 //! A point of the tissue: the element it belongs to and where in that element; moves and turns with it.
 
 use super::Deformed;
+use crate::scene::Lattice;
 use serde::{Deserialize, Serialize};
 
 /// `local` runs from -0.5 to 0.5 across an element, along the deformed links.
@@ -28,6 +29,19 @@ impl MaterialPoint {
         let p = in_reach(body, point_m)?;
         let from_hint = hint.and_then(|element| Self::locate_from(body, point_m, element));
         from_hint.or_else(|| walk(body, p, nearest_sample(body, p)))
+    }
+
+    /// The material point at a place of the scene frame while the body is at rest; `None` outside the tissue.
+    pub fn at_rest(lattice: &Lattice, point_m: [f64; 3]) -> Option<MaterialPoint> {
+        let p = point_m.map(|c| c / lattice.spacing_m);
+        if !p.iter().all(|&c| c >= 0.0) {
+            return None;
+        }
+        let element = lattice.element_of_cell(p[0] as usize, p[1] as usize, p[2] as usize)?;
+        Some(MaterialPoint {
+            element,
+            local: p.map(|c| (c - c.floor() - 0.5) as f32),
+        })
     }
 
     /// The same by a walk from `element` alone: as cheap where there is no tissue.

@@ -20,6 +20,9 @@ impl HapticLoop {
             contact,
             pose,
             goal,
+            // Of elastic bodies, which no recording holds.
+            line: _,
+            on_line: _,
             watchdog,
             answer: _,
             state,

@@ -20,6 +20,10 @@ impl HapticLoop {
                     force,
                 } => {
                     self.parameters = ChainParameters { needle, force };
+                    let forces = self.parameters.layer_forces();
+                    if let Some(line) = &mut self.line {
+                        line.set_forces(&forces);
+                    }
                     self.state.parameters_generation = generation;
                     self.notify(Notice::ParametersActive {
                         ticket,

@@ -14,7 +14,7 @@ const AT_REST_M_PER_S: f64 = 3e-3;
 
 impl HapticLoop {
     fn flags(&self, response: &ChainOutput) -> u32 {
-        let always = flags::REAL_TIME | flags::SIMULATED_DEVICE;
+        let always = flags::REAL_TIME | flags::SIMULATED_DEVICE | flags::LINE_NEEDED;
         let speed = self.chain.estimator.velocity_m_per_s().norm();
         let at_goal = self.goal.is_some_and(|goal| {
             (self.pose.tip_in_scene - goal.tip_in_world).norm() < AT_GOAL_M && speed < AT_REST_M_PER_S
@@ -26,6 +26,7 @@ impl HapticLoop {
             | bit(response.phase != Phase::Outside, flags::IN_CONTACT)
             | bit(self.chain.needle.punctured, flags::PUNCTURED)
             | bit(at_goal, flags::AT_GOAL)
+            | bit(self.on_line, flags::LINE_READY)
     }
 
     pub(super) fn record(

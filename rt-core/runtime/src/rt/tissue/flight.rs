@@ -14,6 +14,9 @@ impl TissueLoop {
             seeds,
             contact,
             contacts,
+            // Of elastic bodies, which no recording holds.
+            line: _,
+            in_by_line: _,
             layers,
             clear,
             held,

@@ -12,7 +12,8 @@ impl TissueLoop {
     pub(super) fn drop_seed(&mut self, ticket: Ticket) {
         let tip_m = self.pose.tip_in_scene;
         let hint = self.held.map(|h| h.element);
-        let found = self.locate(&tip_m, hint);
+        let on_line = self.material_on_line(SEED_LENGTH_M);
+        let found = on_line.map_or_else(|| self.locate(&tip_m, hint), |[tip, _]| tip);
         let notice = match found {
             None => Notice::Refused {
                 ticket,
@@ -24,7 +25,8 @@ impl TissueLoop {
             },
             Some(tip) => {
                 let index = self.seeds.len() as u32;
-                let tail = self.locate(&(tip_m - self.pose.direction * SEED_LENGTH_M), Some(tip.element));
+                let tail_m = tip_m - self.pose.direction * SEED_LENGTH_M;
+                let tail = on_line.map_or_else(|| self.locate(&tail_m, Some(tip.element)), |[_, tail]| tail);
                 // Room for MAX_SEEDS was reserved: this push does not allocate.
                 self.seeds.push(Seed {
                     tip,

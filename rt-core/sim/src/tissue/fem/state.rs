@@ -1,5 +1,6 @@
 //! Where the elastic body is, and everything that a step works in.
 
+use super::batch::ElementField;
 use super::grip::Grip;
 use super::model::FemModel;
 use super::real::Real;
@@ -73,6 +74,35 @@ impl<T: Real> FemState<T> {
     /// The elastic energy, in body and springs.
     pub fn strain_energy_j(&mut self, model: &FemModel<T>) -> f64 {
         T::strain_energy_j(self, model)
+    }
+
+    /// Lets loose what is held, and displaces every element by the sum of loads times answers (m/N); how many moved.
+    pub fn displace(&mut self, model: &FemModel<T>, columns: &[ElementField], loads_n: &[f64]) -> u32 {
+        if !self.fits(model) {
+            return 0;
+        }
+        self.grip.release();
+        self.has_time = false;
+        let per_element = 1.0 / model.lattice.spacing_m;
+        for (axis, sum) in self.displacement.iter_mut().enumerate() {
+            sum.fill(0.0);
+            for (column, &load_n) in columns.iter().zip(loads_n).filter(|(_, load_n)| **load_n != 0.0) {
+                let factor = (load_n * per_element) as f32;
+                for (sum, u) in sum.iter_mut().zip(&column.0[axis]) {
+                    *sum += factor * u;
+                }
+            }
+        }
+        let [x, y, z] = &self.displacement;
+        let (mut largest, mut moved) = (0.0_f32, 0);
+        for ((x, y), z) in x.iter().zip(y).zip(z) {
+            let square = x * x + y * y + z * z;
+            moved += u32::from(square > 0.0);
+            // What is no number stays, so that nobody takes the answer for one.
+            largest = if square <= largest { largest } else { square };
+        }
+        self.max_displacement = largest.sqrt();
+        moved
     }
 
     /// Drops the answers that are kept: steps from here on give the same bytes as those of a new state.

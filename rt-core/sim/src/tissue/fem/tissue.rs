@@ -1,5 +1,6 @@
 //! FEM as a tissue model.
 
+use super::batch::ElementField;
 use super::material::{FemProblem, FemSettings, Integration, Material, Structure};
 use super::model::FemModel;
 use super::real::Real;
@@ -7,7 +8,7 @@ use super::solve::{SolveSettings, TipPatch, prepare, step};
 use super::state::FemState;
 use crate::limits::Limits;
 use crate::scene::Scene;
-use crate::tissue::{Deformed, Held, Solve, StepReport, TissueModel};
+use crate::tissue::{Deformed, Held, HeldOutcome, Solve, StepReport, TissueModel};
 
 /// What surrounds a body: 20 mm of fat of 5 kPa, per surface area (assumed).
 pub const SURROUNDINGS_PA_PER_M: f64 = 5e3 / 20e-3;
@@ -88,6 +89,21 @@ impl<T: Real> TissueModel for FemTissue<T> {
 
     fn prepare(&mut self, next: Option<Held>) {
         prepare(&self.model, &mut self.state, next.map(patch), &self.settings);
+    }
+
+    fn displace(&mut self, columns: &[ElementField], loads_n: &[f64]) -> Option<StepReport> {
+        let moved = self.state.displace(&self.model, columns, loads_n);
+        Some(StepReport {
+            passes: 0,
+            // What the columns were solved to is theirs; the sum adds nothing.
+            residual: 0.0,
+            moved,
+            converged: self.state.max_displacement.is_finite(),
+            max_displacement: self.state.max_displacement,
+            held: HeldOutcome::None,
+            solve: Solve::Nothing,
+            tip_force_n: None,
+        })
     }
 
     fn may_be_felt(&self, report: &StepReport) -> bool {

@@ -1,0 +1,72 @@
+//! The needle on a prepared line: taking lines up, one tick on one, and the forces that the tissue loop hears of.
+
+use super::HapticLoop;
+use crate::rt::line_loads::LineLoads;
+use crate::rt::response::TissueResponse;
+use stylet_hw::Sample;
+use stylet_sim::force::chain::{ChainOutput, step_on_line};
+
+impl HapticLoop {
+    /// A line is changed only while the needle is out of the tissue; the old one goes back to be freed.
+    pub(super) fn take_line(&mut self) {
+        let in_tissue = self.line.as_ref().is_some_and(|line| line.is_in_tissue());
+        if in_tissue || self.ports.old_lines.is_full() {
+            return;
+        }
+        if let Ok(mut next) = self.ports.lines.pop() {
+            next.set_forces(&self.parameters.layer_forces());
+            if let Some(old) = self.line.replace(next) {
+                // There is room: it was looked at above, and this thread alone fills the ring.
+                let _ = self.ports.old_lines.push(old);
+            }
+        }
+    }
+
+    /// Whether this tick is one on the line: the needle is in tissue by it, or comes to it outside of any other contact.
+    /// A line that the tissue loop has no columns for is none; what held the needle by it lets go.
+    pub(super) fn is_on_line(&mut self, sample: &Sample, tissue: &TissueResponse) -> bool {
+        let in_other_contact = tissue.contact > self.pose.released_contact;
+        self.line.as_mut().is_some_and(|line| {
+            if line.generation != tissue.line {
+                line.reset();
+                return false;
+            }
+            line.is_in_tissue()
+                || (!in_other_contact && line.is_met_by(&sample.tip_in_world, &sample.direction_in_world()))
+        })
+    }
+
+    /// One tick on the line; `None` without one.
+    pub(super) fn respond_on_line(&mut self, sample: &Sample) -> Option<ChainOutput> {
+        let line = self.line.as_mut()?;
+        let output = step_on_line(
+            &self.parameters,
+            &self.info,
+            &mut self.chain,
+            sample,
+            line,
+            self.period_s,
+        );
+        let state = line.state();
+        let loads = self.ports.loads.input_buffer_mut();
+        loads.generation = line.generation;
+        loads.in_tissue = line.is_in_tissue();
+        loads.tip_material_m = state.tip().material_m;
+        loads.count = 0;
+        for (slot, load) in loads.loads_n.iter_mut().zip(state.loads_n()) {
+            *slot = *load;
+            loads.count += 1;
+        }
+        self.ports.loads.publish();
+        self.on_line = true;
+        Some(output)
+    }
+
+    /// The needle is on no line from now on.
+    pub(super) fn leave_line(&mut self) {
+        if std::mem::take(&mut self.on_line) {
+            *self.ports.loads.input_buffer_mut() = LineLoads::default();
+            self.ports.loads.publish();
+        }
+    }
+}

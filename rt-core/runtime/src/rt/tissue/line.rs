@@ -1,0 +1,92 @@
+//! The tissue tick while the needle is on a prepared line: the body is the sum of the line's loads times its columns.
+
+use super::TissueLoop;
+use crate::rt::exchange::Notice;
+use crate::rt::line_loads::LineLoads;
+use nalgebra::Vector3;
+use stylet_sim::line::BodyLine;
+use stylet_sim::tissue::{MaterialPoint, StepReport};
+
+impl TissueLoop {
+    /// Takes up the columns of a new line; the old ones go back to be freed.
+    pub(super) fn take_line(&mut self, line: Box<BodyLine>) {
+        if self.in_by_line {
+            // The force loop keeps the line that it is on; the bridge sends another when it sees that this one is not in use.
+            self.free(line);
+            return;
+        }
+        self.drop_line();
+        self.response.line = line.generation;
+        self.line = Some(line);
+    }
+
+    /// The body that they were solved for has gone.
+    pub(super) fn drop_line(&mut self) {
+        self.response.line = 0;
+        if let Some(old) = self.line.take() {
+            self.free(old);
+        }
+    }
+
+    /// By the bridge: freeing has no place in a tick. The bridge empties the ring before it sends another line.
+    fn free(&mut self, line: Box<BodyLine>) {
+        if let Err(rtrb::PushError::Full(line)) = self.ports.old_lines.push(line) {
+            std::mem::forget(line);
+        }
+    }
+
+    /// The step of a tick on the line; `None` where the needle is on none that this loop has.
+    pub(super) fn step_on_line(&mut self) -> Option<StepReport> {
+        let loads = *self.ports.loads.read();
+        let line = self.line.as_ref().filter(|line| line.generation == loads.generation)?;
+        let report = self.world.tissue.displace(&line.columns, loads.loads_n())?;
+        let entry = Vector3::from(line.line.entry_m);
+        let direction = Vector3::from(line.line.axes[0]);
+        if self.contact.is_some() {
+            self.end_contact();
+        }
+        self.meet_on_line(&loads, entry, direction);
+        Some(report)
+    }
+
+    /// The needle is on no line: whoever was told of a contact is told of its end.
+    pub(super) fn leave_line(&mut self) {
+        if std::mem::take(&mut self.in_by_line) {
+            let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
+            self.notify(Notice::LeftTissue { tick, time_ns });
+        }
+    }
+
+    fn meet_on_line(&mut self, loads: &LineLoads, entry: Vector3<f64>, direction: Vector3<f64>) {
+        if loads.in_tissue && !self.in_by_line {
+            self.in_by_line = true;
+            self.response.contact_in_scene = entry;
+            self.response.path_direction = direction;
+            let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
+            self.notify(Notice::Contact {
+                tick,
+                time_ns,
+                position_m: entry,
+            });
+        } else if !loads.in_tissue {
+            self.leave_line();
+        }
+    }
+
+    /// The material at the tip and `behind_m` behind it, by the line; `None` where the needle is in no tissue by one.
+    pub(super) fn material_on_line(&mut self, behind_m: f64) -> Option<[Option<MaterialPoint>; 2]> {
+        let loads = self.ports.loads.read();
+        let line = self.line.as_ref().filter(|line| line.generation == loads.generation)?;
+        let tip_m = loads.tip_material_m;
+        if !loads.in_tissue {
+            return None;
+        }
+        let at = |along_m: f64| {
+            let place_m = line.line.point_m(along_m, [0.0; 2]);
+            (along_m > 0.0)
+                .then(|| MaterialPoint::at_rest(&self.world.scene.lattice, place_m))
+                .flatten()
+        };
+        Some([at(tip_m), at(tip_m - behind_m)])
+    }
+}

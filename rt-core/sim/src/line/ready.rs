@@ -1,0 +1,283 @@
+//! A line that is ready to be used: its hand's half for the force loop, its body's half for the tissue loop.
+//!
+//! Made ahead of the needle on a thread of normal priority ([`ReadyLine::prepare`]); neither half allocates after that.
+
+use super::columns::{ColumnQueue, QueueProgress, TOLERANCE};
+use super::compliance::Compliance;
+use super::contact::{LineInput, LineOutput, LineState, step};
+use super::model::{LineLayer, LineModel, LineSettings, MAX_LAYERS, MAX_STATIONS};
+use super::stations::{Line, StationSettings, Stations};
+use crate::needle::{LayerKind, Layers};
+use crate::scene::Lattice;
+use crate::tissue::fem::batch::{BatchModel, ElementField};
+use nalgebra::Vector3;
+
+/// The needle is on a line whose entry it would meet so far from it, and whose direction is that close to its own.
+const BESIDE_M: f64 = 1e-3;
+const TILT_RAD: f64 = 0.02;
+/// Slices of work between two looks at whether the line is still wanted.
+const SLICES: usize = 8;
+
+/// Both halves of a line, one for each loop.
+pub struct ReadyLine {
+    /// For the force loop.
+    pub hand: Box<HandLine>,
+    /// For the tissue loop.
+    pub body: Box<BodyLine>,
+}
+
+/// What the force loop needs: how the stations move with the forces on them, and what has happened so far.
+#[derive(Clone, Debug)]
+pub struct HandLine {
+    /// Rises with each line of a run, from 1.
+    pub generation: u64,
+    line: Line,
+    /// Layers on the way in order of depth; the membrane of a kind that was met before is felt once only.
+    kinds: Vec<(f64, LayerKind, bool)>,
+    model: LineModel,
+    state: LineState,
+}
+
+/// What the tissue loop needs: the body's answer to a newton at each station.
+#[derive(Clone, Debug)]
+pub struct BodyLine {
+    /// That of the [`HandLine`] made with it.
+    pub generation: u64,
+    /// Where the line is at rest.
+    pub line: Line,
+    /// Displacement of every element, m/N: shaft of each station, then tip at each.
+    pub columns: Vec<ElementField>,
+}
+
+/// What the layers on the way resist with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LayerForces {
+    /// Membrane, cutting and friction of each kind.
+    pub layers: Layers,
+    /// Scales the force at which membranes give way; 0 leaves them out. Their depth stays.
+    pub membrane_gain: f64,
+    /// Scales cutting.
+    pub cutting_gain: f64,
+    /// Scales friction.
+    pub shaft_gain: f64,
+}
+
+impl Default for LayerForces {
+    fn default() -> Self {
+        LayerForces {
+            layers: Layers::default(),
+            membrane_gain: 1.0,
+            cutting_gain: 1.0,
+            shaft_gain: 1.0,
+        }
+    }
+}
+
+/// Why a line could not be made.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LineError {
+    /// No tissue on the way.
+    #[error("the needle's line does not pass through tissue that gives way")]
+    NoTissue,
+    /// It was no longer wanted.
+    #[error("the needle's line was given up before it was ready")]
+    Stopped,
+    /// The layers of the scene give no line: every problem, one a line.
+    #[error("the needle's line cannot be used: {0}")]
+    Unusable(String),
+}
+
+impl ReadyLine {
+    /// Solves for a line of needle at rest; some seconds for a body of 20,000 elements. `report` is called between slices of
+    /// work and ends it by returning false.
+    pub fn prepare(
+        generation: u64,
+        body: &BatchModel<f32>,
+        lattice: &Lattice,
+        layer_of: &dyn Fn(u32) -> LayerKind,
+        line: Line,
+        report: &mut dyn FnMut(QueueProgress) -> bool,
+    ) -> Result<ReadyLine, LineError> {
+        let settings = StationSettings::of_lattice(lattice.spacing_m);
+        let stations = Stations::along(body, line, settings, MAX_STATIONS);
+        if stations.count() == 0 {
+            return Err(LineError::NoTissue);
+        }
+        let mut queue = ColumnQueue::new(body, &stations, false, TOLERANCE);
+        while !queue.prepare(body, SLICES).is_done() {
+            if !report(queue.progress()) {
+                return Err(LineError::Stopped);
+            }
+        }
+        let compliance = Compliance::of_columns(body, &stations, queue.columns()).ok_or(LineError::NoTissue)?;
+        let kinds = kinds_along(&stations, lattice, layer_of);
+        let layers = layers_of(&kinds, &LayerForces::default());
+        let model = LineModel::new(compliance, &layers, LineSettings::default()).map_err(|problems| {
+            let lines: Vec<_> = problems.iter().map(ToString::to_string).collect();
+            LineError::Unusable(lines.join("\n"))
+        })?;
+        Ok(ReadyLine {
+            hand: Box::new(HandLine {
+                generation,
+                line,
+                kinds,
+                state: LineState::new(&model),
+                model,
+            }),
+            body: Box::new(BodyLine {
+                generation,
+                line,
+                columns: queue.into_fields(),
+            }),
+        })
+    }
+}
+
+/// Where each layer begins on the way, up to [`MAX_LAYERS`]; the rest is felt as the last.
+fn kinds_along(
+    stations: &Stations,
+    lattice: &Lattice,
+    layer_of: &dyn Fn(u32) -> LayerKind,
+) -> Vec<(f64, LayerKind, bool)> {
+    const STEPS: usize = 8;
+    let mut kinds: Vec<(f64, LayerKind, bool)> = Vec::new();
+    let step_m = stations.settings.spacing_m / STEPS as f64;
+    for n in 0..stations.count() * STEPS {
+        let place_m = stations.line.point_m((n as f64 + 0.5) * step_m, [0.0; 2]);
+        let [i, j, k] = place_m.map(|c| (c / lattice.spacing_m) as usize);
+        let Some(kind) = lattice.element_of_cell(i, j, k).map(layer_of) else {
+            continue;
+        };
+        let is_new = kinds.last().is_none_or(|(_, last, _)| *last != kind);
+        if is_new && kinds.len() < MAX_LAYERS {
+            let has_membrane = !kinds.iter().any(|(_, met, _)| *met == kind);
+            kinds.push((n as f64 * step_m, kind, has_membrane));
+        }
+    }
+    if let Some(first) = kinds.first_mut() {
+        first.0 = 0.0;
+    }
+    kinds
+}
+
+fn layer(forces: &LayerForces, &(from_m, kind, has_membrane): &(f64, LayerKind, bool)) -> LineLayer {
+    let layer = forces.layers.of(kind);
+    let is_closed = has_membrane && layer.has_membrane() && forces.membrane_gain > 0.0;
+    LineLayer {
+        from_m,
+        puncture_force_n: if is_closed {
+            forces.membrane_gain * layer.puncture_force_n
+        } else {
+            0.0
+        },
+        puncture_depth_m: if is_closed {
+            layer.puncture_depth_m
+        } else {
+            f64::INFINITY
+        },
+        cutting_force_n: forces.cutting_gain * layer.cutting_force_n,
+        shaft_friction_n_per_m: forces.shaft_gain * layer.shaft_friction_n_per_m,
+    }
+}
+
+fn layers_of(kinds: &[(f64, LayerKind, bool)], forces: &LayerForces) -> Vec<LineLayer> {
+    kinds.iter().map(|kind| layer(forces, kind)).collect()
+}
+
+impl HandLine {
+    /// The straight way at rest.
+    pub fn line(&self) -> &Line {
+        &self.line
+    }
+
+    /// Takes up the layers' forces; does not allocate.
+    pub fn set_forces(&mut self, forces: &LayerForces) {
+        let kinds = &self.kinds;
+        self.model.set_layers(|n| kinds.get(n).map(|kind| layer(forces, kind)));
+    }
+
+    /// Whether a needle held like this goes in on this line.
+    pub fn is_met_by(&self, tip_m: &Vector3<f64>, direction: &Vector3<f64>) -> bool {
+        self.line.is_met_by(tip_m, direction, BESIDE_M, TILT_RAD)
+    }
+
+    /// How far the tip is along the line from the entry at rest, m.
+    pub fn along_m(&self, tip_m: &Vector3<f64>) -> f64 {
+        (tip_m - Vector3::from(self.line.entry_m)).dot(&Vector3::from(self.line.axes[0]))
+    }
+
+    /// One tick of the needle.
+    pub fn step(&mut self, tip_m: f64, dt_s: f64) -> LineOutput {
+        step(&self.model, &mut self.state, &LineInput { tip_m, dt_s })
+    }
+
+    /// What the state is.
+    pub fn state(&self) -> &LineState {
+        &self.state
+    }
+
+    /// The tip has tissue before or around it.
+    pub fn is_in_tissue(&self) -> bool {
+        self.state.is_in_contact()
+    }
+
+    /// Depth at which the membrane that holds the tip gives way; 0 where none does.
+    pub fn puncture_depth_m(&self, held_by: Option<usize>) -> f64 {
+        let depth_m = held_by
+            .and_then(|n| self.model.layers.get(n))
+            .map(|l| l.puncture_depth_m);
+        depth_m.filter(|d| d.is_finite()).unwrap_or(0.0)
+    }
+
+    /// Tissue at rest that no needle has touched.
+    pub fn reset(&mut self) {
+        self.state.reset();
+    }
+}
+
+impl Line {
+    /// The line on which a needle at `tip_m` goes in; `None` where there is no tissue on its way.
+    pub fn into_body(lattice: &Lattice, tip_m: [f64; 3], direction: [f64; 3]) -> Option<Line> {
+        let line = Line::new(tip_m, direction)?;
+        let (low, high) = lattice.bounds_m();
+        let size_m = (0..3).map(|a| (high[a] - low[a]).powi(2)).sum::<f64>().sqrt();
+        let middle_m = (0..3)
+            .map(|a| (0.5 * (low[a] + high[a]) - tip_m[a]) * line.axes[0][a])
+            .sum::<f64>();
+        let is_inside = |along_m: f64| {
+            let cell = line.point_m(along_m, [0.0; 2]).map(|c| c / lattice.spacing_m);
+            cell.iter().all(|&c| c >= 0.0)
+                && lattice
+                    .element_of_cell(cell[0] as usize, cell[1] as usize, cell[2] as usize)
+                    .is_some()
+        };
+        let step_m = lattice.spacing_m / 16.0;
+        let count = (size_m / step_m) as i64;
+        let first = (-count..=count)
+            .map(|n| middle_m + n as f64 * step_m)
+            .find(|&m| is_inside(m))?;
+        let (mut outside_m, mut inside_m) = (first - step_m, first);
+        for _ in 0..20 {
+            let between_m = 0.5 * (outside_m + inside_m);
+            if is_inside(between_m) {
+                inside_m = between_m;
+            } else {
+                outside_m = between_m;
+            }
+        }
+        Line::new(line.point_m(inside_m, [0.0; 2]), direction)
+    }
+
+    /// Whether a needle held like this would go in within `beside_m` of the entry and `tilt_rad` of the direction.
+    pub fn is_met_by(&self, tip_m: &Vector3<f64>, direction: &Vector3<f64>, beside_m: f64, tilt_rad: f64) -> bool {
+        let axis = Vector3::from(self.axes[0]);
+        let from_entry = tip_m - Vector3::from(self.entry_m);
+        let along_m = from_entry.dot(&axis);
+        // Where the needle's own axis passes the entry.
+        let there = from_entry - direction * (along_m / direction.dot(&axis));
+        direction.dot(&axis) > 0.0 && there.norm() <= beside_m && direction.cross(&axis).norm() <= tilt_rad
+    }
+}
+
+#[cfg(test)]
+mod tests;
