@@ -2,7 +2,7 @@
 
 use crate::action::Action;
 use crate::settings::{SCALES, STRENGTHS_U, Settings, ThemeChoice};
-use crate::shown::Shown;
+use crate::shown::{NeedleLine, Shown};
 use crate::theme;
 use egui::{Align, Color32, DragValue, Layout, RichText, Sense, Vec2};
 use stylet_base::format;
@@ -88,6 +88,33 @@ fn link_ui(ui: &mut egui::Ui, shown: &Shown) {
         };
         badge(ui, word, color);
     }
+    line_ui(ui, shown);
+}
+
+/// With finite elements: whether the tissue is prepared for the needle where it is.
+fn line_ui(ui: &mut egui::Ui, shown: &Shown) {
+    let tokens = theme::of(ui);
+    let (word, color, hint) = match shown.needle_line() {
+        None => return,
+        Some(NeedleLine::Ready) => (
+            "LINE READY",
+            tokens.good,
+            "The tissue is prepared for the needle where it is: friction, membranes and tissue are solved together.",
+        ),
+        Some(NeedleLine::Preparing) => (
+            "preparing line",
+            tokens.warn,
+            "rt-core solves for the tissue along the needle, some seconds for each place. Hold the needle before its \
+             entry until this says LINE READY.",
+        ),
+        Some(NeedleLine::Missing) => (
+            "NO LINE",
+            tokens.bad,
+            "The needle went in before the tissue was prepared for it: it is felt by the paper's force law, and its seeds \
+             may rest up to 2 cm from where they should. Take it out, and wait for LINE READY.",
+        ),
+    };
+    badge(ui, word, color).on_hover_text(hint);
 }
 
 fn badge(ui: &mut egui::Ui, word: &str, color: Color32) -> egui::Response {

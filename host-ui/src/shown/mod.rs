@@ -103,6 +103,16 @@ pub struct Note {
     pub text: String,
 }
 
+/// Whether the tissue is prepared for the needle where it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NeedleLine {
+    Ready,
+    /// The needle is outside.
+    Preparing,
+    /// The needle is in tissue without one.
+    Missing,
+}
+
 impl Shown {
     pub fn empty(instance: &str) -> Self {
         Self {
@@ -172,6 +182,19 @@ impl Shown {
     /// Engaged, but the force would begin with a jump.
     pub fn is_waiting(&self) -> bool {
         self.has_flag(flags::WAITING)
+    }
+
+    /// `None` where the tissue needs no lines.
+    pub fn needle_line(&self) -> Option<NeedleLine> {
+        self.has_flag(flags::LINE_NEEDED).then(|| {
+            if self.has_flag(flags::LINE_READY) {
+                NeedleLine::Ready
+            } else if self.has_flag(flags::IN_CONTACT) {
+                NeedleLine::Missing
+            } else {
+                NeedleLine::Preparing
+            }
+        })
     }
 
     pub fn is_real_time(&self) -> bool {

@@ -156,3 +156,12 @@ pub struct HapticFlight {
     /// Each with the index of the tick that took it up.
     pub orders: Vec<(u64, HapticOrder)>,
 }
+
+impl HapticFlight {
+    /// Ticks in which the needle was on a prepared line. The tape holds no line: such a flight can be looked at, but its
+    /// forces cannot be repeated.
+    pub fn ticks_on_line(&self) -> usize {
+        let is_on_line = |entry: &&HapticEntry| entry.record.flags & flags::LINE_READY != 0;
+        self.ticks.iter().filter(is_on_line).count()
+    }
+}
