@@ -30,7 +30,7 @@ struct Finished {
     line: Result<ReadyLine, NoLine>,
 }
 
-struct Work {
+struct LineTask {
     axis: Line,
     thread: JoinHandle<Finished>,
     stop: Arc<AtomicBool>,
@@ -43,7 +43,7 @@ pub struct LinePreparer {
     body: Option<(u64, LineBody)>,
     /// Where the needle is, and since when.
     steady: Option<(Line, Instant)>,
-    under_way: Option<Work>,
+    under_way: Option<LineTask>,
     /// The last axis that there is an answer for, and when it came: a line, or that there is none.
     answered: Option<(Line, Instant)>,
     generation: u64,
@@ -131,7 +131,7 @@ impl LinePreparer {
         };
         // Without a thread there is no line; it is tried again at the next pass.
         if let Ok(thread) = std::thread::Builder::new().name("needle-line".to_owned()).spawn(work) {
-            self.under_way = Some(Work { axis, thread, stop });
+            self.under_way = Some(LineTask { axis, thread, stop });
         }
     }
 

@@ -1,8 +1,9 @@
 //! A queue of columns: the body's answer to one newton at each station, eight at once, in slices of bounded work.
 
 use super::stations::Stations;
-use crate::tissue::fem::Real;
-use crate::tissue::fem::batch::{BatchModel, BatchState, ElementField, LOADS, NodeWeight};
+use crate::tissue::ElementField;
+use crate::tissue::fem::Compiled;
+use crate::tissue::fem::batch::{BatchModel, BatchState, LOADS, NodeWeight};
 
 /// Residual over load down to which columns are solved: the compliance then is right to 6e-4 and the field to 7e-3 (paper's
 /// gland, nu 0.49; `docs/adr/0010-condensed-needle-line.md`).
@@ -65,7 +66,7 @@ pub struct ColumnQueue<T = f32> {
     tolerance: f64,
 }
 
-impl<T: Real> ColumnQueue<T> {
+impl<T: Compiled> ColumnQueue<T> {
     /// Along the line, shaft then tip; with `is_flexible` those across it as well.
     pub fn new(model: &BatchModel<T>, stations: &Stations, is_flexible: bool, tolerance: f64) -> Self {
         let m = stations.count();

@@ -3,7 +3,7 @@
 use super::columns::Column;
 use super::rows::Rows;
 use super::stations::Stations;
-use crate::tissue::fem::Real;
+use crate::tissue::fem::Compiled;
 use crate::tissue::fem::batch::BatchModel;
 
 /// Stations that were all solved for: symmetric, positive definite. Rows 0 to m - 1 are the shaft's stations, m to 2m - 1
@@ -26,7 +26,11 @@ pub struct Compliance {
 
 impl Compliance {
     /// From the answers to each station's load along the line: those of the shaft, then those of the tip.
-    pub fn of_columns<T: Real>(model: &BatchModel<T>, stations: &Stations, columns: &[Column]) -> Option<Compliance> {
+    pub fn of_columns<T: Compiled>(
+        model: &BatchModel<T>,
+        stations: &Stations,
+        columns: &[Column],
+    ) -> Option<Compliance> {
         let m = stations.count();
         let (axial, across) = columns.split_at_checked(2 * m)?;
         let mut rows = symmetric(axial);
@@ -124,7 +128,7 @@ fn green(i: i64, j: i64) -> f64 {
 }
 
 /// Radius of the cylinder that an even load would move as far as the lattice moves a station's shaft with it.
-pub(super) fn lattice_radius_m<T: Real>(model: &BatchModel<T>, stations: &Stations, along_m: f64) -> f64 {
+pub(super) fn lattice_radius_m<T: Compiled>(model: &BatchModel<T>, stations: &Stations, along_m: f64) -> f64 {
     let h = model.spacing_m();
     let direction = stations.line.axes[0];
     let main = (0..3)

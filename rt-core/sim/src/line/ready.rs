@@ -9,7 +9,8 @@ use super::model::{LineLayer, LineModel, LineSettings, MAX_LAYERS, MAX_STATIONS}
 use super::stations::{Line, StationSettings, Stations};
 use crate::needle::{LayerKind, Layers};
 use crate::scene::Lattice;
-use crate::tissue::fem::batch::{BatchModel, ElementField};
+use crate::tissue::ElementField;
+use crate::tissue::fem::batch::BatchModel;
 use nalgebra::Vector3;
 
 /// The needle is on a line whose entry it would meet so far from it, and whose direction is that close to its own.

@@ -1,6 +1,6 @@
 //! Stations along the needle's way through the tissue at rest, and where each of them loads the lattice.
 
-use crate::tissue::fem::Real;
+use crate::tissue::fem::Compiled;
 use crate::tissue::fem::batch::{BatchModel, NodeWeight};
 
 /// What the lattice spreads a patch by, in squares of its spacing: 2 by the variance of trilinear weights, less by measurement
@@ -87,7 +87,7 @@ pub struct Stations {
 
 impl Stations {
     /// As many stations as lie inside the body from the entry on, `most` at most.
-    pub fn along<T: Real>(model: &BatchModel<T>, line: Line, settings: StationSettings, most: usize) -> Stations {
+    pub fn along<T: Compiled>(model: &BatchModel<T>, line: Line, settings: StationSettings, most: usize) -> Stations {
         let mut stations = Stations {
             line,
             settings,
@@ -129,13 +129,13 @@ impl Stations {
         })
     }
 
-    fn shaft_weights<T: Real>(&self, model: &BatchModel<T>, middle_m: f64) -> Vec<(u32, f64)> {
+    fn shaft_weights<T: Compiled>(&self, model: &BatchModel<T>, middle_m: f64) -> Vec<(u32, f64)> {
         let across = self.around_m();
         self.mean(model, middle_m, &across)
     }
 
     /// The patch is narrower than its cube by what trilinear weights spread it.
-    fn tip_weights<T: Real>(&self, model: &BatchModel<T>, middle_m: f64) -> Vec<(u32, f64)> {
+    fn tip_weights<T: Compiled>(&self, model: &BatchModel<T>, middle_m: f64) -> Vec<(u32, f64)> {
         // So many samples have that much less variance than the box that they stand for.
         let edge_m = self.patch_edge_m(model.spacing_m()) / (1.0 - 1.0 / (ACROSS * ACROSS) as f64).sqrt();
         let at = |n: usize| ((n as f64 + 0.5) / ACROSS as f64 - 0.5) * edge_m;
@@ -150,7 +150,7 @@ impl Stations {
     }
 
     /// Mean of trilinear weights over samples; those outside the body do not count.
-    fn mean<T: Real>(&self, model: &BatchModel<T>, middle_m: f64, across: &[[f64; 2]]) -> Vec<(u32, f64)> {
+    fn mean<T: Compiled>(&self, model: &BatchModel<T>, middle_m: f64, across: &[[f64; 2]]) -> Vec<(u32, f64)> {
         let mut all = Vec::new();
         let mut count = 0.0;
         for n in 0..ALONG {

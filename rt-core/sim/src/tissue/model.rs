@@ -1,8 +1,7 @@
 //! What every tissue model is: a body that takes steps and can be read.
 
-use super::Deformed;
+use super::{Deformed, ElementField};
 use crate::limits::Limits;
-use crate::tissue::fem::batch::ElementField;
 
 use serde::{Deserialize, Serialize};
 

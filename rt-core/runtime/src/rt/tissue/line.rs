@@ -20,7 +20,7 @@ impl TissueLoop {
         self.line = Some(line);
     }
 
-    /// The body that they were solved for has gone.
+    /// The body that they were solved for is replaced.
     pub(super) fn drop_line(&mut self) {
         self.response.line = 0;
         if let Some(old) = self.line.take() {
@@ -49,7 +49,7 @@ impl TissueLoop {
         Some(report)
     }
 
-    /// The needle is on no line: whoever was told of a contact is told of its end.
+    /// The needle is on no line: a contact that was reported ends.
     pub(super) fn leave_line(&mut self) {
         if std::mem::take(&mut self.in_by_line) {
             let (tick, time_ns) = (self.response.tick, self.pose.time_ns);

@@ -3,30 +3,40 @@
 use super::batch::{BatchModel, BatchState, NodeWeight, Progress};
 use super::material::{FemProblem, FemSettings};
 use super::model::FemModel;
+use super::real::Real;
 use super::solve::{self, FemReport, SolveSettings, TipPatch};
 use super::state::FemState;
 use crate::scene::Lattice;
 use std::sync::Arc;
 
-/// What takes a compiler long.
-pub trait Compiled: Sized {
+/// A number type with a solver compiled for it.
+pub trait Compiled: Real {
+    /// [`FemModel::with_fixed_nodes`].
     fn model(
         lattice: &Arc<Lattice>,
         settings: &FemSettings,
         is_fixed: &dyn Fn([f64; 3]) -> bool,
     ) -> Result<FemModel<Self>, Vec<FemProblem>>;
+    /// [`FemState::at_rest`].
     fn at_rest(model: &FemModel<Self>) -> FemState<Self>;
+    /// [`step`].
     fn step(
         model: &FemModel<Self>,
         state: &mut FemState<Self>,
         held: Option<TipPatch>,
         settings: &SolveSettings,
     ) -> FemReport;
+    /// [`prepare`].
     fn prepare(model: &FemModel<Self>, state: &mut FemState<Self>, next: Option<TipPatch>, settings: &SolveSettings);
+    /// [`FemState::strain_energy_j`].
     fn strain_energy_j(state: &mut FemState<Self>, model: &FemModel<Self>) -> f64;
+    /// [`BatchModel::new`].
     fn batch_model(model: &FemModel<Self>) -> BatchModel<Self>;
+    /// [`BatchState::new`].
     fn batch_state(model: &BatchModel<Self>) -> BatchState<Self>;
+    /// [`BatchState::begin`].
     fn begin(state: &mut BatchState<Self>, model: &BatchModel<Self>, loads: &[&[NodeWeight]]);
+    /// [`BatchState::advance`].
     fn advance(state: &mut BatchState<Self>, model: &BatchModel<Self>) -> Progress;
 }
 
@@ -86,3 +96,78 @@ macro_rules! compiled {
     )*};
 }
 compiled!(f32, f64);
+
+impl<T: Compiled> FemModel<T> {
+    /// The body of a lattice, or every problem with the settings.
+    pub fn new(lattice: &Arc<Lattice>, settings: &FemSettings) -> Result<Self, Vec<FemProblem>> {
+        Self::with_fixed_nodes(lattice, settings, |_| false)
+    }
+
+    /// The same with more fixed nodes: those for whose place in the scene frame (m) `is_fixed` holds.
+    pub fn with_fixed_nodes(
+        lattice: &Arc<Lattice>,
+        settings: &FemSettings,
+        is_fixed: impl Fn([f64; 3]) -> bool,
+    ) -> Result<Self, Vec<FemProblem>> {
+        T::model(lattice, settings, &is_fixed)
+    }
+}
+
+impl<T: Compiled> FemState<T> {
+    /// The body at rest.
+    pub fn at_rest(model: &FemModel<T>) -> Self {
+        T::at_rest(model)
+    }
+
+    /// The elastic energy, in body and springs.
+    pub fn strain_energy_j(&mut self, model: &FemModel<T>) -> f64 {
+        T::strain_energy_j(self, model)
+    }
+}
+
+/// Brings the body to equilibrium with the held patch, as far as `settings` allow. No patch: at rest.
+///
+/// What cannot be followed is refused and changes nothing; so is a state of another model.
+pub fn step<T: Compiled>(
+    model: &FemModel<T>,
+    state: &mut FemState<T>,
+    held: Option<TipPatch>,
+    settings: &SolveSettings,
+) -> FemReport {
+    T::step(model, state, held, settings)
+}
+
+/// A piece of work on the answer to a patch that may be held soon, where the last step took no cycle: so much that both
+/// together cost no more than a step with one cycle. Changes no answer.
+pub fn prepare<T: Compiled>(
+    model: &FemModel<T>,
+    state: &mut FemState<T>,
+    next: Option<TipPatch>,
+    settings: &SolveSettings,
+) {
+    T::prepare(model, state, next, settings);
+}
+
+impl<T: Compiled> BatchModel<T> {
+    /// The same body. Parts that nothing keeps in place do not move here: a load on them has no answer.
+    pub fn new(model: &FemModel<T>) -> Self {
+        T::batch_model(model)
+    }
+}
+
+impl<T: Compiled> BatchState<T> {
+    /// Room for eight answers.
+    pub fn new(model: &BatchModel<T>) -> Self {
+        T::batch_state(model)
+    }
+
+    /// Takes up at most eight loads; those past the eighth are ignored, as are nodes that do not move.
+    pub fn begin(&mut self, model: &BatchModel<T>, loads: &[&[NodeWeight]]) {
+        T::begin(self, model, loads);
+    }
+
+    /// Does one slice of work; its cost is that of one pass over one level.
+    pub fn advance(&mut self, model: &BatchModel<T>) -> Progress {
+        T::advance(self, model)
+    }
+}

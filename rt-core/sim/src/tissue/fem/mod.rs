@@ -58,10 +58,11 @@ mod take_up;
 mod tissue;
 mod transfer;
 
+pub use compiled::{Compiled, prepare, step};
 pub use material::{FemProblem, FemSettings, Integration, MAX_POISSON_RATIO, Material, Structure};
 pub use model::FemModel;
 pub use real::Real;
-pub use solve::{FemReport, SolveSettings, TipPatch, prepare, step};
+pub use solve::{FemReport, SolveSettings, TipPatch};
 pub use state::FemState;
 pub use tissue::FemTissue;
 

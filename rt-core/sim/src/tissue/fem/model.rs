@@ -37,20 +37,6 @@ pub struct FemModel<T = f32> {
 }
 
 impl<T: Real> FemModel<T> {
-    /// The body of a lattice, or every problem with the settings.
-    pub fn new(lattice: &Arc<Lattice>, settings: &FemSettings) -> Result<Self, Vec<FemProblem>> {
-        Self::with_fixed_nodes(lattice, settings, |_| false)
-    }
-
-    /// The same with more fixed nodes: those for whose place in the scene frame (m) `is_fixed` holds.
-    pub fn with_fixed_nodes(
-        lattice: &Arc<Lattice>,
-        settings: &FemSettings,
-        is_fixed: impl Fn([f64; 3]) -> bool,
-    ) -> Result<Self, Vec<FemProblem>> {
-        T::model(lattice, settings, &is_fixed)
-    }
-
     pub(super) fn of_lattice(
         lattice: &Arc<Lattice>,
         settings: &FemSettings,

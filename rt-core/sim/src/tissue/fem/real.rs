@@ -1,6 +1,5 @@
 //! The number types that the solver runs in: f32 live, f64 to see what f32 costs.
 
-use super::compiled::Compiled;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// `f32` or `f64`.
@@ -19,7 +18,6 @@ pub trait Real:
     + Send
     + Sync
     + std::fmt::Debug
-    + Compiled
     + 'static
 {
     /// 0.

@@ -55,18 +55,6 @@ pub struct FemReport {
     pub max_displacement: f32,
 }
 
-/// Brings the body to equilibrium with the held patch, as far as `settings` allow. No patch: at rest.
-///
-/// What cannot be followed is refused and changes nothing; so is a state of another model.
-pub fn step<T: Real>(
-    model: &FemModel<T>,
-    state: &mut FemState<T>,
-    held: Option<TipPatch>,
-    settings: &SolveSettings,
-) -> FemReport {
-    T::step(model, state, held, settings)
-}
-
 pub(super) fn step_held<T: Real>(
     model: &FemModel<T>,
     state: &mut FemState<T>,
@@ -165,17 +153,6 @@ pub(super) fn hold_cells<T: Real>(
         moved,
         ..report(state, HeldOutcome::Followed, cycles, residual, settings)
     }
-}
-
-/// A piece of work on the answer to a patch that may be held soon, where the last step took no cycle: so much that both
-/// together cost no more than a step with one cycle. Changes no answer.
-pub fn prepare<T: Real>(
-    model: &FemModel<T>,
-    state: &mut FemState<T>,
-    next: Option<TipPatch>,
-    settings: &SolveSettings,
-) {
-    T::prepare(model, state, next, settings);
 }
 
 pub(super) fn prepare_next<T: Real>(

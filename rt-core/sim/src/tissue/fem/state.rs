@@ -1,10 +1,10 @@
 //! Where the elastic body is, and everything that a step works in.
 
-use super::batch::ElementField;
 use super::grip::Grip;
 use super::model::FemModel;
 use super::real::Real;
 use super::sweep::touched;
+use crate::tissue::ElementField;
 
 /// Displacements of all elements, and what the solver keeps from tick to tick.
 #[derive(Clone, Debug)]
@@ -21,11 +21,6 @@ pub struct FemState<T = f32> {
 }
 
 impl<T: Real> FemState<T> {
-    /// The body at rest.
-    pub fn at_rest(model: &FemModel<T>) -> Self {
-        T::at_rest(model)
-    }
-
     pub(super) fn of_model(model: &FemModel<T>) -> Self {
         FemState {
             displacement: std::array::from_fn(|_| touched(model.element_count(), 0.0)),
@@ -69,11 +64,6 @@ impl<T: Real> FemState<T> {
                     .sum()
             })
         })
-    }
-
-    /// The elastic energy, in body and springs.
-    pub fn strain_energy_j(&mut self, model: &FemModel<T>) -> f64 {
-        T::strain_energy_j(self, model)
     }
 
     /// Lets loose what is held, and displaces every element by the sum of loads times answers (m/N); how many moved.

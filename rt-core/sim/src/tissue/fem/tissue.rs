@@ -1,14 +1,13 @@
 //! FEM as a tissue model.
 
-use super::batch::ElementField;
+use super::compiled::{Compiled, prepare, step};
 use super::material::{FemProblem, FemSettings, Integration, Material, Structure};
 use super::model::FemModel;
-use super::real::Real;
-use super::solve::{SolveSettings, TipPatch, prepare, step};
+use super::solve::{SolveSettings, TipPatch};
 use super::state::FemState;
 use crate::limits::Limits;
 use crate::scene::Scene;
-use crate::tissue::{Deformed, Held, HeldOutcome, Solve, StepReport, TissueModel};
+use crate::tissue::{Deformed, ElementField, Held, HeldOutcome, Solve, StepReport, TissueModel};
 
 /// What surrounds a body: 20 mm of fat of 5 kPa, per surface area (assumed).
 pub const SURROUNDINGS_PA_PER_M: f64 = 5e3 / 20e-3;
@@ -30,7 +29,7 @@ pub struct FemTissue<T = f32> {
     pub settings: SolveSettings,
 }
 
-impl<T: Real> FemTissue<T> {
+impl<T: Compiled> FemTissue<T> {
     /// The scene's materials in its surroundings, solved as far as the loop has time for.
     pub fn new(scene: &Scene) -> Result<Self, Vec<FemProblem>> {
         let structures = scene.structures.iter().map(|s| match s.material.fixed {
@@ -66,7 +65,7 @@ fn patch(held: Held) -> TipPatch {
     }
 }
 
-impl<T: Real> TissueModel for FemTissue<T> {
+impl<T: Compiled> TissueModel for FemTissue<T> {
     /// Quasi-static: `dt_s` plays no part, and tissue that nothing holds is at rest at once.
     fn step(&mut self, held: Option<Held>, _dt_s: f64) -> StepReport {
         let report = step(&self.model, &mut self.state, held.map(patch), &self.settings);

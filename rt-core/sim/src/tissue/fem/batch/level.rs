@@ -76,11 +76,6 @@ pub struct BatchModel<T = f32> {
 }
 
 impl<T: Real> BatchModel<T> {
-    /// The same body. Parts that nothing keeps in place do not move here: a load on them has no answer.
-    pub fn new(model: &FemModel<T>) -> Self {
-        T::batch_model(model)
-    }
-
     pub(in super::super) fn of_model(model: &FemModel<T>) -> Self {
         let mut levels: Vec<BatchLevel<T>> = model.levels.iter().map(compact).collect();
         for &node in model.loose.iter().flatten() {

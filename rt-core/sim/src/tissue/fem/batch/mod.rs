@@ -14,7 +14,6 @@ mod output;
 mod solve;
 
 pub use level::{BatchModel, NodeWeight};
-pub use output::ElementField;
 pub use solve::{BatchState, Progress};
 
 /// Loads that are solved at once.

@@ -50,11 +50,6 @@ pub struct BatchState<T = f32> {
 }
 
 impl<T: Real> BatchState<T> {
-    /// Room for eight answers.
-    pub fn new(model: &BatchModel<T>) -> Self {
-        T::batch_state(model)
-    }
-
     pub(in super::super) fn of_model(model: &BatchModel<T>) -> Self {
         let zeros = || vec![[[T::ZERO; LOADS]; 3]; model.node_count()];
         let last = model.levels.len() - 1;
@@ -93,11 +88,6 @@ impl<T: Real> BatchState<T> {
         (nodes + 4 * self.u.len()) * size_of::<Node<T>>()
     }
 
-    /// Takes up at most eight loads; those past the eighth are ignored, as are nodes that do not move.
-    pub fn begin(&mut self, model: &BatchModel<T>, loads: &[&[NodeWeight]]) {
-        T::begin(self, model, loads);
-    }
-
     pub(in super::super) fn take_up(&mut self, model: &BatchModel<T>, loads: &[&[NodeWeight]]) {
         for field in [&mut self.u, &mut self.r, &mut self.p, &mut self.q] {
             field.fill([[T::ZERO; LOADS]; 3]);
@@ -113,11 +103,6 @@ impl<T: Real> BatchState<T> {
         self.residuals = self.load;
         (self.next, self.iterations) = (0, 0);
         (self.rz, self.alpha) = ([0.0; LOADS], [0.0; LOADS]);
-    }
-
-    /// Does one slice of work; its cost is that of one pass over one level.
-    pub fn advance(&mut self, model: &BatchModel<T>) -> Progress {
-        T::advance(self, model)
     }
 
     pub(in super::super) fn do_slice(&mut self, model: &BatchModel<T>) -> Progress {
@@ -158,7 +143,7 @@ impl<T: Real> BatchState<T> {
     /// Solves to `tolerance`, in at most so many iterations.
     pub fn solve(&mut self, model: &BatchModel<T>, tolerance: f64, most: u32) -> Progress {
         while !(self.next == 0 && (self.progress().residual <= tolerance || self.iterations >= most)) {
-            self.advance(model);
+            self.do_slice(model);
         }
         self.progress()
     }

@@ -20,7 +20,7 @@ fn golden(text: &str) -> (f64, f64, Vec<[f64; 6]>) {
 }
 
 /// The golden problem on `n` elements along an edge.
-fn solve_golden<T: Real>(n: usize, settings: &SolveSettings) -> (FemModel<T>, FemState<T>, FemReport) {
+fn solve_golden<T: Compiled>(n: usize, settings: &SolveSettings) -> (FemModel<T>, FemState<T>, FemReport) {
     let lattice = block([n; 3], 60e-3 / n as f64);
     let material = Material {
         youngs_modulus_pa: 30e3,
@@ -35,7 +35,7 @@ fn solve_golden<T: Real>(n: usize, settings: &SolveSettings) -> (FemModel<T>, Fe
 }
 
 /// Displacements to the rounding of the file (a millionth of a millimetre, far below 1e-3 of any that is not zero).
-fn assert_agrees_with_golden<T: Real>(n: usize, text: &str, settings: &SolveSettings, within_mm: f64) {
+fn assert_agrees_with_golden<T: Compiled>(n: usize, text: &str, settings: &SolveSettings, within_mm: f64) {
     let (force_n, energy_n_mm, rows) = golden(text);
     let (model, mut state, report) = solve_golden::<T>(n, settings);
     println!("{n} elements: {report:?}");

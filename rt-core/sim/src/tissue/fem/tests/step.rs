@@ -84,7 +84,11 @@ fn step_finds_what_a_dense_solver_finds() {
 }
 
 /// Holds one corner of a body whose cells are soft and stiff by turns.
-fn hold_corner<T: Real>(lattice: &Arc<Lattice>, contrast: f64, settings: &SolveSettings) -> (FemState<T>, FemReport) {
+fn hold_corner<T: Compiled>(
+    lattice: &Arc<Lattice>,
+    contrast: f64,
+    settings: &SolveSettings,
+) -> (FemState<T>, FemReport) {
     let model = FemModel::<T>::new(lattice, &two_materials(lattice, contrast, 1e5)).expect("valid");
     let mut state = FemState::at_rest(&model);
     let held = patch(lattice, 0, [1e-3, -0.5e-3, 0.8e-3], 0.0);
