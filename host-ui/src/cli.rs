@@ -17,30 +17,11 @@ use stylet_implant::procedure;
 use stylet_implant::readers::{SeedDefaults, read_seeds};
 use stylet_shm_schema::service::Instance;
 
-const SCENE_HELP: &str = "\
-A scene file is TOML; all but [volume] may be left out. Omitted fields are inferred from the name of the structure (scenes/README.md):
-  name = \"phantom\"
-  [volume]
-  file = \"gland.seg.nrrd\"         # beside the scene file
-  [image]
-  file = \"trus.nrrd\"             # for the slices of the window; leave out for simulated ultrasound
-  [[structure]]
-  name = \"Prostate\"               # as the volume calls it; or label = 1, and called = \"Prostate\"
-  role = \"target\"                 # or \"spare\", \"tissue\", \"leave out\"
-  young_kpa = 17
-  poisson = 0.49
-  stretch = [0.6, 1.7]            # shortest and longest link, as a share of its length at rest
-  shear_deg = 25
-  fixed = false                   # true: never moves, as bone
-  [needle]
-  insert_mm_per_s = 50
-  retract_mm_per_s = 50
-  [device]
-  name = \"simulated\"              # for an rt-core that host-ui starts (--core)
-  [plan]
-  file = \"plan.dcm\"               # RT Plan or CSV
-
-Names that are known follow TG-263: Prostate, PTV, CTV (targets), Urethra, Rectum, Bladder, PenileBulb, Bowel (spared), and so on.";
+const SCENE_HELP: &str = concat!(
+    "A scene file is TOML. All fields but [volume] may be omitted; omitted fields are inferred from the name of the structure:\n\n",
+    include_str!("../../scenes/example.toml"),
+    "\nNames that are known follow TG-263: Prostate, PTV, CTV (targets), Urethra, Rectum, Bladder, PenileBulb, Bowel (spared), and so on."
+);
 
 /// Operator's program of Stylet, a haptic simulator of prostate brachytherapy.
 ///

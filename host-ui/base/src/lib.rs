@@ -9,6 +9,5 @@ pub mod input;
 pub mod interrupt;
 pub mod job;
 pub mod progress_bar;
-mod write;
 
-pub use write::{WriteError, write_streamed, write_whole};
+pub use stylet_write::{WriteError, write_streamed, write_whole};

@@ -6,6 +6,7 @@ use crate::action::Action;
 use crate::affinity;
 use crate::dose_worker::{DoseOf, DoseRequest};
 use crate::loader::Loaded;
+use crate::panel::workflow::SCRIPTED_STEPS;
 use crate::shown::{LoadState, Note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -264,7 +265,7 @@ impl App {
                 RunStatus::Done => Some(Note {
                     refused: false,
                     text: match self.run_needles.len() {
-                        0 => "All four steps are done.".to_owned(),
+                        0 => format!("Done: {SCRIPTED_STEPS}."),
                         n => format!("All {n} needles are done."),
                     },
                 }),

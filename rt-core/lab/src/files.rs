@@ -7,18 +7,13 @@ use hdrhistogram::Histogram;
 use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, Tag};
 use sha2::{Digest, Sha256};
-use std::fs::Permissions;
-use std::io::{self, Write};
-use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::time::Duration;
+use stylet_write::write_whole;
 
 /// Writes all three files into `folder`, each with its digest in the report.
 pub fn write(folder: &Path, report: &mut Report, measured: &Measured) -> Result<(), String> {
-    let put = |name: &str, bytes: &[u8]| {
-        let path = folder.join(name);
-        write_whole(&path, bytes).map_err(|e| format!("cannot write {}: {e}", path.display()))
-    };
+    let put = |name: &str, bytes: &[u8]| write_whole(&folder.join(name), bytes).map_err(|e| e.to_string());
     let raw = raw_histograms(report, measured)?;
     put(HISTOGRAMS, &raw)?;
     let page = html::page(report, measured)?;
@@ -36,20 +31,6 @@ pub fn write(folder: &Path, report: &mut Report, measured: &Measured) -> Result<
     report.sha256 = sha256(json.as_bytes());
     put(JSON, json.replacen(NO_DIGEST, &report.sha256, 1).as_bytes())?;
     put(PAGE, page.replacen(NO_DIGEST, &report.sha256, 1).as_bytes())
-}
-
-/// Permissions of a new file before the umask, as of every file that a program creates.
-const MODE: u32 = 0o666;
-
-/// Writes to a temporary file beside `path` and renames it: a reader sees the old content or the new, never a part.
-fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let mut file = tempfile::Builder::new()
-        .permissions(Permissions::from_mode(MODE))
-        .tempfile_in(folder.unwrap_or(Path::new(".")))?;
-    file.write_all(bytes)?;
-    file.persist(path)?;
-    Ok(())
 }
 
 /// SHA-256 of `bytes` as 64 lower-case hexadecimal digits.
@@ -107,29 +88,5 @@ mod tests {
         let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!(sha256(b"abc"), abc);
         assert_eq!(NO_DIGEST.len(), abc.len());
-    }
-
-    #[test]
-    fn a_file_is_replaced_whole_and_a_failed_write_leaves_nothing() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join(JSON);
-        write_whole(&path, b"a longer old report").expect("written");
-        write_whole(&path, b"new").expect("written");
-        assert_eq!(std::fs::read(&path).expect("readable"), b"new");
-        // A folder has this name: the rename fails.
-        let taken = folder.path().join("taken");
-        std::fs::create_dir(&taken).expect("made");
-        assert!(write_whole(&taken, b"new").is_err());
-        assert_eq!(std::fs::read_dir(folder.path()).expect("readable").count(), 2);
-    }
-
-    #[test]
-    fn a_new_file_has_the_permissions_of_any_other() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let mode = |path: &Path| std::fs::metadata(path).expect("there").permissions().mode() & 0o777;
-        let (ours, plain) = (folder.path().join("ours"), folder.path().join("plain"));
-        write_whole(&ours, b"x").expect("written");
-        std::fs::write(&plain, b"x").expect("written");
-        assert_eq!(mode(&ours), mode(&plain));
     }
 }

@@ -11,4 +11,5 @@ pub mod line;
 pub mod needle;
 pub mod scene;
 pub mod settings;
+mod simd;
 pub mod tissue;

@@ -13,9 +13,10 @@ use stylet_tests::{Core, ask, scratch, until};
 
 const LONG: Duration = Duration::from_secs(20);
 
+/// The host is dropped before its core.
 struct Rig {
-    core: Core,
     link: Link,
+    core: Core,
     control: &'static Control,
     /// Where the device's origin lies in the scene.
     origin_m: Vector3<f64>,
@@ -49,8 +50,8 @@ impl Rig {
         assert_eq!(state.fault, 0, "{:?}", Fault::from_number(state.fault));
         let origin_m = Vector3::from(state.tip_in_scene_m);
         Self {
-            core,
             link,
+            core,
             control,
             origin_m,
         }

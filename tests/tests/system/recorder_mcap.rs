@@ -162,6 +162,7 @@ fn a_recording_with_the_window_open_loses_no_tick_and_others_read_it() {
             assert!(read["topics"]["/stylet/gland"].as_u64() > Some(50), "{read}");
         }
     }
+    drop(hand);
     core.finish();
 }
 

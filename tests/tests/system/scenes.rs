@@ -333,7 +333,7 @@ fn volumes_that_cannot_be_used_get_one_refusal_with_every_reason_and_the_scene_g
         (before.generation, before.element_count),
         (after.generation, after.element_count)
     );
-    drop(link);
+    drop((sender, link));
     core.finish();
 }
 

@@ -117,3 +117,16 @@ fn structures_that_the_volume_has_not_are_reported_together() {
         "{why}"
     );
 }
+
+/// The example stood in two places, and each knew fields that the other lacked.
+#[test]
+fn the_example_in_the_help_and_on_the_page_is_a_scene_file_with_every_field() {
+    let scene = parse(include_str!("../../../../scenes/example.toml")).unwrap();
+    assert_eq!(scene.name.as_deref(), Some("phantom"));
+    assert_eq!(scene.volume, Path::new("gland.nii.gz"));
+    assert!(scene.image.is_some() && scene.device.is_some() && scene.plan.is_some());
+    assert!(scene.insert_m_per_s.is_some() && scene.retract_m_per_s.is_some());
+    let tissues = scene.tissues(&voxels()).unwrap();
+    assert_eq!((tissues[0].name.as_str(), tissues[0].role), ("Prostate", Role::Target));
+    assert!(tissues[0].material.limits.is_some());
+}

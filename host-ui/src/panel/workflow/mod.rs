@@ -16,6 +16,9 @@ use stylet_base::format;
 use stylet_implant::workflow::Step;
 use stylet_shm_schema::Request;
 
+/// What the script does of a plan of one needle, by the numbers in the panel.
+pub const SCRIPTED_STEPS: &str = "steps 2 to 6";
+
 /// What the panel keeps between frames: what a person is typing, and which step was opened by hand.
 #[derive(Default)]
 pub struct WorkflowState {
@@ -97,16 +100,28 @@ fn run_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     }
     let blocked = missing(shown, Progress::Plan);
     let response = ui.add_enabled(blocked.is_none(), Button::new(run_name(shown)).min_size(wide));
-    if hinted(response, blocked).clicked() {
+    if hinted(response, blocked).on_hover_text(run_help(shown)).clicked() {
         actions.push(Action::RunAll);
     }
 }
 
 fn run_name(shown: &Shown) -> String {
-    match shown.planning.implant.as_ref().map(|i| i.plan.needles.len()) {
-        None | Some(0) => "Run all four steps".to_owned(),
-        Some(count) => format!("Run all {count} needles"),
+    match needle_count(shown) {
+        0 => format!("Run {SCRIPTED_STEPS}"),
+        count => format!("Run all {count} needles"),
     }
+}
+
+fn run_help(shown: &Shown) -> &'static str {
+    match needle_count(shown) {
+        0 => "A scripted hand plans five seeds, places the needle, inserts it, drops the seeds and retracts it",
+        _ => "A scripted hand places each needle in turn, inserts it, drops its seeds and retracts it",
+    }
+}
+
+/// Needles of the plan of many; 0 where the script plans the only one.
+fn needle_count(shown: &Shown) -> usize {
+    shown.planning.implant.as_ref().map_or(0, |i| i.plan.needles.len())
 }
 
 fn hinted(response: egui::Response, blocked: Option<String>) -> egui::Response {

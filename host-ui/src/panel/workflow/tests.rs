@@ -1,6 +1,6 @@
-//! Which needle of a plan is next.
+//! Which needle of a plan is next, and what the script does.
 
-use super::{Progress, is_needle_done, next_action, progress};
+use super::{Progress, SCRIPTED_STEPS, is_needle_done, next_action, progress, run_name};
 use crate::action::{Action, PlanAction};
 use crate::planner::Planner;
 use crate::planner::tests::{planned, planner, planning};
@@ -67,4 +67,14 @@ fn the_next_needle_is_the_thing_to_do_once_one_is_outside_and_its_seeds_are_drop
     let last = shown(&mut planner, 0.0, &[0.08, 0.07, 0.08, 0.07]);
     assert!(is_needle_done(&last));
     assert_eq!((progress(&last), next_action(&last)), (Progress::Debrief, None));
+}
+
+/// The button said "all four steps" over a list of seven.
+#[test]
+fn the_button_names_the_steps_of_the_panel_that_the_script_does() {
+    let [first, last] = [Progress::Plan, Progress::Retract].map(Progress::number);
+    assert_eq!(SCRIPTED_STEPS, format!("steps {first} to {last}"));
+    assert_eq!(run_name(&Shown::empty("lab")), format!("Run {SCRIPTED_STEPS}"));
+    let mut planner = planner();
+    assert_eq!(run_name(&shown(&mut planner, 0.0, &[])), "Run all 2 needles");
 }

@@ -9,6 +9,7 @@ use super::model::LineModel;
 use super::prony::Memory;
 use super::rows::{add_scaled, dot};
 use super::tip::{TipState, follow};
+use crate::simd::{Simd, vectorised};
 
 /// Solutions in one tick at most: the tip goes on, a membrane gives way, the tip goes on again.
 const MAX_PASSES: u32 = 12;
@@ -196,7 +197,7 @@ pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> Line
     for _ in 0..MAX_PASSES {
         touch(model, state, tip_m);
         let front = model.front(&state.tip);
-        let gap_m = solve_vectorised(model, state, tip_m, front.limit_n, input.dt_s, &mut output);
+        let gap_m = solve_vectorised(model.simd, model, state, tip_m, front.limit_n, input.dt_s, &mut output);
         output.held_by = front.membrane;
         let is_pushed = state.tip.force_n >= front.limit_n;
         if let (Some(layer), true) = (front.membrane, state.tip.force_n > 0.0) {
@@ -272,27 +273,18 @@ fn limit_n(model: &LineModel, place_m: f64, n: usize) -> f64 {
     model.friction_n_per_m[n] * (place_m - n as f64 * ds).clamp(0.0, ds)
 }
 
-/// [`solve`] for the instructions that the processor has; the same bits with all of them.
-fn solve_vectorised(
-    model: &LineModel,
-    state: &mut LineState,
-    tip_m: f64,
-    tip_limit_n: f64,
-    dt_s: f64,
-    output: &mut LineOutput,
-) -> f64 {
-    #[cfg(target_arch = "x86_64")]
-    {
-        #[target_feature(enable = "avx2")]
-        fn avx2(m: &LineModel, s: &mut LineState, tip_m: f64, limit_n: f64, dt_s: f64, o: &mut LineOutput) -> f64 {
-            solve(m, s, tip_m, limit_n, dt_s, o)
-        }
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { avx2(model, state, tip_m, tip_limit_n, dt_s, output) };
-        }
+vectorised! {
+    /// [`solve`] for the instructions that the processor has; the same bits with all of them.
+    fn solve_vectorised(
+        model: &LineModel,
+        state: &mut LineState,
+        tip_m: f64,
+        tip_limit_n: f64,
+        dt_s: f64,
+        output: &mut LineOutput,
+    ) -> f64 {
+        solve(model, state, tip_m, tip_limit_n, dt_s, output)
     }
-    solve(model, state, tip_m, tip_limit_n, dt_s, output)
 }
 
 /// Forces of shaft and tip; returns how far the tip is beyond where the material has it.

@@ -3,6 +3,7 @@
 use super::compliance::Compliance;
 use super::prony::PronyTerm;
 use crate::settings::{Problem, Problems};
+use crate::simd::Simd;
 
 /// Stations of one line at most.
 pub const MAX_STATIONS: usize = 128;
@@ -77,6 +78,8 @@ pub struct LineModel {
     /// Friction of each station for each metre of it.
     pub(super) friction_n_per_m: Vec<f64>,
     pub(super) settings: LineSettings,
+    /// Instructions for the solver.
+    pub(super) simd: Simd,
 }
 
 impl LineModel {
@@ -124,6 +127,7 @@ impl LineModel {
             layers: layers.to_vec(),
             settings,
             compliance,
+            simd: Simd::detect(),
         })
     }
 

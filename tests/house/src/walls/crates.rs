@@ -47,6 +47,12 @@ const LAYERS: &[Layer] = &[
         not_itself: &[],
     },
     Layer {
+        folder: "shm-schema/write",
+        may_use: &[],
+        never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
         folder: "shm-schema",
         may_use: &["shm-schema/anatomy"],
         never: &[WINDOW, ARGUMENTS, PROGRAM, DEVICES, DICOM],
@@ -93,6 +99,7 @@ const LAYERS: &[Layer] = &[
             "rt-core/sim",
             "shm-schema",
             "shm-schema/anatomy",
+            "shm-schema/write",
         ],
         never: &[WINDOW, DICOM],
         not_itself: &[],
@@ -114,7 +121,7 @@ const LAYERS: &[Layer] = &[
     // The host's side.
     Layer {
         folder: "host-ui/base",
-        may_use: &["shm-schema/anatomy"],
+        may_use: &["shm-schema/anatomy", "shm-schema/write"],
         never: &[WINDOW, PORTS, DEVICES, DICOM],
         not_itself: &[],
     },

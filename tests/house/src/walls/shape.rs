@@ -26,10 +26,6 @@ pub const LONGER: &[(&str, &str)] = &[
         "vector kernels that share their lanes and constants",
     ),
     ("src/link.rs", "not split yet"),
-    (
-        "lab/src/html.rs",
-        "not split yet: a writer of HTML that a template replaces",
-    ),
 ];
 
 /// Public functions that may still return their error as prose: only ever lowered.

@@ -9,9 +9,9 @@ use super::lanes::{add_scaled, dot, keep_free, keep_opposite, scale_and_add};
 use super::model::FemModel;
 use super::multigrid::{FEW_CYCLES, Stage};
 use super::real::Real;
-use super::simd::{Simd, vectorised};
 use super::smooth::Product;
 use super::sweep::{Field, LineOp, sweep};
+use crate::simd::{Simd, vectorised};
 
 /// `b = -A u` where nodes are free, zero elsewhere: what is left to do from `u` on where nothing pushes free nodes.
 struct Opposite<'a, T> {

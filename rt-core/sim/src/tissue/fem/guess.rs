@@ -4,8 +4,8 @@ use super::grip::{Grip, PatchCells, Response, SAME_WAY, dot};
 use super::level::Level;
 use super::model::FemModel;
 use super::real::Real;
-use super::simd::{Simd, vectorised};
 use super::sweep::Field;
+use crate::simd::{Simd, vectorised};
 
 /// A patch is the next one up to so many cells away.
 const NEXT_PATCH: isize = 2;

@@ -1,7 +1,7 @@
 //! One level of the multigrid: a grid of cubic elements, each with a stiffness, and the springs of the foundation.
 
 use super::grid::Grid;
-use super::simd::Simd;
+use crate::simd::Simd;
 
 /// The operator on one grid.
 #[derive(Clone, Debug)]

@@ -5,8 +5,8 @@ use super::hexahedron::Stiffness;
 use super::lanes::LANES;
 use super::level::Level;
 use super::real::Real;
-use super::simd::Simd;
 use super::sweep::{Field, LineOp, Planes, sweep, zeros};
+use crate::simd::Simd;
 
 /// Below so many free nodes the coarsest level is solved directly.
 const DIRECT_NODES: usize = 30;

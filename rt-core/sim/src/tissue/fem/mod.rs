@@ -49,7 +49,6 @@ mod model;
 mod multigrid;
 mod output;
 mod real;
-mod simd;
 mod smooth;
 mod solve;
 mod state;

@@ -3,8 +3,8 @@
 use super::hexahedron::CHUNK;
 use super::model::{CellRun, FemModel};
 use super::real::Real;
-use super::simd::{Simd, vectorised};
 use super::state::FemState;
+use crate::simd::{Simd, vectorised};
 
 /// Superposes the responses and writes the displacements; returns how many elements moved.
 pub(super) fn write<T: Real>(model: &FemModel<T>, state: &mut FemState<T>) -> u32 {

@@ -5,8 +5,8 @@ use std::ops::Range;
 use super::lanes::{chebyshev, difference_where_free, dot, first_chebyshev, keep_free};
 use super::level::Level;
 use super::real::Real;
-use super::simd::{Simd, vectorised};
 use super::sweep::{Field, LineOp, Planes, sweep};
+use crate::simd::{Simd, vectorised};
 
 /// `x += d` after `d = keep d + gain (b - A x) / diagonal`: one step of a Chebyshev iteration.
 struct Step<'a, T> {

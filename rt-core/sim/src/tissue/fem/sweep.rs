@@ -9,7 +9,7 @@ use super::hexahedron::{CHUNK, Scratch, add_line, forces};
 use super::lanes::{LANES, add_products};
 use super::level::Level;
 use super::real::Real;
-use super::simd::{Simd, vectorised};
+use crate::simd::{Simd, vectorised};
 
 /// One value for each node along x, y, z.
 pub(super) type Field<T> = [Vec<T>; 3];

@@ -2,8 +2,8 @@
 
 use super::grid::Grid;
 use super::real::Real;
-use super::simd::{Simd, vectorised};
 use super::sweep::Field;
+use crate::simd::{Simd, vectorised};
 
 /// Weight of the two or one coarse lines (or planes) that a fine one lies between.
 #[inline(always)]

@@ -5,8 +5,8 @@ use std::ops::Range;
 use super::kernel::{PlaneOp, TwoPlanes, each, sweep};
 use super::level::{BatchLevel, BatchModel};
 use super::{LOADS, Node};
+use crate::simd::{Simd, vectorised};
 use crate::tissue::fem::real::Real;
-use crate::tissue::fem::simd::{Simd, vectorised};
 
 /// Part of the spectrum, from the top, that the smoother is for.
 const SMOOTHED: f64 = 5.0;

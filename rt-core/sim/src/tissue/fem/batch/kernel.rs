@@ -7,8 +7,8 @@ use std::ops::Range;
 
 use super::level::{BatchLevel, Run};
 use super::{LOADS, Lanes, Node};
+use crate::simd::{Simd, vectorised};
 use crate::tissue::fem::real::Real;
-use crate::tissue::fem::simd::{Simd, vectorised};
 
 /// What to do with the forces on a plane of nodes; no later plane needs this `x`.
 pub(super) trait PlaneOp<T> {

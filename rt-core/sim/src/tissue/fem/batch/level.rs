@@ -2,10 +2,10 @@
 
 use super::LOADS;
 use crate::scene::Lattice;
+use crate::simd::Simd;
 use crate::tissue::fem::level::Level;
 use crate::tissue::fem::model::FemModel;
 use crate::tissue::fem::real::Real;
-use crate::tissue::fem::simd::Simd;
 use std::sync::Arc;
 
 /// A grid place that no element touches.

@@ -6,8 +6,8 @@ use super::cycle::{Stage, prolong, restrict, smooth, smooth_down, solve_coarsest
 use super::kernel::{PlaneOp, TwoPlanes, each, sweep};
 use super::level::{BatchLevel, BatchModel, NodeWeight};
 use super::{LOADS, Lanes, Node};
+use crate::simd::{Simd, vectorised};
 use crate::tissue::fem::real::Real;
-use crate::tissue::fem::simd::{Simd, vectorised};
 
 /// What the next slice of work does.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,5 +1,7 @@
 //! Files that appear under their name only once they are complete.
 
+#![warn(missing_docs)]
+
 use std::fs::{File, Permissions};
 use std::io::{self, BufWriter, Write};
 use std::os::unix::fs::PermissionsExt;
@@ -26,7 +28,7 @@ pub struct WriteError {
 /// ```
 /// let folder = tempfile::tempdir().unwrap();
 /// let path = folder.path().join("seeds.csv");
-/// stylet_base::write_whole(&path, b"x_mm,y_mm,z_mm\n").unwrap();
+/// stylet_write::write_whole(&path, b"x_mm,y_mm,z_mm\n").unwrap();
 /// assert_eq!(std::fs::read(&path).unwrap(), b"x_mm,y_mm,z_mm\n");
 /// ```
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
@@ -91,6 +93,8 @@ mod tests {
             "{text}"
         );
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        // A folder has the name.
+        assert!(write_whole(folder.path(), b"new").is_err());
         assert_eq!(names(folder.path()), ["plan.toml"]);
     }
 

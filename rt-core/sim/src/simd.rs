@@ -2,7 +2,7 @@
 
 /// The results are the same with all of them: nothing is reordered or fused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Simd {
+pub(crate) enum Simd {
     Portable,
     #[cfg(target_arch = "x86_64")]
     Avx2,
@@ -31,22 +31,22 @@ impl Simd {
 macro_rules! vectorised {
     (
         $(#[$attribute:meta])*
-        fn $name:ident<$t:ident $(, $o:ident: $bound:ident)?>($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? $body:block
+        fn $name:ident$(<$t:ident $(, $o:ident: $bound:ident)?>)?($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? $body:block
     ) => {
         $(#[$attribute])*
-        pub(super) fn $name<$t: Real $(, $o: $bound<$t>)?>(simd: Simd, $($argument: $type),*) $(-> $result)? {
+        pub(super) fn $name$(<$t: Real $(, $o: $bound<$t>)?>)?(simd: Simd, $($argument: $type),*) $(-> $result)? {
             #[inline(always)]
-            fn portable<$t: Real $(, $o: $bound<$t>)?>($($argument: $type),*) $(-> $result)? $body
+            fn portable$(<$t: Real $(, $o: $bound<$t>)?>)?($($argument: $type),*) $(-> $result)? $body
 
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx2")]
-            fn avx2<$t: Real $(, $o: $bound<$t>)?>($($argument: $type),*) $(-> $result)? {
+            fn avx2$(<$t: Real $(, $o: $bound<$t>)?>)?($($argument: $type),*) $(-> $result)? {
                 portable($($argument),*)
             }
 
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx512f")]
-            fn avx512<$t: Real $(, $o: $bound<$t>)?>($($argument: $type),*) $(-> $result)? {
+            fn avx512$(<$t: Real $(, $o: $bound<$t>)?>)?($($argument: $type),*) $(-> $result)? {
                 portable($($argument),*)
             }
 
@@ -62,4 +62,4 @@ macro_rules! vectorised {
         }
     };
 }
-pub(super) use vectorised;
+pub(crate) use vectorised;

@@ -1,0 +1,116 @@
+//! What the figures come from: counters of the kernel, settings, machine, packages, method.
+
+use super::parts::{Column, cell, count, num, or_na, table};
+use crate::report::Report;
+use maud::{Markup, html};
+
+const COUNTS: [Column; 4] = [Column::Text, Column::Number, Column::Number, Column::Number];
+
+pub fn counters(r: &Report) -> Markup {
+    let (h, t) = (&r.haptic.counts, &r.tissue.counts);
+    let rows = [
+        ("ticks", h.ticks as f64, t.ticks as f64),
+        ("missed deadlines", h.missed_deadlines as f64, t.missed_deadlines as f64),
+        ("overruns", h.overruns as f64, t.overruns as f64),
+        ("ticks not measured", h.unmeasured as f64, t.unmeasured as f64),
+        ("heap calls", h.heap_calls as f64, t.heap_calls as f64),
+        ("minor page faults", h.minor_faults as f64, t.minor_faults as f64),
+        ("major page faults", h.major_faults as f64, t.major_faults as f64),
+        (
+            "voluntary context switches",
+            h.voluntary_switches as f64,
+            t.voluntary_switches as f64,
+        ),
+        (
+            "... beyond one for each sleep",
+            h.voluntary_switches_beyond_sleep as f64,
+            t.voluntary_switches_beyond_sleep as f64,
+        ),
+        (
+            "involuntary context switches",
+            h.involuntary_switches as f64,
+            t.involuntary_switches as f64,
+        ),
+    ];
+    let rows = rows.map(|(what, haptic, tissue)| vec![cell(what), count(haptic), count(tissue)]);
+    let cores: Vec<Vec<Markup>> = r
+        .cores
+        .iter()
+        .map(|c| {
+            let range = c.lowest_mhz.zip(c.highest_mhz);
+            let mhz = range.map_or(or_na(None), |(low, high)| {
+                cell(format!("{} to {}", num(low), num(high)))
+            });
+            let served = c.interrupts.map(|n| n as f64);
+            vec![cell(c.core), mhz, or_na(c.steal_s), or_na(served)]
+        })
+        .collect();
+    html! {
+        h2 { "Counters" }
+        div class="pair" {
+            (table(&["from arming to the end", "force loop", "tissue loop"], &rows, &COUNTS))
+            (table(&["core", "MHz", "steal time, s", "interrupts served"], &cores, &COUNTS))
+        }
+    }
+}
+
+pub fn stiffness(r: &Report) -> Markup {
+    let s = &r.stiffness;
+    let rows: Vec<Vec<Markup>> = s
+        .margins
+        .iter()
+        .map(|m| vec![cell(m.at), or_na(m.delay_us), or_na(m.k_max_n_per_m.map(|k| k / 1e3))])
+        .collect();
+    html! {
+        h2 { "What the delay costs the hand" }
+        div class="half" { (table(&["at", "delay t_d, \u{b5}s", "K_max, N/mm"], &rows, &COUNTS)) }
+        p class="faint" {
+            (s.rule) ". b = " (num(s.hand_damping_n_s_per_m)) " N s/m, a hand in the middle of what people have; B = "
+            (num(s.law_damping_n_s_per_m)) " N s/m, damping of the force law. Stiffer walls than K_max may vibrate."
+        }
+    }
+}
+
+pub fn provenance(r: &Report) -> Markup {
+    let met = |is_met: bool| html! { @if is_met { "yes" } @else { b { "no" } } };
+    let settings = r.settings.iter();
+    let settings: Vec<_> = settings
+        .map(|s| vec![cell(&s.name), cell(&s.asked), cell(&s.got), met(s.met)])
+        .collect();
+    let facts = r.facts.iter();
+    let facts: Vec<_> = facts
+        .map(|f| vec![cell(f.group), cell(&f.name), cell(&f.value)])
+        .collect();
+    let packages = r.dependencies.iter();
+    let packages: Vec<_> = packages
+        .map(|d| vec![cell(&d.name), cell(&d.version), cell(d.known_anomalies.join(" "))])
+        .collect();
+    let last_wide = [Column::Text, Column::Text, Column::Wide];
+    html! {
+        h2 { "Settings, asked and read back" }
+        (table(&["setting", "asked", "got", "met"], &settings, &[]))
+        h2 { "Machine" }
+        (table(&["", "what", "reported value"], &facts, &last_wide))
+        details {
+            summary { (packages.len()) " packages that rt-core is built from, with what we know to be wrong with them" }
+            (table(&["package", "version", "known anomalies"], &packages, &last_wide))
+        }
+    }
+}
+
+pub fn method(r: &Report) -> Markup {
+    html! {
+        h2 { "Method" }
+        p {
+            "The run's own force loop, tissue loop and bridge, with the simulated device and a script that inserts and retracts \
+             the needle every 4 s. The first " (num(r.protocol.warm_up_s)) " s are not recorded. Wake-up: clock read right after \
+             the sleep, less the due time on the ideal grid. Missed deadline: a grid point that was skipped. Overrun: a tick that \
+             ended after the next was due. A percentile needs ten samples beyond it. Values are known to 0.1 %. This report is \
+             evidence for whoever assesses the machine; it claims no conformity with any standard."
+        }
+        p class="faint" {
+            "Command: " code { (r.command.join(" ")) } br;
+            "Commit: " code { (r.commit) } ", schema " (r.schema)
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! What took how long: loops, host, comparison, latest wake-ups.
+
+use super::parts::{Column, cell, count, duration, micro, num, or_na, table};
+use crate::compare::Against;
+use crate::report::{LoopSection, Report};
+use crate::summary::{QUANTILES, Summary};
+use maud::{Markup, html};
+
+pub fn of_loop(title: &str, section: &LoopSection) -> Markup {
+    html! {
+        h2 { (title) }
+        (time_table(&section.times))
+    }
+}
+
+fn time_table(times: &[Summary]) -> Markup {
+    let mut head = vec!["microseconds", "min", "mean"];
+    head.extend(QUANTILES.iter().map(|(name, _)| *name));
+    head.extend(["max", "samples"]);
+    let row = |s: &Summary| {
+        let mut cells = vec![cell(&s.name), or_na(s.min_us), or_na(s.mean_us)];
+        cells.extend(s.quantiles.iter().map(|q| or_na(q.us)));
+        cells.extend([or_na(s.max_us), count(s.count as f64)]);
+        cells
+    };
+    let rows: Vec<Vec<Markup>> = times.iter().map(row).collect();
+    let mut columns = vec![Column::Number; head.len()];
+    columns[0] = Column::Text;
+    let mut needs: Vec<String> = Vec::new();
+    for q in times.iter().flat_map(|t| &t.quantiles) {
+        let reason = q.needs_s.map(|s| format!("{} needs a run of {}", q.name, duration(s)));
+        needs.extend(reason.filter(|reason| !needs.contains(reason)));
+    }
+    html! {
+        (table(&head, &rows, &columns))
+        @if !needs.is_empty() {
+            p class="faint" { "n/a: " (needs.join(", ")) "." }
+        }
+    }
+}
+
+pub fn host(r: &Report) -> Markup {
+    html! {
+        h2 { "Host" }
+        (time_table(&r.host.times))
+        p class="faint" {
+            "A thread of normal priority that looks once a millisecond; the bridge sends every two. "
+            (num(r.host.snapshots as f64)) " snapshots and " (num(r.host.records as f64)) " records seen, "
+            (r.host.records_missing) " records missing, " (r.host.faults) " faults."
+        }
+    }
+}
+
+pub fn comparison(r: &Report) -> Markup {
+    let Some(c) = &r.comparison else {
+        return Markup::default();
+    };
+    let (title, heads) = match c.against {
+        Against::Cyclictest => ("Beside cyclictest", ["ours", "theirs"]),
+        Against::Unloaded => ("With and without the load", ["with", "without"]),
+    };
+    if let Some(why) = &c.absent {
+        return html! { h2 { (title) } p { (why) } };
+    }
+    let mut rows: Vec<Vec<Markup>> = Vec::new();
+    for (i, round) in c.rounds.iter().enumerate() {
+        let cells = (0..c.names.len()).flat_map(|k| [round.ours_us[k], round.others_us[k], round.ratio[k]].map(or_na));
+        rows.push([cell(i + 1)].into_iter().chain(cells).collect());
+    }
+    let ratio = |median: &Option<f64>| html! { b { (or_na(*median)) } };
+    let median = c.median_ratio.iter().flat_map(|m| [cell(""), cell(""), ratio(m)]);
+    rows.push([html! { b { "median" } }].into_iter().chain(median).collect());
+    let mut head = vec![cell("round")];
+    for name in c.names {
+        head.extend(heads.map(|whose| html! { (name) br; (whose) }));
+        head.push(cell("ratio"));
+    }
+    let turns = num(c.turn_s);
+    html! {
+        h2 { (title) }
+        (table(&head, &rows, &vec![Column::Number; head.len()]))
+        p class="faint" {
+            @match c.against {
+                Against::Cyclictest => {
+                    (c.tool) ", alternating (turns of " (turns) " s): same core, priority and interval, microseconds, both read \
+                     right after the sleep. The force loop does all its work, cyclictest sleeps only."
+                }
+                Against::Unloaded => { "The same loops, alternating (turns of " (turns) " s), microseconds." }
+            }
+            " Values past 1 ms are left out of p99 and p99.9."
+        }
+    }
+}
+
+pub fn late(r: &Report) -> Markup {
+    let row = |l: &crate::report::Late| {
+        vec![
+            cell(format!("{:.3}", l.at_s)),
+            count(l.wake_us),
+            count(l.work_us),
+            cell(micro(&l.cause)),
+        ]
+    };
+    let rows: Vec<Vec<Markup>> = r.latest_wake_ups.iter().map(row).collect();
+    let head = ["at, s", "wake-up, \u{b5}s", "work, \u{b5}s", "cause"];
+    let columns = [Column::Number, Column::Number, Column::Number, Column::Wide];
+    html! {
+        h2 { "Latest wake-ups" }
+        (table(&head, &rows, &columns))
+    }
+}
