@@ -15,6 +15,7 @@ pub fn plan(count: usize) -> SeedPlan {
             position_m: [t * 1.234567e-3 - 0.03, 0.0123456789 - t * 1e-4, -0.1 + t / 3e3],
             axis: (i % 5 != 4).then_some(axis),
             strength_u: [0.5, 0.4321, 0.62][i % 3],
+            strength_on: Some(Date::constant(2026, 9, [1, 20][i % 2])),
         }
     };
     SeedPlan {
@@ -22,6 +23,7 @@ pub fn plan(count: usize) -> SeedPlan {
         identity: Identity::new(),
         uid: new_uid(),
         prescription_gy: Some(145.0),
+        planned_on: Some(Date::constant(2026, 10, 31)),
         source: PlanSource {
             model: "6711".to_owned(),
             manufacturer: "nobody".to_owned(),
