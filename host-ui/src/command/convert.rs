@@ -3,6 +3,7 @@
 use super::CommandError;
 use clap::Args;
 use std::path::{Path, PathBuf};
+use stylet_base::format::printable;
 use stylet_base::{input, write_whole};
 use stylet_dose::Source;
 use stylet_files::convert::{can_hold_labels, write_labels};
@@ -82,7 +83,7 @@ impl ConvertArgs {
         }
         let voxels = files::read_voxels(&self.from, &Progress::default())?;
         if let Some(note) = &voxels.frame.warning {
-            eprintln!("note: {note}");
+            seeds::report(&self.from, std::slice::from_ref(note));
         }
         if to_dicom {
             let bytes = dicom::structures::write::bytes(&voxels, &Identity::new())
@@ -94,7 +95,7 @@ impl ConvertArgs {
             if !keeps_names && !voxels.names.is_empty() {
                 eprintln!(
                     "note: names of structures have no place in this format: {}",
-                    names(&voxels)
+                    printable(&names(&voxels))
                 );
             }
         }

@@ -299,9 +299,7 @@ impl Common {
                 return Err(format!("--name: {} names its structures itself", file.display()).into());
             }
             Some((structures, notes)) => {
-                notes
-                    .iter()
-                    .for_each(|note| eprintln!("note: {}: {note}", file.display()));
+                seeds::report(file, &notes);
                 structures
             }
             None => self.labelled(file, given, most_points)?,
@@ -332,7 +330,7 @@ impl Common {
             .into());
         }
         if let Some(warning) = &voxels.frame.warning {
-            eprintln!("note: {}: {warning}", file.display());
+            seeds::report(file, std::slice::from_ref(warning));
         }
         // The names in the file count where none are given.
         let mut names = voxels.names.clone();
