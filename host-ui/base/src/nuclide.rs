@@ -57,7 +57,16 @@ mod tests {
 
     #[test]
     fn one_nuclide_has_many_spellings_and_two_have_none_in_common() {
-        for text in ["I-125", "i125", "125I", "125-I", "I 125", "IODINE-125", "Iod-125", " I_125 "] {
+        for text in [
+            "I-125",
+            "i125",
+            "125I",
+            "125-I",
+            "I 125",
+            "IODINE-125",
+            "Iod-125",
+            " I_125 ",
+        ] {
             assert_eq!(Nuclide::parse(text), Nuclide::parse("I-125"), "{text}");
         }
         let all = ["I-125", "I-131", "Pd-103", "Cs-131", "Ir-192", "Cs-137"].map(|t| Nuclide::parse(t).unwrap());

@@ -11,12 +11,12 @@ use stylet_dose::criteria::DoseStructure;
 use stylet_dose::decay::Interval;
 use stylet_dose::report::Judge;
 use stylet_dose::{DoseKernel, Dvh, Source};
+use stylet_files::dicom::plan::Date;
 use stylet_host::core_args::CoreArgs;
 use stylet_implant::plan::automatic::{self, Aims};
-use stylet_implant::plan::{file, seeds};
 use stylet_implant::plan::{Anatomy, ImplantPlan, Template, check};
+use stylet_implant::plan::{file, seeds};
 use stylet_implant::procedure::{Connect, Live};
-use stylet_files::dicom::plan::Date;
 use stylet_implant::readers::{DayOfImplant, SeedDefaults, SeedFile};
 
 const DOSE_PITCH_M: f64 = 1e-3;

@@ -85,7 +85,13 @@ const TABLE: [Row; 14] = {
             Target,
             Material::GLAND,
         ),
-        row(O::ProstateBed, &["prostatebed", "prostatabett"], &[], Target, Material::GLAND),
+        row(
+            O::ProstateBed,
+            &["prostatebed", "prostatabett"],
+            &[],
+            Target,
+            Material::GLAND,
+        ),
         row(
             O::Prostate,
             &["prostate", "prostata", "prostaat", "prosztata", "eturauhanen", "gland"],

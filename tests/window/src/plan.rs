@@ -279,7 +279,9 @@ fn an_automatic_plan_covers_the_target_and_nothing_is_wrong_with_its_needles() {
     wait_long_for_label(&mut driven, &prescription);
     // A limit that the dose does not keep stood beside "The plan has no problems.".
     let broken = [" %, above", " Gy, above", " %, below", " Gy, below"];
-    let is_broken = broken.iter().any(|words| driven.window.query_all_by_label_contains(words).count() > 0);
+    let is_broken = broken
+        .iter()
+        .any(|words| driven.window.query_all_by_label_contains(words).count() > 0);
     let is_praised = driven.window.query_by_label("The plan has no problems.").is_some();
     assert_ne!(is_broken, is_praised);
     keep_for_docs(&driven.picture("plan-automatic"), "plan");

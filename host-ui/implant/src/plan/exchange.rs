@@ -43,7 +43,14 @@ pub fn read(path: &Path, scene: &SceneHeader) -> Result<ImplantPlan, PlanError> 
     let (prescription_gy, notes) = agreed.map_err(|e| PlanError::of_file(path, e))?;
     seeds::report(path, &notes);
     let prescription_gy = prescription_gy.unwrap_or(usual_gy);
-    file::import(path, seeds, &patient, Template::before(scene), &source.model, prescription_gy)
+    file::import(
+        path,
+        seeds,
+        &patient,
+        Template::before(scene),
+        &source.model,
+        prescription_gy,
+    )
 }
 
 /// The source that the seeds of a plan are of, or another one of their nuclide, among those that need no file.

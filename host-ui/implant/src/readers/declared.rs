@@ -49,7 +49,9 @@ pub enum Mismatch {
         source_model: String,
     },
     /// A strength whose day is years from that of the implant.
-    #[error("the strength of its seeds refers to {strength_on}, {days} days from the implant on {implant}; correct --implant-date")]
+    #[error(
+        "the strength of its seeds refers to {strength_on}, {days} days from the implant on {implant}; correct --implant-date"
+    )]
     Date {
         /// Day of the strength.
         strength_on: Date,
@@ -140,7 +142,9 @@ fn prescription(asked_gy: Option<f64>, declared: Option<&Declared>, source: &Sou
     };
     let differs = |gy: &f64| (gy - of_plan).abs() > SAME_GY;
     let note = match (asked_gy.filter(differs), source.prescription_gy.filter(differs)) {
-        (Some(asked), _) => Some(format!("it prescribes {of_plan} Gy; the {asked} Gy that were asked for count")),
+        (Some(asked), _) => Some(format!(
+            "it prescribes {of_plan} Gy; the {asked} Gy that were asked for count"
+        )),
         (None, Some(usual)) => Some(format!(
             "it prescribes {of_plan} Gy, which counts; the source file names {usual} Gy"
         )),
@@ -175,7 +179,10 @@ impl DayOfImplant {
         };
         let Some(implant) = self.0 else {
             let old = declared.and_then(|d| d.planned_on).map_or_else(String::new, |planned| {
-                format!(" (the plan is of {planned}, {} days later)", days_between(last, planned))
+                format!(
+                    " (the plan is of {planned}, {} days later)",
+                    days_between(last, planned)
+                )
             });
             return Ok(Some(format!(
                 "strengths are used as of their reference date {when}{old}; give --implant-date to let them decay to that day"

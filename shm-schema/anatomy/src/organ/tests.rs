@@ -231,7 +231,14 @@ fn prostata_is_a_target() {
 /// "Próstata" was tissue, and the urethra had the measures of an unknown structure.
 #[test]
 fn names_of_near_languages_are_known_with_and_without_accents() {
-    for name in ["Próstata", "Pro\u{301}stata", "PRÓSTATA", "Prostaat", "Prosztata", "Prostate gland"] {
+    for name in [
+        "Próstata",
+        "Pro\u{301}stata",
+        "PRÓSTATA",
+        "Prostaat",
+        "Prosztata",
+        "Prostate gland",
+    ] {
         assert_eq!(Organ::of_name(name), Some(Organ::Prostate), "{name}");
         assert_eq!(target_among(&["Rektum", name]), Some(1), "{name}");
     }

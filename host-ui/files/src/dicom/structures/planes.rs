@@ -75,7 +75,8 @@ fn shape(contour: &[Vector3<f64>]) -> Vec<[i64; 3]> {
 }
 
 fn planes(structure: &Contoured, normal: Vector3<f64>) -> Vec<Plane> {
-    let mut contours: Vec<(f64, &Vec<Vector3<f64>>)> = structure.contours.iter().map(|c| (c[0].dot(&normal), c)).collect();
+    let mut contours: Vec<(f64, &Vec<Vector3<f64>>)> =
+        structure.contours.iter().map(|c| (c[0].dot(&normal), c)).collect();
     contours.sort_by(|a, b| a.0.total_cmp(&b.0));
     let aside = if normal.x.abs() < 0.9 {
         Vector3::x()
@@ -165,7 +166,9 @@ fn distances(name: &str, planes: &[Plane]) -> Vec<String> {
     let (empty, empty_cc) = all(&|gap| gap > WIDEST * usual_m);
     if !empty.is_empty() {
         let places = first_of(&empty);
-        text += &format!("; nothing is drawn between {places} mm, and it is taken as empty ({empty_cc:.1} cc if it is one body)");
+        text += &format!(
+            "; nothing is drawn between {places} mm, and it is taken as empty ({empty_cc:.1} cc if it is one body)"
+        );
     }
     text += "; check its contours";
     vec![text]

@@ -54,7 +54,10 @@ fn another_isotope_is_refused_and_another_model_or_half_life_is_reported() {
         ..declared()
     };
     let notes = other.check(&iodine).unwrap();
-    assert!(notes[0].contains("60.2 days") && notes[1].contains("IAI-125A"), "{notes:?}");
+    assert!(
+        notes[0].contains("60.2 days") && notes[1].contains("IAI-125A"),
+        "{notes:?}"
+    );
 }
 
 /// A prescription of 110 Gy in the plan was ignored, and 145 taken from the source.
@@ -80,7 +83,10 @@ fn strengths_decay_to_the_implant_and_without_its_day_they_are_reported_with_the
     let note = implant.decay(&mut aged, Some(&declared()), &source).unwrap().unwrap();
     let left = (-60.0_f64 / 59.4).exp2();
     let strengths: Vec<f64> = aged.iter().map(|r| r.seed.strength_u).collect();
-    assert!((strengths[0] - 0.5 * left).abs() < 1e-12 && strengths[2] == 0.7, "{strengths:?}");
+    assert!(
+        (strengths[0] - 0.5 * left).abs() < 1e-12 && strengths[2] == 0.7,
+        "{strengths:?}"
+    );
     assert!(note.contains("2026-09-01") && note.contains("49.7 %"), "{note}");
     let mut same = rows();
     let note = DayOfImplant(None).decay(&mut same, Some(&declared()), &source).unwrap();
