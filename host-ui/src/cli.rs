@@ -8,6 +8,7 @@ use crate::command::plan::PlanArgs;
 use clap::{Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use stylet_base::format::printable;
 use stylet_base::interrupt;
 use stylet_controllers as controller;
 use stylet_files as files;
@@ -224,7 +225,7 @@ impl Cli {
 
 fn check(file: &Path, label: Option<u8>) -> Result<(), CommandError> {
     let v = files::read(file, label, &files::Progress::default())?;
-    println!("{}", v.name);
+    println!("{}", printable(&v.name));
     if files::scene::is_scene(file) {
         check_scene_file(file)?;
     }
@@ -248,7 +249,7 @@ fn check(file: &Path, label: Option<u8>) -> Result<(), CommandError> {
         let cells = v.cells.iter().filter(|&&c| c == t.label).count();
         println!(
             "  {} (label {}, {:?}): {cells} elements, {:.2} cm3, {} kPa{}",
-            t.name,
+            printable(&t.name),
             t.label,
             t.role,
             cells as f64 * (h_mm / 10.0).powi(3),
@@ -268,7 +269,7 @@ fn check(file: &Path, label: Option<u8>) -> Result<(), CommandError> {
         );
     }
     for warning in &v.warnings {
-        println!("  note: {warning}");
+        println!("  note: {}", printable(warning));
     }
     Ok(())
 }

@@ -4,6 +4,7 @@
 //! grids, whichever the caller chooses. Water everywhere and no shielding of one seed by another, as TG-43 has it.
 #![warn(missing_docs)]
 
+pub mod criteria;
 pub mod curve;
 pub mod decay;
 pub mod dvh;

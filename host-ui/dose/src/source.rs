@@ -44,8 +44,12 @@ const KNOWN: [&str; 2] = [
 impl Source {
     /// One of those that come with the program, by its model.
     pub fn known(model: &str) -> Option<Self> {
-        let all = KNOWN.iter().filter_map(|text| Self::parse(text).ok());
-        all.into_iter().find(|source| source.model == model)
+        Self::all_known().find(|source| source.model == model)
+    }
+
+    /// All that come with the program.
+    pub fn all_known() -> impl Iterator<Item = Self> {
+        KNOWN.iter().filter_map(|text| Self::parse(text).ok())
     }
 
     /// Reads and checks a file; the error names the file and lists all that is wrong in it.

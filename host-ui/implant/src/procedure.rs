@@ -147,6 +147,9 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
         Some(path) => Job::from_file(path, &scene)?,
         None => Job::suggested(&scene, options.seeds),
     };
+    if let Some(implant) = &job.implant {
+        debrief::source_of(implant, options.source.as_deref())?;
+    }
     println!(
         "scene {}: {} elements of {:.2} mm",
         scene.header.name.read(),

@@ -3,19 +3,24 @@
 use super::CommandError;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use stylet_base::write_whole;
+use stylet_base::format::printable;
+use stylet_base::{input, write_whole};
 use stylet_dose::Source;
 use stylet_files::convert::{can_hold_labels, write_labels};
-use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
+use stylet_files::dicom::plan::{self, Date, PlanSeed, PlanSource, SeedPlan};
 use stylet_files::dicom::{self, Identity};
 use stylet_files::{self as files, FileError, Progress, bytes, scene};
-use stylet_implant::readers::{DoseFile, SeedDefaults, read_dose, read_seed_rows};
+use stylet_implant::plan::seeds;
+use stylet_implant::readers::{DayOfImplant, DoseFile, SeedDefaults, SeedFile, SeedRow, read_dose};
+
+const MAX_PLAN_BYTES: u64 = 4 << 20;
 
 const HELP: &str = "\
 What is converted into what:
   label volume   .nii .nii.gz .nrrd .nhdr .seg.nrrd .mha .mhd, .dcm (RT Structure Set, with its images beside it)
                  into .nrrd .seg.nrrd .mha .nii.gz, .dcm (RT Structure Set)
-  seed plan      .csv (columns as for host-ui dose) into .dcm (RT Plan; needs --source), and back
+  seed plan      .csv (columns as for host-ui dose) into .dcm (RT Plan; needs --source), and back;
+                 .toml (plan of host-ui) into .dcm or .csv
   dose           .csv (dose_grid.csv of host-ui dose) into .dcm (RT Dose; needs --plan) or .nrrd
 
 Orientation and spacing are kept: NIfTI is in RAS, DICOM and MetaImage in LPS, NRRD names its own.
@@ -26,6 +31,7 @@ Examples:
   host-ui convert gland.seg.nrrd rtstruct.dcm
   host-ui convert seeds.csv plan.dcm --source sources/i125_6711.toml --strength-u 0.5
   host-ui convert plan.dcm seeds.csv
+  host-ui convert plan.toml plan.dcm
   host-ui convert dose/dose_grid.csv dose.dcm --plan plan.dcm";
 
 #[derive(Args, Debug)]
@@ -35,7 +41,7 @@ pub struct ConvertArgs {
     from: PathBuf,
     /// File to write; its name decides the format
     to: PathBuf,
-    /// Source of the seeds (TOML), for a plan out of CSV
+    /// Source of the seeds (TOML), for a plan out of CSV; a plan out of .toml has to be of its isotope
     #[arg(long, value_name = "FILE")]
     source: Option<PathBuf>,
     /// Strength in U of seeds whose CSV gives none
@@ -48,14 +54,17 @@ pub struct ConvertArgs {
 
 impl ConvertArgs {
     pub fn run(self) -> Result<(), CommandError> {
-        if has_ending(&self.from, "csv") {
-            return match first_line(&self.from)?.contains("dose_gy") {
-                true => self.dose(),
-                false => self.plan_from_csv(),
+        if is_dose(&self.from)? {
+            return self.dose();
+        }
+        if has_ending(&self.from, "csv") || is_plan_file(&self.from) {
+            return match has_ending(&self.to, "csv") {
+                true => self.seeds_to_csv(),
+                false => self.seeds_to_plan(),
             };
         }
         if has_ending(&self.to, "csv") {
-            return self.plan_to_csv();
+            return self.seeds_to_csv();
         }
         self.labels()
     }
@@ -74,7 +83,7 @@ impl ConvertArgs {
         }
         let voxels = files::read_voxels(&self.from, &Progress::default())?;
         if let Some(note) = &voxels.frame.warning {
-            eprintln!("note: {note}");
+            seeds::report(&self.from, std::slice::from_ref(note));
         }
         if to_dicom {
             let bytes = dicom::structures::write::bytes(&voxels, &Identity::new())
@@ -86,30 +95,31 @@ impl ConvertArgs {
             if !keeps_names && !voxels.names.is_empty() {
                 eprintln!(
                     "note: names of structures have no place in this format: {}",
-                    names(&voxels)
+                    printable(&names(&voxels))
                 );
             }
         }
         self.written()
     }
 
-    fn plan_from_csv(&self) -> Result<(), CommandError> {
-        self.needs_ending("dcm", "seeds out of CSV become an RT Plan")?;
-        let source = self
-            .source
-            .as_deref()
-            .ok_or("a plan needs --source FILE: DICOM has isotope and half-life in it")?;
-        let source = Source::read(source)?;
-        let defaults = SeedDefaults {
-            strength_u: self.strength_u,
-            strength_per_activity_u_per_mci: source.strength_per_activity_u_per_mci,
+    fn seeds_to_plan(&self) -> Result<(), CommandError> {
+        self.needs_ending("dcm", "seeds become an RT Plan")?;
+        let mut file = self.read_seeds(self.source()?.as_ref())?;
+        let source = match (self.source()?, &file.declared) {
+            (Some(source), _) => source,
+            (None, Some(declared)) => Source::known(&declared.model)
+                .ok_or_else(|| format!("no source is known as \"{}\"; give --source FILE", declared.model))?,
+            (None, None) => return Err("a plan needs --source FILE: DICOM has isotope and half-life in it".into()),
         };
-        let rows = read_seed_rows(&self.from, defaults)?.into_rows();
+        let agreed = file.agree(&source, None, DayOfImplant(None));
+        let (prescription_gy, notes) = agreed.map_err(|why| format!("{}: {why}", self.from.display()))?;
+        seeds::report(&self.from, &notes);
         let plan = SeedPlan {
             label: "Stylet".to_owned(),
             identity: Identity::new(),
             uid: dicom::new_uid(),
-            prescription_gy: source.prescription_gy,
+            prescription_gy,
+            planned_on: None,
             source: PlanSource {
                 model: source.model.clone(),
                 manufacturer: String::new(),
@@ -117,26 +127,21 @@ impl ConvertArgs {
                 half_life_days: stylet_dose::decay::s_to_days(source.half_life_s),
                 active_length_m: source.tables.active_length_m,
             },
-            seeds: rows
-                .into_iter()
-                .map(|row| PlanSeed {
-                    needle: row.needle,
-                    hole: row.hole.unwrap_or_default(),
-                    position_m: row.seed.position_m,
-                    axis: row.seed.axis,
-                    strength_u: row.seed.strength_u,
-                })
-                .collect(),
+            seeds: file.rows.into_iter().map(plan_seed).collect(),
             notes: Vec::new(),
         };
         write_whole(&self.to, &plan::bytes(&plan)?)?;
         self.written()
     }
 
-    fn plan_to_csv(&self) -> Result<(), CommandError> {
-        let plan = plan::open(&self.from)?;
+    fn seeds_to_csv(&self) -> Result<(), CommandError> {
+        let file = self.read_seeds(self.source()?.as_ref())?;
         let mut out = String::from("x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,needle,hole\n");
-        for seed in &plan.seeds {
+        let mut days: Vec<Date> = file.rows.iter().filter_map(|row| row.strength_on).collect();
+        days.sort_unstable();
+        days.dedup();
+        for row in file.rows {
+            let seed = plan_seed(row);
             let [x, y, z] = seed.position_m.map(|v| v * 1e3);
             let axis = seed.axis.map_or(",,".to_owned(), |[a, b, c]| format!("{a},{b},{c}"));
             let needle = seed.needle.map_or_else(String::new, |n| n.to_string());
@@ -145,7 +150,29 @@ impl ConvertArgs {
             out.push_str(&format!("{x},{y},{z},{axis},{},{needle},{hole}\n", seed.strength_u));
         }
         write_whole(&self.to, out.as_bytes())?;
+        if !days.is_empty() {
+            let days: Vec<String> = days.iter().map(Date::to_string).collect();
+            seeds::report(
+                &self.from,
+                &[format!(
+                    "a table has no place for the day of a strength: they are those of {}",
+                    days.join(", ")
+                )],
+            );
+        }
         self.written()
+    }
+
+    fn source(&self) -> Result<Option<Source>, CommandError> {
+        Ok(self.source.as_deref().map(Source::read).transpose()?)
+    }
+
+    fn read_seeds(&self, source: Option<&Source>) -> Result<SeedFile, CommandError> {
+        let defaults = SeedDefaults {
+            strength_u: self.strength_u,
+            strength_per_activity_u_per_mci: source.and_then(|s| s.strength_per_activity_u_per_mci),
+        };
+        Ok(seeds::read(&self.from, defaults)?)
     }
 
     fn dose(&self) -> Result<(), CommandError> {
@@ -180,6 +207,26 @@ impl ConvertArgs {
         println!("written: {}", self.to.display());
         Ok(())
     }
+}
+
+fn plan_seed(row: SeedRow) -> PlanSeed {
+    PlanSeed {
+        needle: row.needle,
+        hole: row.hole.unwrap_or_default(),
+        position_m: row.seed.position_m,
+        axis: row.seed.axis,
+        strength_u: row.seed.strength_u,
+        strength_on: row.strength_on,
+    }
+}
+
+/// Scene files end in .toml as well.
+fn is_plan_file(path: &Path) -> bool {
+    has_ending(path, "toml") && input::read_text(path, MAX_PLAN_BYTES).is_ok_and(|text| text.contains("\"stylet plan,"))
+}
+
+fn is_dose(path: &Path) -> Result<bool, CommandError> {
+    Ok(has_ending(path, "csv") && first_line(path)?.contains("dose_gy"))
 }
 
 fn names(voxels: &files::Voxels) -> String {

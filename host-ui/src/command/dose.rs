@@ -15,7 +15,9 @@ use stylet_dose::seed::Seed;
 use stylet_dose::source::Source;
 use stylet_dose::structure::Structure;
 use stylet_dose::{DoseGrid, DosePoints, perturb, picture, structure};
-use stylet_implant::readers::{SeedDefaults, contours, labels, read_points, read_seeds};
+use stylet_files::dicom::plan::Date;
+use stylet_implant::plan::seeds;
+use stylet_implant::readers::{DayOfImplant, SeedDefaults, contours, labels, read_points};
 
 mod write;
 
@@ -31,6 +33,8 @@ Units: positions in mm (any frame, the same for all files; structures are in pat
 
 Seeds are CSV with a header; the columns in brackets may be left out, and lines that begin with # are skipped:
   x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u or activity_mci][,needle][,hole]
+A plan says itself which isotope its seeds are of, how strong they are on which day, and what is prescribed: seeds of another
+isotope than the source are refused, strengths decay to --implant-date, and its prescription counts unless another is asked for.
 A seed with an axis gets the 2D formalism, a seed without one the 1D formalism (averaged over directions).
 
 Examples:
@@ -45,7 +49,7 @@ const PERTURB_HELP: &str = "\
 Every trial moves each seed by a normal error of --sigma-mm along x, y and z, keeps its axis and strength, and computes all metrics
 again. The same --seed gives the same trials on any number of cores. Ctrl-C ends early and writes the trials done so far.
 
-Example, as published (4 mm, 1000 trials):
+Example, with the settings of published studies (4 mm, 1000 trials); its figures are those of your plan:
   host-ui perturb --source sources/i125_6711.toml --plan seeds.csv --strength-u 0.5 --structures gland.nii.gz \\
       --name 1=Prostate --name 2=Urethra --name 3=Rectum --sigma-mm 4 --trials 1000 --out perturb
 
@@ -62,13 +66,16 @@ struct Common {
     /// The strengths were measured this many days before the implant, and have decayed since
     #[arg(long, value_name = "DAYS", default_value_t = 0.0)]
     measured_days_before: f64,
+    /// Day of the implant (2026-10-31), to which strengths with a reference date decay, as those of an RT Plan have it
+    #[arg(long, value_name = "DATE", conflicts_with = "measured_days_before")]
+    implant_date: Option<Date>,
     /// Count dose from this day after the implant
     #[arg(long, value_name = "DAYS", default_value_t = 0.0)]
     from_days: f64,
     /// Count dose up to this day after the implant [default: without end]
     #[arg(allow_negative_numbers = true, long, value_name = "DAYS")]
     to_days: Option<f64>,
-    /// Prescribed dose in Gy [default: that of the source file]
+    /// Prescribed dose in Gy [default: that of the plan, or else of the source file]
     #[arg(long, value_name = "GY")]
     prescription_gy: Option<f64>,
     /// What a label is called: 1=Prostate; may be given again
@@ -90,7 +97,7 @@ struct Common {
 pub struct DoseArgs {
     #[command(flatten)]
     common: Common,
-    /// Seeds (CSV, or a DICOM RT Plan); see --help
+    /// Seeds: CSV, a plan of host-ui (.toml), or a DICOM RT Plan; see --help
     #[arg(long, value_name = "FILE")]
     seeds: PathBuf,
     /// Points to take the dose at (CSV: x_mm,y_mm,z_mm)
@@ -112,7 +119,7 @@ pub struct DoseArgs {
 pub struct PerturbArgs {
     #[command(flatten)]
     common: Common,
-    /// Planned seeds (CSV, or a DICOM RT Plan); see `host-ui dose --help`
+    /// Planned seeds: CSV, a plan of host-ui (.toml), or a DICOM RT Plan; see `host-ui dose --help`
     #[arg(long, value_name = "FILE")]
     plan: PathBuf,
     /// Structures: NIfTI-1, NRRD, MetaImage or a DICOM RT Structure Set
@@ -134,10 +141,11 @@ impl DoseArgs {
         let c = &self.common;
         within("--spacing-mm", self.spacing_mm, 0.05, 100.0)?;
         within("--bin-gy", self.bin_gy, 1e-3, 1e4)?;
-        let (source, kernel, seeds) = c.load(&self.seeds)?;
+        let loaded = c.load(&self.seeds)?;
+        let (source, kernel, seeds) = (&loaded.source, &loaded.kernel, &loaded.seeds);
         let judged = self.structures.as_ref().map(|file| {
-            let judge = c.judge(file, &source, &seeds, POINTS_FOR_DOSE)?;
-            let verdict = judge.judge(&kernel, &seeds);
+            let judge = c.judge(file, &loaded, POINTS_FOR_DOSE)?;
+            let verdict = judge.judge(kernel, seeds);
             Ok::<_, CommandError>((judge, verdict))
         });
         let judged = judged.transpose()?;
@@ -145,21 +153,21 @@ impl DoseArgs {
         write::folder(&c.out)?;
         if let Some(points_m) = &points {
             let mut dose = DosePoints::new(points_m);
-            dose.add(&kernel, &seeds);
+            dose.add(kernel, seeds);
             write::doses(&c.out.join("dose_points.csv"), points_m.iter().copied(), dose.dose_gy())?;
         }
         if let Some((judge, verdict)) = &judged {
-            let prescription_gy = c.prescription_gy(&source)?;
+            let prescription_gy = c.prescription_gy(&loaded)?;
             let curves: Vec<_> = judge.names().zip(&verdict.dvhs).collect();
             write::dvh(&c.out.join("dvh.csv"), &curves, prescription_gy, self.bin_gy)?;
             picture::dvh(&c.out.join("dvh.svg"), &curves, prescription_gy)?;
             let mut metrics = judge.to_json(verdict);
-            metrics["dose"] = c.provenance(&source, &seeds);
+            metrics["dose"] = c.provenance(source, seeds);
             write::json(&c.out.join("metrics.json"), &metrics)?;
             print!("{}", judge.table(verdict));
         }
         if points.is_none() && judged.is_none() {
-            let grid = grid(&seeds, &kernel, self.spacing_mm * 1e-3)?;
+            let grid = grid(seeds, kernel, self.spacing_mm * 1e-3)?;
             let [nx, ny, nz] = grid.dims();
             let centres = (0..nx * ny * nz).map(|i| grid.centre_m([i % nx, i / nx % ny, i / nx / ny]));
             write::doses(&c.out.join("dose_grid.csv"), centres, grid.dose_gy())?;
@@ -173,8 +181,9 @@ impl PerturbArgs {
     pub fn run(self) -> Result<(), CommandError> {
         let c = &self.common;
         within("--sigma-mm", self.sigma_mm, 0.0, 100.0)?;
-        let (source, kernel, plan) = c.load(&self.plan)?;
-        let judge = c.judge(&self.structures, &source, &plan, POINTS_FOR_A_TRIAL)?;
+        let loaded = c.load(&self.plan)?;
+        let (source, kernel, plan) = (&loaded.source, &loaded.kernel, &loaded.seeds);
+        let judge = c.judge(&self.structures, &loaded, POINTS_FOR_A_TRIAL)?;
         let how = perturb::Perturbation {
             sigma_m: self.sigma_mm * 1e-3,
             trials: self.trials as usize,
@@ -182,9 +191,9 @@ impl PerturbArgs {
         };
         let stop = Interrupt::on_signals()?;
         write::folder(&c.out)?;
-        let planned = judge.values(&judge.judge(&kernel, &plan));
+        let planned = judge.values(&judge.judge(kernel, plan));
         let bar = progress_bar(self.trials, "trials");
-        let trials = perturb::trials(&judge, &kernel, &plan, how, &stop, || bar.inc(1));
+        let trials = perturb::trials(&judge, kernel, plan, how, &stop, || bar.inc(1));
         bar.finish_and_clear();
         if trials.is_empty() {
             return Err("stopped before the first trial was done; nothing is written".into());
@@ -193,7 +202,7 @@ impl PerturbArgs {
         write::trials(&c.out.join("trials.csv"), &planned, &trials)?;
         write::distribution(&c.out.join("distribution.csv"), &spreads)?;
         let mut result = write::spreads_json(&spreads);
-        result["dose"] = c.provenance(&source, &plan);
+        result["dose"] = c.provenance(source, plan);
         result["sigma_mm"] = json!(self.sigma_mm);
         result["random_seed"] = json!(self.seed);
         result["trials"] = json!(trials.len());
@@ -208,9 +217,17 @@ impl PerturbArgs {
     }
 }
 
+/// What dose is computed from.
+struct Loaded {
+    source: Source,
+    kernel: DoseKernel,
+    seeds: Vec<Seed>,
+    prescription_gy: Option<f64>,
+}
+
 impl Common {
     /// Source, dose of a seed of 1 U over the time asked for, and seeds with their strength at the implant.
-    fn load(&self, seeds: &Path) -> Result<(Source, DoseKernel, Vec<Seed>), CommandError> {
+    fn load(&self, path: &Path) -> Result<Loaded, CommandError> {
         within("--measured-days-before", self.measured_days_before, 0.0, 1e6)?;
         within("--from-days", self.from_days, 0.0, 1e6)?;
         if let Some(to) = self.to_days {
@@ -224,7 +241,12 @@ impl Common {
             strength_u: self.strength_u,
             strength_per_activity_u_per_mci: source.strength_per_activity_u_per_mci,
         };
-        let mut all = read_seeds(seeds, defaults)?;
+        let mut file = seeds::read(path, defaults)?;
+        let day = DayOfImplant(self.implant_date);
+        let agreed = file.agree(&source, self.prescription_gy, day);
+        let (prescription_gy, notes) = agreed.map_err(|why| format!("{}: {why}", path.display()))?;
+        seeds::report(path, &notes);
+        let mut all: Vec<Seed> = file.rows.into_iter().map(|row| row.seed).collect();
         if source.tables.anisotropy_2d.is_none() && all.iter().any(|s| s.axis.is_some()) {
             return Err(format!(
                 "{} has no [anisotropy_2d], which seeds with an axis need; leave the axis columns out",
@@ -245,11 +267,16 @@ impl Common {
         }
         let interval = Interval::days(self.from_days, self.to_days.unwrap_or(f64::INFINITY));
         let kernel = DoseKernel::new(&source, interval);
-        Ok((source, kernel, all))
+        Ok(Loaded {
+            source,
+            kernel,
+            seeds: all,
+            prescription_gy,
+        })
     }
 
-    fn prescription_gy(&self, source: &Source) -> Result<f64, CommandError> {
-        let gy = self.prescription_gy.or(source.prescription_gy).ok_or_else(|| {
+    fn prescription_gy(&self, loaded: &Loaded) -> Result<f64, CommandError> {
+        let gy = loaded.prescription_gy.ok_or_else(|| {
             format!(
                 "{} names no prescription_gy; give --prescription-gy",
                 self.source.display()
@@ -259,22 +286,20 @@ impl Common {
         Ok(gy)
     }
 
-    fn judge(&self, file: &Path, source: &Source, seeds: &[Seed], most_points: usize) -> Result<Judge, CommandError> {
+    fn judge(&self, file: &Path, loaded: &Loaded, most_points: usize) -> Result<Judge, CommandError> {
         let extra = self
             .metrics
             .iter()
             .map(|m| Metric::parse(m))
             .collect::<Result<Vec<_>, _>>()?;
         let given = self.label_names()?;
-        let prescription_gy = self.prescription_gy(source)?;
+        let prescription_gy = self.prescription_gy(loaded)?;
         let structures = match contours::structures(file, most_points)? {
             Some((_, _)) if !given.is_empty() => {
                 return Err(format!("--name: {} names its structures itself", file.display()).into());
             }
             Some((structures, notes)) => {
-                notes
-                    .iter()
-                    .for_each(|note| eprintln!("note: {}: {note}", file.display()));
+                seeds::report(file, &notes);
                 structures
             }
             None => self.labelled(file, given, most_points)?,
@@ -285,7 +310,7 @@ impl Common {
             target,
             &extra,
             prescription_gy,
-            seeds,
+            &loaded.seeds,
             most_points,
         )?)
     }
@@ -305,7 +330,7 @@ impl Common {
             .into());
         }
         if let Some(warning) = &voxels.frame.warning {
-            eprintln!("note: {}: {warning}", file.display());
+            seeds::report(file, std::slice::from_ref(warning));
         }
         // The names in the file count where none are given.
         let mut names = voxels.names.clone();
@@ -338,6 +363,7 @@ impl Common {
             "total_strength_u": seeds.iter().map(|s| s.strength_u).sum::<f64>(),
             "from_days": self.from_days,
             "to_days": self.to_days,
+            "implant_date": self.implant_date.map(|day| day.to_string()),
             "version": env!("CARGO_PKG_VERSION"),
         })
     }

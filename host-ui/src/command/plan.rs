@@ -3,19 +3,21 @@
 use super::CommandError;
 use clap::Args;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use stylet_anatomy::PatientFrame;
 use stylet_base::progress_bar::progress_bar;
 use stylet_base::write_whole;
+use stylet_dose::criteria::DoseStructure;
 use stylet_dose::decay::Interval;
 use stylet_dose::report::Judge;
-use stylet_dose::{DoseKernel, Source};
+use stylet_dose::{DoseKernel, Dvh, Source};
+use stylet_files::dicom::plan::Date;
 use stylet_host::core_args::CoreArgs;
 use stylet_implant::plan::automatic::{self, Aims};
-use stylet_implant::plan::file;
 use stylet_implant::plan::{Anatomy, ImplantPlan, Template, check};
+use stylet_implant::plan::{file, seeds};
 use stylet_implant::procedure::{Connect, Live};
-use stylet_implant::readers::SeedDefaults;
+use stylet_implant::readers::{DayOfImplant, SeedDefaults, SeedFile};
 
 const DOSE_PITCH_M: f64 = 1e-3;
 const POINTS: usize = 100_000;
@@ -43,15 +45,18 @@ pub struct PlanArgs {
     /// Source file (TOML) as those in sources/
     #[arg(long, value_name = "FILE")]
     source: PathBuf,
-    /// Prescribed dose in Gy [default: that of the source file]
+    /// Prescribed dose in Gy [default: that of the seeds' plan, or else of the source file]
     #[arg(long, value_name = "GY")]
     prescription_gy: Option<f64>,
-    /// Seeds to take instead (CSV)
+    /// Seeds to take instead (CSV, a plan .toml, or a DICOM RT Plan)
     #[arg(long, value_name = "FILE")]
     seeds: Option<PathBuf>,
     /// Strength in U of seeds whose table gives none
     #[arg(long, value_name = "U", requires = "seeds")]
     strength_u: Option<f64>,
+    /// Day of the implant (2026-10-31), to which strengths with a reference date decay
+    #[arg(long, value_name = "DATE", requires = "seeds")]
+    implant_date: Option<Date>,
     /// Plan file to write (TOML)
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -63,7 +68,7 @@ pub struct PlanArgs {
 impl PlanArgs {
     pub fn run(self) -> Result<(), CommandError> {
         let source = Source::read(&self.source)?;
-        let prescription_gy = self.prescription_gy.or(source.prescription_gy);
+        let (seeds, prescription_gy) = self.seeds(&source)?;
         let prescription_gy = prescription_gy.filter(|gy| (1e-3..=1e4).contains(gy)).ok_or_else(|| {
             let file = self.source.display();
             format!(
@@ -77,7 +82,7 @@ impl PlanArgs {
         let (anatomy, template) = (Anatomy::of(&live.scene)?, Template::before(&live.scene.header));
         let frames = anatomy.patient;
         let kernel = DoseKernel::new(&source, Interval::ALL);
-        let plan = match &self.seeds {
+        let plan = match seeds {
             None => {
                 let bar = progress_bar(100, "% of the patterns");
                 let report = |share: f32| {
@@ -89,21 +94,35 @@ impl PlanArgs {
                 bar.finish_and_clear();
                 plan?
             }
-            Some(seeds) => {
-                let defaults = SeedDefaults {
-                    strength_u: self.strength_u,
-                    strength_per_activity_u_per_mci: source.strength_per_activity_u_per_mci,
-                };
-                file::import_csv(seeds, defaults, &frames, template, &source.model, prescription_gy)?
-            }
+            Some((path, seeds)) => file::import(path, seeds, &frames, template, &source.model, prescription_gy)?,
         };
         for problem in check::problems(&plan, &anatomy) {
             println!("note: {problem}");
         }
         self.write(&plan, &frames)?;
-        print!("{}", figures(&plan, &anatomy, &kernel)?);
+        let (figures, broken) = figures(&plan, &anatomy, &kernel)?;
+        for criterion in &broken {
+            println!("note: {criterion}");
+        }
+        print!("{figures}");
         println!("written: {}", self.out.display());
         Ok(())
+    }
+
+    /// The seeds to take, compared with the source, and the prescription.
+    fn seeds(&self, source: &Source) -> Result<(Option<(&Path, SeedFile)>, Option<f64>), CommandError> {
+        let Some(path) = self.seeds.as_deref() else {
+            return Ok((None, self.prescription_gy.or(source.prescription_gy)));
+        };
+        let defaults = SeedDefaults {
+            strength_u: self.strength_u,
+            strength_per_activity_u_per_mci: source.strength_per_activity_u_per_mci,
+        };
+        let mut seeds = seeds::read(path, defaults)?;
+        let agreed = seeds.agree(source, self.prescription_gy, DayOfImplant(self.implant_date));
+        let (prescription_gy, notes) = agreed.map_err(|why| format!("{}: {why}", path.display()))?;
+        seeds::report(path, &notes);
+        Ok((Some((path, seeds)), prescription_gy))
     }
 
     fn write(&self, plan: &ImplantPlan, frames: &PatientFrame) -> Result<(), CommandError> {
@@ -114,7 +133,8 @@ impl PlanArgs {
     }
 }
 
-fn figures(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel) -> Result<String, CommandError> {
+/// The measures as a table, and the limits that they do not keep.
+fn figures(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel) -> Result<(String, Vec<String>), CommandError> {
     let seeds = plan.seeds();
     let strengths = seeds.iter().map(|s| s.strength_u);
     let total: f64 = strengths.clone().sum();
@@ -127,12 +147,21 @@ fn figures(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel) -> Result
         &seeds,
         POINTS,
     )?;
-    Ok(format!(
+    let verdict = judge.judge(kernel, &seeds);
+    // The target is the first one.
+    let named = judge.names().zip(&verdict.dvhs).enumerate();
+    let of_structure = |(n, (name, dvh)): (usize, (&str, &Dvh))| {
+        let figures = DoseStructure::of(name, n == 0).map(|s| s.figures(dvh, plan.prescription_gy));
+        figures.unwrap_or_default()
+    };
+    let broken = named.flat_map(of_structure).filter_map(|f| f.broken()).collect();
+    let text = format!(
         "{} needles, {} seeds, {total:.2} U in all ({:.3} to {:.3} U a seed)\n{}",
         plan.needles.len(),
         seeds.len(),
         strengths.clone().fold(f64::INFINITY, f64::min),
         strengths.fold(0.0, f64::max),
-        judge.table(&judge.judge(kernel, &seeds))
-    ))
+        judge.table(&verdict)
+    );
+    Ok((text, broken))
 }

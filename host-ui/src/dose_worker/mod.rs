@@ -3,9 +3,9 @@
 mod figures;
 
 use crate::mesh::{self, SurfaceVertex};
-pub use figures::{Figure, Limit};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+pub use stylet_dose::criteria::{Figure, Limit};
 use stylet_dose::decay::Interval;
 use stylet_dose::isodose::isodose;
 use stylet_dose::{DoseGrid, DoseKernel, Seed, Source};

@@ -85,10 +85,16 @@ const TABLE: [Row; 14] = {
             Target,
             Material::GLAND,
         ),
-        row(O::ProstateBed, &["prostatebed"], &[], Target, Material::GLAND),
+        row(
+            O::ProstateBed,
+            &["prostatebed", "prostatabett"],
+            &[],
+            Target,
+            Material::GLAND,
+        ),
         row(
             O::Prostate,
-            &["prostate", "prostata", "gland"],
+            &["prostate", "prostata", "prostaat", "prosztata", "eturauhanen", "gland"],
             &[],
             Target,
             Material::GLAND,
@@ -100,15 +106,21 @@ const TABLE: [Row; 14] = {
             Tissue,
             Material::GLAND,
         ),
-        row(O::Urethra, &["urethra"], &["urethra"], Spare, Material::URETHRA),
+        row(
+            O::Urethra,
+            &["urethra", "uretra", "uretre", "harnrohre"],
+            &["urethra", "uretra", "uretre", "harnrohre"],
+            Spare,
+            Material::URETHRA,
+        ),
         row(
             O::Rectum,
-            &["rectum", "anorectum", "wallrectum"],
-            &["rectum"],
+            &["rectum", "anorectum", "wallrectum", "rektum"],
+            &["rectum", "rektum"],
             Spare,
             Material::WALL,
         ),
-        row(O::RectalWall, &["rectalwall"], &["rect"], Spare, Material::WALL),
+        row(O::RectalWall, &["rectalwall"], &["rect", "rekt"], Spare, Material::WALL),
         row(O::Bladder, &["bladder"], &["bladder"], Spare, Material::WALL),
         row(O::OtherAtRisk, &BOWEL_AND_NERVES, &[], Spare, Material::OTHER),
         row(
@@ -141,11 +153,7 @@ impl Organ {
     /// assert_eq!(Organ::of_name("helper 3"), None);
     /// ```
     pub fn of_name(name: &str) -> Option<Self> {
-        let plain: String = name
-            .to_ascii_lowercase()
-            .chars()
-            .filter(char::is_ascii_alphanumeric)
-            .collect();
+        let plain: String = folded(name).chars().filter(char::is_ascii_alphanumeric).collect();
         TABLE
             .iter()
             .find(|row| row.names.iter().any(|n| plain.starts_with(n)))
@@ -155,7 +163,7 @@ impl Organ {
     /// Whether a word for the organ stands anywhere in the name, in upper or lower case: "wall of the urethra" mentions the
     /// urethra, but does not begin with it.
     pub fn is_mentioned_in(self, name: &str) -> bool {
-        let name = name.to_ascii_lowercase();
+        let name = folded(name);
         self.row().words.iter().any(|word| name.contains(word))
     }
 
@@ -181,6 +189,23 @@ impl Organ {
         // In the order of the variants, which a test holds.
         &TABLE[self as usize]
     }
+}
+
+/// In lower case and without accents: "Próstata" is "prostata".
+fn folded(name: &str) -> String {
+    let plain = |c: char| match c {
+        'à' | 'á' | 'â' | 'ã' | 'ä' | 'å' => 'a',
+        'è' | 'é' | 'ê' | 'ë' => 'e',
+        'ì' | 'í' | 'î' | 'ï' => 'i',
+        'ò' | 'ó' | 'ô' | 'õ' | 'ö' | 'ø' => 'o',
+        'ù' | 'ú' | 'û' | 'ü' => 'u',
+        'ç' => 'c',
+        'ñ' => 'n',
+        c => c,
+    };
+    // The accent may be a character of its own.
+    let is_mark = |c: &char| ('\u{300}'..='\u{36f}').contains(c);
+    name.to_lowercase().chars().filter(|c| !is_mark(c)).map(plain).collect()
 }
 
 /// The part of an organ, where a name says so.
@@ -210,11 +235,22 @@ impl Part {
 }
 
 /// Words for the target in the order of preference.
-const TARGET_WORDS: [&str; 7] = ["ptv", "ctv", "prostate", "prostata", "gland", "gtv", "target"];
+const TARGET_WORDS: [&str; 10] = [
+    "ptv",
+    "ctv",
+    "prostate",
+    "prostata",
+    "prostaat",
+    "prosztata",
+    "eturauhanen",
+    "gland",
+    "gtv",
+    "target",
+];
 
 /// The place of the name that most likely is the target's; `None` if none of them sounds like one.
 pub fn target_among(names: &[&str]) -> Option<usize> {
-    let mentions = |word: &&str| names.iter().position(|n| n.to_ascii_lowercase().contains(*word));
+    let mentions = |word: &&str| names.iter().position(|n| folded(n).contains(*word));
     TARGET_WORDS.iter().find_map(mentions)
 }
 

@@ -1,8 +1,10 @@
 //! RT Plan of a permanent implant: the sources, and where each seed lies.
 
+mod permanent;
 mod read;
 mod write;
 
+pub use jiff::civil::Date;
 pub use read::of;
 pub use write::bytes;
 
@@ -12,7 +14,7 @@ use crate::progress::Progress;
 use std::path::Path;
 use stylet_base::format::printable;
 
-/// Patient frame (RAS, m); strengths in U at the time of the plan.
+/// Patient frame (RAS, m); strengths in U on the day to which each of them refers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeedPlan {
     /// Label of the plan.
@@ -23,6 +25,8 @@ pub struct SeedPlan {
     pub uid: String,
     /// Prescribed dose, in Gy.
     pub prescription_gy: Option<f64>,
+    /// Day of the plan itself.
+    pub planned_on: Option<Date>,
     /// The model of all seeds.
     pub source: PlanSource,
     /// The seeds.
@@ -59,6 +63,8 @@ pub struct PlanSeed {
     pub axis: Option<[f64; 3]>,
     /// Air kerma strength, in U.
     pub strength_u: f64,
+    /// Day to which the strength refers.
+    pub strength_on: Option<Date>,
 }
 
 /// The DICOM plan in the file at `path`; its notes go to standard error.

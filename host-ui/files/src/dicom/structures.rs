@@ -1,6 +1,7 @@
 //! RT Structure Set: named contours, as a label volume on the grid of their images.
 
 mod outline;
+mod planes;
 mod raster;
 mod solid;
 pub mod write;
@@ -87,6 +88,9 @@ impl StructureSet {
             }
         }
         ContentError::all(problems)?;
+        for structure in &mut structures {
+            notes.extend(planes::tidy(structure));
+        }
         if structures.is_empty() {
             let why = if notes.is_empty() {
                 "there are no contours".to_owned()

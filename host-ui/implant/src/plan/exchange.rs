@@ -1,10 +1,10 @@
 //! Plans in and out of files of any of the formats, by the file's ending.
 
-use super::file;
-use super::{ImplantPlan, PlanError, Template};
-use crate::readers::SeedDefaults;
+use super::{ImplantPlan, PlanError, Template, file, seeds};
+use crate::readers::{DayOfImplant, Declared, SeedDefaults};
 use std::path::Path;
 use stylet_anatomy::PatientFrame;
+use stylet_base::format::printable;
 use stylet_dose::Source;
 use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
 use stylet_files::dicom::{Identity, new_uid};
@@ -29,13 +29,41 @@ pub fn read(path: &Path, scene: &SceneHeader) -> Result<ImplantPlan, PlanError> 
     if has_ending(path, "toml") {
         return file::read(path, &patient);
     }
-    let (source, prescription_gy) = usual()?;
+    let (usual, usual_gy) = usual()?;
     let defaults = SeedDefaults {
         strength_u: None,
-        strength_per_activity_u_per_mci: source.strength_per_activity_u_per_mci,
+        strength_per_activity_u_per_mci: usual.strength_per_activity_u_per_mci,
     };
-    let template = Template::before(scene);
-    file::import_csv(path, defaults, &patient, template, &source.model, prescription_gy)
+    let mut seeds = seeds::read(path, defaults)?;
+    let source = match &seeds.declared {
+        Some(declared) => source_of(declared).map_err(|e| PlanError::of_file(path, e))?,
+        None => usual,
+    };
+    let agreed = seeds.agree(&source, None, DayOfImplant(None));
+    let (prescription_gy, notes) = agreed.map_err(|e| PlanError::of_file(path, e))?;
+    seeds::report(path, &notes);
+    let prescription_gy = prescription_gy.unwrap_or(usual_gy);
+    file::import(
+        path,
+        seeds,
+        &patient,
+        Template::before(scene),
+        &source.model,
+        prescription_gy,
+    )
+}
+
+/// The source that the seeds of a plan are of, or another one of their nuclide, among those that need no file.
+fn source_of(declared: &Declared) -> Result<Source, PlanError> {
+    let mut fitting: Vec<Source> = Source::all_known().filter(|s| declared.check(s).is_ok()).collect();
+    let place = fitting.iter().position(|s| declared.is_of_model(s)).unwrap_or(0);
+    if place < fitting.len() {
+        return Ok(fitting.swap_remove(place));
+    }
+    Err(PlanError::Source(format!(
+        "its seeds are {}, and no source of that comes with the program; compute their dose with host-ui dose --source FILE",
+        printable(&declared.isotope)
+    )))
 }
 
 /// All of the plan as .toml, its seeds as .csv or .dcm.
@@ -72,6 +100,7 @@ fn seed_plan(plan: &ImplantPlan, patient: &PatientFrame) -> Result<SeedPlan, Pla
             position_m: patient.patient_from_scene(place),
             axis,
             strength_u,
+            strength_on: None,
         };
         let strengths = needle.seeds.iter().map(|s| s.strength_u);
         needle.seeds_m().zip(strengths).map(seed).collect::<Vec<_>>()
@@ -81,6 +110,7 @@ fn seed_plan(plan: &ImplantPlan, patient: &PatientFrame) -> Result<SeedPlan, Pla
         identity: Identity::new(),
         uid: new_uid(),
         prescription_gy: Some(plan.prescription_gy),
+        planned_on: None,
         source: PlanSource {
             model: source.model.clone(),
             manufacturer: String::new(),

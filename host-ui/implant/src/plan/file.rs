@@ -1,7 +1,7 @@
 //! Plans in files: TOML with everything, CSV with the seeds alone; mm, patient frame (RAS).
 
 use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, NotAHole, PlanError, Template};
-use crate::readers::{SeedDefaults, SeedFile, read_seed_rows};
+use crate::readers::SeedFile;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -249,20 +249,19 @@ pub fn seeds_to_csv(plan: &ImplantPlan, patient: &PatientFrame) -> String {
     text
 }
 
-/// Seeds of a CSV file as needles through a template: those of one number are on one needle, and those without one where they are
+/// Seeds as needles through a template: those of one number are on one needle, and those without one where they are
 /// on one line, which goes along their axis, or along the template's where they have none.
-pub fn import_csv(
+pub fn import(
     path: &Path,
-    defaults: SeedDefaults,
+    file: SeedFile,
     patient: &PatientFrame,
     template: Template,
     source: &str,
     prescription_gy: f64,
 ) -> Result<ImplantPlan, PlanError> {
-    let file = read_seed_rows(path, defaults).map_err(|e| PlanError::Invalid(vec![e.to_string()]))?;
     // A plan names holes of the template that it was made with, and its needles may be curved.
-    let is_table = matches!(file, SeedFile::Table(_));
-    let rows = file.into_rows();
+    let is_table = file.declared.is_none();
+    let rows = file.rows;
     if rows.len() > MAX_SEEDS {
         let count = rows.len();
         return Err(PlanError::of_file(

@@ -12,6 +12,7 @@ pub mod exchange;
 pub mod file;
 mod needle;
 pub mod rehearse;
+pub mod seeds;
 mod template;
 
 pub use anatomy::Anatomy;

@@ -3,9 +3,10 @@
 use super::Seen;
 use super::error::ProcedureError;
 use super::job::{self, Job, PlannedDrop};
-use crate::plan::Anatomy;
+use crate::plan::{Anatomy, ImplantPlan};
 use crate::score::{self, Implant, Motion, Score, SeedPair};
 use std::path::Path;
+use stylet_base::nuclide::Nuclide;
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Seed, Source};
 use stylet_host::link::{Link, SceneModel};
@@ -22,13 +23,7 @@ pub fn write(
     source: Option<&Path>,
 ) -> Result<(), ProcedureError> {
     let Some(implant) = &job.implant else { return Ok(()) };
-    let source = match source {
-        Some(path) => Source::read(path).map_err(|e| ProcedureError::Input(e.to_string()))?,
-        None => Source::known(&implant.source).ok_or_else(|| {
-            let model = &implant.source;
-            ProcedureError::Input(format!("no source is known as \"{model}\"; give --source FILE"))
-        })?,
-    };
+    let source = source_of(implant, source)?;
     let header = &link
         .snapshot()
         .ok_or(ProcedureError::NothingReceived("the core sent no tissue"))?
@@ -79,4 +74,27 @@ pub fn write(
     print!("delivered\n{}", score.judge.table(&score.delivered));
     println!("debrief: {}", out.join("debrief.html").display());
     Ok(())
+}
+
+/// The source that the score is computed with: the one asked for, or the plan's. One of another isotope than the plan's is refused.
+pub fn source_of(implant: &ImplantPlan, asked: Option<&Path>) -> Result<Source, ProcedureError> {
+    let of_plan = Source::known(&implant.source);
+    let Some(path) = asked else {
+        return of_plan.ok_or_else(|| {
+            let model = &implant.source;
+            ProcedureError::Input(format!("no source is known as \"{model}\"; give --source FILE"))
+        });
+    };
+    let source = Source::read(path).map_err(|e| ProcedureError::Input(e.to_string()))?;
+    let is_other = |planned: &Source| Nuclide::parse(&planned.nuclide) != Nuclide::parse(&source.nuclide);
+    match of_plan.filter(is_other) {
+        Some(planned) => Err(ProcedureError::Input(format!(
+            "{}: it is {} and the plan is for {} (model \"{}\"); leave --source out, or choose one of that isotope",
+            path.display(),
+            source.nuclide,
+            planned.nuclide,
+            planned.model
+        ))),
+        None => Ok(source),
+    }
 }

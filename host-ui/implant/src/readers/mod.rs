@@ -1,11 +1,13 @@
 //! What dose is computed from and for, out of files: seeds, structures, points, and a dose that was written.
 
 pub mod contours;
+mod declared;
 pub mod grid;
 pub mod labels;
 pub mod seeds;
 mod table;
 
+pub use declared::{DayOfImplant, Declared, Mismatch};
 pub use grid::{DoseFile, read_dose};
 pub use seeds::{SeedDefaults, SeedFile, SeedRow, read_seed_rows, read_seeds};
 pub use table::read_points;

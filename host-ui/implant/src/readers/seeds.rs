@@ -1,9 +1,11 @@
 //! Seeds out of a table (CSV) or a DICOM RT Plan, which of both is found out from the content.
 
+use super::declared::Declared;
 use super::table::{self, LineError, PLACE, Row, shown};
 use std::path::Path;
 use stylet_dose::Seed;
-use stylet_files::dicom::{self, plan::PlanSeed};
+use stylet_files::dicom;
+use stylet_files::dicom::plan::{Date, PlanSeed, SeedPlan};
 use stylet_files::{FileError, bytes};
 
 const MAX_U: f64 = 1e5;
@@ -29,29 +31,22 @@ pub struct SeedRow {
     pub needle: Option<u32>,
     /// The needle's hole in the template, as the file has it.
     pub hole: Option<String>,
+    /// Day to which the strength refers, where the file gives one.
+    pub strength_on: Option<Date>,
 }
 
-/// Where seeds come from.
+/// Seeds of a file, and what the file says of all of them.
 #[derive(Clone, Debug, PartialEq)]
-pub enum SeedFile {
-    /// A table.
-    Table(Vec<SeedRow>),
-    /// A DICOM RT Plan.
-    Plan(Vec<SeedRow>),
-}
-
-impl SeedFile {
+pub struct SeedFile {
     /// The seeds with their needles.
-    pub fn into_rows(self) -> Vec<SeedRow> {
-        match self {
-            Self::Table(rows) | Self::Plan(rows) => rows,
-        }
-    }
+    pub rows: Vec<SeedRow>,
+    /// `None` for a table, which says nothing of its source.
+    pub declared: Option<Declared>,
 }
 
 /// As [`read_seed_rows`], the seeds alone.
 pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<Vec<Seed>, FileError> {
-    let rows = read_seed_rows(path, defaults)?.into_rows();
+    let rows = read_seed_rows(path, defaults)?.rows;
     Ok(rows.into_iter().map(|row| row.seed).collect())
 }
 
@@ -60,8 +55,7 @@ pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<Vec<Seed>, File
 pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, FileError> {
     let is_plan = bytes::start(path, START_BYTES).is_some_and(|start| dicom::is_dicom(&start));
     if is_plan {
-        let seeds = dicom::plan::open(path)?.seeds;
-        return Ok(SeedFile::Plan(seeds.into_iter().map(row_of_plan).collect()));
+        return Ok(of_plan(dicom::plan::open(path)?));
     }
     let known = [
         PLACE.as_slice(),
@@ -78,9 +72,24 @@ pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, F
             },
             needle: needle(row)?,
             hole: row.text("hole").map(str::to_owned),
+            strength_on: None,
         })
     };
-    table::read(path, &known, row).map(SeedFile::Table)
+    let rows = table::read(path, &known, row)?;
+    Ok(SeedFile { rows, declared: None })
+}
+
+fn of_plan(plan: SeedPlan) -> SeedFile {
+    SeedFile {
+        declared: Some(Declared {
+            model: plan.source.model,
+            isotope: plan.source.isotope,
+            half_life_days: Some(plan.source.half_life_days),
+            prescription_gy: plan.prescription_gy,
+            planned_on: plan.planned_on,
+        }),
+        rows: plan.seeds.into_iter().map(row_of_plan).collect(),
+    }
 }
 
 fn row_of_plan(seed: PlanSeed) -> SeedRow {
@@ -92,6 +101,7 @@ fn row_of_plan(seed: PlanSeed) -> SeedRow {
         },
         needle: seed.needle,
         hole: Some(seed.hole).filter(|hole| !hole.is_empty()),
+        strength_on: seed.strength_on,
     }
 }
 

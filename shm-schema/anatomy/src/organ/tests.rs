@@ -227,3 +227,24 @@ fn prostata_is_a_target() {
     assert_eq!(target_among(&["Blase", "Prostata"]), Some(1));
     assert_eq!(Organ::of_name("prostatic urethra"), None);
 }
+
+/// "Próstata" was tissue, and the urethra had the measures of an unknown structure.
+#[test]
+fn names_of_near_languages_are_known_with_and_without_accents() {
+    for name in [
+        "Próstata",
+        "Pro\u{301}stata",
+        "PRÓSTATA",
+        "Prostaat",
+        "Prosztata",
+        "Prostate gland",
+    ] {
+        assert_eq!(Organ::of_name(name), Some(Organ::Prostate), "{name}");
+        assert_eq!(target_among(&["Rektum", name]), Some(1), "{name}");
+    }
+    for name in ["Uretra", "Urètre", "Harnröhre"] {
+        assert_eq!(Organ::of_name(name), Some(Organ::Urethra), "{name}");
+        assert!(Organ::Urethra.is_mentioned_in(name), "{name}");
+    }
+    assert!(Organ::Rectum.is_mentioned_in("Rektum") && Organ::RectalWall.is_mentioned_in("Rektum"));
+}

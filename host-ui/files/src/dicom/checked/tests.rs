@@ -10,6 +10,7 @@ fn good() -> Vec<u8> {
         identity: Identity::new(),
         uid: new_uid(),
         prescription_gy: Some(145.0),
+        planned_on: None,
         source: PlanSource {
             model: "6711".to_owned(),
             manufacturer: String::new(),
@@ -23,6 +24,7 @@ fn good() -> Vec<u8> {
             position_m: [0.01, 0.02, 0.03],
             axis: None,
             strength_u: 0.5,
+            strength_on: None,
         }],
         notes: Vec::new(),
     };

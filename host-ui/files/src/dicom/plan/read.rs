@@ -5,8 +5,9 @@ use super::super::Identity;
 use super::super::checked::Object;
 use super::super::values::{exactly, items, name, needed, number, text};
 use super::super::write::new_uid;
-use super::{PlanSeed, PlanSource, SeedPlan};
+use super::{Date, PlanSeed, PlanSource, SeedPlan, permanent};
 use crate::error::ContentError;
+use dicom_core::Tag;
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::InMemDicomObject;
 use nalgebra::Vector3;
@@ -30,8 +31,9 @@ pub fn of(object: &Object) -> Result<SeedPlan, ContentError> {
         )));
     }
     let data = &object.data;
-    permanent(data)?;
+    permanent::is_brachytherapy(data)?;
     let sources = sources(data)?;
+    let stays = permanent::check(data, &sources[0].model)?;
     let (mut seeds, mut problems) = (Vec::new(), Vec::new());
     for setup in items(data, tags::APPLICATION_SETUP_SEQUENCE) {
         for channel in items(setup, tags::CHANNEL_SEQUENCE) {
@@ -49,48 +51,25 @@ pub fn of(object: &Object) -> Result<SeedPlan, ContentError> {
             "it holds no seed: no channel has a control point with a place".to_owned(),
         ));
     }
-    let (source, notes) = one_model(sources)?;
+    let (source, mut notes) = one_model(sources)?;
+    notes.extend(stays);
     Ok(SeedPlan {
         label: text(data, tags::RT_PLAN_LABEL).unwrap_or_default(),
         identity: identity(data),
         uid: text(data, tags::SOP_INSTANCE_UID).unwrap_or_else(new_uid),
         prescription_gy: prescription_gy(data)?,
+        planned_on: date(data, tags::RT_PLAN_DATE),
         source,
         seeds,
         notes,
     })
 }
 
-fn permanent(data: &InMemDicomObject) -> Result<(), ContentError> {
-    let beams = items(data, tags::BEAM_SEQUENCE).len();
-    match text(data, tags::BRACHY_TREATMENT_TECHNIQUE) {
-        None if beams > 0 => Err(ContentError::Invalid(format!(
-            "it is a plan of {beams} external beams; a seed plan is one of brachytherapy"
-        ))),
-        None => Err(ContentError::Invalid(format!(
-            "{} is missing, so it is no plan of brachytherapy",
-            name(tags::BRACHY_TREATMENT_TECHNIQUE)
-        ))),
-        Some(t) if t == "PERMANENT" => Ok(()),
-        Some(t) => {
-            let kind = text(data, tags::BRACHY_TREATMENT_TYPE).unwrap_or_default();
-            // Some programs give the approach as the technique, and seeds by the type.
-            if kind == "MANUAL" || kind == "LDR" {
-                return Ok(());
-            }
-            Err(ContentError::Invalid(format!(
-                "its technique is {} and its type {}: sources that are taken out again; only permanent implants are read",
-                short(&t),
-                short(&kind)
-            )))
-        }
-    }
-}
-
 struct Source {
     number: f64,
     model: PlanSource,
     strength_u: f64,
+    strength_on: Option<Date>,
 }
 
 fn sources(data: &InMemDicomObject) -> Result<Vec<Source>, ContentError> {
@@ -128,6 +107,7 @@ fn source(item: &InMemDicomObject) -> Result<Source, ContentError> {
     Ok(Source {
         number,
         strength_u,
+        strength_on: date(item, tags::SOURCE_STRENGTH_REFERENCE_DATE),
         model: PlanSource {
             model: text(item, tags::SOURCE_DESCRIPTION)
                 .or(text(item, tags::SOURCE_MODEL_ID))
@@ -209,6 +189,7 @@ fn of_channel(channel: &InMemDicomObject, sources: &[Source], seeds: &mut Vec<Pl
                 position_m: (ras_from_lps(place) * 1e-3).into(),
                 axis: axis(point).map_err(at)?,
                 strength_u: source.strength_u,
+                strength_on: source.strength_on,
             });
         }
         last = Some(place);
@@ -235,6 +216,13 @@ fn prescription_gy(data: &InMemDicomObject) -> Result<Option<f64>, ContentError>
         }
     }
     Ok(None)
+}
+
+/// `None` for a day that is absent or none of the calendar.
+fn date(object: &InMemDicomObject, tag: Tag) -> Option<Date> {
+    // Files of before 1993 have points between.
+    let digits: String = text(object, tag)?.chars().filter(|c| *c != '.').collect();
+    Date::strptime("%Y%m%d", digits).ok()
 }
 
 fn identity(data: &InMemDicomObject) -> Identity {

@@ -15,6 +15,7 @@ pub fn plan(count: usize) -> SeedPlan {
             position_m: [t * 1.234567e-3 - 0.03, 0.0123456789 - t * 1e-4, -0.1 + t / 3e3],
             axis: (i % 5 != 4).then_some(axis),
             strength_u: [0.5, 0.4321, 0.62][i % 3],
+            strength_on: Some(Date::constant(2026, 9, [1, 20][i % 2])),
         }
     };
     SeedPlan {
@@ -22,6 +23,7 @@ pub fn plan(count: usize) -> SeedPlan {
         identity: Identity::new(),
         uid: new_uid(),
         prescription_gy: Some(145.0),
+        planned_on: Some(Date::constant(2026, 10, 31)),
         source: PlanSource {
             model: "6711".to_owned(),
             manufacturer: "nobody".to_owned(),
@@ -134,4 +136,36 @@ fn plans_that_mix_isotopes_or_refer_to_nothing_are_refused() {
     set(&mut data, "300A0200", "INTERSTITIAL");
     set(&mut data, "300A0202", "HDR");
     assert!(read(&data).unwrap_err().to_string().contains("taken out again"));
+}
+
+/// A temporary plan of Ir-192, loaded by hand, was computed as a permanent one of I-125.
+#[test]
+fn sources_that_are_taken_out_again_are_refused_by_nuclide_movement_and_time() {
+    use dicom_core::dictionary::DataDictionary;
+    use dicom_core::ops::{ApplyOp, AttributeAction, AttributeOp};
+    use dicom_dictionary_std::StandardDataDictionary;
+    let original = checked::read(&bytes(&plan(4)).unwrap()).unwrap().data;
+    let read = |changes: &[(&str, &str)]| {
+        let mut data = original.clone();
+        for (at, value) in changes {
+            let at = StandardDataDictionary.parse_selector(at).unwrap();
+            let action = AttributeAction::SetStr((*value).to_owned().into());
+            data.apply(AttributeOp::new(at, action)).unwrap();
+        }
+        let bytes = super::super::write::bytes(data).unwrap();
+        let plan = checked::read(&bytes).and_then(|o| of(&o));
+        plan.map(|p| p.notes).map_err(|e| e.to_string())
+    };
+    let by_hand = [("300A0200", "INTERSTITIAL"), ("300A0202", "LDR")];
+    let notes = read(&by_hand).unwrap();
+    assert!(notes[0].contains("INTERSTITIAL and not PERMANENT"), "{notes:?}");
+    for (change, reported) in [
+        (("300A0210[0].300A0226", "Ir-192"), "its sources are Ir-192"),
+        (("300A0230[0].300A0280[2].300A0288", "STEPWISE"), "its sources move (STEPWISE)"),
+        (("300A0230[0].300A0280[1].300A0286", "259200"), "its sources stay 3.00 days"),
+    ] {
+        let why = read(&[by_hand[0], by_hand[1], change]).unwrap_err();
+        assert!(why.contains(reported) && why.contains("taken out again"), "{why}");
+    }
+    assert!(read(&[("300A0202", "HDR")]).unwrap_err().contains("taken out again"));
 }

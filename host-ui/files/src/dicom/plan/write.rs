@@ -1,12 +1,13 @@
 //! A plan as DICOM: one source for each strength, one channel with a fixed source for each seed.
 
 use super::super::write::{common, decimals, item, now, sequence, string, whole};
-use super::{PlanSeed, SeedPlan};
+use super::{Date, PlanSeed, SeedPlan};
 use crate::error::ContentError;
 use dicom_core::VR;
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::InMemDicomObject;
 use nalgebra::Vector3;
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use stylet_anatomy::ras_from_lps;
 
@@ -21,10 +22,11 @@ pub fn bytes(plan: &SeedPlan) -> Result<Vec<u8>, ContentError> {
             "a plan without seeds cannot be written".to_owned(),
         ));
     }
-    let mut strengths: Vec<f64> = plan.seeds.iter().map(|s| s.strength_u).collect();
-    strengths.sort_by(f64::total_cmp);
+    let mut strengths: Vec<Strength> = plan.seeds.iter().map(Strength::of).collect();
+    strengths.sort_by(Strength::cmp);
     strengths.dedup();
-    let (date, time) = now();
+    let (today, time) = now();
+    let planned_on = plan.planned_on.map_or_else(|| today.clone(), digits);
     let mut object = common(uids::RT_PLAN_STORAGE, "RTPLAN", &plan.identity);
     object.put(string(tags::SOP_INSTANCE_UID, VR::UI, &plan.uid));
     object.put(string(
@@ -32,7 +34,7 @@ pub fn bytes(plan: &SeedPlan) -> Result<Vec<u8>, ContentError> {
         VR::SH,
         &plan.label.chars().take(16).collect::<String>(),
     ));
-    object.put(string(tags::RT_PLAN_DATE, VR::DA, &date));
+    object.put(string(tags::RT_PLAN_DATE, VR::DA, &planned_on));
     object.put(string(tags::RT_PLAN_TIME, VR::TM, &time));
     // There may be no structure set that the plan was made on.
     object.put(string(tags::RT_PLAN_GEOMETRY, VR::CS, "PATIENT"));
@@ -62,7 +64,7 @@ pub fn bytes(plan: &SeedPlan) -> Result<Vec<u8>, ContentError> {
     let sources = strengths
         .iter()
         .zip(1..)
-        .map(|(&u, n)| source(plan, n, u, &date, &time));
+        .map(|(strength, n)| source(plan, n, strength, (&today, &time)));
     object.put(sequence(tags::SOURCE_SEQUENCE, sources.collect()));
     object.put(sequence(
         tags::APPLICATION_SETUP_SEQUENCE,
@@ -71,8 +73,35 @@ pub fn bytes(plan: &SeedPlan) -> Result<Vec<u8>, ContentError> {
     super::super::write::bytes(object)
 }
 
-fn source(plan: &SeedPlan, number: usize, strength_u: f64, date: &str, time: &str) -> InMemDicomObject {
+/// A source of the file: seeds of one strength on one day.
+#[derive(PartialEq)]
+struct Strength {
+    u: f64,
+    on: Option<Date>,
+}
+
+impl Strength {
+    fn of(seed: &PlanSeed) -> Self {
+        Self {
+            u: seed.strength_u,
+            on: seed.strength_on,
+        }
+    }
+
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.u.total_cmp(&other.u).then(self.on.cmp(&other.on))
+    }
+}
+
+fn digits(date: Date) -> String {
+    date.strftime("%Y%m%d").to_string()
+}
+
+/// Without a day of its own the strength is that of now.
+fn source(plan: &SeedPlan, number: usize, strength: &Strength, (today, now): (&str, &str)) -> InMemDicomObject {
     let s = &plan.source;
+    let date = strength.on.map_or_else(|| today.to_owned(), digits);
+    let time = if strength.on.is_some() { "000000" } else { now };
     item([
         whole(tags::SOURCE_NUMBER, number),
         string(tags::SOURCE_TYPE, VR::CS, "LINE"),
@@ -92,18 +121,18 @@ fn source(plan: &SeedPlan, number: usize, strength_u: f64, date: &str, time: &st
         decimals(tags::SOURCE_ISOTOPE_HALF_LIFE, &[s.half_life_days]),
         string(tags::SOURCE_STRENGTH_UNITS, VR::CS, "AIR_KERMA_RATE"),
         // In uGy/h at 1 m, which is U.
-        decimals(tags::REFERENCE_AIR_KERMA_RATE, &[strength_u]),
-        string(tags::SOURCE_STRENGTH_REFERENCE_DATE, VR::DA, date),
+        decimals(tags::REFERENCE_AIR_KERMA_RATE, &[strength.u]),
+        string(tags::SOURCE_STRENGTH_REFERENCE_DATE, VR::DA, &date),
         string(tags::SOURCE_STRENGTH_REFERENCE_TIME, VR::TM, time),
     ])
 }
 
-fn setup(plan: &SeedPlan, strengths: &[f64]) -> InMemDicomObject {
+fn setup(plan: &SeedPlan, strengths: &[Strength]) -> InMemDicomObject {
     let numbers = needle_numbers(plan);
     let mut channels = Vec::new();
     let mean_life_s = plan.source.half_life_days * SECONDS_PER_DAY / std::f64::consts::LN_2;
     for ((seed, needle), number) in plan.seeds.iter().zip(numbers).zip(1..) {
-        let source = strengths.partition_point(|&u| u < seed.strength_u) + 1;
+        let source = strengths.partition_point(|s| s.cmp(&Strength::of(seed)).is_lt()) + 1;
         channels.push(item([
             whole(tags::CHANNEL_NUMBER, number),
             string(tags::CHANNEL_LENGTH, VR::DS, ""),

@@ -2,6 +2,7 @@
 
 use super::super::super::element::short;
 use super::super::images::Grid;
+use super::planes::WIDEST;
 use super::{Contoured, SAME_PLANE_M};
 use crate::error::ContentError;
 use std::ops::Range;
@@ -13,8 +14,6 @@ const MAX_CROSSINGS: f64 = 1e7;
 /// Voxels that are looked at and painted in one file; a whole pelvis has some ten million.
 const MAX_VOXELS_TOUCHED: usize = 150_000_000;
 const MAX_RUNS: usize = 20_000_000;
-/// Planes of contours that are farther apart than this many usual distances have a gap between them.
-const GAP: f64 = 1.5;
 
 /// Columns from and to (exclusive), in a row of a slice.
 #[derive(Clone, Copy)]
@@ -158,7 +157,7 @@ pub fn slabs(heights: &[f64], single: f64) -> Vec<[f64; 2]> {
     let mut gaps: Vec<f64> = heights.windows(2).map(|w| w[1] - w[0]).collect();
     gaps.sort_by(f64::total_cmp);
     let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(single);
-    let half = |gap: f64| if gap > GAP * usual { usual / 2.0 } else { gap / 2.0 };
+    let half = |gap: f64| if gap > WIDEST * usual { usual / 2.0 } else { gap / 2.0 };
     (0..heights.len())
         .map(|i| {
             let below = if i > 0 {

@@ -100,7 +100,7 @@ impl Solid {
 }
 
 /// Edges that a ray to the right crosses, even or odd.
-fn encloses(polygon: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
+pub fn encloses(polygon: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
     let next = polygon.iter().cycle().skip(1);
     let crossed = |(a, b): (&[f64; 2], &[f64; 2])| {
         (a[1] > y) != (b[1] > y) && x < a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])

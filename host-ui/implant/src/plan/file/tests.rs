@@ -1,7 +1,7 @@
 //! A plan written and read is the same plan; a broken one is refused with everything that is wrong.
 
 use super::*;
-use crate::readers::{SeedDefaults, read_seeds};
+use crate::readers::{SeedDefaults, read_seed_rows, read_seeds};
 
 /// A quarter turn about x, and a shift: patient y is the scene's -z.
 fn frames() -> PatientFrame {
@@ -101,25 +101,20 @@ fn seeds_written_for_the_dose_command_are_the_same_seeds_when_they_are_read_and_
         assert!((b.axis.unwrap()[1] + 1.0).abs() < 1e-9 && a.strength_u == b.strength_u);
     }
     let plan = plan();
-    let imported = import_csv(&file, SeedDefaults::default(), &frames(), plan.template, "6711", 145.0).unwrap();
+    let rows = read_seed_rows(&file, SeedDefaults::default()).unwrap();
+    let imported = import(&file, rows, &frames(), plan.template, "6711", 145.0).unwrap();
     same(&plan, &imported);
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
-/// What `import_csv` makes of a table.
+/// What `import` makes of a table.
 fn imported(name: &str, csv: &str) -> Result<ImplantPlan, String> {
     let file = std::env::temp_dir().join(format!("stylet-plan-{name}-{}.csv", std::process::id()));
     std::fs::write(&file, csv).unwrap();
-    let plan = import_csv(
-        &file,
-        SeedDefaults::default(),
-        &frames(),
-        plan().template,
-        "6711",
-        145.0,
-    );
+    let rows = read_seed_rows(&file, SeedDefaults::default());
     std::fs::remove_file(&file).unwrap();
-    plan.map_err(|why| why.to_string())
+    let rows = rows.map_err(|why| why.to_string())?;
+    import(&file, rows, &frames(), plan().template, "6711", 145.0).map_err(|why| why.to_string())
 }
 
 #[test]

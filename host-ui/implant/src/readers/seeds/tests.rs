@@ -11,6 +11,7 @@ fn plan() -> Vec<u8> {
         position_m: [0.0, 0.0, z_m],
         axis: None,
         strength_u: 0.5,
+        strength_on: None,
     };
     let seeds = [(Some(3), "D4", 0.01), (Some(3), "D4", 0.02), (Some(1), "", 0.03)];
     let plan = SeedPlan {
@@ -18,6 +19,7 @@ fn plan() -> Vec<u8> {
         identity: Identity::new(),
         uid: new_uid(),
         prescription_gy: Some(145.0),
+        planned_on: None,
         source: PlanSource {
             model: "6711".to_owned(),
             manufacturer: String::new(),
@@ -38,10 +40,9 @@ fn seeds_of_a_plan_keep_needle_and_hole_whatever_the_file_is_called() {
     for name in ["plan.dcm", "plan", "PLAN.IMG"] {
         let path = folder.path().join(name);
         std::fs::write(&path, plan()).unwrap();
-        let SeedFile::Plan(rows) = read_seed_rows(&path, SeedDefaults::default()).unwrap() else {
-            panic!("{name} is a plan");
-        };
-        let found: Vec<_> = rows.iter().map(|r| (r.needle, r.hole.as_deref())).collect();
+        let file = read_seed_rows(&path, SeedDefaults::default()).unwrap();
+        assert!(file.declared.is_some(), "{name} is a plan");
+        let found: Vec<_> = file.rows.iter().map(|r| (r.needle, r.hole.as_deref())).collect();
         assert_eq!(found, [(Some(3), Some("D4")), (Some(3), Some("D4")), (Some(1), None)]);
     }
 }

@@ -1,22 +1,29 @@
-//! Problems of the plan, in words; a click shows the needle.
+//! Problems of the plan, and limits that its dose does not keep, in words; a click shows the needle.
 
 use super::{PlanState, name_of};
+use crate::dose_worker::{DoseOf, DoseResult, Figure};
 use crate::planner::Implant;
 use crate::theme;
 use egui::{FontId, RichText, Sense};
 use stylet_implant::plan::check::Problem;
 
-pub fn findings_ui(ui: &mut egui::Ui, implant: &Implant, state: &mut PlanState) {
+pub fn findings_ui(ui: &mut egui::Ui, dose: Option<&DoseResult>, implant: &Implant, state: &mut PlanState) {
     let tokens = theme::of(ui);
     let Some(problems) = &implant.problems else {
         ui.label(theme::small("Checking the plan."));
         return;
     };
-    if problems.is_empty() {
-        ui.label(RichText::new("The plan has no problems.").color(tokens.good));
+    let broken = dose.and_then(|dose| broken(dose, implant));
+    let count = problems.len() + broken.as_ref().map_or(0, Vec::len);
+    if count == 0 {
+        let text = match broken {
+            Some(_) => "The plan has no problems.",
+            None => "Needles and seeds have no problems; the dose of the plan is not known yet.",
+        };
+        ui.label(RichText::new(text).color(tokens.good));
         return;
     }
-    let what = match problems.len() {
+    let what = match count {
         1 => "1 problem".to_owned(),
         n => format!("{n} problems"),
     };
@@ -28,10 +35,19 @@ pub fn findings_ui(ui: &mut egui::Ui, implant: &Implant, state: &mut PlanState) 
         .max_height(height)
         .auto_shrink([false, true])
         .show(ui, |ui| {
+            for criterion in broken.iter().flatten() {
+                ui.label(RichText::new(criterion).size(11.5).color(tokens.bad));
+            }
             for problem in problems.iter() {
                 finding_ui(ui, implant, problem, state);
             }
         });
+}
+
+/// Criteria that the dose of the plan does not meet; `None` for a dose of other seeds.
+fn broken(dose: &DoseResult, implant: &Implant) -> Option<Vec<String>> {
+    let is_of_plan = dose.of == DoseOf::Plan && dose.seeds == implant.seeds.len();
+    is_of_plan.then(|| dose.figures.iter().filter_map(Figure::broken).collect())
 }
 
 fn finding_ui(ui: &mut egui::Ui, implant: &Implant, problem: &Problem, state: &mut PlanState) {

@@ -75,7 +75,7 @@ pub fn editor_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut PlanState) -> Vec
         ui.separator();
         list::list_ui(ui, implant, state);
         ui.separator();
-        findings::findings_ui(ui, implant, state);
+        findings::findings_ui(ui, shown.dose.as_deref(), implant, state);
     });
     actions
 }

@@ -1,0 +1,98 @@
+//! Plans against sources that they are not made for.
+
+use super::*;
+use stylet_dose::Seed;
+
+fn declared() -> Declared {
+    Declared {
+        model: "OncoSeed 6711".to_owned(),
+        isotope: "125I".to_owned(),
+        half_life_days: Some(59.4),
+        prescription_gy: Some(110.0),
+        planned_on: Some(Date::constant(2026, 10, 31)),
+    }
+}
+
+fn rows() -> Vec<SeedRow> {
+    let row = |(strength_u, strength_on)| SeedRow {
+        seed: Seed {
+            position_m: [0.0; 3],
+            axis: None,
+            strength_u,
+        },
+        needle: None,
+        hole: None,
+        strength_on,
+    };
+    [
+        (0.5, Some(Date::constant(2026, 9, 1))),
+        (0.6, Some(Date::constant(2026, 9, 1))),
+        (0.7, None),
+    ]
+    .map(row)
+    .to_vec()
+}
+
+/// A plan of I-125 with the source of Pd-103 gave 28.4 Gy instead of 190.1 and no word.
+#[test]
+fn another_isotope_is_refused_and_another_model_or_half_life_is_reported() {
+    let (iodine, palladium) = (Source::known("6711").unwrap(), Source::known("200").unwrap());
+    assert_eq!(declared().check(&iodine).unwrap(), [""; 0]);
+    let why = declared().check(&palladium).unwrap_err().to_string();
+    assert!(
+        why.contains("seeds are 125I") && why.contains("Pd-103") && why.contains("--source"),
+        "{why}"
+    );
+    let unreadable = Declared {
+        isotope: "seed".to_owned(),
+        ..declared()
+    };
+    assert!(unreadable.check(&iodine).is_ok() && unreadable.check(&palladium).is_err());
+    let other = Declared {
+        model: "IAI-125A".to_owned(),
+        half_life_days: Some(60.2),
+        ..declared()
+    };
+    let notes = other.check(&iodine).unwrap();
+    assert!(
+        notes[0].contains("60.2 days") && notes[1].contains("IAI-125A"),
+        "{notes:?}"
+    );
+}
+
+/// A prescription of 110 Gy in the plan was ignored, and 145 taken from the source.
+#[test]
+fn the_prescription_of_the_plan_counts_before_that_of_the_source_and_after_an_option() {
+    let source = Source::known("6711").unwrap();
+    let (used, note) = prescription(None, Some(&declared()), &source);
+    assert_eq!(used, Some(110.0));
+    let note = note.unwrap();
+    assert!(note.contains("110 Gy") && note.contains("145 Gy"), "{note}");
+    let (used, note) = prescription(Some(120.0), Some(&declared()), &source);
+    assert!(used == Some(120.0) && note.unwrap().contains("prescribes 110 Gy"));
+    assert_eq!(prescription(Some(110.0), Some(&declared()), &source).0, Some(110.0));
+    assert_eq!(prescription(None, None, &source), (Some(145.0), None));
+}
+
+/// A strength of 60 days before the implant was used as it is.
+#[test]
+fn strengths_decay_to_the_implant_and_without_its_day_they_are_reported_with_theirs() {
+    let source = Source::known("6711").unwrap();
+    let mut aged = rows();
+    let implant = DayOfImplant(Some(Date::constant(2026, 10, 31)));
+    let note = implant.decay(&mut aged, Some(&declared()), &source).unwrap().unwrap();
+    let left = (-60.0_f64 / 59.4).exp2();
+    let strengths: Vec<f64> = aged.iter().map(|r| r.seed.strength_u).collect();
+    assert!(
+        (strengths[0] - 0.5 * left).abs() < 1e-12 && strengths[2] == 0.7,
+        "{strengths:?}"
+    );
+    assert!(note.contains("2026-09-01") && note.contains("49.7 %"), "{note}");
+    let mut same = rows();
+    let note = DayOfImplant(None).decay(&mut same, Some(&declared()), &source).unwrap();
+    assert_eq!(same, rows());
+    let note = note.unwrap();
+    assert!(note.contains("2026-09-01") && note.contains("60 days later"), "{note}");
+    let wrong = DayOfImplant(Some(Date::constant(2062, 10, 31)));
+    assert!(wrong.decay(&mut same, None, &source).is_err());
+}
