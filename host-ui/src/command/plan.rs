@@ -110,7 +110,7 @@ impl PlanArgs {
     }
 
     /// The seeds to take, compared with the source, and the prescription.
-    fn seeds(&self, source: &Source) -> Result<(Option<(&Path, SeedFile)>, Option<f64>), CommandError> {
+    fn seeds(&self, source: &Source) -> Result<SeedsAndPrescription<'_>, CommandError> {
         let Some(path) = self.seeds.as_deref() else {
             return Ok((None, self.prescription_gy.or(source.prescription_gy)));
         };
@@ -132,6 +132,9 @@ impl PlanArgs {
         Ok(write_whole(csv, text.as_bytes())?)
     }
 }
+
+/// The file with its seeds, where one was given, and the dose in gray.
+type SeedsAndPrescription<'a> = (Option<(&'a Path, SeedFile)>, Option<f64>);
 
 /// The measures as a table, and the limits that they do not keep.
 fn figures(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel) -> Result<(String, Vec<String>), CommandError> {

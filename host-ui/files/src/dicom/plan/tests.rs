@@ -161,8 +161,14 @@ fn sources_that_are_taken_out_again_are_refused_by_nuclide_movement_and_time() {
     assert!(notes[0].contains("INTERSTITIAL and not PERMANENT"), "{notes:?}");
     for (change, reported) in [
         (("300A0210[0].300A0226", "Ir-192"), "its sources are Ir-192"),
-        (("300A0230[0].300A0280[2].300A0288", "STEPWISE"), "its sources move (STEPWISE)"),
-        (("300A0230[0].300A0280[1].300A0286", "259200"), "its sources stay 3.00 days"),
+        (
+            ("300A0230[0].300A0280[2].300A0288", "STEPWISE"),
+            "its sources move (STEPWISE)",
+        ),
+        (
+            ("300A0230[0].300A0280[1].300A0286", "259200"),
+            "its sources stay 3.00 days",
+        ),
     ] {
         let why = read(&[by_hand[0], by_hand[1], change]).unwrap_err();
         assert!(why.contains(reported) && why.contains("taken out again"), "{why}");
