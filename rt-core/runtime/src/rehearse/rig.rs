@@ -66,6 +66,12 @@ impl Rig {
         let _ = self.loops.bridge.haptic_orders.push(HapticOrder::Engage { ticket: 0 });
     }
 
+    #[cfg(test)]
+    pub fn reset(&mut self) {
+        let _ = self.loops.bridge.haptic_orders.push(HapticOrder::Reset { ticket: 0 });
+        let _ = self.loops.bridge.tissue_orders.push(TissueOrder::Reset);
+    }
+
     pub fn move_hand(&mut self, hand: &HandMove) {
         let goal = HandGoal {
             tip_in_world: hand.tip_m.into(),

@@ -227,3 +227,33 @@ fn on_a_line_seeds_rest_where_they_do_at_any_speed_and_near_their_plan() {
     assert!(apart_m(usual, fast) < 0.2e-3, "{} m", apart_m(usual, fast));
     assert!(apart_m(usual, slow) < 1.5e-3, "{} m", apart_m(usual, slow));
 }
+
+/// The line began anew at the tip's depth, and pushed the needle out at once.
+#[test]
+fn a_reset_with_the_needle_in_tissue_leaves_no_force_on_a_line_either() {
+    let (mut stage, run) = (fem_stage(), needle());
+    let active = activate(&ParameterSet::default(), &stage.device).expect("valid");
+    let body = stage.lines.as_ref().expect("of finite elements");
+    let line = body.prepare(1, run.entry_m.into(), run.direction.into(), &mut || true);
+    let world = stage.world.take().expect("built");
+    let mut rig = Rig::new(world, &active, &stage.device, &run);
+    rig.take_line(line.expect("through the gland"));
+    rig.engage();
+    rig.move_hand(&stylet_shm_schema::HandMove {
+        tip_m: run.drops_m[1].into(),
+        direction: run.direction.into(),
+        speed_m_per_s: 0.05,
+        acceleration_m_per_s2: 2.0,
+    });
+    (0..2500).for_each(|_| rig.tick());
+    assert!(rig.state().flags & flags::IN_CONTACT != 0 && rig.state().tissue_force_n == 0.0);
+    assert!(rig.state().peak_force_n > 1.0, "{} N", rig.state().peak_force_n);
+    rig.reset();
+    (0..1000).for_each(|_| rig.tick());
+    let force_n = Vector3::from(rig.state().force_on_hand_n).norm();
+    assert!(
+        force_n < 1e-9 && rig.state().flags & flags::IN_CONTACT == 0,
+        "{force_n} N"
+    );
+    assert!(rig.displacement_m() < 1e-9, "{} m", rig.displacement_m());
+}

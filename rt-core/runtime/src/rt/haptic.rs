@@ -228,6 +228,7 @@ impl HapticLoop {
         if let Some(line) = &mut self.line {
             line.reset();
         }
+        self.leave_line();
     }
 
     /// Where the tip meets tissue, unless this loop has ended that contact already.

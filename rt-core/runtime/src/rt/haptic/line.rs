@@ -6,6 +6,9 @@ use crate::rt::response::TissueResponse;
 use stylet_hw::Sample;
 use stylet_sim::force::chain::{ChainOutput, step_on_line};
 
+/// A needle is taken for one outside up to so far behind the entry: plans name entries on the surface, which is one of cells.
+const BEGINS_WITHIN_M: f64 = 1e-3;
+
 impl HapticLoop {
     /// A line is changed only while the needle is out of the tissue; the old one goes back to be freed.
     pub(super) fn take_line(&mut self) {
@@ -23,16 +26,19 @@ impl HapticLoop {
     }
 
     /// Whether this tick is one on the line: the needle is in tissue by it, or comes to it outside of any other contact.
-    /// A line that the tissue loop has no columns for is none; what held the needle by it lets go.
+    /// It comes to it from outside: a tip that stands in tissue without a contact, as after a reset, is felt once it has been
+    /// out. A line that the tissue loop has no columns for is none; what held the needle by it lets go.
     pub(super) fn is_on_line(&mut self, sample: &Sample, tissue: &TissueResponse) -> bool {
         let in_other_contact = tissue.contact > self.pose.released_contact;
+        let was_on_line = self.on_line;
         self.line.as_mut().is_some_and(|line| {
             if line.generation != tissue.line {
                 line.reset();
                 return false;
             }
-            line.is_in_tissue()
-                || (!in_other_contact && line.is_met_by(&sample.tip_in_world, &sample.direction_in_world()))
+            let tip = &sample.tip_in_world;
+            let may_begin = was_on_line || (!in_other_contact && line.along_m(tip) <= BEGINS_WITHIN_M);
+            line.is_in_tissue() || (may_begin && line.is_met_by(tip, &sample.direction_in_world()))
         })
     }
 
