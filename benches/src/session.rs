@@ -13,6 +13,7 @@ use stylet_runtime::stepped::SteppedLoops;
 use stylet_sim::force::ForceParameters;
 use stylet_sim::force::chain::{ChainOutput, ChainState};
 use stylet_sim::needle::{LayerKind, NeedleParameters};
+use stylet_sim::tissue::MaterialPoint;
 
 /// A simulated Phantom that the force loop owns and the measurement looks into.
 #[derive(Clone)]
@@ -136,7 +137,7 @@ pub fn axis_start(world: &World) -> Vector3<f64> {
     let lattice = &world.scene.lattice;
     let elements = 0..lattice.element_count() as u32;
     let (mut sum, mut count) = (Vector3::zeros(), 0.0);
-    for element in elements.filter(|&e| world.layer(e) == LayerKind::Gland) {
+    for element in elements.filter(|&e| world.layer(&MaterialPoint::centre(e)) == LayerKind::Gland) {
         sum += Vector3::from(lattice.rest_m(element));
         count += 1.0;
     }
@@ -155,7 +156,7 @@ pub fn axis_start(world: &World) -> Vector3<f64> {
 /// How far the gland as a whole has moved along z.
 pub fn gland_shift_m(world: &World) -> f64 {
     let body = world.tissue.deformed();
-    let gland = (0..body.lattice.element_count() as u32).filter(|&e| world.layer(e) == LayerKind::Gland);
+    let gland = (0..body.lattice.element_count() as u32).filter(|&e| world.layer(&MaterialPoint::centre(e)) == LayerKind::Gland);
     let (sum, count) = gland.fold((0.0, 0.0), |(sum, count), e| {
         (sum + body.displacement(e)[2], count + 1.0)
     });

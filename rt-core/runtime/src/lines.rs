@@ -3,7 +3,7 @@
 use crate::rt::world::WorldError;
 use stylet_sim::line::{Line, LineError, ReadyLine};
 use stylet_sim::needle::LayerKind;
-use stylet_sim::scene::{Scene, SceneError, SceneSource};
+use stylet_sim::scene::{Scene, SceneError, SceneSource, TissueKind};
 use stylet_sim::tissue::FemTissue;
 use stylet_sim::tissue::fem::batch::BatchModel;
 
@@ -31,7 +31,7 @@ pub struct LineBody {
 impl LineBody {
     /// Builds the scene anew.
     pub fn of_source(source: &SceneSource) -> Result<Self, NoLine> {
-        let scene = source.build()?;
+        let scene = source.build()?.with_tissue(TissueKind::Fem);
         let tissue = FemTissue::<f32>::new(&scene)
             .map_err(|problems| WorldError(problems.iter().map(ToString::to_string).collect()))?;
         Ok(Self {

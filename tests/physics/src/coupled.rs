@@ -18,10 +18,8 @@ const GUIDED: Hand = Hand {
 };
 
 fn world(fem: bool) -> World {
-    let mut scene = Scene::builtin("paper").expect("built in");
-    if fem {
-        scene.tissue = TissueKind::Fem;
-    }
+    let kind = if fem { TissueKind::Fem } else { TissueKind::ChainMail };
+    let scene = Scene::builtin("paper").expect("built in").with_tissue(kind);
     let limits = TissueParameters::default().validate().expect("defaults are valid");
     World::new(scene, limits, 1).expect("the paper's gland can be solved")
 }

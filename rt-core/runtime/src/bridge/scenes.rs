@@ -101,14 +101,14 @@ impl Bridge {
 
     /// Sends a scene that has been built to the tissue loop.
     fn order_scene(&mut self, Loaded { wanted, scene }: Loaded) -> Result<(), Refusal> {
-        let (mut scene, source) = scene?;
-        scene.tissue = self.tissue;
+        let (scene, source) = scene?;
+        let scene = scene.with_tissue(self.tissue);
         // Changes on their way to the tissue loop reach it before the scene does.
         let limits = activate(&self.parameters.with(&[]), &self.device)?.limits;
         let (generation, session_id) = (self.scene.generation() + 1, self.link.session.session_id);
         let mut picture = ScenePicture::of(&scene, session_id, generation, wanted.patient);
         picture.header.name = Text::new(&wanted.name);
-        let world = World::new(*scene, limits, generation)
+        let world = World::new(scene, limits, generation)
             .map_err(|why| Refusal::new(RefusalCode::SceneNotBuilt, why.to_string()))?;
         let source = Arc::new(source);
         let order = TissueOrder::World {

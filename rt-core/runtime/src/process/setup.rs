@@ -61,8 +61,8 @@ pub(super) struct KernelGrants {
 
 impl Setup {
     pub fn new(options: &Options) -> Result<Self, RunError> {
-        let mut scene = Scene::builtin(&options.scene).map_err(|e| RunError::Scene(e.to_string()))?;
-        scene.tissue = options.tissue;
+        let scene = Scene::builtin(&options.scene).map_err(|e| RunError::Scene(e.to_string()))?;
+        let scene = scene.with_tissue(options.tissue);
         let force_loop = Ask {
             priority: (!options.no_rt).then_some(options.haptic_priority),
             core: options.haptic_core,

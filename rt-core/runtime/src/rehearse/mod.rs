@@ -123,8 +123,8 @@ pub struct Stage {
 impl Stage {
     /// Builds the scene anew, apart from the one that runs.
     pub fn build(source: &SceneSource, tissue: TissueKind, device: DeviceInfo) -> Result<Self, RehearseError> {
-        let mut scene = source.build().map_err(|e| RehearseError::Scene(e.to_string()))?;
-        scene.tissue = tissue;
+        let scene = source.build().map_err(|e| RehearseError::Scene(e.to_string()))?;
+        let scene = scene.with_tissue(tissue);
         let lines = match tissue {
             TissueKind::Fem => Some(LineBody::of_source(source)?),
             TissueKind::ChainMail => None,

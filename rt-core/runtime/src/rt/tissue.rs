@@ -108,7 +108,7 @@ impl TissueLoop {
     /// Largest displacement of an element after the last tick, m.
     pub fn displacement_m(&self) -> f64 {
         let elements = self.report.map_or(0.0, |r| r.max_displacement);
-        f64::from(elements) * self.world.scene.lattice.spacing_m
+        f64::from(elements) * self.world.scene.body.spacing_m
     }
 
     /// Ends the loop and returns its scene, deformed as it is.
@@ -263,7 +263,7 @@ impl TissueLoop {
         let Some(held) = self.held else {
             return LocalResponse::default();
         };
-        let rest_m = Vector3::from(self.world.scene.lattice.rest_m(held.element));
+        let rest_m = Vector3::from(self.world.scene.body.rest_m(held.element));
         let now_m = Vector3::from(self.world.tissue.deformed().position_m(held.element));
         LocalResponse {
             tick: self.response.tick + 1,

@@ -3,7 +3,7 @@
 use stylet_sim::limits::Limits;
 use stylet_sim::needle::LayerKind;
 use stylet_sim::scene::{Scene, TissueKind};
-use stylet_sim::tissue::{ChainMailTissue, FemTissue, TissueModel};
+use stylet_sim::tissue::{ChainMailTissue, FemTissue, MaterialPoint, TissueModel};
 
 /// Why a tissue model cannot be set up: every problem, one a line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -49,9 +49,9 @@ impl World {
         self.tissue.set_limits(limits);
     }
 
-    /// The layer that an element belongs to.
-    pub fn layer(&self, element: u32) -> LayerKind {
-        let structure = usize::from(self.scene.lattice.structure(element));
+    /// The layer that a point of the body belongs to.
+    pub fn layer(&self, point: &MaterialPoint) -> LayerKind {
+        let structure = usize::from(self.scene.structure_at(point.element, point.local));
         self.layers.get(structure).copied().unwrap_or_default()
     }
 }

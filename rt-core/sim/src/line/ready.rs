@@ -99,7 +99,7 @@ impl ReadyLine {
         line: Line,
         report: &mut dyn FnMut(QueueProgress) -> bool,
     ) -> Result<ReadyLine, LineError> {
-        let settings = StationSettings::of_lattice(lattice.spacing_m);
+        let settings = StationSettings::of_lattice(body.spacing_m());
         let stations = Stations::along(body, line, settings, MAX_STATIONS);
         if stations.count() == 0 {
             return Err(LineError::NoTissue);

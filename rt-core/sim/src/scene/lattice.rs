@@ -39,28 +39,59 @@ pub struct Lattice {
 impl Lattice {
     /// Expects labels that `Scene::from_labels` has accepted.
     pub(crate) fn from_checked_labels(labels: &Labels) -> Self {
-        let [nx, ny, nz] = labels.dims;
         let number_of_label = |label: u8| labels.structures.iter().position(|s| s.label == label).unwrap_or(0) as u8;
+        let mut lattice = Self::of_cells(labels.dims, labels.spacing_m, &labels.cells);
+        if labels.structures.len() > 1 {
+            let tissue = labels.cells.iter().filter(|&&label| label != 0);
+            lattice.structures = tissue.map(|&label| number_of_label(label)).collect();
+        }
+        lattice
+    }
+
+    /// One structure, of all cells but those of zero.
+    fn of_cells(dims: [usize; 3], spacing_m: f64, cells: &[u8]) -> Self {
+        let [nx, ny, nz] = dims;
         let mut lattice = Lattice {
-            dims: labels.dims,
-            spacing_m: labels.spacing_m,
+            dims,
+            spacing_m,
             cells: Vec::new(),
             structures: Vec::new(),
             runs: Vec::new(),
             row_runs: Vec::with_capacity(ny * nz + 1),
             occupied: [[0; 3]; 2],
         };
-        for (row_index, row) in labels.cells.chunks_exact(nx).enumerate() {
+        for (row_index, row) in cells.chunks_exact(nx).enumerate() {
             lattice.row_runs.push(lattice.runs.len() as u32);
             lattice.push_row(row, row_index % ny, row_index / ny);
         }
         lattice.row_runs.push(lattice.runs.len() as u32);
-        if labels.structures.len() > 1 {
-            let tissue = labels.cells.iter().filter(|&&label| label != 0);
-            lattice.structures = tissue.map(|&label| number_of_label(label)).collect();
-        }
         lattice.occupied = occupied_box(&lattice.cells);
         lattice
+    }
+
+    /// Elements of twice the edge wherever any of their eight cells is tissue, each of the structure that most of those are of;
+    /// the same scene frame.
+    pub fn coarser(&self) -> Lattice {
+        let dims = self.dims.map(|n| n.div_ceil(2));
+        let index = |cell: &[u16; 3]| {
+            let [i, j, k] = cell.map(|c| usize::from(c) / 2);
+            i + dims[0] * (j + dims[1] * k)
+        };
+        let mut tissue = vec![0_u8; dims.iter().product()];
+        // Coarse cell, structure.
+        let mut members: Vec<(u32, u8)> = Vec::with_capacity(self.cells.len());
+        for (element, cell) in self.cells.iter().enumerate() {
+            let at = index(cell);
+            tissue[at] = 1;
+            members.push((at as u32, self.structure(element as u32)));
+        }
+        let mut coarse = Self::of_cells(dims, 2.0 * self.spacing_m, &tissue);
+        if !self.structures.is_empty() {
+            members.sort_unstable();
+            let of_cell = members.chunk_by(|a, b| a.0 == b.0);
+            coarse.structures = of_cell.map(most_common).collect();
+        }
+        coarse
     }
 
     fn push_row(&mut self, row: &[u8], j: usize, k: usize) {
@@ -111,6 +142,11 @@ impl Lattice {
         let run = runs.get(after.checked_sub(1)?)?;
         let offset = i - run.start_i;
         (offset < run.len).then(|| run.first + offset)
+    }
+
+    /// The element at a place of the scene frame while the body is at rest.
+    pub fn element_at_rest(&self, place_m: [f64; 3]) -> Option<u32> {
+        self.element_at(place_m.map(|c| (c / self.spacing_m).floor() as i64))
     }
 
     /// As `element_of_cell`, for coordinates that may lie below zero.
@@ -202,6 +238,13 @@ pub struct Extent {
     pub lower_m: [f64; 3],
     /// Highest corner, m.
     pub upper_m: [f64; 3],
+}
+
+/// The structure of most of a cell's members, which are in order; the first of several.
+fn most_common(members: &[(u32, u8)]) -> u8 {
+    let of_structure = members.chunk_by(|a, b| a.1 == b.1);
+    let most = of_structure.reduce(|most, next| if next.len() > most.len() { next } else { most });
+    most.and_then(|members| members.first()).map_or(0, |member| member.1)
 }
 
 fn occupied_box(cells: &[[u16; 3]]) -> [[usize; 3]; 2] {

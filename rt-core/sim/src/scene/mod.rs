@@ -56,8 +56,10 @@ pub struct Scene {
     pub name: String,
     /// At least one; elements know theirs by its place here (`Lattice::structure`).
     pub structures: Vec<Structure>,
-    /// Shared with the tissue model, which would otherwise hold a copy.
+    /// The labels' cells: what is where in the body at rest. Shared with the tissue model, which would otherwise hold a copy.
     pub lattice: Arc<Lattice>,
+    /// What the tissue model moves: `lattice`, or a coarser one of it where that is too dear.
+    pub body: Arc<Lattice>,
     /// Triangles over the body and its parts.
     pub surface: Surface,
     /// Nodes at which hosts get its displacements.
@@ -85,16 +87,48 @@ impl Scene {
             [] => vec![Structure::soft("tissue", 1)],
             several => several.to_vec(),
         };
-        let lattice = Lattice::from_checked_labels(labels);
+        let lattice = Arc::new(Lattice::from_checked_labels(labels));
         let surface = Surface::of(&lattice, &structures);
         Ok(Scene {
             name: name.to_owned(),
             structures,
             nodes: NodeGrid::of(&lattice),
-            lattice: Arc::new(lattice),
+            body: Arc::clone(&lattice),
+            lattice,
             surface,
             tissue: TissueKind::default(),
         })
+    }
+
+    /// The same scene with another tissue model, and as coarse a body as that needs.
+    pub fn with_tissue(mut self, tissue: TissueKind) -> Scene {
+        self.tissue = tissue;
+        self.body = Arc::clone(&self.lattice);
+        while self.body.element_count() > tissue.most_elements() {
+            self.body = Arc::new(self.body.coarser());
+        }
+        self.nodes = NodeGrid::of(&self.body);
+        self.surface.move_with(&self.lattice, &self.body);
+        self
+    }
+
+    /// Cells of the lattice along the edge of an element of the body.
+    pub fn coarseness(&self) -> u32 {
+        (self.body.spacing_m / self.lattice.spacing_m).round() as u32
+    }
+
+    /// Structure of the material at a place in an element of the body; `local` runs from -0.5 to 0.5 across it.
+    pub fn structure_at(&self, element: u32, local: [f32; 3]) -> u8 {
+        if Arc::ptr_eq(&self.body, &self.lattice) {
+            return self.lattice.structure(element);
+        }
+        let (rest_m, edge_m) = (self.body.rest_m(element), self.body.spacing_m);
+        let place_m = [0, 1, 2].map(|a| rest_m[a] + f64::from(local[a]).clamp(-0.499, 0.499) * edge_m);
+        // A cell of no tissue at the surface counts as most of its element.
+        match self.lattice.element_at_rest(place_m) {
+            Some(element) => self.lattice.structure(element),
+            None => self.body.structure(element),
+        }
     }
 
     /// Box around the targets at rest; around the whole body where there is none.

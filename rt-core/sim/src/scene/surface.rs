@@ -14,6 +14,8 @@ use super::{Lattice, Role, Structure};
 pub struct Surface {
     /// Every element on one of the surfaces, in the order of elements.
     pub vertex_elements: Vec<u32>,
+    /// The element of a coarser body that each vertex goes with; empty where bodies are not coarser.
+    pub moved_by: Vec<u32>,
     /// Indices into `vertex_elements`: the body's first, then the parts'.
     pub triangles: Vec<[u32; 3]>,
     /// How many triangles are the body's.
@@ -69,6 +71,15 @@ impl Surface {
         Surface::joined(&meshes)
     }
 
+    /// Vertices go with the elements of `body`, which is `lattice` or coarser.
+    pub(super) fn move_with(&mut self, lattice: &Lattice, body: &Lattice) {
+        self.moved_by.clear();
+        if lattice.spacing_m != body.spacing_m {
+            let around = |&e: &u32| body.element_at_rest(lattice.rest_m(e)).unwrap_or(0);
+            self.moved_by = self.vertex_elements.iter().map(around).collect();
+        }
+    }
+
     /// The same element is the same vertex in all of them.
     fn joined(meshes: &[(u8, Mesh)]) -> Self {
         let mut vertex_elements: Vec<u32> = meshes.iter().flat_map(|(_, m)| &m.vertex_elements).copied().collect();
@@ -89,6 +100,7 @@ impl Surface {
         let body = parts.remove(0);
         Surface {
             vertex_elements,
+            moved_by: Vec::new(),
             triangles,
             body_triangles: body.triangles.len(),
             body_elements: meshes[0].1.vertex_elements.len(),

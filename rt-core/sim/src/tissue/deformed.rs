@@ -36,10 +36,19 @@ impl Deformed<'_> {
         }
     }
 
-    /// Writes the positions of the surface's vertices in metres; stops at the shorter of the two.
-    pub fn write_surface(&self, surface: &Surface, positions_m: &mut [[f32; 3]]) {
-        for (slot, &element) in positions_m.iter_mut().zip(&surface.vertex_elements) {
-            *slot = self.position_m(element).map(|c| c as f32);
+    /// Writes the positions of the surface's vertices in metres; stops at the shorter of the two. `at_rest` is the lattice that
+    /// the surface was cut from.
+    pub fn write_surface(&self, at_rest: &Lattice, surface: &Surface, positions_m: &mut [[f32; 3]]) {
+        let vertices = surface.vertex_elements.iter();
+        if surface.moved_by.is_empty() {
+            for (slot, &element) in positions_m.iter_mut().zip(vertices) {
+                *slot = self.position_m(element).map(|c| c as f32);
+            }
+            return;
+        }
+        for ((slot, &element), &moved_by) in positions_m.iter_mut().zip(vertices).zip(&surface.moved_by) {
+            let (rest_m, u) = (at_rest.rest_m(element), self.displacement(moved_by));
+            *slot = [0, 1, 2].map(|a| (rest_m[a] + self.lattice.spacing_m * u[a]) as f32);
         }
     }
 }

@@ -31,6 +31,11 @@ impl MaterialPoint {
         from_hint.or_else(|| walk(body, p, nearest_sample(body, p)))
     }
 
+    /// The middle of an element.
+    pub fn centre(element: u32) -> MaterialPoint {
+        MaterialPoint { element, local: [0.0; 3] }
+    }
+
     /// The material point at a place of the scene frame while the body is at rest; `None` outside the tissue.
     pub fn at_rest(lattice: &Lattice, point_m: [f64; 3]) -> Option<MaterialPoint> {
         let p = point_m.map(|c| c / lattice.spacing_m);

@@ -46,7 +46,7 @@ impl TissueLoop {
             place,
             direction: self.pose.direction,
         });
-        let layer = self.world.layer(point.element);
+        let layer = self.world.layer(&point);
         let number = self.layers.begin(layer);
         self.take_hold_at(layer, number, place, point.element);
         let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
@@ -65,11 +65,11 @@ impl TissueLoop {
         let Some(point) = self.locate(&self.pose.tip_in_scene, Some(held.element)) else {
             return;
         };
-        let layer = self.world.layer(point.element);
+        let layer = self.world.layer(&point);
         let inwards = self.pose.speed_along_m_per_s > CONTACT_SPEED_M_PER_S;
         if let Some(number) = self.layers.enter(layer, inwards, &self.pose) {
             let (from, to) = (before.tip_in_scene, self.pose.tip_in_scene);
-            let place = self.entry_between(from, to, point.element, |e| self.world.layer(e) == layer);
+            let place = self.entry_between(from, to, point.element, |p| self.world.layer(p) == layer);
             self.take_hold_at(layer, number, place, point.element);
         }
     }
@@ -91,13 +91,13 @@ impl TissueLoop {
         mut outside: Vector3<f64>,
         mut inside: Vector3<f64>,
         hint: u32,
-        is_inside: impl Fn(u32) -> bool,
+        is_inside: impl Fn(&MaterialPoint) -> bool,
     ) -> Vector3<f64> {
         for _ in 0..8 {
             let middle = (outside + inside) / 2.0;
             if self
                 .locate(&middle, Some(hint))
-                .is_some_and(|point| is_inside(point.element))
+                .is_some_and(|point| is_inside(&point))
             {
                 inside = middle;
             } else {

@@ -84,7 +84,7 @@ impl TissueLoop {
         let at = |along_m: f64| {
             let place_m = line.line.point_m(along_m, [0.0; 2]);
             (along_m > 0.0)
-                .then(|| MaterialPoint::at_rest(&self.world.scene.lattice, place_m))
+                .then(|| MaterialPoint::at_rest(&self.world.scene.body, place_m))
                 .flatten()
         };
         Some([at(tip_m), at(tip_m - behind_m)])

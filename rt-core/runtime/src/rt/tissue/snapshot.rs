@@ -37,12 +37,13 @@ impl TissueLoop {
         if let Ok(positions) = bytemuck::try_cast_slice_mut::<Vertex, [f32; 3]>(vertices)
             && let Some((surface, inside)) = positions.split_at_mut_checked(slot.vertex_count)
         {
-            body.write_surface(&self.world.scene.surface, surface);
+            let scene = &self.world.scene;
+            body.write_surface(&scene.lattice, &scene.surface, surface);
             body.write_displacements(&self.world.scene.nodes.elements, inside);
         }
         // SAFETY: as above, for the header.
         let header = unsafe { &mut *slot.header };
-        let spacing_m = self.world.scene.lattice.spacing_m;
+        let spacing_m = self.world.scene.body.spacing_m;
         *header = SnapshotHeader {
             session_id: self.session_id,
             scene_generation: self.world.generation,

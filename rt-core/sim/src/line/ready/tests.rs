@@ -1,5 +1,5 @@
 use super::*;
-use crate::scene::Scene;
+use crate::scene::{Scene, TissueKind};
 use crate::tissue::TissueModel;
 use crate::tissue::fem::{FemModel, FemTissue};
 
@@ -107,4 +107,130 @@ fn a_line_that_was_reset_or_has_taken_new_forces_answers_like_a_new_one() {
         );
         assert_eq!(a, b);
     }
+}
+
+/// What the coarser body of the pelvis is worth: `cargo test --release -p stylet-sim --lib a_coarser_pelvis -- --ignored --nocapture`
+///
+/// The same forces, 2 N of shaft friction along 50 mm and 1.5 N at the tip, on the body as it ships and on one of all cells.
+#[test]
+#[ignore = "a measurement of some minutes"]
+fn a_coarser_pelvis_beside_one_of_all_cells() {
+    let coarse = Scene::builtin("pelvis").unwrap().with_tissue(TissueKind::Fem);
+    let full = Scene::builtin("pelvis").unwrap();
+    for across_m in [[0.0, 0.0], [0.012, -0.008]] {
+        let (low, high) = coarse.target_bounds_m();
+        let start_m = [
+            0.5 * (low[0] + high[0]) + across_m[0],
+            0.5 * (low[1] + high[1]) + across_m[1],
+            0.0,
+        ];
+        let line = Line::into_body(&full.lattice, start_m, [0.0, 0.0, 1.0]).unwrap();
+        let depth_m = 0.5 * (low[2] + high[2]) - line.entry_m[2];
+        let answer = |scene: &Scene| {
+            let begun = std::time::Instant::now();
+            let tissue = FemTissue::<f32>::new(scene).unwrap();
+            let body = BatchModel::new(&tissue.model);
+            let made = begun.elapsed();
+            let stations = Stations::along(&body, line, StationSettings::of_lattice(body.spacing_m()), MAX_STATIONS);
+            let place_m = |n: usize| (n as f64 + 0.5) * stations.settings.spacing_m;
+            let on_shaft: Vec<usize> = (0..stations.count())
+                .filter(|&n| (depth_m - 0.05..depth_m).contains(&place_m(n)))
+                .collect();
+            let mut load = Vec::new();
+            let add = |weights: &[(u32, f64)], force_n: f64, load: &mut Vec<_>| {
+                let scaled: Vec<_> = weights.iter().map(|&(node, w)| (node, w * force_n)).collect();
+                load.extend(stations.load(&scaled, 0));
+            };
+            on_shaft
+                .iter()
+                .for_each(|&n| add(&stations.shaft[n], 2.0 / on_shaft.len() as f64, &mut load));
+            let shaft = load.clone();
+            let at_tip = (depth_m / stations.settings.spacing_m) as usize;
+            add(&stations.tip[at_tip], 1.5, &mut load);
+            let mut state = crate::tissue::fem::batch::BatchState::new(&body);
+            state.begin(&body, &[&load, &shaft]);
+            let begun = std::time::Instant::now();
+            let progress = loop {
+                let progress = state.advance(&body);
+                if state.is_whole() && (progress.residual < 1e-4 || progress.iterations > 200) {
+                    break progress;
+                }
+            };
+            let solved = begun.elapsed();
+            let tip_m = state.sample(0, &stations.load(&stations.tip[at_tip], 0));
+            let mut field = ElementField::zeros(body.element_count());
+            state.write(&body, 0, &mut field);
+            println!(
+                "{} elements, {} nodes, {} stations: set up {made:.1?}, eight loads {solved:.1?}, {progress:?}, tip {:.3} mm, {:.0} MB",
+                body.element_count(),
+                body.node_count(),
+                stations.count(),
+                tip_m * 1e3,
+                body.bytes() as f64 / 1e6
+            );
+            (field, tip_m)
+        };
+        let ((near, _), (exact, _)) = (answer(&coarse), answer(&full));
+        // Gland and all, by the distance from the tip: what a seed there would be off.
+        for (name, least_m, only_target) in [("gland", 0.0, true), ("gland, 5 mm off the tip", 5e-3, true), ("all", 0.0, false)] {
+            let (mut square, mut size, mut worst, mut largest, mut count) = (0.0, 0.0, 0.0_f64, 0.0_f64, 0);
+            for element in 0..full.lattice.element_count() as u32 {
+                let place_m = full.lattice.rest_m(element);
+                let structure = &full.structures[usize::from(full.lattice.structure(element))];
+                let from_tip = Vector3::from(place_m) - Vector3::from(line.point_m(depth_m, [0.0; 2]));
+                if (only_target && structure.role != crate::scene::Role::Target) || from_tip.norm() < least_m {
+                    continue;
+                }
+                let point = crate::tissue::MaterialPoint::at_rest(&coarse.body, place_m).unwrap();
+                let around = coarse.body.neighbours(point.element);
+                for c in 0..3 {
+                    let at = |e: u32| f64::from(near.0[c][e as usize]);
+                    let mut u = at(point.element);
+                    for a in 0..3 {
+                        let other = around[2 * a + usize::from(point.local[a] > 0.0)];
+                        u += f64::from(point.local[a].abs()) * other.map_or(0.0, |e| at(e) - at(point.element));
+                    }
+                    let v = f64::from(exact.0[c][element as usize]);
+                    square += (u - v).powi(2);
+                    size += v * v;
+                    worst = worst.max((u - v).abs());
+                    largest = largest.max(v.abs());
+                }
+                count += 1;
+            }
+            println!(
+                "   {name}: {count} cells, rms {:.3} mm of {:.3} mm, worst {:.3} mm of {:.3} mm",
+                (square / f64::from(count)).sqrt() * 1e3,
+                (size / f64::from(count)).sqrt() * 1e3,
+                worst * 1e3,
+                largest * 1e3
+            );
+        }
+    }
+    let source = std::time::Instant::now();
+    let tissue = FemTissue::<f32>::new(&coarse).unwrap();
+    let body = BatchModel::new(&tissue.model);
+    let (low, high) = coarse.target_bounds_m();
+    let start_m = [0.5 * (low[0] + high[0]) + 0.012, 0.5 * (low[1] + high[1]) - 0.008, 0.0];
+    let line = Line::into_body(&coarse.lattice, start_m, [0.0, 0.0, 1.0]).unwrap();
+    let built = source.elapsed();
+    let ready = ReadyLine::prepare(1, &body, &coarse.lattice, &|_| LayerKind::Gland, line, &mut |_| true).unwrap();
+    let bytes: usize = ready.body.columns.iter().map(ElementField::bytes).sum();
+    println!(
+        "body {built:.1?}, line of {} columns {:.1?}, {:.0} MB",
+        ready.body.columns.len(),
+        source.elapsed() - built,
+        bytes as f64 / 1e6
+    );
+    let mut tissue = tissue;
+    let loads: Vec<f64> = (0..ready.body.columns.len()).map(|n| if n < 40 { 0.05 } else { 0.0 }).collect();
+    let mut times_us: Vec<f64> = (0..200)
+        .map(|_| {
+            let begun = std::time::Instant::now();
+            tissue.displace(&ready.body.columns, &loads).unwrap();
+            begun.elapsed().as_secs_f64() * 1e6
+        })
+        .collect();
+    times_us.sort_by(f64::total_cmp);
+    println!("a tick of 40 loads: p50 {:.0} us, p99 {:.0} us", times_us[100], times_us[198]);
 }

@@ -11,9 +11,10 @@ use std::sync::Arc;
 
 /// A number type with a solver compiled for it.
 pub trait Compiled: Real {
-    /// [`FemModel::with_fixed_nodes`].
+    /// [`FemModel::coarser`], with fixed nodes as in [`FemModel::with_fixed_nodes`].
     fn model(
-        lattice: &Arc<Lattice>,
+        lattice: &Lattice,
+        of: &Arc<Lattice>,
         settings: &FemSettings,
         is_fixed: &dyn Fn([f64; 3]) -> bool,
     ) -> Result<FemModel<Self>, Vec<FemProblem>>;
@@ -44,11 +45,12 @@ macro_rules! compiled {
     ($($t:ty),*) => {$(
         impl Compiled for $t {
             fn model(
-                lattice: &Arc<Lattice>,
+                lattice: &Lattice,
+                of: &Arc<Lattice>,
                 settings: &FemSettings,
                 is_fixed: &dyn Fn([f64; 3]) -> bool,
             ) -> Result<FemModel<$t>, Vec<FemProblem>> {
-                FemModel::of_lattice(lattice, settings, is_fixed)
+                FemModel::of_lattice(lattice, of, settings, is_fixed)
             }
 
             fn at_rest(model: &FemModel<$t>) -> FemState<$t> {
@@ -109,7 +111,13 @@ impl<T: Compiled> FemModel<T> {
         settings: &FemSettings,
         is_fixed: impl Fn([f64; 3]) -> bool,
     ) -> Result<Self, Vec<FemProblem>> {
-        T::model(lattice, settings, &is_fixed)
+        T::model(lattice, lattice, settings, &is_fixed)
+    }
+
+    /// The body of `lattice` in the elements of `of`, a lattice some times [`Lattice::coarser`] than it: each as stiff as the
+    /// cells in it are on average, also where part of it is no tissue.
+    pub fn coarser(lattice: &Lattice, of: &Arc<Lattice>, settings: &FemSettings) -> Result<Self, Vec<FemProblem>> {
+        T::model(lattice, of, settings, &|_| false)
     }
 }
 

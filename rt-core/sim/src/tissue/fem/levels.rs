@@ -19,6 +19,18 @@ pub(super) struct Cells {
     pub fixed: Vec<bool>,
 }
 
+impl Cells {
+    /// Nothing on any of the grid's cells and nodes.
+    pub fn empty(grid: Grid) -> Self {
+        Cells {
+            stiffness: vec![Stiffness::default(); grid.len()],
+            springs_n_per_m: vec![0.0; grid.len()],
+            fixed: vec![false; grid.len()],
+            grid,
+        }
+    }
+}
+
 impl<T: Real> Level<T> {
     pub fn new(cells: &Cells, work: &mut Planes<T>) -> Self {
         // Rows are done in whole lanes, the last one past the end.
@@ -142,12 +154,7 @@ pub(super) fn coarser(fine: &Cells) -> Cells {
     let place = |cell: usize| fine.grid.place(cell).map(|c| c / 2);
     let all = 0..fine.grid.len();
     let grid = Grid::new(cells, all.clone().filter(|&c| used(c)).map(place));
-    let mut coarse = Cells {
-        stiffness: vec![Stiffness::default(); grid.len()],
-        springs_n_per_m: vec![0.0; grid.len()],
-        fixed: vec![false; grid.len()],
-        grid,
-    };
+    let mut coarse = Cells::empty(grid);
     for cell in all {
         if used(cell) {
             // Twice the edge, an eighth of the sum.

@@ -3,7 +3,7 @@
 use super::grid::{Grid, corners};
 use super::hexahedron::Stiffness;
 use super::level::Level;
-use super::levels::{Cells, levels};
+use super::levels::{Cells, coarser, levels};
 use super::material::{FemProblem, FemSettings, Structure, problems_of};
 use super::real::Real;
 use crate::scene::Lattice;
@@ -37,8 +37,10 @@ pub struct FemModel<T = f32> {
 }
 
 impl<T: Real> FemModel<T> {
+    /// The body of `lattice` in the elements of `of`, which is that lattice or a coarser one of it.
     pub(super) fn of_lattice(
-        lattice: &Arc<Lattice>,
+        lattice: &Lattice,
+        of: &Arc<Lattice>,
         settings: &FemSettings,
         is_fixed: &dyn Fn([f64; 3]) -> bool,
     ) -> Result<Self, Vec<FemProblem>> {
@@ -46,7 +48,12 @@ impl<T: Real> FemModel<T> {
         if !problems.is_empty() {
             return Err(problems);
         }
-        let body = Body::new(lattice, settings, is_fixed);
+        let halvings = (of.spacing_m / lattice.spacing_m).log2().round() as u32;
+        let mut body = Body::new(lattice, settings, is_fixed, 1 << halvings);
+        for _ in 0..halvings {
+            body.cells = coarser(&body.cells);
+        }
+        body.set_elements(of, 1 << halvings);
         let (part, anchored) = parts(&body);
         let mut loose = vec![Vec::new(); anchored.len()];
         for (node, &part) in part.iter().enumerate() {
@@ -56,7 +63,7 @@ impl<T: Real> FemModel<T> {
         }
         loose.retain(|nodes| !nodes.is_empty());
         Ok(FemModel {
-            lattice: lattice.clone(),
+            lattice: of.clone(),
             levels: levels(&body.cells),
             low_cell: body.low_cell,
             runs: body.runs,
@@ -95,30 +102,26 @@ struct Body {
 }
 
 impl Body {
-    fn new(lattice: &Lattice, settings: &FemSettings, is_fixed: impl Fn([f64; 3]) -> bool) -> Self {
+    /// In the cells of `lattice`; its lowest cell is the lowest of a group of `aligned_to` cells along each axis.
+    fn new(
+        lattice: &Lattice,
+        settings: &FemSettings,
+        is_fixed: impl Fn([f64; 3]) -> bool,
+        aligned_to: usize,
+    ) -> Self {
         let edge_m = lattice.spacing_m;
-        let (low, high) = lattice.bounds_m();
-        let low_cell = low.map(|c| (c / edge_m).round() as usize);
-        let size = [0, 1, 2].map(|a| (high[a] / edge_m).round() as usize - low_cell[a]);
-        let elements = 0..lattice.element_count() as u32;
-        let cell_of = |element: u32| {
-            let cell = lattice.cell(element);
-            [0, 1, 2].map(|a| cell[a] - low_cell[a])
-        };
-        let grid = Grid::new(size, elements.clone().map(cell_of));
+        let [low, high] = lattice.occupied();
+        let low_cell = low.map(|c| c / aligned_to * aligned_to);
+        let size = [0, 1, 2].map(|a| high[a] - low_cell[a]);
         let mut body = Body {
             low_cell,
             runs: Vec::new(),
-            is_cell: vec![false; grid.len()],
-            cells: Cells {
-                stiffness: vec![Stiffness::default(); grid.len()],
-                springs_n_per_m: vec![0.0; grid.len()],
-                fixed: vec![false; grid.len()],
-                grid,
-            },
+            is_cell: Vec::new(),
+            cells: Cells::empty(Grid::new(size, cells_of(lattice, low_cell))),
         };
-        for element in elements {
-            let cell = body.cells.grid.index(cell_of(element));
+        body.set_elements(lattice, 1);
+        for (element, cell) in cells_of(lattice, low_cell).enumerate() {
+            let cell = body.cells.grid.index(cell);
             body.add_element(element, cell, settings, edge_m);
         }
         body.add_surroundings(settings.foundation_pa_per_m * edge_m * edge_m / 4.0);
@@ -130,22 +133,32 @@ impl Body {
         body
     }
 
-    fn add_element(&mut self, element: u32, cell: usize, settings: &FemSettings, edge_m: f64) {
-        self.is_cell[cell] = true;
-        let structure = settings.structure_of.get(element as usize).copied().unwrap_or(0);
+    /// Where the elements of `lattice` are in the grid, whose cells are that many of the first lattice along each axis.
+    fn set_elements(&mut self, lattice: &Lattice, cells_along_edge: usize) {
+        self.low_cell = self.low_cell.map(|c| c / cells_along_edge);
+        self.is_cell = vec![false; self.cells.grid.len()];
+        self.runs.clear();
+        for (element, cell) in cells_of(lattice, self.low_cell).enumerate() {
+            let cell = self.cells.grid.index(cell);
+            self.is_cell[cell] = true;
+            match self.runs.last_mut() {
+                Some(run) if run.cell + run.len == cell && !cell.is_multiple_of(self.cells.grid.stride) => run.len += 1,
+                _ => self.runs.push(CellRun {
+                    first: element,
+                    len: 1,
+                    cell,
+                }),
+            }
+        }
+    }
+
+    fn add_element(&mut self, element: usize, cell: usize, settings: &FemSettings, edge_m: f64) {
+        let structure = settings.structure_of.get(element).copied().unwrap_or(0);
         match &settings.structures[usize::from(structure)] {
             Structure::Elastic(material) => self.cells.stiffness[cell] = Stiffness::of(material, edge_m),
             Structure::Fixed => corners(&self.cells.grid, cell)
                 .into_iter()
                 .for_each(|node| self.cells.fixed[node] = true),
-        }
-        match self.runs.last_mut() {
-            Some(run) if run.cell + run.len == cell && !cell.is_multiple_of(self.cells.grid.stride) => run.len += 1,
-            _ => self.runs.push(CellRun {
-                first: element as usize,
-                len: 1,
-                cell,
-            }),
         }
     }
 
@@ -174,6 +187,14 @@ impl Body {
             }
         }
     }
+}
+
+/// Cells of the elements in their order, counted from `low_cell`.
+fn cells_of(lattice: &Lattice, low_cell: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+    (0..lattice.element_count() as u32).map(move |element| {
+        let cell = lattice.cell(element);
+        [0, 1, 2].map(|a| cell[a] - low_cell[a])
+    })
 }
 
 /// The part of each node, and whether the part has a spring or a fixed node.

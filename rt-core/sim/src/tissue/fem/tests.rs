@@ -10,6 +10,7 @@ use crate::scene::{Labels, Lattice, Scene, test_bodies};
 use crate::tissue::HeldOutcome;
 
 mod ahead;
+mod coarser;
 mod golden;
 mod locking;
 mod operator;

@@ -45,7 +45,7 @@ impl<T: Compiled> FemTissue<T> {
             structure_of: scene.lattice.structures().to_vec(),
             foundation_pa_per_m: SURROUNDINGS_PA_PER_M,
         };
-        let model = FemModel::new(&scene.lattice, &settings)?;
+        let model = FemModel::coarser(&scene.lattice, &scene.body, &settings)?;
         Ok(FemTissue {
             state: FemState::at_rest(&model),
             model,
