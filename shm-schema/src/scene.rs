@@ -176,8 +176,8 @@ pub struct UploadStructure {
     pub role: u32,
     /// 1: `limits` count; 0: the structure takes the limits that the operator sets.
     pub own_limits: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// What it rests on: `stylet_anatomy::Surroundings` on the wire.
+    pub surroundings: u32,
     /// Young's modulus, Pa.
     pub young_pa: f64,
     /// Poisson's ratio.

@@ -10,7 +10,7 @@ use super::volume::{LabelVolume, Tissue, Voxels, role_and_material};
 use crate::error::ContentError;
 use keys::Keys;
 use std::path::{Path, PathBuf};
-use stylet_anatomy::{Material, Role};
+use stylet_anatomy::{Beyond, Material, Role, Surroundings};
 
 const MAX_BYTES: usize = 1 << 20;
 const MAX_STRUCTURES: usize = 255;
@@ -62,6 +62,8 @@ pub struct Part {
     pub limits: Option<[[f64; 3]; 3]>,
     /// Whether it never moves.
     pub fixed: Option<bool>,
+    /// What it rests on at the outside of the body.
+    pub surroundings: Option<Surroundings>,
 }
 
 /// Whether a file is a scene file: the only format here that is known by its name.
@@ -151,6 +153,7 @@ fn part(k: &mut Keys) -> Option<Part> {
         "stretch",
         "shear_deg",
         "fixed",
+        "surroundings",
     ]);
     let label = k.number("label", 1.0, 255.0);
     if label.is_some_and(|l| l.fract() != 0.0) {
@@ -206,8 +209,26 @@ fn part(k: &mut Keys) -> Option<Part> {
         poisson: k.number("poisson", 0.0, 0.4999),
         limits,
         fixed: k.yes("fixed"),
+        surroundings: surroundings(k),
         pick: pick?,
     })
+}
+
+/// One word for all faces, or six for those towards -x, +x, -y, +y, -z, +z of the scene.
+fn surroundings(k: &mut Keys) -> Option<Surroundings> {
+    let words = k.words("surroundings")?;
+    let beyond: Option<Vec<Beyond>> = words.iter().map(|word| Beyond::of_name(word)).collect();
+    let found = beyond.and_then(|beyond| match beyond.as_slice() {
+        [all] => Some(Surroundings::all(*all)),
+        each => <[Beyond; 6]>::try_from(each).ok().map(Surroundings),
+    });
+    if found.is_none() {
+        k.problem(
+            "surroundings",
+            "must be \"fat\", \"free\" or \"fixed\", or a list of six of them, for the faces towards -x, +x, -y, +y, -z, +z",
+        );
+    }
+    found
 }
 
 impl SceneFile {
@@ -279,6 +300,7 @@ impl Part {
                 poisson: self.poisson.unwrap_or(material.poisson),
                 limits: self.limits.or(material.limits),
                 fixed: self.fixed.unwrap_or(material.fixed),
+                surroundings: self.surroundings.unwrap_or(material.surroundings),
             },
         })
     }

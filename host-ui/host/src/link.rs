@@ -483,7 +483,7 @@ fn upload_structure(tissue: &Tissue) -> UploadStructure {
         label: u32::from(tissue.label),
         role: role | if tissue.material.fixed { role::FIXED } else { 0 },
         own_limits: u32::from(tissue.material.limits.is_some()),
-        reserved: 0,
+        surroundings: tissue.material.surroundings.to_wire(),
         young_pa: tissue.material.young_pa,
         poisson: tissue.material.poisson,
         limits: tissue.material.limits.unwrap_or_default(),

@@ -3,8 +3,10 @@
 
 mod frame;
 mod organ;
+mod surroundings;
 mod tissue;
 
 pub use frame::{PatientFrame, ras_from_lps};
 pub use organ::{Organ, Part, target_among};
+pub use surroundings::{Beyond, Surroundings};
 pub use tissue::{Material, Role};

@@ -1,5 +1,6 @@
 //! What a structure is in the procedure, and how it yields.
 
+use super::Surroundings;
 use serde::{Deserialize, Serialize};
 
 /// What a structure is in the procedure.
@@ -25,6 +26,8 @@ pub struct Material {
     pub limits: Option<[[f64; 3]; 3]>,
     /// The structure never moves.
     pub fixed: bool,
+    /// What it rests on where it is at the outside of the body.
+    pub surroundings: Surroundings,
 }
 
 impl Material {
@@ -34,6 +37,7 @@ impl Material {
             poisson: 0.49,
             limits: None,
             fixed: false,
+            surroundings: Surroundings::FAT,
         }
     }
 
@@ -51,5 +55,6 @@ impl Material {
         poisson: 0.3,
         limits: None,
         fixed: true,
+        surroundings: Surroundings::FAT,
     };
 }

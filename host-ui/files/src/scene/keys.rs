@@ -47,6 +47,20 @@ impl<'a, 'p> Keys<'a, 'p> {
         self.text(key).map(PathBuf::from)
     }
 
+    /// A text, or a list of texts.
+    pub fn words(&mut self, key: &str) -> Option<Vec<String>> {
+        match self.table.get(key)? {
+            Value::Array(list) => {
+                let words: Option<Vec<String>> = list.iter().map(|v| v.as_str().map(str::to_owned)).collect();
+                if words.is_none() {
+                    self.problem(key, "must be a list of texts in quotes");
+                }
+                words
+            }
+            _ => self.text(key).map(|word| vec![word]),
+        }
+    }
+
     pub fn yes(&mut self, key: &str) -> Option<bool> {
         let value = self.table.get(key)?.as_bool();
         if value.is_none() {

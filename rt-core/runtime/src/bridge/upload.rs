@@ -2,7 +2,7 @@
 
 use stylet_shm_schema::{MAX_STRUCTURES, UploadHeader, UploadStructure, check, role};
 use stylet_sim::limits::AxisLimits;
-use stylet_sim::scene::{Labels, Material, Role, Structure};
+use stylet_sim::scene::{Labels, Material, Role, Structure, Surroundings};
 
 /// Every problem with the header of an upload, one a line.
 #[derive(Debug, thiserror::Error)]
@@ -62,6 +62,10 @@ fn read(sent: &UploadStructure) -> Result<Structure, String> {
             sent.role, sent.own_limits
         ));
     }
+    let Some(surroundings) = Surroundings::of_wire(sent.surroundings) else {
+        let bits = sent.surroundings;
+        return Err(format!("structure \"{name}\" has surroundings {bits:#x}, which host and core understand differently"));
+    };
     let limits = sent.limits.map(|[min_stretch, max_stretch, shear_rad]| AxisLimits {
         min_stretch,
         max_stretch,
@@ -80,6 +84,7 @@ fn read(sent: &UploadStructure) -> Result<Structure, String> {
             fixed: sent.role & role::FIXED != 0,
             young_pa: sent.young_pa,
             poisson: sent.poisson,
+            surroundings,
         },
     })
 }

@@ -24,7 +24,7 @@ pub(crate) use lattice::Run;
 pub use lattice::{Extent, Lattice};
 pub use problem::{SceneError, SceneProblem};
 pub use source::SceneSource;
-pub use structure::{Material, Role, Structure};
+pub use structure::{Material, Role, Structure, Surroundings};
 pub use stylet_shm_schema::MAX_STRUCTURES;
 pub use surface::{Surface, SurfacePart, surface_elements};
 pub use tissue_kind::TissueKind;

@@ -2,7 +2,7 @@
 
 use crate::limits::AxisLimits;
 use serde::{Deserialize, Serialize};
-pub use stylet_anatomy::Role;
+pub use stylet_anatomy::{Role, Surroundings};
 
 /// One anatomical structure; its cells carry its label.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,6 +24,8 @@ pub struct Material {
     pub limits: Option<[AxisLimits; 3]>,
     /// Bone, or a probe: never moves.
     pub fixed: bool,
+    /// What it rests on where it is at the outside of the body (FEM).
+    pub surroundings: Surroundings,
     /// Young's modulus (FEM).
     pub young_pa: f64,
     /// Poisson's ratio (FEM).
@@ -36,6 +38,7 @@ impl Structure {
         let material = Material {
             limits: None,
             fixed: false,
+            surroundings: Surroundings::FAT,
             young_pa: 17e3,
             poisson: 0.49,
         };

@@ -7,7 +7,8 @@ use super::paper::PAPER_GLAND;
 use super::shape::{Bounds, Rod, Rounded, Tube};
 use super::{DIMS, SPACING_M, draw};
 use crate::limits::AxisLimits;
-use crate::scene::{Labels, Material, Role, SceneProblem, Structure};
+use crate::scene::{Labels, Material, Role, SceneProblem, Structure, Surroundings};
+use stylet_anatomy::Beyond;
 
 const GLAND: u8 = 1;
 const CAPSULE: u8 = 2;
@@ -18,6 +19,9 @@ const BLADDER_CONTENT: u8 = 6;
 const PUBIC_ARCH: u8 = 7;
 const PERINEUM: u8 = 8;
 const FAT: u8 = 9;
+
+/// The face towards -z, among those of [`Surroundings`].
+const TOWARDS_SKIN: usize = 4;
 
 /// Sizes and places; the gland itself is the paper's.
 #[derive(Clone, Debug)]
@@ -206,10 +210,17 @@ fn structures() -> Vec<Structure> {
             fixed: false,
             young_pa,
             poisson,
+            surroundings: Surroundings::FAT,
         },
     };
     let mut arch = row("pubic arch", PUBIC_ARCH, Role::Tissue, None, 300e6, 0.3);
     arch.material.fixed = true;
+    // Needles come in through skin; beyond the other faces of the volume the body goes on.
+    let mut perineum = row("perineum", PERINEUM, Role::Tissue, limits(0.6, 1.65, 25.0), 15e3, 0.49);
+    perineum.material.surroundings.0[TOWARDS_SKIN] = Beyond::Free;
+    // Nothing is in the rectum.
+    let mut rectal_wall = row("rectal wall", RECTAL_WALL, Role::Spare, limits(0.65, 1.55, 23.0), 20e3, 0.49);
+    rectal_wall.material.surroundings = Surroundings::all(Beyond::Free);
     vec![
         // 17 kPa: Ahn 2010.
         row("gland", GLAND, Role::Target, None, 17e3, 0.49),
@@ -218,14 +229,7 @@ fn structures() -> Vec<Structure> {
         // Assumed: muscle.
         row("urethra", URETHRA, Role::Spare, limits(0.7, 1.45, 20.0), 30e3, 0.49),
         // Assumed: muscle, relaxed.
-        row(
-            "rectal wall",
-            RECTAL_WALL,
-            Role::Spare,
-            limits(0.65, 1.55, 23.0),
-            20e3,
-            0.49,
-        ),
+        rectal_wall,
         // Assumed: muscle, relaxed.
         row(
             "bladder wall",
@@ -247,7 +251,7 @@ fn structures() -> Vec<Structure> {
         // Apparent modulus of cancellous bone: 0.1 to 0.5 GPa, Goldstein 1987. Fixed, as the table holds the pelvis.
         arch,
         // Assumed: skin and muscle together.
-        row("perineum", PERINEUM, Role::Tissue, limits(0.6, 1.65, 25.0), 15e3, 0.49),
+        perineum,
         // 3.25 kPa: Samani 2007 (breast fat).
         row("fat", FAT, Role::Tissue, limits(0.5, 1.9, 26.565), 3.25e3, 0.49),
     ]

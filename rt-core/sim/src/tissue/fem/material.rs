@@ -1,5 +1,7 @@
 //! What a structure is made of, and what that makes of one hexahedron.
 
+use crate::scene::Surroundings;
+
 /// How the volumetric part of an element's energy is integrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integration {
@@ -50,8 +52,10 @@ pub struct FemSettings {
     pub structures: Vec<Structure>,
     /// Structure of each element; empty if there is one structure only.
     pub structure_of: Vec<u8>,
-    /// Springs to rest that stand for what surrounds the body: stiffness per surface area.
+    /// Springs to rest that stand for the fat around the body: stiffness per surface area.
     pub foundation_pa_per_m: f64,
+    /// What each structure rests on where it is at the outside; empty: fat on all sides.
+    pub surroundings: Vec<Surroundings>,
 }
 
 impl FemSettings {
@@ -61,6 +65,7 @@ impl FemSettings {
             structures: vec![Structure::Elastic(material)],
             structure_of: Vec::new(),
             foundation_pa_per_m,
+            surroundings: Vec::new(),
         }
     }
 }

@@ -8,6 +8,7 @@ use super::material::{FemProblem, FemSettings, Structure, problems_of};
 use super::real::Real;
 use crate::scene::Lattice;
 use std::sync::Arc;
+use stylet_anatomy::Beyond;
 
 /// A node that touches no element.
 const NO_PART: u32 = u32::MAX;
@@ -124,7 +125,7 @@ impl Body {
             let cell = body.cells.grid.index(cell);
             body.add_element(element, cell, settings, edge_m);
         }
-        body.add_surroundings(settings.foundation_pa_per_m * edge_m * edge_m / 4.0);
+        body.add_surroundings(lattice, settings);
         for node in 0..body.cells.grid.len() {
             let place = body.cells.grid.place(node);
             let place_m = [0, 1, 2].map(|a| (place[a] + low_cell[a]) as f64 * edge_m);
@@ -162,28 +163,28 @@ impl Body {
         }
     }
 
-    /// A quarter of each free face's springs to each of its nodes.
-    fn add_surroundings(&mut self, quarter_n_per_m: f64) {
+    /// A quarter of the springs of each face that is at the outside to each of its nodes, by what lies beyond it.
+    fn add_surroundings(&mut self, lattice: &Lattice, settings: &FemSettings) {
+        let quarter_n_per_m = settings.foundation_pa_per_m * lattice.spacing_m.powi(2) / 4.0;
         let grid = &self.cells.grid;
-        for cell in (0..grid.len()).filter(|&cell| self.is_cell[cell]) {
+        for (element, cell) in cells_of(lattice, self.low_cell).enumerate() {
+            let cell = grid.index(cell);
             let nodes = corners(grid, cell);
-            for axis in 0..3 {
+            let structure = settings.structure_of.get(element).copied().unwrap_or(0);
+            let surroundings = settings.surroundings.get(usize::from(structure)).copied().unwrap_or_default();
+            for (face, beyond) in surroundings.0.into_iter().enumerate() {
+                let (axis, is_upper) = (face / 2, face % 2 == 1);
                 let step = grid.index([0, 1, 2].map(|a| usize::from(a == axis)));
-                for upper in [false, true] {
-                    let beyond = if upper {
-                        cell.checked_add(step)
-                    } else {
-                        cell.checked_sub(step)
-                    };
-                    if beyond.and_then(|c| self.is_cell.get(c)) == Some(&true) {
-                        continue;
-                    }
-                    for (corner, &node) in nodes.iter().enumerate() {
-                        if (corner >> axis & 1 == 1) == upper {
-                            self.cells.springs_n_per_m[node] += quarter_n_per_m;
-                        }
-                    }
+                let other = if is_upper { cell.checked_add(step) } else { cell.checked_sub(step) };
+                if other.and_then(|c| self.is_cell.get(c)) == Some(&true) {
+                    continue;
                 }
+                let of_face = nodes.iter().enumerate().filter(|(corner, _)| (corner >> axis & 1 == 1) == is_upper);
+                of_face.for_each(|(_, &node)| match beyond {
+                    Beyond::Fat => self.cells.springs_n_per_m[node] += quarter_n_per_m,
+                    Beyond::Fixed => self.cells.fixed[node] = true,
+                    Beyond::Free => {}
+                });
             }
         }
     }

@@ -16,6 +16,7 @@ mod locking;
 mod operator;
 mod refusals;
 mod step;
+mod surroundings;
 
 const EXACT: SolveSettings = SolveSettings {
     relative_tolerance: 1e-9,
@@ -58,6 +59,7 @@ fn two_materials(lattice: &Lattice, contrast: f64, foundation_pa_per_m: f64) -> 
         structures: vec![Structure::Elastic(soft), Structure::Elastic(stiff)],
         structure_of: (0..lattice.element_count() as u32).map(structure).collect(),
         foundation_pa_per_m,
+        surroundings: Vec::new(),
     }
 }
 

@@ -44,6 +44,7 @@ impl<T: Compiled> FemTissue<T> {
             structures: structures.collect(),
             structure_of: scene.lattice.structures().to_vec(),
             foundation_pa_per_m: SURROUNDINGS_PA_PER_M,
+            surroundings: scene.structures.iter().map(|s| s.material.surroundings).collect(),
         };
         let model = FemModel::coarser(&scene.lattice, &scene.body, &settings)?;
         Ok(FemTissue {

@@ -31,6 +31,7 @@ fn answers_are_reciprocal_and_balance_their_loads() {
         structures: vec![Structure::Elastic(material(0.3)), Structure::Elastic(material(0.45))],
         structure_of: (0..lattice.element_count()).map(|e| (e / 5 % 2) as u8).collect(),
         foundation_pa_per_m: 1e5,
+        surroundings: Vec::new(),
     };
     let model = BatchModel::new(&FemModel::<f64>::new(&lattice, &settings).expect("valid"));
     let mut state = BatchState::new(&model);

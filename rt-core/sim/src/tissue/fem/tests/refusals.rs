@@ -65,6 +65,7 @@ fn every_problem_with_the_settings_is_listed() {
         structures: vec![Structure::Elastic(bad)],
         structure_of: vec![0, 0, 1],
         foundation_pa_per_m: -1.0,
+        surroundings: Vec::new(),
     };
     let problems = FemModel::<f32>::new(&lattice, &settings).expect_err("five problems");
     assert_eq!(problems.len(), 5, "{problems:?}");

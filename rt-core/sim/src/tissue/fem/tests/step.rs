@@ -174,6 +174,7 @@ fn fixed_structures_do_not_move() {
         structures: vec![Structure::Elastic(material(0.45, MEAN)), Structure::Fixed],
         structure_of: (0..480).map(|e| u8::from(is_fixed(e))).collect(),
         foundation_pa_per_m: 0.0,
+        surroundings: Vec::new(),
     };
     let model = FemModel::<f32>::new(&lattice, &elastic).expect("valid");
     let mut state = FemState::at_rest(&model);

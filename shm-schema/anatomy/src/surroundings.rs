@@ -1,0 +1,78 @@
+//! What a body rests on, face by face.
+
+use serde::{Deserialize, Serialize};
+
+/// What lies beyond a face at the outside of the body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Beyond {
+    /// Soft tissue that the scene leaves out: it gives way like a layer of fat on something fixed.
+    #[default]
+    Fat,
+    /// Air: skin, or the inside of an empty rectum.
+    Free,
+    /// Bone, or a table: the face does not move.
+    Fixed,
+}
+
+impl Beyond {
+    /// In the order of their numbers on the wire.
+    pub const ALL: [Self; 3] = [Self::Fat, Self::Free, Self::Fixed];
+
+    /// Name in scene files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fat => "fat",
+            Self::Free => "free",
+            Self::Fixed => "fixed",
+        }
+    }
+
+    /// The one of that name.
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|beyond| beyond.name() == name)
+    }
+}
+
+/// What lies beyond the faces of a structure towards -x, +x, -y, +y, -z and +z, where they are at the outside of the body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Surroundings(pub [Beyond; 6]);
+
+impl Surroundings {
+    /// Fat on all sides.
+    pub const FAT: Self = Self([Beyond::Fat; 6]);
+
+    /// The same on all sides.
+    pub const fn all(beyond: Beyond) -> Self {
+        Self([beyond; 6])
+    }
+
+    /// Two bits for each face, the first lowest.
+    pub fn to_wire(self) -> u32 {
+        let bits = |(face, beyond): (usize, Beyond)| (beyond as u32) << (2 * face);
+        self.0.into_iter().enumerate().map(bits).sum()
+    }
+
+    /// `None` where a number stands for nothing.
+    pub fn of_wire(bits: u32) -> Option<Self> {
+        let mut faces = [Beyond::Fat; 6];
+        for (face, slot) in faces.iter_mut().enumerate() {
+            *slot = *Beyond::ALL.get((bits >> (2 * face) & 3) as usize)?;
+        }
+        (bits >> 12 == 0).then_some(Self(faces))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_face_survives_the_wire_and_what_is_unknown_does_not() {
+        for n in 0..3_usize.pow(6) {
+            let surroundings = Surroundings(std::array::from_fn(|face| Beyond::ALL[n / 3_usize.pow(face as u32) % 3]));
+            assert_eq!(Surroundings::of_wire(surroundings.to_wire()), Some(surroundings));
+        }
+        assert_eq!(Surroundings::of_wire(0), Some(Surroundings::FAT), "what hosts sent before");
+        assert_eq!((Surroundings::of_wire(3), Surroundings::of_wire(1 << 12)), (None, None));
+    }
+}
