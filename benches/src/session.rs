@@ -156,7 +156,8 @@ pub fn axis_start(world: &World) -> Vector3<f64> {
 /// How far the gland as a whole has moved along z.
 pub fn gland_shift_m(world: &World) -> f64 {
     let body = world.tissue.deformed();
-    let gland = (0..body.lattice.element_count() as u32).filter(|&e| world.layer(&MaterialPoint::centre(e)) == LayerKind::Gland);
+    let gland = (0..body.lattice.element_count() as u32)
+        .filter(|&e| world.layer(&MaterialPoint::centre(e)) == LayerKind::Gland);
     let (sum, count) = gland.fold((0.0, 0.0), |(sum, count), e| {
         (sum + body.displacement(e)[2], count + 1.0)
     });

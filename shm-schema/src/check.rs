@@ -90,6 +90,7 @@ pub fn scene(h: &SceneHeader, words: &[u32]) -> Result<(), Invalid> {
     ensure(within(&h.patient_from_scene, MAX_COORDINATE_M), "patient transform")?;
     ensure(h.body_triangle_count <= h.triangle_count, "triangles of the body")?;
     ensure(h.structure_count as usize <= MAX_STRUCTURES, "structure count")?;
+    ensure((1..=1024).contains(&h.body_edge), "edge of the body's elements")?;
     for structure in h.structures() {
         let end = structure.first_triangle.checked_add(structure.triangle_count);
         ensure(
@@ -193,6 +194,7 @@ mod tests {
     #[test]
     fn one_bad_index_or_vertex_is_found() {
         let mut h = SceneHeader::zeroed();
+        h.body_edge = 1;
         (h.vertex_count, h.triangle_count, h.spacing_m) = (1, 1, 1e-3);
         let word = 1.0_f32.to_bits();
         assert!(scene(&h, &[word, word, word, 0, 0, 0]).is_ok());

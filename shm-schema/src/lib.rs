@@ -49,7 +49,7 @@ pub use record::TickRecord;
 pub use refusal::{Reason, Refusal, RefusalCode};
 pub use rehearsal::Rehearsal;
 pub use request::{
-    ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, NeedleRehearsal, ParameterChange, PlannedNeedle,
+    ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, NeedleAxis, NeedleRehearsal, ParameterChange, PlannedNeedle,
     RETRACT_RANGE_M, Request, RequestError, RequestErrors, SPEED_RANGE_M_PER_S,
 };
 pub use scene::{
@@ -62,4 +62,4 @@ pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.
-pub const SCHEMA_VERSION: u32 = 6;
+pub const SCHEMA_VERSION: u32 = 7;

@@ -103,8 +103,9 @@ pub struct SceneHeader {
     pub body_triangle_count: u32,
     /// How many of `structures` count; at least one.
     pub structure_count: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// Edge of the elements that the tissue model solves for, in edges of the elements here: 1, or more where those are too
+    /// many for it.
+    pub body_edge: u32,
     /// Edge of an element, m.
     pub spacing_m: f64,
     /// Volume of the tissue, m³.
@@ -150,6 +151,11 @@ impl SceneHeader {
             session_id: self.session_id,
             generation: self.generation,
         }
+    }
+
+    /// Edge of the elements that the tissue model solves for, m.
+    pub fn body_spacing_m(&self) -> f64 {
+        f64::from(self.body_edge) * self.spacing_m
     }
 
     /// Those that count.

@@ -151,10 +151,15 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
         debrief::source_of(implant, options.source.as_deref())?;
     }
     println!(
-        "scene {}: {} elements of {:.2} mm",
+        "scene {}: {} elements of {:.2} mm{}",
         scene.header.name.read(),
         scene.header.element_count,
-        scene.header.spacing_m * 1e3
+        scene.header.spacing_m * 1e3,
+        if scene.header.body_edge > 1 {
+            format!(", solved in elements of {:.2} mm", scene.header.body_spacing_m() * 1e3)
+        } else {
+            String::new()
+        }
     );
     if options.compensate {
         job.compensate(&mut link, &pace, &interrupted)?;

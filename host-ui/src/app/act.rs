@@ -246,6 +246,7 @@ fn request_name(request: &Request) -> &'static str {
         Request::SaveFlight => "Flight recording",
         Request::Rehearse(_) => "Rehearsal",
         Request::StopHand => "Stop",
+        Request::ExpectNeedle(_) => "Next needle",
     }
 }
 

@@ -69,10 +69,16 @@ mod tests {
     #[test]
     fn every_face_survives_the_wire_and_what_is_unknown_does_not() {
         for n in 0..3_usize.pow(6) {
-            let surroundings = Surroundings(std::array::from_fn(|face| Beyond::ALL[n / 3_usize.pow(face as u32) % 3]));
+            let surroundings = Surroundings(std::array::from_fn(|face| {
+                Beyond::ALL[n / 3_usize.pow(face as u32) % 3]
+            }));
             assert_eq!(Surroundings::of_wire(surroundings.to_wire()), Some(surroundings));
         }
-        assert_eq!(Surroundings::of_wire(0), Some(Surroundings::FAT), "what hosts sent before");
+        assert_eq!(
+            Surroundings::of_wire(0),
+            Some(Surroundings::FAT),
+            "what hosts sent before"
+        );
         assert_eq!((Surroundings::of_wire(3), Surroundings::of_wire(1 << 12)), (None, None));
     }
 }

@@ -110,6 +110,7 @@ fn takes(kind: CommandKind) -> String {
         }
         CommandKind::MoveHand => "8 values".to_owned(),
         CommandKind::LoadBuiltinScene => "one number".to_owned(),
+        CommandKind::ExpectNeedle => "entry and direction, three values each".to_owned(),
         CommandKind::Rehearse => format!("11 values and 1 to {MAX_SEEDS} drops of three values each"),
         _ => "no values".to_owned(),
     }
@@ -146,6 +147,7 @@ fn count_fits(kind: CommandKind, count: usize) -> bool {
         CommandKind::SetParameters => count > 0 && count.is_multiple_of(2),
         CommandKind::SetPlan => count == 0 || places_after(PLAN_HEAD).is_some_and(|n| n <= MAX_SEEDS),
         CommandKind::MoveHand => count == 8,
+        CommandKind::ExpectNeedle => count == 6,
         // Without a value: the first scene.
         CommandKind::LoadBuiltinScene => count <= 1,
         CommandKind::Rehearse => places_after(REHEARSAL_HEAD).is_some_and(|n| (1..=MAX_SEEDS).contains(&n)),
@@ -201,6 +203,10 @@ impl<'a> Reader<'a> {
                 drops_m: self.rest(Self::place),
             }),
             CommandKind::StopHand => Request::StopHand,
+            CommandKind::ExpectNeedle => Request::ExpectNeedle(NeedleAxis {
+                entry_m: self.place(),
+                direction: self.direction(),
+            }),
         }
     }
 

@@ -61,6 +61,18 @@ pub enum Request {
     /// Stop the simulated hand as fast as it can; only the core knows where that is.
     #[strum_discriminants(doc = "[`Request::StopHand`]")]
     StopHand = 13,
+    /// The needle that will come after the planned one: what it needs is prepared meanwhile.
+    #[strum_discriminants(doc = "[`Request::ExpectNeedle`]")]
+    ExpectNeedle(NeedleAxis) = 14,
+}
+
+/// Where a needle goes in, scene frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NeedleAxis {
+    /// Where the needle enters, m.
+    pub entry_m: [f64; 3],
+    /// Unit vector from the entry into the body.
+    pub direction: [f64; 3],
 }
 
 /// New value of one parameter.
@@ -150,6 +162,7 @@ impl Request {
                 joined(&[&hand.tip_m, &hand.direction, &pace], &[])
             }
             Self::LoadBuiltinScene(number) => vec![f64::from(*number)],
+            Self::ExpectNeedle(axis) => joined(&[&axis.entry_m, &axis.direction], &[]),
             Self::Rehearse(run) => {
                 let pace = [
                     run.insert_m_per_s,

@@ -52,6 +52,10 @@ fn all() -> Vec<Request> {
         Request::Rehearse(rehearsal(1)),
         Request::Rehearse(rehearsal(MAX_SEEDS)),
         Request::StopHand,
+        Request::ExpectNeedle(NeedleAxis {
+            entry_m: [0.01, 0.02, 0.03],
+            direction: [0.0, 0.0, 1.0],
+        }),
     ]
 }
 
@@ -76,8 +80,8 @@ fn every_request_survives_its_record() {
         numbers.push(command.kind);
     }
     numbers.dedup();
-    // The wire values of schema 5.
-    assert_eq!(numbers, (1..=13).collect::<Vec<u32>>());
+    // The wire values of schema 5, and one of schema 7.
+    assert_eq!(numbers, (1..=14).collect::<Vec<u32>>());
 }
 
 #[test]
@@ -164,6 +168,8 @@ fn every_malformed_payload_is_refused_with_its_reason() {
         (K::SetParameters, &[0.0, f64::INFINITY], C::NotFinite),
         (K::SetPlan, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.5], C::NotUnitDirection),
         (K::SetPlan, &[0.0; 5], C::ValueCount),
+        (K::ExpectNeedle, &[0.0; 5], C::ValueCount),
+        (K::ExpectNeedle, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.5], C::NotUnitDirection),
         (K::SetPlan, &[0.0; 396], C::ValueCount),
         (K::SetPlan, &[21.0, 0.0, 0.0, 0.0, 0.0, 1.0], C::PlaceTooFar),
         (K::MoveHand, &[0.0, 0.0, 1e30, 0.0, 0.0, 1.0, 0.1, 1.0], C::PlaceTooFar),

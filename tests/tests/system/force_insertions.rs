@@ -84,7 +84,12 @@ fn membranes_on_line(world: &World, start: Vector3<f64>, depth_m: f64) -> Vec<(L
             let off = |axis: usize| start[axis] - at[axis];
             (0..2).all(|a| off(a) >= -half_m && off(a) < half_m) && (start.z..start.z + depth_m).contains(&at[2])
         })
-        .map(|e| (lattice.rest_m(e)[2] - half_m - start.z, world.layer(&MaterialPoint::centre(e))))
+        .map(|e| {
+            (
+                lattice.rest_m(e)[2] - half_m - start.z,
+                world.layer(&MaterialPoint::centre(e)),
+            )
+        })
         .collect();
     on_line.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut met: Vec<(LayerKind, f64)> = Vec::new();

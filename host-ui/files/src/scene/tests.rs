@@ -54,8 +54,13 @@ fn structures_are_found_by_name_or_label_and_made_of_what_the_file_says() {
     assert!((limits[2] - std::f64::consts::FRAC_PI_4).abs() < 1e-12 && limits[0] == 0.6);
     assert!(tissues[1].material.fixed);
     assert_eq!(tissues[1].material.surroundings, Surroundings::all(Beyond::Free));
-    assert_eq!(tissues[0].material.surroundings.0[3..], [Beyond::Fat, Beyond::Free, Beyond::Fixed]);
-    let wrong = parse(&FULL.replace("\"fixed\"]", "\"fixed\", \"air\"]")).unwrap_err().to_string();
+    assert_eq!(
+        tissues[0].material.surroundings.0[3..],
+        [Beyond::Fat, Beyond::Free, Beyond::Fixed]
+    );
+    let wrong = parse(&FULL.replace("\"fixed\"]", "\"fixed\", \"air\"]"))
+        .unwrap_err()
+        .to_string();
     assert!(wrong.contains("six of them"), "{wrong}");
     let volume = LabelVolume::from_tissues(&voxels(), tissues, "v".to_owned(), &Progress::default()).unwrap();
     let cells = |label: u8| volume.cells.iter().filter(|&&c| c == label).count();

@@ -47,6 +47,7 @@ pub fn write(
         "parameters": parameters(link),
         "scene": link.scene().map(|s| json!({
             "name": s.header.name.read(), "elements": s.header.element_count, "spacing_mm": s.header.spacing_m * 1e3,
+            "solved_in_elements_of_mm": s.header.body_spacing_m() * 1e3,
             "volume_cm3": s.header.volume_m3 * 1e6,
             "structures": s.header.structures().iter().map(|t| json!({
                 "name": t.name.read(), "label": t.label, "elements": t.element_count,

@@ -5,7 +5,7 @@ use crate::plan::{Drops, Needle};
 use std::time::Instant;
 use stylet_host::link::{Link, LinkError, LinkStatus};
 use stylet_procedure::{HandRequest, Next, Observed, Pace, Procedure, Reply, Step, StepFailure};
-use stylet_shm_schema::{HapticState, RefusalCode, Request};
+use stylet_shm_schema::{HapticState, NeedleAxis, RefusalCode, Request};
 
 /// How a run ended, or that it has not.
 #[derive(Clone, Debug, PartialEq)]
@@ -178,13 +178,23 @@ impl Run {
     }
 
     fn send(&self, link: &mut Link, request: HandRequest) -> Result<u64, LinkError> {
-        link.send(&match request {
+        let sent = link.send(&match request {
             HandRequest::Reset => Request::Reset,
             HandRequest::PublishPlan { needle } => plan_request(&self.tasks[needle].plan),
             HandRequest::Engage => Request::Engage,
             HandRequest::MoveHand(goal) => Request::MoveHand(goal),
             HandRequest::DropSeed => Request::DropSeed,
-        })
+        })?;
+        if let HandRequest::PublishPlan { needle } = request
+            && let Some(next) = self.tasks.get(needle + 1)
+        {
+            // A courtesy, whose reply nothing waits for.
+            link.send(&Request::ExpectNeedle(NeedleAxis {
+                entry_m: next.drops.entry_m,
+                direction: next.drops.direction,
+            }))?;
+        }
+        Ok(sent)
     }
 
     /// What became of the request that was sent last.

@@ -22,6 +22,15 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
         ),
     };
     let label = ui.add(egui::Label::new(name).truncate());
+    if let Some(s) = shown.scene.as_ref().filter(|s| s.body_edge > 1) {
+        let solved = format!("Tissue solved in elements of {:.1} mm", s.body_spacing_m() * 1e3);
+        ui.label(theme::small(&solved)).on_hover_text(format!(
+            "{} elements of {:.1} mm are too many for finite elements at 200 Hz. Layers and the needle's entry stay those of the \
+             scene.",
+            format::count(u64::from(s.element_count)),
+            s.spacing_m * 1e3
+        ));
+    }
     let free = shown.is_live() && !shown.load.is_busy() && !shown.running;
     ui.horizontal(|ui| {
         ui.label(theme::small("Built in"));

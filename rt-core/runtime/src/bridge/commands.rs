@@ -53,6 +53,11 @@ impl Bridge {
                 let goal = hand_goal(&hand);
                 self.order_haptic(HapticOrder::Hand { ticket, goal })
             }
+            Request::ExpectNeedle(axis) => {
+                self.lines.expect_next(axis.entry_m, axis.direction);
+                self.link.answer(ticket, Ok(0));
+                Ok(())
+            }
             Request::StopHand => self.order_haptic(HapticOrder::StopHand { ticket }),
             Request::Engage => self.order_haptic(HapticOrder::Engage { ticket }),
             Request::Disengage => self.order_haptic(HapticOrder::Disengage { ticket }),
@@ -129,6 +134,8 @@ impl Bridge {
         self.plan.session_id = self.link.session.session_id;
         self.plan.scene_generation = self.scene.generation();
         let _ = self.link.ports.plan.send_copy(self.plan);
+        self.lines
+            .expect_planned(plan.map(|plan| (plan.entry_m, plan.direction)));
     }
 
     fn reset(&mut self, ticket: Ticket) -> Result<(), Refusal> {

@@ -1,7 +1,8 @@
 //! Lines are prepared while the needle is outside: on a thread of normal priority, for where it would go in.
 //!
 //! A needle that stands still on an axis for [`STEADY`] is taken to go in along it. What a loop has is replaced only when the
-//! needle has moved off it, and while it is in no tissue.
+//! needle has moved off it, and while it is in no tissue. Between times the lines of the planned needle and of the one after it
+//! are prepared ahead, and kept until a needle stands there.
 
 use super::notices::LoopRings;
 use crate::lines::{LineBody, NoLine};
@@ -30,6 +31,12 @@ struct Finished {
     line: Result<ReadyLine, NoLine>,
 }
 
+/// A line that waits for its needle.
+struct Kept {
+    axis: Line,
+    line: ReadyLine,
+}
+
 struct LineTask {
     axis: Line,
     thread: JoinHandle<Finished>,
@@ -44,8 +51,14 @@ pub struct LinePreparer {
     /// Where the needle is, and since when.
     steady: Option<(Line, Instant)>,
     under_way: Option<LineTask>,
-    /// The last axis that there is an answer for, and when it came: a line, or that there is none.
-    answered: Option<(Line, Instant)>,
+    /// The axis of the line that the loops were given last, and when.
+    handed_over: Option<(Line, Instant)>,
+    /// Axes that cannot have one: no tissue there, or none that can be solved for.
+    without: Vec<Line>,
+    /// The planned needle and the one after it.
+    expected: Vec<Line>,
+    /// Of those that are expected.
+    kept: Vec<Kept>,
     generation: u64,
     is_wanted: bool,
 }
@@ -57,7 +70,10 @@ impl LinePreparer {
             body: None,
             steady: None,
             under_way: None,
-            answered: None,
+            handed_over: None,
+            without: Vec::new(),
+            expected: Vec::new(),
+            kept: Vec::new(),
             generation: 0,
             is_wanted: tissue == TissueKind::Fem,
         }
@@ -67,8 +83,32 @@ impl LinePreparer {
     pub fn change_scene(&mut self, source: Arc<SceneSource>) {
         self.source = source;
         self.body = None;
-        self.answered = None;
+        self.handed_over = None;
+        self.without.clear();
+        self.expected.clear();
+        self.kept.clear();
         self.give_up();
+    }
+
+    /// The needle of a plan that has come, entry and direction; `None` where it was withdrawn.
+    pub(super) fn expect_planned(&mut self, needle: Option<([f64; 3], [f64; 3])>) {
+        self.expected.clear();
+        self.expected
+            .extend(needle.and_then(|(entry_m, direction)| Line::new(entry_m, direction)));
+        self.forget_unexpected();
+    }
+
+    /// The needle after the planned one.
+    pub(super) fn expect_next(&mut self, entry_m: [f64; 3], direction: [f64; 3]) {
+        self.expected.truncate(1);
+        self.expected.extend(Line::new(entry_m, direction));
+        self.forget_unexpected();
+    }
+
+    fn forget_unexpected(&mut self) {
+        let expected = &self.expected;
+        self.kept
+            .retain(|kept| expected.iter().any(|axis| same(&kept.axis, axis)));
     }
 
     /// Hands over a line that is ready, and begins one where the needle needs another.
@@ -80,25 +120,58 @@ impl LinePreparer {
         }
         self.take(scene_generation, loops);
         let Some(record) = newest else { return };
+        if let Some(axis) = self.axis_without_line(record) {
+            if let Some(at) = self.kept.iter().position(|kept| same(&kept.axis, &axis)) {
+                let kept = self.kept.swap_remove(at);
+                self.hand_over(axis, kept.line, loops);
+            } else if !self.is_under_way(&axis) {
+                self.begin(axis, scene_generation);
+            }
+        } else if self.under_way.is_none()
+            && let Some(axis) = self.expected.iter().find(|axis| !self.has_answer(axis)).copied()
+        {
+            self.begin(axis, scene_generation);
+        }
+    }
+
+    /// The axis that a needle outside of the tissue stands on, where the loops have no line for it.
+    fn axis_without_line(&mut self, record: &TickRecord) -> Option<Line> {
         if record.flags & flags::IN_CONTACT != 0 {
             self.steady = None;
-            return;
+            return None;
         }
-        let Some(axis) = axis(record) else { return };
+        let axis = axis(record)?;
         let now = Instant::now();
         match &self.steady {
             Some((since, _)) if same(since, &axis) => {}
             _ => self.steady = Some((axis, now)),
         }
         let is_steady = self.steady.as_ref().is_some_and(|(_, since)| now - *since >= STEADY);
-        let is_answered = self.answered.as_ref().is_some_and(|(answered, since)| {
+        let has_line = self.handed_over.as_ref().is_some_and(|(given, since)| {
             let is_in_use = record.flags & flags::LINE_READY != 0;
-            same(answered, &axis) && (is_in_use || now - *since < IN_USE_AFTER)
+            same(given, &axis) && (is_in_use || now - *since < IN_USE_AFTER)
         });
-        let is_under_way = self.under_way.as_ref().is_some_and(|work| same(&work.axis, &axis));
-        if is_steady && !is_answered && !is_under_way {
-            self.begin(axis, scene_generation);
-        }
+        (is_steady && !has_line && !self.has_none(&axis)).then_some(axis)
+    }
+
+    fn is_under_way(&self, axis: &Line) -> bool {
+        self.under_way.as_ref().is_some_and(|task| same(&task.axis, axis))
+    }
+
+    fn has_answer(&self, axis: &Line) -> bool {
+        let has_line = self.handed_over.as_ref().is_some_and(|(given, _)| same(given, axis));
+        has_line || self.has_none(axis) || self.kept.iter().any(|kept| same(&kept.axis, axis))
+    }
+
+    fn has_none(&self, axis: &Line) -> bool {
+        self.without.iter().any(|without| same(without, axis))
+    }
+
+    /// The needle there is felt as without a line, until the scene changes.
+    fn do_without(&mut self, axis: Line) {
+        const MOST: usize = 64;
+        self.without.truncate(MOST - 1);
+        self.without.insert(0, axis);
     }
 
     /// Begins once the thread has ended that is at work on another axis.
@@ -148,24 +221,28 @@ impl LinePreparer {
         };
         let axis = work.axis;
         let Ok(finished) = work.thread.join() else {
-            self.answered = Some((axis, Instant::now()));
+            self.do_without(axis);
             return;
         };
         if finished.scene_generation != scene_generation {
             return;
         }
         self.body = finished.body.map(|body| (scene_generation, body));
+        let is_expected = self.expected.iter().any(|expected| same(expected, &axis));
+        let stands_there = self.steady.as_ref().is_some_and(|(steady, _)| same(steady, &axis));
         match finished.line {
-            Ok(ReadyLine { hand, body }) => {
-                // Both rings are emptied at every tick: one that is full belongs to a loop that has ended.
-                let _ = loops.tissue_orders.push(TissueOrder::Line(body));
-                let _ = loops.lines.push(hand);
-                self.answered = Some((axis, Instant::now()));
-            }
-            Err(NoLine::Line(stylet_sim::line::LineError::Stopped)) => {}
-            // No tissue there, or none that can be solved for: the needle is felt as without a line.
-            Err(_) => self.answered = Some((axis, Instant::now() + Duration::from_secs(3600))),
+            Ok(line) if stands_there => self.hand_over(axis, line, loops),
+            Ok(line) if is_expected => self.kept.push(Kept { axis, line }),
+            Ok(_) | Err(NoLine::Line(stylet_sim::line::LineError::Stopped)) => {}
+            Err(_) => self.do_without(axis),
         }
+    }
+
+    fn hand_over(&mut self, axis: Line, ReadyLine { hand, body }: ReadyLine, loops: &mut LoopRings) {
+        // Both rings are emptied at every tick: one that is full belongs to a loop that has ended.
+        let _ = loops.tissue_orders.push(TissueOrder::Line(body));
+        let _ = loops.lines.push(hand);
+        self.handed_over = Some((axis, Instant::now()));
     }
 }
 

@@ -59,7 +59,7 @@ impl ScenePicture {
                 triangle_count: surface.triangles.len() as u32,
                 body_triangle_count: surface.body_triangles as u32,
                 structure_count: scene.structures.len() as u32,
-                reserved: 0,
+                body_edge: scene.coarseness(),
                 spacing_m: lattice.spacing_m,
                 volume_m3: lattice.volume_m3(),
                 lower_m,

@@ -64,7 +64,9 @@ fn read(sent: &UploadStructure) -> Result<Structure, String> {
     }
     let Some(surroundings) = Surroundings::of_wire(sent.surroundings) else {
         let bits = sent.surroundings;
-        return Err(format!("structure \"{name}\" has surroundings {bits:#x}, which host and core understand differently"));
+        return Err(format!(
+            "structure \"{name}\" has surroundings {bits:#x}, which host and core understand differently"
+        ));
     };
     let limits = sent.limits.map(|[min_stretch, max_stretch, shear_rad]| AxisLimits {
         min_stretch,

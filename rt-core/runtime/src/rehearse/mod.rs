@@ -15,9 +15,11 @@ use script::Script;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use stylet_hw::DeviceInfo;
-use stylet_shm_schema::{MAX_SEEDS, ParameterProblems, ParameterSet, Reason, Refusal, RefusalCode, SeedPose, flags};
+use stylet_shm_schema::{
+    MAX_SEEDS, NeedleAxis, ParameterProblems, ParameterSet, Reason, Refusal, RefusalCode, SeedPose, flags,
+};
 use stylet_sim::active::activate;
-use stylet_sim::line::LineError;
+use stylet_sim::line::{LineError, ReadyLine};
 use stylet_sim::scene::{SceneSource, TissueKind};
 
 /// A rehearsal that takes longer than this, in its own time, has failed.
@@ -117,6 +119,8 @@ pub struct Stage {
     world: Option<Box<World>>,
     /// Where needles have lines: bodies of finite elements.
     lines: Option<LineBody>,
+    /// The line of the last needle: compensation rehearses the same needle several times.
+    kept: Option<(NeedleAxis, ReadyLine)>,
     device: DeviceInfo,
 }
 
@@ -134,8 +138,30 @@ impl Stage {
         Ok(Self {
             world: Some(Box::new(world)),
             lines,
+            kept: None,
             device,
         })
+    }
+
+    /// A line for the needle, at rest; `None` in tissue that needs none.
+    fn line(&mut self, run: &NeedleRun, stop: &AtomicBool) -> Result<Option<ReadyLine>, RehearseError> {
+        let Some(body) = &self.lines else { return Ok(None) };
+        let axis = NeedleAxis {
+            entry_m: run.entry_m.into(),
+            direction: run.direction.into(),
+        };
+        if let Some((_, line)) = self.kept.as_ref().filter(|(of, _)| *of == axis) {
+            return Ok(Some(line.clone()));
+        }
+        // SYNC: set by the bridge when it ends; nothing but the flag is carried.
+        let mut goes_on = || !stop.load(Ordering::Relaxed);
+        let line = body.prepare(1, axis.entry_m, axis.direction, &mut goes_on);
+        let line = line.map_err(|why| match why {
+            NoLine::Line(LineError::Stopped) => RehearseError::Stopped,
+            why => RehearseError::Line(why),
+        })?;
+        self.kept = Some((axis, line.clone()));
+        Ok(Some(line))
     }
 
     /// From rest, under these parameters; ends early, with an error, when `stop` is set.
@@ -149,16 +175,7 @@ impl Stage {
             return Err(RehearseError::TooManyDrops(run.drops_m.len()));
         }
         let active = activate(set, &self.device)?;
-        // SYNC: set by the bridge when it ends; nothing but the flag is carried.
-        let mut goes_on = || !stop.load(Ordering::Relaxed);
-        let line = self.lines.as_ref().map(|body| {
-            let line = body.prepare(1, run.entry_m.into(), run.direction.into(), &mut goes_on);
-            line.map_err(|why| match why {
-                NoLine::Line(LineError::Stopped) => RehearseError::Stopped,
-                why => RehearseError::Line(why),
-            })
-        });
-        let line = line.transpose()?;
+        let line = self.line(run, stop)?;
         let mut world = self.world.take().ok_or(RehearseError::BodyLost)?;
         world.tissue.return_to_rest();
         world.set_limits(active.limits.clone());

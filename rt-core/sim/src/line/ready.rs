@@ -20,6 +20,7 @@ const TILT_RAD: f64 = 0.02;
 const SLICES: usize = 8;
 
 /// Both halves of a line, one for each loop.
+#[derive(Clone, Debug)]
 pub struct ReadyLine {
     /// For the force loop.
     pub hand: Box<HandLine>,

@@ -33,7 +33,10 @@ impl MaterialPoint {
 
     /// The middle of an element.
     pub fn centre(element: u32) -> MaterialPoint {
-        MaterialPoint { element, local: [0.0; 3] }
+        MaterialPoint {
+            element,
+            local: [0.0; 3],
+        }
     }
 
     /// The material point at a place of the scene frame while the body is at rest; `None` outside the tissue.

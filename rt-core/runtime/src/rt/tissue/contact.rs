@@ -95,10 +95,7 @@ impl TissueLoop {
     ) -> Vector3<f64> {
         for _ in 0..8 {
             let middle = (outside + inside) / 2.0;
-            if self
-                .locate(&middle, Some(hint))
-                .is_some_and(|point| is_inside(&point))
-            {
+            if self.locate(&middle, Some(hint)).is_some_and(|point| is_inside(&point)) {
                 inside = middle;
             } else {
                 outside = middle;

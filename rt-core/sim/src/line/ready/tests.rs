@@ -172,7 +172,11 @@ fn a_coarser_pelvis_beside_one_of_all_cells() {
         };
         let ((near, _), (exact, _)) = (answer(&coarse), answer(&full));
         // Gland and all, by the distance from the tip: what a seed there would be off.
-        for (name, least_m, only_target) in [("gland", 0.0, true), ("gland, 5 mm off the tip", 5e-3, true), ("all", 0.0, false)] {
+        for (name, least_m, only_target) in [
+            ("gland", 0.0, true),
+            ("gland, 5 mm off the tip", 5e-3, true),
+            ("all", 0.0, false),
+        ] {
             let (mut square, mut size, mut worst, mut largest, mut count) = (0.0, 0.0, 0.0_f64, 0.0_f64, 0);
             for element in 0..full.lattice.element_count() as u32 {
                 let place_m = full.lattice.rest_m(element);
@@ -223,7 +227,9 @@ fn a_coarser_pelvis_beside_one_of_all_cells() {
         bytes as f64 / 1e6
     );
     let mut tissue = tissue;
-    let loads: Vec<f64> = (0..ready.body.columns.len()).map(|n| if n < 40 { 0.05 } else { 0.0 }).collect();
+    let loads: Vec<f64> = (0..ready.body.columns.len())
+        .map(|n| if n < 40 { 0.05 } else { 0.0 })
+        .collect();
     let mut times_us: Vec<f64> = (0..200)
         .map(|_| {
             let begun = std::time::Instant::now();
@@ -232,5 +238,8 @@ fn a_coarser_pelvis_beside_one_of_all_cells() {
         })
         .collect();
     times_us.sort_by(f64::total_cmp);
-    println!("a tick of 40 loads: p50 {:.0} us, p99 {:.0} us", times_us[100], times_us[198]);
+    println!(
+        "a tick of 40 loads: p50 {:.0} us, p99 {:.0} us",
+        times_us[100], times_us[198]
+    );
 }

@@ -219,7 +219,14 @@ fn structures() -> Vec<Structure> {
     let mut perineum = row("perineum", PERINEUM, Role::Tissue, limits(0.6, 1.65, 25.0), 15e3, 0.49);
     perineum.material.surroundings.0[TOWARDS_SKIN] = Beyond::Free;
     // Nothing is in the rectum.
-    let mut rectal_wall = row("rectal wall", RECTAL_WALL, Role::Spare, limits(0.65, 1.55, 23.0), 20e3, 0.49);
+    let mut rectal_wall = row(
+        "rectal wall",
+        RECTAL_WALL,
+        Role::Spare,
+        limits(0.65, 1.55, 23.0),
+        20e3,
+        0.49,
+    );
     rectal_wall.material.surroundings = Surroundings::all(Beyond::Free);
     vec![
         // 17 kPa: Ahn 2010.

@@ -104,12 +104,7 @@ struct Body {
 
 impl Body {
     /// In the cells of `lattice`; its lowest cell is the lowest of a group of `aligned_to` cells along each axis.
-    fn new(
-        lattice: &Lattice,
-        settings: &FemSettings,
-        is_fixed: impl Fn([f64; 3]) -> bool,
-        aligned_to: usize,
-    ) -> Self {
+    fn new(lattice: &Lattice, settings: &FemSettings, is_fixed: impl Fn([f64; 3]) -> bool, aligned_to: usize) -> Self {
         let edge_m = lattice.spacing_m;
         let [low, high] = lattice.occupied();
         let low_cell = low.map(|c| c / aligned_to * aligned_to);
@@ -171,15 +166,26 @@ impl Body {
             let cell = grid.index(cell);
             let nodes = corners(grid, cell);
             let structure = settings.structure_of.get(element).copied().unwrap_or(0);
-            let surroundings = settings.surroundings.get(usize::from(structure)).copied().unwrap_or_default();
+            let surroundings = settings
+                .surroundings
+                .get(usize::from(structure))
+                .copied()
+                .unwrap_or_default();
             for (face, beyond) in surroundings.0.into_iter().enumerate() {
                 let (axis, is_upper) = (face / 2, face % 2 == 1);
                 let step = grid.index([0, 1, 2].map(|a| usize::from(a == axis)));
-                let other = if is_upper { cell.checked_add(step) } else { cell.checked_sub(step) };
+                let other = if is_upper {
+                    cell.checked_add(step)
+                } else {
+                    cell.checked_sub(step)
+                };
                 if other.and_then(|c| self.is_cell.get(c)) == Some(&true) {
                     continue;
                 }
-                let of_face = nodes.iter().enumerate().filter(|(corner, _)| (corner >> axis & 1 == 1) == is_upper);
+                let of_face = nodes
+                    .iter()
+                    .enumerate()
+                    .filter(|(corner, _)| (corner >> axis & 1 == 1) == is_upper);
                 of_face.for_each(|(_, &node)| match beyond {
                     Beyond::Fat => self.cells.springs_n_per_m[node] += quarter_n_per_m,
                     Beyond::Fixed => self.cells.fixed[node] = true,

@@ -35,7 +35,12 @@ fn elements_that_are_partly_outside_are_as_stiff_as_their_part() {
         let model = <f64 as Compiled>::model(fine, of, &settings, &|place_m| place_m[2] < 1e-9).expect("valid");
         let mut state = FemState::at_rest(&model);
         let last = of.element_count() as u32 - 1;
-        let report = step(&model, &mut state, Some(patch(of, last, [0.0, 0.0, 0.1e-3], 0.0)), &EXACT);
+        let report = step(
+            &model,
+            &mut state,
+            Some(patch(of, last, [0.0, 0.0, 0.1e-3], 0.0)),
+            &EXACT,
+        );
         report.tip_force_n[2]
     };
     let of = |fine: &Lattice| Arc::new(fine.coarser());

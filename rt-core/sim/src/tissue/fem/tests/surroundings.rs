@@ -26,7 +26,10 @@ fn springs_stand_for_the_faces_on_fat_alone() {
             let on_fat: usize = (0..6).filter(|&f| f != face).map(|f| cells[f]).sum();
             let wanted = 1e6 * on_fat as f64 * H * H;
             let sum: f64 = model.levels[0].springs.iter().sum();
-            assert!((sum / wanted - 1.0).abs() < 1e-12, "{sum} N/m, {wanted} N/m of {surroundings:?}");
+            assert!(
+                (sum / wanted - 1.0).abs() < 1e-12,
+                "{sum} N/m, {wanted} N/m of {surroundings:?}"
+            );
             let free = model.levels[0].inverse_diagonal.iter().filter(|&&d| d != 0.0).count();
             let nodes = [6 * 7, 6 * 7, 5 * 7, 5 * 7, 5 * 6, 5 * 6];
             let fixed = if beyond == Beyond::Fixed { nodes[face] } else { 0 };
