@@ -19,6 +19,16 @@ pub struct Error {
 /// Displacements of one tick, in metres.
 pub type Field = Vec<[f64; 3]>;
 
+/// The shift that comes nearest to a field where that moves, in metres: the mean there.
+pub fn best_shift_m(field: &Field, travel_m: f64) -> [f64; 3] {
+    let (mut sum, mut count) = ([0.0; 3], 0.0);
+    for u in field.iter().filter(|&&u| norm(u) > MOVED * travel_m) {
+        (0..3).for_each(|a| sum[a] += u[a]);
+        count += 1.0;
+    }
+    sum.map(|s| if count > 0.0 { s / count } else { 0.0 })
+}
+
 pub fn field(body: &Deformed) -> Field {
     let h = body.lattice.spacing_m;
     let elements = 0..body.lattice.element_count() as u32;
@@ -29,9 +39,21 @@ impl Error {
     /// Adds one tick: `reference` against the body as it is, where the reference has moved.
     pub fn add(&mut self, reference: &Field, body: &Deformed, travel_m: f64, seeds: &[u32]) {
         let h = body.lattice.spacing_m;
+        let moved_m = |e: usize| body.displacement(e as u32).map(|u| h * u);
+        self.add_field(reference, moved_m, travel_m, seeds);
+    }
+
+    /// The same of displacements in metres, by element.
+    pub fn add_field(
+        &mut self,
+        reference: &Field,
+        moved_m: impl Fn(usize) -> [f64; 3],
+        travel_m: f64,
+        seeds: &[u32],
+    ) {
         let apart = |e: usize| {
-            let u = body.displacement(e as u32);
-            norm([0, 1, 2].map(|a| h * u[a] - reference[e][a]))
+            let u = moved_m(e);
+            norm([0, 1, 2].map(|a| u[a] - reference[e][a]))
         };
         for (e, &there) in reference.iter().enumerate() {
             if norm(there) > MOVED * travel_m {
@@ -68,4 +90,28 @@ impl Error {
 
 pub fn norm(v: [f64; 3]) -> f64 {
     v.iter().map(|c| c * c).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_other_shift_comes_nearer_than_the_best() {
+        let field: Field = (0..50).map(|n| [1e-3 * f64::from(n % 7), -2e-4 * f64::from(n), 3e-3]).collect();
+        let best_m = best_shift_m(&field, 0.01);
+        let rms_m = |shift_m: [f64; 3]| {
+            let mut error = Error::default();
+            error.add_field(&field, |_| shift_m, 0.01, &[]);
+            error.rms_m()
+        };
+        for axis in 0..3 {
+            for by_m in [-1e-4, 1e-4] {
+                let mut other_m = best_m;
+                other_m[axis] += by_m;
+                assert!(rms_m(other_m) > rms_m(best_m));
+            }
+        }
+        assert!(rms_m(best_m) < rms_m([0.0; 3]));
+    }
 }

@@ -95,6 +95,7 @@ fn measure(scene: &Scene, insertion: &Insertion, fitted: &models::Fitted, rounds
     let place = Where {
         spacing_m: scene.lattice.spacing_m,
         elements: scene.lattice.element_count(),
+        without_model: reference.without_model(insertion.travel_m, &seeds),
     };
     let named = entries.iter().zip(&runs);
     named

@@ -1,7 +1,7 @@
 //! One model through one insertion: its time, and its error against the converged FEM on the same lattice.
 
 use std::time::Instant;
-use stylet_benches::error::{Error, Field, field};
+use stylet_benches::error::{Error, Field, best_shift_m, field};
 use stylet_benches::insertions::TICK_S;
 use stylet_sim::tissue::{Held, TissueModel};
 
@@ -28,6 +28,19 @@ impl Reference {
             }
         }
         Reference { fields }
+    }
+
+    /// What is off without any model: where nothing moves, and where each tick shifts the body as one piece by what fits best,
+    /// which nobody knows beforehand.
+    pub fn without_model(&self, travel_m: f64, seeds: &[u32]) -> [Error; 2] {
+        let mut errors = [Error::default(), Error::default()];
+        for field in &self.fields {
+            let shifts_m = [[0.0; 3], best_shift_m(field, travel_m)];
+            for (error, shift_m) in errors.iter_mut().zip(shifts_m) {
+                error.add_field(field, |_| shift_m, travel_m, seeds);
+            }
+        }
+        errors
     }
 }
 

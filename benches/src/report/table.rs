@@ -4,6 +4,7 @@ use crate::models::Family;
 use crate::runs::Run;
 use serde::Serialize;
 use std::path::Path;
+use stylet_benches::error::Error;
 use stylet_benches::insertions::Insertion;
 
 /// One model through one insertion.
@@ -32,11 +33,17 @@ pub struct Row {
     pub seed_rms_percent: f64,
     pub residual: f64,
     pub unconverged_ticks: usize,
+    /// RMS of the same insertion where nothing moves.
+    pub nothing_moves_percent: f64,
+    /// RMS of the same insertion where the body goes along as one piece, by the best shift of each tick.
+    pub best_shift_percent: f64,
 }
 
 pub struct Where {
     pub spacing_m: f64,
     pub elements: usize,
+    /// Errors where nothing moves, and of the best shift.
+    pub without_model: [Error; 2],
 }
 
 /// `rounds` are equal runs; each tick's time is the least of them, as the tissue does the same in each.
@@ -72,6 +79,8 @@ pub fn row(place: &Where, insertion: &Insertion, family: Family, setting: &str, 
         seed_rms_percent: error.seed_rms_m() * percent,
         residual: first.residual,
         unconverged_ticks: first.unconverged,
+        nothing_moves_percent: place.without_model[0].rms_m() * percent,
+        best_shift_percent: place.without_model[1].rms_m() * percent,
     }
 }
 
@@ -95,6 +104,8 @@ pub struct Point {
     pub worst_max_percent: f64,
     pub seed_rms_mm: f64,
     pub unconverged_ticks: usize,
+    pub nothing_moves_percent: f64,
+    pub best_shift_percent: f64,
 }
 
 pub fn points(rows: &[Row]) -> Vec<Point> {
@@ -116,6 +127,8 @@ pub fn points(rows: &[Row]) -> Vec<Point> {
                 worst_max_percent: 0.0,
                 seed_rms_mm: 0.0,
                 unconverged_ticks: 0,
+                nothing_moves_percent: 0.0,
+                best_shift_percent: 0.0,
             });
             points.len() - 1
         });
@@ -124,6 +137,8 @@ pub fn points(rows: &[Row]) -> Vec<Point> {
         point.mean_us += row.mean_us;
         point.rms_percent += row.rms_percent;
         point.seed_rms_mm += row.seed_rms_mm;
+        point.nothing_moves_percent += row.nothing_moves_percent;
+        point.best_shift_percent += row.best_shift_percent;
         point.worst_p99_us = point.worst_p99_us.max(row.p99_us);
         point.worst_rms_percent = point.worst_rms_percent.max(row.rms_percent);
         point.worst_max_percent = point.worst_max_percent.max(row.max_percent);
@@ -133,6 +148,8 @@ pub fn points(rows: &[Row]) -> Vec<Point> {
         point.mean_us /= count;
         point.rms_percent /= count;
         point.seed_rms_mm /= count;
+        point.nothing_moves_percent /= count;
+        point.best_shift_percent /= count;
     }
     points
 }
