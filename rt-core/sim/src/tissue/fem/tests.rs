@@ -12,6 +12,7 @@ use crate::tissue::HeldOutcome;
 mod ahead;
 mod golden;
 mod locking;
+mod memory;
 mod operator;
 mod refusals;
 mod step;
