@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::Duration;
-use stylet_runtime::replay::{file::Flight, repeat};
+use stylet_runtime::replay::{file::Flight, lines::LinesAgain, repeat};
 use stylet_shm_schema::{EventKind, ParameterChange, ParameterId, Request, TickRecord};
 use stylet_tests::hand::Insertion;
 use stylet_tests::stopped::StoppedThread;
@@ -141,7 +141,7 @@ fn what_was_changed_is_found(flight: &Flight, file: &Path) {
     let haptic = other.haptic.as_mut().expect("recorded");
     let sample = haptic.ticks[2000].read.as_mut().expect("a sample");
     sample.tip_in_world.z = f64::from_bits(sample.tip_in_world.z.to_bits() ^ 1);
-    let found = repeat::haptic(&other, other.haptic.as_ref().expect("recorded"));
+    let found = repeat::haptic(&other, other.haptic.as_ref().expect("recorded")).expect("can be run");
     assert!(
         found.first_different == Some(2000) && !found.is_identical(),
         "{found:?}"
@@ -151,7 +151,8 @@ fn what_was_changed_is_found(flight: &Flight, file: &Path) {
     // The last one: the next would take the held element back.
     let late = tissue.ticks.len() - 1;
     tissue.ticks[late].pose.held_travel_m.z += 1e-4;
-    let found = repeat::tissue(&other, other.tissue.as_ref().expect("recorded")).expect("can be run");
+    let recorded = other.tissue.as_ref().expect("recorded");
+    let found = repeat::tissue(&other, recorded, LinesAgain::default()).expect("can be run");
     assert!(found.different > 0 && found.different_positions > 0, "{found:?}");
 
     let mut bytes = std::fs::read(file).expect("there");

@@ -3,6 +3,7 @@
 //! A needle that stands still on an axis for [`STEADY`] is taken to go in along it. What a loop has is replaced only when the
 //! needle has moved off it, and while it is in no tissue.
 
+use super::line_archive::{Half, LineArchive};
 use super::notices::LoopRings;
 use crate::lines::{LineBody, NoLine};
 use crate::rt::exchange::TissueOrder;
@@ -12,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::{TickRecord, flags};
-use stylet_sim::line::{Line, ReadyLine};
+use stylet_sim::line::{Line, LineSource, ReadyLine};
 use stylet_sim::scene::{SceneSource, TissueKind};
 
 /// So long the needle keeps its axis before a line is begun.
@@ -27,7 +28,7 @@ const IN_USE_AFTER: Duration = Duration::from_secs(1);
 struct Finished {
     scene_generation: u64,
     body: Option<LineBody>,
-    line: Result<ReadyLine, NoLine>,
+    line: Result<(ReadyLine, LineSource), NoLine>,
 }
 
 struct LineTask {
@@ -48,6 +49,7 @@ pub struct LinePreparer {
     answered: Option<(Line, Instant)>,
     generation: u64,
     is_wanted: bool,
+    archive: LineArchive,
 }
 
 impl LinePreparer {
@@ -60,7 +62,13 @@ impl LinePreparer {
             answered: None,
             generation: 0,
             is_wanted: tissue == TissueKind::Fem,
+            archive: LineArchive::default(),
         }
+    }
+
+    /// What the lines of the run were made from, for flight recordings.
+    pub(super) fn archive(&self) -> &LineArchive {
+        &self.archive
     }
 
     /// Another scene runs.
@@ -73,8 +81,12 @@ impl LinePreparer {
 
     /// Hands over a line that is ready, and begins one where the needle needs another.
     pub(super) fn pass(&mut self, newest: Option<&TickRecord>, scene_generation: u64, loops: &mut LoopRings) {
-        while loops.old_hand_lines.pop().is_ok() {}
-        while loops.old_body_lines.pop().is_ok() {}
+        while let Ok(line) = loops.old_hand_lines.pop() {
+            self.archive.returned(line.generation, Half::Hand);
+        }
+        while let Ok(line) = loops.old_body_lines.pop() {
+            self.archive.returned(line.generation, Half::Body);
+        }
         if !self.is_wanted {
             return;
         }
@@ -119,7 +131,11 @@ impl LinePreparer {
             let (body, line) = match body {
                 Ok(body) => {
                     let line = body.prepare(generation, axis.entry_m, axis.axes[0], &mut goes_on);
-                    (Some(body), line)
+                    let with_source = line.map(|line| {
+                        let source = line.hand.source();
+                        (line, source)
+                    });
+                    (Some(body), with_source)
                 }
                 Err(why) => (None, Err(why)),
             };
@@ -156,7 +172,8 @@ impl LinePreparer {
         }
         self.body = finished.body.map(|body| (scene_generation, body));
         match finished.line {
-            Ok(ReadyLine { hand, body }) => {
+            Ok((ReadyLine { hand, body }, source)) => {
+                self.archive.keep(source);
                 // Both rings are emptied at every tick: one that is full belongs to a loop that has ended.
                 let _ = loops.tissue_orders.push(TissueOrder::Line(body));
                 let _ = loops.lines.push(hand);

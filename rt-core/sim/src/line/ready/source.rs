@@ -54,6 +54,16 @@ impl HandLine {
         }
     }
 
+    /// A line of stations that do not know each other, for tests and examples: 1 mm apart, 1 mm/N.
+    ///
+    /// # Errors
+    ///
+    /// [`LineError::Unusable`]: too many stations.
+    pub fn uniform(generation: u64, line: Line, stations: usize) -> Result<Self, LineError> {
+        let kinds = vec![(0.0, LayerKind::Gland, true)];
+        Self::new(generation, line, kinds, Compliance::diagonal(stations, 1e-3, 1e-3))
+    }
+
     /// The line in tissue at rest, with the default forces of its layers.
     ///
     /// # Errors

@@ -169,13 +169,8 @@ fn a_line_made_again_from_its_source_goes_on_from_a_copied_state_in_every_bit() 
 
 #[test]
 fn a_source_or_a_state_that_is_not_whole_is_refused() {
-    let hand = HandLine::new(
-        1,
-        Line::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap(),
-        vec![(0.0, LayerKind::Gland, true)],
-        Compliance::diagonal(4, 1e-3, 1e-3),
-    );
-    let mut hand = hand.unwrap();
+    let line = Line::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap();
+    let mut hand = HandLine::uniform(1, line, 4).unwrap();
     assert!(!hand.take_state(&LineState::with_room()));
     let mut source = hand.source();
     assert!(HandLine::of_source(source.clone()).is_ok());
