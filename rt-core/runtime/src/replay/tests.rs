@@ -121,6 +121,7 @@ impl Recorded {
             needle: NeedleParameters::default(),
             force: ForceParameters {
                 membrane_gain: 0.4,
+                shaft_gain: 1.5,
                 ..ForceParameters::default()
             },
         });
