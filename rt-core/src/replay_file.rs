@@ -3,6 +3,7 @@
 use clap::Args;
 use std::path::PathBuf;
 use stylet_runtime::replay::file::{Flight, FlightError};
+use stylet_runtime::replay::lines::{self, LinesAgain};
 use stylet_runtime::replay::repeat::{self, RepeatError, Repeated};
 use stylet_runtime::rt::arm::{self, Ask, Refused};
 use stylet_runtime::rt::haptic_tape::HapticFlight;
@@ -18,9 +19,9 @@ pub enum ReplayError {
     /// The thread cannot be set up as the loops were.
     #[error(transparent)]
     Thread(#[from] Refused),
-    /// The tissue cannot be repeated.
+    /// A loop cannot be repeated.
     #[error(transparent)]
-    Tissue(#[from] RepeatError),
+    Loop(#[from] RepeatError),
 }
 
 /// The command.
@@ -43,37 +44,39 @@ impl Replay {
         }
         println!("reason   {}", flight.reason);
         println!("device   {}", flight.device_name);
+        // Before denormal numbers are off: what prepared the lines had them on.
+        let again = flight.tissue.as_ref().map(|recorded| solve_again(&flight, recorded));
+        let again = again.transpose()?.unwrap_or_default();
         // The loops run with denormal numbers off, and so must their repetition.
         arm::arm(Ask {
             priority: None,
             core: None,
         })?;
-        let compare_forces = |recorded: &HapticFlight| {
+        let forces = flight.haptic.as_ref().map(|recorded| {
             print_haptic(recorded);
-            match recorded.ticks_on_line() {
-                0 => print_result("forces", Some(&repeat::haptic(&flight, recorded))),
-                on_line => {
-                    println!(
-                        "forces   not repeated: in {on_line} of {} ticks the needle was on a line of finite elements, which \
-                         no recording holds",
-                        recorded.ticks.len()
-                    );
-                    true
-                }
-            }
-        };
-        let forces = flight.haptic.as_ref();
-        let forces_are_same = forces.map_or_else(|| print_result("forces", None), compare_forces);
-        let tissue = flight
-            .tissue
-            .as_ref()
-            .map(|recorded| {
-                print_tissue(recorded);
-                repeat::tissue(&flight, recorded)
-            })
-            .transpose()?;
-        Ok(forces_are_same & print_result("tissue", tissue.as_ref()))
+            repeat::haptic(&flight, recorded)
+        });
+        let forces_are_same = print_result("forces", forces.transpose()?.as_ref());
+        let tissue = flight.tissue.as_ref().map(|recorded| {
+            print_tissue(recorded);
+            repeat::tissue(&flight, recorded, again)
+        });
+        Ok(forces_are_same & print_result("tissue", tissue.transpose()?.as_ref()))
     }
+}
+
+/// A recording holds no columns of needle lines; those that count take some seconds each.
+fn solve_again(flight: &Flight, recorded: &TissueFlight) -> Result<LinesAgain, RepeatError> {
+    let mut reported = None;
+    lines::solve_again(flight, recorded, &mut |progress| {
+        let quarter = (progress.generation, 4 * progress.ready / progress.of.max(1));
+        if reported.replace(quarter) != Some(quarter) {
+            println!(
+                "line {}   {} of {} columns solved again",
+                progress.generation, progress.ready, progress.of
+            );
+        }
+    })
 }
 
 fn print_haptic(recorded: &HapticFlight) {
@@ -100,6 +103,9 @@ fn print_haptic(recorded: &HapticFlight) {
         longest(|r| r.work_ns),
         recorded.orders.len()
     );
+    if let on_line @ 1.. = recorded.ticks_on_line() {
+        println!("         on a needle line in {on_line} of {} ticks", recorded.ticks.len());
+    }
     let mut before = None;
     for record in records {
         if before.is_some_and(|fault| fault != record.fault) || (before.is_none() && record.fault != 0) {
@@ -140,6 +146,9 @@ fn print_result(what: &str, found: Option<&Repeated>) -> bool {
             r.positions - r.different_positions,
             r.positions
         );
+    }
+    if r.lines > 0 {
+        println!("         {} of {} needle lines the same", r.lines - r.different_lines, r.lines);
     }
     if let Some(first) = r.first_different {
         println!("         the first that differs is tick {} of the recording", first + 1);

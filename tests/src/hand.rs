@@ -4,7 +4,7 @@ use crate::{Core, ask, until};
 use std::time::Duration;
 use stylet_host::link::Link;
 use stylet_implant::workflow::{default_plan, move_request, plan_request};
-use stylet_shm_schema::{ParameterId, Request, TickRecord, flags};
+use stylet_shm_schema::{HapticState, ParameterId, Request, TickRecord, flags};
 
 /// A host that inserts slowly and keeps every record.
 pub struct Insertion {
@@ -15,7 +15,7 @@ pub struct Insertion {
 }
 
 impl Insertion {
-    /// Engaged, with the tip at the entry, then moving at `speed_m_per_s` for at most 60 mm.
+    /// Engaged, with the tip at the entry, on a needle line where the tissue has such, then moving at `speed_m_per_s` for at most 60 mm.
     pub fn begin(core: &mut Core, speed_m_per_s: f64) -> Self {
         let mut link = core.host();
         let plan = default_plan(&link.scene().expect("live").header);
@@ -24,7 +24,13 @@ impl Insertion {
         let to = move_request(plan.entry_m, plan.direction, 0.2, 2.0);
         ask(&mut link, &to).expect("moved");
         std::thread::sleep(Duration::from_millis(800));
-        link.poll();
+        let is_ready = until(Duration::from_secs(120), || {
+            link.poll();
+            link.take_records();
+            let has_line = |s: &HapticState| s.flags & (flags::LINE_NEEDED | flags::LINE_READY) != flags::LINE_NEEDED;
+            link.state().is_some_and(has_line)
+        });
+        assert!(is_ready, "no line: {:?}", link.state());
         link.take_records();
         let (entry_m, direction) = (plan.entry_m, plan.direction);
         let mut insertion = Self {

@@ -1,7 +1,7 @@
 //! Lines for needles: the body at rest that they are solved in, apart from the one that moves.
 
 use crate::rt::world::WorldError;
-use stylet_sim::line::{Line, LineError, ReadyLine};
+use stylet_sim::line::{Line, LineError, QueueProgress, ReadyLine};
 use stylet_sim::needle::LayerKind;
 use stylet_sim::scene::{Scene, SceneError, SceneSource, TissueKind};
 use stylet_sim::tissue::FemTissue;
@@ -49,13 +49,24 @@ impl LineBody {
         direction: [f64; 3],
         goes_on: &mut dyn FnMut() -> bool,
     ) -> Result<ReadyLine, NoLine> {
+        let line = Line::into_body(&self.scene.lattice, tip_m, direction).ok_or(LineError::NoTissue)?;
+        self.prepare_along(generation, line, &mut |_| goes_on())
+    }
+
+    /// Solves for a line that enters the body where it says. `report` is called between slices of work and ends it by
+    /// returning false.
+    pub fn prepare_along(
+        &self,
+        generation: u64,
+        line: Line,
+        report: &mut dyn FnMut(QueueProgress) -> bool,
+    ) -> Result<ReadyLine, NoLine> {
         let lattice = &self.scene.lattice;
-        let line = Line::into_body(lattice, tip_m, direction).ok_or(LineError::NoTissue)?;
         let layer_of = |element: u32| {
             let structure = usize::from(lattice.structure(element));
             self.layers.get(structure).copied().unwrap_or_default()
         };
-        let ready = ReadyLine::prepare(generation, &self.batch, lattice, &layer_of, line, &mut |_| goes_on());
+        let ready = ReadyLine::prepare(generation, &self.batch, lattice, &layer_of, line, report);
         Ok(ready?)
     }
 }

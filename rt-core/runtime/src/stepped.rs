@@ -4,8 +4,9 @@
 
 use crate::rt::clock::{HAPTIC_PERIOD_NS, TISSUE_PERIOD_NS};
 use crate::rt::haptic::HapticLoop;
-use crate::rt::haptic_tape::HapticMemory;
+use crate::rt::haptic_tape::{HapticMemory, HapticTape};
 use crate::rt::tissue::TissueLoop;
+use crate::rt::tissue_tape::TissueTape;
 use crate::rt::wiring::{BridgePorts, Capacities, Wiring};
 use crate::rt::world::World;
 use stylet_hw::Device;
@@ -35,7 +36,18 @@ impl SteppedLoops {
         memory: &HapticMemory,
         haptic_ticks_per_tissue_tick: u64,
     ) -> Self {
-        let Wiring { haptic, tissue, bridge } = Wiring::new(Capacities::STEPPED, None, None);
+        Self::with_tapes(world, device, memory, haptic_ticks_per_tissue_tick, (None, None))
+    }
+
+    /// As [`new`](Self::new), with flight recordings of the loops that have a tape.
+    pub fn with_tapes(
+        world: Box<World>,
+        device: Box<dyn Device>,
+        memory: &HapticMemory,
+        haptic_ticks_per_tissue_tick: u64,
+        (haptic_tape, tissue_tape): (Option<Box<HapticTape>>, Option<Box<TissueTape>>),
+    ) -> Self {
+        let Wiring { haptic, tissue, bridge } = Wiring::new(Capacities::STEPPED, haptic_tape, tissue_tape);
         let tissue_period_ns = haptic_ticks_per_tissue_tick.max(1) * HAPTIC_PERIOD_NS;
         let seconds = |ns: u64| ns as f64 / 1e9;
         Self {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::Duration;
-use stylet_runtime::replay::{file::Flight, repeat};
+use stylet_runtime::replay::{file::Flight, lines::LinesAgain, repeat};
 use stylet_shm_schema::{EventKind, ParameterChange, ParameterId, Request, TickRecord};
 use stylet_tests::hand::Insertion;
 use stylet_tests::stopped::StoppedThread;
@@ -135,13 +135,45 @@ fn a_request_a_fault_and_the_end_each_leave_a_recording_that_repeats_bit_for_bit
     what_was_changed_is_found(&requested, &exit[0]);
 }
 
+/// With finite elements neither loop was repeated: no recording held the needle's line, nor an elastic body.
+#[test]
+fn a_needle_on_a_line_leaves_a_recording_that_repeats_bit_for_bit() {
+    let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "fem"]);
+    let mut hand = Insertion::begin(&mut core, 0.01);
+    hand.watch(Duration::from_secs(3));
+    ask(&mut hand.link, &Request::DropSeed).expect("dropped");
+    // Longer than either tape reaches back: both begin with the needle in tissue.
+    hand.go(0.02, 0.01);
+    hand.watch(Duration::from_secs(9));
+    let flight = assert_identical(&request(&core, &mut hand));
+    let haptic = flight.haptic.as_ref().expect("recorded");
+    let tissue = flight.tissue.as_ref().expect("recorded");
+    println!(
+        "{} lines; {} of {} ticks on one; {} tissue ticks, {} changes of loads",
+        flight.lines.len(),
+        haptic.ticks_on_line(),
+        haptic.ticks.len(),
+        tissue.ticks.len(),
+        tissue.loads.len()
+    );
+    assert_eq!(haptic.ticks_on_line(), haptic.ticks.len());
+    assert!(haptic.line_state.as_ref().is_some_and(|state| state.is_in_contact()));
+    assert!(tissue.loads.iter().any(|(_, loads)| loads.is_any()) && !flight.lines.is_empty());
+    // The next one begins with tapes that came back.
+    hand.go(0.005, 0.01);
+    hand.watch(Duration::from_secs(2));
+    assert_identical(&request(&core, &mut hand));
+    drop(hand);
+    core.finish();
+}
+
 /// One bit of one input makes another outcome, and the comparison says so; a damaged file is refused.
 fn what_was_changed_is_found(flight: &Flight, file: &Path) {
     let mut other = flight.clone();
     let haptic = other.haptic.as_mut().expect("recorded");
     let sample = haptic.ticks[2000].read.as_mut().expect("a sample");
     sample.tip_in_world.z = f64::from_bits(sample.tip_in_world.z.to_bits() ^ 1);
-    let found = repeat::haptic(&other, other.haptic.as_ref().expect("recorded"));
+    let found = repeat::haptic(&other, other.haptic.as_ref().expect("recorded")).expect("can be run");
     assert!(
         found.first_different == Some(2000) && !found.is_identical(),
         "{found:?}"
@@ -151,7 +183,8 @@ fn what_was_changed_is_found(flight: &Flight, file: &Path) {
     // The last one: the next would take the held element back.
     let late = tissue.ticks.len() - 1;
     tissue.ticks[late].pose.held_travel_m.z += 1e-4;
-    let found = repeat::tissue(&other, other.tissue.as_ref().expect("recorded")).expect("can be run");
+    let recorded = other.tissue.as_ref().expect("recorded");
+    let found = repeat::tissue(&other, recorded, LinesAgain::default()).expect("can be run");
     assert!(found.different > 0 && found.different_positions > 0, "{found:?}");
 
     let mut bytes = std::fs::read(file).expect("there");

@@ -1,5 +1,6 @@
 //! Collects the tapes of both loops, returns them, and writes the recording to disk on a separate thread.
 
+use super::line_archive::LineArchive;
 use crate::replay::file::{Flight, FlightError};
 use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
 use crate::rt::haptic_tape::{HapticFlight, HapticTape};
@@ -133,13 +134,14 @@ impl FlightKeeper {
         scene_generation: u64,
         haptic_orders: &mut rtrb::Producer<HapticOrder>,
         tissue_orders: &mut rtrb::Producer<TissueOrder>,
+        lines: &LineArchive,
     ) -> Option<Saved> {
         self.take_tapes(scene_generation);
         if let Some(gathering) = self
             .gathering
             .take_if(|g| g.is_whole() || g.since.elapsed() > GATHER_LIMIT)
         {
-            self.write(gathering);
+            self.write(gathering, lines);
         }
         let now = Instant::now();
         if self.gathering.is_none()
@@ -172,10 +174,10 @@ impl FlightKeeper {
         }
     }
 
-    fn write(&mut self, gathering: Gathering) {
+    fn write(&mut self, gathering: Gathering, lines: &LineArchive) {
         let path = self.next_path(gathering.wanted.kind);
         let ticket = gathering.wanted.ticket;
-        let (flight, sender) = (gathering.into_flight(&self.common), self.written.0.clone());
+        let (flight, sender) = (gathering.into_flight(&self.common, lines), self.written.0.clone());
         let spawned = std::thread::Builder::new()
             .name("flight-writer".to_owned())
             .spawn(move || {
@@ -190,7 +192,7 @@ impl FlightKeeper {
     }
 
     /// After both loops have ended and handed their tapes over.
-    pub fn save_at_end(&mut self, scene_generation: u64) -> Result<PathBuf, SaveError> {
+    pub fn save_at_end(&mut self, scene_generation: u64, lines: &LineArchive) -> Result<PathBuf, SaveError> {
         let reason = "rt-core ended".to_owned();
         self.gathering = Some(Gathering::new(Wanted {
             kind: "exit",
@@ -201,7 +203,7 @@ impl FlightKeeper {
         self.take_tapes(scene_generation);
         let path = self.next_path("exit");
         match self.gathering.take() {
-            Some(gathering) if gathering.haptic.is_some() => save(&gathering.into_flight(&self.common), &path),
+            Some(gathering) if gathering.haptic.is_some() => save(&gathering.into_flight(&self.common, lines), &path),
             _ => Err(SaveError::NothingRecorded),
         }
     }
@@ -231,11 +233,13 @@ impl Gathering {
         self.haptic.is_some() && self.tissue.is_some()
     }
 
-    fn into_flight(self, common: &Flight) -> Flight {
+    fn into_flight(self, common: &Flight, lines: &LineArchive) -> Flight {
+        let (haptic, tissue) = (self.haptic.flatten(), self.tissue.flatten());
         Flight {
             reason: self.wanted.reason,
-            haptic: self.haptic.flatten(),
-            tissue: self.tissue.flatten(),
+            lines: lines.of(haptic.as_ref(), tissue.as_ref()),
+            haptic,
+            tissue,
             ..common.clone()
         }
     }

@@ -4,6 +4,7 @@
 //! needle has moved off it, and while it is in no tissue. Between times the lines of the planned needle and of the one after it
 //! are prepared ahead, and kept until a needle stands there.
 
+use super::line_archive::{Half, LineArchive};
 use super::notices::LoopRings;
 use crate::lines::{LineBody, NoLine};
 use crate::rt::exchange::TissueOrder;
@@ -13,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::{TickRecord, flags};
-use stylet_sim::line::{Line, ReadyLine};
+use stylet_sim::line::{Line, LineSource, ReadyLine};
 use stylet_sim::scene::{SceneSource, TissueKind};
 
 /// So long the needle keeps its axis before a line is begun.
@@ -28,13 +29,13 @@ const IN_USE_AFTER: Duration = Duration::from_secs(1);
 struct Finished {
     scene_generation: u64,
     body: Option<LineBody>,
-    line: Result<ReadyLine, NoLine>,
+    line: Result<(ReadyLine, LineSource), NoLine>,
 }
 
 /// A line that waits for its needle.
 struct Kept {
     axis: Line,
-    line: ReadyLine,
+    line: (ReadyLine, LineSource),
 }
 
 struct LineTask {
@@ -61,6 +62,7 @@ pub struct LinePreparer {
     kept: Vec<Kept>,
     generation: u64,
     is_wanted: bool,
+    archive: LineArchive,
 }
 
 impl LinePreparer {
@@ -76,7 +78,13 @@ impl LinePreparer {
             kept: Vec::new(),
             generation: 0,
             is_wanted: tissue == TissueKind::Fem,
+            archive: LineArchive::default(),
         }
+    }
+
+    /// What the lines of the run were made from, for flight recordings.
+    pub(super) fn archive(&self) -> &LineArchive {
+        &self.archive
     }
 
     /// Another scene runs.
@@ -113,8 +121,12 @@ impl LinePreparer {
 
     /// Hands over a line that is ready, and begins one where the needle needs another.
     pub(super) fn pass(&mut self, newest: Option<&TickRecord>, scene_generation: u64, loops: &mut LoopRings) {
-        while loops.old_hand_lines.pop().is_ok() {}
-        while loops.old_body_lines.pop().is_ok() {}
+        while let Ok(line) = loops.old_hand_lines.pop() {
+            self.archive.returned(line.generation, Half::Hand);
+        }
+        while let Ok(line) = loops.old_body_lines.pop() {
+            self.archive.returned(line.generation, Half::Body);
+        }
         if !self.is_wanted {
             return;
         }
@@ -192,7 +204,11 @@ impl LinePreparer {
             let (body, line) = match body {
                 Ok(body) => {
                     let line = body.prepare(generation, axis.entry_m, axis.axes[0], &mut goes_on);
-                    (Some(body), line)
+                    let with_source = line.map(|line| {
+                        let source = line.hand.source();
+                        (line, source)
+                    });
+                    (Some(body), with_source)
                 }
                 Err(why) => (None, Err(why)),
             };
@@ -238,7 +254,9 @@ impl LinePreparer {
         }
     }
 
-    fn hand_over(&mut self, axis: Line, ReadyLine { hand, body }: ReadyLine, loops: &mut LoopRings) {
+    fn hand_over(&mut self, axis: Line, (line, source): (ReadyLine, LineSource), loops: &mut LoopRings) {
+        let ReadyLine { hand, body } = line;
+        self.archive.keep(source);
         // Both rings are emptied at every tick: one that is full belongs to a loop that has ended.
         let _ = loops.tissue_orders.push(TissueOrder::Line(body));
         let _ = loops.lines.push(hand);

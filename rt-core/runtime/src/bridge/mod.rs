@@ -2,6 +2,7 @@
 
 mod commands;
 mod flight;
+mod line_archive;
 mod lines;
 mod link;
 mod loader;
@@ -148,7 +149,7 @@ impl Bridge {
 
     /// After both loops have ended: writes what they recorded last.
     pub fn save_last_flight(&mut self) -> Result<PathBuf, SaveError> {
-        self.flights.save_at_end(self.scene.generation())
+        self.flights.save_at_end(self.scene.generation(), self.lines.archive())
     }
 
     /// One pass; true when a host asked to end.
@@ -185,7 +186,7 @@ impl Bridge {
     fn serve_flights(&mut self) {
         let generation = self.scene.generation();
         let (haptic, tissue) = (&mut self.loops.haptic_orders, &mut self.loops.tissue_orders);
-        let Some(saved) = self.flights.pass(generation, haptic, tissue) else {
+        let Some(saved) = self.flights.pass(generation, haptic, tissue, self.lines.archive()) else {
             return;
         };
         let result = saved.result.map_err(|why| why.to_string());

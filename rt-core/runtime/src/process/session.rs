@@ -44,6 +44,7 @@ pub(super) fn flight(device: &DeviceInfo, session_id: u64, haptic_period_ns: u64
         device: device.into(),
         haptic_period_s: haptic_period_ns as f64 / 1e9,
         tissue_period_s: TISSUE_PERIOD_NS as f64 / 1e9,
+        lines: Vec::new(),
         haptic: None,
         tissue: None,
     }

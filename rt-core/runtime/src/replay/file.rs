@@ -7,9 +7,12 @@ use sha2::{Digest, Sha256};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use stylet_hw::DeviceInfo;
+use stylet_sim::line::LineSource;
 
 /// Ends in the version of the layout.
-const MAGIC: &[u8; 8] = b"STYFLT\0\x03";
+const MAGIC: &[u8; 8] = b"STYFLT\0\x04";
+/// Where the version stands.
+const VERSION_AT: usize = MAGIC.len() - 1;
 const DIGEST: usize = 32;
 /// No recording is larger: two bodies of 8 MiB and the ticks.
 const MAX_BYTES: u64 = 256 << 20;
@@ -39,8 +42,14 @@ enum Problem {
     Encoding(postcard::Error),
     #[error("too large for a flight recording")]
     TooLarge,
-    #[error("not a flight recording of this version of rt-core")]
+    #[error("not a flight recording")]
     OtherFormat,
+    #[error(
+        "a flight recording of layout {layout}, which another version of rt-core wrote: repeat it with that one; this one \
+         reads layout {}",
+        MAGIC[VERSION_AT]
+    )]
+    OtherLayout { layout: u8 },
     #[error("cut short")]
     CutShort,
     #[error("damaged: its digest does not match")]
@@ -111,9 +120,12 @@ pub struct Flight {
     pub haptic_period_s: f64,
     /// Time between two ticks of the tissue loop, s.
     pub tissue_period_s: f64,
+    /// The needle lines that either loop had, each once.
+    pub lines: Vec<LineSource>,
     /// The force loop. `None`: it did not hand its tape over in time.
     pub haptic: Option<HapticFlight>,
-    /// The tissue loop. `None`: as above, or the body is too large to be recorded.
+    /// The tissue loop. `None`: as above, the body is too large to be recorded, or an elastic body was held without a needle
+    /// line for as long as the tape reaches back: its solver's state is not recorded.
     pub tissue: Option<TissueFlight>,
 }
 
@@ -148,12 +160,21 @@ impl Flight {
         let bytes = std::fs::read(path).map_err(io)?;
         let rest = bytes
             .strip_prefix(MAGIC.as_slice())
-            .ok_or_else(|| failed(Problem::OtherFormat))?;
+            .ok_or_else(|| failed(other_format(&bytes)))?;
         let (digest, body) = rest.split_at_checked(DIGEST).ok_or_else(|| failed(Problem::CutShort))?;
         if Sha256::digest(body).as_slice() != digest {
             return Err(failed(Problem::Damaged));
         }
         postcard::from_bytes(body).map_err(|e| failed(Problem::Decoding(e)))
+    }
+}
+
+/// Why bytes that do not begin with [`MAGIC`] are refused.
+fn other_format(bytes: &[u8]) -> Problem {
+    let is_ours = bytes.starts_with(&MAGIC[..VERSION_AT]);
+    match bytes.get(VERSION_AT) {
+        Some(&layout) if is_ours => Problem::OtherLayout { layout },
+        _ => Problem::OtherFormat,
     }
 }
 

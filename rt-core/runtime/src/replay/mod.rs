@@ -4,4 +4,8 @@
 //! and their outputs are compared with what was recorded, bit by bit.
 
 pub mod file;
+pub mod lines;
 pub mod repeat;
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,8 @@
 //! Runs both loops again from a recording, and reports where their outputs differ.
 
 use super::file::Flight;
+use super::lines::{LinesAgain, hand_line};
+use crate::lines::NoLine;
 use crate::rt::exchange::{HapticOrder, TissueOrder};
 use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticEntry, HapticFlight, HapticTape};
@@ -26,12 +28,16 @@ pub struct Repeated {
     pub positions: usize,
     /// How many of `positions` differ.
     pub different_positions: usize,
+    /// Needle lines whose columns were solved again.
+    pub lines: usize,
+    /// How many of `lines` are not the recorded ones in every bit.
+    pub different_lines: usize,
 }
 
 impl Repeated {
     /// Something was repeated and every bit is the same.
     pub fn is_identical(&self) -> bool {
-        self.ticks > 0 && self.different == 0 && self.different_positions == 0
+        self.ticks > 0 && self.different == 0 && self.different_positions == 0 && self.different_lines == 0
     }
 
     fn count(&mut self, index: usize, same: bool) {
@@ -79,8 +85,8 @@ fn without_times(record: &TickRecord) -> TickRecord {
     }
 }
 
-/// The haptic chain: forces, phases, faults and flags of each tick.
-pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Repeated {
+/// The haptic chain: forces, phases, faults and flags of each tick, on needle lines as well.
+pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, RepeatError> {
     let tape = Box::new(HapticTape::new(&recorded.memory));
     let Wiring {
         haptic: ports,
@@ -95,9 +101,21 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Repeated {
     };
     let (session_id, period_s) = (flight.session_id, flight.haptic_period_s);
     let mut again = HapticLoop::new(session_id, Box::new(device), ports, &recorded.memory, period_s);
+    if let Some(state) = &recorded.line_state {
+        let generation = recorded.memory.line;
+        let mut line = hand_line(flight, generation)?;
+        if !line.take_state(state) {
+            return Err(RepeatError::OtherLine(generation));
+        }
+        again.resume_line(line);
+    }
     let mut found = Repeated::default();
     let mut orders = recorded.orders.iter().peekable();
+    let mut lines = recorded.lines.iter().peekable();
     for (index, entry) in recorded.ticks.iter().enumerate() {
+        while let Some((_, line)) = lines.next_if(|(tick, _)| *tick == index as u64) {
+            let _ = bridge.lines.push(hand_line(flight, *line)?);
+        }
         while let Some((_, order)) = orders.next_if(|(tick, _)| *tick == index as u64) {
             // A tape that is handed over changes nothing of what the loop does.
             if !matches!(order, HapticOrder::HandOverTape) {
@@ -107,9 +125,10 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Repeated {
         tissue.response.write(entry.tissue);
         again.tick(entry.record.due_ns, entry.woke_ns, entry.record.missed);
         while bridge.haptic_notices.pop().is_ok() {}
+        while bridge.old_hand_lines.pop().is_ok() {}
         found.count(index, bridge.records.pop().is_ok_and(|record| is_same(&record, entry)));
     }
-    found
+    Ok(found)
 }
 
 /// All orders of the recording may come in one tick.
@@ -125,7 +144,7 @@ fn is_same(record: &TickRecord, entry: &HapticEntry) -> bool {
     bytemuck::bytes_of(&without_times(record)) == bytemuck::bytes_of(&without_times(&entry.record))
 }
 
-/// Why recorded tissue cannot be repeated.
+/// Why a recording cannot be repeated.
 #[derive(Debug, thiserror::Error)]
 pub enum RepeatError {
     /// The scene of the recording cannot be built again.
@@ -137,11 +156,22 @@ pub enum RepeatError {
     /// The recorded body has another size than the scene gives.
     #[error("the recorded tissue is not that of its scene: another version recorded it")]
     OtherBody,
+    /// A loop had a line that is not among those of the recording.
+    #[error("the recording lacks needle line {0}, which a loop had: it cannot be repeated")]
+    NoLine(u64),
+    /// The recorded state has another size than the line.
+    #[error("the recorded state of needle line {0} is not one of that line: the file was changed")]
+    OtherLine(u64),
+    /// A line cannot be used, or its columns cannot be solved again.
+    #[error(transparent)]
+    Line(#[from] NoLine),
 }
 
-/// The tissue chain: response and held element of each tick, and every element's position at each checkpoint.
-pub fn tissue(flight: &Flight, recorded: &TissueFlight) -> Result<Repeated, RepeatError> {
-    let scene = recorded.scene.build().map_err(|e| RepeatError::Scene(e.to_string()))?;
+/// The tissue chain: response and held element of each tick, and every element's position at each checkpoint. `lines` are
+/// those of [`solve_again`](super::lines::solve_again).
+pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -> Result<Repeated, RepeatError> {
+    let mut scene = recorded.scene.build().map_err(|e| RepeatError::Scene(e.to_string()))?;
+    scene.tissue = recorded.tissue;
     let world = || World::new(scene.clone(), recorded.memory.limits.clone(), 1).map(Box::new);
     let reference = world()?;
     if reference.tissue.memory_len() != recorded.memory.body.len() {
@@ -154,35 +184,54 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight) -> Result<Repeated, Repe
         mut bridge,
     } = Wiring::new(capacities(recorded.orders.len()), None, Some(tape));
     let mut again = TissueLoop::new(flight.session_id, ports, world()?, flight.tissue_period_s);
-    again.remember(&recorded.memory);
+    let before = match recorded.memory.response.line {
+        0 => None,
+        line => Some(lines.take(line).ok_or(RepeatError::NoLine(line))?),
+    };
+    again.remember(&recorded.memory, before);
+    *haptic.loads.input_buffer_mut() = recorded.memory.loads;
+    haptic.loads.publish();
     let mut compare = Bodies {
         reference,
-        found: Repeated::default(),
+        found: Repeated {
+            lines: lines.solved,
+            different_lines: lines.different,
+            ..Repeated::default()
+        },
     };
+    let mut loads = recorded.loads.iter().peekable();
     let mut orders = recorded.orders.iter().peekable();
     for (index, entry) in recorded.ticks.iter().enumerate() {
         if let Some((_, memory)) = recorded.middle.as_ref().filter(|(tick, _)| *tick == index as u64) {
             compare.positions(&again, memory);
         }
         while let Some((_, order)) = orders.next_if(|(tick, _)| *tick == index as u64) {
-            let _ = bridge.tissue_orders.push(order_of(order));
+            let _ = bridge.tissue_orders.push(order_of(order, &mut lines)?);
+        }
+        while let Some((_, loads)) = loads.next_if(|(tick, _)| *tick == index as u64) {
+            *haptic.loads.input_buffer_mut() = *loads;
+            haptic.loads.publish();
         }
         haptic.pose.write(entry.pose);
         again.tick(entry.woke_ns);
         while bridge.tissue_notices.pop().is_ok() {}
+        while bridge.old_body_lines.pop().is_ok() {}
         compare.found.count(index, same_step(&again, entry));
     }
     compare.positions(&again, &recorded.end);
     Ok(compare.found)
 }
 
-fn order_of(order: &TapedOrder) -> TissueOrder {
-    match order {
+fn order_of(order: &TapedOrder, lines: &mut LinesAgain) -> Result<TissueOrder, RepeatError> {
+    Ok(match order {
         TapedOrder::Limits(limits) => TissueOrder::Limits(limits.clone()),
         TapedOrder::DropSeed => TissueOrder::DropSeed { ticket: 0 },
         TapedOrder::UndoSeed => TissueOrder::UndoSeed { ticket: 0 },
         TapedOrder::Reset => TissueOrder::Reset,
-    }
+        TapedOrder::Line { generation } => {
+            TissueOrder::Line(lines.take(*generation).ok_or(RepeatError::NoLine(*generation))?)
+        }
+    })
 }
 
 /// The same in every bit, except the times that work took.
@@ -191,7 +240,7 @@ fn same_step(again: &TissueLoop, entry: &TissueEntry) -> bool {
     let response = |r: &TissueResponse| {
         let numbers = bits(&[r.worst_residual]);
         let places = [bits(r.contact_in_scene.as_slice()), bits(r.path_direction.as_slice())];
-        (r.time_ns, r.tick, r.contact, r.seed_count, r.unsolved, numbers, places)
+        (r.time_ns, r.tick, r.contact, r.line, r.seed_count, r.unsolved, numbers, places)
     };
     let (held, residual) = again.last_step();
     let place =

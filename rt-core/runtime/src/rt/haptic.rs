@@ -76,7 +76,7 @@ impl Default for DeviceAnswer {
 }
 
 impl HapticLoop {
-    /// Begins with `memory`, which names every field.
+    /// Begins with `memory`, which names every field; its line comes by [`resume_line`](Self::resume_line).
     pub fn new(
         session_id: u64,
         device: Box<dyn Device>,
@@ -96,7 +96,7 @@ impl HapticLoop {
             pose: memory.pose,
             goal: memory.goal,
             line: None,
-            on_line: false,
+            on_line: memory.on_line,
             watchdog: memory.watchdog,
             answer: DeviceAnswer::default(),
             state: memory.state,

@@ -11,12 +11,15 @@ use stylet_hw::{DeviceFault, DeviceInfo, HandGoal, Sample};
 use stylet_shm_schema::{HapticState, TickRecord, flags};
 use stylet_sim::force::ForceParameters;
 use stylet_sim::force::chain::{ChainParameters, ChainState};
+use stylet_sim::line::LineState;
 use stylet_sim::needle::NeedleParameters;
 
 /// Ticks between two checkpoints.
 const CHECKPOINT_EVERY: u64 = 256;
 const CHECKPOINTS: usize = FLIGHT_TICKS / CHECKPOINT_EVERY as usize + 2;
 const ORDERS: usize = 4096;
+/// Lines taken up. Each is one that the needle stood before for a while: fewer than one in 60 ms.
+const LINES: usize = 128;
 
 /// Everything that one tick of the haptic loop leaves to the next.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -33,6 +36,10 @@ pub struct HapticMemory {
     pub pose: TipPose,
     /// Goal of the simulated hand.
     pub goal: Option<HandGoal>,
+    /// Number of the needle line that the loop has; 0 for none. Its state stands beside the memory.
+    pub line: u64,
+    /// The last tick was one on it.
+    pub on_line: bool,
     /// Watchdog with the fault that it keeps.
     pub watchdog: Watchdog,
     /// State as hosts see it.
@@ -54,6 +61,8 @@ impl HapticMemory {
             contact: 0,
             pose: TipPose::default(),
             goal: None,
+            line: 0,
+            on_line: false,
             watchdog: Watchdog::default(),
             state,
         }
@@ -82,8 +91,12 @@ pub struct HapticTape {
     pub ticks: Last<HapticEntry>,
     /// Orders, each with the number of the tick that took it up.
     pub orders: Last<(u64, HapticOrder)>,
+    /// Numbers of needle lines, each with the number of the tick that took it up.
+    pub lines: Last<(u64, u64)>,
     /// Checkpoints, each with the number of the tick that it comes before.
     pub checkpoints: Last<(u64, HapticMemory)>,
+    /// State of the line beside each checkpoint; without stations where there was none.
+    line_states: Last<LineState>,
 }
 
 impl HapticTape {
@@ -99,7 +112,9 @@ impl HapticTape {
         Self {
             ticks: Last::new(&blank, CHECKPOINTS * CHECKPOINT_EVERY as usize),
             orders: Last::new(&(0, HapticOrder::HandOverTape), ORDERS),
+            lines: Last::new(&(0, 0), LINES),
             checkpoints: Last::new(&(0, *memory), CHECKPOINTS),
+            line_states: Last::of_slots((0..CHECKPOINTS).map(|_| LineState::with_room()).collect()),
         }
     }
 
@@ -108,9 +123,20 @@ impl HapticTape {
         self.ticks.next().is_multiple_of(CHECKPOINT_EVERY)
     }
 
-    /// Keeps what the tick that begins now starts from.
-    pub fn checkpoint(&mut self, memory: HapticMemory) {
+    /// Keeps what the tick that begins now starts from: with the state of the line, where the loop has one.
+    pub fn checkpoint(&mut self, memory: HapticMemory, line: Option<&LineState>) {
         self.checkpoints.push((self.ticks.next(), memory));
+        if let Some(slot) = self.line_states.advance() {
+            match line {
+                Some(state) => slot.copy_from(state),
+                None => slot.clear(),
+            }
+        }
+    }
+
+    /// Keeps that the tick that runs takes up a line.
+    pub fn line(&mut self, generation: u64) {
+        self.lines.push((self.ticks.next(), generation));
     }
 
     /// Keeps an order of the tick that runs.
@@ -120,16 +146,18 @@ impl HapticTape {
 
     /// The longest stretch that can be repeated: from the oldest checkpoint after which nothing was overwritten.
     pub fn flight(&self) -> Option<HapticFlight> {
-        let oldest_tick = self.ticks.first().max(complete_from(&self.orders));
-        let (first, memory) = self
-            .checkpoints
-            .since(0)
-            .find(|(tick, _)| *tick >= oldest_tick && *tick < self.ticks.next())?;
+        let complete = complete_from(&self.orders).max(complete_from(&self.lines));
+        let possible = self.ticks.first().max(complete)..self.ticks.next();
+        let pairs = self.checkpoints.since(0).zip(self.line_states.since(0));
+        let ((first, memory), line_state) = pairs.into_iter().find(|((tick, _), _)| possible.contains(tick))?;
         let orders = self.orders.since(0).filter(|(tick, _)| tick >= first);
+        let lines = self.lines.since(0).filter(|(tick, _)| tick >= first);
         Some(HapticFlight {
             memory: *memory,
             ticks: self.ticks.since(*first).copied().collect(),
             orders: orders.map(|(tick, order)| (tick - first, *order)).collect(),
+            line_state: (memory.line != 0).then(|| line_state.clone()),
+            lines: lines.map(|(tick, line)| (tick - first, *line)).collect(),
         })
     }
 }
@@ -138,7 +166,9 @@ impl Tape for HapticTape {
     fn clear(&mut self) {
         self.ticks.clear();
         self.orders.clear();
+        self.lines.clear();
         self.checkpoints.clear();
+        self.line_states.clear();
     }
 
     fn is_for(&self, _scene_generation: u64) -> bool {
@@ -155,11 +185,20 @@ pub struct HapticFlight {
     pub ticks: Vec<HapticEntry>,
     /// Each with the index of the tick that took it up.
     pub orders: Vec<(u64, HapticOrder)>,
+    /// State of the line of `memory`, where there is one.
+    pub line_state: Option<LineState>,
+    /// Numbers of lines, each with the index of the tick that took it up.
+    pub lines: Vec<(u64, u64)>,
 }
 
 impl HapticFlight {
-    /// Ticks in which the needle was on a prepared line. The tape holds no line: such a flight can be looked at, but its
-    /// forces cannot be repeated.
+    /// Numbers of the lines that the loop had, in their order.
+    pub fn line_numbers(&self) -> impl Iterator<Item = u64> {
+        let first = (self.memory.line != 0).then_some(self.memory.line);
+        first.into_iter().chain(self.lines.iter().map(|(_, line)| *line))
+    }
+
+    /// Ticks in which the needle was on a prepared line.
     pub fn ticks_on_line(&self) -> usize {
         let is_on_line = |entry: &&HapticEntry| entry.record.flags & flags::LINE_READY != 0;
         self.ticks.iter().filter(is_on_line).count()

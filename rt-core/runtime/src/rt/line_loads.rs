@@ -1,9 +1,11 @@
 //! What the force loop does to the body on a prepared line: forces for the tissue loop's columns.
 
+use serde::{Deserialize, Serialize};
 use stylet_sim::line::MAX_STATIONS;
 
 /// Forces of the newest tick on a line.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(into = "TapedLoads", from = "TapedLoads")]
 pub struct LineLoads {
     /// Of the line that they are for; 0: the needle is on none.
     pub generation: u64,
@@ -22,6 +24,18 @@ impl LineLoads {
     pub fn loads_n(&self) -> &[f64] {
         self.loads_n.get(..self.count).unwrap_or(&[])
     }
+
+    /// Some tissue is pushed.
+    pub fn is_any(&self) -> bool {
+        self.loads_n().iter().any(|load_n| *load_n != 0.0)
+    }
+
+    /// The same in every bit.
+    pub fn is_same(&self, other: &Self) -> bool {
+        let bits = |loads: &Self| (loads.generation, loads.in_tissue, loads.tip_material_m.to_bits(), loads.count);
+        let pairs = self.loads_n().iter().zip(other.loads_n());
+        bits(self) == bits(other) && pairs.into_iter().all(|(a, b)| a.to_bits() == b.to_bits())
+    }
 }
 
 impl Default for LineLoads {
@@ -33,5 +47,48 @@ impl Default for LineLoads {
             count: 0,
             loads_n: [0.0; 2 * MAX_STATIONS],
         }
+    }
+}
+
+/// Loads as a flight recording holds them: few stations are in contact.
+#[derive(Serialize, Deserialize)]
+struct TapedLoads {
+    generation: u64,
+    in_tissue: bool,
+    tip_material_m: f64,
+    count: usize,
+    /// Those that are not zero, each with its place.
+    loads_n: Vec<(u16, f64)>,
+}
+
+impl From<LineLoads> for TapedLoads {
+    fn from(loads: LineLoads) -> Self {
+        let numbered = (0_u16..).zip(loads.loads_n().iter().copied());
+        Self {
+            generation: loads.generation,
+            in_tissue: loads.in_tissue,
+            tip_material_m: loads.tip_material_m,
+            count: loads.count,
+            loads_n: numbered.filter(|(_, load_n)| load_n.to_bits() != 0).collect(),
+        }
+    }
+}
+
+impl From<TapedLoads> for LineLoads {
+    /// Places that no line has are left out.
+    fn from(taped: TapedLoads) -> Self {
+        let mut loads = Self {
+            generation: taped.generation,
+            in_tissue: taped.in_tissue,
+            tip_material_m: taped.tip_material_m,
+            count: taped.count.min(2 * MAX_STATIONS),
+            ..Self::default()
+        };
+        for (place, load_n) in taped.loads_n {
+            if let Some(slot) = loads.loads_n.get_mut(usize::from(place)) {
+                *slot = load_n;
+            }
+        }
+        loads
     }
 }

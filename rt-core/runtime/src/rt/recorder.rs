@@ -13,23 +13,33 @@ pub struct Last<T> {
     next: u64,
 }
 
-impl<T: Clone> Last<T> {
+impl<T> Last<T> {
+    /// Into these slots.
+    pub fn of_slots(slots: Vec<T>) -> Self {
+        Self { slots, next: 0 }
+    }
+
+    /// The slot of the next value, to be written in place.
+    pub fn advance(&mut self) -> Option<&mut T> {
+        let at = self.place(self.next);
+        self.next += 1;
+        self.slots.get_mut(at)
+    }
+
     /// Room for `capacity` values, at least one.
-    pub fn new(blank: &T, capacity: usize) -> Self {
-        Self {
-            slots: vec![blank.clone(); capacity.max(1)],
-            next: 0,
-        }
+    pub fn new(blank: &T, capacity: usize) -> Self
+    where
+        T: Clone,
+    {
+        Self::of_slots(vec![blank.clone(); capacity.max(1)])
     }
 
     /// Keeps `value`; the oldest one is dropped when there is no room.
     pub fn push(&mut self, value: T) {
-        let at = self.place(self.next);
         // There is a slot at every place; a loop has no room for a panic all the same.
-        if let Some(slot) = self.slots.get_mut(at) {
+        if let Some(slot) = self.advance() {
             *slot = value;
         }
-        self.next += 1;
     }
 
     /// Forgets every value; the next number is 0.
@@ -57,6 +67,11 @@ impl<T: Clone> Last<T> {
         (number % self.slots.len().max(1) as u64) as usize
     }
 
+    /// The newest value.
+    pub fn newest(&self) -> Option<&T> {
+        self.get(self.next.checked_sub(1)?)
+    }
+
     /// Those held from `number` on, oldest first.
     pub fn since(&self, number: u64) -> impl Iterator<Item = &T> {
         (number.max(self.first())..self.next).filter_map(|n| self.get(n))
@@ -64,7 +79,7 @@ impl<T: Clone> Last<T> {
 }
 
 /// The first tick from which on every order is held; each stands beside the number of its tick.
-pub fn complete_from<T: Clone>(orders: &Last<(u64, T)>) -> u64 {
+pub fn complete_from<T>(orders: &Last<(u64, T)>) -> u64 {
     if orders.first() == 0 {
         return 0;
     }

@@ -5,6 +5,7 @@ use crate::rt::clock::{self, Grid};
 use crate::rt::contact::Contact;
 use crate::rt::exchange::{Notice, Ticket, TissueOrder};
 use crate::rt::layers_met::LayersMet;
+use crate::rt::line_loads::LineLoads;
 use crate::rt::pose::TipPose;
 use crate::rt::response::TissueResponse;
 use crate::rt::seed::Seed;
@@ -37,6 +38,8 @@ pub struct TissueLoop {
     line: Option<Box<BodyLine>>,
     /// The needle is in tissue by them.
     in_by_line: bool,
+    /// Forces on the line that the last tick used.
+    loads: LineLoads,
     layers: LayersMet,
     /// The tip has been outside since the last contact.
     clear: bool,
@@ -71,6 +74,7 @@ impl TissueLoop {
             contacts: 0,
             line: None,
             in_by_line: false,
+            loads: LineLoads::default(),
             layers: LayersMet::default(),
             clear: true,
             held: None,
@@ -191,7 +195,12 @@ impl TissueLoop {
                     self.checkpoint();
                 }
                 TissueOrder::HandOverTape => self.hand_over_tape(),
-                TissueOrder::Line(line) => self.take_line(line),
+                TissueOrder::Line(line) => {
+                    self.tape_order(TapedOrder::Line {
+                        generation: line.generation,
+                    });
+                    self.take_line(line);
+                }
             }
         }
     }

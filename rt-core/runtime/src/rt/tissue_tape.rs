@@ -2,6 +2,7 @@
 
 use crate::rt::contact::Contact;
 use crate::rt::layers_met::LayersMet;
+use crate::rt::line_loads::LineLoads;
 use crate::rt::pose::TipPose;
 use crate::rt::recorder::{Last, Tape, complete_from};
 use crate::rt::response::TissueResponse;
@@ -11,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use stylet_shm_schema::MAX_SEEDS;
 use stylet_sim::limits::Limits;
-use stylet_sim::scene::SceneSource;
+use stylet_sim::scene::{SceneSource, TissueKind};
 use stylet_sim::tissue::Held;
 
 /// Ticks between two checkpoints: 5 s at 200 Hz. Two are kept, so that a tape reaches back at least 5 s.
@@ -31,6 +32,11 @@ pub enum TapedOrder {
     UndoSeed,
     /// See [`TissueOrder::Reset`](crate::rt::exchange::TissueOrder).
     Reset,
+    /// See [`TissueOrder::Line`](crate::rt::exchange::TissueOrder).
+    Line {
+        /// Number of the line.
+        generation: u64,
+    },
 }
 
 /// Everything that one tick of the tissue loop leaves to the next.
@@ -42,6 +48,10 @@ pub struct TissueMemory {
     pub contact: Option<Contact>,
     /// Contacts so far.
     pub contacts: u64,
+    /// The needle is in tissue by the line that `response` names.
+    pub in_by_line: bool,
+    /// Forces on it that the last tick used.
+    pub loads: LineLoads,
     /// Layers on the path of the needle.
     pub layers: LayersMet,
     /// The tip has been outside since the last contact.
@@ -81,8 +91,14 @@ pub struct TissueTape {
     pub ticks: Last<TissueEntry>,
     /// Orders, each with the number of the tick that took it up.
     pub orders: Last<(u64, TapedOrder)>,
-    /// Written in turn, each with the tick that it comes before.
+    /// Forces on a needle line, each with the number of the first tick that used them.
+    loads: Last<(u64, LineLoads)>,
+    /// Written alternately, each with the tick that it comes before.
     checkpoints: [(u64, TissueMemory); 2],
+    /// Checkpoints so far, and the tick from which on the next is due.
+    points: usize,
+    next_due: u64,
+    tissue: TissueKind,
     end: TissueMemory,
     /// The body is too large to be recorded, or its model cannot be saved.
     not_kept: bool,
@@ -97,6 +113,8 @@ impl TissueTape {
             seeds: Vec::with_capacity(MAX_SEEDS),
             contact: None,
             contacts: 0,
+            in_by_line: false,
+            loads: LineLoads::default(),
             layers: LayersMet::default(),
             clear: true,
             held: None,
@@ -112,31 +130,44 @@ impl TissueTape {
             residual: 0.0,
             response: TissueResponse::default(),
         };
+        let tissue = world.scene.tissue;
+        let room = |is_needed: bool| if is_needed { 2 * CHECKPOINT_EVERY as usize } else { 1 };
         Self {
             scene_generation: world.generation,
             scene,
-            ticks: Last::new(&blank, if not_kept { 1 } else { 2 * CHECKPOINT_EVERY as usize }),
+            ticks: Last::new(&blank, room(!not_kept)),
             orders: Last::new(&(0, TapedOrder::Reset), ORDERS),
+            // Only elastic bodies have lines.
+            loads: Last::new(&(0, LineLoads::default()), room(!not_kept && tissue == TissueKind::Fem)),
             checkpoints: [(0, memory()), (0, memory())],
+            points: 0,
+            next_due: 0,
+            tissue,
             end: memory(),
             not_kept,
         }
     }
 
-    /// Where to copy all that the tick that begins now starts from, when it is time to.
-    pub fn checkpoint_due(&mut self) -> Option<&mut TissueMemory> {
+    /// Where to copy all that the tick that begins now starts from, when it is time to and `is_all_saved`, which
+    /// [`TissueModel`](stylet_sim::tissue::TissueModel) says.
+    pub fn checkpoint_due(&mut self, is_all_saved: bool) -> Option<&mut TissueMemory> {
         let tick = self.ticks.next();
-        if self.not_kept || !tick.is_multiple_of(CHECKPOINT_EVERY) {
+        if self.not_kept || !is_all_saved || tick < self.next_due {
             return None;
         }
         let [even, odd] = &mut self.checkpoints;
-        let slot = if (tick / CHECKPOINT_EVERY).is_multiple_of(2) {
-            even
-        } else {
-            odd
-        };
+        let slot = if self.points.is_multiple_of(2) { even } else { odd };
+        self.points += 1;
+        self.next_due = tick + CHECKPOINT_EVERY;
         slot.0 = tick;
         Some(&mut slot.1)
+    }
+
+    /// Keeps the forces on a needle line that the tick that runs has used, where they are others than before.
+    pub fn loads(&mut self, loads: &LineLoads) {
+        if !self.loads.newest().is_some_and(|(_, newest)| newest.is_same(loads)) {
+            self.loads.push((self.ticks.next(), *loads));
+        }
     }
 
     /// Keeps an order of the tick that runs.
@@ -155,22 +186,23 @@ impl TissueTape {
         if self.not_kept || next == 0 {
             return None;
         }
-        // The newest was written before the tick that is a multiple of the distance, the older one a distance before.
-        let newest = (next - 1) / CHECKPOINT_EVERY * CHECKPOINT_EVERY;
-        let mut points: Vec<&(u64, TissueMemory)> =
-            self.checkpoints.iter().filter(|(tick, _)| *tick <= newest).collect();
+        let complete = complete_from(&self.orders).max(complete_from(&self.loads));
+        let possible = self.ticks.first().max(complete)..next;
+        let written = self.checkpoints.iter().take(self.points);
+        let mut points: Vec<&(u64, TissueMemory)> = written.filter(|(tick, _)| possible.contains(tick)).collect();
         points.sort_by_key(|(tick, _)| *tick);
-        points.dedup_by_key(|(tick, _)| *tick);
-        points.retain(|(tick, _)| *tick >= complete_from(&self.orders));
         let (first, memory) = points.first()?;
+        let loads = self.loads.since(0).filter(|(tick, _)| tick >= first);
         let orders = self.orders.since(0).filter(|(tick, _)| tick >= first);
         Some(TissueFlight {
             scene: (*self.scene).clone(),
+            tissue: self.tissue,
             memory: memory.clone(),
             middle: points.get(1).map(|(tick, memory)| (tick - first, memory.clone())),
             end: self.end.clone(),
             ticks: self.ticks.since(*first).copied().collect(),
             orders: orders.map(|(tick, order)| (tick - first, order.clone())).collect(),
+            loads: loads.map(|(tick, loads)| (tick - first, *loads)).collect(),
         })
     }
 }
@@ -179,6 +211,9 @@ impl Tape for TissueTape {
     fn clear(&mut self) {
         self.ticks.clear();
         self.orders.clear();
+        self.loads.clear();
+        self.points = 0;
+        self.next_due = 0;
     }
 
     fn is_for(&self, scene_generation: u64) -> bool {
@@ -191,6 +226,8 @@ impl Tape for TissueTape {
 pub struct TissueFlight {
     /// What the scene was built from.
     pub scene: SceneSource,
+    /// Its tissue model.
+    pub tissue: TissueKind,
     /// Before the first of `ticks`.
     pub memory: TissueMemory,
     /// A later checkpoint, with the index of the tick that it comes before.
@@ -201,4 +238,25 @@ pub struct TissueFlight {
     pub ticks: Vec<TissueEntry>,
     /// Each with the index of the tick that took it up.
     pub orders: Vec<(u64, TapedOrder)>,
+    /// Forces on a needle line, each with the index of the first tick that used them.
+    pub loads: Vec<(u64, LineLoads)>,
+}
+
+impl TissueFlight {
+    /// Numbers of the lines that the loop had, in their order.
+    pub fn line_numbers(&self) -> impl Iterator<Item = u64> {
+        let before = self.memory.response.line;
+        let first = (before != 0).then_some(before);
+        let taken = self.orders.iter().filter_map(|(_, order)| match order {
+            TapedOrder::Line { generation } => Some(*generation),
+            _ => None,
+        });
+        first.into_iter().chain(taken)
+    }
+
+    /// Whether a needle on that line pushed tissue, so that its columns count.
+    pub fn is_pushed_by(&self, generation: u64) -> bool {
+        let all = self.loads.iter().map(|(_, loads)| loads).chain([&self.memory.loads]);
+        all.into_iter().any(|loads| loads.generation == generation && loads.is_any())
+    }
 }

@@ -5,10 +5,11 @@ use super::rows::Rows;
 use super::stations::Stations;
 use crate::tissue::fem::Compiled;
 use crate::tissue::fem::batch::BatchModel;
+use serde::{Deserialize, Serialize};
 
 /// Stations that were all solved for: symmetric, positive definite. Rows 0 to m - 1 are the shaft's stations, m to 2m - 1
 /// the tip's patch at the same places.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Compliance {
     /// Stations m.
     pub stations: usize,

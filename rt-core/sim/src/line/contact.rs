@@ -10,6 +10,10 @@ use super::prony::Memory;
 use super::rows::{add_scaled, dot};
 use super::tip::{TipState, follow};
 use crate::simd::{Simd, vectorised};
+use serde::{Deserialize, Serialize};
+use serde_big_array::BigArray;
+
+mod kept;
 
 /// Solutions in one tick at most: the tip goes on, a membrane gives way, the tip goes on again.
 const MAX_PASSES: u32 = 12;
@@ -28,7 +32,7 @@ pub struct LineInput {
 }
 
 /// Forces of one tick, N.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LineOutput {
     /// Along the line, positive inwards: the needle is pushed out by what is negative.
     pub force_on_hand_n: f64,
@@ -53,7 +57,7 @@ pub struct LineOutput {
 }
 
 /// Forces, anchors and the track: everything that the line remembers.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LineState {
     /// Force of each station of the shaft on the tissue.
     pub(super) shaft_n: Vec<f64>,
@@ -66,6 +70,7 @@ pub struct LineState {
     /// Stations that the shaft touches: the first so many.
     pub(super) in_contact: usize,
     pub(super) tip_range: std::ops::Range<usize>,
+    #[serde(with = "BigArray")]
     pub(super) tip_weights: [f64; 64],
     /// How each station in contact moves with the tip's force, and how the tip does.
     tip_column: Vec<f64>,

@@ -38,7 +38,7 @@ pub use compliance::Compliance;
 pub use contact::{LineInput, LineOutput, LineState, step};
 pub use model::{LineLayer, LineModel, LineProblem, LineSettings, MAX_LAYERS, MAX_STATIONS};
 pub use prony::PronyTerm;
-pub use ready::{BodyLine, HandLine, LayerForces, LineError, ReadyLine};
+pub use ready::{BodyLine, HandLine, LayerForces, LineError, LineSource, ReadyLine};
 pub use rows::Rows;
 pub use stations::{Line, StationSettings, Stations};
 pub use tip::TipState;

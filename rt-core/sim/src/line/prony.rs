@@ -6,6 +6,7 @@
 //! element of the chain stores or dissipates and none makes energy.
 
 use super::rows::{Rows, dot};
+use serde::{Deserialize, Serialize};
 
 /// One element of the chain; a strength of 0 is off.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,7 +27,7 @@ impl Default for PronyTerm {
 }
 
 /// The past loads that the tissue remembers.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Memory {
     /// q of each term, in newtons.
     loads_n: [Vec<f64>; 2],
@@ -60,6 +61,30 @@ impl Memory {
         self.gain = 1.0;
         self.parts = [0.0; 2];
         self.is_on = false;
+    }
+
+    /// Keeps what `from` holds; does not allocate where there is room for as many rows.
+    pub fn copy_from(&mut self, from: &Memory) {
+        let [first, second] = &mut self.loads_n;
+        first.clone_from(&from.loads_n[0]);
+        second.clone_from(&from.loads_n[1]);
+        self.offset_m.clone_from(&from.offset_m);
+        self.sum.clone_from(&from.sum);
+        self.gain = from.gain;
+        self.parts = from.parts;
+        self.is_on = from.is_on;
+    }
+
+    /// Every vector of it.
+    pub fn vectors_mut(&mut self) -> [&mut Vec<f64>; 4] {
+        let [first, second] = &mut self.loads_n;
+        [first, second, &mut self.offset_m, &mut self.sum]
+    }
+
+    /// Whether it is of that many rows.
+    pub fn fits(&self, rows: usize) -> bool {
+        let [first, second] = &self.loads_n;
+        [first, second, &self.offset_m, &self.sum].iter().all(|v| v.len() == rows)
     }
 
     /// What is known of this tick before its loads are.

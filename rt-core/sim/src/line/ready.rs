@@ -13,6 +13,10 @@ use crate::tissue::ElementField;
 use crate::tissue::fem::batch::BatchModel;
 use nalgebra::Vector3;
 
+mod source;
+
+pub use source::LineSource;
+
 /// The needle is on a line whose entry it would meet so far from it, and whose direction is that close to its own.
 const BESIDE_M: f64 = 1e-3;
 const TILT_RAD: f64 = 0.02;
@@ -113,19 +117,8 @@ impl ReadyLine {
         }
         let compliance = Compliance::of_columns(body, &stations, queue.columns()).ok_or(LineError::NoTissue)?;
         let kinds = kinds_along(&stations, lattice, layer_of);
-        let layers = layers_of(&kinds, &LayerForces::default());
-        let model = LineModel::new(compliance, &layers, LineSettings::default()).map_err(|problems| {
-            let lines: Vec<_> = problems.iter().map(ToString::to_string).collect();
-            LineError::Unusable(lines.join("\n"))
-        })?;
         Ok(ReadyLine {
-            hand: Box::new(HandLine {
-                generation,
-                line,
-                kinds,
-                state: LineState::new(&model),
-                model,
-            }),
+            hand: Box::new(HandLine::new(generation, line, kinds, compliance)?),
             body: Box::new(BodyLine {
                 generation,
                 line,
@@ -187,6 +180,26 @@ fn layers_of(kinds: &[(f64, LayerKind, bool)], forces: &LayerForces) -> Vec<Line
 }
 
 impl HandLine {
+    fn new(
+        generation: u64,
+        line: Line,
+        kinds: Vec<(f64, LayerKind, bool)>,
+        compliance: Compliance,
+    ) -> Result<Self, LineError> {
+        let layers = layers_of(&kinds, &LayerForces::default());
+        let model = LineModel::new(compliance, &layers, LineSettings::default()).map_err(|problems| {
+            let lines: Vec<_> = problems.iter().map(ToString::to_string).collect();
+            LineError::Unusable(lines.join("\n"))
+        })?;
+        Ok(Self {
+            generation,
+            line,
+            kinds,
+            state: LineState::new(&model),
+            model,
+        })
+    }
+
     /// The straight way at rest.
     pub fn line(&self) -> &Line {
         &self.line

@@ -1,9 +1,11 @@
 //! A square matrix in rows of whole lanes, for loops without a remainder.
 
+use serde::{Deserialize, Serialize};
+
 const LANES: usize = 8;
 
 /// Rows with zeros past their end.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Rows {
     size: usize,
     stride: usize,
@@ -31,6 +33,12 @@ impl Rows {
     /// Rows, and columns.
     pub fn size(&self) -> usize {
         self.size
+    }
+
+    /// Whether it has that size, and all of its rows: one that was read from a file may not.
+    pub(super) fn is_whole(&self, size: usize) -> bool {
+        let stride = size.next_multiple_of(LANES);
+        (self.size, self.stride) == (size, stride) && self.values.len() == size * stride
     }
 
     /// Row `n`, with the zeros past its end; nothing for a row that is not there.

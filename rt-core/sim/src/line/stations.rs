@@ -2,6 +2,7 @@
 
 use crate::tissue::fem::Compiled;
 use crate::tissue::fem::batch::{BatchModel, NodeWeight};
+use serde::{Deserialize, Serialize};
 
 /// What the lattice spreads a patch by, in squares of its spacing: 2 by the variance of trilinear weights, less by measurement
 /// (own compliance 2.7 to 3 % too large with 2, against the rigid sphere).
@@ -16,7 +17,7 @@ const ACROSS: usize = 8;
 const CUBE_PER_RADIUS: f64 = 1.882_312_645;
 
 /// A straight way in the scene frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Line {
     /// Where it enters the body.
     pub entry_m: [f64; 3],

@@ -3,6 +3,7 @@
 use super::contact::LineState;
 use super::model::{LineLayer, LineModel};
 use super::rows::dot;
+use serde::{Deserialize, Serialize};
 
 /// Places closer than this are the same.
 const SAME_M: f64 = 1e-9;
@@ -14,7 +15,7 @@ const MOST_PRESSED: f64 = 10.0;
 const WINDOW: usize = 64;
 
 /// The tip in the material of the line.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TipState {
     /// Force on the tissue, inwards.
     pub force_n: f64,

@@ -1,7 +1,9 @@
 //! Which tissue model a scene takes.
 
+use serde::{Deserialize, Serialize};
+
 /// The tissue models that a scene can choose.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum TissueKind {
     /// Restricted ChainMail.
     #[default]

@@ -84,7 +84,8 @@ pub trait TissueModel: Send {
     /// this work and no more; answers stay what they are within the model's tolerance.
     fn prepare(&mut self, _next: Option<Held>) {}
 
-    /// Displaces the body by the answers `columns` (m/N) to `loads_n`, in place of a step; what is held is let loose.
+    /// Displaces the body by the answers `columns` (m/N) to `loads_n`, in place of a step; what is held is let loose, and what
+    /// the model knew of it is dropped.
     /// Obligations as for `step`. `None` from a model whose answers do not add up.
     fn displace(&mut self, _columns: &[ElementField], _loads_n: &[f64]) -> Option<StepReport> {
         None
@@ -107,6 +108,12 @@ pub trait TissueModel: Send {
     /// Bytes of all that one step leaves to the next; constant for the life of the model. 0: it cannot be saved.
     fn memory_len(&self) -> usize {
         0
+    }
+
+    /// Whether those bytes are all of it now: a model may carry more for a while than can be written in a tick. A recording
+    /// begins at a step before which they are.
+    fn is_all_saved(&self) -> bool {
+        true
     }
 
     /// Writes those bytes, without allocating; nothing where `to` has another length.

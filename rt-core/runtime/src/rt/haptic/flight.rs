@@ -4,6 +4,7 @@ use super::HapticLoop;
 use crate::rt::exchange::HapticOrder;
 use crate::rt::haptic_tape::{HapticEntry, HapticMemory};
 use crate::rt::response::TissueResponse;
+use stylet_sim::line::HandLine;
 use stylet_shm_schema::TickRecord;
 
 impl HapticLoop {
@@ -20,9 +21,8 @@ impl HapticLoop {
             contact,
             pose,
             goal,
-            // Of elastic bodies, which no recording holds.
-            line: _,
-            on_line: _,
+            line,
+            on_line,
             watchdog,
             answer: _,
             state,
@@ -37,9 +37,17 @@ impl HapticLoop {
             contact: *contact,
             pose: *pose,
             goal: *goal,
+            line: line.as_ref().map_or(0, |line| line.generation),
+            on_line: *on_line,
             watchdog: *watchdog,
             state: *state,
         }
+    }
+
+    /// Goes on with the line of the memory that the loop began with, before its first tick.
+    pub fn resume_line(&mut self, mut line: Box<HandLine>) {
+        line.set_forces(&self.parameters.layer_forces());
+        self.line = Some(line);
     }
 
     /// The end counts as an order, so that its ramp can be repeated.
@@ -60,7 +68,7 @@ impl HapticLoop {
         if due {
             let memory = self.memory();
             if let Some(tape) = self.ports.flight.tape() {
-                tape.checkpoint(memory);
+                tape.checkpoint(memory, self.line.as_ref().map(|line| line.state()));
             }
         }
     }

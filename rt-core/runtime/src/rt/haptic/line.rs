@@ -18,6 +18,9 @@ impl HapticLoop {
         }
         if let Ok(mut next) = self.ports.lines.pop() {
             next.set_forces(&self.parameters.layer_forces());
+            if let Some(tape) = self.ports.flight.tape() {
+                tape.line(next.generation);
+            }
             if let Some(old) = self.line.replace(next) {
                 // There is room: it was looked at above, and this thread alone fills the ring.
                 let _ = self.ports.old_lines.push(old);

@@ -2,6 +2,7 @@
 
 use super::TissueLoop;
 use crate::rt::tissue_tape::{TapedOrder, TissueEntry, TissueMemory, TissueTape};
+use stylet_sim::line::BodyLine;
 use stylet_sim::tissue::{Deformed, Held};
 
 impl TissueLoop {
@@ -14,9 +15,10 @@ impl TissueLoop {
             seeds,
             contact,
             contacts,
-            // Of elastic bodies, which no recording holds.
+            // By its number, which the response holds.
             line: _,
-            in_by_line: _,
+            in_by_line,
+            loads,
             layers,
             clear,
             held,
@@ -30,6 +32,8 @@ impl TissueLoop {
         to.seeds.extend_from_slice(seeds);
         to.contact = *contact;
         to.contacts = *contacts;
+        to.in_by_line = *in_by_line;
+        to.loads = *loads;
         to.layers = *layers;
         to.clear = *clear;
         to.held = *held;
@@ -39,12 +43,15 @@ impl TissueLoop {
         world.tissue.save(&mut to.body);
     }
 
-    /// Continues from the memory of another loop.
-    pub fn remember(&mut self, memory: &TissueMemory) {
+    /// Continues from the memory of another loop, with the line that it had.
+    pub fn remember(&mut self, memory: &TissueMemory, line: Option<Box<BodyLine>>) {
         self.seeds.clear();
         self.seeds.extend_from_slice(&memory.seeds);
         self.contact = memory.contact;
         self.contacts = memory.contacts;
+        self.line = line;
+        self.in_by_line = memory.in_by_line;
+        self.loads = memory.loads;
         self.layers = memory.layers;
         self.clear = memory.clear;
         self.held = memory.held;
@@ -68,7 +75,7 @@ impl TissueLoop {
         let generation = self.world.generation;
         self.ports.flight.begin_tick(generation);
         self.with_tape(|this, tape| {
-            if let Some(memory) = tape.checkpoint_due() {
+            if let Some(memory) = tape.checkpoint_due(this.world.tissue.is_all_saved()) {
                 this.copy_memory(memory);
             }
         });
@@ -83,6 +90,7 @@ impl TissueLoop {
     pub(super) fn tape(&mut self, woke_ns: u64, residual: f64) {
         let (pose, held, response) = (self.pose, self.held, self.response);
         if let Some(tape) = self.ports.flight.tape() {
+            tape.loads(&self.loads);
             tape.ticks.push(TissueEntry {
                 woke_ns,
                 pose,

@@ -38,6 +38,7 @@ impl TissueLoop {
     /// The step of a tick on the line; `None` where the needle is on none that this loop has.
     pub(super) fn step_on_line(&mut self) -> Option<StepReport> {
         let loads = *self.ports.loads.read();
+        self.loads = loads;
         let line = self.line.as_ref().filter(|line| line.generation == loads.generation)?;
         let report = self.world.tissue.displace(&line.columns, loads.loads_n())?;
         let entry = Vector3::from(line.line.entry_m);
@@ -73,9 +74,9 @@ impl TissueLoop {
         }
     }
 
-    /// The material at the tip and `behind_m` behind it, by the line; `None` where the needle is in no tissue by one.
-    pub(super) fn material_on_line(&mut self, behind_m: f64) -> Option<[Option<MaterialPoint>; 2]> {
-        let loads = self.ports.loads.read();
+    /// The material at the tip of the last pose and `behind_m` behind it, by the line; `None` where the needle is in no tissue by one.
+    pub(super) fn material_on_line(&self, behind_m: f64) -> Option<[Option<MaterialPoint>; 2]> {
+        let loads = &self.loads;
         let line = self.line.as_ref().filter(|line| line.generation == loads.generation)?;
         let tip_m = loads.tip_material_m;
         if !loads.in_tissue {

@@ -9,6 +9,20 @@ fn paper() -> (Scene, BatchModel<f32>, FemModel<f32>) {
     (scene, BatchModel::new(&tissue.model), tissue.model)
 }
 
+/// Small, so that its columns are soon solved.
+fn block() -> (Scene, BatchModel<f32>) {
+    let labels = crate::scene::Labels {
+        dims: [6, 6, 10],
+        spacing_m: 2e-3,
+        cells: vec![1; 6 * 6 * 10],
+        structures: Vec::new(),
+    };
+    let scene = Scene::from_labels("block", &labels).unwrap();
+    let tissue = FemTissue::<f32>::new(&scene).unwrap();
+    let body = BatchModel::new(&tissue.model);
+    (scene, body)
+}
+
 /// A line through the middle of the gland, along its axis.
 fn ready(scene: &Scene, body: &BatchModel<f32>) -> ReadyLine {
     let (low, high) = scene.lattice.bounds_m();
@@ -242,4 +256,59 @@ fn a_coarser_pelvis_beside_one_of_all_cells() {
         "a tick of 40 loads: p50 {:.0} us, p99 {:.0} us",
         times_us[100], times_us[198]
     );
+}
+
+/// A flight recording holds no columns: they are solved again when it is repeated.
+#[test]
+fn a_line_that_is_prepared_twice_is_the_same_in_every_bit() {
+    let (first, again) = (block(), block());
+    let [a, b] = [&first, &again].map(|(scene, body)| ready(scene, body));
+    assert!(a.hand.source().is_identical(&b.hand.source()));
+    let bits = |line: &BodyLine| -> Vec<u32> {
+        let values = line.columns.iter().flat_map(|c| c.0.iter().flatten());
+        values.map(|v| v.to_bits()).collect()
+    };
+    let columns = bits(&a.body);
+    assert!(columns == bits(&b.body) && columns.iter().any(|&v| v != 0));
+    let other = Line::new(first.0.lattice.rest_m(0), [0.0, 0.0, 1.0]).unwrap();
+    let other = ReadyLine::prepare(1, &first.1, &first.0.lattice, &|_| LayerKind::Gland, other, &mut |_| true).unwrap();
+    assert!(!a.hand.source().is_identical(&other.hand.source()));
+}
+
+/// What a flight recording keeps of a line, as bytes and back: the same answers from there on, and no heap call for the copy.
+#[test]
+fn a_line_made_again_from_its_source_goes_on_from_a_copied_state_in_every_bit() {
+    let (scene, body) = block();
+    let mut hand = ready(&scene, &body).hand;
+    let mut kept = LineState::with_room();
+    for n in 0..300 {
+        hand.step(5e-5 * f64::from(n), 1e-3);
+    }
+    assert!(hand.is_in_tissue());
+    let before = stylet_heap::calls_of_this_thread();
+    kept.copy_from(hand.state());
+    kept.clear();
+    kept.copy_from(hand.state());
+    assert_eq!(stylet_heap::calls_of_this_thread(), before, "calls of the heap");
+    assert_eq!(&kept, hand.state());
+    let source = hand.source();
+    assert!(source.is_identical(&hand.source()) && source.stations() == 10);
+    let mut again = HandLine::of_source(source).expect("a line");
+    assert!(again.take_state(&kept));
+    for n in 300..500 {
+        let tip_m = 5e-5 * f64::from(n.min(700 - n));
+        assert_eq!(again.step(tip_m, 1e-3), hand.step(tip_m, 1e-3), "tick {n}");
+    }
+    assert_eq!(again.state(), hand.state());
+}
+
+#[test]
+fn a_source_or_a_state_that_is_not_whole_is_refused() {
+    let line = Line::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap();
+    let mut hand = HandLine::uniform(1, line, 4).unwrap();
+    assert!(!hand.take_state(&LineState::with_room()));
+    let mut source = hand.source();
+    assert!(HandLine::of_source(source.clone()).is_ok());
+    source.compliance_mut().stations = 5;
+    assert!(HandLine::of_source(source).is_err());
 }

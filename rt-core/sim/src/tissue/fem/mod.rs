@@ -45,6 +45,7 @@ mod lanes;
 mod level;
 mod levels;
 mod material;
+mod memory;
 mod model;
 mod multigrid;
 mod output;

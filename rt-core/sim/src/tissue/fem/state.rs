@@ -66,12 +66,13 @@ impl<T: Real> FemState<T> {
         })
     }
 
-    /// Lets loose what is held, and displaces every element by the sum of loads times answers (m/N); how many moved.
+    /// Lets loose and forgets what is held, and displaces every element by the sum of loads times answers (m/N); how many moved.
     pub fn displace(&mut self, model: &FemModel<T>, columns: &[ElementField], loads_n: &[f64]) -> u32 {
         if !self.fits(model) {
             return 0;
         }
-        self.grip.release();
+        // A line's body owes nothing to what was held before: what comes after repeats without it.
+        self.forget();
         self.has_time = false;
         let per_element = 1.0 / model.lattice.spacing_m;
         for (axis, sum) in self.displacement.iter_mut().enumerate() {
@@ -93,6 +94,11 @@ impl<T: Real> FemState<T> {
         }
         self.max_displacement = largest.sqrt();
         moved
+    }
+
+    /// No answer is kept: steps from here on depend on nothing that came before.
+    pub(super) fn has_forgotten(&self) -> bool {
+        self.grip.cells.is_none() && self.next.cells.is_none()
     }
 
     /// Drops the answers that are kept: steps from here on give the same bytes as those of a new state.

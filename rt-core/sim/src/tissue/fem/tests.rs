@@ -13,6 +13,7 @@ mod ahead;
 mod coarser;
 mod golden;
 mod locking;
+mod memory;
 mod operator;
 mod refusals;
 mod step;

@@ -125,6 +125,24 @@ impl<T: Compiled> TissueModel for FemTissue<T> {
         step(&self.model, &mut self.state, None, &self.settings);
     }
 
+    /// Displacements alone: see [`is_all_saved`](TissueModel::is_all_saved).
+    fn memory_len(&self) -> usize {
+        self.state.memory_len()
+    }
+
+    /// While a patch is held, or was and is kept for when it is held again, its answers and the solver's are not.
+    fn is_all_saved(&self) -> bool {
+        self.state.has_forgotten()
+    }
+
+    fn save(&self, to: &mut [u8]) {
+        self.state.save(to);
+    }
+
+    fn load(&mut self, from: &[u8]) {
+        self.state.load(from);
+    }
+
     /// Elasticity has no limits.
     fn set_limits(&mut self, _limits: Limits) {}
 }

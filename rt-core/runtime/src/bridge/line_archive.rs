@@ -1,0 +1,88 @@
+//! What lines were made from, for as long as a flight recording may need it: once per line, beside the loops.
+
+use crate::rt::haptic_tape::HapticFlight;
+use crate::rt::tissue_tape::TissueFlight;
+use std::time::{Duration, Instant};
+use stylet_sim::line::LineSource;
+
+/// No tape reaches back so far: the tissue loop's has room for 10 s.
+const KEPT: Duration = Duration::from_secs(60);
+
+/// The loop that had a half of a line.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Half {
+    Hand,
+    Body,
+}
+
+struct KeptLine {
+    source: LineSource,
+    /// When each half came back; `None` while a loop has it.
+    returned: [Option<Instant>; 2],
+}
+
+/// Lines that are in use, and those that were until lately.
+#[derive(Default)]
+pub(super) struct LineArchive {
+    lines: Vec<KeptLine>,
+}
+
+impl LineArchive {
+    /// Both halves go to their loops.
+    pub fn keep(&mut self, source: LineSource) {
+        self.drop_old(Instant::now());
+        self.lines.push(KeptLine {
+            source,
+            returned: [None; 2],
+        });
+    }
+
+    /// A loop has another line instead.
+    pub fn returned(&mut self, generation: u64, half: Half) {
+        for line in self.lines.iter_mut().filter(|l| l.source.generation == generation) {
+            line.returned[half as usize] = Some(Instant::now());
+        }
+    }
+
+    fn drop_old(&mut self, now: Instant) {
+        let is_old = |at: &Option<Instant>| at.is_some_and(|at| now.duration_since(at) > KEPT);
+        self.lines.retain(|line| !line.returned.iter().all(is_old));
+    }
+
+    /// Those that a recording names.
+    pub fn of(&self, haptic: Option<&HapticFlight>, tissue: Option<&TissueFlight>) -> Vec<LineSource> {
+        let of_haptic = haptic.into_iter().flat_map(HapticFlight::line_numbers);
+        let of_tissue = tissue.into_iter().flat_map(TissueFlight::line_numbers);
+        let wanted: Vec<u64> = of_haptic.chain(of_tissue).collect();
+        let named = self.lines.iter().filter(|l| wanted.contains(&l.source.generation));
+        named.map(|line| line.source.clone()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stylet_sim::line::{HandLine, Line};
+
+    fn source(generation: u64) -> LineSource {
+        HandLine::uniform(generation, Line::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap(), 4).unwrap().source()
+    }
+
+    /// A line in use may be far older than a tape, and the one before it may be on the tape still.
+    #[test]
+    fn a_line_is_kept_while_a_loop_has_it_and_for_a_tape_after_that() {
+        let mut archive = LineArchive::default();
+        archive.keep(source(1));
+        archive.keep(source(2));
+        archive.returned(1, Half::Hand);
+        let later = Instant::now() + 2 * KEPT;
+        archive.drop_old(later);
+        assert_eq!(archive.lines.len(), 2, "the tissue loop has the first");
+        archive.returned(1, Half::Body);
+        archive.drop_old(Instant::now());
+        assert_eq!(archive.lines.len(), 2, "a tape may name it");
+        archive.drop_old(later);
+        let left: Vec<u64> = archive.lines.iter().map(|l| l.source.generation).collect();
+        assert_eq!(left, [2]);
+    }
+}

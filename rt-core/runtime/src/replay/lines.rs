@@ -1,0 +1,88 @@
+//! The needle lines of a recording: the force loop's half from the file, the tissue loop's columns solved again.
+
+use super::file::Flight;
+use super::repeat::RepeatError;
+use crate::lines::LineBody;
+use crate::rt::tissue_tape::TissueFlight;
+use stylet_sim::line::{BodyLine, HandLine, LineSource};
+
+/// How far the columns of one line are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LineProgress {
+    /// Number of the line.
+    pub generation: u64,
+    /// Columns that are solved.
+    pub ready: usize,
+    /// Columns in all.
+    pub of: usize,
+}
+
+/// The tissue loop's half of each line of a recording.
+#[derive(Debug, Default)]
+pub struct LinesAgain {
+    bodies: Vec<BodyLine>,
+    /// Lines whose columns were solved again.
+    pub solved: usize,
+    /// How many of them are not the recorded ones in every bit.
+    pub different: usize,
+}
+
+/// Solves for the columns of every line that the recorded tissue was pushed by: some seconds each for a body of 20,000
+/// elements. No recording holds them; they follow from the scene and the line.
+///
+/// To be called before this thread turns denormal numbers off as the loops do: the thread that prepared the lines did not.
+pub fn solve_again(
+    flight: &Flight,
+    recorded: &TissueFlight,
+    report: &mut dyn FnMut(LineProgress),
+) -> Result<LinesAgain, RepeatError> {
+    let mut again = LinesAgain::default();
+    let mut body = None;
+    for generation in recorded.line_numbers() {
+        let source = source_of(flight, generation)?;
+        if !recorded.is_pushed_by(generation) {
+            // Its columns do not count.
+            again.bodies.push(BodyLine {
+                generation,
+                line: source.line,
+                columns: Vec::new(),
+            });
+            continue;
+        }
+        let body = match &mut body {
+            Some(body) => body,
+            none => none.insert(LineBody::of_source(&recorded.scene)?),
+        };
+        let ready = body.prepare_along(generation, source.line, &mut |progress| {
+            report(LineProgress {
+                generation,
+                ready: progress.ready,
+                of: progress.of,
+            });
+            true
+        })?;
+        again.solved += 1;
+        again.different += usize::from(!ready.hand.source().is_identical(source));
+        again.bodies.push(*ready.body);
+    }
+    Ok(again)
+}
+
+impl LinesAgain {
+    pub(super) fn take(&mut self, generation: u64) -> Option<Box<BodyLine>> {
+        let at = self.bodies.iter().position(|line| line.generation == generation)?;
+        Some(Box::new(self.bodies.swap_remove(at)))
+    }
+}
+
+fn source_of(flight: &Flight, generation: u64) -> Result<&LineSource, RepeatError> {
+    let found = flight.lines.iter().find(|line| line.generation == generation);
+    found.ok_or(RepeatError::NoLine(generation))
+}
+
+/// The force loop's half of that line, in tissue at rest.
+pub(super) fn hand_line(flight: &Flight, generation: u64) -> Result<Box<HandLine>, RepeatError> {
+    let source = source_of(flight, generation)?.clone();
+    let line = HandLine::of_source(source).map_err(crate::lines::NoLine::from)?;
+    Ok(Box::new(line))
+}

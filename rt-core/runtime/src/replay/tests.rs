@@ -1,0 +1,254 @@
+//! An insertion on a needle line, recorded and repeated: by both loops, stepped, in a small elastic body.
+
+use super::file::{DeviceFigures, Flight};
+use super::lines::{LineProgress, solve_again};
+use super::repeat::{self, RepeatError};
+use crate::lines::LineBody;
+use crate::rt::exchange::{HapticOrder, TissueOrder};
+use crate::rt::haptic_tape::{HapticMemory, HapticTape};
+use crate::rt::tissue_tape::TissueTape;
+use crate::rt::world::World;
+use crate::stepped::{HAPTIC_TICKS_PER_TISSUE_TICK, SteppedLoops};
+use nalgebra::Vector3;
+use std::sync::Arc;
+use stylet_hw::{Device, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
+use stylet_sim::force::ForceParameters;
+use stylet_sim::limits::TissueParameters;
+use stylet_sim::line::{LineSource, ReadyLine};
+use stylet_sim::needle::NeedleParameters;
+use stylet_sim::scene::{Labels, SceneSource, TissueKind};
+
+/// The loops with their tapes, and what the bridge would keep beside them.
+struct Recorded {
+    loops: SteppedLoops,
+    entry_m: Vector3<f64>,
+    line: ReadyLine,
+    kept: Vec<LineSource>,
+    figures: DeviceFigures,
+    heap_calls: u64,
+}
+
+fn block() -> SceneSource {
+    SceneSource::of_labels(
+        "block",
+        &Labels {
+            dims: [6, 6, 10],
+            spacing_m: 2e-3,
+            cells: vec![1; 6 * 6 * 10],
+            structures: Vec::new(),
+        },
+    )
+}
+
+impl Recorded {
+    fn new() -> Self {
+        let source = block();
+        let mut scene = source.build().expect("valid");
+        scene.tissue = TissueKind::Fem;
+        let (low, high) = scene.lattice.bounds_m();
+        let entry_m = Vector3::new((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, low[2]);
+        let body = LineBody::of_source(&source).expect("valid");
+        let line = body.prepare(1, entry_m.into(), [0.0, 0.0, 1.0], &mut || true);
+        let limits = TissueParameters::default().validate().expect("valid");
+        let world = Box::new(World::new(scene, limits, 1).expect("valid"));
+        let device = SimulatedPhantom::new(SimulatedPhantomConfig {
+            start_tip_in_world: entry_m - Vector3::z() * 0.008,
+            ..SimulatedPhantomConfig::default()
+        });
+        let figures = DeviceFigures::from(&device.info());
+        let parameters = (NeedleParameters::default(), ForceParameters::default());
+        let memory = HapticMemory::new(&device.info(), parameters, 0);
+        let tapes = (
+            Some(Box::new(HapticTape::new(&memory))),
+            Some(Box::new(TissueTape::new(&world, Arc::new(source)))),
+        );
+        let each = HAPTIC_TICKS_PER_TISSUE_TICK;
+        Self {
+            loops: SteppedLoops::with_tapes(world, Box::new(device), &memory, each, tapes),
+            entry_m,
+            line: line.expect("through the block"),
+            kept: Vec::new(),
+            figures,
+            heap_calls: 0,
+        }
+    }
+
+    fn haptic(&mut self, order: HapticOrder) {
+        self.loops.bridge.haptic_orders.push(order).expect("room");
+    }
+
+    /// The line under that number, to both loops.
+    fn give_line(&mut self, generation: u64) {
+        let (mut hand, mut body) = (self.line.hand.clone(), self.line.body.clone());
+        (hand.generation, body.generation) = (generation, generation);
+        self.kept.push(hand.source());
+        let bridge = &mut self.loops.bridge;
+        bridge.lines.push(hand).expect("room");
+        bridge.tissue_orders.push(TissueOrder::Line(body)).ok().expect("room");
+    }
+
+    fn go(&mut self, depth_m: f64) {
+        let goal = HandGoal {
+            tip_in_world: self.entry_m + Vector3::z() * depth_m,
+            direction: Vector3::z(),
+            speed_m_per_s: 0.02,
+            acceleration_m_per_s2: 1.0,
+        };
+        self.haptic(HapticOrder::Hand { ticket: 0, goal });
+    }
+
+    fn run(&mut self, seconds: f64) {
+        for _ in 0..(1e3 * seconds) as u64 {
+            let before = stylet_heap::calls_of_this_thread();
+            self.loops.step();
+            self.heap_calls += stylet_heap::calls_of_this_thread() - before;
+            let bridge = &mut self.loops.bridge;
+            while bridge.haptic_notices.pop().is_ok() || bridge.tissue_notices.pop().is_ok() {}
+            while bridge.old_hand_lines.pop().is_ok() || bridge.old_body_lines.pop().is_ok() {}
+        }
+    }
+
+    /// Two lines, one after the other; parameters, a seed and turns on the way. Ends with the needle in tissue.
+    fn insert(&mut self) {
+        self.haptic(HapticOrder::Engage { ticket: 0 });
+        self.give_line(1);
+        self.run(0.1);
+        self.go(5e-3);
+        self.run(1.9);
+        self.haptic(HapticOrder::Parameters {
+            ticket: 0,
+            generation: 2,
+            needle: NeedleParameters::default(),
+            force: ForceParameters {
+                // So small a body would be pushed along whole.
+                membrane_gain: 0.05,
+                cutting_gain: 0.1,
+                shaft_gain: 0.2,
+                ..ForceParameters::default()
+            },
+        });
+        self.run(0.2);
+        self.go(12e-3);
+        self.run(1.8);
+        let drop = TissueOrder::DropSeed { ticket: 0 };
+        self.loops.bridge.tissue_orders.push(drop).ok().expect("room");
+        self.go(9e-3);
+        self.run(3.0);
+        self.go(-8e-3);
+        self.run(1.5);
+        self.give_line(2);
+        self.run(0.1);
+        self.go(10e-3);
+        self.run(1.2);
+        self.go(7e-3);
+        self.run(0.8);
+    }
+
+    /// Hands both tapes over, and gives them back blank.
+    fn flight(&mut self) -> Flight {
+        self.haptic(HapticOrder::HandOverTape);
+        let order = TissueOrder::HandOverTape;
+        self.loops.bridge.tissue_orders.push(order).ok().expect("room");
+        self.run(0.005);
+        let bridge = &mut self.loops.bridge;
+        let haptic = bridge.haptic_tapes.taken.pop().expect("handed over");
+        let tissue = bridge.tissue_tapes.taken.pop().expect("handed over");
+        let flight = Flight {
+            version: String::new(),
+            session_id: 0,
+            reason: String::new(),
+            device_name: String::new(),
+            device: self.figures,
+            haptic_period_s: 1e-3,
+            tissue_period_s: 5e-3,
+            lines: self.kept.clone(),
+            haptic: haptic.flight(),
+            tissue: tissue.flight(),
+        };
+        bridge.haptic_tapes.back.push(haptic).ok().expect("room");
+        bridge.tissue_tapes.back.push(tissue).ok().expect("room");
+        flight
+    }
+}
+
+fn through_a_file(flight: &Flight) -> Flight {
+    let path = std::env::temp_dir().join(format!("stylet-line-{}.flight", std::process::id()));
+    flight.write(&path).expect("written");
+    let bytes = std::fs::metadata(&path).expect("there").len();
+    println!("file of {bytes} bytes");
+    let again = Flight::read(&path).expect("read");
+    let mut old = std::fs::read(&path).expect("there");
+    old[7] = 3;
+    std::fs::write(&path, old).expect("written");
+    let refusal = Flight::read(&path).map(|_| ()).expect_err("of another layout");
+    std::fs::remove_file(&path).expect("there");
+    assert!(refusal.to_string().contains("layout 3"), "{refusal}");
+    again
+}
+
+fn assert_identical(flight: &Flight) {
+    let haptic = flight.haptic.as_ref().expect("recorded");
+    let found = repeat::haptic(flight, haptic).expect("can be run");
+    assert!(found.is_identical(), "forces: {found:?}");
+    let tissue = flight.tissue.as_ref().expect("recorded");
+    let mut last = None;
+    let lines = solve_again(flight, tissue, &mut |p| last = Some(p)).expect("solved");
+    assert_eq!(last.map(|p: LineProgress| p.of), Some(20), "shaft and tip of 10 stations");
+    let found = repeat::tissue(flight, tissue, lines).expect("can be run");
+    assert!(found.is_identical() && found.positions > 0, "tissue: {found:?}");
+}
+
+/// The recorder left lines out, so that forces on one were not repeated and an elastic body was in no recording.
+#[test]
+fn a_recorded_insertion_on_a_needle_line_repeats_in_every_bit() {
+    let mut run = Recorded::new();
+    run.insert();
+    let flight = through_a_file(&run.flight());
+    assert_eq!(run.heap_calls, 0, "heap calls of the loops");
+    let haptic = flight.haptic.as_ref().expect("recorded");
+    let peak_n = haptic.ticks.iter().map(|e| e.record.force_on_hand_n[2].abs()).fold(0.0, f64::max);
+    println!(
+        "{} ticks, {} on a line, peak {peak_n} N, lines {:?}",
+        haptic.ticks.len(),
+        haptic.ticks_on_line(),
+        haptic.lines
+    );
+    assert!(haptic.ticks_on_line() > 3000 && peak_n > 0.1);
+    assert!(haptic.memory.line == 1 && haptic.memory.on_line, "it begins with the needle on a line");
+    assert!(haptic.line_state.as_ref().is_some_and(|s| s.is_in_contact()), "and in tissue");
+    assert_eq!(haptic.lines.iter().map(|l| l.1).collect::<Vec<_>>(), [2]);
+    let tissue = flight.tissue.as_ref().expect("recorded");
+    assert!(tissue.memory.loads.is_any() && tissue.memory.in_by_line && tissue.middle.is_some());
+    assert!(tissue.memory.body.iter().any(|&byte| byte != 0), "tissue that is not at rest");
+    assert_eq!(tissue.line_numbers().collect::<Vec<_>>(), [1, 2]);
+    assert_identical(&flight);
+    what_was_changed_is_found(&flight);
+
+    // The tapes came back, and the needle stays in tissue.
+    run.go(3e-3);
+    run.run(1.0);
+    let next = run.flight();
+    assert_eq!(next.haptic.as_ref().expect("recorded").line_numbers().collect::<Vec<_>>(), [2]);
+    assert_identical(&next);
+}
+
+fn what_was_changed_is_found(flight: &Flight) {
+    let mut other = flight.clone();
+    let tissue = other.tissue.as_mut().expect("recorded");
+    let late = tissue.loads.last_mut().expect("on a line");
+    late.1.loads_n[0] += 0.1;
+    let tissue = other.tissue.as_ref().expect("recorded");
+    let lines = solve_again(&other, tissue, &mut |_| {}).expect("solved");
+    let found = repeat::tissue(&other, tissue, lines).expect("can be run");
+    assert!(found.different_positions > 0, "{found:?}");
+
+    let haptic = other.haptic.as_mut().expect("recorded");
+    haptic.line_state = None;
+    let found = repeat::haptic(&other, other.haptic.as_ref().expect("recorded")).expect("can be run");
+    assert!(found.first_different == Some(0) && !found.is_identical(), "{found:?}");
+
+    other.lines.remove(1);
+    let haptic = flight.haptic.as_ref().expect("recorded");
+    let refused = repeat::haptic(&other, haptic).expect_err("without its line");
+    assert!(matches!(refused, RepeatError::NoLine(2)), "{refused}");
+}

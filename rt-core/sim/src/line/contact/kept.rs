@@ -1,0 +1,91 @@
+//! A state that is kept beside the one in use: in flight recordings, and taken up again when one is repeated.
+
+use super::super::model::{LineModel, MAX_STATIONS};
+use super::{LineState, TipState};
+use crate::line::{LineOutput, prony::Memory};
+
+impl LineState {
+    /// Room for the state of any line. Every page is written to, so that no tick is the first to touch one.
+    pub fn with_room() -> Self {
+        let mut state = LineState {
+            shaft_n: vec![1.0; MAX_STATIONS],
+            anchor_m: vec![1.0; MAX_STATIONS],
+            u_m: vec![1.0; MAX_STATIONS],
+            tip_u_m: 0.0,
+            tip: TipState::default(),
+            in_contact: 0,
+            tip_range: 0..0,
+            tip_weights: [0.0; 64],
+            tip_column: vec![1.0; MAX_STATIONS],
+            tip_own: 0.0,
+            memory: Memory::new(2 * MAX_STATIONS),
+            loads_n: vec![1.0; 2 * MAX_STATIONS],
+            last: LineOutput::default(),
+        };
+        state.memory.vectors_mut().into_iter().for_each(|v| v.fill(1.0));
+        state.clear();
+        state
+    }
+
+    /// Holds no state, and keeps its room.
+    pub fn clear(&mut self) {
+        let Self {
+            shaft_n,
+            anchor_m,
+            u_m,
+            tip_column,
+            loads_n,
+            memory,
+            ..
+        } = self;
+        let own = [shaft_n, anchor_m, u_m, tip_column, loads_n];
+        own.into_iter().chain(memory.vectors_mut()).for_each(Vec::clear);
+    }
+
+    /// Copies all of `from`; names every field, so that a new one is not forgotten. Does not allocate where there is room
+    /// for as many stations.
+    pub fn copy_from(&mut self, from: &LineState) {
+        let LineState {
+            shaft_n,
+            anchor_m,
+            u_m,
+            tip_u_m,
+            tip,
+            in_contact,
+            tip_range,
+            tip_weights,
+            tip_column,
+            tip_own,
+            memory,
+            loads_n,
+            last,
+        } = from;
+        self.shaft_n.clone_from(shaft_n);
+        self.anchor_m.clone_from(anchor_m);
+        self.u_m.clone_from(u_m);
+        self.tip_u_m = *tip_u_m;
+        self.tip = *tip;
+        self.in_contact = *in_contact;
+        self.tip_range = tip_range.clone();
+        self.tip_weights = *tip_weights;
+        self.tip_column.clone_from(tip_column);
+        self.tip_own = *tip_own;
+        self.memory.copy_from(memory);
+        self.loads_n.clone_from(loads_n);
+        self.last = *last;
+    }
+
+    /// Whether it is one of `model`, in all of its parts: a state that was read from a file may not be.
+    pub(in crate::line) fn is_of(&self, model: &LineModel) -> bool {
+        let m = model.compliance.stations;
+        let each = [&self.shaft_n, &self.anchor_m, &self.u_m, &self.tip_column];
+        let tip = &self.tip_range;
+        each.iter().all(|v| v.len() == m)
+            && self.loads_n.len() == 2 * m
+            && self.memory.fits(2 * m)
+            && self.in_contact <= m
+            && tip.start <= tip.end
+            && tip.end <= m
+            && tip.end - tip.start <= self.tip_weights.len()
+    }
+}

@@ -1,0 +1,93 @@
+//! What the force loop's half of a line can be made from again: kept beside a recording.
+
+use super::{HandLine, LineError};
+use crate::line::{Compliance, Line, LineState, MAX_STATIONS};
+use crate::needle::LayerKind;
+use serde::{Deserialize, Serialize};
+
+/// Where a line lies, how its stations move, and the layers on the way: all of a [`HandLine`] that does not change while it
+/// is in use, but for the layers' forces, which are parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LineSource {
+    /// That of the [`HandLine`].
+    pub generation: u64,
+    /// Where the line is at rest.
+    pub line: Line,
+    kinds: Vec<(f64, LayerKind, bool)>,
+    compliance: Compliance,
+}
+
+impl LineSource {
+    /// Stations of the line.
+    pub fn stations(&self) -> usize {
+        self.compliance.stations
+    }
+
+    #[cfg(test)]
+    pub(super) fn compliance_mut(&mut self) -> &mut Compliance {
+        &mut self.compliance
+    }
+
+    /// Whether two lines are the same in every bit, whatever their number in the run.
+    pub fn is_identical(&self, other: &LineSource) -> bool {
+        let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        let place = |s: &LineSource| [bits(&s.line.entry_m), bits(s.line.axes.as_flattened())];
+        let kinds = |s: &LineSource| s.kinds.iter().map(|k| (k.0.to_bits(), k.1, k.2)).collect::<Vec<_>>();
+        let sizes = |s: &LineSource| bits(&[s.compliance.spacing_m, s.compliance.tip_length_m]);
+        let row = |s: &LineSource, n| bits(s.compliance.rows.row(n));
+        self.stations() == other.stations()
+            && place(self) == place(other)
+            && kinds(self) == kinds(other)
+            && sizes(self) == sizes(other)
+            && (0..2 * self.stations()).all(|n| row(self, n) == row(other, n))
+    }
+}
+
+impl HandLine {
+    /// What it can be made from again. Allocates: for the thread that prepares lines.
+    pub fn source(&self) -> LineSource {
+        LineSource {
+            generation: self.generation,
+            line: self.line,
+            kinds: self.kinds.clone(),
+            compliance: self.model.compliance.clone(),
+        }
+    }
+
+    /// A line of stations that do not know each other, for tests and examples: 1 mm apart, 1 mm/N.
+    ///
+    /// # Errors
+    ///
+    /// [`LineError::Unusable`]: too many stations.
+    pub fn uniform(generation: u64, line: Line, stations: usize) -> Result<Self, LineError> {
+        let kinds = vec![(0.0, LayerKind::Gland, true)];
+        Self::new(generation, line, kinds, Compliance::diagonal(stations, 1e-3, 1e-3))
+    }
+
+    /// The line in tissue at rest, with the default forces of its layers.
+    ///
+    /// # Errors
+    ///
+    /// [`LineError::Unusable`]: numbers that are no line's.
+    pub fn of_source(source: LineSource) -> Result<Self, LineError> {
+        let LineSource {
+            generation,
+            line,
+            kinds,
+            compliance,
+        } = source;
+        if compliance.stations > MAX_STATIONS || !compliance.rows.is_whole(2 * compliance.stations) {
+            return Err(LineError::Unusable("its compliance is not whole".to_owned()));
+        }
+        Self::new(generation, line, kinds, compliance)
+    }
+
+    /// Goes on from that state; false, and nothing changes, where it is one of another line.
+    pub fn take_state(&mut self, state: &LineState) -> bool {
+        let is_own = state.is_of(&self.model);
+        if is_own {
+            self.state.copy_from(state);
+        }
+        is_own
+    }
+}
