@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::TissueKind;
-use stylet_sim::scene::{Scene, Structure};
+use stylet_sim::scene::Scene;
 use stylet_sim::tissue::{ChainMailTissue, FemTissue, Held, MaterialPoint, TissueModel, element_ahead};
 
 /// Tissue ticks of one insertion: 50 mm/s at 200 Hz over 40 mm and back.
@@ -145,11 +145,7 @@ fn models(scene: &Scene) -> Result<Vec<Timed>, String> {
     let plain = TissueParameters::default();
     let mut models = vec![chainmail("tissue step, as the scene is".to_owned(), scene, &plain)?];
     if scene.structures.len() > 1 {
-        let one = Scene {
-            structures: vec![Structure::soft("tissue", 1)],
-            lattice: scene.lattice.homogeneous().into(),
-            ..scene.clone()
-        };
+        let one = scene.homogeneous();
         let name = "  the same as one homogeneous structure".to_owned();
         models.push(chainmail(name, &one, &plain)?);
     }
@@ -159,8 +155,10 @@ fn models(scene: &Scene) -> Result<Vec<Timed>, String> {
     };
     let name = format!("  with relaxation, {RELAXATION} iterations (off by default)");
     models.push(chainmail(name, scene, &relaxed)?);
-    if scene.lattice.element_count() <= FEM_ELEMENTS {
-        let fem = FemTissue::<f32>::new(scene)
+    // In a coarser body the ticks below, in elements of the scene, would be others.
+    let elastic = scene.clone().with_tissue(TissueKind::Fem);
+    if elastic.coarseness() == 1 {
+        let fem = FemTissue::<f32>::new(&elastic)
             .map_err(|p| p.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
         models.push(Timed {
             name: "  FEM in its place (--tissue fem)".to_owned(),
@@ -170,9 +168,6 @@ fn models(scene: &Scene) -> Result<Vec<Timed>, String> {
     }
     Ok(models)
 }
-
-/// Beyond this FEM is far from real time, and its memory many times ChainMail's.
-const FEM_ELEMENTS: usize = 300_000;
 
 /// Where the tip is in each tick, on a straight line through the target.
 struct Script {

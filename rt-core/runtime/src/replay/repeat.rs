@@ -170,8 +170,8 @@ pub enum RepeatError {
 /// The tissue chain: response and held element of each tick, and every element's position at each checkpoint. `lines` are
 /// those of [`solve_again`](super::lines::solve_again).
 pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -> Result<Repeated, RepeatError> {
-    let mut scene = recorded.scene.build().map_err(|e| RepeatError::Scene(e.to_string()))?;
-    scene.tissue = recorded.tissue;
+    let scene = recorded.scene.build().map_err(|e| RepeatError::Scene(e.to_string()))?;
+    let scene = scene.with_tissue(recorded.tissue);
     let world = || World::new(scene.clone(), recorded.memory.limits.clone(), 1).map(Box::new);
     let reference = world()?;
     if reference.tissue.memory_len() != recorded.memory.body.len() {

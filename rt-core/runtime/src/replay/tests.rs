@@ -43,8 +43,7 @@ fn block() -> SceneSource {
 impl Recorded {
     fn new() -> Self {
         let source = block();
-        let mut scene = source.build().expect("valid");
-        scene.tissue = TissueKind::Fem;
+        let scene = source.build().expect("valid").with_tissue(TissueKind::Fem);
         let (low, high) = scene.lattice.bounds_m();
         let entry_m = Vector3::new((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, low[2]);
         let body = LineBody::of_source(&source).expect("valid");

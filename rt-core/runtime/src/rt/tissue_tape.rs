@@ -130,7 +130,7 @@ impl TissueTape {
             residual: 0.0,
             response: TissueResponse::default(),
         };
-        let tissue = world.scene.tissue;
+        let tissue = world.scene.tissue();
         let room = |is_needed: bool| if is_needed { 2 * CHECKPOINT_EVERY as usize } else { 1 };
         Self {
             scene_generation: world.generation,

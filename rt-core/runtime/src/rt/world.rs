@@ -27,7 +27,7 @@ pub struct World {
 impl World {
     /// Sets up the tissue model that `scene` asks for, at rest.
     pub fn new(scene: Scene, limits: Limits, generation: u64) -> Result<Self, WorldError> {
-        let tissue: Box<dyn TissueModel> = match scene.tissue {
+        let tissue: Box<dyn TissueModel> = match scene.tissue() {
             TissueKind::ChainMail => Box::new(ChainMailTissue::new(&scene, limits.clone())),
             TissueKind::Fem => {
                 let texts = |problems: Vec<_>| problems.iter().map(ToString::to_string).collect();

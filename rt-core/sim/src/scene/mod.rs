@@ -64,8 +64,8 @@ pub struct Scene {
     pub surface: Surface,
     /// Nodes at which hosts get its displacements.
     pub nodes: NodeGrid,
-    /// What computes where its elements are.
-    pub tissue: TissueKind,
+    /// Changed by [`Scene::with_tissue`] alone, which makes the body for it.
+    tissue: TissueKind,
 }
 
 impl Scene {
@@ -110,6 +110,25 @@ impl Scene {
         self.nodes = NodeGrid::of(&self.body);
         self.surface.move_with(&self.lattice, &self.body);
         self
+    }
+
+    /// The same cells as one structure, without the surfaces of its parts.
+    pub fn homogeneous(&self) -> Scene {
+        let structures = vec![Structure::soft("tissue", 1)];
+        let lattice = Arc::new(self.lattice.homogeneous());
+        Scene {
+            surface: Surface::of(&lattice, &structures),
+            structures,
+            body: Arc::clone(&lattice),
+            lattice,
+            ..self.clone()
+        }
+        .with_tissue(self.tissue)
+    }
+
+    /// What computes where its elements are.
+    pub fn tissue(&self) -> TissueKind {
+        self.tissue
     }
 
     /// Cells of the lattice along the edge of an element of the body.
