@@ -44,13 +44,7 @@ impl Error {
     }
 
     /// The same of displacements in metres, by element.
-    pub fn add_field(
-        &mut self,
-        reference: &Field,
-        moved_m: impl Fn(usize) -> [f64; 3],
-        travel_m: f64,
-        seeds: &[u32],
-    ) {
+    pub fn add_field(&mut self, reference: &Field, moved_m: impl Fn(usize) -> [f64; 3], travel_m: f64, seeds: &[u32]) {
         let apart = |e: usize| {
             let u = moved_m(e);
             norm([0, 1, 2].map(|a| u[a] - reference[e][a]))
@@ -98,7 +92,9 @@ mod tests {
 
     #[test]
     fn no_other_shift_comes_nearer_than_the_best() {
-        let field: Field = (0..50).map(|n| [1e-3 * f64::from(n % 7), -2e-4 * f64::from(n), 3e-3]).collect();
+        let field: Field = (0..50)
+            .map(|n| [1e-3 * f64::from(n % 7), -2e-4 * f64::from(n), 3e-3])
+            .collect();
         let best_m = best_shift_m(&field, 0.01);
         let rms_m = |shift_m: [f64; 3]| {
             let mut error = Error::default();

@@ -104,7 +104,10 @@ fn print_haptic(recorded: &HapticFlight) {
         recorded.orders.len()
     );
     if let on_line @ 1.. = recorded.ticks_on_line() {
-        println!("         on a needle line in {on_line} of {} ticks", recorded.ticks.len());
+        println!(
+            "         on a needle line in {on_line} of {} ticks",
+            recorded.ticks.len()
+        );
     }
     let mut before = None;
     for record in records {
@@ -148,7 +151,11 @@ fn print_result(what: &str, found: Option<&Repeated>) -> bool {
         );
     }
     if r.lines > 0 {
-        println!("         {} of {} needle lines the same", r.lines - r.different_lines, r.lines);
+        println!(
+            "         {} of {} needle lines the same",
+            r.lines - r.different_lines,
+            r.lines
+        );
     }
     if let Some(first) = r.first_different {
         println!("         the first that differs is tick {} of the recording", first + 1);

@@ -5,8 +5,8 @@
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 use stylet_sim::limits::TissueParameters;
-use stylet_sim::scene::TissueKind;
 use stylet_sim::scene::Scene;
+use stylet_sim::scene::TissueKind;
 use stylet_sim::tissue::{ChainMailTissue, FemTissue, Held, MaterialPoint, TissueModel, element_ahead};
 
 /// Tissue ticks of one insertion: 50 mm/s at 200 Hz over 40 mm and back.

@@ -65,7 +65,9 @@ mod tests {
     use stylet_sim::line::{HandLine, Line};
 
     fn source(generation: u64) -> LineSource {
-        HandLine::uniform(generation, Line::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap(), 4).unwrap().source()
+        HandLine::uniform(generation, Line::new([0.0; 3], [0.0, 0.0, 1.0]).unwrap(), 4)
+            .unwrap()
+            .source()
     }
 
     /// A line in use may be far older than a tape, and the one before it may be on the tape still.

@@ -281,3 +281,6 @@ fn axis(record: &TickRecord) -> Option<Line> {
     let world_from_tool = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9)?;
     Line::new(record.tip_in_scene_m, (world_from_tool * Vector3::z()).into())
 }
+
+#[cfg(test)]
+mod tests;

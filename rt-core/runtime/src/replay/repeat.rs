@@ -240,7 +240,16 @@ fn same_step(again: &TissueLoop, entry: &TissueEntry) -> bool {
     let response = |r: &TissueResponse| {
         let numbers = bits(&[r.worst_residual]);
         let places = [bits(r.contact_in_scene.as_slice()), bits(r.path_direction.as_slice())];
-        (r.time_ns, r.tick, r.contact, r.line, r.seed_count, r.unsolved, numbers, places)
+        (
+            r.time_ns,
+            r.tick,
+            r.contact,
+            r.line,
+            r.seed_count,
+            r.unsolved,
+            numbers,
+            places,
+        )
     };
     let (held, residual) = again.last_step();
     let place =

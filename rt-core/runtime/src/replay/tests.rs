@@ -192,7 +192,11 @@ fn assert_identical(flight: &Flight) {
     let tissue = flight.tissue.as_ref().expect("recorded");
     let mut last = None;
     let lines = solve_again(flight, tissue, &mut |p| last = Some(p)).expect("solved");
-    assert_eq!(last.map(|p: LineProgress| p.of), Some(20), "shaft and tip of 10 stations");
+    assert_eq!(
+        last.map(|p: LineProgress| p.of),
+        Some(20),
+        "shaft and tip of 10 stations"
+    );
     let found = repeat::tissue(flight, tissue, lines).expect("can be run");
     assert!(found.is_identical() && found.positions > 0, "tissue: {found:?}");
 }
@@ -205,7 +209,11 @@ fn a_recorded_insertion_on_a_needle_line_repeats_in_every_bit() {
     let flight = through_a_file(&run.flight());
     assert_eq!(run.heap_calls, 0, "heap calls of the loops");
     let haptic = flight.haptic.as_ref().expect("recorded");
-    let peak_n = haptic.ticks.iter().map(|e| e.record.force_on_hand_n[2].abs()).fold(0.0, f64::max);
+    let peak_n = haptic
+        .ticks
+        .iter()
+        .map(|e| e.record.force_on_hand_n[2].abs())
+        .fold(0.0, f64::max);
     println!(
         "{} ticks, {} on a line, peak {peak_n} N, lines {:?}",
         haptic.ticks.len(),
@@ -213,12 +221,21 @@ fn a_recorded_insertion_on_a_needle_line_repeats_in_every_bit() {
         haptic.lines
     );
     assert!(haptic.ticks_on_line() > 3000 && peak_n > 0.1);
-    assert!(haptic.memory.line == 1 && haptic.memory.on_line, "it begins with the needle on a line");
-    assert!(haptic.line_state.as_ref().is_some_and(|s| s.is_in_contact()), "and in tissue");
+    assert!(
+        haptic.memory.line == 1 && haptic.memory.on_line,
+        "it begins with the needle on a line"
+    );
+    assert!(
+        haptic.line_state.as_ref().is_some_and(|s| s.is_in_contact()),
+        "and in tissue"
+    );
     assert_eq!(haptic.lines.iter().map(|l| l.1).collect::<Vec<_>>(), [2]);
     let tissue = flight.tissue.as_ref().expect("recorded");
     assert!(tissue.memory.loads.is_any() && tissue.memory.in_by_line && tissue.middle.is_some());
-    assert!(tissue.memory.body.iter().any(|&byte| byte != 0), "tissue that is not at rest");
+    assert!(
+        tissue.memory.body.iter().any(|&byte| byte != 0),
+        "tissue that is not at rest"
+    );
     assert_eq!(tissue.line_numbers().collect::<Vec<_>>(), [1, 2]);
     assert_identical(&flight);
     what_was_changed_is_found(&flight);
@@ -227,7 +244,14 @@ fn a_recorded_insertion_on_a_needle_line_repeats_in_every_bit() {
     run.go(3e-3);
     run.run(1.0);
     let next = run.flight();
-    assert_eq!(next.haptic.as_ref().expect("recorded").line_numbers().collect::<Vec<_>>(), [2]);
+    assert_eq!(
+        next.haptic
+            .as_ref()
+            .expect("recorded")
+            .line_numbers()
+            .collect::<Vec<_>>(),
+        [2]
+    );
     assert_identical(&next);
 }
 

@@ -32,7 +32,14 @@ impl LineLoads {
 
     /// The same in every bit.
     pub fn is_same(&self, other: &Self) -> bool {
-        let bits = |loads: &Self| (loads.generation, loads.in_tissue, loads.tip_material_m.to_bits(), loads.count);
+        let bits = |loads: &Self| {
+            (
+                loads.generation,
+                loads.in_tissue,
+                loads.tip_material_m.to_bits(),
+                loads.count,
+            )
+        };
         let pairs = self.loads_n().iter().zip(other.loads_n());
         bits(self) == bits(other) && pairs.into_iter().all(|(a, b)| a.to_bits() == b.to_bits())
     }

@@ -257,6 +257,7 @@ impl TissueFlight {
     /// Whether a needle on that line pushed tissue, so that its columns count.
     pub fn is_pushed_by(&self, generation: u64) -> bool {
         let all = self.loads.iter().map(|(_, loads)| loads).chain([&self.memory.loads]);
-        all.into_iter().any(|loads| loads.generation == generation && loads.is_any())
+        all.into_iter()
+            .any(|loads| loads.generation == generation && loads.is_any())
     }
 }

@@ -30,15 +30,16 @@ mod model;
 pub mod prony;
 mod ready;
 mod rows;
+mod state;
 mod stations;
 mod tip;
 
 pub use columns::{Column, ColumnQueue, Load, QueueProgress, TOLERANCE};
 pub use compliance::Compliance;
-pub use contact::{LineInput, LineOutput, LineState, step};
+pub use contact::{LineInput, step};
 pub use model::{LineLayer, LineModel, LineProblem, LineSettings, MAX_LAYERS, MAX_STATIONS};
 pub use prony::PronyTerm;
 pub use ready::{BodyLine, HandLine, LayerForces, LineError, LineSource, ReadyLine};
 pub use rows::Rows;
+pub use state::{LineOutput, LineState, TipState};
 pub use stations::{Line, StationSettings, Stations};
-pub use tip::TipState;

@@ -84,7 +84,9 @@ impl Memory {
     /// Whether it is of that many rows.
     pub fn fits(&self, rows: usize) -> bool {
         let [first, second] = &self.loads_n;
-        [first, second, &self.offset_m, &self.sum].iter().all(|v| v.len() == rows)
+        [first, second, &self.offset_m, &self.sum]
+            .iter()
+            .all(|v| v.len() == rows)
     }
 
     /// What is known of this tick before its loads are.

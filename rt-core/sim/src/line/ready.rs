@@ -4,8 +4,9 @@
 
 use super::columns::{ColumnQueue, QueueProgress, TOLERANCE};
 use super::compliance::Compliance;
-use super::contact::{LineInput, LineOutput, LineState, step};
+use super::contact::{LineInput, step};
 use super::model::{LineLayer, LineModel, LineSettings, MAX_LAYERS, MAX_STATIONS};
+use super::state::{LineOutput, LineState};
 use super::stations::{Line, StationSettings, Stations};
 use crate::needle::{LayerKind, Layers};
 use crate::scene::Lattice;

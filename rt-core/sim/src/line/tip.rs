@@ -1,9 +1,8 @@
 //! The tip: what stops it, and where it is in the material.
 
-use super::contact::LineState;
 use super::model::{LineLayer, LineModel};
 use super::rows::dot;
-use serde::{Deserialize, Serialize};
+use super::state::{LineState, TipState};
 
 /// Places closer than this are the same.
 const SAME_M: f64 = 1e-9;
@@ -13,19 +12,6 @@ const PLACE_M: f64 = 1e-13;
 const MOST_PRESSED: f64 = 10.0;
 /// Stations around the tip that a pass can reach.
 const WINDOW: usize = 64;
-
-/// The tip in the material of the line.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct TipState {
-    /// Force on the tissue, inwards.
-    pub force_n: f64,
-    /// Its place at rest; negative outside.
-    pub material_m: f64,
-    /// End of the track that was cut.
-    pub track_m: f64,
-    /// One bit for each layer whose membrane has given way.
-    pub opened: u32,
-}
 
 /// What is in front of the tip.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,8 +4,8 @@ use super::HapticLoop;
 use crate::rt::exchange::HapticOrder;
 use crate::rt::haptic_tape::{HapticEntry, HapticMemory};
 use crate::rt::response::TissueResponse;
-use stylet_sim::line::HandLine;
 use stylet_shm_schema::TickRecord;
+use stylet_sim::line::HandLine;
 
 impl HapticLoop {
     /// Names every field, so that a new one is not forgotten.

@@ -271,7 +271,10 @@ fn a_line_that_is_prepared_twice_is_the_same_in_every_bit() {
     let columns = bits(&a.body);
     assert!(columns == bits(&b.body) && columns.iter().any(|&v| v != 0));
     let other = Line::new(first.0.lattice.rest_m(0), [0.0, 0.0, 1.0]).unwrap();
-    let other = ReadyLine::prepare(1, &first.1, &first.0.lattice, &|_| LayerKind::Gland, other, &mut |_| true).unwrap();
+    let other = ReadyLine::prepare(1, &first.1, &first.0.lattice, &|_| LayerKind::Gland, other, &mut |_| {
+        true
+    })
+    .unwrap();
     assert!(!a.hand.source().is_identical(&other.hand.source()));
 }
 

@@ -6,7 +6,12 @@ use bytemuck::{bytes_of, bytes_of_mut, cast_slice, cast_slice_mut};
 
 impl<T: Real> FemState<T> {
     pub(super) fn memory_len(&self) -> usize {
-        size_of_val(&self.max_displacement) + self.displacement.iter().map(|u| size_of_val(u.as_slice())).sum::<usize>()
+        size_of_val(&self.max_displacement)
+            + self
+                .displacement
+                .iter()
+                .map(|u| size_of_val(u.as_slice()))
+                .sum::<usize>()
     }
 
     pub(super) fn save(&self, to: &mut [u8]) {

@@ -2,7 +2,7 @@
 
 use crate::scene::builtin::pelvis::Pelvis;
 use crate::scene::builtin::shape::Rod;
-use crate::scene::{Lattice, Role, Scene, SceneError, SceneProblem};
+use crate::scene::{Lattice, Role, Scene, SceneError, SceneProblem, TissueKind};
 use std::f64::consts::PI;
 
 fn pelvis() -> Scene {
@@ -220,4 +220,24 @@ fn full_is_every_cell() {
     assert_eq!((scene.structures.len(), scene.surface.parts.len()), (1, 0));
     let inner = 105 * 60 * 174;
     assert_eq!(scene.surface.body_elements, 1_167_584 - inner);
+}
+
+/// In elements of twice the edge the capsule, one cell thick, would be lost: what is where is still asked of the cells.
+#[test]
+fn a_coarser_body_keeps_what_is_where() {
+    let scene = Scene::builtin("pelvis").unwrap().with_tissue(TissueKind::Fem);
+    assert_eq!((scene.coarseness(), scene.body.element_count()), (2, 53_951));
+    assert_eq!(scene.surface.moved_by.len(), scene.surface.vertex_elements.len());
+    for element in 0..scene.lattice.element_count() as u32 {
+        let place_m = scene.lattice.rest_m(element);
+        let around = scene
+            .body
+            .element_at_rest(place_m)
+            .expect("every cell is in an element");
+        let middle_m = scene.body.rest_m(around);
+        let local = [0, 1, 2].map(|a| ((place_m[a] - middle_m[a]) / scene.body.spacing_m) as f32);
+        assert_eq!(scene.structure_at(around, local), scene.lattice.structure(element));
+    }
+    let again = scene.with_tissue(TissueKind::ChainMail);
+    assert!(again.coarseness() == 1 && again.surface.moved_by.is_empty());
 }

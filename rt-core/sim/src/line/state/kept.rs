@@ -1,8 +1,8 @@
 //! A state that is kept beside the one in use: in flight recordings, and taken up again when one is repeated.
 
-use super::super::model::{LineModel, MAX_STATIONS};
-use super::{LineState, TipState};
-use crate::line::{LineOutput, prony::Memory};
+use super::{LineOutput, LineState, TipState};
+use crate::line::model::{LineModel, MAX_STATIONS};
+use crate::line::prony::Memory;
 
 impl LineState {
     /// Room for the state of any line. Every page is written to, so that no tick is the first to touch one.

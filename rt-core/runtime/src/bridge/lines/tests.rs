@@ -1,0 +1,100 @@
+//! Which lines are prepared, and when a needle gets one.
+
+use super::*;
+use crate::rt::wiring::{Capacities, HapticPorts, TissuePorts, Wiring};
+use bytemuck::Zeroable;
+use stylet_sim::scene::Labels;
+
+/// Rings as in a run; nothing ticks at their other ends.
+fn rings() -> (LoopRings, HapticPorts, TissuePorts) {
+    let Wiring { haptic, tissue, bridge } = Wiring::new(Capacities::RUN, None, None);
+    let rings = LoopRings {
+        records: bridge.records,
+        haptic_orders: bridge.haptic_orders,
+        haptic_notices: bridge.haptic_notices,
+        tissue_orders: bridge.tissue_orders,
+        tissue_notices: bridge.tissue_notices,
+        old_worlds: bridge.old_worlds,
+        lines: bridge.lines,
+        old_hand_lines: bridge.old_hand_lines,
+        old_body_lines: bridge.old_body_lines,
+    };
+    (rings, haptic, tissue)
+}
+
+/// A needle along z.
+fn needle_at(tip_in_scene_m: [f64; 3], flags: u32) -> TickRecord {
+    TickRecord {
+        tip_in_scene_m,
+        world_from_tool: [0.0, 0.0, 0.0, 1.0],
+        flags,
+        ..TickRecord::zeroed()
+    }
+}
+
+const INTO_BODY: [f64; 3] = [0.0, 0.0, 1.0];
+
+/// A second needle waited for its line as the first had, though the plan had named both.
+#[test]
+fn the_lines_of_both_planned_needles_are_there_when_they_come() {
+    let source = SceneSource::of_labels(
+        "block",
+        &Labels {
+            dims: [6, 6, 6],
+            spacing_m: 2e-3,
+            cells: vec![1; 6 * 6 * 6],
+            structures: Vec::new(),
+        },
+    );
+    let mut lines = LinePreparer::new(Arc::new(source), TissueKind::Fem);
+    let (mut rings, mut haptic, _tissue) = rings();
+    let entries_m = [[5e-3, 5e-3, 0.0], [7e-3, 5e-3, 0.0]];
+    lines.expect_planned(Some((entries_m[0], INTO_BODY)));
+    lines.expect_next(entries_m[1], INTO_BODY);
+    let begun = Instant::now();
+    while lines.kept.len() < 2 && begun.elapsed() < Duration::from_secs(60) {
+        lines.pass(Some(&needle_at([0.5, 0.5, -0.1], flags::IN_CONTACT)), 1, &mut rings);
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert_eq!(lines.kept.len(), 2, "both are prepared while a needle is in tissue");
+    assert!(haptic.lines.pop().is_err(), "and no loop has them yet");
+    for (entry_m, left) in entries_m.into_iter().zip([1, 0]) {
+        let outside = needle_at([entry_m[0], entry_m[1], -0.02], 0);
+        lines.pass(Some(&outside), 1, &mut rings);
+        std::thread::sleep(STEADY);
+        lines.pass(Some(&outside), 1, &mut rings);
+        let line = haptic
+            .lines
+            .pop()
+            .expect("handed over as soon as the needle stands there");
+        assert!(line.is_met_by(&outside.tip_in_scene_m.into(), &INTO_BODY.into()));
+        assert_eq!((lines.kept.len(), lines.under_way.is_some()), (left, false));
+    }
+    assert_eq!(lines.generation, 2, "none was solved for twice");
+}
+
+/// A plan whose needle misses the body is no reason to try for ever, nor to forget the line that is in use.
+#[test]
+fn an_axis_without_tissue_is_tried_once() {
+    let source = SceneSource::of_labels(
+        "block",
+        &Labels {
+            dims: [4, 4, 4],
+            spacing_m: 2e-3,
+            cells: vec![1; 4 * 4 * 4],
+            structures: Vec::new(),
+        },
+    );
+    let mut lines = LinePreparer::new(Arc::new(source), TissueKind::Fem);
+    let (mut rings, ..) = rings();
+    lines.expect_planned(Some(([0.1, 0.1, 0.0], INTO_BODY)));
+    let begun = Instant::now();
+    while lines.without.is_empty() && begun.elapsed() < Duration::from_secs(60) {
+        lines.pass(Some(&needle_at([0.5, 0.5, -0.1], flags::IN_CONTACT)), 1, &mut rings);
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    for _ in 0..20 {
+        lines.pass(Some(&needle_at([0.5, 0.5, -0.1], flags::IN_CONTACT)), 1, &mut rings);
+    }
+    assert_eq!((lines.without.len(), lines.generation), (1, 1));
+}

@@ -1,0 +1,173 @@
+//! What a line remembers from tick to tick, and what one tick gives.
+
+use super::model::LineModel;
+use super::prony::Memory;
+use super::rows::dot;
+use serde::{Deserialize, Serialize};
+use serde_big_array::BigArray;
+
+mod kept;
+
+/// The tip in the material of the line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TipState {
+    /// Force on the tissue, inwards.
+    pub force_n: f64,
+    /// Its place at rest; negative outside.
+    pub material_m: f64,
+    /// End of the track that was cut.
+    pub track_m: f64,
+    /// One bit for each layer whose membrane has given way.
+    pub opened: u32,
+}
+
+/// Forces of one tick, N.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LineOutput {
+    /// Along the line, positive inwards: the needle is pushed out by what is negative.
+    pub force_on_hand_n: f64,
+    /// Force of the tip on the tissue.
+    pub tip_n: f64,
+    /// Force of the shaft on the tissue.
+    pub shaft_n: f64,
+    /// Place at rest of the material that the tip is in; a seed dropped now belongs there.
+    pub tip_material_m: f64,
+    /// Layer whose membrane gave way in this tick.
+    pub punctured: Option<usize>,
+    /// Layer whose membrane holds the tip.
+    pub held_by: Option<usize>,
+    /// Least length of a stretch of the line between two stations, over that at rest; below 0 the linear answer is folded.
+    pub least_stretch: f64,
+    /// Of the solver, all passes together.
+    pub sweeps: u32,
+    /// Largest correction of the last sweep.
+    pub residual_m: f64,
+    /// The input was not finite: the output before it is repeated.
+    pub is_refused: bool,
+}
+
+/// Forces, anchors and the track: everything that the line remembers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LineState {
+    /// Force of each station of the shaft on the tissue.
+    pub(super) shaft_n: Vec<f64>,
+    /// Where on the needle each station sticks: tip's place in the world less displacement of the station.
+    pub(super) anchor_m: Vec<f64>,
+    /// Displacement of the stations in contact, and of the material at the tip.
+    pub(super) u_m: Vec<f64>,
+    pub(super) tip_u_m: f64,
+    pub(super) tip: TipState,
+    /// Stations that the shaft touches: the first so many.
+    pub(super) in_contact: usize,
+    pub(super) tip_range: std::ops::Range<usize>,
+    #[serde(with = "BigArray")]
+    pub(super) tip_weights: [f64; 64],
+    /// How each station in contact moves with the tip's force, and how the tip does.
+    pub(super) tip_column: Vec<f64>,
+    pub(super) tip_own: f64,
+    pub(super) memory: Memory,
+    pub(super) loads_n: Vec<f64>,
+    pub(super) last: LineOutput,
+}
+
+impl LineState {
+    /// Tissue at rest that no needle has touched.
+    pub fn new(model: &LineModel) -> Self {
+        let m = model.compliance.stations;
+        let outside = TipState {
+            material_m: f64::NEG_INFINITY,
+            ..TipState::default()
+        };
+        LineState {
+            shaft_n: vec![0.0; m],
+            anchor_m: vec![0.0; m],
+            u_m: vec![0.0; m],
+            tip_u_m: 0.0,
+            tip: outside,
+            in_contact: 0,
+            tip_range: 0..0,
+            tip_weights: [0.0; 64],
+            tip_column: vec![0.0; m],
+            tip_own: 0.0,
+            memory: Memory::new(2 * m),
+            loads_n: vec![0.0; 2 * m],
+            last: LineOutput::default(),
+        }
+    }
+
+    /// What the columns are multiplied with: newtons of each shaft station, then of the tip at each.
+    pub fn loads_n(&self) -> &[f64] {
+        &self.loads_n
+    }
+
+    /// The tip: membrane, cutting, track.
+    pub fn tip(&self) -> &TipState {
+        &self.tip
+    }
+
+    /// Force of each shaft station on the tissue.
+    pub fn shaft_n(&self) -> &[f64] {
+        &self.shaft_n
+    }
+
+    /// Places in the tissue that stick to the shaft, along the line, m.
+    pub fn anchors_m(&self) -> &[f64] {
+        &self.anchor_m
+    }
+
+    /// Elastic energy of the tissue, in joules.
+    pub fn stored_j(&self, model: &LineModel) -> f64 {
+        let m = model.compliance.stations;
+        let rows = &model.compliance.rows;
+        let mut f = vec![0.0; 2 * m];
+        f[..m].copy_from_slice(&self.shaft_n);
+        for (n, weight) in self.tip_range.clone().zip(self.tip_weights) {
+            f[m + n] = weight * self.tip.force_n;
+        }
+        let at_once: f64 = f
+            .iter()
+            .enumerate()
+            .map(|(n, force)| 0.5 * force * dot(rows.row(n), &f))
+            .sum();
+        at_once + self.memory.stored_j(rows, &model.settings.prony)
+    }
+
+    /// The tip presses on tissue or is in it.
+    pub fn is_in_contact(&self) -> bool {
+        self.in_contact > 0 || self.tip.force_n > 0.0
+    }
+
+    /// Half of force times displacement: the elastic energy without what relaxation holds, J. Does not allocate.
+    pub fn elastic_j(&self) -> f64 {
+        let shaft = self.shaft_n.iter().zip(&self.u_m).take(self.in_contact);
+        0.5 * (shaft.map(|(f, u)| f * u).sum::<f64>() + self.tip.force_n * self.tip_u_m)
+    }
+
+    /// Tissue at rest that no needle has touched, as [`LineState::new`]; does not allocate.
+    pub fn reset(&mut self) {
+        for field in [
+            &mut self.shaft_n,
+            &mut self.anchor_m,
+            &mut self.u_m,
+            &mut self.tip_column,
+            &mut self.loads_n,
+        ] {
+            field.fill(0.0);
+        }
+        self.tip = TipState {
+            material_m: f64::NEG_INFINITY,
+            ..TipState::default()
+        };
+        self.tip_u_m = 0.0;
+        self.in_contact = 0;
+        self.tip_range = 0..0;
+        self.tip_weights.fill(0.0);
+        self.tip_own = 0.0;
+        self.memory.reset();
+        self.last = LineOutput::default();
+    }
+
+    pub(super) fn fits(&self, model: &LineModel) -> bool {
+        self.shaft_n.len() == model.compliance.stations
+    }
+}
