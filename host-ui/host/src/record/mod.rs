@@ -45,7 +45,7 @@ pub struct Options {
 pub fn run(options: &Options) -> Result<(), RecordError> {
     let interrupted = Interrupt::on_signals().map_err(|e| RecordError::Signals(e.to_string()))?;
     let stop = || interrupted.asked();
-    let mut link = Link::new(options.instance.clone());
+    let mut link = Link::for_recording(options.instance.clone());
     find_core(&mut link, stop)?;
     let (send, receive) = mpsc::channel();
     let path = options.out.clone();
