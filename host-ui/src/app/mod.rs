@@ -28,7 +28,7 @@ use stylet_files::Image;
 use stylet_host::core_args::SceneChoice;
 use stylet_host::link::{Link, LinkStatus};
 use stylet_implant::score::Trace;
-use stylet_implant::workflow::{Pace, Run};
+use stylet_implant::workflow::{NeedleTask, Pace, Placed, Run};
 use stylet_shm_schema::service::Instance;
 
 const LIVE_FRAME: Duration = Duration::from_millis(16);
@@ -84,6 +84,11 @@ pub struct App {
     run: Option<Run>,
     /// Which needles of the plan the script goes through.
     run_needles: Vec<usize>,
+    /// What was in the tissue when the script began or went on.
+    run_placed: Placed,
+    /// Needles of a script that was stopped, and its drops that left no seed.
+    run_lost: (Vec<NeedleTask>, Vec<usize>),
+    placed_found: Instant,
     planner: Planner,
     pace: Pace,
     waiting: Vec<Waiting>,
@@ -179,6 +184,9 @@ impl App {
             image_to_come: None,
             run: None,
             run_needles: Vec::new(),
+            run_placed: Placed::default(),
+            run_lost: Default::default(),
+            placed_found: Instant::now(),
             planner: Planner::default(),
             pace: Pace::default(),
             waiting: Vec::new(),
