@@ -165,6 +165,8 @@ impl App {
         theme::apply(&cc.egui_ctx);
         let settings = Settings::read(cc.storage);
         let shown = Shown::empty(options.instance.name());
+        // It goes with the core.
+        let kept_in = PathBuf::from(options.instance.root());
         Self {
             link: Link::new(options.instance),
             label: options.label,
@@ -187,7 +189,7 @@ impl App {
             run_placed: Placed::default(),
             run_lost: Default::default(),
             placed_found: Instant::now(),
-            planner: Planner::default(),
+            planner: Planner::default().keeping_in(kept_in),
             pace: Pace::default(),
             waiting: Vec::new(),
             controllers: if options.controllers {

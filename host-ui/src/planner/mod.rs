@@ -4,11 +4,13 @@
 
 mod edit;
 mod jobs;
+mod kept;
 mod needles;
 mod outlines;
 mod shown;
 
 use jobs::JobMessage;
+use kept::Kept;
 pub(crate) use jobs::JobProgress;
 pub(crate) use needles::NeedleProgress;
 pub use needles::NeedleState;
@@ -56,6 +58,10 @@ pub struct Planner {
     checking: Option<(u64, Checked)>,
     checked: u64,
     job: Option<(Job<JobMessage>, JobProgress)>,
+    /// Where the plan is kept for another window; nowhere when not given.
+    kept_in: Option<PathBuf>,
+    /// The scene that a kept plan was looked for, and the look.
+    looked: Option<(SceneId, Job<Kept>)>,
     /// With the needles as they were when they were rehearsed.
     compensated: Vec<(Needle, Compensation)>,
     progress: NeedleProgress,
@@ -97,6 +103,7 @@ impl Planner {
     pub fn take(&mut self, scene: Option<&Arc<SceneModel>>, seeds: usize) {
         let Some(scene) = scene else { return };
         self.take_scene(scene);
+        self.take_kept();
         self.take_job();
         self.take_problems();
         if self.progress.is_undone(seeds) {
@@ -135,6 +142,7 @@ impl Planner {
                 of_scene: Some(of_scene),
                 message: self.message.take(),
                 revision: self.revision + 1,
+                kept_in: self.kept_in.take(),
                 ..Self::default()
             };
         }
@@ -172,6 +180,54 @@ impl Planner {
     fn no_outlines(&mut self, key: SceneId, template: Template, why: &str) {
         (self.outlines, self.outlining, self.failed) = (None, None, Some((key, template)));
         self.message = Some(Message::Refused(format!("No plan can be made for this scene: {why}")));
+    }
+
+    /// The plan is kept in this folder while needles are inserted, and looked for there.
+    #[must_use]
+    pub fn keeping_in(self, folder: PathBuf) -> Self {
+        Self {
+            kept_in: Some(folder),
+            ..self
+        }
+    }
+
+    /// A plan that another window of this run of the core has begun to insert.
+    fn take_kept(&mut self) {
+        let (Some(folder), Some(outlines)) = (&self.kept_in, &self.outlines) else {
+            return;
+        };
+        if self.looked.as_ref().is_none_or(|(scene, _)| *scene != outlines.scene) {
+            let (path, frames) = (kept::path(folder, outlines.scene), outlines.frames);
+            let job = Job::begin("kept plan", move |messages, _| {
+                if let Some(kept) = Kept::read(&path, &frames) {
+                    let _ = messages.send(kept);
+                }
+            });
+            self.looked = Some((outlines.scene, job));
+        }
+        let Some((_, job)) = &self.looked else { return };
+        if let JobUpdate::Message(kept) = job.poll()
+            && self.history.is_none()
+        {
+            self.put(kept.plan);
+            self.compensated = kept.compensated;
+            self.message = Some(Message::Done("The plan of this implant was found again.".to_owned()));
+        }
+    }
+
+    /// Keeps the plan for another window, on a thread of its own.
+    fn keep(&self) {
+        if let (Some(folder), Some(outlines), Some(plan)) = (&self.kept_in, &self.outlines, self.plan()) {
+            let (path, frames) = (kept::path(folder, outlines.scene), outlines.frames);
+            let kept = Kept {
+                plan: plan.clone(),
+                compensated: self.compensated.clone(),
+            };
+            // It ends by itself; what it has written is looked for by another window.
+            let _writes = std::thread::Builder::new()
+                .name("keep plan".to_owned())
+                .spawn(move || kept.write(&path, &frames));
+        }
     }
 
     fn take_problems(&mut self) {
@@ -341,6 +397,7 @@ impl Planner {
 
     /// A needle is inserted now, with so many seeds in the tissue.
     pub fn begin_needle(&mut self, number: usize, seeds: usize) {
+        self.keep();
         let mut progress = self.progress.clone();
         progress.begin(number, seeds);
         self.set_progress(progress);

@@ -8,6 +8,7 @@
 //! the best drops of the single seeds are tried together. What half of the rehearsals do not bring home is looked for around
 //! each seed's best drop.
 
+use serde::{Deserialize, Serialize};
 use super::rehearse::{Drops, RehearsalError, Rehearser, Rest};
 use super::{Loading, Needle};
 use nalgebra::Vector3;
@@ -57,7 +58,7 @@ const AROUND_M: [f64; 6] = [0.3e-3, -0.3e-3, 0.6e-3, -0.6e-3, 0.15e-3, -0.15e-3]
 const DEEPER_M: f64 = 1e-3;
 
 /// One needle, before and after.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Compensation {
     /// The drops that leave the smallest errors.
     pub drops: Drops,

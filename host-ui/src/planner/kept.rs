@@ -1,0 +1,95 @@
+//! The plan that needles are inserted by, kept beside the core's shared memory: a window that was closed or killed finds it
+//! again while that run of the core lasts, and it goes with the core.
+
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use stylet_anatomy::PatientFrame;
+use stylet_base::{input, write_whole};
+use stylet_implant::plan::{Compensation, ImplantPlan, Needle, file};
+use stylet_shm_schema::SceneId;
+
+/// More is no plan of ours.
+const MOST_BYTES: u64 = 4 << 20;
+
+/// A plan, and what its needles were compensated by.
+pub struct Kept {
+    /// The plan.
+    pub plan: ImplantPlan,
+    /// Of the needles that were rehearsed.
+    pub compensated: Vec<(Needle, Compensation)>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Stored {
+    plan: String,
+    /// With the number of the needle.
+    compensated: Vec<(usize, Compensation)>,
+}
+
+/// The file for a scene of a run of the core.
+pub fn path(folder: &Path, scene: SceneId) -> PathBuf {
+    folder.join(format!("plan-{:016x}-{}.json", scene.session_id, scene.generation))
+}
+
+impl Kept {
+    /// Writes it. What cannot be written is not found again, and nothing else is lost by that.
+    pub fn write(&self, path: &Path, frames: &PatientFrame) {
+        let Ok(plan) = file::to_text(&self.plan, frames) else { return };
+        let number = |needle: &Needle| self.plan.needles.iter().position(|n| n == needle);
+        let compensated = self.compensated.iter();
+        let compensated = compensated.filter_map(|(needle, done)| Some((number(needle)?, done.clone())));
+        let stored = Stored {
+            plan,
+            compensated: compensated.collect(),
+        };
+        if let Ok(bytes) = serde_json::to_vec(&stored) {
+            let _kept = write_whole(path, &bytes);
+        }
+    }
+
+    /// Reads it, if it is there and whole.
+    pub fn read(path: &Path, frames: &PatientFrame) -> Option<Self> {
+        let stored: Stored = serde_json::from_slice(&input::read(path, MOST_BYTES).ok()?).ok()?;
+        let plan = file::from_text(&stored.plan, frames).ok()?;
+        let needle = |(number, done): (usize, Compensation)| Some((plan.needles.get(number)?.clone(), done));
+        let compensated = stored.compensated.into_iter().filter_map(needle).collect();
+        Some(Self { plan, compensated })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stylet_implant::plan::Drops;
+
+    #[test]
+    fn a_plan_is_found_again_with_its_compensation() {
+        let mut planner = super::super::tests::planner();
+        let plan = planner.plan().expect("a plan").clone();
+        planner.restart();
+        let done = Compensation {
+            drops: Drops::as_planned(&plan.needles[1]),
+            before_m: None,
+            after_m: vec![[1e-4, 0.0, 0.0]; plan.needles[1].seeds.len()],
+            rehearsals: 3,
+        };
+        let frames = PatientFrame::default();
+        let scene = SceneId {
+            session_id: 7,
+            generation: 2,
+        };
+        let path = path(&std::env::temp_dir(), scene).with_extension(std::process::id().to_string());
+        let kept = Kept {
+            compensated: vec![(plan.needles[1].clone(), done.clone())],
+            plan: plan.clone(),
+        };
+        kept.write(&path, &frames);
+        let found = Kept::read(&path, &frames).expect("found");
+        assert_eq!(found.plan.needles.len(), plan.needles.len());
+        assert_eq!(found.compensated.len(), 1);
+        assert_eq!(found.compensated[0].1.rehearsals, 3);
+        std::fs::write(&path, b"{}").expect("written");
+        assert!(Kept::read(&path, &frames).is_none(), "what is not whole is not used");
+        let _removed = std::fs::remove_file(&path);
+    }
+}
