@@ -139,7 +139,6 @@ impl Passes {
     }
 
     fn pass(&mut self) {
-        self.connect();
         self.send();
         if let Some(ports) = self.ports.take() {
             self.receive(&ports);
@@ -148,6 +147,8 @@ impl Passes {
         }
         self.feel_pulse();
         self.tidy();
+        // Last: after a pause of this thread the ports seem deaf until their queues are read, and new ones have none.
+        self.connect();
     }
 
     fn connect(&mut self) {
