@@ -106,7 +106,10 @@ impl<const N: usize> Envelope<N> {
         let newest_ns = self.newest_ns.unwrap_or(0);
         self.slots.iter().map(move |slot| {
             let [low, high] = slot.extremes[quantity];
-            let middle_ns = slot.number.saturating_mul(self.slot_ns).saturating_add(self.slot_ns / 2);
+            let middle_ns = slot
+                .number
+                .saturating_mul(self.slot_ns)
+                .saturating_add(self.slot_ns / 2);
             Band {
                 time_ns: middle_ns.min(newest_ns),
                 low,

@@ -29,7 +29,11 @@ impl Seen {
     /// assert_eq!(seen.words(), "28 930 of 60 000 ticks seen");
     /// ```
     pub fn words(self) -> String {
-        format!("{} of {} ticks seen", format::count(self.seen), format::count(self.ran()))
+        format!(
+            "{} of {} ticks seen",
+            format::count(self.seen),
+            format::count(self.ran())
+        )
     }
 }
 

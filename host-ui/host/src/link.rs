@@ -3,8 +3,8 @@
 mod inbox;
 mod ports;
 mod receive;
-mod receiver;
 mod received;
+mod receiver;
 
 use inbox::{Pulse, RECORDS_KEPT};
 use receive::Latest;

@@ -273,7 +273,7 @@ impl App {
                         n => format!("All {n} needles are done."),
                     },
                 }),
-                RunStatus::Failed(why) => Some(refusal(format!("The run stopped: {why}. It can be gone on with."))),
+                RunStatus::Failed(why) => Some(refusal(format!("The run stopped: {why}"))),
             };
             if self.shown.note.is_some() {
                 self.end_run();

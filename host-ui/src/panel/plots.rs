@@ -98,7 +98,9 @@ fn seen_ui(ui: &mut egui::Ui, of: &str, seen: Seen) {
     if seen.is_all() {
         return;
     }
-    let text = RichText::new(format!("{of}: {}", seen.words())).small().color(theme::of(ui).warn);
+    let text = RichText::new(format!("{of}: {}", seen.words()))
+        .small()
+        .color(theme::of(ui).warn);
     ui.label(text).on_hover_text(
         "The other ticks ran, and their records did not reach this window. Deadlines that the core itself missed are no \
          ticks: they are counted under \"missed deadlines\".",

@@ -37,7 +37,7 @@ impl Planner {
         (self.history, self.job, self.problems) = (None, None, None);
         if let (Some(folder), Some(outlines)) = (&self.kept_in, &self.outlines) {
             // Mostly there is none.
-            let _removed = std::fs::remove_file(super::kept::path(folder, outlines.scene));
+            let _removed = std::fs::remove_file(super::kept::path_of(folder, outlines.scene));
         }
         self.compensated.clear();
         self.progress = NeedleProgress::default();

@@ -1,9 +1,11 @@
 //! The plan that needles are inserted by, kept beside the core's shared memory: a window that was closed or killed finds it
 //! again while that run of the core lasts, and it goes with the core.
 
+use super::{Message, Planner};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use stylet_anatomy::PatientFrame;
+use stylet_base::job::{Job, JobUpdate};
 use stylet_base::{input, write_whole};
 use stylet_implant::plan::{Compensation, ImplantPlan, Needle, file};
 use stylet_shm_schema::SceneId;
@@ -27,14 +29,16 @@ struct Stored {
 }
 
 /// The file for a scene of a run of the core.
-pub fn path(folder: &Path, scene: SceneId) -> PathBuf {
+pub fn path_of(folder: &Path, scene: SceneId) -> PathBuf {
     folder.join(format!("plan-{:016x}-{}.json", scene.session_id, scene.generation))
 }
 
 impl Kept {
     /// Writes it. What cannot be written is not found again, and nothing else is lost by that.
     pub fn write(&self, path: &Path, frames: &PatientFrame) {
-        let Ok(plan) = file::to_text(&self.plan, frames) else { return };
+        let Ok(plan) = file::to_text(&self.plan, frames) else {
+            return;
+        };
         let number = |needle: &Needle| self.plan.needles.iter().position(|n| n == needle);
         let compensated = self.compensated.iter();
         let compensated = compensated.filter_map(|(needle, done)| Some((number(needle)?, done.clone())));
@@ -54,6 +58,56 @@ impl Kept {
         let needle = |(number, done): (usize, Compensation)| Some((plan.needles.get(number)?.clone(), done));
         let compensated = stored.compensated.into_iter().filter_map(needle).collect();
         Some(Self { plan, compensated })
+    }
+}
+
+impl Planner {
+    /// The plan is kept in this folder while needles are inserted, and looked for there.
+    #[must_use]
+    pub fn keeping_in(self, folder: PathBuf) -> Self {
+        Self {
+            kept_in: Some(folder),
+            ..self
+        }
+    }
+
+    /// A plan that another window of this run of the core has begun to insert.
+    pub(super) fn take_kept(&mut self) {
+        let (Some(folder), Some(outlines)) = (&self.kept_in, &self.outlines) else {
+            return;
+        };
+        if self.looked.as_ref().is_none_or(|(scene, _)| *scene != outlines.scene) {
+            let (path, frames) = (path_of(folder, outlines.scene), outlines.frames);
+            let job = Job::begin("kept plan", move |messages, _| {
+                if let Some(kept) = Kept::read(&path, &frames) {
+                    let _ = messages.send(kept);
+                }
+            });
+            self.looked = Some((outlines.scene, job));
+        }
+        let Some((_, job)) = &self.looked else { return };
+        if let JobUpdate::Message(kept) = job.poll()
+            && self.history.is_none()
+        {
+            self.put(kept.plan);
+            self.compensated = kept.compensated;
+            self.message = Some(Message::Done("The plan of this implant was found again.".to_owned()));
+        }
+    }
+
+    /// Keeps the plan for another window, on a thread of its own.
+    pub(super) fn keep(&self) {
+        if let (Some(folder), Some(outlines), Some(plan)) = (&self.kept_in, &self.outlines, self.plan()) {
+            let (path, frames) = (path_of(folder, outlines.scene), outlines.frames);
+            let kept = Kept {
+                plan: plan.clone(),
+                compensated: self.compensated.clone(),
+            };
+            // It ends by itself; what it has written is looked for by another window.
+            let _writes = std::thread::Builder::new()
+                .name("keep plan".to_owned())
+                .spawn(move || kept.write(&path, &frames));
+        }
     }
 }
 
@@ -78,7 +132,7 @@ mod tests {
             session_id: 7,
             generation: 2,
         };
-        let path = path(&std::env::temp_dir(), scene).with_extension(std::process::id().to_string());
+        let path = path_of(&std::env::temp_dir(), scene).with_extension(std::process::id().to_string());
         let kept = Kept {
             compensated: vec![(plan.needles[1].clone(), done.clone())],
             plan: plan.clone(),

@@ -10,8 +10,8 @@ mod outlines;
 mod shown;
 
 use jobs::JobMessage;
-use kept::Kept;
 pub(crate) use jobs::JobProgress;
+use kept::Kept;
 pub(crate) use needles::NeedleProgress;
 pub use needles::NeedleState;
 pub(crate) use outlines::{AnatomyOutlines, Outline};
@@ -180,54 +180,6 @@ impl Planner {
     fn no_outlines(&mut self, key: SceneId, template: Template, why: &str) {
         (self.outlines, self.outlining, self.failed) = (None, None, Some((key, template)));
         self.message = Some(Message::Refused(format!("No plan can be made for this scene: {why}")));
-    }
-
-    /// The plan is kept in this folder while needles are inserted, and looked for there.
-    #[must_use]
-    pub fn keeping_in(self, folder: PathBuf) -> Self {
-        Self {
-            kept_in: Some(folder),
-            ..self
-        }
-    }
-
-    /// A plan that another window of this run of the core has begun to insert.
-    fn take_kept(&mut self) {
-        let (Some(folder), Some(outlines)) = (&self.kept_in, &self.outlines) else {
-            return;
-        };
-        if self.looked.as_ref().is_none_or(|(scene, _)| *scene != outlines.scene) {
-            let (path, frames) = (kept::path(folder, outlines.scene), outlines.frames);
-            let job = Job::begin("kept plan", move |messages, _| {
-                if let Some(kept) = Kept::read(&path, &frames) {
-                    let _ = messages.send(kept);
-                }
-            });
-            self.looked = Some((outlines.scene, job));
-        }
-        let Some((_, job)) = &self.looked else { return };
-        if let JobUpdate::Message(kept) = job.poll()
-            && self.history.is_none()
-        {
-            self.put(kept.plan);
-            self.compensated = kept.compensated;
-            self.message = Some(Message::Done("The plan of this implant was found again.".to_owned()));
-        }
-    }
-
-    /// Keeps the plan for another window, on a thread of its own.
-    fn keep(&self) {
-        if let (Some(folder), Some(outlines), Some(plan)) = (&self.kept_in, &self.outlines, self.plan()) {
-            let (path, frames) = (kept::path(folder, outlines.scene), outlines.frames);
-            let kept = Kept {
-                plan: plan.clone(),
-                compensated: self.compensated.clone(),
-            };
-            // It ends by itself; what it has written is looked for by another window.
-            let _writes = std::thread::Builder::new()
-                .name("keep plan".to_owned())
-                .spawn(move || kept.write(&path, &frames));
-        }
     }
 
     fn take_problems(&mut self) {

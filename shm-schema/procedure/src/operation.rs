@@ -86,7 +86,7 @@ pub enum Operation {
     Place,
     /// Move the tip to the first drop.
     Insert,
-    /// Move the tip inwards to a drop, counted from 0 in its needle, where the needle is gone on with.
+    /// Move the tip inwards to a drop, counted from 0 in its needle, where the needle is continued.
     InsertTo(usize),
     /// Drop a seed, counted from 0 over all needles.
     Drop(usize),

@@ -256,7 +256,9 @@ fn a_script_that_was_stopped_goes_on_in_this_window_and_in_the_next() {
     driven.window.get_by_label("Needle 2 of 2");
     // Another window finds the plan of the first, and looks at what is in the tissue.
     driven.reopen(SMALL);
-    driven.until("the plan", |app| app.planner().plan().is_some_and(|plan| plan.needles.len() == 2));
+    driven.until("the plan", |app| {
+        app.planner().plan().is_some_and(|plan| plan.needles.len() == 2)
+    });
     wait_long_for_label(&mut driven, "Go on at needle 2 of 2");
     driven.click("Go on at needle 2 of 2");
     wait_long(&mut driven, "all needles", |app| app.planner().progress().done() == 2);
@@ -264,7 +266,10 @@ fn a_script_that_was_stopped_goes_on_in_this_window_and_in_the_next() {
     driven.window.get_by_label("All 2 needles are done.");
     let placed = driven.window.state().link().snapshot().expect("a snapshot").header;
     assert_eq!(placed.seed_count, 4);
-    let dropped_at_m = placed.seeds[..4].iter().map(|seed| seed.dropped_at_m).collect::<Vec<_>>();
+    let dropped_at_m = placed.seeds[..4]
+        .iter()
+        .map(|seed| seed.dropped_at_m)
+        .collect::<Vec<_>>();
     for (n, one) in dropped_at_m.iter().enumerate() {
         let apart = |other: &[f64; 3]| (0..3).map(|a| (one[a] - other[a]).powi(2)).sum::<f64>().sqrt();
         let nearest_m = dropped_at_m[..n].iter().map(apart).fold(f64::MAX, f64::min);

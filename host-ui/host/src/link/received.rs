@@ -1,9 +1,7 @@
 //! What a host knows of the core, as types of its own.
 
 use std::time::Duration;
-use stylet_shm_schema::{
-    Reason, Refusal, RefusalCode, Reply, ReplyStatus, SceneHeader, SnapshotHeader, Vertex, check,
-};
+use stylet_shm_schema::{Reason, Refusal, RefusalCode, Reply, ReplyStatus, SceneHeader, SnapshotHeader, Vertex, check};
 
 /// Whether the core runs.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,9 +1,9 @@
 //! A host against a core made of the same ports.
 
 use super::*;
-use std::time::Instant;
 use bytemuck::Zeroable;
 use iceoryx2::prelude::PortFactory;
+use std::time::Instant;
 use stylet_shm_schema::service;
 
 /// A name that leaves nothing in shared memory; to be dropped last.
@@ -258,5 +258,8 @@ fn a_request_that_cannot_be_sent_is_answered() {
         answer.is_some()
     }));
     let answer = answer.unwrap();
-    assert!(!answer.accepted && answer.text.contains("queue is full or it has just ended"), "{answer:?}");
+    assert!(
+        !answer.accepted && answer.text.contains("queue is full or it has just ended"),
+        "{answer:?}"
+    );
 }

@@ -50,5 +50,8 @@ fn what_a_recording_lacks_is_listed_for_each_kind() {
         assert!(words.contains(part), "{words}");
     }
     let error = totals.verdict().unwrap_err().to_string();
-    assert!(error.starts_with("1000 ticks are missing in 1 gaps, 600 of them lost in the core; 3 events"), "{error}");
+    assert!(
+        error.starts_with("1000 ticks are missing in 1 gaps, 600 of them lost in the core; 3 events"),
+        "{error}"
+    );
 }

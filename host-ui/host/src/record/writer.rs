@@ -72,7 +72,11 @@ impl Totals {
         let line = |(what, gaps): (&str, &Gaps)| {
             let first: Vec<String> = gaps.gaps().iter().take(GAPS_PRINTED).map(Gap::to_string).collect();
             let more = gaps.gaps().len().saturating_sub(GAPS_PRINTED);
-            let more = if more > 0 { format!(", and {more} more") } else { String::new() };
+            let more = if more > 0 {
+                format!(", and {more} more")
+            } else {
+                String::new()
+            };
             (!first.is_empty()).then(|| format!("missing {what}: {}{more}", first.join(", ")))
         };
         [("ticks", &self.gaps), ("events", &self.events)]

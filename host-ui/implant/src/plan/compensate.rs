@@ -8,10 +8,10 @@
 //! the best drops of the single seeds are tried together. What half of the rehearsals do not bring home is looked for around
 //! each seed's best drop.
 
-use serde::{Deserialize, Serialize};
 use super::rehearse::{Drops, RehearsalError, Rehearser, Rest};
 use super::{Loading, Needle};
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use stylet_procedure::Pace;
 
 /// What compensation may do.

@@ -1,7 +1,7 @@
 //! One needle rehearsed: what the operator would do, and where the seeds would rest.
 
-use serde::{Deserialize, Serialize};
 use super::Needle;
+use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Link, LinkError, LinkStatus};

@@ -215,7 +215,7 @@ fn curve(dvh: &Dvh, most_gy: f64) -> Vec<(f64, f64)> {
     (0..=STEPS).map(|i| (at(i), share(at(i)))).collect()
 }
 
-/// Stretches of a curve over time that are told apart.
+/// Stretches of a curve over time that can be distinguished.
 const STRETCHES: usize = 900;
 /// Records so many times farther apart than usual, and by this at least, have a gap between them.
 const USUAL_TIMES: u64 = 4;
@@ -276,7 +276,7 @@ fn series(
     let per_stretch = records.len().div_ceil(STRETCHES).max(1);
     for piece in pieces(records) {
         chart.draw_series(LineSeries::new(
-            thinned(piece, per_stretch, &seconds, &value),
+            thinned(piece, per_stretch, seconds, &value),
             colour.stroke_width(1),
         ))?;
     }

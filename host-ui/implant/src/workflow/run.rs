@@ -6,7 +6,8 @@ use crate::plan::{Drops, Needle};
 use std::time::{Duration, Instant};
 use stylet_host::link::{Link, LinkError, LinkStatus};
 use stylet_procedure::{
-    Done, HandRequest, NeedleWay, Next, Observed, Pace, Patience, Procedure, Reply, Step, StepFailure, Waiting, needle_inside,
+    Done, HandRequest, NeedleWay, Next, Observed, Pace, Patience, Procedure, Reply, Step, StepFailure, Waiting,
+    needle_inside,
 };
 use stylet_shm_schema::{HapticState, RefusalCode, Request};
 
@@ -105,7 +106,10 @@ impl Placed {
     /// no seed.
     pub fn find(tasks: &[NeedleTask], dropped_at_m: &[[f64; 3]], tip_m: Option<[f64; 3]>, lost: &[usize]) -> Self {
         let ways: Vec<NeedleWay> = tasks.iter().map(|task| task.drops.way()).collect();
-        let drops_m: Vec<[f64; 3]> = ways.iter().flat_map(|way| way.drops_m.iter().map(|&d| d.into())).collect();
+        let drops_m: Vec<[f64; 3]> = ways
+            .iter()
+            .flat_map(|way| way.drops_m.iter().map(|&d| d.into()))
+            .collect();
         let made = pairing::made(&drops_m, dropped_at_m);
         let mut from = 0;
         let mut count = |way: &NeedleWay| {
@@ -123,7 +127,9 @@ impl Placed {
         };
         let is_left = |(needle, way): (usize, &NeedleWay)| {
             let first: usize = ways[..needle].iter().map(|way| way.drops_m.len()).sum();
-            (first..first + way.drops_m.len()).any(|n| !done.drops.contains(&n)).then_some(needle)
+            (first..first + way.drops_m.len())
+                .any(|n| !done.drops.contains(&n))
+                .then_some(needle)
         };
         let next = ways.iter().enumerate().find_map(is_left);
         let next = done.inside.map(|(needle, _)| needle).or(next);
@@ -135,7 +141,7 @@ impl Placed {
         }
     }
 
-    /// Whether something was done and something is left: it can be gone on with.
+    /// Whether something was done and something is left: it can be continued.
     pub fn is_partial(&self) -> bool {
         let made = self.done.drops.len();
         made > 0 && (made < self.drops || self.done.inside.is_some())

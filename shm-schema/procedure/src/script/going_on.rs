@@ -1,4 +1,4 @@
-//! A procedure that was stopped is gone on with from what is in the tissue: the seeds, and the needle if it is still there.
+//! A procedure that was stopped is continued from what is in the tissue: the seeds, and the needle if it is still there.
 
 use crate::tolerance::{OUTSIDE_M, PLACED_WITHIN_M};
 use crate::{NeedleWay, Operation};
@@ -42,7 +42,10 @@ pub(super) fn ahead(ways: &[NeedleWay], done: &Done) -> VecDeque<(usize, Operati
         let first: usize = ways[..needle].iter().map(|way| way.drops_m.len()).sum();
         let is_left = |index: &usize| !done.drops.contains(&(first + index));
         let left: Vec<usize> = (0..way.drops_m.len()).filter(is_left).collect();
-        let depth_m = done.inside.filter(|_| inside == Some(needle)).map(|(_, depth_m)| depth_m);
+        let depth_m = done
+            .inside
+            .filter(|_| inside == Some(needle))
+            .map(|(_, depth_m)| depth_m);
         if left.is_empty() && depth_m.is_none() {
             continue;
         }

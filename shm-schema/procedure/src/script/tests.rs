@@ -197,7 +197,10 @@ fn what_is_not_answered_refused_or_without_effect_ends_the_procedure() {
     assert_eq!(refused, Err("Reset was refused: no".to_owned()));
     let mut unseen = Procedure::of_needles(vec![way()], Pace::default());
     assert_eq!(unseen.advance(0.0, None, Reply::Pending), Ok(Next::Wait));
-    assert_eq!(unseen.advance(3.1, None, Reply::Pending), Err(StepFailure::NoState(3.0)));
+    assert_eq!(
+        unseen.advance(3.1, None, Reply::Pending),
+        Err(StepFailure::NoState(3.0))
+    );
 }
 
 #[test]
@@ -225,19 +228,25 @@ fn an_operator_decides_how_long_is_waited_and_sees_what_for() {
         procedure
     };
     let mut procedure = begin(Patience::Operator);
-    assert_eq!(procedure.advance(3_600.0, Some(&observed), Reply::Pending), Ok(Next::Wait));
+    assert_eq!(
+        procedure.advance(3_600.0, Some(&observed), Reply::Pending),
+        Ok(Next::Wait)
+    );
     let waiting = procedure.waiting();
     assert_eq!((waiting.waits_for, waiting.for_s), (WaitsFor::Reply("Reset"), 3_600.0));
     assert_eq!(waiting.waits_for.to_string(), "a reply to Reset");
-    assert_eq!(procedure.advance(3_601.0, Some(&observed), Reply::InEffect), Ok(Next::Continue));
+    assert_eq!(
+        procedure.advance(3_601.0, Some(&observed), Reply::InEffect),
+        Ok(Next::Continue)
+    );
     let mut unwatched = begin(Patience::AtLeast(60.0));
     assert_eq!(unwatched.advance(59.0, Some(&observed), Reply::Pending), Ok(Next::Wait));
     let failed = unwatched.advance(61.0, Some(&observed), Reply::Pending);
     assert_eq!(failed, Err(StepFailure::NoReply("Reset", 60.0)));
 }
 
-/// Stopped after `sent` requests, and gone on with by what is in the tissue: what is sent after that.
-fn gone_on_with(ways: &[NeedleWay], sent: usize) -> (Obedient, Vec<HandRequest>) {
+/// Stopped after `sent` requests, and continued by what is in the tissue: what is sent after that.
+fn continued(ways: &[NeedleWay], sent: usize) -> (Obedient, Vec<HandRequest>) {
     let mut hand = Obedient::new();
     let mut procedure = Procedure::of_needles(ways.to_vec(), Pace::default());
     while hand.sent.len() < sent {
@@ -266,7 +275,7 @@ fn a_procedure_goes_on_from_wherever_it_was_stopped_with_no_seed_twice_and_none_
     let mut whole = Obedient::new();
     whole.go_through(&mut Procedure::of_needles(ways.to_vec(), Pace::default()), &[]);
     for stopped in 3..=whole.sent.len() {
-        let (hand, before) = gone_on_with(&ways, stopped);
+        let (hand, before) = continued(&ways, stopped);
         assert_eq!(hand.state.seed_count, 6, "stopped after {:?}", words(&before));
         assert!(!hand.sent.contains(&HandRequest::Reset), "{:?}", words(&hand.sent));
         let drops = [before, hand.sent].concat();
@@ -274,6 +283,9 @@ fn a_procedure_goes_on_from_wherever_it_was_stopped_with_no_seed_twice_and_none_
         assert_eq!(drops, 6, "stopped after {stopped}");
     }
     // In the second needle, with its first seed dropped: straight to the second.
-    let (hand, _) = gone_on_with(&ways, 13);
-    assert_eq!(words(&hand.sent)[..4], ["plan 1", "Engage", "20 mm at 50 mm/s", "DropSeed"]);
+    let (hand, _) = continued(&ways, 13);
+    assert_eq!(
+        words(&hand.sent)[..4],
+        ["plan 1", "Engage", "20 mm at 50 mm/s", "DropSeed"]
+    );
 }
