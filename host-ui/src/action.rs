@@ -26,6 +26,8 @@ pub enum Action {
     Redo,
     Plan(PlanAction),
     RunAll,
+    /// All needles again, from a reset, whatever was done.
+    RunAnew,
     StopRun,
     LoadScene(PathBuf),
     /// Loads an image of the patient of the present scene for the slices.

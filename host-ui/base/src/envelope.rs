@@ -11,17 +11,27 @@ pub struct Band {
     pub low: f32,
     /// Largest value in the slot.
     pub high: f32,
+    /// Whether it goes on from the band before it: nothing is missing between them.
+    pub joined: bool,
 }
 
 /// Smallest and largest.
 type Extremes = [f32; 2];
 
+#[derive(Clone, Copy, Debug)]
+struct Slot<const N: usize> {
+    number: u64,
+    extremes: [Extremes; N],
+    joined: bool,
+}
+
 /// Envelope of `N` quantities that are sampled together. The slots lie on the grid of time itself, so that a line that moves on keeps its shape.
 #[derive(Clone, Debug)]
 pub struct Envelope<const N: usize> {
     slot_ns: u64,
-    slots: VecDeque<(u64, [Extremes; N])>,
+    slots: VecDeque<Slot<N>>,
     newest_ns: Option<u64>,
+    after_gap: bool,
 }
 
 impl<const N: usize> Envelope<N> {
@@ -31,7 +41,13 @@ impl<const N: usize> Envelope<N> {
             slot_ns: slot_ns.max(1),
             slots: VecDeque::new(),
             newest_ns: None,
+            after_gap: false,
         }
+    }
+
+    /// The next sample does not follow the last one: nobody measured what was between.
+    pub fn gap(&mut self) {
+        self.after_gap = true;
     }
 
     /// Adds a sample. Times must rise; a sample with an older one is counted to the newest slot.
@@ -39,15 +55,23 @@ impl<const N: usize> Envelope<N> {
         self.newest_ns = self.newest_ns.max(Some(time_ns));
         let (number, extremes) = (time_ns / self.slot_ns, values.map(|v| [v, v]));
         match self.slots.back_mut() {
-            Some((last, slot)) if number <= *last => join(slot, extremes),
-            _ => self.slots.push_back((number, extremes)),
+            Some(last) if number <= last.number => join(&mut last.extremes, extremes),
+            last => {
+                let follows = last.is_some_and(|last| number == last.number + 1);
+                self.slots.push_back(Slot {
+                    number,
+                    extremes,
+                    joined: follows && !self.after_gap,
+                });
+            }
         }
+        self.after_gap = false;
     }
 
     /// Drops the slots that ended before that time.
     pub fn forget_before(&mut self, time_ns: u64) {
         let first = time_ns / self.slot_ns;
-        while self.slots.front().is_some_and(|(number, _)| *number < first) {
+        while self.slots.front().is_some_and(|slot| slot.number < first) {
             self.slots.pop_front();
         }
     }
@@ -57,10 +81,11 @@ impl<const N: usize> Envelope<N> {
         while self.slots.len() > most.max(1) {
             self.slot_ns = self.slot_ns.saturating_mul(2);
             let narrow = std::mem::take(&mut self.slots);
-            for (number, extremes) in narrow {
+            for slot in narrow {
+                let number = slot.number / 2;
                 match self.slots.back_mut() {
-                    Some((last, slot)) if number / 2 == *last => join(slot, extremes),
-                    _ => self.slots.push_back((number / 2, extremes)),
+                    Some(last) if number == last.number => join(&mut last.extremes, slot.extremes),
+                    _ => self.slots.push_back(Slot { number, ..slot }),
                 }
             }
         }
@@ -79,15 +104,31 @@ impl<const N: usize> Envelope<N> {
     /// Bands of one quantity, one for each slot, at its middle.
     pub fn bands(&self, quantity: usize) -> impl Iterator<Item = Band> {
         let newest_ns = self.newest_ns.unwrap_or(0);
-        self.slots.iter().map(move |(number, slot)| {
-            let [low, high] = slot[quantity];
-            let middle_ns = number.saturating_mul(self.slot_ns).saturating_add(self.slot_ns / 2);
+        self.slots.iter().map(move |slot| {
+            let [low, high] = slot.extremes[quantity];
+            let middle_ns = slot
+                .number
+                .saturating_mul(self.slot_ns)
+                .saturating_add(self.slot_ns / 2);
             Band {
                 time_ns: middle_ns.min(newest_ns),
                 low,
                 high,
+                joined: slot.joined,
             }
         })
+    }
+
+    /// Bands of one quantity, cut where something is missing between two of them.
+    pub fn pieces(&self, quantity: usize) -> Vec<Vec<Band>> {
+        let mut pieces: Vec<Vec<Band>> = Vec::new();
+        for band in self.bands(quantity) {
+            match pieces.last_mut() {
+                Some(piece) if band.joined => piece.push(band),
+                _ => pieces.push(vec![band]),
+            }
+        }
+        pieces
     }
 }
 
@@ -152,5 +193,26 @@ mod tests {
         assert_eq!(envelope.newest_ns(), Some(sample(999).0));
         envelope.forget_before(u64::MAX);
         assert!(envelope.is_empty());
+    }
+
+    /// A line was drawn from the last sample before a loss to the first after it: a ramp that nobody measured.
+    #[test]
+    fn what_was_not_measured_cuts_the_curve() {
+        let mut envelope = Envelope::new(40 * MS);
+        let add = |envelope: &mut Envelope<2>, ticks: std::ops::Range<u64>| {
+            ticks.map(sample).for_each(|(t, v)| envelope.add(t, v));
+        };
+        let lengths = |e: &Envelope<2>| e.pieces(0).iter().map(Vec::len).collect::<Vec<_>>();
+        add(&mut envelope, 0..400);
+        // Time without a sample.
+        add(&mut envelope, 480..800);
+        // A loss of some ticks between two slots that both have samples, and one inside a slot.
+        envelope.gap();
+        add(&mut envelope, 810..820);
+        envelope.gap();
+        add(&mut envelope, 830..1_200);
+        assert_eq!(lengths(&envelope), [10, 8, 10]);
+        envelope.widen_to(15);
+        assert_eq!(lengths(&envelope), [5, 4, 5]);
     }
 }

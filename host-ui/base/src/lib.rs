@@ -1,5 +1,5 @@
 //! What every part of the host program uses: units for people, long work that can be interrupted, files that are written
-//! whole, curves in slots of time, spellings of nuclides.
+//! whole, curves in slots of time, ticks that were seen, spellings of nuclides.
 
 #![warn(missing_docs)]
 
@@ -10,5 +10,6 @@ pub mod interrupt;
 pub mod job;
 pub mod nuclide;
 pub mod progress_bar;
+pub mod seen;
 
 pub use stylet_write::{WriteError, write_streamed, write_whole};

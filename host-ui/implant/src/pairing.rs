@@ -65,6 +65,20 @@ pub fn nearest(planned_m: &[[f64; 3]], dropped_at_m: &[[f64; 3]]) -> Vec<Option<
     placed
 }
 
+/// A seed that left the tip farther than this from a planned drop was dropped for something else, m. A tip that is held back
+/// counts as arrived within 2 mm.
+const DROPPED_WITHIN_M: f64 = 2.5e-3;
+
+/// Which of the planned drops were made, by where the tip was when seeds left it: for each drop, whether there is a seed of it.
+pub fn made(drops_m: &[[f64; 3]], dropped_at_m: &[[f64; 3]]) -> Vec<bool> {
+    let seeds = nearest(drops_m, dropped_at_m);
+    let is_near = |(drop_m, seed): (&[f64; 3], &Option<usize>)| {
+        let seed_m = seed.map(|seed| Vector3::from(dropped_at_m[seed]));
+        seed_m.is_some_and(|seed_m| (seed_m - Vector3::from(*drop_m)).norm() <= DROPPED_WITHIN_M)
+    };
+    drops_m.iter().zip(&seeds).map(is_near).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -79,6 +93,16 @@ mod tests {
         assert_eq!(nearest(&[at(0.01), at(0.02)], &[at(0.02)]), [None, Some(0)]);
         let off = SeedOffset::of(at(0.01), [0.003, 0.0, 0.011], [0.0, 0.0, 1.0]);
         assert!((off.along_m - 0.001).abs() < 1e-12 && (off.across_m - 0.003).abs() < 1e-12);
+    }
+
+    /// After a seed dropped by hand elsewhere, counting seeds would leave a planned one out.
+    #[test]
+    fn drops_are_known_by_their_places_and_a_seed_elsewhere_is_of_none() {
+        let at = |z: f64| [0.0, 0.0, z];
+        let planned = [at(0.05), at(0.04), at(0.03)];
+        let dropped = [at(0.0505), [0.02, 0.0, 0.04], at(0.031)];
+        assert_eq!(made(&planned, &dropped), [true, false, true]);
+        assert_eq!(made(&planned, &[]), [false; 3]);
     }
 
     #[test]

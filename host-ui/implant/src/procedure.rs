@@ -7,7 +7,7 @@ mod error;
 pub mod job;
 mod report;
 
-use crate::workflow::{Pace, Run, RunStatus, Step};
+use crate::workflow::{Pace, Patience, Run, RunStatus, Step};
 use child::Core;
 pub use error::ProcedureError;
 use job::Job;
@@ -21,6 +21,8 @@ use stylet_host::core_args::{CoreArgs, SceneChoice};
 use stylet_host::link::{Link, LinkStatus, SceneModel};
 use stylet_shm_schema::*;
 
+/// Nobody watches: what has not arrived by then does not.
+const UNWATCHED: Patience = Patience::AtLeast(60.0);
 const POLL_EVERY: Duration = Duration::from_millis(5);
 const FIND_LIMIT: Duration = Duration::from_secs(3);
 const START_LIMIT: Duration = Duration::from_secs(20);
@@ -272,7 +274,7 @@ fn perform(
     interrupted: &Interrupt,
     seen: &mut Seen,
 ) -> Result<(), ProcedureError> {
-    let mut run = Run::of_needles(job.tasks.clone(), pace);
+    let mut run = Run::of_needles(job.tasks.clone(), pace).with_patience(UNWATCHED);
     let begun = Instant::now();
     let mut step: Option<(usize, Step)> = None;
     seen.last_event = link.events().back().map(|e| e.sequence);

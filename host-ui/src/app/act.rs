@@ -100,6 +100,7 @@ impl App {
             },
             Action::Plan(action) => self.act_on_plan(action),
             Action::RunAll => self.run_all(),
+            Action::RunAnew => self.run_anew(),
             Action::PlanSeeds => {
                 if let Some(scene) = &self.shown.scene {
                     let request = plan_request(&default_plan(scene));
@@ -165,7 +166,7 @@ impl App {
 
     /// The needle stays where it is; the force stays as it is.
     fn stop_run(&mut self) {
-        self.run = None;
+        self.end_run();
         self.shown.running = false;
         if let Some(tip) = self.shown.tip_on_path() {
             self.drive.stop(&tip);

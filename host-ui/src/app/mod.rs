@@ -28,7 +28,7 @@ use stylet_files::Image;
 use stylet_host::core_args::SceneChoice;
 use stylet_host::link::{Link, LinkStatus};
 use stylet_implant::score::Trace;
-use stylet_implant::workflow::{Pace, Run};
+use stylet_implant::workflow::{NeedleTask, Pace, Placed, Run};
 use stylet_shm_schema::service::Instance;
 
 const LIVE_FRAME: Duration = Duration::from_millis(16);
@@ -84,6 +84,11 @@ pub struct App {
     run: Option<Run>,
     /// Which needles of the plan the script goes through.
     run_needles: Vec<usize>,
+    /// What was in the tissue when the script began or went on.
+    run_placed: Placed,
+    /// Needles of a script that was stopped, and its drops that left no seed.
+    run_lost: (Vec<NeedleTask>, Vec<usize>),
+    placed_found: Instant,
     planner: Planner,
     pace: Pace,
     waiting: Vec<Waiting>,
@@ -160,6 +165,8 @@ impl App {
         theme::apply(&cc.egui_ctx);
         let settings = Settings::read(cc.storage);
         let shown = Shown::empty(options.instance.name());
+        // It goes with the core.
+        let kept_in = PathBuf::from(options.instance.root());
         Self {
             link: Link::new(options.instance),
             label: options.label,
@@ -179,7 +186,10 @@ impl App {
             image_to_come: None,
             run: None,
             run_needles: Vec::new(),
-            planner: Planner::default(),
+            run_placed: Placed::default(),
+            run_lost: Default::default(),
+            placed_found: Instant::now(),
+            planner: Planner::default().keeping_in(kept_in),
             pace: Pace::default(),
             waiting: Vec::new(),
             controllers: if options.controllers {

@@ -7,7 +7,11 @@ use crate::panel::workflow::Progress;
 use crate::planner::Message;
 use crate::shown::Note;
 use nalgebra::Vector3;
-use stylet_implant::workflow::{Run, default_plan, plan_request};
+use std::time::{Duration, Instant};
+use stylet_implant::workflow::{NeedleTask, Placed, Run, default_plan, plan_request};
+
+/// Looking for what is in the tissue compares every planned drop with every seed.
+const FIND_PLACED_EVERY: Duration = Duration::from_millis(300);
 
 impl App {
     /// Undo is for the plan while it is edited.
@@ -81,8 +85,58 @@ impl App {
         view.cursor_m += inwards * (depth_m - off_m);
     }
 
-    /// All needles of the plan; without one, one through the middle.
+    /// What of the plan is in the tissue.
+    fn placed(&self, tasks: &[NeedleTask]) -> Placed {
+        let dropped_at_m: Vec<[f64; 3]> = self.shown.seeds.iter().map(|seed| seed.dropped_at_m).collect();
+        // Of another plan the numbers are others.
+        let (of, lost) = &self.run_lost;
+        let lost = if of == tasks { &lost[..] } else { &[] };
+        Placed::find(tasks, &dropped_at_m, self.shown.tip_m(), lost)
+    }
+
+    /// Whether the script can go on, looked at now and then while it rests.
+    pub(super) fn find_placed(&mut self) {
+        if self.run.is_some() || self.shown.seeds.is_empty() {
+            self.shown.goes_on_at = None;
+        } else if self.placed_found.elapsed() >= FIND_PLACED_EVERY {
+            self.placed_found = Instant::now();
+            let tasks: Vec<NeedleTask> = self.planner.tasks().into_iter().map(|(_, task)| task).collect();
+            let placed = self.placed(&tasks);
+            self.shown.goes_on_at = placed.is_partial().then(|| (placed.next_needle(), tasks.len()));
+        }
+    }
+
+    /// Goes on with the needles of the plan from where the tissue shows that they are; where there is nothing to go on with, from
+    /// the beginning.
     pub(super) fn run_all(&mut self) {
+        let (numbers, tasks): (Vec<usize>, Vec<NeedleTask>) = self.planner.tasks().into_iter().unzip();
+        let placed = self.placed(&tasks);
+        if self.planner.is_busy() || !placed.is_partial() {
+            return self.run_anew();
+        }
+        self.planner.restart();
+        let mut before = 0;
+        for (at, &number) in numbers.iter().enumerate().take(placed.next_needle()) {
+            self.planner.begin_needle(number, before);
+            self.planner.finish_needle();
+            before += placed.seeds_of(at);
+        }
+        self.run = Some(Run::going_on(tasks, self.pace, &placed));
+        (self.run_needles, self.run_placed) = (numbers, placed);
+        self.drive = Drive::default();
+    }
+
+    /// The script rests; what it knows of drops without a seed is kept for going on.
+    pub(super) fn end_run(&mut self) {
+        if let Some(run) = self.run.take() {
+            self.run_lost = (run.tasks().to_vec(), run.lost().to_vec());
+        }
+        (self.shown.run_waits, self.placed_found) = (None, Instant::now());
+    }
+
+    /// All needles of the plan from a reset; without one, one through the middle.
+    pub(super) fn run_anew(&mut self) {
+        (self.run_placed, self.run_lost) = (Placed::default(), Default::default());
         if self.planner.is_busy() {
             self.shown.note = Some(refusal("Wait for the running task, or cancel it first.".to_owned()));
             return;
@@ -108,7 +162,10 @@ impl App {
         };
         let progress = self.planner.progress();
         if progress.begun() != number + 1 {
-            let seeds = if at == 0 { 0 } else { self.shown.seeds.len() };
+            let begins = at == 0 && self.run_placed == Placed::default();
+            let seeds = if begins { 0 } else { self.shown.seeds.len() };
+            // Those that it had when the script went on with it are its own.
+            let seeds = seeds.saturating_sub(self.run_placed.seeds_of(at));
             self.planner.begin_needle(number, seeds);
         }
         if is_done {

@@ -17,7 +17,7 @@ use stylet_implant::workflow::RunStatus;
 use stylet_shm_schema::Request;
 
 const SUM_UP_EVERY: Duration = Duration::from_millis(500);
-/// A request without an answer within this time is reported.
+/// A request that waits for its answer for longer is shown.
 const ANSWER_WITHIN: Duration = Duration::from_secs(3);
 
 impl App {
@@ -145,11 +145,14 @@ impl App {
                 *note = Some(refusal(format!("{} refused: {}", w.what, answer.text)));
                 false
             }
-            None if w.since.elapsed() > ANSWER_WITHIN => {
-                *note = Some(refusal(format!("{}: no answer from rt-core", w.what)));
-                false
+            None => {
+                let waited = w.since.elapsed();
+                if waited > ANSWER_WITHIN && note.as_ref().is_none_or(|note| !note.refused) {
+                    let text = format!("{}: waiting for rt-core to answer, {} s", w.what, waited.as_secs());
+                    *note = Some(Note { refused: false, text });
+                }
+                true
             }
-            None => true,
         });
         let answer = self.uploading.as_ref().and_then(|(id, _)| self.link.reply(*id));
         if let (Some(answer), Some((_, name))) = (answer, self.uploading.clone()) {
@@ -258,6 +261,7 @@ impl App {
             let status = run.advance(&mut self.link);
             let needle = run.needle();
             self.shown.run_step = Some(run.step());
+            self.shown.run_waits = Some(run.waiting());
             self.shown.run_needle = (self.run_needles.len() > 1).then_some((needle, self.run_needles.len()));
             self.follow_run(needle, status == RunStatus::Done);
             self.shown.note = match status {
@@ -272,10 +276,11 @@ impl App {
                 RunStatus::Failed(why) => Some(refusal(format!("The run stopped: {why}"))),
             };
             if self.shown.note.is_some() {
-                self.run = None;
+                self.end_run();
             }
         }
         self.shown.running = self.run.is_some();
+        self.find_placed();
     }
 }
 

@@ -18,7 +18,13 @@ pub fn histogram_ui(ui: &mut egui::Ui, timing: &Timing) {
         ui.label(RichText::new("Ticks by wake-up").color(tokens.wake).size(12.5));
         ui.label(RichText::new("and work").color(tokens.work).size(12.5));
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.monospace(format!("{} ticks", format::count(timing.samples as u64)));
+            let seen = timing.seen;
+            if seen.is_all() {
+                ui.monospace(format!("{} ticks", format::count(seen.seen)));
+            } else {
+                let text = format!("{} of {} seen", format::count(seen.seen), format::count(seen.ran()));
+                ui.label(RichText::new(text).monospace().size(11.0).color(tokens.warn));
+            }
         });
     });
     let shown = plot("wake-up histogram", 66.0)

@@ -2,8 +2,9 @@
 
 use hdrhistogram::Histogram;
 use std::collections::VecDeque;
-use stylet_base::envelope::Envelope;
+use stylet_base::envelope::{Band, Envelope};
 use stylet_base::format;
+use stylet_base::seen::{Seen, TickOrder};
 use stylet_shm_schema::TickRecord;
 
 /// Seconds that the plots show.
@@ -12,7 +13,7 @@ const WINDOW_NS: u64 = WINDOW_S as u64 * 1_000_000_000;
 /// Ticks of this time are one place of a plot: 250 in its width.
 const SLOT_NS: u64 = WINDOW_NS / 250;
 /// Ticks that percentiles are taken over: one minute at 1 kHz, so that p99.9 has samples beyond it.
-const KEPT_TIMINGS: usize = 60_000;
+const KEPT_TICKS: u64 = 60_000;
 /// A percentile with fewer samples beyond it is a guess and is not shown.
 const SAMPLES_BEYOND: f64 = 10.0;
 /// Digits of a percentile that hold.
@@ -37,7 +38,8 @@ pub struct Percentiles {
 
 #[derive(Clone, Debug, Default)]
 pub struct Timing {
-    pub samples: usize,
+    /// Of the ticks of the last minute.
+    pub seen: Seen,
     pub wake: Percentiles,
     pub work: Percentiles,
     /// Counts by [`bin_low_us`].
@@ -47,10 +49,13 @@ pub struct Timing {
 
 pub struct History {
     curves: Envelope<3>,
-    /// Wake latency and work, ns, cut off at four seconds.
-    timings: VecDeque<[u32; 2]>,
+    /// Number of the tick, and its wake latency and work, ns, cut off at four seconds.
+    timings: VecDeque<(u64, [u32; 2])>,
     counts: [LastMinute; 2],
     session: u64,
+    order: TickOrder,
+    /// The first tick of the session that was seen, and the last.
+    ticks: Option<[u64; 2]>,
     pub missed: u64,
     pub timing: Timing,
 }
@@ -62,6 +67,8 @@ impl Default for History {
             timings: VecDeque::new(),
             counts: [(); 2].map(|()| LastMinute::new()),
             session: 0,
+            order: TickOrder::default(),
+            ticks: None,
             missed: 0,
             timing: Timing::default(),
         }
@@ -79,23 +86,45 @@ impl History {
                 };
             }
             self.missed += u64::from(r.missed);
+            if self.order.missing_before(r.session_id, r.tick) > 0 {
+                self.curves.gap();
+            }
+            let [first, last] = self.ticks.unwrap_or([r.tick; 2]);
+            self.ticks = Some([first, last.max(r.tick)]);
             let along: f64 = r.force_on_hand_n.iter().zip(direction).map(|(f, d)| f * d).sum();
             let plotted = [-along, format::mm(r.depth_m), format::us(r.wake_latency_ns)];
             self.curves.add(r.due_ns, plotted.map(|v| v as f32));
             let timing = [r.wake_latency_ns, r.work_ns].map(|ns| u32::try_from(ns).unwrap_or(u32::MAX));
-            self.timings.push_back(timing);
-            let expired = (self.timings.len() > KEPT_TIMINGS)
-                .then(|| self.timings.pop_front())
-                .flatten();
+            self.timings.push_back((r.tick, timing));
             for (which, counts) in self.counts.iter_mut().enumerate() {
                 counts.add(timing[which]);
-                if let Some(expired) = expired {
-                    counts.drop(expired[which]);
-                }
             }
+            self.expire(r.tick);
         }
         if let Some(newest_ns) = self.curves.newest_ns() {
             self.curves.forget_before(newest_ns.saturating_sub(WINDOW_NS));
+        }
+    }
+
+    /// The minute is one of ticks, seen or not.
+    fn expire(&mut self, newest: u64) {
+        while let Some(&(tick, timing)) = self.timings.front()
+            && tick + KEPT_TICKS <= newest
+        {
+            self.timings.pop_front();
+            for (which, counts) in self.counts.iter_mut().enumerate() {
+                counts.drop(timing[which]);
+            }
+        }
+    }
+
+    /// How many of the ticks of the last minute were seen.
+    fn seen(&self) -> Seen {
+        let seen = self.timings.len() as u64;
+        let ran = self.ticks.map_or(0, |[first, last]| (last - first + 1).min(KEPT_TICKS));
+        Seen {
+            seen,
+            unseen: ran.saturating_sub(seen),
         }
     }
 
@@ -104,7 +133,7 @@ impl History {
         let [wake, work] = self.counts.each_mut().map(LastMinute::percentiles);
         let [wake_histogram, work_histogram] = self.counts.each_ref().map(|c| c.bins);
         self.timing = Timing {
-            samples: self.timings.len(),
+            seen: self.seen(),
             wake,
             work,
             wake_histogram,
@@ -112,13 +141,17 @@ impl History {
         };
     }
 
-    /// Smallest and largest over seconds before the newest tick.
-    pub fn curve(&self, quantity: Quantity) -> Vec<[f64; 3]> {
+    /// Smallest and largest over seconds before the newest tick, in pieces: between two of them nothing was seen.
+    pub fn curve(&self, quantity: Quantity) -> Vec<Vec<[f64; 3]>> {
         let newest_ns = self.curves.newest_ns().unwrap_or(0);
         let before = |time_ns: u64| -format::seconds(newest_ns.saturating_sub(time_ns));
-        let bands = self.curves.bands(quantity as usize);
-        let points = bands.map(|b| [before(b.time_ns), f64::from(b.low), f64::from(b.high)]);
-        points.filter(|[x, ..]| *x >= -WINDOW_S).collect()
+        let piece = |bands: &Vec<Band>| {
+            let points = bands.iter();
+            let points = points.map(|b| [before(b.time_ns), f64::from(b.low), f64::from(b.high)]);
+            points.filter(|[x, ..]| *x >= -WINDOW_S).collect::<Vec<_>>()
+        };
+        let pieces = self.curves.pieces(quantity as usize);
+        pieces.iter().map(piece).filter(|piece| !piece.is_empty()).collect()
     }
 }
 
@@ -188,8 +221,8 @@ mod tests {
     use super::*;
     use bytemuck::Zeroable;
 
-    fn records(count: u64) -> Vec<TickRecord> {
-        (0..count)
+    fn records(ticks: std::ops::Range<u64>) -> Vec<TickRecord> {
+        ticks
             .map(|tick| TickRecord {
                 session_id: 1,
                 tick,
@@ -203,9 +236,9 @@ mod tests {
     #[test]
     fn memory_is_bounded_and_the_curves_reach_from_end_to_end() {
         let mut history = History::default();
-        history.take(&records(100_000), [0.0, 0.0, 1.0]);
-        assert_eq!(history.timings.len(), KEPT_TIMINGS);
-        let curve = history.curve(Quantity::WakeUs);
+        history.take(&records(0..100_000), [0.0, 0.0, 1.0]);
+        assert_eq!(history.timings.len() as u64, KEPT_TICKS);
+        let curve = history.curve(Quantity::WakeUs).concat();
         assert!((249..=251).contains(&curve.len()), "{}", curve.len());
         let [x, low, high] = curve[curve.len() - 1];
         assert!((-0.02..=0.0).contains(&x) && low < high && high == f64::from(99.999_f32));
@@ -219,15 +252,15 @@ mod tests {
     #[test]
     fn a_percentile_needs_ten_samples_beyond_it() {
         let mut history = History::default();
-        history.take(&records(9_999), [0.0, 0.0, 1.0]);
+        history.take(&records(0..9_999), [0.0, 0.0, 1.0]);
         history.sum_up();
         assert_eq!(history.timing.wake.p999, None);
         assert!(history.timing.wake.p99.is_some());
-        history.take(&records(1), [0.0, 0.0, 1.0]);
+        history.take(&records(9_999..10_000), [0.0, 0.0, 1.0]);
         history.sum_up();
         assert!(history.timing.wake.p999.is_some());
-        history.take(&records(5), [0.0; 3]);
-        assert_eq!(history.timing.samples, 10_000);
+        history.take(&records(10_000..10_005), [0.0; 3]);
+        assert_eq!(history.timing.seen.seen, 10_000);
     }
 
     /// Against all of the last minute, sorted and counted.
@@ -237,7 +270,8 @@ mod tests {
         let mut given = Vec::new();
         let mut wake_ns = 12_345_u64;
         for count in [7, 1_500, 58_000, 30_000] {
-            let mut some = records(count);
+            let first = given.len() as u64;
+            let mut some = records(first..first + count);
             for r in &mut some {
                 wake_ns = wake_ns
                     .wrapping_mul(6_364_136_223_846_793_005)
@@ -247,7 +281,7 @@ mod tests {
             }
             history.take(&some, [0.0; 3]);
             history.sum_up();
-            let mut kept = given[given.len().saturating_sub(KEPT_TIMINGS)..].to_vec();
+            let mut kept = given[given.len().saturating_sub(KEPT_TICKS as usize)..].to_vec();
             kept.sort_unstable();
             let rank = |share: f64| (kept.len() as f64 * share).ceil() as usize - 1;
             let rank_value =
@@ -276,11 +310,30 @@ mod tests {
     #[test]
     fn another_session_starts_afresh() {
         let mut history = History::default();
-        history.take(&records(100), [0.0; 3]);
-        let mut other = records(1);
+        history.take(&records(0..100), [0.0; 3]);
+        let mut other = records(0..1);
         other[0].session_id = 2;
         history.take(&other, [0.0; 3]);
         assert_eq!(history.timings.len(), 1);
-        assert_eq!(history.curve(Quantity::DepthMm).len(), 1);
+        assert_eq!(history.curve(Quantity::DepthMm).concat().len(), 1);
+    }
+
+    /// The last 60 000 records counted as the last minute however many ticks had run between them, and nothing said so.
+    #[test]
+    fn the_last_minute_is_one_of_ticks_and_says_how_many_of_them_were_seen() {
+        let mut history = History::default();
+        // Of every 128 ticks 64 are seen.
+        for block in 0..1_000 {
+            history.take(&records(block * 128..block * 128 + 64), [0.0; 3]);
+        }
+        history.sum_up();
+        let seen = history.timing.seen;
+        assert_eq!(seen.ran(), KEPT_TICKS);
+        assert!(seen.seen.abs_diff(KEPT_TICKS / 2) <= 64, "{}", seen.words());
+        let counted: u32 = history.timing.wake_histogram.iter().sum();
+        assert_eq!(u64::from(counted), seen.seen);
+        // Of the last ten seconds no piece of a curve crosses a loss.
+        let longest = history.curve(Quantity::WakeUs).iter().map(Vec::len).max();
+        assert!(longest.is_some_and(|n| n <= 3), "{longest:?}");
     }
 }

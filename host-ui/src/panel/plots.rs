@@ -8,15 +8,21 @@ use crate::shown::Shown;
 use crate::theme;
 use egui::{Color32, RichText};
 use stylet_base::format;
+use stylet_base::seen::Seen;
 use stylet_implant::score::Trace;
 
 /// What stands between and under the three plots over time.
 const BESIDE_PLOTS: f32 = 492.0;
 const PLOT_HEIGHTS: [f32; 2] = [48.0, 150.0];
+/// A line on ticks that were not seen.
+const SEEN_LINE: f32 = 20.0;
 
 /// The plots share what of `height` the rest leaves. With `whole` they look back on all of the procedure.
 pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, whole: Option<&Trace>, height: f32) {
-    let each = ((height - BESIDE_PLOTS) / 3.0).clamp(PLOT_HEIGHTS[0], PLOT_HEIGHTS[1]);
+    let whole = whole.filter(|trace| !trace.is_empty());
+    let lines = usize::from(!history.timing.seen.is_all())
+        + usize::from(whole.is_some_and(|trace| !trace.motion().seen.is_all()));
+    let each = ((height - BESIDE_PLOTS - lines as f32 * SEEN_LINE) / 3.0).clamp(PLOT_HEIGHTS[0], PLOT_HEIGHTS[1]);
     let recent = |ui: &mut egui::Ui, name, color, unit, least, quantity| {
         Strip {
             name,
@@ -25,7 +31,7 @@ pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, whole: Opti
             height: each,
             seconds: [-WINDOW_S, 0.0],
             least,
-            points: &history.curve(quantity),
+            pieces: &history.curve(quantity),
             worst_only: matches!(quantity, Quantity::WakeUs),
         }
         .show(ui);
@@ -33,7 +39,7 @@ pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, whole: Opti
     let tokens = theme::of(ui);
     tension_ui(ui, shown);
     let now = |value: Option<String>| value.unwrap_or_else(|| "n/a".to_owned());
-    match whole.filter(|trace| !trace.is_empty()) {
+    match whole {
         Some(trace) => whole_ui(ui, trace, each),
         None => {
             let force = now(shown.resistance_n().map(format::force));
@@ -64,15 +70,16 @@ pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, whole: Opti
 /// From the first contact with tissue on.
 fn whole_ui(ui: &mut egui::Ui, trace: &Trace, height: f32) {
     let (tokens, motion) = (theme::of(ui), trace.motion());
-    let whole = |ui: &mut egui::Ui, name, color, unit, points: Vec<[f64; 3]>| {
+    let whole = |ui: &mut egui::Ui, name, color, unit, pieces: Vec<Vec<[f64; 3]>>| {
+        let last = pieces.last().and_then(|piece| piece.last());
         Strip {
             name,
             unit,
             color,
             height,
-            seconds: [0.0, points.last().map_or(1.0, |[seconds, ..]| seconds.max(1.0))],
+            seconds: [0.0, last.map_or(1.0, |[seconds, ..]| seconds.max(1.0))],
             least: [0.0, 1.0],
-            points: &points,
+            pieces: &pieces,
             worst_only: false,
         }
         .show(ui);
@@ -83,6 +90,21 @@ fn whole_ui(ui: &mut egui::Ui, trace: &Trace, height: f32) {
     let peak = format!("peak inwards {}", format::speed(motion.peak_insertion_m_per_s));
     title(ui, "Speed, mm/s", &peak, tokens.depth);
     whole(ui, "whole speed", tokens.depth, ("mm/s", 1), trace.speed_mm_per_s());
+    seen_ui(ui, "peaks and curves", motion.seen);
+}
+
+/// Beside figures that are not of every tick.
+fn seen_ui(ui: &mut egui::Ui, of: &str, seen: Seen) {
+    if seen.is_all() {
+        return;
+    }
+    let text = RichText::new(format!("{of}: {}", seen.words()))
+        .small()
+        .color(theme::of(ui).warn);
+    ui.label(text).on_hover_text(
+        "The other ticks ran, and their records did not reach this window. Deadlines that the core itself missed are no \
+         ticks: they are counted under \"missed deadlines\".",
+    );
 }
 
 /// What the membrane does before it gives way, which a mouse cannot let one feel.
@@ -136,6 +158,7 @@ fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
             percentile_row(ui, "wake-up", &history.timing.wake);
             percentile_row(ui, "tick work", &history.timing.work);
         });
+    seen_ui(ui, "last 60 s", history.timing.seen);
     let Some(s) = &shown.state else {
         ui.label(theme::small("missed deadlines n/a"));
         return;
@@ -152,7 +175,7 @@ fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
         ui.label(theme::small(format!("of {} ticks", format::count(s.tick))));
     });
     let text = format!(
-        "tissue: missed {}, worst work {}; records lost {}; gate acted {}",
+        "tissue: missed {}, worst work {}; lost in core {}; gate acted {}",
         format::count(s.tissue_missed_deadlines),
         format::microseconds(Some(format::us(s.worst_tissue_work_ns))),
         format::count(s.records_lost),

@@ -5,6 +5,10 @@ use egui::Color32;
 use egui_plot::{FilledArea, GridMark, Line, PlotPoints};
 use stylet_base::format;
 
+/// Of the axis of time: half of what a point between two gaps covers, and how near to a piece a pointer means it.
+const LONE_SHARE: f64 = 0.001;
+const BESIDE_SHARE: f64 = 0.005;
+
 pub struct Strip<'a> {
     pub name: &'a str,
     /// Unit and decimals of a value that is pointed at.
@@ -15,8 +19,8 @@ pub struct Strip<'a> {
     pub seconds: [f64; 2],
     /// The axis that goes up shows at least these.
     pub least: [f64; 2],
-    /// Time, smallest and largest.
-    pub points: &'a [[f64; 3]],
+    /// Time, smallest and largest, in pieces: between two of them nothing is known.
+    pub pieces: &'a [Vec<[f64; 3]>],
     /// From nothing up to the largest, where only that counts.
     pub worst_only: bool,
 }
@@ -42,15 +46,18 @@ impl Strip<'_> {
                 }
             })
             .show(ui, |plot| {
-                let [xs, lows, highs] = [0, 1, 2].map(|n| self.points.iter().map(|p| p[n]).collect::<Vec<f64>>());
-                let lows = if self.worst_only { vec![0.0; xs.len()] } else { lows };
-                let band = FilledArea::new(self.name, &xs, &lows, &highs).fill_color(self.color);
-                plot.add(band.allow_hover(false));
-                // Where both are the same a band has no width.
-                if !self.worst_only {
-                    let middle = self.points.iter().map(|[x, low, high]| [*x, 0.5 * (low + high)]);
-                    let line = Line::new(self.name, PlotPoints::from_iter(middle)).color(self.color);
-                    plot.line(line.width(1.3).allow_hover(false));
+                for piece in self.pieces {
+                    let piece = widened(piece, length_s * LONE_SHARE);
+                    let [xs, lows, highs] = [0, 1, 2].map(|n| piece.iter().map(|p| p[n]).collect::<Vec<f64>>());
+                    let lows = if self.worst_only { vec![0.0; xs.len()] } else { lows };
+                    let band = FilledArea::new(self.name, &xs, &lows, &highs).fill_color(self.color);
+                    plot.add(band.allow_hover(false));
+                    // Where both are the same a band has no width.
+                    if !self.worst_only {
+                        let middle = piece.iter().map(|[x, low, high]| [*x, 0.5 * (low + high)]);
+                        let line = Line::new(self.name, PlotPoints::from_iter(middle)).color(self.color);
+                        plot.line(line.width(1.3).allow_hover(false));
+                    }
                 }
             });
         if let Some(place) = shown.response.hover_pos()
@@ -62,9 +69,13 @@ impl Strip<'_> {
 
     /// The value that is nearest in time.
     fn value_at(&self, seconds: f64) -> Option<String> {
-        let after = self.points.partition_point(|[x, ..]| *x < seconds);
+        let points: Vec<[f64; 3]> = self.pieces.concat();
+        if self.is_in_gap(seconds) {
+            return Some(format!("{seconds:.1} s: no tick was seen"));
+        }
+        let after = points.partition_point(|[x, ..]| *x < seconds);
         let near = [after.checked_sub(1), Some(after)].into_iter().flatten();
-        let near = near.filter_map(|n| self.points.get(n));
+        let near = near.filter_map(|n| points.get(n));
         let [at_s, low, high] = near.min_by(|a, b| (a[0] - seconds).abs().total_cmp(&(b[0] - seconds).abs()))?;
         let (unit, decimals) = self.unit;
         let [low, high] = [low, high].map(|v| format::decimal(*v, decimals));
@@ -76,6 +87,25 @@ impl Strip<'_> {
             format!("{at_s:.1} s: {low} to {high} {unit}")
         })
     }
+
+    /// Between two pieces, and not just beside one of them.
+    fn is_in_gap(&self, seconds: f64) -> bool {
+        let [from_s, to_s] = self.seconds;
+        let beside_s = (to_s - from_s) * BESIDE_SHARE;
+        self.pieces.windows(2).any(|pair| {
+            let end = pair[0].last().map_or(f64::MAX, |[x, ..]| *x);
+            let begin = pair[1].first().map_or(f64::MIN, |[x, ..]| *x);
+            (end + beside_s..begin - beside_s).contains(&seconds)
+        })
+    }
+}
+
+/// A single point has no width to be seen by.
+fn widened(piece: &[[f64; 3]], half_s: f64) -> Vec<[f64; 3]> {
+    match piece {
+        &[[x, low, high]] => vec![[x - half_s, low, high], [x + half_s, low, high]],
+        many => many.to_vec(),
+    }
 }
 
 #[cfg(test)]
@@ -84,7 +114,7 @@ mod tests {
 
     #[test]
     fn the_value_under_the_pointer_is_shown_with_its_time_and_unit() {
-        let points = [[-2.0, -1e-9, 0.0], [-1.96, 1.0, 3.456], [-1.92, 3.5, 3.5]];
+        let pieces = [vec![[-2.0, -1e-9, 0.0], [-1.96, 1.0, 3.456], [-1.92, 3.5, 3.5]]];
         let mut strip = Strip {
             name: "force",
             unit: ("N", 2),
@@ -92,7 +122,7 @@ mod tests {
             height: 50.0,
             seconds: [-10.0, 0.0],
             least: [0.0, 1.0],
-            points: &points,
+            pieces: &pieces,
             worst_only: false,
         };
         let value = |strip: &Strip<'_>, at_s| strip.value_at(at_s).expect("some");
@@ -101,7 +131,11 @@ mod tests {
         assert_eq!(value(&strip, -1.0), "-1.9 s: 3.50 N");
         strip.worst_only = true;
         assert_eq!(value(&strip, -1.97), "-2.0 s: at most 3.46 N");
-        strip.points = &[];
+        let parted = [vec![[-4.0, 1.0, 1.0]], vec![[-1.0, 2.0, 2.0]]];
+        strip.pieces = &parted;
+        assert_eq!(value(&strip, -2.5), "-2.5 s: no tick was seen");
+        assert_eq!(value(&strip, -3.98), "-4.0 s: at most 1.00 N");
+        strip.pieces = &[];
         assert_eq!(strip.value_at(0.0), None);
     }
 }

@@ -35,6 +35,10 @@ impl Planner {
     /// Discards the plan; one needle is left.
     pub fn discard(&mut self) {
         (self.history, self.job, self.problems) = (None, None, None);
+        if let (Some(folder), Some(outlines)) = (&self.kept_in, &self.outlines) {
+            // Mostly there is none.
+            let _removed = std::fs::remove_file(super::kept::path_of(folder, outlines.scene));
+        }
         self.compensated.clear();
         self.progress = NeedleProgress::default();
         self.change();

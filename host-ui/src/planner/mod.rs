@@ -4,12 +4,14 @@
 
 mod edit;
 mod jobs;
+mod kept;
 mod needles;
 mod outlines;
 mod shown;
 
 use jobs::JobMessage;
 pub(crate) use jobs::JobProgress;
+use kept::Kept;
 pub(crate) use needles::NeedleProgress;
 pub use needles::NeedleState;
 pub(crate) use outlines::{AnatomyOutlines, Outline};
@@ -56,6 +58,10 @@ pub struct Planner {
     checking: Option<(u64, Checked)>,
     checked: u64,
     job: Option<(Job<JobMessage>, JobProgress)>,
+    /// Where the plan is kept for another window; nowhere when not given.
+    kept_in: Option<PathBuf>,
+    /// The scene that a kept plan was looked for, and the look.
+    looked: Option<(SceneId, Job<Kept>)>,
     /// With the needles as they were when they were rehearsed.
     compensated: Vec<(Needle, Compensation)>,
     progress: NeedleProgress,
@@ -97,6 +103,7 @@ impl Planner {
     pub fn take(&mut self, scene: Option<&Arc<SceneModel>>, seeds: usize) {
         let Some(scene) = scene else { return };
         self.take_scene(scene);
+        self.take_kept();
         self.take_job();
         self.take_problems();
         if self.progress.is_undone(seeds) {
@@ -135,6 +142,7 @@ impl Planner {
                 of_scene: Some(of_scene),
                 message: self.message.take(),
                 revision: self.revision + 1,
+                kept_in: self.kept_in.take(),
                 ..Self::default()
             };
         }
@@ -341,6 +349,7 @@ impl Planner {
 
     /// A needle is inserted now, with so many seeds in the tissue.
     pub fn begin_needle(&mut self, number: usize, seeds: usize) {
+        self.keep();
         let mut progress = self.progress.clone();
         progress.begin(number, seeds);
         self.set_progress(progress);

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use stylet_controllers::Latest;
 use stylet_host::link::{Link, LinkStatus};
 use stylet_implant::plan::{HOLES, Template};
-use stylet_implant::workflow::Step;
+use stylet_implant::workflow::{Step, Waiting};
 use stylet_shm_schema::{
     EventKind, Fault, HapticState, ParametersInForce, Phase, PlanInForce, PlannedSeed, SceneHeader, SeedPose, Session,
     flags,
@@ -54,6 +54,10 @@ pub struct Shown {
     pub run_step: Option<Step>,
     /// Which of how many needles the script is at, counted from 0; `None` for one needle.
     pub run_needle: Option<(usize, usize)>,
+    /// What the script waits for, and for how long.
+    pub run_waits: Option<Waiting>,
+    /// Which needle of how many the script would go on with, counted from 0; `None` where it begins.
+    pub goes_on_at: Option<(usize, usize)>,
     /// The last answer that the operator should read.
     pub note: Option<Note>,
     pub load: LoadState,
@@ -129,6 +133,8 @@ impl Shown {
             running: false,
             run_step: None,
             run_needle: None,
+            run_waits: None,
+            goes_on_at: None,
             note: None,
             load: LoadState::Idle,
             dose: None,

@@ -15,4 +15,6 @@ pub mod tolerance;
 
 pub use at_hand::AtHand;
 pub use operation::{NeedleWay, Operation, Pace, Step};
-pub use script::{HandRequest, Next, Observed, Procedure, Reply, StepFailure};
+pub use script::{
+    Done, HandRequest, Next, Observed, Patience, Procedure, Reply, StepFailure, Waiting, WaitsFor, needle_inside,
+};

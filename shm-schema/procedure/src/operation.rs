@@ -86,6 +86,8 @@ pub enum Operation {
     Place,
     /// Move the tip to the first drop.
     Insert,
+    /// Move the tip inwards to a drop, counted from 0 in its needle, where the needle is continued.
+    InsertTo(usize),
     /// Drop a seed, counted from 0 over all needles.
     Drop(usize),
     /// Draw the tip back to a drop, counted from 0 in its needle.
@@ -104,7 +106,7 @@ impl Operation {
         match self {
             Self::Reset | Self::PublishPlan => Step::Plan,
             Self::Engage | Self::Place => Step::Place,
-            Self::Insert => Step::Insert,
+            Self::Insert | Self::InsertTo(_) => Step::Insert,
             Self::Drop(_) | Self::DrawBack(_) => Step::Drop,
             Self::Retract | Self::TakeOut => Step::Retract,
             Self::Settle => Step::Settle,
@@ -116,6 +118,7 @@ impl Operation {
         match self {
             Self::Place => Some((way.entry_m, pace.approach_m_per_s)),
             Self::Insert => way.drops_m.first().map(|&drop_m| (drop_m, pace.insert_m_per_s)),
+            Self::InsertTo(index) => way.drops_m.get(index).map(|&drop_m| (drop_m, pace.insert_m_per_s)),
             Self::DrawBack(index) => way.drops_m.get(index).map(|&drop_m| (drop_m, pace.retract_m_per_s)),
             Self::Retract => Some((way.entry_m + way.direction * way.retract_to_m, pace.retract_m_per_s)),
             Self::TakeOut => Some((way.entry_m, pace.retract_m_per_s)),

@@ -1,12 +1,20 @@
 //! The scripted procedure: which request comes next, and when each operation is done.
 
+mod failure;
+mod going_on;
+mod waiting;
+
 use crate::tolerance::{TISSUE_REST_FOR_S, TISSUE_REST_LIMIT_S, TISSUE_REST_M, arrived_after_s, move_limit_s};
 use crate::{NeedleWay, Operation, Pace, Step};
+pub use failure::StepFailure;
+use going_on::ahead;
+pub use going_on::{Done, needle_inside};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
 use stylet_shm_schema::{Fault, HandMove, HapticState, flags};
+pub use waiting::{Patience, Waiting, WaitsFor};
 
-/// A request that is not answered, or does not take effect, within this time has failed, s.
+/// In a rehearsal a request that is not answered, or does not take effect, within this time has failed, s.
 const REPLY_LIMIT_S: f64 = 3.0;
 
 /// Preparing the tissue for a needle takes seconds, on a busy machine many.
@@ -80,48 +88,6 @@ pub enum Next {
     Done,
 }
 
-/// Why the procedure cannot go on. Times are those that were waited, s.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum StepFailure {
-    /// The force loop shows nothing.
-    #[error("waited {REPLY_LIMIT_S:.1} s for the state of the force loop")]
-    NoState,
-    /// The force went off after it was turned on.
-    #[error("the force is off: {}", .0.message())]
-    ForceOff(Fault),
-    /// A request was refused.
-    #[error("{request} was refused: {why}")]
-    Refused {
-        /// Which one.
-        request: &'static str,
-        /// The reasons, in words.
-        why: String,
-    },
-    /// A request was not answered.
-    #[error("waited {REPLY_LIMIT_S:.1} s for a reply to {0}")]
-    NoReply(&'static str),
-    /// A request was accepted and nothing came of it.
-    #[error("waited {REPLY_LIMIT_S:.1} s for {0} to take effect")]
-    NoEffect(&'static str),
-    /// A seed was dropped and is not in the tissue.
-    #[error("waited {REPLY_LIMIT_S:.1} s for the seed in the tissue")]
-    NoSeed,
-    /// The tissue did not come to be ready for the needle.
-    #[error(
-        "waited {LINE_LIMIT_S:.0} s for the tissue to be ready for the needle where it is placed; rt-core prepares that beside \
-         its loops, so give it a processor, or run with --tissue chainmail"
-    )]
-    NoLine,
-    /// The tip did not arrive.
-    #[error("waited {limit_s:.1} s for the tip at its target; it is {:.2} mm from it along the needle", off_along_m * 1e3)]
-    NotArrived {
-        /// The time that the move was given, s.
-        limit_s: f64,
-        /// How far the tip is beyond its target along the needle, m.
-        off_along_m: f64,
-    },
-}
-
 /// Needles in sequence. Call [`Procedure::advance`] whenever something new is seen.
 #[derive(Clone, Debug)]
 pub struct Procedure {
@@ -133,6 +99,11 @@ pub struct Procedure {
     lost: Vec<usize>,
     /// From here on a fault ends the procedure.
     is_engaged: bool,
+    patience: Patience,
+    waits_for: WaitsFor,
+    now_s: f64,
+    /// Seeds in the tissue when the drop at work was sent.
+    seeds_before: u32,
     is_sent: bool,
     begun_s: f64,
     /// When the tissue was last not ready for the needle.
@@ -170,6 +141,29 @@ impl Procedure {
         Self::new(ways, pace, ahead)
     }
 
+    /// A procedure that was stopped, from where it was: without a reset, and no drop twice.
+    pub fn going_on(ways: Vec<NeedleWay>, pace: Pace, done: &Done) -> Self {
+        let ahead = ahead(&ways, done);
+        Self {
+            lost: done.lost.clone(),
+            ..Self::new(ways, pace, ahead)
+        }
+    }
+
+    /// How long it waits for what does not arrive.
+    #[must_use]
+    pub fn with_patience(self, patience: Patience) -> Self {
+        Self { patience, ..self }
+    }
+
+    /// What it waits for, and for how long.
+    pub fn waiting(&self) -> Waiting {
+        Waiting {
+            waits_for: self.waits_for,
+            for_s: self.now_s - self.begun_s,
+        }
+    }
+
     /// One needle in tissue at rest, until the tissue has come to rest again with the needle drawn back.
     pub fn rehearsal(way: NeedleWay, pace: Pace) -> Self {
         let mut ahead = VecDeque::from([(0, Operation::Engage)]);
@@ -185,6 +179,10 @@ impl Procedure {
             ahead,
             lost: Vec::new(),
             is_engaged: false,
+            patience: Patience::Usual,
+            waits_for: WaitsFor::State,
+            now_s: 0.0,
+            seeds_before: 0,
             is_sent: false,
             begun_s: 0.0,
             ready_s: 0.0,
@@ -214,8 +212,9 @@ impl Procedure {
         let Some(&(needle, operation)) = self.ahead.front() else {
             return Ok(Next::Done);
         };
+        self.now_s = now_s;
         let Some(observed) = observed else {
-            self.in_time(now_s, StepFailure::NoState)?;
+            self.waits(now_s, WaitsFor::State)?;
             return Ok(Next::Wait);
         };
         let fault = Fault::from_number(observed.state.fault).unwrap_or(Fault::None);
@@ -224,6 +223,7 @@ impl Procedure {
         }
         if !self.is_sent {
             self.is_sent = true;
+            self.seeds_before = observed.state.seed_count;
             return Ok(self.request(needle, operation).map_or(Next::Wait, Next::Send));
         }
         if !self.is_over(now_s, observed, reply, (needle, operation))? {
@@ -257,9 +257,12 @@ impl Procedure {
             Operation::Engage => Some(HandRequest::Engage),
             Operation::Drop(_) => Some(HandRequest::DropSeed),
             Operation::Settle => None,
-            Operation::Place | Operation::Insert | Operation::DrawBack(_) | Operation::Retract | Operation::TakeOut => {
-                self.goal(needle, operation).map(HandRequest::MoveHand)
-            }
+            Operation::Place
+            | Operation::Insert
+            | Operation::InsertTo(_)
+            | Operation::DrawBack(_)
+            | Operation::Retract
+            | Operation::TakeOut => self.goal(needle, operation).map(HandRequest::MoveHand),
         }
     }
 
@@ -281,35 +284,37 @@ impl Procedure {
         }
         match operation {
             Operation::Reset | Operation::PublishPlan | Operation::Engage => Ok(true),
-            Operation::Drop(number) => {
-                self.in_time(now_s, StepFailure::NoSeed)?;
-                Ok(observed.state.seed_count as usize + self.lost.len() > number)
+            Operation::Drop(_) => {
+                self.waits(now_s, WaitsFor::Seed)?;
+                Ok(observed.state.seed_count > self.seeds_before)
             }
             Operation::Settle => {
+                self.waits_for = WaitsFor::Rest;
                 let at_rest = observed.displacement_m.is_some_and(|d| d < TISSUE_REST_M);
                 let waited = now_s - self.begun_s > TISSUE_REST_LIMIT_S;
                 Ok(self.holds_for(at_rest, TISSUE_REST_FOR_S, now_s) || waited)
             }
             Operation::Place if waits_for_line(observed.state) => {
-                if now_s - self.begun_s > LINE_LIMIT_S {
-                    return Err(StepFailure::NoLine);
-                }
+                self.waits(now_s, WaitsFor::Line)?;
                 // The time to arrive counts from when the line is ready.
                 self.ready_s = now_s;
                 Ok(false)
             }
-            Operation::Place | Operation::Insert | Operation::DrawBack(_) | Operation::Retract | Operation::TakeOut => {
-                self.has_arrived(now_s, observed.state, (needle, operation))
-            }
+            Operation::Place
+            | Operation::Insert
+            | Operation::InsertTo(_)
+            | Operation::DrawBack(_)
+            | Operation::Retract
+            | Operation::TakeOut => self.has_arrived(now_s, observed.state, (needle, operation)),
         }
     }
 
-    fn is_in_effect(&self, now_s: f64, request: &HandRequest, reply: Reply) -> Result<bool, StepFailure> {
+    fn is_in_effect(&mut self, now_s: f64, request: &HandRequest, reply: Reply) -> Result<bool, StepFailure> {
         let request = request.name();
         match reply {
             Reply::InEffect => return Ok(true),
-            Reply::Pending => self.in_time(now_s, StepFailure::NoReply(request))?,
-            Reply::Accepted => self.in_time(now_s, StepFailure::NoEffect(request))?,
+            Reply::Pending => self.waits(now_s, WaitsFor::Reply(request))?,
+            Reply::Accepted => self.waits(now_s, WaitsFor::Effect(request))?,
             Reply::TipOutsideTissue => {
                 let why = "the tip is outside the tissue".to_owned();
                 return Err(StepFailure::Refused { request, why });
@@ -330,7 +335,8 @@ impl Procedure {
         };
         let along_m = |place_m: Vector3<f64>| (place_m - way.entry_m).dot(&way.direction);
         let off_along_m = along_m(Vector3::from(state.tip_in_scene_m)) - along_m(Vector3::from(goal.tip_m));
-        let limit_s = move_limit_s(goal.speed_m_per_s);
+        self.waits_for = WaitsFor::Tip { off_along_m };
+        let limit_s = self.patience.limit_s(move_limit_s(goal.speed_m_per_s));
         if now_s - self.begun_s.max(self.ready_s) > limit_s {
             return Err(StepFailure::NotArrived { limit_s, off_along_m });
         }
@@ -346,11 +352,23 @@ impl Procedure {
         now_s - *self.holds_since_s.get_or_insert(now_s) >= least_s
     }
 
-    fn in_time(&self, now_s: f64, failure: StepFailure) -> Result<(), StepFailure> {
-        if now_s - self.begun_s <= REPLY_LIMIT_S {
+    /// Fails once it has waited for longer than its patience.
+    fn waits(&mut self, now_s: f64, waits_for: WaitsFor) -> Result<(), StepFailure> {
+        self.waits_for = waits_for;
+        let limit_s = self.patience.limit_s(match waits_for {
+            WaitsFor::Line => LINE_LIMIT_S,
+            _ => REPLY_LIMIT_S,
+        });
+        if now_s - self.begun_s <= limit_s {
             return Ok(());
         }
-        Err(failure)
+        Err(match waits_for {
+            WaitsFor::State | WaitsFor::Rest | WaitsFor::Tip { .. } => StepFailure::NoState(limit_s),
+            WaitsFor::Reply(request) => StepFailure::NoReply(request, limit_s),
+            WaitsFor::Effect(request) => StepFailure::NoEffect(request, limit_s),
+            WaitsFor::Seed => StepFailure::NoSeed(limit_s),
+            WaitsFor::Line => StepFailure::NoLine(limit_s),
+        })
     }
 }
 

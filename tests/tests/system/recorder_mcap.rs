@@ -98,6 +98,31 @@ fn record(core: &Core, out: &Path, duration_s: f64) -> Child {
         .expect("host-ui starts")
 }
 
+/// The core sent a batch every 2 ms into a queue of 64: a recorder that was held up for 0.2 s lost ticks.
+#[test]
+fn a_recorder_that_stalls_for_ten_seconds_loses_no_tick() {
+    let file = scratch("recording-stalled").join("session.mcap");
+    let mut core = Core::start_with(&["--no-rt"]);
+    drop(core.host());
+    let recorder = record(&core, &file, 14.0);
+    std::thread::sleep(Duration::from_secs(2));
+    let id = recorder.id() as libc::pid_t;
+    // SAFETY: signals to a child of ours that was not waited for.
+    unsafe { libc::kill(id, libc::SIGSTOP) };
+    std::thread::sleep(Duration::from_secs(10));
+    // SAFETY: as above.
+    unsafe { libc::kill(id, libc::SIGCONT) };
+    let output = recorder.wait_with_output().expect("ours");
+    println!("{}", text(&output));
+    assert!(output.status.success(), "ticks were lost");
+    let recording = stylet_host::record::read(&file).expect("readable");
+    assert_eq!(recording.gaps.missing(), 0);
+    let [first, last] = [recording.ticks.first(), recording.ticks.last()].map(|t| t.expect("ticks").due_ns);
+    assert!(last - first > 10_500_000_000, "the stall is part of the recording");
+    // The queue holds no snapshots of that time, and the recorder says so.
+    assert!(!text(&output).contains("in 0 gaps; "), "{}", text(&output));
+}
+
 #[test]
 fn a_recording_with_the_window_open_loses_no_tick_and_others_read_it() {
     let folder = scratch("recording");

@@ -29,6 +29,19 @@ impl Driven {
     }
 
     pub fn on(core: Core, size: [f32; 2]) -> Self {
+        let window = Self::window(&core, size);
+        let mut driven = Self { window, core };
+        driven.until_live();
+        driven
+    }
+
+    /// Closes the window as a kill would, and opens another.
+    pub fn reopen(&mut self, size: [f32; 2]) {
+        self.window = Self::window(&self.core, size);
+        self.until_live();
+    }
+
+    fn window(core: &Core, size: [f32; 2]) -> Harness<'static, App> {
         let options = Options {
             instance: core.instance.clone(),
             scene: None,
@@ -37,15 +50,16 @@ impl Driven {
             controllers: false,
             pause: true,
         };
-        let window = Harness::builder()
+        Harness::builder()
             .with_size(size)
             .wgpu()
-            .build_eframe(|cc| App::new(cc, options));
-        let mut driven = Self { window, core };
-        driven.until("a live core", |app| {
+            .build_eframe(|cc| App::new(cc, options))
+    }
+
+    fn until_live(&mut self) {
+        self.until("a live core", |app| {
             app.link().state().is_some() && app.link().scene().is_some()
         });
-        driven
     }
 
     /// Draws frames until the window knows what is waited for.

@@ -240,6 +240,45 @@ fn needles_go_in_one_after_the_other_by_one_key() {
     assert_eq!([0, 1].map(|n| progress.seeds_of(n, 4)), [0..2, 2..4]);
 }
 
+/// A script that was stopped took the seeds away and began at its first needle; so did one in a window that was opened again.
+#[test]
+fn a_script_that_was_stopped_goes_on_in_this_window_and_in_the_next() {
+    let mut driven = open(SMALL);
+    let planned = plan_through(&header(&driven), &["F7", "H7"], 2);
+    put(&mut driven, "ui-plan-go-on", &planned);
+    driven.click("Run all 2 needles");
+    wait_long(&mut driven, "the first seed", |app| seeds(app) == 1);
+    driven.click("Stop");
+    wait_long_for_label(&mut driven, "Go on at needle 1 of 2");
+    driven.window.get_by_label("Begin anew");
+    driven.click("Go on at needle 1 of 2");
+    wait_long(&mut driven, "the third seed", |app| seeds(app) == 3);
+    driven.window.get_by_label("Needle 2 of 2");
+    // Another window finds the plan of the first, and looks at what is in the tissue.
+    driven.reopen(SMALL);
+    driven.until("the plan", |app| {
+        app.planner().plan().is_some_and(|plan| plan.needles.len() == 2)
+    });
+    wait_long_for_label(&mut driven, "Go on at needle 2 of 2");
+    driven.click("Go on at needle 2 of 2");
+    wait_long(&mut driven, "all needles", |app| app.planner().progress().done() == 2);
+    driven.window.run_steps(3);
+    driven.window.get_by_label("All 2 needles are done.");
+    let placed = driven.window.state().link().snapshot().expect("a snapshot").header;
+    assert_eq!(placed.seed_count, 4);
+    let dropped_at_m = placed.seeds[..4]
+        .iter()
+        .map(|seed| seed.dropped_at_m)
+        .collect::<Vec<_>>();
+    for (n, one) in dropped_at_m.iter().enumerate() {
+        let apart = |other: &[f64; 3]| (0..3).map(|a| (one[a] - other[a]).powi(2)).sum::<f64>().sqrt();
+        let nearest_m = dropped_at_m[..n].iter().map(apart).fold(f64::MAX, f64::min);
+        assert!(nearest_m > 3e-3, "seed {n} lies {nearest_m} m from another");
+    }
+    let progress = driven.window.state().planner().progress().clone();
+    assert_eq!([0, 1].map(|n| progress.seeds_of(n, 4)), [0..2, 2..4]);
+}
+
 /// As [`Driven::until`], for what takes minutes on a busy machine.
 fn wait_long(driven: &mut Driven, what: &str, ready: impl Fn(&App) -> bool) {
     let start = Instant::now();

@@ -1,5 +1,6 @@
-//! Takes what lies in each subscriber's queue, checked, and keeps what belongs to the present run of the core.
+//! Keeps what belongs to the present run of the core, of what the receiving thread has taken.
 
+use super::inbox::Inbox;
 use super::*;
 
 /// A value of the present run; one of a run not announced yet waits for its announcement.
@@ -48,6 +49,8 @@ pub struct Latest {
     pub plan: PerSession<PlanInForce>,
     pub events: VecDeque<Event>,
     early_events: VecDeque<Event>,
+    /// Numbers that are missing among the events of this run.
+    pub events_unseen: u64,
 }
 
 impl Latest {
@@ -63,6 +66,7 @@ impl Latest {
         self.parameters.begin(id);
         self.plan.begin(id);
         self.events.clear();
+        self.events_unseen = 0;
         for event in std::mem::take(&mut self.early_events) {
             if event.session_id == id {
                 self.put_event(event);
@@ -72,17 +76,19 @@ impl Latest {
 
     /// History may be delivered twice when the ports are made again.
     pub fn put_event(&mut self, event: Event) {
-        let queue = if self.id() == Some(event.session_id) {
-            &mut self.events
-        } else {
-            &mut self.early_events
+        let is_current = self.id() == Some(event.session_id);
+        let queue = match is_current {
+            true => &mut self.events,
+            false => &mut self.early_events,
         };
-        let known = queue
-            .back()
-            .is_some_and(|last| last.session_id == event.session_id && last.sequence >= event.sequence);
-        if !known {
-            queue.push_back(event);
+        let last = queue.back().filter(|last| last.session_id == event.session_id);
+        if last.is_some_and(|last| last.sequence >= event.sequence) {
+            return;
         }
+        if let Some(last) = last.filter(|_| is_current) {
+            self.events_unseen += event.sequence - last.sequence - 1;
+        }
+        queue.push_back(event);
         if queue.len() > EVENTS_KEPT {
             queue.pop_front();
         }
@@ -90,119 +96,78 @@ impl Latest {
 }
 
 impl Link {
-    pub(super) fn receive(&mut self) {
-        let Some(ports) = self.ports.take() else { return };
-        self.receive_session(&ports);
-        self.receive_scene(&ports);
-        self.receive_snapshot(&ports);
+    pub(super) fn take(&mut self, inbox: Inbox) {
+        self.pulse = inbox.pulse;
+        self.invalid_dropped += inbox.invalid_dropped;
+        if let Some(session) = inbox.session {
+            match &mut self.latest.session {
+                Some(held) if held.session_id == session.session_id => *held = session,
+                _ => self.begin_session(session),
+            }
+        }
         let id = self.latest.id();
-        while let Ok(Some(sample)) = ports.parameters.receive() {
-            let p = *sample.payload();
-            match check::parameters(&p) {
-                Ok(()) => self.latest.parameters.put(id, p.session_id, p),
-                Err(_) => self.invalid_dropped += 1,
-            }
+        if let Some((session_id, scene)) = inbox.scene {
+            self.latest.scene.put(id, session_id, scene);
         }
-        while let Ok(Some(sample)) = ports.plan.receive() {
-            let p = *sample.payload();
-            match check::plan(&p) {
-                Ok(()) => self.latest.plan.put(id, p.session_id, p),
-                Err(_) => self.invalid_dropped += 1,
-            }
+        if let Some(snapshot) = inbox.snapshot {
+            self.latest.snapshot.put(id, snapshot.header.session_id, snapshot);
         }
-        while let Ok(Some(sample)) = ports.events.receive() {
-            let event = *sample.payload();
-            let finite = event.value.is_finite() && event.position_m.iter().all(|c| c.is_finite());
-            if finite && EventKind::from_number(event.kind).is_some() {
-                self.latest.put_event(event);
-            } else {
-                self.invalid_dropped += 1;
-            }
+        if let Some(p) = inbox.parameters {
+            self.latest.parameters.put(id, p.session_id, p);
         }
-        // Before the replies: whoever has the reply to a rehearsal has its result.
-        while let Ok(Some(sample)) = ports.rehearsals.receive() {
-            let rehearsal = *sample.payload();
-            match check::rehearsal(&rehearsal) {
-                Ok(()) => self.take_rehearsal(rehearsal),
-                Err(_) => self.invalid_dropped += 1,
-            }
+        if let Some(p) = inbox.plan {
+            self.latest.plan.put(id, p.session_id, p);
         }
-        while let Ok(Some(sample)) = ports.replies.receive() {
-            self.take_reply(sample.payload());
+        if inbox.state.is_some() {
+            self.state = inbox.state;
         }
-        self.receive_records(&ports);
-        self.ports = Some(ports);
-    }
-
-    fn receive_session(&mut self, ports: &Ports) {
-        let mut newest = None;
-        while let Ok(Some(sample)) = ports.session.receive() {
-            let session = *sample.payload();
-            if session.schema_version == SCHEMA_VERSION && session.period_ns > 0 {
-                // Two publishers, a dead one and its successor, are not received in the order of time.
-                if newest.is_none_or(|n: Session| n.time_ns <= session.time_ns) {
-                    newest = Some(session);
-                }
-            } else {
-                self.invalid_dropped += 1;
-            }
+        inbox.events.into_iter().for_each(|event| self.latest.put_event(event));
+        inbox.rehearsals.into_iter().for_each(|r| self.take_rehearsal(r));
+        inbox.replies.iter().for_each(|reply| self.take_reply(reply));
+        for (id, why) in inbox.unsent {
+            self.put_answer(id, Answer::unsent(why));
         }
-        let Some(session) = newest else { return };
-        match &self.latest.session {
-            Some(old) if old.session_id == session.session_id => self.latest.session = Some(session),
-            Some(old) if old.started_ns > session.started_ns => {}
-            _ => self.begin_session(session),
-        }
-    }
-
-    fn receive_scene(&mut self, ports: &Ports) {
-        while let Ok(Some(sample)) = ports.scene.receive() {
-            let (header, words) = (*sample.user_header(), sample.payload());
-            let Some(model) = SceneModel::of_words(&header, words) else {
-                self.invalid_dropped += 1;
-                continue;
-            };
-            self.latest
-                .scene
-                .put(self.latest.id(), header.session_id, Arc::new(model));
-        }
-    }
-
-    fn receive_snapshot(&mut self, ports: &Ports) {
-        let mut newest = None;
-        while let Ok(Some(sample)) = ports.snapshots.receive() {
-            newest = Some(sample);
-        }
-        let Some(sample) = newest else { return };
-        let (header, vertices) = (*sample.user_header(), sample.payload());
-        if check::snapshot(&header, vertices).is_err() {
-            self.invalid_dropped += 1;
-            return;
-        }
-        let (surface, inside) = vertices.split_at(header.vertex_count as usize);
-        let places = |part: &[Vertex]| part.iter().map(|v| v.position_m).collect();
-        let snapshot = Snapshot {
-            header,
-            positions_m: places(surface),
-            displacements_m: places(inside),
-        };
-        self.latest.snapshot.put(self.latest.id(), header.session_id, snapshot);
-    }
-
-    fn receive_records(&mut self, ports: &Ports) {
-        let id = self.latest.id();
-        while let Ok(Some(sample)) = ports.records.receive() {
-            for record in sample.payload() {
-                match check::record(record) {
-                    Ok(()) if id == Some(record.session_id) => self.records.push(*record),
-                    Ok(()) => {}
-                    Err(_) => self.invalid_dropped += 1,
-                }
-            }
+        match self.records.is_empty() {
+            true => self.records = inbox.records,
+            false => self.records.extend(inbox.records),
         }
         // A host that never takes them must not grow.
-        if self.records.len() > RECORDS_KEPT {
-            self.records.drain(..self.records.len() - RECORDS_KEPT / 2);
+        let beyond = self.records.len().saturating_sub(RECORDS_KEPT);
+        self.records.drain(..beyond);
+    }
+
+    fn begin_session(&mut self, session: Session) {
+        self.state = None;
+        self.answers.clear();
+        self.rehearsals.clear();
+        self.records.clear();
+        self.latest.begin(session);
+    }
+
+    fn take_rehearsal(&mut self, rehearsal: Box<Rehearsal>) {
+        if self.latest.id() != Some(rehearsal.session_id) {
+            return;
+        }
+        self.rehearsals.insert(rehearsal.command_id, rehearsal);
+        if self.rehearsals.len() > REHEARSALS_KEPT {
+            self.rehearsals.pop_first();
+        }
+    }
+
+    fn take_reply(&mut self, reply: &Reply) {
+        if self.latest.id() != Some(reply.session_id) {
+            return;
+        }
+        match Answer::of_reply(reply) {
+            Some(answer) => self.put_answer(reply.command_id, answer),
+            None => self.invalid_dropped += 1,
+        }
+    }
+
+    fn put_answer(&mut self, command_id: u64, answer: Answer) {
+        self.answers.insert(command_id, answer);
+        if self.answers.len() > ANSWERS_KEPT {
+            self.answers.pop_first();
         }
     }
 }

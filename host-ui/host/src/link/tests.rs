@@ -2,6 +2,8 @@
 
 use super::*;
 use bytemuck::Zeroable;
+use iceoryx2::prelude::PortFactory;
+use std::time::Instant;
 use stylet_shm_schema::service;
 
 /// A name that leaves nothing in shared memory; to be dropped last.
@@ -22,6 +24,33 @@ impl Drop for Swept {
 
 fn instance(name: &str) -> Swept {
     Swept(Instance::new(&format!("{name}-{}", std::process::id())).unwrap())
+}
+
+/// Polls as a frame would until it holds.
+fn until(link: &mut Link, mut holds: impl FnMut(&mut Link) -> bool) -> bool {
+    let begun = Instant::now();
+    while begun.elapsed() < Duration::from_secs(20) {
+        link.poll();
+        if holds(link) {
+            return true;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    false
+}
+
+/// Has made its ports: what is sent from now on reaches it.
+fn connected(instance: &Instance) -> Link {
+    let mut link = Link::new(instance.clone());
+    let node = instance.node().unwrap();
+    let sessions = service::session(&node).unwrap();
+    assert!(until(&mut link, |_| sessions.dynamic_config().number_of_subscribers() == 1));
+    // The last of the ports that are made.
+    let scene = service::scene(&node).unwrap();
+    assert!(until(&mut link, |_| scene.dynamic_config().number_of_subscribers() == 1));
+    let commands = service::commands(&node).unwrap();
+    assert!(until(&mut link, |_| commands.dynamic_config().number_of_publishers() == 1));
+    link
 }
 
 fn announce(id: u64, time_ns: u64) -> Session {
@@ -46,8 +75,7 @@ fn no_core_says_what_to_type() {
 #[test]
 fn a_restarted_core_is_found_and_nothing_of_the_first_run_is_left() {
     let instance = instance("restart");
-    let mut link = Link::new(instance.0.clone());
-    link.poll();
+    let mut link = connected(&instance);
     for run in 1..=3_u64 {
         let node = instance.node().unwrap();
         let board = service::create_state_board(&node, run).unwrap();
@@ -69,12 +97,13 @@ fn a_restarted_core_is_found_and_nothing_of_the_first_run_is_left() {
         };
         // Before the announcement: the link keeps it.
         parameters.send_copy(in_force).unwrap();
+        std::thread::sleep(Duration::from_millis(20));
         link.poll();
         assert!(link.parameters().is_none_or(|p| p.session_id == run - 1));
         let sessions = service::session(&node).unwrap().publisher_builder().create().unwrap();
         sessions.send_copy(announce(run, run)).unwrap();
-        link.poll();
-        assert_eq!(link.session().unwrap().session_id, run);
+        let begun = |link: &mut Link| link.session().is_some_and(|s| s.session_id == run) && link.state().is_some();
+        assert!(until(&mut link, begun));
         assert_eq!(link.state().unwrap().tick, 10 * run);
         assert_eq!(link.parameters().unwrap().generation, run);
         assert_eq!(link.status(), LinkStatus::Live);
@@ -84,8 +113,7 @@ fn a_restarted_core_is_found_and_nothing_of_the_first_run_is_left() {
 #[test]
 fn invalid_messages_are_counted_and_not_used() {
     let instance = instance("invalid");
-    let mut link = Link::new(instance.0.clone());
-    link.poll();
+    let mut link = connected(&instance);
     let node = instance.node().unwrap();
     let sessions = service::session(&node).unwrap().publisher_builder().create().unwrap();
     sessions.send_copy(announce(7, 1)).unwrap();
@@ -97,7 +125,7 @@ fn invalid_messages_are_counted_and_not_used() {
     events
         .send_copy(bytemuck::pod_read_unaligned(&vec![0xff; size_of::<Event>()]))
         .unwrap();
-    link.poll();
+    assert!(until(&mut link, |link| link.invalid_dropped() >= 2));
     assert!(link.plan().is_none() && link.events().is_empty());
     assert_eq!(link.invalid_dropped(), 2);
 }
@@ -105,26 +133,34 @@ fn invalid_messages_are_counted_and_not_used() {
 #[test]
 fn a_command_and_a_volume_arrive_and_are_answered_once() {
     let instance = instance("answer");
-    let mut link = Link::new(instance.0.clone());
-    link.poll();
+    let mut link = connected(&instance);
     let node = instance.node().unwrap();
     let sessions = service::session(&node).unwrap().publisher_builder().create().unwrap();
     let replies = service::replies(&node).unwrap().publisher_builder().create().unwrap();
     let commands = service::commands(&node).unwrap().subscriber_builder().create().unwrap();
     let uploads = service::uploads(&node).unwrap().subscriber_builder().create().unwrap();
     sessions.send_copy(announce(9, 1)).unwrap();
-    link.poll();
+    assert!(until(&mut link, |link| link.status() == LinkStatus::Live));
 
     let request = Request::LoadBuiltinScene(2);
     let id = link.send(&request).unwrap();
-    let command = *commands.receive().unwrap().unwrap();
+    let mut arrived = None;
+    assert!(until(&mut link, |_| {
+        arrived = commands.receive().unwrap();
+        arrived.is_some()
+    }));
+    let command = *arrived.unwrap();
     assert_eq!((command.command_id, Request::decode(&command)), (id, Ok(request)));
     for (host_id, text) in [(command.host_id, "mine"), (command.host_id ^ 1, "another's")] {
         let refusal = Refusal::new(RefusalCode::SceneLoading, text);
         replies.send_copy(Reply::new(9, (host_id, id), Err(&refusal))).unwrap();
     }
-    link.poll();
-    let answer = link.reply(id).unwrap();
+    let mut answer = None;
+    assert!(until(&mut link, |link| {
+        answer = link.reply(id);
+        answer.is_some()
+    }));
+    let answer = answer.unwrap();
     assert_eq!(answer.text, "mine");
     assert!(answer.is_refused_for(RefusalCode::SceneLoading) && !answer.accepted);
     assert_eq!(link.reply(id), None);
@@ -141,8 +177,89 @@ fn a_command_and_a_volume_arrive_and_are_answered_once() {
     };
     for _ in 0..3 {
         let id = link.upload(&volume).unwrap();
-        let sample = uploads.receive().unwrap().unwrap();
+        let mut arrived = None;
+        assert!(until(&mut link, |_| {
+            arrived = uploads.receive().unwrap();
+            arrived.is_some()
+        }));
+        let sample = arrived.unwrap();
         assert_eq!(sample.user_header().command_id, id);
         assert_eq!(sample.payload(), &volume.cells[..]);
     }
+}
+
+fn sends_records(instance: &Instance, session_id: u64, batches: u64, every: Duration) {
+    let node = instance.node().unwrap();
+    let sessions = service::session(&node).unwrap().publisher_builder().create().unwrap();
+    sessions.send_copy(announce(session_id, 1)).unwrap();
+    let records = service::records(&node).unwrap();
+    let records = records.publisher_builder().initial_max_slice_len(service::MAX_BATCH);
+    let records = records.create().unwrap();
+    std::thread::sleep(Duration::from_millis(50));
+    for batch in 0..batches {
+        let mut sample = records.loan_slice_uninit(2).unwrap();
+        *sample.user_header_mut() = session_id;
+        let two = [1, 2].map(|n| TickRecord {
+            session_id,
+            tick: 2 * batch + n,
+            ..TickRecord::zeroed()
+        });
+        sample.write_from_slice(&two).send().unwrap();
+        std::thread::sleep(every);
+    }
+}
+
+/// The window took records in its frame: whatever came in the time of 64 batches, 0.13 s, before it was lost without a word.
+#[test]
+fn a_frame_of_three_seconds_loses_no_record() {
+    let instance = instance("slow");
+    let mut link = connected(&instance);
+    let sender = std::thread::spawn({
+        let instance = instance.0.clone();
+        move || sends_records(&instance, 5, 1500, Duration::from_millis(2))
+    });
+    assert!(until(&mut link, |link| link.session().is_some()));
+    sender.join().unwrap();
+    let mut ticks = Vec::new();
+    until(&mut link, |link| {
+        ticks.extend(link.take_records().iter().map(|r| r.tick));
+        ticks.len() == 3000
+    });
+    assert_eq!(ticks.len(), 3000);
+    assert!(ticks.iter().zip(1..).all(|(&tick, n)| tick == n));
+}
+
+/// Gaps in the numbers of the events were not looked at.
+#[test]
+fn events_that_were_not_seen_are_counted_and_those_before_this_host_are_not() {
+    let mut latest = Latest::default();
+    latest.begin(announce(1, 1));
+    for sequence in [7, 8, 8, 12] {
+        let mut event = Event::zeroed();
+        (event.session_id, event.sequence) = (1, sequence);
+        latest.put_event(event);
+    }
+    assert_eq!((latest.events.len(), latest.events_unseen), (3, 3));
+}
+
+#[test]
+fn a_request_that_cannot_be_sent_is_answered() {
+    let instance = instance("unsent");
+    let mut link = connected(&instance);
+    let node = instance.node().unwrap();
+    let sessions = service::session(&node).unwrap().publisher_builder().create().unwrap();
+    sessions.send_copy(announce(3, 1)).unwrap();
+    assert!(until(&mut link, |link| link.status() == LinkStatus::Live));
+    // Nobody takes commands.
+    let id = link.send(&Request::Engage).unwrap();
+    let mut answer = None;
+    assert!(until(&mut link, |link| {
+        answer = link.reply(id);
+        answer.is_some()
+    }));
+    let answer = answer.unwrap();
+    assert!(
+        !answer.accepted && answer.text.contains("queue is full or it has just ended"),
+        "{answer:?}"
+    );
 }

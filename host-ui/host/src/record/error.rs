@@ -28,13 +28,20 @@ pub enum RecordError {
     /// The thread that writes failed by itself.
     #[error("the recording ended by itself")]
     Panicked,
-    /// The recording lacks ticks.
-    #[error("{ticks} ticks are missing in {gaps} gaps")]
+    /// The recording lacks ticks or events.
+    #[error(
+        "{ticks} ticks are missing in {gaps} gaps, {in_core} of them lost in the core; {events} events are missing. \
+         The file says which; a faster disk, or fewer programs beside this one, lose none"
+    )]
     Missing {
         /// Ticks that are missing.
         ticks: u64,
         /// Gaps that they are missing in.
         gaps: usize,
+        /// Ticks that never left the core.
+        in_core: u64,
+        /// Events that are missing.
+        events: u64,
     },
     /// A file cannot be created, read or written; the text says why.
     #[error("{}: {why}", path.display())]

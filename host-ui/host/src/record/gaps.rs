@@ -1,8 +1,8 @@
-//! Which ticks of a session never came.
+//! Which numbers of a session never arrived: ticks or events.
 
 use std::collections::BTreeSet;
 
-/// Ticks that are missing in a row.
+/// Ticks, or events, that are missing in a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gap {
     /// The run of the core.
@@ -13,7 +13,14 @@ pub struct Gap {
     pub missing: u64,
 }
 
-/// Counts the ticks that arrive and those that are missing.
+impl std::fmt::Display for Gap {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let last = self.tick + self.missing.saturating_sub(1);
+        write!(f, "{} to {last} ({})", self.tick, self.missing)
+    }
+}
+
+/// Counts the ticks, or events, that arrive and those that are missing.
 #[derive(Clone, Debug, Default)]
 pub struct Gaps {
     records: u64,

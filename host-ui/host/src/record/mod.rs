@@ -1,8 +1,9 @@
 //! A session on disk: every record of the force loop, the tissue's snapshots and what happened, in MCAP; and what can be
 //! made of such a file.
 //!
-//! One thread takes what arrives in shared memory, another encodes and writes it: the disk may be slow for as long as
-//! memory lasts. Every tick that is missing is counted.
+//! The link's thread takes what arrives in shared memory, another encodes and writes it. A disk may be slow for five minutes
+//! before a tick is lost (65 MB, `link`), and a program that is stopped altogether for 12 s (`service::RECORD_BUFFER`). What
+//! is lost all the same is counted and listed, for each kind of message.
 
 mod error;
 mod export;
@@ -27,6 +28,10 @@ use writer::{Item, Totals};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);
 const FIND_LIMIT: Duration = Duration::from_secs(3);
+/// What is handed to the writer ahead of it, beyond which the link's memory is used.
+const ITEMS_AHEAD: usize = 32;
+/// Two snapshots that are kept and are farther apart than they should be by this have a gap between them, s.
+const SNAPSHOT_LATE_S: f64 = 0.1;
 const PRINT_EVERY: Duration = Duration::from_secs(10);
 
 /// What to record.
@@ -45,9 +50,9 @@ pub struct Options {
 pub fn run(options: &Options) -> Result<(), RecordError> {
     let interrupted = Interrupt::on_signals().map_err(|e| RecordError::Signals(e.to_string()))?;
     let stop = || interrupted.asked();
-    let mut link = Link::new(options.instance.clone());
+    let mut link = Link::for_recording(options.instance.clone());
     find_core(&mut link, stop)?;
-    let (send, receive) = mpsc::channel();
+    let (send, receive) = mpsc::sync_channel(ITEMS_AHEAD);
     let path = options.out.clone();
     let writer = std::thread::Builder::new()
         .name("recording".to_owned())
@@ -57,6 +62,7 @@ pub fn run(options: &Options) -> Result<(), RecordError> {
     drop(send);
     let totals = writer.join().map_err(|_| RecordError::Panicked)??;
     println!("{}: {}", options.out.display(), totals.words());
+    totals.missing_words().iter().for_each(|line| println!("{line}"));
     totals.verdict()
 }
 
@@ -86,10 +92,12 @@ struct Handed {
     event: u64,
     tissue_tick: u64,
     snapshot_ns: u64,
+    /// What the core had lost when the recording began.
+    lost_before: Option<u64>,
 }
 
-/// Takes what arrives and hands it to the writer, which never makes this thread wait.
-fn take(link: &mut Link, options: &Options, stop: impl Fn() -> bool, to: &mpsc::Sender<Item>) {
+/// Takes what arrives and hands it to the writer; while that is behind, the link keeps what arrives.
+fn take(link: &mut Link, options: &Options, stop: impl Fn() -> bool, to: &mpsc::SyncSender<Item>) {
     let begun = Instant::now();
     let mut printed = begun;
     let mut handed = Handed::default();
@@ -122,6 +130,9 @@ impl Handed {
     fn collect(&mut self, link: &mut Link, snapshots_hz: f64, items: &mut Vec<Item>) {
         if let Some(session) = link.session().filter(|s| self.session != Some(s.session_id)) {
             self.session = Some(session.session_id);
+            // A run that begins while it is recorded had lost nothing.
+            let lost_before = link.state().map_or(0, |s| s.records_lost);
+            self.lost_before = Some(self.lost_before.map_or(lost_before, |_| 0));
             (self.event, self.tissue_tick, self.snapshot_ns) = (0, 0, 0);
             items.push(Item::Session(Box::new(*session)));
         }
@@ -135,9 +146,10 @@ impl Handed {
         self.event = link.events().back().map_or(self.event, |e| e.sequence);
         if let Some(snapshot) = link.snapshot().filter(|s| s.header.tissue_tick != self.tissue_tick) {
             self.tissue_tick = snapshot.header.tissue_tick;
-            let due = snapshots_hz > 0.0
-                && snapshot.header.time_ns.saturating_sub(self.snapshot_ns) as f64 * 1e-9 >= 0.999 / snapshots_hz;
-            if due {
+            let since_s = snapshot.header.time_ns.saturating_sub(self.snapshot_ns) as f64 * 1e-9;
+            if snapshots_hz > 0.0 && since_s >= 0.999 / snapshots_hz {
+                let late = self.snapshot_ns > 0 && since_s > 2.0 / snapshots_hz + SNAPSHOT_LATE_S;
+                items.extend(late.then_some(Item::SnapshotsMissing(since_s)));
                 self.snapshot_ns = snapshot.header.time_ns;
                 items.push(Item::Snapshot(Box::new(snapshot.clone())));
             } else {
@@ -145,7 +157,8 @@ impl Handed {
             }
         }
         if let Some(state) = link.state() {
-            items.push(Item::LostInCore(state.records_lost));
+            let before = self.lost_before.unwrap_or(0);
+            items.push(Item::LostInCore(state.records_lost.saturating_sub(before)));
         }
     }
 }
@@ -178,12 +191,17 @@ pub fn save_flight(instance: &Instance) -> Result<String, RecordError> {
 
 impl Totals {
     fn verdict(&self) -> Result<(), RecordError> {
-        match self.gaps.missing() {
-            0 => Ok(()),
-            ticks => Err(RecordError::Missing {
+        match (self.gaps.missing(), self.events.missing()) {
+            (0, 0) => Ok(()),
+            (ticks, events) => Err(RecordError::Missing {
                 ticks,
                 gaps: self.gaps.gaps().len(),
+                in_core: self.lost_in_core,
+                events,
             }),
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

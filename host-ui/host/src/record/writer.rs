@@ -1,7 +1,7 @@
 //! The thread that encodes and writes.
 
 use super::error::RecordError;
-use super::gaps::Gaps;
+use super::gaps::{Gap, Gaps};
 use super::messages::{self, Channel, EVENT, GLAND, TICK, TISSUE, Tick};
 use crate::link::Snapshot;
 use mcap::records::{MessageHeader, Metadata};
@@ -16,6 +16,8 @@ use stylet_shm_schema::{Event, Session, TickRecord};
 const CHUNK_BYTES: u64 = 1 << 20;
 /// Gaps listed one by one in the file; all are counted.
 const GAPS_LISTED: usize = 1000;
+/// Gaps listed one by one in the terminal.
+const GAPS_PRINTED: usize = 10;
 
 /// What the taking thread hands over.
 pub enum Item {
@@ -25,7 +27,9 @@ pub enum Item {
     Snapshot(Box<Snapshot>),
     /// One that was seen and is not kept.
     SnapshotLeftOut,
-    /// As the core itself says.
+    /// No snapshot was kept for so long, s.
+    SnapshotsMissing(f64),
+    /// As the core itself says, since the recording began.
     LostInCore(u64),
 }
 
@@ -33,9 +37,12 @@ pub enum Item {
 #[derive(Default)]
 pub struct Totals {
     pub gaps: Gaps,
-    pub events: u64,
+    pub events: Gaps,
     pub snapshots: u64,
     pub snapshots_left_out: u64,
+    /// How often, and for how long altogether, there was no snapshot to keep.
+    pub snapshot_gaps: u64,
+    pub snapshot_gaps_s: f64,
     pub lost_in_core: u64,
     pub bytes: u64,
 }
@@ -43,37 +50,67 @@ pub struct Totals {
 impl Totals {
     pub fn words(&self) -> String {
         format!(
-            "{} ticks of {} session(s), {} missing in {} gaps, {} lost in the core; {} events; {} snapshots kept, {} left out; {:.1} MB",
+            "{} ticks of {} session(s), {} missing in {} gaps, {} of them lost in the core; {} events, {} missing; \
+             {} snapshots kept, {} left out, none for {:.1} s in {} gaps; {:.1} MB",
             self.gaps.records(),
             self.gaps.sessions(),
             self.gaps.missing(),
             self.gaps.gaps().len(),
             self.lost_in_core,
-            self.events,
+            self.events.records(),
+            self.events.missing(),
             self.snapshots,
             self.snapshots_left_out,
+            self.snapshot_gaps_s,
+            self.snapshot_gaps,
             self.bytes as f64 / 1e6
         )
     }
 
+    /// The numbers of what is missing, the first gaps of each kind.
+    pub fn missing_words(&self) -> Vec<String> {
+        let line = |(what, gaps): (&str, &Gaps)| {
+            let first: Vec<String> = gaps.gaps().iter().take(GAPS_PRINTED).map(Gap::to_string).collect();
+            let more = gaps.gaps().len().saturating_sub(GAPS_PRINTED);
+            let more = if more > 0 {
+                format!(", and {more} more")
+            } else {
+                String::new()
+            };
+            (!first.is_empty()).then(|| format!("missing {what}: {}{more}", first.join(", ")))
+        };
+        [("ticks", &self.gaps), ("events", &self.events)]
+            .into_iter()
+            .filter_map(line)
+            .collect()
+    }
+
     fn metadata(&self) -> BTreeMap<String, String> {
-        let listed = self.gaps.gaps().iter().take(GAPS_LISTED);
-        let listed = listed.map(|g| format!("{:016x}:{}+{}", g.session_id, g.tick, g.missing));
         [
             ("ticks", self.gaps.records().to_string()),
             ("ticks_missing", self.gaps.missing().to_string()),
             ("gaps", self.gaps.gaps().len().to_string()),
-            ("gaps_listed", listed.collect::<Vec<_>>().join(" ")),
+            ("gaps_listed", listed_gaps(&self.gaps)),
             ("ticks_repeated", self.gaps.repeated().to_string()),
             ("records_lost_in_core", self.lost_in_core.to_string()),
             ("sessions", self.gaps.sessions().to_string()),
-            ("events", self.events.to_string()),
+            ("events", self.events.records().to_string()),
+            ("events_missing", self.events.missing().to_string()),
+            ("event_gaps_listed", listed_gaps(&self.events)),
             ("snapshots", self.snapshots.to_string()),
             ("snapshots_left_out", self.snapshots_left_out.to_string()),
+            ("snapshot_gaps", self.snapshot_gaps.to_string()),
+            ("snapshot_gaps_s", format!("{:.3}", self.snapshot_gaps_s)),
         ]
         .map(|(key, value)| (key.to_owned(), value))
         .into()
     }
+}
+
+fn listed_gaps(gaps: &Gaps) -> String {
+    let listed = gaps.gaps().iter().take(GAPS_LISTED);
+    let listed = listed.map(|g| format!("{:016x}:{}+{}", g.session_id, g.tick, g.missing));
+    listed.collect::<Vec<_>>().join(" ")
 }
 
 struct Writer {
@@ -131,8 +168,9 @@ impl Writer {
                 }
             }
             Item::Event(event) => {
-                self.totals.events += 1;
-                self.message(1, event.time_ns, messages::event(&event).to_string().as_bytes())?;
+                if self.totals.events.record(event.session_id, event.sequence) {
+                    self.message(1, event.time_ns, messages::event(&event).to_string().as_bytes())?;
+                }
             }
             Item::Snapshot(snapshot) => {
                 self.totals.snapshots += 1;
@@ -142,6 +180,10 @@ impl Writer {
                 self.message(3, time_ns, gland.to_string().as_bytes())?;
             }
             Item::SnapshotLeftOut => self.totals.snapshots_left_out += 1,
+            Item::SnapshotsMissing(seconds) => {
+                self.totals.snapshot_gaps += 1;
+                self.totals.snapshot_gaps_s += seconds;
+            }
             Item::LostInCore(count) => self.totals.lost_in_core = self.totals.lost_in_core.max(count),
         }
         Ok(())

@@ -11,6 +11,7 @@
 use super::rehearse::{Drops, RehearsalError, Rehearser, Rest};
 use super::{Loading, Needle};
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use stylet_procedure::Pace;
 
 /// What compensation may do.
@@ -57,7 +58,7 @@ const AROUND_M: [f64; 6] = [0.3e-3, -0.3e-3, 0.6e-3, -0.6e-3, 0.15e-3, -0.15e-3]
 const DEEPER_M: f64 = 1e-3;
 
 /// One needle, before and after.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Compensation {
     /// The drops that leave the smallest errors.
     pub drops: Drops,

@@ -1,6 +1,7 @@
 //! One needle rehearsed: what the operator would do, and where the seeds would rest.
 
 use super::Needle;
+use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Link, LinkError, LinkStatus};
@@ -12,7 +13,7 @@ const POLL_EVERY: Duration = Duration::from_millis(2);
 const LONGEST: Duration = Duration::from_secs(300);
 
 /// What is done with one needle; the plan says what for.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Drops {
     /// Where the tip starts, outside the body, scene frame, m.
     pub entry_m: [f64; 3],

@@ -1,6 +1,7 @@
 //! How the hand moved: time, speed, force, and how often a needle went in again.
 
 use nalgebra::Vector3;
+use stylet_base::seen::{Seen, TickOrder};
 use stylet_shm_schema::{TickRecord, flags};
 
 /// Slower than this the needle rests.
@@ -25,13 +26,19 @@ pub struct Motion {
     pub insertions: usize,
     /// Times that it turned inwards again without having left.
     pub reinsertions: usize,
+    /// Of the ticks in this time; every figure here is of those that were seen.
+    pub seen: Seen,
 }
 
 impl Motion {
     /// `direction`: of the needles, into the body.
     pub fn of(records: &[TickRecord], direction: [f64; 3]) -> Self {
         let mut meter = MotionMeter::default();
-        records.iter().for_each(|record| meter.take(record, direction));
+        let mut order = TickOrder::default();
+        for record in records {
+            meter.miss(order.missing_before(record.session_id, record.tick));
+            meter.take(record, direction);
+        }
         meter.motion()
     }
 }
@@ -48,6 +55,11 @@ pub struct MotionMeter {
 }
 
 impl MotionMeter {
+    /// Ticks that ran before the next record and were not seen.
+    pub fn miss(&mut self, ticks: u64) {
+        self.motion.seen.unseen += ticks;
+    }
+
     /// `direction`: of the needle, into the body.
     pub fn take(&mut self, record: &TickRecord, direction: [f64; 3]) {
         let [first_ns, before_ns] = self.due_ns.unwrap_or([record.due_ns; 2]);
@@ -55,6 +67,7 @@ impl MotionMeter {
         // A gap in the records is no time in tissue.
         let dt_s = seconds(record.due_ns.saturating_sub(before_ns)).min(0.01);
         let motion = &mut self.motion;
+        motion.seen.seen += 1;
         motion.duration_s = seconds(record.due_ns.saturating_sub(first_ns));
         motion.peak_force_n = motion.peak_force_n.max(Vector3::from(record.force_on_hand_n).norm());
         if record.flags & flags::IN_CONTACT == 0 {

@@ -144,6 +144,9 @@ fn cards(score: &Score) -> Markup {
                 div class="card" { b { (value) } span { (what) } }
             }
         }
+        @if !m.seen.is_all() {
+            p class="note" { "Force, speed and times are of what was seen: " (m.seen.words()) "." }
+        }
     }
 }
 

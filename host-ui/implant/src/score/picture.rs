@@ -215,6 +215,12 @@ fn curve(dvh: &Dvh, most_gy: f64) -> Vec<(f64, f64)> {
     (0..=STEPS).map(|i| (at(i), share(at(i)))).collect()
 }
 
+/// Stretches of a curve over time that can be distinguished.
+const STRETCHES: usize = 900;
+/// Records so many times farther apart than usual, and by this at least, have a gap between them.
+const USUAL_TIMES: u64 = 4;
+const LEAST_GAP_NS: u64 = 40_000_000;
+
 /// Force above, speed along the needle below.
 pub fn over_time(records: &[TickRecord]) -> Result<String, ScoreError> {
     let force = |r: &TickRecord| Vector3::from(r.force_on_hand_n).norm();
@@ -267,21 +273,33 @@ fn series(
         .label_style((FONT, 13))
         .axis_desc_style((FONT, 14))
         .draw()?;
-    chart.draw_series(LineSeries::new(
-        thinned(records, seconds, value),
-        colour.stroke_width(1),
-    ))?;
+    let per_stretch = records.len().div_ceil(STRETCHES).max(1);
+    for piece in pieces(records) {
+        chart.draw_series(LineSeries::new(
+            thinned(piece, per_stretch, seconds, &value),
+            colour.stroke_width(1),
+        ))?;
+    }
     Ok(())
+}
+
+/// Cut where records are farther apart than most: what was between was not seen.
+fn pieces(records: &[TickRecord]) -> impl Iterator<Item = &[TickRecord]> {
+    let apart_ns = |a: &TickRecord, b: &TickRecord| b.due_ns.saturating_sub(a.due_ns);
+    let mut all: Vec<u64> = records.windows(2).map(|pair| apart_ns(&pair[0], &pair[1])).collect();
+    all.sort_unstable();
+    let usual_ns = all.get(all.len() / 2).copied().unwrap_or(0);
+    let most_ns = (USUAL_TIMES * usual_ns).max(LEAST_GAP_NS);
+    records.chunk_by(move |a, b| apart_ns(a, b) <= most_ns)
 }
 
 /// Lowest and highest of each stretch, so that no peak is lost.
 fn thinned(
     records: &[TickRecord],
+    per_stretch: usize,
     seconds: impl Fn(&TickRecord) -> f64,
     value: impl Fn(&TickRecord) -> f64,
 ) -> Vec<(f64, f64)> {
-    const STRETCHES: usize = 900;
-    let per_stretch = records.len().div_ceil(STRETCHES).max(1);
     records
         .chunks(per_stretch)
         .flat_map(|stretch| {

@@ -1,8 +1,9 @@
 //! Force and speed of a whole procedure in bounded memory, and how the hand moved.
 
 use super::motion::{Motion, MotionMeter};
-use stylet_base::envelope::Envelope;
+use stylet_base::envelope::{Band, Envelope};
 use stylet_base::format;
+use stylet_base::seen::TickOrder;
 use stylet_shm_schema::{SceneId, TickRecord, flags};
 
 /// Records kept at most: ten of a second for twenty minutes; of a longer procedure fewer of a second.
@@ -30,6 +31,7 @@ pub struct Trace {
     /// When the tip touched tissue last.
     contact_ns: Option<u64>,
     meter: MotionMeter,
+    order: TickOrder,
 }
 
 impl Default for Trace {
@@ -44,6 +46,7 @@ impl Default for Trace {
             began_ns: None,
             contact_ns: None,
             meter: MotionMeter::default(),
+            order: TickOrder::default(),
         }
     }
 }
@@ -54,15 +57,21 @@ impl Trace {
         if scene.is_some() && scene != self.scene {
             *self = Self {
                 scene,
+                order: self.order,
                 ..Self::default()
             };
         }
         for record in records {
+            let missing = self.order.missing_before(record.session_id, record.tick);
             if record.flags & flags::IN_CONTACT != 0 {
                 self.contact_ns = Some(record.due_ns);
             }
             let Some(contact_ns) = self.contact_ns else { continue };
             if record.due_ns.saturating_sub(contact_ns) <= OUTSIDE_NS {
+                if missing > 0 && self.began_ns.is_some() {
+                    self.meter.miss(missing);
+                    self.curves.gap();
+                }
                 self.meter.take(record, direction);
                 self.keep(record);
                 self.began_ns.get_or_insert(record.due_ns);
@@ -103,22 +112,22 @@ impl Trace {
         self.curves.is_empty()
     }
 
-    /// Smallest and largest over seconds since it began.
-    pub fn force_n(&self) -> Vec<[f64; 3]> {
+    /// Smallest and largest over seconds since it began, in pieces: between two of them nothing was seen.
+    pub fn force_n(&self) -> Vec<Vec<[f64; 3]>> {
         self.curve(0)
     }
 
-    /// Smallest and largest over seconds since it began.
-    pub fn speed_mm_per_s(&self) -> Vec<[f64; 3]> {
+    /// The same of the speed.
+    pub fn speed_mm_per_s(&self) -> Vec<Vec<[f64; 3]>> {
         self.curve(1)
     }
 
-    fn curve(&self, quantity: usize) -> Vec<[f64; 3]> {
+    fn curve(&self, quantity: usize) -> Vec<Vec<[f64; 3]>> {
         let began_ns = self.began_ns.unwrap_or(0);
         let seconds = |time_ns: u64| format::seconds(time_ns.saturating_sub(began_ns));
-        let bands = self.curves.bands(quantity);
-        let points = bands.map(|b| [seconds(b.time_ns), f64::from(b.low), f64::from(b.high)]);
-        points.collect()
+        let point = |b: &Band| [seconds(b.time_ns), f64::from(b.low), f64::from(b.high)];
+        let pieces = self.curves.pieces(quantity);
+        pieces.iter().map(|piece| piece.iter().map(point).collect()).collect()
     }
 
     /// How the hand has moved so far.
@@ -147,7 +156,7 @@ mod tests {
     fn records(ticks: std::ops::Range<u64>, in_contact: bool) -> Vec<TickRecord> {
         let record = |tick: u64| {
             let mut r = TickRecord::zeroed();
-            r.due_ns = (tick + 1) * 1_000_000;
+            (r.tick, r.due_ns) = (tick, (tick + 1) * 1_000_000);
             r.flags = if in_contact { flags::IN_CONTACT } else { 0 };
             r.force_on_hand_n[2] = (tick as f64 / 159.0).sin();
             if tick == 5_003 {
@@ -179,7 +188,7 @@ mod tests {
         let last_ns = trace.records().last().map(|r| r.due_ns);
         assert!(last_ns.is_some_and(|ns| ns > 3_599_000_000_000), "{last_ns:?}");
         assert!((trace.motion().in_tissue_s - 3_599.999).abs() < 1e-6);
-        let curve = trace.force_n();
+        let curve = trace.force_n().concat();
         assert!((MOST_SLOTS / 2..=MOST_SLOTS).contains(&curve.len()), "{}", curve.len());
         assert!(curve.is_sorted_by_key(|[s, ..]| *s) && curve[0][0] < 5.2);
         assert!(curve.last().is_some_and(|[s, ..]| *s > 3_594.0));
@@ -199,7 +208,22 @@ mod tests {
         trace.take(&records(11_000..60_000, false), Some(scene(1)), [0.0, 0.0, 1.0]);
         assert!((trace.motion().duration_s - 2.999).abs() < 1e-9, "{:?}", trace.motion());
         assert_eq!(trace.records().len(), 300);
+        assert!(trace.motion().seen.is_all(), "{:?}", trace.motion());
         trace.take(&records(60_000..60_010, true), Some(scene(2)), [0.0, 0.0, 1.0]);
         assert_eq!(trace.records().len(), 1, "another scene");
+    }
+
+    /// Peaks and curves of a procedure were of the ticks that arrived, and nothing said how many that were.
+    #[test]
+    fn ticks_that_were_not_seen_cut_the_curves_and_are_counted() {
+        let mut trace = Trace::default();
+        for ticks in [0..2_000, 3_500..5_000] {
+            trace.take(&records(ticks, true), Some(scene(1)), [0.0, 0.0, 1.0]);
+        }
+        assert_eq!(trace.motion().seen.words(), "3 500 of 5 000 ticks seen");
+        let pieces = trace.force_n();
+        assert_eq!(pieces.len(), 2);
+        let [end, begin] = [pieces[0].last(), pieces[1].first()].map(|p| p.expect("points")[0]);
+        assert!((end - 2.0).abs() < 0.05 && (begin - 3.5).abs() < 0.05, "{end} {begin}");
     }
 }

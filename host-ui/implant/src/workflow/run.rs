@@ -1,11 +1,18 @@
 //! The procedure driven over the link: requests out, replies and the state of the force loop in.
 
 use super::{NeedlePlan, plan_request};
+use crate::pairing;
 use crate::plan::{Drops, Needle};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use stylet_host::link::{Link, LinkError, LinkStatus};
-use stylet_procedure::{HandRequest, Next, Observed, Pace, Procedure, Reply, Step, StepFailure};
+use stylet_procedure::{
+    Done, HandRequest, NeedleWay, Next, Observed, Pace, Patience, Procedure, Reply, Step, StepFailure, Waiting,
+    needle_inside,
+};
 use stylet_shm_schema::{HapticState, NeedleAxis, RefusalCode, Request};
+
+/// A core that is absent for less is waited for: a busy machine may hold it up.
+const ABSENT_LIMIT: Duration = Duration::from_secs(10);
 
 /// How a run ended, or that it has not.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,12 +90,81 @@ impl NeedleTask {
     }
 }
 
+/// What of the needles of a script is in the tissue already.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Placed {
+    done: Done,
+    /// Seeds of each needle that are in the tissue.
+    seeds: Vec<usize>,
+    drops: usize,
+    /// The first needle that has something left to do.
+    next: usize,
+}
+
+impl Placed {
+    /// By where the tip was when seeds left it, and where it is now; `lost` are the numbers of drops that are known to have left
+    /// no seed.
+    pub fn find(tasks: &[NeedleTask], dropped_at_m: &[[f64; 3]], tip_m: Option<[f64; 3]>, lost: &[usize]) -> Self {
+        let ways: Vec<NeedleWay> = tasks.iter().map(|task| task.drops.way()).collect();
+        let drops_m: Vec<[f64; 3]> = ways
+            .iter()
+            .flat_map(|way| way.drops_m.iter().map(|&d| d.into()))
+            .collect();
+        let made = pairing::made(&drops_m, dropped_at_m);
+        let mut from = 0;
+        let mut count = |way: &NeedleWay| {
+            let own = from..from + way.drops_m.len();
+            from = own.end;
+            made[own].iter().filter(|made| **made).count()
+        };
+        let seeds = ways.iter().map(&mut count).collect();
+        let lost: Vec<usize> = lost.iter().copied().filter(|&n| made.get(n) == Some(&false)).collect();
+        let is_done = |number: &usize| made[*number] || lost.contains(number);
+        let done = Done {
+            drops: (0..made.len()).filter(is_done).collect(),
+            inside: tip_m.and_then(|tip_m| needle_inside(&ways, tip_m)),
+            lost,
+        };
+        let is_left = |(needle, way): (usize, &NeedleWay)| {
+            let first: usize = ways[..needle].iter().map(|way| way.drops_m.len()).sum();
+            (first..first + way.drops_m.len())
+                .any(|n| !done.drops.contains(&n))
+                .then_some(needle)
+        };
+        let next = ways.iter().enumerate().find_map(is_left);
+        let next = done.inside.map(|(needle, _)| needle).or(next);
+        Self {
+            seeds,
+            drops: made.len(),
+            next: next.unwrap_or(0),
+            done,
+        }
+    }
+
+    /// Whether something was done and something is left: it can be continued.
+    pub fn is_partial(&self) -> bool {
+        let made = self.done.drops.len();
+        made > 0 && (made < self.drops || self.done.inside.is_some())
+    }
+
+    /// The needle that it goes on with, counted from 0.
+    pub fn next_needle(&self) -> usize {
+        self.next
+    }
+
+    /// Seeds of a needle that are in the tissue.
+    pub fn seeds_of(&self, needle: usize) -> usize {
+        self.seeds.get(needle).copied().unwrap_or(0)
+    }
+}
+
 /// One scripted implantation. Call [`Run::advance`] after each [`Link::poll`].
 pub struct Run {
     tasks: Vec<NeedleTask>,
     procedure: Procedure,
     status: RunStatus,
     session_id: Option<u64>,
+    absent_since: Option<Instant>,
     started: Instant,
     sent: Option<u64>,
     /// The tick from which the state shows the request.
@@ -104,11 +180,29 @@ impl Run {
     /// One needle after another; between two of them the tissue comes to rest.
     pub fn of_needles(tasks: Vec<NeedleTask>, pace: Pace) -> Self {
         let ways = tasks.iter().map(|task| task.drops.way()).collect();
+        Self::of(tasks, Procedure::of_needles(ways, pace))
+    }
+
+    /// The same from where it was stopped: nothing is reset, and no seed is dropped twice.
+    pub fn going_on(tasks: Vec<NeedleTask>, pace: Pace, placed: &Placed) -> Self {
+        let ways = tasks.iter().map(|task| task.drops.way()).collect();
+        Self::of(tasks, Procedure::going_on(ways, pace, &placed.done))
+    }
+
+    /// How long it waits for what does not arrive; without this, until the operator decides.
+    #[must_use]
+    pub fn with_patience(self, patience: Patience) -> Self {
+        let procedure = self.procedure.with_patience(patience);
+        Self { procedure, ..self }
+    }
+
+    fn of(tasks: Vec<NeedleTask>, procedure: Procedure) -> Self {
         Self {
             tasks,
-            procedure: Procedure::of_needles(ways, pace),
+            procedure: procedure.with_patience(Patience::Operator),
             status: RunStatus::Working,
             session_id: None,
+            absent_since: None,
             started: Instant::now(),
             sent: None,
             effective_tick: None,
@@ -118,6 +212,16 @@ impl Run {
     /// The step at present.
     pub fn step(&self) -> Step {
         self.procedure.step()
+    }
+
+    /// The needles, in the order in which they are inserted.
+    pub fn tasks(&self) -> &[NeedleTask] {
+        &self.tasks
+    }
+
+    /// What it waits for, and for how long.
+    pub fn waiting(&self) -> Waiting {
+        self.procedure.waiting()
     }
 
     /// Which needle is at work, counted from 0; the last one when all are done.
@@ -152,7 +256,9 @@ impl Run {
     }
 
     fn try_advance(&mut self, link: &mut Link) -> Result<Next, RunFailure> {
-        self.check_core(link)?;
+        if !self.has_core(link)? {
+            return Ok(Next::Wait);
+        }
         let now_s = self.started.elapsed().as_secs_f64();
         let state = link.state().copied();
         let reply = state.as_ref().map_or(Reply::Pending, |state| self.reply(link, state));
@@ -165,16 +271,22 @@ impl Run {
         Ok(next)
     }
 
-    fn check_core(&mut self, link: &Link) -> Result<(), RunFailure> {
+    /// False while it is to be waited for.
+    fn has_core(&mut self, link: &Link) -> Result<bool, RunFailure> {
         if let LinkStatus::Absent { why } = link.status() {
-            return Err(RunFailure::Absent(why));
+            let since = *self.absent_since.get_or_insert_with(Instant::now);
+            return match since.elapsed() > ABSENT_LIMIT || self.session_id.is_none() {
+                true => Err(RunFailure::Absent(why)),
+                false => Ok(false),
+            };
         }
+        self.absent_since = None;
         let id = link.session().map(|s| s.session_id);
         if self.session_id.is_some() && id != self.session_id {
             return Err(RunFailure::Restarted);
         }
         self.session_id = id;
-        Ok(())
+        Ok(true)
     }
 
     fn send(&self, link: &mut Link, request: HandRequest) -> Result<u64, LinkError> {
@@ -213,5 +325,42 @@ impl Run {
         } else {
             Reply::Accepted
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two needles with two seeds each, along z.
+    fn tasks() -> Vec<NeedleTask> {
+        let needle = |x: f64| NeedlePlan {
+            entry_m: [x, 0.0, 0.0],
+            direction: [0.0, 0.0, 1.0],
+            seeds_m: vec![[x, 0.0, 0.05], [x, 0.0, 0.04]],
+        };
+        [0.0, 0.01].map(needle).map(NeedleTask::as_planned).to_vec()
+    }
+
+    #[test]
+    fn what_is_in_the_tissue_says_where_to_go_on() {
+        let tasks = tasks();
+        let found = |dropped: &[[f64; 3]], tip_m| Placed::find(&tasks, dropped, tip_m, &[]);
+        let none = found(&[], Some([0.0, 0.0, -0.01]));
+        assert!(!none.is_partial());
+        let first = [[0.0, 0.0, 0.0502]];
+        assert_eq!(found(&first, None).next_needle(), 0);
+        let three = [[0.0, 0.0, 0.05], [0.0, 0.0, 0.04], [0.01, 0.0, 0.05]];
+        let rest = found(&three, Some([0.01, 0.0, 0.05]));
+        assert_eq!((rest.is_partial(), rest.next_needle()), (true, 1));
+        assert_eq!([0, 1].map(|n| rest.seeds_of(n)), [2, 1]);
+        // All seeds of the first, and it is still in the tissue.
+        assert_eq!(found(&three[..2], Some([0.0, 0.0, 0.03])).next_needle(), 0);
+        let all = [&three[..], &[[0.01, 0.0, 0.04]]].concat();
+        assert!(!found(&all, Some([0.0, 0.0, -0.01])).is_partial(), "nothing is left");
+        assert!(found(&all, Some([0.01, 0.0, 0.03])).is_partial(), "but to take it out");
+        // A drop that left no seed is not made again.
+        let lost = Placed::find(&tasks, &three[1..], None, &[0]);
+        assert_eq!((lost.next_needle(), lost.done.lost.as_slice()), (1, &[0][..]));
     }
 }

@@ -9,7 +9,7 @@ mod scene;
 use crate::action::Action;
 use crate::shown::{SeedError, Shown, own_errors};
 use crate::theme;
-use egui::{Align2, Button, FontId, RichText, Sense, Stroke, Vec2};
+use egui::{Align, Align2, Button, FontId, Layout, RichText, Sense, Stroke, Vec2};
 pub use plan::{PlanState, editor_ui};
 pub use progress::{Progress, Undo, is_at_next_seed, is_needle_done, missing, next_action, progress, undo_action};
 use stylet_base::format;
@@ -18,6 +18,8 @@ use stylet_shm_schema::Request;
 
 /// What the script does of a plan of one needle, by the numbers in the panel.
 pub const SCRIPTED_STEPS: &str = "steps 2 to 6";
+/// Waiting for longer is shown.
+const SHOW_WAITING_S: f64 = 2.0;
 
 /// What the panel keeps between frames: what a person is typing, and which step was opened by hand.
 #[derive(Default)]
@@ -88,14 +90,21 @@ fn run_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         };
         ui.horizontal(|ui| {
             ui.spinner();
-            match shown.run_needle {
-                Some((needle, count)) => ui.label(format!("Needle {} of {count}: {step}", needle + 1)),
-                None => ui.label(format!("Running: {step}")),
-            };
-            if ui.button("Stop").clicked() {
-                actions.push(Action::StopRun);
-            }
+            ui.label(match shown.run_needle {
+                Some((needle, count)) => format!("Needle {} of {count}", needle + 1),
+                None => "Running".to_owned(),
+            });
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                if ui.button("Stop").clicked() {
+                    actions.push(Action::StopRun);
+                }
+            });
         });
+        // On lines of its own: as long as it is, it may not make the panel wider.
+        ui.label(theme::weak(match waits(shown) {
+            Some(waits) => format!("{step}: {waits}"),
+            None => step.to_owned(),
+        }));
         return;
     }
     let blocked = missing(shown, Progress::Plan);
@@ -103,9 +112,25 @@ fn run_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     if hinted(response, blocked).on_hover_text(run_help(shown)).clicked() {
         actions.push(Action::RunAll);
     }
+    if shown.goes_on_at.is_some() {
+        let anew = ui.add_enabled(shown.is_live(), Button::new("Begin anew"));
+        let help = "Takes all seeds out of the tissue and begins at the first needle";
+        if anew.on_hover_text(help).clicked() {
+            actions.push(Action::RunAnew);
+        }
+    }
+}
+
+/// What the script waits for, once that takes longer than usual.
+fn waits(shown: &Shown) -> Option<String> {
+    let waiting = shown.run_waits.filter(|waiting| waiting.for_s >= SHOW_WAITING_S)?;
+    Some(format!("waiting for {}, {:.0} s", waiting.waits_for, waiting.for_s))
 }
 
 fn run_name(shown: &Shown) -> String {
+    if let Some((needle, count)) = shown.goes_on_at {
+        return format!("Go on at needle {} of {count}", needle + 1);
+    }
     match needle_count(shown) {
         0 => format!("Run {SCRIPTED_STEPS}"),
         count => format!("Run all {count} needles"),
@@ -113,6 +138,9 @@ fn run_name(shown: &Shown) -> String {
 }
 
 fn run_help(shown: &Shown) -> &'static str {
+    if shown.goes_on_at.is_some() {
+        return "The seeds in the tissue stay; the scripted hand goes on with the first seed that is missing";
+    }
     match needle_count(shown) {
         0 => "A scripted hand plans five seeds, places the needle, inserts it, drops the seeds and retracts it",
         _ => "A scripted hand places each needle in turn, inserts it, drops its seeds and retracts it",

@@ -147,7 +147,7 @@ pub fn next_action(shown: &Shown) -> Option<Action> {
             let needle = at_hand(shown)?;
             match needle.next()? {
                 Operation::Place => Some(Action::PlaceNeedle),
-                Operation::Insert => Some(Action::Insert),
+                Operation::Insert | Operation::InsertTo(_) => Some(Action::Insert),
                 Operation::Drop(_) => Some(Action::Send(Request::DropSeed)),
                 Operation::DrawBack(_) => needle.next_drop_m.map(Action::MoveTo),
                 Operation::Retract | Operation::TakeOut => Some(Action::Retract),

@@ -1,12 +1,14 @@
 //! Which needle of a plan is next, and what the script does.
 
-use super::{Progress, SCRIPTED_STEPS, is_needle_done, next_action, progress, run_name};
+use super::{Progress, SCRIPTED_STEPS, is_needle_done, next_action, progress, run_name, run_ui, waits};
 use crate::action::{Action, PlanAction};
 use crate::planner::Planner;
 use crate::planner::tests::{planned, planner, planning};
 use crate::shown::Shown;
+use crate::theme;
 use bytemuck::Zeroable;
 use stylet_host::link::LinkStatus;
+use stylet_procedure::{Step, Waiting, WaitsFor};
 use stylet_shm_schema::{HapticState, PlanInForce, SceneHeader, SeedPose, flags};
 
 /// The needle at work in force, its tip at a depth, seeds dropped so far along their needles.
@@ -77,4 +79,45 @@ fn the_button_names_the_steps_of_the_panel_that_the_script_does() {
     assert_eq!(run_name(&Shown::empty("lab")), format!("Run {SCRIPTED_STEPS}"));
     let mut planner = planner();
     assert_eq!(run_name(&shown(&mut planner, 0.0, &[])), "Run all 2 needles");
+}
+
+/// The row said the needle and the step on one line, made the panel wider than it was, and "Stop" was cut off.
+#[test]
+fn the_button_says_where_it_goes_on_and_the_row_what_is_waited_for() {
+    let mut shown = Shown::empty("lab");
+    shown.goes_on_at = Some((2, 19));
+    assert_eq!(run_name(&shown), "Go on at needle 3 of 19");
+    let mut waiting = Waiting {
+        waits_for: WaitsFor::Reply("DropSeed"),
+        for_s: 1.5,
+    };
+    shown.run_waits = Some(waiting);
+    assert_eq!(waits(&shown), None, "as long as it usually takes");
+    waiting.for_s = 12.4;
+    shown.run_waits = Some(waiting);
+    assert_eq!(waits(&shown).as_deref(), Some("waiting for a reply to DropSeed, 12 s"));
+}
+
+/// At the end of many needles, in the longest step.
+#[test]
+fn the_row_of_a_run_stays_inside_its_panel() {
+    let mut shown = Shown::empty("lab");
+    (shown.running, shown.run_needle, shown.run_step) = (true, Some((18, 19)), Some(Step::Settle));
+    shown.run_waits = Some(Waiting {
+        waits_for: WaitsFor::Line,
+        for_s: 3_600.0,
+    });
+    let width = theme::LEFT_WIDTH - 20.0;
+    let ctx = egui::Context::default();
+    let mut needed = egui::Rect::NOTHING;
+    for _ in 0..3 {
+        let mut output = ctx.run_ui(egui::RawInput::default(), |ui| {
+            let panel = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, 600.0));
+            let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(panel));
+            run_ui(&mut ui, &shown, &mut Vec::new());
+            needed = ui.min_rect();
+        });
+        output.textures_delta.clear();
+    }
+    assert!(needed.width() <= width + 0.5, "{needed:?}");
 }

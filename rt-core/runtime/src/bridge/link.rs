@@ -5,7 +5,7 @@ use crate::rt::clock;
 use crate::rt::exchange::Ticket;
 use iceoryx2::node::Node;
 use std::collections::HashMap;
-use stylet_shm_schema::service::{Ipc, MAX_BATCH};
+use stylet_shm_schema::service::{BATCH_EVERY, Ipc, MAX_BATCH};
 use stylet_shm_schema::{Event, EventKind, Refusal, Reply, Session, Text, TickRecord};
 
 const ANNOUNCE_NS: u64 = 200_000_000;
@@ -25,6 +25,8 @@ pub struct Link {
     events: u64,
     batch: Vec<TickRecord>,
     newest: Option<TickRecord>,
+    /// When records were sent last.
+    sent_ns: u64,
     announced_ns: u64,
     cleaned_ns: u64,
 }
@@ -69,6 +71,7 @@ impl Link {
             events: 0,
             newest: None,
             batch: Vec::with_capacity(MAX_BATCH),
+            sent_ns: 0,
             announced_ns: 0,
             cleaned_ns: 0,
         }
@@ -89,31 +92,40 @@ impl Link {
         }
     }
 
-    /// True when the force loop has made a tick.
-    /// The last record that was sent.
+    /// The newest record of the force loop.
     pub fn newest_record(&self) -> Option<&TickRecord> {
         self.newest.as_ref()
     }
 
+    /// Takes what the force loop has made and sends it in batches, each full or [`BATCH_EVERY`] after the last. True when
+    /// the loop has made a tick.
     pub fn send_records(&mut self, records: &mut rtrb::Consumer<TickRecord>) -> bool {
         let mut any = false;
-        loop {
-            while self.batch.len() < MAX_BATCH
-                && let Ok(record) = records.pop()
-            {
-                self.batch.push(record);
-            }
-            if self.batch.is_empty() {
-                return any;
-            }
+        while let Ok(record) = records.pop() {
             any = true;
-            self.newest = self.batch.last().copied();
-            if let Ok(mut sample) = self.ports.records.loan_slice_uninit(self.batch.len()) {
-                *sample.user_header_mut() = self.session.session_id;
-                let _ = sample.write_from_slice(&self.batch).send();
+            self.newest = Some(record);
+            self.batch.push(record);
+            if self.batch.len() == MAX_BATCH {
+                self.send_batch();
             }
-            self.batch.clear();
         }
+        if clock::now_ns() - self.sent_ns >= BATCH_EVERY.as_nanos() as u64 {
+            self.send_batch();
+        }
+        any
+    }
+
+    /// Whatever has not been sent yet.
+    pub fn send_batch(&mut self) {
+        if self.batch.is_empty() {
+            return;
+        }
+        self.sent_ns = clock::now_ns();
+        if let Ok(mut sample) = self.ports.records.loan_slice_uninit(self.batch.len()) {
+            *sample.user_header_mut() = self.session.session_id;
+            let _ = sample.write_from_slice(&self.batch).send();
+        }
+        self.batch.clear();
     }
 
     pub fn event(&mut self, kind: EventKind, details: EventDetails<'_>) {

@@ -138,12 +138,10 @@ impl Bridge {
     /// Serves hosts until `stopped` or a host asks to end. An error when the force loop has stopped by itself: then
     /// neither loop must be waited for.
     pub fn run(&mut self, stopped: impl Fn() -> bool) -> Result<(), LoopStopped> {
-        while !stopped() {
-            if self.pass()? {
-                return Ok(());
-            }
+        while !stopped() && !self.pass()? {
             std::thread::sleep(PASS);
         }
+        self.link.send_batch();
         Ok(())
     }
 

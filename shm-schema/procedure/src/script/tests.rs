@@ -191,13 +191,16 @@ fn what_is_not_answered_refused_or_without_effect_ends_the_procedure() {
     };
     assert_eq!(fails(Reply::Pending, 2.9), Ok(Next::Wait));
     assert_eq!(fails(Reply::Accepted, 2.9), Ok(Next::Wait));
-    assert_eq!(fails(Reply::Pending, 3.1), Err(StepFailure::NoReply("Reset")));
-    assert_eq!(fails(Reply::Accepted, 3.1), Err(StepFailure::NoEffect("Reset")));
+    assert_eq!(fails(Reply::Pending, 3.1), Err(StepFailure::NoReply("Reset", 3.0)));
+    assert_eq!(fails(Reply::Accepted, 3.1), Err(StepFailure::NoEffect("Reset", 3.0)));
     let refused = fails(Reply::Refused("no".to_owned()), 0.1).map_err(|e| e.to_string());
     assert_eq!(refused, Err("Reset was refused: no".to_owned()));
     let mut unseen = Procedure::of_needles(vec![way()], Pace::default());
     assert_eq!(unseen.advance(0.0, None, Reply::Pending), Ok(Next::Wait));
-    assert_eq!(unseen.advance(3.1, None, Reply::Pending), Err(StepFailure::NoState));
+    assert_eq!(
+        unseen.advance(3.1, None, Reply::Pending),
+        Err(StepFailure::NoState(3.0))
+    );
 }
 
 #[test]
@@ -208,5 +211,81 @@ fn a_fault_ends_the_procedure_only_once_the_force_was_turned_on() {
     assert_eq!(
         hand.step(&mut procedure, &[]),
         Err(StepFailure::ForceOff(Fault::DeviceError))
+    );
+}
+
+/// A drop that a busy machine answered after 3 s ended the implant.
+#[test]
+fn an_operator_decides_how_long_is_waited_and_sees_what_for() {
+    let state = HapticState::zeroed();
+    let observed = Observed {
+        state: &state,
+        displacement_m: None,
+    };
+    let begin = |patience| {
+        let mut procedure = Procedure::of_needles(vec![way()], Pace::default()).with_patience(patience);
+        let _sent = procedure.advance(0.0, Some(&observed), Reply::Pending);
+        procedure
+    };
+    let mut procedure = begin(Patience::Operator);
+    assert_eq!(
+        procedure.advance(3_600.0, Some(&observed), Reply::Pending),
+        Ok(Next::Wait)
+    );
+    let waiting = procedure.waiting();
+    assert_eq!((waiting.waits_for, waiting.for_s), (WaitsFor::Reply("Reset"), 3_600.0));
+    assert_eq!(waiting.waits_for.to_string(), "a reply to Reset");
+    assert_eq!(
+        procedure.advance(3_601.0, Some(&observed), Reply::InEffect),
+        Ok(Next::Continue)
+    );
+    let mut unwatched = begin(Patience::AtLeast(60.0));
+    assert_eq!(unwatched.advance(59.0, Some(&observed), Reply::Pending), Ok(Next::Wait));
+    let failed = unwatched.advance(61.0, Some(&observed), Reply::Pending);
+    assert_eq!(failed, Err(StepFailure::NoReply("Reset", 60.0)));
+}
+
+/// Stopped after `sent` requests, and continued by what is in the tissue: what is sent after that.
+fn continued(ways: &[NeedleWay], sent: usize) -> (Obedient, Vec<HandRequest>) {
+    let mut hand = Obedient::new();
+    let mut procedure = Procedure::of_needles(ways.to_vec(), Pace::default());
+    while hand.sent.len() < sent {
+        assert_ne!(hand.step(&mut procedure, &[]), Ok(Next::Done));
+    }
+    let done = Done {
+        drops: (0..hand.state.seed_count as usize).collect(),
+        lost: Vec::new(),
+        inside: needle_inside(ways, hand.state.tip_in_scene_m),
+    };
+    let before = std::mem::take(&mut hand.sent);
+    let mut procedure = Procedure::going_on(ways.to_vec(), Pace::default(), &done);
+    hand.go_through(&mut procedure, &[]);
+    (hand, before)
+}
+
+/// A run that was stopped began at its first needle again, without the seeds that were there.
+#[test]
+fn a_procedure_goes_on_from_wherever_it_was_stopped_with_no_seed_twice_and_none_missing() {
+    let beside = |x: f64| NeedleWay {
+        entry_m: Vector3::new(x, 0.0, 0.0),
+        drops_m: [0.03, 0.02].map(|z| Vector3::new(x, 0.0, z)).to_vec(),
+        ..way()
+    };
+    let ways = [beside(0.01), beside(0.02), beside(0.03)];
+    let mut whole = Obedient::new();
+    whole.go_through(&mut Procedure::of_needles(ways.to_vec(), Pace::default()), &[]);
+    for stopped in 3..=whole.sent.len() {
+        let (hand, before) = continued(&ways, stopped);
+        assert_eq!(hand.state.seed_count, 6, "stopped after {:?}", words(&before));
+        assert!(!hand.sent.contains(&HandRequest::Reset), "{:?}", words(&hand.sent));
+        let drops = [before, hand.sent].concat();
+        let drops = drops.iter().filter(|r| matches!(r, HandRequest::DropSeed)).count();
+        assert_eq!(drops, 6, "stopped after {stopped}");
+    }
+    // In the second needle, with its first seed dropped: straight to the second.
+    let (hand, _) = continued(&ways, 13);
+    assert_eq!(
+        words(&hand.sent)[..4],
+        ["plan 1", "Engage", "20 mm at 50 mm/s", "DropSeed"]
     );
 }

@@ -25,7 +25,6 @@ pub const LONGER: &[(&str, &str)] = &[
         "chainmail/avx2.rs",
         "vector kernels that share their lanes and constants",
     ),
-    ("src/link.rs", "not split yet"),
 ];
 
 /// Public functions that may still return their error as prose: only ever lowered.

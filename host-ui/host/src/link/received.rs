@@ -1,0 +1,134 @@
+//! What a host knows of the core, as types of its own.
+
+use std::time::Duration;
+use stylet_shm_schema::{Reason, Refusal, RefusalCode, Reply, ReplyStatus, SceneHeader, SnapshotHeader, Vertex, check};
+
+/// Whether the core runs.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LinkStatus {
+    /// No core has announced itself, or it has been silent for long; `why` says what to do.
+    Absent {
+        /// What to do.
+        why: String,
+    },
+    /// The heartbeat moves.
+    Live,
+    /// The heartbeat has not moved.
+    Silent {
+        /// For how long.
+        since: Duration,
+    },
+}
+
+/// The rest surface of the scene that runs.
+#[derive(Clone, Debug)]
+pub struct SceneModel {
+    /// Counts, boxes, structures.
+    pub header: SceneHeader,
+    /// Vertices at rest, m.
+    pub rest_m: Vec<[f32; 3]>,
+    /// Vertices of each triangle.
+    pub triangles: Vec<[u32; 3]>,
+    /// One for each cell of `header.labels`: 0 outside, else one more than the place among the header's structures.
+    pub labels: Vec<u8>,
+}
+
+impl SceneModel {
+    /// From what the core sends; nothing where it does not hold together.
+    pub fn of_words(header: &SceneHeader, words: &[u32]) -> Option<Self> {
+        check::scene(header, words).ok()?;
+        let (positions, rest) = words.split_at(3 * header.vertex_count as usize);
+        let (indices, cells) = rest.split_at(3 * header.triangle_count as usize);
+        let mut labels: Vec<u8> = cells.iter().flat_map(|word| word.to_le_bytes()).collect();
+        labels.truncate(header.labels.node_count().unwrap_or(0));
+        let place = |w: &[u32]| [0, 1, 2].map(|a| f32::from_bits(w[a]));
+        Some(Self {
+            header: *header,
+            rest_m: positions.chunks_exact(3).map(place).collect(),
+            triangles: indices.chunks_exact(3).map(|w| [w[0], w[1], w[2]]).collect(),
+            labels,
+        })
+    }
+}
+
+/// The deformed body of one tissue tick.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// Tick, needle, seeds.
+    pub header: SnapshotHeader,
+    /// Vertices of the surface, m.
+    pub positions_m: Vec<[f32; 3]>,
+    /// Displacement from rest at each node of the scene's grid.
+    pub displacements_m: Vec<[f32; 3]>,
+}
+
+impl Snapshot {
+    /// From what the core sends; nothing where it does not hold together.
+    pub(super) fn of_vertices(header: &SnapshotHeader, vertices: &[Vertex]) -> Option<Self> {
+        check::snapshot(header, vertices).ok()?;
+        let (surface, inside) = vertices.split_at(header.vertex_count as usize);
+        let places = |part: &[Vertex]| part.iter().map(|v| v.position_m).collect();
+        Some(Self {
+            header: *header,
+            positions_m: places(surface),
+            displacements_m: places(inside),
+        })
+    }
+}
+
+/// What the core said to a command or an upload.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// Whether it was carried out.
+    pub accepted: bool,
+    /// For people.
+    pub text: String,
+    /// For programs; empty when accepted.
+    pub reasons: Vec<Reason>,
+    /// First tick of the force loop that ran with the change.
+    pub effective_tick: u64,
+}
+
+impl From<Refusal> for Answer {
+    fn from(refusal: Refusal) -> Self {
+        Self {
+            accepted: false,
+            text: refusal.text,
+            reasons: refusal.reasons,
+            effective_tick: 0,
+        }
+    }
+}
+
+impl Answer {
+    /// From what the core sends; nothing where it does not hold together.
+    pub(super) fn of_reply(reply: &Reply) -> Option<Self> {
+        let status = ReplyStatus::from_number(reply.status)?;
+        Some(Self {
+            accepted: status == ReplyStatus::Accepted,
+            text: reply.text.read(),
+            reasons: reply.reasons().to_vec(),
+            effective_tick: reply.effective_tick,
+        })
+    }
+
+    /// To a request that never reached the core.
+    pub(super) fn unsent(why: String) -> Self {
+        Self {
+            accepted: false,
+            text: why,
+            reasons: Vec::new(),
+            effective_tick: 0,
+        }
+    }
+
+    /// Whether it was refused for this reason.
+    pub fn is_refused_for(&self, code: RefusalCode) -> bool {
+        self.reasons.iter().any(|reason| reason.code() == Some(code))
+    }
+}
+
+/// Why something could not be sent.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct LinkError(pub String);

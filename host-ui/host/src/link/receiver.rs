@@ -1,0 +1,376 @@
+//! The thread that owns every port of a host: it takes what arrives however slow the host is, and sends what the host asks.
+//!
+//! iceoryx2's ports belong to one thread. The queue of records holds seconds of them (`service::RECORD_BUFFER`), and
+//! this thread looks every two milliseconds.
+
+use super::inbox::Inbox;
+use super::ports::{Board, Ports, UploadPort};
+use super::{ABSENT_AFTER, SceneModel, Snapshot};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use stylet_shm_schema::service::{Instance, MAX_HOSTS};
+use stylet_shm_schema::*;
+
+const PASS: Duration = Duration::from_millis(2);
+const CLEAN_EVERY: Duration = Duration::from_secs(1);
+const CLEAN_AFTER: Duration = Duration::from_millis(300);
+/// A new core may have swept the folder of the ports that this host holds.
+const RECONNECT_EVERY: Duration = Duration::from_secs(4);
+const CONNECT_EVERY: Duration = Duration::from_secs(1);
+const OPEN_BOARD_EVERY: Duration = Duration::from_millis(20);
+/// What the host may ask for ahead of the thread that sends it.
+const OUTGOING: usize = 64;
+
+/// What the host asks the core for.
+pub enum Outgoing {
+    Command(Box<Command>),
+    Upload(Box<UploadHeader>, Vec<u8>),
+}
+
+/// The host's side of the thread; dropping it ends the thread and closes the ports.
+pub struct Receiver {
+    inbox: Arc<Mutex<Inbox>>,
+    outgoing: mpsc::SyncSender<Outgoing>,
+    end: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Receiver {
+    pub fn start(instance: Instance, host_id: u64, snapshots_every: Duration) -> Self {
+        let inbox = Arc::new(Mutex::new(Inbox::default()));
+        let end = Arc::new(AtomicBool::new(false));
+        let (outgoing, asked) = mpsc::sync_channel(OUTGOING);
+        let (into, ended) = (Arc::clone(&inbox), Arc::clone(&end));
+        let work = move || {
+            let mut passes = Passes::new(instance, host_id, into, asked);
+            passes.snapshots_every = snapshots_every;
+            // SYNC: set when the host drops its side; nothing but the flag is carried.
+            while !ended.load(Ordering::Relaxed) {
+                passes.pass();
+                std::thread::park_timeout(PASS);
+            }
+        };
+        let thread = std::thread::Builder::new().name("link".to_owned()).spawn(work);
+        if let Err(why) = &thread {
+            lock(&inbox).pulse.trouble = Some(format!("no thread could be started to receive: {why}"));
+        }
+        Self {
+            inbox,
+            outgoing,
+            end,
+            thread: thread.ok(),
+        }
+    }
+
+    /// Everything since the last call.
+    pub fn take(&self) -> Inbox {
+        lock(&self.inbox).take()
+    }
+
+    /// False when more waits than may.
+    pub fn send(&self, outgoing: Outgoing) -> bool {
+        let accepted = self.outgoing.try_send(outgoing).is_ok();
+        if let Some(thread) = &self.thread {
+            thread.thread().unpark();
+        }
+        accepted
+    }
+}
+
+impl Drop for Receiver {
+    fn drop(&mut self) {
+        // SYNC: read by the thread; nothing but the flag is carried.
+        self.end.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            thread.thread().unpark();
+            // A panic there was reported when it happened.
+            let _ended = thread.join();
+        }
+    }
+}
+
+/// What is held behind the lock is whole after each statement.
+fn lock(inbox: &Mutex<Inbox>) -> MutexGuard<'_, Inbox> {
+    inbox.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+struct Passes {
+    // Dropped in this order: handles before the ports, and those before their node.
+    board: Option<Board>,
+    upload_port: Option<UploadPort>,
+    ports: Option<Ports>,
+    instance: Instance,
+    host_id: u64,
+    inbox: Arc<Mutex<Inbox>>,
+    asked: mpsc::Receiver<Outgoing>,
+    session: Option<Session>,
+    tick: u64,
+    connect_tried: Option<Instant>,
+    board_tried: Option<Instant>,
+    snapshots_every: Duration,
+    snapshot_taken: Option<Instant>,
+    cleaned: Instant,
+    beat: Option<(u64, u64)>,
+    beat_moved: Option<Instant>,
+}
+
+impl Passes {
+    fn new(instance: Instance, host_id: u64, inbox: Arc<Mutex<Inbox>>, asked: mpsc::Receiver<Outgoing>) -> Self {
+        Self {
+            board: None,
+            upload_port: None,
+            ports: None,
+            instance,
+            host_id,
+            inbox,
+            asked,
+            session: None,
+            tick: 0,
+            connect_tried: None,
+            board_tried: None,
+            snapshots_every: Duration::ZERO,
+            snapshot_taken: None,
+            cleaned: Instant::now(),
+            beat: None,
+            beat_moved: None,
+        }
+    }
+
+    fn pass(&mut self) {
+        self.send();
+        if let Some(ports) = self.ports.take() {
+            self.receive(&ports);
+            self.read_board(&ports);
+            self.ports = Some(ports);
+        }
+        self.feel_pulse();
+        self.tidy();
+        // Last: after a pause of this thread the ports seem deaf until their queues are read, and new ones have none.
+        self.connect();
+    }
+
+    fn connect(&mut self) {
+        let now = Instant::now();
+        let long_ago = |then: Option<Instant>, every| then.is_none_or(|t: Instant| now - t >= every);
+        let deaf = self.beat_moved.is_none_or(|t| now - t > ABSENT_AFTER);
+        if self.ports.is_some() && deaf && long_ago(self.connect_tried, RECONNECT_EVERY) {
+            (self.board, self.upload_port, self.ports) = (None, None, None);
+        }
+        if self.ports.is_some() || !long_ago(self.connect_tried, CONNECT_EVERY) {
+            return;
+        }
+        self.connect_tried = Some(now);
+        let trouble = match Ports::new(&self.instance) {
+            Ok(ports) => {
+                self.ports = Some(ports);
+                None
+            }
+            Err(e) => Some(e.0),
+        };
+        lock(&self.inbox).pulse.trouble = trouble;
+    }
+
+    fn send(&mut self) {
+        while let Ok(outgoing) = self.asked.try_recv() {
+            let (id, sent) = match outgoing {
+                Outgoing::Command(command) => (command.command_id, self.send_command(&command)),
+                Outgoing::Upload(header, cells) => (header.command_id, self.send_volume(&header, &cells)),
+            };
+            if let Err(why) = sent {
+                lock(&self.inbox).put_unsent(id, why);
+            }
+        }
+    }
+
+    fn send_command(&self, command: &Command) -> Result<(), String> {
+        let ports = self.ports.as_ref().ok_or("there is no connection to rt-core")?;
+        match ports.commands.send_copy(*command) {
+            Ok(0) => Err("the core did not accept the command: its queue is full or it has just ended".to_owned()),
+            Ok(_) => Ok(()),
+            Err(e) => Err(format!("the command could not be sent: {e:?}")),
+        }
+    }
+
+    fn send_volume(&mut self, header: &UploadHeader, cells: &[u8]) -> Result<(), String> {
+        self.upload_port = None;
+        let ports = self.ports.as_ref().ok_or("there is no connection to rt-core")?;
+        let port = ports.upload_port(cells.len()).map_err(|e| e.0)?;
+        let mut sample = port
+            .loan_slice_uninit(cells.len())
+            .map_err(|e| format!("no room in shared memory for {} cells: {e:?}", cells.len()))?;
+        *sample.user_header_mut() = *header;
+        let taken = sample.write_from_slice(cells).send();
+        // The core still has to map the port's memory.
+        self.upload_port = Some(port);
+        match taken {
+            Ok(0) => Err(format!(
+                "the core did not accept the volume; at most {MAX_HOSTS} hosts can be connected"
+            )),
+            Ok(_) => Ok(()),
+            Err(e) => Err(format!("the volume could not be sent: {e:?}")),
+        }
+    }
+
+    /// What has numbers first: of it the queues drop the oldest.
+    fn receive(&mut self, ports: &Ports) {
+        self.receive_session(ports);
+        let snapshot = self.receive_snapshot(ports);
+        let scene = receive_scene(ports);
+        let id = self.session.map(|s| s.session_id);
+        let mut invalid = 0;
+        let inbox = &mut *lock(&self.inbox);
+        while let Ok(Some(sample)) = ports.records.receive() {
+            for record in sample.payload() {
+                match check::record(record) {
+                    Ok(()) if id == Some(record.session_id) => inbox.put_record(*record),
+                    Ok(()) => {}
+                    Err(_) => invalid += 1,
+                }
+            }
+        }
+        while let Ok(Some(sample)) = ports.events.receive() {
+            let event = *sample.payload();
+            let finite = event.value.is_finite() && event.position_m.iter().all(|c| c.is_finite());
+            if finite && EventKind::from_number(event.kind).is_some() {
+                inbox.put_event(event);
+            } else {
+                invalid += 1;
+            }
+        }
+        // Before the replies: whoever has the reply to a rehearsal has its result.
+        while let Ok(Some(sample)) = ports.rehearsals.receive() {
+            let rehearsal = *sample.payload();
+            match check::rehearsal(&rehearsal) {
+                Ok(()) if rehearsal.host_id == self.host_id => inbox.put_rehearsal(rehearsal),
+                Ok(()) => {}
+                Err(_) => invalid += 1,
+            }
+        }
+        while let Ok(Some(sample)) = ports.replies.receive() {
+            let reply = *sample.payload();
+            if reply.host_id == self.host_id {
+                inbox.put_reply(reply);
+            }
+        }
+        while let Ok(Some(sample)) = ports.parameters.receive() {
+            match check::parameters(sample.payload()) {
+                Ok(()) => inbox.parameters = Some(*sample.payload()),
+                Err(_) => invalid += 1,
+            }
+        }
+        while let Ok(Some(sample)) = ports.plan.receive() {
+            match check::plan(sample.payload()) {
+                Ok(()) => inbox.plan = Some(*sample.payload()),
+                Err(_) => invalid += 1,
+            }
+        }
+        for scene in scene {
+            match scene {
+                Some(scene) => inbox.scene = Some(scene),
+                None => invalid += 1,
+            }
+        }
+        match snapshot {
+            Some(Some(snapshot)) => inbox.snapshot = Some(snapshot),
+            Some(None) => invalid += 1,
+            None => {}
+        }
+        inbox.invalid_dropped += invalid;
+    }
+
+    fn receive_session(&mut self, ports: &Ports) {
+        let mut newest = None;
+        while let Ok(Some(sample)) = ports.session.receive() {
+            let session = *sample.payload();
+            if session.schema_version == SCHEMA_VERSION && session.period_ns > 0 {
+                // Two publishers, a dead one and its successor, are not received in the order of time.
+                if newest.is_none_or(|n: Session| n.time_ns <= session.time_ns) {
+                    newest = Some(session);
+                }
+            } else {
+                lock(&self.inbox).invalid_dropped += 1;
+            }
+        }
+        let Some(session) = newest else { return };
+        match &self.session {
+            Some(old) if old.session_id == session.session_id => lock(&self.inbox).session = Some(session),
+            Some(old) if old.started_ns > session.started_ns => return,
+            // Everything of an earlier run goes before anything of the new one is opened.
+            _ => {
+                (self.board, self.board_tried, self.tick) = (None, None, 0);
+                lock(&self.inbox).begin(session);
+            }
+        }
+        self.session = Some(session);
+    }
+
+    /// The newest; inside it nothing where it does not hold together.
+    fn receive_snapshot(&mut self, ports: &Ports) -> Option<Option<Snapshot>> {
+        if self.snapshot_taken.is_some_and(|t| t.elapsed() < self.snapshots_every) {
+            return None;
+        }
+        let mut newest = None;
+        while let Ok(Some(sample)) = ports.snapshots.receive() {
+            newest = Some(sample);
+        }
+        let sample = newest?;
+        self.snapshot_taken = Some(Instant::now());
+        Some(Snapshot::of_vertices(sample.user_header(), sample.payload()))
+    }
+
+    fn read_board(&mut self, ports: &Ports) {
+        let Some(session) = &self.session else { return };
+        if self.board.is_none() && self.board_tried.is_none_or(|t| t.elapsed() >= OPEN_BOARD_EVERY) {
+            self.board_tried = Some(Instant::now());
+            self.board = Board::open(&ports.node, session.session_id).ok();
+        }
+        let Some(board) = &self.board else { return };
+        let state = board.read();
+        let inbox = &mut *lock(&self.inbox);
+        match check::state(&state) {
+            Ok(()) => {
+                self.tick = state.tick;
+                inbox.state = Some(state);
+            }
+            Err(_) => inbox.invalid_dropped += 1,
+        }
+    }
+
+    fn feel_pulse(&mut self) {
+        if let Some(session) = &self.session {
+            let beat = (session.time_ns, self.tick);
+            if self.beat != Some(beat) {
+                self.beat = Some(beat);
+                self.beat_moved = Some(Instant::now());
+            }
+        }
+        let pulse = &mut lock(&self.inbox).pulse;
+        (pulse.moved, pulse.has_board) = (self.beat_moved, self.board.is_some());
+    }
+
+    /// Removes what a dead core left: nobody else does it in the background.
+    fn tidy(&mut self) {
+        let silent = self.beat_moved.map_or(ABSENT_AFTER, |t| t.elapsed());
+        if silent >= ABSENT_AFTER {
+            (self.board, self.upload_port) = (None, None);
+        }
+        if silent > CLEAN_AFTER && self.cleaned.elapsed() >= CLEAN_EVERY {
+            self.cleaned = Instant::now();
+            if let Some(ports) = &self.ports {
+                let _removed = ports.node.try_cleanup_dead_nodes();
+            }
+        }
+    }
+}
+
+/// With the run that each belongs to; nothing for one that does not hold together.
+fn receive_scene(ports: &Ports) -> Vec<Option<(u64, Arc<SceneModel>)>> {
+    let mut scenes = Vec::new();
+    while let Ok(Some(sample)) = ports.scene.receive() {
+        let (header, words) = (*sample.user_header(), sample.payload());
+        scenes.push(SceneModel::of_words(&header, words).map(|model| (header.session_id, Arc::new(model))));
+    }
+    scenes
+}

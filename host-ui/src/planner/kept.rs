@@ -1,0 +1,149 @@
+//! The plan that needles are inserted by, kept beside the core's shared memory: a window that was closed or killed finds it
+//! again while that run of the core lasts, and it goes with the core.
+
+use super::{Message, Planner};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use stylet_anatomy::PatientFrame;
+use stylet_base::job::{Job, JobUpdate};
+use stylet_base::{input, write_whole};
+use stylet_implant::plan::{Compensation, ImplantPlan, Needle, file};
+use stylet_shm_schema::SceneId;
+
+/// More is no plan of ours.
+const MOST_BYTES: u64 = 4 << 20;
+
+/// A plan, and what its needles were compensated by.
+pub struct Kept {
+    /// The plan.
+    pub plan: ImplantPlan,
+    /// Of the needles that were rehearsed.
+    pub compensated: Vec<(Needle, Compensation)>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Stored {
+    plan: String,
+    /// With the number of the needle.
+    compensated: Vec<(usize, Compensation)>,
+}
+
+/// The file for a scene of a run of the core.
+pub fn path_of(folder: &Path, scene: SceneId) -> PathBuf {
+    folder.join(format!("plan-{:016x}-{}.json", scene.session_id, scene.generation))
+}
+
+impl Kept {
+    /// Writes it. What cannot be written is not found again, and nothing else is lost by that.
+    pub fn write(&self, path: &Path, frames: &PatientFrame) {
+        let Ok(plan) = file::to_text(&self.plan, frames) else {
+            return;
+        };
+        let number = |needle: &Needle| self.plan.needles.iter().position(|n| n == needle);
+        let compensated = self.compensated.iter();
+        let compensated = compensated.filter_map(|(needle, done)| Some((number(needle)?, done.clone())));
+        let stored = Stored {
+            plan,
+            compensated: compensated.collect(),
+        };
+        if let Ok(bytes) = serde_json::to_vec(&stored) {
+            let _kept = write_whole(path, &bytes);
+        }
+    }
+
+    /// Reads it, if it is there and whole.
+    pub fn read(path: &Path, frames: &PatientFrame) -> Option<Self> {
+        let stored: Stored = serde_json::from_slice(&input::read(path, MOST_BYTES).ok()?).ok()?;
+        let plan = file::from_text(&stored.plan, frames).ok()?;
+        let needle = |(number, done): (usize, Compensation)| Some((plan.needles.get(number)?.clone(), done));
+        let compensated = stored.compensated.into_iter().filter_map(needle).collect();
+        Some(Self { plan, compensated })
+    }
+}
+
+impl Planner {
+    /// The plan is kept in this folder while needles are inserted, and looked for there.
+    #[must_use]
+    pub fn keeping_in(self, folder: PathBuf) -> Self {
+        Self {
+            kept_in: Some(folder),
+            ..self
+        }
+    }
+
+    /// A plan that another window of this run of the core has begun to insert.
+    pub(super) fn take_kept(&mut self) {
+        let (Some(folder), Some(outlines)) = (&self.kept_in, &self.outlines) else {
+            return;
+        };
+        if self.looked.as_ref().is_none_or(|(scene, _)| *scene != outlines.scene) {
+            let (path, frames) = (path_of(folder, outlines.scene), outlines.frames);
+            let job = Job::begin("kept plan", move |messages, _| {
+                if let Some(kept) = Kept::read(&path, &frames) {
+                    let _ = messages.send(kept);
+                }
+            });
+            self.looked = Some((outlines.scene, job));
+        }
+        let Some((_, job)) = &self.looked else { return };
+        if let JobUpdate::Message(kept) = job.poll()
+            && self.history.is_none()
+        {
+            self.put(kept.plan);
+            self.compensated = kept.compensated;
+            self.message = Some(Message::Done("The plan of this implant was found again.".to_owned()));
+        }
+    }
+
+    /// Keeps the plan for another window, on a thread of its own.
+    pub(super) fn keep(&self) {
+        if let (Some(folder), Some(outlines), Some(plan)) = (&self.kept_in, &self.outlines, self.plan()) {
+            let (path, frames) = (path_of(folder, outlines.scene), outlines.frames);
+            let kept = Kept {
+                plan: plan.clone(),
+                compensated: self.compensated.clone(),
+            };
+            // It ends by itself; what it has written is looked for by another window.
+            let _writes = std::thread::Builder::new()
+                .name("keep plan".to_owned())
+                .spawn(move || kept.write(&path, &frames));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stylet_implant::plan::Drops;
+
+    #[test]
+    fn a_plan_is_found_again_with_its_compensation() {
+        let mut planner = super::super::tests::planner();
+        let plan = planner.plan().expect("a plan").clone();
+        planner.restart();
+        let done = Compensation {
+            drops: Drops::as_planned(&plan.needles[1]),
+            before_m: None,
+            after_m: vec![[1e-4, 0.0, 0.0]; plan.needles[1].seeds.len()],
+            rehearsals: 3,
+        };
+        let frames = PatientFrame::default();
+        let scene = SceneId {
+            session_id: 7,
+            generation: 2,
+        };
+        let path = path_of(&std::env::temp_dir(), scene).with_extension(std::process::id().to_string());
+        let kept = Kept {
+            compensated: vec![(plan.needles[1].clone(), done.clone())],
+            plan: plan.clone(),
+        };
+        kept.write(&path, &frames);
+        let found = Kept::read(&path, &frames).expect("found");
+        assert_eq!(found.plan.needles.len(), plan.needles.len());
+        assert_eq!(found.compensated.len(), 1);
+        assert_eq!(found.compensated[0].1.rehearsals, 3);
+        std::fs::write(&path, b"{}").expect("written");
+        assert!(Kept::read(&path, &frames).is_none(), "what is not whole is not used");
+        let _removed = std::fs::remove_file(&path);
+    }
+}

@@ -1,0 +1,45 @@
+//! Why a procedure cannot go on.
+
+use stylet_shm_schema::Fault;
+
+/// Why the procedure cannot go on. Times are those that were waited, s.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StepFailure {
+    /// The force loop shows nothing.
+    #[error("waited {0:.1} s for the state of the force loop")]
+    NoState(f64),
+    /// The force went off after it was turned on.
+    #[error("the force is off: {}", .0.message())]
+    ForceOff(Fault),
+    /// A request was refused.
+    #[error("{request} was refused: {why}")]
+    Refused {
+        /// Which one.
+        request: &'static str,
+        /// The reasons, in words.
+        why: String,
+    },
+    /// A request was not answered.
+    #[error("waited {1:.1} s for a reply to {0}")]
+    NoReply(&'static str, f64),
+    /// A request was accepted and nothing came of it.
+    #[error("waited {1:.1} s for {0} to take effect")]
+    NoEffect(&'static str, f64),
+    /// A seed was dropped and is not in the tissue.
+    #[error("waited {0:.1} s for the seed in the tissue")]
+    NoSeed(f64),
+    /// The tissue did not come to be ready for the needle.
+    #[error(
+        "waited {0:.0} s for the tissue to be ready for the needle where it is placed; rt-core prepares that beside \
+         its loops, so give it a processor, or run with --tissue chainmail"
+    )]
+    NoLine(f64),
+    /// The tip did not arrive.
+    #[error("waited {limit_s:.1} s for the tip at its target; it is {:.2} mm from it along the needle", off_along_m * 1e3)]
+    NotArrived {
+        /// The time that the move was given, s.
+        limit_s: f64,
+        /// How far the tip is beyond its target along the needle, m.
+        off_along_m: f64,
+    },
+}
