@@ -145,7 +145,16 @@ fn a_needle_on_a_line_leaves_a_recording_that_repeats_bit_for_bit() {
     // Longer than either tape reaches back: both begin with the needle in tissue.
     hand.go(0.02, 0.01);
     hand.watch(Duration::from_secs(9));
-    let flight = assert_identical(&request(&core, &mut hand));
+    let first = request(&core, &mut hand);
+    // The next one begins with tapes that came back.
+    hand.go(0.005, 0.01);
+    hand.watch(Duration::from_secs(2));
+    let second = request(&core, &mut hand);
+    assert_ne!(first, second);
+    drop(hand);
+    core.finish();
+    assert_identical(&second);
+    let flight = assert_identical(&first);
     let haptic = flight.haptic.as_ref().expect("recorded");
     let tissue = flight.tissue.as_ref().expect("recorded");
     println!(
@@ -159,12 +168,6 @@ fn a_needle_on_a_line_leaves_a_recording_that_repeats_bit_for_bit() {
     assert_eq!(haptic.ticks_on_line(), haptic.ticks.len());
     assert!(haptic.line_state.as_ref().is_some_and(|state| state.is_in_contact()));
     assert!(tissue.loads.iter().any(|(_, loads)| loads.is_any()) && !flight.lines.is_empty());
-    // The next one begins with tapes that came back.
-    hand.go(0.005, 0.01);
-    hand.watch(Duration::from_secs(2));
-    assert_identical(&request(&core, &mut hand));
-    drop(hand);
-    core.finish();
 }
 
 /// One bit of one input makes another outcome, and the comparison says so; a damaged file is refused.
