@@ -83,7 +83,7 @@ impl Recorded {
         self.kept.push(hand.source());
         let bridge = &mut self.loops.bridge;
         bridge.lines.push(hand).expect("room");
-        bridge.tissue_orders.push(TissueOrder::Line(body)).ok().expect("room");
+        bridge.tissue_orders.push(TissueOrder::Line(body)).expect("room");
     }
 
     fn go(&mut self, depth_m: f64) {
@@ -130,7 +130,7 @@ impl Recorded {
         self.go(12e-3);
         self.run(1.8);
         let drop = TissueOrder::DropSeed { ticket: 0 };
-        self.loops.bridge.tissue_orders.push(drop).ok().expect("room");
+        self.loops.bridge.tissue_orders.push(drop).expect("room");
         self.go(9e-3);
         self.run(3.0);
         self.go(-8e-3);
@@ -147,7 +147,7 @@ impl Recorded {
     fn flight(&mut self) -> Flight {
         self.haptic(HapticOrder::HandOverTape);
         let order = TissueOrder::HandOverTape;
-        self.loops.bridge.tissue_orders.push(order).ok().expect("room");
+        self.loops.bridge.tissue_orders.push(order).expect("room");
         self.run(0.005);
         let bridge = &mut self.loops.bridge;
         let haptic = bridge.haptic_tapes.taken.pop().expect("handed over");
@@ -164,8 +164,8 @@ impl Recorded {
             haptic: haptic.flight(),
             tissue: tissue.flight(),
         };
-        bridge.haptic_tapes.back.push(haptic).ok().expect("room");
-        bridge.tissue_tapes.back.push(tissue).ok().expect("room");
+        bridge.haptic_tapes.back.push(haptic).expect("room");
+        bridge.tissue_tapes.back.push(tissue).expect("room");
         flight
     }
 }
