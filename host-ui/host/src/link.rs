@@ -244,6 +244,8 @@ impl Link {
     }
 
     fn next_id(&mut self) -> Result<u64, LinkError> {
+        // A host that did not poll for seconds does not take the core for stopped.
+        self.pulse = self.receiver.pulse();
         if let LinkStatus::Absent { why } = self.status() {
             return Err(LinkError(why));
         }
