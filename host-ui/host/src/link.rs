@@ -102,7 +102,8 @@ impl Link {
         let Some(moved) = self.pulse.moved else {
             return LinkStatus::Absent { why: self.why_absent() };
         };
-        let since = moved.elapsed();
+        let looked = self.pulse.looked.unwrap_or(moved);
+        let since = looked.saturating_duration_since(moved);
         let patience = if self.pulse.has_board {
             SILENT_AFTER
         } else {

@@ -353,6 +353,7 @@ impl Passes {
         }
         let pulse = &mut lock(&self.inbox).pulse;
         (pulse.moved, pulse.has_board) = (self.beat_moved, self.board.is_some());
+        pulse.looked = Some(Instant::now());
     }
 
     /// Removes what a dead core left: nobody else does it in the background.
