@@ -197,6 +197,10 @@ fn sends_records(instance: &Instance, session_id: u64, batches: u64, every: Dura
     let records = records.create().unwrap();
     std::thread::sleep(Duration::from_millis(50));
     for batch in 0..batches {
+        if batch % 100 == 0 {
+            // The heartbeat: without it the host would make its ports again.
+            sessions.send_copy(announce(session_id, 2 + batch)).unwrap();
+        }
         let mut sample = records.loan_slice_uninit(2).unwrap();
         *sample.user_header_mut() = session_id;
         let two = [1, 2].map(|n| TickRecord {
