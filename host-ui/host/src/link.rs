@@ -102,7 +102,8 @@ impl Link {
         let Some(moved) = self.pulse.moved else {
             return LinkStatus::Absent { why: self.why_absent() };
         };
-        let since = moved.elapsed();
+        let looked = self.pulse.looked.unwrap_or(moved);
+        let since = looked.saturating_duration_since(moved);
         let patience = if self.pulse.has_board {
             SILENT_AFTER
         } else {
@@ -244,6 +245,8 @@ impl Link {
     }
 
     fn next_id(&mut self) -> Result<u64, LinkError> {
+        // A host that did not poll for seconds does not take the core for stopped.
+        self.pulse = self.receiver.pulse();
         if let LinkStatus::Absent { why } = self.status() {
             return Err(LinkError(why));
         }

@@ -23,6 +23,8 @@ const REHEARSALS_KEPT: usize = 8;
 pub struct Pulse {
     /// When the heartbeat was last seen to move.
     pub moved: Option<Instant>,
+    /// When it was last looked at: a host that stood still itself does not know how the core is.
+    pub looked: Option<Instant>,
     /// Whether the heartbeat is that of the board, every tick, or that of the announcements.
     pub has_board: bool,
     /// Why there are no ports.

@@ -3,7 +3,7 @@
 //! iceoryx2's ports belong to one thread. The queue of records holds seconds of them (`service::RECORD_BUFFER`), and
 //! this thread looks every two milliseconds.
 
-use super::inbox::Inbox;
+use super::inbox::{Inbox, Pulse};
 use super::ports::{Board, Ports, UploadPort};
 use super::{ABSENT_AFTER, SceneModel, Snapshot};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -67,6 +67,11 @@ impl Receiver {
     /// Everything since the last call.
     pub fn take(&self) -> Inbox {
         lock(&self.inbox).take()
+    }
+
+    /// What is known of the connection now, without taking anything.
+    pub fn pulse(&self) -> Pulse {
+        lock(&self.inbox).pulse.clone()
     }
 
     /// False when more waits than may.
@@ -348,6 +353,7 @@ impl Passes {
         }
         let pulse = &mut lock(&self.inbox).pulse;
         (pulse.moved, pulse.has_board) = (self.beat_moved, self.board.is_some());
+        pulse.looked = Some(Instant::now());
     }
 
     /// Removes what a dead core left: nobody else does it in the background.
