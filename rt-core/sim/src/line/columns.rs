@@ -1,9 +1,9 @@
 //! A queue of columns: the body's answer to one newton at each station, eight at once, in slices of bounded work.
 
 use super::stations::Stations;
-use crate::tissue::ElementField;
 use crate::tissue::fem::Compiled;
 use crate::tissue::fem::batch::{BatchModel, BatchState, LOADS, NodeWeight};
+use crate::tissue::{ElementField, PackedField};
 
 /// Residual over load down to which columns are solved: the compliance then is right to 6e-4 and the field to 7e-3 (paper's
 /// gland, nu 0.49; `docs/adr/0010-condensed-needle-line.md`).
@@ -27,7 +27,7 @@ pub struct Column {
     /// The load that it answers.
     pub load: Load,
     /// Displacement of the element centres, m/N.
-    pub field: ElementField,
+    pub field: PackedField,
     /// Displacement at the stations, m/N: of shaft and tip along the line, or of the shaft across it.
     pub samples_m: Vec<f64>,
     /// Force of the foundation on the body.
@@ -62,6 +62,8 @@ pub struct ColumnQueue<T = f32> {
     ready: usize,
     stations: usize,
     state: BatchState<T>,
+    /// An answer on its way into a column.
+    unpacked: ElementField,
     is_begun: bool,
     tolerance: f64,
 }
@@ -81,7 +83,7 @@ impl<T: Compiled> ColumnQueue<T> {
         };
         let column = |&load: &Load| Column {
             load,
-            field: ElementField::zeros(model.element_count()),
+            field: PackedField::zeros(model.element_count()),
             samples_m: vec![0.0; if matches!(load, Load::Across(..)) { m } else { 2 * m }],
             foundation_n: [0.0; 3],
             residual: f64::INFINITY,
@@ -92,6 +94,7 @@ impl<T: Compiled> ColumnQueue<T> {
             ready: 0,
             stations: m,
             state: BatchState::new(model),
+            unpacked: ElementField::zeros(model.element_count()),
             is_begun: false,
             tolerance,
         }
@@ -111,7 +114,7 @@ impl<T: Compiled> ColumnQueue<T> {
     }
 
     /// The displacement fields of those that are ready, in order.
-    pub fn into_fields(mut self) -> Vec<ElementField> {
+    pub fn into_fields(mut self) -> Vec<PackedField> {
         self.columns.truncate(self.ready);
         self.columns.into_iter().map(|column| column.field).collect()
     }
@@ -167,7 +170,8 @@ impl<T: Compiled> ColumnQueue<T> {
             for (value, weights) in column.samples_m.iter_mut().zip(sampled) {
                 *value = self.state.sample(lane, weights);
             }
-            self.state.write(model, lane, &mut column.field);
+            self.state.write(model, lane, &mut self.unpacked);
+            column.field.pack(&self.unpacked);
             column.foundation_n = self.state.foundation_n(model, lane);
             column.residual = residual;
         }

@@ -10,7 +10,7 @@ use super::state::{LineOutput, LineState};
 use super::stations::{Line, StationSettings, Stations};
 use crate::needle::{LayerKind, Layers};
 use crate::scene::Lattice;
-use crate::tissue::ElementField;
+use crate::tissue::PackedField;
 use crate::tissue::fem::batch::BatchModel;
 use nalgebra::Vector3;
 
@@ -53,7 +53,7 @@ pub struct BodyLine {
     /// Where the line is at rest.
     pub line: Line,
     /// Displacement of every element, m/N: shaft of each station, then tip at each.
-    pub columns: Vec<ElementField>,
+    pub columns: Vec<PackedField>,
 }
 
 /// What the layers on the way resist with.

@@ -1,5 +1,7 @@
 //! A displacement of every element, as a model answers a force with.
 
+use crate::simd::{Simd, vectorised};
+
 /// Displacement of every element's centre, along x, y, z: per newton, in metres.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ElementField(pub [Vec<f32>; 3]);
@@ -9,9 +11,131 @@ impl ElementField {
     pub fn zeros(elements: usize) -> Self {
         ElementField(std::array::from_fn(|_| vec![0.0; elements]))
     }
+}
+
+/// The same in half of the memory, which is what adding up many of them waits for: in steps of 1 / 32,767 of the largest
+/// displacement in it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PackedField {
+    step_m: f32,
+    steps: [Vec<i16>; 3],
+}
+
+impl PackedField {
+    /// Zeros for that many elements.
+    pub fn zeros(elements: usize) -> Self {
+        PackedField {
+            step_m: 0.0,
+            steps: std::array::from_fn(|_| vec![0; elements]),
+        }
+    }
+
+    /// Takes up a field of as many elements; what is not finite in it counts as zero. Does not allocate.
+    pub fn pack(&mut self, field: &ElementField) {
+        let sizes = field.0.iter().flatten().map(|u| u.abs());
+        let largest = sizes.filter(|u| u.is_finite()).fold(0.0, f32::max);
+        self.step_m = largest / f32::from(i16::MAX);
+        let steps_per_m = if self.step_m > 0.0 { 1.0 / self.step_m } else { 0.0 };
+        for (steps, u) in self.steps.iter_mut().zip(&field.0) {
+            for (steps, u) in steps.iter_mut().zip(u) {
+                // A cast of a float saturates, and takes NaN for 0.
+                *steps = (u * steps_per_m).round() as i16;
+            }
+        }
+    }
+
+    /// Displacement of an element, m/N; zero for a number past the end.
+    pub fn at(&self, element: u32) -> [f32; 3] {
+        let steps = |axis: &Vec<i16>| axis.get(element as usize).copied().map_or(0.0, f32::from);
+        self.steps.each_ref().map(|axis| steps(axis) * self.step_m)
+    }
+
+    /// Every displacement as bits, to be compared.
+    pub fn is_identical(&self, other: &PackedField) -> bool {
+        self.step_m.to_bits() == other.step_m.to_bits() && self.steps == other.steps
+    }
 
     /// Bytes of the displacements.
     pub fn bytes(&self) -> usize {
-        self.0.iter().map(|c| c.len() * size_of::<f32>()).sum()
+        self.steps.iter().map(|axis| axis.len() * size_of::<i16>()).sum()
+    }
+}
+
+/// Elements that are added up at once: their sum stays in the first cache.
+const BLOCK: usize = 2048;
+
+/// The sum of factor times field for each factor other than zero, in place of `sum`.
+pub(crate) fn add_up(simd: Simd, fields: &[PackedField], factors: &[f64], scale: f64, sum: &mut [Vec<f32>; 3]) {
+    for (axis, sum) in sum.iter_mut().enumerate() {
+        for (block, sum) in sum.chunks_mut(BLOCK).enumerate() {
+            sum.fill(0.0);
+            for (field, &factor) in fields.iter().zip(factors).filter(|(_, factor)| **factor != 0.0) {
+                let from = (block * BLOCK).min(field.steps[axis].len());
+                let factor = (factor * scale * f64::from(field.step_m)) as f32;
+                add(simd, sum, factor, &field.steps[axis][from..]);
+            }
+        }
+    }
+}
+
+vectorised! {
+    fn add(sum: &mut [f32], factor: f32, steps: &[i16]) {
+        for (sum, &steps) in sum.iter_mut().zip(steps) {
+            *sum += factor * f32::from(steps);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn field(elements: usize, scale: f32) -> ElementField {
+        let mut field = ElementField::zeros(elements);
+        for (axis, u) in field.0.iter_mut().enumerate() {
+            for (n, u) in u.iter_mut().enumerate() {
+                *u = scale * (n as f32 * 0.37 + axis as f32).sin();
+            }
+        }
+        field
+    }
+
+    #[test]
+    fn packed_fields_add_up_as_fields_do_to_a_part_in_30_000_of_each() {
+        let elements = 2 * BLOCK + 37;
+        let fields = [1e-3, 7e-4, 2e-3].map(|scale| field(elements, scale));
+        let packed = fields.each_ref().map(|field| {
+            let mut packed = PackedField::zeros(elements);
+            packed.pack(field);
+            packed
+        });
+        let (factors, scale) = ([2.0, 0.0, -0.5], 700.0);
+        for simd in [Simd::Portable, Simd::detect()] {
+            let mut sum: [Vec<f32>; 3] = std::array::from_fn(|_| vec![f32::NAN; elements]);
+            add_up(simd, &packed, &factors, scale, &mut sum);
+            for axis in 0..3 {
+                for element in 0..elements {
+                    let each = fields
+                        .iter()
+                        .zip(factors)
+                        .map(|(f, factor)| factor * f64::from(f.0[axis][element]));
+                    let wanted = scale * each.sum::<f64>();
+                    let off = (f64::from(sum[axis][element]) - wanted).abs();
+                    assert!(off < 700.0 * (2.0 * 1e-3 + 0.5 * 2e-3) / 60_000.0, "{off} of {wanted}");
+                }
+            }
+        }
+        assert!((packed[0].at(5)[0] - fields[0].0[0][5]).abs() < 1e-3 / 60_000.0);
+    }
+
+    #[test]
+    fn a_field_of_zeros_and_one_that_is_not_finite_are_packed() {
+        let mut packed = PackedField::zeros(3);
+        packed.pack(&ElementField::zeros(3));
+        assert_eq!(packed.at(1), [0.0; 3]);
+        let mut broken = field(3, 1.0);
+        broken.0[0][1] = f32::NAN;
+        packed.pack(&broken);
+        assert_eq!(packed.at(1)[0], 0.0);
     }
 }

@@ -1,6 +1,6 @@
 //! What every tissue model is: a body that takes steps and can be read.
 
-use super::{Deformed, ElementField};
+use super::{Deformed, PackedField};
 use crate::limits::Limits;
 
 use serde::{Deserialize, Serialize};
@@ -87,7 +87,7 @@ pub trait TissueModel: Send {
     /// Displaces the body by the answers `columns` (m/N) to `loads_n`, in place of a step; what is held is let loose, and what
     /// the model knew of it is dropped.
     /// Obligations as for `step`. `None` from a model whose answers do not add up.
-    fn displace(&mut self, _columns: &[ElementField], _loads_n: &[f64]) -> Option<StepReport> {
+    fn displace(&mut self, _columns: &[PackedField], _loads_n: &[f64]) -> Option<StepReport> {
         None
     }
 

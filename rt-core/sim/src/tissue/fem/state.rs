@@ -4,7 +4,7 @@ use super::grip::Grip;
 use super::model::FemModel;
 use super::real::Real;
 use super::sweep::touched;
-use crate::tissue::ElementField;
+use crate::tissue::{PackedField, add_up};
 
 /// Displacements of all elements, and what the solver keeps from tick to tick.
 #[derive(Clone, Debug)]
@@ -67,23 +67,15 @@ impl<T: Real> FemState<T> {
     }
 
     /// Lets loose and forgets what is held, and displaces every element by the sum of loads times answers (m/N); how many moved.
-    pub fn displace(&mut self, model: &FemModel<T>, columns: &[ElementField], loads_n: &[f64]) -> u32 {
+    pub fn displace(&mut self, model: &FemModel<T>, columns: &[PackedField], loads_n: &[f64]) -> u32 {
         if !self.fits(model) {
             return 0;
         }
         // A line's body owes nothing to what was held before: what comes after repeats without it.
         self.forget();
         self.has_time = false;
-        let per_element = 1.0 / model.lattice.spacing_m;
-        for (axis, sum) in self.displacement.iter_mut().enumerate() {
-            sum.fill(0.0);
-            for (column, &load_n) in columns.iter().zip(loads_n).filter(|(_, load_n)| **load_n != 0.0) {
-                let factor = (load_n * per_element) as f32;
-                for (sum, u) in sum.iter_mut().zip(&column.0[axis]) {
-                    *sum += factor * u;
-                }
-            }
-        }
+        let (simd, per_element) = (model.levels[0].simd, 1.0 / model.lattice.spacing_m);
+        add_up(simd, columns, loads_n, per_element, &mut self.displacement);
         let [x, y, z] = &self.displacement;
         let (mut largest, mut moved) = (0.0_f32, 0);
         for ((x, y), z) in x.iter().zip(y).zip(z) {

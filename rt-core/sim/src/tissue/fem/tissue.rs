@@ -7,7 +7,7 @@ use super::solve::{SolveSettings, TipPatch};
 use super::state::FemState;
 use crate::limits::Limits;
 use crate::scene::Scene;
-use crate::tissue::{Deformed, ElementField, Held, HeldOutcome, Solve, StepReport, TissueModel};
+use crate::tissue::{Deformed, Held, HeldOutcome, PackedField, Solve, StepReport, TissueModel};
 
 /// What surrounds a body: 20 mm of fat of 5 kPa, per surface area (assumed).
 pub const SURROUNDINGS_PA_PER_M: f64 = 5e3 / 20e-3;
@@ -91,7 +91,7 @@ impl<T: Compiled> TissueModel for FemTissue<T> {
         prepare(&self.model, &mut self.state, next.map(patch), &self.settings);
     }
 
-    fn displace(&mut self, columns: &[ElementField], loads_n: &[f64]) -> Option<StepReport> {
+    fn displace(&mut self, columns: &[PackedField], loads_n: &[f64]) -> Option<StepReport> {
         let moved = self.state.displace(&self.model, columns, loads_n);
         Some(StepReport {
             passes: 0,

@@ -1,7 +1,7 @@
 //! Claims about what a flight recording keeps of an elastic body: on a needle line its displacements are all of it.
 
 use super::*;
-use crate::tissue::{ElementField, Held, TissueModel};
+use crate::tissue::{ElementField, Held, PackedField, TissueModel};
 use stylet_heap as heap;
 
 fn body() -> (Scene, FemTissue<f32>) {
@@ -27,12 +27,14 @@ fn held(scene: &Scene, by_m: f64) -> Held {
     }
 }
 
-fn columns(scene: &Scene) -> Vec<ElementField> {
+fn columns(scene: &Scene) -> Vec<PackedField> {
     let mut column = ElementField::zeros(scene.lattice.element_count());
     for (n, u) in column.0[2].iter_mut().enumerate() {
         *u = 1e-3 * (n as f32 * 0.7).sin();
     }
-    vec![column]
+    let mut packed = PackedField::zeros(scene.lattice.element_count());
+    packed.pack(&column);
+    vec![packed]
 }
 
 /// Answers to what was held before a line were kept and went into later steps, so that no recording could begin on one.
