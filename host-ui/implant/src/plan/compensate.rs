@@ -331,14 +331,19 @@ fn aside(needle: &Needle, last: &Tried, share: f64, limits: &Limits, drops: &mut
 }
 
 /// Means and the worst: before, of the needles that can be done as planned; after, of all.
-pub fn summary_m(all: &[Compensation]) -> [[f64; 2]; 2] {
+pub fn summary_m<'a>(all: impl IntoIterator<Item = &'a Compensation> + Clone) -> [[f64; 2]; 2] {
     let figures = |errors: Vec<f64>| {
         let mean = errors.iter().sum::<f64>() / errors.len().max(1) as f64;
         [mean, errors.iter().copied().fold(0.0, f64::max)]
     };
     [
-        figures(all.iter().flat_map(Compensation::errors_before_m).collect()),
-        figures(all.iter().flat_map(Compensation::errors_after_m).collect()),
+        figures(
+            all.clone()
+                .into_iter()
+                .flat_map(Compensation::errors_before_m)
+                .collect(),
+        ),
+        figures(all.into_iter().flat_map(Compensation::errors_after_m).collect()),
     ]
 }
 

@@ -7,6 +7,7 @@ use crate::plan::exchange;
 use crate::plan::rehearse::{Drops, LinkRehearser};
 use crate::plan::{Anatomy, Compensation, Hole, ImplantPlan, Limits, Needle, check, compensate};
 use crate::workflow::{NeedlePlan, NeedleTask, Pace, plan_with_seeds};
+use std::collections::BTreeMap;
 use std::path::Path;
 use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Link, SceneModel};
@@ -25,6 +26,8 @@ pub struct PlannedDrop {
     pub direction: [f64; 3],
     /// `None` where no plan file says.
     pub strength_u: Option<f64>,
+    /// Where the seed came to rest in the rehearsal of this drop, scene frame, m; `None` where it was not rehearsed.
+    pub rehearsed_m: Option<[f64; 3]>,
 }
 
 /// Each seed in the tissue with what was planned for it; `lost` are the numbers of drops that left none.
@@ -44,8 +47,8 @@ pub struct Job {
     pub implant: Option<ImplantPlan>,
     /// Its needles, in their order.
     pub tasks: Vec<NeedleTask>,
-    /// One a needle, where it was asked for.
-    pub compensations: Vec<Compensation>,
+    /// By the number of the needle, where it was asked for and possible.
+    pub compensations: BTreeMap<usize, Compensation>,
 }
 
 impl Job {
@@ -55,7 +58,7 @@ impl Job {
         Self {
             implant: None,
             tasks: vec![NeedleTask::as_planned(plan)],
-            compensations: Vec::new(),
+            compensations: BTreeMap::new(),
         }
     }
 
@@ -77,7 +80,7 @@ impl Job {
         Ok(Self {
             tasks: loaded.map(|n| NeedleTask::of(n, Drops::as_planned(n))).collect(),
             implant: Some(plan),
-            compensations: Vec::new(),
+            compensations: BTreeMap::new(),
         })
     }
 
@@ -111,7 +114,7 @@ impl Job {
                 after * 1e3
             );
             task.drops.clone_from(&done.drops);
-            self.compensations.push(done);
+            self.compensations.insert(number, done);
         }
         Ok(())
     }
@@ -125,7 +128,11 @@ impl Job {
         };
         let of_task = |(number, task): (usize, &NeedleTask)| {
             let needle = needles().nth(number);
+            let rehearsed = self.compensations.get(&number);
             let drop = |(i, planned_m): (usize, [f64; 3])| PlannedDrop {
+                rehearsed_m: rehearsed
+                    .and_then(|c| c.after_m.get(i))
+                    .map(|off_m| [0, 1, 2].map(|a| planned_m[a] + off_m[a])),
                 needle: number,
                 hole: needle.and_then(|n| n.hole),
                 planned_m,

@@ -69,6 +69,10 @@ fn mm(v: [f64; 3]) -> [f64; 3] {
     v.map(|c| c * 1e3)
 }
 
+fn distance_m(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (Vector3::from(a) - Vector3::from(b)).norm()
+}
+
 fn seeds(link: &Link, planned: &[PlannedDrop], lost: &[usize]) -> Vec<Value> {
     let (Some(snapshot), Some(scene)) = (link.snapshot(), link.scene()) else {
         return Vec::new();
@@ -88,6 +92,8 @@ fn seeds(link: &Link, planned: &[PlannedDrop], lost: &[usize]) -> Vec<Value> {
                 "placed_ras_mm": to_patient(seed.position_m),
                 "error_mm": off.distance_m() * 1e3, "error_along_mm": off.along_m * 1e3,
                 "error_across_mm": off.across_m * 1e3,
+                "rehearsed_mm": drop.rehearsed_m.map(mm),
+                "off_rehearsal_mm": drop.rehearsed_m.map(|m| distance_m(m, seed.position_m) * 1e3),
             })
         })
         .collect()
@@ -107,12 +113,12 @@ fn needles(job: &Job) -> Vec<Value> {
 /// As the rehearsals had it.
 fn compensation(job: &Job) -> Option<Value> {
     let [[mean_before, worst_before], [mean_after, worst_after]] =
-        summary_m(&job.compensations).map(|e| e.map(|m| m * 1e3));
+        summary_m(job.compensations.values()).map(|e| e.map(|m| m * 1e3));
     (!job.compensations.is_empty()).then(|| {
         json!({
             "mean_error_before_mm": mean_before, "mean_error_after_mm": mean_after,
             "worst_error_before_mm": worst_before, "worst_error_after_mm": worst_after,
-            "rehearsals": job.compensations.iter().map(|c| c.rehearsals).sum::<usize>(),
+            "rehearsals": job.compensations.values().map(|c| c.rehearsals).sum::<usize>(),
         })
     })
 }
@@ -212,6 +218,14 @@ fn force_csv(file: &mut impl Write, direction: [f64; 3], seen: &Seen) -> std::io
     Ok(())
 }
 
+/// That number of each that has it.
+fn all<'a>(list: &'a Value, key: &'a str) -> impl Iterator<Item = f64> + 'a {
+    list.as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(move |v| v[key].as_f64())
+}
+
 fn table(result: &Value) {
     println!("seed  along the needle (mm)  across (mm)  total (mm)");
     for (index, seed) in result["seeds"].as_array().into_iter().flatten().enumerate() {
@@ -224,6 +238,24 @@ fn table(result: &Value) {
             value("error_mm")
         );
     }
+    let off: Vec<f64> = all(&result["seeds"], "off_rehearsal_mm").collect();
+    if !off.is_empty() {
+        let (mean, worst) = (
+            off.iter().sum::<f64>() / off.len() as f64,
+            off.iter().copied().fold(0.0, f64::max),
+        );
+        println!(
+            "live against rehearsed: {} seeds, mean {mean:.3} mm, worst {worst:.3} mm apart",
+            off.len()
+        );
+    }
+    let errors: Vec<f64> = all(&result["seeds"], "error_mm").collect();
+    println!(
+        "off plan: {} seeds, mean {:.2} mm, worst {:.2} mm",
+        errors.len(),
+        errors.iter().sum::<f64>() / errors.len().max(1) as f64,
+        errors.iter().copied().fold(0.0, f64::max)
+    );
     let (force, timing) = (&result["force"], &result["timing"]);
     let number = |v: &Value| v.as_f64().map_or_else(|| "-".to_owned(), |n| format!("{n:.3}"));
     println!(
