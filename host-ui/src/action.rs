@@ -27,7 +27,7 @@ pub enum Action {
     Plan(PlanAction),
     RunAll,
     /// All needles again, from a reset, whatever was done.
-    RunAnew,
+    StartOver,
     StopRun,
     LoadScene(PathBuf),
     /// Loads an image of the patient of the present scene for the slices.

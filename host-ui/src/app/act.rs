@@ -100,7 +100,7 @@ impl App {
             },
             Action::Plan(action) => self.act_on_plan(action),
             Action::RunAll => self.run_all(),
-            Action::RunAnew => self.run_anew(),
+            Action::StartOver => self.start_over(),
             Action::PlanSeeds => {
                 if let Some(scene) = &self.shown.scene {
                     let request = plan_request(&default_plan(scene));

@@ -97,12 +97,12 @@ impl App {
     /// Whether the script can go on, looked at now and then while it rests.
     pub(super) fn find_placed(&mut self) {
         if self.run.is_some() || self.shown.seeds.is_empty() {
-            self.shown.goes_on_at = None;
+            self.shown.continues_at = None;
         } else if self.placed_found.elapsed() >= FIND_PLACED_EVERY {
             self.placed_found = Instant::now();
             let tasks: Vec<NeedleTask> = self.planner.tasks().into_iter().map(|(_, task)| task).collect();
             let placed = self.placed(&tasks);
-            self.shown.goes_on_at = placed.is_partial().then(|| (placed.next_needle(), tasks.len()));
+            self.shown.continues_at = placed.is_partial().then(|| (placed.next_needle(), tasks.len()));
         }
     }
 
@@ -112,7 +112,7 @@ impl App {
         let (numbers, tasks): (Vec<usize>, Vec<NeedleTask>) = self.planner.tasks().into_iter().unzip();
         let placed = self.placed(&tasks);
         if self.planner.is_busy() || !placed.is_partial() {
-            return self.run_anew();
+            return self.start_over();
         }
         self.planner.restart();
         let mut before = 0;
@@ -121,7 +121,7 @@ impl App {
             self.planner.finish_needle();
             before += placed.seeds_of(at);
         }
-        self.run = Some(Run::going_on(tasks, self.pace, &placed));
+        self.run = Some(Run::continuing(tasks, self.pace, &placed));
         (self.run_needles, self.run_placed) = (numbers, placed);
         self.drive = Drive::default();
     }
@@ -135,7 +135,7 @@ impl App {
     }
 
     /// All needles of the plan from a reset; without one, one through the middle.
-    pub(super) fn run_anew(&mut self) {
+    pub(super) fn start_over(&mut self) {
         (self.run_placed, self.run_lost) = (Placed::default(), Default::default());
         if self.planner.is_busy() {
             self.shown.note = Some(refusal("Wait for the running task, or cancel it first.".to_owned()));

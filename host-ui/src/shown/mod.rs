@@ -57,7 +57,7 @@ pub struct Shown {
     /// What the script waits for, and for how long.
     pub run_waits: Option<Waiting>,
     /// Which needle of how many the script would go on with, counted from 0; `None` where it begins.
-    pub goes_on_at: Option<(usize, usize)>,
+    pub continues_at: Option<(usize, usize)>,
     /// The last answer that the operator should read.
     pub note: Option<Note>,
     pub load: LoadState,
@@ -134,7 +134,7 @@ impl Shown {
             run_step: None,
             run_needle: None,
             run_waits: None,
-            goes_on_at: None,
+            continues_at: None,
             note: None,
             load: LoadState::Idle,
             dose: None,

@@ -1,14 +1,14 @@
 //! The scripted procedure: which request comes next, and when each operation is done.
 
+mod continuing;
 mod failure;
-mod going_on;
 mod waiting;
 
 use crate::tolerance::{TISSUE_REST_FOR_S, TISSUE_REST_LIMIT_S, TISSUE_REST_M, arrived_after_s, move_limit_s};
 use crate::{NeedleWay, Operation, Pace, Step};
+use continuing::ahead;
+pub use continuing::{Done, needle_inside};
 pub use failure::StepFailure;
-use going_on::ahead;
-pub use going_on::{Done, needle_inside};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
 use stylet_shm_schema::{Fault, HandMove, HapticState, flags};
@@ -142,7 +142,7 @@ impl Procedure {
     }
 
     /// A procedure that was stopped, from where it was: without a reset, and no drop twice.
-    pub fn going_on(ways: Vec<NeedleWay>, pace: Pace, done: &Done) -> Self {
+    pub fn continuing(ways: Vec<NeedleWay>, pace: Pace, done: &Done) -> Self {
         let ahead = ahead(&ways, done);
         Self {
             lost: done.lost.clone(),

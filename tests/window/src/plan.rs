@@ -249,9 +249,9 @@ fn a_script_that_was_stopped_goes_on_in_this_window_and_in_the_next() {
     driven.click("Run all 2 needles");
     wait_long(&mut driven, "the first seed", |app| seeds(app) == 1);
     driven.click("Stop");
-    wait_long_for_label(&mut driven, "Go on at needle 1 of 2");
-    driven.window.get_by_label("Begin anew");
-    driven.click("Go on at needle 1 of 2");
+    wait_long_for_label(&mut driven, "Continue at needle 1 of 2");
+    driven.window.get_by_label("Start over");
+    driven.click("Continue at needle 1 of 2");
     wait_long(&mut driven, "the third seed", |app| seeds(app) == 3);
     driven.window.get_by_label("Needle 2 of 2");
     // Another window finds the plan of the first, and looks at what is in the tissue.
@@ -259,8 +259,8 @@ fn a_script_that_was_stopped_goes_on_in_this_window_and_in_the_next() {
     driven.until("the plan", |app| {
         app.planner().plan().is_some_and(|plan| plan.needles.len() == 2)
     });
-    wait_long_for_label(&mut driven, "Go on at needle 2 of 2");
-    driven.click("Go on at needle 2 of 2");
+    wait_long_for_label(&mut driven, "Continue at needle 2 of 2");
+    driven.click("Continue at needle 2 of 2");
     wait_long(&mut driven, "all needles", |app| app.planner().progress().done() == 2);
     driven.window.run_steps(3);
     driven.window.get_by_label("All 2 needles are done.");

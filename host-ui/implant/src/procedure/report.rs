@@ -250,12 +250,14 @@ fn table(result: &Value) {
         );
     }
     let errors: Vec<f64> = all(&result["seeds"], "error_mm").collect();
-    println!(
-        "off plan: {} seeds, mean {:.2} mm, worst {:.2} mm",
-        errors.len(),
-        errors.iter().sum::<f64>() / errors.len().max(1) as f64,
-        errors.iter().copied().fold(0.0, f64::max)
-    );
+    if !errors.is_empty() {
+        println!(
+            "off plan: {} seeds, mean {:.2} mm, worst {:.2} mm",
+            errors.len(),
+            errors.iter().sum::<f64>() / errors.len() as f64,
+            errors.iter().copied().fold(0.0, f64::max)
+        );
+    }
     let (force, timing) = (&result["force"], &result["timing"]);
     let number = |v: &Value| v.as_f64().map_or_else(|| "-".to_owned(), |n| format!("{n:.3}"));
     println!(

@@ -184,9 +184,9 @@ impl Run {
     }
 
     /// The same from where it was stopped: nothing is reset, and no seed is dropped twice.
-    pub fn going_on(tasks: Vec<NeedleTask>, pace: Pace, placed: &Placed) -> Self {
+    pub fn continuing(tasks: Vec<NeedleTask>, pace: Pace, placed: &Placed) -> Self {
         let ways = tasks.iter().map(|task| task.drops.way()).collect();
-        Self::of(tasks, Procedure::going_on(ways, pace, &placed.done))
+        Self::of(tasks, Procedure::continuing(ways, pace, &placed.done))
     }
 
     /// How long it waits for what does not arrive; without this, until the operator decides.

@@ -112,11 +112,11 @@ fn run_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     if hinted(response, blocked).on_hover_text(run_help(shown)).clicked() {
         actions.push(Action::RunAll);
     }
-    if shown.goes_on_at.is_some() {
-        let anew = ui.add_enabled(shown.is_live(), Button::new("Begin anew"));
+    if shown.continues_at.is_some() {
+        let anew = ui.add_enabled(shown.is_live(), Button::new("Start over"));
         let help = "Takes all seeds out of the tissue and begins at the first needle";
         if anew.on_hover_text(help).clicked() {
-            actions.push(Action::RunAnew);
+            actions.push(Action::StartOver);
         }
     }
 }
@@ -128,8 +128,8 @@ fn waits(shown: &Shown) -> Option<String> {
 }
 
 fn run_name(shown: &Shown) -> String {
-    if let Some((needle, count)) = shown.goes_on_at {
-        return format!("Go on at needle {} of {count}", needle + 1);
+    if let Some((needle, count)) = shown.continues_at {
+        return format!("Continue at needle {} of {count}", needle + 1);
     }
     match needle_count(shown) {
         0 => format!("Run {SCRIPTED_STEPS}"),
@@ -138,7 +138,7 @@ fn run_name(shown: &Shown) -> String {
 }
 
 fn run_help(shown: &Shown) -> &'static str {
-    if shown.goes_on_at.is_some() {
+    if shown.continues_at.is_some() {
         return "The seeds in the tissue stay; the scripted hand goes on with the first seed that is missing";
     }
     match needle_count(shown) {

@@ -85,8 +85,8 @@ fn the_button_names_the_steps_of_the_panel_that_the_script_does() {
 #[test]
 fn the_button_says_where_it_goes_on_and_the_row_what_is_waited_for() {
     let mut shown = Shown::empty("lab");
-    shown.goes_on_at = Some((2, 19));
-    assert_eq!(run_name(&shown), "Go on at needle 3 of 19");
+    shown.continues_at = Some((2, 19));
+    assert_eq!(run_name(&shown), "Continue at needle 3 of 19");
     let mut waiting = Waiting {
         waits_for: WaitsFor::Reply("DropSeed"),
         for_s: 1.5,

@@ -73,24 +73,28 @@ pub struct LineState {
 impl LineState {
     /// Tissue at rest that no needle has touched.
     pub fn new(model: &LineModel) -> Self {
-        let m = model.compliance.stations;
-        let outside = TipState {
-            material_m: f64::NEG_INFINITY,
-            ..TipState::default()
-        };
+        Self::filled(model.compliance.stations, 0.0)
+    }
+
+    /// Outside; every vector but the memory's is of that value.
+    fn filled(stations: usize, value: f64) -> Self {
+        let each = || vec![value; stations];
         LineState {
-            shaft_n: vec![0.0; m],
-            anchor_m: vec![0.0; m],
-            u_m: vec![0.0; m],
+            shaft_n: each(),
+            anchor_m: each(),
+            u_m: each(),
             tip_u_m: 0.0,
-            tip: outside,
+            tip: TipState {
+                material_m: f64::NEG_INFINITY,
+                ..TipState::default()
+            },
             in_contact: 0,
             tip_range: 0..0,
             tip_weights: [0.0; 64],
-            tip_column: vec![0.0; m],
+            tip_column: each(),
             tip_own: 0.0,
-            memory: Memory::new(2 * m),
-            loads_n: vec![0.0; 2 * m],
+            memory: Memory::new(2 * stations),
+            loads_n: vec![value; 2 * stations],
             last: LineOutput::default(),
         }
     }

@@ -258,7 +258,7 @@ fn continued(ways: &[NeedleWay], sent: usize) -> (Obedient, Vec<HandRequest>) {
         inside: needle_inside(ways, hand.state.tip_in_scene_m),
     };
     let before = std::mem::take(&mut hand.sent);
-    let mut procedure = Procedure::going_on(ways.to_vec(), Pace::default(), &done);
+    let mut procedure = Procedure::continuing(ways.to_vec(), Pace::default(), &done);
     hand.go_through(&mut procedure, &[]);
     (hand, before)
 }

@@ -32,21 +32,23 @@ fn needle_at(tip_in_scene_m: [f64; 3], flags: u32) -> TickRecord {
     }
 }
 
+/// A cube of elements of 2 mm.
+fn cube(edge: usize) -> SceneSource {
+    let labels = Labels {
+        dims: [edge; 3],
+        spacing_m: 2e-3,
+        cells: vec![1; edge.pow(3)],
+        structures: Vec::new(),
+    };
+    SceneSource::of_labels("cube", &labels)
+}
+
 const INTO_BODY: [f64; 3] = [0.0, 0.0, 1.0];
 
 /// A second needle waited for its line as the first had, though the plan had named both.
 #[test]
 fn the_lines_of_both_planned_needles_are_there_when_they_come() {
-    let source = SceneSource::of_labels(
-        "block",
-        &Labels {
-            dims: [6, 6, 6],
-            spacing_m: 2e-3,
-            cells: vec![1; 6 * 6 * 6],
-            structures: Vec::new(),
-        },
-    );
-    let mut lines = LinePreparer::new(Arc::new(source), TissueKind::Fem);
+    let mut lines = LinePreparer::new(Arc::new(cube(6)), TissueKind::Fem);
     let (mut rings, mut haptic, _tissue) = rings();
     let entries_m = [[5e-3, 5e-3, 0.0], [7e-3, 5e-3, 0.0]];
     lines.expect_planned(Some((entries_m[0], INTO_BODY)));
@@ -76,16 +78,7 @@ fn the_lines_of_both_planned_needles_are_there_when_they_come() {
 /// A plan whose needle misses the body is no reason to try for ever, nor to forget the line that is in use.
 #[test]
 fn an_axis_without_tissue_is_tried_once() {
-    let source = SceneSource::of_labels(
-        "block",
-        &Labels {
-            dims: [4, 4, 4],
-            spacing_m: 2e-3,
-            cells: vec![1; 4 * 4 * 4],
-            structures: Vec::new(),
-        },
-    );
-    let mut lines = LinePreparer::new(Arc::new(source), TissueKind::Fem);
+    let mut lines = LinePreparer::new(Arc::new(cube(4)), TissueKind::Fem);
     let (mut rings, ..) = rings();
     lines.expect_planned(Some(([0.1, 0.1, 0.0], INTO_BODY)));
     let begun = Instant::now();

@@ -1,27 +1,12 @@
 //! A state that is kept beside the one in use: in flight recordings, and taken up again when one is repeated.
 
-use super::{LineOutput, LineState, TipState};
+use super::LineState;
 use crate::line::model::{LineModel, MAX_STATIONS};
-use crate::line::prony::Memory;
 
 impl LineState {
     /// Room for the state of any line. Every page is written to, so that no tick is the first to touch one.
     pub fn with_room() -> Self {
-        let mut state = LineState {
-            shaft_n: vec![1.0; MAX_STATIONS],
-            anchor_m: vec![1.0; MAX_STATIONS],
-            u_m: vec![1.0; MAX_STATIONS],
-            tip_u_m: 0.0,
-            tip: TipState::default(),
-            in_contact: 0,
-            tip_range: 0..0,
-            tip_weights: [0.0; 64],
-            tip_column: vec![1.0; MAX_STATIONS],
-            tip_own: 0.0,
-            memory: Memory::new(2 * MAX_STATIONS),
-            loads_n: vec![1.0; 2 * MAX_STATIONS],
-            last: LineOutput::default(),
-        };
+        let mut state = LineState::filled(MAX_STATIONS, 1.0);
         state.memory.vectors_mut().into_iter().for_each(|v| v.fill(1.0));
         state.clear();
         state
