@@ -5,6 +5,7 @@ pub mod phantom;
 pub mod rehearsal;
 pub mod stopped;
 pub mod window_process;
+pub mod witness;
 
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;

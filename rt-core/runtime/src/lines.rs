@@ -1,9 +1,9 @@
 //! Lines for needles: the body at rest that they are solved in, apart from the one that moves.
 
 use crate::rt::world::WorldError;
-use stylet_sim::line::{Line, LineError, QueueProgress, ReadyLine};
+use stylet_sim::line::{BodyAnswer, Line, LineError, QueueProgress, ReadyLine};
 use stylet_sim::needle::LayerKind;
-use stylet_sim::scene::{Scene, SceneError, SceneSource, TissueKind};
+use stylet_sim::scene::{Scene, SceneError, SceneSource, Structure, TissueKind};
 use stylet_sim::tissue::FemTissue;
 use stylet_sim::tissue::fem::batch::BatchModel;
 
@@ -23,22 +23,26 @@ pub enum NoLine {
 
 /// A body at rest with its solver for eight loads at once.
 pub struct LineBody {
+    tissue: TissueKind,
     scene: Scene,
     layers: Vec<LayerKind>,
     batch: BatchModel<f32>,
 }
 
 impl LineBody {
-    /// Builds the scene anew.
-    pub fn of_source(source: &SceneSource) -> Result<Self, NoLine> {
-        let scene = source.build()?.with_tissue(TissueKind::Fem);
-        let tissue = FemTissue::<f32>::new(&scene)
+    /// Builds the scene anew, for needles in that tissue; `None` where they slip by speed.
+    pub fn of_source(source: &SceneSource, tissue: TissueKind) -> Result<Option<Self>, NoLine> {
+        let Some(scene) = source.build()?.for_lines(tissue) else {
+            return Ok(None);
+        };
+        let body = FemTissue::<f32>::new(&scene)
             .map_err(|problems| WorldError(problems.iter().map(ToString::to_string).collect()))?;
-        Ok(Self {
+        Ok(Some(Self {
+            tissue,
             layers: scene.structures.iter().map(LayerKind::of_structure).collect(),
-            batch: BatchModel::new(&tissue.model),
+            batch: BatchModel::new(&body.model),
             scene,
-        })
+        }))
     }
 
     /// Solves for the line of a needle held like this, scene frame. `goes_on` is asked between slices of work.
@@ -66,7 +70,18 @@ impl LineBody {
             let structure = usize::from(lattice.structure(element));
             self.layers.get(structure).copied().unwrap_or_default()
         };
-        let ready = ReadyLine::prepare(generation, &self.batch, lattice, &layer_of, line, report);
-        Ok(ready?)
+        let mut ready = ReadyLine::prepare(generation, &self.batch, lattice, &layer_of, line, report)?;
+        if let BodyAnswer::Columns(columns) = &ready.body.answer
+            && !self.tissue.adds_columns()
+        {
+            ready.body.answer = BodyAnswer::shifts_of(columns, &self.scene.body, self.is_held());
+        }
+        Ok(ready)
+    }
+
+    /// Something of the scene never moves.
+    fn is_held(&self) -> bool {
+        let is_fixed = |structure: &Structure| structure.material.fixed;
+        self.scene.structures.iter().any(is_fixed)
     }
 }

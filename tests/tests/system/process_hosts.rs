@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use stylet_shm_schema::service::{self, Instance};
 use stylet_shm_schema::*;
 use stylet_tests::hand::{Insertion, assert_undisturbed, missed};
+use stylet_tests::witness::{STALL, Witness, where_the_machine_runs};
 use stylet_tests::{Core, ask, left_behind, program, scratch, until};
 
 /// A host without a window, which attaches to everything and reads it; killed with SIGKILL when dropped.
@@ -53,40 +54,59 @@ const KILLS: usize = 100;
 const ROUNDS: usize = 10;
 const ROUND: Duration = Duration::from_millis(2500);
 
+/// One round with a host that lives and one with hosts that are killed: missed deadlines of each.
+fn round(core: &Core, hand: &mut Insertion) -> (u64, u64) {
+    let mut host = Host::start(&core.instance);
+    hand.watch(Duration::from_millis(500));
+    let begin = hand.records.len();
+    hand.watch(ROUND);
+    let control = missed(&hand.records[begin..]);
+    assert!(host.is_running(), "the host ended by itself");
+    drop(host);
+
+    hand.watch(Duration::from_millis(500));
+    let (begin, since) = (hand.records.len(), Instant::now());
+    for kill in 1..=KILLS / ROUNDS {
+        let host = Host::start(&core.instance);
+        // At all stages of coming up: after 10 to 230 ms.
+        let until = since + ROUND * kill as u32 / (KILLS / ROUNDS) as u32;
+        let late = Duration::from_millis(240 * (kill as u64 % 7) / 7);
+        hand.watch((until - late).saturating_duration_since(Instant::now()));
+        drop(host);
+    }
+    hand.watch((since + ROUND).saturating_duration_since(Instant::now()));
+    (control, missed(&hand.records[begin..]))
+}
+
 #[test]
 fn a_hundred_killed_hosts_in_one_insertion_cost_no_more_deadlines_than_hosts_that_live() {
     let mut core = Core::start();
     let mut hand = Insertion::begin(&mut core, 0.001);
-    let (mut control, mut killed, mut kills) = (Vec::new(), Vec::new(), 0);
+    let witness = Witness::begin();
+    let (mut control, mut killed, mut not_judged) = (Vec::new(), Vec::new(), 0);
     // Turn by turn in the same insertion, since a shared machine has bad seconds of its own.
-    for _ in 0..ROUNDS {
-        let mut host = Host::start(&core.instance);
-        hand.watch(Duration::from_millis(500));
-        let begin = hand.records.len();
-        hand.watch(ROUND);
-        control.push(missed(&hand.records[begin..]));
-        assert!(host.is_running(), "the host ended by itself");
-        drop(host);
-
-        hand.watch(Duration::from_millis(500));
-        let (begin, since) = (hand.records.len(), Instant::now());
-        for kill in 1..=KILLS / ROUNDS {
-            let host = Host::start(&core.instance);
-            // At all stages of coming up: after 10 to 230 ms.
-            let until = since + ROUND * kill as u32 / (KILLS / ROUNDS) as u32;
-            let late = Duration::from_millis(240 * (kill as u64 % 7) / 7);
-            hand.watch((until - late).saturating_duration_since(Instant::now()));
-            drop(host);
-            kills += 1;
+    while control.len() < ROUNDS {
+        hand.records.clear();
+        witness.longest_stall();
+        let (alive, dead) = round(&core, &mut hand);
+        let stall = witness.longest_stall();
+        if stall >= STALL {
+            not_judged += 1;
+            println!(
+                "a core stood still for {stall:?}; {alive} deadlines missed with a host, {dead} with kills: not judged"
+            );
+            assert!(not_judged <= 2 * ROUNDS, "this machine stands still too often");
+            ask(&mut hand.link, &Request::Engage).expect("armed, or armed again");
+            hand.watch(Duration::from_millis(500));
+            continue;
         }
-        hand.watch((since + ROUND).saturating_duration_since(Instant::now()));
-        killed.push(missed(&hand.records[begin..]));
+        assert_undisturbed(&hand.records);
+        control.push(alive);
+        killed.push(dead);
     }
     let sum = |v: &[u64]| v.iter().sum::<u64>();
-    println!("missed deadlines in each round: control {control:?}, {kills} kills {killed:?}");
+    println!("missed deadlines in each round: control {control:?}, {KILLS} kills {killed:?}");
     println!("in all: control {}, with kills {}", sum(&control), sum(&killed));
-    assert_eq!(kills, KILLS);
-    assert_undisturbed(&hand.records);
     assert!(
         sum(&killed) <= sum(&control) || !is_worse(&control, &killed),
         "kills cost deadlines: control {control:?}, killed {killed:?}"
@@ -121,35 +141,37 @@ fn the_rank_test_separates_worse_from_chance() {
 
 #[test]
 fn stopped_and_starved_hosts_are_not_felt_and_go_on_by_themselves() {
-    let mut core = Core::start();
-    let mut hand = Insertion::begin(&mut core, 0.004);
-    let mut host = Host::start(&core.instance);
-    hand.watch(Duration::from_secs(1));
-    host.signal(libc::SIGSTOP);
-    // Starved as well: every core has work of normal priority, twice.
-    let cores = std::thread::available_parallelism().map_or(2, |n| n.get());
-    let burners: Vec<Host> = (0..2 * cores)
-        .map(|_| {
-            Host(
-                Process::new("sh")
-                    .args(["-c", "while :; do :; done"])
-                    .spawn()
-                    .expect("sh"),
-            )
-        })
-        .collect();
-    hand.watch(Duration::from_secs(3));
-    drop(burners);
-    host.signal(libc::SIGCONT);
-    hand.watch(Duration::from_secs(1));
-    assert!(host.is_running(), "the host did not survive being stopped");
-    // The core's queue holds 12 s: a host that stood still for 3 s has lost nothing.
-    host.signal(libc::SIGINT);
-    let ended = host.0.wait().expect("ours");
-    assert_eq!(ended.code(), Some(0), "a recording without gaps ends without an error");
-    assert_undisturbed(&hand.records);
-    assert_eq!(hand.link.state().expect("live").records_lost, 0);
-    finish(core, hand);
+    where_the_machine_runs(|| {
+        let mut core = Core::start();
+        let mut hand = Insertion::begin(&mut core, 0.004);
+        let mut host = Host::start(&core.instance);
+        hand.watch(Duration::from_secs(1));
+        host.signal(libc::SIGSTOP);
+        // Starved as well: every core has work of normal priority, twice.
+        let cores = std::thread::available_parallelism().map_or(2, |n| n.get());
+        let burners: Vec<Host> = (0..2 * cores)
+            .map(|_| {
+                Host(
+                    Process::new("sh")
+                        .args(["-c", "while :; do :; done"])
+                        .spawn()
+                        .expect("sh"),
+                )
+            })
+            .collect();
+        hand.watch(Duration::from_secs(3));
+        drop(burners);
+        host.signal(libc::SIGCONT);
+        hand.watch(Duration::from_secs(1));
+        assert!(host.is_running(), "the host did not survive being stopped");
+        // The core's queue holds 12 s: a host that stood still for 3 s has lost nothing.
+        host.signal(libc::SIGINT);
+        let ended = host.0.wait().expect("ours");
+        assert_eq!(ended.code(), Some(0), "a recording without gaps ends without an error");
+        assert_undisturbed(&hand.records);
+        assert_eq!(hand.link.state().expect("live").records_lost, 0);
+        finish(core, hand);
+    });
 }
 
 /// Sends as fast as it can for a while; how many were taken in by the queue.
@@ -169,85 +191,89 @@ fn flood(instance: &Instance, time: Duration, mut next: impl FnMut(u64) -> Comma
 
 #[test]
 fn a_flood_of_good_commands_reaches_neither_hand_nor_loop_and_the_operator_can_still_release() {
-    let mut core = Core::start();
-    let mut hand = Insertion::begin(&mut core, 0.004);
-    hand.press();
-    let instance = core.instance.clone();
-    let plan = move |id: u64| {
-        let id_of_change = ParameterId::MembranePeak;
-        let value = 5.0 + (id % 10) as f64 * 0.01;
-        let change = ParameterChange {
-            id: id_of_change,
-            value,
+    where_the_machine_runs(|| {
+        let mut core = Core::start();
+        let mut hand = Insertion::begin(&mut core, 0.004);
+        hand.press();
+        let instance = core.instance.clone();
+        let plan = move |id: u64| {
+            let id_of_change = ParameterId::MembranePeak;
+            let value = 5.0 + (id % 10) as f64 * 0.01;
+            let change = ParameterChange {
+                id: id_of_change,
+                value,
+            };
+            Request::SetParameters(vec![change]).encode(77, id).expect("fits")
         };
-        Request::SetParameters(vec![change]).encode(77, id).expect("fits")
-    };
-    let flooder = std::thread::spawn(move || flood(&instance, Duration::from_secs(3), plan));
-    hand.watch(Duration::from_millis(2000));
-    let asked = Instant::now();
-    ask(&mut hand.link, &Request::Disengage).expect("a release is never refused");
-    println!("released {:?} after it was asked, under a flood", asked.elapsed());
-    assert!(hand.watch_until(Duration::from_secs(10), |_| flooder.is_finished()));
-    let sent = flooder.join().expect("ours");
-    hand.watch(Duration::from_millis(500));
-    let session = *hand.link.session().expect("live");
-    println!("{sent} commands sent in 3 s, {} refused", session.refused);
-    assert!(sent > 10_000 && session.refused > 1000, "{sent} {}", session.refused);
-    stylet_tests::hand::assert_smooth(&hand.records);
-    assert!(hand.records.iter().all(|r| r.fault == 0));
-    assert_eq!(stylet_tests::hand::force_n(hand.records.last().expect("records")), 0.0);
-    assert_eq!(hand.link.state().expect("live").records_lost, 0);
-    finish(core, hand);
+        let flooder = std::thread::spawn(move || flood(&instance, Duration::from_secs(3), plan));
+        hand.watch(Duration::from_millis(2000));
+        let asked = Instant::now();
+        ask(&mut hand.link, &Request::Disengage).expect("a release is never refused");
+        println!("released {:?} after it was asked, under a flood", asked.elapsed());
+        assert!(hand.watch_until(Duration::from_secs(10), |_| flooder.is_finished()));
+        let sent = flooder.join().expect("ours");
+        hand.watch(Duration::from_millis(500));
+        let session = *hand.link.session().expect("live");
+        println!("{sent} commands sent in 3 s, {} refused", session.refused);
+        assert!(sent > 10_000 && session.refused > 1000, "{sent} {}", session.refused);
+        stylet_tests::hand::assert_smooth(&hand.records);
+        assert!(hand.records.iter().all(|r| r.fault == 0));
+        assert_eq!(stylet_tests::hand::force_n(hand.records.last().expect("records")), 0.0);
+        assert_eq!(hand.link.state().expect("live").records_lost, 0);
+        finish(core, hand);
+    });
 }
 
 #[test]
 fn ten_thousand_invalid_commands_are_all_refused_and_counted() {
-    const COUNT: u64 = 10_000;
-    let mut core = Core::start();
-    let mut hand = Insertion::begin(&mut core, 0.003);
-    let before = hand.link.session().expect("live").refused;
-    let parameters = hand.link.parameters().expect("live").generation;
-    let node = core.instance.node().expect("same user");
-    let commands = service::commands(&node).expect("service");
-    let port = commands.publisher_builder().create().expect("a free place");
-    let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut random = move || {
-        seed ^= seed << 13;
-        seed ^= seed >> 7;
-        seed ^= seed << 17;
-        seed
-    };
-    for n in 0..COUNT {
-        let mut command = Command::zeroed();
-        for word in bytemuck::cast_slice_mut::<u8, u64>(bytemuck::bytes_of_mut(&mut command)) {
-            *word = random();
+    where_the_machine_runs(|| {
+        const COUNT: u64 = 10_000;
+        let mut core = Core::start();
+        let mut hand = Insertion::begin(&mut core, 0.003);
+        let before = hand.link.session().expect("live").refused;
+        let parameters = hand.link.parameters().expect("live").generation;
+        let node = core.instance.node().expect("same user");
+        let commands = service::commands(&node).expect("service");
+        let port = commands.publisher_builder().create().expect("a free place");
+        let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
+        let mut random = move || {
+            seed ^= seed << 13;
+            seed ^= seed >> 7;
+            seed ^= seed << 17;
+            seed
+        };
+        for n in 0..COUNT {
+            let mut command = Command::zeroed();
+            for word in bytemuck::cast_slice_mut::<u8, u64>(bytemuck::bytes_of_mut(&mut command)) {
+                *word = random();
+            }
+            // Half of them with a kind and a length that exist, so that the values are what is wrong.
+            if n % 2 == 0 {
+                (command.kind, command.value_count) = (1 + 2 * (n % 2) as u32, 1 + (n % 7) as u32);
+                command.values[0] = f64::from_bits(random() | 0x7ff0_0000_0000_0000);
+            } else {
+                command.kind |= 1 << 31;
+            }
+            port.send_copy(command).expect("sent");
+            // No faster than the queue of 64 is read: each one is to be counted.
+            if n % 32 == 31 {
+                hand.watch(Duration::from_millis(8));
+            }
         }
-        // Half of them with a kind and a length that exist, so that the values are what is wrong.
-        if n % 2 == 0 {
-            (command.kind, command.value_count) = (1 + 2 * (n % 2) as u32, 1 + (n % 7) as u32);
-            command.values[0] = f64::from_bits(random() | 0x7ff0_0000_0000_0000);
-        } else {
-            command.kind |= 1 << 31;
-        }
-        port.send_copy(command).expect("sent");
-        // No faster than the queue of 64 is read: each one is to be counted.
-        if n % 32 == 31 {
-            hand.watch(Duration::from_millis(8));
-        }
-    }
-    hand.watch(Duration::from_millis(500));
-    let refused = hand.link.session().expect("live").refused - before;
-    println!("{refused} of {COUNT} refused");
-    assert!(core.is_running());
-    assert_eq!(refused, COUNT);
-    assert_eq!(
-        hand.link.parameters().expect("live").generation,
-        parameters,
-        "an invalid command changed a parameter"
-    );
-    assert_undisturbed(&hand.records);
-    drop((port, commands, node));
-    finish(core, hand);
+        hand.watch(Duration::from_millis(500));
+        let refused = hand.link.session().expect("live").refused - before;
+        println!("{refused} of {COUNT} refused");
+        assert!(core.is_running());
+        assert_eq!(refused, COUNT);
+        assert_eq!(
+            hand.link.parameters().expect("live").generation,
+            parameters,
+            "an invalid command changed a parameter"
+        );
+        assert_undisturbed(&hand.records);
+        drop((port, commands, node));
+        finish(core, hand);
+    });
 }
 
 /// The second of two changes in flight used to start from the set in force, and undid the first.

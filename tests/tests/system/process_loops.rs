@@ -4,6 +4,7 @@ use std::time::Duration;
 use stylet_shm_schema::{EventKind, Fault, Request, flags};
 use stylet_tests::hand::{Insertion, assert_smooth, force_n};
 use stylet_tests::stopped::{StoppedThread, is_dead};
+use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, ask, left_behind, until};
 
 /// Words that the operator reads about a fault.
@@ -16,112 +17,118 @@ fn is_reported(link: &stylet_host::link::Link, fault: Fault) -> bool {
 
 #[test]
 fn tissue_that_stops_takes_the_force_off_and_the_operator_rearms() {
-    let mut core = Core::start();
-    let mut hand = Insertion::begin(&mut core, 0.005);
-    hand.press();
-    let stopped = StoppedThread::stop(core.id(), "tissue");
-    let faulted = hand.watch_until(Duration::from_secs(3), |link| {
-        link.state().is_some_and(|s| s.fault != 0)
+    where_the_machine_runs(|| {
+        let mut core = Core::start();
+        let mut hand = Insertion::begin(&mut core, 0.005);
+        hand.press();
+        let stopped = StoppedThread::stop(core.id(), "tissue");
+        let faulted = hand.watch_until(Duration::from_secs(3), |link| {
+            link.state().is_some_and(|s| s.fault != 0)
+        });
+        assert!(faulted, "no fault without tissue");
+        hand.watch(Duration::from_millis(100));
+        assert!(
+            is_reported(&hand.link, Fault::TissueStale),
+            "the operator has no message"
+        );
+        let raised = hand
+            .records
+            .iter()
+            .position(|r| r.fault == Fault::TissueStale as u32)
+            .expect("in the record");
+        let ramp = hand.records[raised..]
+            .iter()
+            .position(|r| force_n(r) == 0.0)
+            .expect("zero at last");
+        println!("{:.2} N to zero in {ramp} ticks", force_n(&hand.records[raised - 1]));
+        assert!(ramp <= 20, "{ramp} ticks to zero");
+
+        // Still stopped: arming it again ends in the same fault, not in a force.
+        ask(&mut hand.link, &Request::Engage).expect("taken");
+        hand.watch(Duration::from_millis(100));
+        let state = hand.link.state().expect("live");
+        assert_eq!(
+            (state.fault, state.flags & flags::ENGAGED),
+            (Fault::TissueStale as u32, 0)
+        );
+
+        drop(stopped);
+        hand.watch(Duration::from_millis(200));
+        ask(&mut hand.link, &Request::Engage).expect("re-armed");
+        hand.watch(Duration::from_secs(1));
+        let last = hand.records.last().expect("records");
+        assert!(
+            last.fault == 0 && last.flags & flags::ENGAGED != 0,
+            "not re-armed: {last:?}"
+        );
+        assert_smooth(&hand.records);
+        drop(hand);
+        let instance = core.instance.clone();
+        core.finish();
+        assert_eq!(left_behind(&instance), [""; 0]);
     });
-    assert!(faulted, "no fault without tissue");
-    hand.watch(Duration::from_millis(100));
-    assert!(
-        is_reported(&hand.link, Fault::TissueStale),
-        "the operator has no message"
-    );
-    let raised = hand
-        .records
-        .iter()
-        .position(|r| r.fault == Fault::TissueStale as u32)
-        .expect("in the record");
-    let ramp = hand.records[raised..]
-        .iter()
-        .position(|r| force_n(r) == 0.0)
-        .expect("zero at last");
-    println!("{:.2} N to zero in {ramp} ticks", force_n(&hand.records[raised - 1]));
-    assert!(ramp <= 20, "{ramp} ticks to zero");
-
-    // Still stopped: arming it again ends in the same fault, not in a force.
-    ask(&mut hand.link, &Request::Engage).expect("taken");
-    hand.watch(Duration::from_millis(100));
-    let state = hand.link.state().expect("live");
-    assert_eq!(
-        (state.fault, state.flags & flags::ENGAGED),
-        (Fault::TissueStale as u32, 0)
-    );
-
-    drop(stopped);
-    hand.watch(Duration::from_millis(200));
-    ask(&mut hand.link, &Request::Engage).expect("re-armed");
-    hand.watch(Duration::from_secs(1));
-    let last = hand.records.last().expect("records");
-    assert!(
-        last.fault == 0 && last.flags & flags::ENGAGED != 0,
-        "not re-armed: {last:?}"
-    );
-    assert_smooth(&hand.records);
-    drop(hand);
-    let instance = core.instance.clone();
-    core.finish();
-    assert_eq!(left_behind(&instance), [""; 0]);
 }
 
 #[test]
 fn a_force_loop_that_stops_ends_the_process_and_leaves_nothing() {
-    let mut core = Core::start();
-    let mut hand = Insertion::begin(&mut core, 0.005);
-    hand.press();
-    let instance = core.instance.clone();
-    let stopped = StoppedThread::stop(core.id(), "haptic");
-    let begun = std::time::Instant::now();
-    let id = core.id();
-    assert!(
-        until(Duration::from_secs(5), || is_dead(id)),
-        "a core whose force loop stands still must end"
-    );
-    println!("ended {:?} after the force loop stopped", begun.elapsed());
-    drop(stopped);
-    let status = core.ended(Duration::from_secs(5)).expect("dead");
-    assert_eq!(status.code(), Some(1), "it ends with an error, not by a signal");
-    hand.watch(Duration::from_millis(200));
-    assert!(
-        is_reported(&hand.link, Fault::LoopStopped),
-        "the operator has no message: {:?}",
-        hand.link.events().back()
-    );
-    drop(hand);
-    drop(core);
-    assert_eq!(left_behind(&instance), [""; 0]);
+    where_the_machine_runs(|| {
+        let mut core = Core::start();
+        let mut hand = Insertion::begin(&mut core, 0.005);
+        hand.press();
+        let instance = core.instance.clone();
+        let stopped = StoppedThread::stop(core.id(), "haptic");
+        let begun = std::time::Instant::now();
+        let id = core.id();
+        assert!(
+            until(Duration::from_secs(5), || is_dead(id)),
+            "a core whose force loop stands still must end"
+        );
+        println!("ended {:?} after the force loop stopped", begun.elapsed());
+        drop(stopped);
+        let status = core.ended(Duration::from_secs(5)).expect("dead");
+        assert_eq!(status.code(), Some(1), "it ends with an error, not by a signal");
+        hand.watch(Duration::from_millis(200));
+        assert!(
+            is_reported(&hand.link, Fault::LoopStopped),
+            "the operator has no message: {:?}",
+            hand.link.events().back()
+        );
+        drop(hand);
+        drop(core);
+        assert_eq!(left_behind(&instance), [""; 0]);
+    });
 }
 
 #[test]
 fn a_core_that_is_stopped_whole_and_goes_on_turns_the_force_off_and_lives() {
-    let mut core = Core::start();
-    let mut hand = Insertion::begin(&mut core, 0.005);
-    hand.press();
-    let send = |signal| {
-        // SAFETY: a child of ours that has not been waited for.
-        assert_eq!(unsafe { libc::kill(core.id() as libc::pid_t, signal) }, 0);
-    };
-    send(libc::SIGSTOP);
-    let silent = until(Duration::from_secs(3), || {
-        hand.take();
-        !matches!(hand.link.status(), stylet_host::link::LinkStatus::Live)
+    where_the_machine_runs(|| {
+        let mut core = Core::start();
+        let mut hand = Insertion::begin(&mut core, 0.005);
+        hand.press();
+        let send = |signal| {
+            // SAFETY: a child of ours that has not been waited for.
+            assert_eq!(unsafe { libc::kill(core.id() as libc::pid_t, signal) }, 0);
+        };
+        send(libc::SIGSTOP);
+        let silent = until(Duration::from_secs(3), || {
+            hand.take();
+            !matches!(hand.link.status(), stylet_host::link::LinkStatus::Live)
+        });
+        assert!(silent, "the operator does not see that the core is silent");
+        std::thread::sleep(Duration::from_millis(700));
+        send(libc::SIGCONT);
+        let back = hand.watch_until(Duration::from_secs(3), |link| {
+            link.status() == stylet_host::link::LinkStatus::Live
+        });
+        assert!(back && core.is_running(), "the core did not come back");
+        hand.watch(Duration::from_millis(500));
+        assert_smooth(&hand.records);
+        // Whichever loop woke first: after such a gap either nothing was late any more, or the force went off with a name.
+        let last = hand.records.last().expect("records");
+        let off = last.fault == Fault::TissueStale as u32 && force_n(last) == 0.0;
+        let on = last.fault == 0 && last.flags & flags::ENGAGED != 0;
+        assert!(off || on, "{last:?}");
+        drop(hand);
+        core.finish();
     });
-    assert!(silent, "the operator does not see that the core is silent");
-    std::thread::sleep(Duration::from_millis(700));
-    send(libc::SIGCONT);
-    let back = hand.watch_until(Duration::from_secs(3), |link| {
-        link.status() == stylet_host::link::LinkStatus::Live
-    });
-    assert!(back && core.is_running(), "the core did not come back");
-    hand.watch(Duration::from_millis(500));
-    assert_smooth(&hand.records);
-    // Whichever loop woke first: after such a gap either nothing was late any more, or the force went off with a name.
-    let last = hand.records.last().expect("records");
-    let off = last.fault == Fault::TissueStale as u32 && force_n(last) == 0.0;
-    let on = last.fault == 0 && last.flags & flags::ENGAGED != 0;
-    assert!(off || on, "{last:?}");
-    drop(hand);
-    core.finish();
 }

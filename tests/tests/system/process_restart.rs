@@ -6,6 +6,7 @@ use stylet_host::link::{Link, LinkStatus};
 use stylet_shm_schema::Request;
 use stylet_shm_schema::service::Instance;
 use stylet_tests::hand::{Insertion, assert_undisturbed};
+use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, ask, fresh_instance, left_behind, program, scratch, until};
 
 fn core(instance: &Instance) -> Command {
@@ -25,86 +26,90 @@ fn core(instance: &Instance) -> Command {
 
 #[test]
 fn a_killed_core_is_seen_and_its_successor_is_found_by_the_same_host() {
-    let mut first = Core::start();
-    let mut hand = Insertion::begin(&mut first, 0.005);
-    hand.press();
-    let before = hand.link.session().expect("live").session_id;
-    let instance = first.kill();
-    assert!(
-        !left_behind(&instance).is_empty(),
-        "a killed core leaves files: that is the case to cope with"
-    );
-    let mut silent = false;
-    let absent = until(Duration::from_secs(5), || {
-        hand.take();
-        silent |= matches!(hand.link.status(), LinkStatus::Silent { .. });
-        matches!(hand.link.status(), LinkStatus::Absent { .. })
-    });
-    let LinkStatus::Absent { why } = hand.link.status() else {
-        panic!("{:?}", hand.link.status())
-    };
-    assert!(
-        silent && absent && why.contains("rt-core has stopped") && why.contains("Start it"),
-        "{why}"
-    );
-    assert_undisturbed(&hand.records);
+    where_the_machine_runs(|| {
+        let mut first = Core::start();
+        let mut hand = Insertion::begin(&mut first, 0.005);
+        hand.press();
+        let before = hand.link.session().expect("live").session_id;
+        let instance = first.kill();
+        assert!(
+            !left_behind(&instance).is_empty(),
+            "a killed core leaves files: that is the case to cope with"
+        );
+        let mut silent = false;
+        let absent = until(Duration::from_secs(5), || {
+            hand.take();
+            silent |= matches!(hand.link.status(), LinkStatus::Silent { .. });
+            matches!(hand.link.status(), LinkStatus::Absent { .. })
+        });
+        let LinkStatus::Absent { why } = hand.link.status() else {
+            panic!("{:?}", hand.link.status())
+        };
+        assert!(
+            silent && absent && why.contains("rt-core has stopped") && why.contains("Start it"),
+            "{why}"
+        );
+        assert_undisturbed(&hand.records);
 
-    // Three times, at once: the host that watched the first one finds each.
-    let (mut instance, mut last) = (instance, before);
-    for _ in 0..3 {
-        let mut next = Core::start_as(instance.clone(), &["--rt-if-allowed"]);
+        // Three times, at once: the host that watched the first one finds each.
+        let (mut instance, mut last) = (instance, before);
+        for _ in 0..3 {
+            let mut next = Core::start_as(instance.clone(), &["--rt-if-allowed"]);
+            let found = hand.watch_until(Duration::from_secs(15), |link| {
+                link.status() == LinkStatus::Live && link.session().is_some_and(|s| s.session_id != last)
+            });
+            assert!(found && next.is_running(), "not found again: {:?}", hand.link.status());
+            last = hand.link.session().expect("live").session_id;
+            hand.watch(Duration::from_millis(300));
+            ask(&mut hand.link, &Request::Engage).expect("a host that was there before commands the new core");
+            instance = next.kill();
+        }
+        let end = Core::start_as(instance.clone(), &["--rt-if-allowed"]);
         let found = hand.watch_until(Duration::from_secs(15), |link| {
             link.status() == LinkStatus::Live && link.session().is_some_and(|s| s.session_id != last)
         });
-        assert!(found && next.is_running(), "not found again: {:?}", hand.link.status());
-        last = hand.link.session().expect("live").session_id;
-        hand.watch(Duration::from_millis(300));
-        ask(&mut hand.link, &Request::Engage).expect("a host that was there before commands the new core");
-        instance = next.kill();
-    }
-    let end = Core::start_as(instance.clone(), &["--rt-if-allowed"]);
-    let found = hand.watch_until(Duration::from_secs(15), |link| {
-        link.status() == LinkStatus::Live && link.session().is_some_and(|s| s.session_id != last)
+        assert!(found, "not found again: {:?}", hand.link.status());
+        drop(hand);
+        end.finish();
+        assert_eq!(left_behind(&instance), [""; 0]);
     });
-    assert!(found, "not found again: {:?}", hand.link.status());
-    drop(hand);
-    end.finish();
-    assert_eq!(left_behind(&instance), [""; 0]);
 }
 
 #[test]
 fn a_second_core_is_refused_under_the_same_name_and_runs_under_another() {
-    let mut first = Core::start();
-    let mut hand = Insertion::begin(&mut first, 0.005);
-    let mut second = core(&first.instance).stderr(Stdio::piped()).spawn().expect("runs");
-    let mut status = None;
-    assert!(hand.watch_until(Duration::from_secs(10), |_| {
-        status = second.try_wait().expect("ours");
-        status.is_some()
-    }));
-    let words = std::io::read_to_string(second.stderr.take().expect("piped")).expect("text");
-    println!("{words}");
-    assert_eq!(status.and_then(|s| s.code()), Some(1));
-    assert!(
-        words.contains("another rt-core") && words.contains("--instance"),
-        "{words}"
-    );
+    where_the_machine_runs(|| {
+        let mut first = Core::start();
+        let mut hand = Insertion::begin(&mut first, 0.005);
+        let mut second = core(&first.instance).stderr(Stdio::piped()).spawn().expect("runs");
+        let mut status = None;
+        assert!(hand.watch_until(Duration::from_secs(10), |_| {
+            status = second.try_wait().expect("ours");
+            status.is_some()
+        }));
+        let words = std::io::read_to_string(second.stderr.take().expect("piped")).expect("text");
+        println!("{words}");
+        assert_eq!(status.and_then(|s| s.code()), Some(1));
+        assert!(
+            words.contains("another rt-core") && words.contains("--instance"),
+            "{words}"
+        );
 
-    let other = Core::start();
-    let mut link = Link::new(other.instance.clone());
-    let live = hand.watch_until(Duration::from_secs(10), |_| {
-        link.poll();
-        link.status() == LinkStatus::Live && link.parameters().is_some()
+        let other = Core::start();
+        let mut link = Link::new(other.instance.clone());
+        let live = hand.watch_until(Duration::from_secs(10), |_| {
+            link.poll();
+            link.status() == LinkStatus::Live && link.parameters().is_some()
+        });
+        assert!(live, "another name is another core: {:?}", link.status());
+        hand.watch(Duration::from_secs(2));
+        assert_undisturbed(&hand.records);
+        drop(link);
+        other.finish();
+        drop(hand);
+        let instance = first.instance.clone();
+        first.finish();
+        assert_eq!(left_behind(&instance), [""; 0]);
     });
-    assert!(live, "another name is another core: {:?}", link.status());
-    hand.watch(Duration::from_secs(2));
-    assert_undisturbed(&hand.records);
-    drop(link);
-    other.finish();
-    drop(hand);
-    let instance = first.instance.clone();
-    first.finish();
-    assert_eq!(left_behind(&instance), [""; 0]);
 }
 
 #[test]

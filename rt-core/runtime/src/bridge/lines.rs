@@ -61,7 +61,7 @@ pub struct LinePreparer {
     /// Of those that are expected.
     kept: Vec<Kept>,
     generation: u64,
-    is_wanted: bool,
+    tissue: TissueKind,
     archive: LineArchive,
 }
 
@@ -77,7 +77,7 @@ impl LinePreparer {
             expected: Vec::new(),
             kept: Vec::new(),
             generation: 0,
-            is_wanted: tissue == TissueKind::Fem,
+            tissue,
             archive: LineArchive::default(),
         }
     }
@@ -127,7 +127,7 @@ impl LinePreparer {
         while let Ok(line) = loops.old_body_lines.pop() {
             self.archive.returned(line.generation, Half::Body);
         }
-        if !self.is_wanted {
+        if !self.tissue.has_lines() {
             return;
         }
         self.take(scene_generation, loops);
@@ -195,14 +195,18 @@ impl LinePreparer {
         self.generation += 1;
         let generation = self.generation;
         let kept = self.body.take().filter(|(of, _)| *of == scene_generation);
-        let (source, stop) = (Arc::clone(&self.source), Arc::new(AtomicBool::new(false)));
+        let (source, tissue) = (Arc::clone(&self.source), self.tissue);
+        let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let work = move || {
-            let body = kept.map_or_else(|| LineBody::of_source(&source), |(_, body)| Ok(body));
+            let body = match kept {
+                Some((_, body)) => Ok(Some(body)),
+                None => LineBody::of_source(&source, tissue),
+            };
             // SYNC: nothing but the flag is carried.
             let mut goes_on = || !stopped.load(Ordering::Relaxed);
             let (body, line) = match body {
-                Ok(body) => {
+                Ok(Some(body)) => {
                     let line = body.prepare(generation, axis.entry_m, axis.axes[0], &mut goes_on);
                     let with_source = line.map(|line| {
                         let source = line.hand.source();
@@ -210,6 +214,7 @@ impl LinePreparer {
                     });
                     (Some(body), with_source)
                 }
+                Ok(None) => (None, Err(stylet_sim::line::LineError::NoTissue.into())),
                 Err(why) => (None, Err(why)),
             };
             Finished {

@@ -19,7 +19,7 @@ use stylet_hw::{Device, DeviceInfo};
 use stylet_shm_schema::service::{self, Ipc, StateBoard};
 use stylet_shm_schema::{ParameterSet, flags};
 use stylet_sim::active::{Active, activate};
-use stylet_sim::scene::{Scene, SceneSource, TissueKind};
+use stylet_sim::scene::{Scene, SceneSource};
 
 /// Scene, device and their figures.
 pub(super) struct Setup {
@@ -107,9 +107,9 @@ impl Body {
     ) -> Loops {
         let info = self.device.info();
         let real_time = if options.no_rt { 0 } else { flags::REAL_TIME };
-        let lines = match options.tissue {
-            TissueKind::Fem => flags::LINE_NEEDED,
-            TissueKind::ChainMail => 0,
+        let lines = match options.tissue.has_lines() {
+            true => flags::LINE_NEEDED,
+            false => 0,
         };
         let memory = HapticMemory::new(&info, (self.active.needle, self.active.force), real_time | lines);
         let haptic_tape = Box::new(HapticTape::new(&memory));

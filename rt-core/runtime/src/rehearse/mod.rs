@@ -117,7 +117,7 @@ pub struct Rehearsed {
 /// A body to rehearse in; kept from one rehearsal to the next.
 pub struct Stage {
     world: Option<Box<World>>,
-    /// Where needles have lines: bodies of finite elements.
+    /// Where needles have lines.
     lines: Option<LineBody>,
     /// The line of the last needle: compensation rehearses the same needle several times.
     kept: Option<(NeedleAxis, ReadyLine)>,
@@ -129,10 +129,7 @@ impl Stage {
     pub fn build(source: &SceneSource, tissue: TissueKind, device: DeviceInfo) -> Result<Self, RehearseError> {
         let scene = source.build().map_err(|e| RehearseError::Scene(e.to_string()))?;
         let scene = scene.with_tissue(tissue);
-        let lines = match tissue {
-            TissueKind::Fem => Some(LineBody::of_source(source)?),
-            TissueKind::ChainMail => None,
-        };
+        let lines = LineBody::of_source(source, tissue)?;
         let active = activate(&ParameterSet::default(), &device)?;
         let world = World::new(scene, active.limits, 1)?;
         Ok(Self {

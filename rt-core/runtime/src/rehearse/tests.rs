@@ -257,3 +257,56 @@ fn a_reset_with_the_needle_in_tissue_leaves_no_force_on_a_line_either() {
     );
     assert!(rig.displacement_m() < 1e-9, "{} m", rig.displacement_m());
 }
+
+/// What ChainMail's lines are worth, beside those of finite elements at full resolution:
+/// `cargo test --release -p stylet-runtime --lib seeds_of_chainmail -- --ignored --nocapture`
+#[test]
+#[ignore = "a measurement of some minutes"]
+fn seeds_of_chainmail_beside_those_of_finite_elements() {
+    let (device, set, stop) = (
+        DeviceInfo::phantom_premium_1_5(),
+        ParameterSet::default(),
+        AtomicBool::new(false),
+    );
+    for name in ["paper", "pelvis"] {
+        let source = SceneSource::Builtin(name.to_owned());
+        let scene = source.build().expect("built in");
+        let (low, high) = scene.target_bounds_m();
+        let begun = Instant::now();
+        let mut stages = TissueKind::ALL.map(|kind| Stage::build(&source, kind, device).expect("built in"));
+        println!("{name}: stages in {:.1?}", begun.elapsed());
+        for across_m in [[0.0, 0.0], [0.01, 0.0], [-0.006, 0.008], [0.0, -0.01]] {
+            let (x, y) = (
+                0.5 * (low[0] + high[0]) + across_m[0],
+                0.5 * (low[1] + high[1]) + across_m[1],
+            );
+            let at = |share: f64| Vector3::new(x, y, low[2] + share * (high[2] - low[2]));
+            let run = NeedleRun {
+                entry_m: Vector3::new(x, y, scene.lattice.bounds_m().0[2] - 0.01),
+                drops_m: [0.85, 0.6, 0.4, 0.2].map(at).to_vec(),
+                ..needle()
+            };
+            let results = stages.each_mut().map(|stage| {
+                let begun = Instant::now();
+                let rehearsed = stage.rehearse(&run, &set, &stop).expect("goes through");
+                (rehearsed, begun.elapsed())
+            });
+            let fem = &results[1].0;
+            for ((rehearsed, took), kind) in results.iter().zip(TissueKind::ALL) {
+                let off = |seeds: &[SeedPose], n: usize| (seeds[n].position_m[2] - run.drops_m[n].z) * 1e3;
+                let plan: Vec<String> = (0..4).map(|n| format!("{:5.1}", off(&rehearsed.seeds, n))).collect();
+                let apart = (0..4)
+                    .map(|n| (off(&rehearsed.seeds, n) - off(&fem.seeds, n)).abs())
+                    .fold(0.0, f64::max);
+                println!(
+                    "  {across_m:?} {:9}: off plan {} mm, from FEM {apart:.2} mm at most; peak {:.2} N ({:+.1} %), before puncture {:.1} mm; {took:.1?}",
+                    kind.name(),
+                    plan.join(" "),
+                    rehearsed.peak_force_n,
+                    100.0 * (rehearsed.peak_force_n / fem.peak_force_n - 1.0),
+                    rehearsed.displacement_before_puncture_m * 1e3
+                );
+            }
+        }
+    }
+}

@@ -4,7 +4,7 @@ use super::file::Flight;
 use super::repeat::RepeatError;
 use crate::lines::LineBody;
 use crate::rt::tissue_tape::TissueFlight;
-use stylet_sim::line::{BodyLine, HandLine, LineSource};
+use stylet_sim::line::{BodyAnswer, BodyLine, HandLine, LineSource};
 
 /// How far the columns of one line are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,13 +45,16 @@ pub fn solve_again(
             again.bodies.push(BodyLine {
                 generation,
                 line: source.line,
-                columns: Vec::new(),
+                answer: BodyAnswer::Columns(Vec::new()),
             });
             continue;
         }
         let body = match &mut body {
             Some(body) => body,
-            none => none.insert(LineBody::of_source(&recorded.scene)?),
+            none => {
+                let of_scene = LineBody::of_source(&recorded.scene, recorded.tissue)?;
+                none.insert(of_scene.ok_or(RepeatError::NoLine(generation))?)
+            }
         };
         let ready = body.prepare_along(generation, source.line, &mut |progress| {
             report(LineProgress {

@@ -13,6 +13,8 @@ pub struct LineLoads {
     pub in_tissue: bool,
     /// Place at rest of the material that the tip is in, from the entry along the line, m.
     pub tip_material_m: f64,
+    /// Displacement of that material along the line, m.
+    pub tip_displacement_m: f64,
     /// How many of `loads_n` there are.
     pub count: usize,
     /// Shaft of each station, then tip at each.
@@ -37,6 +39,7 @@ impl LineLoads {
                 loads.generation,
                 loads.in_tissue,
                 loads.tip_material_m.to_bits(),
+                loads.tip_displacement_m.to_bits(),
                 loads.count,
             )
         };
@@ -51,6 +54,7 @@ impl Default for LineLoads {
             generation: 0,
             in_tissue: false,
             tip_material_m: 0.0,
+            tip_displacement_m: 0.0,
             count: 0,
             loads_n: [0.0; 2 * MAX_STATIONS],
         }
@@ -63,6 +67,7 @@ struct TapedLoads {
     generation: u64,
     in_tissue: bool,
     tip_material_m: f64,
+    tip_displacement_m: f64,
     count: usize,
     /// Those that are not zero, each with its place.
     loads_n: Vec<(u16, f64)>,
@@ -75,6 +80,7 @@ impl From<LineLoads> for TapedLoads {
             generation: loads.generation,
             in_tissue: loads.in_tissue,
             tip_material_m: loads.tip_material_m,
+            tip_displacement_m: loads.tip_displacement_m,
             count: loads.count,
             loads_n: numbered.filter(|(_, load_n)| load_n.to_bits() != 0).collect(),
         }
@@ -88,6 +94,7 @@ impl From<TapedLoads> for LineLoads {
             generation: taped.generation,
             in_tissue: taped.in_tissue,
             tip_material_m: taped.tip_material_m,
+            tip_displacement_m: taped.tip_displacement_m,
             count: taped.count.min(2 * MAX_STATIONS),
             ..Self::default()
         };

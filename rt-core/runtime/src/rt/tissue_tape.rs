@@ -137,8 +137,7 @@ impl TissueTape {
             scene,
             ticks: Last::new(&blank, room(!not_kept)),
             orders: Last::new(&(0, TapedOrder::Reset), ORDERS),
-            // Only elastic bodies have lines.
-            loads: Last::new(&(0, LineLoads::default()), room(!not_kept && tissue == TissueKind::Fem)),
+            loads: Last::new(&(0, LineLoads::default()), room(!not_kept && tissue.has_lines())),
             checkpoints: [(0, memory()), (0, memory())],
             points: 0,
             next_due: 0,

@@ -28,7 +28,7 @@ impl World {
     /// Sets up the tissue model that `scene` asks for, at rest.
     pub fn new(scene: Scene, limits: Limits, generation: u64) -> Result<Self, WorldError> {
         let tissue: Box<dyn TissueModel> = match scene.tissue() {
-            TissueKind::ChainMail => Box::new(ChainMailTissue::new(&scene, limits.clone())),
+            TissueKind::ChainMail | TissueKind::Paper => Box::new(ChainMailTissue::new(&scene, limits.clone())),
             TissueKind::Fem => {
                 let texts = |problems: Vec<_>| problems.iter().map(ToString::to_string).collect();
                 Box::new(FemTissue::<f32>::new(&scene).map_err(|p| WorldError(texts(p)))?)

@@ -39,7 +39,7 @@ pub use compliance::Compliance;
 pub use contact::{LineInput, step};
 pub use model::{LineLayer, LineModel, LineProblem, LineSettings, MAX_LAYERS, MAX_STATIONS};
 pub use prony::PronyTerm;
-pub use ready::{BodyLine, HandLine, LayerForces, LineError, LineSource, ReadyLine};
+pub use ready::{BodyAnswer, BodyLine, HandLine, LayerForces, LineError, LineSource, ReadyLine};
 pub use rows::Rows;
 pub use state::{LineOutput, LineState, TipState};
 pub use stations::{Line, StationSettings, Stations};

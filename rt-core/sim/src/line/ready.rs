@@ -10,8 +10,8 @@ use super::state::{LineOutput, LineState};
 use super::stations::{Line, StationSettings, Stations};
 use crate::needle::{LayerKind, Layers};
 use crate::scene::Lattice;
-use crate::tissue::PackedField;
 use crate::tissue::fem::batch::BatchModel;
+use crate::tissue::{BodyShift, PackedField};
 use nalgebra::Vector3;
 
 mod source;
@@ -52,8 +52,28 @@ pub struct BodyLine {
     pub generation: u64,
     /// Where the line is at rest.
     pub line: Line,
-    /// Displacement of every element, m/N: shaft of each station, then tip at each.
-    pub columns: Vec<PackedField>,
+    /// For each newton: shaft of each station, then tip at each.
+    pub answer: BodyAnswer,
+}
+
+/// What a tissue model takes of the body's answers to the loads of a line.
+#[derive(Clone, Debug)]
+pub enum BodyAnswer {
+    /// Displacement of every element, m/N: tissue that adds them up.
+    Columns(Vec<PackedField>),
+    /// Motion of the body as a whole, per newton: tissue that finds the rest by itself.
+    Shifts(Vec<BodyShift>),
+}
+
+impl BodyAnswer {
+    /// Of the columns no more than the motion as a whole; none in a body that something holds, which does not move so.
+    pub fn shifts_of(columns: &[PackedField], body: &Lattice, is_held: bool) -> Self {
+        let shift = |column| match is_held {
+            true => BodyShift::default(),
+            false => BodyShift::of_field(body, column),
+        };
+        Self::Shifts(columns.iter().map(shift).collect())
+    }
 }
 
 /// What the layers on the way resist with.
@@ -123,7 +143,7 @@ impl ReadyLine {
             body: Box::new(BodyLine {
                 generation,
                 line,
-                columns: queue.into_fields(),
+                answer: BodyAnswer::Columns(queue.into_fields()),
             }),
         })
     }

@@ -136,6 +136,11 @@ impl LineState {
         at_once + self.memory.stored_j(rows, &model.settings.prony)
     }
 
+    /// Displacement of the material at the tip along the line, m.
+    pub fn tip_displacement_m(&self) -> f64 {
+        self.tip_u_m
+    }
+
     /// The tip presses on tissue or is in it.
     pub fn is_in_contact(&self) -> bool {
         self.in_contact > 0 || self.tip.force_n > 0.0

@@ -101,10 +101,20 @@ impl Scene {
     }
 
     /// The same scene with another tissue model, and as coarse a body as that needs.
-    pub fn with_tissue(mut self, tissue: TissueKind) -> Scene {
+    pub fn with_tissue(self, tissue: TissueKind) -> Scene {
+        self.with_body(tissue, tissue.most_elements())
+    }
+
+    /// The same scene with the finite elements that needles' lines are solved for in, where `tissue` has lines.
+    pub fn for_lines(self, tissue: TissueKind) -> Option<Scene> {
+        let most = tissue.most_line_elements()?;
+        Some(self.with_body(TissueKind::Fem, most))
+    }
+
+    fn with_body(mut self, tissue: TissueKind, most_elements: usize) -> Scene {
         self.tissue = tissue;
         self.body = Arc::clone(&self.lattice);
-        while self.body.element_count() > tissue.most_elements() {
+        while self.body.element_count() > most_elements {
             self.body = Arc::new(self.body.coarser());
         }
         self.nodes = NodeGrid::of(&self.body);

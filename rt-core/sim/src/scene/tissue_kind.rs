@@ -3,33 +3,42 @@
 use serde::{Deserialize, Serialize};
 
 /// The tissue models that a scene can choose.
+// Flight recordings know them by their place: new ones go to the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum TissueKind {
-    /// Restricted ChainMail.
+    /// Restricted ChainMail around a needle that slips by force, on a body that shifts as a whole.
     #[default]
     ChainMail,
     /// Linear elastic finite elements.
     Fem,
+    /// Restricted ChainMail around a needle that slips by speed: the paper as it is printed, eq. 6.
+    Paper,
 }
 
 impl TissueKind {
     /// In the order of the help.
-    pub const ALL: [Self; 2] = [Self::ChainMail, Self::Fem];
+    pub const ALL: [Self; 3] = [Self::ChainMail, Self::Fem, Self::Paper];
 
     /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             TissueKind::ChainMail => "chainmail",
             TissueKind::Fem => "fem",
+            TissueKind::Paper => "paper",
         }
     }
 
     /// What it is good for, in one line.
     pub fn help(self) -> &'static str {
         match self {
-            TissueKind::ChainMail => "Restricted ChainMail: microseconds a tick, limits that always hold, no forces",
+            TissueKind::ChainMail => {
+                "Restricted ChainMail: microseconds a tick; the needle slips by force, and a needle's line is ready within a second"
+            }
             TissueKind::Fem => {
-                "Linear elastic finite elements: displacements and forces of the material; a body of more than 60,000 elements is solved in larger ones"
+                "Linear elastic finite elements: displacements and forces of the material; a needle's line takes seconds, and a body of more than 60,000 elements is solved in larger ones"
+            }
+            TissueKind::Paper => {
+                "Restricted ChainMail as the paper prints it: the needle slips by speed (eq. 6), so slow needles misplace seeds by centimetres"
             }
         }
     }
@@ -42,25 +51,42 @@ impl TissueKind {
     /// A body of more elements is made coarser. FEM: a tick of 200 Hz and some seconds for a needle's line allow no more.
     pub fn most_elements(self) -> usize {
         match self {
-            TissueKind::ChainMail => usize::MAX,
+            TissueKind::ChainMail | TissueKind::Paper => usize::MAX,
             TissueKind::Fem => 60_000,
         }
+    }
+
+    /// Needles go along lines, which are solved for in a body of at most so many elements; `None` where they slip by speed.
+    /// ChainMail takes no more of the answer than how the line moves, and how the body does as a whole.
+    pub fn most_line_elements(self) -> Option<usize> {
+        match self {
+            TissueKind::ChainMail => Some(8_000),
+            TissueKind::Fem => Some(self.most_elements()),
+            TissueKind::Paper => None,
+        }
+    }
+
+    /// Whether needles go along lines.
+    pub fn has_lines(self) -> bool {
+        self.most_line_elements().is_some()
+    }
+
+    /// Whether the tissue answers a line's loads by the sum of its columns.
+    pub fn adds_columns(self) -> bool {
+        self == TissueKind::Fem
     }
 
     /// Edge of the tissue that moves as one piece with the tip. FEM needs one: the force on a single node goes to
     /// zero with the spacing.
     pub fn tip_patch_m(self) -> f64 {
         match self {
-            TissueKind::ChainMail => 0.0,
+            TissueKind::ChainMail | TissueKind::Paper => 0.0,
             TissueKind::Fem => 4e-3,
         }
     }
 
     /// Whether `TissueModel::prepare` does anything: only then need the loop look where the tip goes.
     pub fn prepares(self) -> bool {
-        match self {
-            TissueKind::ChainMail => false,
-            TissueKind::Fem => true,
-        }
+        self == TissueKind::Fem
     }
 }

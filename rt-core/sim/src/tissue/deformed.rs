@@ -1,5 +1,6 @@
 //! The body as it is now: what everything but the models reads.
 
+use super::BodyShift;
 use crate::scene::{Lattice, Surface};
 
 /// A lattice and the displacement of each of its elements.
@@ -11,6 +12,8 @@ pub struct Deformed<'a> {
     pub u: [&'a [f32]; 3],
     /// Elements for each unit of `u`.
     pub scale: f32,
+    /// A motion of the whole body, on top of that.
+    pub shift: Option<BodyShift>,
     /// No corner of an element is farther from the element's box at rest, in elements.
     pub reach: f32,
 }
@@ -19,7 +22,10 @@ impl Deformed<'_> {
     /// Displacement from rest of one element, in elements; the last element's for a number past the end.
     pub fn displacement(&self, element: u32) -> [f64; 3] {
         let e = (element as usize).min(self.lattice.element_count().saturating_sub(1));
-        self.u.map(|c| c.get(e).map_or(0.0, |u| f64::from(self.scale * u)))
+        let u = self.u.map(|c| c.get(e).map_or(0.0, |u| f64::from(self.scale * u)));
+        let Some(shift) = &self.shift else { return u };
+        let whole_m = shift.at_m(self.lattice.rest_m(e as u32));
+        [0, 1, 2].map(|a| u[a] + whole_m[a] / self.lattice.spacing_m)
     }
 
     /// Centre of an element in the scene frame; the last element's for a number past the end.

@@ -34,6 +34,7 @@ pub mod fem;
 mod field;
 mod model;
 mod point;
+mod shift;
 mod violation;
 
 pub use ahead::element_ahead;
@@ -44,4 +45,5 @@ pub(crate) use field::add_up;
 pub use field::{ElementField, PackedField};
 pub use model::{Held, HeldOutcome, REACH, Solve, StepReport, TissueModel};
 pub use point::MaterialPoint;
+pub use shift::BodyShift;
 pub use violation::largest_violation;

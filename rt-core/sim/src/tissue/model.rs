@@ -1,6 +1,6 @@
 //! What every tissue model is: a body that takes steps and can be read.
 
-use super::{Deformed, PackedField};
+use super::{BodyShift, Deformed, PackedField};
 use crate::limits::Limits;
 
 use serde::{Deserialize, Serialize};
@@ -90,6 +90,10 @@ pub trait TissueModel: Send {
     fn displace(&mut self, _columns: &[PackedField], _loads_n: &[f64]) -> Option<StepReport> {
         None
     }
+
+    /// Moves the body as a whole, on top of what its steps do; `None` takes that back. Nothing in a model that does not know
+    /// such a motion. Obligations as for `step`.
+    fn carry(&mut self, _shift: Option<BodyShift>) {}
 
     /// Whether forces may go by this step: one that has not converged is for no hand, but where a model says otherwise.
     fn may_be_felt(&self, report: &StepReport) -> bool {

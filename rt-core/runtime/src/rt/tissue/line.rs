@@ -1,11 +1,12 @@
-//! The tissue tick while the needle is on a prepared line: the body is the sum of the line's loads times its columns.
+//! The tissue tick while the needle is on a prepared line: the body is the sum of the line's loads times its columns, or moves as a
+//! whole by them while the tip holds what it presses on.
 
 use super::TissueLoop;
 use crate::rt::exchange::Notice;
 use crate::rt::line_loads::LineLoads;
 use nalgebra::Vector3;
-use stylet_sim::line::BodyLine;
-use stylet_sim::tissue::{MaterialPoint, StepReport};
+use stylet_sim::line::{BodyAnswer, BodyLine, Line};
+use stylet_sim::tissue::{BodyShift, Held, MaterialPoint, StepReport};
 
 impl TissueLoop {
     /// Takes up the columns of a new line; the old ones go back to be freed.
@@ -40,9 +41,18 @@ impl TissueLoop {
         let loads = *self.ports.loads.read();
         self.loads = loads;
         let line = self.line.as_ref().filter(|line| line.generation == loads.generation)?;
-        let report = self.world.tissue.displace(&line.columns, loads.loads_n())?;
-        let entry = Vector3::from(line.line.entry_m);
-        let direction = Vector3::from(line.line.axes[0]);
+        let axis = line.line;
+        let report = match &line.answer {
+            BodyAnswer::Columns(columns) => self.world.tissue.displace(columns, loads.loads_n())?,
+            BodyAnswer::Shifts(shifts) => {
+                let shift = BodyShift::sum(shifts, loads.loads_n());
+                self.world.tissue.carry(Some(shift));
+                let held = self.held_on_line(&axis, &loads);
+                self.world.tissue.step(held, self.period_s)
+            }
+        };
+        let entry = Vector3::from(axis.entry_m);
+        let direction = Vector3::from(axis.axes[0]);
         if self.contact.is_some() {
             self.end_contact();
         }
@@ -50,9 +60,26 @@ impl TissueLoop {
         Some(report)
     }
 
+    /// The material at the tip, where the line has it.
+    fn held_on_line(&self, axis: &Line, loads: &LineLoads) -> Option<Held> {
+        let along_m = loads.tip_material_m;
+        if !loads.in_tissue || !along_m.is_finite() {
+            return None;
+        }
+        let body = &self.world.scene.body;
+        let element = MaterialPoint::at_rest(body, axis.point_m(along_m.max(0.0), [0.0; 2]))?.element;
+        let rest_m = body.rest_m(element);
+        Some(Held {
+            element,
+            position_m: [0, 1, 2].map(|a| rest_m[a] + loads.tip_displacement_m * axis.axes[0][a]),
+            patch_m: self.world.scene.tissue().tip_patch_m(),
+        })
+    }
+
     /// The needle is on no line: a contact that was reported ends.
     pub(super) fn leave_line(&mut self) {
         if std::mem::take(&mut self.in_by_line) {
+            self.world.tissue.carry(None);
             let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
             self.notify(Notice::LeftTissue { tick, time_ns });
         }

@@ -41,15 +41,17 @@ pub use state::TissueState;
 
 use crate::limits::Limits;
 use crate::scene::Scene;
-use crate::tissue::{Deformed, Held, StepReport, TissueModel};
+use crate::tissue::{BodyShift, Deformed, Held, StepReport, TissueModel};
 
 /// Restricted ChainMail as a tissue model.
 #[derive(Clone)]
 pub struct ChainMailTissue {
     /// Topology and limits.
     pub model: ChainMail,
-    /// Where every element is.
+    /// Where every element is, in the body as a whole.
     pub state: TissueState,
+    /// How that is moved.
+    shift: Option<BodyShift>,
 }
 
 impl ChainMailTissue {
@@ -57,21 +59,57 @@ impl ChainMailTissue {
     pub fn new(scene: &Scene, limits: Limits) -> Self {
         let model = ChainMail::new(scene, limits);
         let state = TissueState::at_rest(&model);
-        ChainMailTissue { model, state }
+        ChainMailTissue {
+            model,
+            state,
+            shift: None,
+        }
+    }
+}
+
+impl ChainMailTissue {
+    /// No element is moved farther by the body as a whole, in elements.
+    fn largest_shift(&self) -> f32 {
+        let lattice = &self.model.lattice;
+        let largest_m = self.shift.map_or(0.0, |shift| shift.largest_m(lattice));
+        (largest_m / lattice.spacing_m) as f32
     }
 }
 
 impl TissueModel for ChainMailTissue {
     fn step(&mut self, held: Option<Held>, dt_s: f64) -> StepReport {
-        step(&self.model, &mut self.state, held, dt_s)
+        let Some(shift) = self.shift else {
+            return step(&self.model, &mut self.state, held, dt_s);
+        };
+        // In the body as a whole the held element has to go the rest of the way.
+        let in_body = held.map(|held| {
+            let whole_m = shift.at_m(self.model.lattice.rest_m(held.element));
+            Held {
+                position_m: [0, 1, 2].map(|a| held.position_m[a] - whole_m[a]),
+                ..held
+            }
+        });
+        let mut report = step(&self.model, &mut self.state, in_body, dt_s);
+        report.max_displacement += self.largest_shift();
+        report
+    }
+
+    fn carry(&mut self, shift: Option<BodyShift>) {
+        self.shift = shift.filter(|shift| *shift != BodyShift::default());
     }
 
     fn deformed(&self) -> Deformed<'_> {
-        self.state.deformed(&self.model)
+        let body = self.state.deformed(&self.model);
+        Deformed {
+            shift: self.shift,
+            reach: body.reach + self.largest_shift(),
+            ..body
+        }
     }
 
     fn return_to_rest(&mut self) {
         self.state.return_to_rest(&self.model);
+        self.shift = None;
     }
 
     fn set_limits(&mut self, limits: Limits) {
@@ -80,14 +118,26 @@ impl TissueModel for ChainMailTissue {
     }
 
     fn memory_len(&self) -> usize {
-        self.state.memory().iter().map(|part| part.len()).sum()
+        let state = self.state.memory().iter().map(|part| part.len()).sum::<usize>();
+        state + size_of::<BodyShift>()
     }
 
     fn save(&self, to: &mut [u8]) {
-        self.state.save(to);
+        if let Some((state, shift)) = to.split_last_chunk_mut() {
+            self.state.save(state);
+            let bytes: &mut [u8; size_of::<BodyShift>()] = shift;
+            bytes.copy_from_slice(bytemuck::bytes_of(&self.shift.unwrap_or_default()));
+        }
     }
 
     fn load(&mut self, from: &[u8]) {
-        self.state.load(&self.model, from);
+        const BYTES: usize = size_of::<BodyShift>();
+        if let Some((state, shift)) = from.split_last_chunk::<BYTES>() {
+            self.state.load(&self.model, state);
+            let shift: BodyShift = bytemuck::pod_read_unaligned(shift);
+            let numbers = shift.shift_m.iter().chain(&shift.turn_rad);
+            let is_motion = numbers.clone().all(|c| c.is_finite()) && numbers.into_iter().any(|c| *c != 0.0);
+            self.shift = is_motion.then_some(shift);
+        }
     }
 }

@@ -102,6 +102,7 @@ impl TissueState {
             lattice: &model.lattice,
             u: self.u.each_ref().map(Vec::as_slice),
             scale: self.scale(),
+            shift: None,
             reach: 1.0 + stretch + self.max_displacement,
         }
     }

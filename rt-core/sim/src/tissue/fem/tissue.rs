@@ -115,6 +115,7 @@ impl<T: Compiled> TissueModel for FemTissue<T> {
             lattice: self.model.lattice(),
             u: [0, 1, 2].map(|axis| self.state.displacement(axis)),
             scale: 1.0,
+            shift: None,
             // Corners move with their neighbours; a cell is not stretched beyond what both move.
             reach: 1.0 + 3.0 * self.state.max_displacement,
         }
