@@ -68,6 +68,7 @@ fn insertion(lattice: &Lattice, way: Way, depth_m: f64) -> Vec<Tick> {
         lattice,
         u: [&still, &still, &still],
         scale: 1.0,
+        shift: None,
         reach: 1.0,
     };
     let ahead = |rest_m: f64, now: Option<u32>, by_m: f64| {

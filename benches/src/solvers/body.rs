@@ -54,6 +54,7 @@ impl Body {
             lattice: &self.lattice,
             u: self.u.each_ref().map(Vec::as_slice),
             scale: 1.0,
+            shift: None,
             // A link brings its outer end nearer to the inner one's displacement, so nothing passes what was put.
             reach: 1.0 + stretch + 2.0 * self.farthest,
         }

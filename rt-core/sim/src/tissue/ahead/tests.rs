@@ -30,6 +30,7 @@ impl Body {
             lattice: &self.scene.lattice,
             u: self.u.each_ref().map(Vec::as_slice),
             scale: 1.0,
+            shift: None,
             reach: 20.0,
         }
     }
