@@ -74,6 +74,14 @@ impl BodyAnswer {
         };
         Self::Shifts(columns.iter().map(shift).collect())
     }
+
+    /// Those that are added up; none where the motion as a whole is all.
+    pub fn columns(&self) -> &[PackedField] {
+        match self {
+            Self::Columns(columns) => columns,
+            Self::Shifts(_) => &[],
+        }
+    }
 }
 
 /// What the layers on the way resist with.

@@ -75,7 +75,9 @@ fn the_body_follows_the_loads_of_the_line_and_is_at_rest_without_them() {
         let answer = hand.step(tip_m, 1e-3);
         assert!(answer.punctured.is_none(), "5 of 8 mm");
     }
-    let report = tissue.displace(&columns.columns, hand.state().loads_n()).unwrap();
+    let report = tissue
+        .displace(columns.answer.columns(), hand.state().loads_n())
+        .unwrap();
     assert!(report.converged && report.moved > 19_000, "{report:?}");
     // The tip presses as a patch: at its middle the lattice moves a little more than on the mean over the patch.
     let at_entry = hand
@@ -93,7 +95,9 @@ fn the_body_follows_the_loads_of_the_line_and_is_at_rest_without_them() {
         hand.step(tip_m, 1e-3);
     }
     assert!(!hand.is_in_tissue());
-    let report = tissue.displace(&columns.columns, hand.state().loads_n()).unwrap();
+    let report = tissue
+        .displace(columns.answer.columns(), hand.state().loads_n())
+        .unwrap();
     assert_eq!((report.moved, report.max_displacement), (0, 0.0));
 }
 
@@ -233,21 +237,27 @@ fn a_coarser_pelvis_beside_one_of_all_cells() {
     let line = Line::into_body(&coarse.lattice, start_m, [0.0, 0.0, 1.0]).unwrap();
     let built = source.elapsed();
     let ready = ReadyLine::prepare(1, &body, &coarse.lattice, &|_| LayerKind::Gland, line, &mut |_| true).unwrap();
-    let bytes: usize = ready.body.columns.iter().map(crate::tissue::PackedField::bytes).sum();
+    let bytes: usize = ready
+        .body
+        .answer
+        .columns()
+        .iter()
+        .map(crate::tissue::PackedField::bytes)
+        .sum();
     println!(
         "body {built:.1?}, line of {} columns {:.1?}, {:.0} MB",
-        ready.body.columns.len(),
+        ready.body.answer.columns().len(),
         source.elapsed() - built,
         bytes as f64 / 1e6
     );
     let mut tissue = tissue;
-    let loads: Vec<f64> = (0..ready.body.columns.len())
+    let loads: Vec<f64> = (0..ready.body.answer.columns().len())
         .map(|n| if n < 40 { 0.05 } else { 0.0 })
         .collect();
     let mut times_us: Vec<f64> = (0..200)
         .map(|_| {
             let begun = std::time::Instant::now();
-            tissue.displace(&ready.body.columns, &loads).unwrap();
+            tissue.displace(ready.body.answer.columns(), &loads).unwrap();
             begun.elapsed().as_secs_f64() * 1e6
         })
         .collect();
@@ -264,9 +274,9 @@ fn a_line_that_is_prepared_twice_is_the_same_in_every_bit() {
     let (first, again) = (block(), block());
     let [a, b] = [&first, &again].map(|(scene, body)| ready(scene, body));
     assert!(a.hand.source().is_identical(&b.hand.source()));
-    let pairs = a.body.columns.iter().zip(&b.body.columns);
+    let pairs = a.body.answer.columns().iter().zip(b.body.answer.columns());
     assert!(pairs.clone().count() == 20 && pairs.clone().all(|(a, b)| a.is_identical(b)));
-    assert!(a.body.columns[0].at(0) != [0.0; 3]);
+    assert!(a.body.answer.columns()[0].at(0) != [0.0; 3]);
     let other = Line::new(first.0.lattice.rest_m(0), [0.0, 0.0, 1.0]).unwrap();
     let other = ReadyLine::prepare(1, &first.1, &first.0.lattice, &|_| LayerKind::Gland, other, &mut |_| {
         true
