@@ -6,9 +6,13 @@ use stylet_shm_schema::ParameterId;
 use stylet_sim::limits::Limits;
 use stylet_sim::tissue::{Deformed, Held, StepReport, TissueModel};
 
-fn stage() -> Stage {
+fn stage_of(tissue: TissueKind) -> Stage {
     let source = SceneSource::Builtin("paper".to_owned());
-    Stage::build(&source, TissueKind::ChainMail, DeviceInfo::phantom_premium_1_5()).expect("built in")
+    Stage::build(&source, tissue, DeviceInfo::phantom_premium_1_5()).expect("built in")
+}
+
+fn stage() -> Stage {
+    stage_of(TissueKind::ChainMail)
 }
 
 /// Along the middle of the paper's gland.
@@ -53,8 +57,8 @@ fn a_rehearsal_leaves_its_seeds_off_plan_and_repeats_bit_by_bit() {
 }
 
 #[test]
-fn tissue_that_sticks_less_leaves_seeds_nearer_to_plan() {
-    let (mut stage, run, stop) = (stage(), needle(), AtomicBool::new(false));
+fn tissue_that_sticks_less_by_eq_6_leaves_seeds_nearer_to_plan() {
+    let (mut stage, run, stop) = (stage_of(TissueKind::Paper), needle(), AtomicBool::new(false));
     let mut loose = ParameterSet::default();
     loose.set(ParameterId::DepthCoefficient, 1e-8);
     loose.set(ParameterId::PunctureDepth, 1e-3);
@@ -100,8 +104,7 @@ fn a_rehearsal_with_finite_elements_repeats_bit_by_bit() {
 }
 
 fn fem_stage() -> Stage {
-    let source = SceneSource::Builtin("paper".to_owned());
-    Stage::build(&source, TissueKind::Fem, DeviceInfo::phantom_premium_1_5()).expect("built in")
+    stage_of(TissueKind::Fem)
 }
 
 /// One seed, within reach of the tip in an elastic body.
@@ -191,7 +194,16 @@ fn the_loop_prepares_what_it_holds_next() {
 /// at 123 mm/s.
 #[test]
 fn on_a_line_seeds_rest_where_they_do_at_any_speed_and_near_their_plan() {
-    let (mut stage, stop) = (fem_stage(), AtomicBool::new(false));
+    seeds_rest_at_any_speed(TissueKind::Fem);
+}
+
+#[test]
+fn in_chainmail_seeds_rest_where_they_do_at_any_speed_and_near_their_plan() {
+    seeds_rest_at_any_speed(TissueKind::ChainMail);
+}
+
+fn seeds_rest_at_any_speed(tissue: TissueKind) {
+    let (mut stage, stop) = (stage_of(tissue), AtomicBool::new(false));
     let set = ParameterSet::default();
     let mut rehearse = |speed_m_per_s: f64| {
         let run = NeedleRun {
