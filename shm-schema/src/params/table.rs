@@ -34,10 +34,10 @@ parameters! {
     RecoveryTime "tissue.recovery_time" "Recovery time" Tissue "ms" 1e3, 5.0, 10000.0, 1000.0, "ours", "Time in which the surroundings bring the gland back by 63 %.";
     ResidualTolerance "tissue.residual_tolerance" "Residual tolerance" Tissue "elements" 1.0, 1e-4, 1e-2, 1e-3, "ours, physics.md", "Largest constraint violation that a tissue step may leave (docs/physics.md, Tissue: constraints).";
     PunctureDepth "needle.puncture_depth" "Puncture depth u_cri" Needle "mm" 1e3, 0.5, 20.0, 8.0, "paper eq. 6", "Depth at which the needle goes through the membrane.";
-    SpeedCoefficient "needle.speed_coefficient" "Speed coefficient K_V" Needle "mm2/s2" 1e6, 1.0, 1e6, 10000.0, "paper eq. 6", "The larger, the more a fast needle drags the tissue along.";
-    DepthCoefficient "needle.depth_coefficient" "Depth coefficient K_s" Needle "mm2" 1e6, 0.01, 1000.0, 200.0, "paper eq. 6", "The larger, the longer the tissue follows the tip after puncture.";
-    StaticSpeed "needle.static_speed" "Static friction speed V_0" Needle "mm/s" 1e3, 0.0, 200.0, 20.0, "paper eq. 6", "Below this speed the tissue sticks to the needle.";
-    RetractionRatio "needle.retraction_ratio" "Retraction ratio K_ret" Needle "" 1.0, 0.0, 1.0, 0.3, "paper eq. 6", "Share of the tip's step that the tissue follows on the way out.";
+    SpeedCoefficient "needle.speed_coefficient" "Speed coefficient K_V" Needle "mm2/s2" 1e6, 1.0, 1e6, 10000.0, "paper eq. 6", "The larger, the more a fast needle drags the tissue along. Has no part on a needle line.";
+    DepthCoefficient "needle.depth_coefficient" "Depth coefficient K_s" Needle "mm2" 1e6, 0.01, 1000.0, 200.0, "paper eq. 6", "The larger, the longer the tissue follows the tip after puncture. Has no part on a needle line.";
+    StaticSpeed "needle.static_speed" "Static friction speed V_0" Needle "mm/s" 1e3, 0.0, 200.0, 20.0, "paper eq. 6", "Below this speed the tissue sticks to the needle. Has no part on a needle line.";
+    RetractionRatio "needle.retraction_ratio" "Retraction ratio K_ret" Needle "" 1.0, 0.0, 1.0, 0.3, "paper eq. 6", "Share of the tip's step that the tissue follows on the way out. Has no part on a needle line.";
     PunctureHysteresis "needle.puncture_hysteresis" "Puncture hysteresis" Needle "mm" 1e3, 0.0, 5.0, 0.5, "ours, physics.md", "How far the tip must come back out before the membrane counts as closed (docs/physics.md, Needle and tissue).";
     MembranePeak "force.membrane_peak" "Membrane force F_R" Force "N" 1.0, 0.0, 20.0, 5.6, "Podder 2006", "Force of the capsule at the moment of puncture (paper eq. 10).";
     CuttingForce "force.cutting" "Cutting force" Force "N" 1.0, 0.0, 10.0, 1.5, "ours", "Force at the tip while it cuts the gland.";
@@ -49,11 +49,11 @@ parameters! {
     ForceScale "force.scale" "Force scale" Force "" 1.0, 0.0, 2.0, 0.9, "ours", "Fits the force of a real needle to the device; always shown. The Phantom gives the skin's 9 N up to 0.94.";
     SlewLimit "force.slew_limit" "Slew limit" Force "N/ms" 1e-3, 0.05, 10.0, 0.5, "ours, physics.md", "Largest change of force from tick to tick (docs/physics.md, Gate).";
     HoldSpeed "needle.hold_speed" "Hold speed" Needle "mm/s" 1e3, 0.0, 50.0, 2.0, "ours", "Below this speed along the path the needle is at rest; above the noise of the velocity estimate.";
-    StickStiffness "force.stick_stiffness" "Stick stiffness" Force "N/m" 1.0, 1.0, 8000.0, 6000.0, "ours", "How stiffly the tissue holds a needle that sticks to it: friction over this is the way before it slips.";
+    StickStiffness "force.stick_stiffness" "Stick stiffness" Force "N/m" 1.0, 1.0, 8000.0, 6000.0, "ours", "How stiffly the tissue holds a needle that sticks to it: friction over this is the way before it slips. Has no part on a needle line.";
     MembraneGain "force.membrane_gain" "Membrane gain" Force "" 1.0, 0.0, 1.0, 1.0, "ours", "Scales F_R of every layer; 0 turns it off.";
     CuttingGain "force.cutting_gain" "Cutting gain" Force "" 1.0, 0.0, 1.0, 1.0, "ours", "Scales the cutting force of every layer; 0 turns it off.";
     ShaftGain "force.shaft_gain" "Shaft friction gain" Force "" 1.0, 0.0, 1.0, 1.0, "ours", "Scales the shaft friction of every layer; 0 turns it off.";
-    Coupling "force.coupling" "Coupling to the tissue" Force "" 1.0, 0.0, 1.0, 0.0, "paper section 3", "Share of membrane, cutting and friction that comes from the deformed tissue instead: 0 is eq. 8-10, 1 is coupled.";
+    Coupling "force.coupling" "Coupling to the tissue" Force "" 1.0, 0.0, 1.0, 0.0, "paper section 3", "Share of membrane, cutting and friction that comes from the deformed tissue instead: 0 is eq. 8-10, 1 is coupled. On a needle line all of it does.";
     TissueStiffness "force.tissue_stiffness" "Tissue stiffness, coupled" Force "N/m" 1.0, 0.0, 800.0, 700.0, "ours", "Coupled mode with ChainMail, which knows no forces: force for each metre that the held element is displaced.";
     GuideTorque "force.guide_torque" "Guide torque" Force "N m/rad" 1.0, 0.0, 2.0, 0.5, "ours", "Turns the needle's axis to the straight path, on devices that can; 0 turns it off.";
     StickDamping "force.stick_damping" "Stick damping" Force "N s/m" 1.0, 0.0, 20.0, 10.0, "ours", "Damping of a needle that sticks; keeps the stick stiffness stable.";

@@ -1,5 +1,6 @@
 //! Claims about the step, on bodies from a block to a horseshoe.
 
+mod carried;
 mod queue;
 mod reference;
 mod relax;
