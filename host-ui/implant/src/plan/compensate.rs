@@ -314,12 +314,16 @@ fn step_m(seen: &[(f64, f64)], share: f64) -> f64 {
     -error_m / slope * share
 }
 
-/// The needle as a whole moves across by what its seeds are off on average.
+/// The needle as a whole moves across by what its seeds are off on average; for next to nothing it stays in its place, where the
+/// tissue is ready for it.
 fn aside(needle: &Needle, last: &Tried, share: f64, limits: &Limits, drops: &mut Drops) {
     let direction = Vector3::from(needle.direction);
     let sum = last.error_m.iter().fold(Vector3::zeros(), |sum, e| sum + e);
     let mean = sum / last.error_m.len().max(1) as f64;
     let across = mean - direction * mean.dot(&direction);
+    if across.norm() < 0.5 * limits.enough_m {
+        return;
+    }
     let shifted = Vector3::from(drops.entry_m) - across * share - Vector3::from(needle.entry_m);
     let size = shifted.norm();
     let kept = if size > limits.across_m {

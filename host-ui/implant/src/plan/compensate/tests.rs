@@ -104,6 +104,16 @@ fn a_needle_that_is_pushed_aside_is_aimed_beside_but_not_past_its_limit() {
     );
 }
 
+/// A needle moved aside by nanometres is another needle to the core, which solves for its line again.
+#[test]
+fn a_needle_whose_seeds_are_hardly_aside_stays_in_its_place() {
+    let mut known = tissue(|z| 2e-3 + 0.1 * z);
+    known.across_m = [2e-8, 0.0, 0.0];
+    let needle = needle(Loading::Loose);
+    let done = run(&needle, &mut known);
+    assert!(done.rehearsals > 1 && done.drops.entry_m == needle.entry_m, "{:?}", done.drops);
+}
+
 #[test]
 fn limits_hold_and_what_cannot_be_had_is_approached() {
     let mut known = tissue(|_| 20e-3);
