@@ -1,12 +1,10 @@
-//! Where to drop each seed so that it rests on plan: rehearse, see where the seeds end, drop them so much further the other way,
-//! rehearse again.
+//! Where to drop each seed so that it rests on plan: rehearse, see where the seeds end, drop them elsewhere, rehearse again.
 //!
-//! The tissue lies ahead of its place at rest when a seed leaves the needle, by some millimetres that hardly change with the
-//! place of the drop. So each step moves a drop by the error that is left, over the slope of rest against drop that the last two
-//! rehearsals show (a secant; at first 1). Rest against drop has jumps, where the tip takes hold of another element: once a seed
-//! has been seen to rest on both sides of its place, its drop is sought between those two. Where a step makes the needle worse,
-//! the best drops of the single seeds are tried together. What half of the rehearsals do not bring home is looked for around
-//! each seed's best drop.
+//! What a seed does depends on its own drop and on those before it, not on those that come after. So the deepest seed's drop is
+//! sought first, and with that fixed the next one's. The deeper a seed is dropped the deeper it rests, but not in
+//! proportion: tissue that sticks to the needle goes along for millimetres, so that many drops leave a seed in one place,
+//! and where it lets go a seed's place jumps. A drop is therefore sought between one that leaves the seed short and one that leaves it too far in.
+//! Seeds that are not sought yet move along by what they are off, which often is enough.
 
 use super::rehearse::{Drops, RehearsalError, Rehearser, Rest};
 use super::{Loading, Needle};
@@ -35,25 +33,23 @@ impl Default for Limits {
             along_m: 15e-3,
             across_m: 1.5e-3,
             reach_m: super::check::REACH_M,
-            rehearsals: 16,
+            rehearsals: 30,
             enough_m: 0.1e-3,
         }
     }
 }
 
-/// The slope of rest against drop is taken to lie between these.
-const SLOPES: [f64; 2] = [0.5, 2.0];
-/// Two drops less far apart say nothing about the slope.
+/// A drop is not sought any closer.
 const LEAST_MOVE_M: f64 = 0.05e-3;
-/// A seed's drop is sought between two of its last drops, so many of them: older ones were with other drops of its neighbours.
-const REMEMBERED: usize = 5;
 /// Between two drops the next one keeps from both by this part of their distance.
 const KEPT_FROM_ENDS: f64 = 0.1;
+/// Where a step leaves a seed on the same side, the next one is so many times as long.
+const LONGER: f64 = 1.5;
+/// Rehearsals for one seed, at most.
+const PER_SEED: usize = 9;
 /// Drops of one needle keep their order by at least this.
 const APART_M: f64 = 0.1e-3;
 
-/// In the second half of the rehearsals each seed is tried so far from its best drop, in turn.
-const AROUND_M: [f64; 6] = [0.3e-3, -0.3e-3, 0.6e-3, -0.6e-3, 0.15e-3, -0.15e-3];
 /// Where dropping as planned is not possible, drops are tried so much deeper at a time.
 const DEEPER_M: f64 = 1e-3;
 
@@ -98,45 +94,99 @@ impl Tried {
     fn worst_m(&self) -> f64 {
         self.error_m.iter().map(Vector3::norm).fold(0.0, f64::max)
     }
+
+    /// How far a seed lies beyond its place along the needle; of a strand, all of it.
+    fn off_m(&self, needle: &Needle, seed: usize) -> f64 {
+        let direction = Vector3::from(needle.direction);
+        let along = |e: &Vector3<f64>| e.dot(&direction);
+        match needle.loading {
+            Loading::Loose => self.error_m.get(seed).map_or(0.0, along),
+            Loading::Stranded { .. } => median(self.error_m.iter().map(along).collect()),
+        }
+    }
 }
 
-/// For each seed, the drop that brought it nearest to plan. Where a seed rests depends on its own drop most of all, so these
-/// together may do where steps of all seeds at once do not.
-struct Nearest(Vec<(f64, f64)>);
+/// Where one seed's drop is sought, while those before it stay; of a strand, that of its first seed.
+struct Search {
+    /// Number of the seed.
+    seed: usize,
+    /// The deepest drop that leaves it short of its place, and the shallowest that leaves it beyond; how far, unless it could not be
+    /// dropped there.
+    short: Option<(f64, Option<f64>)>,
+    beyond: Option<(f64, Option<f64>)>,
+    /// The rehearsal that brought it nearest.
+    nearest: Tried,
+    step_m: f64,
+    tries: usize,
+}
 
-impl Nearest {
-    fn of(tried: &Tried) -> Self {
-        let drops = tried.drops.along_m.iter().zip(&tried.error_m);
-        Self(drops.map(|(&along_m, error_m)| (along_m, error_m.norm())).collect())
+impl Search {
+    fn begin(seed: usize, needle: &Needle, from: Tried) -> Self {
+        let mut search = Self {
+            seed,
+            short: None,
+            beyond: None,
+            nearest: from.clone(),
+            step_m: 0.0,
+            tries: 0,
+        };
+        search.take(needle, &from);
+        search
     }
 
-    fn take(&mut self, tried: &Tried) {
-        for (kept, new) in self.0.iter_mut().zip(Self::of(tried).0) {
-            if new.1 < kept.1 {
-                *kept = new;
-            }
+    fn take(&mut self, needle: &Needle, tried: &Tried) {
+        let (drop_m, off_m) = (tried.drops.along_m[self.seed], tried.off_m(needle, self.seed));
+        if off_m.abs() < self.nearest.off_m(needle, self.seed).abs() {
+            self.nearest = tried.clone();
+        }
+        if off_m < 0.0 && self.short.is_none_or(|(at_m, _)| drop_m > at_m) {
+            self.short = Some((drop_m, Some(off_m)));
+            self.beyond = self.beyond.filter(|(at_m, _)| *at_m > drop_m);
+        } else if off_m >= 0.0 && self.beyond.is_none_or(|(at_m, _)| drop_m < at_m) {
+            self.beyond = Some((drop_m, Some(off_m)));
+            self.short = self.short.filter(|(at_m, _)| *at_m < drop_m);
         }
     }
 
-    /// Each loose seed that is not near enough yet, so far from its best drop; nothing for a strand.
-    fn around(&self, needle: &Needle, best: &Tried, turn: usize, limits: &Limits) -> Option<Drops> {
-        let by_m = AROUND_M[turn % AROUND_M.len()];
-        let moved = |&(along_m, off_m): &(f64, f64)| along_m + if off_m > limits.enough_m { by_m } else { 0.0 };
-        let mut drops = best.drops.clone();
-        drops.along_m = self.0.iter().map(moved).collect();
-        keep_within(needle, limits, &mut drops);
-        (needle.loading == Loading::Loose).then_some(drops)
+    /// It could not be dropped there.
+    fn refuse(&mut self, drop_m: f64) {
+        if drop_m > self.nearest.drops.along_m[self.seed] {
+            self.beyond = Some((drop_m, None));
+        } else {
+            self.short = Some((drop_m, None));
+        }
     }
 
-    /// Nothing for a strand, which keeps its pitch, nor where the best way has them already or their order would change.
-    fn together(&self, needle: &Needle, best: &Tried) -> Option<Drops> {
-        let along_m: Vec<f64> = self.0.iter().map(|(along_m, _)| *along_m).collect();
-        let in_order = along_m.windows(2).all(|w| w[1] <= w[0] - APART_M);
-        let is_new = needle.loading == Loading::Loose && along_m != best.drops.along_m;
-        (is_new && in_order).then(|| Drops {
-            along_m,
-            ..best.drops.clone()
-        })
+    /// The next drop to try; `None` where it is near enough, or nothing better is to be expected.
+    fn next_m(&mut self, needle: &Needle, limits: &Limits) -> Option<f64> {
+        let is_near = self.nearest.off_m(needle, self.seed).abs() <= limits.enough_m;
+        if is_near || self.tries >= PER_SEED {
+            return None;
+        }
+        self.tries += 1;
+        let planned_m = needle.seeds[self.seed].along_m;
+        let deepest_m = (planned_m + limits.along_m).min(limits.reach_m);
+        let shallowest_m = (planned_m - limits.along_m).max(0.0);
+        match (self.short, self.beyond) {
+            (Some((from_m, short)), Some((to_m, beyond))) => {
+                let part = match (short, beyond) {
+                    // By turns, as the rest of a seed may hardly depend on its drop on one side.
+                    (Some(short), Some(beyond)) if self.tries % 2 == 1 => short / (short - beyond),
+                    _ => 0.5,
+                };
+                let part = part.clamp(KEPT_FROM_ENDS, 1.0 - KEPT_FROM_ENDS);
+                (to_m - from_m > LEAST_MOVE_M).then_some(from_m + part * (to_m - from_m))
+            }
+            (Some((from_m, off)), None) => {
+                self.step_m = off.unwrap_or(DEEPER_M).abs().max(LONGER * self.step_m);
+                (from_m < deepest_m - LEAST_MOVE_M).then_some((from_m + self.step_m).min(deepest_m))
+            }
+            (None, Some((from_m, off))) => {
+                self.step_m = off.unwrap_or(DEEPER_M).abs().max(LONGER * self.step_m);
+                (from_m > shallowest_m + LEAST_MOVE_M).then_some((from_m - self.step_m).max(shallowest_m))
+            }
+            (None, None) => None,
+        }
     }
 }
 
@@ -148,45 +198,57 @@ pub fn compensate(
     rehearser: &mut dyn Rehearser,
 ) -> Result<Compensation, RehearsalError> {
     let (start, is_as_planned) = start(needle, pace, limits, rehearser)?;
-    let mut best = start.clone();
-    let mut tried = vec![start.clone()];
+    let (mut best, mut last) = (start.clone(), start.clone());
     let mut rehearsals = 1;
-    // Shortened when a step leads out of the tissue or makes it worse.
-    let mut share = 1.0;
-    let mut nearest = Nearest::of(&start);
-    let mut is_worse = false;
-    while rehearsals < limits.rehearsals && best.worst_m() > limits.enough_m {
-        let together = nearest.together(needle, &best);
-        let drops = match together {
-            Some(drops) if is_worse => drops,
-            _ => {
-                let turn = rehearsals.checked_sub(limits.rehearsals / 2);
-                let around = turn.and_then(|turn| nearest.around(needle, &best, turn, limits));
-                match around.or_else(|| next(needle, &tried, share, limits)) {
-                    Some(drops) if tried.iter().all(|t| t.drops != drops) => drops,
-                    _ => break,
-                }
+    let mut drops = start.drops.clone();
+    aside(needle, &start, limits, &mut drops);
+    if drops != start.drops {
+        rehearsals += 1;
+        if let Ok(new) = try_it(needle, drops, pace, rehearser) {
+            if new.mean_m() < best.mean_m() {
+                best = new.clone();
             }
+            last = new;
+        }
+    }
+    let mut search = Search::begin(0, needle, last.clone());
+    let mut others_move = true;
+    let sought = match needle.loading {
+        Loading::Loose => start.error_m.len(),
+        // A strand keeps its pitch: one step for all.
+        Loading::Stranded { .. } => 1,
+    };
+    let mut next = search.next_m(needle, limits);
+    while rehearsals < limits.rehearsals && best.worst_m() > limits.enough_m {
+        let Some(drop_m) = next else {
+            if search.seed + 1 >= sought {
+                break;
+            }
+            last = search.nearest.clone();
+            search = Search::begin(search.seed + 1, needle, last.clone());
+            next = search.next_m(needle, limits);
+            continue;
         };
+        let drops = moved(needle, &search, &last, drop_m, others_move, limits);
+        let asked_m = drops.along_m[search.seed];
         rehearsals += 1;
         match try_it(needle, drops, pace, rehearser) {
             Ok(new) => {
-                let is_worse_than_last = tried.last().is_some_and(|last| new.mean_m() > last.mean_m());
-                share = if is_worse_than_last { 0.5 * share } else { 1.0 };
-                nearest.take(&new);
-                is_worse = new.mean_m() >= best.mean_m();
-                if !is_worse {
+                search.take(needle, &new);
+                if new.mean_m() < best.mean_m() {
                     best = new.clone();
                 }
-                tried.push(new);
+                last = new;
+                others_move = true;
             }
-            // A drop outside the tissue: go less far from the best that worked.
-            Err(_) if share > 0.1 => {
-                share *= 0.5;
-                tried = vec![best.clone()];
+            // It may be another seed that cannot be dropped where it was moved along to.
+            Err(_) if others_move && search.seed + 1 < sought => {
+                others_move = false;
+                continue;
             }
-            Err(_) => break,
+            Err(_) => search.refuse(asked_m),
         }
+        next = search.next_m(needle, limits);
     }
     let vectors = |t: &Tried| t.error_m.iter().map(|e| (*e).into()).collect();
     Ok(Compensation {
@@ -237,32 +299,22 @@ fn try_it(needle: &Needle, drops: Drops, pace: &Pace, rehearser: &mut dyn Rehear
     })
 }
 
-fn next(needle: &Needle, tried: &[Tried], share: f64, limits: &Limits) -> Option<Drops> {
-    let last = tried.last()?;
-    let direction = Vector3::from(needle.direction);
-    let seen = |i: usize| {
-        tried
-            .iter()
-            .map(move |t| (t.drops.along_m[i], t.error_m[i].dot(&direction)))
-    };
-    let count = last.error_m.len();
-    let steps_m: Vec<f64> = if needle.loading == Loading::Loose {
-        (0..count)
-            .map(|i| step_m(&seen(i).collect::<Vec<_>>(), share))
-            .collect()
-    } else {
-        // A strand keeps its pitch: one step for all.
-        let middle = |t: &Tried| median(t.error_m.iter().map(|e| e.dot(&direction)).collect());
-        let seen: Vec<_> = tried.iter().map(|t| (t.drops.along_m[0], middle(t))).collect();
-        vec![step_m(&seen, share); count]
-    };
-    let mut drops = last.drops.clone();
-    for (along_m, step_m) in drops.along_m.iter_mut().zip(&steps_m) {
-        *along_m += step_m;
+/// The drops of the nearest rehearsal with that of the sought seed at `drop_m`; those after it by what they were off last.
+fn moved(needle: &Needle, search: &Search, last: &Tried, drop_m: f64, others_move: bool, limits: &Limits) -> Drops {
+    let mut drops = search.nearest.drops.clone();
+    let by_m = drop_m - drops.along_m[search.seed];
+    let after = search.seed + 1..drops.along_m.len();
+    drops.along_m[search.seed] = drop_m;
+    for seed in after {
+        drops.along_m[seed] = match needle.loading {
+            Loading::Stranded { .. } => drops.along_m[seed] + by_m,
+            Loading::Loose if others_move => last.drops.along_m[seed] - last.off_m(needle, seed),
+            Loading::Loose => drops.along_m[seed],
+        };
     }
     keep_within(needle, limits, &mut drops);
-    aside(needle, last, share, limits, &mut drops);
-    Some(drops)
+    aside(needle, last, limits, &mut drops);
+    drops
 }
 
 /// What a strand is off: moved by that, its seeds are off by the least in the mean, and one that lies far away does not draw the others.
@@ -286,45 +338,18 @@ fn keep_within(needle: &Needle, limits: &Limits, drops: &mut Drops) {
     }
 }
 
-/// How much farther to drop a seed than the last time, from where it was dropped and how far along it then lay off, oldest first.
-fn step_m(seen: &[(f64, f64)], share: f64) -> f64 {
-    let Some((&(drop_m, error_m), before)) = seen.split_last() else {
-        return 0.0;
-    };
-    let recent = &seen[seen.len().saturating_sub(REMEMBERED)..];
-    let short = recent.iter().filter(|(_, error_m)| *error_m < 0.0);
-    let pairs = short.flat_map(|short| recent.iter().filter(|far| far.1 > 0.0).map(move |far| (short, far)));
-    let nearest = pairs
-        .filter(|(short, far)| far.0 - short.0 > LEAST_MOVE_M)
-        .min_by(|a, b| (a.1.0 - a.0.0).total_cmp(&(b.1.0 - b.0.0)));
-    if let Some((short, far)) = nearest {
-        let part = (short.1 / (short.1 - far.1)).clamp(KEPT_FROM_ENDS, 1.0 - KEPT_FROM_ENDS);
-        return short.0 + part * (far.0 - short.0) - drop_m;
-    }
-    let slope = before.last().map_or(1.0, |&(drop_before_m, error_before_m)| {
-        let moved_m = drop_m - drop_before_m;
-        // What the error changed by is what the seed's rest did.
-        let slope = (error_m - error_before_m) / moved_m;
-        if moved_m.abs() < LEAST_MOVE_M {
-            1.0
-        } else {
-            slope.clamp(SLOPES[0], SLOPES[1])
-        }
-    });
-    -error_m / slope * share
-}
-
 /// The needle as a whole moves across by what its seeds are off on average; for next to nothing it stays in its place, where the
 /// tissue is ready for it.
-fn aside(needle: &Needle, last: &Tried, share: f64, limits: &Limits, drops: &mut Drops) {
+fn aside(needle: &Needle, last: &Tried, limits: &Limits, drops: &mut Drops) {
     let direction = Vector3::from(needle.direction);
     let sum = last.error_m.iter().fold(Vector3::zeros(), |sum, e| sum + e);
     let mean = sum / last.error_m.len().max(1) as f64;
     let across = mean - direction * mean.dot(&direction);
     if across.norm() < 0.5 * limits.enough_m {
+        drops.entry_m = last.drops.entry_m;
         return;
     }
-    let shifted = Vector3::from(drops.entry_m) - across * share - Vector3::from(needle.entry_m);
+    let shifted = Vector3::from(last.drops.entry_m) - across - Vector3::from(needle.entry_m);
     let size = shifted.norm();
     let kept = if size > limits.across_m {
         shifted * (limits.across_m / size)

@@ -111,7 +111,11 @@ fn a_needle_whose_seeds_are_hardly_aside_stays_in_its_place() {
     known.across_m = [2e-8, 0.0, 0.0];
     let needle = needle(Loading::Loose);
     let done = run(&needle, &mut known);
-    assert!(done.rehearsals > 1 && done.drops.entry_m == needle.entry_m, "{:?}", done.drops);
+    assert!(
+        done.rehearsals > 1 && done.drops.entry_m == needle.entry_m,
+        "{:?}",
+        done.drops
+    );
 }
 
 #[test]
