@@ -151,8 +151,9 @@ one shift applies to all their seeds.
 
 - *Not as planned*: needles whose last drop, if dropped as planned, would leave the tip outside the tissue, which has moved ahead of
   it. They count only after compensation.
-- *Not possible*: needles whose tissue, dragged along by a slow tip, leaves the last seeds outside wherever they are dropped. A
-  faster tip drags less (eq. 6).
+- *Not possible*: needles that no way was found for to leave their last seeds inside the tissue.
+
+A strand is pressed: its first seed lies up to 10 mm short, where the tip has pushed the tissue ahead, and its other seeds do not. One shift cannot cure both.
 
 | gland | speed in | needles | not as planned | not possible | seeds | mean before | mean after | worst before | worst after | rehearsals | time |
 |---|---|---|---|---|---|---|---|---|---|---|---|

@@ -49,7 +49,7 @@ fn request(core: &Core, hand: &mut Insertion) -> PathBuf {
 
 #[test]
 fn a_request_a_fault_and_the_end_each_leave_a_recording_that_repeats_bit_for_bit() {
-    let mut core = Core::start();
+    let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "paper"]);
     let mut hand = Insertion::begin(&mut core, 0.006);
     // Parameters, seeds and a turn on the way, and longer than the distance of two checkpoints of the tissue.
     hand.watch(Duration::from_secs(5));
@@ -138,7 +138,16 @@ fn a_request_a_fault_and_the_end_each_leave_a_recording_that_repeats_bit_for_bit
 /// With finite elements neither loop was repeated: no recording held the needle's line, nor an elastic body.
 #[test]
 fn a_needle_on_a_line_leaves_a_recording_that_repeats_bit_for_bit() {
-    let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "fem"]);
+    repeats_on_a_line("fem");
+}
+
+#[test]
+fn so_does_one_in_chainmail() {
+    repeats_on_a_line("chainmail");
+}
+
+fn repeats_on_a_line(tissue: &str) {
+    let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", tissue]);
     let mut hand = Insertion::begin(&mut core, 0.01);
     hand.watch(Duration::from_secs(3));
     ask(&mut hand.link, &Request::DropSeed).expect("dropped");
