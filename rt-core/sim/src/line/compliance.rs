@@ -17,6 +17,8 @@ pub struct Compliance {
     pub spacing_m: f64,
     /// Length over which the tip's load is spread along the line.
     pub tip_length_m: f64,
+    /// Of the body as a whole on its foundation, m/N; 0 where something holds it.
+    pub whole_m_per_n: f64,
     /// m/N, 2m x 2m.
     pub(super) rows: Rows,
     /// The same along the two directions across, m x m each; empty where they were not solved for.
@@ -56,6 +58,7 @@ impl Compliance {
             stations: m,
             spacing_m: stations.settings.spacing_m,
             tip_length_m: stations.patch_edge_m(model.spacing_m()),
+            whole_m_per_n: model.whole_m_per_n(),
             rows,
             across: sides,
             foundation: axial.iter().map(foundation).collect(),
@@ -85,6 +88,7 @@ impl Compliance {
             stations,
             spacing_m,
             tip_length_m,
+            whole_m_per_n: 0.0,
             rows: Rows::new(2 * stations, entry),
             across: [Rows::default(), Rows::default()],
             foundation: vec![-1.0; 2 * stations],

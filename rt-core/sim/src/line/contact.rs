@@ -45,13 +45,14 @@ pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> Line
         .begin(&model.compliance.rows, &model.settings.prony, input.dt_s);
     let mut output = LineOutput::default();
     for _ in 0..MAX_PASSES {
-        touch(model, state, tip_m);
         let front = model.front(&state.tip);
+        touch(model, state, tip_m);
+        press(model, state, front.membrane);
         let gap_m = solve_vectorised(model.simd, model, state, tip_m, front.limit_n, input.dt_s, &mut output);
         output.held_by = front.membrane;
         let is_pushed = state.tip.force_n >= front.limit_n;
         if let (Some(layer), true) = (front.membrane, state.tip.force_n > 0.0) {
-            let pushed_m = tip_m - gap_m - state.tip.material_m;
+            let pushed_m = tip_m - gap_m - state.tip.material_m - state.tip.met_u_m;
             if is_pushed || pushed_m >= model.layers[layer].puncture_depth_m {
                 state.tip.opened |= 1 << layer;
                 output.punctured = output.punctured.or(Some(layer));
@@ -116,6 +117,33 @@ fn touch(model: &LineModel, state: &mut LineState, tip_m: f64) {
     }
 }
 
+/// A membrane is stiffer than what it holds: between the place of the tip and the body as a whole it is a spring, of such a
+/// stiffness that both of its limits, force and depth, are met at once (eq. 10). It is relaxed when the tip meets it.
+fn press(model: &LineModel, state: &mut LineState, membrane: Option<usize>) {
+    let whole = model.compliance.whole_m_per_n;
+    let count = state.in_contact;
+    let held_by = membrane.map_or(0, |n| n as u32 + 1);
+    if held_by != state.tip.held_by {
+        let load_n = state.shaft_n[..count].iter().sum::<f64>() + state.tip.force_n;
+        state.tip.met_u_m = if held_by == 0 { 0.0 } else { state.tip_u_m };
+        state.tip.met_dent_m = if held_by == 0 {
+            0.0
+        } else {
+            state.tip_u_m - whole * load_n
+        };
+        state.tip.held_by = held_by;
+    }
+    state.tip_offset_m = 0.0;
+    let Some(kept) = membrane.and_then(|n| model.kept_of_dent(n, state.tip_own)) else {
+        return;
+    };
+    state.tip_own = whole + kept * (state.tip_own - whole);
+    for of_tip in &mut state.tip_column[..count] {
+        *of_tip = whole + kept * (*of_tip - whole);
+    }
+    state.tip_offset_m = (1.0 - kept) * state.tip.met_dent_m;
+}
+
 /// Friction that each station can have, by how much of it the shaft is in.
 #[inline]
 fn limit_n(model: &LineModel, place_m: f64, n: usize) -> f64 {
@@ -166,6 +194,7 @@ fn solve(
         .zip(state.tip_weights)
         .map(|(n, w)| w * memory.offset_m[m + n])
         .sum();
+    let offset = offset + state.tip_offset_m;
     let mut tip_u_m = gain * (dot(tip_column, shaft_n) + state.tip_own * state.tip.force_n) + offset;
     let mut tip_n = state.tip.force_n;
     let tip_gain = gain * state.tip_own;
@@ -214,13 +243,36 @@ fn solve(
     tip_m - place_m - tip_u_m
 }
 
+/// What a membrane passes on to the body as a whole: the tip's force less what dents the tissue under it.
+fn whole_n(model: &LineModel, state: &LineState) -> f64 {
+    let c = &model.compliance;
+    let (m, count, whole) = (c.stations, state.in_contact, c.whole_m_per_n);
+    if state.tip.held_by == 0 || state.tip.force_n == 0.0 {
+        return 0.0;
+    }
+    let shaft_n = &state.shaft_n[..count];
+    let (mut own, mut of_shaft_m) = (0.0, 0.0);
+    for (n, &weight) in state.tip_range.clone().zip(&state.tip_weights) {
+        let row = c.rows.row(m + n);
+        of_shaft_m += weight * dot(&row[..count], shaft_n);
+        let tips = row[m..].iter().skip(state.tip_range.start).zip(&state.tip_weights);
+        own += weight * tips.take(state.tip_range.len()).map(|(r, w)| r * w).sum::<f64>();
+    }
+    if own <= whole {
+        return 0.0;
+    }
+    let dent_m = state.tip_u_m - whole * state.tip.force_n - of_shaft_m;
+    state.tip.force_n - (dent_m / (own - whole)).max(0.0)
+}
+
 fn finish(model: &LineModel, state: &mut LineState, output: &mut LineOutput) {
     let m = model.compliance.stations;
     let count = state.in_contact;
+    state.whole_n = whole_n(model, state);
     state.loads_n.fill(0.0);
     state.loads_n[..count].copy_from_slice(&state.shaft_n[..count]);
     for (n, weight) in state.tip_range.clone().zip(state.tip_weights) {
-        state.loads_n[m + n] = weight * state.tip.force_n;
+        state.loads_n[m + n] = weight * (state.tip.force_n - state.whole_n);
     }
     output.shaft_n = state.shaft_n[..count].iter().sum();
     output.tip_n = state.tip.force_n;

@@ -19,6 +19,12 @@ pub struct TipState {
     pub track_m: f64,
     /// One bit for each layer whose membrane has given way.
     pub opened: u32,
+    /// Layer whose membrane holds it, from 1; 0: none does.
+    pub held_by: u32,
+    /// How far the tissue there was displaced when the tip met that membrane.
+    pub met_u_m: f64,
+    /// The same, less what the body as a whole was.
+    pub met_dent_m: f64,
 }
 
 /// Forces of one tick, N.
@@ -65,6 +71,10 @@ pub struct LineState {
     /// How each station in contact moves with the tip's force, and how the tip does.
     pub(super) tip_column: Vec<f64>,
     pub(super) tip_own: f64,
+    /// What the dent that a membrane was met with adds to the tip's displacement, m.
+    pub(super) tip_offset_m: f64,
+    /// How much of the tip's force goes to the body as a whole, by the membrane that holds it, N.
+    pub(super) whole_n: f64,
     pub(super) memory: Memory,
     pub(super) loads_n: Vec<f64>,
     pub(super) last: LineOutput,
@@ -93,6 +103,8 @@ impl LineState {
             tip_weights: [0.0; 64],
             tip_column: each(),
             tip_own: 0.0,
+            tip_offset_m: 0.0,
+            whole_n: 0.0,
             memory: Memory::new(2 * stations),
             loads_n: vec![value; 2 * stations],
             last: LineOutput::default(),
@@ -136,6 +148,11 @@ impl LineState {
         at_once + self.memory.stored_j(rows, &model.settings.prony)
     }
 
+    /// The part of the tip's force that moves the body as a whole and is not among the loads, N.
+    pub fn whole_n(&self) -> f64 {
+        self.whole_n
+    }
+
     /// Displacement of the material at the tip along the line, m.
     pub fn tip_displacement_m(&self) -> f64 {
         self.tip_u_m
@@ -172,6 +189,7 @@ impl LineState {
         self.tip_range = 0..0;
         self.tip_weights.fill(0.0);
         self.tip_own = 0.0;
+        (self.tip_offset_m, self.whole_n) = (0.0, 0.0);
         self.memory.reset();
         self.last = LineOutput::default();
     }

@@ -4,6 +4,8 @@ use super::model::{LineLayer, LineModel};
 use super::rows::dot;
 use super::state::{LineState, TipState};
 
+/// No membrane leaves less of a dent.
+const LEAST_KEPT: f64 = 0.02;
 /// Places closer than this are the same.
 const SAME_M: f64 = 1e-9;
 /// The tip's place is found to this.
@@ -57,6 +59,15 @@ impl LineModel {
             to_m: next_m,
             membrane: None,
         }
+    }
+
+    /// What a membrane leaves of the dent that a force makes under it, from 0 to 1; `None` where it gives way by force alone.
+    /// `own` is how far the tip moves the tissue without it, m/N.
+    pub(super) fn kept_of_dent(&self, layer: usize, own: f64) -> Option<f64> {
+        let layer = self.layers.get(layer)?;
+        let wanted = layer.puncture_depth_m / layer.puncture_force_n;
+        let whole = self.compliance.whole_m_per_n;
+        (wanted.is_finite() && own > whole).then(|| ((wanted - whole) / (own - whole)).clamp(LEAST_KEPT, 1.0))
     }
 
     /// First station and weights of the tip's load where it is; they add up to 1, or to 0 outside.

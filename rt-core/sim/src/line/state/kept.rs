@@ -41,6 +41,8 @@ impl LineState {
             tip_weights,
             tip_column,
             tip_own,
+            tip_offset_m,
+            whole_n,
             memory,
             loads_n,
             last,
@@ -55,6 +57,8 @@ impl LineState {
         self.tip_weights = *tip_weights;
         self.tip_column.clone_from(tip_column);
         self.tip_own = *tip_own;
+        self.tip_offset_m = *tip_offset_m;
+        self.whole_n = *whole_n;
         self.memory.copy_from(memory);
         self.loads_n.clone_from(loads_n);
         self.last = *last;

@@ -5,6 +5,20 @@ use super::solve::{BatchState, finest};
 use crate::tissue::ElementField;
 use crate::tissue::fem::real::Real;
 
+impl<T: Real> BatchModel<T> {
+    /// How far the body moves as a whole for each newton, on the springs to rest: m/N; 0 where something of it is fixed.
+    pub fn whole_m_per_n(&self) -> f64 {
+        let level = finest(self);
+        let springs_n_per_m: f64 = level.springs.iter().map(|spring| spring.to_f64()).sum();
+        let is_held = level.inverse_diagonal.contains(&T::ZERO);
+        if is_held || springs_n_per_m <= 0.0 {
+            0.0
+        } else {
+            1.0 / springs_n_per_m
+        }
+    }
+}
+
 impl<T: Real> BatchState<T> {
     /// Sum of weight times displacement of answer `load`, in metres.
     pub fn sample(&self, load: usize, weights: &[NodeWeight]) -> f64 {
