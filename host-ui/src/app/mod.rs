@@ -352,3 +352,6 @@ impl eframe::App for App {
 fn refusal(text: String) -> Note {
     Note { refused: true, text }
 }
+
+#[cfg(test)]
+mod tests;

@@ -44,6 +44,11 @@ impl WorkflowState {
         self.opened.or(self.was) == Some(step)
     }
 
+    /// Opens a step that is not the present one.
+    pub fn open_by_hand(&mut self, step: Progress) {
+        self.opened = Some(step);
+    }
+
     /// The step that is open: the present one, until another is opened by hand and the procedure goes on.
     fn open(&mut self, now: Progress) -> Progress {
         if self.was != Some(now) {
@@ -63,7 +68,7 @@ pub fn workflow_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState) 
         if step == open {
             step_ui(ui, (step, now), shown, state, &mut actions);
         } else if head_ui(ui, (step, now), shown).clicked() {
-            state.opened = Some(step);
+            state.open_by_hand(step);
         }
     }
     if let Some(note) = &shown.note {

@@ -1,0 +1,188 @@
+//! Finds text that is clipped or lies over other text, from what was painted, whatever the window shows.
+
+use super::fixture::Drawn;
+use egui::accesskit::{NodeId, Role};
+use egui::epaint::ClippedShape;
+use egui::{LayerId, Pos2, Rect, Shape};
+use std::collections::HashMap;
+
+/// Text may stick out by this much, in points.
+const SLACK: f32 = 1.0;
+/// Neighbours may share this much, in points.
+const SHARED: f32 = 1.5;
+/// Turns of the wheel, in points: down, and up again past the start.
+const TURNS: [f32; 3] = [-40.0, 80.0, -40.0];
+
+/// Text that was painted, or a widget with a name, which may have been clipped away whole.
+#[derive(Clone, Debug)]
+struct Piece {
+    name: String,
+    rect: Rect,
+    clip: Rect,
+    layer: LayerId,
+    is_painted: bool,
+}
+
+impl Piece {
+    fn leaves_sideways(&self) -> bool {
+        self.rect.left() < self.clip.left() - SLACK || self.rect.right() > self.clip.right() + SLACK
+    }
+
+    fn leaves_upwards_or_downwards(&self) -> bool {
+        self.rect.top() < self.clip.top() - SLACK || self.rect.bottom() > self.clip.bottom() + SLACK
+    }
+
+    fn seen(&self) -> Rect {
+        self.rect.intersect(self.clip)
+    }
+}
+
+/// What one frame painted.
+pub struct Painted {
+    pieces: Vec<Piece>,
+    screen: Rect,
+}
+
+impl Painted {
+    /// Within the frame, once everything is drawn.
+    pub fn of(ctx: &egui::Context) -> Self {
+        let mut layers: Vec<LayerId> = ctx.memory(|m| m.layer_ids().collect());
+        layers.push(LayerId::background());
+        layers.sort_by_key(|layer| (layer.order, layer.id.value()));
+        layers.dedup();
+        let mut pieces = Vec::new();
+        ctx.graphics(|graphics| {
+            for layer in layers {
+                for ClippedShape { clip_rect, shape, .. } in graphics.get(layer).into_iter().flat_map(|l| l.all_entries()) {
+                    texts(shape, *clip_rect, layer, &mut pieces);
+                }
+            }
+        });
+        Self {
+            pieces,
+            screen: ctx.content_rect(),
+        }
+    }
+
+    /// Names, and which of them are fields for text, are known after the frame.
+    pub fn name_widgets(&mut self, ctx: &egui::Context, nodes: &[(NodeId, egui::accesskit::Node)]) {
+        let names: HashMap<u64, &egui::accesskit::Node> = nodes.iter().map(|(id, node)| (id.0, node)).collect();
+        let mut fields = Vec::new();
+        ctx.viewport(|viewport| {
+            for (layer, widgets) in viewport.this_pass.widgets.layers() {
+                for widget in widgets {
+                    let Some(node) = names.get(&widget.id.value()) else {
+                        continue;
+                    };
+                    if node.role() == Role::TextInput {
+                        fields.push(widget.rect);
+                    }
+                    let Some(name) = node.label().or(node.value()).filter(|name| !name.is_empty()) else {
+                        continue;
+                    };
+                    self.pieces.push(Piece {
+                        name: name.to_owned(),
+                        rect: widget.rect,
+                        clip: widget.interact_rect,
+                        layer: *layer,
+                        is_painted: false,
+                    });
+                }
+            }
+        });
+        // A field shows a part of what is typed, which the keys go through.
+        self.pieces
+            .retain(|piece| !piece.is_painted || !fields.iter().any(|field| field.contains(piece.seen().center())));
+    }
+
+    /// Where the widget of this name is.
+    pub fn place(&self, name: &str) -> Option<Rect> {
+        let named = self.pieces.iter().find(|p| !p.is_painted && p.name == name);
+        named.map(|piece| piece.rect)
+    }
+
+    fn place_of(&self, piece: &Piece) -> Option<f32> {
+        let like = |other: &&Piece| {
+            other.is_painted == piece.is_painted
+                && other.name == piece.name
+                && (other.rect.left() - piece.rect.left()).abs() < 0.5
+        };
+        self.pieces.iter().find(like).map(|found| found.rect.top())
+    }
+}
+
+fn texts(shape: &Shape, clip: Rect, layer: LayerId, pieces: &mut Vec<Piece>) {
+    match shape {
+        Shape::Vec(shapes) => shapes.iter().for_each(|shape| texts(shape, clip, layer, pieces)),
+        Shape::Text(text) if text.angle == 0.0 && !text.galley.mesh_bounds.is_negative() => pieces.push(Piece {
+            name: text.galley.text().to_owned(),
+            rect: text.galley.mesh_bounds.translate(text.pos.to_vec2()),
+            clip,
+            layer,
+            is_painted: true,
+        }),
+        _ => {}
+    }
+}
+
+/// Every text that is cut off where nothing scrolls to it, and every pair in one layer that overlaps.
+pub fn misplaced(drawn: &mut Drawn) -> Vec<String> {
+    let painted = drawn.frame();
+    let mut problems = overlaps(&painted);
+    let (sideways, rest): (Vec<&Piece>, Vec<&Piece>) = painted.pieces.iter().partition(|p| p.leaves_sideways());
+    let cut = |piece: &Piece| format!("{:?} at {} is cut off by {}", piece.name, piece.rect, piece.clip);
+    problems.extend(sideways.into_iter().map(cut));
+    let candidates: Vec<&Piece> = rest.into_iter().filter(|p| p.leaves_upwards_or_downwards()).collect();
+    problems.extend(out_of_reach(drawn, &painted, candidates).into_iter().map(cut));
+    problems.sort();
+    problems.dedup();
+    problems
+}
+
+fn overlaps(painted: &Painted) -> Vec<String> {
+    let seen: Vec<&Piece> = painted
+        .pieces
+        .iter()
+        .filter(|p| p.is_painted && p.seen().is_positive())
+        .collect();
+    let mut problems = Vec::new();
+    for (n, one) in seen.iter().enumerate() {
+        for other in seen[n + 1..].iter().filter(|other| other.layer == one.layer) {
+            let common = one.seen().intersect(other.seen());
+            if common.width() > SHARED && common.height() > SHARED {
+                let (a, b) = (one.seen(), other.seen());
+                problems.push(format!("{:?} at {a} lies over {:?} at {b}", one.name, other.name));
+            }
+        }
+    }
+    problems
+}
+
+/// Those of the pieces that no turn of the wheel moves.
+fn out_of_reach<'a>(drawn: &mut Drawn, before: &Painted, mut left: Vec<&'a Piece>) -> Vec<&'a Piece> {
+    let mut stuck = Vec::new();
+    while let Some(piece) = left.pop() {
+        let seen = piece.seen();
+        let place = match seen.is_positive() {
+            true => seen.center(),
+            // Nothing of it is seen: over what is in the same column.
+            false => Pos2::new(piece.rect.center().x, before.screen.center().y),
+        };
+        let mut is_moved = false;
+        for turn in TURNS {
+            let after = drawn.scrolled(place, turn);
+            let has_moved = |piece: &Piece| {
+                let (was, is) = (before.place_of(piece), after.place_of(piece));
+                was.zip(is).is_none_or(|(was, is)| (was - is).abs() > 1.0)
+            };
+            if has_moved(piece) {
+                is_moved = true;
+                left.retain(|other| !has_moved(other));
+            }
+        }
+        if !is_moved {
+            stuck.push(piece);
+        }
+    }
+    stuck
+}
