@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Under which the settings are kept.
 const KEY: &str = "stylet.settings";
 /// Smallest and largest scale of words and widgets.
-pub const SCALES: [f32; 2] = [0.8, 1.6];
+pub const SCALES: [f32; 2] = [0.8, 2.0];
 /// Air kerma strength of a seed that can be set (U).
 pub const STRENGTHS_U: [f64; 2] = [0.05, 5.0];
 const LONGEST_FILE_NAME: usize = 4096;

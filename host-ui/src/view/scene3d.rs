@@ -211,9 +211,9 @@ impl Scene3d {
                 legend.rows(self.look, alone.map(|d| &**d));
             }
             None => {
-                let text = "No 3D view: the window has no wgpu device.\nInstall a Vulkan driver (mesa-vulkan-drivers)\nand start again; everything else works.";
-                let font = FontId::proportional(13.5);
-                painter.text(rect.center(), Align2::CENTER_CENTER, text, font, tokens.weak);
+                let text = "No 3D view: the window has no wgpu device. Install a Vulkan driver (mesa-vulkan-drivers) and start again; everything else \
+                            works.";
+                super::slice::words(&painter, rect, text, tokens.weak);
             }
         }
     }

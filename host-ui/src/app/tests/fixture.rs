@@ -54,11 +54,11 @@ impl Drawn {
     }
 
     fn pass(&mut self, events: Vec<Event>) -> Painted {
-        self.time += 0.1;
+        self.time += 0.5;
         let mut input = RawInput {
             screen_rect: Some(Rect::from_min_size(Pos2::ZERO, self.size)),
             time: Some(self.time),
-            predicted_dt: 0.1,
+            predicted_dt: 0.5,
             events,
             ..RawInput::default()
         };
@@ -83,10 +83,15 @@ impl Drawn {
 
     /// As it looks once it has settled.
     pub fn frame(&mut self) -> Painted {
-        for _ in 0..2 {
-            self.pass(vec![Event::PointerGone]);
+        let mut before = self.pass(vec![Event::PointerGone]);
+        for _ in 0..10 {
+            let after = self.pass(Vec::new());
+            if after.is_as(&before) {
+                return after;
+            }
+            before = after;
         }
-        self.pass(Vec::new())
+        before
     }
 
     /// After the wheel was turned with the pointer here.
@@ -99,15 +104,15 @@ impl Drawn {
             phase: egui::TouchPhase::Move,
             source: egui::MouseWheelSource::Wheel,
         }]);
-        for _ in 0..4 {
-            self.pass(Vec::new());
-        }
+        self.pass(Vec::new());
         self.pass(Vec::new())
     }
 
     /// Where a widget of this name is.
     pub fn place(&mut self, name: &str) -> Rect {
-        self.frame().place(name).unwrap_or_else(|| panic!("there is no {name:?}"))
+        self.frame()
+            .place(name)
+            .unwrap_or_else(|| panic!("there is no {name:?}"))
     }
 }
 
@@ -246,6 +251,8 @@ pub fn dose(seeds: usize) -> Arc<DoseResult> {
         prescription_gy: 145.0,
         shells: Vec::new(),
         figures,
-        target_dvh: (0..100).map(|n| [f64::from(n) * 0.03, 1.0 - f64::from(n) * 0.01]).collect(),
+        target_dvh: (0..100)
+            .map(|n| [f64::from(n) * 0.03, 1.0 - f64::from(n) * 0.01])
+            .collect(),
     })
 }

@@ -14,7 +14,7 @@ fn places(shown: Shown, names: &[&str]) -> Vec<Rect> {
 /// Everything went down by 34 points as a banner came: the second click fell on something else.
 #[test]
 fn a_banner_moves_nothing() {
-    let names = ["Place needle", "Engage force", "Follow tip", "Membrane tension", "Parameters"];
+    let names = ["Insert", "Engage force", "Follow tip", "Membrane tension", "Parameters"];
     let without = places(one_needle(0.0, 0), &names);
     let mut shown = one_needle(0.0, 0);
     if let Some(state) = &mut shown.state {
@@ -27,7 +27,7 @@ fn a_banner_moves_nothing() {
 /// The buttons for the force stood under the last answer.
 #[test]
 fn a_note_moves_nothing() {
-    let names = ["Built in", "Engage force", "Disengage", "Reset"];
+    let names = ["Plan five seeds", "Engage force", "Disengage", "Reset"];
     let without = places(live(), &names);
     let mut shown = live();
     let text = "Debrief saved as /home/lab/out/debrief-2026-11-23T02-00-00, with a page and figures ".repeat(4);

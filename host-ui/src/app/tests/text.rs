@@ -11,7 +11,7 @@ const SLACK: f32 = 1.0;
 /// Neighbours may share this much, in points.
 const SHARED: f32 = 1.5;
 /// Turns of the wheel, in points: down, and up again past the start.
-const TURNS: [f32; 3] = [-40.0, 80.0, -40.0];
+const TURNS: [f32; 2] = [-40.0, 80.0];
 
 /// Text that was painted, or a widget with a name, which may have been clipped away whole.
 #[derive(Clone, Debug)]
@@ -53,7 +53,9 @@ impl Painted {
         let mut pieces = Vec::new();
         ctx.graphics(|graphics| {
             for layer in layers {
-                for ClippedShape { clip_rect, shape, .. } in graphics.get(layer).into_iter().flat_map(|l| l.all_entries()) {
+                for ClippedShape { clip_rect, shape, .. } in
+                    graphics.get(layer).into_iter().flat_map(|l| l.all_entries())
+                {
                     texts(shape, *clip_rect, layer, &mut pieces);
                 }
             }
@@ -99,6 +101,12 @@ impl Painted {
     pub fn place(&self, name: &str) -> Option<Rect> {
         let named = self.pieces.iter().find(|p| !p.is_painted && p.name == name);
         named.map(|piece| piece.rect)
+    }
+
+    /// Nothing is elsewhere.
+    pub fn is_as(&self, other: &Self) -> bool {
+        let pairs = self.pieces.iter().zip(&other.pieces);
+        self.pieces.len() == other.pieces.len() && pairs.into_iter().all(|(a, b)| a.rect == b.rect && a.clip == b.clip)
     }
 
     fn place_of(&self, piece: &Piece) -> Option<f32> {
@@ -160,29 +168,40 @@ fn overlaps(painted: &Painted) -> Vec<String> {
 
 /// Those of the pieces that no turn of the wheel moves.
 fn out_of_reach<'a>(drawn: &mut Drawn, before: &Painted, mut left: Vec<&'a Piece>) -> Vec<&'a Piece> {
-    let mut stuck = Vec::new();
-    while let Some(piece) = left.pop() {
+    let mut tried: Vec<Pos2> = Vec::new();
+    let pieces = left.clone();
+    for piece in pieces {
         let seen = piece.seen();
-        let place = match seen.is_positive() {
-            true => seen.center(),
+        let place = match (seen.is_positive(), piece.clip.is_positive()) {
+            (true, _) => seen.center(),
+            (false, true) => piece.clip.center(),
             // Nothing of it is seen: over what is in the same column.
-            false => Pos2::new(piece.rect.center().x, before.screen.center().y),
+            (false, false) => Pos2::new(piece.rect.center().x, before.screen.center().y),
         };
-        let mut is_moved = false;
+        // Once in each column and stretch of it.
+        let near = |other: &Pos2| (other.x - place.x).abs() < 150.0 && (other.y - place.y).abs() < 60.0;
+        if !left.iter().any(|other| std::ptr::eq(*other, piece)) || tried.iter().any(near) {
+            continue;
+        }
+        tried.push(place);
+        // Under a window that was opened over it; by itself it is tried in another state.
+        if drawn.ctx.layer_id_at(place).is_some_and(|layer| layer != piece.layer) {
+            left.retain(|other| other.layer != piece.layer || !near_clip(other, piece));
+            continue;
+        }
         for turn in TURNS {
             let after = drawn.scrolled(place, turn);
             let has_moved = |piece: &Piece| {
                 let (was, is) = (before.place_of(piece), after.place_of(piece));
                 was.zip(is).is_none_or(|(was, is)| (was - is).abs() > 1.0)
             };
-            if has_moved(piece) {
-                is_moved = true;
-                left.retain(|other| !has_moved(other));
-            }
-        }
-        if !is_moved {
-            stuck.push(piece);
+            left.retain(|other| !has_moved(other));
         }
     }
-    stuck
+    left
+}
+
+fn near_clip(one: &Piece, other: &Piece) -> bool {
+    let across = one.clip.x_range().intersection(other.clip.x_range());
+    across.span() > 0.0
 }

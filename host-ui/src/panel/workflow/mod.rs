@@ -9,7 +9,8 @@ mod scene;
 use crate::action::Action;
 use crate::shown::{SeedError, Shown, own_errors};
 use crate::theme;
-use egui::{Align, Align2, Button, FontId, Layout, RichText, Sense, Stroke, Vec2};
+use egui::text::LayoutJob;
+use egui::{Align, Align2, Button, FontId, Layout, RichText, Sense, Stroke, TextStyle, Vec2};
 pub use plan::{PlanState, editor_ui};
 pub use progress::{Progress, Undo, is_at_next_seed, is_needle_done, missing, next_action, progress, undo_action};
 use stylet_base::format;
@@ -18,6 +19,9 @@ use stylet_shm_schema::Request;
 
 /// What the script does of a plan of one needle, by the numbers in the panel.
 pub const SCRIPTED_STEPS: &str = "steps 2 to 6";
+/// The button that runs the script, and with the line under it.
+const RUN_BUTTON: f32 = 28.0;
+const RUN_HEIGHT: f32 = RUN_BUTTON + theme::GAP + 24.0;
 /// Waiting for longer is shown.
 const SHOW_WAITING_S: f64 = 2.0;
 
@@ -62,8 +66,6 @@ pub fn workflow_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState) 
     let mut actions = Vec::new();
     let now = progress(shown);
     let open = state.open(now);
-    ui.heading("Procedure");
-    run_ui(ui, shown, &mut actions);
     for step in Progress::ALL {
         if step == open {
             step_ui(ui, (step, now), shown, state, &mut actions);
@@ -71,58 +73,96 @@ pub fn workflow_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState) 
             state.open_by_hand(step);
         }
     }
-    if let Some(note) = &shown.note {
-        let tokens = theme::of(ui);
-        let color = if note.refused { tokens.bad } else { tokens.weak };
-        ui.label(RichText::new(&note.text).color(color));
-    }
-    ui.separator();
-    force_ui(ui, shown, &mut actions);
     actions
 }
 
-fn run_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
-    let wide = egui::vec2(ui.available_width(), 28.0);
-    if shown.running {
-        let step = match shown.run_step {
-            Some(Step::Plan) => "planning",
-            Some(Step::Place) => "placing the needle",
-            Some(Step::Insert) => "inserting",
-            Some(Step::Drop) => "dropping the seeds",
-            Some(Step::Retract) => "retracting",
-            Some(Step::Settle) => "waiting for the tissue to rest",
-            Some(Step::Done) | None => "finishing",
-        };
-        ui.horizontal(|ui| {
-            ui.spinner();
-            ui.label(match shown.run_needle {
-                Some((needle, count)) => format!("Needle {} of {count}", needle + 1),
-                None => "Running".to_owned(),
-            });
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                if ui.button("Stop").clicked() {
-                    actions.push(Action::StopRun);
-                }
-            });
+/// Lines of the last answer, and what its buttons take.
+const NOTE_LINES: [usize; 2] = [1, 3];
+const SHORT: f32 = 420.0;
+
+fn note_lines(ui: &egui::Ui) -> usize {
+    NOTE_LINES[usize::from(ui.ctx().content_rect().height() >= SHORT)]
+}
+
+/// Room of [`foot_ui`], whatever it shows.
+pub fn foot_height(ui: &egui::Ui) -> f32 {
+    let line = ui.text_style_height(&TextStyle::Small) + 1.0;
+    ui.spacing().interact_size.y + 2.0 * theme::GAP + note_lines(ui) as f32 * line
+}
+
+/// The force, and the last answer that the operator should read, under the steps.
+pub fn foot_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
+    ui.add_space(theme::GAP);
+    force_ui(ui, shown, actions);
+    let Some(note) = &shown.note else { return };
+    let tokens = theme::of(ui);
+    let color = if note.refused { tokens.bad } else { tokens.weak };
+    let font = TextStyle::Small.resolve(ui.style());
+    let mut job = LayoutJob::simple(note.text.clone(), font, color, ui.available_width());
+    (job.wrap.max_rows, job.wrap.break_anywhere) = (note_lines(ui), false);
+    // Cut off with three dots it shows the whole on hover.
+    ui.add(egui::Label::new(job).wrap());
+}
+
+/// Always as high, running or not.
+pub fn run_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
+    ui.heading("Procedure");
+    let size = egui::vec2(ui.available_width(), RUN_HEIGHT);
+    ui.allocate_ui(size, |ui| {
+        ui.set_min_size(size);
+        match shown.running {
+            true => running_ui(ui, shown, actions),
+            false => begin_ui(ui, shown, actions),
+        }
+    });
+}
+
+fn running_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
+    let step = match shown.run_step {
+        Some(Step::Plan) => "planning",
+        Some(Step::Place) => "placing the needle",
+        Some(Step::Insert) => "inserting",
+        Some(Step::Drop) => "dropping the seeds",
+        Some(Step::Retract) => "retracting",
+        Some(Step::Settle) => "waiting for the tissue to rest",
+        Some(Step::Done) | None => "finishing",
+    };
+    ui.horizontal(|ui| {
+        ui.set_min_height(RUN_BUTTON);
+        ui.spinner();
+        ui.label(match shown.run_needle {
+            Some((needle, count)) => format!("Needle {} of {count}", needle + 1),
+            None => "Running".to_owned(),
         });
-        // On lines of its own: as long as it is, it may not make the panel wider.
-        ui.label(theme::weak(match waits(shown) {
-            Some(waits) => format!("{step}: {waits}"),
-            None => step.to_owned(),
-        }));
-        return;
-    }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            if ui.button("Stop").clicked() {
+                actions.push(Action::StopRun);
+            }
+        });
+    });
+    // On a line of its own: as long as it is, it may not make the panel wider.
+    let text = match waits(shown) {
+        Some(waits) => format!("{step}: {waits}"),
+        None => step.to_owned(),
+    };
+    ui.add(egui::Label::new(theme::weak(text)).truncate());
+}
+
+fn begin_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
+    let wide = egui::vec2(ui.available_width(), RUN_BUTTON);
     let blocked = missing(shown, Progress::Plan);
     let response = ui.add_enabled(blocked.is_none(), Button::new(run_name(shown)).min_size(wide));
     if hinted(response, blocked).on_hover_text(run_help(shown)).clicked() {
         actions.push(Action::RunAll);
     }
-    if shown.continues_at.is_some() {
-        let anew = ui.add_enabled(shown.is_live(), Button::new("Start over"));
-        let help = "Takes all seeds out of the tissue and begins at the first needle";
-        if anew.on_hover_text(help).clicked() {
-            actions.push(Action::StartOver);
-        }
+    if shown.continues_at.is_none() {
+        ui.add(egui::Label::new(theme::small(run_help(shown))).truncate());
+        return;
+    }
+    let anew = ui.add_enabled(shown.is_live(), Button::new("Start over"));
+    let help = "Takes all seeds out of the tissue and begins at the first needle";
+    if anew.on_hover_text(help).clicked() {
+        actions.push(Action::StartOver);
     }
 }
 
