@@ -95,11 +95,11 @@ impl Drawn {
     }
 
     /// After the wheel was turned with the pointer here.
-    pub fn scrolled(&mut self, place: Pos2, points: f32) -> Painted {
+    pub fn scrolled(&mut self, place: Pos2, points: Vec2) -> Painted {
         self.pass(vec![Event::PointerMoved(place)]);
         self.pass(vec![Event::MouseWheel {
             unit: MouseWheelUnit::Point,
-            delta: Vec2::new(0.0, points),
+            delta: points,
             modifiers: egui::Modifiers::NONE,
             phase: egui::TouchPhase::Move,
             source: egui::MouseWheelSource::Wheel,

@@ -3,15 +3,15 @@
 use super::fixture::Drawn;
 use egui::accesskit::{NodeId, Role};
 use egui::epaint::ClippedShape;
-use egui::{LayerId, Pos2, Rect, Shape};
+use egui::{LayerId, Pos2, Rect, Shape, Vec2};
 use std::collections::HashMap;
 
 /// Text may stick out by this much, in points.
 const SLACK: f32 = 1.0;
 /// Neighbours may share this much, in points.
 const SHARED: f32 = 1.5;
-/// Turns of the wheel, in points: down, and up again past the start.
-const TURNS: [f32; 2] = [-40.0, 80.0];
+/// Turns of the wheel, in points: to the end of what is under the pointer, on with what is around it, and back.
+const TURNS: [f32; 3] = [-400.0, -400.0, 900.0];
 
 /// Text that was painted, or a widget with a name, which may have been clipped away whole.
 #[derive(Clone, Debug)]
@@ -40,7 +40,6 @@ impl Piece {
 /// What one frame painted.
 pub struct Painted {
     pieces: Vec<Piece>,
-    screen: Rect,
 }
 
 impl Painted {
@@ -60,10 +59,7 @@ impl Painted {
                 }
             }
         });
-        Self {
-            pieces,
-            screen: ctx.content_rect(),
-        }
+        Self { pieces }
     }
 
     /// Names, and which of them are fields for text, are known after the frame.
@@ -109,13 +105,17 @@ impl Painted {
         self.pieces.len() == other.pieces.len() && pairs.into_iter().all(|(a, b)| a.rect == b.rect && a.clip == b.clip)
     }
 
-    fn place_of(&self, piece: &Piece) -> Option<f32> {
-        let like = |other: &&Piece| {
-            other.is_painted == piece.is_painted
-                && other.name == piece.name
-                && (other.rect.left() - piece.rect.left()).abs() < 0.5
-        };
-        self.pieces.iter().find(like).map(|found| found.rect.top())
+    /// Of the piece along the way of the wheel; the other way it stays where it is.
+    fn place_of(&self, piece: &Piece, sideways: bool) -> Option<f32> {
+        let along = |at: Pos2| if sideways { [at.x, at.y] } else { [at.y, at.x] };
+        let [_, was_across] = along(piece.rect.min);
+        let mut like = self
+            .pieces
+            .iter()
+            .filter(|other| other.is_painted == piece.is_painted && other.name == piece.name)
+            .map(|other| along(other.rect.min));
+        like.find(|[_, across]| (across - was_across).abs() < 0.5)
+            .map(|[at, _]| at)
     }
 }
 
@@ -139,9 +139,9 @@ pub fn misplaced(drawn: &mut Drawn) -> Vec<String> {
     let mut problems = overlaps(&painted);
     let (sideways, rest): (Vec<&Piece>, Vec<&Piece>) = painted.pieces.iter().partition(|p| p.leaves_sideways());
     let cut = |piece: &Piece| format!("{:?} at {} is cut off by {}", piece.name, piece.rect, piece.clip);
-    problems.extend(sideways.into_iter().map(cut));
+    problems.extend(out_of_reach(drawn, &painted, sideways, true).into_iter().map(cut));
     let candidates: Vec<&Piece> = rest.into_iter().filter(|p| p.leaves_upwards_or_downwards()).collect();
-    problems.extend(out_of_reach(drawn, &painted, candidates).into_iter().map(cut));
+    problems.extend(out_of_reach(drawn, &painted, candidates, false).into_iter().map(cut));
     problems.sort();
     problems.dedup();
     problems
@@ -167,16 +167,17 @@ fn overlaps(painted: &Painted) -> Vec<String> {
 }
 
 /// Those of the pieces that no turn of the wheel moves.
-fn out_of_reach<'a>(drawn: &mut Drawn, before: &Painted, mut left: Vec<&'a Piece>) -> Vec<&'a Piece> {
+fn out_of_reach<'a>(drawn: &mut Drawn, before: &Painted, mut left: Vec<&'a Piece>, sideways: bool) -> Vec<&'a Piece> {
     let mut tried: Vec<Pos2> = Vec::new();
     let pieces = left.clone();
     for piece in pieces {
         let seen = piece.seen();
-        let place = match (seen.is_positive(), piece.clip.is_positive()) {
-            (true, _) => seen.center(),
-            (false, true) => piece.clip.center(),
-            // Nothing of it is seen: over what is in the same column.
-            (false, false) => Pos2::new(piece.rect.center().x, before.screen.center().y),
+        let (rect, clip) = (piece.rect, piece.clip);
+        let place = match seen.is_positive() {
+            true => seen.center(),
+            // Nothing of it is seen: just within the edge that it is beyond.
+            false if rect.top() >= clip.bottom() => Pos2::new(rect.center().x, clip.bottom() - 4.0),
+            false => Pos2::new(rect.center().x, clip.top() + 4.0),
         };
         // Once in each column and stretch of it.
         let near = |other: &Pos2| (other.x - place.x).abs() < 150.0 && (other.y - place.y).abs() < 60.0;
@@ -190,9 +191,17 @@ fn out_of_reach<'a>(drawn: &mut Drawn, before: &Painted, mut left: Vec<&'a Piece
             continue;
         }
         for turn in TURNS {
-            let after = drawn.scrolled(place, turn);
+            let after = drawn.scrolled(
+                place,
+                if sideways {
+                    Vec2::new(turn, 0.0)
+                } else {
+                    Vec2::new(0.0, turn)
+                },
+            );
             let has_moved = |piece: &Piece| {
-                let (was, is) = (before.place_of(piece), after.place_of(piece));
+                let (was, is) = (before.place_of(piece, sideways), after.place_of(piece, sideways));
+                // What scrolled out of the picture is not painted any more.
                 was.zip(is).is_none_or(|(was, is)| (was - is).abs() > 1.0)
             };
             left.retain(|other| !has_moved(other));

@@ -31,7 +31,7 @@ use stylet_shm_schema::{SceneId, Text, role};
 const MARGIN: f64 = 1.45;
 const ZOOMS: [f64; 2] = [0.2, 12.0];
 /// A lower picture does not say why it is empty.
-const ROOM_FOR_REASON: f32 = 170.0;
+pub const ROOM_FOR_REASON: f32 = 170.0;
 /// The tip is taken hold of within this many points.
 const HANDLE: f32 = 16.0;
 const M_PER_SCROLLED_POINT: f64 = 0.05e-3;
