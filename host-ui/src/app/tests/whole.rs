@@ -3,6 +3,7 @@
 use super::fixture::{Drawn, LONG_PATH, dose, live, many_needles, one_needle};
 use super::text::misplaced;
 use crate::app::App;
+use crate::app::layout::Narrow;
 use crate::panel::workflow::Progress;
 use crate::shown::{LoadState, Note, Shown};
 use stylet_host::link::LinkStatus;
@@ -81,6 +82,14 @@ const STATES: &[State] = &[
                 for_s: 1234.0,
             }),
         );
+    }),
+    ("instruments in a narrow window", |app| {
+        app.shown = one_needle(0.03, 2);
+        app.narrow = Narrow::Right;
+    }),
+    ("needles in a narrow window", |app| {
+        app.shown = many_needles(24, 0);
+        app.narrow = Narrow::Right;
     }),
     ("goes on at needle 2 of 19", |app| {
         app.shown = many_needles(19, 2);
