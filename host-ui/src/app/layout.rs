@@ -22,6 +22,7 @@ pub(super) enum Narrow {
 impl App {
     pub(super) fn frame_ui(&mut self, ui: &mut egui::Ui) -> Vec<Action> {
         let mut actions = Vec::new();
+        self.workflow.recent.clone_from(&self.settings.recent);
         let [beside, above] = [10_i8, 5];
         let bar = Frame::new()
             .fill(theme::of(ui).panel)

@@ -3,11 +3,13 @@
 mod act;
 mod debrief;
 mod drive;
+mod files;
 mod layout;
 mod plan;
 mod take;
 
 use crate::action::{Action, PlanAction};
+use crate::dialog::Dialogs;
 use crate::dose_worker::DoseWorker;
 use crate::loader::Loader;
 use crate::panel::history::History;
@@ -78,6 +80,7 @@ pub struct App {
     debrief: Option<Job<debrief::Saved>>,
     summed_up: Instant,
     loader: Loader,
+    dialogs: Dialogs,
     uploading: Option<(u64, String)>,
     /// Shown once the scene that it belongs to, by name, is taken.
     image_to_come: Option<(Image, String)>,
@@ -184,6 +187,7 @@ impl App {
             debrief: None,
             summed_up: Instant::now(),
             loader: Loader::default(),
+            dialogs: Dialogs::default(),
             uploading: None,
             image_to_come: None,
             run: None,
@@ -276,6 +280,7 @@ impl eframe::App for App {
         actions.extend(keys.actions);
         actions.append(&mut self.pressed);
         actions.extend(self.dropped_file(&ctx));
+        actions.extend(self.picked_file());
         if ctx.input(|i| i.key_pressed(egui::Key::Escape)) {
             (self.help, self.parameters.open) = (false, false);
         }

@@ -7,6 +7,7 @@ mod progress;
 mod scene;
 
 use crate::action::Action;
+use crate::recent::{Missing, Recent};
 use crate::shown::{SeedError, Shown, own_errors};
 use crate::theme;
 use egui::text::LayoutJob;
@@ -30,6 +31,9 @@ const SHOW_WAITING_S: f64 = 2.0;
 pub struct WorkflowState {
     pub scene_path: String,
     pub plan: PlanState,
+    /// Files that were opened last, as the settings have them, and which of them are missing.
+    pub recent: Vec<Recent>,
+    missing: Missing,
     opened: Option<Progress>,
     was: Option<Progress>,
 }
