@@ -10,6 +10,8 @@ const TITLE_AND_EDGES: f32 = 70.0;
 const TWO_COLUMNS: f32 = 1100.0;
 /// Longer words go on in another line.
 const LONGEST: f32 = 440.0;
+/// What the keys and the edges take.
+const BESIDE_WORDS: f32 = 290.0;
 
 pub fn help_ui(ctx: &egui::Context, shown: &Shown, open: &mut bool) {
     egui::Window::new("Keys, mouse and controllers")
@@ -64,19 +66,21 @@ fn controllers_ui(ui: &mut egui::Ui, shown: &Shown) {
 }
 
 fn rows_ui<S: Into<String>>(ui: &mut egui::Ui, id: &str, rows: impl IntoIterator<Item = (&'static str, S)>) {
+    let screen = ui.ctx().content_rect().size();
+    let is_wide = screen.x >= TWO_COLUMNS;
+    let longest = LONGEST.min(screen.x - BESIDE_WORDS);
     let grid = egui::Grid::new(id)
         .num_columns(2)
         .spacing([16.0, 6.0])
+        .max_col_width(longest)
         .min_row_height(18.0);
     grid.show(ui, |ui| {
         ui.spacing_mut().interact_size.y = 18.0;
         for (what, does) in rows {
             ui.label(theme::strong(what));
-            // Rows are as wide as their words, up to what fits.
-            ui.scope(|ui| {
-                ui.set_max_width(LONGEST.min(ui.ctx().content_rect().width() - 290.0));
-                ui.add(egui::Label::new(does.into()).wrap());
-            });
+            // Beside each other both columns are as wide as their words.
+            let words = egui::Label::new(does.into());
+            ui.add(if is_wide { words.extend() } else { words.wrap() });
             ui.end_row();
         }
     });

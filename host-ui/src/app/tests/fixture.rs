@@ -83,7 +83,7 @@ impl Drawn {
 
     /// As it looks once it has settled.
     pub fn frame(&mut self) -> Painted {
-        let mut before = self.pass(vec![Event::PointerGone]);
+        let mut before = self.pass(vec![Event::PointerMoved(Pos2::new(-9.0, -9.0))]);
         for _ in 0..10 {
             let after = self.pass(Vec::new());
             if after.is_as(&before) {

@@ -30,7 +30,7 @@ fn a_note_moves_nothing() {
     let names = ["Plan five seeds", "Engage force", "Disengage", "Reset"];
     let without = places(live(), &names);
     let mut shown = live();
-    let text = "Debrief saved as /home/lab/out/debrief-2026-11-23T02-00-00, with a page and figures ".repeat(4);
+    let text = "Debrief saved as /srv/lab/out/debrief-2026-11-23T02-00-00, with a page and figures ".repeat(4);
     shown.note = Some(Note { refused: true, text });
     assert_eq!(places(shown, &names), without);
 }

@@ -11,7 +11,7 @@ const SLACK: f32 = 1.0;
 /// Neighbours may share this much, in points.
 const SHARED: f32 = 1.5;
 /// Turns of the wheel, in points: to the end of what is under the pointer, on with what is around it, and back.
-const TURNS: [f32; 3] = [-400.0, -400.0, 900.0];
+const WHEEL: [f32; 3] = [-400.0, -400.0, 900.0];
 
 /// Text that was painted, or a widget with a name, which may have been clipped away whole.
 #[derive(Clone, Debug)]
@@ -190,7 +190,7 @@ fn out_of_reach<'a>(drawn: &mut Drawn, before: &Painted, mut left: Vec<&'a Piece
             left.retain(|other| other.layer != piece.layer || !near_clip(other, piece));
             continue;
         }
-        for turn in TURNS {
+        for turn in WHEEL {
             let after = drawn.scrolled(
                 place,
                 if sideways {

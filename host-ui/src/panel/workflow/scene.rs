@@ -14,7 +14,7 @@ use stylet_base::format;
 use stylet_shm_schema::{BUILTIN_SCENES, SceneHeader, role};
 
 /// The button beside the field.
-const OPEN_WIDTH: f32 = 64.0;
+const OPEN_WIDTH: f32 = 78.0;
 
 pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, actions: &mut Vec<Action>) {
     let tokens = theme::of(ui);

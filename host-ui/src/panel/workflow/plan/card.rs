@@ -151,7 +151,7 @@ fn strength_ui(ui: &mut egui::Ui, implant: &Implant, free: bool, actions: &mut V
 }
 
 /// Buttons beside the field of the plan's file.
-const BESIDE_FIELD: f32 = 158.0;
+const BESIDE_FIELD: f32 = 170.0;
 
 /// By name of the format.
 fn dialogs_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
