@@ -1,5 +1,6 @@
 //! What the operator asks for, as plain data: pictures, panels and keys return it, the window carries it out.
 
+use crate::dialog::Purpose;
 use crate::settings::Layout;
 use std::path::PathBuf;
 use stylet_implant::plan::{Hole, Row};
@@ -33,6 +34,8 @@ pub enum Action {
     /// Loads an image of the patient of the present scene for the slices.
     LoadImage(PathBuf),
     CancelLoad,
+    /// Opens a dialog for a file.
+    PickFile(Purpose),
     /// Loads the scene of this index in [`stylet_shm_schema::BUILTIN_SCENES`].
     LoadBuiltinScene(usize),
     OpenParameters,

@@ -1,7 +1,7 @@
 //! The operator's program: the window, and the command line over the same code.
 //!
 //! The modules of the window depend on each other in one direction:
-//! `app` → `panel` → `view`, `keyboard` → `shown`, `action` → `planner`, `dose_worker`, `loader` → `mesh`, `theme`, `settings`.
+//! `app` → `panel` → `view`, `keyboard` → `shown`, `action` → `planner`, `dose_worker`, `loader` → `mesh`, `theme`, `settings` → `recent` → `dialog`.
 
 #![warn(missing_docs)]
 
@@ -11,6 +11,7 @@ pub mod app;
 pub mod cli;
 mod command;
 pub mod cpu_time;
+mod dialog;
 mod dose_worker;
 pub mod heap;
 pub mod keyboard;
@@ -19,6 +20,7 @@ mod mesh;
 mod panel;
 mod picture;
 pub mod planner;
+mod recent;
 mod settings;
 mod shown;
 mod theme;

@@ -1,11 +1,12 @@
 //! What a person set in the window and finds again the next time it opens.
 
+use crate::recent::{self, Recent};
 use serde::{Deserialize, Serialize};
 
 /// Under which the settings are kept.
 const KEY: &str = "stylet.settings";
 /// Smallest and largest scale of words and widgets.
-pub const SCALES: [f32; 2] = [0.8, 1.6];
+pub const SCALES: [f32; 2] = [0.8, 2.0];
 /// Air kerma strength of a seed that can be set (U).
 pub const STRENGTHS_U: [f64; 2] = [0.05, 5.0];
 const LONGEST_FILE_NAME: usize = 4096;
@@ -55,6 +56,8 @@ pub struct Settings {
     pub layout: Layout,
     /// The volume that was loaded last.
     pub last_file: String,
+    /// Files that were opened, the last one first.
+    pub recent: Vec<Recent>,
     /// Air kerma strength of each seed (U).
     pub seed_strength_u: f64,
 }
@@ -66,6 +69,7 @@ impl Default for Settings {
             scale: 1.0,
             layout: Layout::default(),
             last_file: String::new(),
+            recent: Vec::new(),
             seed_strength_u: 0.5,
         }
     }
@@ -96,6 +100,7 @@ impl Settings {
         if self.last_file.len() > LONGEST_FILE_NAME {
             self.last_file.clear();
         }
+        self.recent = recent::checked(self.recent);
         self
     }
 
@@ -140,6 +145,10 @@ mod tests {
             scale: 1.25,
             layout: Layout::Slices,
             last_file: "gland.nii.gz".to_owned(),
+            recent: vec![Recent {
+                path: "gland.nii.gz".to_owned(),
+                is_image: false,
+            }],
             seed_strength_u: 0.6,
         };
         let mut kept = Kept::default();

@@ -81,6 +81,7 @@ impl App {
             Action::LoadScene(path) => self.load(&path, None),
             Action::LoadImage(path) => self.load_image(&path),
             Action::CancelLoad => self.cancel_load(),
+            Action::PickFile(purpose) => self.pick_file(purpose),
             Action::StopRun => self.stop_run(),
             // While the script runs the needle is its own.
             _ if self.run.is_some() && action != Action::Send(Request::Disengage) => {}

@@ -3,16 +3,18 @@
 mod act;
 mod debrief;
 mod drive;
+mod files;
+mod layout;
 mod plan;
 mod take;
 
 use crate::action::{Action, PlanAction};
+use crate::dialog::Dialogs;
 use crate::dose_worker::DoseWorker;
 use crate::loader::Loader;
 use crate::panel::history::History;
-use crate::panel::parameters::{ParametersState, parameters_ui};
-use crate::panel::workflow::{Progress, WorkflowState, editor_ui, workflow_ui};
-use crate::panel::{banners, help, plots, status};
+use crate::panel::parameters::ParametersState;
+use crate::panel::workflow::{Progress, WorkflowState};
 use crate::picture::Pictures;
 use crate::planner::Planner;
 use crate::settings::Settings;
@@ -78,6 +80,7 @@ pub struct App {
     debrief: Option<Job<debrief::Saved>>,
     summed_up: Instant,
     loader: Loader,
+    dialogs: Dialogs,
     uploading: Option<(u64, String)>,
     /// Shown once the scene that it belongs to, by name, is taken.
     image_to_come: Option<(Image, String)>,
@@ -107,6 +110,8 @@ pub struct App {
     workflow: WorkflowState,
     parameters: ParametersState,
     help: bool,
+    /// What stands in the middle where there is no room for the right panel.
+    narrow: layout::Narrow,
 }
 
 /// Opens the window and returns when it is closed.
@@ -182,6 +187,7 @@ impl App {
             debrief: None,
             summed_up: Instant::now(),
             loader: Loader::default(),
+            dialogs: Dialogs::default(),
             uploading: None,
             image_to_come: None,
             run: None,
@@ -208,59 +214,13 @@ impl App {
             settings,
             parameters: ParametersState::default(),
             help: false,
+            narrow: layout::Narrow::default(),
         }
     }
 
     /// Replaces the devices of the system.
     pub fn use_controllers(&mut self, controllers: Controllers) {
         self.controllers = controllers;
-    }
-
-    fn frame_ui(&mut self, ui: &mut egui::Ui) -> Vec<Action> {
-        let mut actions = Vec::new();
-        let bar = egui::Frame::new()
-            .fill(theme::of(ui).panel)
-            .inner_margin(egui::Margin::symmetric(10, 5));
-        egui::Panel::top("status").frame(bar).show(ui, |ui| {
-            actions.extend(status::status_ui(ui, &self.shown, &mut self.settings));
-        });
-        let shown_banners = banners::banners(&self.shown);
-        if !shown_banners.is_empty() {
-            egui::Panel::top("banners").frame(egui::Frame::new()).show(ui, |ui| {
-                ui.spacing_mut().item_spacing.y = 1.0;
-                actions.extend(banners::banners_ui(ui, &shown_banners));
-            });
-        }
-        let left = egui::Panel::left("workflow")
-            .exact_size(theme::LEFT_WIDTH)
-            .frame(theme::side_panel(ui));
-        left.resizable(false).show(ui, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| {
-                actions.extend(workflow_ui(ui, &self.shown, &mut self.workflow));
-            });
-        });
-        let right = egui::Panel::right("plots")
-            .exact_size(theme::RIGHT_WIDTH)
-            .frame(theme::side_panel(ui));
-        right.resizable(false).show(ui, |ui| {
-            if self.edits_plan() {
-                actions.extend(editor_ui(ui, &self.shown, &mut self.workflow.plan));
-                return;
-            }
-            let height = ui.available_height();
-            // The debrief looks back on all of it, not on the last seconds.
-            let whole = self.workflow.is_open(Progress::Debrief).then_some(&self.trace);
-            egui::ScrollArea::vertical().show(ui, |ui| plots::plots_ui(ui, &self.shown, &self.history, whole, height));
-        });
-        egui::CentralPanel::default()
-            .frame(egui::Frame::new().fill(theme::of(ui).background))
-            .show(ui, |ui| {
-                let (layout, dose) = (self.settings.layout, self.shown.dose.as_ref());
-                actions.extend(self.middle.middle_ui(ui, layout, &self.shown, dose));
-            });
-        parameters_ui(ui.ctx(), &self.shown, &mut self.parameters);
-        help::help_ui(ui.ctx(), &self.shown, &mut self.help);
-        actions
     }
 
     /// What was set since the last frame, here or by the keys for larger and smaller words.
@@ -320,6 +280,7 @@ impl eframe::App for App {
         actions.extend(keys.actions);
         actions.append(&mut self.pressed);
         actions.extend(self.dropped_file(&ctx));
+        actions.extend(self.picked_file());
         if ctx.input(|i| i.key_pressed(egui::Key::Escape)) {
             (self.help, self.parameters.open) = (false, false);
         }
@@ -352,3 +313,6 @@ impl eframe::App for App {
 fn refusal(text: String) -> Note {
     Note { refused: true, text }
 }
+
+#[cfg(test)]
+mod tests;

@@ -7,6 +7,7 @@ use crate::affinity;
 use crate::dose_worker::{DoseOf, DoseRequest};
 use crate::loader::Loaded;
 use crate::panel::workflow::SCRIPTED_STEPS;
+use crate::recent;
 use crate::shown::{LoadState, Note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -197,12 +198,14 @@ impl App {
     pub(super) fn load(&mut self, path: &Path, image: Option<PathBuf>) {
         if !self.shown.load.is_busy() {
             self.settings.last_file = path.display().to_string();
+            recent::remember(&mut self.settings.recent, absolute(path), false);
             self.loader.begin_scene(path, self.label, image);
         }
     }
 
     pub(super) fn load_image(&mut self, path: &Path) {
         if !self.shown.load.is_busy() {
+            recent::remember(&mut self.settings.recent, absolute(path), true);
             self.loader.begin_image(path);
         }
     }
@@ -291,4 +294,12 @@ fn asked_by(button: Button) -> Action {
         Button::Stop => Action::StopRun,
         Button::Engage => Action::Send(Request::Engage),
     }
+}
+
+/// As it is found from any folder.
+fn absolute(path: &Path) -> String {
+    std::path::absolute(path)
+        .unwrap_or_else(|_| path.to_owned())
+        .display()
+        .to_string()
 }

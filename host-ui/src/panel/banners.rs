@@ -4,7 +4,7 @@ use crate::action::Action;
 use crate::shown::Shown;
 use crate::theme;
 use crate::theme::Tokens;
-use egui::{Color32, RichText};
+use egui::{Color32, Rect, RichText};
 use stylet_host::link::LinkStatus;
 use stylet_shm_schema::{Fault, Request};
 
@@ -167,36 +167,70 @@ fn sentence(text: &str) -> String {
         .unwrap_or_default()
 }
 
-pub fn banners_ui(ui: &mut egui::Ui, list: &[Banner]) -> Option<Action> {
-    let mut action = None;
+/// Over so much of the pictures at most.
+const SHARE: f32 = 0.6;
+/// Narrower than this the text stands under the title.
+const NARROW: f32 = 560.0;
+
+/// Over the upper edge of the pictures, so that nothing moves when a banner comes or goes.
+pub fn banners_ui(ctx: &egui::Context, pictures: Rect, list: &[Banner]) -> Option<Action> {
+    if list.is_empty() {
+        return None;
+    }
+    let area = egui::Area::new(egui::Id::unique("banners"))
+        .fixed_pos(pictures.min)
+        .movable(false)
+        .constrain(false)
+        .default_width(pictures.width());
+    let shown = area.show(ctx, |ui| {
+        ui.set_max_width(pictures.width());
+        let scroll = egui::ScrollArea::vertical().max_height(SHARE * pictures.height());
+        let inner = scroll.show(ui, |ui| {
+            ui.spacing_mut().item_spacing.y = 1.0;
+            // The last one that was clicked.
+            list.iter().filter_map(|banner| banner_ui(ui, banner)).last()
+        });
+        inner.inner
+    });
+    shown.inner
+}
+
+fn banner_ui(ui: &mut egui::Ui, banner: &Banner) -> Option<Action> {
     let tokens = theme::of(ui);
     let ink = tokens.on_signal;
-    for banner in list {
-        let fill = banner.level.color(tokens);
-        egui::Frame::new()
-            .fill(fill)
-            .inner_margin(egui::Margin::symmetric(10, 5))
-            .show(ui, |ui| {
-                ui.set_min_width(ui.available_width());
-                ui.horizontal(|ui| {
-                    ui.label(RichText::new(banner.title).strong().size(15.0).color(ink));
-                    if let Some((name, remedy)) = &banner.remedy
-                        && ui.button(*name).clicked()
-                    {
-                        action = Some(remedy.clone());
-                    }
-                    let body = RichText::new(&banner.text).color(ink);
-                    // Two hyphens of a command must not look like one dash.
-                    let body = if banner.text.contains("--") {
-                        body.monospace()
-                    } else {
-                        body
-                    };
-                    ui.add(egui::Label::new(body).wrap()).on_hover_text(&banner.text);
-                });
-            });
-    }
-    action
+    let head = |ui: &mut egui::Ui| {
+        ui.label(RichText::new(banner.title).strong().size(15.0).color(ink));
+        let (name, remedy) = banner.remedy.as_ref()?;
+        ui.button(*name).clicked().then(|| remedy.clone())
+    };
+    let body = |ui: &mut egui::Ui| {
+        let text = RichText::new(&banner.text).color(ink);
+        // Two hyphens of a command must not look like one dash.
+        let text = if banner.text.contains("--") {
+            text.monospace()
+        } else {
+            text
+        };
+        ui.add(egui::Label::new(text).wrap());
+    };
+    let frame = egui::Frame::new()
+        .fill(banner.level.color(tokens))
+        .inner_margin(egui::Margin::symmetric(10, 5));
+    let shown = frame.show(ui, |ui| {
+        ui.set_min_width(ui.available_width());
+        if ui.available_width() < NARROW {
+            let action = ui.horizontal(head).inner;
+            body(ui);
+            return action;
+        }
+        let both = ui.horizontal(|ui| {
+            let action = head(ui);
+            body(ui);
+            action
+        });
+        both.inner
+    });
+    shown.inner
 }
 
 #[cfg(test)]

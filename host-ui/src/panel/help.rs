@@ -4,6 +4,15 @@ use crate::shown::Shown;
 use crate::{keyboard, theme};
 use stylet_controllers::Kind;
 
+/// Around what is listed, in points.
+const TITLE_AND_EDGES: f32 = 70.0;
+/// Narrower than this, controllers stand under the keys.
+const TWO_COLUMNS: f32 = 1100.0;
+/// Longer words go on in another line.
+const LONGEST: f32 = 440.0;
+/// What the keys and the edges take.
+const BESIDE_WORDS: f32 = 290.0;
+
 pub fn help_ui(ctx: &egui::Context, shown: &Shown, open: &mut bool) {
     egui::Window::new("Keys, mouse and controllers")
         .open(open)
@@ -11,17 +20,31 @@ pub fn help_ui(ctx: &egui::Context, shown: &Shown, open: &mut bool) {
         .resizable(false)
         .anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO)
         .show(ctx, |ui| {
-            ui.horizontal_top(|ui| {
-                ui.vertical(|ui| {
-                    rows_ui(ui, "keys", keyboard::KEYS);
-                    ui.label(theme::small(
-                        "Keys move the needle unless a field has the focus; Esc returns them.",
-                    ));
+            let screen = ui.ctx().content_rect().size();
+            let room = screen.y - TITLE_AND_EDGES;
+            let scroll = egui::ScrollArea::vertical().max_height(room).min_scrolled_height(room);
+            scroll.show(ui, |ui| {
+                if screen.x < TWO_COLUMNS {
+                    ui.set_max_width(screen.x - TITLE_AND_EDGES);
+                    keys_ui(ui);
+                    ui.add_space(12.0);
+                    controllers_ui(ui, shown);
+                    return;
+                }
+                ui.horizontal_top(|ui| {
+                    ui.vertical(keys_ui);
+                    ui.add_space(12.0);
+                    ui.vertical(|ui| controllers_ui(ui, shown));
                 });
-                ui.add_space(12.0);
-                ui.vertical(|ui| controllers_ui(ui, shown));
             });
         });
+}
+
+fn keys_ui(ui: &mut egui::Ui) {
+    rows_ui(ui, "keys", keyboard::KEYS);
+    ui.label(theme::small(
+        "Keys move the needle unless a field has the focus; Esc returns them.",
+    ));
 }
 
 fn controllers_ui(ui: &mut egui::Ui, shown: &Shown) {
@@ -43,15 +66,21 @@ fn controllers_ui(ui: &mut egui::Ui, shown: &Shown) {
 }
 
 fn rows_ui<S: Into<String>>(ui: &mut egui::Ui, id: &str, rows: impl IntoIterator<Item = (&'static str, S)>) {
+    let screen = ui.ctx().content_rect().size();
+    let is_wide = screen.x >= TWO_COLUMNS;
+    let longest = LONGEST.min(screen.x - BESIDE_WORDS);
     let grid = egui::Grid::new(id)
         .num_columns(2)
         .spacing([16.0, 6.0])
+        .max_col_width(longest)
         .min_row_height(18.0);
     grid.show(ui, |ui| {
         ui.spacing_mut().interact_size.y = 18.0;
         for (what, does) in rows {
             ui.label(theme::strong(what));
-            ui.label(does.into());
+            // Beside each other both columns are as wide as their words.
+            let words = egui::Label::new(does.into());
+            ui.add(if is_wide { words.extend() } else { words.wrap() });
             ui.end_row();
         }
     });

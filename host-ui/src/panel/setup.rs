@@ -22,7 +22,7 @@ pub fn setup_ui(ui: &mut egui::Ui, shown: &Shown) {
                 ui.label(theme::small(name));
                 let tokens = theme::of(ui);
                 let color = if fine { tokens.text } else { tokens.warn };
-                ui.label(RichText::new(value).small().color(color));
+                ui.add(egui::Label::new(RichText::new(value).small().color(color)).truncate());
                 ui.end_row();
             };
             if let Some(session) = &shown.session {

@@ -9,24 +9,60 @@ use stylet_base::format;
 use stylet_host::link::LinkStatus;
 use stylet_shm_schema::ParameterId;
 
+/// Narrower than this the bar takes two rows, or three. How many depends on the width alone, so that nothing moves.
+const ONE_ROW: f32 = 1240.0;
+const TWO_ROWS: f32 = 720.0;
+
+/// Height of the bar without its margins.
+pub fn status_height(ui: &egui::Ui, width: f32) -> f32 {
+    let rows = 1.0 + f32::from(u8::from(width < ONE_ROW)) + f32::from(u8::from(width < TWO_ROWS));
+    rows * ui.spacing().interact_size.y + (rows - 1.0) * ui.spacing().item_spacing.y
+}
+
 pub fn status_ui(ui: &mut egui::Ui, shown: &Shown, settings: &mut Settings) -> Option<Action> {
     let mut action = None;
+    let width = ui.available_width();
     ui.horizontal(|ui| {
         ui.label(RichText::new("Stylet").strong().size(17.0));
         link_ui(ui, shown);
-        ui.separator();
-        figures_ui(ui, shown);
+        if width >= ONE_ROW {
+            ui.separator();
+            figures_ui(ui, shown);
+        }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            if ui.button("Help").on_hover_text("Key F1").clicked() {
-                action = Some(Action::ToggleHelp);
+            action = buttons_ui(ui, settings);
+            if width >= ONE_ROW {
+                force_ui(ui, shown);
             }
-            ui.menu_button("Settings", |ui| settings_ui(ui, settings));
-            if ui.button("Parameters").on_hover_text("Key P").clicked() {
-                action = Some(Action::OpenParameters);
-            }
-            force_ui(ui, shown);
         });
     });
+    if width >= ONE_ROW {
+        return action;
+    }
+    ui.horizontal(|ui| {
+        figures_ui(ui, shown);
+        if width >= TWO_ROWS {
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| force_ui(ui, shown));
+        }
+    });
+    if width < TWO_ROWS {
+        ui.horizontal(|ui| {
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| force_ui(ui, shown));
+        });
+    }
+    action
+}
+
+/// Right to left.
+fn buttons_ui(ui: &mut egui::Ui, settings: &mut Settings) -> Option<Action> {
+    let mut action = None;
+    if ui.button("Help").on_hover_text("Key F1").clicked() {
+        action = Some(Action::ToggleHelp);
+    }
+    ui.menu_button("Settings", |ui| settings_ui(ui, settings));
+    if ui.button("Parameters").on_hover_text("Key P").clicked() {
+        action = Some(Action::OpenParameters);
+    }
     action
 }
 

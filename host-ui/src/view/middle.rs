@@ -27,6 +27,8 @@ pub struct Middle {
     slices: Slices,
     /// What all pictures share.
     pub(crate) view: ViewState,
+    /// Under the tools, in the last frame.
+    pictures_top: f32,
 }
 
 /// Where each picture stands.
@@ -42,7 +44,13 @@ impl Middle {
             solid: Scene3d::new(state.clone()),
             slices: Slices::new(state),
             view: ViewState::default(),
+            pictures_top: 0.0,
         }
+    }
+
+    /// Where the pictures begin.
+    pub(crate) fn pictures_top(&self) -> f32 {
+        self.pictures_top
     }
 
     /// Bytes sent to the graphics card since the window opened.
@@ -96,10 +104,11 @@ impl Middle {
         tools.show(ui, |ui| {
             ui.spacing_mut().item_spacing = spacing;
             ui.set_min_width(ui.available_width());
-            ui.horizontal(|ui| self.tools_ui(ui, layout, shown, &mut actions));
+            ui.horizontal_wrapped(|ui| self.tools_ui(ui, layout, shown, &mut actions));
         });
         let rect = ui.available_rect_before_wrap();
         ui.advance_cursor_after_rect(rect);
+        self.pictures_top = rect.top();
         let places = places(rect, layout);
         for (orientation, rect) in places.slices {
             actions.extend(

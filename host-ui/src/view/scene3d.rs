@@ -15,7 +15,7 @@ use crate::mesh::Surface;
 use crate::shown::Shown;
 use crate::theme::{self, IMAGE, Tokens};
 use eframe::egui_wgpu::RenderState;
-use egui::{Align2, Color32, FontId, PointerButton, Pos2, Rect, Sense};
+use egui::{Color32, PointerButton, Pos2, Rect, Sense};
 use nalgebra::Vector3;
 use std::sync::Arc;
 use stylet_host::link::{SceneModel, Snapshot};
@@ -210,11 +210,12 @@ impl Scene3d {
                 let alone = dose.filter(|_| rect.width() > ALONE);
                 legend.rows(self.look, alone.map(|d| &**d));
             }
-            None => {
-                let text = "No 3D view: the window has no wgpu device.\nInstall a Vulkan driver (mesa-vulkan-drivers)\nand start again; everything else works.";
-                let font = FontId::proportional(13.5);
-                painter.text(rect.center(), Align2::CENTER_CENTER, text, font, tokens.weak);
+            None if rect.height() >= super::slice::ROOM_FOR_REASON => {
+                let text = "No 3D view: the window has no wgpu device. Install a Vulkan driver (mesa-vulkan-drivers) and start again; everything else \
+                            works.";
+                super::slice::words(&painter, rect, text, tokens.weak);
             }
+            None => {}
         }
     }
 

@@ -3,6 +3,7 @@
 
 mod dose_cost;
 mod motion;
+mod outline;
 mod page;
 mod picture;
 mod trace;

@@ -1,5 +1,6 @@
 //! Pictures of a debrief, as SVG: the implant from three sides, dose-volume histograms, force and speed over time.
 
+use super::outline;
 use super::{Score, ScoreError, SeedPair};
 use crate::plan::anatomy::Body;
 use nalgebra::Vector3;
@@ -22,6 +23,8 @@ const COLOURS: [RGBColor; 6] = [
     RGBColor(86, 180, 233),
     RGBColor(0, 0, 0),
 ];
+/// What is to be spared.
+const SPARED: RGBColor = RGBColor(204, 121, 167);
 const INK: RGBColor = RGBColor(70, 70, 70);
 const FAINT: RGBColor = RGBColor(225, 225, 225);
 const FONT: &str = "sans-serif";
@@ -115,16 +118,12 @@ fn one_view(area: &Canvas, score: &Score, view: &View) -> Drawn<()> {
         .label_style((FONT, 13))
         .axis_desc_style((FONT, 14))
         .draw()?;
-    for body in &anatomy.spared {
-        let line = outline(body, view, &seen)
-            .into_iter()
-            .filter(|(x, y)| x.abs() <= reach && y.abs() <= reach);
-        chart.draw_series(LineSeries::new(line, RGBColor(204, 121, 167).stroke_width(1)))?;
+    let bodies = anatomy.spared.iter().map(|body| (body, SPARED.stroke_width(1)));
+    for (body, style) in bodies.chain([(&anatomy.target, INK.stroke_width(2))]) {
+        for ring in closed_rings(body, view, &seen, reach) {
+            chart.draw_series([PathElement::new(ring, style)])?;
+        }
     }
-    chart.draw_series(LineSeries::new(
-        outline(&anatomy.target, view, &seen),
-        INK.stroke_width(2),
-    ))?;
     let ends = |p: &SeedPair| [p.planned, p.delivered].map(|s| seen(Vector3::from(s.position_m)));
     let ways = pairs
         .iter()
@@ -135,23 +134,24 @@ fn one_view(area: &Canvas, score: &Score, view: &View) -> Drawn<()> {
     Ok(())
 }
 
-/// The edge of a body in the plane of the view through its middle.
-fn outline(body: &Body, view: &View, seen: &impl Fn(Vector3<f64>) -> (f64, f64)) -> Vec<(f64, f64)> {
-    const RAYS: usize = 120;
-    const STEP_M: f64 = 0.25e-3;
+/// Edges of a body in the plane of the view through its middle, each ending where it begins, as far as they are in the picture.
+fn closed_rings(
+    body: &Body,
+    view: &View,
+    seen: &impl Fn(Vector3<f64>) -> (f64, f64),
+    reach: f64,
+) -> Vec<Vec<(f64, f64)>> {
     let (low, high) = body.bounds_m();
-    let (low, high) = (Vector3::from(low), Vector3::from(high));
-    let (middle, farthest_m) = ((low + high) / 2.0, (high - low).norm() / 2.0);
-    let steps = (farthest_m / STEP_M) as usize;
-    (0..=RAYS)
-        .filter_map(|ray| {
-            let (sine, cosine) = (ray as f64 / RAYS as f64 * std::f64::consts::TAU).sin_cos();
-            let out = Vector3::from(view.across) * cosine + Vector3::from(view.up) * sine;
-            let at = |step: usize| middle + out * (step as f64 * STEP_M);
-            let last = (0..=steps).rev().find(|&step| body.contains(at(step).into()))?;
-            Some(seen(at(last)))
-        })
-        .collect()
+    let middle = (Vector3::from(low) + Vector3::from(high)) / 2.0;
+    let normal = Vector3::from(view.across).cross(&Vector3::from(view.up));
+    let in_picture = |ring: Vec<Vector3<f64>>| {
+        let places: Vec<(f64, f64)> = ring.into_iter().map(seen).collect();
+        let mut inside = outline::clipped(&places, reach);
+        inside.extend(inside.first().copied());
+        inside
+    };
+    let rings = outline::rings(body, middle, normal).into_iter().map(in_picture);
+    rings.filter(|ring| !ring.is_empty()).collect()
 }
 
 /// Planned dashed, delivered drawn through.

@@ -152,10 +152,13 @@ fn reason_for(spec: &ParameterSpec, answer: &Answer) -> &'static str {
 
 pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersState) {
     let mut open = state.open;
+    let screen = ctx.content_rect().size();
+    let room = screen - egui::vec2(24.0, 24.0);
     egui::Window::new("Parameters")
         .open(&mut open)
-        .default_size([700.0, 600.0])
-        .default_pos([300.0, 90.0])
+        .default_size(egui::vec2(700.0, 600.0).min(room))
+        .default_pos([300.0_f32.min(screen.x - 712.0).max(12.0), 90.0_f32.min(screen.y / 8.0)])
+        .max_size(room)
         .collapsible(false)
         .show(ctx, |ui| {
             if shown.parameters.is_none() {
@@ -165,9 +168,10 @@ pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersS
                 );
             }
             search_ui(ui, state);
-            let height = (ui.ctx().content_rect().height() - 330.0).clamp(200.0, 640.0);
-            egui::ScrollArea::vertical()
+            let height = (screen.y - 330.0).clamp(80.0, 640.0);
+            egui::ScrollArea::both()
                 .max_height(height)
+                .min_scrolled_height(height)
                 .auto_shrink([false, true])
                 .show(ui, |ui| {
                     let found = found(&state.search);
@@ -307,7 +311,7 @@ fn note_ui(ui: &mut egui::Ui, state: &ParametersState, index: usize) {
 }
 
 fn foot_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState) {
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         if ui
             .add_enabled(shown.is_live(), Button::new("Reset all parameters"))
             .clicked()
@@ -325,7 +329,7 @@ fn foot_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState) {
             ui.label(theme::small(text));
         }
     });
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let label = ui.label(theme::weak("Preset"));
         let edit = egui::TextEdit::singleline(&mut state.preset_path).desired_width(260.0);
         ui.add(edit).labelled_by(label.id);

@@ -4,28 +4,29 @@ mod debrief;
 mod job;
 mod plan;
 mod progress;
+mod run;
 mod scene;
 
 use crate::action::Action;
+use crate::recent::{Missing, Recent};
 use crate::shown::{SeedError, Shown, own_errors};
 use crate::theme;
-use egui::{Align, Align2, Button, FontId, Layout, RichText, Sense, Stroke, Vec2};
+use egui::text::LayoutJob;
+use egui::{Align2, Button, FontId, RichText, Sense, Stroke, TextStyle, Vec2};
 pub use plan::{PlanState, editor_ui};
 pub use progress::{Progress, Undo, is_at_next_seed, is_needle_done, missing, next_action, progress, undo_action};
+pub use run::{SCRIPTED_STEPS, run_ui};
 use stylet_base::format;
-use stylet_implant::workflow::Step;
 use stylet_shm_schema::Request;
-
-/// What the script does of a plan of one needle, by the numbers in the panel.
-pub const SCRIPTED_STEPS: &str = "steps 2 to 6";
-/// Waiting for longer is shown.
-const SHOW_WAITING_S: f64 = 2.0;
 
 /// What the panel keeps between frames: what a person is typing, and which step was opened by hand.
 #[derive(Default)]
 pub struct WorkflowState {
     pub scene_path: String,
     pub plan: PlanState,
+    /// Files that were opened last, as the settings have them, and which of them are missing.
+    pub recent: Vec<Recent>,
+    missing: Missing,
     opened: Option<Progress>,
     was: Option<Progress>,
 }
@@ -44,6 +45,11 @@ impl WorkflowState {
         self.opened.or(self.was) == Some(step)
     }
 
+    /// Opens a step that is not the present one.
+    pub fn open_by_hand(&mut self, step: Progress) {
+        self.opened = Some(step);
+    }
+
     /// The step that is open: the present one, until another is opened by hand and the procedure goes on.
     fn open(&mut self, now: Progress) -> Progress {
         if self.was != Some(now) {
@@ -57,99 +63,42 @@ pub fn workflow_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState) 
     let mut actions = Vec::new();
     let now = progress(shown);
     let open = state.open(now);
-    ui.heading("Procedure");
-    run_ui(ui, shown, &mut actions);
     for step in Progress::ALL {
         if step == open {
             step_ui(ui, (step, now), shown, state, &mut actions);
         } else if head_ui(ui, (step, now), shown).clicked() {
-            state.opened = Some(step);
+            state.open_by_hand(step);
         }
     }
-    if let Some(note) = &shown.note {
-        let tokens = theme::of(ui);
-        let color = if note.refused { tokens.bad } else { tokens.weak };
-        ui.label(RichText::new(&note.text).color(color));
-    }
-    ui.separator();
-    force_ui(ui, shown, &mut actions);
     actions
 }
 
-fn run_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
-    let wide = egui::vec2(ui.available_width(), 28.0);
-    if shown.running {
-        let step = match shown.run_step {
-            Some(Step::Plan) => "planning",
-            Some(Step::Place) => "placing the needle",
-            Some(Step::Insert) => "inserting",
-            Some(Step::Drop) => "dropping the seeds",
-            Some(Step::Retract) => "retracting",
-            Some(Step::Settle) => "waiting for the tissue to rest",
-            Some(Step::Done) | None => "finishing",
-        };
-        ui.horizontal(|ui| {
-            ui.spinner();
-            ui.label(match shown.run_needle {
-                Some((needle, count)) => format!("Needle {} of {count}", needle + 1),
-                None => "Running".to_owned(),
-            });
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                if ui.button("Stop").clicked() {
-                    actions.push(Action::StopRun);
-                }
-            });
-        });
-        // On lines of its own: as long as it is, it may not make the panel wider.
-        ui.label(theme::weak(match waits(shown) {
-            Some(waits) => format!("{step}: {waits}"),
-            None => step.to_owned(),
-        }));
-        return;
-    }
-    let blocked = missing(shown, Progress::Plan);
-    let response = ui.add_enabled(blocked.is_none(), Button::new(run_name(shown)).min_size(wide));
-    if hinted(response, blocked).on_hover_text(run_help(shown)).clicked() {
-        actions.push(Action::RunAll);
-    }
-    if shown.continues_at.is_some() {
-        let anew = ui.add_enabled(shown.is_live(), Button::new("Start over"));
-        let help = "Takes all seeds out of the tissue and begins at the first needle";
-        if anew.on_hover_text(help).clicked() {
-            actions.push(Action::StartOver);
-        }
-    }
+/// Lines of the last answer, and what its buttons take.
+const NOTE_LINES: [usize; 2] = [1, 3];
+const SHORT: f32 = 420.0;
+
+fn note_lines(ui: &egui::Ui) -> usize {
+    NOTE_LINES[usize::from(ui.ctx().content_rect().height() >= SHORT)]
 }
 
-/// What the script waits for, once that takes longer than usual.
-fn waits(shown: &Shown) -> Option<String> {
-    let waiting = shown.run_waits.filter(|waiting| waiting.for_s >= SHOW_WAITING_S)?;
-    Some(format!("waiting for {}, {:.0} s", waiting.waits_for, waiting.for_s))
+/// Room of [`foot_ui`], whatever it shows.
+pub fn foot_height(ui: &egui::Ui) -> f32 {
+    let line = ui.text_style_height(&TextStyle::Small) + 1.0;
+    ui.spacing().interact_size.y + 2.0 * theme::GAP + note_lines(ui) as f32 * line
 }
 
-fn run_name(shown: &Shown) -> String {
-    if let Some((needle, count)) = shown.continues_at {
-        return format!("Continue at needle {} of {count}", needle + 1);
-    }
-    match needle_count(shown) {
-        0 => format!("Run {SCRIPTED_STEPS}"),
-        count => format!("Run all {count} needles"),
-    }
-}
-
-fn run_help(shown: &Shown) -> &'static str {
-    if shown.continues_at.is_some() {
-        return "The seeds in the tissue stay; the scripted hand goes on with the first seed that is missing";
-    }
-    match needle_count(shown) {
-        0 => "A scripted hand plans five seeds, places the needle, inserts it, drops the seeds and retracts it",
-        _ => "A scripted hand places each needle in turn, inserts it, drops its seeds and retracts it",
-    }
-}
-
-/// Needles of the plan of many; 0 where the script plans the only one.
-fn needle_count(shown: &Shown) -> usize {
-    shown.planning.implant.as_ref().map_or(0, |i| i.plan.needles.len())
+/// The force, and the last answer that the operator should read, under the steps.
+pub fn foot_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
+    ui.add_space(theme::GAP);
+    force_ui(ui, shown, actions);
+    let Some(note) = &shown.note else { return };
+    let tokens = theme::of(ui);
+    let color = if note.refused { tokens.bad } else { tokens.weak };
+    let font = TextStyle::Small.resolve(ui.style());
+    let mut job = LayoutJob::simple(note.text.clone(), font, color, ui.available_width());
+    (job.wrap.max_rows, job.wrap.break_anywhere) = (note_lines(ui), false);
+    // Cut off with three dots it shows the whole on hover.
+    ui.add(egui::Label::new(job).wrap());
 }
 
 fn hinted(response: egui::Response, blocked: Option<String>) -> egui::Response {

@@ -3,12 +3,18 @@
 use super::WorkflowState;
 use super::job::job_ui;
 use crate::action::Action;
+use crate::dialog::Purpose;
+use crate::panel::field::path_ui;
+use crate::recent::Recent;
 use crate::shown::{LoadState, Shown};
 use crate::theme;
 use egui::{Button, RichText};
 use std::path::PathBuf;
 use stylet_base::format;
 use stylet_shm_schema::{BUILTIN_SCENES, SceneHeader, role};
+
+/// The button beside the field.
+const OPEN_WIDTH: f32 = 78.0;
 
 pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, actions: &mut Vec<Action>) {
     let tokens = theme::of(ui);
@@ -40,11 +46,14 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
             }
         }
     });
-    let edit = egui::TextEdit::singleline(&mut state.scene_path)
-        .hint_text("file, or drop one here")
-        .desired_width(f32::INFINITY);
-    let field = ui.add(edit).labelled_by(label.id);
-    let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+    let entered = ui.horizontal(|ui| {
+        let width = ui.available_width() - OPEN_WIDTH;
+        let field = path_ui(ui, "scene file", &mut state.scene_path, "file, or drop one here", width);
+        let field = field.labelled_by(label.id);
+        open_ui(ui, shown, state, free, actions);
+        field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter))
+    });
+    let entered = entered.inner;
     ui.horizontal(|ui| {
         let path = state.scene_path.trim();
         let free = free && !path.is_empty();
@@ -80,6 +89,58 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
     }
     if let Some(scene) = shown.scene.as_ref().filter(|s| s.structures().len() > 1) {
         structures_ui(ui, scene);
+    }
+}
+
+/// Dialogs, and the files that were opened last.
+fn open_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bool, actions: &mut Vec<Action>) {
+    ui.add_enabled_ui(free, |ui| {
+        let menu = ui.menu_button("Open…", |ui| {
+            for purpose in [Purpose::Scene, Purpose::Image] {
+                let can = purpose == Purpose::Scene || shown.scene.is_some();
+                if ui
+                    .add_enabled(can, Button::new(format!("{}…", purpose.title())))
+                    .clicked()
+                {
+                    actions.push(Action::PickFile(purpose));
+                }
+            }
+            ui.separator();
+            if state.recent.is_empty() {
+                ui.label(theme::small("No file was opened yet."));
+            }
+            for one in state.recent.clone() {
+                recent_ui(ui, shown, state, &one, actions);
+            }
+        });
+        if menu.response.clicked() {
+            state.missing.look(&state.recent);
+        }
+    });
+}
+
+fn recent_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, one: &Recent, actions: &mut Vec<Action>) {
+    let is_missing = state.missing.has(one);
+    let path = PathBuf::from(&one.path);
+    let name = path
+        .file_name()
+        .map_or(one.path.clone(), |name| name.to_string_lossy().into_owned());
+    let what = match (is_missing, one.is_image) {
+        (true, _) => " (missing)",
+        (false, true) => " (image)",
+        (false, false) => "",
+    };
+    let can = !is_missing && (!one.is_image || shown.scene.is_some());
+    let button = ui.add_enabled(can, Button::new(format!("{name}{what}")).truncate());
+    let button = button.on_hover_text(&one.path).on_disabled_hover_text(&one.path);
+    if button.clicked() {
+        actions.push(match one.purpose() {
+            Purpose::Image => Action::LoadImage(path),
+            _ => {
+                state.scene_path.clone_from(&one.path);
+                Action::LoadScene(path)
+            }
+        });
     }
 }
 

@@ -1,6 +1,7 @@
 //! Which needle of a plan is next, and what the script does.
 
-use super::{Progress, SCRIPTED_STEPS, is_needle_done, next_action, progress, run_name, run_ui, waits};
+use super::run::{run_name, waits};
+use super::{Progress, SCRIPTED_STEPS, is_needle_done, next_action, progress, run_ui};
 use crate::action::{Action, PlanAction};
 use crate::planner::Planner;
 use crate::planner::tests::{planned, planner, planning};

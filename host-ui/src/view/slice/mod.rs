@@ -19,6 +19,7 @@ use field::Field;
 pub use gpu::ImageError;
 use gpu::SliceGpu;
 use nalgebra::{Matrix3, Vector3};
+pub use overlay::words;
 use overlay::{Lines, Overlay};
 pub use plane::Plane;
 use std::sync::Arc;
@@ -29,6 +30,8 @@ use stylet_shm_schema::{SceneId, Text, role};
 /// Of the target, this much is seen at first.
 const MARGIN: f64 = 1.45;
 const ZOOMS: [f64; 2] = [0.2, 12.0];
+/// A lower picture does not say why it is empty.
+pub const ROOM_FOR_REASON: f32 = 170.0;
 /// The tip is taken hold of within this many points.
 const HANDLE: f32 = 16.0;
 const M_PER_SCROLLED_POINT: f64 = 0.05e-3;
@@ -202,7 +205,12 @@ impl Slices {
         let painter = ui.painter_at(rect);
         painter.rect_filled(rect, 0.0, IMAGE.background);
         if shown.scene.is_none() {
-            overlay::words(&painter, rect, &format!("{}: no scene yet", orientation.name()));
+            words(
+                &painter,
+                rect,
+                &format!("{}: no scene yet", orientation.name()),
+                IMAGE.text,
+            );
             return None;
         }
         let scale = ui.ctx().pixels_per_point();
@@ -216,13 +224,11 @@ impl Slices {
                 let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
                 painter.image(texture, rect, whole, Color32::WHITE);
             }
-            None => {
-                overlay::words(
-                    &painter,
-                    rect,
-                    "No slice: no wgpu device, or the scene is too large for it",
-                );
+            None if rect.height() >= ROOM_FOR_REASON => {
+                let why = "No slice: no wgpu device, or the scene is too large for it";
+                words(&painter, rect, why, IMAGE.text);
             }
+            None => {}
         }
         let dose = dose.filter(|_| view.isodose);
         // One slice a frame, so that no frame waits for all three.

@@ -8,7 +8,8 @@ use crate::shown::Shown;
 use crate::theme::IMAGE;
 use crate::view::orientation::Orientation;
 use crate::view::state::ViewState;
-use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2};
+use egui::text::LayoutJob;
+use egui::{Align, Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2};
 use nalgebra::Vector3;
 use std::sync::Arc;
 use stylet_base::format;
@@ -72,15 +73,21 @@ impl Lines {
     }
 }
 
-pub fn words(painter: &Painter, rect: Rect, text: &str) {
-    painter.text(
-        rect.center(),
-        Align2::CENTER_CENTER,
-        text,
-        FontId::proportional(12.5),
-        IMAGE.text,
-    );
+/// In the middle of a picture, in as many lines as it takes.
+pub fn words(painter: &Painter, rect: Rect, text: &str, color: Color32) {
+    let font = FontId::proportional(12.5);
+    let mut job = LayoutJob::simple(text.to_owned(), font, color, rect.width() - 48.0);
+    job.halign = Align::Center;
+    let galley = painter.layout_job(job);
+    // Its places are counted from the middle.
+    let at = rect.center() - Vec2::new(0.0, galley.size().y / 2.0);
+    painter.galley(at, galley, color);
 }
+
+/// Smaller pictures have no room for every word.
+const ROOM_FOR_LEGEND: f32 = 170.0;
+const ROOM_FOR_UPPER_LETTER: f32 = 270.0;
+const ROOM_FOR_LETTERS: f32 = 80.0;
 
 pub struct Overlay<'a> {
     pub painter: &'a Painter,
@@ -106,7 +113,8 @@ impl Overlay<'_> {
         self.measure();
         self.letters();
         self.scale_bar();
-        if with_dose && self.orientation == Orientation::Axial {
+        let has_room = self.plane.rect.height() >= ROOM_FOR_LEGEND;
+        if with_dose && has_room && self.orientation == Orientation::Axial {
             self.isodose_legend();
         }
     }
@@ -249,9 +257,13 @@ impl Overlay<'_> {
         let rect = self.plane.rect.shrink(6.0);
         let [left, right, top, bottom] = self.orientation.letters();
         let word = |at, anchor, text| self.word(at, anchor, text, 12.0, IMAGE.text);
-        word(rect.left_center(), Align2::LEFT_CENTER, left);
-        word(rect.right_center(), Align2::RIGHT_CENTER, right);
-        word(rect.center_top(), Align2::CENTER_TOP, top);
+        if rect.height() >= ROOM_FOR_LETTERS {
+            word(rect.left_center(), Align2::LEFT_CENTER, left);
+            word(rect.right_center(), Align2::RIGHT_CENTER, right);
+        }
+        if rect.width() >= ROOM_FOR_UPPER_LETTER {
+            word(rect.center_top(), Align2::CENTER_TOP, top);
+        }
         word(rect.center_bottom(), Align2::CENTER_BOTTOM, bottom);
         let title = format!("{}  {}", self.orientation.name(), self.place());
         self.word(

@@ -3,6 +3,8 @@
 use super::super::{WorkflowState, debrief, hinted, main_button, progress, undo_action};
 use super::summary;
 use crate::action::{Action, PlanAction};
+use crate::dialog::Purpose;
+use crate::panel::field::path_ui;
 use crate::panel::workflow::Undo;
 use crate::panel::workflow::job::job_ui;
 use crate::planner::Implant;
@@ -148,13 +150,30 @@ fn strength_ui(ui: &mut egui::Ui, implant: &Implant, free: bool, actions: &mut V
     });
 }
 
+/// Buttons beside the field of the plan's file.
+const BESIDE_FIELD: f32 = 170.0;
+
+/// By name of the format.
+fn dialogs_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
+    let menu = ui.menu_button("…", |ui| {
+        let import = [(Purpose::ImportPlan, progress::is_before_needles(shown))];
+        let saves = Purpose::SAVES.map(|purpose| (purpose, shown.planning.implant.is_some()));
+        for (purpose, can) in import.into_iter().chain(saves) {
+            if ui
+                .add_enabled(can, Button::new(format!("{}…", purpose.title())))
+                .clicked()
+            {
+                actions.push(Action::PickFile(purpose));
+            }
+        }
+    });
+    menu.response.on_hover_text("Choose the file in a dialog");
+}
+
 fn file_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bool, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
-        let hint = "or drop a file";
-        let edit = egui::TextEdit::singleline(&mut state.plan.path)
-            .hint_text(hint)
-            .desired_width(ui.available_width() - 126.0);
-        let field = ui.add(edit);
+        let width = ui.available_width() - BESIDE_FIELD;
+        let field = path_ui(ui, "plan file", &mut state.plan.path, "or drop a file", width);
         field.widget_info(|| {
             egui::WidgetInfo::labeled(egui::accesskit::Role::TextInput, true, "Plan file: .toml, .csv or .dcm")
         });
@@ -171,5 +190,6 @@ fn file_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bo
         if export.on_hover_text("To the file named at the left").clicked() {
             actions.push(Action::Plan(PlanAction::Export(PathBuf::from(path))));
         }
+        ui.add_enabled_ui(free, |ui| dialogs_ui(ui, shown, actions));
     });
 }

@@ -61,9 +61,13 @@ impl PlanState {
     }
 }
 
+/// Where there is less, the panel as a whole scrolls.
+const LEAST_HEIGHT: f32 = 620.0;
+
 /// The right panel while a plan of many needles is edited.
-pub fn editor_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut PlanState) -> Vec<Action> {
+pub fn editor_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut PlanState, height: f32) -> Vec<Action> {
     let mut actions = Vec::new();
+    ui.set_max_height(height.max(LEAST_HEIGHT));
     let Some(implant) = &shown.planning.implant else {
         return actions;
     };
@@ -72,11 +76,12 @@ pub fn editor_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut PlanState) -> Vec
     ui.add_enabled_ui(free, |ui| {
         template::template_ui(ui, shown, implant, state, &mut actions);
         needle::needle_ui(ui, shown, implant, state, &mut actions);
-        ui.separator();
-        list::list_ui(ui, implant, state);
-        ui.separator();
-        findings::findings_ui(ui, shown.dose.as_deref(), implant, state);
     });
+    // Looked through at any time, also while the script runs.
+    ui.separator();
+    list::list_ui(ui, implant, state);
+    ui.separator();
+    findings::findings_ui(ui, shown.dose.as_deref(), implant, state);
     actions
 }
 

@@ -1,0 +1,44 @@
+//! Files that are chosen in a dialog.
+
+use super::{App, refusal};
+use crate::action::{Action, PlanAction};
+use crate::dialog::{Picked, Purpose};
+
+impl App {
+    pub(super) fn pick_file(&mut self, purpose: Purpose) {
+        let beside = match purpose {
+            Purpose::Scene | Purpose::Image => &self.workflow.scene_path,
+            _ => &self.workflow.plan.path,
+        };
+        self.dialogs.begin(purpose, beside);
+    }
+
+    /// What is done with the file of a dialog that was closed.
+    pub(super) fn picked_file(&mut self) -> Option<Action> {
+        let (purpose, picked) = self.dialogs.poll()?;
+        let path = match picked {
+            Picked::File(path) => path,
+            Picked::Nothing => return None,
+            Picked::Failed(why) => {
+                self.shown.note = Some(refusal(format!("{}: {why}", purpose.title())));
+                return None;
+            }
+        };
+        let typed = path.display().to_string();
+        Some(match purpose {
+            Purpose::Scene => {
+                self.workflow.scene_path = typed;
+                Action::LoadScene(path)
+            }
+            Purpose::Image => Action::LoadImage(path),
+            Purpose::ImportPlan => {
+                self.workflow.plan.path = typed;
+                Action::Plan(PlanAction::Import(path))
+            }
+            Purpose::SavePlan | Purpose::SaveTable | Purpose::SaveRtPlan => {
+                self.workflow.plan.path = typed;
+                Action::Plan(PlanAction::Export(path))
+            }
+        })
+    }
+}

@@ -1,0 +1,6 @@
+//! The whole window without a core and without a graphics device: what is clipped, what overlaps, what moves.
+
+mod fixture;
+mod held;
+mod text;
+mod whole;

@@ -1,0 +1,188 @@
+//! Every state of the window in all its sizes, with the longest words that there are.
+
+use super::fixture::{Drawn, LONG_PATH, dose, live, many_needles, one_needle};
+use super::text::misplaced;
+use crate::app::App;
+use crate::app::layout::Narrow;
+use crate::panel::workflow::Progress;
+use crate::shown::{LoadState, Note, Shown};
+use stylet_host::link::LinkStatus;
+use stylet_procedure::{Step, Waiting, WaitsFor};
+use stylet_shm_schema::{Fault, Text};
+
+type State = (&'static str, fn(&mut App));
+
+const STATES: &[State] = &[
+    ("absent", |app| {
+        app.shown.status = LinkStatus::Absent {
+            why: format!(
+                "an rt-core of another version is running (schema 6, this program has 7): start the one beside {LONG_PATH}"
+            ),
+        };
+    }),
+    ("silent", |app| {
+        app.shown = live();
+        app.shown.status = LinkStatus::Silent {
+            since: std::time::Duration::from_secs(12_345),
+        };
+    }),
+    ("every banner", |app| {
+        app.shown = live();
+        every_banner(&mut app.shown);
+    }),
+    ("scene", |app| app.shown = live()),
+    ("file is read", |app| {
+        app.shown = live();
+        app.shown.load = LoadState::Reading(format!("{LONG_PATH}: resampling to the lattice"), 0.4);
+        app.workflow.scene_path = LONG_PATH.to_owned();
+    }),
+    ("file is refused", |app| {
+        app.shown = live();
+        app.shown.load = LoadState::Refused(format!("{LONG_PATH}: it is no volume, no scene and no DICOM file"));
+        app.shown.note = Some(Note {
+            refused: true,
+            text: format!("Debrief not saved: {LONG_PATH}/debrief.html: permission denied; choose another folder"),
+        });
+    }),
+    ("parameters", |app| {
+        app.shown = live();
+        app.parameters.open = true;
+    }),
+    ("help", |app| {
+        app.shown = live();
+        app.help = true;
+    }),
+    ("planned", |app| app.shown = one_needle(0.0, 0)),
+    ("inserting", |app| app.shown = one_needle(0.03, 0)),
+    ("dropping", |app| {
+        app.shown = one_needle(0.06, 2);
+        app.shown.dose = Some(dose(2));
+    }),
+    ("debrief", |app| {
+        app.shown = one_needle(0.0, 5);
+        app.shown.dose = Some(dose(5));
+    }),
+    ("plan of many needles", |app| app.shown = many_needles(24, 0)),
+    ("plan is made", |app| {
+        app.shown = many_needles(24, 0);
+        app.workflow.plan.path = LONG_PATH.to_owned();
+        every_banner(&mut app.shown);
+    }),
+    ("needle 2 of 19", |app| {
+        app.shown = many_needles(19, 2);
+        running(&mut app.shown, None);
+    }),
+    ("needle 2 of 19 waits", |app| {
+        app.shown = many_needles(19, 2);
+        let waits_for = WaitsFor::Tip { off_along_m: -0.1234 };
+        running(
+            &mut app.shown,
+            Some(Waiting {
+                waits_for,
+                for_s: 1234.0,
+            }),
+        );
+    }),
+    ("instruments in a narrow window", |app| {
+        app.shown = one_needle(0.03, 2);
+        app.narrow = Narrow::Right;
+    }),
+    ("needles in a narrow window", |app| {
+        app.shown = many_needles(24, 0);
+        app.narrow = Narrow::Right;
+    }),
+    ("goes on at needle 2 of 19", |app| {
+        app.shown = many_needles(19, 2);
+        app.shown.continues_at = Some((1, 19));
+    }),
+];
+
+fn running(shown: &mut Shown, waits: Option<Waiting>) {
+    (shown.running, shown.run_step, shown.run_needle) = (true, Some(Step::Place), Some((1, 19)));
+    shown.run_waits = waits;
+}
+
+fn every_banner(shown: &mut Shown) {
+    if let Some(state) = &mut shown.state {
+        (state.fault, state.flags) = (Fault::DeviceSilent as u32, 0);
+    }
+    if let Some(session) = &mut shown.session {
+        session.advice =
+            Text::new(&"allow rtprio for this user in /etc/security/limits.d and log in again\n".repeat(9));
+    }
+    (shown.refusals, shown.last_refusal) = (12_345, "needle.puncture_depth = 1000 mm\n".repeat(8));
+    shown.disconnected = Some("3Dconnexion SpaceMouse Pro Wireless (cabled), with a long name".to_owned());
+    shown.controllers.denied = vec![format!(
+        "/dev/input/event17 may not be read; run: sudo usermod -aG input $USER, {LONG_PATH}"
+    )];
+}
+
+/// "Stop" and every "done" were cut off while many needles ran, at every size; nothing looked for it.
+fn assert_in_place(pixels: [f32; 2], scales: &[f32]) {
+    let mut problems = Vec::new();
+    for scale in scales {
+        for (name, make) in STATES {
+            let mut drawn = Drawn::new(pixels, *scale);
+            make(&mut drawn.app);
+            let at = format!("{name}, {} x {}, {} %", pixels[0], pixels[1], scale * 100.0);
+            problems.extend(
+                misplaced(&mut drawn)
+                    .into_iter()
+                    .map(|problem| format!("{at}: {problem}")),
+            );
+        }
+    }
+    assert!(
+        problems.is_empty(),
+        "{} problems:\n{}",
+        problems.len(),
+        problems.join("\n")
+    );
+}
+
+#[test]
+fn no_text_is_cut_off_or_lies_over_another_at_1280_x_720() {
+    assert_in_place([1280.0, 720.0], &[1.0, 1.5, 2.0]);
+}
+
+#[test]
+fn no_text_is_cut_off_or_lies_over_another_at_1366_x_768() {
+    assert_in_place([1366.0, 768.0], &[1.0, 1.5, 2.0]);
+}
+
+/// 150 % are as many points as 1280 x 720.
+#[test]
+fn no_text_is_cut_off_or_lies_over_another_at_1920_x_1080() {
+    assert_in_place([1920.0, 1080.0], &[1.0, 2.0]);
+}
+
+/// 200 % are as many points as 1920 x 1080.
+#[test]
+fn no_text_is_cut_off_or_lies_over_another_at_3840_x_2160() {
+    assert_in_place([3840.0, 2160.0], &[1.0, 1.5]);
+}
+
+/// Steps that are opened by hand.
+#[test]
+fn no_text_is_cut_off_in_a_step_that_was_opened_by_hand() {
+    let mut problems = Vec::new();
+    for (pixels, scale) in [([1280.0, 720.0], 1.0), ([1280.0, 720.0], 2.0)] {
+        for step in Progress::ALL {
+            for make in [|| many_needles(24, 1), || one_needle(0.03, 3)] {
+                let mut drawn = Drawn::new(pixels, scale);
+                drawn.app.shown = make();
+                drawn.frame();
+                drawn.app.workflow.open_by_hand(step);
+                let found = misplaced(&mut drawn);
+                let at = format!("{}, {} x {}, {} %", step.name(), pixels[0], pixels[1], scale * 100.0);
+                problems.extend(found.into_iter().map(|problem| format!("{at}: {problem}")));
+            }
+        }
+    }
+    assert!(
+        problems.is_empty(),
+        "{} problems:\n{}",
+        problems.len(),
+        problems.join("\n")
+    );
+}

@@ -1,0 +1,206 @@
+//! Native dialogs for files, through the desktop's portal, on a thread of its own: a frame never waits for one.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use stylet_base::job::{Job, JobUpdate};
+
+/// Nobody closes a dialog faster than this: it never opened.
+const OPENS_WITHIN: Duration = Duration::from_millis(400);
+
+/// What a file is chosen for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// A segmentation or a scene file.
+    Scene,
+    /// An image of the patient of the scene.
+    Image,
+    /// A plan to read.
+    ImportPlan,
+    /// A plan to write, with all that it holds.
+    SavePlan,
+    /// Its seeds as a table.
+    SaveTable,
+    /// Its seeds as a DICOM RT Plan.
+    SaveRtPlan,
+}
+
+impl Purpose {
+    /// The ways to save a plan.
+    pub const SAVES: [Self; 3] = [Self::SavePlan, Self::SaveTable, Self::SaveRtPlan];
+
+    /// What the dialog, and the entry of the menu that opens it, are called.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Scene => "Open a scene",
+            Self::Image => "Open an image",
+            Self::ImportPlan => "Import a plan",
+            Self::SavePlan => "Save as Stylet plan (.toml)",
+            Self::SaveTable => "Save seeds as table (.csv)",
+            Self::SaveRtPlan => "Save seeds as DICOM RT Plan (.dcm)",
+        }
+    }
+
+    fn is_for_writing(self) -> bool {
+        Self::SAVES.contains(&self)
+    }
+
+    /// Names of the formats, each with its endings.
+    fn formats(self) -> &'static [(&'static str, &'static [&'static str])] {
+        match self {
+            Self::Scene => &[
+                (
+                    "Scenes and segmentations",
+                    &["toml", "nii", "gz", "nrrd", "nhdr", "mha", "mhd", "dcm"],
+                ),
+                ("All files", &["*"]),
+            ],
+            Self::Image => &[
+                ("Images", &["nii", "gz", "nrrd", "nhdr", "mha", "mhd", "dcm"]),
+                ("All files", &["*"]),
+            ],
+            Self::ImportPlan => &[("Plans", &["toml", "csv", "dcm"]), ("All files", &["*"])],
+            Self::SavePlan => &[("Stylet plan", &["toml"])],
+            Self::SaveTable => &[("Table of seeds", &["csv"])],
+            Self::SaveRtPlan => &[("DICOM RT Plan", &["dcm"])],
+        }
+    }
+}
+
+/// How a dialog ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Picked {
+    /// With a file.
+    File(PathBuf),
+    /// Closed without one.
+    Nothing,
+    /// It never opened.
+    Failed(DialogError),
+}
+
+/// No dialog could be opened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DialogError {
+    /// Neither a session bus nor zenity is there.
+    #[error(
+        "this desktop has no file dialog (no session bus with a portal, no zenity): type the path into the field instead"
+    )]
+    NoDesktop,
+    /// The portal did not answer, or refused.
+    #[error(
+        "the desktop's file dialog did not open (is xdg-desktop-portal installed?): type the path into the field instead"
+    )]
+    NotOpened,
+    /// Its thread ended without an outcome.
+    #[error("the file dialog ended without an answer: type the path into the field instead")]
+    Ended,
+}
+
+/// One dialog at a time.
+#[derive(Default)]
+pub struct Dialogs {
+    open: Option<(Purpose, Job<Picked>)>,
+}
+
+impl Dialogs {
+    /// Opens a dialog in the folder of a file that is known, unless one is open.
+    pub fn begin(&mut self, purpose: Purpose, beside: &str) {
+        if self.open.is_some() {
+            return;
+        }
+        let folder = Path::new(beside.trim()).parent().map(Path::to_owned);
+        let job = Job::begin("file dialog", move |answer, _| {
+            // The window may be closed by now; then nobody reads the answer.
+            let _ = answer.send(pick(purpose, folder));
+        });
+        self.open = Some((purpose, job));
+    }
+
+    /// Each outcome once.
+    pub fn poll(&mut self) -> Option<(Purpose, Picked)> {
+        let (purpose, job) = self.open.as_ref()?;
+        let (purpose, picked) = match job.poll() {
+            JobUpdate::Pending => return None,
+            JobUpdate::Message(picked) => (*purpose, picked),
+            JobUpdate::Ended => (*purpose, Picked::Failed(DialogError::Ended)),
+        };
+        self.open = None;
+        Some((purpose, picked))
+    }
+}
+
+fn pick(purpose: Purpose, folder: Option<PathBuf>) -> Picked {
+    if !is_possible(|name| std::env::var_os(name).map(PathBuf::from)) {
+        return Picked::Failed(DialogError::NoDesktop);
+    }
+    let mut dialog = rfd::FileDialog::new().set_title(purpose.title());
+    for (name, endings) in purpose.formats() {
+        dialog = dialog.add_filter(*name, endings);
+    }
+    if let Some(folder) = folder.filter(|folder| folder.is_dir()) {
+        dialog = dialog.set_directory(folder);
+    }
+    let begun = Instant::now();
+    let picked = if purpose.is_for_writing() {
+        dialog.save_file()
+    } else {
+        dialog.pick_file()
+    };
+    match picked {
+        Some(path) => Picked::File(with_ending(purpose, path)),
+        None if begun.elapsed() < OPENS_WITHIN => Picked::Failed(DialogError::NotOpened),
+        None => Picked::Nothing,
+    }
+}
+
+/// A session bus that could have a portal, or zenity.
+fn is_possible(variable: impl Fn(&str) -> Option<PathBuf>) -> bool {
+    let has_bus = variable("DBUS_SESSION_BUS_ADDRESS").is_some_and(|address| !address.as_os_str().is_empty())
+        || variable("XDG_RUNTIME_DIR").is_some_and(|folder| folder.join("bus").exists());
+    let has_display = ["DISPLAY", "WAYLAND_DISPLAY"]
+        .iter()
+        .any(|name| variable(name).is_some());
+    let paths = variable("PATH").unwrap_or_default();
+    has_bus || (has_display && std::env::split_paths(&paths).any(|folder| folder.join("zenity").exists()))
+}
+
+/// A plan's format goes by its ending.
+fn with_ending(purpose: Purpose, path: PathBuf) -> PathBuf {
+    let ending = match purpose {
+        Purpose::SavePlan => "toml",
+        Purpose::SaveTable => "csv",
+        Purpose::SaveRtPlan => "dcm",
+        Purpose::Scene | Purpose::Image | Purpose::ImportPlan => return path,
+    };
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
+        return path;
+    }
+    let mut named = path.into_os_string();
+    named.push(".");
+    named.push(ending);
+    named.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_a_desktop_the_failure_says_what_to_do_and_no_dialog_is_tried() {
+        assert!(!is_possible(|_| None));
+        assert!(!is_possible(|name| (name == "DISPLAY").then(|| PathBuf::from(":99"))));
+        assert!(is_possible(
+            |name| (name == "DBUS_SESSION_BUS_ADDRESS").then(|| "unix:path=/x".into())
+        ));
+        for error in [DialogError::NoDesktop, DialogError::NotOpened, DialogError::Ended] {
+            assert!(error.to_string().contains("type the path into the field"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_plan_is_saved_in_the_format_that_was_chosen() {
+        let named = |purpose, path: &str| with_ending(purpose, PathBuf::from(path));
+        assert_eq!(named(Purpose::SaveTable, "a/plan.v2"), Path::new("a/plan.v2.csv"));
+        assert_eq!(named(Purpose::SaveRtPlan, "a/PLAN.DCM"), Path::new("a/PLAN.DCM"));
+        assert_eq!(named(Purpose::Scene, "a/gland"), Path::new("a/gland"));
+    }
+}

@@ -1,0 +1,109 @@
+//! The row above the steps: the scripted hand, how far it is, and its end.
+
+use super::{Progress, hinted, missing};
+use crate::action::Action;
+use crate::shown::Shown;
+use crate::theme;
+use egui::{Align, Button, Layout};
+use stylet_implant::workflow::Step;
+
+/// What the script does of a plan of one needle, by the numbers in the panel.
+pub const SCRIPTED_STEPS: &str = "steps 2 to 6";
+/// The button that runs the script, and with the line under it.
+const RUN_BUTTON: f32 = 28.0;
+const RUN_HEIGHT: f32 = RUN_BUTTON + theme::GAP + 24.0;
+/// Waiting for longer is shown.
+const SHOW_WAITING_S: f64 = 2.0;
+
+/// Always as high, running or not.
+pub fn run_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
+    ui.heading("Procedure");
+    let size = egui::vec2(ui.available_width(), RUN_HEIGHT);
+    ui.allocate_ui(size, |ui| {
+        ui.set_min_size(size);
+        match shown.running {
+            true => running_ui(ui, shown, actions),
+            false => begin_ui(ui, shown, actions),
+        }
+    });
+}
+
+fn running_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
+    let step = match shown.run_step {
+        Some(Step::Plan) => "planning",
+        Some(Step::Place) => "placing the needle",
+        Some(Step::Insert) => "inserting",
+        Some(Step::Drop) => "dropping the seeds",
+        Some(Step::Retract) => "retracting",
+        Some(Step::Settle) => "waiting for the tissue to rest",
+        Some(Step::Done) | None => "finishing",
+    };
+    ui.horizontal(|ui| {
+        ui.set_min_height(RUN_BUTTON);
+        ui.spinner();
+        ui.label(match shown.run_needle {
+            Some((needle, count)) => format!("Needle {} of {count}", needle + 1),
+            None => "Running".to_owned(),
+        });
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            if ui.button("Stop").clicked() {
+                actions.push(Action::StopRun);
+            }
+        });
+    });
+    // On a line of its own: as long as it is, it may not make the panel wider.
+    let text = match waits(shown) {
+        Some(waits) => format!("{step}: {waits}"),
+        None => step.to_owned(),
+    };
+    ui.add(egui::Label::new(theme::weak(text)).truncate());
+}
+
+fn begin_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
+    let wide = egui::vec2(ui.available_width(), RUN_BUTTON);
+    let blocked = missing(shown, Progress::Plan);
+    let response = ui.add_enabled(blocked.is_none(), Button::new(run_name(shown)).min_size(wide));
+    if hinted(response, blocked).on_hover_text(run_help(shown)).clicked() {
+        actions.push(Action::RunAll);
+    }
+    if shown.continues_at.is_none() {
+        ui.add(egui::Label::new(theme::small(run_help(shown))).truncate());
+        return;
+    }
+    let anew = ui.add_enabled(shown.is_live(), Button::new("Start over"));
+    let help = "Takes all seeds out of the tissue and begins at the first needle";
+    if anew.on_hover_text(help).clicked() {
+        actions.push(Action::StartOver);
+    }
+}
+
+/// What the script waits for, once that takes longer than usual.
+pub(super) fn waits(shown: &Shown) -> Option<String> {
+    let waiting = shown.run_waits.filter(|waiting| waiting.for_s >= SHOW_WAITING_S)?;
+    Some(format!("waiting for {}, {:.0} s", waiting.waits_for, waiting.for_s))
+}
+
+pub(super) fn run_name(shown: &Shown) -> String {
+    if let Some((needle, count)) = shown.continues_at {
+        return format!("Continue at needle {} of {count}", needle + 1);
+    }
+    match needle_count(shown) {
+        0 => format!("Run {SCRIPTED_STEPS}"),
+        count => format!("Run all {count} needles"),
+    }
+}
+
+fn run_help(shown: &Shown) -> &'static str {
+    if shown.continues_at.is_some() {
+        return "The seeds in the tissue stay; the scripted hand goes on with the first seed that is missing";
+    }
+    match needle_count(shown) {
+        0 => "A scripted hand plans five seeds, places the needle, inserts it, drops the seeds and retracts it",
+        _ => "A scripted hand places each needle in turn, inserts it, drops its seeds and retracts it",
+    }
+}
+
+/// Needles of the plan of many; 0 where the script plans the only one.
+fn needle_count(shown: &Shown) -> usize {
+    shown.planning.implant.as_ref().map_or(0, |i| i.plan.needles.len())
+}

@@ -1,0 +1,106 @@
+//! Files that were opened last, as the settings keep them, and which of them are missing.
+
+use crate::dialog::Purpose;
+use serde::{Deserialize, Serialize};
+use stylet_base::job::{Job, JobUpdate};
+
+/// So many are kept.
+pub const MOST: usize = 10;
+const LONGEST: usize = 4096;
+
+/// A file that was opened.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Recent {
+    /// Where it lies.
+    pub path: String,
+    /// It was opened as an image, and not as a scene.
+    pub is_image: bool,
+}
+
+impl Recent {
+    /// What it was opened for.
+    pub fn purpose(&self) -> Purpose {
+        if self.is_image { Purpose::Image } else { Purpose::Scene }
+    }
+}
+
+/// Puts a file first, once.
+pub fn remember(list: &mut Vec<Recent>, path: String, is_image: bool) {
+    let one = Recent { path, is_image };
+    list.retain(|other| *other != one);
+    list.insert(0, one);
+    list.truncate(MOST);
+}
+
+/// What a settings file holds may be anything.
+pub fn checked(mut list: Vec<Recent>) -> Vec<Recent> {
+    list.retain(|one| !one.path.is_empty() && one.path.len() <= LONGEST);
+    list.truncate(MOST);
+    list
+}
+
+/// Looks for the files on a thread of its own: they may lie on a share that does not answer.
+#[derive(Default)]
+pub struct Missing {
+    looking: Option<Job<Vec<Recent>>>,
+    found: Vec<Recent>,
+}
+
+impl Missing {
+    /// Looks again.
+    pub fn look(&mut self, list: &[Recent]) {
+        let list = list.to_vec();
+        self.looking = Some(Job::begin("recent files", move |answer, _| {
+            let missing = list.into_iter().filter(|one| !std::path::Path::new(&one.path).exists());
+            // The window may be closed by now; then nobody reads the answer.
+            let _ = answer.send(missing.collect());
+        }));
+    }
+
+    /// Whether a file is missing, as far as is known.
+    pub fn has(&mut self, one: &Recent) -> bool {
+        if let Some(JobUpdate::Message(found)) = self.looking.as_ref().map(Job::poll) {
+            (self.found, self.looking) = (found, None);
+        }
+        self.found.contains(one)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_newest_file_stands_first_and_ten_are_kept() {
+        let mut list = Vec::new();
+        for n in 0..14 {
+            remember(&mut list, format!("{n}.nrrd"), false);
+        }
+        remember(&mut list, "9.nrrd".to_owned(), false);
+        assert_eq!((list.len(), list[0].path.as_str()), (MOST, "9.nrrd"));
+        assert_eq!(list.iter().filter(|one| one.path == "9.nrrd").count(), 1);
+        list.push(Recent {
+            path: "x".repeat(LONGEST + 1),
+            is_image: true,
+        });
+        assert_eq!(checked(list).len(), MOST);
+    }
+
+    #[test]
+    fn files_that_are_missing_are_found_without_waiting() {
+        let here = Recent {
+            path: env!("CARGO_MANIFEST_DIR").to_owned(),
+            is_image: false,
+        };
+        let not_here = Recent {
+            path: "/no/such/file.nrrd".to_owned(),
+            is_image: false,
+        };
+        let mut missing = Missing::default();
+        missing.look(&[here.clone(), not_here.clone()]);
+        while !missing.has(&not_here) {
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
+        assert!(!missing.has(&here));
+    }
+}
