@@ -142,7 +142,7 @@ fn seed_alone(found: &mut Found, needle: &Needle, seed: usize, place_m: [f64; 3]
     }
 }
 
-fn is_in_target(anatomy: &Anatomy, place_m: [f64; 3], direction: [f64; 3]) -> bool {
+pub(super) fn is_in_target(anatomy: &Anatomy, place_m: [f64; 3], direction: [f64; 3]) -> bool {
     let shifted = |by_m: f64| [0, 1, 2].map(|a| place_m[a] + direction[a] * by_m);
     [0.0, EDGE_M, -EDGE_M]
         .into_iter()

@@ -11,6 +11,7 @@ mod error;
 pub mod exchange;
 pub mod file;
 mod needle;
+pub mod optimise;
 pub mod rehearse;
 pub mod seeds;
 mod template;

@@ -1,0 +1,215 @@
+//! Inverse planning: needles, places of seeds and one strength from a catalogue, chosen so that the dose keeps its limits.
+//!
+//! The dose of a seed at each possible place is computed once at a few thousand points; a search then changes seeds, needles and the
+//! strength. The full dose engine judges what it found; where the sample points were wrong about a limit, the search goes on with
+//! that limit moved by the error.
+
+pub mod annealing;
+pub mod candidates;
+mod figures;
+mod greedy;
+mod objective;
+mod samples;
+mod state;
+
+pub use figures::{Engine, Figures, Measure};
+
+use super::anatomy::Body;
+use super::dose::criteria::DoseStructure;
+use super::dose::{DoseKernel, Source};
+use super::{Anatomy, ImplantPlan, PlanError, Template};
+use annealing::Schedule;
+use candidates::Candidates;
+use objective::Limits;
+use samples::Samples;
+use state::State;
+use std::ops::ControlFlow;
+
+/// How the search goes on from the greedy choice of seeds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Single seeds are exchanged as long as that helps.
+    GreedyExchange,
+    /// Simulated annealing.
+    Annealing,
+}
+
+/// What a plan aims at; limits of the dose are those of [`Figures::measures`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Objectives {
+    /// Prescribed dose, Gy.
+    pub prescription_gy: f64,
+    /// Needles at most.
+    pub needles: usize,
+    /// Strengths that can be ordered, U, weakest first.
+    pub strengths_u: Vec<f64>,
+}
+
+impl Objectives {
+    /// The usual ones for a source.
+    pub fn new(source: &Source, prescription_gy: f64) -> Self {
+        Self {
+            prescription_gy,
+            needles: 25,
+            strengths_u: catalogue_u(source, prescription_gy),
+        }
+    }
+}
+
+/// Strengths in which seeds are sold; for a source without a list, the same shares of the prescription at 1 cm as I-125 has.
+fn catalogue_u(source: &Source, prescription_gy: f64) -> Vec<f64> {
+    let steps = |from: f64, step: f64| (0..21).map(|n| from + f64::from(n) * step).collect();
+    match source.nuclide.as_str() {
+        "I-125" => steps(0.30, 0.02),
+        "Pd-103" => steps(1.2, 0.08),
+        _ => {
+            let whole_u = prescription_gy / source.reference_dose_gy_per_u();
+            steps(0.04 * whole_u, 0.003 * whole_u)
+        }
+    }
+}
+
+/// A plan with its measures.
+#[derive(Clone, Debug)]
+pub struct Proposal {
+    /// The plan.
+    pub plan: ImplantPlan,
+    /// Measures by the full dose engine.
+    pub figures: Figures,
+    /// The same at the sample points of the search.
+    pub sampled: Figures,
+    /// Holes before the target that bone closes.
+    pub behind_bone: usize,
+}
+
+/// Strengths beside the middle of a catalogue; the search moves from there.
+const FIRST_STRENGTH: usize = 7;
+/// The search, and corrections of it by what the full engine found.
+const ROUNDS: usize = 4;
+const FIRST_SEARCH: Schedule = Schedule {
+    moves: 60_000,
+    temperatures: [0.03, 0.0005],
+};
+const CORRECTION: Schedule = Schedule {
+    moves: 20_000,
+    temperatures: [0.004, 0.0003],
+};
+/// Share of all that is reported after the search begins and after its first round.
+const BEGUN: f32 = 0.1;
+const SEARCHED: f32 = 0.7;
+
+/// Target, urethra and rectum, by their names.
+pub fn bodies(anatomy: &Anatomy) -> [Option<&Body>; 3] {
+    let named = |which: DoseStructure| {
+        let mut spared = anatomy.spared.iter();
+        spared.find(|body| DoseStructure::of(&body.name, false) == Some(which))
+    };
+    [
+        Some(&anatomy.target),
+        named(DoseStructure::Urethra),
+        named(DoseStructure::Rectum),
+    ]
+}
+
+/// Searches for a plan; an error where no needle fits. `report` gets the share that is done; where it breaks, the search is cancelled.
+pub fn plan(
+    template: Template,
+    anatomy: &Anatomy,
+    kernel: &DoseKernel,
+    source: &str,
+    objectives: &Objectives,
+    method: Method,
+    report: impl Fn(f32) -> ControlFlow<()>,
+) -> Result<Proposal, PlanError> {
+    let cancelled = |flow: ControlFlow<()>| match flow {
+        ControlFlow::Break(()) => Err(PlanError::Cancelled),
+        ControlFlow::Continue(()) => Ok(()),
+    };
+    cancelled(report(0.0))?;
+    let candidates = Candidates::new(&template, anatomy);
+    if candidates.ways.is_empty() || objectives.strengths_u.is_empty() {
+        return Err(PlanError::NoWay);
+    }
+    let bodies = bodies(anatomy);
+    let samples = Samples::new(bodies, &candidates, kernel, objectives.prescription_gy);
+    cancelled(report(BEGUN / 2.0))?;
+    let engine = Engine::new(kernel, bodies);
+    let strengths_u = &objectives.strengths_u;
+    let limits = limits(objectives, None);
+    let first = FIRST_STRENGTH.min(strengths_u.len() - 1);
+    let mut state = State::empty(&candidates, &samples, strengths_u, first, limits);
+    cancelled(greedy::build(&mut state, &|_| report(BEGUN)))?;
+    let mut best: Option<Proposal> = None;
+    for round in 0..ROUNDS {
+        let span = match round {
+            0 => [BEGUN, SEARCHED],
+            n => [n - 1, n].map(|n| SEARCHED + (1.0 - SEARCHED) * n as f32 / (ROUNDS - 1) as f32),
+        };
+        let within = |share: f32| report(span[0] + (span[1] - span[0]) * share);
+        let schedule = if round == 0 { FIRST_SEARCH } else { CORRECTION };
+        cancelled(match method {
+            Method::GreedyExchange => greedy::exchange(&mut state, &within),
+            Method::Annealing => annealing::anneal(&mut state, &schedule, &within),
+        })?;
+        let found = judge(&mut state, &samples, &engine, (source, objectives))?;
+        state.set_limits(self::limits(objectives, Some((&found.figures, &found.sampled))));
+        if best.as_ref().is_none_or(|best| found.figures.beyond() < best.figures.beyond()) {
+            best = Some(found);
+        }
+        if best.as_ref().is_some_and(|best| best.figures.beyond() == 0.0) {
+            break;
+        }
+    }
+    best.ok_or(PlanError::NoDose)
+}
+
+/// The limits with a small reserve, moved by what the sample points were wrong.
+fn limits(objectives: &Objectives, seen: Option<(&Figures, &Figures)>) -> Limits {
+    let off = |of: fn(&Figures) -> f64| seen.map_or(0.0, |(full, sampled)| ((of(full) - of(sampled)) / 100.0) as f32);
+    let ratio = |of: fn(&Figures) -> Option<f64>| {
+        let both = seen.and_then(|(full, sampled)| of(full).zip(of(sampled)));
+        both.map_or(1.0, |(full, sampled)| (sampled / full).clamp(0.8, 1.2) as f32)
+    };
+    Limits {
+        cold: (0.05 - 0.006 + off(|f| f.v100)).clamp(0.01, 0.1),
+        hot: (0.60 - 0.008 - off(|f| f.v150)).clamp(0.4, 0.7),
+        urethra_tenth: 1.5 * 0.985 * ratio(|f| f.urethra_d10),
+        urethra_third: 1.3 * 0.985 * ratio(|f| f.urethra_d30),
+        rectum: 0.97 * ratio(|f| f.rectum_d2cc),
+        needles: objectives.needles,
+    }
+}
+
+/// The plan of a state with the strength that the full engine finds best, which the state takes over.
+fn judge(
+    state: &mut State,
+    samples: &Samples,
+    engine: &Engine,
+    (source, objectives): (&str, &Objectives),
+) -> Result<Proposal, PlanError> {
+    let of_one_u = state.candidates.plan(&state.chosen, 1.0, source, objectives.prescription_gy);
+    let histograms = engine.histograms(&of_one_u.seeds());
+    let figures = |strength: usize| histograms.figures(objectives.strengths_u[strength], objectives.prescription_gy);
+    let present = state.strength;
+    let mut best = (present, figures(present).ok_or(PlanError::NoDose)?);
+    for strength in 0..objectives.strengths_u.len() {
+        if let Some(found) = figures(strength)
+            && found.beyond() < best.1.beyond()
+        {
+            best = (strength, found);
+        }
+    }
+    let (strength, figures) = best;
+    state.set_strength(strength);
+    Ok(Proposal {
+        plan: of_one_u.with_strength(objectives.strengths_u[strength]),
+        figures,
+        sampled: Figures::of_samples(samples, &state.dose()).ok_or(PlanError::NoDose)?,
+        behind_bone: state.candidates.behind_bone,
+    })
+}
+
+#[cfg(test)]
+mod glands;
+#[cfg(test)]
+mod tests;
