@@ -10,6 +10,7 @@ pub mod edit;
 mod error;
 pub mod exchange;
 pub mod file;
+pub mod first;
 mod needle;
 pub mod optimise;
 pub mod rehearse;

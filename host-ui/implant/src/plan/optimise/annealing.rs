@@ -96,7 +96,11 @@ fn any_seed(state: &State, random: &mut ChaCha8Rng) -> Option<usize> {
 fn along(state: &State, seed: usize, random: &mut ChaCha8Rng) -> Option<usize> {
     let places = &state.candidates.ways[state.candidates.places[seed].way].places;
     let by = below(random, 2)? + 1;
-    let to = if random.next_u32() & 1 == 1 { seed + by } else { seed.checked_sub(by)? };
+    let to = if random.next_u32() & 1 == 1 {
+        seed + by
+    } else {
+        seed.checked_sub(by)?
+    };
     (places.contains(&to) && !state.chosen[to]).then_some(to)
 }
 
@@ -119,7 +123,11 @@ fn needle_aside(state: &State, random: &mut ChaCha8Rng) -> Option<Move> {
     if state.of_way[to] > 0 {
         return None;
     }
-    let without: Vec<usize> = candidates.ways[from].places.clone().filter(|&p| state.chosen[p]).collect();
+    let without: Vec<usize> = candidates.ways[from]
+        .places
+        .clone()
+        .filter(|&p| state.chosen[p])
+        .collect();
     Some(Move {
         with: nearest_places(state, &without, to),
         without,

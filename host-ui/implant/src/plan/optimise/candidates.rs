@@ -77,7 +77,9 @@ impl Candidates {
         let free_until = |bodies: &[crate::plan::anatomy::Body], margin_m: f64| {
             let steps = (to_m / STEP_M) as usize;
             let is_blocked = |along_m: f64| bodies.iter().any(|b| b.is_near(at(along_m), inwards, margin_m));
-            (0..=steps).map(|s| s as f64 * STEP_M).find(|along_m| is_blocked(*along_m))
+            (0..=steps)
+                .map(|s| s as f64 * STEP_M)
+                .find(|along_m| is_blocked(*along_m))
         };
         if free_until(&anatomy.bone, BONE_M).is_some() {
             self.behind_bone += 1;

@@ -11,7 +11,10 @@ pub fn build(state: &mut State, report: &dyn Fn(f32) -> ControlFlow<()>) -> Cont
     loop {
         report(0.0)?;
         let mut best: Option<(f32, Move)> = None;
-        for place in (0..state.chosen.len()).filter(|&place| !state.chosen[place]).collect::<Vec<_>>() {
+        for place in (0..state.chosen.len())
+            .filter(|&place| !state.chosen[place])
+            .collect::<Vec<_>>()
+        {
             let change = Move {
                 without: Vec::new(),
                 with: vec![place],

@@ -78,16 +78,18 @@ pub struct Proposal {
     pub figures: Figures,
     /// The same at the sample points of the search.
     pub sampled: Figures,
+    /// What the search made small, at the sample points; below 1 where limits are kept.
+    pub cost: f32,
     /// Holes before the target that bone closes.
     pub behind_bone: usize,
 }
 
-/// Strengths beside the middle of a catalogue; the search moves from there.
+/// Place in the catalogue that the search begins with, 0.44 U for I-125.
 const FIRST_STRENGTH: usize = 7;
 /// The search, and corrections of it by what the full engine found.
 const ROUNDS: usize = 4;
 const FIRST_SEARCH: Schedule = Schedule {
-    moves: 60_000,
+    moves: 100_000,
     temperatures: [0.03, 0.0005],
 };
 const CORRECTION: Schedule = Schedule {
@@ -153,7 +155,10 @@ pub fn plan(
         })?;
         let found = judge(&mut state, &samples, &engine, (source, objectives))?;
         state.set_limits(self::limits(objectives, Some((&found.figures, &found.sampled))));
-        if best.as_ref().is_none_or(|best| found.figures.beyond() < best.figures.beyond()) {
+        if best
+            .as_ref()
+            .is_none_or(|best| found.figures.beyond() < best.figures.beyond())
+        {
             best = Some(found);
         }
         if best.as_ref().is_some_and(|best| best.figures.beyond() == 0.0) {
@@ -187,7 +192,9 @@ fn judge(
     engine: &Engine,
     (source, objectives): (&str, &Objectives),
 ) -> Result<Proposal, PlanError> {
-    let of_one_u = state.candidates.plan(&state.chosen, 1.0, source, objectives.prescription_gy);
+    let of_one_u = state
+        .candidates
+        .plan(&state.chosen, 1.0, source, objectives.prescription_gy);
     let histograms = engine.histograms(&of_one_u.seeds());
     let figures = |strength: usize| histograms.figures(objectives.strengths_u[strength], objectives.prescription_gy);
     let present = state.strength;
@@ -205,6 +212,7 @@ fn judge(
         plan: of_one_u.with_strength(objectives.strengths_u[strength]),
         figures,
         sampled: Figures::of_samples(samples, &state.dose()).ok_or(PlanError::NoDose)?,
+        cost: state.cost,
         behind_bone: state.candidates.behind_bone,
     })
 }

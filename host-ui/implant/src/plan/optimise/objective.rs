@@ -10,12 +10,12 @@ const EDGE: f32 = 0.05;
 /// Cost of a share beyond its limit, beside 1 for a share of cold target within it.
 const BEYOND: f32 = 12.0;
 /// Cost of what is within its limit: less of it is still better.
-const WITHIN_HOT: f32 = 0.25;
+const WITHIN_HOT: f32 = 0.4;
 const WITHIN_SPARED: f32 = 0.05;
 /// How cold the cold part is, and how hot the hot part of the urethra.
 const DEPTH: f32 = 2.0;
-const NEEDLE: f32 = 1e-3;
-const SEED: f32 = 1e-4;
+const NEEDLE: f32 = 5e-4;
+const SEED: f32 = 5e-5;
 
 /// Limits as the search sees them: shares, and doses as shares of the prescription.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +35,14 @@ pub struct Limits {
 }
 
 /// The cost of a dose that is given for seeds of 1 U.
-pub fn cost(samples: &Samples, of_one_u: &[f32], strength_u: f32, limits: &Limits, needles: usize, seeds: usize) -> f32 {
+pub fn cost(
+    samples: &Samples,
+    of_one_u: &[f32],
+    strength_u: f32,
+    limits: &Limits,
+    needles: usize,
+    seeds: usize,
+) -> f32 {
     let group = |range: &std::ops::Range<usize>| (&of_one_u[range.clone()], &samples.weights[range.clone()]);
     let (dose, weights) = group(&samples.target);
     let [cold, depth, hot] = sums(dose, weights, |d| {
@@ -47,7 +54,11 @@ pub fn cost(samples: &Samples, of_one_u: &[f32], strength_u: f32, limits: &Limit
     let [tenth, third, over] = sums(dose, weights, |d| {
         let d = d * strength_u;
         let excess = (d - limits.urethra_third).max(0.0);
-        [above(d, limits.urethra_tenth), above(d, limits.urethra_third), excess.min(2.0)]
+        [
+            above(d, limits.urethra_tenth),
+            above(d, limits.urethra_third),
+            excess.min(2.0),
+        ]
     });
     let (dose, weights) = group(&samples.rectum);
     let [rectum] = sums(dose, weights, |d| [above(d * strength_u, limits.rectum)]);
@@ -99,6 +110,9 @@ mod tests {
         let [mean, cold] = sums(&dose, &weights, |d| [d, below(d, 1.0)]);
         assert!((mean - 0.99375).abs() < 1e-5, "{mean}");
         assert!((cold - 0.5).abs() < 0.04, "{cold}");
-        assert_eq!([above(1.0 + EDGE, 1.0), above(1.0 - EDGE, 1.0), above(1.0, 1.0)], [1.0, 0.0, 0.5]);
+        assert_eq!(
+            [above(1.0 + EDGE, 1.0), above(1.0 - EDGE, 1.0), above(1.0, 1.0)],
+            [1.0, 0.0, 0.5]
+        );
     }
 }

@@ -31,12 +31,7 @@ pub struct Samples {
 
 impl Samples {
     /// Draws the points and computes the dose of each place at each of them.
-    pub fn new(
-        bodies: [Option<&Body>; 3],
-        candidates: &Candidates,
-        kernel: &DoseKernel,
-        prescription_gy: f64,
-    ) -> Self {
+    pub fn new(bodies: [Option<&Body>; 3], candidates: &Candidates, kernel: &DoseKernel, prescription_gy: f64) -> Self {
         let axis = Some(candidates.inwards());
         let seeds: Vec<Seed> = candidates
             .places
@@ -116,5 +111,9 @@ fn hottest(points: Vec<([f64; 3], f64)>, kernel: &DoseKernel, seeds: &[Seed]) ->
         kept_m3 += points[point].1;
         kept_m3 <= RECTUM_KEPT_M3
     };
-    order.into_iter().take_while(is_kept).map(|point| points[point]).collect()
+    order
+        .into_iter()
+        .take_while(is_kept)
+        .map(|point| points[point])
+        .collect()
 }

@@ -124,7 +124,14 @@ impl<'a> State<'a> {
         }
         let seeds = self.seeds.len() + change.with.len() - change.without.len();
         let strength_u = self.strengths_u[change.strength] as f32;
-        Some(cost(self.samples, &self.tried, strength_u, &self.limits, needles, seeds))
+        Some(cost(
+            self.samples,
+            &self.tried,
+            strength_u,
+            &self.limits,
+            needles,
+            seeds,
+        ))
     }
 
     /// Takes the move that was tried last, with its cost.
