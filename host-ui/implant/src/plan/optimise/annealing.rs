@@ -75,14 +75,25 @@ fn propose(state: &State, random: &mut ChaCha8Rng) -> Option<Move> {
         60..68 => change(vec![any_seed(state, random)?], Vec::new()),
         68..76 => change(Vec::new(), vec![on_used_way(state, random)?]),
         76..90 => needle_aside(state, random),
-        90..96 => new_needle(state, random),
+        90..98 => new_needle(state, random),
         _ => {
             let up = random.next_u32() & 1 == 1;
             let strength = if up { strength + 1 } else { strength.checked_sub(1)? };
-            // A weaker source needs one more seed now and then, a stronger one less.
-            (strength < state.strengths()).then(|| Move {
+            let one = if up {
+                any_seed(state, random)?
+            } else {
+                on_used_way(state, random)?
+            };
+            // Stronger seeds are fewer.
+            let [without, with] = if up {
+                [vec![one], Vec::new()]
+            } else {
+                [Vec::new(), vec![one]]
+            };
+            (strength < state.strengths()).then_some(Move {
+                without,
+                with,
                 strength,
-                ..Move::default()
             })
         }
     }

@@ -84,17 +84,17 @@ pub struct Proposal {
     pub behind_bone: usize,
 }
 
-/// Place in the catalogue that the search begins with, 0.44 U for I-125.
-const FIRST_STRENGTH: usize = 7;
+/// Places in the catalogue that a search may begin with, 0.36 to 0.60 U for I-125; the one whose greedy choice costs least is taken.
+const FIRST_STRENGTHS: [usize; 4] = [3, 7, 11, 15];
 /// The search, and corrections of it by what the full engine found.
 const ROUNDS: usize = 4;
 const FIRST_SEARCH: Schedule = Schedule {
     moves: 100_000,
-    temperatures: [0.03, 0.0005],
+    temperatures: [0.006, 0.0003],
 };
 const CORRECTION: Schedule = Schedule {
     moves: 20_000,
-    temperatures: [0.004, 0.0003],
+    temperatures: [0.002, 0.0003],
 };
 /// Share of all that is reported after the search begins and after its first round.
 const BEGUN: f32 = 0.1;
@@ -138,9 +138,15 @@ pub fn plan(
     let engine = Engine::new(kernel, bodies);
     let strengths_u = &objectives.strengths_u;
     let limits = limits(objectives, None);
-    let first = FIRST_STRENGTH.min(strengths_u.len() - 1);
-    let mut state = State::empty(&candidates, &samples, strengths_u, first, limits);
-    cancelled(greedy::build(&mut state, &|_| report(BEGUN)))?;
+    let mut begun: Option<State> = None;
+    for strength in FIRST_STRENGTHS.into_iter().filter(|s| *s < strengths_u.len()) {
+        let mut state = State::empty(&candidates, &samples, strengths_u, strength, limits);
+        cancelled(greedy::build(&mut state, &|_| report(BEGUN)))?;
+        if begun.as_ref().is_none_or(|begun| state.cost < begun.cost) {
+            begun = Some(state);
+        }
+    }
+    let mut state = begun.ok_or(PlanError::NoWay)?;
     let mut best: Option<Proposal> = None;
     for round in 0..ROUNDS {
         let span = match round {

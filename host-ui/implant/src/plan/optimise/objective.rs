@@ -15,7 +15,7 @@ const WITHIN_SPARED: f32 = 0.05;
 /// How cold the cold part is, and how hot the hot part of the urethra.
 const DEPTH: f32 = 2.0;
 const NEEDLE: f32 = 5e-4;
-const SEED: f32 = 5e-5;
+const SEED: f32 = 2e-4;
 
 /// Limits as the search sees them: shares, and doses as shares of the prescription.
 #[derive(Clone, Copy, Debug)]
@@ -110,9 +110,11 @@ mod tests {
         let [mean, cold] = sums(&dose, &weights, |d| [d, below(d, 1.0)]);
         assert!((mean - 0.99375).abs() < 1e-5, "{mean}");
         assert!((cold - 0.5).abs() < 0.04, "{cold}");
-        assert_eq!(
-            [above(1.0 + EDGE, 1.0), above(1.0 - EDGE, 1.0), above(1.0, 1.0)],
-            [1.0, 0.0, 0.5]
+        let values = [(1.0 + EDGE, 1.0), (1.0 - EDGE, 0.0), (1.0, 0.5)];
+        assert!(
+            values
+                .iter()
+                .all(|(dose, share)| (above(*dose, 1.0) - share).abs() < 1e-5)
         );
     }
 }
