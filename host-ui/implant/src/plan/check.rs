@@ -1,5 +1,6 @@
 //! What is wrong with a plan, all of it at once.
 
+use super::anatomy::Body;
 use super::{Anatomy, ImplantPlan, Loading, Needle, NeedleSeed, SEED_LENGTH_M};
 use nalgebra::Vector3;
 use stylet_shm_schema::MAX_SEEDS;
@@ -105,6 +106,13 @@ fn way(found: &mut Found, needle: &Needle, anatomy: &Anatomy) {
     let depth_m = needle.depth_m.min(REACH_M);
     if let Some(body) = anatomy.spared_in_the_way(needle.entry_m, needle.direction, depth_m, SPARED_MARGIN_M) {
         found.add(&format!("it goes through {}, which is to be spared", body.name));
+    }
+    let piece = |body: &&Body| !body.pieces_m(needle.entry_m, needle.direction, depth_m).is_empty();
+    if let Some(bone) = anatomy.bone.iter().find(piece) {
+        found.add(&format!(
+            "it goes through {}, which is bone; choose another hole",
+            bone.name
+        ));
     }
 }
 

@@ -30,7 +30,7 @@ use std::ops::ControlFlow;
 pub enum Method {
     /// Single seeds are exchanged as long as that helps.
     GreedyExchange,
-    /// Simulated annealing.
+    /// Simulated annealing, and an exchange at its end.
     Annealing,
 }
 
@@ -58,13 +58,13 @@ impl Objectives {
 
 /// Strengths in which seeds are sold; for a source without a list, the same shares of the prescription at 1 cm as I-125 has.
 fn catalogue_u(source: &Source, prescription_gy: f64) -> Vec<f64> {
-    let steps = |from: f64, step: f64| (0..21).map(|n| from + f64::from(n) * step).collect();
+    let steps = |from: f64, step: f64| (0..16).map(|n| from + f64::from(n) * step).collect();
     match source.nuclide.as_str() {
         "I-125" => steps(0.30, 0.02),
-        "Pd-103" => steps(1.2, 0.08),
+        "Pd-103" => steps(1.2, 0.1),
         _ => {
             let whole_u = prescription_gy / source.reference_dose_gy_per_u();
-            steps(0.04 * whole_u, 0.003 * whole_u)
+            steps(0.041 * whole_u, 0.0027 * whole_u)
         }
     }
 }
@@ -84,8 +84,8 @@ pub struct Proposal {
     pub behind_bone: usize,
 }
 
-/// Places in the catalogue that a search may begin with, 0.36 to 0.60 U for I-125; the one whose greedy choice costs least is taken.
-const FIRST_STRENGTHS: [usize; 4] = [3, 7, 11, 15];
+/// Places in the catalogue that a search may begin with, 0.36 to 0.52 U for I-125; the one whose greedy choice costs least is taken.
+const FIRST_STRENGTHS: [usize; 3] = [3, 7, 11];
 /// The search, and corrections of it by what the full engine found.
 const ROUNDS: usize = 4;
 const FIRST_SEARCH: Schedule = Schedule {
@@ -99,6 +99,8 @@ const CORRECTION: Schedule = Schedule {
 /// Share of all that is reported after the search begins and after its first round.
 const BEGUN: f32 = 0.1;
 const SEARCHED: f32 = 0.7;
+/// Share of annealing in a round.
+const ANNEALED: f32 = 0.7;
 
 /// Target, urethra and rectum, by their names.
 pub fn bodies(anatomy: &Anatomy) -> [Option<&Body>; 3] {
@@ -157,7 +159,7 @@ pub fn plan(
         let schedule = if round == 0 { FIRST_SEARCH } else { CORRECTION };
         cancelled(match method {
             Method::GreedyExchange => greedy::exchange(&mut state, &within),
-            Method::Annealing => annealing::anneal(&mut state, &schedule, &within),
+            Method::Annealing => anneal(&mut state, &schedule, &within),
         })?;
         let found = judge(&mut state, &samples, &engine, (source, objectives))?;
         state.set_limits(self::limits(objectives, Some((&found.figures, &found.sampled))));
@@ -172,6 +174,12 @@ pub fn plan(
         }
     }
     best.ok_or(PlanError::NoDose)
+}
+
+/// Anneals, and moves single seeds until none of them helps: the last step of a temperature of 0.
+fn anneal(state: &mut State, schedule: &Schedule, report: &dyn Fn(f32) -> ControlFlow<()>) -> ControlFlow<()> {
+    annealing::anneal(state, schedule, &|share| report(share * ANNEALED))?;
+    greedy::exchange(state, &|share| report(ANNEALED + (1.0 - ANNEALED) * share))
 }
 
 /// The limits with a small reserve, moved by what the sample points were wrong.

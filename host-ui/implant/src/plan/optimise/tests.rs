@@ -126,10 +126,23 @@ fn no_needle_is_offered_through_bone() {
     };
     assert!(!past_bone.is_empty() && past_bone.iter().all(|hole| !crosses(hole, &anatomy)));
     let bone = std::mem::take(&mut anatomy.bone);
+    let unaware = find(&anatomy, Method::GreedyExchange).plan;
     let without = holes(&anatomy);
     anatomy.bone = bone;
     assert!(behind_bone > 0 && without.len() > past_bone.len());
     assert!(without.iter().any(|hole| crosses(hole, &anatomy)));
+    // A plan that was made without the arch is not free of problems beside it.
+    let through_bone = unaware
+        .needles
+        .iter()
+        .filter(|n| crosses(&n.hole.unwrap(), &anatomy))
+        .count();
+    let named = problems(&unaware, &anatomy);
+    let named = named
+        .iter()
+        .filter(|p| p.what.contains("pubic arch, which is bone"))
+        .count();
+    assert!(through_bone > 0 && named == through_bone, "{named} of {through_bone}");
 }
 
 #[test]
