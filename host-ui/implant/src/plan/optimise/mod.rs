@@ -9,6 +9,7 @@ pub mod candidates;
 mod figures;
 mod greedy;
 mod objective;
+pub mod robust;
 mod samples;
 mod state;
 
