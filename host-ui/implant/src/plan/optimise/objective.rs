@@ -20,8 +20,12 @@ const SEED: f32 = 2e-4;
 /// Limits as the search sees them: shares, and doses as shares of the prescription.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// At most so much of the target gets less than the prescription.
+    /// What the target should get: the prescription and a reserve for seeds that miss their places.
+    pub level: f32,
+    /// At most so much of the target gets less than that.
     pub cold: f32,
+    /// At most 90 % of the target gets more than this: the upper limit of D90.
+    pub most: f32,
     /// At most so much of the target gets more than 150 %.
     pub hot: f32,
     /// At most a tenth of the urethra gets more than this.
@@ -45,10 +49,15 @@ pub fn cost(
 ) -> f32 {
     let group = |range: &std::ops::Range<usize>| (&of_one_u[range.clone()], &samples.weights[range.clone()]);
     let (dose, weights) = group(&samples.target);
-    let [cold, depth, hot] = sums(dose, weights, |d| {
+    let [cold, depth, most, hot] = sums(dose, weights, |d| {
         let d = d * strength_u;
-        let missing = (1.0 - d).max(0.0);
-        [below(d, 1.0), missing * missing, above(d, 1.5)]
+        let missing = (limits.level - d).max(0.0);
+        [
+            below(d, limits.level),
+            missing * missing,
+            above(d, limits.most),
+            above(d, 1.5),
+        ]
     });
     let (dose, weights) = group(&samples.urethra);
     let [tenth, third, over] = sums(dose, weights, |d| {
@@ -66,6 +75,7 @@ pub fn cost(
     beyond(cold, limits.cold)
         + cold
         + depth * DEPTH
+        + beyond(most, 0.9)
         + beyond(hot, limits.hot)
         + hot * WITHIN_HOT
         + beyond(tenth, 0.1)

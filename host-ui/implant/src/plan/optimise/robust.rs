@@ -5,11 +5,14 @@ use crate::plan::dose::perturb::{Perturbation, moved};
 use crate::plan::dose::{DoseKernel, DosePoints, Dvh, Seed};
 
 /// Coarse is enough: the spread of trials is wider than the error of the points.
-const PITCH_M: f64 = 2.5e-3;
+const PITCH_M: f64 = 3e-3;
 /// The D90 that a trial should keep, as a share of the prescription.
 const KEPT: f64 = 0.9;
 /// The trials that should keep it.
-const TRIALS_KEPT: f64 = 0.95;
+pub const TRIALS_KEPT: f64 = 0.95;
+
+/// The trials that a search aims at.
+const TRIALS_AIM: f64 = 0.97;
 
 /// D90 of trials in Gy, lowest first.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,9 +41,9 @@ impl Trials {
         1.0 - below as f64 / self.d90_gy.len().max(1) as f64
     }
 
-    /// So many times the strength let 95 % of the trials keep it; `None` without dose.
+    /// So many times the strength let 97 % of the trials keep it, a few more than needed; `None` without dose.
     pub fn strengthening(&self, prescription_gy: f64) -> Option<f64> {
-        let at = ((1.0 - TRIALS_KEPT) * self.d90_gy.len() as f64) as usize;
+        let at = ((1.0 - TRIALS_AIM) * self.d90_gy.len() as f64) as usize;
         let gy = self.d90_gy.get(at).filter(|gy| **gy > 0.0)?;
         Some(KEPT * prescription_gy / gy)
     }
