@@ -45,18 +45,19 @@ fn the_automatic_plan_of_the_pelvis_keeps_its_limits() {
         let sum: f64 = engine.points_m().map(dose_at).sum();
         let loop_s = begun.elapsed().as_secs_f64();
         println!(
-            "{method:?}: {} needles, {} seeds of {:.2} U, {} holes behind bone, {seconds:.1} s, {:.2} times the straightforward loop of {loop_s:.1} s; cost {:.4}\n  {:?}\n  samples {:?}",
+            "{method:?}: {} needles, {} seeds of {:.2} U, {} holes behind bone, {seconds:.1} s, {:.2} times the straightforward loop of {loop_s:.1} s; robust {:.3}, cost {:.4}\n  {:?}\n  samples {:?}",
             found.plan.needles.len(),
             found.plan.seed_count(),
             seeds[0].strength_u,
             found.behind_bone,
             seconds / loop_s,
+            found.robust,
             found.cost,
             found.figures,
             found.sampled
         );
         assert!(sum > 0.0);
-        if method == Method::Annealing {
+        if method == Method::default() {
             let wrong = check::problems(&found.plan, &anatomy);
             assert!(wrong.is_empty(), "{wrong:?}");
             assert_eq!(found.figures.broken(), Vec::<String>::new());

@@ -39,7 +39,7 @@ pub fn plan(
     }
     let objectives = Objectives::new(source, prescription_gy);
     let model = &source.model;
-    let found = optimise::plan(template, anatomy, kernel, model, &objectives, Method::Annealing, report)?;
+    let found = optimise::plan(template, anatomy, kernel, model, &objectives, Method::default(), report)?;
     Ok(FirstPlan {
         notes: found.figures.broken(),
         plan: found.plan,

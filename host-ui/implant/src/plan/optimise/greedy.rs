@@ -3,9 +3,6 @@
 use super::state::{Move, State};
 use std::ops::ControlFlow;
 
-/// Rounds over all seeds after which the exchange ends, whatever it still finds.
-const ROUNDS: usize = 12;
-
 /// Adds the seed that makes the cost smallest until none does.
 pub fn build(state: &mut State, report: &dyn Fn(f32) -> ControlFlow<()>) -> ControlFlow<()> {
     loop {
@@ -33,12 +30,13 @@ pub fn build(state: &mut State, report: &dyn Fn(f32) -> ControlFlow<()>) -> Cont
     }
 }
 
-/// Takes the first move of a seed to any other place, its removal, a new seed or another strength that helps, until none does.
-pub fn exchange(state: &mut State, report: &dyn Fn(f32) -> ControlFlow<()>) -> ControlFlow<()> {
-    for round in 0..ROUNDS {
+/// Takes the first move of a seed to any other place, its removal, a new seed or another strength that helps, until none does or
+/// for so many rounds over all seeds.
+pub fn exchange(state: &mut State, rounds: usize, report: &dyn Fn(f32) -> ControlFlow<()>) -> ControlFlow<()> {
+    for round in 0..rounds {
         let before = state.cost;
         for (number, seed) in state.seeds.clone().into_iter().enumerate() {
-            report((round as f32 + number as f32 / state.seeds.len().max(1) as f32) / ROUNDS as f32)?;
+            report((round as f32 + number as f32 / state.seeds.len().max(1) as f32) / rounds as f32)?;
             exchange_one(state, seed);
         }
         build(state, &|_| ControlFlow::Continue(()))?;

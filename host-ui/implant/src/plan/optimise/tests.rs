@@ -113,12 +113,12 @@ fn study(glands: impl Iterator<Item = &'static Gland>) {
 #[test]
 fn a_plan_keeps_its_limits_by_the_full_engine_and_is_the_same_each_time() {
     let anatomy = GLANDS[0].anatomy();
-    let found = find(&anatomy, Method::Annealing);
+    let found = find(&anatomy, Method::default());
     assert_eq!(found.figures.broken(), Vec::<String>::new());
     assert!(found.plan.needles.len() <= 25);
     let wrong = problems(&found.plan, &anatomy);
     assert!(wrong.is_empty(), "{wrong:?}");
-    let again = find(&anatomy, Method::Annealing);
+    let again = find(&anatomy, Method::default());
     assert_eq!(found.plan, again.plan);
     assert_eq!(found.figures, again.figures);
     let (full, sampled) = (found.figures, found.sampled);
@@ -184,7 +184,7 @@ fn a_search_reports_its_share_and_ends_when_it_is_cancelled() {
         &kernel,
         &source.model,
         &objectives,
-        Method::Annealing,
+        Method::default(),
         report,
     );
     assert!(matches!(ended, Err(PlanError::Cancelled)));
