@@ -57,7 +57,7 @@ impl Samples {
                 weights.extend(of_body.iter().map(|p| (p.1 / unit_m3) as f32));
                 points_m.extend(of_body.iter().map(|p| p.0));
                 let filler = points_m[from..].first().copied().unwrap_or_default();
-                while points_m.len() % LANES != 0 {
+                while !points_m.len().is_multiple_of(LANES) {
                     points_m.push(filler);
                     weights.push(0.0);
                 }

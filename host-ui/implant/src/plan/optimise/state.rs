@@ -150,7 +150,7 @@ impl<'a> State<'a> {
         self.needles = self.of_way.iter().filter(|&&n| n > 0).count();
         (self.strength, self.cost) = (change.strength, cost);
         self.accepted += 1;
-        if self.accepted % REFRESH_EVERY == 0 {
+        if self.accepted.is_multiple_of(REFRESH_EVERY) {
             self.refresh();
         }
     }

@@ -105,6 +105,7 @@ fn study(glands: impl Iterator<Item = &'static Gland>) {
             let wrong = problems(&found.plan, &anatomy);
             assert!(wrong.is_empty(), "{name}: {wrong:?}");
             assert!(found.plan.needles.len() <= 25);
+            assert_eq!(found.figures.broken(), Vec::<String>::new(), "{name}, {words}");
         }
     }
 }
