@@ -19,8 +19,8 @@ fn the_automatic_plan_of_the_pelvis_keeps_its_limits() {
     let source = Source::known("6711").expect("comes with the program");
     let kernel = DoseKernel::new(&source, Interval::ALL);
     let engine = Engine::new(&kernel, optimise::bodies(&anatomy));
-    let go_on = |_| ControlFlow::Continue(());
-    let before = automatic::plan(template, &anatomy, &kernel, "6711", &Aims::new(145.0), go_on).expect("a plan");
+    let proceed = |_| ControlFlow::Continue(());
+    let before = automatic::plan(template, &anatomy, &kernel, "6711", &Aims::new(145.0), proceed).expect("a plan");
     let figures = |plan: &stylet_implant::plan::ImplantPlan| engine.histograms(&plan.seeds()).figures(1.0, 145.0);
     let crosses = |needle: &&Needle| {
         let bone = &anatomy.bone[0];
@@ -38,7 +38,7 @@ fn the_automatic_plan_of_the_pelvis_keeps_its_limits() {
     let objectives = Objectives::new(&source, 145.0);
     for method in [Method::GreedyExchange, Method::Annealing] {
         let begun = Instant::now();
-        let found = optimise::plan(template, &anatomy, &kernel, "6711", &objectives, method, go_on).expect("a plan");
+        let found = optimise::plan(template, &anatomy, &kernel, "6711", &objectives, method, proceed).expect("a plan");
         let seconds = begun.elapsed().as_secs_f64();
         let (begun, seeds) = (Instant::now(), found.plan.seeds());
         let dose_at = |point_m: [f64; 3]| seeds.iter().map(|s| kernel.exact_at_gy(s, point_m)).sum::<f64>();

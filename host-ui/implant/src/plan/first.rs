@@ -16,8 +16,7 @@ pub struct FirstPlan {
 }
 
 /// What a plan without a known urethra says.
-pub const NO_URETHRA: &str = "no urethra is known in this scene, so the plan is modified peripheral loading, which aims at the coverage \
-                              of the target alone; name a structure \"urethra\" and give it the role \"spare\" for a plan that keeps limits";
+pub const NO_URETHRA: &str = "no urethra is known, so the plan only covers the target (modified peripheral loading)";
 
 /// Needles, seeds and strength; an error where no needle fits. `report` gets the share that is done; where it breaks, the search is
 /// cancelled.
@@ -74,10 +73,10 @@ mod tests {
         };
         let source = Source::known("6711").unwrap();
         let kernel = DoseKernel::new(&source, Interval::ALL);
-        let go_on = |_| ControlFlow::Continue(());
-        let first = plan(template, &anatomy, &kernel, &source, 145.0, go_on).unwrap();
+        let proceed = |_| ControlFlow::Continue(());
+        let first = plan(template, &anatomy, &kernel, &source, 145.0, proceed).unwrap();
         let aims = Aims::new(145.0);
-        let peripheral = automatic::plan(template, &anatomy, &kernel, "6711", &aims, go_on).unwrap();
+        let peripheral = automatic::plan(template, &anatomy, &kernel, "6711", &aims, proceed).unwrap();
         assert_eq!(first.plan, peripheral);
         assert_eq!(first.notes, [NO_URETHRA]);
     }

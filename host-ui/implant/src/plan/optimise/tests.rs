@@ -17,8 +17,8 @@ fn iodine() -> (Source, DoseKernel) {
 fn find(anatomy: &Anatomy, method: Method) -> Proposal {
     let (source, kernel) = iodine();
     let objectives = Objectives::new(&source, 145.0);
-    let go_on = |_| ControlFlow::Continue(());
-    plan(TEMPLATE, anatomy, &kernel, &source.model, &objectives, method, go_on).unwrap()
+    let proceed = |_| ControlFlow::Continue(());
+    plan(TEMPLATE, anatomy, &kernel, &source.model, &objectives, method, proceed).unwrap()
 }
 
 fn row(gland: &str, method: &str, plan: &ImplantPlan, figures: &Figures, seconds: f64) {
@@ -78,8 +78,8 @@ fn study(glands: impl Iterator<Item = &'static Gland>) {
         let arch = if gland.arch_mm.is_some() { ", arch" } else { "" };
         let name = format!("{} ({} cc{arch}{aside})", gland.name, gland.cc);
         let begun = Instant::now();
-        let go_on = |_| ControlFlow::Continue(());
-        let today = automatic::plan(TEMPLATE, &anatomy, &kernel, &source.model, &Aims::new(145.0), go_on).unwrap();
+        let proceed = |_| ControlFlow::Continue(());
+        let today = automatic::plan(TEMPLATE, &anatomy, &kernel, &source.model, &Aims::new(145.0), proceed).unwrap();
         let seconds = begun.elapsed().as_secs_f64();
         let figures = engine.histograms(&today.seeds()).figures(1.0, 145.0).unwrap();
         row(&name, "peripheral", &today, &figures, seconds);
