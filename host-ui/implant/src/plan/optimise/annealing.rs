@@ -51,7 +51,7 @@ fn unit(random: &mut ChaCha8Rng) -> f32 {
 }
 
 fn below(random: &mut ChaCha8Rng, count: usize) -> Option<usize> {
-    (count > 0).then(|| (random.next_u32() as u64 * count as u64 >> 32) as usize)
+    (count > 0).then(|| ((u64::from(random.next_u32()) * count as u64) >> 32) as usize)
 }
 
 fn propose(state: &State, random: &mut ChaCha8Rng) -> Option<Move> {

@@ -35,8 +35,9 @@ pub fn build(state: &mut State, report: &dyn Fn(f32) -> ControlFlow<()>) -> Cont
 pub fn exchange(state: &mut State, rounds: usize, report: &dyn Fn(f32) -> ControlFlow<()>) -> ControlFlow<()> {
     for round in 0..rounds {
         let before = state.cost;
-        for (number, seed) in state.seeds.clone().into_iter().enumerate() {
-            report((round as f32 + number as f32 / state.seeds.len().max(1) as f32) / rounds as f32)?;
+        let seeds = state.seeds.clone();
+        for (number, &seed) in seeds.iter().enumerate() {
+            report((round as f32 + number as f32 / seeds.len() as f32) / rounds as f32)?;
             exchange_one(state, seed);
         }
         build(state, &|_| ControlFlow::Continue(()))?;

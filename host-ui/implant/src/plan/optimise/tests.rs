@@ -112,16 +112,13 @@ fn study(glands: impl Iterator<Item = &'static Gland>) {
 
 /// The peripheral pattern gave V150 84.5 % and a urethra D10 of 291 Gy in `pelvis`, and nothing aimed at either.
 #[test]
-fn a_plan_keeps_its_limits_by_the_full_engine_and_is_the_same_each_time() {
+fn a_plan_keeps_its_limits_by_the_full_engine() {
     let anatomy = GLANDS[0].anatomy();
     let found = find(&anatomy, Method::default());
     assert_eq!(found.figures.broken(), Vec::<String>::new());
     assert!(found.plan.needles.len() <= 25);
     let wrong = problems(&found.plan, &anatomy);
     assert!(wrong.is_empty(), "{wrong:?}");
-    let again = find(&anatomy, Method::default());
-    assert_eq!(found.plan, again.plan);
-    assert_eq!(found.figures, again.figures);
     let (full, sampled) = (found.figures, found.sampled);
     assert!((full.v100 - sampled.v100).abs() < 2.0, "{full:?} {sampled:?}");
     assert!((full.v150 - sampled.v150).abs() < 4.0, "{full:?} {sampled:?}");
@@ -148,7 +145,10 @@ fn no_needle_is_offered_through_bone() {
     };
     assert!(!past_bone.is_empty() && past_bone.iter().all(|hole| !crosses(hole, &anatomy)));
     let bone = std::mem::take(&mut anatomy.bone);
-    let unaware = find(&anatomy, Method::GreedyExchange).plan;
+    let candidates = Candidates::new(&TEMPLATE, &anatomy);
+    let mut chosen = vec![false; candidates.places.len()];
+    candidates.ways.iter().for_each(|way| chosen[way.places.start] = true);
+    let unaware = candidates.plan(&chosen, 0.5, "6711", 145.0);
     let without = holes(&anatomy);
     anatomy.bone = bone;
     assert!(behind_bone > 0 && without.len() > past_bone.len());
@@ -174,7 +174,7 @@ fn a_search_reports_its_share_and_ends_when_it_is_cancelled() {
     let reported = std::cell::RefCell::new(Vec::new());
     let report = |share: f32| {
         reported.borrow_mut().push(share);
-        match share > 0.3 {
+        match share > 0.12 {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
         }
@@ -191,7 +191,7 @@ fn a_search_reports_its_share_and_ends_when_it_is_cancelled() {
     assert!(matches!(ended, Err(PlanError::Cancelled)));
     let reported = reported.into_inner();
     assert!(reported.windows(2).all(|pair| pair[0] <= pair[1]), "{reported:?}");
-    assert!(reported.len() > 20 && reported.last().is_some_and(|share| *share < 0.4));
+    assert!(reported.len() > 20 && reported.last().is_some_and(|share| *share < 0.2));
 }
 
 #[test]
@@ -211,6 +211,16 @@ fn what_is_beyond_a_limit_says_by_how_much() {
     ];
     assert_eq!(figures.broken(), broken);
     assert!((figures.beyond() - 76.2).abs() < 1e-9);
+}
+
+#[test]
+#[ignore = "minutes; the command is in docs/plan.md"]
+fn glands_that_are_planned_twice_have_the_same_plan() {
+    let anatomy = GLANDS[0].anatomy();
+    for method in [Method::GreedyExchange, Method::Annealing] {
+        let [first, second] = [(); 2].map(|()| find(&anatomy, method));
+        assert_eq!((first.plan, first.figures), (second.plan, second.figures));
+    }
 }
 
 #[test]
