@@ -32,8 +32,9 @@ impl Figure {
         };
         let (structure, metric) = (&self.structure, self.metric);
         Some(format!(
-            "{structure} {metric} is {:.1} {unit}, {side} {value:.1} {unit}",
-            self.value
+            "{structure} {metric} is {:.1} {unit}, {side} {value:.1} {unit} by {:.1}",
+            self.value,
+            (self.value - value).abs()
         ))
     }
 }
@@ -133,8 +134,8 @@ mod tests {
         assert_eq!(
             broken,
             [
-                "urethra D10 is 291.0 Gy, above 217.5 Gy",
-                "urethra D30 is 291.0 Gy, above 188.5 Gy"
+                "urethra D10 is 291.0 Gy, above 217.5 Gy by 73.5",
+                "urethra D30 is 291.0 Gy, above 188.5 Gy by 102.5"
             ]
         );
         let dvh = Dvh::new(&[145.0; 10], &[1e-7; 10]).unwrap();

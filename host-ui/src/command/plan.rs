@@ -13,7 +13,7 @@ use stylet_dose::report::Judge;
 use stylet_dose::{DoseKernel, Dvh, Source};
 use stylet_files::dicom::plan::Date;
 use stylet_host::core_args::CoreArgs;
-use stylet_implant::plan::automatic::{self, Aims};
+use stylet_implant::plan::first;
 use stylet_implant::plan::{Anatomy, ImplantPlan, Template, check};
 use stylet_implant::plan::{file, seeds};
 use stylet_implant::procedure::{Connect, Live};
@@ -23,9 +23,10 @@ const DOSE_PITCH_M: f64 = 1e-3;
 const POINTS: usize = 100_000;
 
 const HELP: &str = "\
-Without --seeds the plan is modified peripheral loading: needles near the edge of the target, fewer inside, none near what is to
-be spared; the strength of a seed is the one with which 96 % of the target gets the prescription. With --seeds it is those of a
-table (columns as in 'host-ui dose --help'), put on needles by their numbers, or by their lines where it has none.
+Without --seeds needles, seeds and one strength are searched for that keep the limits: target V100 at least 95 %, D90 100 to 125 %,
+V150 at most 60 %; urethra D10 at most 150 %, D30 130 %; rectum D2cc at most 100 %; at most 25 needles, none through bone. A limit
+that cannot be kept is reported. Where no urethra is known the plan is modified peripheral loading, and says so. With --seeds the plan
+is the seeds of a table (columns as in 'host-ui dose --help'), put on needles by their numbers, or by their lines where it has none.
 
 Units: mm, patient frame (RAS); strength in U (1 U = 1 cGy cm2/h).
 
@@ -84,15 +85,18 @@ impl PlanArgs {
         let kernel = DoseKernel::new(&source, Interval::ALL);
         let plan = match seeds {
             None => {
-                let bar = progress_bar(100, "% of the patterns");
+                let bar = progress_bar(100, "% of the search");
                 let report = |share: f32| {
                     bar.set_position((share * 100.0) as u64);
                     ControlFlow::Continue(())
                 };
-                let aims = Aims::new(prescription_gy);
-                let plan = automatic::plan(template, &anatomy, &kernel, &source.model, &aims, report);
+                let found = first::plan(template, &anatomy, &kernel, &source, prescription_gy, report);
                 bar.finish_and_clear();
-                plan?
+                let found = found?;
+                for note in &found.notes {
+                    println!("note: {note}");
+                }
+                found.plan
             }
             Some((path, seeds)) => file::import(path, seeds, &frames, template, &source.model, prescription_gy)?,
         };

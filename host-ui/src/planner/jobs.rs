@@ -13,6 +13,7 @@ use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Source};
 use stylet_host::link::{Link, SceneModel};
 use stylet_implant::plan::automatic::{self, Aims};
+use stylet_implant::plan::first::{self, FirstPlan};
 use stylet_implant::plan::{Compensation, ImplantPlan, Limits, LinkRehearser, Needle, compensate, exchange};
 use stylet_implant::workflow::Pace;
 use stylet_shm_schema::service::Instance;
@@ -35,6 +36,8 @@ pub struct JobProgress {
 pub(super) enum JobMessage {
     Progress(JobProgress),
     Plan(Result<ImplantPlan, Failure>),
+    /// A plan, with what there is to know about it.
+    First(FirstPlan),
     Compensated(Box<(Needle, Compensation)>),
     /// The last message, in words.
     End(Result<String, Failure>),
@@ -53,21 +56,24 @@ pub(super) fn automatic(outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
                 false => ControlFlow::Continue(()),
             }
         };
-        let plan = || -> Result<ImplantPlan, Failure> {
+        let plan = || -> Result<FirstPlan, Failure> {
             let (source, prescription_gy) = exchange::usual()?;
             let kernel = DoseKernel::new(&source, Interval::ALL);
-            let aims = Aims::new(prescription_gy);
-            Ok(automatic::plan(
-                outlines.template,
-                &outlines.anatomy,
+            let (template, anatomy) = (outlines.template, &outlines.anatomy);
+            Ok(first::plan(
+                template,
+                anatomy,
                 &kernel,
-                &source.model,
-                &aims,
+                &source,
+                prescription_gy,
                 report,
             )?)
         };
         // The window may be closed by now; then nobody reads the answer.
-        let _ = messages.send(JobMessage::Plan(plan()));
+        let _ = messages.send(match plan() {
+            Ok(first) => JobMessage::First(first),
+            Err(why) => JobMessage::Plan(Err(why)),
+        });
     })
 }
 

@@ -228,6 +228,16 @@ impl Planner {
                     Err(why) => self.message = Some(Message::Refused(why.to_string())),
                 }
             }
+            JobUpdate::Message(JobMessage::First(first)) => {
+                self.job = None;
+                match self.can_be(first.plan) {
+                    Ok(plan) => {
+                        self.put(plan);
+                        self.message = plan_message(&first.notes);
+                    }
+                    Err(why) => self.message = Some(Message::Refused(why.to_string())),
+                }
+            }
             JobUpdate::Message(JobMessage::Compensated(done)) => {
                 self.compensated.retain(|(needle, _)| *needle != done.0);
                 self.compensated.push(*done);
@@ -373,6 +383,11 @@ impl Planner {
     pub fn restart(&mut self) {
         self.set_progress(NeedleProgress::default());
     }
+}
+
+/// What there is to know about an automatic plan.
+fn plan_message(notes: &[String]) -> Option<Message> {
+    (!notes.is_empty()).then(|| Message::Done(format!("Automatic plan: {}.", notes.join("; "))))
 }
 
 #[cfg(test)]

@@ -138,6 +138,7 @@ mod tests {
         let anatomy = Anatomy {
             target: ball("gland", [0.05, 0.05, 0.06], HALF_M),
             spared: vec![ball("urethra", [0.05, 0.05, 0.06], [0.003, 0.003, 0.03])],
+            bone: Vec::new(),
             lower_m: [0.0; 3],
             upper_m: [0.1; 3],
             patient: PatientFrame::default(),

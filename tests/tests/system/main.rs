@@ -10,6 +10,7 @@ mod insertion;
 mod kill;
 mod lab_latency;
 mod plan_compensation;
+mod plan_optimised;
 mod plan_rehearsal;
 mod process_hosts;
 mod process_loops;

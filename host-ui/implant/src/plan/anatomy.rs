@@ -3,7 +3,7 @@
 use super::PlanError;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
-use stylet_anatomy::PatientFrame;
+use stylet_anatomy::{Organ, PatientFrame};
 use stylet_dose::mesh::Mesh;
 use stylet_dose::structure::Region;
 use stylet_dose::{Structure, structure};
@@ -101,6 +101,8 @@ pub struct Anatomy {
     pub target: Body,
     /// What needles and dose are kept from.
     pub spared: Vec<Body>,
+    /// What no needle goes through: the pubic arch.
+    pub bone: Vec<Body>,
     /// Smallest corner of the box of all tissue, m.
     pub lower_m: [f64; 3],
     /// Largest corner of that box, m.
@@ -132,9 +134,12 @@ impl Anatomy {
             }
         };
         let spared = structures().filter(|s| s.role & role::SPARE != 0).map(part);
+        let is_bone = |s: &&StructureInfo| Organ::of_name(&s.name.read()) == Some(Organ::Bone);
+        let bone = structures().filter(is_bone).map(part);
         Ok(Self {
             target: target?,
             spared: spared.collect::<Result<_, _>>()?,
+            bone: bone.collect::<Result<_, _>>()?,
             lower_m: header.lower_m,
             upper_m: header.upper_m,
             patient: header.patient(),

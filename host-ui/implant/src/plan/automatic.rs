@@ -310,6 +310,7 @@ mod tests {
         Anatomy {
             target: ball("gland", middle_m, half_m),
             spared: vec![ball("urethra", middle_m, [0.003, 0.003, 0.03])],
+            bone: Vec::new(),
             lower_m: [0.0; 3],
             upper_m: [0.1; 3],
             patient: PatientFrame::default(),

@@ -1,5 +1,6 @@
 //! What is wrong with a plan, all of it at once.
 
+use super::anatomy::Body;
 use super::{Anatomy, ImplantPlan, Loading, Needle, NeedleSeed, SEED_LENGTH_M};
 use nalgebra::Vector3;
 use stylet_shm_schema::MAX_SEEDS;
@@ -106,6 +107,13 @@ fn way(found: &mut Found, needle: &Needle, anatomy: &Anatomy) {
     if let Some(body) = anatomy.spared_in_the_way(needle.entry_m, needle.direction, depth_m, SPARED_MARGIN_M) {
         found.add(&format!("it goes through {}, which is to be spared", body.name));
     }
+    let piece = |body: &&Body| !body.pieces_m(needle.entry_m, needle.direction, depth_m).is_empty();
+    if let Some(bone) = anatomy.bone.iter().find(piece) {
+        found.add(&format!(
+            "it goes through {}, which is bone; choose another hole",
+            bone.name
+        ));
+    }
 }
 
 /// The first needle before this one that goes through the same hole.
@@ -142,7 +150,7 @@ fn seed_alone(found: &mut Found, needle: &Needle, seed: usize, place_m: [f64; 3]
     }
 }
 
-fn is_in_target(anatomy: &Anatomy, place_m: [f64; 3], direction: [f64; 3]) -> bool {
+pub(super) fn is_in_target(anatomy: &Anatomy, place_m: [f64; 3], direction: [f64; 3]) -> bool {
     let shifted = |by_m: f64| [0, 1, 2].map(|a| place_m[a] + direction[a] * by_m);
     [0.0, EDGE_M, -EDGE_M]
         .into_iter()

@@ -13,6 +13,7 @@ fn anatomy() -> Anatomy {
     Anatomy {
         target: ball("gland", MIDDLE_M, [0.02, 0.018, 0.018]),
         spared: vec![ball("urethra", MIDDLE_M, [0.003, 0.003, 0.02])],
+        bone: Vec::new(),
         lower_m: [0.0; 3],
         upper_m: [0.1; 3],
         patient: PatientFrame::default(),

@@ -12,6 +12,7 @@ fn anatomy() -> Anatomy {
     Anatomy {
         target: ball("gland", GLAND_M, [0.024, 0.02, 0.02]),
         spared: vec![ball("urethra", GLAND_M, [0.003, 0.003, 0.025])],
+        bone: Vec::new(),
         lower_m: [0.0; 3],
         upper_m: [0.1; 3],
         patient: PatientFrame::default(),

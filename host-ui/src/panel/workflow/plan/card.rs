@@ -60,7 +60,7 @@ fn begin_ui(ui: &mut egui::Ui, shown: &Shown, (ready, free): (bool, bool), actio
 fn automatic_ui(ui: &mut egui::Ui, shown: &Shown, free: bool, actions: &mut Vec<Action>) {
     let can = free && shown.planning.outlines.is_some();
     let response = ui.add_enabled(can, Button::new("Automatic plan"));
-    let hint = "Needles near the edge of the target, fewer inside, none near spared structures";
+    let hint = "Needles, seeds and one strength that cover the target and keep the limits of urethra and rectum";
     if response.on_hover_text(hint).clicked() {
         actions.push(Action::Plan(PlanAction::Automatic));
     }

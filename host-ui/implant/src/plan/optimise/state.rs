@@ -1,0 +1,213 @@
+//! Chosen places with their dose at the sample points, changed by moves that can be taken back.
+
+use super::candidates::Candidates;
+use super::objective::{Limits, cost};
+use super::samples::Samples;
+
+/// Accepted moves after which the dose is summed anew: rounding adds up.
+const REFRESH_EVERY: usize = 500;
+
+/// What a search changes.
+#[derive(Clone)]
+pub struct State<'a> {
+    /// Ways and places.
+    pub candidates: &'a Candidates,
+    samples: &'a Samples,
+    /// Strengths that can be ordered, U.
+    strengths_u: &'a [f64],
+    /// The limits.
+    pub limits: Limits,
+    /// Whether a place has a seed.
+    pub chosen: Vec<bool>,
+    /// Places with a seed.
+    pub seeds: Vec<usize>,
+    /// Seeds of each way.
+    pub of_way: Vec<usize>,
+    /// Ways with seeds.
+    pub needles: usize,
+    /// Place in the list of strengths.
+    pub strength: usize,
+    /// Of the present choice.
+    pub cost: f32,
+    of_one_u: Vec<f32>,
+    tried: Vec<f32>,
+    accepted: usize,
+}
+
+/// Places that lose and get a seed, and the strength after it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Move {
+    /// Places that lose their seed.
+    pub without: Vec<usize>,
+    /// Places that get one.
+    pub with: Vec<usize>,
+    /// Place in the list of strengths.
+    pub strength: usize,
+}
+
+impl<'a> State<'a> {
+    /// No seed at all.
+    pub fn empty(
+        candidates: &'a Candidates,
+        samples: &'a Samples,
+        strengths_u: &'a [f64],
+        strength: usize,
+        limits: Limits,
+    ) -> Self {
+        let mut state = Self {
+            candidates,
+            samples,
+            strengths_u,
+            limits,
+            chosen: vec![false; candidates.places.len()],
+            seeds: Vec::new(),
+            of_way: vec![0; candidates.ways.len()],
+            needles: 0,
+            strength,
+            cost: 0.0,
+            of_one_u: vec![0.0; samples.count()],
+            tried: vec![0.0; samples.count()],
+            accepted: 0,
+        };
+        state.refresh();
+        state
+    }
+
+    /// The strength, U.
+    pub fn strength_u(&self) -> f64 {
+        self.strengths_u[self.strength]
+    }
+
+    /// Strengths to choose from.
+    pub fn strengths(&self) -> usize {
+        self.strengths_u.len()
+    }
+
+    /// Dose at the sample points as a share of the prescription.
+    pub fn dose(&self) -> Vec<f32> {
+        self.of_one_u.iter().map(|d| d * self.strength_u() as f32).collect()
+    }
+
+    /// The same choice with another strength.
+    pub fn set_strength(&mut self, strength: usize) {
+        self.strength = strength;
+        self.refresh();
+    }
+
+    /// The same choice under other limits.
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.limits = limits;
+        self.refresh();
+    }
+
+    /// The cost after a move; `None` for one with too many needles. [`State::accept`] takes it.
+    pub fn try_move(&mut self, change: &Move) -> Option<f32> {
+        let needles = self.needles_after(change);
+        if needles > self.limits.needles {
+            return None;
+        }
+        let rows = |places: &[usize]| places.iter().map(|&p| self.samples.of_place(p)).collect::<Vec<_>>();
+        let (minus, plus) = (rows(&change.without), rows(&change.with));
+        match (&minus[..], &plus[..]) {
+            ([], []) => self.tried.copy_from_slice(&self.of_one_u),
+            ([], [plus]) => add(&mut self.tried, &self.of_one_u, plus),
+            ([minus], [plus]) => exchange(&mut self.tried, &self.of_one_u, minus, plus),
+            _ => {
+                self.tried.copy_from_slice(&self.of_one_u);
+                for row in &minus {
+                    self.tried.iter_mut().zip(*row).for_each(|(sum, d)| *sum -= d);
+                }
+                for row in &plus {
+                    self.tried.iter_mut().zip(*row).for_each(|(sum, d)| *sum += d);
+                }
+            }
+        }
+        let seeds = self.seeds.len() + change.with.len() - change.without.len();
+        let strength_u = self.strengths_u[change.strength] as f32;
+        Some(cost(
+            self.samples,
+            &self.tried,
+            strength_u,
+            &self.limits,
+            needles,
+            seeds,
+        ))
+    }
+
+    /// Takes the move that was tried last, with its cost.
+    pub fn accept(&mut self, change: &Move, cost: f32) {
+        std::mem::swap(&mut self.of_one_u, &mut self.tried);
+        for &place in &change.without {
+            self.chosen[place] = false;
+            self.seeds.retain(|&other| other != place);
+            self.of_way[self.candidates.places[place].way] -= 1;
+        }
+        for &place in &change.with {
+            self.chosen[place] = true;
+            self.seeds.push(place);
+            self.of_way[self.candidates.places[place].way] += 1;
+        }
+        self.needles = self.of_way.iter().filter(|&&n| n > 0).count();
+        (self.strength, self.cost) = (change.strength, cost);
+        self.accepted += 1;
+        if self.accepted.is_multiple_of(REFRESH_EVERY) {
+            self.refresh();
+        }
+    }
+
+    /// Tries a move and takes it where it makes the cost smaller.
+    pub fn take_if_better(&mut self, change: &Move) -> bool {
+        match self.try_move(change) {
+            Some(cost) if cost < self.cost - 1e-6 => {
+                self.accept(change, cost);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    fn needles_after(&self, change: &Move) -> usize {
+        let way = |&place: &usize| self.candidates.places[place].way;
+        let count = |places: &[usize], of: usize| places.iter().filter(|p| way(p) == of).count();
+        let mut needles = self.needles;
+        let touched = || change.without.iter().chain(&change.with).map(way);
+        for (n, of) in touched().enumerate() {
+            if touched().take(n).any(|other| other == of) {
+                continue;
+            }
+            let before = self.of_way[of];
+            let after = before + count(&change.with, of) - count(&change.without, of);
+            needles = needles + usize::from(after > 0) - usize::from(before > 0);
+        }
+        needles
+    }
+
+    fn refresh(&mut self) {
+        self.of_one_u.fill(0.0);
+        for &place in &self.seeds {
+            let row = self.samples.of_place(place);
+            self.of_one_u.iter_mut().zip(row).for_each(|(sum, d)| *sum += d);
+        }
+        let strength_u = self.strength_u() as f32;
+        self.cost = cost(
+            self.samples,
+            &self.of_one_u,
+            strength_u,
+            &self.limits,
+            self.needles,
+            self.seeds.len(),
+        );
+    }
+}
+
+fn add(to: &mut [f32], from: &[f32], plus: &[f32]) {
+    for ((to, from), plus) in to.iter_mut().zip(from).zip(plus) {
+        *to = from + plus;
+    }
+}
+
+fn exchange(to: &mut [f32], from: &[f32], minus: &[f32], plus: &[f32]) {
+    for (((to, from), minus), plus) in to.iter_mut().zip(from).zip(minus).zip(plus) {
+        *to = from - minus + plus;
+    }
+}
