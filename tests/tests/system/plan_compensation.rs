@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Source};
-use stylet_implant::plan::automatic::{self, Aims};
 use stylet_implant::plan::compensate::summary_m;
+use stylet_implant::plan::first;
 use stylet_implant::plan::{Anatomy, ImplantPlan, Limits, Needle, Template, compensate};
 use stylet_implant::workflow::{Pace, plan_with_seeds};
 use stylet_sim::scene::Labels;
@@ -38,10 +38,10 @@ fn first_plan(theatre: &Theatre) -> ImplantPlan {
     let kernel = DoseKernel::new(&source, Interval::ALL);
     let anatomy = Anatomy::of(&theatre.scene).expect("a closed target");
     let template = Template::before(&theatre.scene.header);
-    let plan = automatic::plan(template, &anatomy, &kernel, &source.model, &Aims::new(145.0), |_| {
-        std::ops::ControlFlow::Continue(())
-    })
-    .expect("a plan");
+    let proceed = |_| std::ops::ControlFlow::Continue(());
+    let plan = first::plan(template, &anatomy, &kernel, &source, 145.0, proceed)
+        .expect("a plan")
+        .plan;
     let found = stylet_implant::plan::check::problems(&plan, &anatomy);
     assert!(found.is_empty(), "{found:?}");
     plan
@@ -146,7 +146,7 @@ Errors of seeds at rest relative to the plan, dropped as planned and dropped whe
 The test that checks these figures writes this page: `UPDATE_DOCS=1 cargo test --release -p stylet-tests --test system plan_compensation`.
 Nothing in `plan/compensate.rs` was fitted to any of these glands: its limits come from tissues of known motion in its unit tests.
 
-Plans are the automatic ones (modified peripheral loading, I-125 6711, 145 Gy) unless stated otherwise. Strands keep their pitch, so
+Plans are the automatic ones (I-125 6711, 145 Gy) unless stated otherwise. Strands keep their pitch, so
 one shift applies to all their seeds.
 
 - *Not as planned*: needles whose last drop, if dropped as planned, would leave the tip outside the tissue, which has moved ahead of
