@@ -15,6 +15,8 @@ pub struct LineLoads {
     pub tip_material_m: f64,
     /// Displacement of that material along the line, m.
     pub tip_displacement_m: f64,
+    /// How far the body is moved as a whole besides, along the line, m.
+    pub whole_m: f64,
     /// How many of `loads_n` there are.
     pub count: usize,
     /// Shaft of each station, then tip at each.
@@ -40,6 +42,7 @@ impl LineLoads {
                 loads.in_tissue,
                 loads.tip_material_m.to_bits(),
                 loads.tip_displacement_m.to_bits(),
+                loads.whole_m.to_bits(),
                 loads.count,
             )
         };
@@ -55,6 +58,7 @@ impl Default for LineLoads {
             in_tissue: false,
             tip_material_m: 0.0,
             tip_displacement_m: 0.0,
+            whole_m: 0.0,
             count: 0,
             loads_n: [0.0; 2 * MAX_STATIONS],
         }
@@ -68,6 +72,7 @@ struct TapedLoads {
     in_tissue: bool,
     tip_material_m: f64,
     tip_displacement_m: f64,
+    whole_m: f64,
     count: usize,
     /// Those that are not zero, each with its place.
     loads_n: Vec<(u16, f64)>,
@@ -81,6 +86,7 @@ impl From<LineLoads> for TapedLoads {
             in_tissue: loads.in_tissue,
             tip_material_m: loads.tip_material_m,
             tip_displacement_m: loads.tip_displacement_m,
+            whole_m: loads.whole_m,
             count: loads.count,
             loads_n: numbered.filter(|(_, load_n)| load_n.to_bits() != 0).collect(),
         }
@@ -95,6 +101,7 @@ impl From<TapedLoads> for LineLoads {
             in_tissue: taped.in_tissue,
             tip_material_m: taped.tip_material_m,
             tip_displacement_m: taped.tip_displacement_m,
+            whole_m: taped.whole_m,
             count: taped.count.min(2 * MAX_STATIONS),
             ..Self::default()
         };

@@ -260,6 +260,11 @@ impl HandLine {
         &self.state
     }
 
+    /// How far the body is moved as a whole by what a membrane passes on to it, along the line, m.
+    pub fn whole_m(&self) -> f64 {
+        self.state.whole_n() * self.model.compliance().whole_m_per_n
+    }
+
     /// The tip has tissue before or around it.
     pub fn is_in_tissue(&self) -> bool {
         self.state.is_in_contact()

@@ -84,10 +84,10 @@ pub trait TissueModel: Send {
     /// this work and no more; answers stay what they are within the model's tolerance.
     fn prepare(&mut self, _next: Option<Held>) {}
 
-    /// Displaces the body by the answers `columns` (m/N) to `loads_n`, in place of a step; what is held is let loose, and what
+    /// Displaces the body by the answers `columns` (m/N) to `loads_n` and by `whole_m` as a whole, in place of a step; what is held is let loose, and what
     /// the model knew of it is dropped.
     /// Obligations as for `step`. `None` from a model whose answers do not add up.
-    fn displace(&mut self, _columns: &[PackedField], _loads_n: &[f64]) -> Option<StepReport> {
+    fn displace(&mut self, _columns: &[PackedField], _loads_n: &[f64], _whole_m: [f64; 3]) -> Option<StepReport> {
         None
     }
 

@@ -62,6 +62,7 @@ impl HapticLoop {
         loads.in_tissue = line.is_in_tissue();
         loads.tip_material_m = state.tip().material_m;
         loads.tip_displacement_m = state.tip_displacement_m();
+        loads.whole_m = line.whole_m();
         loads.count = 0;
         for (slot, load) in loads.loads_n.iter_mut().zip(state.loads_n()) {
             *slot = *load;

@@ -42,10 +42,14 @@ impl TissueLoop {
         self.loads = loads;
         let line = self.line.as_ref().filter(|line| line.generation == loads.generation)?;
         let axis = line.line;
+        let whole_m = axis.axes[0].map(|c| c * loads.whole_m);
         let report = match &line.answer {
-            BodyAnswer::Columns(columns) => self.world.tissue.displace(columns, loads.loads_n())?,
+            BodyAnswer::Columns(columns) => self.world.tissue.displace(columns, loads.loads_n(), whole_m)?,
             BodyAnswer::Shifts(shifts) => {
-                let shift = BodyShift::sum(shifts, loads.loads_n());
+                let mut shift = BodyShift::sum(shifts, loads.loads_n());
+                for (sum, whole_m) in shift.shift_m.iter_mut().zip(whole_m) {
+                    *sum += whole_m;
+                }
                 self.world.tissue.carry(Some(shift));
                 let held = self.held_on_line(&axis, &loads);
                 self.world.tissue.step(held, self.period_s)

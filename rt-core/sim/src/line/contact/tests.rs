@@ -117,13 +117,14 @@ fn what_the_hand_feels_is_what_the_foundation_holds() {
         &[4e-3, 12e-3, 25e-3, 40e-3, 30e-3, 33e-3, 10e-3],
         1e-4,
     ) {
-        let sum: f64 = state.loads_n().iter().sum();
+        let sum = state.loads_n().iter().sum::<f64>() + state.whole_n();
         let foundation: f64 = state
             .loads_n()
             .iter()
             .zip(&model.compliance().foundation)
             .map(|(f, c)| f * c)
-            .sum();
+            .sum::<f64>()
+            - state.whole_n();
         // The loads are those at the last place only.
         if output == state.last {
             println!(
@@ -143,7 +144,8 @@ fn what_the_hand_feels_is_what_the_foundation_holds() {
             .iter()
             .zip(&model.compliance().foundation)
             .map(|(f, c)| f * c)
-            .sum();
+            .sum::<f64>()
+            - state.whole_n();
         worst = worst.max((foundation / output.force_on_hand_n - 1.0).abs());
         println!(
             "hand {:.4} N at {place_m} m, foundation {foundation:.4} N",

@@ -23,6 +23,11 @@ fn block() -> (Scene, BatchModel<f32>) {
     (scene, body)
 }
 
+/// What the membrane passes on to the body as a whole.
+fn whole_m(hand: &HandLine) -> [f64; 3] {
+    [0.0, 0.0, hand.whole_m()]
+}
+
 /// A line through the middle of the gland, along its axis.
 fn ready(scene: &Scene, body: &BatchModel<f32>) -> ReadyLine {
     let (low, high) = scene.lattice.bounds_m();
@@ -76,7 +81,7 @@ fn the_body_follows_the_loads_of_the_line_and_is_at_rest_without_them() {
         assert!(answer.punctured.is_none(), "5 of 8 mm");
     }
     let report = tissue
-        .displace(columns.answer.columns(), hand.state().loads_n())
+        .displace(columns.answer.columns(), hand.state().loads_n(), whole_m(&hand))
         .unwrap();
     assert!(report.converged && report.moved > 19_000, "{report:?}");
     // The tip presses as a patch: at its middle the lattice moves a little more than on the mean over the patch.
@@ -96,7 +101,7 @@ fn the_body_follows_the_loads_of_the_line_and_is_at_rest_without_them() {
     }
     assert!(!hand.is_in_tissue());
     let report = tissue
-        .displace(columns.answer.columns(), hand.state().loads_n())
+        .displace(columns.answer.columns(), hand.state().loads_n(), whole_m(&hand))
         .unwrap();
     assert_eq!((report.moved, report.max_displacement), (0, 0.0));
 }
@@ -257,7 +262,7 @@ fn a_coarser_pelvis_beside_one_of_all_cells() {
     let mut times_us: Vec<f64> = (0..200)
         .map(|_| {
             let begun = std::time::Instant::now();
-            tissue.displace(ready.body.answer.columns(), &loads).unwrap();
+            tissue.displace(ready.body.answer.columns(), &loads, [0.0; 3]).unwrap();
             begun.elapsed().as_secs_f64() * 1e6
         })
         .collect();

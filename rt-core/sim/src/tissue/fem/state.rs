@@ -66,8 +66,15 @@ impl<T: Real> FemState<T> {
         })
     }
 
-    /// Lets loose and forgets what is held, and displaces every element by the sum of loads times answers (m/N); how many moved.
-    pub fn displace(&mut self, model: &FemModel<T>, columns: &[PackedField], loads_n: &[f64]) -> u32 {
+    /// Lets loose and forgets what is held, and displaces every element by the sum of loads times answers (m/N) and by `whole_m`; how
+    /// many moved.
+    pub fn displace(
+        &mut self,
+        model: &FemModel<T>,
+        columns: &[PackedField],
+        loads_n: &[f64],
+        whole_m: [f64; 3],
+    ) -> u32 {
         if !self.fits(model) {
             return 0;
         }
@@ -76,6 +83,12 @@ impl<T: Real> FemState<T> {
         self.has_time = false;
         let (simd, per_element) = (model.levels[0].simd, 1.0 / model.lattice.spacing_m);
         add_up(simd, columns, loads_n, per_element, &mut self.displacement);
+        for (u, whole_m) in self.displacement.iter_mut().zip(whole_m) {
+            if whole_m != 0.0 {
+                let by = (whole_m * per_element) as f32;
+                u.iter_mut().for_each(|u| *u += by);
+            }
+        }
         let [x, y, z] = &self.displacement;
         let (mut largest, mut moved) = (0.0_f32, 0);
         for ((x, y), z) in x.iter().zip(y).zip(z) {

@@ -91,8 +91,8 @@ impl<T: Compiled> TissueModel for FemTissue<T> {
         prepare(&self.model, &mut self.state, next.map(patch), &self.settings);
     }
 
-    fn displace(&mut self, columns: &[PackedField], loads_n: &[f64]) -> Option<StepReport> {
-        let moved = self.state.displace(&self.model, columns, loads_n);
+    fn displace(&mut self, columns: &[PackedField], loads_n: &[f64], whole_m: [f64; 3]) -> Option<StepReport> {
+        let moved = self.state.displace(&self.model, columns, loads_n, whole_m);
         Some(StepReport {
             passes: 0,
             // What the columns were solved to is theirs; the sum adds nothing.

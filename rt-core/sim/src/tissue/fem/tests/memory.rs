@@ -47,7 +47,7 @@ fn a_body_on_a_line_goes_on_from_its_memory_in_every_bit_whatever_was_held_befor
         first.prepare(Some(held(&scene, 2e-4 * f64::from(n + 1))));
     }
     assert!(!first.is_all_saved(), "the solver is in the middle of it");
-    first.displace(&columns(&scene), &[2.0]);
+    first.displace(&columns(&scene), &[2.0], [0.0, 0.0, 1e-3]);
     assert!(first.is_all_saved());
     let mut memory = vec![0; first.memory_len()];
     let calls = heap::calls_of_this_thread();
