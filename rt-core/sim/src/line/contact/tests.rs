@@ -9,6 +9,7 @@ use crate::line::{Compliance, LineLayer, LineSettings, PronyTerm};
 use stylet_heap as heap;
 
 mod behaviour;
+mod membrane;
 
 const DT_S: f64 = 1e-3;
 /// The paper's gland, as the needle meets it: a membrane that is pushed 8 mm at most, cutting, friction.
