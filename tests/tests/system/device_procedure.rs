@@ -9,6 +9,7 @@ use stylet_host::link::Link;
 use stylet_implant::workflow::{NeedlePlan, Pace, Run, RunStatus, Step, default_plan};
 use stylet_shm_schema::{EventKind, Fault, Request, TickRecord, flags};
 use stylet_tests::phantom::library;
+use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, ask, scratch, until};
 
 const LONG: Duration = Duration::from_secs(20);
@@ -86,177 +87,181 @@ fn goal(run: &Run, plan: &NeedlePlan, seeds_dropped: usize) -> Option<[f64; 3]> 
 
 #[test]
 fn the_whole_procedure_runs_with_a_phantom_and_its_motors_get_the_force() {
-    let mut rig = Rig::start("phantom-procedure", true);
-    assert!(
-        rig.link
-            .session()
-            .expect("live")
-            .device
-            .read()
-            .contains("Phantom Premium 1.5 6DOF")
-    );
-    assert_eq!(rig.link.state().expect("live").flags & flags::SIMULATED_DEVICE, 0);
-    let plan = default_plan(&rig.link.scene().expect("live").header);
-    let mut run = Run::new(plan.clone(), Pace::default());
-    let (mut status, mut led, mut records) = (RunStatus::Working, None, Vec::<TickRecord>::new());
-    let ended = until(Duration::from_secs(120), || {
-        rig.link.poll();
-        records.append(&mut rig.link.take_records());
-        let dropped = rig.link.state().map_or(0, |s| s.seed_count as usize);
-        let goal = goal(&run, &plan, dropped);
-        if goal != led
-            && let Some(to_m) = goal
-        {
-            rig.lead(to_m, 0.05);
-            led = goal;
-        }
-        status = run.advance(&mut rig.link);
-        status != RunStatus::Working
+    where_the_machine_runs(|| {
+        let mut rig = Rig::start("phantom-procedure", true);
+        assert!(
+            rig.link
+                .session()
+                .expect("live")
+                .device
+                .read()
+                .contains("Phantom Premium 1.5 6DOF")
+        );
+        assert_eq!(rig.link.state().expect("live").flags & flags::SIMULATED_DEVICE, 0);
+        let plan = default_plan(&rig.link.scene().expect("live").header);
+        let mut run = Run::new(plan.clone(), Pace::default());
+        let (mut status, mut led, mut records) = (RunStatus::Working, None, Vec::<TickRecord>::new());
+        let ended = until(Duration::from_secs(120), || {
+            rig.link.poll();
+            records.append(&mut rig.link.take_records());
+            let dropped = rig.link.state().map_or(0, |s| s.seed_count as usize);
+            let goal = goal(&run, &plan, dropped);
+            if goal != led
+                && let Some(to_m) = goal
+            {
+                rig.lead(to_m, 0.05);
+                led = goal;
+            }
+            status = run.advance(&mut rig.link);
+            status != RunStatus::Working
+        });
+        assert!(ended && status == RunStatus::Done, "{status:?}");
+        let largest = records
+            .iter()
+            .map(|r| Vector3::from(r.force_on_hand_n).norm())
+            .fold(0.0, f64::max);
+        let commanded = get(&rig.control.peak_force_n);
+        println!("largest force: {largest:.3} N in the records, {commanded:.3} N commanded to the driver");
+        assert!(
+            records.iter().any(|r| r.flags & flags::PUNCTURED != 0),
+            "the membrane gave way"
+        );
+        assert!(largest > 3.0, "{largest} N");
+        // Two grids of 1 kHz: the very tick of the peak may be passed over.
+        assert!(
+            (commanded - largest).abs() < 0.1 * largest,
+            "{commanded} N commanded, {largest} N meant"
+        );
+        assert_eq!(rig.control.non_finite_forces.load(Relaxed), 0);
+        assert_eq!(rig.link.snapshot().expect("live").header.seed_count, 5);
+        let control = rig.control;
+        drop(rig.link);
+        rig.core.finish();
+        assert_eq!(get(&control.force_at_stop_n), 0.0);
+        let order = control.order();
+        assert_eq!(
+            order.iter().rfind(|call| **call != "hdGetError"),
+            Some(&"hdDisableDevice"),
+            "released at the end"
+        );
     });
-    assert!(ended && status == RunStatus::Done, "{status:?}");
-    let largest = records
-        .iter()
-        .map(|r| Vector3::from(r.force_on_hand_n).norm())
-        .fold(0.0, f64::max);
-    let commanded = get(&rig.control.peak_force_n);
-    println!("largest force: {largest:.3} N in the records, {commanded:.3} N commanded to the driver");
-    assert!(
-        records.iter().any(|r| r.flags & flags::PUNCTURED != 0),
-        "the membrane gave way"
-    );
-    assert!(largest > 3.0, "{largest} N");
-    // Two grids of 1 kHz: the very tick of the peak may be passed over.
-    assert!(
-        (commanded - largest).abs() < 0.1 * largest,
-        "{commanded} N commanded, {largest} N meant"
-    );
-    assert_eq!(rig.control.non_finite_forces.load(Relaxed), 0);
-    assert_eq!(rig.link.snapshot().expect("live").header.seed_count, 5);
-    let control = rig.control;
-    drop(rig.link);
-    rig.core.finish();
-    assert_eq!(get(&control.force_at_stop_n), 0.0);
-    let order = control.order();
-    assert_eq!(
-        order.iter().rfind(|call| **call != "hdGetError"),
-        Some(&"hdDisableDevice"),
-        "released at the end"
-    );
 }
 
 #[test]
 fn unplugged_in_mid_insertion_the_force_is_off_the_screen_says_why_and_it_goes_on_after_a_re_plug() {
-    let mut rig = Rig::start("phantom-unplugged", false);
-    let plan = default_plan(&rig.link.scene().expect("live").header);
-    ask(&mut rig.link, &Request::Engage).expect("engages");
-    rig.lead(plan.entry_m, 0.1);
-    let entry = Vector3::from(plan.entry_m);
-    let tip = |link: &Link| Vector3::from(link.state().expect("live").tip_in_scene_m);
-    assert!(until(LONG, || {
-        rig.link.poll();
-        (tip(&rig.link) - entry).norm() < 2e-3
-    }));
-    rig.lead(plan.deepest_first()[0], 0.02);
-    assert!(
-        until(LONG, || {
+    where_the_machine_runs(|| {
+        let mut rig = Rig::start("phantom-unplugged", false);
+        let plan = default_plan(&rig.link.scene().expect("live").header);
+        ask(&mut rig.link, &Request::Engage).expect("engages");
+        rig.lead(plan.entry_m, 0.1);
+        let entry = Vector3::from(plan.entry_m);
+        let tip = |link: &Link| Vector3::from(link.state().expect("live").tip_in_scene_m);
+        assert!(until(LONG, || {
             rig.link.poll();
-            rig.felt_n() > 1.0
-        }),
-        "in the membrane"
-    );
-    rig.link.take_records();
+            (tip(&rig.link) - entry).norm() < 2e-3
+        }));
+        rig.lead(plan.deepest_first()[0], 0.02);
+        assert!(
+            until(LONG, || {
+                rig.link.poll();
+                rig.felt_n() > 1.0
+            }),
+            "in the membrane"
+        );
+        rig.link.take_records();
 
-    rig.control.unplugged.store(1, Relaxed);
-    assert!(
-        until(LONG, || {
+        rig.control.unplugged.store(1, Relaxed);
+        assert!(
+            until(LONG, || {
+                rig.link.poll();
+                rig.fault() == Fault::DeviceLost
+            }),
+            "{:?}",
+            rig.fault()
+        );
+        assert!(
+            until(LONG, || {
+                rig.link.poll();
+                rig.felt_n() == 0.0
+            }),
+            "the motors are released"
+        );
+        let at_zero = |link: &Link| {
+            link.state()
+                .is_some_and(|s| s.force_on_hand_n == [0.0; 3] && s.flags & flags::ENGAGED == 0)
+        };
+        assert!(
+            until(LONG, || {
+                rig.link.poll();
+                at_zero(&rig.link)
+            }),
+            "zero in the loop's own state"
+        );
+        let said = |link: &Link| {
+            link.events()
+                .iter()
+                .rev()
+                .find(|e| e.kind == EventKind::FaultRaised as u32)
+                .map(|e| e.text.read())
+        };
+        assert!(until(LONG, || {
             rig.link.poll();
-            rig.fault() == Fault::DeviceLost
-        }),
-        "{:?}",
-        rig.fault()
-    );
-    assert!(
-        until(LONG, || {
-            rig.link.poll();
-            rig.felt_n() == 0.0
-        }),
-        "the motors are released"
-    );
-    let at_zero = |link: &Link| {
-        link.state()
-            .is_some_and(|s| s.force_on_hand_n == [0.0; 3] && s.flags & flags::ENGAGED == 0)
-    };
-    assert!(
-        until(LONG, || {
-            rig.link.poll();
-            at_zero(&rig.link)
-        }),
-        "zero in the loop's own state"
-    );
-    let said = |link: &Link| {
-        link.events()
+            said(&rig.link).is_some_and(|t| t.contains("power and cable"))
+        }));
+        // The force of the loop goes to zero in the ticks of the ramp, and stays there.
+        let records = rig.link.take_records();
+        let lost = records
             .iter()
-            .rev()
-            .find(|e| e.kind == EventKind::FaultRaised as u32)
-            .map(|e| e.text.read())
-    };
-    assert!(until(LONG, || {
-        rig.link.poll();
-        said(&rig.link).is_some_and(|t| t.contains("power and cable"))
-    }));
-    // The force of the loop goes to zero in the ticks of the ramp, and stays there.
-    let records = rig.link.take_records();
-    let lost = records
-        .iter()
-        .position(|r| r.fault == Fault::DeviceLost as u32)
-        .expect("in the records");
-    let late = records.iter().skip(lost + 21).find(|r| r.force_on_hand_n != [0.0; 3]);
-    assert!(late.is_none(), "{late:?}");
-    // Arming again without a device is of no use.
-    ask(&mut rig.link, &Request::Engage).expect("answered");
-    assert!(until(LONG, || {
-        rig.link.poll();
-        rig.fault() == Fault::DeviceLost && at_zero(&rig.link)
-    }));
+            .position(|r| r.fault == Fault::DeviceLost as u32)
+            .expect("in the records");
+        let late = records.iter().skip(lost + 21).find(|r| r.force_on_hand_n != [0.0; 3]);
+        assert!(late.is_none(), "{late:?}");
+        // Arming again without a device is of no use.
+        ask(&mut rig.link, &Request::Engage).expect("answered");
+        assert!(until(LONG, || {
+            rig.link.poll();
+            rig.fault() == Fault::DeviceLost && at_zero(&rig.link)
+        }));
 
-    rig.control.unplugged.store(0, Relaxed);
-    assert!(until(LONG, || rig.control.inits.load(Relaxed) == 2), "initialised anew");
-    let moving = |link: &Link, from: Vector3<f64>| (tip(link) - from).norm() > 1e-3;
-    let before = tip(&rig.link);
-    rig.lead(plan.entry_m, 0.05);
-    assert!(
-        until(LONG, || {
+        rig.control.unplugged.store(0, Relaxed);
+        assert!(until(LONG, || rig.control.inits.load(Relaxed) == 2), "initialised anew");
+        let moving = |link: &Link, from: Vector3<f64>| (tip(link) - from).norm() > 1e-3;
+        let before = tip(&rig.link);
+        rig.lead(plan.entry_m, 0.05);
+        assert!(
+            until(LONG, || {
+                rig.link.poll();
+                moving(&rig.link, before)
+            }),
+            "the pose comes again"
+        );
+        // In the membrane the gate would wait for a small force.
+        assert!(until(LONG, || {
             rig.link.poll();
-            moving(&rig.link, before)
-        }),
-        "the pose comes again"
-    );
-    // In the membrane the gate would wait for a small force.
-    assert!(until(LONG, || {
-        rig.link.poll();
-        (tip(&rig.link) - entry).norm() < 2e-3
-    }));
-    assert_eq!(rig.felt_n(), 0.0, "no force before it is armed again");
-    let mut armed = false;
-    assert!(
-        until(LONG, || {
-            armed |= ask(&mut rig.link, &Request::Engage).is_ok();
-            rig.link.poll();
-            rig.fault() == Fault::None
-        }),
-        "{armed} {:?}",
-        rig.fault()
-    );
-    rig.lead(plan.deepest_first()[0], 0.02);
-    assert!(
-        until(LONG, || {
-            rig.link.poll();
-            rig.felt_n() > 0.5
-        }),
-        "felt again"
-    );
-    drop(rig.link);
-    rig.core.finish();
+            (tip(&rig.link) - entry).norm() < 2e-3
+        }));
+        assert_eq!(rig.felt_n(), 0.0, "no force before it is armed again");
+        let mut armed = false;
+        assert!(
+            until(LONG, || {
+                armed |= ask(&mut rig.link, &Request::Engage).is_ok();
+                rig.link.poll();
+                rig.fault() == Fault::None
+            }),
+            "{armed} {:?}",
+            rig.fault()
+        );
+        rig.lead(plan.deepest_first()[0], 0.02);
+        assert!(
+            until(LONG, || {
+                rig.link.poll();
+                rig.felt_n() > 0.5
+            }),
+            "felt again"
+        );
+        drop(rig.link);
+        rig.core.finish();
+    });
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 use stylet_shm_schema::role;
+use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, program, scratch, until};
 
 /// A gland, a urethra through it and a rectum beside it, 0.8 x 0.9 x 1.5 mm, oblique; prints centres in patient mm and volumes.
@@ -84,65 +85,68 @@ fn formats(folder: &Path) -> Vec<PathBuf> {
 
 #[test]
 fn every_format_gives_the_same_structures_at_the_same_place() {
-    let folder = scratch("formats");
-    let out = Command::new("/usr/bin/python3")
-        .args(["-c", WRITE])
-        .arg(folder.join("labels.nii.gz"))
-        .output()
-        .expect("python3 runs");
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-    let truth: serde_json::Value = serde_json::from_slice(&out.stdout).expect("JSON");
-    let mut core = Core::start();
-    let mut link = core.host();
-    for path in formats(&folder) {
-        let name = path.file_name().expect("named").to_string_lossy().into_owned();
-        let volume =
-            stylet_files::read(&path, None, &stylet_files::Progress::default()).unwrap_or_else(|e| panic!("{e}"));
-        let before = link.scene().expect("live").header.generation;
-        let id = link.upload(&volume).expect("sent");
-        let shown = until(Duration::from_secs(60), || {
-            link.poll();
-            if let Some(answer) = link.reply(id) {
-                assert!(answer.accepted, "{name}: {}", answer.text);
+    where_the_machine_runs(|| {
+        let folder = scratch("formats");
+        let out = Command::new("/usr/bin/python3")
+            .args(["-c", WRITE])
+            .arg(folder.join("labels.nii.gz"))
+            .output()
+            .expect("python3 runs");
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let truth: serde_json::Value = serde_json::from_slice(&out.stdout).expect("JSON");
+        let mut core = Core::start();
+        let mut link = core.host();
+        for path in formats(&folder) {
+            let name = path.file_name().expect("named").to_string_lossy().into_owned();
+            let volume =
+                stylet_files::read(&path, None, &stylet_files::Progress::default()).unwrap_or_else(|e| panic!("{e}"));
+            let before = link.scene().expect("live").header.generation;
+            let id = link.upload(&volume).expect("sent");
+            let shown = until(Duration::from_secs(60), || {
+                link.poll();
+                if let Some(answer) = link.reply(id) {
+                    assert!(answer.accepted, "{name}: {}", answer.text);
+                }
+                link.scene().is_some_and(|s| s.header.generation != before)
+            });
+            assert!(shown && core.is_running(), "{name}");
+            let header = link.scene().expect("live").header;
+            let t = header.patient_from_scene;
+            assert_eq!(header.structures().len(), 3, "{name}");
+            for (structure, label) in header.structures().iter().zip(["1", "2", "5"]) {
+                let expected_role = if label == "1" { role::TARGET } else { role::SPARE };
+                assert_eq!(structure.role, expected_role, "{name}: {}", structure.name.read());
+                let expected: Vec<f64> = truth[label]
+                    .as_array()
+                    .expect("four")
+                    .iter()
+                    .map(|v| v.as_f64().expect("a number"))
+                    .collect();
+                let volume_mm3 = f64::from(structure.element_count) * (header.spacing_m * 1e3).powi(3);
+                assert!(
+                    (volume_mm3 / expected[3] - 1.0).abs() < 0.03,
+                    "{name}, {}: {volume_mm3} and {} mm3",
+                    structure.name.read(),
+                    expected[3]
+                );
+                let centre = centre_of_cells(&volume, structure.label as u8);
+                let patient_mm = [0, 1, 2].map(|r| {
+                    (t[3 * r] * centre[0] + t[3 * r + 1] * centre[1] + t[3 * r + 2] * centre[2] + t[9 + r]) * 1e3
+                });
+                let off_mm = (0..3)
+                    .map(|a| (patient_mm[a] - expected[a]).powi(2))
+                    .sum::<f64>()
+                    .sqrt();
+                println!("{name}: {} is off by {off_mm:.3} mm", structure.name.read());
+                // Half of the smallest side of a voxel.
+                assert!(
+                    off_mm < 0.4,
+                    "{name}, {}: {patient_mm:?} and {expected:?}",
+                    structure.name.read()
+                );
             }
-            link.scene().is_some_and(|s| s.header.generation != before)
-        });
-        assert!(shown && core.is_running(), "{name}");
-        let header = link.scene().expect("live").header;
-        let t = header.patient_from_scene;
-        assert_eq!(header.structures().len(), 3, "{name}");
-        for (structure, label) in header.structures().iter().zip(["1", "2", "5"]) {
-            let expected_role = if label == "1" { role::TARGET } else { role::SPARE };
-            assert_eq!(structure.role, expected_role, "{name}: {}", structure.name.read());
-            let expected: Vec<f64> = truth[label]
-                .as_array()
-                .expect("four")
-                .iter()
-                .map(|v| v.as_f64().expect("a number"))
-                .collect();
-            let volume_mm3 = f64::from(structure.element_count) * (header.spacing_m * 1e3).powi(3);
-            assert!(
-                (volume_mm3 / expected[3] - 1.0).abs() < 0.03,
-                "{name}, {}: {volume_mm3} and {} mm3",
-                structure.name.read(),
-                expected[3]
-            );
-            let centre = centre_of_cells(&volume, structure.label as u8);
-            let patient_mm = [0, 1, 2]
-                .map(|r| (t[3 * r] * centre[0] + t[3 * r + 1] * centre[1] + t[3 * r + 2] * centre[2] + t[9 + r]) * 1e3);
-            let off_mm = (0..3)
-                .map(|a| (patient_mm[a] - expected[a]).powi(2))
-                .sum::<f64>()
-                .sqrt();
-            println!("{name}: {} is off by {off_mm:.3} mm", structure.name.read());
-            // Half of the smallest side of a voxel.
-            assert!(
-                off_mm < 0.4,
-                "{name}, {}: {patient_mm:?} and {expected:?}",
-                structure.name.read()
-            );
         }
-    }
+    });
 }
 
 fn centre_of_cells(v: &stylet_files::LabelVolume, label: u8) -> [f64; 3] {
@@ -161,23 +165,25 @@ fn centre_of_cells(v: &stylet_files::LabelVolume, label: u8) -> [f64; 3] {
 
 #[test]
 fn a_scene_file_that_cannot_be_used_is_refused_and_the_scene_goes_on() {
-    let folder = scratch("bad-scene");
-    let scene = folder.join("bad.toml");
-    std::fs::write(&scene, "[volume]\nfile = \"none.nrrd\"\n[needle]\nspeed = 3\n").expect("written");
-    let mut core = Core::start();
-    let mut link = core.host();
-    let before = link.scene().expect("live").header.generation;
-    let run = Command::new(program("host-ui"))
-        .args(["procedure", "--instance", core.instance.name(), "--scene"])
-        .arg(&scene)
-        .output()
-        .expect("host-ui runs");
-    let said = String::from_utf8_lossy(&run.stderr).into_owned();
-    assert!(
-        !run.status.success() && said.contains("[needle] speed is not known"),
-        "{said}"
-    );
-    link.poll();
-    assert!(core.is_running());
-    assert_eq!(link.scene().expect("live").header.generation, before);
+    where_the_machine_runs(|| {
+        let folder = scratch("bad-scene");
+        let scene = folder.join("bad.toml");
+        std::fs::write(&scene, "[volume]\nfile = \"none.nrrd\"\n[needle]\nspeed = 3\n").expect("written");
+        let mut core = Core::start();
+        let mut link = core.host();
+        let before = link.scene().expect("live").header.generation;
+        let run = Command::new(program("host-ui"))
+            .args(["procedure", "--instance", core.instance.name(), "--scene"])
+            .arg(&scene)
+            .output()
+            .expect("host-ui runs");
+        let said = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert!(
+            !run.status.success() && said.contains("[needle] speed is not known"),
+            "{said}"
+        );
+        link.poll();
+        assert!(core.is_running());
+        assert_eq!(link.scene().expect("live").header.generation, before);
+    });
 }

@@ -4,6 +4,7 @@ use std::time::Duration;
 use stylet_host::link::Link;
 use stylet_implant::workflow::{Pace, Run, RunStatus, default_plan};
 use stylet_shm_schema::{Phase, TickRecord, flags};
+use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, until};
 
 /// What a host saw of a whole procedure.
@@ -50,82 +51,86 @@ fn run_procedure(link: &mut Link) -> Seen {
 
 #[test]
 fn needle_enters_gland_moves_force_peaks_at_puncture_and_seeds_end_off_plan() {
-    let mut core = Core::start();
-    let mut link = core.host();
-    let seen = run_procedure(&mut link);
-    let state = *link.state().expect("live");
+    where_the_machine_runs(|| {
+        let mut core = Core::start();
+        let mut link = core.host();
+        let seen = run_procedure(&mut link);
+        let state = *link.state().expect("live");
 
-    assert!(
-        state.worst_residual <= 1e-3,
-        "a tissue tick left {} element",
-        state.worst_residual
-    );
-    assert!(seen.snapshots > 100, "{} snapshots", seen.snapshots);
-    let moved_mm = seen.largest_displacement_before_puncture_m * 1e3;
-    assert!(moved_mm > 2.0, "the gland moved {moved_mm} mm before puncture");
+        assert!(
+            state.worst_residual <= 1e-3,
+            "a tissue tick left {} element",
+            state.worst_residual
+        );
+        assert!(seen.snapshots > 100, "{} snapshots", seen.snapshots);
+        let moved_mm = seen.largest_displacement_before_puncture_m * 1e3;
+        assert!(moved_mm > 2.0, "the gland moved {moved_mm} mm before puncture");
 
-    let force = |r: &TickRecord| r.force_on_hand_n.iter().map(|f| f * f).sum::<f64>().sqrt();
-    let puncture = seen
-        .records
-        .iter()
-        .position(|r| r.flags & flags::PUNCTURED != 0)
-        .expect("the membrane gave way");
-    let before = seen.records[..puncture].iter().map(force).fold(0.0, f64::max);
-    let after = seen.records[puncture + 20..puncture + 60]
-        .iter()
-        .map(force)
-        .fold(0.0, f64::max);
-    println!("force before puncture {before:.2} N, after {after:.2} N; gland moved {moved_mm:.2} mm");
-    assert!(
-        before > 3.0 && after < 0.7 * before,
-        "before {before} N, after {after} N"
-    );
-    let largest = seen.records.iter().map(force).fold(0.0, f64::max);
-    assert!(
-        largest <= state.device_limit_n + 1e-9,
-        "{largest} N is over the device's limit"
-    );
+        let force = |r: &TickRecord| r.force_on_hand_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+        let puncture = seen
+            .records
+            .iter()
+            .position(|r| r.flags & flags::PUNCTURED != 0)
+            .expect("the membrane gave way");
+        let before = seen.records[..puncture].iter().map(force).fold(0.0, f64::max);
+        let after = seen.records[puncture + 20..puncture + 60]
+            .iter()
+            .map(force)
+            .fold(0.0, f64::max);
+        println!("force before puncture {before:.2} N, after {after:.2} N; gland moved {moved_mm:.2} mm");
+        assert!(
+            before > 3.0 && after < 0.7 * before,
+            "before {before} N, after {after} N"
+        );
+        let largest = seen.records.iter().map(force).fold(0.0, f64::max);
+        assert!(
+            largest <= state.device_limit_n + 1e-9,
+            "{largest} N is over the device's limit"
+        );
 
-    let snapshot = link.snapshot().expect("live");
-    let plan = link.plan().expect("planned");
-    assert_eq!(snapshot.header.seed_count, 5);
-    let mut sum_mm = 0.0;
-    for i in 0..5 {
-        let (p, s) = (plan.seeds[i].position_m, snapshot.header.seeds[i].position_m);
-        let error_mm = (0..3).map(|a| (p[a] - s[a]).powi(2)).sum::<f64>().sqrt() * 1e3;
-        println!("seed {i}: {error_mm:.2} mm");
-        assert!(error_mm < 10.0, "seed {i} ended {error_mm} mm from plan");
-        sum_mm += error_mm;
-    }
-    assert!(
-        sum_mm / 5.0 > 1.0,
-        "the seeds ended {} mm from plan on average",
-        sum_mm / 5.0
-    );
-    drop(link);
-    core.finish();
+        let snapshot = link.snapshot().expect("live");
+        let plan = link.plan().expect("planned");
+        assert_eq!(snapshot.header.seed_count, 5);
+        let mut sum_mm = 0.0;
+        for i in 0..5 {
+            let (p, s) = (plan.seeds[i].position_m, snapshot.header.seeds[i].position_m);
+            let error_mm = (0..3).map(|a| (p[a] - s[a]).powi(2)).sum::<f64>().sqrt() * 1e3;
+            println!("seed {i}: {error_mm:.2} mm");
+            assert!(error_mm < 10.0, "seed {i} ended {error_mm} mm from plan");
+            sum_mm += error_mm;
+        }
+        assert!(
+            sum_mm / 5.0 > 1.0,
+            "the seeds ended {} mm from plan on average",
+            sum_mm / 5.0
+        );
+        drop(link);
+        core.finish();
+    });
 }
 
 #[test]
 fn every_tick_has_its_record() {
-    let mut core = Core::start();
-    let mut link = core.host();
-    link.take_records();
-    let mut records: Vec<TickRecord> = Vec::new();
-    until(Duration::from_secs(3), || {
-        link.poll();
-        records.append(&mut link.take_records());
-        false
+    where_the_machine_runs(|| {
+        let mut core = Core::start();
+        let mut link = core.host();
+        link.take_records();
+        let mut records: Vec<TickRecord> = Vec::new();
+        until(Duration::from_secs(3), || {
+            link.poll();
+            records.append(&mut link.take_records());
+            false
+        });
+        assert!(records.len() > 1000, "{} records in 3 s", records.len());
+        for pair in records.windows(2) {
+            assert_eq!(pair[1].tick, pair[0].tick + 1, "a record is missing");
+            let periods = u64::from(pair[1].missed) + 1;
+            assert_eq!(
+                pair[1].due_ns - pair[0].due_ns,
+                periods * 1_000_000,
+                "the grid kept its phase"
+            );
+        }
+        assert_eq!(link.state().expect("live").records_lost, 0);
     });
-    assert!(records.len() > 1000, "{} records in 3 s", records.len());
-    for pair in records.windows(2) {
-        assert_eq!(pair[1].tick, pair[0].tick + 1, "a record is missing");
-        let periods = u64::from(pair[1].missed) + 1;
-        assert_eq!(
-            pair[1].due_ns - pair[0].due_ns,
-            periods * 1_000_000,
-            "the grid kept its phase"
-        );
-    }
-    assert_eq!(link.state().expect("live").records_lost, 0);
 }

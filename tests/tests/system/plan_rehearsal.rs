@@ -6,6 +6,7 @@ use stylet_host::link::Link;
 use stylet_implant::plan::rehearse::{Drops, LinkRehearser, Rehearser, Rest};
 use stylet_implant::workflow::{NeedleTask, Pace, Run, RunStatus, default_plan};
 use stylet_shm_schema::{Event, EventKind, Fault, NeedleRehearsal, RefusalCode, Request, flags};
+use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, ask, until};
 
 /// Live and rehearsed seeds agree within this, and what two live runs differ by themselves.
@@ -122,70 +123,74 @@ fn the_default_needle_of_the_paper_s_gland_ends_where_it_was_rehearsed() {
 /// A needle was felt by one loop, and moved tissue by the other's rule: seeds came 11 to 18 mm short, and the last was lost.
 #[test]
 fn in_finite_elements_every_seed_rests_where_it_was_rehearsed() {
-    let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "fem"]);
-    let mut link = core.host();
-    let task = NeedleTask::as_planned(default_plan(&link.scene().expect("live").header));
-    let rest = rehearsed(&mut link, &task);
-    let placed = live(&mut link, &task);
-    assert_eq!(placed.seeds_m.len(), task.plan.deepest_first().len(), "none is lost");
-    // The hand stops within 0.3 mm of its goal, before or behind it: where the core is taken away, on the other side.
-    let missed = link.state().expect("live").missed_deadlines;
-    let bound_m = if missed < 50 { 0.35e-3 } else { 1.2e-3 };
-    for ((live, rehearsed), plan) in placed.seeds_m.iter().zip(&rest.seeds_m).zip(task.plan.deepest_first()) {
-        let (off_m, error_m) = (apart_m(live, rehearsed), apart_m(live, &plan));
-        println!(
-            "{:.3} mm from plan, rehearsal off by {:.3} mm; {missed} ticks missed",
-            error_m * 1e3,
-            off_m * 1e3
-        );
-        assert!(off_m < bound_m, "{live:?} live, {rehearsed:?} rehearsed");
-    }
-    let peak = link.state().expect("live").peak_force_n;
-    println!("peak force {peak:.3} N live, {:.3} N rehearsed", rest.peak_force_n);
-    assert!((peak - rest.peak_force_n).abs() < 0.1 * peak);
+    where_the_machine_runs(|| {
+        let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "fem"]);
+        let mut link = core.host();
+        let task = NeedleTask::as_planned(default_plan(&link.scene().expect("live").header));
+        let rest = rehearsed(&mut link, &task);
+        let placed = live(&mut link, &task);
+        assert_eq!(placed.seeds_m.len(), task.plan.deepest_first().len(), "none is lost");
+        // The hand stops within 0.3 mm of its goal, before or behind it: where the core is taken away, on the other side.
+        let missed = link.state().expect("live").missed_deadlines;
+        let bound_m = if missed < 50 { 0.35e-3 } else { 1.2e-3 };
+        for ((live, rehearsed), plan) in placed.seeds_m.iter().zip(&rest.seeds_m).zip(task.plan.deepest_first()) {
+            let (off_m, error_m) = (apart_m(live, rehearsed), apart_m(live, &plan));
+            println!(
+                "{:.3} mm from plan, rehearsal off by {:.3} mm; {missed} ticks missed",
+                error_m * 1e3,
+                off_m * 1e3
+            );
+            assert!(off_m < bound_m, "{live:?} live, {rehearsed:?} rehearsed");
+        }
+        let peak = link.state().expect("live").peak_force_n;
+        println!("peak force {peak:.3} N live, {:.3} N rehearsed", rest.peak_force_n);
+        assert!((peak - rest.peak_force_n).abs() < 0.1 * peak);
+    });
 }
 
 #[test]
 fn one_rehearsal_at_a_time_and_the_run_does_not_notice() {
-    let mut core = Core::start();
-    let mut link = core.host();
-    let plan = default_plan(&link.scene().expect("live").header);
-    let drops: Drops = NeedleTask::as_planned(plan).drops;
-    let rehearsal = drops.rehearsal(&Pace::default());
-    let request = Request::Rehearse(rehearsal.clone());
-    let first = link.send(&request).expect("sent");
-    let second = link.send(&request).expect("sent");
-    let (mut one, mut other) = (None, None);
-    until(Duration::from_secs(30), || {
-        link.poll();
-        one = one.take().or_else(|| link.reply(first));
-        other = other.take().or_else(|| link.reply(second));
-        one.is_some() && other.is_some()
-    });
-    let (one, other) = (one.expect("answered"), other.expect("answered"));
-    assert!(one.accepted, "{}", one.text);
-    assert!(
-        !other.accepted && other.is_refused_for(RefusalCode::RehearsalRunning),
-        "{}",
-        other.text
-    );
-    assert_eq!(link.rehearsal(first).map(|r| r.seed_count), Some(5));
-    assert!(link.rehearsal(second).is_none());
+    where_the_machine_runs(|| {
+        let mut core = Core::start();
+        let mut link = core.host();
+        let plan = default_plan(&link.scene().expect("live").header);
+        let drops: Drops = NeedleTask::as_planned(plan).drops;
+        let rehearsal = drops.rehearsal(&Pace::default());
+        let request = Request::Rehearse(rehearsal.clone());
+        let first = link.send(&request).expect("sent");
+        let second = link.send(&request).expect("sent");
+        let (mut one, mut other) = (None, None);
+        until(Duration::from_secs(30), || {
+            link.poll();
+            one = one.take().or_else(|| link.reply(first));
+            other = other.take().or_else(|| link.reply(second));
+            one.is_some() && other.is_some()
+        });
+        let (one, other) = (one.expect("answered"), other.expect("answered"));
+        assert!(one.accepted, "{}", one.text);
+        assert!(
+            !other.accepted && other.is_refused_for(RefusalCode::RehearsalRunning),
+            "{}",
+            other.text
+        );
+        assert_eq!(link.rehearsal(first).map(|r| r.seed_count), Some(5));
+        assert!(link.rehearsal(second).is_none());
 
-    let state = *link.state().expect("live");
-    assert_eq!(
-        (state.fault, state.seed_count),
-        (Fault::None as u32, 0),
-        "the live tissue has no seed"
-    );
-    let mut outside = rehearsal.clone();
-    outside.drops_m[0][2] = outside.entry_m[2] - 0.05;
-    let why = ask(&mut link, &Request::Rehearse(outside)).expect_err("nothing to drop a seed into");
-    assert!(why.contains("outside the tissue"), "{why}");
-    let without_drops = NeedleRehearsal {
-        drops_m: Vec::new(),
-        ..rehearsal
-    };
-    assert!(ask(&mut link, &Request::Rehearse(without_drops)).is_err());
-    ask(&mut link, &request).expect("the next one goes");
+        let state = *link.state().expect("live");
+        assert_eq!(
+            (state.fault, state.seed_count),
+            (Fault::None as u32, 0),
+            "the live tissue has no seed"
+        );
+        let mut outside = rehearsal.clone();
+        outside.drops_m[0][2] = outside.entry_m[2] - 0.05;
+        let why = ask(&mut link, &Request::Rehearse(outside)).expect_err("nothing to drop a seed into");
+        assert!(why.contains("outside the tissue"), "{why}");
+        let without_drops = NeedleRehearsal {
+            drops_m: Vec::new(),
+            ..rehearsal
+        };
+        assert!(ask(&mut link, &Request::Rehearse(without_drops)).is_err());
+        ask(&mut link, &request).expect("the next one goes");
+    });
 }

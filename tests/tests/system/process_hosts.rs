@@ -279,32 +279,34 @@ fn ten_thousand_invalid_commands_are_all_refused_and_counted() {
 /// The second of two changes in flight used to start from the set in force, and undid the first.
 #[test]
 fn two_changes_of_parameters_sent_at_once_are_both_in_force() {
-    let mut core = Core::start();
-    let mut link = core.host();
-    let changes = [(ParameterId::MembranePeak, 4.5), (ParameterId::CuttingForce, 1.25)];
-    let sent = changes.map(|(id, value)| {
-        let request = Request::SetParameters(vec![ParameterChange { id, value }]);
-        link.send(&request).expect("sent")
+    where_the_machine_runs(|| {
+        let mut core = Core::start();
+        let mut link = core.host();
+        let changes = [(ParameterId::MembranePeak, 4.5), (ParameterId::CuttingForce, 1.25)];
+        let sent = changes.map(|(id, value)| {
+            let request = Request::SetParameters(vec![ParameterChange { id, value }]);
+            link.send(&request).expect("sent")
+        });
+        let mut accepted = Vec::new();
+        until(Duration::from_secs(5), || {
+            link.poll();
+            accepted.extend(
+                sent.iter()
+                    .filter_map(|&id| link.reply(id))
+                    .map(|answer| answer.accepted),
+            );
+            accepted.len() == 2
+        });
+        assert_eq!(accepted, [true, true]);
+        until(Duration::from_secs(1), || {
+            link.poll();
+            link.parameters().is_some_and(|p| p.generation == 3)
+        });
+        let set = link.parameters().expect("live").set;
+        for (id, value) in changes {
+            assert_eq!(set.get(id), value, "{}", id.spec().key);
+        }
+        drop(link);
+        core.finish();
     });
-    let mut accepted = Vec::new();
-    until(Duration::from_secs(5), || {
-        link.poll();
-        accepted.extend(
-            sent.iter()
-                .filter_map(|&id| link.reply(id))
-                .map(|answer| answer.accepted),
-        );
-        accepted.len() == 2
-    });
-    assert_eq!(accepted, [true, true]);
-    until(Duration::from_secs(1), || {
-        link.poll();
-        link.parameters().is_some_and(|p| p.generation == 3)
-    });
-    let set = link.parameters().expect("live").set;
-    for (id, value) in changes {
-        assert_eq!(set.get(id), value, "{}", id.spec().key);
-    }
-    drop(link);
-    core.finish();
 }

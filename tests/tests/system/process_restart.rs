@@ -114,29 +114,31 @@ fn a_second_core_is_refused_under_the_same_name_and_runs_under_another() {
 
 #[test]
 fn what_killed_cores_and_hosts_left_is_removed_by_the_next_run() {
-    let mut instance = fresh_instance();
-    for _ in 0..3 {
+    where_the_machine_runs(|| {
+        let mut instance = fresh_instance();
+        for _ in 0..3 {
+            let mut core = Core::start_as(instance.clone(), &["--rt-if-allowed"]);
+            let out = scratch("stale").join("a.mcap");
+            let mut host = Command::new(program("host-ui"))
+                .args(["record", "--instance", instance.name(), "--out"])
+                .arg(out)
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .spawn()
+                .expect("host-ui starts");
+            drop(core.host());
+            let _ = host.kill();
+            let _ = host.wait();
+            instance = core.kill();
+        }
+        assert!(!left_behind(&instance).is_empty());
         let mut core = Core::start_as(instance.clone(), &["--rt-if-allowed"]);
-        let out = scratch("stale").join("a.mcap");
-        let mut host = Command::new(program("host-ui"))
-            .args(["record", "--instance", instance.name(), "--out"])
-            .arg(out)
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("host-ui starts");
-        drop(core.host());
-        let _ = host.kill();
-        let _ = host.wait();
-        instance = core.kill();
-    }
-    assert!(!left_behind(&instance).is_empty());
-    let mut core = Core::start_as(instance.clone(), &["--rt-if-allowed"]);
-    let mut link = core.host();
-    ask(&mut link, &Request::Engage).expect("works as on a clean machine");
-    drop(link);
-    core.finish();
-    assert_eq!(left_behind(&instance), [""; 0]);
+        let mut link = core.host();
+        ask(&mut link, &Request::Engage).expect("works as on a clean machine");
+        drop(link);
+        core.finish();
+        assert_eq!(left_behind(&instance), [""; 0]);
+    });
 }
 
 /// Runs in a mount namespace of its own, with a small `/dev/shm`, so that no other program is hurt.

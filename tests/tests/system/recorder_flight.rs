@@ -7,6 +7,7 @@ use stylet_runtime::replay::{file::Flight, lines::LinesAgain, repeat};
 use stylet_shm_schema::{EventKind, ParameterChange, ParameterId, Request, TickRecord};
 use stylet_tests::hand::Insertion;
 use stylet_tests::stopped::StoppedThread;
+use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, ask, program, until};
 
 fn replay(file: &Path) -> Output {
@@ -49,101 +50,107 @@ fn request(core: &Core, hand: &mut Insertion) -> PathBuf {
 
 #[test]
 fn a_request_a_fault_and_the_end_each_leave_a_recording_that_repeats_bit_for_bit() {
-    let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "paper"]);
-    let mut hand = Insertion::begin(&mut core, 0.006);
-    // Parameters, seeds and a turn on the way, and longer than the distance of two checkpoints of the tissue.
-    hand.watch(Duration::from_secs(5));
-    let change = |id, value| ParameterChange { id, value };
-    let changes = vec![
-        change(ParameterId::MembranePeak, 4.5),
-        change(ParameterId::ShearHorizontal, 0.4),
-    ];
-    ask(&mut hand.link, &Request::SetParameters(changes)).expect("set");
-    hand.watch(Duration::from_secs(3));
-    ask(&mut hand.link, &Request::DropSeed).expect("dropped");
-    hand.go(0.02, 0.02);
-    hand.watch(Duration::from_secs(2));
-    let requested = assert_identical(&request(&core, &mut hand));
-    let haptic = requested.haptic.as_ref().expect("recorded");
-    let tissue = requested.tissue.as_ref().expect("recorded");
-    assert!(haptic.ticks.len() >= 4000, "{} ticks", haptic.ticks.len());
-    assert!(
-        haptic.memory.state.tick > 1000,
-        "the recording begins in the middle of the session"
-    );
-    assert!(tissue.ticks.len() >= 800 && tissue.middle.is_some() && !tissue.orders.is_empty());
-    assert!(
-        tissue.memory.body.iter().any(|&byte| byte != 0),
-        "it begins with tissue that is not at rest"
-    );
-    // The forces of the file are those that the host saw.
-    let seen = |tick| hand.records.iter().find(|r: &&TickRecord| r.tick == tick);
-    let compared = haptic
-        .ticks
-        .iter()
-        .filter_map(|e| seen(e.record.tick).map(|r| (e.record, *r)));
-    assert!(compared.inspect(|(a, b)| assert_eq!(a, b)).count() > 3000);
+    where_the_machine_runs(|| {
+        let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "paper"]);
+        let mut hand = Insertion::begin(&mut core, 0.006);
+        // Parameters, seeds and a turn on the way, and longer than the distance of two checkpoints of the tissue.
+        hand.watch(Duration::from_secs(5));
+        let change = |id, value| ParameterChange { id, value };
+        let changes = vec![
+            change(ParameterId::MembranePeak, 4.5),
+            change(ParameterId::ShearHorizontal, 0.4),
+        ];
+        ask(&mut hand.link, &Request::SetParameters(changes)).expect("set");
+        hand.watch(Duration::from_secs(3));
+        ask(&mut hand.link, &Request::DropSeed).expect("dropped");
+        hand.go(0.02, 0.02);
+        hand.watch(Duration::from_secs(2));
+        let requested = assert_identical(&request(&core, &mut hand));
+        let haptic = requested.haptic.as_ref().expect("recorded");
+        let tissue = requested.tissue.as_ref().expect("recorded");
+        assert!(haptic.ticks.len() >= 4000, "{} ticks", haptic.ticks.len());
+        assert!(
+            haptic.memory.state.tick > 1000,
+            "the recording begins in the middle of the session"
+        );
+        assert!(tissue.ticks.len() >= 800 && tissue.middle.is_some() && !tissue.orders.is_empty());
+        assert!(
+            tissue.memory.body.iter().any(|&byte| byte != 0),
+            "it begins with tissue that is not at rest"
+        );
+        // The forces of the file are those that the host saw.
+        let seen = |tick| hand.records.iter().find(|r: &&TickRecord| r.tick == tick);
+        let compared = haptic
+            .ticks
+            .iter()
+            .filter_map(|e| seen(e.record.tick).map(|r| (e.record, *r)));
+        assert!(compared.inspect(|(a, b)| assert_eq!(a, b)).count() > 3000);
 
-    // A fault: the tissue thread stands still for a while.
-    drop(StoppedThread::stop(core.id(), "tissue"));
-    let stopped = StoppedThread::stop(core.id(), "tissue");
-    assert!(hand.watch_until(Duration::from_secs(3), |link| {
-        link.state().is_some_and(|s| s.fault != 0)
-    }));
-    drop(stopped);
-    assert!(
-        until(Duration::from_secs(5), || core.flights().len() == 2),
-        "{:?}",
-        core.flights()
-    );
-    let fault = core
-        .flights()
-        .into_iter()
-        .find(|f| f.display().to_string().contains("-fault"))
-        .expect("of the fault");
-    let flight = assert_identical(&fault);
-    let faults: Vec<u32> = flight
-        .haptic
-        .expect("recorded")
-        .ticks
-        .iter()
-        .map(|e| e.record.fault)
-        .collect();
-    assert!(
-        faults.first() == Some(&0) && faults.last() != Some(&0),
-        "it shows the way into the fault"
-    );
+        // A fault: the tissue thread stands still for a while.
+        drop(StoppedThread::stop(core.id(), "tissue"));
+        let stopped = StoppedThread::stop(core.id(), "tissue");
+        assert!(hand.watch_until(Duration::from_secs(3), |link| {
+            link.state().is_some_and(|s| s.fault != 0)
+        }));
+        drop(stopped);
+        assert!(
+            until(Duration::from_secs(5), || core.flights().len() == 2),
+            "{:?}",
+            core.flights()
+        );
+        let fault = core
+            .flights()
+            .into_iter()
+            .find(|f| f.display().to_string().contains("-fault"))
+            .expect("of the fault");
+        let flight = assert_identical(&fault);
+        let faults: Vec<u32> = flight
+            .haptic
+            .expect("recorded")
+            .ticks
+            .iter()
+            .map(|e| e.record.fault)
+            .collect();
+        assert!(
+            faults.first() == Some(&0) && faults.last() != Some(&0),
+            "it shows the way into the fault"
+        );
 
-    // The end, with the force on.
-    ask(&mut hand.link, &Request::Engage).expect("re-armed");
-    hand.watch(Duration::from_secs(1));
-    drop(hand);
-    let folder = core.flights()[0].parent().expect("in a folder").to_owned();
-    core.finish();
-    let files = std::fs::read_dir(folder).expect("there").flatten().map(|f| f.path());
-    let exit: Vec<PathBuf> = files
-        .filter(|f| f.display().to_string().ends_with("-exit.flight"))
-        .collect();
-    assert_eq!(exit.len(), 1);
-    let last = assert_identical(&exit[0])
-        .haptic
-        .expect("recorded")
-        .ticks
-        .pop()
-        .expect("ticks");
-    assert_eq!(last.record.force_on_hand_n, [0.0; 3], "the last tick leaves no force");
-    what_was_changed_is_found(&requested, &exit[0]);
+        // The end, with the force on.
+        ask(&mut hand.link, &Request::Engage).expect("re-armed");
+        hand.watch(Duration::from_secs(1));
+        drop(hand);
+        let folder = core.flights()[0].parent().expect("in a folder").to_owned();
+        core.finish();
+        let files = std::fs::read_dir(folder).expect("there").flatten().map(|f| f.path());
+        let exit: Vec<PathBuf> = files
+            .filter(|f| f.display().to_string().ends_with("-exit.flight"))
+            .collect();
+        assert_eq!(exit.len(), 1);
+        let last = assert_identical(&exit[0])
+            .haptic
+            .expect("recorded")
+            .ticks
+            .pop()
+            .expect("ticks");
+        assert_eq!(last.record.force_on_hand_n, [0.0; 3], "the last tick leaves no force");
+        what_was_changed_is_found(&requested, &exit[0]);
+    });
 }
 
 /// With finite elements neither loop was repeated: no recording held the needle's line, nor an elastic body.
 #[test]
 fn a_needle_on_a_line_leaves_a_recording_that_repeats_bit_for_bit() {
-    repeats_on_a_line("fem");
+    where_the_machine_runs(|| {
+        repeats_on_a_line("fem");
+    });
 }
 
 #[test]
 fn so_does_one_in_chainmail() {
-    repeats_on_a_line("chainmail");
+    where_the_machine_runs(|| {
+        repeats_on_a_line("chainmail");
+    });
 }
 
 fn repeats_on_a_line(tissue: &str) {

@@ -2,17 +2,22 @@
 
 use std::time::Duration;
 use stylet_implant::workflow::{Pace, Run, RunStatus, default_plan};
+use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, until};
 
 #[test]
 fn armed_threads_make_no_heap_call_and_fault_no_page() {
-    the_loops_keep_their_contract(&["--rt-if-allowed"], 10_000);
+    where_the_machine_runs(|| {
+        the_loops_keep_their_contract(&["--rt-if-allowed"], 10_000);
+    });
 }
 
 /// Lines come to both loops while they run, and go back to be freed.
 #[test]
 fn armed_threads_make_no_heap_call_and_fault_no_page_with_finite_elements() {
-    the_loops_keep_their_contract(&["--rt-if-allowed", "--tissue", "fem"], 4_000);
+    where_the_machine_runs(|| {
+        the_loops_keep_their_contract(&["--rt-if-allowed", "--tissue", "fem"], 4_000);
+    });
 }
 
 fn the_loops_keep_their_contract(options: &[&str], ticks: u64) {

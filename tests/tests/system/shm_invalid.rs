@@ -6,6 +6,7 @@ use std::time::Duration;
 use stylet_host::link::{Link, LinkStatus};
 use stylet_shm_schema::service::{self, create_state_board};
 use stylet_shm_schema::*;
+use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Alone, Core, ask, fresh_instance, until};
 
 /// All ones, zeros, random bytes and huge counts, of any type.
@@ -32,81 +33,83 @@ fn invalid<T: Pod>() -> Vec<T> {
 
 #[test]
 fn core_refuses_invalid_records_of_hosts_and_runs_on() {
-    let mut core = Core::start();
-    let mut link = core.host();
-    let before = *link.state().expect("live");
-    let node = core.instance.node().expect("same user");
-    let commands = service::commands(&node).expect("service");
-    let commands = commands
-        .publisher_builder()
-        .backpressure_strategy(BackpressureStrategy::DiscardData)
-        .create();
-    let commands = commands.expect("a free place");
-    let mut sent = 0;
-    for mut command in invalid::<Command>() {
-        // A record that happens to be a valid request to end is obeyed, as it must be.
-        if command.kind == CommandKind::Shutdown as u32 {
-            command.kind = u32::MAX;
-        }
-        commands.send_copy(command).expect("sent");
-        sent += 1;
-        if sent % 16 == 0 {
-            std::thread::sleep(Duration::from_millis(10));
-        }
-    }
-    for kind in 1..=9_u32 {
-        for bad in [f64::NAN, f64::INFINITY, 1e300, -1e300] {
-            let mut command = Command::zeroed();
-            (command.kind, command.value_count) = (kind, 8);
-            command.values = [bad; MAX_COMMAND_VALUES];
+    where_the_machine_runs(|| {
+        let mut core = Core::start();
+        let mut link = core.host();
+        let before = *link.state().expect("live");
+        let node = core.instance.node().expect("same user");
+        let commands = service::commands(&node).expect("service");
+        let commands = commands
+            .publisher_builder()
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .create();
+        let commands = commands.expect("a free place");
+        let mut sent = 0;
+        for mut command in invalid::<Command>() {
+            // A record that happens to be a valid request to end is obeyed, as it must be.
+            if command.kind == CommandKind::Shutdown as u32 {
+                command.kind = u32::MAX;
+            }
             commands.send_copy(command).expect("sent");
+            sent += 1;
+            if sent % 16 == 0 {
+                std::thread::sleep(Duration::from_millis(10));
+            }
+        }
+        for kind in 1..=9_u32 {
+            for bad in [f64::NAN, f64::INFINITY, 1e300, -1e300] {
+                let mut command = Command::zeroed();
+                (command.kind, command.value_count) = (kind, 8);
+                command.values = [bad; MAX_COMMAND_VALUES];
+                commands.send_copy(command).expect("sent");
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+        let uploads = service::uploads(&node).expect("service");
+        let uploads = uploads
+            .publisher_builder()
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .allocation_strategy(AllocationStrategy::PowerOfTwo)
+            .initial_max_slice_len(64)
+            .create()
+            .expect("a free place");
+        for header in invalid::<UploadHeader>() {
+            let mut sample = uploads.loan_slice_uninit(64).expect("loaned");
+            *sample.user_header_mut() = header;
+            sample.write_from_fn(|i| i as u8).send().expect("sent");
             std::thread::sleep(Duration::from_millis(1));
         }
-    }
-    let uploads = service::uploads(&node).expect("service");
-    let uploads = uploads
-        .publisher_builder()
-        .backpressure_strategy(BackpressureStrategy::DiscardData)
-        .allocation_strategy(AllocationStrategy::PowerOfTwo)
-        .initial_max_slice_len(64)
-        .create()
-        .expect("a free place");
-    for header in invalid::<UploadHeader>() {
-        let mut sample = uploads.loan_slice_uninit(64).expect("loaned");
-        *sample.user_header_mut() = header;
-        sample.write_from_fn(|i| i as u8).send().expect("sent");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    let went_on = until(Duration::from_secs(5), || {
-        link.poll();
-        link.state().is_some_and(|s| s.tick > before.tick + 1000)
+        let went_on = until(Duration::from_secs(5), || {
+            link.poll();
+            link.state().is_some_and(|s| s.tick > before.tick + 1000)
+        });
+        assert!(went_on && core.is_running(), "the core stopped");
+        let state = *link.state().expect("live");
+        assert_eq!(state.fault, Fault::None as u32);
+        assert_eq!(
+            link.parameters().expect("live").set,
+            ParameterSet::default(),
+            "an invalid record changed a parameter"
+        );
+        let refused = link
+            .events()
+            .iter()
+            .filter(|e| e.kind == EventKind::InvalidRefused as u32)
+            .count();
+        assert!(refused > 50, "{refused} refusals were reported");
+        let why = ask(
+            &mut link,
+            &Request::SetParameters(vec![ParameterChange {
+                id: ParameterId::ShearVertical,
+                value: 0.7,
+            }]),
+        );
+        assert!(
+            why.as_ref().is_err_and(|w| w.contains("eq. 1 in three dimensions")),
+            "eq. 1 is not enforced: {why:?}"
+        );
+        ask(&mut link, &Request::Engage).expect("a good command is still carried out");
     });
-    assert!(went_on && core.is_running(), "the core stopped");
-    let state = *link.state().expect("live");
-    assert_eq!(state.fault, Fault::None as u32);
-    assert_eq!(
-        link.parameters().expect("live").set,
-        ParameterSet::default(),
-        "an invalid record changed a parameter"
-    );
-    let refused = link
-        .events()
-        .iter()
-        .filter(|e| e.kind == EventKind::InvalidRefused as u32)
-        .count();
-    assert!(refused > 50, "{refused} refusals were reported");
-    let why = ask(
-        &mut link,
-        &Request::SetParameters(vec![ParameterChange {
-            id: ParameterId::ShearVertical,
-            value: 0.7,
-        }]),
-    );
-    assert!(
-        why.as_ref().is_err_and(|w| w.contains("eq. 1 in three dimensions")),
-        "eq. 1 is not enforced: {why:?}"
-    );
-    ask(&mut link, &Request::Engage).expect("a good command is still carried out");
 }
 
 /// More than 10,000 values of each kind of message.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::Duration;
+use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, program, scratch, until};
 
 /// An irregular gland in 300x200x180 voxels of 0.4x0.5x0.9 mm under an oblique affine, written by nibabel;
@@ -58,39 +59,43 @@ fn procedure(core: &Core, scene: &Path, out: &Path) -> Output {
 
 #[test]
 fn procedure_runs_in_an_oblique_anisotropic_volume_and_the_geometry_is_right() {
-    let folder = scratch("volume");
-    let file = folder.join("gland.nii.gz");
-    let [x, y, z, volume_mm3] = write_volume(&file);
-    let mut core = Core::start();
-    let out = folder.join("out");
-    let run = procedure(&core, &file, &out);
-    let said = format!(
-        "{}{}",
-        String::from_utf8_lossy(&run.stdout),
-        String::from_utf8_lossy(&run.stderr)
-    );
-    assert!(run.status.success(), "{said}");
-    let result: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("result.json")).expect("result.json")).expect("JSON");
-    assert_eq!(result["seeds"].as_array().map(Vec::len), Some(5), "{result:#}");
+    where_the_machine_runs(|| {
+        let folder = scratch("volume");
+        let file = folder.join("gland.nii.gz");
+        let [x, y, z, volume_mm3] = write_volume(&file);
+        let mut core = Core::start();
+        let out = folder.join("out");
+        let run = procedure(&core, &file, &out);
+        let said = format!(
+            "{}{}",
+            String::from_utf8_lossy(&run.stdout),
+            String::from_utf8_lossy(&run.stderr)
+        );
+        assert!(run.status.success(), "{said}");
+        let result: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(out.join("result.json")).expect("result.json"))
+                .expect("JSON");
+        assert_eq!(result["seeds"].as_array().map(Vec::len), Some(5), "{result:#}");
 
-    // The surface that the core sent back, in patient mm, against the voxels that nibabel wrote.
-    let link = core.host();
-    let scene = link.scene().expect("live");
-    let t = scene.header.patient_from_scene;
-    let to_patient_mm =
-        |p: [f64; 3]| [0, 1, 2].map(|r| (t[3 * r] * p[0] + t[3 * r + 1] * p[1] + t[3 * r + 2] * p[2] + t[9 + r]) * 1e3);
-    let centre = centre_of_volume(&scene.rest_m, &scene.triangles);
-    let found = to_patient_mm(centre);
-    let off_mm = ((found[0] - x).powi(2) + (found[1] - y).powi(2) + (found[2] - z).powi(2)).sqrt();
-    println!(
-        "gland centre off by {off_mm:.3} mm, {} elements",
-        scene.header.element_count
-    );
-    // Half of the smallest voxel side.
-    assert!(off_mm < 0.2, "centre {found:?} mm, voxels say {x} {y} {z}");
-    let volume_error = (scene.header.volume_m3 * 1e9 - volume_mm3).abs() / volume_mm3;
-    assert!(volume_error < 0.02, "volume off by {volume_error}");
+        // The surface that the core sent back, in patient mm, against the voxels that nibabel wrote.
+        let link = core.host();
+        let scene = link.scene().expect("live");
+        let t = scene.header.patient_from_scene;
+        let to_patient_mm = |p: [f64; 3]| {
+            [0, 1, 2].map(|r| (t[3 * r] * p[0] + t[3 * r + 1] * p[1] + t[3 * r + 2] * p[2] + t[9 + r]) * 1e3)
+        };
+        let centre = centre_of_volume(&scene.rest_m, &scene.triangles);
+        let found = to_patient_mm(centre);
+        let off_mm = ((found[0] - x).powi(2) + (found[1] - y).powi(2) + (found[2] - z).powi(2)).sqrt();
+        println!(
+            "gland centre off by {off_mm:.3} mm, {} elements",
+            scene.header.element_count
+        );
+        // Half of the smallest voxel side.
+        assert!(off_mm < 0.2, "centre {found:?} mm, voxels say {x} {y} {z}");
+        let volume_error = (scene.header.volume_m3 * 1e9 - volume_mm3).abs() / volume_mm3;
+        assert!(volume_error < 0.02, "volume off by {volume_error}");
+    });
 }
 
 /// Centre of the body inside a closed surface (divergence theorem).
@@ -114,60 +119,62 @@ fn centre_of_volume(points: &[[f32; 3]], triangles: &[[u32; 3]]) -> [f64; 3] {
 
 #[test]
 fn unusable_volumes_get_one_clear_message_and_the_scene_goes_on() {
-    let folder = scratch("bad-volumes");
-    let good = folder.join("good.nii");
-    write_volume(&good);
-    let bytes = std::fs::read(&good).expect("written");
-    let mut files: Vec<(&str, PathBuf)> = Vec::new();
-    let mut add = |name: &'static str, content: &[u8]| {
-        let path = folder.join(format!("{name}.nii"));
-        std::fs::write(&path, content).expect("written");
-        files.push((name, path));
-    };
-    add("empty", &[]);
-    add("cut-off", &bytes[..bytes.len() / 2]);
-    add(
-        "wrong",
-        b"this is a letter, not a volume, and it goes on for a while "
-            .repeat(20)
-            .as_slice(),
-    );
-    let mut absurd = bytes.clone();
-    // dim[1..=3] = 32767: 35 TB of voxels are claimed.
-    for axis in 0..3 {
-        absurd[42 + 2 * axis..44 + 2 * axis].copy_from_slice(&32767_i16.to_le_bytes());
-    }
-    add("absurd", &absurd);
-    let mut nothing = bytes.clone();
-    nothing[352..].fill(0);
-    add("no-gland", &nothing);
-    files.push(("missing", folder.join("there-is-no-such-file.nii")));
-
-    let mut core = Core::start();
-    let mut link = core.host();
-    let before = link.scene().expect("live").header;
-    for (name, path) in &files {
-        let run = procedure(&core, path, &folder.join("out"));
-        let said = String::from_utf8_lossy(&run.stderr).into_owned();
-        println!("{name}: {}", said.trim());
-        assert!(!run.status.success(), "{name} was taken");
-        assert!(!said.contains("panicked"), "{name}: {said}");
-        let messages = said.lines().filter(|l| l.starts_with("host-ui:")).count();
-        assert_eq!(messages, 1, "{name}: {said}");
-        assert!(
-            said.contains(&*path.file_name().expect("named").to_string_lossy()),
-            "{name} is not named: {said}"
+    where_the_machine_runs(|| {
+        let folder = scratch("bad-volumes");
+        let good = folder.join("good.nii");
+        write_volume(&good);
+        let bytes = std::fs::read(&good).expect("written");
+        let mut files: Vec<(&str, PathBuf)> = Vec::new();
+        let mut add = |name: &'static str, content: &[u8]| {
+            let path = folder.join(format!("{name}.nii"));
+            std::fs::write(&path, content).expect("written");
+            files.push((name, path));
+        };
+        add("empty", &[]);
+        add("cut-off", &bytes[..bytes.len() / 2]);
+        add(
+            "wrong",
+            b"this is a letter, not a volume, and it goes on for a while "
+                .repeat(20)
+                .as_slice(),
         );
-    }
-    let tick = link.state().expect("live").tick;
-    let goes_on = until(Duration::from_secs(3), || {
-        link.poll();
-        link.state().is_some_and(|s| s.tick > tick + 500)
+        let mut absurd = bytes.clone();
+        // dim[1..=3] = 32767: 35 TB of voxels are claimed.
+        for axis in 0..3 {
+            absurd[42 + 2 * axis..44 + 2 * axis].copy_from_slice(&32767_i16.to_le_bytes());
+        }
+        add("absurd", &absurd);
+        let mut nothing = bytes.clone();
+        nothing[352..].fill(0);
+        add("no-gland", &nothing);
+        files.push(("missing", folder.join("there-is-no-such-file.nii")));
+
+        let mut core = Core::start();
+        let mut link = core.host();
+        let before = link.scene().expect("live").header;
+        for (name, path) in &files {
+            let run = procedure(&core, path, &folder.join("out"));
+            let said = String::from_utf8_lossy(&run.stderr).into_owned();
+            println!("{name}: {}", said.trim());
+            assert!(!run.status.success(), "{name} was taken");
+            assert!(!said.contains("panicked"), "{name}: {said}");
+            let messages = said.lines().filter(|l| l.starts_with("host-ui:")).count();
+            assert_eq!(messages, 1, "{name}: {said}");
+            assert!(
+                said.contains(&*path.file_name().expect("named").to_string_lossy()),
+                "{name} is not named: {said}"
+            );
+        }
+        let tick = link.state().expect("live").tick;
+        let goes_on = until(Duration::from_secs(3), || {
+            link.poll();
+            link.state().is_some_and(|s| s.tick > tick + 500)
+        });
+        assert!(goes_on && core.is_running());
+        let after = link.scene().expect("live").header;
+        assert_eq!(
+            (before.generation, before.element_count),
+            (after.generation, after.element_count)
+        );
     });
-    assert!(goes_on && core.is_running());
-    let after = link.scene().expect("live").header;
-    assert_eq!(
-        (before.generation, before.element_count),
-        (after.generation, after.element_count)
-    );
 }
