@@ -184,7 +184,9 @@ pub fn banners_ui(ctx: &egui::Context, pictures: Rect, list: &[Banner]) -> Optio
         .default_width(pictures.width());
     let shown = area.show(ctx, |ui| {
         ui.set_max_width(pictures.width());
-        let scroll = egui::ScrollArea::vertical().max_height(SHARE * pictures.height());
+        let most = SHARE * pictures.height();
+        // It would scroll from 64 points on.
+        let scroll = egui::ScrollArea::vertical().max_height(most).min_scrolled_height(most);
         let inner = scroll.show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 1.0;
             // The last one that was clicked.

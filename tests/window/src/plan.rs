@@ -129,6 +129,9 @@ fn needles_are_added_moved_and_taken_away_and_each_step_can_be_taken_back() {
     for key in [Key::ArrowRight, Key::ArrowRight, Key::ArrowUp, Key::Enter] {
         driven.press(key);
     }
+    driven.until("the second needle", |app| {
+        app.planner().plan().is_some_and(|plan| plan.needles.len() == 2)
+    });
     assert_eq!(plan(&driven).needles[1].hole, Some(hole("I8")));
     driven.window.key_press_modifiers(Modifiers::SHIFT, Key::ArrowDown);
     driven.window.run_steps(2);
@@ -233,8 +236,7 @@ fn needles_go_in_one_after_the_other_by_one_key() {
     driven.click("Run all 2 needles");
     driven.until("the first needle", |app| app.planner().progress().begun() == 1);
     wait_long(&mut driven, "the scripted hand", done);
-    driven.window.run_steps(3);
-    driven.window.get_by_label("All 2 needles are done.");
+    wait_long_for_label(&mut driven, "All 2 needles are done.");
     assert_eq!(seeds(driven.window.state()), 4);
     let progress = driven.window.state().planner().progress().clone();
     assert_eq!([0, 1].map(|n| progress.seeds_of(n, 4)), [0..2, 2..4]);
@@ -262,8 +264,7 @@ fn a_script_that_was_stopped_goes_on_in_this_window_and_in_the_next() {
     wait_long_for_label(&mut driven, "Continue at needle 2 of 2");
     driven.click("Continue at needle 2 of 2");
     wait_long(&mut driven, "all needles", |app| app.planner().progress().done() == 2);
-    driven.window.run_steps(3);
-    driven.window.get_by_label("All 2 needles are done.");
+    wait_long_for_label(&mut driven, "All 2 needles are done.");
     let placed = driven.window.state().link().snapshot().expect("a snapshot").header;
     assert_eq!(placed.seed_count, 4);
     let dropped_at_m = placed.seeds[..4]
