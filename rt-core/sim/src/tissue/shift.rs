@@ -87,10 +87,10 @@ mod tests {
         for element in 0..lattice.element_count() as u32 {
             let place_m = lattice.rest_m(element);
             let u = motion.at_m(place_m);
-            for a in 0..3 {
-                // Stretched along x about its middle: no motion as a whole in a body that is symmetric to it.
-                let stretch = if a == 0 { 0.05 * (place_m[0] - middle[0]) } else { 0.0 };
-                field.0[a][element as usize] = (u[a] + stretch) as f32;
+            // Stretched along x about its middle: no motion as a whole in a body that is symmetric to it.
+            let stretch = [0.05 * (place_m[0] - middle[0]), 0.0, 0.0];
+            for ((slot, u), stretch) in field.0.iter_mut().zip(u).zip(stretch) {
+                slot[element as usize] = (u + stretch) as f32;
             }
         }
         let mut packed = PackedField::zeros(lattice.element_count());
