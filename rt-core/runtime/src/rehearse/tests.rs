@@ -159,10 +159,11 @@ impl TissueModel for Watched {
     }
 }
 
-/// On a straight way, in and out, the loop knows in the tick before which element it will hold.
+/// On a straight way, in and out, the loop knows in the tick before which element a needle without a line will hold.
 #[test]
 fn the_loop_prepares_what_it_holds_next() {
     let (mut stage, run, stop) = (fem_stage(), shallow(), AtomicBool::new(false));
+    stage.lines = None;
     let world = stage.world.as_mut().expect("built");
     let (asked, seen) = std::sync::mpsc::channel();
     let fem = stylet_sim::tissue::FemTissue::<f32>::new(&world.scene).expect("valid");
