@@ -133,10 +133,11 @@ fn press(model: &LineModel, state: &mut LineState, membrane: Option<usize>) {
         };
         state.tip.held_by = held_by;
     }
-    state.tip_offset_m = 0.0;
+    (state.tip_offset_m, state.membrane_n_per_m) = (0.0, 0.0);
     let Some(kept) = membrane.and_then(|n| model.kept_of_dent(n, state.tip_own)) else {
         return;
     };
+    state.membrane_n_per_m = (1.0 / kept - 1.0) / (state.tip_own - whole);
     state.tip_own = whole + kept * (state.tip_own - whole);
     for of_tip in &mut state.tip_column[..count] {
         *of_tip = whole + kept * (*of_tip - whole);
@@ -243,26 +244,14 @@ fn solve(
     tip_m - place_m - tip_u_m
 }
 
-/// What a membrane passes on to the body as a whole: the tip's force less what dents the tissue under it.
+/// What the spring of a membrane that is stretched passes on to the body as a whole.
 fn whole_n(model: &LineModel, state: &LineState) -> f64 {
-    let c = &model.compliance;
-    let (m, count, whole) = (c.stations, state.in_contact, c.whole_m_per_n);
-    if state.tip.held_by == 0 || state.tip.force_n == 0.0 {
+    if state.membrane_n_per_m == 0.0 {
         return 0.0;
     }
-    let shaft_n = &state.shaft_n[..count];
-    let (mut own, mut of_shaft_m) = (0.0, 0.0);
-    for (n, &weight) in state.tip_range.clone().zip(&state.tip_weights) {
-        let row = c.rows.row(m + n);
-        of_shaft_m += weight * dot(&row[..count], shaft_n);
-        let tips = row[m..].iter().skip(state.tip_range.start).zip(&state.tip_weights);
-        own += weight * tips.take(state.tip_range.len()).map(|(r, w)| r * w).sum::<f64>();
-    }
-    if own <= whole {
-        return 0.0;
-    }
-    let dent_m = state.tip_u_m - whole * state.tip.force_n - of_shaft_m;
-    state.tip.force_n - (dent_m / (own - whole)).max(0.0)
+    let load_n = state.shaft_n[..state.in_contact].iter().sum::<f64>() + state.tip.force_n;
+    let dent_m = state.tip_u_m - model.compliance.whole_m_per_n * load_n;
+    state.membrane_n_per_m * (dent_m - state.tip.met_dent_m)
 }
 
 fn finish(model: &LineModel, state: &mut LineState, output: &mut LineOutput) {

@@ -73,6 +73,8 @@ pub struct LineState {
     pub(super) tip_own: f64,
     /// What the dent that a membrane was met with adds to the tip's displacement, m.
     pub(super) tip_offset_m: f64,
+    /// Stiffness of the membrane that holds the tip, beyond that of the tissue under it, N/m.
+    pub(super) membrane_n_per_m: f64,
     /// How much of the tip's force goes to the body as a whole, by the membrane that holds it, N.
     pub(super) whole_n: f64,
     pub(super) memory: Memory,
@@ -104,6 +106,7 @@ impl LineState {
             tip_column: each(),
             tip_own: 0.0,
             tip_offset_m: 0.0,
+            membrane_n_per_m: 0.0,
             whole_n: 0.0,
             memory: Memory::new(2 * stations),
             loads_n: vec![value; 2 * stations],
@@ -189,7 +192,7 @@ impl LineState {
         self.tip_range = 0..0;
         self.tip_weights.fill(0.0);
         self.tip_own = 0.0;
-        (self.tip_offset_m, self.whole_n) = (0.0, 0.0);
+        (self.tip_offset_m, self.membrane_n_per_m, self.whole_n) = (0.0, 0.0, 0.0);
         self.memory.reset();
         self.last = LineOutput::default();
     }

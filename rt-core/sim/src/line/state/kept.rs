@@ -42,6 +42,7 @@ impl LineState {
             tip_column,
             tip_own,
             tip_offset_m,
+            membrane_n_per_m,
             whole_n,
             memory,
             loads_n,
@@ -58,6 +59,7 @@ impl LineState {
         self.tip_column.clone_from(tip_column);
         self.tip_own = *tip_own;
         self.tip_offset_m = *tip_offset_m;
+        self.membrane_n_per_m = *membrane_n_per_m;
         self.whole_n = *whole_n;
         self.memory.copy_from(memory);
         self.loads_n.clone_from(loads_n);
