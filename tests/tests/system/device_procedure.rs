@@ -208,12 +208,18 @@ fn unplugged_in_mid_insertion_the_force_is_off_the_screen_says_why_and_it_goes_o
             rig.link.poll();
             said(&rig.link).is_some_and(|t| t.contains("power and cable"))
         }));
-        // The force of the loop goes to zero in the ticks of the ramp, and stays there.
-        let records = rig.link.take_records();
-        let lost = records
-            .iter()
-            .position(|r| r.fault == Fault::DeviceLost as u32)
-            .expect("in the records");
+        // The force of the loop goes to zero in the ticks of the ramp, and stays there. Records come in batches, after the event.
+        let (mut records, mut lost) = (Vec::<TickRecord>::new(), None);
+        assert!(
+            until(LONG, || {
+                rig.link.poll();
+                records.append(&mut rig.link.take_records());
+                lost = records.iter().position(|r| r.fault == Fault::DeviceLost as u32);
+                lost.is_some_and(|lost| records.len() > lost + 100)
+            }),
+            "in the records"
+        );
+        let lost = lost.expect("seen");
         let late = records.iter().skip(lost + 21).find(|r| r.force_on_hand_n != [0.0; 3]);
         assert!(late.is_none(), "{late:?}");
         // Arming again without a device is of no use.

@@ -117,7 +117,12 @@ fn rehearsed_is_live(scene: &str) {
 
 #[test]
 fn the_default_needle_of_the_paper_s_gland_ends_where_it_was_rehearsed() {
-    rehearsed_is_live("paper");
+    where_the_machine_runs(|| rehearsed_is_live("paper"));
+}
+
+#[test]
+fn so_does_the_one_of_the_pelvis() {
+    where_the_machine_runs(|| rehearsed_is_live("pelvis"));
 }
 
 /// A needle was felt by one loop, and moved tissue by the other's rule: seeds came 11 to 18 mm short, and the last was lost.

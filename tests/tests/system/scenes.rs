@@ -105,18 +105,8 @@ fn the_default_needle_reaches_the_gland_in_the_pelvis_past_bone_urethra_and_rect
             ended && matches!(status, RunStatus::Done),
             "the procedure failed: {status:?}"
         );
-        let snapshot = link.snapshot().expect("live");
-        assert_eq!(snapshot.header.seed_count, 5);
-        for (number, seed) in snapshot.header.seeds[..5].iter().enumerate() {
-            let planned = link.plan().expect("planned").seeds[number].position_m;
-            let off_mm = (0..3)
-                .map(|a| (seed.position_m[a] - planned[a]).powi(2))
-                .sum::<f64>()
-                .sqrt()
-                * 1e3;
-            println!("seed {number}: {off_mm:.2} mm from plan");
-            assert!(off_mm < 10.0);
-        }
+        // Where they rest is compared with a rehearsal in `plan_rehearsal`.
+        assert_eq!(link.snapshot().expect("live").header.seed_count, 5);
         let state = link.state().expect("live");
         assert_eq!(state.fault, Fault::None as u32);
         drop(link);
