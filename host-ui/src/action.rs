@@ -11,6 +11,8 @@ use stylet_shm_schema::Request;
 pub enum Action {
     /// Sends a request without a payload.
     Send(Request),
+    /// Joined to the one before it where the needle is loaded with a strand.
+    DropSeed,
     PlanSeeds,
     PlaceNeedle,
     Insert,

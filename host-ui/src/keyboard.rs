@@ -87,7 +87,7 @@ pub fn read(ctx: &egui::Context) -> Keys {
         (Modifiers::NONE, Key::Num3, Action::LookFrom(Viewpoint::Side)),
         (Modifiers::NONE, Key::Num4, Action::LookFrom(Viewpoint::Above)),
         (Modifiers::NONE, Key::Num5, Action::LookFrom(Viewpoint::Needle)),
-        (Modifiers::NONE, Key::Space, Action::Send(Request::DropSeed)),
+        (Modifiers::NONE, Key::Space, Action::DropSeed),
         (Modifiers::NONE, Key::E, Action::Send(Request::Engage)),
         (Modifiers::NONE, Key::D, Action::Send(Request::Disengage)),
         (Modifiers::NONE, Key::P, Action::OpenParameters),

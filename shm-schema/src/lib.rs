@@ -50,7 +50,7 @@ pub use refusal::{Reason, Refusal, RefusalCode};
 pub use rehearsal::Rehearsal;
 pub use request::{
     ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, NeedleAxis, NeedleRehearsal, ParameterChange, PlannedNeedle,
-    RETRACT_RANGE_M, Request, RequestError, RequestErrors, SPEED_RANGE_M_PER_S,
+    RETRACT_RANGE_M, Request, RequestError, RequestErrors, SPEED_RANGE_M_PER_S, STRAND_PITCH_RANGE_M,
 };
 pub use scene::{
     BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, SceneId, StructureInfo,
@@ -62,4 +62,4 @@ pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.
-pub const SCHEMA_VERSION: u32 = 7;
+pub const SCHEMA_VERSION: u32 = 8;

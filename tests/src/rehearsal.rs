@@ -53,6 +53,7 @@ impl Rehearser for Theatre {
             approach_m_per_s: pace.approach_m_per_s,
             acceleration_m_per_s2: pace.acceleration_m_per_s2,
             retract_to_m: drops.retract_to_m,
+            strand_pitch_m: drops.strand_pitch_m,
             drops_m: drops.drops_m().map(Vector3::from).collect(),
         };
         let done = self

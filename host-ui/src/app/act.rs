@@ -123,6 +123,10 @@ impl App {
             Action::Retract => self.move_to("Retract", 0.0, self.pace.retract_m_per_s),
             Action::DriveTo(depth) => self.pulled_to_m = Some(depth),
             Action::MoveTo(depth) => self.move_to("Depth", depth, self.pace.insert_m_per_s),
+            Action::DropSeed => {
+                let strand_pitch_m = self.shown.planning.strand_pitch_m();
+                self.send("Drop seed", &Request::DropSeed { strand_pitch_m });
+            }
             Action::Send(request) => self.send(request_name(&request), &request),
         }
     }
@@ -238,7 +242,7 @@ fn request_name(request: &Request) -> &'static str {
         Request::SetParameters(_) => "Parameters",
         Request::SetPlan(_) => "Plan",
         Request::MoveHand(_) => "Needle",
-        Request::DropSeed => "Drop seed",
+        Request::DropSeed { .. } => "Drop seed",
         Request::Engage => "Engage force",
         Request::Disengage => "Disengage",
         Request::Reset => "Reset",

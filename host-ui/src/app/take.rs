@@ -289,7 +289,7 @@ impl App {
 
 fn asked_by(button: Button) -> Action {
     match button {
-        Button::Drop => Action::Send(Request::DropSeed),
+        Button::Drop => Action::DropSeed,
         Button::Undo => Action::Undo,
         Button::Stop => Action::StopRun,
         Button::Engage => Action::Send(Request::Engage),

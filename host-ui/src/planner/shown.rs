@@ -34,6 +34,11 @@ impl Planning {
         self.implant.is_some() && self.progress.begun() == 0
     }
 
+    /// From middle to middle of two seeds of the needle at work, m, where it is loaded with a strand.
+    pub fn strand_pitch_m(&self) -> Option<f64> {
+        self.at_work().and_then(|(_, needle)| needle.loading.pitch_m())
+    }
+
     /// The inserted needle, or the last one that was.
     pub fn at_work(&self) -> Option<(usize, &Needle)> {
         let number = self.progress.begun().checked_sub(1)?;

@@ -200,7 +200,7 @@ impl Host {
             self.report.insertions += 1;
         } else {
             if self.step / 2 <= SEEDS {
-                self.send(&Request::DropSeed);
+                self.send(&Request::DropSeed { strand_pitch_m: None });
             }
             self.move_hand(self.script.outside_m);
         }

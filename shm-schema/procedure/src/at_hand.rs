@@ -94,6 +94,7 @@ mod tests {
             direction: Vector3::z(),
             drops_m: [0.03, 0.02].map(|z| Vector3::new(0.0, 0.0, z)).to_vec(),
             retract_to_m: 0.0,
+            strand_pitch_m: None,
         };
         let mut scripted: Vec<Operation> = way.to_the_last_drop(0).collect();
         scripted.push(Operation::TakeOut);

@@ -37,6 +37,8 @@ pub struct NeedleWay {
     pub drops_m: Vec<Vector3<f64>>,
     /// How far from the entry the tip is drawn back to after the last drop, m, along the needle.
     pub retract_to_m: f64,
+    /// From middle to middle of two seeds, m, where they are one strand.
+    pub strand_pitch_m: Option<f64>,
 }
 
 /// A step of the procedure, as a person counts them.

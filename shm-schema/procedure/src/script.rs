@@ -35,7 +35,10 @@ pub enum HandRequest {
     /// Move the hand.
     MoveHand(HandMove),
     /// Leave a seed at the tip.
-    DropSeed,
+    DropSeed {
+        /// From middle to middle of two seeds, m, where they are one strand.
+        strand_pitch_m: Option<f64>,
+    },
 }
 
 impl HandRequest {
@@ -46,7 +49,7 @@ impl HandRequest {
             Self::PublishPlan { .. } => "SetPlan",
             Self::Engage => "Engage",
             Self::MoveHand(_) => "MoveHand",
-            Self::DropSeed => "DropSeed",
+            Self::DropSeed { .. } => "DropSeed",
         }
     }
 }
@@ -255,7 +258,9 @@ impl Procedure {
             Operation::Reset => Some(HandRequest::Reset),
             Operation::PublishPlan => Some(HandRequest::PublishPlan { needle }),
             Operation::Engage => Some(HandRequest::Engage),
-            Operation::Drop(_) => Some(HandRequest::DropSeed),
+            Operation::Drop(_) => Some(HandRequest::DropSeed {
+                strand_pitch_m: self.ways.get(needle).and_then(|way| way.strand_pitch_m),
+            }),
             Operation::Settle => None,
             Operation::Place
             | Operation::Insert

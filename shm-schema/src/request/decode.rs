@@ -110,8 +110,9 @@ fn takes(kind: CommandKind) -> String {
         }
         CommandKind::MoveHand => "8 values".to_owned(),
         CommandKind::LoadBuiltinScene => "one number".to_owned(),
+        CommandKind::DropSeed => "nothing, or the pitch of a strand".to_owned(),
         CommandKind::ExpectNeedle => "entry and direction, three values each".to_owned(),
-        CommandKind::Rehearse => format!("11 values and 1 to {MAX_SEEDS} drops of three values each"),
+        CommandKind::Rehearse => format!("12 values and 1 to {MAX_SEEDS} drops of three values each"),
         _ => "no values".to_owned(),
     }
 }
@@ -139,7 +140,7 @@ impl Request {
 }
 
 const PLAN_HEAD: usize = 6;
-const REHEARSAL_HEAD: usize = 11;
+const REHEARSAL_HEAD: usize = 12;
 
 fn count_fits(kind: CommandKind, count: usize) -> bool {
     let places_after = |head: usize| count.checked_sub(head).filter(|n| n % 3 == 0).map(|n| n / 3);
@@ -148,6 +149,8 @@ fn count_fits(kind: CommandKind, count: usize) -> bool {
         CommandKind::SetPlan => count == 0 || places_after(PLAN_HEAD).is_some_and(|n| n <= MAX_SEEDS),
         CommandKind::MoveHand => count == 8,
         CommandKind::ExpectNeedle => count == 6,
+        // Without a value: loose.
+        CommandKind::DropSeed => count <= 1,
         // Without a value: the first scene.
         CommandKind::LoadBuiltinScene => count <= 1,
         CommandKind::Rehearse => places_after(REHEARSAL_HEAD).is_some_and(|n| (1..=MAX_SEEDS).contains(&n)),
@@ -184,7 +187,10 @@ impl<'a> Reader<'a> {
                 speed_m_per_s: self.within("speed in m/s", SPEED_RANGE_M_PER_S),
                 acceleration_m_per_s2: self.within("acceleration in m/s2", ACCELERATION_RANGE_M_PER_S2),
             }),
-            CommandKind::DropSeed => Request::DropSeed,
+            CommandKind::DropSeed => Request::DropSeed {
+                strand_pitch_m: (!self.values.is_empty())
+                    .then(|| self.within("pitch of a strand in m", STRAND_PITCH_RANGE_M)),
+            },
             CommandKind::Engage => Request::Engage,
             CommandKind::Disengage => Request::Disengage,
             CommandKind::Reset => Request::Reset,
@@ -200,6 +206,7 @@ impl<'a> Reader<'a> {
                 approach_m_per_s: self.within("approach in m/s", SPEED_RANGE_M_PER_S),
                 acceleration_m_per_s2: self.within("acceleration in m/s2", ACCELERATION_RANGE_M_PER_S2),
                 retract_to_m: self.within("place drawn back to, in m from the entry,", RETRACT_RANGE_M),
+                strand_pitch_m: self.strand_pitch(),
                 drops_m: self.rest(Self::place),
             }),
             CommandKind::StopHand => Request::StopHand,
@@ -254,6 +261,15 @@ impl<'a> Reader<'a> {
             });
         }
         value
+    }
+
+    /// 0 where the seeds are loose.
+    fn strand_pitch(&mut self) -> Option<f64> {
+        if self.values.get(self.at) == Some(&0.0) {
+            self.next();
+            return None;
+        }
+        Some(self.within("pitch of a strand in m", STRAND_PITCH_RANGE_M))
     }
 
     fn change(&mut self) -> ParameterChange {

@@ -11,6 +11,8 @@ use strum::EnumDiscriminants;
 
 /// Slowest and fastest speed of the simulated hand, m/s.
 pub const SPEED_RANGE_M_PER_S: [f64; 2] = [1e-4, 1.0];
+/// From middle to middle of two seeds of a strand.
+pub const STRAND_PITCH_RANGE_M: [f64; 2] = [1e-3, 0.06];
 /// Smallest and largest acceleration of the simulated hand, m/s².
 pub const ACCELERATION_RANGE_M_PER_S2: [f64; 2] = [1e-2, 100.0];
 /// How far from the entry a rehearsed needle may be drawn back to, along the needle, m.
@@ -33,7 +35,11 @@ pub enum Request {
     MoveHand(HandMove) = 3,
     /// Leave a seed at the tip.
     #[strum_discriminants(doc = "[`Request::DropSeed`]")]
-    DropSeed = 4,
+    DropSeed {
+        /// Where needles are loaded with strands: from middle to middle of two seeds, m, within [`STRAND_PITCH_RANGE_M`]. The
+        /// seed is joined to the one dropped before it, where that is behind it by about so much on the same needle.
+        strand_pitch_m: Option<f64>,
+    } = 4,
     /// Turn the force on; also re-arms after a fault.
     #[strum_discriminants(doc = "[`Request::Engage`]")]
     Engage = 5,
@@ -125,6 +131,8 @@ pub struct NeedleRehearsal {
     pub acceleration_m_per_s2: f64,
     /// How far from the entry the tip is drawn back to at the end, m, within [`RETRACT_RANGE_M`].
     pub retract_to_m: f64,
+    /// As in [`Request::DropSeed`].
+    pub strand_pitch_m: Option<f64>,
     /// Where the tip leaves each seed, m, in the order of the drops: 1 to [`MAX_SEEDS`].
     pub drops_m: Vec<[f64; 3]>,
 }
@@ -170,11 +178,12 @@ impl Request {
                     run.approach_m_per_s,
                     run.acceleration_m_per_s2,
                     run.retract_to_m,
+                    run.strand_pitch_m.unwrap_or_default(),
                 ];
                 joined(&[&run.entry_m, &run.direction, &pace], &run.drops_m)
             }
-            Self::DropSeed
-            | Self::Engage
+            Self::DropSeed { strand_pitch_m } => strand_pitch_m.iter().copied().collect(),
+            Self::Engage
             | Self::Disengage
             | Self::Reset
             | Self::UndoSeed

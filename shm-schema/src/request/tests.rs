@@ -20,6 +20,7 @@ fn rehearsal(drops: usize) -> NeedleRehearsal {
         approach_m_per_s: 0.1,
         acceleration_m_per_s2: 2.0,
         retract_to_m: -0.01,
+        strand_pitch_m: (drops > 1).then_some(0.01),
         drops_m: needle(drops).seeds_m,
     }
 }
@@ -40,7 +41,10 @@ fn all() -> Vec<Request> {
             speed_m_per_s: 1e-4,
             acceleration_m_per_s2: 100.0,
         }),
-        Request::DropSeed,
+        Request::DropSeed { strand_pitch_m: None },
+        Request::DropSeed {
+            strand_pitch_m: Some(0.01),
+        },
         Request::Engage,
         Request::Disengage,
         Request::Reset,
@@ -179,9 +183,12 @@ fn every_malformed_payload_is_refused_with_its_reason() {
             C::ValueOutOfLimits,
         ),
         (K::MoveHand, &[], C::ValueCount),
-        (K::Rehearse, &[0.0; 11], C::ValueCount),
-        (K::Rehearse, &[0.0; 15], C::ValueCount),
-        (K::Rehearse, &[0.0; 14], C::NotUnitDirection),
+        (K::DropSeed, &[0.5], C::ValueOutOfLimits),
+        (K::DropSeed, &[0.0], C::ValueOutOfLimits),
+        (K::DropSeed, &[0.01, 0.01], C::ValueCount),
+        (K::Rehearse, &[0.0; 12], C::ValueCount),
+        (K::Rehearse, &[0.0; 16], C::ValueCount),
+        (K::Rehearse, &[0.0; 15], C::NotUnitDirection),
         (K::LoadBuiltinScene, &[3.0], C::UnknownScene),
         (K::LoadBuiltinScene, &[0.5], C::UnknownScene),
         (K::LoadBuiltinScene, &[-1.0], C::UnknownScene),
@@ -196,6 +203,7 @@ fn a_rehearsal_lists_every_bad_value() {
     let mut bad = rehearsal(2);
     bad.direction[2] = 0.9;
     (bad.insert_m_per_s, bad.acceleration_m_per_s2) = (0.0, 1e9);
+    bad.strand_pitch_m = Some(-0.01);
     bad.drops_m[1][2] = 30.0;
     let command = Request::Rehearse(bad).encode(1, 1).expect("fits");
     let reasons: Vec<_> = Request::decode(&command)
@@ -208,7 +216,8 @@ fn a_rehearsal_lists_every_bad_value() {
         (RefusalCode::NotUnitDirection, 3),
         (RefusalCode::ValueOutOfLimits, 6),
         (RefusalCode::ValueOutOfLimits, 9),
-        (RefusalCode::PlaceTooFar, 14),
+        (RefusalCode::ValueOutOfLimits, 11),
+        (RefusalCode::PlaceTooFar, 15),
     ];
     assert_eq!(reasons, expected);
 }

@@ -62,7 +62,7 @@ fn a_request_a_fault_and_the_end_each_leave_a_recording_that_repeats_bit_for_bit
         ];
         ask(&mut hand.link, &Request::SetParameters(changes)).expect("set");
         hand.watch(Duration::from_secs(3));
-        ask(&mut hand.link, &Request::DropSeed).expect("dropped");
+        ask(&mut hand.link, &Request::DropSeed { strand_pitch_m: None }).expect("dropped");
         hand.go(0.02, 0.02);
         hand.watch(Duration::from_secs(2));
         let requested = assert_identical(&request(&core, &mut hand));
@@ -157,7 +157,7 @@ fn repeats_on_a_line(tissue: &str) {
     let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", tissue]);
     let mut hand = Insertion::begin(&mut core, 0.01);
     hand.watch(Duration::from_secs(3));
-    ask(&mut hand.link, &Request::DropSeed).expect("dropped");
+    ask(&mut hand.link, &Request::DropSeed { strand_pitch_m: None }).expect("dropped");
     // Longer than either tape reaches back: both begin with the needle in tissue.
     hand.go(0.02, 0.01);
     hand.watch(Duration::from_secs(9));

@@ -23,6 +23,9 @@ pub struct Drops {
     pub along_m: Vec<f64>,
     /// How far from the entry the tip is drawn back to after the last drop, m.
     pub retract_to_m: f64,
+    /// From middle to middle of two seeds, m, where they are one strand.
+    #[serde(default)]
+    pub strand_pitch_m: Option<f64>,
 }
 
 impl Drops {
@@ -33,6 +36,7 @@ impl Drops {
             direction: needle.direction,
             along_m: needle.seeds.iter().map(|s| s.along_m).collect(),
             retract_to_m: needle.retract_to_m,
+            strand_pitch_m: needle.loading.pitch_m(),
         }
     }
 
@@ -53,6 +57,7 @@ impl Drops {
             direction: self.direction.into(),
             drops_m: self.drops_m().map(Into::into).collect(),
             retract_to_m: self.retract_to_m,
+            strand_pitch_m: self.strand_pitch_m,
         }
     }
 
@@ -66,6 +71,7 @@ impl Drops {
             approach_m_per_s: pace.approach_m_per_s,
             acceleration_m_per_s2: pace.acceleration_m_per_s2,
             retract_to_m: self.retract_to_m,
+            strand_pitch_m: self.strand_pitch_m,
             drops_m: self.drops_m().collect(),
         }
     }

@@ -85,6 +85,7 @@ impl NeedleTask {
                 .map(|seed| plan.along_m(seed))
                 .collect(),
             retract_to_m: 0.0,
+            strand_pitch_m: None,
         };
         Self { plan, drops }
     }
@@ -295,7 +296,7 @@ impl Run {
             HandRequest::PublishPlan { needle } => plan_request(&self.tasks[needle].plan),
             HandRequest::Engage => Request::Engage,
             HandRequest::MoveHand(goal) => Request::MoveHand(goal),
-            HandRequest::DropSeed => Request::DropSeed,
+            HandRequest::DropSeed { strand_pitch_m } => Request::DropSeed { strand_pitch_m },
         })?;
         if let HandRequest::PublishPlan { needle } = request
             && let Some(next) = self.tasks.get(needle + 1)

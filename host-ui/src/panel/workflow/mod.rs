@@ -254,7 +254,7 @@ fn drop_ui(ui: &mut egui::Ui, shown: &Shown, ready: bool, actions: &mut Vec<Acti
             .on_hover_text("Space")
             .clicked()
         {
-            actions.push(Action::Send(Request::DropSeed));
+            actions.push(Action::DropSeed);
         }
         let next = shown.next_seed_m().filter(|_| !is_at_next_seed(shown));
         let to_next = ui.add_enabled(live && next.is_some(), Button::new("To the next place"));

@@ -4,7 +4,6 @@ use crate::action::{Action, PlanAction};
 use crate::shown::Shown;
 use stylet_base::format;
 use stylet_procedure::{AtHand, Operation, Step};
-use stylet_shm_schema::Request;
 
 /// A step of the procedure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -148,7 +147,7 @@ pub fn next_action(shown: &Shown) -> Option<Action> {
             match needle.next()? {
                 Operation::Place => Some(Action::PlaceNeedle),
                 Operation::Insert | Operation::InsertTo(_) => Some(Action::Insert),
-                Operation::Drop(_) => Some(Action::Send(Request::DropSeed)),
+                Operation::Drop(_) => Some(Action::DropSeed),
                 Operation::DrawBack(_) => needle.next_drop_m.map(Action::MoveTo),
                 Operation::Retract | Operation::TakeOut => Some(Action::Retract),
                 Operation::Reset | Operation::PublishPlan | Operation::Engage | Operation::Settle => None,
@@ -215,7 +214,7 @@ mod tests {
 
     #[test]
     fn the_procedure_goes_through_its_steps_one_thing_at_a_time() {
-        let drop = Action::Send(Request::DropSeed);
+        let drop = Action::DropSeed;
         let way: [(f64, &[f64], Progress, Option<Action>); 7] = [
             (-0.05, &[], Progress::Place, Some(Action::PlaceNeedle)),
             (0.0, &[], Progress::Insert, Some(Action::Insert)),

@@ -61,7 +61,7 @@ impl Bridge {
             Request::StopHand => self.order_haptic(HapticOrder::StopHand { ticket }),
             Request::Engage => self.order_haptic(HapticOrder::Engage { ticket }),
             Request::Disengage => self.order_haptic(HapticOrder::Disengage { ticket }),
-            Request::DropSeed => self.order_tissue(TissueOrder::DropSeed { ticket }),
+            Request::DropSeed { strand_pitch_m } => self.order_tissue(TissueOrder::DropSeed { ticket, strand_pitch_m }),
             Request::UndoSeed => self.order_tissue(TissueOrder::UndoSeed { ticket }),
             Request::Reset => self.reset(ticket),
             Request::LoadBuiltinScene(number) => {

@@ -95,6 +95,8 @@ pub struct NeedleRun {
     pub acceleration_m_per_s2: f64,
     /// Where the tip is drawn back to, from the entry along the needle, m.
     pub retract_to_m: f64,
+    /// From middle to middle of two seeds, m, where they are one strand.
+    pub strand_pitch_m: Option<f64>,
     /// Places of the drops in their order, m.
     pub drops_m: Vec<Vector3<f64>>,
 }

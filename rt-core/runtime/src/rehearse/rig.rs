@@ -86,12 +86,11 @@ impl Rig {
             .push(HapticOrder::Hand { ticket: 0, goal });
     }
 
-    pub fn drop_seed(&mut self) {
-        let _ = self
-            .loops
-            .bridge
-            .tissue_orders
-            .push(TissueOrder::DropSeed { ticket: 0 });
+    pub fn drop_seed(&mut self, strand_pitch_m: Option<f64>) {
+        let _ = self.loops.bridge.tissue_orders.push(TissueOrder::DropSeed {
+            ticket: 0,
+            strand_pitch_m,
+        });
     }
 
     pub fn state(&self) -> &HapticState {

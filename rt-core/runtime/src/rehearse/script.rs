@@ -13,6 +13,7 @@ impl Script {
             direction: run.direction,
             drops_m: run.drops_m.clone(),
             retract_to_m: run.retract_to_m,
+            strand_pitch_m: run.strand_pitch_m,
         };
         let pace = Pace {
             insert_m_per_s: run.insert_m_per_s,
@@ -39,7 +40,7 @@ impl Script {
         match next {
             Next::Send(HandRequest::Engage) => rig.engage(),
             Next::Send(HandRequest::MoveHand(goal)) => rig.move_hand(&goal),
-            Next::Send(HandRequest::DropSeed) => rig.drop_seed(),
+            Next::Send(HandRequest::DropSeed { strand_pitch_m }) => rig.drop_seed(strand_pitch_m),
             // A rehearsal begins from rest and shows its plan to nobody.
             Next::Send(HandRequest::Reset | HandRequest::PublishPlan { .. }) => {}
             Next::Wait | Next::Continue | Next::Done => {}

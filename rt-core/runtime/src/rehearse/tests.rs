@@ -29,6 +29,7 @@ fn needle() -> NeedleRun {
         approach_m_per_s: 0.1,
         acceleration_m_per_s2: 2.0,
         retract_to_m: 0.0,
+        strand_pitch_m: None,
         drops_m: [0.8, 0.5, 0.2].map(at).to_vec(),
     }
 }
@@ -54,6 +55,38 @@ fn a_rehearsal_leaves_its_seeds_off_plan_and_repeats_bit_by_bit() {
         assert!(off.norm() > 0.1e-3 && off.norm() < 10e-3, "{off:?}");
         assert!((Vector3::from(seed.dropped_at_m) - drop).norm() < 0.5e-3);
     }
+}
+
+/// Loose seeds show where the tissue has each; a strand was pulled to 17 mm between seeds that a spacer holds 10 mm apart.
+#[test]
+fn a_strand_keeps_its_pitch_and_rests_where_the_tissue_at_its_seeds_balances() {
+    let (mut stage, mut run, stop) = (stage(), needle(), AtomicBool::new(false));
+    let set = ParameterSet::default();
+    let along = |r: &Rehearsed| r.seeds.iter().map(|s| s.position_m[2]).collect::<Vec<_>>();
+    let loose = stage.rehearse(&run, &set, &stop).expect("goes through");
+    let pitch_m = run.drops_m[0].z - run.drops_m[1].z;
+    run.strand_pitch_m = Some(pitch_m);
+    let strand = stage.rehearse(&run, &set, &stop).expect("goes through");
+    let (apart, together) = (along(&loose), along(&strand));
+    let mean = |z: &[f64]| z.iter().sum::<f64>() / 3.0;
+    assert!((mean(&apart) - mean(&together)).abs() < 1e-12, "{apart:?} {together:?}");
+    for (deep, next) in together.iter().zip(&together[1..]) {
+        assert!((deep - next - pitch_m).abs() < 1e-12, "{together:?}");
+    }
+    let worst = |z: &[f64]| z.windows(2).map(|p| (p[0] - p[1] - pitch_m).abs()).fold(0.0, f64::max);
+    assert!(worst(&apart) > 2e-3, "loose seeds move apart: {apart:?}");
+    for (alone, joined) in loose.seeds.iter().zip(&strand.seeds) {
+        assert_eq!(
+            alone.position_m[..2],
+            joined.position_m[..2],
+            "it bends with the tissue"
+        );
+        assert_eq!(alone.axis, joined.axis);
+    }
+    // At another pitch than they were dropped at: each by itself.
+    run.strand_pitch_m = Some(2.5 * pitch_m);
+    let other = stage.rehearse(&run, &set, &stop).expect("goes through");
+    assert_eq!(along(&other), apart);
 }
 
 #[test]

@@ -129,7 +129,10 @@ impl Recorded {
         self.run(0.2);
         self.go(12e-3);
         self.run(1.8);
-        let drop = TissueOrder::DropSeed { ticket: 0 };
+        let drop = TissueOrder::DropSeed {
+            ticket: 0,
+            strand_pitch_m: None,
+        };
         self.loops.bridge.tissue_orders.push(drop).expect("room");
         self.go(9e-3);
         self.run(3.0);

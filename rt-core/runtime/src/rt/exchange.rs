@@ -69,6 +69,8 @@ pub enum TissueOrder {
     DropSeed {
         /// Number of the request.
         ticket: Ticket,
+        /// As in the request.
+        strand_pitch_m: Option<f64>,
     },
     /// Remove the seed that was dropped last.
     UndoSeed {

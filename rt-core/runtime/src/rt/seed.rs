@@ -1,4 +1,4 @@
-//! A seed in the tissue: material points that move with the body.
+//! Seeds in the tissue: material points that move with the body, and strands of them, which do not stretch.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -16,11 +16,37 @@ pub struct Seed {
     pub axis: [f64; 3],
     /// Place of the tip at the drop, scene frame, m.
     pub dropped_at_m: [f64; 3],
+    /// From middle to middle to the seed before it, m, where a spacer joins them.
+    pub strand_pitch_m: Option<f64>,
+}
+
+/// Places and axes in the deformed body, scene frame, in the order of the drops.
+///
+/// A strand bends and does not stretch: along it each seed keeps its pitch, where springs of one stiffness between each seed and its
+/// own place in the tissue balance (docs/physics.md, Strands). What that does to the tissue is left out.
+pub fn poses<'a>(seeds: &'a [Seed], body: Deformed<'a>) -> impl Iterator<Item = SeedPose> + 'a {
+    let strands = seeds.chunk_by(|_, next| next.strand_pitch_m.is_some());
+    strands.flat_map(move |strand| {
+        let axis: Vector3<f64> = strand.first().map_or_else(Vector3::zeros, |first| first.axis.into());
+        let in_tissue = move || {
+            let mut behind_m = 0.0;
+            strand.iter().enumerate().map(move |(number, seed)| {
+                behind_m += seed.strand_pitch_m.filter(|_| number > 0).unwrap_or(0.0);
+                (seed.pose(&body), behind_m)
+            })
+        };
+        let along_m = move |(pose, behind_m): &(SeedPose, f64)| axis.dot(&Vector3::from(pose.position_m)) + behind_m;
+        let first_m = in_tissue().map(|seed| along_m(&seed)).sum::<f64>() / strand.len() as f64;
+        in_tissue().map(move |seed| SeedPose {
+            position_m: (Vector3::from(seed.0.position_m) + axis * (first_m - along_m(&seed))).into(),
+            ..seed.0
+        })
+    })
 }
 
 impl Seed {
-    /// Place and axis in the deformed body, scene frame.
-    pub fn pose(&self, body: &Deformed<'_>) -> SeedPose {
+    /// Place and axis in the deformed body, scene frame, as if by itself.
+    fn pose(&self, body: &Deformed<'_>) -> SeedPose {
         let position_m = self.tip.position_m(body);
         let along = self
             .tail

@@ -8,7 +8,7 @@ use crate::rt::layers_met::LayersMet;
 use crate::rt::line_loads::LineLoads;
 use crate::rt::pose::TipPose;
 use crate::rt::response::TissueResponse;
-use crate::rt::seed::Seed;
+use crate::rt::seed::{self, Seed};
 use crate::rt::timing::Probe;
 use crate::rt::tissue_tape::TapedOrder;
 use crate::rt::wiring::TissuePorts;
@@ -105,8 +105,7 @@ impl TissueLoop {
 
     /// Places of the seeds now, scene frame, in the order of the drops.
     pub fn seeds(&self) -> impl Iterator<Item = SeedPose> {
-        let body = self.world.tissue.deformed();
-        self.seeds.iter().map(move |seed| seed.pose(&body))
+        seed::poses(&self.seeds, self.world.tissue.deformed())
     }
 
     /// Largest displacement of an element after the last tick, m.
@@ -177,9 +176,9 @@ impl TissueLoop {
                     self.tape_order(TapedOrder::Limits(limits.clone()));
                     self.world.set_limits(limits);
                 }
-                TissueOrder::DropSeed { ticket } => {
-                    self.tape_order(TapedOrder::DropSeed);
-                    self.drop_seed(ticket);
+                TissueOrder::DropSeed { ticket, strand_pitch_m } => {
+                    self.tape_order(TapedOrder::DropSeed { strand_pitch_m });
+                    self.drop_seed(ticket, strand_pitch_m);
                 }
                 TissueOrder::UndoSeed { ticket } => {
                     self.tape_order(TapedOrder::UndoSeed);

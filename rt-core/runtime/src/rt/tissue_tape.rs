@@ -27,7 +27,10 @@ pub enum TapedOrder {
     /// See [`TissueOrder::Limits`](crate::rt::exchange::TissueOrder).
     Limits(Limits),
     /// See [`TissueOrder::DropSeed`](crate::rt::exchange::TissueOrder).
-    DropSeed,
+    DropSeed {
+        /// As in the order.
+        strand_pitch_m: Option<f64>,
+    },
     /// See [`TissueOrder::UndoSeed`](crate::rt::exchange::TissueOrder).
     UndoSeed,
     /// See [`TissueOrder::Reset`](crate::rt::exchange::TissueOrder).

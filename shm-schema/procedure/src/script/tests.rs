@@ -11,6 +11,7 @@ fn way() -> NeedleWay {
         direction: Vector3::z(),
         drops_m: [0.03, 0.02].map(|z| Vector3::new(0.01, 0.0, z)).to_vec(),
         retract_to_m: 0.0,
+        strand_pitch_m: None,
     }
 }
 
@@ -35,9 +36,13 @@ impl Obedient {
     /// One millisecond; drops after `lost` are refused.
     fn step(&mut self, procedure: &mut Procedure, lost: &[usize]) -> Result<Next, StepFailure> {
         self.now_s += 1e-3;
-        let drops = self.sent.iter().filter(|r| matches!(r, HandRequest::DropSeed)).count();
+        let drops = self
+            .sent
+            .iter()
+            .filter(|r| matches!(r, HandRequest::DropSeed { .. }))
+            .count();
         let is_lost =
-            matches!(self.sent.last(), Some(HandRequest::DropSeed)) && lost.contains(&(drops.saturating_sub(1)));
+            matches!(self.sent.last(), Some(HandRequest::DropSeed { .. })) && lost.contains(&(drops.saturating_sub(1)));
         let reply = if is_lost {
             Reply::TipOutsideTissue
         } else {
@@ -51,7 +56,7 @@ impl Obedient {
         if let Next::Send(request) = next {
             match request {
                 HandRequest::MoveHand(goal) => self.state.tip_in_scene_m = goal.tip_m,
-                HandRequest::DropSeed if !lost.contains(&drops) => self.state.seed_count += 1,
+                HandRequest::DropSeed { .. } if !lost.contains(&drops) => self.state.seed_count += 1,
                 _ => {}
             }
             self.sent.push(request);
@@ -120,6 +125,7 @@ fn a_procedure_goes_through_each_needle_step_by_step() {
 fn a_needle_that_is_drawn_back_first_is_then_taken_out_but_not_in_a_rehearsal() {
     let way = NeedleWay {
         retract_to_m: 0.01,
+        strand_pitch_m: None,
         ..way()
     };
     let mut hand = Obedient::new();
@@ -279,7 +285,10 @@ fn a_procedure_goes_on_from_wherever_it_was_stopped_with_no_seed_twice_and_none_
         assert_eq!(hand.state.seed_count, 6, "stopped after {:?}", words(&before));
         assert!(!hand.sent.contains(&HandRequest::Reset), "{:?}", words(&hand.sent));
         let drops = [before, hand.sent].concat();
-        let drops = drops.iter().filter(|r| matches!(r, HandRequest::DropSeed)).count();
+        let drops = drops
+            .iter()
+            .filter(|r| matches!(r, HandRequest::DropSeed { .. }))
+            .count();
         assert_eq!(drops, 6, "stopped after {stopped}");
     }
     // In the second needle, with its first seed dropped: straight to the second.

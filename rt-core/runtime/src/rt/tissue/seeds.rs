@@ -3,13 +3,17 @@
 use super::TissueLoop;
 use crate::rt::exchange::{Notice, Ticket};
 use crate::rt::seed::Seed;
+use nalgebra::Vector3;
 use stylet_shm_schema::{MAX_SEEDS, RefusalCode};
 
 /// A seed is 4.5 mm long; its tail shows where its axis points.
 const SEED_LENGTH_M: f64 = 4.5e-3;
+/// Two seeds of one needle are no further off its line, and were dropped in one direction (cosine of 5 degrees).
+const ON_NEEDLE_M: f64 = 2e-3;
+const PARALLEL: f64 = 0.996;
 
 impl TissueLoop {
-    pub(super) fn drop_seed(&mut self, ticket: Ticket) {
+    pub(super) fn drop_seed(&mut self, ticket: Ticket, strand_pitch_m: Option<f64>) {
         let tip_m = self.pose.tip_in_scene;
         let hint = self.held.map(|h| h.element);
         let on_line = self.material_on_line(SEED_LENGTH_M);
@@ -28,11 +32,14 @@ impl TissueLoop {
                 let tail_m = tip_m - self.pose.direction * SEED_LENGTH_M;
                 let tail = on_line.map_or_else(|| self.locate(&tail_m, Some(tip.element)), |[_, tail]| tail);
                 // Room for MAX_SEEDS was reserved: this push does not allocate.
+                let is_behind = |pitch_m: &f64| self.is_behind_the_last(*pitch_m);
+                let strand_pitch_m = strand_pitch_m.filter(is_behind);
                 self.seeds.push(Seed {
                     tip,
                     tail,
                     axis: self.pose.direction.into(),
                     dropped_at_m: tip_m.into(),
+                    strand_pitch_m,
                 });
                 let tick = self.response.tick;
                 self.response.seed_count = self.seeds.len() as u32;
@@ -46,6 +53,18 @@ impl TissueLoop {
             }
         };
         self.notify(notice);
+    }
+
+    /// Whether the tip is where the next seed of the last one's strand leaves the needle, within half a pitch.
+    fn is_behind_the_last(&self, pitch_m: f64) -> bool {
+        let direction = self.pose.direction;
+        self.seeds.last().is_some_and(|last| {
+            let back_m = Vector3::from(last.dropped_at_m) - self.pose.tip_in_scene;
+            let along_m = back_m.dot(&direction);
+            let is_on_needle = (back_m - direction * along_m).norm() < ON_NEEDLE_M;
+            let is_parallel = Vector3::from(last.axis).dot(&direction) > PARALLEL;
+            is_on_needle && is_parallel && (along_m - pitch_m).abs() < 0.5 * pitch_m
+        })
     }
 
     pub(super) fn undo_seed(&mut self, ticket: Ticket) {

@@ -3,6 +3,7 @@
 use super::TissueLoop;
 use crate::rt::clock;
 use crate::rt::exchange::{SnapshotReturn, SnapshotSlot};
+use crate::rt::seed;
 use stylet_shm_schema::{MAX_SEEDS, SnapshotHeader, Vertex};
 use stylet_sim::tissue::StepReport;
 
@@ -65,8 +66,8 @@ impl TissueLoop {
             seed_count: self.seeds.len() as u32,
             seeds: [bytemuck::Zeroable::zeroed(); MAX_SEEDS],
         };
-        for (slot, seed) in header.seeds.iter_mut().zip(&self.seeds) {
-            *slot = seed.pose(&body);
+        for (slot, pose) in header.seeds.iter_mut().zip(seed::poses(&self.seeds, body)) {
+            *slot = pose;
         }
     }
 }
