@@ -153,7 +153,7 @@ one shift applies to all their seeds.
   it. They count only after compensation.
 - *Not possible*: needles that no way was found for to leave their last seeds inside the tissue.
 
-A strand is pressed: its first seed lies up to 10 mm short, where the tip has pushed the tissue ahead, and its other seeds do not. One shift cannot cure both.
+A strand does not stretch (docs/physics.md, Strands), so one shift can bring all its seeds to their places.
 
 | gland | speed in | needles | not as planned | not possible | seeds | mean before | mean after | worst before | worst after | rehearsals | time |
 |---|---|---|---|---|---|---|---|---|---|---|---|

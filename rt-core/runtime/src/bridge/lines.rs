@@ -199,7 +199,6 @@ impl LinePreparer {
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let work = move || {
-            give_way();
             let body = match kept {
                 Some((_, body)) => Ok(Some(body)),
                 None => LineBody::of_source(&source, tissue),
@@ -274,13 +273,6 @@ impl Drop for LinePreparer {
     fn drop(&mut self) {
         self.give_up();
     }
-}
-
-/// A driver's own thread and the hosts' go before this one: who waits for a line waits, a driver without a core is a fault.
-fn give_way() {
-    const NICE: libc::c_int = 10;
-    // SAFETY: changes the calling thread alone (on Linux 0 is the thread, not its process); a refusal leaves it as it is.
-    unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICE) };
 }
 
 /// Whether a needle on `axis` counts as one on `of`.
