@@ -1,17 +1,20 @@
 //! The real loops under a simulated hand, on one thread and one clock: a session that can be repeated.
 
+use crate::rig::Tick;
 use nalgebra::Vector3;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use stylet_hw::{
-    Device, DeviceFault, DeviceInfo, Hand, HandGoal, Sample, SimulatedPhantom, SimulatedPhantomConfig, Wrench,
+    BadLink, Device, DeviceFault, DeviceInfo, Hand, HandGoal, LinkFaults, Sample, SimulatedPhantom,
+    SimulatedPhantomConfig, Wrench,
 };
-use stylet_runtime::rt::exchange::HapticOrder;
+use stylet_runtime::rt::exchange::{HapticOrder, TissueOrder};
 use stylet_runtime::rt::haptic_tape::HapticMemory;
 use stylet_runtime::rt::response::TissueResponse;
 use stylet_runtime::rt::world::World;
-use stylet_runtime::stepped::SteppedLoops;
+use stylet_runtime::stepped::{HAPTIC_TICKS_PER_TISSUE_TICK, SteppedLoops};
 use stylet_sim::force::ForceParameters;
 use stylet_sim::force::chain::{ChainOutput, ChainState};
+use stylet_sim::line::ReadyLine;
 use stylet_sim::needle::{LayerKind, NeedleParameters};
 use stylet_sim::tissue::MaterialPoint;
 
@@ -20,6 +23,14 @@ use stylet_sim::tissue::MaterialPoint;
 struct SharedPhantom(Arc<Mutex<SimulatedPhantom>>);
 
 impl SharedPhantom {
+    fn new(hand: Hand, start_tip_in_world: Vector3<f64>) -> Self {
+        Self(Arc::new(Mutex::new(SimulatedPhantom::new(SimulatedPhantomConfig {
+            hand,
+            start_tip_in_world,
+            ..SimulatedPhantomConfig::default()
+        }))))
+    }
+
     fn phantom(&self) -> MutexGuard<'_, SimulatedPhantom> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -67,17 +78,53 @@ impl Session {
         tissue_every: u64,
         force: ForceParameters,
     ) -> Self {
-        let device = SharedPhantom(Arc::new(Mutex::new(SimulatedPhantom::new(SimulatedPhantomConfig {
-            hand,
-            start_tip_in_world: start,
-            ..SimulatedPhantomConfig::default()
-        }))));
+        let device = SharedPhantom::new(hand, start);
         let mut memory = HapticMemory::new(&device.info(), (NeedleParameters::default(), force), 0);
         memory.chain.gate.engage();
         Self {
             loops: SteppedLoops::new(Box::new(world), Box::new(device.clone()), &memory, tissue_every),
             device,
         }
+    }
+
+    /// As [`new`](Self::new), on a needle line and over a link with faults.
+    pub fn on_line(
+        world: Box<World>,
+        (start, line): (Vector3<f64>, ReadyLine),
+        (hand, faults): (Hand, LinkFaults),
+        force: ForceParameters,
+    ) -> Self {
+        let device = SharedPhantom::new(hand, start);
+        let mut memory = HapticMemory::new(&device.info(), (NeedleParameters::default(), force), 0);
+        memory.chain.gate.engage();
+        let link = Box::new(BadLink::new(device.clone(), faults));
+        let mut loops = SteppedLoops::new(world, link, &memory, HAPTIC_TICKS_PER_TISSUE_TICK);
+        // Both rings are empty.
+        let _ = loops.bridge.lines.push(line.hand);
+        let _ = loops.bridge.tissue_orders.push(TissueOrder::Line(line.body));
+        Self { loops, device }
+    }
+
+    /// Another hand takes over.
+    pub fn set_hand(&mut self, hand: Hand) {
+        self.device.phantom().set_hand(hand);
+    }
+
+    /// One tick, and what it did to the hand along z.
+    pub fn tick(&mut self) -> Tick {
+        let output = self.step();
+        let phantom = self.device.phantom();
+        Tick {
+            output,
+            true_tip_m: phantom.true_tip_in_world().z,
+            true_speed_m_per_s: phantom.true_velocity_m_per_s().norm(),
+            work_j: phantom.work_j(),
+        }
+    }
+
+    /// The body, for another session.
+    pub fn into_world(self) -> Box<World> {
+        self.loops.tissue.into_world()
     }
 
     /// Orders the hand to bring the tip there.

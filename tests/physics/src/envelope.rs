@@ -1,5 +1,7 @@
 //! Every hand of the envelope, every lateness of the link, three places: does the loop sing?
 
+mod on_line;
+
 use stylet_benches::rig::{Rig, Tick, hand_envelope};
 use stylet_hw::{Hand, LinkFaults};
 use stylet_sim::needle::LayerKind;

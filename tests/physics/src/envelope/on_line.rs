@@ -1,0 +1,157 @@
+//! The same hands on a needle line, as every scene ships: the real loops, compliance and membranes of finite elements.
+
+use super::{Case, STEP_M, excess, to_and_fro, worst};
+use nalgebra::Vector3;
+use stylet_benches::rig::{Tick, hand_envelope};
+use stylet_benches::session::{Session, axis_start};
+use stylet_hw::{Hand, LinkFaults};
+use stylet_runtime::lines::LineBody;
+use stylet_runtime::rt::world::World;
+use stylet_sim::force::{ForceParameters, PassivityParameters};
+use stylet_sim::limits::TissueParameters;
+use stylet_sim::line::ReadyLine;
+use stylet_sim::scene::{SceneSource, TissueKind};
+
+/// A body and the line through the middle of its gland, used by one session after the other.
+struct Theatre {
+    world: Option<Box<World>>,
+    start: Vector3<f64>,
+    line: ReadyLine,
+}
+
+impl Theatre {
+    fn of(scene: &str, tissue: TissueKind) -> Self {
+        let source = SceneSource::Builtin(scene.to_owned());
+        let built = source.build().expect("built in").with_tissue(TissueKind::ChainMail);
+        let limits = TissueParameters::default().validate().expect("defaults are valid");
+        let world = World::new(built, limits, 1).expect("can be used");
+        let start = axis_start(&world);
+        let body = LineBody::of_source(&source, tissue)
+            .expect("can be solved")
+            .expect("has lines");
+        let line = body.prepare(1, start.into(), [0.0, 0.0, 1.0], &mut || true);
+        let mut line = line.expect("through the gland");
+        if tissue == TissueKind::Fem {
+            // What the hand feels is of full resolution; the body that is drawn does not matter here.
+            let light = LineBody::of_source(&source, TissueKind::ChainMail).expect("can be solved");
+            let light = light
+                .expect("has lines")
+                .prepare(1, start.into(), [0.0, 0.0, 1.0], &mut || true);
+            line.body.answer = light.expect("through the gland").body.answer;
+        }
+        Self {
+            world: Some(Box::new(world)),
+            start,
+            line,
+        }
+    }
+
+    /// As in [`super::session`], with the tip brought to rest `rest_m` behind where the body begins.
+    fn session(&mut self, (hand, late_ticks): (Hand, usize), (name, rest_m): (&str, f64), controlled: bool) -> Case {
+        let faults = LinkFaults {
+            late_ticks,
+            ..LinkFaults::default()
+        };
+        let mut force = ForceParameters::default();
+        if !controlled {
+            force.gate.passivity = PassivityParameters::OFF;
+        }
+        let mut world = self.world.take().expect("given back");
+        world.tissue.return_to_rest();
+        let mut session = Session::on_line(world, (self.start, self.line.clone()), (Hand::steady(), faults), force);
+        let at = |depth_m: f64| self.start + Vector3::z() * (5e-3 + depth_m);
+        let run = |session: &mut Session, seconds: f64| -> Vec<Tick> {
+            (0..(seconds * 1e3) as usize).map(|_| session.tick()).collect()
+        };
+        session.go_to(at(rest_m), 0.05);
+        let mut ticks = run(&mut session, 2.0 + rest_m / 0.05);
+        let before = *ticks.last().expect("ticks");
+        session.set_hand(hand);
+        session.go_to(at(rest_m - 2e-3), 0.1);
+        let mut after = run(&mut session, 0.05);
+        session.go_to(at(rest_m), 0.1);
+        after.extend(run(&mut session, 0.95));
+        let (early, late) = (run(&mut session, 1.0), run(&mut session, 1.0));
+        let (early_m, late_m) = (to_and_fro(&early), to_and_fro(&late));
+        after.extend(early);
+        after.extend(late);
+        let (given_j, hidden_j) = excess(&after, before.work_j);
+        ticks.extend(after);
+        let (excess_j, bound_j) = excess(&ticks, 0.0);
+        self.world = Some(session.into_world());
+        Case {
+            name: format!(
+                "{name}, {} kg, {} N s/m, {} N/m, {late_ticks} late",
+                hand.mass_kg, hand.damping_n_s_per_m, hand.stiffness_n_per_m
+            ),
+            early_m,
+            late_m,
+            excess_j,
+            bound_j,
+            after_j: given_j - hidden_j - 0.9 * before.output.terms.stored_j,
+        }
+    }
+}
+
+fn no_hand_sings(tissue: TissueKind) {
+    let mut theatre = Theatre::of("paper", tissue);
+    for place in [("pressed 4 mm", 4e-3), ("45 mm deep", 45e-3)] {
+        let mut all = Vec::new();
+        for late_ticks in 0..=3 {
+            all.extend(hand_envelope().map(|hand| theatre.session((hand, late_ticks), place, true)));
+        }
+        report(place.0, &all);
+        for case in &all {
+            assert!(!case.sings(), "{} sings: {} m", case.name, case.late_m);
+            assert!(case.late_m <= case.early_m + STEP_M, "{} grows", case.name);
+            assert!(
+                case.after_j < 10e-3,
+                "{} gives {} J after the change",
+                case.name,
+                case.after_j
+            );
+            assert!(
+                case.excess_j <= case.bound_j,
+                "{} gives {} J",
+                case.name,
+                case.excess_j - case.bound_j
+            );
+        }
+    }
+}
+
+fn report(place: &str, all: &[Case]) {
+    let (late_m, where_late) = worst(all, |c| c.late_m);
+    let (given_j, where_given) = worst(all, |c| c.excess_j - c.bound_j);
+    let (after_j, where_after) = worst(all, |c| c.after_j);
+    let singing = all.iter().filter(|case| case.sings()).count();
+    println!("{place}, {} sessions, {singing} sing:", all.len());
+    println!("  to and fro {:.3} mm ({where_late})", late_m * 1e3);
+    println!(
+        "  given beyond taken and rounding {:.3} mJ ({where_given})",
+        given_j * 1e3
+    );
+    println!("  from the change of hands on {:.3} mJ ({where_after})", after_j * 1e3);
+}
+
+#[test]
+fn no_hand_sings_on_a_line_of_chainmail() {
+    no_hand_sings(TissueKind::ChainMail);
+}
+
+#[test]
+fn no_hand_sings_on_a_line_of_finite_elements() {
+    no_hand_sings(TissueKind::Fem);
+}
+
+/// The tests above can fail.
+#[test]
+fn without_control_late_links_sing_on_a_line() {
+    let mut theatre = Theatre::of("paper", TissueKind::ChainMail);
+    let place = ("pressed 4 mm", 4e-3);
+    let cases: Vec<Case> = hand_envelope()
+        .map(|hand| theatre.session((hand, 3), place, false))
+        .collect();
+    report("uncontrolled, pressed 4 mm", &cases);
+    assert!(cases.iter().any(Case::sings), "control has nothing to do");
+}
