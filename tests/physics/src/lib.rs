@@ -7,6 +7,8 @@ mod envelope;
 #[cfg(test)]
 mod hard_cases;
 #[cfg(test)]
+mod needle;
+#[cfg(test)]
 mod stability;
 #[cfg(test)]
 mod z_width;

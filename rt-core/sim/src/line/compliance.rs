@@ -19,7 +19,9 @@ pub struct Compliance {
     pub tip_length_m: f64,
     /// Of the body as a whole on its foundation, m/N; 0 where something holds it.
     pub whole_m_per_n: f64,
-    /// m/N, 2m x 2m.
+    /// Of the needle itself, between hand and tissue, m/N; see [`behind_needle`](Self::behind_needle).
+    pub needle_m_per_n: f64,
+    /// m/N, 2m x 2m; with the needle's own.
     pub(super) rows: Rows,
     /// The same along the two directions across, m x m each; empty where they were not solved for.
     pub across: [Rows; 2],
@@ -59,6 +61,7 @@ impl Compliance {
             spacing_m: stations.settings.spacing_m,
             tip_length_m: stations.patch_edge_m(model.spacing_m()),
             whole_m_per_n: model.whole_m_per_n(),
+            needle_m_per_n: 0.0,
             rows,
             across: sides,
             foundation: axial.iter().map(foundation).collect(),
@@ -89,10 +92,39 @@ impl Compliance {
             spacing_m,
             tip_length_m,
             whole_m_per_n: 0.0,
+            needle_m_per_n: 0.0,
             rows: Rows::new(2 * stations, entry),
             across: [Rows::default(), Rows::default()],
             foundation: vec![-1.0; 2 * stations],
         }
+    }
+
+    /// Force for each metre of a shaft that is stuck at every station, N/m: `1' W^-1 1`. Infinite where `W` is no compliance.
+    pub fn stuck_n_per_m(&self) -> f64 {
+        let matrix = nalgebra::DMatrix::from_fn(self.stations, self.stations, |i, j| self.at(i, j));
+        let ones = nalgebra::DVector::from_element(self.stations, 1.0);
+        let solved = matrix.cholesky().map(|factors| factors.solve(&ones).sum());
+        solved.filter(|k| k.is_finite() && *k > 0.0).unwrap_or(f64::INFINITY)
+    }
+
+    /// Puts a spring between hand and tissue that makes a stuck shaft no stiffer than this: what is stiffer no loop at 1 kHz can
+    /// hold still over a late link. Nothing where the tissue is soft enough by itself.
+    pub fn behind_needle(mut self, stiffest_n_per_m: f64) -> Self {
+        self.needle_m_per_n = (1.0 / stiffest_n_per_m - 1.0 / self.stuck_n_per_m()).max(0.0);
+        if self.needle_m_per_n > 0.0 {
+            for n in 0..2 * self.stations {
+                let count = 2 * self.stations;
+                for entry in &mut self.rows.row_mut(n)[..count] {
+                    *entry += self.needle_m_per_n;
+                }
+            }
+        }
+        self
+    }
+
+    /// What any force on the line moves all of it by, m/N: the body as a whole, and the needle itself.
+    pub(super) fn common_m_per_n(&self) -> f64 {
+        self.whole_m_per_n + self.needle_m_per_n
     }
 
     /// How row `i` moves with a newton at row `j`, m/N.

@@ -120,7 +120,7 @@ fn touch(model: &LineModel, state: &mut LineState, tip_m: f64) {
 /// A membrane is stiffer than what it holds: between the place of the tip and the body as a whole it is a spring, of such a
 /// stiffness that both of its limits, force and depth, are met at once (eq. 10). It is relaxed when the tip meets it.
 fn press(model: &LineModel, state: &mut LineState, membrane: Option<usize>) {
-    let whole = model.compliance.whole_m_per_n;
+    let whole = model.compliance.common_m_per_n();
     let count = state.in_contact;
     let held_by = membrane.map_or(0, |n| n as u32 + 1);
     if held_by != state.tip.held_by {
@@ -250,7 +250,7 @@ fn whole_n(model: &LineModel, state: &LineState) -> f64 {
         return 0.0;
     }
     let load_n = state.shaft_n[..state.in_contact].iter().sum::<f64>() + state.tip.force_n;
-    let dent_m = state.tip_u_m - model.compliance.whole_m_per_n * load_n;
+    let dent_m = state.tip_u_m - model.compliance.common_m_per_n() * load_n;
     state.membrane_n_per_m * (dent_m - state.tip.met_dent_m)
 }
 

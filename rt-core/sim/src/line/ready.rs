@@ -21,6 +21,9 @@ pub use source::LineSource;
 /// The needle is on a line whose entry it would meet so far from it, and whose direction is that close to its own.
 const BESIDE_M: f64 = 1e-3;
 const TILT_RAD: f64 = 0.02;
+/// A stuck shaft is felt no stiffer: by trial with every hand of the envelope, links up to three ticks late, tissue up to 1.7 MPa
+/// (docs/stability.md, 19). The paper's gland has 0.42 N/mm.
+const STIFFEST_N_PER_M: f64 = 1000.0;
 /// Slices of work between two looks at whether the line is still wanted.
 const SLICES: usize = 8;
 
@@ -145,6 +148,7 @@ impl ReadyLine {
             }
         }
         let compliance = Compliance::of_columns(body, &stations, queue.columns()).ok_or(LineError::NoTissue)?;
+        let compliance = compliance.behind_needle(STIFFEST_N_PER_M);
         let kinds = kinds_along(&stations, lattice, layer_of);
         Ok(ReadyLine {
             hand: Box::new(HandLine::new(generation, line, kinds, compliance)?),
@@ -258,6 +262,12 @@ impl HandLine {
     /// What the state is.
     pub fn state(&self) -> &LineState {
         &self.state
+    }
+
+    /// Displacement of the material at the tip along the line, m.
+    pub fn tip_displacement_m(&self) -> f64 {
+        let load_n: f64 = self.state.loads_n().iter().sum::<f64>() + self.state.whole_n();
+        self.state.tip_displacement_m() - self.model.compliance().needle_m_per_n * load_n
     }
 
     /// How far the body is moved as a whole by what a membrane passes on to it, along the line, m.

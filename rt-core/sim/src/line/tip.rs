@@ -66,7 +66,7 @@ impl LineModel {
     pub(super) fn kept_of_dent(&self, layer: usize, own: f64) -> Option<f64> {
         let layer = self.layers.get(layer)?;
         let wanted = layer.puncture_depth_m / layer.puncture_force_n;
-        let whole = self.compliance.whole_m_per_n;
+        let whole = self.compliance.common_m_per_n();
         (wanted.is_finite() && own > whole).then(|| ((wanted - whole) / (own - whole)).clamp(LEAST_KEPT, 1.0))
     }
 

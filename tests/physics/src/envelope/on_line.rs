@@ -10,7 +10,7 @@ use stylet_runtime::rt::world::World;
 use stylet_sim::force::{ForceParameters, PassivityParameters};
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::line::ReadyLine;
-use stylet_sim::scene::{SceneSource, TissueKind};
+use stylet_sim::scene::{Labels, Role, SceneSource, Structure, TissueKind};
 
 /// A body and the line through the middle of its gland, used by one session after the other.
 struct Theatre {
@@ -21,19 +21,36 @@ struct Theatre {
 
 impl Theatre {
     fn of(scene: &str, tissue: TissueKind) -> Self {
-        let source = SceneSource::Builtin(scene.to_owned());
+        Self::of_source(&SceneSource::Builtin(scene.to_owned()), tissue)
+    }
+
+    /// A block of 60 mm on fat, with its membrane.
+    fn of_stiffness(young_pa: f64) -> Self {
+        let mut block = Structure::soft("block", 1);
+        block.role = Role::Target;
+        block.material.young_pa = young_pa;
+        let labels = Labels {
+            dims: [30; 3],
+            spacing_m: 2e-3,
+            cells: vec![1; 27_000],
+            structures: vec![block],
+        };
+        Self::of_source(&SceneSource::of_labels("block", &labels), TissueKind::ChainMail)
+    }
+
+    fn of_source(source: &SceneSource, tissue: TissueKind) -> Self {
         let built = source.build().expect("built in").with_tissue(TissueKind::ChainMail);
         let limits = TissueParameters::default().validate().expect("defaults are valid");
         let world = World::new(built, limits, 1).expect("can be used");
         let start = axis_start(&world);
-        let body = LineBody::of_source(&source, tissue)
+        let body = LineBody::of_source(source, tissue)
             .expect("can be solved")
             .expect("has lines");
         let line = body.prepare(1, start.into(), [0.0, 0.0, 1.0], &mut || true);
         let mut line = line.expect("through the gland");
         if tissue == TissueKind::Fem {
             // What the hand feels is of full resolution; the body that is drawn does not matter here.
-            let light = LineBody::of_source(&source, TissueKind::ChainMail).expect("can be solved");
+            let light = LineBody::of_source(source, TissueKind::ChainMail).expect("can be solved");
             let light = light
                 .expect("has lines")
                 .prepare(1, start.into(), [0.0, 0.0, 1.0], &mut || true);
@@ -66,6 +83,11 @@ impl Theatre {
         session.go_to(at(rest_m), 0.05);
         let mut ticks = run(&mut session, 2.0 + rest_m / 0.05);
         let before = *ticks.last().expect("ticks");
+        assert!(
+            before.output.wrench.force_n.z < -1.0,
+            "felt at rest: {:?}",
+            before.output.wrench
+        );
         session.set_hand(hand);
         session.go_to(at(rest_m - 2e-3), 0.1);
         let mut after = run(&mut session, 0.05);
@@ -144,14 +166,37 @@ fn no_hand_sings_on_a_line_of_finite_elements() {
     no_hand_sings(TissueKind::Fem);
 }
 
-/// The tests above can fail.
+/// The tests above can fail. Tissue in series is softer than a membrane before a rigid hand: it takes eight ticks.
 #[test]
-fn without_control_late_links_sing_on_a_line() {
+fn without_control_a_link_eight_ticks_late_sings_on_a_line() {
     let mut theatre = Theatre::of("paper", TissueKind::ChainMail);
     let place = ("pressed 4 mm", 4e-3);
-    let cases: Vec<Case> = hand_envelope()
-        .map(|hand| theatre.session((hand, 3), place, false))
-        .collect();
-    report("uncontrolled, pressed 4 mm", &cases);
-    assert!(cases.iter().any(Case::sings), "control has nothing to do");
+    let mut sing = |late_ticks, controlled| {
+        let hands = hand_envelope();
+        let cases: Vec<Case> = hands
+            .map(|hand| theatre.session((hand, late_ticks), place, controlled))
+            .collect();
+        report(&format!("{late_ticks} late, controlled {controlled}"), &cases);
+        cases.iter().filter(|case| case.sings()).count()
+    };
+    assert_eq!(sing(3, false), 0);
+    // More than the controller has accounts for.
+    assert!(sing(8, false) > 0, "what sings is not seen");
+}
+
+/// A scene file may have structures of any modulus. In tissue ten times as stiff as a prostate 6 of 108 hands sang over a link that is
+/// three ticks late, and in stiffer tissue all were thrown out.
+#[test]
+fn no_hand_sings_on_a_line_in_tissue_of_any_stiffness() {
+    for young_pa in [17e3, 170e3, 1.7e6] {
+        let mut theatre = Theatre::of_stiffness(young_pa);
+        for place in [("pressed 4 mm", 4e-3), ("45 mm deep", 45e-3)] {
+            let mut all = Vec::new();
+            for late_ticks in [0, 3] {
+                all.extend(hand_envelope().map(|hand| theatre.session((hand, late_ticks), place, true)));
+            }
+            report(&format!("{} kPa, {}", young_pa / 1e3, place.0), &all);
+            assert!(!all.iter().any(Case::sings), "at {young_pa} Pa, {}", place.0);
+        }
+    }
 }

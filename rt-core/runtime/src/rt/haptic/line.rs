@@ -61,7 +61,7 @@ impl HapticLoop {
         loads.generation = line.generation;
         loads.in_tissue = line.is_in_tissue();
         loads.tip_material_m = state.tip().material_m;
-        loads.tip_displacement_m = state.tip_displacement_m();
+        loads.tip_displacement_m = line.tip_displacement_m();
         loads.whole_m = line.whole_m();
         loads.count = 0;
         for (slot, load) in loads.loads_n.iter_mut().zip(state.loads_n()) {

@@ -193,3 +193,21 @@ fn lines_that_leave_the_body_or_the_numbers_have_no_stations() {
     queue.prepare_all(&model);
     assert!(queue.columns().is_empty());
 }
+
+/// In tissue of 170 kPa a stuck shaft had 2.6 N/mm, with which a hand over a late link sings.
+#[test]
+fn a_needle_makes_stiff_tissue_as_soft_as_a_loop_can_hold_and_leaves_soft_tissue_alone() {
+    let soft = Compliance::diagonal(10, 1e-3, 0.02);
+    assert!((soft.stuck_n_per_m() - 500.0).abs() < 1e-6, "{}", soft.stuck_n_per_m());
+    assert_eq!(soft.clone().behind_needle(1000.0), soft);
+    let stiff = Compliance::diagonal(10, 1e-3, 0.002);
+    let held = stiff.clone().behind_needle(1000.0);
+    assert!((held.stuck_n_per_m() - 1000.0).abs() < 1e-6, "{}", held.stuck_n_per_m());
+    // A spring in series: what a force moves each row by is the tissue's, and the same for all.
+    assert!((held.needle_m_per_n - (1e-3 - 1.0 / 5000.0)).abs() < 1e-12);
+    for (i, j) in [(0, 0), (0, 5), (3, 17), (19, 19)] {
+        assert!((held.at(i, j) - stiff.at(i, j) - held.needle_m_per_n).abs() < 1e-15);
+    }
+    let rigid = Compliance::diagonal(10, 1e-3, 0.0).behind_needle(1000.0);
+    assert!((rigid.needle_m_per_n - 1e-3).abs() < 1e-12, "no compliance at all");
+}
