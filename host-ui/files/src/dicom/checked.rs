@@ -86,6 +86,27 @@ pub fn read(bytes: &[u8]) -> Result<Object, ContentError> {
     Ok(Object { sop_class, data })
 }
 
+/// As [`read`], with the bytes of the pixels, and whether their numbers begin with the highest byte.
+pub fn read_with_pixels(bytes: &[u8]) -> Result<(Object, &[u8], bool), ContentError> {
+    let object = read(bytes)?;
+    let (syntax, from) = syntax(bytes)?;
+    let mut walk = Walk {
+        bytes,
+        at: from,
+        syntax,
+        elements: 0,
+    };
+    walk.at = walk.top()?;
+    if walk.at >= bytes.len() {
+        return Err("it has no pixels; export it again".into());
+    }
+    let head = walk.head()?;
+    if head.length == UNDEFINED {
+        return Err("its pixels are compressed; export it without compression".into());
+    }
+    Ok((object, walk.value(&head)?, syntax == Syntax::ExplicitBig))
+}
+
 /// With a group 2 of our own in front, as that of the file has served.
 fn parse(syntax: Syntax, dataset: &[u8]) -> Result<InMemDicomObject, ContentError> {
     let meta = FileMetaTableBuilder::new()

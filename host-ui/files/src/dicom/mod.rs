@@ -4,14 +4,16 @@ use crate::error::ContentError;
 
 mod checked;
 pub mod dose;
-mod images;
+mod identity;
+pub mod images;
 pub mod plan;
 pub mod structures;
 mod values;
 mod write;
 
 pub use checked::{Object, is_dicom, read};
-pub use write::{Identity, new_uid};
+pub use identity::Identity;
+pub use write::new_uid;
 
 /// The frame of an image series out of one of its files twice, one slice apart; for checking the reader by itself.
 pub fn image_geometry(bytes: &[u8]) -> Result<(), ContentError> {

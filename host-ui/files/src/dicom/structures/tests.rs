@@ -1,6 +1,6 @@
 //! Contours against closed forms, and outlines that give their voxels back.
 
-use super::super::write::Identity;
+use super::super::Identity;
 use super::super::{checked, images};
 use super::*;
 use nalgebra::Rotation3;
@@ -25,6 +25,15 @@ fn circle(grid: &Grid, slice: f64, middle_mm: [f64; 2], radius_mm: f64) -> Vec<V
             .place_m([mm[0] * 1e-3 / side[0], mm[1] * 1e-3 / side[1], slice])
     };
     (0..200).map(corner).collect()
+}
+
+fn written(v: &Voxels) -> Result<Vec<u8>, ContentError> {
+    write::bytes(&write::Written {
+        uid: "2.25.1",
+        identity: &Identity::new(),
+        images: &[],
+        structures: &write::of_voxels(v)?,
+    })
 }
 
 fn set(structures: Vec<(&str, Vec<Vec<Vector3<f64>>>)>) -> StructureSet {
@@ -190,7 +199,7 @@ fn voxels_that_are_outlined_and_drawn_again_are_the_same() {
         frame: grid.frame.clone(),
         names: [(1, "Prostate".to_owned()), (3, "Urethra".to_owned())].into(),
     };
-    let bytes = write::bytes(&v, &Identity::new()).unwrap();
+    let bytes = written(&v).unwrap();
     let set = StructureSet::of(&checked::read(&bytes).unwrap()).unwrap();
     assert_eq!(
         set.structures.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(),
@@ -258,7 +267,7 @@ fn missing_planes_are_bridged_and_contours_there_twice_count_once_and_both_are_r
             frame: grid.frame.clone(),
             names: [(1, "Prostate".to_owned())].into(),
         };
-        let mut object = checked::read(&write::bytes(&v, &Identity::new()).unwrap()).unwrap();
+        let mut object = checked::read(&written(&v).unwrap()).unwrap();
         let item = |c: &Vec<Vector3<f64>>| {
             let mm: Vec<f64> = c.iter().flat_map(|p| [-p.x * 1e3, -p.y * 1e3, p.z * 1e3]).collect();
             super::super::write::item([
