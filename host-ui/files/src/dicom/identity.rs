@@ -13,6 +13,24 @@ use std::path::Path;
 /// Number of bytes that distinguish a DICOM file from others.
 const START_BYTES: u64 = 160;
 
+/// Begins a comment that holds a part of an identity.
+const LINE: &str = "# dicom ";
+/// Names of the parts, in the order of `fields`.
+const KEYS: [&str; 12] = [
+    "patient_name",
+    "patient_id",
+    "birth_date",
+    "sex",
+    "study",
+    "study_date",
+    "study_time",
+    "study_id",
+    "accession_number",
+    "referring_physician",
+    "frame_of_reference",
+    "position_reference",
+];
+
 /// To whom, to which study and to which frame a file belongs; a text is empty where the file leaves it open.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identity {
@@ -91,6 +109,58 @@ impl Identity {
         let bytes = crate::bytes::whole(path, &Progress::default()).map_err(refused)?;
         let object = checked::read(&bytes).map_err(refused)?;
         Ok(Some(Self::of(&object)))
+    }
+
+    /// As comments of a table, which [`Identity::of_lines`] reads.
+    pub fn to_lines(&self) -> String {
+        let mut copy = self.clone();
+        let line = |(key, field): (&str, &mut String)| {
+            let value = field.replace(|c: char| c.is_control(), " ");
+            (!value.is_empty()).then(|| format!("{LINE}{key}: {value}\n"))
+        };
+        KEYS.into_iter().zip(copy.fields()).filter_map(line).collect()
+    }
+
+    /// Out of the comments before a table; `None` where they name no patient, study and frame.
+    pub fn of_lines(text: &str) -> Option<Self> {
+        let mut found = Self {
+            study: String::new(),
+            study_date: String::new(),
+            study_time: String::new(),
+            frame_of_reference: String::new(),
+            patient_name: String::new(),
+            patient_id: String::new(),
+            ..Self::new()
+        };
+        for line in text.lines().take_while(|line| line.starts_with('#')) {
+            let Some((key, value)) = line.strip_prefix(LINE).and_then(|l| l.split_once(": ")) else {
+                continue;
+            };
+            let field = KEYS.into_iter().zip(found.fields()).find(|(k, _)| *k == key);
+            if let Some((_, field)) = field {
+                // No value of DICOM that stands here is longer.
+                *field = value.trim().chars().filter(|c| !c.is_control()).take(64).collect();
+            }
+        }
+        let is_uid = |uid: &str| !uid.is_empty() && uid.chars().all(|c| c.is_ascii_digit() || c == '.');
+        (is_uid(&found.study) && is_uid(&found.frame_of_reference)).then_some(found)
+    }
+
+    fn fields(&mut self) -> [&mut String; 12] {
+        [
+            &mut self.patient_name,
+            &mut self.patient_id,
+            &mut self.birth_date,
+            &mut self.sex,
+            &mut self.study,
+            &mut self.study_date,
+            &mut self.study_time,
+            &mut self.study_id,
+            &mut self.accession_number,
+            &mut self.referring_physician,
+            &mut self.frame_of_reference,
+            &mut self.position_reference,
+        ]
     }
 
     /// Why files of both cannot be parts of one study: another patient, or places in another frame.

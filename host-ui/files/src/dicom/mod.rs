@@ -15,6 +15,11 @@ pub use checked::{Object, is_dicom, read};
 pub use identity::Identity;
 pub use write::new_uid;
 
+/// SOP class of an RT Dose.
+pub const RT_DOSE: &str = dicom_dictionary_std::uids::RT_DOSE_STORAGE;
+/// SOP class of an RT Plan.
+pub const RT_PLAN: &str = dicom_dictionary_std::uids::RT_PLAN_STORAGE;
+
 /// The frame of an image series out of one of its files twice, one slice apart; for checking the reader by itself.
 pub fn image_geometry(bytes: &[u8]) -> Result<(), ContentError> {
     let Some(read) = images::slice(bytes) else {
