@@ -6,3 +6,5 @@ mod corpus;
 mod dicom;
 #[cfg(test)]
 mod labels;
+#[cfg(test)]
+mod study;
