@@ -188,6 +188,8 @@ fn dose_at_points_and_over_a_time_comes_as_csv() {
     );
     let points = write("points.csv", "x_mm,y_mm,z_mm\n11,2,3\n");
     let dose = |more: &[&str]| {
+        // Results are not added to those of before.
+        let _ = std::fs::remove_dir_all(folder.join("out"));
         let files = [
             ("--source", source()),
             ("--seeds", seeds.clone()),
@@ -367,6 +369,64 @@ fn what_is_wrong_is_reported_once_with_its_file_and_line() {
     assert!(went_well, "{said}");
     let grid = std::fs::read_to_string(folder.join("out/dose_grid.csv")).expect("written");
     assert_eq!(grid.lines().count(), 1 + 9 * 9 * 9);
+}
+
+/// Results were written beside those of another plan, and none of them named what it was made from.
+#[test]
+fn results_go_into_a_folder_of_their_own_and_name_their_inputs() {
+    let folder = scratch("dose-provenance");
+    let seeds = folder.join("seeds.csv");
+    std::fs::write(&seeds, "x_mm,y_mm,z_mm,strength_u\n0,0,0,0.5\n").expect("written");
+    let files = [("--source", source()), ("--seeds", seeds), ("--out", folder.join("out"))];
+    let ended = run(&mut host(&["dose", "--spacing-mm", "5"], &files));
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    let made = json(&folder.join("out/made.json"));
+    assert_eq!(made["inputs"][1]["option"], "--seeds");
+    let digest = Command::new("sha256sum").arg(folder.join("seeds.csv")).output();
+    let digest = String::from_utf8_lossy(&digest.expect("sha256sum runs").stdout).into_owned();
+    let found = made["inputs"][1]["sha256"].as_str().expect("a digest");
+    assert!(digest.starts_with(found) && found.len() == 64, "{digest} and {found}");
+    assert!(made["version"].is_string() && made["made_at"].is_string(), "{made:#}");
+    let before = std::fs::read(folder.join("out/dose_grid.csv")).expect("written");
+    let ended = run(&mut host(&["dose", "--spacing-mm", "4"], &files));
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(!ended.status.success() && said.contains("holds 2 files already"), "{said}");
+    assert_eq!(std::fs::read(folder.join("out/dose_grid.csv")).expect("still there"), before);
+}
+
+/// Seeds beside the target and on one spot, and a source of HDR counted for ever, gave figures without a word.
+#[test]
+fn seeds_that_lie_oddly_are_reported_and_a_temporary_source_needs_its_time() {
+    let case = case("dose-odd");
+    let seeds = case.folder.join("odd.csv");
+    std::fs::write(
+        &seeds,
+        "x_mm,y_mm,z_mm,strength_u\n0,0,40,0.5\n0,0,40,0.5\n300,0,40,0.5\n",
+    )
+    .expect("written");
+    let structures = case.folder.join("case.nii.gz");
+    let files = |source: PathBuf, out: &str| {
+        [
+            ("--source", source),
+            ("--seeds", seeds.clone()),
+            ("--structures", structures.clone()),
+            ("--out", case.folder.join(out)),
+        ]
+    };
+    let arguments = [["dose"].as_slice(), NAMES.as_slice()].concat();
+    let ended = run(&mut host(&arguments, &files(source(), "a")));
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(ended.status.success(), "{said}");
+    assert!(said.contains("1 of its 3 seeds lie on the spot of another one"), "{said}");
+    assert!(said.contains("of its 3 seeds lie outside Prostate, the farthest by 2"), "{said}");
+    let text = std::fs::read_to_string(source()).expect("a source");
+    let temporary = case.folder.join("ir192.toml");
+    std::fs::write(&temporary, text.replace("I-125", "Ir-192")).expect("written");
+    let ended = run(&mut host(&arguments, &files(temporary.clone(), "b")));
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(!ended.status.success() && said.contains("give the time that they stay with --to-days"), "{said}");
+    let ended = run(&mut host(&[&arguments, ["--to-days", "2"].as_slice()].concat(), &files(temporary, "c")));
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
 }
 
 /// It used to panic: `host-ui scene check FILE | head -1`.
