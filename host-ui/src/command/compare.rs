@@ -61,7 +61,10 @@ impl CompareArgs {
         let found = difference(&one, &other, self.threshold / 100.0 * of_gy)
             .ok_or("the two doses have no voxel in common; are they of one frame of reference?")?;
         let percent = |gy: f64| gy / of_gy * 100.0;
-        println!("{} voxels compared, {} outside of the second dose", found.compared, found.outside);
+        println!(
+            "{} voxels compared, {} outside of the second dose",
+            found.compared, found.outside
+        );
         for (name, gy) in [
             ("mean", found.mean_gy),
             ("root mean square", found.root_mean_square_gy),

@@ -222,7 +222,10 @@ impl ConvertArgs {
             let hole = seed.hole.replace([',', '"', '\n', '\r'], " ");
             let day = seed.strength_on.map_or_else(String::new, |day| day.to_string());
             let day = if is_dated { day + "," } else { day };
-            out.push_str(&format!("{x},{y},{z},{axis},{},{day}{needle},{hole}\n", seed.strength_u));
+            out.push_str(&format!(
+                "{x},{y},{z},{axis},{},{day}{needle},{hole}\n",
+                seed.strength_u
+            ));
         }
         write_whole(&self.to, out.as_bytes())?;
         self.written()

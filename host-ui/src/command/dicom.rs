@@ -167,7 +167,12 @@ impl DicomArgs {
             let identity = identity.ok_or_else(|| format!("{}: it is no DICOM file", like.display()))?;
             all.push((like.clone(), identity));
         }
-        all.extend(drawn.identity.clone().map(|identity| (self.structures.clone(), identity)));
+        all.extend(
+            drawn
+                .identity
+                .clone()
+                .map(|identity| (self.structures.clone(), identity)),
+        );
         all.extend(loaded.identity.clone().map(|identity| (self.seeds.clone(), identity)));
         if let Some(image) = drawn.images.first() {
             let folder = self.images.clone().unwrap_or_else(|| self.structures.clone());

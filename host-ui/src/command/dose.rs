@@ -112,7 +112,10 @@ impl DoseArgs {
             .transpose()?;
         new_folder(&c.out)?;
         let judged = judge.map(|judge| {
-            let task = LongTask::new(judge.points(), &format!("points have their dose of {} seeds", seeds.len()));
+            let task = LongTask::new(
+                judge.points(),
+                &format!("points have their dose of {} seeds", seeds.len()),
+            );
             let verdict = judge.judge_reporting(kernel, seeds, &|done| task.advance(done));
             (judge, verdict)
         });

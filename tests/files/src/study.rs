@@ -115,13 +115,7 @@ print(json.dumps({"same": [str(given[k].value) == str(plan[k].value) for k in ke
     );
     // What is written is read again: plan and dose, the dose as it was computed.
     let again = scratch("study-again").join("dose.json");
-    let (done, said) = host_ui(&[
-        Path::new("compare"),
-        &files[2],
-        &files[2],
-        Path::new("--json"),
-        &again,
-    ]);
+    let (done, said) = host_ui(&[Path::new("compare"), &files[2], &files[2], Path::new("--json"), &again]);
     assert!(done && said.contains("0.000000 Gy"), "{said}");
 }
 
@@ -159,10 +153,7 @@ print(json.dumps({"tried": tried, "unseen": unseen}))
     // Needed for characters beyond ASCII alone, or for sources of beta rays; each may be there otherwise.
     let optional = ["SpecificCharacterSet", "SourceStrengthUnits"];
     let unseen: Vec<_> = found["unseen"].as_array().expect("a list").iter().collect();
-    assert!(
-        unseen.iter().all(|key| optional.iter().any(|o| key == o)),
-        "{unseen:?}"
-    );
+    assert!(unseen.iter().all(|key| optional.iter().any(|o| key == o)), "{unseen:?}");
     // A reference that leads nowhere.
     let broken = scratch("study-broken").join("dose.dcm");
     let text = r#"
@@ -171,7 +162,10 @@ ds = pydicom.dcmread(sys.argv[1]); ds.ReferencedRTPlanSequence[0].ReferencedSOPI
 "#;
     script(text, &[&files[2], &broken]);
     let (done, found) = check(&[files[0].clone(), files[1].clone(), broken], &[]);
-    assert!(!done && found["wrong"].as_array().is_some_and(|w| w.len() == 1), "{found:#}");
+    assert!(
+        !done && found["wrong"].as_array().is_some_and(|w| w.len() == 1),
+        "{found:#}"
+    );
 }
 
 /// `convert` made a new patient, study and frame for every file.
@@ -213,7 +207,10 @@ ds = pydicom.dcmread(sys.argv[1]); ds.PatientID = "P7"; ds.save_as(sys.argv[2]);
         Path::new("--out"),
         &out,
     ]);
-    assert!(!done && said.contains("it is of patient \"P7\" and not of \"P6\""), "{said}");
+    assert!(
+        !done && said.contains("it is of patient \"P7\" and not of \"P6\""),
+        "{said}"
+    );
     assert!(!out.exists(), "nothing is written");
 }
 
@@ -259,7 +256,10 @@ def seeds(f):
 names = lambda f: [str(r.ROIName) for r in f.StructureSetROISequence if r.ROIName != "Isocentre"]
 print(json.dumps({"same": same, "seeds": [seeds(f) for f in files[:3]], "names": [names(f) for f in files[3:]]}))
 "#;
-    let found = script(text, &[&given, &plan, &copy, &data("dicom/structures.dcm"), &set, &back]);
+    let found = script(
+        text,
+        &[&given, &plan, &copy, &data("dicom/structures.dcm"), &set, &back],
+    );
     assert_eq!(found["same"], serde_json::json!([true, true, true, true, true, true]));
     for copy in [1, 2] {
         assert_eq!(found["seeds"][copy], found["seeds"][0]);
@@ -321,10 +321,21 @@ print("{}")
         let plan = data("dicom/plan_pairs.dcm");
         let (done, said) = host_ui(&[Path::new("convert"), &to, &again, Path::new("--plan"), &plan]);
         assert!(done, "{said}");
-        let (done, said) = host_ui(&[Path::new("compare"), &from, &again, Path::new("--threshold"), Path::new("0")]);
+        let (done, said) = host_ui(&[
+            Path::new("compare"),
+            &from,
+            &again,
+            Path::new("--threshold"),
+            Path::new("0"),
+        ]);
         assert!(done && said.contains("60 voxels compared, 0 outside"), "{said}");
         let largest = said.lines().find(|l| l.starts_with("largest")).expect("a line");
-        let gy: f64 = largest.split_whitespace().nth(1).expect("a number").parse().expect("a number");
+        let gy: f64 = largest
+            .split_whitespace()
+            .nth(1)
+            .expect("a number")
+            .parse()
+            .expect("a number");
         assert!(gy.abs() < 1e-6, "{said}");
     }
 }

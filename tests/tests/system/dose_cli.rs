@@ -377,7 +377,11 @@ fn results_go_into_a_folder_of_their_own_and_name_their_inputs() {
     let folder = scratch("dose-provenance");
     let seeds = folder.join("seeds.csv");
     std::fs::write(&seeds, "x_mm,y_mm,z_mm,strength_u\n0,0,0,0.5\n").expect("written");
-    let files = [("--source", source()), ("--seeds", seeds), ("--out", folder.join("out"))];
+    let files = [
+        ("--source", source()),
+        ("--seeds", seeds),
+        ("--out", folder.join("out")),
+    ];
     let ended = run(&mut host(&["dose", "--spacing-mm", "5"], &files));
     assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
     let made = json(&folder.join("out/made.json"));
@@ -390,8 +394,14 @@ fn results_go_into_a_folder_of_their_own_and_name_their_inputs() {
     let before = std::fs::read(folder.join("out/dose_grid.csv")).expect("written");
     let ended = run(&mut host(&["dose", "--spacing-mm", "4"], &files));
     let said = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert!(!ended.status.success() && said.contains("holds 2 files already"), "{said}");
-    assert_eq!(std::fs::read(folder.join("out/dose_grid.csv")).expect("still there"), before);
+    assert!(
+        !ended.status.success() && said.contains("holds 2 files already"),
+        "{said}"
+    );
+    assert_eq!(
+        std::fs::read(folder.join("out/dose_grid.csv")).expect("still there"),
+        before
+    );
 }
 
 /// Seeds beside the target and on one spot, and a source of HDR counted for ever, gave figures without a word.
@@ -417,15 +427,27 @@ fn seeds_that_lie_oddly_are_reported_and_a_temporary_source_needs_its_time() {
     let ended = run(&mut host(&arguments, &files(source(), "a")));
     let said = String::from_utf8_lossy(&ended.stderr).into_owned();
     assert!(ended.status.success(), "{said}");
-    assert!(said.contains("1 of its 3 seeds lie on the spot of another one"), "{said}");
-    assert!(said.contains("of its 3 seeds lie outside Prostate, the farthest by 2"), "{said}");
+    assert!(
+        said.contains("1 of its 3 seeds lie on the spot of another one"),
+        "{said}"
+    );
+    assert!(
+        said.contains("of its 3 seeds lie outside Prostate, the farthest by 2"),
+        "{said}"
+    );
     let text = std::fs::read_to_string(source()).expect("a source");
     let temporary = case.folder.join("ir192.toml");
     std::fs::write(&temporary, text.replace("I-125", "Ir-192")).expect("written");
     let ended = run(&mut host(&arguments, &files(temporary.clone(), "b")));
     let said = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert!(!ended.status.success() && said.contains("give the time that they stay with --to-days"), "{said}");
-    let ended = run(&mut host(&[&arguments, ["--to-days", "2"].as_slice()].concat(), &files(temporary, "c")));
+    assert!(
+        !ended.status.success() && said.contains("give the time that they stay with --to-days"),
+        "{said}"
+    );
+    let ended = run(&mut host(
+        &[&arguments, ["--to-days", "2"].as_slice()].concat(),
+        &files(temporary, "c"),
+    ));
     assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
 }
 

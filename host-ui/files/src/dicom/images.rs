@@ -3,8 +3,8 @@
 use super::super::element::voxel_count;
 use super::super::frame::VoxelFrame;
 use super::super::{Progress, bytes};
-use super::{Identity, checked};
 use super::values::{exactly, needed, text};
+use super::{Identity, checked};
 use crate::error::ContentError;
 use dicom_dictionary_std::tags;
 use nalgebra::{Matrix3, Vector3};
@@ -102,7 +102,9 @@ pub fn all_in(folder: &Path) -> Result<Vec<Slice>, ContentError> {
 
 /// The slices in a folder that belong to a series or are named one by one.
 pub fn find(folder: &Path, series: &[String], named: &[String]) -> Result<Vec<Slice>, ContentError> {
-    slices_of(folder, |slice| series.contains(&slice.series) || named.contains(&slice.uid))
+    slices_of(folder, |slice| {
+        series.contains(&slice.series) || named.contains(&slice.uid)
+    })
 }
 
 fn slices_of(folder: &Path, wanted: impl Fn(&Slice) -> bool) -> Result<Vec<Slice>, ContentError> {

@@ -58,7 +58,9 @@ impl DoseFile {
         let [nx, ny, _] = self.dims;
         let corner = |n: usize| {
             let up = [n & 1, n >> 1 & 1, n >> 2];
-            let weight: f64 = (0..3).map(|a| if up[a] == 1 { share[a] } else { 1.0 - share[a] }).product();
+            let weight: f64 = (0..3)
+                .map(|a| if up[a] == 1 { share[a] } else { 1.0 - share[a] })
+                .product();
             if weight == 0.0 {
                 return 0.0;
             }

@@ -96,7 +96,10 @@ mod tests {
     fn seeds_on_one_spot_are_reported_with_their_number() {
         assert_eq!(on_one_spot(&seeds(&[[0.0; 3], [0.0, 0.0, 5.0]])), None);
         let note = on_one_spot(&seeds(&[[0.0; 3], [0.0, 0.0, 5.0], [0.1, 0.0, 0.0]])).unwrap();
-        assert!(note.contains("1 of its 3 seeds") && note.contains("are 1 and 3, 0.10 mm apart"), "{note}");
+        assert!(
+            note.contains("1 of its 3 seeds") && note.contains("are 1 and 3, 0.10 mm apart"),
+            "{note}"
+        );
         let many: Vec<[f64; 3]> = (0..6000).map(|n| [f64::from(n / 2 * 2), 0.0, 0.0]).collect();
         assert!(on_one_spot(&seeds(&many)).unwrap().contains("3000 of its 6000 seeds"));
     }
@@ -107,6 +110,9 @@ mod tests {
         let target = Structure::of_box("Prostate", [0.0; 3], [0.02; 3], 0.5e-3);
         assert_eq!(outside(&seeds(&[[10.0; 3], [20.5, 10.0, 10.0]]), &target), None);
         let note = outside(&seeds(&[[10.0; 3], [30.0, 10.0, 10.0], [10.0, 24.0, 10.0]]), &target).unwrap();
-        assert!(note.starts_with("2 of its 3 seeds lie outside Prostate, the farthest by 10."), "{note}");
+        assert!(
+            note.starts_with("2 of its 3 seeds lie outside Prostate, the farthest by 10."),
+            "{note}"
+        );
     }
 }

@@ -4,8 +4,8 @@ use super::declared::Declared;
 use super::table::{self, LineError, PLACE, Row, shown};
 use std::path::Path;
 use stylet_dose::Seed;
-use stylet_files::dicom::{self, Identity};
 use stylet_files::dicom::plan::{Date, PlanSeed, SeedPlan};
+use stylet_files::dicom::{self, Identity};
 use stylet_files::{FileError, bytes};
 
 const MAX_U: f64 = 1e5;

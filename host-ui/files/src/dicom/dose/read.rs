@@ -122,9 +122,7 @@ impl Layout {
             let aside = ras.norm_squared() - ras[axis] * ras[axis];
             // NaN compares false.
             if !(aside.max(0.0).sqrt() <= OBLIQUE * ras.norm() && ras.norm() > 1e-6) {
-                return Err(
-                    "its grid lies obliquely in the patient; export it along the patient's axes".into(),
-                );
+                return Err("its grid lies obliquely in the patient; export it along the patient's axes".into());
             }
             (axes[n], steps_m[n]) = (axis, ras[axis]);
         }
@@ -174,9 +172,8 @@ impl Layout {
         let strides = [1, self.counts[0], self.counts[0] * self.counts[1]];
         let (strides, is_turned) = (self.turned(strides), self.turned(self.steps_m.map(|s| s < 0.0)));
         let [nx, ny, nz] = self.dims();
-        let at = move |axis: usize, count: usize, i: usize| {
-            strides[axis] * if is_turned[axis] { count - 1 - i } else { i }
-        };
+        let at =
+            move |axis: usize, count: usize, i: usize| strides[axis] * if is_turned[axis] { count - 1 - i } else { i };
         (0..nx * ny * nz).map(move |n| raw[at(0, nx, n % nx) + at(1, ny, n / nx % ny) + at(2, nz, n / nx / ny)])
     }
 }

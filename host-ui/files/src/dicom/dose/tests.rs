@@ -48,7 +48,10 @@ fn a_dose_read_back_equals_what_was_written() {
     let highest = dose_gy.iter().copied().fold(0.0, f64::max);
     for (read, written) in found.dose_gy.iter().zip(&dose_gy) {
         // Half a step of 32 bits.
-        assert!((read - written).abs() <= highest / f64::from(u32::MAX) * 0.51, "{read} and {written}");
+        assert!(
+            (read - written).abs() <= highest / f64::from(u32::MAX) * 0.51,
+            "{read} and {written}"
+        );
     }
     // Cut off in the pixels.
     let mut short = std::fs::read(&path).unwrap();

@@ -89,10 +89,7 @@ pub fn bytes(set: &Written) -> Result<Vec<u8>, ContentError> {
     object.put(string(tags::STRUCTURE_SET_LABEL, VR::SH, "Stylet"));
     object.put(string(tags::STRUCTURE_SET_DATE, VR::DA, &date));
     object.put(string(tags::STRUCTURE_SET_TIME, VR::TM, &time));
-    object.put(sequence(
-        tags::REFERENCED_FRAME_OF_REFERENCE_SEQUENCE,
-        vec![frame(set)],
-    ));
+    object.put(sequence(tags::REFERENCED_FRAME_OF_REFERENCE_SEQUENCE, vec![frame(set)]));
     let roi = |(structure, number): (&Outlined, usize)| {
         item([
             whole(tags::ROI_NUMBER, number),
