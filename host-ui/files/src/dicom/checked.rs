@@ -13,22 +13,8 @@ const MAX_ELEMENTS: usize = 1 << 20;
 const MAX_VALUES: usize = 8 << 20;
 /// Retired, but there are files in it.
 const EXPLICIT_VR_BIG_ENDIAN: &str = "1.2.840.10008.1.2.2";
-/// Kinds whose length has four bytes.
-const LONG: [VR; 13] = [
-    VR::OB,
-    VR::OD,
-    VR::OF,
-    VR::OL,
-    VR::OV,
-    VR::OW,
-    VR::SQ,
-    VR::SV,
-    VR::UC,
-    VR::UN,
-    VR::UR,
-    VR::UT,
-    VR::UV,
-];
+/// Kinds whose length has two bytes; all others have four.
+const SHORT: &str = "AE AS AT CS DA DS DT FD FL IS LO LT PN SH SL SS ST TM UI UL US";
 const UNDEFINED: u32 = u32::MAX;
 const ITEM: Tag = Tag(0xfffe, 0xe000);
 const ITEM_END: Tag = Tag(0xfffe, 0xe00d);
@@ -392,7 +378,7 @@ impl<'a> Walk<'a> {
                 String::from_utf8_lossy(&code)
             )
         })?;
-        let length = if LONG.contains(&vr) {
+        let length = if !SHORT.contains(vr.to_string()) {
             self.u16()?;
             self.u32()?
         } else {
