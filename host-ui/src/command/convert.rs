@@ -29,7 +29,7 @@ What is converted into what:
   dose           .csv (dose_grid.csv of host-ui dose) into .dcm (RT Dose; needs --plan) or .nrrd;
                  .dcm (RT Dose) into .csv, .nrrd or .dcm
 
-Patient, study and frame of reference of a DICOM file are kept, and a table of seeds keeps them in its first lines. Formats that have
+Patient, study and frame of reference of a DICOM file are kept, and a table of seeds keeps them in columns. Formats that have
 no place for them lose them: give --like FILE, a DICOM file of the same patient, when you come back to DICOM. Files that belong
 together (structure set, plan and dose of one study) are written by host-ui dicom.
 
@@ -209,10 +209,15 @@ impl ConvertArgs {
 
     fn seeds_to_csv(&self) -> Result<(), CommandError> {
         let file = self.read_seeds(self.source()?.as_ref())?;
-        let mut out = file.identity.as_ref().map_or_else(String::new, Identity::to_lines);
+        let identity = file.identity.as_ref().map(Identity::to_columns).unwrap_or_default();
+        let (mut names, mut values) = (String::new(), String::new());
+        for (column, value) in identity {
+            names += &format!(",{column}");
+            values += &format!(",\"{}\"", value.replace('"', "\"\""));
+        }
         let is_dated = file.rows.iter().any(|row| row.strength_on.is_some());
         let dated = if is_dated { "strength_date," } else { "" };
-        out += &format!("x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,{dated}needle,hole\n");
+        let mut out = format!("x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,{dated}needle,hole{names}\n");
         for row in file.rows {
             let seed = plan_seed(row);
             let [x, y, z] = seed.position_m.map(|v| v * 1e3);
@@ -223,7 +228,7 @@ impl ConvertArgs {
             let day = seed.strength_on.map_or_else(String::new, |day| day.to_string());
             let day = if is_dated { day + "," } else { day };
             out.push_str(&format!(
-                "{x},{y},{z},{axis},{},{day}{needle},{hole}\n",
+                "{x},{y},{z},{axis},{},{day}{needle},{hole}{values}\n",
                 seed.strength_u
             ));
         }

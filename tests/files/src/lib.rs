@@ -7,4 +7,6 @@ mod dicom;
 #[cfg(test)]
 mod labels;
 #[cfg(test)]
+mod results;
+#[cfg(test)]
 mod study;

@@ -13,22 +13,20 @@ use std::path::Path;
 /// Number of bytes that distinguish a DICOM file from others.
 const START_BYTES: u64 = 160;
 
-/// Begins a comment that holds a part of an identity.
-const LINE: &str = "# dicom ";
-/// Names of the parts, in the order of `fields`.
-const KEYS: [&str; 12] = [
-    "patient_name",
-    "patient_id",
-    "birth_date",
-    "sex",
-    "study",
-    "study_date",
-    "study_time",
-    "study_id",
-    "accession_number",
-    "referring_physician",
-    "frame_of_reference",
-    "position_reference",
+/// Names of the parts in a table, in the order of `fields`.
+pub const COLUMNS: [&str; 12] = [
+    "dicom_patient_name",
+    "dicom_patient_id",
+    "dicom_birth_date",
+    "dicom_sex",
+    "dicom_study",
+    "dicom_study_date",
+    "dicom_study_time",
+    "dicom_study_id",
+    "dicom_accession_number",
+    "dicom_referring_physician",
+    "dicom_frame_of_reference",
+    "dicom_position_reference",
 ];
 
 /// To whom, to which study and to which frame a file belongs; a text is empty where the file leaves it open.
@@ -111,36 +109,21 @@ impl Identity {
         Ok(Some(Self::of(&object)))
     }
 
-    /// As comments of a table, which [`Identity::of_lines`] reads.
-    pub fn to_lines(&self) -> String {
+    /// As columns of a table, which [`Identity::of_columns`] reads; those without a value are left out.
+    pub fn to_columns(&self) -> Vec<(&'static str, String)> {
         let mut copy = self.clone();
-        let line = |(key, field): (&str, &mut String)| {
-            let value = field.replace(|c: char| c.is_control(), " ");
-            (!value.is_empty()).then(|| format!("{LINE}{key}: {value}\n"))
-        };
-        KEYS.into_iter().zip(copy.fields()).filter_map(line).collect()
+        let columns = COLUMNS.into_iter().zip(copy.fields());
+        let filled = columns.filter(|(_, field)| !field.is_empty());
+        filled.map(|(column, field)| (column, field.clone())).collect()
     }
 
-    /// Out of the comments before a table; `None` where they name no patient, study and frame.
-    pub fn of_lines(text: &str) -> Option<Self> {
-        let mut found = Self {
-            study: String::new(),
-            study_date: String::new(),
-            study_time: String::new(),
-            frame_of_reference: String::new(),
-            patient_name: String::new(),
-            patient_id: String::new(),
-            ..Self::new()
-        };
-        for line in text.lines().take_while(|line| line.starts_with('#')) {
-            let Some((key, value)) = line.strip_prefix(LINE).and_then(|l| l.split_once(": ")) else {
-                continue;
-            };
-            let field = KEYS.into_iter().zip(found.fields()).find(|(k, _)| *k == key);
-            if let Some((_, field)) = field {
-                // No value of DICOM that stands here is longer.
-                *field = value.trim().chars().filter(|c| !c.is_control()).take(64).collect();
-            }
+    /// Out of one row of a table; `None` where it names no study and no frame.
+    pub fn of_columns<'a>(value: impl Fn(&str) -> Option<&'a str>) -> Option<Self> {
+        let mut found = Self::new();
+        for (column, field) in COLUMNS.into_iter().zip(found.fields()) {
+            // No value of DICOM that stands here is longer.
+            let text = value(column).unwrap_or_default().chars();
+            *field = text.filter(|c| !c.is_control()).take(64).collect();
         }
         let is_uid = |uid: &str| !uid.is_empty() && uid.chars().all(|c| c.is_ascii_digit() || c == '.');
         (is_uid(&found.study) && is_uid(&found.frame_of_reference)).then_some(found)

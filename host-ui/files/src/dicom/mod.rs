@@ -12,7 +12,7 @@ mod values;
 mod write;
 
 pub use checked::{Object, is_dicom, read};
-pub use identity::Identity;
+pub use identity::{COLUMNS, Identity};
 pub use write::new_uid;
 
 /// SOP class of an RT Dose.

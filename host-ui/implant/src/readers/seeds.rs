@@ -2,6 +2,7 @@
 
 use super::declared::Declared;
 use super::table::{self, LineError, PLACE, Row, shown};
+use std::cell::OnceCell;
 use std::path::Path;
 use stylet_dose::Seed;
 use stylet_files::dicom::plan::{Date, PlanSeed, SeedPlan};
@@ -12,8 +13,6 @@ const MAX_U: f64 = 1e5;
 const AXIS: [&str; 3] = ["axis_x", "axis_y", "axis_z"];
 /// Number of bytes that distinguish a DICOM file from a table.
 const START_BYTES: u64 = 160;
-/// Comments before a table that may name the patient.
-const IDENTITY_BYTES: u64 = 4096;
 
 /// What is assumed of seeds whose file does not say it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -55,6 +54,7 @@ pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<Vec<Seed>, File
 }
 
 /// Seeds of a file with the columns `x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u|activity_mci][,strength_date][,needle][,hole]`,
+/// and those of [`dicom::COLUMNS`],
 /// or those of a DICOM RT Plan, which gives their strength itself.
 pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, FileError> {
     let is_plan = bytes::start(path, START_BYTES).is_some_and(|start| dicom::is_dicom(&start));
@@ -65,9 +65,13 @@ pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, F
         PLACE.as_slice(),
         &AXIS,
         &["strength_u", "activity_mci", "strength_date", "needle", "hole"],
+        &dicom::COLUMNS,
     ]
     .concat();
+    // Of the first row; all are of one patient.
+    let identity = OnceCell::new();
     let row = |row: &Row| {
+        identity.get_or_init(|| Identity::of_columns(|column| row.text(column)));
         Ok(SeedRow {
             seed: Seed {
                 position_m: row.position_m()?,
@@ -80,11 +84,10 @@ pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, F
         })
     };
     let rows = table::read(path, &known, row)?;
-    let start = bytes::start(path, IDENTITY_BYTES).unwrap_or_default();
     Ok(SeedFile {
         rows,
         declared: None,
-        identity: Identity::of_lines(&String::from_utf8_lossy(&start)),
+        identity: identity.into_inner().flatten(),
     })
 }
 
