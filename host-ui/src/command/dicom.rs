@@ -80,9 +80,14 @@ impl DicomArgs {
         let covered = bounds_m(&drawn.structures);
         let dose = grid(&loaded.seeds, &loaded.kernel, self.spacing_mm * 1e-3, covered)?;
         let number = |name: &str| drawn.structures.iter().position(|s| s.name == name).map(|n| n + 1);
-        let named: Vec<(&str, &Dvh)> = judge.names().zip(&verdict.dvhs).collect();
-        let histograms = named.iter().filter_map(|(name, dvh)| Some((number(name)?, *dvh)));
-        let histograms: Vec<(usize, &Dvh)> = histograms.collect();
+        // Structures may have one name: the first histogram of it is that of the first.
+        let mut left: Vec<(usize, &str)> = (1..).zip(drawn.structures.iter().map(|s| s.name.as_str())).collect();
+        let mut histograms: Vec<(usize, &Dvh)> = Vec::new();
+        for (name, dvh) in judge.names().zip(&verdict.dvhs) {
+            if let Some(at) = left.iter().position(|(_, of)| *of == name) {
+                histograms.push((left.remove(at).0, dvh));
+            }
+        }
         let plan = plan(&loaded, &identity, prescription_gy);
         let seeds_in_plan = plan.seeds.len();
         let target = number(judge.target_name());

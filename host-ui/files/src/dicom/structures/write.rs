@@ -94,7 +94,11 @@ pub fn bytes(set: &Written) -> Result<Vec<u8>, ContentError> {
         item([
             whole(tags::ROI_NUMBER, number),
             string(tags::REFERENCED_FRAME_OF_REFERENCE_UID, VR::UI, &of.frame_of_reference),
-            string(tags::ROI_NAME, VR::LO, &structure.name),
+            string(
+                tags::ROI_NAME,
+                VR::LO,
+                &structure.name.chars().take(64).collect::<String>(),
+            ),
             string(tags::ROI_GENERATION_ALGORITHM, VR::CS, ""),
         ])
     };
