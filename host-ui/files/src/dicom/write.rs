@@ -105,9 +105,19 @@ pub fn now() -> (String, String) {
     (of("%Y%m%d"), of("%H%M%S"))
 }
 
+/// The whole file, each element with its kind.
 pub fn bytes(object: InMemDicomObject) -> Result<Vec<u8>, ContentError> {
+    bytes_in(uids::EXPLICIT_VR_LITTLE_ENDIAN, object)
+}
+
+/// As [`bytes`], without the kinds: then lists of numbers may be longer than 64 KiB.
+pub fn implicit_bytes(object: InMemDicomObject) -> Result<Vec<u8>, ContentError> {
+    bytes_in(uids::IMPLICIT_VR_LITTLE_ENDIAN, object)
+}
+
+fn bytes_in(syntax: &str, object: InMemDicomObject) -> Result<Vec<u8>, ContentError> {
     let meta = FileMetaTableBuilder::new()
-        .transfer_syntax(uids::EXPLICIT_VR_LITTLE_ENDIAN)
+        .transfer_syntax(syntax)
         .implementation_class_uid(IMPLEMENTATION)
         .implementation_version_name("STYLET");
     let file = object

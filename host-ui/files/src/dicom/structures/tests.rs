@@ -309,3 +309,20 @@ fn missing_planes_are_bridged_and_contours_there_twice_count_once_and_both_are_r
     let even = (2..30).map(f64::from).map(|k| drawn(&k)).collect();
     assert_eq!(volumes(even).1, "");
 }
+
+/// An outline of more than some 1,300 corners could not be written at all.
+#[test]
+fn an_outline_of_many_corners_is_written_and_read() {
+    let grid = grid([1500, 3, 2], [0.1, 0.1, 1.0]);
+    // A comb: every second column is longer.
+    let inside = |n: usize| n / 1500 % 3 == 0 || (n / 1500 % 3 == 1 && n % 2 == 0);
+    let v = Voxels {
+        dims: grid.dims,
+        labels: (0..1500 * 3 * 2).map(|n| u8::from(inside(n))).collect(),
+        frame: grid.frame.clone(),
+        names: [(1, "Prostate".to_owned())].into(),
+    };
+    let set = StructureSet::of(&checked::read(&written(&v).unwrap()).unwrap()).unwrap();
+    assert!(set.structures[0].contours[0].len() > 2900);
+    assert_eq!(set.voxels(Some(grid)).unwrap().labels, v.labels);
+}

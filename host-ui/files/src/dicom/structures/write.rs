@@ -3,6 +3,7 @@
 use super::super::super::volume::Voxels;
 use super::super::Identity;
 use super::super::images::Slice;
+use super::super::write::{bytes as file_bytes, implicit_bytes};
 use super::super::write::{common, decimals, item, now, reference, sequence, string, whole};
 use super::{StructureSet, nested, outline};
 use crate::error::ContentError;
@@ -16,6 +17,9 @@ use stylet_anatomy::{Organ, ras_from_lps};
 
 /// Class of a study in references to it; retired for all else.
 const STUDY_CLASS: &str = "1.2.840.10008.3.1.2.3.1";
+
+/// Three numbers of 16 characters for each corner then fit into 64 KiB.
+const MOST_CORNERS: usize = 65_534 / (3 * 17);
 
 /// Distinct on a dark background.
 const COLOURS: [[u8; 3]; 8] = [
@@ -136,7 +140,11 @@ pub fn bytes(set: &Written) -> Result<Vec<u8>, ContentError> {
         numbered().map(observed).collect(),
     ));
     object.put(string(tags::APPROVAL_STATUS, VR::CS, "UNAPPROVED"));
-    super::super::write::bytes(object)
+    let contours = set.structures.iter().flat_map(|s| &s.contours);
+    match contours.into_iter().any(|c| c.len() > MOST_CORNERS) {
+        true => implicit_bytes(object),
+        false => file_bytes(object),
+    }
 }
 
 /// The frame of reference, and the study and the series of the images in it.
