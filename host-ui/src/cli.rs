@@ -2,7 +2,9 @@
 
 use crate::app;
 use crate::command::CommandError;
+use crate::command::compare::CompareArgs;
 use crate::command::convert::ConvertArgs;
+use crate::command::dicom::DicomArgs;
 use crate::command::dose::{DoseArgs, PerturbArgs};
 use crate::command::plan::PlanArgs;
 use clap::{Parser, Subcommand};
@@ -114,10 +116,14 @@ enum Task {
     Scene(SceneTask),
     /// Label volumes, seed plans and doses from one format to another, DICOM among them
     Convert(ConvertArgs),
+    /// Structure set, plan and dose of one study as DICOM files that name each other
+    Dicom(Box<DicomArgs>),
     /// Make a plan for the scene that runs: needles through the template, seeds, their strength; or from a table of seeds
     Plan(PlanArgs),
     /// Dose of seeds (TG-43U1) at points, in structures, or on a grid
     Dose(DoseArgs),
+    /// Difference of two doses, each an RT Dose or a dose_grid.csv
+    Compare(CompareArgs),
     /// Dose of a plan under random seed errors
     Perturb(PerturbArgs),
 }
@@ -190,6 +196,8 @@ impl Cli {
                 Ok(())
             }
             Some(Task::Convert(args)) => args.run(),
+            Some(Task::Dicom(args)) => args.run(),
+            Some(Task::Compare(args)) => args.run(),
             Some(Task::Plan(args)) => args.run(),
             Some(Task::Dose(args)) => args.run(),
             Some(Task::Perturb(args)) => args.run(),

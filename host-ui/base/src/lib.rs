@@ -9,6 +9,7 @@ pub mod input;
 pub mod interrupt;
 pub mod job;
 pub mod nuclide;
+pub mod output;
 pub mod progress_bar;
 pub mod seen;
 

@@ -83,15 +83,20 @@ impl DoseGrid {
 
     /// Adds the dose of seeds.
     pub fn add(&mut self, kernel: &DoseKernel, seeds: &[Seed]) {
-        self.change(kernel, seeds, 1.0);
+        self.change(kernel, seeds, 1.0, &|_| ());
+    }
+
+    /// As [`DoseGrid::add`]; `done` is called with the number of voxels done since, from any thread.
+    pub fn add_reporting(&mut self, kernel: &DoseKernel, seeds: &[Seed], done: &(dyn Fn(u64) + Sync)) {
+        self.change(kernel, seeds, 1.0, done);
     }
 
     /// Undoes [`DoseGrid::add`] to the last bit.
     pub fn remove(&mut self, kernel: &DoseKernel, seeds: &[Seed]) {
-        self.change(kernel, seeds, -1.0);
+        self.change(kernel, seeds, -1.0, &|_| ());
     }
 
-    fn change(&mut self, kernel: &DoseKernel, seeds: &[Seed], sign: f64) {
+    fn change(&mut self, kernel: &DoseKernel, seeds: &[Seed], sign: f64, done: &(dyn Fn(u64) + Sync)) {
         // Single precision is fine enough from the middle of the grid.
         let anchor_m = self.centre_m(self.dims.map(|d| d / 2));
         let placed: Vec<Placed> = seeds.iter().map(|s| DoseKernel::place(s, anchor_m)).collect();
@@ -118,6 +123,7 @@ impl DoseGrid {
                 }
                 kernel.add(&placed, &block, sign, dose);
             }
+            done(doses.len() as u64);
         });
     }
 

@@ -46,22 +46,37 @@ impl DosePoints {
 
     fn change(&mut self, kernel: &DoseKernel, seeds: &[Seed], sign: f64) {
         let placed = self.place(seeds);
-        Self::accumulate(&self.blocks, kernel, &placed, sign, &mut self.dose_gy);
+        Self::accumulate(&self.blocks, kernel, &placed, sign, &mut self.dose_gy, &|_| ());
     }
 
-    fn accumulate(blocks: &[[[f32; BLOCK]; 3]], kernel: &DoseKernel, seeds: &[Placed], sign: f64, dose_gy: &mut [f64]) {
+    fn accumulate(
+        blocks: &[[[f32; BLOCK]; 3]],
+        kernel: &DoseKernel,
+        seeds: &[Placed],
+        sign: f64,
+        dose_gy: &mut [f64],
+        done: &(dyn Fn(u64) + Sync),
+    ) {
         dose_gy
             .par_chunks_mut(BLOCK)
             .zip(blocks)
             .with_min_len(16)
-            .for_each(|(dose, block)| kernel.add(seeds, &as_block(block), sign, dose));
+            .for_each(|(dose, block)| {
+                kernel.add(seeds, &as_block(block), sign, dose);
+                done(dose.len() as u64);
+            });
     }
 
     /// Dose of these seeds alone.
     pub fn of_seeds_gy(&self, kernel: &DoseKernel, seeds: &[Seed]) -> Vec<f64> {
+        self.of_seeds_reporting(kernel, seeds, &|_| ())
+    }
+
+    /// As [`DosePoints::of_seeds_gy`]; `done` is called with the number of points done since, from any thread.
+    pub fn of_seeds_reporting(&self, kernel: &DoseKernel, seeds: &[Seed], done: &(dyn Fn(u64) + Sync)) -> Vec<f64> {
         let placed = self.place(seeds);
         let mut dose_gy = vec![0.0; self.dose_gy.len()];
-        Self::accumulate(&self.blocks, kernel, &placed, 1.0, &mut dose_gy);
+        Self::accumulate(&self.blocks, kernel, &placed, 1.0, &mut dose_gy, done);
         dose_gy
     }
 

@@ -91,21 +91,32 @@ impl Judge {
 
     /// Evaluates one set of seeds.
     pub fn judge(&self, kernel: &DoseKernel, seeds: &[Seed]) -> Verdict {
+        self.judge_reporting(kernel, seeds, &|_| ())
+    }
+
+    /// Points that the dose is computed at.
+    pub fn points(&self) -> u64 {
+        let in_structures = self.structures.iter().map(|s| s.volumes_m3.len());
+        (in_structures.sum::<usize>() + self.around.points.dose_gy().len()) as u64
+    }
+
+    /// As [`Judge::judge`]; `done` is called with the number of points done since, from any thread.
+    pub fn judge_reporting(&self, kernel: &DoseKernel, seeds: &[Seed], done: &(dyn Fn(u64) + Sync)) -> Verdict {
         let dvhs: Vec<Dvh> = self
             .structures
             .iter()
-            .filter_map(|s| Dvh::new(&s.points.of_seeds_gy(kernel, seeds), &s.volumes_m3))
+            .filter_map(|s| Dvh::new(&s.points.of_seeds_reporting(kernel, seeds, done), &s.volumes_m3))
             .collect();
-        let fit = self.fit(&dvhs[self.target], kernel, seeds);
+        let fit = self.fit(&dvhs[self.target], kernel, seeds, done);
         Verdict { dvhs, fit }
     }
 
-    fn fit(&self, target: &Dvh, kernel: &DoseKernel, seeds: &[Seed]) -> Fit {
+    fn fit(&self, target: &Dvh, kernel: &DoseKernel, seeds: &[Seed], done: &(dyn Fn(u64) + Sync)) -> Fit {
         let (v100, v150) = (
             target.at_least_m3(self.prescription_gy),
             target.at_least_m3(1.5 * self.prescription_gy),
         );
-        let dose = self.around.points.of_seeds_gy(kernel, seeds);
+        let dose = self.around.points.of_seeds_reporting(kernel, seeds, done);
         let reached = |d: &f64| *d >= self.prescription_gy;
         let inside = !self.around.outermost.iter().any(|&i| reached(&dose[i]));
         let at_prescription_m3 =
@@ -141,6 +152,11 @@ impl Judge {
     /// Names of the structures, in the order of the histograms.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.structures.iter().map(|s| s.name.as_str())
+    }
+
+    /// Name of the structure that the prescription is for.
+    pub fn target_name(&self) -> &str {
+        &self.structures[self.target].name
     }
 
     /// The measures as JSON; doses in Gy, volumes in cm³.
@@ -214,7 +230,8 @@ impl Around {
     }
 }
 
-fn choose_target(names: &[&str], wanted: Option<&str>) -> Result<usize, DoseError> {
+/// The structure that the prescription is for: by name, or the one that is called like a target, or the first.
+pub fn choose_target(names: &[&str], wanted: Option<&str>) -> Result<usize, DoseError> {
     if let Some(wanted) = wanted {
         return names
             .iter()

@@ -5,6 +5,10 @@ use crate::error::ContentError;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use nifti::NiftiHeader;
 
+/// Orientations nearer than this at every corner are one.
+const SAME_MM: f64 = 0.1;
+
+/// Where the voxels lie, by the sform, or else the qform.
 pub fn voxel_frame(h: &NiftiHeader) -> Result<VoxelFrame, ContentError> {
     let (unit_m, unknown_unit) = match h.xyzt_units & 7 {
         1 => (1.0, false),
@@ -12,6 +16,7 @@ pub fn voxel_frame(h: &NiftiHeader) -> Result<VoxelFrame, ContentError> {
         3 => (1e-6, false),
         _ => (1e-3, true),
     };
+    let differs_mm = differs_m(h).map(|m| m * unit_m * 1e3);
     let (columns, origin, source) = if h.sform_code > 0 {
         sform(h)
     } else if h.qform_code > 0 {
@@ -29,7 +34,28 @@ pub fn voxel_frame(h: &NiftiHeader) -> Result<VoxelFrame, ContentError> {
     } else if unknown_unit {
         frame.warning = Some("the file names no unit of length; mm is assumed".to_owned());
     }
+    // NaN compares false, and is no reason to refuse what the sform says.
+    if let Some(mm) = differs_mm.filter(|mm| *mm > SAME_MM) {
+        let note = format!(
+            "its sform and its qform differ, by {mm:.2} mm at a corner of the volume; the sform counts. Is it the one of this patient?"
+        );
+        frame.warning = Some(frame.warning.map_or(note.clone(), |other| format!("{other}; {note}")));
+    }
     Ok(frame)
+}
+
+/// How far the two orientations of a file put a corner of its volume apart, in its unit; `None` where it has only one.
+fn differs_m(h: &NiftiHeader) -> Option<f64> {
+    if h.sform_code <= 0 || h.qform_code <= 0 {
+        return None;
+    }
+    let ((s, s_origin, _), (q, q_origin, _)) = (sform(h), qform(h));
+    let corner = |n: usize| {
+        let last = |a: usize| f64::from(h.dim[a + 1].max(1) - 1) * (n >> a & 1) as f64;
+        Vector3::new(last(0), last(1), last(2))
+    };
+    let off = |n: usize| (s * corner(n) + s_origin - q * corner(n) - q_origin).norm();
+    Some((0..8).map(off).fold(0.0, f64::max))
 }
 
 fn pixdim(h: &NiftiHeader) -> [f64; 3] {

@@ -3,9 +3,10 @@
 use super::volume::Voxels;
 use std::collections::BTreeMap;
 
-/// `of_voxel` adds every label that a voxel has. Gives the labels, and what was lost by it in words.
+/// `of_voxel` adds every label that a voxel has. Gives the labels, and what was lost by it in words, voxels of `voxel_m3` each.
 pub fn smallest_wins(
     count: usize,
+    voxel_m3: f64,
     names: &BTreeMap<u8, String>,
     of_voxel: impl Fn(usize, &mut Vec<u8>),
 ) -> (Vec<u8>, Option<String>) {
@@ -35,11 +36,8 @@ pub fn smallest_wins(
         .iter()
         .filter(|(label, _)| taken[usize::from(**label)] > 0)
         .map(|(label, name)| {
-            format!(
-                "{name} ({} of {} voxels)",
-                taken[usize::from(*label)],
-                sizes[usize::from(*label)]
-            )
+            let (taken, size) = (taken[usize::from(*label)], sizes[usize::from(*label)]);
+            format!("{name} ({taken} of {size} voxels) {}", in_cc(taken as f64 * voxel_m3))
         })
         .collect();
     let warning = (!lost.is_empty()).then(|| {
@@ -49,6 +47,15 @@ pub fn smallest_wins(
         )
     });
     (labels, warning)
+}
+
+/// A lost volume for a note; small ones with more digits.
+pub fn in_cc(m3: f64) -> String {
+    let cc = m3 * 1e6;
+    match cc < 0.1 {
+        true => format!("{cc:.4} cc"),
+        false => format!("{cc:.2} cc"),
+    }
 }
 
 /// The volume with one more warning for the user.

@@ -2,10 +2,12 @@
 
 #![warn(missing_docs)]
 
+pub mod linked;
 pub mod pairing;
 mod patient;
 pub mod plan;
 pub mod procedure;
+pub mod provenance;
 pub mod readers;
 pub mod score;
 pub mod workflow;

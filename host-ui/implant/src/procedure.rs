@@ -7,6 +7,7 @@ mod error;
 pub mod job;
 mod report;
 
+use crate::provenance;
 use crate::workflow::{Pace, Patience, Run, RunStatus, Step};
 use child::Core;
 pub use error::ProcedureError;
@@ -16,6 +17,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use stylet_base::format;
 use stylet_base::interrupt::Interrupt;
+use stylet_base::output::new_folder;
 use stylet_files::{self as files, scene::SceneFile};
 use stylet_host::core_args::{CoreArgs, SceneChoice};
 use stylet_host::link::{Link, LinkStatus, SceneModel};
@@ -125,6 +127,9 @@ struct Seen {
 
 /// An error when not every step was completed.
 pub fn run(options: Options) -> Result<(), ProcedureError> {
+    if let Some(out) = &options.out {
+        new_folder(out).map_err(|e| ProcedureError::Input(e.to_string()))?;
+    }
     let Live {
         mut link,
         core,
@@ -145,7 +150,15 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
     let beside = options.connect.asked.file().and_then(Path::parent);
     let of_scene = said.as_ref().and_then(|s| s.plan.as_deref());
     let of_scene = of_scene.map(|plan| beside.unwrap_or(Path::new("")).join(plan));
-    let mut job = match options.plan.as_deref().or(of_scene.as_deref()) {
+    let plan = options.plan.as_deref().or(of_scene.as_deref());
+    let inputs = [
+        ("--scene", options.connect.asked.file()),
+        ("--plan", plan),
+        ("--source", options.source.as_deref()),
+    ];
+    let inputs: Vec<(&str, &Path)> = inputs.into_iter().filter_map(|(o, p)| Some((o, p?))).collect();
+    let made = provenance::made(&inputs).map_err(|e| ProcedureError::Input(e.to_string()))?;
+    let mut job = match plan {
         Some(path) => Job::from_file(path, &scene)?,
         None => Job::suggested(&scene, options.seeds),
     };
@@ -176,7 +189,7 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
         .out
         .unwrap_or_else(|| PathBuf::from(format!("out/procedure-{}", format::utc_now())));
     let failure = outcome.as_ref().err().map(ToString::to_string);
-    let written = report::write(&out, &link, &job, &pace, &seen, failure.as_ref());
+    let written = report::write(&out, &link, &job, &pace, &seen, failure.as_ref(), made);
     let scored = written.and_then(|()| debrief::write(&out, &link, &scene, &job, &seen, options.source.as_deref()));
     drop(core);
     outcome?;

@@ -1,17 +1,22 @@
 //! `host-ui convert`: label volumes, seed plans and doses from one format to another, by the names of the two files.
 
 use super::CommandError;
+use super::dicom::plan_seed;
+use super::dose::write;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use stylet_base::format::printable;
 use stylet_base::{input, write_whole};
 use stylet_dose::Source;
 use stylet_files::convert::{can_hold_labels, write_labels};
-use stylet_files::dicom::plan::{self, Date, PlanSeed, PlanSource, SeedPlan};
-use stylet_files::dicom::{self, Identity};
+use stylet_files::dicom::images::Slice;
+use stylet_files::dicom::plan::{self, PlanSource, SeedPlan};
+use stylet_files::dicom::structures::write::{Outlined, Written, of_set, of_voxels};
+use stylet_files::dicom::structures::{self, StructureSet};
+use stylet_files::dicom::{self, Identity, RT_DOSE, RT_PLAN};
 use stylet_files::{self as files, FileError, Progress, bytes, scene};
 use stylet_implant::plan::seeds;
-use stylet_implant::readers::{DayOfImplant, DoseFile, SeedDefaults, SeedFile, SeedRow, read_dose};
+use stylet_implant::readers::{DayOfImplant, DoseFile, SeedDefaults, SeedFile, read_dose};
 
 const MAX_PLAN_BYTES: u64 = 4 << 20;
 
@@ -20,8 +25,13 @@ What is converted into what:
   label volume   .nii .nii.gz .nrrd .nhdr .seg.nrrd .mha .mhd, .dcm (RT Structure Set, with its images beside it)
                  into .nrrd .seg.nrrd .mha .nii.gz, .dcm (RT Structure Set)
   seed plan      .csv (columns as for host-ui dose) into .dcm (RT Plan; needs --source), and back;
-                 .toml (plan of host-ui) into .dcm or .csv
-  dose           .csv (dose_grid.csv of host-ui dose) into .dcm (RT Dose; needs --plan) or .nrrd
+                 .toml (plan of host-ui) into .dcm or .csv; .dcm into .dcm
+  dose           .csv (dose_grid.csv of host-ui dose) into .dcm (RT Dose; needs --plan) or .nrrd;
+                 .dcm (RT Dose) into .csv, .nrrd or .dcm
+
+Patient, study and frame of reference of a DICOM file are kept, and a table of seeds keeps them in columns. Formats that have
+no place for them lose them: give --like FILE, a DICOM file of the same patient, when you come back to DICOM. Files that belong
+together (structure set, plan and dose of one study) are written by host-ui dicom.
 
 Orientation and spacing are kept: NIfTI is in RAS, DICOM and MetaImage in LPS, NRRD names its own.
 Losses (overlaps, structures without volume) are reported.
@@ -50,12 +60,21 @@ pub struct ConvertArgs {
     /// RT Plan that a dose belongs to
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
+    /// DICOM file whose patient, study and frame of reference are taken, instead of those of the file that is read
+    #[arg(long, value_name = "FILE")]
+    like: Option<PathBuf>,
 }
 
 impl ConvertArgs {
     pub fn run(self) -> Result<(), CommandError> {
         if is_dose(&self.from)? {
             return self.dose();
+        }
+        if dicom_class(&self.from)?.as_deref() == Some(RT_DOSE) {
+            return self.dose_of_dicom();
+        }
+        if dicom_class(&self.from)?.as_deref() == Some(RT_PLAN) && has_ending(&self.to, "dcm") {
+            return self.plan_again();
         }
         if has_ending(&self.from, "csv") || is_plan_file(&self.from) {
             return match has_ending(&self.to, "csv") {
@@ -81,14 +100,17 @@ impl ConvertArgs {
         if scene::is_scene(&self.from) {
             return Err(format!("{}: give the volume that the scene file names", self.from.display()).into());
         }
+        if to_dicom && dicom_class(&self.from)?.is_some() {
+            return self.structures_again();
+        }
         let voxels = files::read_voxels(&self.from, &Progress::default())?;
         if let Some(note) = &voxels.frame.warning {
             seeds::report(&self.from, std::slice::from_ref(note));
         }
         if to_dicom {
-            let bytes = dicom::structures::write::bytes(&voxels, &Identity::new())
-                .map_err(|why| FileError::of(&self.to, why))?;
-            write_whole(&self.to, &bytes)?;
+            let structures = of_voxels(&voxels).map_err(|why| FileError::of(&self.to, why))?;
+            let identity = self.identity(None)?;
+            self.write_structures(&identity, &[], &structures)?;
         } else {
             write_labels(&voxels, &self.to)?;
             let keeps_names = has_ending(&self.to, "nrrd");
@@ -100,6 +122,56 @@ impl ConvertArgs {
             }
         }
         self.written()
+    }
+
+    /// A structure set contour by contour, on the images beside it.
+    fn structures_again(&self) -> Result<(), CommandError> {
+        let refused = |why| FileError::of(&self.from, why);
+        let content = bytes::whole(&self.from, &Progress::default()).map_err(refused)?;
+        let object = dicom::read(&content).map_err(refused)?;
+        let set = StructureSet::of(&object).map_err(refused)?;
+        seeds::report(&self.from, &set.notes);
+        let folder = self.from.parent().unwrap_or(Path::new(""));
+        let images = dicom::images::find(folder, &set.series, &set.images).map_err(refused)?;
+        let identity = self.identity(Some(Identity::of(&object)))?;
+        self.write_structures(&identity, &images, &of_set(set))?;
+        self.written()
+    }
+
+    fn write_structures(
+        &self,
+        identity: &Identity,
+        images: &[Slice],
+        structures: &[Outlined],
+    ) -> Result<(), CommandError> {
+        let set = Written {
+            uid: &dicom::new_uid(),
+            identity,
+            images,
+            structures,
+        };
+        let bytes = structures::write::bytes(&set).map_err(|why| FileError::of(&self.to, why))?;
+        Ok(write_whole(&self.to, &bytes)?)
+    }
+
+    fn plan_again(&self) -> Result<(), CommandError> {
+        let plan = plan::open(&self.from)?;
+        let plan = SeedPlan {
+            identity: self.identity(Some(plan.identity.clone()))?,
+            uid: dicom::new_uid(),
+            ..plan
+        };
+        write_whole(&self.to, &plan::bytes(&plan)?)?;
+        self.written()
+    }
+
+    /// That of --like, or else that of the file that is read, or a new one.
+    fn identity(&self, of_file: Option<Identity>) -> Result<Identity, CommandError> {
+        let Some(like) = &self.like else {
+            return Ok(of_file.unwrap_or_default());
+        };
+        let identity = Identity::of_file(like)?;
+        Ok(identity.ok_or_else(|| format!("{}: it is no DICOM file; --like needs one", like.display()))?)
     }
 
     fn seeds_to_plan(&self) -> Result<(), CommandError> {
@@ -116,8 +188,9 @@ impl ConvertArgs {
         seeds::report(&self.from, &notes);
         let plan = SeedPlan {
             label: "Stylet".to_owned(),
-            identity: Identity::new(),
+            identity: self.identity(file.identity.take())?,
             uid: dicom::new_uid(),
+            structure_set: None,
             prescription_gy,
             planned_on: None,
             source: PlanSource {
@@ -136,10 +209,15 @@ impl ConvertArgs {
 
     fn seeds_to_csv(&self) -> Result<(), CommandError> {
         let file = self.read_seeds(self.source()?.as_ref())?;
-        let mut out = String::from("x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,needle,hole\n");
-        let mut days: Vec<Date> = file.rows.iter().filter_map(|row| row.strength_on).collect();
-        days.sort_unstable();
-        days.dedup();
+        let identity = file.identity.as_ref().map(Identity::to_columns).unwrap_or_default();
+        let (mut names, mut values) = (String::new(), String::new());
+        for (column, value) in identity {
+            names += &format!(",{column}");
+            values += &format!(",\"{}\"", value.replace('"', "\"\""));
+        }
+        let is_dated = file.rows.iter().any(|row| row.strength_on.is_some());
+        let dated = if is_dated { "strength_date," } else { "" };
+        let mut out = format!("x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,{dated}needle,hole{names}\n");
         for row in file.rows {
             let seed = plan_seed(row);
             let [x, y, z] = seed.position_m.map(|v| v * 1e3);
@@ -147,19 +225,14 @@ impl ConvertArgs {
             let needle = seed.needle.map_or_else(String::new, |n| n.to_string());
             // The only characters that would end the field.
             let hole = seed.hole.replace([',', '"', '\n', '\r'], " ");
-            out.push_str(&format!("{x},{y},{z},{axis},{},{needle},{hole}\n", seed.strength_u));
+            let day = seed.strength_on.map_or_else(String::new, |day| day.to_string());
+            let day = if is_dated { day + "," } else { day };
+            out.push_str(&format!(
+                "{x},{y},{z},{axis},{},{day}{needle},{hole}{values}\n",
+                seed.strength_u
+            ));
         }
         write_whole(&self.to, out.as_bytes())?;
-        if !days.is_empty() {
-            let days: Vec<String> = days.iter().map(Date::to_string).collect();
-            seeds::report(
-                &self.from,
-                &[format!(
-                    "a table has no place for the day of a strength: they are those of {}",
-                    days.join(", ")
-                )],
-            );
-        }
         self.written()
     }
 
@@ -186,13 +259,44 @@ impl ConvertArgs {
             .plan
             .as_deref()
             .ok_or("an RT Dose needs --plan FILE: the RT Plan that it is the dose of")?;
+        let plan = plan::open(plan)?;
+        self.write_dose(&grid, &self.identity(Some(plan.identity))?, &plan.uid)
+    }
+
+    fn dose_of_dicom(&self) -> Result<(), CommandError> {
+        let dose = dicom::dose::of_file(&self.from)?;
+        let identity = self.identity(Some(dose.identity.clone()))?;
+        let plan = dose.plan.clone();
+        let grid = DoseFile::from(dose);
+        if has_ending(&self.to, "nrrd") {
+            write_whole(&self.to, &dose_nrrd(&grid))?;
+            return self.written();
+        }
+        if has_ending(&self.to, "csv") {
+            write::doses(&self.to, grid.places_m(), &grid.dose_gy)?;
+            return self.written();
+        }
+        self.needs_ending("dcm", "an RT Dose becomes .csv, .nrrd or .dcm")?;
+        let other = self.plan.as_deref().map(plan::open).transpose()?.map(|plan| plan.uid);
+        let plan = other.or(plan).ok_or("it names no plan; give one with --plan FILE")?;
+        self.write_dose(&grid, &identity, &plan)
+    }
+
+    fn write_dose(&self, grid: &DoseFile, identity: &Identity, plan: &str) -> Result<(), CommandError> {
         let image = dicom::dose::DoseImage {
             dims: grid.dims,
             origin_m: grid.origin_m,
             spacing_m: grid.spacing_m,
             dose_gy: &grid.dose_gy,
         };
-        write_whole(&self.to, &dicom::dose::bytes(&image, &plan::open(plan)?)?)?;
+        let of = dicom::dose::DoseOf {
+            uid: &dicom::new_uid(),
+            identity,
+            plan,
+            structure_set: None,
+            histograms: &[],
+        };
+        write_whole(&self.to, &dicom::dose::bytes(&image, &of)?)?;
         self.written()
     }
 
@@ -209,15 +313,14 @@ impl ConvertArgs {
     }
 }
 
-fn plan_seed(row: SeedRow) -> PlanSeed {
-    PlanSeed {
-        needle: row.needle,
-        hole: row.hole.unwrap_or_default(),
-        position_m: row.seed.position_m,
-        axis: row.seed.axis,
-        strength_u: row.seed.strength_u,
-        strength_on: row.strength_on,
+/// SOP class of a DICOM file; `None` for any other.
+fn dicom_class(path: &Path) -> Result<Option<String>, CommandError> {
+    let refused = |why| FileError::of(path, why);
+    if !bytes::start(path, 160).is_some_and(|start| dicom::is_dicom(&start)) {
+        return Ok(None);
     }
+    let content = bytes::whole(path, &Progress::default()).map_err(refused)?;
+    Ok(Some(dicom::read(&content).map_err(refused)?.sop_class))
 }
 
 /// Scene files end in .toml as well.

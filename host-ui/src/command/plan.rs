@@ -17,6 +17,7 @@ use stylet_implant::plan::first;
 use stylet_implant::plan::{Anatomy, ImplantPlan, Template, check};
 use stylet_implant::plan::{file, seeds};
 use stylet_implant::procedure::{Connect, Live};
+use stylet_implant::provenance;
 use stylet_implant::readers::{DayOfImplant, SeedDefaults, SeedFile};
 
 const DOSE_PITCH_M: f64 = 1e-3;
@@ -130,7 +131,13 @@ impl PlanArgs {
     }
 
     fn write(&self, plan: &ImplantPlan, frames: &PatientFrame) -> Result<(), CommandError> {
-        file::write(&self.out, plan, frames)?;
+        let mut inputs: Vec<(&str, &Path)> = vec![("--source", &self.source)];
+        inputs.extend(self.seeds.as_deref().map(|file| ("--seeds", file)));
+        inputs.extend(self.asked.file().map(|file| ("--scene", file)));
+        let made = serde_json::to_string(&provenance::made(&inputs)?)?;
+        // One line, as JSON has no line feeds of its own.
+        let text = format!("# made: {made}\n{}", file::to_text(plan, frames)?);
+        write_whole(&self.out, text.as_bytes())?;
         let Some(csv) = &self.csv else { return Ok(()) };
         let text = file::seeds_to_csv(plan, frames);
         Ok(write_whole(csv, text.as_bytes())?)

@@ -6,3 +6,7 @@ mod corpus;
 mod dicom;
 #[cfg(test)]
 mod labels;
+#[cfg(test)]
+mod results;
+#[cfg(test)]
+mod study;

@@ -188,6 +188,8 @@ fn dose_at_points_and_over_a_time_comes_as_csv() {
     );
     let points = write("points.csv", "x_mm,y_mm,z_mm\n11,2,3\n");
     let dose = |more: &[&str]| {
+        // Results are not added to those of before.
+        let _ = std::fs::remove_dir_all(folder.join("out"));
         let files = [
             ("--source", source()),
             ("--seeds", seeds.clone()),

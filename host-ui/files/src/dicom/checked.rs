@@ -13,6 +13,8 @@ const MAX_ELEMENTS: usize = 1 << 20;
 const MAX_VALUES: usize = 8 << 20;
 /// Retired, but there are files in it.
 const EXPLICIT_VR_BIG_ENDIAN: &str = "1.2.840.10008.1.2.2";
+/// Kinds whose length has two bytes; all others have four.
+const SHORT: &str = "AE AS AT CS DA DS DT FD FL IS LO LT PN SH SL SS ST TM UI UL US";
 const UNDEFINED: u32 = u32::MAX;
 const ITEM: Tag = Tag(0xfffe, 0xe000);
 const ITEM_END: Tag = Tag(0xfffe, 0xe00d);
@@ -67,23 +69,42 @@ fn syntax(bytes: &[u8]) -> Result<(Syntax, usize), ContentError> {
 
 /// Everything before the pixels.
 pub fn read(bytes: &[u8]) -> Result<Object, ContentError> {
+    Ok(before_pixels(bytes)?.0)
+}
+
+/// As [`read`], with the bytes of the pixels, and whether their numbers begin with the highest byte.
+pub fn read_with_pixels(bytes: &[u8]) -> Result<(Object, &[u8], bool), ContentError> {
+    let (object, mut walk) = before_pixels(bytes)?;
+    if walk.at >= bytes.len() {
+        return Err("it has no pixels; export it again".into());
+    }
+    let head = walk.head()?;
+    if head.length == UNDEFINED {
+        return Err("its pixels are compressed; export it without compression".into());
+    }
+    Ok((object, walk.value(&head)?, walk.syntax == Syntax::ExplicitBig))
+}
+
+fn before_pixels(bytes: &[u8]) -> Result<(Object, Walk<'_>), ContentError> {
     let values = bytes.iter().filter(|&&b| b == b'\\').count();
     if values > MAX_VALUES {
         return Err(ContentError::Invalid(format!(
             "it has {values} values in lists, more than {MAX_VALUES}; export fewer structures"
         )));
     }
-    let (syntax, from) = syntax(bytes)?;
+    let (syntax, at) = syntax(bytes)?;
+    let elements = 0;
     let mut walk = Walk {
         bytes,
-        at: from,
+        at,
         syntax,
-        elements: 0,
+        elements,
     };
     let end = walk.top().map_err(|why| format!("{why}; copy or export it again"))?;
-    let data = parse(syntax, &bytes[from..end])?;
+    walk.at = end;
+    let data = parse(syntax, &bytes[at..end])?;
     let sop_class = super::values::text(&data, tags::SOP_CLASS_UID).unwrap_or_default();
-    Ok(Object { sop_class, data })
+    Ok((Object { sop_class, data }, walk))
 }
 
 /// With a group 2 of our own in front, as that of the file has served.
@@ -357,23 +378,7 @@ impl<'a> Walk<'a> {
                 String::from_utf8_lossy(&code)
             )
         })?;
-        let long = matches!(
-            vr,
-            VR::OB
-                | VR::OD
-                | VR::OF
-                | VR::OL
-                | VR::OV
-                | VR::OW
-                | VR::SQ
-                | VR::SV
-                | VR::UC
-                | VR::UN
-                | VR::UR
-                | VR::UT
-                | VR::UV
-        );
-        let length = if long {
+        let length = if !SHORT.contains(vr.to_string()) {
             self.u16()?;
             self.u32()?
         } else {

@@ -3,8 +3,8 @@
 use super::super::element::voxel_count;
 use super::super::frame::VoxelFrame;
 use super::super::{Progress, bytes};
-use super::checked;
 use super::values::{exactly, needed, text};
+use super::{Identity, checked};
 use crate::error::ContentError;
 use dicom_dictionary_std::tags;
 use nalgebra::{Matrix3, Vector3};
@@ -16,17 +16,31 @@ const MAX_FILES: usize = 4096;
 /// Slices may be so far from even distances, as a share of one.
 const UNEVEN: f64 = 0.02;
 
+/// A contour off its image by so much still lies in it.
+const SAME_PLANE_MM: f64 = 0.05;
+
 /// Voxels without their values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
+    /// Voxels along each axis.
     pub dims: [usize; 3],
+    /// Where they lie in the patient.
     pub frame: VoxelFrame,
 }
 
-/// One slice, LPS, mm.
+/// One slice of an image series, without its pixels; LPS, mm.
 #[derive(Clone, Debug)]
 pub struct Slice {
+    /// SOP instance UID.
     pub uid: String,
+    /// SOP class UID.
+    pub sop_class: String,
+    /// Series instance UID.
+    pub series: String,
+    /// Study instance UID.
+    pub study: String,
+    /// Patient, study and frame of reference.
+    pub identity: Identity,
     corner: Vector3<f64>,
     /// Steps from column to column, and from row to row.
     steps: [Vector3<f64>; 2],
@@ -49,6 +63,10 @@ pub fn slice(file: &[u8]) -> Option<Result<(String, Slice), ContentError>> {
         let [columns, rows] = size;
         Ok::<_, ContentError>(Slice {
             uid: text(data, tags::SOP_INSTANCE_UID).unwrap_or_default(),
+            sop_class: object.sop_class.clone(),
+            series: series.clone(),
+            study: text(data, tags::STUDY_INSTANCE_UID).unwrap_or_default(),
+            identity: Identity::of(&object),
             corner: Vector3::new(x, y, z),
             steps: [
                 Vector3::new(a, b, c) * between_columns,
@@ -57,11 +75,39 @@ pub fn slice(file: &[u8]) -> Option<Result<(String, Slice), ContentError>> {
             size: [columns? as u64, rows? as u64],
         })
     };
-    Some(read().map(|slice| (series, slice)))
+    let read = read();
+    Some(read.map(|slice| (series, slice)))
+}
+
+impl Slice {
+    /// The image that a contour lies in; corners in RAS, m.
+    pub fn under<'a>(images: &'a [Self], corners_m: &[Vector3<f64>]) -> Option<&'a Self> {
+        let first = images.first()?;
+        let normal = first.steps[0].cross(&first.steps[1]).try_normalize(1e-9)?;
+        let height = ras_from_lps(*corners_m.first()?).dot(&normal) * 1e3;
+        let off = |slice: &Self| (slice.corner.dot(&normal) - height).abs();
+        let nearest = images.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
+        let beside = |slice: &Self| (slice.corner - nearest.corner).dot(&normal).abs();
+        let next = images.iter().map(beside).filter(|d| *d > SAME_PLANE_MM);
+        let half = next.fold(f64::INFINITY, f64::min) / 2.0;
+        let most = if half.is_finite() { half } else { 0.0 };
+        (off(nearest) <= most + SAME_PLANE_MM).then_some(nearest)
+    }
+}
+
+/// The slices in a folder, of whatever series.
+pub fn all_in(folder: &Path) -> Result<Vec<Slice>, ContentError> {
+    slices_of(folder, |_| true)
 }
 
 /// The slices in a folder that belong to a series or are named one by one.
 pub fn find(folder: &Path, series: &[String], named: &[String]) -> Result<Vec<Slice>, ContentError> {
+    slices_of(folder, |slice| {
+        series.contains(&slice.series) || named.contains(&slice.uid)
+    })
+}
+
+fn slices_of(folder: &Path, wanted: impl Fn(&Slice) -> bool) -> Result<Vec<Slice>, ContentError> {
     let Ok(entries) = std::fs::read_dir(folder) else {
         return Ok(Vec::new());
     };
@@ -74,8 +120,8 @@ pub fn find(folder: &Path, series: &[String], named: &[String]) -> Result<Vec<Sl
         let Some(read) = bytes::whole(&path, &Progress::default()).ok().and_then(|b| slice(&b)) else {
             continue;
         };
-        let (of_series, slice) = read.map_err(|why| format!("the image {}: {why}", path.display()))?;
-        if series.contains(&of_series) || named.contains(&slice.uid) {
+        let (_, slice) = read.map_err(|why| format!("the image {}: {why}", path.display()))?;
+        if wanted(&slice) {
             found.push(slice);
         }
     }

@@ -4,14 +4,21 @@ use crate::error::ContentError;
 
 mod checked;
 pub mod dose;
-mod images;
+mod identity;
+pub mod images;
 pub mod plan;
 pub mod structures;
 mod values;
 mod write;
 
 pub use checked::{Object, is_dicom, read};
-pub use write::{Identity, new_uid};
+pub use identity::{COLUMNS, Identity};
+pub use write::new_uid;
+
+/// SOP class of an RT Dose.
+pub const RT_DOSE: &str = dicom_dictionary_std::uids::RT_DOSE_STORAGE;
+/// SOP class of an RT Plan.
+pub const RT_PLAN: &str = dicom_dictionary_std::uids::RT_PLAN_STORAGE;
 
 /// The frame of an image series out of one of its files twice, one slice apart; for checking the reader by itself.
 pub fn image_geometry(bytes: &[u8]) -> Result<(), ContentError> {

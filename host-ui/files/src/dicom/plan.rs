@@ -23,6 +23,8 @@ pub struct SeedPlan {
     pub identity: Identity,
     /// Of the file itself; a dose refers to it.
     pub uid: String,
+    /// The structure set that it was made on.
+    pub structure_set: Option<PlannedOn>,
     /// Prescribed dose, in Gy.
     pub prescription_gy: Option<f64>,
     /// Day of the plan itself.
@@ -33,6 +35,15 @@ pub struct SeedPlan {
     pub seeds: Vec<PlanSeed>,
     /// What the user should know about how it was read.
     pub notes: Vec<String>,
+}
+
+/// The structure set that a plan was made on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlannedOn {
+    /// SOP instance UID of the structure set.
+    pub uid: String,
+    /// Number of the structure that the prescription is for.
+    pub target: Option<usize>,
 }
 
 /// The model that all seeds are of.

@@ -50,6 +50,29 @@ pub struct StructureSet {
     pub notes: Vec<String>,
 }
 
+/// Whether contours of one plane lie in each other, so that the inner ones are holes.
+fn nested(contours: &[Vec<Vector3<f64>>]) -> bool {
+    let largest = contours.iter().map(|c| area_vector(c));
+    let largest = largest.max_by(|a, b| a.norm().total_cmp(&b.norm()));
+    let Some(normal) = largest.and_then(|a| a.try_normalize(1e-12)) else {
+        return false;
+    };
+    planes::flat(contours, normal)
+        .iter()
+        .any(|polygons| polygons.len() > planes::MOST_NESTED || any_in_another(polygons))
+}
+
+/// Loops along voxels may touch at corners, and never along an edge.
+fn any_in_another(polygons: &[Vec<[f64; 2]>]) -> bool {
+    let middle = |p: &[[f64; 2]]| [0, 1].map(|a| (p[0][a] + p[1 % p.len()][a]) / 2.0);
+    let is_in = |n: usize| {
+        let others = polygons.iter().enumerate().filter(move |(other, _)| *other != n);
+        let middle = middle(&polygons[n]);
+        others.into_iter().any(|(_, polygon)| solid::encloses(polygon, middle))
+    };
+    (0..polygons.len()).any(is_in)
+}
+
 /// Of a file and the images beside it.
 pub fn read(object: &Object, folder: Option<&Path>) -> Result<Voxels, ContentError> {
     let set = StructureSet::of(object)?;

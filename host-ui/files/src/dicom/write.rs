@@ -1,5 +1,6 @@
 //! What all DICOM files of ours have in common: who, when, and numbers that nobody else uses.
 
+use super::Identity;
 use crate::error::ContentError;
 use dicom_core::value::{DataSetSequence, PrimitiveValue};
 use dicom_core::{DataElement, Length, Tag, VR};
@@ -9,37 +10,6 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 
 /// Names the program in the files it writes; under 2.25 as it has no root of its own.
 const IMPLEMENTATION: &str = "2.25.302416733929811471066208173541526011461";
-
-/// To whom and to which frame a file belongs.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Identity {
-    /// Name of the patient.
-    pub patient_name: String,
-    /// Identifier of the patient.
-    pub patient_id: String,
-    /// Study instance UID.
-    pub study: String,
-    /// Frame of reference UID.
-    pub frame_of_reference: String,
-}
-
-impl Identity {
-    /// Nobody's.
-    pub fn new() -> Self {
-        Self {
-            patient_name: "Stylet^Simulation".to_owned(),
-            patient_id: "STYLET".to_owned(),
-            study: new_uid(),
-            frame_of_reference: new_uid(),
-        }
-    }
-}
-
-impl Default for Identity {
-    fn default() -> Self {
-        Self::new()
-    }
-}
 
 /// 128 random bits under 2.25, as the standard has it for those without a root.
 pub fn new_uid() -> String {
@@ -73,6 +43,14 @@ fn decimal(value: f64) -> String {
         .unwrap_or_else(|| format!("{value:.8e}"))
 }
 
+/// One item that names another object by its class and its UID.
+pub fn reference(sop_class: &str, uid: &str) -> InMemDicomObject {
+    item([
+        string(tags::REFERENCED_SOP_CLASS_UID, VR::UI, sop_class),
+        string(tags::REFERENCED_SOP_INSTANCE_UID, VR::UI, uid),
+    ])
+}
+
 pub fn whole(tag: Tag, value: usize) -> DataElement<InMemDicomObject> {
     string(tag, VR::IS, &value.to_string())
 }
@@ -92,11 +70,11 @@ pub fn common(sop_class: &str, modality: &str, of: &Identity) -> InMemDicomObjec
         string(tags::SPECIFIC_CHARACTER_SET, VR::CS, "ISO_IR 192"),
         string(tags::SOP_CLASS_UID, VR::UI, sop_class),
         string(tags::SOP_INSTANCE_UID, VR::UI, &new_uid()),
-        string(tags::STUDY_DATE, VR::DA, &date),
-        string(tags::STUDY_TIME, VR::TM, &time),
+        string(tags::STUDY_DATE, VR::DA, &of.study_date),
+        string(tags::STUDY_TIME, VR::TM, &of.study_time),
         string(tags::INSTANCE_CREATION_DATE, VR::DA, &date),
         string(tags::INSTANCE_CREATION_TIME, VR::TM, &time),
-        string(tags::ACCESSION_NUMBER, VR::SH, ""),
+        string(tags::ACCESSION_NUMBER, VR::SH, &of.accession_number),
         string(tags::MODALITY, VR::CS, modality),
         string(tags::MANUFACTURER, VR::LO, "Stylet"),
         string(
@@ -105,18 +83,18 @@ pub fn common(sop_class: &str, modality: &str, of: &Identity) -> InMemDicomObjec
             "Stylet simulator, not for treatment",
         ),
         string(tags::SOFTWARE_VERSIONS, VR::LO, env!("CARGO_PKG_VERSION")),
-        string(tags::REFERRING_PHYSICIAN_NAME, VR::PN, ""),
+        string(tags::REFERRING_PHYSICIAN_NAME, VR::PN, &of.referring_physician),
         string(tags::OPERATORS_NAME, VR::PN, ""),
         string(tags::PATIENT_NAME, VR::PN, &of.patient_name),
         string(tags::PATIENT_ID, VR::LO, &of.patient_id),
-        string(tags::PATIENT_BIRTH_DATE, VR::DA, ""),
-        string(tags::PATIENT_SEX, VR::CS, ""),
+        string(tags::PATIENT_BIRTH_DATE, VR::DA, &of.birth_date),
+        string(tags::PATIENT_SEX, VR::CS, &of.sex),
         string(tags::STUDY_INSTANCE_UID, VR::UI, &of.study),
         string(tags::SERIES_INSTANCE_UID, VR::UI, &new_uid()),
-        string(tags::STUDY_ID, VR::SH, ""),
+        string(tags::STUDY_ID, VR::SH, &of.study_id),
         string(tags::SERIES_NUMBER, VR::IS, "1"),
         string(tags::FRAME_OF_REFERENCE_UID, VR::UI, &of.frame_of_reference),
-        string(tags::POSITION_REFERENCE_INDICATOR, VR::LO, ""),
+        string(tags::POSITION_REFERENCE_INDICATOR, VR::LO, &of.position_reference),
     ])
 }
 
@@ -127,9 +105,19 @@ pub fn now() -> (String, String) {
     (of("%Y%m%d"), of("%H%M%S"))
 }
 
+/// The whole file, each element with its kind.
 pub fn bytes(object: InMemDicomObject) -> Result<Vec<u8>, ContentError> {
+    bytes_in(uids::EXPLICIT_VR_LITTLE_ENDIAN, object)
+}
+
+/// As [`bytes`], without the kinds: then lists of numbers may be longer than 64 KiB.
+pub fn implicit_bytes(object: InMemDicomObject) -> Result<Vec<u8>, ContentError> {
+    bytes_in(uids::IMPLICIT_VR_LITTLE_ENDIAN, object)
+}
+
+fn bytes_in(syntax: &str, object: InMemDicomObject) -> Result<Vec<u8>, ContentError> {
     let meta = FileMetaTableBuilder::new()
-        .transfer_syntax(uids::EXPLICIT_VR_LITTLE_ENDIAN)
+        .transfer_syntax(syntax)
         .implementation_class_uid(IMPLEMENTATION)
         .implementation_version_name("STYLET");
     let file = object

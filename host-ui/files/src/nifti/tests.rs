@@ -189,3 +189,19 @@ fn an_oblique_gland_stays_where_it_is_in_the_patient() {
         assert!((volumes - 1.0).abs() < 0.03, "{volumes}");
     }
 }
+
+/// Of two orientations that differ one was taken in silence.
+#[test]
+fn an_sform_that_differs_from_the_qform_is_reported_by_how_much() {
+    let with_qform = |shift_mm: f32| {
+        let mut b = small();
+        b[252..254].copy_from_slice(&1_i16.to_le_bytes());
+        b[268..272].copy_from_slice(&shift_mm.to_le_bytes());
+        let temp = file(&format!("qform-{shift_mm}.nii"), &b);
+        read(&temp.0, None).unwrap().warnings.join("; ")
+    };
+    let said = with_qform(4.5);
+    assert!(said.contains("its sform and its qform differ, by 4.50 mm"), "{said}");
+    let said = with_qform(0.0);
+    assert!(!said.contains("qform"), "{said}");
+}

@@ -122,7 +122,7 @@ pub fn flatten(
         }
     };
     let names: BTreeMap<u8, String> = (1_u8..=255).zip(segments.into_iter().map(|s| s.name)).collect();
-    let (labels, warning) = overlap::smallest_wins(count, &names, of_voxel);
+    let (labels, warning) = overlap::smallest_wins(count, frame.spacing_m.iter().product(), &names, of_voxel);
     Ok(overlap::with_warning(
         Voxels {
             dims,

@@ -109,6 +109,7 @@ fn seed_plan(plan: &ImplantPlan, patient: &PatientFrame) -> Result<SeedPlan, Pla
         label: "Stylet".to_owned(),
         identity: Identity::new(),
         uid: new_uid(),
+        structure_set: None,
         prescription_gy: Some(plan.prescription_gy),
         planned_on: None,
         source: PlanSource {

@@ -228,12 +228,6 @@ pub fn read(path: &Path, patient: &PatientFrame) -> Result<ImplantPlan, PlanErro
     from_text(&text, patient).map_err(|e| PlanError::of_file(path, e))
 }
 
-/// Writes a plan as TOML, in one step.
-pub fn write(path: &Path, plan: &ImplantPlan, patient: &PatientFrame) -> Result<(), PlanError> {
-    let text = to_text(plan, patient)?;
-    Ok(stylet_base::write_whole(path, text.as_bytes())?)
-}
-
 /// Seeds as `host-ui dose --seeds` reads them, with the number of their needle and its hole.
 pub fn seeds_to_csv(plan: &ImplantPlan, patient: &PatientFrame) -> String {
     let mut text = format!("{HEADER}\n");

@@ -39,6 +39,7 @@ fn of_plan_file(path: &Path) -> Result<SeedFile, PlanError> {
     }
     let source = Source::known(&plan.source);
     Ok(SeedFile {
+        identity: None,
         rows,
         declared: Some(Declared {
             isotope: source.as_ref().map_or_else(String::new, |s| s.nuclide.clone()),

@@ -21,6 +21,7 @@ pub fn write(
     pace: &Pace,
     seen: &Seen,
     failure: Option<&String>,
+    made: Value,
 ) -> Result<(), ProcedureError> {
     std::fs::create_dir_all(out).map_err(|why| ProcedureError::Folder {
         folder: out.to_owned(),
@@ -35,6 +36,7 @@ pub fn write(
     let result = json!({
         "completed": failure.is_none(),
         "failure": failure,
+        "made": made,
         "seeds": seeds, "lost_seeds": seen.lost.iter().map(|n| n + 1).collect::<Vec<_>>(),
         "force": force(link, direction, seen),
         "timing": timing(link, seen),

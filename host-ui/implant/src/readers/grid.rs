@@ -2,7 +2,11 @@
 
 use super::table::{self, LineError, PLACE};
 use std::path::Path;
-use stylet_files::FileError;
+use stylet_files::dicom::{self, dose::ReadDose};
+use stylet_files::{FileError, bytes};
+
+/// Number of bytes that distinguish a DICOM file from a table.
+const START_BYTES: u64 = 160;
 
 /// Doses on a regular grid of places in RAS; x runs fastest.
 pub struct DoseFile {
@@ -14,6 +18,66 @@ pub struct DoseFile {
     pub spacing_m: [f64; 3],
     /// Doses in Gy.
     pub dose_gy: Vec<f64>,
+}
+
+impl From<ReadDose> for DoseFile {
+    fn from(dose: ReadDose) -> Self {
+        Self {
+            dims: dose.dims,
+            origin_m: dose.origin_m,
+            spacing_m: dose.spacing_m,
+            dose_gy: dose.dose_gy,
+        }
+    }
+}
+
+impl DoseFile {
+    /// Every place, x fastest, in m.
+    pub fn places_m(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
+        let [nx, ny, nz] = self.dims;
+        (0..nx * ny * nz).map(move |n| {
+            let at = [n % nx, n / nx % ny, n / nx / ny];
+            [0, 1, 2].map(|a| self.origin_m[a] + at[a] as f64 * self.spacing_m[a])
+        })
+    }
+
+    /// Linear between the eight voxels around a place; `None` outside of the middles of the outermost.
+    pub fn at_gy(&self, place_m: [f64; 3]) -> Option<f64> {
+        let (mut low, mut share) = ([0; 3], [0.0; 3]);
+        for a in 0..3 {
+            let at = (place_m[a] - self.origin_m[a]) / self.spacing_m[a];
+            let last = (self.dims[a] - 1) as f64;
+            // A part in a million of a voxel is rounding.
+            if !(-1e-6..=last + 1e-6).contains(&at) {
+                return None;
+            }
+            let at = at.clamp(0.0, last);
+            low[a] = (at as usize).min(self.dims[a].saturating_sub(2));
+            share[a] = at - low[a] as f64;
+        }
+        let [nx, ny, _] = self.dims;
+        let corner = |n: usize| {
+            let up = [n & 1, n >> 1 & 1, n >> 2];
+            let weight: f64 = (0..3)
+                .map(|a| if up[a] == 1 { share[a] } else { 1.0 - share[a] })
+                .product();
+            if weight == 0.0 {
+                return 0.0;
+            }
+            let at = [0, 1, 2].map(|a| low[a] + up[a]);
+            weight * self.dose_gy[(at[2] * ny + at[1]) * nx + at[0]]
+        };
+        Some((0..8).map(corner).sum())
+    }
+}
+
+/// A dose out of an RT Dose or a table, which of both is found out from the content.
+pub fn read_any_dose(path: &Path) -> Result<DoseFile, FileError> {
+    let is_dicom = bytes::start(path, START_BYTES).is_some_and(|start| dicom::is_dicom(&start));
+    match is_dicom {
+        true => Ok(dicom::dose::of_file(path)?.into()),
+        false => read_dose(path),
+    }
 }
 
 /// A dose grid as `host-ui dose` writes it: every place of a regular grid, x fastest.

@@ -4,10 +4,11 @@ pub mod contours;
 mod declared;
 pub mod grid;
 pub mod labels;
+pub mod places;
 pub mod seeds;
 mod table;
 
 pub use declared::{DayOfImplant, Declared, Mismatch};
-pub use grid::{DoseFile, read_dose};
+pub use grid::{DoseFile, read_any_dose, read_dose};
 pub use seeds::{SeedDefaults, SeedFile, SeedRow, read_seed_rows, read_seeds};
 pub use table::read_points;

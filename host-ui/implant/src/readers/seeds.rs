@@ -2,10 +2,11 @@
 
 use super::declared::Declared;
 use super::table::{self, LineError, PLACE, Row, shown};
+use std::cell::OnceCell;
 use std::path::Path;
 use stylet_dose::Seed;
-use stylet_files::dicom;
 use stylet_files::dicom::plan::{Date, PlanSeed, SeedPlan};
+use stylet_files::dicom::{self, Identity};
 use stylet_files::{FileError, bytes};
 
 const MAX_U: f64 = 1e5;
@@ -42,6 +43,8 @@ pub struct SeedFile {
     pub rows: Vec<SeedRow>,
     /// `None` for a table, which says nothing of its source.
     pub declared: Option<Declared>,
+    /// Patient, study and frame of reference, where the file names them.
+    pub identity: Option<Identity>,
 }
 
 /// As [`read_seed_rows`], the seeds alone.
@@ -50,7 +53,8 @@ pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<Vec<Seed>, File
     Ok(rows.into_iter().map(|row| row.seed).collect())
 }
 
-/// Seeds of a file with the columns `x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u|activity_mci][,needle][,hole]`,
+/// Seeds of a file with the columns `x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u|activity_mci][,strength_date][,needle][,hole]`,
+/// and those of [`dicom::COLUMNS`],
 /// or those of a DICOM RT Plan, which gives their strength itself.
 pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, FileError> {
     let is_plan = bytes::start(path, START_BYTES).is_some_and(|start| dicom::is_dicom(&start));
@@ -60,10 +64,14 @@ pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, F
     let known = [
         PLACE.as_slice(),
         &AXIS,
-        &["strength_u", "activity_mci", "needle", "hole"],
+        &["strength_u", "activity_mci", "strength_date", "needle", "hole"],
+        &dicom::COLUMNS,
     ]
     .concat();
+    // Of the first row; all are of one patient.
+    let identity = OnceCell::new();
     let row = |row: &Row| {
+        identity.get_or_init(|| Identity::of_columns(|column| row.text(column)));
         Ok(SeedRow {
             seed: Seed {
                 position_m: row.position_m()?,
@@ -72,15 +80,20 @@ pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, F
             },
             needle: needle(row)?,
             hole: row.text("hole").map(str::to_owned),
-            strength_on: None,
+            strength_on: strength_on(row)?,
         })
     };
     let rows = table::read(path, &known, row)?;
-    Ok(SeedFile { rows, declared: None })
+    Ok(SeedFile {
+        rows,
+        declared: None,
+        identity: identity.into_inner().flatten(),
+    })
 }
 
 fn of_plan(plan: SeedPlan) -> SeedFile {
     SeedFile {
+        identity: Some(plan.identity),
         declared: Some(Declared {
             model: plan.source.model,
             isotope: plan.source.isotope,
@@ -132,6 +145,18 @@ fn needle(row: &Row) -> Result<Option<u32>, LineError> {
         ))),
     });
     number.transpose()
+}
+
+fn strength_on(row: &Row) -> Result<Option<Date>, LineError> {
+    let date = row.text("strength_date").map(|text| {
+        text.parse().map_err(|_| {
+            LineError::new(format!(
+                "strength_date is \"{}\", not a day like 2026-10-31",
+                shown(text)
+            ))
+        })
+    });
+    date.transpose()
 }
 
 fn strength_u(row: &Row, defaults: SeedDefaults) -> Result<f64, LineError> {

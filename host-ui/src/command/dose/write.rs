@@ -7,15 +7,6 @@ use stylet_base::{write_streamed, write_whole};
 use stylet_dose::Dvh;
 use stylet_dose::perturb::{PERCENTILES, Spread};
 
-pub fn folder(out: &Path) -> Result<(), CommandError> {
-    Ok(std::fs::create_dir_all(out).map_err(|e| {
-        format!(
-            "{} cannot be created ({e}); choose another folder with --out",
-            out.display()
-        )
-    })?)
-}
-
 pub fn json(path: &Path, value: &Value) -> Result<(), CommandError> {
     let text = serde_json::to_string_pretty(value)?;
     Ok(write_whole(path, (text + "\n").as_bytes())?)

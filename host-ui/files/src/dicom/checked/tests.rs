@@ -9,6 +9,7 @@ fn good() -> Vec<u8> {
         label: "a".to_owned(),
         identity: Identity::new(),
         uid: new_uid(),
+        structure_set: None,
         prescription_gy: Some(145.0),
         planned_on: None,
         source: PlanSource {

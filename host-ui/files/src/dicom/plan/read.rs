@@ -5,7 +5,7 @@ use super::super::Identity;
 use super::super::checked::Object;
 use super::super::values::{exactly, items, name, needed, number, text};
 use super::super::write::new_uid;
-use super::{Date, PlanSeed, PlanSource, SeedPlan, permanent};
+use super::{Date, PlanSeed, PlanSource, PlannedOn, SeedPlan, permanent};
 use crate::error::ContentError;
 use dicom_core::Tag;
 use dicom_dictionary_std::{tags, uids};
@@ -55,7 +55,8 @@ pub fn of(object: &Object) -> Result<SeedPlan, ContentError> {
     notes.extend(stays);
     Ok(SeedPlan {
         label: text(data, tags::RT_PLAN_LABEL).unwrap_or_default(),
-        identity: identity(data),
+        identity: Identity::of(object),
+        structure_set: structure_set(data),
         uid: text(data, tags::SOP_INSTANCE_UID).unwrap_or_else(new_uid),
         prescription_gy: prescription_gy(data)?,
         planned_on: date(data, tags::RT_PLAN_DATE),
@@ -218,18 +219,24 @@ fn prescription_gy(data: &InMemDicomObject) -> Result<Option<f64>, ContentError>
     Ok(None)
 }
 
+/// The structure set that the plan was made on, and which of its structures the prescription is for.
+fn structure_set(data: &InMemDicomObject) -> Option<PlannedOn> {
+    let referenced = items(data, tags::REFERENCED_STRUCTURE_SET_SEQUENCE).first()?;
+    let target = items(data, tags::DOSE_REFERENCE_SEQUENCE)
+        .iter()
+        .filter(|r| text(r, tags::DOSE_REFERENCE_TYPE).as_deref() == Some("TARGET"))
+        .find_map(|r| number(r, tags::REFERENCED_ROI_NUMBER).ok().flatten());
+    Some(PlannedOn {
+        uid: text(referenced, tags::REFERENCED_SOP_INSTANCE_UID)?,
+        target: target
+            .filter(|n| (0.0..1e9).contains(n) && n.fract() == 0.0)
+            .map(|n| n as usize),
+    })
+}
+
 /// `None` for a day that is absent or none of the calendar.
 fn date(object: &InMemDicomObject, tag: Tag) -> Option<Date> {
     // Files of before 1993 have points between.
     let digits: String = text(object, tag)?.chars().filter(|c| *c != '.').collect();
     Date::strptime("%Y%m%d", digits).ok()
-}
-
-fn identity(data: &InMemDicomObject) -> Identity {
-    Identity {
-        patient_name: text(data, tags::PATIENT_NAME).unwrap_or_default(),
-        patient_id: text(data, tags::PATIENT_ID).unwrap_or_default(),
-        study: text(data, tags::STUDY_INSTANCE_UID).unwrap_or_else(new_uid),
-        frame_of_reference: text(data, tags::FRAME_OF_REFERENCE_UID).unwrap_or_else(new_uid),
-    }
 }

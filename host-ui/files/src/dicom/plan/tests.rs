@@ -22,6 +22,7 @@ pub fn plan(count: usize) -> SeedPlan {
         label: "test".to_owned(),
         identity: Identity::new(),
         uid: new_uid(),
+        structure_set: None,
         prescription_gy: Some(145.0),
         planned_on: Some(Date::constant(2026, 10, 31)),
         source: PlanSource {

@@ -1,6 +1,6 @@
 //! A plan as DICOM: one source for each strength, one channel with a fixed source for each seed.
 
-use super::super::write::{common, decimals, item, now, sequence, string, whole};
+use super::super::write::{common, decimals, item, now, reference, sequence, string, whole};
 use super::{Date, PlanSeed, SeedPlan};
 use crate::error::ContentError;
 use dicom_core::VR;
@@ -14,6 +14,10 @@ use stylet_anatomy::ras_from_lps;
 const SECONDS_PER_DAY: f64 = 86_400.0;
 const DOSE_REFERENCE: usize = 1;
 const SETUP: usize = 1;
+/// The usual needle; no file that is read here says another length.
+const NEEDLE_LENGTH_MM: f64 = 200.0;
+
+type Element = dicom_core::DataElement<InMemDicomObject>;
 
 /// The whole file.
 pub fn bytes(plan: &SeedPlan) -> Result<Vec<u8>, ContentError> {
@@ -36,16 +40,30 @@ pub fn bytes(plan: &SeedPlan) -> Result<Vec<u8>, ContentError> {
     ));
     object.put(string(tags::RT_PLAN_DATE, VR::DA, &planned_on));
     object.put(string(tags::RT_PLAN_TIME, VR::TM, &time));
-    // There may be no structure set that the plan was made on.
-    object.put(string(tags::RT_PLAN_GEOMETRY, VR::CS, "PATIENT"));
+    match &plan.structure_set {
+        Some(set) => {
+            object.put(string(tags::RT_PLAN_GEOMETRY, VR::CS, "PATIENT"));
+            let set = reference(uids::RT_STRUCTURE_SET_STORAGE, &set.uid);
+            object.put(sequence(tags::REFERENCED_STRUCTURE_SET_SEQUENCE, vec![set]));
+        }
+        // PATIENT would need a structure set.
+        None => {
+            object.put(string(tags::RT_PLAN_GEOMETRY, VR::CS, "TREATMENT_DEVICE"));
+        }
+    }
     object.put(string(tags::APPROVAL_STATUS, VR::CS, "UNAPPROVED"));
     if let Some(gy) = plan.prescription_gy {
-        let reference = item([
+        let target = plan.structure_set.as_ref().and_then(|set| set.target);
+        let kind = if target.is_some() { "VOLUME" } else { "SITE" };
+        let mut reference = item([
             whole(tags::DOSE_REFERENCE_NUMBER, DOSE_REFERENCE),
-            string(tags::DOSE_REFERENCE_STRUCTURE_TYPE, VR::CS, "SITE"),
+            string(tags::DOSE_REFERENCE_STRUCTURE_TYPE, VR::CS, kind),
             string(tags::DOSE_REFERENCE_TYPE, VR::CS, "TARGET"),
             decimals(tags::TARGET_PRESCRIPTION_DOSE, &[gy]),
         ]);
+        if let Some(number) = target {
+            reference.put(whole(tags::REFERENCED_ROI_NUMBER, number));
+        }
         object.put(sequence(tags::DOSE_REFERENCE_SEQUENCE, vec![reference]));
     }
     let referenced = item([whole(tags::REFERENCED_BRACHY_APPLICATION_SETUP_NUMBER, SETUP)]);
@@ -133,19 +151,11 @@ fn setup(plan: &SeedPlan, strengths: &[Strength]) -> InMemDicomObject {
     let mean_life_s = plan.source.half_life_days * SECONDS_PER_DAY / std::f64::consts::LN_2;
     for ((seed, needle), number) in plan.seeds.iter().zip(numbers).zip(1..) {
         let source = strengths.partition_point(|s| s.cmp(&Strength::of(seed)).is_lt()) + 1;
-        channels.push(item([
+        let mut channel = item([
             whole(tags::CHANNEL_NUMBER, number),
             string(tags::CHANNEL_LENGTH, VR::DS, ""),
             decimals(tags::CHANNEL_TOTAL_TIME, &[mean_life_s]),
             string(tags::SOURCE_MOVEMENT_TYPE, VR::CS, "FIXED"),
-            whole(tags::SOURCE_APPLICATOR_NUMBER, needle as usize),
-            string(
-                tags::SOURCE_APPLICATOR_ID,
-                VR::SH,
-                &seed.hole.chars().take(16).collect::<String>(),
-            ),
-            string(tags::SOURCE_APPLICATOR_TYPE, VR::CS, "RIGID"),
-            string(tags::SOURCE_APPLICATOR_LENGTH, VR::DS, ""),
             string(tags::TRANSFER_TUBE_NUMBER, VR::IS, ""),
             whole(tags::REFERENCED_SOURCE_NUMBER, source),
             whole(tags::NUMBER_OF_CONTROL_POINTS, 2),
@@ -154,7 +164,14 @@ fn setup(plan: &SeedPlan, strengths: &[Strength]) -> InMemDicomObject {
                 tags::BRACHY_CONTROL_POINT_SEQUENCE,
                 vec![point(seed, 0, 0.0), point(seed, 1, 100.0)],
             ),
-        ]));
+        ]);
+        needle
+            .into_iter()
+            .flat_map(|n| applicator(n, &seed.hole))
+            .for_each(|element| {
+                channel.put(element);
+            });
+        channels.push(channel);
     }
     let total_kerma: f64 = plan.seeds.iter().map(|s| s.strength_u * mean_life_s / 3600.0).sum();
     item([
@@ -165,8 +182,24 @@ fn setup(plan: &SeedPlan, strengths: &[Strength]) -> InMemDicomObject {
     ])
 }
 
-/// The number of each seed's needle: its own, or the next free one for each hole of needles without a number.
-fn needle_numbers(plan: &SeedPlan) -> Vec<u32> {
+/// A needle and its hole; there is no structure that stands for it.
+fn applicator(number: u32, hole: &str) -> [Element; 5] {
+    [
+        whole(tags::SOURCE_APPLICATOR_NUMBER, number as usize),
+        string(
+            tags::SOURCE_APPLICATOR_ID,
+            VR::SH,
+            &hole.chars().take(16).collect::<String>(),
+        ),
+        string(tags::SOURCE_APPLICATOR_TYPE, VR::CS, "RIGID"),
+        decimals(tags::SOURCE_APPLICATOR_LENGTH, &[NEEDLE_LENGTH_MM]),
+        string(tags::REFERENCED_ROI_NUMBER, VR::IS, ""),
+    ]
+}
+
+/// The number of each seed's needle: its own, or the next free one for each hole of needles without a number; none for seeds
+/// without either.
+fn needle_numbers(plan: &SeedPlan) -> Vec<Option<u32>> {
     let mut last = plan.seeds.iter().filter_map(|s| s.needle).max().unwrap_or(0);
     let mut by_hole = BTreeMap::new();
     let mut numbers = Vec::with_capacity(plan.seeds.len());
@@ -177,7 +210,7 @@ fn needle_numbers(plan: &SeedPlan) -> Vec<u32> {
                 last
             })
         };
-        numbers.push(seed.needle.unwrap_or_else(of_hole));
+        numbers.push(seed.needle.or_else(|| (!seed.hole.is_empty()).then(of_hole)));
     }
     numbers
 }

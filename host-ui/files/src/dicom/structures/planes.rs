@@ -13,7 +13,7 @@ pub const WIDEST: f64 = 3.5;
 /// Corners nearer than this are the same corner.
 const SAME_CORNER_M: f64 = 1e-6;
 /// Contours of one plane whose nesting is looked at.
-const MOST_NESTED: usize = 32;
+pub const MOST_NESTED: usize = 32;
 /// Gaps that a note lists.
 const LISTED: usize = 4;
 
@@ -72,6 +72,25 @@ fn shape(contour: &[Vector3<f64>]) -> Vec<[i64; 3]> {
     from_least(&mut corners);
     from_least(&mut reversed);
     corners.min(reversed)
+}
+
+/// The contours plane by plane, as polygons in their plane.
+pub fn flat(contours: &[Vec<Vector3<f64>>], normal: Vector3<f64>) -> Vec<Vec<Vec<[f64; 2]>>> {
+    let aside = if normal.x.abs() < 0.9 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
+    let across = (aside - normal * aside.dot(&normal)).normalize();
+    let axes = Matrix3::from_columns(&[across, normal.cross(&across), normal]);
+    let mut by_height: Vec<&Vec<Vector3<f64>>> = contours.iter().filter(|c| !c.is_empty()).collect();
+    let height = |c: &Vec<Vector3<f64>>| c[0].dot(&normal);
+    by_height.sort_by(|a, b| height(a).total_cmp(&height(b)));
+    let polygon = |c: &&Vec<Vector3<f64>>| c.iter().map(|p| axes.tr_mul(p)).map(|p| [p.x, p.y]).collect();
+    by_height
+        .chunk_by(|a, b| height(b) - height(a) < SAME_PLANE_M)
+        .map(|of_plane| of_plane.iter().map(polygon).collect())
+        .collect()
 }
 
 fn planes(structure: &Contoured, normal: Vector3<f64>) -> Vec<Plane> {

@@ -1,6 +1,7 @@
 //! Contours to voxels: a voxel belongs to a structure that covers at least half of it in the plane of the slice.
 
 use super::super::super::element::short;
+use super::super::super::overlap::in_cc;
 use super::super::images::Grid;
 use super::planes::WIDEST;
 use super::{Contoured, SAME_PLANE_M};
@@ -74,7 +75,10 @@ pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<Str
         .iter()
         .enumerate()
         .filter(|(s, _)| taken[s + 1] > 0)
-        .map(|(s, c)| format!("{} ({} of {} voxels)", short(&c.name), taken[s + 1], sizes[s]))
+        .map(|(s, c)| {
+            let cc = in_cc(taken[s + 1] as f64 * grid.frame.spacing_m.iter().product::<f64>());
+            format!("{} ({} of {} voxels) {cc}", short(&c.name), taken[s + 1], sizes[s])
+        })
         .collect();
     let mut notes: Vec<String> = structures
         .iter()

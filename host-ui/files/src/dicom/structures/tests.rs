@@ -1,6 +1,6 @@
 //! Contours against closed forms, and outlines that give their voxels back.
 
-use super::super::write::Identity;
+use super::super::Identity;
 use super::super::{checked, images};
 use super::*;
 use nalgebra::Rotation3;
@@ -25,6 +25,15 @@ fn circle(grid: &Grid, slice: f64, middle_mm: [f64; 2], radius_mm: f64) -> Vec<V
             .place_m([mm[0] * 1e-3 / side[0], mm[1] * 1e-3 / side[1], slice])
     };
     (0..200).map(corner).collect()
+}
+
+fn written(v: &Voxels) -> Result<Vec<u8>, ContentError> {
+    write::bytes(&write::Written {
+        uid: "2.25.1",
+        identity: &Identity::new(),
+        images: &[],
+        structures: &write::of_voxels(v)?,
+    })
 }
 
 fn set(structures: Vec<(&str, Vec<Vec<Vector3<f64>>>)>) -> StructureSet {
@@ -190,7 +199,7 @@ fn voxels_that_are_outlined_and_drawn_again_are_the_same() {
         frame: grid.frame.clone(),
         names: [(1, "Prostate".to_owned()), (3, "Urethra".to_owned())].into(),
     };
-    let bytes = write::bytes(&v, &Identity::new()).unwrap();
+    let bytes = written(&v).unwrap();
     let set = StructureSet::of(&checked::read(&bytes).unwrap()).unwrap();
     assert_eq!(
         set.structures.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(),
@@ -258,7 +267,7 @@ fn missing_planes_are_bridged_and_contours_there_twice_count_once_and_both_are_r
             frame: grid.frame.clone(),
             names: [(1, "Prostate".to_owned())].into(),
         };
-        let mut object = checked::read(&write::bytes(&v, &Identity::new()).unwrap()).unwrap();
+        let mut object = checked::read(&written(&v).unwrap()).unwrap();
         let item = |c: &Vec<Vector3<f64>>| {
             let mm: Vec<f64> = c.iter().flat_map(|p| [-p.x * 1e3, -p.y * 1e3, p.z * 1e3]).collect();
             super::super::write::item([
@@ -299,4 +308,21 @@ fn missing_planes_are_bridged_and_contours_there_twice_count_once_and_both_are_r
     );
     let even = (2..30).map(f64::from).map(|k| drawn(&k)).collect();
     assert_eq!(volumes(even).1, "");
+}
+
+/// An outline of more than some 1,300 corners could not be written at all.
+#[test]
+fn an_outline_of_many_corners_is_written_and_read() {
+    let grid = grid([1500, 3, 2], [0.1, 0.1, 1.0]);
+    // A comb: every second column is longer.
+    let inside = |n: usize| n / 1500 % 3 == 0 || (n / 1500 % 3 == 1 && n % 2 == 0);
+    let v = Voxels {
+        dims: grid.dims,
+        labels: (0..1500 * 3 * 2).map(|n| u8::from(inside(n))).collect(),
+        frame: grid.frame.clone(),
+        names: [(1, "Prostate".to_owned())].into(),
+    };
+    let set = StructureSet::of(&checked::read(&written(&v).unwrap()).unwrap()).unwrap();
+    assert!(set.structures[0].contours[0].len() > 2900);
+    assert_eq!(set.voxels(Some(grid)).unwrap().labels, v.labels);
 }

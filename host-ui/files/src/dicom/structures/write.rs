@@ -1,8 +1,11 @@
-//! A label volume as RT Structure Set: one structure a label, outlined slice by slice along its voxels.
+//! Structures as RT Structure Set: those of another one contour by contour, those of a label volume slice by slice along its voxels.
 
 use super::super::super::volume::Voxels;
-use super::super::write::{Identity, common, decimals, item, now, sequence, string, whole};
-use super::outline;
+use super::super::Identity;
+use super::super::images::Slice;
+use super::super::write::{bytes as file_bytes, implicit_bytes};
+use super::super::write::{common, decimals, item, now, reference, sequence, string, whole};
+use super::{StructureSet, nested, outline};
 use crate::error::ContentError;
 use dicom_core::DataElement;
 use dicom_core::VR;
@@ -11,6 +14,12 @@ use dicom_dictionary_std::{tags, uids};
 use dicom_object::InMemDicomObject;
 use nalgebra::Vector3;
 use stylet_anatomy::{Organ, ras_from_lps};
+
+/// Class of a study in references to it; retired for all else.
+const STUDY_CLASS: &str = "1.2.840.10008.3.1.2.3.1";
+
+/// Three numbers of 16 characters for each corner then fit into 64 KiB.
+const MOST_CORNERS: usize = 65_534 / (3 * 17);
 
 /// Distinct on a dark background.
 const COLOURS: [[u8; 3]; 8] = [
@@ -24,30 +33,76 @@ const COLOURS: [[u8; 3]; 8] = [
     [240, 150, 190],
 ];
 
-/// The whole file.
-pub fn bytes(v: &Voxels, of: &Identity) -> Result<Vec<u8>, ContentError> {
+/// A structure to be written; corners in RAS, m. Structures are numbered from 1 in their order.
+pub struct Outlined {
+    /// Name of the structure.
+    pub name: String,
+    /// Closed polygons in planes; what lies in two of one plane is outside.
+    pub contours: Vec<Vec<Vector3<f64>>>,
+}
+
+/// A structure set, and what it belongs to.
+pub struct Written<'a> {
+    /// SOP instance UID of the file.
+    pub uid: &'a str,
+    /// Patient, study and frame of reference.
+    pub identity: &'a Identity,
+    /// The images that the structures are drawn on, if there are any.
+    pub images: &'a [Slice],
+    /// The structures.
+    pub structures: &'a [Outlined],
+}
+
+/// The structures of a label volume, by label.
+pub fn of_voxels(v: &Voxels) -> Result<Vec<Outlined>, ContentError> {
     let mut present = [false; 256];
     v.labels.iter().for_each(|&l| present[usize::from(l)] = true);
-    let labels: Vec<u8> = (1..=255).filter(|&l| present[usize::from(l)]).collect();
-    if labels.is_empty() {
+    let labels = (1..=255).filter(|&l| present[usize::from(l)]);
+    let all: Vec<Outlined> = labels
+        .map(|label| Outlined {
+            name: v.names.get(&label).cloned().unwrap_or_else(|| format!("label {label}")),
+            contours: contours(v, label),
+        })
+        .collect();
+    if all.is_empty() {
         return Err(ContentError::Invalid(
             "every voxel is 0, so there is no structure to write".to_owned(),
         ));
     }
-    let name = |label: u8| v.names.get(&label).cloned().unwrap_or_else(|| format!("label {label}"));
-    let numbered = || labels.iter().zip(1_usize..);
+    Ok(all)
+}
+
+/// The structures of another structure set, as they are drawn.
+pub fn of_set(set: StructureSet) -> Vec<Outlined> {
+    set.structures
+        .into_iter()
+        .map(|s| Outlined {
+            name: s.name,
+            contours: s.contours,
+        })
+        .collect()
+}
+
+/// The whole file.
+pub fn bytes(set: &Written) -> Result<Vec<u8>, ContentError> {
+    let of = set.identity;
+    let numbered = || set.structures.iter().zip(1_usize..);
     let (date, time) = now();
     let mut object = common(uids::RT_STRUCTURE_SET_STORAGE, "RTSTRUCT", of);
+    object.put(string(tags::SOP_INSTANCE_UID, VR::UI, set.uid));
     object.put(string(tags::STRUCTURE_SET_LABEL, VR::SH, "Stylet"));
     object.put(string(tags::STRUCTURE_SET_DATE, VR::DA, &date));
     object.put(string(tags::STRUCTURE_SET_TIME, VR::TM, &time));
-    let frame = item([string(tags::FRAME_OF_REFERENCE_UID, VR::UI, &of.frame_of_reference)]);
-    object.put(sequence(tags::REFERENCED_FRAME_OF_REFERENCE_SEQUENCE, vec![frame]));
-    let roi = |(&label, number): (&u8, usize)| {
+    object.put(sequence(tags::REFERENCED_FRAME_OF_REFERENCE_SEQUENCE, vec![frame(set)]));
+    let roi = |(structure, number): (&Outlined, usize)| {
         item([
             whole(tags::ROI_NUMBER, number),
             string(tags::REFERENCED_FRAME_OF_REFERENCE_UID, VR::UI, &of.frame_of_reference),
-            string(tags::ROI_NAME, VR::LO, &name(label)),
+            string(
+                tags::ROI_NAME,
+                VR::LO,
+                &structure.name.chars().take(64).collect::<String>(),
+            ),
             string(tags::ROI_GENERATION_ALGORITHM, VR::CS, ""),
         ])
     };
@@ -55,7 +110,7 @@ pub fn bytes(v: &Voxels, of: &Identity) -> Result<Vec<u8>, ContentError> {
         tags::STRUCTURE_SET_ROI_SEQUENCE,
         numbered().map(roi).collect(),
     ));
-    let drawn = |(&label, number): (&u8, usize)| {
+    let drawn = |(structure, number): (&Outlined, usize)| {
         let colour = COLOURS[(number - 1) % COLOURS.len()].map(|c| c.to_string());
         item([
             DataElement::new(
@@ -63,19 +118,19 @@ pub fn bytes(v: &Voxels, of: &Identity) -> Result<Vec<u8>, ContentError> {
                 VR::IS,
                 PrimitiveValue::Strs(colour.to_vec().into()),
             ),
-            sequence(tags::CONTOUR_SEQUENCE, contours(v, label)),
+            sequence(tags::CONTOUR_SEQUENCE, drawn(structure, set.images)),
             whole(tags::REFERENCED_ROI_NUMBER, number),
         ])
     };
     object.put(sequence(tags::ROI_CONTOUR_SEQUENCE, numbered().map(drawn).collect()));
-    let observed = |(&label, number): (&u8, usize)| {
+    let observed = |(structure, number): (&Outlined, usize)| {
         item([
             whole(tags::OBSERVATION_NUMBER, number),
             whole(tags::REFERENCED_ROI_NUMBER, number),
             string(
                 tags::RTROI_INTERPRETED_TYPE,
                 VR::CS,
-                Organ::of_name(&name(label)).map_or("", Organ::dicom_type),
+                Organ::of_name(&structure.name).map_or("", Organ::dicom_type),
             ),
             string(tags::ROI_INTERPRETER, VR::PN, ""),
         ])
@@ -85,34 +140,64 @@ pub fn bytes(v: &Voxels, of: &Identity) -> Result<Vec<u8>, ContentError> {
         numbered().map(observed).collect(),
     ));
     object.put(string(tags::APPROVAL_STATUS, VR::CS, "UNAPPROVED"));
-    super::super::write::bytes(object)
+    let contours = set.structures.iter().flat_map(|s| &s.contours);
+    match contours.into_iter().any(|c| c.len() > MOST_CORNERS) {
+        true => implicit_bytes(object),
+        false => file_bytes(object),
+    }
 }
 
-fn contours(v: &Voxels, label: u8) -> Vec<InMemDicomObject> {
+/// The frame of reference, and the study and the series of the images in it.
+fn frame(set: &Written) -> InMemDicomObject {
+    let of = set.identity;
+    let mut frame = item([string(tags::FRAME_OF_REFERENCE_UID, VR::UI, &of.frame_of_reference)]);
+    let Some(first) = set.images.first() else {
+        return frame;
+    };
+    let images = set.images.iter().map(|i| reference(&i.sop_class, &i.uid)).collect();
+    let series = item([
+        string(tags::SERIES_INSTANCE_UID, VR::UI, &first.series),
+        sequence(tags::CONTOUR_IMAGE_SEQUENCE, images),
+    ]);
+    let mut study = reference(STUDY_CLASS, &first.study);
+    study.put(sequence(tags::RT_REFERENCED_SERIES_SEQUENCE, vec![series]));
+    frame.put(sequence(tags::RT_REFERENCED_STUDY_SEQUENCE, vec![study]));
+    frame
+}
+
+fn drawn(structure: &Outlined, images: &[Slice]) -> Vec<InMemDicomObject> {
+    // Several loops may be a body with a hole; then all contours of a structure are of that kind.
+    let kind = match nested(&structure.contours) {
+        true => "CLOSEDPLANAR_XOR",
+        false => "CLOSED_PLANAR",
+    };
+    let contour = |corners: &Vec<Vector3<f64>>| {
+        let points = corners.iter().flat_map(|corner| {
+            let lps: Vector3<f64> = ras_from_lps(*corner) * 1e3;
+            <[f64; 3]>::from(lps)
+        });
+        let mut contour = item([
+            string(tags::CONTOUR_GEOMETRIC_TYPE, VR::CS, kind),
+            whole(tags::NUMBER_OF_CONTOUR_POINTS, corners.len()),
+            decimals(tags::CONTOUR_DATA, &points.collect::<Vec<_>>()),
+        ]);
+        if let Some(image) = Slice::under(images, corners) {
+            let image = reference(&image.sop_class, &image.uid);
+            contour.put(sequence(tags::CONTOUR_IMAGE_SEQUENCE, vec![image]));
+        }
+        contour
+    };
+    structure.contours.iter().map(contour).collect()
+}
+
+fn contours(v: &Voxels, label: u8) -> Vec<Vec<Vector3<f64>>> {
     let [columns, rows, slices] = v.dims;
     let mut all = Vec::new();
     for k in 0..slices {
         let inside = |i: usize, j: usize| v.labels[(k * rows + j) * columns + i] == label;
-        let loops = outline::loops([columns, rows], inside);
-        // Several loops may be a body with a hole: what lies in two of them is outside.
-        let kind = if loops.len() > 1 {
-            "CLOSEDPLANAR_XOR"
-        } else {
-            "CLOSED_PLANAR"
-        };
-        for corners in loops {
-            let number = corners.len();
-            let points = corners.into_iter().flat_map(|[i, j]| {
-                let place = v.frame.place_m([i as f64 - 0.5, j as f64 - 0.5, k as f64]);
-                let lps: Vector3<f64> = ras_from_lps(place) * 1e3;
-                <[f64; 3]>::from(lps)
-            });
-            all.push(item([
-                string(tags::CONTOUR_GEOMETRIC_TYPE, VR::CS, kind),
-                whole(tags::NUMBER_OF_CONTOUR_POINTS, number),
-                decimals(tags::CONTOUR_DATA, &points.collect::<Vec<_>>()),
-            ]));
-        }
+        let place = |[i, j]: outline::Corner| v.frame.place_m([i as f64 - 0.5, j as f64 - 0.5, k as f64]);
+        let loops = outline::loops([columns, rows], inside).into_iter();
+        all.extend(loops.map(|corners| corners.into_iter().map(place).collect::<Vec<_>>()));
     }
     all
 }

@@ -18,6 +18,7 @@ fn plan() -> Vec<u8> {
         label: "test".to_owned(),
         identity: Identity::new(),
         uid: new_uid(),
+        structure_set: None,
         prescription_gy: Some(145.0),
         planned_on: None,
         source: PlanSource {

@@ -1,0 +1,247 @@
+//! A dose out of DICOM: any even grid along the patient's axes, whichever way its rows and frames run.
+
+use super::super::super::element::{short, voxel_count};
+use super::super::values::{exactly, items, name, needed, numbers, text};
+use super::super::{Identity, Object, checked};
+use crate::error::{ContentError, FileError};
+use crate::progress::Progress;
+use dicom_dictionary_std::{tags, uids};
+use dicom_object::InMemDicomObject;
+use nalgebra::Vector3;
+use std::path::Path;
+use stylet_anatomy::ras_from_lps;
+
+/// Axes that are off the patient's by more, as a cosine of what is across them, are oblique.
+const OBLIQUE: f64 = 1e-3;
+/// Frames may be so far from even distances, as a share of one.
+const UNEVEN: f64 = 1e-3;
+
+/// A dose as a file has it, its voxels in the order of [`super::DoseImage`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReadDose {
+    /// Patient, study and frame of reference.
+    pub identity: Identity,
+    /// SOP instance UID of the dose itself.
+    pub uid: String,
+    /// SOP instance UID of the RT Plan that it is of.
+    pub plan: Option<String>,
+    /// SOP instance UID of the structure set of its histograms.
+    pub structure_set: Option<String>,
+    /// Voxels along x, y, z.
+    pub dims: [usize; 3],
+    /// Middle of the first voxel (RAS), in m.
+    pub origin_m: [f64; 3],
+    /// Sides of a voxel, in m.
+    pub spacing_m: [f64; 3],
+    /// Dose of each voxel, in Gy, x fastest.
+    pub dose_gy: Vec<f64>,
+}
+
+/// The dose in the file at `path`.
+pub fn of_file(path: &Path) -> Result<ReadDose, FileError> {
+    let refused = |why| FileError::of(path, why);
+    let bytes = crate::bytes::whole(path, &Progress::default()).map_err(refused)?;
+    let (object, pixels, is_big_endian) = checked::read_with_pixels(&bytes).map_err(refused)?;
+    of(&object, pixels, is_big_endian).map_err(refused)
+}
+
+fn of(object: &Object, pixels: &[u8], is_big_endian: bool) -> Result<ReadDose, ContentError> {
+    if object.sop_class != uids::RT_DOSE_STORAGE {
+        return Err(ContentError::Invalid(format!(
+            "it is DICOM of another kind (SOP class {}); a dose is an RT Dose",
+            short(&object.sop_class)
+        )));
+    }
+    let data = &object.data;
+    let units = text(data, tags::DOSE_UNITS).unwrap_or_default();
+    if units != "GY" {
+        let units = short(&units);
+        return Err(ContentError::Invalid(format!(
+            "its dose is in \"{units}\"; only doses in GY are read"
+        )));
+    }
+    let grid = Layout::of(data)?;
+    let raw = values(data, pixels, is_big_endian, grid.counts.iter().product())?;
+    let scaling = needed(data, tags::DOSE_GRID_SCALING, f64::MIN_POSITIVE, 1e12)?;
+    let first = |tag| {
+        let item = items(data, tag).first()?;
+        text(item, tags::REFERENCED_SOP_INSTANCE_UID)
+    };
+    Ok(ReadDose {
+        identity: Identity::of(object),
+        uid: text(data, tags::SOP_INSTANCE_UID).unwrap_or_default(),
+        plan: first(tags::REFERENCED_RT_PLAN_SEQUENCE),
+        structure_set: first(tags::REFERENCED_STRUCTURE_SET_SEQUENCE),
+        dims: grid.dims(),
+        origin_m: grid.origin_m(),
+        spacing_m: grid.spacing_m(),
+        dose_gy: grid.in_order(&raw).map(|value| value * scaling).collect(),
+    })
+}
+
+/// How the voxels of a file lie in the patient: columns, rows and frames, in this order, each with an axis of the patient.
+struct Layout {
+    /// Columns, rows, frames.
+    counts: [usize; 3],
+    /// Which axis of the patient each of them runs along.
+    axes: [usize; 3],
+    /// The step along that axis (RAS, m), negative where it runs the other way.
+    steps_m: [f64; 3],
+    /// Middle of the first voxel of the file (RAS, m).
+    first_m: Vector3<f64>,
+}
+
+impl Layout {
+    fn of(data: &InMemDicomObject) -> Result<Self, ContentError> {
+        let missing = |tag| ContentError::Invalid(format!("{} is missing", name(tag)));
+        let count = |tag| needed(data, tag, 1.0, 65535.0).map(|n| n as usize);
+        let frames = match text(data, tags::NUMBER_OF_FRAMES) {
+            Some(_) => count(tags::NUMBER_OF_FRAMES)?,
+            None => 1,
+        };
+        let counts = [count(tags::COLUMNS)?, count(tags::ROWS)?, frames];
+        voxel_count(&counts.map(|c| c as u64))?;
+        let tag = tags::IMAGE_POSITION_PATIENT;
+        let first: [f64; 3] = exactly(data, tag)?.ok_or_else(|| missing(tag))?;
+        let tag = tags::IMAGE_ORIENTATION_PATIENT;
+        let [a, b, c, d, e, f] = exactly(data, tag)?.ok_or_else(|| missing(tag))?;
+        let tag = tags::PIXEL_SPACING;
+        let [between_rows, between_columns] = exactly(data, tag)?.ok_or_else(|| missing(tag))?;
+        let (row, column) = (Vector3::new(a, b, c), Vector3::new(d, e, f));
+        let across = row.cross(&column);
+        let steps = [
+            row * between_columns,
+            column * between_rows,
+            across * frame_step_mm(data, frames, Vector3::from(first), across)?,
+        ];
+        let mut axes = [0; 3];
+        let mut steps_m = [0.0; 3];
+        for (n, step) in steps.iter().enumerate() {
+            let ras = ras_from_lps(*step) * 1e-3;
+            let axis = ras.iamax();
+            let aside = ras.norm_squared() - ras[axis] * ras[axis];
+            // NaN compares false.
+            if !(aside.max(0.0).sqrt() <= OBLIQUE * ras.norm() && ras.norm() > 1e-6) {
+                return Err("its grid lies obliquely in the patient; export it along the patient's axes".into());
+            }
+            (axes[n], steps_m[n]) = (axis, ras[axis]);
+        }
+        let mut sorted = axes;
+        sorted.sort_unstable();
+        if sorted != [0, 1, 2] {
+            return Err(ContentError::Invalid(format!(
+                "{} gives no right angles",
+                name(tags::IMAGE_ORIENTATION_PATIENT)
+            )));
+        }
+        Ok(Self {
+            counts,
+            axes,
+            steps_m,
+            first_m: ras_from_lps(Vector3::from(first)) * 1e-3,
+        })
+    }
+
+    /// From columns, rows and frames to the patient's x, y, z.
+    fn turned<T: Copy + Default>(&self, of_file: [T; 3]) -> [T; 3] {
+        let mut turned = [T::default(); 3];
+        for (n, axis) in self.axes.into_iter().enumerate() {
+            turned[axis] = of_file[n];
+        }
+        turned
+    }
+
+    fn dims(&self) -> [usize; 3] {
+        self.turned(self.counts)
+    }
+
+    fn spacing_m(&self) -> [f64; 3] {
+        self.turned(self.steps_m.map(f64::abs))
+    }
+
+    fn origin_m(&self) -> [f64; 3] {
+        let mut origin = self.first_m;
+        for n in 0..3 {
+            origin[self.axes[n]] += (self.steps_m[n] * (self.counts[n] - 1) as f64).min(0.0);
+        }
+        origin.into()
+    }
+
+    /// The values of the file with x fastest, from right to left or however the file has them.
+    fn in_order<'a>(&'a self, raw: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+        let strides = [1, self.counts[0], self.counts[0] * self.counts[1]];
+        let (strides, is_turned) = (self.turned(strides), self.turned(self.steps_m.map(|s| s < 0.0)));
+        let [nx, ny, nz] = self.dims();
+        let at =
+            move |axis: usize, count: usize, i: usize| strides[axis] * if is_turned[axis] { count - 1 - i } else { i };
+        (0..nx * ny * nz).map(move |n| raw[at(0, nx, n % nx) + at(1, ny, n / nx % ny) + at(2, nz, n / nx / ny)])
+    }
+}
+
+/// The distance of frames along the normal of the rows, in mm; 1 where there is one frame without a thickness.
+fn frame_step_mm(
+    data: &InMemDicomObject,
+    frames: usize,
+    first_mm: Vector3<f64>,
+    across: Vector3<f64>,
+) -> Result<f64, ContentError> {
+    if frames == 1 {
+        let thickness = exactly::<1>(data, tags::SLICE_THICKNESS)?.map(|[mm]| mm);
+        return Ok(thickness.filter(|mm| *mm > 0.0).unwrap_or(1.0));
+    }
+    let offsets = numbers(data, tags::GRID_FRAME_OFFSET_VECTOR)?.unwrap_or_default();
+    let refused = |why: String| ContentError::Invalid(format!("{} {why}", name(tags::GRID_FRAME_OFFSET_VECTOR)));
+    if offsets.len() != frames {
+        return Err(refused(format!("has {} values for {frames} frames", offsets.len())));
+    }
+    // Either distances from the first frame, or coordinates along the patient.
+    let absolute = offsets[0] != 0.0;
+    if absolute && (offsets[0] - first_mm.z).abs() > 1e-3 {
+        return Err(refused(format!(
+            "begins with {}; it must begin with 0 or the height of the first frame",
+            offsets[0]
+        )));
+    }
+    let step = (offsets[frames - 1] - offsets[0]) / (frames - 1) as f64;
+    let is_even = |(n, offset): (usize, &f64)| (offset - offsets[0] - step * n as f64).abs() <= UNEVEN * step.abs();
+    if step == 0.0 || !offsets.iter().enumerate().all(is_even) {
+        return Err(refused("does not go in even steps; export an even grid".to_owned()));
+    }
+    Ok(match absolute && across.z < 0.0 {
+        true => -step,
+        false => step,
+    })
+}
+
+/// The stored numbers, unscaled.
+fn values(data: &InMemDicomObject, pixels: &[u8], is_big_endian: bool, count: usize) -> Result<Vec<f64>, ContentError> {
+    let bits = needed(data, tags::BITS_ALLOCATED, 1.0, 64.0)?;
+    if ![16.0, 32.0].contains(&bits) {
+        return Err(ContentError::Invalid(format!(
+            "its doses have {bits} bits; 16 and 32 are read"
+        )));
+    }
+    let is_signed = needed(data, tags::PIXEL_REPRESENTATION, 0.0, 1.0)? == 1.0;
+    let size = bits as usize / 8;
+    if pixels.len() < count * size {
+        return Err(ContentError::Invalid(format!(
+            "it is cut off: {count} voxels need {} bytes, and {} are there; copy or export it again",
+            count * size,
+            pixels.len()
+        )));
+    }
+    let value = |bytes: &[u8]| {
+        let mut b = [0_u8; 4];
+        b[..size].copy_from_slice(bytes);
+        if is_big_endian {
+            b[..size].reverse();
+        }
+        let unsigned = u32::from_le_bytes(b);
+        match (is_signed, size) {
+            (false, _) => f64::from(unsigned),
+            (true, 2) => f64::from(unsigned as u16 as i16),
+            (true, _) => f64::from(unsigned as i32),
+        }
+    };
+    Ok(pixels.chunks_exact(size).take(count).map(value).collect())
+}

@@ -1,0 +1,113 @@
+//! Structure set, plan and dose of one study, each of which names the others it was made from.
+
+use std::path::{Path, PathBuf};
+use stylet_base::write_whole;
+use stylet_dose::{DoseGrid, Dvh};
+use stylet_files::dicom::dose::{self, DoseImage, DoseOf, Histogram};
+use stylet_files::dicom::images::Slice;
+use stylet_files::dicom::plan::{self, PlannedOn, SeedPlan};
+use stylet_files::dicom::structures::write::{self as structures, Outlined};
+use stylet_files::dicom::{Identity, new_uid};
+use stylet_files::{ContentError, FileError};
+
+/// Names of the files.
+const NAMES: [&str; 3] = ["structure_set.dcm", "plan.dcm", "dose.dcm"];
+/// A histogram ends at so many prescriptions, far above every limit.
+const MOST_PRESCRIPTIONS: f64 = 10.0;
+/// Bins of a histogram: its numbers have to fit into 64 KiB.
+const MOST_BINS: f64 = 2000.0;
+
+/// What a study is made of. Patient frame (RAS, m).
+pub struct LinkedStudy<'a> {
+    /// Patient, study and frame of reference of all three.
+    pub identity: Identity,
+    /// The images that the structures are drawn on; none if there are none.
+    pub images: Vec<Slice>,
+    /// The structures, numbered from 1 in their order.
+    pub structures: Vec<Outlined>,
+    /// Number of the structure that the prescription is for.
+    pub target: Option<usize>,
+    /// The seeds; which study and structure set they belong to is written anew.
+    pub plan: SeedPlan,
+    /// Dose of the seeds.
+    pub dose: &'a DoseGrid,
+    /// Histograms by the number of their structure.
+    pub histograms: Vec<(usize, &'a Dvh)>,
+    /// Prescribed dose, in Gy.
+    pub prescription_gy: f64,
+}
+
+/// UIDs of what was written, and where it is.
+pub struct WrittenStudy {
+    /// Structure set, plan, dose.
+    pub files: [PathBuf; 3],
+    /// SOP instance UIDs, in the same order.
+    pub uids: [String; 3],
+}
+
+/// Writes the three files into a folder.
+pub fn write(folder: &Path, study: LinkedStudy) -> Result<WrittenStudy, FileError> {
+    let files = NAMES.map(|name| folder.join(name));
+    let uids = [new_uid(), new_uid(), new_uid()];
+    let [structure_set, plan_uid, dose_uid] = &uids;
+    let put = |n: usize, bytes: Result<Vec<u8>, ContentError>| {
+        let bytes = bytes.map_err(|why| FileError::of(&files[n], why))?;
+        let unwritable = |e: stylet_base::WriteError| ContentError::Unwritable(e.source.to_string());
+        write_whole(&files[n], &bytes).map_err(|e| FileError::of(&files[n], unwritable(e)))
+    };
+    put(
+        0,
+        structures::bytes(&structures::Written {
+            uid: structure_set,
+            identity: &study.identity,
+            images: &study.images,
+            structures: &study.structures,
+        }),
+    )?;
+    let plan = SeedPlan {
+        identity: study.identity.clone(),
+        uid: plan_uid.clone(),
+        structure_set: Some(PlannedOn {
+            uid: structure_set.clone(),
+            target: study.target,
+        }),
+        ..study.plan
+    };
+    put(1, plan::bytes(&plan))?;
+    let histograms: Vec<Histogram> = study
+        .histograms
+        .iter()
+        .map(|(number, dvh)| histogram(*number, dvh, study.prescription_gy))
+        .collect();
+    let image = DoseImage {
+        dims: study.dose.dims(),
+        origin_m: study.dose.centre_m([0; 3]),
+        spacing_m: study.dose.spacing_m(),
+        dose_gy: study.dose.dose_gy(),
+    };
+    let of = DoseOf {
+        uid: dose_uid,
+        identity: &study.identity,
+        plan: plan_uid,
+        structure_set: Some(structure_set),
+        histograms: &histograms,
+    };
+    put(2, dose::bytes(&image, &of))?;
+    Ok(WrittenStudy { files, uids })
+}
+
+/// In whole gray, or coarser where there would be too many bins.
+fn histogram(structure: usize, dvh: &Dvh, prescription_gy: f64) -> Histogram {
+    let most_gy = dvh.highest_gy().min(MOST_PRESCRIPTIONS * prescription_gy);
+    let bin_gy = (most_gy / MOST_BINS).ceil().max(1.0);
+    Histogram {
+        structure,
+        bin_gy,
+        at_least_m3: dvh
+            .bins(bin_gy, most_gy + bin_gy)
+            .iter()
+            .map(|bin| bin.at_least_m3)
+            .collect(),
+        range_gy: [dvh.lowest_gy(), dvh.mean_gy(), dvh.highest_gy()],
+    }
+}

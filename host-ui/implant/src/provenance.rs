@@ -1,0 +1,81 @@
+//! What a result was made from: each input with its SHA-256, the program with its version, and when.
+
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+use std::io::{Error, Read};
+use std::path::{Path, PathBuf};
+use stylet_base::format::utc_now;
+use stylet_base::input;
+
+/// Read at a time.
+const PART_BYTES: usize = 1 << 16;
+
+/// An input that could not be read again for its digest.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: its digest cannot be computed ({why}); was it moved?", .path.display())]
+pub struct DigestError {
+    /// The file.
+    pub path: PathBuf,
+    /// What the system reported.
+    pub why: Error,
+}
+
+/// Program, version, time, and each of the `inputs` by the option that named it, with size and SHA-256.
+pub fn made(inputs: &[(&str, &Path)]) -> Result<Value, DigestError> {
+    let inputs: Result<Vec<Value>, DigestError> = inputs
+        .iter()
+        .map(|(option, path)| {
+            let (sha256, bytes) = sha256(path)?;
+            Ok(json!({ "option": option, "file": path.display().to_string(), "bytes": bytes, "sha256": sha256 }))
+        })
+        .collect();
+    Ok(json!({
+        "program": "host-ui",
+        "version": env!("CARGO_PKG_VERSION"),
+        "made_at": utc_now(),
+        "inputs": inputs?,
+    }))
+}
+
+/// Digest in hexadecimal digits, and size in bytes.
+fn sha256(path: &Path) -> Result<(String, u64), DigestError> {
+    let failed = |why| DigestError {
+        path: path.to_owned(),
+        why,
+    };
+    let (mut file, _) = input::open(path).map_err(|why| failed(Error::other(why.to_string())))?;
+    let (mut digest, mut bytes) = (Sha256::new(), 0);
+    let mut part = vec![0; PART_BYTES];
+    loop {
+        let count = file.read(&mut part).map_err(failed)?;
+        if count == 0 {
+            break;
+        }
+        digest.update(&part[..count]);
+        bytes += count as u64;
+    }
+    let hex = digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+    Ok((hex, bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A result said nothing of the files that it was made from.
+    #[test]
+    fn an_input_is_named_with_its_digest() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("abc");
+        std::fs::write(&path, "abc").unwrap();
+        let made = made(&[("--seeds", &path)]).unwrap();
+        // FIPS 180-2, appendix B.1.
+        assert_eq!(
+            made["inputs"][0]["sha256"],
+            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+        );
+        assert_eq!(made["inputs"][0]["bytes"], 3);
+        assert!(made["version"].is_string() && made["made_at"].is_string());
+        assert!(super::made(&[("--seeds", &folder.path().join("none"))]).is_err());
+    }
+}

@@ -1,0 +1,125 @@
+//! `host-ui compare`: what two doses differ by.
+
+use super::CommandError;
+use clap::Args;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use stylet_implant::provenance;
+use stylet_implant::readers::{DoseFile, read_any_dose};
+
+/// Doses below this share of the highest are left out of relative differences.
+const USUAL_THRESHOLD_PERCENT: f64 = 10.0;
+
+const HELP: &str = "\
+Doses are RT Dose (.dcm) or dose_grid.csv of host-ui dose. The second one is taken at every voxel of the first, linearly between its
+own; voxels outside of it are counted and left out.
+
+Example:
+  host-ui compare study/dose.dcm other/dose.dcm --json difference.json";
+
+/// Options of `host-ui compare`.
+#[derive(Args, Debug)]
+#[command(after_long_help = HELP)]
+pub struct CompareArgs {
+    /// Dose that is compared
+    dose: PathBuf,
+    /// Dose that it is compared with
+    with: PathBuf,
+    /// Only voxels count where the first dose is at least this share of --of-gy
+    #[arg(long, value_name = "PERCENT", default_value_t = USUAL_THRESHOLD_PERCENT)]
+    threshold: f64,
+    /// Dose that shares are of, as the prescription [default: the highest of the first dose]
+    #[arg(long, value_name = "GY")]
+    of_gy: Option<f64>,
+    /// File for the figures
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Differences second minus first, in Gy.
+struct Difference {
+    compared: usize,
+    outside: usize,
+    mean_gy: f64,
+    root_mean_square_gy: f64,
+    largest_gy: f64,
+    largest_at_mm: [f64; 3],
+}
+
+impl CompareArgs {
+    /// Carries out the command.
+    pub fn run(self) -> Result<(), CommandError> {
+        if !(0.0..=1000.0).contains(&self.threshold) {
+            return Err(format!("--threshold {}: give 0 to 1000 percent", self.threshold).into());
+        }
+        let (one, other) = (read_any_dose(&self.dose)?, read_any_dose(&self.with)?);
+        let highest = one.dose_gy.iter().copied().fold(0.0, f64::max);
+        let of_gy = self.of_gy.unwrap_or(highest);
+        if !(of_gy > 0.0 && of_gy.is_finite()) {
+            return Err("the first dose is 0 everywhere, or --of-gy is not above 0".into());
+        }
+        let found = difference(&one, &other, self.threshold / 100.0 * of_gy)
+            .ok_or("the two doses have no voxel in common; are they of one frame of reference?")?;
+        let percent = |gy: f64| gy / of_gy * 100.0;
+        println!(
+            "{} voxels compared, {} outside of the second dose",
+            found.compared, found.outside
+        );
+        for (name, gy) in [
+            ("mean", found.mean_gy),
+            ("root mean square", found.root_mean_square_gy),
+            ("largest", found.largest_gy),
+        ] {
+            println!("{name:<17} {gy:>14.6} Gy {:>12.6} % of {of_gy:.3} Gy", percent(gy));
+        }
+        let [x, y, z] = found.largest_at_mm;
+        println!("the largest lies at {x:.2}, {y:.2}, {z:.2} mm");
+        if let Some(file) = &self.json {
+            let inputs: [(&str, &Path); 2] = [("dose", &self.dose), ("with", &self.with)];
+            let value = json!({
+                "compared": found.compared,
+                "outside": found.outside,
+                "of_gy": of_gy,
+                "threshold_percent": self.threshold,
+                "mean_gy": found.mean_gy,
+                "root_mean_square_gy": found.root_mean_square_gy,
+                "largest_gy": found.largest_gy,
+                "largest_at_mm": found.largest_at_mm,
+                "made": provenance::made(&inputs)?,
+            });
+            super::dose::write::json(file, &value)?;
+            println!("written: {}", file.display());
+        }
+        Ok(())
+    }
+}
+
+fn difference(one: &DoseFile, other: &DoseFile, from_gy: f64) -> Option<Difference> {
+    let mut found = Difference {
+        compared: 0,
+        outside: 0,
+        mean_gy: 0.0,
+        root_mean_square_gy: 0.0,
+        largest_gy: 0.0,
+        largest_at_mm: [0.0; 3],
+    };
+    for (place, gy) in one.places_m().zip(&one.dose_gy).filter(|(_, gy)| **gy >= from_gy) {
+        let Some(other_gy) = other.at_gy(place) else {
+            found.outside += 1;
+            continue;
+        };
+        let difference = other_gy - gy;
+        found.compared += 1;
+        found.mean_gy += difference;
+        found.root_mean_square_gy += difference * difference;
+        if difference.abs() >= found.largest_gy.abs() {
+            (found.largest_gy, found.largest_at_mm) = (difference, place.map(|m| m * 1e3));
+        }
+    }
+    let count = found.compared as f64;
+    (found.compared > 0).then(|| Difference {
+        mean_gy: found.mean_gy / count,
+        root_mean_square_gy: (found.root_mean_square_gy / count).sqrt(),
+        ..found
+    })
+}

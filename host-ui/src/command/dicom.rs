@@ -1,0 +1,279 @@
+//! `host-ui dicom`: structure set, plan and dose of one study as DICOM, linked to each other.
+
+use super::CommandError;
+use super::dose::common::{Common, Loaded, within};
+use super::dose::{POINTS_FOR_DOSE, grid, write};
+use clap::Args;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use stylet_base::output::new_folder;
+use stylet_base::progress_bar::LongTask;
+use stylet_dose::Dvh;
+use stylet_files::dicom::images::{self, Slice};
+use stylet_files::dicom::plan::{PlanSeed, PlanSource, SeedPlan};
+use stylet_files::dicom::structures::StructureSet;
+use stylet_files::dicom::structures::write::{Outlined, of_set, of_voxels};
+use stylet_files::dicom::{self, Identity};
+use stylet_files::{FileError, Progress, bytes, read_voxels};
+use stylet_implant::linked::{self, LinkedStudy};
+use stylet_implant::plan::seeds;
+use stylet_implant::provenance;
+use stylet_implant::readers::SeedRow;
+
+/// The grid reaches this far beyond the outermost structure.
+const GRID_MARGIN_M: f64 = 0.005;
+
+const HELP: &str = "\
+Writes three files that belong together into --out, a new or empty folder: structure_set.dcm, plan.dcm and dose.dcm; and study.json
+with their UIDs, the inputs with their SHA-256, the version and the time.
+
+Patient, study and frame of reference are those of --like, or else of the structure set, or of the plan of the seeds, or of the
+images; where none of them is DICOM they are made, once for all three. Files of another patient or of another frame of reference are
+refused.
+
+  structure_set.dcm  the contours as drawn, or outlines of a label volume; each names its image, and all name their series
+  plan.dcm           names the structure set, and in it the target; every seed with its needle and hole, strength and its date
+  dose.dcm           names the plan; the grid covers all structures and 20 mm around the seeds; histograms of all structures
+
+Examples:
+  host-ui dicom --source sources/i125_6711.toml --seeds plan.toml --structures rtstruct.dcm --out study
+  host-ui dicom --source sources/i125_6711.toml --seeds seeds.csv --strength-u 0.5 --structures gland.seg.nrrd \\
+      --images ct_series --out study";
+
+/// Options of `host-ui dicom`.
+#[derive(Args, Debug)]
+#[command(after_long_help = HELP)]
+pub struct DicomArgs {
+    #[command(flatten)]
+    common: Common,
+    /// Seeds: CSV, a plan of host-ui (.toml), or a DICOM RT Plan; see `host-ui dose --help`
+    #[arg(long, value_name = "FILE")]
+    seeds: PathBuf,
+    /// Structures: NIfTI-1, NRRD, MetaImage or a DICOM RT Structure Set
+    #[arg(long, value_name = "FILE")]
+    structures: PathBuf,
+    /// Folder with the image series that the structures are drawn on [default: that of the structure set]
+    #[arg(long, value_name = "DIR")]
+    images: Option<PathBuf>,
+    /// DICOM file whose patient, study and frame of reference are taken
+    #[arg(long, value_name = "FILE")]
+    like: Option<PathBuf>,
+    /// Side of the voxels of the dose
+    #[arg(long, value_name = "MM", default_value_t = 1.0)]
+    spacing_mm: f64,
+}
+
+impl DicomArgs {
+    /// Carries out the command.
+    pub fn run(self) -> Result<(), CommandError> {
+        let c = &self.common;
+        within("--spacing-mm", self.spacing_mm, 0.05, 100.0)?;
+        let loaded = c.load(&self.seeds)?;
+        let prescription_gy = c.prescription_gy(&loaded)?;
+        let judge = c.judge(&self.structures, &loaded, POINTS_FOR_DOSE)?;
+        let drawn = self.drawn()?;
+        let identity = self.identity(&drawn, &loaded)?;
+        new_folder(&c.out)?;
+        let task = LongTask::new(judge.points(), "points have their dose");
+        let verdict = judge.judge_reporting(&loaded.kernel, &loaded.seeds, &|done| task.advance(done));
+        drop(task);
+        let covered = bounds_m(&drawn.structures);
+        let dose = grid(&loaded.seeds, &loaded.kernel, self.spacing_mm * 1e-3, covered)?;
+        let number = |name: &str| drawn.structures.iter().position(|s| s.name == name).map(|n| n + 1);
+        // Structures may have one name: the first histogram of it is that of the first.
+        let mut left: Vec<(usize, &str)> = (1..).zip(drawn.structures.iter().map(|s| s.name.as_str())).collect();
+        let mut histograms: Vec<(usize, &Dvh)> = Vec::new();
+        for (name, dvh) in judge.names().zip(&verdict.dvhs) {
+            if let Some(at) = left.iter().position(|(_, of)| *of == name) {
+                histograms.push((left.remove(at).0, dvh));
+            }
+        }
+        let plan = plan(&loaded, &identity, prescription_gy);
+        let seeds_in_plan = plan.seeds.len();
+        let target = number(judge.target_name());
+        let study = LinkedStudy {
+            identity: identity.clone(),
+            images: drawn.images,
+            structures: drawn.structures,
+            target,
+            plan,
+            dose: &dose,
+            histograms,
+            prescription_gy,
+        };
+        let written = linked::write(&c.out, study)?;
+        let [structure_set, plan_uid, dose_uid] = &written.uids;
+        let mut inputs: Vec<(&str, &Path)> = vec![
+            ("--source", &c.source),
+            ("--seeds", &self.seeds),
+            ("--structures", &self.structures),
+        ];
+        inputs.extend(self.like.as_deref().map(|file| ("--like", file)));
+        let record = json!({
+            "patient_id": identity.patient_id,
+            "study_uid": identity.study,
+            "frame_of_reference_uid": identity.frame_of_reference,
+            "structure_set_uid": structure_set,
+            "plan_uid": plan_uid,
+            "dose_uid": dose_uid,
+            "seeds": seeds_in_plan,
+            "prescription_gy": prescription_gy,
+            "dose_voxels": dose.dims(),
+            "dose_spacing_mm": self.spacing_mm,
+            "made": provenance::made(&inputs)?,
+        });
+        write::json(&c.out.join("study.json"), &record)?;
+        print!("{}", judge.table(&verdict));
+        for file in &written.files {
+            println!("written: {}", file.display());
+        }
+        Ok(())
+    }
+
+    /// The structures as they are drawn, with the images under them.
+    fn drawn(&self) -> Result<Drawn, CommandError> {
+        let path = &self.structures;
+        let refused = |why| FileError::of(path, why);
+        let content = bytes::whole(path, &Progress::default()).map_err(refused)?;
+        if !dicom::is_dicom(&content) {
+            let mut voxels = read_voxels(path, &Progress::default())?;
+            voxels.names.extend(self.common.label_names()?);
+            let images = match &self.images {
+                Some(folder) => one_series(folder)?,
+                None => Vec::new(),
+            };
+            return Ok(Drawn {
+                structures: of_voxels(&voxels).map_err(refused)?,
+                identity: None,
+                images,
+            });
+        }
+        let object = dicom::read(&content).map_err(refused)?;
+        let set = StructureSet::of(&object).map_err(refused)?;
+        let images = match &self.images {
+            Some(folder) => one_series(folder)?,
+            None => {
+                let folder = path.parent().unwrap_or(Path::new(""));
+                images::find(folder, &set.series, &set.images).map_err(refused)?
+            }
+        };
+        Ok(Drawn {
+            structures: of_set(set),
+            identity: Some(Identity::of(&object)),
+            images,
+        })
+    }
+
+    /// That of the first file that has one; all others must agree with it.
+    fn identity(&self, drawn: &Drawn, loaded: &Loaded) -> Result<Identity, CommandError> {
+        let mut all: Vec<(PathBuf, Identity)> = Vec::new();
+        if let Some(like) = &self.like {
+            let identity = Identity::of_file(like)?;
+            let identity = identity.ok_or_else(|| format!("{}: it is no DICOM file", like.display()))?;
+            all.push((like.clone(), identity));
+        }
+        all.extend(
+            drawn
+                .identity
+                .clone()
+                .map(|identity| (self.structures.clone(), identity)),
+        );
+        all.extend(loaded.identity.clone().map(|identity| (self.seeds.clone(), identity)));
+        if let Some(image) = drawn.images.first() {
+            let folder = self.images.clone().unwrap_or_else(|| self.structures.clone());
+            all.push((folder, image.identity.clone()));
+        }
+        let Some((first, identity)) = all.first().cloned() else {
+            return Ok(Identity::new());
+        };
+        for (path, other) in &all[1..] {
+            if let Some(why) = other.differs_from(&identity) {
+                return Err(format!(
+                    "{}: {why} as {} has it; give files of one patient",
+                    path.display(),
+                    first.display()
+                )
+                .into());
+            }
+            if other.study != identity.study {
+                let note = format!("it is of another study; that of {} is taken", first.display());
+                seeds::report(path, &[note]);
+            }
+        }
+        Ok(identity)
+    }
+}
+
+/// Structures with what they belong to.
+struct Drawn {
+    structures: Vec<Outlined>,
+    identity: Option<Identity>,
+    images: Vec<Slice>,
+}
+
+/// The images of a folder, which must be of one series.
+fn one_series(folder: &Path) -> Result<Vec<Slice>, CommandError> {
+    let slices = images::all_in(folder).map_err(|why| FileError::of(folder, why))?;
+    let Some(first) = slices.first() else {
+        return Err(format!("{}: it holds no image series; choose another folder", folder.display()).into());
+    };
+    let other = slices.iter().find(|slice| slice.series != first.series);
+    if other.is_some() {
+        return Err(format!(
+            "{}: it holds images of several series; leave those of one there",
+            folder.display()
+        )
+        .into());
+    }
+    Ok(slices)
+}
+
+/// Around every corner of a contour.
+fn bounds_m(structures: &[Outlined]) -> Option<([f64; 3], [f64; 3])> {
+    let corners: Vec<[f64; 3]> = structures
+        .iter()
+        .flat_map(|s| s.contours.iter().flatten())
+        .map(|corner| (*corner).into())
+        .collect();
+    let (low, high) = stylet_dose::structure::bounds(&corners);
+    let margin = |v: f64, by: f64| v + by;
+    (!corners.is_empty()).then(|| {
+        (
+            low.map(|v| margin(v, -GRID_MARGIN_M)),
+            high.map(|v| margin(v, GRID_MARGIN_M)),
+        )
+    })
+}
+
+fn plan(loaded: &Loaded, identity: &Identity, prescription_gy: f64) -> SeedPlan {
+    let source = &loaded.source;
+    SeedPlan {
+        label: "Stylet".to_owned(),
+        identity: identity.clone(),
+        uid: String::new(),
+        structure_set: None,
+        prescription_gy: Some(prescription_gy),
+        planned_on: loaded.declared.as_ref().and_then(|d| d.planned_on),
+        source: PlanSource {
+            model: source.model.clone(),
+            manufacturer: String::new(),
+            isotope: source.nuclide.clone(),
+            half_life_days: stylet_dose::decay::s_to_days(source.half_life_s),
+            active_length_m: source.tables.active_length_m,
+        },
+        seeds: loaded.rows.iter().cloned().map(plan_seed).collect(),
+        notes: Vec::new(),
+    }
+}
+
+/// A seed with its needle and hole, as a plan has it.
+pub fn plan_seed(row: SeedRow) -> PlanSeed {
+    PlanSeed {
+        needle: row.needle,
+        hole: row.hole.unwrap_or_default(),
+        position_m: row.seed.position_m,
+        axis: row.seed.axis,
+        strength_u: row.seed.strength_u,
+        strength_on: row.strength_on,
+    }
+}

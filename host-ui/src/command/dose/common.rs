@@ -1,0 +1,249 @@
+//! What `dose`, `perturb` and `dicom` have in common: source, seeds, times and structures.
+
+use crate::command::CommandError;
+use clap::Args;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use stylet_base::nuclide::Nuclide;
+use stylet_dose::decay::{Interval, days_to_s, left_after};
+use stylet_dose::kernel::DoseKernel;
+use stylet_dose::metric::Metric;
+use stylet_dose::report::{Judge, choose_target};
+use stylet_dose::seed::Seed;
+use stylet_dose::source::Source;
+use stylet_dose::structure::Structure;
+use stylet_files::dicom::Identity;
+use stylet_files::dicom::plan::Date;
+use stylet_implant::plan::seeds;
+use stylet_implant::readers::{DayOfImplant, Declared, SeedDefaults, SeedRow, contours, labels, places};
+
+/// Options of all commands that compute dose.
+#[derive(Args, Debug)]
+pub struct Common {
+    /// Source file (TOML) as those in sources/
+    #[arg(long, value_name = "FILE")]
+    pub source: PathBuf,
+    /// Strength in U of seeds whose file gives none
+    #[arg(long, value_name = "U")]
+    strength_u: Option<f64>,
+    /// The strengths were measured this many days before the implant, and have decayed since
+    #[arg(long, value_name = "DAYS", default_value_t = 0.0)]
+    measured_days_before: f64,
+    /// Day of the implant (2026-10-31), to which strengths with a reference date decay, as those of an RT Plan have it
+    #[arg(long, value_name = "DATE", conflicts_with = "measured_days_before")]
+    pub implant_date: Option<Date>,
+    /// Count dose from this day after the implant
+    #[arg(long, value_name = "DAYS", default_value_t = 0.0)]
+    from_days: f64,
+    /// Count dose up to this day after the implant [default: without end]
+    #[arg(allow_negative_numbers = true, long, value_name = "DAYS")]
+    to_days: Option<f64>,
+    /// Prescribed dose in Gy [default: that of the plan, or else of the source file]
+    #[arg(long, value_name = "GY")]
+    prescription_gy: Option<f64>,
+    /// What a label is called: 1=Prostate; may be given again
+    #[arg(long = "name", value_name = "LABEL=NAME")]
+    names: Vec<String>,
+    /// Structure that the prescription is for [default: the one named PTV, CTV, prostate, gland, ..., or the lowest label]
+    #[arg(long, value_name = "NAME")]
+    pub target: Option<String>,
+    /// One more metric of every structure: D90, D2cc, V150, V145Gy, Dmean, Dmax, Dmin; may be given again
+    #[arg(long = "metric", value_name = "METRIC")]
+    metrics: Vec<String>,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+/// What dose is computed from.
+pub struct Loaded {
+    /// The model of seed.
+    pub source: Source,
+    /// Dose of a seed of 1 U over the time asked for.
+    pub kernel: DoseKernel,
+    /// The seeds, with their strength at the implant.
+    pub seeds: Vec<Seed>,
+    /// The seeds with needle, hole and the strength of the file.
+    pub rows: Vec<SeedRow>,
+    /// What a plan says of its seeds.
+    pub declared: Option<Declared>,
+    /// Patient, study and frame of reference, where the file of the seeds names them.
+    pub identity: Option<Identity>,
+    prescription_gy: Option<f64>,
+}
+
+impl Common {
+    /// Source, dose of a seed of 1 U over the time asked for, and seeds with their strength at the implant.
+    pub fn load(&self, path: &Path) -> Result<Loaded, CommandError> {
+        within("--measured-days-before", self.measured_days_before, 0.0, 1e6)?;
+        within("--from-days", self.from_days, 0.0, 1e6)?;
+        if let Some(to) = self.to_days {
+            within("--to-days", to, self.from_days, 1e6)?;
+        }
+        if let Some(u) = self.strength_u {
+            within("--strength-u", u, 0.0, 1e5)?;
+        }
+        let source = Source::read(&self.source)?;
+        let is_taken_out = Nuclide::parse(&source.nuclide).is_some_and(|n| !n.is_of_permanent_seeds());
+        if is_taken_out && self.to_days.is_none() {
+            return Err(format!(
+                "{} is {}, whose sources are taken out again; give the time that they stay with --to-days",
+                self.source.display(),
+                source.nuclide
+            )
+            .into());
+        }
+        let defaults = SeedDefaults {
+            strength_u: self.strength_u,
+            strength_per_activity_u_per_mci: source.strength_per_activity_u_per_mci,
+        };
+        let mut file = seeds::read(path, defaults)?;
+        let of_file = file.rows.clone();
+        let day = DayOfImplant(self.implant_date);
+        let agreed = file.agree(&source, self.prescription_gy, day);
+        let (prescription_gy, notes) = agreed.map_err(|why| format!("{}: {why}", path.display()))?;
+        seeds::report(path, &notes);
+        let (declared, identity) = (file.declared.take(), file.identity.take());
+        let mut all: Vec<Seed> = file.rows.into_iter().map(|row| row.seed).collect();
+        if source.tables.anisotropy_2d.is_none() && all.iter().any(|s| s.axis.is_some()) {
+            return Err(format!(
+                "{} has no [anisotropy_2d], which seeds with an axis need; leave the axis columns out",
+                self.source.display()
+            )
+            .into());
+        }
+        if source.tables.anisotropy_1d.is_none() && all.iter().any(|s| s.axis.is_none()) {
+            return Err(format!(
+                "{} has no [anisotropy_1d], which seeds without an axis need; give every seed its axis",
+                self.source.display()
+            )
+            .into());
+        }
+        let left = left_after(days_to_s(self.measured_days_before), source.half_life_s);
+        for seed in &mut all {
+            seed.strength_u *= left;
+        }
+        let mut rows = of_file;
+        // A strength without a day is that of the implant.
+        for (row, seed) in rows.iter_mut().zip(&all).filter(|(row, _)| row.strength_on.is_none()) {
+            row.seed.strength_u = seed.strength_u;
+        }
+        seeds::report(path, places::on_one_spot(&all).as_slice());
+        let interval = Interval::days(self.from_days, self.to_days.unwrap_or(f64::INFINITY));
+        let kernel = DoseKernel::new(&source, interval);
+        Ok(Loaded {
+            source,
+            kernel,
+            seeds: all,
+            rows,
+            declared,
+            identity,
+            prescription_gy,
+        })
+    }
+
+    pub fn prescription_gy(&self, loaded: &Loaded) -> Result<f64, CommandError> {
+        let gy = loaded.prescription_gy.ok_or_else(|| {
+            format!(
+                "{} names no prescription_gy; give --prescription-gy",
+                self.source.display()
+            )
+        })?;
+        within("--prescription-gy", gy, 1e-3, 1e4)?;
+        Ok(gy)
+    }
+
+    pub fn judge(&self, file: &Path, loaded: &Loaded, most_points: usize) -> Result<Judge, CommandError> {
+        let extra = self
+            .metrics
+            .iter()
+            .map(|m| Metric::parse(m))
+            .collect::<Result<Vec<_>, _>>()?;
+        let given = self.label_names()?;
+        let prescription_gy = self.prescription_gy(loaded)?;
+        let structures = match contours::structures(file, most_points)? {
+            Some((_, _)) if !given.is_empty() => {
+                return Err(format!("--name: {} names its structures itself", file.display()).into());
+            }
+            Some((structures, notes)) => {
+                seeds::report(file, &notes);
+                structures
+            }
+            None => self.labelled(file, given, most_points)?,
+        };
+        let target = self.target.as_deref();
+        let names: Vec<&str> = structures.iter().map(|s| s.name.as_str()).collect();
+        let at = choose_target(&names, target)?;
+        let note = places::outside(&loaded.seeds, &structures[at]);
+        seeds::report(file, note.as_slice());
+        Ok(Judge::new(
+            structures,
+            target,
+            &extra,
+            prescription_gy,
+            &loaded.seeds,
+            most_points,
+        )?)
+    }
+
+    fn labelled(
+        &self,
+        file: &Path,
+        given: BTreeMap<u8, String>,
+        most_points: usize,
+    ) -> Result<Vec<Structure>, CommandError> {
+        let voxels = stylet_files::read_voxels(file, &stylet_files::Progress::default())?;
+        if let Some((label, name)) = given.iter().find(|(label, _)| !voxels.labels.contains(label)) {
+            return Err(format!(
+                "--name {label}={name}: {} has no voxel with label {label}",
+                file.display()
+            )
+            .into());
+        }
+        if let Some(warning) = &voxels.frame.warning {
+            seeds::report(file, std::slice::from_ref(warning));
+        }
+        // The names in the file count where none are given.
+        let mut names = voxels.names.clone();
+        names.extend(given);
+        Ok(labels::structures(&voxels, &names, most_points))
+    }
+
+    pub fn label_names(&self) -> Result<BTreeMap<u8, String>, CommandError> {
+        let mut names = BTreeMap::new();
+        for text in &self.names {
+            let wrong = || format!("--name {text}: write LABEL=NAME with a label from 1 to 255, as in 1=Prostate");
+            let (label, name) = text.split_once('=').ok_or_else(wrong)?;
+            let label: u8 = label.trim().parse().ok().filter(|&l| l > 0).ok_or_else(wrong)?;
+            let name = name.trim();
+            if name.is_empty() || names.values().any(|n| n == name) {
+                return Err(format!("--name {text}: the name is empty or there twice").into());
+            }
+            if names.insert(label, name.to_owned()).is_some() {
+                return Err(format!("--name {text}: label {label} has two names").into());
+            }
+        }
+        Ok(names)
+    }
+
+    pub fn provenance(&self, source: &Source, seeds: &[Seed]) -> serde_json::Value {
+        json!({
+            "source": { "model": source.model, "nuclide": source.nuclide },
+            "seeds": seeds.len(),
+            "seeds_2d": seeds.iter().filter(|s| s.axis.is_some()).count(),
+            "total_strength_u": seeds.iter().map(|s| s.strength_u).sum::<f64>(),
+            "from_days": self.from_days,
+            "to_days": self.to_days,
+            "implant_date": self.implant_date.map(|day| day.to_string()),
+            "version": env!("CARGO_PKG_VERSION"),
+        })
+    }
+}
+
+pub fn within(option: &str, value: f64, least: f64, most: f64) -> Result<(), CommandError> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    Err(format!("{option} {value}: give {least} to {most}").into())
+}
