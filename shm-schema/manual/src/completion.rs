@@ -16,9 +16,22 @@ pub fn scripts(program: Command) -> Vec<(PathBuf, Vec<u8>)> {
     let script = |shell| {
         let mut text = Vec::new();
         generate(shell, &mut program.clone(), &name, &mut text);
-        text
+        match shell {
+            Shell::Bash => with_one_name_for_each_state(&name, text),
+            _ => text,
+        }
     };
     paths.map(|(shell, path)| (path.into(), script(shell))).into()
+}
+
+/// The generator (4.6.11) enters the states of subcommands as `rt__core__subcmd__doctor` and handles them as
+/// `rt__subcmd__core__subcmd__doctor`, if the name of the program has a hyphen: nothing would be completed there.
+fn with_one_name_for_each_state(name: &str, script: Vec<u8>) -> Vec<u8> {
+    let (entered, handled) = (name.replace('-', "__"), name.replace('-', "__subcmd__"));
+    match String::from_utf8(script) {
+        Ok(text) => text.replace(&handled, &entered).into_bytes(),
+        Err(other) => other.into_bytes(),
+    }
 }
 
 /// A command without its hidden subcommands, which the scripts would offer.
