@@ -4,7 +4,7 @@ SHELL := /bin/bash
 CARGO ?= cargo
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: help run test build package package-test picture report fuzz soak force-pictures clean deps-run deps-package deps-soak deps-test
+.PHONY: help run test build package package-test picture report fuzz soak force-pictures clean deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -25,7 +25,7 @@ test: deps-test ## Install what the tests need, build everything, run all tests
 package: deps-package build ## Build the Debian packages of both programs, into target/package
 	docs/tools/package "$(BIN)"
 
-package-test: package ## Install both packages in a fresh Debian root, run them, purge them, list what remains
+package-test: deps-package-test package ## Install both packages in a fresh Debian root, run them, purge them, list what remains
 	docs/tools/package-test
 
 picture: deps-test build ## Redraw the pictures of the README and the tour
@@ -50,7 +50,10 @@ deps-run:
 	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers
 
 deps-package:
-	@docs/tools/need cargo binutils debootstrap desktop-file-utils mandoc python3 xvfb
+	@docs/tools/need cargo binutils
+
+deps-package-test:
+	@docs/tools/need debootstrap desktop-file-utils mandoc python3 xvfb
 
 deps-soak:
 	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers xauth xvfb
