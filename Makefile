@@ -4,7 +4,7 @@ SHELL := /bin/bash
 CARGO ?= cargo
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: help run test build picture report fuzz soak force-pictures clean deps-run deps-soak deps-test
+.PHONY: help run test build package package-test picture report fuzz soak force-pictures clean deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -21,6 +21,12 @@ test: deps-test ## Install what the tests need, build everything, run all tests
 # because each system test starts its own real-time core.
 	$(CARGO) build --release --workspace --all-targets
 	$(CARGO) test --release --workspace -- --test-threads=1
+
+package: deps-package build ## Build the Debian packages of both programs, into target/package
+	docs/tools/package "$(BIN)"
+
+package-test: deps-package-test package ## Install both packages in a fresh Debian root, run them, purge them, list what remains
+	docs/tools/package-test
 
 picture: deps-test build ## Redraw the pictures of the README and the tour
 	UPDATE_SNAPSHOTS=1 $(CARGO) test --release -p stylet-tests-window -- --test-threads=1
@@ -43,8 +49,14 @@ clean: ## Remove the build output
 deps-run:
 	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers
 
+deps-package:
+	@docs/tools/need cargo binutils
+
+deps-package-test:
+	@docs/tools/need debootstrap desktop-file-utils mandoc python3 xvfb
+
 deps-soak:
 	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers xauth xvfb
 
 deps-test:
-	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers python3-nibabel python3-pydicom xvfb
+	@docs/tools/need cargo libxkbcommon-x11-0 mesa-vulkan-drivers mandoc python3-nibabel python3-pydicom xvfb

@@ -7,7 +7,7 @@ use crate::command::convert::ConvertArgs;
 use crate::command::dicom::DicomArgs;
 use crate::command::dose::{DoseArgs, PerturbArgs};
 use crate::command::plan::PlanArgs;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use stylet_base::format::printable;
@@ -18,6 +18,7 @@ use stylet_host::core_args::{self, CoreArgs};
 use stylet_host::record;
 use stylet_implant::procedure;
 use stylet_implant::readers::{SeedDefaults, read_seeds};
+use stylet_manual::ManualArgs;
 use stylet_shm_schema::service::Instance;
 
 const SCENE_HELP: &str = concat!(
@@ -126,6 +127,8 @@ enum Task {
     Compare(CompareArgs),
     /// Dose of a plan under random seed errors
     Perturb(PerturbArgs),
+    /// Write the man pages and shell completions of this program
+    Manual(ManualArgs),
 }
 
 #[derive(Subcommand, Debug)]
@@ -201,6 +204,7 @@ impl Cli {
             Some(Task::Plan(args)) => args.run(),
             Some(Task::Dose(args)) => args.run(),
             Some(Task::Perturb(args)) => args.run(),
+            Some(Task::Manual(args)) => Ok(args.run(Self::command())?),
             Some(Task::Procedure {
                 common,
                 out,

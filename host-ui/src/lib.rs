@@ -21,6 +21,7 @@ mod panel;
 mod picture;
 pub mod planner;
 mod recent;
+pub mod session;
 mod settings;
 mod shown;
 mod theme;

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     host_ui::heap::keep_little();
+    host_ui::session::name_runtime_folder();
     match host_ui::cli::Cli::parse().run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(why) => {

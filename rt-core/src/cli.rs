@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use stylet_lab::args::LatencyArgs;
 use stylet_lab::load::LoadProcess;
+use stylet_manual::ManualArgs;
 use stylet_runtime::args::{OptionsError, RealTimeArgs, scenes};
 use stylet_runtime::device::{self, DeviceChoice};
 use stylet_runtime::process::Options;
@@ -54,6 +55,8 @@ pub enum Task {
         #[arg(long, default_value = BUILTIN_SCENES[0], value_parser = scenes())]
         scene: String,
     },
+    /// Write the man pages and shell completions of this program
+    Manual(ManualArgs),
     /// One process of a load; started by `latency`
     #[command(hide = true)]
     Load {

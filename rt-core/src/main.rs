@@ -1,6 +1,6 @@
 //! `rt-core`: the real-time process, and the laboratory that measures it.
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use rt_core::cli::{Cli, RunArgs, Task};
 use rt_core::report::Report;
 use std::error::Error;
@@ -30,6 +30,7 @@ fn carry_out(cli: &Cli) -> Result<u8, Box<dyn Error>> {
         Some(Task::Verify { report }) => verify::run(report)?,
         Some(Task::Doctor { json, haptic_core }) => doctor::run(*json, *haptic_core),
         Some(Task::Replay(replay)) => u8::from(!replay.run()?),
+        Some(Task::Manual(args)) => args.run(Cli::command()).map(|()| 0)?,
         Some(Task::Cost { scene }) => cost(scene).map(|()| 0)?,
         Some(Task::Load { work, instance, file }) => serve_as_load(*work, instance, file).map(|()| 0)?,
     })

@@ -133,16 +133,41 @@ pub fn run(options: Options) -> Result<(), WindowError> {
         native.wgpu_options.surface.present_mode = eframe::wgpu::PresentMode::AutoNoVsync;
     }
     let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::new(cc, options))));
-    Ok(eframe::run_native("Stylet", native, create)?)
+    eframe::run_native("Stylet", native, create).map_err(|why| match why {
+        eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => WindowError::Display(shown_on()),
+        eframe::Error::Wgpu(why) => WindowError::Driver(why.to_string()),
+        other => WindowError::Other(other.to_string()),
+    })
+}
+
+/// The display that the environment names, for people.
+fn shown_on() -> String {
+    let named = ["WAYLAND_DISPLAY", "DISPLAY"]
+        .iter()
+        .filter_map(|name| Some(format!("{name}={}", format::printable(&std::env::var(name).ok()?))));
+    let named = named.collect::<Vec<_>>().join(", ");
+    if named.is_empty() {
+        "neither WAYLAND_DISPLAY nor DISPLAY is set".to_owned()
+    } else {
+        named
+    }
 }
 
 /// The window could not be opened.
 #[derive(Debug, thiserror::Error)]
-#[error(
-    "cannot open a window: {0}. It needs a display (DISPLAY or WAYLAND_DISPLAY) and a graphics driver (mesa-vulkan-drivers); \
-     without them use `host-ui procedure`"
-)]
-pub struct WindowError(#[from] eframe::Error);
+pub enum WindowError {
+    /// There is no display, or it does not answer.
+    #[error("no display answers ({0}). Start it in a desktop, or use `host-ui procedure`, which needs no window")]
+    Display(String),
+    /// Nothing can draw.
+    #[error(
+        "no graphics driver can draw the window ({0}). Install mesa-vulkan-drivers, or use `host-ui procedure`, which needs no window"
+    )]
+    Driver(String),
+    /// Everything else, as the library has it.
+    #[error("the window cannot be opened: {0}. `host-ui procedure` needs no window")]
+    Other(String),
+}
 
 impl App {
     /// What the window knows of the core.

@@ -15,4 +15,6 @@ mod plugged;
 #[cfg(test)]
 mod states;
 #[cfg(test)]
+mod terminal;
+#[cfg(test)]
 mod whole;

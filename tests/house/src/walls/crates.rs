@@ -53,6 +53,12 @@ const LAYERS: &[Layer] = &[
         not_itself: &[],
     },
     Layer {
+        folder: "shm-schema/manual",
+        may_use: &["shm-schema/write"],
+        never: &[WINDOW, PORTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
         folder: "shm-schema",
         may_use: &["shm-schema/anatomy"],
         never: &[WINDOW, ARGUMENTS, PROGRAM, DEVICES, DICOM],
@@ -114,6 +120,7 @@ const LAYERS: &[Layer] = &[
             "rt-core/sim",
             "shm-schema",
             "shm-schema/anatomy",
+            "shm-schema/manual",
         ],
         never: &[WINDOW, DICOM],
         not_itself: &[],
@@ -175,6 +182,7 @@ const LAYERS: &[Layer] = &[
             "host-ui/implant",
             "shm-schema",
             "shm-schema/anatomy",
+            "shm-schema/manual",
         ],
         never: &[],
         not_itself: &[],

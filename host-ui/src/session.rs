@@ -1,0 +1,36 @@
+//! What a desktop's session sets and libraries complain about on the terminal where there is none, as in `ssh` or `su`.
+
+use std::ffi::{OsStr, OsString};
+use std::path::Path;
+
+const RUNTIME_FOLDER: &str = "XDG_RUNTIME_DIR";
+
+/// Names the folder for the user's sockets where no session did. Libraries look for sockets of the desktop there; without
+/// the name, graphics drivers write an error to the terminal each time.
+pub fn name_runtime_folder() {
+    if let Some(folder) = missing_runtime_folder(std::env::var_os(RUNTIME_FOLDER).as_deref()) {
+        // SAFETY: `main` calls this before any other thread starts.
+        unsafe { std::env::set_var(RUNTIME_FOLDER, folder) };
+    }
+}
+
+/// Where sessions put the folder, unless `named` is one. It need not exist: nothing is made in it.
+fn missing_runtime_folder(named: Option<&OsStr>) -> Option<OsString> {
+    let is_named = named.is_some_and(|folder| Path::new(folder).is_absolute());
+    // SAFETY: no preconditions.
+    (!is_named).then(|| format!("/run/user/{}", unsafe { libc::getuid() }).into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_session_keeps_its_folder_and_without_one_it_is_where_sessions_have_it() {
+        assert_eq!(missing_runtime_folder(Some(OsStr::new("/run/user/1000"))), None);
+        for none in [None, Some(OsStr::new("")), Some(OsStr::new("run"))] {
+            let folder = missing_runtime_folder(none).expect("a folder");
+            assert!(Path::new(&folder).starts_with("/run/user"), "{folder:?}");
+        }
+    }
+}

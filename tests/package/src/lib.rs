@@ -1,0 +1,24 @@
+//! What is installed: man pages and completions of both programs, and what the Debian packages hold.
+
+#[cfg(test)]
+mod contents;
+#[cfg(test)]
+mod pages;
+
+#[cfg(test)]
+const PROGRAMS: [&str; 2] = ["rt-core", "host-ui"];
+
+/// Pages and completions of both programs, as the programs write them.
+#[cfg(test)]
+fn manual(name: &str) -> std::path::PathBuf {
+    let folder = stylet_test_kit::scratch(name);
+    for program in PROGRAMS {
+        let written = std::process::Command::new(stylet_test_kit::program(program))
+            .args(["manual", "--out"])
+            .arg(&folder)
+            .output()
+            .expect("it starts");
+        assert!(written.status.success(), "{}", String::from_utf8_lossy(&written.stderr));
+    }
+    folder
+}

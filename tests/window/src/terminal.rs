@@ -1,0 +1,60 @@
+//! What the window writes to the terminal that it was started from.
+
+use std::io::Read;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+use stylet_tests::{Alone, Display, fresh_instance, program, until};
+
+fn started(alone: &Alone, display: &str) -> Child {
+    let child = Command::new(program("host-ui"))
+        .args(["--instance", alone.0.name(), "--no-controllers"])
+        .env("DISPLAY", display)
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("XDG_RUNTIME_DIR")
+        .stderr(Stdio::piped())
+        .spawn();
+    child.expect("host-ui starts")
+}
+
+fn written(window: &mut Child) -> String {
+    let mut text = String::new();
+    let mut errors = window.stderr.take().expect("piped");
+    errors.read_to_string(&mut text).expect("UTF-8");
+    text
+}
+
+/// In a shell without a session of a desktop the graphics driver wrote "error: XDG_RUNTIME_DIR is invalid or not set in the
+/// environment." four times, and the window then opened all the same.
+#[test]
+fn a_window_outside_of_a_session_writes_no_errors_of_a_library() {
+    let alone = Alone(fresh_instance());
+    let display = Display::open();
+    let mut window = started(&alone, &display.name());
+    let maps = format!("/proc/{}/maps", window.id());
+    let drives = || std::fs::read_to_string(&maps).is_ok_and(|maps| maps.contains("libvulkan_"));
+    assert!(until(Duration::from_secs(60), drives), "no graphics driver was loaded");
+    // The driver is asked for its devices, and draws.
+    std::thread::sleep(Duration::from_secs(5));
+    assert!(matches!(window.try_wait(), Ok(None)), "it is open");
+    window.kill().expect("ours");
+    let written = written(&mut window);
+    window.wait().expect("ours");
+    assert_eq!(written, "");
+}
+
+/// The message named a source file of the library and a folder of the machine that had built it.
+#[test]
+fn without_a_display_the_reason_is_in_our_words() {
+    let alone = Alone(fresh_instance());
+    let mut window = started(&alone, ":4711");
+    let written = written(&mut window);
+    assert!(!window.wait().expect("ours").success());
+    assert!(
+        written.starts_with("host-ui: no display answers (DISPLAY=:4711)"),
+        "{written}"
+    );
+    assert!(
+        written.contains("host-ui procedure") && !written.contains(".rs"),
+        "{written}"
+    );
+}
