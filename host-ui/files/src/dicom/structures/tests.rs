@@ -315,7 +315,7 @@ fn missing_planes_are_bridged_and_contours_there_twice_count_once_and_both_are_r
 fn an_outline_of_many_corners_is_written_and_read() {
     let grid = grid([1500, 3, 2], [0.1, 0.1, 1.0]);
     // A comb: every second column is longer.
-    let inside = |n: usize| n / 1500 % 3 == 0 || (n / 1500 % 3 == 1 && n % 2 == 0);
+    let inside = |n: usize| (n / 1500).is_multiple_of(3) || (n / 1500 % 3 == 1 && n.is_multiple_of(2));
     let v = Voxels {
         dims: grid.dims,
         labels: (0..1500 * 3 * 2).map(|n| u8::from(inside(n))).collect(),
