@@ -10,11 +10,12 @@ use stylet_base::{input, write_whole};
 use stylet_dose::Source;
 use stylet_files::convert::{can_hold_labels, write_labels};
 use stylet_files::dicom::images::Slice;
-use stylet_files::dicom::plan::{self, PlanSource, SeedPlan};
+use stylet_files::dicom::plan::{self, SeedPlan};
 use stylet_files::dicom::structures::write::{Outlined, Written, of_set, of_voxels};
 use stylet_files::dicom::structures::{self, StructureSet};
 use stylet_files::dicom::{self, Identity, RT_DOSE, RT_PLAN};
 use stylet_files::{self as files, FileError, Progress, bytes, scene};
+use stylet_implant::plan::exchange::plan_source;
 use stylet_implant::plan::seeds;
 use stylet_implant::readers::{DayOfImplant, DoseFile, SeedDefaults, SeedFile, read_dose};
 
@@ -193,13 +194,7 @@ impl ConvertArgs {
             structure_set: None,
             prescription_gy,
             planned_on: None,
-            source: PlanSource {
-                model: source.model.clone(),
-                manufacturer: String::new(),
-                isotope: source.nuclide.clone(),
-                half_life_days: stylet_dose::decay::s_to_days(source.half_life_s),
-                active_length_m: source.tables.active_length_m,
-            },
+            source: plan_source(&source),
             seeds: file.rows.into_iter().map(plan_seed).collect(),
             notes: Vec::new(),
         };

@@ -10,12 +10,13 @@ use stylet_base::output::new_folder;
 use stylet_base::progress_bar::LongTask;
 use stylet_dose::Dvh;
 use stylet_files::dicom::images::{self, Slice};
-use stylet_files::dicom::plan::{PlanSeed, PlanSource, SeedPlan};
+use stylet_files::dicom::plan::{PlanSeed, SeedPlan};
 use stylet_files::dicom::structures::StructureSet;
 use stylet_files::dicom::structures::write::{Outlined, of_set, of_voxels};
 use stylet_files::dicom::{self, Identity};
 use stylet_files::{FileError, Progress, bytes, read_voxels};
 use stylet_implant::linked::{self, LinkedStudy};
+use stylet_implant::plan::exchange::plan_source;
 use stylet_implant::plan::seeds;
 use stylet_implant::provenance;
 use stylet_implant::readers::SeedRow;
@@ -254,13 +255,7 @@ fn plan(loaded: &Loaded, identity: &Identity, prescription_gy: f64) -> SeedPlan 
         structure_set: None,
         prescription_gy: Some(prescription_gy),
         planned_on: loaded.declared.as_ref().and_then(|d| d.planned_on),
-        source: PlanSource {
-            model: source.model.clone(),
-            manufacturer: String::new(),
-            isotope: source.nuclide.clone(),
-            half_life_days: stylet_dose::decay::s_to_days(source.half_life_s),
-            active_length_m: source.tables.active_length_m,
-        },
+        source: plan_source(source),
         seeds: loaded.rows.iter().cloned().map(plan_seed).collect(),
         notes: Vec::new(),
     }

@@ -40,6 +40,31 @@ impl Case {
     fn sings(&self) -> bool {
         self.late_m > SINGING_M
     }
+
+    /// Comes to rest, and gives the hand no more than it took.
+    fn assert_rests(&self) {
+        assert!(
+            !self.sings(),
+            "{} sings: {} m, before {} m",
+            self.name,
+            self.late_m,
+            self.early_m
+        );
+        assert!(self.late_m <= self.early_m + STEP_M, "{} grows", self.name);
+        // Until a shake is seen to be one; uncontrolled it is some hundred times that.
+        assert!(
+            self.after_j < 10e-3,
+            "{} gives {} J after the change",
+            self.name,
+            self.after_j
+        );
+        assert!(
+            self.excess_j <= self.bound_j,
+            "{} gives {} J",
+            self.name,
+            self.excess_j - self.bound_j
+        );
+    }
 }
 
 /// Brings the needle there with an operator who sees to it, hands over to `hand`, gives it a nudge, and waits.
@@ -150,29 +175,7 @@ fn no_hand_of_the_envelope_makes_the_loop_sing_at_any_lateness_anywhere() {
             given_j * 1e3
         );
         println!("  from the change of hands on {:.3} mJ ({where_after})", after_j * 1e3);
-        for case in &all {
-            assert!(
-                !case.sings(),
-                "{} sings: {} m, before {} m",
-                case.name,
-                case.late_m,
-                case.early_m
-            );
-            assert!(case.late_m <= case.early_m + STEP_M, "{} grows", case.name);
-            // Until a shake is seen to be one; uncontrolled it is some hundred times that.
-            assert!(
-                case.after_j < 10e-3,
-                "{} gives {} J after the change",
-                case.name,
-                case.after_j
-            );
-            assert!(
-                case.excess_j <= case.bound_j,
-                "{} gives {} J",
-                case.name,
-                case.excess_j - case.bound_j
-            );
-        }
+        all.iter().for_each(Case::assert_rests);
     }
 }
 

@@ -317,7 +317,7 @@ fn moved(needle: &Needle, search: &Search, last: &Tried, drop_m: f64, others_mov
     drops
 }
 
-/// What a strand is off: moved by that, its seeds are off by the least in the mean, and one that lies far away does not draw the others.
+/// What a strand is off: moved by that, its seeds are off by the least in the mean.
 fn median(mut off_m: Vec<f64>) -> f64 {
     off_m.sort_by(f64::total_cmp);
     let n = off_m.len();

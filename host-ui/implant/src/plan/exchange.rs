@@ -112,13 +112,7 @@ fn seed_plan(plan: &ImplantPlan, patient: &PatientFrame) -> Result<SeedPlan, Pla
         structure_set: None,
         prescription_gy: Some(plan.prescription_gy),
         planned_on: None,
-        source: PlanSource {
-            model: source.model.clone(),
-            manufacturer: String::new(),
-            isotope: source.nuclide.clone(),
-            half_life_days: stylet_dose::decay::s_to_days(source.half_life_s),
-            active_length_m: source.tables.active_length_m,
-        },
+        source: plan_source(&source),
         seeds: (1..).zip(&plan.needles).flat_map(of_needle).collect(),
         notes: Vec::new(),
     })
@@ -126,4 +120,15 @@ fn seed_plan(plan: &ImplantPlan, patient: &PatientFrame) -> Result<SeedPlan, Pla
 
 fn has_ending(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
+}
+
+/// A source as an RT Plan describes it.
+pub fn plan_source(source: &Source) -> PlanSource {
+    PlanSource {
+        model: source.model.clone(),
+        manufacturer: String::new(),
+        isotope: source.nuclide.clone(),
+        half_life_days: stylet_dose::decay::s_to_days(source.half_life_s),
+        active_length_m: source.tables.active_length_m,
+    }
 }

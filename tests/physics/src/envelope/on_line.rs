@@ -1,6 +1,6 @@
 //! The same hands on a needle line, as every scene ships: the real loops, compliance and membranes of finite elements.
 
-use super::{Case, STEP_M, excess, to_and_fro, worst};
+use super::{Case, excess, to_and_fro, worst};
 use nalgebra::Vector3;
 use stylet_benches::rig::{Tick, hand_envelope};
 use stylet_benches::session::{Session, axis_start};
@@ -123,22 +123,7 @@ fn no_hand_sings(tissue: TissueKind) {
             all.extend(hand_envelope().map(|hand| theatre.session((hand, late_ticks), place, true)));
         }
         report(place.0, &all);
-        for case in &all {
-            assert!(!case.sings(), "{} sings: {} m", case.name, case.late_m);
-            assert!(case.late_m <= case.early_m + STEP_M, "{} grows", case.name);
-            assert!(
-                case.after_j < 10e-3,
-                "{} gives {} J after the change",
-                case.name,
-                case.after_j
-            );
-            assert!(
-                case.excess_j <= case.bound_j,
-                "{} gives {} J",
-                case.name,
-                case.excess_j - case.bound_j
-            );
-        }
+        all.iter().for_each(Case::assert_rests);
     }
 }
 
