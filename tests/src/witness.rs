@@ -4,8 +4,8 @@
 //! nothing about what a test asks, and it is not judged.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Barrier};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -22,32 +22,35 @@ struct Seen {
     longest_ns: AtomicU64,
 }
 
-/// Watches every core until dropped.
+/// Watches every core until it is asked, or dropped.
 pub struct Witness {
     seen: Arc<Seen>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Witness {
+    /// Returns as soon as every core is watched.
     pub fn begin() -> Self {
         let seen = Arc::new(Seen::default());
         let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+        let are_watching = Arc::new(Barrier::new(cores + 1));
         let thread = |core| {
-            let seen = seen.clone();
-            std::thread::spawn(move || watch(core, &seen))
+            let (seen, are_watching) = (seen.clone(), are_watching.clone());
+            std::thread::spawn(move || watch(core, &seen, &are_watching))
         };
         let threads = (0..cores).map(thread).collect();
+        are_watching.wait();
         Self { seen, threads }
     }
 
-    /// The longest time that a core ran nothing of the highest priority, since the last call.
-    pub fn longest_stall(&self) -> Duration {
-        Duration::from_nanos(self.seen.longest_ns.swap(0, Ordering::Relaxed))
+    /// The longest time that a core ran nothing of the highest priority. It waits for the watcher of a core that stands still
+    /// at this moment, or a stall that has just ended would not count yet.
+    pub fn longest_stall(mut self) -> Duration {
+        self.stop();
+        Duration::from_nanos(self.seen.longest_ns.load(Ordering::Relaxed))
     }
-}
 
-impl Drop for Witness {
-    fn drop(&mut self) {
+    fn stop(&mut self) {
         self.seen.is_over.store(true, Ordering::Relaxed);
         for thread in self.threads.drain(..) {
             let _ = thread.join();
@@ -55,8 +58,14 @@ impl Drop for Witness {
     }
 }
 
+impl Drop for Witness {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
 /// Without the rights for that priority it sees busy cores as well.
-fn watch(core: usize, seen: &Seen) {
+fn watch(core: usize, seen: &Seen, are_watching: &Barrier) {
     let priority = libc::sched_param {
         sched_priority: PRIORITY,
     };
@@ -67,6 +76,7 @@ fn watch(core: usize, seen: &Seen) {
         libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &set);
         libc::sched_setscheduler(0, libc::SCHED_FIFO, &priority);
     }
+    are_watching.wait();
     while !seen.is_over.load(Ordering::Relaxed) {
         let begun = Instant::now();
         std::thread::sleep(SLEEP);
@@ -77,14 +87,20 @@ fn watch(core: usize, seen: &Seen) {
 
 /// Runs a check of what happens in time, and once more, up to twice, where it failed while the machine stood still.
 pub fn where_the_machine_runs(check: impl Fn()) {
-    for attempt in 1.. {
+    repeat_after_stalls(|| {
         let witness = Witness::begin();
-        let Err(panic) = catch_unwind(AssertUnwindSafe(&check)) else {
-            return;
-        };
-        let stall = witness.longest_stall();
-        if stall < STALL || attempt == ATTEMPTS {
-            println!("the longest stall of the machine was {stall:?}, in attempt {attempt}");
+        let outcome = catch_unwind(AssertUnwindSafe(&check));
+        (outcome, witness.longest_stall())
+    });
+}
+
+/// An attempt gives its outcome and the longest stall in it.
+fn repeat_after_stalls(mut attempt: impl FnMut() -> (std::thread::Result<()>, Duration)) {
+    for number in 1.. {
+        let (outcome, stall) = attempt();
+        let Err(panic) = outcome else { return };
+        if stall < STALL || number == ATTEMPTS {
+            println!("the longest stall of the machine was {stall:?}, in attempt {number}");
             resume_unwind(panic);
         }
         println!("a core stood still for {stall:?}: the check is repeated");
@@ -98,29 +114,34 @@ mod tests {
     /// A failure on a machine that ran is a failure at once, and is not tried until it passes.
     #[test]
     fn a_failure_is_repeated_only_where_a_core_stood_still() {
-        let (tries, stalls) = (AtomicU64::new(0), AtomicU64::new(0));
-        let outcome = catch_unwind(AssertUnwindSafe(|| {
-            where_the_machine_runs(|| {
-                // The machine may really stand still in this test: what was seen here counts.
-                let witness = Witness::begin();
-                std::thread::sleep(Duration::from_millis(20));
-                tries.fetch_add(1, Ordering::Relaxed);
-                let stalled = witness.longest_stall() > STALL / 2;
-                stalls.fetch_add(u64::from(stalled), Ordering::Relaxed);
-                panic!("on purpose");
-            });
-        }));
-        assert!(outcome.is_err());
-        let tries = tries.into_inner();
-        assert!(tries == 1 || tries <= 1 + stalls.into_inner(), "{tries} tries");
+        let (ran, stood_still) = (STALL / 2, STALL * 2);
+        for (stalls, passes_at, tries, passes) in [
+            (vec![ran; 3], 2, 1, false),
+            (vec![stood_still, ran, ran], 9, 2, false),
+            (vec![stood_still; 9], 9, ATTEMPTS, false),
+            (vec![stood_still, ran], 2, 2, true),
+            (vec![stood_still], 1, 1, true),
+        ] {
+            let mut count = 0;
+            let outcome = catch_unwind(AssertUnwindSafe(|| {
+                repeat_after_stalls(|| {
+                    count += 1;
+                    let outcome: std::thread::Result<()> = if count == passes_at {
+                        Ok(())
+                    } else {
+                        Err(Box::new("on purpose"))
+                    };
+                    (outcome, stalls[count - 1])
+                })
+            }));
+            assert_eq!((count, outcome.is_ok()), (tries, passes), "{stalls:?}");
+        }
     }
 
     /// A rival of a higher priority on one core is what a hypervisor looks like from inside.
     #[test]
     fn a_core_that_ran_nothing_is_seen() {
         let witness = Witness::begin();
-        std::thread::sleep(Duration::from_millis(20));
-        witness.longest_stall();
         let rival = std::thread::spawn(|| {
             let priority = libc::sched_param { sched_priority: 99 };
             // SAFETY: plain data of this thread.

@@ -84,12 +84,11 @@ fn round(core: &Core, hand: &mut Insertion) -> (u64, u64) {
 fn a_hundred_killed_hosts_in_one_insertion_cost_no_more_deadlines_than_hosts_that_live() {
     let mut core = Core::start();
     let mut hand = Insertion::begin(&mut core, 0.001);
-    let witness = Witness::begin();
     let (mut control, mut killed, mut not_judged) = (Vec::new(), Vec::new(), 0);
     // Turn by turn in the same insertion, since a shared machine has bad seconds of its own.
     while control.len() < ROUNDS && not_judged < MOST_NOT_JUDGED {
         hand.records.clear();
-        witness.longest_stall();
+        let witness = Witness::begin();
         let (alive, dead) = round(&core, &mut hand);
         let stall = witness.longest_stall();
         if stall >= STALL {
