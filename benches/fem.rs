@@ -8,7 +8,7 @@ use stylet_sim::limits::TissueParameters;
 use stylet_sim::needle::{NeedleParameters, Phase, transmission};
 use stylet_sim::scene::{Lattice, Scene};
 use stylet_sim::tissue::fem::{self, FemModel, FemSettings, FemState, Integration, Material, SolveSettings, TipPatch};
-use stylet_sim::tissue::{ChainMail, Deformed, Held, TissueState, element_ahead};
+use stylet_sim::tissue::{Carried, ChainMail, Deformed, Held, TissueState, element_ahead};
 
 const PERIOD_S: f64 = 5e-3;
 const PATCH_M: f64 = 4e-3;
@@ -68,7 +68,7 @@ fn insertion(lattice: &Lattice, way: Way, depth_m: f64) -> Vec<Tick> {
         lattice,
         u: [&still, &still, &still],
         scale: 1.0,
-        shift: None,
+        carried: Carried::Not,
         reach: 1.0,
     };
     let ahead = |rest_m: f64, now: Option<u32>, by_m: f64| {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use stylet_sim::limits::{Limits, LinkLimits};
 use stylet_sim::scene::{Lattice, Scene};
-use stylet_sim::tissue::Deformed;
+use stylet_sim::tissue::{Carried, Deformed};
 
 /// Where every element is, and how far its links may go.
 pub struct Body {
@@ -54,7 +54,7 @@ impl Body {
             lattice: &self.lattice,
             u: self.u.each_ref().map(Vec::as_slice),
             scale: 1.0,
-            shift: None,
+            carried: Carried::Not,
             // A link brings its outer end nearer to the inner one's displacement, so nothing passes what was put.
             reach: 1.0 + stretch + 2.0 * self.farthest,
         }

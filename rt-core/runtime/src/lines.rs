@@ -1,9 +1,9 @@
 //! Lines for needles: the body at rest that they are solved in, apart from the one that moves.
 
 use crate::rt::world::WorldError;
-use stylet_sim::line::{BodyAnswer, Line, LineError, QueueProgress, ReadyLine};
+use stylet_sim::line::{Line, LineError, QueueProgress, ReadyLine};
 use stylet_sim::needle::LayerKind;
-use stylet_sim::scene::{Scene, SceneError, SceneSource, Structure, TissueKind};
+use stylet_sim::scene::{Scene, SceneError, SceneSource, TissueKind};
 use stylet_sim::tissue::FemTissue;
 use stylet_sim::tissue::fem::batch::BatchModel;
 
@@ -71,17 +71,9 @@ impl LineBody {
             self.layers.get(structure).copied().unwrap_or_default()
         };
         let mut ready = ReadyLine::prepare(generation, &self.batch, lattice, &layer_of, line, report)?;
-        if let BodyAnswer::Columns(columns) = &ready.body.answer
-            && !self.tissue.adds_columns()
-        {
-            ready.body.answer = BodyAnswer::shifts_of(columns, &self.scene.body, self.is_held());
+        if !self.tissue.adds_columns() {
+            ready.body.answer.carry(&self.scene.body, self.scene.is_held());
         }
         Ok(ready)
-    }
-
-    /// Something of the scene never moves.
-    fn is_held(&self) -> bool {
-        let is_fixed = |structure: &Structure| structure.material.fixed;
-        self.scene.structures.iter().any(is_fixed)
     }
 }

@@ -230,6 +230,7 @@ fn the_gland_moves_by_millimetres_until_its_membrane_gives_way() {
     for (scene, kind) in [
         ("paper", TissueKind::ChainMail),
         ("paper", TissueKind::Fem),
+        ("pelvis", TissueKind::ChainMail),
         ("pelvis", TissueKind::Fem),
     ] {
         let mut theatre = Theatre::in_scene(scene, kind);

@@ -64,24 +64,28 @@ pub struct BodyLine {
 pub enum BodyAnswer {
     /// Displacement of every element, m/N: tissue that adds them up.
     Columns(Vec<PackedField>),
-    /// Motion of the body as a whole, per newton: tissue that finds the rest by itself.
+    /// The same of a coarser body, which carries tissue that finds the rest by itself and is held by something.
+    Carrying(Vec<PackedField>),
+    /// Motion of the body as a whole, per newton: it carries tissue that nothing holds.
     Shifts(Vec<BodyShift>),
 }
 
 impl BodyAnswer {
-    /// Of the columns no more than the motion as a whole; none in a body that something holds, which does not move so.
-    pub fn shifts_of(columns: &[PackedField], body: &Lattice, is_held: bool) -> Self {
-        let shift = |column| match is_held {
-            true => BodyShift::default(),
-            false => BodyShift::of_field(body, column),
+    /// For tissue that does not add columns up: they carry it, or in a body that nothing holds no more of them than the
+    /// motion as a whole.
+    pub fn carry(&mut self, body: &Lattice, is_held: bool) {
+        let Self::Columns(columns) = self else { return };
+        *self = if is_held {
+            Self::Carrying(std::mem::take(columns))
+        } else {
+            Self::Shifts(columns.iter().map(|column| BodyShift::of_field(body, column)).collect())
         };
-        Self::Shifts(columns.iter().map(shift).collect())
     }
 
-    /// Those that are added up; none where the motion as a whole is all.
+    /// Displacements of every element; none where the motion as a whole is all.
     pub fn columns(&self) -> &[PackedField] {
         match self {
-            Self::Columns(columns) => columns,
+            Self::Columns(columns) | Self::Carrying(columns) => columns,
             Self::Shifts(_) => &[],
         }
     }

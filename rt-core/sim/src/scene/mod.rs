@@ -111,12 +111,27 @@ impl Scene {
         Some(self.with_body(TissueKind::Fem, most))
     }
 
+    /// The lattice of those finite elements, for the tissue of this scene.
+    pub fn body_of_lines(&self) -> Option<Arc<Lattice>> {
+        self.tissue.most_line_elements().map(|most| self.coarser_body(most))
+    }
+
+    /// Something of it never moves.
+    pub fn is_held(&self) -> bool {
+        self.structures.iter().any(|structure| structure.material.fixed)
+    }
+
+    fn coarser_body(&self, most_elements: usize) -> Arc<Lattice> {
+        let mut body = Arc::clone(&self.lattice);
+        while body.element_count() > most_elements {
+            body = Arc::new(body.coarser());
+        }
+        body
+    }
+
     fn with_body(mut self, tissue: TissueKind, most_elements: usize) -> Scene {
         self.tissue = tissue;
-        self.body = Arc::clone(&self.lattice);
-        while self.body.element_count() > most_elements {
-            self.body = Arc::new(self.body.coarser());
-        }
+        self.body = self.coarser_body(most_elements);
         self.nodes = NodeGrid::of(&self.body);
         self.surface.move_with(&self.lattice, &self.body);
         self

@@ -57,7 +57,7 @@ impl TissueKind {
     }
 
     /// Needles go along lines, which are solved for in a body of at most so many elements; `None` where they slip by speed.
-    /// ChainMail takes no more of the answer than how the line moves, and how the body does as a whole.
+    /// ChainMail takes no more of the answer than how the line moves, and how the body is carried by it.
     pub fn most_line_elements(self) -> Option<usize> {
         match self {
             TissueKind::ChainMail => Some(8_000),

@@ -1,6 +1,6 @@
 //! The body as it is now: what everything but the models reads.
 
-use super::BodyShift;
+use super::Carried;
 use crate::scene::{Lattice, Surface};
 
 /// A lattice and the displacement of each of its elements.
@@ -12,8 +12,8 @@ pub struct Deformed<'a> {
     pub u: [&'a [f32]; 3],
     /// Elements for each unit of `u`.
     pub scale: f32,
-    /// A motion of the whole body, on top of that.
-    pub shift: Option<BodyShift>,
+    /// A displacement of the whole body, on top of that.
+    pub carried: Carried<'a>,
     /// No corner of an element is farther from the element's box at rest, in elements.
     pub reach: f32,
 }
@@ -23,9 +23,11 @@ impl Deformed<'_> {
     pub fn displacement(&self, element: u32) -> [f64; 3] {
         let e = (element as usize).min(self.lattice.element_count().saturating_sub(1));
         let u = self.u.map(|c| c.get(e).map_or(0.0, |u| f64::from(self.scale * u)));
-        let Some(shift) = &self.shift else { return u };
-        let whole_m = shift.at_m(self.lattice.rest_m(e as u32));
-        [0, 1, 2].map(|a| u[a] + whole_m[a] / self.lattice.spacing_m)
+        if matches!(self.carried, Carried::Not) {
+            return u;
+        }
+        let carried_m = self.carried.at_m(self.lattice, e as u32);
+        [0, 1, 2].map(|a| u[a] + carried_m[a] / self.lattice.spacing_m)
     }
 
     /// Centre of an element in the scene frame; the last element's for a number past the end.

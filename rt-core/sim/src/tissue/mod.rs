@@ -28,6 +28,7 @@
 )]
 
 mod ahead;
+mod carried;
 pub mod chainmail;
 mod deformed;
 pub mod fem;
@@ -38,6 +39,7 @@ mod shift;
 mod violation;
 
 pub use ahead::element_ahead;
+pub use carried::{Carried, CarriedField, Carry};
 pub use chainmail::{ChainMail, ChainMailTissue, TissueState, step};
 pub use deformed::Deformed;
 pub use fem::FemTissue;

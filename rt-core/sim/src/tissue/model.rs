@@ -1,6 +1,6 @@
 //! What every tissue model is: a body that takes steps and can be read.
 
-use super::{BodyShift, Deformed, PackedField};
+use super::{Carry, Deformed, PackedField};
 use crate::limits::Limits;
 
 use serde::{Deserialize, Serialize};
@@ -91,9 +91,9 @@ pub trait TissueModel: Send {
         None
     }
 
-    /// Moves the body as a whole, on top of what its steps do; `None` takes that back. Nothing in a model that does not know
-    /// such a motion. Obligations as for `step`.
-    fn carry(&mut self, _shift: Option<BodyShift>) {}
+    /// Displaces the whole body, on top of what its steps do, until the next call. Nothing in a model that does not know such a
+    /// displacement. Obligations as for `step`.
+    fn carry(&mut self, _by: Carry<'_>) {}
 
     /// Whether forces may go by this step: one that has not converged is for no hand, but where a model says otherwise.
     fn may_be_felt(&self, report: &StepReport) -> bool {

@@ -6,7 +6,7 @@ use crate::rt::exchange::Notice;
 use crate::rt::line_loads::LineLoads;
 use nalgebra::Vector3;
 use stylet_sim::line::{BodyAnswer, BodyLine, Line};
-use stylet_sim::tissue::{BodyShift, Held, MaterialPoint, StepReport};
+use stylet_sim::tissue::{BodyShift, Carry, Held, MaterialPoint, StepReport};
 
 impl TissueLoop {
     /// Takes up the columns of a new line; the old ones go back to be freed.
@@ -50,7 +50,12 @@ impl TissueLoop {
                 for (sum, whole_m) in shift.shift_m.iter_mut().zip(whole_m) {
                     *sum += whole_m;
                 }
-                self.world.tissue.carry(Some(shift));
+                self.world.tissue.carry(Carry::Shift(shift));
+                let held = self.held_on_line(&axis, &loads);
+                self.world.tissue.step(held, self.period_s)
+            }
+            BodyAnswer::Carrying(columns) => {
+                self.world.tissue.carry(Carry::Columns(columns, loads.loads_n()));
                 let held = self.held_on_line(&axis, &loads);
                 self.world.tissue.step(held, self.period_s)
             }
@@ -83,7 +88,7 @@ impl TissueLoop {
     /// The needle is on no line: a contact that was reported ends.
     pub(super) fn leave_line(&mut self) {
         if std::mem::take(&mut self.in_by_line) {
-            self.world.tissue.carry(None);
+            self.world.tissue.carry(Carry::Not);
             let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
             self.notify(Notice::LeftTissue { tick, time_ns });
         }

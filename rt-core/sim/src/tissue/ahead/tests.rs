@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::scene::{Scene, test_bodies};
+use crate::tissue::Carried;
 
 /// A body moved as a whole by so many elements, sheared along z.
 struct Body {
@@ -30,7 +31,7 @@ impl Body {
             lattice: &self.scene.lattice,
             u: self.u.each_ref().map(Vec::as_slice),
             scale: 1.0,
-            shift: None,
+            carried: Carried::Not,
             reach: 20.0,
         }
     }

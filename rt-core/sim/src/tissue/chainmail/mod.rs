@@ -41,17 +41,19 @@ pub use state::TissueState;
 
 use crate::limits::Limits;
 use crate::scene::Scene;
-use crate::tissue::{BodyShift, Deformed, Held, StepReport, TissueModel};
+use crate::tissue::{BodyShift, Carried, CarriedField, Carry, Deformed, Held, StepReport, TissueModel};
 
 /// Restricted ChainMail as a tissue model.
 #[derive(Clone)]
 pub struct ChainMailTissue {
     /// Topology and limits.
     pub model: ChainMail,
-    /// Where every element is, in the body as a whole.
+    /// Where every element is, in the body as it is carried.
     pub state: TissueState,
-    /// How that is moved.
-    shift: Option<BodyShift>,
+    /// How the body is carried as one piece.
+    shift: BodyShift,
+    /// How it is carried where something holds it; only in such a scene.
+    field: Option<CarriedField>,
 }
 
 impl ChainMailTissue {
@@ -59,57 +61,79 @@ impl ChainMailTissue {
     pub fn new(scene: &Scene, limits: Limits) -> Self {
         let model = ChainMail::new(scene, limits);
         let state = TissueState::at_rest(&model);
+        let coarse = scene.body_of_lines().filter(|_| scene.is_held());
         ChainMailTissue {
             model,
             state,
-            shift: None,
+            shift: BodyShift::default(),
+            field: coarse.map(|coarse| CarriedField::new(scene, coarse)),
         }
     }
-}
 
-impl ChainMailTissue {
-    /// No element is moved farther by the body as a whole, in elements.
-    fn largest_shift(&self) -> f32 {
+    fn carried(&self) -> Carried<'_> {
+        match &self.field {
+            Some(field) if !field.is_at_rest() => Carried::Field(field),
+            _ if self.shift != BodyShift::default() => Carried::Shift(&self.shift),
+            _ => Carried::Not,
+        }
+    }
+
+    /// No element is carried farther, in elements.
+    fn largest_carried(&self) -> f32 {
         let lattice = &self.model.lattice;
-        let largest_m = self.shift.map_or(0.0, |shift| shift.largest_m(lattice));
-        (largest_m / lattice.spacing_m) as f32
+        (self.carried().largest_m(lattice) / lattice.spacing_m) as f32
     }
 }
 
 impl TissueModel for ChainMailTissue {
     fn step(&mut self, held: Option<Held>, dt_s: f64) -> StepReport {
-        let Some(shift) = self.shift else {
+        let carried = self.carried();
+        if matches!(carried, Carried::Not) {
             return step(&self.model, &mut self.state, held, dt_s);
-        };
-        // In the body as a whole the held element has to go the rest of the way.
+        }
+        // The held element has to go no farther than the rest of its way.
         let in_body = held.map(|held| {
-            let whole_m = shift.at_m(self.model.lattice.rest_m(held.element));
+            let carried_m = carried.at_m(&self.model.lattice, held.element);
             Held {
-                position_m: [0, 1, 2].map(|a| held.position_m[a] - whole_m[a]),
+                position_m: [0, 1, 2].map(|a| held.position_m[a] - carried_m[a]),
                 ..held
             }
         });
         let mut report = step(&self.model, &mut self.state, in_body, dt_s);
-        report.max_displacement += self.largest_shift();
+        let largest = self.largest_carried();
+        report.max_displacement += largest;
+        report.converged &= largest.is_finite();
         report
     }
 
-    fn carry(&mut self, shift: Option<BodyShift>) {
-        self.shift = shift.filter(|shift| *shift != BodyShift::default());
+    fn carry(&mut self, by: Carry<'_>) {
+        self.shift = match by {
+            Carry::Shift(shift) => shift,
+            _ => BodyShift::default(),
+        };
+        match (&mut self.field, by) {
+            (Some(field), Carry::Columns(columns, loads_n)) if loads_n.iter().any(|n| *n != 0.0) => {
+                field.set(columns, loads_n);
+            }
+            (Some(field), _) if !field.is_at_rest() => field.clear(),
+            _ => {}
+        }
     }
 
     fn deformed(&self) -> Deformed<'_> {
         let body = self.state.deformed(&self.model);
+        // A corner lies half an element from its element along each axis; a coarser body's elements have twice the edge at least.
+        const CORNER: f32 = 2.5;
         Deformed {
-            shift: self.shift,
-            reach: body.reach + self.largest_shift(),
+            carried: self.carried(),
+            reach: body.reach + CORNER * self.largest_carried(),
             ..body
         }
     }
 
     fn return_to_rest(&mut self) {
         self.state.return_to_rest(&self.model);
-        self.shift = None;
+        self.carry(Carry::Not);
     }
 
     fn set_limits(&mut self, limits: Limits) {
@@ -119,25 +143,34 @@ impl TissueModel for ChainMailTissue {
 
     fn memory_len(&self) -> usize {
         let state = self.state.memory().iter().map(|part| part.len()).sum::<usize>();
-        state + size_of::<BodyShift>()
+        state + self.field.as_ref().map_or(0, CarriedField::memory_len) + size_of::<BodyShift>()
     }
 
     fn save(&self, to: &mut [u8]) {
-        if let Some((state, shift)) = to.split_last_chunk_mut() {
-            self.state.save(state);
-            let bytes: &mut [u8; size_of::<BodyShift>()] = shift;
-            bytes.copy_from_slice(bytemuck::bytes_of(&self.shift.unwrap_or_default()));
+        let Some((to, shift)) = to.split_last_chunk_mut::<{ size_of::<BodyShift>() }>() else {
+            return;
+        };
+        shift.copy_from_slice(bytemuck::bytes_of(&self.shift));
+        let field_len = self.field.as_ref().map_or(0, CarriedField::memory_len);
+        let (state, field) = to.split_at_mut(to.len().saturating_sub(field_len));
+        self.state.save(state);
+        if let Some(carried) = &self.field {
+            carried.save(field);
         }
     }
 
     fn load(&mut self, from: &[u8]) {
-        const BYTES: usize = size_of::<BodyShift>();
-        if let Some((state, shift)) = from.split_last_chunk::<BYTES>() {
-            self.state.load(&self.model, state);
-            let shift: BodyShift = bytemuck::pod_read_unaligned(shift);
-            let numbers = shift.shift_m.iter().chain(&shift.turn_rad);
-            let is_motion = numbers.clone().all(|c| c.is_finite()) && numbers.into_iter().any(|c| *c != 0.0);
-            self.shift = is_motion.then_some(shift);
+        let Some((from, shift)) = from.split_last_chunk::<{ size_of::<BodyShift>() }>() else {
+            return;
+        };
+        let shift: BodyShift = bytemuck::pod_read_unaligned(shift);
+        let is_motion = shift.shift_m.iter().chain(&shift.turn_rad).all(|c| c.is_finite());
+        self.shift = if is_motion { shift } else { BodyShift::default() };
+        let field_len = self.field.as_ref().map_or(0, CarriedField::memory_len);
+        let (state, field) = from.split_at(from.len().saturating_sub(field_len));
+        self.state.load(&self.model, state);
+        if let Some(carried) = &mut self.field {
+            carried.load(field);
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::activity::Active;
 use super::kernels::Stretch;
 use super::model::ChainMail;
-use crate::tissue::Deformed;
+use crate::tissue::{Carried, Deformed};
 
 /// Displacements from rest of all elements, one array for each axis; and what the last step left to look at.
 ///
@@ -102,7 +102,7 @@ impl TissueState {
             lattice: &model.lattice,
             u: self.u.each_ref().map(Vec::as_slice),
             scale: self.scale(),
-            shift: None,
+            carried: Carried::Not,
             reach: 1.0 + stretch + self.max_displacement,
         }
     }

@@ -7,7 +7,7 @@ use super::solve::{SolveSettings, TipPatch};
 use super::state::FemState;
 use crate::limits::Limits;
 use crate::scene::Scene;
-use crate::tissue::{Deformed, Held, HeldOutcome, PackedField, Solve, StepReport, TissueModel};
+use crate::tissue::{Carried, Deformed, Held, HeldOutcome, PackedField, Solve, StepReport, TissueModel};
 
 /// What surrounds a body: 20 mm of fat of 5 kPa, per surface area (assumed).
 pub const SURROUNDINGS_PA_PER_M: f64 = 5e3 / 20e-3;
@@ -115,7 +115,7 @@ impl<T: Compiled> TissueModel for FemTissue<T> {
             lattice: self.model.lattice(),
             u: [0, 1, 2].map(|axis| self.state.displacement(axis)),
             scale: 1.0,
-            shift: None,
+            carried: Carried::Not,
             // Corners move with their neighbours; a cell is not stretched beyond what both move.
             reach: 1.0 + 3.0 * self.state.max_displacement,
         }
