@@ -153,6 +153,11 @@ impl Session {
         output
     }
 
+    /// The next ticks of the tissue loop do not take place.
+    pub fn miss_tissue_ticks(&mut self, ticks: u32) {
+        self.loops.miss_tissue_ticks(ticks);
+    }
+
     /// Ticks for so long.
     pub fn run(&mut self, seconds: f64) -> Vec<ChainOutput> {
         (0..(seconds * 1e3).round() as u64).map(|_| self.step()).collect()

@@ -25,6 +25,7 @@ pub struct SteppedLoops {
     pub bridge: BridgePorts,
     tissue_period_ns: u64,
     now_ns: u64,
+    missed: u32,
 }
 
 impl SteppedLoops {
@@ -56,6 +57,7 @@ impl SteppedLoops {
             bridge,
             tissue_period_ns,
             now_ns: 0,
+            missed: 0,
         }
     }
 
@@ -65,9 +67,17 @@ impl SteppedLoops {
         let output = self.haptic.tick(self.now_ns, self.now_ns, 0);
         while self.bridge.records.pop().is_ok() {}
         if self.now_ns.is_multiple_of(self.tissue_period_ns) {
-            self.tissue.tick(self.now_ns);
+            if self.missed == 0 {
+                self.tissue.tick(self.now_ns);
+            }
+            self.missed = self.missed.saturating_sub(1);
         }
         output
+    }
+
+    /// The next ticks of the tissue loop do not take place, as where a machine is busy.
+    pub fn miss_tissue_ticks(&mut self, ticks: u32) {
+        self.missed = ticks;
     }
 
     /// Simulated time since the start, s.

@@ -11,6 +11,8 @@ use stylet_sim::limits::TissueParameters;
 use stylet_sim::line::ReadyLine;
 use stylet_sim::scene::{SceneSource, TissueKind};
 
+mod hard;
+
 const KINDS: [TissueKind; 2] = [TissueKind::ChainMail, TissueKind::Fem];
 
 /// Body and line, used by one insertion after the other.
@@ -32,12 +34,16 @@ impl Theatre {
     }
 
     fn in_scene(scene: &str, tissue: TissueKind) -> Self {
-        let source = SceneSource::Builtin(scene.to_owned());
-        let scene = source.build().expect("built in").with_tissue(tissue);
+        Self::beside_axis(&SceneSource::Builtin(scene.to_owned()), tissue, 0.0)
+    }
+
+    /// The needle goes in so far beside the axis of the gland, along x.
+    fn beside_axis(source: &SceneSource, tissue: TissueKind, beside_m: f64) -> Self {
+        let scene = source.build().expect("no problem with it").with_tissue(tissue);
         let limits = TissueParameters::default().validate().expect("defaults are valid");
         let world = World::new(scene, limits, 1).expect("can be used");
-        let start = axis_start(&world);
-        let body = LineBody::of_source(&source, tissue).expect("can be solved");
+        let start = axis_start(&world) + Vector3::x() * beside_m;
+        let body = LineBody::of_source(source, tissue).expect("can be solved");
         let line = body
             .expect("has lines")
             .prepare(1, start.into(), [0.0, 0.0, 1.0], &mut || true);
