@@ -4,8 +4,8 @@ use crate::rt::world::WorldError;
 use stylet_sim::line::{Line, LineError, QueueProgress, ReadyLine};
 use stylet_sim::needle::LayerKind;
 use stylet_sim::scene::{Scene, SceneError, SceneSource, TissueKind};
-use stylet_sim::tissue::FemTissue;
 use stylet_sim::tissue::fem::batch::BatchModel;
+use stylet_sim::tissue::{FemTissue, MaterialPoint};
 
 /// Why there is no line; the text is for people.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -19,14 +19,22 @@ pub enum NoLine {
     /// The line itself.
     #[error(transparent)]
     Line(#[from] LineError),
+    /// A part that would fly off at the first newton.
+    #[error(
+        "nothing holds the part of the body that the needle enters: let fat or something fixed lie beyond one of its faces (surroundings)"
+    )]
+    NothingHolds,
 }
 
 /// A body at rest with its solver for eight loads at once.
 pub struct LineBody {
     tissue: TissueKind,
     scene: Scene,
-    layers: Vec<LayerKind>,
+    /// By structure; bone is none.
+    layers: Vec<Option<LayerKind>>,
     batch: BatchModel<f32>,
+    /// By element; empty where everything is held.
+    is_loose: Vec<bool>,
 }
 
 impl LineBody {
@@ -39,8 +47,13 @@ impl LineBody {
             .map_err(|problems| WorldError(problems.iter().map(ToString::to_string).collect()))?;
         Ok(Some(Self {
             tissue,
-            layers: scene.structures.iter().map(LayerKind::of_structure).collect(),
+            layers: scene
+                .structures
+                .iter()
+                .map(|structure| (!structure.material.fixed).then(|| LayerKind::of_structure(structure)))
+                .collect(),
             batch: BatchModel::new(&body.model),
+            is_loose: loose_elements(&body),
             scene,
         }))
     }
@@ -65,10 +78,19 @@ impl LineBody {
         line: Line,
         report: &mut dyn FnMut(QueueProgress) -> bool,
     ) -> Result<ReadyLine, NoLine> {
+        let inside_m = 0.25 * self.scene.body.spacing_m;
+        let first = MaterialPoint::at_rest(&self.scene.body, line.point_m(inside_m, [0.0; 2]));
+        let is_loose = |point: MaterialPoint| self.is_loose.get(point.element as usize).copied();
+        if first.and_then(is_loose).unwrap_or(false) {
+            return Err(NoLine::NothingHolds);
+        }
         let lattice = &self.scene.lattice;
         let layer_of = |element: u32| {
             let structure = usize::from(lattice.structure(element));
-            self.layers.get(structure).copied().unwrap_or_default()
+            self.layers
+                .get(structure)
+                .copied()
+                .unwrap_or(Some(LayerKind::default()))
         };
         let mut ready = ReadyLine::prepare(generation, &self.batch, lattice, &layer_of, line, report)?;
         if !self.tissue.adds_columns() {
@@ -76,4 +98,10 @@ impl LineBody {
         }
         Ok(ready)
     }
+}
+
+fn loose_elements(body: &FemTissue<f32>) -> Vec<bool> {
+    let elements = 0..body.model.element_count() as u32;
+    let is_loose: Vec<bool> = elements.map(|element| !body.model.is_held(element)).collect();
+    if is_loose.contains(&true) { is_loose } else { Vec::new() }
 }

@@ -5,7 +5,7 @@
 use super::columns::{ColumnQueue, QueueProgress, TOLERANCE};
 use super::compliance::Compliance;
 use super::contact::{LineInput, step};
-use super::model::{LineLayer, LineModel, LineSettings, MAX_LAYERS, MAX_STATIONS};
+use super::model::{LineModel, LineSettings, MAX_STATIONS};
 use super::state::{LineOutput, LineState};
 use super::stations::{Line, StationSettings, Stations};
 use crate::needle::{LayerKind, Layers};
@@ -15,8 +15,10 @@ use crate::tissue::{BodyShift, PackedField};
 use nalgebra::Vector3;
 
 mod source;
+mod way;
 
 pub use source::LineSource;
+use way::{Way, layer};
 
 /// The needle is on a line whose entry it would meet so far from it, and whose direction is that close to its own.
 const BESIDE_M: f64 = 1e-3;
@@ -24,6 +26,8 @@ const TILT_RAD: f64 = 0.02;
 /// A stuck shaft is felt no stiffer: by trial with every hand of the envelope, links up to three ticks late, tissue up to 1.7 MPa
 /// (docs/stability.md, 19). The paper's gland has 0.42 N/mm.
 const STIFFEST_N_PER_M: f64 = 1000.0;
+/// Bone is felt like a spring of that: the stiffest that every hand of the envelope holds over a slow link.
+const BONE_N_PER_M: f64 = STIFFEST_N_PER_M;
 /// Slices of work between two looks at whether the line is still wanted.
 const SLICES: usize = 8;
 
@@ -42,8 +46,7 @@ pub struct HandLine {
     /// Rises with each line of a run, from 1.
     pub generation: u64,
     line: Line,
-    /// Layers on the way in order of depth; the membrane of a kind that was met before is felt once only.
-    kinds: Vec<(f64, LayerKind, bool)>,
+    way: Way,
     model: LineModel,
     state: LineState,
 }
@@ -130,18 +133,23 @@ pub enum LineError {
 }
 
 impl ReadyLine {
-    /// Solves for a line of needle at rest; some seconds for a body of 20,000 elements. `report` is called between slices of
-    /// work and ends it by returning false.
+    /// Solves for a line of needle at rest; some seconds for a body of 20,000 elements. `layer_of` says what an element of `lattice`
+    /// is to a needle, and nothing of what no needle enters. `report` is called between slices of work and ends it by returning
+    /// false.
     pub fn prepare(
         generation: u64,
         body: &BatchModel<f32>,
         lattice: &Lattice,
-        layer_of: &dyn Fn(u32) -> LayerKind,
+        layer_of: &dyn Fn(u32) -> Option<LayerKind>,
         line: Line,
         report: &mut dyn FnMut(QueueProgress) -> bool,
     ) -> Result<ReadyLine, LineError> {
         let settings = StationSettings::of_lattice(body.spacing_m());
-        let stations = Stations::along(body, line, settings, MAX_STATIONS);
+        let way = Way::along(&line, lattice, layer_of);
+        let before_bone = way
+            .bone_m
+            .map_or(MAX_STATIONS, |bone_m| (bone_m / settings.spacing_m).round() as usize);
+        let stations = Stations::along(body, line, settings, MAX_STATIONS.min(before_bone));
         if stations.count() == 0 {
             return Err(LineError::NoTissue);
         }
@@ -153,9 +161,8 @@ impl ReadyLine {
         }
         let compliance = Compliance::of_columns(body, &stations, queue.columns()).ok_or(LineError::NoTissue)?;
         let compliance = compliance.behind_needle(STIFFEST_N_PER_M);
-        let kinds = kinds_along(&stations, lattice, layer_of);
         Ok(ReadyLine {
-            hand: Box::new(HandLine::new(generation, line, kinds, compliance)?),
+            hand: Box::new(HandLine::new(generation, line, way, compliance)?),
             body: Box::new(BodyLine {
                 generation,
                 line,
@@ -165,65 +172,9 @@ impl ReadyLine {
     }
 }
 
-/// Where each layer begins on the way, up to [`MAX_LAYERS`]; the rest is felt as the last.
-fn kinds_along(
-    stations: &Stations,
-    lattice: &Lattice,
-    layer_of: &dyn Fn(u32) -> LayerKind,
-) -> Vec<(f64, LayerKind, bool)> {
-    const STEPS: usize = 8;
-    let mut kinds: Vec<(f64, LayerKind, bool)> = Vec::new();
-    let step_m = stations.settings.spacing_m / STEPS as f64;
-    for n in 0..stations.count() * STEPS {
-        let place_m = stations.line.point_m((n as f64 + 0.5) * step_m, [0.0; 2]);
-        let [i, j, k] = place_m.map(|c| (c / lattice.spacing_m) as usize);
-        let Some(kind) = lattice.element_of_cell(i, j, k).map(layer_of) else {
-            continue;
-        };
-        let is_new = kinds.last().is_none_or(|(_, last, _)| *last != kind);
-        if is_new && kinds.len() < MAX_LAYERS {
-            let has_membrane = !kinds.iter().any(|(_, met, _)| *met == kind);
-            kinds.push((n as f64 * step_m, kind, has_membrane));
-        }
-    }
-    if let Some(first) = kinds.first_mut() {
-        first.0 = 0.0;
-    }
-    kinds
-}
-
-fn layer(forces: &LayerForces, &(from_m, kind, has_membrane): &(f64, LayerKind, bool)) -> LineLayer {
-    let layer = forces.layers.of(kind);
-    let is_closed = has_membrane && layer.has_membrane() && forces.membrane_gain > 0.0;
-    LineLayer {
-        from_m,
-        puncture_force_n: if is_closed {
-            forces.membrane_gain * layer.puncture_force_n
-        } else {
-            0.0
-        },
-        puncture_depth_m: if is_closed {
-            layer.puncture_depth_m
-        } else {
-            f64::INFINITY
-        },
-        cutting_force_n: forces.cutting_gain * layer.cutting_force_n,
-        shaft_friction_n_per_m: forces.shaft_gain * layer.shaft_friction_n_per_m,
-    }
-}
-
-fn layers_of(kinds: &[(f64, LayerKind, bool)], forces: &LayerForces) -> Vec<LineLayer> {
-    kinds.iter().map(|kind| layer(forces, kind)).collect()
-}
-
 impl HandLine {
-    fn new(
-        generation: u64,
-        line: Line,
-        kinds: Vec<(f64, LayerKind, bool)>,
-        compliance: Compliance,
-    ) -> Result<Self, LineError> {
-        let layers = layers_of(&kinds, &LayerForces::default());
+    fn new(generation: u64, line: Line, way: Way, compliance: Compliance) -> Result<Self, LineError> {
+        let layers = way.layers(&LayerForces::default());
         let model = LineModel::new(compliance, &layers, LineSettings::default()).map_err(|problems| {
             let lines: Vec<_> = problems.iter().map(ToString::to_string).collect();
             LineError::Unusable(lines.join("\n"))
@@ -231,7 +182,7 @@ impl HandLine {
         Ok(Self {
             generation,
             line,
-            kinds,
+            way,
             state: LineState::new(&model),
             model,
         })
@@ -244,7 +195,7 @@ impl HandLine {
 
     /// Takes up the layers' forces; does not allocate.
     pub fn set_forces(&mut self, forces: &LayerForces) {
-        let kinds = &self.kinds;
+        let kinds = &self.way.kinds;
         self.model.set_layers(|n| kinds.get(n).map(|kind| layer(forces, kind)));
     }
 
@@ -258,9 +209,24 @@ impl HandLine {
         (tip_m - Vector3::from(self.line.entry_m)).dot(&Vector3::from(self.line.axes[0]))
     }
 
-    /// One tick of the needle.
+    /// One tick of the needle, whose tip goes no farther than the bone.
     pub fn step(&mut self, tip_m: f64, dt_s: f64) -> LineOutput {
+        let tip_m = tip_m - self.in_bone_m(tip_m);
         step(&self.model, &mut self.state, &LineInput { tip_m, dt_s })
+    }
+
+    /// How far a hand wants the tip to be in bone, m; what is no number stays.
+    pub fn in_bone_m(&self, tip_m: f64) -> f64 {
+        match self.way.bone_m {
+            Some(bone_m) if tip_m > bone_m => tip_m - bone_m,
+            _ => 0.0,
+        }
+    }
+
+    /// Bone against a tip that is held so far in it: force on the hand against the line, N, and the energy in that, J.
+    pub fn bone(&self, tip_m: f64) -> (f64, f64) {
+        let in_bone_m = self.in_bone_m(tip_m);
+        (BONE_N_PER_M * in_bone_m, 0.5 * BONE_N_PER_M * in_bone_m * in_bone_m)
     }
 
     /// What the state is.

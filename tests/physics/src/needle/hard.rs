@@ -31,6 +31,12 @@ fn block(label: impl Fn(usize) -> u8, others: Vec<Structure>, beyond: Beyond) ->
     SceneSource::of_labels("block", &labels)
 }
 
+fn other(name: &str) -> Structure {
+    let mut structure = Structure::soft(name, 2);
+    structure.role = Role::Tissue;
+    structure
+}
+
 /// The slip is the force loop's own: what the hand feels does not wait for the tissue.
 #[test]
 fn tissue_ticks_that_do_not_take_place_are_not_felt() {
@@ -77,12 +83,21 @@ fn tissue_ticks_that_do_not_take_place_are_not_felt() {
 fn a_membrane_that_gives_way_at_full_speed_changes_the_force_no_faster_than_the_gate_allows() {
     for kind in KINDS {
         let mut theatre = Theatre::of(kind);
-        let mut needle = theatre.begin();
-        let ticks = needle.go_to(40e-3, 0.28);
-        let (step_n, peak_n) = (largest_step_n(&ticks), peak_n(&ticks));
-        println!("{kind:?}, 280 mm/s: peak {peak_n:.2} N, largest step {step_n:.3} N in a tick");
-        assert!(peak_n > 4.5 && step_n <= SLEW_N, "{peak_n} N, {step_n} N");
-        theatre.end(needle);
+        let peaks = [0.05, 0.123, 0.28].map(|speed_m_per_s| {
+            let mut needle = theatre.begin();
+            // The force comes up within half a second after the hand engages.
+            needle.go_to(-5e-3, 0.05);
+            let ticks = needle.go_to(40e-3, speed_m_per_s);
+            let (step_n, peak_n) = (largest_step_n(&ticks), peak_n(&ticks));
+            println!(
+                "{kind:?}, {:.0} mm/s: peak {peak_n:.2} N, largest step {step_n:.3} N in a tick",
+                speed_m_per_s * 1e3
+            );
+            assert!(step_n <= SLEW_N, "{step_n} N");
+            theatre.end(needle);
+            peak_n
+        });
+        assert!(peaks.iter().all(|n| (n / peaks[0] - 1.0).abs() < 0.1), "{peaks:?} N");
     }
 }
 
@@ -122,11 +137,7 @@ fn a_needle_through_the_rim_of_the_gland_moves_little_and_leaves_it_at_rest() {
 #[test]
 fn membranes_closer_than_their_depth_give_way_one_after_the_other() {
     for kind in KINDS {
-        let source = block(
-            |k| if k < 2 { 2 } else { 1 },
-            vec![Structure::soft("skin", 2)],
-            Beyond::Fat,
-        );
+        let source = block(|k| if k < 2 { 2 } else { 1 }, vec![other("skin")], Beyond::Fat);
         let mut theatre = Theatre::beside_axis(&source, kind, 0.0);
         let mut needle = theatre.begin();
         let ticks = needle.go_to(50e-3, 0.05);
@@ -143,7 +154,7 @@ fn membranes_closer_than_their_depth_give_way_one_after_the_other() {
             peak_n(&ticks),
             rest_n(&ticks)
         );
-        assert!((1..=2).contains(&falls.len()) && peak_n(&ticks) < 12.0, "{falls:?}");
+        assert!(falls.len() == 2 && peak_n(&ticks) < 12.0, "{falls:?}");
         assert!(rest_n(&ticks) < 6.0 && largest_step_n(&ticks) <= SLEW_N);
         theatre.end(needle);
     }
@@ -153,22 +164,29 @@ fn membranes_closer_than_their_depth_give_way_one_after_the_other() {
 #[test]
 fn bone_on_the_way_is_not_entered() {
     for kind in KINDS {
-        let mut bone = Structure::soft("bone", 2);
+        let mut bone = other("bone");
         bone.material.fixed = true;
         let source = block(|k| if (15..18).contains(&k) { 2 } else { 1 }, vec![bone], Beyond::Fat);
         let mut theatre = Theatre::beside_axis(&source, kind, 0.0);
         let mut needle = theatre.begin();
         let ticks = needle.go_to(45e-3, 0.05);
-        let deep_m = needle.session.true_tip_in_world().z - needle.surface.z;
+        let hand_m = needle.session.true_tip_in_world().z - needle.surface.z;
+        let tip_m = ticks.last().expect("ticks").output.depth_m;
         let moved_m = needle.displacement_m();
         println!(
-            "{kind:?}: bone at 30 mm: the hand wants 45 and stands at {:.1} mm with {:.2} N, peak {:.2} N; the body is moved by {:.2} mm",
-            deep_m * 1e3,
+            "{kind:?}: bone at 30 mm: the hand wants 45 and stands at {:.1} mm with {:.2} N, the tip at {:.2} mm; the body is moved by {:.2} mm",
+            hand_m * 1e3,
             rest_n(&ticks),
-            peak_n(&ticks),
+            tip_m * 1e3,
             moved_m * 1e3
         );
-        assert!(moved_m < 25e-3 && largest_step_n(&ticks) <= SLEW_N, "{moved_m} m");
+        assert!((tip_m - 30e-3).abs() < 0.3e-3, "{tip_m} m");
+        assert!(
+            hand_m < 42e-3 && rest_n(&ticks) > 5.0,
+            "{hand_m} m, {} N",
+            rest_n(&ticks)
+        );
+        assert!(moved_m < 15e-3 && largest_step_n(&ticks) <= SLEW_N, "{moved_m} m");
         theatre.end(needle);
     }
 }
@@ -193,8 +211,10 @@ fn what_a_body_rests_on_goes_from_nothing_to_a_table() {
             moved_m
         });
         assert!(moved_m[1] < moved_m[0], "{moved_m:?}");
-        let refused = LineBody::of_source(&block(gland, Vec::new(), Beyond::Free), kind);
-        let why = refused.err().map(|why| why.to_string());
+        let body = LineBody::of_source(&block(gland, Vec::new(), Beyond::Free), kind);
+        let body = body.expect("can be solved").expect("has lines");
+        let line = body.prepare(1, [28e-3, 28e-3, -5e-3], [0.0, 0.0, 1.0], &mut || true);
+        let why = line.err().map(|why| why.to_string());
         println!("{kind:?}, nothing on all sides: {why:?}");
         assert!(why.is_some(), "a body that nothing holds has no answer");
     }

@@ -68,12 +68,14 @@ pub fn step_on_line(
         guided: is_in && answer.tip_material_m > 0.0,
         tissue_n: None,
     };
-    let terms = terms(parameters, &input, &axis, &answer, line.state().elastic_j());
+    let (bone_n, bone_j) = line.bone(along_m);
+    let tissue_j = line.state().elastic_j() + bone_j;
+    let terms = terms(parameters, &input, &axis, &answer, bone_n, tissue_j);
     let wrench = guard(parameters, device, state, &terms, moved_m, velocity_m_per_s, dt_s);
     state.tip_in_world = Some(tip);
     ChainOutput {
         phase,
-        depth_m: if is_in { along_m } else { 0.0 },
+        depth_m: if is_in { along_m - line.in_bone_m(along_m) } else { 0.0 },
         puncture_depth_m: line.puncture_depth_m(answer.held_by),
         speed_along_m_per_s,
         terms,
@@ -103,7 +105,8 @@ fn terms(
     input: &ForceInput,
     axis: &Vector3<f64>,
     answer: &LineOutput,
-    elastic_j: f64,
+    bone_n: f64,
+    tissue_j: f64,
 ) -> ForceTerms {
     let force = &parameters.force;
     let gravity_n = law::gravity(force);
@@ -125,16 +128,17 @@ fn terms(
     let guide_n = law::guide(force, input, axis);
     let damping_n = law::damping(force, input, axis, &membrane_n);
     let beside_m = input.tip_in_world - input.path_origin_in_world - axis * input.along_m;
-    let total_n = membrane_n + guide_n + damping_n + friction_n + gravity_n;
+    let tissue_n = axis * -bone_n;
+    let total_n = membrane_n + guide_n + damping_n + friction_n + gravity_n + tissue_n;
     ForceTerms {
         membrane_n,
         guide_n,
         damping_n,
         friction_n,
         gravity_n,
-        tissue_n: Vector3::zeros(),
+        tissue_n,
         total_n: total_n.add_scalar(unknown),
         torque_nm: law::guide_torque(force, input, axis),
-        stored_j: elastic_j + 0.5 * guide_n.norm() * beside_m.norm(),
+        stored_j: tissue_j + 0.5 * guide_n.norm() * beside_m.norm(),
     }
 }

@@ -1,5 +1,6 @@
 //! What the force loop's half of a line can be made from again: kept beside a recording.
 
+use super::way::Way;
 use super::{HandLine, LineError};
 use crate::line::{Compliance, Line, LineState, MAX_STATIONS};
 use crate::needle::LayerKind;
@@ -13,7 +14,7 @@ pub struct LineSource {
     pub generation: u64,
     /// Where the line is at rest.
     pub line: Line,
-    kinds: Vec<(f64, LayerKind, bool)>,
+    way: Way,
     compliance: Compliance,
 }
 
@@ -32,12 +33,20 @@ impl LineSource {
     pub fn is_identical(&self, other: &LineSource) -> bool {
         let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
         let place = |s: &LineSource| [bits(&s.line.entry_m), bits(s.line.axes.as_flattened())];
-        let kinds = |s: &LineSource| s.kinds.iter().map(|k| (k.0.to_bits(), k.1, k.2)).collect::<Vec<_>>();
+        let kinds = |s: &LineSource| {
+            s.way
+                .kinds
+                .iter()
+                .map(|k| (k.0.to_bits(), k.1, k.2))
+                .collect::<Vec<_>>()
+        };
+        let bone = |s: &LineSource| s.way.bone_m.map(f64::to_bits);
         let sizes = |s: &LineSource| bits(&[s.compliance.spacing_m, s.compliance.tip_length_m]);
         let row = |s: &LineSource, n| bits(s.compliance.rows.row(n));
         self.stations() == other.stations()
             && place(self) == place(other)
             && kinds(self) == kinds(other)
+            && bone(self) == bone(other)
             && sizes(self) == sizes(other)
             && (0..2 * self.stations()).all(|n| row(self, n) == row(other, n))
     }
@@ -49,7 +58,7 @@ impl HandLine {
         LineSource {
             generation: self.generation,
             line: self.line,
-            kinds: self.kinds.clone(),
+            way: self.way.clone(),
             compliance: self.model.compliance.clone(),
         }
     }
@@ -60,8 +69,11 @@ impl HandLine {
     ///
     /// [`LineError::Unusable`]: too many stations.
     pub fn uniform(generation: u64, line: Line, stations: usize) -> Result<Self, LineError> {
-        let kinds = vec![(0.0, LayerKind::Gland, true)];
-        Self::new(generation, line, kinds, Compliance::diagonal(stations, 1e-3, 1e-3))
+        let way = Way {
+            kinds: vec![(0.0, LayerKind::Gland, true)],
+            bone_m: None,
+        };
+        Self::new(generation, line, way, Compliance::diagonal(stations, 1e-3, 1e-3))
     }
 
     /// The line in tissue at rest, with the default forces of its layers.
@@ -73,13 +85,13 @@ impl HandLine {
         let LineSource {
             generation,
             line,
-            kinds,
+            way,
             compliance,
         } = source;
         if compliance.stations > MAX_STATIONS || !compliance.rows.is_whole(2 * compliance.stations) {
             return Err(LineError::Unusable("its compliance is not whole".to_owned()));
         }
-        Self::new(generation, line, kinds, compliance)
+        Self::new(generation, line, way, compliance)
     }
 
     /// Goes on from that state; false, and nothing changes, where it is one of another line.

@@ -33,7 +33,10 @@ fn ready(scene: &Scene, body: &BatchModel<f32>) -> ReadyLine {
     let (low, high) = scene.lattice.bounds_m();
     let start_m = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2] - 0.01];
     let line = Line::into_body(&scene.lattice, start_m, [0.0, 0.0, 1.0]).unwrap();
-    ReadyLine::prepare(1, body, &scene.lattice, &|_| LayerKind::Gland, line, &mut |_| true).unwrap()
+    ReadyLine::prepare(1, body, &scene.lattice, &|_| Some(LayerKind::Gland), line, &mut |_| {
+        true
+    })
+    .unwrap()
 }
 
 #[test]
@@ -241,7 +244,15 @@ fn a_coarser_pelvis_beside_one_of_all_cells() {
     let start_m = [0.5 * (low[0] + high[0]) + 0.012, 0.5 * (low[1] + high[1]) - 0.008, 0.0];
     let line = Line::into_body(&coarse.lattice, start_m, [0.0, 0.0, 1.0]).unwrap();
     let built = source.elapsed();
-    let ready = ReadyLine::prepare(1, &body, &coarse.lattice, &|_| LayerKind::Gland, line, &mut |_| true).unwrap();
+    let ready = ReadyLine::prepare(
+        1,
+        &body,
+        &coarse.lattice,
+        &|_| Some(LayerKind::Gland),
+        line,
+        &mut |_| true,
+    )
+    .unwrap();
     let bytes: usize = ready
         .body
         .answer
@@ -283,9 +294,14 @@ fn a_line_that_is_prepared_twice_is_the_same_in_every_bit() {
     assert!(pairs.clone().count() == 20 && pairs.clone().all(|(a, b)| a.is_identical(b)));
     assert!(a.body.answer.columns()[0].at(0) != [0.0; 3]);
     let other = Line::new(first.0.lattice.rest_m(0), [0.0, 0.0, 1.0]).unwrap();
-    let other = ReadyLine::prepare(1, &first.1, &first.0.lattice, &|_| LayerKind::Gland, other, &mut |_| {
-        true
-    })
+    let other = ReadyLine::prepare(
+        1,
+        &first.1,
+        &first.0.lattice,
+        &|_| Some(LayerKind::Gland),
+        other,
+        &mut |_| true,
+    )
     .unwrap();
     assert!(!a.hand.source().is_identical(&other.hand.source()));
 }

@@ -74,6 +74,18 @@ impl<T: Real> FemModel<T> {
         })
     }
 
+    /// Whether springs or something fixed hold the part of the body that an element belongs to.
+    pub fn is_held(&self, element: u32) -> bool {
+        let cell = self.lattice.cell(element);
+        let place = [0, 1, 2].map(|a| cell[a].saturating_sub(self.low_cell[a]));
+        let part_of = |node: usize| self.part.get(node).copied().unwrap_or(NO_PART);
+        let part = part_of(self.levels[0].grid.index(place));
+        !self
+            .loose
+            .iter()
+            .any(|nodes| nodes.first().is_some_and(|&node| part_of(node as usize) == part))
+    }
+
     /// Elements and their neighbours.
     pub fn lattice(&self) -> &Lattice {
         &self.lattice

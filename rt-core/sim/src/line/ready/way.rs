@@ -1,0 +1,87 @@
+//! What lies along a line: layers, and bone.
+
+use super::LayerForces;
+use crate::line::Line;
+use crate::line::model::{LineLayer, MAX_LAYERS, MAX_STATIONS};
+use crate::needle::LayerKind;
+use crate::scene::Lattice;
+use serde::{Deserialize, Serialize};
+
+/// Looks for each element on the way.
+const STEPS: usize = 8;
+
+/// Where each layer begins, and where the needle is stopped.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Way {
+    /// In order of depth, up to [`MAX_LAYERS`], the rest is felt as the last; the membrane of a kind that was met before is felt
+    /// once only.
+    pub kinds: Vec<(f64, LayerKind, bool)>,
+    /// Depth of the first element that no needle enters.
+    pub bone_m: Option<f64>,
+}
+
+impl Way {
+    /// From the entry on through `lattice`; what `layer_of` knows nothing of is bone.
+    pub fn along(line: &Line, lattice: &Lattice, layer_of: &dyn Fn(u32) -> Option<LayerKind>) -> Self {
+        let mut way = Way {
+            kinds: Vec::new(),
+            bone_m: None,
+        };
+        let step_m = lattice.spacing_m / STEPS as f64;
+        let longest = lattice.dims.iter().sum::<usize>().max(MAX_STATIONS) * STEPS;
+        for n in 0..longest {
+            let cell = line
+                .point_m((n as f64 + 0.5) * step_m, [0.0; 2])
+                .map(|c| c / lattice.spacing_m);
+            if !cell.iter().all(|&c| c >= 0.0) {
+                continue;
+            }
+            let [i, j, k] = cell.map(|c| c as usize);
+            let Some(element) = lattice.element_of_cell(i, j, k) else {
+                continue;
+            };
+            let Some(kind) = layer_of(element) else {
+                way.bone_m = Some(n as f64 * step_m);
+                break;
+            };
+            way.meet(n as f64 * step_m, kind);
+        }
+        if let Some(first) = way.kinds.first_mut() {
+            first.0 = 0.0;
+        }
+        way
+    }
+
+    fn meet(&mut self, from_m: f64, kind: LayerKind) {
+        let is_new = self.kinds.last().is_none_or(|(_, last, _)| *last != kind);
+        if is_new && self.kinds.len() < MAX_LAYERS {
+            let has_membrane = !self.kinds.iter().any(|(_, met, _)| *met == kind);
+            self.kinds.push((from_m, kind, has_membrane));
+        }
+    }
+
+    pub fn layers(&self, forces: &LayerForces) -> Vec<LineLayer> {
+        self.kinds.iter().map(|kind| layer(forces, kind)).collect()
+    }
+}
+
+/// What a layer of the way resists with.
+pub(super) fn layer(forces: &LayerForces, &(from_m, kind, has_membrane): &(f64, LayerKind, bool)) -> LineLayer {
+    let layer = forces.layers.of(kind);
+    let is_closed = has_membrane && layer.has_membrane() && forces.membrane_gain > 0.0;
+    LineLayer {
+        from_m,
+        puncture_force_n: if is_closed {
+            forces.membrane_gain * layer.puncture_force_n
+        } else {
+            0.0
+        },
+        puncture_depth_m: if is_closed {
+            layer.puncture_depth_m
+        } else {
+            f64::INFINITY
+        },
+        cutting_force_n: forces.cutting_gain * layer.cutting_force_n,
+        shaft_friction_n_per_m: forces.shaft_gain * layer.shaft_friction_n_per_m,
+    }
+}
