@@ -153,6 +153,11 @@ impl Session {
         output
     }
 
+    /// No force of the device is larger, N.
+    pub fn device_limit_n(&self) -> f64 {
+        self.device.info().peak_force_n
+    }
+
     /// The next ticks of the tissue loop do not take place.
     pub fn miss_tissue_ticks(&mut self, ticks: u32) {
         self.loops.miss_tissue_ticks(ticks);

@@ -97,7 +97,12 @@ fn a_membrane_that_gives_way_at_full_speed_changes_the_force_no_faster_than_the_
             theatre.end(needle);
             peak_n
         });
-        assert!(peaks.iter().all(|n| (n / peaks[0] - 1.0).abs() < 0.1), "{peaks:?} N");
+        // Eq. 9's damping comes on top: 5 N s/m of the hand's speed.
+        let most_n = |n: usize| peaks[0] + 5.0 * [0.05, 0.123, 0.28][n];
+        assert!(
+            (0..3).all(|n| (peaks[0] - 0.1..most_n(n)).contains(&peaks[n])),
+            "{peaks:?} N"
+        );
     }
 }
 
@@ -181,9 +186,11 @@ fn bone_on_the_way_is_not_entered() {
             moved_m * 1e3
         );
         assert!((tip_m - 30e-3).abs() < 0.3e-3, "{tip_m} m");
+        // The hand is stronger than the device, which gives all that it has.
+        let most_n = needle.session.device_limit_n();
         assert!(
-            hand_m < 42e-3 && rest_n(&ticks) > 5.0,
-            "{hand_m} m, {} N",
+            (rest_n(&ticks) - most_n).abs() < 0.1,
+            "{} of {most_n} N",
             rest_n(&ticks)
         );
         assert!(moved_m < 15e-3 && largest_step_n(&ticks) <= SLEW_N, "{moved_m} m");
