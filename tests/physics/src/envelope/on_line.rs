@@ -26,14 +26,21 @@ impl Theatre {
 
     /// A block of 60 mm on fat, with its membrane.
     fn of_stiffness(young_pa: f64) -> Self {
+        Self::of_block(young_pa, usize::MAX)
+    }
+
+    /// The same with bone from a layer of cells on, 2 mm each.
+    fn of_block(young_pa: f64, bone_from: usize) -> Self {
+        let mut bone = Structure::soft("bone", 2);
+        (bone.role, bone.material.fixed) = (Role::Tissue, true);
         let mut block = Structure::soft("block", 1);
         block.role = Role::Target;
         block.material.young_pa = young_pa;
         let labels = Labels {
             dims: [30; 3],
             spacing_m: 2e-3,
-            cells: vec![1; 27_000],
-            structures: vec![block],
+            cells: (0..27_000).map(|n| if n / 900 < bone_from { 1 } else { 2 }).collect(),
+            structures: if bone_from < 30 { vec![block, bone] } else { vec![block] },
         };
         Self::of_source(&SceneSource::of_labels("block", &labels), TissueKind::ChainMail)
     }
@@ -176,6 +183,22 @@ fn no_hand_sings_on_a_line_in_tissue_of_any_stiffness() {
     for young_pa in [17e3, 170e3, 1.7e6] {
         let mut theatre = Theatre::of_stiffness(young_pa);
         for place in [("pressed 4 mm", 4e-3), ("45 mm deep", 45e-3)] {
+            let mut all = Vec::new();
+            for late_ticks in [0, 3] {
+                all.extend(hand_envelope().map(|hand| theatre.session((hand, late_ticks), place, true)));
+            }
+            report(&format!("{} kPa, {}", young_pa / 1e3, place.0), &all);
+            assert!(!all.iter().any(Case::sings), "at {young_pa} Pa, {}", place.0);
+        }
+    }
+}
+
+/// Bone is a wall, and the shaft in the tissue before it holds as well.
+#[test]
+fn no_hand_sings_on_bone_at_the_end_of_a_line() {
+    for young_pa in [17e3, 170e3] {
+        let mut theatre = Theatre::of_block(young_pa, 15);
+        for place in [("3 mm into bone", 33e-3), ("1 mm into bone", 31e-3)] {
             let mut all = Vec::new();
             for late_ticks in [0, 3] {
                 all.extend(hand_envelope().map(|hand| theatre.session((hand, late_ticks), place, true)));
