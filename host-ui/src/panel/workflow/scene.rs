@@ -8,6 +8,7 @@ use crate::panel::field::path_ui;
 use crate::recent::Recent;
 use crate::shown::{LoadState, Shown};
 use crate::theme;
+use crate::words::Explained;
 use egui::{Button, RichText};
 use std::path::PathBuf;
 use stylet_base::format;
@@ -27,7 +28,10 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
             format::count(u64::from(s.element_count))
         ),
     };
-    let label = ui.add(egui::Label::new(name).truncate());
+    let label = ui
+        .add(egui::Label::new(name).truncate())
+        .explained("scene")
+        .explained("element");
     if let Some(s) = shown.scene.as_ref().filter(|s| s.body_edge > 1) {
         let solved = format!("Tissue solved in elements of {:.1} mm", s.body_spacing_m() * 1e3);
         ui.label(theme::small(&solved)).on_hover_text(format!(
@@ -35,7 +39,8 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
              scene.",
             format::count(u64::from(s.element_count)),
             s.spacing_m * 1e3
-        ));
+        ))
+        .explained("finite elements");
     }
     let free = shown.is_live() && !shown.load.is_busy() && !shown.running;
     ui.horizontal(|ui| {
@@ -153,7 +158,8 @@ fn structures_ui(ui: &mut egui::Ui, scene: &SceneHeader) {
                 ui.label(theme::small(structure.name.read()));
                 let volume_m3 = f64::from(structure.element_count) * scene.spacing_m.powi(3);
                 ui.label(theme::small(format::volume(volume_m3)));
-                ui.label(theme::small(role_name(structure.role)));
+                let role = role_name(structure.role);
+                ui.label(theme::small(role)).explained(role);
                 ui.end_row();
             }
         });
