@@ -10,6 +10,8 @@ use stylet_shm_schema::SceneId;
 pub struct ShownBody {
     model: Option<Arc<SceneModel>>,
     scene: Option<SceneId>,
+    /// Surfaces that a thread makes, or has made.
+    making: Option<SceneId>,
     snapshot: Option<(u64, u64)>,
     /// Of the elements at the surface of the lattice.
     elements_m: Vec<[f32; 3]>,
@@ -18,10 +20,12 @@ pub struct ShownBody {
 }
 
 impl ShownBody {
-    /// Takes what is new since the last frame.
+    /// Takes what is new since the last frame. A new scene is shown once a thread has made its surfaces.
     pub fn take(&mut self, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
         let Some(model) = model else { return };
-        let bodies = model.bodies();
+        let Some(bodies) = model.bodies_made() else {
+            return self.make(model);
+        };
         if self.scene != Some(model.header.id()) {
             self.scene = Some(model.header.id());
             self.model = Some(model.clone());
@@ -42,6 +46,26 @@ impl ShownBody {
             bodies.deformed(&model.rest_m, &self.elements_m, &mut self.positions_m);
             self.moved += 1;
         }
+    }
+
+    fn make(&mut self, model: &Arc<SceneModel>) {
+        if self.making == Some(model.header.id()) {
+            return;
+        }
+        self.making = Some(model.header.id());
+        let made = Arc::clone(model);
+        let thread = std::thread::Builder::new().name("surfaces".to_owned());
+        if thread.spawn(move || {
+            made.bodies();
+        }).is_err() {
+            // Without a thread a frame has to wait.
+            model.bodies();
+        }
+    }
+
+    /// The scene that is shown; nothing before the first one.
+    pub fn model(&self) -> Option<&Arc<SceneModel>> {
+        self.model.as_ref()
     }
 
     /// The surfaces at rest; nothing before the first scene.

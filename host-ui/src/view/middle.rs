@@ -64,8 +64,8 @@ impl Middle {
     /// Takes what is new since the last frame.
     pub(crate) fn take(&mut self, shown: &Shown, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
         self.body.take(model, snapshot);
-        self.solid.take(shown, model, &self.body);
-        self.slices.take((model, &self.body), snapshot, &mut self.view);
+        self.solid.take(shown, &self.body);
+        self.slices.take(&self.body, snapshot, &mut self.view);
         if let Some(tip) = shown
             .tip_m()
             .filter(|tip| self.view.follow_tip && is_near_body(shown, tip))

@@ -19,7 +19,6 @@ use eframe::egui_wgpu::RenderState;
 use egui::{Color32, PointerButton, Pos2, Rect, Sense};
 use nalgebra::Vector3;
 use std::sync::Arc;
-use stylet_host::link::SceneModel;
 use stylet_shm_schema::SceneId;
 
 const TURN_PER_POINT_RAD: f32 = 0.008;
@@ -143,8 +142,8 @@ impl Scene3d {
         }
     }
 
-    pub fn take(&mut self, shown: &Shown, model: Option<&Arc<SceneModel>>, body: &ShownBody) {
-        let (Some(model), Some(bodies)) = (model, body.bodies()) else {
+    pub fn take(&mut self, shown: &Shown, body: &ShownBody) {
+        let (Some(model), Some(bodies)) = (body.model(), body.bodies()) else {
             return;
         };
         let scene_key = model.header.id();

@@ -70,6 +70,11 @@ pub fn shown_alone(header: &SceneHeader) -> Vec<(usize, Vec<bool>)> {
         .collect()
 }
 
+/// Whether the core sends the label of every cell, so that surfaces can follow the segmentation.
+pub fn has_every_label(header: &SceneHeader) -> bool {
+    (header.labels.spacing_m / header.spacing_m - 1.0).abs() < 1e-6
+}
+
 impl Bodies {
     /// Takes tens of milliseconds: not for a frame.
     pub fn of(scene: Segmentation) -> Self {
@@ -99,7 +104,7 @@ impl Bodies {
     fn smooth(scene: Segmentation) -> Option<Self> {
         let (header, grid) = (scene.header, scene.header.labels);
         let is_whole = grid.node_count() == Some(scene.labels.len()) && !scene.labels.is_empty();
-        if !is_whole || (grid.spacing_m / header.spacing_m - 1.0).abs() > 1e-6 {
+        if !is_whole || !has_every_label(header) {
             return None;
         }
         let mut bodies = Self::default();

@@ -48,7 +48,12 @@ impl SceneModel {
         }
     }
 
-    /// The surfaces as they are drawn. The first call makes them, which takes long for a frame: the receiver's thread calls it.
+    /// The surfaces as they are drawn, where a call of [`SceneModel::bodies`] has made them.
+    pub fn bodies_made(&self) -> Option<&Bodies> {
+        self.bodies.get()
+    }
+
+    /// The surfaces as they are drawn. The first call makes them, which takes too long for a frame.
     pub fn bodies(&self) -> &Bodies {
         self.bodies.get_or_init(|| {
             Bodies::of(Segmentation {

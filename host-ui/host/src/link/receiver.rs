@@ -376,12 +376,7 @@ fn receive_scene(ports: &Ports) -> Vec<Option<(u64, Arc<SceneModel>)>> {
     let mut scenes = Vec::new();
     while let Ok(Some(sample)) = ports.scene.receive() {
         let (header, words) = (*sample.user_header(), sample.payload());
-        let model = SceneModel::of_words(&header, words);
-        // Made here, so that no frame waits for them.
-        if let Some(model) = &model {
-            model.bodies();
-        }
-        scenes.push(model.map(|model| (header.session_id, Arc::new(model))));
+        scenes.push(SceneModel::of_words(&header, words).map(|model| (header.session_id, Arc::new(model))));
     }
     scenes
 }

@@ -12,7 +12,8 @@ use crate::words::Explained;
 use egui::{Button, RichText};
 use std::path::PathBuf;
 use stylet_base::format;
-use stylet_shm_schema::{BUILTIN_SCENES, SceneHeader, role};
+use stylet_host::bodies::has_every_label;
+use stylet_shm_schema::{BUILTIN_SCENES, MAX_LABEL_CELLS, SceneHeader, role};
 
 /// The button beside the field.
 const OPEN_WIDTH: f32 = 78.0;
@@ -41,6 +42,13 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
             s.spacing_m * 1e3
         ))
         .explained("finite elements");
+    }
+    if shown.scene.as_ref().is_some_and(|s| !has_every_label(s)) {
+        ui.label(theme::small("Surfaces follow the lattice")).on_hover_text(format!(
+            "The scene has more than {} cells, so that not every label reaches the window: surfaces go through the middles of the \
+             outermost elements, half an element within the structures.",
+            format::count(MAX_LABEL_CELLS as u64)
+        ));
     }
     let free = shown.is_live() && !shown.load.is_busy() && !shown.running;
     ui.horizontal(|ui| {

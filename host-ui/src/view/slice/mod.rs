@@ -96,11 +96,11 @@ impl Slices {
     /// Takes what is new since the last frame.
     pub fn take(
         &mut self,
-        (model, body): (Option<&Arc<SceneModel>>, &ShownBody),
+        body: &ShownBody,
         snapshot: Option<&Snapshot>,
         view: &mut ViewState,
     ) {
-        let (Some(model), Some(bodies)) = (model, body.bodies()) else {
+        let (Some(model), Some(bodies)) = (body.model(), body.bodies()) else {
             return;
         };
         let key = model.header.id();
