@@ -154,7 +154,9 @@ fn line_ui(ui: &mut egui::Ui, shown: &Shown) {
              may rest up to 2 cm from where they should. Take it out, and wait for LINE READY.",
         ),
     };
-    badge(ui, word, color).on_hover_text(hint).explained("needle line ready");
+    badge(ui, word, color)
+        .on_hover_text(hint)
+        .explained("needle line ready");
 }
 
 fn badge(ui: &mut egui::Ui, word: &str, color: Color32) -> egui::Response {
@@ -197,8 +199,7 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown) {
         .map(|s| s.force_scale)
         .or_else(|| shown.parameters.map(|p| p.set.get(ParameterId::ForceScale)));
     let text = scale.map_or("scale n/a".to_owned(), |s| format!("scale {s:.2}"));
-    ui.label(theme::weak(text))
-        .explained("force scale");
+    ui.label(theme::weak(text)).explained("force scale");
     let (force, limit, peak) = shown.state.map_or((0.0, 0.0, 0.0), |s| {
         let size = s.force_on_hand_n.iter().map(|c| c * c).sum::<f64>().sqrt();
         (size, s.device_limit_n, s.peak_force_n)

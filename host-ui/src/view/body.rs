@@ -55,9 +55,12 @@ impl ShownBody {
         self.making = Some(model.header.id());
         let made = Arc::clone(model);
         let thread = std::thread::Builder::new().name("surfaces".to_owned());
-        if thread.spawn(move || {
-            made.bodies();
-        }).is_err() {
+        if thread
+            .spawn(move || {
+                made.bodies();
+            })
+            .is_err()
+        {
             // Without a thread a frame has to wait.
             model.bodies();
         }

@@ -121,7 +121,8 @@ impl Middle {
             );
         }
         if let Some(rect) = places.solid {
-            self.solid.scene3d_ui(ui, rect, (shown, dose, &self.body), &mut self.view);
+            self.solid
+                .scene3d_ui(ui, rect, (shown, dose, &self.body), &mut self.view);
         }
         actions
     }

@@ -126,7 +126,11 @@ impl<'a> Drawn<'a> {
             hausdorff = hausdorff.max(to_drawn(&middle.0));
         }
         let cells = self.is_in.iter().filter(|i| **i).count() as f64;
-        let volume: f64 = self.triangles.iter().map(|[a, b, c]| dot(*a, cross(*b, *c)) / 6.0).sum();
+        let volume: f64 = self
+            .triangles
+            .iter()
+            .map(|[a, b, c]| dot(*a, cross(*b, *c)) / 6.0)
+            .sum();
         Errors {
             mean: sum / area,
             hausdorff,
@@ -160,7 +164,11 @@ fn dot(a: Place, b: Place) -> f64 {
 }
 
 fn cross(a: Place, b: Place) -> Place {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }
 
 fn length(v: Place) -> f64 {

@@ -56,13 +56,7 @@ impl Bonds {
     }
 
     /// Places of the vertices while the elements are at `now_m`.
-    pub fn moved(
-        &self,
-        vertices_m: &[[f32; 3]],
-        rest_m: &[[f32; 3]],
-        now_m: &[[f32; 3]],
-        out: &mut Vec<[f32; 3]>,
-    ) {
+    pub fn moved(&self, vertices_m: &[[f32; 3]], rest_m: &[[f32; 3]], now_m: &[[f32; 3]], out: &mut Vec<[f32; 3]>) {
         let mut start = 0;
         out.extend(vertices_m.iter().zip(&self.ends).map(|(vertex, &end)| {
             let own = &self.bonds[start..end as usize];

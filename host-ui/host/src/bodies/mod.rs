@@ -111,7 +111,11 @@ impl Bodies {
         let elements = bonds::elements_of_cells(&grid, scene.rest_m);
         bodies.push(&grid, scene.labels, |label| label != 0, &elements)?;
         for (_, members) in shown_alone(header) {
-            let is_in = |label: u8| label.checked_sub(1).is_some_and(|n| members.get(usize::from(n)) == Some(&true));
+            let is_in = |label: u8| {
+                label
+                    .checked_sub(1)
+                    .is_some_and(|n| members.get(usize::from(n)) == Some(&true))
+            };
             bodies.push(&grid, scene.labels, is_in, &elements)?;
         }
         Some(bodies)

@@ -73,9 +73,7 @@ impl Net {
         let corner = |v: u32| [0, 1, 2].map(|a| f64::from(self.points[v as usize][a] - from[a]));
         let of = |t: &[u32; 3]| {
             let [a, b, c] = t.map(corner);
-            a[0] * (b[1] * c[2] - b[2] * c[1])
-                + a[1] * (b[2] * c[0] - b[0] * c[2])
-                + a[2] * (b[0] * c[1] - b[1] * c[0])
+            a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
         };
         self.triangles.iter().map(of).sum()
     }

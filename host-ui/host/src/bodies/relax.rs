@@ -54,7 +54,11 @@ fn push(net: &mut Net) {
     for t in &net.triangles {
         let [a, b, c] = t.map(|v| net.points[v as usize]);
         let (u, w) = ([0, 1, 2].map(|i| b[i] - a[i]), [0, 1, 2].map(|i| c[i] - a[i]));
-        let area = [u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]];
+        let area = [
+            u[1] * w[2] - u[2] * w[1],
+            u[2] * w[0] - u[0] * w[2],
+            u[0] * w[1] - u[1] * w[0],
+        ];
         whole += f64::from(length(area)) / 2.0;
         for v in t {
             let sum = &mut areas[*v as usize];

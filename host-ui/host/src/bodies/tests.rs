@@ -16,7 +16,8 @@ fn scene(dims: [usize; 3], is_in: impl Fn([usize; 3]) -> bool) -> (SceneHeader, 
         origin_m: [0.02, -0.01, 0.03],
         spacing_m: SPACING_M,
     };
-    let cells = || (0..dims.iter().product()).map(|n: usize| [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]]);
+    let cells =
+        || (0..dims.iter().product()).map(|n: usize| [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]]);
     let place = |c: [usize; 3]| [0, 1, 2].map(|a| (header.labels.origin_m[a] + c[a] as f64 * SPACING_M) as f32);
     let labels = cells().map(|c| u8::from(is_in(c))).collect();
     let rest_m = cells().filter(|c| is_in(*c)).map(place).collect();
@@ -36,7 +37,11 @@ fn volume_mm3(bodies: &Bodies) -> f64 {
     let corner = |v: u32| bodies.rest_m[v as usize].map(|c| f64::from(c) * 1e3);
     let of = |t: &[u32; 3]| {
         let [a, b, c] = t.map(corner);
-        let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
+        let cross = [
+            b[1] * c[2] - b[2] * c[1],
+            b[2] * c[0] - b[0] * c[2],
+            b[0] * c[1] - b[1] * c[0],
+        ];
         (a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2]) / 6.0
     };
     bodies.triangles.iter().map(of).sum()

@@ -54,7 +54,14 @@ fn the_debrief_has_the_figures_of_the_seeds_and_of_the_membrane() {
     let lesson = lesson(&one_needle(0.0, 5), &felt);
     assert!(lesson.what.contains("+2.00 mm"), "{}", lesson.what);
     let notes = lesson.notes.join("\n");
-    for word in ["pressed in by 8.0 mm", "2.50 N", "planned 70.0 mm deep", "left at 70.0 mm", "rests at 72.0 mm", "1.0 mm beside"] {
+    for word in [
+        "pressed in by 8.0 mm",
+        "2.50 N",
+        "planned 70.0 mm deep",
+        "left at 70.0 mm",
+        "rests at 72.0 mm",
+        "1.0 mm beside",
+    ] {
         assert!(notes.contains(word), "{word:?} is not in {notes}");
     }
     assert!(notes.contains("Most of it is the tissue"));

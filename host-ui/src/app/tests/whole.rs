@@ -6,9 +6,9 @@ use crate::app::App;
 use crate::app::layout::Narrow;
 use crate::panel::workflow::Progress;
 use crate::shown::{LoadState, Note, Shown};
+use bytemuck::Zeroable;
 use stylet_host::link::LinkStatus;
 use stylet_procedure::{Step, Waiting, WaitsFor};
-use bytemuck::Zeroable;
 use stylet_shm_schema::{Fault, Text, TickRecord, flags};
 
 type State = (&'static str, fn(&mut App));

@@ -31,7 +31,10 @@ pub fn dose_ui(ui: &mut egui::Ui, shown: &Shown, height: f32, otherwise: &str) {
         ui.label(theme::small(shown.dose_trouble.unwrap_or(otherwise)));
         return;
     };
-    let what = format!("Dose: {} seeds of {}, {:.0} Gy", dose.seeds, dose.source, dose.prescription_gy);
+    let what = format!(
+        "Dose: {} seeds of {}, {:.0} Gy",
+        dose.seeds, dose.source, dose.prescription_gy
+    );
     ui.label(what).explained("source").explained("prescription");
     ui.spacing_mut().interact_size.y = 16.0;
     egui::Grid::new("dose")

@@ -27,22 +27,20 @@ pub fn guide_ui(ui: &mut egui::Ui, shown: &Shown, guide: &mut Guide) {
     }
     let tokens = theme::of(ui);
     let lesson = lesson(shown, &guide.felt);
-    theme::card(ui)
-        .stroke(Stroke::new(1.0, tokens.accent))
-        .show(ui, |ui| {
-            ui.set_min_width(ui.available_width());
-            ui.horizontal(|ui| {
-                ui.label(theme::strong("First insertion"));
-                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    let leave = ui.button("Leave the guide");
-                    guide.open = !leave.on_hover_text("Nothing else changes").clicked();
-                });
+    theme::card(ui).stroke(Stroke::new(1.0, tokens.accent)).show(ui, |ui| {
+        ui.set_min_width(ui.available_width());
+        ui.horizontal(|ui| {
+            ui.label(theme::strong("First insertion"));
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let leave = ui.button("Leave the guide");
+                guide.open = !leave.on_hover_text("Nothing else changes").clicked();
             });
-            ui.label(lesson.what);
-            for line in lesson.notes {
-                ui.label(theme::weak(line));
-            }
         });
+        ui.label(lesson.what);
+        for line in lesson.notes {
+            ui.label(theme::weak(line));
+        }
+    });
     ui.add_space(theme::GAP);
 }
 

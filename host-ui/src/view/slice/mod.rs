@@ -94,12 +94,7 @@ impl Slices {
     }
 
     /// Takes what is new since the last frame.
-    pub fn take(
-        &mut self,
-        body: &ShownBody,
-        snapshot: Option<&Snapshot>,
-        view: &mut ViewState,
-    ) {
+    pub fn take(&mut self, body: &ShownBody, snapshot: Option<&Snapshot>, view: &mut ViewState) {
         let (Some(model), Some(bodies)) = (body.model(), body.bodies()) else {
             return;
         };

@@ -39,7 +39,11 @@ impl Felt {
                 let pressed = self.pressed.get_or_insert_default();
                 pressed.pressed_m = pressed.pressed_m.max(record.depth_m);
                 pressed.force_n = pressed.force_n.max(force_n);
-            } else if let Some(gave_way) = self.pressed.take().filter(|_| is_through && self.punctures.len() < MOST) {
+            } else if let Some(gave_way) = self
+                .pressed
+                .take()
+                .filter(|_| is_through && self.punctures.len() < MOST)
+            {
                 self.punctures.push(gave_way);
             }
         }

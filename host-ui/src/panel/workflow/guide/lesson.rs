@@ -28,15 +28,22 @@ fn of(what: impl Into<String>, notes: &[&str]) -> Lesson {
 /// What comes next, by the state of the core.
 pub fn lesson(shown: &Shown, felt: &Felt) -> Lesson {
     if !shown.is_live() {
-        let why = "The window shows what the core computes; it may be closed and opened again without the core noticing.";
+        let why =
+            "The window shows what the core computes; it may be closed and opened again without the core noticing.";
         return of("Start the core: run rt-core in a terminal, or make run.", &[why]);
     }
     if shown.running {
-        return of("The script moves the needle now. Watch it, or press Stop to go on by hand.", &[]);
+        return of(
+            "The script moves the needle now. Watch it, or press Stop to go on by hand.",
+            &[],
+        );
     }
     let next = needle_at_hand(shown).and_then(|needle| needle.next().map(|operation| (needle, operation)));
     match (progress(shown), next) {
-        (Progress::Scene, _) => of("Choose a scene: press \"paper\" in step 1. It is a gland by itself.", &[]),
+        (Progress::Scene, _) => of(
+            "Choose a scene: press \"paper\" in step 1. It is a gland by itself.",
+            &[],
+        ),
         (Progress::Plan, _) => of(
             "Press \"Plan five seeds\" in step 2, or Enter. Enter always does what comes next.",
             &["Rings in the pictures show where the seeds should come to rest."],
@@ -81,7 +88,8 @@ fn place(shown: &Shown) -> Lesson {
         &["The dashed path leads from the entry to the deepest seed."],
     );
     if !shown.is_engaged() {
-        let engage = "To feel the force on a device, press E first. With keys or mouse, watch the force at the upper right.";
+        let engage =
+            "To feel the force on a device, press E first. With keys or mouse, watch the force at the upper right.";
         lesson.notes.push(engage.to_owned());
     }
     lesson
@@ -98,11 +106,14 @@ fn insert(shown: &Shown, felt: &Felt, needle: &AtHand) -> Lesson {
                 share * 100.0
             ),
             notes: vec![
-                "The force rises, and the gland moves away before the needle: follow the outlines in the slices.".to_owned(),
+                "The force rises, and the gland moves away before the needle: follow the outlines in the slices."
+                    .to_owned(),
             ],
         };
     }
-    let left_m = needle.deepest_drop_m.map_or(0.0, |deepest_m| deepest_m - needle.depth_m);
+    let left_m = needle
+        .deepest_drop_m
+        .map_or(0.0, |deepest_m| deepest_m - needle.depth_m);
     let left = format::length(left_m.max(0.0));
     match felt.punctures().last().filter(|_| shown.has_punctured()) {
         Some(puncture) => Lesson {
@@ -113,7 +124,9 @@ fn insert(shown: &Shown, felt: &Felt, needle: &AtHand) -> Lesson {
             ],
         },
         None => of(
-            format!("Push the needle in, {left} to the deepest seed: hold W; with Shift it goes slower, S draws it back."),
+            format!(
+                "Push the needle in, {left} to the deepest seed: hold W; with Shift it goes slower, S draws it back."
+            ),
             &["You can also drag the tip in a slice, or push a device. Watch the membrane tension at the right."],
         ),
     }
@@ -156,7 +169,10 @@ fn depths(shown: &Shown) -> Vec<Depths> {
 fn debrief(shown: &Shown, felt: &Felt) -> Lesson {
     let seeds = depths(shown);
     if seeds.is_empty() {
-        return of("The needle is out, and no seed was dropped. Press Reset to try again.", &[]);
+        return of(
+            "The needle is out, and no seed was dropped. Press Reset to try again.",
+            &[],
+        );
     }
     let mean_m = |of: &dyn Fn(&Depths) -> f64| seeds.iter().map(of).sum::<f64>() / seeds.len() as f64;
     let by_hand_m = mean_m(&|seed| seed.left_m - seed.planned_m);
