@@ -57,14 +57,16 @@ impl Bonds {
 
     /// Places of the vertices while the elements are at `now_m`.
     pub fn moved(&self, vertices_m: &[[f32; 3]], rest_m: &[[f32; 3]], now_m: &[[f32; 3]], out: &mut Vec<[f32; 3]>) {
+        let off = |(now, rest): (&[f32; 3], &[f32; 3])| [now[0] - rest[0], now[1] - rest[1], now[2] - rest[2]];
+        let moved_m: Vec<[f32; 3]> = now_m.iter().zip(rest_m).map(off).collect();
         let mut start = 0;
         out.extend(vertices_m.iter().zip(&self.ends).map(|(vertex, &end)| {
             let own = &self.bonds[start..end as usize];
             start = end as usize;
             let mut place = *vertex;
             for &(element, share) in own {
-                if let (Some(rest), Some(now)) = (rest_m.get(element as usize), now_m.get(element as usize)) {
-                    place = [0, 1, 2].map(|a| place[a] + share * (now[a] - rest[a]));
+                if let Some([x, y, z]) = moved_m.get(element as usize) {
+                    place = [place[0] + share * x, place[1] + share * y, place[2] + share * z];
                 }
             }
             place

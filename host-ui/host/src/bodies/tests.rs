@@ -73,8 +73,8 @@ fn a_plate_a_wire_and_a_cell_that_are_one_cell_thick_do_not_vanish() {
         let cells = scene.1.iter().filter(|&&l| l != 0).count() as f64;
         let share = volume_mm3(&bodies) / cells;
         println!("{name}: {:.0} % of its cells", share * 100.0);
-        // What the reach in a cube leaves of a single cell.
-        assert!((0.6..1.05).contains(&share), "{name}: {share} of its cells");
+        // Pushed out flat, a single cell overshoots.
+        assert!((0.9..1.3).contains(&share), "{name}: {share} of its cells");
     }
 }
 

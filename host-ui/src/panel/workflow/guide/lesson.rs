@@ -15,7 +15,7 @@ pub struct Lesson {
     pub notes: Vec<String>,
 }
 
-/// Seeds that are gone through one by one.
+/// Seeds that have a line of their own.
 const SEEDS: usize = 6;
 
 fn of(what: impl Into<String>, notes: &[&str]) -> Lesson {
@@ -85,7 +85,7 @@ fn operation_lesson(shown: &Shown, felt: &Felt, needle: &AtHand, operation: Oper
 fn place(shown: &Shown) -> Lesson {
     let mut lesson = of(
         "Bring the tip to the entry: press Enter. With a device, move its tip there by hand.",
-        &["The dashed path leads from the entry to the deepest seed."],
+        &["A line in the pictures leads from the entry past the deepest seed."],
     );
     if !shown.is_engaged() {
         let engage =
