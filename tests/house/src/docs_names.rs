@@ -239,7 +239,7 @@ fn every_page_of_docs_is_in_the_book() {
         let own = page.strip_prefix("docs/").unwrap_or(page);
         summary.contains(&format!("]({own})"))
     };
-    let pages: Vec<&str> = tree.ending_in(".md").filter(|page| page.starts_with("docs/")).collect();
+    let pages: Vec<&str> = tree.pages().filter(|page| page.starts_with("docs/")).collect();
     let missing: Vec<&&str> = pages
         .iter()
         .filter(|page| **page != "docs/SUMMARY.md" && !is_listed(page))

@@ -44,9 +44,14 @@ impl Body {
     /// The same structure, drawn by this part of the scene's surfaces where they follow the segmentation.
     fn drawn_as(mut self, bodies: &Bodies, part: Option<usize>) -> Self {
         let triangles = part.and_then(|n| bodies.triangles.get(bodies.parts.get(n)?.clone()));
-        if let Some(triangles) = triangles.filter(|t| !t.is_empty() && bodies.follows == Follows::Segmentation) {
-            self.points_m.clone_from(&bodies.rest_m);
-            self.triangles = triangles.to_vec();
+        let triangles = triangles
+            .filter(|_| bodies.follows == Follows::Segmentation)
+            .unwrap_or(&[]);
+        let vertices = || triangles.iter().flatten().copied();
+        // The vertices of a part stand together.
+        if let (Some(first), Some(last)) = (vertices().min(), vertices().max()) {
+            self.points_m = bodies.rest_m[first as usize..=last as usize].to_vec();
+            self.triangles = triangles.iter().map(|t| t.map(|v| v - first)).collect();
         }
         self
     }
