@@ -4,7 +4,7 @@ SHELL := /bin/bash
 CARGO ?= cargo
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: help run test build package package-test picture report fuzz soak force-pictures clean deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: help run test build package package-test picture report fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -42,6 +42,10 @@ soak: deps-soak build ## Measure the memory of the window during SOAK_SECONDS (3
 
 force-pictures: ## Measure the stiffness that the force loop holds, and redraw the pictures of force
 	$(CARGO) bench -p stylet-benches --bench force
+
+book: ## Make a site of docs/ in target/book; installs mdbook with cargo if it is missing
+	@command -v mdbook >/dev/null || $(CARGO) install mdbook --locked
+	PATH="$$PATH:$${CARGO_HOME:-$$HOME/.cargo}/bin" mdbook build docs
 
 clean: ## Remove the build output
 	$(CARGO) clean

@@ -1,7 +1,7 @@
 //! The operator's program: the window, and the command line over the same code.
 //!
 //! The modules of the window depend on each other in one direction:
-//! `app` → `panel` → `view`, `keyboard` → `shown`, `action` → `planner`, `dose_worker`, `loader` → `mesh`, `theme`, `settings` → `recent` → `dialog`.
+//! `app` → `panel` → `view`, `keyboard` → `shown`, `action` → `planner`, `dose_worker`, `loader` → `mesh`, `theme`, `settings`, `words` → `recent` → `dialog`.
 
 #![warn(missing_docs)]
 
@@ -26,3 +26,4 @@ mod settings;
 mod shown;
 mod theme;
 pub mod view;
+mod words;

@@ -34,6 +34,7 @@ impl App {
         let direction = self.shown.state.map_or([0.0, 0.0, 1.0], |s| s.needle_direction);
         let records = self.link.take_records();
         self.history.take(&records, direction);
+        self.workflow.guide.felt.take(&records);
         let scene = self.shown.scene.map(|s| s.id());
         self.trace.take(&records, scene, direction);
         if self.summed_up.elapsed() >= SUM_UP_EVERY {

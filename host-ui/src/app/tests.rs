@@ -1,6 +1,7 @@
 //! The whole window without a core and without a graphics device: what is clipped, what overlaps, what moves.
 
 mod fixture;
+mod guide;
 mod held;
 mod text;
 mod whole;

@@ -20,13 +20,7 @@ fn scene() -> Arc<SceneModel> {
     (header.target_lower_m, header.target_upper_m) = ([0.0; 3], [0.04; 3]);
     header.structure_count = 1;
     header.structures[0].role = role::TARGET;
-    let model = SceneModel {
-        header,
-        rest_m: Vec::new(),
-        triangles: Vec::new(),
-        labels: vec![1; 8000],
-    };
-    Arc::new(model)
+    Arc::new(SceneModel::new(header, Vec::new(), Vec::new(), vec![1; 8000]))
 }
 
 fn wait(worker: &mut DoseWorker, scene: &Arc<SceneModel>, poses: &[SeedPose]) -> Arc<DoseResult> {

@@ -6,6 +6,7 @@ use super::setup;
 use super::strip::Strip;
 use crate::shown::Shown;
 use crate::theme;
+use crate::words::Explained;
 use egui::{Color32, RichText};
 use stylet_base::format;
 use stylet_base::seen::Seen;
@@ -43,17 +44,17 @@ pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, whole: Opti
         Some(trace) => whole_ui(ui, trace, each),
         None => {
             let force = now(shown.resistance_n().map(format::force));
-            title(ui, "Force along the needle, N", &force, tokens.force);
+            title(ui, "Force along the needle, N", &force, tokens.force).explained("force on the hand");
             recent(ui, "force", tokens.force, ("N", 2), [-0.5, 2.0], Quantity::ResistanceN);
             let depth = now(shown.state.map(|s| format::length(s.depth_m)));
-            title(ui, "Depth, mm", &depth, tokens.depth);
+            title(ui, "Depth, mm", &depth, tokens.depth).explained("depth");
             recent(ui, "depth", tokens.depth, ("mm", 1), [0.0, 10.0], Quantity::DepthMm);
         }
     }
     let worst = now(shown
         .state
         .map(|s| format::microseconds(Some(format::us(s.worst_wake_ns)))));
-    title(ui, "Wake-up latency, us", &format!("worst {worst}"), tokens.wake);
+    title(ui, "Wake-up latency, us", &format!("worst {worst}"), tokens.wake).explained("wake-up latency");
     recent(
         ui,
         "wake-up latency",
@@ -85,10 +86,10 @@ fn whole_ui(ui: &mut egui::Ui, trace: &Trace, height: f32) {
         .show(ui);
     };
     let peak = format!("peak {}", format::force(motion.peak_force_n));
-    title(ui, "Whole procedure: force, N", &peak, tokens.force);
+    title(ui, "Whole procedure: force, N", &peak, tokens.force).explained("force on the hand");
     whole(ui, "whole force", tokens.force, ("N", 2), trace.force_n());
     let peak = format!("peak inwards {}", format::speed(motion.peak_insertion_m_per_s));
-    title(ui, "Speed, mm/s", &peak, tokens.depth);
+    title(ui, "Speed, mm/s", &peak, tokens.depth).explained("speed");
     whole(ui, "whole speed", tokens.depth, ("mm/s", 1), trace.speed_mm_per_s());
     seen_ui(ui, "peaks and curves", motion.seen);
 }
@@ -117,7 +118,10 @@ fn tension_ui(ui: &mut egui::Ui, shown: &Shown) {
         None if shown.state.is_none() => "n/a".to_owned(),
         None => "slack".to_owned(),
     };
-    title(ui, "Membrane tension", &words, tokens.text);
+    title(ui, "Membrane tension", &words, tokens.text)
+        .explained("membrane tension")
+        .explained("membrane")
+        .explained("puncture");
     let size = egui::vec2(ui.available_width(), 8.0);
     let (rect, response) = ui.allocate_exact_size(size, egui::Sense::hover());
     let share = tension.unwrap_or(0.0) as f32;
@@ -135,13 +139,15 @@ fn tension_ui(ui: &mut egui::Ui, shown: &Shown) {
     });
 }
 
-fn title(ui: &mut egui::Ui, name: &str, value: &str, color: Color32) {
-    ui.horizontal(|ui| {
-        ui.label(RichText::new(name).color(color).size(12.5));
+fn title(ui: &mut egui::Ui, name: &str, value: &str, color: Color32) -> egui::Response {
+    let named = ui.horizontal(|ui| {
+        let named = ui.label(RichText::new(name).color(color).size(12.5));
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             ui.monospace(value);
         });
+        named
     });
+    named.inner
 }
 
 fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
@@ -171,8 +177,10 @@ fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
             tokens.good
         };
         let text = format!("missed deadlines {}", format::count(s.missed_deadlines));
-        ui.label(RichText::new(text).color(color).strong());
-        ui.label(theme::small(format!("of {} ticks", format::count(s.tick))));
+        ui.label(RichText::new(text).color(color).strong())
+            .explained("missed deadline");
+        ui.label(theme::small(format!("of {} ticks", format::count(s.tick))))
+            .explained("tick");
     });
     let text = format!(
         "tissue: missed {}, worst work {}; lost in core {}; gate acted {}",
@@ -181,7 +189,7 @@ fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
         format::count(s.records_lost),
         format::count(s.gate_interventions)
     );
-    ui.label(theme::small(text));
+    ui.label(theme::small(text)).explained("gate");
 }
 
 fn percentile_row(ui: &mut egui::Ui, name: &str, p: &Percentiles) {

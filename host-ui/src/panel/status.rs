@@ -4,6 +4,7 @@ use crate::action::Action;
 use crate::settings::{SCALES, STRENGTHS_U, Settings, ThemeChoice};
 use crate::shown::{NeedleLine, Shown};
 use crate::theme;
+use crate::words::Explained;
 use egui::{Align, Color32, DragValue, Layout, RichText, Sense, Vec2};
 use stylet_base::format;
 use stylet_host::link::LinkStatus;
@@ -83,7 +84,10 @@ fn settings_ui(ui: &mut egui::Ui, settings: &mut Settings) {
     if ui.add(drag).labelled_by(label.id).changed() {
         settings.scale = percent / 100.0;
     }
-    let label = ui.label(theme::weak("Air kerma strength of a seed"));
+    let label = ui
+        .label(theme::weak("Air kerma strength of a seed"))
+        .explained("strength")
+        .explained("U");
     let drag = DragValue::new(&mut settings.seed_strength_u)
         .range(STRENGTHS_U[0]..=STRENGTHS_U[1])
         .speed(0.01)
@@ -150,7 +154,9 @@ fn line_ui(ui: &mut egui::Ui, shown: &Shown) {
              may rest up to 2 cm from where they should. Take it out, and wait for LINE READY.",
         ),
     };
-    badge(ui, word, color).on_hover_text(hint);
+    badge(ui, word, color)
+        .on_hover_text(hint)
+        .explained("needle line ready");
 }
 
 fn badge(ui: &mut egui::Ui, word: &str, color: Color32) -> egui::Response {
@@ -178,7 +184,7 @@ fn figures_ui(ui: &mut egui::Ui, shown: &Shown) {
 
 /// Fixed width, so that the bar does not jump as figures change.
 fn figure(ui: &mut egui::Ui, name: &str, value: &str, width: f32) {
-    ui.label(theme::small(name));
+    ui.label(theme::small(name)).explained(name);
     let height = ui.spacing().interact_size.y;
     ui.allocate_ui_with_layout(Vec2::new(width, height), Layout::left_to_right(Align::Center), |ui| {
         ui.set_min_width(width);
@@ -193,8 +199,7 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown) {
         .map(|s| s.force_scale)
         .or_else(|| shown.parameters.map(|p| p.set.get(ParameterId::ForceScale)));
     let text = scale.map_or("scale n/a".to_owned(), |s| format!("scale {s:.2}"));
-    ui.label(theme::weak(text))
-        .on_hover_text("Force on the hand for each newton of a real needle");
+    ui.label(theme::weak(text)).explained("force scale");
     let (force, limit, peak) = shown.state.map_or((0.0, 0.0, 0.0), |s| {
         let size = s.force_on_hand_n.iter().map(|c| c * c).sum::<f64>().sqrt();
         (size, s.device_limit_n, s.peak_force_n)
@@ -233,5 +238,5 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown) {
         ui.set_min_width(size.x);
         ui.add(egui::Label::new(theme::strong(&label)).truncate());
     });
-    ui.label(theme::small("force"));
+    ui.label(theme::small("force")).explained("force on the hand");
 }

@@ -3,8 +3,9 @@
 use crate::mesh;
 use crate::theme::Tokens;
 use egui::Color32;
-use stylet_host::link::SceneModel;
-use stylet_shm_schema::{SceneHeader, StructureInfo, role};
+use std::ops::Range;
+use stylet_host::bodies::{Bodies, shown_alone};
+use stylet_shm_schema::{SceneHeader, role};
 
 /// What a surface is of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,35 +38,27 @@ impl Kind {
     }
 }
 
-/// Structures that are drawn by themselves.
-fn drawn(scene: &SceneHeader) -> impl Iterator<Item = &StructureInfo> {
-    scene.structures().iter().filter(|s| s.triangle_count > 0)
-}
-
 /// What each surface is of, the body's first. A body without others in it is the gland.
 pub fn kinds(scene: Option<&SceneHeader>) -> impl Iterator<Item = Kind> {
-    let inner = scene.into_iter().flat_map(drawn).map(|s| match s.role {
-        bits if bits & role::TARGET != 0 => Kind::Gland,
-        bits if bits & role::FIXED != 0 => Kind::Bone,
-        _ => Kind::Spared,
+    let alone = scene.map_or_else(Vec::new, shown_alone);
+    let body = if alone.is_empty() { Kind::Gland } else { Kind::Body };
+    let inner = alone.into_iter().filter_map(move |(n, _)| {
+        Some(match scene?.structures().get(n)?.role {
+            bits if bits & role::TARGET != 0 => Kind::Gland,
+            bits if bits & role::FIXED != 0 => Kind::Bone,
+            _ => Kind::Spared,
+        })
     });
-    let body = if scene.is_some_and(|s| drawn(s).next().is_some()) {
-        Kind::Body
-    } else {
-        Kind::Gland
-    };
     std::iter::once(body).chain(inner)
 }
 
 /// The indices of each surface, in the order of [`kinds`].
-pub fn surfaces(model: &SceneModel) -> Vec<Vec<u32>> {
-    let header = &model.header;
-    let inner = drawn(header).map(|s| (s.first_triangle as usize, s.triangle_count as usize));
-    std::iter::once((0, header.body_triangle_count as usize))
-        .chain(inner)
-        .map(|(first, count)| {
-            let triangles = model.triangles.get(first..first + count).unwrap_or(&[]);
-            mesh::indices(triangles, model.rest_m.len())
-        })
+pub fn surfaces(bodies: &Bodies) -> Vec<Vec<u32>> {
+    let triangles = |part: &Range<usize>| bodies.triangles.get(part.clone()).unwrap_or(&[]);
+    let count = bodies.rest_m.len();
+    bodies
+        .parts
+        .iter()
+        .map(|part| mesh::indices(triangles(part), count))
         .collect()
 }

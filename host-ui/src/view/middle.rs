@@ -1,5 +1,6 @@
 //! What stands in the middle of the window: the three-dimensional picture, the slices, and the tools over them.
 
+use super::body::ShownBody;
 use super::driver::DriverCost;
 use super::orientation::Orientation;
 use super::scene3d::Scene3d;
@@ -25,6 +26,7 @@ pub struct Middle {
     /// The three-dimensional picture.
     pub(crate) solid: Scene3d,
     slices: Slices,
+    body: ShownBody,
     /// What all pictures share.
     pub(crate) view: ViewState,
     /// Under the tools, in the last frame.
@@ -43,6 +45,7 @@ impl Middle {
         Self {
             solid: Scene3d::new(state.clone()),
             slices: Slices::new(state),
+            body: ShownBody::default(),
             view: ViewState::default(),
             pictures_top: 0.0,
         }
@@ -60,8 +63,9 @@ impl Middle {
 
     /// Takes what is new since the last frame.
     pub(crate) fn take(&mut self, shown: &Shown, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
-        self.solid.take(shown, model, snapshot);
-        self.slices.take(model, snapshot, &mut self.view);
+        self.body.take(model, snapshot);
+        self.solid.take(shown, &self.body);
+        self.slices.take(&self.body, snapshot, &mut self.view);
         if let Some(tip) = shown
             .tip_m()
             .filter(|tip| self.view.follow_tip && is_near_body(shown, tip))
@@ -113,11 +117,12 @@ impl Middle {
         for (orientation, rect) in places.slices {
             actions.extend(
                 self.slices
-                    .slice_ui(ui, rect, orientation, (shown, dose), &mut self.view),
+                    .slice_ui(ui, rect, orientation, (shown, dose, &self.body), &mut self.view),
             );
         }
         if let Some(rect) = places.solid {
-            self.solid.scene3d_ui(ui, rect, (shown, dose), &mut self.view);
+            self.solid
+                .scene3d_ui(ui, rect, (shown, dose, &self.body), &mut self.view);
         }
         actions
     }

@@ -1,5 +1,6 @@
 //! What is drawn of the body: the deforming gland, the needle and the seeds, in three dimensions and in slices.
 
+mod body;
 mod camera;
 mod driver;
 mod gpu;

@@ -1,5 +1,6 @@
 //! The three-dimensional picture: what it shows, and how the pointer turns it.
 
+use super::body::ShownBody;
 use super::camera::Camera;
 use super::driver::DriverCost;
 use super::gpu::{Gpu, SceneUniform};
@@ -18,7 +19,6 @@ use eframe::egui_wgpu::RenderState;
 use egui::{Color32, PointerButton, Pos2, Rect, Sense};
 use nalgebra::Vector3;
 use std::sync::Arc;
-use stylet_host::link::{SceneModel, Snapshot};
 use stylet_shm_schema::SceneId;
 
 const TURN_PER_POINT_RAD: f32 = 0.008;
@@ -77,12 +77,10 @@ pub struct Scene3d {
     gpu: Option<Gpu>,
     pub camera: Camera,
     pub look: Look,
-    model: Option<Arc<SceneModel>>,
     /// Scene of the surface that the card has.
     uploaded_scene: Option<SceneId>,
-    uploaded_snapshot: Option<(u64, u64)>,
     surface: Surface,
-    /// Rises whenever it moves.
+    /// Of the body as the card has it.
     moved: u64,
     /// The dose that the card has.
     shells: u64,
@@ -100,9 +98,7 @@ impl Scene3d {
             gpu: state.map(Gpu::new),
             camera: Camera::default(),
             look: Look::default(),
-            model: None,
             uploaded_scene: None,
-            uploaded_snapshot: None,
             surface: Surface::default(),
             moved: 0,
             shells: 0,
@@ -146,34 +142,27 @@ impl Scene3d {
         }
     }
 
-    pub fn take(&mut self, shown: &Shown, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
-        let Some(model) = model else { return };
+    pub fn take(&mut self, shown: &Shown, body: &ShownBody) {
+        let (Some(model), Some(bodies)) = (body.model(), body.bodies()) else {
+            return;
+        };
         let scene_key = model.header.id();
         if self.uploaded_scene != Some(scene_key) {
             self.uploaded_scene = Some(scene_key);
-            self.uploaded_snapshot = None;
             self.drawn = None;
-            self.model = Some(model.clone());
             self.reset_view(shown);
-            self.surface = Surface::new(&model.rest_m, &model.triangles);
+            self.surface = Surface::new(&bodies.rest_m, &bodies.triangles);
             if let Some(gpu) = &mut self.gpu {
-                gpu.set_scene(self.surface.vertices(), &surfaces(model));
+                gpu.set_scene(self.surface.vertices(), &surfaces(bodies));
                 gpu.set_surface(self.surface.vertices());
             }
         }
-        let Some(snapshot) = snapshot else { return };
-        let snapshot_key = (snapshot.header.session_id, snapshot.header.tissue_tick);
-        if self.uploaded_snapshot == Some(snapshot_key) || snapshot.positions_m.len() != model.rest_m.len() {
+        if self.moved == body.moved() {
             return;
         }
-        self.uploaded_snapshot = Some(snapshot_key);
-        // Tissue at rest is sent 200 times a second too.
-        let runs = self.surface.move_to(&snapshot.positions_m);
-        if runs.is_empty() {
-            return;
-        }
-        self.moved += 1;
-        if let Some(gpu) = &mut self.gpu {
+        self.moved = body.moved();
+        let runs = self.surface.move_to(body.positions_m());
+        if let Some(gpu) = self.gpu.as_mut().filter(|_| !runs.is_empty()) {
             gpu.move_surface(self.surface.vertices(), runs);
         }
     }
@@ -182,7 +171,7 @@ impl Scene3d {
         &mut self,
         ui: &mut egui::Ui,
         rect: Rect,
-        (shown, dose): (&Shown, Option<&Arc<DoseResult>>),
+        (shown, dose, body): (&Shown, Option<&Arc<DoseResult>>, &ShownBody),
         view: &mut ViewState,
     ) {
         let tokens = theme::of(ui);
@@ -190,7 +179,7 @@ impl Scene3d {
         response.widget_info(|| {
             egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, "View of gland, needle and seeds")
         });
-        self.steer(ui, &response, rect, view);
+        self.steer(ui, &response, rect, (body, view));
         let dose = dose.filter(|_| view.isodose);
         let painter = ui.painter_at(rect);
         match self.render(ui.ctx().pixels_per_point(), rect, (shown, dose, view), tokens) {
@@ -219,7 +208,13 @@ impl Scene3d {
         }
     }
 
-    fn steer(&mut self, ui: &egui::Ui, response: &egui::Response, rect: Rect, view: &mut ViewState) {
+    fn steer(
+        &mut self,
+        ui: &egui::Ui,
+        response: &egui::Response,
+        rect: Rect,
+        (body, view): (&ShownBody, &mut ViewState),
+    ) {
         let drag = response.drag_delta();
         if response.dragged_by(PointerButton::Primary) {
             self.camera
@@ -234,11 +229,11 @@ impl Scene3d {
         }
         if response.clicked()
             && view.measure.active
-            && let (Some(place), Some(model)) = (response.interact_pointer_pos(), &self.model)
+            && let (Some(place), Some(bodies)) = (response.interact_pointer_pos(), body.bodies())
         {
             let at = (place - rect.min) / rect.size();
             let ray = self.camera.ray(rect.aspect_ratio(), [at.x, at.y]);
-            if let Some(met) = pick(self.surface.vertices(), &model.triangles, self.camera.eye_m(), ray) {
+            if let Some(met) = pick(self.surface.vertices(), &bodies.triangles, self.camera.eye_m(), ray) {
                 view.measure.take(met.map(f64::from));
             }
         }

@@ -229,3 +229,20 @@ fn every_link_and_path_on_a_page_leads_to_a_file() {
     assert!(checked > 50, "only {checked} paths found");
     assert!(wrong.is_empty(), "these lead nowhere:\n{}", wrong.join("\n"));
 }
+
+/// A page that `docs/SUMMARY.md` does not list is not in the book of `make book`.
+#[test]
+fn every_page_of_docs_is_in_the_book() {
+    let tree = Tree::of_workspace();
+    let summary = tree.text("docs/SUMMARY.md");
+    let is_listed = |page: &&str| {
+        let own = page.strip_prefix("docs/").unwrap_or(page);
+        summary.contains(&format!("]({own})"))
+    };
+    let pages: Vec<&str> = tree.pages().filter(|page| page.starts_with("docs/")).collect();
+    let missing: Vec<&&str> = pages
+        .iter()
+        .filter(|page| **page != "docs/SUMMARY.md" && !is_listed(page))
+        .collect();
+    assert!(pages.len() > 20 && missing.is_empty(), "not in the book: {missing:?}");
+}

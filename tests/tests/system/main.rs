@@ -18,6 +18,7 @@ mod process_restart;
 mod recorder_flight;
 mod recorder_mcap;
 mod rt_contract;
+mod scene_surfaces;
 mod scenes;
 mod shm_invalid;
 mod volume;

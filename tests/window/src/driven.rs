@@ -58,7 +58,7 @@ impl Driven {
 
     fn until_live(&mut self) {
         self.until("a live core", |app| {
-            app.link().state().is_some() && app.link().scene().is_some()
+            app.link().state().is_some() && app.link().scene().is_some_and(|scene| scene.bodies_made().is_some())
         });
     }
 

@@ -1,5 +1,7 @@
 //! What a host knows of the core, as types of its own.
 
+use crate::bodies::{Bodies, Segmentation};
+use std::sync::OnceLock;
 use std::time::Duration;
 use stylet_shm_schema::{Reason, Refusal, RefusalCode, Reply, ReplyStatus, SceneHeader, SnapshotHeader, Vertex, check};
 
@@ -31,9 +33,38 @@ pub struct SceneModel {
     pub triangles: Vec<[u32; 3]>,
     /// One for each cell of `header.labels`: 0 outside, else one more than the place among the header's structures.
     pub labels: Vec<u8>,
+    bodies: OnceLock<Bodies>,
 }
 
 impl SceneModel {
+    /// A scene in these parts.
+    pub fn new(header: SceneHeader, rest_m: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, labels: Vec<u8>) -> Self {
+        Self {
+            header,
+            rest_m,
+            triangles,
+            labels,
+            bodies: OnceLock::new(),
+        }
+    }
+
+    /// The surfaces as they are drawn, where a call of [`SceneModel::bodies`] has made them.
+    pub fn bodies_made(&self) -> Option<&Bodies> {
+        self.bodies.get()
+    }
+
+    /// The surfaces as they are drawn. The first call makes them, which takes too long for a frame.
+    pub fn bodies(&self) -> &Bodies {
+        self.bodies.get_or_init(|| {
+            Bodies::of(Segmentation {
+                header: &self.header,
+                labels: &self.labels,
+                rest_m: &self.rest_m,
+                triangles: &self.triangles,
+            })
+        })
+    }
+
     /// From what the core sends; nothing where it does not hold together.
     pub fn of_words(header: &SceneHeader, words: &[u32]) -> Option<Self> {
         check::scene(header, words).ok()?;
@@ -42,12 +73,12 @@ impl SceneModel {
         let mut labels: Vec<u8> = cells.iter().flat_map(|word| word.to_le_bytes()).collect();
         labels.truncate(header.labels.node_count().unwrap_or(0));
         let place = |w: &[u32]| [0, 1, 2].map(|a| f32::from_bits(w[a]));
-        Some(Self {
-            header: *header,
-            rest_m: positions.chunks_exact(3).map(place).collect(),
-            triangles: indices.chunks_exact(3).map(|w| [w[0], w[1], w[2]]).collect(),
+        Some(Self::new(
+            *header,
+            positions.chunks_exact(3).map(place).collect(),
+            indices.chunks_exact(3).map(|w| [w[0], w[1], w[2]]).collect(),
             labels,
-        })
+        ))
     }
 }
 

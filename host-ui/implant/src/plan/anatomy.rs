@@ -7,6 +7,7 @@ use stylet_anatomy::{Organ, PatientFrame};
 use stylet_dose::mesh::Mesh;
 use stylet_dose::structure::Region;
 use stylet_dose::{Structure, structure};
+use stylet_host::bodies::{Bodies, Follows, shown_alone};
 use stylet_host::link::SceneModel;
 use stylet_shm_schema::{StructureInfo, role};
 
@@ -38,6 +39,21 @@ impl Body {
             points_m: points_m.iter().map(|p| p.map(|c| c as f32)).collect(),
             triangles: triangles.iter().map(|t| t.map(|i| i as u32)).collect(),
         })
+    }
+
+    /// The same structure, drawn by this part of the scene's surfaces where they follow the segmentation.
+    fn drawn_as(mut self, bodies: &Bodies, part: Option<usize>) -> Self {
+        let triangles = part.and_then(|n| bodies.triangles.get(bodies.parts.get(n)?.clone()));
+        let triangles = triangles
+            .filter(|_| bodies.follows == Follows::Segmentation)
+            .unwrap_or(&[]);
+        let vertices = || triangles.iter().flatten().copied();
+        // The vertices of a part stand together.
+        if let (Some(first), Some(last)) = (vertices().min(), vertices().max()) {
+            self.points_m = bodies.rest_m[first as usize..=last as usize].to_vec();
+            self.triangles = triangles.iter().map(|t| t.map(|v| v - first)).collect();
+        }
+        self
     }
 
     /// Its surface, as it is drawn.
@@ -115,13 +131,14 @@ impl Anatomy {
     /// From what the core sent; an error when the scene has no closed target.
     pub fn of(scene: &SceneModel) -> Result<Self, PlanError> {
         let header = &scene.header;
+        let alone = shown_alone(header);
         let part = |s: &StructureInfo| {
             let first = s.first_triangle as usize;
-            body(
-                scene,
-                &s.name.read(),
-                &scene.triangles[first..first + s.triangle_count as usize],
-            )
+            let triangles = &scene.triangles[first..first + s.triangle_count as usize];
+            let is_it = |(n, _): &(usize, Vec<bool>)| std::ptr::eq(&header.structures()[*n], s);
+            // The first surface is that of the whole body.
+            let number = alone.iter().position(is_it).map(|n| n + 1);
+            Ok(body(scene, &s.name.read(), triangles)?.drawn_as(scene.bodies(), number))
         };
         let drawn = |s: &&StructureInfo| s.triangle_count > 0;
         let structures = || header.structures().iter().filter(drawn);
@@ -131,6 +148,7 @@ impl Anatomy {
             None => {
                 let name = header.structures().first().map_or_else(String::new, |s| s.name.read());
                 body(scene, &name, &scene.triangles[..header.body_triangle_count as usize])
+                    .map(|body| body.drawn_as(scene.bodies(), Some(0)))
             }
         };
         let spared = structures().filter(|s| s.role & role::SPARE != 0).map(part);

@@ -6,9 +6,10 @@ use crate::app::App;
 use crate::app::layout::Narrow;
 use crate::panel::workflow::Progress;
 use crate::shown::{LoadState, Note, Shown};
+use bytemuck::Zeroable;
 use stylet_host::link::LinkStatus;
 use stylet_procedure::{Step, Waiting, WaitsFor};
-use stylet_shm_schema::{Fault, Text};
+use stylet_shm_schema::{Fault, Text, TickRecord, flags};
 
 type State = (&'static str, fn(&mut App));
 
@@ -51,6 +52,24 @@ const STATES: &[State] = &[
     ("help", |app| {
         app.shown = live();
         app.help = true;
+    }),
+    ("guide without a core", |app| app.workflow.guide.open = true),
+    ("guide through the plan", |app| guided(app, live())),
+    ("guide to the entry", |app| guided(app, one_needle(-0.05, 0))),
+    ("guide through a membrane", |app| {
+        let mut shown = one_needle(0.01, 0);
+        if let Some(state) = &mut shown.state {
+            state.flags = flags::REAL_TIME | flags::IN_CONTACT;
+            state.puncture_depth_m = 0.2;
+        }
+        guided(app, shown);
+    }),
+    ("guide on the way in", |app| guided(app, one_needle(0.03, 0))),
+    ("guide at a drop", |app| guided(app, one_needle(0.07, 1))),
+    ("guide out", |app| guided(app, one_needle(0.03, 5))),
+    ("guide at the end", |app| {
+        guided(app, one_needle(0.0, 5));
+        app.shown.dose = Some(dose(5));
     }),
     ("planned", |app| app.shown = one_needle(0.0, 0)),
     ("inserting", |app| app.shown = one_needle(0.03, 0)),
@@ -96,6 +115,21 @@ const STATES: &[State] = &[
         app.shown.continues_at = Some((1, 19));
     }),
 ];
+
+/// With the guide open, after a membrane gave way.
+fn guided(app: &mut App, shown: Shown) {
+    app.shown = shown;
+    app.workflow.guide.open = true;
+    let tick = |depth_m, flags| {
+        let mut record = TickRecord::zeroed();
+        (record.depth_m, record.flags, record.force_on_hand_n) = (depth_m, flags, [0.0, 0.0, -12.345]);
+        record
+    };
+    app.workflow.guide.felt.take(&[
+        tick(0.0123, flags::IN_CONTACT),
+        tick(0.0123, flags::IN_CONTACT | flags::PUNCTURED),
+    ]);
+}
 
 fn running(shown: &mut Shown, waits: Option<Waiting>) {
     (shown.running, shown.run_step, shown.run_needle) = (true, Some(Step::Place), Some((1, 19)));

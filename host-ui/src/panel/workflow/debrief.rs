@@ -5,6 +5,7 @@ use crate::dose_worker::{DoseResult, Figure, Limit};
 use crate::panel::axis::{plot, upwards};
 use crate::shown::{SeedError, Shown, all_errors};
 use crate::theme;
+use crate::words::Explained;
 use egui::RichText;
 use egui_plot::{Line, PlotPoints, VLine};
 use stylet_base::format;
@@ -30,10 +31,11 @@ pub fn dose_ui(ui: &mut egui::Ui, shown: &Shown, height: f32, otherwise: &str) {
         ui.label(theme::small(shown.dose_trouble.unwrap_or(otherwise)));
         return;
     };
-    ui.label(format!(
+    let what = format!(
         "Dose: {} seeds of {}, {:.0} Gy",
         dose.seeds, dose.source, dose.prescription_gy
-    ));
+    );
+    ui.label(what).explained("source").explained("prescription");
     ui.spacing_mut().interact_size.y = 16.0;
     egui::Grid::new("dose")
         .num_columns(4)
@@ -54,7 +56,8 @@ fn figure_ui(ui: &mut egui::Ui, figure: &Figure) {
         _ => "%",
     };
     ui.label(theme::small(&figure.structure));
-    ui.label(figure.metric.to_string());
+    let metric = figure.metric.to_string();
+    ui.label(&metric).explained(&metric);
     ui.monospace(format!("{:.1} {unit}", figure.value));
     let Some(limit) = figure.limit else {
         ui.label("");
@@ -72,7 +75,8 @@ fn figure_ui(ui: &mut egui::Ui, figure: &Figure) {
 
 fn dvh_ui(ui: &mut egui::Ui, dose: &DoseResult, height: f32) {
     let tokens = theme::of(ui);
-    ui.label(theme::small("Target: volume over dose, both in %"));
+    ui.label(theme::small("Target: volume over dose, both in %"))
+        .explained("DVH");
     let points: Vec<[f64; 2]> = dose.target_dvh.iter().map(|[x, y]| [x * 100.0, y * 100.0]).collect();
     plot("dvh", height)
         .include_x(0.0)
@@ -100,6 +104,7 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
     let has_many = shown.planning.implant.is_some();
     ui.horizontal(|ui| {
         ui.label(theme::strong("Seed error, mm"))
+            .explained("error of a seed")
             .on_hover_text("Where the seed lies now against where it was planned; along is positive inwards");
         let placed = rows.iter().map(|(_, row)| row).filter(|r| r.placed.is_some());
         let placed: Vec<f64> = placed.map(total_m).collect();

@@ -1,6 +1,7 @@
 //! The left panel: the steps of the procedure, one of them open, with its main action and what is missing.
 
 mod debrief;
+mod guide;
 mod job;
 mod plan;
 mod progress;
@@ -13,6 +14,9 @@ use crate::shown::{SeedError, Shown, own_errors};
 use crate::theme;
 use egui::text::LayoutJob;
 use egui::{Align2, Button, FontId, RichText, Sense, Stroke, TextStyle, Vec2};
+pub use guide::Guide;
+#[cfg(test)]
+pub use guide::{Felt, lesson};
 pub use plan::{PlanState, editor_ui};
 pub use progress::{Progress, Undo, is_at_next_seed, is_needle_done, missing, next_action, progress, undo_action};
 pub use run::{SCRIPTED_STEPS, run_ui};
@@ -27,6 +31,8 @@ pub struct WorkflowState {
     /// Files that were opened last, as the settings have them, and which of them are missing.
     pub recent: Vec<Recent>,
     missing: Missing,
+    /// Through the first insertion.
+    pub guide: Guide,
     opened: Option<Progress>,
     was: Option<Progress>,
 }
@@ -63,6 +69,7 @@ pub fn workflow_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState) 
     let mut actions = Vec::new();
     let now = progress(shown);
     let open = state.open(now);
+    guide::guide_ui(ui, shown, &mut state.guide);
     for step in Progress::ALL {
         if step == open {
             step_ui(ui, (step, now), shown, state, &mut actions);
@@ -70,6 +77,7 @@ pub fn workflow_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState) 
             state.open_by_hand(step);
         }
     }
+    guide::open_ui(ui, &mut state.guide);
     actions
 }
 

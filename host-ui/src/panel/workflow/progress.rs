@@ -53,7 +53,7 @@ pub fn progress(shown: &Shown) -> Progress {
     if shown.planning.waits() {
         return Progress::Plan;
     }
-    match at_hand(shown).map(|needle| needle.step()) {
+    match needle_at_hand(shown).map(|needle| needle.step()) {
         None | Some(Step::Plan) => Progress::Plan,
         Some(Step::Place) => Progress::Place,
         Some(Step::Insert) => Progress::Insert,
@@ -65,7 +65,7 @@ pub fn progress(shown: &Shown) -> Progress {
 }
 
 /// The needle at work; `None` without a plan or a tip.
-fn at_hand(shown: &Shown) -> Option<AtHand> {
+pub fn needle_at_hand(shown: &Shown) -> Option<AtHand> {
     Some(AtHand {
         depth_m: shown.path_depth_m()?,
         beside_m: shown.off_path_m()?,
@@ -90,14 +90,14 @@ pub fn is_before_needles(shown: &Shown) -> bool {
 
 /// All its seeds are dropped and its tip is outside.
 pub fn is_needle_done(shown: &Shown) -> bool {
-    let is_out = at_hand(shown).is_some_and(|needle| needle.is_outside());
+    let is_out = needle_at_hand(shown).is_some_and(|needle| needle.is_outside());
     // A needle that was withdrawn leaves no path, and those before it are done.
     shown.planning.progress.is_done() || (shown.planning.at_work().is_some() && shown.next_seed_m().is_none() && is_out)
 }
 
 /// The needle at work is outside, whatever it has dropped.
 pub fn can_leave_needle(shown: &Shown) -> bool {
-    shown.planning.next_needle().is_some() && at_hand(shown).is_none_or(|needle| needle.is_outside())
+    shown.planning.next_needle().is_some() && needle_at_hand(shown).is_none_or(|needle| needle.is_outside())
 }
 
 /// What is missing before `step` can be done; `None` when nothing is.
@@ -117,7 +117,7 @@ pub fn missing(shown: &Shown, step: Progress) -> Option<String> {
     if shown.plan.is_none() {
         return Some("plan the seeds first".to_owned());
     }
-    match (step, at_hand(shown)) {
+    match (step, needle_at_hand(shown)) {
         (Progress::Insert, Some(needle)) if !needle.is_on_path() => Some(format!(
             "place the needle first: it is {} beside the path",
             format::length(needle.beside_m)
@@ -143,7 +143,7 @@ pub fn next_action(shown: &Shown) -> Option<Action> {
         Progress::Plan if shown.planning.implant.is_some() => None,
         Progress::Plan => Some(Action::PlanSeeds),
         Progress::Place | Progress::Insert | Progress::Drop | Progress::Retract => {
-            let needle = at_hand(shown)?;
+            let needle = needle_at_hand(shown)?;
             match needle.next()? {
                 Operation::Place => Some(Action::PlaceNeedle),
                 Operation::Insert | Operation::InsertTo(_) => Some(Action::Insert),
@@ -158,7 +158,7 @@ pub fn next_action(shown: &Shown) -> Option<Action> {
 
 /// Whether the next seed may be dropped where the tip is.
 pub fn is_at_next_seed(shown: &Shown) -> bool {
-    at_hand(shown).is_some_and(|needle| needle.is_at_next_drop())
+    needle_at_hand(shown).is_some_and(|needle| needle.is_at_next_drop())
 }
 
 /// What Ctrl+Z undoes: the last seed, or else the plan while the needle is outside.

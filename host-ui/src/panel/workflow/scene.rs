@@ -8,10 +8,12 @@ use crate::panel::field::path_ui;
 use crate::recent::Recent;
 use crate::shown::{LoadState, Shown};
 use crate::theme;
+use crate::words::Explained;
 use egui::{Button, RichText};
 use std::path::PathBuf;
 use stylet_base::format;
-use stylet_shm_schema::{BUILTIN_SCENES, SceneHeader, role};
+use stylet_host::bodies::has_every_label;
+use stylet_shm_schema::{BUILTIN_SCENES, MAX_LABEL_CELLS, SceneHeader, role};
 
 /// The button beside the field.
 const OPEN_WIDTH: f32 = 78.0;
@@ -27,7 +29,10 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
             format::count(u64::from(s.element_count))
         ),
     };
-    let label = ui.add(egui::Label::new(name).truncate());
+    let label = ui
+        .add(egui::Label::new(name).truncate())
+        .explained("scene")
+        .explained("element");
     if let Some(s) = shown.scene.as_ref().filter(|s| s.body_edge > 1) {
         let solved = format!("Tissue solved in elements of {:.1} mm", s.body_spacing_m() * 1e3);
         ui.label(theme::small(&solved)).on_hover_text(format!(
@@ -35,6 +40,14 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
              scene.",
             format::count(u64::from(s.element_count)),
             s.spacing_m * 1e3
+        ))
+        .explained("finite elements");
+    }
+    if shown.scene.as_ref().is_some_and(|s| !has_every_label(s)) {
+        ui.label(theme::small("Surfaces follow the lattice")).on_hover_text(format!(
+            "The scene has more than {} cells, so that not every label reaches the window: surfaces go through the middles of the \
+             outermost elements, half an element within the structures.",
+            format::count(MAX_LABEL_CELLS as u64)
         ));
     }
     let free = shown.is_live() && !shown.load.is_busy() && !shown.running;
@@ -153,7 +166,8 @@ fn structures_ui(ui: &mut egui::Ui, scene: &SceneHeader) {
                 ui.label(theme::small(structure.name.read()));
                 let volume_m3 = f64::from(structure.element_count) * scene.spacing_m.powi(3);
                 ui.label(theme::small(format::volume(volume_m3)));
-                ui.label(theme::small(role_name(structure.role)));
+                let role = role_name(structure.role);
+                ui.label(theme::small(role)).explained(role);
                 ui.end_row();
             }
         });

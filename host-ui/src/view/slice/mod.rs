@@ -6,7 +6,9 @@ mod overlay;
 mod plane;
 mod speckle;
 
+use super::body::ShownBody;
 use super::driver::DriverCost;
+use super::kinds::{Kind, kinds};
 use super::orientation::{Orientation, scene_from_patient};
 use super::state::ViewState;
 use crate::action::Action;
@@ -24,8 +26,9 @@ use overlay::{Lines, Overlay};
 pub use plane::Plane;
 use std::sync::Arc;
 use stylet_files::Image;
+use stylet_host::bodies::Bodies;
 use stylet_host::link::{SceneModel, Snapshot};
-use stylet_shm_schema::{SceneId, Text, role};
+use stylet_shm_schema::{SceneHeader, SceneId, Text};
 
 /// Of the target, this much is seen at first.
 const MARGIN: f64 = 1.45;
@@ -50,10 +53,6 @@ pub(super) struct Slices {
     scene_from_patient: Matrix3<f64>,
     model: Option<Arc<SceneModel>>,
     contours: Vec<Contour>,
-    /// Of the surface as it is now.
-    positions_m: Vec<[f32; 3]>,
-    /// Rises whenever they change.
-    moved: u64,
     field: Field,
     /// In the middle of all pictures, and how much of it is seen.
     middle_m: Vector3<f64>,
@@ -78,8 +77,6 @@ impl Slices {
             scene_from_patient: Matrix3::identity(),
             model: None,
             contours: Vec::new(),
-            positions_m: Vec::new(),
-            moved: 0,
             field: Field::default(),
             middle_m: Vector3::repeat(0.03),
             extent_m: 0.06,
@@ -97,11 +94,14 @@ impl Slices {
     }
 
     /// Takes what is new since the last frame.
-    pub fn take(&mut self, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>, view: &mut ViewState) {
-        let Some(model) = model else { return };
+    pub fn take(&mut self, body: &ShownBody, snapshot: Option<&Snapshot>, view: &mut ViewState) {
+        let (Some(model), Some(bodies)) = (body.model(), body.bodies()) else {
+            return;
+        };
         let key = model.header.id();
         if self.scene != Some(key) {
             self.scene = Some(key);
+            self.contours = contours(&model.header, bodies);
             self.take_scene(model);
             view.cursor_m = self.middle_m;
         }
@@ -111,10 +111,6 @@ impl Slices {
             return;
         }
         self.snapshot = Some(key);
-        if self.positions_m != snapshot.positions_m {
-            self.positions_m.clone_from(&snapshot.positions_m);
-            self.moved += 1;
-        }
         if let Some(field) = Field::of(model, snapshot)
             && field != self.field
         {
@@ -128,10 +124,7 @@ impl Slices {
     fn take_scene(&mut self, model: &Arc<SceneModel>) {
         self.snapshot = None;
         self.scene_from_patient = scene_from_patient(&model.header);
-        self.contours = contours(model);
         self.model = Some(model.clone());
-        self.positions_m.clone_from(&model.rest_m);
-        self.moved += 1;
         self.field = Field::rest(model.header.nodes);
         let (low, high) = (
             Vector3::from(model.header.target_lower_m),
@@ -188,7 +181,7 @@ impl Slices {
         ui: &mut egui::Ui,
         rect: Rect,
         orientation: Orientation,
-        (shown, dose): (&Shown, Option<&Arc<DoseResult>>),
+        (shown, dose, body): (&Shown, Option<&Arc<DoseResult>>, &ShownBody),
         view: &mut ViewState,
     ) -> Option<Action> {
         let id = ui.scope_id().with(orientation.name());
@@ -233,7 +226,7 @@ impl Slices {
         let dose = dose.filter(|_| view.isodose);
         // One slice a frame, so that no frame waits for all three.
         let pass = ui.ctx().cumulative_pass_nr();
-        let surface = (&self.positions_m[..], self.moved);
+        let surface = (body.positions_m(), body.moved());
         if self.lines[number].update(&plane, surface, &self.contours, dose, self.dose_cut_in != pass) {
             self.dose_cut_in = pass;
         }
@@ -319,30 +312,17 @@ fn is_on_tip(plane: &Plane, shown: &Shown, place: Pos2) -> bool {
 }
 
 /// What is looked at in a scene: its targets, what is spared and what is fixed; the whole body where it is one.
-fn contours(model: &SceneModel) -> Vec<Contour> {
-    let header = &model.header;
-    let part = |first: u32, count: u32| {
-        let (first, count) = (first as usize, count as usize);
-        model.triangles.get(first..first + count).unwrap_or(&[]).to_vec()
-    };
-    let mut contours: Vec<Contour> = header
-        .structures()
-        .iter()
-        .filter(|s| s.triangle_count > 0)
-        .map(|s| Contour {
-            color: match s.role {
-                bits if bits & role::TARGET != 0 => IMAGE.gland,
-                bits if bits & role::FIXED != 0 => IMAGE.bone,
-                _ => IMAGE.spared,
+fn contours(header: &SceneHeader, bodies: &Bodies) -> Vec<Contour> {
+    let all = kinds(Some(header)).zip(&bodies.parts);
+    let looked_at = all.filter(|(kind, _)| *kind != Kind::Body);
+    looked_at
+        .map(|(kind, part)| Contour {
+            color: match kind {
+                Kind::Gland => IMAGE.gland,
+                Kind::Bone => IMAGE.bone,
+                Kind::Spared | Kind::Body => IMAGE.spared,
             },
-            triangles: part(s.first_triangle, s.triangle_count),
+            triangles: bodies.triangles.get(part.clone()).unwrap_or(&[]).to_vec(),
         })
-        .collect();
-    if contours.is_empty() {
-        contours.push(Contour {
-            color: IMAGE.gland,
-            triangles: part(0, header.body_triangle_count),
-        });
-    }
-    contours
+        .collect()
 }

@@ -10,6 +10,7 @@ use crate::panel::workflow::job::job_ui;
 use crate::planner::Implant;
 use crate::shown::Shown;
 use crate::theme;
+use crate::words::Explained;
 use egui::{Button, DragValue};
 use std::path::PathBuf;
 use stylet_base::format;
@@ -99,7 +100,8 @@ fn implant_ui(ui: &mut egui::Ui, shown: &Shown, implant: &Implant, free: bool, a
             Button::new("Compensate"),
         );
         let hint = "Rehearses each needle and moves its drops so that the seeds rest where they are planned";
-        if compensate.on_hover_text(hint).clicked() {
+        let compensate = compensate.on_hover_text(hint).explained("rehearsal");
+        if compensate.explained("compensation").clicked() {
             actions.push(Action::Plan(PlanAction::Compensate));
         }
     });

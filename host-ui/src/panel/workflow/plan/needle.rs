@@ -6,6 +6,7 @@ use crate::action::{Action, PlanAction};
 use crate::planner::{Implant, NeedleState};
 use crate::shown::Shown;
 use crate::theme;
+use crate::words::Explained;
 use egui::{Button, DragValue};
 use stylet_base::format;
 use stylet_implant::plan::check::{REACH_M, STRENGTHS_U};
@@ -38,7 +39,9 @@ fn empty_ui(ui: &mut egui::Ui, shown: &Shown, state: &PlanState, actions: &mut V
     let outlines = shown.planning.outlines.as_ref();
     let piece_m = outlines.and_then(|g| g.piece_m(state.hole));
     ui.horizontal(|ui| {
-        ui.label(theme::strong(format!("Hole {}", state.hole)));
+        ui.label(theme::strong(format!("Hole {}", state.hole)))
+            .explained("hole")
+            .explained("template");
         let add = ui.add_enabled(piece_m.is_some(), Button::new("Add needle"));
         let add = add.on_disabled_hover_text("It would miss the target");
         if add.on_hover_text("Enter in the template").clicked() {
@@ -95,7 +98,9 @@ fn row_ui(ui: &mut egui::Ui, implant: &Implant, number: usize, actions: &mut Vec
             row.pitch_m = format::metres(pitch_mm);
         }
         ui.checkbox(&mut row.stranded, "Strand")
-            .on_hover_text("In one strand with spacers between the seeds, or each by itself");
+            .on_hover_text("In one strand with spacers between the seeds, or each by itself")
+            .explained("strand")
+            .explained("spacer");
     });
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;

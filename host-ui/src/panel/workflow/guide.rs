@@ -1,0 +1,58 @@
+//! A guide through the first insertion: what to do, what to watch, and why the seeds missed.
+//!
+//! What comes next is what the state machine of the procedure says; only the words are here.
+
+mod felt;
+mod lesson;
+
+use crate::shown::Shown;
+use crate::theme;
+use egui::{Button, Stroke};
+pub use felt::Felt;
+pub use lesson::lesson;
+
+/// Whether the guide is open, and what the needle met so far.
+#[derive(Default)]
+pub struct Guide {
+    /// Shown above the steps.
+    pub open: bool,
+    /// The membranes of the last insertion.
+    pub felt: Felt,
+}
+
+/// Above the steps, in the panel that scrolls: it covers nothing and can be left at any time.
+pub fn guide_ui(ui: &mut egui::Ui, shown: &Shown, guide: &mut Guide) {
+    if !guide.open {
+        return;
+    }
+    let tokens = theme::of(ui);
+    let lesson = lesson(shown, &guide.felt);
+    theme::card(ui).stroke(Stroke::new(1.0, tokens.accent)).show(ui, |ui| {
+        ui.set_min_width(ui.available_width());
+        ui.horizontal(|ui| {
+            ui.label(theme::strong("First insertion"));
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let leave = ui.button("Leave the guide");
+                guide.open = !leave.on_hover_text("Nothing else changes").clicked();
+            });
+        });
+        ui.label(lesson.what);
+        for line in lesson.notes {
+            ui.label(theme::weak(line));
+        }
+    });
+    ui.add_space(theme::GAP);
+}
+
+/// Under the steps.
+pub fn open_ui(ui: &mut egui::Ui, guide: &mut Guide) {
+    if guide.open {
+        return;
+    }
+    ui.add_space(theme::GAP);
+    let button = ui.add(Button::new("First insertion"));
+    let hint = "A guide through one needle: what to do, what to watch, and why the seeds missed";
+    if button.on_hover_text(hint).clicked() {
+        guide.open = true;
+    }
+}

@@ -1,0 +1,56 @@
+//! The membranes that a needle met, from the records of the ticks.
+
+use stylet_shm_schema::{TickRecord, flags};
+
+/// A membrane that gave way.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Puncture {
+    /// How far the tip pressed it in before, m.
+    pub pressed_m: f64,
+    /// Largest force on the hand meanwhile, N.
+    pub force_n: f64,
+}
+
+/// Punctures of the last insertion, in their order.
+#[derive(Clone, Debug, Default)]
+pub struct Felt {
+    punctures: Vec<Puncture>,
+    pressed: Option<Puncture>,
+    was_in_contact: bool,
+    session: u64,
+}
+
+/// More membranes than any way through a body has.
+const MOST: usize = 16;
+
+impl Felt {
+    /// Takes records in their order.
+    pub fn take(&mut self, records: &[TickRecord]) {
+        for record in records {
+            let is_in_contact = record.flags & flags::IN_CONTACT != 0;
+            if record.session_id != self.session || (is_in_contact && !self.was_in_contact) {
+                (self.session, self.pressed) = (record.session_id, None);
+                self.punctures.clear();
+            }
+            self.was_in_contact = is_in_contact;
+            let is_through = record.flags & flags::PUNCTURED != 0;
+            if is_in_contact && !is_through {
+                let force_n = record.force_on_hand_n.iter().map(|c| c * c).sum::<f64>().sqrt();
+                let pressed = self.pressed.get_or_insert_default();
+                pressed.pressed_m = pressed.pressed_m.max(record.depth_m);
+                pressed.force_n = pressed.force_n.max(force_n);
+            } else if let Some(gave_way) = self
+                .pressed
+                .take()
+                .filter(|_| is_through && self.punctures.len() < MOST)
+            {
+                self.punctures.push(gave_way);
+            }
+        }
+    }
+
+    /// Those of the last insertion, the outermost first.
+    pub fn punctures(&self) -> &[Puncture] {
+        &self.punctures
+    }
+}

@@ -1,0 +1,213 @@
+//! The words of the guide for what comes next.
+
+use super::felt::{Felt, Puncture};
+use crate::panel::workflow::progress::{Progress, needle_at_hand, progress};
+use crate::shown::{NeedleLine, SeedError, Shown, all_errors};
+use stylet_base::format;
+use stylet_procedure::{AtHand, Operation};
+
+/// What to do, and what to watch meanwhile.
+#[derive(Debug, Default, PartialEq)]
+pub struct Lesson {
+    /// What to do.
+    pub what: String,
+    /// What to watch, or what happened.
+    pub notes: Vec<String>,
+}
+
+/// Seeds that have a line of their own.
+const SEEDS: usize = 6;
+
+fn of(what: impl Into<String>, notes: &[&str]) -> Lesson {
+    Lesson {
+        what: what.into(),
+        notes: notes.iter().map(|note| (*note).to_owned()).collect(),
+    }
+}
+
+/// What comes next, by the state of the core.
+pub fn lesson(shown: &Shown, felt: &Felt) -> Lesson {
+    if !shown.is_live() {
+        let why =
+            "The window shows what the core computes; it may be closed and opened again without the core noticing.";
+        return of("Start the core: run rt-core in a terminal, or make run.", &[why]);
+    }
+    if shown.running {
+        return of(
+            "The script moves the needle now. Watch it, or press Stop to go on by hand.",
+            &[],
+        );
+    }
+    let next = needle_at_hand(shown).and_then(|needle| needle.next().map(|operation| (needle, operation)));
+    match (progress(shown), next) {
+        (Progress::Scene, _) => of(
+            "Choose a scene: press \"paper\" in step 1. It is a gland by itself.",
+            &[],
+        ),
+        (Progress::Plan, _) => of(
+            "Press \"Plan five seeds\" in step 2, or Enter. Enter always does what comes next.",
+            &["Rings in the pictures show where the seeds should come to rest."],
+        ),
+        (Progress::Debrief, _) => debrief(shown, felt),
+        (_, Some((needle, operation))) => operation_lesson(shown, felt, &needle, operation),
+        (_, None) => of("Press Enter for the next needle.", &[]),
+    }
+}
+
+fn operation_lesson(shown: &Shown, felt: &Felt, needle: &AtHand, operation: Operation) -> Lesson {
+    match operation {
+        Operation::Place => place(shown),
+        Operation::Insert | Operation::InsertTo(_) => insert(shown, felt, needle),
+        Operation::Drop(_) => of(
+            "The tip is at the next planned place. Press Space: the seed leaves the needle here.",
+            &["It lies in tissue that the needle still holds out of its place."],
+        ),
+        Operation::DrawBack(_) => {
+            let back_m = needle.next_drop_m.map_or(0.0, |next_m| needle.depth_m - next_m);
+            of(
+                format!(
+                    "Draw the needle back by {} to the next place: hold S, or press Enter.",
+                    format::length(back_m.max(0.0))
+                ),
+                &["Friction of the shaft pulls the tissue along, and the seed with it."],
+            )
+        }
+        Operation::Retract | Operation::TakeOut => of(
+            "All seeds are dropped. Take the needle out: hold S, or press Enter.",
+            &["Watch the seeds as the tissue goes back to where it was."],
+        ),
+        Operation::Reset | Operation::PublishPlan | Operation::Engage | Operation::Settle => {
+            of("Wait until the tissue rests.", &[])
+        }
+    }
+}
+
+fn place(shown: &Shown) -> Lesson {
+    let mut lesson = of(
+        "Bring the tip to the entry: press Enter. With a device, move its tip there by hand.",
+        &["A line in the pictures leads from the entry past the deepest seed."],
+    );
+    if !shown.is_engaged() {
+        let engage =
+            "To feel the force on a device, press E first. With keys or mouse, watch the force at the upper right.";
+        lesson.notes.push(engage.to_owned());
+    }
+    lesson
+}
+
+fn insert(shown: &Shown, felt: &Felt, needle: &AtHand) -> Lesson {
+    if shown.needle_line() == Some(NeedleLine::Preparing) {
+        return of("Wait here until LINE READY stands in the bar at the top.", &[]);
+    }
+    if let Some(share) = shown.membrane_tension() {
+        return Lesson {
+            what: format!(
+                "Push on: the membrane resists, and its tension is {:.0} %. At 100 % it gives way.",
+                share * 100.0
+            ),
+            notes: vec![
+                "The force rises, and the gland moves away before the needle: follow the outlines in the slices."
+                    .to_owned(),
+            ],
+        };
+    }
+    let left_m = needle
+        .deepest_drop_m
+        .map_or(0.0, |deepest_m| deepest_m - needle.depth_m);
+    let left = format::length(left_m.max(0.0));
+    match felt.punctures().last().filter(|_| shown.has_punctured()) {
+        Some(puncture) => Lesson {
+            what: format!("It gave way. Go on to the deepest seed, {left} ahead: hold W, or press Enter."),
+            notes: vec![
+                pressed(puncture),
+                "What you feel now is friction along the shaft; it grows with the depth.".to_owned(),
+            ],
+        },
+        None => of(
+            format!(
+                "Push the needle in, {left} to the deepest seed: hold W; with Shift it goes slower, S draws it back."
+            ),
+            &["You can also drag the tip in a slice, or push a device. Watch the membrane tension at the right."],
+        ),
+    }
+}
+
+fn pressed(puncture: &Puncture) -> String {
+    format!(
+        "The membrane was pressed in by {} before it gave way, at {}.",
+        format::length(puncture.pressed_m),
+        format::force(puncture.force_n)
+    )
+}
+
+/// Depths of one seed along the needle, m.
+#[derive(Clone, Copy)]
+struct Depths {
+    number: usize,
+    planned_m: f64,
+    left_m: f64,
+    rests_m: f64,
+    across_m: f64,
+}
+
+fn depths(shown: &Shown) -> Vec<Depths> {
+    let of_seed = |(_, row): (usize, SeedError)| {
+        let seed = shown.own_seeds().get(row.placed?)?;
+        let rests_m = shown.depth_of_m(seed.position_m)?;
+        Some(Depths {
+            number: row.planned + 1,
+            planned_m: rests_m - row.along_m,
+            left_m: shown.depth_of_m(seed.dropped_at_m)?,
+            rests_m,
+            across_m: row.across_m,
+        })
+    };
+    all_errors(shown).into_iter().filter_map(of_seed).collect()
+}
+
+/// Why the seeds missed, in figures of this insertion.
+fn debrief(shown: &Shown, felt: &Felt) -> Lesson {
+    let seeds = depths(shown);
+    if seeds.is_empty() {
+        return of(
+            "The needle is out, and no seed was dropped. Press Reset to try again.",
+            &[],
+        );
+    }
+    let mean_m = |of: &dyn Fn(&Depths) -> f64| seeds.iter().map(of).sum::<f64>() / seeds.len() as f64;
+    let by_hand_m = mean_m(&|seed| seed.left_m - seed.planned_m);
+    let by_tissue_m = mean_m(&|seed| seed.rests_m - seed.left_m);
+    let mut notes: Vec<String> = felt.punctures().iter().map(pressed).collect();
+    notes.extend(seeds.iter().take(SEEDS).map(|seed| {
+        format!(
+            "Seed {}: planned {} deep, left at {}, rests at {}, {} beside the path.",
+            seed.number,
+            format::length(seed.planned_m),
+            format::length(seed.left_m),
+            format::length(seed.rests_m),
+            format::length(seed.across_m)
+        )
+    }));
+    notes.push(match by_tissue_m.abs() >= by_hand_m.abs() {
+        true => format!(
+            "Most of it is the tissue: the needle had moved it, and as it went back it took the seeds along, by {} mm on \
+             average. The hand left them {} mm from their places.",
+            format::signed_mm(by_tissue_m),
+            format::signed_mm(by_hand_m)
+        ),
+        false => format!(
+            "Most of it is the hand: the seeds were left {} mm from their planned places on average. The tissue took them \
+             {} mm along.",
+            format::signed_mm(by_hand_m),
+            format::signed_mm(by_tissue_m)
+        ),
+    });
+    notes.push("\"Compensate\" in a plan of many needles moves the drops ahead of this.".to_owned());
+    Lesson {
+        what: format!(
+            "The seeds rest {} mm from where they were planned, on average along the needle. Inwards is positive.",
+            format::signed_mm(by_hand_m + by_tissue_m)
+        ),
+        notes,
+    }
+}

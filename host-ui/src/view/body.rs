@@ -1,0 +1,88 @@
+//! Where the drawn surfaces of the scene are now: computed once a frame, for all pictures.
+
+use std::sync::Arc;
+use stylet_host::bodies::Bodies;
+use stylet_host::link::{SceneModel, Snapshot};
+use stylet_shm_schema::SceneId;
+
+/// The surfaces of the scene that is shown, as the last snapshot has them.
+#[derive(Default)]
+pub struct ShownBody {
+    model: Option<Arc<SceneModel>>,
+    scene: Option<SceneId>,
+    /// Surfaces that a thread makes, or has made.
+    making: Option<SceneId>,
+    snapshot: Option<(u64, u64)>,
+    /// Of the elements at the surface of the lattice.
+    elements_m: Vec<[f32; 3]>,
+    positions_m: Vec<[f32; 3]>,
+    moved: u64,
+}
+
+impl ShownBody {
+    /// Takes what is new since the last frame. A new scene is shown once a thread has made its surfaces.
+    pub fn take(&mut self, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
+        let Some(model) = model else { return };
+        let Some(bodies) = model.bodies_made() else {
+            return self.make(model);
+        };
+        if self.scene != Some(model.header.id()) {
+            self.scene = Some(model.header.id());
+            self.model = Some(model.clone());
+            self.snapshot = None;
+            self.elements_m.clone_from(&model.rest_m);
+            self.positions_m.clone_from(&bodies.rest_m);
+            self.moved += 1;
+        }
+        let Some(snapshot) = snapshot else { return };
+        let key = (snapshot.header.session_id, snapshot.header.tissue_tick);
+        if self.snapshot == Some(key) || snapshot.positions_m.len() != model.rest_m.len() {
+            return;
+        }
+        self.snapshot = Some(key);
+        // Tissue at rest is sent 200 times a second too.
+        if self.elements_m != snapshot.positions_m {
+            self.elements_m.clone_from(&snapshot.positions_m);
+            bodies.deformed(&model.rest_m, &self.elements_m, &mut self.positions_m);
+            self.moved += 1;
+        }
+    }
+
+    fn make(&mut self, model: &Arc<SceneModel>) {
+        if self.making == Some(model.header.id()) {
+            return;
+        }
+        self.making = Some(model.header.id());
+        let made = Arc::clone(model);
+        let thread = std::thread::Builder::new().name("surfaces".to_owned());
+        if thread
+            .spawn(move || {
+                made.bodies();
+            })
+            .is_err()
+        {
+            // Without a thread a frame has to wait.
+            model.bodies();
+        }
+    }
+
+    /// The scene that is shown; nothing before the first one.
+    pub fn model(&self) -> Option<&Arc<SceneModel>> {
+        self.model.as_ref()
+    }
+
+    /// The surfaces at rest; nothing before the first scene.
+    pub fn bodies(&self) -> Option<&Bodies> {
+        self.model.as_ref().map(|model| model.bodies())
+    }
+
+    /// Where their vertices are now.
+    pub fn positions_m(&self) -> &[[f32; 3]] {
+        &self.positions_m
+    }
+
+    /// Rises whenever they move.
+    pub fn moved(&self) -> u64 {
+        self.moved
+    }
+}

@@ -1,0 +1,88 @@
+//! What the words of physics and of the clinic mean, on hover: the tables of `docs/words.md`, which goes into the program.
+
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
+const PAGE: &str = include_str!("../../docs/words.md");
+
+/// Row by row: words that share a meaning are separated by commas. Lower case is another word: D is a dose, d a distance.
+static MEANINGS: LazyLock<BTreeMap<&str, &str>> = LazyLock::new(|| {
+    let rows = PAGE.lines().filter_map(|line| {
+        let (words, meaning) = line.strip_prefix("| ")?.strip_suffix(" |")?.split_once(" | ")?;
+        let is_head = words == "word";
+        (!is_head).then_some((words, meaning))
+    });
+    rows.flat_map(|(words, meaning)| words.split(", ").map(move |word| (word, meaning)))
+        .collect()
+});
+
+/// What a word means; `None` where the page has no row for it.
+pub fn meaning(word: &str) -> Option<&'static str> {
+    MEANINGS.get(word).copied()
+}
+
+/// Something in the window that a word of the page stands for.
+pub trait Explained {
+    /// Shows the word and its meaning on hover.
+    fn explained(self, word: &str) -> Self;
+}
+
+impl Explained for egui::Response {
+    fn explained(self, word: &str) -> Self {
+        match meaning(word) {
+            Some(meaning) => self.on_hover_text(format!("{word}: {meaning}")),
+            None => self,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::{Path, PathBuf};
+    use stylet_dose::Dvh;
+    use stylet_dose::criteria::DoseStructure;
+
+    fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+        for entry in std::fs::read_dir(folder).expect("a folder of sources").flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                sources(&path, found);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                found.push(path);
+            }
+        }
+    }
+
+    /// The window asks for a word by its name: one that the page does not have would show nothing.
+    #[test]
+    fn every_word_that_the_window_explains_has_its_row_on_the_page() {
+        let mut files = Vec::new();
+        sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/panel"), &mut files);
+        let mut asked = Vec::new();
+        for file in files {
+            let text = std::fs::read_to_string(&file).expect("a source");
+            for call in text.split(".explained(\"").skip(1) {
+                asked.push(call.split('"').next().unwrap_or_default().to_owned());
+            }
+        }
+        asked.extend(["phase", "depth", "speed", "target", "spared", "fixed", "hole", "strand"].map(str::to_owned));
+        let missing: Vec<&String> = asked.iter().filter(|word| meaning(word).is_none()).collect();
+        println!("{} words are asked for, the page has {}", asked.len(), MEANINGS.len());
+        assert!(asked.len() > 20 && missing.is_empty(), "without a row: {missing:?}");
+    }
+
+    #[test]
+    fn the_measures_of_the_dose_are_on_the_page_by_the_names_that_are_shown() {
+        let dvh = Dvh::new(&[145.0; 10], &[1e-6; 10]).expect("a histogram");
+        for structure in [DoseStructure::Target, DoseStructure::Urethra, DoseStructure::Rectum] {
+            let figures = structure.figures(&dvh, 145.0);
+            assert!(!figures.is_empty());
+            for name in figures.iter().map(|figure| figure.metric.to_string()) {
+                assert!(meaning(&name).is_some(), "{name}");
+            }
+        }
+        assert_eq!(meaning("no such word"), None);
+        assert!(meaning("ChainMail").is_some_and(|m| m.contains("soft tissue")));
+    }
+}
