@@ -17,6 +17,7 @@ use stylet_dose::report::{Judge, Verdict};
 use stylet_dose::{DoseKernel, Seed};
 use stylet_shm_schema::TickRecord;
 pub use trace::Trace;
+pub use page::STYLE;
 pub use write::{to_json, write};
 
 const DOSE_PITCH_M: f64 = 1e-3;
