@@ -23,11 +23,6 @@ impl Counts {
         self.signals[component] / self.of_one
     }
 
-    /// Signals of all components, in seeds.
-    pub fn signals_of_all(&self) -> Vec<f64> {
-        (0..self.signals.len()).map(|n| self.signal(n)).collect()
-    }
-
     /// Probability of the count of a component, beside one more and one fewer.
     pub fn probability(&self, component: usize) -> f64 {
         let (signal, count) = (self.signal(component), self.seeds[component]);

@@ -139,7 +139,6 @@ impl<'a> Fitter<'a> {
         let mut fits = vec![Fitted::default(); components.len()];
         let mut counts = first.clone();
         for sweep in 0..SWEEPS {
-            let mut signals = counts.signals_of_all();
             for (n, component) in components.iter().enumerate() {
                 if counts.seeds[n] == 0 && lines[n].is_empty() {
                     continue;
@@ -154,27 +153,25 @@ impl<'a> Fitter<'a> {
                     self.exchange(&task, component, &mut lines[n]);
                 }
                 fits[n] = self.fitted(&task, &lines[n]);
-                signals[n] = self.signal(&task, &lines[n]);
                 self.spread(component, &lines[n], 1.0, &mut field);
             }
             if sweep + 1 < SWEEPS {
-                counts = count(&signals);
+                counts = count(&self.signals(components, &lines, &field));
             }
         }
         (fits, counts)
     }
 
-    /// Signal of a component in seeds: its data over what as many whole seeds leave in its voxels.
-    fn signal(&self, task: &Task, lines: &[Line]) -> f64 {
-        let data: f64 = task.data.iter().sum();
-        let mut model = vec![0.0; task.data.len()];
-        let whole = |line: &Line| Line { amount: 1.0, ..*line };
-        lines.iter().for_each(|line| task.patch.add(&whole(line), &self.look, 1.0, &mut model));
-        let one = match lines.len() {
-            0 => self.look.signal,
-            count => model.iter().sum::<f64>() / count as f64,
+    /// Signal of each component without what its neighbours' seeds give to its voxels; `field` is that of all seeds.
+    fn signals(&self, components: &[Component], lines: &[Vec<Line>], field: &[f64]) -> Vec<f64> {
+        let of_component = |(component, lines): (&Component, &Vec<Line>)| {
+            let patch = Patch::of(self.volume.dims, self.volume.frame.spacing_m, &component.voxels);
+            let mut own = vec![0.0; component.voxels.len()];
+            lines.iter().for_each(|line| patch.add(line, &self.look, 1.0, &mut own));
+            let of_others = component.voxels.iter().zip(&own).map(|(n, own)| field[*n] - own);
+            component.signal - of_others.sum::<f64>()
         };
-        data / one.max(f64::MIN_POSITIVE)
+        components.iter().zip(lines).map(of_component).collect()
     }
 
     /// Takes each seed away in turn and puts it where most signal is left, as long as the fit becomes better.
