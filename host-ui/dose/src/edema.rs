@@ -95,7 +95,11 @@ impl Edema {
 impl std::fmt::Display for Edema {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let days = s_to_days(self.half_life_s);
-        write!(f, "{:.0} % of the volume, half-life {days:.1} days", self.magnitude * 100.0)
+        write!(
+            f,
+            "{:.0} % of the volume, half-life {days:.1} days",
+            self.magnitude * 100.0
+        )
     }
 }
 
@@ -156,7 +160,10 @@ mod tests {
             }
             for (moving, seen) in moving.iter().zip(&seen) {
                 let ratio = moving / (seen * in_end);
-                assert!((ratio / expected - 1.0).abs() < 2e-4, "{magnitude} {days}: {ratio} {expected}");
+                assert!(
+                    (ratio / expected - 1.0).abs() < 2e-4,
+                    "{magnitude} {days}: {ratio} {expected}"
+                );
             }
         }
     }

@@ -81,7 +81,8 @@ impl Response {
         }
         let left = |rate: f64| (-rate * until_s).exp();
         let given = 1.0 - left(decay);
-        let kappa = ((1.0 - left(2.0 * decay)) / (2.0 * decay) - (1.0 - left(repair + decay)) / (repair + decay)) / given;
+        let kappa =
+            ((1.0 - left(2.0 * decay)) / (2.0 * decay) - (1.0 - left(repair + decay)) / (repair + decay)) / given;
         let relative = 1.0 + 2.0 * first_rate * decay / (repair - decay) / self.alpha_beta_gy * kappa;
         dose_gy * given * relative - growth_gy
     }
@@ -113,7 +114,9 @@ mod tests {
             unrepaired = steady + (unrepaired - steady) * (-repair * step_s).exp();
             linear += rate * step_s;
         }
-        let growth = response.doubling_s.map_or(0.0, |d| LN_2 * until_s / (response.alpha_per_gy * d));
+        let growth = response
+            .doubling_s
+            .map_or(0.0, |d| LN_2 * until_s / (response.alpha_per_gy * d));
         linear + square / response.alpha_beta_gy - growth
     }
 

@@ -116,9 +116,18 @@ impl Criterion {
 mod tests {
     use super::*;
 
-    const PLACES: [[f64; 3]; 4] = [[0.0; 3], [0.004, 0.002, -0.003], [-0.001, 0.0, 0.006], [0.003, -0.003, 0.001]];
+    const PLACES: [[f64; 3]; 4] = [
+        [0.0; 3],
+        [0.004, 0.002, -0.003],
+        [-0.001, 0.0, 0.006],
+        [0.003, -0.003, 0.001],
+    ];
 
-    fn gammas(criterion: Criterion, dose: impl Fn([f64; 3]) -> f64, other: impl Fn([f64; 3]) -> Option<f64> + Sync) -> Vec<Option<f64>> {
+    fn gammas(
+        criterion: Criterion,
+        dose: impl Fn([f64; 3]) -> f64,
+        other: impl Fn([f64; 3]) -> Option<f64> + Sync,
+    ) -> Vec<Option<f64>> {
         let places: Vec<([f64; 3], f64)> = PLACES.iter().map(|p| (*p, dose(*p))).collect();
         criterion.gammas(&places, &other)
     }

@@ -187,7 +187,8 @@ impl DoseArgs {
 
 /// Name of a file, without its folder.
 pub fn file_name(path: &Path) -> String {
-    path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+    path.file_name()
+        .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
 impl PerturbArgs {

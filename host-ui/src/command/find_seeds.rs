@@ -81,7 +81,11 @@ impl FindSeedsArgs {
 
     fn print(&self, found: &Found) {
         let [tissue, noise] = found.tissue;
-        let given = if self.threshold.is_some() { "given" } else { "from the data" };
+        let given = if self.threshold.is_some() {
+            "given"
+        } else {
+            "from the data"
+        };
         println!(
             "threshold {:.0} HU ({given}); tissue {tissue:.0} HU, noise {noise:.0} HU, blur {:.2} mm",
             found.threshold,
@@ -113,9 +117,10 @@ impl FindSeedsArgs {
 
     fn json(&self, found: &Found) -> Result<serde_json::Value, CommandError> {
         let mm = |place: [f64; 3]| place.map(|m| m * 1e3);
-        let doubts = found.doubts.iter().map(|d| {
-            json!({ "at_mm": mm(d.place_m), "signal_seeds": d.signal, "counted": d.counted, "why": d.why })
-        });
+        let doubts = found
+            .doubts
+            .iter()
+            .map(|d| json!({ "at_mm": mm(d.place_m), "signal_seeds": d.signal, "counted": d.counted, "why": d.why }));
         let inputs: [(&str, &Path); 1] = [("ct", &self.ct)];
         Ok(json!({
             "seeds": found.seeds.len(),

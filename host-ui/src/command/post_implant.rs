@@ -81,7 +81,9 @@ impl PostImplantArgs {
         within("--imaged-after", self.imaged_after, 0.0, 400.0)?;
         let edema = self.edema()?;
         if edema.is_some() && !c.is_for_ever() {
-            return Err("--edema is for the dose of the whole life of the seeds; leave --from-days and --to-days out".into());
+            return Err(
+                "--edema is for the dose of the whole life of the seeds; leave --from-days and --to-days out".into(),
+            );
         }
         let loaded = c.load(&self.planned)?;
         let (structures, target) = c.structures(&self.structures, &loaded.seeds, POINTS_FOR_DOSE / 3)?;
@@ -107,7 +109,12 @@ impl PostImplantArgs {
         }
         let later = [
             ("day 0", 0.0, &self.day0, &self.day0_structures),
-            (&*format!("day {:.0}", self.imaged_after), self.imaged_after, &self.day30, &self.day30_structures),
+            (
+                &*format!("day {:.0}", self.imaged_after),
+                self.imaged_after,
+                &self.day30,
+                &self.day30_structures,
+            ),
         ];
         for (name, days, file, structures) in later {
             if let Some(file) = file {
@@ -188,7 +195,11 @@ impl PostImplantArgs {
             ("--day30", &self.day30),
             ("--day30-structures", &self.day30_structures),
         ];
-        inputs.extend(others.into_iter().filter_map(|(option, file)| Some((option, file.as_deref()?))));
+        inputs.extend(
+            others
+                .into_iter()
+                .filter_map(|(option, file)| Some((option, file.as_deref()?))),
+        );
         let mut value = sheet::to_json(implant, columns);
         value["made"] = provenance::made(&inputs)?;
         write::json(&out.join("post_implant.json"), &value)?;

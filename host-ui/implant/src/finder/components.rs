@@ -64,7 +64,10 @@ pub fn of(volume: &VoxelValues<f32>, level: &Level) -> Result<Vec<Component>, Fi
         groups.push(group);
     }
     surround(volume, &mut owners, &mut groups);
-    Ok(groups.into_iter().map(|voxels| component(volume, level, voxels)).collect())
+    Ok(groups
+        .into_iter()
+        .map(|voxels| component(volume, level, voxels))
+        .collect())
 }
 
 /// Gives every component the voxels around it, ring by ring; one between two belongs to the first.
@@ -99,7 +102,10 @@ fn component(volume: &VoxelValues<f32>, level: &Level, mut voxels: Vec<usize>) -
     };
     let excess: Vec<f64> = voxels.iter().map(excess).collect();
     let signal: f64 = excess.iter().sum();
-    let weighted = voxels.iter().zip(&excess).map(|(n, e)| place_m(volume, *n) * e.max(0.0));
+    let weighted = voxels
+        .iter()
+        .zip(&excess)
+        .map(|(n, e)| place_m(volume, *n) * e.max(0.0));
     let weight: f64 = excess.iter().map(|e| e.max(0.0)).sum();
     Component {
         middle_m: weighted.sum::<Vector3<f64>>() / weight.max(f64::MIN_POSITIVE),

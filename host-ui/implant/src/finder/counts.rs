@@ -59,7 +59,10 @@ pub fn of(signals: &[f64], count: Option<usize>, most: f64) -> Counts {
     let in_reach: f64 = signals.iter().filter(|s| **s < most * middle).sum();
     // Where most components are several seeds the middle one is no seed; then the number of seeds shows it.
     let starts = [Some(middle), count.map(|count| in_reach / count.max(1) as f64)];
-    let found = starts.into_iter().flatten().map(|start| of_start(signals, start, count, most));
+    let found = starts
+        .into_iter()
+        .flatten()
+        .map(|start| of_start(signals, start, count, most));
     let best = found.min_by(|a, b| a.total_cost().total_cmp(&b.total_cost()));
     best.unwrap_or_else(|| one_each(signals))
 }
@@ -74,7 +77,11 @@ fn of_start(signals: &[f64], start: f64, count: Option<usize>, most: f64) -> Cou
     for _ in 0..ROUNDS {
         for n in 0..signals.len() {
             let signal = counts.signal(n);
-            counts.seeds[n] = if signal > most { 0 } else { signal.round().max(0.0) as usize };
+            counts.seeds[n] = if signal > most {
+                0
+            } else {
+                signal.round().max(0.0) as usize
+            };
         }
         let singles = (0..signals.len()).filter(|&n| counts.seeds[n] == 1);
         let of_single: Vec<f64> = singles.map(|n| signals[n]).collect();
@@ -127,7 +134,11 @@ mod tests {
         let signals = [1.02, 0.97, 1.0, 2.1, 0.99, 1.46, 0.1, 40.0].map(|s| s * 4000.0);
         let free = of(&signals, None, 12.0);
         assert_eq!(free.seeds, [1, 1, 1, 2, 1, 1, 0, 0]);
-        assert!(free.probability(0) > 0.99 && free.probability(5) < 0.9, "{}", free.probability(5));
+        assert!(
+            free.probability(0) > 0.99 && free.probability(5) < 0.9,
+            "{}",
+            free.probability(5)
+        );
         assert_eq!(of(&signals, Some(8), 12.0).seeds, [1, 1, 1, 2, 1, 2, 0, 0]);
         // More than the signals hold is not made up.
         assert_eq!(of(&signals, Some(30), 12.0).seeds.iter().sum::<usize>(), 8);

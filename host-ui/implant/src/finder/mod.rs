@@ -9,6 +9,7 @@ mod counts;
 mod level;
 mod shape;
 mod split;
+mod starts;
 
 use components::Component;
 use nalgebra::{Matrix3, Vector3};

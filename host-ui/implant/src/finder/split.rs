@@ -20,10 +20,6 @@ const SIGNAL_SPREAD: f64 = 0.1;
 const TURN_SPREAD: f64 = 0.4;
 /// Rows of a seed beside those of the voxels: its signal, and two of its direction.
 const OWN_ROWS: usize = 3;
-/// Times that each seed of a component may be taken away and put where signal is left.
-const EXCHANGES: usize = 2;
-/// An exchange must lower the sum of squares by this share.
-const WORTHWHILE: f64 = 0.99;
 /// What the shape is off that of a real seed, as a share of the highest voxel.
 const OFF_SHAPE: f64 = 0.05;
 /// Blurs of scanners that are tried, m.
@@ -55,18 +51,21 @@ pub struct Fitted {
 
 /// Fits components of one volume.
 pub struct Fitter<'a> {
-    volume: &'a VoxelValues<f32>,
+    /// The CT.
+    pub volume: &'a VoxelValues<f32>,
     level: &'a Level,
-    look: Look,
+    /// What seeds look like.
+    pub look: Look,
     /// Direction of all seeds, and two across it.
-    axes: [Vector3<f64>; 3],
+    pub axes: [Vector3<f64>; 3],
 }
 
 /// A component on the way to its fit.
-struct Task {
-    patch: Patch,
+pub struct Task {
+    /// The voxels.
+    pub patch: Patch,
     /// Values above the tissue, without what neighbours give.
-    data: Vec<f64>,
+    pub data: Vec<f64>,
     /// Weight of each residual.
     per_value: f64,
     /// Data from here on are cut off.
@@ -96,10 +95,16 @@ impl<'a> Fitter<'a> {
         };
         let mut singles: Vec<usize> = (0..components.len()).filter(|&n| counts.seeds[n] == 1).collect();
         // Those whose signal is nearest to that of one seed.
-        singles.sort_by(|a, b| (counts.signal(*a) - 1.0).abs().total_cmp(&(counts.signal(*b) - 1.0).abs()));
+        singles.sort_by(|a, b| {
+            (counts.signal(*a) - 1.0)
+                .abs()
+                .total_cmp(&(counts.signal(*b) - 1.0).abs())
+        });
         singles.truncate(CALIBRATED);
-        let tasks: Vec<(Task, &Component)> =
-            singles.iter().map(|&n| (fitter.task(&components[n], None), &components[n])).collect();
+        let tasks: Vec<(Task, &Component)> = singles
+            .iter()
+            .map(|&n| (fitter.task(&components[n], None), &components[n]))
+            .collect();
         let mut best = (f64::INFINITY, fitter.look, Matrix3::zeros());
         for blur_m in BLURS_M {
             fitter.look = Look { blur_m, ..look };
@@ -133,7 +138,12 @@ impl<'a> Fitter<'a> {
 
     /// Fits every component; then again, with counts from the signal that is left once neighbours and what lies outside of the
     /// component are known.
-    pub fn fit_all(&self, components: &[Component], first: &Counts, count: impl Fn(&[f64]) -> Counts) -> (Vec<Fitted>, Counts) {
+    pub fn fit_all(
+        &self,
+        components: &[Component],
+        first: &Counts,
+        count: impl Fn(&[f64]) -> Counts,
+    ) -> (Vec<Fitted>, Counts) {
         let mut field = vec![0.0; self.volume.values.len()];
         let mut lines: Vec<Vec<Line>> = vec![Vec::new(); components.len()];
         let mut fits = vec![Fitted::default(); components.len()];
@@ -163,44 +173,21 @@ impl<'a> Fitter<'a> {
     }
 
     /// Signal of each component without what its neighbours' seeds give to its voxels; `field` is that of all seeds.
+    ///
+    /// What its own seeds have, and what they leave in the bright voxels: in the many others tissue that is not even would add up.
     fn signals(&self, components: &[Component], lines: &[Vec<Line>], field: &[f64]) -> Vec<f64> {
+        let bright = self.level.threshold - self.level.tissue;
         let of_component = |(component, lines): (&Component, &Vec<Line>)| {
             let patch = Patch::of(self.volume.dims, self.volume.frame.spacing_m, &component.voxels);
             let mut own = vec![0.0; component.voxels.len()];
             lines.iter().for_each(|line| patch.add(line, &self.look, 1.0, &mut own));
-            let of_others = component.voxels.iter().zip(&own).map(|(n, own)| field[*n] - own);
-            component.signal - of_others.sum::<f64>()
+            let of_seeds: f64 = lines.iter().map(|line| line.amount * self.look.signal).sum();
+            let voxels = component.voxels.iter().zip(&component.excess).zip(&own);
+            let left = voxels.map(|((n, excess), own)| (excess, excess - (field[*n] - own) - own));
+            let counted = left.filter(|(excess, _)| lines.is_empty() || **excess >= bright);
+            of_seeds + counted.map(|(_, left)| left).sum::<f64>()
         };
         components.iter().zip(lines).map(of_component).collect()
-    }
-
-    /// Takes each seed away in turn and puts it where most signal is left, as long as the fit becomes better.
-    fn exchange(&self, task: &Task, component: &Component, lines: &mut Vec<Line>) {
-        if lines.len() < 2 {
-            return;
-        }
-        let mut cost = self.residuals(task, lines).norm_squared();
-        let count = lines.len();
-        for n in (0..EXCHANGES).flat_map(|_| 0..count) {
-            let mut other = lines.clone();
-            other.remove(n);
-            self.improve(task, &mut other);
-            let mut left = task.data.clone();
-            other.iter().for_each(|line| task.patch.add(line, &self.look, -1.0, &mut left));
-            other.insert(n, self.new_line(self.brightest(component, &left)));
-            let after = self.improve(task, &mut other);
-            if after < WORTHWHILE * cost {
-                (cost, *lines) = (after, other);
-            }
-        }
-    }
-
-    fn new_line(&self, middle_m: Vector3<f64>) -> Line {
-        Line {
-            middle_m,
-            axis: self.axes[0],
-            amount: 1.0,
-        }
     }
 
     /// A component as one seed at the middle of its signal.
@@ -212,10 +199,17 @@ impl<'a> Fitter<'a> {
 
     fn task(&self, component: &Component, neighbours: Option<&[f64]>) -> Task {
         let of_others = |n: &usize| neighbours.map_or(0.0, |field| field[*n]);
-        let data: Vec<f64> =
-            component.voxels.iter().zip(&component.excess).map(|(n, e)| e - of_others(n)).collect();
+        let data: Vec<f64> = component
+            .voxels
+            .iter()
+            .zip(&component.excess)
+            .map(|(n, e)| e - of_others(n))
+            .collect();
         let highest = component.excess.iter().copied().fold(0.0, f64::max);
-        let saturated = self.level.saturated.map_or(f64::INFINITY, |value| value - self.level.tissue);
+        let saturated = self
+            .level
+            .saturated
+            .map_or(f64::INFINITY, |value| value - self.level.tissue);
         Task {
             patch: Patch::of(self.volume.dims, self.volume.frame.spacing_m, &component.voxels),
             data,
@@ -234,7 +228,9 @@ impl<'a> Fitter<'a> {
         let voxels = patch.with_room(dims, 2);
         let patch = Patch::of(dims, spacing_m, &voxels);
         let mut values = vec![0.0; voxels.len()];
-        lines.iter().for_each(|line| patch.add(line, &self.look, share, &mut values));
+        lines
+            .iter()
+            .for_each(|line| patch.add(line, &self.look, share, &mut values));
         voxels.iter().zip(values).for_each(|(n, value)| field[*n] += value);
     }
 
@@ -249,7 +245,8 @@ impl<'a> Fitter<'a> {
         }
         // Voxels are longer along some axes; that is not the seed's extent.
         let sides = Vector3::from(self.volume.frame.spacing_m);
-        let spread = spread / weight.max(f64::MIN_POSITIVE) - Matrix3::from_diagonal(&sides.component_mul(&sides)) / 12.0;
+        let spread =
+            spread / weight.max(f64::MIN_POSITIVE) - Matrix3::from_diagonal(&sides.component_mul(&sides)) / 12.0;
         let eigen = spread.symmetric_eigen();
         let longest = eigen.eigenvalues.imax();
         Line {
@@ -259,81 +256,13 @@ impl<'a> Fitter<'a> {
         }
     }
 
-    /// Seeds of a component, one after the other where most signal is left, or by k-means: which of both fits better.
-    fn starts(&self, task: &Task, component: &Component, count: usize) -> Vec<Line> {
-        if count < 2 {
-            return (0..count).map(|_| self.new_line(component.middle_m)).collect();
-        }
-        let mut by_remainder: Vec<Line> = Vec::new();
-        while by_remainder.len() < count {
-            let mut left = task.data.clone();
-            by_remainder.iter().for_each(|line| task.patch.add(line, &self.look, -1.0, &mut left));
-            by_remainder.push(self.new_line(self.brightest(component, &left)));
-            self.improve(task, &mut by_remainder);
-        }
-        let mut by_means = self.means(component, &task.data, count);
-        let [one, other] = [&mut by_remainder, &mut by_means].map(|lines| self.improve(task, lines));
-        if one <= other { by_remainder } else { by_means }
-    }
-
-    /// Where most signal is, summed over the voxels within a seed's reach.
-    fn brightest(&self, component: &Component, left: &[f64]) -> Vector3<f64> {
-        let places: Vec<Vector3<f64>> = component.voxels.iter().map(|n| place_m(self.volume, *n)).collect();
-        // A voxel is thicker than a seed, and its middle beside the seed all the same.
-        let across_m = self.look.blur_m.hypot(self.look.diameter_m) + self.volume.frame.spacing_m[0] / 2.0;
-        let is_near = |p: &Vector3<f64>, middle: &Vector3<f64>| {
-            let off = p - middle;
-            let along = off.dot(&self.axes[0]);
-            along.abs() <= self.look.length_m / 2.0 + across_m && (off - self.axes[0] * along).norm() <= across_m
-        };
-        let within = |middle: &Vector3<f64>| {
-            let near = places.iter().zip(left).filter(|(p, _)| is_near(p, middle));
-            near.map(|(_, value)| value).sum::<f64>()
-        };
-        let best = places.iter().max_by(|a, b| within(a).total_cmp(&within(b)));
-        let middle = best.copied().unwrap_or(component.middle_m);
-        let near = places.iter().zip(left).filter(|(p, _)| is_near(p, &middle));
-        let (sum, moment) = near.fold((0.0, Vector3::zeros()), |(sum, moment), (p, value)| {
-            (sum + value.max(0.0), moment + p * value.max(0.0))
-        });
-        if sum > 0.0 { moment / sum } else { middle }
-    }
-
-    /// k-means on the weighted voxels, from places far from each other.
-    fn means(&self, component: &Component, data: &[f64], count: usize) -> Vec<Line> {
-        let places: Vec<Vector3<f64>> = component.voxels.iter().map(|n| place_m(self.volume, *n)).collect();
-        let weights: Vec<f64> = data.iter().map(|v| v.max(0.0)).collect();
-        let mut middles = vec![self.brightest(component, data)];
-        let nearest = |middles: &[Vector3<f64>], p: &Vector3<f64>| {
-            let distances = middles.iter().map(|m| (m - p).norm_squared()).enumerate();
-            distances.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
-        };
-        while middles.len() < count {
-            let far = |n: &usize| weights[*n] * nearest(&middles, &places[*n]).1;
-            let next = (0..places.len()).max_by(|a, b| far(a).total_cmp(&far(b)));
-            middles.push(next.map_or(component.middle_m, |n| places[n]));
-        }
-        for _ in 0..20 {
-            let mut sums = vec![(0.0, Vector3::zeros()); count];
-            for (place, weight) in places.iter().zip(&weights) {
-                let (n, _) = nearest(&middles, place);
-                sums[n].0 += weight;
-                sums[n].1 += place * *weight;
-            }
-            for (middle, (weight, moment)) in middles.iter_mut().zip(sums) {
-                if weight > 0.0 {
-                    *middle = moment / weight;
-                }
-            }
-        }
-        middles.into_iter().map(|middle_m| self.new_line(middle_m)).collect()
-    }
-
     /// Residuals in standard deviations: voxels, then the signals of the seeds.
-    fn residuals(&self, task: &Task, lines: &[Line]) -> DVector<f64> {
+    pub fn residuals(&self, task: &Task, lines: &[Line]) -> DVector<f64> {
         let voxels = task.data.len();
         let mut model = vec![0.0; voxels];
-        lines.iter().for_each(|line| task.patch.add(line, &self.look, 1.0, &mut model));
+        lines
+            .iter()
+            .for_each(|line| task.patch.add(line, &self.look, 1.0, &mut model));
         DVector::from_fn(voxels + OWN_ROWS * lines.len(), |n, _| match n.checked_sub(voxels) {
             Some(own) => self.own_rows(&lines[own / OWN_ROWS])[own % OWN_ROWS],
             // Of what is cut off only the lower bound is known.
@@ -376,7 +305,7 @@ impl<'a> Fitter<'a> {
     }
 
     /// Moves seeds to the least sum of squares, which it returns.
-    fn improve(&self, task: &Task, lines: &mut Vec<Line>) -> f64 {
+    pub fn improve(&self, task: &Task, lines: &mut Vec<Line>) -> f64 {
         let mut residuals = self.residuals(task, lines);
         let (mut cost, mut damping) = (residuals.norm_squared(), 1e-2);
         for _ in 0..ITERATIONS {
@@ -391,7 +320,11 @@ impl<'a> Fitter<'a> {
                 let step = damped.cholesky().map(|c| -c.solve(&slope));
                 let moved: Option<Vec<Line>> = step.map(|step| {
                     let of_seed = |n: usize| std::array::from_fn(|p| step[PARAMETERS * n + p].clamp(-1.0, 1.0));
-                    lines.iter().enumerate().map(|(n, line)| changed(line, &of_seed(n))).collect()
+                    lines
+                        .iter()
+                        .enumerate()
+                        .map(|(n, line)| changed(line, &of_seed(n)))
+                        .collect()
                 });
                 if let Some(moved) = moved {
                     let after = self.residuals(task, &moved);

@@ -54,14 +54,12 @@ fn outcome(phantom: &Phantom, found: &Found) -> Outcome {
     let off = |(at, found): (&[f64; 3], &Option<usize>)| {
         found.map(|n| (Vector3::from(places[n]) - Vector3::from(*at)).norm())
     };
-    let off_m: Vec<f64> = truth.iter().zip(&pairs).filter_map(off).filter(|m| *m <= 1e-3).collect();
-    for (at, n) in truth.iter().zip(&pairs) {
-        let m = n.map(|n| (Vector3::from(places[n]) - Vector3::from(*at)).norm()).unwrap_or(9.0);
-        if m > 1e-3 {
-            let t = n.map(|n| found.seeds[n]);
-            eprintln!("DBG off {:.2} mm at {:?} found {:?}", m * 1e3, at.map(|v| (v * 1e4).round() / 10.0), t.map(|t| (t.position_m.map(|v| (v * 1e4).round() / 10.0), t.together, t.confidence)));
-        }
-    }
+    let off_m: Vec<f64> = truth
+        .iter()
+        .zip(&pairs)
+        .filter_map(off)
+        .filter(|m| *m <= 1e-3)
+        .collect();
     let d90 = d90_gy(found.seeds.iter().map(|s| (s.position_m, s.axis)));
     Outcome {
         within_1_mm: off_m.len(),
@@ -81,8 +79,14 @@ fn a_hundred_seeds_are_found_within_a_millimetre_and_give_the_same_d90() {
         };
         let found = find(&phantom.volume, &search).unwrap();
         let result = outcome(&phantom, &found);
-        println!("{random_seed}: {result:?}, threshold {:.0}, blur {:.2} mm, {} components, {} split, {:?}",
-            found.threshold, found.blur_m * 1e3, found.components, found.split_components, found.doubts);
+        println!(
+            "{random_seed}: {result:?}, threshold {:.0}, blur {:.2} mm, {} components, {} split, {:?}",
+            found.threshold,
+            found.blur_m * 1e3,
+            found.components,
+            found.split_components,
+            found.doubts
+        );
         assert_eq!(found.seeds.len(), 100);
         assert!(result.within_1_mm >= 98, "{result:?}");
         assert!((result.d90_share - 1.0).abs() < 0.01, "{result:?}");
@@ -110,8 +114,15 @@ fn the_number_of_seeds_is_found_where_it_is_not_given() {
     let phantom = Phantom::new(3, None);
     let found = find(&phantom.volume, &Search::default()).unwrap();
     let result = outcome(&phantom, &found);
-    println!("without a count: {} seeds, {result:?}, {:?}", found.seeds.len(), found.doubts);
-    assert!((98..=102).contains(&found.seeds.len()) && result.within_1_mm >= 97, "{result:?}");
+    println!(
+        "without a count: {} seeds, {result:?}, {:?}",
+        found.seeds.len(),
+        found.doubts
+    );
+    assert!(
+        (98..=102).contains(&found.seeds.len()) && result.within_1_mm >= 97,
+        "{result:?}"
+    );
     let left_out = |why: &str| found.doubts.iter().filter(|d| d.why.starts_with(why)).count();
     assert_eq!(left_out("too large"), 1, "the bone: {:?}", found.doubts);
     assert!(left_out("too faint") >= 1, "the calcification: {:?}", found.doubts);

@@ -74,7 +74,9 @@ mod tests {
         for rows in 1..=5 {
             for _ in 0..40 {
                 let mut random = || {
-                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                    state = state
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1_442_695_040_888_963_407);
                     (state >> 40) as f64
                 };
                 let costs: Vec<[f64; 5]> = (0..rows).map(|_| std::array::from_fn(|_| random())).collect();

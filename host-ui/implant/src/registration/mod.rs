@@ -59,9 +59,9 @@ impl RigidFit {
         }
         let planned: Vec<Vector3<f64>> = planned_m.iter().map(|p| Vector3::from(*p)).collect();
         let found: Vec<Vector3<f64>> = found_m.iter().map(|p| Vector3::from(*p)).collect();
-        let turns = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()].into_iter().flat_map(|axis| {
-            STARTS_DEG.into_iter().map(move |deg| turn(&axis, deg))
-        });
+        let turns = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()]
+            .into_iter()
+            .flat_map(|axis| STARTS_DEG.into_iter().map(move |deg| turn(&axis, deg)));
         let nearest = |moved: &[Vector3<f64>]| {
             let moved: Vec<[f64; 3]> = moved.iter().map(|p| (*p).into()).collect();
             pairing::nearest(planned_m, &moved)
@@ -112,7 +112,11 @@ impl RigidFit {
         let count = self.residuals_m.len().max(1) as f64;
         let mean = self.residuals_m.iter().sum::<f64>() / count;
         let square = self.residuals_m.iter().map(|r| r * r).sum::<f64>() / count;
-        [mean, square.sqrt(), self.residuals_m.iter().copied().fold(0.0, f64::max)]
+        [
+            mean,
+            square.sqrt(),
+            self.residuals_m.iter().copied().fold(0.0, f64::max),
+        ]
     }
 }
 
@@ -177,7 +181,9 @@ fn stretch(places: &Places) -> f64 {
 
 fn middles(places: &Places) -> (Vector3<f64>, Vector3<f64>) {
     let count = places.len().max(1) as f64;
-    let sum = places.iter().fold((Vector3::zeros(), Vector3::zeros()), |(a, b), (p, f)| (a + p, b + f));
+    let sum = places
+        .iter()
+        .fold((Vector3::zeros(), Vector3::zeros()), |(a, b), (p, f)| (a + p, b + f));
     (sum.0 / count, sum.1 / count)
 }
 
@@ -195,7 +201,16 @@ mod tests {
 
     /// Strands with seeds every 10 mm, which fit onto themselves shifted by one seed nearly as well.
     fn plan() -> Vec<[f64; 3]> {
-        let holes = [(-15.0, -10.0), (-15.0, 5.0), (-5.0, 12.0), (0.0, -12.0), (6.0, 11.0), (15.0, -8.0), (16.0, 4.0), (5.0, 0.0)];
+        let holes = [
+            (-15.0, -10.0),
+            (-15.0, 5.0),
+            (-5.0, 12.0),
+            (0.0, -12.0),
+            (6.0, 11.0),
+            (15.0, -8.0),
+            (16.0, 4.0),
+            (5.0, 0.0),
+        ];
         let seeds = |(n, (x, y)): (usize, (f64, f64))| {
             let count = 3 + n % 3;
             (0..count).map(move |s| [x, y, 10.0 * s as f64 - 5.0 * (count as f64 - 1.0)].map(|v| v * 1e-3))
@@ -219,7 +234,11 @@ mod tests {
         found[9][1] += 0.06;
         found.reverse();
         let fit = RigidFit::of(&planned, &found).unwrap();
-        assert!((fit.rotation.transpose() * rotation - Matrix3::identity()).norm() < 0.06, "{}", fit.rotation);
+        assert!(
+            (fit.rotation.transpose() * rotation - Matrix3::identity()).norm() < 0.06,
+            "{}",
+            fit.rotation
+        );
         assert!((fit.turn_deg() - 14.0).abs() < 2.0, "{}", fit.turn_deg());
         assert_eq!(fit.pairs.iter().flatten().count(), planned.len() - 1);
         let [mean, _, worst] = fit.residual_figures_m();

@@ -13,11 +13,11 @@ use crate::pairing::SeedOffset;
 use crate::plan::{Anatomy, Hole};
 pub use dose_cost::{Cost, costs};
 pub use motion::Motion;
+pub use page::STYLE;
 use stylet_dose::report::{Judge, Verdict};
 use stylet_dose::{DoseKernel, Seed};
 use stylet_shm_schema::TickRecord;
 pub use trace::Trace;
-pub use page::STYLE;
 pub use write::{to_json, write};
 
 const DOSE_PITCH_M: f64 = 1e-3;

@@ -68,22 +68,30 @@ pub fn rows(implant: &Implant, columns: &[Column]) -> Vec<Row> {
     };
     let total_u = |c: &Column| c.state.seeds.iter().map(|s| s.strength_u).sum::<f64>();
     row("implant", "seeds", "", 0, &|c| Ok(c.state.seeds.len() as f64));
-    row("implant", "strength of a seed, mean", "U", 3, &|c| Ok(total_u(c) / c.state.seeds.len().max(1) as f64));
+    row("implant", "strength of a seed, mean", "U", 3, &|c| {
+        Ok(total_u(c) / c.state.seeds.len().max(1) as f64)
+    });
     row("implant", "strength, total", "U", 2, &|c| Ok(total_u(c)));
-    row("implant", "strength over target volume", "U/cc", 3, &|c| Ok(total_u(c) / (target(c)?.volume_m3() * 1e6)));
+    row("implant", "strength over target volume", "U/cc", 3, &|c| {
+        Ok(total_u(c) / (target(c)?.volume_m3() * 1e6))
+    });
     row("target", "volume", "cc", 2, &|c| Ok(target(c)?.volume_m3() * 1e6));
     let rx = implant.prescription_gy;
     for name in ["D100", "D90"] {
         row("target", name, "Gy", 1, &|c| gy(target(c)?, name, rx));
     }
-    row("target", "D90", "% of prescription", 1, &|c| Ok(gy(target(c)?, "D90", rx)? / rx * 100.0));
+    row("target", "D90", "% of prescription", 1, &|c| {
+        Ok(gy(target(c)?, "D90", rx)? / rx * 100.0)
+    });
     for name in ["V90", "V100", "V150", "V200"] {
         row("target", name, "%", 1, &|c| percent(target(c)?, name, rx));
     }
     for name in ["D5", "D10", "D30"] {
         row("urethra", name, "Gy", 1, &|c| gy(organ(c, Organ::Urethra)?, name, rx));
     }
-    row("urethra", "V150", "cc", 3, &|c| cc(organ(c, Organ::Urethra)?, "V150", rx));
+    row("urethra", "V150", "cc", 3, &|c| {
+        cc(organ(c, Organ::Urethra)?, "V150", rx)
+    });
     row("rectum", "V100", "cc", 3, &|c| cc(organ(c, Organ::Rectum)?, "V100", rx));
     for name in ["D2cc", "D0.1cc"] {
         row("rectum", name, "Gy", 1, &|c| gy(organ(c, Organ::Rectum)?, name, rx));
@@ -115,11 +123,17 @@ pub fn rows(implant: &Implant, columns: &[Column]) -> Vec<Row> {
         Ok(if is_eqd2 { response.eqd2_gy(bed_gy) } else { bed_gy })
     };
     let of_target = |c: &Column| gy(target(c)?, "D90", rx);
-    row("effect", "BED of target D90", "Gy", 1, &|c| effect(c, &Response::PROSTATE, of_target(c), false));
-    row("effect", "EQD2 of target D90", "Gy", 1, &|c| effect(c, &Response::PROSTATE, of_target(c), true));
+    row("effect", "BED of target D90", "Gy", 1, &|c| {
+        effect(c, &Response::PROSTATE, of_target(c), false)
+    });
+    row("effect", "EQD2 of target D90", "Gy", 1, &|c| {
+        effect(c, &Response::PROSTATE, of_target(c), true)
+    });
     for (name, organ_is, of) in [("urethra", Organ::Urethra, "D10"), ("rectum", Organ::Rectum, "D2cc")] {
         let dose = |c: &Column| gy(organ(c, organ_is)?, of, rx);
-        row("effect", &format!("EQD2 of {name} {of}"), "Gy", 1, &|c| effect(c, &Response::LATE, dose(c), true));
+        row("effect", &format!("EQD2 of {name} {of}"), "Gy", 1, &|c| {
+            effect(c, &Response::LATE, dose(c), true)
+        });
     }
     all
 }
@@ -133,7 +147,9 @@ fn organ(column: &Column, organ: Organ) -> Result<&Dvh, NotComputed> {
         Organ::Urethra => "urethra",
         _ => "rectum",
     };
-    column.organ(organ).ok_or_else(|| format!("no structure is called {name}").into())
+    column
+        .organ(organ)
+        .ok_or_else(|| format!("no structure is called {name}").into())
 }
 
 fn around(column: &Column) -> Result<&super::Around, NotComputed> {

@@ -133,19 +133,32 @@ impl Column {
     /// Histogram of the target.
     pub fn target(&self) -> Option<&Dvh> {
         let name = self.state.structures.get(self.state.target).map(|s| s.name.as_str());
-        self.histograms.iter().find(|h| Some(h.name.as_str()) == name).map(|h| &h.dvh)
+        self.histograms
+            .iter()
+            .find(|h| Some(h.name.as_str()) == name)
+            .map(|h| &h.dvh)
     }
 
     /// Histogram of the first structure that is called like an organ.
     pub fn organ(&self, organ: Organ) -> Option<&Dvh> {
-        self.histograms.iter().find(|h| organ.is_mentioned_in(&h.name)).map(|h| &h.dvh)
+        self.histograms
+            .iter()
+            .find(|h| organ.is_mentioned_in(&h.name))
+            .map(|h| &h.dvh)
     }
 }
 
 /// Dose in the room around seeds and target.
 fn around(implant: &Implant, kernel: &DoseKernel, state: &State) -> Around {
     let mut corners: Vec<[f64; 3]> = state.seeds.iter().map(|s| s.position_m).collect();
-    corners.extend(state.structures.get(state.target).map(|t| <[[f64; 3]; 2]>::from(t.bounds_m())).into_iter().flatten());
+    corners.extend(
+        state
+            .structures
+            .get(state.target)
+            .map(|t| <[[f64; 3]; 2]>::from(t.bounds_m()))
+            .into_iter()
+            .flatten(),
+    );
     let (low, high) = bounds(&corners);
     let (low, high) = (low.map(|v| v - MARGIN_M), high.map(|v| v + MARGIN_M));
     let volume: f64 = (0..3).map(|a| high[a] - low[a]).product();
@@ -153,7 +166,12 @@ fn around(implant: &Implant, kernel: &DoseKernel, state: &State) -> Around {
     let room = Structure::of_box("around", low, high, pitch_m);
     let dose_gy = DosePoints::new(&room.points_m).of_seeds_gy(kernel, &state.seeds);
     let at_face = |p: &[f64; 3]| (0..3).any(|a| p[a] < low[a] + pitch_m || p[a] > high[a] - pitch_m);
-    let on_faces = room.points_m.iter().zip(&dose_gy).filter(|(p, _)| at_face(p)).map(|(_, gy)| *gy);
+    let on_faces = room
+        .points_m
+        .iter()
+        .zip(&dose_gy)
+        .filter(|(p, _)| at_face(p))
+        .map(|(_, gy)| *gy);
     let leaves_gy = on_faces.fold(0.0, f64::max);
     let point_m3 = room.volumes_m3.first().copied().unwrap_or(0.0);
     let reached = dose_gy.iter().filter(|gy| **gy >= implant.prescription_gy).count() as f64 * point_m3;
@@ -171,7 +189,9 @@ pub fn to_json(implant: &Implant, columns: &[Column]) -> Value {
             Err(why) => json!({ "not_computed": why.to_string() }),
         };
         let figures = rows(implant, columns);
-        let figures = figures.iter().map(|row| (format!("{} {} [{}]", row.group, row.name, row.unit), cell(row)));
+        let figures = figures
+            .iter()
+            .map(|row| (format!("{} {} [{}]", row.group, row.name, row.unit), cell(row)));
         let sectors = column.sectors.iter().map(|s| {
             json!({ "name": s.name, "volume_cc": s.volume_m3 * 1e6, "d90_gy": s.d90_gy, "v100_percent": s.v100.map(|v| v * 100.0) })
         });

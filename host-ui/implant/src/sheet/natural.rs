@@ -39,7 +39,9 @@ mod tests {
     #[test]
     fn the_edge_of_a_histogram_is_found_and_a_lone_source_has_none() {
         let to = |edge: f64| -> Vec<f64> {
-            (0..200_000).map(|n| 145.0 * (edge * (f64::from(n) + 0.5) / 200_000.0).powf(-2.0 / 3.0)).collect()
+            (0..200_000)
+                .map(|n| 145.0 * (edge * (f64::from(n) + 0.5) / 200_000.0).powf(-2.0 / 3.0))
+                .collect()
         };
         let found = natural_dose_gy(&to(1.2), 145.0, 10.0).unwrap();
         let edge = 145.0 * 1.2_f64.powf(-2.0 / 3.0);

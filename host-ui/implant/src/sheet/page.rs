@@ -29,7 +29,11 @@ td.why{font-size:6.5pt}footer{font-size:6pt;margin-top:4pt;line-height:1.15}}
 
 /// The page of one state or of several.
 pub fn page(implant: &Implant, columns: &[Column]) -> String {
-    let size = if columns.len() > UPRIGHT { "landscape" } else { "portrait" };
+    let size = if columns.len() > UPRIGHT {
+        "landscape"
+    } else {
+        "portrait"
+    };
     let print = format!("@page{{size:A4 {size};margin:9mm}}");
     let sectors = columns.iter().any(|c| !c.sectors.is_empty());
     let page = html! {
@@ -139,7 +143,12 @@ fn of_sectors(columns: &[Column]) -> Markup {
 }
 
 fn fits(columns: &[Column]) -> Markup {
-    let fitted = || columns.iter().filter(|c| !c.swells).filter_map(|c| Some((c, c.state.fit.as_ref()?)));
+    let fitted = || {
+        columns
+            .iter()
+            .filter(|c| !c.swells)
+            .filter_map(|c| Some((c, c.state.fit.as_ref()?)))
+    };
     html! {
         @if fitted().next().is_some() {
             h2 { "Fit of the seeds to the plan" }

@@ -69,7 +69,11 @@ mod tests {
     #[test]
     fn a_sector_has_the_part_of_the_target_that_its_name_says() {
         let target = Structure::of_box("Prostate", [-0.02, 0.0, -0.03], [0.02, 0.04, 0.03], 1e-3);
-        let dose: Vec<f64> = target.points_m.iter().map(|p| 100.0 + 1e3 * (p[2] + p[0] + p[1])).collect();
+        let dose: Vec<f64> = target
+            .points_m
+            .iter()
+            .map(|p| 100.0 + 1e3 * (p[2] + p[0] + p[1]))
+            .collect();
         let sectors = of(&target, &dose, 145.0);
         let all: f64 = sectors.iter().map(|s| s.volume_m3).sum();
         assert!((all - target.volume_m3()).abs() < 1e-9);

@@ -53,7 +53,10 @@ fn the_page_has_every_figure_of_the_report_or_why_there_is_none() {
     }
     assert!((value("implant", "strength over target volume", 0).unwrap() / (25.6 / 32.768) - 1.0).abs() < 1e-9);
     assert!(value("urethra", "D10", 0).unwrap() > value("urethra", "D30", 0).unwrap());
-    assert_eq!(value("rectum", "D2cc", 0).unwrap_err().to_string(), "no structure is called rectum");
+    assert_eq!(
+        value("rectum", "D2cc", 0).unwrap_err().to_string(),
+        "no structure is called rectum"
+    );
     let (v100, v150) = (value("target", "V100", 0).unwrap(), value("target", "V150", 0).unwrap());
     assert!((value("indices", "homogeneity", 0).unwrap() - (v100 - v150) / v100).abs() < 1e-9);
     assert!((0.3..1.0).contains(&value("indices", "conformity", 0).unwrap()));

@@ -200,7 +200,10 @@ impl Common {
             (Some(day), None) => format!("calibrated {day}, not decayed"),
             (None, Some(implant)) => format!("as of the implant on {implant}; the file gives no day of calibration"),
             (None, None) if self.measured_days_before > 0.0 => {
-                format!("measured {} days before the implant, decayed since", self.measured_days_before)
+                format!(
+                    "measured {} days before the implant, decayed since",
+                    self.measured_days_before
+                )
             }
             (None, None) => "as of the implant; no day of calibration is given".to_owned(),
         }

@@ -105,7 +105,9 @@ pub fn figure_table(columns: &[&str], rows: &[Row]) -> String {
     for row in rows {
         text += &format!("\n{:44}", format!("{} {} {}", row.group, row.name, row.unit));
         for value in &row.values {
-            let value = value.as_ref().map_or_else(|_| "-".to_owned(), |v| format!("{v:.*}", row.digits));
+            let value = value
+                .as_ref()
+                .map_or_else(|_| "-".to_owned(), |v| format!("{v:.*}", row.digits));
             text += &format!(" {value:>16}");
         }
     }

@@ -89,7 +89,13 @@ fn tissue(random: &mut Random) -> Vec<f32> {
         let wave = (0..3).map(|a| 8.0 * (mm[a] / 7.0 + phases[a]).sin()).sum::<f64>();
         let bone = mm[0] > 10.0 && mm[0] < 60.0 && mm[1] < 6.0 && mm[2] > 15.0 && mm[2] < 60.0;
         let calcification = at == [4, 70, 3];
-        (if bone { 750.0 } else if calcification { 1500.0 } else { 40.0 + wave }) as f32
+        (if bone {
+            750.0
+        } else if calcification {
+            1500.0
+        } else {
+            40.0 + wave
+        }) as f32
     };
     (0..DIMS.iter().product()).map(value).collect()
 }
@@ -104,7 +110,10 @@ fn implant(random: &mut Random) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     for (share, count) in rings {
         for n in 0..count {
             let angle = std::f64::consts::TAU * (f64::from(n) + 0.3 * share) / f64::from(count);
-            let (x, y) = (share * SEMI_AXES_M[0] * 1e3 * angle.cos(), share * SEMI_AXES_M[1] * 1e3 * angle.sin());
+            let (x, y) = (
+                share * SEMI_AXES_M[0] * 1e3 * angle.cos(),
+                share * SEMI_AXES_M[1] * 1e3 * angle.sin(),
+            );
             let tilt = Vector3::new(random.within(-0.09, 0.09), random.within(-0.09, 0.09), 1.0).normalize();
             strands.push((Vector3::new(x, y, random.within(-3.0, 3.0)), tilt));
         }
@@ -122,7 +131,9 @@ fn implant(random: &mut Random) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     for n in 0..TOUCHING {
         let with = if n < 13 { alone - 13 + n } else { (n - 13) % 13 };
         let (place, axis) = seeds[with];
-        let across = axis.cross(&Vector3::new(random.normal(), random.normal(), 0.2)).normalize();
+        let across = axis
+            .cross(&Vector3::new(random.normal(), random.normal(), 0.2))
+            .normalize();
         let beside = match n {
             0..13 => axis * random.within(4.6, 5.0) + across * random.within(0.0, 0.5),
             13..26 => across * random.within(1.0, 2.0) + axis * random.within(-1.5, 1.5),
@@ -143,7 +154,10 @@ fn draw(volume: &mut VoxelValues<f32>, random: &mut Random, place_mm: Vector3<f6
         let solid = axis * random.within(-2.25, 2.25) + across * radius * angle.cos() + other * radius * angle.sin();
         // In the plane a normal blur, along the table one of a box, as a spiral gives it.
         let blur = Vector3::new(0.55 * random.normal(), 0.55 * random.normal(), random.within(-0.8, 0.8));
-        let index = volume.frame.index_of((place_mm + solid + blur) * 1e-3).map(|i| i.round() as usize);
+        let index = volume
+            .frame
+            .index_of((place_mm + solid + blur) * 1e-3)
+            .map(|i| i.round() as usize);
         volume.values[(index[2] * ny + index[1]) * nx + index[0]] += (signal / POINTS as f64) as f32;
     }
 }
