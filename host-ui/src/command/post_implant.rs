@@ -100,7 +100,7 @@ impl PostImplantArgs {
             structures,
             target,
         };
-        // Where the edema is gone: planned and delivered are in the gland as it was imaged before.
+        // Long after any edema: planned and delivered are in the gland as it was imaged before.
         let settled_s = f64::INFINITY;
         let mut states = vec![planned.state("planned", &self.planned, settled_s, loaded.seeds.clone(), None)];
         if let Some(file) = &self.delivered {

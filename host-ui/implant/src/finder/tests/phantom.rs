@@ -1,6 +1,6 @@
 //! The generator: strands with their seeds every 10 mm, some that touch, in tissue with bone, noise, and voxels of 1 x 1 x 3 mm.
 //!
-//! It shares nothing with the search: points scattered in the cylinder of every seed are moved by the scanner's blur and counted.
+//! It shares nothing with the search: points scattered in each seed's cylinder are moved by the scanner's blur and counted.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand_chacha::ChaCha8Rng;
@@ -23,7 +23,7 @@ const NOISE_HU: f64 = 25.0;
 pub struct Phantom {
     /// The CT.
     pub volume: VoxelValues<f32>,
-    /// Place (RAS, m) and axis of every seed.
+    /// Place (RAS, m) and axis of each.
     pub seeds: Vec<([f64; 3], [f64; 3])>,
 }
 
