@@ -180,7 +180,11 @@ mod tests {
                     least = least.min(distance.hypot((gy - field(*place)) / 3.0));
                 }
             }
-            assert!((found.unwrap() - least).abs() < 0.01, "{found:?} {least}");
+            // The search ends between the places of this lattice, at an eighth of a step of its own.
+            assert!(
+                (least - 0.02..least + 0.01).contains(&found.unwrap()),
+                "{found:?} {least}"
+            );
         }
     }
 }
