@@ -6,7 +6,9 @@ use crate::command::compare::CompareArgs;
 use crate::command::convert::ConvertArgs;
 use crate::command::dicom::DicomArgs;
 use crate::command::dose::{DoseArgs, PerturbArgs};
+use crate::command::find_seeds::FindSeedsArgs;
 use crate::command::plan::PlanArgs;
+use crate::command::post_implant::PostImplantArgs;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -123,6 +125,10 @@ enum Task {
     Plan(PlanArgs),
     /// Dose of seeds (TG-43U1) at points, in structures, or on a grid
     Dose(DoseArgs),
+    /// Find the implanted seeds in a CT volume; seeds that touch are split
+    FindSeeds(FindSeedsArgs),
+    /// The implant as planned, delivered, on day 0 and on day 30: dose, sectors, indices and effect side by side
+    PostImplant(Box<PostImplantArgs>),
     /// Difference of two doses, each an RT Dose or a dose_grid.csv
     Compare(CompareArgs),
     /// Dose of a plan under random seed errors
@@ -200,6 +206,8 @@ impl Cli {
             }
             Some(Task::Convert(args)) => args.run(),
             Some(Task::Dicom(args)) => args.run(),
+            Some(Task::FindSeeds(args)) => args.run(),
+            Some(Task::PostImplant(args)) => args.run(),
             Some(Task::Compare(args)) => args.run(),
             Some(Task::Plan(args)) => args.run(),
             Some(Task::Dose(args)) => args.run(),

@@ -34,25 +34,8 @@ pub struct Image {
 impl Image {
     /// Reads an image of any format; the error names the file.
     pub fn read(path: &Path, progress: &Progress) -> Result<Self, FileError> {
-        let refused = |why: ContentError| FileError::of(path, why);
-        let bytes = whole(path, progress).map_err(refused)?;
-        let sink = Sink::greys(progress);
-        let data = |name: &str| beside(path, name, progress);
-        let values = match Format::of(&bytes) {
-            Some(Format::Nrrd) => nrrd::read_image(&bytes, &data, sink),
-            Some(Format::Nifti) => nifti::read(&bytes, sink),
-            Some(Format::MetaImage) => metaimage::read(&bytes, &data, sink),
-            Some(Format::Dicom) => {
-                Err(ContentError::Invalid("images are not read from DICOM; convert the series, for example with dcm2niix".to_owned()))
-            }
-            None => Err(
-                "it is none of the formats that images are read from: NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd)"
-                    .into(),
-            ),
-        };
-        values
-            .and_then(|values| Self::of(values, file_name(path)))
-            .map_err(refused)
+        let values = read_values(path, progress)?;
+        Self::of(values, file_name(path)).map_err(|why| FileError::of(path, why))
     }
 
     fn of(voxels: VoxelValues<f32>, name: String) -> Result<Self, ContentError> {
@@ -105,6 +88,27 @@ impl Image {
         }));
         beyond.norm()
     }
+}
+
+/// The values of an image as they are in the file, such as Hounsfield units; the error names the file.
+pub fn read_values(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>, FileError> {
+    let refused = |why: ContentError| FileError::of(path, why);
+    let bytes = whole(path, progress).map_err(refused)?;
+    let sink = Sink::greys(progress);
+    let data = |name: &str| beside(path, name, progress);
+    let values = match Format::of(&bytes) {
+        Some(Format::Nrrd) => nrrd::read_image(&bytes, &data, sink),
+        Some(Format::Nifti) => nifti::read(&bytes, sink),
+        Some(Format::MetaImage) => metaimage::read(&bytes, &data, sink),
+        Some(Format::Dicom) => {
+            Err(ContentError::Invalid("images are not read from DICOM; convert the series, for example with dcm2niix".to_owned()))
+        }
+        None => Err(
+            "it is none of the formats that images are read from: NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd)"
+                .into(),
+        ),
+    };
+    values.map_err(refused)
 }
 
 /// Values to be shown black and white; what is no number counts for nothing.

@@ -2,6 +2,7 @@
 
 #![warn(missing_docs)]
 
+pub mod finder;
 pub mod linked;
 pub mod pairing;
 mod patient;
@@ -9,5 +10,7 @@ pub mod plan;
 pub mod procedure;
 pub mod provenance;
 pub mod readers;
+pub mod registration;
 pub mod score;
+pub mod sheet;
 pub mod workflow;

@@ -4,6 +4,7 @@ use super::CommandError;
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use stylet_dose::gamma::{self, Agreement, Criterion};
 use stylet_implant::provenance;
 use stylet_implant::readers::{DoseFile, read_any_dose};
 
@@ -14,8 +15,13 @@ const HELP: &str = "\
 Doses are RT Dose (.dcm) or dose_grid.csv of host-ui dose. The second one is taken at every voxel of the first, linearly between its
 own; voxels outside of it are counted and left out.
 
-Example:
-  host-ui compare study/dose.dcm other/dose.dcm --json difference.json";
+With --gamma the share of voxels whose gamma index is at most 1 is given as well (Low et al. 1998): dose difference in percent and
+distance in mm, searched in three dimensions to a gamma of 2 and between voxels. The percents are of --of-gy (global), or with
+--local of the dose at each voxel.
+
+Examples:
+  host-ui compare study/dose.dcm other/dose.dcm --json difference.json
+  host-ui compare study/dose.dcm other/dose.dcm --of-gy 145 --gamma 3,2";
 
 /// Options of `host-ui compare`.
 #[derive(Args, Debug)]
@@ -31,6 +37,12 @@ pub struct CompareArgs {
     /// Dose that shares are of, as the prescription [default: the highest of the first dose]
     #[arg(long, value_name = "GY")]
     of_gy: Option<f64>,
+    /// Gamma index too: allowed dose difference and distance, such as 3,2
+    #[arg(long, value_name = "PERCENT,MM", value_delimiter = ',')]
+    gamma: Option<Vec<f64>>,
+    /// Percents of the gamma index are of the dose at each voxel
+    #[arg(long, requires = "gamma")]
+    local: bool,
     /// File for the figures
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -74,9 +86,25 @@ impl CompareArgs {
         }
         let [x, y, z] = found.largest_at_mm;
         println!("the largest lies at {x:.2}, {y:.2}, {z:.2} mm");
+        let gamma = self.criterion(of_gy)?.map(|criterion| {
+            let agreement = agreement(&one, &other, self.threshold / 100.0 * of_gy, &criterion);
+            (criterion, agreement)
+        });
+        if let Some((criterion, Some(found))) = &gamma {
+            println!(
+                "gamma {:.1} % ({}), {:.1} mm: {:.2} % of {} voxels pass, mean {:.3}, highest {}",
+                criterion.dose_share * 100.0,
+                self.side(),
+                criterion.distance_m * 1e3,
+                found.passed as f64 / found.compared as f64 * 100.0,
+                found.compared,
+                found.mean,
+                highest_gamma(found.highest),
+            );
+        }
         if let Some(file) = &self.json {
             let inputs: [(&str, &Path); 2] = [("dose", &self.dose), ("with", &self.with)];
-            let value = json!({
+            let mut value = json!({
                 "compared": found.compared,
                 "outside": found.outside,
                 "of_gy": of_gy,
@@ -87,11 +115,56 @@ impl CompareArgs {
                 "largest_at_mm": found.largest_at_mm,
                 "made": provenance::made(&inputs)?,
             });
+            if let Some((criterion, Some(found))) = &gamma {
+                value["gamma"] = json!({
+                    "dose_percent": criterion.dose_share * 100.0,
+                    "percent_of": self.side(),
+                    "distance_mm": criterion.distance_m * 1e3,
+                    "compared": found.compared,
+                    "passed": found.passed,
+                    "mean": found.mean,
+                    "highest": found.highest,
+                    "searched_to": gamma::HIGHEST,
+                });
+            }
             super::dose::write::json(file, &value)?;
             println!("written: {}", file.display());
         }
         Ok(())
     }
+
+    fn criterion(&self, of_gy: f64) -> Result<Option<Criterion>, CommandError> {
+        let criterion = |percent: f64, mm: f64| Criterion {
+            dose_share: percent / 100.0,
+            of_gy: (!self.local).then_some(of_gy),
+            distance_m: mm * 1e-3,
+        };
+        match self.gamma.as_deref() {
+            None => Ok(None),
+            Some([percent, mm]) if (0.01..=100.0).contains(percent) && (0.01..=50.0).contains(mm) => {
+                Ok(Some(criterion(*percent, *mm)))
+            }
+            Some(_) => Err("--gamma: give 0.01 to 100 percent and 0.01 to 50 mm, as in 3,2".into()),
+        }
+    }
+
+    fn side(&self) -> &'static str {
+        if self.local { "local" } else { "global" }
+    }
+}
+
+fn highest_gamma(highest: f64) -> String {
+    match highest < gamma::HIGHEST {
+        true => format!("{highest:.3}"),
+        false => format!("{:.0} or more", gamma::HIGHEST),
+    }
+}
+
+fn agreement(one: &DoseFile, other: &DoseFile, from_gy: f64, criterion: &Criterion) -> Option<Agreement> {
+    let all = one.places_m().zip(one.dose_gy.iter().copied());
+    let places: Vec<([f64; 3], f64)> = all.filter(|(_, gy)| *gy >= from_gy).collect();
+    let gammas = criterion.gammas(&places, &|place| other.at_gy(place));
+    Agreement::of(&gammas.into_iter().flatten().collect::<Vec<_>>())
 }
 
 fn difference(one: &DoseFile, other: &DoseFile, from_gy: f64) -> Option<Difference> {

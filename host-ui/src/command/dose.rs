@@ -2,17 +2,19 @@
 
 use super::CommandError;
 use clap::Args;
-use common::{Common, within};
+use common::{Common, Loaded, within};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use stylet_base::interrupt::Interrupt;
 use stylet_base::output::new_folder;
 use stylet_base::progress_bar::LongTask;
+use stylet_base::write_whole;
 use stylet_dose::kernel::DoseKernel;
 use stylet_dose::seed::Seed;
 use stylet_dose::{DoseGrid, DosePoints, perturb, picture, structure};
 use stylet_implant::provenance;
 use stylet_implant::readers::read_points;
+use stylet_implant::sheet::{self, Column, Implant, State};
 
 pub mod common;
 pub mod write;
@@ -39,8 +41,8 @@ Examples:
       --name 1=Prostate --name 2=Urethra --name 3=Rectum --metric D5 --metric V145Gy --out dose
   host-ui dose --source sources/pd103_200.toml --seeds seeds.csv --from-days 0 --to-days 30 --spacing-mm 2 --out dose
 
-Written to --out, a new or empty folder: dose_points.csv; dvh.csv, dvh.svg and metrics.json; dose_grid.csv when neither points nor
-structures are given; made.json, which names every input with its SHA-256, the version and the time.";
+Written to --out, a new or empty folder: dose_points.csv; dvh.csv, dvh.svg, metrics.json and report.html (one page by TG-137, A4);
+dose_grid.csv when neither points nor structures are given; made.json, which names every input with its SHA-256, the version and the time.";
 
 const PERTURB_HELP: &str = "\
 Every trial moves each seed by a normal error of --sigma-mm along x, y and z, keeps its axis and strength, and computes all metrics
@@ -105,10 +107,14 @@ impl DoseArgs {
         let loaded = c.load(&self.seeds)?;
         let (source, kernel, seeds) = (&loaded.source, &loaded.kernel, &loaded.seeds);
         let points = self.points.as_deref().map(read_points).transpose()?;
-        let judge = self
+        let structures = self
             .structures
             .as_ref()
-            .map(|file| c.judge(file, &loaded, POINTS_FOR_DOSE))
+            .map(|file| c.structures(file, seeds, POINTS_FOR_DOSE))
+            .transpose()?;
+        let judge = structures
+            .clone()
+            .map(|(structures, _)| c.judge_of(structures, &loaded, POINTS_FOR_DOSE))
             .transpose()?;
         new_folder(&c.out)?;
         let judged = judge.map(|judge| {
@@ -139,6 +145,21 @@ impl DoseArgs {
             write::json(&c.out.join("metrics.json"), &metrics)?;
             print!("{}", judge.table(verdict));
         }
+        if let Some((structures, target)) = structures {
+            let implant = self.implant(&loaded)?;
+            let state = State {
+                name: "dose".to_owned(),
+                file: file_name(&self.seeds),
+                structures_are: self.structures.as_deref().map(file_name).unwrap_or_default(),
+                seen_s: 0.0,
+                seeds: seeds.clone(),
+                structures,
+                target,
+                fit: None,
+            };
+            let column = Column::of(&implant, kernel, state, None);
+            write_whole(&c.out.join("report.html"), sheet::page(&implant, &[column]).as_bytes())?;
+        }
         if points.is_none() && judged.is_none() {
             let grid = grid(seeds, kernel, self.spacing_mm * 1e-3, None)?;
             let [nx, ny, nz] = grid.dims();
@@ -149,6 +170,25 @@ impl DoseArgs {
         println!("written: {}", c.out.display());
         Ok(())
     }
+}
+
+impl DoseArgs {
+    fn implant(&self, loaded: &Loaded) -> Result<Implant, CommandError> {
+        Ok(Implant {
+            title: file_name(&self.seeds),
+            source: loaded.source.clone(),
+            prescription_gy: self.common.prescription_gy(loaded)?,
+            calibrated: self.common.calibrated(loaded),
+            edema: None,
+            is_for_ever: self.common.is_for_ever(),
+        })
+    }
+}
+
+/// Name of a file, without its folder.
+pub fn file_name(path: &Path) -> String {
+    path.file_name()
+        .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
 impl PerturbArgs {

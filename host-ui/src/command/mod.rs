@@ -7,4 +7,6 @@ pub mod compare;
 pub mod convert;
 pub mod dicom;
 pub mod dose;
+pub mod find_seeds;
 pub mod plan;
+pub mod post_implant;

@@ -60,13 +60,9 @@ fn assert_closed(bodies: &Bodies) {
 #[test]
 fn a_plate_a_wire_and_a_cell_that_are_one_cell_thick_do_not_vanish() {
     let far = |c: [usize; 3]| c.iter().all(|i| (2..13).contains(i));
-    let cases: [(&str, fn([usize; 3]) -> bool); 3] = [
-        ("plate", |c| c[0] == 7),
-        ("wire", |c| c[0] == 7 && c[1] == 5),
-        ("cell", |c| c == [7, 7, 7]),
-    ];
-    for (name, is_in) in cases {
-        let scene = scene([15; 3], |c| far(c) && is_in(c));
+    // What is one cell thick at the seventh cell, along x; x and y; x, y and z.
+    for (name, thin) in [("plate", 1), ("wire", 2), ("cell", 3)] {
+        let scene = scene([15; 3], |c| far(c) && c[..thin].iter().all(|&i| i == 7));
         let bodies = bodies(&scene);
         assert_eq!(bodies.follows, Follows::Segmentation, "{name}");
         assert_closed(&bodies);

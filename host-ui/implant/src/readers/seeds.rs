@@ -1,7 +1,8 @@
 //! Seeds out of a table (CSV) or a DICOM RT Plan, which of both is found out from the content.
 
 use super::declared::Declared;
-use super::table::{self, LineError, PLACE, Row, shown};
+pub use super::table::PLACE;
+use super::table::{self, LineError, Row, shown};
 use std::cell::OnceCell;
 use std::path::Path;
 use stylet_dose::Seed;
@@ -10,7 +11,10 @@ use stylet_files::dicom::{self, Identity};
 use stylet_files::{FileError, bytes};
 
 const MAX_U: f64 = 1e5;
-const AXIS: [&str; 3] = ["axis_x", "axis_y", "axis_z"];
+/// Columns of the direction.
+pub const AXIS: [&str; 3] = ["axis_x", "axis_y", "axis_z"];
+/// Columns that say how sure a seed of a CT is; dose has no use for them.
+pub const FOUND: [&str; 3] = ["confidence", "deviation_mm", "together"];
 /// Number of bytes that distinguish a DICOM file from a table.
 const START_BYTES: u64 = 160;
 
@@ -65,6 +69,7 @@ pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, F
         PLACE.as_slice(),
         &AXIS,
         &["strength_u", "activity_mci", "strength_date", "needle", "hole"],
+        &FOUND,
         &dicom::COLUMNS,
     ]
     .concat();

@@ -13,6 +13,7 @@ use crate::pairing::SeedOffset;
 use crate::plan::{Anatomy, Hole};
 pub use dose_cost::{Cost, costs};
 pub use motion::Motion;
+pub use page::STYLE;
 use stylet_dose::report::{Judge, Verdict};
 use stylet_dose::{DoseKernel, Seed};
 use stylet_shm_schema::TickRecord;

@@ -3,7 +3,8 @@
 use super::{Score, ScoreError, picture};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-const STYLE: &str = "\
+/// Look of every page.
+pub const STYLE: &str = "\
 :root{--ink:#1c2126;--soft:#5b6570;--line:#d9dee3;--card:#f5f7f9;--planned:#0072b2;--delivered:#d55e00}
 *{box-sizing:border-box}
 body{font:15px/1.5 system-ui,'Segoe UI',Roboto,'Liberation Sans',sans-serif;color:var(--ink);background:#fff;margin:0}

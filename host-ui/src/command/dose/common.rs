@@ -155,13 +155,68 @@ impl Common {
     }
 
     pub fn judge(&self, file: &Path, loaded: &Loaded, most_points: usize) -> Result<Judge, CommandError> {
+        let (structures, _) = self.structures(file, &loaded.seeds, most_points)?;
+        self.judge_of(structures, loaded, most_points)
+    }
+
+    /// Structures, ready to be judged with the metrics that were asked for.
+    pub fn judge_of(
+        &self,
+        structures: Vec<Structure>,
+        loaded: &Loaded,
+        most_points: usize,
+    ) -> Result<Judge, CommandError> {
         let extra = self
             .metrics
             .iter()
             .map(|m| Metric::parse(m))
             .collect::<Result<Vec<_>, _>>()?;
+        Ok(Judge::new(
+            structures,
+            self.target.as_deref(),
+            &extra,
+            self.prescription_gy(loaded)?,
+            &loaded.seeds,
+            most_points,
+        )?)
+    }
+
+    /// Whether dose is that of the whole life of the seeds.
+    pub fn is_for_ever(&self) -> bool {
+        self.from_days == 0.0 && self.to_days.is_none()
+    }
+
+    /// Day to which the strengths refer, in words.
+    pub fn calibrated(&self, loaded: &Loaded) -> String {
+        let mut days: Vec<Date> = loaded.rows.iter().filter_map(|row| row.strength_on).collect();
+        days.sort_unstable();
+        let of_file = match (days.first(), days.last()) {
+            (Some(first), Some(last)) if first == last => Some(first.to_string()),
+            (Some(first), Some(last)) => Some(format!("{first} to {last}")),
+            _ => None,
+        };
+        match (of_file, self.implant_date) {
+            (Some(day), Some(implant)) => format!("calibrated {day}, decayed to the implant on {implant}"),
+            (Some(day), None) => format!("calibrated {day}, not decayed"),
+            (None, Some(implant)) => format!("as of the implant on {implant}; the file gives no day of calibration"),
+            (None, None) if self.measured_days_before > 0.0 => {
+                format!(
+                    "measured {} days before the implant, decayed since",
+                    self.measured_days_before
+                )
+            }
+            (None, None) => "as of the implant; no day of calibration is given".to_owned(),
+        }
+    }
+
+    /// The structures of a file and which of them is the target; seeds outside of it are reported.
+    pub fn structures(
+        &self,
+        file: &Path,
+        seeds: &[Seed],
+        most_points: usize,
+    ) -> Result<(Vec<Structure>, usize), CommandError> {
         let given = self.label_names()?;
-        let prescription_gy = self.prescription_gy(loaded)?;
         let structures = match contours::structures(file, most_points)? {
             Some((_, _)) if !given.is_empty() => {
                 return Err(format!("--name: {} names its structures itself", file.display()).into());
@@ -172,19 +227,10 @@ impl Common {
             }
             None => self.labelled(file, given, most_points)?,
         };
-        let target = self.target.as_deref();
         let names: Vec<&str> = structures.iter().map(|s| s.name.as_str()).collect();
-        let at = choose_target(&names, target)?;
-        let note = places::outside(&loaded.seeds, &structures[at]);
-        seeds::report(file, note.as_slice());
-        Ok(Judge::new(
-            structures,
-            target,
-            &extra,
-            prescription_gy,
-            &loaded.seeds,
-            most_points,
-        )?)
+        let at = choose_target(&names, self.target.as_deref())?;
+        seeds::report(file, places::outside(seeds, &structures[at]).as_slice());
+        Ok((structures, at))
     }
 
     fn labelled(

@@ -6,6 +6,9 @@ use std::path::Path;
 use stylet_base::{write_streamed, write_whole};
 use stylet_dose::Dvh;
 use stylet_dose::perturb::{PERCENTILES, Spread};
+use stylet_implant::finder::FoundSeed;
+use stylet_implant::readers::seeds::{AXIS, FOUND, PLACE};
+use stylet_implant::sheet::{NotComputed, Row};
 
 pub fn json(path: &Path, value: &Value) -> Result<(), CommandError> {
     let text = serde_json::to_string_pretty(value)?;
@@ -34,6 +37,22 @@ pub fn doses(path: &Path, points_m: impl Iterator<Item = [f64; 3]>, dose_gy: &[f
         vec![x, y, z, format!("{gy:.6}")]
     });
     csv(path, &owned(&["x_mm", "y_mm", "z_mm", "dose_gy"]), rows)
+}
+
+/// Seeds of a CT, in the columns that `host-ui dose --seeds` reads; the last three say how sure each is.
+pub fn found_seeds(path: &Path, seeds: &[FoundSeed]) -> Result<(), CommandError> {
+    let header = [PLACE.as_slice(), &AXIS, &FOUND].concat();
+    let rows = seeds.iter().map(|s| {
+        let place = s.position_m.map(|m| format!("{:.3}", m * 1e3));
+        let axis = s.axis.map(|v| format!("{v:.4}"));
+        let sure = [
+            format!("{:.3}", s.confidence),
+            format!("{:.3}", s.deviation_m * 1e3),
+            s.together.to_string(),
+        ];
+        [place, axis, sure].concat()
+    });
+    csv(path, &owned(&header), rows)
 }
 
 /// Differential and cumulative, up to the highest dose but not beyond ten times the prescription.
@@ -66,6 +85,33 @@ pub fn dvh(path: &Path, curves: &[(&str, &Dvh)], prescription_gy: f64, bin_gy: f
         })
     });
     csv(path, &header, rows)
+}
+
+/// Figures of several states, one line each; a field says why there is no figure.
+pub fn figures(path: &Path, columns: &[&str], rows: &[Row]) -> Result<(), CommandError> {
+    let header = [owned(&["group", "figure", "unit"]), owned(columns)].concat();
+    let rows = rows.iter().map(|row| {
+        let value = |v: &Result<f64, NotComputed>| v.as_ref().map_or_else(ToString::to_string, |v| format!("{v:.6}"));
+        let names = [row.group.to_owned(), row.name.clone(), row.unit.to_owned()];
+        names.into_iter().chain(row.values.iter().map(value)).collect()
+    });
+    csv(path, &header, rows)
+}
+
+/// The same for people.
+pub fn figure_table(columns: &[&str], rows: &[Row]) -> String {
+    let mut text = format!("{:44}", "");
+    columns.iter().for_each(|name| text += &format!(" {name:>16}"));
+    for row in rows {
+        text += &format!("\n{:44}", format!("{} {} {}", row.group, row.name, row.unit));
+        for value in &row.values {
+            let value = value
+                .as_ref()
+                .map_or_else(|_| "-".to_owned(), |v| format!("{v:.*}", row.digits));
+            text += &format!(" {value:>16}");
+        }
+    }
+    text + "\n"
 }
 
 /// An empty field is a measure that is not defined in that trial.

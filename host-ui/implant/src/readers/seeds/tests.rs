@@ -60,3 +60,18 @@ fn a_pipe_and_a_device_are_refused() {
         assert!(why.contains("it is not a file"), "{why}");
     }
 }
+
+/// The columns that say how sure a seed of a CT is were refused as unknown.
+#[test]
+fn a_table_of_seeds_found_in_a_ct_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("seeds.csv");
+    let header = [PLACE.as_slice(), &AXIS, &FOUND].concat().join(",");
+    std::fs::write(&path, format!("{header}\n1,2,3,0,0,1,0.98,0.12,2\n")).unwrap();
+    let defaults = SeedDefaults {
+        strength_u: Some(0.45),
+        ..SeedDefaults::default()
+    };
+    let seeds = read_seeds(&path, defaults).unwrap();
+    assert_eq!((seeds.len(), seeds[0].axis), (1, Some([0.0, 0.0, 1.0])));
+}

@@ -1,0 +1,180 @@
+//! Dose in a gland that swells at the implant and shrinks again, with the seeds that move with it.
+//!
+//! The volume is `V(t) = V_end (1 + M exp(-λ_e t))` from the implant on, and every distance in it grows with the cube root (Chen, Yue,
+//! Wang, Roberts, Peschel, Nath, Int. J. Radiat. Oncol. 47, 1405, 2000; AAPM TG-137, 2009). The dose to a piece of tissue is the
+//! integral of its dose rate in the geometry of each moment. With `u = exp(-λ t)` it is the mean over u of the dose that the
+//! geometry of that moment would give for ever: a sum of doses at a few moments (Gauss and Legendre in the root of u).
+
+use super::decay::{days_to_s, s_to_days};
+use super::kernel::DoseKernel;
+use super::points::DosePoints;
+use super::seed::Seed;
+
+/// Nodes and weights of Gauss and Legendre from -1 to 1, the positive half.
+const NODES: [[f64; 2]; 6] = [
+    [0.125_233_408_511_469, 0.249_147_045_813_403],
+    [0.367_831_498_998_180, 0.233_492_536_538_355],
+    [0.587_317_954_286_617, 0.203_167_426_723_066],
+    [0.769_902_674_194_305, 0.160_078_328_543_346],
+    [0.904_117_256_370_475, 0.106_939_325_995_318],
+    [0.981_560_634_246_719, 0.047_175_336_386_512],
+];
+
+/// Swelling of a gland at the implant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edema {
+    /// Volume gained at the implant, as a share of the volume in the end: 0.5 for half as much again.
+    pub magnitude: f64,
+    /// Time in which half of what was gained is lost, in s.
+    pub half_life_s: f64,
+}
+
+impl Edema {
+    /// From a half-life in days.
+    pub fn of_days(magnitude: f64, half_life_days: f64) -> Self {
+        Self {
+            magnitude,
+            half_life_s: days_to_s(half_life_days),
+        }
+    }
+
+    /// Distances some time after the implant, as a share of those in the end.
+    pub fn stretch(self, after_s: f64) -> f64 {
+        (1.0 + self.magnitude * (-after_s / self.half_life_s).exp2()).cbrt()
+    }
+
+    /// Moments, in half-lives of the source turned into s, with the share of the whole dose that the geometry of each has.
+    fn moments(half_life_s: f64) -> impl Iterator<Item = (f64, f64)> {
+        let both = NODES.into_iter().flat_map(|[x, weight]| [(x, weight), (-x, weight)]);
+        both.map(move |(x, weight)| {
+            // u = v², v from 0 to 1.
+            let v = (1.0 + x) / 2.0;
+            (-v.powi(2).log2() * half_life_s, weight * v)
+        })
+    }
+
+    /// Dose of seeds at points (Gy) for ever, both as they lie `seen_s` after the implant; `kernel` is for all time.
+    pub fn dose_gy(
+        self,
+        kernel: &DoseKernel,
+        half_life_s: f64,
+        seen_s: f64,
+        seeds: &[Seed],
+        points_m: &[[f64; 3]],
+    ) -> Vec<f64> {
+        let count = points_m.len().max(1) as f64;
+        let middle_m = [0, 1, 2].map(|a| points_m.iter().map(|p| p[a]).sum::<f64>() / count);
+        let seen = self.stretch(seen_s);
+        let mut dose_gy = vec![0.0; points_m.len()];
+        for (after_s, share) in Self::moments(half_life_s) {
+            let by = self.stretch(after_s) / seen;
+            let moved = |p: [f64; 3]| [0, 1, 2].map(|a| middle_m[a] + (p[a] - middle_m[a]) * by);
+            let seed = |s: &Seed| Seed {
+                position_m: moved(s.position_m),
+                strength_u: s.strength_u * share,
+                ..*s
+            };
+            let seeds: Vec<Seed> = seeds.iter().map(seed).collect();
+            let points: Vec<[f64; 3]> = points_m.iter().map(|p| moved(*p)).collect();
+            let of_moment = DosePoints::new(&points).of_seeds_gy(kernel, &seeds);
+            dose_gy.iter_mut().zip(of_moment).for_each(|(sum, gy)| *sum += gy);
+        }
+        dose_gy
+    }
+
+    /// What two volumes of one gland on two days say of its swelling at the implant, for a given half-life; `None` where the later one
+    /// is not the smaller.
+    pub fn of_volumes(volumes_m3: [f64; 2], seen_s: [f64; 2], half_life_s: f64) -> Option<Self> {
+        let [early, late] = seen_s.map(|t| (-t / half_life_s).exp2());
+        let ratio = volumes_m3[0] / volumes_m3[1];
+        let magnitude = (ratio - 1.0) / (early - ratio * late);
+        (magnitude.is_finite() && magnitude > 0.0).then_some(Self { magnitude, half_life_s })
+    }
+}
+
+impl std::fmt::Display for Edema {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let days = s_to_days(self.half_life_s);
+        write!(
+            f,
+            "{:.0} % of the volume, half-life {days:.1} days",
+            self.magnitude * 100.0
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Source;
+    use crate::decay::Interval;
+
+    /// A point that radiates as 1/r² alone.
+    const PLAIN: &str = "[source]\nmodel = \"plain\"\nnuclide = \"I-125\"\nhalf_life_days = 59.4\ndose_rate_constant = 1.0\n\
+        active_length_cm = 0.0\nr0_cm = 1.0\ntheta0_deg = 90.0\n[radial]\nr_cm = [0.1, 1.0, 20.0]\ng_point = [1.0, 1.0, 1.0]\n\
+        [anisotropy_1d]\nr_cm = [0.5, 5.0]\nphi_an = [1.0, 1.0]\n";
+    const POINTS_M: [[f64; 3]; 3] = [[0.008, 0.0, 0.0], [-0.004, 0.012, 0.001], [-0.004, -0.012, -0.001]];
+
+    fn doses(edema: Edema, seen_days: f64) -> (Vec<f64>, Vec<f64>) {
+        let source = Source::parse(PLAIN).unwrap();
+        let kernel = DoseKernel::new(&source, Interval::ALL);
+        let seeds = [Seed {
+            position_m: [-0.001, 0.001, 0.002],
+            axis: None,
+            strength_u: 0.5,
+        }];
+        let moving = edema.dose_gy(&kernel, source.half_life_s, days_to_s(seen_days), &seeds, &POINTS_M);
+        (moving, DosePoints::new(&POINTS_M).of_seeds_gy(&kernel, &seeds))
+    }
+
+    /// Dose over that of the geometry in the end: the sum over n of C(-2/3, n) Mⁿ / (1 + n T/Tₑ), which converges for M < 1.
+    fn series(magnitude: f64, ratio: f64) -> f64 {
+        let (mut sum, mut term) = (0.0, 1.0);
+        for n in 0..400 {
+            sum += term / (1.0 + f64::from(n) * ratio);
+            term *= magnitude * (-2.0 / 3.0 - f64::from(n)) / f64::from(n + 1);
+        }
+        sum
+    }
+
+    #[test]
+    fn without_edema_the_dose_is_that_of_plain_decay() {
+        let (moving, still) = doses(Edema::of_days(0.0, 10.0), 0.0);
+        for (moving, still) in moving.iter().zip(&still) {
+            assert!((moving / still - 1.0).abs() < 1e-6, "{moving} {still}");
+        }
+    }
+
+    /// Closed forms for a seed and a point that radiate as 1/r². Where the half-lives are the same the ratio is
+    /// 3 ((1 + M)^(1/3) - 1) / M.
+    #[test]
+    fn a_swelling_gland_gets_what_the_closed_form_says() {
+        for (magnitude, days) in [(0.5, 59.4), (0.5, 9.3), (0.8, 25.0), (0.3, 4.0), (0.95, 200.0)] {
+            let edema = Edema::of_days(magnitude, days);
+            let (moving, seen) = doses(edema, 0.0);
+            // What was seen on the first day is stretched: in the end the dose is larger.
+            let in_end = edema.stretch(0.0).powi(2);
+            let expected = series(magnitude, 59.4 / days);
+            if days == 59.4 {
+                assert!((expected - 3.0 * ((1.0 + magnitude).cbrt() - 1.0) / magnitude).abs() < 1e-9);
+            }
+            for (moving, seen) in moving.iter().zip(&seen) {
+                let ratio = moving / (seen * in_end);
+                assert!(
+                    (ratio / expected - 1.0).abs() < 2e-4,
+                    "{magnitude} {days}: {ratio} {expected}"
+                );
+            }
+        }
+    }
+
+    /// The same implant, seen on day 0 and on day 30: one dose.
+    #[test]
+    fn two_volumes_show_the_magnitude() {
+        let edema = Edema::of_days(0.4, 9.3);
+        let volume = |day: f64| 30e-6 * edema.stretch(days_to_s(day)).powi(3);
+        let found = Edema::of_volumes([volume(0.0), volume(30.0)], [0.0, days_to_s(30.0)], edema.half_life_s).unwrap();
+        assert!((found.magnitude - 0.4).abs() < 1e-9, "{found}");
+        assert!(Edema::of_volumes([30e-6, 31e-6], [0.0, days_to_s(30.0)], edema.half_life_s).is_none());
+    }
+}

@@ -1,0 +1,88 @@
+//! Value of the tissue, its noise, and the value from which a voxel belongs to a seed.
+
+use super::{FinderError, Search};
+use stylet_files::VoxelValues;
+
+/// Values of soft tissue, in HU; a volume in another unit has all its values taken.
+const SOFT: std::ops::RangeInclusive<f32> = -200.0..=300.0;
+/// Share of the voxels that must be soft tissue for the volume to be one in HU.
+const SOFT_SHARE: f64 = 0.05;
+/// Voxels that medians are taken of.
+const SAMPLED: usize = 1 << 20;
+/// Peaks must rise above the tissue by so many standard deviations of its noise.
+const ABOVE_NOISE: f64 = 8.0;
+/// Without a number of seeds, peaks below are bone or calcifications, in HU above the tissue.
+const ABOVE_BONE: f64 = 800.0;
+/// Height of the threshold between tissue and the typical peak of a seed.
+const SHARE_OF_PEAK: f64 = 0.3;
+
+/// What voxels are compared with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Level {
+    /// Value of the tissue.
+    pub tissue: f64,
+    /// Standard deviation of the tissue.
+    pub noise: f64,
+    /// Value from which a voxel belongs to a seed.
+    pub threshold: f64,
+    /// Value that the scanner does not exceed, where many voxels have it.
+    pub saturated: Option<f64>,
+}
+
+/// From the voxels; the threshold is that of the search where it names one.
+pub fn of(volume: &VoxelValues<f32>, search: &Search) -> Result<Level, FinderError> {
+    let every = volume.values.len().div_ceil(SAMPLED).max(1);
+    let some = volume.values.iter().step_by(every).copied().filter(|v| v.is_finite());
+    let all: Vec<f32> = some.collect();
+    let soft: Vec<f32> = all.iter().copied().filter(|v| SOFT.contains(v)).collect();
+    let is_in_hu = soft.len() as f64 > SOFT_SHARE * all.len() as f64;
+    let mut of_tissue = if is_in_hu { soft } else { all };
+    let tissue = median(&mut of_tissue).ok_or(FinderError::Nothing)?;
+    let mut off: Vec<f32> = of_tissue.iter().map(|v| (v - tissue as f32).abs()).collect();
+    // Of a normal distribution half lies within 0.6745 standard deviations.
+    let noise = (median(&mut off).unwrap_or(0.0) / 0.6745).max(1.0);
+    let peaks = peaks(volume, tissue + ABOVE_NOISE * noise);
+    let typical = match search.count {
+        Some(count) => peaks.get(count.min(peaks.len()).div_ceil(2).saturating_sub(1)),
+        None => {
+            let high = peaks.partition_point(|p| *p > tissue + ABOVE_BONE);
+            let used = if high > 0 { high } else { peaks.len() };
+            peaks.get(used / 2)
+        }
+    };
+    let typical = *typical.ok_or(FinderError::Nothing)?;
+    let highest = peaks[0];
+    let at_highest = volume.values.iter().filter(|v| f64::from(**v) >= highest).count();
+    Ok(Level {
+        tissue,
+        noise,
+        threshold: search.threshold.unwrap_or(tissue + SHARE_OF_PEAK * (typical - tissue)),
+        // Noise does not give the same highest value again and again.
+        saturated: (at_highest > 4).then_some(highest),
+    })
+}
+
+fn median(values: &mut [f32]) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| f64::from(*values.select_nth_unstable_by(middle, f32::total_cmp).1))
+}
+
+/// Values of voxels above `least` that no neighbour exceeds, highest first.
+fn peaks(volume: &VoxelValues<f32>, least: f64) -> Vec<f64> {
+    let [nx, ny, nz] = volume.dims;
+    let at = |i: usize, j: usize, k: usize| volume.values[(k * ny + j) * nx + i];
+    let near = |i: usize, n: usize| i.saturating_sub(1)..(i + 2).min(n);
+    let mut peaks = Vec::new();
+    for (n, &value) in volume.values.iter().enumerate() {
+        if !value.is_finite() || f64::from(value) < least {
+            continue;
+        }
+        let (i, j, k) = (n % nx, n / nx % ny, n / nx / ny);
+        let lower = near(k, nz).all(|c| near(j, ny).all(|b| near(i, nx).all(|a| at(a, b, c) <= value)));
+        if lower {
+            peaks.push(f64::from(value));
+        }
+    }
+    peaks.sort_by(|a, b| b.total_cmp(a));
+    peaks
+}

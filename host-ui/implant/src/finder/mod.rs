@@ -1,0 +1,201 @@
+//! Seeds found in a CT volume: bright components, each split into as many seeds as its signal holds.
+//!
+//! A seed is smaller than a voxel, so its voxels hold parts of it. The sum of what they have above the tissue around them, the signal,
+//! is the same for every seed however it lies, and two seeds that touch have twice as much. A component is fitted by as many
+//! seeds as its signal holds, each a line of the seed's length blurred by the scanner.
+
+mod components;
+mod counts;
+mod level;
+mod shape;
+mod split;
+mod starts;
+
+use components::Component;
+use nalgebra::{Matrix3, Vector3};
+use split::{Fitted, Fitter};
+use stylet_files::VoxelValues;
+
+/// A component with the signal of more seeds is bone, contrast medium or a hip.
+const MOST_IN_ONE: f64 = 12.0;
+/// A component with less than this share of a seed's signal is noise and is not reported.
+const LEAST_REPORTED: f64 = 0.15;
+/// A count of seeds that is less probable is reported as doubtful.
+const SURE: f64 = 0.9;
+/// A place that is less certain is reported as doubtful.
+const CERTAIN_M: f64 = 0.5e-3;
+
+/// What is known of the seeds before the search.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Search {
+    /// Voxels of this value or more belong to seeds; found from the data where none is given.
+    pub threshold: Option<f64>,
+    /// Number of seeds that were implanted, where it is known.
+    pub count: Option<usize>,
+    /// Length of a seed, in m.
+    pub length_m: f64,
+    /// Diameter of a seed, in m.
+    pub diameter_m: f64,
+    /// Whether a component may be several seeds; without it every component is one seed at its centre, as a null model.
+    pub split: bool,
+}
+
+impl Default for Search {
+    /// Seeds of 4.5 mm x 0.8 mm, of any number.
+    fn default() -> Self {
+        Self {
+            threshold: None,
+            count: None,
+            length_m: 4.5e-3,
+            diameter_m: 0.8e-3,
+            split: true,
+        }
+    }
+}
+
+/// One seed; patient frame of the volume (RAS).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FoundSeed {
+    /// Place of its middle, in m.
+    pub position_m: [f64; 3],
+    /// Unit vector, with its sign so that it points to the head.
+    pub axis: [f64; 3],
+    /// From 0 to 1: probability of the number of seeds in its component, times the share of the signal that the fit explains.
+    pub confidence: f64,
+    /// Standard deviation of the place by the fit, in m.
+    pub deviation_m: f64,
+    /// Seeds in its component.
+    pub together: usize,
+}
+
+/// Something bright that leaves a doubt.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Doubt {
+    /// Where it is (RAS), in m.
+    pub place_m: [f64; 3],
+    /// Its signal, in seeds.
+    pub signal: f64,
+    /// Seeds that it was counted as.
+    pub counted: usize,
+    /// What is doubtful, for people.
+    pub why: String,
+}
+
+/// Result of a search.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// The seeds, from the head to the feet.
+    pub seeds: Vec<FoundSeed>,
+    /// What is doubtful, largest signal first.
+    pub doubts: Vec<Doubt>,
+    /// Value that a voxel of a seed has at least.
+    pub threshold: f64,
+    /// Value of the tissue around, and its standard deviation.
+    pub tissue: [f64; 2],
+    /// Components of voxels above the threshold.
+    pub components: usize,
+    /// Components that were counted as more than one seed.
+    pub split_components: usize,
+    /// Blur of the scanner, standard deviation, in m.
+    pub blur_m: f64,
+}
+
+/// Why no seed can be found.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FinderError {
+    /// All voxels are alike, or no number.
+    #[error("it holds nothing that is brighter than its tissue; is it the CT?")]
+    Nothing,
+    /// No voxel reaches the threshold.
+    #[error("no voxel reaches {threshold}; its highest value is {highest}; choose a lower --threshold")]
+    NoneAbove {
+        /// The threshold.
+        threshold: String,
+        /// The highest value of the volume.
+        highest: String,
+    },
+    /// Too much of the volume is above the threshold.
+    #[error("{percent} % of its voxels reach {threshold}, too many for seeds; choose a higher --threshold")]
+    TooMany {
+        /// Share of the voxels, in percent.
+        percent: String,
+        /// The threshold.
+        threshold: String,
+    },
+}
+
+/// Finds seeds in a CT volume.
+pub fn find(volume: &VoxelValues<f32>, search: &Search) -> Result<Found, FinderError> {
+    let level = level::of(volume, search)?;
+    let components = components::of(volume, &level)?;
+    let signals: Vec<f64> = components.iter().map(|c| c.signal).collect();
+    let count = |signals: &[f64]| match search.split {
+        true => counts::of(signals, search.count, MOST_IN_ONE),
+        false => counts::one_each(signals),
+    };
+    let first = count(&signals);
+    let fitter = Fitter::calibrated(volume, &level, search, &components, &first);
+    let (fits, counts) = match search.split {
+        true => fitter.fit_all(&components, &first, count),
+        false => (components.iter().map(|c| fitter.centre(c)).collect(), first),
+    };
+    let frame = &volume.frame;
+    let place = |at_m: Vector3<f64>| -> [f64; 3] { (frame.directions * at_m + frame.origin_m).into() };
+    let (mut seeds, mut doubts) = (Vec::new(), Vec::new());
+    for (n, (component, fit)) in components.iter().zip(&fits).enumerate() {
+        let sure = counts.probability(n);
+        for seed in &fit.seeds {
+            seeds.push(FoundSeed {
+                position_m: place(seed.middle_m),
+                axis: to_the_head(&frame.directions, seed.axis),
+                confidence: (sure * fit.explained).clamp(0.0, 1.0),
+                deviation_m: seed.deviation_m,
+                together: fit.seeds.len(),
+            });
+        }
+        doubts.extend(doubt(component, fit, counts.signal(n), sure).map(|(at_m, why)| Doubt {
+            place_m: place(at_m),
+            signal: counts.signal(n),
+            counted: fit.seeds.len(),
+            why,
+        }));
+    }
+    seeds.sort_by(|a, b| b.position_m[2].total_cmp(&a.position_m[2]));
+    doubts.sort_by(|a, b| b.signal.total_cmp(&a.signal));
+    Ok(Found {
+        threshold: level.threshold,
+        tissue: [level.tissue, level.noise],
+        components: components.len(),
+        split_components: fits.iter().filter(|f| f.seeds.len() > 1).count(),
+        blur_m: fitter.blur_m(),
+        seeds,
+        doubts,
+    })
+}
+
+/// Where and why a component is doubtful.
+fn doubt(component: &Component, fit: &Fitted, signal: f64, sure: f64) -> Option<(Vector3<f64>, String)> {
+    let counted = fit.seeds.len();
+    let worst_m = fit.seeds.iter().map(|s| s.deviation_m).fold(0.0, f64::max);
+    let why = if counted == 0 && signal > MOST_IN_ONE {
+        "too large for seeds: left out".to_owned()
+    } else if counted == 0 && signal >= LEAST_REPORTED {
+        "too faint for a seed: left out".to_owned()
+    } else if counted > 0 && sure < SURE {
+        format!("the count is {:.0} % probable", sure * 100.0)
+    } else if worst_m > CERTAIN_M {
+        format!("a place is known to {:.1} mm only", worst_m * 1e3)
+    } else {
+        return None;
+    };
+    Some((component.middle_m, why))
+}
+
+fn to_the_head(directions: &Matrix3<f64>, axis: Vector3<f64>) -> [f64; 3] {
+    let axis = directions * axis;
+    let sign = if axis.z < 0.0 { -1.0 } else { 1.0 };
+    (axis * sign).into()
+}
+
+#[cfg(test)]
+mod tests;

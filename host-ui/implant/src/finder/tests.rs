@@ -1,0 +1,162 @@
+//! A synthetic CT of an implant that is known: what is found of it, beside components that are not split.
+
+use super::{FinderError, Found, Search, find};
+use crate::pairing;
+use nalgebra::{Matrix3, Vector3};
+use phantom::{Phantom, TOUCHING};
+use stylet_dose::decay::Interval;
+use stylet_dose::{DoseKernel, DosePoints, Dvh, Region, Seed, Source, Structure};
+use stylet_files::{VoxelFrame, VoxelValues};
+
+mod phantom;
+
+struct Gland;
+
+impl Region for Gland {
+    fn bounds_m(&self) -> ([f64; 3], [f64; 3]) {
+        (phantom::SEMI_AXES_M.map(|s| -s), phantom::SEMI_AXES_M)
+    }
+
+    fn contains(&self, p: [f64; 3]) -> bool {
+        (0..3).map(|a| (p[a] / phantom::SEMI_AXES_M[a]).powi(2)).sum::<f64>() <= 1.0
+    }
+}
+
+/// D90 of the gland by seeds of 0.45 U with their axes, in Gy.
+fn d90_gy(seeds: impl Iterator<Item = ([f64; 3], [f64; 3])>) -> f64 {
+    let source = Source::known("6711").unwrap();
+    let kernel = DoseKernel::new(&source, Interval::ALL);
+    let gland = Structure::of_region("Prostate", &Gland, 1.5e-3);
+    let seed = |(position_m, axis)| Seed {
+        position_m,
+        axis: Some(axis),
+        strength_u: 0.45,
+    };
+    let seeds: Vec<Seed> = seeds.map(seed).collect();
+    let dose = DosePoints::new(&gland.points_m).of_seeds_gy(&kernel, &seeds);
+    let dvh = Dvh::new(&dose, &gland.volumes_m3).unwrap();
+    dvh.dose_of_gy(0.9 * gland.volume_m3()).unwrap()
+}
+
+/// What a search found of what was implanted.
+#[derive(Debug)]
+#[allow(dead_code, reason = "shown where a test fails")]
+struct Outcome {
+    within_1_mm: usize,
+    mean_m: f64,
+    d90_share: f64,
+}
+
+fn outcome(phantom: &Phantom, found: &Found) -> Outcome {
+    let truth: Vec<[f64; 3]> = phantom.seeds.iter().map(|s| s.0).collect();
+    let places: Vec<[f64; 3]> = found.seeds.iter().map(|s| s.position_m).collect();
+    let pairs = pairing::nearest(&truth, &places);
+    let off = |(at, found): (&[f64; 3], &Option<usize>)| {
+        found.map(|n| (Vector3::from(places[n]) - Vector3::from(*at)).norm())
+    };
+    let off_m: Vec<f64> = truth
+        .iter()
+        .zip(&pairs)
+        .filter_map(off)
+        .filter(|m| *m <= 1e-3)
+        .collect();
+    let d90 = d90_gy(found.seeds.iter().map(|s| (s.position_m, s.axis)));
+    Outcome {
+        within_1_mm: off_m.len(),
+        mean_m: off_m.iter().sum::<f64>() / off_m.len().max(1) as f64,
+        d90_share: d90 / d90_gy(phantom.seeds.iter().copied()),
+    }
+}
+
+/// 53 of the seeds touch another: side by side, end to end, and three together.
+#[test]
+fn a_hundred_seeds_are_found_within_a_millimetre_and_give_the_same_d90() {
+    // In the second implant the one seed that is counted in the wrong component is missed or doubled where D90 is decided: it is
+    // 3.7 % off there.
+    for (random_seed, d90_within) in [(1, 0.01), (2, 0.04)] {
+        let phantom = Phantom::new(random_seed, None);
+        let search = Search {
+            count: Some(phantom.seeds.len()),
+            ..Search::default()
+        };
+        let found = find(&phantom.volume, &search).unwrap();
+        let result = outcome(&phantom, &found);
+        println!(
+            "{random_seed}: {result:?}, threshold {:.0}, blur {:.2} mm, {} components, {} split, {:?}",
+            found.threshold,
+            found.blur_m * 1e3,
+            found.components,
+            found.split_components,
+            found.doubts
+        );
+        assert_eq!(found.seeds.len(), 100);
+        assert!(result.within_1_mm >= 98, "{result:?}");
+        assert!((result.d90_share - 1.0).abs() < d90_within, "{result:?}");
+    }
+}
+
+/// The null model: every component is one seed. It loses most seeds that touch another.
+#[test]
+fn components_that_are_not_split_lose_the_seeds_that_touch() {
+    let phantom = Phantom::new(1, None);
+    let search = Search {
+        count: Some(phantom.seeds.len()),
+        split: false,
+        ..Search::default()
+    };
+    let found = find(&phantom.volume, &search).unwrap();
+    let result = outcome(&phantom, &found);
+    println!("null model: {} seeds, {result:?}", found.seeds.len());
+    assert!(result.within_1_mm < 100 - TOUCHING / 2, "{result:?}");
+}
+
+/// Without the number implanted the signal alone has to show how many there are: 104 for 100 here.
+#[test]
+fn the_number_of_seeds_is_found_where_it_is_not_given() {
+    let phantom = Phantom::new(3, None);
+    let found = find(&phantom.volume, &Search::default()).unwrap();
+    let result = outcome(&phantom, &found);
+    println!(
+        "without a count: {} seeds, {result:?}, {:?}",
+        found.seeds.len(),
+        found.doubts
+    );
+    assert!(
+        (98..=105).contains(&found.seeds.len()) && result.within_1_mm >= 98,
+        "{result:?}"
+    );
+    let left_out = |why: &str| found.doubts.iter().filter(|d| d.why.starts_with(why)).count();
+    assert_eq!(left_out("too large"), 1, "the bone: {:?}", found.doubts);
+    assert!(left_out("too faint") >= 1, "the calcification: {:?}", found.doubts);
+}
+
+/// A scanner that ends at 3071 HU cuts the highest voxels off.
+#[test]
+fn seeds_are_found_where_the_scanner_cuts_their_values_off() {
+    let phantom = Phantom::new(4, Some(3071.0));
+    let search = Search {
+        count: Some(phantom.seeds.len()),
+        ..Search::default()
+    };
+    let found = find(&phantom.volume, &search).unwrap();
+    let result = outcome(&phantom, &found);
+    println!("cut off: {result:?}, {:?}", found.doubts);
+    assert!(result.within_1_mm >= 98, "{result:?}");
+}
+
+#[test]
+fn a_volume_without_seeds_is_refused() {
+    let frame = VoxelFrame::new(Matrix3::identity() * 1e-3, Vector3::zeros(), "test").unwrap();
+    let volume = |peak: f32| VoxelValues {
+        dims: [9; 3],
+        values: (0..729).map(|n| if n == 364 { peak } else { 40.0 }).collect(),
+        frame: frame.clone(),
+    };
+    assert_eq!(find(&volume(40.0), &Search::default()), Err(FinderError::Nothing));
+    let high = Search {
+        threshold: Some(9e4),
+        ..Search::default()
+    };
+    let none = find(&volume(2000.0), &high).unwrap_err();
+    assert!(none.to_string().contains("choose a lower --threshold"), "{none}");
+}

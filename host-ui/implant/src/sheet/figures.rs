@@ -1,0 +1,199 @@
+//! The figures of the page, row by row: each a number, or why there is none.
+
+use super::{Column, Implant};
+use stylet_anatomy::Organ;
+use stylet_dose::effect::Response;
+use stylet_dose::metric::Value;
+use stylet_dose::{Dvh, Metric};
+
+/// What the figures mean, for the foot of the page.
+pub const DEFINITIONS: [&str; 7] = [
+    "D: dose that a share of the structure gets at least. V: share or volume with at least that percentage of the prescription.",
+    "Conformity (van 't Riet 1997; COIN without organs, Baltas 1998): share of the target at the prescription, times the target's share of \
+     all that is.",
+    "Homogeneity (Wu 1988): (V100 - V150)/V100 of the target. Non-uniformity: V150/V100. External volume: what gets the prescription \
+     outside of the target, over the target's volume.",
+    "Natural dose ratio: natural dose over prescription. The natural dose is where the histogram dV/du, u = D^(-3/2) (Anderson 1986), of all \
+     that surrounds the seeds has half of its peak on the side of low doses.",
+    "BED (Dale 1989, as in TG-137): D(T) [1 + 2 d0 λ/(μ-λ) (β/α) κ(T)] - ln2 T/(α Tp); EQD2 = BED/(1 + 2/(α/β)).",
+    "Edema (Chen 2000): V(t) = V (1 + M exp(-λe t)); seeds and tissue move together, the dose is the integral over time.",
+    "D100 is the lowest of the points that the structure is made of, so it depends on their number.",
+];
+
+/// A figure of every state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// What it belongs to: "target".
+    pub group: &'static str,
+    /// Its name: "D90".
+    pub name: String,
+    /// Its unit; empty for a number.
+    pub unit: &'static str,
+    /// Digits after the point.
+    pub digits: usize,
+    /// The value in each column, or why there is none.
+    pub values: Vec<Result<f64, NotComputed>>,
+}
+
+type Cell = Result<f64, NotComputed>;
+
+/// Why a figure cannot be computed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct NotComputed(String);
+
+impl From<String> for NotComputed {
+    fn from(why: String) -> Self {
+        Self(why)
+    }
+}
+
+impl From<&str> for NotComputed {
+    fn from(why: &str) -> Self {
+        Self(why.to_owned())
+    }
+}
+
+/// All rows, in the order of the page.
+pub fn rows(implant: &Implant, columns: &[Column]) -> Vec<Row> {
+    let mut all = Vec::new();
+    let mut row = |group: &'static str, name: &str, unit: &'static str, digits: usize, of: &dyn Fn(&Column) -> Cell| {
+        all.push(Row {
+            group,
+            name: name.to_owned(),
+            unit,
+            digits,
+            values: columns.iter().map(of).collect(),
+        });
+    };
+    let total_u = |c: &Column| c.state.seeds.iter().map(|s| s.strength_u).sum::<f64>();
+    row("implant", "seeds", "", 0, &|c| Ok(c.state.seeds.len() as f64));
+    row("implant", "strength of a seed, mean", "U", 3, &|c| {
+        Ok(total_u(c) / c.state.seeds.len().max(1) as f64)
+    });
+    row("implant", "strength, total", "U", 2, &|c| Ok(total_u(c)));
+    row("implant", "strength over target volume", "U/cc", 3, &|c| {
+        Ok(total_u(c) / (target(c)?.volume_m3() * 1e6))
+    });
+    row("target", "volume", "cc", 2, &|c| Ok(target(c)?.volume_m3() * 1e6));
+    let rx = implant.prescription_gy;
+    for name in ["D100", "D90"] {
+        row("target", name, "Gy", 1, &|c| gy(target(c)?, name, rx));
+    }
+    row("target", "D90", "% of prescription", 1, &|c| {
+        Ok(gy(target(c)?, "D90", rx)? / rx * 100.0)
+    });
+    for name in ["V90", "V100", "V150", "V200"] {
+        row("target", name, "%", 1, &|c| percent(target(c)?, name, rx));
+    }
+    for name in ["D5", "D10", "D30"] {
+        row("urethra", name, "Gy", 1, &|c| gy(organ(c, Organ::Urethra)?, name, rx));
+    }
+    row("urethra", "V150", "cc", 3, &|c| {
+        cc(organ(c, Organ::Urethra)?, "V150", rx)
+    });
+    row("rectum", "V100", "cc", 3, &|c| cc(organ(c, Organ::Rectum)?, "V100", rx));
+    for name in ["D2cc", "D0.1cc"] {
+        row("rectum", name, "Gy", 1, &|c| gy(organ(c, Organ::Rectum)?, name, rx));
+    }
+    row("indices", "conformity", "", 3, &|c| {
+        let (inside, all) = (target(c)?.at_least_m3(rx), at_prescription_m3(c)?);
+        // The two volumes come from different points, which may leave a share just above 1.
+        Ok(inside / target(c)?.volume_m3() * if all > 0.0 { (inside / all).min(1.0) } else { 0.0 })
+    });
+    row("indices", "homogeneity", "", 3, &|c| Ok(1.0 - non_uniformity(c, rx)?));
+    row("indices", "non-uniformity", "", 3, &|c| non_uniformity(c, rx));
+    row("indices", "external volume", "", 3, &|c| {
+        Ok((at_prescription_m3(c)? - target(c)?.at_least_m3(rx)).max(0.0) / target(c)?.volume_m3())
+    });
+    row("indices", "natural dose ratio", "", 3, &|c| {
+        let none = "its natural histogram does not fall to half of its peak within 30 mm";
+        let natural_gy = around(c)?.natural_gy.ok_or(none)?;
+        Ok(natural_gy / rx)
+    });
+    let half_life_s = implant.source.half_life_s;
+    let effect = |c: &Column, response: &Response, dose_gy: Cell, is_eqd2: bool| -> Cell {
+        if c.swells {
+            return Err("with edema the dose rate does not decay with the source alone".into());
+        }
+        if !implant.is_for_ever {
+            return Err("the dose is that of a part of the time".into());
+        }
+        let bed_gy = response.bed_gy(dose_gy?, half_life_s);
+        Ok(if is_eqd2 { response.eqd2_gy(bed_gy) } else { bed_gy })
+    };
+    let of_target = |c: &Column| gy(target(c)?, "D90", rx);
+    row("effect", "BED of target D90", "Gy", 1, &|c| {
+        effect(c, &Response::PROSTATE, of_target(c), false)
+    });
+    row("effect", "EQD2 of target D90", "Gy", 1, &|c| {
+        effect(c, &Response::PROSTATE, of_target(c), true)
+    });
+    for (name, organ_is, of) in [("urethra", Organ::Urethra, "D10"), ("rectum", Organ::Rectum, "D2cc")] {
+        let dose = |c: &Column| gy(organ(c, organ_is)?, of, rx);
+        row("effect", &format!("EQD2 of {name} {of}"), "Gy", 1, &|c| {
+            effect(c, &Response::LATE, dose(c), true)
+        });
+    }
+    all
+}
+
+fn target(column: &Column) -> Result<&Dvh, NotComputed> {
+    column.target().ok_or_else(|| "the target has no volume".into())
+}
+
+fn organ(column: &Column, organ: Organ) -> Result<&Dvh, NotComputed> {
+    let name = match organ {
+        Organ::Urethra => "urethra",
+        _ => "rectum",
+    };
+    column
+        .organ(organ)
+        .ok_or_else(|| format!("no structure is called {name}").into())
+}
+
+fn around(column: &Column) -> Result<&super::Around, NotComputed> {
+    let why = "with edema what lies around the gland does not move with it";
+    column.around.as_ref().ok_or_else(|| why.into())
+}
+
+fn at_prescription_m3(column: &Column) -> Cell {
+    let why = "the prescription isodose leaves the 30 mm around seeds and target";
+    around(column)?.at_prescription_m3.ok_or_else(|| why.into())
+}
+
+fn non_uniformity(column: &Column, rx_gy: f64) -> Cell {
+    let v100 = target(column)?.at_least_m3(rx_gy);
+    match v100 > 0.0 {
+        true => Ok(target(column)?.at_least_m3(1.5 * rx_gy) / v100),
+        false => Err("V100 is 0".into()),
+    }
+}
+
+fn value(dvh: &Dvh, name: &str, rx_gy: f64) -> Result<Value, NotComputed> {
+    match Metric::parse(name).map_err(|why| why.to_string())?.of(dvh, rx_gy) {
+        Value::TooSmall { cc } => Err(format!("the structure has only {cc:.3} cc").into()),
+        value => Ok(value),
+    }
+}
+
+fn gy(dvh: &Dvh, name: &str, rx_gy: f64) -> Cell {
+    match value(dvh, name, rx_gy)? {
+        Value::Dose { gy, .. } => Ok(gy),
+        _ => Err(format!("{name} is no dose").into()),
+    }
+}
+
+fn percent(dvh: &Dvh, name: &str, rx_gy: f64) -> Cell {
+    match value(dvh, name, rx_gy)? {
+        Value::Volume { percent, .. } => Ok(percent),
+        _ => Err(format!("{name} is no volume").into()),
+    }
+}
+
+fn cc(dvh: &Dvh, name: &str, rx_gy: f64) -> Cell {
+    match value(dvh, name, rx_gy)? {
+        Value::Volume { cc, .. } => Ok(cc),
+        _ => Err(format!("{name} is no volume").into()),
+    }
+}

@@ -1,0 +1,232 @@
+//! One page of an implant by AAPM TG-137: dose of target, urethra and rectum, indices, effect, sectors; several states side by side.
+
+mod figures;
+mod natural;
+mod page;
+mod sectors;
+
+pub use figures::{NotComputed, Row, rows};
+pub use page::page;
+pub use sectors::Sector;
+
+use crate::registration::RigidFit;
+use natural::natural_dose_gy;
+use serde_json::{Value, json};
+use stylet_anatomy::Organ;
+use stylet_dose::edema::Edema;
+use stylet_dose::structure::bounds;
+use stylet_dose::{DoseKernel, DosePoints, Dvh, Seed, Source, Structure};
+
+/// Room around seeds and target in which volumes at a dose are looked for.
+const MARGIN_M: f64 = 0.03;
+/// Points in that room.
+const POINTS_AROUND: f64 = 200_000.0;
+
+/// What all states of an implant have in common.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Implant {
+    /// Name of the page.
+    pub title: String,
+    /// The model of seed.
+    pub source: Source,
+    /// Prescribed dose, in Gy.
+    pub prescription_gy: f64,
+    /// Day to which the strengths refer, in words.
+    pub calibrated: String,
+    /// Swelling of the gland that one more column of each state is of.
+    pub edema: Option<Edema>,
+    /// Whether dose is that of the whole life of the seeds; effects are of that only.
+    pub is_for_ever: bool,
+}
+
+/// An implant at one time: as planned, as delivered, on a day after.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// What it is called: "planned", "day 30".
+    pub name: String,
+    /// File of the seeds.
+    pub file: String,
+    /// Whose outlines the dose is counted in, and in which frame.
+    pub structures_are: String,
+    /// Time after the implant at which seeds and structures lie so, in s.
+    pub seen_s: f64,
+    /// The seeds, in the frame of the structures.
+    pub seeds: Vec<Seed>,
+    /// The structures.
+    pub structures: Vec<Structure>,
+    /// Which of them the prescription is for.
+    pub target: usize,
+    /// How the seeds fit those of the plan.
+    pub fit: Option<RigidFit>,
+}
+
+/// A structure with its histogram.
+#[derive(Clone, Debug)]
+pub struct Histogram {
+    /// Name of the structure.
+    pub name: String,
+    /// Its histogram.
+    pub dvh: Dvh,
+}
+
+/// Volumes at a dose beyond the target, which indices are made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Around {
+    /// All that gets the prescription, in m³; `None` where it leaves the room of 30 mm around seeds and target.
+    pub at_prescription_m3: Option<f64>,
+    /// Natural dose, in Gy.
+    pub natural_gy: Option<f64>,
+}
+
+/// A state with its dose.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// The state.
+    pub state: State,
+    /// Name, with what was considered.
+    pub name: String,
+    /// Histograms, in the order of the structures.
+    pub histograms: Vec<Histogram>,
+    /// `None` with edema: what lies around the gland does not swell with it.
+    pub around: Option<Around>,
+    /// Sectors of the target.
+    pub sectors: Vec<Sector>,
+    /// Whether the dose is that of a gland that swells.
+    pub swells: bool,
+}
+
+impl Column {
+    /// Computes the dose of a state, with its edema where one is given.
+    pub fn of(implant: &Implant, kernel: &DoseKernel, state: State, edema: Option<Edema>) -> Self {
+        let dose = |structure: &Structure| match edema {
+            Some(edema) => {
+                let half_life_s = implant.source.half_life_s;
+                edema.dose_gy(kernel, half_life_s, state.seen_s, &state.seeds, &structure.points_m)
+            }
+            None => DosePoints::new(&structure.points_m).of_seeds_gy(kernel, &state.seeds),
+        };
+        let (mut histograms, mut sectors) = (Vec::new(), Vec::new());
+        for (n, structure) in state.structures.iter().enumerate() {
+            let dose_gy = dose(structure);
+            if n == state.target {
+                sectors = sectors::of(structure, &dose_gy, implant.prescription_gy);
+            }
+            let dvh = Dvh::new(&dose_gy, &structure.volumes_m3);
+            histograms.extend(dvh.map(|dvh| Histogram {
+                name: structure.name.clone(),
+                dvh,
+            }));
+        }
+        Self {
+            name: match edema {
+                Some(_) => format!("{}, edema", state.name),
+                None => state.name.clone(),
+            },
+            around: edema.is_none().then(|| around(implant, kernel, &state)),
+            swells: edema.is_some(),
+            histograms,
+            sectors,
+            state,
+        }
+    }
+
+    /// Histogram of the target.
+    pub fn target(&self) -> Option<&Dvh> {
+        let name = self.state.structures.get(self.state.target).map(|s| s.name.as_str());
+        self.histograms
+            .iter()
+            .find(|h| Some(h.name.as_str()) == name)
+            .map(|h| &h.dvh)
+    }
+
+    /// Histogram of the first structure that is called like an organ.
+    pub fn organ(&self, organ: Organ) -> Option<&Dvh> {
+        self.histograms
+            .iter()
+            .find(|h| organ.is_mentioned_in(&h.name))
+            .map(|h| &h.dvh)
+    }
+}
+
+/// Dose in the room around seeds and target.
+fn around(implant: &Implant, kernel: &DoseKernel, state: &State) -> Around {
+    let mut corners: Vec<[f64; 3]> = state.seeds.iter().map(|s| s.position_m).collect();
+    corners.extend(
+        state
+            .structures
+            .get(state.target)
+            .map(|t| <[[f64; 3]; 2]>::from(t.bounds_m()))
+            .into_iter()
+            .flatten(),
+    );
+    let (low, high) = bounds(&corners);
+    let (low, high) = (low.map(|v| v - MARGIN_M), high.map(|v| v + MARGIN_M));
+    let volume: f64 = (0..3).map(|a| high[a] - low[a]).product();
+    let pitch_m = (volume / POINTS_AROUND).cbrt();
+    let room = Structure::of_box("around", low, high, pitch_m);
+    let dose_gy = DosePoints::new(&room.points_m).of_seeds_gy(kernel, &state.seeds);
+    let at_face = |p: &[f64; 3]| (0..3).any(|a| p[a] < low[a] + pitch_m || p[a] > high[a] - pitch_m);
+    let on_faces = room
+        .points_m
+        .iter()
+        .zip(&dose_gy)
+        .filter(|(p, _)| at_face(p))
+        .map(|(_, gy)| *gy);
+    let leaves_gy = on_faces.fold(0.0, f64::max);
+    let point_m3 = room.volumes_m3.first().copied().unwrap_or(0.0);
+    let reached = dose_gy.iter().filter(|gy| **gy >= implant.prescription_gy).count() as f64 * point_m3;
+    Around {
+        at_prescription_m3: (leaves_gy < implant.prescription_gy).then_some(reached),
+        natural_gy: natural_dose_gy(&dose_gy, implant.prescription_gy, leaves_gy),
+    }
+}
+
+/// The figures of all states as JSON; what cannot be computed says why.
+pub fn to_json(implant: &Implant, columns: &[Column]) -> Value {
+    let of_column = |n: usize, column: &Column| {
+        let cell = |row: &Row| match &row.values[n] {
+            Ok(value) => json!(value),
+            Err(why) => json!({ "not_computed": why.to_string() }),
+        };
+        let figures = rows(implant, columns);
+        let figures = figures
+            .iter()
+            .map(|row| (format!("{} {} [{}]", row.group, row.name, row.unit), cell(row)));
+        let sectors = column.sectors.iter().map(|s| {
+            json!({ "name": s.name, "volume_cc": s.volume_m3 * 1e6, "d90_gy": s.d90_gy, "v100_percent": s.v100.map(|v| v * 100.0) })
+        });
+        let fit = column.state.fit.as_ref().map(|fit| {
+            let [mean, square, worst] = fit.residual_figures_m().map(|m| m * 1e3);
+            json!({
+                "pairs": fit.residuals_m.len(),
+                "counted": fit.counted,
+                "turn_deg": fit.turn_deg(),
+                "shift_mm": fit.shift_m.as_slice().iter().map(|m| m * 1e3).collect::<Vec<_>>(),
+                "mean_mm": mean,
+                "root_mean_square_mm": square,
+                "worst_mm": worst,
+                "stretch": fit.stretch,
+                "residuals_mm": fit.residuals_m.iter().map(|m| m * 1e3).collect::<Vec<_>>(),
+            })
+        });
+        json!({
+            "state": column.name,
+            "seeds_file": column.state.file,
+            "structures": column.state.structures_are,
+            "figures": figures.collect::<serde_json::Map<_, _>>(),
+            "sectors": sectors.collect::<Vec<_>>(),
+            "fit": fit,
+        })
+    };
+    json!({
+        "prescription_gy": implant.prescription_gy,
+        "source": { "model": implant.source.model, "nuclide": implant.source.nuclide },
+        "calibrated": implant.calibrated,
+        "edema": implant.edema.map(|e| json!({ "magnitude_percent": e.magnitude * 100.0, "half_life_days": stylet_dose::decay::s_to_days(e.half_life_s) })),
+        "definitions": figures::DEFINITIONS,
+        "states": columns.iter().enumerate().map(|(n, c)| of_column(n, c)).collect::<Vec<_>>(),
+    })
+}
+
+#[cfg(test)]
+mod tests;

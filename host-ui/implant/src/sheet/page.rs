@@ -1,0 +1,171 @@
+//! The page as HTML that stands by itself and prints on one sheet of A4.
+
+use super::figures::{DEFINITIONS, Row, rows};
+use super::{Column, Implant};
+use crate::score::STYLE;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use stylet_base::format::printable;
+use stylet_dose::decay::s_to_days;
+use stylet_dose::effect::Response;
+
+/// More columns than this are printed across.
+const UPRIGHT: usize = 3;
+
+/// Smaller than the debrief: all of it stands on one sheet.
+const SHEET: &str = "\
+body{font-size:13px;line-height:1.35}
+main{max-width:1100px;padding:18px 20px}
+h1{font-size:21px}h2{font-size:14px;margin:12px 0 4px}
+th,td{padding:1.5px 8px}td.why{white-space:normal;color:var(--soft);font-size:11px}
+tr.group td{font-weight:650;border-bottom:1px solid var(--ink);padding-top:7px}
+td:nth-child(2),th:nth-child(2){text-align:left;color:var(--soft)}
+.two{display:grid;grid-template-columns:auto auto;gap:0 26px;align-items:start}
+footer{margin-top:10px;padding-top:6px;font-size:10px;line-height:1.3}
+footer p{margin:1px 0}
+@media print{html{font-size:8pt}body{font-size:8pt;line-height:1.2}main{padding:0;max-width:none}th,td{padding:.4pt 4pt}
+h1{font-size:13pt}h2{font-size:9pt;margin:5pt 0 1pt}tr.group td{padding-top:2.5pt}th{font-size:7.5pt}
+td.why{font-size:6.5pt}footer{font-size:6pt;margin-top:4pt;line-height:1.15}}
+";
+
+/// The page of one state or of several.
+pub fn page(implant: &Implant, columns: &[Column]) -> String {
+    let size = if columns.len() > UPRIGHT {
+        "landscape"
+    } else {
+        "portrait"
+    };
+    let print = format!("@page{{size:A4 {size};margin:9mm}}");
+    let sectors = columns.iter().any(|c| !c.sectors.is_empty());
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width";
+                title { "Implant: " (printable(&implant.title)) }
+                style { (PreEscaped(STYLE)) (PreEscaped(SHEET)) (PreEscaped(print)) }
+            }
+            body {
+                main {
+                    h1 { "Dose of a permanent implant (AAPM TG-137)" }
+                    (head(implant, columns))
+                    div class=[(columns.len() <= UPRIGHT).then_some("two")] {
+                        div { h2 { "Figures" } (figures(&rows(implant, columns), columns)) }
+                        @if sectors {
+                            div { h2 { "Sectors of the target: D90 (Gy) and V100 (%)" } (of_sectors(columns)) (fits(columns)) }
+                        }
+                    }
+                    footer {
+                        @for line in DEFINITIONS { p { (line) } }
+                        p { (super::sectors::CUTS) }
+                        p { (Response::PROSTATE.words()) ". " (Response::LATE.words()) "." }
+                        p { "Made by a simulator for research and training. Not a medical device: no treatment may rest on it." }
+                    }
+                }
+            }
+        }
+    };
+    page.into_string()
+}
+
+fn head(implant: &Implant, columns: &[Column]) -> Markup {
+    let source = &implant.source;
+    html! {
+        p {
+            (printable(&implant.title)) " · prescription " (format!("{:.0} Gy", implant.prescription_gy)) " · source "
+            (printable(&source.model)) " (" (printable(&source.nuclide))
+            (format!(", half-life {:.2} days)", s_to_days(source.half_life_s))) " · strengths " (printable(&implant.calibrated))
+            @if let Some(edema) = implant.edema { " · edema " (edema.to_string()) }
+        }
+        @for column in columns.iter().filter(|c| !c.swells) {
+            p { b { (column.state.name) } ": seeds of " (printable(&column.state.file)) ", " (printable(&column.state.structures_are)) }
+        }
+    }
+}
+
+fn names(columns: &[Column]) -> Markup {
+    html! { @for column in columns { th { (column.name) } } }
+}
+
+fn figures(rows: &[Row], columns: &[Column]) -> Markup {
+    let begins = |n: usize| n == 0 || rows[n - 1].group != rows[n].group;
+    html! {
+        table {
+            thead { tr { th { "" } th { "" } (names(columns)) } }
+            tbody {
+                @for (n, row) in rows.iter().enumerate() {
+                    @if begins(n) {
+                        tr class="group" { td colspan=(2 + columns.len()) { (row.group) } }
+                    }
+                    tr { td { (row.name) } td { (row.unit) } (cells(row)) }
+                }
+            }
+        }
+    }
+}
+
+/// Where every column lacks a figure for the same reason it is given once.
+fn cells(row: &Row) -> Markup {
+    let first = row.values.first().and_then(|v| v.as_ref().err());
+    let all_lack = first.filter(|why| row.values.iter().all(|v| v.as_ref().err() == Some(*why)));
+    html! {
+        @if let Some(why) = all_lack {
+            td class="why" colspan=(row.values.len()) { "not computed: " (why.to_string()) }
+        } @else {
+            @for value in &row.values {
+                @match value {
+                    Ok(value) => td { (format!("{value:.*}", row.digits)) },
+                    Err(why) => td class="why" { "not computed: " (why.to_string()) },
+                }
+            }
+        }
+    }
+}
+
+fn of_sectors(columns: &[Column]) -> Markup {
+    let first = columns.first().map_or(&[][..], |c| &c.sectors);
+    let number = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |v| format!("{v:.0}"));
+    html! {
+        table {
+            thead { tr { th { "" } th { "cc" } (names(columns)) } }
+            tbody {
+                @for (n, sector) in first.iter().enumerate() {
+                    tr {
+                        td { (sector.name) } td { (format!("{:.1}", sector.volume_m3 * 1e6)) }
+                        @for s in columns.iter().filter_map(|c| c.sectors.get(n)) {
+                            td { (number(s.d90_gy)) " · " (number(s.v100.map(|v| v * 100.0))) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn fits(columns: &[Column]) -> Markup {
+    let fitted = || {
+        columns
+            .iter()
+            .filter(|c| !c.swells)
+            .filter_map(|c| Some((c, c.state.fit.as_ref()?)))
+    };
+    html! {
+        @if fitted().next().is_some() {
+            h2 { "Fit of the seeds to the plan" }
+            table {
+                thead { tr { th { "" } th { "pairs" } th { "mean" br; "(mm)" } th { "worst" br; "(mm)" } th { "turn" br; "(deg)" } th { "extent" } } }
+                tbody {
+                    @for (column, fit) in fitted() {
+                        tr {
+                            td { (column.state.name) } td { (fit.residuals_m.len()) }
+                            td { (format!("{:.1}", fit.residual_figures_m()[0] * 1e3)) }
+                            td { (format!("{:.1}", fit.residual_figures_m()[2] * 1e3)) }
+                            td { (format!("{:.1}", fit.turn_deg())) } td { (format!("{:.3}", fit.stretch)) }
+                        }
+                    }
+                }
+            }
+            p { "Seeds paired one to one for the least sum of squares; extent: that of the seeds over that of the plan." }
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! `host-ui find-seeds`: the seeds in a CT volume, as a table.
+
+use super::CommandError;
+use super::dose::common::within;
+use super::dose::write;
+use clap::Args;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use stylet_base::format::printable;
+use stylet_base::output::new_folder;
+use stylet_files::Progress;
+use stylet_files::image::read_values;
+use stylet_implant::finder::{self, Found, Search};
+use stylet_implant::provenance;
+
+/// Seeds at least are one, and no implant has more.
+const MOST_SEEDS: u64 = 400;
+
+const HELP: &str = "\
+Voxels from a threshold on are joined to components; each is fitted by as many seeds as its signal (the sum of what it has above the
+tissue) holds, so that seeds that touch are split. With --count the sum of all is the number that was implanted. Every seed gets a
+place (mm, RAS), an axis, a confidence (probability of the count of its component times the share of the signal that the fit explains)
+and the standard deviation of its place. What is doubtful is listed with its signal in seeds.
+
+The CT is NIfTI-1, NRRD or MetaImage in HU; crop it to the gland and its surroundings. Written to --out, a new or empty folder:
+seeds.csv, which `host-ui dose --seeds` and `host-ui post-implant` read, and found.json.
+
+Example:
+  host-ui find-seeds day30.nii.gz --count 98 --out found
+  host-ui dose --source sources/i125_6711.toml --seeds found/seeds.csv --strength-u 0.45 --structures day30.nrrd --out day30";
+
+/// Options of `host-ui find-seeds`.
+#[derive(Args, Debug)]
+#[command(after_long_help = HELP)]
+pub struct FindSeedsArgs {
+    /// CT of the implant: NIfTI-1, NRRD, MetaImage
+    ct: PathBuf,
+    /// Number of seeds that were implanted, less those that were lost
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
+    count: Option<u64>,
+    /// Voxels of this value or more belong to seeds [default: from the data, and reported]
+    #[arg(long, value_name = "HU", allow_negative_numbers = true)]
+    threshold: Option<f64>,
+    /// Length of a seed
+    #[arg(long, value_name = "MM", default_value_t = 4.5)]
+    length_mm: f64,
+    /// Diameter of a seed
+    #[arg(long, value_name = "MM", default_value_t = 0.8)]
+    diameter_mm: f64,
+    /// Count every component as one seed, to see what splitting gains
+    #[arg(long)]
+    no_split: bool,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+impl FindSeedsArgs {
+    /// Carries out the command.
+    pub fn run(self) -> Result<(), CommandError> {
+        within("--length-mm", self.length_mm, 1.0, 10.0)?;
+        within("--diameter-mm", self.diameter_mm, 0.2, 3.0)?;
+        let ct = read_values(&self.ct, &Progress::default())?;
+        let search = Search {
+            threshold: self.threshold,
+            count: self.count.map(|n| n as usize),
+            length_m: self.length_mm * 1e-3,
+            diameter_m: self.diameter_mm * 1e-3,
+            split: !self.no_split,
+        };
+        let found = finder::find(&ct, &search).map_err(|why| format!("{}: {why}", self.ct.display()))?;
+        if let Some(note) = &ct.frame.warning {
+            eprintln!("note: {}: {}", self.ct.display(), printable(note));
+        }
+        new_folder(&self.out)?;
+        write::found_seeds(&self.out.join("seeds.csv"), &found.seeds)?;
+        write::json(&self.out.join("found.json"), &self.json(&found)?)?;
+        self.print(&found);
+        Ok(())
+    }
+
+    fn print(&self, found: &Found) {
+        let [tissue, noise] = found.tissue;
+        let given = if self.threshold.is_some() {
+            "given"
+        } else {
+            "from the data"
+        };
+        println!(
+            "threshold {:.0} HU ({given}); tissue {tissue:.0} HU, noise {noise:.0} HU, blur {:.2} mm",
+            found.threshold,
+            found.blur_m * 1e3
+        );
+        println!(
+            "{} components, {} of them split: {} seeds{}",
+            found.components,
+            found.split_components,
+            found.seeds.len(),
+            self.count.map_or_else(String::new, |n| format!(" of {n}"))
+        );
+        for doubt in &found.doubts {
+            let [x, y, z] = doubt.place_m.map(|m| m * 1e3);
+            println!(
+                "doubtful: at {x:.1}, {y:.1}, {z:.1} mm, signal of {:.2} seeds, counted as {}: {}",
+                doubt.signal, doubt.counted, doubt.why
+            );
+        }
+        if let Some(count) = self.count.filter(|n| *n != found.seeds.len() as u64) {
+            eprintln!(
+                "note: {} seeds are asked for and the signal holds {}; look at what is doubtful, or choose another --threshold",
+                count,
+                found.seeds.len()
+            );
+        }
+        println!("written: {}", self.out.display());
+    }
+
+    fn json(&self, found: &Found) -> Result<serde_json::Value, CommandError> {
+        let mm = |place: [f64; 3]| place.map(|m| m * 1e3);
+        let doubts = found
+            .doubts
+            .iter()
+            .map(|d| json!({ "at_mm": mm(d.place_m), "signal_seeds": d.signal, "counted": d.counted, "why": d.why }));
+        let inputs: [(&str, &Path); 1] = [("ct", &self.ct)];
+        Ok(json!({
+            "seeds": found.seeds.len(),
+            "asked": self.count,
+            "threshold_hu": found.threshold,
+            "threshold_is_given": self.threshold.is_some(),
+            "tissue_hu": found.tissue[0],
+            "noise_hu": found.tissue[1],
+            "blur_mm": found.blur_m * 1e3,
+            "components": found.components,
+            "components_split": found.split_components,
+            "doubtful": doubts.collect::<Vec<_>>(),
+            "made": provenance::made(&inputs)?,
+        }))
+    }
+}
