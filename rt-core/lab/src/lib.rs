@@ -6,6 +6,7 @@
 #![warn(missing_docs)]
 
 pub mod args;
+mod bound;
 mod collect;
 mod compare;
 pub mod cost;

@@ -1,5 +1,6 @@
 //! The report of a measurement: everything in one record, written as JSON, as a page, and as raw histograms.
 
+use crate::bound::{self, MissBound};
 use crate::collect::LoopTiming;
 use crate::compare::Comparison;
 use crate::gaps::GapReport;
@@ -63,6 +64,7 @@ pub struct LoopCounts {
 pub struct LoopSection {
     pub times: Vec<Summary>,
     pub counts: LoopCounts,
+    pub miss_bound: MissBound,
     /// Own work at p99.9 as a share of the period.
     pub work_p999_of_period: Option<f64>,
 }
@@ -263,6 +265,7 @@ fn loop_section(run: &LoopReport, timing: &LoopTiming, rate_hz: f64, [path, outp
             voluntary_switches_beyond_sleep: switches_beyond_sleep(run, timing.unslept),
             involuntary_switches: run.usage.involuntary_switches,
         },
+        miss_bound: bound::of_misses(timing.missed, timing.ticks + timing.missed, rate_hz),
         work_p999_of_period: quantile_us(&timing.work, 0.999).map(|us| us * rate_hz / 1e6),
     }
 }

@@ -1,6 +1,7 @@
 //! What the figures come from: counters of the kernel, settings, machine, packages, method.
 
 use super::parts::{Column, cell, count, num, or_na, table};
+use crate::bound::MissBound;
 use crate::report::Report;
 use maud::{Markup, html};
 
@@ -50,6 +51,20 @@ pub fn counters(r: &Report) -> Markup {
         div class="pair" {
             (table(&["from arming to the end", "force loop", "tissue loop"], &rows, &COUNTS))
             (table(&["core", "MHz", "steal time, s", "interrupts served"], &cores, &COUNTS))
+        }
+        (miss_bound("Force loop", &r.haptic.miss_bound))
+        (miss_bound("Tissue loop", &r.tissue.miss_bound))
+    }
+}
+
+fn miss_bound(name: &str, b: &MissBound) -> Markup {
+    let Some((share, hourly)) = b.at_most.zip(b.at_most_per_hour) else {
+        return Markup::default();
+    };
+    html! {
+        p class="faint" {
+            (name) ": " (b.misses) " missed of " (num(b.of as f64)) "; with 95 % confidence at most " (format!("{share:.2e}"))
+            " of all, " (num(hourly)) " an hour (Clopper-Pearson, if misses are independent and the machine stays as it was)."
         }
     }
 }
