@@ -62,7 +62,7 @@ impl App {
             let foot = Panel::bottom("foot").exact_size(foot_height(ui)).resizable(false);
             foot.frame(Frame::new())
                 .show(ui, |ui| foot_ui(ui, &self.shown, actions));
-            run_ui(ui, &self.shown, actions);
+            run_ui(ui, &self.shown, &mut self.workflow.guide, actions);
             ScrollArea::vertical().show(ui, |ui| {
                 actions.extend(workflow_ui(ui, &self.shown, &mut self.workflow));
             });

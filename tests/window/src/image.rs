@@ -186,6 +186,9 @@ fn an_image_lies_where_its_file_says_and_moves_with_the_tissue() {
             .scene()
             .is_some_and(|s| s.header.name.read().contains("pelvis"))
     });
+    driven.until("its surfaces", |app| {
+        app.link().scene().is_some_and(|scene| scene.bodies_made().is_some())
+    });
     driven.window.run_steps(3);
     assert!(
         driven.window.query_by_label("Image").is_none(),

@@ -7,7 +7,7 @@ mod lesson;
 
 use crate::shown::Shown;
 use crate::theme;
-use egui::{Button, Stroke};
+use egui::Stroke;
 pub use felt::Felt;
 pub use lesson::lesson;
 
@@ -44,15 +44,10 @@ pub fn guide_ui(ui: &mut egui::Ui, shown: &Shown, guide: &mut Guide) {
     ui.add_space(theme::GAP);
 }
 
-/// Under the steps.
-pub fn open_ui(ui: &mut egui::Ui, guide: &mut Guide) {
-    if guide.open {
-        return;
-    }
-    ui.add_space(theme::GAP);
-    let button = ui.add(Button::new("First insertion"));
-    let hint = "A guide through one needle: what to do, what to watch, and why the seeds missed";
-    if button.on_hover_text(hint).clicked() {
-        guide.open = true;
+impl Guide {
+    /// Opens and closes it.
+    pub fn toggle_ui(&mut self, ui: &mut egui::Ui) {
+        let hint = "Through the first insertion: what to do, what to watch, and why the seeds missed";
+        ui.toggle_value(&mut self.open, "Guide").on_hover_text(hint);
     }
 }

@@ -77,7 +77,6 @@ pub fn workflow_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState) 
             state.open_by_hand(step);
         }
     }
-    guide::open_ui(ui, &mut state.guide);
     actions
 }
 

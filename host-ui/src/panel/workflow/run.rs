@@ -1,6 +1,6 @@
 //! The row above the steps: the scripted hand, how far it is, and its end.
 
-use super::{Progress, hinted, missing};
+use super::{Guide, Progress, hinted, missing};
 use crate::action::Action;
 use crate::shown::Shown;
 use crate::theme;
@@ -16,8 +16,11 @@ const RUN_HEIGHT: f32 = RUN_BUTTON + theme::GAP + 24.0;
 const SHOW_WAITING_S: f64 = 2.0;
 
 /// Always as high, running or not.
-pub fn run_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
-    ui.heading("Procedure");
+pub fn run_ui(ui: &mut egui::Ui, shown: &Shown, guide: &mut Guide, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        ui.heading("Procedure");
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| guide.toggle_ui(ui));
+    });
     let size = egui::vec2(ui.available_width(), RUN_HEIGHT);
     ui.allocate_ui(size, |ui| {
         ui.set_min_size(size);
