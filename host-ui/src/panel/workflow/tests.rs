@@ -115,7 +115,7 @@ fn the_row_of_a_run_stays_inside_its_panel() {
         let mut output = ctx.run_ui(egui::RawInput::default(), |ui| {
             let panel = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, 600.0));
             let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(panel));
-            run_ui(&mut ui, &shown, &mut Guide::default(), &mut Vec::new());
+            run_ui(&mut ui, &shown, &mut super::Guide::default(), &mut Vec::new());
             needed = ui.min_rect();
         });
         output.textures_delta.clear();
