@@ -166,19 +166,19 @@ impl Common {
         loaded: &Loaded,
         most_points: usize,
     ) -> Result<Judge, CommandError> {
-        let extra = self
-            .metrics
-            .iter()
-            .map(|m| Metric::parse(m))
-            .collect::<Result<Vec<_>, _>>()?;
         Ok(Judge::new(
             structures,
             self.target.as_deref(),
-            &extra,
+            &self.extra_metrics()?,
             self.prescription_gy(loaded)?,
             &loaded.seeds,
             most_points,
         )?)
+    }
+
+    fn extra_metrics(&self) -> Result<Vec<Metric>, CommandError> {
+        let metrics = self.metrics.iter().map(|m| Metric::parse(m));
+        Ok(metrics.collect::<Result<Vec<_>, _>>()?)
     }
 
     /// Whether dose is that of the whole life of the seeds.
@@ -217,6 +217,8 @@ impl Common {
         most_points: usize,
     ) -> Result<(Vec<Structure>, usize), CommandError> {
         let given = self.label_names()?;
+        // A long file is not read for a wrong option.
+        self.extra_metrics()?;
         let structures = match contours::structures(file, most_points)? {
             Some((_, _)) if !given.is_empty() => {
                 return Err(format!("--name: {} names its structures itself", file.display()).into());
