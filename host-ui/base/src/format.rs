@@ -32,7 +32,7 @@ pub fn length(metres: f64) -> String {
 
 /// With its sign, to be read as an error.
 pub fn signed_mm(metres: f64) -> String {
-    format!("{:+.2}", mm(metres))
+    signed(mm(metres), 2)
 }
 
 /// Speed with its unit, to 0.1 mm/s.
@@ -86,6 +86,17 @@ pub fn decimal(value: f64, decimals: usize) -> String {
     format!("{:.decimals$}", if is_zero { 0.0 } else { value })
 }
 
+/// With its sign, unless it is zero as shown.
+pub fn signed(value: f64, decimals: usize) -> String {
+    let shown = decimal(value, decimals);
+    let is_zero = shown.bytes().all(|b| matches!(b, b'0' | b'.'));
+    if is_zero || value < 0.0 {
+        shown
+    } else {
+        format!("+{shown}")
+    }
+}
+
 /// Characters of a text out of a file that are shown: a file chooses what it makes a message say, and how much.
 const MAX_SHOWN_CHARS: usize = 4000;
 
@@ -111,6 +122,12 @@ mod tests {
         assert_eq!(length(0.0123), "12.3 mm");
         assert_eq!(length(-1e-9), "0.0 mm");
         assert_eq!(signed_mm(-0.00125), "-1.25");
+        assert_eq!(signed_mm(0.00125), "+1.25");
+        assert_eq!(
+            (signed(-0.004, 2), signed(0.004, 2)),
+            ("0.00".to_owned(), "0.00".to_owned())
+        );
+        assert_eq!(signed(-0.006, 2), "-0.01");
         assert_eq!(count(12_345_678), "12 345 678");
         assert_eq!(count(999), "999");
         assert_eq!(microseconds(None), "n/a");

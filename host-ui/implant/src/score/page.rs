@@ -2,6 +2,7 @@
 
 use super::{Score, ScoreError, picture};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use stylet_base::format;
 
 /// Look of every page.
 pub const STYLE: &str = "\
@@ -158,9 +159,11 @@ fn clock(seconds: f64) -> String {
 /// Every measure of every structure, planned beside delivered.
 fn measures(score: &Score) -> Markup {
     let (planned, delivered) = (score.judge.values(&score.planned), score.judge.values(&score.delivered));
-    let number = |v: &Option<f64>, name: &str| v.map_or_else(|| "not defined".to_owned(), |v| figure(v, name));
+    let number = |v: &Option<f64>, name: &str| {
+        v.map_or_else(|| "not defined".to_owned(), |v| format::decimal(v, decimals(name)))
+    };
     let change = |before: &Option<f64>, after: &Option<f64>, name: &str| match (before, after) {
-        (Some(b), Some(a)) => format!("{}{}", if a >= b { "+" } else { "−" }, figure((a - b).abs(), name)),
+        (Some(b), Some(a)) => format::signed(a - b, decimals(name)),
         _ => String::new(),
     };
     html! {
@@ -182,12 +185,8 @@ fn measures(score: &Score) -> Markup {
     }
 }
 
-fn figure(value: f64, name: &str) -> String {
-    if name.ends_with("[1]") {
-        format!("{value:.3}")
-    } else {
-        format!("{value:.1}")
-    }
+fn decimals(name: &str) -> usize {
+    if name.ends_with("[1]") { 3 } else { 1 }
 }
 
 /// Names carry their unit in brackets.
@@ -235,12 +234,12 @@ fn seed(score: &Score, n: usize) -> Markup {
         tr {
             td { (n + 1) } td { (pair.needle + 1) } td { (hole) }
             td { (format!("{:.2}", pair.error_m() * 1e3)) }
-            td { (format!("{:+.2}", pair.error_along_m() * 1e3)) }
+            td { (format::signed_mm(pair.error_along_m())) }
             td { (format!("{:.2}", pair.error_across_m() * 1e3)) }
-            td class=[is_costly.then_some("bad")] { (format!("{:.2}", cost.target_d90_gy)) }
-            td { (format!("{:.3}", cost.target_v100_percent)) }
+            td class=[is_costly.then_some("bad")] { (format::decimal(cost.target_d90_gy, 2)) }
+            td { (format::decimal(cost.target_v100_percent, 3)) }
             @for gy in [cost.urethra_d10_gy, cost.urethra_d30_gy].into_iter().flatten() {
-                td { (format!("{gy:.2}")) }
+                td { (format::decimal(gy, 2)) }
             }
         }
     }

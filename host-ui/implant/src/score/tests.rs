@@ -140,6 +140,10 @@ fn the_page_stands_by_itself_and_escapes_what_it_is_given() {
     let score = score(&[4, 20], &anatomy, &kernel, &records);
     let page = super::page::page(&score).unwrap();
     assert_eq!(page.matches("<svg").count(), 3);
+    // A change of nothing read "−0.0", and one of -0.001 Gy "-0.00".
+    for zero in ["-0.0<", "-0.00<", "-0.000<", "+0.0<", "+0.00<", "+0.000<", "−"] {
+        assert!(!page.contains(zero), "{zero}");
+    }
     assert!(page.contains("a &lt;test&gt;") && !page.contains("<test>"));
     for foreign in ["http://", "https://", "src=", "NaN"] {
         let elsewhere = page.replace("http://www.w3.org/2000/svg", "");
