@@ -1,6 +1,6 @@
 //! The page as HTML that stands by itself and prints on one sheet of A4.
 
-use super::figures::{DEFINITIONS, Row, rows};
+use super::figures::{DEFINITIONS, NotComputed, Row, rows};
 use super::{Column, Implant};
 use crate::score::STYLE;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -16,7 +16,7 @@ const SHEET: &str = "\
 body{font-size:13px;line-height:1.35}
 main{max-width:1100px;padding:18px 20px}
 h1{font-size:21px}h2{font-size:14px;margin:12px 0 4px}
-th,td{padding:1.5px 8px}td.why{white-space:normal;color:var(--soft);font-size:11px}
+th,td{padding:1.5px 8px}.why{white-space:normal;color:var(--soft);font-size:11px}sup{font-size:8px;line-height:0}p.why{margin:3px 8px}
 tr.group td{font-weight:650;border-bottom:1px solid var(--ink);padding-top:7px}
 td:nth-child(2),th:nth-child(2){text-align:left;color:var(--soft)}
 .two{display:grid;grid-template-columns:auto auto;gap:0 26px;align-items:start}
@@ -24,7 +24,7 @@ footer{margin-top:10px;padding-top:6px;font-size:10px;line-height:1.3}
 footer p{margin:1px 0}
 @media print{html{font-size:8pt}body{font-size:8pt;line-height:1.2}main{padding:0;max-width:none}th,td{padding:.4pt 4pt}
 h1{font-size:13pt}h2{font-size:9pt;margin:5pt 0 1pt}tr.group td{padding-top:2.5pt}th{font-size:7.5pt}
-td.why{font-size:6.5pt}footer{font-size:6pt;margin-top:4pt;line-height:1.15}}
+.why{font-size:6.5pt}sup{font-size:5pt}footer{font-size:6pt;margin-top:4pt;line-height:1.15}}
 ";
 
 /// The page of one state or of several.
@@ -89,6 +89,7 @@ fn names(columns: &[Column]) -> Markup {
 
 fn figures(rows: &[Row], columns: &[Column]) -> Markup {
     let begins = |n: usize| n == 0 || rows[n - 1].group != rows[n].group;
+    let reasons = reasons(rows);
     html! {
         table {
             thead { tr { th { "" } th { "" } (names(columns)) } }
@@ -97,25 +98,44 @@ fn figures(rows: &[Row], columns: &[Column]) -> Markup {
                     @if begins(n) {
                         tr class="group" { td colspan=(2 + columns.len()) { (row.group) } }
                     }
-                    tr { td { (row.name) } td { (row.unit) } (cells(row)) }
+                    tr { td { (row.name) } td { (row.unit) } (cells(row, &reasons)) }
                 }
             }
+        }
+        @for (n, why) in reasons.iter().enumerate() {
+            p class="why" { sup { (n + 1) } " not computed: " (why.to_string()) }
         }
     }
 }
 
-/// Where every column lacks a figure for the same reason it is given once.
-fn cells(row: &Row) -> Markup {
-    let first = row.values.first().and_then(|v| v.as_ref().err());
-    let all_lack = first.filter(|why| row.values.iter().all(|v| v.as_ref().err() == Some(*why)));
+/// Why no column has this figure, where that is one reason.
+fn lacked_by_all(row: &Row) -> Option<&NotComputed> {
+    let first = row.values.first()?.as_ref().err()?;
+    row.values.iter().all(|v| v.as_ref() == Err(first)).then_some(first)
+}
+
+/// Why some columns lack a figure that others have; each reason once, for the notes under the table.
+fn reasons(rows: &[Row]) -> Vec<&NotComputed> {
+    let mut reasons = Vec::new();
+    let lacking = rows.iter().filter(|row| lacked_by_all(row).is_none());
+    for why in lacking.flat_map(|row| &row.values).filter_map(|v| v.as_ref().err()) {
+        if !reasons.contains(&why) {
+            reasons.push(why);
+        }
+    }
+    reasons
+}
+
+fn cells(row: &Row, reasons: &[&NotComputed]) -> Markup {
+    let note = |why: &NotComputed| reasons.iter().position(|r| *r == why).map(|n| n + 1);
     html! {
-        @if let Some(why) = all_lack {
+        @if let Some(why) = lacked_by_all(row) {
             td class="why" colspan=(row.values.len()) { "not computed: " (why.to_string()) }
         } @else {
             @for value in &row.values {
                 @match value {
                     Ok(value) => td { (format!("{value:.*}", row.digits)) },
-                    Err(why) => td class="why" { "not computed: " (why.to_string()) },
+                    Err(why) => td { "–" @if let Some(n) = note(why) { sup { (n) } } },
                 }
             }
         }

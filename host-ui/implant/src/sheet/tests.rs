@@ -68,6 +68,10 @@ fn the_page_has_every_figure_of_the_report_or_why_there_is_none() {
     let page = page(&implant, &columns);
     assert!(page.contains("@page{size:A4 portrait") && page.contains("case &lt;1&gt;"));
     assert!(page.contains("not computed: no structure is called rectum"));
+    // The same sentence stood in seven cells and made every other column as wide as it.
+    let edema_s = "not computed: with edema the dose rate does not decay with the source alone";
+    assert_eq!(page.matches(edema_s).count(), 1, "{page}");
+    assert!(page.contains("–<sup>1</sup>") && page.contains("–<sup>2</sup>"));
     assert_eq!(columns[0].sectors.len(), 12);
     let json = to_json(&implant, &columns);
     assert!(json["states"][0]["figures"]["target D90 [Gy]"].as_f64().unwrap() > 100.0);
