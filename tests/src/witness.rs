@@ -14,7 +14,10 @@ pub const STALL: Duration = Duration::from_millis(15);
 
 const SLEEP: Duration = Duration::from_millis(2);
 const PRIORITY: libc::c_int = 98;
-const ATTEMPTS: usize = 3;
+/// A shared machine was seen to stand still for 30 ms every five seconds, which is as long as an attempt is.
+const ATTEMPTS: usize = 12;
+/// No attempt begins after this.
+const PATIENCE: Duration = Duration::from_secs(180);
 
 #[derive(Default)]
 struct Seen {
@@ -85,7 +88,7 @@ fn watch(core: usize, seen: &Seen, are_watching: &Barrier) {
     }
 }
 
-/// Runs a check of what happens in time, and once more, up to twice, where it failed while the machine stood still.
+/// Runs a check of what happens in time, and again, for up to three minutes, where it failed while the machine stood still.
 pub fn where_the_machine_runs(check: impl Fn()) {
     repeat_after_stalls(|| {
         let witness = Witness::begin();
@@ -96,10 +99,11 @@ pub fn where_the_machine_runs(check: impl Fn()) {
 
 /// An attempt gives its outcome and the longest stall in it.
 fn repeat_after_stalls(mut attempt: impl FnMut() -> (std::thread::Result<()>, Duration)) {
+    let begun = Instant::now();
     for number in 1.. {
         let (outcome, stall) = attempt();
         let Err(panic) = outcome else { return };
-        if stall < STALL || number == ATTEMPTS {
+        if stall < STALL || number == ATTEMPTS || begun.elapsed() > PATIENCE {
             println!("the longest stall of the machine was {stall:?}, in attempt {number}");
             resume_unwind(panic);
         }
@@ -118,7 +122,7 @@ mod tests {
         for (stalls, passes_at, tries, passes) in [
             (vec![ran; 3], 2, 1, false),
             (vec![stood_still, ran, ran], 9, 2, false),
-            (vec![stood_still; 9], 9, ATTEMPTS, false),
+            (vec![stood_still; ATTEMPTS], 99, ATTEMPTS, false),
             (vec![stood_still, ran], 2, 2, true),
             (vec![stood_still], 1, 1, true),
         ] {
