@@ -45,7 +45,7 @@ pub struct Cli {
     /// Ignore gamepads and 3D mice: only keys and mouse move the needle
     #[arg(long)]
     no_controllers: bool,
-    /// Draw frames without a pause, for measurements
+    /// Draw frames without a pause, and print each second how many and what they cost, for measurements
     #[arg(long)]
     without_pause: bool,
     #[command(subcommand)]

@@ -4,6 +4,7 @@ mod act;
 mod debrief;
 mod drive;
 mod files;
+mod frames;
 mod layout;
 mod plan;
 mod take;
@@ -97,6 +98,7 @@ pub struct App {
     waiting: Vec<Waiting>,
     controllers: Controllers,
     pause: bool,
+    frames: frames::Frames,
     /// The core that was left to the force loop.
     left_core: Option<u32>,
     drive: drive::Drive,
@@ -229,6 +231,7 @@ impl App {
                 Controllers::none()
             },
             pause: options.pause,
+            frames: frames::Frames::new(Instant::now()),
             left_core: None,
             drive: drive::Drive::default(),
             pressed: Vec::new(),
@@ -323,6 +326,13 @@ impl eframe::App for App {
             driver_us: format::us(driver_ns),
             uploaded_bytes: asked.uploaded_bytes - driver.uploaded_bytes,
         };
+        if let Some((rate_hz, mean)) = self.frames.count(Instant::now(), &self.shown.cost) {
+            self.shown.frames_hz = Some(rate_hz);
+            if !self.pause {
+                let [ours_ms, driver_ms] = [mean.cpu_us, mean.driver_us].map(|us| us * 1e-3);
+                eprintln!("host-ui: {rate_hz:.1} frames/s, {ours_ms:.2} ms a frame, {driver_ms:.2} in the driver");
+            }
+        }
         ctx.request_repaint_after(match self.shown.status {
             LinkStatus::Live if self.pause => LIVE_FRAME,
             LinkStatus::Live => Duration::ZERO,

@@ -75,6 +75,8 @@ pub struct Shown {
     /// The device that was unplugged, until the message is dismissed or a device is plugged in.
     pub disconnected: Option<String>,
     pub cost: FrameCost,
+    /// Frames that the window drew in the last second (Hz).
+    pub frames_hz: Option<f64>,
 }
 
 /// Where the tip is against the planned path.
@@ -92,7 +94,7 @@ pub struct TipOnPath {
 }
 
 /// What the last frame cost this program.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrameCost {
     /// Processor time without the driver's.
     pub cpu_us: f64,
@@ -146,6 +148,7 @@ impl Shown {
             has_focus: true,
             disconnected: None,
             cost: FrameCost::default(),
+            frames_hz: None,
         }
     }
 
