@@ -45,9 +45,12 @@ pub struct Cli {
     /// Ignore gamepads and 3D mice: only keys and mouse move the needle
     #[arg(long)]
     no_controllers: bool,
-    /// Draw frames without a pause, and print each second how many and what they cost, for measurements
+    /// Draw frames without a pause, for measurements
     #[arg(long)]
     without_pause: bool,
+    /// Print each second how many frames were drawn and what they cost
+    #[arg(long)]
+    count_frames: bool,
     #[command(subcommand)]
     task: Option<Task>,
 }
@@ -172,6 +175,7 @@ impl Cli {
                     image: self.image,
                     controllers: !self.no_controllers,
                     pause: !self.without_pause,
+                    count_frames: self.count_frames,
                 });
                 instance.sweep();
                 Ok(ended?)

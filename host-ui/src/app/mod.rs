@@ -52,6 +52,8 @@ pub struct Options {
     pub controllers: bool,
     /// Limits the frame rate to what the eye needs; without it frames follow at once.
     pub pause: bool,
+    /// Prints each second how many frames were drawn and what they cost.
+    pub count_frames: bool,
 }
 
 /// A command that has not been answered yet.
@@ -98,6 +100,7 @@ pub struct App {
     waiting: Vec<Waiting>,
     controllers: Controllers,
     pause: bool,
+    count_frames: bool,
     frames: frames::Frames,
     /// The core that was left to the force loop.
     left_core: Option<u32>,
@@ -231,6 +234,7 @@ impl App {
                 Controllers::none()
             },
             pause: options.pause,
+            count_frames: options.count_frames,
             frames: frames::Frames::new(Instant::now()),
             left_core: None,
             drive: drive::Drive::default(),
@@ -328,7 +332,7 @@ impl eframe::App for App {
         };
         if let Some((rate_hz, mean)) = self.frames.count(Instant::now(), &self.shown.cost) {
             self.shown.frames_hz = Some(rate_hz);
-            if !self.pause {
+            if self.count_frames {
                 let [ours_ms, driver_ms] = [mean.cpu_us, mean.driver_us].map(|us| us * 1e-3);
                 eprintln!("host-ui: {rate_hz:.1} frames/s, {ours_ms:.2} ms a frame, {driver_ms:.2} in the driver");
             }

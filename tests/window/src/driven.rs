@@ -49,6 +49,7 @@ impl Driven {
             image: None,
             controllers: false,
             pause: true,
+            count_frames: false,
         };
         Harness::builder()
             .with_size(size)

@@ -80,6 +80,7 @@ fn a_window_that_comes_moves_nothing_by_itself() {
         image: None,
         controllers: false,
         pause: true,
+        count_frames: false,
     };
     let mut second = Harness::builder()
         .with_size([1280.0, 800.0])

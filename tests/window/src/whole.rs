@@ -42,6 +42,7 @@ fn window_of(instance: &str, size: [f32; 2]) -> Window {
         image: None,
         controllers: false,
         pause: true,
+        count_frames: false,
     };
     Window {
         harness: Harness::builder()

@@ -41,6 +41,7 @@ impl Drawn {
             image: None,
             controllers: false,
             pause: true,
+            count_frames: false,
         };
         let app = App::new(&eframe::CreationContext::_new_kittest(ctx.clone()), options);
         ctx.all_styles_mut(|style| style.interaction.tooltip_delay = 1e9);
