@@ -105,7 +105,7 @@ impl App {
     }
 
     fn middle_ui(&mut self, ui: &mut egui::Ui, actions: &mut Vec<Action>) -> Rect {
-        let middle = CentralPanel::default().frame(Frame::new().fill(theme::of(ui).background));
+        let middle = CentralPanel::default().frame(Frame::new());
         let shown = middle.show(ui, |ui| {
             let (layout, dose) = (self.settings.layout, self.shown.dose.as_ref());
             actions.extend(self.middle.middle_ui(ui, layout, &self.shown, dose));

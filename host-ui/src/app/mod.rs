@@ -330,12 +330,10 @@ impl eframe::App for App {
             driver_us: format::us(driver_ns),
             uploaded_bytes: asked.uploaded_bytes - driver.uploaded_bytes,
         };
-        if let Some((rate_hz, mean)) = self.frames.count(Instant::now(), &self.shown.cost) {
-            self.shown.frames_hz = Some(rate_hz);
-            if self.count_frames {
-                let [ours_ms, driver_ms] = [mean.cpu_us, mean.driver_us].map(|us| us * 1e-3);
-                eprintln!("host-ui: {rate_hz:.1} frames/s, {ours_ms:.2} ms a frame, {driver_ms:.2} in the driver");
-            }
+        let counted = self.frames.count(Instant::now(), &self.shown.cost);
+        if let Some((rate_hz, mean)) = counted.filter(|_| self.count_frames) {
+            let [ours_ms, driver_ms] = [mean.cpu_us, mean.driver_us].map(|us| us * 1e-3);
+            eprintln!("host-ui: {rate_hz:.1} frames/s, {ours_ms:.2} ms a frame, {driver_ms:.2} in the driver");
         }
         ctx.request_repaint_after(match self.shown.status {
             LinkStatus::Live if self.pause => LIVE_FRAME,

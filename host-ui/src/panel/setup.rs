@@ -93,9 +93,8 @@ fn axes(shown: &Shown) -> String {
 
 fn frame(shown: &Shown) -> String {
     let cost = shown.cost;
-    let rate = shown.frames_hz.map_or_else(String::new, |hz| format!("{hz:.0}/s, "));
     format!(
-        "{rate}{:.1} ms a frame, {:.1} in the driver, {:.0} KiB",
+        "{:.1} ms a frame, {:.1} in the driver, {:.0} KiB",
         cost.cpu_us * 1e-3,
         cost.driver_us * 1e-3,
         cost.uploaded_bytes as f64 / 1024.0

@@ -75,8 +75,6 @@ pub struct Shown {
     /// The device that was unplugged, until the message is dismissed or a device is plugged in.
     pub disconnected: Option<String>,
     pub cost: FrameCost,
-    /// Frames that the window drew in the last second (Hz).
-    pub frames_hz: Option<f64>,
 }
 
 /// Where the tip is against the planned path.
@@ -148,7 +146,6 @@ impl Shown {
             has_focus: true,
             disconnected: None,
             cost: FrameCost::default(),
-            frames_hz: None,
         }
     }
 

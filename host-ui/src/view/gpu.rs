@@ -7,6 +7,7 @@ mod pipelines;
 
 use super::driver::DriverCost;
 use super::marks::Marks;
+use super::paste::{Paste, Pasted};
 use crate::dose_worker::IsodoseShell;
 use crate::mesh::SurfaceVertex;
 use bytemuck::{Pod, Zeroable};
@@ -41,7 +42,7 @@ struct Targets {
     resolved: wgpu::TextureView,
     color: wgpu::TextureView,
     depth: wgpu::TextureView,
-    id: egui::TextureId,
+    pasted: Pasted,
 }
 
 struct Material {
@@ -66,6 +67,7 @@ pub struct Gpu {
     state: RenderState,
     layout: wgpu::BindGroupLayout,
     pipelines: Pipelines,
+    paste: Paste,
     /// The body's surface, then those inside it.
     surfaces: Vec<Layer>,
     ghost: Material,
@@ -99,6 +101,7 @@ impl Gpu {
         let vertex = wgpu::BufferUsages::VERTEX;
         Self {
             pipelines: pipelines(device, &layout),
+            paste: Paste::new(&state),
             surfaces: Vec::new(),
             ghost: material(device, &layout),
             solids: [Growing::new(device, vertex), Growing::new(device, vertex)],
@@ -173,13 +176,12 @@ impl Gpu {
         if self.targets.as_ref().is_some_and(|t| t.size == size) {
             return false;
         }
-        let old = self.targets.take().map(|t| t.id);
-        self.targets = Some(targets(&self.state, size, old));
+        self.targets = Some(targets(&self.state, &self.paste, size));
         true
     }
 
-    pub fn texture(&self) -> Option<egui::TextureId> {
-        self.targets.as_ref().map(|t| t.id)
+    pub fn picture(&self) -> Option<Pasted> {
+        self.targets.as_ref().map(|t| t.pasted.clone())
     }
 
     /// Opaque first, then the rest shape, then the body's far side, what is in the body, and the body's near side.
@@ -319,7 +321,7 @@ fn begin<'a>(encoder: &'a mut wgpu::CommandEncoder, targets: &Targets, clear: [f
     })
 }
 
-fn targets(state: &RenderState, size: [u32; 2], old: Option<egui::TextureId>) -> Targets {
+fn targets(state: &RenderState, paste: &Paste, size: [u32; 2]) -> Targets {
     let make = |format, samples, usage| {
         let texture = state.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("stylet view"),
@@ -339,21 +341,12 @@ fn targets(state: &RenderState, size: [u32; 2], old: Option<egui::TextureId>) ->
     };
     let drawn = wgpu::TextureUsages::RENDER_ATTACHMENT;
     let resolved = make(COLOR, 1, drawn | wgpu::TextureUsages::TEXTURE_BINDING);
-    let mut renderer = state.renderer.write();
-    let filter = wgpu::FilterMode::Linear;
-    let id = match old {
-        Some(id) => {
-            renderer.update_egui_texture_from_wgpu_texture(&state.device, &resolved, filter, id);
-            id
-        }
-        None => renderer.register_native_texture(&state.device, &resolved, filter),
-    };
     Targets {
         size,
         color: make(COLOR, SAMPLES, drawn),
         depth: make(DEPTH, SAMPLES, drawn),
+        pasted: paste.of(&resolved),
         resolved,
-        id,
     }
 }
 

@@ -114,6 +114,16 @@ impl Middle {
         ui.advance_cursor_after_rect(rect);
         self.pictures_top = rect.top();
         let places = places(rect, layout);
+        if layout != Layout::Solid {
+            // Only what is seen between the pictures: each layer of a pixel costs as much as the last on a driver in software.
+            let whole = Rect::from_center_size(rect.center(), egui::Vec2::splat(GAP));
+            for strip in [
+                Rect::from_x_y_ranges(rect.x_range(), whole.y_range()),
+                Rect::from_x_y_ranges(whole.x_range(), rect.y_range()),
+            ] {
+                ui.painter().rect_filled(strip, 0.0, tokens.background);
+            }
+        }
         for (orientation, rect) in places.slices {
             actions.extend(
                 self.slices

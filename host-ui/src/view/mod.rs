@@ -9,6 +9,7 @@ mod legend;
 mod marks;
 pub mod middle;
 pub mod orientation;
+mod paste;
 mod pick;
 mod scene3d;
 pub mod slice;

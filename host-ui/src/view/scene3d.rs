@@ -8,6 +8,7 @@ use super::kinds::{kinds, surfaces};
 use super::legend::Legend;
 use super::marks::Marks;
 use super::orientation::{Orientation, scene_from_patient};
+use super::paste::Pasted;
 use super::pick::pick;
 use super::state::ViewState;
 use crate::action::Viewpoint;
@@ -16,7 +17,7 @@ use crate::mesh::Surface;
 use crate::shown::Shown;
 use crate::theme::{self, IMAGE, Tokens};
 use eframe::egui_wgpu::RenderState;
-use egui::{Color32, PointerButton, Pos2, Rect, Sense};
+use egui::{Color32, PointerButton, Rect, Sense};
 use nalgebra::Vector3;
 use std::sync::Arc;
 use stylet_shm_schema::SceneId;
@@ -183,9 +184,8 @@ impl Scene3d {
         let dose = dose.filter(|_| view.isodose);
         let painter = ui.painter_at(rect);
         match self.render(ui.ctx().pixels_per_point(), rect, (shown, dose, view), tokens) {
-            Some(texture) => {
-                let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
-                painter.image(texture, rect, whole, Color32::WHITE);
+            Some(picture) => {
+                picture.paint(&painter, rect);
                 let legend = Legend {
                     painter: &painter,
                     rect,
@@ -200,11 +200,14 @@ impl Scene3d {
                 legend.rows(self.look, alone.map(|d| &**d));
             }
             None if rect.height() >= super::slice::ROOM_FOR_REASON => {
+                painter.rect_filled(rect, 0.0, tokens.background);
                 let text = "No 3D view: the window has no wgpu device. Install a Vulkan driver (mesa-vulkan-drivers) and start again; everything else \
                             works.";
                 super::slice::words(&painter, rect, text, tokens.weak);
             }
-            None => {}
+            None => {
+                painter.rect_filled(rect, 0.0, tokens.background);
+            }
         }
     }
 
@@ -245,7 +248,7 @@ impl Scene3d {
         rect: Rect,
         (shown, dose, view): (&Shown, Option<&Arc<DoseResult>>, &ViewState),
         tokens: &'static Tokens,
-    ) -> Option<egui::TextureId> {
+    ) -> Option<Pasted> {
         let gpu = self.gpu.as_mut()?;
         let pixels = [rect.width() * scale, rect.height() * scale].map(|side| side.round().max(1.0) as u32);
         let fresh = gpu.resize(pixels);
@@ -298,7 +301,7 @@ impl Scene3d {
             gpu.draw(&looks, &shells, self.look.rest_shape.then_some(&ghost), clear);
             self.drawn = Some(key);
         }
-        gpu.texture()
+        gpu.picture()
     }
 }
 

@@ -7,6 +7,7 @@ use super::field::Field;
 use super::plane::Plane;
 use super::speckle::{self, GRAIN_M, GRAINS, LARGEST_AMPLITUDE};
 use crate::view::driver::DriverCost;
+use crate::view::paste::{Paste, Pasted};
 use bytemuck::{Pod, Zeroable};
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
@@ -85,13 +86,14 @@ struct Pane {
 struct Target {
     size: [u32; 2],
     view: wgpu::TextureView,
-    id: egui::TextureId,
+    pasted: Pasted,
 }
 
 pub struct SliceGpu {
     state: RenderState,
     layout: wgpu::BindGroupLayout,
     pipeline: wgpu::RenderPipeline,
+    paste: Paste,
     grain: wgpu::TextureView,
     clamped: wgpu::Sampler,
     repeated: wgpu::Sampler,
@@ -129,6 +131,7 @@ impl SliceGpu {
         driver.send(|| write(&state, &grain, &grains, 1));
         Self {
             pipeline: pipeline(device, &layout),
+            paste: Paste::new(&state),
             grain: grain.create_view(&wgpu::TextureViewDescriptor::default()),
             clamped: sampler(wgpu::AddressMode::ClampToEdge),
             repeated: sampler(wgpu::AddressMode::Repeat),
@@ -215,13 +218,7 @@ impl SliceGpu {
     }
 
     /// The picture of a plane, drawn if anything in it has changed; `None` without a scene.
-    pub fn picture(
-        &mut self,
-        number: usize,
-        plane: &Plane,
-        pixels_per_point: f32,
-        with_image: bool,
-    ) -> Option<egui::TextureId> {
+    pub fn picture(&mut self, number: usize, plane: &Plane, pixels_per_point: f32, with_image: bool) -> Option<Pasted> {
         let body = self.body.as_ref()?;
         let image = self.image.as_ref().filter(|_| with_image).map(|on_card| &on_card.image);
         let uniform = uniform(body, plane, image);
@@ -234,8 +231,7 @@ impl SliceGpu {
             .map(|side| ((side * pixels_per_point).round() as u32).clamp(1, LARGEST_SIDE));
         let pane = &mut self.panes[number];
         if pane.target.as_ref().is_none_or(|t| t.size != size) {
-            let old = pane.target.take().map(|t| t.id);
-            pane.target = Some(target(&self.state, size, old));
+            pane.target = Some(target(&self.state, &self.paste, size));
             pane.drawn = None;
         }
         let target = pane.target.as_ref()?;
@@ -248,7 +244,7 @@ impl SliceGpu {
                 bytes.len() as u64
             });
         }
-        Some(target.id)
+        Some(target.pasted.clone())
     }
 
     fn pane(&self, target: Option<Target>) -> Option<Pane> {
@@ -320,7 +316,7 @@ fn uniform(body: &Body, plane: &Plane, image: Option<&Image>) -> SliceUniform {
     }
 }
 
-fn target(state: &RenderState, size: [u32; 2], old: Option<egui::TextureId>) -> Target {
+fn target(state: &RenderState, paste: &Paste, size: [u32; 2]) -> Target {
     let texture = state.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("stylet slice"),
         size: extent([size[0], size[1], 1]),
@@ -332,16 +328,11 @@ fn target(state: &RenderState, size: [u32; 2], old: Option<egui::TextureId>) -> 
         view_formats: &[],
     });
     let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-    let mut renderer = state.renderer.write();
-    let filter = wgpu::FilterMode::Linear;
-    let id = match old {
-        Some(id) => {
-            renderer.update_egui_texture_from_wgpu_texture(&state.device, &view, filter, id);
-            id
-        }
-        None => renderer.register_native_texture(&state.device, &view, filter),
-    };
-    Target { size, view, id }
+    Target {
+        size,
+        pasted: paste.of(&view),
+        view,
+    }
 }
 
 fn draw(state: &RenderState, pipeline: &wgpu::RenderPipeline, bind: &wgpu::BindGroup, view: &wgpu::TextureView) {

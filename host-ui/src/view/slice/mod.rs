@@ -196,8 +196,8 @@ impl Slices {
         let plane = self.plane(orientation, view, rect);
         let action = self.steer(&response, &plane, shown, view);
         let painter = ui.painter_at(rect);
-        painter.rect_filled(rect, 0.0, IMAGE.background);
         if shown.scene.is_none() {
+            painter.rect_filled(rect, 0.0, IMAGE.background);
             words(
                 &painter,
                 rect,
@@ -213,15 +213,15 @@ impl Slices {
             .as_mut()
             .and_then(|gpu| gpu.picture(number, &plane, scale, view.image))
         {
-            Some(texture) => {
-                let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
-                painter.image(texture, rect, whole, Color32::WHITE);
-            }
+            Some(picture) => picture.paint(&painter, rect),
             None if rect.height() >= ROOM_FOR_REASON => {
+                painter.rect_filled(rect, 0.0, IMAGE.background);
                 let why = "No slice: no wgpu device, or the scene is too large for it";
                 words(&painter, rect, why, IMAGE.text);
             }
-            None => {}
+            None => {
+                painter.rect_filled(rect, 0.0, IMAGE.background);
+            }
         }
         let dose = dose.filter(|_| view.isodose);
         // One slice a frame, so that no frame waits for all three.

@@ -1,0 +1,118 @@
+//! Puts a finished picture into the window, pixel for pixel.
+//!
+//! As an image of the toolkit it would go through the shader of its widgets, which a driver without a graphics card runs in
+//! full for each pixel: that took longer than drawing the picture.
+
+use eframe::egui_wgpu::{Callback, CallbackResources, CallbackTrait, RenderState};
+use eframe::wgpu;
+use egui::{PaintCallbackInfo, Painter, Rect};
+
+/// How pictures are put into the window.
+pub struct Paste {
+    device: wgpu::Device,
+    layout: wgpu::BindGroupLayout,
+    pipeline: wgpu::RenderPipeline,
+}
+
+/// A picture that can be put into the window.
+#[derive(Clone)]
+pub struct Pasted {
+    pipeline: wgpu::RenderPipeline,
+    picture: wgpu::BindGroup,
+}
+
+impl Paste {
+    /// For windows of this graphics device.
+    pub fn new(state: &RenderState) -> Self {
+        let device = &state.device;
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("stylet paste"),
+            entries: &[wgpu::BindGroupLayoutEntry {
+                binding: 0,
+                visibility: wgpu::ShaderStages::FRAGMENT,
+                ty: wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
+                    view_dimension: wgpu::TextureViewDimension::D2,
+                    multisampled: false,
+                },
+                count: None,
+            }],
+        });
+        Self {
+            pipeline: pipeline(device, &layout, state.target_format),
+            layout,
+            device: device.clone(),
+        }
+    }
+
+    /// The texture holds what the screen shall show, in red, green and blue.
+    pub fn of(&self, texture: &wgpu::TextureView) -> Pasted {
+        let picture = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("stylet paste"),
+            layout: &self.layout,
+            entries: &[wgpu::BindGroupEntry {
+                binding: 0,
+                resource: wgpu::BindingResource::TextureView(texture),
+            }],
+        });
+        Pasted {
+            pipeline: self.pipeline.clone(),
+            picture,
+        }
+    }
+}
+
+impl Pasted {
+    /// Over what was painted there before.
+    pub fn paint(self, painter: &Painter, rect: Rect) {
+        painter.add(Callback::new_paint_callback(rect, self));
+    }
+}
+
+impl CallbackTrait for Pasted {
+    fn paint(&self, _info: PaintCallbackInfo, pass: &mut wgpu::RenderPass<'static>, _resources: &CallbackResources) {
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.picture, &[]);
+        pass.draw(0..3, 0..1);
+    }
+}
+
+fn pipeline(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+    window: wgpu::TextureFormat,
+) -> wgpu::RenderPipeline {
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some("stylet paste"),
+        source: wgpu::ShaderSource::Wgsl(include_str!("paste.wgsl").into()),
+    });
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("stylet paste"),
+        bind_group_layouts: &[Some(layout)],
+        immediate_size: 0,
+    });
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("stylet paste"),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("paste_vertex"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: None,
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: Some("paste_fragment"),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &[("TAKES_LIGHT", f64::from(u8::from(window.is_srgb())))],
+                ..Default::default()
+            },
+            targets: &[Some(window.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}

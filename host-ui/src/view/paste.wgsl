@@ -1,0 +1,35 @@
+// A finished picture, pixel for pixel.
+
+// The window's texture takes light, not what the screen gets.
+override TAKES_LIGHT: bool;
+
+@group(0) @binding(0) var picture: texture_2d<f32>;
+
+struct Out {
+    @builtin(position) clip: vec4<f32>,
+    // From the upper left corner, 0 to 1.
+    @location(0) at: vec2<f32>,
+}
+
+@vertex
+fn paste_vertex(@builtin(vertex_index) index: u32) -> Out {
+    // One triangle over the whole picture.
+    let at = vec2(f32(i32(index & 1u) * 2), f32(i32(index >> 1u) * 2));
+    return Out(vec4(2.0 * at.x - 1.0, 1.0 - 2.0 * at.y, 0.0, 1.0), at);
+}
+
+fn light_of(color: vec3<f32>) -> vec3<f32> {
+    let high = pow((color + 0.055) / 1.055, vec3(2.4));
+    return select(high, color / 12.92, color < vec3(0.04045));
+}
+
+@fragment
+fn paste_fragment(in: Out) -> @location(0) vec4<f32> {
+    let size = vec2<f32>(textureDimensions(picture));
+    let texel = vec2<i32>(clamp(in.at * size, vec2(0.0), size - 1.0));
+    let color = textureLoad(picture, texel, 0).xyz;
+    if (TAKES_LIGHT) {
+        return vec4(light_of(color), 1.0);
+    }
+    return vec4(color, 1.0);
+}
