@@ -1,7 +1,7 @@
 //! The operator's program: the window, and the command line over the same code.
 //!
 //! The modules of the window depend on each other in one direction:
-//! `app` → `panel` → `view`, `keyboard` → `shown`, `action` → `planner`, `dose_worker`, `loader` → `mesh`, `theme`, `settings`, `words` → `recent` → `dialog`.
+//! `app` → `redraw`, `panel` → `view`, `keyboard` → `shown`, `action` → `planner`, `dose_worker`, `loader` → `mesh`, `theme`, `settings`, `words` → `recent` → `dialog`.
 
 #![warn(missing_docs)]
 
@@ -21,6 +21,7 @@ mod panel;
 mod picture;
 pub mod planner;
 mod recent;
+mod redraw;
 pub mod session;
 mod settings;
 mod shown;

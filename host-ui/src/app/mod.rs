@@ -18,6 +18,7 @@ use crate::panel::parameters::ParametersState;
 use crate::panel::workflow::{Progress, WorkflowState};
 use crate::picture::Pictures;
 use crate::planner::Planner;
+use crate::redraw::Redraw;
 use crate::settings::Settings;
 use crate::shown::{FrameCost, Note, Shown};
 use crate::view::middle::Middle;
@@ -198,6 +199,9 @@ impl App {
     /// The window with these options, before its first frame.
     pub fn new(cc: &eframe::CreationContext<'_>, options: Options) -> Self {
         theme::apply(&cc.egui_ctx);
+        if let Some(state) = &cc.wgpu_render_state {
+            cc.egui_ctx.add_plugin(Redraw::new(state.clone()));
+        }
         let settings = Settings::read(cc.storage);
         let shown = Shown::empty(options.instance.name());
         // It goes with the core.
@@ -248,6 +252,11 @@ impl App {
             help: false,
             narrow: layout::Narrow::default(),
         }
+    }
+
+    /// Draws all of the window in the next frame, not only what has changed.
+    pub fn redraw_all(ctx: &egui::Context) {
+        ctx.with_plugin(Redraw::forget);
     }
 
     /// Replaces the devices of the system.
@@ -325,9 +334,13 @@ impl eframe::App for App {
         let asked = self.middle.driver();
         let driver_ns = asked.cpu_ns - driver.cpu_ns;
         let all_ns = cpu_time::thread_ns().saturating_sub(begun_ns);
+        // That of the frame before: this one is drawn when all of it is known.
+        let redraw = ctx
+            .with_plugin(|redraw: &mut Redraw| redraw.take_cost())
+            .unwrap_or_default();
         self.shown.cost = FrameCost {
-            cpu_us: format::us(all_ns.saturating_sub(driver_ns)),
-            driver_us: format::us(driver_ns),
+            cpu_us: format::us(all_ns.saturating_sub(driver_ns) + redraw.own_ns),
+            driver_us: format::us(driver_ns + redraw.driver_ns),
             uploaded_bytes: asked.uploaded_bytes - driver.uploaded_bytes,
         };
         let counted = self.frames.count(Instant::now(), &self.shown.cost);

@@ -196,6 +196,9 @@ impl Gpu {
         let mut driver = self.driver;
         driver.send(|| self.send_picture(looks, shells, ghost, clear));
         self.driver = driver;
+        if let Some(targets) = &mut self.targets {
+            targets.pasted.renew();
+        }
     }
 
     /// Returns the bytes that it sent.

@@ -2,14 +2,14 @@
 
 mod body;
 mod camera;
-mod driver;
+pub(crate) mod driver;
 mod gpu;
 mod kinds;
 mod legend;
 mod marks;
 pub mod middle;
 pub mod orientation;
-mod paste;
+pub(crate) mod paste;
 mod pick;
 mod scene3d;
 pub mod slice;

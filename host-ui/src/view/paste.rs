@@ -5,7 +5,8 @@
 
 use eframe::egui_wgpu::{Callback, CallbackResources, CallbackTrait, RenderState};
 use eframe::wgpu;
-use egui::{PaintCallbackInfo, Painter, Rect};
+use egui::epaint::PaintCallback;
+use egui::{PaintCallbackInfo, Painter, Rect, Shape};
 
 /// How pictures are put into the window.
 pub struct Paste {
@@ -17,13 +18,29 @@ pub struct Paste {
 /// A picture that can be put into the window.
 #[derive(Clone)]
 pub struct Pasted {
+    draw: Draw,
+    /// Its identity says whether the picture is the one of the frame before.
+    callback: PaintCallback,
+}
+
+#[derive(Clone)]
+struct Draw {
     pipeline: wgpu::RenderPipeline,
     picture: wgpu::BindGroup,
 }
 
 impl Paste {
-    /// For windows of this graphics device.
+    /// For textures that hold what the screen shall show, in red, green and blue.
     pub fn new(state: &RenderState) -> Self {
+        Self::converting(state, state.target_format.is_srgb())
+    }
+
+    /// For textures of the window's own format.
+    pub fn as_window(state: &RenderState) -> Self {
+        Self::converting(state, false)
+    }
+
+    fn converting(state: &RenderState, to_light: bool) -> Self {
         let device = &state.device;
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("stylet paste"),
@@ -39,13 +56,13 @@ impl Paste {
             }],
         });
         Self {
-            pipeline: pipeline(device, &layout, state.target_format),
+            pipeline: pipeline(device, &layout, state.target_format, to_light),
             layout,
             device: device.clone(),
         }
     }
 
-    /// The texture holds what the screen shall show, in red, green and blue.
+    /// The picture in this texture.
     pub fn of(&self, texture: &wgpu::TextureView) -> Pasted {
         let picture = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("stylet paste"),
@@ -55,21 +72,37 @@ impl Paste {
                 resource: wgpu::BindingResource::TextureView(texture),
             }],
         });
-        Pasted {
+        let draw = Draw {
             pipeline: self.pipeline.clone(),
             picture,
+        };
+        Pasted {
+            callback: Callback::new_paint_callback(Rect::NOTHING, draw.clone()),
+            draw,
         }
     }
 }
 
 impl Pasted {
+    /// To be called when the texture holds another picture.
+    pub fn renew(&mut self) {
+        self.callback = Callback::new_paint_callback(Rect::NOTHING, self.draw.clone());
+    }
+
+    /// The picture at this place of the window.
+    pub fn shape(&self, rect: Rect) -> Shape {
+        let mut callback = self.callback.clone();
+        callback.rect = rect;
+        callback.into()
+    }
+
     /// Over what was painted there before.
-    pub fn paint(self, painter: &Painter, rect: Rect) {
-        painter.add(Callback::new_paint_callback(rect, self));
+    pub fn paint(&self, painter: &Painter, rect: Rect) {
+        painter.add(self.shape(rect));
     }
 }
 
-impl CallbackTrait for Pasted {
+impl CallbackTrait for Draw {
     fn paint(&self, _info: PaintCallbackInfo, pass: &mut wgpu::RenderPass<'static>, _resources: &CallbackResources) {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.picture, &[]);
@@ -81,6 +114,7 @@ fn pipeline(
     device: &wgpu::Device,
     layout: &wgpu::BindGroupLayout,
     window: wgpu::TextureFormat,
+    to_light: bool,
 ) -> wgpu::RenderPipeline {
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("stylet paste"),
@@ -107,7 +141,7 @@ fn pipeline(
             module: &module,
             entry_point: Some("paste_fragment"),
             compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &[("TAKES_LIGHT", f64::from(u8::from(window.is_srgb())))],
+                constants: &[("TAKES_LIGHT", f64::from(u8::from(to_light)))],
                 ..Default::default()
             },
             targets: &[Some(window.into())],

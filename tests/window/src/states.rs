@@ -4,7 +4,6 @@ use crate::driven::{Driven, is_at_rest, keep_for_docs, misplaced};
 use egui::Key;
 use egui_kittest::kittest::{NodeT, Queryable};
 use host_ui::app::App;
-use host_ui::cpu_time;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::flags;
 use stylet_tests::Core;
@@ -227,17 +226,11 @@ fn cost_of_a_frame() {
 }
 
 fn measure(driven: &mut Driven, what: &str, frames: usize) {
-    let [mut frame_us, mut driver_us, mut tessellation_us, mut both_us, mut kib] = [(); 5].map(|()| Vec::new());
+    let [mut frame_us, mut driver_us, mut kib] = [(); 3].map(|()| Vec::new());
     for _ in 0..frames {
         driven.window.run_steps(1);
         let cost = driven.window.state().cost();
-        let shapes = driven.window.output().shapes.clone();
-        let begun_ns = cpu_time::thread_ns();
-        assert!(!driven.window.ctx.tessellate(shapes, 1.0).is_empty());
-        let shapes_us = (cpu_time::thread_ns() - begun_ns) as f64 * 1e-3;
-        tessellation_us.push(shapes_us);
         frame_us.push(cost.cpu_us);
-        both_us.push(cost.cpu_us + shapes_us);
         driver_us.push(cost.driver_us);
         kib.push(cost.uploaded_bytes as f64 / 1024.0);
         std::thread::sleep(Duration::from_millis(12));
@@ -248,10 +241,8 @@ fn measure(driven: &mut Driven, what: &str, frames: usize) {
     };
     let ms = |values: &mut Vec<f64>| of(values).map(|us| format!("{:.2}", us * 1e-3)).join(" ");
     println!(
-        "{what}, {frames} frames, p50 p99 max: panels and pictures {} ms; tessellation {} ms; both {} ms; driver {} ms; to the card {} KiB",
+        "{what}, {frames} frames, p50 p99 max: ours {} ms; driver {} ms; to the card {} KiB",
         ms(&mut frame_us),
-        ms(&mut tessellation_us),
-        ms(&mut both_us),
         ms(&mut driver_us),
         of(&mut kib).map(|kib| format!("{kib:.0}")).join(" "),
     );

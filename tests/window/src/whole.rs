@@ -86,6 +86,53 @@ fn nothing_is_misplaced_without_a_core_in_any_theme_or_size() {
     }
 }
 
+/// Only what changed is drawn again; drawn anew, the whole window has to look the same.
+#[test]
+fn a_window_drawn_by_its_changes_is_the_window_drawn_at_once() {
+    let mut window = window("ui-window-redraw");
+    settle(&mut window);
+    let mut pictures = 0;
+    let mut same = |window: &mut Window, state: &str| {
+        settle(window);
+        let by_changes = window.render().expect("a picture");
+        App::redraw_all(&window.ctx);
+        window.run_steps(1);
+        let at_once = window.render().expect("a picture");
+        let differing = by_changes.pixels().zip(at_once.pixels()).filter(|(a, b)| a != b);
+        assert_eq!(differing.count(), 0, "{state}");
+        pictures += 1;
+    };
+    same(&mut window, "at first");
+    for key in [
+        egui::Key::F1,
+        egui::Key::Escape,
+        egui::Key::T,
+        egui::Key::V,
+        egui::Key::V,
+        egui::Key::T,
+    ] {
+        window.key_press(key);
+        same(&mut window, &format!("after {key:?}"));
+    }
+    window.get_by_label("Parameters").click();
+    same(&mut window, "a dialog over the pictures");
+    window.get_by_label("Search").click();
+    settle(&mut window);
+    let field = window.get_by_role_and_label(egui::accesskit::Role::TextInput, "Search");
+    field.focus();
+    field.type_text("seed");
+    same(&mut window, "words in a field");
+    for size in [[1700.0, 900.0], [960.0, 600.0]] {
+        window.set_size(size.into());
+        same(&mut window, &format!("{size:?}"));
+    }
+    for scale in [1.5, 1.25] {
+        window.ctx.set_zoom_factor(scale);
+        same(&mut window, &format!("text of {scale}"));
+    }
+    assert_eq!(pictures, 12);
+}
+
 #[test]
 fn help_lists_every_key() {
     let mut window = window("ui-window-help");

@@ -234,7 +234,7 @@ impl SliceGpu {
             pane.target = Some(target(&self.state, &self.paste, size));
             pane.drawn = None;
         }
-        let target = pane.target.as_ref()?;
+        let target = pane.target.as_mut()?;
         if pane.drawn != Some((uniform, self.content)) {
             pane.drawn = Some((uniform, self.content));
             let bytes = bytemuck::bytes_of(&uniform);
@@ -243,6 +243,7 @@ impl SliceGpu {
                 draw(&self.state, &self.pipeline, &pane.bind, &target.view);
                 bytes.len() as u64
             });
+            target.pasted.renew();
         }
         Some(target.pasted.clone())
     }

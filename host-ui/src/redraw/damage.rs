@@ -1,0 +1,210 @@
+//! Where two frames of the window differ.
+
+use egui::epaint::ClippedShape;
+use egui::{Pos2, Rect, Vec2};
+
+/// Smoothed edges and rounding to pixels reach so far beyond a shape, in points.
+const EDGE: f32 = 3.0;
+/// Shapes that were added or removed together, at most, before all that follows counts as changed until the next equal pair.
+const REACH: usize = 12;
+/// Each rectangle costs one pass over the shapes.
+const MOST: usize = 12;
+
+/// A shape, and where it can be seen.
+#[derive(Clone, Debug)]
+pub(super) struct Drawn {
+    pub shape: ClippedShape,
+    /// In points; empty where nothing can be seen.
+    pub rect: Rect,
+}
+
+impl Drawn {
+    /// In a window of this size.
+    pub(super) fn new(shape: ClippedShape, window: Rect) -> Self {
+        let own = shape.transform_after_tessellation * shape.shape.visual_bounding_rect();
+        let seen = own.expand(EDGE).intersect(shape.clip_rect).intersect(window);
+        Self {
+            rect: if seen.is_positive() { seen } else { Rect::ZERO },
+            shape,
+        }
+    }
+}
+
+/// Rectangles, in points and on whole pixels, outside which both frames look the same. They do not overlap by much.
+///
+/// Equal shapes are paired in the order they are painted in, so that what is not paired covers every difference.
+pub(super) fn damage(before: &[Drawn], now: &[Drawn], pixels_per_point: f32) -> Vec<Rect> {
+    let mut rects = Vec::new();
+    let (mut old, mut new) = (0, 0);
+    while old < before.len() || new < now.len() {
+        let (removed, added) = next_pair(&before[old..], &now[new..]);
+        for drawn in before[old..old + removed].iter().chain(&now[new..new + added]) {
+            add(&mut rects, on_pixels(drawn.rect, pixels_per_point));
+        }
+        // The pair itself, unless a frame has ended.
+        old = before.len().min(old + removed + 1);
+        new = now.len().min(new + added + 1);
+    }
+    rects
+}
+
+/// How many shapes stand before the first equal pair in each of both; all of them where there is none.
+fn next_pair(before: &[Drawn], now: &[Drawn]) -> (usize, usize) {
+    for skipped in 0..=before.len().max(now.len()) {
+        // The same number on both sides first: most often a shape was replaced.
+        if let (Some(a), Some(b)) = (before.get(skipped), now.get(skipped))
+            && a.shape == b.shape
+        {
+            return (skipped, skipped);
+        }
+        if skipped > REACH {
+            continue;
+        }
+        for fewer in 0..skipped {
+            for (removed, added) in [(skipped, fewer), (fewer, skipped)] {
+                if let (Some(a), Some(b)) = (before.get(removed), now.get(added))
+                    && a.shape == b.shape
+                {
+                    return (removed, added);
+                }
+            }
+        }
+    }
+    (before.len(), now.len())
+}
+
+fn on_pixels(rect: Rect, pixels_per_point: f32) -> Rect {
+    let low = (rect.min.to_vec2() * pixels_per_point).floor() / pixels_per_point;
+    let high = (rect.max.to_vec2() * pixels_per_point).ceil() / pixels_per_point;
+    Rect::from_min_max(low.to_pos2(), high.to_pos2())
+}
+
+/// Joins rectangles where drawing their union costs little more than drawing both.
+fn add(rects: &mut Vec<Rect>, rect: Rect) {
+    if !rect.is_positive() {
+        return;
+    }
+    let mut rect = rect;
+    loop {
+        let joined = rects.iter().position(|r| extra_area(*r, rect) <= 0.0);
+        let cheapest =
+            || (0..rects.len()).min_by(|a, b| extra_area(rects[*a], rect).total_cmp(&extra_area(rects[*b], rect)));
+        let Some(at) = joined.or_else(|| cheapest().filter(|_| rects.len() >= MOST)) else {
+            break rects.push(rect);
+        };
+        rect = rect.union(rects.swap_remove(at));
+    }
+}
+
+/// What the union has more than both, in square points.
+fn extra_area(a: Rect, b: Rect) -> f32 {
+    a.union(b).area() - a.area() - b.area()
+}
+
+/// The whole window, in points.
+pub(super) fn window(size: [u32; 2], pixels_per_point: f32) -> Rect {
+    let [width, height] = size.map(|side| side as f32 / pixels_per_point);
+    Rect::from_min_size(Pos2::ZERO, Vec2::new(width, height))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use egui::{Color32, Shape};
+
+    const WINDOW: Rect = Rect::from_min_max(Pos2::ZERO, Pos2::new(400.0, 300.0));
+
+    fn square(x: f32, y: f32, side: f32, red: u8) -> Drawn {
+        let rect = Rect::from_min_size(Pos2::new(x, y), Vec2::splat(side));
+        let shape = Shape::rect_filled(rect, 0.0, Color32::from_rgb(red, 0, 0));
+        Drawn::new(ClippedShape::new(WINDOW, shape), WINDOW)
+    }
+
+    /// Colour of the shape on top at each point, with its edge.
+    fn picture(shapes: &[Drawn]) -> Vec<usize> {
+        let mut points = vec![usize::MAX; 400 * 300];
+        for drawn in shapes {
+            let Shape::Rect(square) = &drawn.shape.shape else {
+                panic!("a square")
+            };
+            for y in 0..300 {
+                for x in 0..400 {
+                    if drawn.rect.contains(Pos2::new(x as f32 + 0.5, y as f32 + 0.5)) {
+                        points[y * 400 + x] = usize::from(square.fill.r());
+                    }
+                }
+            }
+        }
+        points
+    }
+
+    #[test]
+    fn frames_look_alike_outside_the_damage() {
+        let mut seed = 7_u64;
+        let mut random = move |below: usize| {
+            seed = seed
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            ((seed >> 33) as usize) % below
+        };
+        let any = |random: &mut dyn FnMut(usize) -> usize| {
+            let [x, y, side, red] = [380, 280, 60, 256].map(|below| random(below));
+            square(x as f32, y as f32, side as f32 + 1.0, red as u8)
+        };
+        let mut changed_points = 0;
+        for round in 0..60 {
+            let before: Vec<Drawn> = (0..random(40)).map(|_| any(&mut random)).collect();
+            let mut now = before.clone();
+            for _ in 0..random(1 + round % 20) {
+                let count = now.len();
+                let at = random(count + 1);
+                match random(4) {
+                    0 => now.insert(at, any(&mut random)),
+                    1 if at < count => now[at] = any(&mut random),
+                    2 if at < count => drop(now.remove(at)),
+                    _ if count > 1 => now.swap(at % count, 0),
+                    _ => {}
+                }
+            }
+            let damaged = damage(&before, &now, 1.5);
+            assert!(damaged.len() <= MOST);
+            for (i, (a, b)) in picture(&before).iter().zip(picture(&now)).enumerate() {
+                let point = Pos2::new((i % 400) as f32 + 0.5, (i / 400) as f32 + 0.5);
+                if *a != b {
+                    changed_points += 1;
+                    assert!(damaged.iter().any(|r| r.contains(point)), "round {round}: {point:?}");
+                }
+            }
+        }
+        assert!(changed_points > 10_000, "{changed_points}");
+    }
+
+    #[test]
+    fn a_frame_like_the_one_before_has_no_damage() {
+        let frame = [square(1.0, 2.0, 30.0, 9), square(40.0, 2.0, 30.0, 8)];
+        assert!(damage(&frame, &frame, 1.0).is_empty());
+    }
+
+    #[test]
+    fn what_was_inserted_damages_only_its_own_place() {
+        let before: Vec<Drawn> = (0..50).map(|i| square(7.0 * i as f32, 20.0, 5.0, i)).collect();
+        let mut now = before.clone();
+        now.insert(10, square(200.0, 200.0, 10.0, 255));
+        let own = Rect::from_min_max(Pos2::new(197.0, 197.0), Pos2::new(213.0, 213.0));
+        assert_eq!(damage(&before, &now, 1.0), [own]);
+        assert_eq!(damage(&now, &before, 1.0), [own]);
+    }
+
+    #[test]
+    fn damage_lies_on_whole_pixels() {
+        let (before, now) = ([square(10.3, 10.0, 5.0, 1)], [square(10.3, 10.0, 5.0, 2)]);
+        for scale in [1.0, 1.25, 1.5, 2.0] {
+            for rect in damage(&before, &now, scale) {
+                for edge in [rect.min.x, rect.min.y, rect.max.x, rect.max.y] {
+                    let pixels = edge * scale;
+                    assert!((pixels - pixels.round()).abs() < 1e-3, "{scale}: {rect:?}");
+                }
+            }
+        }
+    }
+}

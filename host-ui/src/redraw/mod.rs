@@ -1,0 +1,199 @@
+//! Draws again only what differs from the frame before.
+//!
+//! The toolkit draws all of the window in each frame. Where a driver without a graphics card does that on the processor, it
+//! took most of a frame, for words that had not changed. Here the window is a texture that is kept, only what changed is drawn
+//! into it, and the toolkit is left with one picture.
+
+mod damage;
+
+use crate::cpu_time::thread_ns;
+use crate::view::driver::DriverCost;
+use crate::view::paste::{Paste, Pasted};
+use damage::{Drawn, damage, window};
+use eframe::egui_wgpu::{RenderState, ScreenDescriptor};
+use eframe::wgpu;
+use egui::epaint::textures::TexturesDelta;
+use egui::epaint::{ClippedPrimitive, ClippedShape, Shape};
+use egui::{Color32, Context, FullOutput, Rect, TextureId};
+
+/// Takes the shapes of a frame and leaves one that shows them.
+pub(crate) struct Redraw {
+    state: RenderState,
+    paste: Paste,
+    kept: Option<Kept>,
+    cost: RedrawCost,
+    driver: DriverCost,
+}
+
+/// Processor time.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct RedrawCost {
+    /// To find what changed and to turn it into triangles.
+    pub own_ns: u64,
+    pub driver_ns: u64,
+}
+
+/// The window as it was last drawn.
+struct Kept {
+    size: [u32; 2],
+    pixels_per_point: f32,
+    background: Color32,
+    texture: wgpu::TextureView,
+    pasted: Pasted,
+    shapes: Vec<Drawn>,
+}
+
+impl Redraw {
+    /// For the window of this graphics device.
+    pub(crate) fn new(state: RenderState) -> Self {
+        Self {
+            paste: Paste::as_window(&state),
+            state,
+            kept: None,
+            cost: RedrawCost::default(),
+            driver: DriverCost::default(),
+        }
+    }
+
+    /// What it cost since this was last asked for.
+    pub(crate) fn take_cost(&mut self) -> RedrawCost {
+        std::mem::take(&mut self.cost)
+    }
+
+    /// Draws all of the window in the next frame.
+    pub(crate) fn forget(&mut self) {
+        self.kept = None;
+    }
+
+    /// What is drawn from textures that change at one place keeps its place; a texture that is replaced may move everything.
+    fn take_textures(&mut self, textures: &mut TexturesDelta) {
+        let mut renderer = self.state.renderer.write();
+        for (id, changes) in textures.set.drain() {
+            for change in changes {
+                if change.is_whole() || id != TextureId::default() {
+                    self.kept = None;
+                }
+                renderer.update_texture(&self.state.device, &self.state.queue, id, &change);
+            }
+        }
+    }
+
+    fn kept(&mut self, size: [u32; 2], pixels_per_point: f32, background: Color32) -> Kept {
+        let same = |k: &Kept| k.size == size && k.pixels_per_point == pixels_per_point && k.background == background;
+        if let Some(kept) = self.kept.take().filter(same) {
+            return kept;
+        }
+        let texture = self.state.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("stylet window"),
+            size: wgpu::Extent3d {
+                width: size[0],
+                height: size[1],
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: self.state.target_format,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        });
+        let texture = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let whole = Drawn {
+            shape: ClippedShape::new(Rect::EVERYTHING, Shape::Noop),
+            rect: window(size, pixels_per_point),
+        };
+        Kept {
+            size,
+            pixels_per_point,
+            background,
+            pasted: self.paste.of(&texture),
+            texture,
+            // Is in no frame, so that all of the window differs.
+            shapes: vec![whole],
+        }
+    }
+
+    /// Draws the damaged rectangles of `kept` from its shapes.
+    fn draw(&mut self, ctx: &Context, kept: &Kept, damaged: &[Rect]) {
+        let mut shapes = Vec::new();
+        for rect in damaged {
+            // Larger than what is seen of it: its own edge is smooth.
+            let background = Shape::rect_filled(rect.expand(4.0), 0.0, kept.background);
+            shapes.push(ClippedShape::new(*rect, background));
+            for drawn in kept.shapes.iter().filter(|d| d.rect.intersects(*rect)) {
+                let mut shape = drawn.shape.clone();
+                shape.clip_rect = shape.clip_rect.intersect(*rect);
+                shapes.push(shape);
+            }
+        }
+        let primitives = ctx.tessellate(shapes, kept.pixels_per_point);
+        let mut driver = self.driver;
+        driver.time(|| self.send(kept, &primitives));
+        self.driver = driver;
+    }
+
+    fn send(&self, kept: &Kept, primitives: &[ClippedPrimitive]) {
+        let screen = ScreenDescriptor {
+            size_in_pixels: kept.size,
+            pixels_per_point: kept.pixels_per_point,
+        };
+        let (device, queue) = (&self.state.device, &self.state.queue);
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
+            label: Some("stylet window"),
+        });
+        let mut renderer = self.state.renderer.write();
+        let prepared = renderer.update_buffers(device, queue, &mut encoder, primitives, &screen);
+        {
+            let mut pass = encoder
+                .begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some("stylet window"),
+                    color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                        view: &kept.texture,
+                        depth_slice: None,
+                        resolve_target: None,
+                        ops: wgpu::Operations {
+                            load: wgpu::LoadOp::Load,
+                            store: wgpu::StoreOp::Store,
+                        },
+                    })],
+                    ..Default::default()
+                })
+                .forget_lifetime();
+            renderer.render(&mut pass, primitives, &screen);
+        }
+        queue.submit(prepared.into_iter().chain([encoder.finish()]));
+    }
+}
+
+impl egui::Plugin for Redraw {
+    fn debug_name(&self) -> &'static str {
+        "redraw"
+    }
+
+    fn output_hook(&mut self, ctx: &Context, output: &mut FullOutput) {
+        let begun = (thread_ns(), self.driver.cpu_ns);
+        self.take_textures(&mut output.textures_delta);
+        let pixels_per_point = output.pixels_per_point;
+        let points = ctx.viewport_rect().size();
+        let size = [points.x, points.y].map(|side| (side * pixels_per_point).round() as u32);
+        let largest = self.state.device.limits().max_texture_dimension_2d;
+        if !size.iter().all(|side| (1..=largest).contains(side)) {
+            return;
+        }
+        let mut kept = self.kept(size, pixels_per_point, ctx.global_style().visuals.panel_fill);
+        let rect = window(size, pixels_per_point);
+        let shapes = std::mem::take(&mut output.shapes);
+        let shapes: Vec<Drawn> = shapes.into_iter().map(|shape| Drawn::new(shape, rect)).collect();
+        let damaged = damage(&kept.shapes, &shapes, pixels_per_point);
+        kept.shapes = shapes;
+        if !damaged.is_empty() {
+            self.draw(ctx, &kept, &damaged);
+        }
+        output.shapes = vec![ClippedShape::new(rect, kept.pasted.shape(rect))];
+        self.kept = Some(kept);
+        let all_ns = thread_ns().saturating_sub(begun.0);
+        let driver_ns = self.driver.cpu_ns - begun.1;
+        self.cost.driver_ns += driver_ns;
+        self.cost.own_ns += all_ns.saturating_sub(driver_ns);
+    }
+}
