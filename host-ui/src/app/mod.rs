@@ -254,9 +254,14 @@ impl App {
         }
     }
 
-    /// Draws all of the window in the next frame, not only what has changed.
-    pub fn redraw_all(ctx: &egui::Context) {
-        ctx.with_plugin(Redraw::forget);
+    /// Whether only what changed in the window is drawn again in a frame.
+    pub fn draw_changes_only(ctx: &egui::Context, only: bool) {
+        ctx.with_plugin(|redraw: &mut Redraw| redraw.switch(only));
+    }
+
+    /// Draws all of the last frame at once, whatever has changed in it.
+    pub fn draw_all_again(ctx: &egui::Context) {
+        ctx.with_plugin(|redraw: &mut Redraw| redraw.again(ctx));
     }
 
     /// Replaces the devices of the system.

@@ -148,7 +148,7 @@ mod tests {
             ((seed >> 33) as usize) % below
         };
         let any = |random: &mut dyn FnMut(usize) -> usize| {
-            let [x, y, side, red] = [380, 280, 60, 256].map(|below| random(below));
+            let [x, y, side, red] = [380, 280, 60, 256].map(&mut *random);
             square(x as f32, y as f32, side as f32 + 1.0, red as u8)
         };
         let mut changed_points = 0;

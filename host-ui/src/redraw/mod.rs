@@ -18,6 +18,7 @@ use egui::{Color32, Context, FullOutput, Rect, TextureId};
 
 /// Takes the shapes of a frame and leaves one that shows them.
 pub(crate) struct Redraw {
+    is_on: bool,
     state: RenderState,
     paste: Paste,
     kept: Option<Kept>,
@@ -47,6 +48,7 @@ impl Redraw {
     /// For the window of this graphics device.
     pub(crate) fn new(state: RenderState) -> Self {
         Self {
+            is_on: true,
             paste: Paste::as_window(&state),
             state,
             kept: None,
@@ -60,9 +62,17 @@ impl Redraw {
         std::mem::take(&mut self.cost)
     }
 
-    /// Draws all of the window in the next frame.
-    pub(crate) fn forget(&mut self) {
-        self.kept = None;
+    /// Leaves the window to the toolkit where it is off.
+    pub(crate) fn switch(&mut self, on: bool) {
+        (self.is_on, self.kept) = (on, None);
+    }
+
+    /// Draws all of the last frame once more.
+    pub(crate) fn again(&mut self, ctx: &Context) {
+        if let Some(kept) = self.kept.take() {
+            self.draw(ctx, &kept, &[window(kept.size, kept.pixels_per_point)]);
+            self.kept = Some(kept);
+        }
     }
 
     /// What is drawn from textures that change at one place keeps its place; a texture that is replaced may move everything.
@@ -171,6 +181,9 @@ impl egui::Plugin for Redraw {
     }
 
     fn output_hook(&mut self, ctx: &Context, output: &mut FullOutput) {
+        if !self.is_on {
+            return;
+        }
         let begun = (thread_ns(), self.driver.cpu_ns);
         self.take_textures(&mut output.textures_delta);
         let pixels_per_point = output.pixels_per_point;

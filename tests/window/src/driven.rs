@@ -51,10 +51,22 @@ impl Driven {
             pause: true,
             count_frames: false,
         };
-        Harness::builder()
+        let window = Harness::builder()
             .with_size(size)
             .wgpu()
-            .build_eframe(|cc| App::new(cc, options))
+            .build_eframe(|cc| App::new(cc, options));
+        // Steps without a picture draw nothing.
+        App::draw_changes_only(&window.ctx, false);
+        window
+    }
+
+    /// The window as it ships draws it.
+    fn drawn(&mut self) -> image::RgbaImage {
+        App::draw_changes_only(&self.window.ctx, true);
+        self.window.run_steps(2);
+        let picture = self.window.render().expect("a picture");
+        App::draw_changes_only(&self.window.ctx, false);
+        picture
     }
 
     fn until_live(&mut self) {
@@ -118,8 +130,8 @@ impl Driven {
     }
 
     pub fn picture(&mut self, name: &str) -> image::RgbaImage {
-        self.window.run_steps(3);
-        let picture = self.window.render().expect("a picture");
+        self.window.run_steps(1);
+        let picture = self.drawn();
         picture
             .save(scratch(&format!("picture-{name}")).join(format!("{name}.png")))
             .expect("saved");
@@ -128,23 +140,23 @@ impl Driven {
 
     /// As [`Driven::compare`], where the plan stands in place of the plots.
     pub fn compare_plan(&mut self, name: &str) {
-        self.window.run_steps(3);
+        self.window.run_steps(1);
         let size = self.window.ctx.content_rect().size();
         let status = egui::Rect::from_min_max([120.0, 0.0].into(), [size.x - 250.0, 33.0].into());
         self.window.mask(status);
-        let picture = self.window.render().expect("a picture");
+        let picture = self.drawn();
         image_snapshot_options(&with_fewer_greys(&picture, 51), name, &tolerant());
     }
 
     /// As [`Driven::compare`] where tissue and seeds have moved, never to the same place twice: the slices are covered too, and
     /// figures may differ by so many pixels.
     pub fn compare_live(&mut self, name: &str, pixels: usize) {
-        self.window.run_steps(3);
+        self.window.run_steps(1);
         let slices =
             ["Axial slice", "Sagittal slice", "Coronal slice"].map(|label| self.window.get_by_label(label).rect());
         slices.into_iter().for_each(|rect| self.window.mask(rect));
         self.cover_figures();
-        let picture = self.window.render().expect("a picture");
+        let picture = self.drawn();
         image_snapshot_options(
             &with_fewer_greys(&picture, 51),
             name,
@@ -162,11 +174,26 @@ impl Driven {
 
     /// Compares with the picture that is kept; what lives is covered: figures at the top and the plots.
     pub fn compare(&mut self, name: &str) {
-        self.window.run_steps(3);
+        self.window.run_steps(1);
         self.cover_figures();
-        let picture = self.window.render().expect("a picture");
+        let picture = self.drawn();
         image_snapshot_options(&with_fewer_greys(&picture, 51), name, &tolerant());
     }
+}
+
+/// Draws the last frame at once, and compares it with what its changes made of the frames before.
+pub fn assert_drawn_by_changes<T>(window: &mut Harness<'static, T>, state: &str) {
+    let by_changes = window.render().expect("a picture");
+    App::draw_all_again(&window.ctx);
+    let at_once = window.render().expect("a picture");
+    let differing: Vec<_> = by_changes
+        .enumerate_pixels()
+        .zip(at_once.pixels())
+        .filter(|((.., a), b)| a != b)
+        .map(|((x, y, a), b)| (x, y, a.0, b.0))
+        .collect();
+    let some = &differing[..differing.len().min(12)];
+    assert_eq!(differing.len(), 0, "{state}: {some:?}");
 }
 
 /// Another version of the software driver may round a few edges otherwise; a moved or missing widget is thousands of pixels.

@@ -1,6 +1,6 @@
 //! The main states of the window in both themes and sizes: nothing clipped, nothing overlapping, and as it was.
 
-use crate::driven::{Driven, is_at_rest, keep_for_docs, misplaced};
+use crate::driven::{Driven, assert_drawn_by_changes, is_at_rest, keep_for_docs, misplaced};
 use egui::Key;
 use egui_kittest::kittest::{NodeT, Queryable};
 use host_ui::app::App;
@@ -104,6 +104,21 @@ fn insertion_is_in_place_and_as_it_was() {
         assert_in_place(&mut driven, &format!("inserting, {theme}"));
         driven.picture(&format!("inserting-{theme}"));
         driven.compare_live(&format!("inserting_{theme}"), INSERTING_PIXELS);
+    }
+}
+
+#[test]
+fn an_insertion_drawn_by_its_changes_is_the_insertion_drawn_at_once() {
+    let mut driven = Driven::open_plain(SMALL);
+    driven.press(Key::E);
+    driven.plan_and_place();
+    App::draw_changes_only(&driven.window.ctx, true);
+    for round in 0..3 {
+        driven.pull_tip(0.006);
+        assert_drawn_by_changes(&mut driven.window, &format!("round {round}"));
+        driven.press(Key::V);
+        assert_drawn_by_changes(&mut driven.window, &format!("round {round}, other pictures"));
+        driven.press(Key::V);
     }
 }
 
