@@ -60,10 +60,14 @@ impl Driven {
         window
     }
 
-    /// The window as it ships draws it.
-    fn drawn(&mut self) -> image::RgbaImage {
+    /// Three steps, drawn as the window that ships draws them.
+    fn draw(&mut self) {
         App::draw_changes_only(&self.window.ctx, true);
-        self.window.run_steps(2);
+        self.window.run_steps(3);
+    }
+
+    /// What was drawn, with what was covered since.
+    fn drawn(&mut self) -> image::RgbaImage {
         let picture = self.window.render().expect("a picture");
         App::draw_changes_only(&self.window.ctx, false);
         picture
@@ -130,7 +134,7 @@ impl Driven {
     }
 
     pub fn picture(&mut self, name: &str) -> image::RgbaImage {
-        self.window.run_steps(1);
+        self.draw();
         let picture = self.drawn();
         picture
             .save(scratch(&format!("picture-{name}")).join(format!("{name}.png")))
@@ -140,7 +144,7 @@ impl Driven {
 
     /// As [`Driven::compare`], where the plan stands in place of the plots.
     pub fn compare_plan(&mut self, name: &str) {
-        self.window.run_steps(1);
+        self.draw();
         let size = self.window.ctx.content_rect().size();
         let status = egui::Rect::from_min_max([120.0, 0.0].into(), [size.x - 250.0, 33.0].into());
         self.window.mask(status);
@@ -151,7 +155,7 @@ impl Driven {
     /// As [`Driven::compare`] where tissue and seeds have moved, never to the same place twice: the slices are covered too, and
     /// figures may differ by so many pixels.
     pub fn compare_live(&mut self, name: &str, pixels: usize) {
-        self.window.run_steps(1);
+        self.draw();
         let slices =
             ["Axial slice", "Sagittal slice", "Coronal slice"].map(|label| self.window.get_by_label(label).rect());
         slices.into_iter().for_each(|rect| self.window.mask(rect));
@@ -174,7 +178,7 @@ impl Driven {
 
     /// Compares with the picture that is kept; what lives is covered: figures at the top and the plots.
     pub fn compare(&mut self, name: &str) {
-        self.window.run_steps(1);
+        self.draw();
         self.cover_figures();
         let picture = self.drawn();
         image_snapshot_options(&with_fewer_greys(&picture, 51), name, &tolerant());
