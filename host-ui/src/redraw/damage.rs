@@ -1,6 +1,6 @@
 //! Where two frames of the window differ.
 
-use egui::epaint::ClippedShape;
+use egui::epaint::{ClippedShape, Shape};
 use egui::{Pos2, Rect, Vec2};
 
 /// Smoothed edges and rounding to pixels reach so far beyond a shape, in points.
@@ -8,7 +8,7 @@ const EDGE: f32 = 3.0;
 /// Shapes that were added or removed together, at most, before all that follows counts as changed until the next equal pair.
 const REACH: usize = 12;
 /// Each rectangle costs one pass over the shapes.
-const MOST: usize = 12;
+const MOST: usize = 24;
 
 /// A shape, and where it can be seen.
 #[derive(Clone, Debug)]
@@ -16,17 +16,32 @@ pub(super) struct Drawn {
     pub shape: ClippedShape,
     /// In points; empty where nothing can be seen.
     pub rect: Rect,
+    /// A finished picture: nothing below it is seen.
+    is_picture: bool,
 }
 
 impl Drawn {
     /// In a window of this size.
     pub(super) fn new(shape: ClippedShape, window: Rect) -> Self {
         let own = shape.transform_after_tessellation * shape.shape.visual_bounding_rect();
-        let seen = own.expand(EDGE).intersect(shape.clip_rect).intersect(window);
+        let is_picture = matches!(shape.shape, Shape::Callback(_));
+        let own = if is_picture { own } else { own.expand(EDGE) };
+        let seen = own.intersect(shape.clip_rect).intersect(window);
         Self {
             rect: if seen.is_positive() { seen } else { Rect::ZERO },
+            is_picture,
             shape,
         }
+    }
+
+    /// As if it were seen in all of this rectangle.
+    pub(super) fn everywhere(self, rect: Rect) -> Self {
+        Self { rect, ..self }
+    }
+
+    /// Whether it hides all that is below it in this rectangle, which lies on whole pixels.
+    pub(super) fn hides_below(&self, rect: Rect) -> bool {
+        self.is_picture && self.rect.contains_rect(rect)
     }
 }
 
@@ -34,17 +49,32 @@ impl Drawn {
 ///
 /// Equal shapes are paired in the order they are painted in, so that what is not paired covers every difference.
 pub(super) fn damage(before: &[Drawn], now: &[Drawn], pixels_per_point: f32) -> Vec<Rect> {
-    let mut rects = Vec::new();
+    let (mut pictures, mut others) = (Vec::new(), Vec::new());
     let (mut old, mut new) = (0, 0);
     while old < before.len() || new < now.len() {
         let (removed, added) = next_pair(&before[old..], &now[new..]);
         for drawn in before[old..old + removed].iter().chain(&now[new..new + added]) {
-            add(&mut rects, on_pixels(drawn.rect, pixels_per_point));
+            let rects = if drawn.is_picture { &mut pictures } else { &mut others };
+            rects.push(on_pixels(drawn.rect, pixels_per_point));
         }
         // The pair itself, unless a frame has ended.
         old = before.len().min(old + removed + 1);
         new = now.len().min(new + added + 1);
     }
+    // A picture is kept apart, so that nothing below it need be drawn.
+    let mut rects: Vec<Rect> = Vec::new();
+    for picture in pictures {
+        if !rects.iter().any(|r| r.contains_rect(picture)) {
+            rects.push(picture);
+        }
+    }
+    let mut between = Vec::new();
+    for rect in others {
+        if !rects.iter().any(|r| r.contains_rect(rect)) {
+            add(&mut between, rect);
+        }
+    }
+    rects.append(&mut between);
     rects
 }
 
@@ -79,20 +109,24 @@ fn on_pixels(rect: Rect, pixels_per_point: f32) -> Rect {
     Rect::from_min_max(low.to_pos2(), high.to_pos2())
 }
 
-/// Joins rectangles where drawing their union costs little more than drawing both.
+/// Joins rectangles where drawing their union costs no more than drawing both.
 fn add(rects: &mut Vec<Rect>, rect: Rect) {
     if !rect.is_positive() {
         return;
     }
     let mut rect = rect;
-    loop {
-        let joined = rects.iter().position(|r| extra_area(*r, rect) <= 0.0);
-        let cheapest =
-            || (0..rects.len()).min_by(|a, b| extra_area(rects[*a], rect).total_cmp(&extra_area(rects[*b], rect)));
-        let Some(at) = joined.or_else(|| cheapest().filter(|_| rects.len() >= MOST)) else {
-            break rects.push(rect);
-        };
+    while let Some(at) = rects.iter().position(|r| extra_area(*r, rect) <= 0.0) {
         rect = rect.union(rects.swap_remove(at));
+    }
+    rects.push(rect);
+    if rects.len() > MOST {
+        let pairs = (1..rects.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+        let extra = |&(a, b): &(usize, usize)| extra_area(rects[a], rects[b]);
+        if let Some((a, b)) = pairs.min_by(|one, other| extra(one).total_cmp(&extra(other))) {
+            let both = rects[a].union(rects.swap_remove(b));
+            rects.swap_remove(a);
+            add(rects, both);
+        }
     }
 }
 
@@ -110,7 +144,7 @@ pub(super) fn window(size: [u32; 2], pixels_per_point: f32) -> Rect {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use egui::{Color32, Shape};
+    use egui::Color32;
 
     const WINDOW: Rect = Rect::from_min_max(Pos2::ZERO, Pos2::new(400.0, 300.0));
 

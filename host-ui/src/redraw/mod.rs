@@ -108,10 +108,8 @@ impl Redraw {
             view_formats: &[],
         });
         let texture = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let whole = Drawn {
-            shape: ClippedShape::new(Rect::EVERYTHING, Shape::Noop),
-            rect: window(size, pixels_per_point),
-        };
+        let whole = window(size, pixels_per_point);
+        let nothing = ClippedShape::new(Rect::EVERYTHING, Shape::Noop);
         Kept {
             size,
             pixels_per_point,
@@ -119,7 +117,7 @@ impl Redraw {
             pasted: self.paste.of(&texture),
             texture,
             // Is in no frame, so that all of the window differs.
-            shapes: vec![whole],
+            shapes: vec![Drawn::new(nothing, whole).everywhere(whole)],
         }
     }
 
@@ -127,10 +125,14 @@ impl Redraw {
     fn draw(&mut self, ctx: &Context, kept: &Kept, damaged: &[Rect]) {
         let mut shapes = Vec::new();
         for rect in damaged {
-            // Larger than what is seen of it: its own edge is smooth.
-            let background = Shape::rect_filled(rect.expand(4.0), 0.0, kept.background);
-            shapes.push(ClippedShape::new(*rect, background));
-            for drawn in kept.shapes.iter().filter(|d| d.rect.intersects(*rect)) {
+            let hidden = kept.shapes.iter().rposition(|drawn| drawn.hides_below(*rect));
+            if hidden.is_none() {
+                // Larger than what is seen of it: its own edge is smooth.
+                let background = Shape::rect_filled(rect.expand(4.0), 0.0, kept.background);
+                shapes.push(ClippedShape::new(*rect, background));
+            }
+            let seen = &kept.shapes[hidden.unwrap_or(0)..];
+            for drawn in seen.iter().filter(|d| d.rect.intersects(*rect)) {
                 let mut shape = drawn.shape.clone();
                 shape.clip_rect = shape.clip_rect.intersect(*rect);
                 shapes.push(shape);

@@ -8,9 +8,9 @@ mod pipelines;
 use super::driver::DriverCost;
 use super::marks::Marks;
 use super::paste::{Paste, Pasted};
+use super::uniforms::SceneUniform;
 use crate::dose_worker::IsodoseShell;
 use crate::mesh::SurfaceVertex;
-use bytemuck::{Pod, Zeroable};
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
 use growing::{Growing, allocate};
@@ -23,19 +23,6 @@ const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 const SAMPLES: u32 = 4;
 const LARGEST_SIDE: u32 = 4096;
-
-/// As `Scene` in `scene.wgsl`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct SceneUniform {
-    pub clip_from_scene: [[f32; 4]; 4],
-    pub eye_m: [f32; 4],
-    pub light: [f32; 4],
-    pub surface: [f32; 4],
-    pub look: [f32; 4],
-    /// Normal and offset of the plane in front of which surfaces are cut away; a normal of zero cuts nothing.
-    pub section: [f32; 4],
-}
 
 struct Targets {
     size: [u32; 2],
@@ -78,7 +65,11 @@ pub struct Gpu {
     ghost_vertices: Growing,
     indices: Growing,
     shells: Vec<Shell>,
-    targets: Option<Targets>,
+    /// Without a graphics card what moves is drawn with a quarter of the pixels.
+    has_card: bool,
+    fine: Option<Targets>,
+    coarse: Option<Targets>,
+    shows_coarse: bool,
     pub driver: DriverCost,
 }
 
@@ -110,7 +101,10 @@ impl Gpu {
             ghost_vertices: Growing::new(device, vertex),
             indices: Growing::new(device, wgpu::BufferUsages::INDEX),
             shells: Vec::new(),
-            targets: None,
+            has_card: state.adapter.get_info().device_type != wgpu::DeviceType::Cpu,
+            fine: None,
+            coarse: None,
+            shows_coarse: false,
             driver: DriverCost::default(),
             layout,
             state,
@@ -173,43 +167,64 @@ impl Gpu {
     /// Sizes in pixels. True when the picture is new and has to be drawn.
     pub fn resize(&mut self, size: [u32; 2]) -> bool {
         let size = size.map(|side| side.clamp(1, LARGEST_SIDE));
-        if self.targets.as_ref().is_some_and(|t| t.size == size) {
+        if self.fine.as_ref().is_some_and(|t| t.size == size) {
             return false;
         }
-        self.targets = Some(targets(&self.state, &self.paste, size));
+        self.fine = Some(targets(&self.state, size, |resolved| self.paste.of(resolved)));
+        self.coarse = (!self.has_card).then(|| {
+            let size = size.map(|side| side.div_ceil(2));
+            targets(&self.state, size, |resolved| self.paste.enlarged(resolved))
+        });
         true
     }
 
+    /// What was drawn last.
     pub fn picture(&self) -> Option<Pasted> {
-        self.targets.as_ref().map(|t| t.pasted.clone())
+        let shown = if self.shows_coarse { &self.coarse } else { &self.fine };
+        shown.as_ref().map(|t| t.pasted.clone())
+    }
+
+    /// Whether what was drawn last has fewer pixels than its place.
+    pub fn shows_coarse(&self) -> bool {
+        self.shows_coarse
     }
 
     /// Opaque first, then the rest shape, then the body's far side, what is in the body, and the body's near side.
     /// `looks` has one uniform for each surface, `shells` one for each isodose surface; those that are not there are not drawn.
+    /// The background, and whether the picture will be another one in the next frame.
     pub fn draw(
         &mut self,
         looks: &[SceneUniform],
         shells: &[SceneUniform],
         ghost: Option<&SceneUniform>,
-        clear: [f64; 3],
+        (clear, moves): ([f64; 3], bool),
     ) {
+        self.shows_coarse = moves && self.coarse.is_some();
+        let drawn = if self.shows_coarse {
+            &mut self.coarse
+        } else {
+            &mut self.fine
+        };
+        let Some(mut targets) = drawn.take() else { return };
         let mut driver = self.driver;
-        driver.send(|| self.send_picture(looks, shells, ghost, clear));
+        driver.send(|| self.send_picture(&targets, (looks, shells, ghost), clear));
         self.driver = driver;
-        if let Some(targets) = &mut self.targets {
-            targets.pasted.renew();
-        }
+        targets.pasted.renew();
+        let drawn = if self.shows_coarse {
+            &mut self.coarse
+        } else {
+            &mut self.fine
+        };
+        *drawn = Some(targets);
     }
 
     /// Returns the bytes that it sent.
     fn send_picture(
         &self,
-        looks: &[SceneUniform],
-        shells: &[SceneUniform],
-        ghost: Option<&SceneUniform>,
+        targets: &Targets,
+        (looks, shells, ghost): (&[SceneUniform], &[SceneUniform], Option<&SceneUniform>),
         clear: [f64; 3],
     ) -> u64 {
-        let Some(targets) = &self.targets else { return 0 };
         let queue = &self.state.queue;
         for (surface, look) in self.surfaces.iter().zip(looks) {
             queue.write_buffer(&surface.material.uniform, 0, bytemuck::bytes_of(look));
@@ -324,7 +339,7 @@ fn begin<'a>(encoder: &'a mut wgpu::CommandEncoder, targets: &Targets, clear: [f
     })
 }
 
-fn targets(state: &RenderState, paste: &Paste, size: [u32; 2]) -> Targets {
+fn targets(state: &RenderState, size: [u32; 2], paste: impl Fn(&wgpu::TextureView) -> Pasted) -> Targets {
     let make = |format, samples, usage| {
         let texture = state.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("stylet view"),
@@ -348,7 +363,7 @@ fn targets(state: &RenderState, paste: &Paste, size: [u32; 2]) -> Targets {
         size,
         color: make(COLOR, SAMPLES, drawn),
         depth: make(DEPTH, SAMPLES, drawn),
-        pasted: paste.of(&resolved),
+        pasted: paste(&resolved),
         resolved,
     }
 }

@@ -14,3 +14,4 @@ mod pick;
 mod scene3d;
 pub mod slice;
 mod state;
+mod uniforms;

@@ -12,7 +12,10 @@ use egui::{PaintCallbackInfo, Painter, Rect, Shape};
 pub struct Paste {
     device: wgpu::Device,
     layout: wgpu::BindGroupLayout,
-    pipeline: wgpu::RenderPipeline,
+    /// Pixel for pixel.
+    exact: wgpu::RenderPipeline,
+    /// For a picture with fewer pixels than its place.
+    enlarging: wgpu::RenderPipeline,
 }
 
 /// A picture that can be put into the window.
@@ -56,7 +59,8 @@ impl Paste {
             }],
         });
         Self {
-            pipeline: pipeline(device, &layout, state.target_format, to_light),
+            exact: pipeline(device, &layout, state.target_format, [to_light, false]),
+            enlarging: pipeline(device, &layout, state.target_format, [to_light, true]),
             layout,
             device: device.clone(),
         }
@@ -64,6 +68,15 @@ impl Paste {
 
     /// The picture in this texture.
     pub fn of(&self, texture: &wgpu::TextureView) -> Pasted {
+        self.by(&self.exact, texture)
+    }
+
+    /// The picture in this texture, which has fewer pixels than the picture will have.
+    pub fn enlarged(&self, texture: &wgpu::TextureView) -> Pasted {
+        self.by(&self.enlarging, texture)
+    }
+
+    fn by(&self, pipeline: &wgpu::RenderPipeline, texture: &wgpu::TextureView) -> Pasted {
         let picture = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("stylet paste"),
             layout: &self.layout,
@@ -73,7 +86,7 @@ impl Paste {
             }],
         });
         let draw = Draw {
-            pipeline: self.pipeline.clone(),
+            pipeline: pipeline.clone(),
             picture,
         };
         Pasted {
@@ -114,7 +127,7 @@ fn pipeline(
     device: &wgpu::Device,
     layout: &wgpu::BindGroupLayout,
     window: wgpu::TextureFormat,
-    to_light: bool,
+    [to_light, enlarges]: [bool; 2],
 ) -> wgpu::RenderPipeline {
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("stylet paste"),
@@ -141,7 +154,10 @@ fn pipeline(
             module: &module,
             entry_point: Some("paste_fragment"),
             compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &[("TAKES_LIGHT", f64::from(u8::from(to_light)))],
+                constants: &[
+                    ("TAKES_LIGHT", f64::from(u8::from(to_light))),
+                    ("ENLARGES", f64::from(u8::from(enlarges))),
+                ],
                 ..Default::default()
             },
             targets: &[Some(window.into())],

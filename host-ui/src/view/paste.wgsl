@@ -2,6 +2,8 @@
 
 // The window's texture takes light, not what the screen gets.
 override TAKES_LIGHT: bool;
+// Of a picture with fewer pixels than its place.
+override ENLARGES: bool;
 
 @group(0) @binding(0) var picture: texture_2d<f32>;
 
@@ -23,11 +25,28 @@ fn light_of(color: vec3<f32>) -> vec3<f32> {
     return select(high, color / 12.92, color < vec3(0.04045));
 }
 
+fn texel(at: vec2<f32>) -> vec3<f32> {
+    let last = vec2<f32>(textureDimensions(picture)) - 1.0;
+    return textureLoad(picture, vec2<i32>(clamp(at, vec2(0.0), last)), 0).xyz;
+}
+
+fn between(at: vec2<f32>) -> vec3<f32> {
+    let low = floor(at - 0.5);
+    let part = at - 0.5 - low;
+    let upper = mix(texel(low), texel(low + vec2(1.0, 0.0)), part.x);
+    let lower = mix(texel(low + vec2(0.0, 1.0)), texel(low + vec2(1.0, 1.0)), part.x);
+    return mix(upper, lower, part.y);
+}
+
 @fragment
 fn paste_fragment(in: Out) -> @location(0) vec4<f32> {
-    let size = vec2<f32>(textureDimensions(picture));
-    let texel = vec2<i32>(clamp(in.at * size, vec2(0.0), size - 1.0));
-    let color = textureLoad(picture, texel, 0).xyz;
+    let at = in.at * vec2<f32>(textureDimensions(picture));
+    var color: vec3<f32>;
+    if (ENLARGES) {
+        color = between(at);
+    } else {
+        color = texel(at);
+    }
     if (TAKES_LIGHT) {
         return vec4(light_of(color), 1.0);
     }

@@ -3,33 +3,36 @@
 use super::body::ShownBody;
 use super::camera::Camera;
 use super::driver::DriverCost;
-use super::gpu::{Gpu, SceneUniform};
+use super::gpu::Gpu;
 use super::kinds::{kinds, surfaces};
 use super::legend::Legend;
 use super::marks::Marks;
-use super::orientation::{Orientation, scene_from_patient};
+use super::orientation::scene_from_patient;
 use super::paste::Pasted;
 use super::pick::pick;
 use super::state::ViewState;
+use super::uniforms::{SceneUniform, section, tint, uniform};
 use crate::action::Viewpoint;
 use crate::dose_worker::DoseResult;
 use crate::mesh::Surface;
 use crate::shown::Shown;
 use crate::theme::{self, IMAGE, Tokens};
 use eframe::egui_wgpu::RenderState;
-use egui::{Color32, PointerButton, Rect, Sense};
+use egui::{PointerButton, Rect, Sense};
 use nalgebra::Vector3;
 use std::sync::Arc;
 use stylet_shm_schema::SceneId;
 
 const TURN_PER_POINT_RAD: f32 = 0.008;
-const LIGHT: [f32; 4] = [-0.48, 0.78, -0.40, 0.0];
 /// Behind the entry, where the template is held.
 const TEMPLATE_BEFORE_M: f32 = 0.01;
 /// The needle's own view is from so far behind the tip.
 const NEEDLE_VIEW_M: f32 = 0.06;
 /// A picture wider than this has room for words about doses.
 const ALONE: f32 = 500.0;
+/// Less is not seen, so that a force and a tip at rest leave the picture as it is.
+const SEEN_M: f64 = 2e-5;
+const SEEN_N: f64 = 0.02;
 /// Opacity of isodose surfaces.
 const SHELL: f32 = 0.30;
 
@@ -268,13 +271,14 @@ impl Scene3d {
                 shown.planning.implant.as_ref().map_or(0, |i| i.revision),
                 shown.planning.progress.begun(),
             ),
-            tip: shown.tip_m().unwrap_or_default(),
-            force: shown.state.map_or([0.0; 3], |s| s.force_on_hand_n),
+            tip: rounded(shown.tip_m().unwrap_or_default(), SEEN_M),
+            force: rounded(shown.state.map_or([0.0; 3], |s| s.force_on_hand_n), SEEN_N),
             seeds: shown.seeds.iter().map(|s| s.position_m).collect(),
             dose: number,
             dark: tokens.dark,
         };
-        if fresh || self.drawn.as_ref() != Some(&key) {
+        let moves = !fresh && self.drawn.as_ref() != Some(&key);
+        if fresh || moves || gpu.shows_coarse() {
             let fixed = (key.scene, key.plan, key.look.template, key.dark);
             if self.fixed != Some(fixed) {
                 self.fixed = Some(fixed);
@@ -298,53 +302,15 @@ impl Scene3d {
             let ghost = tinted(tokens.ghost, 0.22, [0.0; 4]);
             let clear = theme::rgba(tokens.background, 1.0);
             let clear = [clear[0], clear[1], clear[2]].map(f64::from);
-            gpu.draw(&looks, &shells, self.look.rest_shape.then_some(&ghost), clear);
+            gpu.draw(&looks, &shells, self.look.rest_shape.then_some(&ghost), (clear, moves));
             self.drawn = Some(key);
         }
         gpu.picture()
     }
 }
 
-/// The plane through the cursor whose near side is cut away.
-fn section(camera: &Camera, view: &ViewState, shown: &Shown) -> [f32; 4] {
-    let (Some(orientation), Some(scene)) = (view.section, &shown.scene) else {
-        return [0.0; 4];
-    };
-    let axis = match orientation {
-        Orientation::Axial => Vector3::z(),
-        Orientation::Sagittal => Vector3::x(),
-        Orientation::Coronal => Vector3::y(),
-    };
-    let normal = (scene_from_patient(scene) * axis).map(|c| c as f32);
-    let cursor = view.cursor_m.map(|c| c as f32);
-    let normal = if (camera.eye_m() - cursor).dot(&normal) < 0.0 {
-        -normal
-    } else {
-        normal
-    };
-    [normal.x, normal.y, normal.z, normal.dot(&cursor)]
-}
-
-fn uniform(camera: &Camera, aspect: f32) -> SceneUniform {
-    let eye = camera.eye_m();
-    let length = LIGHT.iter().map(|c| c * c).sum::<f32>().sqrt();
-    SceneUniform {
-        clip_from_scene: camera.clip_from_scene(aspect).into(),
-        eye_m: [eye.x, eye.y, eye.z, 1.0],
-        light: LIGHT.map(|c| c / length),
-        surface: [1.0; 4],
-        look: [0.0; 4],
-        section: [0.0; 4],
-    }
-}
-
-fn tint(whole: SceneUniform, color: Color32, opacity: f32, section: [f32; 4]) -> SceneUniform {
-    SceneUniform {
-        surface: theme::rgba(color, opacity),
-        look: [1.0, 0.25 * (1.0 - opacity), 0.0, 0.0],
-        section,
-        ..whole
-    }
+fn rounded(values: [f64; 3], step: f64) -> [f64; 3] {
+    values.map(|value| (value / step).round() * step)
 }
 
 /// What changes with the scene and the plan only. Gives the corner where the axes are drawn.
