@@ -1,5 +1,6 @@
 //! The gland's surface for the graphics card: positions with smooth normals, indices. Only what moves is computed again.
 
+pub mod coarse;
 pub mod cut;
 
 use bytemuck::{Pod, Zeroable};

@@ -11,6 +11,7 @@ use super::paste::{Paste, Pasted};
 use super::uniforms::SceneUniform;
 use crate::dose_worker::IsodoseShell;
 use crate::mesh::SurfaceVertex;
+use crate::mesh::coarse::coarse;
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
 use growing::{Growing, allocate};
@@ -37,9 +38,10 @@ struct Material {
     bind: wgpu::BindGroup,
 }
 
-/// One closed surface: its indices, and what it looks like.
+/// One closed surface: its indices, all and fewer, and what it looks like.
 struct Layer {
-    indices: Range<u32>,
+    fine: Range<u32>,
+    coarse: Range<u32>,
     material: Material,
 }
 
@@ -65,7 +67,7 @@ pub struct Gpu {
     ghost_vertices: Growing,
     indices: Growing,
     shells: Vec<Shell>,
-    /// Without a graphics card what moves is drawn with a quarter of the pixels.
+    /// Without a graphics card what moves is drawn with a quarter of the pixels, and with fewer triangles.
     has_card: bool,
     fine: Option<Targets>,
     coarse: Option<Targets>,
@@ -114,17 +116,27 @@ impl Gpu {
     /// The indices of each surface, the body's first.
     pub fn set_scene(&mut self, rest: &[SurfaceVertex], surfaces: &[Vec<u32>]) {
         self.driver.send(|| self.ghost_vertices.write(&self.state, rest));
-        self.driver.send(|| self.indices.write(&self.state, &surfaces.concat()));
-        let mut end = 0;
+        let mut indices: Vec<u32> = Vec::new();
+        let mut add = |some: &[u32]| {
+            let begun = indices.len() as u32;
+            indices.extend(some);
+            begun..indices.len() as u32
+        };
         self.surfaces.clear();
-        for indices in surfaces {
-            let start = end;
-            end += indices.len() as u32;
+        for surface in surfaces {
+            let fine = add(surface);
+            let coarse = if self.has_card {
+                fine.clone()
+            } else {
+                add(&coarse(rest, surface))
+            };
             self.surfaces.push(Layer {
-                indices: start..end,
+                fine,
+                coarse,
                 material: material(&self.state.device, &self.layout),
             });
         }
+        self.driver.send(|| self.indices.write(&self.state, &indices));
     }
 
     pub fn set_surface(&mut self, vertices: &[SurfaceVertex]) {
@@ -251,19 +263,20 @@ impl Gpu {
             for list in &self.lines {
                 draw_list(&mut pass, &self.pipelines.line, list);
             }
+            let of = |layer: &Layer| if self.shows_coarse { &layer.coarse } else { &layer.fine }.clone();
             let (far, near) = (&self.pipelines.surface_back, &self.pipelines.surface_front);
             if let Some((body, inner)) = self.surfaces.split_first() {
                 if ghost.is_some() {
-                    self.draw_surface(&mut pass, near, &self.ghost_vertices, &self.ghost, &body.indices);
+                    self.draw_surface(&mut pass, near, &self.ghost_vertices, &self.ghost, &of(body));
                 }
                 let now = &self.surface_vertices;
-                self.draw_surface(&mut pass, far, now, &body.material, &body.indices);
+                self.draw_surface(&mut pass, far, now, &body.material, &of(body));
                 self.draw_shells(&mut pass, shells.len());
                 for surface in inner {
-                    self.draw_surface(&mut pass, far, now, &surface.material, &surface.indices);
-                    self.draw_surface(&mut pass, near, now, &surface.material, &surface.indices);
+                    self.draw_surface(&mut pass, far, now, &surface.material, &of(surface));
+                    self.draw_surface(&mut pass, near, now, &surface.material, &of(surface));
                 }
-                self.draw_surface(&mut pass, near, now, &body.material, &body.indices);
+                self.draw_surface(&mut pass, near, now, &body.material, &of(body));
             }
         }
         queue.submit([encoder.finish()]);

@@ -1,0 +1,104 @@
+//! Fewer triangles about the same vertices, for pictures that are replaced at once.
+
+use super::SurfaceVertex;
+use std::collections::HashMap;
+
+/// Vertices in a cube of this side become one.
+const CELL_M: f32 = 3e-3;
+
+/// Indices of a surface whose corners are some of the vertices of this one: in each cube of [`CELL_M`] the one nearest to the
+/// middle of those there (vertex clustering, Rossignac and Borrel 1993). They move with the surface.
+pub fn coarse(vertices: &[SurfaceVertex], indices: &[u32]) -> Vec<u32> {
+    let place = |vertex: u32| vertices[vertex as usize].place_m;
+    let cell = |vertex: u32| place(vertex).map(|c| (c / CELL_M).floor() as i32);
+    let mut sums: HashMap<[i32; 3], ([f32; 3], f32)> = HashMap::new();
+    for &vertex in indices {
+        let (sum, count) = sums.entry(cell(vertex)).or_default();
+        for (sum, c) in sum.iter_mut().zip(place(vertex)) {
+            *sum += c;
+        }
+        *count += 1.0;
+    }
+    let from_middle = |vertex: u32, (sum, count): &([f32; 3], f32)| -> f32 {
+        let at = place(vertex);
+        (0..3).map(|a| (at[a] - sum[a] / count).powi(2)).sum()
+    };
+    let mut nearest: HashMap<[i32; 3], u32> = HashMap::new();
+    for &vertex in indices {
+        let cell = cell(vertex);
+        let sum = &sums[&cell];
+        let kept = nearest.entry(cell).or_insert(vertex);
+        if from_middle(vertex, sum) < from_middle(*kept, sum) {
+            *kept = vertex;
+        }
+    }
+    indices
+        .chunks_exact(3)
+        .map(|corners| [0, 1, 2].map(|c| nearest[&cell(corners[c])]))
+        .filter(|[a, b, c]| a != b && b != c && c != a)
+        .flatten()
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ball of so many rings, each with twice as many vertices.
+    fn ball(radius_m: f32, rings: u32) -> (Vec<SurfaceVertex>, Vec<u32>) {
+        let across = 2 * rings;
+        let mut vertices = Vec::new();
+        for ring in 0..=rings {
+            for n in 0..across {
+                let (polar, around) = (
+                    std::f32::consts::PI * ring as f32 / rings as f32,
+                    std::f32::consts::TAU * n as f32 / across as f32,
+                );
+                let normal = [polar.sin() * around.cos(), polar.sin() * around.sin(), polar.cos()];
+                vertices.push(SurfaceVertex {
+                    place_m: normal.map(|c| c * radius_m),
+                    normal,
+                });
+            }
+        }
+        let at = |ring: u32, n: u32| ring * across + n % across;
+        let mut indices = Vec::new();
+        for ring in 0..rings {
+            for n in 0..across {
+                let [a, b, c, d] = [at(ring, n), at(ring, n + 1), at(ring + 1, n), at(ring + 1, n + 1)];
+                indices.extend([a, c, b, b, c, d]);
+            }
+        }
+        (vertices, indices)
+    }
+
+    fn volume(vertices: &[SurfaceVertex], indices: &[u32]) -> f64 {
+        indices
+            .chunks_exact(3)
+            .map(|t| {
+                let [a, b, c] =
+                    [0, 1, 2].map(|i| nalgebra::Vector3::from(vertices[t[i] as usize].place_m).map(f64::from));
+                a.dot(&b.cross(&c)) / 6.0
+            })
+            .sum()
+    }
+
+    #[test]
+    fn a_ball_keeps_its_volume_with_a_tenth_of_the_triangles() {
+        let (vertices, indices) = ball(0.022, 90);
+        let fewer = coarse(&vertices, &indices);
+        assert!(fewer.len() * 10 < indices.len(), "{} of {}", fewer.len(), indices.len());
+        let ratio = volume(&vertices, &fewer) / volume(&vertices, &indices);
+        assert!((0.95..=1.0).contains(&ratio), "{ratio}");
+    }
+
+    #[test]
+    fn what_is_smaller_than_a_cube_has_no_triangles() {
+        let (mut vertices, indices) = ball(0.001, 8);
+        vertices
+            .iter_mut()
+            .for_each(|v| v.place_m = v.place_m.map(|c| c + 0.5 * CELL_M));
+        assert!(coarse(&vertices, &indices).is_empty());
+        assert!(coarse(&[], &[]).is_empty());
+    }
+}
