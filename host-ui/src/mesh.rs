@@ -9,6 +9,8 @@ use std::ops::Range;
 
 /// A surface cut from a lattice has steps; the light should not show them.
 const SMOOTHINGS: usize = 2;
+/// A twentieth of a pixel, where a body of 100 mm fills a picture of 500 pixels.
+const SEEN_M: f32 = 1e-5;
 /// Runs of vertices with a gap no longer than this between them are sent as one.
 const GAP: usize = 64;
 
@@ -89,11 +91,13 @@ impl Surface {
         self.vertices
     }
 
-    /// Gives the runs of vertices that are others now; none where nothing has moved.
+    /// Gives the runs of vertices that are others now; none where nothing has moved. A vertex stays until its place is farther
+    /// away than [`SEEN_M`]: tissue that creeps would otherwise have the picture drawn again in each frame.
     pub fn move_to(&mut self, positions_m: &[[f32; 3]]) -> Vec<Range<usize>> {
         self.near.vertices.clear();
         for ((vertex, place_m), number) in self.vertices.iter_mut().zip(positions_m).zip(0..) {
-            if vertex.place_m != *place_m {
+            let away_m = [0, 1, 2].map(|a| (vertex.place_m[a] - place_m[a]).abs());
+            if away_m.iter().any(|a| *a > SEEN_M) {
                 vertex.place_m = *place_m;
                 self.near.vertices.push(number);
             }

@@ -64,7 +64,7 @@ struct Key {
     look: Look,
     view: ViewState,
     scene: SceneId,
-    moved: u64,
+    changes: u64,
     /// Of the needle at work, and of the plan of all.
     plan: (u64, u64, usize),
     tip: [f64; 3],
@@ -86,6 +86,8 @@ pub struct Scene3d {
     surface: Surface,
     /// Of the body as the card has it.
     moved: u64,
+    /// How often what the card has was changed.
+    changes: u64,
     /// The dose that the card has.
     shells: u64,
     drawn: Option<Key>,
@@ -105,6 +107,7 @@ impl Scene3d {
             uploaded_scene: None,
             surface: Surface::default(),
             moved: 0,
+            changes: 0,
             shells: 0,
             drawn: None,
             fixed: None,
@@ -166,6 +169,7 @@ impl Scene3d {
         }
         self.moved = body.moved();
         let runs = self.surface.move_to(body.positions_m());
+        self.changes += u64::from(!runs.is_empty());
         if let Some(gpu) = self.gpu.as_mut().filter(|_| !runs.is_empty()) {
             gpu.move_surface(self.surface.vertices(), runs);
         }
@@ -265,7 +269,7 @@ impl Scene3d {
             look: self.look,
             view: view.clone(),
             scene: self.uploaded_scene.unwrap_or_default(),
-            moved: self.moved,
+            changes: self.changes,
             plan: (
                 shown.plan.map_or(0, |p| p.generation),
                 shown.planning.implant.as_ref().map_or(0, |i| i.revision),

@@ -60,8 +60,12 @@ impl Driven {
         window
     }
 
-    /// Three steps, drawn as the window that ships draws them.
+    /// Some steps, the last ones drawn as the window that ships draws them. What moved last is drawn in full by then.
     fn draw(&mut self) {
+        for _ in 0..20 {
+            self.window.run_steps(1);
+            std::thread::sleep(Duration::from_millis(10));
+        }
         App::draw_changes_only(&self.window.ctx, true);
         self.window.run_steps(3);
     }

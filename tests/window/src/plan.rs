@@ -347,7 +347,7 @@ fn compensation_reports_how_far_it_is_and_can_be_ended() {
     driven.window.run_steps(2);
     driven.window.get_by_label_contains("1 of 3 needles compensated");
     driven.click("Cancel");
-    assert!(!driven.window.state().planner().is_busy());
+    driven.until("the end of the work", |app| !app.planner().is_busy());
     driven.picture("plan-compensated-in-part");
     let task = driven.window.state().planner().task(0).expect("a needle");
     assert_ne!(task.drops.along_m[0], planned.needles[0].depth_m, "the drop was moved");
