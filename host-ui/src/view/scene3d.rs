@@ -57,9 +57,27 @@ impl Default for Look {
     }
 }
 
-/// Everything a picture depends on: drawn again only when one of them changed.
-#[derive(Clone, PartialEq)]
+/// Everything a picture depends on: drawn again only when one of them changed, places and the force by what can be seen.
 struct Key {
+    what: What,
+    tip: [f64; 3],
+    force: [f64; 3],
+    seeds: Vec<[f64; 3]>,
+}
+
+impl Key {
+    fn looks_as(&self, drawn: &Self) -> bool {
+        let near = |a: &[f64; 3], b: &[f64; 3], seen: f64| (0..3).all(|axis| (a[axis] - b[axis]).abs() <= seen);
+        self.what == drawn.what
+            && near(&self.tip, &drawn.tip, SEEN_M)
+            && near(&self.force, &drawn.force, SEEN_N)
+            && self.seeds.len() == drawn.seeds.len()
+            && self.seeds.iter().zip(&drawn.seeds).all(|(a, b)| near(a, b, SEEN_M))
+    }
+}
+
+#[derive(Clone, PartialEq)]
+struct What {
     camera: Camera,
     look: Look,
     view: ViewState,
@@ -67,9 +85,6 @@ struct Key {
     changes: u64,
     /// Of the needle at work, and of the plan of all.
     plan: (u64, u64, usize),
-    tip: [f64; 3],
-    force: [f64; 3],
-    seeds: Vec<[f64; 3]>,
     dose: u64,
     dark: bool,
 }
@@ -264,7 +279,7 @@ impl Scene3d {
             self.shells = number;
             gpu.set_shells(dose.map_or(&[], |d| &d.shells));
         }
-        let key = Key {
+        let what = What {
             camera: self.camera,
             look: self.look,
             view: view.clone(),
@@ -275,15 +290,18 @@ impl Scene3d {
                 shown.planning.implant.as_ref().map_or(0, |i| i.revision),
                 shown.planning.progress.begun(),
             ),
-            tip: rounded(shown.tip_m().unwrap_or_default(), SEEN_M),
-            force: rounded(shown.state.map_or([0.0; 3], |s| s.force_on_hand_n), SEEN_N),
-            seeds: shown.seeds.iter().map(|s| s.position_m).collect(),
             dose: number,
             dark: tokens.dark,
         };
-        let moves = !fresh && self.drawn.as_ref() != Some(&key);
+        let key = Key {
+            what,
+            tip: shown.tip_m().unwrap_or_default(),
+            force: shown.state.map_or([0.0; 3], |s| s.force_on_hand_n),
+            seeds: shown.seeds.iter().map(|s| s.position_m).collect(),
+        };
+        let moves = !fresh && !self.drawn.as_ref().is_some_and(|drawn| key.looks_as(drawn));
         if fresh || moves || gpu.shows_coarse() {
-            let fixed = (key.scene, key.plan, key.look.template, key.dark);
+            let fixed = (key.what.scene, key.what.plan, key.what.look.template, key.what.dark);
             if self.fixed != Some(fixed) {
                 self.fixed = Some(fixed);
                 self.corner_m = collect_fixed(&mut self.marks, shown, self.look, tokens);
@@ -311,10 +329,6 @@ impl Scene3d {
         }
         gpu.picture()
     }
-}
-
-fn rounded(values: [f64; 3], step: f64) -> [f64; 3] {
-    values.map(|value| (value / step).round() * step)
 }
 
 /// What changes with the scene and the plan only. Gives the corner where the axes are drawn.
