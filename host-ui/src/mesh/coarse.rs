@@ -3,14 +3,22 @@
 use super::SurfaceVertex;
 use std::collections::HashMap;
 
-/// Vertices in a cube of this side become one.
-const CELL_M: f32 = 3e-3;
+/// Vertices in a cube become one. Its side is this part of the largest side of the surface, within limits.
+const PART: f32 = 1.0 / 14.0;
+const CELL_M: [f32; 2] = [2.5e-3, 8e-3];
 
-/// Indices of a surface whose corners are some of the vertices of this one: in each cube of [`CELL_M`] the one nearest to the
+/// Indices of a surface whose corners are some of the vertices of this one: in each cube the one nearest to the
 /// middle of those there (vertex clustering, Rossignac and Borrel 1993). They move with the surface.
 pub fn coarse(vertices: &[SurfaceVertex], indices: &[u32]) -> Vec<u32> {
     let place = |vertex: u32| vertices[vertex as usize].place_m;
-    let cell = |vertex: u32| place(vertex).map(|c| (c / CELL_M).floor() as i32);
+    let side_m = (0..3)
+        .map(|a| {
+            let along = || indices.iter().map(|&vertex| place(vertex)[a]);
+            along().fold(f32::MIN, f32::max) - along().fold(f32::MAX, f32::min)
+        })
+        .fold(0.0, f32::max);
+    let cell_m = (side_m * PART).clamp(CELL_M[0], CELL_M[1]);
+    let cell = |vertex: u32| place(vertex).map(|c| (c / cell_m).floor() as i32);
     let mut sums: HashMap<[i32; 3], ([f32; 3], f32)> = HashMap::new();
     for &vertex in indices {
         let (sum, count) = sums.entry(cell(vertex)).or_default();
@@ -97,7 +105,7 @@ mod tests {
         let (mut vertices, indices) = ball(0.001, 8);
         vertices
             .iter_mut()
-            .for_each(|v| v.place_m = v.place_m.map(|c| c + 0.5 * CELL_M));
+            .for_each(|v| v.place_m = v.place_m.map(|c| c + 0.5 * CELL_M[0]));
         assert!(coarse(&vertices, &indices).is_empty());
         assert!(coarse(&[], &[]).is_empty());
     }

@@ -4,6 +4,7 @@
 
 mod growing;
 mod pipelines;
+mod targets;
 
 use super::driver::DriverCost;
 use super::marks::Marks;
@@ -18,20 +19,9 @@ use growing::{Growing, allocate};
 use pipelines::{Pipelines, pipelines};
 use std::mem::size_of;
 use std::ops::Range;
+use targets::{FINE, ONE_SAMPLE, Targets};
 
-/// What egui takes for an image that is already gamma-encoded.
-const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
-const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-const SAMPLES: u32 = 4;
 const LARGEST_SIDE: u32 = 4096;
-
-struct Targets {
-    size: [u32; 2],
-    resolved: wgpu::TextureView,
-    color: wgpu::TextureView,
-    depth: wgpu::TextureView,
-    pasted: Pasted,
-}
 
 struct Material {
     uniform: wgpu::Buffer,
@@ -56,6 +46,8 @@ pub struct Gpu {
     state: RenderState,
     layout: wgpu::BindGroupLayout,
     pipelines: Pipelines,
+    /// For `coarse`.
+    coarse_pipelines: Pipelines,
     paste: Paste,
     /// The body's surface, then those inside it.
     surfaces: Vec<Layer>,
@@ -93,7 +85,8 @@ impl Gpu {
         });
         let vertex = wgpu::BufferUsages::VERTEX;
         Self {
-            pipelines: pipelines(device, &layout),
+            pipelines: pipelines(device, &layout, FINE),
+            coarse_pipelines: pipelines(device, &layout, ONE_SAMPLE),
             paste: Paste::new(&state),
             surfaces: Vec::new(),
             ghost: material(device, &layout),
@@ -182,10 +175,10 @@ impl Gpu {
         if self.fine.as_ref().is_some_and(|t| t.size == size) {
             return false;
         }
-        self.fine = Some(targets(&self.state, size, |resolved| self.paste.of(resolved)));
+        self.fine = Some(Targets::new(&self.state, size, FINE, |picture| self.paste.of(picture)));
         self.coarse = (!self.has_card).then(|| {
             let size = size.map(|side| side.div_ceil(2));
-            targets(&self.state, size, |resolved| self.paste.enlarged(resolved))
+            Targets::new(&self.state, size, ONE_SAMPLE, |picture| self.paste.enlarged(picture))
         });
         true
     }
@@ -255,23 +248,28 @@ impl Gpu {
                 label: Some("stylet view"),
             });
         {
-            let mut pass = begin(&mut encoder, targets, clear);
+            let mut pass = targets.begin(&mut encoder, clear);
+            let pipelines = if self.shows_coarse {
+                &self.coarse_pipelines
+            } else {
+                &self.pipelines
+            };
             pass.set_bind_group(0, &self.ghost.bind, &[]);
             for list in &self.solids {
-                draw_list(&mut pass, &self.pipelines.solid, list);
+                draw_list(&mut pass, &pipelines.solid, list);
             }
             for list in &self.lines {
-                draw_list(&mut pass, &self.pipelines.line, list);
+                draw_list(&mut pass, &pipelines.line, list);
             }
             let of = |layer: &Layer| if self.shows_coarse { &layer.coarse } else { &layer.fine }.clone();
-            let (far, near) = (&self.pipelines.surface_back, &self.pipelines.surface_front);
+            let (far, near) = (&pipelines.surface_back, &pipelines.surface_front);
             if let Some((body, inner)) = self.surfaces.split_first() {
                 if ghost.is_some() {
                     self.draw_surface(&mut pass, near, &self.ghost_vertices, &self.ghost, &of(body));
                 }
                 let now = &self.surface_vertices;
                 self.draw_surface(&mut pass, far, now, &body.material, &of(body));
-                self.draw_shells(&mut pass, shells.len());
+                self.draw_shells(&mut pass, pipelines, shells.len());
                 for surface in inner {
                     self.draw_surface(&mut pass, far, now, &surface.material, &of(surface));
                     self.draw_surface(&mut pass, near, now, &surface.material, &of(surface));
@@ -284,9 +282,9 @@ impl Gpu {
     }
 
     /// The highest dose is innermost and is drawn first.
-    fn draw_shells(&self, pass: &mut wgpu::RenderPass<'_>, count: usize) {
+    fn draw_shells(&self, pass: &mut wgpu::RenderPass<'_>, pipelines: &Pipelines, count: usize) {
         for shell in self.shells.iter().take(count).rev().filter(|s| s.indices.len > 0) {
-            for pipeline in [&self.pipelines.surface_back, &self.pipelines.surface_front] {
+            for pipeline in [&pipelines.surface_back, &pipelines.surface_front] {
                 pass.set_pipeline(pipeline);
                 pass.set_bind_group(0, &shell.material.bind, &[]);
                 pass.set_vertex_buffer(0, shell.vertices.buffer.slice(..));
@@ -322,62 +320,6 @@ fn draw_list(pass: &mut wgpu::RenderPass<'_>, pipeline: &wgpu::RenderPipeline, l
         pass.set_pipeline(pipeline);
         pass.set_vertex_buffer(0, list.buffer.slice(..));
         pass.draw(0..list.len, 0..1);
-    }
-}
-
-fn begin<'a>(encoder: &'a mut wgpu::CommandEncoder, targets: &Targets, clear: [f64; 3]) -> wgpu::RenderPass<'a> {
-    let [r, g, b] = clear;
-    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some("stylet view"),
-        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-            view: &targets.color,
-            depth_slice: None,
-            resolve_target: Some(&targets.resolved),
-            ops: wgpu::Operations {
-                load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
-                store: wgpu::StoreOp::Discard,
-            },
-        })],
-        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-            view: &targets.depth,
-            depth_ops: Some(wgpu::Operations {
-                load: wgpu::LoadOp::Clear(1.0),
-                store: wgpu::StoreOp::Discard,
-            }),
-            stencil_ops: None,
-        }),
-        timestamp_writes: None,
-        occlusion_query_set: None,
-        multiview_mask: None,
-    })
-}
-
-fn targets(state: &RenderState, size: [u32; 2], paste: impl Fn(&wgpu::TextureView) -> Pasted) -> Targets {
-    let make = |format, samples, usage| {
-        let texture = state.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("stylet view"),
-            size: wgpu::Extent3d {
-                width: size[0],
-                height: size[1],
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: samples,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage,
-            view_formats: &[],
-        });
-        texture.create_view(&wgpu::TextureViewDescriptor::default())
-    };
-    let drawn = wgpu::TextureUsages::RENDER_ATTACHMENT;
-    let resolved = make(COLOR, 1, drawn | wgpu::TextureUsages::TEXTURE_BINDING);
-    Targets {
-        size,
-        color: make(COLOR, SAMPLES, drawn),
-        depth: make(DEPTH, SAMPLES, drawn),
-        pasted: paste(&resolved),
-        resolved,
     }
 }
 

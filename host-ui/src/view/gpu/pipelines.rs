@@ -1,7 +1,7 @@
 //! How marks and surfaces are drawn: shaders, blending and depth.
 
 use super::super::marks::MarkVertex;
-use super::{COLOR, DEPTH, SAMPLES};
+use super::targets::{COLOR, DEPTH};
 use crate::mesh::SurfaceVertex;
 use eframe::wgpu;
 use std::mem::size_of;
@@ -14,7 +14,8 @@ pub struct Pipelines {
     pub surface_front: wgpu::RenderPipeline,
 }
 
-pub fn pipelines(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> Pipelines {
+/// For pictures with so many samples in a pixel.
+pub fn pipelines(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, samples: u32) -> Pipelines {
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("stylet scene"),
         source: wgpu::ShaderSource::Wgsl(include_str!("../scene.wgsl").into()),
@@ -33,6 +34,7 @@ pub fn pipelines(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> Pipel
         topology: wgpu::PrimitiveTopology::TriangleList,
         cull: None,
         opaque: true,
+        samples,
     };
     let front = Kind {
         stage: "surface",
@@ -41,6 +43,7 @@ pub fn pipelines(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> Pipel
         topology: wgpu::PrimitiveTopology::TriangleList,
         cull: Some(wgpu::Face::Back),
         opaque: false,
+        samples,
     };
     let line = Kind {
         topology: wgpu::PrimitiveTopology::LineList,
@@ -67,6 +70,7 @@ struct Kind<'a> {
     topology: wgpu::PrimitiveTopology,
     cull: Option<wgpu::Face>,
     opaque: bool,
+    samples: u32,
 }
 
 fn pipeline(
@@ -102,7 +106,7 @@ fn pipeline(
             bias: wgpu::DepthBiasState::default(),
         }),
         multisample: wgpu::MultisampleState {
-            count: SAMPLES,
+            count: kind.samples,
             ..Default::default()
         },
         fragment: Some(wgpu::FragmentState {
