@@ -7,19 +7,27 @@ use std::collections::HashMap;
 const PART: f32 = 1.0 / 14.0;
 const CELL_M: [f32; 2] = [2.5e-3, 8e-3];
 
+/// A cube, and whether the surface looks outwards there.
+type Cell = ([i32; 3], bool);
+
 /// Indices of a surface whose corners are some of the vertices of this one: in each cube the one nearest to the
 /// middle of those there (vertex clustering, Rossignac and Borrel 1993). They move with the surface.
 pub fn coarse(vertices: &[SurfaceVertex], indices: &[u32]) -> Vec<u32> {
     let place = |vertex: u32| vertices[vertex as usize].place_m;
-    let side_m = (0..3)
-        .map(|a| {
-            let along = || indices.iter().map(|&vertex| place(vertex)[a]);
-            along().fold(f32::MIN, f32::max) - along().fold(f32::MAX, f32::min)
-        })
-        .fold(0.0, f32::max);
+    let bounds = [0, 1, 2].map(|a| {
+        let along = || indices.iter().map(|&vertex| place(vertex)[a]);
+        [along().fold(f32::MAX, f32::min), along().fold(f32::MIN, f32::max)]
+    });
+    let side_m = bounds.iter().map(|[low, high]| high - low).fold(0.0, f32::max);
     let cell_m = (side_m * PART).clamp(CELL_M[0], CELL_M[1]);
-    let cell = |vertex: u32| place(vertex).map(|c| (c / cell_m).floor() as i32);
-    let mut sums: HashMap<[i32; 3], ([f32; 3], f32)> = HashMap::new();
+    // Both faces of a thin wall lie in one cube and stay apart: one looks away from the middle, the other to it.
+    let cell = |vertex: u32| -> Cell {
+        let SurfaceVertex { place_m, normal } = vertices[vertex as usize];
+        let from_middle = |a: usize| place_m[a] - 0.5 * (bounds[a][0] + bounds[a][1]);
+        let away: f32 = (0..3).map(|a| normal[a] * from_middle(a)).sum();
+        (place_m.map(|c| (c / cell_m).floor() as i32), away > 0.0)
+    };
+    let mut sums: HashMap<Cell, ([f32; 3], f32)> = HashMap::new();
     for &vertex in indices {
         let (sum, count) = sums.entry(cell(vertex)).or_default();
         for (sum, c) in sum.iter_mut().zip(place(vertex)) {
@@ -31,7 +39,7 @@ pub fn coarse(vertices: &[SurfaceVertex], indices: &[u32]) -> Vec<u32> {
         let at = place(vertex);
         (0..3).map(|a| (at[a] - sum[a] / count).powi(2)).sum()
     };
-    let mut nearest: HashMap<[i32; 3], u32> = HashMap::new();
+    let mut nearest: HashMap<Cell, u32> = HashMap::new();
     for &vertex in indices {
         let cell = cell(vertex);
         let sum = &sums[&cell];
@@ -98,6 +106,27 @@ mod tests {
         assert!(fewer.len() * 10 < indices.len(), "{} of {}", fewer.len(), indices.len());
         let ratio = volume(&vertices, &fewer) / volume(&vertices, &indices);
         assert!((0.95..=1.0).contains(&ratio), "{ratio}");
+    }
+
+    /// The wall of a bladder.
+    #[test]
+    fn a_thin_wall_keeps_its_volume() {
+        let (mut vertices, mut indices) = ball(0.022, 90);
+        let (inner, around) = ball(0.0205, 90);
+        let first = vertices.len() as u32;
+        let turned = |v: &SurfaceVertex| SurfaceVertex {
+            place_m: v.place_m,
+            normal: v.normal.map(|c| -c),
+        };
+        vertices.extend(inner.iter().map(turned));
+        indices.extend(
+            around
+                .chunks_exact(3)
+                .flat_map(|t| [t[0], t[2], t[1]].map(|v| first + v)),
+        );
+        let fewer = coarse(&vertices, &indices);
+        let ratio = volume(&vertices, &fewer) / volume(&vertices, &indices);
+        assert!((0.9..=1.1).contains(&ratio), "{ratio}");
     }
 
     #[test]
