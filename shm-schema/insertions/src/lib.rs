@@ -1,0 +1,124 @@
+//! Results of a population study: one row for each simulated insertion, in Parquet files that any program can query.
+//!
+//! The core writes them and the host reads them. Lengths in mm, patient frame (RAS); forces in N, times in s, strengths in U.
+
+#![warn(missing_docs)]
+
+mod columns;
+mod digest;
+mod error;
+mod folder;
+mod read;
+mod write;
+
+pub use columns::{SEED_COLUMNS, schema};
+pub use digest::digest;
+pub use error::TableError;
+pub use folder::{FILE_ENDING, Shard, shard_files, structures_file};
+pub use read::read;
+pub use write::write;
+
+/// One needle that was inserted, or that could not be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Insertion {
+    /// `STUDY/SCENE/PLAN/IMPLANT/NEEDLE`; all random numbers of the insertion follow from it.
+    pub id: String,
+    /// Name of the scene.
+    pub scene: String,
+    /// Name of the plan, which is that of its file without the ending.
+    pub plan: String,
+    /// Number of the implant in its scene and plan, from 1.
+    pub implant: i32,
+    /// Number of the needle in its plan, from 1.
+    pub needle: i32,
+    /// Hole of the template; empty where the plan names none.
+    pub hole: String,
+    /// Tissue model.
+    pub tissue: String,
+    /// Model of the seeds, as source files name it.
+    pub source: String,
+    /// Prescribed dose, Gy.
+    pub prescription_gy: f64,
+    /// What was drawn or set for this insertion, in the order of [`Table::quantities`].
+    pub drawn: Vec<f64>,
+    /// What happened; the text says why nothing did.
+    pub outcome: Result<Motion, String>,
+    /// In the order of the drops.
+    pub seeds: Vec<Seed>,
+}
+
+/// What an insertion did to hand and tissue.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Largest force on the hand, N.
+    pub peak_force_n: f64,
+    /// Largest displacement of an element before the first puncture, mm.
+    pub displacement_before_puncture_mm: f64,
+    /// Largest displacement of an element during the whole insertion, mm.
+    pub largest_displacement_mm: f64,
+    /// Largest shift of the middle of the target during the whole insertion, mm.
+    pub target_shift_mm: f64,
+    /// Duration on the clock of the simulation, s.
+    pub duration_s: f64,
+}
+
+/// One seed as planned, and where it rests.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seed {
+    /// Where the plan wants it, mm.
+    pub planned_mm: [f64; 3],
+    /// Direction of its needle in the plan.
+    pub planned_axis: [f64; 3],
+    /// Air kerma strength, U.
+    pub strength_u: f64,
+    /// `None` where the insertion failed.
+    pub rest: Option<Rest>,
+}
+
+/// A seed in tissue that has come to rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rest {
+    /// Its middle, mm.
+    pub at_mm: [f64; 3],
+    /// Its axis.
+    pub axis: [f64; 3],
+    /// When it was dropped, after the tip's first contact with tissue, s.
+    pub dropped_after_s: f64,
+}
+
+impl Seed {
+    /// From plan to rest, mm: its length, and what of it is along the needle (positive: too deep).
+    pub fn misplacement_mm(&self) -> Option<[f64; 2]> {
+        let rest = self.rest?;
+        let off = [0, 1, 2].map(|a| rest.at_mm[a] - self.planned_mm[a]);
+        let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        Some([dot(off, off).sqrt(), dot(off, self.planned_axis)])
+    }
+}
+
+/// What was studied.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct About {
+    /// Name of the study.
+    pub study: String,
+    /// SHA-256 of all that the results follow from; files of different studies are not mixed.
+    pub fingerprint: String,
+    /// The study file as it was read.
+    pub definition: String,
+    /// Program and version.
+    pub made_by: String,
+}
+
+/// The content of one file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    /// What was studied.
+    pub about: About,
+    /// Columns of what was drawn, such as `stiffness`; units stand in the names.
+    pub quantities: Vec<String>,
+    /// Insertions.
+    pub rows: Vec<Insertion>,
+}
+
+#[cfg(test)]
+mod tests;
