@@ -4,17 +4,19 @@
 //! run, fed with a time that does not wait. Each rehearsal begins with tissue at rest, and the same needle gives the same bytes.
 //! Runs on a thread of normal priority (`bridge/rehearsals.rs`).
 
+mod motion;
 mod rig;
 mod script;
 
 use crate::lines::{LineBody, NoLine};
 use crate::rt::world::{World, WorldError};
+use motion::{Motion, TargetElements};
 use nalgebra::Vector3;
 use rig::Rig;
 use script::Script;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
-use stylet_hw::DeviceInfo;
+use stylet_hw::{DeviceInfo, Hand};
 use stylet_shm_schema::{
     MAX_SEEDS, NeedleAxis, ParameterProblems, ParameterSet, Reason, Refusal, RefusalCode, SeedPose, flags,
 };
@@ -112,6 +114,10 @@ pub struct Rehearsed {
     pub peak_force_n: f64,
     /// Largest displacement of tissue before the first puncture, m.
     pub displacement_before_puncture_m: f64,
+    /// Largest displacement of tissue during the whole insertion, m.
+    pub largest_displacement_m: f64,
+    /// Largest shift of the middle of the target during the whole insertion, m; of the whole body where it has none.
+    pub target_shift_m: f64,
     /// Time of the rehearsal on its own clock, s.
     pub simulated_s: f64,
 }
@@ -124,6 +130,8 @@ pub struct Stage {
     /// The line of the last needle: compensation rehearses the same needle several times.
     kept: Option<(NeedleAxis, ReadyLine)>,
     device: DeviceInfo,
+    hand: Hand,
+    target: TargetElements,
 }
 
 impl Stage {
@@ -133,13 +141,21 @@ impl Stage {
         let scene = scene.with_tissue(tissue);
         let lines = LineBody::of_source(source, tissue)?;
         let active = activate(&ParameterSet::default(), &device)?;
+        let target = TargetElements::of(&scene);
         let world = World::new(scene, active.limits, 1)?;
         Ok(Self {
             world: Some(Box::new(world)),
             lines,
             kept: None,
             device,
+            hand: Hand::steady(),
+            target,
         })
+    }
+
+    /// Another hand for the rehearsals from now on; the first is [`Hand::steady`].
+    pub fn take_hand(&mut self, hand: Hand) {
+        self.hand = hand;
     }
 
     /// A line for the needle, at rest; `None` in tissue that needs none.
@@ -178,17 +194,17 @@ impl Stage {
         let mut world = self.world.take().ok_or(RehearseError::BodyLost)?;
         world.tissue.return_to_rest();
         world.set_limits(active.limits.clone());
-        let mut rig = Rig::new(world, &active, &self.device, run);
+        let mut rig = Rig::new(world, &active, (&self.device, self.hand), run);
         if let Some(line) = line {
             rig.take_line(line);
         }
-        let outcome = perform(&mut rig, run, stop);
+        let outcome = perform(&mut rig, run, Motion::new(&self.target), stop);
         self.world = Some(rig.into_world());
         outcome
     }
 }
 
-fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearsed, RehearseError> {
+fn perform(rig: &mut Rig, run: &NeedleRun, mut motion: Motion, stop: &AtomicBool) -> Result<Rehearsed, RehearseError> {
     let mut script = Script::new(run);
     let mut displacement_before_puncture_m = 0.0_f64;
     let (mut punctured, mut contact_s) = (false, None);
@@ -198,7 +214,9 @@ fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearse
         if stop.load(Ordering::Relaxed) {
             return Err(RehearseError::Stopped);
         }
-        rig.tick();
+        if rig.tick() {
+            motion.look(rig.displacement_m(), rig.deformed());
+        }
         let state = rig.state();
         if state.flags & flags::IN_CONTACT != 0 {
             contact_s.get_or_insert(rig.seconds());
@@ -217,6 +235,8 @@ fn perform(rig: &mut Rig, run: &NeedleRun, stop: &AtomicBool) -> Result<Rehearse
                 dropped_after_s,
                 peak_force_n: rig.state().peak_force_n,
                 displacement_before_puncture_m,
+                largest_displacement_m: motion.largest_m,
+                target_shift_m: motion.target_m,
                 simulated_s,
             });
         }

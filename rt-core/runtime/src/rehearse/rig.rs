@@ -5,10 +5,11 @@ use crate::rt::exchange::{HapticOrder, Notice, TissueOrder};
 use crate::rt::haptic_tape::HapticMemory;
 use crate::rt::world::World;
 use crate::stepped::{HAPTIC_TICKS_PER_TISSUE_TICK, SteppedLoops};
-use stylet_hw::{DeviceInfo, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
+use stylet_hw::{DeviceInfo, Hand, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
 use stylet_shm_schema::{HandMove, HapticState, RefusalCode, SeedPose};
 use stylet_sim::active::Active;
 use stylet_sim::line::ReadyLine;
+use stylet_sim::tissue::Deformed;
 
 /// The tip begins at this distance before the entry, and comes to it as in a run.
 const RUN_UP_M: f64 = 0.01;
@@ -19,12 +20,13 @@ pub struct Rig {
 }
 
 impl Rig {
-    pub fn new(world: Box<World>, active: &Active, device: &DeviceInfo, run: &NeedleRun) -> Self {
+    pub fn new(world: Box<World>, active: &Active, (device, hand): (&DeviceInfo, Hand), run: &NeedleRun) -> Self {
         let phantom = SimulatedPhantom::new(SimulatedPhantomConfig {
             info: DeviceInfo {
                 simulated: true,
                 ..*device
             },
+            hand,
             start_tip_in_world: run.entry_m - run.direction * RUN_UP_M,
             start_direction: run.direction,
             ..SimulatedPhantomConfig::default()
@@ -43,8 +45,9 @@ impl Rig {
         let _ = self.loops.bridge.tissue_orders.push(TissueOrder::Line(line.body));
     }
 
-    /// One tick of the force loop, and of the tissue loop where one is due.
-    pub fn tick(&mut self) {
+    /// One tick of the force loop, and of the tissue loop where one is due: then true.
+    pub fn tick(&mut self) -> bool {
+        let tissue_tick = self.loops.tissue.response().tick;
         self.loops.step();
         let bridge = &mut self.loops.bridge;
         for notices in [&mut bridge.haptic_notices, &mut bridge.tissue_notices] {
@@ -54,6 +57,7 @@ impl Rig {
                 }
             }
         }
+        self.loops.tissue.response().tick != tissue_tick
     }
 
     /// What a loop refused since the last call.
@@ -99,6 +103,10 @@ impl Rig {
 
     pub fn seeds(&self) -> Vec<SeedPose> {
         self.loops.tissue.seeds().collect()
+    }
+
+    pub fn deformed(&self) -> Deformed<'_> {
+        self.loops.tissue.world().tissue.deformed()
     }
 
     pub fn displacement_m(&self) -> f64 {

@@ -6,6 +6,8 @@ use stylet_shm_schema::ParameterId;
 use stylet_sim::limits::Limits;
 use stylet_sim::tissue::{Deformed, Held, StepReport, TissueModel};
 
+mod order;
+
 fn stage_of(tissue: TissueKind) -> Stage {
     let source = SceneSource::Builtin("paper".to_owned());
     Stage::build(&source, tissue, DeviceInfo::phantom_premium_1_5()).expect("built in")
@@ -282,7 +284,7 @@ fn a_reset_with_the_needle_in_tissue_leaves_no_force_on_a_line_either() {
     let body = stage.lines.as_ref().expect("of finite elements");
     let line = body.prepare(1, run.entry_m.into(), run.direction.into(), &mut || true);
     let world = stage.world.take().expect("built");
-    let mut rig = Rig::new(world, &active, &stage.device, &run);
+    let mut rig = Rig::new(world, &active, (&stage.device, stage.hand), &run);
     rig.take_line(line.expect("through the gland"));
     rig.engage();
     rig.move_hand(&stylet_shm_schema::HandMove {
@@ -291,11 +293,11 @@ fn a_reset_with_the_needle_in_tissue_leaves_no_force_on_a_line_either() {
         speed_m_per_s: 0.05,
         acceleration_m_per_s2: 2.0,
     });
-    (0..2500).for_each(|_| rig.tick());
+    (0..2500).for_each(|_| _ = rig.tick());
     assert!(rig.state().flags & flags::IN_CONTACT != 0 && rig.state().tissue_force_n == 0.0);
     assert!(rig.state().peak_force_n > 1.0, "{} N", rig.state().peak_force_n);
     rig.reset();
-    (0..1000).for_each(|_| rig.tick());
+    (0..1000).for_each(|_| _ = rig.tick());
     let force_n = Vector3::from(rig.state().force_on_hand_n).norm();
     assert!(
         force_n < 1e-9 && rig.state().flags & flags::IN_CONTACT == 0,

@@ -1,0 +1,57 @@
+//! How far hand and needle move the body: the farthest element, and the middle of the target.
+
+use nalgebra::Vector3;
+use stylet_sim::scene::{Role, Scene};
+use stylet_sim::tissue::Deformed;
+
+/// The middle of the target is that of at most so many of its elements.
+const MOST_ELEMENTS: usize = 500;
+
+/// Elements of the target, evenly among all of it; of the whole body where it has none.
+pub struct TargetElements(Vec<u32>);
+
+impl TargetElements {
+    pub fn of(scene: &Scene) -> Self {
+        let is_target = |element: &u32| {
+            let structure = usize::from(scene.body.structure(*element));
+            scene.structures.get(structure).is_some_and(|s| s.role == Role::Target)
+        };
+        let all = 0..scene.body.element_count() as u32;
+        let mut elements: Vec<u32> = all.clone().filter(is_target).collect();
+        if elements.is_empty() {
+            elements = all.collect();
+        }
+        let every = elements.len().div_ceil(MOST_ELEMENTS).max(1);
+        Self(elements.into_iter().step_by(every).collect())
+    }
+}
+
+/// The largest displacements so far.
+pub struct Motion<'a> {
+    elements: &'a [u32],
+    displacements_m: Vec<[f32; 3]>,
+    pub largest_m: f64,
+    pub target_m: f64,
+}
+
+impl<'a> Motion<'a> {
+    pub fn new(target: &'a TargetElements) -> Self {
+        Self {
+            displacements_m: vec![[0.0; 3]; target.0.len()],
+            elements: &target.0,
+            largest_m: 0.0,
+            target_m: 0.0,
+        }
+    }
+
+    /// After a tick of the tissue.
+    pub fn look(&mut self, displacement_m: f64, body: Deformed<'_>) {
+        self.largest_m = self.largest_m.max(displacement_m);
+        body.write_displacements(self.elements, &mut self.displacements_m);
+        let sum = self
+            .displacements_m
+            .iter()
+            .fold(Vector3::zeros(), |sum, d| sum + Vector3::from(d.map(f64::from)));
+        self.target_m = self.target_m.max(sum.norm() / self.elements.len().max(1) as f64);
+    }
+}
