@@ -42,6 +42,34 @@ impl SceneSource {
         }
     }
 
+    /// The same scene with Young's modulus of all tissue multiplied; what it rests on stays as it is. A factor of 1 changes
+    /// nothing, a built-in scene stays built-in.
+    ///
+    /// # Errors
+    ///
+    /// A name that is no built-in scene, or every problem with it.
+    pub fn stiffened(&self, factor: f64) -> Result<Self, SceneError> {
+        if factor == 1.0 {
+            return Ok(self.clone());
+        }
+        let mut source = match self {
+            Self::Builtin(name) => {
+                let labels = super::builtin::labels(name).ok_or_else(|| SceneError::Unknown(name.clone()))?;
+                Self::of_labels(name, &labels.map_err(SceneError::Invalid)?)
+            }
+            labels => labels.clone(),
+        };
+        if let Self::Labels { structures, .. } = &mut source {
+            if structures.is_empty() {
+                structures.push(Structure::soft("tissue", 1));
+            }
+            for structure in structures {
+                structure.material.young_pa *= factor;
+            }
+        }
+        Ok(source)
+    }
+
     /// The same scene again.
     ///
     /// # Errors
@@ -81,6 +109,21 @@ impl SceneSource {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_stiffer_scene_differs_in_its_moduli_alone() {
+        for name in stylet_shm_schema::BUILTIN_SCENES {
+            let source = SceneSource::Builtin(name.to_owned());
+            let (soft, stiff) = (source.build().unwrap(), source.stiffened(2.5).unwrap().build().unwrap());
+            assert_eq!(soft.lattice.structures(), stiff.lattice.structures());
+            assert_eq!(soft.lattice.dims, stiff.lattice.dims);
+            for (one, other) in soft.structures.iter().zip(&stiff.structures) {
+                assert_eq!(2.5 * one.material.young_pa, other.material.young_pa);
+                assert_eq!((one.material.fixed, &one.name), (other.material.fixed, &other.name));
+            }
+        }
+        assert!(SceneSource::Builtin("knee".to_owned()).stiffened(2.0).is_err());
+    }
 
     #[test]
     fn labels_survive_and_a_wrong_count_is_refused() {

@@ -59,6 +59,12 @@ const LAYERS: &[Layer] = &[
         not_itself: &[],
     },
     Layer {
+        folder: "shm-schema/insertions",
+        may_use: &["shm-schema/write"],
+        never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
         folder: "shm-schema",
         may_use: &["shm-schema/anatomy"],
         never: &[WINDOW, ARGUMENTS, PROGRAM, DEVICES, DICOM],
@@ -111,12 +117,27 @@ const LAYERS: &[Layer] = &[
         not_itself: &[],
     },
     Layer {
+        folder: "rt-core/study",
+        may_use: &[
+            "shm-schema/insertions",
+            "shm-schema/procedure",
+            "hw",
+            "rt-core/runtime",
+            "rt-core/sim",
+            "shm-schema",
+            "shm-schema/write",
+        ],
+        never: &[WINDOW, PROGRAM, DICOM],
+        not_itself: &[PORTS, DEVICES],
+    },
+    Layer {
         folder: "rt-core",
         may_use: &[
             "rt-core/heap",
             "hw",
             "rt-core/lab",
             "rt-core/runtime",
+            "rt-core/study",
             "rt-core/sim",
             "shm-schema",
             "shm-schema/anatomy",
