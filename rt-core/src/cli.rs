@@ -49,6 +49,9 @@ pub enum Task {
     },
     /// Show a flight recording, repeat it, and check that all forces and positions are bit-identical
     Replay(Replay),
+    /// Run thousands of insertions over scenes, plans, hands and tissues, in shards that make Parquet files
+    #[cfg(feature = "study")]
+    Study(Box<stylet_study::args::StudyArgs>),
     /// Measure what each part of a scene costs in a tissue tick
     Cost {
         /// Built-in scene

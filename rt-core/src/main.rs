@@ -30,6 +30,8 @@ fn carry_out(cli: &Cli) -> Result<u8, Box<dyn Error>> {
         Some(Task::Verify { report }) => verify::run(report)?,
         Some(Task::Doctor { json, haptic_core }) => doctor::run(*json, *haptic_core),
         Some(Task::Replay(replay)) => u8::from(!replay.run()?),
+        #[cfg(feature = "study")]
+        Some(Task::Study(args)) => args.run(&*stop_on_signal()?)?,
         Some(Task::Manual(args)) => args.run(Cli::command()).map(|()| 0)?,
         Some(Task::Cost { scene }) => cost(scene).map(|()| 0)?,
         Some(Task::Load { work, instance, file }) => serve_as_load(*work, instance, file).map(|()| 0)?,

@@ -1,5 +1,6 @@
 //! STUDY.toml: read strictly, with every problem at once.
 
+use crate::corners;
 use crate::error::StudyError;
 use crate::plan::{self, Plan};
 use crate::quantity::{self, QUANTITIES};
@@ -79,6 +80,10 @@ impl Study {
         sum.update(table.to_string());
         let glands = glands(&table, folder, &mut sum, &mut problems);
         let (quantities, parameters) = vary(&table, tissue, &mut problems);
+        // Each by itself first: a corner that is out of range would be reported twice.
+        if problems.is_empty() {
+            problems.extend(corners::problem(&parameters, tissue));
+        }
         if !problems.is_empty() {
             return Err(problems);
         }

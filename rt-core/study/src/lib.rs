@@ -6,6 +6,7 @@
 #![warn(missing_docs)]
 
 pub mod args;
+mod corners;
 mod definition;
 mod draw;
 mod error;

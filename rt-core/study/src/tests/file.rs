@@ -69,6 +69,22 @@ entry_right_mm = { normal = [5.0, 1.0], within = [-1.0, 1.0] }
     assert_eq!(problems.len(), expected.len(), "{problems:#?}");
 }
 
+/// Thousands of insertions failed one by one where the file could have been refused.
+#[test]
+fn parameters_that_the_device_does_not_hold_together_are_refused_with_their_values() {
+    let folder = tempfile::tempdir().unwrap();
+    let keys =
+        "[vary]\n\"force.membrane_peak\" = { uniform = [4.0, 9.0] }\n\"force.cutting\" = { uniform = [1.0, 2.0] }";
+    let problems = study_in(folder.path(), &(text("implants = 1") + keys)).expect_err("refused");
+    assert_eq!(problems.len(), 1, "{problems:#?}");
+    assert!(
+        problems[0].contains("force.membrane_peak = 9") && problems[0].contains("the device holds at most"),
+        "{problems:#?}"
+    );
+    let usual = keys.replace("9.0", "6.0");
+    assert!(study_in(folder.path(), &(text("implants = 1") + &usual)).is_ok());
+}
+
 #[test]
 fn a_plan_without_sense_is_refused_with_the_number_of_its_needle() {
     let folder = tempfile::tempdir().unwrap();

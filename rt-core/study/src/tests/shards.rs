@@ -19,7 +19,7 @@ hand_stiffness_n_per_m = { uniform = [150.0, 600.0] }
 insert_mm_per_s = { uniform = [60.0, 120.0] }
 entry_right_mm = { normal = [0.0, 1.0], within = [-3.0, 3.0] }
 tilt_anterior_deg = { uniform = [-1.0, 1.0] }
-"needle.puncture_depth" = { uniform = [5.0, 8.0] }
+"needle.puncture_depth" = { uniform = [7.5, 10.0] }
 "#;
 
 fn few(folder: &Path) -> Study {
@@ -67,7 +67,11 @@ fn two_shards_and_seven_give_the_same_bits_on_any_number_of_threads() {
     let (two, seven) = (all_of(&two), all_of(&seven));
     assert_eq!((two.rows.len(), digest(&two)), (18, digest(&seven)));
     assert_eq!(two.rows, seven.rows, "and stand in the same order");
-    assert!(two.rows.iter().all(|row| row.outcome.is_ok() && row.seeds.len() == 2));
+    let failed: Vec<_> = two.rows.iter().filter_map(|row| row.outcome.as_ref().err()).collect();
+    assert!(
+        failed.is_empty() && two.rows.iter().all(|row| row.seeds.len() == 2),
+        "{failed:?}"
+    );
     let ids: std::collections::BTreeSet<_> = two.rows.iter().map(|row| &row.id).collect();
     assert_eq!(ids.len(), 18);
     let stiffness: std::collections::BTreeSet<u64> = two.rows.iter().map(|row| row.drawn[0].to_bits()).collect();

@@ -1,0 +1,36 @@
+//! Parameters that are valid one by one may not be together: the device holds only so stiff a membrane.
+
+use crate::quantity::has_no_part;
+use crate::spread::Spread;
+use stylet_hw::DeviceInfo;
+use stylet_shm_schema::{ParameterSet, ParameterSpec};
+use stylet_sim::active::activate;
+use stylet_sim::scene::TissueKind;
+
+/// More parameters than this have too many corners.
+const MOST: usize = 12;
+
+/// What is wrong with one of the corners of what varies, if anything is.
+pub fn problem(parameters: &[(&'static ParameterSpec, Spread)], tissue: TissueKind) -> Option<String> {
+    let varied: Vec<_> = parameters
+        .iter()
+        .filter(|(spec, _)| !has_no_part(spec, tissue))
+        .collect();
+    if varied.len() > MOST {
+        return Some(format!(
+            "vary: {} parameters of the core; at most {MOST} can vary at once",
+            varied.len()
+        ));
+    }
+    (0..1_usize << varied.len()).find_map(|corner| {
+        let mut set = ParameterSet::default();
+        let mut names = Vec::new();
+        for (n, (spec, spread)) in varied.iter().enumerate() {
+            let value = spread.bounds()[corner >> n & 1];
+            set.set(spec.id, (value / spec.display_per_si).clamp(spec.min, spec.max));
+            names.push(format!("{} = {value}", spec.key));
+        }
+        let why = activate(&set, &DeviceInfo::phantom_premium_1_5()).err()?;
+        Some(format!("vary: {} cannot be together: {why}", names.join(", ")))
+    })
+}
