@@ -9,6 +9,7 @@ use crate::command::dose::{DoseArgs, PerturbArgs};
 use crate::command::find_seeds::FindSeedsArgs;
 use crate::command::plan::PlanArgs;
 use crate::command::post_implant::PostImplantArgs;
+use crate::command::study::StudyArgs;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -136,6 +137,8 @@ enum Task {
     Compare(CompareArgs),
     /// Dose of a plan under random seed errors
     Perturb(PerturbArgs),
+    /// Distributions and dose of the insertions that `rt-core study` simulated, beside published values
+    Study(StudyArgs),
     /// Write the man pages and shell completions of this program
     Manual(ManualArgs),
 }
@@ -216,6 +219,7 @@ impl Cli {
             Some(Task::Plan(args)) => args.run(),
             Some(Task::Dose(args)) => args.run(),
             Some(Task::Perturb(args)) => args.run(),
+            Some(Task::Study(args)) => args.run(),
             Some(Task::Manual(args)) => Ok(args.run(Self::command())?),
             Some(Task::Procedure {
                 common,

@@ -10,3 +10,4 @@ pub mod dose;
 pub mod find_seeds;
 pub mod plan;
 pub mod post_implant;
+pub mod study;

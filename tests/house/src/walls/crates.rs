@@ -186,6 +186,18 @@ const LAYERS: &[Layer] = &[
         not_itself: &[PORTS],
     },
     Layer {
+        folder: "host-ui/population",
+        may_use: &[
+            "shm-schema/insertions",
+            "host-ui/base",
+            "host-ui/dose",
+            "host-ui/files",
+            "host-ui/implant",
+        ],
+        never: &[WINDOW, DEVICES],
+        not_itself: &[PORTS, ARGUMENTS],
+    },
+    Layer {
         folder: "host-ui/controllers",
         may_use: &["host-ui/base"],
         never: &[WINDOW, PORTS, DICOM],
@@ -201,6 +213,7 @@ const LAYERS: &[Layer] = &[
             "host-ui/files",
             "host-ui/host",
             "host-ui/implant",
+            "host-ui/population",
             "shm-schema",
             "shm-schema/anatomy",
             "shm-schema/manual",

@@ -1,0 +1,157 @@
+//! Distributions of what insertions did, and what goes with their misplacement.
+
+use crate::dose::Scored;
+use stylet_insertions::{Insertion, Table};
+
+/// Sorted values of one quantity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Distribution {
+    /// Name for people.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// One value of what: a seed, an insertion, an implant.
+    pub each: &'static str,
+    /// Ascending.
+    pub values: Vec<f64>,
+}
+
+impl Distribution {
+    /// Of values in any order.
+    pub fn new(name: &'static str, unit: &'static str, each: &'static str, mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        Self {
+            name,
+            unit,
+            each,
+            values,
+        }
+    }
+
+    /// `None` without values.
+    pub fn mean(&self) -> Option<f64> {
+        let count = self.values.len();
+        (count > 0).then(|| self.values.iter().sum::<f64>() / count as f64)
+    }
+
+    /// Standard deviation of a sample; `None` for fewer than two values.
+    pub fn deviation(&self) -> Option<f64> {
+        let (mean, count) = (self.mean()?, self.values.len());
+        let square = self.values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+        (count > 1).then(|| (square / (count - 1) as f64).sqrt())
+    }
+
+    /// Linear between neighbours; `None` without values.
+    pub fn percentile(&self, percent: f64) -> Option<f64> {
+        let last = self.values.len().checked_sub(1)?;
+        let at = (percent / 100.0).clamp(0.0, 1.0) * last as f64;
+        let (low, share) = (at as usize, at.fract());
+        let high = self.values[(low + 1).min(last)];
+        Some(self.values[low] + (high - self.values[low]) * share)
+    }
+}
+
+/// All distributions, in the order of the page.
+pub fn figures(table: &Table, scored: &Scored) -> Vec<Distribution> {
+    let seeds = || {
+        table
+            .rows
+            .iter()
+            .flat_map(|row| &row.seeds)
+            .filter_map(|seed| seed.misplacement_mm())
+    };
+    let motions = || table.rows.iter().filter_map(|row| row.outcome.as_ref().ok());
+    let implants = |of: fn(&crate::ImplantDose) -> f64| scored.implants.iter().map(of).collect::<Vec<_>>();
+    let all = [
+        Distribution::new("Seed misplacement", "mm", "seed", seeds().map(|m| m[0]).collect()),
+        Distribution::new(
+            "Along the needle, + too deep",
+            "mm",
+            "seed",
+            seeds().map(|m| m[1]).collect(),
+        ),
+        Distribution::new(
+            "Shift of the gland",
+            "mm",
+            "insertion",
+            motions().map(|m| m.target_shift_mm).collect(),
+        ),
+        Distribution::new(
+            "Largest displacement of tissue",
+            "mm",
+            "insertion",
+            motions().map(|m| m.largest_displacement_mm).collect(),
+        ),
+        Distribution::new(
+            "Peak force on the hand",
+            "N",
+            "insertion",
+            motions().map(|m| m.peak_force_n).collect(),
+        ),
+        Distribution::new(
+            "Duration of an insertion",
+            "s",
+            "insertion",
+            motions().map(|m| m.duration_s).collect(),
+        ),
+        Distribution::new(
+            "D90 of the implant",
+            "% of the prescription",
+            "implant",
+            implants(|i| i.delivered.d90_percent),
+        ),
+        Distribution::new(
+            "V100 of the implant",
+            "% of the target",
+            "implant",
+            implants(|i| i.delivered.v100_percent),
+        ),
+    ];
+    all.into_iter().filter(|d| !d.values.is_empty()).collect()
+}
+
+/// Mean misplacement of the seeds of one needle, mm.
+pub fn mean_misplacement_mm(row: &Insertion) -> Option<f64> {
+    let seeds: Vec<f64> = row.seeds.iter().filter_map(|s| Some(s.misplacement_mm()?[0])).collect();
+    (!seeds.is_empty()).then(|| seeds.iter().sum::<f64>() / seeds.len() as f64)
+}
+
+/// What varies with its rank correlation (Spearman) to the mean misplacement of a needle, strongest first.
+pub fn influences(table: &Table) -> Vec<(String, f64)> {
+    let rows: Vec<(&Insertion, f64)> = table
+        .rows
+        .iter()
+        .filter_map(|r| Some((r, mean_misplacement_mm(r)?)))
+        .collect();
+    let misplaced = ranks(&rows.iter().map(|(_, m)| *m).collect::<Vec<_>>());
+    let of = |(n, name): (usize, &String)| {
+        let values: Vec<f64> = rows.iter().map(|(row, _)| row.drawn[n]).collect();
+        Some((name.clone(), correlation(&ranks(&values), &misplaced)?))
+    };
+    let mut found: Vec<(String, f64)> = table.quantities.iter().enumerate().filter_map(of).collect();
+    found.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+    found
+}
+
+/// Place of each value among all; equal ones share the mean of their places.
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let mut ranks = vec![0.0; values.len()];
+    let mut first = 0;
+    for same in order.chunk_by(|&a, &b| values[a] == values[b]) {
+        let mean = first as f64 + 0.5 * (same.len() - 1) as f64;
+        same.iter().for_each(|&n| ranks[n] = mean);
+        first += same.len();
+    }
+    ranks
+}
+
+/// Pearson's; `None` where one of both does not vary.
+fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let (ma, mb) = (mean(a), mean(b));
+    let sum = |of: &dyn Fn(f64, f64) -> f64| a.iter().zip(b).map(|(x, y)| of(x - ma, y - mb)).sum::<f64>();
+    let width = (sum(&|x, _| x * x) * sum(&|_, y| y * y)).sqrt();
+    (a.len() > 2 && width > 0.0).then(|| sum(&|x, y| x * y) / width)
+}

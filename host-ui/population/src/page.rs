@@ -1,0 +1,308 @@
+//! The page: every distribution beside what was published, dose, and how it was made. Stands by itself.
+
+use crate::dose::Scored;
+use crate::error::PopulationError;
+use crate::figures::{Distribution, influences};
+use crate::picture;
+use crate::published::{PUBLISHED, Published, beside};
+use crate::shards::Population;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use stylet_base::format::printable;
+use stylet_implant::score::STYLE;
+
+const OWN: &str = "\
+.plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(460px,1fr));gap:26px 30px}
+figure{margin:0}figure h3{font-size:15px;font-weight:650;margin:0 0 2px}
+figcaption{color:var(--soft);font-size:13px;line-height:1.4}
+figcaption b{color:var(--ink);font-weight:600;font-variant-numeric:tabular-nums}
+figcaption .ref{color:#b04a00}
+.warn{background:#fff4e8;border-left:4px solid #d55e00;border-radius:4px;padding:8px 12px;color:var(--ink);margin:14px 0 0}
+td.text,th.text{text-align:left;white-space:normal}
+pre{background:var(--card);border-radius:8px;padding:12px 14px;font-size:12.5px;line-height:1.45;overflow-x:auto}
+code{font-size:.93em}
+.bar{display:inline-block;height:9px;border-radius:2px;background:var(--planned);vertical-align:1px}
+.bar.minus{background:var(--delivered)}
+";
+
+/// What has no effect on the misplacement beyond chance is left out below this rank correlation.
+const LEAST_CORRELATION: f64 = 0.05;
+
+/// The page as HTML.
+///
+/// # Errors
+/// Where a picture cannot be drawn.
+pub fn page(p: &Population, scored: &Scored, figures: &[Distribution]) -> Result<String, PopulationError> {
+    let plots = figures.iter().map(plot).collect::<Result<Vec<_>, _>>()?;
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width";
+                title { "Study " (printable(&p.table.about.study)) }
+                style { (PreEscaped(STYLE)) (PreEscaped(OWN)) }
+            }
+            body {
+                main {
+                    (head(p, scored))
+                    (cards(figures))
+                    (warnings(p, scored))
+                    h2 { "Distributions" }
+                    p class="key" {
+                        span { i class="line" {} "median of the simulation" }
+                        span { i class="line" style="border-top:2px dashed #d55e00" {} "published, numbered as in the caption" }
+                    }
+                    div class="plots" { @for plot in &plots { (plot) } }
+                    (dose(scored))
+                    (what_goes_with_it(p))
+                    (published_table())
+                    (made(p))
+                }
+            }
+        }
+    };
+    Ok(page.into_string() + "\n")
+}
+
+fn head(p: &Population, scored: &Scored) -> Markup {
+    let rows = &p.table.rows;
+    let seeds: usize = rows.iter().map(|row| row.seeds.len()).sum();
+    let mut glands: Vec<String> = rows
+        .iter()
+        .map(|row| format!("{} with {}, {}", row.scene, row.plan, row.tissue))
+        .collect();
+    glands.sort();
+    glands.dedup();
+    html! {
+        h1 { "Study " (printable(&p.table.about.study)) }
+        p {
+            (thousands(rows.len())) " insertions of " (thousands(scored.implants.len() + scored.incomplete)) " implants, "
+            (thousands(seeds)) " seeds, through the two ticks of the live simulator. " (printable(&glands.join("; "))) "."
+        }
+    }
+}
+
+fn cards(figures: &[Distribution]) -> Markup {
+    let of = |name: &str| figures.iter().find(|d| d.name == name);
+    let names = [
+        "Seed misplacement",
+        "Shift of the gland",
+        "Peak force on the hand",
+        "Duration of an insertion",
+        "D90 of the implant",
+        "V100 of the implant",
+    ];
+    html! {
+        div class="cards" {
+            @for d in names.into_iter().filter_map(of) {
+                div class="card" {
+                    b { (value(d.percentile(50.0))) " " (d.unit.split(' ').next().unwrap_or_default()) }
+                    span { (d.name) ", median" br; "p5 " (value(d.percentile(5.0))) ", p95 " (value(d.percentile(95.0))) }
+                }
+            }
+        }
+    }
+}
+
+fn warnings(p: &Population, scored: &Scored) -> Markup {
+    let [found, of] = p.shards;
+    let mut failures: Vec<&String> = p
+        .table
+        .rows
+        .iter()
+        .filter_map(|row| row.outcome.as_ref().err())
+        .collect();
+    failures.sort();
+    let failed = failures.len();
+    let mut reasons: Vec<(usize, &String)> = failures
+        .chunk_by(|a, b| a == b)
+        .map(|same| (same.len(), same[0]))
+        .collect();
+    reasons.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
+    html! {
+        @if found < of {
+            p class="warn" { (found) " of " (of) " shards are finished: the page shows these alone." }
+        }
+        @if failed > 0 {
+            p class="warn" {
+                (failed) " of " (thousands(p.table.rows.len())) " insertions failed and are in no distribution. "
+                @for (count, why) in reasons.iter().take(5) { (count) ": " (printable(why)) ". " }
+            }
+        }
+        @if scored.incomplete > 0 {
+            p class="warn" {
+                (scored.incomplete) " implants have no dose: a needle failed, or its shard is not finished."
+            }
+        }
+        @if let Some(why) = &scored.missing { p class="warn" { "No dose was computed: " (printable(why)) } }
+    }
+}
+
+fn plot(d: &Distribution) -> Result<Markup, PopulationError> {
+    let published: Vec<&Published> = beside(d.name).collect();
+    let (svg, beyond) = picture::histogram(d, &published)?;
+    Ok(html! {
+        figure {
+            h3 { (d.name) }
+            (PreEscaped(svg))
+            figcaption {
+                (thousands(d.values.len())) " " (d.each) "s: mean " b { (value(d.mean())) } ", SD " (value(d.deviation())) ", median "
+                b { (value(d.percentile(50.0))) } ", p5 " (value(d.percentile(5.0))) ", p95 " (value(d.percentile(95.0)))
+                ", largest " (value(d.percentile(100.0))) " " (d.unit) "."
+                @if beyond > 0 { " The last bar holds " (beyond) " beyond it." }
+                @for (n, p) in published.iter().enumerate() {
+                    br; span class="ref" { (n + 1) " published: " (value(Some(p.value))) " " (p.unit) } ", " (p.how) " (" (p.source) ")"
+                }
+            }
+        }
+    })
+}
+
+fn dose(scored: &Scored) -> Markup {
+    if scored.implants.is_empty() {
+        return html! {};
+    }
+    let count = scored.implants.len() as f64;
+    let share = |of: &dyn Fn(&crate::ImplantDose) -> bool| {
+        100.0 * scored.implants.iter().filter(|i| of(i)).count() as f64 / count
+    };
+    let column = |of: fn(&crate::ImplantDose) -> f64| {
+        Distribution::new("", "%", "implant", scored.implants.iter().map(of).collect())
+    };
+    let rows = [
+        (
+            "D90, % of the prescription",
+            column(|i| i.planned.d90_percent),
+            column(|i| i.delivered.d90_percent),
+        ),
+        (
+            "V100, % of the target",
+            column(|i| i.planned.v100_percent),
+            column(|i| i.delivered.v100_percent),
+        ),
+    ];
+    html! {
+        h2 { "Dose of the target" }
+        p { "TG-43U1, as the plan has its seeds and as they came to rest; every needle began in a gland at rest, so that "
+            "needles that push or hold the gland for others are not part of it." }
+        div class="scroll" {
+            table {
+                thead { tr { th { "" } th { "planned, mean" } th { "delivered, mean" } th { "SD" } th { "p5" } th { "median" } th { "p95" } } }
+                tbody {
+                    @for (name, planned, delivered) in &rows {
+                        tr {
+                            td { (name) } td { (value(planned.mean())) } td { (value(delivered.mean())) } td { (value(delivered.deviation())) }
+                            @for p in [5.0, 50.0, 95.0] { td { (value(delivered.percentile(p))) } }
+                        }
+                    }
+                }
+            }
+        }
+        p {
+            "D90 is at least 90 % of the prescription in " b { (format!("{:.1} %", share(&|i| i.delivered.d90_percent >= 90.0))) }
+            " of the implants, and at least 100 % in " b { (format!("{:.1} %", share(&|i| i.delivered.d90_percent >= 100.0))) } "."
+        }
+    }
+}
+
+fn what_goes_with_it(p: &Population) -> Markup {
+    let found: Vec<(String, f64)> = influences(&p.table).into_iter().collect();
+    if found.is_empty() {
+        return html! {};
+    }
+    let (shown, rest): (Vec<_>, Vec<_>) = found.into_iter().partition(|(_, r)| r.abs() >= LEAST_CORRELATION);
+    html! {
+        h2 { "What goes with the misplacement" }
+        p { "Rank correlation (Spearman) of what was drawn with the mean misplacement of a needle; a correlation is no cause." }
+        div class="scroll" {
+            table {
+                thead { tr { th { "quantity" } th { "correlation" } th class="text" { "" } } }
+                tbody {
+                    @for (name, r) in &shown {
+                        tr {
+                            td { code { (name) } }
+                            td { (format!("{r:+.2}").replace('-', "\u{2212}")) }
+                            td class="text" {
+                                span class=(if *r < 0.0 { "bar minus" } else { "bar" }) style=(format!("width:{:.0}px", 320.0 * r.abs())) {}
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        @if !rest.is_empty() {
+            p { "Below " (LEAST_CORRELATION) ": " (rest.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")) "." }
+        }
+    }
+}
+
+fn published_table() -> Markup {
+    html! {
+        h2 { "Published values" }
+        div class="scroll" {
+            table {
+                thead { tr { th { "measured" } th { "value" } th class="text" { "of what" } th class="text" { "source" } th class="text" { "to be kept in mind" } } }
+                tbody {
+                    @for p in PUBLISHED {
+                        tr {
+                            td { (p.what) } td { (value(Some(p.value))) " " (p.unit) }
+                            td class="text" { (p.how) } td class="text" { (p.source) } td class="text" { (p.note) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn made(p: &Population) -> Markup {
+    let about = &p.table.about;
+    html! {
+        h2 { "The study" }
+        pre { (printable_lines(&about.definition)) }
+        footer {
+            p { "Made by " (printable(&about.made_by)) ", page by host-ui " (env!("CARGO_PKG_VERSION")) ". "
+                (p.files.len()) " files; SHA-256 of the rows, in whatever shards: " code { (p.digest) } }
+            p { "Query the same files: " code { "duckdb -c \"SELECT scene, avg(peak_force_n) FROM 'shard-*.parquet' GROUP BY scene\"" } }
+            p { "Made by a simulator for research and training. Not a medical device." }
+        }
+    }
+}
+
+fn printable_lines(text: &str) -> String {
+    text.lines()
+        .map(printable)
+        .map(|line| line.to_string())
+        .collect::<Vec<_>>()
+        .join("\n")
+}
+
+/// Three significant digits, as people read them.
+fn value(value: Option<f64>) -> String {
+    let Some(v) = value else { return "\u{2013}".to_owned() };
+    let digits = match v.abs() {
+        0.0..9.995 => 2,
+        9.995..99.95 => 1,
+        _ => 0,
+    };
+    // No signed zero.
+    let text = format!("{:.digits$}", v);
+    let zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
+    if zero {
+        text.trim_start_matches('-').to_owned()
+    } else {
+        text.replace('-', "\u{2212}")
+    }
+}
+
+fn thousands(count: usize) -> String {
+    let digits = count.to_string();
+    let mut text = String::new();
+    for (n, digit) in digits.chars().enumerate() {
+        if n > 0 && (digits.len() - n) % 3 == 0 {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}

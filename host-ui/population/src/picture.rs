@@ -1,0 +1,126 @@
+//! A histogram as SVG, with published values as lines.
+
+use crate::error::PopulationError;
+use crate::figures::Distribution;
+use crate::published::Published;
+use plotters::prelude::*;
+
+const SIZE: (u32, u32) = (560, 300);
+const BLUE: RGBColor = RGBColor(0, 114, 178);
+const ORANGE: RGBColor = RGBColor(213, 94, 0);
+const INK: RGBColor = RGBColor(70, 70, 70);
+const FAINT: RGBColor = RGBColor(225, 225, 225);
+const FONT: &str = "sans-serif";
+const MOST_BINS: usize = 40;
+/// What is beyond this percentile is drawn in the last bar, or one outlier would press all others into one.
+const LAST_PERCENTILE: f64 = 99.5;
+
+type Drawn = Result<(), Box<dyn std::error::Error>>;
+
+/// Edges of equal bars from below the least value to above nearly all.
+struct Bars {
+    from: f64,
+    width: f64,
+    counts: Vec<usize>,
+    /// Values beyond the last bar, which are counted in it.
+    beyond: usize,
+}
+
+impl Bars {
+    fn of(d: &Distribution, published: &[&Published]) -> Self {
+        let least = d.percentile(0.0).unwrap_or(0.0);
+        let most = d.percentile(LAST_PERCENTILE).unwrap_or(1.0);
+        let drawn = |limit: f64, choose: fn(f64, f64) -> f64| published.iter().map(|p| p.value).fold(limit, choose);
+        let (low, high) = (drawn(least, f64::min), drawn(most, f64::max));
+        let wanted = ((d.values.len() as f64).sqrt() as usize).clamp(8, MOST_BINS);
+        let width = round_width((high - low).max(1e-9 * high.abs().max(1e-9)) / wanted as f64);
+        let from = (low / width).floor() * width;
+        let count = ((high - from) / width).floor() as usize + 1;
+        let mut counts = vec![0; count];
+        let mut beyond = 0;
+        for &value in &d.values {
+            let bar = ((value - from) / width).max(0.0) as usize;
+            beyond += usize::from(bar >= count);
+            counts[bar.min(count - 1)] += 1;
+        }
+        Self {
+            from,
+            width,
+            counts,
+            beyond,
+        }
+    }
+}
+
+/// 1, 2 or 5 times a power of ten, at least `width`.
+fn round_width(width: f64) -> f64 {
+    let power = 10.0_f64.powf(width.log10().floor());
+    let times = [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .find(|t| t * power >= width * (1.0 - 1e-9));
+    times.unwrap_or(10.0) * power
+}
+
+/// The histogram; published values in orange, in the order of their numbers in the caption.
+pub fn histogram(d: &Distribution, published: &[&Published]) -> Result<(String, usize), PopulationError> {
+    let bars = Bars::of(d, published);
+    let mut text = String::new();
+    draw(&mut text, d, published, &bars).map_err(|e| PopulationError::Picture(e.to_string()))?;
+    Ok((text, bars.beyond))
+}
+
+fn draw(text: &mut String, d: &Distribution, published: &[&Published], bars: &Bars) -> Drawn {
+    let root = SVGBackend::with_string(text, SIZE).into_drawing_area();
+    let to = bars.from + bars.width * bars.counts.len() as f64;
+    let share = |count: usize| 100.0 * count as f64 / d.values.len() as f64;
+    let highest = bars.counts.iter().copied().map(share).fold(0.0, f64::max) * 1.18;
+    let mut chart = ChartBuilder::on(&root)
+        .margin(8)
+        .margin_right(16)
+        .x_label_area_size(44)
+        .y_label_area_size(52)
+        .build_cartesian_2d(bars.from..to, 0.0..highest)?;
+    let digits = (-bars.width.log10().floor()).max(0.0) as usize;
+    chart
+        .configure_mesh()
+        .x_desc(format!("{} ({})", d.name, d.unit))
+        .y_desc(format!("{}s (%)", d.each))
+        .disable_x_mesh()
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(FAINT)
+        .axis_style(INK)
+        .x_labels(8)
+        .y_labels(5)
+        .x_label_formatter(&|x| format!("{:.*}", digits.min(1), x + 0.0))
+        .y_label_formatter(&|y| format!("{y:.0}"))
+        .label_style((FONT, 13).into_font().color(&INK))
+        .axis_desc_style((FONT, 14).into_font().color(&INK))
+        .draw()?;
+    let gap = 0.04 * bars.width;
+    chart.draw_series(bars.counts.iter().enumerate().map(|(n, &count)| {
+        let left = bars.from + n as f64 * bars.width;
+        Rectangle::new(
+            [(left + gap, 0.0), (left + bars.width - gap, share(count))],
+            BLUE.mix(0.75).filled(),
+        )
+    }))?;
+    if let Some(median) = d.percentile(50.0) {
+        chart.draw_series([PathElement::new(
+            [(median, 0.0), (median, highest)],
+            INK.stroke_width(2),
+        )])?;
+    }
+    for (n, p) in published.iter().enumerate() {
+        let line = [(p.value, 0.0), (p.value, highest * 0.9)];
+        chart.draw_series(DashedLineSeries::new(line, 6, 4, ORANGE.stroke_width(2)))?;
+        let style = (FONT, 15).into_font().color(&ORANGE);
+        let half_a_letter = 0.008 * (to - bars.from);
+        chart.draw_series([Text::new(
+            (n + 1).to_string(),
+            (p.value - half_a_letter, highest * 0.985),
+            style,
+        )])?;
+    }
+    root.present()?;
+    Ok(())
+}

@@ -1,0 +1,63 @@
+//! `host-ui study`: a page and tables of a population of insertions.
+
+use super::CommandError;
+use clap::Args;
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use stylet_base::output::new_folder;
+use stylet_base::progress_bar::LongTask;
+use stylet_base::write_whole;
+use stylet_population as population;
+
+const HELP: &str = "\
+Reads every finished shard of a study (shard-*.parquet). Dose is that of the whole implant: D90 and V100 of the target as planned and
+with the seeds where they came to rest, in the structures that the study wrote beside its shards. An implant with a needle that failed
+has no dose, and the page says how many there are.
+
+Written to --out, a new or empty folder: study.html (stands by itself), insertions.csv, implants.csv, distributions.csv. Programs that
+read Parquet query the shards themselves; docs/study.md has examples for DuckDB and polars.
+
+Example:
+  rt-core study paper.toml --out out/paper && host-ui study out/paper --out out/paper-page";
+
+/// Options of `host-ui study`.
+#[derive(Args, Debug)]
+#[command(after_long_help = HELP)]
+pub struct StudyArgs {
+    /// Folder that `rt-core study` wrote to
+    folder: PathBuf,
+    /// Folder for the page and the tables [default: page, in that folder]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl StudyArgs {
+    /// Carries out the command.
+    pub fn run(self) -> Result<(), CommandError> {
+        let out = self.out.unwrap_or_else(|| self.folder.join("page"));
+        let read = population::load(&self.folder)?;
+        let implants: BTreeSet<_> = read.table.rows.iter().map(|r| (&r.scene, &r.plan, r.implant)).collect();
+        let task = LongTask::new(implants.len() as u64, "implants have their dose");
+        let scored = population::score(&self.folder, &read.table, || task.advance(1))?;
+        drop(task);
+        let figures = population::figures(&read.table, &scored);
+        let page = population::page(&read, &scored, &figures)?;
+        new_folder(&out)?;
+        population::write_tables(&out, &read.table, &scored, &figures)?;
+        write_whole(&out.join("study.html"), page.as_bytes())?;
+        for d in &figures {
+            println!(
+                "{:32} median {:8.2}, p5 {:8.2}, p95 {:8.2} {}",
+                d.name,
+                d.percentile(50.0).unwrap_or(f64::NAN),
+                d.percentile(5.0).unwrap_or(f64::NAN),
+                d.percentile(95.0).unwrap_or(f64::NAN),
+                d.unit
+            );
+        }
+        let failed = read.table.rows.iter().filter(|row| row.outcome.is_err()).count();
+        println!("{} insertions, {failed} of them failed", read.table.rows.len());
+        println!("written: {}", out.join("study.html").display());
+        Ok(())
+    }
+}
