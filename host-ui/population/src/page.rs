@@ -11,6 +11,7 @@ use stylet_base::format::printable;
 use stylet_implant::score::STYLE;
 
 const OWN: &str = "\
+.cards{grid-template-columns:repeat(auto-fit,minmax(150px,1fr))}
 .plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(460px,1fr));gap:26px 30px}
 figure{margin:0}figure h3{font-size:15px;font-weight:650;margin:0 0 2px}
 figcaption{color:var(--soft);font-size:13px;line-height:1.4}
@@ -125,13 +126,13 @@ fn warnings(p: &Population, scored: &Scored) -> Markup {
         }
         @if failed > 0 {
             p class="warn" {
-                (failed) " of " (thousands(p.table.rows.len())) " insertions failed and are in no distribution. "
-                @for (count, why) in reasons.iter().take(5) { (count) ": " (printable(why)) ". " }
+                "Failed insertions, in no distribution: " (thousands(failed)) " of " (thousands(p.table.rows.len())) ". "
+                @for (count, why) in reasons.iter().take(5) { (count) " \u{d7} \u{201c}" (printable(why)) "\u{201d}. " }
             }
         }
         @if scored.incomplete > 0 {
             p class="warn" {
-                (scored.incomplete) " implants have no dose: a needle failed, or its shard is not finished."
+                "Implants without a dose: " (scored.incomplete) ". A needle failed, or its shard is not finished."
             }
         }
         @if let Some(why) = &scored.missing { p class="warn" { "No dose was computed: " (printable(why)) } }
@@ -151,7 +152,7 @@ fn plot(d: &Distribution) -> Result<Markup, PopulationError> {
                 ", largest " (value(d.percentile(100.0))) " " (d.unit) "."
                 @if beyond > 0 { " The last bar holds " (beyond) " beyond it." }
                 @for (n, p) in published.iter().enumerate() {
-                    br; span class="ref" { (n + 1) " published: " (value(Some(p.value))) " " (p.unit) } ", " (p.how) " (" (p.source) ")"
+                    br; span class="ref" { (n + 1) " published: " (p.value) " " (p.unit) } ", " (p.how) " (" (p.source) ")"
                 }
             }
         }
@@ -245,7 +246,7 @@ fn published_table() -> Markup {
                 tbody {
                     @for p in PUBLISHED {
                         tr {
-                            td { (p.what) } td { (value(Some(p.value))) " " (p.unit) }
+                            td { (p.what) } td { (p.value) " " (p.unit) }
                             td class="text" { (p.how) } td class="text" { (p.source) } td class="text" { (p.note) }
                         }
                     }

@@ -24,18 +24,28 @@ struct Bars {
     counts: Vec<usize>,
     /// Values beyond the last bar, which are counted in it.
     beyond: usize,
+    /// Both ends of the axis.
+    axis: [f64; 2],
 }
 
 impl Bars {
     fn of(d: &Distribution, published: &[&Published]) -> Self {
         let least = d.percentile(0.0).unwrap_or(0.0);
         let most = d.percentile(LAST_PERCENTILE).unwrap_or(1.0);
+        // Published values widen the axis, not the bars.
         let drawn = |limit: f64, choose: fn(f64, f64) -> f64| published.iter().map(|p| p.value).fold(limit, choose);
-        let (low, high) = (drawn(least, f64::min), drawn(most, f64::max));
         let wanted = ((d.values.len() as f64).sqrt() as usize).clamp(8, MOST_BINS);
-        let width = round_width((high - low).max(1e-9 * high.abs().max(1e-9)) / wanted as f64);
-        let from = (low / width).floor() * width;
-        let count = ((high - from) / width).floor() as usize + 1;
+        let width = round_width((most - least).max(1e-6 * most.abs().max(1e-6)) / wanted as f64);
+        let from = (least / width).floor() * width;
+        let count = ((most - from) / width).floor() as usize + 1;
+        let room = 2.0 * width;
+        let low = drawn(from, f64::min);
+        let to = from + width * count as f64;
+        let high = drawn(to, f64::max);
+        let axis = [
+            if low < from { low - room } else { from },
+            if high > to { high + room } else { to },
+        ];
         let mut counts = vec![0; count];
         let mut beyond = 0;
         for &value in &d.values {
@@ -48,6 +58,7 @@ impl Bars {
             width,
             counts,
             beyond,
+            axis,
         }
     }
 }
@@ -71,7 +82,7 @@ pub fn histogram(d: &Distribution, published: &[&Published]) -> Result<(String, 
 
 fn draw(text: &mut String, d: &Distribution, published: &[&Published], bars: &Bars) -> Drawn {
     let root = SVGBackend::with_string(text, SIZE).into_drawing_area();
-    let to = bars.from + bars.width * bars.counts.len() as f64;
+    let [low, high] = bars.axis;
     let share = |count: usize| 100.0 * count as f64 / d.values.len() as f64;
     let highest = bars.counts.iter().copied().map(share).fold(0.0, f64::max) * 1.18;
     let mut chart = ChartBuilder::on(&root)
@@ -79,8 +90,8 @@ fn draw(text: &mut String, d: &Distribution, published: &[&Published], bars: &Ba
         .margin_right(16)
         .x_label_area_size(44)
         .y_label_area_size(52)
-        .build_cartesian_2d(bars.from..to, 0.0..highest)?;
-    let digits = (-bars.width.log10().floor()).max(0.0) as usize;
+        .build_cartesian_2d(low..high, 0.0..highest)?;
+    let digits = usize::from(high - low < 4.0);
     chart
         .configure_mesh()
         .x_desc(format!("{} ({})", d.name, d.unit))
@@ -91,7 +102,7 @@ fn draw(text: &mut String, d: &Distribution, published: &[&Published], bars: &Ba
         .axis_style(INK)
         .x_labels(8)
         .y_labels(5)
-        .x_label_formatter(&|x| format!("{:.*}", digits.min(1), x + 0.0))
+        .x_label_formatter(&|x| format!("{:.*}", digits, x + 0.0))
         .y_label_formatter(&|y| format!("{y:.0}"))
         .label_style((FONT, 13).into_font().color(&INK))
         .axis_desc_style((FONT, 14).into_font().color(&INK))
@@ -114,7 +125,7 @@ fn draw(text: &mut String, d: &Distribution, published: &[&Published], bars: &Ba
         let line = [(p.value, 0.0), (p.value, highest * 0.9)];
         chart.draw_series(DashedLineSeries::new(line, 6, 4, ORANGE.stroke_width(2)))?;
         let style = (FONT, 15).into_font().color(&ORANGE);
-        let half_a_letter = 0.008 * (to - bars.from);
+        let half_a_letter = 0.008 * (high - low);
         chart.draw_series([Text::new(
             (n + 1).to_string(),
             (p.value - half_a_letter, highest * 0.985),

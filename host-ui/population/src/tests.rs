@@ -151,9 +151,9 @@ fn the_page_stands_by_itself_and_shows_what_is_missing() {
     let page = page(&population, &scored, &figures).expect("draws");
     for text in [
         "1 of 5 shards",
-        "1 of 30 insertions failed",
+        "Failed insertions, in no distribution: 1 of 30",
         "the tip &lt;was&gt; outside",
-        "4.90 mm",
+        "4.9 mm",
         "1,197 seeds",
     ] {
         assert!(page.contains(text), "{text}");
