@@ -1,7 +1,7 @@
 //! STUDY.toml: read strictly, with every problem at once.
 
 use crate::corners;
-use crate::error::StudyError;
+use crate::error::{Problems, StudyError};
 use crate::plan::{self, Plan};
 use crate::quantity::{self, QUANTITIES};
 use crate::spread::Spread;
@@ -64,10 +64,10 @@ impl Study {
     }
 
     /// As [`read`](Self::read); `folder` is where the plans are looked for.
-    pub(crate) fn of_text(text: &str, folder: &Path) -> Result<Self, Vec<String>> {
+    pub(crate) fn of_text(text: &str, folder: &Path) -> Result<Self, Problems> {
         let table: Table = text
             .parse()
-            .map_err(|e: toml::de::Error| vec![format!("it is no TOML: {e}")])?;
+            .map_err(|e: toml::de::Error| Problems(vec![format!("it is no TOML: {e}")]))?;
         let mut problems = Vec::new();
         unknown(&table, "", &KEYS, &mut problems);
         let name = name(&table, &mut problems);
@@ -85,7 +85,7 @@ impl Study {
             problems.extend(corners::problem(&parameters, tissue));
         }
         if !problems.is_empty() {
-            return Err(problems);
+            return Err(Problems(problems));
         }
         Ok(Self {
             name,
@@ -233,7 +233,7 @@ fn read_plan(path: &PathBuf, place: &str, sum: &mut Sha256, problems: &mut Vec<S
         }
     };
     sum.update(&text);
-    let listed = |found: Vec<String>| {
+    let listed = |Problems(found): Problems| {
         problems.extend(
             found
                 .into_iter()

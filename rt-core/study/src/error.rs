@@ -6,6 +6,11 @@ use stylet_runtime::rehearse::RehearseError;
 use stylet_sim::scene::SceneError;
 use stylet_write::WriteError;
 
+/// Everything that is wrong with a file: each with its key, what it is and what it may be.
+#[derive(Debug, thiserror::Error)]
+#[error("{} found\n  {}", counted(.0.len()), .0.join("\n  "))]
+pub struct Problems(pub Vec<String>);
+
 /// What stops a study; an insertion that fails is a result and does not.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
@@ -18,12 +23,12 @@ pub enum StudyError {
         source: std::io::Error,
     },
     /// Everything that is wrong with the study file and its plans.
-    #[error("{}: {} found; nothing was run\n  {}", .path.display(), counted(.problems.len()), .problems.join("\n  "))]
+    #[error("{}: nothing was run; {problems}", .path.display())]
     Invalid {
         /// The study file.
         path: PathBuf,
-        /// Each with its key, what it is and what it may be.
-        problems: Vec<String>,
+        /// They.
+        problems: Problems,
     },
     /// The folder.
     #[error("{}: it cannot be used ({source}); check the path and its rights", .path.display())]

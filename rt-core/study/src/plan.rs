@@ -1,5 +1,6 @@
 //! The needles of a plan file, as far as insertions need them; `host-ui` writes such files and checks all of them.
 
+use crate::error::Problems;
 use nalgebra::{Unit, Vector3};
 use serde::Deserialize;
 use stylet_shm_schema::MAX_SEEDS;
@@ -61,8 +62,8 @@ pub struct Needle {
 }
 
 /// Reads a plan, or lists what is wrong with it.
-pub fn of_text(text: &str) -> Result<Plan, Vec<String>> {
-    let file: PlanFile = toml::from_str(text).map_err(|e| vec![format!("it is no plan of host-ui: {e}")])?;
+pub fn of_text(text: &str) -> Result<Plan, Problems> {
+    let file: PlanFile = toml::from_str(text).map_err(|e| Problems(vec![format!("it is no plan of host-ui: {e}")]))?;
     let mut problems = Vec::new();
     if file.format != FORMAT {
         problems.push(format!("format is \"{}\"; it must be \"{FORMAT}\"", file.format));
@@ -84,7 +85,7 @@ pub fn of_text(text: &str) -> Result<Plan, Vec<String>> {
     });
     let needles = needles.collect();
     if !problems.is_empty() {
-        return Err(problems);
+        return Err(Problems(problems));
     }
     Ok(Plan {
         source: file.source,

@@ -4,6 +4,7 @@ mod file;
 mod shards;
 
 use crate::Study;
+use crate::error::Problems;
 use std::path::Path;
 
 /// Two needles, one of them with a strand, in the middle of the gland of `paper`.
@@ -38,7 +39,7 @@ pub fn text(keys: &str) -> String {
     format!("name = \"t\"\n{keys}\n[[gland]]\nscene = \"paper\"\nplan = \"plan.toml\"\n")
 }
 
-pub fn study_in(folder: &Path, text: &str) -> Result<Study, Vec<String>> {
+pub fn study_in(folder: &Path, text: &str) -> Result<Study, Problems> {
     std::fs::write(folder.join("plan.toml"), PLAN).expect("a folder of the test");
     Study::of_text(text, folder)
 }

@@ -3,6 +3,7 @@
 mod circles;
 mod crates;
 mod imports;
+mod layers;
 mod lexer;
 mod shape;
 mod tree;
