@@ -97,7 +97,7 @@ enum Task {
         /// Seconds to record [default: until interrupted or until rt-core ends]
         #[arg(long, value_name = "S")]
         duration: Option<f64>,
-        /// Snapshots of the gland per second, 0 to 200
+        /// Snapshots of the gland per second, 0 to 60; the core sends 67 while the needle moves and 33 while it rests
         #[arg(long, default_value_t = 20.0, value_name = "HZ")]
         snapshot_rate: f64,
     },
@@ -191,9 +191,9 @@ impl Cli {
                 duration,
                 snapshot_rate,
             }) => {
-                let fits = duration.is_none_or(|s| s > 0.0 && s < 1e6) && (0.0..=200.0).contains(&snapshot_rate);
+                let fits = duration.is_none_or(|s| s > 0.0 && s < 1e6) && (0.0..=60.0).contains(&snapshot_rate);
                 if !fits {
-                    return Err("--duration needs seconds above 0, --snapshot-rate 0 to 200 Hz".into());
+                    return Err("--duration needs seconds above 0, --snapshot-rate 0 to 60 Hz".into());
                 }
                 let ended = record::run(&record::Options {
                     instance: instance.clone(),

@@ -92,6 +92,8 @@ struct Handed {
     event: u64,
     tissue_tick: u64,
     snapshot_ns: u64,
+    /// When the next snapshot is to be kept.
+    due_ns: u64,
     /// What the core had lost when the recording began.
     lost_before: Option<u64>,
 }
@@ -133,7 +135,7 @@ impl Handed {
             // A run that begins while it is recorded had lost nothing.
             let lost_before = link.state().map_or(0, |s| s.records_lost);
             self.lost_before = Some(self.lost_before.map_or(lost_before, |_| 0));
-            (self.event, self.tissue_tick, self.snapshot_ns) = (0, 0, 0);
+            (self.event, self.tissue_tick, self.snapshot_ns, self.due_ns) = (0, 0, 0, 0);
             items.push(Item::Session(Box::new(*session)));
         }
         let records = link.take_records();
@@ -146,11 +148,15 @@ impl Handed {
         self.event = link.events().back().map_or(self.event, |e| e.sequence);
         if let Some(snapshot) = link.snapshot().filter(|s| s.header.tissue_tick != self.tissue_tick) {
             self.tissue_tick = snapshot.header.tissue_tick;
-            let since_s = snapshot.header.time_ns.saturating_sub(self.snapshot_ns) as f64 * 1e-9;
-            if snapshots_hz > 0.0 && since_s >= 0.999 / snapshots_hz {
+            let now_ns = snapshot.header.time_ns;
+            if snapshots_hz > 0.0 && now_ns >= self.due_ns {
+                let since_s = now_ns.saturating_sub(self.snapshot_ns) as f64 * 1e-9;
+                let period_ns = (1e9 / snapshots_hz) as u64;
+                // From when it was due, so that the rate is that asked for whatever the core's is.
+                self.due_ns = (self.due_ns + period_ns).max(now_ns + period_ns / 2);
                 let late = self.snapshot_ns > 0 && since_s > 2.0 / snapshots_hz + SNAPSHOT_LATE_S;
                 items.extend(late.then_some(Item::SnapshotsMissing(since_s)));
-                self.snapshot_ns = snapshot.header.time_ns;
+                self.snapshot_ns = now_ns;
                 items.push(Item::Snapshot(Box::new(snapshot.clone())));
             } else {
                 items.push(Item::SnapshotLeftOut);

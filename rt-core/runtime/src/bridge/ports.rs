@@ -5,6 +5,8 @@ use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
+use iceoryx2::service::port_factory::PortFactory as _;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use stylet_shm_schema::service::{self, Ipc, MAX_BATCH, SNAPSHOTS_AHEAD, ServiceError};
 use stylet_shm_schema::*;
 
@@ -18,6 +20,7 @@ pub struct Ports {
     pub(super) rehearsals: Publisher<Ipc, Rehearsal, ()>,
     pub(super) records: Publisher<Ipc, [TickRecord], u64>,
     pub(super) snapshots: Publisher<Ipc, [Vertex], SnapshotHeader>,
+    snapshot_service: PortFactory<Ipc, [Vertex], SnapshotHeader>,
     pub(super) scene: Publisher<Ipc, [u32], SceneHeader>,
     pub(super) commands: Subscriber<Ipc, Command, ()>,
     pub(super) uploads: Subscriber<Ipc, [u8], UploadHeader>,
@@ -58,6 +61,7 @@ const SCENES_KEPT: usize = 3;
 impl Ports {
     /// Creates every port, for a scene of `word_count` words whose snapshots hold `snapshot_len` vertices and nodes.
     pub fn new(node: &Node<Ipc>, snapshot_len: usize, word_count: usize) -> Result<Self, ServiceError> {
+        let snapshot_service = service::snapshots(node)?;
         Ok(Self {
             session: publisher!(service::session(node)),
             events: publisher!(service::events(node)),
@@ -66,7 +70,8 @@ impl Ports {
             replies: publisher!(service::replies(node)),
             rehearsals: publisher!(service::rehearsals(node)),
             records: publisher!(service::records(node), slices of MAX_BATCH, loans 2, kept |all| all),
-            snapshots: publisher!(service::snapshots(node), slices of snapshot_len, loans 2 * SNAPSHOTS_AHEAD, kept |_| SNAPSHOTS_KEPT),
+            snapshots: publisher!(Ok::<_, ServiceError>(&snapshot_service), slices of snapshot_len, loans 2 * SNAPSHOTS_AHEAD, kept |_| SNAPSHOTS_KEPT),
+            snapshot_service,
             scene: publisher!(service::scene(node), slices of word_count, loans 2, kept |_| SCENES_KEPT),
             commands: service::commands(node)?
                 .subscriber_builder()
@@ -75,6 +80,11 @@ impl Ports {
                 .map_err(failed)?,
             uploads: service::uploads(node)?.subscriber_builder().create().map_err(failed)?,
         })
+    }
+
+    /// Somebody takes snapshots.
+    pub fn has_viewers(&self) -> bool {
+        self.snapshot_service.dynamic_config().number_of_subscribers() > 0
     }
 
     /// Connects new hosts and drops those that have disconnected.

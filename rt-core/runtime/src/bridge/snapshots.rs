@@ -40,7 +40,7 @@ impl SnapshotLoans {
         }
     }
 
-    /// Sends the slots that returned filled, then loans new ones for the scene that runs.
+    /// Sends the slots that returned filled, then loans new ones for the scene that runs, where somebody takes them.
     pub fn pass(&mut self, ports: &Ports, scene_generation: u64, size: SnapshotSize) {
         while let Ok(back) = self.filled.pop() {
             let loan = self.out.get_mut(back.index as usize).and_then(Option::take);
@@ -48,6 +48,9 @@ impl SnapshotLoans {
                 // A send that fails reaches nobody; the next snapshot is 5 ms away.
                 let _ = loan.send();
             }
+        }
+        if !ports.has_viewers() {
+            return;
         }
         while self.out.iter().flatten().count() < SNAPSHOTS_AHEAD {
             if !self.loan(ports, scene_generation, size) {

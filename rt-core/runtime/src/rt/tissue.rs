@@ -47,6 +47,7 @@ pub struct TissueLoop {
     pose: TipPose,
     report: Option<StepReport>,
     response: TissueResponse,
+    shown: snapshot::Shown,
     /// Present in a measurement.
     pub probe: Option<Box<Probe>>,
     period_s: f64,
@@ -81,6 +82,7 @@ impl TissueLoop {
             pose: TipPose::default(),
             report: None,
             response: TissueResponse::default(),
+            shown: snapshot::Shown::default(),
             probe: None,
             period_s,
         }

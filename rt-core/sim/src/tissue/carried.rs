@@ -55,16 +55,18 @@ const NONE: u32 = u32::MAX;
 /// Displacements of a coarser body's elements, between whose centres they are interpolated. What is fixed stays.
 #[derive(Clone, Debug)]
 pub struct CarriedField {
-    coarse: Arc<Lattice>,
     simd: Simd,
     /// Of each element of the coarser body, m.
     of_element: [Vec<f32>; 3],
-    /// The same at each cell of a box with one empty cell around the body: what is beside the body moves with it.
-    of_cell_m: Vec<[f32; 3]>,
+    /// The same at each cell of a box with one empty cell around the body: what is beside the body moves with it. The fourth
+    /// number is empty, so that a cell is one register.
+    of_cell_m: Vec<[f32; 4]>,
     /// Element that a cell of the box takes its displacement from.
     source: Vec<u32>,
     /// Cells of the box along x, y, z.
     dims: [usize; 3],
+    /// Where the centres of the scene's cells lie along x, y, z: the cell of the box before it, and how far to the next.
+    between: [Vec<(u32, f32)>; 3],
     /// By structure.
     is_fixed: Vec<bool>,
     largest_m: f32,
@@ -79,13 +81,13 @@ impl CarriedField {
             .collect();
         CarriedField {
             simd: Simd::detect(),
+            between: [0, 1, 2].map(|a| between(&scene.lattice, &coarse, a)),
             of_element: std::array::from_fn(|_| vec![0.0; coarse.element_count()]),
-            of_cell_m: vec![[0.0; 3]; source.len()],
+            of_cell_m: vec![[0.0; 4]; source.len()],
             source,
             dims,
             is_fixed: scene.structures.iter().map(|s| s.material.fixed).collect(),
             largest_m: 0.0,
-            coarse,
         }
     }
 
@@ -111,7 +113,7 @@ impl CarriedField {
         let mut largest = 0.0_f32;
         for (cell, &source) in self.of_cell_m.iter_mut().zip(&self.source) {
             let at = |axis: &Vec<f32>| axis.get(source as usize).copied().unwrap_or(0.0);
-            *cell = [at(x), at(y), at(z)];
+            *cell = [at(x), at(y), at(z), 0.0];
             let square = cell.iter().map(|c| c * c).sum::<f32>();
             // What is no number stays, so that nobody takes the answer for one.
             largest = if square <= largest { largest } else { square };
@@ -125,24 +127,18 @@ impl CarriedField {
         if self.is_fixed.get(structure).copied().unwrap_or(false) {
             return [0.0; 3];
         }
-        // Centres of cells are half a cell from their corners, and the box begins one cell before the body.
-        let per_cell = 1.0 / self.coarse.spacing_m;
-        let p = lattice.rest_m(element).map(|c| c * per_cell + 0.5);
-        let cell = [0, 1, 2].map(|a| (p[a] as usize).min(self.dims[a].saturating_sub(2)));
-        let part = [0, 1, 2].map(|a| (p[a] - cell[a] as f64).clamp(0.0, 1.0) as f32);
-        let mut sum = [0.0_f32; 3];
-        for corner in 0..8_usize {
-            let step = [corner & 1, corner >> 1 & 1, corner >> 2];
-            let weight: f32 = (0..3)
-                .map(|a| if step[a] == 1 { part[a] } else { 1.0 - part[a] })
-                .product();
-            let at = cell[0] + step[0] + self.dims[0] * (cell[1] + step[1] + self.dims[1] * (cell[2] + step[2]));
-            let Some(u) = self.of_cell_m.get(at) else { continue };
-            for (sum, u) in sum.iter_mut().zip(u) {
-                *sum += weight * u;
+        let cell = lattice.cell(element);
+        let [x, y, z] = [0, 1, 2].map(|a| self.between[a].get(cell[a]).copied().unwrap_or_default());
+        let along_x = |j: usize, k: usize| {
+            let at = x.0 as usize + self.dims[0] * (y.0 as usize + j + self.dims[1] * (z.0 as usize + k));
+            match self.of_cell_m.get(at..at + 2) {
+                Some([a, b]) => mixed(*a, *b, x.1),
+                _ => [0.0; 4],
             }
-        }
-        sum.map(f64::from)
+        };
+        let along_y = |k: usize| mixed(along_x(0, k), along_x(1, k), y.1);
+        let [x_m, y_m, z_m, _] = mixed(along_y(0), along_y(1), z.1);
+        [x_m, y_m, z_m].map(f64::from)
     }
 
     /// Bytes of [`Self::save`].
@@ -178,6 +174,23 @@ impl CarriedField {
         }
         self.spread();
     }
+}
+
+/// From `a` at 0 to `b` at 1.
+fn mixed(a: [f32; 4], b: [f32; 4], part: f32) -> [f32; 4] {
+    std::array::from_fn(|c| a[c] + part * (b[c] - a[c]))
+}
+
+/// Where the centres of the scene's cells lie along one axis, among those of the box around the coarser body.
+fn between(lattice: &Lattice, coarse: &Lattice, axis: usize) -> Vec<(u32, f32)> {
+    // Centres of cells are half a cell from their corners, and the box begins one cell before the body.
+    let per_cell = lattice.spacing_m / coarse.spacing_m;
+    let place = |c: usize| (c as f64 + 0.5) * per_cell + 0.5;
+    let cell = |place: f64| (place as u32).min(coarse.dims[axis] as u32);
+    let found = (0..lattice.dims[axis]).map(|c| (cell(place(c)), place(c)));
+    found
+        .map(|(cell, place)| (cell, (place - f64::from(cell)).clamp(0.0, 1.0) as f32))
+        .collect()
 }
 
 /// The element of a cell of the box, or else one of a neighbouring cell: first over faces, then edges, then corners.

@@ -24,6 +24,8 @@ impl TissueLoop {
             held,
             pose,
             report: _,
+            // No force depends on what hosts were shown.
+            shown: _,
             response,
             probe: _,
             period_s: _,

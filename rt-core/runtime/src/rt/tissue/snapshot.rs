@@ -7,10 +7,45 @@ use crate::rt::seed;
 use stylet_shm_schema::{MAX_SEEDS, SnapshotHeader, Vertex};
 use stylet_sim::tissue::StepReport;
 
+/// Ticks from one snapshot to the next while the needle moves: 67 Hz, above the rate of most screens. What moves by itself,
+/// with the needle at rest, is seen at 33 Hz.
+const TICKS_MOVING: u64 = 3;
+const TICKS_AT_REST: u64 = 6;
+
+/// What the last snapshot showed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Shown {
+    tick: u64,
+    tip_in_scene: [f64; 3],
+    direction: [f64; 3],
+    seeds: usize,
+    scene_generation: u64,
+}
+
 impl TissueLoop {
+    /// The next snapshot is due: sooner where the needle has moved or a seed was dropped since the last one.
+    fn is_snapshot_due(&self, now: &Shown) -> bool {
+        let same = Shown {
+            tick: now.tick,
+            ..self.shown
+        };
+        let least = if *now == same { TICKS_AT_REST } else { TICKS_MOVING };
+        now.tick.wrapping_sub(self.shown.tick) >= least || now.scene_generation != self.shown.scene_generation
+    }
+
     pub(super) fn publish_snapshot(&mut self, woke_ns: u64, report: &StepReport) {
         let work_ns = clock::now_ns().saturating_sub(woke_ns);
         self.response.worst_work_ns = self.response.worst_work_ns.max(work_ns);
+        let now = Shown {
+            tick: self.response.tick,
+            tip_in_scene: self.pose.tip_in_scene.into(),
+            direction: self.pose.direction.into(),
+            seeds: self.seeds.len(),
+            scene_generation: self.world.generation,
+        };
+        if !self.is_snapshot_due(&now) {
+            return;
+        }
         while let Ok(slot) = self.ports.slots.pop() {
             let filled = slot.scene_generation == self.world.generation
                 && slot.vertex_count == self.world.scene.surface.vertex_elements.len()
@@ -23,6 +58,7 @@ impl TissueLoop {
                 filled,
             });
             if filled {
+                self.shown = now;
                 return;
             }
         }
