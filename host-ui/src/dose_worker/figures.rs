@@ -3,22 +3,27 @@
 use stylet_dose::criteria::{DoseStructure, Figure};
 use stylet_dose::{DoseKernel, DosePoints, Dvh, Seed};
 use stylet_host::link::SceneModel;
-use stylet_shm_schema::{SceneHeader, role};
+use stylet_shm_schema::{SceneHeader, StructureInfo, role};
 
 /// Cells of one structure that its histogram is made of, at most.
 const MOST_POINTS: usize = 60_000;
 
-fn evaluated(scene: &SceneHeader, place: usize) -> Option<DoseStructure> {
-    let structure = scene.structures().get(place)?;
-    DoseStructure::of(&structure.name.read(), structure.role & role::TARGET != 0)
+/// What each structure is evaluated as, in the order of the labels.
+fn evaluated(scene: &SceneHeader) -> Vec<Option<DoseStructure>> {
+    let of = |structure: &StructureInfo| DoseStructure::of(&structure.name.read(), structure.role & role::TARGET != 0);
+    scene.structures().iter().map(of).collect()
 }
 
 /// Histograms of the target, then of the other evaluated structures that the scene has.
 pub(super) fn dvhs(scene: &SceneModel, kernel: &DoseKernel, seeds: &[Seed]) -> Vec<(DoseStructure, Dvh)> {
     let header = &scene.header;
     let all = [DoseStructure::Target, DoseStructure::Urethra, DoseStructure::Rectum];
+    let evaluated = evaluated(header);
     let points_of = |which: DoseStructure| {
-        let is_in = |label: u8| label > 0 && evaluated(header, usize::from(label) - 1) == Some(which);
+        let is_in = |label: u8| {
+            let place = usize::from(label).checked_sub(1);
+            place.and_then(|place| *evaluated.get(place)?) == Some(which)
+        };
         cell_centres(scene, is_in)
     };
     all.into_iter()
