@@ -23,6 +23,8 @@ use texture::{extent, volume, write};
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const GREY: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
 const LARGEST_SIDE: u32 = 2048;
+/// Side of a cell of the picture at whose corners the material point is found.
+const CELL_PIXELS: u32 = 8;
 
 /// As `Slice` in `slice.wgsl`.
 #[repr(C)]
@@ -221,14 +223,15 @@ impl SliceGpu {
     pub fn picture(&mut self, number: usize, plane: &Plane, pixels_per_point: f32, with_image: bool) -> Option<Pasted> {
         let body = self.body.as_ref()?;
         let image = self.image.as_ref().filter(|_| with_image).map(|on_card| &on_card.image);
-        let uniform = uniform(body, plane, image);
+        let size = [plane.rect.width(), plane.rect.height()]
+            .map(|side| ((side * pixels_per_point).round() as u32).clamp(1, LARGEST_SIDE));
+        let cells = size.map(|side| side.div_ceil(CELL_PIXELS));
+        let uniform = uniform(body, plane, cells, image);
         while self.panes.len() <= number {
             let old = self.targets.get_mut(self.panes.len()).and_then(Option::take);
             let pane = self.pane(old)?;
             self.panes.push(pane);
         }
-        let size = [plane.rect.width(), plane.rect.height()]
-            .map(|side| ((side * pixels_per_point).round() as u32).clamp(1, LARGEST_SIDE));
         let pane = &mut self.panes[number];
         if pane.target.as_ref().is_none_or(|t| t.size != size) {
             pane.target = Some(target(&self.state, &self.paste, size));
@@ -240,7 +243,7 @@ impl SliceGpu {
             let bytes = bytemuck::bytes_of(&uniform);
             self.driver.send(|| {
                 self.state.queue.write_buffer(&pane.uniform, 0, bytes);
-                draw(&self.state, &self.pipeline, &pane.bind, &target.view);
+                draw(&self.state, &self.pipeline, &pane.bind, &target.view, cells);
                 bytes.len() as u64
             });
             target.pasted.renew();
@@ -290,7 +293,7 @@ impl SliceGpu {
     }
 }
 
-fn uniform(body: &Body, plane: &Plane, image: Option<&Image>) -> SliceUniform {
+fn uniform(body: &Body, plane: &Plane, cells: [u32; 2], image: Option<&Image>) -> SliceUniform {
     let four = |v: Vector3<f64>, w: f32| [v.x as f32, v.y as f32, v.z as f32, w];
     let padded = |v: [f32; 3], w: f32| [v[0], v[1], v[2], w];
     let half = |side: f32| f64::from(side) / 2.0 * plane.m_per_point;
@@ -306,8 +309,8 @@ fn uniform(body: &Body, plane: &Plane, image: Option<&Image>) -> SliceUniform {
             f32::from(u8::from(image.is_some())),
         ),
         up_m: four(plane.up * half(plane.rect.height()), 0.0),
-        volume_corner_m: padded(body.volume_corner_m, 0.0),
-        volume_size_m: padded(body.volume_size_m, 0.0),
+        volume_corner_m: padded(body.volume_corner_m, cells[0] as f32),
+        volume_size_m: padded(body.volume_size_m, cells[1] as f32),
         nodes_corner_m: padded(nodes.origin_m.map(|c| (c - 0.5 * nodes.spacing_m) as f32), 0.0),
         nodes_size_m: padded(nodes.dims.map(|d| (f64::from(d) * nodes.spacing_m) as f32), 0.0),
         grain,
@@ -336,7 +339,13 @@ fn target(state: &RenderState, paste: &Paste, size: [u32; 2]) -> Target {
     }
 }
 
-fn draw(state: &RenderState, pipeline: &wgpu::RenderPipeline, bind: &wgpu::BindGroup, view: &wgpu::TextureView) {
+fn draw(
+    state: &RenderState,
+    pipeline: &wgpu::RenderPipeline,
+    bind: &wgpu::BindGroup,
+    view: &wgpu::TextureView,
+    cells: [u32; 2],
+) {
     let descriptor = wgpu::CommandEncoderDescriptor {
         label: Some("stylet slice"),
     };
@@ -360,7 +369,7 @@ fn draw(state: &RenderState, pipeline: &wgpu::RenderPipeline, bind: &wgpu::BindG
         });
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, bind, &[]);
-        pass.draw(0..3, 0..1);
+        pass.draw(0..6 * cells[0] * cells[1], 0..1);
     }
     state.queue.submit([encoder.finish()]);
 }

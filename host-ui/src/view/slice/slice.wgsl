@@ -1,4 +1,5 @@
 // One slice: for each place the material point that lies there now, and its grey in an image, or its brightness and grain as ultrasound.
+// The material point is found at the corners of small cells of the picture: displacements vary over millimetres.
 
 // How often the fixed point is applied at most, and what it need not be followed for (m).
 override STEPS: i32;
@@ -9,7 +10,7 @@ struct Slice {
     middle_m: vec4<f32>,
     right_m: vec4<f32>,
     up_m: vec4<f32>,
-    // Corner and size of the brightness volume and of the grid of displacements (m).
+    // Corner and size of the brightness volume and of the grid of displacements (m); beside the first the cells of the picture.
     volume_corner_m: vec4<f32>,
     volume_size_m: vec4<f32>,
     nodes_corner_m: vec4<f32>,
@@ -34,14 +35,7 @@ struct Slice {
 
 struct Out {
     @builtin(position) clip: vec4<f32>,
-    @location(0) at: vec2<f32>,
-}
-
-@vertex
-fn slice_vertex(@builtin(vertex_index) index: u32) -> Out {
-    // One triangle over the whole picture.
-    let at = vec2(f32(i32(index & 1u) * 4 - 1), f32(i32(index >> 1u) * 4 - 1));
-    return Out(vec4(at, 0.0, 1.0), at);
+    @location(0) rest_m: vec3<f32>,
 }
 
 fn displacement_m(rest_m: vec3<f32>) -> vec3<f32> {
@@ -62,9 +56,19 @@ fn image_at(rest_m: vec3<f32>) -> f32 {
     return select(0.0, textureSampleLevel(image, clamped, at, 0.0).x, inside);
 }
 
-@fragment
-fn slice_fragment(in: Out) -> @location(0) vec4<f32> {
-    let place_m = slice.middle_m.xyz + in.at.x * slice.right_m.xyz + in.at.y * slice.up_m.xyz;
+@vertex
+fn slice_vertex(@builtin(vertex_index) index: u32) -> Out {
+    let cells = vec2(u32(slice.volume_corner_m.w), u32(slice.volume_size_m.w));
+    let cell = vec2((index / 6u) % cells.x, (index / 6u) / cells.x);
+    // Two triangles: corners 0, 1, 2 and 2, 1, 3.
+    let place = index % 6u;
+    let corner = select(place, place - 2u + u32(place == 3u) - u32(place == 4u), place > 2u);
+    let at = 2.0 * vec2<f32>(cell + vec2(corner & 1u, corner >> 1u)) / vec2<f32>(cells) - 1.0;
+    let place_m = slice.middle_m.xyz + at.x * slice.right_m.xyz + at.y * slice.up_m.xyz;
+    return Out(vec4(at, 0.0, 1.0), rest_of(place_m));
+}
+
+fn rest_of(place_m: vec3<f32>) -> vec3<f32> {
     var rest_m = place_m;
     // No uniform decides how often: Mesa's software driver would compile the shader anew for each of its values, and keep them all.
     for (var step = 0; step < STEPS; step++) {
@@ -75,6 +79,12 @@ fn slice_fragment(in: Out) -> @location(0) vec4<f32> {
             break;
         }
     }
+    return rest_m;
+}
+
+@fragment
+fn slice_fragment(in: Out) -> @location(0) vec4<f32> {
+    let rest_m = in.rest_m;
     if (slice.right_m.w > 0.5) {
         let grey = image_at(rest_m);
         return vec4(grey, grey, grey, 1.0);

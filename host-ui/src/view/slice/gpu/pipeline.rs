@@ -22,7 +22,7 @@ pub fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         .enumerate()
         .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
             binding: binding as u32,
-            visibility: wgpu::ShaderStages::FRAGMENT,
+            visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
             ty,
             count: None,
         })
@@ -49,7 +49,10 @@ pub fn pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::
         vertex: wgpu::VertexState {
             module: &module,
             entry_point: Some("slice_vertex"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &[("STEPS", f64::from(STEPS)), ("SEEN_M", f64::from(SEEN_M))],
+                ..Default::default()
+            },
             buffers: &[],
         },
         primitive: wgpu::PrimitiveState::default(),
@@ -58,10 +61,7 @@ pub fn pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::
         fragment: Some(wgpu::FragmentState {
             module: &module,
             entry_point: Some("slice_fragment"),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &[("STEPS", f64::from(STEPS)), ("SEEN_M", f64::from(SEEN_M))],
-                ..Default::default()
-            },
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
             targets: &[Some(COLOR.into())],
         }),
         multiview_mask: None,
