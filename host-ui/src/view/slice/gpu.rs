@@ -5,7 +5,7 @@ mod texture;
 
 use super::field::Field;
 use super::plane::Plane;
-use super::speckle::{self, GRAIN_M, GRAINS, LARGEST_AMPLITUDE};
+use super::speckle::{self, GRAIN_M, GRAINS, LARGEST_AMPLITUDE, LARGEST_LEVEL};
 use crate::view::driver::DriverCost;
 use crate::view::paste::{Paste, Pasted};
 use bytemuck::{Pod, Zeroable};
@@ -161,6 +161,8 @@ impl SliceGpu {
             return;
         }
         let (dims, bytes) = speckle::brightness_volume(&model.header, &model.labels);
+        let beam = scene_from_patient.column(1).normalize();
+        let bytes = speckle::with_edges(&bytes, dims, info.spacing_m, beam.into());
         let brightness = volume(&self.state, GREY, dims.map(|d| d as u32));
         self.driver.send(|| write(&self.state, &brightness, &bytes, 1));
         let nodes = volume(&self.state, wgpu::TextureFormat::Rgba16Float, nodes_info.dims);
@@ -308,7 +310,7 @@ fn uniform(body: &Body, plane: &Plane, cells: [u32; 2], image: Option<&Image>) -
             plane.right * half(plane.rect.width()),
             f32::from(u8::from(image.is_some())),
         ),
-        up_m: four(plane.up * half(plane.rect.height()), 0.0),
+        up_m: four(plane.up * half(plane.rect.height()), LARGEST_LEVEL),
         volume_corner_m: padded(body.volume_corner_m, cells[0] as f32),
         volume_size_m: padded(body.volume_size_m, cells[1] as f32),
         nodes_corner_m: padded(nodes.origin_m.map(|c| (c - 0.5 * nodes.spacing_m) as f32), 0.0),

@@ -6,7 +6,7 @@ override STEPS: i32;
 override SEEN_M: f32;
 
 struct Slice {
-    // Middle of the picture, and the ways to its right and upper edge (m); beside them the largest amplitude of grain, and 1 for an image.
+    // Middle of the picture, and the ways to its right and upper edge (m); beside them the largest amplitude of grain, 1 for an image, and the largest level.
     middle_m: vec4<f32>,
     right_m: vec4<f32>,
     up_m: vec4<f32>,
@@ -90,13 +90,10 @@ fn slice_fragment(in: Out) -> @location(0) vec4<f32> {
         return vec4(grey, grey, grey, 1.0);
     }
     let here = brightness_at(rest_m);
-    // Along the beam, where tissue meets other tissue, it shines.
-    let beam_m = normalize(slice.grain_y.xyz) * 0.0008;
-    let edge = abs(brightness_at(rest_m + beam_m) - brightness_at(rest_m - beam_m));
     let cell = vec3(dot(slice.grain_x.xyz, rest_m), dot(slice.grain_y.xyz, rest_m), dot(slice.grain_z.xyz, rest_m));
     let amplitude = textureSampleLevel(grain, repeated, cell, 0.0).x * slice.middle_m.w;
     // What a scanner shows: the logarithm of what comes back.
-    let level = (here + 0.55 * edge) * (1.0 + 0.34 * log(amplitude + 0.09));
+    let level = here * slice.up_m.w * (1.0 + 0.34 * log(amplitude + 0.09));
     let value = clamp(level, 0.0, 1.0);
     return vec4(value * 0.97, value * 0.985, value, 1.0);
 }
