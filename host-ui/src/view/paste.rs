@@ -12,6 +12,7 @@ use egui::{PaintCallbackInfo, Painter, Rect, Shape};
 pub struct Paste {
     device: wgpu::Device,
     layout: wgpu::BindGroupLayout,
+    between: wgpu::Sampler,
     /// Pixel for pixel.
     exact: wgpu::RenderPipeline,
     /// For a picture with fewer pixels than its place.
@@ -45,23 +46,32 @@ impl Paste {
 
     fn converting(state: &RenderState, to_light: bool) -> Self {
         let device = &state.device;
+        let picture = wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Float { filterable: true },
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        };
+        let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
+        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::FRAGMENT,
+            ty,
+            count: None,
+        };
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("stylet paste"),
-            entries: &[wgpu::BindGroupLayoutEntry {
-                binding: 0,
-                visibility: wgpu::ShaderStages::FRAGMENT,
-                ty: wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
-                    view_dimension: wgpu::TextureViewDimension::D2,
-                    multisampled: false,
-                },
-                count: None,
-            }],
+            entries: &[entry(0, picture), entry(1, sampler)],
+        });
+        let between = device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("stylet paste"),
+            mag_filter: wgpu::FilterMode::Linear,
+            ..Default::default()
         });
         Self {
             exact: pipeline(device, &layout, state.target_format, [to_light, false]),
             enlarging: pipeline(device, &layout, state.target_format, [to_light, true]),
             layout,
+            between,
             device: device.clone(),
         }
     }
@@ -80,10 +90,16 @@ impl Paste {
         let picture = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("stylet paste"),
             layout: &self.layout,
-            entries: &[wgpu::BindGroupEntry {
-                binding: 0,
-                resource: wgpu::BindingResource::TextureView(texture),
-            }],
+            entries: &[
+                wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: wgpu::BindingResource::TextureView(texture),
+                },
+                wgpu::BindGroupEntry {
+                    binding: 1,
+                    resource: wgpu::BindingResource::Sampler(&self.between),
+                },
+            ],
         });
         let draw = Draw {
             pipeline: pipeline.clone(),

@@ -6,6 +6,7 @@ override TAKES_LIGHT: bool;
 override ENLARGES: bool;
 
 @group(0) @binding(0) var picture: texture_2d<f32>;
+@group(0) @binding(1) var between: sampler;
 
 struct Out {
     @builtin(position) clip: vec4<f32>,
@@ -30,22 +31,13 @@ fn texel(at: vec2<f32>) -> vec3<f32> {
     return textureLoad(picture, vec2<i32>(clamp(at, vec2(0.0), last)), 0).xyz;
 }
 
-fn between(at: vec2<f32>) -> vec3<f32> {
-    let low = floor(at - 0.5);
-    let part = at - 0.5 - low;
-    let upper = mix(texel(low), texel(low + vec2(1.0, 0.0)), part.x);
-    let lower = mix(texel(low + vec2(0.0, 1.0)), texel(low + vec2(1.0, 1.0)), part.x);
-    return mix(upper, lower, part.y);
-}
-
 @fragment
 fn paste_fragment(in: Out) -> @location(0) vec4<f32> {
-    let at = in.at * vec2<f32>(textureDimensions(picture));
     var color: vec3<f32>;
     if (ENLARGES) {
-        color = between(at);
+        color = textureSampleLevel(picture, between, in.at, 0.0).xyz;
     } else {
-        color = texel(at);
+        color = texel(in.at * vec2<f32>(textureDimensions(picture)));
     }
     if (TAKES_LIGHT) {
         return vec4(light_of(color), 1.0);

@@ -94,7 +94,8 @@ struct Target {
 pub struct SliceGpu {
     state: RenderState,
     layout: wgpu::BindGroupLayout,
-    pipeline: wgpu::RenderPipeline,
+    tissue_pipeline: wgpu::RenderPipeline,
+    image_pipeline: wgpu::RenderPipeline,
     paste: Paste,
     grain: wgpu::TextureView,
     clamped: wgpu::Sampler,
@@ -132,7 +133,8 @@ impl SliceGpu {
         let mut driver = DriverCost::default();
         driver.send(|| write(&state, &grain, &grains, 1));
         Self {
-            pipeline: pipeline(device, &layout),
+            tissue_pipeline: pipeline(device, &layout, "slice_fragment"),
+            image_pipeline: pipeline(device, &layout, "image_fragment"),
             paste: Paste::new(&state),
             grain: grain.create_view(&wgpu::TextureViewDescriptor::default()),
             clamped: sampler(wgpu::AddressMode::ClampToEdge),
@@ -229,6 +231,11 @@ impl SliceGpu {
             .map(|side| ((side * pixels_per_point).round() as u32).clamp(1, LARGEST_SIDE));
         let cells = size.map(|side| side.div_ceil(CELL_PIXELS));
         let uniform = uniform(body, plane, cells, image);
+        let pipeline = match image {
+            Some(_) => &self.image_pipeline,
+            None => &self.tissue_pipeline,
+        }
+        .clone();
         while self.panes.len() <= number {
             let old = self.targets.get_mut(self.panes.len()).and_then(Option::take);
             let pane = self.pane(old)?;
@@ -245,7 +252,7 @@ impl SliceGpu {
             let bytes = bytemuck::bytes_of(&uniform);
             self.driver.send(|| {
                 self.state.queue.write_buffer(&pane.uniform, 0, bytes);
-                draw(&self.state, &self.pipeline, &pane.bind, &target.view, cells);
+                draw(&self.state, &pipeline, &pane.bind, &target.view, cells);
                 bytes.len() as u64
             });
             target.pasted.renew();
@@ -306,10 +313,7 @@ fn uniform(body: &Body, plane: &Plane, cells: [u32; 2], image: Option<&Image>) -
     });
     SliceUniform {
         middle_m: four(plane.middle_m, LARGEST_AMPLITUDE),
-        right_m: four(
-            plane.right * half(plane.rect.width()),
-            f32::from(u8::from(image.is_some())),
-        ),
+        right_m: four(plane.right * half(plane.rect.width()), 0.0),
         up_m: four(plane.up * half(plane.rect.height()), LARGEST_LEVEL),
         volume_corner_m: padded(body.volume_corner_m, cells[0] as f32),
         volume_size_m: padded(body.volume_size_m, cells[1] as f32),

@@ -6,7 +6,7 @@ override STEPS: i32;
 override SEEN_M: f32;
 
 struct Slice {
-    // Middle of the picture, and the ways to its right and upper edge (m); beside them the largest amplitude of grain, 1 for an image, and the largest level.
+    // Middle of the picture, and the ways to its right and upper edge (m); beside the first the largest amplitude of grain, beside the last the largest level.
     middle_m: vec4<f32>,
     right_m: vec4<f32>,
     up_m: vec4<f32>,
@@ -82,13 +82,16 @@ fn rest_of(place_m: vec3<f32>) -> vec3<f32> {
     return rest_m;
 }
 
+// Two shaders: a driver without a graphics card takes both sides of each condition.
+@fragment
+fn image_fragment(in: Out) -> @location(0) vec4<f32> {
+    let grey = image_at(in.rest_m);
+    return vec4(grey, grey, grey, 1.0);
+}
+
 @fragment
 fn slice_fragment(in: Out) -> @location(0) vec4<f32> {
     let rest_m = in.rest_m;
-    if (slice.right_m.w > 0.5) {
-        let grey = image_at(rest_m);
-        return vec4(grey, grey, grey, 1.0);
-    }
     let here = brightness_at(rest_m);
     let cell = vec3(dot(slice.grain_x.xyz, rest_m), dot(slice.grain_y.xyz, rest_m), dot(slice.grain_z.xyz, rest_m));
     let amplitude = textureSampleLevel(grain, repeated, cell, 0.0).x * slice.middle_m.w;

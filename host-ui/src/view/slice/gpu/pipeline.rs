@@ -33,7 +33,8 @@ pub fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     })
 }
 
-pub fn pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::RenderPipeline {
+/// Of what the fragment shader of this name shows.
+pub fn pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, shader: &str) -> wgpu::RenderPipeline {
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("stylet slice"),
         source: wgpu::ShaderSource::Wgsl(include_str!("../slice.wgsl").into()),
@@ -60,7 +61,7 @@ pub fn pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::
         multisample: wgpu::MultisampleState::default(),
         fragment: Some(wgpu::FragmentState {
             module: &module,
-            entry_point: Some("slice_fragment"),
+            entry_point: Some(shader),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             targets: &[Some(COLOR.into())],
         }),
