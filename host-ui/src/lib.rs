@@ -1,7 +1,7 @@
 //! The operator's program: the window, and the command line over the same code.
 //!
 //! The modules of the window depend on each other in one direction:
-//! `app` → `redraw`, `panel` → `view`, `keyboard` → `shown`, `action` → `planner`, `dose_worker`, `loader` → `mesh`, `theme`, `settings`, `words` → `recent` → `dialog`.
+//! `app` → `redraw`, `panel` → `view`, `keyboard` → `shown`, `action` → `planner`, `dose_worker`, `loader` → `theme`, `settings`, `words` → `recent` → `dialog`.
 
 #![warn(missing_docs)]
 
@@ -16,7 +16,6 @@ mod dose_worker;
 pub mod heap;
 pub mod keyboard;
 mod loader;
-mod mesh;
 mod panel;
 mod picture;
 pub mod planner;

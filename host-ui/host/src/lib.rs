@@ -4,5 +4,7 @@
 
 pub mod bodies;
 pub mod core_args;
+pub mod field;
 pub mod link;
+pub mod mesh;
 pub mod record;

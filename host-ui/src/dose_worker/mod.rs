@@ -2,7 +2,6 @@
 
 mod figures;
 
-use crate::mesh::{self, SurfaceVertex};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 pub use stylet_dose::criteria::{Figure, Limit};
@@ -10,6 +9,7 @@ use stylet_dose::decay::Interval;
 use stylet_dose::isodose::isodose;
 use stylet_dose::{DoseGrid, DoseKernel, Seed, Source};
 use stylet_host::link::SceneModel;
+use stylet_host::mesh::{self, SurfaceVertex};
 use stylet_implant::plan::exchange::USUAL_SOURCE;
 use stylet_shm_schema::{SceneId, SeedPose};
 

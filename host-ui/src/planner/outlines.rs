@@ -1,10 +1,10 @@
 //! Outlines of the scene's anatomy behind the holes of a template, made once per scene.
 
 use super::Failure;
-use crate::mesh::cut;
 use nalgebra::Vector3;
 use stylet_anatomy::PatientFrame;
 use stylet_host::link::SceneModel;
+use stylet_host::mesh::cut;
 use stylet_implant::plan::anatomy::Body;
 use stylet_implant::plan::{Anatomy, HOLES, Hole, Template};
 use stylet_shm_schema::SceneId;

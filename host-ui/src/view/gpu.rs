@@ -11,14 +11,14 @@ use super::marks::Marks;
 use super::paste::{Paste, Pasted};
 use super::uniforms::SceneUniform;
 use crate::dose_worker::IsodoseShell;
-use crate::mesh::SurfaceVertex;
-use crate::mesh::coarse::coarse;
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
 use growing::{Growing, allocate};
 use pipelines::{Pipelines, pipelines};
 use std::mem::size_of;
 use std::ops::Range;
+use stylet_host::mesh::SurfaceVertex;
+use stylet_host::mesh::coarse::coarse;
 use targets::{FINE, ONE_SAMPLE, Targets};
 
 const LARGEST_SIDE: u32 = 4096;

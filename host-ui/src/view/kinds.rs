@@ -1,10 +1,10 @@
 //! What the surfaces of a scene are of, and how each is drawn.
 
-use crate::mesh;
 use crate::theme::Tokens;
 use egui::Color32;
 use std::ops::Range;
 use stylet_host::bodies::{Bodies, shown_alone};
+use stylet_host::mesh;
 use stylet_shm_schema::{SceneHeader, role};
 
 /// What a surface is of.

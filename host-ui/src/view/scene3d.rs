@@ -14,13 +14,13 @@ use super::state::ViewState;
 use super::uniforms::{SceneUniform, section, tint, uniform};
 use crate::action::Viewpoint;
 use crate::dose_worker::DoseResult;
-use crate::mesh::Surface;
 use crate::shown::Shown;
 use crate::theme::{self, IMAGE, Tokens};
 use eframe::egui_wgpu::RenderState;
 use egui::{PointerButton, Rect, Sense};
 use nalgebra::Vector3;
 use std::sync::Arc;
+use stylet_host::mesh::Surface;
 use stylet_shm_schema::SceneId;
 
 const TURN_PER_POINT_RAD: f32 = 0.008;

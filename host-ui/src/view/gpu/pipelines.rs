@@ -2,9 +2,9 @@
 
 use super::super::marks::MarkVertex;
 use super::targets::{COLOR, DEPTH};
-use crate::mesh::SurfaceVertex;
 use eframe::wgpu;
 use std::mem::size_of;
+use stylet_host::mesh::SurfaceVertex;
 
 /// Pipelines of one picture.
 pub struct Pipelines {

@@ -3,7 +3,6 @@
 mod pipeline;
 mod texture;
 
-use super::field::Field;
 use super::plane::Plane;
 use super::speckle::{self, GRAIN_M, GRAINS, LARGEST_AMPLITUDE, LARGEST_LEVEL};
 use crate::view::driver::DriverCost;
@@ -16,6 +15,7 @@ use pipeline::{layout, pipeline};
 use std::mem::size_of;
 use stylet_anatomy::PatientFrame;
 use stylet_files::Image;
+use stylet_host::field::Field;
 use stylet_host::link::SceneModel;
 use stylet_shm_schema::GridInfo;
 use texture::{extent, volume, write};

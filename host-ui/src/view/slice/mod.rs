@@ -1,6 +1,5 @@
 //! Three orthogonal slices through the deformed body that look like ultrasound, and what is drawn over them.
 
-pub mod field;
 mod gpu;
 mod overlay;
 mod plane;
@@ -17,7 +16,6 @@ use crate::shown::Shown;
 use crate::theme::IMAGE;
 use eframe::egui_wgpu::RenderState;
 use egui::{Color32, PointerButton, Pos2, Rect, Sense};
-use field::Field;
 pub use gpu::ImageError;
 use gpu::SliceGpu;
 use nalgebra::{Matrix3, Vector3};
@@ -27,6 +25,7 @@ pub use plane::Plane;
 use std::sync::Arc;
 use stylet_files::Image;
 use stylet_host::bodies::Bodies;
+use stylet_host::field::Field;
 use stylet_host::link::{SceneModel, Snapshot};
 use stylet_shm_schema::{SceneHeader, SceneId, Text};
 

@@ -1,8 +1,8 @@
 //! How a slice is drawn: its bindings and its shader.
 
-use super::super::field::{SEEN_M, STEPS};
 use super::COLOR;
 use eframe::wgpu;
+use stylet_host::field::{SEEN_M, STEPS};
 
 /// Uniform, four volumes and two samplers.
 pub fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {

@@ -1,8 +1,8 @@
 //! The displacements of a snapshot as a texture takes them, and which material point lies at a place.
 
+use crate::link::{SceneModel, Snapshot};
 use half::f16;
 use nalgebra::Vector3;
-use stylet_host::link::{SceneModel, Snapshot};
 use stylet_shm_schema::GridInfo;
 
 /// A displacement smaller than this is not seen (m).

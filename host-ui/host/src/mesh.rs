@@ -14,9 +14,11 @@ const SEEN_M: f32 = 1e-5;
 /// Runs of vertices with a gap no longer than this between them are sent as one.
 const GAP: usize = 64;
 
+/// A vertex as the graphics card takes it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct SurfaceVertex {
+    /// Scene frame.
     pub place_m: [f32; 3],
     /// Not of unit length: the shader normalises.
     pub normal: [f32; 3],
@@ -83,10 +85,12 @@ impl Surface {
         surface
     }
 
+    /// With their normals, in the order of the positions.
     pub fn vertices(&self) -> &[SurfaceVertex] {
         &self.vertices
     }
 
+    /// As [`Self::vertices`].
     pub fn into_vertices(self) -> Vec<SurfaceVertex> {
         self.vertices
     }

@@ -1,0 +1,223 @@
+//! The table of layers: a row for each crate.
+
+const WINDOW: &[&str] = &[
+    "egui",
+    "eframe",
+    "egui_plot",
+    "egui-wgpu",
+    "egui_kittest",
+    "wgpu",
+    "winit",
+];
+const PORTS: &[&str] = &["iceoryx2"];
+const ARGUMENTS: &[&str] = &["clap"];
+const PROGRAM: &[&str] = &["indicatif", "signal-hook"];
+const DEVICES: &[&str] = &["evdev", "libloading"];
+const DICOM: &[&str] = &["dicom-core", "dicom-dictionary-std", "dicom-object", "nifti"];
+
+/// What one crate may know.
+pub struct Layer {
+    pub folder: &'static str,
+    /// Folders of those of our crates that it may name in its manifest.
+    pub may_use: &'static [&'static str],
+    /// Crates of others that neither it nor what it depends on may name.
+    pub never: &'static [&'static [&'static str]],
+    /// Crates of others that it may not name itself.
+    pub not_itself: &'static [&'static [&'static str]],
+}
+
+/// From the bottom up: a crate uses what stands above it in this table. A new crate gets a row; a row may stand here
+/// before its crate does.
+pub const LAYERS: &[Layer] = &[
+    // Below both sides.
+    Layer {
+        folder: "hw",
+        may_use: &[],
+        never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DICOM],
+        not_itself: &[],
+    },
+    Layer {
+        folder: "shm-schema/anatomy",
+        may_use: &[],
+        never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
+        folder: "shm-schema/write",
+        may_use: &[],
+        never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
+        folder: "shm-schema/manual",
+        may_use: &["shm-schema/write"],
+        never: &[WINDOW, PORTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
+        folder: "shm-schema/insertions",
+        may_use: &["shm-schema/write"],
+        never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
+        folder: "shm-schema",
+        may_use: &["shm-schema/anatomy"],
+        never: &[WINDOW, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
+        folder: "shm-schema/procedure",
+        may_use: &["shm-schema", "shm-schema/anatomy"],
+        never: &[WINDOW, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[PORTS],
+    },
+    // The real-time side.
+    Layer {
+        folder: "rt-core/heap",
+        may_use: &[],
+        never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
+        folder: "rt-core/sim",
+        may_use: &["hw", "rt-core/heap", "shm-schema", "shm-schema/anatomy"],
+        never: &[WINDOW, PROGRAM, DICOM],
+        not_itself: &[PORTS, DEVICES, ARGUMENTS],
+    },
+    Layer {
+        folder: "rt-core/runtime",
+        may_use: &[
+            "shm-schema/procedure",
+            "rt-core/heap",
+            "hw",
+            "rt-core/sim",
+            "shm-schema",
+            "shm-schema/anatomy",
+        ],
+        never: &[WINDOW, PROGRAM, DICOM],
+        not_itself: &[],
+    },
+    Layer {
+        folder: "rt-core/lab",
+        may_use: &[
+            "rt-core/heap",
+            "hw",
+            "rt-core/runtime",
+            "rt-core/sim",
+            "shm-schema",
+            "shm-schema/anatomy",
+            "shm-schema/write",
+        ],
+        never: &[WINDOW, DICOM],
+        not_itself: &[],
+    },
+    Layer {
+        folder: "rt-core/study",
+        may_use: &[
+            "shm-schema/insertions",
+            "shm-schema/procedure",
+            "hw",
+            "rt-core/runtime",
+            "rt-core/sim",
+            "shm-schema",
+            "shm-schema/write",
+        ],
+        never: &[WINDOW, PROGRAM, DICOM],
+        not_itself: &[PORTS, DEVICES],
+    },
+    Layer {
+        folder: "rt-core",
+        may_use: &[
+            "rt-core/heap",
+            "hw",
+            "rt-core/lab",
+            "rt-core/runtime",
+            "rt-core/study",
+            "rt-core/sim",
+            "shm-schema",
+            "shm-schema/anatomy",
+            "shm-schema/manual",
+        ],
+        never: &[WINDOW, DICOM],
+        not_itself: &[],
+    },
+    // The host's side.
+    Layer {
+        folder: "host-ui/base",
+        may_use: &["shm-schema/anatomy", "shm-schema/write"],
+        never: &[WINDOW, PORTS, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
+        folder: "host-ui/files",
+        may_use: &["host-ui/base", "shm-schema", "shm-schema/anatomy"],
+        never: &[WINDOW, DEVICES],
+        not_itself: &[PORTS],
+    },
+    Layer {
+        folder: "host-ui/dose",
+        may_use: &["host-ui/base", "host-ui/files", "shm-schema", "shm-schema/anatomy"],
+        never: &[WINDOW, DEVICES],
+        not_itself: &[PORTS],
+    },
+    Layer {
+        folder: "host-ui/host",
+        may_use: &["host-ui/base", "host-ui/files", "shm-schema", "shm-schema/anatomy"],
+        never: &[WINDOW, DEVICES],
+        not_itself: &[DICOM],
+    },
+    Layer {
+        folder: "host-ui/implant",
+        may_use: &[
+            "shm-schema/procedure",
+            "host-ui/base",
+            "host-ui/dose",
+            "host-ui/files",
+            "host-ui/host",
+            "shm-schema",
+            "shm-schema/anatomy",
+        ],
+        never: &[WINDOW, DEVICES],
+        not_itself: &[PORTS],
+    },
+    Layer {
+        folder: "host-ui/population",
+        may_use: &[
+            "shm-schema/insertions",
+            "host-ui/base",
+            "host-ui/dose",
+            "host-ui/files",
+            "host-ui/implant",
+        ],
+        never: &[WINDOW, DEVICES],
+        not_itself: &[PORTS, ARGUMENTS],
+    },
+    Layer {
+        folder: "host-ui/controllers",
+        may_use: &["host-ui/base"],
+        never: &[WINDOW, PORTS, DICOM],
+        not_itself: &[ARGUMENTS, PROGRAM],
+    },
+    Layer {
+        folder: "host-ui",
+        may_use: &[
+            "shm-schema/procedure",
+            "host-ui/base",
+            "host-ui/controllers",
+            "host-ui/dose",
+            "host-ui/files",
+            "host-ui/host",
+            "host-ui/implant",
+            "host-ui/population",
+            "shm-schema",
+            "shm-schema/anatomy",
+            "shm-schema/manual",
+        ],
+        never: &[],
+        not_itself: &[],
+    },
+];
+
+/// Crates that test and measure: they may use every crate, and no other crate may use them.
+pub const OUTSIDE: &[&str] = &["tests", "tests/fake-libhd", "benches"];
