@@ -23,8 +23,8 @@ use texture::{extent, volume, write};
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const GREY: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
 const LARGEST_SIDE: u32 = 2048;
-/// Side of a cell of the picture at whose corners the material point is found.
-const CELL_PIXELS: u32 = 8;
+/// Side of a cell of the picture at whose corners the material point is found. Displacements come every 8 mm (ADR 9), which is more pixels.
+const CELL_PIXELS: u32 = 16;
 
 /// As `Slice` in `slice.wgsl`.
 #[repr(C)]
