@@ -21,6 +21,8 @@ mod machine;
 mod measure;
 mod plots;
 mod provenance;
+#[cfg(test)]
+mod random;
 mod report;
 mod summary;
 mod verdict;

@@ -1,5 +1,6 @@
 //! A histogram in a few numbers; a percentile that the run was too short for has none.
 
+use crate::bound::ranks_of_quantile;
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
@@ -18,6 +19,9 @@ const BEYOND: f64 = 10.0;
 pub struct Quantile {
     pub name: &'static str,
     pub us: Option<f64>,
+    /// 95 % interval, from the order statistics of the samples; it holds for any distribution of independent samples.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interval_us: Option<[f64; 2]>,
     /// When there is no value: how long the run must be.
     pub needs_s: Option<f64>,
 }
@@ -49,6 +53,23 @@ pub fn quantile_us(histogram: &Histogram<u64>, quantile: f64) -> Option<f64> {
     (histogram.len() >= needed(quantile)).then(|| histogram.value_at_quantile(quantile) as f64 / 1e3)
 }
 
+/// The 95 % interval of a percentile, widened to the bins in which its ends lie.
+pub fn interval_us(histogram: &Histogram<u64>, quantile: f64) -> Option<[f64; 2]> {
+    let (low, high) = ranks_of_quantile(quantile, histogram.len())?;
+    let (mut below, mut from_ns) = (0, None);
+    for bin in histogram.iter_recorded() {
+        below += bin.count_at_value();
+        if below >= low && from_ns.is_none() {
+            from_ns = Some(histogram.lowest_equivalent(bin.value_iterated_to()));
+        }
+        if below >= high {
+            let to_ns = histogram.highest_equivalent(bin.value_iterated_to());
+            return from_ns.map(|from_ns| [from_ns, to_ns].map(|ns| ns as f64 / 1e3));
+        }
+    }
+    None
+}
+
 /// `rate_hz`: how many samples a second bring.
 pub fn summary(name: &str, histogram: &Histogram<u64>, rate_hz: f64) -> Summary {
     let some = !histogram.is_empty();
@@ -61,7 +82,13 @@ pub fn summary(name: &str, histogram: &Histogram<u64>, rate_hz: f64) -> Summary 
             .map(|(name, q)| {
                 let us = quantile_us(histogram, q);
                 let needs_s = us.is_none().then(|| needed(q) as f64 / rate_hz);
-                Quantile { name, us, needs_s }
+                let interval_us = us.and_then(|_| interval_us(histogram, q));
+                Quantile {
+                    name,
+                    us,
+                    interval_us,
+                    needs_s,
+                }
             })
             .to_vec(),
         max_us: some.then(|| histogram.max() as f64 / 1e3),
@@ -92,6 +119,43 @@ mod tests {
         let last = s.quantile("p99.99").expect("in the list");
         assert_eq!((last.us, last.needs_s), (None, Some(100.0)));
         assert_eq!(s.count, 10_000);
+    }
+
+    #[test]
+    fn interval_holds_the_percentile_in_95_of_100_runs() {
+        // Claim: of 400 seeded runs with a known p90 and p99, the intervals hold them as often as the binomial allows, at least
+        // 95 % less three deviations. Bins widen the intervals a little, so there is no bound from above but 400.
+        for (name, q) in [("p90", 0.9), ("p99", 0.99)] {
+            let mut held = 0;
+            for seed in 0..400_u64 {
+                let mut random = crate::random::SplitMix(seed);
+                let mut h = histogram();
+                for _ in 0..2_000 {
+                    // Exponential of mean 100 us.
+                    h.saturating_record((-(1.0 - random.unit()).ln() * 1e5) as u64);
+                }
+                let s = summary("x", &h, 1_000.0);
+                let [low, high] = s.quantile(name).and_then(|q| q.interval_us).expect("enough samples");
+                let true_us = -(1.0_f64 - q).ln() * 100.0;
+                held += u32::from(low <= true_us && true_us <= high);
+            }
+            assert!((367..=398).contains(&held), "{name}: {held} of 400");
+        }
+    }
+
+    #[test]
+    fn interval_ends_at_the_samples_of_its_ranks() {
+        let mut h = histogram();
+        for us in 1..=1_000_u64 {
+            h.record(us * 1_000).expect("in range");
+        }
+        let (low, high) = ranks_of_quantile(0.5, 1_000).expect("enough samples");
+        let [from, to] = interval_us(&h, 0.5).expect("enough samples");
+        assert!(
+            (from - low as f64).abs() < 1.0 && (to - high as f64).abs() < 1.0,
+            "{from} {to}"
+        );
+        assert!(interval_us(&histogram(), 0.5).is_none());
     }
 
     #[test]

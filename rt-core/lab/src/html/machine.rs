@@ -120,7 +120,9 @@ pub fn method(r: &Report) -> Markup {
             "The run's own force loop, tissue loop and bridge, with the simulated device and a script that inserts and retracts \
              the needle every 4 s. The first " (num(r.protocol.warm_up_s)) " s are not recorded. Wake-up: clock read right after \
              the sleep, less the due time on the ideal grid. Missed deadline: a grid point that was skipped. Overrun: a tick that \
-             ended after the next was due. A percentile needs ten samples beyond it. Values are known to 0.1 %. This report is \
+             ended after the next was due. A percentile needs ten samples beyond it; below it stands its 95 % interval between two \
+             order statistics (binomial), which holds for any distribution of times that do not depend on each other. Values are \
+             known to 0.1 %. This report is \
              evidence for whoever assesses the machine; it claims no conformity with any standard."
         }
         p class="faint" {

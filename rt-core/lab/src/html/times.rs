@@ -3,7 +3,7 @@
 use super::parts::{Column, cell, count, duration, micro, num, or_na, table};
 use crate::compare::Against;
 use crate::report::{LoopSection, Report};
-use crate::summary::{QUANTILES, Summary};
+use crate::summary::{QUANTILES, Quantile, Summary};
 use maud::{Markup, html};
 
 pub fn of_loop(title: &str, section: &LoopSection) -> Markup {
@@ -19,7 +19,7 @@ fn time_table(times: &[Summary]) -> Markup {
     head.extend(["max", "samples"]);
     let row = |s: &Summary| {
         let mut cells = vec![cell(&s.name), or_na(s.min_us), or_na(s.mean_us)];
-        cells.extend(s.quantiles.iter().map(|q| or_na(q.us)));
+        cells.extend(s.quantiles.iter().map(percentile));
         cells.extend([or_na(s.max_us), count(s.count as f64)]);
         cells
     };
@@ -36,6 +36,14 @@ fn time_table(times: &[Summary]) -> Markup {
         @if !needs.is_empty() {
             p class="faint" { "n/a: " (needs.join(", ")) "." }
         }
+    }
+}
+
+/// A percentile with its interval below it.
+fn percentile(q: &Quantile) -> Markup {
+    html! {
+        (or_na(q.us))
+        @if let Some([low, high]) = q.interval_us { br; span class="faint" { (num(low)) "\u{2013}" (num(high)) } }
     }
 }
 
