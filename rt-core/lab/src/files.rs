@@ -2,6 +2,7 @@
 
 use crate::html;
 use crate::measure::Measured;
+use crate::plots::DrawError;
 use crate::report::{FileDigest, HISTOGRAMS, JSON, NO_DIGEST, PAGE, Report};
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::V2DeflateSerializer;
@@ -11,9 +12,22 @@ use std::path::Path;
 use std::time::Duration;
 use stylet_write::write_whole;
 
+/// The files of a measurement cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum FilesError {
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+    #[error("the histograms cannot be written: {0}")]
+    Histograms(String),
+    #[error("the report cannot be written as JSON: {0}")]
+    Json(#[from] serde_json::Error),
+    #[error(transparent)]
+    Write(#[from] stylet_write::WriteError),
+}
+
 /// Writes all three files into `folder`, each with its digest in the report.
-pub fn write(folder: &Path, report: &mut Report, measured: &Measured) -> Result<(), String> {
-    let put = |name: &str, bytes: &[u8]| write_whole(&folder.join(name), bytes).map_err(|e| e.to_string());
+pub fn write(folder: &Path, report: &mut Report, measured: &Measured) -> Result<(), FilesError> {
+    let put = |name: &str, bytes: &[u8]| write_whole(&folder.join(name), bytes).map_err(FilesError::from);
     let raw = raw_histograms(report, measured)?;
     put(HISTOGRAMS, &raw)?;
     let page = html::page(report, measured)?;
@@ -27,7 +41,7 @@ pub fn write(folder: &Path, report: &mut Report, measured: &Measured) -> Result<
             sha256: sha256(page.as_bytes()),
         },
     ];
-    let json = serde_json::to_string_pretty(report).map_err(|e| format!("the report cannot be written: {e}"))? + "\n";
+    let json = serde_json::to_string_pretty(report)? + "\n";
     report.sha256 = sha256(json.as_bytes());
     put(JSON, json.replacen(NO_DIGEST, &report.sha256, 1).as_bytes())?;
     put(PAGE, page.replacen(NO_DIGEST, &report.sha256, 1).as_bytes())
@@ -39,7 +53,7 @@ pub fn sha256(bytes: &[u8]) -> String {
 }
 
 /// Every histogram in the interval log format of HdrHistogram, nanoseconds, one tagged line each.
-fn raw_histograms(report: &Report, measured: &Measured) -> Result<Vec<u8>, String> {
+fn raw_histograms(report: &Report, measured: &Measured) -> Result<Vec<u8>, FilesError> {
     let mut all: Vec<(String, &Histogram<u64>)> = Vec::new();
     for (name, timing) in [("haptic", &measured.haptic), ("tissue", &measured.tissue)] {
         let mut add = |what: &str, h| all.push((format!("{name}/{}", what.replace(' ', "_")), h));
@@ -61,7 +75,7 @@ fn raw_histograms(report: &Report, measured: &Measured) -> Result<Vec<u8>, Strin
         all.push(("comparison/ours".to_owned(), &comparison.ours));
         all.push(("comparison/other".to_owned(), &comparison.others));
     }
-    let failed = |e: &dyn std::fmt::Debug| format!("the histograms cannot be written: {e:?}");
+    let failed = |e: &dyn std::fmt::Debug| FilesError::Histograms(format!("{e:?}"));
     let mut bytes = Vec::new();
     let mut serializer = V2DeflateSerializer::new();
     let mut log = IntervalLogWriterBuilder::new()

@@ -6,7 +6,7 @@ mod times;
 
 use crate::compare::Against;
 use crate::measure::Measured;
-use crate::plots::{self, BLUE, ORANGE, Series};
+use crate::plots::{self, BLUE, DrawError, ORANGE, Series};
 use crate::report::{NO_DIGEST, Report};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use parts::{Column, badge, cell, micro, num, or_na, table};
@@ -14,7 +14,7 @@ use parts::{Column, badge, cell, micro, num, or_na, table};
 const STYLE: &str = include_str!("report.css");
 
 /// The whole page; the report's digest stands in it as zeros, once.
-pub fn page(report: &Report, measured: &Measured) -> Result<String, String> {
+pub fn page(report: &Report, measured: &Measured) -> Result<String, DrawError> {
     let pictures = pictures(report, measured)?;
     let page = html! {
         (DOCTYPE)
@@ -137,7 +137,7 @@ fn short(evidence: &str) -> String {
     }
 }
 
-fn pictures(r: &Report, m: &Measured) -> Result<Markup, String> {
+fn pictures(r: &Report, m: &Measured) -> Result<Markup, DrawError> {
     let h = &m.haptic;
     let wake = Series {
         name: "force loop",

@@ -49,7 +49,7 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
         comparison,
         machine: &machine,
     });
-    files::write(&args.out, &mut report, &measured)?;
+    files::write(&args.out, &mut report, &measured).map_err(|e| e.to_string())?;
     print_verdict(&report);
     println!("{}", args.out.join(PAGE).display());
     println!("{}", args.out.join(JSON).display());

@@ -16,15 +16,20 @@ pub const BLUE: RGBColor = RGBColor(0x1f, 0x6f, 0xb2);
 /// Color of the second series: cyclictest, or the work of the loop.
 pub const ORANGE: RGBColor = RGBColor(0xd9, 0x7a, 0x1a);
 
+/// A picture cannot be drawn.
+#[derive(Debug, thiserror::Error)]
+#[error("a picture of the report cannot be drawn: {0}")]
+pub struct DrawError(String);
+
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
-fn picture(draw: impl FnOnce(&Area) -> Drawn) -> Result<String, String> {
+fn picture(draw: impl FnOnce(&Area) -> Drawn) -> Result<String, DrawError> {
     let mut svg = String::new();
     {
         let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-        draw(&root).map_err(|e| format!("a picture cannot be drawn: {e}"))?;
-        root.present().map_err(|e| format!("a picture cannot be drawn: {e}"))?;
+        draw(&root).map_err(|e| DrawError(e.to_string()))?;
+        root.present().map_err(|e| DrawError(e.to_string()))?;
     }
     // The page scales it; a fixed size would not fit a narrow window.
     let fixed = format!("width=\"{}\" height=\"{}\" ", SIZE.0, SIZE.1);
@@ -110,7 +115,7 @@ pub struct Series<'a> {
 }
 
 /// Histogram of the wake-up latency: linear microseconds, logarithmic count. The legend has the number past the right edge.
-pub fn wake_histogram(series: &[Series]) -> Result<String, String> {
+pub fn wake_histogram(series: &[Series]) -> Result<String, DrawError> {
     picture(|root| {
         // Wide enough for the body; a long tail would press it into a line, and has a picture of its own.
         let at = |s: &Series, q| s.histogram.value_at_quantile(q) as f64 / 1e3;
@@ -167,7 +172,7 @@ fn beyond(series: &Series, right_us: f64) -> String {
 }
 
 /// Where a tick's time goes: for each stage a bar from p50 to p99.9 and a point at the largest.
-pub fn stages(timing: &LoopTiming) -> Result<String, String> {
+pub fn stages(timing: &LoopTiming) -> Result<String, DrawError> {
     let named = timing.stage_names.iter().copied().zip(&timing.stages);
     let rows: Vec<(&str, &Histogram<u64>)> = named.chain([("whole tick", &timing.work)]).collect();
     picture(|root| {
@@ -211,7 +216,7 @@ pub fn stages(timing: &LoopTiming) -> Result<String, String> {
 }
 
 /// The worst wake-up and the longest tick of each window of the run.
-pub fn windows(windows: &[Window], window_ns: u64) -> Result<String, String> {
+pub fn windows(windows: &[Window], window_ns: u64) -> Result<String, DrawError> {
     picture(|root| {
         let used: Vec<(f64, &Window)> = windows
             .iter()
@@ -250,7 +255,7 @@ pub fn windows(windows: &[Window], window_ns: u64) -> Result<String, String> {
 }
 
 /// The share of ticks later than so many microseconds, both axes logarithmic.
-pub fn tail(series: &[Series]) -> Result<String, String> {
+pub fn tail(series: &[Series]) -> Result<String, DrawError> {
     picture(|root| {
         let longest = series.iter().map(|s| s.histogram.max()).max().unwrap_or(1) as f64 / 1e3;
         let shortest = series.iter().map(|s| s.histogram.min()).min().unwrap_or(0) as f64 / 1e3;

@@ -1,0 +1,247 @@
+//! Puts a report together from what was measured.
+
+use super::{
+    Environment, GapSection, HostSection, Late, LoopCounts, LoopSection, Margin, NO_DIGEST, Protocol, Report, SCHEMA,
+    StiffnessSection, Verdict, WindowRow,
+};
+use crate::bound;
+use crate::collect::LoopTiming;
+use crate::compare::Comparison;
+use crate::gaps::GapReport;
+use crate::load::Load;
+use crate::machine::Machine;
+use crate::measure::{Measured, WARM_UP_S, switches_beyond_sleep};
+use crate::provenance;
+use crate::summary::{quantile_us, summary};
+use crate::verdict::{self, Limits};
+use hdrhistogram::Histogram;
+use stylet_runtime::process::{LoopReport, Options};
+
+/// What a report is made of.
+pub struct Parts<'a> {
+    pub options: &'a Options,
+    pub duration_ns: u64,
+    pub load: Load,
+    pub limits: &'a Limits,
+    pub measured: &'a Measured,
+    pub comparison: Option<Comparison>,
+    pub machine: &'a Machine,
+}
+
+/// Puts a report together; digests are still missing.
+pub fn report(parts: &Parts) -> Report {
+    let Parts { options, measured, .. } = parts;
+    let period_ns = options.haptic_period_ns;
+    let rate_hz = 1e9 / period_ns as f64;
+    let tissue_rate_hz = 1e9 / stylet_runtime::rt::clock::TISSUE_PERIOD_NS as f64;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let unqualified = provenance::unqualified(parts.machine, &measured.run);
+    let limits = verdict::evaluate(parts.limits, measured, period_ns, &unqualified);
+    let host = &measured.host;
+    Report {
+        schema: SCHEMA,
+        sha256: NO_DIGEST.to_owned(),
+        sha256_is_of: "this file, with the 64 digits of sha256 as zeros",
+        files: Vec::new(),
+        made_at: jiff::Timestamp::now().strftime("%Y-%m-%d %H:%M:%S UTC").to_string(),
+        program: format!("rt-core {}", env!("CARGO_PKG_VERSION")),
+        commit: provenance::COMMIT,
+        command: std::env::args().collect(),
+        protocol: Protocol {
+            scene: options.scene.clone(),
+            load: parts.load,
+            load_is: parts.load.describe(cores),
+            rate_hz,
+            tissue_rate_hz,
+            duration_s: parts.duration_ns as f64 / 1e9,
+            measured_s: parts.measured.haptic.measured_ns() as f64 / 1e9,
+            warm_up_s: WARM_UP_S,
+            spin_us: options.spin_ns / 1_000,
+            insertions: host.insertions,
+        },
+        verdict: Verdict {
+            overall: verdict::overall(&limits),
+            limits,
+        },
+        environment: environment(&unqualified, measured),
+        haptic: loop_section(
+            &measured.run.haptic,
+            &measured.haptic,
+            rate_hz,
+            ["device read to force written", "due to force written"],
+        ),
+        tissue: loop_section(
+            &measured.run.tissue,
+            &measured.tissue,
+            tissue_rate_hz,
+            ["tip moved to response published", "due to response published"],
+        ),
+        host: HostSection {
+            times: vec![
+                summary("tip moved to host saw it", &host.tip_to_host, tissue_rate_hz),
+                summary("tissue tick to host saw it", &host.tissue_to_host, tissue_rate_hz),
+            ],
+            snapshots: host.snapshots,
+            records: host.records,
+            records_missing: host.records_missing,
+            faults: host.faults,
+        },
+        stiffness: stiffness(&measured.haptic.due_to_output, period_ns),
+        windows: windows(measured),
+        latest_wake_ups: latest(measured),
+        gaps: gap_section(measured),
+        cores: measured.cores.clone(),
+        comparison: parts.comparison.clone(),
+        settings: provenance::settings(parts.machine, options, &measured.run),
+        facts: provenance::facts(parts.machine, options),
+        dependencies: provenance::dependencies(),
+    }
+}
+
+fn loop_section(run: &LoopReport, timing: &LoopTiming, rate_hz: f64, [path, output]: [&str; 2]) -> LoopSection {
+    let of = |name: &str, h: &Histogram<u64>| summary(name, h, rate_hz);
+    let mut times = vec![of("wake-up", &timing.wake), of("period jitter", &timing.jitter)];
+    let stages = timing.stage_names.iter().zip(&timing.stages);
+    times.extend(stages.map(|(name, h)| of(name, h)));
+    times.extend([
+        of("whole tick", &timing.work),
+        of(path, &timing.path),
+        of(output, &timing.due_to_output),
+        of("handing over what was measured", &timing.recording),
+    ]);
+    LoopSection {
+        times,
+        counts: LoopCounts {
+            ticks: run.ticks,
+            missed_deadlines: timing.missed,
+            overruns: timing.overruns,
+            unmeasured: timing.lost,
+            heap_calls: run.usage.heap_calls,
+            minor_faults: run.usage.minor_faults,
+            major_faults: run.usage.major_faults,
+            voluntary_switches: run.usage.voluntary_switches,
+            voluntary_switches_beyond_sleep: switches_beyond_sleep(run, timing.unslept),
+            involuntary_switches: run.usage.involuntary_switches,
+        },
+        miss_bound: bound::of_misses(timing.missed, timing.ticks + timing.missed, rate_hz),
+        work_p999_of_period: quantile_us(&timing.work, 0.999).map(|us| us * rate_hz / 1e6),
+    }
+}
+
+fn environment(unqualified: &[String], measured: &Measured) -> Environment {
+    let gaps = &measured.gaps;
+    let core = gaps.core.map_or("any core".to_owned(), |c| format!("core {c}"));
+    let worst = match gaps.gaps.len() {
+        0 => String::new(),
+        _ => format!(", the worst {:.0} us", gaps.gaps.max() as f64 / 1e3),
+    };
+    let steal: f64 = measured.cores.iter().filter_map(|c| c.steal_s).sum();
+    let mut evidence = unqualified.to_vec();
+    evidence.push(format!(
+        "gap watch: spun {:.1} s on {core} and saw {} gaps over 20 us in which the kernel switched no thread{worst}",
+        gaps.watched_ns as f64 / 1e9,
+        gaps.gaps.len()
+    ));
+    if !gaps.wake.is_empty() {
+        evidence.push(format!(
+            "gap watch: its own timer fired up to {:.0} us late",
+            gaps.wake.max() as f64 / 1e3
+        ));
+    }
+    evidence.push(format!(
+        "steal time on our cores as reported by /proc/stat: {steal:.2} s"
+    ));
+    Environment {
+        qualified: unqualified.is_empty(),
+        evidence,
+    }
+}
+
+fn stiffness(delay: &Histogram<u64>, period_ns: u64) -> StiffnessSection {
+    let (hand, law) = provenance::dampings_n_s_per_m();
+    let margin = |at, delay_us: Option<f64>| Margin {
+        at,
+        delay_us,
+        k_max_n_per_m: delay_us.map(|us| provenance::stiffness_margin_n_per_m(period_ns, us * 1e3)),
+    };
+    let max_us = (!delay.is_empty()).then(|| delay.max() as f64 / 1e3);
+    StiffnessSection {
+        rule: "K_max = (b + B) / (T/2 + t_d); t_d from due time to force written; a loop that is always so late",
+        hand_damping_n_s_per_m: hand,
+        law_damping_n_s_per_m: law,
+        margins: vec![
+            margin("p50", quantile_us(delay, 0.5)),
+            margin("p99.9", quantile_us(delay, 0.999)),
+            margin("max", max_us),
+        ],
+    }
+}
+
+fn windows(measured: &Measured) -> Vec<WindowRow> {
+    let timing = &measured.haptic;
+    let used = timing.windows.iter().enumerate().filter(|(_, w)| w.ticks > 0);
+    used.map(|(i, w)| WindowRow {
+        at_s: i as f64 * measured.window_ns as f64 / 1e9,
+        worst_wake_us: w.worst_wake_ns as f64 / 1e3,
+        worst_work_us: w.worst_work_ns as f64 / 1e3,
+        missed: w.missed,
+    })
+    .collect()
+}
+
+fn latest(measured: &Measured) -> Vec<Late> {
+    let timing = &measured.haptic;
+    let late = timing.worst.iter().filter(|t| t.wake_ns > 0);
+    late.map(|t| Late {
+        at_s: t.due_ns.saturating_sub(timing.first_due_ns) as f64 / 1e9,
+        wake_us: t.wake_ns as f64 / 1e3,
+        work_us: t.work_ns as f64 / 1e3,
+        cause: cause(&measured.gaps, t.due_ns, t.due_ns + t.wake_ns),
+    })
+    .collect()
+}
+
+/// What the gap watch saw between two times.
+fn cause(gaps: &GapReport, from_ns: u64, to_ns: u64) -> String {
+    let core = gaps.core.map_or("another core".to_owned(), |c| format!("core {c}"));
+    if let Some(ns) = gaps.gap_during(from_ns, to_ns) {
+        return format!(
+            "a gap of {:.0} us on {core} at the same time, without a switch",
+            ns as f64 / 1e3
+        );
+    }
+    match gaps.late_during(from_ns, to_ns) {
+        Some(ns) => format!(
+            "the gap watch on {core} woke {:.0} us late at the same time: not this core alone",
+            ns as f64 / 1e3
+        ),
+        None => format!("nothing seen on {core}: this core alone"),
+    }
+}
+
+fn gap_section(measured: &Measured) -> GapSection {
+    let gaps = &measured.gaps;
+    GapSection {
+        core: gaps.core,
+        watched_s: gaps.watched_ns as f64 / 1e9,
+        gaps: gaps.gaps.len(),
+        worst_us: (!gaps.gaps.is_empty()).then(|| gaps.gaps.max() as f64 / 1e3),
+        wake: summary("wake-up of the gap watch", &gaps.wake, 1e3),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn margins_fall_as_the_delay_grows() {
+        let mut delay = crate::collect::histogram();
+        for i in 0..20_000_u64 {
+            delay.record(15_000 + i * 10).expect("in range");
+        }
+        let s = stiffness(&delay, 1_000_000);
+        let k: Vec<f64> = s.margins.iter().filter_map(|m| m.k_max_n_per_m).collect();
+        assert!(k.len() == 3 && k[0] > k[1] && k[1] > k[2], "{k:?}");
+    }
+}
