@@ -1,22 +1,14 @@
 //! Collects the times of each tick into histograms, windows and the latest wake-ups; at normal priority.
 
+use crate::sample::{Sample, histogram};
 use hdrhistogram::Histogram;
 use std::time::Duration;
 use stylet_runtime::rt::timing::{MAX_STAGES, TickTimes};
 
-/// Longest time that a histogram resolves; longer ones count as this.
-const LONGEST_NS: u64 = 10_000_000_000;
-/// Three digits: a value is known to 0.1 %.
-const DIGITS: u8 = 3;
 /// Latest wake-ups that are kept one by one.
 pub const WORST_KEPT: usize = 16;
 /// How often the ring is emptied; it holds seconds.
 const PAUSE: Duration = Duration::from_millis(5);
-
-/// A histogram of nanoseconds with fixed bounds.
-pub fn histogram() -> Histogram<u64> {
-    Histogram::new_with_bounds(1, LONGEST_NS, DIGITS).expect("the bounds are constants that fit")
-}
 
 /// How ticks are gathered.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +18,8 @@ pub struct Plan {
     pub warm_up_ticks: u64,
     pub window_ns: u64,
     pub windows: usize,
+    /// Grid points of the run as planned.
+    pub grid: u64,
 }
 
 /// The worst of a stretch of time.
@@ -63,6 +57,8 @@ pub struct LoopTiming {
     pub recording: Histogram<u64>,
     pub windows: Vec<Window>,
     pub worst: [LateTick; WORST_KEPT],
+    /// Wake-ups in the order of time, those of parts of the run, and the latest ones.
+    pub sample: Sample,
     pub first_due_ns: u64,
     last_due_ns: u64,
     pub ticks: u64,
@@ -91,6 +87,7 @@ impl LoopTiming {
             recording: histogram(),
             windows: vec![Window::default(); plan.windows],
             worst: [LateTick::default(); WORST_KEPT],
+            sample: Sample::new(plan.grid),
             first_due_ns: 0,
             last_due_ns: 0,
             ticks: 0,
@@ -164,6 +161,8 @@ impl LoopTiming {
             self.jitter.saturating_record(interval_ns.abs_diff(self.plan.period_ns));
         }
         self.recording.saturating_record(tick.recording_ns);
+        let place = due_ns.saturating_sub(self.first_due_ns) / self.plan.period_ns;
+        self.sample.take(place, wake_ns);
         self.note_window(due_ns, wake_ns, work_ns, tick.missed);
         self.note_worst(LateTick {
             due_ns,
@@ -202,6 +201,7 @@ mod tests {
         warm_up_ticks: 2,
         window_ns: 10_000,
         windows: 4,
+        grid: 100,
     };
 
     fn timing() -> LoopTiming {

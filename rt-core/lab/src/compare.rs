@@ -1,9 +1,9 @@
 //! Our wake-up latency, alternating with another one: that of `cyclictest` on the same core with the same priority and interval, or our own without
 //! the load.
 
-use crate::collect::histogram;
 use crate::load::{Load, Running};
 use crate::measure::{Measured, Setup, measure};
+use crate::sample::histogram;
 use crate::summary::quantile_us;
 use clap::ValueEnum;
 use hdrhistogram::Histogram;

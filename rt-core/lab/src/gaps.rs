@@ -3,7 +3,7 @@
 //! A thread on another core spins for a tenth of each millisecond and reads the clock. A gap during which the kernel
 //! switched no thread is an interrupt, firmware, or a hypervisor that ran something else.
 
-use crate::collect::histogram;
+use crate::sample::histogram;
 use hdrhistogram::Histogram;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_runtime::rt::arm::{self, Ask, Usage};

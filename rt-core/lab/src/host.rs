@@ -1,6 +1,6 @@
 //! A host inside the measurement, at normal priority: it moves the hand, and records when it sees the tissue respond.
 
-use crate::collect::histogram;
+use crate::sample::histogram;
 use hdrhistogram::Histogram;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;

@@ -24,6 +24,8 @@ mod provenance;
 #[cfg(test)]
 mod random;
 mod report;
+mod sample;
+mod stationary;
 mod summary;
 mod verdict;
 pub mod verify;

@@ -67,6 +67,7 @@ fn plan(period_ns: u64, duration_ns: u64) -> Plan {
         warm_up_ticks: warm_up_ticks(period_ns),
         window_ns,
         windows: (duration_ns / window_ns + 1) as usize,
+        grid: duration_ns / period_ns,
     }
 }
 

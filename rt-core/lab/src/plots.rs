@@ -338,7 +338,7 @@ fn legend_at_left(root: &Area, entries: &[(String, RGBColor)]) -> Drawn {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::collect::histogram;
+    use crate::sample::histogram;
 
     #[test]
     fn bins_and_tail_keep_every_sample() {

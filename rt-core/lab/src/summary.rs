@@ -98,7 +98,7 @@ pub fn summary(name: &str, histogram: &Histogram<u64>, rate_hz: f64) -> Summary 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::collect::histogram;
+    use crate::sample::histogram;
 
     #[test]
     fn percentiles_agree_with_a_sorted_list_and_need_ten_samples_beyond() {

@@ -343,7 +343,7 @@ mod tests {
 
     #[test]
     fn percentile_without_ten_samples_beyond_is_not_reported() {
-        let mut h = crate::collect::histogram();
+        let mut h = crate::sample::histogram();
         for ns in 1..=999_u64 {
             h.record(ns * 1_000).expect("in range");
         }

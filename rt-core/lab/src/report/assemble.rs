@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn margins_fall_as_the_delay_grows() {
-        let mut delay = crate::collect::histogram();
+        let mut delay = crate::sample::histogram();
         for i in 0..20_000_u64 {
             delay.record(15_000 + i * 10).expect("in range");
         }
