@@ -66,6 +66,9 @@ fn raw_histograms(report: &Report, measured: &Measured) -> Result<Vec<u8>, Files
         add("path", &timing.path);
         add("due_to_output", &timing.due_to_output);
         add("recording", &timing.recording);
+        for (i, part) in timing.sample.parts.iter().enumerate() {
+            add(&format!("wake/part_{}", i + 1), part);
+        }
     }
     all.push(("host/tip_to_host".to_owned(), &measured.host.tip_to_host));
     all.push(("host/tissue_to_host".to_owned(), &measured.host.tissue_to_host));

@@ -2,6 +2,7 @@
 
 mod machine;
 mod parts;
+mod steady;
 mod times;
 
 use crate::compare::Against;
@@ -38,6 +39,7 @@ pub fn page(report: &Report, measured: &Measured) -> Result<String, DrawError> {
                     (machine::stiffness(report))
                     (machine::counters(report))
                     (times::late(report))
+                    (steady::steady(report))
                     (machine::provenance(report))
                     (machine::method(report))
                     footer {

@@ -11,6 +11,7 @@ mod collect;
 mod compare;
 pub mod cost;
 pub mod doctor;
+mod extreme;
 mod files;
 mod gaps;
 mod host;

@@ -6,6 +6,7 @@ pub use assemble::{Parts, report};
 
 use crate::bound::MissBound;
 use crate::compare::Comparison;
+use crate::extreme::Extremes;
 use crate::load::Load;
 use crate::provenance::{Dependency, Fact, Setting};
 use crate::summary::Summary;
@@ -149,6 +150,9 @@ pub struct Report {
     pub stiffness: StiffnessSection,
     pub windows: Vec<WindowRow>,
     pub latest_wake_ups: Vec<Late>,
+    /// Wake-ups of the force loop in equal parts of the run. Reports of older versions have neither this nor `extremes`.
+    pub parts: Vec<Summary>,
+    pub extremes: Extremes,
     pub gaps: GapSection,
     pub cores: Vec<CoreWatch>,
     pub comparison: Option<Comparison>,

@@ -13,7 +13,7 @@ pub fn of_loop(title: &str, section: &LoopSection) -> Markup {
     }
 }
 
-fn time_table(times: &[Summary]) -> Markup {
+pub fn time_table(times: &[Summary]) -> Markup {
     let mut head = vec!["microseconds", "min", "mean"];
     head.extend(QUANTILES.iter().map(|(name, _)| *name));
     head.extend(["max", "samples"]);

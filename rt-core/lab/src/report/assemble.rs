@@ -7,12 +7,14 @@ use super::{
 use crate::bound;
 use crate::collect::LoopTiming;
 use crate::compare::Comparison;
+use crate::extreme;
 use crate::gaps::GapReport;
 use crate::load::Load;
 use crate::machine::Machine;
 use crate::measure::{Measured, WARM_UP_S, switches_beyond_sleep};
 use crate::provenance;
-use crate::summary::{quantile_us, summary};
+use crate::sample::PARTS;
+use crate::summary::{Summary, quantile_us, summary};
 use crate::verdict::{self, Limits};
 use hdrhistogram::Histogram;
 use stylet_runtime::process::{LoopReport, Options};
@@ -89,6 +91,8 @@ pub fn report(parts: &Parts) -> Report {
         stiffness: stiffness(&measured.haptic.due_to_output, period_ns),
         windows: windows(measured),
         latest_wake_ups: latest(measured),
+        parts: parts_of_run(&measured.haptic, rate_hz),
+        extremes: extreme::examine(&measured.haptic.sample, rate_hz),
         gaps: gap_section(measured),
         cores: measured.cores.clone(),
         comparison: parts.comparison.clone(),
@@ -126,6 +130,13 @@ fn loop_section(run: &LoopReport, timing: &LoopTiming, rate_hz: f64, [path, outp
         miss_bound: bound::of_misses(timing.missed, timing.ticks + timing.missed, rate_hz),
         work_p999_of_period: quantile_us(&timing.work, 0.999).map(|us| us * rate_hz / 1e6),
     }
+}
+
+fn parts_of_run(timing: &LoopTiming, rate_hz: f64) -> Vec<Summary> {
+    let parts = timing.sample.parts.iter().enumerate().filter(|(_, h)| !h.is_empty());
+    parts
+        .map(|(i, h)| summary(&format!("part {} of {PARTS}", i + 1), h, rate_hz))
+        .collect()
 }
 
 fn environment(unqualified: &[String], measured: &Measured) -> Environment {
