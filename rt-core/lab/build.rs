@@ -7,6 +7,7 @@ use std::process::Command;
 fn main() {
     println!("cargo:rerun-if-env-changed=STYLET_COMMIT");
     println!("cargo:rustc-env=STYLET_COMMIT={}", commit());
+    println!("cargo:rustc-env=STYLET_TOOLCHAIN={}", toolchain());
     let out = std::env::var("OUT_DIR").expect("cargo sets OUT_DIR");
     let list = dependencies(Path::new("../../Cargo.lock")).unwrap_or_default();
     std::fs::write(Path::new(&out).join("dependencies.txt"), list).expect("OUT_DIR can be written");
@@ -31,6 +32,15 @@ fn commit() -> String {
     } else {
         format!("{commit} with changes")
     }
+}
+
+/// Version of the compiler, and the platform that it builds for.
+fn toolchain() -> String {
+    let compiler = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_owned());
+    let output = Command::new(compiler).arg("--version").output().ok();
+    let version = output.and_then(|o| String::from_utf8(o.stdout).ok());
+    let version = version.map_or("unknown".to_owned(), |v| v.trim().to_owned());
+    format!("{version}, {}", std::env::var("TARGET").unwrap_or_default())
 }
 
 fn git(arguments: &[&str]) -> Option<String> {

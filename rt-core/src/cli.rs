@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use stylet_lab::args::LatencyArgs;
 use stylet_lab::load::LoadProcess;
+use stylet_lab::verify::VerifyArgs;
 use stylet_manual::ManualArgs;
 use stylet_runtime::args::{OptionsError, RealTimeArgs, scenes};
 use stylet_runtime::device::{self, DeviceChoice};
@@ -33,11 +34,8 @@ pub struct Cli {
 pub enum Task {
     /// Measure how late the loops are on this machine, and write a report with a verdict
     Latency(Box<LatencyArgs>),
-    /// Verify that a saved latency report is unaltered
-    Verify {
-        /// The folder of the report, or its report.json
-        report: PathBuf,
-    },
+    /// Verify that a saved latency report is unaltered, who signed it, and which programs it is of
+    Verify(VerifyArgs),
     /// Check whether this PC is fit for the force loop, and what to change
     Doctor {
         /// As JSON

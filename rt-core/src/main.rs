@@ -27,7 +27,7 @@ fn carry_out(cli: &Cli) -> Result<u8, Box<dyn Error>> {
     Ok(match &cli.task {
         None => run(&cli.run).map(|()| 0)?,
         Some(Task::Latency(args)) => latency::run(args, &*stop_on_signal()?)?,
-        Some(Task::Verify { report }) => verify::run(report)?,
+        Some(Task::Verify(args)) => verify::run(args)?,
         Some(Task::Doctor { json, haptic_core }) => doctor::run(*json, *haptic_core),
         Some(Task::Replay(replay)) => u8::from(!replay.run()?),
         #[cfg(feature = "study")]

@@ -4,6 +4,7 @@ use crate::compare::Against;
 use crate::load::Load;
 use crate::machine::{Machine, Throttle};
 use crate::measure;
+use crate::whose::WhoseArgs;
 use clap::Args;
 use std::path::PathBuf;
 use stylet_runtime::args::RealTimeArgs;
@@ -39,6 +40,8 @@ pub struct LatencyArgs {
     /// Folder for report.json, report.html and histograms.hlog
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    #[command(flatten)]
+    pub(crate) whose: WhoseArgs,
     #[command(flatten)]
     real_time: RealTimeArgs,
 }

@@ -3,11 +3,11 @@
 use crate::html;
 use crate::measure::Measured;
 use crate::plots::DrawError;
+use crate::provenance::sha256;
 use crate::report::{FileDigest, HISTOGRAMS, JSON, NO_DIGEST, PAGE, Report};
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::{IntervalLogWriterBuilder, Tag};
-use sha2::{Digest, Sha256};
 use std::path::Path;
 use std::time::Duration;
 use stylet_write::write_whole;
@@ -45,11 +45,6 @@ pub fn write(folder: &Path, report: &mut Report, measured: &Measured) -> Result<
     report.sha256 = sha256(json.as_bytes());
     put(JSON, json.replacen(NO_DIGEST, &report.sha256, 1).as_bytes())?;
     put(PAGE, page.replacen(NO_DIGEST, &report.sha256, 1).as_bytes())
-}
-
-/// SHA-256 of `bytes` as 64 lower-case hexadecimal digits.
-pub fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Every histogram in the interval log format of HdrHistogram, nanoseconds, one tagged line each.

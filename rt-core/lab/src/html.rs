@@ -62,6 +62,7 @@ fn header(r: &Report) -> Markup {
             " Hz, load " b { (load) } " (" (p.load_is) "), " b { (num(p.measured_s.round())) " s" } " measured, "
             (p.insertions) " insertions. " (r.made_at) ", " (r.program) "."
         }
+        @if let Some(whose) = whose(r) { p class="sub" { (whose) } }
         @if r.environment.qualified {
             p class="note" { "Environment qualified: no reason was found to doubt the tail." }
         } @else {
@@ -73,6 +74,17 @@ fn header(r: &Report) -> Markup {
             }
         }
     }
+}
+
+/// Who measured, where, with which device; as far as it was named.
+fn whose(r: &Report) -> Option<String> {
+    let w = &r.whose;
+    let serial = w.device_serial.as_ref().map(|s| format!("device {s}"));
+    let named: Vec<String> = [w.operator.clone(), w.site.clone(), serial]
+        .into_iter()
+        .flatten()
+        .collect();
+    (!named.is_empty()).then(|| format!("{}.", named.join(", ")))
 }
 
 fn key_figures(r: &Report) -> Markup {

@@ -6,12 +6,14 @@ use crate::files;
 use crate::machine::Machine;
 use crate::measure::{Setup, measure};
 use crate::report::{self, JSON, PAGE, Parts, Report};
+use crate::sign;
 use crate::verdict::{self, Outcome};
 use std::sync::atomic::AtomicBool;
 
 /// The exit code is the verdict: 0 pass, 1 fail, 2 not measurable.
 pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
     let options = args.options()?;
+    let whose = args.whose.read().map_err(|e| e.to_string())?;
     let limits = verdict::limits(options.haptic_period_ns, args.limits.as_deref(), &args.limit)?;
     std::fs::create_dir_all(&args.out).map_err(|e| format!("cannot make {}: {e}", args.out.display()))?;
     let setup = Setup {
@@ -48,11 +50,18 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
         measured: &measured,
         comparison,
         machine: &machine,
+        whose: &whose,
     });
+    // A signature of an earlier report in the same folder is none of this one.
+    let json = args.out.join(JSON);
+    let _ = std::fs::remove_file(sign::signature_of(&json));
     files::write(&args.out, &mut report, &measured).map_err(|e| e.to_string())?;
     print_verdict(&report);
     println!("{}", args.out.join(PAGE).display());
-    println!("{}", args.out.join(JSON).display());
+    println!("{}", json.display());
+    if let Some(key) = &whose.sign {
+        println!("{}", sign::sign(&json, key).map_err(|e| e.to_string())?.display());
+    }
     Ok(report.verdict.overall.exit_code())
 }
 

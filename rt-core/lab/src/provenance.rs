@@ -2,12 +2,44 @@
 
 use crate::machine::{Machine, Throttle, core_list};
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 use stylet_hw::sim::hand::Hand;
 use stylet_runtime::process::{LoopReport, Options, RunReport};
 use stylet_shm_schema::{ParameterId, ParameterSet};
 
 /// Commit of the sources, `unknown` where they were built without git.
 pub const COMMIT: &str = env!("STYLET_COMMIT");
+
+/// Compiler that built the program.
+const TOOLCHAIN: &str = env!("STYLET_TOOLCHAIN");
+
+/// A program of Stylet on this machine.
+#[derive(Clone, Debug, Serialize)]
+pub struct ProgramDigest {
+    pub name: String,
+    pub sha256: String,
+}
+
+/// This program, and the window that is installed beside it.
+pub fn programs() -> Vec<ProgramDigest> {
+    let Ok(own) = std::env::current_exe() else {
+        return Vec::new();
+    };
+    let all = [own.clone(), own.with_file_name("host-ui")];
+    let digest = |path: &std::path::PathBuf| {
+        let bytes = std::fs::read(path).ok()?;
+        Some(ProgramDigest {
+            name: path.file_name()?.to_string_lossy().into_owned(),
+            sha256: sha256(&bytes),
+        })
+    };
+    all.iter().filter_map(digest).collect()
+}
+
+/// SHA-256 of `bytes` as 64 lower-case hexadecimal digits.
+pub fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
 
 /// One property of the machine or of the program, as reported by it.
 #[derive(Clone, Debug, Serialize)]
@@ -89,6 +121,16 @@ fn or_not_reported(value: Option<String>) -> String {
         .unwrap_or_else(|| "not reported".to_owned())
 }
 
+/// What the firmware reports about the PC; a serial number is readable with root's rights alone.
+const DMI: [(&str, &str); 6] = [
+    ("maker", "sys_vendor"),
+    ("model", "product_name"),
+    ("serial number", "product_serial"),
+    ("board", "board_name"),
+    ("firmware maker", "bios_vendor"),
+    ("firmware date", "bios_date"),
+];
+
 /// Properties that the machine reports about itself.
 pub fn facts(machine: &Machine, options: &Options) -> Vec<Fact> {
     let mut facts = Vec::new();
@@ -100,6 +142,11 @@ pub fn facts(machine: &Machine, options: &Options) -> Vec<Fact> {
         });
     };
     let text = |path: &str| or_not_reported(machine.text(path));
+    add("Program", "toolchain", TOOLCHAIN.to_owned());
+    add("PC", "name", text("proc/sys/kernel/hostname"));
+    for (what, file) in DMI {
+        add("PC", what, text(&format!("sys/class/dmi/id/{file}")));
+    }
     add("Kernel", "version", text("proc/version"));
     add("Kernel", "preemption", machine.preemption().name().to_owned());
     add("Kernel", "command line", text("proc/cmdline"));

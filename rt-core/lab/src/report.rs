@@ -8,10 +8,11 @@ use crate::bound::MissBound;
 use crate::compare::Comparison;
 use crate::extreme::Extremes;
 use crate::load::Load;
-use crate::provenance::{Dependency, Fact, Setting};
+use crate::provenance::{Dependency, Fact, ProgramDigest, Setting};
 use crate::summary::Summary;
 use crate::verdict::{LimitResult, Outcome};
 use crate::watch::CoreWatch;
+use crate::whose::Whose;
 use serde::Serialize;
 
 /// Version of the format: it rises when a field changes its meaning or is removed.
@@ -141,6 +142,9 @@ pub struct Report {
     pub program: String,
     pub commit: &'static str,
     pub command: Vec<String>,
+    /// Reports of older versions have neither this nor `programs`.
+    pub whose: Whose,
+    pub programs: Vec<ProgramDigest>,
     pub protocol: Protocol,
     pub verdict: Verdict,
     pub environment: Environment,

@@ -1,49 +1,127 @@
-//! Verifies that a saved report is unaltered. It finds damage and careless edits; it is not a signature.
+//! Verifies that a saved report is unaltered, who signed it, and which programs it is of.
 
-use crate::files::sha256;
+use crate::provenance::sha256;
 use crate::report::{JSON, NO_DIGEST};
+use crate::sign::{self, SignError};
+use clap::Args;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
+
+/// What to verify.
+#[derive(Args, Clone, Debug)]
+pub struct VerifyArgs {
+    /// The folder of the report, or its report.json
+    pub report: PathBuf,
+    /// Who may sign: OpenSSH's file of allowed signers, a line `NAME ssh-ed25519 KEY` for each. The report must then be signed
+    #[arg(long, value_name = "FILE")]
+    pub allowed_signers: Option<PathBuf>,
+    /// Program that the report must be of, rt-core or host-ui; may be given for both
+    #[arg(long, value_name = "FILE")]
+    pub binary: Vec<PathBuf>,
+}
 
 /// The report cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot read {}: {source}", .path.display())]
 pub struct ReadError {
-    /// `report.json` of the report.
+    /// `report.json`, or a program.
     pub path: PathBuf,
     /// What the system reports.
     pub source: std::io::Error,
 }
 
-/// Checks the report at `place`, its folder or its `report.json`, and prints every problem.
+/// Checks the report, and prints every problem; without one, who signed the report.
 ///
-/// Returns 0 when the report is unaltered, else 1.
+/// Returns 0 when the report is unaltered and is what was asked for, else 1.
 ///
 /// # Errors
-/// `report.json` cannot be read.
-pub fn run(place: &Path) -> Result<u8, ReadError> {
-    let file = if place.is_dir() {
-        place.join(JSON)
+/// `report.json` or a named program cannot be read.
+pub fn run(args: &VerifyArgs) -> Result<u8, ReadError> {
+    let file = if args.report.is_dir() {
+        args.report.join(JSON)
     } else {
-        place.to_owned()
+        args.report.clone()
     };
-    let text = std::fs::read_to_string(&file).map_err(|source| ReadError {
-        path: file.clone(),
-        source,
-    })?;
+    let bytes = read(&file)?;
+    // Damage may leave what is not text; it then differs from its digest.
+    let text = String::from_utf8_lossy(&bytes);
     let folder = file.parent().unwrap_or(Path::new("."));
-    let problems = problems(&text, |name| std::fs::read(folder.join(name)).ok());
+    let mut problems = problems(&text, |name| std::fs::read(folder.join(name)).ok());
+    let mut notes = Vec::new();
+    match signature(&file, args.allowed_signers.as_deref()) {
+        Ok(note) => notes.push(note),
+        Err(problem) => problems.push(problem),
+    }
+    let report: Value = serde_json::from_str(&text).unwrap_or_default();
+    for binary in &args.binary {
+        problems.extend(other_program(&report, binary, &sha256(&read(binary)?)));
+    }
     for problem in &problems {
         println!("{problem}");
     }
     if problems.is_empty() {
         println!("{}: unaltered", file.display());
+        notes.iter().for_each(|note| println!("{note}"));
     }
     Ok(u8::from(!problems.is_empty()))
 }
 
+fn read(path: &Path) -> Result<Vec<u8>, ReadError> {
+    std::fs::read(path).map_err(|source| ReadError {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// Who signed the report, or what is wrong with its signature.
+fn signature(file: &Path, allowed: Option<&Path>) -> Result<String, String> {
+    let signature = sign::signature_of(file);
+    let name = signature.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    if !signature.exists() {
+        return match allowed {
+            Some(_) => Err(format!("{name}: missing, the report is not signed")),
+            None => Ok("not signed".to_owned()),
+        };
+    }
+    match sign::check(file, allowed) {
+        Ok(signer) => Ok(match signer.person {
+            Some(person) => format!("signed by {person} with {}", signer.key),
+            None => format!(
+                "signed with {}; --allowed-signers FILE names whose key it is",
+                signer.key
+            ),
+        }),
+        // What cannot be checked without the program is a problem only where somebody asks for it.
+        Err(SignError::Missing) if allowed.is_none() => Ok(format!("{name}: not checked: {}", SignError::Missing)),
+        Err(problem) => Err(format!("{name}: {problem}")),
+    }
+}
+
+/// What is wrong where the report is not of the program `binary`.
+fn other_program(report: &Value, binary: &Path, digest: &str) -> Option<String> {
+    let programs = report["programs"].as_array().map_or(&[][..], Vec::as_slice);
+    let text = |program: &Value, key: &str| program[key].as_str().unwrap_or_default().to_owned();
+    if programs.iter().any(|program| text(program, "sha256") == digest) {
+        return None;
+    }
+    let own_name = binary.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let named: Vec<String> = programs
+        .iter()
+        .map(|p| format!("{} {}", text(p, "name"), text(p, "sha256")))
+        .collect();
+    let named = if named.is_empty() {
+        "no program".to_owned()
+    } else {
+        named.join(", ")
+    };
+    Some(format!(
+        "{JSON}: a report of another program: {own_name} has the SHA-256 {digest}, the report names {named}"
+    ))
+}
+
 /// Everything that was altered; `read` returns the content of a file beside the report.
 fn problems(text: &str, read: impl Fn(&str) -> Option<Vec<u8>>) -> Vec<String> {
-    let Ok(report) = serde_json::from_str::<serde_json::Value>(text) else {
+    let Ok(report) = serde_json::from_str::<Value>(text) else {
         return vec![format!("{JSON}: tampered with or damaged, it is not JSON")];
     };
     let digest = report["sha256"].as_str().unwrap_or_default();
@@ -81,45 +159,4 @@ fn problems(text: &str, read: impl Fn(&str) -> Option<Vec<u8>>) -> Vec<String> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const RAW: &[u8] = b"raw data";
-
-    /// A report with one page, digests and all.
-    fn written() -> (String, Vec<u8>) {
-        let page = format!("<p>{NO_DIGEST}</p>");
-        let text = format!(
-            "{{\"sha256\": \"{NO_DIGEST}\", \"max_us\": 48.5, \"files\": [{{\"name\": \"raw\", \"sha256\": \"{}\"}}, \
-             {{\"name\": \"page\", \"sha256\": \"{}\"}}]}}",
-            sha256(RAW),
-            sha256(page.as_bytes())
-        );
-        let digest = sha256(text.as_bytes());
-        let fill = |s: &str| s.replacen(NO_DIGEST, &digest, 1);
-        (fill(&text), fill(&page).into_bytes())
-    }
-
-    fn check(text: &str, raw: Option<&[u8]>, page: &[u8]) -> Vec<String> {
-        problems(text, |name| {
-            if name == "raw" {
-                raw.map(<[u8]>::to_vec)
-            } else {
-                Some(page.to_vec())
-            }
-        })
-    }
-
-    #[test]
-    fn unaltered_report_passes_and_every_change_is_found() {
-        let (text, page) = written();
-        assert_eq!(check(&text, Some(RAW), &page), Vec::<String>::new());
-        let better = text.replace("48.5", "18.5");
-        assert!(check(&better, Some(RAW), &page)[0].contains("report.json: tampered"));
-        assert_eq!(check(&text, Some(b"raw dat4"), &page).len(), 1);
-        assert_eq!(check(&text, None, &page), ["raw: missing"]);
-        assert!(check(&text, Some(RAW), b"<p>other</p>")[0].contains("page: tampered"));
-        assert!(check("{}", None, b"")[0].contains("no SHA-256"));
-        assert!(check("{", None, b"")[0].contains("not JSON"));
-    }
-}
+mod tests;

@@ -128,6 +128,7 @@ pub fn method(r: &Report) -> Markup {
         p class="faint" {
             "Command: " code { (r.command.join(" ")) } br;
             "Commit: " code { (r.commit) } ", schema " (r.schema)
+            @for program in &r.programs { br; "SHA-256 of " (program.name) ": " code { (program.sha256) } }
         }
     }
 }

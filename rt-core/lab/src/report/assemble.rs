@@ -16,6 +16,7 @@ use crate::provenance;
 use crate::sample::PARTS;
 use crate::summary::{Summary, quantile_us, summary};
 use crate::verdict::{self, Limits};
+use crate::whose::Whose;
 use hdrhistogram::Histogram;
 use stylet_runtime::process::{LoopReport, Options};
 
@@ -28,6 +29,7 @@ pub struct Parts<'a> {
     pub measured: &'a Measured,
     pub comparison: Option<Comparison>,
     pub machine: &'a Machine,
+    pub whose: &'a Whose,
 }
 
 /// Puts a report together; digests are still missing.
@@ -49,6 +51,8 @@ pub fn report(parts: &Parts) -> Report {
         program: format!("rt-core {}", env!("CARGO_PKG_VERSION")),
         commit: provenance::COMMIT,
         command: std::env::args().collect(),
+        whose: parts.whose.clone(),
+        programs: provenance::programs(),
         protocol: Protocol {
             scene: options.scene.clone(),
             load: parts.load,

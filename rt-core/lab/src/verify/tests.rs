@@ -1,0 +1,222 @@
+//! Every change is found and named: a byte, a key, a program.
+
+use super::*;
+
+const RAW: &[u8] = b"raw data";
+
+/// A report with one page, digests and all.
+fn written() -> (String, Vec<u8>) {
+    let page = format!("<p>{NO_DIGEST}</p>");
+    let text = format!(
+        "{{\"sha256\": \"{NO_DIGEST}\", \"max_us\": 48.5, \"files\": [{{\"name\": \"raw\", \"sha256\": \"{}\"}}, \
+         {{\"name\": \"page\", \"sha256\": \"{}\"}}]}}",
+        sha256(RAW),
+        sha256(page.as_bytes())
+    );
+    let digest = sha256(text.as_bytes());
+    let fill = |s: &str| s.replacen(NO_DIGEST, &digest, 1);
+    (fill(&text), fill(&page).into_bytes())
+}
+
+fn check(text: &str, raw: Option<&[u8]>, page: &[u8]) -> Vec<String> {
+    problems(text, |name| {
+        if name == "raw" {
+            raw.map(<[u8]>::to_vec)
+        } else {
+            Some(page.to_vec())
+        }
+    })
+}
+
+#[test]
+fn unaltered_report_passes_and_every_change_is_found() {
+    let (text, page) = written();
+    assert_eq!(check(&text, Some(RAW), &page), Vec::<String>::new());
+    let better = text.replace("48.5", "18.5");
+    assert!(check(&better, Some(RAW), &page)[0].contains("report.json: tampered"));
+    assert_eq!(check(&text, Some(b"raw dat4"), &page).len(), 1);
+    assert_eq!(check(&text, None, &page), ["raw: missing"]);
+    assert!(check(&text, Some(RAW), b"<p>other</p>")[0].contains("page: tampered"));
+    assert!(check("{}", None, b"")[0].contains("no SHA-256"));
+    assert!(check("{", None, b"")[0].contains("not JSON"));
+}
+
+/// A report in a folder of its own, with two keys: that of A. Meyer, who may sign, and another.
+struct Signed {
+    folder: PathBuf,
+}
+
+impl Signed {
+    /// `None` where ssh-keygen is not installed.
+    fn new(name: &str) -> Option<Self> {
+        let folder = std::env::temp_dir().join(format!("stylet-signed-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(&folder).expect("the temporary folder can be written");
+        let signed = Self { folder };
+        for key in ["meyer", "other"] {
+            let made = std::process::Command::new("ssh-keygen")
+                .args(["-q", "-t", "ed25519", "-N", "", "-C", key, "-f"])
+                .arg(signed.path(key))
+                .status();
+            if made.is_err() {
+                println!("skipped: ssh-keygen is not installed");
+                return None;
+            }
+        }
+        let public = std::fs::read_to_string(signed.path("meyer.pub")).expect("a public key");
+        std::fs::write(signed.path("allowed"), format!("a.meyer@site {public}")).expect("written");
+        let (text, page) = written();
+        let text = text.replacen(
+            '{',
+            "{\"programs\": [{\"name\": \"rt-core\", \"sha256\": \"0123\"}], ",
+            1,
+        );
+        let digest = sha256(text.replacen(&text_digest(&text), NO_DIGEST, 1).as_bytes());
+        let old = text_digest(&text);
+        signed.put(JSON, text.replacen(&old, &digest, 1).as_bytes());
+        signed.put("raw", RAW);
+        signed.put(
+            "page",
+            String::from_utf8(page)
+                .expect("text")
+                .replacen(&old, &digest, 1)
+                .as_bytes(),
+        );
+        sign::sign(&signed.path(JSON), &signed.path("meyer")).expect("the key signs");
+        Some(signed)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    fn put(&self, name: &str, bytes: &[u8]) {
+        std::fs::write(self.path(name), bytes).expect("the folder can be written");
+    }
+
+    /// Changes the byte in the middle of a file for the time of `then`.
+    fn flipped(&self, name: &str, then: impl FnOnce()) {
+        let whole = std::fs::read(self.path(name)).expect("a file");
+        let mut flipped = whole.clone();
+        flipped[whole.len() / 2] ^= 1;
+        self.put(name, &flipped);
+        then();
+        self.put(name, &whole);
+    }
+
+    fn args(&self) -> VerifyArgs {
+        VerifyArgs {
+            report: self.folder.clone(),
+            allowed_signers: Some(self.path("allowed")),
+            binary: Vec::new(),
+        }
+    }
+
+    fn signature(&self) -> Result<String, String> {
+        signature(&self.path(JSON), Some(&self.path("allowed")))
+    }
+}
+
+impl Drop for Signed {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.folder);
+    }
+}
+
+fn text_digest(text: &str) -> String {
+    let report: Value = serde_json::from_str(text).expect("JSON");
+    report["sha256"].as_str().expect("a digest").to_owned()
+}
+
+#[test]
+fn signature_names_person_and_key() {
+    let Some(signed) = Signed::new("good") else { return };
+    let said = signed.signature().expect("a good signature");
+    assert!(
+        said.starts_with("signed by a.meyer@site with ED25519 key SHA256:"),
+        "{said}"
+    );
+    // Oracle: the fingerprint as ssh-keygen -l prints it.
+    let listed = std::process::Command::new("ssh-keygen")
+        .arg("-lf")
+        .arg(signed.path("meyer.pub"))
+        .output()
+        .expect("runs");
+    let listed = String::from_utf8_lossy(&listed.stdout).into_owned();
+    assert!(
+        said.ends_with(listed.split(' ').nth(1).expect("a fingerprint")),
+        "{said} {listed}"
+    );
+    assert_eq!(run(&signed.args()).expect("readable"), 0);
+    let unnamed = signature(&signed.path(JSON), None).expect("a good signature");
+    assert!(unnamed.starts_with("signed with ED25519 key SHA256:") && unnamed.contains("--allowed-signers"));
+}
+
+#[test]
+fn one_flipped_byte_is_found_in_each_file_and_named() {
+    let Some(signed) = Signed::new("flipped") else { return };
+    let found = || {
+        let bytes = std::fs::read(signed.path(JSON)).expect("a report");
+        problems(&String::from_utf8_lossy(&bytes), |name| {
+            std::fs::read(signed.path(name)).ok()
+        })
+    };
+    for name in ["raw", "page", JSON] {
+        signed.flipped(name, || {
+            assert_eq!(run(&signed.args()).expect("readable"), 1, "{name}");
+            assert!(
+                found().iter().any(|problem| problem.starts_with(name)),
+                "{name}: {:?}",
+                found()
+            );
+        });
+    }
+    signed.flipped(JSON, || {
+        let why = signed.signature().expect_err("another report");
+        assert!(
+            why.starts_with("report.json.sig: the signature is not one of this report.json"),
+            "{why}"
+        );
+    });
+    signed.flipped("report.json.sig", || {
+        let why = signed.signature().expect_err("no signature");
+        assert!(why.starts_with("report.json.sig: "), "{why}");
+    });
+    assert_eq!((found(), run(&signed.args()).expect("readable")), (Vec::new(), 0));
+}
+
+#[test]
+fn wrong_key_and_missing_signature_are_named() {
+    let Some(signed) = Signed::new("key") else { return };
+    sign::sign(&signed.path(JSON), &signed.path("other")).expect("the key signs");
+    let why = signed.signature().expect_err("not allowed");
+    assert!(
+        why.contains("wrong key: signed with ED25519 key SHA256:") && why.contains("allowed does not list"),
+        "{why}"
+    );
+    assert_eq!(run(&signed.args()).expect("readable"), 1);
+    std::fs::remove_file(signed.path("report.json.sig")).expect("removed");
+    assert!(signed.signature().expect_err("none").contains("not signed"));
+    assert_eq!(signature(&signed.path(JSON), None).as_deref(), Ok("not signed"));
+    // A key that is none.
+    signed.put("meyer", b"no key");
+    let why = sign::sign(&signed.path(JSON), &signed.path("meyer"))
+        .expect_err("no key")
+        .to_string();
+    assert!(why.contains("cannot sign the report"), "{why}");
+}
+
+#[test]
+fn report_of_another_program_is_named() {
+    let report = serde_json::json!({"programs": [{"name": "rt-core", "sha256": "0123"}]});
+    assert_eq!(other_program(&report, Path::new("bin/rt-core"), "0123"), None);
+    let why = other_program(&report, Path::new("bin/rt-core"), "4567").expect("another one");
+    assert!(
+        why.contains("rt-core has the SHA-256 4567, the report names rt-core 0123"),
+        "{why}"
+    );
+    // Reports of older versions name none.
+    assert!(
+        other_program(&Value::Null, Path::new("rt-core"), "4567").is_some_and(|why| why.contains("names no program"))
+    );
+}
