@@ -89,7 +89,8 @@ impl DoseStructure {
         }
     }
 
-    fn metrics(self, prescription_gy: f64) -> Vec<(Metric, Option<Limit>)> {
+    /// Measures of the structure, with the limits of those that have one.
+    pub(crate) fn metrics(self, prescription_gy: f64) -> Vec<(Metric, Option<Limit>)> {
         let dose = |share: f64| Metric::DoseToShare(share);
         let volume = |share: f64| Metric::VolumeAtShare(share);
         match self {

@@ -29,6 +29,23 @@ pub struct Edema {
     pub half_life_s: f64,
 }
 
+/// Swelling of a gland that was imaged without it, and the source whose dose it changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Swelling {
+    /// The swelling.
+    pub edema: Edema,
+    /// Half-life of the source, in s.
+    pub half_life_s: f64,
+}
+
+impl Swelling {
+    /// Dose of seeds at points, both as in the gland without edema (Gy); `kernel` is for all time.
+    pub fn dose_gy(self, kernel: &DoseKernel, seeds: &[Seed], points: &DosePoints) -> Vec<f64> {
+        self.edema
+            .dose_at_gy(kernel, self.half_life_s, f64::INFINITY, seeds, points)
+    }
+}
+
 impl Edema {
     /// From a half-life in days.
     pub fn of_days(magnitude: f64, half_life_days: f64) -> Self {
@@ -62,21 +79,28 @@ impl Edema {
         seeds: &[Seed],
         points_m: &[[f64; 3]],
     ) -> Vec<f64> {
-        let count = points_m.len().max(1) as f64;
-        let middle_m = [0, 1, 2].map(|a| points_m.iter().map(|p| p[a]).sum::<f64>() / count);
+        self.dose_at_gy(kernel, half_life_s, seen_s, seeds, &DosePoints::new(points_m))
+    }
+
+    /// As [`Edema::dose_gy`], at points that are ready.
+    pub fn dose_at_gy(
+        self,
+        kernel: &DoseKernel,
+        half_life_s: f64,
+        seen_s: f64,
+        seeds: &[Seed],
+        points: &DosePoints,
+    ) -> Vec<f64> {
         let seen = self.stretch(seen_s);
-        let mut dose_gy = vec![0.0; points_m.len()];
+        let mut dose_gy = vec![0.0; points.dose_gy().len()];
         for (after_s, share) in Self::moments(half_life_s) {
             let by = self.stretch(after_s) / seen;
-            let moved = |p: [f64; 3]| [0, 1, 2].map(|a| middle_m[a] + (p[a] - middle_m[a]) * by);
             let seed = |s: &Seed| Seed {
-                position_m: moved(s.position_m),
                 strength_u: s.strength_u * share,
                 ..*s
             };
             let seeds: Vec<Seed> = seeds.iter().map(seed).collect();
-            let points: Vec<[f64; 3]> = points_m.iter().map(|p| moved(*p)).collect();
-            let of_moment = DosePoints::new(&points).of_seeds_gy(kernel, &seeds);
+            let of_moment = points.of_seeds_stretched_gy(kernel, &seeds, by);
             dose_gy.iter_mut().zip(of_moment).for_each(|(sum, gy)| *sum += gy);
         }
         dose_gy

@@ -5,6 +5,7 @@
 #![warn(missing_docs)]
 
 pub mod criteria;
+pub mod criterion;
 pub mod curve;
 pub mod decay;
 pub mod dvh;

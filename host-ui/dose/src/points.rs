@@ -80,6 +80,25 @@ impl DosePoints {
         dose_gy
     }
 
+    /// Dose of seeds alone once every distance, among the points and to the seeds, is `by` times as long.
+    pub fn of_seeds_stretched_gy(&self, kernel: &DoseKernel, seeds: &[Seed], by: f64) -> Vec<f64> {
+        let stretched = Self {
+            blocks: self
+                .blocks
+                .iter()
+                .map(|axes| axes.map(|axis| axis.map(|v| v * by as f32)))
+                .collect(),
+            anchor_m: self.anchor_m,
+            dose_gy: vec![0.0; self.dose_gy.len()],
+        };
+        let moved = |s: &Seed| Seed {
+            position_m: [0, 1, 2].map(|a| self.anchor_m[a] + (s.position_m[a] - self.anchor_m[a]) * by),
+            ..*s
+        };
+        let seeds: Vec<Seed> = seeds.iter().map(moved).collect();
+        stretched.of_seeds_gy(kernel, &seeds)
+    }
+
     fn place(&self, seeds: &[Seed]) -> Vec<Placed> {
         seeds.iter().map(|s| DoseKernel::place(s, self.anchor_m)).collect()
     }

@@ -1,6 +1,8 @@
 //! What a plan is judged by: the measures of each structure, homogeneity and conformity of the target.
 
 use super::Dvh;
+use super::criterion::Criterion;
+use super::edema::Swelling;
 use super::error::DoseError;
 use super::kernel::DoseKernel;
 use super::metric::{Metric, Value};
@@ -94,6 +96,14 @@ impl Judge {
         self.judge_reporting(kernel, seeds, &|_| ())
     }
 
+    /// As [`Judge::judge`], in a gland that swells at the implant where a swelling is given; `kernel` is then for all time.
+    pub fn judge_swollen(&self, kernel: &DoseKernel, seeds: &[Seed], swelling: Option<Swelling>) -> Verdict {
+        match swelling {
+            Some(swelling) => self.judge_by(&|points| swelling.dose_gy(kernel, seeds, points)),
+            None => self.judge(kernel, seeds),
+        }
+    }
+
     /// Points that the dose is computed at.
     pub fn points(&self) -> u64 {
         let in_structures = self.structures.iter().map(|s| s.volumes_m3.len());
@@ -102,21 +112,24 @@ impl Judge {
 
     /// As [`Judge::judge`]; `done` is called with the number of points done since, from any thread.
     pub fn judge_reporting(&self, kernel: &DoseKernel, seeds: &[Seed], done: &(dyn Fn(u64) + Sync)) -> Verdict {
+        self.judge_by(&|points| points.of_seeds_reporting(kernel, seeds, done))
+    }
+
+    fn judge_by(&self, dose_gy: &dyn Fn(&DosePoints) -> Vec<f64>) -> Verdict {
         let dvhs: Vec<Dvh> = self
             .structures
             .iter()
-            .filter_map(|s| Dvh::new(&s.points.of_seeds_reporting(kernel, seeds, done), &s.volumes_m3))
+            .filter_map(|s| Dvh::new(&dose_gy(&s.points), &s.volumes_m3))
             .collect();
-        let fit = self.fit(&dvhs[self.target], kernel, seeds, done);
+        let fit = self.fit(&dvhs[self.target], &dose_gy(&self.around.points));
         Verdict { dvhs, fit }
     }
 
-    fn fit(&self, target: &Dvh, kernel: &DoseKernel, seeds: &[Seed], done: &(dyn Fn(u64) + Sync)) -> Fit {
+    fn fit(&self, target: &Dvh, dose: &[f64]) -> Fit {
         let (v100, v150) = (
             target.at_least_m3(self.prescription_gy),
             target.at_least_m3(1.5 * self.prescription_gy),
         );
-        let dose = self.around.points.of_seeds_reporting(kernel, seeds, done);
         let reached = |d: &f64| *d >= self.prescription_gy;
         let inside = !self.around.outermost.iter().any(|&i| reached(&dose[i]));
         let at_prescription_m3 =
@@ -152,6 +165,12 @@ impl Judge {
     /// Names of the structures, in the order of the histograms.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.structures.iter().map(|s| s.name.as_str())
+    }
+
+    /// What is asked of the structures with a role by [`Criterion::of_structure`].
+    pub fn criteria(&self) -> Vec<Criterion> {
+        let of = |(i, s): (usize, &Judged)| Criterion::of_structure(&s.name, i == self.target, self.prescription_gy);
+        self.structures.iter().enumerate().flat_map(of).collect()
     }
 
     /// Name of the structure that the prescription is for.

@@ -1,17 +1,15 @@
-//! `host-ui dose` and `host-ui perturb`.
+//! `host-ui dose`.
 
 use super::CommandError;
 use clap::Args;
 use common::{Common, Loaded, within};
-use serde_json::json;
 use std::path::{Path, PathBuf};
-use stylet_base::interrupt::Interrupt;
 use stylet_base::output::new_folder;
 use stylet_base::progress_bar::LongTask;
 use stylet_base::write_whole;
 use stylet_dose::kernel::DoseKernel;
 use stylet_dose::seed::Seed;
-use stylet_dose::{DoseGrid, DosePoints, perturb, picture, structure};
+use stylet_dose::{DoseGrid, DosePoints, picture, structure};
 use stylet_implant::provenance;
 use stylet_implant::readers::read_points;
 use stylet_implant::sheet::{self, Column, Implant, State};
@@ -20,10 +18,8 @@ pub mod common;
 pub mod write;
 
 pub const POINTS_FOR_DOSE: usize = 300_000;
-const POINTS_FOR_A_TRIAL: usize = 40_000;
 /// The grid reaches this far beyond the outermost seeds.
 const GRID_MARGIN_M: f64 = 0.02;
-const MAX_TRIALS: u64 = 1_000_000;
 
 const DOSE_HELP: &str = "\
 Units: positions in mm (any frame, the same for all files; structures are in patient RAS), dose in Gy, air kerma strength in U
@@ -43,17 +39,6 @@ Examples:
 
 Written to --out, a new or empty folder: dose_points.csv; dvh.csv, dvh.svg, metrics.json and report.html (one page by TG-137, A4);
 dose_grid.csv when neither points nor structures are given; made.json, which names every input with its SHA-256, the version and the time.";
-
-const PERTURB_HELP: &str = "\
-Every trial moves each seed by a normal error of --sigma-mm along x, y and z, keeps its axis and strength, and computes all metrics
-again. The same --seed gives the same trials on any number of cores. Ctrl-C ends early and writes the trials done so far.
-
-Example, with the settings of published studies (4 mm, 1000 trials); its figures are those of your plan:
-  host-ui perturb --source sources/i125_6711.toml --plan seeds.csv --strength-u 0.5 --structures gland.nii.gz \\
-      --name 1=Prostate --name 2=Urethra --name 3=Rectum --sigma-mm 4 --trials 1000 --out perturb
-
-Written to --out, a new or empty folder: trials.csv (one line a trial), distribution.csv and distribution.json (planned, mean, sd,
-p5 to p95), made.json (inputs with their SHA-256, version, time).";
 
 #[derive(Args, Debug)]
 #[command(after_long_help = DOSE_HELP)]
@@ -77,28 +62,6 @@ pub struct DoseArgs {
     bin_gy: f64,
 }
 
-#[derive(Args, Debug)]
-#[command(after_long_help = PERTURB_HELP)]
-pub struct PerturbArgs {
-    #[command(flatten)]
-    common: Common,
-    /// Planned seeds: CSV, a plan of host-ui (.toml), or a DICOM RT Plan; see `host-ui dose --help`
-    #[arg(long, value_name = "FILE")]
-    plan: PathBuf,
-    /// Structures: NIfTI-1, NRRD, MetaImage or a DICOM RT Structure Set
-    #[arg(long, value_name = "FILE")]
-    structures: PathBuf,
-    /// Standard deviation of a seed's error along each axis
-    #[arg(long, value_name = "MM", default_value_t = 4.0)]
-    sigma_mm: f64,
-    /// Number of trials, each with its own random errors
-    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=MAX_TRIALS))]
-    trials: u64,
-    /// Seed of the random numbers
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-}
-
 impl DoseArgs {
     pub fn run(self) -> Result<(), CommandError> {
         let c = &self.common;
@@ -114,7 +77,7 @@ impl DoseArgs {
             .transpose()?;
         let judge = structures
             .clone()
-            .map(|(structures, _)| c.judge_of(structures, &loaded, POINTS_FOR_DOSE))
+            .map(|(structures, _)| c.judge_of(structures, &loaded, &[], POINTS_FOR_DOSE))
             .transpose()?;
         new_folder(&c.out)?;
         let judged = judge.map(|judge| {
@@ -189,53 +152,6 @@ impl DoseArgs {
 pub fn file_name(path: &Path) -> String {
     path.file_name()
         .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
-}
-
-impl PerturbArgs {
-    pub fn run(self) -> Result<(), CommandError> {
-        let c = &self.common;
-        within("--sigma-mm", self.sigma_mm, 0.0, 100.0)?;
-        let loaded = c.load(&self.plan)?;
-        let (source, kernel, plan) = (&loaded.source, &loaded.kernel, &loaded.seeds);
-        let judge = c.judge(&self.structures, &loaded, POINTS_FOR_A_TRIAL)?;
-        let how = perturb::Perturbation {
-            sigma_m: self.sigma_mm * 1e-3,
-            trials: self.trials as usize,
-            random_seed: self.seed,
-        };
-        let stop = Interrupt::on_signals()?;
-        new_folder(&c.out)?;
-        let planned = judge.values(&judge.judge(kernel, plan));
-        let task = LongTask::new(self.trials, "trials");
-        let trials = perturb::trials(&judge, kernel, plan, how, &stop, || task.advance(1));
-        drop(task);
-        if trials.is_empty() {
-            return Err("stopped before the first trial was done; nothing is written".into());
-        }
-        let spreads = perturb::spreads(&planned, &trials);
-        write::trials(&c.out.join("trials.csv"), &planned, &trials)?;
-        write::distribution(&c.out.join("distribution.csv"), &spreads)?;
-        let mut result = write::spreads_json(&spreads);
-        result["dose"] = c.provenance(source, plan);
-        result["sigma_mm"] = json!(self.sigma_mm);
-        result["random_seed"] = json!(self.seed);
-        result["trials"] = json!(trials.len());
-        result["trials_asked"] = json!(self.trials);
-        let inputs: [(&str, &Path); 3] = [
-            ("--source", &c.source),
-            ("--plan", &self.plan),
-            ("--structures", &self.structures),
-        ];
-        result["made"] = provenance::made(&inputs)?;
-        write::json(&c.out.join("made.json"), &result["made"])?;
-        write::json(&c.out.join("distribution.json"), &result)?;
-        print!("{}", write::spread_table(&spreads));
-        if trials.len() < how.trials {
-            println!("stopped after {} of {} trials", trials.len(), how.trials);
-        }
-        println!("written: {}", c.out.display());
-        Ok(())
-    }
 }
 
 /// Dose on a grid around the seeds, and around a box (m) where one is given; with progress.

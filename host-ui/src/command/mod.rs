@@ -8,6 +8,7 @@ pub mod convert;
 pub mod dicom;
 pub mod dose;
 pub mod find_seeds;
+pub mod perturb;
 pub mod plan;
 pub mod post_implant;
 pub mod study;

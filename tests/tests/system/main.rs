@@ -9,6 +9,7 @@ mod formats;
 mod insertion;
 mod kill;
 mod lab_latency;
+mod perturb_cli;
 mod plan_compensation;
 mod plan_optimised;
 mod plan_rehearsal;

@@ -156,20 +156,27 @@ impl Common {
 
     pub fn judge(&self, file: &Path, loaded: &Loaded, most_points: usize) -> Result<Judge, CommandError> {
         let (structures, _) = self.structures(file, &loaded.seeds, most_points)?;
-        self.judge_of(structures, loaded, most_points)
+        self.judge_of(structures, loaded, &[], most_points)
     }
 
-    /// Structures, ready to be judged with the metrics that were asked for.
+    /// Structures, ready to be judged with the metrics that were asked for and `more`.
     pub fn judge_of(
         &self,
         structures: Vec<Structure>,
         loaded: &Loaded,
+        more: &[Metric],
         most_points: usize,
     ) -> Result<Judge, CommandError> {
+        let mut metrics = self.extra_metrics()?;
+        for metric in more {
+            if !metrics.contains(metric) {
+                metrics.push(*metric);
+            }
+        }
         Ok(Judge::new(
             structures,
             self.target.as_deref(),
-            &self.extra_metrics()?,
+            &metrics,
             self.prescription_gy(loaded)?,
             &loaded.seeds,
             most_points,

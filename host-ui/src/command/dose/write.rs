@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use std::path::Path;
 use stylet_base::{write_streamed, write_whole};
 use stylet_dose::Dvh;
+use stylet_dose::criterion::Kept;
 use stylet_dose::perturb::{PERCENTILES, Spread};
 use stylet_implant::finder::FoundSeed;
 use stylet_implant::readers::seeds::{AXIS, FOUND, PLACE};
@@ -131,7 +132,7 @@ pub fn trials(
 
 pub fn distribution(path: &Path, spreads: &[Spread]) -> Result<(), CommandError> {
     let percentiles = PERCENTILES.map(|p| format!("p{p}"));
-    let header: Vec<String> = owned(&["measure [unit]", "planned", "mean", "sd"])
+    let header: Vec<String> = owned(&["measure [unit]", "planned", "mean", "mean_low", "mean_high", "sd"])
         .into_iter()
         .chain(percentiles)
         .chain(["trials".to_owned()])
@@ -139,7 +140,8 @@ pub fn distribution(path: &Path, spreads: &[Spread]) -> Result<(), CommandError>
     let rows = spreads.iter().map(|s| {
         let planned = s.planned.map_or_else(String::new, |v| format!("{v:.6}"));
         let percentiles = PERCENTILES.iter().enumerate().map(|(i, _)| s.percentiles.map(|p| p[i]));
-        let figures = [s.mean, s.deviation].into_iter().chain(percentiles);
+        let [low, high] = [0, 1].map(|end| s.interval.map(|ends| ends[end]));
+        let figures = [s.mean, low, high, s.deviation].into_iter().chain(percentiles);
         [s.name.clone(), planned]
             .into_iter()
             .chain(figures.map(|v| v.map_or_else(String::new, |v| format!("{v:.6}"))))
@@ -159,7 +161,7 @@ pub fn spreads_json(spreads: &[Spread]) -> Value {
                 .map(|(i, p)| (format!("p{p}"), json!(s.percentiles.map(|all| all[i]))))
                 .collect();
             let value = json!({
-                "planned": s.planned, "mean": s.mean, "sd": s.deviation, "trials": s.defined, "percentiles": percentiles,
+                "planned": s.planned, "mean": s.mean, "mean_interval": s.interval, "sd": s.deviation, "trials": s.defined, "percentiles": percentiles,
             });
             (s.name.clone(), value)
         })
@@ -186,6 +188,43 @@ pub fn spread_table(spreads: &[Spread]) -> String {
             percentile(2),
             percentile(4)
         );
+    }
+    text
+}
+
+/// Share of the trials that meet each criterion, with its 95 % interval.
+pub fn criteria(path: &Path, kept: &[Kept]) -> Result<(), CommandError> {
+    let header = owned(&["criterion", "met", "trials", "percent", "percent_low", "percent_high"]);
+    let rows = kept.iter().map(|k| {
+        let percent = |i: usize| k.share().map_or_else(String::new, |s| format!("{:.4}", s[i] * 100.0));
+        let count = [k.criterion.to_string(), k.met.to_string(), k.of.to_string()];
+        count.into_iter().chain([0, 1, 2].map(percent)).collect()
+    });
+    csv(path, &header, rows)
+}
+
+pub fn criteria_json(kept: &[Kept]) -> Value {
+    let of = |k: &Kept| {
+        let percent = k.share().map(|s| s.map(|share| share * 100.0));
+        json!({
+            "criterion": k.criterion.to_string(), "met": k.met, "trials": k.of,
+            "percent": percent.map(|p| p[0]), "percent_interval": percent.map(|p| [p[1], p[2]]),
+        })
+    };
+    kept.iter().map(of).collect()
+}
+
+pub fn criteria_table(kept: &[Kept]) -> String {
+    let mut text = String::new();
+    for k in kept {
+        let share = k.share().map_or_else(
+            || "defined in no trial".to_owned(),
+            |s| {
+                let [p, low, high] = s.map(|share| share * 100.0);
+                format!("{p:.1} % of trials ({low:.1} to {high:.1})")
+            },
+        );
+        text += &format!("{}: {share}\n", k.criterion);
     }
     text
 }

@@ -17,7 +17,7 @@ pub use figures::{Engine, Figures, Measure};
 
 use super::anatomy::Body;
 use super::dose::criteria::DoseStructure;
-use super::dose::perturb::Perturbation;
+use super::dose::perturb::{Errors, Perturbation};
 use super::dose::{DoseKernel, Source};
 use super::{Anatomy, ImplantPlan, PlanError, Template};
 use annealing::Schedule;
@@ -53,7 +53,7 @@ pub struct Objectives {
 
 /// The mean distance of a seed from its place is about 5 mm in the clinic; 4 mm along each axis is the usual figure for studies.
 const MISPLACEMENT: Perturbation = Perturbation {
-    sigma_m: 4e-3,
+    errors: Errors::of_sigma(4e-3),
     trials: 150,
     random_seed: 11,
 };

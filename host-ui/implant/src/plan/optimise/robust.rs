@@ -26,7 +26,7 @@ impl Trials {
         let target = target.structure(PITCH_M);
         let points = DosePoints::new(&target.points_m);
         let d90_gy = |trial: usize| {
-            let gy = points.of_seeds_gy(kernel, &moved(seeds, how, trial));
+            let gy = points.of_seeds_gy(kernel, &moved(seeds, &[], how, trial));
             let dvh = Dvh::new(&gy, &target.volumes_m3)?;
             dvh.dose_of_gy(0.9 * dvh.volume_m3())
         };

@@ -41,7 +41,7 @@ fn row(gland: &str, method: &str, plan: &ImplantPlan, figures: &Figures, seconds
 /// Over 1,000 trials of 4 mm: share with D90 of at least 90 %, and V150 with the strength that makes it 95 %.
 fn robustness(anatomy: &Anatomy, engine: &Engine, kernel: &DoseKernel, plan: &ImplantPlan) -> [f64; 4] {
     let how = crate::plan::dose::perturb::Perturbation {
-        sigma_m: 4e-3,
+        errors: crate::plan::dose::perturb::Errors::of_sigma(4e-3),
         trials: 1000,
         random_seed: 1,
     };
