@@ -102,6 +102,19 @@ enum Task {
         #[arg(long, default_value_t = 20.0, value_name = "HZ")]
         snapshot_rate: f64,
     },
+    /// Serve needle, seeds, gland and state to 3D Slicer over OpenIGTLink, until interrupted; anyone who reaches the
+    /// address can watch, for the protocol has no passwords
+    Igtl {
+        /// Name that rt-core was started under
+        #[arg(long, default_value = "main", value_parser = core_args::instance)]
+        instance: Instance,
+        /// Address and port to listen on
+        #[arg(long, default_value = "127.0.0.1:18944", value_name = "ADDRESS")]
+        listen: std::net::SocketAddr,
+        /// Transforms of the needle per second, 1 to 200
+        #[arg(long, default_value_t = 60.0, value_name = "HZ")]
+        hz: f64,
+    },
     /// Convert a recording into a table, or into a motion for rt-core's replay device
     Export {
         /// Recording made by 'host-ui record'
@@ -201,6 +214,18 @@ impl Cli {
                     out,
                     duration: duration.map(Duration::from_secs_f64),
                     snapshots_hz: snapshot_rate,
+                });
+                instance.sweep();
+                Ok(ended?)
+            }
+            Some(Task::Igtl { instance, listen, hz }) => {
+                if !(1.0..=200.0).contains(&hz) {
+                    return Err(format!("--hz {hz}: 1 to 200 Hz are possible").into());
+                }
+                let ended = stylet_igtl::serve::run(&stylet_igtl::serve::Options {
+                    instance: instance.clone(),
+                    listen,
+                    rate_hz: hz,
                 });
                 instance.sweep();
                 Ok(ended?)

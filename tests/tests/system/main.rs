@@ -6,6 +6,7 @@ mod device_procedure;
 mod dose_cli;
 mod force_insertions;
 mod formats;
+mod igtl;
 mod insertion;
 mod kill;
 mod lab_latency;

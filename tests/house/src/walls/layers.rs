@@ -194,6 +194,12 @@ pub const LAYERS: &[Layer] = &[
         not_itself: &[PORTS, ARGUMENTS],
     },
     Layer {
+        folder: "host-ui/igtl",
+        may_use: &["host-ui/base", "host-ui/host", "shm-schema", "shm-schema/anatomy"],
+        never: &[WINDOW, DEVICES],
+        not_itself: &[PORTS, ARGUMENTS, DICOM],
+    },
+    Layer {
         folder: "host-ui/controllers",
         may_use: &["host-ui/base"],
         never: &[WINDOW, PORTS, DICOM],
@@ -208,6 +214,7 @@ pub const LAYERS: &[Layer] = &[
             "host-ui/dose",
             "host-ui/files",
             "host-ui/host",
+            "host-ui/igtl",
             "host-ui/implant",
             "host-ui/population",
             "shm-schema",

@@ -1,0 +1,217 @@
+//! What a message says, of six types.
+
+use super::CodecError;
+use super::polydata::PolyData;
+use super::reader::{Reader, put_f32s, put_text, put_u16s};
+
+/// US-ASCII in IANA's table of character sets; UTF-8 is sent under its own number.
+const ASCII: u16 = 3;
+const UTF8: u16 = 106;
+const POINT_BYTES: usize = 136;
+const IMAGE_VERSION: u16 = 1;
+const UINT8: u8 = 3;
+const BIG_ENDIAN: u8 = 1;
+const RAS: u8 = 1;
+
+/// A picture of one byte a pixel, in RAS.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Image {
+    /// Pixels along i, j and k.
+    pub size: [u16; 3],
+    /// Steps from pixel to pixel along i, j and k, mm: direction times spacing.
+    pub steps_mm: [[f32; 3]; 3],
+    /// The centre of the picture, mm; not its corner.
+    pub centre_mm: [f32; 3],
+    /// Brightness, i fastest.
+    pub pixels: Vec<u8>,
+}
+
+/// A place with a name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    /// At most 64 bytes.
+    pub name: String,
+    /// At most 32 bytes.
+    pub group: String,
+    /// Red, green, blue, opacity.
+    pub rgba: [u8; 4],
+    /// Place, mm.
+    pub place_mm: [f32; 3],
+    /// 0 for a place without extent, mm.
+    pub diameter_mm: f32,
+    /// Device of the image that it belongs to, at most 20 bytes, or none.
+    pub owner: String,
+}
+
+/// How a device does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Status {
+    /// 1 is well; others are in the protocol's table.
+    pub code: u16,
+    /// The device's own number.
+    pub subcode: i64,
+    /// Name of the error, at most 20 bytes.
+    pub error: String,
+    /// In words.
+    pub text: String,
+}
+
+/// What a message says.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Body {
+    /// Columns of a matrix: three axes, and the origin in mm.
+    Transform([[f32; 3]; 4]),
+    /// A picture.
+    Image(Image),
+    /// Places with names.
+    Points(Vec<Point>),
+    /// A surface.
+    PolyData(PolyData),
+    /// How a device does.
+    Status(Status),
+    /// A text.
+    Text(String),
+}
+
+impl Body {
+    /// Type of the message in the header.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Transform(_) => "TRANSFORM",
+            Self::Image(_) => "IMAGE",
+            Self::Points(_) => "POINT",
+            Self::PolyData(_) => "POLYDATA",
+            Self::Status(_) => "STATUS",
+            Self::Text(_) => "STRING",
+        }
+    }
+
+    pub(super) fn encode(&self) -> Result<Vec<u8>, CodecError> {
+        let mut bytes = Vec::new();
+        match self {
+            Self::Transform(columns) => columns.iter().for_each(|column| put_f32s(&mut bytes, column)),
+            Self::Image(image) => image.encode(&mut bytes)?,
+            Self::Points(points) => points.iter().try_for_each(|point| point.encode(&mut bytes))?,
+            Self::PolyData(surface) => surface.encode(&mut bytes)?,
+            Self::Status(status) => {
+                bytes.extend(status.code.to_be_bytes());
+                bytes.extend(status.subcode.to_be_bytes());
+                put_text(&mut bytes, &status.error, 20)?;
+                // The library writes the zero that ends a C string.
+                put_text(&mut bytes, &status.text, status.text.len() + 1)?;
+            }
+            Self::Text(text) => {
+                let length = u16::try_from(text.len())
+                    .map_err(|_| CodecError::Field("STRING: a text of more than 65535 bytes"))?;
+                put_u16s(&mut bytes, &[if text.is_ascii() { ASCII } else { UTF8 }, length]);
+                bytes.extend(text.as_bytes());
+            }
+        }
+        Ok(bytes)
+    }
+
+    pub(super) fn decode(kind: &'static str, body: &[u8]) -> Result<Self, CodecError> {
+        let mut reader = Reader::new(kind, body);
+        let decoded = match kind {
+            "TRANSFORM" => {
+                let columns = [reader.f32s()?, reader.f32s()?, reader.f32s()?, reader.f32s()?];
+                if !columns.iter().flatten().all(|value: &f32| value.is_finite()) {
+                    return Err(CodecError::Field("TRANSFORM: a number that is not finite"));
+                }
+                Self::Transform(columns)
+            }
+            "IMAGE" => Self::Image(Image::decode(&mut reader)?),
+            "POINT" => {
+                if !body.len().is_multiple_of(POINT_BYTES) {
+                    return Err(CodecError::Field("POINT: the length is no multiple of 136 bytes"));
+                }
+                let points = (0..body.len() / POINT_BYTES).map(|_| Point::decode(&mut reader));
+                Self::Points(points.collect::<Result<_, _>>()?)
+            }
+            "POLYDATA" => Self::PolyData(PolyData::decode(&mut reader)?),
+            "STATUS" => Self::Status(Status {
+                code: reader.u16()?,
+                subcode: reader.u64()? as i64,
+                error: reader.text(20)?,
+                text: reader.text(reader.rest())?,
+            }),
+            "STRING" => {
+                let _character_set = reader.u16()?;
+                let length = usize::from(reader.u16()?);
+                Self::Text(String::from_utf8_lossy(reader.take(length)?).into_owned())
+            }
+            other => return Err(CodecError::Type(other.to_owned())),
+        };
+        reader.end()?;
+        Ok(decoded)
+    }
+}
+
+impl Image {
+    fn pixels_expected(size: [u16; 3]) -> Option<usize> {
+        size.iter().try_fold(1usize, |all, n| all.checked_mul(usize::from(*n)))
+    }
+
+    fn encode(&self, bytes: &mut Vec<u8>) -> Result<(), CodecError> {
+        if Self::pixels_expected(self.size) != Some(self.pixels.len()) {
+            return Err(CodecError::Field("IMAGE: the number of pixels is not that of its size"));
+        }
+        bytes.extend(IMAGE_VERSION.to_be_bytes());
+        bytes.extend([1, UINT8, BIG_ENDIAN, RAS]);
+        put_u16s(bytes, &self.size);
+        self.steps_mm.iter().for_each(|step| put_f32s(bytes, step));
+        put_f32s(bytes, &self.centre_mm);
+        put_u16s(bytes, &[0; 3]);
+        put_u16s(bytes, &self.size);
+        bytes.extend(&self.pixels);
+        Ok(())
+    }
+
+    fn decode(reader: &mut Reader) -> Result<Self, CodecError> {
+        let version = reader.u16()?;
+        // The order of bytes does not matter to pixels of one byte.
+        let (components, scalar, _order, axes) = (reader.u8()?, reader.u8()?, reader.u8()?, reader.u8()?);
+        if (version, components, scalar, axes) != (IMAGE_VERSION, 1, UINT8, RAS) {
+            return Err(CodecError::Field(
+                "IMAGE: only version 1 with one unsigned byte a pixel in RAS is accepted",
+            ));
+        }
+        let size = reader.u16s()?;
+        let steps_mm = [reader.f32s()?, reader.f32s()?, reader.f32s()?];
+        let centre_mm = reader.f32s()?;
+        let (offset, part) = (reader.u16s::<3>()?, reader.u16s::<3>()?);
+        if offset != [0; 3] || part != size || Self::pixels_expected(size) != Some(reader.rest()) {
+            return Err(CodecError::Field(
+                "IMAGE: its pixels are not those of the whole picture",
+            ));
+        }
+        Ok(Self {
+            size,
+            steps_mm,
+            centre_mm,
+            pixels: reader.take(reader.rest())?.to_vec(),
+        })
+    }
+}
+
+impl Point {
+    fn encode(&self, bytes: &mut Vec<u8>) -> Result<(), CodecError> {
+        put_text(bytes, &self.name, 64)?;
+        put_text(bytes, &self.group, 32)?;
+        bytes.extend(self.rgba);
+        put_f32s(bytes, &self.place_mm);
+        put_f32s(bytes, &[self.diameter_mm]);
+        put_text(bytes, &self.owner, 20)
+    }
+
+    fn decode(reader: &mut Reader) -> Result<Self, CodecError> {
+        Ok(Self {
+            name: reader.text(64)?,
+            group: reader.text(32)?,
+            rgba: [reader.u8()?, reader.u8()?, reader.u8()?, reader.u8()?],
+            place_mm: reader.f32s()?,
+            diameter_mm: reader.f32()?,
+            owner: reader.text(20)?,
+        })
+    }
+}

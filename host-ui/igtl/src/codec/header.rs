@@ -1,0 +1,108 @@
+//! The 58 bytes before every body, and the limits of bodies.
+
+use super::CodecError;
+use super::reader::{Reader, put_text};
+use std::time::Duration;
+
+/// Length of a header of version 1.
+pub const HEADER_BYTES: usize = 58;
+const VERSION: u16 = 1;
+
+/// Types and the largest bodies of them that are accepted or sent, in bytes.
+const LIMITS: [(&str, u64); 6] = [
+    ("TRANSFORM", 48),
+    ("IMAGE", 16 << 20),
+    ("POINT", 136 * 4096),
+    ("POLYDATA", 16 << 20),
+    ("STATUS", 30 + 4096),
+    ("STRING", 4 + 65_535),
+];
+
+/// Seconds since 1970 and 2^-32 of a second.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Timestamp {
+    /// Whole seconds.
+    pub seconds: u32,
+    /// Parts of a second, of 2^32.
+    pub fraction: u32,
+}
+
+impl Timestamp {
+    /// Of a time since 1970; seconds beyond 32 bits (the year 2106) are cut off.
+    pub fn since_1970(time: Duration) -> Self {
+        Self {
+            seconds: time.as_secs() as u32,
+            fraction: ((u64::from(time.subsec_nanos()) << 32) / 1_000_000_000) as u32,
+        }
+    }
+}
+
+/// What stands before a body.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Header {
+    /// One of the six types.
+    pub kind: &'static str,
+    /// Name of the device.
+    pub device: String,
+    /// When it was measured.
+    pub time: Timestamp,
+    /// Length of the body, within the limit of its type.
+    pub body_bytes: usize,
+    /// CRC-64 of the body.
+    pub checksum: u64,
+}
+
+/// Fails when a body of this type may not be so long.
+pub fn check_length(kind: &'static str, found: u64) -> Result<(), CodecError> {
+    let limit = LIMITS.iter().find(|row| row.0 == kind).map_or(0, |row| row.1);
+    match found <= limit {
+        true => Ok(()),
+        false => Err(CodecError::TooLong { kind, found, limit }),
+    }
+}
+
+impl Header {
+    /// From 58 bytes; the length is within its limit afterwards.
+    pub fn decode(bytes: &[u8]) -> Result<Self, CodecError> {
+        let mut reader = Reader::new("header", bytes);
+        let version = reader.u16()?;
+        if version != VERSION {
+            return Err(CodecError::Version(version));
+        }
+        let kind = reader.text(12)?;
+        let device = reader.text(20)?;
+        let time = Timestamp {
+            seconds: reader.u32()?,
+            fraction: reader.u32()?,
+        };
+        let body_bytes = reader.u64()?;
+        let checksum = reader.u64()?;
+        reader.end()?;
+        let Some((kind, _)) = LIMITS.iter().find(|row| row.0 == kind) else {
+            return Err(CodecError::Type(kind));
+        };
+        check_length(kind, body_bytes)?;
+        Ok(Self {
+            kind,
+            device,
+            time,
+            body_bytes: body_bytes as usize,
+            checksum,
+        })
+    }
+
+    /// Its 58 bytes.
+    pub fn encode(&self) -> Result<[u8; HEADER_BYTES], CodecError> {
+        let mut bytes = Vec::with_capacity(HEADER_BYTES);
+        bytes.extend(VERSION.to_be_bytes());
+        put_text(&mut bytes, self.kind, 12)?;
+        put_text(&mut bytes, &self.device, 20)?;
+        bytes.extend(self.time.seconds.to_be_bytes());
+        bytes.extend(self.time.fraction.to_be_bytes());
+        bytes.extend((self.body_bytes as u64).to_be_bytes());
+        bytes.extend(self.checksum.to_be_bytes());
+        let mut array = [0; HEADER_BYTES];
+        array.copy_from_slice(&bytes);
+        Ok(array)
+    }
+}

@@ -1,0 +1,123 @@
+//! Bytes of OpenIGTLink messages, header version 1, and back. No I/O; every length is checked before memory is taken for it.
+//!
+//! Source: the messages that libOpenIGTLink 1.11 writes, byte for byte.
+//! Lengths are in mm and places in the frame that the sender names, for Stylet the patient's (RAS).
+
+mod body;
+mod crc;
+mod header;
+mod polydata;
+mod reader;
+
+pub use body::{Body, Image, Point, Status};
+pub use crc::crc64;
+pub use header::{HEADER_BYTES, Header, Timestamp};
+pub use polydata::PolyData;
+
+/// Why bytes are no message, or a message has no bytes.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum CodecError {
+    /// Bytes end before the message does.
+    #[error("{what}: {needed} bytes expected, {found} found")]
+    Short {
+        /// Which part.
+        what: &'static str,
+        /// Bytes that it needs.
+        needed: usize,
+        /// Bytes that there are.
+        found: usize,
+    },
+    /// A header of another version than 1.
+    #[error(
+        "header version 1 expected, {0} found; let the sender use protocol version 1 or 2 without extended headers"
+    )]
+    Version(u16),
+    /// A type of message that is not among the six.
+    #[error("message type {0:?} is not supported; supported are TRANSFORM, IMAGE, POINT, POLYDATA, STATUS and STRING")]
+    Type(String),
+    /// The body is longer than this type may be.
+    #[error("{kind} of {found} bytes: at most {limit} are accepted")]
+    TooLong {
+        /// Type of the message.
+        kind: &'static str,
+        /// Length that the header states.
+        found: u64,
+        /// Largest length accepted.
+        limit: u64,
+    },
+    /// The checksum of the body is another than the header's.
+    #[error("checksum {found:#018x}: the header states {stated:#018x}")]
+    Checksum {
+        /// In the header.
+        stated: u64,
+        /// Of the body.
+        found: u64,
+    },
+    /// A field that contradicts another or lies outside its range.
+    #[error("{0}")]
+    Field(&'static str),
+}
+
+/// One message: from which device, when, and what.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Message {
+    /// Name of the device, at most 20 bytes; Slicer names its node after it.
+    pub device: String,
+    /// When it was measured.
+    pub time: Timestamp,
+    /// What it says.
+    pub body: Body,
+}
+
+impl Message {
+    /// The bytes to send. Fails when a text or a list is longer than its field.
+    pub fn encode(&self) -> Result<Vec<u8>, CodecError> {
+        let body = self.body.encode()?;
+        let kind = self.body.kind();
+        header::check_length(kind, body.len() as u64)?;
+        let header = Header {
+            kind,
+            device: self.device.clone(),
+            time: self.time,
+            body_bytes: body.len(),
+            checksum: crc64(&body),
+        };
+        let mut bytes = header.encode()?.to_vec();
+        bytes.extend_from_slice(&body);
+        Ok(bytes)
+    }
+
+    /// One whole message; bytes after its end are an error.
+    pub fn decode(bytes: &[u8]) -> Result<Self, CodecError> {
+        let (head, body) = bytes.split_at_checked(HEADER_BYTES).ok_or(CodecError::Short {
+            what: "header",
+            needed: HEADER_BYTES,
+            found: bytes.len(),
+        })?;
+        Self::of(&Header::decode(head)?, body)
+    }
+
+    /// A message of a header that was decoded, and its body.
+    pub fn of(header: &Header, body: &[u8]) -> Result<Self, CodecError> {
+        if body.len() != header.body_bytes {
+            return Err(CodecError::Short {
+                what: "body",
+                needed: header.body_bytes,
+                found: body.len(),
+            });
+        }
+        let found = crc64(body);
+        if found != header.checksum {
+            let stated = header.checksum;
+            return Err(CodecError::Checksum { stated, found });
+        }
+        Ok(Self {
+            device: header.device.clone(),
+            time: header.time,
+            body: Body::decode(header.kind, body)?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,214 @@
+//! Sends what the core publishes: the needle, the seeds, the surface of the gland and the state in words, in RAS and mm.
+
+use crate::codec::{Body, CodecError, Message, Point, PolyData, Timestamp};
+use crate::server::{Server, ServerError};
+use std::collections::HashMap;
+use std::net::SocketAddr;
+use std::ops::Range;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use stylet_anatomy::PatientFrame;
+use stylet_base::interrupt::Interrupt;
+use stylet_host::link::{Link, LinkStatus, SceneModel, Snapshot};
+use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::{HapticState, Phase, StructureInfo, role};
+
+const MM_PER_M: f64 = 1000.0;
+/// The surface and the words change slowly, and cost Slicer more than the needle.
+const SLOW_EVERY: Duration = Duration::from_millis(500);
+
+/// What to serve.
+pub struct Options {
+    /// Which core.
+    pub instance: Instance,
+    /// Where to listen.
+    pub listen: SocketAddr,
+    /// Transforms of the needle in a second.
+    pub rate_hz: f64,
+}
+
+/// Why serving ended with an error.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// The server does not start.
+    #[error(transparent)]
+    Server(#[from] ServerError),
+    /// A message has no bytes.
+    #[error(transparent)]
+    Codec(#[from] CodecError),
+    /// Ctrl-C cannot be taken.
+    #[error("signals cannot be taken: {0}")]
+    Signals(String),
+}
+
+/// Serves until interrupted; a core that starts later or again is served as well.
+pub fn run(options: &Options) -> Result<(), ServeError> {
+    let interrupted = Interrupt::on_signals().map_err(|e| ServeError::Signals(e.to_string()))?;
+    let server = Server::listen(options.listen, |line| println!("{line}"))?;
+    println!("OpenIGTLink on {}; end with Ctrl-C", server.address());
+    let mut link = Link::new(options.instance.clone());
+    let every = Duration::from_secs_f64(1.0 / options.rate_hz);
+    let mut slow: Option<Instant> = None;
+    let mut next = Instant::now();
+    while !interrupted.asked() {
+        link.poll();
+        link.take_records();
+        let is_slow = slow.is_none_or(|at| at.elapsed() >= SLOW_EVERY);
+        if is_slow {
+            slow = Some(Instant::now());
+        }
+        for (device, body) in devices(&link, is_slow) {
+            publish(&server, device, body)?;
+        }
+        next = (next + every).max(Instant::now());
+        std::thread::sleep(next.saturating_duration_since(Instant::now()));
+    }
+    Ok(())
+}
+
+fn publish(server: &Server, device: &str, body: Body) -> Result<(), CodecError> {
+    let time = Timestamp::since_1970(SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default());
+    let message = Message {
+        device: device.to_owned(),
+        time,
+        body,
+    };
+    server.publish(device, message.encode()?);
+    Ok(())
+}
+
+fn devices(link: &Link, is_slow: bool) -> Vec<(&'static str, Body)> {
+    let mut devices = Vec::new();
+    let scene = link.scene();
+    if is_slow {
+        devices.push(("State", Body::Text(words(&link.status(), link.state()))));
+    }
+    let (Some(scene), LinkStatus::Live) = (scene, link.status()) else {
+        return devices;
+    };
+    let patient = scene.header.patient();
+    if let Some(state) = link.state() {
+        let needle = needle(&patient, state.tip_in_scene_m, state.needle_direction);
+        devices.push(("Needle", Body::Transform(needle)));
+    }
+    // A snapshot of another scene has other vertices.
+    let snapshot = link.snapshot().filter(|s| s.header.scene_id() == scene.header.id());
+    if let Some(snapshot) = snapshot.filter(|_| is_slow) {
+        devices.push(("Seeds", Body::Points(seeds(&patient, snapshot))));
+        devices.push(("Gland", Body::PolyData(surface(&patient, scene, snapshot))));
+    }
+    devices
+}
+
+fn place_mm(patient: &PatientFrame, in_scene_m: [f64; 3]) -> [f32; 3] {
+    patient.patient_from_scene(in_scene_m).map(|m| (m * MM_PER_M) as f32)
+}
+
+/// Columns of the needle's frame in RAS: the third axis points where the needle goes, the origin is the tip.
+fn needle(patient: &PatientFrame, tip_in_scene_m: [f64; 3], direction_in_scene: [f64; 3]) -> [[f32; 3]; 4] {
+    let along = unit(patient.patient_from_scene_direction(direction_in_scene));
+    // Any axis that is not nearly parallel fixes the roll, which the needle does not have.
+    let aside = if along[0].abs() < 0.9 {
+        [1.0, 0.0, 0.0]
+    } else {
+        [0.0, 1.0, 0.0]
+    };
+    let second = unit(cross(along, aside));
+    let first = cross(second, along);
+    let axis = |v: [f64; 3]| v.map(|x| x as f32);
+    [
+        axis(first),
+        axis(second),
+        axis(along),
+        place_mm(patient, tip_in_scene_m),
+    ]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+fn unit(v: [f64; 3]) -> [f64; 3] {
+    let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if length > 0.0 {
+        v.map(|x| x / length)
+    } else {
+        [0.0, 0.0, 1.0]
+    }
+}
+
+fn seeds(patient: &PatientFrame, snapshot: &Snapshot) -> Vec<Point> {
+    let header = &snapshot.header;
+    let dropped = header.seeds.iter().take(header.seed_count as usize).enumerate();
+    dropped
+        .map(|(index, seed)| Point {
+            name: format!("Seed {}", index + 1),
+            group: "Seeds".to_owned(),
+            rgba: [255, 200, 0, 255],
+            place_mm: place_mm(patient, seed.position_m),
+            diameter_mm: 0.0,
+            owner: String::new(),
+        })
+        .collect()
+}
+
+/// Of the targets, with the vertices that they use; of the whole body where no target is drawn by itself.
+fn surface(patient: &PatientFrame, scene: &SceneModel, snapshot: &Snapshot) -> PolyData {
+    let header = &scene.header;
+    let own = |s: &&StructureInfo| s.role & role::TARGET != 0 && s.triangle_count > 0;
+    let parts: Vec<Range<usize>> = match header.structures().iter().filter(own) {
+        targets if targets.clone().next().is_some() => targets
+            .map(|s| s.first_triangle as usize..(s.first_triangle as usize + s.triangle_count as usize))
+            .collect(),
+        _ => std::iter::once(0..header.body_triangle_count as usize).collect(),
+    };
+    let mut number_of: HashMap<u32, u32> = HashMap::new();
+    let mut points = Vec::new();
+    let mut triangles = Vec::new();
+    for triangle in parts.into_iter().filter_map(|part| scene.triangles.get(part)).flatten() {
+        let corners = triangle.map(|vertex| {
+            *number_of.entry(vertex).or_insert_with(|| {
+                let place_m = snapshot.positions_m.get(vertex as usize).copied().unwrap_or_default();
+                points.push(place_mm(patient, place_m.map(f64::from)));
+                (points.len() - 1) as u32
+            })
+        });
+        triangles.push(corners);
+    }
+    PolyData { points, triangles }
+}
+
+fn words(status: &LinkStatus, state: Option<&HapticState>) -> String {
+    match (status, state) {
+        (LinkStatus::Absent { why }, _) => why.clone(),
+        (LinkStatus::Silent { since }, _) => format!("rt-core has been silent for {:.1} s", since.as_secs_f64()),
+        (LinkStatus::Live, None) => "rt-core runs without a state yet".to_owned(),
+        (LinkStatus::Live, Some(state)) => format!(
+            "{}; depth {:.1} mm; force {:.2} N; {} seeds",
+            Phase::from_number(state.phase).map_or("unknown phase", Phase::name),
+            state.depth_m * MM_PER_M,
+            state.force_on_hand_n.iter().map(|f| f * f).sum::<f64>().sqrt(),
+            state.seed_count
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_needle_is_a_right_handed_frame_in_mm_whose_third_axis_is_its_direction() {
+        for direction in [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.3, -0.4, 0.866]] {
+            let [x, y, z, tip] = needle(&PatientFrame::default(), [0.01, -0.02, 0.03], direction);
+            let wide = |v: [f32; 3]| v.map(f64::from);
+            let third = cross(wide(x), wide(y));
+            assert!((0..3).all(|a| (third[a] - f64::from(z[a])).abs() < 1e-6));
+            assert!((0..3).all(|a| (f64::from(z[a]) - unit(direction)[a]).abs() < 1e-6));
+            assert_eq!(tip, [10.0, -20.0, 30.0]);
+        }
+    }
+}
