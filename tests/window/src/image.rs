@@ -4,11 +4,11 @@ use crate::driven::{Driven, misplaced};
 use egui_kittest::kittest::{NodeT, Queryable, by};
 use host_ui::app::App;
 use host_ui::view::orientation::Orientation;
-use host_ui::view::slice::field::Field;
 use nalgebra::{Rotation3, Vector3};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use stylet_files::{Image, Progress};
+use stylet_host::field::Field;
 use stylet_tests::scratch;
 
 const DIMS: [usize; 3] = [90, 100, 110];

@@ -7,9 +7,9 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use host_ui::app::{App, Options};
 use host_ui::view::orientation::Orientation;
-use host_ui::view::slice::field::Field;
 use nalgebra::Vector3;
 use std::time::Duration;
+use stylet_host::field::Field;
 use stylet_shm_schema::{Phase, flags};
 
 fn phase(app: &App) -> u32 {
