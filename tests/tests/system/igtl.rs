@@ -11,7 +11,9 @@ struct Served(Child);
 
 impl Drop for Served {
     fn drop(&mut self) {
-        let _ = self.0.kill();
+        // As Ctrl-C: it leaves nothing in shared memory.
+        // SAFETY: a signal to a child that was not waited for yet.
+        unsafe { libc::kill(self.0.id() as libc::pid_t, libc::SIGINT) };
         let _ = self.0.wait();
     }
 }
@@ -44,7 +46,7 @@ fn receive(stream: &mut TcpStream) -> Message {
 fn a_client_gets_needle_gland_and_state_where_the_core_has_them() {
     let mut core = Core::start_with(&["--no-rt", "--scene", "pelvis"]);
     let mut link = core.host();
-    let (_served, address) = serve(core.instance.name());
+    let (served, address) = serve(core.instance.name());
     let mut stream = TcpStream::connect(&address).expect("it listens");
     stream
         .set_read_timeout(Some(Duration::from_secs(10)))
@@ -89,6 +91,6 @@ fn a_client_gets_needle_gland_and_state_where_the_core_has_them() {
     }
     let words = words.expect("received");
     assert!(words.contains("0 seeds") && words.contains("N"), "{words}");
-    drop(link);
+    drop((served, stream, link));
     core.finish();
 }
