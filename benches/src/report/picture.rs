@@ -58,7 +58,17 @@ where
 }
 
 pub fn draw(points: &[Point], path: &Path) -> Result<(), Box<dyn Error>> {
-    let root = SVGBackend::new(path, SIZE).into_drawing_area();
+    let mut svg = String::new();
+    draw_into(&mut svg, points)?;
+    // As wide as its window, at most as drawn: a fixed size would scroll sideways in a narrow one.
+    let fixed = format!("width=\"{}\" height=\"{}\"", SIZE.0, SIZE.1);
+    let fitted = format!("style=\"width:100%;max-width:{}px;height:auto\"", SIZE.0);
+    std::fs::write(path, svg.replacen(&fixed, &fitted, 1))?;
+    Ok(())
+}
+
+fn draw_into(svg: &mut String, points: &[Point]) -> Result<(), Box<dyn Error>> {
+    let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
     let (title, rest) = root.split_vertically(TITLE);
     let (panels, legend) = rest.split_vertically(SIZE.1 - TITLE - LEGEND);

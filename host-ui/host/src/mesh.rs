@@ -96,7 +96,7 @@ impl Surface {
     }
 
     /// Gives the runs of vertices that are others now; none where nothing has moved. A vertex stays until its place is farther
-    /// away than [`SEEN_M`]: tissue that creeps would otherwise have the picture drawn again in each frame.
+    /// away than 10 um: tissue that creeps would otherwise have the picture drawn again in each frame.
     pub fn move_to(&mut self, positions_m: &[[f32; 3]]) -> Vec<Range<usize>> {
         self.near.vertices.clear();
         for ((vertex, place_m), number) in self.vertices.iter_mut().zip(positions_m).zip(0..) {

@@ -29,7 +29,7 @@ pub struct Study {
     pub tissue: TissueKind,
     /// What is implanted.
     pub glands: Vec<Gland>,
-    /// In the order of [`QUANTITIES`].
+    /// In the order of `QUANTITIES`.
     pub quantities: Vec<Spread>,
     /// Parameters that differ from their defaults, in the unit of the table.
     pub parameters: Vec<(&'static ParameterSpec, Spread)>,
