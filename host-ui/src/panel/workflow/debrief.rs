@@ -108,10 +108,9 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
             .on_hover_text("Where the seed lies now against where it was planned; along is positive inwards");
         let placed = rows.iter().map(|(_, row)| row).filter(|r| r.placed.is_some());
         let placed: Vec<f64> = placed.map(total_m).collect();
-        let mean = placed.iter().sum::<f64>() / placed.len().max(1) as f64;
-        let worst = placed.iter().copied().fold(0.0, f64::max);
-        let text = format!("mean {:.2}, worst {:.2}", format::mm(mean), format::mm(worst));
-        ui.label(theme::small(text));
+        if let Some(text) = mean_and_worst(&placed) {
+            ui.label(theme::small(text));
+        }
     });
     egui::ScrollArea::vertical()
         .id_salt("seed errors")
@@ -134,6 +133,13 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
         });
 }
 
+/// Nothing while no seed of the list is placed.
+fn mean_and_worst(errors_m: &[f64]) -> Option<String> {
+    let worst = errors_m.iter().copied().reduce(f64::max)?;
+    let mean = errors_m.iter().sum::<f64>() / errors_m.len() as f64;
+    Some(format!("mean {:.2}, worst {:.2}", format::mm(mean), format::mm(worst)))
+}
+
 fn total_m(row: &SeedError) -> f64 {
     row.along_m.hypot(row.across_m)
 }
@@ -152,4 +158,15 @@ fn seed_row_ui(ui: &mut egui::Ui, needle: Option<usize>, row: &SeedError) {
         ui.label("");
     }
     ui.end_row();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::mean_and_worst;
+
+    #[test]
+    fn errors_have_a_mean_only_once_a_seed_is_placed() {
+        assert_eq!(mean_and_worst(&[]), None);
+        assert_eq!(mean_and_worst(&[1e-3, 4e-3]).as_deref(), Some("mean 2.50, worst 4.00"));
+    }
 }
