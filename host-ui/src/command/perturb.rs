@@ -22,16 +22,16 @@ const MAX_TRIALS: u64 = 1_000_000;
 const HELP: &str = "\
 Every trial moves each seed by a normal error, keeps its axis and strength, and computes all metrics again. The same --seed gives the
 same trials on any number of cores. Ctrl-C ends early and writes the trials done so far. What may happen to the seeds:
-  --sigma-mm, --sigma-along-mm   an error of each seed, which may have another deviation along the needle (the axis of the seed)
-  --strand-correlation           how far the seeds of one needle share their errors: 0 not at all, 1 they move as one
-  --shift-mm, --shift-sigma-mm   an error of the whole implant: the same in every trial, or drawn for each
-  --loss                         seeds that are lost, each by itself
-  --edema, --edema-half-life     a gland that swells at the implant and shrinks, with its seeds; the plan lies in the gland without edema.
-                                 A trial takes about twelve times as long
+  an error of each seed (--sigma-mm); along the needle, the axis of the seed, it may have another deviation (--sigma-along-mm)
+  seeds of one needle share their errors (--strand-correlation): 0 not at all, 1 they move as one
+  an error of the whole implant: the same in every trial (--shift-mm), or drawn for each (--shift-sigma-mm)
+  seeds that are lost, each by itself (--loss)
+  a gland that swells at the implant and shrinks, with its seeds (--edema, --edema-half-life); the plan lies in the gland without
+  edema, and a trial takes about twelve times as long
 What one of them draws does not change when another is added. The planned figures are those without any of them.
 
-Criteria are the limits of ABS and AAPM TG-137 for target (D90, V100, V150), urethra (D10, D30) and rectum (D2cc), and those of
---criterion. The share of trials that meet each has its 95 % interval by Wilson, the mean of each measure by Student's t.
+Criteria are the limits of ABS and AAPM TG-137 for target (D90, V100, V150), urethra (D10, D30) and rectum (D2cc), and
+those of --criterion. The share of trials that meet each has its 95 % interval by Wilson, the mean of each measure by Student's t.
 
 Examples; the first has the settings of published studies (4 mm, 1000 trials), its figures are those of your plan:
   host-ui perturb --source sources/i125_6711.toml --plan seeds.csv --strength-u 0.5 --structures gland.nii.gz \\
