@@ -5,6 +5,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use stylet_lab::args::LatencyArgs;
+use stylet_lab::fleet::FleetArgs;
 use stylet_lab::load::LoadProcess;
 use stylet_lab::verify::VerifyArgs;
 use stylet_manual::ManualArgs;
@@ -36,6 +37,8 @@ pub enum Task {
     Latency(Box<LatencyArgs>),
     /// Verify that a saved latency report is unaltered, who signed it, and which programs it is of
     Verify(VerifyArgs),
+    /// Compare the latency reports of many PCs: who passes, how each changed and what changed with it; a page and a CSV table
+    Fleet(FleetArgs),
     /// Check whether this PC is fit for the force loop, and what to change
     Doctor {
         /// As JSON

@@ -7,7 +7,7 @@ use std::error::Error;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stylet_lab::{doctor, latency, load, verify};
+use stylet_lab::{doctor, fleet, latency, load, verify};
 use stylet_shm_schema::service::Instance;
 use stylet_sim::scene::Scene;
 
@@ -28,6 +28,7 @@ fn carry_out(cli: &Cli) -> Result<u8, Box<dyn Error>> {
         None => run(&cli.run).map(|()| 0)?,
         Some(Task::Latency(args)) => latency::run(args, &*stop_on_signal()?)?,
         Some(Task::Verify(args)) => verify::run(args)?,
+        Some(Task::Fleet(args)) => fleet::run(args)?,
         Some(Task::Doctor { json, haptic_core }) => doctor::run(*json, *haptic_core),
         Some(Task::Replay(replay)) => u8::from(!replay.run()?),
         #[cfg(feature = "study")]

@@ -1,7 +1,7 @@
 //! The report as one page that needs nothing else: light, system fonts, pictures inside.
 
 mod machine;
-mod parts;
+pub mod parts;
 mod steady;
 mod times;
 
@@ -12,7 +12,8 @@ use crate::report::{NO_DIGEST, Report};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use parts::{Column, badge, cell, micro, num, or_na, table};
 
-const STYLE: &str = include_str!("report.css");
+/// The style sheet of every page of the laboratory.
+pub const STYLE: &str = include_str!("report.css");
 
 /// The whole page; the report's digest stands in it as zeros, once.
 pub fn page(report: &Report, measured: &Measured) -> Result<String, DrawError> {

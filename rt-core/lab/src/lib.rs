@@ -1,7 +1,7 @@
 //! The latency laboratory: runs the real loops under load, and reports with evidence how late they are.
 //!
 //! [`latency`] runs a measurement and writes a report; [`verify`] verifies that a saved report is
-//! unaltered; [`doctor`] checks whether this PC is fit. No report claims conformity with a standard.
+//! unaltered; [`fleet`] compares the reports of many PCs; [`doctor`] checks whether this PC is fit. No report claims conformity with a standard.
 
 #![warn(missing_docs)]
 
@@ -13,6 +13,7 @@ pub mod cost;
 pub mod doctor;
 mod extreme;
 mod files;
+pub mod fleet;
 mod gaps;
 mod host;
 mod html;

@@ -1,5 +1,9 @@
 //! The pictures of a report, as SVG.
 
+mod trend;
+
+pub use trend::{TrendPoint, trend};
+
 use crate::collect::{LoopTiming, Window};
 use hdrhistogram::Histogram;
 use plotters::coord::Shift;
@@ -25,14 +29,18 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
 fn picture(draw: impl FnOnce(&Area) -> Drawn) -> Result<String, DrawError> {
+    picture_of(SIZE, draw)
+}
+
+fn picture_of(size: (u32, u32), draw: impl FnOnce(&Area) -> Drawn) -> Result<String, DrawError> {
     let mut svg = String::new();
     {
-        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
         draw(&root).map_err(|e| DrawError(e.to_string()))?;
         root.present().map_err(|e| DrawError(e.to_string()))?;
     }
     // The page scales it; a fixed size would not fit a narrow window.
-    let fixed = format!("width=\"{}\" height=\"{}\" ", SIZE.0, SIZE.1);
+    let fixed = format!("width=\"{}\" height=\"{}\" ", size.0, size.1);
     Ok(svg.replacen(&fixed, "", 1))
 }
 

@@ -120,7 +120,7 @@ fn other_program(report: &Value, binary: &Path, digest: &str) -> Option<String> 
 }
 
 /// Everything that was altered; `read` returns the content of a file beside the report.
-fn problems(text: &str, read: impl Fn(&str) -> Option<Vec<u8>>) -> Vec<String> {
+pub(crate) fn problems(text: &str, read: impl Fn(&str) -> Option<Vec<u8>>) -> Vec<String> {
     let Ok(report) = serde_json::from_str::<Value>(text) else {
         return vec![format!("{JSON}: tampered with or damaged, it is not JSON")];
     };

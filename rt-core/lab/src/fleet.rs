@@ -1,0 +1,170 @@
+//! `rt-core fleet`: one page over the latency reports of many PCs: who passes, how each PC changed, and what changed with it.
+
+mod change;
+mod entry;
+mod page;
+mod table;
+
+use crate::plots::DrawError;
+use crate::verdict::Outcome;
+use clap::Args;
+use entry::{Entry, Unread};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use stylet_write::{WriteError, write_whole};
+
+const PAGE: &str = "fleet.html";
+const TABLE: &str = "fleet.csv";
+/// The reports in a folder have this name.
+const REPORT: &str = crate::report::JSON;
+
+/// Which reports to read.
+#[derive(Args, Clone, Debug)]
+pub struct FleetArgs {
+    /// Folders with reports of `rt-core latency`, at any depth
+    #[arg(required = true, value_name = "DIR")]
+    pub folders: Vec<PathBuf>,
+    /// Folder for fleet.html and fleet.csv
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+/// The page cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum FleetError {
+    /// A folder cannot be read.
+    #[error("cannot read {}: {source}", .path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What the system reports.
+        source: std::io::Error,
+    },
+    /// There is nothing to show.
+    #[error(
+        "no latency report found: expected report.json in a folder below the named ones, as `rt-core latency --out DIR` writes it{0}"
+    )]
+    None(String),
+    /// The picture of a trend.
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+    /// The page or the table cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+/// The reports of one PC, oldest first.
+struct Pc {
+    name: String,
+    entries: Vec<Entry>,
+}
+
+impl Pc {
+    fn latest(&self) -> &Entry {
+        self.entries.last().expect("a PC is known by its reports")
+    }
+}
+
+/// Reads all reports and writes page and table.
+///
+/// Returns 0 when the latest report of every PC passes, 1 when one fails, 2 when one is open or could not be read.
+///
+/// # Errors
+/// A folder cannot be read, no report is found, or the files cannot be written.
+pub fn run(args: &FleetArgs) -> Result<u8, FleetError> {
+    let mut files = Vec::new();
+    for folder in &args.folders {
+        find(folder, &mut files)?;
+    }
+    files.sort();
+    // One folder may lie in another.
+    files.dedup();
+    let (entries, unread) = read_all(&files);
+    if entries.is_empty() {
+        let why: String = unread.iter().map(|u| format!("\n{}: {}", u.path, u.why)).collect();
+        return Err(FleetError::None(why));
+    }
+    let table = table::csv(&entries);
+    let pcs = by_pc(entries);
+    let page = page::page(&pcs, &unread)?;
+    std::fs::create_dir_all(&args.out).map_err(|source| FleetError::Folder {
+        path: args.out.clone(),
+        source,
+    })?;
+    write_whole(&args.out.join(TABLE), table.as_bytes())?;
+    write_whole(&args.out.join(PAGE), page.as_bytes())?;
+    for pc in &pcs {
+        println!(
+            "{:<14} {} ({} reports, latest of {})",
+            pc.latest().outcome.words(),
+            pc.name,
+            pc.entries.len(),
+            pc.latest().made_at
+        );
+    }
+    unread
+        .iter()
+        .for_each(|u| println!("not counted    {}: {}", u.path, u.why));
+    println!("{}", args.out.join(PAGE).display());
+    println!("{}", args.out.join(TABLE).display());
+    Ok(exit_code(&pcs, &unread))
+}
+
+fn exit_code(pcs: &[Pc], unread: &[Unread]) -> u8 {
+    let any = |outcome| pcs.iter().any(|pc| pc.latest().outcome == outcome);
+    if any(Outcome::Fail) {
+        1
+    } else if any(Outcome::NotMeasurable) || !unread.is_empty() {
+        2
+    } else {
+        0
+    }
+}
+
+/// Every report below `folder`; links to folders are not followed, since they may lead in a circle.
+fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), FleetError> {
+    let failed = |source| FleetError::Folder {
+        path: folder.to_owned(),
+        source,
+    };
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        if entry.file_type().map_err(failed)?.is_dir() {
+            find(&entry.path(), files)?;
+        } else if entry.file_name() == REPORT {
+            files.push(entry.path());
+        }
+    }
+    Ok(())
+}
+
+fn read_all(files: &[PathBuf]) -> (Vec<Entry>, Vec<Unread>) {
+    let (mut entries, mut unread): (Vec<Entry>, Vec<Unread>) = (Vec::new(), Vec::new());
+    for (i, file) in files.iter().enumerate() {
+        if files.len() >= 100 && i % 100 == 0 {
+            eprintln!("rt-core: report {} of {}", i + 1, files.len());
+        }
+        match entry::read(file) {
+            // A copy of a report is the same measurement.
+            Ok(entry) if entries.iter().any(|e| e.digest == entry.digest) => unread.push(Unread {
+                path: entry.path,
+                why: "a copy of a report that is already counted".to_owned(),
+            }),
+            Ok(entry) => entries.push(entry),
+            Err(why) => unread.push(why),
+        }
+    }
+    entries.sort_by(|a, b| (&a.pc, &a.made_at).cmp(&(&b.pc, &b.made_at)));
+    (entries, unread)
+}
+
+fn by_pc(entries: Vec<Entry>) -> Vec<Pc> {
+    let mut pcs: BTreeMap<String, Vec<Entry>> = BTreeMap::new();
+    for entry in entries {
+        pcs.entry(entry.pc.clone()).or_default().push(entry);
+    }
+    pcs.into_iter().map(|(name, entries)| Pc { name, entries }).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,143 @@
+//! What changed from one report of a PC to the next, and what the PCs that pass have in common.
+
+use super::Pc;
+use super::entry::{Entry, Percentile};
+use crate::verdict::Outcome;
+
+/// A tail has grown where it is longer by more than this, and the intervals, where there are any, lie apart.
+const GROWN: f64 = 1.25;
+
+/// A tail that grew between two reports of one PC and one protocol.
+pub struct Growth<'a> {
+    pub before: &'a Entry,
+    pub after: &'a Entry,
+    /// Which percentile grew.
+    pub percentile: &'static str,
+    pub from_us: f64,
+    pub to_us: f64,
+    pub changes: Vec<Change>,
+}
+
+/// One value of the machine section that differs; a value that one report lacks is `None`.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Change {
+    pub what: String,
+    pub before: Option<String>,
+    pub after: Option<String>,
+}
+
+/// Every growth between consecutive reports of the same protocol.
+pub fn growths(pc: &Pc) -> Vec<Growth<'_>> {
+    let mut found = Vec::new();
+    for (i, after) in pc.entries.iter().enumerate() {
+        let before = pc.entries[..i].iter().rev().find(|e| e.protocol == after.protocol);
+        found.extend(before.and_then(|before| growth(before, after)));
+    }
+    found
+}
+
+/// The highest percentile that both reports have decides.
+fn growth<'a>(before: &'a Entry, after: &'a Entry) -> Option<Growth<'a>> {
+    let pairs = [("p99.9", before.p999, after.p999), ("p99", before.p99, after.p99)];
+    let (percentile, from, to) = pairs
+        .into_iter()
+        .find_map(|(name, a, b)| a.zip(b).map(|(a, b)| (name, a, b)))?;
+    has_grown(from, to).then(|| Growth {
+        before,
+        after,
+        percentile,
+        from_us: from.us,
+        to_us: to.us,
+        changes: changes(before, after),
+    })
+}
+
+fn has_grown(from: Percentile, to: Percentile) -> bool {
+    let apart = from
+        .interval_us
+        .zip(to.interval_us)
+        .is_none_or(|(from, to)| to[0] > from[1]);
+    to.us > GROWN * from.us && apart
+}
+
+/// What the machine sections say differently. A fact that older versions did not write is no change.
+fn changes(before: &Entry, after: &Entry) -> Vec<Change> {
+    let mut names: Vec<&String> = before.machine.keys().chain(after.machine.keys()).collect();
+    names.sort();
+    names.dedup();
+    let of_group = |entry: &Entry, name: &str| {
+        let group = name.split(": ").next().unwrap_or_default();
+        entry.machine.keys().any(|k| k.split(": ").next() == Some(group))
+    };
+    let differs = |name: &&String| {
+        let same = before.machine.get(*name) == after.machine.get(*name);
+        !same && of_group(before, name) && of_group(after, name)
+    };
+    let change = |name: &String| Change {
+        what: name.clone(),
+        before: before.machine.get(name).cloned(),
+        after: after.machine.get(name).cloned(),
+    };
+    names.into_iter().filter(differs).map(change).collect()
+}
+
+/// A value that every passing PC has, and what the others have instead.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Common {
+    pub what: String,
+    pub value: String,
+    /// Name and value of each PC that does not pass and differs.
+    pub others: Vec<(String, String)>,
+}
+
+/// By the latest reports; first what most of the other PCs have otherwise.
+pub fn in_common(pcs: &[Pc]) -> Vec<Common> {
+    let (good, others): (Vec<&Pc>, Vec<&Pc>) = pcs.iter().partition(|pc| pc.latest().outcome == Outcome::Pass);
+    // What a single PC has in common with itself says nothing.
+    let Some((first, rest)) = good.split_first().filter(|(_, rest)| !rest.is_empty()) else {
+        return Vec::new();
+    };
+    let shared = first
+        .latest()
+        .machine
+        .iter()
+        .filter(|(what, value)| rest.iter().all(|pc| pc.latest().machine.get(*what) == Some(value)));
+    let mut found: Vec<Common> = shared
+        .map(|(what, value)| {
+            let differing = others.iter().filter_map(|pc| {
+                let other = pc.latest().machine.get(what)?;
+                (other != value).then(|| (pc.name.clone(), other.clone()))
+            });
+            Common {
+                what: what.clone(),
+                value: value.clone(),
+                others: differing.collect(),
+            }
+        })
+        .filter(|common| !common.others.is_empty())
+        .collect();
+    found.sort_by_key(|common| std::cmp::Reverse(common.others.len()));
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tail_grows_only_beyond_its_uncertainty() {
+        let p = |us, interval_us| Percentile { us, interval_us };
+        assert!(has_grown(p(20.0, Some([18.0, 22.0])), p(30.0, Some([27.0, 34.0]))));
+        assert!(
+            !has_grown(p(20.0, Some([18.0, 28.0])), p(30.0, Some([27.0, 34.0]))),
+            "the intervals overlap"
+        );
+        assert!(
+            !has_grown(p(20.0, Some([19.9, 20.1])), p(22.0, Some([21.9, 22.1]))),
+            "a tenth is not much"
+        );
+        // Reports of older versions have no intervals.
+        assert!(has_grown(p(20.0, None), p(30.0, Some([27.0, 34.0]))));
+        assert!(!has_grown(p(30.0, None), p(20.0, None)));
+    }
+}

@@ -1,0 +1,224 @@
+//! The page over all reports.
+
+use super::Pc;
+use super::change::{self, Change, Common, Growth};
+use super::entry::{Entry, Percentile, Unread};
+use crate::html::STYLE;
+use crate::html::parts::{Column, badge, cell, num, or_na, table};
+use crate::plots::{self, DrawError, TrendPoint};
+use crate::verdict::Outcome;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+/// The whole page, which needs nothing else.
+pub fn page(pcs: &[Pc], unread: &[Unread]) -> Result<String, DrawError> {
+    let trends = trends(pcs)?;
+    let growths: Vec<(&Pc, Growth)> = pcs
+        .iter()
+        .flat_map(|pc| change::growths(pc).into_iter().map(move |g| (pc, g)))
+        .collect();
+    let reports: usize = pcs.iter().map(|pc| pc.entries.len()).sum();
+    let times = || pcs.iter().flat_map(|pc| pc.entries.iter().map(|e| e.made_at.as_str()));
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                title { "Latency of " (pcs.len()) " PCs" }
+                meta name="viewport" content="width=device-width";
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                main {
+                    header { h1 { "Latency of " (pcs.len()) " PCs" } }
+                    p class="sub" {
+                        (reports) " reports, " (times().min().unwrap_or_default()) " to " (times().max().unwrap_or_default())
+                        ". Times are wake-up latencies of the force loop."
+                    }
+                    (cards(pcs, growths.len()))
+                    h2 { "Latest report of each PC" }
+                    (overview(pcs))
+                    h2 { "Trend of each PC" }
+                    (trends)
+                    (grown(&growths))
+                    (common(pcs, &change::in_common(pcs)))
+                    (not_counted(unread))
+                    footer {
+                        "A tail counts as grown where p99.9 (else p99) is more than 1.25 times that of the previous report of the same PC, \
+                         scene, load, rate and spin, and the 95 % intervals lie apart. A change beside it is not yet its cause. All \
+                         reports as a table: fleet.csv."
+                    }
+                }
+            }
+        }
+    };
+    Ok(page.into_string() + "\n")
+}
+
+fn cards(pcs: &[Pc], grown: usize) -> Markup {
+    let with = |outcome| pcs.iter().filter(|pc| pc.latest().outcome == outcome).count();
+    let cards = [
+        ("PCs pass", with(Outcome::Pass)),
+        ("PCs fail", with(Outcome::Fail)),
+        ("PCs not measurable", with(Outcome::NotMeasurable)),
+        ("tails grew", grown),
+    ];
+    html! {
+        section class="cards four" {
+            @for (what, count) in cards { div { b { (count) } br; span { (what) } } }
+        }
+    }
+}
+
+fn overview(pcs: &[Pc]) -> Markup {
+    let us = |p: Option<Percentile>| or_na(p.map(|p| p.us));
+    let row = |pc: &Pc| {
+        let e = pc.latest();
+        let kernel = e.machine.get("Kernel: version").map_or("", |v| kernel_release(v));
+        vec![
+            badge(e.outcome),
+            html! { b { (pc.name) } br; span class="faint" { (e.made_at) } },
+            us(e.p50),
+            us(e.p99),
+            us(e.p999),
+            or_na(e.max_us),
+            cell(e.missed),
+            html! { (e.protocol.replace(" us", " \u{b5}s")) br; span class="faint" { (kernel) } },
+            cell(e.failed.join(", ")),
+        ]
+    };
+    let mut sorted: Vec<&Pc> = pcs.iter().collect();
+    let rank = |pc: &&Pc| match pc.latest().outcome {
+        Outcome::Fail => 0,
+        Outcome::NotMeasurable => 1,
+        Outcome::Pass => 2,
+    };
+    // What needs attention first.
+    sorted.sort_by_key(rank);
+    let rows: Vec<Vec<Markup>> = sorted.into_iter().map(row).collect();
+    let head = [
+        "outcome",
+        "PC",
+        "p50, \u{b5}s",
+        "p99, \u{b5}s",
+        "p99.9, \u{b5}s",
+        "max, \u{b5}s",
+        "missed",
+        "measured on",
+        "limits not met",
+    ];
+    let n = Column::Number;
+    table(
+        &head,
+        &rows,
+        &[Column::Text, Column::Text, n, n, n, n, n, Column::Text, Column::Wide],
+    )
+}
+
+/// `Linux version 6.1.0-rt (builder) ...`: what stands third.
+fn kernel_release(version: &str) -> &str {
+    version.split_whitespace().nth(2).unwrap_or(version)
+}
+
+/// One picture for each PC with two reports or more of one protocol.
+fn trends(pcs: &[Pc]) -> Result<Markup, DrawError> {
+    let (mut figures, mut single) = (Vec::new(), Vec::new());
+    for pc in pcs {
+        let protocol = &pc.latest().protocol;
+        let same: Vec<&Entry> = pc.entries.iter().filter(|e| e.protocol == *protocol).collect();
+        if same.len() < 2 {
+            single.push(pc.name.as_str());
+            continue;
+        }
+        let points: Vec<TrendPoint> = same.iter().map(|e| point(e)).collect();
+        figures.push((
+            pc.name.as_str(),
+            protocol.replace(" us", " \u{b5}s"),
+            plots::trend(&points)?,
+        ));
+    }
+    Ok(html! {
+        section class="figures three" {
+            @for (name, protocol, svg) in figures {
+                figure { figcaption { (name) br; span class="faint" { (protocol) } } (PreEscaped(svg)) }
+            }
+        }
+        @if !single.is_empty() { p class="faint" { "One report alone: " (single.join(", ")) "." } }
+    })
+}
+
+fn point(e: &Entry) -> TrendPoint {
+    let time = jiff::civil::DateTime::strptime("%Y-%m-%d %H:%M:%S UTC", &e.made_at).ok();
+    let seconds = time
+        .and_then(|t| t.to_zoned(jiff::tz::TimeZone::UTC).ok())
+        .map_or(0, |t| t.timestamp().as_second());
+    TrendPoint {
+        day: seconds as f64 / 86_400.0,
+        p50_us: e.p50.map(|p| p.us),
+        p999_us: e.p999.map(|p| p.us),
+        interval_us: e.p999.and_then(|p| p.interval_us),
+        passed: e.outcome == Outcome::Pass,
+    }
+}
+
+fn grown(growths: &[(&Pc, Growth)]) -> Markup {
+    let row = |(pc, g): &(&Pc, Growth)| {
+        vec![
+            html! { b { (pc.name) } br; span class="faint" { (g.before.made_at) br; (g.after.made_at) } },
+            cell(g.percentile),
+            cell(format!("{} to {}", num(g.from_us), num(g.to_us))),
+            changes(&g.changes),
+        ]
+    };
+    let rows: Vec<Vec<Markup>> = growths.iter().map(row).collect();
+    html! {
+        h2 { "Tails that grew, and what changed with them" }
+        @if rows.is_empty() {
+            p { "No tail grew from one report to the next." }
+        } @else {
+            (table(&["PC, between", "of", "\u{b5}s", "what changed"], &rows, &[Column::Text, Column::Text, Column::Number, Column::Wide]))
+        }
+    }
+}
+
+fn changes(all: &[Change]) -> Markup {
+    let shown = |value: &Option<String>| value.clone().unwrap_or_else(|| "not reported".to_owned());
+    html! {
+        @if all.is_empty() { "Nothing that the reports record: look at what else runs on the PC, its load and its temperature." }
+        @for change in all {
+            div { b { (change.what) } ": " (shown(&change.before)) " \u{2192} " (shown(&change.after)) }
+        }
+    }
+}
+
+fn common(pcs: &[Pc], all: &[Common]) -> Markup {
+    let good: Vec<&str> = pcs
+        .iter()
+        .filter(|pc| pc.latest().outcome == Outcome::Pass)
+        .map(|pc| pc.name.as_str())
+        .collect();
+    let row = |c: &Common| {
+        let others = html! { @for (pc, value) in &c.others { div { (pc) ": " (value) } } };
+        vec![cell(&c.what), cell(&c.value), others]
+    };
+    let rows: Vec<Vec<Markup>> = all.iter().map(row).collect();
+    html! {
+        h2 { "What the PCs that pass have in common" }
+        @if good.len() < 2 {
+            p { "Fewer than two PCs pass." }
+        } @else if rows.is_empty() {
+            p { "Nothing that the other PCs do not have as well." }
+        } @else {
+            p class="faint" { "All of " (good.join(", ")) "; shown where another PC differs." }
+            (table(&["what", "PCs that pass", "others"], &rows, &[Column::Text, Column::Wide, Column::Wide]))
+        }
+    }
+}
+
+fn not_counted(unread: &[Unread]) -> Markup {
+    html! {
+        @if !unread.is_empty() {
+            h2 { "Files that are not counted" }
+            ul { @for u in unread { li { code { (u.path) } ": " (u.why) } } }
+        }
+    }
+}
