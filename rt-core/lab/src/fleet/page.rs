@@ -103,7 +103,7 @@ fn overview(pcs: &[Pc]) -> Markup {
         "p99.9, \u{b5}s",
         "max, \u{b5}s",
         "missed",
-        "measured on",
+        "measured with",
         "limits not met",
     ];
     let n = Column::Number;
@@ -142,6 +142,7 @@ fn trends(pcs: &[Pc]) -> Result<Markup, DrawError> {
                 figure { figcaption { (name) br; span class="faint" { (protocol) } } (PreEscaped(svg)) }
             }
         }
+        p class="faint" { "A full point is a report that passed, a bar the 95 % interval of p99.9." }
         @if !single.is_empty() { p class="faint" { "One report alone: " (single.join(", ")) "." } }
     })
 }

@@ -1,7 +1,8 @@
 //! The wake-ups of one PC over its reports.
 
-use super::{BLUE, Decades, DrawError, FAINT, INK, ORANGE, decade_above, label, number, picture_of};
+use super::{BLUE, Decades, DrawError, FAINT, ORANGE, decade_above, label, number, picture_of};
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 const SIZE: (u32, u32) = (400, 220);
 
@@ -27,7 +28,7 @@ pub fn trend(points: &[TrendPoint]) -> Result<String, DrawError> {
                 .flatten()
         };
         let low = all().fold(f64::MAX, f64::min).min(10.0).max(0.1).log10().floor();
-        let high = decade_above(all().fold(100.0, f64::max) * 1.1);
+        let high = decade_above(all().fold(50.0, f64::max) * 1.8);
         let mut chart = ChartBuilder::on(root)
             .margin(8)
             .margin_right(18)
@@ -67,11 +68,11 @@ pub fn trend(points: &[TrendPoint]) -> Result<String, DrawError> {
                 chart.draw_series([Circle::new((x, us), 4, ORANGE.stroke_width(2))])?;
             }
         }
-        // The names stand at the ends of the lines, where there is room above the first point.
+        // The names stand above the first points.
         for (values, name) in [(&p50, "p50"), (&p999, "p99.9")] {
             if let Some(&(x, us)) = values.first() {
-                let style = (super::FONT, 12).into_font().color(&INK);
-                chart.draw_series([Text::new(name, (x + 0.02 * days, us * 1.5), style)])?;
+                let style = label().pos(Pos::new(HPos::Left, VPos::Bottom));
+                chart.draw_series([Text::new(name, (x, us * 1.25), style)])?;
             }
         }
         Ok(())
