@@ -2,7 +2,7 @@
 
 mod trend;
 
-pub use trend::{TrendPoint, trend};
+pub use trend::{TrendPoint, trend, trend_range_us};
 
 use crate::collect::{LoopTiming, Window};
 use hdrhistogram::Histogram;

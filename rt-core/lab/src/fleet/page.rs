@@ -121,7 +121,7 @@ fn kernel_release(version: &str) -> &str {
 
 /// One picture for each PC with two reports or more of one protocol.
 fn trends(pcs: &[Pc]) -> Result<Markup, DrawError> {
-    let (mut figures, mut single) = (Vec::new(), Vec::new());
+    let (mut lines, mut single) = (Vec::new(), Vec::new());
     for pc in pcs {
         let protocol = &pc.latest().protocol;
         let same: Vec<&Entry> = pc.entries.iter().filter(|e| e.protocol == *protocol).collect();
@@ -129,12 +129,19 @@ fn trends(pcs: &[Pc]) -> Result<Markup, DrawError> {
             single.push(pc.name.as_str());
             continue;
         }
-        let points: Vec<TrendPoint> = same.iter().map(|e| point(e)).collect();
-        figures.push((
-            pc.name.as_str(),
-            protocol.replace(" us", " \u{b5}s"),
-            plots::trend(&points)?,
-        ));
+        // Short runs have no p99.9; a line is of one percentile.
+        let (tail, of): (_, fn(&Entry) -> Option<Percentile>) = if same.iter().all(|e| e.p999.is_some()) {
+            ("p99.9", |e| e.p999)
+        } else {
+            ("p99", |e| e.p99)
+        };
+        let points: Vec<TrendPoint> = same.iter().map(|e| point(e, of(e))).collect();
+        lines.push((pc.name.as_str(), protocol.replace(" us", " \u{b5}s"), tail, points));
+    }
+    let range_us = plots::trend_range_us(lines.iter().flat_map(|line| &line.3));
+    let mut figures = Vec::new();
+    for (name, protocol, tail, points) in &lines {
+        figures.push((name, protocol, plots::trend(points, tail, range_us)?));
     }
     Ok(html! {
         section class="figures three" {
@@ -142,21 +149,21 @@ fn trends(pcs: &[Pc]) -> Result<Markup, DrawError> {
                 figure { figcaption { (name) br; span class="faint" { (protocol) } } (PreEscaped(svg)) }
             }
         }
-        p class="faint" { "A full point is a report that passed, a bar the 95 % interval of p99.9." }
+        p class="faint" { "A full point is a report that passed, a bar the 95 % interval. All pictures have one scale." }
         @if !single.is_empty() { p class="faint" { "One report alone: " (single.join(", ")) "." } }
     })
 }
 
-fn point(e: &Entry) -> TrendPoint {
+fn point(e: &Entry, tail: Option<Percentile>) -> TrendPoint {
     let time = jiff::civil::DateTime::strptime("%Y-%m-%d %H:%M:%S UTC", &e.made_at).ok();
     let seconds = time
         .and_then(|t| t.to_zoned(jiff::tz::TimeZone::UTC).ok())
         .map_or(0, |t| t.timestamp().as_second());
     TrendPoint {
-        day: seconds as f64 / 86_400.0,
+        time_s: seconds as f64,
         p50_us: e.p50.map(|p| p.us),
-        p999_us: e.p999.map(|p| p.us),
-        interval_us: e.p999.and_then(|p| p.interval_us),
+        tail_us: tail.map(|p| p.us),
+        interval_us: tail.and_then(|p| p.interval_us),
         passed: e.outcome == Outcome::Pass,
     }
 }

@@ -137,9 +137,11 @@ fn loop_section(run: &LoopReport, timing: &LoopTiming, rate_hz: f64, [path, outp
 }
 
 fn parts_of_run(timing: &LoopTiming, rate_hz: f64) -> Vec<Summary> {
+    // A second of the run brings a part that share of its samples.
+    let rate_of_part_hz = rate_hz / PARTS as f64;
     let parts = timing.sample.parts.iter().enumerate().filter(|(_, h)| !h.is_empty());
     parts
-        .map(|(i, h)| summary(&format!("part {} of {PARTS}", i + 1), h, rate_hz))
+        .map(|(i, h)| summary(&format!("part {} of {PARTS}", i + 1), h, rate_of_part_hz))
         .collect()
 }
 
