@@ -84,11 +84,11 @@ pub fn trend(points: &[TrendPoint], tail: &str, range_us: [f64; 2]) -> Result<St
                 chart.draw_series([Circle::new((x, us), 4, ORANGE.stroke_width(2))])?;
             }
         }
-        // The names stand above the first points.
-        for (values, name) in [(&p50, "p50"), (&late, tail)] {
+        // The names stand below and above the first points.
+        for (values, name, side, factor) in [(&p50, "p50", VPos::Top, 0.8), (&late, tail, VPos::Bottom, 1.25)] {
             if let Some(&(x, us)) = values.first() {
-                let style = label().pos(Pos::new(HPos::Left, VPos::Bottom));
-                chart.draw_series([Text::new(name.to_owned(), (x, us * 1.25), style)])?;
+                let style = label().pos(Pos::new(HPos::Left, side));
+                chart.draw_series([Text::new(name.to_owned(), (x, us * factor), style)])?;
             }
         }
         Ok(())
