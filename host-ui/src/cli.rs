@@ -18,7 +18,7 @@ use stylet_base::format::printable;
 use stylet_base::interrupt;
 use stylet_controllers as controller;
 use stylet_files as files;
-use stylet_host::core_args::{self, CoreArgs};
+use stylet_host::core_args::CoreArgs;
 use stylet_host::record;
 use stylet_implant::procedure;
 use stylet_implant::readers::{SeedDefaults, read_seeds};
@@ -90,7 +90,7 @@ enum Task {
     /// Record every tick of the force loop and the tissue's snapshots in an MCAP file, and count what is missing
     Record {
         /// Name that rt-core was started under
-        #[arg(long, default_value = "main", value_parser = core_args::instance)]
+        #[arg(long, default_value = "main", value_parser = Instance::new)]
         instance: Instance,
         /// File to write
         #[arg(long, value_name = "FILE.mcap")]
@@ -106,7 +106,7 @@ enum Task {
     /// address can watch, for the protocol has no passwords
     Igtl {
         /// Name that rt-core was started under
-        #[arg(long, default_value = "main", value_parser = core_args::instance)]
+        #[arg(long, default_value = "main", value_parser = Instance::new)]
         instance: Instance,
         /// Address and port to listen on
         #[arg(long, default_value = "127.0.0.1:18944", value_name = "ADDRESS")]
@@ -129,7 +129,7 @@ enum Task {
     /// Let rt-core write its flight recording: the last seconds of both loops, for 'rt-core replay'
     Flight {
         /// Name that rt-core was started under
-        #[arg(long, default_value = "main", value_parser = core_args::instance)]
+        #[arg(long, default_value = "main", value_parser = Instance::new)]
         instance: Instance,
     },
     /// Segmented volumes and scene files

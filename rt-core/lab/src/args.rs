@@ -7,7 +7,7 @@ use crate::measure;
 use crate::whose::WhoseArgs;
 use clap::Args;
 use std::path::PathBuf;
-use stylet_runtime::args::RealTimeArgs;
+use stylet_runtime::args::{OptionsError, RealTimeArgs};
 use stylet_runtime::process::Options;
 
 /// A measurement.
@@ -46,19 +46,40 @@ pub struct LatencyArgs {
     real_time: RealTimeArgs,
 }
 
+/// Settings of the loops that this PC cannot have.
+#[derive(Debug, thiserror::Error)]
+pub enum ArgsError {
+    /// Those of every run.
+    #[error(transparent)]
+    Options(#[from] OptionsError),
+    /// The loop would take more of its core than the kernel gives to real-time threads.
+    #[error(
+        "--spin-us {given_us}: at {rate_hz} Hz at most {longest_us}, or the kernel would stop the loop for its share of real-time work"
+    )]
+    Spin {
+        /// As given.
+        given_us: u64,
+        /// Rate of the loop.
+        rate_hz: u32,
+        /// Longest spin that leaves the rest of the core to others.
+        longest_us: u64,
+    },
+}
+
 impl LatencyArgs {
     /// Settings of the loops, with an instance of its own, so that a running simulator is not disturbed in its shared memory.
-    pub fn options(&self) -> Result<Options, String> {
+    pub fn options(&self) -> Result<Options, ArgsError> {
         let instance = format!("lab-{}", std::process::id());
-        let mut options = self.real_time.options(&instance).map_err(|e| e.to_string())?;
+        let mut options = self.real_time.options(&instance)?;
         options.haptic_period_ns = measure::period_ns(self.rate);
         options.spin_ns = self.spin_us * 1_000;
         let longest_us = longest_spin_ns(options.haptic_period_ns, Machine::this().throttle()) / 1_000;
         if self.spin_us > longest_us {
-            return Err(format!(
-                "--spin-us {}: at {} Hz at most {longest_us}, or the kernel would stop the loop for its share of real-time work",
-                self.spin_us, self.rate
-            ));
+            return Err(ArgsError::Spin {
+                given_us: self.spin_us,
+                rate_hz: self.rate,
+                longest_us,
+            });
         }
         Ok(options)
     }

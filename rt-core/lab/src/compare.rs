@@ -1,13 +1,14 @@
 //! Our wake-up latency, alternating with another one: that of `cyclictest` on the same core with the same priority and interval, or our own without
 //! the load.
 
-use crate::load::{Load, Running};
-use crate::measure::{Measured, Setup, measure};
+use crate::load::{Load, LoadError, Running};
+use crate::measure::{MeasureError, Measured, Setup, measure};
 use crate::sample::histogram;
 use crate::summary::quantile_us;
 use clap::ValueEnum;
 use hdrhistogram::Histogram;
 use serde::Serialize;
+use std::io;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -69,8 +70,50 @@ pub struct Comparison {
     pub others: Histogram<u64>,
 }
 
+/// Why there is no comparison.
+#[derive(Debug, thiserror::Error)]
+pub enum CompareError {
+    /// Our side.
+    #[error(transparent)]
+    Measure(#[from] MeasureError),
+    /// The load beside cyclictest.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The other side.
+    #[error(transparent)]
+    Cyclictest(#[from] CyclictestError),
+    /// Histograms of different bins; a fault of the program.
+    #[error("histograms: {0}")]
+    Histograms(String),
+}
+
+/// Why `cyclictest` has no histogram.
+#[derive(Debug, thiserror::Error)]
+pub enum CyclictestError {
+    /// It does not start.
+    #[error("cyclictest does not start: {0}")]
+    Start(io::Error),
+    /// It cannot be waited for.
+    #[error("cyclictest: {0}")]
+    Wait(io::Error),
+    /// It failed; first line of what it printed.
+    #[error("cyclictest failed: {0}")]
+    Failed(String),
+    /// It ended well, and its file holds none.
+    #[error("cyclictest wrote no histogram")]
+    NoHistogram,
+    /// A signal asked this program to end.
+    #[error("interrupted")]
+    Interrupted,
+}
+
 /// Measures our loops and the other side alternately, `rounds` times each.
-pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &AtomicBool) -> Result<Comparison, String> {
+pub fn compare(
+    setup: &Setup,
+    against: Against,
+    rounds: u32,
+    interrupted: &AtomicBool,
+) -> Result<Comparison, CompareError> {
     let turn_ns = (setup.duration_ns / u64::from(rounds)).max(SHORTEST_TURN_NS);
     let tool = match against {
         Against::Cyclictest => version(),
@@ -111,13 +154,13 @@ pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &Atomi
         let others = match others {
             Ok(others) => others,
             Err(why) => {
-                comparison.absent = Some(why);
+                comparison.absent = Some(why.to_string());
                 break;
             }
         };
         comparison.rounds.push(round(ours, &others));
         let joined = comparison.ours.add(ours).and(comparison.others.add(&others));
-        joined.map_err(|e| format!("histograms: {e:?}"))?;
+        joined.map_err(|e| CompareError::Histograms(format!("{e:?}")))?;
         // SYNC: set by a signal handler; nothing but the flag is carried.
         if interrupted.load(Ordering::Acquire) {
             break;
@@ -127,7 +170,7 @@ pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &Atomi
     Ok(comparison)
 }
 
-fn unloaded(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, String> {
+fn unloaded(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, CompareError> {
     let setup = Setup {
         load: Load::None,
         ..*setup
@@ -176,7 +219,7 @@ fn version() -> Option<String> {
         .map(|l| l.trim().to_owned())
 }
 
-fn cyclictest(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, String> {
+fn cyclictest(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, CompareError> {
     let load = Running::start(setup.load, &setup.options.instance, setup.folder)?;
     let file = setup.folder.join("cyclictest.tmp");
     let mut child = Command::new("cyclictest")
@@ -184,17 +227,15 @@ fn cyclictest(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>,
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
-        .map_err(|e| format!("cyclictest does not start: {e}"))?;
+        .map_err(CyclictestError::Start)?;
     let ended = wait(&mut child, interrupted);
     drop(load);
     // The ui load was in shared memory, and there was no core to clean up after it.
     setup.options.instance.sweep();
     let text = std::fs::read_to_string(&file).unwrap_or_default();
     let _ = std::fs::remove_file(&file);
-    match ended {
-        Ok(()) => read(&text).ok_or_else(|| "cyclictest wrote no histogram".to_owned()),
-        Err(why) => Err(why),
-    }
+    ended?;
+    Ok(read(&text).ok_or(CyclictestError::NoHistogram)?)
 }
 
 fn arguments(options: &Options, duration_ns: u64, file: &Path) -> Vec<String> {
@@ -213,7 +254,7 @@ fn arguments(options: &Options, duration_ns: u64, file: &Path) -> Vec<String> {
     arguments
 }
 
-fn wait(child: &mut Child, interrupted: &AtomicBool) -> Result<(), String> {
+fn wait(child: &mut Child, interrupted: &AtomicBool) -> Result<(), CyclictestError> {
     loop {
         match child.try_wait() {
             Ok(Some(status)) if status.success() => return Ok(()),
@@ -223,16 +264,16 @@ fn wait(child: &mut Child, interrupted: &AtomicBool) -> Result<(), String> {
                     let _ = std::io::Read::read_to_string(&mut pipe, &mut said);
                 }
                 let first = said.lines().next().unwrap_or("no reason given").to_owned();
-                return Err(format!("cyclictest failed: {first}"));
+                return Err(CyclictestError::Failed(first));
             }
             Ok(None) => {}
-            Err(e) => return Err(format!("cyclictest: {e}")),
+            Err(e) => return Err(CyclictestError::Wait(e)),
         }
         // SYNC: set by a signal handler; nothing but the flag is carried.
         if interrupted.load(Ordering::Acquire) {
             let _ = child.kill();
             let _ = child.wait();
-            return Err("interrupted".to_owned());
+            return Err(CyclictestError::Interrupted);
         }
         std::thread::sleep(Duration::from_millis(50));
     }

@@ -2,19 +2,19 @@
 
 use crate::collect::{LoopTiming, Plan};
 use crate::gaps::{self, GapReport};
-use crate::host::{Host, HostReport, Script};
-use crate::load::{Load, Running};
+use crate::host::{Host, HostError, HostReport, Script};
+use crate::load::{Load, LoadError, Running};
 use crate::machine::Machine;
 use crate::watch::{self, CoreWatch};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stylet_runtime::process::{self, LoopReport, Options, RunReport};
+use stylet_runtime::process::{self, LoopReport, Options, RunError, RunReport};
 use stylet_runtime::rt::clock::{HAPTIC_PERIOD_NS, TISSUE_PERIOD_NS};
 use stylet_runtime::rt::haptic::HAPTIC_STAGES;
 use stylet_runtime::rt::timing::{PoseTimes, Probe, Probes};
 use stylet_runtime::rt::tissue::TISSUE_STAGES;
-use stylet_sim::scene::Scene;
+use stylet_sim::scene::{Scene, SceneError};
 
 /// Ticks of the first half second are not recorded: caches and page tables are still being filled.
 pub const WARM_UP_S: f64 = 0.5;
@@ -35,6 +35,26 @@ pub struct Setup<'a> {
 
 /// The ring to the gathering thread holds so much time of ticks.
 const RING_NS: u64 = 4_000_000_000;
+
+/// Why nothing was measured.
+#[derive(Debug, thiserror::Error)]
+pub enum MeasureError {
+    /// The scene cannot be built.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The load does not start, or ended by itself.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The loops did not run.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The host saw no tick.
+    #[error(transparent)]
+    Host(#[from] HostError),
+    /// A thread of the measurement ended early.
+    #[error("a measuring thread panicked")]
+    Panicked,
+}
 
 /// Results of one measurement.
 pub struct Measured {
@@ -82,8 +102,8 @@ fn watch_core(options: &Options) -> Option<usize> {
 }
 
 /// Runs for `setup.duration_ns` after the first tick that a host saw, or until `interrupted`.
-pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, String> {
-    let script = Script::of(&Scene::builtin(&setup.options.scene).map_err(|e| e.to_string())?);
+pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, MeasureError> {
+    let script = Script::of(&Scene::builtin(&setup.options.scene)?);
     let pose_times = Arc::new(PoseTimes::new());
     let options = setup.options;
     let ring = |period_ns| rtrb::RingBuffer::new((RING_NS / period_ns) as usize);
@@ -109,7 +129,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Stri
         let stop = &stop;
         let host = threads.spawn(|| {
             let warm_up = warm_up_ticks(options.haptic_period_ns);
-            let host = Host::new(&options.instance, script, pose_times, warm_up).map_err(|e| e.to_string());
+            let host = Host::new(&options.instance, script, pose_times, warm_up);
             let report = host.and_then(|h| h.run(setup.duration_ns, || interrupted.load(Ordering::Acquire), stop));
             // SYNC: pairs with the acquire loads of bridge and watches; nothing but the flag is carried.
             stop.store(true, Ordering::Release);
@@ -134,9 +154,9 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Stri
     drop(load);
     options.instance.sweep();
     loaded?;
-    let panicked = |_| "a measuring thread panicked".to_owned();
+    let panicked = |_| MeasureError::Panicked;
     // The reason why the loops did not run is more useful than that the host saw nothing.
-    let run = run.map_err(|e| e.to_string())?;
+    let run = run?;
     Ok(Measured {
         run,
         haptic: haptic.map_err(panicked)?,
