@@ -44,6 +44,9 @@ pub struct Cli {
     /// Image for the slices instead of simulated ultrasound, of the patient of --scene FILE: NIfTI-1, NRRD, MetaImage
     #[arg(long, value_name = "FILE", requires = "scene")]
     image: Option<PathBuf>,
+    /// Show a recording made by 'host-ui record' in place of a running rt-core; nothing in it can be moved
+    #[arg(long, value_name = "FILE.mcap", conflicts_with = "scene")]
+    watch: Option<PathBuf>,
     /// Ignore gamepads and 3D mice: only keys and mouse move the needle
     #[arg(long)]
     no_controllers: bool,
@@ -190,6 +193,7 @@ impl Cli {
                     scene: self.window.scene,
                     label: self.window.label,
                     image: self.image,
+                    watch: self.watch,
                     controllers: !self.no_controllers,
                     pause: !self.without_pause,
                     count_frames: self.count_frames,
@@ -278,7 +282,7 @@ impl Cli {
 }
 
 fn check(file: &Path, label: Option<u8>) -> Result<(), CommandError> {
-    let v = files::read(file, label, &files::Progress::default())?;
+    let v = files::watched(file, |progress| files::read(file, label, progress))?;
     println!("{}", printable(&v.name));
     if files::scene::is_scene(file) {
         check_scene_file(file)?;
@@ -349,7 +353,7 @@ fn check_scene_file(file: &Path) -> Result<(), CommandError> {
     }
     if let Some(named) = &scene.image {
         let path = file.with_file_name(named);
-        let image = files::Image::read(&path, &files::Progress::default())?;
+        let image = files::watched(&path, |progress| files::Image::read(&path, progress))?;
         let [x, y, z] = image.dims;
         println!("  image: {x} x {y} x {z} voxels in {}", path.display());
     }
