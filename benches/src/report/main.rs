@@ -1,10 +1,14 @@
 //! `make report`: every tissue model over the same insertions; speed, error, and what to pick.
 
+mod budget;
 mod fit;
 mod models;
 mod page;
+mod page_parts;
+mod passes;
 mod picture;
 mod runs;
+mod ships;
 mod table;
 
 use clap::Parser;
@@ -51,6 +55,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             rows.extend(measure(&scene, insertion, &fitted, options.rounds.max(1)));
         }
     }
+    let passes = passes::measure();
+    let causes = budget::causes();
+    let ships = ships::measure(options.rounds);
+    ships::write(&ships, &out.join("as-it-ships.csv"))?;
     let points = table::points(&rows);
     table::write(&rows, &out.join("speed-vs-error.csv"))?;
     picture::draw(&points, &out.join("speed-vs-error.svg"))?;
@@ -60,6 +68,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         points: &points,
         fitted: &fitted,
         refinement: &refinement(),
+        ships: &ships,
+        causes: &causes,
+        passes: &passes,
         seconds: start.elapsed().as_secs_f64(),
     };
     std::fs::write(out.join("README.md"), page::write(&found)?)?;
