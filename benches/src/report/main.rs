@@ -44,6 +44,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let out = options.out.unwrap_or_else(|| machine::run_folder(&machine));
     std::fs::create_dir_all(&out)?;
 
+    let passes = passes::measure();
+    let causes = budget::causes();
+    let ships = ships::measure(options.rounds);
+    ships::write(&ships, &out.join("as-it-ships.csv"))?;
     eprintln!("fitting ChainMail to the converged FEM ...");
     let fitted = fit_at(SPACINGS_M[1]);
     eprintln!("fitted: {fitted:?}");
@@ -55,10 +59,6 @@ fn main() -> Result<(), Box<dyn Error>> {
             rows.extend(measure(&scene, insertion, &fitted, options.rounds.max(1)));
         }
     }
-    let passes = passes::measure();
-    let causes = budget::causes();
-    let ships = ships::measure(options.rounds);
-    ships::write(&ships, &out.join("as-it-ships.csv"))?;
     let points = table::points(&rows);
     table::write(&rows, &out.join("speed-vs-error.csv"))?;
     picture::draw(&points, &out.join("speed-vs-error.svg"))?;

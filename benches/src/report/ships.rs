@@ -85,7 +85,9 @@ pub fn measure(rounds: usize) -> Vec<Ships> {
         let chainmail = theatre.line(TissueKind::ChainMail);
         for (kind, (line, prepared_s)) in [(TissueKind::Fem, fem), (TissueKind::ChainMail, chainmail)] {
             let live = theatre.run(kind, &line, &mut twin, rounds);
-            rows.push(row(case, kind, &live, prepared_s, twin.residual));
+            let row = row(case, kind, &live, prepared_s, twin.residual);
+            eprintln!("  {}: field {:.2} % of {:.1} mm on average, {:.2} % at worst", row.tissue, row.field_percent, row.largest_mm, row.field_worst_percent);
+            rows.push(row);
         }
     }
     rows

@@ -85,7 +85,7 @@ fn a_needle_off_its_line_is_as_near_to_the_converged_body_as_the_page_says() {
         ("off the line, 280 mm/s, nu 0.499", 0.499, fast),
     ];
     for (case, nu, way) in cases {
-        let (field, tip, unfit, ticks) = off_its_line(nu, way, 25e-3);
+        let (field, tip, unfit, ticks) = off_its_line(nu, way, 18e-3);
         keep(&Row {
             number: 32,
             case,

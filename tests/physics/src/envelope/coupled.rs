@@ -91,9 +91,10 @@ fn no_hand_sings_in_coupled_mode() {
     for kind in [TissueKind::ChainMail, TissueKind::Fem] {
         let mut world = block(kind);
         let mut all = Vec::new();
+        // A tick of finite elements takes long.
+        let latenesses: &[usize] = if kind == TissueKind::Fem { &[0, 3] } else { &[0, 1, 2, 3] };
         for rest_m in [4e-3, 20e-3] {
-            for late_ticks in [0, 1, 2, 3] {
-                // The middle latenesses in FEM with the corners of the envelope alone.
+            for &late_ticks in latenesses {
                 for hand in hand_envelope() {
                     let (case, back) = session(world, hand, late_ticks, rest_m);
                     world = back;
@@ -106,7 +107,7 @@ fn no_hand_sings_in_coupled_mode() {
         let (given_j, where_given) = worst(&all, |c| c.excess_j - c.bound_j);
         keep(&Row {
             number: 42,
-            case: "coupled mode off the line, 27 hands, 0 to 3 ticks late, pressed 4 mm and 20 mm deep",
+            case: "coupled mode off the line, 27 hands, 0 to 3 ticks late (FEM: 0 and 3), pressed 4 mm and 20 mm deep",
             model: kind.name(),
             should: "none oscillates, none is given more than it gave",
             happened: format!(
