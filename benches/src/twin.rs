@@ -2,11 +2,14 @@
 
 use crate::error::Field;
 use std::sync::Arc;
-use stylet_sim::line::{ColumnQueue, Compliance, HandLine, StationSettings, Stations};
+use stylet_sim::line::{Column, Compliance, HandLine, Load, StationSettings, Stations};
 use stylet_sim::scene::{Lattice, Scene};
 use stylet_sim::tissue::fem::Compiled;
-use stylet_sim::tissue::fem::batch::{BatchModel, BatchState, NodeWeight};
-use stylet_sim::tissue::{FemTissue, PackedField};
+use stylet_sim::tissue::fem::batch::{BatchModel, BatchState, LOADS, NodeWeight};
+use stylet_sim::tissue::{ElementField, FemTissue, PackedField};
+
+/// Nearly incompressible tissue beside bone takes hundreds.
+const MOST_ITERATIONS: u32 = 600;
 
 /// The same needle on the same way, with another answer of the body.
 pub struct Twin {
@@ -44,10 +47,9 @@ impl Twin {
             .model;
         let batch = BatchModel::<T>::new(&fem);
         let stations = Stations::along(&batch, *like.line(), settings.stations, settings.most);
-        let mut queue = ColumnQueue::new(&batch, &stations, false, settings.tolerance);
-        queue.prepare_all(&batch);
-        let residual = queue.columns().iter().map(|c| c.residual).fold(0.0, f64::max);
-        let mut compliance = Compliance::of_columns(&batch, &stations, queue.columns()).expect("tissue on the way");
+        let columns = columns(&batch, &stations, settings.tolerance);
+        let residual = columns.iter().map(|c| c.residual).fold(0.0, f64::max);
+        let mut compliance = Compliance::of_columns(&batch, &stations, &columns).expect("tissue on the way");
         if let Some(structure) = settings.whole_of {
             let axis = like.line().axes[0];
             compliance.whole_m_per_n = whole_m_per_n(&batch, &scene.body, structure, axis, settings.tolerance);
@@ -55,7 +57,7 @@ impl Twin {
         Self {
             hand: like.in_other_body(compliance).expect("a line as valid as the first"),
             body: Arc::clone(&scene.body),
-            columns: queue.into_fields(),
+            columns: columns.into_iter().map(|column| column.field).collect(),
             residual,
         }
     }
@@ -69,6 +71,44 @@ impl Twin {
     pub fn field_of(&self, hand: &HandLine) -> Field {
         let axis = hand.line().axes[0];
         sum(&self.columns, hand.state().loads_n(), axis.map(|c| c * hand.whole_m()))
+    }
+}
+
+/// Shaft, then tip of every station; the queue that ships gives up where a body is hard to solve, this one goes on.
+fn columns<T: Compiled>(batch: &BatchModel<T>, stations: &Stations, tolerance: f64) -> Vec<Column> {
+    let shaft = stations.shaft.iter().enumerate().map(|(n, at)| (Load::Shaft(n), at));
+    let tip = stations.tip.iter().enumerate().map(|(n, at)| (Load::Tip(n), at));
+    let wanted: Vec<(Load, Vec<NodeWeight>)> = shaft.chain(tip).map(|(load, at)| (load, stations.load(at, 0))).collect();
+    let mut state = BatchState::<T>::new(batch);
+    let mut field = ElementField::zeros(batch.element_count());
+    let mut columns = Vec::new();
+    for eight in wanted.chunks(LOADS) {
+        let loads: Vec<&[NodeWeight]> = eight.iter().map(|(_, load)| load.as_slice()).collect();
+        state.begin(batch, &loads);
+        let residual = solved(batch, &mut state, tolerance);
+        for (lane, (load, _)) in eight.iter().enumerate() {
+            state.write(batch, lane, &mut field);
+            let mut packed = PackedField::zeros(batch.element_count());
+            packed.pack(&field);
+            columns.push(Column {
+                load: *load,
+                field: packed,
+                samples_m: wanted.iter().map(|(_, load)| state.sample(lane, load)).collect(),
+                foundation_n: state.foundation_n(batch, lane),
+                residual,
+            });
+        }
+    }
+    columns
+}
+
+/// Goes on to the tolerance, or as far as anybody waits; returns the residual.
+fn solved<T: Compiled>(batch: &BatchModel<T>, state: &mut BatchState<T>, tolerance: f64) -> f64 {
+    loop {
+        let progress = state.advance(batch);
+        if state.is_whole() && (progress.residual <= tolerance || progress.iterations >= MOST_ITERATIONS) {
+            return progress.residual;
+        }
     }
 }
 
@@ -107,7 +147,7 @@ fn whole_m_per_n<T: Compiled>(
     load.iter_mut().for_each(|l| l.weight = l.weight.map(|w| w / elements));
     let mut state = BatchState::<T>::new(batch);
     state.begin(batch, &[&load]);
-    while state.advance(batch).residual > tolerance || !state.is_whole() {}
+    solved(batch, &mut state, tolerance);
     state.sample(0, &load)
 }
 

@@ -86,7 +86,10 @@ pub fn measure(rounds: usize) -> Vec<Ships> {
         for (kind, (line, prepared_s)) in [(TissueKind::Fem, fem), (TissueKind::ChainMail, chainmail)] {
             let live = theatre.run(kind, &line, &mut twin, rounds);
             let row = row(case, kind, &live, prepared_s, twin.residual);
-            eprintln!("  {}: field {:.2} % of {:.1} mm on average, {:.2} % at worst", row.tissue, row.field_percent, row.largest_mm, row.field_worst_percent);
+            eprintln!(
+                "  {}: field {:.2} % of {:.1} mm on average, {:.2} % at worst",
+                row.tissue, row.field_percent, row.largest_mm, row.field_worst_percent
+            );
             rows.push(row);
         }
     }

@@ -36,7 +36,7 @@ const STEPS: usize = 50;
 /// Of a rotary encoder of a Phantom's gimbal, and more than half of its step is an oscillation.
 const SEEN_RAD: f64 = 2e-3;
 
-/// Turns the handle by 10 degrees with the tip 45 mm deep; swing in the first and the last half second of three, and the largest torque.
+/// Turns the handle by 10 degrees with the tip 45 mm deep; swing in the first and the last half second of eight, and the largest torque.
 fn turn(wrist: Wrist, late_ticks: usize, gain: f64) -> (f64, f64, f64) {
     let info = DeviceInfo::phantom_premium_1_5();
     let force = ForceParameters {
@@ -54,7 +54,7 @@ fn turn(wrist: Wrist, late_ticks: usize, gain: f64) -> (f64, f64, f64) {
     let (mut angle, mut speed) = (0.0_f64, 0.0_f64);
     let mut torques = vec![0.0; late_ticks + 1];
     let (mut angles, mut most_nm) = (Vec::new(), 0.0_f64);
-    for tick in 0..3600_usize {
+    for tick in 0..8600_usize {
         let aim = if tick < 600 { 0.0 } else { 10.0_f64.to_radians() };
         let torque = torques[late_ticks];
         let (m, b, k) = (

@@ -92,7 +92,11 @@ fn no_hand_sings_in_coupled_mode() {
         let mut world = block(kind);
         let mut all = Vec::new();
         // A tick of finite elements takes long.
-        let latenesses: &[usize] = if kind == TissueKind::Fem { &[0, 3] } else { &[0, 1, 2, 3] };
+        let latenesses: &[usize] = if kind == TissueKind::Fem {
+            &[0, 3]
+        } else {
+            &[0, 1, 2, 3]
+        };
         for rest_m in [4e-3, 20e-3] {
             for &late_ticks in latenesses {
                 for hand in hand_envelope() {
