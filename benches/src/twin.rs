@@ -78,7 +78,10 @@ impl Twin {
 fn columns<T: Compiled>(batch: &BatchModel<T>, stations: &Stations, tolerance: f64) -> Vec<Column> {
     let shaft = stations.shaft.iter().enumerate().map(|(n, at)| (Load::Shaft(n), at));
     let tip = stations.tip.iter().enumerate().map(|(n, at)| (Load::Tip(n), at));
-    let wanted: Vec<(Load, Vec<NodeWeight>)> = shaft.chain(tip).map(|(load, at)| (load, stations.load(at, 0))).collect();
+    let wanted: Vec<(Load, Vec<NodeWeight>)> = shaft
+        .chain(tip)
+        .map(|(load, at)| (load, stations.load(at, 0)))
+        .collect();
     let mut state = BatchState::<T>::new(batch);
     let mut field = ElementField::zeros(batch.element_count());
     let mut columns = Vec::new();

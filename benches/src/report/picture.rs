@@ -152,7 +152,10 @@ where
         let line = DashedLineSeries::new([(start, percent), (end, percent)], 5, 4, TEXT.stroke_width(1));
         chart.draw_series(line)?;
         let at = (start * 1.15, percent * 1.06);
-        let style = (FONT, 12).into_font().color(&TEXT).pos(Pos::new(HPos::Left, VPos::Bottom));
+        let style = (FONT, 12)
+            .into_font()
+            .color(&TEXT)
+            .pos(Pos::new(HPos::Left, VPos::Bottom));
         chart.draw_series([Text::new(name, at, style)])?;
     }
     let plotting = chart.plotting_area();

@@ -283,11 +283,20 @@ fn a_constant_force_is_no_debt_and_what_is_beside_it_still_is() {
     for tick in 0..2000 {
         let by_m = if tick < 1000 { 5e-5 } else { -5e-5 };
         let out = step(&parameters, &device(), &mut state, &lifted(weight_n, by_m));
-        assert!((out.wrench.force_n - weight_n).norm() < 1e-9, "tick {tick}: {:?}", out.wrench.force_n);
+        assert!(
+            (out.wrench.force_n - weight_n).norm() < 1e-9,
+            "tick {tick}: {:?}",
+            out.wrench.force_n
+        );
     }
     assert_eq!(state.counts().passivity, 0);
     for _ in 0..1000 {
-        step(&parameters, &device(), &mut state, &lifted(weight_n + Vector3::z() * 2.0, 5e-5));
+        step(
+            &parameters,
+            &device(),
+            &mut state,
+            &lifted(weight_n + Vector3::z() * 2.0, 5e-5),
+        );
     }
     assert!(state.counts().passivity > 0, "2 N more give 100 mJ");
 }
