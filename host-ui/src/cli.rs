@@ -41,7 +41,8 @@ const SCENE_HELP: &str = concat!(
 pub struct Cli {
     #[command(flatten)]
     window: CoreArgs,
-    /// Image for the slices instead of simulated ultrasound, of the patient of --scene FILE: NIfTI-1, NRRD, MetaImage
+    /// Image for the slices instead of simulated ultrasound, of the patient of --scene FILE: a DICOM series (its folder, or one of its
+    /// files), NIfTI-1, NRRD, MetaImage
     #[arg(long, value_name = "FILE", requires = "scene")]
     image: Option<PathBuf>,
     /// Show a recording made by 'host-ui record' in place of a running rt-core; nothing in it can be moved

@@ -7,7 +7,7 @@ use std::io::Read;
 /// A volume with more voxels is not a prostate.
 pub const MAX_VOXELS: u64 = 1 << 28;
 /// 512 x 512 x 512: the greys of an image are kept for as long as it is shown.
-const MAX_IMAGE_VOXELS: usize = 1 << 27;
+pub const MAX_IMAGE_VOXELS: usize = 1 << 27;
 /// Nothing that deflate makes is larger than this many times what it was made from.
 pub const MAX_DEFLATE_RATIO: u64 = 1032;
 /// Read at a time; a whole number of elements of any type.
@@ -141,6 +141,17 @@ impl<'a> Sink<'a, f32> {
     pub fn greys(progress: &'a Progress) -> Self {
         Self {
             made_of: |value| Ok(value as f32),
+            most: MAX_IMAGE_VOXELS,
+            progress,
+        }
+    }
+}
+
+impl<'a> Sink<'a, f64> {
+    /// Takes numbers of an image as they are.
+    pub fn exact(progress: &'a Progress) -> Self {
+        Self {
+            made_of: Ok,
             most: MAX_IMAGE_VOXELS,
             progress,
         }

@@ -1,6 +1,7 @@
 //! The image that a segmentation was drawn on, or another of the same patient: greys for the slices.
 
 use super::bytes::{beside, file_name, whole};
+use super::dicom::series;
 use super::element::Sink;
 use super::error::{ContentError, FileError};
 use super::frame::VoxelFrame;
@@ -32,7 +33,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// Reads an image of any format; the error names the file.
+    /// Reads an image of any format, or the series of DICOM in a folder; the error names the file.
     pub fn read(path: &Path, progress: &Progress) -> Result<Self, FileError> {
         let values = read_values(path, progress)?;
         Self::of(values, file_name(path)).map_err(|why| FileError::of(path, why))
@@ -90,8 +91,12 @@ impl Image {
     }
 }
 
-/// The values of an image as they are in the file, such as Hounsfield units; the error names the file.
+/// The values of an image as they are in the file, or in the DICOM series of a folder, such as Hounsfield units; the error names the
+/// file.
 pub fn read_values(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>, FileError> {
+    if path.is_dir() {
+        return series::read(path, progress);
+    }
     let refused = |why: ContentError| FileError::of(path, why);
     let bytes = whole(path, progress).map_err(refused)?;
     let sink = Sink::greys(progress);
@@ -100,11 +105,9 @@ pub fn read_values(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>,
         Some(Format::Nrrd) => nrrd::read_image(&bytes, &data, sink),
         Some(Format::Nifti) => nifti::read(&bytes, sink),
         Some(Format::MetaImage) => metaimage::read(&bytes, &data, sink),
-        Some(Format::Dicom) => {
-            Err(ContentError::Invalid("images are not read from DICOM; convert the series, for example with dcm2niix".to_owned()))
-        }
+        Some(Format::Dicom) => return series::read(path, progress),
         None => Err(
-            "it is none of the formats that images are read from: NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd)"
+            "it is none of the formats that images are read from: a DICOM series (its folder, or a file of it), NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd)"
                 .into(),
         ),
     };

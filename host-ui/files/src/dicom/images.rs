@@ -80,6 +80,35 @@ pub fn slice(file: &[u8]) -> Option<Result<(String, Slice), ContentError>> {
 }
 
 impl Slice {
+    /// A slice of a series; corner in LPS, mm, steps from column to column and from row to row, columns and rows.
+    pub(super) fn new(
+        (series, identity): (String, Identity),
+        corner: Vector3<f64>,
+        steps: [Vector3<f64>; 2],
+        size: [u64; 2],
+    ) -> Self {
+        Self {
+            uid: String::new(),
+            sop_class: String::new(),
+            series,
+            study: identity.study.clone(),
+            identity,
+            corner,
+            steps,
+            size,
+        }
+    }
+
+    /// Not a unit vector.
+    fn normal(&self) -> Vector3<f64> {
+        self.steps[0].cross(&self.steps[1])
+    }
+
+    /// Pixels of it.
+    pub(super) fn pixels(&self) -> usize {
+        self.size[0] as usize * self.size[1] as usize
+    }
+
     /// The image that a contour lies in; corners in RAS, m.
     pub fn under<'a>(images: &'a [Self], corners_m: &[Vector3<f64>]) -> Option<&'a Self> {
         let first = images.first()?;
@@ -129,8 +158,17 @@ fn slices_of(folder: &Path, wanted: impl Fn(&Slice) -> bool) -> Result<Vec<Slice
 }
 
 /// Only the start is read, so that a folder with other large files costs little.
-fn begins_as_dicom(path: &Path) -> bool {
+pub(super) fn begins_as_dicom(path: &Path) -> bool {
     bytes::start(path, 160).is_some_and(|start| checked::is_dicom(&start))
+}
+
+/// Puts what has slices in the order of [`grid`].
+pub(super) fn sort<T>(all: &mut [T], slice: impl Fn(&T) -> &Slice) {
+    let Some(normal) = all.first().map(|first| slice(first).normal()) else {
+        return;
+    };
+    let height = |of: &T| slice(of).corner.dot(&normal);
+    all.sort_by(|a, b| height(a).total_cmp(&height(b)));
 }
 
 /// `None` for fewer than two slices.

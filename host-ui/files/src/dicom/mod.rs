@@ -7,6 +7,7 @@ pub mod dose;
 mod identity;
 pub mod images;
 pub mod plan;
+pub mod series;
 pub mod structures;
 mod values;
 mod write;
