@@ -3,13 +3,16 @@
 use super::volume::Voxels;
 use std::collections::BTreeMap;
 
-/// `of_voxel` adds every label that a voxel has. Gives the labels, and what was lost by it in words, voxels of `voxel_m3` each.
+/// Labels of the voxels, those that voxels have beside it, and what that leaves out in words.
+pub type Settled = (Vec<u8>, Vec<(u8, u32)>, Option<String>);
+
+/// `of_voxel` adds every label that a voxel has; voxels of `voxel_m3` each.
 pub fn smallest_wins(
     count: usize,
     voxel_m3: f64,
     names: &BTreeMap<u8, String>,
     of_voxel: impl Fn(usize, &mut Vec<u8>),
-) -> (Vec<u8>, Option<String>) {
+) -> Settled {
     let mut sizes = [0_u64; 256];
     let mut found = Vec::new();
     for voxel in 0..count {
@@ -19,6 +22,7 @@ pub fn smallest_wins(
     }
     let mut taken = [0_u64; 256];
     let mut labels = vec![0_u8; count];
+    let mut also = Vec::new();
     for (voxel, label) in labels.iter_mut().enumerate() {
         found.clear();
         of_voxel(voxel, &mut found);
@@ -27,10 +31,10 @@ pub fn smallest_wins(
             continue;
         };
         *label = smallest;
-        found
-            .iter()
-            .filter(|&&l| l != smallest)
-            .for_each(|&l| taken[usize::from(l)] += 1);
+        found.iter().filter(|&&l| l != smallest).for_each(|&l| {
+            taken[usize::from(l)] += 1;
+            also.push((l, voxel as u32));
+        });
     }
     let lost: Vec<String> = names
         .iter()
@@ -46,7 +50,7 @@ pub fn smallest_wins(
             lost.join(", ")
         )
     });
-    (labels, warning)
+    (labels, also, warning)
 }
 
 /// A lost volume for a note; small ones with more digits.

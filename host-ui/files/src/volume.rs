@@ -59,6 +59,37 @@ pub struct Voxels {
     pub frame: VoxelFrame,
     /// What the file calls its labels, where it says so.
     pub names: BTreeMap<u8, String>,
+    /// Where structures overlap: labels that voxels, by their index, have beside the one that stands there.
+    pub also: Vec<(u8, u32)>,
+    /// What the one label of a voxel leaves out of that, in words.
+    pub overlap: Option<String>,
+}
+
+impl Voxels {
+    /// Indices of all voxels of a label, lowest first, also of those where another label stands.
+    pub fn of_label(&self, label: u8) -> Vec<usize> {
+        let here = (0..self.labels.len()).filter(|&n| self.labels[n] == label);
+        let also = self
+            .also
+            .iter()
+            .filter(|(of, _)| *of == label)
+            .map(|(_, n)| *n as usize);
+        let mut all: Vec<usize> = here.chain(also).collect();
+        all.sort_unstable();
+        all
+    }
+
+    /// Every label but 0 that a voxel has, lowest first.
+    pub fn present(&self) -> Vec<u8> {
+        let mut is_there = [false; 256];
+        self.labels
+            .iter()
+            .for_each(|&label| is_there[usize::from(label)] = true);
+        self.also
+            .iter()
+            .for_each(|&(label, _)| is_there[usize::from(label)] = true);
+        (1..=255).filter(|&label| is_there[usize::from(label)]).collect()
+    }
 }
 
 /// What a file holds in its voxels, x fastest, whatever the numbers mean.
@@ -80,6 +111,8 @@ impl VoxelValues<u8> {
             labels: self.values,
             frame: self.frame,
             names,
+            also: Vec::new(),
+            overlap: None,
         }
     }
 }
@@ -190,7 +223,7 @@ impl LabelVolume {
                         h * 1e3
                     )));
                 }
-                let mut warnings: Vec<String> = voxels.frame.warning.iter().cloned().collect();
+                let mut warnings: Vec<String> = voxels.frame.warning.iter().chain(&voxels.overlap).cloned().collect();
                 if h > finest {
                     warnings.push(format!(
                         "the elements were made {:.2} mm instead of {:.2} mm so that the volume can be sent",

@@ -17,7 +17,7 @@ use stylet_files::dicom::{self, Identity, RT_DOSE, RT_PLAN};
 use stylet_files::{self as files, FileError, bytes, scene};
 use stylet_implant::plan::exchange::plan_source;
 use stylet_implant::plan::seeds;
-use stylet_implant::readers::{DayOfImplant, DoseFile, SeedDefaults, SeedFile, read_dose};
+use stylet_implant::readers::{DayOfImplant, DoseFile, Mapped, SeedDefaults, SeedFile, read_dose};
 
 const MAX_PLAN_BYTES: u64 = 4 << 20;
 
@@ -58,6 +58,9 @@ pub struct ConvertArgs {
     /// Strength in U of seeds whose CSV gives none
     #[arg(long, value_name = "U")]
     strength_u: Option<f64>,
+    /// What a column of the table of seeds is: NAME=HEADER with its unit, as in x_mm=-Lateral:cm; may be given again
+    #[arg(long = "column", value_name = "NAME=HEADER[:UNIT]")]
+    columns: Vec<Mapped>,
     /// RT Plan that a dose belongs to
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
@@ -105,7 +108,9 @@ impl ConvertArgs {
             return self.structures_again();
         }
         let voxels = files::watched(&self.from, |progress| files::read_voxels(&self.from, progress))?;
-        if let Some(note) = &voxels.frame.warning {
+        // Contours may overlap; in a volume one label has the voxel.
+        let lost = voxels.overlap.iter().filter(|_| !to_dicom);
+        for note in voxels.frame.warning.iter().chain(lost) {
             seeds::report(&self.from, std::slice::from_ref(note));
         }
         if to_dicom {
@@ -239,8 +244,11 @@ impl ConvertArgs {
         let defaults = SeedDefaults {
             strength_u: self.strength_u,
             strength_per_activity_u_per_mci: source.and_then(|s| s.strength_per_activity_u_per_mci),
+            columns: self.columns.clone(),
         };
-        Ok(seeds::read(&self.from, defaults)?)
+        let mut read = seeds::read(&self.from, defaults)?;
+        seeds::report(&self.from, &std::mem::take(&mut read.notes));
+        Ok(read)
     }
 
     fn dose(&self) -> Result<(), CommandError> {

@@ -289,6 +289,8 @@ fn labels_are_counted_by_their_voxels_in_place_and_volume() {
         labels,
         frame,
         names: BTreeMap::new(),
+        also: Vec::new(),
+        overlap: None,
     };
     let names = BTreeMap::from([(2, "Urethra".to_owned())]);
     let found = structures(&voxels, &names, 500_000);

@@ -37,6 +37,25 @@ pub struct Contoured {
     pub contours: Vec<Vec<Vector3<f64>>>,
 }
 
+impl Contoured {
+    /// Unit vector across the plane of its largest contour.
+    fn normal(&self) -> Result<Vector3<f64>, ContentError> {
+        let largest = self.contours.iter().map(|c| area_vector(c));
+        let largest = largest.max_by(|a, b| a.norm().total_cmp(&b.norm()));
+        let normal = largest.and_then(|a| a.try_normalize(1e-12));
+        normal.ok_or_else(|| ContentError::Invalid(format!("the contours of {} enclose no area", short(&self.name))))
+    }
+
+    /// The smallest distance between two of its planes, m; infinite for one plane.
+    fn plane_distance_m(&self) -> Result<f64, ContentError> {
+        let normal = self.normal()?;
+        let mut heights: Vec<f64> = self.contours.iter().map(|c| c[0].dot(&normal)).collect();
+        heights.sort_by(f64::total_cmp);
+        let gaps = heights.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > SAME_PLANE_M);
+        Ok(gaps.fold(f64::INFINITY, f64::min))
+    }
+}
+
 /// The contours of an RT Structure Set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StructureSet {
@@ -160,6 +179,8 @@ impl StructureSet {
             labels,
             frame: grid.frame,
             names,
+            also: Vec::new(),
+            overlap: None,
         };
         Ok(with_warning(voxels, (!notes.is_empty()).then(|| notes.join("; "))))
     }
@@ -183,7 +204,7 @@ impl StructureSet {
             .unwrap_or(Vector3::z());
         let across = (across - normal * across.dot(&normal)).normalize();
         let axes = Matrix3::from_columns(&[across, normal.cross(&across), normal]);
-        let step_m = self.plane_distance_m(normal)?;
+        let step_m = self.plane_distance_m()?;
         let sides = [SIDE_M, SIDE_M, step_m];
         let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
         for p in points() {
@@ -202,13 +223,10 @@ impl StructureSet {
     }
 
     /// The smallest distance between two planes of one structure.
-    fn plane_distance_m(&self, normal: Vector3<f64>) -> Result<f64, ContentError> {
+    fn plane_distance_m(&self) -> Result<f64, ContentError> {
         let mut smallest = f64::INFINITY;
         for structure in &self.structures {
-            let mut heights: Vec<f64> = structure.contours.iter().map(|c| c[0].dot(&normal)).collect();
-            heights.sort_by(f64::total_cmp);
-            let gaps = heights.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > SAME_PLANE_M);
-            smallest = gaps.fold(smallest, f64::min);
+            smallest = structure.plane_distance_m()?.min(smallest);
         }
         if smallest.is_finite() {
             return Ok(smallest);

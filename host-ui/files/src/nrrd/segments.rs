@@ -122,14 +122,13 @@ pub fn flatten(
         }
     };
     let names: BTreeMap<u8, String> = (1_u8..=255).zip(segments.into_iter().map(|s| s.name)).collect();
-    let (labels, warning) = overlap::smallest_wins(count, frame.spacing_m.iter().product(), &names, of_voxel);
-    Ok(overlap::with_warning(
-        Voxels {
-            dims,
-            labels,
-            frame,
-            names,
-        },
-        warning,
-    ))
+    let (labels, also, overlap) = overlap::smallest_wins(count, frame.spacing_m.iter().product(), &names, of_voxel);
+    Ok(Voxels {
+        dims,
+        labels,
+        frame,
+        names,
+        also,
+        overlap,
+    })
 }

@@ -168,5 +168,16 @@ fn layers_without_segments_and_segments_that_contradict_are_refused() {
     assert!(why(&four(&format!("{}{}", layer(0, 1, 0), layer(1, 1, 0)))).contains("two segments"));
     let both = format!("{}{}", layer(0, 1, 0), layer(1, 1, 1));
     // Layer 0 holds 0 1 1 0, layer 1 holds 0 0 1 1: of the same size, the first has what both want.
-    assert_eq!(read(&four(&both), &no_file).unwrap().labels, [0, 1, 1, 2]);
+    let read = read(&four(&both), &no_file).unwrap();
+    assert_eq!(read.labels, [0, 1, 1, 2]);
+    // Nothing of the second is lost: its outline and its dose have all of it.
+    assert_eq!(read.also, [(2, 2)]);
+    assert_eq!((read.of_label(1), read.of_label(2)), (vec![1, 2], vec![2, 3]));
+    assert!(
+        read.overlap
+            .as_deref()
+            .is_some_and(|note| note.contains("s1 (1 of 2 voxels)")),
+        "{:?}",
+        read.overlap
+    );
 }

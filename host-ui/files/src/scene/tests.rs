@@ -37,6 +37,8 @@ fn voxels() -> Voxels {
         labels: (0..64).map(|i| [1, 2, 3, 4][i / 16]).collect(),
         frame: crate::VoxelFrame::new(Matrix3::identity() * 2e-3, Vector3::zeros(), "test").unwrap(),
         names: [(1, "Prostate".to_owned())].into(),
+        also: Vec::new(),
+        overlap: None,
     }
 }
 

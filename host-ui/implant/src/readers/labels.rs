@@ -10,19 +10,13 @@ use stylet_files::Voxels;
 const PITCH_M: f64 = 0.5e-3;
 const FEWEST_POINTS: f64 = 20_000.0;
 
-/// One structure for each label but 0, in the order of labels; `names` where the user gave them.
+/// One structure for each label but 0, in the order of labels, all of it where structures overlap; `names` where the user gave them.
 pub fn structures(voxels: &Voxels, names: &BTreeMap<u8, String>, most_points: usize) -> Vec<Structure> {
-    let mut indices: BTreeMap<u8, Vec<usize>> = BTreeMap::new();
-    for (index, &label) in voxels.labels.iter().enumerate().filter(|(_, l)| **l != 0) {
-        indices.entry(label).or_default().push(index);
-    }
-    indices
-        .into_iter()
-        .map(|(label, indices)| {
-            let name = names.get(&label).cloned().unwrap_or_else(|| format!("label {label}"));
-            structure(voxels, name, &indices, most_points)
-        })
-        .collect()
+    let of_label = |label: u8| {
+        let name = names.get(&label).cloned().unwrap_or_else(|| format!("label {label}"));
+        structure(voxels, name, &voxels.of_label(label), most_points)
+    };
+    voxels.present().into_iter().map(of_label).collect()
 }
 
 fn structure(v: &Voxels, name: String, indices: &[usize], most_points: usize) -> Structure {

@@ -4,8 +4,10 @@ use super::super::super::element::short;
 use super::super::super::overlap::in_cc;
 use super::super::images::Grid;
 use super::planes::WIDEST;
+use super::solid::Solid;
 use super::{Contoured, SAME_PLANE_M};
 use crate::error::ContentError;
+use nalgebra::Vector3;
 use std::ops::Range;
 
 /// Lines across each row of voxels along which coverage is measured.
@@ -99,7 +101,9 @@ pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<Str
 type Polygons = Vec<Vec<[f64; 2]>>;
 
 fn runs(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec<Run>, ContentError> {
-    let planes = planes(structure, grid)?;
+    let Some(planes) = planes(structure, grid) else {
+        return runs_of_solid(structure, grid, scratch);
+    };
     let heights: Vec<f64> = planes.iter().map(|(h, _)| *h).collect();
     let mut runs = Vec::new();
     // A single plane stands for the slice it is in.
@@ -127,8 +131,68 @@ fn runs(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec
     Ok(runs)
 }
 
-/// The contours by the height of their plane, in slices.
-fn planes(structure: &Contoured, grid: &Grid) -> Result<Vec<(f64, Polygons)>, ContentError> {
+/// Contours that lie across the slices: a voxel belongs to the body that they enclose where five of nine points in it do.
+fn runs_of_solid(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec<Run>, ContentError> {
+    let own_m = structure.plane_distance_m()?;
+    let solid = Solid::of(
+        structure,
+        if own_m.is_finite() {
+            own_m
+        } else {
+            grid.frame.spacing_m[2]
+        },
+    )?;
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for corner in 0..8 {
+        let corner = Vector3::from([0, 1, 2].map(|a| match corner >> a & 1 {
+            0 => solid.lower_m[a],
+            _ => solid.upper_m[a],
+        }));
+        let at = grid.frame.index_of(corner);
+        (low, high) = (
+            [0, 1, 2].map(|a| low[a].min(at[a])),
+            [0, 1, 2].map(|a| high[a].max(at[a])),
+        );
+    }
+    let range = |a: usize| {
+        let first = low[a].floor().clamp(0.0, grid.dims[a] as f64) as usize;
+        first..(high[a].ceil() + 1.0).clamp(0.0, grid.dims[a] as f64) as usize
+    };
+    scratch.voxels += (0..3).map(|a| range(a).len()).product::<usize>();
+    scratch.check()?;
+    let holds = |at: [usize; 3]| {
+        let part = |n: usize| {
+            let place = [0, 1, 2].map(|a| at[a] as f64 + if n >> a & 1 == 0 { -0.25 } else { 0.25 });
+            solid.contains(grid.frame.place_m(place).into())
+        };
+        // With the middle as the ninth there is no half, which would count for one side alone.
+        let middle = solid.contains(grid.frame.place_m(at.map(|i| i as f64)).into());
+        (0..8).filter(|&n| part(n)).count() + usize::from(middle) >= 5
+    };
+    let mut runs: Vec<Run> = Vec::new();
+    for k in range(2) {
+        for j in range(1) {
+            let row = (k * grid.dims[1] + j) as u32;
+            for i in range(0).filter(|&i| holds([i, j, k])) {
+                let at = i as u32;
+                match runs.last_mut() {
+                    Some(run) if run.row == row && run.to == at => run.to = at + 1,
+                    _ => runs.push(Run {
+                        row,
+                        from: at,
+                        to: at + 1,
+                    }),
+                }
+            }
+        }
+    }
+    scratch.runs += runs.len();
+    scratch.check()?;
+    Ok(runs)
+}
+
+/// The contours by the height of their plane, in slices; `None` where they do not lie in the slices.
+fn planes(structure: &Contoured, grid: &Grid) -> Option<Vec<(f64, Polygons)>> {
     let step_m = grid.frame.spacing_m[2];
     let mut placed = Vec::new();
     for contour in &structure.contours {
@@ -136,11 +200,7 @@ fn planes(structure: &Contoured, grid: &Grid) -> Result<Vec<(f64, Polygons)>, Co
         let height = corners.iter().map(|c| c[2]).sum::<f64>() / corners.len() as f64;
         let off_m = corners.iter().map(|c| (c[2] - height).abs()).fold(0.0, f64::max) * step_m;
         if off_m > 10.0 * SAME_PLANE_M {
-            return Err(ContentError::Invalid(format!(
-                "{}: a contour is tilted {:.2} mm out of the slices of the images; export it in their planes",
-                short(&structure.name),
-                off_m * 1e3
-            )));
+            return None;
         }
         placed.push((height, corners.into_iter().map(|[x, y, _]| [x, y]).collect::<Vec<_>>()));
     }
@@ -152,7 +212,7 @@ fn planes(structure: &Contoured, grid: &Grid) -> Result<Vec<(f64, Polygons)>, Co
             _ => planes.push((height, vec![polygon])),
         }
     }
-    Ok(planes)
+    Some(planes)
 }
 
 /// From where to where each plane stands for its structure: half-way to its neighbours, but no farther than half of the

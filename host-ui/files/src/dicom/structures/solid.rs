@@ -1,7 +1,8 @@
 //! The body that the contours of one structure enclose, asked point by point: dose is counted in it as it is drawn, whatever overlaps.
 
+use super::super::super::element::short;
 use super::raster::slabs;
-use super::{Contoured, SAME_PLANE_M, StructureSet, area_vector};
+use super::{Contoured, SAME_PLANE_M, StructureSet};
 use crate::error::ContentError;
 use nalgebra::{Matrix3, Vector3};
 
@@ -27,22 +28,17 @@ struct Plane {
 }
 
 impl StructureSet {
-    /// Every structure by itself.
+    /// Every structure by itself, in the planes that it is drawn in.
     pub fn solids(&self) -> Result<Vec<Solid>, ContentError> {
-        let contours = self.structures.iter().flat_map(|s| &s.contours);
-        let largest = contours
-            .map(|c| area_vector(c))
-            .max_by(|a, b| a.norm().total_cmp(&b.norm()));
-        let normal = largest
-            .and_then(|a| a.try_normalize(1e-12))
-            .ok_or("its contours enclose no area")?;
-        let usual_m = self.plane_distance_m(normal)?;
-        Ok(self.structures.iter().map(|s| Solid::of(s, normal, usual_m)).collect())
+        let usual_m = self.plane_distance_m()?;
+        self.structures.iter().map(|s| Solid::of(s, usual_m)).collect()
     }
 }
 
 impl Solid {
-    fn of(structure: &Contoured, normal: Vector3<f64>, usual_m: f64) -> Self {
+    /// The body of a structure, whose planes may lie in any direction; `usual_m` is the thickness of a single plane.
+    pub fn of(structure: &Contoured, usual_m: f64) -> Result<Self, ContentError> {
+        let normal = structure.normal()?;
         let aside = if normal.x.abs() < 0.9 {
             Vector3::x()
         } else {
@@ -54,6 +50,14 @@ impl Solid {
         for contour in &structure.contours {
             let corners: Vec<Vector3<f64>> = contour.iter().map(|p| axes.transpose() * p).collect();
             let height = corners.iter().map(|c| c.z).sum::<f64>() / corners.len() as f64;
+            let off_m = corners.iter().map(|c| (c.z - height).abs()).fold(0.0, f64::max);
+            if off_m > 10.0 * SAME_PLANE_M {
+                return Err(ContentError::Invalid(format!(
+                    "{}: a contour is {:.2} mm off the planes of its others; draw all of a structure in one direction",
+                    short(&structure.name),
+                    off_m * 1e3
+                )));
+            }
             drawn.push((height, corners.iter().map(|c| [c.x, c.y]).collect()));
         }
         drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -73,13 +77,13 @@ impl Solid {
             .map(|([from_m, to_m], polygons)| Plane { from_m, to_m, polygons })
             .collect();
         let (lower_m, upper_m) = bounds(&axes, &planes);
-        Self {
+        Ok(Self {
             name: structure.name.clone(),
             axes,
             planes,
             lower_m,
             upper_m,
-        }
+        })
     }
 
     /// Whether a place (RAS, m) lies inside.

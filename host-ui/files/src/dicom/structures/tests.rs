@@ -198,6 +198,8 @@ fn voxels_that_are_outlined_and_drawn_again_are_the_same() {
         labels,
         frame: grid.frame.clone(),
         names: [(1, "Prostate".to_owned()), (3, "Urethra".to_owned())].into(),
+        also: Vec::new(),
+        overlap: None,
     };
     let bytes = written(&v).unwrap();
     let set = StructureSet::of(&checked::read(&bytes).unwrap()).unwrap();
@@ -217,21 +219,71 @@ fn voxels_that_are_outlined_and_drawn_again_are_the_same() {
     assert!(again.frame.warning.is_none());
 }
 
+/// Contours of sagittal images were refused beside axial ones, and dose was counted in a body that was none of them.
 #[test]
-fn contours_that_lie_in_no_slice_and_ones_beyond_all_measure_are_refused() {
+fn contours_across_the_slices_enclose_the_same_body() {
+    let grid = grid([60, 60, 30], [0.5, 0.5, 1.0]);
+    let (middle, radius_m) = (grid.frame.place_m([30.0, 30.0, 15.0]), 9e-3);
+    let columns = grid.frame.directions;
+    // A ball in discs across the first axis of the grid, across one that is oblique to all, and across the slices.
+    let oblique = (columns.column(0) + columns.column(1) * 0.4 + columns.column(2) * 0.7).normalize();
+    let expected_mm3 = 4.0 / 3.0 * PI * (radius_m * 1e3_f64).powi(3);
+    let discs = |normal: Vector3<f64>| -> Vec<Vec<Vector3<f64>>> {
+        let u = normal.cross(&Vector3::new(0.3, -0.5, 0.8)).normalize();
+        let v = normal.cross(&u);
+        let disc = |n: i32| {
+            let height_m = f64::from(n) * 1e-3;
+            let across_m = (radius_m * radius_m - height_m * height_m).sqrt();
+            let corner = |i: u32| {
+                let t = f64::from(i) / 100.0 * 2.0 * PI;
+                middle + normal * height_m + (u * t.cos() + v * t.sin()) * across_m
+            };
+            (0..100).map(corner).collect()
+        };
+        (-8..=8).map(disc).collect()
+    };
+    let normals = [columns.column(0).into(), oblique, columns.column(2).into()];
+    let drawn = set(vec![
+        ("across", discs(normals[0])),
+        ("oblique", discs(normals[1])),
+        ("axial", discs(normals[2])),
+    ]);
+    for solid in drawn.solids().unwrap() {
+        let (mut inside, mut all) = (0, 0);
+        for n in 0..60_u32.pow(3) {
+            let at = [n % 60, n / 60 % 60, n / 3600].map(|i| (f64::from(i) - 29.5) / 3.0 * 1e-3);
+            let place = middle + Vector3::from(at);
+            all += 1;
+            inside += usize::from(solid.contains(place.into()));
+        }
+        let mm3 = f64::from(inside as u32) / f64::from(all) * 20.0_f64.powi(3);
+        assert!(
+            (mm3 / expected_mm3 - 1.0).abs() < 0.02,
+            "{}: {mm3} of {expected_mm3}",
+            solid.name
+        );
+    }
+    for name in ["across", "oblique", "axial"] {
+        let alone = drawn.structures.iter().filter(|s| s.name == name).cloned().collect();
+        let alone = StructureSet {
+            structures: alone,
+            ..drawn.clone()
+        };
+        let mm3 = volume_mm3(&alone.voxels(Some(grid.clone())).unwrap(), 1);
+        assert!(
+            (mm3 / expected_mm3 - 1.0).abs() < 0.02,
+            "{name}: {mm3} of {expected_mm3}"
+        );
+    }
+    // One structure in two directions has no body.
+    let mixed = set(vec![("mixed", [discs(normals[0]), discs(normals[2])].concat())]);
+    let why = mixed.solids().unwrap_err().to_string();
+    assert!(why.contains("off the planes of its others"), "{why}");
+}
+
+#[test]
+fn contours_beyond_all_measure_are_refused() {
     let grid = grid([40, 40, 6], [0.5, 0.5, 2.0]);
-    let mut tilted = circle(&grid, 2.0, [10.0, 10.0], 6.0);
-    let normal: Vector3<f64> = grid.frame.directions.column(2).into();
-    let along: Vector3<f64> = grid.frame.directions.column(0).into();
-    let middle = tilted[0];
-    tilted
-        .iter_mut()
-        .for_each(|p| *p += normal * (*p - middle).dot(&along) * 0.5);
-    let why = set(vec![("Prostate", vec![tilted])])
-        .voxels(Some(grid.clone()))
-        .unwrap_err()
-        .to_string();
-    assert!(why.contains("tilted"), "{why}");
     // A saw from one end of the slice to the other, again and again.
     let saw: Vec<_> = (0..200_000)
         .map(|i| {
@@ -266,6 +318,8 @@ fn missing_planes_are_bridged_and_contours_there_twice_count_once_and_both_are_r
             labels: vec![1],
             frame: grid.frame.clone(),
             names: [(1, "Prostate".to_owned())].into(),
+            also: Vec::new(),
+            overlap: None,
         };
         let mut object = checked::read(&written(&v).unwrap()).unwrap();
         let item = |c: &Vec<Vector3<f64>>| {
@@ -321,6 +375,8 @@ fn an_outline_of_many_corners_is_written_and_read() {
         labels: (0..1500 * 3 * 2).map(|n| u8::from(inside(n))).collect(),
         frame: grid.frame.clone(),
         names: [(1, "Prostate".to_owned())].into(),
+        also: Vec::new(),
+        overlap: None,
     };
     let set = StructureSet::of(&checked::read(&written(&v).unwrap()).unwrap()).unwrap();
     assert!(set.structures[0].contours[0].len() > 2900);

@@ -13,6 +13,7 @@ use dicom_core::value::PrimitiveValue;
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::InMemDicomObject;
 use nalgebra::Vector3;
+use std::collections::HashSet;
 use stylet_anatomy::{Organ, ras_from_lps};
 
 /// Class of a study in references to it; retired for all else.
@@ -55,10 +56,9 @@ pub struct Written<'a> {
 
 /// The structures of a label volume, by label.
 pub fn of_voxels(v: &Voxels) -> Result<Vec<Outlined>, ContentError> {
-    let mut present = [false; 256];
-    v.labels.iter().for_each(|&l| present[usize::from(l)] = true);
-    let labels = (1..=255).filter(|&l| present[usize::from(l)]);
-    let all: Vec<Outlined> = labels
+    let all: Vec<Outlined> = v
+        .present()
+        .into_iter()
         .map(|label| Outlined {
             name: v.names.get(&label).cloned().unwrap_or_else(|| format!("label {label}")),
             contours: contours(v, label),
@@ -192,9 +192,13 @@ fn drawn(structure: &Outlined, images: &[Slice]) -> Vec<InMemDicomObject> {
 
 fn contours(v: &Voxels, label: u8) -> Vec<Vec<Vector3<f64>>> {
     let [columns, rows, slices] = v.dims;
+    let also: HashSet<u32> = v.also.iter().filter(|(of, _)| *of == label).map(|(_, n)| *n).collect();
     let mut all = Vec::new();
     for k in 0..slices {
-        let inside = |i: usize, j: usize| v.labels[(k * rows + j) * columns + i] == label;
+        let inside = |i: usize, j: usize| {
+            let n = (k * rows + j) * columns + i;
+            v.labels[n] == label || (!also.is_empty() && also.contains(&(n as u32)))
+        };
         let place = |[i, j]: outline::Corner| v.frame.place_m([i as f64 - 0.5, j as f64 - 0.5, k as f64]);
         let loops = outline::loops([columns, rows], inside).into_iter();
         all.extend(loops.map(|corners| corners.into_iter().map(place).collect::<Vec<_>>()));
