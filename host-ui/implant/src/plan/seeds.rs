@@ -39,6 +39,7 @@ fn of_plan_file(path: &Path) -> Result<SeedFile, PlanError> {
     }
     let source = Source::known(&plan.source);
     Ok(SeedFile {
+        notes: Vec::new(),
         identity: None,
         rows,
         declared: Some(Declared {

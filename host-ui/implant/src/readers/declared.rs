@@ -114,7 +114,8 @@ impl SeedFile {
         day: DayOfImplant,
     ) -> Result<(Option<f64>, Vec<String>), Mismatch> {
         let declared = self.declared.as_ref();
-        let mut notes = declared.map_or(Ok(Vec::new()), |d| d.check(source))?;
+        let mut notes = std::mem::take(&mut self.notes);
+        notes.extend(declared.map_or(Ok(Vec::new()), |d| d.check(source))?);
         notes.extend(day.decay(&mut self.rows, declared, source)?);
         let (prescription_gy, note) = prescription(asked_gy, declared, source);
         notes.extend(note);

@@ -82,7 +82,7 @@ pub fn read_any_dose(path: &Path) -> Result<DoseFile, FileError> {
 
 /// A dose grid as `host-ui dose` writes it: every place of a regular grid, x fastest.
 pub fn read_dose(path: &Path) -> Result<DoseFile, FileError> {
-    let rows = table::read(path, &[PLACE.as_slice(), &["dose_gy"]].concat(), |row| {
+    let (rows, _) = table::read(path, &[PLACE.as_slice(), &["dose_gy"]].concat(), &[], |row| {
         let dose = row
             .number("dose_gy")?
             .ok_or_else(|| LineError::new("dose_gy is empty"))?;

@@ -1,5 +1,6 @@
 //! What dose is computed from and for, out of files: seeds, structures, points, and a dose that was written.
 
+mod columns;
 pub mod contours;
 mod declared;
 pub mod grid;
@@ -8,6 +9,7 @@ pub mod places;
 pub mod seeds;
 mod table;
 
+pub use columns::{Mapped, NotAColumn};
 pub use declared::{DayOfImplant, Declared, Mismatch};
 pub use grid::{DoseFile, read_any_dose, read_dose};
 pub use seeds::{SeedDefaults, SeedFile, SeedRow, read_seed_rows, read_seeds};

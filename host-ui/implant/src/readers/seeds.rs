@@ -1,5 +1,6 @@
 //! Seeds out of a table (CSV) or a DICOM RT Plan, which of both is found out from the content.
 
+use super::columns::Mapped;
 use super::declared::Declared;
 pub use super::table::PLACE;
 use super::table::{self, LineError, Row, shown};
@@ -19,12 +20,14 @@ pub const FOUND: [&str; 3] = ["confidence", "deviation_mm", "together"];
 const START_BYTES: u64 = 160;
 
 /// What is assumed of seeds whose file does not say it.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct SeedDefaults {
     /// Air kerma strength, in U.
     pub strength_u: Option<f64>,
     /// For a column `activity_mci`.
     pub strength_per_activity_u_per_mci: Option<f64>,
+    /// What the columns of a table are, where their headers do not say it.
+    pub columns: Vec<Mapped>,
 }
 
 /// A seed, and the needle that it belongs to where the file says so.
@@ -49,6 +52,8 @@ pub struct SeedFile {
     pub declared: Option<Declared>,
     /// Patient, study and frame of reference, where the file names them.
     pub identity: Option<Identity>,
+    /// What should be reported of how the file was read.
+    pub notes: Vec<String>,
 }
 
 /// As [`read_seed_rows`], the seeds alone.
@@ -59,7 +64,8 @@ pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<Vec<Seed>, File
 
 /// Seeds of a file with the columns `x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u|activity_mci][,strength_date][,needle][,hole]`,
 /// and those of [`dicom::COLUMNS`],
-/// or those of a DICOM RT Plan, which gives their strength itself.
+/// or those of a DICOM RT Plan, which gives their strength itself. A table may also have columns that state their quantity and unit,
+/// such as "Pos X (cm)", or any columns that [`SeedDefaults::columns`] names; commas, semicolons or tabs lie between them.
 pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, FileError> {
     let is_plan = bytes::start(path, START_BYTES).is_some_and(|start| dicom::is_dicom(&start));
     if is_plan {
@@ -81,16 +87,17 @@ pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, F
             seed: Seed {
                 position_m: row.position_m()?,
                 axis: axis(row)?,
-                strength_u: strength_u(row, defaults)?,
+                strength_u: strength_u(row, &defaults)?,
             },
             needle: needle(row)?,
             hole: row.text("hole").map(str::to_owned),
             strength_on: strength_on(row)?,
         })
     };
-    let rows = table::read(path, &known, row)?;
+    let (rows, notes) = table::read(path, &known, &defaults.columns, row)?;
     Ok(SeedFile {
         rows,
+        notes,
         declared: None,
         identity: identity.into_inner().flatten(),
     })
@@ -98,6 +105,8 @@ pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, F
 
 fn of_plan(plan: SeedPlan) -> SeedFile {
     SeedFile {
+        // They were reported when it was opened.
+        notes: Vec::new(),
         identity: Some(plan.identity),
         declared: Some(Declared {
             model: plan.source.model,
@@ -164,7 +173,7 @@ fn strength_on(row: &Row) -> Result<Option<Date>, LineError> {
     date.transpose()
 }
 
-fn strength_u(row: &Row, defaults: SeedDefaults) -> Result<f64, LineError> {
+fn strength_u(row: &Row, defaults: &SeedDefaults) -> Result<f64, LineError> {
     let strength = match (row.number("strength_u")?, row.number("activity_mci")?) {
         (Some(_), Some(_)) => return Err(LineError::new("both strength_u and activity_mci are given")),
         (Some(u), None) => Some(u),

@@ -1,5 +1,6 @@
 //! Tables of numbers (CSV): columns by name, and every problem listed with its line.
 
+use super::columns::{self, Column, Mapped};
 use std::path::Path;
 use stylet_base::format::printable;
 use stylet_base::input;
@@ -17,7 +18,7 @@ pub const PLACE: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
 
 /// Points of a file with the columns `x_mm,y_mm,z_mm`, in m.
 pub fn read_points(path: &Path) -> Result<Vec<[f64; 3]>, FileError> {
-    read(path, &PLACE, |row| row.position_m())
+    Ok(read(path, &PLACE, &[], |row| row.position_m())?.0)
 }
 
 /// The beginning of a field, for a message.
@@ -44,24 +45,36 @@ impl LineError {
 
 /// Numbers of a line by the names of their columns; empty fields are absent.
 pub struct Row<'a> {
-    columns: &'a [String],
+    columns: &'a [Column],
     record: &'a csv::StringRecord,
+    /// What stands before the fractions of a number.
+    point: char,
 }
 
 impl Row<'_> {
     /// The field, where there is one that is not empty.
     pub fn text(&self, column: &str) -> Option<&str> {
-        let place = self.columns.iter().position(|c| c == column)?;
-        self.record.get(place).filter(|text| !text.is_empty())
+        self.field(column).map(|(text, _)| text)
+    }
+
+    /// With what a number in it is multiplied by.
+    fn field(&self, column: &str) -> Option<(&str, f64)> {
+        let place = self.columns.iter().position(|c| c.name == column)?;
+        let text = self.record.get(place).filter(|text| !text.is_empty())?;
+        Some((text, self.columns[place].factor))
     }
 
     /// The number in the field, where there is one.
     pub fn number(&self, column: &str) -> Result<Option<f64>, LineError> {
-        let Some(text) = self.text(column) else {
+        let Some((text, factor)) = self.field(column) else {
             return Ok(None);
         };
-        match text.parse::<f64>() {
-            Ok(v) if v.is_finite() => Ok(Some(v)),
+        let parsed = match self.point {
+            '.' => text.parse::<f64>(),
+            point => text.replacen(point, ".", 1).parse::<f64>(),
+        };
+        match parsed {
+            Ok(v) if v.is_finite() => Ok(Some(v * factor)),
             _ => Err(LineError::new(format!("{column} is \"{}\", not a number", shown(text)))),
         }
     }
@@ -87,30 +100,56 @@ impl Row<'_> {
     }
 }
 
-/// One value for each line; the header may have the columns `known` and must have those of a place.
-pub fn read<T>(path: &Path, known: &[&str], parse: impl Fn(&Row) -> Result<T, LineError>) -> Result<Vec<T>, FileError> {
+/// One value for each line, and what there is to know about the columns. Without a mapping the header may have the columns `known`,
+/// or such that state their quantity and unit, and must have those of a place.
+pub fn read<T>(
+    path: &Path,
+    known: &[&str],
+    mapped: &[Mapped],
+    parse: impl Fn(&Row) -> Result<T, LineError>,
+) -> Result<(Vec<T>, Vec<String>), FileError> {
     let text = input::read(path, MAX_BYTES).map_err(|why| FileError::of(path, why.to_string()))?;
-    parse_lines(&text, known, parse).map_err(|why| FileError::of(path, why.0))
+    parse_lines(&text, known, mapped, parse).map_err(|why| FileError::of(path, why.0))
+}
+
+/// What stands between the fields, by the header: a comma, a semicolon or a tab.
+fn delimiter(text: &[u8]) -> u8 {
+    let mut lines = text.split(|&b| b == b'\n');
+    let header = lines.find(|line| !matches!(line.first(), None | Some(&b'\r' | &COMMENT)));
+    let count = |delimiter: u8| header.unwrap_or_default().iter().filter(|&&b| b == delimiter).count();
+    let others = [b';', b'\t'].into_iter().find(|&d| count(d) > count(b','));
+    others.unwrap_or(b',')
 }
 
 fn parse_lines<T>(
     text: &[u8],
     known: &[&str],
+    mapped: &[Mapped],
     parse: impl Fn(&Row) -> Result<T, LineError>,
-) -> Result<Vec<T>, LineError> {
+) -> Result<(Vec<T>, Vec<String>), LineError> {
     let lines = record_lines(text);
     let line_of = |record: usize| lines.get(record).copied().unwrap_or(1);
+    let delimiter = delimiter(text);
+    // Between semicolons numbers may have commas; a table that has both has points in its numbers.
+    let point = if delimiter == b';' && !text.contains(&b'.') {
+        ','
+    } else {
+        '.'
+    };
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .comment(Some(COMMENT))
+        .delimiter(delimiter)
         .from_reader(text);
-    let columns: Vec<String> = reader
+    let headers: Vec<String> = reader
         .headers()
         .map_err(|e| LineError::new(format!("line {}: {}", line_of(0), field_count(&e))))?
         .iter()
-        .map(|c| c.trim_start_matches('\u{feff}').to_ascii_lowercase())
+        .map(|c| c.trim_start_matches('\u{feff}').to_lowercase())
         .collect();
-    check_columns(&columns, known).map_err(|why| LineError::new(format!("line {}: {why}", line_of(0))))?;
+    let in_header = |why: String| LineError::new(format!("line {}: {why}", line_of(0)));
+    let (columns, passed_over) = columns::of_header(&headers, known, mapped).map_err(in_header)?;
+    check_place(&columns, known).map_err(in_header)?;
     let (mut all, mut problems) = (Vec::new(), Vec::new());
     for (index, record) in reader.records().enumerate() {
         if index >= MAX_ROWS {
@@ -120,6 +159,7 @@ fn parse_lines<T>(
             parse(&Row {
                 columns: &columns,
                 record: &record,
+                point,
             })
         });
         match found {
@@ -133,7 +173,7 @@ fn parse_lines<T>(
     }
     match problems.len() {
         0 if all.is_empty() => Err(LineError::new("it has no line beside its header".to_owned())),
-        0 => Ok(all),
+        0 => Ok((all, notes(&headers, &columns, &passed_over))),
         1 => Err(LineError::new(problems.remove(0))),
         _ => Err(LineError::new(format!("\n  {}", problems.join("\n  ")))),
     }
@@ -156,26 +196,39 @@ fn field_count(error: &csv::Error) -> String {
     }
 }
 
-fn check_columns(columns: &[String], known: &[&str]) -> Result<(), LineError> {
-    let missing: Vec<&str> = PLACE.into_iter().filter(|c| !columns.iter().any(|x| x == c)).collect();
-    if !missing.is_empty() {
-        return Err(LineError(format!(
-            "the header lacks {}; it may have {}",
-            missing.join(", "),
-            known.join(",")
-        )));
+fn check_place(columns: &[Column], known: &[&str]) -> Result<(), String> {
+    let missing: Vec<&str> = PLACE
+        .into_iter()
+        .filter(|name| !columns.iter().any(|column| column.name == *name))
+        .collect();
+    if missing.is_empty() {
+        return Ok(());
     }
-    if let Some(twice) = columns.iter().enumerate().find(|(i, c)| columns[..*i].contains(c)) {
-        return Err(LineError(format!("the column {} is there twice", shown(twice.1))));
+    Err(format!(
+        "the header lacks {}; it may have {}, or say which columns they are with --column",
+        missing.join(", "),
+        known.join(",")
+    ))
+}
+
+/// What columns were taken as, where they are called otherwise, and which were passed over.
+fn notes(headers: &[String], columns: &[Column], passed_over: &[String]) -> Vec<String> {
+    let renamed = headers.iter().zip(columns);
+    let renamed: Vec<String> = renamed
+        .filter(|(header, column)| !column.name.is_empty() && **header != column.name)
+        .map(|(header, column)| match column.factor {
+            1.0 => format!("\"{}\" as {}", shown(header), column.name),
+            factor => format!("\"{}\" times {factor} as {}", shown(header), column.name),
+        })
+        .collect();
+    let mut notes = Vec::new();
+    if !renamed.is_empty() {
+        notes.push(format!("columns are taken: {}", renamed.join(", ")));
     }
-    match columns.iter().find(|c| !known.contains(&c.as_str())) {
-        Some(other) => Err(LineError(format!(
-            "the column \"{}\" is not known; there may be {}",
-            shown(other),
-            known.join(",")
-        ))),
-        None => Ok(()),
+    if !passed_over.is_empty() {
+        notes.push(format!("columns are passed over: {}", passed_over.join(", ")));
     }
+    notes
 }
 
 #[cfg(test)]
@@ -186,7 +239,7 @@ mod tests {
     #[test]
     fn a_message_repeats_only_the_beginning_of_a_field_and_no_escape_sequence() {
         let text = format!("x_mm,y_mm,z_mm\n1,2,\u{1b}[31m{}\n", "9x".repeat(25_000_000));
-        let why = parse_lines(text.as_bytes(), &PLACE, |row| row.position_m())
+        let why = parse_lines(text.as_bytes(), &PLACE, &[], |row| row.position_m())
             .unwrap_err()
             .0;
         assert!(
@@ -195,9 +248,23 @@ mod tests {
             why.len()
         );
         let header = format!("x_mm,y_mm,z_mm,{}\n1,2,3,4\n", "q".repeat(1000));
-        let why = parse_lines(header.as_bytes(), &PLACE, |row| row.position_m())
+        let why = parse_lines(header.as_bytes(), &PLACE, &[], |row| row.position_m())
             .unwrap_err()
             .0;
         assert!(why.len() < 200, "{why}");
+    }
+
+    /// A table of another program was refused whatever it said of its columns.
+    #[test]
+    fn tables_of_other_programs_are_read_with_their_units() {
+        let comma = "# exported\nNeedle #;X (cm);Y (cm);Z (cm)\n1;-0,35;2,5;1e1\n";
+        let tabs = "needle\tx_mm\ty_cm\tSeed Z (m)\n1\t-3.5\t2.5\t0.1\n";
+        for text in [comma, tabs] {
+            let known = [PLACE.as_slice(), &["needle"]].concat();
+            let (places, notes) = parse_lines(text.as_bytes(), &known, &[], |row| row.position_m()).unwrap();
+            let expected = [-3.5e-3, 25e-3, 100e-3];
+            assert!((0..3).all(|a| (places[0][a] - expected[a]).abs() < 1e-12), "{places:?}");
+            assert!(notes[0].starts_with("columns are taken: "), "{notes:?}");
+        }
     }
 }

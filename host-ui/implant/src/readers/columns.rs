@@ -1,0 +1,352 @@
+//! Which column of a table is what: names of ours, headers that state a quantity and its unit, or what a person says.
+
+use super::table::shown;
+use std::str::FromStr;
+
+/// Words for the axes of a place.
+const PLACE_WORDS: [&str; 6] = ["position", "pos", "coordinate", "coord", "seed", "location"];
+/// Units by the quantity of a column, with what a number in them is multiplied by.
+const UNITS: [(Quantity, &str, f64); 9] = [
+    (Quantity::Length, "mm", 1.0),
+    (Quantity::Length, "cm", 10.0),
+    (Quantity::Length, "m", 1000.0),
+    (Quantity::Strength, "u", 1.0),
+    (Quantity::Strength, "cgy*cm2/h", 1.0),
+    (Quantity::Strength, "ugy*m2/h", 1.0),
+    (Quantity::Activity, "mci", 1.0),
+    // 1 mCi is 37 MBq.
+    (Quantity::Activity, "mbq", 1.0 / 37.0),
+    (Quantity::Activity, "gbq", 1000.0 / 37.0),
+];
+
+/// What the numbers of a column are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Quantity {
+    Length,
+    Strength,
+    Activity,
+    /// Directions, numbers of needles, names, dates.
+    Plain,
+}
+
+impl Quantity {
+    fn of(column: &str) -> Self {
+        match column {
+            "strength_u" => Self::Strength,
+            "activity_mci" => Self::Activity,
+            _ if column.ends_with("_mm") => Self::Length,
+            _ => Self::Plain,
+        }
+    }
+
+    /// What a number in this unit is multiplied by.
+    fn unit(self, name: &str) -> Option<f64> {
+        let name = name
+            .trim()
+            .to_lowercase()
+            .replace('µ', "u")
+            .replace('²', "2")
+            .replace('·', "*");
+        let of = UNITS
+            .iter()
+            .find(|(quantity, unit, _)| *quantity == self && *unit == name);
+        of.map(|(_, _, factor)| *factor)
+    }
+}
+
+/// What a person says of one column: `x_mm=-Lateral:cm`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mapped {
+    /// Name of ours.
+    known: String,
+    /// Header in the file.
+    header: String,
+    is_negated: bool,
+    /// What a number is multiplied by, where a unit was given.
+    factor: Option<f64>,
+}
+
+/// A mapping that cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "\"{0}\" is no column; write NAME=HEADER, as in x_mm=\"Pos X:cm\" or y_mm=-Y:cm; units are mm, cm, m, U, mCi, MBq, GBq"
+)]
+pub struct NotAColumn(String);
+
+impl FromStr for Mapped {
+    type Err = NotAColumn;
+
+    fn from_str(text: &str) -> Result<Self, NotAColumn> {
+        let refused = || NotAColumn(shown(text));
+        let (known, header) = text.split_once('=').ok_or_else(refused)?;
+        let (known, header) = (known.trim().to_lowercase(), header.trim());
+        let quantity = Quantity::of(&known);
+        let (header, factor) = match header.rsplit_once(':') {
+            Some((header, unit)) if quantity != Quantity::Plain => match quantity.unit(unit) {
+                Some(factor) => (header.trim(), Some(factor)),
+                None => return Err(refused()),
+            },
+            _ => (header, None),
+        };
+        let (header, is_negated) = match header.strip_prefix('-') {
+            Some(header) => (header.trim(), true),
+            None => (header, false),
+        };
+        if known.is_empty()
+            || header.is_empty()
+            || (is_negated && quantity == Quantity::Plain && !known.starts_with("axis_"))
+        {
+            return Err(refused());
+        }
+        Ok(Self {
+            known,
+            header: header.to_lowercase(),
+            is_negated,
+            factor,
+        })
+    }
+}
+
+/// A column of a table: its name among ours, and what its numbers are multiplied by.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Column {
+    /// Empty where it is passed over.
+    pub name: String,
+    pub factor: f64,
+}
+
+/// The columns of a header, and those that are passed over. Without a mapping every header must be one of `known` or state its
+/// quantity and unit.
+pub(super) fn of_header(
+    headers: &[String],
+    known: &[&str],
+    mapped: &[Mapped],
+) -> Result<(Vec<Column>, Vec<String>), String> {
+    let mut problems = Vec::new();
+    let (mut columns, mut passed_over) = (Vec::new(), Vec::new());
+    for header in headers {
+        match of_one(header, known, mapped) {
+            Ok(Some(column)) => columns.push(column),
+            Ok(None) => {
+                passed_over.push(shown(header));
+                columns.push(Column {
+                    name: String::new(),
+                    factor: 1.0,
+                });
+            }
+            Err(why) => problems.push(why),
+        }
+    }
+    if mapped.is_empty() && !passed_over.is_empty() {
+        problems.push(format!(
+            "the column{} \"{}\" {} not known; there may be {}, or say what columns are with --column",
+            if passed_over.len() == 1 { "" } else { "s" },
+            passed_over.join("\", \""),
+            if passed_over.len() == 1 { "is" } else { "are" },
+            known.join(",")
+        ));
+    }
+    for wanted in mapped {
+        if !known.contains(&wanted.known.as_str()) {
+            problems.push(format!(
+                "there is no column {} to give; there are {}",
+                shown(&wanted.known),
+                known.join(",")
+            ));
+        } else if !headers.contains(&wanted.header) {
+            let all: Vec<String> = headers.iter().map(|header| shown(header)).collect();
+            problems.push(format!(
+                "it has no column \"{}\"; it has {}",
+                shown(&wanted.header),
+                all.join(", ")
+            ));
+        }
+    }
+    let twice = |(n, column): &(usize, &Column)| {
+        !column.name.is_empty() && columns[..*n].iter().any(|other| other.name == column.name)
+    };
+    if let Some((_, column)) = columns.iter().enumerate().find(twice) {
+        problems.push(format!("the column {} is there twice", column.name));
+    }
+    match problems.is_empty() {
+        true => Ok((columns, passed_over)),
+        false => Err(problems.join("; ")),
+    }
+}
+
+/// `None` for one that nothing is known of.
+fn of_one(header: &str, known: &[&str], mapped: &[Mapped]) -> Result<Option<Column>, String> {
+    if let Some(wanted) = mapped.iter().find(|wanted| wanted.header == *header) {
+        let quantity = Quantity::of(&wanted.known);
+        let stated = stated(header).1.and_then(|unit| quantity.unit(&unit));
+        let own = (wanted.known == *header).then_some(1.0);
+        let plain = (quantity == Quantity::Plain).then_some(1.0);
+        let Some(factor) = wanted.factor.or(stated).or(own).or(plain) else {
+            return Err(format!(
+                "the column \"{}\" states no unit; give it, as in {}={}:mm",
+                shown(header),
+                wanted.known,
+                shown(header)
+            ));
+        };
+        return Ok(Some(Column {
+            name: wanted.known.clone(),
+            factor: if wanted.is_negated { -factor } else { factor },
+        }));
+    }
+    if known.contains(&header) {
+        return Ok(Some(Column {
+            name: header.to_owned(),
+            factor: 1.0,
+        }));
+    }
+    let (words, unit) = stated(header);
+    let Some(name) = recognised(&words, unit.as_deref()).filter(|name| known.contains(name)) else {
+        return Ok(None);
+    };
+    // What a person mapped from elsewhere is not taken from here.
+    if mapped.iter().any(|wanted| wanted.known == name) {
+        return Ok(None);
+    }
+    let quantity = Quantity::of(name);
+    match (quantity, unit.as_deref().and_then(|unit| quantity.unit(unit))) {
+        (Quantity::Plain, _) => Ok(Some(1.0)),
+        (_, Some(factor)) => Ok(Some(factor)),
+        // A length without a unit may be of any.
+        (_, None) => Ok(None),
+    }
+    .map(|factor| {
+        factor.map(|factor| Column {
+            name: name.to_owned(),
+            factor,
+        })
+    })
+}
+
+/// The words of a header, and the unit in brackets or after the last underscore or space: "Pos X (cm)", "y_cm", "Z [mm]".
+fn stated(header: &str) -> (Vec<String>, Option<String>) {
+    let (name, unit) = match header.find(['(', '[']) {
+        Some(at) => {
+            let inside = header[at + 1..].trim_end_matches([')', ']', ' ']);
+            (&header[..at], Some(inside.to_owned()))
+        }
+        None => (header, None),
+    };
+    let mut words: Vec<String> = name
+        .split(|c: char| !c.is_alphanumeric() && c != '#')
+        .filter(|word| !word.is_empty())
+        .map(str::to_lowercase)
+        .collect();
+    let is_unit = |word: &String| UNITS.iter().any(|(_, unit, _)| unit == word) && word != "u" && word != "m";
+    let unit = unit.or_else(|| {
+        let last = words.last().filter(|word| words.len() > 1 && is_unit(word)).cloned()?;
+        words.pop();
+        Some(last)
+    });
+    (words, unit)
+}
+
+/// The name of ours that words stand for.
+fn recognised(words: &[String], unit: Option<&str>) -> Option<&'static str> {
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let without: Vec<&str> = words
+        .iter()
+        .copied()
+        .filter(|word| !PLACE_WORDS.contains(word))
+        .collect();
+    match without[..] {
+        ["x"] => return Some("x_mm"),
+        ["y"] => return Some("y_mm"),
+        ["z"] => return Some("z_mm"),
+        _ => {}
+    }
+    match words[..] {
+        ["strength"] | ["air", "kerma", "strength"] | ["aks"] | ["sk"] => Some("strength_u"),
+        // Some call an activity a strength, and its unit tells.
+        ["activity"] | ["apparent", "activity"] | ["seed", "activity"] => match unit {
+            Some(unit) if Quantity::Strength.unit(unit).is_some() => Some("strength_u"),
+            _ => Some("activity_mci"),
+        },
+        ["needle", "#" | "no" | "nr" | "number" | "id"] | ["needle#"] => Some("needle"),
+        ["grid"] | ["template", "hole"] | ["grid", "location"] | ["needle", "hole"] => Some("hole"),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KNOWN: [&str; 9] = [
+        "x_mm",
+        "y_mm",
+        "z_mm",
+        "axis_x",
+        "strength_u",
+        "activity_mci",
+        "needle",
+        "hole",
+        "strength_date",
+    ];
+
+    fn columns(headers: &[&str], mapped: &[&str]) -> Result<(Vec<(String, f64)>, Vec<String>), String> {
+        let headers: Vec<String> = headers.iter().map(|h| h.to_lowercase()).collect();
+        let mapped: Vec<Mapped> = mapped.iter().map(|m| m.parse().unwrap()).collect();
+        let (columns, passed) = of_header(&headers, &KNOWN, &mapped)?;
+        Ok((columns.into_iter().map(|c| (c.name, c.factor)).collect(), passed))
+    }
+
+    #[test]
+    fn headers_that_state_their_unit_are_recognised_and_others_refused() {
+        let found = columns(
+            &[
+                "Needle #",
+                "Pos X (cm)",
+                "y_cm",
+                "Seed Z [mm]",
+                "Activity (MBq)",
+                "Hole",
+            ],
+            &[],
+        );
+        let expected = [
+            ("needle", 1.0),
+            ("x_mm", 10.0),
+            ("y_mm", 10.0),
+            ("z_mm", 1.0),
+            ("activity_mci", 1.0 / 37.0),
+            ("hole", 1.0),
+        ];
+        let expected: Vec<(String, f64)> = expected.iter().map(|(n, f)| ((*n).to_owned(), *f)).collect();
+        assert_eq!(found.unwrap().0, expected);
+        for headers in [&["x", "y_mm", "z_mm"][..], &["x_mm", "y_mm", "z_mm", "strength_q"]] {
+            let why = columns(headers, &[]).unwrap_err();
+            assert!(why.contains("is not known") && why.contains("--column"), "{why}");
+        }
+        let why = columns(&["x_mm", "X (cm)", "y_mm", "z_mm"], &[]).unwrap_err();
+        assert!(why.contains("x_mm is there twice"), "{why}");
+    }
+
+    #[test]
+    fn a_mapping_gives_names_units_and_signs_and_reports_what_is_passed_over() {
+        let mapped = [
+            "x_mm=-Lateral:cm",
+            "y_mm=Height (mm)",
+            "z_mm=depth:m",
+            "strength_u=S:U",
+            "needle=n",
+        ];
+        let headers = ["Lateral", "Height (mm)", "Depth", "S", "N", "Comment"];
+        let (found, passed) = columns(&headers, &mapped).unwrap();
+        let factors: Vec<f64> = found.iter().map(|c| c.1).collect();
+        assert_eq!(factors, [-10.0, 1.0, 1000.0, 1.0, 1.0, 1.0]);
+        assert_eq!(passed, ["comment"]);
+        let why = columns(&["a", "y_mm", "z_mm"], &["x_mm=a"]).unwrap_err();
+        assert!(why.contains("states no unit"), "{why}");
+        let why = columns(&["a", "y_mm", "z_mm"], &["x_mm=b:mm"]).unwrap_err();
+        assert!(why.contains("no column \"b\""), "{why}");
+        for wrong in ["x_mm", "x_mm=a:kg", "=a:mm", "needle=-n"] {
+            assert!(wrong.parse::<Mapped>().is_err(), "{wrong}");
+        }
+    }
+}
