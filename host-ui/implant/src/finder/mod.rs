@@ -7,7 +7,9 @@
 mod components;
 mod counts;
 mod level;
+mod settle;
 mod shape;
+mod signal;
 mod split;
 mod starts;
 
@@ -136,7 +138,7 @@ pub fn find(volume: &VoxelValues<f32>, search: &Search) -> Result<Found, FinderE
     let first = count(&signals);
     let fitter = Fitter::calibrated(volume, &level, search, &components, &first);
     let (fits, counts) = match search.split {
-        true => fitter.fit_all(&components, &first, count),
+        true => fitter.fit_all(&components, &first, search.count, count),
         false => (components.iter().map(|c| fitter.centre(c)).collect(), first),
     };
     let frame = &volume.frame;

@@ -4,6 +4,7 @@ use super::Search;
 use super::components::{Component, place_m};
 use super::counts::Counts;
 use super::level::Level;
+use super::settle::Fits;
 use super::shape::{Line, Look, Patch};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use stylet_files::VoxelValues;
@@ -53,7 +54,8 @@ pub struct Fitted {
 pub struct Fitter<'a> {
     /// The CT.
     pub volume: &'a VoxelValues<f32>,
-    level: &'a Level,
+    /// What voxels are compared with.
+    pub level: &'a Level,
     /// What seeds look like.
     pub look: Look,
     /// Direction of all seeds, and two across it.
@@ -103,7 +105,7 @@ impl<'a> Fitter<'a> {
         singles.truncate(CALIBRATED);
         let tasks: Vec<(Task, &Component)> = singles
             .iter()
-            .map(|&n| (fitter.task(&components[n], None), &components[n]))
+            .map(|&n| (fitter.task(&components[n], None, 0.0), &components[n]))
             .collect();
         let mut best = (f64::INFINITY, fitter.look, Matrix3::zeros());
         for blur_m in BLURS_M {
@@ -142,19 +144,22 @@ impl<'a> Fitter<'a> {
         &self,
         components: &[Component],
         first: &Counts,
+        wanted: Option<usize>,
         count: impl Fn(&[f64]) -> Counts,
     ) -> (Vec<Fitted>, Counts) {
         let mut field = vec![0.0; self.volume.values.len()];
         let mut lines: Vec<Vec<Line>> = vec![Vec::new(); components.len()];
         let mut fits = vec![Fitted::default(); components.len()];
         let mut counts = first.clone();
+        let mut tissue = vec![0.0; components.len()];
         for sweep in 0..SWEEPS {
             for (n, component) in components.iter().enumerate() {
                 if counts.seeds[n] == 0 && lines[n].is_empty() {
                     continue;
                 }
                 self.spread(component, &lines[n], -1.0, &mut field);
-                let task = self.task(component, Some(&field));
+                tissue[n] = self.tissue_beside(component, &lines[n], &field);
+                let task = self.task(component, Some(&field), tissue[n]);
                 if lines[n].len() != counts.seeds[n] {
                     lines[n] = self.starts(&task, component, counts.seeds[n]);
                 }
@@ -166,44 +171,34 @@ impl<'a> Fitter<'a> {
                 self.spread(component, &lines[n], 1.0, &mut field);
             }
             if sweep + 1 < SWEEPS {
-                counts = count(&self.signals(components, &lines, &field));
+                counts = count(&self.signals(components, &lines, &field, &tissue));
             }
         }
-        (fits, counts)
-    }
-
-    /// Signal of each component without what its neighbours' seeds give to its voxels; `field` is that of all seeds.
-    ///
-    /// What its own seeds have, and what they leave in the bright voxels: in the many others tissue that is not even would add up.
-    fn signals(&self, components: &[Component], lines: &[Vec<Line>], field: &[f64]) -> Vec<f64> {
-        let bright = self.level.threshold - self.level.tissue;
-        let of_component = |(component, lines): (&Component, &Vec<Line>)| {
-            let patch = Patch::of(self.volume.dims, self.volume.frame.spacing_m, &component.voxels);
-            let mut own = vec![0.0; component.voxels.len()];
-            lines.iter().for_each(|line| patch.add(line, &self.look, 1.0, &mut own));
-            let of_seeds: f64 = lines.iter().map(|line| line.amount * self.look.signal).sum();
-            let voxels = component.voxels.iter().zip(&component.excess).zip(&own);
-            let left = voxels.map(|((n, excess), own)| (excess, excess - (field[*n] - own) - own));
-            let counted = left.filter(|(excess, _)| lines.is_empty() || **excess >= bright);
-            of_seeds + counted.map(|(_, left)| left).sum::<f64>()
+        let mut all = Fits {
+            lines,
+            fitted: fits,
+            field,
+            tissue,
         };
-        components.iter().zip(lines).map(of_component).collect()
+        self.settle(components, &mut all, &mut counts, wanted);
+        (all.fitted, counts)
     }
 
     /// A component as one seed at the middle of its signal.
     pub fn centre(&self, component: &Component) -> Fitted {
-        let task = self.task(component, None);
+        let task = self.task(component, None, 0.0);
         let line = self.start(component, &task.data);
         self.fitted(&task, &[line])
     }
 
-    fn task(&self, component: &Component, neighbours: Option<&[f64]>) -> Task {
+    /// What a component is fitted to, without what `neighbours` and the `tissue` around give to its voxels.
+    pub fn task(&self, component: &Component, neighbours: Option<&[f64]>, tissue: f64) -> Task {
         let of_others = |n: &usize| neighbours.map_or(0.0, |field| field[*n]);
         let data: Vec<f64> = component
             .voxels
             .iter()
             .zip(&component.excess)
-            .map(|(n, e)| e - of_others(n))
+            .map(|(n, e)| e - tissue - of_others(n))
             .collect();
         let highest = component.excess.iter().copied().fold(0.0, f64::max);
         let saturated = self
@@ -219,7 +214,7 @@ impl<'a> Fitter<'a> {
     }
 
     /// Adds seeds to the field of all, in the box of their component with room around for the neighbours.
-    fn spread(&self, component: &Component, lines: &[Line], share: f64, field: &mut [f64]) {
+    pub fn spread(&self, component: &Component, lines: &[Line], share: f64, field: &mut [f64]) {
         if lines.is_empty() {
             return;
         }
@@ -343,7 +338,8 @@ impl<'a> Fitter<'a> {
         cost
     }
 
-    fn fitted(&self, task: &Task, lines: &[Line]) -> Fitted {
+    /// The seeds of a component with what the fit leaves open.
+    pub fn fitted(&self, task: &Task, lines: &[Line]) -> Fitted {
         let residuals = self.residuals(task, lines);
         let of_voxels: f64 = residuals.iter().take(task.data.len()).map(|r| r * r).sum();
         let whole: f64 = task.data.iter().map(|v| (v * task.per_value).powi(2)).sum();

@@ -71,8 +71,8 @@ fn outcome(phantom: &Phantom, found: &Found) -> Outcome {
 /// 53 of the seeds touch another: side by side, end to end, and three together.
 #[test]
 fn a_hundred_seeds_are_found_within_a_millimetre_and_give_the_same_d90() {
-    // In the second implant the signals ask for one more than the number implanted, and it lies where D90 is decided: 3.7 % off.
-    for (random_seed, number, d90_within) in [(1, 100, 0.01), (2, 101, 0.04)] {
+    // In the second implant 101 seeds were found and D90 was 3.7 % off: uneven tissue counted as signal.
+    for random_seed in [1, 2, 5, 6] {
         let phantom = Phantom::new(random_seed, None);
         let search = Search {
             count: Some(phantom.seeds.len()),
@@ -88,12 +88,12 @@ fn a_hundred_seeds_are_found_within_a_millimetre_and_give_the_same_d90() {
             found.split_components,
             found.doubts
         );
-        assert_eq!(found.seeds.len(), number);
+        assert_eq!(found.seeds.len(), 100);
         let left_out = |why: &str| found.doubts.iter().filter(|d| d.why.starts_with(why)).count();
         assert_eq!(left_out("too large"), 1, "the bone: {:?}", found.doubts);
         assert!(left_out("too faint") >= 1, "the calcification: {:?}", found.doubts);
         assert!(result.within_1_mm >= 98, "{result:?}");
-        assert!((result.d90_share - 1.0).abs() < d90_within, "{result:?}");
+        assert!((result.d90_share - 1.0).abs() < 0.01, "{result:?}");
     }
 }
 

@@ -1,0 +1,117 @@
+//! Counts of seeds settled by the fit: where the signal leaves a doubt, one seed more and one fewer are fitted too.
+//!
+//! The signal of a component alone does not tell two faint seeds from three strong ones; how well they explain the voxels does.
+
+use super::components::Component;
+use super::counts::Counts;
+use super::shape::Line;
+use super::split::{Fitted, Fitter};
+
+/// Single seeds whose count is less probable by their signal are fitted again, as all that touch another are.
+const SURE: f64 = 0.98;
+/// Sum of squares that another count must gain where no number of seeds asks for it.
+const WORTHWHILE: f64 = 12.0;
+/// A count that the number of seeds asks for may cost so much, and no more: rather is a doubt reported.
+const MOST_COST: f64 = 400.0;
+/// Changes at most.
+const CHANGES: usize = 8;
+
+/// Components as they are fitted so far.
+pub struct Fits {
+    /// The seeds of each component.
+    pub lines: Vec<Vec<Line>>,
+    /// The same with what is known of them.
+    pub fitted: Vec<Fitted>,
+    /// What all of them give to every voxel.
+    pub field: Vec<f64>,
+    /// What the tissue around each component is above that of the volume.
+    pub tissue: Vec<f64>,
+}
+
+/// Another count for a component, with its seeds and what the sum of squares grows by.
+struct Change {
+    component: usize,
+    lines: Vec<Line>,
+    cost: f64,
+    is_more: bool,
+}
+
+impl Fitter<'_> {
+    /// Changes counts by one where the fit asks for it: to the number of seeds where that is `wanted`, and between components.
+    pub fn settle(&self, components: &[Component], fits: &mut Fits, counts: &mut Counts, wanted: Option<usize>) {
+        let is_open = |n: &usize| counts.seeds[*n] > 1 || (counts.seeds[*n] == 1 && counts.probability(*n) < SURE);
+        let doubtful = (0..components.len()).filter(is_open);
+        let mut changes: Vec<Change> = Vec::new();
+        for n in doubtful.collect::<Vec<_>>() {
+            changes.extend(self.changes(components, fits, n));
+        }
+        for _ in 0..CHANGES {
+            let total: usize = counts.seeds.iter().sum();
+            let Some(chosen) = choose(&changes, total, wanted) else {
+                return;
+            };
+            for n in chosen.iter().map(|&at| changes[at].component).collect::<Vec<_>>() {
+                let at = chosen.iter().find(|&&at| changes[at].component == n);
+                let Some(change) = at.map(|&at| &changes[at]) else {
+                    continue;
+                };
+                let lines = change.lines.clone();
+                self.spread(&components[n], &fits.lines[n], -1.0, &mut fits.field);
+                let task = self.task(&components[n], Some(&fits.field), fits.tissue[n]);
+                counts.seeds[n] = lines.len();
+                fits.fitted[n] = self.fitted(&task, &lines);
+                self.spread(&components[n], &lines, 1.0, &mut fits.field);
+                fits.lines[n] = lines;
+            }
+            let changed: Vec<usize> = chosen.iter().map(|&at| changes[at].component).collect();
+            changes.retain(|change| !changed.contains(&change.component));
+            for n in changed {
+                changes.extend(self.changes(components, fits, n));
+            }
+        }
+    }
+
+    /// One seed more, and one fewer where one is left.
+    fn changes(&self, components: &[Component], fits: &mut Fits, n: usize) -> Vec<Change> {
+        let component = &components[n];
+        let own = fits.lines[n].clone();
+        self.spread(component, &own, -1.0, &mut fits.field);
+        let task = self.task(component, Some(&fits.field), fits.tissue[n]);
+        self.spread(component, &own, 1.0, &mut fits.field);
+        let before = self.residuals(&task, &own).norm_squared();
+        let counts = [own.len().checked_sub(1).filter(|&count| count > 0), Some(own.len() + 1)];
+        let other = |count: usize| {
+            let mut lines = self.starts(&task, component, count);
+            self.improve(&task, &mut lines);
+            self.exchange(&task, component, &mut lines);
+            Change {
+                component: n,
+                cost: self.residuals(&task, &lines).norm_squared() - before,
+                is_more: count > own.len(),
+                lines,
+            }
+        };
+        counts.into_iter().flatten().map(other).collect()
+    }
+}
+
+/// Places of the changes to make next; none where nothing is gained.
+fn choose(changes: &[Change], total: usize, wanted: Option<usize>) -> Option<Vec<usize>> {
+    let best = |is_more: bool, but: Option<usize>| {
+        let fits = |&at: &usize| changes[at].is_more == is_more && Some(changes[at].component) != but;
+        let all = (0..changes.len()).filter(fits);
+        all.min_by(|&a, &b| changes[a].cost.total_cmp(&changes[b].cost))
+    };
+    let Some(wanted) = wanted else {
+        let one = [best(true, None), best(false, None)].into_iter().flatten();
+        let one = one.min_by(|&a, &b| changes[a].cost.total_cmp(&changes[b].cost))?;
+        return (changes[one].cost < -WORTHWHILE).then(|| vec![one]);
+    };
+    if total != wanted {
+        let one = best(total < wanted, None)?;
+        return (changes[one].cost < MOST_COST).then(|| vec![one]);
+    }
+    let more = best(true, None)?;
+    let fewer = best(false, Some(changes[more].component))?;
+    (changes[more].cost + changes[fewer].cost < -WORTHWHILE).then(|| vec![more, fewer])
+}

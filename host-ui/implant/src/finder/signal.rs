@@ -1,0 +1,47 @@
+//! Signal of a component once its seeds, its neighbours and the tissue around it are known.
+
+use super::components::Component;
+use super::shape::{Line, Patch};
+use super::split::Fitter;
+
+/// Voxels to which seeds give less than so many standard deviations of the noise are dim, and so many of them show the tissue.
+const DIM: f64 = 0.5;
+const FEWEST_DIM: usize = 20;
+
+impl Fitter<'_> {
+    /// Signal of each component without what its neighbours' seeds give to its voxels; `field` is that of all seeds.
+    ///
+    /// What its own seeds have, and what they leave in the bright voxels: in the many others tissue that is not even would add up.
+    pub fn signals(&self, components: &[Component], lines: &[Vec<Line>], field: &[f64], tissue: &[f64]) -> Vec<f64> {
+        let bright = self.level.threshold - self.level.tissue;
+        let of_component = |((component, lines), tissue): ((&Component, &Vec<Line>), &f64)| {
+            let patch = Patch::of(self.volume.dims, self.volume.frame.spacing_m, &component.voxels);
+            let mut own = vec![0.0; component.voxels.len()];
+            lines.iter().for_each(|line| patch.add(line, &self.look, 1.0, &mut own));
+            let of_seeds: f64 = lines.iter().map(|line| line.amount * self.look.signal).sum();
+            let voxels = component.voxels.iter().zip(&component.excess).zip(&own);
+            let left = voxels.map(|((n, excess), own)| (excess, excess - tissue - (field[*n] - own) - own));
+            let counted = left.filter(|(excess, _)| lines.is_empty() || **excess >= bright);
+            of_seeds + counted.map(|(_, left)| left).sum::<f64>()
+        };
+        components.iter().zip(lines).zip(tissue).map(of_component).collect()
+    }
+
+    /// What the tissue around a component is above that of the volume: the median of what its dim voxels have beyond the seeds so far.
+    pub fn tissue_beside(&self, component: &Component, lines: &[Line], others: &[f64]) -> f64 {
+        if lines.is_empty() {
+            return 0.0;
+        }
+        let patch = Patch::of(self.volume.dims, self.volume.frame.spacing_m, &component.voxels);
+        let mut own = vec![0.0; component.voxels.len()];
+        lines.iter().for_each(|line| patch.add(line, &self.look, 1.0, &mut own));
+        let voxels = component.voxels.iter().zip(&component.excess).zip(&own);
+        let dim = voxels.filter(|((n, _), own)| **own + others[**n] < DIM * self.level.noise);
+        let mut left: Vec<f64> = dim.map(|((n, excess), own)| excess - own - others[*n]).collect();
+        if left.len() < FEWEST_DIM {
+            return 0.0;
+        }
+        left.sort_by(f64::total_cmp);
+        left[left.len() / 2]
+    }
+}
