@@ -6,6 +6,7 @@
 
 mod dose;
 mod error;
+mod errors;
 mod figures;
 mod page;
 mod picture;
@@ -15,6 +16,7 @@ mod tables;
 
 pub use dose::{ImplantDose, Scored, score};
 pub use error::PopulationError;
+pub use errors::{misplacement, turned};
 pub use figures::{Distribution, figures};
 pub use page::page;
 pub use published::{PUBLISHED, Published, Use};

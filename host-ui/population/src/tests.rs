@@ -41,6 +41,14 @@ fn row(implant: i32, needle: i32, off_mm: f64) -> Insertion {
     }
 }
 
+/// An insertion with other seeds.
+pub fn insertion_with(seeds: Vec<Seed>) -> Insertion {
+    Insertion {
+        seeds,
+        ..row(1, 1, 0.0)
+    }
+}
+
 fn table(rows: Vec<Insertion>) -> Table {
     Table {
         about: About {

@@ -1,7 +1,7 @@
 //! `host-ui perturb`.
 
 use super::CommandError;
-use super::dose::common::{Common, Loaded, within};
+use super::dose::common::{Common, Loaded, errors_of, within};
 use super::dose::write;
 use clap::Args;
 use serde_json::json;
@@ -28,6 +28,7 @@ same trials on any number of cores. Ctrl-C ends early and writes the trials done
   seeds that are lost, each by itself (--loss)
   a gland that swells at the implant and shrinks, with its seeds (--edema, --edema-half-life); the plan lies in the gland without
   edema, and a trial takes about twelve times as long
+  instead of those of each seed, the errors that a study of rt-core found: shift, deviations, correlation on a needle (--errors-of)
 What one of them draws does not change when another is added. The planned figures are those without any of them.
 
 Criteria are the limits of ABS and AAPM TG-137 for target (D90, V100, V150), urethra (D10, D30) and rectum (D2cc), and
@@ -69,6 +70,9 @@ pub struct PerturbArgs {
     /// Standard deviation along each axis of a shift that all seeds of a trial have in common
     #[arg(long, value_name = "MM", default_value_t = 0.0)]
     shift_sigma_mm: f64,
+    /// Take shift, deviations and correlation from the seeds of a study of rt-core instead: its folder
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["sigma_mm", "sigma_along_mm", "strand_correlation", "shift_mm"])]
+    errors_of: Option<PathBuf>,
     /// Probability that a seed is lost, 0 to 1
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     loss: f64,
@@ -113,7 +117,7 @@ impl PerturbArgs {
         let edema = self.edema()?;
         let loaded = c.load(&self.plan)?;
         let kernel = &loaded.kernel;
-        let strands = self.strands(&loaded)?;
+        let strands = self.strands(&loaded, &errors)?;
         let (judge, criteria) = self.judge(&loaded)?;
         let how = perturb::Perturbation {
             errors,
@@ -156,11 +160,12 @@ impl PerturbArgs {
         result["random_seed"] = json!(self.seed);
         result["trials"] = json!(trials.len());
         result["trials_asked"] = json!(self.trials);
-        let inputs: [(&str, &Path); 3] = [
+        let mut inputs: Vec<(&str, &Path)> = vec![
             ("--source", &c.source),
             ("--plan", &self.plan),
             ("--structures", &self.structures),
         ];
+        inputs.extend(self.errors_of.as_deref().map(|folder| ("--errors-of", folder)));
         result["made"] = provenance::made(&inputs)?;
         write::json(&c.out.join("made.json"), &result["made"])?;
         write::json(&c.out.join("distribution.json"), &result)?;
@@ -182,13 +187,20 @@ impl PerturbArgs {
         for mm in shift_mm {
             within("--shift-mm", mm, -100.0, 100.0)?;
         }
+        let own = match &self.errors_of {
+            Some(folder) => errors_of(folder)?,
+            None => Errors {
+                sigma_m: self.sigma_mm * 1e-3,
+                along_m: self.sigma_along_mm.map(|mm| mm * 1e-3),
+                within_strand: self.strand_correlation,
+                shift_m: shift_mm.map(|mm| mm * 1e-3),
+                ..Errors::of_sigma(0.0)
+            },
+        };
         Ok(Errors {
-            sigma_m: self.sigma_mm * 1e-3,
-            along_m: self.sigma_along_mm.map(|mm| mm * 1e-3),
-            within_strand: self.strand_correlation,
-            shift_m: shift_mm.map(|mm| mm * 1e-3),
             shift_sigma_m: self.shift_sigma_mm * 1e-3,
             loss: self.loss,
+            ..own
         })
     }
 
@@ -207,22 +219,22 @@ impl PerturbArgs {
     }
 
     /// The needle of each seed, counted from 0, where it matters; what the file lacks for the errors asked for is refused.
-    fn strands(&self, loaded: &Loaded) -> Result<Vec<usize>, CommandError> {
+    fn strands(&self, loaded: &Loaded, errors: &Errors) -> Result<Vec<usize>, CommandError> {
         let (file, all) = (self.plan.display(), loaded.rows.len());
         let without_axis = loaded.seeds.iter().filter(|s| s.axis.is_none()).count();
-        if self.sigma_along_mm.is_some() && without_axis > 0 {
+        if errors.along_m.is_some() && without_axis > 0 {
             return Err(format!(
-                "--sigma-along-mm: {without_axis} of {all} seeds of {file} have no axis; give the columns axis_x, axis_y, axis_z"
+                "errors along the needle: {without_axis} of {all} seeds of {file} have no axis; give the columns axis_x, axis_y, axis_z"
             )
             .into());
         }
-        if self.strand_correlation == 0.0 {
+        if errors.within_strand == 0.0 {
             return Ok(Vec::new());
         }
         let without_needle = loaded.rows.iter().filter(|row| row.needle.is_none()).count();
         if without_needle > 0 {
             return Err(format!(
-                "--strand-correlation: {without_needle} of {all} seeds of {file} have no needle; give the column needle"
+                "correlated errors: {without_needle} of {all} seeds of {file} have no needle; give the column needle"
             )
             .into());
         }

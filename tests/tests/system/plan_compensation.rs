@@ -7,6 +7,7 @@ use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Source};
 use stylet_implant::plan::compensate::summary_m;
 use stylet_implant::plan::first;
+use stylet_implant::plan::optimise::Objectives;
 use stylet_implant::plan::{Anatomy, ImplantPlan, Limits, Needle, Template, compensate};
 use stylet_implant::workflow::{Pace, plan_with_seeds};
 use stylet_sim::scene::Labels;
@@ -39,7 +40,8 @@ fn first_plan(theatre: &Theatre) -> ImplantPlan {
     let anatomy = Anatomy::of(&theatre.scene).expect("a closed target");
     let template = Template::before(&theatre.scene.header);
     let proceed = |_| std::ops::ControlFlow::Continue(());
-    let plan = first::plan(template, &anatomy, &kernel, &source, 145.0, proceed)
+    let objectives = Objectives::new(&source, 145.0);
+    let plan = first::plan(template, &anatomy, &kernel, &source, &objectives, proceed)
         .expect("a plan")
         .plan;
     let found = stylet_implant::plan::check::problems(&plan, &anatomy);

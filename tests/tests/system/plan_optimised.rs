@@ -4,9 +4,13 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Source};
+use stylet_files::dicom::structures::StructureSet;
+use stylet_files::dicom::{self, Identity};
+use stylet_implant::linked::scene;
 use stylet_implant::plan::automatic::{self, Aims};
 use stylet_implant::plan::optimise::{self, Engine, Method, Objectives};
 use stylet_implant::plan::{Anatomy, Needle, Template, check};
+use stylet_implant::readers::DoseFile;
 use stylet_tests::rehearsal::Theatre;
 
 /// V150 was 84.5 % and D10 of the urethra 291 Gy: the pattern looked at the coverage of the target alone.
@@ -62,6 +66,92 @@ fn the_automatic_plan_of_the_pelvis_keeps_its_limits() {
             assert!(wrong.is_empty(), "{wrong:?}");
             assert_eq!(found.figures.broken(), Vec::<String>::new());
             assert!(found.plan.needles.len() <= 25);
+            assert!(found.robust >= 0.95, "{}", found.robust);
         }
     }
+}
+
+/// The window had no button for a study: its three files were of three patients.
+#[test]
+fn a_plan_of_a_scene_becomes_three_files_that_belong_together() {
+    let theatre = Theatre::builtin("pelvis");
+    let anatomy = Anatomy::of(&theatre.scene).expect("a closed target");
+    let template = Template::before(&theatre.scene.header);
+    let proceed = |_| ControlFlow::Continue(());
+    let source = Source::known("6711").expect("comes with the program");
+    let kernel = DoseKernel::new(&source, Interval::ALL);
+    let plan = automatic::plan(template, &anatomy, &kernel, "6711", &Aims::new(145.0), proceed).expect("a plan");
+    let folder = stylet_test_kit::scratch("plan-scene-study").join("study");
+    let shares = std::cell::RefCell::new(Vec::new());
+    let report = |share: f32| {
+        shares.borrow_mut().push(share);
+        ControlFlow::Continue(())
+    };
+    let notes = scene::write(&folder, &plan, (&theatre.scene, &anatomy), None, &report).expect("written");
+    assert!(notes[0].contains("are new"), "{notes:?}");
+    let shares = shares.into_inner();
+    assert!(
+        shares.windows(2).all(|pair| pair[0] <= pair[1]) && shares.len() > 5,
+        "{shares:?}"
+    );
+    let opened = |name: &str| {
+        let bytes = std::fs::read(folder.join(name)).expect("written");
+        dicom::read(&bytes).expect("DICOM")
+    };
+    let identities = ["structure_set.dcm", "plan.dcm", "dose.dcm"].map(|name| Identity::of(&opened(name)));
+    assert!(identities.iter().all(|other| *other == identities[0]), "{identities:?}");
+    // Contours enclose what the segmentation has, and every structure is there.
+    let set = StructureSet::of(&opened("structure_set.dcm")).expect("contours");
+    let header = &theatre.scene.header;
+    assert_eq!(set.structures.len(), header.structures().len());
+    let cell_m3 = header.labels.spacing_m.powi(3);
+    let voxels = set.voxels(None).expect("voxels");
+    for (label, name) in &voxels.names {
+        let found_m3 = voxels.of_label(*label).len() as f64 * voxels.frame.spacing_m.iter().product::<f64>();
+        let number = header
+            .structures()
+            .iter()
+            .position(|s| s.name.read() == *name)
+            .expect("by its name");
+        let cells = theatre
+            .scene
+            .labels
+            .iter()
+            .filter(|&&cell| usize::from(cell) == number + 1)
+            .count();
+        let expected_m3 = cells as f64 * cell_m3;
+        assert!(
+            (found_m3 / expected_m3 - 1.0).abs() < 0.02,
+            "{name}: {found_m3} of {expected_m3} m3"
+        );
+    }
+    // Seeds where they are planned, and the dose that they give there.
+    let written = dicom::plan::open(&folder.join("plan.dcm")).expect("a plan");
+    let dose = dicom::dose::of_file(&folder.join("dose.dcm")).expect("a dose");
+    assert_eq!(dose.plan.as_deref(), Some(written.uid.as_str()));
+    assert!(written.structure_set.is_some() && dose.structure_set == written.structure_set.map(|of| of.uid));
+    let seeds = plan.seeds();
+    assert_eq!(written.seeds.len(), seeds.len());
+    let patient = header.patient();
+    for (found, seed) in written.seeds.iter().zip(&seeds) {
+        let expected = patient.patient_from_scene(seed.position_m);
+        assert!(
+            (0..3).all(|a| (found.position_m[a] - expected[a]).abs() < 1e-6),
+            "{found:?}"
+        );
+    }
+    let dose = DoseFile::from(dose);
+    let place = dose.places_m().nth(dose.dose_gy.len() / 2).expect("a voxel");
+    let in_scene = patient.scene_from_patient(place);
+    let expected: f64 = seeds.iter().map(|seed| kernel.exact_at_gy(seed, in_scene)).sum();
+    let found = dose.at_gy(place).expect("in the grid");
+    assert!((found / expected - 1.0).abs() < 1e-3, "{found} of {expected} Gy");
+    // Cancelled, nothing is written.
+    let other = folder.with_file_name("cancelled");
+    let stop = |share: f32| match share > 0.03 {
+        true => ControlFlow::Break(()),
+        false => ControlFlow::Continue(()),
+    };
+    assert!(scene::write(&other, &plan, (&theatre.scene, &anatomy), None, &stop).is_err());
+    assert!(!other.exists());
 }

@@ -33,6 +33,7 @@ pub fn read(path: &Path, scene: &SceneHeader) -> Result<ImplantPlan, PlanError> 
     let defaults = SeedDefaults {
         strength_u: None,
         strength_per_activity_u_per_mci: usual.strength_per_activity_u_per_mci,
+        columns: Vec::new(),
     };
     let mut seeds = seeds::read(path, defaults)?;
     let source = match &seeds.declared {
@@ -84,7 +85,8 @@ pub fn write(path: &Path, plan: &ImplantPlan, patient: &PatientFrame) -> Result<
     Ok(stylet_base::write_whole(path, &bytes)?)
 }
 
-fn seed_plan(plan: &ImplantPlan, patient: &PatientFrame) -> Result<SeedPlan, PlanError> {
+/// The seeds of a plan as an RT Plan has them; an error where its source is not known.
+pub fn seed_plan(plan: &ImplantPlan, patient: &PatientFrame) -> Result<SeedPlan, PlanError> {
     let source = Source::known(&plan.source).ok_or_else(|| {
         PlanError::Source(format!(
             "an RT Plan holds isotope and half-life, and those of source {} are not known; write .toml",

@@ -1,7 +1,7 @@
 //! The automatic plan: inverse planning where the scene says what is to be spared, else modified peripheral loading.
 
 use super::automatic::{self, Aims};
-use super::optimise::{self, Method, Objectives};
+use super::optimise::{self, Figures, Method, Objectives, Proposal, Search, Statistic};
 use super::{Anatomy, ImplantPlan, PlanError, Template};
 use std::ops::ControlFlow;
 use stylet_dose::{DoseKernel, Source};
@@ -9,40 +9,135 @@ use stylet_dose::{DoseKernel, Source};
 /// A plan, and what there is to know about how it was made.
 #[derive(Clone, Debug)]
 pub struct FirstPlan {
+    /// What distinguishes it from the other proposals, in a word or two.
+    pub name: &'static str,
+    /// The same in a sentence.
+    pub why: &'static str,
     /// The plan.
     pub plan: ImplantPlan,
+    /// Its measures; `None` for one that was made without limits.
+    pub measures: Option<Measures>,
     /// For people: what is beyond its limit and by how much, or why the plan was made without limits. Empty where all limits are kept.
     pub notes: Vec<String>,
 }
 
+/// What proposals are compared by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measures {
+    /// Of the dose.
+    pub figures: Figures,
+    /// Share of trials with misplaced seeds whose D90 is at least 90 % of the prescription.
+    pub robust: f64,
+    /// Mean D90 of those trials, percent of the prescription.
+    pub expected_d90: f64,
+    /// D90 that nine of ten of those trials reach, percent of the prescription.
+    pub d90_p10: f64,
+}
+
 /// What a plan without a known urethra says.
 pub const NO_URETHRA: &str = "no urethra is known, so the plan only covers the target (modified peripheral loading)";
+/// What a needle costs where few of them are wanted.
+const FEW_NEEDLES: f32 = 6e-3;
 
-/// Needles, seeds and strength; an error where no needle fits. `report` gets the share that is done; where it breaks, the search is
+/// One plan for the objectives; an error where no needle fits. `report` gets the share that is done; where it breaks, the search is
 /// cancelled.
 pub fn plan(
     template: Template,
     anatomy: &Anatomy,
     kernel: &DoseKernel,
     source: &Source,
-    prescription_gy: f64,
+    objectives: &Objectives,
     report: impl Fn(f32) -> ControlFlow<()>,
 ) -> Result<FirstPlan, PlanError> {
     let [_, urethra, _] = optimise::bodies(anatomy);
     if urethra.is_none() {
-        let aims = Aims::new(prescription_gy);
-        return Ok(FirstPlan {
-            plan: automatic::plan(template, anatomy, kernel, &source.model, &aims, report)?,
-            notes: vec![NO_URETHRA.to_owned()],
-        });
+        return peripheral(template, anatomy, kernel, source, objectives, report);
     }
-    let objectives = Objectives::new(source, prescription_gy);
-    let model = &source.model;
-    let found = optimise::plan(template, anatomy, kernel, model, &objectives, Method::default(), report)?;
+    let search = Search::new(template, anatomy, kernel, &source.model, objectives, &report)?;
+    let found = search.find(objectives, Method::default(), &report)?;
+    Ok(FirstPlan::of("Robust", ROBUST, found))
+}
+
+/// Several plans to choose from, the usual one first; one alone where no urethra is known. `report` as for [`plan`].
+pub fn proposals(
+    template: Template,
+    anatomy: &Anatomy,
+    kernel: &DoseKernel,
+    source: &Source,
+    objectives: &Objectives,
+    report: impl Fn(f32) -> ControlFlow<()>,
+) -> Result<Vec<FirstPlan>, PlanError> {
+    let [_, urethra, _] = optimise::bodies(anatomy);
+    if urethra.is_none() {
+        return Ok(vec![peripheral(template, anatomy, kernel, source, objectives, report)?]);
+    }
+    let search = Search::new(template, anatomy, kernel, &source.model, objectives, &|_| report(0.0))?;
+    let few = Objectives {
+        needle_cost: FEW_NEEDLES,
+        ..objectives.clone()
+    };
+    let planned = Objectives {
+        robust: Statistic::Planned,
+        ..objectives.clone()
+    };
+    let aims = [
+        ("Robust", ROBUST, objectives),
+        (
+            "Fewer needles",
+            "Robust as well, with as few needles as that takes.",
+            &few,
+        ),
+        (
+            "Cooler",
+            "The dose as planned alone: the least of the target gets 150 %, and seeds that miss their places cost more coverage.",
+            &planned,
+        ),
+    ];
+    let count = aims.len() as f32;
+    let find = |(number, (name, why, objectives)): (usize, (_, _, &Objectives))| {
+        let found = search.find(objectives, Method::default(), &|share| {
+            report((number as f32 + share) / count)
+        })?;
+        Ok(FirstPlan::of(name, why, found))
+    };
+    aims.into_iter().enumerate().map(find).collect()
+}
+
+const ROBUST: &str = "Most trials with misplaced seeds keep a D90 of 90 % of the prescription.";
+
+fn peripheral(
+    template: Template,
+    anatomy: &Anatomy,
+    kernel: &DoseKernel,
+    source: &Source,
+    objectives: &Objectives,
+    report: impl Fn(f32) -> ControlFlow<()>,
+) -> Result<FirstPlan, PlanError> {
+    let aims = Aims::new(objectives.prescription_gy);
     Ok(FirstPlan {
-        notes: found.figures.broken(),
-        plan: found.plan,
+        name: "Peripheral",
+        why: "Modified peripheral loading.",
+        plan: automatic::plan(template, anatomy, kernel, &source.model, &aims, report)?,
+        measures: None,
+        notes: vec![NO_URETHRA.to_owned()],
     })
+}
+
+impl FirstPlan {
+    fn of(name: &'static str, why: &'static str, found: Proposal) -> Self {
+        Self {
+            name,
+            why,
+            notes: found.figures.broken(),
+            measures: Some(Measures {
+                figures: found.figures,
+                robust: found.robust,
+                expected_d90: found.expected_d90,
+                d90_p10: found.d90_p10,
+            }),
+            plan: found.plan,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -74,7 +169,8 @@ mod tests {
         let source = Source::known("6711").unwrap();
         let kernel = DoseKernel::new(&source, Interval::ALL);
         let proceed = |_| ControlFlow::Continue(());
-        let first = plan(template, &anatomy, &kernel, &source, 145.0, proceed).unwrap();
+        let objectives = Objectives::new(&source, 145.0);
+        let first = plan(template, &anatomy, &kernel, &source, &objectives, proceed).unwrap();
         let aims = Aims::new(145.0);
         let peripheral = automatic::plan(template, &anatomy, &kernel, "6711", &aims, proceed).unwrap();
         assert_eq!(first.plan, peripheral);

@@ -45,6 +45,12 @@ impl ImplantPlan {
         self.needles.iter().map(|n| n.seeds.len()).sum()
     }
 
+    /// Place of its needle for each of [`ImplantPlan::seeds`].
+    pub fn needle_of_seeds(&self) -> Vec<usize> {
+        let of_needle = |(n, needle): (usize, &Needle)| vec![n; needle.seeds.len()];
+        self.needles.iter().enumerate().flat_map(of_needle).collect()
+    }
+
     /// As dose takes them, needle by needle, deepest first.
     pub fn seeds(&self) -> Vec<dose::Seed> {
         let of_needle = |n: &Needle| {

@@ -9,6 +9,7 @@ use stylet_base::nuclide::Nuclide;
 use stylet_dose::decay::{Interval, days_to_s, left_after};
 use stylet_dose::kernel::DoseKernel;
 use stylet_dose::metric::Metric;
+use stylet_dose::perturb::Errors;
 use stylet_dose::report::{Judge, choose_target};
 use stylet_dose::seed::Seed;
 use stylet_dose::source::Source;
@@ -16,7 +17,8 @@ use stylet_dose::structure::Structure;
 use stylet_files::dicom::Identity;
 use stylet_files::dicom::plan::Date;
 use stylet_implant::plan::seeds;
-use stylet_implant::readers::{DayOfImplant, Declared, SeedDefaults, SeedRow, contours, labels, places};
+use stylet_implant::readers::{DayOfImplant, Declared, Mapped, SeedDefaults, SeedRow, contours, labels, places};
+use stylet_population as population;
 
 /// Options of all commands that compute dose.
 #[derive(Args, Debug)]
@@ -27,6 +29,9 @@ pub struct Common {
     /// Strength in U of seeds whose file gives none
     #[arg(long, value_name = "U")]
     strength_u: Option<f64>,
+    /// What a column of the table of seeds is: NAME=HEADER with its unit, as in x_mm=-Lateral:cm; may be given again
+    #[arg(long = "column", value_name = "NAME=HEADER[:UNIT]")]
+    columns: Vec<Mapped>,
     /// The strengths were measured this many days before the implant, and have decayed since
     #[arg(long, value_name = "DAYS", default_value_t = 0.0)]
     measured_days_before: f64,
@@ -97,6 +102,7 @@ impl Common {
         let defaults = SeedDefaults {
             strength_u: self.strength_u,
             strength_per_activity_u_per_mci: source.strength_per_activity_u_per_mci,
+            columns: self.columns.clone(),
         };
         let mut file = seeds::read(path, defaults)?;
         let of_file = file.rows.clone();
@@ -249,7 +255,7 @@ impl Common {
         most_points: usize,
     ) -> Result<Vec<Structure>, CommandError> {
         let voxels = stylet_files::watched(file, |progress| stylet_files::read_voxels(file, progress))?;
-        if let Some((label, name)) = given.iter().find(|(label, _)| !voxels.labels.contains(label)) {
+        if let Some((label, name)) = given.iter().find(|(label, _)| !voxels.present().contains(label)) {
             return Err(format!(
                 "--name {label}={name}: {} has no voxel with label {label}",
                 file.display()
@@ -294,6 +300,22 @@ impl Common {
             "version": env!("CARGO_PKG_VERSION"),
         })
     }
+}
+
+/// How the seeds of a study of rt-core missed their places, in the patient's frame; it is printed as well.
+pub fn errors_of(folder: &Path) -> Result<Errors, CommandError> {
+    let read = population::load(folder)?;
+    let errors = population::misplacement(&read.table)
+        .ok_or_else(|| format!("{}: no seed of it came to rest", folder.display()))?;
+    let [x, y, z] = errors.shift_m.map(|m| m * 1e3);
+    println!(
+        "errors of {}: shift {x:.2}, {y:.2}, {z:.2} mm; deviation {:.2} mm across and {:.2} mm along the needle; correlation on a needle {:.2}",
+        folder.display(),
+        errors.sigma_m * 1e3,
+        errors.along_m.unwrap_or(0.0) * 1e3,
+        errors.within_strand
+    );
+    Ok(errors)
 }
 
 pub fn within(option: &str, value: f64, least: f64, most: f64) -> Result<(), CommandError> {

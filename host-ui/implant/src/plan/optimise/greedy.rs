@@ -7,31 +7,20 @@ use std::ops::ControlFlow;
 pub fn build(state: &mut State, report: &dyn Fn(f32) -> ControlFlow<()>) -> ControlFlow<()> {
     loop {
         report(0.0)?;
-        let mut best: Option<(f32, Move)> = None;
-        for place in (0..state.chosen.len())
-            .filter(|&place| !state.chosen[place])
-            .collect::<Vec<_>>()
-        {
-            let change = Move {
-                without: Vec::new(),
-                with: vec![place],
-                strength: state.strength,
-            };
-            if let Some(cost) = state.try_move(&change)
-                && cost < best.as_ref().map_or(state.cost - 1e-6, |(least, _)| *least)
-            {
-                best = Some((cost, change));
-            }
-        }
-        let Some((_, change)) = best else {
-            return ControlFlow::Continue(());
+        let (strength, free) = (state.strength, free_places(state));
+        let change = |place| Move {
+            without: Vec::new(),
+            with: vec![place],
+            strength,
         };
-        state.take_if_better(&change);
+        if !take_best(state, &free.into_iter().map(change).collect::<Vec<_>>()) {
+            return ControlFlow::Continue(());
+        }
     }
 }
 
-/// Takes the first move of a seed to any other place, its removal, a new seed or another strength that helps, until none does or
-/// for so many rounds over all seeds.
+/// Takes the best of removing a seed and of moving it to any other place, seed by seed, then new seeds and another strength where
+/// they help; until nothing does, or for so many rounds over all seeds.
 pub fn exchange(state: &mut State, rounds: usize, report: &dyn Fn(f32) -> ControlFlow<()>) -> ControlFlow<()> {
     for round in 0..rounds {
         let before = state.cost;
@@ -58,23 +47,23 @@ pub fn exchange(state: &mut State, rounds: usize, report: &dyn Fn(f32) -> Contro
 
 fn exchange_one(state: &mut State, seed: usize) {
     let strength = state.strength;
-    let without = vec![seed];
-    let removed = Move {
-        without: without.clone(),
-        with: Vec::new(),
+    let change = |with: Vec<usize>| Move {
+        without: vec![seed],
+        with,
         strength,
     };
-    if state.take_if_better(&removed) {
-        return;
-    }
-    for place in 0..state.chosen.len() {
-        let change = Move {
-            without: without.clone(),
-            with: vec![place],
-            strength,
-        };
-        if !state.chosen[place] && state.take_if_better(&change) {
-            return;
-        }
+    let to_places = free_places(state).into_iter().map(|place| change(vec![place]));
+    let moves: Vec<Move> = std::iter::once(change(Vec::new())).chain(to_places).collect();
+    take_best(state, &moves);
+}
+
+fn free_places(state: &State) -> Vec<usize> {
+    (0..state.chosen.len()).filter(|&place| !state.chosen[place]).collect()
+}
+
+fn take_best(state: &mut State, moves: &[Move]) -> bool {
+    match state.best_of(moves) {
+        Some((best, _)) => state.take_if_better(&moves[best]),
+        None => false,
     }
 }

@@ -12,9 +12,12 @@ const BEYOND: f32 = 12.0;
 /// Cost of what is within its limit: less of it is still better.
 const WITHIN_HOT: f32 = 0.4;
 const WITHIN_SPARED: f32 = 0.05;
+/// Cost of a share of the target that is expected to be cold when seeds miss their places.
+const EXPECTED: f32 = 2.0;
+/// Where the smooth step that stands for the normal distribution ends, in standard deviations.
+const STEP_ENDS: f32 = 2.2;
 /// How cold the cold part is, and how hot the hot part of the urethra.
 const DEPTH: f32 = 2.0;
-const NEEDLE: f32 = 5e-4;
 const SEED: f32 = 2e-4;
 
 /// Limits as the search sees them: shares, and doses as shares of the prescription.
@@ -34,8 +37,21 @@ pub struct Limits {
     pub urethra_third: f32,
     /// At most 2 cc of the rectum get more than this.
     pub rectum: f32,
+    /// When seeds miss their places, so much of the target is expected to get less than `kept`; `None` where nothing is asked.
+    pub expected: Option<Expected>,
     /// Needles at most.
     pub needles: usize,
+    /// Cost of a needle.
+    pub of_needle: f32,
+}
+
+/// What the dose should be when seeds miss their places.
+#[derive(Clone, Copy, Debug)]
+pub struct Expected {
+    /// A dose, as a share of the prescription.
+    pub kept: f32,
+    /// At most so much of the target may be expected to get less.
+    pub cold: f32,
 }
 
 /// The cost of a dose that is given for seeds of 1 U.
@@ -72,6 +88,10 @@ pub fn cost(
     let (dose, weights) = group(&samples.rectum);
     let [rectum] = sums(dose, weights, |d| [above(d * strength_u, limits.rectum)]);
     let beyond = |share: f32, limit: f32| (share - limit).max(0.0) * BEYOND;
+    let expected = limits.expected.map_or(0.0, |asked| {
+        let cold = expected_cold(samples, of_one_u, strength_u, asked.kept);
+        beyond(cold, asked.cold) + cold * EXPECTED
+    });
     beyond(cold, limits.cold)
         + cold
         + depth * DEPTH
@@ -83,8 +103,32 @@ pub fn cost(
         + (tenth + third + over) * WITHIN_SPARED
         + beyond(rectum, 1.0) / 4.0
         + rectum * WITHIN_SPARED
-        + needles as f32 * NEEDLE
+        + expected
+        + needles as f32 * limits.of_needle
         + seeds as f32 * SEED
+}
+
+/// Share of the target that gets less than `kept` over the errors of the seeds.
+fn expected_cold(samples: &Samples, of_one_u: &[f32], strength_u: f32, kept: f32) -> f32 {
+    let means = &of_one_u[samples.mean.clone()];
+    let variances = &of_one_u[samples.variance.clone()];
+    let weights = &samples.weights[samples.mean.clone()];
+    let mut lanes = [0.0_f32; LANES];
+    let chunks = means.chunks_exact(LANES).zip(variances.chunks_exact(LANES));
+    for ((mean, variance), weights) in chunks.zip(weights.chunks_exact(LANES)) {
+        for lane in 0..LANES {
+            // Rounding may leave a little less than nothing.
+            let deviation = variance[lane].max(1e-8).sqrt() * strength_u;
+            lanes[lane] += probability((kept - mean[lane] * strength_u) / deviation) * weights[lane];
+        }
+    }
+    lanes.iter().sum()
+}
+
+/// About the normal distribution up to a number of standard deviations.
+fn probability(deviations: f32) -> f32 {
+    let t = (deviations * (0.5 / STEP_ENDS) + 0.5).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
 }
 
 fn above(dose: f32, level: f32) -> f32 {
@@ -112,6 +156,26 @@ fn sums<const N: usize>(dose: &[f32], weights: &[f32], of: impl Fn(f32) -> [f32;
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_smooth_step_is_near_the_normal_distribution() {
+        // Abramowitz and Stegun, table 26.1.
+        for (deviations, expected) in [
+            (0.0, 0.5),
+            (0.5, 0.69146),
+            (1.0, 0.84134),
+            (1.5, 0.93319),
+            (2.0, 0.97725),
+        ] {
+            assert!(
+                (probability(deviations) - expected).abs() < 0.03,
+                "{deviations}: {}",
+                probability(deviations)
+            );
+            assert!((probability(-deviations) - 1.0 + expected).abs() < 0.025);
+        }
+        assert_eq!((probability(-9.0), probability(9.0)), (0.0, 1.0));
+    }
 
     #[test]
     fn sums_are_weighted_means_and_edges_are_soft_about_their_level() {

@@ -1,8 +1,11 @@
 //! Points that the search looks at, and the dose that a seed of 1 U at each place gives to each of them.
 
 use super::candidates::Candidates;
+use super::misplaced::Misplaced;
 use crate::plan::anatomy::Body;
+use crate::plan::dose::perturb::Perturbation;
 use crate::plan::dose::{DoseKernel, DosePoints, Seed};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Points of a group are filled up to a multiple of this with points that count nothing.
@@ -10,6 +13,8 @@ pub const LANES: usize = 8;
 const TARGET_POINTS: f64 = 3000.0;
 const URETHRA_POINTS: f64 = 400.0;
 const RECTUM_POINTS: f64 = 4000.0;
+/// Points of the target at which the dose of misplaced seeds is looked at: it varies less from place to place.
+const MISPLACED_POINTS: f64 = 1000.0;
 /// Of the rectum only so much is kept, where seeds reach most: the hottest 2 cc lie there.
 const RECTUM_KEPT_M3: f64 = 5e-6;
 /// The volume that the limit of the rectum is about.
@@ -23,6 +28,10 @@ pub struct Samples {
     pub urethra: Range<usize>,
     /// Points of the rectum, weights in units of [`RECTUM_M3`]; empty without one.
     pub rectum: Range<usize>,
+    /// Mean dose at points of the target over the errors of a seed, weights of 1 in all.
+    pub mean: Range<usize>,
+    /// Variance of that dose at the same points, in squares of the prescription.
+    pub variance: Range<usize>,
     /// Weight of each point.
     pub weights: Vec<f32>,
     /// Dose of 1 U as a share of the prescription, place by place.
@@ -30,8 +39,15 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// Draws the points and computes the dose of each place at each of them.
-    pub fn new(bodies: [Option<&Body>; 3], candidates: &Candidates, kernel: &DoseKernel, prescription_gy: f64) -> Self {
+    /// Draws the points and computes the dose of each place at each of them, where it is planned and over the errors of `how`.
+    /// `usual_u` is a strength in the middle of the catalogue.
+    pub fn new(
+        bodies: [Option<&Body>; 3],
+        candidates: &Candidates,
+        kernel: &DoseKernel,
+        (prescription_gy, usual_u): (f64, f64),
+        how: Perturbation,
+    ) -> Self {
         let axis = Some(candidates.inwards());
         let seeds: Vec<Seed> = candidates
             .places
@@ -42,51 +58,74 @@ impl Samples {
                 strength_u: 1.0,
             })
             .collect();
-        let (mut points_m, mut weights) = (Vec::new(), Vec::new());
-        let counts = [TARGET_POINTS, URETHRA_POINTS, RECTUM_POINTS];
-        let mut ranges = Vec::new();
-        for (group, (body, count)) in bodies.into_iter().zip(counts).enumerate() {
-            let from = points_m.len();
-            if let Some(body) = body {
-                let mut of_body = points(body, count);
-                if group == 2 {
-                    of_body = hottest(of_body, kernel, &seeds);
-                }
-                let all_m3: f64 = of_body.iter().map(|p| p.1).sum();
-                let unit_m3 = if group == 2 { RECTUM_M3 } else { all_m3 };
-                weights.extend(of_body.iter().map(|p| (p.1 / unit_m3) as f32));
-                points_m.extend(of_body.iter().map(|p| p.0));
-                let filler = points_m[from..].first().copied().unwrap_or_default();
-                while !points_m.len().is_multiple_of(LANES) {
-                    points_m.push(filler);
-                    weights.push(0.0);
-                }
-            }
-            ranges.push(from..points_m.len());
-        }
-        let at = DosePoints::new(&points_m);
-        let of_seed = |seed: &Seed| at.of_seeds_gy(kernel, std::slice::from_ref(seed));
-        let of_one_u = seeds
-            .iter()
-            .flat_map(|seed| of_seed(seed).into_iter().map(|gy| (gy / prescription_gy) as f32));
+        let mut drawn = Drawn::default();
+        let [target, urethra, rectum] = bodies;
+        let of_target = drawn.add(target.map(|body| points(body, TARGET_POINTS)), None);
+        let of_urethra = drawn.add(urethra.map(|body| points(body, URETHRA_POINTS)), None);
+        let kept = rectum.map(|body| hottest(points(body, RECTUM_POINTS), kernel, &seeds));
+        let of_rectum = drawn.add(kept, Some(RECTUM_M3));
+        let planned = drawn.points_m.len();
+        let mean = drawn.add(target.map(|body| points(body, MISPLACED_POINTS)), None);
+        let variance = mean.end..mean.end + mean.len();
+        let at = DosePoints::new(&drawn.points_m[..planned]);
+        let misplaced = Misplaced::new(
+            &drawn.points_m[planned..],
+            how,
+            (prescription_gy, usual_u),
+            candidates.inwards(),
+        );
+        drawn.weights.resize(variance.end, 0.0);
+        let of_seed = |seed: &Seed| {
+            let gy = at.of_seeds_gy(kernel, std::slice::from_ref(seed));
+            let mut row: Vec<f32> = gy.into_iter().map(|gy| (gy / prescription_gy) as f32).collect();
+            misplaced.moments(kernel, seed.position_m, &mut row);
+            row
+        };
         Self {
-            of_one_u: of_one_u.collect(),
-            target: ranges[0].clone(),
-            urethra: ranges[1].clone(),
-            rectum: ranges[2].clone(),
-            weights,
+            of_one_u: seeds.par_iter().flat_map_iter(of_seed).collect(),
+            target: of_target,
+            urethra: of_urethra,
+            rectum: of_rectum,
+            mean,
+            variance,
+            weights: drawn.weights,
         }
     }
 
-    /// Points of all groups.
-    pub fn count(&self) -> usize {
+    /// Values of a place: doses at points, then means and variances.
+    pub fn row_len(&self) -> usize {
         self.weights.len()
     }
 
-    /// What a seed of 1 U at a place gives to each point, as a share of the prescription.
+    /// What a seed of 1 U at a place gives to each point, as a share of the prescription, and the moments of that
+    /// over its errors.
     pub fn of_place(&self, place: usize) -> &[f32] {
-        let count = self.count();
+        let count = self.row_len();
         &self.of_one_u[place * count..(place + 1) * count]
+    }
+}
+
+/// Points of all groups so far.
+#[derive(Default)]
+struct Drawn {
+    points_m: Vec<[f64; 3]>,
+    weights: Vec<f32>,
+}
+
+impl Drawn {
+    /// Points of one more structure; weights are shares of `unit_m3`, or of all.
+    fn add(&mut self, of_body: Option<Vec<([f64; 3], f64)>>, unit_m3: Option<f64>) -> Range<usize> {
+        let from = self.points_m.len();
+        let of_body = of_body.unwrap_or_default();
+        let unit_m3 = unit_m3.unwrap_or_else(|| of_body.iter().map(|p| p.1).sum());
+        self.weights.extend(of_body.iter().map(|p| (p.1 / unit_m3) as f32));
+        self.points_m.extend(of_body.iter().map(|p| p.0));
+        let filler = self.points_m[from..].first().copied().unwrap_or_default();
+        while !self.points_m.len().is_multiple_of(LANES) {
+            self.points_m.push(filler);
+            self.weights.push(0.0);
+        }
+        from..self.points_m.len()
     }
 }
 

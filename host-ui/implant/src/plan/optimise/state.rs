@@ -3,9 +3,12 @@
 use super::candidates::Candidates;
 use super::objective::{Limits, cost};
 use super::samples::Samples;
+use rayon::prelude::*;
 
 /// Accepted moves after which the dose is summed anew: rounding adds up.
 const REFRESH_EVERY: usize = 500;
+/// Moves that a thread tries at least.
+const TRIED_TOGETHER: usize = 16;
 
 /// What a search changes.
 #[derive(Clone)]
@@ -65,8 +68,8 @@ impl<'a> State<'a> {
             needles: 0,
             strength,
             cost: 0.0,
-            of_one_u: vec![0.0; samples.count()],
-            tried: vec![0.0; samples.count()],
+            of_one_u: vec![0.0; samples.row_len()],
+            tried: vec![0.0; samples.row_len()],
             accepted: 0,
         };
         state.refresh();
@@ -85,7 +88,8 @@ impl<'a> State<'a> {
 
     /// Dose at the sample points as a share of the prescription.
     pub fn dose(&self) -> Vec<f32> {
-        self.of_one_u.iter().map(|d| d * self.strength_u() as f32).collect()
+        let planned = &self.of_one_u[..self.samples.mean.start];
+        planned.iter().map(|d| d * self.strength_u() as f32).collect()
     }
 
     /// The same choice with another strength.
@@ -102,36 +106,48 @@ impl<'a> State<'a> {
 
     /// The cost after a move; `None` for one with too many needles. [`State::accept`] takes it.
     pub fn try_move(&mut self, change: &Move) -> Option<f32> {
+        let mut tried = std::mem::take(&mut self.tried);
+        let cost = self.cost_after(change, &mut tried);
+        self.tried = tried;
+        cost
+    }
+
+    /// The best of these moves with its cost, the first of those that are alike; `None` where none makes the cost smaller.
+    pub fn best_of(&self, moves: &[Move]) -> Option<(usize, f32)> {
+        let try_one = |tried: &mut Vec<f32>, change: &Move| self.cost_after(change, tried).unwrap_or(f32::INFINITY);
+        let costs: Vec<f32> = moves
+            .par_iter()
+            .with_min_len(TRIED_TOGETHER)
+            .map_init(|| vec![0.0; self.samples.row_len()], try_one)
+            .collect();
+        let least = costs.into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        (least.1 < self.cost - 1e-6).then_some(least)
+    }
+
+    /// The cost after a move, whose dose is left in `tried`.
+    fn cost_after(&self, change: &Move, tried: &mut [f32]) -> Option<f32> {
         let needles = self.needles_after(change);
         if needles > self.limits.needles {
             return None;
         }
-        let rows = |places: &[usize]| places.iter().map(|&p| self.samples.of_place(p)).collect::<Vec<_>>();
-        let (minus, plus) = (rows(&change.without), rows(&change.with));
-        match (&minus[..], &plus[..]) {
-            ([], []) => self.tried.copy_from_slice(&self.of_one_u),
-            ([], [plus]) => add(&mut self.tried, &self.of_one_u, plus),
-            ([minus], [plus]) => exchange(&mut self.tried, &self.of_one_u, minus, plus),
-            _ => {
-                self.tried.copy_from_slice(&self.of_one_u);
-                for row in &minus {
-                    self.tried.iter_mut().zip(*row).for_each(|(sum, d)| *sum -= d);
+        let row = |&place: &usize| self.samples.of_place(place);
+        match (&change.without[..], &change.with[..]) {
+            ([], []) => tried.copy_from_slice(&self.of_one_u),
+            ([], [plus]) => add(tried, &self.of_one_u, row(plus)),
+            ([minus], [plus]) => exchange(tried, &self.of_one_u, row(minus), row(plus)),
+            (minus, plus) => {
+                tried.copy_from_slice(&self.of_one_u);
+                for row in minus.iter().map(row) {
+                    tried.iter_mut().zip(row).for_each(|(sum, d)| *sum -= d);
                 }
-                for row in &plus {
-                    self.tried.iter_mut().zip(*row).for_each(|(sum, d)| *sum += d);
+                for row in plus.iter().map(row) {
+                    tried.iter_mut().zip(row).for_each(|(sum, d)| *sum += d);
                 }
             }
         }
         let seeds = self.seeds.len() + change.with.len() - change.without.len();
         let strength_u = self.strengths_u[change.strength] as f32;
-        Some(cost(
-            self.samples,
-            &self.tried,
-            strength_u,
-            &self.limits,
-            needles,
-            seeds,
-        ))
+        Some(cost(self.samples, tried, strength_u, &self.limits, needles, seeds))
     }
 
     /// Takes the move that was tried last, with its cost.

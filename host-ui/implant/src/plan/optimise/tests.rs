@@ -1,5 +1,6 @@
 //! Plans of synthetic glands keep their limits, cancel, and are the same each time.
 
+use super::candidates::Candidates;
 use super::glands::{GLANDS, Gland, TEMPLATE};
 use super::robust::Trials;
 use super::*;
@@ -45,8 +46,8 @@ fn robustness(anatomy: &Anatomy, engine: &Engine, kernel: &DoseKernel, plan: &Im
         trials: 1000,
         random_seed: 1,
     };
-    let trials = Trials::new(&anatomy.target, kernel, &plan.seeds(), how);
-    let factor = trials.strengthening(145.0).unwrap().max(1.0);
+    let trials = Trials::new(&anatomy.target, kernel, (&plan.seeds(), &[]), how);
+    let factor = trials.strengthening(Statistic::USUAL, 145.0).unwrap().max(1.0);
     let stronger = engine.histograms(&plan.seeds()).figures(factor, 145.0).unwrap();
     [
         trials.kept(145.0) * 100.0,

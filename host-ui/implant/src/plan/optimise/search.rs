@@ -1,0 +1,209 @@
+//! The search: a greedy choice from several strengths, the method on the best of them, and corrections by the full dose engine.
+
+use super::annealing::{self, Schedule};
+use super::candidates::Candidates;
+use super::figures::{Engine, Figures};
+use super::objective::{Expected, Limits};
+use super::robust::Trials;
+use super::samples::Samples;
+use super::state::State;
+use super::{Method, Objectives, Proposal, bodies, greedy};
+use crate::plan::dose::DoseKernel;
+use crate::plan::{Anatomy, PlanError, Template};
+use std::ops::ControlFlow;
+
+/// Places in the catalogue that a search may begin with, 0.36, 0.44 and 0.52 U for I-125; the one whose greedy choice costs least is
+/// taken.
+const FIRST_STRENGTHS: [usize; 3] = [3, 7, 11];
+/// The search, and corrections of it by what the full engine found.
+const ROUNDS: usize = 3;
+const FIRST_SEARCH: Schedule = Schedule {
+    moves: 90_000,
+    temperatures: [0.006, 0.0003],
+};
+const CORRECTION: Schedule = Schedule {
+    moves: 20_000,
+    temperatures: [0.002, 0.0003],
+};
+/// Share of all that is reported once the samples are there, after the search begins and after its first round.
+const SAMPLED: f32 = 0.05;
+const BEGUN: f32 = 0.1;
+const SEARCHED: f32 = 0.7;
+/// Share of annealing in a round.
+const ANNEALED: f32 = 0.7;
+/// The dose that is to be kept when seeds miss their places, as a share of the prescription: at first, and the largest.
+const FIRST_KEPT: f32 = 0.9;
+const HIGHEST_KEPT: f32 = 1.1;
+/// What the target should get, as a share of the prescription.
+const LEVEL: f32 = 1.0;
+/// Rounds over all seeds after which an exchange ends, whatever it still finds.
+const MOST_EXCHANGES: usize = 12;
+
+type Report<'a> = &'a dyn Fn(f32) -> ControlFlow<()>;
+
+/// What is computed once for all plans of an anatomy.
+pub struct Search<'a> {
+    anatomy: &'a Anatomy,
+    kernel: &'a DoseKernel,
+    source: String,
+    candidates: Candidates,
+    samples: Samples,
+    engine: Engine<'a>,
+}
+
+impl<'a> Search<'a> {
+    /// Doses of all places; prescription, strengths and misplacement are those of `objectives`. `report` as for [`super::plan`].
+    pub fn new(
+        template: Template,
+        anatomy: &'a Anatomy,
+        kernel: &'a DoseKernel,
+        source: &str,
+        objectives: &Objectives,
+        report: Report<'_>,
+    ) -> Result<Self, PlanError> {
+        go_on(report(0.0))?;
+        let candidates = Candidates::new(&template, anatomy);
+        let strengths_u = &objectives.strengths_u;
+        if candidates.ways.is_empty() || strengths_u.is_empty() {
+            return Err(PlanError::NoWay);
+        }
+        let bodies = bodies(anatomy);
+        let usual = (objectives.prescription_gy, strengths_u[strengths_u.len() / 2]);
+        let samples = Samples::new(bodies, &candidates, kernel, usual, objectives.misplacement);
+        go_on(report(SAMPLED))?;
+        Ok(Self {
+            anatomy,
+            kernel,
+            source: source.to_owned(),
+            candidates,
+            samples,
+            engine: Engine::new(kernel, bodies),
+        })
+    }
+
+    /// A plan for these objectives, which differ from those of [`Search::new`] in needles and robustness alone.
+    pub fn find(&self, objectives: &Objectives, method: Method, report: Report<'_>) -> Result<Proposal, PlanError> {
+        let mut kept = FIRST_KEPT;
+        let mut state = self.begin(objectives, limits(objectives, kept, None), report)?;
+        let mut best: Option<Proposal> = None;
+        for round in 0..ROUNDS {
+            let span = match round {
+                0 => [BEGUN, SEARCHED],
+                n => [n - 1, n].map(|n| SEARCHED + (1.0 - SEARCHED) * n as f32 / (ROUNDS - 1) as f32),
+            };
+            let within = |share: f32| report(span[0] + (span[1] - span[0]) * share);
+            let schedule = if round == 0 { FIRST_SEARCH } else { CORRECTION };
+            go_on(match method {
+                Method::GreedyExchange => greedy::exchange(&mut state, MOST_EXCHANGES, &within),
+                Method::Annealing => anneal(&mut state, &schedule, &within),
+            })?;
+            let (found, trials) = self.judge(&mut state, objectives)?;
+            let prescription_gy = objectives.prescription_gy / state.strength_u();
+            let more = trials.strengthening(objectives.robust, prescription_gy);
+            kept = (kept * more.map_or(1.0, |f| f as f32)).clamp(FIRST_KEPT, HIGHEST_KEPT);
+            state.set_limits(limits(objectives, kept, Some((&found.figures, &found.sampled))));
+            if best.as_ref().is_none_or(|best| found.is_better_than(best)) {
+                best = Some(found);
+            }
+            let is_met = |best: &Proposal| best.figures.beyond() == 0.0 && best.shortfall == 0.0;
+            if best.as_ref().is_some_and(is_met) {
+                break;
+            }
+        }
+        best.ok_or(PlanError::NoDose)
+    }
+
+    /// The best greedy choice of the first strengths.
+    fn begin<'s>(
+        &'s self,
+        objectives: &'s Objectives,
+        limits: Limits,
+        report: Report<'_>,
+    ) -> Result<State<'s>, PlanError> {
+        let strengths_u = &objectives.strengths_u;
+        let mut begun: Option<State> = None;
+        for strength in FIRST_STRENGTHS.into_iter().filter(|s| *s < strengths_u.len()) {
+            let mut state = State::empty(&self.candidates, &self.samples, strengths_u, strength, limits);
+            go_on(greedy::build(&mut state, &|_| report(BEGUN)))?;
+            if begun.as_ref().is_none_or(|begun| state.cost < begun.cost) {
+                begun = Some(state);
+            }
+        }
+        begun.ok_or(PlanError::NoWay)
+    }
+
+    /// The plan of a state with the strength that the full engine and the trials find best, which the state takes over; and the
+    /// trials of 1 U.
+    fn judge(&self, state: &mut State, objectives: &Objectives) -> Result<(Proposal, Trials), PlanError> {
+        let prescription_gy = objectives.prescription_gy;
+        let of_one_u = self.candidates.plan(&state.chosen, 1.0, &self.source, prescription_gy);
+        let seeds = of_one_u.seeds();
+        let needles = of_one_u.needle_of_seeds();
+        let histograms = self.engine.histograms(&seeds);
+        let trials = Trials::new(
+            &self.anatomy.target,
+            self.kernel,
+            (&seeds, &needles),
+            objectives.misplacement,
+        );
+        let mut best: Option<(usize, Proposal)> = None;
+        for (strength, &strength_u) in objectives.strengths_u.iter().enumerate() {
+            state.set_strength(strength);
+            let of_prescription_gy = prescription_gy / strength_u;
+            let percent = |gy: f64| gy / of_prescription_gy * 100.0;
+            let found = Proposal {
+                plan: of_one_u.with_strength(strength_u),
+                figures: histograms
+                    .figures(strength_u, prescription_gy)
+                    .ok_or(PlanError::NoDose)?,
+                sampled: Figures::of_samples(&self.samples, &state.dose()).ok_or(PlanError::NoDose)?,
+                robust: trials.kept(of_prescription_gy),
+                expected_d90: percent(trials.expected_gy()),
+                d90_p10: percent(trials.kept_by_gy(0.9).unwrap_or(0.0)),
+                shortfall: trials.shortfall(objectives.robust, of_prescription_gy),
+                cost: state.cost,
+                behind_bone: self.candidates.behind_bone,
+            };
+            if best.as_ref().is_none_or(|(_, best)| found.is_better_than(best)) {
+                best = Some((strength, found));
+            }
+        }
+        let (strength, best) = best.ok_or(PlanError::NoWay)?;
+        state.set_strength(strength);
+        Ok((best, trials))
+    }
+}
+
+fn go_on(flow: ControlFlow<()>) -> Result<(), PlanError> {
+    match flow {
+        ControlFlow::Break(()) => Err(PlanError::Cancelled),
+        ControlFlow::Continue(()) => Ok(()),
+    }
+}
+
+/// Anneals, and then moves each seed once more where that helps.
+fn anneal(state: &mut State, schedule: &Schedule, report: Report<'_>) -> ControlFlow<()> {
+    annealing::anneal(state, schedule, &|share| report(share * ANNEALED))?;
+    greedy::exchange(state, 1, &|share| report(ANNEALED + (1.0 - ANNEALED) * share))
+}
+
+/// The limits with a small reserve, moved by what the sample points were wrong.
+fn limits(objectives: &Objectives, kept: f32, seen: Option<(&Figures, &Figures)>) -> Limits {
+    let off = |of: fn(&Figures) -> f64| seen.map_or(0.0, |(full, sampled)| ((of(full) - of(sampled)) / 100.0) as f32);
+    let ratio = |of: fn(&Figures) -> Option<f64>| {
+        let both = seen.and_then(|(full, sampled)| of(full).zip(of(sampled)));
+        both.map_or(1.0, |(full, sampled)| (sampled / full).clamp(0.8, 1.2) as f32)
+    };
+    Limits {
+        level: LEVEL,
+        most: 1.25 * 0.985,
+        cold: (0.05 - 0.006 + off(|f| f.v100)).clamp(0.01, 0.1),
+        hot: (0.60 - 0.008 - off(|f| f.v150)).clamp(0.4, 0.7),
+        urethra_tenth: 1.5 * 0.985 * ratio(|f| f.urethra_d10),
+        urethra_third: 1.3 * 0.985 * ratio(|f| f.urethra_d30),
+        rectum: 0.97 * ratio(|f| f.rectum_d2cc),
+        expected: objectives.robust.cold().map(|cold| Expected { kept, cold }),
+        needles: objectives.needles,
+        of_needle: objectives.needle_cost,
+    }
+}
