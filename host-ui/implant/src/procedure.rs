@@ -189,8 +189,9 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
         .out
         .unwrap_or_else(|| PathBuf::from(format!("out/procedure-{}", format::utc_now())));
     let failure = outcome.as_ref().err().map(ToString::to_string);
-    let written = report::write(&out, &link, &job, &pace, &seen, failure.as_ref(), made);
-    let scored = written.and_then(|()| debrief::write(&out, &link, &scene, &job, &seen, options.source.as_deref()));
+    let written = report::write(&out, &link, &job, &pace, &seen, failure.as_ref(), made.clone());
+    let scored =
+        written.and_then(|()| debrief::write(&out, &link, &scene, &job, &seen, options.source.as_deref(), made));
     drop(core);
     outcome?;
     scored

@@ -20,6 +20,21 @@ pub struct DigestError {
     pub why: Error,
 }
 
+/// As [`made`] where inputs are not files: each by its name, with size and SHA-256 of what it holds.
+pub fn made_of(inputs: &[(&str, &[u8])]) -> Value {
+    let input = |(name, content): &(&str, &[u8])| json!({ "input": name, "bytes": content.len(), "sha256": hexadecimal(&Sha256::digest(content)) });
+    json!({
+        "program": "host-ui",
+        "version": env!("CARGO_PKG_VERSION"),
+        "made_at": utc_now(),
+        "inputs": inputs.iter().map(input).collect::<Vec<_>>(),
+    })
+}
+
+fn hexadecimal(digest: &[u8]) -> String {
+    digest.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// Program, version, time, and each of the `inputs` by the option that named it, with size and SHA-256.
 pub fn made(inputs: &[(&str, &Path)]) -> Result<Value, DigestError> {
     let inputs: Result<Vec<Value>, DigestError> = inputs
@@ -37,12 +52,27 @@ pub fn made(inputs: &[(&str, &Path)]) -> Result<Value, DigestError> {
     }))
 }
 
-/// Digest in hexadecimal digits, and size in bytes.
+/// Digest in hexadecimal digits, and size in bytes; of a folder that of the list of its files as `sha256sum` prints it, sorted by
+/// their names.
 fn sha256(path: &Path) -> Result<(String, u64), DigestError> {
     let failed = |why| DigestError {
         path: path.to_owned(),
         why,
     };
+    if path.is_dir() {
+        let entries = std::fs::read_dir(path).and_then(Iterator::collect::<Result<Vec<_>, _>>);
+        let mut files: Vec<PathBuf> = entries.map_err(failed)?.into_iter().map(|entry| entry.path()).collect();
+        files.retain(|file| file.is_file());
+        files.sort();
+        let (mut list, mut bytes) = (String::new(), 0);
+        for file in &files {
+            let (digest, size) = sha256(file)?;
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            list += &format!("{digest}  {name}\n");
+            bytes += size;
+        }
+        return Ok((hexadecimal(&Sha256::digest(list.as_bytes())), bytes));
+    }
     let (mut file, _) = input::open(path).map_err(|why| failed(Error::other(why.to_string())))?;
     let (mut digest, mut bytes) = (Sha256::new(), 0);
     let mut part = vec![0; PART_BYTES];
@@ -54,8 +84,7 @@ fn sha256(path: &Path) -> Result<(String, u64), DigestError> {
         digest.update(&part[..count]);
         bytes += count as u64;
     }
-    let hex = digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-    Ok((hex, bytes))
+    Ok((hexadecimal(&digest.finalize()), bytes))
 }
 
 #[cfg(test)]
@@ -75,7 +104,20 @@ mod tests {
             "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
         );
         assert_eq!(made["inputs"][0]["bytes"], 3);
+        assert_eq!(
+            made_of(&[("plan", b"abc")])["inputs"][0]["sha256"],
+            made["inputs"][0]["sha256"]
+        );
         assert!(made["version"].is_string() && made["made_at"].is_string());
         assert!(super::made(&[("--seeds", &folder.path().join("none"))]).is_err());
+        // A folder by its list, as sha256sum would have it.
+        std::fs::write(folder.path().join("empty"), "").unwrap();
+        let made = super::made(&[("--images", folder.path())]).unwrap();
+        let list = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad  abc\n\
+                    e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855  empty\n";
+        assert_eq!(
+            made["inputs"][0]["sha256"],
+            made_of(&[("", list.as_bytes())])["inputs"][0]["sha256"]
+        );
     }
 }

@@ -9,7 +9,8 @@ use stylet_base::job::{Job, JobUpdate};
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Seed, Source};
 use stylet_host::link::SceneModel;
-use stylet_implant::plan::{Anatomy, exchange};
+use stylet_implant::plan::{Anatomy, ImplantPlan, exchange, file};
+use stylet_implant::provenance;
 use stylet_implant::score::{self, Implant, Motion, Score, SeedPair};
 use stylet_shm_schema::{SeedPose, TickRecord};
 
@@ -27,6 +28,8 @@ struct Delivered {
     lost: Vec<Seed>,
     motion: Motion,
     records: Vec<TickRecord>,
+    /// The plan as its file would be; `None` for one needle by hand.
+    plan: Option<ImplantPlan>,
 }
 
 impl App {
@@ -100,6 +103,7 @@ impl App {
             lost,
             motion: self.trace.motion(),
             records: self.trace.records().to_vec(),
+            plan: implant.map(|implant| implant.plan.clone()),
         })
     }
 
@@ -134,6 +138,23 @@ impl App {
     }
 }
 
+impl Delivered {
+    /// The scene by its labels, the plan by the text of its file, and the source by its model.
+    fn made(&self) -> Result<serde_json::Value, Failure> {
+        let plan = match &self.plan {
+            Some(plan) => file::to_text(plan, &self.scene.header.patient())?,
+            None => String::new(),
+        };
+        let named = [
+            ("labels of the scene", &self.scene.labels[..]),
+            ("plan", plan.as_bytes()),
+            ("model of the source", self.source.model.as_bytes()),
+        ];
+        let inputs: Vec<(&str, &[u8])> = named.into_iter().filter(|(_, content)| !content.is_empty()).collect();
+        Ok(provenance::made_of(&inputs))
+    }
+}
+
 fn write(delivered: &Delivered, folder: PathBuf) -> Result<PathBuf, Failure> {
     let anatomy = Anatomy::of(&delivered.scene)?;
     let kernel = DoseKernel::new(&delivered.source, Interval::ALL);
@@ -149,6 +170,6 @@ fn write(delivered: &Delivered, folder: PathBuf) -> Result<PathBuf, Failure> {
         records: &delivered.records,
     })?;
     std::fs::create_dir_all(&folder).map_err(|e| format!("{} cannot be created ({e})", folder.display()))?;
-    score::write(&score, &folder)?;
+    score::write(&score, delivered.made()?, &folder)?;
     Ok(folder)
 }

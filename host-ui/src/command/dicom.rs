@@ -110,6 +110,7 @@ impl DicomArgs {
             ("--structures", &self.structures),
         ];
         inputs.extend(self.like.as_deref().map(|file| ("--like", file)));
+        inputs.extend(self.images.as_deref().map(|folder| ("--images", folder)));
         let record = json!({
             "patient_id": identity.patient_id,
             "study_uid": identity.study,

@@ -9,12 +9,14 @@ use std::path::{Path, PathBuf};
 use stylet_base::format::printable;
 use stylet_base::output::new_folder;
 use stylet_files::image::read_values;
-use stylet_files::watched;
+use stylet_files::{bytes, dicom, watched};
 use stylet_implant::finder::{self, Found, Search};
 use stylet_implant::provenance;
 
 /// Seeds at least are one, and no implant has more.
 const MOST_SEEDS: u64 = 400;
+/// Number of bytes that distinguish a DICOM file from others.
+const START_BYTES: u64 = 160;
 
 const HELP: &str = "\
 Voxels from a threshold on are joined to components; each is fitted by as many seeds as its signal (the sum of what it has above the
@@ -22,7 +24,7 @@ tissue) holds, so that seeds that touch are split. With --count the sum of all i
 place (mm, RAS), an axis, a confidence (probability of the count of its component times the share of the signal that the fit explains)
 and the standard deviation of its place. What is doubtful is listed with its signal in seeds.
 
-The CT is NIfTI-1, NRRD or MetaImage in HU; crop it to the gland and its surroundings. Written to --out, a new or empty folder:
+The CT is a DICOM series (its folder, or one of its files), NIfTI-1, NRRD or MetaImage in HU; crop it to the gland and its surroundings. Written to --out, a new or empty folder:
 seeds.csv, which `host-ui dose --seeds` and `host-ui post-implant` read, and found.json.
 
 Example:
@@ -33,7 +35,7 @@ Example:
 #[derive(Args, Debug)]
 #[command(after_long_help = HELP)]
 pub struct FindSeedsArgs {
-    /// CT of the implant: NIfTI-1, NRRD, MetaImage
+    /// CT of the implant: a DICOM series (its folder, or one of its files), NIfTI-1, NRRD, MetaImage
     ct: PathBuf,
     /// Number of seeds that were implanted, less those that were lost
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
@@ -121,7 +123,10 @@ impl FindSeedsArgs {
             .doubts
             .iter()
             .map(|d| json!({ "at_mm": mm(d.place_m), "signal_seeds": d.signal, "counted": d.counted, "why": d.why }));
-        let inputs: [(&str, &Path); 1] = [("ct", &self.ct)];
+        let mut inputs: Vec<(&str, &Path)> = vec![("ct", &self.ct)];
+        // A file of a series stands for all files beside it.
+        let is_slice = bytes::start(&self.ct, START_BYTES).is_some_and(|start| dicom::is_dicom(&start));
+        inputs.extend(self.ct.parent().filter(|_| is_slice).map(|folder| ("series", folder)));
         Ok(json!({
             "seeds": found.seeds.len(),
             "asked": self.count,

@@ -1,12 +1,15 @@
 //! `host-ui study`: a page and tables of a population of insertions.
 
 use super::CommandError;
+use super::dose::write;
 use clap::Args;
+use serde_json::json;
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use stylet_base::output::new_folder;
 use stylet_base::progress_bar::LongTask;
 use stylet_base::write_whole;
+use stylet_implant::provenance;
 use stylet_population as population;
 
 const HELP: &str = "\
@@ -14,8 +17,9 @@ Reads every finished shard of a study (shard-*.parquet). Dose is that of the who
 with the seeds where they came to rest, in the structures that the study wrote beside its shards. An implant with a needle that failed
 has no dose, and the page says how many there are.
 
-Written to --out, a new or empty folder: study.html (stands by itself), insertions.csv, implants.csv, distributions.csv. Programs that
-read Parquet query the shards themselves; docs/study.md has examples for DuckDB and polars.
+Written to --out, a new or empty folder: study.html (stands by itself), insertions.csv, implants.csv, distributions.csv;
+made.json names the shards with their SHA-256, version and time. Programs that read Parquet query the shards themselves; docs/study.md
+has examples for DuckDB and polars.
 
 Example:
   rt-core study paper.toml --out out/paper && host-ui study out/paper --out out/paper-page";
@@ -45,6 +49,16 @@ impl StudyArgs {
         new_folder(&out)?;
         population::write_tables(&out, &read.table, &scored, &figures)?;
         write_whole(&out.join("study.html"), page.as_bytes())?;
+        let inputs: Vec<(&str, &Path)> = read.files.iter().map(|file| ("shard", file.as_path())).collect();
+        let record = json!({
+            "study": read.table.about.study,
+            "fingerprint": read.table.about.fingerprint,
+            "simulated_by": read.table.about.made_by,
+            "rows_sha256": read.digest,
+            "insertions": read.table.rows.len(),
+            "made": provenance::made(&inputs)?,
+        });
+        write::json(&out.join("made.json"), &record)?;
         for d in &figures {
             println!(
                 "{:32} median {:8.2}, p5 {:8.2}, p95 {:8.2} {}",

@@ -5,6 +5,7 @@ use super::error::ProcedureError;
 use super::job::{self, Job, PlannedDrop};
 use crate::plan::{Anatomy, ImplantPlan};
 use crate::score::{self, Implant, Motion, Score, SeedPair};
+use serde_json::Value;
 use std::path::Path;
 use stylet_base::nuclide::Nuclide;
 use stylet_dose::decay::Interval;
@@ -21,6 +22,7 @@ pub fn write(
     job: &Job,
     seen: &Seen,
     source: Option<&Path>,
+    made: Value,
 ) -> Result<(), ProcedureError> {
     let Some(implant) = &job.implant else { return Ok(()) };
     let source = source_of(implant, source)?;
@@ -69,7 +71,7 @@ pub fn write(
         motion: Motion::of(&seen.records, drops.first().map_or([0.0, 0.0, 1.0], |d| d.direction)),
         records: &seen.records,
     })?;
-    score::write(&score, out)?;
+    score::write(&score, made, out)?;
     print!("planned\n{}", score.judge.table(&score.planned));
     print!("delivered\n{}", score.judge.table(&score.delivered));
     println!("debrief: {}", out.join("debrief.html").display());

@@ -42,11 +42,11 @@ pub fn to_json(score: &Score) -> Value {
     })
 }
 
-/// `score.json` and `debrief.html` in a folder that is there.
-pub fn write(score: &Score, folder: &Path) -> Result<(), ScoreError> {
-    let json = serde_json::to_string_pretty(&to_json(score))?
-        + "
-";
+/// `score.json` and `debrief.html` in a folder that is there; `made` says what they were made from.
+pub fn write(score: &Score, made: Value, folder: &Path) -> Result<(), ScoreError> {
+    let mut value = to_json(score);
+    value["made"] = made;
+    let json = serde_json::to_string_pretty(&value)? + "\n";
     write_whole(&folder.join("score.json"), json.as_bytes())?;
     write_whole(&folder.join("debrief.html"), page::page(score)?.as_bytes())?;
     Ok(())
