@@ -83,6 +83,8 @@ pub enum PlanAction {
     /// Begins an empty plan.
     Begin,
     Automatic,
+    /// Takes a proposal of the automatic plan, by its place among them.
+    Choose(usize),
     Discard,
     Add(Hole),
     Remove(usize),
@@ -95,6 +97,8 @@ pub enum PlanAction {
     Cancel,
     Import(PathBuf),
     Export(PathBuf),
+    /// Structure set, plan and dose as DICOM, into a new folder.
+    ExportStudy,
     /// The next needle with seeds becomes the one to insert.
     NextNeedle,
     /// Moves the slices to this depth from the template's face, m.

@@ -1,5 +1,7 @@
 //! Structure set, plan and dose of one study, each of which names the others it was made from.
 
+pub mod scene;
+
 use std::path::{Path, PathBuf};
 use stylet_base::write_whole;
 use stylet_dose::{DoseGrid, Dvh};

@@ -89,6 +89,10 @@ pub struct App {
     loader: Loader,
     dialogs: Dialogs,
     uploading: Option<(u64, String)>,
+    /// The file that is read or sent as the next scene, and that of the present one where the window sent it.
+    /// Each with the name of its scene.
+    scene_to_come: Option<(PathBuf, String)>,
+    scene_file: Option<(PathBuf, String)>,
     /// Shown once the scene that it belongs to, by name, is taken.
     image_to_come: Option<(Image, String)>,
     run: Option<Run>,
@@ -227,6 +231,8 @@ impl App {
             loader: Loader::default(),
             dialogs: Dialogs::default(),
             uploading: None,
+            scene_to_come: None,
+            scene_file: None,
             image_to_come: None,
             run: None,
             run_needles: Vec::new(),
@@ -299,7 +305,7 @@ impl App {
         }
     }
 
-    /// While the plan's step is open, a file that is no volume is a plan.
+    /// A folder is an image series; while the plan's step is open, a file that is no volume is a plan.
     fn dropped_file(&self, ctx: &egui::Context) -> Option<Action> {
         let path = ctx.input(|i| {
             i.raw
@@ -310,6 +316,9 @@ impl App {
         })?;
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
             return Some(Action::Watch(WatchAction::File(path)));
+        }
+        if path.is_dir() {
+            return Some(Action::LoadImage(path));
         }
         let is_plan = ["toml", "csv", "dcm"]
             .iter()
@@ -379,4 +388,4 @@ fn refusal(text: String) -> Note {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

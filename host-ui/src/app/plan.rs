@@ -7,7 +7,9 @@ use crate::panel::workflow::Progress;
 use crate::planner::Message;
 use crate::shown::Note;
 use nalgebra::Vector3;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
+use stylet_base::format;
 use stylet_implant::workflow::{NeedleTask, Placed, Run, default_plan, plan_request};
 
 /// Looking for what is in the tissue compares every planned drop with every seed.
@@ -34,13 +36,17 @@ impl App {
     }
 
     pub(super) fn act_on_plan(&mut self, action: PlanAction) {
-        if !matches!(action, PlanAction::Export(_) | PlanAction::LookAt(_)) {
+        if !matches!(
+            action,
+            PlanAction::Export(_) | PlanAction::ExportStudy | PlanAction::LookAt(_)
+        ) {
             self.shown.note = None;
         }
         let planner = &mut self.planner;
         match action {
             PlanAction::Begin => planner.begin(),
             PlanAction::Automatic => planner.automatic(),
+            PlanAction::Choose(number) => planner.choose(number),
             PlanAction::Discard => planner.discard(),
             PlanAction::Add(hole) => planner.add(hole),
             PlanAction::Remove(needle) => planner.edit(|plan| plan.without_needle(needle)),
@@ -56,6 +62,15 @@ impl App {
                 }
             }
             PlanAction::Export(path) => planner.export(path),
+            PlanAction::ExportStudy => {
+                if let Some(scene) = self.link.scene() {
+                    let folder = PathBuf::from(format!("out/study-{}", format::utc_now()));
+                    // Another window may have loaded another scene since.
+                    let name = scene.header.name.read();
+                    let file = self.scene_file.as_ref().filter(|(_, of)| *of == name);
+                    planner.export_study(folder, scene.clone(), file.map(|(path, _)| path.clone()));
+                }
+            }
             PlanAction::NextNeedle => self.next_needle(),
             PlanAction::LookAt(depth_m) => self.look_at(depth_m),
         }

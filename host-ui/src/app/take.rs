@@ -164,6 +164,9 @@ impl App {
         if let (Some(answer), Some((_, name))) = (answer, self.uploading.clone()) {
             self.uploading = None;
             let image = self.image_to_come.take();
+            if answer.accepted {
+                self.scene_file = self.scene_to_come.take();
+            }
             self.shown.load = match answer.accepted {
                 true => LoadState::Loaded(format!("{name} is the scene now")),
                 false => LoadState::Refused(format!("{name} refused: {}", answer.text)),
@@ -191,6 +194,9 @@ impl App {
             Some(Err(why)) => self.shown.load = LoadState::Refused(why.to_string()),
             Some(Ok(Loaded::Scene(volume, image))) => {
                 self.image_to_come = image.map(|image| (image, volume.name.clone()));
+                if let Some((_, name)) = &mut self.scene_to_come {
+                    name.clone_from(&volume.name);
+                }
                 self.upload(&volume);
             }
             Some(Ok(Loaded::Image(image))) => self.take_image(image),
@@ -204,6 +210,7 @@ impl App {
         if !self.shown.load.is_busy() {
             self.settings.last_file = path.display().to_string();
             recent::remember(&mut self.settings.recent, absolute(path), false);
+            self.scene_to_come = Some((path.to_owned(), String::new()));
             self.loader.begin_scene(path, self.label, image);
         }
     }

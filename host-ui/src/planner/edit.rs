@@ -34,7 +34,7 @@ impl Planner {
 
     /// Discards the plan; one needle is left.
     pub fn discard(&mut self) {
-        (self.history, self.job, self.problems) = (None, None, None);
+        (self.history, self.job, self.problems, self.proposals) = (None, None, None, None);
         if let (Some(folder), Some(outlines)) = (&self.kept_in, &self.outlines) {
             // Mostly there is none.
             let _removed = std::fs::remove_file(super::kept::path_of(folder, outlines.scene));

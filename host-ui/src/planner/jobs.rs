@@ -12,8 +12,10 @@ use stylet_base::job::Job;
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Source};
 use stylet_host::link::{Link, SceneModel};
+use stylet_implant::linked::scene as study;
 use stylet_implant::plan::automatic::{self, Aims};
 use stylet_implant::plan::first::{self, FirstPlan};
+use stylet_implant::plan::optimise::Objectives;
 use stylet_implant::plan::{Compensation, ImplantPlan, Limits, LinkRehearser, Needle, compensate, exchange};
 use stylet_implant::workflow::Pace;
 use stylet_shm_schema::service::Instance;
@@ -22,6 +24,7 @@ use stylet_shm_schema::service::Instance;
 const FIND_LIMIT: Duration = Duration::from_secs(10);
 const POLL_EVERY: Duration = Duration::from_millis(5);
 pub(super) const FIRST_PLAN: &str = "Looking for a first plan";
+pub(super) const STUDY: &str = "Writing the DICOM study";
 
 /// What a job does, for people.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,8 +39,8 @@ pub struct JobProgress {
 pub(super) enum JobMessage {
     Progress(JobProgress),
     Plan(Result<ImplantPlan, Failure>),
-    /// A plan, with what there is to know about it.
-    First(FirstPlan),
+    /// Plans to choose from, with what there is to know about them.
+    First(Vec<FirstPlan>),
     Compensated(Box<(Needle, Compensation)>),
     /// The last message, in words.
     End(Result<String, Failure>),
@@ -56,22 +59,23 @@ pub(super) fn automatic(outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
                 false => ControlFlow::Continue(()),
             }
         };
-        let plan = || -> Result<FirstPlan, Failure> {
+        let plan = || -> Result<Vec<FirstPlan>, Failure> {
             let (source, prescription_gy) = exchange::usual()?;
             let kernel = DoseKernel::new(&source, Interval::ALL);
             let (template, anatomy) = (outlines.template, &outlines.anatomy);
-            Ok(first::plan(
+            let objectives = Objectives::new(&source, prescription_gy);
+            Ok(first::proposals(
                 template,
                 anatomy,
                 &kernel,
                 &source,
-                prescription_gy,
+                &objectives,
                 report,
             )?)
         };
         // The window may be closed by now; then nobody reads the answer.
         let _ = messages.send(match plan() {
-            Ok(first) => JobMessage::First(first),
+            Ok(found) => JobMessage::First(found),
             Err(why) => JobMessage::Plan(Err(why)),
         });
     })
@@ -104,6 +108,35 @@ pub(super) fn export(path: PathBuf, plan: Arc<ImplantPlan>, outlines: Arc<Anatom
         let written = exchange::write(&path, &plan, &outlines.frames);
         let saved = written.map(|()| format!("Plan saved as {}", path.display()));
         let _ = messages.send(JobMessage::End(saved.map_err(Failure::from)));
+    })
+}
+
+/// Structure set, plan and dose of one study.
+pub(super) fn study(
+    folder: PathBuf,
+    plan: Arc<ImplantPlan>,
+    (scene, outlines): (Arc<SceneModel>, Arc<AnatomyOutlines>),
+    like: Option<PathBuf>,
+) -> Job<JobMessage> {
+    Job::begin("study writer", move |messages, interrupt| {
+        let report = |share: f32| {
+            let progress = JobProgress {
+                what: STUDY.to_owned(),
+                share: Some(share),
+            };
+            let _ = messages.send(JobMessage::Progress(progress));
+            match interrupt.asked() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        };
+        let written = study::write(&folder, &plan, (&scene, &outlines.anatomy), like.as_deref(), &report);
+        let end = match written {
+            Ok(notes) if notes.is_empty() => Ok(format!("Study saved as {}", folder.display())),
+            Ok(notes) => Ok(format!("Study saved as {}: {}", folder.display(), notes.join("; "))),
+            Err(why) => Err(Failure::from(why)),
+        };
+        let _ = messages.send(JobMessage::End(end));
     })
 }
 

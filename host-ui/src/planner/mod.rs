@@ -2,6 +2,7 @@
 //!
 //! Each frame hands over new data and takes what is shown; nothing here takes longer than a copy of the plan.
 
+mod begin;
 mod edit;
 mod jobs;
 mod kept;
@@ -22,10 +23,10 @@ use std::time::Instant;
 use stylet_base::job::{Job, JobUpdate};
 use stylet_host::link::SceneModel;
 use stylet_implant::plan::check::{Problem, problems};
+use stylet_implant::plan::first::FirstPlan;
 use stylet_implant::plan::{Compensation, Drops, History, ImplantPlan, Needle, Template};
-use stylet_implant::workflow::{NeedleTask, Pace};
+use stylet_implant::workflow::NeedleTask;
 use stylet_shm_schema::SceneId;
-use stylet_shm_schema::service::Instance;
 
 /// Whatever was wrong, to be shown as text.
 type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -64,6 +65,8 @@ pub struct Planner {
     looked: Option<(SceneId, Job<Kept>)>,
     /// With the needles as they were when they were rehearsed.
     compensated: Vec<(Needle, Compensation)>,
+    /// Of the last automatic plan.
+    proposals: Option<Arc<Vec<FirstPlan>>>,
     progress: NeedleProgress,
     /// The needle whose seeds were changed last, and when.
     drawn: Option<(usize, Instant)>,
@@ -96,6 +99,7 @@ impl Planner {
             implant: self.implant.clone(),
             job: self.job.as_ref().map(|(_, progress)| progress.clone()),
             progress: self.progress.clone(),
+            proposals: self.proposals.clone(),
         }
     }
 
@@ -228,15 +232,10 @@ impl Planner {
                     Err(why) => self.message = Some(Message::Refused(why.to_string())),
                 }
             }
-            JobUpdate::Message(JobMessage::First(first)) => {
+            JobUpdate::Message(JobMessage::First(found)) => {
                 self.job = None;
-                match self.can_be(first.plan) {
-                    Ok(plan) => {
-                        self.put(plan);
-                        self.message = plan_message(&first.notes);
-                    }
-                    Err(why) => self.message = Some(Message::Refused(why.to_string())),
-                }
+                self.proposals = Some(Arc::new(found));
+                self.choose(0);
             }
             JobUpdate::Message(JobMessage::Compensated(done)) => {
                 self.compensated.retain(|(needle, _)| *needle != done.0);
@@ -252,75 +251,6 @@ impl Planner {
             }
             JobUpdate::Ended => self.job = None,
         }
-    }
-
-    /// Whether a job runs.
-    pub fn is_busy(&self) -> bool {
-        self.job.is_some()
-    }
-
-    /// Cancels the job.
-    pub fn cancel(&mut self) {
-        self.job = None;
-    }
-
-    fn begin_job(
-        &mut self,
-        what: &str,
-        begin: impl FnOnce(&Self, Arc<AnatomyOutlines>) -> Result<Job<JobMessage>, Failure>,
-    ) {
-        let job = match (&self.outlines, self.is_busy()) {
-            (_, true) => return,
-            (None, _) => Err("the scene's anatomy is not known yet; try again in a moment".into()),
-            (Some(outlines), false) => begin(self, outlines.clone()),
-        };
-        match job {
-            Ok(job) => {
-                let progress = JobProgress {
-                    what: what.to_owned(),
-                    share: None,
-                };
-                self.job = Some((job, progress));
-            }
-            Err(why) => self.message = Some(Message::Refused(why.to_string())),
-        }
-    }
-
-    /// Begins a search for a first plan.
-    pub fn automatic(&mut self) {
-        self.begin_job(jobs::FIRST_PLAN, |_, outlines| Ok(jobs::automatic(outlines)));
-    }
-
-    /// Begins to fit the strength of the seeds to the dose of the target.
-    pub fn fit_strength(&mut self) {
-        self.begin_job("Fitting the strength", |planner, outlines| {
-            Ok(jobs::strength(outlines, Arc::new(planner.planned()?.clone())))
-        });
-    }
-
-    /// Begins to read a plan from a file.
-    pub fn import(&mut self, path: PathBuf, scene: Arc<SceneModel>) {
-        self.begin_job("Reading the plan", |_, _| Ok(jobs::import(path, scene)));
-    }
-
-    /// Begins to write the plan to a file.
-    pub fn export(&mut self, path: PathBuf) {
-        self.begin_job("Writing the plan", |planner, outlines| {
-            Ok(jobs::export(path, Arc::new(planner.planned()?.clone()), outlines))
-        });
-    }
-
-    /// Compensates the needles that are not inserted yet.
-    pub fn compensate(&mut self, instance: Instance, pace: Pace) {
-        self.begin_job("Rehearsing", |planner, _| {
-            let begun = planner.progress.begun();
-            let left = planner.planned()?.needles.iter().skip(begun);
-            let needles: Vec<Needle> = left.filter(|n| !n.seeds.is_empty()).cloned().collect();
-            if needles.is_empty() {
-                return Err("no needle with seeds is left to rehearse".into());
-            }
-            Ok(jobs::compensation(instance, needles, pace))
-        });
     }
 
     /// What is shown of it has changed.

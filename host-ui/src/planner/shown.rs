@@ -6,6 +6,7 @@ use super::outlines::AnatomyOutlines;
 use std::sync::Arc;
 use stylet_dose::Seed;
 use stylet_implant::plan::check::Problem;
+use stylet_implant::plan::first::FirstPlan;
 use stylet_implant::plan::{Compensation, History, ImplantPlan, Needle};
 
 /// Everything about plans of many needles that a frame shows.
@@ -19,6 +20,8 @@ pub struct Planning {
     pub job: Option<JobProgress>,
     /// Progress of its needles.
     pub progress: NeedleProgress,
+    /// Plans of the last search, to choose from.
+    pub proposals: Option<Arc<Vec<FirstPlan>>>,
 }
 
 impl Planning {

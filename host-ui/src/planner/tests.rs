@@ -107,3 +107,25 @@ fn what_was_rehearsed_for_a_needle_holds_until_the_needle_is_changed() {
     assert_eq!(planner.task(0).unwrap().drops.along_m[0], 0.08);
     assert!(planner.compensated.is_empty());
 }
+
+#[test]
+fn a_proposal_is_taken_as_one_change_and_goes_with_the_plan() {
+    use crate::app::tests::fixture::proposals;
+    let mut planner = planner();
+    let of = planned();
+    let all = proposals(&of);
+    planner.proposals = Some(all.clone());
+    planner.choose(2);
+    assert_eq!(planner.plan(), Some(&all[2].plan));
+    planner.undo();
+    assert_eq!(planner.plan(), Some(&of));
+    planner.choose(7);
+    assert_eq!(planner.plan(), Some(&of), "there is no such proposal");
+    // A needle that was inserted stays.
+    planner.begin_needle(0, 0);
+    planner.choose(0);
+    assert_eq!(planner.plan(), Some(&of));
+    assert!(matches!(planner.take_message(), Some(Message::Refused(_))));
+    planner.discard();
+    assert!(planner.planning().proposals.is_none());
+}

@@ -13,6 +13,8 @@ use stylet_dose::Metric;
 use stylet_dose::criteria::{Figure, Limit};
 use stylet_host::link::LinkStatus;
 use stylet_implant::plan::check::Problem;
+use stylet_implant::plan::first::{FirstPlan, Measures};
+use stylet_implant::plan::optimise::Figures;
 use stylet_implant::plan::{Hole, ImplantPlan};
 use stylet_shm_schema::service::Instance;
 use stylet_shm_schema::{
@@ -232,6 +234,31 @@ pub fn many_needles(count: usize, begun: usize) -> Shown {
     shown.planning.progress = progress;
     shown.dose = Some(dose(shown.planning.implant.as_ref().map_or(0, |i| i.seeds.len())));
     shown
+}
+
+/// Three proposals, the second of which is this plan.
+pub fn proposals(plan: &ImplantPlan) -> Arc<Vec<FirstPlan>> {
+    let proposal = |(name, v150, robust, strength_u): (&'static str, f64, f64, Option<f64>)| FirstPlan {
+        name,
+        why: "Most trials with misplaced seeds keep a D90 of 90 % of the prescription.",
+        plan: strength_u.map_or_else(|| plan.clone(), |u| plan.with_strength(u)),
+        measures: Some(Measures {
+            figures: Figures {
+                v150,
+                ..Figures::default()
+            },
+            robust,
+            expected_d90: 101.2,
+            d90_p10: 93.4,
+        }),
+        notes: Vec::new(),
+    };
+    let all = [
+        ("Robust", 58.7, 0.997, Some(0.4)),
+        ("Fewer needles", 52.3, 0.961, None),
+        ("Cooler", 31.2, 0.424, Some(0.6)),
+    ];
+    Arc::new(all.into_iter().map(proposal).collect())
 }
 
 pub fn dose(seeds: usize) -> Arc<DoseResult> {

@@ -1,6 +1,6 @@
 //! Every state of the window in all its sizes, with the longest words that there are.
 
-use super::fixture::{Drawn, LONG_PATH, dose, live, many_needles, one_needle};
+use super::fixture::{Drawn, LONG_PATH, dose, live, many_needles, one_needle, proposals};
 use super::text::misplaced;
 use crate::app::App;
 use crate::app::layout::Narrow;
@@ -88,6 +88,11 @@ pub const STATES: &[State] = &[
         app.shown.dose = Some(dose(5));
     }),
     ("plan of many needles", |app| app.shown = many_needles(24, 0)),
+    ("proposals of a plan", |app| {
+        app.shown = many_needles(24, 0);
+        let plan = app.shown.planning.implant.as_ref().map(|implant| implant.plan.clone());
+        app.shown.planning.proposals = plan.map(|plan| proposals(&plan));
+    }),
     ("plan is made", |app| {
         app.shown = many_needles(24, 0);
         app.workflow.plan.path = LONG_PATH.to_owned();

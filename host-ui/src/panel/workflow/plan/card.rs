@@ -61,7 +61,8 @@ fn begin_ui(ui: &mut egui::Ui, shown: &Shown, (ready, free): (bool, bool), actio
 fn automatic_ui(ui: &mut egui::Ui, shown: &Shown, free: bool, actions: &mut Vec<Action>) {
     let can = free && shown.planning.outlines.is_some();
     let response = ui.add_enabled(can, Button::new("Automatic plan"));
-    let hint = "Needles, seeds and one strength that cover the target and keep the limits of urethra and rectum";
+    let hint = "Needles, seeds and one strength that cover the target and keep the limits of urethra and rectum: three proposals to \
+                choose from";
     if response.on_hover_text(hint).clicked() {
         actions.push(Action::Plan(PlanAction::Automatic));
     }
@@ -106,6 +107,9 @@ fn implant_ui(ui: &mut egui::Ui, shown: &Shown, implant: &Implant, free: bool, a
         }
     });
     compensated_ui(ui, implant);
+    if waits {
+        super::proposals::proposals_ui(ui, shown, free, actions);
+    }
     if shown.planning.job.is_none() {
         strength_ui(ui, implant, free && waits, actions);
     }
@@ -194,4 +198,17 @@ fn file_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bo
         }
         ui.add_enabled_ui(free, |ui| dialogs_ui(ui, shown, actions));
     });
+    if shown.planning.implant.is_some() {
+        study_ui(ui, free, actions);
+    }
+}
+
+/// Structure set, plan and dose at once.
+fn study_ui(ui: &mut egui::Ui, free: bool, actions: &mut Vec<Action>) {
+    let response = ui.add_enabled(free, Button::new("Save as DICOM study"));
+    let hint = "Structure set, plan and dose that name each other, into a new folder; patient and frame are those of the scene's \
+                file where it is DICOM";
+    if response.on_hover_text(hint).clicked() {
+        actions.push(Action::Plan(PlanAction::ExportStudy));
+    }
 }

@@ -4,6 +4,7 @@ mod card;
 mod findings;
 mod list;
 mod needle;
+mod proposals;
 mod template;
 
 use super::progress;

@@ -1,0 +1,245 @@
+//! The study of a plan in a scene: outlines of the scene's structures, the plan, and the dose of its seeds.
+
+use super::{LinkedStudy, write as write_linked};
+use crate::plan::{Anatomy, ImplantPlan, PlanError, exchange, file};
+use crate::provenance;
+use nalgebra::{Matrix3, Vector3};
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::path::Path;
+use stylet_base::output::new_folder;
+use stylet_base::write_whole;
+use stylet_dose::decay::Interval;
+use stylet_dose::report::Judge;
+use stylet_dose::{DoseGrid, DoseKernel, Dvh, Seed, Source, structure};
+use stylet_files::dicom::images::{self, Slice};
+use stylet_files::dicom::structures::StructureSet;
+use stylet_files::dicom::structures::write::{Outlined, of_set, of_voxels};
+use stylet_files::dicom::{self, Identity};
+use stylet_files::{ContentError, FileError, Progress, VoxelFrame, Voxels, bytes, scene as scene_file};
+use stylet_host::link::SceneModel;
+
+/// Pitch of the points of the histograms, as everywhere where a plan is judged, and side of a voxel of the dose.
+const PITCH_M: f64 = 1e-3;
+const POINTS: usize = 100_000;
+/// The grid reaches so far beyond structures and seeds.
+const STRUCTURE_MARGIN_M: f64 = 5e-3;
+const SEED_MARGIN_M: f64 = 20e-3;
+/// Share of the work that is the dose.
+const SHARE_OF_DOSE: f32 = 0.9;
+/// Seeds whose dose is added between two looks at whether the study is still wanted.
+const TOGETHER: usize = 16;
+
+/// Why a study was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneStudyError {
+    /// The plan cannot be written as DICOM.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// A file was refused or cannot be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The structures cannot be outlined.
+    #[error("the structures of the scene: {0}")]
+    Structures(#[from] ContentError),
+    /// The dose cannot be computed or counted.
+    #[error("the dose of the plan: {0}")]
+    Dose(#[from] stylet_dose::DoseError),
+    /// The folder is there and not empty, or cannot be made.
+    #[error("{0}")]
+    Folder(String),
+    /// `study.json` cannot be written.
+    #[error(transparent)]
+    Write(#[from] stylet_base::WriteError),
+    /// A figure is not representable in JSON.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+    /// Whoever asked for it ended the work.
+    #[error("the study was cancelled; nothing was written")]
+    Cancelled,
+}
+
+/// Writes `structure_set.dcm`, `plan.dcm`, `dose.dcm` and `study.json` into a new or empty folder, and gives what there is to know
+/// about them. Patient, study and frame of reference, contours and images are those of `like` where that is a DICOM structure set;
+/// otherwise the structures are outlined along the cells of the scene. `report` gets the share that is done; where it breaks,
+/// nothing is written.
+///
+/// # Errors
+/// A source that is not known, a plan without seeds, a file that cannot be written.
+pub fn write(
+    folder: &Path,
+    plan: &ImplantPlan,
+    (scene, anatomy): (&SceneModel, &Anatomy),
+    like: Option<&Path>,
+    report: &dyn Fn(f32) -> ControlFlow<()>,
+) -> Result<Vec<String>, SceneStudyError> {
+    let go_on = |share: f32| match report(share) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(SceneStudyError::Cancelled),
+    };
+    let patient = scene.header.patient();
+    let (of_plan, source) = (exchange::seed_plan(plan, &patient)?, known(plan)?);
+    let kernel = DoseKernel::new(&source, Interval::ALL);
+    go_on(0.0)?;
+    let (drawn, mut notes) = match like.map(of_file).transpose()?.flatten() {
+        Some(drawn) => (drawn, Vec::new()),
+        None => {
+            let structures = of_voxels(&voxels(scene)?)?;
+            let drawn = Drawn {
+                structures,
+                identity: Identity::new(),
+                images: Vec::new(),
+            };
+            (drawn, vec!["patient, study and frame of reference are new".to_owned()])
+        }
+    };
+    go_on(0.02)?;
+    let in_patient = |seed: Seed| Seed {
+        position_m: patient.patient_from_scene(seed.position_m),
+        axis: seed.axis.map(|axis| patient.patient_from_scene_direction(axis)),
+        ..seed
+    };
+    let seeds: Vec<Seed> = plan.seeds().into_iter().map(in_patient).collect();
+    let judge = Judge::new(
+        anatomy.structures(PITCH_M),
+        Some(&anatomy.target.name),
+        &[],
+        plan.prescription_gy,
+        &plan.seeds(),
+        POINTS,
+    )?;
+    let verdict = judge.judge(&kernel, &plan.seeds());
+    go_on(0.05)?;
+    let mut dose = grid(&seeds, &drawn.structures)?;
+    // Sums of doses are exact, so that the order in which seeds are added does not matter.
+    let parts = seeds.len().div_ceil(TOGETHER);
+    for (n, part) in seeds.chunks(TOGETHER).enumerate() {
+        dose.add(&kernel, part);
+        go_on(0.05 + SHARE_OF_DOSE * (n + 1) as f32 / parts as f32)?;
+    }
+    let number = |name: &str| drawn.structures.iter().position(|s| s.name == name).map(|n| n + 1);
+    let histograms: Vec<(usize, &Dvh)> = judge
+        .names()
+        .zip(&verdict.dvhs)
+        .filter_map(|(name, dvh)| Some((number(name)?, dvh)))
+        .collect();
+    let target = number(&anatomy.target.name);
+    if target.is_none() {
+        notes.push(format!("the target {} is not among the contours", anatomy.target.name));
+    }
+    let identity = drawn.identity.clone();
+    new_folder(folder).map_err(|why| SceneStudyError::Folder(why.to_string()))?;
+    let written = write_linked(
+        folder,
+        LinkedStudy {
+            identity: identity.clone(),
+            images: drawn.images,
+            structures: drawn.structures,
+            target,
+            plan: of_plan,
+            dose: &dose,
+            histograms,
+            prescription_gy: plan.prescription_gy,
+        },
+    )?;
+    let [structure_set, plan_uid, dose_uid] = &written.uids;
+    let text = file::to_text(plan, &patient)?;
+    let record = json!({
+        "patient_id": identity.patient_id,
+        "study_uid": identity.study,
+        "frame_of_reference_uid": identity.frame_of_reference,
+        "structure_set_uid": structure_set,
+        "plan_uid": plan_uid,
+        "dose_uid": dose_uid,
+        "seeds": seeds.len(),
+        "prescription_gy": plan.prescription_gy,
+        "dose_voxels": dose.dims(),
+        "scene": scene.header.name.read(),
+        "made": provenance::made_of(&[
+            ("labels of the scene", &scene.labels),
+            ("plan", text.as_bytes()),
+            ("model of the source", source.model.as_bytes()),
+        ]),
+    });
+    let text = serde_json::to_string_pretty(&record)? + "\n";
+    write_whole(&folder.join("study.json"), text.as_bytes())?;
+    // It is written; there is nothing left to cancel.
+    let _ = report(1.0);
+    Ok(notes)
+}
+
+fn known(plan: &ImplantPlan) -> Result<Source, PlanError> {
+    let missing = || PlanError::Source(format!("source {} is not known", plan.source));
+    Source::known(&plan.source).ok_or_else(missing)
+}
+
+/// Structures with what they belong to.
+struct Drawn {
+    structures: Vec<Outlined>,
+    identity: Identity,
+    images: Vec<Slice>,
+}
+
+/// The contours of a structure set, or of the one that a scene file names; `None` for any other file.
+fn of_file(path: &Path) -> Result<Option<Drawn>, SceneStudyError> {
+    let named = match scene_file::is_scene(path) {
+        true => Some(path.with_file_name(scene_file::read(path)?.volume)),
+        false => None,
+    };
+    let path = named.as_deref().unwrap_or(path);
+    let refused = |why| FileError::of(path, why);
+    let content = bytes::whole(path, &Progress::default()).map_err(refused)?;
+    if !dicom::is_dicom(&content) {
+        return Ok(None);
+    }
+    let object = dicom::read(&content).map_err(refused)?;
+    let set = StructureSet::of(&object).map_err(refused)?;
+    let beside = path.parent().unwrap_or(Path::new(""));
+    Ok(Some(Drawn {
+        images: images::find(beside, &set.series, &set.images).map_err(refused)?,
+        identity: Identity::of(&object),
+        structures: of_set(set),
+    }))
+}
+
+/// The cells of a scene as a volume of the patient.
+fn voxels(scene: &SceneModel) -> Result<Voxels, SceneStudyError> {
+    let (header, labels) = (&scene.header, &scene.header.labels);
+    let patient = header.patient();
+    let columns_m: Matrix3<f64> = patient.rotation() * labels.spacing_m;
+    let origin_m = Vector3::from(patient.patient_from_scene(labels.origin_m));
+    let names: BTreeMap<u8, String> = (1_u8..=255)
+        .zip(header.structures().iter().map(|structure| structure.name.read()))
+        .collect();
+    Ok(Voxels {
+        dims: labels.dims.map(|d| d as usize),
+        labels: scene.labels.clone(),
+        frame: VoxelFrame::new(columns_m, origin_m, "scene")?,
+        names,
+        also: Vec::new(),
+        overlap: None,
+    })
+}
+
+/// Around all structures and seeds, without dose.
+fn grid(seeds: &[Seed], structures: &[Outlined]) -> Result<DoseGrid, SceneStudyError> {
+    let corners: Vec<[f64; 3]> = structures
+        .iter()
+        .flat_map(|structure| structure.contours.iter().flatten())
+        .map(|corner| (*corner).into())
+        .collect();
+    let places: Vec<[f64; 3]> = seeds.iter().map(|seed| seed.position_m).collect();
+    let boxes = [
+        (structure::bounds(&corners), STRUCTURE_MARGIN_M),
+        (structure::bounds(&places), SEED_MARGIN_M),
+    ];
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for ((lower, upper), margin_m) in boxes {
+        for a in 0..3 {
+            low[a] = low[a].min(lower[a] - margin_m);
+            high[a] = high[a].max(upper[a] + margin_m);
+        }
+    }
+    Ok(DoseGrid::covering(low, high, PITCH_M)?)
+}
