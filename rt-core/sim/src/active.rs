@@ -2,6 +2,7 @@
 
 use crate::force::ForceParameters;
 use crate::limits::{Limits, TissueParameters};
+use crate::line::PronyTerm;
 use crate::needle::{Layer, Layers, NeedleParameters};
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::{ParameterId, ParameterProblem, ParameterProblems, ParameterSet};
@@ -78,6 +79,16 @@ fn force(set: &ParameterSet, device: &DeviceInfo) -> ForceParameters {
         stick_stiffness_n_per_m: set.get(P::StickStiffness),
         stick_damping_n_s_per_m: set.get(P::StickDamping),
         compensated_mass_kg: set.get(P::HandleMass),
+        creep: [
+            PronyTerm {
+                strength: set.get(P::QuickCreep),
+                time_s: set.get(P::QuickCreepTime),
+            },
+            PronyTerm {
+                strength: set.get(P::SlowCreep),
+                time_s: set.get(P::SlowCreepTime),
+            },
+        ],
         ..ForceParameters::default()
     };
     force.gate.force_scale = set.get(P::ForceScale);

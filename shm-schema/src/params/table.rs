@@ -67,4 +67,8 @@ parameters! {
     WallPeak "layers.wall_peak" "Organ wall: puncture force" Layers "N" 1.0, 0.0, 20.0, 2.0, "ours", "Force of the wall at the moment of puncture.";
     WallCutting "layers.wall_cutting" "Organ wall: cutting force" Layers "N" 1.0, 0.0, 10.0, 0.8, "ours", "Force at the tip while it cuts the wall.";
     WallFriction "layers.wall_friction" "Organ wall: shaft friction" Layers "N/m" 1.0, 0.0, 500.0, 40.0, "ours", "Friction along the shaft for each metre in the wall.";
+    QuickCreep "tissue.quick_creep" "Quick creep" Tissue "" 1.0, 0.0, 5.0, 0.0, "physics.md, Creep", "Displacement that tissue adds under a load that is held, over that at once, within some times the quick time. 0 is off; a prostate has about 0.6. Acts on a needle line.";
+    QuickCreepTime "tissue.quick_creep_time" "Quick creep: time" Tissue "s" 1.0, 0.01, 10.0, 0.5, "physics.md, Creep", "Time in which 63 % of the quick creep has come.";
+    SlowCreep "tissue.slow_creep" "Slow creep" Tissue "" 1.0, 0.0, 5.0, 0.0, "physics.md, Creep", "The same over a longer time. 0 is off; a prostate has about 1. Acts on a needle line.";
+    SlowCreepTime "tissue.slow_creep_time" "Slow creep: time" Tissue "s" 1.0, 0.1, 100.0, 5.0, "physics.md, Creep", "Time in which 63 % of the slow creep has come.";
 }

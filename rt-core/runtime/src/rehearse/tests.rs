@@ -129,6 +129,24 @@ fn a_drop_outside_the_tissue_and_a_stop_are_reported_and_leave_the_stage_usable(
     assert!(stage.rehearse(&needle(), &set, &stop).is_ok());
 }
 
+/// Tissue that creeps goes on after a needle that stands still, and its seeds rest where it then is.
+#[test]
+fn tissue_that_creeps_repeats_bit_by_bit_and_moves_seeds() {
+    let (mut stage, run, stop) = (stage(), needle(), AtomicBool::new(false));
+    let mut creeping = ParameterSet::default();
+    creeping.set(ParameterId::QuickCreep, 0.6);
+    creeping.set(ParameterId::SlowCreep, 1.0);
+    let elastic = stage.rehearse(&run, &ParameterSet::default(), &stop).expect("goes through");
+    let first = stage.rehearse(&run, &creeping, &stop).expect("goes through");
+    assert_eq!(first, stage.rehearse(&run, &creeping, &stop).expect("goes through"));
+    let along = |r: &Rehearsed| r.seeds.iter().map(|s| 1e3 * s.position_m[2]).collect::<Vec<_>>();
+    println!("elastic {:.2?} mm, {:.2} N; creeping {:.2?} mm, {:.2} N", along(&elastic), elastic.peak_force_n, along(&first), first.peak_force_n);
+    let moved = along(&elastic).iter().zip(along(&first)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(moved > 0.1 && moved < 10.0, "{moved} mm");
+    // Terms that are off leave nothing behind.
+    assert_eq!(elastic, stage.rehearse(&run, &ParameterSet::default(), &stop).expect("goes through"));
+}
+
 /// FEM keeps answers from tick to tick and works ahead: a body at rest must have forgotten both.
 #[test]
 fn a_rehearsal_with_finite_elements_repeats_bit_by_bit() {

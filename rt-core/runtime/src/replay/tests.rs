@@ -14,7 +14,7 @@ use std::sync::Arc;
 use stylet_hw::{Device, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
 use stylet_sim::force::ForceParameters;
 use stylet_sim::limits::TissueParameters;
-use stylet_sim::line::{LineSource, ReadyLine};
+use stylet_sim::line::{LineSource, PronyTerm, ReadyLine};
 use stylet_sim::needle::NeedleParameters;
 use stylet_sim::scene::{Labels, SceneSource, TissueKind};
 
@@ -25,6 +25,7 @@ struct Recorded {
     line: ReadyLine,
     kept: Vec<LineSource>,
     figures: DeviceFigures,
+    creep: [PronyTerm; 2],
     heap_calls: u64,
 }
 
@@ -68,6 +69,7 @@ impl Recorded {
             line: line.expect("through the block"),
             kept: Vec::new(),
             figures,
+            creep: [PronyTerm::default(); 2],
             heap_calls: 0,
         }
     }
@@ -123,6 +125,7 @@ impl Recorded {
                 membrane_gain: 0.05,
                 cutting_gain: 0.1,
                 shaft_gain: 0.2,
+                creep: self.creep,
                 ..ForceParameters::default()
             },
         });
@@ -207,17 +210,25 @@ fn assert_identical(flight: &Flight) {
 /// The recorder left lines out, so that forces on one were not repeated and an elastic body was in no recording.
 #[test]
 fn a_recorded_insertion_on_a_needle_line_repeats_in_every_bit() {
-    repeats_in_every_bit(TissueKind::Fem);
+    repeats_in_every_bit(TissueKind::Fem, [PronyTerm::default(); 2]);
+}
+
+/// What tissue that creeps remembers of past loads is part of what a recording begins with.
+#[test]
+fn a_recorded_insertion_into_tissue_that_creeps_repeats_in_every_bit() {
+    let creep = [(0.6, 0.5), (1.0, 5.0)].map(|(strength, time_s)| PronyTerm { strength, time_s });
+    repeats_in_every_bit(TissueKind::Fem, creep);
 }
 
 /// ChainMail's line moves the body as a whole, which its own memory did not hold.
 #[test]
 fn a_recorded_insertion_in_chainmail_repeats_in_every_bit() {
-    repeats_in_every_bit(TissueKind::ChainMail);
+    repeats_in_every_bit(TissueKind::ChainMail, [PronyTerm::default(); 2]);
 }
 
-fn repeats_in_every_bit(kind: TissueKind) {
+fn repeats_in_every_bit(kind: TissueKind, creep: [PronyTerm; 2]) {
     let mut run = Recorded::new(kind);
+    run.creep = creep;
     run.insert();
     let flight = through_a_file(&run.flight());
     assert_eq!(run.heap_calls, 0, "heap calls of the loops");

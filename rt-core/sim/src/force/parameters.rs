@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use stylet_hw::DeviceInfo;
 
 use super::gate::GateParameters;
+use crate::line::PronyTerm;
 use crate::needle::Layers;
 use crate::settings::{Problem, Problems};
 
@@ -41,6 +42,8 @@ pub struct ForceParameters {
     pub stick_damping_n_s_per_m: f64,
     /// Mass whose weight `F_G` (eq. 8) takes off the operator's hand.
     pub compensated_mass_kg: f64,
+    /// How tissue on a needle line goes on giving way under a load that is held; strengths of 0 turn it off.
+    pub creep: [PronyTerm; 2],
     /// Acceleration of gravity in world, m/s^2.
     pub gravity_in_world_m_per_s2: Vector3<f64>,
     /// Settings of the gate.
@@ -63,6 +66,7 @@ impl Default for ForceParameters {
             stick_stiffness_n_per_m: 6000.0,
             stick_damping_n_s_per_m: 10.0,
             compensated_mass_kg: 0.0,
+            creep: [PronyTerm::default(); 2],
             gravity_in_world_m_per_s2: Vector3::new(0.0, 0.0, -9.81),
             gate: GateParameters::default(),
         }
@@ -97,6 +101,10 @@ impl ForceParameters {
         );
         problems.range("force.stick_damping_n_s_per_m", self.stick_damping_n_s_per_m, 0.0, 50.0);
         problems.range("force.compensated_mass_kg", self.compensated_mass_kg, 0.0, 1.0);
+        for term in self.creep {
+            problems.range("force.creep.strength", term.strength, 0.0, 10.0);
+            problems.range("force.creep.time_s", term.time_s, 1e-3, 1e5);
+        }
         for (key, value) in [
             ("force.gravity_in_world_m_per_s2.x", self.gravity_in_world_m_per_s2.x),
             ("force.gravity_in_world_m_per_s2.y", self.gravity_in_world_m_per_s2.y),

@@ -40,9 +40,10 @@ pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> Line
     if state.tip.material_m == f64::NEG_INFINITY {
         state.tip.material_m = tip_m.min(0.0);
     }
+    let (rows, common_m_per_n) = (&model.compliance.rows, model.compliance.common_m_per_n());
     state
         .memory
-        .begin(&model.compliance.rows, &model.settings.prony, input.dt_s);
+        .begin(rows, common_m_per_n, &model.settings.prony, input.dt_s);
     let mut output = LineOutput::default();
     for _ in 0..MAX_PASSES {
         let front = model.front(&state.tip);
@@ -129,7 +130,7 @@ fn press(model: &LineModel, state: &mut LineState, membrane: Option<usize>) {
         state.tip.met_dent_m = if held_by == 0 {
             0.0
         } else {
-            state.tip_u_m - whole * load_n
+            state.tip_u_m - whole_m(state, whole, load_n)
         };
         state.tip.held_by = held_by;
     }
@@ -138,11 +139,39 @@ fn press(model: &LineModel, state: &mut LineState, membrane: Option<usize>) {
         return;
     };
     state.membrane_n_per_m = (1.0 / kept - 1.0) / (state.tip_own - whole);
+    // Tissue that gives way within the tick leaves the spring more of the dent.
+    let gain = state.memory.gain;
+    let kept = if gain == 1.0 {
+        kept
+    } else {
+        kept / (kept + gain * (1.0 - kept))
+    };
     state.tip_own = whole + kept * (state.tip_own - whole);
     for of_tip in &mut state.tip_column[..count] {
         *of_tip = whole + kept * (*of_tip - whole);
     }
     state.tip_offset_m = (1.0 - kept) * state.tip.met_dent_m;
+    if state.memory.is_on() {
+        // Of the dent that the past leaves, the spring leaves that part as well.
+        state.tip_offset_m -= (1.0 - kept) * (past_at_tip_m(model, state) - state.memory.whole_offset_m);
+    }
+}
+
+/// Displacement of the material at the tip that the past leaves.
+fn past_at_tip_m(model: &LineModel, state: &LineState) -> f64 {
+    let places = state.tip_range.clone().zip(state.tip_weights);
+    places
+        .map(|(n, w)| w * state.memory.offset_m[model.compliance.stations + n])
+        .sum()
+}
+
+/// How far loads of that sum displace the body as a whole, with what the past leaves.
+fn whole_m(state: &LineState, whole_m_per_n: f64, load_n: f64) -> f64 {
+    if state.memory.is_on() {
+        state.memory.gain * whole_m_per_n * load_n + state.memory.whole_offset_m
+    } else {
+        whole_m_per_n * load_n
+    }
 }
 
 /// Friction that each station can have, by how much of it the shaft is in.
@@ -177,25 +206,19 @@ fn solve(
     output: &mut LineOutput,
 ) -> f64 {
     let rows = &model.compliance.rows;
-    let (m, count, gain) = (model.compliance.stations, state.in_contact, state.memory.gain);
+    let (count, gain) = (state.in_contact, state.memory.gain);
     let place_m = state.tip.material_m;
+    let past_m = past_at_tip_m(model, state);
     let LineState {
         ref mut shaft_n,
         ref anchor_m,
         ref mut u_m,
         ref tip_column,
-        ref memory,
         ..
     } = *state;
     let (shaft_n, anchor_m, u_m) = (&mut shaft_n[..count], &anchor_m[..count], &mut u_m[..count]);
     let tip_column = &tip_column[..count];
-    let offset: f64 = state
-        .tip_range
-        .clone()
-        .zip(state.tip_weights)
-        .map(|(n, w)| w * memory.offset_m[m + n])
-        .sum();
-    let offset = offset + state.tip_offset_m;
+    let offset = past_m + state.tip_offset_m;
     let mut tip_u_m = gain * (dot(tip_column, shaft_n) + state.tip_own * state.tip.force_n) + offset;
     let mut tip_n = state.tip.force_n;
     let tip_gain = gain * state.tip_own;
@@ -250,7 +273,7 @@ fn whole_n(model: &LineModel, state: &LineState) -> f64 {
         return 0.0;
     }
     let load_n = state.shaft_n[..state.in_contact].iter().sum::<f64>() + state.tip.force_n;
-    let dent_m = state.tip_u_m - model.compliance.common_m_per_n() * load_n;
+    let dent_m = state.tip_u_m - whole_m(state, model.compliance.common_m_per_n(), load_n);
     state.membrane_n_per_m * (dent_m - state.tip.met_dent_m)
 }
 
@@ -269,7 +292,7 @@ fn finish(model: &LineModel, state: &mut LineState, output: &mut LineOutput) {
     output.tip_material_m = state.tip.material_m;
     let stretch = |pair: &[f64]| 1.0 + (pair[1] - pair[0]) / model.compliance.spacing_m;
     output.least_stretch = state.u_m[..count].windows(2).map(stretch).fold(1.0, f64::min);
-    state.memory.finish(&mut state.loads_n);
+    state.whole_n = state.memory.finish(&mut state.loads_n, state.whole_n);
     state.last = *output;
 }
 

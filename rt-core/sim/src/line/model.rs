@@ -147,6 +147,14 @@ impl LineModel {
         }
     }
 
+    /// Takes up how the tissue goes on giving way; terms out of range are left as they are. Does not allocate.
+    pub fn set_prony(&mut self, terms: [PronyTerm; 2]) {
+        let is_usable = |t: &PronyTerm| (0.0..=10.0).contains(&t.strength) && (1e-3..=1e5).contains(&t.time_s);
+        if terms.iter().all(is_usable) {
+            self.settings.prony = terms;
+        }
+    }
+
     /// How stations move with the loads on them.
     pub fn compliance(&self) -> &Compliance {
         &self.compliance

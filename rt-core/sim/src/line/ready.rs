@@ -6,6 +6,7 @@ use super::columns::{ColumnQueue, QueueProgress, TOLERANCE};
 use super::compliance::Compliance;
 use super::contact::{LineInput, step};
 use super::model::{LineModel, LineSettings, MAX_STATIONS};
+use super::prony::PronyTerm;
 use super::state::{LineOutput, LineState};
 use super::stations::{Line, StationSettings, Stations};
 use crate::needle::{LayerKind, Layers};
@@ -105,6 +106,8 @@ pub struct LayerForces {
     pub cutting_gain: f64,
     /// Scales friction.
     pub shaft_gain: f64,
+    /// How all of the tissue goes on giving way.
+    pub creep: [PronyTerm; 2],
 }
 
 impl Default for LayerForces {
@@ -114,6 +117,7 @@ impl Default for LayerForces {
             membrane_gain: 1.0,
             cutting_gain: 1.0,
             shaft_gain: 1.0,
+            creep: [PronyTerm::default(); 2],
         }
     }
 }
@@ -193,10 +197,11 @@ impl HandLine {
         &self.line
     }
 
-    /// Takes up the layers' forces; does not allocate.
+    /// Takes up the layers' forces and how the tissue creeps; does not allocate.
     pub fn set_forces(&mut self, forces: &LayerForces) {
         let kinds = &self.way.kinds;
         self.model.set_layers(|n| kinds.get(n).map(|kind| layer(forces, kind)));
+        self.model.set_prony(forces.creep);
     }
 
     /// Whether a needle held like this goes in on this line.

@@ -148,7 +148,8 @@ impl LineState {
             .enumerate()
             .map(|(n, force)| 0.5 * force * dot(rows.row(n), &f))
             .sum();
-        at_once + self.memory.stored_j(rows, &model.settings.prony)
+        let common_m_per_n = model.compliance.common_m_per_n();
+        at_once + self.memory.stored_j(rows, common_m_per_n, &model.settings.prony)
     }
 
     /// The part of the tip's force that moves the body as a whole and is not among the loads, N.
@@ -166,8 +167,17 @@ impl LineState {
         self.in_contact > 0 || self.tip.force_n > 0.0
     }
 
-    /// Half of force times displacement: the elastic energy without what relaxation holds, J. Does not allocate.
+    /// The elastic energy, J: half of force times displacement at once, and what the tissue that creeps held before the tick.
+    /// Does not allocate.
     pub fn elastic_j(&self) -> f64 {
+        if self.memory.is_on() {
+            let at_once = |(n, f): (usize, &f64)| f * (self.u_m[n] - self.memory.offset_m[n]);
+            let shaft_j: f64 = self.shaft_n.iter().enumerate().take(self.in_contact).map(at_once).sum();
+            let places = self.tip_range.clone().zip(self.tip_weights);
+            let past_m: f64 = places.map(|(n, w)| w * self.memory.offset_m[self.shaft_n.len() + n]).sum();
+            let tip_j = self.tip.force_n * (self.tip_u_m - self.tip_offset_m - past_m);
+            return 0.5 * (shaft_j + tip_j) / self.memory.gain + self.memory.held_j;
+        }
         let shaft = self.shaft_n.iter().zip(&self.u_m).take(self.in_contact);
         0.5 * (shaft.map(|(f, u)| f * u).sum::<f64>() + self.tip.force_n * self.tip_u_m)
     }

@@ -17,6 +17,7 @@ impl ChainParameters {
             membrane_gain: self.force.membrane_gain,
             cutting_gain: self.force.cutting_gain,
             shaft_gain: self.force.shaft_gain,
+            creep: self.force.creep,
         }
     }
 }
@@ -142,3 +143,6 @@ fn terms(
         stored_j: tissue_j + 0.5 * guide_n.norm() * beside_m.norm(),
     }
 }
+
+#[cfg(test)]
+mod tests;

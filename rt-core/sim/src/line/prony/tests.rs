@@ -19,10 +19,10 @@ fn a_constant_load_creeps_as_the_chain_says() {
     let rows = Rows::new(1, |_, _| 0.01);
     let mut memory = Memory::new(1);
     for tick in 1..=4000 {
-        memory.begin(&rows, &TERMS, DT_S);
+        memory.begin(&rows, 0.0, &TERMS, DT_S);
         let u = memory.gain * 0.01 * 2.0 + memory.offset_m[0];
         let mut load = [2.0];
-        memory.finish(&mut load);
+        memory.finish(&mut load, 0.0);
         assert!(
             (load[0] * 0.01 - u).abs() < 1e-15,
             "the load that is handed on moves the tissue there"
@@ -42,9 +42,9 @@ fn no_terms_cost_nothing_and_change_nothing() {
     let rows = Rows::new(1, |_, _| 0.01);
     let mut memory = Memory::new(1);
     let before = memory.clone();
-    memory.begin(&rows, &[PronyTerm::default(); 2], DT_S);
+    memory.begin(&rows, 0.0, &[PronyTerm::default(); 2], DT_S);
     let mut load = [2.0];
-    memory.finish(&mut load);
+    memory.finish(&mut load, 0.0);
     assert_eq!((load, memory), ([2.0], before));
 }
 
@@ -58,12 +58,12 @@ fn the_chain_makes_no_energy() {
     for _ in 0..200_000 {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
         force += (seed >> 40) as f64 / (1 << 24) as f64 - 0.5 - 0.01 * force;
-        memory.begin(&rows, &TERMS, 0.01);
+        memory.begin(&rows, 0.0, &TERMS, 0.01);
         let u = memory.gain * 0.01 * force + memory.offset_m[0];
-        memory.finish(&mut [force]);
+        memory.finish(&mut [force], 0.0);
         work_j += force * (u - before_m);
         before_m = u;
-        let stored = 0.5 * 0.01 * force * force + memory.stored_j(&rows, &TERMS);
+        let stored = 0.5 * 0.01 * force * force + memory.stored_j(&rows, 0.0, &TERMS);
         least_j = least_j.min(work_j - stored);
     }
     assert!(work_j > 0.0 && least_j > -1e-12, "{least_j}");
