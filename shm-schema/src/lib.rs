@@ -57,7 +57,7 @@ pub use scene::{
     UploadHeader, UploadStructure, role,
 };
 pub use session::{Session, ThreadReport};
-pub use snapshot::{SeedPose, SnapshotHeader, Vertex};
+pub use snapshot::{MAX_BEND_POINTS, SeedPose, SnapshotHeader, Vertex};
 pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 

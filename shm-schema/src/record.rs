@@ -42,6 +42,8 @@ pub struct TickRecord {
     pub tissue_tick: u64,
     /// Quaternion i, j, k, w; with the tip all that the device said.
     pub world_from_tool: [f64; 4],
+    /// Tip of the needle less where a rigid one in the same hand would have it, scene frame, m.
+    pub tip_deflection_m: [f64; 3],
     /// Bits of the buttons that are pressed.
     pub buttons: u32,
     /// Zero.

@@ -25,6 +25,8 @@ pub struct Rehearsal {
     pub peak_force_n: f64,
     /// How far any tissue moved before the first membrane gave way.
     pub displacement_before_puncture_m: f64,
+    /// Largest deflection of the tip from where a rigid needle would have it.
+    pub deflection_m: f64,
     /// How many of `seeds` and `dropped_after_ns` count.
     pub seed_count: u64,
     /// Where the seeds rest, in the order of the drops.

@@ -27,6 +27,9 @@ pub struct SeedPose {
     pub dropped_at_m: [f64; 3],
 }
 
+/// Places along a bent needle in a snapshot at most.
+pub const MAX_BEND_POINTS: usize = 16;
+
 /// Header of the vertices of one tissue tick, written by the tissue thread.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
@@ -66,13 +69,23 @@ pub struct SnapshotHeader {
     pub node_count: u32,
     /// How many of `seeds` count.
     pub seed_count: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// How many of `bend_m` count; 0 for a needle that does not bend.
+    pub bend_count: u32,
+    /// Distance along the needle from one of `bend_m` to the next, m.
+    pub bend_spacing_m: f64,
+    /// Places of the shaft less where a rigid needle would have them, scene frame, m: from the tip back to the hand.
+    pub bend_m: [[f64; 3]; MAX_BEND_POINTS],
     /// In the order of the drops.
     pub seeds: [SeedPose; MAX_SEEDS],
 }
 
 impl SnapshotHeader {
+    /// Places of the shaft less where a rigid needle would have them, m: from the tip back to the hand. None for a needle that does
+    /// not bend.
+    pub fn bends_m(&self) -> &[[f64; 3]] {
+        self.bend_m.get(..self.bend_count as usize).unwrap_or(&[])
+    }
+
     /// Identity of the scene that the vertices belong to.
     pub fn scene_id(&self) -> SceneId {
         SceneId {

@@ -67,6 +67,17 @@ pub struct HapticState {
     pub tissue_force_n: f64,
     /// [`crate::ParametersInForce::generation`] that the tick ran with.
     pub parameters_generation: u64,
+    /// Tip of the needle less where a rigid one in the same hand would have it, scene frame, m; 0 for a needle that does not bend.
+    pub tip_deflection_m: [f64; 3],
+    /// In contact without a line: how old the pose is that the tissue has answered to within its tolerance. 0 on a line, which the
+    /// force loop solves in the same tick.
+    pub lag_ns: u64,
+    /// How far the tip has come since that pose.
+    pub lag_m: f64,
+    /// Largest [`lag_ns`](Self::lag_ns) since the last reset.
+    pub worst_lag_ns: u64,
+    /// Largest [`lag_m`](Self::lag_m) since the last reset.
+    pub worst_lag_m: f64,
     /// [`Phase`] by number.
     pub phase: u32,
     /// [`Fault`] by number.

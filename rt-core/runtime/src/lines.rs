@@ -58,16 +58,17 @@ impl LineBody {
         }))
     }
 
-    /// Solves for the line of a needle held like this, scene frame. `goes_on` is asked between slices of work.
+    /// Solves for the line of a needle held like this, scene frame, across it as well where the needle `bends`. `goes_on` is asked between slices of work.
     pub fn prepare(
         &self,
         generation: u64,
         tip_m: [f64; 3],
         direction: [f64; 3],
+        bends: bool,
         goes_on: &mut dyn FnMut() -> bool,
     ) -> Result<ReadyLine, NoLine> {
         let line = Line::into_body(&self.scene.lattice, tip_m, direction).ok_or(LineError::NoTissue)?;
-        self.prepare_along(generation, line, &mut |_| goes_on())
+        self.prepare_along(generation, line, bends, &mut |_| goes_on())
     }
 
     /// Solves for a line that enters the body where it says. `report` is called between slices of work and ends it by
@@ -76,6 +77,7 @@ impl LineBody {
         &self,
         generation: u64,
         line: Line,
+        bends: bool,
         report: &mut dyn FnMut(QueueProgress) -> bool,
     ) -> Result<ReadyLine, NoLine> {
         let inside_m = 0.25 * self.scene.body.spacing_m;
@@ -92,7 +94,7 @@ impl LineBody {
                 .copied()
                 .unwrap_or(Some(LayerKind::default()))
         };
-        let mut ready = ReadyLine::prepare(generation, &self.batch, lattice, &layer_of, line, report)?;
+        let mut ready = ReadyLine::prepare(generation, &self.batch, lattice, &layer_of, line, bends, report)?;
         if !self.tissue.adds_columns() {
             ready.body.answer.carry(&self.scene.body, self.scene.is_held());
         }

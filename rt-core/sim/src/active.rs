@@ -2,7 +2,7 @@
 
 use crate::force::ForceParameters;
 use crate::limits::{Limits, TissueParameters};
-use crate::line::PronyTerm;
+use crate::line::{NeedleBending, PronyTerm};
 use crate::needle::{Layer, Layers, NeedleParameters};
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::{ParameterId, ParameterProblem, ParameterProblems, ParameterSet};
@@ -89,6 +89,12 @@ fn force(set: &ParameterSet, device: &DeviceInfo) -> ForceParameters {
                 time_s: set.get(P::SlowCreepTime),
             },
         ],
+        bending: NeedleBending {
+            bending_stiffness_n_m2: set.get(P::BendingStiffness),
+            bevel: set.get(P::Bevel),
+            template_gap_m: set.get(P::TemplateGap),
+            template_distance_m: set.get(P::TemplateDistance),
+        },
         ..ForceParameters::default()
     };
     force.gate.force_scale = set.get(P::ForceScale);

@@ -71,4 +71,11 @@ parameters! {
     QuickCreepTime "tissue.quick_creep_time" "Quick creep: time" Tissue "s" 1.0, 0.01, 10.0, 0.5, "physics.md, Creep", "Time in which 63 % of the quick creep has come.";
     SlowCreep "tissue.slow_creep" "Slow creep" Tissue "" 1.0, 0.0, 5.0, 0.0, "physics.md, Creep", "The same over a longer time. 0 is off; a prostate has about 1. Acts on a needle line.";
     SlowCreepTime "tissue.slow_creep_time" "Slow creep: time" Tissue "s" 1.0, 0.1, 100.0, 5.0, "physics.md, Creep", "Time in which 63 % of the slow creep has come.";
+    BendingStiffness "needle.bending_stiffness" "Bending stiffness E I" Needle "N m2" 1.0, 0.0, 1.0, 0.0, "physics.md, Beam", "How stiff the needle is against bending. 0 is a needle that does not bend, 0.016 one of 18 G steel. Acts on a needle line that was prepared for it.";
+    Bevel "needle.bevel" "Bevel" Needle "" 1.0, 0.0, 1.0, 0.1, "physics.md, Beam", "Force of the bevel across a needle that bends, over the cutting force. It leads towards the x axis of the tool, so turning the needle turns it.";
+    TemplateGap "needle.template_gap" "Template: play of the hole" Needle "mm" 1e3, 0.0, 3.0, 0.1, "ours", "Room on each side of a needle that bends, in the hole of the template.";
+    TemplateDistance "needle.template_distance" "Template: distance" Needle "mm" 1e3, 0.0, 150.0, 20.0, "ours", "From the template to the place of entry of a needle that bends; 0 is a needle without a template.";
+    EntryScatter "needle.entry_scatter" "Scatter of the entry" Needle "mm" 1e3, 0.0, 10.0, 0.0, "physics.md, Scatter", "Rehearsals and studies: standard deviation of how far a needle enters beside its hole, in each direction across. 0 is off.";
+    SkinDeflection "needle.skin_deflection" "Deflection at the skin" Needle "deg" (1.0 / RAD), 0.0, 10.0, 0.0, "physics.md, Scatter", "Rehearsals and studies: standard deviation of the angle by which template and skin turn a needle about its entry, in each direction across. 0 is off; with 1.5 mm of scatter, 3.7 is what Moreira 2018 measured in patients.";
+    ScatterSeed "needle.scatter_seed" "Scatter: seed" Needle "" 1.0, 1.0, 1e6, 1.0, "ours", "Which of the random numbers scatter and deflection are. The same seed gives the same needle the same error.";
 }

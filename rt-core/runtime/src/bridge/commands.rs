@@ -116,6 +116,7 @@ impl Bridge {
             refusal
         })?;
         let generation = self.parameters.next_generation();
+        let bends = active.force.bending.is_on();
         let haptic = HapticOrder::Parameters {
             ticket,
             generation,
@@ -124,6 +125,7 @@ impl Bridge {
         };
         self.order_both((haptic, TissueOrder::Limits(active.limits)))?;
         self.parameters.ordered(generation, set);
+        self.lines.take_bending(bends);
         Ok(())
     }
 

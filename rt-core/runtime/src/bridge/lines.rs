@@ -28,6 +28,7 @@ const IN_USE_AFTER: Duration = Duration::from_secs(1);
 /// What the thread returns.
 struct Finished {
     scene_generation: u64,
+    bends: bool,
     body: Option<LineBody>,
     line: Result<(ReadyLine, LineSource), NoLine>,
 }
@@ -62,6 +63,8 @@ pub struct LinePreparer {
     kept: Vec<Kept>,
     generation: u64,
     tissue: TissueKind,
+    /// The needle bends: lines are solved for across as well.
+    bends: bool,
     archive: LineArchive,
 }
 
@@ -78,6 +81,7 @@ impl LinePreparer {
             kept: Vec::new(),
             generation: 0,
             tissue,
+            bends: false,
             archive: LineArchive::default(),
         }
     }
@@ -96,6 +100,16 @@ impl LinePreparer {
         self.expected.clear();
         self.kept.clear();
         self.give_up();
+    }
+
+    /// The needle bends from now on, or no longer. A line for one that does not is of no use to one that does.
+    pub(super) fn take_bending(&mut self, bends: bool) {
+        if bends && !self.bends {
+            self.handed_over = None;
+            self.kept.clear();
+            self.give_up();
+        }
+        self.bends = bends;
     }
 
     /// The needle of a plan that has come, entry and direction; `None` where it was withdrawn.
@@ -195,7 +209,7 @@ impl LinePreparer {
         self.generation += 1;
         let generation = self.generation;
         let kept = self.body.take().filter(|(of, _)| *of == scene_generation);
-        let (source, tissue) = (Arc::clone(&self.source), self.tissue);
+        let (source, tissue, bends) = (Arc::clone(&self.source), self.tissue, self.bends);
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let work = move || {
@@ -207,7 +221,7 @@ impl LinePreparer {
             let mut goes_on = || !stopped.load(Ordering::Relaxed);
             let (body, line) = match body {
                 Ok(Some(body)) => {
-                    let line = body.prepare(generation, axis.entry_m, axis.axes[0], &mut goes_on);
+                    let line = body.prepare(generation, axis.entry_m, axis.axes[0], bends, &mut goes_on);
                     let with_source = line.map(|line| {
                         let source = line.hand.source();
                         (line, source)
@@ -219,6 +233,7 @@ impl LinePreparer {
             };
             Finished {
                 scene_generation,
+                bends,
                 body,
                 line,
             }
@@ -249,6 +264,9 @@ impl LinePreparer {
             return;
         }
         self.body = finished.body.map(|body| (scene_generation, body));
+        if self.bends && !finished.bends {
+            return;
+        }
         let is_expected = self.expected.iter().any(|expected| same(expected, &axis));
         let stands_there = self.steady.as_ref().is_some_and(|(steady, _)| same(steady, &axis));
         match finished.line {

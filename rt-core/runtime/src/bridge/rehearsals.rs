@@ -129,6 +129,7 @@ fn message(r: &Rehearsed, scene_generation: u64, wall_ns: u64) -> Box<Rehearsal>
     message.wall_ns = wall_ns;
     message.peak_force_n = r.peak_force_n;
     message.displacement_before_puncture_m = r.displacement_before_puncture_m;
+    message.deflection_m = r.deflection_m;
     message.seed_count = r.seeds.len().min(MAX_SEEDS) as u64;
     for (slot, seed) in message.seeds.iter_mut().zip(&r.seeds) {
         *slot = *seed;

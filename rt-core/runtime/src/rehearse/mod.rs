@@ -6,6 +6,7 @@
 
 mod motion;
 mod rig;
+mod scatter;
 mod script;
 
 use crate::lines::{LineBody, NoLine};
@@ -13,6 +14,7 @@ use crate::rt::world::{World, WorldError};
 use motion::{Motion, TargetElements};
 use nalgebra::Vector3;
 use rig::Rig;
+use scatter::Scatter;
 use script::Script;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -118,6 +120,8 @@ pub struct Rehearsed {
     pub largest_displacement_m: f64,
     /// Largest shift of the middle of the target during the whole insertion, m; of the whole body where it has none.
     pub target_shift_m: f64,
+    /// Largest deflection of the tip from where a rigid needle would have it, m.
+    pub deflection_m: f64,
     /// Time of the rehearsal on its own clock, s.
     pub simulated_s: f64,
 }
@@ -128,7 +132,7 @@ pub struct Stage {
     /// Where needles have lines.
     lines: Option<LineBody>,
     /// The line of the last needle: compensation rehearses the same needle several times.
-    kept: Option<(NeedleAxis, ReadyLine)>,
+    kept: Option<(NeedleAxis, bool, ReadyLine)>,
     device: DeviceInfo,
     hand: Hand,
     target: TargetElements,
@@ -159,23 +163,23 @@ impl Stage {
     }
 
     /// A line for the needle, at rest; `None` in tissue that needs none.
-    fn line(&mut self, run: &NeedleRun, stop: &AtomicBool) -> Result<Option<ReadyLine>, RehearseError> {
+    fn line(&mut self, run: &NeedleRun, bends: bool, stop: &AtomicBool) -> Result<Option<ReadyLine>, RehearseError> {
         let Some(body) = &self.lines else { return Ok(None) };
         let axis = NeedleAxis {
             entry_m: run.entry_m.into(),
             direction: run.direction.into(),
         };
-        if let Some((_, line)) = self.kept.as_ref().filter(|(of, _)| *of == axis) {
+        if let Some((.., line)) = self.kept.as_ref().filter(|(of, bent, _)| *of == axis && *bent == bends) {
             return Ok(Some(line.clone()));
         }
         // SYNC: set by the bridge when it ends; nothing but the flag is carried.
         let mut goes_on = || !stop.load(Ordering::Relaxed);
-        let line = body.prepare(1, axis.entry_m, axis.direction, &mut goes_on);
+        let line = body.prepare(1, axis.entry_m, axis.direction, bends, &mut goes_on);
         let line = line.map_err(|why| match why {
             NoLine::Line(LineError::Stopped) => RehearseError::Stopped,
             why => RehearseError::Line(why),
         })?;
-        self.kept = Some((axis, line.clone()));
+        self.kept = Some((axis, bends, line.clone()));
         Ok(Some(line))
     }
 
@@ -190,7 +194,9 @@ impl Stage {
             return Err(RehearseError::TooManyDrops(run.drops_m.len()));
         }
         let active = activate(set, &self.device)?;
-        let line = self.line(run, stop)?;
+        let scattered = Scatter::of(set).map(|scatter| scatter.apply(run));
+        let run = scattered.as_ref().unwrap_or(run);
+        let line = self.line(run, active.force.bending.is_on(), stop)?;
         let mut world = self.world.take().ok_or(RehearseError::BodyLost)?;
         world.tissue.return_to_rest();
         world.set_limits(active.limits.clone());
@@ -208,6 +214,7 @@ fn perform(rig: &mut Rig, run: &NeedleRun, mut motion: Motion, stop: &AtomicBool
     let mut script = Script::new(run);
     let mut displacement_before_puncture_m = 0.0_f64;
     let (mut punctured, mut contact_s) = (false, None);
+    let mut deflection_m = 0.0_f64;
     let mut dropped_after_s = Vec::new();
     while rig.seconds() < LONGEST_S {
         // SYNC: set by the bridge when it ends; nothing but the flag is carried.
@@ -224,6 +231,7 @@ fn perform(rig: &mut Rig, run: &NeedleRun, mut motion: Motion, stop: &AtomicBool
         while dropped_after_s.len() < state.seed_count as usize {
             dropped_after_s.push(rig.seconds() - contact_s.unwrap_or(rig.seconds()));
         }
+        deflection_m = deflection_m.max(Vector3::from(state.tip_deflection_m).norm());
         punctured |= state.flags & flags::PUNCTURED != 0;
         if !punctured {
             displacement_before_puncture_m = displacement_before_puncture_m.max(rig.displacement_m());
@@ -237,6 +245,7 @@ fn perform(rig: &mut Rig, run: &NeedleRun, mut motion: Motion, stop: &AtomicBool
                 displacement_before_puncture_m,
                 largest_displacement_m: motion.largest_m,
                 target_shift_m: motion.target_m,
+                deflection_m,
                 simulated_s,
             });
         }

@@ -45,6 +45,7 @@ pub fn solve_again(
             again.bodies.push(BodyLine {
                 generation,
                 line: source.line,
+                whole_m_per_n: 0.0,
                 answer: BodyAnswer::Columns(Vec::new()),
             });
             continue;
@@ -56,7 +57,7 @@ pub fn solve_again(
                 none.insert(of_scene.ok_or(RepeatError::NoLine(generation))?)
             }
         };
-        let ready = body.prepare_along(generation, source.line, &mut |progress| {
+        let ready = body.prepare_along(generation, source.line, source.bends(), &mut |progress| {
             report(LineProgress {
                 generation,
                 ready: progress.ready,

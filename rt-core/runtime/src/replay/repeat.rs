@@ -242,14 +242,14 @@ fn same_step(again: &TissueLoop, entry: &TissueEntry) -> bool {
     let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
     let response = |r: &TissueResponse| {
         let numbers = bits(&[r.worst_residual]);
-        let places = [bits(r.contact_in_scene.as_slice()), bits(r.path_direction.as_slice())];
+        let places = [r.contact_in_scene, r.path_direction, r.solved_tip_in_scene].map(|v| bits(v.as_slice()));
         (
             r.time_ns,
             r.tick,
             r.contact,
             r.line,
             r.seed_count,
-            r.unsolved,
+            (r.unsolved, r.solved_ns),
             numbers,
             places,
         )

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use stylet_hw::{Device, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
 use stylet_sim::force::ForceParameters;
 use stylet_sim::limits::TissueParameters;
-use stylet_sim::line::{LineSource, PronyTerm, ReadyLine};
+use stylet_sim::line::{LineSource, NeedleBending, PronyTerm, ReadyLine};
 use stylet_sim::needle::NeedleParameters;
 use stylet_sim::scene::{Labels, SceneSource, TissueKind};
 
@@ -25,7 +25,7 @@ struct Recorded {
     line: ReadyLine,
     kept: Vec<LineSource>,
     figures: DeviceFigures,
-    creep: [PronyTerm; 2],
+    force: ForceParameters,
     heap_calls: u64,
 }
 
@@ -42,13 +42,13 @@ fn block() -> SceneSource {
 }
 
 impl Recorded {
-    fn new(tissue: TissueKind) -> Self {
+    fn new(tissue: TissueKind, force: &ForceParameters) -> Self {
         let source = block();
         let scene = source.build().expect("valid").with_tissue(tissue);
         let (low, high) = scene.lattice.bounds_m();
         let entry_m = Vector3::new((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, low[2]);
         let body = LineBody::of_source(&source, tissue).expect("valid").expect("has lines");
-        let line = body.prepare(1, entry_m.into(), [0.0, 0.0, 1.0], &mut || true);
+        let line = body.prepare(1, entry_m.into(), [0.0, 0.0, 1.0], force.bending.is_on(), &mut || true);
         let limits = TissueParameters::default().validate().expect("valid");
         let world = Box::new(World::new(scene, limits, 1).expect("valid"));
         let device = SimulatedPhantom::new(SimulatedPhantomConfig {
@@ -69,7 +69,7 @@ impl Recorded {
             line: line.expect("through the block"),
             kept: Vec::new(),
             figures,
-            creep: [PronyTerm::default(); 2],
+            force: *force,
             heap_calls: 0,
         }
     }
@@ -125,8 +125,7 @@ impl Recorded {
                 membrane_gain: 0.05,
                 cutting_gain: 0.1,
                 shaft_gain: 0.2,
-                creep: self.creep,
-                ..ForceParameters::default()
+                ..self.force
             },
         });
         self.run(0.2);
@@ -198,10 +197,15 @@ fn assert_identical(flight: &Flight) {
     let tissue = flight.tissue.as_ref().expect("recorded");
     let mut last = None;
     let lines = solve_again(flight, tissue, &mut |p| last = Some(p)).expect("solved");
+    let wanted = if flight.lines.iter().all(|line| line.bends()) {
+        30
+    } else {
+        20
+    };
     assert_eq!(
         last.map(|p: LineProgress| p.of),
-        Some(20),
-        "shaft and tip of 10 stations"
+        Some(wanted),
+        "shaft and tip of 10 stations, and 5 across along each direction"
     );
     let found = repeat::tissue(flight, tissue, lines).expect("can be run");
     assert!(found.is_identical() && found.positions > 0, "tissue: {found:?}");
@@ -210,25 +214,58 @@ fn assert_identical(flight: &Flight) {
 /// The recorder left lines out, so that forces on one were not repeated and an elastic body was in no recording.
 #[test]
 fn a_recorded_insertion_on_a_needle_line_repeats_in_every_bit() {
-    repeats_in_every_bit(TissueKind::Fem, [PronyTerm::default(); 2]);
+    repeats_in_every_bit(TissueKind::Fem, &ForceParameters::default());
 }
 
 /// What tissue that creeps remembers of past loads is part of what a recording begins with.
 #[test]
 fn a_recorded_insertion_into_tissue_that_creeps_repeats_in_every_bit() {
     let creep = [(0.6, 0.5), (1.0, 5.0)].map(|(strength, time_s)| PronyTerm { strength, time_s });
-    repeats_in_every_bit(TissueKind::Fem, creep);
+    let force = ForceParameters {
+        creep,
+        ..ForceParameters::default()
+    };
+    repeats_in_every_bit(TissueKind::Fem, &force);
+}
+
+/// Forces and track across the line are part of it as well, and loads across go to the tissue.
+#[test]
+fn a_recorded_insertion_of_a_needle_that_bends_repeats_in_every_bit() {
+    let force = ForceParameters {
+        bending: NeedleBending {
+            bending_stiffness_n_m2: 0.016,
+            bevel: 0.3,
+            template_gap_m: 1e-4,
+            template_distance_m: 0.02,
+        },
+        ..ForceParameters::default()
+    };
+    for kind in [TissueKind::Fem, TissueKind::ChainMail] {
+        let flight = repeats_in_every_bit(kind, &force);
+        let haptic = flight.haptic.expect("recorded");
+        let deflection = haptic
+            .ticks
+            .iter()
+            .map(|e| Vector3::from(e.record.tip_deflection_m).norm());
+        assert!(deflection.fold(0.0, f64::max) > 1e-5, "it bends");
+        let tissue = flight.tissue.expect("recorded");
+        assert!(
+            tissue
+                .loads
+                .iter()
+                .any(|(_, loads)| loads.across_n()[0].iter().any(|f| *f != 0.0))
+        );
+    }
 }
 
 /// ChainMail's line moves the body as a whole, which its own memory did not hold.
 #[test]
 fn a_recorded_insertion_in_chainmail_repeats_in_every_bit() {
-    repeats_in_every_bit(TissueKind::ChainMail, [PronyTerm::default(); 2]);
+    repeats_in_every_bit(TissueKind::ChainMail, &ForceParameters::default());
 }
 
-fn repeats_in_every_bit(kind: TissueKind, creep: [PronyTerm; 2]) {
-    let mut run = Recorded::new(kind);
-    run.creep = creep;
+fn repeats_in_every_bit(kind: TissueKind, force: &ForceParameters) -> Flight {
+    let mut run = Recorded::new(kind, force);
     run.insert();
     let flight = through_a_file(&run.flight());
     assert_eq!(run.heap_calls, 0, "heap calls of the loops");
@@ -277,6 +314,7 @@ fn repeats_in_every_bit(kind: TissueKind, creep: [PronyTerm; 2]) {
         [2]
     );
     assert_identical(&next);
+    flight
 }
 
 fn what_was_changed_is_found(flight: &Flight) {

@@ -19,6 +19,7 @@ use stylet_sim::force::ForceFault;
 use stylet_sim::force::chain::{self, ChainOutput, ChainParameters, ChainState, Touch};
 use stylet_sim::line::HandLine;
 
+mod deflection;
 mod flight;
 mod line;
 mod orders;

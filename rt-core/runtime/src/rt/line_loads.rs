@@ -2,6 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 use stylet_sim::line::MAX_STATIONS;
+use stylet_sim::line::beam::{BentNeedle, MAX_ACROSS};
+
+/// Shaft and tip of each station, and stations across along both directions.
+const MOST: usize = 2 * MAX_STATIONS + 2 * MAX_ACROSS;
 
 /// Forces of the newest tick on a line.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -17,16 +21,82 @@ pub struct LineLoads {
     pub tip_displacement_m: f64,
     /// How far the body is moved as a whole besides, along the line, m.
     pub whole_m: f64,
+    /// The needle, where it bends.
+    pub bent: Option<BentTip>,
+    /// Stations across; none of a needle that does not bend.
+    pub across: usize,
     /// How many of `loads_n` there are.
     pub count: usize,
-    /// Shaft of each station, then tip at each.
-    pub loads_n: [f64; 2 * MAX_STATIONS],
+    /// Shaft of each station, then tip at each, then stations across along each direction.
+    pub loads_n: [f64; MOST],
+}
+
+/// A bent needle and the material at its tip.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BentTip {
+    /// The needle.
+    pub needle: BentNeedle,
+    /// Tip across the line, in the world, m.
+    pub across_m: [f64; 2],
+    /// How far the tissue at the tip is displaced across the line, m.
+    pub displacement_m: [f64; 2],
+}
+
+impl BentTip {
+    /// Place at rest of the material that the tip is in, across the line, m.
+    pub fn material_m(&self) -> [f64; 2] {
+        [0, 1].map(|side| self.across_m[side] - self.displacement_m[side])
+    }
+
+    fn bits(&self) -> [u64; 20] {
+        let n = &self.needle;
+        let pairs = [
+            n.grip,
+            n.hand_m,
+            n.hand_slope,
+            n.hole_n,
+            n.tip_n,
+            self.across_m,
+            self.displacement_m,
+        ];
+        let own = [
+            n.bending_stiffness_n_m2,
+            n.length_m,
+            n.tip_m,
+            n.hole_m,
+            n.first_m,
+            n.spacing_m,
+        ];
+        let mut all = [0; 20];
+        let values = pairs.iter().flatten().chain(&own);
+        all.iter_mut()
+            .zip(values)
+            .for_each(|(slot, value)| *slot = value.to_bits());
+        all
+    }
 }
 
 impl LineLoads {
     /// The forces that there are.
     pub fn loads_n(&self) -> &[f64] {
         self.loads_n.get(..self.count).unwrap_or(&[])
+    }
+
+    /// Forces across the line on each station across, along both directions.
+    pub fn across_n(&self) -> [&[f64]; 2] {
+        let loads_n = self.loads_n();
+        let (_, across) = loads_n.split_at(loads_n.len().saturating_sub(2 * self.across));
+        across
+            .split_at_checked(self.across)
+            .map_or([&[], &[]], |(first, second)| [first, second])
+    }
+
+    /// How far a place of the needle is off where a rigid one would be, along both directions across, m; 0 without a beam.
+    pub fn deflection_m(&self, behind_tip_m: f64) -> [f64; 2] {
+        self.bent.map_or([0.0; 2], |bent| {
+            bent.needle
+                .deflection_m(bent.needle.tip_m - behind_tip_m, self.across_n())
+        })
     }
 
     /// Some tissue is pushed.
@@ -43,6 +113,8 @@ impl LineLoads {
                 loads.tip_material_m.to_bits(),
                 loads.tip_displacement_m.to_bits(),
                 loads.whole_m.to_bits(),
+                loads.bent.map(|bent| bent.bits()),
+                loads.across,
                 loads.count,
             )
         };
@@ -59,8 +131,10 @@ impl Default for LineLoads {
             tip_material_m: 0.0,
             tip_displacement_m: 0.0,
             whole_m: 0.0,
+            bent: None,
+            across: 0,
             count: 0,
-            loads_n: [0.0; 2 * MAX_STATIONS],
+            loads_n: [0.0; MOST],
         }
     }
 }
@@ -73,6 +147,8 @@ struct TapedLoads {
     tip_material_m: f64,
     tip_displacement_m: f64,
     whole_m: f64,
+    bent: Option<BentTip>,
+    across: usize,
     count: usize,
     /// Those that are not zero, each with its place.
     loads_n: Vec<(u16, f64)>,
@@ -87,6 +163,8 @@ impl From<LineLoads> for TapedLoads {
             tip_material_m: loads.tip_material_m,
             tip_displacement_m: loads.tip_displacement_m,
             whole_m: loads.whole_m,
+            bent: loads.bent,
+            across: loads.across,
             count: loads.count,
             loads_n: numbered.filter(|(_, load_n)| load_n.to_bits() != 0).collect(),
         }
@@ -102,7 +180,9 @@ impl From<TapedLoads> for LineLoads {
             tip_material_m: taped.tip_material_m,
             tip_displacement_m: taped.tip_displacement_m,
             whole_m: taped.whole_m,
-            count: taped.count.min(2 * MAX_STATIONS),
+            bent: taped.bent,
+            across: taped.across.min(MAX_ACROSS),
+            count: taped.count.min(MOST),
             ..Self::default()
         };
         for (place, load_n) in taped.loads_n {

@@ -39,6 +39,10 @@ pub struct TissueResponse {
     pub seed_count: u32,
     /// Generation of the line whose columns the tissue loop has; 0 for none.
     pub line: u64,
+    /// When the pose was read that the tissue has last answered to within its tolerance, `CLOCK_MONOTONIC`, ns.
+    pub solved_ns: u64,
+    /// The tip of that pose, scene frame, m.
+    pub solved_tip_in_scene: Vector3<f64>,
     /// The step has not converged and the needle would feel it.
     pub unsolved: bool,
 }
@@ -75,6 +79,8 @@ impl Default for TissueResponse {
             missed: 0,
             seed_count: 0,
             line: 0,
+            solved_ns: 0,
+            solved_tip_in_scene: Vector3::zeros(),
             unsolved: false,
         }
     }

@@ -262,6 +262,10 @@ impl TissueLoop {
             response.path_direction = contact.direction;
         }
         response.local = local;
+        if report.converged {
+            response.solved_ns = self.pose.time_ns;
+            response.solved_tip_in_scene = self.pose.tip_in_scene;
+        }
         response.worst_residual = response.worst_residual.max(report.residual);
         // Limits tightened over tissue that nothing holds are met as it recovers; no force depends on it.
         response.unsolved = !may_be_felt && held;

@@ -87,6 +87,7 @@ pub fn step(
         puncture: needle_out.puncture,
         left,
         wrench,
+        bent: None,
     }
 }
 

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use stylet_hw::DeviceInfo;
 
 use super::gate::GateParameters;
-use crate::line::PronyTerm;
+use crate::line::{NeedleBending, PronyTerm};
 use crate::needle::Layers;
 use crate::settings::{Problem, Problems};
 
@@ -44,6 +44,8 @@ pub struct ForceParameters {
     pub compensated_mass_kg: f64,
     /// How tissue on a needle line goes on giving way under a load that is held; strengths of 0 turn it off.
     pub creep: [PronyTerm; 2],
+    /// How the needle bends on a needle line.
+    pub bending: NeedleBending,
     /// Acceleration of gravity in world, m/s^2.
     pub gravity_in_world_m_per_s2: Vector3<f64>,
     /// Settings of the gate.
@@ -67,6 +69,7 @@ impl Default for ForceParameters {
             stick_damping_n_s_per_m: 10.0,
             compensated_mass_kg: 0.0,
             creep: [PronyTerm::default(); 2],
+            bending: NeedleBending::default(),
             gravity_in_world_m_per_s2: Vector3::new(0.0, 0.0, -9.81),
             gate: GateParameters::default(),
         }
@@ -105,6 +108,21 @@ impl ForceParameters {
             problems.range("force.creep.strength", term.strength, 0.0, 10.0);
             problems.range("force.creep.time_s", term.time_s, 1e-3, 1e5);
         }
+        let bending = &self.bending;
+        problems.range(
+            "force.bending.bending_stiffness_n_m2",
+            bending.bending_stiffness_n_m2,
+            0.0,
+            10.0,
+        );
+        problems.range("force.bending.bevel", bending.bevel, 0.0, 2.0);
+        problems.range("force.bending.template_gap_m", bending.template_gap_m, 0.0, 0.01);
+        problems.range(
+            "force.bending.template_distance_m",
+            bending.template_distance_m,
+            0.0,
+            0.5,
+        );
         for (key, value) in [
             ("force.gravity_in_world_m_per_s2.x", self.gravity_in_world_m_per_s2.x),
             ("force.gravity_in_world_m_per_s2.y", self.gravity_in_world_m_per_s2.y),

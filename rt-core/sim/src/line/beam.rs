@@ -1,13 +1,20 @@
 //! The needle as an Euler-Bernoulli beam: how it bends between hand, template hole and the tissue along its shaft.
 //!
-//! Its flexibility is known in closed form: a beam clamped at the hand, led by the hole of the template. Each station of the shaft is
-//! tied to the tissue across the line, both ways, at the place where the tip went through. With the tissue's compliance across the line
-//! `W` and the needle's `A`, the forces on the tissue solve `(W + A) f = (needle without tissue) - (track)`, which is
-//! positive definite. A rigid needle has no beam and pays nothing.
+//! Each station across is tied to the tissue, both ways, at the place where the tip went through. With the tissue's compliance across
+//! the line `W` and the needle's `A`, known in closed form, the forces on the tissue solve
+//! `(W + A) f = (needle without tissue) - (track)`, which is positive definite. The hole leads the needle where it would lie
+//! beyond the hole's play. A rigid needle has no beam and pays nothing.
 
-use super::rows::Rows;
+use super::rows::{Rows, dot};
+use serde::{Deserialize, Serialize};
 
-/// Closer than this to the template, the hand's clamp and the hole are one clamp.
+mod needle;
+
+pub use needle::BentNeedle;
+
+/// Stations across at most.
+pub const MAX_ACROSS: usize = 32;
+/// Closer than this to the template, hand and hole are one.
 const AT_TEMPLATE_M: f64 = 1e-3;
 
 /// A needle and the tissue across its line.
@@ -17,34 +24,48 @@ pub struct BeamModel {
     pub bending_stiffness_n_m2: f64,
     /// From hand to tip.
     pub length_m: f64,
+    /// How far the hand gives way across the needle, m/N, and how far it turns, rad/(N m). 0 is a clamp.
+    pub grip: [f64; 2],
     /// Hole that leads the needle, along the line from the entry (negative: before it).
     pub template_m: Option<f64>,
+    /// Play of the needle in the hole, to each side.
+    pub gap_m: f64,
     /// Distance of stations, m.
     pub spacing_m: f64,
+    /// Of the body as a whole on its foundation, m/N: it takes the bevel's reaction. What that does close to the tip is left out.
+    pub whole_m_per_n: f64,
     /// How stations move across the line with forces on each, m/N, along both directions.
     pub across: [Rows; 2],
 }
 
 /// Forces across the line and the track that the tip has cut.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BeamState {
     /// On the tissue, along both directions.
-    forces_n: [Vec<f64>; 2],
+    forces_n: [[f64; MAX_ACROSS]; 2],
     /// Where each station's track lies in the tissue at rest, across the line.
-    track_m: [Vec<f64>; 2],
-    /// Stations that have a track, and that the shaft is in.
-    entered: usize,
-    in_contact: usize,
+    track_m: [[f64; MAX_ACROSS]; 2],
+    /// Stations that the shaft is in. One that it leaves forgets its track: a needle that came back to it beside its own would be
+    /// bent by nobody's work.
+    in_contact: u32,
+}
+
+/// Room for the solution of one tick; leaves nothing to the next.
+#[derive(Clone, Debug)]
+pub struct BeamScratch {
+    flexibility: Vec<f64>,
     factor: Vec<f64>,
-    known: Vec<f64>,
+    by_hole: [[f64; MAX_ACROSS]; 2],
 }
 
 /// What holds the needle across the line in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BeamInput {
-    /// Tip along the line from the entry.
+    /// Tip along the line from the entry, in the world.
     pub tip_m: f64,
-    /// Where the hand is across the line, and the slope it gives the needle.
+    /// Place of the tip in the material of the line.
+    pub material_m: f64,
+    /// Where the hand is across the line.
     pub hand_m: [f64; 2],
     /// Slope that the hand gives the needle, along both directions.
     pub hand_slope: [f64; 2],
@@ -55,169 +76,257 @@ pub struct BeamInput {
 /// The bent needle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BeamOutput {
-    /// Of the tip, across the line.
+    /// The needle, and the forces on it but for those of the tissue.
+    pub needle: BentNeedle,
+    /// Tip across the line.
     pub tip_m: [f64; 2],
-    /// Of the needle on what clamps it at the hand.
+    /// Displacement of the tissue at the tip, across the line.
+    pub displacement_m: [f64; 2],
+    /// Of the needle on the hand, across the line.
     pub force_on_hand_n: [f64; 2],
+    /// Moment of the same about the tip of a rigid needle in that hand: force times place along the line.
+    pub moment_nm: [f64; 2],
+    /// On the hand along the line: a bent beam slides out of what bends it.
+    pub axial_n: f64,
+    /// Elastic energy of needle and tissue.
+    pub stored_j: f64,
     /// The model could not be solved; the needle is taken as straight.
     pub is_refused: bool,
 }
 
-impl BeamState {
-    /// A straight needle.
-    pub fn new(model: &BeamModel) -> Self {
-        let m = model.across[0].size();
-        let zeros = || vec![0.0; m];
-        BeamState {
-            forces_n: [zeros(), zeros()],
-            track_m: [zeros(), zeros()],
-            entered: 0,
-            in_contact: 0,
-            factor: vec![0.0; m * m],
-            known: zeros(),
-        }
+impl BeamModel {
+    /// Stations across.
+    pub fn stations(&self) -> usize {
+        self.across[0].size().min(self.across[1].size()).min(MAX_ACROSS)
     }
+}
 
+impl BeamState {
     /// On the tissue at each station, along direction 0 or 1.
     pub fn forces_n(&self, side: usize) -> &[f64] {
         &self.forces_n[side.min(1)]
     }
+
+    /// Its number is one of stations: that of a state that was read from a file may not be.
+    pub(super) fn is_whole(&self) -> bool {
+        self.in_contact as usize <= MAX_ACROSS
+    }
 }
 
-/// The needle without tissue, in one tick.
-struct Beam {
-    clamp_m: f64,
-    hole_m: Option<f64>,
-    stiffness: f64,
-}
-
-impl Beam {
-    fn new(model: &BeamModel, tip_m: f64) -> Self {
-        let hand_m = tip_m - model.length_m;
-        let (clamp_m, hole_m) = match model.template_m {
-            Some(hole) if hole < hand_m + AT_TEMPLATE_M => (hole.max(hand_m), None),
-            Some(hole) if hole < tip_m => (hand_m, Some(hole)),
-            _ => (hand_m, None),
-        };
-        Beam {
-            clamp_m,
-            hole_m,
-            stiffness: model.bending_stiffness_n_m2,
+impl BeamScratch {
+    /// For that model.
+    pub fn new(model: &BeamModel) -> Self {
+        let m = model.stations();
+        BeamScratch {
+            flexibility: vec![0.0; m * m],
+            factor: vec![0.0; m * m],
+            by_hole: [[0.0; MAX_ACROSS]; 2],
         }
-    }
-
-    /// Deflection at one place by a newton at another, clamped and free.
-    fn free(&self, a_m: f64, b_m: f64) -> f64 {
-        let (x, y) = (
-            (a_m.min(b_m) - self.clamp_m).max(0.0),
-            (a_m.max(b_m) - self.clamp_m).max(0.0),
-        );
-        x * x * (3.0 * y - x) / (6.0 * self.stiffness)
-    }
-
-    /// The same, led by the hole.
-    fn led(&self, a_m: f64, b_m: f64) -> f64 {
-        let led = self
-            .hole_m
-            .map(|t| self.free(a_m, t) * self.free(t, b_m) / self.free(t, t));
-        self.free(a_m, b_m) - led.unwrap_or(0.0)
-    }
-
-    /// Deflection without tissue: hand and bevel, the hole at 0.
-    fn alone(&self, at_m: f64, tip_m: f64, input: &BeamInput, side: usize) -> f64 {
-        let straight = |x: f64| input.hand_m[side] + input.hand_slope[side] * (x - self.clamp_m);
-        let led = self.hole_m.map(|t| straight(t) * self.free(at_m, t) / self.free(t, t));
-        straight(at_m) - led.unwrap_or(0.0) + self.led(at_m, tip_m) * input.tip_force_n[side]
     }
 }
 
 /// One tick; does not allocate. Input that is not finite changes nothing.
-pub fn step(model: &BeamModel, state: &mut BeamState, input: &BeamInput) -> BeamOutput {
+pub fn step(model: &BeamModel, state: &mut BeamState, scratch: &mut BeamScratch, input: &BeamInput) -> BeamOutput {
+    let m = model.stations();
     let numbers = [input.hand_m, input.hand_slope, input.tip_force_n];
-    let m = model.across[0].size();
-    if !(input.tip_m.is_finite() && numbers.iter().flatten().all(|n| n.is_finite())) || state.known.len() != m {
+    let is_finite = input.tip_m.is_finite() && numbers.iter().flatten().all(|n| n.is_finite());
+    if !is_finite || scratch.factor.len() != m * m || model.bending_stiffness_n_m2 <= 0.0 {
         return BeamOutput {
             is_refused: true,
             ..BeamOutput::default()
         };
     }
-    let beam = Beam::new(model, input.tip_m);
-    let ds = model.spacing_m;
-    let now = ((input.tip_m / ds + 0.5).floor().max(0.0) as usize).min(m);
-    let mut output = BeamOutput::default();
+    let depth = (input.material_m / model.spacing_m + 0.5).floor();
+    let now = if depth > 0.0 { (depth as usize).min(m) } else { 0 };
+    let tied = now.min(state.in_contact as usize);
+    let mut needle = needle_of(model, input);
+    for n in 0..tied {
+        for k in 0..=n {
+            scratch.flexibility[n * tied + k] = needle.flexibility(needle.station_m(n), needle.station_m(k));
+        }
+    }
     for side in 0..2 {
-        enter(model, state, &beam, input, side, now);
-        balance(model, state, &beam, input, side, now);
-        let forces = &state.forces_n[side][..now];
-        let stations = forces.iter().enumerate().map(|(n, f)| ((n as f64 + 0.5) * ds, f));
-        let by_tissue: f64 = stations.clone().map(|(x, f)| beam.led(input.tip_m, x) * f).sum();
-        output.tip_m[side] = beam.alone(input.tip_m, input.tip_m, input, side) - by_tissue;
-        output.force_on_hand_n[side] = hand(&beam, input, side, stations);
+        state.forces_n[side][tied..].fill(0.0);
+        balance(model, state, scratch, &needle, side, tied);
     }
-    state.entered = state.entered.max(now);
-    state.in_contact = now;
-    output
+    lead(model, state, scratch, &mut needle, tied);
+    for side in 0..2 {
+        enter(model, state, &needle, side, now);
+    }
+    state.in_contact = now as u32;
+    answer(model, state, needle, now)
 }
 
-/// New stations are tied to the tissue where the needle goes through it now; the shaft has left the others.
-fn enter(model: &BeamModel, state: &mut BeamState, beam: &Beam, input: &BeamInput, side: usize, now: usize) {
-    let at = |n: usize| (n as f64 + 0.5) * model.spacing_m;
-    let forces = &mut state.forces_n[side];
-    forces[now..].fill(0.0);
-    for n in state.entered..now {
-        let moved: f64 = (0..n)
-            .map(|k| (beam.led(at(n), at(k)) + model.across[side].row(n)[k]) * forces[k])
-            .sum();
-        state.track_m[side][n] = beam.alone(at(n), input.tip_m, input, side) - moved;
-        forces[n] = 0.0;
+fn needle_of(model: &BeamModel, input: &BeamInput) -> BentNeedle {
+    // Tissue that follows the tip takes its stations along.
+    let along_m = if input.material_m.is_finite() {
+        input.tip_m - input.material_m
+    } else {
+        0.0
+    };
+    BentNeedle {
+        bending_stiffness_n_m2: model.bending_stiffness_n_m2,
+        length_m: model.length_m,
+        grip: model.grip,
+        tip_m: input.tip_m,
+        hand_m: input.hand_m,
+        hand_slope: input.hand_slope,
+        hole_m: model.template_m.unwrap_or(0.0),
+        hole_n: [0.0; 2],
+        tip_n: input.tip_force_n,
+        first_m: 0.5 * model.spacing_m + along_m,
+        spacing_m: model.spacing_m,
     }
 }
 
-/// Solves for the forces, by a Cholesky factor.
-fn balance(model: &BeamModel, state: &mut BeamState, beam: &Beam, input: &BeamInput, side: usize, now: usize) {
-    let at = |n: usize| (n as f64 + 0.5) * model.spacing_m;
-    let (factor, known) = (&mut state.factor, &mut state.known[..now]);
-    for row in 0..now {
-        let (above, this) = factor.split_at_mut(row * now);
+/// Solves for the forces of stations that the shaft was in before, by a Cholesky factor, as if there were no hole; and for what each newton of
+/// the hole adds to them.
+fn balance(
+    model: &BeamModel,
+    state: &mut BeamState,
+    scratch: &mut BeamScratch,
+    needle: &BentNeedle,
+    side: usize,
+    tied: usize,
+) {
+    let factor = &mut scratch.factor;
+    for row in 0..tied {
+        let (above, this) = factor.split_at_mut(row * tied);
         let this = &mut this[..=row];
-        for (column, slot) in this.iter_mut().enumerate() {
-            *slot = model.across[side].row(row)[column] + beam.led(at(row), at(column));
+        let (tissue, beam) = (model.across[side].row(row), &scratch.flexibility[row * tied..]);
+        for ((slot, w), a) in this.iter_mut().zip(tissue).zip(beam) {
+            *slot = w + a;
         }
         for column in 0..row {
-            let other = &above[column * now..column * now + column + 1];
-            let done = super::rows::dot(&this[..column], &other[..column]);
+            let other = &above[column * tied..column * tied + column + 1];
+            let done = dot(&this[..column], &other[..column]);
             // The diagonal holds inverses.
             this[column] = (this[column] - done) * other[column];
         }
-        let pivot = this[row] - super::rows::dot(&this[..row], &this[..row]);
+        let pivot = this[row] - dot(&this[..row], &this[..row]);
         this[row] = if pivot > 0.0 { 1.0 / pivot.sqrt() } else { 0.0 };
-        let wanted = beam.alone(at(row), input.tip_m, input, side) - state.track_m[side][row];
-        known[row] = (wanted - super::rows::dot(&this[..row], &known[..row])) * this[row];
     }
-    for row in (0..now).rev() {
-        let value = known[row] * factor[row * now + row];
-        known[row] = value;
-        for (left, a) in known[..row].iter_mut().zip(&factor[row * now..]) {
+    let by_whole_m = model.whole_m_per_n * needle.tip_n[side];
+    for n in 0..tied {
+        let at_m = needle.station_m(n);
+        state.forces_n[side][n] = needle.without_tissue_m(side, at_m) - state.track_m[side][n] + by_whole_m;
+        scratch.by_hole[side][n] = needle.flexibility(at_m, needle.hole_m);
+    }
+    solve(factor, tied, &mut state.forces_n[side]);
+    if leads(model, needle) {
+        solve(factor, tied, &mut scratch.by_hole[side]);
+    }
+}
+
+fn solve(factor: &[f64], size: usize, values: &mut [f64]) {
+    for row in 0..size {
+        let this = &factor[row * size..=row * size + row];
+        values[row] = (values[row] - dot(&this[..row], &values[..row])) * this[row];
+    }
+    for row in (0..size).rev() {
+        let value = values[row] * factor[row * size + row];
+        values[row] = value;
+        for (left, a) in values[..row].iter_mut().zip(&factor[row * size..]) {
             *left -= a * value;
         }
     }
-    state.forces_n[side][..now].copy_from_slice(known);
 }
 
-/// What the clamp at the hand takes: all forces on the needle less what the hole takes.
-fn hand<'a>(
-    beam: &Beam,
-    input: &BeamInput,
-    side: usize,
-    stations: impl Iterator<Item = (f64, &'a f64)> + Clone,
-) -> f64 {
-    let by_tissue: f64 = stations.clone().map(|(_, f)| -f).sum();
-    let hole = beam.hole_m.map(|t| {
-        let straight = input.hand_m[side] + input.hand_slope[side] * (t - beam.clamp_m);
-        let tissue: f64 = stations.map(|(x, f)| beam.free(t, x) * -f).sum();
-        -(straight + tissue + beam.free(t, input.tip_m) * input.tip_force_n[side]) / beam.free(t, t)
-    });
-    by_tissue + input.tip_force_n[side] + hole.unwrap_or(0.0)
+/// The template stands between hand and tip.
+fn leads(model: &BeamModel, needle: &BentNeedle) -> bool {
+    model
+        .template_m
+        .is_some_and(|hole_m| hole_m > needle.hand_along_m() + AT_TEMPLATE_M && hole_m < needle.tip_m)
+}
+
+/// Where the needle would lie beyond the play of the hole, the hole holds it at its rim, on the side that it lies on.
+fn lead(model: &BeamModel, state: &mut BeamState, scratch: &BeamScratch, needle: &mut BentNeedle, tied: usize) {
+    if !leads(model, needle) {
+        return;
+    }
+    let hole_m = needle.hole_m;
+    let lies_m = [0, 1].map(|side| needle.across_m(side, hole_m, &state.forces_n[side][..tied]));
+    let off_m = lies_m[0].hypot(lies_m[1]);
+    if off_m <= model.gap_m {
+        return;
+    }
+    for side in 0..2 {
+        let wanted_m = lies_m[side] * (model.gap_m / off_m);
+        let by_hole = &scratch.by_hole[side][..tied];
+        let of_tissue: f64 = by_hole
+            .iter()
+            .enumerate()
+            .map(|(n, f)| needle.flexibility(hole_m, needle.station_m(n)) * f)
+            .sum();
+        let own = needle.flexibility(hole_m, hole_m) - of_tissue;
+        if own <= 0.0 {
+            continue;
+        }
+        let force_n = (wanted_m - lies_m[side]) / own;
+        needle.hole_n[side] = force_n;
+        for (f, by) in state.forces_n[side].iter_mut().zip(by_hole) {
+            *f += force_n * by;
+        }
+    }
+}
+
+/// Displacement of the tissue at a station, across the line.
+fn displacement_m(model: &BeamModel, state: &BeamState, needle: &BentNeedle, side: usize, n: usize) -> f64 {
+    dot(model.across[side].row(n), &state.forces_n[side]) - model.whole_m_per_n * needle.tip_n[side]
+}
+
+/// New stations are tied to the tissue where the needle goes through it now: without a force.
+fn enter(model: &BeamModel, state: &mut BeamState, needle: &BentNeedle, side: usize, now: usize) {
+    for n in state.in_contact as usize..now {
+        let lies_m = needle.across_m(side, needle.station_m(n), &state.forces_n[side]);
+        state.track_m[side][n] = lies_m - displacement_m(model, state, needle, side, n);
+    }
+}
+
+fn answer(model: &BeamModel, state: &BeamState, needle: BentNeedle, now: usize) -> BeamOutput {
+    let mut output = BeamOutput {
+        needle,
+        ..BeamOutput::default()
+    };
+    let (hand_m, ei) = (needle.hand_along_m(), needle.bending_stiffness_n_m2);
+    for side in 0..2 {
+        let forces = &state.forces_n[side][..now];
+        let (hole_n, tip_n) = (needle.hole_n[side], needle.tip_n[side]);
+        output.tip_m[side] = needle.across_m(side, needle.tip_m, forces);
+        output.displacement_m[side] = match now {
+            0 => -model.whole_m_per_n * tip_n,
+            _ => displacement_m(model, state, &needle, side, now - 1),
+        };
+        // Of tissue and hole on the needle: sum, moment about the hand, and what the bevel's force turns by bending.
+        let on_needle = forces.iter().enumerate().map(|(n, f)| (needle.station_m(n), -f));
+        let (mut sum_n, mut moment_nm, mut turned) = (0.0, 0.0, 0.0);
+        for (at_m, force_n) in on_needle.chain([(needle.hole_m, hole_n)]) {
+            let x = (at_m - hand_m).max(0.0);
+            sum_n += force_n;
+            moment_nm += force_n * x;
+            turned += force_n * x * (2.0 * needle.length_m - x) / (2.0 * ei);
+            output.moment_nm[side] += force_n * (at_m - needle.tip_m);
+        }
+        output.force_on_hand_n[side] = sum_n + tip_n;
+        let slope = needle.hand_slope[side] + needle.grip[1] * (moment_nm + tip_n * needle.length_m);
+        output.axial_n -= 0.5 * moment_nm * moment_nm / ei + slope * sum_n + tip_n * turned;
+        output.stored_j += stored_j(model, state, &needle, side, now, output.tip_m[side]);
+    }
+    output
+}
+
+fn stored_j(model: &BeamModel, state: &BeamState, needle: &BentNeedle, side: usize, now: usize, tip_m: f64) -> f64 {
+    let forces = &state.forces_n[side][..now];
+    let bent = |at_m: f64| needle.across_m(side, at_m, forces) - needle.straight_m(side, at_m);
+    let each = |(n, f): (usize, &f64)| f * (needle.straight_m(side, needle.station_m(n)) - state.track_m[side][n]);
+    let in_tissue: f64 = forces.iter().enumerate().map(each).sum();
+    let (tip_n, sum_n) = (needle.tip_n[side], forces.iter().sum::<f64>());
+    let by_whole = model.whole_m_per_n * tip_n * (sum_n - tip_n);
+    let by_hole = match needle.hole_n[side] {
+        0.0 => 0.0,
+        hole_n => hole_n * bent(needle.hole_m),
+    };
+    0.5 * (in_tissue - by_whole + by_hole + tip_n * (tip_m - needle.straight_m(side, needle.tip_m)))
 }
 
 #[cfg(test)]

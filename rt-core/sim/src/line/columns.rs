@@ -17,7 +17,7 @@ pub enum Load {
     Shaft(usize),
     /// Along the line, on the tip's patch at a station.
     Tip(usize),
-    /// Across the line (0 or 1), on the shaft of a station.
+    /// Across the line (0 or 1), on the shaft of a station across.
     Across(usize, usize),
 }
 
@@ -58,9 +58,10 @@ pub struct ColumnQueue<T = f32> {
     columns: Vec<Column>,
     /// Loads in order of the columns.
     loads: Vec<Vec<NodeWeight>>,
-    /// What columns are sampled with: `2 m` along the line, then m along each direction across.
+    /// What columns are sampled with: `2 m` along the line, then those across it along each direction.
     ready: usize,
     stations: usize,
+    across: usize,
     state: BatchState<T>,
     /// An answer on its way into a column.
     unpacked: ElementField,
@@ -73,18 +74,24 @@ impl<T: Compiled> ColumnQueue<T> {
     pub fn new(model: &BatchModel<T>, stations: &Stations, is_flexible: bool, tolerance: f64) -> Self {
         let m = stations.count();
         let mut wanted: Vec<Load> = (0..m).map(Load::Shaft).chain((0..m).map(Load::Tip)).collect();
-        if is_flexible {
-            wanted.extend((0..2 * m).map(|n| Load::Across(n / m, n % m)));
-        }
+        let across = if is_flexible { stations.across_count() } else { 0 };
+        wanted.extend((0..2 * across).map(|n| Load::Across(n / across, n % across)));
         let weights = |load: &Load| match *load {
             Load::Shaft(n) => stations.load(&stations.shaft[n], 0),
             Load::Tip(n) => stations.load(&stations.tip[n], 0),
-            Load::Across(side, n) => stations.load(&stations.shaft[n], 1 + side),
+            Load::Across(side, n) => stations.load(&stations.across_weights(n), 1 + side),
         };
         let column = |&load: &Load| Column {
             load,
             field: PackedField::zeros(model.element_count()),
-            samples_m: vec![0.0; if matches!(load, Load::Across(..)) { m } else { 2 * m }],
+            samples_m: vec![
+                0.0;
+                if matches!(load, Load::Across(..)) {
+                    across
+                } else {
+                    2 * m
+                }
+            ],
             foundation_n: [0.0; 3],
             residual: f64::INFINITY,
         };
@@ -93,6 +100,7 @@ impl<T: Compiled> ColumnQueue<T> {
             columns: wanted.iter().map(column).collect(),
             ready: 0,
             stations: m,
+            across,
             state: BatchState::new(model),
             unpacked: ElementField::zeros(model.element_count()),
             is_begun: false,
@@ -161,10 +169,10 @@ impl<T: Compiled> ColumnQueue<T> {
 
     fn keep(&mut self, model: &BatchModel<T>, residual: f64) {
         let end = self.columns.len().min(self.ready + LOADS);
-        let m = self.stations;
+        let (m, across) = (self.stations, self.across);
         for (lane, column) in self.columns[self.ready..end].iter_mut().enumerate() {
             let sampled = match column.load {
-                Load::Across(side, _) => &self.loads[(2 + side) * m..(3 + side) * m],
+                Load::Across(side, _) => &self.loads[2 * m + side * across..2 * m + (side + 1) * across],
                 _ => &self.loads[..2 * m],
             };
             for (value, weights) in column.samples_m.iter_mut().zip(sampled) {

@@ -23,7 +23,9 @@ pub struct Compliance {
     pub needle_m_per_n: f64,
     /// m/N, 2m x 2m; with the needle's own.
     pub(super) rows: Rows,
-    /// The same along the two directions across, m x m each; empty where they were not solved for.
+    /// Distance of stations across, m.
+    pub across_spacing_m: f64,
+    /// Of the stations across, along the two directions, m/N; empty where they were not solved for.
     pub across: [Rows; 2],
     /// Force of the foundation on the body along the line for each newton on it, for each row.
     pub foundation: Vec<f64>,
@@ -45,14 +47,16 @@ impl Compliance {
         let direction = stations.line.axes[0];
         let foundation = |c: &Column| (0..3).map(|a| c.foundation_n[a] * direction[a]).sum();
         let mut sides = [Rows::default(), Rows::default()];
-        for (side, columns) in sides.iter_mut().zip(across.chunks_exact(m.max(1))) {
+        let count = stations.across_count();
+        for (side, columns) in sides.iter_mut().zip(across.chunks_exact(count.max(1))) {
             *side = symmetric(columns);
             // The mean over all directions across is in effect that along, times (3 - 4 nu) / (4 (1 - nu)); see `physics.md`.
-            for (n, missing) in stations.missing_m_per_n.iter().enumerate() {
-                let middle_m = (n as f64 + 0.5) * stations.settings.spacing_m;
+            for n in 0..columns.len() {
+                let middle_m = (n as f64 + 0.5) * stations.group() as f64 * stations.settings.spacing_m;
                 let nu = model
                     .material(stations.line.point_m(middle_m, [0.0; 2]))
                     .map_or(0.49, |m| m[1]);
+                let missing = stations.across_missing_m_per_n(n);
                 side.row_mut(n)[n] += missing * (3.0 - 4.0 * nu) / (4.0 * (1.0 - nu));
             }
         }
@@ -62,6 +66,7 @@ impl Compliance {
             tip_length_m: stations.patch_edge_m(model.spacing_m()),
             whole_m_per_n: model.whole_m_per_n(),
             needle_m_per_n: 0.0,
+            across_spacing_m: stations.group() as f64 * stations.settings.spacing_m,
             rows,
             across: sides,
             foundation: axial.iter().map(foundation).collect(),
@@ -93,6 +98,7 @@ impl Compliance {
             tip_length_m,
             whole_m_per_n: 0.0,
             needle_m_per_n: 0.0,
+            across_spacing_m: spacing_m,
             rows: Rows::new(2 * stations, entry),
             across: [Rows::default(), Rows::default()],
             foundation: vec![-1.0; 2 * stations],

@@ -22,6 +22,7 @@
 //! assert!((output.force_on_hand_n + 0.2).abs() < 1e-9, "{output:?}");
 //! ```
 
+mod across;
 pub mod beam;
 mod columns;
 mod compliance;
@@ -39,7 +40,7 @@ pub use compliance::Compliance;
 pub use contact::{LineInput, step};
 pub use model::{LineLayer, LineModel, LineProblem, LineSettings, MAX_LAYERS, MAX_STATIONS};
 pub use prony::PronyTerm;
-pub use ready::{BodyAnswer, BodyLine, HandLine, LayerForces, LineError, LineSource, ReadyLine};
+pub use ready::{BodyAnswer, BodyLine, HandLine, LayerForces, LineError, LineSource, NeedleBending, ReadyLine};
 pub use rows::Rows;
 pub use state::{LineOutput, LineState, TipState};
 pub use stations::{Line, StationSettings, Stations};

@@ -15,9 +15,12 @@ use crate::tissue::fem::batch::BatchModel;
 use crate::tissue::{BodyShift, PackedField};
 use nalgebra::Vector3;
 
+mod bend;
 mod source;
 mod way;
 
+use bend::Bending;
+pub use bend::NeedleBending;
 pub use source::LineSource;
 use way::{Way, layer};
 
@@ -50,6 +53,8 @@ pub struct HandLine {
     way: Way,
     model: LineModel,
     state: LineState,
+    /// Where the body was solved for forces across the line as well.
+    bending: Option<Box<Bending>>,
 }
 
 /// What the tissue loop needs: the body's answer to a newton at each station.
@@ -59,7 +64,9 @@ pub struct BodyLine {
     pub generation: u64,
     /// Where the line is at rest.
     pub line: Line,
-    /// For each newton: shaft of each station, then tip at each.
+    /// How far a newton moves the body as a whole on its foundation, m; 0 where something holds it.
+    pub whole_m_per_n: f64,
+    /// For each newton: shaft of each station, then tip at each, then stations across along each direction.
     pub answer: BodyAnswer,
 }
 
@@ -108,6 +115,8 @@ pub struct LayerForces {
     pub shaft_gain: f64,
     /// How all of the tissue goes on giving way.
     pub creep: [PronyTerm; 2],
+    /// How the needle bends.
+    pub bending: NeedleBending,
 }
 
 impl Default for LayerForces {
@@ -118,6 +127,7 @@ impl Default for LayerForces {
             cutting_gain: 1.0,
             shaft_gain: 1.0,
             creep: [PronyTerm::default(); 2],
+            bending: NeedleBending::default(),
         }
     }
 }
@@ -146,6 +156,7 @@ impl ReadyLine {
         lattice: &Lattice,
         layer_of: &dyn Fn(u32) -> Option<LayerKind>,
         line: Line,
+        bends: bool,
         report: &mut dyn FnMut(QueueProgress) -> bool,
     ) -> Result<ReadyLine, LineError> {
         let settings = StationSettings::of_lattice(body.spacing_m());
@@ -157,7 +168,7 @@ impl ReadyLine {
         if stations.count() == 0 {
             return Err(LineError::NoTissue);
         }
-        let mut queue = ColumnQueue::new(body, &stations, false, TOLERANCE);
+        let mut queue = ColumnQueue::new(body, &stations, bends, TOLERANCE);
         while !queue.prepare(body, SLICES).is_done() {
             if !report(queue.progress()) {
                 return Err(LineError::Stopped);
@@ -165,11 +176,13 @@ impl ReadyLine {
         }
         let compliance = Compliance::of_columns(body, &stations, queue.columns()).ok_or(LineError::NoTissue)?;
         let compliance = compliance.behind_needle(STIFFEST_N_PER_M);
+        let whole_m_per_n = compliance.whole_m_per_n;
         Ok(ReadyLine {
             hand: Box::new(HandLine::new(generation, line, way, compliance)?),
             body: Box::new(BodyLine {
                 generation,
                 line,
+                whole_m_per_n,
                 answer: BodyAnswer::Columns(queue.into_fields()),
             }),
         })
@@ -179,6 +192,7 @@ impl ReadyLine {
 impl HandLine {
     fn new(generation: u64, line: Line, way: Way, compliance: Compliance) -> Result<Self, LineError> {
         let layers = way.layers(&LayerForces::default());
+        let bending = Bending::new(&compliance);
         let model = LineModel::new(compliance, &layers, LineSettings::default()).map_err(|problems| {
             let lines: Vec<_> = problems.iter().map(ToString::to_string).collect();
             LineError::Unusable(lines.join("\n"))
@@ -189,6 +203,7 @@ impl HandLine {
             way,
             state: LineState::new(&model),
             model,
+            bending,
         })
     }
 
@@ -197,11 +212,14 @@ impl HandLine {
         &self.line
     }
 
-    /// Takes up the layers' forces and how the tissue creeps; does not allocate.
+    /// Takes up the layers' forces, how the tissue creeps and how the needle bends; does not allocate.
     pub fn set_forces(&mut self, forces: &LayerForces) {
         let kinds = &self.way.kinds;
         self.model.set_layers(|n| kinds.get(n).map(|kind| layer(forces, kind)));
         self.model.set_prony(forces.creep);
+        if let Some(bending) = &mut self.bending {
+            bending.take(&forces.bending);
+        }
     }
 
     /// Whether a needle held like this goes in on this line.

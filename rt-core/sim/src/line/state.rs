@@ -1,5 +1,6 @@
 //! What a line remembers from tick to tick, and what one tick gives.
 
+use super::beam::BeamState;
 use super::model::LineModel;
 use super::prony::Memory;
 use super::rows::dot;
@@ -78,6 +79,8 @@ pub struct LineState {
     /// How much of the tip's force goes to the body as a whole, by the membrane that holds it, N.
     pub(super) whole_n: f64,
     pub(super) memory: Memory,
+    /// Forces and track across the line, of a needle that bends.
+    pub(super) beam: BeamState,
     pub(super) loads_n: Vec<f64>,
     pub(super) last: LineOutput,
 }
@@ -109,6 +112,7 @@ impl LineState {
             membrane_n_per_m: 0.0,
             whole_n: 0.0,
             memory: Memory::new(2 * stations),
+            beam: BeamState::default(),
             loads_n: vec![value; 2 * stations],
             last: LineOutput::default(),
         }
@@ -174,7 +178,9 @@ impl LineState {
             let at_once = |(n, f): (usize, &f64)| f * (self.u_m[n] - self.memory.offset_m[n]);
             let shaft_j: f64 = self.shaft_n.iter().enumerate().take(self.in_contact).map(at_once).sum();
             let places = self.tip_range.clone().zip(self.tip_weights);
-            let past_m: f64 = places.map(|(n, w)| w * self.memory.offset_m[self.shaft_n.len() + n]).sum();
+            let past_m: f64 = places
+                .map(|(n, w)| w * self.memory.offset_m[self.shaft_n.len() + n])
+                .sum();
             let tip_j = self.tip.force_n * (self.tip_u_m - self.tip_offset_m - past_m);
             return 0.5 * (shaft_j + tip_j) / self.memory.gain + self.memory.held_j;
         }
@@ -204,6 +210,7 @@ impl LineState {
         self.tip_own = 0.0;
         (self.tip_offset_m, self.membrane_n_per_m, self.whole_n) = (0.0, 0.0, 0.0);
         self.memory.reset();
+        self.beam = BeamState::default();
         self.last = LineOutput::default();
     }
 

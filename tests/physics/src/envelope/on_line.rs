@@ -53,14 +53,14 @@ impl Theatre {
         let body = LineBody::of_source(source, tissue)
             .expect("can be solved")
             .expect("has lines");
-        let line = body.prepare(1, start.into(), [0.0, 0.0, 1.0], &mut || true);
+        let line = body.prepare(1, start.into(), [0.0, 0.0, 1.0], false, &mut || true);
         let mut line = line.expect("through the gland");
         if tissue == TissueKind::Fem {
             // What the hand feels is of full resolution; the body that is drawn does not matter here.
             let light = LineBody::of_source(source, TissueKind::ChainMail).expect("can be solved");
             let light = light
                 .expect("has lines")
-                .prepare(1, start.into(), [0.0, 0.0, 1.0], &mut || true);
+                .prepare(1, start.into(), [0.0, 0.0, 1.0], false, &mut || true);
             line.body.answer = light.expect("through the gland").body.answer;
         }
         Self {

@@ -1,10 +1,11 @@
 //! The needle on a prepared line: taking lines up, one tick on one, and the forces that the tissue loop hears of.
 
 use super::HapticLoop;
-use crate::rt::line_loads::LineLoads;
+use crate::rt::line_loads::{BentTip, LineLoads};
 use crate::rt::response::TissueResponse;
 use stylet_hw::Sample;
 use stylet_sim::force::chain::{ChainOutput, step_on_line};
+use stylet_sim::line::beam::BeamOutput;
 
 /// A needle is taken for one outside up to so far behind the entry: plans name entries on the surface, which is one of cells.
 const BEGINS_WITHIN_M: f64 = 1e-3;
@@ -63,8 +64,15 @@ impl HapticLoop {
         loads.tip_material_m = state.tip().material_m;
         loads.tip_displacement_m = line.tip_displacement_m();
         loads.whole_m = line.whole_m();
+        loads.bent = output.bent.as_ref().map(bent_tip);
+        let across = match output.bent {
+            Some(_) => [line.across_loads_n(0), line.across_loads_n(1)],
+            None => [&[][..]; 2],
+        };
+        loads.across = across[0].len();
+        let wanted = state.loads_n().iter().chain(across[0]).chain(across[1]);
         loads.count = 0;
-        for (slot, load) in loads.loads_n.iter_mut().zip(state.loads_n()) {
+        for (slot, load) in loads.loads_n.iter_mut().zip(wanted) {
             *slot = *load;
             loads.count += 1;
         }
@@ -79,5 +87,13 @@ impl HapticLoop {
             *self.ports.loads.input_buffer_mut() = LineLoads::default();
             self.ports.loads.publish();
         }
+    }
+}
+
+fn bent_tip(bent: &BeamOutput) -> BentTip {
+    BentTip {
+        needle: bent.needle,
+        across_m: bent.tip_m,
+        displacement_m: bent.displacement_m,
     }
 }

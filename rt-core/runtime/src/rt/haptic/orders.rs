@@ -73,6 +73,8 @@ impl HapticLoop {
         self.state.worst_work_ns = 0;
         self.state.worst_residual = 0.0;
         self.state.worst_tissue_work_ns = 0;
+        self.state.worst_lag_ns = 0;
+        self.state.worst_lag_m = 0.0;
         self.notify(Notice::Done { ticket, tick });
     }
 }

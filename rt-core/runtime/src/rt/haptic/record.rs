@@ -26,7 +26,7 @@ impl HapticLoop {
             | bit(response.phase != Phase::Outside, flags::IN_CONTACT)
             | bit(self.chain.needle.punctured, flags::PUNCTURED)
             | bit(at_goal, flags::AT_GOAL)
-            | bit(self.on_line, flags::LINE_READY)
+            | bit(self.on_line && !self.lacks_beam(), flags::LINE_READY)
     }
 
     pub(super) fn record(
@@ -48,6 +48,8 @@ impl HapticLoop {
             now_flags |= flags::GATE_ACTED;
         }
         let wake_latency_ns = woke_ns.saturating_sub(due_ns);
+        let tip_deflection_m = self.tip_deflection_m(response);
+        let (lag_ns, lag_m) = self.lag(woke_ns, tissue, response.phase);
         let s = &mut self.state;
         s.tick += 1;
         s.time_ns = woke_ns;
@@ -79,6 +81,10 @@ impl HapticLoop {
         s.gate_counts = gate_counts;
         s.energy_j = energy_j;
         s.warmth_n = warmth_n;
+        s.tip_deflection_m = tip_deflection_m;
+        (s.lag_ns, s.lag_m) = (lag_ns, lag_m);
+        s.worst_lag_ns = s.worst_lag_ns.max(lag_ns);
+        s.worst_lag_m = s.worst_lag_m.max(lag_m);
         s.tissue_force_n = along(&t.tissue_n);
         s.phase = response.phase.code();
         s.fault = self.watchdog.fault() as u32;
@@ -106,6 +112,7 @@ impl HapticLoop {
             world_from_tool: self
                 .sample
                 .map_or([0.0; 4], |sample| sample.world_from_tool.coords.into()),
+            tip_deflection_m,
             buttons: self.sample.map_or(0, |sample| sample.buttons),
             reserved: 0,
         };

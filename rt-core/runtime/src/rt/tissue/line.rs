@@ -3,7 +3,7 @@
 
 use super::TissueLoop;
 use crate::rt::exchange::Notice;
-use crate::rt::line_loads::LineLoads;
+use crate::rt::line_loads::{BentTip, LineLoads};
 use nalgebra::Vector3;
 use stylet_sim::line::{BodyAnswer, BodyLine, Line};
 use stylet_sim::tissue::{BodyShift, Carry, Held, MaterialPoint, StepReport};
@@ -42,7 +42,10 @@ impl TissueLoop {
         self.loads = loads;
         let line = self.line.as_ref().filter(|line| line.generation == loads.generation)?;
         let axis = line.line;
-        let whole_m = axis.axes[0].map(|c| c * loads.whole_m);
+        let mut whole_m = axis.axes[0].map(|c| c * loads.whole_m);
+        if let Some(bent) = loads.bent {
+            add_bevel(&mut whole_m, &axis, &bent, line.whole_m_per_n);
+        }
         let report = match &line.answer {
             BodyAnswer::Columns(columns) => self.world.tissue.displace(columns, loads.loads_n(), whole_m)?,
             BodyAnswer::Shifts(shifts) => {
@@ -76,11 +79,20 @@ impl TissueLoop {
             return None;
         }
         let body = &self.world.scene.body;
-        let element = MaterialPoint::at_rest(body, axis.point_m(along_m.max(0.0), [0.0; 2]))?.element;
+        let (across_m, moved_m) = loads
+            .bent
+            .map_or(([0.0; 2], [0.0; 2]), |bent| (bent.material_m(), bent.displacement_m));
+        let element = MaterialPoint::at_rest(body, axis.point_m(along_m.max(0.0), across_m))?.element;
         let rest_m = body.rest_m(element);
+        let mut position_m = [0, 1, 2].map(|a| rest_m[a] + loads.tip_displacement_m * axis.axes[0][a]);
+        for (side, moved_m) in moved_m.into_iter().enumerate().filter(|(_, m)| *m != 0.0) {
+            for (place, direction) in position_m.iter_mut().zip(axis.axes[1 + side]) {
+                *place += moved_m * direction;
+            }
+        }
         Some(Held {
             element,
-            position_m: [0, 1, 2].map(|a| rest_m[a] + loads.tip_displacement_m * axis.axes[0][a]),
+            position_m,
             patch_m: self.world.scene.tissue().tip_patch_m(),
         })
     }
@@ -118,12 +130,28 @@ impl TissueLoop {
         if !loads.in_tissue {
             return None;
         }
+        let across_m = |behind_m: f64| {
+            let (here, there) = (loads.deflection_m(0.0), loads.deflection_m(behind_m));
+            loads.bent.map_or([0.0; 2], |bent| {
+                let tip_m = bent.material_m();
+                [0, 1].map(|side| tip_m[side] + there[side] - here[side])
+            })
+        };
         let at = |along_m: f64| {
-            let place_m = line.line.point_m(along_m, [0.0; 2]);
+            let place_m = line.line.point_m(along_m, across_m(tip_m - along_m));
             (along_m > 0.0)
                 .then(|| MaterialPoint::at_rest(&self.world.scene.body, place_m))
                 .flatten()
         };
         Some([at(tip_m), at(tip_m - behind_m)])
+    }
+}
+
+/// The body as a whole takes what the bevel pushes it back with.
+fn add_bevel(whole_m: &mut [f64; 3], axis: &Line, bent: &BentTip, whole_m_per_n: f64) {
+    for (side, tip_n) in bent.needle.tip_n.into_iter().enumerate() {
+        for (sum, direction) in whole_m.iter_mut().zip(axis.axes[1 + side]) {
+            *sum -= whole_m_per_n * tip_n * direction;
+        }
     }
 }

@@ -14,7 +14,7 @@ const PARALLEL: f64 = 0.996;
 
 impl TissueLoop {
     pub(super) fn drop_seed(&mut self, ticket: Ticket, strand_pitch_m: Option<f64>) {
-        let tip_m = self.pose.tip_in_scene;
+        let tip_m = self.pose.tip_in_scene + self.deflection();
         let hint = self.held.map(|h| h.element);
         let on_line = self.material_on_line(SEED_LENGTH_M);
         let found = on_line.map_or_else(|| self.locate(&tip_m, hint), |[tip, _]| tip);
@@ -55,11 +55,21 @@ impl TissueLoop {
         self.notify(notice);
     }
 
+    /// Tip of the needle less where a rigid one has it.
+    fn deflection(&self) -> Vector3<f64> {
+        let Some(line) = self.line.as_ref().filter(|_| self.loads.bent.is_some()) else {
+            return Vector3::zeros();
+        };
+        let [_, first, second] = line.line.axes.map(Vector3::from);
+        let off_m = self.loads.deflection_m(0.0);
+        first * off_m[0] + second * off_m[1]
+    }
+
     /// Whether the tip is where the next seed of the last one's strand leaves the needle, within half a pitch.
     fn is_behind_the_last(&self, pitch_m: f64) -> bool {
         let direction = self.pose.direction;
         self.seeds.last().is_some_and(|last| {
-            let back_m = Vector3::from(last.dropped_at_m) - self.pose.tip_in_scene;
+            let back_m = Vector3::from(last.dropped_at_m) - self.pose.tip_in_scene - self.deflection();
             let along_m = back_m.dot(&direction);
             let is_on_needle = (back_m - direction * along_m).norm() < ON_NEEDLE_M;
             let is_parallel = Vector3::from(last.axis).dot(&direction) > PARALLEL;

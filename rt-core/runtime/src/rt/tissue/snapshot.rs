@@ -4,7 +4,7 @@ use super::TissueLoop;
 use crate::rt::clock;
 use crate::rt::exchange::{SnapshotReturn, SnapshotSlot};
 use crate::rt::seed;
-use stylet_shm_schema::{MAX_SEEDS, SnapshotHeader, Vertex};
+use stylet_shm_schema::{MAX_BEND_POINTS, MAX_SEEDS, SnapshotHeader, Vertex};
 use stylet_sim::tissue::StepReport;
 
 /// Ticks from one snapshot to the next while the needle moves: 67 Hz, above the rate of most screens. What moves by itself,
@@ -98,12 +98,28 @@ impl TissueLoop {
             phase: self.pose.phase.code(),
             vertex_count: slot.vertex_count as u32,
             node_count: slot.node_count as u32,
-            reserved: 0,
+            bend_count: 0,
+            bend_spacing_m: 0.0,
+            bend_m: [[0.0; 3]; MAX_BEND_POINTS],
             seed_count: self.seeds.len() as u32,
             seeds: [bytemuck::Zeroable::zeroed(); MAX_SEEDS],
         };
+        self.fill_bend(header);
         for (slot, pose) in header.seeds.iter_mut().zip(seed::poses(&self.seeds, body)) {
             *slot = pose;
+        }
+    }
+
+    /// Places along a needle that bends.
+    fn fill_bend(&self, header: &mut SnapshotHeader) {
+        let (Some(bent), Some(line)) = (self.loads.bent, &self.line) else {
+            return;
+        };
+        header.bend_count = MAX_BEND_POINTS as u32;
+        header.bend_spacing_m = bent.needle.length_m / (MAX_BEND_POINTS - 1) as f64;
+        for (n, bend_m) in header.bend_m.iter_mut().enumerate() {
+            let off_m = self.loads.deflection_m(n as f64 * header.bend_spacing_m);
+            *bend_m = [0, 1, 2].map(|a| off_m[0] * line.line.axes[1][a] + off_m[1] * line.line.axes[2][a]);
         }
     }
 }

@@ -4,6 +4,7 @@
 
 use super::{ChainOutput, ChainParameters, ChainState, guard};
 use crate::force::law::{self, ForceInput, ForceTerms};
+use crate::line::beam::BeamOutput;
 use crate::line::{HandLine, LayerForces, LineOutput};
 use crate::needle::{LayerKind, Phase};
 use nalgebra::Vector3;
@@ -18,6 +19,7 @@ impl ChainParameters {
             cutting_gain: self.force.cutting_gain,
             shaft_gain: self.force.shaft_gain,
             creep: self.force.creep,
+            bending: self.force.bending,
         }
     }
 }
@@ -70,8 +72,13 @@ pub fn step_on_line(
         tissue_n: None,
     };
     let (bone_n, bone_j) = line.bone(along_m);
+    let bent = line.bend(&tip, &sample.world_from_tool, &answer);
     let tissue_j = line.state().elastic_j() + bone_j;
-    let terms = terms(parameters, &input, &axis, &answer, bone_n, tissue_j);
+    let mut terms = terms(parameters, &input, &axis, &answer, bone_n, tissue_j);
+    if let Some(bent) = bent.as_ref().filter(|_| phase != Phase::Outside) {
+        bend(&mut terms, bent, &axis, line.across());
+        terms.stored_j = tissue_j + bent.stored_j;
+    }
     let wrench = guard(parameters, device, state, &terms, moved_m, velocity_m_per_s, dt_s);
     state.tip_in_world = Some(tip);
     ChainOutput {
@@ -84,7 +91,18 @@ pub fn step_on_line(
         puncture: answer.punctured.is_some(),
         left: was_in && !is_in,
         wrench,
+        bent,
     }
+}
+
+/// The beam holds the needle to its path in place of the guide.
+fn bend(terms: &mut ForceTerms, bent: &BeamOutput, axis: &Vector3<f64>, across: [Vector3<f64>; 2]) {
+    let [first, second] = across;
+    let force_n = first * bent.force_on_hand_n[0] + second * bent.force_on_hand_n[1] + axis * bent.axial_n;
+    let lever_nm = first * bent.moment_nm[0] + second * bent.moment_nm[1];
+    terms.total_n += force_n - terms.guide_n;
+    terms.guide_n = force_n;
+    terms.torque_nm = axis.cross(&lever_nm);
 }
 
 fn phase(is_in: bool, answer: &LineOutput, speed_along_m_per_s: f64, hold_speed_m_per_s: f64) -> Phase {

@@ -10,6 +10,7 @@ use crate::force::gate::GateState;
 use crate::force::law::{ForceState, ForceTerms};
 use crate::force::parameters::ForceParameters;
 use crate::force::velocity::VelocityEstimator;
+use crate::line::beam::BeamOutput;
 use crate::needle::{LayerKind, NeedleParameters, NeedlePath, NeedleState, Phase};
 
 /// Settings; changed as a whole at a tick.
@@ -82,6 +83,8 @@ pub struct ChainOutput {
     pub left: bool,
     /// What goes to the device.
     pub wrench: Wrench,
+    /// The bent needle, where it bends and is on a line.
+    pub bent: Option<BeamOutput>,
 }
 
 impl ChainState {

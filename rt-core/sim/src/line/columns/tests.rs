@@ -63,7 +63,7 @@ fn slices_give_what_all_at_once_gives() {
         calls += 1;
         assert!(calls < 10_000);
     }
-    assert_eq!(all.columns().len(), 4 * stations.count());
+    assert_eq!(all.columns().len(), 2 * (stations.count() + stations.across_count()));
     for (a, b) in all.columns().iter().zip(sliced.columns()) {
         assert!(a.residual <= TOLERANCE);
         assert_eq!((a.load, &a.samples_m, &a.field), (b.load, &b.samples_m, &b.field));

@@ -2,7 +2,8 @@
 
 use super::way::Way;
 use super::{HandLine, LineError, STIFFEST_N_PER_M};
-use crate::line::{Compliance, Line, LineState, MAX_STATIONS};
+use crate::line::beam::MAX_ACROSS;
+use crate::line::{Compliance, Line, LineState, MAX_STATIONS, Rows};
 use crate::needle::LayerKind;
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +20,11 @@ pub struct LineSource {
 }
 
 impl LineSource {
+    /// The body was solved for forces across the line as well.
+    pub fn bends(&self) -> bool {
+        self.compliance.across[0].size() > 0
+    }
+
     /// Stations of the line.
     pub fn stations(&self) -> usize {
         self.compliance.stations
@@ -43,11 +49,20 @@ impl LineSource {
         let bone = |s: &LineSource| s.way.bone_m.map(f64::to_bits);
         let sizes = |s: &LineSource| bits(&[s.compliance.spacing_m, s.compliance.tip_length_m]);
         let row = |s: &LineSource, n| bits(s.compliance.rows.row(n));
+        let across = |s: &LineSource| {
+            let each = s.compliance.across.iter();
+            let rows = |rows: &Rows| (0..rows.size()).map(|n| bits(rows.row(n))).collect::<Vec<_>>();
+            (
+                s.compliance.across_spacing_m.to_bits(),
+                each.map(rows).collect::<Vec<_>>(),
+            )
+        };
         self.stations() == other.stations()
             && place(self) == place(other)
             && kinds(self) == kinds(other)
             && bone(self) == bone(other)
             && sizes(self) == sizes(other)
+            && across(self) == across(other)
             && (0..2 * self.stations()).all(|n| row(self, n) == row(other, n))
     }
 }
@@ -98,7 +113,12 @@ impl HandLine {
             way,
             compliance,
         } = source;
-        if compliance.stations > MAX_STATIONS || !compliance.rows.is_whole(2 * compliance.stations) {
+        let [first, second] = &compliance.across;
+        let across = first.size();
+        let is_whole = compliance.rows.is_whole(2 * compliance.stations)
+            && (across == 0
+                || (first.is_whole(across) && second.is_whole(across) && compliance.across_spacing_m > 0.0));
+        if compliance.stations > MAX_STATIONS || across > MAX_ACROSS || !is_whole {
             return Err(LineError::Unusable("its compliance is not whole".to_owned()));
         }
         Self::new(generation, line, way, compliance)

@@ -33,9 +33,15 @@ fn ready(scene: &Scene, body: &BatchModel<f32>) -> ReadyLine {
     let (low, high) = scene.lattice.bounds_m();
     let start_m = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2] - 0.01];
     let line = Line::into_body(&scene.lattice, start_m, [0.0, 0.0, 1.0]).unwrap();
-    ReadyLine::prepare(1, body, &scene.lattice, &|_| Some(LayerKind::Gland), line, &mut |_| {
-        true
-    })
+    ReadyLine::prepare(
+        1,
+        body,
+        &scene.lattice,
+        &|_| Some(LayerKind::Gland),
+        line,
+        false,
+        &mut |_| true,
+    )
     .unwrap()
 }
 
@@ -250,6 +256,7 @@ fn a_coarser_pelvis_beside_one_of_all_cells() {
         &coarse.lattice,
         &|_| Some(LayerKind::Gland),
         line,
+        false,
         &mut |_| true,
     )
     .unwrap();
@@ -300,6 +307,7 @@ fn a_line_that_is_prepared_twice_is_the_same_in_every_bit() {
         &first.0.lattice,
         &|_| Some(LayerKind::Gland),
         other,
+        false,
         &mut |_| true,
     )
     .unwrap();

@@ -45,6 +45,7 @@ impl LineState {
             membrane_n_per_m,
             whole_n,
             memory,
+            beam,
             loads_n,
             last,
         } = from;
@@ -62,6 +63,7 @@ impl LineState {
         self.membrane_n_per_m = *membrane_n_per_m;
         self.whole_n = *whole_n;
         self.memory.copy_from(memory);
+        self.beam = *beam;
         self.loads_n.clone_from(loads_n);
         self.last = *last;
     }
@@ -74,6 +76,7 @@ impl LineState {
         each.iter().all(|v| v.len() == m)
             && self.loads_n.len() == 2 * m
             && self.memory.fits(2 * m)
+            && self.beam.is_whole()
             && self.in_contact <= m
             && tip.start <= tip.end
             && tip.end <= m

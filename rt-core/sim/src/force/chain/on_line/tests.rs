@@ -80,7 +80,11 @@ fn relaxed(slipped_s: f64, held_s: f64) -> f64 {
 
 #[test]
 fn a_needle_held_at_depth_relaxes_as_the_chain_of_its_stations_says() {
-    let limit_n = ForceParameters::default().layers.of(LayerKind::Gland).shaft_friction_n_per_m * SPACING_M;
+    let limit_n = ForceParameters::default()
+        .layers
+        .of(LayerKind::Gland)
+        .shaft_friction_n_per_m
+        * SPACING_M;
     let held = insert_and_hold(CREEP);
     let scale = ForceParameters::default().gate.force_scale;
     let count = (DEPTH_M / SPACING_M) as usize;
@@ -92,7 +96,10 @@ fn a_needle_held_at_depth_relaxes_as_the_chain_of_its_stations_says() {
         let [friction_n, wrench_n] = held[tick];
         println!("{held_s} s: {friction_n:.4} N, closed form {wanted_n:.4} N, wrench {wrench_n:.4} N");
         assert!((friction_n / wanted_n - 1.0).abs() < 0.01, "{held_s} s");
-        assert!(tick < 1000 || (wrench_n / (scale * friction_n) - 1.0).abs() < 1e-6, "{held_s} s");
+        assert!(
+            tick < 1000 || (wrench_n / (scale * friction_n) - 1.0).abs() < 1e-6,
+            "{held_s} s"
+        );
     }
     assert!(held[9999][0] < 0.6 * held[0][0]);
 }
@@ -100,5 +107,8 @@ fn a_needle_held_at_depth_relaxes_as_the_chain_of_its_stations_says() {
 #[test]
 fn without_creep_a_needle_held_at_depth_keeps_its_force() {
     let held = insert_and_hold([PronyTerm::default(); 2]);
-    assert!(held.iter().all(|[friction_n, _]| friction_n.to_bits() == held[0][0].to_bits()));
+    assert!(
+        held.iter()
+            .all(|[friction_n, _]| friction_n.to_bits() == held[0][0].to_bits())
+    );
 }

@@ -23,14 +23,22 @@ fn creeping() -> LineSettings {
 
 /// Of the tissue under its own loads and that of the membrane's spring, of that spring, and of the chain.
 fn stored_j(state: &LineState, model: &LineModel) -> f64 {
-    let (m, rows, common) = (model.compliance.stations, &model.compliance.rows, model.compliance.common_m_per_n());
+    let (m, rows, common) = (
+        model.compliance.stations,
+        &model.compliance.rows,
+        model.compliance.common_m_per_n(),
+    );
     let spring_n = whole_n(model, state);
     let mut f = vec![0.0; 2 * m];
     f[..m].copy_from_slice(&state.shaft_n);
     for (n, weight) in state.tip_range.clone().zip(state.tip_weights) {
         f[m + n] = weight * (state.tip.force_n - spring_n);
     }
-    let own: f64 = f.iter().enumerate().map(|(n, force)| force * dot(rows.row(n), &f)).sum();
+    let own: f64 = f
+        .iter()
+        .enumerate()
+        .map(|(n, force)| force * dot(rows.row(n), &f))
+        .sum();
     let load_n: f64 = f.iter().sum();
     let whole = common * spring_n * (spring_n + 2.0 * load_n);
     let spring = if state.membrane_n_per_m > 0.0 {
@@ -41,19 +49,25 @@ fn stored_j(state: &LineState, model: &LineModel) -> f64 {
     0.5 * (own + whole + spring) + state.memory.stored_j(rows, common, &model.settings.prony)
 }
 
+/// Forces of the layers, so that tissue that has crept is displaced as far as in the cycles without creep: beyond, linear tissue folds
+/// before the tip, and a tip that goes on through it goes back in the world.
+const PART: f64 = 1.0 / 2.6;
+
 /// Membranes that are no stiffer than what they hold, as in the cycles without creep.
 #[test]
 fn ten_thousand_random_cycles_in_tissue_that_creeps_make_no_energy() {
     let layers = [
         LineLayer {
-            puncture_force_n: 1.2,
+            puncture_force_n: PART * 1.2,
+            cutting_force_n: PART * 1.5,
+            shaft_friction_n_per_m: PART * 80.0,
             ..GLAND
         },
         LineLayer {
             from_m: 17e-3,
-            puncture_force_n: 2.0,
-            cutting_force_n: 0.8,
-            shaft_friction_n_per_m: 40.0,
+            puncture_force_n: PART * 2.0,
+            cutting_force_n: PART * 0.8,
+            shaft_friction_n_per_m: PART * 40.0,
             ..GLAND
         },
     ];
@@ -65,16 +79,16 @@ fn ten_thousand_random_cycles_in_tissue_that_creeps_make_no_energy() {
 /// A stiff membrane passes load on to the body as a whole, which creeps as well.
 #[test]
 fn stiff_membranes_in_tissue_that_creeps_make_no_energy() {
-    let worst_j = random_cycles(&exact(LineSettings::default()), 2_000, stored_j);
+    let worst_j = random_cycles(&exact(1.0, LineSettings::default()), 2_000, stored_j);
     println!("elastic: {:.3} uJ", 1e6 * worst_j);
-    let worst_j = random_cycles(&exact(creeping()), 2_000, stored_j);
+    let worst_j = random_cycles(&exact(PART, creeping()), 2_000, stored_j);
     assert!(worst_j < 1e-6, "{worst_j}");
 }
 
 /// With what the past leaves, the spring of a membrane and the tissue under it carry the tip between them.
 #[test]
 fn loads_handed_on_move_the_tissue_to_where_the_needle_has_it() {
-    let model = exact(creeping());
+    let model = exact(PART, creeping());
     let mut state = LineState::new(&model);
     let rows = &model.compliance.rows;
     for n in 0..3000 {
@@ -84,14 +98,27 @@ fn loads_handed_on_move_the_tissue_to_where_the_needle_has_it() {
             let by_loads_m = dot(rows.row(j), &state.loads_n) + model.compliance.common_m_per_n() * state.whole_n;
             // What a membrane takes from between tip and shaft is left out of the shaft's own displacement.
             if state.membrane_n_per_m == 0.0 {
-                assert!((by_loads_m - state.u_m[j]).abs() < 1e-9, "{n} {j}: {by_loads_m} {}", state.u_m[j]);
+                assert!(
+                    (by_loads_m - state.u_m[j]).abs() < 1e-9,
+                    "{n} {j}: {by_loads_m} {}",
+                    state.u_m[j]
+                );
             }
         }
         let m = model.compliance.stations;
         let tip = |k: usize| dot(rows.row(m + k), &state.loads_n) + model.compliance.common_m_per_n() * state.whole_n;
-        let by_loads_m: f64 = state.tip_range.clone().zip(state.tip_weights).map(|(k, w)| w * tip(k)).sum();
+        let by_loads_m: f64 = state
+            .tip_range
+            .clone()
+            .zip(state.tip_weights)
+            .map(|(k, w)| w * tip(k))
+            .sum();
         if !state.tip_range.is_empty() {
-            assert!((by_loads_m - state.tip_u_m).abs() < 1e-9, "{n}: {by_loads_m} {}", state.tip_u_m);
+            assert!(
+                (by_loads_m - state.tip_u_m).abs() < 1e-9,
+                "{n}: {by_loads_m} {}",
+                state.tip_u_m
+            );
         }
     }
 }
