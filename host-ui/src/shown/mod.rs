@@ -1,9 +1,11 @@
 //! What one frame shows, taken from the link once, so that no panel touches shared memory.
 
+mod bend;
 mod seeds;
 
 use crate::dose_worker::DoseResult;
 use crate::planner::Planning;
+pub use bend::Bend;
 use nalgebra::Vector3;
 pub use seeds::{SeedError, all_errors, own_errors};
 use std::sync::Arc;
@@ -47,6 +49,8 @@ pub struct Shown {
     pub plan: Option<PlanInForce>,
     pub parameters: Option<ParametersInForce>,
     pub seeds: Vec<SeedPose>,
+    /// Of the needle in the last snapshot.
+    pub bend: Bend,
     pub snapshot_residual: Option<f64>,
     pub invalid_dropped: u64,
     /// Step of the scripted procedure while it runs or after it ran.
@@ -141,6 +145,7 @@ impl Shown {
             plan: None,
             parameters: None,
             seeds: Vec::new(),
+            bend: Bend::default(),
             snapshot_residual: None,
             invalid_dropped: 0,
             running: false,
@@ -176,8 +181,10 @@ impl Shown {
         let last = refusals.clone().find(|e| e.kind == EventKind::InvalidRefused as u32);
         self.last_refusal = last.map_or_else(String::new, |e| e.text.read());
         self.seeds.clear();
+        self.bend.clear();
         self.snapshot_residual = None;
         if let Some(snapshot) = link.snapshot() {
+            self.bend.take(&snapshot.header);
             let count = snapshot.header.seed_count as usize;
             self.seeds.extend(snapshot.header.seeds.iter().take(count).copied());
             self.snapshot_residual = Some(snapshot.header.residual);

@@ -11,7 +11,8 @@ pub const SEED_LENGTH_M: f32 = 4.5e-3;
 pub const SEED_RADIUS_M: f32 = 0.4e-3;
 /// 18 gauge.
 const NEEDLE_RADIUS_M: f32 = 0.635e-3;
-const NEEDLE_LENGTH_M: f32 = 0.12;
+/// As much of it is drawn.
+pub const NEEDLE_LENGTH_M: f64 = 0.12;
 const BEVEL_M: f32 = 2.5e-3;
 const RING_RADIUS_M: f32 = 1.6e-3;
 const RING_THICKNESS_M: f32 = 0.16e-3;
@@ -68,12 +69,21 @@ impl Marks {
         self.lines.clear();
     }
 
-    pub fn needle(&mut self, tip_m: [f64; 3], direction: [f64; 3]) {
-        let (tip, axis) = (single(tip_m), unit_or_z(single(direction)));
-        let shoulder = tip - axis * BEVEL_M;
-        let hub = tip - axis * NEEDLE_LENGTH_M;
-        self.cone(hub, shoulder, [NEEDLE_RADIUS_M, NEEDLE_RADIUS_M], self.tokens.needle);
+    /// Through these places, from the tip back; at least two.
+    pub fn needle(&mut self, points_m: &[[f64; 3]]) {
+        let [tip, next, ..] = points_m else { return };
+        let (tip, next) = (single(*tip), single(*next));
+        let shoulder = tip - unit_or_z(tip - next) * BEVEL_M;
+        let radii = [NEEDLE_RADIUS_M, NEEDLE_RADIUS_M];
         self.cone(shoulder, tip, [NEEDLE_RADIUS_M, 0.0], self.tokens.needle_tip);
+        let (mut front, mut axis) = (shoulder, unit_or_z(tip - next));
+        for place in &points_m[1..] {
+            let place = single(*place);
+            axis = unit_or_z(front - place);
+            self.cone(place, front, radii, self.tokens.needle);
+            front = place;
+        }
+        let hub = front;
         // The hub, so that a person sees which end is held.
         let grip = hub - axis * 0.012;
         self.cone(grip, hub, [2.6e-3, 2.0e-3], self.tokens.path);
@@ -321,7 +331,7 @@ mod tests {
     #[test]
     fn marks_of_degenerate_input_are_finite() {
         let mut marks = Marks::default();
-        marks.needle([0.0; 3], [0.0; 3]);
+        marks.needle(&[[0.0; 3]; 2]);
         marks.placed_seed([1.0; 3], [0.0; 3]);
         marks.planned_seed([0.0; 3], [0.0; 3]);
         marks.path([0.0; 3], [0.0; 3]);

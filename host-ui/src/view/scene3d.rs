@@ -6,7 +6,7 @@ use super::driver::DriverCost;
 use super::gpu::Gpu;
 use super::kinds::{kinds, surfaces};
 use super::legend::Legend;
-use super::marks::Marks;
+use super::marks::{Marks, NEEDLE_LENGTH_M};
 use super::orientation::scene_from_patient;
 use super::paste::Pasted;
 use super::pick::pick;
@@ -61,6 +61,8 @@ impl Default for Look {
 struct Key {
     what: What,
     tip: [f64; 3],
+    /// Places along the needle.
+    needle: Vec<[f64; 3]>,
     force: [f64; 3],
     seeds: Vec<[f64; 3]>,
 }
@@ -71,6 +73,8 @@ impl Key {
         self.what == drawn.what
             && near(&self.tip, &drawn.tip, SEEN_M)
             && near(&self.force, &drawn.force, SEEN_N)
+            && self.needle.len() == drawn.needle.len()
+            && self.needle.iter().zip(&drawn.needle).all(|(a, b)| near(a, b, SEEN_M))
             && self.seeds.len() == drawn.seeds.len()
             && self.seeds.iter().zip(&drawn.seeds).all(|(a, b)| near(a, b, SEEN_M))
     }
@@ -296,6 +300,7 @@ impl Scene3d {
         let key = Key {
             what,
             tip: shown.tip_m().unwrap_or_default(),
+            needle: shown.needle_points_m(NEEDLE_LENGTH_M).unwrap_or_default(),
             force: shown.state.map_or([0.0; 3], |s| s.force_on_hand_n),
             seeds: shown.seeds.iter().map(|s| s.position_m).collect(),
         };
@@ -368,7 +373,9 @@ fn collect_fixed(marks: &mut Marks, shown: &Shown, look: Look, tokens: &'static 
 fn collect_live(marks: &mut Marks, (shown, view): (&Shown, &ViewState), look: Look, tokens: &'static Tokens) {
     marks.begin(tokens);
     if let (Some(tip), Some(state)) = (shown.tip_m(), &shown.state) {
-        marks.needle(tip, state.needle_direction);
+        if let Some(points_m) = shown.needle_points_m(NEEDLE_LENGTH_M) {
+            marks.needle(&points_m);
+        }
         if look.force {
             marks.force(tip, state.force_on_hand_n);
         }

@@ -51,7 +51,7 @@ pub fn export(options: &Export) -> Result<(), RecordError> {
     Ok(())
 }
 
-const COLUMNS: [&str; 31] = [
+const COLUMNS: [&str; 34] = [
     "session_id",
     "tick",
     "due_ns",
@@ -81,6 +81,9 @@ const COLUMNS: [&str; 31] = [
     "tool_k",
     "tool_w",
     "buttons",
+    "deflection_x_m",
+    "deflection_y_m",
+    "deflection_z_m",
     "missing_before",
     "session_begins",
 ];
@@ -116,11 +119,9 @@ fn csv(ticks: &[Tick], file: &mut impl Write) -> std::io::Result<()> {
         row.extend(real.map(f64::to_string));
         row.push(t.tissue_tick.to_string());
         row.extend(t.world_from_tool.iter().map(f64::to_string));
-        row.extend([
-            t.buttons.to_string(),
-            missing.to_string(),
-            u8::from(same.is_none()).to_string(),
-        ]);
+        row.push(t.buttons.to_string());
+        row.extend(t.tip_deflection_m.iter().map(f64::to_string));
+        row.extend([missing.to_string(), u8::from(same.is_none()).to_string()]);
         table.write_record(&row)?;
         before = Some(t);
     }

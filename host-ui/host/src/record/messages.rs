@@ -59,6 +59,9 @@ pub struct Tick {
     pub tissue_tick: u64,
     pub world_from_tool: [f64; 4],
     pub buttons: u32,
+    /// Recordings of an older version have none.
+    #[serde(default)]
+    pub tip_deflection_m: [f64; 3],
 }
 
 impl Tick {
@@ -109,6 +112,7 @@ impl From<&TickRecord> for Tick {
             tissue_tick: r.tissue_tick,
             world_from_tool: r.world_from_tool,
             buttons: r.buttons,
+            tip_deflection_m: r.tip_deflection_m,
         }
     }
 }
@@ -145,6 +149,7 @@ fn tick_schema() -> Value {
             "speed_m_per_s": number("m/s along the path, inwards"),
             "force_terms_n": vector(5, "N before the gate: membrane, guide, damping, friction, gravity"),
             "tissue_tick": whole("of the tissue loop"), "world_from_tool": vector(4, "quaternion i, j, k, w"), "buttons": whole("one bit each"),
+            "tip_deflection_m": vector(3, "m, of a needle that bends, from where a rigid one would be"),
         }),
     )
 }
@@ -174,6 +179,8 @@ fn tissue_schema() -> Value {
         json!({
             "session_id": whole("run of rt-core"), "tissue_tick": whole("of the tissue loop"), "time_ns": whole("CLOCK_MONOTONIC"),
             "tip_in_scene_m": vector(3, "m"), "needle_direction": vector(3, "unit vector to the tip"),
+            "bend_m": { "type": "array", "items": vector(3, "m, from where a rigid needle would be; from the tip back to the hand") },
+            "bend_spacing_m": number("m along the needle from one to the next"),
             "held_in_scene_m": vector(3, "m"), "held_element": { "type": ["integer", "null"] }, "phase": whole("as of a tick"),
             "residual": number("of the model"), "max_displacement_m": number("m"), "work_ns": whole("of the tissue tick"),
             "seeds": { "type": "array", "items": { "type": "object", "properties": {
@@ -190,6 +197,7 @@ pub fn tissue(snapshot: &Snapshot) -> Value {
     json!({
         "session_id": h.session_id, "tissue_tick": h.tissue_tick, "time_ns": h.time_ns,
         "tip_in_scene_m": h.tip_in_scene_m, "needle_direction": h.needle_direction, "held_in_scene_m": h.held_in_scene_m,
+        "bend_m": h.bends_m(), "bend_spacing_m": h.bend_spacing_m,
         "held_element": (h.held_element != u32::MAX).then_some(h.held_element), "phase": h.phase, "residual": h.residual,
         "max_displacement_m": h.max_displacement_m, "work_ns": h.work_ns, "seeds": seeds.collect::<Vec<_>>(),
     })

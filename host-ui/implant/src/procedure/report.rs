@@ -5,7 +5,7 @@ use super::error::ProcedureError;
 use super::job::{Job, PlannedDrop, placed};
 use crate::pairing::SeedOffset;
 use crate::plan::compensate::summary_m;
-use crate::workflow::Pace;
+use crate::workflow::{NeedleTask, Pace};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use std::io::Write;
@@ -39,9 +39,10 @@ pub fn write(
         "made": made,
         "seeds": seeds, "lost_seeds": seen.lost.iter().map(|n| n + 1).collect::<Vec<_>>(),
         "force": force(link, direction, seen),
+        "lag": link.state().map(|s| json!({ "worst_ms": s.worst_lag_ns as f64 / 1e6, "worst_mm": s.worst_lag_m * 1e3 })),
         "timing": timing(link, seen),
         "plan": {
-            "entry_mm": mm(first.plan.entry_m), "direction": direction, "needles": needles(job),
+            "entry_mm": mm(first.plan.entry_m), "direction": direction, "needles": needles(job, &seen.records),
             "insert_speed_mm_s": pace.insert_m_per_s * 1e3, "retract_speed_mm_s": pace.retract_m_per_s * 1e3,
         },
         "compensation": compensation(job),
@@ -101,15 +102,38 @@ fn seeds(link: &Link, planned: &[PlannedDrop], lost: &[usize]) -> Vec<Value> {
         .collect()
 }
 
-fn needles(job: &Job) -> Vec<Value> {
-    let of_task = |task: &crate::workflow::NeedleTask| {
+fn needles(job: &Job, records: &[TickRecord]) -> Vec<Value> {
+    let deflections_m = deflections_m(job, records);
+    let of_task = |(task, deflection_m): (&NeedleTask, f64)| {
         json!({
             "entry_mm": mm(task.drops.entry_m), "direction": task.drops.direction,
             "planned_along_mm": task.plan.deepest_first().into_iter().map(|s| task.plan.along_m(s) * 1e3).collect::<Vec<_>>(),
             "dropped_along_mm": task.drops.along_m.iter().map(|a| a * 1e3).collect::<Vec<_>>(),
+            "deflection_mm": deflection_m * 1e3,
         })
     };
-    job.tasks.iter().map(of_task).collect()
+    job.tasks.iter().zip(deflections_m).map(of_task).collect()
+}
+
+/// Largest deflection of the tip of each needle, from where a rigid one would have it. A tick counts for the needle on whose line
+/// the hand is.
+fn deflections_m(job: &Job, records: &[TickRecord]) -> Vec<f64> {
+    let beside_m = |task: &NeedleTask, tip_m: [f64; 3]| {
+        let from_entry = Vector3::from(tip_m) - Vector3::from(task.drops.entry_m);
+        from_entry.cross(&Vector3::from(task.drops.direction)).norm()
+    };
+    let mut largest_m = vec![0.0_f64; job.tasks.len()];
+    for record in records.iter().filter(|r| r.tip_deflection_m != [0.0; 3]) {
+        let beside = job
+            .tasks
+            .iter()
+            .map(|task| beside_m(task, record.tip_in_scene_m))
+            .enumerate();
+        if let Some((needle, _)) = beside.min_by(|a, b| a.1.total_cmp(&b.1)) {
+            largest_m[needle] = largest_m[needle].max(Vector3::from(record.tip_deflection_m).norm());
+        }
+    }
+    largest_m
 }
 
 /// As the rehearsals had it.
@@ -239,6 +263,21 @@ fn table(result: &Value) {
             value("error_across_mm"),
             value("error_mm")
         );
+    }
+    let bent: Vec<f64> = all(&result["plan"]["needles"], "deflection_mm")
+        .filter(|d| *d > 0.0)
+        .collect();
+    if !bent.is_empty() {
+        println!(
+            "deflection of the tip: {} needles, mean {:.2} mm, worst {:.2} mm",
+            bent.len(),
+            bent.iter().sum::<f64>() / bent.len() as f64,
+            bent.iter().copied().fold(0.0, f64::max)
+        );
+    }
+    if let Some(lag_mm) = result["lag"]["worst_mm"].as_f64().filter(|mm| *mm > 0.0) {
+        let lag_ms = result["lag"]["worst_ms"].as_f64().unwrap_or(f64::NAN);
+        println!("without a line the tissue was up to {lag_ms:.0} ms behind, the tip up to {lag_mm:.2} mm ahead");
     }
     let off: Vec<f64> = all(&result["seeds"], "off_rehearsal_mm").collect();
     if !off.is_empty() {

@@ -22,6 +22,8 @@ pub struct Motion {
     pub peak_insertion_m_per_s: f64,
     /// Largest force on the hand, N.
     pub peak_force_n: f64,
+    /// Largest deflection of the tip from where a rigid needle would have it, m.
+    pub deflection_m: f64,
     /// Times that the tip came into tissue.
     pub insertions: usize,
     /// Times that it turned inwards again without having left.
@@ -70,6 +72,7 @@ impl MotionMeter {
         motion.seen.seen += 1;
         motion.duration_s = seconds(record.due_ns.saturating_sub(first_ns));
         motion.peak_force_n = motion.peak_force_n.max(Vector3::from(record.force_on_hand_n).norm());
+        motion.deflection_m = motion.deflection_m.max(Vector3::from(record.tip_deflection_m).norm());
         if record.flags & flags::IN_CONTACT == 0 {
             self.turns = None;
             return;

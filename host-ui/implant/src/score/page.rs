@@ -143,9 +143,15 @@ fn cards(score: &Score) -> Markup {
             format!("{} insertions, {} re-insertions", m.insertions, m.reinsertions),
         ),
     ];
+    let bent = (m.deflection_m > 0.0).then(|| {
+        (
+            format!("{:.1} mm", m.deflection_m * 1e3),
+            "largest deflection of the tip".to_owned(),
+        )
+    });
     html! {
         div class="cards" {
-            @for (value, what) in &all {
+            @for (value, what) in all.iter().chain(&bent) {
                 div class="card" { b { (value) } span { (what) } }
             }
         }

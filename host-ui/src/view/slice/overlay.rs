@@ -184,41 +184,57 @@ impl Overlay<'_> {
 
     /// The part in the plane as a line; where the needle only goes through, a dot; a ring about a tip in the plane.
     fn needle(&self) {
-        let (Some(tip), Some(state)) = (self.shown.tip_m(), &self.shown.state) else {
+        let Some(points_m) = self.shown.needle_points_m(NEEDLE_M) else {
             return;
         };
-        let (tip, direction) = (Vector3::from(tip), Vector3::from(state.needle_direction));
-        let (at_tip, per_m) = (self.plane.distance_m(tip), -direction.dot(&self.plane.normal()));
-        // Ways back from the tip at which the shaft is a given distance in front of the plane.
-        let back = |distance: f64| ((distance - at_tip) / per_m).clamp(0.0, NEEDLE_M);
-        let (near, far) = if per_m.abs() < 1e-6 {
-            let is_in = at_tip.abs() < IN_PLANE_M;
-            (0.0, if is_in { NEEDLE_M } else { 0.0 })
-        } else {
-            let (a, b) = (back(-IN_PLANE_M), back(IN_PLANE_M));
-            (a.min(b), a.max(b))
-        };
-        if far <= near {
-            return;
-        }
-        let place = |way: f64| self.plane.on_screen(tip - direction * way);
+        let points: Vec<Vector3<f64>> = points_m.into_iter().map(Vector3::from).collect();
         let width = (1.27e-3 / self.plane.m_per_point).clamp(2.0, 8.0) as f32;
-        let ends = [place(near), place(far)];
-        if ends[0].distance(ends[1]) < 2.0 * width {
-            let middle = ends[0] + (ends[1] - ends[0]) * 0.5;
+        let pieces: Vec<[Pos2; 2]> = points
+            .windows(2)
+            .filter_map(|ends| self.in_plane(ends[0], ends[1]))
+            .collect();
+        let length: f32 = pieces.iter().map(|ends| ends[0].distance(ends[1])).sum();
+        if let ([first, ..], true) = (pieces.as_slice(), length < 2.0 * width) {
+            let middle = first[0] + (first[1] - first[0]) * 0.5;
             self.painter.circle_filled(middle, width, IMAGE.needle);
             self.painter
                 .circle_stroke(middle, width + 3.0, Stroke::new(1.0, IMAGE.needle.gamma_multiply(0.5)));
         } else {
-            self.painter
-                .line_segment(ends, Stroke::new(width + 2.0, IMAGE.background.gamma_multiply(0.6)));
-            self.painter
-                .line_segment(ends, Stroke::new(width, IMAGE.needle.gamma_multiply(0.85)));
+            let behind = Stroke::new(width + 2.0, IMAGE.background.gamma_multiply(0.6));
+            for ends in &pieces {
+                self.painter.line_segment(*ends, behind);
+            }
+            let shaft = Stroke::new(width, IMAGE.needle.gamma_multiply(0.85));
+            for ends in &pieces {
+                self.painter.line_segment(*ends, shaft);
+            }
         }
-        if at_tip.abs() < IN_PLANE_M {
+        if let Some(tip) = points
+            .first()
+            .filter(|tip| self.plane.distance_m(**tip).abs() < IN_PLANE_M)
+            && !pieces.is_empty()
+        {
             self.painter
-                .circle_stroke(self.plane.on_screen(tip), width + 3.0, Stroke::new(1.5, IMAGE.needle));
+                .circle_stroke(self.plane.on_screen(*tip), width + 3.0, Stroke::new(1.5, IMAGE.needle));
         }
+    }
+
+    /// The part of a piece of needle that lies in the plane, on the screen.
+    fn in_plane(&self, front: Vector3<f64>, end: Vector3<f64>) -> Option<[Pos2; 2]> {
+        let length_m = (front - end).norm();
+        let direction = (front - end).try_normalize(1e-9)?;
+        let (at_front, per_m) = (self.plane.distance_m(front), -direction.dot(&self.plane.normal()));
+        // Ways back from the front at which the shaft is a given distance in front of the plane.
+        let back = |distance: f64| ((distance - at_front) / per_m).clamp(0.0, length_m);
+        let (near, far) = if per_m.abs() < 1e-6 {
+            let is_in = at_front.abs() < IN_PLANE_M;
+            (0.0, if is_in { length_m } else { 0.0 })
+        } else {
+            let (a, b) = (back(-IN_PLANE_M), back(IN_PLANE_M));
+            (a.min(b), a.max(b))
+        };
+        let place = |way: f64| self.plane.on_screen(front - direction * way);
+        (far > near).then(|| [place(near), place(far)])
     }
 
     fn measure(&self) {
