@@ -23,6 +23,7 @@ use stylet_host::record;
 use stylet_implant::procedure;
 use stylet_implant::readers::{SeedDefaults, read_seeds};
 use stylet_manual::ManualArgs;
+use stylet_shm_schema::ParameterChange;
 use stylet_shm_schema::service::Instance;
 
 const SCENE_HELP: &str = concat!(
@@ -87,6 +88,9 @@ enum Task {
         /// Source file for the score [default: the source that the plan names, 6711 or 200]
         #[arg(long, value_name = "FILE")]
         source: Option<PathBuf>,
+        /// Set a parameter before anything else, in the unit that the window shows, such as needle.bending_stiffness=0.016; may be given several times, and stays in force in the core
+        #[arg(long = "set", value_name = "KEY=VALUE", value_parser = procedure::parameter)]
+        parameters: Vec<ParameterChange>,
         /// Seeds along the needle, 1 to 128, where no plan is given
         #[arg(long, default_value_t = 5, conflicts_with = "plan", value_parser = clap::value_parser!(u16).range(1..=128))]
         seeds: u16,
@@ -260,6 +264,7 @@ impl Cli {
                 plan,
                 compensate,
                 source,
+                parameters,
                 seeds,
             }) => {
                 if let Some(speed) = insert_speed.filter(|s| !(0.1..=500.0).contains(s)) {
@@ -274,6 +279,7 @@ impl Cli {
                     plan,
                     compensate,
                     source,
+                    parameters,
                 });
                 instance.sweep();
                 Ok(ended?)

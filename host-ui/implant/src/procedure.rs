@@ -5,6 +5,7 @@ mod debrief;
 mod error;
 /// What a procedure does: its needles, planned and dropped.
 pub mod job;
+mod parameters;
 mod report;
 
 use crate::provenance;
@@ -12,6 +13,7 @@ use crate::workflow::{Pace, Patience, Run, RunStatus, Step};
 use child::Core;
 pub use error::ProcedureError;
 use job::Job;
+pub use parameters::parameter;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -111,6 +113,8 @@ pub struct Options {
     pub compensate: bool,
     /// For the score; else the one that the plan names.
     pub source: Option<PathBuf>,
+    /// Set before anything else; they stay in force.
+    pub parameters: Vec<ParameterChange>,
 }
 
 /// What was seen while the script ran.
@@ -176,6 +180,7 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
             String::new()
         }
     );
+    parameters::set(&mut link, &options.parameters, &interrupted)?;
     if options.compensate {
         job.compensate(&mut link, &pace, &interrupted)?;
     }

@@ -30,6 +30,9 @@ pub enum ProcedureError {
     /// The core refused the scene; the text says why.
     #[error("the core refused the scene: {0}")]
     SceneRefused(String),
+    /// The core refused parameters; the text says why.
+    #[error("the core refused the parameters: {0}")]
+    ParametersRefused(String),
     /// The core did not send what the procedure needs.
     #[error("{0}")]
     NothingReceived(&'static str),
