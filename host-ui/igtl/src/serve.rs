@@ -87,7 +87,8 @@ fn devices(link: &Link, is_slow: bool) -> Vec<(&'static str, Body)> {
     };
     let patient = scene.header.patient();
     if let Some(state) = link.state() {
-        let needle = needle(&patient, state.tip_in_scene_m, state.needle_direction);
+        let tip_m = [0, 1, 2].map(|a| state.tip_in_scene_m[a] + state.tip_deflection_m[a]);
+        let needle = needle(&patient, tip_m, state.needle_direction);
         devices.push(("Needle", Body::Transform(needle)));
     }
     // A snapshot of another scene has other vertices.

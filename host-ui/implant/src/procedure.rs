@@ -13,7 +13,7 @@ use crate::workflow::{Pace, Patience, Run, RunStatus, Step};
 use child::Core;
 pub use error::ProcedureError;
 use job::Job;
-pub use parameters::parameter;
+pub use parameters::{NoParameter, parameter};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};

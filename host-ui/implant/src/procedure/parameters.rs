@@ -9,26 +9,66 @@ use stylet_shm_schema::{PARAMETERS, ParameterChange, Request};
 
 const LIMIT: Duration = Duration::from_secs(5);
 
+/// Why a text is no parameter; each says what is allowed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoParameter {
+    /// Something else than a pair.
+    #[error("{0}: write KEY=VALUE, such as needle.bending_stiffness=0.016")]
+    NoPair(String),
+    /// A key that is not in the table.
+    #[error("{0}: there is no such parameter; there are {keys}", keys = keys())]
+    UnknownKey(String),
+    /// A value that cannot be read.
+    #[error("{key}: {value} is no number")]
+    NoNumber {
+        /// The parameter.
+        key: &'static str,
+        /// What was given.
+        value: String,
+    },
+    /// A value that the table forbids.
+    #[error("{key}: {value} is outside of {least} to {most} {unit}")]
+    OutOfLimits {
+        /// The parameter.
+        key: &'static str,
+        /// What was given, in `unit`.
+        value: f64,
+        /// Least value.
+        least: f64,
+        /// Largest value.
+        most: f64,
+        /// The unit that a person reads.
+        unit: &'static str,
+    },
+}
+
+fn keys() -> String {
+    PARAMETERS.map(|spec| spec.key).join(", ")
+}
+
 /// `KEY=VALUE` of the command line, in the unit that the window shows.
-///
-/// # Errors
-///
-/// No such key, no number, or one out of its limits; the text says what is allowed.
-pub fn parameter(text: &str) -> Result<ParameterChange, String> {
+pub fn parameter(text: &str) -> Result<ParameterChange, NoParameter> {
     let (key, value) = text
         .split_once('=')
-        .ok_or_else(|| format!("{text}: write KEY=VALUE, such as needle.bending_stiffness=0.016"))?;
-    let Some(spec) = PARAMETERS.iter().find(|spec| spec.key == key) else {
-        let keys: Vec<&str> = PARAMETERS.iter().map(|spec| spec.key).collect();
-        return Err(format!("{key}: there is no such parameter; there are {}", keys.join(", ")));
-    };
-    let read: f64 = value.parse().map_err(|_| format!("{key}: {value} is no number"))?;
-    let si = read / spec.display_per_si;
+        .ok_or_else(|| NoParameter::NoPair(text.to_owned()))?;
+    let spec = PARAMETERS.iter().find(|spec| spec.key == key);
+    let spec = spec.ok_or_else(|| NoParameter::UnknownKey(key.to_owned()))?;
+    let given: f64 = value.parse().map_err(|_| NoParameter::NoNumber {
+        key: spec.key,
+        value: value.to_owned(),
+    })?;
+    let si = given / spec.display_per_si;
     // The factor to a person's unit and back may leave the limits by a bit.
     let within = si.clamp(spec.min, spec.max);
-    if !si.is_finite() || (si - within).abs() > 1e-9 * within.abs().max(spec.max.abs()) {
+    if !si.is_finite() || (si - within).abs() > 1e-9 * spec.max.abs() {
         let [least, most] = [spec.min, spec.max].map(|limit| limit * spec.display_per_si);
-        return Err(format!("{key}: {value} is outside of {least} to {most} {}", spec.unit));
+        return Err(NoParameter::OutOfLimits {
+            key: spec.key,
+            value: given,
+            least,
+            most,
+            unit: spec.unit,
+        });
     }
     Ok(ParameterChange {
         id: spec.id,
@@ -78,7 +118,7 @@ mod tests {
             ("needle.template_gap=9", "0 to 3 mm"),
             ("needle.template_gap=NaN", "outside"),
         ] {
-            let why = parameter(text).expect_err(text);
+            let why = parameter(text).expect_err(text).to_string();
             assert!(why.contains(says), "{why}");
         }
     }

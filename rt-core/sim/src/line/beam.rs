@@ -107,6 +107,13 @@ impl BeamState {
         &self.forces_n[side.min(1)]
     }
 
+    /// No tissue holds the needle across.
+    pub(super) fn release(&mut self) {
+        if self.in_contact > 0 {
+            *self = BeamState::default();
+        }
+    }
+
     /// Its number is one of stations: that of a state that was read from a file may not be.
     pub(super) fn is_whole(&self) -> bool {
         self.in_contact as usize <= MAX_ACROSS

@@ -78,14 +78,16 @@ impl HandLine {
         world_from_tool: &UnitQuaternion<f64>,
         answer: &LineOutput,
     ) -> Option<BeamOutput> {
-        let along_m = self.along_m(tip_in_world);
-        let tip_m = along_m - self.in_bone_m(along_m);
         let bending = self.bending.as_mut()?;
         if bending.model.bending_stiffness_n_m2 <= 0.0 {
+            self.state.beam.release();
             return None;
         }
+        let along_m = self.along_m(tip_in_world);
+        let tip_m = along_m - self.in_bone_m(along_m);
         let [axis, first, second] = self.line.axes.map(Vector3::from);
         let sides = [first, second];
+        let bending = self.bending.as_mut()?;
         let direction = world_from_tool * Vector3::z();
         let along = direction.dot(&axis);
         if along < 0.5 {
