@@ -32,7 +32,7 @@ impl Bend {
         if self.bends_m.len() < 2 {
             return vec![at(0.0, [0.0; 3]), at(length_m, [0.0; 3])];
         }
-        let backs = (0..).map(|n| f64::from(n) * self.spacing_m);
+        let backs = (0_u32..).map(|n| f64::from(n) * self.spacing_m);
         let whole = backs.zip(&self.bends_m).take_while(|(back_m, _)| *back_m < length_m);
         let mut points: Vec<_> = whole.map(|(back_m, bend_m)| at(back_m, *bend_m)).collect();
         // The last piece ends where the drawn needle does.
