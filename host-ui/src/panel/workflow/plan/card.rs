@@ -179,7 +179,7 @@ fn dialogs_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
 fn file_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bool, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         let width = ui.available_width() - BESIDE_FIELD;
-        let field = path_ui(ui, "plan file", &mut state.plan.path, "or drop a file", width);
+        let field = path_ui(ui, "plan file", &mut state.plan.path, "plan file", width);
         field.widget_info(|| {
             egui::WidgetInfo::labeled(egui::accesskit::Role::TextInput, true, "Plan file: .toml, .csv or .dcm")
         });
