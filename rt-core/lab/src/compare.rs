@@ -1,7 +1,10 @@
 //! Our wake-up latency, alternating with another one: that of `cyclictest` on the same core with the same priority and interval, or our own without
 //! the load.
 
+mod timerlat;
+
 use crate::load::{Load, Running};
+use crate::machine::Machine;
 use crate::measure::{Measured, Setup, measure};
 use crate::sample::histogram;
 use crate::summary::quantile_us;
@@ -16,6 +19,8 @@ use stylet_runtime::process::Options;
 
 /// Each turn brings p99.9 with ten samples beyond it at 1 kHz.
 const SHORTEST_TURN_NS: u64 = 11_000_000_000;
+/// A turn with or without the trace: p99 with ten samples beyond it at 1 kHz.
+const SHORTEST_TRACED_TURN_NS: u64 = 2_000_000_000;
 /// Bins of 1 ns; what is later than a millisecond is known by its number and its maximum alone.
 const BINS: u64 = 1_000_000;
 const COMPARED: [(&str, f64); 4] = [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999), ("max", 1.0)];
@@ -26,15 +31,21 @@ const COMPARED: [(&str, f64); 4] = [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999
 pub enum Against {
     /// `cyclictest` (Debian package rt-tests) under the same load: same core, priority and interval
     Cyclictest,
+    /// `rtla timerlat` (Debian package rtla), where the kernel has the tracer: same core, priority and period
+    Timerlat,
     /// The same loops without the load
     Unloaded,
+    /// The same loops without the trace of --trace
+    Untraced,
 }
 
 impl Against {
     pub fn name(self) -> &'static str {
         match self {
             Self::Cyclictest => "cyclictest",
+            Self::Timerlat => "timerlat",
             Self::Unloaded => "without the load",
+            Self::Untraced => "without the trace",
         }
     }
 }
@@ -71,16 +82,27 @@ pub struct Comparison {
 
 /// Measures our loops and the other side alternately, `rounds` times each.
 pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &AtomicBool) -> Result<Comparison, String> {
-    let turn_ns = (setup.duration_ns / u64::from(rounds)).max(SHORTEST_TURN_NS);
+    let turn_ns = match against {
+        Against::Untraced => (setup.duration_ns / 4 / u64::from(rounds)).max(SHORTEST_TRACED_TURN_NS),
+        _ => (setup.duration_ns / u64::from(rounds)).max(SHORTEST_TURN_NS),
+    };
     let tool = match against {
         Against::Cyclictest => version(),
-        Against::Unloaded => Some(String::new()),
+        Against::Timerlat => timerlat::version(),
+        Against::Unloaded | Against::Untraced => Some(String::new()),
     };
     let mut comparison = Comparison {
         against,
         absent: match (against, &tool, setup.load) {
+            (Against::Timerlat, _, _) if timerlat::missing(&Machine::this()).is_some() => {
+                timerlat::missing(&Machine::this()).map(str::to_owned)
+            }
+            (Against::Timerlat, None, _) => Some("rtla is not installed: sudo apt-get install rtla".to_owned()),
+            (Against::Untraced, _, _) if setup.trace_over_ns.is_none() => {
+                Some("there is no trace to compare with; give --trace".to_owned())
+            }
             (_, None, _) => Some("cyclictest is not installed: sudo apt-get install rt-tests".to_owned()),
-            (Against::Cyclictest, _, Load::Window) => {
+            (Against::Cyclictest | Against::Timerlat, _, Load::Window) => {
                 Some("the window draws nothing without our loops; give --compare unloaded".to_owned())
             }
             (Against::Unloaded, _, Load::None) => Some("there is no load to compare with; give --load".to_owned()),
@@ -99,6 +121,10 @@ pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &Atomi
     }
     let setup = Setup {
         duration_ns: turn_ns,
+        // Only the cost of the trace is measured with the trace.
+        checkpoints: None,
+        toggle: None,
+        trace_over_ns: setup.trace_over_ns.filter(|_| against == Against::Untraced),
         ..*setup
     };
     for _ in 0..rounds {
@@ -106,7 +132,9 @@ pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &Atomi
         let ours = &measured.haptic.wake;
         let others = match against {
             Against::Cyclictest => cyclictest(&setup, interrupted),
-            Against::Unloaded => unloaded(&setup, interrupted),
+            Against::Timerlat => timerlat::turn(&setup, interrupted),
+            Against::Unloaded => without(&setup, Load::None, interrupted),
+            Against::Untraced => without(&setup, setup.load, interrupted),
         };
         let others = match others {
             Ok(others) => others,
@@ -127,9 +155,11 @@ pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &Atomi
     Ok(comparison)
 }
 
-fn unloaded(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, String> {
+/// Our loops under `load`, without a trace.
+fn without(setup: &Setup, load: Load, interrupted: &AtomicBool) -> Result<Histogram<u64>, String> {
     let setup = Setup {
-        load: Load::None,
+        load,
+        trace_over_ns: None,
         ..*setup
     };
     Ok(measure(&setup, interrupted)?.haptic.wake)
@@ -176,6 +206,12 @@ fn version() -> Option<String> {
         .map(|l| l.trim().to_owned())
 }
 
+/// One turn of cyclictest; the reason where it is not installed.
+pub fn cyclictest_turn(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, String> {
+    version().ok_or("cyclictest is not installed: sudo apt-get install rt-tests")?;
+    cyclictest(setup, interrupted)
+}
+
 fn cyclictest(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, String> {
     let load = Running::start(setup.load, &setup.options.instance, setup.folder)?;
     let file = setup.folder.join("cyclictest.tmp");
@@ -185,7 +221,7 @@ fn cyclictest(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>,
         .stderr(Stdio::piped())
         .spawn()
         .map_err(|e| format!("cyclictest does not start: {e}"))?;
-    let ended = wait(&mut child, interrupted);
+    let ended = wait("cyclictest", &mut child, interrupted);
     drop(load);
     // The ui load was in shared memory, and there was no core to clean up after it.
     setup.options.instance.sweep();
@@ -213,7 +249,8 @@ fn arguments(options: &Options, duration_ns: u64, file: &Path) -> Vec<String> {
     arguments
 }
 
-fn wait(child: &mut Child, interrupted: &AtomicBool) -> Result<(), String> {
+/// Waits for `program`; its first line of errors where it fails.
+fn wait(program: &str, child: &mut Child, interrupted: &AtomicBool) -> Result<(), String> {
     loop {
         match child.try_wait() {
             Ok(Some(status)) if status.success() => return Ok(()),
@@ -223,10 +260,10 @@ fn wait(child: &mut Child, interrupted: &AtomicBool) -> Result<(), String> {
                     let _ = std::io::Read::read_to_string(&mut pipe, &mut said);
                 }
                 let first = said.lines().next().unwrap_or("no reason given").to_owned();
-                return Err(format!("cyclictest failed: {first}"));
+                return Err(format!("{program} failed: {first}"));
             }
             Ok(None) => {}
-            Err(e) => return Err(format!("cyclictest: {e}")),
+            Err(e) => return Err(format!("{program}: {e}")),
         }
         // SYNC: set by a signal handler; nothing but the flag is carried.
         if interrupted.load(Ordering::Acquire) {
