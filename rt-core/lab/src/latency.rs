@@ -2,26 +2,36 @@
 
 use crate::args::LatencyArgs;
 use crate::compare::{Against, compare};
+use crate::external;
 use crate::files;
 use crate::machine::Machine;
 use crate::measure::{Setup, measure};
 use crate::report::{self, JSON, PAGE, Parts, Report};
 use crate::sign;
+use crate::spin::{self, Spin};
 use crate::verdict::{self, Outcome};
 use std::sync::atomic::AtomicBool;
+use stylet_runtime::process::Options;
 
 /// The exit code is the verdict: 0 pass, 1 fail, 2 not measurable.
 pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
-    let options = args.options()?;
+    if let Some(file) = &args.external {
+        return external::run(&args.out, file).map_err(|e| e.to_string());
+    }
+    let mut options = args.options()?;
     let whose = args.whose.read().map_err(|e| e.to_string())?;
     let limits = verdict::limits(options.haptic_period_ns, args.limits.as_deref(), &args.limit)?;
     std::fs::create_dir_all(&args.out).map_err(|e| format!("cannot make {}: {e}", args.out.display()))?;
-    let setup = Setup {
-        options: &options,
-        duration_ns: args.duration,
-        load: args.load,
-        folder: &args.out,
-    };
+    let mut spin_search = None;
+    if args.spin_us == Spin::Auto {
+        eprintln!("rt-core: looking for the smallest spin, trials of three seconds");
+        let setup = setup_of(args, &options);
+        let search = spin::search(&setup, args.longest_spin_us(), interrupted)?;
+        println!("{}", search.words());
+        options.spin_ns = search.used_us * 1_000;
+        spin_search = Some(search);
+    }
+    let setup = setup_of(args, &options);
     eprintln!(
         "rt-core: measuring for {:.0} s at {} Hz on scene '{}'",
         args.duration as f64 / 1e9,
@@ -29,12 +39,18 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
         options.scene
     );
     let measured = measure(&setup, interrupted)?;
-    let comparison = match args.compare {
+    if args.toggle.is_some() {
+        external::keep(&args.out, &measured.haptic.toggles).map_err(|e| e.to_string())?;
+    }
+    if let Some(why) = measured.trace.as_ref().and_then(|t| t.absent.as_ref()) {
+        eprintln!("rt-core: no causes: {why}");
+    }
+    let traced = measured.trace.as_ref().is_some_and(|t| t.absent.is_none());
+    let comparison = match args.against().filter(|against| traced || *against != Against::Untraced) {
         Some(against) => {
-            let ours = if against == Against::Unloaded {
-                "with and "
-            } else {
-                "with "
+            let ours = match against {
+                Against::Unloaded | Against::Untraced => "with and ",
+                Against::Cyclictest | Against::Timerlat => "with ",
             };
             eprintln!("rt-core: alternating {ours}{}, {} rounds", against.name(), args.rounds);
             Some(compare(&setup, against, args.rounds, interrupted)?)
@@ -51,6 +67,7 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
         comparison,
         machine: &machine,
         whose: &whose,
+        spin_search,
     });
     // A signature of an earlier report in the same folder is none of this one.
     let json = args.out.join(JSON);
@@ -63,6 +80,18 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
         println!("{}", sign::sign(&json, key).map_err(|e| e.to_string())?.display());
     }
     Ok(report.verdict.overall.exit_code())
+}
+
+fn setup_of<'a>(args: &'a LatencyArgs, options: &'a Options) -> Setup<'a> {
+    Setup {
+        options,
+        duration_ns: args.duration,
+        load: args.load,
+        folder: &args.out,
+        trace_over_ns: args.trace_over_ns(),
+        checkpoints: None,
+        toggle: args.toggle,
+    }
 }
 
 /// The verdict on the terminal: one line for each limit, then all of them.
@@ -79,6 +108,12 @@ fn print_verdict(report: &Report) {
             j.unit
         );
     }
+    for outlier in report.trace.iter().flat_map(|t| &t.outliers) {
+        println!(
+            "late at {:.3} s by {:.0} us: {}",
+            outlier.at_s, outlier.wake_us, outlier.cause
+        );
+    }
     if let Some(comparison) = &report.comparison {
         match &comparison.absent {
             Some(why) => println!("comparison: {why}"),
@@ -89,7 +124,9 @@ fn print_verdict(report: &Report) {
                     .collect();
                 let over = match comparison.against {
                     Against::Cyclictest => "ours over cyclictest",
+                    Against::Timerlat => "ours over timerlat",
                     Against::Unloaded => "with the load over without it",
+                    Against::Untraced => "with the trace over without it",
                 };
                 println!(
                     "{over}, median of {} rounds: {}",
