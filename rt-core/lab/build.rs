@@ -10,7 +10,10 @@ fn main() {
     println!("cargo:rustc-env=STYLET_TOOLCHAIN={}", toolchain());
     let out = std::env::var("OUT_DIR").expect("cargo sets OUT_DIR");
     let needs = locked(Path::new("../../Cargo.lock")).unwrap_or_default();
-    for (file, list) in [("dependencies.txt", dependencies(&needs)), ("packages.txt", packages(&needs))] {
+    for (file, list) in [
+        ("dependencies.txt", dependencies(&needs)),
+        ("packages.txt", packages(&needs)),
+    ] {
         std::fs::write(Path::new(&out).join(file), list).expect("OUT_DIR can be written");
     }
 }
@@ -95,7 +98,9 @@ fn needed(needs: &Needs, program: &str) -> BTreeSet<Package> {
 /// `name version` of each package that `rt-core` needs, one a line.
 fn dependencies(needs: &Needs) -> String {
     let all = needed(needs, "rt-core");
-    all.iter().map(|(name, version)| format!("{name} {version}\n")).collect()
+    all.iter()
+        .map(|(name, version)| format!("{name} {version}\n"))
+        .collect()
 }
 
 /// `name version programs licence` of each package of others in either program, one a line.
@@ -128,6 +133,8 @@ fn licence(sources: &[PathBuf], (name, version): &Package) -> Option<String> {
     let manifest = |source: &PathBuf| std::fs::read_to_string(source.join(format!("{name}-{version}/Cargo.toml"))).ok();
     let text = sources.iter().find_map(manifest)?;
     // A line of it: parsing hundreds of manifests whole would cost the build more than it is worth.
-    let line = text.lines().find_map(|l| l.strip_prefix("license = \"")?.strip_suffix('"'));
+    let line = text
+        .lines()
+        .find_map(|l| l.strip_prefix("license = \"")?.strip_suffix('"'));
     line.map(|l| l.replace(" / ", "/").replace('/', " OR "))
 }

@@ -31,7 +31,10 @@ impl std::str::FromStr for Spin {
     fn from_str(text: &str) -> Result<Self, String> {
         match text {
             "auto" => Ok(Self::Auto),
-            _ => text.parse().map(Self::Fixed).map_err(|_| "expected microseconds, or auto".to_owned()),
+            _ => text
+                .parse()
+                .map(Self::Fixed)
+                .map_err(|_| "expected microseconds, or auto".to_owned()),
         }
     }
 }
@@ -65,7 +68,9 @@ impl SpinSearch {
         let [p50, p99] = self.at_most_us;
         let share = 100.0 * self.core_share;
         match self.found_us {
-            Some(us) => format!("a spin of {us} us brings p50 to at most {p50:.1} us and p99 to at most {p99:.1} us; it takes up to {share:.1} % of the core"),
+            Some(us) => format!(
+                "a spin of {us} us brings p50 to at most {p50:.1} us and p99 to at most {p99:.1} us; it takes up to {share:.1} % of the core"
+            ),
             None => format!(
                 "no spin up to {} us brings p50 to at most {p50:.1} us and p99 to at most {p99:.1} us; the longest is used, which takes up to {share:.1} % of the core",
                 self.used_us
@@ -100,7 +105,14 @@ pub fn search(setup: &Setup, longest_us: u64, interrupted: &AtomicBool) -> Resul
             spin_ns: spin_us * 1_000,
             ..setup.options.clone()
         };
-        let ours = measure(&Setup { options: &options, ..setup }, interrupted).map(|m| m.haptic.wake);
+        let ours = measure(
+            &Setup {
+                options: &options,
+                ..setup
+            },
+            interrupted,
+        )
+        .map(|m| m.haptic.wake);
         let Ok(ours) = ours.map_err(|why| failed = Some(why)) else {
             return false;
         };
@@ -161,7 +173,10 @@ mod tests {
                 us >= needed
             });
             let found = found.expect("400 is enough");
-            assert!(found >= needed && found < needed + STEP_US.max(1) + 1, "{found} for {needed}");
+            assert!(
+                found >= needed && found < needed + STEP_US.max(1) + 1,
+                "{found} for {needed}"
+            );
             assert!(trials <= 13, "{trials} trials for {needed}");
         }
         assert_eq!(smallest(100, |us| us > 150), None);

@@ -47,7 +47,11 @@ fn kill_after_progress(file: &Path, out: &Path, seconds: f64) {
     let mut child = start(file, out);
     let begin = Instant::now();
     while measured_s(out) < before + seconds {
-        assert!(begin.elapsed() < Duration::from_secs(40), "no checkpoint: {} s", measured_s(out));
+        assert!(
+            begin.elapsed() < Duration::from_secs(40),
+            "no checkpoint: {} s",
+            measured_s(out)
+        );
         std::thread::sleep(Duration::from_millis(50));
     }
     child.kill().expect("ours");
@@ -84,7 +88,10 @@ fn a_campaign_killed_three_times_gives_one_report_and_counts_no_second_twice() {
         let measured = part["measured_s"].as_f64().expect("a time");
         // Each grid point was either served or missed, once. Those missed between the last tick of a session and its end, and
         // those before its first, are at most a few.
-        assert!((points - measured * rate).abs() <= 0.02 * measured * rate, "{points} of {measured} s at {rate} Hz");
+        assert!(
+            (points - measured * rate).abs() <= 0.02 * measured * rate,
+            "{points} of {measured} s at {rate} Hz"
+        );
         let windows = part["maxima"].as_array().expect("a list");
         let in_windows: f64 = windows.iter().map(|w| w["ticks"].as_f64().expect("a count")).sum();
         assert_eq!(Some(in_windows), force["ticks"].as_f64());
@@ -93,18 +100,28 @@ fn a_campaign_killed_three_times_gives_one_report_and_counts_no_second_twice() {
     // The times of the sessions lie apart.
     let mut times: Vec<(u64, u64)> = Vec::new();
     for s in report["sessions"].as_array().expect("a list") {
-        let record: Value =
-            serde_json::from_str(&std::fs::read_to_string(out.join(s["file"].as_str().expect("a name"))).expect("there")).expect("JSON");
+        let record: Value = serde_json::from_str(
+            &std::fs::read_to_string(out.join(s["file"].as_str().expect("a name"))).expect("there"),
+        )
+        .expect("JSON");
         let number = |key: &str| record[key].as_u64().expect("a number");
         times.push((number("first_due_ns"), number("first_due_ns") + number("measured_ns")));
     }
     times.sort_unstable();
     assert!(times.windows(2).all(|w| w[0].1 <= w[1].0), "{times:?}");
-    assert!(std::fs::read_to_string(out.join("campaign.html")).expect("a page").contains("<svg"));
+    assert!(
+        std::fs::read_to_string(out.join("campaign.html"))
+            .expect("a page")
+            .contains("<svg")
+    );
     // Once complete, it measures nothing more; another file for the same folder is refused.
     assert_eq!(start(&file, &out).wait().expect("ours").code(), Some(0));
-    let again: Value = serde_json::from_str(&std::fs::read_to_string(out.join("campaign.json")).expect("a report")).expect("JSON");
-    assert_eq!((&again["measured_s"], &again["sessions"]), (&report["measured_s"], &report["sessions"]));
+    let again: Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("campaign.json")).expect("a report")).expect("JSON");
+    assert_eq!(
+        (&again["measured_s"], &again["sessions"]),
+        (&report["measured_s"], &report["sessions"])
+    );
     std::fs::write(&file, FILE.replace("6s", "7s")).expect("written");
     assert_eq!(start(&file, &out).wait().expect("ours").code(), Some(1));
 }

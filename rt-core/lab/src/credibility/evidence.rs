@@ -27,17 +27,32 @@ pub const CATEGORIES: &[Category] = &[
         number: 1,
         name: "Code verification results",
         there: &[
-            ("finite elements against kept solutions of another solver, a dense solver, closed forms", "rt-core/sim/src/tissue/fem/tests"),
-            ("needle line against Kelvin, Hetenyi and the cantilever", "rt-core/sim/src/line"),
-            ("dose against an independent evaluation of TG-43U1, histograms against closed forms", "tests/dose/src"),
-            ("readers under a fuzzer and a corpus of damaged files", "tests/files/src/corpus.rs"),
+            (
+                "finite elements against kept solutions of another solver, a dense solver, closed forms",
+                "rt-core/sim/src/tissue/fem/tests",
+            ),
+            (
+                "needle line against Kelvin, Hetenyi and the cantilever",
+                "rt-core/sim/src/line",
+            ),
+            (
+                "dose against an independent evaluation of TG-43U1, histograms against closed forms",
+                "tests/dose/src",
+            ),
+            (
+                "readers under a fuzzer and a corpus of damaged files",
+                "tests/files/src/corpus.rs",
+            ),
         ],
         missing: "The independent solutions were made by this project's authors with other programs, not by a third party.",
     },
     Category {
         number: 2,
         name: "Model calibration evidence",
-        there: &[("every parameter with unit, limits and its source in the literature", "shm-schema/src/params/table.rs")],
+        there: &[(
+            "every parameter with unit, limits and its source in the literature",
+            "shm-schema/src/params/table.rs",
+        )],
         missing: "Parameters come from publications. None was fitted to measurements of this project.",
     },
     Category {
@@ -55,15 +70,24 @@ pub const CATEGORIES: &[Category] = &[
     Category {
         number: 5,
         name: "Population-based validation results",
-        there: &[("studies of thousands of simulated insertions beside published forces and shifts", "docs/study.md")],
+        there: &[(
+            "studies of thousands of simulated insertions beside published forces and shifts",
+            "docs/study.md",
+        )],
         missing: "Simulated populations were compared with published figures, not with data of a population.",
     },
     Category {
         number: 6,
         name: "Emergent model behavior",
         there: &[
-            ("the gland moves until its membrane gives way; force drops at puncture and turns on reversal", "tests/physics/src/needle.rs"),
-            ("seeds end off plan by the motion of the gland", "tests/tests/system/insertion.rs"),
+            (
+                "the gland moves until its membrane gives way; force drops at puncture and turns on reversal",
+                "tests/physics/src/needle.rs",
+            ),
+            (
+                "seeds end off plan by the motion of the gland",
+                "tests/tests/system/insertion.rs",
+            ),
         ],
         missing: "",
     },
@@ -80,10 +104,22 @@ pub const CATEGORIES: &[Category] = &[
         number: 8,
         name: "Calculation verification and UQ results using COU simulations",
         there: &[
-            ("speed against error of every model at three spacings, distance from the converged solution", "benches/runs"),
-            ("hard cases of every model, those that are not met included", "docs/stability.md"),
-            ("half the tick and half the spacing in the contact of the needle", "rt-core/sim/src/line/contact/tests.rs"),
-            ("uncertainty of placement carried to dose metrics", "host-ui/dose/src/perturb"),
+            (
+                "speed against error of every model at three spacings, distance from the converged solution",
+                "benches/runs",
+            ),
+            (
+                "hard cases of every model, those that are not met included",
+                "docs/stability.md",
+            ),
+            (
+                "half the tick and half the spacing in the contact of the needle",
+                "rt-core/sim/src/line/contact/tests.rs",
+            ),
+            (
+                "uncertainty of placement carried to dose metrics",
+                "host-ui/dose/src/perturb",
+            ),
         ],
         missing: "The distance to the continuum is not part of the reported error; parameters are varied in studies, not in every run.",
     },

@@ -94,7 +94,11 @@ struct Traced {
 /// # Errors
 /// A report is invalid or was altered, or the files cannot be written.
 pub fn run(args: &CredibilityArgs) -> Result<u8, CredibilityError> {
-    let runs = args.run.iter().map(|folder| runs::read(folder)).collect::<Result<Vec<Run>, _>>()?;
+    let runs = args
+        .run
+        .iter()
+        .map(|folder| runs::read(folder))
+        .collect::<Result<Vec<Run>, _>>()?;
     let credibility = credibility(runs);
     std::fs::create_dir_all(&args.out).map_err(|source| CredibilityError::Folder {
         path: args.out.clone(),

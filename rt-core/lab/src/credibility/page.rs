@@ -59,15 +59,31 @@ fn link(id: &str) -> Markup {
 
 fn hazards(c: &Credibility) -> Markup {
     let held_by = |id: &str| {
-        let all: Vec<&Traced> = c.requirements.iter().filter(|r| r.requirement.hazards.contains(&id)).collect();
+        let all: Vec<&Traced> = c
+            .requirements
+            .iter()
+            .filter(|r| r.requirement.hazards.contains(&id))
+            .collect();
         html! { @for r in all { (link(r.requirement.id)) " " } }
     };
     let rows: Vec<Vec<Markup>> = c
         .hazards
         .iter()
-        .map(|h| vec![anchor(h.id), cell(h.hazard), cell(h.situation), cell(h.harm), held_by(h.id)])
+        .map(|h| {
+            vec![
+                anchor(h.id),
+                cell(h.hazard),
+                cell(h.situation),
+                cell(h.harm),
+                held_by(h.id),
+            ]
+        })
         .collect();
-    table(&["id", "hazard", "situation", "harm", "held off by"], &rows, &[Column::Text; 5])
+    table(
+        &["id", "hazard", "situation", "harm", "held off by"],
+        &rows,
+        &[Column::Text; 5],
+    )
 }
 
 fn requirements(c: &Credibility) -> Markup {
@@ -120,8 +136,19 @@ fn runs(c: &Credibility) -> Markup {
             ]
         })
         .collect();
-    let columns = [Column::Text, Column::Text, Column::Text, Column::Text, Column::Text, Column::Wide];
-    table(&["id", "made", "measured", "verdict", "environment", "file and SHA-256"], &rows, &columns)
+    let columns = [
+        Column::Text,
+        Column::Text,
+        Column::Text,
+        Column::Text,
+        Column::Text,
+        Column::Wide,
+    ];
+    table(
+        &["id", "made", "measured", "verdict", "environment", "file and SHA-256"],
+        &rows,
+        &columns,
+    )
 }
 
 fn categories(c: &Credibility) -> Markup {
@@ -142,7 +169,11 @@ fn categories(c: &Credibility) -> Markup {
 }
 
 fn factors(c: &Credibility) -> Markup {
-    let rows: Vec<Vec<Markup>> = c.factors.iter().map(|f| vec![cell(f.activity), cell(f.name), cell(f.what)]).collect();
+    let rows: Vec<Vec<Markup>> = c
+        .factors
+        .iter()
+        .map(|f| vec![cell(f.activity), cell(f.name), cell(f.what)])
+        .collect();
     table(&["activity", "factor", "state"], &rows, &[Column::Text; 3])
 }
 
@@ -152,14 +183,23 @@ fn packages(c: &Credibility) -> Markup {
         *licences.entry(&p.licence).or_default() += 1;
     }
     let mut licences: Vec<_> = licences.into_iter().collect();
-    licences.sort_by(|a, b| b.1.cmp(&a.1));
-    let counts: Vec<Vec<Markup>> = licences.iter().map(|(licence, n)| vec![cell(licence), cell(n)]).collect();
+    licences.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
+    let counts: Vec<Vec<Markup>> = licences
+        .iter()
+        .map(|(licence, n)| vec![cell(licence), cell(n)])
+        .collect();
     let rows: Vec<Vec<Markup>> = c
         .packages
         .iter()
         .map(|p| {
             let known = p.known_anomalies.join(" ");
-            vec![cell(&p.name), cell(&p.version), cell(&p.licence), cell(p.of), cell(known)]
+            vec![
+                cell(&p.name),
+                cell(&p.version),
+                cell(&p.licence),
+                cell(p.of),
+                cell(known),
+            ]
         })
         .collect();
     html! {

@@ -1,7 +1,7 @@
 //! Reports of `rt-core latency` as evidence: digest and outcome of each limit.
 
-use crate::report::{JSON, NO_DIGEST, SCHEMA};
 use crate::provenance::sha256;
+use crate::report::{JSON, NO_DIGEST, SCHEMA};
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -44,7 +44,9 @@ pub fn read(folder: &Path) -> Result<Run, RunError> {
     }
     let digest = word(&report["sha256"]);
     if sha256(text.replacen(&digest, NO_DIGEST, 1).as_bytes()) != digest {
-        return Err(failed("altered since it was written: its SHA-256 is another".to_owned()));
+        return Err(failed(
+            "altered since it was written: its SHA-256 is another".to_owned(),
+        ));
     }
     let p = &report["protocol"];
     let limits = report["verdict"]["limits"].as_array().cloned().unwrap_or_default();

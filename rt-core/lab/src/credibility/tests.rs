@@ -5,8 +5,8 @@ use super::runs;
 use super::soup;
 use super::trace::{HAZARDS, REQUIREMENTS};
 use super::{credibility, page};
-use crate::report::NO_DIGEST;
 use crate::provenance::sha256;
+use crate::report::NO_DIGEST;
 use crate::verdict::LIMITS;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,11 @@ fn every_test_that_is_named_exists() {
         assert!(!r.tests.is_empty(), "{} has no test", r.id);
         for (file, test) in r.tests {
             let text = std::fs::read_to_string(repository(file)).unwrap_or_else(|e| panic!("{}: {file}: {e}", r.id));
-            assert!(text.contains(&format!("fn {test}(")), "{}: no test {test} in {file}", r.id);
+            assert!(
+                text.contains(&format!("fn {test}(")),
+                "{}: no test {test} in {file}",
+                r.id
+            );
         }
     }
 }
@@ -31,11 +35,19 @@ fn every_hazard_is_held_off_and_every_limit_is_a_requirement() {
     let ids: BTreeSet<&str> = REQUIREMENTS.iter().map(|r| r.id).collect();
     assert_eq!(ids.len(), REQUIREMENTS.len(), "an id stands twice");
     for h in HAZARDS {
-        assert!(REQUIREMENTS.iter().any(|r| r.hazards.contains(&h.id)), "nothing holds off {}", h.id);
+        assert!(
+            REQUIREMENTS.iter().any(|r| r.hazards.contains(&h.id)),
+            "nothing holds off {}",
+            h.id
+        );
     }
     for r in REQUIREMENTS {
         assert!(!r.hazards.is_empty(), "{}", r.id);
-        assert!(r.hazards.iter().all(|id| HAZARDS.iter().any(|h| h.id == *id)), "{}", r.id);
+        assert!(
+            r.hazards.iter().all(|id| HAZARDS.iter().any(|h| h.id == *id)),
+            "{}",
+            r.id
+        );
     }
     for limit in LIMITS {
         assert!(ids.contains(limit.id), "{} is no requirement of the file", limit.id);
@@ -49,7 +61,10 @@ fn places_of_evidence_exist_and_both_lists_are_whole() {
     assert_eq!(FACTORS.len(), 13);
     for (what, place) in CATEGORIES.iter().flat_map(|c| c.there) {
         // What is no path is a command.
-        assert!(repository(place).exists() || place.starts_with("rt-core "), "{what}: {place}");
+        assert!(
+            repository(place).exists() || place.starts_with("rt-core "),
+            "{what}: {place}"
+        );
     }
 }
 
@@ -57,17 +72,34 @@ fn places_of_evidence_exist_and_both_lists_are_whole() {
 fn packages_have_their_licence_and_program() {
     let all = soup::packages();
     assert!(all.len() > 100, "{}", all.len());
-    let of = |name: &str| all.iter().find(|p| p.name == name).unwrap_or_else(|| panic!("no {name}"));
-    assert_eq!((of("iceoryx2").of, of("iceoryx2").licence.as_str()), ("both", "MIT OR Apache-2.0"));
+    let of = |name: &str| {
+        all.iter()
+            .find(|p| p.name == name)
+            .unwrap_or_else(|| panic!("no {name}"))
+    };
+    assert_eq!(
+        (of("iceoryx2").of, of("iceoryx2").licence.as_str()),
+        ("both", "MIT OR Apache-2.0")
+    );
     assert!(!of("iceoryx2").known_anomalies.is_empty());
     assert_eq!(of("egui").of, "host-ui");
-    assert!(all.iter().all(|p| !p.name.starts_with("stylet-") && p.name != "host-ui"));
+    assert!(
+        all.iter()
+            .all(|p| !p.name.starts_with("stylet-") && p.name != "host-ui")
+    );
 }
 
 #[test]
 fn the_page_says_what_it_is_not() {
     let page = page::page(&credibility(Vec::new()));
-    for words in ["claims conformity with none", "not a medical device", "IEC 62304", "ISO 14971", "IEC 60601-1", "no run given"] {
+    for words in [
+        "claims conformity with none",
+        "not a medical device",
+        "IEC 62304",
+        "ISO 14971",
+        "IEC 60601-1",
+        "no run given",
+    ] {
         assert!(page.contains(words), "{words}");
     }
     // Every link has its place.
@@ -89,11 +121,23 @@ fn outcomes_of_a_run_stand_beside_their_requirement_and_an_altered_run_is_refuse
     let text = text.replacen(NO_DIGEST, &digest, 1);
     std::fs::write(folder.join("report.json"), &text).expect("written");
     let file = credibility(vec![runs::read(&folder).expect("unaltered")]);
-    let of = |id: &str| &file.requirements.iter().find(|t| t.requirement.id == id).expect("there").outcomes;
+    let of = |id: &str| {
+        &file
+            .requirements
+            .iter()
+            .find(|t| t.requirement.id == id)
+            .expect("there")
+            .outcomes
+    };
     assert_eq!(*of("REQ-LAT-002"), [(1, "FAIL".to_owned())]);
     assert!(of("REQ-LAT-001").is_empty());
     assert!(page::page(&file).contains("id=\"RUN-1\""));
     std::fs::write(folder.join("report.json"), text.replacen("FAIL", "PASS", 1)).expect("written");
-    assert!(runs::read(&folder).expect_err("altered").to_string().contains("altered"));
+    assert!(
+        runs::read(&folder)
+            .expect_err("altered")
+            .to_string()
+            .contains("altered")
+    );
     std::fs::remove_dir_all(folder).expect("ours");
 }

@@ -85,7 +85,10 @@ pub const HAZARDS: &[Hazard] = &[
     },
 ];
 
-const LATENCY: &[(&str, &str)] = &[("tests/tests/system/lab_latency.rs", "report_holds_the_whole_path_and_the_loops_stayed_clean")];
+const LATENCY: &[(&str, &str)] = &[(
+    "tests/tests/system/lab_latency.rs",
+    "report_holds_the_whole_path_and_the_loops_stayed_clean",
+)];
 
 /// A limit of `rt-core latency`.
 const fn limit(id: &'static str, what: &'static str, hazards: &'static [&'static str]) -> Requirement {
@@ -103,8 +106,14 @@ pub const REQUIREMENTS: &[Requirement] = &[
         what: "Magnitude and rate of the force stay within the limits of settings and device, whatever is asked for.",
         hazards: &["HAZ-01", "HAZ-03"],
         tests: &[
-            ("rt-core/sim/src/force/gate/tests.rs", "neither_magnitude_nor_slew_is_ever_exceeded"),
-            ("rt-core/sim/src/force/gate/tests.rs", "the_device_limit_holds_whatever_the_settings_say"),
+            (
+                "rt-core/sim/src/force/gate/tests.rs",
+                "neither_magnitude_nor_slew_is_ever_exceeded",
+            ),
+            (
+                "rt-core/sim/src/force/gate/tests.rs",
+                "the_device_limit_holds_whatever_the_settings_say",
+            ),
         ],
     },
     Requirement {
@@ -120,7 +129,10 @@ pub const REQUIREMENTS: &[Requirement] = &[
         id: "REQ-FORCE-003",
         what: "Motors that are warm get no more than their continuous force.",
         hazards: &["HAZ-04"],
-        tests: &[("rt-core/sim/src/force/gate/tests.rs", "warm_motors_get_no_more_than_their_continuous_force")],
+        tests: &[(
+            "rt-core/sim/src/force/gate/tests.rs",
+            "warm_motors_get_no_more_than_their_continuous_force",
+        )],
     },
     Requirement {
         id: "REQ-FORCE-004",
@@ -131,8 +143,14 @@ pub const REQUIREMENTS: &[Requirement] = &[
                 "tests/physics/src/envelope.rs",
                 "no_hand_of_the_envelope_makes_the_loop_sing_at_any_lateness_anywhere",
             ),
-            ("tests/physics/src/envelope/on_line.rs", "no_hand_sings_on_a_line_in_tissue_of_any_stiffness"),
-            ("tests/physics/src/z_width.rs", "below_the_bound_no_wall_sings_at_any_rate_and_well_above_it_does"),
+            (
+                "tests/physics/src/envelope/on_line.rs",
+                "no_hand_sings_on_a_line_in_tissue_of_any_stiffness",
+            ),
+            (
+                "tests/physics/src/z_width.rs",
+                "below_the_bound_no_wall_sings_at_any_rate_and_well_above_it_does",
+            ),
         ],
     },
     Requirement {
@@ -183,7 +201,11 @@ pub const REQUIREMENTS: &[Requirement] = &[
     limit("REQ-LAT-001", "Wake-up of the force loop, p50.", &["HAZ-03"]),
     limit("REQ-LAT-002", "Wake-up of the force loop, p99.", &["HAZ-03"]),
     limit("REQ-LAT-003", "Wake-up of the force loop, p99.9.", &["HAZ-03"]),
-    limit("REQ-LAT-004", "Latest wake-up of the force loop.", &["HAZ-02", "HAZ-03"]),
+    limit(
+        "REQ-LAT-004",
+        "Latest wake-up of the force loop.",
+        &["HAZ-02", "HAZ-03"],
+    ),
     limit("REQ-LAT-005", "Jitter of the period, p99.", &["HAZ-03"]),
     limit("REQ-LAT-006", "Own work of a tick, p99.", &["HAZ-03"]),
     limit("REQ-LAT-007", "Own work of a tick, p99.9.", &["HAZ-03"]),
@@ -192,30 +214,60 @@ pub const REQUIREMENTS: &[Requirement] = &[
     limit("REQ-LAT-010", "Overruns.", &["HAZ-02", "HAZ-03"]),
     limit("REQ-LAT-011", "Tip moved to tissue answered, p99.", &["HAZ-05"]),
     limit("REQ-LAT-012", "Tip moved to host saw it, p99.", &["HAZ-05"]),
-    limit("REQ-LAT-013", "Stiffest stable wall at p99.9 of the delay.", &["HAZ-03"]),
+    limit(
+        "REQ-LAT-013",
+        "Stiffest stable wall at p99.9 of the delay.",
+        &["HAZ-03"],
+    ),
     Requirement {
         id: "REQ-RT-001",
         what: "Neither loop calls the heap once it is armed.",
         hazards: &["HAZ-02", "HAZ-03"],
-        tests: &[("tests/tests/system/rt_contract.rs", "armed_threads_make_no_heap_call_and_fault_no_page")],
+        tests: &[(
+            "tests/tests/system/rt_contract.rs",
+            "armed_threads_make_no_heap_call_and_fault_no_page",
+        )],
     },
     Requirement {
         id: "REQ-RT-002",
         what: "Neither loop faults a page once it is armed.",
         hazards: &["HAZ-02", "HAZ-03"],
-        tests: &[("tests/tests/system/rt_contract.rs", "armed_threads_make_no_heap_call_and_fault_no_page")],
+        tests: &[(
+            "tests/tests/system/rt_contract.rs",
+            "armed_threads_make_no_heap_call_and_fault_no_page",
+        )],
     },
-    limit("REQ-RT-003", "Neither loop waits for another thread.", &["HAZ-02", "HAZ-03"]),
-    limit("REQ-RT-004", "Measuring costs a tick at most a microsecond, p99.", &["HAZ-09"]),
+    limit(
+        "REQ-RT-003",
+        "Neither loop waits for another thread.",
+        &["HAZ-02", "HAZ-03"],
+    ),
+    limit(
+        "REQ-RT-004",
+        "Measuring costs a tick at most a microsecond, p99.",
+        &["HAZ-09"],
+    ),
     Requirement {
         id: "REQ-MODEL-001",
         what: "The finite-element solver agrees with independent solutions: kept ones of another solver, a dense one, closed forms.",
         hazards: &["HAZ-05"],
         tests: &[
-            ("rt-core/sim/src/tissue/fem/tests/golden.rs", "agrees_with_the_golden_solutions"),
-            ("rt-core/sim/src/tissue/fem/tests/step.rs", "step_finds_what_a_dense_solver_finds"),
-            ("rt-core/sim/src/tissue/fem/tests/locking.rs", "oedometer_has_the_modulus_of_the_closed_form"),
-            ("rt-core/sim/src/tissue/fem/tests/operator.rs", "uniform_strain_is_exact_on_an_irregular_body"),
+            (
+                "rt-core/sim/src/tissue/fem/tests/golden.rs",
+                "agrees_with_the_golden_solutions",
+            ),
+            (
+                "rt-core/sim/src/tissue/fem/tests/step.rs",
+                "step_finds_what_a_dense_solver_finds",
+            ),
+            (
+                "rt-core/sim/src/tissue/fem/tests/locking.rs",
+                "oedometer_has_the_modulus_of_the_closed_form",
+            ),
+            (
+                "rt-core/sim/src/tissue/fem/tests/operator.rs",
+                "uniform_strain_is_exact_on_an_irregular_body",
+            ),
         ],
     },
     Requirement {
@@ -227,7 +279,10 @@ pub const REQUIREMENTS: &[Requirement] = &[
                 "rt-core/sim/src/line/compliance/tests.rs",
                 "a_line_load_in_a_fixed_cylinder_moves_tissue_by_the_logarithm",
             ),
-            ("rt-core/sim/src/line/compliance/tests.rs", "the_tip_moves_tissue_as_a_rigid_sphere_does"),
+            (
+                "rt-core/sim/src/line/compliance/tests.rs",
+                "the_tip_moves_tissue_as_a_rigid_sphere_does",
+            ),
             (
                 "rt-core/sim/src/line/beam/tests.rs",
                 "a_beam_on_an_elastic_foundation_decays_as_hetenyi_says",
@@ -245,8 +300,14 @@ pub const REQUIREMENTS: &[Requirement] = &[
         what: "Contact makes no energy, and half the tick and half the spacing change little.",
         hazards: &["HAZ-03", "HAZ-05"],
         tests: &[
-            ("rt-core/sim/src/line/contact/tests.rs", "ten_thousand_random_cycles_make_no_energy"),
-            ("rt-core/sim/src/line/contact/tests.rs", "half_the_tick_and_half_the_spacing_change_little"),
+            (
+                "rt-core/sim/src/line/contact/tests.rs",
+                "ten_thousand_random_cycles_make_no_energy",
+            ),
+            (
+                "rt-core/sim/src/line/contact/tests.rs",
+                "half_the_tick_and_half_the_spacing_change_little",
+            ),
         ],
     },
     Requirement {
@@ -258,7 +319,10 @@ pub const REQUIREMENTS: &[Requirement] = &[
                 "tests/dose/src/tg43.rs",
                 "dose_at_points_agrees_with_an_independent_evaluation_in_every_direction",
             ),
-            ("tests/dose/src/grid.rs", "any_grid_agrees_with_the_loop_over_seeds_and_voxels"),
+            (
+                "tests/dose/src/grid.rs",
+                "any_grid_agrees_with_the_loop_over_seeds_and_voxels",
+            ),
         ],
     },
     Requirement {
@@ -266,7 +330,10 @@ pub const REQUIREMENTS: &[Requirement] = &[
         what: "Histograms and metrics agree with closed forms and with numpy.",
         hazards: &["HAZ-06"],
         tests: &[
-            ("tests/dose/src/dvh.rs", "doses_to_volumes_follow_the_closed_form_and_d01cc_is_not_d2cc"),
+            (
+                "tests/dose/src/dvh.rs",
+                "doses_to_volumes_follow_the_closed_form_and_d01cc_is_not_d2cc",
+            ),
             ("tests/tests/system/dose_cli.rs", "metrics_of_a_plan_agree_with_numpy"),
         ],
     },
@@ -275,7 +342,10 @@ pub const REQUIREMENTS: &[Requirement] = &[
         what: "Every format of image gives the same structures at the same place, oblique and anisotropic ones included.",
         hazards: &["HAZ-07"],
         tests: &[
-            ("tests/tests/system/formats.rs", "every_format_gives_the_same_structures_at_the_same_place"),
+            (
+                "tests/tests/system/formats.rs",
+                "every_format_gives_the_same_structures_at_the_same_place",
+            ),
             (
                 "tests/tests/system/volume.rs",
                 "procedure_runs_in_an_oblique_anisotropic_volume_and_the_geometry_is_right",
@@ -296,8 +366,14 @@ pub const REQUIREMENTS: &[Requirement] = &[
         what: "Nothing from shared memory is used unchecked; invalid commands are refused and counted.",
         hazards: &["HAZ-08"],
         tests: &[
-            ("tests/tests/system/shm_invalid.rs", "core_refuses_invalid_records_of_hosts_and_runs_on"),
-            ("tests/tests/system/process_hosts.rs", "ten_thousand_invalid_commands_are_all_refused_and_counted"),
+            (
+                "tests/tests/system/shm_invalid.rs",
+                "core_refuses_invalid_records_of_hosts_and_runs_on",
+            ),
+            (
+                "tests/tests/system/process_hosts.rs",
+                "ten_thousand_invalid_commands_are_all_refused_and_counted",
+            ),
         ],
     },
     Requirement {
@@ -305,8 +381,14 @@ pub const REQUIREMENTS: &[Requirement] = &[
         what: "A file that cannot be used is refused with its reason, and the run goes on.",
         hazards: &["HAZ-08"],
         tests: &[
-            ("tests/tests/system/formats.rs", "a_scene_file_that_cannot_be_used_is_refused_and_the_scene_goes_on"),
-            ("tests/tests/system/volume.rs", "unusable_volumes_get_one_clear_message_and_the_scene_goes_on"),
+            (
+                "tests/tests/system/formats.rs",
+                "a_scene_file_that_cannot_be_used_is_refused_and_the_scene_goes_on",
+            ),
+            (
+                "tests/tests/system/volume.rs",
+                "unusable_volumes_get_one_clear_message_and_the_scene_goes_on",
+            ),
         ],
     },
     Requirement {

@@ -38,7 +38,9 @@ pub fn align(toggles_s: &[f64], edges_s: &[f64]) -> Result<Alignment, String> {
     let mut best = (0, 0, 0_isize);
     for shift in -(theirs.len() as isize - 1)..ours.len() as isize {
         let first = (-shift).max(0) as usize;
-        let all = theirs[first..].iter().zip(ours[(shift + first as isize) as usize..].iter());
+        let all = theirs[first..]
+            .iter()
+            .zip(ours[(shift + first as isize) as usize..].iter());
         let (mut same, mut of) = (0, 0);
         for (b, a) in all {
             of += 1;
@@ -56,7 +58,9 @@ pub fn align(toggles_s: &[f64], edges_s: &[f64]) -> Result<Alignment, String> {
     }
     let pair = |edge: usize| {
         let toggle = edge as isize + shift;
-        (0..toggles_s.len() as isize).contains(&toggle).then_some((toggle as usize, edge))
+        (0..toggles_s.len() as isize)
+            .contains(&toggle)
+            .then_some((toggle as usize, edge))
     };
     let pairs: Vec<(usize, usize)> = (0..edges_s.len()).filter_map(pair).collect();
     Ok(line(toggles_s, edges_s, pairs))

@@ -39,9 +39,16 @@ pub fn delay(capture: &Capture, pin: &Channel, alignment: &Alignment, channel: &
     let mut delays: Vec<f64> = Vec::new();
     for (i, &(_, edge)) in alignment.pairs.iter().enumerate() {
         let at_s = pin.edges_s[edge];
-        let next_s = alignment.pairs.get(i + 1).map_or(f64::MAX, |&(_, next)| pin.edges_s[next]);
+        let next_s = alignment
+            .pairs
+            .get(i + 1)
+            .map_or(f64::MAX, |&(_, next)| pin.edges_s[next]);
         let place = channel.edges_s.partition_point(|e| *e < at_s);
-        if let Some(answer_s) = channel.edges_s.get(place).filter(|a| **a < next_s && **a - at_s < LATEST_S) {
+        if let Some(answer_s) = channel
+            .edges_s
+            .get(place)
+            .filter(|a| **a < next_s && **a - at_s < LATEST_S)
+        {
             // The instrument's clock is not ours.
             delays.push((answer_s - at_s) / (1.0 + alignment.drift));
         }
@@ -68,25 +75,39 @@ pub fn delay(capture: &Capture, pin: &Channel, alignment: &Alignment, channel: &
             "repeatability",
             'A',
             scatter_s / n.sqrt(),
-            format!("standard deviation {:.1} us of {n} delays, over the root of their number", scatter_s * 1e6),
+            format!(
+                "standard deviation {:.1} us of {n} delays, over the root of their number",
+                scatter_s * 1e6
+            ),
         ),
         term(
             "sampling",
             'B',
             capture.step_s / 6_f64.sqrt(),
-            format!("both edges lie anywhere within a sample of {:.2} us (two rectangles); not averaged", capture.step_s * 1e6),
+            format!(
+                "both edges lie anywhere within a sample of {:.2} us (two rectangles); not averaged",
+                capture.step_s * 1e6
+            ),
         ),
         term(
             "threshold",
             'B',
             (pin.rise_s.powi(2) + channel.rise_s.powi(2)).sqrt() / 12_f64.sqrt(),
-            format!("an edge lasts {:.2} and {:.2} us (rectangles)", pin.rise_s * 1e6, channel.rise_s * 1e6),
+            format!(
+                "an edge lasts {:.2} and {:.2} us (rectangles)",
+                pin.rise_s * 1e6,
+                channel.rise_s * 1e6
+            ),
         ),
         term(
             "clock of the instrument",
             'B',
             mean_s * alignment.drift_u,
-            format!("drift {:.3} ppm, known to {:.4} ppm, over the delay", alignment.drift * 1e6, alignment.drift_u * 1e6),
+            format!(
+                "drift {:.3} ppm, known to {:.4} ppm, over the delay",
+                alignment.drift * 1e6,
+                alignment.drift_u * 1e6
+            ),
         ),
     ];
     let combined_us = terms.iter().map(|t| t.us * t.us).sum::<f64>().sqrt();

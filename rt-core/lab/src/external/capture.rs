@@ -33,7 +33,11 @@ pub fn read(path: &Path) -> Result<Capture, String> {
         wav(&bytes)
     } else {
         let text = String::from_utf8(bytes).map_err(|_| "neither WAV nor text".to_owned())?;
-        if text.contains("$timescale") { vcd(&text) } else { csv(&text) }
+        if text.contains("$timescale") {
+            vcd(&text)
+        } else {
+            csv(&text)
+        }
     }?;
     if capture.channels.iter().all(|c| c.edges_s.is_empty()) {
         return Err("no input ever changes".to_owned());
@@ -51,7 +55,10 @@ pub fn csv(text: &str) -> Result<Capture, String> {
     let mut channels: Vec<Channel> = Vec::new();
     let mut levels: Vec<bool> = Vec::new();
     let mut row = 0_u64;
-    for line in text.lines().filter(|l| !l.starts_with([';', '#']) && !l.trim().is_empty()) {
+    for line in text
+        .lines()
+        .filter(|l| !l.starts_with([';', '#']) && !l.trim().is_empty())
+    {
         let cells: Vec<&str> = line.split(',').map(str::trim).collect();
         let Some(now) = cells.iter().map(|c| level(c)).collect::<Option<Vec<bool>>>() else {
             // The head names the channels.
@@ -62,10 +69,17 @@ pub fn csv(text: &str) -> Result<Capture, String> {
             continue;
         };
         if channels.is_empty() {
-            channels = (0..now.len().min(MOST_CHANNELS)).map(|i| channel(&format!("D{i}"))).collect();
+            channels = (0..now.len().min(MOST_CHANNELS))
+                .map(|i| channel(&format!("D{i}")))
+                .collect();
         }
         if now.len() != channels.len() {
-            return Err(format!("row {} has {} values, expected {}", row + 1, now.len(), channels.len()));
+            return Err(format!(
+                "row {} has {} values, expected {}",
+                row + 1,
+                now.len(),
+                channels.len()
+            ));
         }
         for (i, channel) in channels.iter_mut().enumerate() {
             if levels.get(i).is_some_and(|before| *before != now[i]) {
@@ -100,7 +114,9 @@ fn level(cell: &str) -> Option<bool> {
 
 /// `1 MHz`, `24MHz`, `500 kHz`, in hertz.
 fn frequency(text: &str) -> Option<f64> {
-    let end = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+    let end = text
+        .find(|c: char| !c.is_ascii_digit() && c != '.')
+        .unwrap_or(text.len());
     let value: f64 = text[..end].parse().ok()?;
     let factor = match text[end..].trim() {
         "Hz" | "" => 1.0,
@@ -116,7 +132,11 @@ fn frequency(text: &str) -> Option<f64> {
 pub fn vcd(text: &str) -> Result<Capture, String> {
     let words: Vec<&str> = text.split_whitespace().collect();
     let place = words.iter().position(|w| *w == "$timescale").ok_or("no $timescale")?;
-    let scale: String = words[place + 1..].iter().take_while(|w| **w != "$end").copied().collect();
+    let scale: String = words[place + 1..]
+        .iter()
+        .take_while(|w| **w != "$end")
+        .copied()
+        .collect();
     let unit_s = seconds(&scale).ok_or_else(|| format!("$timescale {scale:?} is no time"))?;
     let mut ids: Vec<String> = Vec::new();
     let mut capture = Capture {
@@ -180,12 +200,21 @@ pub fn wav(bytes: &[u8]) -> Result<Capture, String> {
     while let (Some(name), Some(length)) = (bytes.get(at..at + 4), number(at + 4, 4)) {
         let begin = at + 8;
         match name {
-            b"fmt " => format = Some((number(begin, 2), number(begin + 2, 2), number(begin + 4, 4), number(begin + 14, 2))),
+            b"fmt " => {
+                format = Some((
+                    number(begin, 2),
+                    number(begin + 2, 2),
+                    number(begin + 4, 4),
+                    number(begin + 14, 2),
+                ))
+            }
             // A recorder that was stopped leaves a length past the end.
             b"data" => data = Some(&bytes[begin..(begin + length as usize).min(bytes.len())]),
             _ => {}
         }
-        at = begin.saturating_add(length as usize).saturating_add(length as usize % 2);
+        at = begin
+            .saturating_add(length as usize)
+            .saturating_add(length as usize % 2);
     }
     let Some((Some(1 | 0xfffe), Some(channels), Some(rate), Some(16))) = format else {
         return Err("expected WAV of 16 bits without compression".to_owned());
@@ -195,7 +224,11 @@ pub fn wav(bytes: &[u8]) -> Result<Capture, String> {
     };
     let channels = channels as usize;
     let sample = |pair: &[u8]| f64::from(i16::from_le_bytes([pair[0], pair[1]]));
-    let of_channel = |c: usize| -> Vec<f64> { data.chunks_exact(2 * channels).map(|f| sample(&f[2 * c..2 * c + 2])).collect() };
+    let of_channel = |c: usize| -> Vec<f64> {
+        data.chunks_exact(2 * channels)
+            .map(|f| sample(&f[2 * c..2 * c + 2]))
+            .collect()
+    };
     let step_s = 1.0 / f64::from(rate);
     Ok(Capture {
         kind: "WAV",
@@ -209,7 +242,7 @@ fn crossings(samples: &[f64], step_s: f64, number: usize) -> Channel {
     let low = samples.iter().copied().fold(f64::MAX, f64::min);
     let range = samples.iter().copied().fold(f64::MIN, f64::max) - low;
     // A few steps of the converter are noise.
-    if !(range > 64.0) {
+    if range <= 64.0 {
         return channel;
     }
     let middle = low + range / 2.0;
@@ -231,8 +264,9 @@ fn crossings(samples: &[f64], step_s: f64, number: usize) -> Channel {
             && let Some(at_s) = crossed_s
         {
             channel.edges_s.push(at_s);
-            // From one end of the range to the other, as seen by the band of the hysteresis.
-            rises.push((i - left) as f64 * step_s / (2.0 * HYSTERESIS) * 0.8);
+            // From a tenth to nine tenths, as fast as between these two samples.
+            let part = (b - samples[left]).abs() / range;
+            rises.push((i - left) as f64 * step_s * 0.8 / part);
         }
         (level, left) = (Some(now), i);
     }

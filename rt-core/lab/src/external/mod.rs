@@ -83,8 +83,13 @@ pub struct External {
 
 /// Writes the notes of a measurement.
 pub fn keep(folder: &Path, toggles: &[ToggleTime]) -> Result<(), WriteError> {
-    let rows = toggles.iter().map(|t| format!("{},{},{}\n", t.due_ns, t.before_ns, t.after_ns));
-    write_whole(&folder.join(TOGGLES), (format!("{HEAD}\n") + &rows.collect::<String>()).as_bytes())
+    let rows = toggles
+        .iter()
+        .map(|t| format!("{},{},{}\n", t.due_ns, t.before_ns, t.after_ns));
+    write_whole(
+        &folder.join(TOGGLES),
+        (format!("{HEAD}\n") + &rows.collect::<String>()).as_bytes(),
+    )
 }
 
 fn read_toggles(folder: &Path) -> Result<Vec<ToggleTime>, ExternalError> {
@@ -132,7 +137,10 @@ pub fn run(folder: &Path, file: &Path) -> Result<u8, ExternalError> {
         external.pairs, external.edges, external.drift_ppm, external.drift_expanded_ppm, external.pin_worst_us
     );
     for d in &external.delays {
-        println!("{}: {:.1} +- {:.1} us after the pin (k = 2)", d.channel, d.mean_us, d.expanded_us);
+        println!(
+            "{}: {:.1} +- {:.1} us after the pin (k = 2)",
+            d.channel, d.mean_us, d.expanded_us
+        );
     }
     external.without.iter().for_each(|why| println!("no delay: {why}"));
     println!("{}", folder.join(PAGE).display());
@@ -158,7 +166,12 @@ fn evaluate(toggles: &[ToggleTime], capture: &Capture, name: &str) -> Result<Ext
     };
     let pin_channel = &capture.channels[pin];
     let (mut delays, mut without) = (Vec::new(), Vec::new());
-    for (i, channel) in capture.channels.iter().enumerate().filter(|(_, c)| !c.edges_s.is_empty()) {
+    for (i, channel) in capture
+        .channels
+        .iter()
+        .enumerate()
+        .filter(|(_, c)| !c.edges_s.is_empty())
+    {
         if i != pin {
             match budget::delay(capture, pin_channel, &alignment, channel) {
                 Ok(delay) => delays.push(delay),
@@ -171,7 +184,9 @@ fn evaluate(toggles: &[ToggleTime], capture: &Capture, name: &str) -> Result<Ext
         .pairs
         .iter()
         .zip(&alignment.residuals_s)
-        .map(|(&(t, _), residual_s)| middle_s(&toggles[t]) * 1e6 - (toggles[t].due_ns as f64 - first_ns as f64) / 1e3 + residual_s * 1e6)
+        .map(|(&(t, _), residual_s)| {
+            middle_s(&toggles[t]) * 1e6 - (toggles[t].due_ns as f64 - first_ns as f64) / 1e3 + residual_s * 1e6
+        })
         .collect();
     due_to_pin.sort_by(f64::total_cmp);
     let at = |q: f64| due_to_pin[((due_to_pin.len() - 1) as f64 * q) as usize];

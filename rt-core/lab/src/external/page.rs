@@ -10,18 +10,30 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 pub fn page(e: &External) -> String {
     let [p50, p99, most] = e.due_to_pin_us;
     let rows = [
-        ("edges that are toggles of this run", format!("{} of {} edges, {} toggles", e.pairs, e.edges, e.toggles)),
+        (
+            "edges that are toggles of this run",
+            format!("{} of {} edges, {} toggles", e.pairs, e.edges, e.toggles),
+        ),
         (
             "the instrument's clock is faster by, ppm",
             format!("{:.3} \u{b1} {:.3} (k = 2)", e.drift_ppm, e.drift_expanded_ppm),
         ),
-        ("edges beside our record, standard deviation, \u{b5}s", num(e.pin_deviation_us)),
+        (
+            "edges beside our record, standard deviation, \u{b5}s",
+            num(e.pin_deviation_us),
+        ),
         ("edges beside our record, worst, \u{b5}s", num(e.pin_worst_us)),
         ("writing the pin took at most, \u{b5}s", num(e.pin_write_worst_us)),
-        ("due to pin, p50, p99 and latest, \u{b5}s", format!("{}, {}, {}", num(p50), num(p99), num(most))),
+        (
+            "due to pin, p50, p99 and latest, \u{b5}s",
+            format!("{}, {}, {}", num(p50), num(p99), num(most)),
+        ),
         ("sample of the instrument, \u{b5}s", num(e.sample_us)),
     ];
-    let rows: Vec<Vec<Markup>> = rows.into_iter().map(|(what, value)| vec![cell(what), cell(value)]).collect();
+    let rows: Vec<Vec<Markup>> = rows
+        .into_iter()
+        .map(|(what, value)| vec![cell(what), cell(value)])
+        .collect();
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -56,8 +68,18 @@ fn delay(d: &Delay) -> Markup {
         .iter()
         .map(|t| vec![cell(t.name), cell(t.kind), cell(num(t.us)), cell(micro(&t.why))])
         .collect();
-    rows.push(vec![html! { b { "combined" } }, cell(""), html! { b { (num(d.combined_us)) } }, cell("root of the sum of squares")]);
-    rows.push(vec![html! { b { "expanded" } }, cell(""), html! { b { (num(d.expanded_us)) } }, cell("k = 2")]);
+    rows.push(vec![
+        html! { b { "combined" } },
+        cell(""),
+        html! { b { (num(d.combined_us)) } },
+        cell("root of the sum of squares"),
+    ]);
+    rows.push(vec![
+        html! { b { "expanded" } },
+        cell(""),
+        html! { b { (num(d.expanded_us)) } },
+        cell("k = 2"),
+    ]);
     let columns = [Column::Text, Column::Text, Column::Number, Column::Wide];
     html! {
         h2 { "From the pin to " (d.channel) }

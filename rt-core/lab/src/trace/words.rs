@@ -73,7 +73,9 @@ fn nothing_ran(us: &str, who: &str, is_thread: bool, below: Below) -> String {
         Below {
             virtual_machine: true, ..
         } => format!("the hypervisor took the core for {us} (nothing ran; {who} had it)"),
-        _ => format!("nothing ran for {us} while {who} had the core: firmware, a deep sleep state, or interrupts that were off"),
+        _ => format!(
+            "nothing ran for {us} while {who} had the core: firmware, a deep sleep state, or interrupts that were off"
+        ),
     }
 }
 

@@ -28,7 +28,10 @@ impl FromStr for Pin {
     fn from_str(text: &str) -> Result<Self, String> {
         let expected = || format!("{text:?}: expected serial:0x3F8:rts, serial:0x3F8:dtr or parallel:0x378");
         let address = |word: &str| {
-            let digits = word.strip_prefix("0x").or(word.strip_prefix("0X")).ok_or_else(expected)?;
+            let digits = word
+                .strip_prefix("0x")
+                .or(word.strip_prefix("0X"))
+                .ok_or_else(expected)?;
             let port = u16::from_str_radix(digits, 16).map_err(|_| expected())?;
             // Below are the controllers of the board: nothing there is a serial or parallel port.
             (0x100..0xfff0).contains(&port).then_some(port).ok_or_else(expected)
@@ -61,7 +64,10 @@ impl Pin {
         // SAFETY: numbers only.
         if unsafe { libc::ioperm(libc::c_ulong::from(self.port), 1, 1) } != 0 {
             let why = std::io::Error::last_os_error();
-            return Err(format!("the port {:#x} may not be written ({why}): run as root", self.port));
+            return Err(format!(
+                "the port {:#x} may not be written ({why}): run as root",
+                self.port
+            ));
         }
         Ok(Toggle {
             pin: self,
@@ -112,7 +118,9 @@ impl Toggle {
     fn write(&self) {
         let value = self.pin.values[self.level];
         // SAFETY: `acquire` has the right to this port for this thread; the instruction touches no memory.
-        unsafe { std::arch::asm!("out dx, al", in("dx") self.pin.port, in("al") value, options(nomem, nostack, preserves_flags)) };
+        unsafe {
+            std::arch::asm!("out dx, al", in("dx") self.pin.port, in("al") value, options(nomem, nostack, preserves_flags))
+        };
     }
 
     #[cfg(not(target_arch = "x86_64"))]
@@ -126,20 +134,33 @@ mod tests {
     #[test]
     fn ports_are_read_and_what_is_none_is_refused() {
         let pin = |text: &str| text.parse::<Pin>();
-        assert_eq!(pin("serial:0x3F8:rts").map(|p| (p.port, p.values)), Ok((0x3fc, [8, 10])));
+        assert_eq!(
+            pin("serial:0x3F8:rts").map(|p| (p.port, p.values)),
+            Ok((0x3fc, [8, 10]))
+        );
         assert_eq!(pin("serial:0x2f8:dtr").map(|p| (p.port, p.values)), Ok((0x2fc, [8, 9])));
         assert_eq!(pin("parallel:0x378").map(|p| (p.port, p.values)), Ok((0x378, [0, 1])));
-        for none in ["", "serial:0x3F8", "serial:0x3F8:cts", "parallel:378", "parallel:0x20", "parallel:0xffff"] {
+        for none in [
+            "",
+            "serial:0x3F8",
+            "serial:0x3F8:cts",
+            "parallel:378",
+            "parallel:0x20",
+            "parallel:0xffff",
+        ] {
             assert!(pin(none).is_err(), "{none}");
         }
     }
 
-    /// The emulated or real serial port of this machine, where there is one and we may: what was written is read back.
+    /// The emulated serial port of a virtual machine, where we may write it: what was written is read back. On another machine
+    /// something may be connected.
     #[cfg(target_arch = "x86_64")]
     #[test]
     fn a_serial_port_takes_both_levels_in_a_pattern_without_equal_neighbours() {
         let ports = std::fs::read_to_string("/proc/ioports").unwrap_or_default();
-        let toggle = ports.contains("03f8-03ff : serial").then(|| "serial:0x3F8:rts".parse::<Pin>().and_then(Pin::acquire));
+        let emulated = std::fs::read_to_string("/proc/cpuinfo").is_ok_and(|c| c.contains(" hypervisor"));
+        let toggle = (emulated && ports.contains("03f8-03ff : serial"))
+            .then(|| "serial:0x3F8:rts".parse::<Pin>().and_then(Pin::acquire));
         let Some(Ok(mut toggle)) = toggle else {
             eprintln!("skipped: no serial port that may be written");
             return;
@@ -147,7 +168,9 @@ mod tests {
         let control = || {
             let value: u8;
             // SAFETY: `acquire` has the right to this port for this thread; reading it changes nothing.
-            unsafe { std::arch::asm!("in al, dx", in("dx") 0x3fc_u16, out("al") value, options(nomem, nostack, preserves_flags)) };
+            unsafe {
+                std::arch::asm!("in al, dx", in("dx") 0x3fc_u16, out("al") value, options(nomem, nostack, preserves_flags))
+            };
             value
         };
         let before = control();
@@ -161,9 +184,19 @@ mod tests {
             }
         }
         // SAFETY: as in `write`; the driver's own value comes back.
-        unsafe { std::arch::asm!("out dx, al", in("dx") 0x3fc_u16, in("al") before, options(nomem, nostack, preserves_flags)) };
-        assert!(edges.len() > 150 && edges[1..].iter().all(|n| (20..84).contains(n)), "{edges:?}");
-        let runs = |length: usize| edges.windows(length).map(<[i32]>::to_vec).collect::<std::collections::BTreeSet<_>>();
+        unsafe {
+            std::arch::asm!("out dx, al", in("dx") 0x3fc_u16, in("al") before, options(nomem, nostack, preserves_flags))
+        };
+        assert!(
+            edges.len() > 150 && edges[1..].iter().all(|n| (20..84).contains(n)),
+            "{edges:?}"
+        );
+        let runs = |length: usize| {
+            edges
+                .windows(length)
+                .map(<[i32]>::to_vec)
+                .collect::<std::collections::BTreeSet<_>>()
+        };
         // Three gaps in sequence occur once.
         assert_eq!(runs(3).len(), edges.len() - 2);
     }
