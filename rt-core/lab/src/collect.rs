@@ -1,6 +1,5 @@
 //! Collects the times of each tick into histograms, windows and the latest wake-ups; at normal priority.
 
-use crate::external::ToggleTime;
 use crate::sample::{Sample, histogram};
 use hdrhistogram::Histogram;
 use std::sync::mpsc::Sender;
@@ -39,6 +38,14 @@ pub struct LateTick {
     pub due_ns: u64,
     pub wake_ns: u64,
     pub work_ns: u64,
+}
+
+/// A toggle: when its tick was due, and our clock before and after the pin was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ToggleTime {
+    pub due_ns: u64,
+    pub before_ns: u64,
+    pub after_ns: u64,
 }
 
 /// Everything measured of one loop.

@@ -26,7 +26,7 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
     if args.spin_us == Spin::Auto {
         eprintln!("rt-core: looking for the smallest spin, trials of three seconds");
         let setup = setup_of(args, &options);
-        let search = spin::search(&setup, args.longest_spin_us(), interrupted)?;
+        let search = spin::search(&setup, args.longest_spin_us(), interrupted).map_err(|e| e.to_string())?;
         println!("{}", search.words());
         options.spin_ns = search.used_us * 1_000;
         spin_search = Some(search);

@@ -108,7 +108,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Stri
     let (haptic_in, haptic_ring) = ring(options.haptic_period_ns);
     let (tissue_in, tissue_ring) = ring(TISSUE_PERIOD_NS);
     // The loops' threads are started by this one and inherit the right to the pin.
-    let toggle = setup.toggle.map(Pin::acquire).transpose()?;
+    let toggle = setup.toggle.map(Pin::acquire).transpose().map_err(|e| e.to_string())?;
     let probes = Probes {
         haptic: Probe::new(haptic_in, Arc::clone(&pose_times)).with_toggle(toggle),
         tissue: Probe::new(tissue_in, Arc::clone(&pose_times)),

@@ -79,8 +79,13 @@ impl SpinSearch {
     }
 }
 
+/// Why no spin could be looked for; for people.
+#[derive(Debug, thiserror::Error)]
+#[error("--spin-us auto: {0}")]
+pub struct SpinError(String);
+
 /// Searches with trials of three seconds; `longest_us` is the longest spin that the kernel's share permits.
-pub fn search(setup: &Setup, longest_us: u64, interrupted: &AtomicBool) -> Result<SpinSearch, String> {
+pub fn search(setup: &Setup, longest_us: u64, interrupted: &AtomicBool) -> Result<SpinSearch, SpinError> {
     let setup = Setup {
         duration_ns: TRIAL_NS,
         trace_over_ns: None,
@@ -88,10 +93,10 @@ pub fn search(setup: &Setup, longest_us: u64, interrupted: &AtomicBool) -> Resul
         toggle: None,
         ..*setup
     };
-    let theirs = compare::cyclictest_turn(&setup, interrupted).map_err(|why| format!("--spin-us auto: {why}"))?;
+    let theirs = compare::cyclictest_turn(&setup, interrupted).map_err(SpinError)?;
     let at = |h: &Histogram<u64>, q| quantile_us(h, q);
     let (Some(p50), Some(p99)) = (at(&theirs, 0.5), at(&theirs, 0.99)) else {
-        return Err("--spin-us auto: cyclictest gave too few samples".to_owned());
+        return Err(SpinError("cyclictest gave too few samples".to_owned()));
     };
     let at_most_us = [SHARE * p50, SHARE * p99];
     let mut trials = Vec::new();
@@ -128,7 +133,7 @@ pub fn search(setup: &Setup, longest_us: u64, interrupted: &AtomicBool) -> Resul
         met
     });
     if let Some(why) = failed {
-        return Err(why);
+        return Err(SpinError(why));
     }
     let used_us = found_us.unwrap_or_else(|| trials.iter().map(|t| t.spin_us).max().unwrap_or(0));
     Ok(SpinSearch {

@@ -102,7 +102,7 @@ pub enum CampaignError {
 /// The file or a checkpoint is invalid, the folder is of another campaign or in use, or the loops do not run.
 pub fn run(args: &CampaignArgs, interrupted: &AtomicBool) -> Result<u8, CampaignError> {
     let text = read(&args.file)?;
-    let plan = Plan::of(&text).map_err(|problems| CampaignError::Plan(problems.join("\n")))?;
+    let plan = Plan::of(&text).map_err(|problems| CampaignError::Plan(problems.to_string()))?;
     std::fs::create_dir_all(&args.out).map_err(|source| CampaignError::Read {
         path: args.out.clone(),
         source,

@@ -73,10 +73,15 @@ fn kilohertz() -> u32 {
     1_000
 }
 
+/// Every problem with a file of a campaign, one a line.
+#[derive(Debug, thiserror::Error)]
+#[error("{}", .0.join("\n"))]
+pub struct PlanError(pub Vec<String>);
+
 impl Plan {
     /// The plan, or every problem with the file.
-    pub fn of(text: &str) -> Result<Self, Vec<String>> {
-        let raw: RawPlan = toml::from_str(text).map_err(|e| vec![e.to_string()])?;
+    pub fn of(text: &str) -> Result<Self, PlanError> {
+        let raw: RawPlan = toml::from_str(text).map_err(|e| PlanError(vec![e.to_string()]))?;
         let mut problems = Vec::new();
         let mut time = |key: &str, text: &str| {
             duration_ns(text)
@@ -118,7 +123,7 @@ impl Plan {
             }
         }
         if !problems.is_empty() {
-            return Err(problems);
+            return Err(PlanError(problems));
         }
         Ok(Self {
             name: raw.name,

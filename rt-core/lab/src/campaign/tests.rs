@@ -66,8 +66,13 @@ fn the_file_names_its_parts_and_every_problem() {
     assert_eq!((plan.window_ns, plan.checkpoint_ns), (2_000_000_000, 60_000_000_000));
     let problems =
         Plan::of("repeat = 0\nwindow = \"x\"\n[[part]]\nduration = \"5\"\nrate = 20\n").expect_err("invalid");
-    assert_eq!(problems.len(), 4, "{problems:?}");
-    assert!(Plan::of("[[part]]\nduration = \"5s\"\nlod = \"io\"\n").expect_err("a misspelt key")[0].contains("lod"));
+    assert_eq!(problems.0.len(), 4, "{problems:?}");
+    assert!(
+        Plan::of("[[part]]\nduration = \"5s\"\nlod = \"io\"\n")
+            .expect_err("a misspelt key")
+            .to_string()
+            .contains("lod")
+    );
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Context of use: the question that the model answers, for whom, and what it must not be used for.
+//! Context of use: the question that the model answers, for whom, and what it is not for.
 
 /// Heading and text.
 pub const CONTEXT: &[(&str, &str)] = &[

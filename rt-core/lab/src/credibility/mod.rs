@@ -1,12 +1,13 @@
 //! `rt-core credibility`: what an auditor asks for, in one file: what the simulator is for, what could harm, which test holds it
 //! off, and which run shows it.
 //!
-//! The tables are [`context`] (purpose and limits), [`trace`] (hazards and requirements) and [`evidence`] (the categories of
+//! The tables are [`context`] (purpose and limits), [`hazards`], [`trace`] (requirements) and [`evidence`] (the categories of
 //! the FDA's guidance, the factors of ASME V&V 40, with what is there and what is missing). Runs come from reports of
 //! `rt-core latency`. The file names standards as the vocabulary of its reader and claims conformity with none.
 
 mod context;
 mod evidence;
+mod hazards;
 mod page;
 mod runs;
 mod soup;
@@ -18,12 +19,13 @@ use crate::provenance;
 use clap::Args;
 use context::CONTEXT;
 use evidence::{CATEGORIES, Category, FACTORS, Factor};
+use hazards::{HAZARDS, Hazard};
 use runs::{Run, RunError};
 use serde::Serialize;
 use soup::Package;
 use std::path::PathBuf;
 use stylet_write::{WriteError, write_whole};
-use trace::{HAZARDS, Hazard, REQUIREMENTS, Requirement};
+use trace::{REQUIREMENTS, Requirement};
 
 const JSON: &str = "credibility.json";
 const PAGE: &str = "credibility.html";

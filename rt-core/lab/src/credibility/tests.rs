@@ -1,9 +1,10 @@
 //! Nothing in the credibility file leads nowhere: every id, test and place exists.
 
 use super::evidence::{CATEGORIES, FACTORS};
+use super::hazards::HAZARDS;
 use super::runs;
 use super::soup;
-use super::trace::{HAZARDS, REQUIREMENTS};
+use super::trace::REQUIREMENTS;
 use super::{credibility, page};
 use crate::provenance::sha256;
 use crate::report::NO_DIGEST;

@@ -1,5 +1,7 @@
 //! Which captured edge is which toggle of the loop: by the pattern of the times between them, then by a straight line.
 
+use super::capture::CaptureError;
+
 /// The line from our clock to that of the instrument, by least squares.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alignment {
@@ -24,13 +26,14 @@ const JITTER_S: f64 = 4e-4;
 const SHARE: f64 = 0.8;
 
 /// Aligns `edges_s` with `toggles_s`; the reason where they are not of one run.
-pub fn align(toggles_s: &[f64], edges_s: &[f64]) -> Result<Alignment, String> {
+pub fn align(toggles_s: &[f64], edges_s: &[f64]) -> Result<Alignment, CaptureError> {
     if edges_s.len() < FEWEST || toggles_s.len() < FEWEST {
         return Err(format!(
             "{} edges and {} toggles; expected at least {FEWEST} of each",
             edges_s.len(),
             toggles_s.len()
-        ));
+        )
+        .into());
     }
     let (ours, theirs) = (gaps(toggles_s), gaps(edges_s));
     let agrees = |a: f64, b: f64| (a - b).abs() < JITTER_S + DRIFT * a;
@@ -54,7 +57,8 @@ pub fn align(toggles_s: &[f64], edges_s: &[f64]) -> Result<Alignment, String> {
     if same + 1 < FEWEST || (same as f64) < SHARE * of as f64 {
         return Err(format!(
             "not a capture of this run: at best {same} of {of} times between edges agree with those between toggles"
-        ));
+        )
+        .into());
     }
     let pair = |edge: usize| {
         let toggle = edge as isize + shift;

@@ -1,7 +1,7 @@
 //! The delay from the pin to another input, with an uncertainty budget after the GUM (NIST TN 1297): each term named.
 
 use super::align::Alignment;
-use super::capture::{Capture, Channel};
+use super::capture::{Capture, CaptureError, Channel};
 use serde::Serialize;
 
 /// One term of a budget, as a standard uncertainty.
@@ -35,7 +35,12 @@ const LATEST_S: f64 = 0.5;
 const FEWEST: usize = 10;
 
 /// From each edge of the pin to the next one of `channel`, in seconds of our clock.
-pub fn delay(capture: &Capture, pin: &Channel, alignment: &Alignment, channel: &Channel) -> Result<Delay, String> {
+pub fn delay(
+    capture: &Capture,
+    pin: &Channel,
+    alignment: &Alignment,
+    channel: &Channel,
+) -> Result<Delay, CaptureError> {
     let mut delays: Vec<f64> = Vec::new();
     for (i, &(_, edge)) in alignment.pairs.iter().enumerate() {
         let at_s = pin.edges_s[edge];
@@ -59,7 +64,8 @@ pub fn delay(capture: &Capture, pin: &Channel, alignment: &Alignment, channel: &
             channel.name,
             delays.len(),
             alignment.pairs.len()
-        ));
+        )
+        .into());
     }
     let n = delays.len() as f64;
     let mean_s = delays.iter().sum::<f64>() / n;

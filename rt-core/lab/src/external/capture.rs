@@ -21,13 +21,30 @@ pub struct Capture {
     pub channels: Vec<Channel>,
 }
 
+/// Why a capture cannot be used; for people.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct CaptureError(String);
+
+impl From<String> for CaptureError {
+    fn from(why: String) -> Self {
+        Self(why)
+    }
+}
+
+impl From<&str> for CaptureError {
+    fn from(why: &str) -> Self {
+        Self(why.to_owned())
+    }
+}
+
 /// A sound card's samples are taken as edges where they cross half of their range with so much of it to spare.
 const HYSTERESIS: f64 = 0.15;
 /// Channels of a capture at most.
 const MOST_CHANNELS: usize = 64;
 
 /// Reads a capture by what its file begins with.
-pub fn read(path: &Path) -> Result<Capture, String> {
+pub fn read(path: &Path) -> Result<Capture, CaptureError> {
     let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
     let capture = if bytes.starts_with(b"RIFF") {
         wav(&bytes)
@@ -40,13 +57,13 @@ pub fn read(path: &Path) -> Result<Capture, String> {
         }
     }?;
     if capture.channels.iter().all(|c| c.edges_s.is_empty()) {
-        return Err("no input ever changes".to_owned());
+        return Err("no input ever changes".into());
     }
     Ok(capture)
 }
 
 /// Rows of 0 and 1 at the rate of the comment `; Samplerate: 1 MHz`.
-pub fn csv(text: &str) -> Result<Capture, String> {
+pub fn csv(text: &str) -> Result<Capture, CaptureError> {
     let comments = text.lines().filter_map(|l| l.strip_prefix([';', '#']));
     let rate_hz = comments
         .filter_map(|c| c.trim().split_once("amplerate:"))
@@ -63,7 +80,7 @@ pub fn csv(text: &str) -> Result<Capture, String> {
         let Some(now) = cells.iter().map(|c| level(c)).collect::<Option<Vec<bool>>>() else {
             // The head names the channels.
             if row > 0 || !channels.is_empty() {
-                return Err(format!("{line:?} is no row of 0 and 1"));
+                return Err(format!("{line:?} is no row of 0 and 1").into());
             }
             channels = cells.iter().take(MOST_CHANNELS).map(|name| channel(name)).collect();
             continue;
@@ -74,12 +91,7 @@ pub fn csv(text: &str) -> Result<Capture, String> {
                 .collect();
         }
         if now.len() != channels.len() {
-            return Err(format!(
-                "row {} has {} values, expected {}",
-                row + 1,
-                now.len(),
-                channels.len()
-            ));
+            return Err(format!("row {} has {} values, expected {}", row + 1, now.len(), channels.len()).into());
         }
         for (i, channel) in channels.iter_mut().enumerate() {
             if levels.get(i).is_some_and(|before| *before != now[i]) {
@@ -129,7 +141,7 @@ fn frequency(text: &str) -> Option<f64> {
 }
 
 /// Value change dump: `#time` and `0!` or `1!` for each wire.
-pub fn vcd(text: &str) -> Result<Capture, String> {
+pub fn vcd(text: &str) -> Result<Capture, CaptureError> {
     let words: Vec<&str> = text.split_whitespace().collect();
     let place = words.iter().position(|w| *w == "$timescale").ok_or("no $timescale")?;
     let scale: String = words[place + 1..]
@@ -151,7 +163,7 @@ pub fn vcd(text: &str) -> Result<Capture, String> {
         if word == "$var" {
             // $var wire 1 ! D0 $end
             let (Some(id), Some(name)) = (words.get(i + 3), words.get(i + 4)) else {
-                return Err("$var without its name".to_owned());
+                return Err("$var without its name".into());
             };
             if ids.len() < MOST_CHANNELS {
                 ids.push((*id).to_owned());
@@ -191,7 +203,7 @@ fn seconds(text: &str) -> Option<f64> {
 }
 
 /// Samples of 16 bits; an edge is where they cross the middle of their range, between two samples by a straight line.
-pub fn wav(bytes: &[u8]) -> Result<Capture, String> {
+pub fn wav(bytes: &[u8]) -> Result<Capture, CaptureError> {
     let number = |at: usize, length: usize| -> Option<u32> {
         let field = bytes.get(at..at + length)?;
         Some(field.iter().rev().fold(0, |sum, byte| sum << 8 | u32::from(*byte)))
@@ -217,10 +229,10 @@ pub fn wav(bytes: &[u8]) -> Result<Capture, String> {
             .saturating_add(length as usize % 2);
     }
     let Some((Some(1 | 0xfffe), Some(channels), Some(rate), Some(16))) = format else {
-        return Err("expected WAV of 16 bits without compression".to_owned());
+        return Err("expected WAV of 16 bits without compression".into());
     };
     let (Some(data), true) = (data, channels > 0 && channels as usize <= MOST_CHANNELS && rate > 0) else {
-        return Err("a WAV without samples".to_owned());
+        return Err("a WAV without samples".into());
     };
     let channels = channels as usize;
     let sample = |pair: &[u8]| f64::from(i16::from_le_bytes([pair[0], pair[1]]));

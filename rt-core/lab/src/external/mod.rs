@@ -11,9 +11,10 @@ mod page;
 #[cfg(test)]
 mod tests;
 
+use crate::collect::ToggleTime;
 use align::{Alignment, align};
 use budget::Delay;
-use capture::Capture;
+use capture::{Capture, CaptureError};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use stylet_write::{WriteError, write_whole};
@@ -23,14 +24,6 @@ pub const TOGGLES: &str = "toggles.csv";
 const JSON: &str = "external.json";
 const PAGE: &str = "external.html";
 const HEAD: &str = "due_ns,before_ns,after_ns";
-
-/// A toggle: when its tick was due, and our clock before and after the pin was written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ToggleTime {
-    pub due_ns: u64,
-    pub before_ns: u64,
-    pub after_ns: u64,
-}
 
 /// The capture cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -49,7 +42,7 @@ pub enum ExternalError {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
-        why: String,
+        why: CaptureError,
     },
     /// The results cannot be written.
     #[error(transparent)]
@@ -148,7 +141,7 @@ pub fn run(folder: &Path, file: &Path) -> Result<u8, ExternalError> {
 }
 
 /// The pin is the input that agrees best with the notes.
-fn evaluate(toggles: &[ToggleTime], capture: &Capture, name: &str) -> Result<External, String> {
+fn evaluate(toggles: &[ToggleTime], capture: &Capture, name: &str) -> Result<External, CaptureError> {
     let first_ns = toggles.first().map_or(0, |t| t.before_ns);
     let middle_s = |t: &ToggleTime| ((t.before_ns - first_ns) as f64 + (t.after_ns - t.before_ns) as f64 / 2.0) / 1e9;
     let ours: Vec<f64> = toggles.iter().map(middle_s).collect();
@@ -162,7 +155,7 @@ fn evaluate(toggles: &[ToggleTime], capture: &Capture, name: &str) -> Result<Ext
         }
     }
     let Some((pin, alignment)) = best else {
-        return Err(refused.join("; "));
+        return Err(refused.join("; ").into());
     };
     let pin_channel = &capture.channels[pin];
     let (mut delays, mut without) = (Vec::new(), Vec::new());
@@ -175,7 +168,7 @@ fn evaluate(toggles: &[ToggleTime], capture: &Capture, name: &str) -> Result<Ext
         if i != pin {
             match budget::delay(capture, pin_channel, &alignment, channel) {
                 Ok(delay) => delays.push(delay),
-                Err(why) => without.push(why),
+                Err(why) => without.push(why.to_string()),
             }
         }
     }

@@ -1,7 +1,8 @@
 //! Synthetic captures: a known shift and drift are recovered within the stated uncertainty; a capture of something else is refused.
 
 use super::capture::{self, Capture, Channel};
-use super::{ToggleTime, evaluate};
+use super::evaluate;
+use crate::collect::ToggleTime;
 use crate::random::SplitMix;
 
 const SHIFT_S: f64 = 500e-6;
@@ -138,31 +139,46 @@ fn a_capture_of_another_run_or_of_a_clock_is_refused() {
         (clock, "not a capture"),
         (own[..9].to_vec(), "at least 20"),
     ] {
-        let refused = evaluate(&ours, &capture(edges_s), "").expect_err("of something else");
+        let refused = evaluate(&ours, &capture(edges_s), "")
+            .expect_err("of something else")
+            .to_string();
         assert!(refused.contains(why), "{refused}");
     }
 }
 
 #[test]
 fn files_that_are_no_captures_are_refused_with_their_reason() {
-    assert!(capture::csv("0,1\n1,0\n").expect_err("no rate").contains("Samplerate"));
+    assert!(
+        capture::csv("0,1\n1,0\n")
+            .expect_err("no rate")
+            .to_string()
+            .contains("Samplerate")
+    );
     assert!(
         capture::csv("; Samplerate: 1 MHz\n0,1\n1\n")
             .expect_err("uneven")
+            .to_string()
             .contains("row 2")
     );
     assert!(
         capture::csv("; Samplerate: 1 MHz\na,b\n0,1\nx,0\n")
             .expect_err("no level")
+            .to_string()
             .contains("no row")
     );
     assert!(
         capture::vcd("$timescale 1 furlong $end\n")
             .expect_err("no unit")
+            .to_string()
             .contains("furlong")
     );
     assert!(capture::wav(b"RIFF\0\0\0\0WAVEfmt \xff\xff\xff\xff").is_err());
     let mut float = wav(&[[false, true]], 48_000);
     float[20] = 3;
-    assert!(capture::wav(&float).expect_err("floating point").contains("16 bits"));
+    assert!(
+        capture::wav(&float)
+            .expect_err("floating point")
+            .to_string()
+            .contains("16 bits")
+    );
 }

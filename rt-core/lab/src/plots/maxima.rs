@@ -13,16 +13,17 @@ pub struct MaximaPart<'a> {
     pub windows: Vec<(f64, f64, f64)>,
 }
 
-/// Seconds of measurement from the first window to the begin of each one: breaks between sessions are left out.
-fn places(parts: &[MaximaPart], window_s: f64) -> Vec<Vec<f64>> {
+/// Begin and end of each window in seconds of measurement: breaks between sessions are left out.
+fn places(parts: &[MaximaPart], window_s: f64) -> Vec<Vec<(f64, f64)>> {
     let mut at = 0.0;
     let mut place = |part: &MaximaPart| {
         let mut all = Vec::with_capacity(part.windows.len());
-        for i in 0..part.windows.len() {
-            all.push(at);
-            let next = part.windows.get(i + 1).map(|next| next.0 - part.windows[i].0);
+        for (i, window) in part.windows.iter().enumerate() {
+            let next = part.windows.get(i + 1).map(|next| next.0 - window.0);
             // A session that ended within a window leaves a shorter one.
-            at += next.map_or(window_s, |gap| gap.clamp(0.0, window_s));
+            let end = at + next.map_or(window_s, |gap| gap.clamp(0.0, window_s));
+            all.push((at, end));
+            at = end;
         }
         all
     };
@@ -33,7 +34,7 @@ fn places(parts: &[MaximaPart], window_s: f64) -> Vec<Vec<f64>> {
 pub fn maxima(parts: &[MaximaPart], window_s: f64) -> Result<String, DrawError> {
     picture_of(SIZE, |root| {
         let places = places(parts, window_s);
-        let end_s = places.iter().flatten().copied().fold(0.0, f64::max) + window_s;
+        let end_s = places.iter().flatten().map(|(_, end)| *end).fold(window_s, f64::max);
         let (unit_s, unit) = if end_s >= 7_200.0 {
             (3_600.0, "hours")
         } else {
@@ -60,7 +61,7 @@ pub fn maxima(parts: &[MaximaPart], window_s: f64) -> Result<String, DrawError> 
             .label_style(label())
             .draw()?;
         for (part, at) in parts.iter().zip(&places) {
-            let begin = at.first().map_or(0.0, |s| s / unit_s);
+            let begin = at.first().map_or(0.0, |(s, _)| s / unit_s);
             if begin > 0.0 {
                 chart.draw_series([PathElement::new(
                     [(begin, 10_f64.powf(low)), (begin, high)],
@@ -74,9 +75,9 @@ pub fn maxima(parts: &[MaximaPart], window_s: f64) -> Result<String, DrawError> 
                 style,
             )])?;
             for (color, of) in [(BLUE, 1), (ORANGE, 2)] {
-                let steps = at.iter().zip(&part.windows).flat_map(|(s, w)| {
+                let steps = at.iter().zip(&part.windows).flat_map(|((from, to), w)| {
                     let us = if of == 1 { w.1 } else { w.2 }.max(0.1);
-                    [(s / unit_s, us), ((s + window_s).min(end_s) / unit_s, us)]
+                    [(from / unit_s, us), (to / unit_s, us)]
                 });
                 chart.draw_series(LineSeries::new(steps, color.stroke_width(2)))?;
             }
@@ -97,6 +98,7 @@ mod tests {
         };
         // The second window was cut short after 100 s; an hour passed between the third and the fourth.
         let at = places(&[part(&[0.0, 300.0, 400.0, 4_000.0]), part(&[9_000.0])], 300.0);
-        assert_eq!(at, [vec![0.0, 300.0, 400.0, 700.0], vec![1_000.0]]);
+        let first = vec![(0.0, 300.0), (300.0, 400.0), (400.0, 700.0), (700.0, 1_000.0)];
+        assert_eq!(at, [first, vec![(1_000.0, 1_300.0)]]);
     }
 }

@@ -24,7 +24,7 @@ pub struct Watched<'a> {
 
 /// How often the counters are read between late ticks.
 const LOOK: Duration = Duration::from_millis(250);
-/// Events so long before a late tick tell who had the core when it was due.
+/// Events so long before a late tick show who had the core when it was due.
 const BEFORE_NS: u64 = 200_000_000;
 /// The picture begins and ends so much before and after the tick, as a share of its lateness, at least 50 us.
 const MARGIN: f64 = 0.4;

@@ -21,6 +21,11 @@ const OUT2: u8 = 8;
 /// Ticks between two edges are this and up to 63 more.
 const FEWEST_TICKS: u32 = 20;
 
+/// Why a pin cannot be toggled; for people.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct PinError(String);
+
 impl FromStr for Pin {
     type Err = String;
 
@@ -60,14 +65,14 @@ impl Pin {
     /// # Errors
     /// The kernel refuses, or the processor has no such registers.
     #[cfg(target_arch = "x86_64")]
-    pub fn acquire(self) -> Result<Toggle, String> {
+    pub fn acquire(self) -> Result<Toggle, PinError> {
         // SAFETY: numbers only.
         if unsafe { libc::ioperm(libc::c_ulong::from(self.port), 1, 1) } != 0 {
             let why = std::io::Error::last_os_error();
-            return Err(format!(
+            return Err(PinError(format!(
                 "the port {:#x} may not be written ({why}): run as root",
                 self.port
-            ));
+            )));
         }
         Ok(Toggle {
             pin: self,
@@ -82,8 +87,10 @@ impl Pin {
     /// # Errors
     /// The processor has no such registers.
     #[cfg(not(target_arch = "x86_64"))]
-    pub fn acquire(self) -> Result<Toggle, String> {
-        Err("this processor has no ports that a program can write".to_owned())
+    pub fn acquire(self) -> Result<Toggle, PinError> {
+        Err(PinError(
+            "this processor has no ports that a program can write".to_owned(),
+        ))
     }
 }
 
@@ -160,7 +167,7 @@ mod tests {
         let ports = std::fs::read_to_string("/proc/ioports").unwrap_or_default();
         let emulated = std::fs::read_to_string("/proc/cpuinfo").is_ok_and(|c| c.contains(" hypervisor"));
         let toggle = (emulated && ports.contains("03f8-03ff : serial"))
-            .then(|| "serial:0x3F8:rts".parse::<Pin>().and_then(Pin::acquire));
+            .then(|| "serial:0x3F8:rts".parse::<Pin>().expect("valid").acquire());
         let Some(Ok(mut toggle)) = toggle else {
             eprintln!("skipped: no serial port that may be written");
             return;
