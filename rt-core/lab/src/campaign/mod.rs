@@ -1,8 +1,8 @@
 //! `rt-core campaign`: measurements of hours and nights, part after part, that continue after whatever ended them.
 //!
-//! The file of a campaign names its parts ([`plan`]). Each start of the program measures what is left of a part in a session
-//! of its own, and writes what it has gathered every minute ([`session`]). One report is made of all sessions ([`report`],
-//! [`page`]). What was measured after the last checkpoint of a session that was killed is not counted, and measured again.
+//! The file of a campaign names its parts (`plan`). Each start of the program measures what is left of a part in a session
+//! of its own, and writes what it has gathered every minute (`session`). One report is made of all sessions (`report`,
+//! `page`). What was measured after the last checkpoint of a session that was killed is not counted, and measured again.
 
 mod page;
 mod plan;
@@ -34,12 +34,13 @@ const PAGE: &str = "campaign.html";
 /// A campaign.
 #[derive(Args, Debug)]
 pub struct CampaignArgs {
-    /// The campaign as a TOML file: [[part]] with load, rate, duration and spin_us, one after the other; repeat, window, checkpoint
+    /// The campaign as a TOML file: a `part` for each load, one after the other
     ///
-    /// A part needs its duration ("8h"); load is one of those of `rt-core latency` [none], rate in Hz [1000], spin_us [0].
-    /// `repeat` measures the whole list so many times [1], `window` is the time of which the worst is drawn ["5m"],
-    /// `checkpoint` how often all that was measured is written ["1m"]. The same command continues a campaign that was
-    /// interrupted, killed, or ended by a restart of the PC; a line `@reboot` in a crontab does so by itself.
+    /// A part needs its duration ("8h"). Its load is one of those of `rt-core latency`, without one nothing; its rate is in Hz,
+    /// by default 1000; its spin_us is 0 by default. Before the parts, `repeat` measures the whole list so many times, `window`
+    /// is the time of which the worst is drawn, by default "5m", and `checkpoint` how often all that was measured is written, by
+    /// default "1m". The same command continues a campaign that was interrupted, killed, or ended by a restart of the PC; a line
+    /// `@reboot` in a crontab does so by itself.
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// Folder of the campaign: its checkpoints, campaign.json and campaign.html

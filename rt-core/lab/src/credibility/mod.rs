@@ -1,7 +1,7 @@
 //! `rt-core credibility`: what an auditor asks for, in one file: what the simulator is for, what could harm, which test holds it
 //! off, and which run shows it.
 //!
-//! The tables are [`context`] (purpose and limits), [`hazards`], [`trace`] (requirements) and [`evidence`] (the categories of
+//! The tables are `context` (purpose and limits), `hazards`, `trace` (requirements) and `evidence` (the categories of
 //! the FDA's guidance, the factors of ASME V&V 40, with what is there and what is missing). Runs come from reports of
 //! `rt-core latency`. The file names standards as the vocabulary of its reader and claims conformity with none.
 
