@@ -4,7 +4,7 @@ SHELL := /bin/bash
 CARGO ?= cargo
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: help run test build package package-test picture report causes fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: help run test build package package-test picture example report causes fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -30,6 +30,9 @@ package-test: deps-package-test package ## Install both packages in a fresh Debi
 
 picture: deps-test build ## Redraw the pictures of the README and the tour
 	UPDATE_SNAPSHOTS=1 $(CARGO) test --release -p stylet-tests-window -- --test-threads=1
+
+example: build ## Record the example session of the window again
+	docs/tools/example "$(BIN)"
 
 report: ## Measure speed against error of every tissue model; writes benches/runs/<date>-<host> (some minutes)
 	$(CARGO) run --release -p stylet-benches --bin report

@@ -4,122 +4,17 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use stylet_benches::patch::{FOUNDATION_PA_PER_M, PERIOD_S, PatchTick, STRAIGHT, Way, converged, insertion};
 use stylet_sim::limits::TissueParameters;
-use stylet_sim::needle::{NeedleParameters, Phase, transmission};
 use stylet_sim::scene::{Lattice, Scene};
-use stylet_sim::tissue::fem::{self, FemModel, FemSettings, FemState, Integration, Material, SolveSettings, TipPatch};
-use stylet_sim::tissue::{Carried, ChainMail, Deformed, Held, TissueState, element_ahead};
+use stylet_sim::tissue::fem::{self, FemModel, FemSettings, FemState, Integration, Material, SolveSettings};
+use stylet_sim::tissue::{ChainMail, Held, TissueState};
 
-const PERIOD_S: f64 = 5e-3;
-const PATCH_M: f64 = 4e-3;
-/// A centimetre of fat of 3 kPa around the gland.
-const FOUNDATION_PA_PER_M: f64 = 3e5;
-/// As patients' needles go on average; 123 and 280 mm/s are the mean maximum and the maximum.
-const STRAIGHT: Way = Way {
-    direction: [0.0, 0.0, 1.0],
-    speed_m_per_s: 0.05,
-};
 /// What counts as solved.
 const EXACT: SolveSettings = SolveSettings {
     relative_tolerance: 1e-8,
     max_cycles: 400,
 };
-
-/// Ticks in which the needle comes near before it meets the gland.
-const APPROACH: usize = 10;
-
-/// What one tick holds, and what the tip will come to if it goes on straight.
-struct Tick {
-    held: Option<TipPatch>,
-    next: Option<TipPatch>,
-    /// How far the held patch is from rest.
-    by_m: f64,
-}
-
-/// A needle's way through the gland.
-#[derive(Clone, Copy)]
-struct Way {
-    direction: [f64; 3],
-    speed_m_per_s: f64,
-}
-
-/// From before the apex to `depth_m` in it: the tissue follows up to puncture, then as paper eq. 6 says.
-fn insertion(lattice: &Lattice, way: Way, depth_m: f64) -> Vec<Tick> {
-    let Way {
-        direction,
-        speed_m_per_s,
-    } = way;
-    let needle = NeedleParameters::default();
-    let (low, high) = lattice.bounds_m();
-    let at = |t: f64, start: [f64; 3]| [0, 1, 2].map(|a| start[a] + t * direction[a]);
-    let mut entry = [0, 1, 2].map(|a| 0.5 * (low[a] + high[a]));
-    while element_at(lattice, at(-1e-4, entry)).is_some() {
-        entry = at(-1e-4, entry);
-    }
-    let step_m = speed_m_per_s * PERIOD_S;
-    let patch = |element: u32, by_m: f64| TipPatch {
-        element,
-        position_m: at(by_m, lattice.rest_m(element)),
-        edge_m: PATCH_M,
-    };
-    // What the loop would see ahead, not what the script has later. The body moves with the patch: seen from it, at rest.
-    let still = vec![0.0; lattice.element_count()];
-    let rest = Deformed {
-        lattice,
-        u: [&still, &still, &still],
-        scale: 1.0,
-        carried: Carried::Not,
-        reach: 1.0,
-    };
-    let ahead = |rest_m: f64, now: Option<u32>, by_m: f64| {
-        let next = element_ahead(&rest, now, at(rest_m, entry), direction.map(|d| d * step_m));
-        next.map(|element| patch(element, by_m))
-    };
-    let mut ticks = Vec::new();
-    for n in (1..=APPROACH).rev() {
-        ticks.push(Tick {
-            held: None,
-            next: ahead(-(n as f64) * step_m, None, step_m),
-            by_m: 0.0,
-        });
-    }
-    let mut by_m = 0.0;
-    for n in 1..=(depth_m / step_m) as usize {
-        let tip_m = n as f64 * step_m;
-        let phase = if tip_m <= needle.puncture_depth_m {
-            Phase::Contraction
-        } else {
-            Phase::Penetration
-        };
-        let follows_m = step_m * transmission(phase, speed_m_per_s, tip_m, &needle);
-        by_m += follows_m;
-        let Some(element) = element_at(lattice, at(tip_m - by_m, entry)) else {
-            break;
-        };
-        ticks.push(Tick {
-            held: Some(patch(element, by_m)),
-            next: ahead(tip_m - by_m, Some(element), by_m + follows_m),
-            by_m,
-        });
-    }
-    ticks
-}
-
-fn element_at(lattice: &Lattice, place_m: [f64; 3]) -> Option<u32> {
-    let [i, j, k] = place_m.map(|c| (c / lattice.spacing_m).floor() as usize);
-    lattice.element_of_cell(i, j, k)
-}
-
-/// Displacements after each tick, solved to the end in f64.
-fn converged(model: &FemModel<f64>, ticks: &[Tick]) -> Vec<[Vec<f32>; 3]> {
-    let mut state = FemState::at_rest(model);
-    let solved = ticks.iter().map(|tick| {
-        let report = fem::step(model, &mut state, tick.held, &EXACT);
-        assert!(report.converged, "{report:?}");
-        [0, 1, 2].map(|a| state.displacement(a).to_vec())
-    });
-    solved.collect()
-}
 
 /// Root of the mean square of the elements' errors, in elements.
 fn rms<'a>(here: impl Fn(usize) -> &'a [f32], there: &[Vec<f32>; 3]) -> f64 {
@@ -138,7 +33,7 @@ struct Run {
 
 fn run(
     model: &FemModel<f32>,
-    ticks: &[Tick],
+    ticks: &[PatchTick],
     solved: &[[Vec<f32>; 3]],
     settings: &SolveSettings,
     works_ahead: bool,
@@ -171,7 +66,7 @@ fn run(
     run
 }
 
-fn chainmail(scene: &Scene, ticks: &[Tick], rounds: usize) -> Vec<u64> {
+fn chainmail(scene: &Scene, ticks: &[PatchTick], rounds: usize) -> Vec<u64> {
     let limits = TissueParameters::default().validate().expect("defaults are valid");
     let model = ChainMail::new(scene, limits);
     let mut nanoseconds = Vec::new();
@@ -209,7 +104,10 @@ fn report_insertion(name: &str, scene: &Scene, material: Material, way: Way, rou
     let ticks = insertion(lattice, way, 40e-3);
     let exact = FemModel::<f64>::new(lattice, &settings_of(material)).expect("valid");
     let model = FemModel::<f32>::new(lattice, &settings_of(material)).expect("valid");
-    let solved = converged(&exact, &ticks);
+    let solved: Vec<_> = converged(&exact, &ticks, &EXACT)
+        .into_iter()
+        .map(|s| s.displacement)
+        .collect();
     let changes = ticks
         .windows(2)
         .filter(|w| w[0].held.map(|h| h.element) != w[1].held.map(|h| h.element))

@@ -3,7 +3,7 @@
 use stylet_sim::tissue::Deformed;
 
 /// Elements that the reference moves by less than this part of the tip's travel are not of the moved region.
-const MOVED: f64 = 0.01;
+pub const MOVED: f64 = 0.01;
 
 /// Sums of squared distances between two models, over the ticks compared.
 #[derive(Clone, Debug, Default)]

@@ -3,8 +3,11 @@
 pub mod bodies;
 pub mod error;
 pub mod insertions;
+pub mod live;
 pub mod machine;
+pub mod patch;
 pub mod rig;
 pub mod session;
 pub mod solvers;
+pub mod twin;
 pub mod wall;

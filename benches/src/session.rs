@@ -62,6 +62,8 @@ impl Device for SharedPhantom {
 pub struct Session {
     loops: SteppedLoops,
     device: SharedPhantom,
+    /// Which way the hand holds the needle.
+    direction: Vector3<f64>,
 }
 
 impl Session {
@@ -78,31 +80,57 @@ impl Session {
         tissue_every: u64,
         force: ForceParameters,
     ) -> Self {
+        let faults = LinkFaults::default();
+        Self::over_link(Box::new(world), start, (hand, faults), force, tissue_every)
+    }
+
+    /// The same over a link with faults.
+    pub fn over_link(
+        world: Box<World>,
+        start: Vector3<f64>,
+        (hand, faults): (Hand, LinkFaults),
+        force: ForceParameters,
+        tissue_every: u64,
+    ) -> Self {
         let device = SharedPhantom::new(hand, start);
         let mut memory = HapticMemory::new(&device.info(), (NeedleParameters::default(), force), 0);
         memory.chain.gate.engage();
+        let link = Box::new(BadLink::new(device.clone(), faults));
         Self {
-            loops: SteppedLoops::new(Box::new(world), Box::new(device.clone()), &memory, tissue_every),
+            loops: SteppedLoops::new(world, link, &memory, tissue_every),
             device,
+            direction: Vector3::z(),
         }
     }
 
     /// As [`new`](Self::new), on a needle line and over a link with faults.
     pub fn on_line(
         world: Box<World>,
-        (start, line): (Vector3<f64>, ReadyLine),
-        (hand, faults): (Hand, LinkFaults),
+        place: (Vector3<f64>, ReadyLine),
+        hand: (Hand, LinkFaults),
         force: ForceParameters,
     ) -> Self {
-        let device = SharedPhantom::new(hand, start);
-        let mut memory = HapticMemory::new(&device.info(), (NeedleParameters::default(), force), 0);
-        memory.chain.gate.engage();
-        let link = Box::new(BadLink::new(device.clone(), faults));
-        let mut loops = SteppedLoops::new(world, link, &memory, HAPTIC_TICKS_PER_TISSUE_TICK);
+        Self::on_line_every(world, place, hand, force, HAPTIC_TICKS_PER_TISSUE_TICK)
+    }
+
+    /// The same, where the tissue answers every `tissue_every`th tick.
+    pub fn on_line_every(
+        world: Box<World>,
+        (start, line): (Vector3<f64>, ReadyLine),
+        hand: (Hand, LinkFaults),
+        force: ForceParameters,
+        tissue_every: u64,
+    ) -> Self {
+        let mut session = Self::over_link(world, start, hand, force, tissue_every);
         // Both rings are empty.
-        let _ = loops.bridge.lines.push(line.hand);
-        let _ = loops.bridge.tissue_orders.push(TissueOrder::Line(line.body));
-        Self { loops, device }
+        let _ = session.loops.bridge.lines.push(line.hand);
+        let _ = session.loops.bridge.tissue_orders.push(TissueOrder::Line(line.body));
+        session
+    }
+
+    /// The hand turns the needle that way with its next goal.
+    pub fn aim(&mut self, direction: Vector3<f64>) {
+        self.direction = direction.normalize();
     }
 
     /// Another hand takes over.
@@ -131,7 +159,7 @@ impl Session {
     pub fn go_to(&mut self, tip: Vector3<f64>, speed_m_per_s: f64) {
         let goal = HandGoal {
             tip_in_world: tip,
-            direction: Vector3::z(),
+            direction: self.direction,
             speed_m_per_s,
             acceleration_m_per_s2: 20.0 * speed_m_per_s.max(0.05),
         };

@@ -59,6 +59,7 @@ impl Wall {
             let damping = if pressed_m > 0.0 { self.damping_n_s_per_m } else { 0.0 };
             let push_n = (self.stiffness_n_per_m * pressed_m + damping * velocity_m_per_s.z).max(0.0);
             let input = GateInput {
+                constant_n: Vector3::zeros(),
                 wanted: Wrench::from_force(Vector3::z() * -push_n),
                 stored_j: 0.5 * self.stiffness_n_per_m * pressed_m * pressed_m,
                 motion: Motion {

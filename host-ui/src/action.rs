@@ -28,6 +28,7 @@ pub enum Action {
     /// Redoes the change of the plan that was undone last.
     Redo,
     Plan(PlanAction),
+    Watch(WatchAction),
     RunAll,
     /// All needles again, from a reset, whatever was done.
     StartOver,
@@ -59,6 +60,21 @@ pub enum Action {
     DismissRefusals,
     /// The message that a device was unplugged was read.
     DismissDisconnected,
+}
+
+/// What the operator asks for of a recording.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum WatchAction {
+    /// Shows the recorded insertion that comes with the program.
+    Example,
+    /// Shows a recording made by `host-ui record`.
+    File(PathBuf),
+    /// Holds it, or lets it go on.
+    Hold(bool),
+    /// Shows it again from its beginning.
+    Again,
+    /// Goes back to the core.
+    Close,
 }
 
 /// What the operator asks for in a plan of many needles; needles are counted from 0.

@@ -18,7 +18,7 @@ use stylet_base::format::printable;
 use stylet_base::interrupt;
 use stylet_controllers as controller;
 use stylet_files as files;
-use stylet_host::core_args::{self, CoreArgs};
+use stylet_host::core_args::CoreArgs;
 use stylet_host::record;
 use stylet_implant::procedure;
 use stylet_implant::readers::{SeedDefaults, read_seeds};
@@ -44,6 +44,9 @@ pub struct Cli {
     /// Image for the slices instead of simulated ultrasound, of the patient of --scene FILE: NIfTI-1, NRRD, MetaImage
     #[arg(long, value_name = "FILE", requires = "scene")]
     image: Option<PathBuf>,
+    /// Show a recording made by 'host-ui record' in place of a running rt-core; nothing in it can be moved
+    #[arg(long, value_name = "FILE.mcap", conflicts_with = "scene")]
+    watch: Option<PathBuf>,
     /// Ignore gamepads and 3D mice: only keys and mouse move the needle
     #[arg(long)]
     no_controllers: bool,
@@ -90,7 +93,7 @@ enum Task {
     /// Record every tick of the force loop and the tissue's snapshots in an MCAP file, and count what is missing
     Record {
         /// Name that rt-core was started under
-        #[arg(long, default_value = "main", value_parser = core_args::instance)]
+        #[arg(long, default_value = "main", value_parser = Instance::new)]
         instance: Instance,
         /// File to write
         #[arg(long, value_name = "FILE.mcap")]
@@ -106,7 +109,7 @@ enum Task {
     /// address can watch, for the protocol has no passwords
     Igtl {
         /// Name that rt-core was started under
-        #[arg(long, default_value = "main", value_parser = core_args::instance)]
+        #[arg(long, default_value = "main", value_parser = Instance::new)]
         instance: Instance,
         /// Address and port to listen on
         #[arg(long, default_value = "127.0.0.1:18944", value_name = "ADDRESS")]
@@ -129,7 +132,7 @@ enum Task {
     /// Let rt-core write its flight recording: the last seconds of both loops, for 'rt-core replay'
     Flight {
         /// Name that rt-core was started under
-        #[arg(long, default_value = "main", value_parser = core_args::instance)]
+        #[arg(long, default_value = "main", value_parser = Instance::new)]
         instance: Instance,
     },
     /// Segmented volumes and scene files
@@ -190,6 +193,7 @@ impl Cli {
                     scene: self.window.scene,
                     label: self.window.label,
                     image: self.image,
+                    watch: self.watch,
                     controllers: !self.no_controllers,
                     pause: !self.without_pause,
                     count_frames: self.count_frames,
@@ -278,7 +282,7 @@ impl Cli {
 }
 
 fn check(file: &Path, label: Option<u8>) -> Result<(), CommandError> {
-    let v = files::read(file, label, &files::Progress::default())?;
+    let v = files::watched(file, |progress| files::read(file, label, progress))?;
     println!("{}", printable(&v.name));
     if files::scene::is_scene(file) {
         check_scene_file(file)?;
@@ -349,7 +353,7 @@ fn check_scene_file(file: &Path) -> Result<(), CommandError> {
     }
     if let Some(named) = &scene.image {
         let path = file.with_file_name(named);
-        let image = files::Image::read(&path, &files::Progress::default())?;
+        let image = files::watched(&path, |progress| files::Image::read(&path, progress))?;
         let [x, y, z] = image.dims;
         println!("  image: {x} x {y} x {z} voxels in {}", path.display());
     }

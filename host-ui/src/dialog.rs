@@ -14,6 +14,8 @@ pub enum Purpose {
     Scene,
     /// An image of the patient of the scene.
     Image,
+    /// A recording to look at.
+    Recording,
     /// A plan to read.
     ImportPlan,
     /// A plan to write, with all that it holds.
@@ -33,6 +35,7 @@ impl Purpose {
         match self {
             Self::Scene => "Open a scene",
             Self::Image => "Open an image",
+            Self::Recording => "Open a recording",
             Self::ImportPlan => "Import a plan",
             Self::SavePlan => "Save as Stylet plan (.toml)",
             Self::SaveTable => "Save seeds as table (.csv)",
@@ -58,6 +61,7 @@ impl Purpose {
                 ("Images", &["nii", "gz", "nrrd", "nhdr", "mha", "mhd", "dcm"]),
                 ("All files", &["*"]),
             ],
+            Self::Recording => &[("Recordings (MCAP)", &["mcap"]), ("All files", &["*"])],
             Self::ImportPlan => &[("Plans", &["toml", "csv", "dcm"]), ("All files", &["*"])],
             Self::SavePlan => &[("Stylet plan", &["toml"])],
             Self::SaveTable => &[("Table of seeds", &["csv"])],
@@ -169,7 +173,7 @@ fn with_ending(purpose: Purpose, path: PathBuf) -> PathBuf {
         Purpose::SavePlan => "toml",
         Purpose::SaveTable => "csv",
         Purpose::SaveRtPlan => "dcm",
-        Purpose::Scene | Purpose::Image | Purpose::ImportPlan => return path,
+        Purpose::Scene | Purpose::Image | Purpose::Recording | Purpose::ImportPlan => return path,
     };
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
         return path;

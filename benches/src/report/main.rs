@@ -1,10 +1,14 @@
 //! `make report`: every tissue model over the same insertions; speed, error, and what to pick.
 
+mod budget;
 mod fit;
 mod models;
 mod page;
+mod page_parts;
+mod passes;
 mod picture;
 mod runs;
+mod ships;
 mod table;
 
 use clap::Parser;
@@ -40,6 +44,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let out = options.out.unwrap_or_else(|| machine::run_folder(&machine));
     std::fs::create_dir_all(&out)?;
 
+    let passes = passes::measure();
+    let causes = budget::causes();
+    let ships = ships::measure(options.rounds);
+    ships::write(&ships, &out.join("as-it-ships.csv"))?;
     eprintln!("fitting ChainMail to the converged FEM ...");
     let fitted = fit_at(SPACINGS_M[1]);
     eprintln!("fitted: {fitted:?}");
@@ -60,6 +68,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         points: &points,
         fitted: &fitted,
         refinement: &refinement(),
+        ships: &ships,
+        causes: &causes,
+        passes: &passes,
         seconds: start.elapsed().as_secs_f64(),
     };
     std::fs::write(out.join("README.md"), page::write(&found)?)?;

@@ -99,6 +99,12 @@ pub fn entries(scene: &Scene, fitted: &Fitted) -> Vec<Entry> {
         fem.settings.max_cycles = 200;
         add(Family::Fem, format!("tolerance {tolerance:.0e}"), Box::new(fem));
     }
+    let live = FemTissue::<f32>::new(scene).expect("valid materials");
+    add(
+        Family::Fem,
+        "as off its line: one cycle a tick".to_owned(),
+        Box::new(live),
+    );
     for tolerance in [1e-3, 1e-6] {
         let mut fem = FemTissue::<f64>::new(scene).expect("valid materials");
         (fem.settings.relative_tolerance, fem.settings.max_cycles) = (tolerance, 1000);

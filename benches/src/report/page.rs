@@ -1,6 +1,10 @@
 //! The page that says in words what was measured, and which model to pick for what.
 
+use crate::budget::Cause;
 use crate::models::{Family, Fitted};
+use crate::page_parts::{causes, passes, what_ships};
+use crate::passes::Passes;
+use crate::ships::Ships;
 use crate::table::{Point, Row, pareto};
 use std::fmt::Write as _;
 use stylet_benches::insertions::{GLAND, TICK_S};
@@ -13,6 +17,12 @@ pub struct Findings<'a> {
     pub fitted: &'a Fitted,
     /// Spacing (mm) and how far its seeds are from those of the finest spacing (mm, RMS and largest).
     pub refinement: &'a [(f64, f64, f64)],
+    /// What ships, beside the converged solution of each tick.
+    pub ships: &'a [Ships],
+    /// Causes of the error of a needle's line.
+    pub causes: &'a [Cause],
+    /// One pass over a body in which everything moves.
+    pub passes: &'a [Passes],
     pub seconds: f64,
 }
 
@@ -38,6 +48,9 @@ pub fn write(found: &Findings) -> Result<String, std::fmt::Error> {
     )?;
     text.push_str("![Time of a tick against error](speed-vs-error.svg)\n\n");
     choices(&mut text, found)?;
+    what_ships(&mut text, found)?;
+    causes(&mut text, found.causes)?;
+    passes(&mut text, found.passes)?;
     all_points(&mut text, found.points)?;
     fit(&mut text, found)?;
     refinement(&mut text, found)?;
@@ -103,7 +116,7 @@ fn choices(text: &mut String, found: &Findings) -> std::fmt::Result {
     if let Some(p) = fastest_within(Family::Fem, 1.0) {
         writeln!(
             text,
-            "- **Forces and millimetres within 1 %:** FEM, f32, {}: {:.0} us a tick on average, p99 {:.0} us, {:.2} % off in the \
+            "- **Forces and millimetres within 1 % of the converged solution on the same lattice:** FEM, f32, {}: {:.0} us a tick on average, p99 {:.0} us, {:.2} % off in the \
              worst insertion.",
             p.setting, p.mean_us, p.worst_p99_us, p.worst_rms_percent
         )?;
@@ -148,14 +161,14 @@ fn choices(text: &mut String, found: &Findings) -> std::fmt::Result {
 
 fn all_points(text: &mut String, points: &[Point]) -> std::fmt::Result {
     text.push_str("## All of it, insertions held back\n\n");
-    text.push_str("| spacing, mm | model | setting | mean, us | worst p99, us | RMS, % | nothing moves, % | best shift, % | worst RMS, % | worst max, % | seeds, mm | unmet ticks | on the front |\n");
-    text.push_str("|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+    text.push_str("| spacing, mm | model | setting | mean, us | worst p99, us | RMS, % | nothing moves, % | best shift, % | worst RMS, % | worst max, % | seeds, mm | worst force on the tip, % | unmet ticks | on the front |\n");
+    text.push_str("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for p in points {
         let same: Vec<&Point> = points.iter().filter(|q| q.spacing_mm == p.spacing_mm).collect();
         let front = pareto(&same).iter().any(|q| std::ptr::eq(*q, p));
         writeln!(
             text,
-            "| {:.2} | {} | {} | {:.0} | {:.0} | {:.3} | {:.1} | {:.1} | {:.3} | {:.1} | {:.3} | {} | {} |",
+            "| {:.2} | {} | {} | {:.0} | {:.0} | {:.3} | {:.1} | {:.1} | {:.3} | {:.1} | {:.3} | {} | {} | {} |",
             p.spacing_mm,
             p.family.name(),
             p.setting,
@@ -167,6 +180,7 @@ fn all_points(text: &mut String, points: &[Point]) -> std::fmt::Result {
             p.worst_rms_percent,
             p.worst_max_percent,
             p.seed_rms_mm,
+            p.worst_tip_force_percent.map_or("-".to_owned(), |f| format!("{f:.2}")),
             p.unconverged_ticks,
             if front { "yes" } else { "" }
         )?;

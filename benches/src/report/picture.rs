@@ -4,7 +4,9 @@ use crate::models::Family;
 use crate::table::{Point, pareto};
 use plotters::coord::Shift;
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::error::Error;
+use std::ops::Range;
 use std::path::Path;
 
 const SIZE: (u32, u32) = (1320, 620);
@@ -93,8 +95,8 @@ fn draw_into(svg: &mut String, points: &[Point]) -> Result<(), Box<dyn Error>> {
 
 /// Common to all panels, so that they can be compared by eye.
 struct Ranges {
-    micros: std::ops::Range<f64>,
-    percent: std::ops::Range<f64>,
+    micros: Range<f64>,
+    percent: Range<f64>,
 }
 
 impl Ranges {
@@ -140,6 +142,22 @@ where
     let at = |p: &Point| (p.mean_us, p.rms_percent.max(1e-4));
     let front = pareto(points).into_iter().map(at);
     chart.draw_series(LineSeries::new(front, RGBColor(150, 155, 165).stroke_width(2)))?;
+    // What is off without any model, over the same insertions.
+    let Range { start, end } = ranges.micros.clone();
+    let nulls = [
+        ("nothing moves", points[0].nothing_moves_percent),
+        ("best shift as one piece", points[0].best_shift_percent),
+    ];
+    for (name, percent) in nulls {
+        let line = DashedLineSeries::new([(start, percent), (end, percent)], 5, 4, TEXT.stroke_width(1));
+        chart.draw_series(line)?;
+        let at = (start * 1.15, percent * 1.06);
+        let style = (FONT, 12)
+            .into_font()
+            .color(&TEXT)
+            .pos(Pos::new(HPos::Left, VPos::Bottom));
+        chart.draw_series([Text::new(name, at, style)])?;
+    }
     let plotting = chart.plotting_area();
     for point in points {
         let (x, y) = plotting.map_coordinate(&at(point));

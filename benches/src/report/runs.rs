@@ -1,13 +1,14 @@
 //! One model through one insertion: its time, and its error against the converged FEM on the same lattice.
 
 use std::time::Instant;
-use stylet_benches::error::{Error, Field, best_shift_m, field};
+use stylet_benches::error::{Error, Field, best_shift_m, field, norm};
 use stylet_benches::insertions::TICK_S;
 use stylet_sim::tissue::{Held, TissueModel};
 
 /// The converged answer to a script, at the ticks that are compared.
 pub struct Reference {
     fields: Vec<Field>,
+    tip_force_n: Vec<[f64; 3]>,
 }
 
 /// Every so many ticks the tissue is compared.
@@ -19,15 +20,16 @@ fn is_compared(tick: usize, ticks: usize) -> bool {
 
 impl Reference {
     pub fn of(converged: &mut dyn TissueModel, script: &[Held]) -> Reference {
-        let mut fields = Vec::new();
+        let (mut fields, mut tip_force_n) = (Vec::new(), Vec::new());
         for (tick, &held) in script.iter().enumerate() {
             let report = converged.step(Some(held), TICK_S);
             assert!(report.converged, "the reference has to converge: {report:?}");
             if is_compared(tick, script.len()) {
                 fields.push(field(&converged.deformed()));
+                tip_force_n.push(report.tip_force_n.unwrap_or_default());
             }
         }
-        Reference { fields }
+        Reference { fields, tip_force_n }
     }
 
     /// What is off without any model: where nothing moves, and where each tick shifts the body as one piece by what fits best,
@@ -52,6 +54,8 @@ pub struct Run {
     /// Ticks that did not meet the model's own residual, and the largest residual.
     pub unconverged: usize,
     pub residual: f64,
+    /// Error of the force on the tip over the largest of the insertion, RMS and largest; `None` where the model knows no forces.
+    pub tip_force: Option<[f64; 2]>,
 }
 
 /// Steps a model at rest through a script.
@@ -61,8 +65,10 @@ pub fn run(model: &mut dyn TissueModel, script: &[Held], seeds: &[u32], travel_m
         error: Error::default(),
         unconverged: 0,
         residual: 0.0,
+        tip_force: None,
     };
     let mut fields = reference.fields.iter();
+    let mut forces_n = Vec::new();
     model.return_to_rest();
     for (tick, &held) in script.iter().enumerate() {
         // On a straight way what is held next is what the loop would see ahead.
@@ -76,7 +82,17 @@ pub fn run(model: &mut dyn TissueModel, script: &[Held], seeds: &[u32], travel_m
         if is_compared(tick, script.len()) {
             let there = fields.next().expect("one field for each compared tick");
             run.error.add(there, &model.deformed(), travel_m, seeds);
+            forces_n.extend(report.tip_force_n);
         }
     }
+    run.tip_force = force_error(&forces_n, &reference.tip_force_n);
     run
+}
+
+fn force_error(forces_n: &[[f64; 3]], reference_n: &[[f64; 3]]) -> Option<[f64; 2]> {
+    let largest_n = reference_n.iter().map(|&f| norm(f)).fold(0.0, f64::max);
+    let apart = |(a, b): (&[f64; 3], &[f64; 3])| norm([0, 1, 2].map(|c| a[c] - b[c])) / largest_n;
+    let off: Vec<f64> = forces_n.iter().zip(reference_n).map(apart).collect();
+    let rms = (off.iter().map(|d| d * d).sum::<f64>() / off.len() as f64).sqrt();
+    (!off.is_empty() && largest_n > 0.0).then(|| [rms, off.iter().copied().fold(0.0, f64::max)])
 }

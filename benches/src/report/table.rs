@@ -31,6 +31,9 @@ pub struct Row {
     pub seed_rms_mm: f64,
     pub seed_max_mm: f64,
     pub seed_rms_percent: f64,
+    /// Of the insertion's largest force on the tip, RMS and largest; empty where the model knows no forces.
+    pub tip_force_rms_percent: Option<f64>,
+    pub tip_force_max_percent: Option<f64>,
     pub residual: f64,
     pub unconverged_ticks: usize,
     /// RMS of the same insertion where nothing moves.
@@ -77,6 +80,8 @@ pub fn row(place: &Where, insertion: &Insertion, family: Family, setting: &str, 
         seed_rms_mm: error.seed_rms_m() * mm,
         seed_max_mm: error.seed_max_m() * mm,
         seed_rms_percent: error.seed_rms_m() * percent,
+        tip_force_rms_percent: first.tip_force.map(|f| f[0] * 100.0),
+        tip_force_max_percent: first.tip_force.map(|f| f[1] * 100.0),
         residual: first.residual,
         unconverged_ticks: first.unconverged,
         nothing_moves_percent: place.without_model[0].rms_m() * percent,
@@ -103,6 +108,8 @@ pub struct Point {
     pub worst_rms_percent: f64,
     pub worst_max_percent: f64,
     pub seed_rms_mm: f64,
+    /// Worst of the insertions, largest error of the force on the tip.
+    pub worst_tip_force_percent: Option<f64>,
     pub unconverged_ticks: usize,
     pub nothing_moves_percent: f64,
     pub best_shift_percent: f64,
@@ -126,6 +133,7 @@ pub fn points(rows: &[Row]) -> Vec<Point> {
                 worst_rms_percent: 0.0,
                 worst_max_percent: 0.0,
                 seed_rms_mm: 0.0,
+                worst_tip_force_percent: None,
                 unconverged_ticks: 0,
                 nothing_moves_percent: 0.0,
                 best_shift_percent: 0.0,
@@ -142,6 +150,10 @@ pub fn points(rows: &[Row]) -> Vec<Point> {
         point.worst_p99_us = point.worst_p99_us.max(row.p99_us);
         point.worst_rms_percent = point.worst_rms_percent.max(row.rms_percent);
         point.worst_max_percent = point.worst_max_percent.max(row.max_percent);
+        point.worst_tip_force_percent = [point.worst_tip_force_percent, row.tip_force_max_percent]
+            .into_iter()
+            .flatten()
+            .reduce(f64::max);
         point.unconverged_ticks += row.unconverged_ticks;
     }
     for (point, count) in points.iter_mut().zip(counts) {

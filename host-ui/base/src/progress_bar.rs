@@ -67,9 +67,68 @@ impl Drop for LongTask {
     }
 }
 
+/// How far one piece of work is whose parts have no number: a bar in a terminal, else a line every few seconds.
+pub struct ShareBar {
+    bar: ProgressBar,
+    last: Option<Instant>,
+}
+
+impl ShareBar {
+    /// Shows nothing until the first call of [`ShareBar::show`].
+    pub fn new() -> Self {
+        let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}");
+        Self {
+            bar: ProgressBar::new(100).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar())),
+            last: (!std::io::stderr().is_terminal()).then(Instant::now),
+        }
+    }
+
+    /// `share` of `what` is done, 0 to 1.
+    pub fn show(&mut self, what: &str, share: f32) {
+        match (self.line(what, share), self.last) {
+            (Some(line), _) => eprintln!("{line}"),
+            (None, None) => {
+                self.bar.set_message(what.to_owned());
+                self.bar.set_position((share * 100.0) as u64);
+            }
+            (None, Some(_)) => {}
+        }
+    }
+
+    /// The line for a file, where it is time for one.
+    fn line(&mut self, what: &str, share: f32) -> Option<String> {
+        let last = self.last.as_mut().filter(|last| last.elapsed() >= EVERY)?;
+        *last = Instant::now();
+        Some(format!("{what}: {:.0} %", share * 100.0))
+    }
+}
+
+impl Default for ShareBar {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Drop for ShareBar {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_share_is_reported_every_few_seconds_where_there_is_no_terminal() {
+        let mut bar = ShareBar::new();
+        bar.last = Instant::now().checked_sub(2 * EVERY);
+        assert_eq!(
+            bar.line("reading a.nrrd", 0.403).as_deref(),
+            Some("reading a.nrrd: 40 %")
+        );
+        assert_eq!(bar.line("reading a.nrrd", 0.41), None, "the next one is not due");
+    }
 
     /// The dose of 5,000 seeds took 35 s without a word where the output was a file.
     #[test]

@@ -18,6 +18,7 @@ mod overlap;
 mod progress;
 pub mod scene;
 mod volume;
+mod watched;
 
 pub use element::Sink;
 pub use error::{ContentError, FileError};
@@ -27,6 +28,7 @@ pub use load::read;
 pub use open::read_voxels;
 pub use progress::{Progress, Stage};
 pub use volume::{LabelVolume, Tissue, VoxelValues, Voxels};
+pub use watched::watched;
 
 /// Reads the file that a header names as that of its data.
 pub type Beside<'a> = &'a dyn Fn(&str) -> Result<Vec<u8>, ContentError>;

@@ -9,7 +9,7 @@ use stylet_shm_schema::service::Instance;
 #[derive(Args, Clone, Debug)]
 pub struct CoreArgs {
     /// Name that rt-core was started under
-    #[arg(long, default_value = "main", value_parser = instance)]
+    #[arg(long, default_value = "main", value_parser = Instance::new)]
     pub instance: Instance,
     /// What to run instead of rt-core's scene: paper, pelvis or full, which are built in, or a volume: NIfTI-1, NRRD, MetaImage,
     /// DICOM RT Structure Set, or a scene file (.toml)
@@ -54,11 +54,6 @@ impl SceneChoice {
             Self::File(path) => Some(path),
         }
     }
-}
-
-/// For the command line.
-pub fn instance(name: &str) -> Result<Instance, String> {
-    Instance::new(name).map_err(|e| e.to_string())
 }
 
 fn choice(name: &str) -> Result<SceneChoice, String> {

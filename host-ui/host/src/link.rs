@@ -1,14 +1,16 @@
 //! The only place of the host that uses shared memory: receives what the core publishes, checked, and sends requests.
 
 mod inbox;
+mod player;
 mod ports;
 mod receive;
 mod received;
 mod receiver;
+mod thread;
 
 use inbox::{Pulse, RECORDS_KEPT};
 use receive::Latest;
-use receiver::{Outgoing, Receiver};
+use receiver::Outgoing;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
@@ -16,7 +18,9 @@ use stylet_anatomy::Role;
 use stylet_files::{LabelVolume, Tissue};
 use stylet_shm_schema::service::Instance;
 use stylet_shm_schema::*;
+use thread::Receiver;
 
+pub use player::{Piece, Playback, Played};
 pub use received::{Answer, LinkError, LinkStatus, SceneModel, Snapshot};
 
 /// The heartbeat may rest this long.
@@ -38,6 +42,8 @@ pub const MAX_UPLOAD_CELLS: usize = 64 << 20;
 /// and shows as gaps in the numbers of ticks and events.
 pub struct Link {
     receiver: Receiver,
+    /// Of a recording in place of a core.
+    playback: Option<Playback>,
     instance: Instance,
     host_id: u64,
     next_command_id: u64,
@@ -69,10 +75,28 @@ impl Link {
         Self::with_snapshots_every(instance, Duration::ZERO)
     }
 
+    /// A recording in place of a core: everything is as the core said it, and every request is refused.
+    pub fn playing(instance: Instance, played: Arc<Played>) -> Self {
+        let playback = Playback::of(&played);
+        let receiver = Receiver::play(played, playback.clone());
+        Self::of(instance, random_host_id(), receiver, Some(playback))
+    }
+
+    /// The recording that is in place of a core.
+    pub fn playback(&self) -> Option<&Playback> {
+        self.playback.as_ref()
+    }
+
     fn with_snapshots_every(instance: Instance, every: Duration) -> Self {
         let host_id = random_host_id();
+        let receiver = Receiver::start(instance.clone(), host_id, every);
+        Self::of(instance, host_id, receiver, None)
+    }
+
+    fn of(instance: Instance, host_id: u64, receiver: Receiver, playback: Option<Playback>) -> Self {
         Self {
-            receiver: Receiver::start(instance.clone(), host_id, every),
+            receiver,
+            playback,
             instance,
             host_id,
             next_command_id: 1,
@@ -245,6 +269,9 @@ impl Link {
     }
 
     fn next_id(&mut self) -> Result<u64, LinkError> {
+        if self.playback.is_some() {
+            return Err(LinkError("a recording is shown; close it first".to_owned()));
+        }
         // A host that did not poll for seconds does not take the core for stopped.
         self.pulse = self.receiver.pulse();
         if let LinkStatus::Absent { why } = self.status() {

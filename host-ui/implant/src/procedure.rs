@@ -58,7 +58,7 @@ impl Live {
         let asked = &options.asked;
         let volume = asked
             .file()
-            .map(|path| files::read(path, asked.label, &files::Progress::default()));
+            .map(|path| files::watched(path, |progress| files::read(path, asked.label, progress)));
         let volume = volume.transpose().map_err(|e| ProcedureError::Input(e.to_string()))?;
         let scene_file = asked.file().filter(|path| files::scene::is_scene(path));
         let said = scene_file.map(files::scene::read).transpose();

@@ -17,7 +17,7 @@ pub use dose::{ImplantDose, Scored, score};
 pub use error::PopulationError;
 pub use figures::{Distribution, figures};
 pub use page::page;
-pub use published::{PUBLISHED, Published};
+pub use published::{PUBLISHED, Published, Use};
 pub use shards::{Population, load};
 pub use tables::write_tables;
 

@@ -152,7 +152,7 @@ fn plot(d: &Distribution) -> Result<Markup, PopulationError> {
                 ", largest " (value(d.percentile(100.0))) " " (d.unit) "."
                 @if beyond > 0 { " The last bar holds " (beyond) " beyond it." }
                 @for (n, p) in published.iter().enumerate() {
-                    br; span class="ref" { (n + 1) " published: " (p.value) " " (p.unit) } ", " (p.how) " (" (p.source) ")"
+                    br; span class="ref" { (n + 1) " published: " (p.value) " " (p.unit) } ", " (p.how) " (" (p.source) "; " (p.used.name()) ")"
                 }
             }
         }
@@ -240,14 +240,18 @@ fn what_goes_with_it(p: &Population) -> Markup {
 fn published_table() -> Markup {
     html! {
         h2 { "Published values" }
+        p {
+            "Fitted: a parameter of " code { "docs/study/people.toml" } " was fitted to it, so that agreement there says nothing. Check: no parameter \
+             was fitted to it. Context: another organ, needle or cause than what is simulated."
+        }
         div class="scroll" {
             table {
-                thead { tr { th { "measured" } th { "value" } th class="text" { "of what" } th class="text" { "source" } th class="text" { "to be kept in mind" } } }
+                thead { tr { th { "measured" } th { "value" } th class="text" { "of what" } th class="text" { "source" } th class="text" { "used as" } th class="text" { "to be kept in mind" } } }
                 tbody {
                     @for p in PUBLISHED {
                         tr {
                             td { (p.what) } td { (p.value) " " (p.unit) }
-                            td class="text" { (p.how) } td class="text" { (p.source) } td class="text" { (p.note) }
+                            td class="text" { (p.how) } td class="text" { (p.source) } td class="text" { (p.used.name()) } td class="text" { (p.note) }
                         }
                     }
                 }

@@ -15,8 +15,32 @@ pub struct Published {
     pub how: &'static str,
     /// Source.
     pub source: &'static str,
+    /// What it is used for.
+    pub used: Use,
     /// What makes it comparable or not.
     pub note: &'static str,
+}
+
+/// What a published value is to the parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// A parameter of `docs/study/people.toml` was fitted to it; agreement says nothing.
+    Fitted,
+    /// No parameter was fitted to it: it checks.
+    Check,
+    /// Beside what is simulated: another organ, needle, or cause.
+    Context,
+}
+
+impl Use {
+    /// For people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Use::Fitted => "fitted",
+            Use::Check => "check",
+            Use::Context => "context",
+        }
+    }
 }
 
 /// Values with their sources. Those marked as unverified were not compared with the publication.
@@ -28,6 +52,7 @@ pub const PUBLISHED: &[Published] = &[
         unit: "mm",
         how: "mean, 0 to 20; 1,197 seeds",
         source: "University of Alberta",
+        used: Use::Fitted,
         note: "patients; all causes together, swelling and needle deflection among them. Mean speed had no significant effect (p = .47).",
     },
     Published {
@@ -37,6 +62,7 @@ pub const PUBLISHED: &[Published] = &[
         unit: "mm",
         how: "median; 188 insertions",
         source: "Moreira 2018",
+        used: Use::Check,
         note: "patients; biopsy needles, skin contact was the main cause.",
     },
     Published {
@@ -46,7 +72,48 @@ pub const PUBLISHED: &[Published] = &[
         unit: "mm",
         how: "median, 0 to 30; 19 patients",
         source: "PMID 15090279",
+        used: Use::Check,
         note: "patients; with all 16 needles in. Here each needle begins with tissue at rest.",
+    },
+    Published {
+        beside: "",
+        what: "deformation in the plane, all needles in",
+        value: 6.8,
+        unit: "mm",
+        how: "19 patients",
+        source: "PMID 15090279",
+        used: Use::Context,
+        note: "patients; across the needles, and with all of them in.",
+    },
+    Published {
+        beside: "Shift of the gland",
+        what: "shift, needle pushed by hand",
+        value: 5.6,
+        unit: "mm",
+        how: "0.3 to 21.6; tapped 0.9, 0 to 2",
+        source: "Lagerburg 2006",
+        used: Use::Check,
+        note: "unverified: not compared with the publication. A tapped needle is not simulated.",
+    },
+    Published {
+        beside: "",
+        what: "shift, pushed and by a fast pneumatic tool",
+        value: 20.0,
+        unit: "mm",
+        how: "largest; pneumatic 1 mm",
+        source: "McLaughlin, AAPM 2022",
+        used: Use::Context,
+        note: "phantom.",
+    },
+    Published {
+        beside: "",
+        what: "rotation of the gland",
+        value: 14.0,
+        unit: "degrees",
+        how: "largest",
+        source: "Lagerburg 2005",
+        used: Use::Context,
+        note: "unverified: not compared with the publication. The study keeps no rotation.",
     },
     Published {
         beside: "Largest displacement of tissue",
@@ -55,6 +122,7 @@ pub const PUBLISHED: &[Published] = &[
         unit: "mm",
         how: "means of 6.0 to 6.6, their middle is drawn",
         source: "Schouten 2012",
+        used: Use::Check,
         note: "patients; one needle.",
     },
     Published {
@@ -64,7 +132,68 @@ pub const PUBLISHED: &[Published] = &[
         unit: "N",
         how: "mean",
         source: "Podder 2006",
+        used: Use::Check,
         note: "patients; unverified: the layer it belongs to was not compared with the publication. The skin is part of `pelvis` alone.",
+    },
+    Published {
+        beside: "",
+        what: "force of a 17 G needle",
+        value: 15.6,
+        unit: "N",
+        how: "mean",
+        source: "Podder 2006",
+        used: Use::Context,
+        note: "patients; a thicker needle than the simulator's. Unverified as the one of 18 G.",
+    },
+    Published {
+        beside: "",
+        what: "friction of a shaft in liver",
+        value: 14.0,
+        unit: "N/m",
+        how: "10 to 18, their middle; cutting 0.94 N",
+        source: "Okamura 2004",
+        used: Use::Context,
+        note: "another organ, without a capsule; unverified. The gland of the simulator has 80 N/m.",
+    },
+    Published {
+        beside: "",
+        what: "odds that a deviation goes with anatomy",
+        value: 10.9,
+        unit: "(ratio)",
+        how: "231 insertions; orientation of the bevel not significant",
+        source: "Ma 2025",
+        used: Use::Context,
+        note: "patients.",
+    },
+    Published {
+        beside: "",
+        what: "swelling in the theatre",
+        value: 4.5,
+        unit: "cc",
+        how: "of 37.4 cc; 149 patients",
+        source: "PMC3720214",
+        used: Use::Context,
+        note: "patients; not simulated: volumes stay as they are.",
+    },
+    Published {
+        beside: "",
+        what: "seeds that migrate away",
+        value: 0.47,
+        unit: "%",
+        how: "of 19,236 seeds",
+        source: "1748-717X-6-130",
+        used: Use::Context,
+        note: "patients; over weeks, not during the insertion.",
+    },
+    Published {
+        beside: "",
+        what: "finite elements against a phantom",
+        value: 0.36,
+        unit: "mm",
+        how: "indentation; tip 0.14 mm",
+        source: "Moreira 2013",
+        used: Use::Context,
+        note: "phantom; what a model with known materials can reach.",
     },
     Published {
         beside: "",
@@ -73,6 +202,7 @@ pub const PUBLISHED: &[Published] = &[
         unit: "mm",
         how: "median, 1.35 to 2.47",
         source: "Halstuch 2018",
+        used: Use::Context,
         note: "not simulated: the needle of the simulator is straight.",
     },
     Published {
@@ -82,6 +212,7 @@ pub const PUBLISHED: &[Published] = &[
         unit: "mm",
         how: "0.3 to 1.3",
         source: "PMID 27708117",
+        used: Use::Context,
         note: "phantom; error of the needle alone.",
     },
 ];

@@ -1,6 +1,6 @@
 //! Carries out what the operator asked for, after all panels are drawn.
 
-use super::drive::{BEFORE_ENTRY_M, Drive};
+use super::drive::{BEFORE_ENTRY_M, Drive, Goal};
 use super::{App, Waiting, refusal};
 use crate::action::Action;
 use crate::panel::workflow::{Undo, next_action, undo_action};
@@ -43,12 +43,24 @@ impl App {
 
     /// Sends the hand to a depth along the planned path, or along the line beside it where the needle is.
     fn move_to(&mut self, what: &'static str, depth_m: f64, speed_m_per_s: f64) {
-        let goal = self.shown.beside_path_m(depth_m, self.drive.beside_m);
+        let beside_m = self.drive.beside_m();
+        self.move_hand(
+            what,
+            Goal {
+                depth_m,
+                beside_m,
+                speed_m_per_s,
+            },
+        );
+    }
+
+    fn move_hand(&mut self, what: &'static str, to: Goal) {
+        let goal = self.shown.beside_path_m(to.depth_m, to.beside_m);
         let (Some(plan), Some(goal)) = (self.shown.plan, goal) else {
             self.shown.note = Some(refusal(format!("{what}: plan the seeds first")));
             return;
         };
-        let request = move_request(goal, plan.direction, speed_m_per_s, self.pace.acceleration_m_per_s2);
+        let request = move_request(goal, plan.direction, to.speed_m_per_s, self.pace.acceleration_m_per_s2);
         self.send(what, &request);
     }
 
@@ -83,6 +95,10 @@ impl App {
             Action::CancelLoad => self.cancel_load(),
             Action::PickFile(purpose) => self.pick_file(purpose),
             Action::StopRun => self.stop_run(),
+            Action::Watch(action) => self.act_on_recording(action),
+            _ if self.watches() => {
+                self.shown.note = Some(refusal("This is a recording: close it to move the needle.".to_owned()));
+            }
             // While the script runs the needle is its own.
             _ if self.run.is_some() && action != Action::Send(Request::Disengage) => {}
             Action::Next => {
@@ -112,7 +128,7 @@ impl App {
             Action::PlaceNeedle => {
                 // In the tissue the needle keeps its line: aside it would tear.
                 if !self.shown.has_punctured() {
-                    self.drive.beside_m = [0.0; 2];
+                    self.drive.keep_to_path();
                 }
                 self.move_to("Place needle", 0.0, self.pace.approach_m_per_s);
             }
@@ -182,7 +198,7 @@ impl App {
     /// Held keys, a stick or a cap move the goal along the path; letting go stops it there. Without them a hand
     /// may pull the tip.
     pub(super) fn drive(&mut self, wish: Wish, frame_s: f64) {
-        if self.run.is_some() || !self.shown.is_live() {
+        if self.run.is_some() || self.watches() || !self.shown.is_live() {
             self.drive.forget();
             self.pulled_to_m = None;
             return;
@@ -196,10 +212,11 @@ impl App {
             }
             return;
         };
+        self.drive.find(&tip);
         if Drive::follows(&wish, &tip) {
             self.pulled_to_m = None;
             if let Some(goal) = self.drive.step(&wish, &tip, frame_s) {
-                self.move_to("Needle", goal.depth_m, goal.speed_m_per_s);
+                self.move_hand("Needle", goal);
             }
         } else if self.drive.stop(&tip) {
             self.send("Needle", &Request::StopHand);

@@ -4,12 +4,12 @@ use crate::shown::TipOnPath;
 use std::time::Duration;
 use stylet_controllers::{SLOWEST_M_PER_S, Wish};
 
-/// The goal of a driven needle runs ahead of the tip by no more than this, so that it stops when the keys or the device are released.
+/// A tip that is held back lags behind the hand that drives it by no more than this.
 const LEAD_M: f64 = 0.004;
+/// The hand goes on for so long without another goal: a slow frame does not stop the needle, a window that hangs does.
+const HOLD_S: f64 = 0.5;
 /// The needle may be drawn back so far before the entry.
 pub const BEFORE_ENTRY_M: f64 = 0.02;
-/// A longer frame counts as this long, so that a hiccup is not a jump of the needle.
-const LONGEST_S: f64 = 0.05;
 /// Goals are sent no more often, whatever the frame rate.
 const GOALS_EVERY: Duration = Duration::from_millis(10);
 /// The needle goes across the template only with its tip before this depth.
@@ -19,27 +19,47 @@ const OUTSIDE_M: f64 = 1e-3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Goal {
     pub depth_m: f64,
+    /// Beside the planned path.
+    pub beside_m: [f64; 2],
     pub speed_m_per_s: f64,
 }
 
 /// A needle that is being driven.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drive {
-    /// Where it is sent, while it is driven.
-    goal_m: Option<f64>,
-    /// Beside the planned path; every goal of the window is, so that a needle in the tissue is not pulled aside.
-    pub beside_m: [f64; 2],
+    /// Depth at which the hand is now, while it is driven.
+    at_m: Option<f64>,
+    /// The line beside the planned path that every goal of the window is on, so that a needle in the tissue is not pulled aside;
+    /// `None` until this window has chosen one or found a needle in the tissue.
+    beside_m: Option<[f64; 2]>,
     unsent_s: f64,
 }
 
 impl Drive {
     pub fn is_on(&self) -> bool {
-        self.goal_m.is_some()
+        self.at_m.is_some()
     }
 
     /// Nobody drives any more, and nothing is to be sent.
     pub fn forget(&mut self) {
-        self.goal_m = None;
+        self.at_m = None;
+    }
+
+    /// The line beside the planned path that the needle is on.
+    pub fn beside_m(&self) -> [f64; 2] {
+        self.beside_m.unwrap_or_default()
+    }
+
+    /// From now on the needle is on the planned path.
+    pub fn keep_to_path(&mut self) {
+        self.beside_m = Some([0.0; 2]);
+    }
+
+    /// A needle that another window left in the tissue stays on its line.
+    pub fn find(&mut self, tip: &TipOnPath) {
+        if self.beside_m.is_none() && !is_outside(tip) {
+            self.beside_m = Some(tip.beside_m);
+        }
     }
 
     /// Whether the wish is one that is followed here: across only outside.
@@ -47,40 +67,47 @@ impl Drive {
         wish.along_m_per_s != 0.0 || (wish.across_m_per_s != [0.0; 2] && is_outside(tip))
     }
 
-    /// The next goal, where it is time for one. The wish must be one that is followed.
+    /// The next goal, where it is time for one. The wish must be one that is followed, and `frame_s` the time since the last frame.
     pub fn step(&mut self, wish: &Wish, tip: &TipOnPath, frame_s: f64) -> Option<Goal> {
-        self.unsent_s += frame_s.clamp(0.0, LONGEST_S);
+        self.unsent_s += frame_s.clamp(0.0, HOLD_S);
         if self.is_on() && self.unsent_s < GOALS_EVERY.as_secs_f64() {
             return None;
         }
-        let step_s = self.unsent_s.min(LONGEST_S);
+        // The hand was at rest until now, or went on as it was asked to, for so long at most.
+        let went_s = if self.is_on() { self.unsent_s.min(HOLD_S) } else { 0.0 };
         self.unsent_s = 0.0;
-        let from_m = self.goal_m.unwrap_or(tip.depth_m);
-        let ahead_m = from_m + wish.along_m_per_s * step_s;
-        let near_m = ahead_m.clamp(tip.depth_m - LEAD_M, tip.depth_m + LEAD_M);
-        let depth_m = near_m.clamp(-BEFORE_ENTRY_M, tip.length_m.max(-BEFORE_ENTRY_M));
-        self.goal_m = Some(depth_m);
+        let along = wish.along_m_per_s;
+        let on_path = |depth_m: f64| depth_m.clamp(-BEFORE_ENTRY_M, tip.length_m.max(-BEFORE_ENTRY_M));
+        let went_m = self.at_m.unwrap_or(tip.depth_m) + along * went_s;
+        let at_m = on_path(went_m.clamp(tip.depth_m - LEAD_M, tip.depth_m + LEAD_M));
+        self.at_m = Some(at_m);
+        let mut beside_m = self.beside_m();
         let across = wish.across_m_per_s;
         if across != [0.0; 2] && is_outside(tip) {
+            let mut goes_on_m = beside_m;
             for (axis, across) in across.into_iter().enumerate() {
-                let ahead_m = self.beside_m[axis] + across * step_s;
-                let near_m = ahead_m.clamp(tip.beside_m[axis] - LEAD_M, tip.beside_m[axis] + LEAD_M);
                 let [low, high] = tip.room_m[axis];
-                self.beside_m[axis] = near_m.clamp(low.min(high), high.max(low));
+                let in_room = |m: f64| m.clamp(low.min(high), high.max(low));
+                let went_m = beside_m[axis] + across * went_s;
+                beside_m[axis] = in_room(went_m.clamp(tip.beside_m[axis] - LEAD_M, tip.beside_m[axis] + LEAD_M));
+                goes_on_m[axis] = in_room(beside_m[axis] + across * HOLD_S);
             }
+            self.beside_m = Some(beside_m);
+            beside_m = goes_on_m;
         }
-        let speed = wish.along_m_per_s.abs().max(across[0].hypot(across[1]));
+        let speed = along.abs().max(across[0].hypot(across[1]));
         Some(Goal {
-            depth_m,
+            depth_m: on_path(at_m + along * HOLD_S),
+            beside_m,
             speed_m_per_s: speed.max(SLOWEST_M_PER_S),
         })
     }
 
     /// Whether the keys or the device were released just now, so that the core must stop the needle itself: the tip known here is delayed.
     pub fn stop(&mut self, tip: &TipOnPath) -> bool {
-        let was_on = self.goal_m.take().is_some();
+        let was_on = self.at_m.take().is_some();
         if was_on && is_outside(tip) {
-            self.beside_m = tip.beside_m;
+            self.beside_m = Some(tip.beside_m);
         }
         was_on
     }
@@ -116,33 +143,83 @@ mod tests {
         }
     }
 
+    /// A hand that goes to its goal with the speed that it was given, as the core's does.
+    fn goes(tip: &mut TipOnPath, goal: &Goal, time_s: f64) {
+        let step_m = goal.speed_m_per_s * time_s;
+        tip.depth_m += (goal.depth_m - tip.depth_m).clamp(-step_m, step_m);
+    }
+
+    /// A frame of more than 100 ms stopped the needle, and frames that were slow one after the other drove it at a part of its speed.
     #[test]
-    fn the_goal_goes_as_fast_as_it_is_wished_whatever_the_frames_and_goals_are_bounded() {
-        for frame_s in [0.001, 0.004, 0.016, 0.040] {
+    fn the_needle_goes_as_fast_as_it_is_wished_whatever_the_frames_and_goals_are_bounded() {
+        for frame_s in [0.001, 0.004, 0.016, 0.040, 0.150, 0.400] {
             let (mut drive, mut tip, mut goals, mut time_s) = (Drive::default(), OUTSIDE, 0, 0.0);
-            while time_s < 1.0 {
-                if let Some(goal) = drive.step(&along(0.02), &tip, frame_s) {
-                    // A hand that follows at once.
-                    tip.depth_m = goal.depth_m;
-                    goals += 1;
-                    assert_eq!(goal.speed_m_per_s, 0.02);
+            let mut last = None;
+            while time_s < 1.2 {
+                if let Some(goal) = drive.step(&along(0.04), &tip, frame_s) {
+                    assert_eq!(goal.speed_m_per_s, 0.04);
+                    (last, goals) = (Some(goal), goals + 1);
                 }
+                goes(&mut tip, &last.expect("a goal in the first frame"), frame_s);
                 time_s += frame_s;
             }
-            assert!((tip.depth_m - 0.02).abs() < 0.02 * 0.05, "{frame_s}: {}", tip.depth_m);
-            assert!(goals <= 101, "{goals} in a second");
+            let wished_m = 0.04 * time_s;
+            assert!(
+                (tip.depth_m - wished_m).abs() < 1e-9,
+                "{frame_s}: {} of {wished_m}",
+                tip.depth_m
+            );
+            assert!(goals <= 121, "{goals} in 1.2 s");
         }
+    }
+
+    #[test]
+    fn a_window_that_hangs_stops_the_needle() {
+        let (mut drive, mut tip) = (Drive::default(), OUTSIDE);
+        let goal = drive.step(&along(0.04), &tip, 0.016).expect("a goal");
+        goes(&mut tip, &goal, 60.0);
+        assert!((tip.depth_m - 0.04 * HOLD_S).abs() < 1e-12, "{}", tip.depth_m);
     }
 
     #[test]
     fn a_needle_that_is_held_back_or_a_frame_that_hangs_is_no_jump() {
         let mut drive = Drive::default();
-        for _ in 0..1000 {
-            let goal = drive.step(&along(0.04), &OUTSIDE, 0.016).expect("a goal");
-            assert!(goal.depth_m <= LEAD_M + 1e-12);
+        for frame_s in [0.016, 100.0] {
+            for _ in 0..1000 {
+                let goal = drive.step(&along(0.04), &OUTSIDE, frame_s).expect("a goal");
+                assert!(goal.depth_m <= LEAD_M + 0.04 * HOLD_S + 1e-12);
+            }
         }
-        let goal = Drive::default().step(&along(0.04), &OUTSIDE, 100.0).expect("a goal");
-        assert!(goal.depth_m <= 0.04 * LONGEST_S + 1e-12);
+    }
+
+    /// A window that was opened while the needle was beside its path drew it aside in the tissue.
+    #[test]
+    fn a_needle_that_another_window_left_in_the_tissue_stays_on_its_line() {
+        let tip = TipOnPath {
+            depth_m: 0.03,
+            beside_m: [0.005, -0.002],
+            is_free: false,
+            ..OUTSIDE
+        };
+        let mut drive = Drive::default();
+        drive.find(&tip);
+        assert_eq!(drive.beside_m(), tip.beside_m);
+        let goal = drive.step(&along(0.02), &tip, 0.016).expect("a goal");
+        assert_eq!(goal.beside_m, tip.beside_m);
+        // Tissue that bends the tip does not move the line.
+        drive.find(&TipOnPath {
+            beside_m: [0.006, 0.0],
+            ..tip
+        });
+        assert_eq!(drive.beside_m(), tip.beside_m);
+        // Outside it may come to the path.
+        let mut drive = Drive::default();
+        drive.find(&TipOnPath {
+            depth_m: 0.0,
+            is_free: true,
+            ..tip
+        });
+        assert_eq!(drive.beside_m(), [0.0; 2]);
     }
 
     #[test]
@@ -174,7 +251,7 @@ mod tests {
         assert!(drive.stop(&tip));
         assert!(!drive.stop(&tip));
         let goal = drive.step(&along(0.04), &tip, 0.016).expect("a goal");
-        assert!((goal.depth_m - 0.0123 - 0.04 * 0.016).abs() < 1e-12);
+        assert!((goal.depth_m - 0.0123 - 0.04 * HOLD_S).abs() < 1e-12);
     }
 
     #[test]
@@ -193,7 +270,7 @@ mod tests {
         ] {
             assert!(!Drive::follows(&wish, &inside));
             let mut drive = Drive {
-                beside_m: [0.005, 0.0],
+                beside_m: Some([0.005, 0.0]),
                 ..Drive::default()
             };
             drive.step(
@@ -204,17 +281,17 @@ mod tests {
                 &inside,
                 0.016,
             );
-            assert_eq!(drive.beside_m, [0.005, 0.0], "a needle in the tissue keeps its line");
+            assert_eq!(drive.beside_m(), [0.005, 0.0], "a needle in the tissue keeps its line");
             drive.stop(&inside);
-            assert_eq!(drive.beside_m, [0.005, 0.0]);
+            assert_eq!(drive.beside_m(), [0.005, 0.0]);
         }
         let (mut drive, mut tip) = (Drive::default(), OUTSIDE);
         for _ in 0..1000 {
-            drive.step(&wish, &tip, 0.016);
-            assert!((drive.beside_m[0] - tip.beside_m[0]).abs() <= LEAD_M + 1e-12);
-            tip.beside_m = drive.beside_m;
+            let goal = drive.step(&wish, &tip, 0.016).expect("a goal");
+            assert!((goal.beside_m[0] - tip.beside_m[0]).abs() <= LEAD_M + 0.01 * HOLD_S + 1e-12);
+            tip.beside_m = drive.beside_m();
         }
-        assert_eq!(drive.beside_m, [0.03, -0.03]);
+        assert_eq!(drive.beside_m(), [0.03, -0.03]);
     }
 
     #[test]

@@ -1,13 +1,13 @@
 //! Files that are chosen in a dialog.
 
 use super::{App, refusal};
-use crate::action::{Action, PlanAction};
+use crate::action::{Action, PlanAction, WatchAction};
 use crate::dialog::{Picked, Purpose};
 
 impl App {
     pub(super) fn pick_file(&mut self, purpose: Purpose) {
         let beside = match purpose {
-            Purpose::Scene | Purpose::Image => &self.workflow.scene_path,
+            Purpose::Scene | Purpose::Image | Purpose::Recording => &self.workflow.scene_path,
             _ => &self.workflow.plan.path,
         };
         self.dialogs.begin(purpose, beside);
@@ -31,6 +31,7 @@ impl App {
                 Action::LoadScene(path)
             }
             Purpose::Image => Action::LoadImage(path),
+            Purpose::Recording => Action::Watch(WatchAction::File(path)),
             Purpose::ImportPlan => {
                 self.workflow.plan.path = typed;
                 Action::Plan(PlanAction::Import(path))

@@ -8,8 +8,9 @@ mod frames;
 mod layout;
 mod plan;
 mod take;
+mod watch;
 
-use crate::action::{Action, PlanAction};
+use crate::action::{Action, PlanAction, WatchAction};
 use crate::dialog::Dialogs;
 use crate::dose_worker::DoseWorker;
 use crate::loader::Loader;
@@ -49,6 +50,8 @@ pub struct Options {
     pub label: Option<u8>,
     /// Image for the slices, of the patient of the scene file.
     pub image: Option<PathBuf>,
+    /// Recording that is shown in place of a core.
+    pub watch: Option<PathBuf>,
     /// Whether gamepads and 3D mice may hold the needle.
     pub controllers: bool,
     /// Limits the frame rate to what the eye needs; without it frames follow at once.
@@ -97,6 +100,7 @@ pub struct App {
     run_lost: (Vec<NeedleTask>, Vec<usize>),
     placed_found: Instant,
     planner: Planner,
+    recording: watch::Recording,
     pace: Pace,
     waiting: Vec<Waiting>,
     controllers: Controllers,
@@ -230,6 +234,7 @@ impl App {
             run_lost: Default::default(),
             placed_found: Instant::now(),
             planner: Planner::default().keeping_in(kept_in),
+            recording: watch::Recording::beginning_with(options.watch),
             pace: Pace::default(),
             waiting: Vec::new(),
             controllers: if options.controllers {
@@ -303,6 +308,9 @@ impl App {
                 .map(|f| f.path().to_owned())
                 .find(|p| !p.as_os_str().is_empty())
         })?;
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
+            return Some(Action::Watch(WatchAction::File(path)));
+        }
         let is_plan = ["toml", "csv", "dcm"]
             .iter()
             .any(|ending| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)));
@@ -334,7 +342,8 @@ impl eframe::App for App {
             self.act(action, &ctx);
         }
         let wish = self.wish(&ctx, keys.drive_m_per_s);
-        self.drive(wish, f64::from(ctx.input(|i| i.stable_dt)));
+        // Not `stable_dt`, which is that of a fast frame whenever a frame was asked for later than at once.
+        self.drive(wish, f64::from(ctx.input(|i| i.unstable_dt)));
         self.send_parameters();
         let asked = self.middle.driver();
         let driver_ns = asked.cpu_ns - driver.cpu_ns;

@@ -24,6 +24,7 @@ const ANSWER_WITHIN: Duration = Duration::from_secs(3);
 impl App {
     /// Takes all that is new since the last frame.
     pub(super) fn take(&mut self) {
+        self.take_recording();
         self.link.poll();
         let plan_before = self.shown.plan.map(|p| p.generation);
         self.shown.take(&self.link);
@@ -57,6 +58,9 @@ impl App {
 
     /// The force loop has its core to itself.
     fn leave_core(&mut self) {
+        if self.watches() {
+            return;
+        }
         let haptic = self.shown.session.map(|s| s.haptic).filter(|h| h.is_fifo());
         let core = haptic.map(|h| h.core).filter(|&core| core != u32::MAX);
         if let Some(core) = core.filter(|_| core != self.left_core) {
@@ -283,7 +287,7 @@ impl App {
                 self.end_run();
             }
         }
-        self.shown.running = self.run.is_some();
+        self.shown.running = self.run.is_some() || self.watches();
         self.find_placed();
     }
 }

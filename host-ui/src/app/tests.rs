@@ -3,5 +3,6 @@
 mod fixture;
 mod guide;
 mod held;
+mod pictures;
 mod text;
 mod whole;

@@ -14,7 +14,7 @@ use stylet_files::dicom::plan::{self, SeedPlan};
 use stylet_files::dicom::structures::write::{Outlined, Written, of_set, of_voxels};
 use stylet_files::dicom::structures::{self, StructureSet};
 use stylet_files::dicom::{self, Identity, RT_DOSE, RT_PLAN};
-use stylet_files::{self as files, FileError, Progress, bytes, scene};
+use stylet_files::{self as files, FileError, bytes, scene};
 use stylet_implant::plan::exchange::plan_source;
 use stylet_implant::plan::seeds;
 use stylet_implant::readers::{DayOfImplant, DoseFile, SeedDefaults, SeedFile, read_dose};
@@ -104,7 +104,7 @@ impl ConvertArgs {
         if to_dicom && dicom_class(&self.from)?.is_some() {
             return self.structures_again();
         }
-        let voxels = files::read_voxels(&self.from, &Progress::default())?;
+        let voxels = files::watched(&self.from, |progress| files::read_voxels(&self.from, progress))?;
         if let Some(note) = &voxels.frame.warning {
             seeds::report(&self.from, std::slice::from_ref(note));
         }
@@ -128,7 +128,7 @@ impl ConvertArgs {
     /// A structure set contour by contour, on the images beside it.
     fn structures_again(&self) -> Result<(), CommandError> {
         let refused = |why| FileError::of(&self.from, why);
-        let content = bytes::whole(&self.from, &Progress::default()).map_err(refused)?;
+        let content = files::watched(&self.from, |progress| bytes::whole(&self.from, progress)).map_err(refused)?;
         let object = dicom::read(&content).map_err(refused)?;
         let set = StructureSet::of(&object).map_err(refused)?;
         seeds::report(&self.from, &set.notes);
@@ -314,7 +314,7 @@ fn dicom_class(path: &Path) -> Result<Option<String>, CommandError> {
     if !bytes::start(path, 160).is_some_and(|start| dicom::is_dicom(&start)) {
         return Ok(None);
     }
-    let content = bytes::whole(path, &Progress::default()).map_err(refused)?;
+    let content = files::watched(path, |progress| bytes::whole(path, progress)).map_err(refused)?;
     Ok(Some(dicom::read(&content).map_err(refused)?.sop_class))
 }
 
@@ -337,7 +337,8 @@ fn has_ending(path: &Path, ending: &str) -> bool {
 }
 
 fn first_line(path: &Path) -> Result<String, CommandError> {
-    let bytes = bytes::whole(path, &Progress::default()).map_err(|why| FileError::of(path, why))?;
+    let bytes =
+        files::watched(path, |progress| bytes::whole(path, progress)).map_err(|why| FileError::of(path, why))?;
     let line = bytes
         .split(|&b| b == b'\n')
         .find(|l| !l.starts_with(b"#"))

@@ -14,7 +14,7 @@ use stylet_files::dicom::plan::{PlanSeed, SeedPlan};
 use stylet_files::dicom::structures::StructureSet;
 use stylet_files::dicom::structures::write::{Outlined, of_set, of_voxels};
 use stylet_files::dicom::{self, Identity};
-use stylet_files::{FileError, Progress, bytes, read_voxels};
+use stylet_files::{FileError, bytes, read_voxels, watched};
 use stylet_implant::linked::{self, LinkedStudy};
 use stylet_implant::plan::exchange::plan_source;
 use stylet_implant::plan::seeds;
@@ -135,9 +135,9 @@ impl DicomArgs {
     fn drawn(&self) -> Result<Drawn, CommandError> {
         let path = &self.structures;
         let refused = |why| FileError::of(path, why);
-        let content = bytes::whole(path, &Progress::default()).map_err(refused)?;
+        let content = watched(path, |progress| bytes::whole(path, progress)).map_err(refused)?;
         if !dicom::is_dicom(&content) {
-            let mut voxels = read_voxels(path, &Progress::default())?;
+            let mut voxels = watched(path, |progress| read_voxels(path, progress))?;
             voxels.names.extend(self.common.label_names()?);
             let images = match &self.images {
                 Some(folder) => one_series(folder)?,

@@ -8,8 +8,8 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use stylet_base::format::printable;
 use stylet_base::output::new_folder;
-use stylet_files::Progress;
 use stylet_files::image::read_values;
+use stylet_files::watched;
 use stylet_implant::finder::{self, Found, Search};
 use stylet_implant::provenance;
 
@@ -60,7 +60,7 @@ impl FindSeedsArgs {
     pub fn run(self) -> Result<(), CommandError> {
         within("--length-mm", self.length_mm, 1.0, 10.0)?;
         within("--diameter-mm", self.diameter_mm, 0.2, 3.0)?;
-        let ct = read_values(&self.ct, &Progress::default())?;
+        let ct = watched(&self.ct, |progress| read_values(&self.ct, progress))?;
         let search = Search {
             threshold: self.threshold,
             count: self.count.map(|n| n as usize),

@@ -1,7 +1,7 @@
 //! The banners under the bar: what is wrong with the core, the force and the controllers, and what to do.
 
-use crate::action::Action;
-use crate::shown::Shown;
+use crate::action::{Action, WatchAction};
+use crate::shown::{Shown, Watched};
 use crate::theme;
 use crate::theme::Tokens;
 use egui::{Color32, Rect, RichText};
@@ -36,9 +36,25 @@ pub struct Banner {
 
 /// Worst first. Without a core there is no banner about its force.
 pub fn banners(shown: &Shown) -> Vec<Banner> {
-    let mut list = of_core(shown);
+    let mut list = match &shown.watched {
+        Some(watched) => vec![of_recording(watched)],
+        None => of_core(shown),
+    };
     list.extend(of_controllers(shown));
     list
+}
+
+/// In place of whatever was wrong with the core that was recorded.
+fn of_recording(watched: &Watched) -> Banner {
+    Banner {
+        level: BannerLevel::Info,
+        title: "A recording",
+        text: match watched.has_ended {
+            true => "This is its end. Close it, start rt-core, and insert a needle yourself.".to_owned(),
+            false => "Needle, force and tissue are as they were; nothing can be moved.".to_owned(),
+        },
+        remedy: Some(("Close", Action::Watch(WatchAction::Close))),
+    }
 }
 
 /// Devices that were unplugged, and devices that may not be read.
@@ -137,7 +153,7 @@ fn absent(shown: &Shown, why: &str) -> Banner {
         level: BannerLevel::Bad,
         title: "rt-core is absent",
         text,
-        remedy: None,
+        remedy: (!shown.reads_recording).then_some(("Watch an example", Action::Watch(WatchAction::Example))),
     }
 }
 

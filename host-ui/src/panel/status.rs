@@ -100,6 +100,7 @@ fn settings_ui(ui: &mut egui::Ui, settings: &mut Settings) {
 fn link_ui(ui: &mut egui::Ui, shown: &Shown) {
     let tokens = theme::of(ui);
     let (word, color) = match shown.status {
+        _ if shown.watched.is_some() => ("RECORDING", tokens.accent),
         LinkStatus::Live => ("LIVE", tokens.good),
         LinkStatus::Silent { .. } => ("SILENT", tokens.bad),
         LinkStatus::Absent { .. } => ("ABSENT", tokens.bad),

@@ -61,6 +61,9 @@ pub struct Shown {
     /// The last answer that the operator should read.
     pub note: Option<Note>,
     pub load: LoadState,
+    /// The recording that is shown in place of a core, and whether one is being read.
+    pub watched: Option<Watched>,
+    pub reads_recording: bool,
     /// Of the seeds as they lie now, or of those of the plan.
     pub dose: Option<Arc<DoseResult>>,
     /// Why the dose is not known, where that is so.
@@ -101,6 +104,16 @@ pub struct FrameCost {
     pub uploaded_bytes: u64,
 }
 
+/// A recording in place of a core.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Watched {
+    pub name: String,
+    pub at_s: f64,
+    pub length_s: f64,
+    pub is_held: bool,
+    pub has_ended: bool,
+}
+
 #[derive(Clone, Debug, PartialEq)]
 pub struct Note {
     pub refused: bool,
@@ -137,6 +150,8 @@ impl Shown {
             continues_at: None,
             note: None,
             load: LoadState::Idle,
+            watched: None,
+            reads_recording: false,
             dose: None,
             dose_trouble: None,
             planning: Planning::default(),

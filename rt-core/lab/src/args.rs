@@ -8,7 +8,7 @@ use crate::spin::Spin;
 use crate::whose::WhoseArgs;
 use clap::Args;
 use std::path::PathBuf;
-use stylet_runtime::args::RealTimeArgs;
+use stylet_runtime::args::{OptionsError, RealTimeArgs};
 use stylet_runtime::process::Options;
 use stylet_runtime::rt::pin::Pin;
 
@@ -68,11 +68,31 @@ pub struct LatencyArgs {
     real_time: RealTimeArgs,
 }
 
+/// Settings of the loops that this PC cannot have.
+#[derive(Debug, thiserror::Error)]
+pub enum ArgsError {
+    /// Those of every run.
+    #[error(transparent)]
+    Options(#[from] OptionsError),
+    /// The loop would take more of its core than the kernel gives to real-time threads.
+    #[error(
+        "--spin-us {given_us}: at {rate_hz} Hz at most {longest_us}, or the kernel would stop the loop for its share of real-time work"
+    )]
+    Spin {
+        /// As given.
+        given_us: u64,
+        /// Rate of the loop.
+        rate_hz: u32,
+        /// Longest spin that leaves the rest of the core to others.
+        longest_us: u64,
+    },
+}
+
 impl LatencyArgs {
     /// Settings of the loops, with an instance of its own, so that a running simulator is not disturbed in its shared memory.
-    pub fn options(&self) -> Result<Options, String> {
+    pub fn options(&self) -> Result<Options, ArgsError> {
         let instance = format!("lab-{}", std::process::id());
-        let mut options = self.real_time.options(&instance).map_err(|e| e.to_string())?;
+        let mut options = self.real_time.options(&instance)?;
         options.haptic_period_ns = measure::period_ns(self.rate);
         let Spin::Fixed(spin_us) = self.spin_us else {
             return Ok(options);
@@ -80,10 +100,11 @@ impl LatencyArgs {
         options.spin_ns = spin_us * 1_000;
         let longest_us = self.longest_spin_us();
         if spin_us > longest_us {
-            return Err(format!(
-                "--spin-us {spin_us}: at {} Hz at most {longest_us}, or the kernel would stop the loop for its share of real-time work",
-                self.rate
-            ));
+            return Err(ArgsError::Spin {
+                given_us: spin_us,
+                rate_hz: self.rate,
+                longest_us,
+            });
         }
         Ok(options)
     }
@@ -125,13 +146,18 @@ pub(crate) fn longest_spin_ns(period_ns: u64, throttle: Option<Throttle>) -> u64
     ((share - SHARE_KEPT_FREE).max(0.0) * period_ns as f64).round() as u64
 }
 
-pub(crate) fn duration_ns(text: &str) -> Result<u64, String> {
-    let duration: jiff::SignedDuration = text.parse().map_err(|e: jiff::Error| e.to_string())?;
+/// A length of time that is none.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct DurationError(String);
+
+pub(crate) fn duration_ns(text: &str) -> Result<u64, DurationError> {
+    let duration: jiff::SignedDuration = text.parse().map_err(|e: jiff::Error| DurationError(e.to_string()))?;
     let ns = u64::try_from(duration.as_nanos()).unwrap_or(0);
     if (1_000_000_000..=172_800_000_000_000).contains(&ns) {
         Ok(ns)
     } else {
-        Err("between 1s and 48h".to_owned())
+        Err(DurationError("between 1s and 48h".to_owned()))
     }
 }
 
@@ -149,8 +175,8 @@ mod tests {
 
     #[test]
     fn durations_are_read_with_their_unit() {
-        assert_eq!(duration_ns("90s"), Ok(90_000_000_000));
-        assert_eq!(duration_ns("1h"), Ok(3_600_000_000_000));
+        assert_eq!(duration_ns("90s").ok(), Some(90_000_000_000));
+        assert_eq!(duration_ns("1h").ok(), Some(3_600_000_000_000));
         assert!(duration_ns("5").is_err() && duration_ns("10ms").is_err() && duration_ns("-5s").is_err());
     }
 }

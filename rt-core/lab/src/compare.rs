@@ -3,14 +3,15 @@
 
 mod timerlat;
 
-use crate::load::{Load, Running};
+use crate::load::{Load, LoadError, Running};
 use crate::machine::Machine;
-use crate::measure::{Measured, Setup, measure};
+use crate::measure::{MeasureError, Measured, Setup, measure};
 use crate::sample::histogram;
 use crate::summary::quantile_us;
 use clap::ValueEnum;
 use hdrhistogram::Histogram;
 use serde::Serialize;
+use std::io;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -80,8 +81,73 @@ pub struct Comparison {
     pub others: Histogram<u64>,
 }
 
+/// Why there is no comparison.
+#[derive(Debug, thiserror::Error)]
+pub enum CompareError {
+    /// Our side.
+    #[error(transparent)]
+    Measure(#[from] MeasureError),
+    /// The load beside the other side.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The other side.
+    #[error(transparent)]
+    Tool(#[from] ToolError),
+    /// Histograms of different bins; a fault of the program.
+    #[error("histograms: {0}")]
+    Histograms(String),
+}
+
+/// Why a program that measures the same has no histogram.
+#[derive(Debug, thiserror::Error)]
+pub enum ToolError {
+    /// It is not there.
+    #[error("{program} is not installed: sudo apt-get install {package}")]
+    Missing {
+        /// The program.
+        program: &'static str,
+        /// Its Debian package.
+        package: &'static str,
+    },
+    /// It does not start.
+    #[error("{program} does not start: {why}")]
+    Start {
+        /// The program.
+        program: &'static str,
+        /// What the system reports.
+        why: io::Error,
+    },
+    /// It cannot be waited for, or its file cannot be made.
+    #[error("{program}: {why}")]
+    Wait {
+        /// The program.
+        program: &'static str,
+        /// What the system reports.
+        why: io::Error,
+    },
+    /// It failed.
+    #[error("{program} failed: {said}")]
+    Failed {
+        /// The program.
+        program: &'static str,
+        /// First line of what it printed.
+        said: String,
+    },
+    /// It ended well, and its file holds none.
+    #[error("{0} wrote no histogram")]
+    NoHistogram(&'static str),
+    /// A signal asked this program to end.
+    #[error("interrupted")]
+    Interrupted,
+}
+
 /// Measures our loops and the other side alternately, `rounds` times each.
-pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &AtomicBool) -> Result<Comparison, String> {
+pub fn compare(
+    setup: &Setup,
+    against: Against,
+    rounds: u32,
+    interrupted: &AtomicBool,
+) -> Result<Comparison, CompareError> {
     let turn_ns = match against {
         Against::Untraced => (setup.duration_ns / 4 / u64::from(rounds)).max(SHORTEST_TRACED_TURN_NS),
         _ => (setup.duration_ns / u64::from(rounds)).max(SHORTEST_TURN_NS),
@@ -97,11 +163,11 @@ pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &Atomi
             (Against::Timerlat, _, _) if timerlat::missing(&Machine::this()).is_some() => {
                 timerlat::missing(&Machine::this()).map(str::to_owned)
             }
-            (Against::Timerlat, None, _) => Some("rtla is not installed: sudo apt-get install rtla".to_owned()),
+            (Against::Timerlat, None, _) => Some(missing(timerlat::PROGRAM, "rtla").to_string()),
             (Against::Untraced, _, _) if setup.trace_over_ns.is_none() => {
                 Some("there is no trace to compare with; give --trace".to_owned())
             }
-            (_, None, _) => Some("cyclictest is not installed: sudo apt-get install rt-tests".to_owned()),
+            (_, None, _) => Some(missing(CYCLICTEST, "rt-tests").to_string()),
             (Against::Cyclictest | Against::Timerlat, _, Load::Window) => {
                 Some("the window draws nothing without our loops; give --compare unloaded".to_owned())
             }
@@ -122,9 +188,9 @@ pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &Atomi
     let setup = Setup {
         duration_ns: turn_ns,
         // Only the cost of the trace is measured with the trace.
+        trace_over_ns: setup.trace_over_ns.filter(|_| against == Against::Untraced),
         checkpoints: None,
         toggle: None,
-        trace_over_ns: setup.trace_over_ns.filter(|_| against == Against::Untraced),
         ..*setup
     };
     for _ in 0..rounds {
@@ -139,13 +205,13 @@ pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &Atomi
         let others = match others {
             Ok(others) => others,
             Err(why) => {
-                comparison.absent = Some(why);
+                comparison.absent = Some(why.to_string());
                 break;
             }
         };
         comparison.rounds.push(round(ours, &others));
         let joined = comparison.ours.add(ours).and(comparison.others.add(&others));
-        joined.map_err(|e| format!("histograms: {e:?}"))?;
+        joined.map_err(|e| CompareError::Histograms(format!("{e:?}")))?;
         // SYNC: set by a signal handler; nothing but the flag is carried.
         if interrupted.load(Ordering::Acquire) {
             break;
@@ -156,7 +222,7 @@ pub fn compare(setup: &Setup, against: Against, rounds: u32, interrupted: &Atomi
 }
 
 /// Our loops under `load`, without a trace.
-fn without(setup: &Setup, load: Load, interrupted: &AtomicBool) -> Result<Histogram<u64>, String> {
+fn without(setup: &Setup, load: Load, interrupted: &AtomicBool) -> Result<Histogram<u64>, CompareError> {
     let setup = Setup {
         load,
         trace_over_ns: None,
@@ -206,31 +272,38 @@ fn version() -> Option<String> {
         .map(|l| l.trim().to_owned())
 }
 
-/// One turn of cyclictest; the reason where it is not installed.
-pub fn cyclictest_turn(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, String> {
-    version().ok_or("cyclictest is not installed: sudo apt-get install rt-tests")?;
+const CYCLICTEST: &str = "cyclictest";
+
+fn missing(program: &'static str, package: &'static str) -> ToolError {
+    ToolError::Missing { program, package }
+}
+
+/// One turn of cyclictest.
+pub fn cyclictest_turn(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, CompareError> {
+    version().ok_or(missing(CYCLICTEST, "rt-tests"))?;
     cyclictest(setup, interrupted)
 }
 
-fn cyclictest(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, String> {
+fn cyclictest(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, CompareError> {
     let load = Running::start(setup.load, &setup.options.instance, setup.folder)?;
     let file = setup.folder.join("cyclictest.tmp");
-    let mut child = Command::new("cyclictest")
+    let mut child = Command::new(CYCLICTEST)
         .args(arguments(setup.options, setup.duration_ns, &file))
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
-        .map_err(|e| format!("cyclictest does not start: {e}"))?;
-    let ended = wait("cyclictest", &mut child, interrupted);
+        .map_err(|why| ToolError::Start {
+            program: CYCLICTEST,
+            why,
+        })?;
+    let ended = wait(CYCLICTEST, &mut child, interrupted);
     drop(load);
     // The ui load was in shared memory, and there was no core to clean up after it.
     setup.options.instance.sweep();
     let text = std::fs::read_to_string(&file).unwrap_or_default();
     let _ = std::fs::remove_file(&file);
-    match ended {
-        Ok(()) => read(&text).ok_or_else(|| "cyclictest wrote no histogram".to_owned()),
-        Err(why) => Err(why),
-    }
+    ended?;
+    Ok(read(&text).ok_or(ToolError::NoHistogram(CYCLICTEST))?)
 }
 
 fn arguments(options: &Options, duration_ns: u64, file: &Path) -> Vec<String> {
@@ -249,8 +322,7 @@ fn arguments(options: &Options, duration_ns: u64, file: &Path) -> Vec<String> {
     arguments
 }
 
-/// Waits for `program`; its first line of errors where it fails.
-fn wait(program: &str, child: &mut Child, interrupted: &AtomicBool) -> Result<(), String> {
+fn wait(program: &'static str, child: &mut Child, interrupted: &AtomicBool) -> Result<(), ToolError> {
     loop {
         match child.try_wait() {
             Ok(Some(status)) if status.success() => return Ok(()),
@@ -260,16 +332,16 @@ fn wait(program: &str, child: &mut Child, interrupted: &AtomicBool) -> Result<()
                     let _ = std::io::Read::read_to_string(&mut pipe, &mut said);
                 }
                 let first = said.lines().next().unwrap_or("no reason given").to_owned();
-                return Err(format!("{program} failed: {first}"));
+                return Err(ToolError::Failed { program, said: first });
             }
             Ok(None) => {}
-            Err(e) => return Err(format!("{program}: {e}")),
+            Err(why) => return Err(ToolError::Wait { program, why }),
         }
         // SYNC: set by a signal handler; nothing but the flag is carried.
         if interrupted.load(Ordering::Acquire) {
             let _ = child.kill();
             let _ = child.wait();
-            return Err("interrupted".to_owned());
+            return Err(ToolError::Interrupted);
         }
         std::thread::sleep(Duration::from_millis(50));
     }

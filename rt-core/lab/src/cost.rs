@@ -7,6 +7,8 @@ use std::time::{Duration, Instant};
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::Scene;
 use stylet_sim::scene::TissueKind;
+use stylet_sim::settings::Problem;
+use stylet_sim::tissue::fem::FemProblem;
 use stylet_sim::tissue::{ChainMailTissue, FemTissue, Held, MaterialPoint, TissueModel, element_ahead};
 
 /// Tissue ticks of one insertion: 50 mm/s at 200 Hz over 40 mm and back.
@@ -23,6 +25,21 @@ const RELAXATION: u32 = 8;
 /// A part that takes longer than this in one round is measured over its first ticks only, and the table says so.
 const ROUND_LIMIT: Duration = Duration::from_secs(5);
 
+/// Why a scene has no cost.
+#[derive(Debug, thiserror::Error)]
+pub enum CostError {
+    /// Parameters of the tissue that are out of range.
+    #[error("{}", lines(.0))]
+    Tissue(Vec<Problem>),
+    /// The scene has no finite elements.
+    #[error("{}", lines(.0))]
+    FiniteElements(Vec<FemProblem>),
+}
+
+fn lines(problems: &[impl ToString]) -> String {
+    problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+}
+
 /// Microseconds of every tick of one part, in each round; at last the least of each tick, in order.
 struct Part {
     name: String,
@@ -37,8 +54,8 @@ impl Part {
     }
 }
 
-/// The table that the command prints. Errors are for people.
-pub fn table(scene: &Scene) -> Result<String, String> {
+/// The table that the command prints.
+pub fn table(scene: &Scene) -> Result<String, CostError> {
     let parts = measure(scene)?;
     let mut text = format!(
         "Scene \"{}\": {} elements of {:.3} mm, {} structures, {} surface vertices.\n\
@@ -71,7 +88,7 @@ pub fn table(scene: &Scene) -> Result<String, String> {
     Ok(text)
 }
 
-fn measure(scene: &Scene) -> Result<Vec<Part>, String> {
+fn measure(scene: &Scene) -> Result<Vec<Part>, CostError> {
     let mut models = models(scene)?;
     let mut parts: Vec<Part> = models.iter().map(|timed| part(&timed.name, TICK_S)).collect();
     let others = [
@@ -131,11 +148,9 @@ struct Timed {
 }
 
 /// The scene as it is, and what single parts of it add.
-fn models(scene: &Scene) -> Result<Vec<Timed>, String> {
-    let chainmail = |name: String, scene: &Scene, parameters: &TissueParameters| -> Result<Timed, String> {
-        let limits = parameters
-            .validate()
-            .map_err(|p| p.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
+fn models(scene: &Scene) -> Result<Vec<Timed>, CostError> {
+    let chainmail = |name: String, scene: &Scene, parameters: &TissueParameters| -> Result<Timed, CostError> {
+        let limits = parameters.validate().map_err(CostError::Tissue)?;
         Ok(Timed {
             name,
             model: Box::new(ChainMailTissue::new(scene, limits)),
@@ -158,8 +173,7 @@ fn models(scene: &Scene) -> Result<Vec<Timed>, String> {
     // In a coarser body the ticks below, in elements of the scene, would be others.
     let elastic = scene.clone().with_tissue(TissueKind::Fem);
     if elastic.coarseness() == 1 {
-        let fem = FemTissue::<f32>::new(&elastic)
-            .map_err(|p| p.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
+        let fem = FemTissue::<f32>::new(&elastic).map_err(CostError::FiniteElements)?;
         models.push(Timed {
             name: "  FEM in its place (--tissue fem)".to_owned(),
             model: Box::new(fem),

@@ -106,13 +106,24 @@ pub struct Host {
     report: HostReport,
 }
 
+/// Why the host of the measurement saw nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum HostError {
+    /// Shared memory cannot be opened.
+    #[error(transparent)]
+    Service(#[from] ServiceError),
+    /// No tick within so many seconds.
+    #[error("the loops published nothing for {0} s")]
+    Silent(u64),
+}
+
 impl Host {
     pub fn new(
         instance: &Instance,
         script: Script,
         pose_times: Arc<PoseTimes>,
         warm_up_ticks: u64,
-    ) -> Result<Self, ServiceError> {
+    ) -> Result<Self, HostError> {
         Ok(Self {
             warm_up_ticks,
             ports: Ports::new(instance)?,
@@ -139,7 +150,7 @@ impl Host {
         duration_ns: u64,
         interrupted: impl Fn() -> bool,
         stop: &AtomicBool,
-    ) -> Result<HostReport, String> {
+    ) -> Result<HostReport, HostError> {
         let began_ns = clock::now_ns();
         let mut first_ns = 0;
         // SYNC: set by the run when it fails; nothing but the flag is carried.
@@ -150,7 +161,7 @@ impl Host {
                 first_ns = now_ns;
             }
             if first_ns == 0 && now_ns - began_ns > PATIENCE_NS {
-                return Err("the loops published nothing for 15 s".to_owned());
+                return Err(HostError::Silent(PATIENCE_NS / 1_000_000_000));
             }
             if first_ns > 0 {
                 self.follow_script(now_ns - first_ns);

@@ -1,32 +1,81 @@
 //! `rt-core latency`: measure, compare with the limits, write the report, print the verdict.
 
-use crate::args::LatencyArgs;
-use crate::compare::{Against, compare};
-use crate::external;
-use crate::files;
+use crate::args::{ArgsError, LatencyArgs};
+use crate::compare::{Against, CompareError, compare};
+use crate::external::{self, ExternalError};
+use crate::files::{self, FilesError};
 use crate::machine::Machine;
-use crate::measure::{Setup, measure};
+use crate::measure::{MeasureError, Setup, measure};
 use crate::report::{self, JSON, PAGE, Parts, Report};
-use crate::sign;
-use crate::spin::{self, Spin};
-use crate::verdict::{self, Outcome};
+use crate::sign::{self, SignError};
+use crate::spin::{self, Spin, SpinError};
+use crate::verdict::{self, LimitsError, Outcome};
+use crate::whose::WhoseError;
+use std::io;
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use stylet_runtime::process::Options;
 
+/// Why there is no report; the text is for people.
+#[derive(Debug, thiserror::Error)]
+pub enum LatencyError {
+    /// Settings of the loops.
+    #[error(transparent)]
+    Args(#[from] ArgsError),
+    /// Operator, site, device or key.
+    #[error(transparent)]
+    Whose(#[from] WhoseError),
+    /// Limits of the verdict.
+    #[error(transparent)]
+    Limits(#[from] LimitsError),
+    /// The folder of the report.
+    #[error("cannot make {}: {why}", .folder.display())]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// What the system reports.
+        why: io::Error,
+    },
+    /// Nothing was measured.
+    #[error(transparent)]
+    Measure(#[from] MeasureError),
+    /// Nothing was compared.
+    #[error(transparent)]
+    Compare(#[from] CompareError),
+    /// No spin could be looked for.
+    #[error(transparent)]
+    Spin(#[from] SpinError),
+    /// The capture of an instrument.
+    #[error(transparent)]
+    External(#[from] ExternalError),
+    /// The notes of the pin.
+    #[error(transparent)]
+    Toggles(#[from] stylet_write::WriteError),
+    /// The report cannot be written.
+    #[error(transparent)]
+    Files(#[from] FilesError),
+    /// The report cannot be signed.
+    #[error(transparent)]
+    Sign(#[from] SignError),
+}
+
 /// The exit code is the verdict: 0 pass, 1 fail, 2 not measurable.
-pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
+pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyError> {
     if let Some(file) = &args.external {
-        return external::run(&args.out, file).map_err(|e| e.to_string());
+        return Ok(external::run(&args.out, file)?);
     }
     let mut options = args.options()?;
-    let whose = args.whose.read().map_err(|e| e.to_string())?;
+    let whose = args.whose.read()?;
     let limits = verdict::limits(options.haptic_period_ns, args.limits.as_deref(), &args.limit)?;
-    std::fs::create_dir_all(&args.out).map_err(|e| format!("cannot make {}: {e}", args.out.display()))?;
+    std::fs::create_dir_all(&args.out).map_err(|why| LatencyError::Folder {
+        folder: args.out.clone(),
+        why,
+    })?;
     let mut spin_search = None;
     if args.spin_us == Spin::Auto {
         eprintln!("rt-core: looking for the smallest spin, trials of three seconds");
         let setup = setup_of(args, &options);
-        let search = spin::search(&setup, args.longest_spin_us(), interrupted).map_err(|e| e.to_string())?;
+        let search = spin::search(&setup, args.longest_spin_us(), interrupted)?;
         println!("{}", search.words());
         options.spin_ns = search.used_us * 1_000;
         spin_search = Some(search);
@@ -40,7 +89,7 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
     );
     let measured = measure(&setup, interrupted)?;
     if args.toggle.is_some() {
-        external::keep(&args.out, &measured.haptic.toggles).map_err(|e| e.to_string())?;
+        external::keep(&args.out, &measured.haptic.toggles)?;
     }
     if let Some(why) = measured.trace.as_ref().and_then(|t| t.absent.as_ref()) {
         eprintln!("rt-core: no causes: {why}");
@@ -72,12 +121,12 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, String> {
     // A signature of an earlier report in the same folder is none of this one.
     let json = args.out.join(JSON);
     let _ = std::fs::remove_file(sign::signature_of(&json));
-    files::write(&args.out, &mut report, &measured).map_err(|e| e.to_string())?;
+    files::write(&args.out, &mut report, &measured)?;
     print_verdict(&report);
     println!("{}", args.out.join(PAGE).display());
     println!("{}", json.display());
     if let Some(key) = &whose.sign {
-        println!("{}", sign::sign(&json, key).map_err(|e| e.to_string())?.display());
+        println!("{}", sign::sign(&json, key)?.display());
     }
     Ok(report.verdict.overall.exit_code())
 }

@@ -4,8 +4,9 @@ use clap::ValueEnum;
 use iceoryx2::port::subscriber::Subscriber;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
+use std::io;
 use std::io::{Seek, SeekFrom, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 use stylet_shm_schema::service::{self, Instance, Ipc, ServiceError};
@@ -87,13 +88,49 @@ impl Load {
     }
 }
 
+/// Why a load does not run.
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    /// Loads are this program, started again.
+    #[error("cannot find this program: {0}")]
+    Program(io::Error),
+    /// A process of the load.
+    #[error("cannot start the load: {0}")]
+    Start(io::Error),
+    /// The load of the window.
+    #[error("the window load needs a display; without one: xvfb-run -a rt-core latency ...")]
+    NoDisplay,
+    /// The window's program.
+    #[error("cannot start {}: {why}; build it: cargo build --release -p host-ui", .program.display())]
+    Window {
+        /// Where it should lie.
+        program: PathBuf,
+        /// What the system reports.
+        why: io::Error,
+    },
+    /// Without it nothing was measured under load.
+    #[error("the load ended by itself ({0})")]
+    Ended(std::process::ExitStatus),
+    /// The file that the load writes.
+    #[error("{}: {why}", .file.display())]
+    File {
+        /// The file.
+        file: PathBuf,
+        /// What the system reports.
+        why: io::Error,
+    },
+    /// Shared memory cannot be opened.
+    #[error(transparent)]
+    Service(#[from] ServiceError),
+}
+
 /// The processes of a load; ended when dropped.
 pub(crate) struct Running(Vec<Child>);
 
 impl Running {
     /// `folder`: where the io load may write.
-    pub(crate) fn start(load: Load, instance: &Instance, folder: &Path) -> Result<Self, String> {
-        let program = std::env::current_exe().map_err(|e| format!("cannot find this program: {e}"))?;
+    pub(crate) fn start(load: Load, instance: &Instance, folder: &Path) -> Result<Self, LoadError> {
+        let program = std::env::current_exe().map_err(LoadError::Program)?;
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let mut running = Self(Vec::new());
         for (index, work) in load.work(cores).into_iter().enumerate() {
@@ -103,7 +140,7 @@ impl Running {
                 .arg(folder.join(format!("load-{index}.tmp")))
                 .stdin(Stdio::null())
                 .spawn()
-                .map_err(|e| format!("cannot start the load: {e}"))?;
+                .map_err(LoadError::Start)?;
             running.0.push(child);
         }
         if load == Load::Window {
@@ -113,10 +150,10 @@ impl Running {
     }
 
     /// Fails if a process of the load has ended before its time: then there was no load.
-    pub(crate) fn ended(&mut self) -> Result<(), String> {
+    pub(crate) fn ended(&mut self) -> Result<(), LoadError> {
         for child in &mut self.0 {
             if let Ok(Some(status)) = child.try_wait() {
-                return Err(format!("the load ended by itself ({status})"));
+                return Err(LoadError::Ended(status));
             }
         }
         Ok(())
@@ -124,21 +161,16 @@ impl Running {
 }
 
 /// The window that lies beside this program.
-fn window(program: &Path, instance: &Instance) -> Result<Child, String> {
+fn window(program: &Path, instance: &Instance) -> Result<Child, LoadError> {
     if std::env::var_os("DISPLAY").is_none() && std::env::var_os("WAYLAND_DISPLAY").is_none() {
-        return Err("the window load needs a display; without one: xvfb-run -a rt-core latency ...".to_owned());
+        return Err(LoadError::NoDisplay);
     }
     let window = program.with_file_name("host-ui");
     Command::new(&window)
         .args(["--instance", instance.name(), "--without-pause", "--no-controllers"])
         .stdin(Stdio::null())
         .spawn()
-        .map_err(|e| {
-            format!(
-                "cannot start {}: {e}; build it: cargo build --release -p host-ui",
-                window.display()
-            )
-        })
+        .map_err(|why| LoadError::Window { program: window, why })
 }
 
 impl Drop for Running {
@@ -157,17 +189,20 @@ impl Drop for Running {
 /// The body of one such process; ends when `stopped`.
 ///
 /// # Errors
-/// `file` cannot be written, or the shared memory of `instance` cannot be opened; the text is for people.
-pub fn work(kind: LoadProcess, instance: &Instance, file: &Path, stopped: impl Fn() -> bool) -> Result<(), String> {
+/// `file` cannot be written, or the shared memory of `instance` cannot be opened.
+pub fn work(kind: LoadProcess, instance: &Instance, file: &Path, stopped: impl Fn() -> bool) -> Result<(), LoadError> {
     match kind {
         LoadProcess::Cpu => compute(stopped),
         LoadProcess::Memory => stream(stopped),
         LoadProcess::Io => {
-            let ended = write_and_sync(file, stopped).map_err(|e| format!("{}: {e}", file.display()));
+            let ended = write_and_sync(file, stopped).map_err(|why| LoadError::File {
+                file: file.to_owned(),
+                why,
+            });
             let _ = std::fs::remove_file(file);
             ended?;
         }
-        LoadProcess::Ui => copy_all(instance, stopped).map_err(|e| e.to_string())?,
+        LoadProcess::Ui => copy_all(instance, stopped)?,
     }
     Ok(())
 }

@@ -2,8 +2,8 @@
 
 use crate::collect::{LoopTiming, Plan};
 use crate::gaps::{self, GapReport};
-use crate::host::{Host, HostReport, Script};
-use crate::load::{Load, Running};
+use crate::host::{Host, HostError, HostReport, Script};
+use crate::load::{Load, LoadError, Running};
 use crate::machine::Machine;
 use crate::trace::{self, TraceSection, Watched};
 use crate::watch::{self, CoreWatch};
@@ -12,13 +12,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::time::Duration;
-use stylet_runtime::process::{self, LoopReport, Options, RunReport};
+use stylet_runtime::process::{self, LoopReport, Options, RunError, RunReport};
 use stylet_runtime::rt::clock::{HAPTIC_PERIOD_NS, TISSUE_PERIOD_NS};
 use stylet_runtime::rt::haptic::HAPTIC_STAGES;
-use stylet_runtime::rt::pin::Pin;
+use stylet_runtime::rt::pin::{Pin, PinError};
 use stylet_runtime::rt::timing::{PoseTimes, Probe, Probes};
 use stylet_runtime::rt::tissue::TISSUE_STAGES;
-use stylet_sim::scene::Scene;
+use stylet_sim::scene::{Scene, SceneError};
 
 /// Ticks of the first half second are not recorded: caches and page tables are still being filled.
 pub const WARM_UP_S: f64 = 0.5;
@@ -53,6 +53,29 @@ pub struct Checkpoints<'a> {
 
 /// The ring to the gathering thread holds so much time of ticks.
 const RING_NS: u64 = 4_000_000_000;
+
+/// Why nothing was measured.
+#[derive(Debug, thiserror::Error)]
+pub enum MeasureError {
+    /// The scene cannot be built.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The load does not start, or ended by itself.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The loops did not run.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The host saw no tick.
+    #[error(transparent)]
+    Host(#[from] HostError),
+    /// The pin for an instrument.
+    #[error(transparent)]
+    Pin(#[from] PinError),
+    /// A thread of the measurement ended early.
+    #[error("a measuring thread panicked")]
+    Panicked,
+}
 
 /// Results of one measurement.
 pub struct Measured {
@@ -100,15 +123,15 @@ fn watch_core(options: &Options) -> Option<usize> {
 }
 
 /// Runs for `setup.duration_ns` after the first tick that a host saw, or until `interrupted`.
-pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, String> {
-    let script = Script::of(&Scene::builtin(&setup.options.scene).map_err(|e| e.to_string())?);
+pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, MeasureError> {
+    let script = Script::of(&Scene::builtin(&setup.options.scene)?);
     let pose_times = Arc::new(PoseTimes::new());
     let options = setup.options;
     let ring = |period_ns| rtrb::RingBuffer::new((RING_NS / period_ns) as usize);
     let (haptic_in, haptic_ring) = ring(options.haptic_period_ns);
     let (tissue_in, tissue_ring) = ring(TISSUE_PERIOD_NS);
     // The loops' threads are started by this one and inherit the right to the pin.
-    let toggle = setup.toggle.map(Pin::acquire).transpose().map_err(|e| e.to_string())?;
+    let toggle = setup.toggle.map(Pin::acquire).transpose()?;
     let probes = Probes {
         haptic: Probe::new(haptic_in, Arc::clone(&pose_times)).with_toggle(toggle),
         tissue: Probe::new(tissue_in, Arc::clone(&pose_times)),
@@ -155,7 +178,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Stri
             });
         let host = threads.spawn(|| {
             let warm_up = warm_up_ticks(options.haptic_period_ns);
-            let host = Host::new(&options.instance, script, pose_times, warm_up).map_err(|e| e.to_string());
+            let host = Host::new(&options.instance, script, pose_times, warm_up);
             let report = host.and_then(|h| h.run(setup.duration_ns, || interrupted.load(Ordering::Acquire), stop));
             // SYNC: pairs with the acquire loads of bridge and watches; nothing but the flag is carried.
             stop.store(true, Ordering::Release);
@@ -187,9 +210,9 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Stri
     drop(load);
     options.instance.sweep();
     loaded?;
-    let panicked = |_| "a measuring thread panicked".to_owned();
+    let panicked = |_| MeasureError::Panicked;
     // The reason why the loops did not run is more useful than that the host saw nothing.
-    let run = run.map_err(|e| e.to_string())?;
+    let run = run?;
     Ok(Measured {
         run,
         haptic: haptic.map_err(panicked)?,

@@ -248,7 +248,8 @@ pub fn windows(windows: &[Window], window_ns: u64) -> Result<String, DrawError> 
             .margin_right(22)
             .set_label_area_size(LabelAreaPosition::Left, 58)
             .set_label_area_size(LabelAreaPosition::Bottom, 40)
-            .build_cartesian_2d(0.0..right, Decades(10_f64.powf(low)..decade_above(high * 1.5), number))?;
+            // The legend has the highest decade to itself.
+            .build_cartesian_2d(0.0..right, Decades(10_f64.powf(low)..10.0 * decade_above(high), number))?;
         mesh(&mut chart, "time into the run, s", "worst in a window, \u{b5}s")?;
         let wake: Vec<_> = used
             .iter()

@@ -1,7 +1,7 @@
 //! `--spin-us auto`: the smallest spin before each deadline with which the loop wakes sooner than cyclictest does.
 
-use crate::compare;
-use crate::measure::{Setup, measure};
+use crate::compare::{self, CompareError};
+use crate::measure::{MeasureError, Setup, measure};
 use crate::summary::quantile_us;
 use hdrhistogram::Histogram;
 use serde::Serialize;
@@ -79,10 +79,19 @@ impl SpinSearch {
     }
 }
 
-/// Why no spin could be looked for; for people.
+/// Why no spin could be looked for.
 #[derive(Debug, thiserror::Error)]
-#[error("--spin-us auto: {0}")]
-pub struct SpinError(String);
+pub enum SpinError {
+    /// cyclictest, whose times decide.
+    #[error("--spin-us auto: {0}")]
+    Compare(#[from] CompareError),
+    /// A trial.
+    #[error("--spin-us auto: {0}")]
+    Measure(#[from] MeasureError),
+    /// There is nothing to compare with.
+    #[error("--spin-us auto: cyclictest gave too few samples")]
+    TooFew,
+}
 
 /// Searches with trials of three seconds; `longest_us` is the longest spin that the kernel's share permits.
 pub fn search(setup: &Setup, longest_us: u64, interrupted: &AtomicBool) -> Result<SpinSearch, SpinError> {
@@ -93,10 +102,10 @@ pub fn search(setup: &Setup, longest_us: u64, interrupted: &AtomicBool) -> Resul
         toggle: None,
         ..*setup
     };
-    let theirs = compare::cyclictest_turn(&setup, interrupted).map_err(SpinError)?;
+    let theirs = compare::cyclictest_turn(&setup, interrupted)?;
     let at = |h: &Histogram<u64>, q| quantile_us(h, q);
     let (Some(p50), Some(p99)) = (at(&theirs, 0.5), at(&theirs, 0.99)) else {
-        return Err(SpinError("cyclictest gave too few samples".to_owned()));
+        return Err(SpinError::TooFew);
     };
     let at_most_us = [SHARE * p50, SHARE * p99];
     let mut trials = Vec::new();
@@ -133,7 +142,7 @@ pub fn search(setup: &Setup, longest_us: u64, interrupted: &AtomicBool) -> Resul
         met
     });
     if let Some(why) = failed {
-        return Err(SpinError(why));
+        return Err(why.into());
     }
     let used_us = found_us.unwrap_or_else(|| trials.iter().map(|t| t.spin_us).max().unwrap_or(0));
     Ok(SpinSearch {

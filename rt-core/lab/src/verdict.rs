@@ -106,8 +106,13 @@ impl LimitSpec {
 /// A limit by its name, with the value in force.
 pub type Limits = BTreeMap<&'static str, f64>;
 
+/// Limits that are unknown or no numbers, each with its place; at the end those that exist.
+#[derive(Debug, thiserror::Error)]
+#[error("{}", .0.join("\n"))]
+pub struct LimitsError(Vec<String>);
+
 /// Defaults, then the file, then what the command line sets.
-pub fn limits(period_ns: u64, file: Option<&Path>, given: &[String]) -> Result<Limits, String> {
+pub fn limits(period_ns: u64, file: Option<&Path>, given: &[String]) -> Result<Limits, LimitsError> {
     let mut limits: Limits = LIMITS.iter().map(|l| (l.name, l.default_for(period_ns))).collect();
     let mut problems = Vec::new();
     let mut set = |name: &str, value: Option<f64>, place: &str| {
@@ -120,8 +125,9 @@ pub fn limits(period_ns: u64, file: Option<&Path>, given: &[String]) -> Result<L
     };
     if let Some(path) = file {
         let place = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|e| format!("{place}: {e}"))?;
-        let table: toml::Table = text.parse().map_err(|e| format!("{place}: {e}"))?;
+        let unreadable = |why: &dyn std::fmt::Display| LimitsError(vec![format!("{place}: {why}")]);
+        let text = std::fs::read_to_string(path).map_err(|e| unreadable(&e))?;
+        let table: toml::Table = text.parse().map_err(|e: toml::de::Error| unreadable(&e))?;
         for (name, value) in &table {
             let number = value.as_float().or_else(|| value.as_integer().map(|i| i as f64));
             set(name, number, &place);
@@ -136,7 +142,7 @@ pub fn limits(period_ns: u64, file: Option<&Path>, given: &[String]) -> Result<L
     }
     let names: Vec<&str> = LIMITS.iter().map(|l| l.name).collect();
     problems.push(format!("the limits are: {}", names.join(", ")));
-    Err(problems.join("\n"))
+    Err(LimitsError(problems))
 }
 
 /// Result of one limit, or of all together.
@@ -308,7 +314,9 @@ mod tests {
     #[test]
     fn every_bad_limit_is_named() {
         let given = ["wake_p50=7", "wake_p99_us=-1", "faults", "wake_max_us=nan"].map(str::to_owned);
-        let why = limits(1_000_000, None, &given).expect_err("all four are wrong");
+        let why = limits(1_000_000, None, &given)
+            .expect_err("all four are wrong")
+            .to_string();
         assert_eq!(why.lines().count(), 5);
         assert!(
             why.contains("\"wake_p50\"") && why.contains("wake_p99_us needs"),

@@ -1,5 +1,6 @@
 //! Every hand of the envelope, every lateness of the link, three places: does the loop sing?
 
+mod coupled;
 mod on_line;
 
 use stylet_benches::rig::{Rig, Tick, hand_envelope};

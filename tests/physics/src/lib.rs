@@ -1,6 +1,8 @@
 //! Tissue and force in hard cases and in many hands.
 
 #[cfg(test)]
+mod as_it_runs;
+#[cfg(test)]
 mod coupled;
 #[cfg(test)]
 mod envelope;
@@ -9,6 +11,10 @@ mod hard_cases;
 #[cfg(test)]
 mod needle;
 #[cfg(test)]
+mod rows;
+#[cfg(test)]
 mod stability;
+#[cfg(test)]
+mod torque;
 #[cfg(test)]
 mod z_width;

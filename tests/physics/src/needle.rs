@@ -6,11 +6,13 @@ use stylet_benches::session::{Session, axis_start, gland_shift_m};
 use stylet_hw::{Hand, LinkFaults};
 use stylet_runtime::lines::LineBody;
 use stylet_runtime::rt::world::World;
+use stylet_runtime::stepped::HAPTIC_TICKS_PER_TISSUE_TICK;
 use stylet_sim::force::ForceParameters;
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::line::ReadyLine;
 use stylet_sim::scene::{SceneSource, TissueKind};
 
+mod deep;
 mod hard;
 
 const KINDS: [TissueKind; 2] = [TissueKind::ChainMail, TissueKind::Fem];
@@ -55,12 +57,16 @@ impl Theatre {
     }
 
     fn begin(&mut self) -> Insertion {
+        self.begin_with(ForceParameters::default(), HAPTIC_TICKS_PER_TISSUE_TICK)
+    }
+
+    fn begin_with(&mut self, force: ForceParameters, tissue_every: u64) -> Insertion {
         let mut world = self.world.take().expect("given back");
         world.tissue.return_to_rest();
         let hand = (Hand::steady(), LinkFaults::default());
         let line = (self.start, self.line.clone());
         Insertion {
-            session: Session::on_line(world, line, hand, ForceParameters::default()),
+            session: Session::on_line_every(world, line, hand, force, tissue_every),
             surface: self.start + Vector3::z() * 5e-3,
         }
     }

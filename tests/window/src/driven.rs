@@ -47,6 +47,7 @@ impl Driven {
             scene: None,
             label: None,
             image: None,
+            watch: None,
             controllers: false,
             pause: true,
             count_frames: false,

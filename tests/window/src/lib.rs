@@ -17,4 +17,6 @@ mod states;
 #[cfg(test)]
 mod terminal;
 #[cfg(test)]
+mod watch;
+#[cfg(test)]
 mod whole;

@@ -78,6 +78,7 @@ fn a_window_that_comes_moves_nothing_by_itself() {
         scene: None,
         label: None,
         image: None,
+        watch: None,
         controllers: false,
         pause: true,
         count_frames: false,

@@ -40,6 +40,7 @@ fn window_of(instance: &str, size: [f32; 2]) -> Window {
         scene: None,
         label: None,
         image: None,
+        watch: None,
         controllers: false,
         pause: true,
         count_frames: false,

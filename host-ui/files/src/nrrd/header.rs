@@ -93,7 +93,7 @@ impl Header {
     }
 
     /// Which of its axes are those of space.
-    pub fn space_axes(&self) -> Result<[usize; 3], String> {
+    pub fn space_axes(&self) -> Result<[usize; 3], ContentError> {
         if self.sizes.len() == 3 {
             return Ok([0, 1, 2]);
         }
@@ -101,11 +101,11 @@ impl Header {
             .filter(|&a| !matches!(self.axes.get(a), None | Some(Axis::None)))
             .collect();
         in_space.try_into().map_err(|_| {
-            format!(
+            ContentError::Invalid(format!(
                 "it has {} axes ({:?}) and does not say which three are those of space; save one volume of it",
                 self.sizes.len(),
                 self.sizes
-            )
+            ))
         })
     }
 }

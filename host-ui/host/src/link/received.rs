@@ -65,6 +65,27 @@ impl SceneModel {
         })
     }
 
+    /// As the core sends it behind the header: vertices, triangles, labels of the cells.
+    pub fn words(&self) -> Vec<u32> {
+        let positions = self.rest_m.iter().flatten().map(|c| c.to_bits());
+        let indices = self.triangles.iter().flatten().copied();
+        let cells = self.labels.chunks(4).map(|four| {
+            let at = |n: usize| four.get(n).copied().unwrap_or(0);
+            u32::from_le_bytes([at(0), at(1), at(2), at(3)])
+        });
+        positions.chain(indices).chain(cells).collect()
+    }
+
+    /// The same scene of another run of the core.
+    #[must_use]
+    pub fn of_session(&self, session_id: u64) -> Self {
+        let header = SceneHeader {
+            session_id,
+            ..self.header
+        };
+        Self::new(header, self.rest_m.clone(), self.triangles.clone(), self.labels.clone())
+    }
+
     /// From what the core sends; nothing where it does not hold together.
     pub fn of_words(header: &SceneHeader, words: &[u32]) -> Option<Self> {
         check::scene(header, words).ok()?;
@@ -94,6 +115,24 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
+    /// From its parts; nothing where they do not hold together.
+    pub fn of_parts(
+        mut header: SnapshotHeader,
+        positions_m: Vec<[f32; 3]>,
+        displacements_m: Vec<[f32; 3]>,
+    ) -> Option<Self> {
+        header.vertex_count = u32::try_from(positions_m.len()).ok()?;
+        header.node_count = u32::try_from(displacements_m.len()).ok()?;
+        let all = positions_m.iter().chain(&displacements_m);
+        let vertices: Vec<Vertex> = all.map(|&position_m| Vertex { position_m }).collect();
+        check::snapshot(&header, &vertices).ok()?;
+        Some(Self {
+            header,
+            positions_m,
+            displacements_m,
+        })
+    }
+
     /// From what the core sends; nothing where it does not hold together.
     pub(super) fn of_vertices(header: &SnapshotHeader, vertices: &[Vertex]) -> Option<Self> {
         check::snapshot(header, vertices).ok()?;

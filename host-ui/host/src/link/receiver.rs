@@ -3,25 +3,21 @@
 //! iceoryx2's ports belong to one thread. The queue of records holds seconds of them (`service::RECORD_BUFFER`), and
 //! this thread looks every two milliseconds.
 
-use super::inbox::{Inbox, Pulse};
+use super::inbox::Inbox;
 use super::ports::{Board, Ports, UploadPort};
+use super::thread::lock;
 use super::{ABSENT_AFTER, SceneModel, Snapshot};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
-use std::thread::JoinHandle;
+use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::service::{Instance, MAX_HOSTS};
 use stylet_shm_schema::*;
 
-const PASS: Duration = Duration::from_millis(2);
 const CLEAN_EVERY: Duration = Duration::from_secs(1);
 const CLEAN_AFTER: Duration = Duration::from_millis(300);
 /// A new core may have swept the folder of the ports that this host holds.
 const RECONNECT_EVERY: Duration = Duration::from_secs(4);
 const CONNECT_EVERY: Duration = Duration::from_secs(1);
 const OPEN_BOARD_EVERY: Duration = Duration::from_millis(20);
-/// What the host may ask for ahead of the thread that sends it.
-const OUTGOING: usize = 64;
 
 /// What the host asks the core for.
 pub enum Outgoing {
@@ -29,79 +25,8 @@ pub enum Outgoing {
     Upload(Box<UploadHeader>, Vec<u8>),
 }
 
-/// The host's side of the thread; dropping it ends the thread and closes the ports.
-pub struct Receiver {
-    inbox: Arc<Mutex<Inbox>>,
-    outgoing: mpsc::SyncSender<Outgoing>,
-    end: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Receiver {
-    pub fn start(instance: Instance, host_id: u64, snapshots_every: Duration) -> Self {
-        let inbox = Arc::new(Mutex::new(Inbox::default()));
-        let end = Arc::new(AtomicBool::new(false));
-        let (outgoing, asked) = mpsc::sync_channel(OUTGOING);
-        let (into, ended) = (Arc::clone(&inbox), Arc::clone(&end));
-        let work = move || {
-            let mut passes = Passes::new(instance, host_id, into, asked);
-            passes.snapshots_every = snapshots_every;
-            // SYNC: set when the host drops its side; nothing but the flag is carried.
-            while !ended.load(Ordering::Relaxed) {
-                passes.pass();
-                std::thread::park_timeout(PASS);
-            }
-        };
-        let thread = std::thread::Builder::new().name("link".to_owned()).spawn(work);
-        if let Err(why) = &thread {
-            lock(&inbox).pulse.trouble = Some(format!("no thread could be started to receive: {why}"));
-        }
-        Self {
-            inbox,
-            outgoing,
-            end,
-            thread: thread.ok(),
-        }
-    }
-
-    /// Everything since the last call.
-    pub fn take(&self) -> Inbox {
-        lock(&self.inbox).take()
-    }
-
-    /// What is known of the connection now, without taking anything.
-    pub fn pulse(&self) -> Pulse {
-        lock(&self.inbox).pulse.clone()
-    }
-
-    /// False when more waits than may.
-    pub fn send(&self, outgoing: Outgoing) -> bool {
-        let accepted = self.outgoing.try_send(outgoing).is_ok();
-        if let Some(thread) = &self.thread {
-            thread.thread().unpark();
-        }
-        accepted
-    }
-}
-
-impl Drop for Receiver {
-    fn drop(&mut self) {
-        // SYNC: read by the thread; nothing but the flag is carried.
-        self.end.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            thread.thread().unpark();
-            // A panic there was reported when it happened.
-            let _ended = thread.join();
-        }
-    }
-}
-
-/// What is held behind the lock is whole after each statement.
-fn lock(inbox: &Mutex<Inbox>) -> MutexGuard<'_, Inbox> {
-    inbox.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-struct Passes {
+/// The thread's side: one pass over all ports after the other.
+pub struct Passes {
     // Dropped in this order: handles before the ports, and those before their node.
     board: Option<Board>,
     upload_port: Option<UploadPort>,
@@ -114,7 +39,7 @@ struct Passes {
     tick: u64,
     connect_tried: Option<Instant>,
     board_tried: Option<Instant>,
-    snapshots_every: Duration,
+    pub snapshots_every: Duration,
     snapshot_taken: Option<Instant>,
     cleaned: Instant,
     beat: Option<(u64, u64)>,
@@ -122,7 +47,7 @@ struct Passes {
 }
 
 impl Passes {
-    fn new(instance: Instance, host_id: u64, inbox: Arc<Mutex<Inbox>>, asked: mpsc::Receiver<Outgoing>) -> Self {
+    pub fn new(instance: Instance, host_id: u64, inbox: Arc<Mutex<Inbox>>, asked: mpsc::Receiver<Outgoing>) -> Self {
         Self {
             board: None,
             upload_port: None,
@@ -143,7 +68,7 @@ impl Passes {
         }
     }
 
-    fn pass(&mut self) {
+    pub fn pass(&mut self) {
         self.send();
         if let Some(ports) = self.ports.take() {
             self.receive(&ports);

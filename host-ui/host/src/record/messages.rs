@@ -3,10 +3,11 @@
 //! JSON and not a binary form: 1 kHz of it costs one core a few per cent, zstd takes most of its size back (figures in
 //! CHANGELOG), and every reader has a parser. Numbers are written so that they read back to the same bits.
 
+use super::scene;
 use crate::link::Snapshot;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use stylet_shm_schema::{Event, EventKind, TickRecord, Vertex};
+use stylet_shm_schema::{Event, EventKind, MAX_SEEDS, SnapshotHeader, TickRecord, Vertex};
 
 /// Where each kind of message goes, and the name and text of its schema.
 pub struct Channel {
@@ -58,6 +59,33 @@ pub struct Tick {
     pub tissue_tick: u64,
     pub world_from_tool: [f64; 4],
     pub buttons: u32,
+}
+
+impl Tick {
+    /// As the core sent it.
+    pub fn record(&self) -> TickRecord {
+        TickRecord {
+            session_id: self.session_id,
+            tick: self.tick,
+            due_ns: self.due_ns,
+            wake_latency_ns: self.wake_latency_ns,
+            force_written_ns: self.force_written_ns,
+            work_ns: self.work_ns,
+            missed: self.missed,
+            phase: self.phase,
+            fault: self.fault,
+            flags: self.flags,
+            tip_in_scene_m: self.tip_in_scene_m,
+            force_on_hand_n: self.force_on_hand_n,
+            depth_m: self.depth_m,
+            speed_m_per_s: self.speed_m_per_s,
+            force_terms_n: self.force_terms_n,
+            tissue_tick: self.tissue_tick,
+            world_from_tool: self.world_from_tool,
+            buttons: self.buttons,
+            reserved: 0,
+        }
+    }
 }
 
 impl From<&TickRecord> for Tick {
@@ -165,6 +193,64 @@ pub fn tissue(snapshot: &Snapshot) -> Value {
         "held_element": (h.held_element != u32::MAX).then_some(h.held_element), "phase": h.phase, "residual": h.residual,
         "max_displacement_m": h.max_displacement_m, "work_ns": h.work_ns, "seeds": seeds.collect::<Vec<_>>(),
     })
+}
+
+#[derive(Deserialize)]
+struct Seed {
+    position_m: [f64; 3],
+    axis: [f64; 3],
+    dropped_at_m: [f64; 3],
+}
+
+#[derive(Deserialize)]
+struct Tissue {
+    session_id: u64,
+    tissue_tick: u64,
+    time_ns: u64,
+    tip_in_scene_m: [f64; 3],
+    needle_direction: [f64; 3],
+    held_in_scene_m: [f64; 3],
+    held_element: Option<u32>,
+    phase: u32,
+    residual: f64,
+    max_displacement_m: f64,
+    work_ns: u64,
+    seeds: Vec<Seed>,
+}
+
+/// The header of a snapshot, as far as [`tissue`] keeps it.
+pub fn tissue_of(data: &[u8]) -> Option<SnapshotHeader> {
+    let t: Tissue = serde_json::from_slice(data).ok()?;
+    let mut header = SnapshotHeader {
+        session_id: t.session_id,
+        tissue_tick: t.tissue_tick,
+        time_ns: t.time_ns,
+        tip_in_scene_m: t.tip_in_scene_m,
+        needle_direction: t.needle_direction,
+        held_in_scene_m: t.held_in_scene_m,
+        residual: t.residual,
+        max_displacement_m: t.max_displacement_m,
+        work_ns: t.work_ns,
+        held_element: t.held_element.unwrap_or(u32::MAX),
+        phase: t.phase,
+        seed_count: t.seeds.len().min(MAX_SEEDS) as u32,
+        ..SnapshotHeader::default()
+    };
+    for (to, from) in header.seeds.iter_mut().zip(t.seeds) {
+        (to.position_m, to.axis, to.dropped_at_m) = (from.position_m, from.axis, from.dropped_at_m);
+    }
+    Some(header)
+}
+
+#[derive(Deserialize)]
+struct Gland {
+    data: String,
+}
+
+/// The vertices of [`gland`].
+pub fn gland_of(data: &[u8]) -> Option<Vec<[f32; 3]>> {
+    let gland: Gland = serde_json::from_slice(data).ok()?;
+    scene::places_of(&gland.data)
 }
 
 fn gland_schema() -> Value {

@@ -9,12 +9,17 @@ mod error;
 mod export;
 mod gaps;
 mod messages;
+mod played;
 mod read;
+mod scene;
+mod setting;
+mod stream;
 mod writer;
 
 pub use error::RecordError;
 pub use export::{Export, export};
 pub use gaps::{Gap, Gaps};
+pub use played::{played, played_of};
 pub use read::{Recording, read};
 
 use crate::link::{Link, LinkStatus};
@@ -96,6 +101,8 @@ struct Handed {
     due_ns: u64,
     /// What the core had lost when the recording began.
     lost_before: Option<u64>,
+    /// Generations of scene, plan and parameters.
+    settings: [Option<u64>; 3],
 }
 
 /// Takes what arrives and hands it to the writer; while that is behind, the link keeps what arrives.
@@ -136,8 +143,10 @@ impl Handed {
             let lost_before = link.state().map_or(0, |s| s.records_lost);
             self.lost_before = Some(self.lost_before.map_or(lost_before, |_| 0));
             (self.event, self.tissue_tick, self.snapshot_ns, self.due_ns) = (0, 0, 0, 0);
+            self.settings = [None; 3];
             items.push(Item::Session(Box::new(*session)));
         }
+        self.collect_settings(link, items);
         let records = link.take_records();
         if !records.is_empty() {
             items.push(Item::Records(records));
@@ -157,6 +166,7 @@ impl Handed {
                 let late = self.snapshot_ns > 0 && since_s > 2.0 / snapshots_hz + SNAPSHOT_LATE_S;
                 items.extend(late.then_some(Item::SnapshotsMissing(since_s)));
                 self.snapshot_ns = now_ns;
+                items.extend(link.state().map(|state| Item::State(Box::new(*state))));
                 items.push(Item::Snapshot(Box::new(snapshot.clone())));
             } else {
                 items.push(Item::SnapshotLeftOut);
@@ -165,6 +175,23 @@ impl Handed {
         if let Some(state) = link.state() {
             let before = self.lost_before.unwrap_or(0);
             items.push(Item::LostInCore(state.records_lost.saturating_sub(before)));
+        }
+    }
+}
+
+impl Handed {
+    /// Scene, plan and parameters where they have changed.
+    fn collect_settings(&mut self, link: &Link, items: &mut Vec<Item>) {
+        let [scene, plan, parameters] = &mut self.settings;
+        let is_new = |last: &mut Option<u64>, generation: u64| last.replace(generation) != Some(generation);
+        if let Some(now) = link.scene().filter(|now| is_new(scene, now.header.generation)) {
+            items.push(Item::Scene(now.clone()));
+        }
+        if let Some(now) = link.plan().filter(|now| is_new(plan, now.generation)) {
+            items.push(Item::Plan(Box::new(*now)));
+        }
+        if let Some(now) = link.parameters().filter(|now| is_new(parameters, now.generation)) {
+            items.push(Item::Parameters(Box::new(*now)));
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::error::RecordError;
 use super::gaps::Gaps;
 use super::messages::{TICK, Tick};
+use super::stream;
 use std::path::Path;
 
 /// The ticks of a recording, in the order in which they arrived.
@@ -19,30 +20,21 @@ pub struct Recording {
 pub fn read(path: &Path) -> Result<Recording, RecordError> {
     let invalid = |why: String| RecordError::of_file(path, why);
     let bytes = std::fs::read(path).map_err(|e| invalid(e.to_string()))?;
-    let options = enumset::EnumSet::only(mcap::read::Options::IgnoreEndMagic);
-    let messages = mcap::MessageStream::new_with_options(&bytes, options)
-        .map_err(|e| invalid(format!("not an MCAP file ({e})")))?;
     let mut recording = Recording {
         ticks: Vec::new(),
         gaps: Gaps::default(),
         cut_off: None,
     };
-    for message in messages {
-        let message = match message {
-            Ok(message) => message,
-            Err(why) => {
-                recording.cut_off = Some(why.to_string());
-                break;
+    let cut_off = stream::each(&bytes, |topic, _, data| {
+        if topic == TICK.topic {
+            let tick: Tick = serde_json::from_slice(data).map_err(|e| format!("invalid tick: {e}"))?;
+            if recording.gaps.record(tick.session_id, tick.tick) {
+                recording.ticks.push(tick);
             }
-        };
-        if message.channel.topic != TICK.topic {
-            continue;
         }
-        let tick: Tick = serde_json::from_slice(&message.data).map_err(|e| invalid(format!("invalid tick: {e}")))?;
-        if recording.gaps.record(tick.session_id, tick.tick) {
-            recording.ticks.push(tick);
-        }
-    }
+        Ok(())
+    });
+    recording.cut_off = cut_off.map_err(invalid)?;
     if recording.ticks.is_empty() {
         return Err(invalid("holds no tick of Stylet".to_owned()));
     }

@@ -1,8 +1,13 @@
 //! What a recording says of what it lost.
 
 use super::*;
+use crate::link::{Piece, SceneModel, Snapshot};
 use bytemuck::Zeroable;
-use stylet_shm_schema::{Event, TickRecord};
+use std::sync::Arc;
+use stylet_shm_schema::{
+    Event, HapticState, ParameterId, ParameterSet, ParametersInForce, PlanInForce, SceneHeader, Session,
+    SnapshotHeader, Text, TickRecord,
+};
 
 fn ticks(range: std::ops::Range<u64>) -> Item {
     let record = |tick| TickRecord {
@@ -53,5 +58,187 @@ fn what_a_recording_lacks_is_listed_for_each_kind() {
     assert!(
         error.starts_with("1000 ticks are missing in 1 gaps, 600 of them lost in the core; 3 events"),
         "{error}"
+    );
+}
+
+fn scene() -> SceneModel {
+    let mut header = SceneHeader {
+        session_id: 1,
+        generation: 3,
+        dims: [5, 1, 1],
+        element_count: 5,
+        vertex_count: 3,
+        triangle_count: 1,
+        body_triangle_count: 1,
+        structure_count: 2,
+        body_edge: 1,
+        spacing_m: 1.07e-3,
+        volume_m3: 1.0 / 3.0,
+        target_upper_m: [0.1, 0.2, 0.3],
+        name: Text::new("gland"),
+        ..SceneHeader::default()
+    };
+    header.patient_from_scene[0] = 1.0;
+    (header.labels.dims, header.labels.spacing_m) = ([5, 1, 1], 1.07e-3);
+    (header.nodes.dims, header.nodes.spacing_m) = ([2, 1, 1], 8e-3);
+    (header.structures[1].label, header.structures[1].name) = (7, Text::new("Urethra"));
+    let rest_m = vec![[0.1, 0.2, 0.3], [1.0 / 3.0, 0.0, 0.0], [0.0, 0.7, 0.0]];
+    SceneModel::new(header, rest_m, vec![[0, 1, 2]], vec![0, 1, 2, 1, 2])
+}
+
+/// What one run of a core said, with numbers that decimal fractions do not have.
+fn said() -> (Vec<Item>, TickRecord, HapticState, Snapshot) {
+    let tick = |tick: u64| TickRecord {
+        session_id: 1,
+        tick,
+        due_ns: 1_000_000 * tick,
+        flags: 5,
+        tip_in_scene_m: [0.1 * tick as f64, 1.0 / 3.0, -0.0],
+        force_on_hand_n: [std::f64::consts::PI, 0.0, -1e-17],
+        ..TickRecord::zeroed()
+    };
+    let mut state = HapticState::zeroed();
+    (state.time_ns, state.puncture_depth_m, state.force_scale) = (1_000_000 * 20, 8e-3, 0.25);
+    state.needle_direction = [0.0, 0.6, 0.8];
+    let mut header = SnapshotHeader {
+        session_id: 1,
+        scene_generation: 3,
+        time_ns: 1_000_000 * 20,
+        residual: 6e-6,
+        held_element: u32::MAX,
+        seed_count: 1,
+        ..SnapshotHeader::default()
+    };
+    header.seeds[0].position_m = [0.01, 0.02, 1.0 / 7.0];
+    let surface_m = vec![[0.1, 0.2, 0.300_001], [0.333, 0.0, 0.0], [0.0, 0.7, 0.0]];
+    let snapshot = Snapshot::of_parts(header, surface_m, vec![[1e-7, 0.0, 0.0]; 2]).unwrap();
+    let mut plan = PlanInForce::zeroed();
+    (plan.session_id, plan.generation, plan.seed_count) = (1, 2, 1);
+    (plan.direction, plan.seeds[0].position_m) = ([0.0, 0.0, 1.0], [0.1, 1.0 / 3.0, 0.2]);
+    let mut parameters = ParametersInForce::zeroed();
+    parameters.set = ParameterSet::default();
+    parameters.set.set(ParameterId::PunctureDepth, 7.5e-3);
+    let mut session = Session::zeroed();
+    (session.session_id, session.period_ns, session.device) = (1, 1_000_000, Text::new("hand"));
+    let items = vec![
+        Item::Session(Box::new(session)),
+        Item::Scene(Arc::new(scene())),
+        Item::Plan(Box::new(plan)),
+        Item::Parameters(Box::new(parameters)),
+        Item::Records((10..30).map(tick).collect()),
+        Item::State(Box::new(state)),
+        Item::Snapshot(Box::new(snapshot.clone())),
+    ];
+    (items, tick(29), state, snapshot)
+}
+
+fn recorded(name: &str) -> (PathBuf, TickRecord, HapticState, Snapshot) {
+    let path = std::env::temp_dir().join(format!("stylet-{name}-{}.mcap", std::process::id()));
+    let (items, last, state, snapshot) = said();
+    let (send, receive) = mpsc::sync_channel(ITEMS_AHEAD);
+    items.into_iter().for_each(|item| send.send(item).unwrap());
+    drop(send);
+    writer::write_all(&path, &receive).unwrap();
+    (path, last, state, snapshot)
+}
+
+#[test]
+fn a_recording_holds_all_that_a_window_shows_in_the_same_bits() {
+    let (path, last, state, snapshot) = recorded("holds");
+    let played = played(&path, &Interrupt::default()).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let _removed = std::fs::remove_file(&path);
+    assert_eq!((played.session.session_id, played.cut_off.as_deref()), (1, None));
+    assert_eq!(played.session.device.read(), "hand");
+    let mut kinds = [0; 6];
+    for (time_ns, piece) in &played.pieces {
+        match piece {
+            Piece::Tick(tick) => {
+                kinds[0] += 1;
+                assert_eq!(*time_ns, (tick.tick - 10) * 1_000_000);
+                assert!(tick.tick != last.tick || **tick == last);
+                assert!(tick.tip_in_scene_m[2].is_sign_negative());
+            }
+            Piece::State(found) => {
+                kinds[1] += 1;
+                assert_eq!(found.puncture_depth_m, state.puncture_depth_m);
+                assert_eq!(
+                    (found.force_scale, found.needle_direction),
+                    (0.25, state.needle_direction)
+                );
+            }
+            Piece::Scene(found) => {
+                kinds[2] += 1;
+                assert_eq!(found.words(), scene().words());
+                assert_eq!(found.header.name.read(), "gland");
+                assert_eq!(found.header.structures[1].name.read(), "Urethra");
+                assert_eq!(found.header.volume_m3, 1.0 / 3.0);
+                assert_eq!(found.labels, scene().labels);
+            }
+            Piece::Plan(plan) => {
+                kinds[3] += 1;
+                assert_eq!((plan.generation, plan.seed_count), (2, 1));
+                assert_eq!(plan.seeds[0].position_m, [0.1, 1.0 / 3.0, 0.2]);
+            }
+            Piece::Parameters(parameters) => {
+                kinds[4] += 1;
+                assert_eq!(parameters.set.get(ParameterId::PunctureDepth), 7.5e-3);
+            }
+            Piece::Snapshot(found) => {
+                kinds[5] += 1;
+                assert_eq!(*time_ns, 10_000_000);
+                assert_eq!(found.positions_m, snapshot.positions_m);
+                assert_eq!(found.displacements_m, snapshot.displacements_m);
+                assert_eq!(found.header, snapshot.header);
+            }
+        }
+    }
+    assert_eq!(kinds, [20, 1, 1, 1, 1, 1]);
+    // Cut off or damaged anywhere it ends with a reason or with what came before, and never with a panic.
+    for end in (0..bytes.len()).step_by(97) {
+        let _ended = played_of(&bytes[..end], &Interrupt::default());
+        let mut damaged = bytes.clone();
+        damaged[end] ^= 0x5a;
+        let _ended = played_of(&damaged, &Interrupt::default());
+    }
+}
+
+/// In place of a core: it lives, its ticks and its state come, it can be held and shown again, and takes no request.
+#[test]
+fn a_recording_is_played_as_a_core_speaks() {
+    let (path, last, ..) = recorded("played");
+    let played = Arc::new(played(&path, &Interrupt::default()).unwrap());
+    let _removed = std::fs::remove_file(&path);
+    let mut link = Link::playing(Instance::new("played").unwrap(), Arc::clone(&played));
+    let mut ticks = Vec::new();
+    let mut all = |link: &mut Link| {
+        let begun = Instant::now();
+        ticks.clear();
+        while ticks.last() != Some(&last.tick) {
+            assert!(begun.elapsed() < Duration::from_secs(20), "it does not end: {ticks:?}");
+            link.poll();
+            ticks.extend(link.take_records().iter().map(|record| record.tick));
+            std::thread::sleep(POLL_EVERY);
+        }
+        assert_eq!(ticks, (10..30).collect::<Vec<u64>>());
+    };
+    all(&mut link);
+    assert_eq!(link.status(), LinkStatus::Live);
+    let state = *link.state().expect("a state");
+    assert_eq!((state.tick, state.tip_in_scene_m), (29, last.tip_in_scene_m));
+    assert_eq!((state.puncture_depth_m, state.flags), (8e-3, 5));
+    assert_eq!(link.plan().map(|plan| plan.seed_count), Some(1));
+    assert_eq!(link.snapshot().map(|s| s.header.seed_count), Some(1));
+    let first = link.session().map(|session| session.session_id);
+    let refused = link.send(&Request::Engage).expect_err("nobody to ask");
+    assert!(refused.0.contains("recording"), "{refused}");
+    let playback = link.playback().expect("a recording").clone();
+    assert!(playback.has_ended() && (playback.length_s() - 0.019).abs() < 1e-9);
+    playback.again();
+    all(&mut link);
+    assert_ne!(
+        link.session().map(|session| session.session_id),
+        first,
+        "ticks went back within a run"
     );
 }

@@ -3,14 +3,16 @@
 use super::error::RecordError;
 use super::gaps::{Gap, Gaps};
 use super::messages::{self, Channel, EVENT, GLAND, TICK, TISSUE, Tick};
-use crate::link::Snapshot;
+use super::scene::{self, FIELD, SCENE};
+use super::setting::{self, PARAMETERS_CHANNEL, PLAN, SESSION, STATE};
+use crate::link::{SceneModel, Snapshot};
 use mcap::records::{MessageHeader, Metadata};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
-use std::sync::mpsc;
-use stylet_shm_schema::{Event, Session, TickRecord};
+use std::sync::{Arc, mpsc};
+use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, Session, TickRecord};
 
 /// A recording cut off by a crash lacks the last chunk at most: about two seconds.
 const CHUNK_BYTES: u64 = 1 << 20;
@@ -24,6 +26,11 @@ pub enum Item {
     Session(Box<Session>),
     Records(Vec<TickRecord>),
     Event(Box<Event>),
+    Scene(Arc<SceneModel>),
+    Plan(Box<PlanInForce>),
+    Parameters(Box<ParametersInForce>),
+    /// As it was when the snapshot after it was taken.
+    State(Box<HapticState>),
     Snapshot(Box<Snapshot>),
     /// One that was seen and is not kept.
     SnapshotLeftOut,
@@ -113,10 +120,26 @@ fn listed_gaps(gaps: &Gaps) -> String {
     listed.collect::<Vec<_>>().join(" ")
 }
 
+/// By their places here.
+const CHANNELS: [&Channel; 10] = [
+    &TICK,
+    &EVENT,
+    &TISSUE,
+    &GLAND,
+    &SCENE,
+    &PLAN,
+    &PARAMETERS_CHANNEL,
+    &STATE,
+    &FIELD,
+    &SESSION,
+];
+
 struct Writer {
     file: mcap::Writer<BufWriter<File>>,
-    channels: [u16; 4],
-    sequences: [u32; 4],
+    channels: [u16; CHANNELS.len()],
+    sequences: [u32; CHANNELS.len()],
+    /// `CLOCK_MONOTONIC` of the newest message that has a time of its own.
+    newest_ns: u64,
     /// Added to `CLOCK_MONOTONIC` gives the time since 1970.
     epoch_ns: u64,
     totals: Totals,
@@ -141,8 +164,8 @@ impl Writer {
             .chunk_size(Some(CHUNK_BYTES))
             .library(concat!("stylet ", env!("CARGO_PKG_VERSION")))
             .create(BufWriter::new(file))?;
-        let mut channels = [0; 4];
-        for (id, channel) in channels.iter_mut().zip([&TICK, &EVENT, &TISSUE, &GLAND]) {
+        let mut channels = [0; CHANNELS.len()];
+        for (id, channel) in channels.iter_mut().zip(CHANNELS) {
             let Channel { topic, schema, text } = channel;
             let schema = file.add_schema(schema, "jsonschema", text().to_string().as_bytes())?;
             *id = file.add_channel(schema, topic, "json", &BTreeMap::new())?;
@@ -150,7 +173,8 @@ impl Writer {
         Ok(Self {
             file,
             channels,
-            sequences: [0; 4],
+            sequences: [0; CHANNELS.len()],
+            newest_ns: 0,
             epoch_ns: epoch_ns(),
             totals: Totals::default(),
         })
@@ -172,12 +196,17 @@ impl Writer {
                     self.message(1, event.time_ns, messages::event(&event).to_string().as_bytes())?;
                 }
             }
+            Item::Scene(model) => self.between(4, &scene::scene(&model))?,
+            Item::Plan(plan) => self.between(5, &setting::plan(&plan))?,
+            Item::Parameters(parameters) => self.between(6, &setting::parameters(&parameters))?,
+            Item::State(state) => self.message(7, state.time_ns, setting::state(&state).to_string().as_bytes())?,
             Item::Snapshot(snapshot) => {
                 self.totals.snapshots += 1;
                 let time_ns = snapshot.header.time_ns;
                 self.message(2, time_ns, messages::tissue(&snapshot).to_string().as_bytes())?;
                 let gland = messages::gland(&snapshot, time_ns + self.epoch_ns);
                 self.message(3, time_ns, gland.to_string().as_bytes())?;
+                self.message(8, time_ns, scene::field(&snapshot).to_string().as_bytes())?;
             }
             Item::SnapshotLeftOut => self.totals.snapshots_left_out += 1,
             Item::SnapshotsMissing(seconds) => {
@@ -189,7 +218,13 @@ impl Writer {
         Ok(())
     }
 
+    /// A message without a time of its own is of the time of the one before it.
+    fn between(&mut self, channel: usize, message: &serde_json::Value) -> mcap::McapResult<()> {
+        self.message(channel, self.newest_ns, message.to_string().as_bytes())
+    }
+
     fn message(&mut self, channel: usize, time_ns: u64, data: &[u8]) -> mcap::McapResult<()> {
+        self.newest_ns = self.newest_ns.max(time_ns);
         self.sequences[channel] = self.sequences[channel].wrapping_add(1);
         let log_time = time_ns + self.epoch_ns;
         let header = MessageHeader {
@@ -202,6 +237,8 @@ impl Writer {
     }
 
     fn session(&mut self, session: &Session) -> mcap::McapResult<()> {
+        self.newest_ns = self.newest_ns.max(session.time_ns);
+        self.between(9, &setting::session(session))?;
         let metadata = [
             ("session_id", session.session_id.to_string()),
             ("version", session.version.read()),

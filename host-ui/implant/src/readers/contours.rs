@@ -3,7 +3,7 @@
 use std::path::Path;
 use stylet_dose::{Region, Structure};
 use stylet_files::dicom::structures::{Solid, StructureSet};
-use stylet_files::{FileError, Progress, bytes, dicom};
+use stylet_files::{FileError, bytes, dicom, watched};
 
 const PITCH_M: f64 = 0.5e-3;
 const FEWEST_POINTS: f64 = 20_000.0;
@@ -26,7 +26,7 @@ type Drawn = (Vec<Structure>, Vec<String>);
 /// The structures of an RT Structure Set, each of at most `most_points` points; `None` for a file that is no DICOM.
 pub fn structures(path: &Path, most_points: usize) -> Result<Option<Drawn>, FileError> {
     let refused = |why| FileError::of(path, why);
-    let bytes = bytes::whole(path, &Progress::default()).map_err(refused)?;
+    let bytes = watched(path, |progress| bytes::whole(path, progress)).map_err(refused)?;
     if !dicom::is_dicom(&bytes) {
         return Ok(None);
     }

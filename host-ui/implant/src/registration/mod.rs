@@ -104,7 +104,10 @@ impl RigidFit {
 
     /// Angle of the turn, in degrees.
     pub fn turn_deg(&self) -> f64 {
-        Rotation3::from_matrix_unchecked(self.rotation).angle().to_degrees()
+        // By sine and cosine: rounding can take the cosine of no turn beyond 1, which no angle has, and near it the angle is lost.
+        let r = &self.rotation;
+        let twice_sine = Vector3::new(r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12).norm();
+        twice_sine.atan2(r.trace() - 1.0).to_degrees()
     }
 
     /// Mean, root mean square and largest residual, m.
@@ -255,5 +258,20 @@ mod tests {
         let fit = RigidFit::of(&planned, &found).unwrap();
         assert!((fit.stretch - 1.1).abs() < 1e-6, "{}", fit.stretch);
         assert!(RigidFit::of(&planned, &found[..3]).is_err());
+    }
+
+    /// The page after the implant said "NaN" degrees where day 30 lay as planned.
+    #[test]
+    fn no_turn_is_0_degrees_and_a_small_one_is_not_lost() {
+        let planned = plan();
+        let mut fit = RigidFit::of(&planned, &planned).unwrap();
+        assert!(fit.turn_deg() < 1e-6, "{}", fit.turn_deg());
+        // What rounding leaves of a product of turns.
+        fit.rotation = Matrix3::identity() * (1.0 + 4.0 * f64::EPSILON);
+        assert_eq!(fit.turn_deg(), 0.0);
+        for deg in [1e-7, 0.3, 90.0, 179.0] {
+            fit.rotation = turn(&Vector3::y_axis(), deg);
+            assert!((fit.turn_deg() / deg - 1.0).abs() < 1e-6, "{deg}: {}", fit.turn_deg());
+        }
     }
 }

@@ -28,6 +28,7 @@ td:first-child,th:first-child{text-align:left}
 .key .line{width:22px;height:0;border-radius:0;border-top:2px solid var(--ink);vertical-align:4px}
 .bad{color:#a33c00;font-weight:600}
 footer{margin-top:40px;border-top:1px solid var(--line);padding-top:12px}
+@media(max-width:1180px){.cards{grid-template-columns:repeat(3,1fr)}}
 @media print{.card{border:1px solid var(--line)}h2{break-after:avoid}}
 ";
 
@@ -63,7 +64,9 @@ pub fn page(score: &Score) -> Result<String, ScoreError> {
                         span { i style="border:2px solid var(--planned)" {} "planned" }
                         span { i style="background:var(--delivered)" {} "delivered" }
                         span { i class="line" {} "target, cut through its middle" }
-                        span { i class="line" style="border-color:#cc79a7" {} "to be spared" }
+                        @if !i.anatomy.spared.is_empty() {
+                            span { i class="line" style="border-color:#cc79a7" {} "to be spared" }
+                        }
                     }
                     (PreEscaped(views))
                     h2 { "Dose" }

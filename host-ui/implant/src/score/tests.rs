@@ -153,3 +153,14 @@ fn the_page_stands_by_itself_and_escapes_what_it_is_given() {
     assert_eq!(json["seeds"].as_array().map(Vec::len), Some(36));
     assert!((json["seeds"][4]["error_along_mm"].as_f64().unwrap() - 6.0).abs() < 1e-9);
 }
+
+/// The legend named an outline "to be spared" where the scene has none.
+#[test]
+fn the_legend_names_only_what_is_drawn() {
+    let (mut anatomy, kernel) = (anatomy(), kernel());
+    let page_of = |anatomy: &Anatomy| super::page::page(&score(&[4], anatomy, &kernel, &[])).unwrap();
+    assert!(page_of(&anatomy).contains("to be spared"));
+    anatomy.spared.clear();
+    let page = page_of(&anatomy);
+    assert!(page.contains("target, cut through its middle") && !page.contains("to be spared"));
+}

@@ -20,6 +20,20 @@ use stylet_shm_schema::{
     flags, role,
 };
 
+/// Of a window without a core.
+pub fn options() -> Options {
+    Options {
+        instance: Instance::new("ui-drawn").expect("a valid name"),
+        scene: None,
+        label: None,
+        image: None,
+        watch: None,
+        controllers: false,
+        pause: true,
+        count_frames: false,
+    }
+}
+
 /// The window, and the time that its frames believe in.
 pub struct Drawn {
     pub app: App,
@@ -34,16 +48,7 @@ impl Drawn {
     pub fn new(pixels: [f32; 2], scale: f32) -> Self {
         let ctx = egui::Context::default();
         ctx.enable_accesskit();
-        let options = Options {
-            instance: Instance::new("ui-drawn").expect("a valid name"),
-            scene: None,
-            label: None,
-            image: None,
-            controllers: false,
-            pause: true,
-            count_frames: false,
-        };
-        let app = App::new(&eframe::CreationContext::_new_kittest(ctx.clone()), options);
+        let app = App::new(&eframe::CreationContext::_new_kittest(ctx.clone()), options());
         ctx.all_styles_mut(|style| style.interaction.tooltip_delay = 1e9);
         Self {
             app,

@@ -33,6 +33,30 @@ fn the_guide_says_what_the_state_machine_says_comes_next() {
     }
 }
 
+/// Who followed the guide with the keys never turned the force on, and read that the membrane gave way at 0.00 N.
+#[test]
+fn the_force_is_turned_on_before_the_needle_moves() {
+    let mut shown = one_needle(-0.05, 0);
+    if let Some(state) = &mut shown.state {
+        state.flags &= !(flags::ENGAGED | flags::LINE_NEEDED);
+        state.speed_m_per_s = 0.0;
+    }
+    let felt = Felt::default();
+    assert!(what(&shown, &felt).contains("Press E"), "{}", what(&shown, &felt));
+    let mut felt = Felt::default();
+    let tick = |flags| {
+        let mut record = TickRecord::zeroed();
+        (record.depth_m, record.flags) = (8e-3, flags);
+        record
+    };
+    felt.take(&[tick(flags::IN_CONTACT), tick(flags::IN_CONTACT | flags::PUNCTURED)]);
+    let notes = lesson(&one_needle(0.0, 5), &felt).notes.join("\n");
+    assert!(
+        notes.contains("The force was off") && !notes.contains("0.00 N"),
+        "{notes}"
+    );
+}
+
 #[test]
 fn the_debrief_has_the_figures_of_the_seeds_and_of_the_membrane() {
     let mut felt = Felt::default();

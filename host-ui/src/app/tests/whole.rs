@@ -5,15 +5,15 @@ use super::text::misplaced;
 use crate::app::App;
 use crate::app::layout::Narrow;
 use crate::panel::workflow::Progress;
-use crate::shown::{LoadState, Note, Shown};
+use crate::shown::{LoadState, Note, Shown, Watched};
 use bytemuck::Zeroable;
 use stylet_host::link::LinkStatus;
 use stylet_procedure::{Step, Waiting, WaitsFor};
 use stylet_shm_schema::{Fault, Text, TickRecord, flags};
 
-type State = (&'static str, fn(&mut App));
+pub type State = (&'static str, fn(&mut App));
 
-const STATES: &[State] = &[
+pub const STATES: &[State] = &[
     ("absent", |app| {
         app.shown.status = LinkStatus::Absent {
             why: format!(
@@ -31,6 +31,12 @@ const STATES: &[State] = &[
         app.shown = live();
         every_banner(&mut app.shown);
     }),
+    ("recording", |app| recorded(app, one_needle(0.03, 2), false)),
+    ("recording with the guide", |app| {
+        recorded(app, one_needle(0.03, 2), false);
+        app.workflow.guide.open = true;
+    }),
+    ("recording at its end", |app| recorded(app, one_needle(0.0, 5), true)),
     ("scene", |app| app.shown = live()),
     ("file is read", |app| {
         app.shown = live();
@@ -115,6 +121,19 @@ const STATES: &[State] = &[
         app.shown.continues_at = Some((1, 19));
     }),
 ];
+
+/// In place of a core.
+fn recorded(app: &mut App, shown: Shown, has_ended: bool) {
+    app.shown = shown;
+    app.shown.running = true;
+    app.shown.watched = Some(Watched {
+        name: LONG_PATH.to_owned(),
+        at_s: 123.4,
+        length_s: 1234.5,
+        is_held: !has_ended,
+        has_ended,
+    });
+}
 
 /// With the guide open, after a membrane gave way.
 fn guided(app: &mut App, shown: Shown) {

@@ -248,7 +248,7 @@ impl Common {
         given: BTreeMap<u8, String>,
         most_points: usize,
     ) -> Result<Vec<Structure>, CommandError> {
-        let voxels = stylet_files::read_voxels(file, &stylet_files::Progress::default())?;
+        let voxels = stylet_files::watched(file, |progress| stylet_files::read_voxels(file, progress))?;
         if let Some((label, name)) = given.iter().find(|(label, _)| !voxels.labels.contains(label)) {
             return Err(format!(
                 "--name {label}={name}: {} has no voxel with label {label}",

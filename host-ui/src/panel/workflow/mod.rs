@@ -298,7 +298,7 @@ fn retract_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
 
 fn force_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
-        let live = shown.is_live();
+        let live = shown.is_live() && shown.watched.is_none();
         let engaged = shown.is_engaged();
         if ui
             .add_enabled(live && !engaged, Button::new("Engage force"))

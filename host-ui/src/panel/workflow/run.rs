@@ -1,8 +1,8 @@
 //! The row above the steps: the scripted hand, how far it is, and its end.
 
 use super::{Guide, Progress, hinted, missing};
-use crate::action::Action;
-use crate::shown::Shown;
+use crate::action::{Action, WatchAction};
+use crate::shown::{Shown, Watched};
 use crate::theme;
 use egui::{Align, Button, Layout};
 use stylet_implant::workflow::Step;
@@ -24,9 +24,10 @@ pub fn run_ui(ui: &mut egui::Ui, shown: &Shown, guide: &mut Guide, actions: &mut
     let size = egui::vec2(ui.available_width(), RUN_HEIGHT);
     ui.allocate_ui(size, |ui| {
         ui.set_min_size(size);
-        match shown.running {
-            true => running_ui(ui, shown, actions),
-            false => begin_ui(ui, shown, actions),
+        match (&shown.watched, shown.running) {
+            (Some(watched), _) => watched_ui(ui, watched, actions),
+            (None, true) => running_ui(ui, shown, actions),
+            (None, false) => begin_ui(ui, shown, actions),
         }
     });
 }
@@ -60,6 +61,34 @@ fn running_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         None => step.to_owned(),
     };
     ui.add(egui::Label::new(theme::weak(text)).truncate());
+}
+
+/// A recording: how far it is, and its end.
+fn watched_ui(ui: &mut egui::Ui, watched: &Watched, actions: &mut Vec<Action>) {
+    let mut asked = |action| actions.push(Action::Watch(action));
+    ui.horizontal(|ui| {
+        ui.set_min_height(RUN_BUTTON);
+        let (name, action) = match (watched.has_ended, watched.is_held) {
+            (true, _) => ("Again", WatchAction::Again),
+            (false, true) => ("Go on", WatchAction::Hold(false)),
+            (false, false) => ("Hold", WatchAction::Hold(true)),
+        };
+        if ui.button(name).clicked() {
+            asked(action);
+        }
+        ui.label(format!("{:.0} of {:.0} s", watched.at_s.floor(), watched.length_s));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let close = ui
+                .button("Close")
+                .on_hover_text("Back to rt-core, where the needle can be moved");
+            if close.clicked() {
+                asked(WatchAction::Close);
+            }
+        });
+    });
+    let text = format!("Recording: {}", watched.name);
+    ui.add(egui::Label::new(theme::weak(&text)).truncate())
+        .on_hover_text(&watched.name);
 }
 
 fn begin_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {

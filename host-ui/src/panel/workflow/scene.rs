@@ -2,7 +2,7 @@
 
 use super::WorkflowState;
 use super::job::job_ui;
-use crate::action::Action;
+use crate::action::{Action, WatchAction};
 use crate::dialog::Purpose;
 use crate::panel::field::path_ui;
 use crate::recent::Recent;
@@ -57,6 +57,23 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
             if ui.add_enabled(free, Button::new(name)).clicked() {
                 actions.push(Action::LoadBuiltinScene(number));
             }
+        }
+    });
+    let can_watch = !shown.running && !shown.reads_recording;
+    ui.horizontal(|ui| {
+        ui.label(theme::small("Recorded"));
+        let example = ui.add_enabled(can_watch, Button::new("example"));
+        let example = example
+            .on_hover_text("A recorded insertion to look at: needle, force, tissue and seeds. It needs no rt-core.");
+        if example.clicked() {
+            actions.push(Action::Watch(WatchAction::Example));
+        }
+        let other = ui.add_enabled(can_watch, Button::new("recording…"));
+        if other
+            .on_hover_text("A recording made by \"host-ui record\", or drop one on the window")
+            .clicked()
+        {
+            actions.push(Action::PickFile(Purpose::Recording));
         }
     });
     let entered = ui.horizontal(|ui| {

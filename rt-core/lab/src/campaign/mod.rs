@@ -12,7 +12,8 @@ mod session;
 #[cfg(test)]
 mod tests;
 
-use crate::measure::{Checkpoints, Setup, measure, period_ns};
+use crate::measure::{Checkpoints, MeasureError, Setup, measure, period_ns};
+use crate::plots::DrawError;
 use clap::Args;
 use plan::{Part, Plan};
 use progress::Progress;
@@ -93,8 +94,17 @@ pub enum CampaignError {
     #[error(transparent)]
     Write(#[from] WriteError),
     /// The loops did not run.
+    #[error(transparent)]
+    Measure(#[from] MeasureError),
+    /// A picture of the page.
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+    /// The report as JSON.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+    /// A checkpoint could not be written.
     #[error("{0}")]
-    Run(String),
+    Unwritten(String),
 }
 
 /// Measures what is left and writes the report; 0 when the campaign is complete, 2 when it was interrupted before.
@@ -127,8 +137,8 @@ pub fn run(args: &CampaignArgs, interrupted: &AtomicBool) -> Result<u8, Campaign
         measure_what_is_left(&plan, &store, &options, interrupted)?;
     }
     let report = report::report(&plan, &store)?;
-    let page = page::page(&report).map_err(|e| CampaignError::Run(e.to_string()))?;
-    let json = serde_json::to_string_pretty(&report).map_err(|e| CampaignError::Run(e.to_string()))? + "\n";
+    let page = page::page(&report)?;
+    let json = serde_json::to_string_pretty(&report)? + "\n";
     write_whole(&args.out.join(REPORT), json.as_bytes())?;
     write_whole(&args.out.join(PAGE), page.as_bytes())?;
     println!(
@@ -222,6 +232,6 @@ fn session(
         ended.store(true, Ordering::Release);
         measured
     });
-    measured.map_err(CampaignError::Run)?;
-    writer.failed().map_or(Ok(()), |why| Err(CampaignError::Run(why)))
+    measured?;
+    writer.failed().map_or(Ok(()), |why| Err(CampaignError::Unwritten(why)))
 }

@@ -1,6 +1,6 @@
 //! `rtla timerlat hist`: the kernel's own measurement of how late a thread wakes.
 
-use super::wait;
+use super::{CompareError, ToolError, wait};
 use crate::load::Running;
 use crate::machine::Machine;
 use crate::measure::Setup;
@@ -9,12 +9,14 @@ use hdrhistogram::Histogram;
 use std::process::{Command, Stdio};
 use std::sync::atomic::AtomicBool;
 
+/// The program as people start it.
+pub const PROGRAM: &str = "rtla";
 /// Bins of one microsecond.
 const BINS: u64 = 10_000;
 
 /// First line of its help; `None` where it is not installed.
 pub fn version() -> Option<String> {
-    let output = Command::new("rtla").arg("--version").output().ok()?;
+    let output = Command::new(PROGRAM).arg("--version").output().ok()?;
     let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     Some(text.lines().next().unwrap_or("rtla").trim().to_owned())
 }
@@ -28,22 +30,23 @@ pub fn missing(machine: &Machine) -> Option<&'static str> {
 }
 
 /// One turn; wake-ups of its thread.
-pub fn turn(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, String> {
+pub fn turn(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, CompareError> {
     let load = Running::start(setup.load, &setup.options.instance, setup.folder)?;
     let file = setup.folder.join("timerlat.tmp");
-    let out = std::fs::File::create(&file).map_err(|e| format!("{}: {e}", file.display()))?;
-    let mut child = Command::new("rtla")
+    let out = std::fs::File::create(&file).map_err(|why| ToolError::Wait { program: PROGRAM, why })?;
+    let mut child = Command::new(PROGRAM)
         .args(arguments(setup))
         .stdout(out)
         .stderr(Stdio::piped())
         .spawn()
-        .map_err(|e| format!("rtla does not start: {e}"))?;
-    let ended = wait("rtla timerlat", &mut child, interrupted);
+        .map_err(|why| ToolError::Start { program: PROGRAM, why })?;
+    let ended = wait(PROGRAM, &mut child, interrupted);
     drop(load);
     setup.options.instance.sweep();
     let text = std::fs::read_to_string(&file).unwrap_or_default();
     let _ = std::fs::remove_file(&file);
-    ended.and_then(|()| read(&text).ok_or_else(|| "rtla timerlat wrote no histogram".to_owned()))
+    ended?;
+    Ok(read(&text).ok_or(ToolError::NoHistogram(PROGRAM))?)
 }
 
 fn arguments(setup: &Setup) -> Vec<String> {

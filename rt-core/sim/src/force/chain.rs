@@ -208,6 +208,7 @@ fn guard(
             force_n: terms.total_n,
             torque_nm: terms.torque_nm,
         },
+        constant_n: terms.gravity_n,
         stored_j: terms.stored_j,
         motion: Motion {
             moved_m,

@@ -49,6 +49,8 @@ pub struct GateState {
 pub struct GateInput {
     /// Wrench of the force law, before the force scale.
     pub wanted: Wrench,
+    /// The part of its force that is the same everywhere and at all times (`F_G`): what it gives on the way up it takes on the way down.
+    pub constant_n: Vector3<f64>,
     /// Energy in the springs of the model.
     pub stored_j: f64,
     /// Motion in the last tick.
@@ -155,17 +157,19 @@ pub fn step(parameters: &GateParameters, device: &DeviceInfo, state: &mut GateSt
         state.counts.non_finite = state.counts.non_finite.wrapping_add(1);
         state.trip(ForceFault::NonFiniteForce);
     }
-    let small = input.wanted.force_n.norm() * parameters.force_scale <= parameters.engage_below_n;
+    let small = (input.wanted.force_n - input.constant_n).norm() * parameters.force_scale <= parameters.engage_below_n;
     if state.waiting() && small {
         state.mode = Mode::Engaged { ticks: 0 };
         state.passivity = PassivityState::default();
     }
     let ramp_out = parameters.ramp_out_ticks.max(1);
+    let mut constant_n = Vector3::zeros();
     let next = match &mut state.mode {
         Mode::Engaged { ticks } => {
             *ticks = ticks.saturating_add(1).min(parameters.ramp_in_ticks);
             let ramp = f64::from(*ticks) / f64::from(parameters.ramp_in_ticks.max(1));
             let share = parameters.force_scale * ramp.min(1.0);
+            constant_n = input.constant_n * share;
             within_limits(parameters, device, state, input, share)
         }
         Mode::Waiting => Wrench::zero(),
@@ -185,7 +189,8 @@ pub fn step(parameters: &GateParameters, device: &DeviceInfo, state: &mut GateSt
         state.trip(ForceFault::NonFiniteForce);
         Wrench::zero()
     };
-    state.passivity.book(&state.output.force_n);
+    // What is the same everywhere stores what it takes: no motion that ends where it began gets any of it.
+    state.passivity.book(&(state.output.force_n - constant_n));
     let dt_s = input.motion.dt_s;
     state
         .warmth

@@ -27,9 +27,6 @@ pub const LONGER: &[(&str, &str)] = &[
     ),
 ];
 
-/// Public functions that may still return their error as prose: only ever lowered.
-pub const PROSE_ERRORS: usize = 14;
-
 /// Tests stand at the end of `name.rs`, in `name/tests.rs`, or below `name/tests/`.
 pub fn test_layout(path: &str, source: &str) -> Vec<String> {
     let stem = path.rsplit('/').next().unwrap_or(path).trim_end_matches(".rs");

@@ -40,7 +40,7 @@ pub fn exchange(state: &mut State, rounds: usize, report: &dyn Fn(f32) -> Contro
             report((round as f32 + number as f32 / seeds.len() as f32) / rounds as f32)?;
             exchange_one(state, seed);
         }
-        build(state, &|_| ControlFlow::Continue(()))?;
+        build(state, &|_| report((round + 1) as f32 / rounds as f32))?;
         for strength in [state.strength.saturating_sub(1), state.strength + 1] {
             if strength < state.strengths() {
                 state.take_if_better(&Move {

@@ -15,6 +15,8 @@ pub struct Lesson {
     pub notes: Vec<String>,
 }
 
+/// What is shown as no force.
+const LEAST_N: f64 = 5e-3;
 /// Seeds that have a line of their own.
 const SEEDS: usize = 6;
 
@@ -27,12 +29,27 @@ fn of(what: impl Into<String>, notes: &[&str]) -> Lesson {
 
 /// What comes next, by the state of the core.
 pub fn lesson(shown: &Shown, felt: &Felt) -> Lesson {
+    let lesson = next_lesson(shown, felt);
+    match &shown.watched {
+        // What is said to whoever moves a needle is what happens here.
+        Some(_) if progress(shown) != Progress::Debrief => Lesson {
+            what: format!(
+                "A recorded insertion: look on. Whoever moves the needle reads here: \u{201c}{}\u{201d}",
+                lesson.what
+            ),
+            notes: lesson.notes,
+        },
+        _ => lesson,
+    }
+}
+
+fn next_lesson(shown: &Shown, felt: &Felt) -> Lesson {
     if !shown.is_live() {
         let why =
             "The window shows what the core computes; it may be closed and opened again without the core noticing.";
         return of("Start the core: run rt-core in a terminal, or make run.", &[why]);
     }
-    if shown.running {
+    if shown.running && shown.watched.is_none() {
         return of(
             "The script moves the needle now. Watch it, or press Stop to go on by hand.",
             &[],
@@ -83,16 +100,16 @@ fn operation_lesson(shown: &Shown, felt: &Felt, needle: &AtHand, operation: Oper
 }
 
 fn place(shown: &Shown) -> Lesson {
-    let mut lesson = of(
+    if !shown.is_engaged() {
+        return of(
+            "Press E: it turns the force on. Without it nothing is felt, and every force reads 0.",
+            &["A device pushes back from now on. With keys or mouse, watch the force at the upper right."],
+        );
+    }
+    of(
         "Bring the tip to the entry: press Enter. With a device, move its tip there by hand.",
         &["A line in the pictures leads from the entry past the deepest seed."],
-    );
-    if !shown.is_engaged() {
-        let engage =
-            "To feel the force on a device, press E first. With keys or mouse, watch the force at the upper right.";
-        lesson.notes.push(engage.to_owned());
-    }
-    lesson
+    )
 }
 
 fn insert(shown: &Shown, felt: &Felt, needle: &AtHand) -> Lesson {
@@ -133,11 +150,14 @@ fn insert(shown: &Shown, felt: &Felt, needle: &AtHand) -> Lesson {
 }
 
 fn pressed(puncture: &Puncture) -> String {
-    format!(
-        "The membrane was pressed in by {} before it gave way, at {}.",
-        format::length(puncture.pressed_m),
-        format::force(puncture.force_n)
-    )
+    let by = format::length(puncture.pressed_m);
+    match puncture.force_n >= LEAST_N {
+        true => format!(
+            "The membrane was pressed in by {by} before it gave way, at {}.",
+            format::force(puncture.force_n)
+        ),
+        false => format!("The membrane was pressed in by {by} before it gave way. The force was off."),
+    }
 }
 
 /// Depths of one seed along the needle, m.

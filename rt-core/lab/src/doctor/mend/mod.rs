@@ -9,7 +9,8 @@ use super::tunable::{self, Tunable};
 use crate::args::duration_ns;
 use crate::load::Load;
 use crate::machine::Machine;
-use crate::measure::{Measured, Setup, measure};
+use crate::measure::{MeasureError, Measured, Setup, measure};
+use crate::plots::DrawError;
 use crate::summary::{Summary, summary};
 use clap::Args;
 use file::Changes;
@@ -73,8 +74,22 @@ pub enum MendError {
     #[error(transparent)]
     Options(#[from] OptionsError),
     /// The measurement did not run.
-    #[error("{0}")]
-    Measure(String),
+    #[error(transparent)]
+    Measure(#[from] MeasureError),
+    /// The folder of the report.
+    #[error("cannot make {}: {why}", .folder.display())]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// What the system reports.
+        why: std::io::Error,
+    },
+    /// A picture of the page.
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+    /// The report as JSON.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
 }
 
 /// Examines, shows, changes or undoes; 0 when all was done, 1 when there is a blocker or a setting was refused.
@@ -178,7 +193,10 @@ fn mend(
     if Changes::read(&undo).is_ok_and(|c| !c.is_undone()) {
         return Err(MendError::NotUndone(undo));
     }
-    std::fs::create_dir_all(out).map_err(|e| MendError::Measure(format!("cannot make {}: {e}", out.display())))?;
+    std::fs::create_dir_all(out).map_err(|why| MendError::Folder {
+        folder: out.to_owned(),
+        why,
+    })?;
     eprintln!("rt-core: measuring for {:.0} s before", duration_ns as f64 / 1e9);
     let before = side(core, duration_ns, out, interrupted)?;
     let mut changes = Changes::planned(tunables);
@@ -199,9 +217,9 @@ fn mend(
         before,
         after,
     };
-    let json = serde_json::to_string_pretty(&report).map_err(|e| MendError::Measure(e.to_string()))? + "\n";
+    let json = serde_json::to_string_pretty(&report)? + "\n";
     write_whole(&out.join(REPORT), json.as_bytes())?;
-    let page = page::page(&report).map_err(|e| MendError::Measure(e.to_string()))?;
+    let page = page::page(&report)?;
     write_whole(&out.join(PAGE), page.as_bytes())?;
     for (name, ratio) in page::ratios(&report.before.wake, &report.after.wake) {
         println!("wake-up {name}: after over before {ratio}");
@@ -223,7 +241,5 @@ fn side(core: usize, duration_ns: u64, folder: &Path, interrupted: &AtomicBool) 
         toggle: None,
         checkpoints: None,
     };
-    measure(&setup, interrupted)
-        .map(|measured| Side::of(&measured))
-        .map_err(MendError::Measure)
+    Ok(Side::of(&measure(&setup, interrupted)?))
 }

@@ -10,6 +10,7 @@ fn device() -> DeviceInfo {
 
 fn still(wanted_n: Vector3<f64>) -> GateInput {
     GateInput {
+        constant_n: Vector3::zeros(),
         wanted: Wrench::from_force(wanted_n),
         stored_j: 0.0,
         motion: Motion {
@@ -257,4 +258,45 @@ fn every_stage_counts_what_it_did() {
     run(&parameters, &mut state, Vector3::x() * f64::NAN, 1);
     let all = state.counts().all();
     assert_eq!((all[0], all[7]), (1, 1));
+}
+
+/// A handle of 0.2 kg that is carried: 50 mm up are 88 mJ that nobody has to pay for.
+#[test]
+fn a_constant_force_is_no_debt_and_what_is_beside_it_still_is() {
+    let parameters = full_scale();
+    let weight_n = Vector3::z() * 1.77;
+    let lifted = |wanted_n: Vector3<f64>, by_m: f64| GateInput {
+        constant_n: weight_n,
+        motion: Motion {
+            moved_m: Vector3::z() * by_m,
+            velocity_m_per_s: Vector3::z() * (by_m / DT_S),
+            ..still(wanted_n).motion
+        },
+        ..still(wanted_n)
+    };
+    let mut state = GateState::default();
+    state.engage();
+    for _ in 0..=parameters.ramp_in_ticks {
+        step(&parameters, &device(), &mut state, &lifted(weight_n, 0.0));
+    }
+    assert!(!state.waiting(), "a weight that is carried is no reason to wait");
+    for tick in 0..2000 {
+        let by_m = if tick < 1000 { 5e-5 } else { -5e-5 };
+        let out = step(&parameters, &device(), &mut state, &lifted(weight_n, by_m));
+        assert!(
+            (out.wrench.force_n - weight_n).norm() < 1e-9,
+            "tick {tick}: {:?}",
+            out.wrench.force_n
+        );
+    }
+    assert_eq!(state.counts().passivity, 0);
+    for _ in 0..1000 {
+        step(
+            &parameters,
+            &device(),
+            &mut state,
+            &lifted(weight_n + Vector3::z() * 2.0, 5e-5),
+        );
+    }
+    assert!(state.counts().passivity > 0, "2 N more give 100 mJ");
 }

@@ -1,7 +1,7 @@
 //! What the force loop's half of a line can be made from again: kept beside a recording.
 
 use super::way::Way;
-use super::{HandLine, LineError};
+use super::{HandLine, LineError, STIFFEST_N_PER_M};
 use crate::line::{Compliance, Line, LineState, MAX_STATIONS};
 use crate::needle::LayerKind;
 use serde::{Deserialize, Serialize};
@@ -74,6 +74,16 @@ impl HandLine {
             bone_m: None,
         };
         Self::new(generation, line, way, Compliance::diagonal(stations, 1e-3, 1e-3))
+    }
+
+    /// The same way through a body that was solved otherwise, at rest: what a measurement compares a line with.
+    ///
+    /// # Errors
+    ///
+    /// [`LineError::Unusable`]: numbers that are no line's.
+    pub fn in_other_body(&self, compliance: Compliance) -> Result<Self, LineError> {
+        let compliance = compliance.behind_needle(STIFFEST_N_PER_M);
+        Self::new(self.generation, self.line, self.way.clone(), compliance)
     }
 
     /// The line in tissue at rest, with the default forces of its layers.

@@ -1,0 +1,286 @@
+//! The two loops through one insertion, as a scene ships, tick by tick beside the converged solution of the same tick.
+
+use crate::error::{Field, MOVED, best_shift_m, norm};
+use crate::session::{Session, axis_start};
+use crate::twin::{Mean, Twin, TwinSettings};
+use nalgebra::Vector3;
+use std::sync::Arc;
+use std::time::Instant;
+use stylet_hw::{Hand, LinkFaults};
+use stylet_runtime::lines::LineBody;
+use stylet_runtime::rt::world::World;
+use stylet_runtime::stepped::HAPTIC_TICKS_PER_TISSUE_TICK;
+use stylet_sim::force::ForceParameters;
+use stylet_sim::force::chain::{ChainOutput, ChainParameters};
+use stylet_sim::limits::TissueParameters;
+use stylet_sim::line::{HandLine, LayerForces, ReadyLine, StationSettings};
+use stylet_sim::needle::NeedleParameters;
+use stylet_sim::scene::{SceneSource, TissueKind};
+use stylet_sim::tissue::PackedField;
+
+/// Ticks in which the largest displacement is less are not compared: nothing to be right about.
+const LEAST_M: f64 = 0.5e-3;
+/// Every so many ticks of the tissue loop are compared.
+const COMPARED: usize = 4;
+/// A larger body is solved in f32, which takes half of the time and is good to a residual of 1e-5.
+const MOST_DOUBLE: usize = 30_000;
+/// The force comes up within half a second after the hand engages.
+const WAIT_S: f64 = 0.6;
+
+/// One needle along z through a built-in scene.
+#[derive(Clone, Copy, Debug)]
+pub struct LiveCase {
+    /// Built-in scene.
+    pub scene: &'static str,
+    /// So far beside the axis of the gland, along x.
+    pub beside_m: f64,
+    /// How deep the tip goes.
+    pub depth_m: f64,
+    /// Of the hand, in and out.
+    pub speed_m_per_s: f64,
+}
+
+/// What one tick of the tissue loop was, beside the converged solution of the same tick.
+#[derive(Clone, Copy, Debug)]
+pub struct LiveTick {
+    /// Largest displacement of an element, converged.
+    pub largest_m: f64,
+    /// Distance of the elements that move, RMS: as it ships, where nothing moves, by the best shift as one piece.
+    pub rms_m: [f64; 3],
+    /// Largest distance, as it ships.
+    pub worst_m: f64,
+    /// Force of the tip on the tissue, as it ships and converged.
+    pub tip_n: [f64; 2],
+    /// Force of tip and shaft on the hand against the way in, as it ships and converged.
+    pub hand_n: [f64; 2],
+}
+
+/// One insertion.
+pub struct Live {
+    /// Ticks that were compared.
+    pub ticks: Vec<LiveTick>,
+    /// Each tick of the force loop alone, and each together with a tick of the tissue loop, microseconds: the least of the rounds.
+    pub haptic_us: Vec<f64>,
+    pub tissue_us: Vec<f64>,
+    /// Bytes of the columns that the tissue loop adds up.
+    pub column_bytes: usize,
+    /// Elements of the body that moves, and stations of the line.
+    pub elements: usize,
+    pub stations: usize,
+}
+
+/// A scene with the line of one needle: as it ships, and its twin.
+pub struct Theatre {
+    case: LiveCase,
+    source: SceneSource,
+    start: Vector3<f64>,
+}
+
+impl Theatre {
+    /// # Panics
+    ///
+    /// If the scene is not built in.
+    pub fn new(case: LiveCase) -> Self {
+        let source = SceneSource::Builtin(case.scene.to_owned());
+        let world = world(&source, TissueKind::ChainMail);
+        let start = axis_start(&world) + Vector3::x() * case.beside_m;
+        Self { case, source, start }
+    }
+
+    /// The line as it ships in that tissue, and how long it took.
+    ///
+    /// # Panics
+    ///
+    /// If the needle meets no tissue.
+    pub fn line(&self, tissue: TissueKind) -> (ReadyLine, f64) {
+        let body = LineBody::of_source(&self.source, tissue).expect("built in");
+        let begun = Instant::now();
+        let line = body
+            .expect("has lines")
+            .prepare(1, self.start.into(), [0.0, 0.0, 1.0], &mut || true)
+            .expect("through the gland");
+        (line, begun.elapsed().as_secs_f64())
+    }
+
+    /// The converged line in the finite elements that the scene has with `--tissue fem`, beside `like` that ships there; to the first
+    /// residual in f64, or to the second in f32 where the body is large.
+    ///
+    /// # Panics
+    ///
+    /// If the scene has no finite elements.
+    pub fn twin(&self, like: &HandLine, [double, single]: [f64; 2]) -> Twin {
+        let scene = self.source.build().expect("built in").with_tissue(TissueKind::Fem);
+        let settings = |tolerance: f64| TwinSettings {
+            stations: StationSettings::of_lattice(scene.body.spacing_m),
+            most: like.source().stations(),
+            tolerance,
+            whole_of: None,
+        };
+        if scene.body.element_count() > MOST_DOUBLE {
+            Twin::of::<f32>(&scene, like, settings(single))
+        } else {
+            Twin::of::<f64>(&scene, like, settings(double))
+        }
+    }
+
+    /// The insertion: in, half a second of rest, half the way out, rest. The first round is compared with `twin`.
+    pub fn run(&self, tissue: TissueKind, line: &ReadyLine, twin: &mut Twin, rounds: usize) -> Live {
+        let mut live = Live {
+            ticks: Vec::new(),
+            haptic_us: Vec::new(),
+            tissue_us: Vec::new(),
+            column_bytes: line.body.answer.columns().iter().map(PackedField::bytes).sum(),
+            elements: 0,
+            stations: line.hand.source().stations(),
+        };
+        let mut world = Box::new(world(&self.source, tissue));
+        live.elements = world.scene.body.element_count();
+        for round in 0..rounds.max(1) {
+            world.tissue.return_to_rest();
+            let hand = (Hand::steady(), LinkFaults::default());
+            let session = Session::on_line(world, (self.start, line.clone()), hand, ForceParameters::default());
+            let mut watch = (round == 0).then(|| Watch::new(line.hand.as_ref(), twin));
+            world = self.round(session, &mut live, watch.as_mut(), round);
+        }
+        live
+    }
+
+    fn round(&self, mut session: Session, live: &mut Live, mut watch: Option<&mut Watch>, round: usize) -> Box<World> {
+        let LiveCase {
+            depth_m, speed_m_per_s, ..
+        } = self.case;
+        let at = |depth_m: f64| self.start + Vector3::z() * (5e-3 + depth_m);
+        let legs = [
+            (-5e-3, WAIT_S),
+            (depth_m, depth_m / speed_m_per_s + 0.5),
+            (0.5 * depth_m, 0.5 * depth_m / speed_m_per_s + 0.3),
+        ];
+        let (mut tick, mut haptic, mut tissue) = (0, 0, 0);
+        for (depth_m, seconds) in legs {
+            session.go_to(at(depth_m), speed_m_per_s);
+            for _ in 0..(seconds * 1e3) as usize {
+                tick += 1;
+                let is_tissue_tick = tick % HAPTIC_TICKS_PER_TISSUE_TICK == 0;
+                let begun = Instant::now();
+                let output = session.step();
+                let us = begun.elapsed().as_secs_f64() * 1e6;
+                let (list, at) = if is_tissue_tick {
+                    (&mut live.tissue_us, &mut tissue)
+                } else {
+                    (&mut live.haptic_us, &mut haptic)
+                };
+                keep_least(list, *at, us, round);
+                *at += 1;
+                if let Some(watch) = &mut watch {
+                    watch.step(&session, &output);
+                    if is_tissue_tick && tissue % COMPARED == 0 {
+                        live.ticks.extend(watch.compare(session.world()));
+                    }
+                }
+            }
+        }
+        session.into_world()
+    }
+}
+
+fn keep_least(list: &mut Vec<f64>, at: usize, us: f64, round: usize) {
+    match list.get_mut(at) {
+        Some(least) if round > 0 => *least = least.min(us),
+        _ => list.push(us),
+    }
+}
+
+fn world(source: &SceneSource, tissue: TissueKind) -> World {
+    let scene = source.build().expect("built in").with_tissue(tissue);
+    let limits = TissueParameters::default().validate().expect("defaults are valid");
+    World::new(scene, limits, 1).expect("can be used")
+}
+
+/// Layers' forces of the default parameters, as a run sets them.
+pub fn default_forces() -> LayerForces {
+    let parameters = ChainParameters {
+        needle: NeedleParameters::default(),
+        force: ForceParameters::default(),
+    };
+    parameters.layer_forces()
+}
+
+/// Follows the needle of a session with a copy of its line, and with the twin.
+struct Watch<'a> {
+    ships: HandLine,
+    twin: &'a mut Twin,
+    mean: Option<Mean>,
+}
+
+impl<'a> Watch<'a> {
+    fn new(ships: &HandLine, twin: &'a mut Twin) -> Self {
+        let mut ships = ships.clone();
+        for hand in [&mut ships, &mut twin.hand] {
+            hand.reset();
+            hand.set_forces(&default_forces());
+        }
+        Self {
+            ships,
+            twin,
+            mean: None,
+        }
+    }
+
+    /// Both lines take the tip that the force loop has just had.
+    fn step(&mut self, session: &Session, output: &ChainOutput) {
+        let Some(tip) = session.chain().tip_in_world else {
+            return;
+        };
+        let along_m = self.ships.along_m(&tip);
+        let ships = self.ships.step(along_m, 1e-3);
+        self.twin.hand.step(along_m, 1e-3);
+        // The copy is the loop's own line, or nothing here means anything.
+        let felt_n = (output.terms.membrane_n + output.terms.friction_n).z;
+        assert!(
+            (felt_n - ships.force_on_hand_n).abs() < 1e-9 || !self.ships.is_in_tissue(),
+            "{felt_n} N in the loop, {} N on its line",
+            ships.force_on_hand_n
+        );
+    }
+
+    fn compare(&mut self, world: &World) -> Option<LiveTick> {
+        let body = world.tissue.deformed();
+        let h = body.lattice.spacing_m;
+        let converged = self.twin.field();
+        let moved = |element: u32| body.displacement(element).map(|u| u * h);
+        let shown: Field = if body.lattice.element_count() == converged.len() {
+            (0..converged.len() as u32).map(moved).collect()
+        } else {
+            let reference = Arc::clone(&self.twin.body);
+            let mean = self.mean.get_or_insert_with(|| Mean::over(body.lattice, &reference));
+            mean.of(moved)
+        };
+        let largest_m = converged.iter().map(|&u| norm(u)).fold(0.0, f64::max);
+        if largest_m < LEAST_M {
+            return None;
+        }
+        let shift_m = best_shift_m(&converged, largest_m);
+        let (mut squares, mut worst_m, mut count) = ([0.0; 3], 0.0_f64, 0.0);
+        let apart = |a: [f64; 3], b: [f64; 3]| norm([0, 1, 2].map(|c| a[c] - b[c]));
+        for (&there, &here) in converged
+            .iter()
+            .zip(&shown)
+            .filter(|(u, _)| norm(**u) > MOVED * largest_m)
+        {
+            for (square, other) in squares.iter_mut().zip([here, [0.0; 3], shift_m]) {
+                *square += apart(there, other).powi(2);
+            }
+            worst_m = worst_m.max(apart(there, here));
+            count += 1.0;
+        }
+        let lines = [&self.ships, &self.twin.hand];
+        let state = lines.map(|line| line.state());
+        Some(LiveTick {
+            largest_m,
+            rms_m: squares.map(|s| (s / count).sqrt()),
+            worst_m,
+            tip_n: state.map(|s| s.tip().force_n),
+            hand_n: state.map(|s| s.shaft_n().iter().sum::<f64>() + s.tip().force_n),
+        })
+    }
+}

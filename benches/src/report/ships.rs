@@ -1,0 +1,154 @@
+//! What ships, through the real loops, beside the converged solution of each tick.
+
+use serde::Serialize;
+use std::path::Path;
+use stylet_benches::live::{Live, LiveCase, LiveTick, Theatre};
+use stylet_sim::scene::TissueKind;
+
+/// One insertion in one tissue.
+#[derive(Clone, Debug, Serialize)]
+pub struct Ships {
+    pub scene: &'static str,
+    pub tissue: &'static str,
+    pub beside_mm: f64,
+    pub speed_mm_per_s: f64,
+    pub elements: usize,
+    pub stations: usize,
+    pub largest_mm: f64,
+    /// Of the largest displacement in each tick: mean, p99 and worst of the ticks' RMS, and the farthest element of all.
+    pub field_percent: f64,
+    pub field_p99_percent: f64,
+    pub field_worst_percent: f64,
+    pub farthest_mm: f64,
+    pub nothing_moves_percent: f64,
+    pub best_shift_percent: f64,
+    /// Of the largest force of the insertion: p99 and worst of the ticks.
+    pub tip_p99_percent: f64,
+    pub tip_worst_percent: f64,
+    pub hand_p99_percent: f64,
+    pub hand_worst_percent: f64,
+    pub haptic_p50_us: f64,
+    pub haptic_p999_us: f64,
+    pub tissue_p50_us: f64,
+    pub tissue_p99_us: f64,
+    pub tissue_p999_us: f64,
+    pub prepared_s: f64,
+    pub columns_mb: f64,
+    /// Residual of the converged columns.
+    pub twin_residual: f64,
+}
+
+const CASES: [LiveCase; 4] = [
+    LiveCase {
+        scene: "paper",
+        beside_m: 0.0,
+        depth_m: 45e-3,
+        speed_m_per_s: 0.05,
+    },
+    LiveCase {
+        scene: "paper",
+        beside_m: 10e-3,
+        depth_m: 40e-3,
+        speed_m_per_s: 0.05,
+    },
+    LiveCase {
+        scene: "paper",
+        beside_m: 0.0,
+        depth_m: 45e-3,
+        speed_m_per_s: 0.28,
+    },
+    LiveCase {
+        scene: "pelvis",
+        beside_m: 0.0,
+        depth_m: 90e-3,
+        speed_m_per_s: 0.05,
+    },
+];
+/// Residual over load of the converged columns; what ships has 4.5e-2.
+const CONVERGED: f64 = 1e-7;
+/// The same of a body that is solved in f32.
+const CONVERGED_SINGLE: f64 = 1e-5;
+
+/// Every case, FEM first: its line says where the twin's stations are.
+pub fn measure(rounds: usize) -> Vec<Ships> {
+    let mut rows = Vec::new();
+    for case in CASES {
+        eprintln!(
+            "as it ships: {}, {:.0} mm beside, {:.0} mm/s ...",
+            case.scene,
+            case.beside_m * 1e3,
+            case.speed_m_per_s * 1e3
+        );
+        let theatre = Theatre::new(case);
+        let fem = theatre.line(TissueKind::Fem);
+        let mut twin = theatre.twin(&fem.0.hand, [CONVERGED, CONVERGED_SINGLE]);
+        let chainmail = theatre.line(TissueKind::ChainMail);
+        for (kind, (line, prepared_s)) in [(TissueKind::Fem, fem), (TissueKind::ChainMail, chainmail)] {
+            let live = theatre.run(kind, &line, &mut twin, rounds);
+            let row = row(case, kind, &live, prepared_s, twin.residual);
+            eprintln!(
+                "  {}: field {:.2} % of {:.1} mm on average, {:.2} % at worst",
+                row.tissue, row.field_percent, row.largest_mm, row.field_worst_percent
+            );
+            rows.push(row);
+        }
+    }
+    rows
+}
+
+fn row(case: LiveCase, kind: TissueKind, live: &Live, prepared_s: f64, twin_residual: f64) -> Ships {
+    let ticks = &live.ticks;
+    let share = |of: &dyn Fn(&LiveTick) -> f64| ticks.iter().map(|t| 100.0 * of(t) / t.largest_m).collect::<Vec<_>>();
+    let field = share(&|t| t.rms_m[0]);
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let force = |of: fn(&LiveTick) -> [f64; 2]| {
+        let peak_n = ticks.iter().map(|t| of(t)[1].abs()).fold(0.0, f64::max);
+        ticks
+            .iter()
+            .map(|t| 100.0 * (of(t)[0] - of(t)[1]).abs() / peak_n)
+            .collect::<Vec<_>>()
+    };
+    let (tip, hand) = (force(|t| t.tip_n), force(|t| t.hand_n));
+    Ships {
+        scene: case.scene,
+        tissue: kind.name(),
+        beside_mm: case.beside_m * 1e3,
+        speed_mm_per_s: case.speed_m_per_s * 1e3,
+        elements: live.elements,
+        stations: live.stations,
+        largest_mm: ticks.iter().map(|t| t.largest_m * 1e3).fold(0.0, f64::max),
+        field_percent: mean(&field),
+        field_p99_percent: quantile(&field, 0.99),
+        field_worst_percent: quantile(&field, 1.0),
+        farthest_mm: ticks.iter().map(|t| t.worst_m * 1e3).fold(0.0, f64::max),
+        nothing_moves_percent: mean(&share(&|t| t.rms_m[1])),
+        best_shift_percent: mean(&share(&|t| t.rms_m[2])),
+        tip_p99_percent: quantile(&tip, 0.99),
+        tip_worst_percent: quantile(&tip, 1.0),
+        hand_p99_percent: quantile(&hand, 0.99),
+        hand_worst_percent: quantile(&hand, 1.0),
+        haptic_p50_us: quantile(&live.haptic_us, 0.5),
+        haptic_p999_us: quantile(&live.haptic_us, 0.999),
+        tissue_p50_us: quantile(&live.tissue_us, 0.5),
+        tissue_p99_us: quantile(&live.tissue_us, 0.99),
+        tissue_p999_us: quantile(&live.tissue_us, 0.999),
+        prepared_s,
+        columns_mb: live.column_bytes as f64 * 1e-6,
+        twin_residual,
+    }
+}
+
+fn quantile(values: &[f64], q: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted
+        .get(((sorted.len().max(1) - 1) as f64 * q).round() as usize)
+        .copied()
+        .unwrap_or(f64::NAN)
+}
+
+pub fn write(rows: &[Ships], path: &Path) -> Result<(), csv::Error> {
+    let mut writer = csv::Writer::from_path(path)?;
+    rows.iter().try_for_each(|row| writer.serialize(row))?;
+    writer.flush().map_err(Into::into)
+}

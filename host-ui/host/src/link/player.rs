@@ -1,0 +1,226 @@
+//! A recording in place of a core: a thread puts what the core said into the inbox, each at its time.
+
+use super::inbox::Inbox;
+use super::thread::lock;
+use super::{SceneModel, Snapshot};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+use stylet_shm_schema::{HapticState, ParametersInForce, PlanInForce, Session, TickRecord};
+
+const PASS: Duration = Duration::from_millis(4);
+/// A heartbeat, without which the host would take the core for silent while the recording is held.
+const BEAT: Duration = Duration::from_millis(20);
+
+/// What the core said at one time.
+pub enum Piece {
+    /// A tick of the force loop.
+    Tick(Box<TickRecord>),
+    /// What ticks do not say of the state.
+    State(Box<HapticState>),
+    /// The scene from now on.
+    Scene(Arc<SceneModel>),
+    /// The plan from now on.
+    Plan(Box<PlanInForce>),
+    /// The parameters from now on.
+    Parameters(Box<ParametersInForce>),
+    /// The tissue.
+    Snapshot(Box<Snapshot>),
+}
+
+/// The first run of the core in a recording.
+pub struct Played {
+    /// As the core announced itself, as far as the recording says.
+    pub session: Session,
+    /// In the order of their times, ns since the first of them.
+    pub pieces: Vec<(u64, Piece)>,
+    /// Why reading ended before the end of the file, if it did.
+    pub cut_off: Option<String>,
+}
+
+impl Played {
+    /// How long it is, ns.
+    pub fn length_ns(&self) -> u64 {
+        self.pieces.last().map_or(0, |(time_ns, _)| *time_ns)
+    }
+}
+
+/// The host's side of a recording that is played.
+#[derive(Clone, Default)]
+pub struct Playback {
+    held: Arc<AtomicBool>,
+    again: Arc<AtomicBool>,
+    at_ns: Arc<AtomicU64>,
+    length_ns: u64,
+}
+
+impl Playback {
+    pub(super) fn of(played: &Played) -> Self {
+        Self {
+            length_ns: played.length_ns(),
+            ..Self::default()
+        }
+    }
+
+    /// Holds it, or lets it go on.
+    pub fn hold(&self, held: bool) {
+        // SYNC: read by `Player::pass`; nothing but the flag is carried. So with the flag and the number below.
+        self.held.store(held, Ordering::Relaxed);
+    }
+
+    /// Begins it again.
+    pub fn again(&self) {
+        // SYNC: taken by `Player::pass`.
+        self.again.store(true, Ordering::Relaxed);
+        self.hold(false);
+    }
+
+    /// Whether it is held.
+    pub fn is_held(&self) -> bool {
+        // SYNC: stored by `hold`.
+        self.held.load(Ordering::Relaxed)
+    }
+
+    /// How far it is, s.
+    pub fn at_s(&self) -> f64 {
+        // SYNC: stored by `Player::pass`.
+        self.at_ns.load(Ordering::Relaxed) as f64 * 1e-9
+    }
+
+    /// How long it is, s.
+    pub fn length_s(&self) -> f64 {
+        self.length_ns as f64 * 1e-9
+    }
+
+    /// Whether all of it was shown.
+    pub fn has_ended(&self) -> bool {
+        // SYNC: stored by `Player::pass`.
+        self.at_ns.load(Ordering::Relaxed) >= self.length_ns
+    }
+}
+
+/// The thread's side.
+pub struct Player {
+    played: Arc<Played>,
+    playback: Playback,
+    inbox: Arc<Mutex<Inbox>>,
+    /// Rises with each time that it begins: ticks do not go back within a run of the core.
+    session: Session,
+    next: usize,
+    state: Option<HapticState>,
+    last: Option<TickRecord>,
+    at: Duration,
+    looked: Instant,
+    beat: Instant,
+}
+
+impl Player {
+    pub fn new(played: Arc<Played>, playback: Playback, inbox: Arc<Mutex<Inbox>>) -> Self {
+        let mut player = Self {
+            session: played.session,
+            played,
+            playback,
+            inbox,
+            next: 0,
+            state: None,
+            last: None,
+            at: Duration::ZERO,
+            looked: Instant::now(),
+            beat: Instant::now(),
+        };
+        player.begin();
+        player
+    }
+
+    fn begin(&mut self) {
+        self.session.session_id = self.session.session_id.wrapping_add(1);
+        (self.next, self.at) = (0, Duration::ZERO);
+        (self.state, self.last) = (None, None);
+        lock(&self.inbox).begin(self.session);
+    }
+
+    /// Puts in what is due, and returns how long to wait.
+    pub fn pass(&mut self) -> Duration {
+        let now = Instant::now();
+        // SYNC: set by `Playback::again`.
+        if self.playback.again.swap(false, Ordering::Relaxed) {
+            self.begin();
+        } else if !self.playback.is_held() {
+            self.at += now - self.looked;
+        }
+        self.looked = now;
+        let length = Duration::from_nanos(self.played.length_ns());
+        self.at = self.at.min(length);
+        // SYNC: read by `Playback::at_s` and `has_ended`.
+        self.playback.at_ns.store(self.at.as_nanos() as u64, Ordering::Relaxed);
+        let inbox = &mut *lock(&self.inbox);
+        let is_moving = self.next < self.played.pieces.len() && !self.playback.is_held();
+        while let Some((_, piece)) = self
+            .played
+            .pieces
+            .get(self.next)
+            .filter(|(time_ns, _)| u128::from(*time_ns) <= self.at.as_nanos())
+        {
+            self.next += 1;
+            put(inbox, piece, self.session.session_id, (&mut self.state, &mut self.last));
+        }
+        inbox.state = self.state.or(inbox.state);
+        if is_moving || now - self.beat >= BEAT {
+            self.beat = now;
+            (inbox.pulse.moved, inbox.pulse.looked) = (Some(now), Some(now));
+            inbox.pulse.has_board = true;
+        }
+        PASS
+    }
+}
+
+/// A piece as of the run `session_id`; ticks carry the state on.
+fn put(
+    inbox: &mut Inbox,
+    piece: &Piece,
+    session_id: u64,
+    (state, last): (&mut Option<HapticState>, &mut Option<TickRecord>),
+) {
+    match piece {
+        Piece::Tick(tick) => {
+            let mut record = **tick;
+            record.session_id = session_id;
+            inbox.put_record(record);
+            if let Some(state) = state {
+                carry(&record, state);
+            }
+            *last = Some(record);
+        }
+        Piece::State(found) => {
+            let mut found = **found;
+            if let Some(record) = last {
+                carry(record, &mut found);
+            }
+            *state = Some(found);
+        }
+        Piece::Scene(scene) => inbox.scene = Some((session_id, Arc::new(scene.of_session(session_id)))),
+        Piece::Plan(plan) => {
+            inbox.plan = Some(PlanInForce { session_id, ..**plan });
+        }
+        Piece::Parameters(parameters) => {
+            inbox.parameters = Some(ParametersInForce {
+                session_id,
+                ..**parameters
+            });
+        }
+        Piece::Snapshot(snapshot) => {
+            let mut snapshot = (**snapshot).clone();
+            snapshot.header.session_id = session_id;
+            inbox.snapshot = Some(snapshot);
+        }
+    }
+}
+
+/// What a tick says of the state.
+fn carry(record: &TickRecord, state: &mut HapticState) {
+    (state.tick, state.time_ns) = (record.tick, record.due_ns + record.wake_latency_ns);
+    (state.phase, state.fault, state.flags) = (record.phase, record.fault, record.flags);
+    (state.tip_in_scene_m, state.force_on_hand_n) = (record.tip_in_scene_m, record.force_on_hand_n);
+    (state.depth_m, state.speed_m_per_s) = (record.depth_m, record.speed_m_per_s);
+    (state.force_terms_n, state.tissue_tick) = (record.force_terms_n, record.tissue_tick);
+}

@@ -1,0 +1,129 @@
+//! A recording read for a window: what the core said, each with its time.
+
+use super::error::RecordError;
+use super::messages::{GLAND, TICK, TISSUE, Tick, gland_of, tissue_of};
+use super::scene::{self, FIELD, SCENE};
+use super::setting::{self, PARAMETERS_CHANNEL, PLAN, SESSION, STATE};
+use super::stream;
+use crate::link::{Piece, Played, Snapshot};
+use std::path::Path;
+use std::sync::Arc;
+use stylet_base::interrupt::Interrupt;
+use stylet_shm_schema::{Session, SnapshotHeader, check};
+
+/// Longer recordings are shown up to here.
+const MOST_BYTES: usize = 1 << 30;
+
+/// Reads a recording of `host-ui record` for a window; refuses one without a scene.
+pub fn played(path: &Path, interrupt: &Interrupt) -> Result<Played, RecordError> {
+    let invalid = |why: String| RecordError::of_file(path, why);
+    let bytes = stylet_base::input::read(path, MOST_BYTES as u64).map_err(|why| invalid(why.to_string()))?;
+    played_of(&bytes, interrupt).map_err(invalid)
+}
+
+/// As [`played`], of the bytes of a file; the text of an error follows the name of the file.
+pub fn played_of(bytes: &[u8], interrupt: &Interrupt) -> Result<Played, String> {
+    let mut reader = Reader::default();
+    let cut_off = stream::each(bytes, |topic, time_ns, data| match interrupt.asked() {
+        true => Err("reading was cancelled".to_owned()),
+        false => reader.take(topic, time_ns, data),
+    })?;
+    reader.end(cut_off)
+}
+
+#[derive(Default)]
+struct Reader {
+    session: Option<Session>,
+    pieces: Vec<(u64, Piece)>,
+    header: Option<SnapshotHeader>,
+    surface_m: Vec<[f32; 3]>,
+    has_scene: bool,
+    bytes: usize,
+}
+
+impl Reader {
+    /// A message that is not known is left out; the error says why nothing more is read.
+    fn take(&mut self, topic: &str, time_ns: u64, data: &[u8]) -> Result<(), String> {
+        self.bytes += data.len();
+        if self.bytes > MOST_BYTES {
+            return Err("it is too long to be shown whole".to_owned());
+        }
+        let damaged = || format!("a message of {topic} is damaged");
+        let session_id = self.session.map_or(0, |session| session.session_id);
+        let piece = match topic {
+            t if t == SESSION.topic => {
+                if self.session.is_none() {
+                    self.session = Some(setting::session_of(data).ok_or_else(damaged)?);
+                }
+                return Ok(());
+            }
+            t if t == TICK.topic => {
+                let tick: Tick = serde_json::from_slice(data).map_err(|_| damaged())?;
+                if tick.session_id != session_id {
+                    return Err("another run of rt-core begins".to_owned());
+                }
+                let record = tick.record();
+                check::record(&record).map_err(|_| damaged())?;
+                Piece::Tick(Box::new(record))
+            }
+            t if t == STATE.topic => {
+                let state = setting::state_of(data).filter(|state| check::state(state).is_ok());
+                Piece::State(Box::new(state.ok_or_else(damaged)?))
+            }
+            t if t == SCENE.topic => {
+                self.has_scene = true;
+                Piece::Scene(Arc::new(scene::scene_of(data, session_id).ok_or_else(damaged)?))
+            }
+            t if t == PLAN.topic => {
+                let plan = setting::plan_of(data, session_id).filter(|plan| check::plan(plan).is_ok());
+                Piece::Plan(Box::new(plan.ok_or_else(damaged)?))
+            }
+            t if t == PARAMETERS_CHANNEL.topic => {
+                let found = setting::parameters_of(data, session_id).filter(|p| check::parameters(p).is_ok());
+                Piece::Parameters(Box::new(found.ok_or_else(damaged)?))
+            }
+            t if t == TISSUE.topic => {
+                self.header = Some(tissue_of(data).ok_or_else(damaged)?);
+                return Ok(());
+            }
+            t if t == GLAND.topic => {
+                self.surface_m = gland_of(data).ok_or_else(damaged)?;
+                return Ok(());
+            }
+            t if t == FIELD.topic => {
+                let (scene_generation, displacements_m) = scene::field_of(data).ok_or_else(damaged)?;
+                let header = self.header.take().ok_or_else(damaged)?;
+                let header = SnapshotHeader {
+                    scene_generation,
+                    ..header
+                };
+                let surface_m = std::mem::take(&mut self.surface_m);
+                let snapshot = Snapshot::of_parts(header, surface_m, displacements_m);
+                Piece::Snapshot(Box::new(snapshot.ok_or_else(damaged)?))
+            }
+            _ => return Ok(()),
+        };
+        self.pieces.push((time_ns, piece));
+        Ok(())
+    }
+
+    fn end(mut self, cut_off: Option<String>) -> Result<Played, String> {
+        let Some(session) = self.session.filter(|_| self.has_scene) else {
+            return Err(cut_off.unwrap_or_else(|| {
+                "it holds no scene: an earlier version recorded it; record it again to look at it".to_owned()
+            }));
+        };
+        // The thread that takes what arrives has states and snapshots a moment later than ticks.
+        self.pieces.sort_by_key(|(time_ns, _)| *time_ns);
+        let first_ns = self.pieces.iter().find(|(_, piece)| matches!(piece, Piece::Tick(_)));
+        let first_ns = first_ns.map_or(0, |(time_ns, _)| *time_ns);
+        for (time_ns, _) in &mut self.pieces {
+            *time_ns = time_ns.saturating_sub(first_ns);
+        }
+        Ok(Played {
+            session,
+            pieces: self.pieces,
+            cut_off,
+        })
+    }
+}

@@ -1,0 +1,142 @@
+//! A recording in the window, in place of a core: everything is as it was, and nothing can be moved.
+
+use super::{App, refusal};
+use crate::action::WatchAction;
+use crate::planner::Planner;
+use crate::shown::{Note, Watched};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use stylet_base::job::{Job, JobUpdate};
+use stylet_host::link::{Link, Played};
+use stylet_host::record;
+
+/// One needle through the gland of `paper`, recorded by `make example`.
+pub(super) const EXAMPLE: &[u8] = include_bytes!("../../example/insertion.mcap");
+
+type Read = Job<Result<Played, String>>;
+
+/// The recording that is read or shown.
+#[derive(Default)]
+pub(super) struct Recording {
+    reading: Option<(String, Read)>,
+    name: String,
+    /// That of the core, for when the recording is closed.
+    planner: Option<Planner>,
+}
+
+impl Recording {
+    /// One that is read as soon as the window opens.
+    pub(super) fn beginning_with(file: Option<PathBuf>) -> Self {
+        let mut recording = Self::default();
+        if let Some(path) = file {
+            recording.read(&path);
+        }
+        recording
+    }
+
+    fn read(&mut self, path: &Path) {
+        let name = path
+            .file_name()
+            .map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        let path = path.to_owned();
+        let job = Job::begin("recording", move |answer, interrupt| {
+            // The window may be closed by now; then nobody reads the answer. So below.
+            let _ = answer.send(record::played(&path, interrupt).map_err(|why| why.to_string()));
+        });
+        self.reading = Some((name, job));
+    }
+
+    fn read_example(&mut self) {
+        let job = Job::begin("example", |answer, interrupt| {
+            let _ = answer.send(record::played_of(EXAMPLE, interrupt));
+        });
+        self.reading = Some(("Example".to_owned(), job));
+    }
+}
+
+impl App {
+    /// Whether a recording is shown in place of a core.
+    pub(super) fn watches(&self) -> bool {
+        self.link.playback().is_some()
+    }
+
+    pub(super) fn act_on_recording(&mut self, action: WatchAction) {
+        match action {
+            WatchAction::Example | WatchAction::File(_) if self.run.is_some() => {
+                self.shown.note = Some(refusal("Stop the needles first, then look at a recording.".to_owned()));
+            }
+            // Its keys would not reach the core any more.
+            WatchAction::Example | WatchAction::File(_) if self.shown.is_engaged() && !self.watches() => {
+                let why = "Turn the force off first (key D), then look at a recording.";
+                self.shown.note = Some(refusal(why.to_owned()));
+            }
+            WatchAction::Example => self.recording.read_example(),
+            WatchAction::File(path) => self.recording.read(&path),
+            WatchAction::Hold(held) => self.link.playback().into_iter().for_each(|p| p.hold(held)),
+            WatchAction::Again => self.link.playback().into_iter().for_each(|p| p.again()),
+            WatchAction::Close => self.close_recording(),
+        }
+    }
+
+    /// What is shown of the recording, once it is read.
+    pub(super) fn take_recording(&mut self) {
+        let Some((name, job)) = &self.recording.reading else {
+            return self.show_recording();
+        };
+        let (name, read) = match job.poll() {
+            JobUpdate::Pending => return self.show_recording(),
+            JobUpdate::Message(read) => (name.clone(), read),
+            JobUpdate::Ended => (
+                name.clone(),
+                Err("the reader ended before the file was read".to_owned()),
+            ),
+        };
+        self.recording.reading = None;
+        match read {
+            Ok(played) => self.open_recording(name, played),
+            Err(why) => self.shown.note = Some(refusal(format!("{name}: {why}"))),
+        }
+        self.show_recording();
+    }
+
+    fn open_recording(&mut self, name: String, played: Played) {
+        self.shown.note = played.cut_off.as_ref().map(|why| Note {
+            refused: false,
+            text: format!("{name} is shown up to here: {why}"),
+        });
+        self.change_link(|instance| Link::playing(instance, Arc::new(played)));
+        self.recording.name = name;
+        let planner = std::mem::take(&mut self.planner);
+        self.recording.planner.get_or_insert(planner);
+    }
+
+    fn close_recording(&mut self) {
+        if !self.watches() {
+            return;
+        }
+        self.change_link(Link::new);
+        if let Some(planner) = self.recording.planner.take() {
+            self.planner = planner;
+        }
+    }
+
+    /// Nothing of one core, or of one recording, is taken for that of another.
+    fn change_link(&mut self, make: impl FnOnce(stylet_shm_schema::service::Instance) -> Link) {
+        self.link = make(self.link.instance().clone());
+        self.waiting.clear();
+        self.parameters.forget();
+        self.drive = Default::default();
+        (self.shown.run_step, self.shown.run_needle) = (None, None);
+    }
+
+    fn show_recording(&mut self) {
+        self.shown.reads_recording = self.recording.reading.is_some();
+        self.shown.watched = self.link.playback().map(|playback| Watched {
+            name: self.recording.name.clone(),
+            at_s: playback.at_s(),
+            length_s: playback.length_s(),
+            is_held: playback.is_held(),
+            has_ended: playback.has_ended(),
+        });
+    }
+}
