@@ -4,7 +4,7 @@ SHELL := /bin/bash
 CARGO ?= cargo
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: help run test build package package-test picture example report fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: help run test build package package-test picture example report causes fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -36,6 +36,10 @@ example: build ## Record the example session of the window again
 
 report: ## Measure speed against error of every tissue model; writes benches/runs/<date>-<host> (some minutes)
 	$(CARGO) run --release -p stylet-benches --bin report
+
+causes: ## Inject ten causes of late ticks into measurements, and see which of them the trace names (as root, about a minute)
+	$(CARGO) build --release --workspace --bin rt-core
+	$(CARGO) test --release -p stylet-tests-lab -- eight_of_ten --ignored --nocapture --test-threads=1
 
 fuzz: ## Fuzz each file reader for FUZZ_SECONDS (600) seconds
 	docs/tools/fuzz

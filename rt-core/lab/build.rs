@@ -1,7 +1,7 @@
-//! Puts into the program what a filed report must name: commit, and every dependency with its version.
+//! Puts into the program what a filed report must name: commit, and every dependency with its version and licence.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 fn main() {
@@ -9,8 +9,13 @@ fn main() {
     println!("cargo:rustc-env=STYLET_COMMIT={}", commit());
     println!("cargo:rustc-env=STYLET_TOOLCHAIN={}", toolchain());
     let out = std::env::var("OUT_DIR").expect("cargo sets OUT_DIR");
-    let list = dependencies(Path::new("../../Cargo.lock")).unwrap_or_default();
-    std::fs::write(Path::new(&out).join("dependencies.txt"), list).expect("OUT_DIR can be written");
+    let needs = locked(Path::new("../../Cargo.lock")).unwrap_or_default();
+    for (file, list) in [
+        ("dependencies.txt", dependencies(&needs)),
+        ("packages.txt", packages(&needs)),
+    ] {
+        std::fs::write(Path::new(&out).join(file), list).expect("OUT_DIR can be written");
+    }
 }
 
 /// From the environment, else from git, else `unknown`: a source archive has neither.
@@ -49,11 +54,16 @@ fn git(arguments: &[&str]) -> Option<String> {
     output.status.success().then(|| text.trim().to_owned())
 }
 
-/// `name version` of each package that `rt-core` needs, one a line, as locked.
-fn dependencies(lock: &Path) -> Option<String> {
+/// Name and version of a package.
+type Package = (String, String);
+/// The packages that each one names, as `name` or `name version`.
+type Needs = BTreeMap<Package, Vec<String>>;
+
+/// All packages as locked.
+fn locked(lock: &Path) -> Option<Needs> {
     println!("cargo:rerun-if-changed={}", lock.display());
     let lock: toml::Table = std::fs::read_to_string(lock).ok()?.parse().ok()?;
-    let mut needs: BTreeMap<(String, String), Vec<String>> = BTreeMap::new();
+    let mut needs = Needs::new();
     for package in lock.get("package")?.as_array()? {
         let text = |key: &str| package.get(key).and_then(|v| v.as_str()).map(str::to_owned);
         let listed = package.get("dependencies").and_then(|d| d.as_array());
@@ -63,24 +73,68 @@ fn dependencies(lock: &Path) -> Option<String> {
             .filter_map(|d| d.as_str().map(str::to_owned));
         needs.insert((text("name")?, text("version")?), listed.collect());
     }
+    Some(needs)
+}
+
+/// What `program` needs, without itself.
+fn needed(needs: &Needs, program: &str) -> BTreeSet<Package> {
     let mut found = BTreeSet::new();
-    let mut open = vec!["rt-core".to_owned()];
+    let mut open = vec![program.to_owned()];
     while let Some(wanted) = open.pop() {
         // "name", or "name version" where several are locked.
         let mut words = wanted.split(' ');
         let (name, version) = (words.next(), words.next());
-        for (package, more) in &needs {
+        for (package, more) in needs {
             let same = Some(package.0.as_str()) == name && version.is_none_or(|v| v == package.1);
             if same && found.insert(package.clone()) {
                 open.extend(more.iter().cloned());
             }
         }
     }
-    found.retain(|(name, _)| name != "rt-core");
-    Some(
-        found
-            .iter()
-            .map(|(name, version)| format!("{name} {version}\n"))
-            .collect(),
-    )
+    found.retain(|(name, _)| name != program);
+    found
+}
+
+/// `name version` of each package that `rt-core` needs, one a line.
+fn dependencies(needs: &Needs) -> String {
+    let all = needed(needs, "rt-core");
+    all.iter()
+        .map(|(name, version)| format!("{name} {version}\n"))
+        .collect()
+}
+
+/// `name version programs licence` of each package of others in either program, one a line.
+fn packages(needs: &Needs) -> String {
+    let (core, host) = (needed(needs, "rt-core"), needed(needs, "host-ui"));
+    let ours = |name: &str| name.starts_with("stylet-") || name == "rt-core" || name == "host-ui";
+    let sources = sources();
+    let line = |package: &Package| {
+        let of = match (core.contains(package), host.contains(package)) {
+            (true, true) => "both",
+            (true, false) => "rt-core",
+            _ => "host-ui",
+        };
+        let licence = licence(&sources, package).unwrap_or_else(|| "not known".to_owned());
+        format!("{} {} {of} {licence}\n", package.0, package.1)
+    };
+    core.union(&host).filter(|(name, _)| !ours(name)).map(line).collect()
+}
+
+/// Folders in which cargo keeps the sources of registries.
+fn sources() -> Vec<PathBuf> {
+    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| Some(PathBuf::from(std::env::var_os("HOME")?).join(".cargo")));
+    let registries = home.and_then(|h| std::fs::read_dir(h.join("registry/src")).ok());
+    registries.into_iter().flatten().flatten().map(|e| e.path()).collect()
+}
+
+/// `package.license` of the manifest in the sources.
+fn licence(sources: &[PathBuf], (name, version): &Package) -> Option<String> {
+    let manifest = |source: &PathBuf| std::fs::read_to_string(source.join(format!("{name}-{version}/Cargo.toml"))).ok();
+    let text = sources.iter().find_map(manifest)?;
+    // A line of it: parsing hundreds of manifests whole would cost the build more than it is worth.
+    let line = text
+        .lines()
+        .find_map(|l| l.strip_prefix("license = \"")?.strip_suffix('"'));
+    line.map(|l| l.replace(" / ", "/").replace('/', " OR "))
 }

@@ -5,6 +5,9 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use stylet_lab::args::LatencyArgs;
+use stylet_lab::campaign::CampaignArgs;
+use stylet_lab::credibility::CredibilityArgs;
+use stylet_lab::doctor::DoctorArgs;
 use stylet_lab::fleet::FleetArgs;
 use stylet_lab::load::LoadProcess;
 use stylet_lab::verify::VerifyArgs;
@@ -35,19 +38,16 @@ pub struct Cli {
 pub enum Task {
     /// Measure how late the loops are on this machine, and write a report with a verdict
     Latency(Box<LatencyArgs>),
+    /// Measure for hours or nights, load after load, and continue after whatever ended it; one report over all of it
+    Campaign(Box<CampaignArgs>),
     /// Verify that a saved latency report is unaltered, who signed it, and which programs it is of
     Verify(VerifyArgs),
     /// Compare the latency reports of many PCs: who passes, how each changed and what changed with it; a page and a CSV table
     Fleet(FleetArgs),
-    /// Check whether this PC is fit for the force loop, and what to change
-    Doctor {
-        /// As JSON
-        #[arg(long)]
-        json: bool,
-        /// Core of the force loop [default: the last one]
-        #[arg(long, value_name = "N")]
-        haptic_core: Option<usize>,
-    },
+    /// Write the file that an auditor asks for: purpose, hazards, requirements with their tests and runs, packages and licences
+    Credibility(CredibilityArgs),
+    /// Check whether this PC is fit for the force loop, and what to change; change it, measured before and after; undo it
+    Doctor(DoctorArgs),
     /// Show a flight recording, repeat it, and check that all forces and positions are bit-identical
     Replay(Replay),
     /// Run thousands of insertions over scenes, plans, hands and tissues, in shards that make Parquet files
@@ -61,6 +61,12 @@ pub enum Task {
     },
     /// Write the man pages and shell completions of this program
     Manual(ManualArgs),
+    /// Remove the trace instance NAME once the input ends; started by `latency --trace`
+    #[command(hide = true)]
+    TraceKeeper {
+        /// Instance of tracefs
+        name: String,
+    },
     /// One process of a load; started by `latency`
     #[command(hide = true)]
     Load {

@@ -7,7 +7,7 @@ use std::error::Error;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stylet_lab::{doctor, fleet, latency, load, verify};
+use stylet_lab::{campaign, credibility, doctor, fleet, latency, load, verify};
 use stylet_shm_schema::service::Instance;
 use stylet_sim::scene::Scene;
 
@@ -27,14 +27,17 @@ fn carry_out(cli: &Cli) -> Result<u8, Box<dyn Error>> {
     Ok(match &cli.task {
         None => run(&cli.run).map(|()| 0)?,
         Some(Task::Latency(args)) => latency::run(args, &*stop_on_signal()?)?,
+        Some(Task::Campaign(args)) => campaign::run(args, &*stop_on_signal()?)?,
         Some(Task::Verify(args)) => verify::run(args)?,
         Some(Task::Fleet(args)) => fleet::run(args)?,
-        Some(Task::Doctor { json, haptic_core }) => doctor::run(*json, *haptic_core),
+        Some(Task::Credibility(args)) => credibility::run(args)?,
+        Some(Task::Doctor(args)) => doctor::run(args, &*stop_on_signal()?)?,
         Some(Task::Replay(replay)) => u8::from(!replay.run()?),
         #[cfg(feature = "study")]
         Some(Task::Study(args)) => args.run(&*stop_on_signal()?)?,
         Some(Task::Manual(args)) => args.run(Cli::command()).map(|()| 0)?,
         Some(Task::Cost { scene }) => cost(scene).map(|()| 0)?,
+        Some(Task::TraceKeeper { name }) => stylet_lab::keep_trace_instance(name).map(|()| 0)?,
         Some(Task::Load { work, instance, file }) => serve_as_load(*work, instance, file).map(|()| 0)?,
     })
 }

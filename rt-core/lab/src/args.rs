@@ -4,11 +4,13 @@ use crate::compare::Against;
 use crate::load::Load;
 use crate::machine::{Machine, Throttle};
 use crate::measure;
+use crate::spin::Spin;
 use crate::whose::WhoseArgs;
 use clap::Args;
 use std::path::PathBuf;
 use stylet_runtime::args::{OptionsError, RealTimeArgs};
 use stylet_runtime::process::Options;
+use stylet_runtime::rt::pin::Pin;
 
 /// A measurement.
 #[derive(Args, Debug)]
@@ -22,15 +24,35 @@ pub struct LatencyArgs {
     /// Rate of the force loop, Hz
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(500..=10_000), value_name = "HZ")]
     pub rate: u32,
-    /// Spin for the last N microseconds before each deadline
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    pub spin_us: u64,
+    /// Spin for the last N microseconds before each deadline; auto finds the smallest with which p50 and p99 are half of cyclictest's
+    #[arg(long, default_value = "0", value_name = "N")]
+    pub(crate) spin_us: Spin,
     /// Then measure again, alternating with something else
     #[arg(long, value_enum, num_args = 0..=1, default_missing_value = "cyclictest", value_name = "WITH")]
     pub compare: Option<Against>,
-    /// Rounds of the comparison; each measures both sides once
-    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100), value_name = "N")]
+    /// Name the cause of each late tick from a trace of the kernel, and measure what tracing costs; needs root
+    ///
+    /// The trace runs in an instance of its own in tracefs, in a buffer of 256 KiB for each core. After a late tick it is frozen
+    /// and read. Tracing makes the loop a little slower: unless --compare asks for something else, the loops are then measured
+    /// again, with and without the trace by turns.
+    #[arg(long)]
+    pub trace: bool,
+    /// With --trace, a tick is late from N microseconds on, wake-up and own work together [default: a fifth of the period]
+    #[arg(long, value_name = "N", requires = "trace", value_parser = clap::value_parser!(u64).range(1..))]
+    pub trace_over_us: Option<u64>,
+    /// Rounds of the comparison; each measures both sides once, 0 measures none
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(0..=100), value_name = "N")]
     pub rounds: u32,
+    /// Let the force loop toggle a pin for an instrument: serial:0x3F8:rts, serial:0x3F8:dtr or parallel:0x378; needs root
+    ///
+    /// One instruction writes the register, at irregular times of 20 to 83 ticks, and the loop notes when: DIR/toggles.csv. The
+    /// addresses of the ports are in /proc/ioports. Record the pin with a logic analyser, or with a sound card through a
+    /// divider; record beside it what answers to it, then give the capture to --external.
+    #[arg(long, value_name = "PORT")]
+    pub toggle: Option<Pin>,
+    /// Measure nothing: compare a capture of the pin (sigrok CSV or VCD, WAV) with the record of --toggle in DIR
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["toggle", "trace", "compare"])]
+    pub external: Option<PathBuf>,
     /// Limits in a TOML file, one `name = value` a line
     #[arg(long, value_name = "FILE")]
     pub limits: Option<PathBuf>,
@@ -72,11 +94,14 @@ impl LatencyArgs {
         let instance = format!("lab-{}", std::process::id());
         let mut options = self.real_time.options(&instance)?;
         options.haptic_period_ns = measure::period_ns(self.rate);
-        options.spin_ns = self.spin_us * 1_000;
-        let longest_us = longest_spin_ns(options.haptic_period_ns, Machine::this().throttle()) / 1_000;
-        if self.spin_us > longest_us {
+        let Spin::Fixed(spin_us) = self.spin_us else {
+            return Ok(options);
+        };
+        options.spin_ns = spin_us * 1_000;
+        let longest_us = self.longest_spin_us();
+        if spin_us > longest_us {
             return Err(ArgsError::Spin {
-                given_us: self.spin_us,
+                given_us: spin_us,
                 rate_hz: self.rate,
                 longest_us,
             });
@@ -85,11 +110,35 @@ impl LatencyArgs {
     }
 }
 
+/// A tick is late when it has used up so much of its period before its end.
+const LATE_SHARE: u64 = 5;
+
+impl LatencyArgs {
+    /// From when on the trace names the cause of a late tick; `None` without a trace.
+    pub fn trace_over_ns(&self) -> Option<u64> {
+        let default_ns = measure::period_ns(self.rate) / LATE_SHARE;
+        self.trace
+            .then(|| self.trace_over_us.map_or(default_ns, |us| us * 1_000))
+    }
+
+    /// The longest spin that the kernel's share for real-time threads permits.
+    pub fn longest_spin_us(&self) -> u64 {
+        longest_spin_ns(measure::period_ns(self.rate), Machine::this().throttle()) / 1_000
+    }
+
+    /// What the loops are compared with: with a trace, the loops without it.
+    pub fn against(&self) -> Option<Against> {
+        self.compare
+            .or(self.trace.then_some(Against::Untraced))
+            .filter(|_| self.rounds > 0)
+    }
+}
+
 /// What the loop itself and all else of real-time priority on its core may need besides spinning.
 const SHARE_KEPT_FREE: f64 = 0.15;
 
 /// The longest spin that leaves the core below the kernel's share for real-time threads.
-fn longest_spin_ns(period_ns: u64, throttle: Option<Throttle>) -> u64 {
+pub(crate) fn longest_spin_ns(period_ns: u64, throttle: Option<Throttle>) -> u64 {
     let share = match throttle {
         Some(Throttle::Share(share)) => share,
         Some(Throttle::Off) | None => 0.95,
@@ -97,13 +146,18 @@ fn longest_spin_ns(period_ns: u64, throttle: Option<Throttle>) -> u64 {
     ((share - SHARE_KEPT_FREE).max(0.0) * period_ns as f64).round() as u64
 }
 
-fn duration_ns(text: &str) -> Result<u64, String> {
-    let duration: jiff::SignedDuration = text.parse().map_err(|e: jiff::Error| e.to_string())?;
+/// A length of time that is none.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct DurationError(String);
+
+pub(crate) fn duration_ns(text: &str) -> Result<u64, DurationError> {
+    let duration: jiff::SignedDuration = text.parse().map_err(|e: jiff::Error| DurationError(e.to_string()))?;
     let ns = u64::try_from(duration.as_nanos()).unwrap_or(0);
     if (1_000_000_000..=172_800_000_000_000).contains(&ns) {
         Ok(ns)
     } else {
-        Err("between 1s and 48h".to_owned())
+        Err(DurationError("between 1s and 48h".to_owned()))
     }
 }
 
@@ -121,8 +175,8 @@ mod tests {
 
     #[test]
     fn durations_are_read_with_their_unit() {
-        assert_eq!(duration_ns("90s"), Ok(90_000_000_000));
-        assert_eq!(duration_ns("1h"), Ok(3_600_000_000_000));
+        assert_eq!(duration_ns("90s").ok(), Some(90_000_000_000));
+        assert_eq!(duration_ns("1h").ok(), Some(3_600_000_000_000));
         assert!(duration_ns("5").is_err() && duration_ns("10ms").is_err() && duration_ns("-5s").is_err());
     }
 }

@@ -2,7 +2,8 @@
 
 use crate::sample::{Sample, histogram};
 use hdrhistogram::Histogram;
-use std::time::Duration;
+use std::sync::mpsc::Sender;
+use std::time::{Duration, Instant};
 use stylet_runtime::rt::timing::{MAX_STAGES, TickTimes};
 
 /// Latest wake-ups that are kept one by one.
@@ -39,6 +40,14 @@ pub struct LateTick {
     pub work_ns: u64,
 }
 
+/// A toggle: when its tick was due, and our clock before and after the pin was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ToggleTime {
+    pub due_ns: u64,
+    pub before_ns: u64,
+    pub after_ns: u64,
+}
+
 /// Everything measured of one loop.
 pub struct LoopTiming {
     /// Names of the stages, in the order of the tick.
@@ -69,6 +78,10 @@ pub struct LoopTiming {
     pub unslept: u64,
     /// Ticks that did not fit into the ring.
     pub lost: u64,
+    /// When the loop toggled its pin, warm-up included.
+    pub toggles: Vec<ToggleTime>,
+    /// Where ticks that are late by so many nanoseconds are reported, wake-up and work together.
+    late: Option<(u64, Sender<LateTick>)>,
     plan: Plan,
     seen: u64,
     last_woke_ns: u64,
@@ -95,21 +108,45 @@ impl LoopTiming {
             overruns: 0,
             unslept: 0,
             lost: 0,
+            toggles: Vec::new(),
+            late: None,
             plan,
             seen: 0,
             last_woke_ns: 0,
         }
     }
 
+    /// Reports each tick that is late by `over_ns` to `late`, until gathering ends.
+    pub fn report_late(&mut self, over_ns: u64, late: Sender<LateTick>) {
+        self.late = Some((over_ns, late));
+    }
+
     /// Gathers until the loop has ended and the ring is empty.
-    pub fn gather(mut self, mut ring: rtrb::Consumer<TickTimes>) -> Self {
+    pub fn gather(self, ring: rtrb::Consumer<TickTimes>) -> Self {
+        self.gather_with(ring, Duration::MAX, |_| {})
+    }
+
+    /// The same; `checkpoint` sees what was gathered so far, as often as `every`, and at the end.
+    pub fn gather_with(
+        mut self,
+        mut ring: rtrb::Consumer<TickTimes>,
+        every: Duration,
+        checkpoint: impl Fn(&Self),
+    ) -> Self {
+        let mut begin = Instant::now();
         loop {
             let last = ring.is_abandoned();
             while let Ok(tick) = ring.pop() {
                 self.take(&tick);
             }
             if last {
+                self.late = None;
+                checkpoint(&self);
                 return self;
+            }
+            if begin.elapsed() >= every {
+                checkpoint(&self);
+                begin = Instant::now();
             }
             std::thread::sleep(PAUSE);
         }
@@ -127,6 +164,13 @@ impl LoopTiming {
         self.seen += 1;
         self.lost = u64::from(tick.lost);
         self.unslept += u64::from(!tick.slept);
+        if let Some([before_ns, after_ns]) = tick.toggled_ns {
+            self.toggles.push(ToggleTime {
+                due_ns: tick.due_ns,
+                before_ns,
+                after_ns,
+            });
+        }
         if self.seen > self.plan.warm_up_ticks {
             self.record(tick);
         }
@@ -164,11 +208,18 @@ impl LoopTiming {
         let place = due_ns.saturating_sub(self.first_due_ns) / self.plan.period_ns;
         self.sample.take(place, wake_ns);
         self.note_window(due_ns, wake_ns, work_ns, tick.missed);
-        self.note_worst(LateTick {
+        let tick = LateTick {
             due_ns,
             wake_ns,
             work_ns,
-        });
+        };
+        if let Some((over_ns, late)) = &self.late
+            && wake_ns + work_ns >= *over_ns
+        {
+            // Nobody may listen any more.
+            let _ = late.send(tick);
+        }
+        self.note_worst(tick);
     }
 
     fn note_window(&mut self, due_ns: u64, wake_ns: u64, work_ns: u64, missed: u32) {
@@ -262,6 +313,19 @@ mod tests {
         assert_eq!(timing.windows[0].worst_wake_ns, 11);
         assert_eq!(timing.windows[1].missed, 1);
         assert_eq!(timing.windows.iter().map(|w| w.ticks).sum::<u32>(), 40);
+    }
+
+    #[test]
+    fn ticks_that_are_late_by_wake_up_and_work_together_are_reported() {
+        let mut timing = timing();
+        let (late, reported) = std::sync::mpsc::channel();
+        timing.report_late(1_000, late);
+        for (i, wake_ns) in [5_000, 5_000, 699, 700, 10, 2_000].into_iter().enumerate() {
+            timing.take(&tick(10_000 * i as u64, wake_ns, 0));
+        }
+        // Each works for 300 ns; the first two are the warm-up.
+        let wakes: Vec<u64> = reported.try_iter().map(|t| t.wake_ns).collect();
+        assert_eq!(wakes, [700, 2_000]);
     }
 
     #[test]

@@ -1,7 +1,10 @@
 //! Our wake-up latency, alternating with another one: that of `cyclictest` on the same core with the same priority and interval, or our own without
 //! the load.
 
+mod timerlat;
+
 use crate::load::{Load, LoadError, Running};
+use crate::machine::Machine;
 use crate::measure::{MeasureError, Measured, Setup, measure};
 use crate::sample::histogram;
 use crate::summary::quantile_us;
@@ -17,6 +20,8 @@ use stylet_runtime::process::Options;
 
 /// Each turn brings p99.9 with ten samples beyond it at 1 kHz.
 const SHORTEST_TURN_NS: u64 = 11_000_000_000;
+/// A turn with or without the trace: p99 with ten samples beyond it at 1 kHz.
+const SHORTEST_TRACED_TURN_NS: u64 = 2_000_000_000;
 /// Bins of 1 ns; what is later than a millisecond is known by its number and its maximum alone.
 const BINS: u64 = 1_000_000;
 const COMPARED: [(&str, f64); 4] = [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999), ("max", 1.0)];
@@ -27,15 +32,21 @@ const COMPARED: [(&str, f64); 4] = [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999
 pub enum Against {
     /// `cyclictest` (Debian package rt-tests) under the same load: same core, priority and interval
     Cyclictest,
+    /// `rtla timerlat` (Debian package rtla), where the kernel has the tracer: same core, priority and period
+    Timerlat,
     /// The same loops without the load
     Unloaded,
+    /// The same loops without the trace of --trace
+    Untraced,
 }
 
 impl Against {
     pub fn name(self) -> &'static str {
         match self {
             Self::Cyclictest => "cyclictest",
+            Self::Timerlat => "timerlat",
             Self::Unloaded => "without the load",
+            Self::Untraced => "without the trace",
         }
     }
 }
@@ -76,32 +87,55 @@ pub enum CompareError {
     /// Our side.
     #[error(transparent)]
     Measure(#[from] MeasureError),
-    /// The load beside cyclictest.
+    /// The load beside the other side.
     #[error(transparent)]
     Load(#[from] LoadError),
     /// The other side.
     #[error(transparent)]
-    Cyclictest(#[from] CyclictestError),
+    Tool(#[from] ToolError),
     /// Histograms of different bins; a fault of the program.
     #[error("histograms: {0}")]
     Histograms(String),
 }
 
-/// Why `cyclictest` has no histogram.
+/// Why a program that measures the same has no histogram.
 #[derive(Debug, thiserror::Error)]
-pub enum CyclictestError {
+pub enum ToolError {
+    /// It is not there.
+    #[error("{program} is not installed: sudo apt-get install {package}")]
+    Missing {
+        /// The program.
+        program: &'static str,
+        /// Its Debian package.
+        package: &'static str,
+    },
     /// It does not start.
-    #[error("cyclictest does not start: {0}")]
-    Start(io::Error),
-    /// It cannot be waited for.
-    #[error("cyclictest: {0}")]
-    Wait(io::Error),
-    /// It failed; first line of what it printed.
-    #[error("cyclictest failed: {0}")]
-    Failed(String),
+    #[error("{program} does not start: {why}")]
+    Start {
+        /// The program.
+        program: &'static str,
+        /// What the system reports.
+        why: io::Error,
+    },
+    /// It cannot be waited for, or its file cannot be made.
+    #[error("{program}: {why}")]
+    Wait {
+        /// The program.
+        program: &'static str,
+        /// What the system reports.
+        why: io::Error,
+    },
+    /// It failed.
+    #[error("{program} failed: {said}")]
+    Failed {
+        /// The program.
+        program: &'static str,
+        /// First line of what it printed.
+        said: String,
+    },
     /// It ended well, and its file holds none.
-    #[error("cyclictest wrote no histogram")]
-    NoHistogram,
+    #[error("{0} wrote no histogram")]
+    NoHistogram(&'static str),
     /// A signal asked this program to end.
     #[error("interrupted")]
     Interrupted,
@@ -114,16 +148,27 @@ pub fn compare(
     rounds: u32,
     interrupted: &AtomicBool,
 ) -> Result<Comparison, CompareError> {
-    let turn_ns = (setup.duration_ns / u64::from(rounds)).max(SHORTEST_TURN_NS);
+    let turn_ns = match against {
+        Against::Untraced => (setup.duration_ns / 4 / u64::from(rounds)).max(SHORTEST_TRACED_TURN_NS),
+        _ => (setup.duration_ns / u64::from(rounds)).max(SHORTEST_TURN_NS),
+    };
     let tool = match against {
         Against::Cyclictest => version(),
-        Against::Unloaded => Some(String::new()),
+        Against::Timerlat => timerlat::version(),
+        Against::Unloaded | Against::Untraced => Some(String::new()),
     };
     let mut comparison = Comparison {
         against,
         absent: match (against, &tool, setup.load) {
-            (_, None, _) => Some("cyclictest is not installed: sudo apt-get install rt-tests".to_owned()),
-            (Against::Cyclictest, _, Load::Window) => {
+            (Against::Timerlat, _, _) if timerlat::missing(&Machine::this()).is_some() => {
+                timerlat::missing(&Machine::this()).map(str::to_owned)
+            }
+            (Against::Timerlat, None, _) => Some(missing(timerlat::PROGRAM, "rtla").to_string()),
+            (Against::Untraced, _, _) if setup.trace_over_ns.is_none() => {
+                Some("there is no trace to compare with; give --trace".to_owned())
+            }
+            (_, None, _) => Some(missing(CYCLICTEST, "rt-tests").to_string()),
+            (Against::Cyclictest | Against::Timerlat, _, Load::Window) => {
                 Some("the window draws nothing without our loops; give --compare unloaded".to_owned())
             }
             (Against::Unloaded, _, Load::None) => Some("there is no load to compare with; give --load".to_owned()),
@@ -142,6 +187,10 @@ pub fn compare(
     }
     let setup = Setup {
         duration_ns: turn_ns,
+        // Only the cost of the trace is measured with the trace.
+        trace_over_ns: setup.trace_over_ns.filter(|_| against == Against::Untraced),
+        checkpoints: None,
+        toggle: None,
         ..*setup
     };
     for _ in 0..rounds {
@@ -149,7 +198,9 @@ pub fn compare(
         let ours = &measured.haptic.wake;
         let others = match against {
             Against::Cyclictest => cyclictest(&setup, interrupted),
-            Against::Unloaded => unloaded(&setup, interrupted),
+            Against::Timerlat => timerlat::turn(&setup, interrupted),
+            Against::Unloaded => without(&setup, Load::None, interrupted),
+            Against::Untraced => without(&setup, setup.load, interrupted),
         };
         let others = match others {
             Ok(others) => others,
@@ -170,9 +221,11 @@ pub fn compare(
     Ok(comparison)
 }
 
-fn unloaded(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, CompareError> {
+/// Our loops under `load`, without a trace.
+fn without(setup: &Setup, load: Load, interrupted: &AtomicBool) -> Result<Histogram<u64>, CompareError> {
     let setup = Setup {
-        load: Load::None,
+        load,
+        trace_over_ns: None,
         ..*setup
     };
     Ok(measure(&setup, interrupted)?.haptic.wake)
@@ -219,23 +272,38 @@ fn version() -> Option<String> {
         .map(|l| l.trim().to_owned())
 }
 
+const CYCLICTEST: &str = "cyclictest";
+
+fn missing(program: &'static str, package: &'static str) -> ToolError {
+    ToolError::Missing { program, package }
+}
+
+/// One turn of cyclictest.
+pub fn cyclictest_turn(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, CompareError> {
+    version().ok_or(missing(CYCLICTEST, "rt-tests"))?;
+    cyclictest(setup, interrupted)
+}
+
 fn cyclictest(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, CompareError> {
     let load = Running::start(setup.load, &setup.options.instance, setup.folder)?;
     let file = setup.folder.join("cyclictest.tmp");
-    let mut child = Command::new("cyclictest")
+    let mut child = Command::new(CYCLICTEST)
         .args(arguments(setup.options, setup.duration_ns, &file))
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
-        .map_err(CyclictestError::Start)?;
-    let ended = wait(&mut child, interrupted);
+        .map_err(|why| ToolError::Start {
+            program: CYCLICTEST,
+            why,
+        })?;
+    let ended = wait(CYCLICTEST, &mut child, interrupted);
     drop(load);
     // The ui load was in shared memory, and there was no core to clean up after it.
     setup.options.instance.sweep();
     let text = std::fs::read_to_string(&file).unwrap_or_default();
     let _ = std::fs::remove_file(&file);
     ended?;
-    Ok(read(&text).ok_or(CyclictestError::NoHistogram)?)
+    Ok(read(&text).ok_or(ToolError::NoHistogram(CYCLICTEST))?)
 }
 
 fn arguments(options: &Options, duration_ns: u64, file: &Path) -> Vec<String> {
@@ -254,7 +322,7 @@ fn arguments(options: &Options, duration_ns: u64, file: &Path) -> Vec<String> {
     arguments
 }
 
-fn wait(child: &mut Child, interrupted: &AtomicBool) -> Result<(), CyclictestError> {
+fn wait(program: &'static str, child: &mut Child, interrupted: &AtomicBool) -> Result<(), ToolError> {
     loop {
         match child.try_wait() {
             Ok(Some(status)) if status.success() => return Ok(()),
@@ -264,16 +332,16 @@ fn wait(child: &mut Child, interrupted: &AtomicBool) -> Result<(), CyclictestErr
                     let _ = std::io::Read::read_to_string(&mut pipe, &mut said);
                 }
                 let first = said.lines().next().unwrap_or("no reason given").to_owned();
-                return Err(CyclictestError::Failed(first));
+                return Err(ToolError::Failed { program, said: first });
             }
             Ok(None) => {}
-            Err(e) => return Err(CyclictestError::Wait(e)),
+            Err(why) => return Err(ToolError::Wait { program, why }),
         }
         // SYNC: set by a signal handler; nothing but the flag is carried.
         if interrupted.load(Ordering::Acquire) {
             let _ = child.kill();
             let _ = child.wait();
-            return Err(CyclictestError::Interrupted);
+            return Err(ToolError::Interrupted);
         }
         std::thread::sleep(Duration::from_millis(50));
     }

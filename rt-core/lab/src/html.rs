@@ -1,9 +1,10 @@
 //! The report as one page that needs nothing else: light, system fonts, pictures inside.
 
+mod causes;
 mod machine;
 pub mod parts;
 mod steady;
-mod times;
+pub mod times;
 
 use crate::compare::Against;
 use crate::measure::Measured;
@@ -37,9 +38,11 @@ pub fn page(report: &Report, measured: &Measured) -> Result<String, DrawError> {
                     (times::of_loop("Tissue loop", &report.tissue))
                     (times::host(report))
                     (times::comparison(report))
+                    (times::spin(report))
                     (machine::stiffness(report))
                     (machine::counters(report))
                     (times::late(report))
+                    (causes::causes(report))
                     (steady::steady(report))
                     (machine::provenance(report))
                     (machine::method(report))
@@ -197,6 +200,15 @@ fn pictures(r: &Report, m: &Measured) -> Result<Markup, DrawError> {
                 "Wake-up with and without the load, all turns",
                 plots::wake_histogram(turns)?,
             ));
+        }
+        Some((Against::Untraced, turns)) => {
+            figures.push((
+                "Wake-up with and without the trace, all turns",
+                plots::wake_histogram(turns)?,
+            ));
+        }
+        Some((Against::Timerlat, turns)) => {
+            figures.push(("Wake-up beside timerlat, all turns", plots::wake_histogram(turns)?));
         }
         None => {
             let seen = Series {

@@ -2,16 +2,19 @@
 
 use crate::args::{ArgsError, LatencyArgs};
 use crate::compare::{Against, CompareError, compare};
+use crate::external::{self, ExternalError};
 use crate::files::{self, FilesError};
 use crate::machine::Machine;
 use crate::measure::{MeasureError, Setup, measure};
 use crate::report::{self, JSON, PAGE, Parts, Report};
 use crate::sign::{self, SignError};
+use crate::spin::{self, Spin, SpinError};
 use crate::verdict::{self, LimitsError, Outcome};
 use crate::whose::WhoseError;
 use std::io;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
+use stylet_runtime::process::Options;
 
 /// Why there is no report; the text is for people.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +42,15 @@ pub enum LatencyError {
     /// Nothing was compared.
     #[error(transparent)]
     Compare(#[from] CompareError),
+    /// No spin could be looked for.
+    #[error(transparent)]
+    Spin(#[from] SpinError),
+    /// The capture of an instrument.
+    #[error(transparent)]
+    External(#[from] ExternalError),
+    /// The notes of the pin.
+    #[error(transparent)]
+    Toggles(#[from] stylet_write::WriteError),
     /// The report cannot be written.
     #[error(transparent)]
     Files(#[from] FilesError),
@@ -49,19 +61,26 @@ pub enum LatencyError {
 
 /// The exit code is the verdict: 0 pass, 1 fail, 2 not measurable.
 pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyError> {
-    let options = args.options()?;
+    if let Some(file) = &args.external {
+        return Ok(external::run(&args.out, file)?);
+    }
+    let mut options = args.options()?;
     let whose = args.whose.read()?;
     let limits = verdict::limits(options.haptic_period_ns, args.limits.as_deref(), &args.limit)?;
     std::fs::create_dir_all(&args.out).map_err(|why| LatencyError::Folder {
         folder: args.out.clone(),
         why,
     })?;
-    let setup = Setup {
-        options: &options,
-        duration_ns: args.duration,
-        load: args.load,
-        folder: &args.out,
-    };
+    let mut spin_search = None;
+    if args.spin_us == Spin::Auto {
+        eprintln!("rt-core: looking for the smallest spin, trials of three seconds");
+        let setup = setup_of(args, &options);
+        let search = spin::search(&setup, args.longest_spin_us(), interrupted)?;
+        println!("{}", search.words());
+        options.spin_ns = search.used_us * 1_000;
+        spin_search = Some(search);
+    }
+    let setup = setup_of(args, &options);
     eprintln!(
         "rt-core: measuring for {:.0} s at {} Hz on scene '{}'",
         args.duration as f64 / 1e9,
@@ -69,12 +88,18 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
         options.scene
     );
     let measured = measure(&setup, interrupted)?;
-    let comparison = match args.compare {
+    if args.toggle.is_some() {
+        external::keep(&args.out, &measured.haptic.toggles)?;
+    }
+    if let Some(why) = measured.trace.as_ref().and_then(|t| t.absent.as_ref()) {
+        eprintln!("rt-core: no causes: {why}");
+    }
+    let traced = measured.trace.as_ref().is_some_and(|t| t.absent.is_none());
+    let comparison = match args.against().filter(|against| traced || *against != Against::Untraced) {
         Some(against) => {
-            let ours = if against == Against::Unloaded {
-                "with and "
-            } else {
-                "with "
+            let ours = match against {
+                Against::Unloaded | Against::Untraced => "with and ",
+                Against::Cyclictest | Against::Timerlat => "with ",
             };
             eprintln!("rt-core: alternating {ours}{}, {} rounds", against.name(), args.rounds);
             Some(compare(&setup, against, args.rounds, interrupted)?)
@@ -91,6 +116,7 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
         comparison,
         machine: &machine,
         whose: &whose,
+        spin_search,
     });
     // A signature of an earlier report in the same folder is none of this one.
     let json = args.out.join(JSON);
@@ -103,6 +129,18 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
         println!("{}", sign::sign(&json, key)?.display());
     }
     Ok(report.verdict.overall.exit_code())
+}
+
+fn setup_of<'a>(args: &'a LatencyArgs, options: &'a Options) -> Setup<'a> {
+    Setup {
+        options,
+        duration_ns: args.duration,
+        load: args.load,
+        folder: &args.out,
+        trace_over_ns: args.trace_over_ns(),
+        checkpoints: None,
+        toggle: args.toggle,
+    }
 }
 
 /// The verdict on the terminal: one line for each limit, then all of them.
@@ -119,6 +157,12 @@ fn print_verdict(report: &Report) {
             j.unit
         );
     }
+    for outlier in report.trace.iter().flat_map(|t| &t.outliers) {
+        println!(
+            "late at {:.3} s by {:.0} us: {}",
+            outlier.at_s, outlier.wake_us, outlier.cause
+        );
+    }
     if let Some(comparison) = &report.comparison {
         match &comparison.absent {
             Some(why) => println!("comparison: {why}"),
@@ -129,7 +173,9 @@ fn print_verdict(report: &Report) {
                     .collect();
                 let over = match comparison.against {
                     Against::Cyclictest => "ours over cyclictest",
+                    Against::Timerlat => "ours over timerlat",
                     Against::Unloaded => "with the load over without it",
+                    Against::Untraced => "with the trace over without it",
                 };
                 println!(
                     "{over}, median of {} rounds: {}",

@@ -1,16 +1,21 @@
 //! The latency laboratory: runs the real loops under load, and reports with evidence how late they are.
 //!
-//! [`latency`] runs a measurement and writes a report; [`verify`] verifies that a saved report is
-//! unaltered; [`fleet`] compares the reports of many PCs; [`doctor`] checks whether this PC is fit. No report claims conformity with a standard.
+//! [`latency`] runs a measurement and writes a report, [`campaign`] one of hours and nights; [`verify`] verifies that a saved
+//! report is unaltered; [`fleet`] compares the reports of many PCs; [`doctor`] checks whether this PC is fit, and makes it fitter;
+//! [`credibility`] is the file for an auditor.
+//! No report claims conformity with a standard.
 
 #![warn(missing_docs)]
 
 pub mod args;
 mod bound;
+pub mod campaign;
 mod collect;
 mod compare;
 pub mod cost;
+pub mod credibility;
 pub mod doctor;
+mod external;
 mod extreme;
 mod files;
 pub mod fleet;
@@ -28,9 +33,13 @@ mod random;
 mod report;
 mod sample;
 mod sign;
+mod spin;
 mod stationary;
 mod summary;
+mod trace;
 mod verdict;
 pub mod verify;
 mod watch;
 mod whose;
+
+pub use trace::keep as keep_trace_instance;

@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 use iceoryx2::port::subscriber::Subscriber;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io;
 use std::io::{Seek, SeekFrom, Write};
@@ -13,7 +13,7 @@ use stylet_shm_schema::service::{self, Instance, Ipc, ServiceError};
 use stylet_shm_schema::{SnapshotHeader, TickRecord, Vertex};
 
 /// What runs beside the loops.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Load {
     /// Nothing

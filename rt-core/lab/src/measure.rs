@@ -5,13 +5,17 @@ use crate::gaps::{self, GapReport};
 use crate::host::{Host, HostError, HostReport, Script};
 use crate::load::{Load, LoadError, Running};
 use crate::machine::Machine;
+use crate::trace::{self, TraceSection, Watched};
 use crate::watch::{self, CoreWatch};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+use std::time::Duration;
 use stylet_runtime::process::{self, LoopReport, Options, RunError, RunReport};
 use stylet_runtime::rt::clock::{HAPTIC_PERIOD_NS, TISSUE_PERIOD_NS};
 use stylet_runtime::rt::haptic::HAPTIC_STAGES;
+use stylet_runtime::rt::pin::{Pin, PinError};
 use stylet_runtime::rt::timing::{PoseTimes, Probe, Probes};
 use stylet_runtime::rt::tissue::TISSUE_STAGES;
 use stylet_sim::scene::{Scene, SceneError};
@@ -31,6 +35,20 @@ pub struct Setup<'a> {
     pub load: Load,
     /// Where the io load may write.
     pub folder: &'a Path,
+    /// A trace of the kernel names the causes of ticks that are later than this.
+    pub trace_over_ns: Option<u64>,
+    /// What was gathered is handed over while the run goes on.
+    pub checkpoints: Option<&'a Checkpoints<'a>>,
+    /// The force loop toggles it for an instrument.
+    pub toggle: Option<Pin>,
+}
+
+/// Checkpoints of a long run; the names of the loops are `force` and `tissue`.
+pub struct Checkpoints<'a> {
+    pub every: Duration,
+    /// Length of the windows of which the worst is kept.
+    pub window_ns: u64,
+    pub take: &'a (dyn Fn(&'static str, &LoopTiming) + Sync),
 }
 
 /// The ring to the gathering thread holds so much time of ticks.
@@ -51,6 +69,9 @@ pub enum MeasureError {
     /// The host saw no tick.
     #[error(transparent)]
     Host(#[from] HostError),
+    /// The pin for an instrument.
+    #[error(transparent)]
+    Pin(#[from] PinError),
     /// A thread of the measurement ended early.
     #[error("a measuring thread panicked")]
     Panicked,
@@ -64,6 +85,7 @@ pub struct Measured {
     pub host: HostReport,
     pub gaps: GapReport,
     pub cores: Vec<CoreWatch>,
+    pub trace: Option<TraceSection>,
     pub window_ns: u64,
 }
 
@@ -80,8 +102,7 @@ fn warm_up_ticks(period_ns: u64) -> u64 {
     (WARM_UP_S * 1e9) as u64 / period_ns
 }
 
-fn plan(period_ns: u64, duration_ns: u64) -> Plan {
-    let window_ns = window_ns(duration_ns);
+fn plan(period_ns: u64, duration_ns: u64, window_ns: u64) -> Plan {
     Plan {
         period_ns,
         warm_up_ticks: warm_up_ticks(period_ns),
@@ -109,12 +130,20 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
     let ring = |period_ns| rtrb::RingBuffer::new((RING_NS / period_ns) as usize);
     let (haptic_in, haptic_ring) = ring(options.haptic_period_ns);
     let (tissue_in, tissue_ring) = ring(TISSUE_PERIOD_NS);
+    // The loops' threads are started by this one and inherit the right to the pin.
+    let toggle = setup.toggle.map(Pin::acquire).transpose()?;
     let probes = Probes {
-        haptic: Probe::new(haptic_in, Arc::clone(&pose_times)),
+        haptic: Probe::new(haptic_in, Arc::clone(&pose_times)).with_toggle(toggle),
         tissue: Probe::new(tissue_in, Arc::clone(&pose_times)),
     };
-    let haptic = LoopTiming::new(HAPTIC_STAGES, plan(options.haptic_period_ns, setup.duration_ns));
-    let tissue = LoopTiming::new(TISSUE_STAGES, plan(TISSUE_PERIOD_NS, setup.duration_ns));
+    let window_ns = setup
+        .checkpoints
+        .map_or_else(|| window_ns(setup.duration_ns), |c| c.window_ns);
+    let mut haptic = LoopTiming::new(
+        HAPTIC_STAGES,
+        plan(options.haptic_period_ns, setup.duration_ns, window_ns),
+    );
+    let tissue = LoopTiming::new(TISSUE_STAGES, plan(TISSUE_PERIOD_NS, setup.duration_ns, window_ns));
     let machine = Machine::this();
     let priority = (!options.no_rt).then(|| {
         options
@@ -125,8 +154,28 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
     let (core, watched) = (watch_core(options), [options.haptic_core, options.tissue_core]);
     let stop = Arc::new(AtomicBool::new(false));
     let mut load = Running::start(setup.load, &options.instance, setup.folder)?;
-    let (run, host, gaps, cores, haptic, tissue) = std::thread::scope(|threads| {
+    let traced = setup.trace_over_ns.zip(options.haptic_core);
+    let tracing = traced.map(|(over_ns, core)| Watched {
+        machine: &machine,
+        core,
+        thread: "haptic",
+        priority: (!options.no_rt).then_some(options.haptic_priority),
+        over_ns,
+    });
+    let instance = tracing.as_ref().map(|_| trace::Instance::start());
+    let (run, host, gaps, cores, trace, haptic, tissue) = std::thread::scope(|threads| {
         let stop = &stop;
+        let trace = tracing
+            .as_ref()
+            .zip(instance)
+            .map(|(watched, instance)| match instance {
+                Ok(instance) => {
+                    let (into, late) = mpsc::channel();
+                    haptic.report_late(watched.over_ns, into);
+                    Ok(threads.spawn(move || trace::watch(instance, watched, &late)))
+                }
+                Err(why) => Err(TraceSection::absent(watched.over_ns, &why)),
+            });
         let host = threads.spawn(|| {
             let warm_up = warm_up_ticks(options.haptic_period_ns);
             let host = Host::new(&options.instance, script, pose_times, warm_up);
@@ -135,8 +184,12 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
             stop.store(true, Ordering::Release);
             report
         });
-        let haptic = threads.spawn(|| haptic.gather(haptic_ring));
-        let tissue = threads.spawn(|| tissue.gather(tissue_ring));
+        let gathered = |timing: LoopTiming, ring, name| match setup.checkpoints {
+            Some(c) => timing.gather_with(ring, c.every, |so_far| (c.take)(name, so_far)),
+            None => timing.gather(ring),
+        };
+        let haptic = threads.spawn(move || gathered(haptic, haptic_ring, "force"));
+        let tissue = threads.spawn(move || gathered(tissue, tissue_ring, "tissue"));
         let gaps = threads.spawn(move || gaps::watch(core, priority, stop));
         let machine = &machine;
         let cores: Vec<_> = watched
@@ -147,7 +200,10 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         let run = process::run_with(options, Some(probes), stop);
         stop.store(true, Ordering::Release);
         let cores: Vec<CoreWatch> = cores.into_iter().filter_map(|t| t.join().ok()).collect();
-        (run, host.join(), gaps.join(), cores, haptic.join(), tissue.join())
+        let (haptic, tissue) = (haptic.join(), tissue.join());
+        // It ends with the gathering of the force loop.
+        let trace = trace.map(|started| started.map_or_else(Ok, |thread| thread.join()));
+        (run, host.join(), gaps.join(), cores, trace, haptic, tissue)
     });
     // A window that could not open draws nothing.
     let loaded = load.ended();
@@ -164,7 +220,8 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         host: host.map_err(panicked)??,
         gaps: gaps.map_err(panicked)?,
         cores,
-        window_ns: window_ns(setup.duration_ns),
+        trace: trace.transpose().map_err(panicked)?,
+        window_ns,
     })
 }
 
@@ -182,7 +239,7 @@ mod tests {
     fn windows_cover_the_run_and_are_few() {
         for duration_s in [1, 10, 60, 3_600] {
             let duration_ns = duration_s * 1_000_000_000;
-            let plan = plan(1_000_000, duration_ns);
+            let plan = plan(1_000_000, duration_ns, window_ns(duration_ns));
             assert!(plan.windows as u64 * plan.window_ns >= duration_ns);
             assert!(plan.windows as u64 <= WINDOWS + 1);
         }

@@ -1,7 +1,9 @@
 //! The pictures of a report, as SVG.
 
+mod maxima;
 mod trend;
 
+pub use maxima::{MaximaPart, maxima};
 pub use trend::{TrendPoint, trend, trend_range_us};
 
 use crate::collect::{LoopTiming, Window};

@@ -86,15 +86,20 @@ const ANOMALIES: &[(&str, &str)] = &[
     ),
 ];
 
+/// What we know to be wrong with a package.
+pub fn known_anomalies(package: &str) -> Vec<&'static str> {
+    let known = ANOMALIES.iter().filter(|(of, _)| *of == package);
+    known.map(|(_, what)| *what).collect()
+}
+
 pub fn dependencies() -> Vec<Dependency> {
     let list = include_str!(concat!(env!("OUT_DIR"), "/dependencies.txt"));
     let read = |line: &str| {
         let (name, version) = line.split_once(' ')?;
-        let known = ANOMALIES.iter().filter(|(of, _)| *of == name).map(|(_, what)| *what);
         Some(Dependency {
             name: name.to_owned(),
             version: version.to_owned(),
-            known_anomalies: known.collect(),
+            known_anomalies: known_anomalies(name),
         })
     };
     list.lines().filter_map(read).collect()

@@ -9,7 +9,9 @@ use crate::compare::Comparison;
 use crate::extreme::Extremes;
 use crate::load::Load;
 use crate::provenance::{Dependency, Fact, ProgramDigest, Setting};
+use crate::spin::SpinSearch;
 use crate::summary::Summary;
+use crate::trace::TraceSection;
 use crate::verdict::{LimitResult, Outcome};
 use crate::watch::CoreWatch;
 use crate::whose::Whose;
@@ -154,12 +156,18 @@ pub struct Report {
     pub stiffness: StiffnessSection,
     pub windows: Vec<WindowRow>,
     pub latest_wake_ups: Vec<Late>,
+    /// Late ticks with their causes; only where a trace was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trace: Option<TraceSection>,
     /// Wake-ups of the force loop in equal parts of the run. Reports of older versions have neither this nor `extremes`.
     pub parts: Vec<Summary>,
     pub extremes: Extremes,
     pub gaps: GapSection,
     pub cores: Vec<CoreWatch>,
     pub comparison: Option<Comparison>,
+    /// How the spin was found; only with `--spin-us auto`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spin_search: Option<SpinSearch>,
     pub settings: Vec<Setting>,
     pub facts: Vec<Fact>,
     pub dependencies: Vec<Dependency>,

@@ -54,6 +54,19 @@ pub fn scenes() -> PossibleValuesParser {
 }
 
 impl RealTimeArgs {
+    /// The defaults of the command line, with the force loop on `haptic_core`; real time where it is allowed.
+    pub fn for_measurement(haptic_core: usize) -> Self {
+        Self {
+            scene: BUILTIN_SCENES[0].to_owned(),
+            no_rt: false,
+            rt_if_allowed: true,
+            haptic_core: Some(haptic_core),
+            tissue_core: None,
+            haptic_priority: 80,
+            tissue_priority: 70,
+        }
+    }
+
     /// The settings of a run, or every problem with them.
     pub fn options(&self, instance: &str) -> Result<Options, OptionsError> {
         let cores: Vec<usize> = core_affinity::get_core_ids()

@@ -2,6 +2,7 @@
 
 use super::{Finding, FindingLevel};
 use crate::machine::Machine;
+use std::path::Path;
 use stylet_hw::libhd::diagnose::{self, Surroundings};
 
 /// USB vendor of 3D Systems: Touch and Touch X, as in the udev rules of its driver.
@@ -24,6 +25,53 @@ fn connected(machine: &Machine) -> Vec<String> {
         }
     }
     found
+}
+
+/// Whether this process may read and write a device file.
+pub fn may_use(path: &Path) -> bool {
+    std::fs::File::options().read(true).write(true).open(path).is_ok()
+}
+
+/// The newer Touch is a HID device: the driver speaks with it through `/dev/hidraw*`, which belongs to root at first.
+pub fn hidraw(machine: &Machine, usable: impl Fn(&Path) -> bool) -> Finding {
+    let folder = "sys/class/hidraw";
+    let is_ours = |name: &&String| {
+        let event = machine
+            .text(&format!("{folder}/{name}/device/uevent"))
+            .unwrap_or_default();
+        // HID_ID=0003:00002988:00000302
+        let vendor = event.lines().find_map(|l| l.strip_prefix("HID_ID=")?.split(':').nth(1));
+        vendor.is_some_and(|v| v.to_lowercase().ends_with(USB_VENDOR))
+    };
+    let names = machine.names(folder);
+    let ours: Vec<&String> = names.iter().filter(is_ours).collect();
+    if ours.is_empty() {
+        return Finding::good("hidraw", "no haptic device is connected as a HID device");
+    }
+    let refused: Vec<String> = ours
+        .iter()
+        .map(|name| format!("dev/{name}"))
+        .filter(|path| !usable(&machine.path(path)))
+        .collect();
+    if refused.is_empty() {
+        return Finding::good(
+            "hidraw",
+            format!("haptic devices on hidraw that may be used: {}", ours.len()),
+        );
+    }
+    Finding::new(
+        "hidraw",
+        FindingLevel::Warning,
+        format!(
+            "a Touch is connected as a HID device, but may not be used: /{}",
+            refused.join(", /")
+        ),
+        format!(
+            "echo 'SUBSYSTEM==\"hidraw\", ATTRS{{idVendor}}==\"{USB_VENDOR}\", TAG+=\"uaccess\"' | sudo tee \
+             /etc/udev/rules.d/70-stylet-haptic.rules && sudo udevadm control --reload && sudo udevadm trigger   (the package of \
+             rt-core installs this rule)"
+        ),
+    )
 }
 
 pub fn haptic(machine: &Machine) -> Finding {

@@ -7,10 +7,14 @@ mod cores;
 mod devices;
 mod kernel;
 mod memory;
+mod mend;
 mod rights;
 mod shared;
 #[cfg(test)]
 mod tests;
+mod tunable;
+
+pub use mend::{DoctorArgs, MendError, run};
 
 use crate::machine::Machine;
 use serde::Serialize;
@@ -90,7 +94,12 @@ pub fn examine(machine: &Machine, haptic_core: usize, here: &Surroundings) -> Ve
         shared::space(machine, shared::free_bytes),
         shared::stale_services(machine),
         devices::haptic(machine),
+        devices::hidraw(machine, devices::may_use),
+        tunable::energy_preference(machine, haptic_core),
+        tunable::turbo(machine),
+        tunable::tuned(machine),
     ];
+    findings.extend(tunable::findings(machine));
     findings.extend(devices::driver(machine, here));
     findings
 }
@@ -105,12 +114,7 @@ fn verdict(findings: &[Finding]) -> &'static str {
 }
 
 /// Examines this PC and prints; 1 when there is a blocker.
-pub fn run(json: bool, haptic_core: Option<usize>) -> u8 {
-    let last = core_affinity::get_core_ids()
-        .unwrap_or_default()
-        .last()
-        .map_or(0, |c| c.id);
-    let core = haptic_core.unwrap_or(last);
+fn print(json: bool, core: usize) -> u8 {
     let (here, _) = Surroundings::of_this_process(None);
     let findings = examine(&Machine::this(), core, &here);
     if json {

@@ -451,6 +451,106 @@ fn what_the_driver_lacks_is_reported_and_weighs_more_where_a_device_is_connected
 }
 
 #[test]
+fn background_work_of_the_kernel_is_found_setting_by_setting() {
+    let of = |fake: &Fake, check: &str| {
+        let all = tunable::findings(&Machine::at(&fake.0));
+        all.into_iter().find(|f| f.check == check).expect("checked")
+    };
+    let nothing = Fake::new();
+    for (path, good, bad, check, severity) in [
+        (
+            "proc/sys/kernel/nmi_watchdog",
+            "0",
+            "1",
+            "NMI watchdog",
+            FindingLevel::Warning,
+        ),
+        (
+            "proc/sys/kernel/numa_balancing",
+            "0",
+            "1",
+            "NUMA balancing",
+            FindingLevel::Warning,
+        ),
+        (
+            "proc/sys/kernel/timer_migration",
+            "0",
+            "1",
+            "timer migration",
+            FindingLevel::Note,
+        ),
+        (
+            "proc/sys/vm/stat_interval",
+            "300",
+            "1",
+            "statistics",
+            FindingLevel::Note,
+        ),
+        (
+            "sys/module/pcie_aspm/parameters/policy",
+            "default [performance] powersave",
+            "[default] performance powersave",
+            "PCIe power",
+            FindingLevel::Note,
+        ),
+    ] {
+        expect(&of(&nothing, check), FindingLevel::Good, "no such setting");
+        expect(&of(&Fake::new().with(path, good), check), FindingLevel::Good, "");
+        let found = of(&Fake::new().with(path, bad), check);
+        expect(&found, severity, "");
+        assert!(found.cure.contains(path), "{found:?}");
+    }
+}
+
+#[test]
+fn energy_preference_turbo_and_tuned_are_looked_at() {
+    const CPU: &str = "sys/devices/system/cpu";
+    let preference = |text: &str| Fake::new().with(&format!("{CPU}/cpu1/cpufreq/energy_performance_preference"), text);
+    let epp = |fake: &Fake| fake.see(|m| tunable::energy_preference(m, 1));
+    expect(&epp(&Fake::new()), FindingLevel::Good, "no energy preference");
+    expect(&epp(&preference("performance\n")), FindingLevel::Good, "speed");
+    expect(
+        &epp(&preference("balance_power\n")),
+        FindingLevel::Warning,
+        "balance_power",
+    );
+    let turbo = |file: &str, text: &str| Fake::new().with(&format!("{CPU}/{file}"), text).see(tunable::turbo);
+    expect(&Fake::new().see(tunable::turbo), FindingLevel::Good, "no turbo");
+    expect(&turbo("intel_pstate/no_turbo", "1\n"), FindingLevel::Good, "off");
+    expect(&turbo("intel_pstate/no_turbo", "0\n"), FindingLevel::Note, "on");
+    expect(&turbo("cpufreq/boost", "0\n"), FindingLevel::Good, "off");
+    expect(&turbo("cpufreq/boost", "1\n"), FindingLevel::Note, "on");
+    let tuned = |profile: &str| {
+        let fake = Fake::new().with("etc/tuned/active_profile", profile);
+        fake.with("proc/77/comm", "tuned\n").see(tunable::tuned)
+    };
+    expect(&Fake::new().see(tunable::tuned), FindingLevel::Good, "does not run");
+    expect(&tuned("realtime\n"), FindingLevel::Good, "realtime");
+    expect(&tuned("balanced\n"), FindingLevel::Warning, "balanced");
+}
+
+#[test]
+fn a_touch_on_hidraw_must_be_usable() {
+    let with = |id: &str| {
+        Fake::new().with(
+            "sys/class/hidraw/hidraw3/device/uevent",
+            &format!("DRIVER=hid-generic\nHID_ID={id}\n"),
+        )
+    };
+    let see = |fake: &Fake, usable: bool| fake.see(|m| devices::hidraw(m, |_| usable));
+    expect(
+        &see(&with("0003:0000046D:0000C31C"), false),
+        FindingLevel::Good,
+        "no haptic device",
+    );
+    let touch = with("0003:00002988:00000302");
+    expect(&see(&touch, true), FindingLevel::Good, "may be used: 1");
+    let refused = see(&touch, false);
+    expect(&refused, FindingLevel::Warning, "/dev/hidraw3");
+    assert!(refused.cure.contains("ATTRS{idVendor}==\"2988\""), "{}", refused.cure);
+}
+
+#[test]
 fn worst_finding_decides_and_every_check_has_its_own_name() {
     let nowhere = Fake::new();
     let findings = examine(&Machine::at(&nowhere.0), 1, &nobody());

@@ -65,7 +65,9 @@ pub fn comparison(r: &Report) -> Markup {
     };
     let (title, heads) = match c.against {
         Against::Cyclictest => ("Beside cyclictest", ["ours", "theirs"]),
+        Against::Timerlat => ("Beside timerlat", ["ours", "theirs"]),
         Against::Unloaded => ("With and without the load", ["with", "without"]),
+        Against::Untraced => ("What tracing costs", ["with", "without"]),
     };
     if let Some(why) = &c.absent {
         return html! { h2 { (title) } p { (why) } };
@@ -93,10 +95,34 @@ pub fn comparison(r: &Report) -> Markup {
                     (c.tool) ", alternating (turns of " (turns) " s): same core, priority and interval, microseconds, both read \
                      right after the sleep. The force loop does all its work, cyclictest sleeps only."
                 }
+                Against::Timerlat => {
+                    (c.tool) ", alternating (turns of " (turns) " s): latency of a thread of the same core, priority and period, \
+                     known to a microsecond."
+                }
+                Against::Untraced => {
+                    "The same loops with and without the trace, alternating (turns of " (turns) " s), microseconds."
+                }
                 Against::Unloaded => { "The same loops, alternating (turns of " (turns) " s), microseconds." }
             }
             " Values past 1 ms are left out of p99 and p99.9."
         }
+    }
+}
+
+/// How `--spin-us auto` came to its spin.
+pub fn spin(r: &Report) -> Markup {
+    let Some(s) = &r.spin_search else {
+        return Markup::default();
+    };
+    let row = |t: &crate::spin::Trial| {
+        let met = if t.met { "yes" } else { "no" };
+        vec![cell(t.spin_us), or_na(t.p50_us), or_na(t.p99_us), cell(met)]
+    };
+    let rows: Vec<Vec<Markup>> = s.trials.iter().map(row).collect();
+    html! {
+        h2 { "Spin before each deadline" }
+        div class="half" { (table(&["spin, \u{b5}s", "p50, \u{b5}s", "p99, \u{b5}s", "low enough"], &rows, &[Column::Number; 4])) }
+        p class="faint" { (micro(&s.words())) "." }
     }
 }
 
@@ -115,5 +141,8 @@ pub fn late(r: &Report) -> Markup {
     html! {
         h2 { "Latest wake-ups" }
         (table(&head, &rows, &columns))
+        @if r.trace.is_none() {
+            p class="faint" { "With " code { "--trace" } " a trace of the kernel names the cause of each." }
+        }
     }
 }

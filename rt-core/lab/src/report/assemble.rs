@@ -5,7 +5,7 @@ use super::{
     StiffnessSection, Verdict, WindowRow,
 };
 use crate::bound;
-use crate::collect::LoopTiming;
+use crate::collect::{LateTick, LoopTiming};
 use crate::compare::Comparison;
 use crate::extreme;
 use crate::gaps::GapReport;
@@ -14,7 +14,9 @@ use crate::machine::Machine;
 use crate::measure::{Measured, WARM_UP_S, switches_beyond_sleep};
 use crate::provenance;
 use crate::sample::PARTS;
+use crate::spin::SpinSearch;
 use crate::summary::{Summary, quantile_us, summary};
+use crate::trace::TraceSection;
 use crate::verdict::{self, Limits};
 use crate::whose::Whose;
 use hdrhistogram::Histogram;
@@ -30,6 +32,7 @@ pub struct Parts<'a> {
     pub comparison: Option<Comparison>,
     pub machine: &'a Machine,
     pub whose: &'a Whose,
+    pub spin_search: Option<SpinSearch>,
 }
 
 /// Puts a report together; digests are still missing.
@@ -95,11 +98,13 @@ pub fn report(parts: &Parts) -> Report {
         stiffness: stiffness(&measured.haptic.due_to_output, period_ns),
         windows: windows(measured),
         latest_wake_ups: latest(measured),
+        trace: traced(measured),
         parts: parts_of_run(&measured.haptic, rate_hz),
         extremes: extreme::examine(&measured.haptic.sample, rate_hz),
         gaps: gap_section(measured),
         cores: measured.cores.clone(),
         comparison: parts.comparison.clone(),
+        spin_search: parts.spin_search.clone(),
         settings: provenance::settings(parts.machine, options, &measured.run),
         facts: provenance::facts(parts.machine, options),
         dependencies: provenance::dependencies(),
@@ -213,13 +218,32 @@ fn latest(measured: &Measured) -> Vec<Late> {
         at_s: t.due_ns.saturating_sub(timing.first_due_ns) as f64 / 1e9,
         wake_us: t.wake_ns as f64 / 1e3,
         work_us: t.work_ns as f64 / 1e3,
-        cause: cause(&measured.gaps, t.due_ns, t.due_ns + t.wake_ns),
+        cause: cause(measured, t),
     })
     .collect()
 }
 
+/// What the trace showed; where it does not cover the tick, what the gap watch saw.
+fn cause(measured: &Measured, tick: &LateTick) -> String {
+    let outliers = measured.trace.iter().flat_map(|t| &t.outliers);
+    let traced = outliers.into_iter().find(|o| o.due_ns == tick.due_ns);
+    traced.map_or_else(
+        || seen_elsewhere(&measured.gaps, tick.due_ns, tick.due_ns + tick.wake_ns),
+        |o| o.cause.clone(),
+    )
+}
+
+/// The trace, with times from the begin of the measurement.
+fn traced(measured: &Measured) -> Option<TraceSection> {
+    let mut section = measured.trace.clone()?;
+    for outlier in &mut section.outliers {
+        outlier.at_s = outlier.due_ns.saturating_sub(measured.haptic.first_due_ns) as f64 / 1e9;
+    }
+    Some(section)
+}
+
 /// What the gap watch saw between two times.
-fn cause(gaps: &GapReport, from_ns: u64, to_ns: u64) -> String {
+fn seen_elsewhere(gaps: &GapReport, from_ns: u64, to_ns: u64) -> String {
     let core = gaps.core.map_or("another core".to_owned(), |c| format!("core {c}"));
     if let Some(ns) = gaps.gap_during(from_ns, to_ns) {
         return format!(

@@ -20,6 +20,7 @@ pub mod haptic;
 pub mod haptic_tape;
 pub mod layers_met;
 pub mod line_loads;
+pub mod pin;
 pub mod pose;
 pub mod recorder;
 pub mod response;

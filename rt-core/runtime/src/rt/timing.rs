@@ -1,6 +1,7 @@
 //! What each tick of a loop cost, sent through a ring to a measurement; a loop that is not measured has no probe.
 
 use crate::rt::clock;
+use crate::rt::pin::Toggle;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -20,6 +21,8 @@ pub struct TickTimes {
     pub path_ns: Option<u64>,
     /// When the output had left.
     pub output_ns: Option<u64>,
+    /// Before and after a pin was toggled in this tick.
+    pub toggled_ns: Option<[u64; 2]>,
     /// What handing over the tick before cost.
     pub recording_ns: u64,
     /// Deadlines skipped just before this tick.
@@ -89,6 +92,7 @@ pub struct Probe {
     ring: rtrb::Producer<TickTimes>,
     tick: TickTimes,
     pose_times: Arc<PoseTimes>,
+    toggle: Option<Toggle>,
 }
 
 impl Probe {
@@ -98,7 +102,13 @@ impl Probe {
             ring,
             tick: TickTimes::default(),
             pose_times,
+            toggle: None,
         }
+    }
+
+    /// The pin that the loop toggles once its output has left.
+    pub fn with_toggle(self, toggle: Option<Toggle>) -> Self {
+        Self { toggle, ..self }
     }
 
     /// Ends a stage; call at the same places of every tick.
@@ -111,6 +121,12 @@ impl Probe {
         let done_ns = self.tick.done_ns();
         self.tick.output_ns = Some(done_ns);
         self.tick.path_ns = self.tick.marks().get(from).map(|begin| done_ns.saturating_sub(*begin));
+        if let Some(toggle) = &mut self.toggle {
+            let before_ns = clock::now_ns();
+            if toggle.tick() {
+                self.tick.toggled_ns = Some([before_ns, clock::now_ns()]);
+            }
+        }
     }
 
     /// The output of tissue tick `tick` left at the last mark, and answers the tip read at `pose_ns`; 0 for no tip yet.

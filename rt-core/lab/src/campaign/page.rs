@@ -1,0 +1,195 @@
+//! The page of a campaign.
+
+use super::progress::time;
+use super::report::{CampaignReport, LoopOfPart, PartReport};
+use crate::html::STYLE;
+use crate::html::parts::{Column, cell, num, or_na, table};
+use crate::html::times::time_table;
+use crate::plots::{self, BLUE, DrawError, MaximaPart, ORANGE, Series};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+/// The whole page, which needs nothing else.
+pub fn page(r: &CampaignReport) -> Result<String, DrawError> {
+    let title = if r.name.is_empty() {
+        "Latency campaign".to_owned()
+    } else {
+        format!("Latency campaign: {}", r.name)
+    };
+    let pictures = pictures(r)?;
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                title { (title) }
+                meta name="viewport" content="width=device-width";
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                main {
+                    header { h1 { (title) } }
+                    p class="sub" {
+                        b { (time(r.measured_s)) } " of " (time(r.planned_s)) " measured in " (r.sessions.len()) " sessions. "
+                        (r.made_at) ", " (r.program) "."
+                    }
+                    @if !r.complete { div class="warning" { strong { "Not complete." } " The same command continues it." } }
+                    @if let Some(name) = &r.hypervisor {
+                        div class="warning" {
+                            strong { "Environment not qualified." }
+                            " This is a virtual machine (" (name) "): the tail says more about the machine below than about this program."
+                        }
+                    }
+                    h2 { "Parts" }
+                    (overview(r))
+                    (pictures)
+                    @for (i, part) in r.parts.iter().enumerate() { (of_part(i, part)) }
+                    h2 { "Sessions" }
+                    (sessions(r))
+                    footer {
+                        "A session is what one start of the program measured without a break. Its file is replaced at each checkpoint; \
+                         what was measured after the last checkpoint of a session that was killed is not counted, and was measured \
+                         again. Two sessions of the same moment are refused. Commit " code { (r.commit) } ", schema " (r.schema) "."
+                    }
+                }
+            }
+        }
+    };
+    Ok(page.into_string() + "\n")
+}
+
+fn name(part: &PartReport) -> String {
+    let p = &part.part;
+    let spin = if p.spin_us > 0 {
+        format!(", spin {} \u{b5}s", p.spin_us)
+    } else {
+        String::new()
+    };
+    format!("{}, {} Hz{spin}", format!("{:?}", p.load).to_lowercase(), p.rate)
+}
+
+fn overview(r: &CampaignReport) -> Markup {
+    let us = |l: &LoopOfPart, q: &str| or_na(l.wake.quantile(q).and_then(|q| q.us));
+    let row = |(i, part): (usize, &PartReport)| {
+        let f = &part.force;
+        vec![
+            cell(i + 1),
+            cell(name(part)),
+            cell(time(part.measured_s)),
+            cell(part.sessions),
+            us(f, "p50"),
+            us(f, "p99"),
+            us(f, "p99.9"),
+            us(f, "p99.99"),
+            or_na(f.wake.max_us),
+            cell(num(f.missed_deadlines as f64)),
+            or_na(f.miss_bound.at_most_per_hour),
+        ]
+    };
+    let rows: Vec<Vec<Markup>> = r.parts.iter().enumerate().map(row).collect();
+    let head = [
+        "part",
+        "load and rate",
+        "measured",
+        "sessions",
+        "p50, \u{b5}s",
+        "p99",
+        "p99.9",
+        "p99.99",
+        "max",
+        "missed",
+        "an hour, at most",
+    ];
+    let mut columns = [Column::Number; 11];
+    columns[1] = Column::Text;
+    html! {
+        (table(&head, &rows, &columns))
+        p class="faint" {
+            "Wake-up of the force loop. The last column is the bound of Clopper and Pearson on missed deadlines, 95 %, if they do not \
+             depend on each other."
+        }
+    }
+}
+
+fn pictures(r: &CampaignReport) -> Result<Markup, DrawError> {
+    let names: Vec<String> = r.parts.iter().map(name).collect();
+    let measured = || r.parts.iter().zip(&names).filter(|(p, _)| !p.maxima.is_empty());
+    if measured().next().is_none() {
+        return Ok(Markup::default());
+    }
+    let parts: Vec<MaximaPart> = measured()
+        .map(|(p, name)| MaximaPart {
+            name,
+            windows: p
+                .maxima
+                .iter()
+                .map(|m| (m.at_s, m.worst_wake_us, m.worst_work_us))
+                .collect(),
+        })
+        .collect();
+    let maxima = plots::maxima(&parts, r.window_s)?;
+    // The quietest and the loudest part show the range; all of them would lie over each other.
+    let median = |p: &PartReport| p.force.wake_times.value_at_quantile(0.99);
+    let least = measured().min_by_key(|(p, _)| median(p));
+    let most = measured().max_by_key(|(p, _)| median(p)).filter(|_| parts.len() > 1);
+    let series = |found: Option<(&PartReport, &String)>, color| {
+        found.map(|(p, name)| (name.clone(), color, p.force.wake_times.clone()))
+    };
+    let drawn: Vec<_> = [series(least, BLUE), series(most, ORANGE)]
+        .into_iter()
+        .flatten()
+        .collect();
+    let lines: Vec<Series> = drawn
+        .iter()
+        .map(|(name, color, histogram)| Series {
+            name,
+            color: *color,
+            histogram,
+        })
+        .collect();
+    let tail = plots::tail(&lines)?;
+    Ok(html! {
+        h2 { "Worst of each " (time(r.window_s)) }
+        figure { (PreEscaped(maxima)) }
+        h2 { "Cumulative tail of the parts with the lowest and the highest p99" }
+        section class="figures" { figure { (PreEscaped(tail)) } }
+    })
+}
+
+fn of_part(i: usize, part: &PartReport) -> Markup {
+    let of = |l: &LoopOfPart| [l.wake.clone(), l.work.clone(), l.due_to_output.clone()];
+    html! {
+        h2 { "Part " (i + 1) ": " (name(part)) }
+        h3 { "Force loop" }
+        (time_table(&of(&part.force)))
+        h3 { "Tissue loop" }
+        (time_table(&of(&part.tissue)))
+        p class="faint" {
+            "Force loop: " (num(part.force.ticks as f64)) " ticks, " (part.force.missed_deadlines) " deadlines missed, "
+            (part.force.overruns) " overruns, " (part.force.unmeasured) " ticks not measured. Tissue loop: "
+            (num(part.tissue.ticks as f64)) " ticks, " (part.tissue.missed_deadlines) " missed."
+        }
+    }
+}
+
+fn sessions(r: &CampaignReport) -> Markup {
+    let moment = |s: f64| {
+        let at = jiff::Timestamp::from_second(s as i64);
+        at.map_or(String::new(), |t| t.strftime("%Y-%m-%d %H:%M:%S UTC").to_string())
+    };
+    let rows: Vec<Vec<Markup>> = r
+        .sessions
+        .iter()
+        .map(|s| {
+            vec![
+                cell(s.part + 1),
+                cell(moment(s.began_s)),
+                cell(time(s.measured_s)),
+                html! { code { (s.boot.split('-').next().unwrap_or_default()) } },
+                html! { (s.file) br; span class="faint" { (s.sha256) } },
+            ]
+        })
+        .collect();
+    let head = ["part", "began", "measured", "start of the PC", "file and its SHA-256"];
+    let columns = [Column::Number, Column::Text, Column::Number, Column::Text, Column::Wide];
+    table(&head, &rows, &columns)
+}

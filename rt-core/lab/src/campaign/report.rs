@@ -1,0 +1,146 @@
+//! One report over all sessions of a campaign.
+
+use super::CampaignError;
+use super::plan::{Part, Plan};
+use super::session::{FORCE, Kept, Maximum, Store, TISSUE, join};
+use crate::bound::{self, MissBound};
+use crate::machine::Machine;
+use crate::provenance;
+use crate::summary::{Summary, summary};
+use hdrhistogram::Histogram;
+use serde::Serialize;
+
+const SCHEMA: &str = "stylet.campaign/1";
+
+/// Everything measured of one loop in one part.
+#[derive(Clone, Debug, Serialize)]
+pub struct LoopOfPart {
+    pub wake: Summary,
+    pub work: Summary,
+    pub due_to_output: Summary,
+    pub ticks: u64,
+    pub missed_deadlines: u64,
+    pub overruns: u64,
+    pub unmeasured: u64,
+    pub miss_bound: MissBound,
+    #[serde(skip)]
+    pub wake_times: Histogram<u64>,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub struct PartReport {
+    pub part: Part,
+    pub measured_s: f64,
+    pub sessions: usize,
+    pub complete: bool,
+    pub force: LoopOfPart,
+    pub tissue: LoopOfPart,
+    /// The worst of each window of the force loop, in the order of time.
+    pub maxima: Vec<Maximum>,
+}
+
+/// A session with its file.
+#[derive(Clone, Debug, Serialize)]
+pub struct SessionReport {
+    pub file: String,
+    pub sha256: String,
+    pub part: usize,
+    pub began_s: f64,
+    pub measured_s: f64,
+    /// Which start of the PC.
+    pub boot: String,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub struct CampaignReport {
+    pub schema: &'static str,
+    pub name: String,
+    pub made_at: String,
+    pub program: String,
+    pub commit: &'static str,
+    pub complete: bool,
+    pub planned_s: f64,
+    pub measured_s: f64,
+    pub window_s: f64,
+    pub parts: Vec<PartReport>,
+    pub sessions: Vec<SessionReport>,
+    /// What is below the loops.
+    pub hypervisor: Option<String>,
+}
+
+/// Joins all sessions. Two that measured the same moment are refused: nothing may count twice.
+pub fn report(plan: &Plan, store: &Store) -> Result<CampaignReport, CampaignError> {
+    let (force, tissue) = (store.records(FORCE)?, store.records(TISSUE)?);
+    for sessions in [&force, &tissue] {
+        disjoint(store, sessions)?;
+    }
+    let mut parts = Vec::new();
+    for (number, part) in plan.parts.iter().enumerate() {
+        let of_part = |all: &[Kept]| -> Vec<Kept> { all.iter().filter(|k| k.record.part == number).cloned().collect() };
+        let (force, tissue) = (of_part(&force), of_part(&tissue));
+        parts.push(PartReport {
+            part: part.clone(),
+            measured_s: force.iter().map(|k| k.record.measured_ns as f64 / 1e9).sum(),
+            sessions: force.len(),
+            complete: store.left_ns(number, part)? == 0,
+            maxima: force.iter().flat_map(|k| k.record.maxima.iter().copied()).collect(),
+            force: one_loop(&force, f64::from(part.rate)),
+            tissue: one_loop(&tissue, 1e9 / stylet_runtime::rt::clock::TISSUE_PERIOD_NS as f64),
+        });
+    }
+    let session = |k: &Kept| SessionReport {
+        file: k.file.clone(),
+        sha256: k.sha256.clone(),
+        part: k.record.part,
+        began_s: k.record.began_s,
+        measured_s: k.record.measured_ns as f64 / 1e9,
+        boot: k.record.boot.clone(),
+    };
+    Ok(CampaignReport {
+        schema: SCHEMA,
+        name: plan.name.clone(),
+        made_at: jiff::Timestamp::now().strftime("%Y-%m-%d %H:%M:%S UTC").to_string(),
+        program: format!("rt-core {}", env!("CARGO_PKG_VERSION")),
+        commit: provenance::COMMIT,
+        complete: parts.iter().all(|p| p.complete),
+        planned_s: plan.parts.iter().map(|p| p.duration_ns as f64 / 1e9).sum(),
+        measured_s: parts.iter().map(|p| p.measured_s).sum(),
+        window_s: plan.window_ns as f64 / 1e9,
+        parts,
+        sessions: force.iter().map(session).collect(),
+        hypervisor: Machine::this().hypervisor(),
+    })
+}
+
+fn disjoint(store: &Store, sessions: &[Kept]) -> Result<(), CampaignError> {
+    for (i, a) in sessions.iter().enumerate() {
+        if let Some(b) = sessions[..i].iter().find(|b| a.record.overlaps(&b.record)) {
+            return Err(CampaignError::Checkpoint {
+                path: store.folder.join(&a.file),
+                why: format!("measured at the same time as {}: it would count twice", b.file),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn one_loop(sessions: &[Kept], rate_hz: f64) -> LoopOfPart {
+    let sum = |of: fn(&Kept) -> u64| sessions.iter().map(of).sum::<u64>();
+    let wake = join(sessions.iter().map(|k| &k.record.wake));
+    let (ticks, missed) = (sum(|k| k.record.ticks), sum(|k| k.record.missed));
+    LoopOfPart {
+        wake: summary("wake-up", &wake, rate_hz),
+        work: summary("whole tick", &join(sessions.iter().map(|k| &k.record.work)), rate_hz),
+        due_to_output: summary(
+            "due to output",
+            &join(sessions.iter().map(|k| &k.record.due_to_output)),
+            rate_hz,
+        ),
+        ticks,
+        missed_deadlines: missed,
+        overruns: sum(|k| k.record.overruns),
+        unmeasured: sum(|k| k.record.unmeasured),
+        miss_bound: bound::of_misses(missed, ticks + missed, rate_hz),
+        wake_times: wake,
+    }
+}

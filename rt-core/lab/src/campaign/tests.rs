@@ -1,0 +1,135 @@
+//! The file of a campaign, its checkpoints, and that nothing counts twice.
+
+use super::plan::Plan;
+use super::progress::{Progress, time};
+use super::report::report;
+use super::session::{FORCE, Store, TISSUE};
+use super::{CampaignError, page};
+use crate::collect::{LoopTiming, Plan as Gathering};
+use crate::load::Load;
+use std::path::PathBuf;
+use stylet_runtime::rt::timing::TickTimes;
+
+const FILE: &str = "name = \"night\"\nrepeat = 2\nwindow = \"2s\"\n[[part]]\nduration = \"10s\"\n[[part]]\nload = \"io\"\nrate = 2000\nduration = \"20s\"\n";
+
+fn folder(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("stylet-campaign-{name}-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("the temporary folder can be written");
+    folder
+}
+
+/// What a loop has gathered in `seconds` from `first_ns` on: each tick wakes 10 us late, the last one 900.
+fn gathered(first_ns: u64, seconds: u64) -> LoopTiming {
+    let mut timing = LoopTiming::new(
+        &[],
+        Gathering {
+            period_ns: 1_000_000,
+            warm_up_ticks: 0,
+            window_ns: 2_000_000_000,
+            windows: 40,
+            grid: seconds * 1_000,
+        },
+    );
+    let (mut into, ring) = rtrb::RingBuffer::new((seconds * 1_000) as usize);
+    for i in 0..seconds * 1_000 {
+        let due_ns = first_ns + i * 1_000_000;
+        let late_ns = if i + 1 == seconds * 1_000 { 900_000 } else { 10_000 };
+        let mut tick = TickTimes::default();
+        (tick.due_ns, tick.woke_ns) = (due_ns, due_ns + late_ns);
+        tick.push_mark(due_ns + late_ns + 5_000);
+        into.push(tick).expect("room");
+    }
+    drop(into);
+    timing = timing.gather(ring);
+    timing
+}
+
+fn put(store: &Store, part: usize, first_ns: u64, seconds: u64) {
+    let writer = store.begin(part).expect("readable");
+    for name in [FORCE, TISSUE] {
+        writer.put(name, &gathered(first_ns, seconds), 2_000_000_000);
+    }
+    assert_eq!(writer.failed(), None);
+}
+
+#[test]
+fn the_file_names_its_parts_and_every_problem() {
+    let plan = Plan::of(FILE).expect("valid");
+    let said: Vec<(Load, u32, u64)> = plan
+        .parts
+        .iter()
+        .map(|p| (p.load, p.rate, p.duration_ns / 1_000_000_000))
+        .collect();
+    let once = [(Load::None, 1_000, 10), (Load::Io, 2_000, 20)];
+    assert_eq!(said, [once, once].concat());
+    assert_eq!((plan.window_ns, plan.checkpoint_ns), (2_000_000_000, 60_000_000_000));
+    let problems =
+        Plan::of("repeat = 0\nwindow = \"x\"\n[[part]]\nduration = \"5\"\nrate = 20\n").expect_err("invalid");
+    assert_eq!(problems.0.len(), 4, "{problems:?}");
+    assert!(
+        Plan::of("[[part]]\nduration = \"5s\"\nlod = \"io\"\n")
+            .expect_err("a misspelt key")
+            .to_string()
+            .contains("lod")
+    );
+}
+
+#[test]
+fn sessions_of_a_part_add_up_and_what_is_left_is_measured() {
+    let plan = Plan::of(FILE).expect("valid");
+    let out = folder("sum");
+    let store = Store::open(&out).expect("empty");
+    let left = |part: usize| store.left_ns(part, &plan.parts[part]).expect("readable") / 1_000_000_000;
+    assert_eq!((left(0), left(1)), (10, 20));
+    put(&store, 0, 1_000_000_000, 4);
+    // A later checkpoint of the same session takes the place of the one before: it was killed, and began anew.
+    put(&store, 0, 20_000_000_000, 6);
+    put(&store, 1, 40_000_000_000, 20);
+    assert_eq!((left(0), left(1), left(2)), (0, 0, 10));
+    let progress = Progress::new(&plan, &store, 2, 10_000_000_000).expect("readable");
+    assert_eq!(
+        progress.line(5.0),
+        "part 3 of 4 (none, 1000 Hz): 5 s left; campaign 58 %, 25 s left"
+    );
+    let report = report(&plan, &store).expect("disjoint");
+    let part = &report.parts[0];
+    assert_eq!((part.force.ticks, part.sessions, part.complete), (10_000, 2, true));
+    assert!((part.measured_s - 10.0).abs() < 1e-9 && !report.complete);
+    assert_eq!(part.maxima.iter().map(|m| u64::from(m.ticks)).sum::<u64>(), 10_000);
+    assert_eq!(part.force.wake.max_us.map(|us| (us / 900.0 * 1e3).round()), Some(1e3));
+    let page = page::page(&report).expect("drawn");
+    assert!(page.contains("night") && page.contains("Not complete") && page.contains("<svg"));
+    std::fs::remove_dir_all(out).expect("ours");
+}
+
+#[test]
+fn two_sessions_of_one_moment_are_refused() {
+    let plan = Plan::of(FILE).expect("valid");
+    let out = folder("twice");
+    let store = Store::open(&out).expect("empty");
+    put(&store, 0, 1_000_000_000, 4);
+    put(&store, 1, 4_500_000_000, 4);
+    let refused = report(&plan, &store).expect_err("half a second counts twice");
+    assert!(
+        matches!(&refused, CampaignError::Checkpoint { why, .. } if why.contains("twice")),
+        "{refused}"
+    );
+    // The same times of another start of the PC are other times.
+    let file = out.join("part-001-session-000-force.json");
+    for file in [file.clone(), out.join("part-001-session-000-tissue.json")] {
+        let mut text: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(&file).expect("there")).expect("JSON");
+        text["boot"] = "another".into();
+        std::fs::write(&file, text.to_string()).expect("written");
+    }
+    assert!(report(&plan, &store).is_ok());
+    std::fs::write(&file, "{\"schema\":").expect("written");
+    assert!(matches!(Store::open(&out), Err(CampaignError::Checkpoint { .. })));
+    std::fs::remove_dir_all(out).expect("ours");
+}
+
+#[test]
+fn times_are_said_in_hours_minutes_or_seconds() {
+    assert_eq!([12.4, 250.0, 25_500.0].map(time), ["12 s", "4 min 10 s", "7 h 05 min"]);
+}

@@ -1,0 +1,213 @@
+//! The credibility file as a page; every id is a place that can be linked to.
+
+use super::{Credibility, Traced};
+use crate::html::STYLE;
+use crate::html::parts::{Column, cell, table};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use std::collections::BTreeMap;
+
+/// The whole page, which needs nothing else.
+pub fn page(c: &Credibility) -> String {
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                title { "Credibility file of Stylet" }
+                meta name="viewport" content="width=device-width";
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                main {
+                    header { h1 { "Credibility file of Stylet" } }
+                    p class="sub" { (c.made_at) ", " (c.program) ", commit " code { (c.commit) } "." }
+                    div class="warning" { strong { "No claim of conformity." } " " (c.claim) }
+                    h2 { "Context of use" }
+                    @for (heading, text) in c.context { h3 { (heading) } p { (text) } }
+                    h2 { "Hazards" }
+                    (hazards(c))
+                    h2 { "Requirements, hazards, tests, runs" }
+                    p class="faint" {
+                        "A test is named by its file in the repository and its function; all of them run in " code { "make test" } ". "
+                        "The last column has the outcomes of the runs below, by their number."
+                    }
+                    (requirements(c))
+                    h2 { "Runs" }
+                    (runs(c))
+                    h2 { "Evidence by the categories of the FDA's guidance (2023)" }
+                    (categories(c))
+                    h2 { "Credibility factors of ASME V&V 40-2018" }
+                    (factors(c))
+                    h2 { "Software of unknown provenance" }
+                    (packages(c))
+                    footer { "Made by " code { "rt-core credibility" } ". Schema " (c.schema) "." }
+                }
+            }
+        }
+    };
+    page.into_string() + "\n"
+}
+
+/// A place with this id.
+fn anchor(id: &str) -> Markup {
+    html! { code id=(id) { (id) } }
+}
+
+fn link(id: &str) -> Markup {
+    html! { a href={ "#" (id) } { code { (id) } } }
+}
+
+fn hazards(c: &Credibility) -> Markup {
+    let held_by = |id: &str| {
+        let all: Vec<&Traced> = c
+            .requirements
+            .iter()
+            .filter(|r| r.requirement.hazards.contains(&id))
+            .collect();
+        html! { @for r in all { (link(r.requirement.id)) " " } }
+    };
+    let rows: Vec<Vec<Markup>> = c
+        .hazards
+        .iter()
+        .map(|h| {
+            vec![
+                anchor(h.id),
+                cell(h.hazard),
+                cell(h.situation),
+                cell(h.harm),
+                held_by(h.id),
+            ]
+        })
+        .collect();
+    table(
+        &["id", "hazard", "situation", "harm", "held off by"],
+        &rows,
+        &[Column::Text; 5],
+    )
+}
+
+fn requirements(c: &Credibility) -> Markup {
+    let rows: Vec<Vec<Markup>> = c
+        .requirements
+        .iter()
+        .map(|t| {
+            let r = t.requirement;
+            vec![
+                anchor(r.id),
+                cell(r.what),
+                html! { @for id in r.hazards { (link(id)) " " } },
+                html! {
+                    @for (file, test) in r.tests {
+                        div { code { (test) } br; span class="faint" { (file) } }
+                    }
+                },
+                html! {
+                    @if t.outcomes.is_empty() { span class="na" { "no run given" } }
+                    @for (run, outcome) in &t.outcomes {
+                        a href={ "#RUN-" (run) } { "run " (run) } ": " (outcome.to_lowercase()) br;
+                    }
+                },
+            ]
+        })
+        .collect();
+    let columns = [Column::Text, Column::Text, Column::Text, Column::Wide, Column::Text];
+    table(&["id", "requirement", "hazards", "tests", "runs"], &rows, &columns)
+}
+
+fn runs(c: &Credibility) -> Markup {
+    if c.runs.is_empty() {
+        return html! {
+            p { "None was given. " code { "rt-core credibility --run DIR" } " takes the report of " code { "rt-core latency --out DIR" } "." }
+        };
+    }
+    let rows: Vec<Vec<Markup>> = c
+        .runs
+        .iter()
+        .enumerate()
+        .map(|(i, r)| {
+            let environment = if r.qualified { "qualified" } else { "not qualified" };
+            vec![
+                anchor(&format!("RUN-{}", i + 1)),
+                cell(&r.made_at),
+                cell(&r.protocol),
+                cell(&r.overall),
+                cell(environment),
+                html! { (r.file) br; span class="faint" { (r.sha256) } },
+            ]
+        })
+        .collect();
+    let columns = [
+        Column::Text,
+        Column::Text,
+        Column::Text,
+        Column::Text,
+        Column::Text,
+        Column::Wide,
+    ];
+    table(
+        &["id", "made", "measured", "verdict", "environment", "file and SHA-256"],
+        &rows,
+        &columns,
+    )
+}
+
+fn categories(c: &Credibility) -> Markup {
+    let rows: Vec<Vec<Markup>> = c
+        .categories
+        .iter()
+        .map(|k| {
+            vec![
+                cell(k.number),
+                cell(k.name),
+                html! { @for (what, place) in k.there { div { (what) " " span class="faint" { (place) } } } },
+                html! { @if k.missing.is_empty() { span class="na" { "nothing known" } } @else { (k.missing) } },
+            ]
+        })
+        .collect();
+    let columns = [Column::Number, Column::Text, Column::Text, Column::Text];
+    table(&["", "category", "what there is", "what is missing"], &rows, &columns)
+}
+
+fn factors(c: &Credibility) -> Markup {
+    let rows: Vec<Vec<Markup>> = c
+        .factors
+        .iter()
+        .map(|f| vec![cell(f.activity), cell(f.name), cell(f.what)])
+        .collect();
+    table(&["activity", "factor", "state"], &rows, &[Column::Text; 3])
+}
+
+fn packages(c: &Credibility) -> Markup {
+    let mut licences: BTreeMap<&str, usize> = BTreeMap::new();
+    for p in &c.packages {
+        *licences.entry(&p.licence).or_default() += 1;
+    }
+    let mut licences: Vec<_> = licences.into_iter().collect();
+    licences.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
+    let counts: Vec<Vec<Markup>> = licences
+        .iter()
+        .map(|(licence, n)| vec![cell(licence), cell(n)])
+        .collect();
+    let rows: Vec<Vec<Markup>> = c
+        .packages
+        .iter()
+        .map(|p| {
+            let known = p.known_anomalies.join(" ");
+            vec![
+                cell(&p.name),
+                cell(&p.version),
+                cell(&p.licence),
+                cell(p.of),
+                cell(known),
+            ]
+        })
+        .collect();
+    html! {
+        p { (c.packages.len()) " packages, as locked; licences as their authors declare them." }
+        div class="half" { (table(&["licence", "packages"], &counts, &[Column::Text, Column::Number])) }
+        details {
+            summary { "All packages, with what we know to be wrong with them" }
+            (table(&["package", "version", "licence", "program", "known anomalies"], &rows, &[Column::Text, Column::Text, Column::Text, Column::Text, Column::Wide]))
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! Nothing in the credibility file leads nowhere: every id, test and place exists.
+
+use super::evidence::{CATEGORIES, FACTORS};
+use super::hazards::HAZARDS;
+use super::runs;
+use super::soup;
+use super::trace::REQUIREMENTS;
+use super::{credibility, page};
+use crate::provenance::sha256;
+use crate::report::NO_DIGEST;
+use crate::verdict::LIMITS;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+fn repository(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)
+}
+
+#[test]
+fn every_test_that_is_named_exists() {
+    for r in REQUIREMENTS {
+        assert!(!r.tests.is_empty(), "{} has no test", r.id);
+        for (file, test) in r.tests {
+            let text = std::fs::read_to_string(repository(file)).unwrap_or_else(|e| panic!("{}: {file}: {e}", r.id));
+            assert!(
+                text.contains(&format!("fn {test}(")),
+                "{}: no test {test} in {file}",
+                r.id
+            );
+        }
+    }
+}
+
+#[test]
+fn every_hazard_is_held_off_and_every_limit_is_a_requirement() {
+    let ids: BTreeSet<&str> = REQUIREMENTS.iter().map(|r| r.id).collect();
+    assert_eq!(ids.len(), REQUIREMENTS.len(), "an id stands twice");
+    for h in HAZARDS {
+        assert!(
+            REQUIREMENTS.iter().any(|r| r.hazards.contains(&h.id)),
+            "nothing holds off {}",
+            h.id
+        );
+    }
+    for r in REQUIREMENTS {
+        assert!(!r.hazards.is_empty(), "{}", r.id);
+        assert!(
+            r.hazards.iter().all(|id| HAZARDS.iter().any(|h| h.id == *id)),
+            "{}",
+            r.id
+        );
+    }
+    for limit in LIMITS {
+        assert!(ids.contains(limit.id), "{} is no requirement of the file", limit.id);
+    }
+}
+
+#[test]
+fn places_of_evidence_exist_and_both_lists_are_whole() {
+    let numbers: Vec<u32> = CATEGORIES.iter().map(|c| c.number).collect();
+    assert_eq!(numbers, (1..=8).collect::<Vec<u32>>());
+    assert_eq!(FACTORS.len(), 13);
+    for (what, place) in CATEGORIES.iter().flat_map(|c| c.there) {
+        // What is no path is a command.
+        assert!(
+            repository(place).exists() || place.starts_with("rt-core "),
+            "{what}: {place}"
+        );
+    }
+}
+
+#[test]
+fn packages_have_their_licence_and_program() {
+    let all = soup::packages();
+    assert!(all.len() > 100, "{}", all.len());
+    let of = |name: &str| {
+        all.iter()
+            .find(|p| p.name == name)
+            .unwrap_or_else(|| panic!("no {name}"))
+    };
+    assert_eq!(
+        (of("iceoryx2").of, of("iceoryx2").licence.as_str()),
+        ("both", "MIT OR Apache-2.0")
+    );
+    assert!(!of("iceoryx2").known_anomalies.is_empty());
+    assert_eq!(of("egui").of, "host-ui");
+    assert!(
+        all.iter()
+            .all(|p| !p.name.starts_with("stylet-") && p.name != "host-ui")
+    );
+}
+
+#[test]
+fn the_page_says_what_it_is_not() {
+    let page = page::page(&credibility(Vec::new()));
+    for words in [
+        "claims conformity with none",
+        "not a medical device",
+        "IEC 62304",
+        "ISO 14971",
+        "IEC 60601-1",
+        "no run given",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
+    // Every link has its place.
+    for link in page.split("href=\"#").skip(1) {
+        let id = link.split('"').next().expect("closed");
+        assert!(page.contains(&format!("id=\"{id}\"")), "{id}");
+    }
+}
+
+#[test]
+fn outcomes_of_a_run_stand_beside_their_requirement_and_an_altered_run_is_refused() {
+    let folder = std::env::temp_dir().join(format!("stylet-credibility-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("made");
+    let text = format!(
+        "{{\"schema\": \"stylet.latency/1\", \"sha256\": \"{NO_DIGEST}\", \"verdict\": {{\"overall\": \"FAIL\", \"limits\": \
+         [{{\"id\": \"REQ-LAT-002\", \"outcome\": \"FAIL\"}}]}}, \"protocol\": {{\"measured_s\": 60.0}}}}\n"
+    );
+    let digest = sha256(text.as_bytes());
+    let text = text.replacen(NO_DIGEST, &digest, 1);
+    std::fs::write(folder.join("report.json"), &text).expect("written");
+    let file = credibility(vec![runs::read(&folder).expect("unaltered")]);
+    let of = |id: &str| {
+        &file
+            .requirements
+            .iter()
+            .find(|t| t.requirement.id == id)
+            .expect("there")
+            .outcomes
+    };
+    assert_eq!(*of("REQ-LAT-002"), [(1, "FAIL".to_owned())]);
+    assert!(of("REQ-LAT-001").is_empty());
+    assert!(page::page(&file).contains("id=\"RUN-1\""));
+    std::fs::write(folder.join("report.json"), text.replacen("FAIL", "PASS", 1)).expect("written");
+    assert!(
+        runs::read(&folder)
+            .expect_err("altered")
+            .to_string()
+            .contains("altered")
+    );
+    std::fs::remove_dir_all(folder).expect("ours");
+}

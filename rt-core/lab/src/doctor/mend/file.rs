@@ -1,0 +1,160 @@
+//! Settings that were changed, as the file from which they are undone.
+
+use super::MendError;
+use crate::doctor::tunable::{self, Tunable};
+use crate::machine::Machine;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+const SCHEMA: &str = "stylet.settings/1";
+
+/// How far a change is.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum State {
+    Planned,
+    Applied,
+    /// The kernel did not take it: its reason.
+    Refused(String),
+    Undone,
+    /// Somebody else has changed it since: its value; it was left alone.
+    Foreign(String),
+}
+
+/// One setting.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Change {
+    pub check: String,
+    /// Without the leading slash.
+    pub path: String,
+    pub before: String,
+    pub after: String,
+    pub state: State,
+}
+
+/// All of them, in the order in which they are applied; undone the other way round.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Changes {
+    schema: String,
+    /// Which start of the PC: a restart undoes them by itself.
+    boot: String,
+    pub changes: Vec<Change>,
+}
+
+fn boot() -> String {
+    let id = std::fs::read_to_string("/proc/sys/kernel/random/boot_id");
+    id.unwrap_or_default().trim().to_owned()
+}
+
+impl Changes {
+    /// Those that are not met, not applied yet.
+    pub fn planned(tunables: &[Tunable]) -> Self {
+        let open = tunables.iter().filter(|t| !t.is_met());
+        Self {
+            schema: SCHEMA.to_owned(),
+            boot: boot(),
+            changes: open
+                .map(|t| Change {
+                    check: t.check.to_owned(),
+                    path: t.path.clone(),
+                    before: t.now.clone(),
+                    after: t.wanted.clone(),
+                    state: State::Planned,
+                })
+                .collect(),
+        }
+    }
+
+    /// A path that leads out of `/proc` and `/sys` is none that this program wrote.
+    pub fn read(path: &Path) -> Result<Self, MendError> {
+        let failed = |why: String| MendError::Undo {
+            path: path.to_owned(),
+            why,
+        };
+        let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
+        let read: Self = serde_json::from_str(&text).map_err(|e| failed(format!("not a file of settings: {e}")))?;
+        if read.schema != SCHEMA {
+            return Err(failed(format!("expected schema {SCHEMA}, found {:?}", read.schema)));
+        }
+        let inside = |c: &Change| (c.path.starts_with("proc/") || c.path.starts_with("sys/")) && !c.path.contains("..");
+        match read.changes.iter().find(|c| !inside(c)) {
+            Some(c) => Err(failed(format!("/{} is not a setting of the kernel", c.path))),
+            None => Ok(read),
+        }
+    }
+
+    pub fn text(&self) -> String {
+        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
+
+    /// Writes each value and reads it back.
+    pub fn apply(&mut self, machine: &Machine) {
+        for change in &mut self.changes {
+            change.state = match put(machine, &change.path, &change.after) {
+                Ok(()) => State::Applied,
+                Err(why) => State::Refused(why),
+            };
+        }
+    }
+
+    /// Gives each applied setting its value from before, unless somebody else has changed it since.
+    ///
+    /// A change that is only planned may have been made: the program was killed between both writes of its file.
+    pub fn undo(&mut self, machine: &Machine) {
+        for change in self.changes.iter_mut().rev() {
+            if !matches!(change.state, State::Applied | State::Planned | State::Foreign(_)) {
+                continue;
+            }
+            let now = tunable::value(machine, &change.path).unwrap_or_default();
+            change.state = if now == change.before {
+                State::Undone
+            } else if now != change.after {
+                State::Foreign(now)
+            } else {
+                match put(machine, &change.path, &change.before) {
+                    Ok(()) => State::Undone,
+                    Err(why) => State::Refused(why),
+                }
+            };
+        }
+    }
+
+    pub fn any_refused(&self) -> bool {
+        let refused = |c: &Change| matches!(c.state, State::Refused(_) | State::Foreign(_));
+        self.changes.iter().any(refused)
+    }
+
+    /// Nothing of it is in force, or the PC was restarted since.
+    pub fn is_undone(&self) -> bool {
+        let done = |c: &Change| matches!(c.state, State::Undone | State::Refused(_));
+        self.boot != boot() || self.changes.iter().all(done)
+    }
+
+    /// A line for each.
+    pub fn words(&self) -> String {
+        let line = |c: &Change| {
+            let state = match &c.state {
+                State::Planned => "planned".to_owned(),
+                State::Applied => "changed".to_owned(),
+                State::Undone => "undone".to_owned(),
+                State::Refused(why) => format!("REFUSED: {why}"),
+                State::Foreign(now) => format!("LEFT ALONE: is {now} now, changed by somebody else"),
+            };
+            let (from, to) = match c.state {
+                State::Undone => (&c.after, &c.before),
+                _ => (&c.before, &c.after),
+            };
+            format!("{:<16} /{}: {from} -> {to}   {state}\n", c.check, c.path)
+        };
+        self.changes.iter().map(line).collect()
+    }
+}
+
+fn put(machine: &Machine, path: &str, value: &str) -> Result<(), String> {
+    std::fs::write(machine.path(path), value).map_err(|e| e.to_string())?;
+    match tunable::value(machine, path) {
+        Some(now) if now == value => Ok(()),
+        now => Err(format!("the kernel took it, and reports {:?}", now.unwrap_or_default())),
+    }
+}

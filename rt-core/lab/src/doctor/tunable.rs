@@ -1,0 +1,259 @@
+//! Settings of the kernel that are files: what each is now, what it should be, and what it costs the loop otherwise.
+
+use super::{Finding, FindingLevel};
+use crate::machine::{Machine, Throttle, core_list, cores};
+
+/// A setting that can be changed while the PC runs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Tunable {
+    /// The check that looks at it.
+    pub check: &'static str,
+    /// Without the leading slash.
+    pub path: String,
+    pub now: String,
+    pub wanted: String,
+}
+
+impl Tunable {
+    pub fn is_met(&self) -> bool {
+        self.now == self.wanted
+    }
+}
+
+/// The value in force: of `a [b] c` the word in brackets.
+pub fn value(machine: &Machine, path: &str) -> Option<String> {
+    let text = machine.text(path)?;
+    let chosen = text
+        .split_once('[')
+        .and_then(|(_, rest)| Some(rest.split_once(']')?.0.to_owned()));
+    Some(chosen.unwrap_or(text))
+}
+
+const CPU: &str = "sys/devices/system/cpu";
+/// Waking from a deeper sleep than this, in microseconds, is seen in the wake-up latency.
+const DEEP_US: u64 = 20;
+/// Seconds between two updates of the memory statistics; the default of 1 wakes a worker on every core each second.
+const STAT_INTERVAL: &str = "120";
+
+/// One that is looked at by a check of this file.
+struct Quiet {
+    check: &'static str,
+    path: &'static str,
+    wanted: &'static str,
+    level: FindingLevel,
+    good: &'static str,
+    bad: &'static str,
+}
+
+const QUIET: [Quiet; 5] = [
+    Quiet {
+        check: "NMI watchdog",
+        path: "proc/sys/kernel/nmi_watchdog",
+        wanted: "0",
+        level: FindingLevel::Warning,
+        good: "the watchdog of hard lock-ups is off",
+        bad: "the watchdog of hard lock-ups interrupts every core, even one whose interrupts are off",
+    },
+    Quiet {
+        check: "NUMA balancing",
+        path: "proc/sys/kernel/numa_balancing",
+        wanted: "0",
+        level: FindingLevel::Warning,
+        good: "the kernel leaves pages where they are",
+        bad: "the kernel unmaps pages to see who uses them: a loop then faults on memory that is locked",
+    },
+    Quiet {
+        check: "timer migration",
+        path: "proc/sys/kernel/timer_migration",
+        wanted: "0",
+        level: FindingLevel::Note,
+        good: "timers stay on the core that set them",
+        bad: "timers of idle cores move to busy ones, such as the core of the loop",
+    },
+    Quiet {
+        check: "statistics",
+        path: "proc/sys/vm/stat_interval",
+        wanted: STAT_INTERVAL,
+        level: FindingLevel::Note,
+        good: "memory statistics are seldom updated",
+        bad: "a worker updates memory statistics on every core each few seconds",
+    },
+    Quiet {
+        check: "PCIe power",
+        path: "sys/module/pcie_aspm/parameters/policy",
+        wanted: "performance",
+        level: FindingLevel::Note,
+        good: "PCIe links stay awake (ASPM performance)",
+        bad: "PCIe links may sleep (ASPM): a FireWire or USB device on them answers later",
+    },
+];
+
+/// Findings of the settings that only this file knows.
+pub fn findings(machine: &Machine) -> Vec<Finding> {
+    QUIET
+        .iter()
+        .map(|q| match value(machine, q.path) {
+            None => Finding::good(q.check, "this kernel has no such setting"),
+            Some(now) if met(q, &now) => Finding::good(q.check, q.good),
+            Some(now) => Finding::new(
+                q.check,
+                q.level,
+                format!("{} ({now})", q.bad),
+                format!("echo {} | sudo tee /{}", q.wanted, q.path),
+            ),
+        })
+        .collect()
+}
+
+/// An interval may be longer than the one wanted.
+fn met(q: &Quiet, now: &str) -> bool {
+    let number = |text: &str| text.parse::<u64>().ok();
+    match (q.wanted == STAT_INTERVAL, number(now), number(q.wanted)) {
+        (true, Some(now), Some(wanted)) => now >= wanted,
+        _ => now == q.wanted,
+    }
+}
+
+/// Every setting of this PC that `rt-core doctor --apply` may change, met or not, in the order of its change.
+pub fn all(machine: &Machine, core: usize) -> Vec<Tunable> {
+    let mut all = Vec::new();
+    let mut add = |check: &'static str, path: String, wanted: &str| {
+        if let Some(now) = value(machine, &path) {
+            all.push(Tunable {
+                check,
+                path,
+                now,
+                wanted: wanted.to_owned(),
+            });
+        }
+    };
+    for q in &QUIET {
+        // What is better than wanted stays.
+        let now = value(machine, q.path).filter(|now| met(q, now));
+        add(q.check, q.path.to_owned(), now.as_deref().unwrap_or(q.wanted));
+    }
+    for c in machine.online_cores() {
+        add(
+            "governor",
+            format!("{CPU}/cpu{c}/cpufreq/scaling_governor"),
+            "performance",
+        );
+        add(
+            "EPP",
+            format!("{CPU}/cpu{c}/cpufreq/energy_performance_preference"),
+            "performance",
+        );
+    }
+    for state in machine.names(&format!("{CPU}/cpu{core}/cpuidle")) {
+        let folder = format!("{CPU}/cpu{core}/cpuidle/{state}");
+        let us = machine
+            .text(&format!("{folder}/latency"))
+            .and_then(|t| t.parse::<u64>().ok());
+        if us.is_some_and(|us| us > DEEP_US) {
+            add("sleep states", format!("{folder}/disable"), "1");
+        }
+    }
+    let huge = "sys/kernel/mm/transparent_hugepage/enabled";
+    if value(machine, huge).as_deref() == Some("always") {
+        add("huge pages", huge.to_owned(), "madvise");
+    }
+    if matches!(machine.throttle(), Some(Throttle::Share(share)) if share < 0.9) {
+        add("throttling", "proc/sys/kernel/sched_rt_runtime_us".to_owned(), "950000");
+    }
+    let mut elsewhere = machine.online_cores();
+    elsewhere.remove(&core);
+    if !elsewhere.is_empty() {
+        for (number, _) in machine.interrupts_allowed_on(core) {
+            let path = format!("proc/irq/{number}/smp_affinity_list");
+            let mut wanted = cores(&machine.text(&path).unwrap_or_default());
+            wanted.remove(&core);
+            let wanted = if wanted.is_empty() { &elsewhere } else { &wanted };
+            add("interrupts", path, &as_kernel_prints(&core_list(wanted)));
+        }
+    }
+    all
+}
+
+/// `0,1,2` as `0-2`, so that what is read back is what was written.
+fn as_kernel_prints(list: &str) -> String {
+    let all: Vec<usize> = cores(list).into_iter().collect();
+    let mut ranges: Vec<(usize, usize)> = Vec::new();
+    for core in all {
+        match ranges.last_mut() {
+            Some((_, last)) if *last + 1 == core => *last = core,
+            _ => ranges.push((core, core)),
+        }
+    }
+    let words = ranges
+        .iter()
+        .map(|(a, b)| if a == b { a.to_string() } else { format!("{a}-{b}") });
+    words.collect::<Vec<String>>().join(",")
+}
+
+/// How the processor weighs speed against energy.
+pub fn energy_preference(machine: &Machine, core: usize) -> Finding {
+    let path = format!("{CPU}/cpu{core}/cpufreq/energy_performance_preference");
+    match machine.text(&path).as_deref() {
+        None => Finding::good("EPP", "the processor has no energy preference"),
+        Some("performance") => Finding::good("EPP", format!("core {core} prefers speed to energy")),
+        Some(other) => Finding::new(
+            "EPP",
+            FindingLevel::Warning,
+            format!("core {core} weighs energy against speed ({other})"),
+            "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/energy_performance_preference",
+        ),
+    }
+}
+
+/// Turbo: fast, but its speed depends on the heat and on what other cores do.
+pub fn turbo(machine: &Machine) -> Finding {
+    let off = "p50 is best with it, the same times again and again are had without it:";
+    let no_turbo = machine.text(&format!("{CPU}/intel_pstate/no_turbo"));
+    let boost = machine.text(&format!("{CPU}/cpufreq/boost"));
+    match (no_turbo.as_deref(), boost.as_deref()) {
+        (None, None) => Finding::good("turbo", "the kernel shows no turbo"),
+        (Some("1"), _) | (None, Some("0")) => {
+            Finding::good("turbo", "turbo is off: the speed does not depend on the heat")
+        }
+        (Some(_), _) => Finding::new(
+            "turbo",
+            FindingLevel::Note,
+            "turbo is on: the speed changes with heat and with other cores",
+            format!("{off} echo 1 | sudo tee /{CPU}/intel_pstate/no_turbo"),
+        ),
+        (None, Some(_)) => Finding::new(
+            "turbo",
+            FindingLevel::Note,
+            "turbo is on: the speed changes with heat and with other cores",
+            format!("{off} echo 0 | sudo tee /{CPU}/cpufreq/boost"),
+        ),
+    }
+}
+
+/// Profiles of tuned that do not save energy.
+const FAST: [&str; 6] = [
+    "realtime",
+    "realtime-virtual-host",
+    "realtime-virtual-guest",
+    "cpu-partitioning",
+    "latency-performance",
+    "network-latency",
+];
+
+/// A daemon that sets the same things by a profile.
+pub fn tuned(machine: &Machine) -> Finding {
+    let profile = machine.text("etc/tuned/active_profile").unwrap_or_default();
+    let fast = profile.split_whitespace().any(|p| FAST.contains(&p));
+    if !machine.runs("tuned") {
+        return Finding::good("tuned", "tuned does not run: no profile changes these settings");
+    }
+    if fast {
+        return Finding::good("tuned", format!("the profile of tuned is {profile}"));
+    }
+    Finding::new(
+        "tuned",
+        FindingLevel::Warning,
+        format!("tuned sets this PC by its profile {profile:?}, which is not one for low latency"),
+        "sudo tuned-adm profile realtime   (package tuned-profiles-realtime; else latency-performance)",
+    )
+}

@@ -1,0 +1,130 @@
+//! The delay from the pin to another input, with an uncertainty budget after the GUM (NIST TN 1297): each term named.
+
+use super::align::Alignment;
+use super::capture::{Capture, CaptureError, Channel};
+use serde::Serialize;
+
+/// One term of a budget, as a standard uncertainty.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Term {
+    pub name: &'static str,
+    /// A: by statistics of the readings. B: by other means.
+    pub kind: char,
+    pub why: String,
+    pub us: f64,
+}
+
+/// A delay with its uncertainty.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Delay {
+    pub channel: String,
+    pub pairs: usize,
+    pub mean_us: f64,
+    pub least_us: f64,
+    pub most_us: f64,
+    pub terms: Vec<Term>,
+    /// Standard uncertainty of the mean, all terms together.
+    pub combined_us: f64,
+    /// With a coverage factor of 2: about 95 %.
+    pub expanded_us: f64,
+}
+
+/// Later than this after its toggle an edge is not its answer.
+const LATEST_S: f64 = 0.5;
+/// Answers that must be there.
+const FEWEST: usize = 10;
+
+/// From each edge of the pin to the next one of `channel`, in seconds of our clock.
+pub fn delay(
+    capture: &Capture,
+    pin: &Channel,
+    alignment: &Alignment,
+    channel: &Channel,
+) -> Result<Delay, CaptureError> {
+    let mut delays: Vec<f64> = Vec::new();
+    for (i, &(_, edge)) in alignment.pairs.iter().enumerate() {
+        let at_s = pin.edges_s[edge];
+        let next_s = alignment
+            .pairs
+            .get(i + 1)
+            .map_or(f64::MAX, |&(_, next)| pin.edges_s[next]);
+        let place = channel.edges_s.partition_point(|e| *e < at_s);
+        if let Some(answer_s) = channel
+            .edges_s
+            .get(place)
+            .filter(|a| **a < next_s && **a - at_s < LATEST_S)
+        {
+            // The instrument's clock is not ours.
+            delays.push((answer_s - at_s) / (1.0 + alignment.drift));
+        }
+    }
+    if delays.len() < FEWEST || 2 * delays.len() < alignment.pairs.len() {
+        return Err(format!(
+            "{}: {} answers to {} edges of the pin; expected one to most of them",
+            channel.name,
+            delays.len(),
+            alignment.pairs.len()
+        )
+        .into());
+    }
+    let n = delays.len() as f64;
+    let mean_s = delays.iter().sum::<f64>() / n;
+    let scatter_s = (delays.iter().map(|d| (d - mean_s).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+    let term = |name, kind, seconds: f64, why: String| Term {
+        name,
+        kind,
+        why,
+        us: seconds * 1e6,
+    };
+    let terms = vec![
+        term(
+            "repeatability",
+            'A',
+            scatter_s / n.sqrt(),
+            format!(
+                "standard deviation {:.1} us of {n} delays, over the root of their number",
+                scatter_s * 1e6
+            ),
+        ),
+        term(
+            "sampling",
+            'B',
+            capture.step_s / 6_f64.sqrt(),
+            format!(
+                "both edges lie anywhere within a sample of {:.2} us (two rectangles); not averaged",
+                capture.step_s * 1e6
+            ),
+        ),
+        term(
+            "threshold",
+            'B',
+            (pin.rise_s.powi(2) + channel.rise_s.powi(2)).sqrt() / 12_f64.sqrt(),
+            format!(
+                "an edge lasts {:.2} and {:.2} us (rectangles)",
+                pin.rise_s * 1e6,
+                channel.rise_s * 1e6
+            ),
+        ),
+        term(
+            "clock of the instrument",
+            'B',
+            mean_s * alignment.drift_u,
+            format!(
+                "drift {:.3} ppm, known to {:.4} ppm, over the delay",
+                alignment.drift * 1e6,
+                alignment.drift_u * 1e6
+            ),
+        ),
+    ];
+    let combined_us = terms.iter().map(|t| t.us * t.us).sum::<f64>().sqrt();
+    Ok(Delay {
+        channel: channel.name.clone(),
+        pairs: delays.len(),
+        mean_us: mean_s * 1e6,
+        least_us: delays.iter().copied().fold(f64::MAX, f64::min) * 1e6,
+        most_us: delays.iter().copied().fold(0.0, f64::max) * 1e6,
+        terms,
+        combined_us,
+        expanded_us: 2.0 * combined_us,
+    })
+}

@@ -1,0 +1,104 @@
+//! The worst wake-up of each window over hours, part by part.
+
+use super::{BLUE, Decades, DrawError, FAINT, INK, ORANGE, decade_above, label, legend, number, picture_of};
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+const SIZE: (u32, u32) = (1_120, 320);
+
+/// One part of a campaign.
+pub struct MaximaPart<'a> {
+    pub name: &'a str,
+    /// Begin of each window in seconds since 1970, worst wake-up and longest tick in microseconds.
+    pub windows: Vec<(f64, f64, f64)>,
+}
+
+/// Begin and end of each window in seconds of measurement: breaks between sessions are left out.
+fn places(parts: &[MaximaPart], window_s: f64) -> Vec<Vec<(f64, f64)>> {
+    let mut at = 0.0;
+    let mut place = |part: &MaximaPart| {
+        let mut all = Vec::with_capacity(part.windows.len());
+        for (i, window) in part.windows.iter().enumerate() {
+            let next = part.windows.get(i + 1).map(|next| next.0 - window.0);
+            // A session that ended within a window leaves a shorter one.
+            let end = at + next.map_or(window_s, |gap| gap.clamp(0.0, window_s));
+            all.push((at, end));
+            at = end;
+        }
+        all
+    };
+    parts.iter().map(&mut place).collect()
+}
+
+/// Wake-ups and own work, logarithmic microseconds over hours; a line parts the parts.
+pub fn maxima(parts: &[MaximaPart], window_s: f64) -> Result<String, DrawError> {
+    picture_of(SIZE, |root| {
+        let places = places(parts, window_s);
+        let end_s = places.iter().flatten().map(|(_, end)| *end).fold(window_s, f64::max);
+        let (unit_s, unit) = if end_s >= 7_200.0 {
+            (3_600.0, "hours")
+        } else {
+            (60.0, "minutes")
+        };
+        let all = || parts.iter().flat_map(|p| p.windows.iter().flat_map(|w| [w.1, w.2]));
+        let low = all().fold(10.0, f64::min).max(0.1).log10().floor();
+        let high = decade_above(all().fold(10.0, f64::max) * 2.0);
+        let mut chart = ChartBuilder::on(root)
+            .margin(10)
+            .margin_right(22)
+            .set_label_area_size(LabelAreaPosition::Left, 58)
+            .set_label_area_size(LabelAreaPosition::Bottom, 40)
+            .build_cartesian_2d(0.0..end_s / unit_s, Decades(10_f64.powf(low)..high, number))?;
+        chart
+            .configure_mesh()
+            .disable_x_mesh()
+            .bold_line_style(FAINT)
+            .light_line_style(TRANSPARENT)
+            .axis_style(FAINT)
+            .x_desc(format!("{unit} of measurement"))
+            .y_desc("worst in a window, \u{b5}s")
+            .x_label_formatter(&|v| number(*v))
+            .label_style(label())
+            .draw()?;
+        for (part, at) in parts.iter().zip(&places) {
+            let begin = at.first().map_or(0.0, |(s, _)| s / unit_s);
+            if begin > 0.0 {
+                chart.draw_series([PathElement::new(
+                    [(begin, 10_f64.powf(low)), (begin, high)],
+                    INK.mix(0.4).stroke_width(1),
+                )])?;
+            }
+            let style = label().pos(Pos::new(HPos::Left, VPos::Bottom));
+            chart.draw_series([Text::new(
+                part.name.to_owned(),
+                (begin + 0.004 * end_s / unit_s, 10_f64.powf(low) * 1.1),
+                style,
+            )])?;
+            for (color, of) in [(BLUE, 1), (ORANGE, 2)] {
+                let steps = at.iter().zip(&part.windows).flat_map(|((from, to), w)| {
+                    let us = if of == 1 { w.1 } else { w.2 }.max(0.1);
+                    [(from / unit_s, us), (to / unit_s, us)]
+                });
+                chart.draw_series(LineSeries::new(steps, color.stroke_width(2)))?;
+            }
+        }
+        legend(root, &[("wake-up".to_owned(), BLUE), ("whole tick".to_owned(), ORANGE)])
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn breaks_between_sessions_take_no_room_and_short_windows_stay_short() {
+        let part = |begins: &[f64]| MaximaPart {
+            name: "none",
+            windows: begins.iter().map(|s| (*s, 10.0, 5.0)).collect(),
+        };
+        // The second window was cut short after 100 s; an hour passed between the third and the fourth.
+        let at = places(&[part(&[0.0, 300.0, 400.0, 4_000.0]), part(&[9_000.0])], 300.0);
+        let first = vec![(0.0, 300.0), (300.0, 400.0), (400.0, 700.0), (700.0, 1_000.0)];
+        assert_eq!(at, [first, vec![(1_000.0, 1_300.0)]]);
+    }
+}

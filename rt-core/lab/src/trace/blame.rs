@@ -1,0 +1,206 @@
+//! Causes of a late tick, from the pieces of time between its due time and its wake-up: kind, name, microseconds.
+
+use super::event::{Interruption, Task};
+use super::timeline::{Holder, Loop, Piece};
+use serde::Serialize;
+
+/// What kept the loop from its tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// A thread of higher real-time priority.
+    HigherPriority,
+    /// A thread of the same real-time priority.
+    SamePriority,
+    /// A thread that the kernel did not preempt: it was inside the kernel.
+    KernelWork,
+    /// The kernel held the loop back: its share of real-time work was used up.
+    Throttled,
+    /// The loop itself has lost its real-time priority.
+    LostPriority,
+    /// The loop was stopped by a signal or a debugger.
+    Stopped,
+    /// The loop waited in the kernel for something else than its time.
+    Blocked,
+    /// Handler of a device interrupt.
+    Interrupt,
+    /// Softirq.
+    SoftInterrupt,
+    /// An interrupt of the processor itself.
+    ProcessorInterrupt,
+    /// Timers of others that expired.
+    Timers,
+    /// The loop's own tick before had not ended.
+    OwnWork,
+    /// The loop's own tick took long and nothing interrupted it.
+    SlowWork,
+    /// No event at all: hypervisor, firmware, or a deep sleep state.
+    NothingRan,
+}
+
+/// One cause, with all pieces of time that it took.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cause {
+    pub kind: Kind,
+    /// The thread, interrupt or function by name.
+    pub who: String,
+    /// Number of the thread.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pid: Option<i32>,
+    /// `SCHED_FIFO` priority of the thread.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub priority: Option<i32>,
+    pub us: f64,
+    pub times: u32,
+    /// System call or work item that it was in.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inside: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub woken_by: Option<String>,
+}
+
+/// A piece without an event is not a wake-up of ordinary length from here on.
+const SILENT_NS: u64 = 20_000;
+/// Causes are kept from this share of the lateness on, and from [`LEAST_US`] on.
+const LEAST_SHARE: f64 = 0.1;
+const LEAST_US: f64 = 8.0;
+/// Causes of one tick at most.
+const MOST: usize = 4;
+/// Numbers of normal threads begin here.
+const NORMAL: i32 = 100;
+
+/// `SCHED_FIFO` priority behind the kernel's number; `None` for a normal thread.
+pub fn fifo(priority: i32) -> Option<i32> {
+    (0..NORMAL - 1).contains(&priority).then_some(NORMAL - 1 - priority)
+}
+
+/// The causes, longest first; `woke_ns` is when the loop's clock was read after its sleep.
+pub fn causes(pieces: &[Piece], woke_ns: u64) -> Vec<Cause> {
+    let late_us = pieces.iter().map(Piece::length_ns).sum::<u64>() as f64 / 1e3;
+    let mut all: Vec<Cause> = Vec::new();
+    // The loop still ran when its time came: the tick before had not ended.
+    let mut own_before = true;
+    for piece in pieces {
+        own_before &= piece.own == Loop::Running;
+        let working = piece.holder == Holder::OwnLoop && piece.from_ns >= woke_ns;
+        let found = if working {
+            Some(named(Kind::SlowWork, "the loop"))
+        } else {
+            cause(piece, own_before)
+        };
+        let Some(mut cause) = found else {
+            continue;
+        };
+        cause.us = piece.length_ns() as f64 / 1e3;
+        match all
+            .iter_mut()
+            .find(|c| c.kind == cause.kind && c.who == cause.who && c.pid == cause.pid)
+        {
+            Some(known) => {
+                known.us += cause.us;
+                known.times += 1;
+                known.inside = known.inside.take().or(cause.inside);
+            }
+            None => all.push(cause),
+        }
+    }
+    all.retain(|c| c.us >= LEAST_US && c.us >= LEAST_SHARE * late_us);
+    all.sort_by(|a, b| b.us.total_cmp(&a.us));
+    all.truncate(MOST);
+    all
+}
+
+fn named(kind: Kind, who: impl Into<String>) -> Cause {
+    Cause {
+        kind,
+        who: who.into(),
+        pid: None,
+        priority: None,
+        us: 0.0,
+        times: 1,
+        inside: None,
+        woken_by: None,
+    }
+}
+
+fn cause(piece: &Piece, own_before: bool) -> Option<Cause> {
+    let silent = piece.length_ns() > SILENT_NS;
+    match &piece.holder {
+        Holder::Interruption(i) => Some(interruption(i)),
+        _ if piece.own == Loop::Stopped => Some(named(Kind::Stopped, "the loop")),
+        _ if piece.own == Loop::Blocked => Some(named(Kind::Blocked, "the loop")),
+        Holder::OwnLoop if own_before => Some(named(Kind::OwnWork, "the tick before")),
+        Holder::OwnLoop => silent.then(|| named(Kind::NothingRan, "the loop")),
+        Holder::Idle(state) => {
+            if piece.own == Loop::Runnable && piece.passed_over {
+                return Some(named(Kind::Throttled, "the core stood idle"));
+            }
+            let who = state.map_or("the idle core".to_owned(), |s| format!("the core in sleep state {s}"));
+            silent.then(|| named(Kind::NothingRan, who))
+        }
+        Holder::Thread {
+            task,
+            call,
+            work,
+            woken_by,
+        } => {
+            let kind = of_thread(piece, task, call.is_some() || work.is_some(), silent)?;
+            Some(Cause {
+                pid: Some(task.pid),
+                priority: fifo(task.priority),
+                inside: call.clone().or_else(|| work.clone()),
+                woken_by: woken_by.clone(),
+                ..named(kind, &task.name)
+            })
+        }
+    }
+}
+
+fn of_thread(piece: &Piece, task: &Task, known_in_kernel: bool, silent: bool) -> Option<Kind> {
+    if piece.own != Loop::Runnable {
+        // Its time has come and no interrupt says so: interrupts are off, or nothing runs.
+        return silent.then_some(if known_in_kernel {
+            Kind::KernelWork
+        } else {
+            Kind::NothingRan
+        });
+    }
+    Some(match task.priority.cmp(&piece.own_priority) {
+        _ if piece.own_priority >= NORMAL => Kind::LostPriority,
+        std::cmp::Ordering::Less => Kind::HigherPriority,
+        std::cmp::Ordering::Equal => Kind::SamePriority,
+        std::cmp::Ordering::Greater if piece.passed_over => Kind::Throttled,
+        std::cmp::Ordering::Greater => Kind::KernelWork,
+    })
+}
+
+fn interruption(i: &Interruption) -> Cause {
+    match i {
+        Interruption::Irq(n, name) => named(Kind::Interrupt, format!("IRQ {n} ({name})")),
+        Interruption::Vector(name) => named(Kind::ProcessorInterrupt, name),
+        Interruption::Softirq(name) => named(Kind::SoftInterrupt, name),
+        Interruption::Timer(function) => named(Kind::Timers, function),
+    }
+}
+
+impl Kind {
+    /// Short, for a table.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::HigherPriority => "thread of higher priority",
+            Self::SamePriority => "thread of the same priority",
+            Self::KernelWork => "work inside the kernel",
+            Self::Throttled => "share of real-time work used up",
+            Self::LostPriority => "lost its priority",
+            Self::Stopped => "stopped by a signal",
+            Self::Blocked => "waited in the kernel",
+            Self::Interrupt => "device interrupt",
+            Self::SoftInterrupt => "softirq",
+            Self::ProcessorInterrupt => "interrupt of the processor",
+            Self::Timers => "timers of others",
+            Self::OwnWork => "the tick before had not ended",
+            Self::SlowWork => "slow work of the loop",
+            Self::NothingRan => "nothing ran",
+        }
+    }
+}

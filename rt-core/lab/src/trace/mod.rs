@@ -1,0 +1,102 @@
+//! The cause of each late tick, from the kernel's own trace.
+//!
+//! A trace instance runs in a bounded buffer ([`tracefs`]). After a late tick a thread of normal priority freezes it, reads
+//! it ([`witness`]), takes its lines as events ([`event`]), walks over them to see who had the core when ([`timeline`]),
+//! and names what stood between the tick's due time and its wake-up ([`blame`], [`words`]).
+
+mod blame;
+mod counters;
+mod event;
+#[cfg(test)]
+mod tests;
+mod timeline;
+mod tracefs;
+mod witness;
+mod words;
+
+pub use blame::{Cause, Kind};
+pub use tracefs::{Instance, TraceError, keep};
+pub use witness::{Watched, watch};
+
+use serde::Serialize;
+
+/// Late ticks that are kept with their trace; a later one takes the place of the least late.
+pub const KEPT: usize = 32;
+
+/// Which row of the picture a piece of time stands in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Lane {
+    Loop,
+    Threads,
+    Interrupts,
+    Idle,
+}
+
+/// Who had the core for how long, microseconds from the tick's due time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TracePiece {
+    pub from_us: f64,
+    pub us: f64,
+    pub lane: Lane,
+    pub who: String,
+}
+
+/// How often something was counted around a late tick.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Counted {
+    pub what: String,
+    pub times: u64,
+}
+
+/// A late tick with its causes.
+#[derive(Clone, Debug, Serialize)]
+pub struct Outlier {
+    #[serde(skip)]
+    pub due_ns: u64,
+    /// Seconds into the measurement.
+    pub at_s: f64,
+    pub wake_us: f64,
+    pub work_us: f64,
+    /// All causes in words.
+    pub cause: String,
+    pub causes: Vec<Cause>,
+    /// What the machine counted on this core in the `counted_over_ms` around it, the most frequent first.
+    pub counted: Vec<Counted>,
+    pub counted_over_ms: f64,
+    /// System management interrupts in the same time; absent where they cannot be counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub system_management_interrupts: Option<u64>,
+    /// The trace around it.
+    pub trace: Vec<TracePiece>,
+}
+
+/// What the trace of a run showed.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct TraceSection {
+    /// Why there is no trace.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub absent: Option<String>,
+    /// A tick counts as late from here on: wake-up, or wake-up and own work together.
+    pub over_us: f64,
+    pub buffer_kib_per_core: u64,
+    pub events: Vec<String>,
+    pub late_ticks: u64,
+    /// Late ticks without a trace, because the buffer was being read or did not reach back so far.
+    pub untraced: u64,
+    pub longest_read_ms: f64,
+    pub lost_events: u64,
+    /// The latest ones, in the order of time.
+    pub outliers: Vec<Outlier>,
+}
+
+impl TraceSection {
+    /// A run that was to be traced and could not be.
+    pub fn absent(over_ns: u64, why: &TraceError) -> Self {
+        Self {
+            absent: Some(why.to_string()),
+            over_us: over_ns as f64 / 1e3,
+            ..Self::default()
+        }
+    }
+}

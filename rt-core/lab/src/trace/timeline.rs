@@ -1,0 +1,221 @@
+//! Who had the core, from one event to the next: a walk over the events of one core.
+
+use super::event::{Event, Interruption, Task, What};
+use std::collections::BTreeMap;
+
+/// How the loop's own thread stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Loop {
+    /// Waits for its time.
+    Asleep,
+    /// Could run, and does not.
+    Runnable,
+    Running,
+    /// By a signal or a debugger.
+    Stopped,
+    /// Waits in the kernel for something else than its time.
+    Blocked,
+}
+
+/// Who had the core.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Holder {
+    /// Nobody: the sleep state, where it is known.
+    Idle(Option<u32>),
+    OwnLoop,
+    Thread {
+        task: Task,
+        /// The system call that it is in, as far as it is traced.
+        call: Option<String>,
+        /// The work item of a kernel worker.
+        work: Option<String>,
+        woken_by: Option<String>,
+    },
+    Interruption(Interruption),
+}
+
+/// A stretch of time between two events.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Piece {
+    pub from_ns: u64,
+    pub to_ns: u64,
+    pub holder: Holder,
+    pub own: Loop,
+    /// Priority with which the loop was woken last, the kernel's number.
+    pub own_priority: i32,
+    /// Another thread, or none, was given the core while the loop could run.
+    pub passed_over: bool,
+}
+
+impl Piece {
+    pub fn length_ns(&self) -> u64 {
+        self.to_ns - self.from_ns
+    }
+}
+
+/// The walk's state.
+struct Walk {
+    own_pid: i32,
+    own: Loop,
+    own_priority: i32,
+    passed_over: bool,
+    current: Task,
+    interruptions: Vec<Interruption>,
+    idle: Option<u32>,
+    calls: BTreeMap<i32, String>,
+    work: BTreeMap<i32, String>,
+    wakers: BTreeMap<i32, String>,
+}
+
+/// The pieces of `[from_ns, to_ns]` on the core of `events`; `own_pid` is the loop's thread, `own_priority` the kernel's
+/// number of its priority. `None` where the events begin later.
+pub fn pieces(events: &[Event], own_pid: i32, own_priority: i32, from_ns: u64, to_ns: u64) -> Option<Vec<Piece>> {
+    let first = events.first().filter(|e| e.at_ns <= from_ns)?;
+    let mut walk = Walk::begin(first, events, own_pid, own_priority);
+    let mut pieces: Vec<Piece> = Vec::new();
+    let mut last_ns = first.at_ns;
+    for e in events {
+        let at_ns = e.at_ns.max(last_ns);
+        push(&mut pieces, &walk, last_ns.max(from_ns), at_ns.min(to_ns));
+        walk.take(e);
+        last_ns = at_ns;
+        if last_ns >= to_ns {
+            break;
+        }
+    }
+    push(&mut pieces, &walk, last_ns.max(from_ns), to_ns);
+    Some(pieces)
+}
+
+fn push(pieces: &mut Vec<Piece>, walk: &Walk, from_ns: u64, to_ns: u64) {
+    if from_ns < to_ns {
+        pieces.push(Piece {
+            from_ns,
+            to_ns,
+            holder: walk.holder(),
+            own: walk.own,
+            own_priority: walk.own_priority,
+            passed_over: walk.passed_over,
+        });
+    }
+}
+
+impl Walk {
+    /// The loop's own state at the begin follows from the first event that names it.
+    fn begin(first: &Event, events: &[Event], own_pid: i32, own_priority: i32) -> Self {
+        let named = events.iter().find_map(|e| match &e.what {
+            What::Switch { from, .. } if from.pid == own_pid => Some(Loop::Running),
+            What::Switch { to, .. } if to.pid == own_pid => Some(Loop::Runnable),
+            What::Waking(task) if task.pid == own_pid => Some(Loop::Asleep),
+            _ if e.pid == own_pid => Some(Loop::Running),
+            _ => None,
+        });
+        // The thread that has the core at the begin: its priority is in the switch that takes the core away.
+        let current = events.iter().find_map(|e| match &e.what {
+            What::Switch { from, .. } => Some(from.clone()),
+            _ => None,
+        });
+        let unknown = || Task {
+            name: first.name.clone(),
+            pid: first.pid,
+            priority: 120,
+        };
+        Self {
+            own_pid,
+            own: named.unwrap_or(Loop::Asleep),
+            own_priority,
+            passed_over: false,
+            current: current.filter(|t| t.pid == first.pid).unwrap_or_else(unknown),
+            interruptions: Vec::new(),
+            idle: None,
+            calls: BTreeMap::new(),
+            work: BTreeMap::new(),
+            wakers: BTreeMap::new(),
+        }
+    }
+
+    fn holder(&self) -> Holder {
+        if let Some(i) = self.interruptions.last() {
+            return Holder::Interruption(i.clone());
+        }
+        let pid = self.current.pid;
+        if pid == 0 {
+            Holder::Idle(self.idle)
+        } else if pid == self.own_pid {
+            Holder::OwnLoop
+        } else {
+            Holder::Thread {
+                task: self.current.clone(),
+                call: self.calls.get(&pid).cloned(),
+                work: self.work.get(&pid).cloned(),
+                woken_by: self.wakers.get(&pid).cloned(),
+            }
+        }
+    }
+
+    fn take(&mut self, e: &Event) {
+        match &e.what {
+            What::Switch { from, left_as, to } => self.switch(from.pid, *left_as, to),
+            What::Waking(task) => self.waking(e, task),
+            What::Begin(i) => self.interruptions.push(i.clone()),
+            What::End(i) => self.end(i),
+            What::Idle(state) => self.idle = *state,
+            What::WorkBegin(function) => drop(self.work.insert(e.pid, function.clone())),
+            What::WorkEnd => drop(self.work.remove(&e.pid)),
+            What::CallBegin(name) => drop(self.calls.insert(e.pid, name.clone())),
+            What::CallEnd => drop(self.calls.remove(&e.pid)),
+            What::Other => {}
+        }
+    }
+
+    fn switch(&mut self, from: i32, left_as: char, to: &Task) {
+        if from == self.own_pid {
+            self.own = match left_as {
+                'R' => Loop::Runnable,
+                'T' | 't' => Loop::Stopped,
+                'D' => Loop::Blocked,
+                _ => Loop::Asleep,
+            };
+            self.passed_over = self.own == Loop::Runnable && to.priority > self.own_priority;
+        }
+        if to.pid == self.own_pid {
+            (self.own, self.own_priority, self.passed_over) = (Loop::Running, to.priority, false);
+        } else if self.own == Loop::Runnable {
+            // The idle thread has the number of the least urgent normal thread.
+            self.passed_over |= to.pid == 0 || to.priority > self.own_priority;
+        }
+        // A switch happens in no interrupt: an end that the buffer lost must not stay for ever.
+        self.interruptions.clear();
+        self.current = to.clone();
+    }
+
+    fn waking(&mut self, e: &Event, task: &Task) {
+        if task.pid == self.own_pid {
+            self.own_priority = task.priority;
+            if matches!(self.own, Loop::Asleep | Loop::Blocked | Loop::Stopped) {
+                (self.own, self.passed_over) = (Loop::Runnable, false);
+            }
+            return;
+        }
+        let waker = match self.interruptions.first() {
+            Some(Interruption::Irq(n, name)) => format!("IRQ {n} ({name})"),
+            Some(Interruption::Softirq(name)) => format!("softirq {name}"),
+            Some(Interruption::Vector(name)) => format!("{name} interrupt"),
+            Some(Interruption::Timer(function)) => format!("timer {function}"),
+            _ => e.name.clone(),
+        };
+        self.wakers.insert(task.pid, waker);
+    }
+
+    /// Ends the innermost interruption of this kind, and those inside it whose end was lost.
+    fn end(&mut self, i: &Interruption) {
+        let same = |open: &Interruption| match (open, i) {
+            (Interruption::Irq(a, _), Interruption::Irq(b, _)) => a == b,
+            (Interruption::Timer(_), Interruption::Timer(_)) => true,
+            (a, b) => a == b,
+        };
+        if let Some(place) = self.interruptions.iter().rposition(same) {
+            self.interruptions.truncate(place);
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! A pin that the force loop toggles for an instrument outside: a register of a serial or parallel port.
+//!
+//! One instruction writes it, without a system call, so that the contract of the loops holds. The right to the register is
+//! taken before the threads start, which inherit it.
+
+use std::str::FromStr;
+
+/// A register with its two values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pin {
+    port: u16,
+    values: [u8; 2],
+}
+
+/// Offset of the modem control register of a serial port (16550).
+const MODEM_CONTROL: u16 = 4;
+const DTR: u8 = 1;
+const RTS: u8 = 2;
+/// Connects the interrupt of a serial port; its driver has set it.
+const OUT2: u8 = 8;
+/// Ticks between two edges are this and up to 63 more.
+const FEWEST_TICKS: u32 = 20;
+
+/// Why a pin cannot be toggled; for people.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct PinError(String);
+
+impl FromStr for Pin {
+    type Err = String;
+
+    /// `serial:0x3F8:rts`, `serial:0x3F8:dtr` or `parallel:0x378`, which toggles pin 2.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || format!("{text:?}: expected serial:0x3F8:rts, serial:0x3F8:dtr or parallel:0x378");
+        let address = |word: &str| {
+            let digits = word
+                .strip_prefix("0x")
+                .or(word.strip_prefix("0X"))
+                .ok_or_else(expected)?;
+            let port = u16::from_str_radix(digits, 16).map_err(|_| expected())?;
+            // Below are the controllers of the board: nothing there is a serial or parallel port.
+            (0x100..0xfff0).contains(&port).then_some(port).ok_or_else(expected)
+        };
+        let words: Vec<&str> = text.split(':').collect();
+        match words[..] {
+            ["serial", port, line @ ("rts" | "dtr")] => {
+                let bit = if line == "rts" { RTS } else { DTR };
+                Ok(Self {
+                    port: address(port)? + MODEM_CONTROL,
+                    values: [OUT2, OUT2 | bit],
+                })
+            }
+            ["parallel", port] => Ok(Self {
+                port: address(port)?,
+                values: [0, 1],
+            }),
+            _ => Err(expected()),
+        }
+    }
+}
+
+impl Pin {
+    /// Takes the right to the register for this thread and those that it starts; needs root.
+    ///
+    /// # Errors
+    /// The kernel refuses, or the processor has no such registers.
+    #[cfg(target_arch = "x86_64")]
+    pub fn acquire(self) -> Result<Toggle, PinError> {
+        // SAFETY: numbers only.
+        if unsafe { libc::ioperm(libc::c_ulong::from(self.port), 1, 1) } != 0 {
+            let why = std::io::Error::last_os_error();
+            return Err(PinError(format!(
+                "the port {:#x} may not be written ({why}): run as root",
+                self.port
+            )));
+        }
+        Ok(Toggle {
+            pin: self,
+            level: 0,
+            left: FEWEST_TICKS,
+            random: 1,
+        })
+    }
+
+    /// Takes the right to the register for this thread and those that it starts; needs root.
+    ///
+    /// # Errors
+    /// The processor has no such registers.
+    #[cfg(not(target_arch = "x86_64"))]
+    pub fn acquire(self) -> Result<Toggle, PinError> {
+        Err(PinError(
+            "this processor has no ports that a program can write".to_owned(),
+        ))
+    }
+}
+
+/// A pin that may be written, and when its next edge is due.
+#[derive(Clone, Copy, Debug)]
+pub struct Toggle {
+    pin: Pin,
+    level: usize,
+    left: u32,
+    random: u32,
+}
+
+impl Toggle {
+    /// Counts a tick; true when the pin was toggled in it. The times between edges are a pattern that repeats after hours,
+    /// so that a capture can be aligned with the record.
+    pub fn tick(&mut self) -> bool {
+        self.left -= 1;
+        if self.left > 0 {
+            return false;
+        }
+        self.level ^= 1;
+        self.write();
+        // xorshift32 (Marsaglia 2003).
+        self.random ^= self.random << 13;
+        self.random ^= self.random >> 17;
+        self.random ^= self.random << 5;
+        self.left = FEWEST_TICKS + self.random % 64;
+        true
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    fn write(&self) {
+        let value = self.pin.values[self.level];
+        // SAFETY: `acquire` has the right to this port for this thread; the instruction touches no memory.
+        unsafe {
+            std::arch::asm!("out dx, al", in("dx") self.pin.port, in("al") value, options(nomem, nostack, preserves_flags))
+        };
+    }
+
+    #[cfg(not(target_arch = "x86_64"))]
+    fn write(&self) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ports_are_read_and_what_is_none_is_refused() {
+        let pin = |text: &str| text.parse::<Pin>();
+        assert_eq!(
+            pin("serial:0x3F8:rts").map(|p| (p.port, p.values)),
+            Ok((0x3fc, [8, 10]))
+        );
+        assert_eq!(pin("serial:0x2f8:dtr").map(|p| (p.port, p.values)), Ok((0x2fc, [8, 9])));
+        assert_eq!(pin("parallel:0x378").map(|p| (p.port, p.values)), Ok((0x378, [0, 1])));
+        for none in [
+            "",
+            "serial:0x3F8",
+            "serial:0x3F8:cts",
+            "parallel:378",
+            "parallel:0x20",
+            "parallel:0xffff",
+        ] {
+            assert!(pin(none).is_err(), "{none}");
+        }
+    }
+
+    /// The emulated serial port of a virtual machine, where we may write it: what was written is read back. On another machine
+    /// something may be connected.
+    #[cfg(target_arch = "x86_64")]
+    #[test]
+    fn a_serial_port_takes_both_levels_in_a_pattern_without_equal_neighbours() {
+        let ports = std::fs::read_to_string("/proc/ioports").unwrap_or_default();
+        let emulated = std::fs::read_to_string("/proc/cpuinfo").is_ok_and(|c| c.contains(" hypervisor"));
+        let toggle = (emulated && ports.contains("03f8-03ff : serial"))
+            .then(|| "serial:0x3F8:rts".parse::<Pin>().expect("valid").acquire());
+        let Some(Ok(mut toggle)) = toggle else {
+            eprintln!("skipped: no serial port that may be written");
+            return;
+        };
+        let control = || {
+            let value: u8;
+            // SAFETY: `acquire` has the right to this port for this thread; reading it changes nothing.
+            unsafe {
+                std::arch::asm!("in al, dx", in("dx") 0x3fc_u16, out("al") value, options(nomem, nostack, preserves_flags))
+            };
+            value
+        };
+        let before = control();
+        let (mut edges, mut last) = (Vec::new(), 0);
+        for tick in 1..=10_000 {
+            if toggle.tick() {
+                let expected = toggle.pin.values[toggle.level];
+                assert_eq!(control() & 0x0f, expected);
+                edges.push(tick - last);
+                last = tick;
+            }
+        }
+        // SAFETY: as in `write`; the driver's own value comes back.
+        unsafe {
+            std::arch::asm!("out dx, al", in("dx") 0x3fc_u16, in("al") before, options(nomem, nostack, preserves_flags))
+        };
+        assert!(
+            edges.len() > 150 && edges[1..].iter().all(|n| (20..84).contains(n)),
+            "{edges:?}"
+        );
+        let runs = |length: usize| {
+            edges
+                .windows(length)
+                .map(<[i32]>::to_vec)
+                .collect::<std::collections::BTreeSet<_>>()
+        };
+        // Three gaps in sequence occur once.
+        assert_eq!(runs(3).len(), edges.len() - 2);
+    }
+}

@@ -1,0 +1,211 @@
+//! What is injected is named, and nothing is named that was not injected.
+
+use crate::inject::{ALL, Injection, NAME, Target};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use stylet_test_kit::{program, scratch};
+
+/// Of ten injections, so many must be named.
+const AT_LEAST: usize = 8;
+
+/// Why no trace can be had here; the tests then say so and end.
+fn no_trace() -> Option<String> {
+    // SAFETY: no preconditions.
+    if unsafe { libc::geteuid() } != 0 {
+        return Some("not root".to_owned());
+    }
+    let known = std::fs::read_to_string("/proc/filesystems").unwrap_or_default();
+    (!known.contains("tracefs")).then(|| "this kernel has no tracefs".to_owned())
+}
+
+fn start(out: &Path, seconds: u32, over_us: u64) -> Child {
+    Command::new(program("rt-core"))
+        .args(["latency", "--rt-if-allowed", "--trace", "--rounds", "0"])
+        .args(["--duration", &format!("{seconds}s")])
+        .args(["--trace-over-us", &over_us.to_string()])
+        .arg("--out")
+        .arg(out)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("rt-core starts")
+}
+
+/// The measurement, once its force loop runs.
+fn target(child: &Child) -> Target {
+    let process = child.id() as i32;
+    let begin = Instant::now();
+    while begin.elapsed() < Duration::from_secs(20) {
+        for task in std::fs::read_dir(format!("/proc/{process}/task"))
+            .into_iter()
+            .flatten()
+            .flatten()
+        {
+            let name = std::fs::read_to_string(task.path().join("comm")).unwrap_or_default();
+            if name.trim() == "haptic" {
+                let thread = task.file_name().to_string_lossy().parse().expect("a number");
+                let status = std::fs::read_to_string(task.path().join("status")).unwrap_or_default();
+                let core = status
+                    .lines()
+                    .find_map(|l| l.strip_prefix("Cpus_allowed_list:")?.trim().parse().ok());
+                if let Some(core) = core {
+                    return Target { process, thread, core };
+                }
+            }
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    panic!("the force loop did not start");
+}
+
+fn outliers(out: &Path) -> Vec<Value> {
+    let text = std::fs::read_to_string(out.join("report.json")).expect("rt-core wrote its report");
+    let report: Value = serde_json::from_str(&text).expect("the report is JSON");
+    let trace = &report["trace"];
+    assert!(trace["absent"].is_null(), "{}", trace["absent"]);
+    trace["outliers"].as_array().expect("a list").clone()
+}
+
+fn folder(name: &str) -> PathBuf {
+    scratch(&format!(
+        "lab-causes-{}",
+        name.replace(|c: char| !c.is_ascii_alphanumeric(), "-")
+    ))
+}
+
+/// The causes of each late tick, longest first.
+fn causes(outliers: &[Value]) -> Vec<Vec<Value>> {
+    outliers
+        .iter()
+        .map(|o| o["causes"].as_array().expect("a list").clone())
+        .collect()
+}
+
+/// No instance of a measurement that has ended is left in the kernel.
+fn instances_left(process: i32) -> bool {
+    let mounts = std::fs::read_to_string("/proc/mounts").unwrap_or_default();
+    let path = mounts
+        .lines()
+        .find_map(|l| l.split(' ').nth(1).filter(|_| l.contains(" tracefs ")));
+    path.is_some_and(|p| Path::new(p).join(format!("instances/stylet-{process}")).exists())
+}
+
+/// `Ok(true)` when at least two late ticks have the injected cause as their first one; the words that the report has for them.
+fn run(injection: &Injection) -> Result<(bool, String), String> {
+    let out = folder(injection.name);
+    let mut child = start(&out, 4, injection.over_us);
+    let target = target(&child);
+    std::thread::sleep(Duration::from_millis(1_200));
+    let injected = (injection.run)(target, Instant::now() + Duration::from_millis(2_500));
+    child.wait().expect("ours");
+    injected?;
+    let outliers = outliers(&out);
+    let named = causes(&outliers)
+        .iter()
+        .filter(|c| c.first().is_some_and(injection.is_named))
+        .count();
+    let example = outliers.iter().find(|o| {
+        o["causes"]
+            .as_array()
+            .is_some_and(|c| c.first().is_some_and(injection.is_named))
+    });
+    let example = example
+        .or(outliers.first())
+        .map_or("no late tick".to_owned(), |o| o["cause"].to_string());
+    assert!(!instances_left(target.process));
+    Ok((
+        named >= 2,
+        format!("{named} of {} late ticks: {example}", outliers.len()),
+    ))
+}
+
+/// A measurement into which nothing is injected.
+fn undisturbed(seconds: u32) {
+    let out = folder("undisturbed");
+    let mut child = start(&out, seconds, 100);
+    child.wait().expect("ours");
+    for (outlier, causes) in outliers(&out)
+        .iter()
+        .map(|o| (&o["cause"], o["causes"].as_array().expect("a list")))
+    {
+        for cause in causes {
+            let who = cause["who"].as_str().expect("a name");
+            let kind = cause["kind"].as_str().expect("a kind");
+            let injected = ["stopped", "throttled", "lost-priority", "same-priority", "timers"];
+            assert!(!who.starts_with(NAME) && !injected.contains(&kind), "{outlier}");
+        }
+    }
+}
+
+#[test]
+fn three_injected_causes_are_named_and_none_where_nothing_was_injected() {
+    if let Some(why) = no_trace() {
+        eprintln!("skipped: {why}");
+        return;
+    }
+    undisturbed(2);
+    for injection in &ALL[..3] {
+        let (is_named, said) = run(injection).expect("root is all that it needs");
+        assert!(is_named, "{}: {said}", injection.name);
+    }
+}
+
+/// `make causes`.
+#[test]
+#[ignore = "a minute; run by `make causes`"]
+fn eight_of_ten_injected_causes_are_named() {
+    if let Some(why) = no_trace() {
+        eprintln!("skipped: {why}");
+        return;
+    }
+    undisturbed(8);
+    let mut named = 0;
+    for injection in ALL {
+        let (is_named, said) = run(injection).unwrap_or_else(|why| (false, format!("not injected: {why}")));
+        named += usize::from(is_named);
+        eprintln!(
+            "{:<6} {:<52} {said}",
+            if is_named { "named" } else { "MISSED" },
+            injection.name
+        );
+    }
+    assert!(named >= AT_LEAST, "{named} of {} were named", ALL.len());
+}
+
+/// SIGKILL in the middle: the keeper removes the instance.
+#[test]
+fn a_killed_measurement_leaves_no_trace_instance() {
+    if let Some(why) = no_trace() {
+        eprintln!("skipped: {why}");
+        return;
+    }
+    let out = folder("killed");
+    let mut child = start(&out, 20, 1_000);
+    let target = target(&child);
+    let keeper = format!("trace-keeper\0stylet-{}", target.process);
+    let is_kept = || {
+        let all = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+        let mut lines = all.filter_map(|p| std::fs::read_to_string(p.path().join("cmdline")).ok());
+        lines.any(|l| l.contains(&keeper))
+    };
+    assert!(is_kept(), "no keeper");
+    child.kill().expect("ours");
+    child.wait().expect("ours");
+    let begin = Instant::now();
+    while is_kept() {
+        assert!(begin.elapsed() < Duration::from_secs(10), "the keeper did not end");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(!instances_left(target.process));
+    let left = std::fs::read_dir("/dev/shm").into_iter().flatten().flatten();
+    for file in left.filter(|f| {
+        f.file_name()
+            .to_string_lossy()
+            .contains(&format!("_lab-{}", target.process))
+    }) {
+        let path = file.path();
+        let _ = std::fs::remove_file(&path).or_else(|_| std::fs::remove_dir_all(&path));
+    }
+}
