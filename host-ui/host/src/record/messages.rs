@@ -86,6 +86,7 @@ impl Tick {
             tissue_tick: self.tissue_tick,
             world_from_tool: self.world_from_tool,
             buttons: self.buttons,
+            tip_deflection_m: self.tip_deflection_m,
             reserved: 0,
         }
     }
