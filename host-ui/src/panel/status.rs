@@ -12,7 +12,7 @@ use stylet_shm_schema::ParameterId;
 
 /// Narrower than this the bar takes two rows, or three. How many depends on the width alone, so that nothing moves.
 const ONE_ROW: f32 = 1240.0;
-const TWO_ROWS: f32 = 720.0;
+const TWO_ROWS: f32 = 780.0;
 
 /// Height of the bar without its margins.
 pub fn status_height(ui: &egui::Ui, width: f32) -> f32 {
@@ -181,12 +181,12 @@ fn figures_ui(ui: &mut egui::Ui, shown: &Shown) {
     let state = shown.state.as_ref();
     let na = || "n/a".to_owned();
     figure(ui, "phase", shown.phase(), 126.0);
-    figure(ui, "depth", &state.map_or_else(na, |s| format::length(s.depth_m)), 58.0);
+    figure(ui, "depth", &state.map_or_else(na, |s| format::length(s.depth_m)), 72.0);
     figure(
         ui,
         "speed",
         &state.map_or_else(na, |s| format::speed(s.speed_m_per_s)),
-        72.0,
+        92.0,
     );
 }
 

@@ -10,6 +10,10 @@ use crate::theme::{IMAGE, Tokens};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Vec2};
 use stylet_base::format;
 
+/// Height of a row of the legend, and the share of the picture that all of them may take.
+const ROW: f32 = 16.0;
+const MOST_SHARE: f32 = 0.5;
+
 pub struct Legend<'a> {
     pub painter: &'a Painter,
     pub rect: Rect,
@@ -118,6 +122,10 @@ impl Legend<'_> {
             let text = format!("{:.0} % isodose", LEVELS[shell.level] * 100.0);
             rows.push((text, IMAGE.isodose[shell.level], true));
         }
+        // In a small picture it would lie over what it explains.
+        if rows.len() as f32 * ROW > MOST_SHARE * self.rect.height() {
+            return;
+        }
         let mut place = self.rect.left_bottom() + Vec2::new(16.0, -14.0);
         for (name, color, filled) in rows.into_iter().rev() {
             if filled {
@@ -126,7 +134,7 @@ impl Legend<'_> {
                 self.painter.circle_stroke(place, 4.0, Stroke::new(1.5, color));
             }
             self.word(place + Vec2::new(11.0, 0.0), Align2::LEFT_CENTER, &name, t.weak);
-            place.y -= 16.0;
+            place.y -= ROW;
         }
     }
 }
