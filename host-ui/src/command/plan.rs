@@ -31,10 +31,11 @@ const HELP: &str = "\
 Without --seeds needles, seeds and one strength are searched for that keep the limits: target V100 at least 95 %, D90 100 to 125 %,
 V150 at most 60 %; urethra D10 at most 150 %, D30 130 %; rectum D2cc at most 100 %; at most 25 needles, none through bone. A limit
 that cannot be kept is reported. Within the limits the plan is robust: 95 % of 300 trials in which every seed misses its place by
-4 mm along each axis (standard deviation) keep a D90 of 90 % of the prescription. --robust asks for their mean or another percentile,
---misplacement-mm for another deviation, --errors-of takes shift, deviations and correlation from the seeds of a study. --compare
-searches for three plans, prints what each keeps and costs, and writes one of them. Where no urethra is known the plan is modified peripheral loading, and says so. With --seeds the plan
-is the seeds of a table (columns as in 'host-ui dose --help'), put on needles by their numbers, or by their lines where it has none.
+4 mm along each axis (standard deviation) keep a D90 of 90 % of the prescription. The option --robust asks for their mean or another
+percentile, --misplacement-mm for another deviation, and --errors-of takes shift, deviations and correlation from the seeds of a
+study. With --compare three plans are searched for: what each keeps and costs is printed, and one of them is written. Where no urethra
+is known the plan is modified peripheral loading, and says so. With --seeds the plan is the seeds of a table (columns as in
+'host-ui dose --help'), put on needles by their numbers, or by their lines where it has none.
 
 Units: mm, patient frame (RAS); strength in U (1 U = 1 cGy cm2/h).
 
