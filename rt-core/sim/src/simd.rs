@@ -1,5 +1,9 @@
 //! Which vector instructions the processor has, found when a model is built.
 
+mod eight;
+
+pub(crate) use eight::{Eight, LANES, Number, Vector, in_vectors};
+
 /// The results are the same with all of them: nothing is reordered or fused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Simd {
@@ -13,7 +17,7 @@ pub(crate) enum Simd {
 impl Simd {
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx512f") {
+        if std::arch::is_x86_feature_detected!("avx512f") && std::arch::is_x86_feature_detected!("avx512vl") {
             return Simd::Avx512;
         }
         #[cfg(target_arch = "x86_64")]
@@ -21,6 +25,17 @@ impl Simd {
             return Simd::Avx2;
         }
         Simd::Portable
+    }
+
+    /// Every set that this processor has.
+    #[cfg(test)]
+    pub fn all() -> Vec<Self> {
+        let best = Simd::detect();
+        #[cfg(target_arch = "x86_64")]
+        if best == Simd::Avx512 {
+            return vec![Simd::Portable, Simd::Avx2, best];
+        }
+        vec![Simd::Portable, best]
     }
 }
 
@@ -45,14 +60,14 @@ macro_rules! vectorised {
             }
 
             #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx512f")]
+            #[target_feature(enable = "avx512f,avx512vl")]
             fn avx512$(<$t: Real $(, $o: $bound<$t>)?>)?($($argument: $type),*) $(-> $result)? {
                 portable($($argument),*)
             }
 
             match simd {
                 #[cfg(target_arch = "x86_64")]
-                // SAFETY: `detect` has found AVX-512F.
+                // SAFETY: `detect` has found AVX-512F and VL.
                 Simd::Avx512 => unsafe { avx512($($argument),*) },
                 #[cfg(target_arch = "x86_64")]
                 // SAFETY: `detect` has found AVX2.

@@ -52,6 +52,16 @@ impl QueueProgress {
     }
 }
 
+/// What the next slice of work does.
+#[derive(Clone, Copy, Debug)]
+enum Slice {
+    /// Takes up the loads of eight columns.
+    Begin,
+    Solve,
+    /// Keeps the answer in this lane.
+    Keep(usize),
+}
+
 /// Columns of one line, ready ones first. Nothing is allocated after `new`.
 #[derive(Clone, Debug)]
 pub struct ColumnQueue<T = f32> {
@@ -65,7 +75,7 @@ pub struct ColumnQueue<T = f32> {
     state: BatchState<T>,
     /// An answer on its way into a column.
     unpacked: ElementField,
-    is_begun: bool,
+    next: Slice,
     tolerance: f64,
 }
 
@@ -103,7 +113,7 @@ impl<T: Compiled> ColumnQueue<T> {
             across,
             state: BatchState::new(model),
             unpacked: ElementField::zeros(model.element_count()),
-            is_begun: false,
+            next: Slice::Begin,
             tolerance,
         }
     }
@@ -152,39 +162,52 @@ impl<T: Compiled> ColumnQueue<T> {
     }
 
     fn slice(&mut self, model: &BatchModel<T>) {
-        if !self.is_begun {
-            let mut loads: [&[NodeWeight]; LOADS] = [&[]; LOADS];
-            let next = self.loads[self.ready..].iter();
-            let count = loads.iter_mut().zip(next).map(|(slot, load)| *slot = load).count();
-            self.state.begin(model, &loads[..count]);
-            self.is_begun = true;
-            return;
-        }
-        let progress = self.state.advance(model);
-        let is_done = progress.residual <= self.tolerance || progress.iterations >= MOST_ITERATIONS;
-        if self.state.is_whole() && is_done {
-            self.keep(model, progress.residual);
-        }
+        let columns = self.columns.len().min(self.ready + LOADS) - self.ready;
+        self.next = match self.next {
+            Slice::Begin => {
+                let mut loads: [&[NodeWeight]; LOADS] = [&[]; LOADS];
+                let next = self.loads[self.ready..].iter();
+                loads.iter_mut().zip(next).for_each(|(slot, load)| *slot = load);
+                self.state.begin(model, &loads[..columns]);
+                Slice::Solve
+            }
+            Slice::Solve => {
+                let progress = self.state.advance(model);
+                let is_done = progress.residual <= self.tolerance || progress.iterations >= MOST_ITERATIONS;
+                if self.state.is_whole() && is_done {
+                    Slice::Keep(0)
+                } else {
+                    Slice::Solve
+                }
+            }
+            Slice::Keep(lane) => {
+                self.keep(model, lane);
+                if lane + 1 < columns {
+                    Slice::Keep(lane + 1)
+                } else {
+                    self.ready += columns;
+                    Slice::Begin
+                }
+            }
+        };
     }
 
-    fn keep(&mut self, model: &BatchModel<T>, residual: f64) {
-        let end = self.columns.len().min(self.ready + LOADS);
+    fn keep(&mut self, model: &BatchModel<T>, lane: usize) {
         let (m, across) = (self.stations, self.across);
-        for (lane, column) in self.columns[self.ready..end].iter_mut().enumerate() {
-            let sampled = match column.load {
-                Load::Across(side, _) => &self.loads[2 * m + side * across..2 * m + (side + 1) * across],
-                _ => &self.loads[..2 * m],
-            };
-            for (value, weights) in column.samples_m.iter_mut().zip(sampled) {
-                *value = self.state.sample(lane, weights);
-            }
-            self.state.write(model, lane, &mut self.unpacked);
-            column.field.pack(&self.unpacked);
-            column.foundation_n = self.state.foundation_n(model, lane);
-            column.residual = residual;
+        let Some(column) = self.columns.get_mut(self.ready + lane) else {
+            return;
+        };
+        let sampled = match column.load {
+            Load::Across(side, _) => &self.loads[2 * m + side * across..2 * m + (side + 1) * across],
+            _ => &self.loads[..2 * m],
+        };
+        for (value, weights) in column.samples_m.iter_mut().zip(sampled) {
+            *value = self.state.sample(lane, weights);
         }
-        self.ready = end;
-        self.is_begun = false;
+        self.state.write(model, lane, &mut self.unpacked);
+        column.field.pack(&self.unpacked);
+        column.foundation_n = self.state.foundation_n(model, lane);
+        column.residual = self.state.progress().residual;
     }
 }
 

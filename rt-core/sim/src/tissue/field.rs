@@ -32,15 +32,12 @@ impl PackedField {
 
     /// Takes up a field of as many elements; what is not finite in it counts as zero. Does not allocate.
     pub fn pack(&mut self, field: &ElementField) {
-        let sizes = field.0.iter().flatten().map(|u| u.abs());
-        let largest = sizes.filter(|u| u.is_finite()).fold(0.0, f32::max);
+        let simd = Simd::detect();
+        let largest = field.0.iter().map(|u| largest(simd, u)).fold(0.0, f32::max);
         self.step_m = largest / f32::from(i16::MAX);
         let steps_per_m = if self.step_m > 0.0 { 1.0 / self.step_m } else { 0.0 };
         for (steps, u) in self.steps.iter_mut().zip(&field.0) {
-            for (steps, u) in steps.iter_mut().zip(u) {
-                // A cast of a float saturates, and takes NaN for 0.
-                *steps = (u * steps_per_m).round() as i16;
-            }
+            to_steps(simd, steps_per_m, u, steps);
         }
     }
 
@@ -58,6 +55,32 @@ impl PackedField {
     /// Bytes of the displacements.
     pub fn bytes(&self) -> usize {
         self.steps.iter().map(|axis| axis.len() * size_of::<i16>()).sum()
+    }
+}
+
+vectorised! {
+    /// Largest size among the numbers that are finite.
+    fn largest(u: &[f32]) -> f32 {
+        const TOGETHER: usize = 16;
+        let mut largest = [0.0_f32; TOGETHER];
+        let (blocks, rest) = u.as_chunks::<TOGETHER>();
+        let rest = rest.iter().map(|u| [*u; TOGETHER]);
+        for block in blocks.iter().copied().chain(rest) {
+            for n in 0..TOGETHER {
+                let size = block[n].abs();
+                largest[n] = if size > largest[n] && size < f32::INFINITY { size } else { largest[n] };
+            }
+        }
+        largest.into_iter().fold(0.0, f32::max)
+    }
+}
+
+vectorised! {
+    fn to_steps(steps_per_m: f32, u: &[f32], steps: &mut [i16]) {
+        for (steps, u) in steps.iter_mut().zip(u) {
+            // A cast of a float saturates, and takes NaN for 0.
+            *steps = (u * steps_per_m).round() as i16;
+        }
     }
 }
 

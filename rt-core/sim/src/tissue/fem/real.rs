@@ -2,9 +2,12 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
+use crate::simd::Number;
+
 /// `f32` or `f64`.
 pub trait Real:
-    Copy
+    Number
+    + Copy
     + Default
     + PartialEq
     + PartialOrd

@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use super::kernel::{PlaneOp, TwoPlanes, each, sweep};
+use super::Node;
+use super::kernel::{PlaneOp, TwoPlanes, answer, nothing, sweep};
 use super::level::{BatchLevel, BatchModel};
-use super::{LOADS, Node};
-use crate::simd::{Simd, vectorised};
+use crate::simd::{Vector, in_vectors};
 use crate::tissue::fem::real::Real;
 
 /// Part of the spectrum, from the top, that the smoother is for.
@@ -21,7 +21,7 @@ pub(super) struct Stage<T> {
 
 impl<T: Real> Stage<T> {
     pub fn new(level: &BatchLevel<T>) -> Self {
-        let zeros = || vec![[[T::ZERO; LOADS]; 3]; level.node_count];
+        let zeros = || vec![nothing(); level.node_count];
         Stage {
             x: zeros(),
             b: zeros(),
@@ -50,18 +50,18 @@ struct Step<'a, T> {
 
 impl<T: Real> PlaneOp<T> for Step<'_, T> {
     #[inline(always)]
-    fn plane(&mut self, at: Range<usize>, forces: &[Node<T>], x: &mut [Node<T>]) {
-        let known = self.inverse_diagonal[at.clone()]
-            .iter()
-            .zip(&self.b[at.clone()])
-            .zip(forces);
-        for (((&inverse, b), forces), (d, x)) in known.zip(self.d[at].iter_mut().zip(x)) {
-            let gain = self.gain * inverse;
+    fn plane<V: Vector<T>>(&mut self, at: Range<usize>, forces: &[Node<T>], springs: &[T], x: &mut [Node<T>]) {
+        let keep = V::splat(self.keep);
+        let known = self.inverse_diagonal[at.clone()].iter().zip(springs);
+        let known = known.zip(self.b[at.clone()].iter().zip(forces));
+        for (((&inverse, &spring), (b, forces)), (d, x)) in known.zip(self.d[at].iter_mut().zip(x)) {
+            let gain = V::splat(self.gain * inverse);
             for c in 0..3 {
-                let (b, f, d0, x0) = (b[c], forces[c], d[c], x[c]);
-                let d1 = each(|n| self.keep * d0[n] + gain * (b[n] - f[n]));
-                d[c] = d1;
-                x[c] = each(|n| x0[n] + d1[n]);
+                let x0 = V::load(&x[c]);
+                let left = V::load(&b[c]).sub(answer::<T, V>(&forces[c], spring, x0));
+                let d1 = keep.mul(V::load(&d[c])).add(gain.mul(left));
+                d1.store(&mut d[c]);
+                x0.add(d1).store(&mut x[c]);
             }
         }
     }
@@ -76,15 +76,17 @@ struct Residual<'a, T> {
 
 impl<T: Real> PlaneOp<T> for Residual<'_, T> {
     #[inline(always)]
-    fn plane(&mut self, at: Range<usize>, forces: &[Node<T>], _: &mut [Node<T>]) {
-        let known = self.inverse_diagonal[at.clone()]
-            .iter()
-            .zip(&self.b[at.clone()])
-            .zip(forces);
-        for (((&inverse, b), forces), r) in known.zip(&mut self.r[at]) {
+    fn plane<V: Vector<T>>(&mut self, at: Range<usize>, forces: &[Node<T>], springs: &[T], x: &mut [Node<T>]) {
+        let known = self.inverse_diagonal[at.clone()].iter().zip(springs);
+        let known = known.zip(self.b[at.clone()].iter().zip(forces));
+        for (((&inverse, &spring), (b, forces)), (r, x)) in known.zip(self.r[at].iter_mut().zip(x)) {
+            if inverse == T::ZERO {
+                *r = nothing();
+                continue;
+            }
             for c in 0..3 {
-                let (b, f) = (b[c], forces[c]);
-                r[c] = each(|n| if inverse == T::ZERO { T::ZERO } else { b[n] - f[n] });
+                let force = answer::<T, V>(&forces[c], spring, V::load(&x[c]));
+                V::load(&b[c]).sub(force).store(&mut r[c]);
             }
         }
     }
@@ -110,15 +112,15 @@ pub(super) fn smooth<T: Real>(level: &BatchLevel<T>, stage: &mut Stage<T>, work:
     sweep(level.simd, level, &mut stage.x, work, &mut op);
 }
 
-vectorised! {
-fn first_step<T>(level: &BatchLevel<T>, gain: T, stage: &mut Stage<T>) {
+in_vectors! {
+fn first_step<T: Real, V>(level: &BatchLevel<T>, gain: T, stage: &mut Stage<T>) {
     let known = level.inverse_diagonal.iter().zip(&stage.b);
     for ((&inverse, b), (d, x)) in known.zip(stage.d.iter_mut().zip(&mut stage.x)) {
-        let gain = gain * inverse;
+        let gain = V::splat(gain * inverse);
         for c in 0..3 {
-            let b = b[c];
-            d[c] = each(|n| gain * b[n]);
-            x[c] = d[c];
+            let step = gain.mul(V::load(&b[c]));
+            step.store(&mut d[c]);
+            step.store(&mut x[c]);
         }
     }
 }
@@ -140,41 +142,41 @@ pub(super) fn restrict<T: Real>(
     share_out(level.simd, level, &fine.d, &mut coarse.b);
 }
 
-vectorised! {
-fn share_out<T>(level: &BatchLevel<T>, r: &[Node<T>], b: &mut [Node<T>]) {
-    b.fill([[T::ZERO; LOADS]; 3]);
-    for (node, r) in r.iter().enumerate() {
-        let parents = &level.parents[level.first_parent[node] as usize..level.first_parent[node + 1] as usize];
-        let weight = T::of(1.0 / parents.len() as f64);
-        for &parent in parents {
-            for (b, r) in b[parent as usize].iter_mut().zip(r) {
-                let (b0, r) = (*b, *r);
-                *b = each(|n| b0[n] + weight * r[n]);
+/// What each of so many parents takes of a node; there are eight at most.
+fn weights<T: Real>() -> [T; 9] {
+    std::array::from_fn(|count| T::of(1.0 / count.max(1) as f64))
+}
+
+in_vectors! {
+fn share_out<T: Real, V>(level: &BatchLevel<T>, r: &[Node<T>], b: &mut [Node<T>]) {
+    b.fill(nothing());
+    let weights = weights();
+    for (parents, r) in level.parents().zip(r) {
+        let weight = V::splat(weights[parents.len() % weights.len()]);
+        for c in 0..3 {
+            let share = weight.mul(V::load(&r[c]));
+            for &parent in parents {
+                let b = &mut b[parent as usize][c];
+                V::load(b).add(share).store(b);
             }
         }
     }
 }
 }
 
-vectorised! {
+in_vectors! {
 /// Adds what the coarser level says to free nodes.
-fn prolong<T>(level: &BatchLevel<T>, coarse: &[Node<T>], x: &mut [Node<T>]) {
-    for (node, x) in x.iter_mut().enumerate() {
-        if level.inverse_diagonal[node] == T::ZERO {
-            continue;
-        }
-        let parents = &level.parents[level.first_parent[node] as usize..level.first_parent[node + 1] as usize];
-        let weight = T::of(1.0 / parents.len() as f64);
-        let mut sum = [[T::ZERO; LOADS]; 3];
-        for &parent in parents {
-            for (sum, from) in sum.iter_mut().zip(&coarse[parent as usize]) {
-                let (s, f) = (*sum, *from);
-                *sum = each(|n| s[n] + f[n]);
+fn prolong<T: Real, V>(level: &BatchLevel<T>, coarse: &[Node<T>], x: &mut [Node<T>]) {
+    let weights = weights();
+    let nodes = level.parents().zip(&level.inverse_diagonal).zip(x);
+    for ((parents, _), x) in nodes.filter(|((_, inverse), _)| **inverse != T::ZERO) {
+        let weight = V::splat(weights[parents.len() % weights.len()]);
+        for c in 0..3 {
+            let mut sum = V::splat(T::ZERO);
+            for &parent in parents {
+                sum = sum.add(V::load(&coarse[parent as usize][c]));
             }
-        }
-        for (x, sum) in x.iter_mut().zip(sum) {
-            let x0 = *x;
-            *x = each(|n| x0[n] + weight * sum[n]);
+            V::load(&x[c]).add(weight.mul(sum)).store(&mut x[c]);
         }
     }
 }
@@ -186,17 +188,19 @@ pub(super) fn solve_coarsest<T: Real>(model: &BatchModel<T>, stage: &mut Stage<T
     multiply(simd, &model.coarsest, &model.coarsest_nodes, &stage.b, &mut stage.x);
 }
 
-vectorised! {
-fn multiply<T>(matrix: &[T], nodes: &[u32], b: &[Node<T>], x: &mut [Node<T>]) {
-    x.fill([[T::ZERO; LOADS]; 3]);
+in_vectors! {
+fn multiply<T: Real, V>(matrix: &[T], nodes: &[u32], b: &[Node<T>], x: &mut [Node<T>]) {
+    x.fill(nothing());
     let size = 3 * nodes.len();
     for (row, values) in matrix.chunks_exact(size.max(1)).enumerate() {
-        let mut sum = [T::ZERO; LOADS];
-        for (column, &value) in values.iter().enumerate() {
-            let (s, b) = (sum, b[nodes[column / 3] as usize][column % 3]);
-            sum = each(|n| s[n] + value * b[n]);
+        let mut sum = V::splat(T::ZERO);
+        for (values, &node) in values.as_chunks::<3>().0.iter().zip(nodes) {
+            let b = &b[node as usize];
+            for c in 0..3 {
+                sum = sum.add(V::splat(values[c]).mul(V::load(&b[c])));
+            }
         }
-        x[nodes[row / 3] as usize][row % 3] = sum;
+        sum.store(&mut x[nodes[row / 3] as usize][row % 3]);
     }
 }
 }

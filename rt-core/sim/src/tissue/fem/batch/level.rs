@@ -1,6 +1,7 @@
 //! The levels of a model with only the nodes in use, numbered x fastest.
 
 use super::LOADS;
+use super::kernel::{nothing, product};
 use crate::scene::Lattice;
 use crate::simd::Simd;
 use crate::tissue::fem::level::Level;
@@ -208,17 +209,17 @@ impl<T: Real> BatchModel<T> {
         let size = 3 * self.coarsest_nodes.len();
         let mut matrix = nalgebra::DMatrix::<f64>::zeros(size, size);
         let nodes = &self.coarsest_nodes;
-        let mut x = vec![[[T::ZERO; LOADS]; 3]; level.node_count];
+        let mut x = vec![nothing(); level.node_count];
         for first in (0..size).step_by(LOADS) {
             let columns = first..size.min(first + LOADS);
             for (lane, c) in columns.clone().enumerate() {
-                x[nodes[c / 3] as usize][c % 3][lane] = T::of(1.0);
+                x[nodes[c / 3] as usize][c % 3].0[lane] = T::of(1.0);
             }
-            let forces = super::kernel::product(level, &mut x);
+            let forces = product(level, &mut x);
             for (lane, c) in columns.enumerate() {
-                x[nodes[c / 3] as usize][c % 3][lane] = T::ZERO;
+                x[nodes[c / 3] as usize][c % 3].0[lane] = T::ZERO;
                 for r in 0..size {
-                    matrix[(r, c)] = forces[nodes[r / 3] as usize][r % 3][lane].to_f64();
+                    matrix[(r, c)] = forces[nodes[r / 3] as usize][r % 3].0[lane].to_f64();
                 }
             }
         }
@@ -229,6 +230,14 @@ impl<T: Real> BatchModel<T> {
         let scaled = &eigen.eigenvectors * nalgebra::DMatrix::from_diagonal(&inverse);
         let product = scaled * eigen.eigenvectors.transpose();
         self.coarsest = product.transpose().iter().map(|&v| T::of(v)).collect();
+    }
+}
+
+impl<T> BatchLevel<T> {
+    /// Parents of each node.
+    pub fn parents(&self) -> impl Iterator<Item = &[u32]> {
+        let of_node = |ends: &[u32]| &self.parents[ends[0] as usize..ends[1] as usize];
+        self.first_parent.windows(2).map(of_node)
     }
 }
 

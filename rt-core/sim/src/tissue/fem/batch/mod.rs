@@ -16,13 +16,13 @@ mod solve;
 pub use level::{BatchModel, NodeWeight};
 pub use solve::{BatchState, Progress};
 
-/// Loads that are solved at once.
-pub const LOADS: usize = 8;
+use crate::simd::{Eight, LANES};
 
-/// One value for each load.
-type Lanes<T> = [T; LOADS];
-/// x, y, z of a node, for each load.
-type Node<T> = [Lanes<T>; 3];
+/// Loads that are solved at once.
+pub const LOADS: usize = LANES;
+
+/// x, y, z of a node, each for every load.
+type Node<T> = [Eight<T>; 3];
 
 #[cfg(test)]
 mod tests;

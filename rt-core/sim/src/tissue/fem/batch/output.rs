@@ -24,7 +24,7 @@ impl<T: Real> BatchState<T> {
     pub fn sample(&self, load: usize, weights: &[NodeWeight]) -> f64 {
         let at = |entry: &NodeWeight| {
             let node = self.u.get(entry.node as usize)?;
-            Some((0..3).map(|c| entry.weight[c] * node[c][load].to_f64()).sum::<f64>())
+            Some((0..3).map(|c| entry.weight[c] * node[c].0[load].to_f64()).sum::<f64>())
         };
         weights.iter().filter_map(at).sum()
     }
@@ -34,7 +34,7 @@ impl<T: Real> BatchState<T> {
         let mut force = [0.0; 3];
         for (u, &spring) in self.u.iter().zip(&finest(model).springs) {
             for c in 0..3 {
-                force[c] -= spring.to_f64() * u[c][load].to_f64();
+                force[c] -= spring.to_f64() * u[c].0[load].to_f64();
             }
         }
         force
@@ -42,17 +42,23 @@ impl<T: Real> BatchState<T> {
 
     /// Writes answer `load` to `field`: the mean of its eight corners is the displacement of an element's centre.
     pub fn write(&self, model: &BatchModel<T>, load: usize, field: &mut ElementField) {
-        for (element, lines) in model.corners.iter().enumerate() {
-            for c in 0..3 {
-                let line = |&at: &u32| {
-                    let value = |n: usize| self.u.get(n).map_or(T::ZERO, |u| u[c][load]);
-                    value(at as usize) + value((at as usize).saturating_add(1))
-                };
-                let sum = lines.iter().map(line).fold(T::ZERO, |sum, v| sum + v);
-                if let Some(slot) = field.0[c].get_mut(element) {
-                    *slot = (0.125 * sum.to_f64()) as f32;
-                }
-            }
+        let [x, y, z] = &mut field.0;
+        // Elements of a run share the face between them.
+        let (mut face, mut sum) = ([u32::MAX; 4], [T::ZERO; 3]);
+        for ((lines, x), (y, z)) in model.corners.iter().zip(x).zip(y.iter_mut().zip(z)) {
+            let near = if *lines == face { sum } else { self.over(load, lines) };
+            face = lines.map(|at| at.saturating_add(1));
+            sum = self.over(load, &face);
+            let mean = [0, 1, 2].map(|c| (0.125 * (near[c] + sum[c]).to_f64()) as f32);
+            [*x, *y, *z] = mean;
         }
+    }
+
+    /// Sum over four nodes.
+    #[inline(always)]
+    fn over(&self, load: usize, nodes: &[u32; 4]) -> [T; 3] {
+        let node = |at: u32, c: usize| self.u.get(at as usize).map_or(T::ZERO, |u| u[c].0[load]);
+        let [a, b, c, d] = *nodes;
+        [0, 1, 2].map(|n| (node(a, n) + node(b, n)) + (node(c, n) + node(d, n)))
     }
 }

@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use super::cycle::{Stage, prolong, restrict, smooth, smooth_down, solve_coarsest};
-use super::kernel::{PlaneOp, TwoPlanes, each, sweep};
+use super::kernel::{PlaneOp, TwoPlanes, answer, nothing, sweep};
 use super::level::{BatchLevel, BatchModel, NodeWeight};
-use super::{LOADS, Lanes, Node};
-use crate::simd::{Simd, vectorised};
+use super::{LOADS, Node};
+use crate::simd::{Eight, Vector, in_vectors};
 use crate::tissue::fem::real::Real;
 
 /// What the next slice of work does.
@@ -34,10 +34,10 @@ pub struct Progress {
 /// Eight answers in the making.
 #[derive(Clone, Debug)]
 pub struct BatchState<T = f32> {
+    /// The residual is the right-hand side of the finest, its preconditioned one the answer there.
     stages: Vec<Stage<T>>,
     work: TwoPlanes<T>,
     pub(super) u: Vec<Node<T>>,
-    r: Vec<Node<T>>,
     p: Vec<Node<T>>,
     q: Vec<Node<T>>,
     slices: Vec<Slice>,
@@ -51,7 +51,7 @@ pub struct BatchState<T = f32> {
 
 impl<T: Real> BatchState<T> {
     pub(in super::super) fn of_model(model: &BatchModel<T>) -> Self {
-        let zeros = || vec![[[T::ZERO; LOADS]; 3]; model.node_count()];
+        let zeros = || vec![nothing(); model.node_count()];
         let last = model.levels.len() - 1;
         let mut slices = Vec::new();
         (0..last).for_each(|n| slices.extend([Slice::Down(n), Slice::Restrict(n)]));
@@ -64,7 +64,6 @@ impl<T: Real> BatchState<T> {
             stages: model.levels.iter().map(Stage::new).collect(),
             work: TwoPlanes::new(&model.levels[0]),
             u: zeros(),
-            r: zeros(),
             p: zeros(),
             q: zeros(),
             slices,
@@ -85,21 +84,22 @@ impl<T: Real> BatchState<T> {
     /// Bytes that the state keeps.
     pub fn bytes(&self) -> usize {
         let nodes: usize = self.stages.iter().map(|s| 3 * s.x.len()).sum();
-        (nodes + 4 * self.u.len()) * size_of::<Node<T>>()
+        (nodes + 3 * self.u.len()) * size_of::<Node<T>>()
     }
 
     pub(in super::super) fn take_up(&mut self, model: &BatchModel<T>, loads: &[&[NodeWeight]]) {
-        for field in [&mut self.u, &mut self.r, &mut self.p, &mut self.q] {
-            field.fill([[T::ZERO; LOADS]; 3]);
+        let r = &mut self.stages[0].b;
+        for field in [&mut self.u, &mut *r, &mut self.p, &mut self.q] {
+            field.fill(nothing());
         }
         for (lane, load) in loads.iter().take(LOADS).enumerate() {
             for entry in load.iter().filter(|entry| model.is_free(entry.node)) {
                 for c in 0..3 {
-                    self.r[entry.node as usize][c][lane] += T::of(entry.weight[c]);
+                    r[entry.node as usize][c].0[lane] += T::of(entry.weight[c]);
                 }
             }
         }
-        self.load = dot(model.levels[0].simd, &self.r, &self.r).map(f64::sqrt);
+        self.load = dots(model.levels[0].simd, &*r, [&*r, &*r])[0].map(f64::sqrt);
         self.residuals = self.load;
         (self.next, self.iterations) = (0, 0);
         (self.rz, self.alpha) = ([0.0; LOADS], [0.0; LOADS]);
@@ -108,21 +108,13 @@ impl<T: Real> BatchState<T> {
     pub(in super::super) fn do_slice(&mut self, model: &BatchModel<T>) -> Progress {
         let levels = &model.levels;
         match self.slices[self.next] {
-            Slice::Down(n) => {
-                if n == 0 {
-                    self.stages[0].b.copy_from_slice(&self.r);
-                }
-                smooth_down(&levels[n], &mut self.stages[n], &mut self.work);
-            }
+            Slice::Down(n) => smooth_down(&levels[n], &mut self.stages[n], &mut self.work),
             Slice::Restrict(n) => {
                 let (fine, coarse) = self.stages.split_at_mut(n + 1);
                 restrict(&levels[n], &mut fine[n], &mut coarse[0], &mut self.work);
             }
             Slice::Coarsest => {
                 if let Some(stage) = self.stages.last_mut() {
-                    if levels.len() == 1 {
-                        stage.b.copy_from_slice(&self.r);
-                    }
                     solve_coarsest(model, stage);
                 }
             }
@@ -169,14 +161,13 @@ impl<T: Real> BatchState<T> {
     /// `p = z + beta p` with Polak and Ribière's beta, then `q = A p`.
     fn turn(&mut self, model: &BatchModel<T>) {
         let simd = model.levels[0].simd;
-        let z = &self.stages[0].x;
-        let rz = dot(simd, &self.r, z);
-        let zq = dot(simd, z, &self.q);
-        let beta: Lanes<T> = each(|n| {
+        let Stage { x: z, b: r, .. } = &self.stages[0];
+        let [rz, zq] = dots(simd, z, [r, &self.q]);
+        let beta = Eight(std::array::from_fn(|n| {
             let beta = -self.alpha[n] * zq[n] / self.rz[n];
             T::of(if beta.is_finite() { beta } else { 0.0 })
-        });
-        scale_and_add(simd, beta, z, &mut self.p);
+        }));
+        scale_and_add(simd, &beta, z, &mut self.p);
         self.rz = rz;
         let mut op = Product {
             q: &mut self.q,
@@ -191,8 +182,9 @@ impl<T: Real> BatchState<T> {
     }
 
     fn go_along(&mut self, model: &BatchModel<T>) {
-        let alpha: Lanes<T> = each(|n| T::of(self.alpha[n]));
-        let square = advance_fields(model.levels[0].simd, alpha, &self.p, &self.q, &mut self.u, &mut self.r);
+        let alpha = Eight(self.alpha.map(T::of));
+        let r = &mut self.stages[0].b;
+        let square = advance_fields(model.levels[0].simd, &alpha, &self.p, &self.q, &mut self.u, r);
         self.residuals = square.map(f64::sqrt);
     }
 }
@@ -206,76 +198,91 @@ struct Product<'a, T> {
 
 impl<T: Real> PlaneOp<T> for Product<'_, T> {
     #[inline(always)]
-    fn plane(&mut self, at: Range<usize>, forces: &[Node<T>], p: &mut [Node<T>]) {
-        let mut sums = [T::ZERO; LOADS];
-        let nodes = self.inverse_diagonal[at.clone()].iter().zip(forces).zip(p);
-        for (((&inverse, forces), p), q) in nodes.zip(&mut self.q[at]) {
+    fn plane<V: Vector<T>>(&mut self, at: Range<usize>, forces: &[Node<T>], springs: &[T], p: &mut [Node<T>]) {
+        let mut sums = V::splat(T::ZERO);
+        let known = self.inverse_diagonal[at.clone()].iter().zip(springs);
+        for (((&inverse, &spring), forces), (p, q)) in known.zip(forces).zip(p.iter().zip(&mut self.q[at])) {
+            if inverse == T::ZERO {
+                *q = nothing();
+                continue;
+            }
             for c in 0..3 {
-                let (f, p, before) = (forces[c], p[c], sums);
-                let kept = each(|n| if inverse == T::ZERO { T::ZERO } else { f[n] });
-                q[c] = kept;
-                sums = each(|n| before[n] + kept[n] * p[n]);
+                let p = V::load(&p[c]);
+                let force = answer::<T, V>(&forces[c], spring, p);
+                force.store(&mut q[c]);
+                sums = sums.add(force.mul(p));
             }
         }
-        self.dot
-            .iter_mut()
-            .zip(sums)
-            .for_each(|(dot, sum)| *dot += sum.to_f64());
+        add_up(&mut self.dot, sums);
     }
 }
 
 /// Nodes whose products are summed before the sum goes on in f64.
 const SUMMED: usize = 256;
 
-vectorised! {
-fn dot<T>(a: &[Node<T>], b: &[Node<T>]) -> [f64; LOADS] {
-    let mut total = [0.0; LOADS];
-    for (a, b) in a.chunks(SUMMED).zip(b.chunks(SUMMED)) {
-        let mut sums = [T::ZERO; LOADS];
-        for (a, b) in a.iter().zip(b) {
+#[inline(always)]
+fn add_up<T: Real, V: Vector<T>>(total: &mut [f64; LOADS], sums: V) {
+    let mut each = Eight([T::ZERO; LOADS]);
+    sums.store(&mut each);
+    total
+        .iter_mut()
+        .zip(each.0)
+        .for_each(|(total, sum)| *total += sum.to_f64());
+}
+
+in_vectors! {
+/// `a . b` for both of `b`.
+fn dots<T: Real, V>(a: &[Node<T>], b: [&[Node<T>]; 2]) -> [[f64; LOADS]; 2] {
+    let mut totals = [[0.0; LOADS]; 2];
+    for ((a, b0), b1) in a.chunks(SUMMED).zip(b[0].chunks(SUMMED)).zip(b[1].chunks(SUMMED)) {
+        let mut sums = [V::splat(T::ZERO); 2];
+        for ((a, b0), b1) in a.iter().zip(b0).zip(b1) {
             for c in 0..3 {
-                let (a, b, before) = (a[c], b[c], sums);
-                sums = each(|n| before[n] + a[n] * b[n]);
+                let a = V::load(&a[c]);
+                sums = [sums[0].add(a.mul(V::load(&b0[c]))), sums[1].add(a.mul(V::load(&b1[c])))];
             }
         }
-        total.iter_mut().zip(sums).for_each(|(total, sum)| *total += sum.to_f64());
+        totals.iter_mut().zip(sums).for_each(|(total, sums)| add_up(total, sums));
     }
-    total
+    totals
 }
 }
 
-vectorised! {
+in_vectors! {
 /// `p = z + beta p`.
-fn scale_and_add<T>(beta: Lanes<T>, z: &[Node<T>], p: &mut [Node<T>]) {
+fn scale_and_add<T: Real, V>(beta: &Eight<T>, z: &[Node<T>], p: &mut [Node<T>]) {
+    let beta = V::load(beta);
     for (z, p) in z.iter().zip(p) {
         for c in 0..3 {
-            let (z, p0) = (z[c], p[c]);
-            p[c] = each(|n| z[n] + beta[n] * p0[n]);
+            V::load(&z[c]).add(beta.mul(V::load(&p[c]))).store(&mut p[c]);
         }
     }
 }
 }
 
-vectorised! {
+in_vectors! {
 /// `u += alpha p`, `r -= alpha q`; returns `r . r`.
-fn advance_fields<T>(alpha: Lanes<T>, p: &[Node<T>], q: &[Node<T>], u: &mut [Node<T>], r: &mut [Node<T>]) -> [f64; LOADS] {
-    for ((p, q), (u, r)) in p.iter().zip(q).zip(u.iter_mut().zip(r.iter_mut())) {
-        for c in 0..3 {
-            let (p, q, u0, r0) = (p[c], q[c], u[c], r[c]);
-            u[c] = each(|n| u0[n] + alpha[n] * p[n]);
-            r[c] = each(|n| r0[n] - alpha[n] * q[n]);
-        }
-    }
+fn advance_fields<T: Real, V>(
+    alpha: &Eight<T>,
+    p: &[Node<T>],
+    q: &[Node<T>],
+    u: &mut [Node<T>],
+    r: &mut [Node<T>],
+) -> [f64; LOADS] {
+    let alpha = V::load(alpha);
     let mut total = [0.0; LOADS];
-    for r in r.chunks(SUMMED) {
-        let mut sums = [T::ZERO; LOADS];
-        for r in r {
-            for r in r {
-                let before = sums;
-                sums = each(|n| before[n] + r[n] * r[n]);
+    let known = p.chunks(SUMMED).zip(q.chunks(SUMMED));
+    for ((p, q), (u, r)) in known.zip(u.chunks_mut(SUMMED).zip(r.chunks_mut(SUMMED))) {
+        let mut sums = V::splat(T::ZERO);
+        for ((p, q), (u, r)) in p.iter().zip(q).zip(u.iter_mut().zip(r)) {
+            for c in 0..3 {
+                V::load(&u[c]).add(alpha.mul(V::load(&p[c]))).store(&mut u[c]);
+                let left = V::load(&r[c]).sub(alpha.mul(V::load(&q[c])));
+                left.store(&mut r[c]);
+                sums = sums.add(left.mul(left));
             }
         }
-        total.iter_mut().zip(sums).for_each(|(total, sum)| *total += sum.to_f64());
+        add_up(&mut total, sums);
     }
     total
 }
