@@ -2,14 +2,18 @@
 //!
 //! Each station of the shaft sticks to the tissue until the force between them reaches the friction of its length, and slips
 //! with that force from then on. The tip pushes, and never pulls: against a membrane up to the force at which it gives way, in tissue up
-//! to the cutting force. All at once this is a convex problem with one solution, which projected Gauss-Seidel finds from that of the last
-//! tick. Nothing depends on speed unless a rate term is asked for.
+//! to the cutting force. All at once this is a convex problem with one solution, which is found from that of the last tick: by sets of
+//! stations that stick (`sets`), or by projected Gauss-Seidel where that fails or a rate term is on. Nothing depends on speed unless a
+//! rate term is asked for.
 
 use super::model::LineModel;
 use super::rows::{add_scaled, dot};
 use super::state::{LineOutput, LineState};
-use super::tip::follow;
+use super::tip::{Place, follow};
 use crate::simd::{Simd, vectorised};
+use sets::{Scratch, Tip};
+
+mod sets;
 
 /// Solutions in one tick at most: the tip goes on, a membrane gives way, the tip goes on again.
 const MAX_PASSES: u32 = 12;
@@ -45,11 +49,20 @@ pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> Line
         .memory
         .begin(rows, common_m_per_n, &model.settings.prony, input.dt_s);
     let mut output = LineOutput::default();
+    let mut scratch = Scratch::new();
+    let mut before = None;
     for _ in 0..MAX_PASSES {
         let front = model.front(&state.tip);
-        touch(model, state, tip_m);
+        touch(model, state, tip_m, &mut scratch);
         press(model, state, front.membrane);
-        let gap_m = solve_vectorised(model.simd, model, state, tip_m, front.limit_n, input.dt_s, &mut output);
+        let gap_m = solve(
+            model,
+            state,
+            tip_m,
+            front.limit_n,
+            input.dt_s,
+            (&mut scratch, &mut output),
+        );
         output.held_by = front.membrane;
         let is_pushed = state.tip.force_n >= front.limit_n;
         if let (Some(layer), true) = (front.membrane, state.tip.force_n > 0.0) {
@@ -57,14 +70,21 @@ pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> Line
             if is_pushed || pushed_m >= model.layers[layer].puncture_depth_m {
                 state.tip.opened |= 1 << layer;
                 output.punctured = output.punctured.or(Some(layer));
+                before = None;
                 continue;
             }
         }
         let goes_on = gap_m > CLOSED_M && is_pushed && front.membrane.is_none();
         let goes_back = gap_m < -CLOSED_M && state.tip.force_n <= 0.0;
-        if !(goes_on || goes_back) || !follow(model, state, tip_m, gap_m, front.to_m) {
+        let place = Place {
+            material_m: state.tip.material_m,
+            gap_m,
+        };
+        if !(goes_on || goes_back) || !follow(model, state, tip_m, front.to_m, place, before) {
             break;
         }
+        // Beyond that it is another force that holds the tip.
+        before = (state.tip.material_m < front.to_m).then_some(place);
     }
     slip(model, state, tip_m);
     finish(model, state, &mut output);
@@ -81,7 +101,7 @@ fn slip(model: &LineModel, state: &mut LineState, tip_m: f64) {
 }
 
 /// Which stations the shaft touches, and where the tip loads. A station that is new sticks to where it is.
-fn touch(model: &LineModel, state: &mut LineState, tip_m: f64) {
+fn touch(model: &LineModel, state: &mut LineState, tip_m: f64, scratch: &mut Scratch) {
     let c = &model.compliance;
     let depth = state.tip.material_m / c.spacing_m;
     let now = if depth > 0.0 {
@@ -109,9 +129,10 @@ fn touch(model: &LineModel, state: &mut LineState, tip_m: f64) {
         state.tip_own += weight * tips.take(state.tip_range.len()).map(|(r, w)| r * w).sum::<f64>();
     }
     let (gain, force_n) = (state.memory.gain, state.tip.force_n);
-    for (n, &of_tip) in column.iter().enumerate().take(now) {
-        let force = dot(&c.rows.row(n)[..now], &state.shaft_n[..now]) + of_tip * force_n;
-        state.u_m[n] = gain * force + state.memory.offset_m[n];
+    scratch.count = now;
+    sets::displacement(model.simd, &c.rows, &state.shaft_n, scratch);
+    for ((n, &of_tip), of_shaft) in column.iter().enumerate().zip(scratch.u_m.numbers()) {
+        state.u_m[n] = gain * (of_shaft + of_tip * force_n) + state.memory.offset_m[n];
         if n >= before {
             state.anchor_m[n] = tip_m - state.u_m[n];
         }
@@ -181,34 +202,98 @@ fn limit_n(model: &LineModel, place_m: f64, n: usize) -> f64 {
     model.friction_n_per_m[n] * (place_m - n as f64 * ds).clamp(0.0, ds)
 }
 
-vectorised! {
-    /// [`solve`] for the instructions that the processor has; the same bits with all of them.
-    fn solve_vectorised(
-        model: &LineModel,
-        state: &mut LineState,
-        tip_m: f64,
-        tip_limit_n: f64,
-        dt_s: f64,
-        output: &mut LineOutput,
-    ) -> f64 {
-        solve(model, state, tip_m, tip_limit_n, dt_s, output)
-    }
-}
-
 /// Forces of shaft and tip; returns how far the tip is beyond where the material has it.
-#[inline(always)]
 fn solve(
     model: &LineModel,
     state: &mut LineState,
     tip_m: f64,
     tip_limit_n: f64,
     dt_s: f64,
-    output: &mut LineOutput,
+    (scratch, output): (&mut Scratch, &mut LineOutput),
 ) -> f64 {
+    let gain = state.memory.gain;
+    let place_m = state.tip.material_m;
+    let offset_m = past_at_tip_m(model, state);
+    let of_shaft = dot(&state.tip_column, &state.shaft_n[..state.in_contact]);
+    state.tip_u_m = gain * (of_shaft + state.tip_own * state.tip.force_n) + offset_m + state.tip_offset_m;
+    let rate = model.settings.viscous_n_s_per_m2 / dt_s;
+    if rate != 0.0 || !model.settings.by_sets || !solve_by_sets(model, state, tip_m, tip_limit_n, scratch, output) {
+        solve_by_sweeps(model.simd, model, state, tip_m, tip_limit_n, rate, output);
+    }
+    tip_m - place_m - state.tip_u_m
+}
+
+/// Returns whether that found the forces; if not, the state is one to go on from.
+fn solve_by_sets(
+    model: &LineModel,
+    state: &mut LineState,
+    tip_m: f64,
+    tip_limit_n: f64,
+    scratch: &mut Scratch,
+    output: &mut LineOutput,
+) -> bool {
+    let count = state.in_contact;
+    let place_m = state.tip.material_m;
+    (scratch.count, scratch.gain) = (count, state.memory.gain);
+    scratch.tolerance_m = model.settings.tolerance_m;
+    scratch
+        .stuck_m
+        .set(count, state.anchor_m.iter().map(|anchor| tip_m - anchor));
+    scratch
+        .limit_n
+        .set(count, (0..count).map(|n| limit_n(model, place_m, n)));
+    scratch.column.set(count, state.tip_column.iter().copied());
+    scratch.force_n.set(count, state.shaft_n.iter().copied());
+    scratch.u_m.set(count, state.u_m.iter().copied());
+    scratch.tip = Tip {
+        own_m_per_n: state.tip_own,
+        stuck_m: tip_m - place_m,
+        limit_n: tip_limit_n,
+        force_n: state.tip.force_n,
+        u_m: state.tip_u_m,
+        ..Tip::default()
+    };
+    scratch.products = 0;
+    let is_found = sets::find(model.simd, &model.compliance.rows, scratch);
+    let found = scratch.force_n.numbers().iter().zip(scratch.limit_n.numbers());
+    for (to, (force, &limit)) in state.shaft_n[..count].iter_mut().zip(found) {
+        *to = force.max(-limit).min(limit);
+    }
+    state.u_m[..count].copy_from_slice(&scratch.u_m.numbers()[..count]);
+    state.tip.force_n = scratch.tip.force_n.max(0.0).min(tip_limit_n);
+    state.tip_u_m = scratch.tip.u_m;
+    output.sweeps += scratch.products;
+    output.residual_m = scratch.residual_m;
+    is_found
+}
+
+vectorised! {
+    /// [`sweep`] for the instructions that the processor has; the same bits with all of them.
+    fn solve_by_sweeps(
+        model: &LineModel,
+        state: &mut LineState,
+        tip_m: f64,
+        tip_limit_n: f64,
+        slowness: f64,
+        output: &mut LineOutput,
+    ) {
+        sweep(model, state, tip_m, tip_limit_n, slowness, output)
+    }
+}
+
+/// Forces of shaft and tip by projected Gauss-Seidel.
+#[inline(always)]
+fn sweep(
+    model: &LineModel,
+    state: &mut LineState,
+    tip_m: f64,
+    tip_limit_n: f64,
+    slowness: f64,
+    output: &mut LineOutput,
+) {
     let rows = &model.compliance.rows;
     let (count, gain) = (state.in_contact, state.memory.gain);
     let place_m = state.tip.material_m;
-    let past_m = past_at_tip_m(model, state);
     let LineState {
         ref mut shaft_n,
         ref anchor_m,
@@ -218,11 +303,8 @@ fn solve(
     } = *state;
     let (shaft_n, anchor_m, u_m) = (&mut shaft_n[..count], &anchor_m[..count], &mut u_m[..count]);
     let tip_column = &tip_column[..count];
-    let offset = past_m + state.tip_offset_m;
-    let mut tip_u_m = gain * (dot(tip_column, shaft_n) + state.tip_own * state.tip.force_n) + offset;
-    let mut tip_n = state.tip.force_n;
+    let (mut tip_n, mut tip_u_m) = (state.tip.force_n, state.tip_u_m);
     let tip_gain = gain * state.tip_own;
-    let slowness = model.settings.viscous_n_s_per_m2 / dt_s;
     for sweep in 0..model.settings.sweeps {
         let mut largest_m = 0.0_f64;
         for step in 0..count {
@@ -264,7 +346,6 @@ fn solve(
     }
     state.tip.force_n = tip_n;
     state.tip_u_m = tip_u_m;
-    tip_m - place_m - tip_u_m
 }
 
 /// What the spring of a membrane that is stretched passes on to the body as a whole.

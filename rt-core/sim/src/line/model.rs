@@ -49,6 +49,8 @@ pub struct LineSettings {
     pub viscous_n_s_per_m2: f64,
     /// Relaxation; terms of no strength are off.
     pub prony: [PronyTerm; 2],
+    /// Forces by sets of stations that stick, with sweeps where that fails; else by sweeps alone, as a twin to compare with.
+    pub by_sets: bool,
     /// Sweeps of the solver at most.
     pub sweeps: u32,
     /// How far a place that sticks may be from where it sticks.
@@ -61,6 +63,7 @@ impl Default for LineSettings {
             track_cutting_ratio: 0.2,
             viscous_n_s_per_m2: 0.0,
             prony: [PronyTerm::default(); 2],
+            by_sets: true,
             sweeps: 60,
             tolerance_m: 2e-9,
         }

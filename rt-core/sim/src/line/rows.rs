@@ -1,8 +1,7 @@
 //! A square matrix in rows of whole lanes, for loops without a remainder.
 
+use crate::simd::LANES;
 use serde::{Deserialize, Serialize};
-
-const LANES: usize = 8;
 
 /// Rows with zeros past their end.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -45,6 +44,12 @@ impl Rows {
     #[inline(always)]
     pub fn row(&self, n: usize) -> &[f64] {
         self.values.get(n * self.stride..(n + 1) * self.stride).unwrap_or(&[])
+    }
+
+    /// Row `n` in whole lanes.
+    #[inline(always)]
+    pub(super) fn blocks(&self, n: usize) -> &[[f64; LANES]] {
+        self.row(n).as_chunks().0
     }
 
     /// One row, to be changed; empty beyond the last.

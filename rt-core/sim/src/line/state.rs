@@ -45,9 +45,9 @@ pub struct LineOutput {
     pub held_by: Option<usize>,
     /// Least length of a stretch of the line between two stations, over that at rest; below 0 the linear answer is folded.
     pub least_stretch: f64,
-    /// Of the solver, all passes together.
+    /// Of the solver, all passes together; or products with the compliance.
     pub sweeps: u32,
-    /// Largest correction of the last sweep.
+    /// Largest correction that is left.
     pub residual_m: f64,
     /// The input was not finite: the output before it is repeated.
     pub is_refused: bool,

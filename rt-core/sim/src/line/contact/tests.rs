@@ -12,6 +12,7 @@ mod behaviour;
 mod bits;
 mod creep;
 mod membrane;
+mod twin;
 
 const DT_S: f64 = 1e-3;
 /// The paper's gland, as the needle meets it: a membrane that is pushed 8 mm at most, cutting, friction.

@@ -1,0 +1,366 @@
+//! The needle's line: what its columns cost beside how exact they are, and a tick of its stations beside sweeps alone.
+//!
+//! `cargo bench -p stylet-benches --bench line`; after `--` the names of what to measure: `columns`, `pelvis`, `ticks`, `folds`.
+
+use std::time::Instant;
+
+use stylet_sim::line::{
+    ColumnQueue, Compliance, Line, LineInput, LineLayer, LineModel, LineOutput, LineSettings, LineState, MAX_STATIONS,
+    StationSettings, Stations, TOLERANCE, step,
+};
+use stylet_sim::scene::{Scene, TissueKind};
+use stylet_sim::tissue::fem::batch::{BatchModel, BatchState, LOADS, NodeWeight, Progress};
+use stylet_sim::tissue::fem::{FemModel, FemSettings, Integration, Material};
+use stylet_sim::tissue::{ElementField, FemTissue, TissueModel, least_corner};
+
+/// As patients' tissue is nearly incompressible; a centimetre of fat around it.
+const GLAND: Material = Material {
+    youngs_modulus_pa: 17e3,
+    poisson_ratio: 0.49,
+    integration: Integration::MeanDilatation,
+};
+const FOUNDATION_PA_PER_M: f64 = 250e3;
+/// What counts as solved.
+const EXACT: f64 = 1e-6;
+/// Axial columns of the bar in issue 16.
+const COLUMNS: usize = 35;
+
+fn main() {
+    let named: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    let is_wanted = |name: &str| named.is_empty() || named.iter().any(|n| n == name);
+    if is_wanted("columns") {
+        let (model, stations) = paper();
+        columns("paper", &model, &stations);
+    }
+    if is_wanted("pelvis") {
+        let (model, stations) = pelvis();
+        columns("pelvis", &model, &stations);
+    }
+    if is_wanted("folds") {
+        folds();
+    }
+    if is_wanted("ticks") {
+        ticks("40 stations, made up", &made_up(40));
+        let (model, stations) = paper();
+        ticks("paper", &solved(&model, &stations));
+    }
+}
+
+/// Through the middle of the gland, from the apex in.
+fn paper() -> (BatchModel<f32>, Stations) {
+    let lattice = Scene::builtin("paper").expect("built in").lattice;
+    let fem = FemModel::<f32>::new(&lattice, &FemSettings::homogeneous(GLAND, FOUNDATION_PA_PER_M)).expect("valid");
+    let model = BatchModel::new(&fem);
+    let (low, high) = lattice.bounds_m();
+    let start = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2] - 10e-3];
+    let line = Line::into_body(&lattice, start, [0.0, 0.0, 1.0]).expect("meets the gland");
+    let stations = Stations::along(
+        &model,
+        line,
+        StationSettings::of_lattice(lattice.spacing_m),
+        MAX_STATIONS,
+    );
+    (model, stations)
+}
+
+/// Through the middle of the gland of the anatomical scene, on the body that its tissue is solved in.
+fn pelvis() -> (BatchModel<f32>, Stations) {
+    let scene = Scene::builtin("pelvis").expect("built in").with_tissue(TissueKind::Fem);
+    let tissue = FemTissue::<f32>::new(&scene).expect("valid");
+    let model = BatchModel::new(&tissue.model);
+    let (low, high) = scene.target_bounds_m();
+    let start = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.0];
+    let line = Line::into_body(&scene.lattice, start, [0.0, 0.0, 1.0]).expect("meets the body");
+    let stations = Stations::along(
+        &model,
+        line,
+        StationSettings::of_lattice(model.spacing_m()),
+        MAX_STATIONS,
+    );
+    (model, stations)
+}
+
+fn solved(model: &BatchModel<f32>, stations: &Stations) -> Compliance {
+    let mut queue = ColumnQueue::new(model, stations, false, TOLERANCE);
+    queue.prepare_all(model);
+    Compliance::of_columns(model, stations, queue.columns()).expect("all columns")
+}
+
+/// Time of this thread on a processor, whatever else the machine does.
+fn processor_time_s() -> f64 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux");
+    let first = text.split_whitespace().next().and_then(|n| n.parse::<f64>().ok());
+    first.expect("nanoseconds") * 1e-9
+}
+
+/// In slices, as the program does: those are compiled where the kernels are.
+fn solve(state: &mut BatchState, model: &BatchModel<f32>, tolerance: f64) -> Progress {
+    loop {
+        let progress = state.advance(model);
+        if state.is_whole() && (progress.residual <= tolerance || progress.iterations >= 200) {
+            return progress;
+        }
+    }
+}
+
+/// Root of the mean square of `a - b`, over that of `b`.
+fn rms(a: &ElementField, b: &ElementField) -> f64 {
+    let squares = |of: &dyn Fn(f32, f32) -> f32| -> f64 {
+        let pairs = a.0.iter().flatten().zip(b.0.iter().flatten());
+        pairs.map(|(a, b)| f64::from(of(*a, *b)).powi(2)).sum()
+    };
+    (squares(&|a, b| a - b) / squares(&|_, b| b)).sqrt()
+}
+
+/// Time of columns beside the error of the compliance and of the fields against those that are solved.
+fn columns(name: &str, model: &BatchModel<f32>, stations: &Stations) {
+    println!(
+        "{name}: {} elements, {} stations; ms of processor time, least of 5 rounds",
+        model.element_count(),
+        stations.count()
+    );
+    let loads: Vec<_> = (0..COLUMNS)
+        .map(|n| stations.load(&stations.shaft[n % stations.count()], 0))
+        .collect();
+    let mut state = BatchState::new(model);
+    for count in [1, LOADS, COLUMNS] {
+        let mut least = f64::INFINITY;
+        for _ in 0..5 {
+            let start = processor_time_s();
+            for chunk in loads[..count].chunks(LOADS) {
+                let chunk: Vec<_> = chunk.iter().map(Vec::as_slice).collect();
+                state.begin(model, &chunk);
+                solve(&mut state, model, TOLERANCE);
+            }
+            least = least.min(processor_time_s() - start);
+        }
+        println!("  {count:2} columns {:7.1}", 1e3 * least);
+    }
+    let mut queue = ColumnQueue::new(model, stations, false, TOLERANCE);
+    let (mut slices, mut slowest, mut all) = (0, 0.0_f64, 0.0);
+    while !queue.progress().is_done() {
+        let start = processor_time_s();
+        queue.prepare(model, 1);
+        let took = processor_time_s() - start;
+        (slices, slowest, all) = (slices + 1, slowest.max(took), all + took);
+    }
+    println!(
+        "  all {} axial columns of the line {:.1}, in {slices} slices, the slowest {:.2}",
+        queue.progress().of,
+        1e3 * all,
+        1e3 * slowest
+    );
+    println!("  tolerance | cycles | residual | error of W | of a column's field, rms");
+    let exact = answers(model, &loads[..LOADS], EXACT);
+    for tolerance in [1e-1, TOLERANCE, 2e-2, 5e-3, 1e-3] {
+        let found = answers(model, &loads[..LOADS], tolerance);
+        let fields = found.fields.iter().zip(&exact.fields).map(|(a, b)| rms(a, b));
+        let compliance = found.compliance.iter().zip(&exact.compliance);
+        let off = compliance.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let largest = exact.compliance.iter().copied().fold(0.0, f64::max);
+        println!(
+            "  {tolerance:9.1e} | {:6} | {:8.1e} | {:10.1e} | {:.1e}",
+            found.cycles,
+            found.residual,
+            off / largest,
+            fields.fold(0.0, f64::max)
+        );
+        assert!(
+            tolerance > TOLERANCE || off / largest < 2e-3,
+            "a wrong answer has no time"
+        );
+    }
+}
+
+/// What a look for folded cells costs beside the tick that it follows, and from which displacement of the tip on there are some.
+fn folds() {
+    let scene = Scene::builtin("paper").expect("built in").with_tissue(TissueKind::Fem);
+    let mut tissue = FemTissue::<f32>::new(&scene).expect("valid");
+    let model = BatchModel::new(&tissue.model);
+    let (low, high) = scene.lattice.bounds_m();
+    let start = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2] - 10e-3];
+    let line = Line::into_body(&scene.lattice, start, [0.0, 0.0, 1.0]).expect("meets the gland");
+    let stations = Stations::along(
+        &model,
+        line,
+        StationSettings::of_lattice(model.spacing_m()),
+        MAX_STATIONS,
+    );
+    let m = stations.count();
+    let mut queue = ColumnQueue::new(&model, &stations, false, TOLERANCE);
+    queue.prepare_all(&model);
+    let columns = queue.into_fields();
+    println!("folds: paper as it ships, a load on the tip's patch alone, {m} stations");
+    for at in [0, m / 4, m / 2] {
+        let place_m = line.point_m((at as f64 + 0.5) * stations.settings.spacing_m, [0.0; 2]);
+        let element = scene.body.element_at_rest(place_m).expect("in the gland");
+        let mut loads = vec![0.0; 2 * m];
+        let (mut displaced_us, mut looked_us) = (f64::INFINITY, f64::INFINITY);
+        let mut from = None;
+        for tenth in 1..=60 {
+            loads[m + at] = 0.1 * f64::from(tenth);
+            let start = Instant::now();
+            tissue.displace(&columns, &loads, [0.0; 3]).expect("adds columns up");
+            displaced_us = (start.elapsed().as_secs_f64() * 1e6).min(displaced_us);
+            let body = tissue.deformed();
+            let start = Instant::now();
+            let least = least_corner(&body, element);
+            looked_us = (start.elapsed().as_secs_f64() * 1e6).min(looked_us);
+            let moved = body.displacement(element).iter().map(|u| u * u).sum::<f64>().sqrt();
+            if least <= 0.0 && from.is_none() {
+                from = Some((loads[m + at], 1e3 * moved * model.spacing_m()));
+            }
+        }
+        println!(
+            "  station {at:2}: look {looked_us:.1} us, tick of one column {displaced_us:.1} us; folded from {}",
+            from.map_or("no load up to 6 N on".to_owned(), |(n, mm)| format!(
+                "{n:.1} N, {mm:.1} mm on"
+            ))
+        );
+    }
+}
+
+struct Answers {
+    cycles: u32,
+    residual: f64,
+    compliance: Vec<f64>,
+    fields: Vec<ElementField>,
+}
+
+fn answers(model: &BatchModel<f32>, loads: &[Vec<NodeWeight>], to: f64) -> Answers {
+    let mut state = BatchState::new(model);
+    let slices: Vec<_> = loads.iter().map(Vec::as_slice).collect();
+    state.begin(model, &slices);
+    let progress = solve(&mut state, model, to);
+    let both = |a: usize, b: usize| 0.5 * (state.sample(a, &loads[b]) + state.sample(b, &loads[a]));
+    let field = |n: usize| {
+        let mut field = ElementField::zeros(model.element_count());
+        state.write(model, n, &mut field);
+        field
+    };
+    Answers {
+        cycles: progress.iterations,
+        residual: progress.residual,
+        compliance: (0..loads.len() * loads.len())
+            .map(|n| both(n / loads.len(), n % loads.len()))
+            .collect(),
+        fields: (0..loads.len()).map(field).collect(),
+    }
+}
+
+/// A gland that moves as a whole and near the load.
+fn made_up(stations: usize) -> Compliance {
+    let spacing_m = 1e-3;
+    Compliance::from_rows(stations, spacing_m, 4e-3, |i, j| {
+        let distance_m = (i % stations).abs_diff(j % stations) as f64 * spacing_m;
+        let own = if i == j && i < stations {
+            0.014 * 1.364e-3 / spacing_m
+        } else {
+            0.0
+        };
+        1.0 / 1434.0 + (-distance_m / 5e-3).exp() / 270.0 + own
+    })
+}
+
+/// Numbers that look random and are the same on every run (splitmix64).
+struct Random(u64);
+
+impl Random {
+    /// In [0, 1).
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// 20 s of a hand that goes in, back and on, at up to 200 mm/s.
+fn way(length_m: f64) -> Vec<f64> {
+    let mut random = Random(3);
+    let (mut tip_m, mut to_m, mut speed) = (0.0, 0.0, 1e-4);
+    let mut places = Vec::new();
+    for _ in 0..20_000 {
+        if tip_m == to_m {
+            to_m = 1.15 * length_m * random.unit();
+            speed = 2e-4 * random.unit() + 1e-6;
+        }
+        tip_m += f64::clamp(to_m - tip_m, -speed, speed);
+        places.push(tip_m);
+    }
+    places
+}
+
+struct Ticks {
+    us: Vec<f64>,
+    least: Vec<f64>,
+    outputs: Vec<LineOutput>,
+}
+
+/// Ticks by sets alternating with the same by sweeps; the answers of both must agree.
+fn ticks(name: &str, compliance: &Compliance) {
+    let layer = LineLayer {
+        puncture_force_n: 5.6,
+        puncture_depth_m: 8e-3,
+        cutting_force_n: 1.5,
+        shaft_friction_n_per_m: 80.0,
+        ..LineLayer::default()
+    };
+    let models = [true, false].map(|by_sets| {
+        let settings = LineSettings {
+            by_sets,
+            ..LineSettings::default()
+        };
+        LineModel::new(compliance.clone(), &[layer], settings).expect("valid")
+    });
+    let places = way(models[0].length_m());
+    let mut runs = models.each_ref().map(|_| Ticks {
+        us: Vec::new(),
+        least: vec![f64::INFINITY; places.len()],
+        outputs: Vec::new(),
+    });
+    for round in 0..8 {
+        let mut states = models.each_ref().map(LineState::new);
+        for (n, &tip_m) in places.iter().enumerate() {
+            for which in 0..2 {
+                let start = Instant::now();
+                let output = step(&models[which], &mut states[which], &LineInput { tip_m, dt_s: 1e-3 });
+                let us = start.elapsed().as_secs_f64() * 1e6;
+                let run = &mut runs[which];
+                run.us.push(us);
+                run.least[n] = run.least[n].min(us);
+                if round == 0 {
+                    run.outputs.push(output);
+                }
+            }
+        }
+    }
+    println!("{name}: {} stations, {} ticks", compliance.stations, places.len());
+    println!(
+        "            |  p50 us    p99  p99.9    max | fastest of 8: p50 p99 p99.9 max | products or sweeps: p50 p99 max"
+    );
+    for (name, run) in ["sets", "sweeps"].iter().zip(&runs) {
+        let [all, least] = [&run.us, &run.least].map(|us| quantiles(us));
+        let work: Vec<f64> = run.outputs.iter().map(|o| f64::from(o.sweeps)).collect();
+        let work = quantiles(&work);
+        println!(
+            "  {name:9} | {:7.2} {:6.2} {:6.2} {:6.2} | {:6.2} {:6.2} {:6.2} {:6.2} | {} {} {}",
+            all[0], all[1], all[2], all[3], least[0], least[1], least[2], least[3], work[0], work[1], work[3]
+        );
+    }
+    let pairs = || runs[0].outputs.iter().zip(&runs[1].outputs);
+    let force_n = pairs().map(|(a, b)| (a.force_on_hand_n - b.force_on_hand_n).abs());
+    let place_m = pairs().map(|(a, b)| (a.tip_material_m - b.tip_material_m).abs());
+    let (force_n, place_m) = (force_n.fold(0.0, f64::max), place_m.fold(0.0, f64::max));
+    println!("  between them: force {force_n:.1e} N, place of the tip {place_m:.1e} m");
+    assert!(force_n < 1e-3 && place_m < 2e-6, "a wrong answer has no time");
+}
+
+/// p50, p99, p99.9 and the largest.
+fn quantiles(values: &[f64]) -> [f64; 4] {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let at = |part: f64| sorted[((sorted.len() - 1) as f64 * part) as usize];
+    [at(0.5), at(0.99), at(0.999), at(1.0)]
+}
