@@ -40,6 +40,11 @@ pub fn state(s: &HapticState) -> Result<(), Invalid> {
     )?;
     ensure(within(&[s.energy_j, s.warmth_n, s.tissue_force_n], 1e4), "gate figures")?;
     ensure(s.worst_residual.is_finite(), "residual")?;
+    ensure(s.least_corner.is_finite(), "corner of an element")?;
+    ensure(
+        within(&[s.folded_from_m], MAX_COORDINATE_M),
+        "displacement of folded tissue",
+    )?;
     ensure(s.seed_count as usize <= MAX_SEEDS, "seed count")
 }
 

@@ -46,6 +46,6 @@ pub struct TickRecord {
     pub tip_deflection_m: [f64; 3],
     /// Bits of the buttons that are pressed.
     pub buttons: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// [`crate::HapticState::folded_from_m`] in micrometres, rounded up.
+    pub folded_from_um: u32,
 }

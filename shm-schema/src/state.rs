@@ -63,6 +63,11 @@ pub struct HapticState {
     pub energy_j: f64,
     /// Root mean square of the force over the thermal time of the motors.
     pub warmth_n: f64,
+    /// Smallest volume that three links of an element near the tip span, over that at rest, where the tissue's answer is linear; 1
+    /// elsewhere. At 0 and below a cell is folded.
+    pub least_corner: f64,
+    /// How far the tissue at the tip was displaced when its linear answer folded, m; 0 while it has not since the needle went in.
+    pub folded_from_m: f64,
     /// Coupled mode: the tissue's answer along the insertion direction, before the gate.
     pub tissue_force_n: f64,
     /// [`crate::ParametersInForce::generation`] that the tick ran with.
@@ -111,6 +116,8 @@ pub mod flags {
     pub const LINE_NEEDED: u32 = 1 << 8;
     /// The needle is on a line that is ready.
     pub const LINE_READY: u32 = 1 << 9;
+    /// The linear answer of the tissue near the tip is folded in this tick: it is not that of tissue.
+    pub const FOLDED: u32 = 1 << 10;
 }
 
 /// Phase of needle and tissue (paper eq. 6), by stable number.

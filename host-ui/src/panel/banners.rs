@@ -109,6 +109,7 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
     if shown.state.is_some() && fault == Some(Fault::None) {
         list.extend(force_is_off(shown));
     }
+    list.extend(folded(shown));
     list.extend(refused(shown));
     list
 }
@@ -126,6 +127,20 @@ fn force_is_off(shown: &Shown) -> Option<Banner> {
         level: BannerLevel::Warn,
         title: "The force waits",
         text: "It would begin with a jump. Move the needle until it is small, best outside the tissue.".to_owned(),
+        remedy: None,
+    })
+}
+
+/// Until the needle is out.
+fn folded(shown: &Shown) -> Option<Banner> {
+    shown.folded_from_m().map(|folded_from_m| Banner {
+        level: BannerLevel::Warn,
+        title: "Tissue folded",
+        text: format!(
+            "The linear answer of the tissue at the tip is folded from {:.1} mm of displacement on. Force and places there are no longer \
+             those of tissue.",
+            stylet_base::format::mm(folded_from_m)
+        ),
         remedy: None,
     })
 }
@@ -288,6 +303,17 @@ mod tests {
         shown.last_refusal = "needle.puncture_depth = 1000 mm".to_owned();
         assert_eq!(titles(&shown), ["The force is off", "rt-core refused"]);
         assert!(banners(&shown)[1].text.contains("puncture_depth"));
+    }
+
+    #[test]
+    fn folded_tissue_has_a_banner_that_says_from_where_on() {
+        let mut shown = live();
+        if let Some(state) = &mut shown.state {
+            state.folded_from_m = 7.93e-3;
+        }
+        let list = banners(&shown);
+        assert_eq!(list.len(), 1);
+        assert!(list[0].text.contains("folded from 7.9 mm"), "{}", list[0].text);
     }
 
     #[test]

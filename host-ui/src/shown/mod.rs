@@ -225,6 +225,11 @@ impl Shown {
         })
     }
 
+    /// How far the tissue at the tip was displaced when its linear answer folded, m; `None` while it has not since the needle went in.
+    pub fn folded_from_m(&self) -> Option<f64> {
+        self.state.map(|s| s.folded_from_m).filter(|m| *m > 0.0)
+    }
+
     pub fn is_real_time(&self) -> bool {
         self.has_flag(flags::REAL_TIME)
     }

@@ -62,6 +62,9 @@ pub struct Tick {
     /// Recordings of an older version have none.
     #[serde(default)]
     pub tip_deflection_m: [f64; 3],
+    /// As above.
+    #[serde(default)]
+    pub folded_from_um: u32,
 }
 
 impl Tick {
@@ -85,9 +88,9 @@ impl Tick {
             force_terms_n: self.force_terms_n,
             tissue_tick: self.tissue_tick,
             world_from_tool: self.world_from_tool,
-            buttons: self.buttons,
             tip_deflection_m: self.tip_deflection_m,
-            reserved: 0,
+            buttons: self.buttons,
+            folded_from_um: self.folded_from_um,
         }
     }
 }
@@ -114,6 +117,7 @@ impl From<&TickRecord> for Tick {
             world_from_tool: r.world_from_tool,
             buttons: r.buttons,
             tip_deflection_m: r.tip_deflection_m,
+            folded_from_um: r.folded_from_um,
         }
     }
 }
@@ -145,12 +149,13 @@ fn tick_schema() -> Value {
             "due_ns": whole("CLOCK_MONOTONIC, on the ideal grid"), "wake_latency_ns": whole("from due to awake"),
             "force_written_ns": whole("from awake to force written"), "work_ns": whole("from awake to done"),
             "missed": whole("deadlines skipped just before"), "phase": whole("0 outside, 1 contraction, 2 penetration, 3 retraction, 4 hold"),
-            "fault": whole("0 none"), "flags": whole("bits: 1 real-time, 2 engaged, 4 in contact, 8 punctured, 16 simulated device, 32 at goal, 64 gate acted"),
+            "fault": whole("0 none"), "flags": whole("bits: 1 real-time, 2 engaged, 4 in contact, 8 punctured, 16 simulated device, 32 at goal, 64 gate acted, 128 waiting, 256 line needed, 512 line ready, 1024 tissue folded"),
             "tip_in_scene_m": vector(3, "m"), "force_on_hand_n": vector(3, "N, after the gate"), "depth_m": number("m since the membrane"),
             "speed_m_per_s": number("m/s along the path, inwards"),
             "force_terms_n": vector(5, "N before the gate: membrane, guide, damping, friction, gravity"),
             "tissue_tick": whole("of the tissue loop"), "world_from_tool": vector(4, "quaternion i, j, k, w"), "buttons": whole("one bit each"),
             "tip_deflection_m": vector(3, "m, of a needle that bends, from where a rigid one would be"),
+            "folded_from_um": whole("displacement at the tip from which on the linear answer is folded, micrometres; 0: it is not"),
         }),
     )
 }

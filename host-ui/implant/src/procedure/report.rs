@@ -47,6 +47,7 @@ pub fn write(
         },
         "compensation": compensation(job),
         "largest_displacement_before_puncture_mm": seen.displacement_before_puncture_m * 1e3,
+        "tissue_folded_from_mm": folded_from_mm(&seen.records),
         "parameters": parameters(link),
         "scene": link.scene().map(|s| json!({
             "name": s.header.name.read(), "elements": s.header.element_count, "spacing_mm": s.header.spacing_m * 1e3,
@@ -171,6 +172,12 @@ fn force(link: &Link, direction: [f64; 3], seen: &Seen) -> Value {
         "scale": state.map(|s| s.force_scale),
         "gate_interventions": state.map(|s| s.gate_interventions),
     })
+}
+
+/// The least displacement of the tissue at the tip at which its linear answer folded; `None` where it never did.
+fn folded_from_mm(records: &[TickRecord]) -> Option<f64> {
+    let folded = records.iter().map(|r| r.folded_from_um).filter(|um| *um > 0);
+    folded.min().map(|um| f64::from(um) * 1e-3)
 }
 
 fn timing(link: &Link, seen: &Seen) -> Value {
@@ -307,6 +314,11 @@ fn table(result: &Value) {
         number(&force["puncture_n"]),
         number(&force["device_limit_n"])
     );
+    if let Some(mm) = result["tissue_folded_from_mm"].as_f64() {
+        println!(
+            "the linear answer of the tissue is folded at the tip from {mm:.1} mm of displacement on: force and places are not those of tissue there"
+        );
+    }
     println!(
         "timing: real time {}, {} deadlines missed, worst wake-up {} us; records received {}, not received {}",
         timing["real_time"],

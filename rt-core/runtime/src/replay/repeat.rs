@@ -241,7 +241,7 @@ fn order_of(order: &TapedOrder, lines: &mut LinesAgain) -> Result<TissueOrder, R
 fn same_step(again: &TissueLoop, entry: &TissueEntry) -> bool {
     let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
     let response = |r: &TissueResponse| {
-        let numbers = bits(&[r.worst_residual]);
+        let numbers = bits(&[r.worst_residual, r.least_corner, r.folded_from_m]);
         let places = [r.contact_in_scene, r.path_direction, r.solved_tip_in_scene].map(|v| bits(v.as_slice()));
         (
             r.time_ns,

@@ -29,6 +29,11 @@ pub struct TissueResponse {
     pub local: LocalResponse,
     /// Largest violation of a limit so far, in elements.
     pub worst_residual: f64,
+    /// Smallest volume that three links of an element near the tip span, over that at rest, as the tick before had it; 1 where the
+    /// tissue's answer is not linear.
+    pub least_corner: f64,
+    /// How far the tissue at the tip was displaced when its linear answer folded, m; 0 while it has not since the needle went in.
+    pub folded_from_m: f64,
     /// Longest tick so far, ns.
     pub worst_work_ns: u64,
     /// Latest wake-up so far, ns.
@@ -74,6 +79,8 @@ impl Default for TissueResponse {
             layer_in_scene: Vector3::zeros(),
             local: LocalResponse::default(),
             worst_residual: 0.0,
+            least_corner: 1.0,
+            folded_from_m: 0.0,
             worst_work_ns: 0,
             worst_wake_ns: 0,
             missed: 0,

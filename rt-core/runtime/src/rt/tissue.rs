@@ -22,6 +22,7 @@ use stylet_sim::tissue::{Held, StepReport};
 
 mod contact;
 mod flight;
+mod folds;
 mod line;
 mod seeds;
 mod snapshot;
@@ -161,6 +162,7 @@ impl TissueLoop {
         self.report = Some(report);
         self.mark();
         self.respond(woke_ns, &report);
+        self.look_for_folds();
         self.tape(woke_ns, report.residual);
         self.mark();
         self.look_ahead(travel);

@@ -16,12 +16,12 @@ pub const SHORT: [(u32, Kind, &str); 4] = [
     (
         3,
         Kind::Fem,
-        "small strain has no limit for a cell: when the tip moves by more than an element or two in a body this small, cells beside it fold",
+        "small strain has no limit for a cell: when the tip moves by more than an element or two in a body this small, cells beside it fold; live, the state, the banner *Tissue folded* and `result.json` say from which displacement on",
     ),
     (
         5,
         Kind::Fem,
-        "as in (3): the element beside the fixed one is pushed by several elements",
+        "as in (3): the element beside the fixed one is pushed by several elements; reported live as in (3)",
     ),
     (
         7,
@@ -31,7 +31,7 @@ pub const SHORT: [(u32, Kind, &str); 4] = [
     (
         14,
         Kind::Fem,
-        "as in (3), by a hundredth, in the cells between hard and soft",
+        "as in (3), by a hundredth, in the cells between hard and soft; reported live as in (3)",
     ),
 ];
 

@@ -13,7 +13,7 @@ const AT_GOAL_M: f64 = 4e-4;
 const AT_REST_M_PER_S: f64 = 3e-3;
 
 impl HapticLoop {
-    fn flags(&self, response: &ChainOutput) -> u32 {
+    fn flags(&self, tissue: &TissueResponse, response: &ChainOutput) -> u32 {
         let always = flags::REAL_TIME | flags::SIMULATED_DEVICE | flags::LINE_NEEDED;
         let speed = self.chain.estimator.velocity_m_per_s().norm();
         let at_goal = self.goal.is_some_and(|goal| {
@@ -27,6 +27,7 @@ impl HapticLoop {
             | bit(self.chain.needle.punctured, flags::PUNCTURED)
             | bit(at_goal, flags::AT_GOAL)
             | bit(self.on_line && !self.lacks_beam(), flags::LINE_READY)
+            | bit(tissue.least_corner <= 0.0, flags::FOLDED)
     }
 
     pub(super) fn record(
@@ -43,7 +44,7 @@ impl HapticLoop {
         let gate_counts = gate.counts().all();
         let interventions = gate_counts.iter().sum();
         let (energy_j, warmth_n) = (gate.passivity().energy_j(), gate.warmth_n());
-        let mut now_flags = self.flags(response);
+        let mut now_flags = self.flags(tissue, response);
         if interventions > self.state.gate_interventions {
             now_flags |= flags::GATE_ACTED;
         }
@@ -76,6 +77,8 @@ impl HapticLoop {
         s.tissue_missed_deadlines = tissue.missed;
         s.tissue_worst_wake_ns = tissue.worst_wake_ns;
         s.worst_residual = tissue.worst_residual;
+        s.least_corner = tissue.least_corner;
+        s.folded_from_m = tissue.folded_from_m;
         s.worst_tissue_work_ns = tissue.worst_work_ns;
         s.gate_interventions = interventions;
         s.gate_counts = gate_counts;
@@ -114,7 +117,7 @@ impl HapticLoop {
                 .map_or([0.0; 4], |sample| sample.world_from_tool.coords.into()),
             tip_deflection_m,
             buttons: self.sample.map_or(0, |sample| sample.buttons),
-            reserved: 0,
+            folded_from_um: (s.folded_from_m * 1e6).ceil() as u32,
         };
         if self.ports.records.push(record).is_err() {
             s.records_lost += 1;

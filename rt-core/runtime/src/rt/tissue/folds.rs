@@ -1,0 +1,42 @@
+//! Whether the tissue near the tip is folded: after the response is out, for the next one.
+
+use super::TissueLoop;
+use stylet_sim::scene::TissueKind;
+use stylet_sim::tissue::{Carried, MaterialPoint, least_corner};
+
+impl TissueLoop {
+    /// Limits keep ChainMail's cells open; a linear answer, of the body or of what carries it, is looked at.
+    pub(super) fn look_for_folds(&mut self) {
+        let body = self.world.tissue.deformed();
+        let is_linear = self.world.scene.tissue() == TissueKind::Fem || matches!(body.carried, Carried::Field(_));
+        let at_tip = if is_linear { self.element_at_tip() } else { None };
+        let Some(element) = at_tip else {
+            (self.response.least_corner, self.response.folded_from_m) = (1.0, 0.0);
+            return;
+        };
+        let least = least_corner(&body, element);
+        let displacement = body.displacement(element).iter().map(|u| u * u).sum::<f64>().sqrt();
+        let spacing_m = body.lattice.spacing_m;
+        self.response.least_corner = least;
+        if least <= 0.0 && self.response.folded_from_m == 0.0 {
+            self.response.folded_from_m = displacement * spacing_m;
+        }
+    }
+
+    /// The element that the tip is in or presses on, by the line or as the contact holds it.
+    fn element_at_tip(&self) -> Option<u32> {
+        if let Some(held) = self.held {
+            return Some(held.element);
+        }
+        let line = self
+            .line
+            .as_ref()
+            .filter(|line| line.generation == self.loads.generation)?;
+        let along_m = self.loads.tip_material_m;
+        if !self.loads.in_tissue || !along_m.is_finite() {
+            return None;
+        }
+        let place_m = line.line.point_m(along_m.max(0.0), [0.0; 2]);
+        MaterialPoint::at_rest(&self.world.scene.body, place_m).map(|point| point.element)
+    }
+}
