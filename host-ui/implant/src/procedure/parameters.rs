@@ -77,11 +77,7 @@ pub fn parameter(text: &str) -> Result<ParameterChange, NoParameter> {
 }
 
 /// Waits until they are in force.
-pub(super) fn set(
-    link: &mut Link,
-    changes: &[ParameterChange],
-    interrupted: &Interrupt,
-) -> Result<(), ProcedureError> {
+pub(super) fn set(link: &mut Link, changes: &[ParameterChange], interrupted: &Interrupt) -> Result<(), ProcedureError> {
     if changes.is_empty() {
         return Ok(());
     }
@@ -96,7 +92,9 @@ pub(super) fn set(
     if are_set {
         Ok(())
     } else {
-        Err(ProcedureError::NothingReceived("the core did not take the parameters up in time"))
+        Err(ProcedureError::NothingReceived(
+            "the core did not take the parameters up in time",
+        ))
     }
 }
 

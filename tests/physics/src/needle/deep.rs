@@ -252,9 +252,18 @@ fn a_needle_that_grazes_the_surface_goes_in_and_out_again() {
         let inwards = session.run(1.5);
         for tick in [0, 300, 600, 900, 1499] {
             let o = &inwards[tick];
-            println!("tick {tick}: {:?} along {:.4} speed {:.4} axis {:?} total {:?}", o.phase, o.depth_m, o.speed_along_m_per_s, o.axis, o.terms.total_n);
+            println!(
+                "tick {tick}: {:?} along {:.4} speed {:.4} axis {:?} total {:?}",
+                o.phase, o.depth_m, o.speed_along_m_per_s, o.axis, o.terms.total_n
+            );
         }
-        println!("tip {:?} line {} contact {} entry {:?}", session.true_tip_in_world(), session.response().line, session.response().contact, session.chain().needle);
+        println!(
+            "tip {:?} line {} contact {} entry {:?}",
+            session.true_tip_in_world(),
+            session.response().line,
+            session.response().contact,
+            session.chain().needle
+        );
         let (deep_m, largest_m) = (inwards[inwards.len() - 1].depth_m, largest(&session));
         session.go_to(start, 0.05);
         let out = session.run(8.0);
