@@ -23,7 +23,7 @@ use stylet_host::record;
 use stylet_implant::procedure;
 use stylet_implant::readers::{SeedDefaults, read_seeds};
 use stylet_manual::ManualArgs;
-use stylet_shm_schema::ParameterChange;
+use stylet_shm_schema::{MAX_LEFT_NEEDLES, ParameterChange};
 use stylet_shm_schema::service::Instance;
 
 const SCENE_HELP: &str = concat!(
@@ -85,6 +85,9 @@ enum Task {
         /// Rehearse every needle first, and drop each seed so that it rests on plan
         #[arg(long)]
         compensate: bool,
+        /// Put this many stabilising needles in first, 0 to 4; they leave no seed, hold the gland while the others come and go, and are drawn out at the end
+        #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=MAX_LEFT_NEEDLES as i64))]
+        stabilise: u8,
         /// Source file for the score [default: the source that the plan names, 6711 or 200]
         #[arg(long, value_name = "FILE")]
         source: Option<PathBuf>,
@@ -263,6 +266,7 @@ impl Cli {
                 insert_speed,
                 plan,
                 compensate,
+                stabilise,
                 source,
                 parameters,
                 seeds,
@@ -278,6 +282,7 @@ impl Cli {
                     seeds: usize::from(seeds),
                     plan,
                     compensate,
+                    stabilise: usize::from(stabilise),
                     source,
                     parameters,
                 });

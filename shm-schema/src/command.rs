@@ -5,8 +5,8 @@ use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 use num_enum::TryFromPrimitive;
 
-/// Values of one command at most: a plan of 128 seeds and its path fits.
-pub const MAX_COMMAND_VALUES: usize = 400;
+/// Values of one command at most: a rehearsal with 128 drops beside as many needles as may stay in fits.
+pub const MAX_COMMAND_VALUES: usize = 432;
 
 /// A [`crate::Request`] as plain old data, written by a host. Answered by one [`Reply`] with the same `host_id` and
 /// `command_id`. Made and read by [`crate::Request::encode`] and [`crate::Request::decode`] only.

@@ -44,20 +44,21 @@ pub use params::{
     PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet,
     ParameterSpec, ParametersInForce, folding,
 };
-pub use plan::{MAX_SEEDS, PlanInForce, PlannedSeed};
+pub use plan::{MAX_LEFT_NEEDLES, MAX_SEEDS, PlanInForce, PlannedSeed};
 pub use record::TickRecord;
 pub use refusal::{Reason, Refusal, RefusalCode};
 pub use rehearsal::Rehearsal;
 pub use request::{
-    ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, NeedleAxis, NeedleRehearsal, ParameterChange, PlannedNeedle,
-    RETRACT_RANGE_M, Request, RequestError, RequestErrors, SPEED_RANGE_M_PER_S, STRAND_PITCH_RANGE_M,
+    ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, LEFT_DEPTH_RANGE_M, NeedleAxis, NeedleRehearsal,
+    ParameterChange, PlannedNeedle, RETRACT_RANGE_M, Request, RequestError, RequestErrors, SPEED_RANGE_M_PER_S,
+    STRAND_PITCH_RANGE_M, StabilisingNeedle,
 };
 pub use scene::{
     BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, SceneId, StructureInfo,
     UploadHeader, UploadStructure, role,
 };
 pub use session::{Session, ThreadReport};
-pub use snapshot::{MAX_BEND_POINTS, SeedPose, SnapshotHeader, Vertex};
+pub use snapshot::{LeftNeedlePose, MAX_BEND_POINTS, SeedPose, SnapshotHeader, Vertex};
 pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 

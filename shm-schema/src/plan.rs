@@ -6,6 +6,9 @@ use iceoryx2::prelude::ZeroCopySend;
 /// Seeds planned or placed at most.
 pub const MAX_SEEDS: usize = 128;
 
+/// Needles that may stay in the tissue while another moves, at most.
+pub const MAX_LEFT_NEEDLES: usize = 4;
+
 /// One seed of a plan.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]

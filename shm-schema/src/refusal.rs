@@ -44,6 +44,18 @@ pub enum RefusalCode {
     NeedleInTissue = 44,
     /// The simulated hand cannot reach the goal.
     BadGoal = 45,
+    /// There is no needle in the tissue that could be left there.
+    NoNeedleToLeave = 46,
+    /// The tip presses on a membrane, which would go on giving way under it.
+    TipAtMembrane = 47,
+    /// As many needles stay in as may.
+    NoRoomToLeave = 48,
+    /// No needle of that number stays in. Subject: the number.
+    NoLeftNeedle = 49,
+    /// The hand is not at the tip of that needle.
+    NotAtNeedle = 50,
+    /// The needle is on no line, and only one on a line may stay in.
+    NeedleWithoutLine = 51,
     /// Another scene is being loaded.
     SceneLoading = 60,
     /// The uploaded volume is invalid.
@@ -88,6 +100,14 @@ impl RefusalCode {
             Self::NeedleInTissue => "the needle is in the tissue: retract it first",
             Self::BadGoal => {
                 "the goal for the hand needs a finite place, a direction, and a speed and acceleration above zero"
+            }
+            Self::NoNeedleToLeave => "there is no needle in the tissue to leave there",
+            Self::TipAtMembrane => "the tip presses on a membrane: go through it or draw back, then leave the needle",
+            Self::NoRoomToLeave => "4 needles stay in already: draw one out first",
+            Self::NoLeftNeedle => "no needle of that number stays in the tissue",
+            Self::NotAtNeedle => "bring the hand along that needle to within 2 mm of its tip, then take it up",
+            Self::NeedleWithoutLine => {
+                "the tissue was not prepared for this needle (no line): draw it back, wait, and go in again"
             }
             Self::SceneLoading => "another scene is being loaded; wait until it is ready",
             Self::InvalidVolume => "the volume is invalid",

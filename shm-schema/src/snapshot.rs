@@ -1,6 +1,6 @@
 //! The deformed gland at 200 Hz, filled straight into memory that the bridge loaned ahead.
 
-use crate::{MAX_SEEDS, SceneId};
+use crate::{MAX_LEFT_NEEDLES, MAX_SEEDS, SceneId};
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -29,6 +29,21 @@ pub struct SeedPose {
 
 /// Places along a bent needle in a snapshot at most.
 pub const MAX_BEND_POINTS: usize = 16;
+
+/// A needle that stays in the tissue.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
+#[type_name("stylet.LeftNeedlePose")]
+pub struct LeftNeedlePose {
+    /// Its number, by which it is taken up again or drawn out.
+    pub number: u64,
+    /// Where it enters the body at rest, scene frame, m.
+    pub entry_m: [f64; 3],
+    /// Unit vector from hub to tip.
+    pub direction: [f64; 3],
+    /// Where its tip is, scene frame, m.
+    pub tip_m: [f64; 3],
+}
 
 /// Header of the vertices of one tissue tick, written by the tissue thread.
 #[repr(C)]
@@ -75,8 +90,14 @@ pub struct SnapshotHeader {
     pub bend_spacing_m: f64,
     /// Places of the shaft less where a rigid needle would have them, scene frame, m: from the tip back to the hand.
     pub bend_m: [[f64; 3]; MAX_BEND_POINTS],
+    /// How many of `left` count.
+    pub left_count: u32,
+    /// Zero.
+    pub reserved: u32,
     /// In the order of the drops.
     pub seeds: [SeedPose; MAX_SEEDS],
+    /// Needles that stay in, in the order in which they were left.
+    pub left: [LeftNeedlePose; MAX_LEFT_NEEDLES],
 }
 
 impl SnapshotHeader {
@@ -84,6 +105,11 @@ impl SnapshotHeader {
     /// not bend.
     pub fn bends_m(&self) -> &[[f64; 3]] {
         self.bend_m.get(..self.bend_count as usize).unwrap_or(&[])
+    }
+
+    /// Needles that stay in.
+    pub fn left(&self) -> &[LeftNeedlePose] {
+        &self.left[..(self.left_count as usize).min(MAX_LEFT_NEEDLES)]
     }
 
     /// Identity of the scene that the vertices belong to.

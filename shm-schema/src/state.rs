@@ -91,6 +91,10 @@ pub struct HapticState {
     pub flags: u32,
     /// Seeds in the tissue.
     pub seed_count: u32,
+    /// Needles that stay in the tissue while another moves.
+    pub left_count: u32,
+    /// Zero.
+    pub reserved: u32,
 }
 
 /// Bits of [`HapticState::flags`] and [`crate::TickRecord::flags`].
@@ -118,6 +122,9 @@ pub mod flags {
     pub const LINE_READY: u32 = 1 << 9;
     /// The linear answer of the tissue near the tip is folded in this tick: it is not that of tissue.
     pub const FOLDED: u32 = 1 << 10;
+    /// The hand holds no needle: it has left one in the tissue and is not out yet, or is on the way of one that stays in. It meets
+    /// nothing, and feels nothing.
+    pub const HAND_EMPTY: u32 = 1 << 11;
 }
 
 /// Phase of needle and tissue (paper eq. 6), by stable number.

@@ -54,6 +54,7 @@ impl Rehearser for Theatre {
             acceleration_m_per_s2: pace.acceleration_m_per_s2,
             retract_to_m: drops.retract_to_m,
             strand_pitch_m: drops.strand_pitch_m,
+            stabilising: Vec::new(),
             drops_m: drops.drops_m().map(Vector3::from).collect(),
         };
         let done = self

@@ -111,6 +111,8 @@ pub struct Options {
     pub plan: Option<PathBuf>,
     /// Rehearse each needle first, and move its drops.
     pub compensate: bool,
+    /// So many needles go in first and stay until the others have left their seeds.
+    pub stabilise: usize,
     /// For the score; else the one that the plan names.
     pub source: Option<PathBuf>,
     /// Set before anything else; they stay in force.
@@ -127,6 +129,8 @@ struct Seen {
     events: Vec<Event>,
     /// Numbers of planned drops that left no seed.
     lost: Vec<usize>,
+    /// Needles that stayed in, as many as there were at once.
+    left: Vec<LeftNeedlePose>,
 }
 
 /// An error when not every step was completed.
@@ -181,6 +185,9 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
         }
     );
     parameters::set(&mut link, &options.parameters, &interrupted)?;
+    if options.stabilise > 0 {
+        job.stabilise(&scene, options.stabilise)?;
+    }
     if options.compensate {
         job.compensate(&mut link, &pace, &interrupted)?;
     }
@@ -293,9 +300,11 @@ fn perform(
     interrupted: &Interrupt,
     seen: &mut Seen,
 ) -> Result<(), ProcedureError> {
-    let mut run = Run::of_needles(job.tasks.clone(), pace).with_patience(UNWATCHED);
+    let mut run = Run::of_needles(job.tasks.clone(), pace)
+        .stabilised(&job.stabilising)
+        .with_patience(UNWATCHED);
     let begun = Instant::now();
-    let mut step: Option<(usize, Step)> = None;
+    let mut step: Option<(usize, Option<usize>, Step)> = None;
     seen.last_event = link.events().back().map(|e| e.sequence);
     link.take_records();
     loop {
@@ -304,16 +313,18 @@ fn perform(
         }
         link.poll();
         let status = run.advance(link);
-        if step != Some((run.needle(), run.step())) {
-            step = Some((run.needle(), run.step()));
-            let (number, count) = (run.needle() + 1, job.tasks.len());
+        let now = (run.needle(), run.stabilising(), run.step());
+        if step != Some(now) {
+            step = Some(now);
             let seconds = begun.elapsed().as_secs_f64();
-            println!(
-                "{seconds:7.2} s  needle {number} of {count}, step: {}",
-                run.step().name()
-            );
+            let which = match run.stabilising() {
+                Some(number) => format!("stabilising needle {} of {}", number + 1, job.stabilising.len()),
+                None => format!("needle {} of {}", run.needle() + 1, job.tasks.len()),
+            };
+            println!("{seconds:7.2} s  {which}, step: {}", run.step().name());
         }
         seen.take(link, begun);
+        seen.most_left(link);
         for number in run.lost().iter().skip(seen.lost.len()) {
             println!("note: seed {} is lost: the tip was outside the tissue", number + 1);
         }
@@ -327,6 +338,12 @@ fn perform(
 }
 
 impl Seen {
+    fn most_left(&mut self, link: &Link) {
+        if let Some(snapshot) = link.snapshot().filter(|s| s.header.left().len() > self.left.len()) {
+            self.left = snapshot.header.left().to_vec();
+        }
+    }
+
     fn take(&mut self, link: &mut Link, begun: Instant) {
         self.records.extend(link.take_records());
         for event in link

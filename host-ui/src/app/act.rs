@@ -270,6 +270,9 @@ fn request_name(request: &Request) -> &'static str {
         Request::Rehearse(_) => "Rehearsal",
         Request::StopHand => "Stop",
         Request::ExpectNeedle(_) => "Next needle",
+        Request::LeaveNeedle => "Leave needle",
+        Request::TakeNeedle(_) => "Take up needle",
+        Request::DrawNeedle { .. } => "Draw out needle",
     }
 }
 

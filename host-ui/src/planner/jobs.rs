@@ -173,6 +173,7 @@ fn all(
         };
         let _ = messages.send(JobMessage::Progress(progress));
         let mut rehearser = LinkRehearser {
+            stabilising: &[],
             link: &mut link,
             interrupted: interrupt,
         };

@@ -1,11 +1,13 @@
 //! What one frame shows, taken from the link once, so that no panel touches shared memory.
 
 mod bend;
+mod line;
 mod seeds;
 
 use crate::dose_worker::DoseResult;
 use crate::planner::Planning;
 pub use bend::Bend;
+pub use line::NeedleLine;
 use nalgebra::Vector3;
 pub use seeds::{SeedError, all_errors, own_errors};
 use std::sync::Arc;
@@ -14,8 +16,8 @@ use stylet_host::link::{Link, LinkStatus};
 use stylet_implant::plan::{HOLES, Template};
 use stylet_implant::workflow::{Step, Waiting};
 use stylet_shm_schema::{
-    EventKind, Fault, HapticState, ParametersInForce, Phase, PlanInForce, PlannedSeed, SceneHeader, SeedPose, Session,
-    flags,
+    EventKind, Fault, HapticState, LeftNeedlePose, ParametersInForce, Phase, PlanInForce, PlannedSeed, SceneHeader,
+    SeedPose, Session, flags,
 };
 
 /// Past the deepest seed the needle may go this far, and the path is drawn this far.
@@ -51,6 +53,8 @@ pub struct Shown {
     pub seeds: Vec<SeedPose>,
     /// Of the needle in the last snapshot.
     pub bend: Bend,
+    /// Needles that stay in while another moves.
+    pub left: Vec<LeftNeedlePose>,
     pub snapshot_residual: Option<f64>,
     pub invalid_dropped: u64,
     /// Step of the scripted procedure while it runs or after it ran.
@@ -124,16 +128,6 @@ pub struct Note {
     pub text: String,
 }
 
-/// Whether the tissue is prepared for the needle where it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NeedleLine {
-    Ready,
-    /// The needle is outside.
-    Preparing,
-    /// The needle is in tissue without one.
-    Missing,
-}
-
 impl Shown {
     pub fn empty(instance: &str) -> Self {
         Self {
@@ -146,6 +140,7 @@ impl Shown {
             parameters: None,
             seeds: Vec::new(),
             bend: Bend::default(),
+            left: Vec::new(),
             snapshot_residual: None,
             invalid_dropped: 0,
             running: false,
@@ -182,11 +177,13 @@ impl Shown {
         self.last_refusal = last.map_or_else(String::new, |e| e.text.read());
         self.seeds.clear();
         self.bend.clear();
+        self.left.clear();
         self.snapshot_residual = None;
         if let Some(snapshot) = link.snapshot() {
             self.bend.take(&snapshot.header);
             let count = snapshot.header.seed_count as usize;
             self.seeds.extend(snapshot.header.seeds.iter().take(count).copied());
+            self.left.extend_from_slice(snapshot.header.left());
             self.snapshot_residual = Some(snapshot.header.residual);
         }
     }
@@ -199,7 +196,8 @@ impl Shown {
         matches!(self.status, LinkStatus::Absent { .. })
     }
 
-    fn has_flag(&self, flag: u32) -> bool {
+    /// Whether the newest tick has a bit of [`flags`].
+    pub fn has_flag(&self, flag: u32) -> bool {
         self.state.is_some_and(|s| s.flags & flag != 0)
     }
 
@@ -210,19 +208,6 @@ impl Shown {
     /// Engaged, but the force would begin with a jump.
     pub fn is_waiting(&self) -> bool {
         self.has_flag(flags::WAITING)
-    }
-
-    /// `None` where the tissue needs no lines.
-    pub fn needle_line(&self) -> Option<NeedleLine> {
-        self.has_flag(flags::LINE_NEEDED).then(|| {
-            if self.has_flag(flags::LINE_READY) {
-                NeedleLine::Ready
-            } else if self.has_flag(flags::IN_CONTACT) {
-                NeedleLine::Missing
-            } else {
-                NeedleLine::Preparing
-            }
-        })
     }
 
     /// How far the tissue at the tip was displaced when its linear answer folded, m; `None` while it has not since the needle went in.

@@ -380,6 +380,10 @@ fn collect_live(marks: &mut Marks, (shown, view): (&Shown, &ViewState), look: Lo
             marks.force(tip, state.force_on_hand_n);
         }
     }
+    for left in &shown.left {
+        let hub_m = [0, 1, 2].map(|a| left.tip_m[a] - left.direction[a] * NEEDLE_LENGTH_M);
+        marks.needle(&[left.tip_m, hub_m]);
+    }
     for seed in &shown.seeds {
         marks.placed_seed(seed.position_m, seed.axis);
     }

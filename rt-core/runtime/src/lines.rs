@@ -1,7 +1,8 @@
 //! Lines for needles: the body at rest that they are solved in, apart from the one that moves.
 
 use crate::rt::world::WorldError;
-use stylet_sim::line::{Line, LineError, QueueProgress, ReadyLine};
+use std::sync::Arc;
+use stylet_sim::line::{Line, LineError, LineStations, QueueProgress, ReadyLine};
 use stylet_sim::needle::LayerKind;
 use stylet_sim::scene::{Scene, SceneError, SceneSource, TissueKind};
 use stylet_sim::tissue::fem::batch::BatchModel;
@@ -67,8 +68,21 @@ impl LineBody {
         bends: bool,
         goes_on: &mut dyn FnMut() -> bool,
     ) -> Result<ReadyLine, NoLine> {
+        self.prepare_beside(generation, tip_m, direction, bends, &[], goes_on)
+    }
+
+    /// The same for a needle that may come beside those of `others`.
+    pub fn prepare_beside(
+        &self,
+        generation: u64,
+        tip_m: [f64; 3],
+        direction: [f64; 3],
+        bends: bool,
+        others: &[Arc<LineStations>],
+        goes_on: &mut dyn FnMut() -> bool,
+    ) -> Result<ReadyLine, NoLine> {
         let line = Line::into_body(&self.scene.lattice, tip_m, direction).ok_or(LineError::NoTissue)?;
-        self.prepare_along(generation, line, bends, &mut |_| goes_on())
+        self.prepare_along(generation, line, bends, others, &mut |_| goes_on())
     }
 
     /// Solves for a line that enters the body where it says. `report` is called between slices of work and ends it by
@@ -78,6 +92,7 @@ impl LineBody {
         generation: u64,
         line: Line,
         bends: bool,
+        others: &[Arc<LineStations>],
         report: &mut dyn FnMut(QueueProgress) -> bool,
     ) -> Result<ReadyLine, NoLine> {
         let inside_m = 0.25 * self.scene.body.spacing_m;
@@ -94,9 +109,10 @@ impl LineBody {
                 .copied()
                 .unwrap_or(Some(LayerKind::default()))
         };
-        let mut ready = ReadyLine::prepare(generation, &self.batch, lattice, &layer_of, line, bends, report)?;
+        let mut ready =
+            ReadyLine::prepare(generation, &self.batch, lattice, &layer_of, line, bends, others, report)?;
         if !self.tissue.adds_columns() {
-            ready.body.answer.carry(&self.scene.body, self.scene.is_held());
+            ready.body.carry(&self.scene.body, self.scene.is_held());
         }
         Ok(ready)
     }

@@ -3,6 +3,7 @@
 use crate::force::ForceParameters;
 use crate::limits::{Limits, TissueParameters};
 use crate::line::{NeedleBending, PronyTerm};
+use crate::migration::Migration;
 use crate::needle::{Layer, Layers, NeedleParameters};
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::{ParameterId, ParameterProblem, ParameterProblems, ParameterSet};
@@ -16,6 +17,8 @@ pub struct Active {
     pub force: ForceParameters,
     /// Limits of the tissue, eq. 3 to 5.
     pub limits: Limits,
+    /// What seeds do after they were dropped.
+    pub migration: Migration,
 }
 
 /// Validates `set` for `device` by the table of parameters; lists every problem. The models verify their own structures
@@ -29,7 +32,16 @@ pub fn activate(set: &ParameterSet, device: &DeviceInfo) -> Result<Active, Param
     let limits = tissue(set).validate().map_err(unusable)?;
     needle.validate().map_err(unusable)?;
     force.validate().map_err(unusable)?;
-    Ok(Active { needle, force, limits })
+    let migration = Migration {
+        share: set.get(ParameterId::MigratingShare),
+        speed_m_per_s: set.get(ParameterId::MigrationSpeed),
+    };
+    Ok(Active {
+        needle,
+        force,
+        limits,
+        migration,
+    })
 }
 
 fn unusable(problems: Vec<impl ToString>) -> ParameterProblems {

@@ -8,6 +8,7 @@ pub mod active;
 pub mod force;
 pub mod limits;
 pub mod line;
+pub mod migration;
 pub mod needle;
 pub mod scene;
 pub mod settings;

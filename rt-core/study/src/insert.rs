@@ -112,6 +112,7 @@ fn run(needle: &Needle, drawn: &Drawn) -> NeedleRun {
         acceleration_m_per_s2: pace.acceleration_m_per_s2,
         retract_to_m: needle.retract_to_mm * 1e-3,
         strand_pitch_m: needle.strand_pitch_mm.map(|pitch| pitch * 1e-3),
+        stabilising: Vec::new(),
         drops_m: needle
             .seeds
             .iter()

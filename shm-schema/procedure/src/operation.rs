@@ -98,6 +98,10 @@ pub enum Operation {
     Retract,
     /// Draw the tip back to the entry.
     TakeOut,
+    /// Leave the needle where it is; the hand comes out without it.
+    Leave,
+    /// Draw out the needle that was left first of those that stay in.
+    DrawOut,
     /// Wait until the tissue is at rest.
     Settle,
 }
@@ -108,9 +112,9 @@ impl Operation {
         match self {
             Self::Reset | Self::PublishPlan => Step::Plan,
             Self::Engage | Self::Place => Step::Place,
-            Self::Insert | Self::InsertTo(_) => Step::Insert,
+            Self::Insert | Self::InsertTo(_) | Self::Leave => Step::Insert,
             Self::Drop(_) | Self::DrawBack(_) => Step::Drop,
-            Self::Retract | Self::TakeOut => Step::Retract,
+            Self::Retract | Self::TakeOut | Self::DrawOut => Step::Retract,
             Self::Settle => Step::Settle,
         }
     }
@@ -124,7 +128,13 @@ impl Operation {
             Self::DrawBack(index) => way.drops_m.get(index).map(|&drop_m| (drop_m, pace.retract_m_per_s)),
             Self::Retract => Some((way.entry_m + way.direction * way.retract_to_m, pace.retract_m_per_s)),
             Self::TakeOut => Some((way.entry_m, pace.retract_m_per_s)),
-            Self::Reset | Self::PublishPlan | Self::Engage | Self::Drop(_) | Self::Settle => None,
+            Self::Reset
+            | Self::PublishPlan
+            | Self::Engage
+            | Self::Drop(_)
+            | Self::Leave
+            | Self::DrawOut
+            | Self::Settle => None,
         }
     }
 }

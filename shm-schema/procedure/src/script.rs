@@ -2,6 +2,8 @@
 
 mod continuing;
 mod failure;
+mod request;
+mod stabilising;
 mod waiting;
 
 use crate::tolerance::{TISSUE_REST_FOR_S, TISSUE_REST_LIMIT_S, TISSUE_REST_M, arrived_after_s, move_limit_s};
@@ -10,6 +12,7 @@ use continuing::ahead;
 pub use continuing::{Done, needle_inside};
 pub use failure::StepFailure;
 use nalgebra::Vector3;
+pub use request::HandRequest;
 use std::collections::VecDeque;
 use stylet_shm_schema::{Fault, HandMove, HapticState, flags};
 pub use waiting::{Patience, Waiting, WaitsFor};
@@ -20,39 +23,8 @@ const REPLY_LIMIT_S: f64 = 3.0;
 /// Preparing the tissue for a needle takes seconds, on a busy machine many.
 const LINE_LIMIT_S: f64 = 120.0;
 
-/// What the procedure asks of whoever drives it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum HandRequest {
-    /// Bring tissue, seeds and peaks back to their start.
-    Reset,
-    /// Publish the plan of a needle, counted from 0.
-    PublishPlan {
-        /// Which needle.
-        needle: usize,
-    },
-    /// Turn the force on.
-    Engage,
-    /// Move the hand.
-    MoveHand(HandMove),
-    /// Leave a seed at the tip.
-    DropSeed {
-        /// From middle to middle of two seeds, m, where they are one strand.
-        strand_pitch_m: Option<f64>,
-    },
-}
-
-impl HandRequest {
-    /// The request in a message to people.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Reset => "Reset",
-            Self::PublishPlan { .. } => "SetPlan",
-            Self::Engage => "Engage",
-            Self::MoveHand(_) => "MoveHand",
-            Self::DropSeed { .. } => "DropSeed",
-        }
-    }
-}
+/// A needle that is drawn out slowly takes its time.
+const LEFT_LIMIT_S: f64 = 30.0;
 
 /// What became of the last request.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -95,6 +67,8 @@ pub enum Next {
 #[derive(Clone, Debug)]
 pub struct Procedure {
     ways: Vec<NeedleWay>,
+    /// Those that go in first and stay: each goes to its first drop and leaves no seed. They are numbered behind the others.
+    stabilising: Vec<NeedleWay>,
     pace: Pace,
     /// What is still to be done, each with the number of its needle.
     ahead: VecDeque<(usize, Operation)>,
@@ -107,6 +81,10 @@ pub struct Procedure {
     now_s: f64,
     /// Seeds in the tissue when the drop at work was sent.
     seeds_before: u32,
+    /// Needles that stayed in when the operation at work began.
+    left_before: u32,
+    /// A displacement that the tissue has kept to, where needles stay in.
+    kept_m: f64,
     is_sent: bool,
     begun_s: f64,
     /// When the tissue was last not ready for the needle.
@@ -175,8 +153,17 @@ impl Procedure {
         Self::new(vec![way], pace, ahead)
     }
 
+    fn way(&self, needle: usize) -> Option<&NeedleWay> {
+        self.ways
+            .get(needle)
+            .or_else(|| self.stabilising.get(needle.checked_sub(self.ways.len())?))
+    }
+
     fn new(ways: Vec<NeedleWay>, pace: Pace, ahead: VecDeque<(usize, Operation)>) -> Self {
         Self {
+            stabilising: Vec::new(),
+            left_before: 0,
+            kept_m: f64::NAN,
             ways,
             pace,
             ahead,
@@ -201,7 +188,9 @@ impl Procedure {
     /// Which needle is at work, counted from 0; the last one when all are done.
     pub fn needle(&self) -> usize {
         let last = self.ways.len().saturating_sub(1);
-        self.ahead.front().map_or(last, |(needle, _)| *needle)
+        // A stabilising one belongs to the needle that comes next, or to the last.
+        let own = self.ahead.iter().find(|(needle, _)| *needle <= last);
+        own.map_or(last, |(needle, _)| *needle)
     }
 
     /// Numbers of the drops that left no seed, counted from 0 over all needles: the tip was outside the tissue.
@@ -227,6 +216,7 @@ impl Procedure {
         if !self.is_sent {
             self.is_sent = true;
             self.seeds_before = observed.state.seed_count;
+            self.left_before = observed.state.left_count;
             return Ok(self.request(needle, operation).map_or(Next::Wait, Next::Send));
         }
         if !self.is_over(now_s, observed, reply, (needle, operation))? {
@@ -243,7 +233,7 @@ impl Procedure {
     }
 
     fn goal(&self, needle: usize, operation: Operation) -> Option<HandMove> {
-        let way = self.ways.get(needle)?;
+        let way = self.way(needle)?;
         let (tip_m, speed_m_per_s) = operation.target(way, &self.pace)?;
         Some(HandMove {
             tip_m: tip_m.into(),
@@ -256,7 +246,14 @@ impl Procedure {
     fn request(&self, needle: usize, operation: Operation) -> Option<HandRequest> {
         match operation {
             Operation::Reset => Some(HandRequest::Reset),
-            Operation::PublishPlan => Some(HandRequest::PublishPlan { needle }),
+            Operation::PublishPlan => Some(match needle.checked_sub(self.ways.len()) {
+                Some(number) => HandRequest::ExpectStabilising { number },
+                None => HandRequest::PublishPlan { needle },
+            }),
+            Operation::Leave => Some(HandRequest::LeaveNeedle),
+            Operation::DrawOut => Some(HandRequest::DrawFirstLeft {
+                speed_m_per_s: self.pace.retract_m_per_s,
+            }),
             Operation::Engage => Some(HandRequest::Engage),
             Operation::Drop(_) => Some(HandRequest::DropSeed {
                 strand_pitch_m: self.ways.get(needle).and_then(|way| way.strand_pitch_m),
@@ -289,13 +286,24 @@ impl Procedure {
         }
         match operation {
             Operation::Reset | Operation::PublishPlan | Operation::Engage => Ok(true),
+            Operation::Leave => {
+                self.waits(now_s, WaitsFor::Left)?;
+                Ok(observed.state.left_count > self.left_before)
+            }
+            Operation::DrawOut => {
+                self.waits(now_s, WaitsFor::Left)?;
+                Ok(observed.state.left_count < self.left_before)
+            }
             Operation::Drop(_) => {
                 self.waits(now_s, WaitsFor::Seed)?;
                 Ok(observed.state.seed_count > self.seeds_before)
             }
             Operation::Settle => {
                 self.waits_for = WaitsFor::Rest;
-                let at_rest = observed.displacement_m.is_some_and(|d| d < TISSUE_REST_M);
+                let beside = observed.state.left_count > 0;
+                let at_rest = observed
+                    .displacement_m
+                    .is_some_and(|d| d < TISSUE_REST_M || (beside && self.keeps(d)));
                 let waited = now_s - self.begun_s > TISSUE_REST_LIMIT_S;
                 Ok(self.holds_for(at_rest, TISSUE_REST_FOR_S, now_s) || waited)
             }
@@ -335,7 +343,7 @@ impl Procedure {
         state: &HapticState,
         (needle, operation): (usize, Operation),
     ) -> Result<bool, StepFailure> {
-        let (Some(goal), Some(way)) = (self.goal(needle, operation), self.ways.get(needle)) else {
+        let (Some(goal), Some(way)) = (self.goal(needle, operation), self.way(needle)) else {
             return Ok(true);
         };
         let along_m = |place_m: Vector3<f64>| (place_m - way.entry_m).dot(&way.direction);
@@ -362,6 +370,7 @@ impl Procedure {
         self.waits_for = waits_for;
         let limit_s = self.patience.limit_s(match waits_for {
             WaitsFor::Line => LINE_LIMIT_S,
+            WaitsFor::Left => LEFT_LIMIT_S,
             _ => REPLY_LIMIT_S,
         });
         if now_s - self.begun_s <= limit_s {
@@ -372,6 +381,7 @@ impl Procedure {
             WaitsFor::Reply(request) => StepFailure::NoReply(request, limit_s),
             WaitsFor::Effect(request) => StepFailure::NoEffect(request, limit_s),
             WaitsFor::Seed => StepFailure::NoSeed(limit_s),
+            WaitsFor::Left => StepFailure::NotLeft(limit_s),
             WaitsFor::Line => StepFailure::NoLine(limit_s),
         })
     }

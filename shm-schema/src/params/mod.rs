@@ -19,11 +19,13 @@ pub enum ParameterGroup {
     Force,
     /// What the needle goes through besides the gland.
     Layers,
+    /// What seeds do after they were dropped.
+    Seeds,
 }
 
 impl ParameterGroup {
     /// In the order of the dialog.
-    pub const ALL: [Self; 4] = [Self::Tissue, Self::Needle, Self::Force, Self::Layers];
+    pub const ALL: [Self; 5] = [Self::Tissue, Self::Needle, Self::Force, Self::Layers, Self::Seeds];
 
     /// Heading of the group.
     pub fn name(self) -> &'static str {
@@ -32,6 +34,7 @@ impl ParameterGroup {
             Self::Needle => "Needle",
             Self::Force => "Force",
             Self::Layers => "Layers",
+            Self::Seeds => "Seeds",
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::check::{MAX_COORDINATE_M, is_unit};
-use crate::{MAX_COMMAND_VALUES, Reason, Refusal, RefusalCode};
+use crate::{MAX_COMMAND_VALUES, MAX_LEFT_NEEDLES, Reason, Refusal, RefusalCode};
 
 /// What is wrong with one record. `at` is the place of the first value concerned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -62,6 +62,14 @@ pub enum RequestError {
         /// Largest value.
         high: f64,
     },
+    /// A needle that stays in has a whole number, from 1 on.
+    #[error("no needle has the number {number}")]
+    NoNeedle {
+        /// Place of the value.
+        at: u32,
+        /// The number that came.
+        number: f64,
+    },
     /// No built-in scene has this number.
     #[error("there is no built-in scene number {number}; from 0 they are {}", BUILTIN_SCENES.join(", "))]
     UnknownScene {
@@ -97,6 +105,7 @@ impl RequestError {
             Self::TooFar { at, .. } => (RefusalCode::PlaceTooFar, at),
             Self::NotUnit { at, .. } => (RefusalCode::NotUnitDirection, at),
             Self::OutOfLimits { at, .. } => (RefusalCode::ValueOutOfLimits, at),
+            Self::NoNeedle { at, .. } => (RefusalCode::NoLeftNeedle, at),
             Self::UnknownScene { .. } => (RefusalCode::UnknownScene, 0),
         }
     }
@@ -112,7 +121,11 @@ fn takes(kind: CommandKind) -> String {
         CommandKind::LoadBuiltinScene => "one number".to_owned(),
         CommandKind::DropSeed => "nothing, or the pitch of a strand".to_owned(),
         CommandKind::ExpectNeedle => "entry and direction, three values each".to_owned(),
-        CommandKind::Rehearse => format!("12 values and 1 to {MAX_SEEDS} drops of three values each"),
+        CommandKind::TakeNeedle => "the number of a needle".to_owned(),
+        CommandKind::DrawNeedle => "the number of a needle, and a speed".to_owned(),
+        CommandKind::Rehearse => format!(
+            "13 values, seven for each of at most {MAX_LEFT_NEEDLES} needles that stay in, and 1 to {MAX_SEEDS} drops of three values each"
+        ),
         _ => "no values".to_owned(),
     }
 }
@@ -140,7 +153,8 @@ impl Request {
 }
 
 const PLAN_HEAD: usize = 6;
-const REHEARSAL_HEAD: usize = 12;
+const REHEARSAL_HEAD: usize = 13;
+const STABILISING: usize = 7;
 
 fn count_fits(kind: CommandKind, count: usize) -> bool {
     let places_after = |head: usize| count.checked_sub(head).filter(|n| n % 3 == 0).map(|n| n / 3);
@@ -149,11 +163,15 @@ fn count_fits(kind: CommandKind, count: usize) -> bool {
         CommandKind::SetPlan => count == 0 || places_after(PLAN_HEAD).is_some_and(|n| n <= MAX_SEEDS),
         CommandKind::MoveHand => count == 8,
         CommandKind::ExpectNeedle => count == 6,
+        CommandKind::TakeNeedle => count == 1,
+        CommandKind::DrawNeedle => count == 2,
         // Without a value: loose.
         CommandKind::DropSeed => count <= 1,
         // Without a value: the first scene.
         CommandKind::LoadBuiltinScene => count <= 1,
-        CommandKind::Rehearse => places_after(REHEARSAL_HEAD).is_some_and(|n| (1..=MAX_SEEDS).contains(&n)),
+        // How many needles stay in is a value; see `Reader::drops`.
+        CommandKind::Rehearse => (0..=MAX_LEFT_NEEDLES)
+            .any(|n| places_after(REHEARSAL_HEAD + STABILISING * n).is_some_and(|n| (1..=MAX_SEEDS).contains(&n))),
         // A payload where there is none has always been ignored.
         _ => count <= MAX_COMMAND_VALUES,
     }
@@ -207,9 +225,16 @@ impl<'a> Reader<'a> {
                 acceleration_m_per_s2: self.within("acceleration in m/s2", ACCELERATION_RANGE_M_PER_S2),
                 retract_to_m: self.within("place drawn back to, in m from the entry,", RETRACT_RANGE_M),
                 strand_pitch_m: self.strand_pitch(),
-                drops_m: self.rest(Self::place),
+                stabilising: self.stabilising(),
+                drops_m: self.drops(),
             }),
             CommandKind::StopHand => Request::StopHand,
+            CommandKind::LeaveNeedle => Request::LeaveNeedle,
+            CommandKind::TakeNeedle => Request::TakeNeedle(self.needle()),
+            CommandKind::DrawNeedle => Request::DrawNeedle {
+                number: self.needle(),
+                speed_m_per_s: self.within("speed in m/s", SPEED_RANGE_M_PER_S),
+            },
             CommandKind::ExpectNeedle => Request::ExpectNeedle(NeedleAxis {
                 entry_m: self.place(),
                 direction: self.direction(),
@@ -272,6 +297,28 @@ impl<'a> Reader<'a> {
         Some(self.within("pitch of a strand in m", STRAND_PITCH_RANGE_M))
     }
 
+    fn stabilising(&mut self) -> Vec<StabilisingNeedle> {
+        let count = self.within("number of needles that stay in", [0.0, MAX_LEFT_NEEDLES as f64]);
+        let count = whole(count).filter(|&n| n as usize <= MAX_LEFT_NEEDLES).unwrap_or(0);
+        let mut needle = |_| StabilisingNeedle {
+            entry_m: self.place(),
+            direction: self.direction(),
+            depth_m: self.within("depth of a needle that stays in, in m,", LEFT_DEPTH_RANGE_M),
+        };
+        (0..count).map(&mut needle).collect()
+    }
+
+    /// Drops of a rehearsal: as many as are left.
+    fn drops(&mut self) -> Vec<[f64; 3]> {
+        let left = self.values.len().saturating_sub(self.at);
+        if left == 0 || left % 3 != 0 || left / 3 > MAX_SEEDS {
+            let count = self.values.len();
+            self.errors.push(RequestError::count(CommandKind::Rehearse, count));
+            return Vec::new();
+        }
+        self.rest(Self::place)
+    }
+
     fn change(&mut self) -> ParameterChange {
         let (at, number, value) = (self.at as u32, self.next(), self.next());
         let id = whole(number).and_then(|n| ParameterId::try_from(n).ok());
@@ -280,6 +327,14 @@ impl<'a> Reader<'a> {
             ParameterId::MinStretch
         });
         ParameterChange { id, value }
+    }
+
+    fn needle(&mut self) -> u32 {
+        let (at, number) = (self.at as u32, self.next());
+        whole(number).filter(|&n| n > 0).unwrap_or_else(|| {
+            self.errors.push(RequestError::NoNeedle { at, number });
+            0
+        })
     }
 
     fn scene(&mut self) -> u32 {

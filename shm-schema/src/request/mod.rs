@@ -18,6 +18,9 @@ pub const ACCELERATION_RANGE_M_PER_S2: [f64; 2] = [1e-2, 100.0];
 /// How far from the entry a rehearsed needle may be drawn back to, along the needle, m.
 pub const RETRACT_RANGE_M: [f64; 2] = [-0.5, 0.5];
 
+/// How deep from its entry a needle that stays in is rehearsed, m.
+pub const LEFT_DEPTH_RANGE_M: [f64; 2] = [1e-3, 0.5];
+
 /// One request of a host. The numbers are stable: [`CommandKind`] is made from them, and [`Command::kind`] carries them.
 #[derive(Clone, Debug, PartialEq, EnumDiscriminants)]
 #[strum_discriminants(name(CommandKind), derive(TryFromPrimitive))]
@@ -70,6 +73,21 @@ pub enum Request {
     /// The needle that will come after the planned one: what it needs is prepared meanwhile.
     #[strum_discriminants(doc = "[`Request::ExpectNeedle`]")]
     ExpectNeedle(NeedleAxis) = 14,
+    /// Leave the needle where it is; the hand is empty until it is out of the tissue, and takes up a new one there. Refused where the
+    /// tip is in no tissue or presses on a membrane, where the needle has no line, and beyond [`crate::MAX_LEFT_NEEDLES`].
+    #[strum_discriminants(doc = "[`Request::LeaveNeedle`]")]
+    LeaveNeedle = 15,
+    /// Take up again a needle that stays in, by its number, with the hand at its tip.
+    #[strum_discriminants(doc = "[`Request::TakeNeedle`]")]
+    TakeNeedle(u32) = 16,
+    /// Draw a needle out that stays in, without the hand.
+    #[strum_discriminants(doc = "[`Request::DrawNeedle`]")]
+    DrawNeedle {
+        /// Its number.
+        number: u32,
+        /// How fast, m/s, within [`SPEED_RANGE_M_PER_S`].
+        speed_m_per_s: f64,
+    } = 17,
 }
 
 /// Where a needle goes in, scene frame.
@@ -133,8 +151,21 @@ pub struct NeedleRehearsal {
     pub retract_to_m: f64,
     /// As in [`Request::DropSeed`].
     pub strand_pitch_m: Option<f64>,
+    /// Needles that go in before it and stay, at most [`crate::MAX_LEFT_NEEDLES`].
+    pub stabilising: Vec<StabilisingNeedle>,
     /// Where the tip leaves each seed, m, in the order of the drops: 1 to [`MAX_SEEDS`].
     pub drops_m: Vec<[f64; 3]>,
+}
+
+/// A needle that goes in, leaves no seed, and stays while others come and go; scene frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StabilisingNeedle {
+    /// Where the needle enters, m.
+    pub entry_m: [f64; 3],
+    /// Unit vector from the entry into the body.
+    pub direction: [f64; 3],
+    /// How far from the entry its tip stays, m, within [`LEFT_DEPTH_RANGE_M`].
+    pub depth_m: f64,
 }
 
 impl Request {
@@ -180,10 +211,18 @@ impl Request {
                     run.retract_to_m,
                     run.strand_pitch_m.unwrap_or_default(),
                 ];
-                joined(&[&run.entry_m, &run.direction, &pace], &run.drops_m)
+                let mut stabilising = vec![run.stabilising.len() as f64];
+                for needle in &run.stabilising {
+                    stabilising.extend(needle.entry_m.iter().chain(&needle.direction));
+                    stabilising.push(needle.depth_m);
+                }
+                joined(&[&run.entry_m, &run.direction, &pace, &stabilising], &run.drops_m)
             }
             Self::DropSeed { strand_pitch_m } => strand_pitch_m.iter().copied().collect(),
-            Self::Engage
+            Self::TakeNeedle(number) => vec![f64::from(*number)],
+            Self::DrawNeedle { number, speed_m_per_s } => vec![f64::from(*number), *speed_m_per_s],
+            Self::LeaveNeedle
+            | Self::Engage
             | Self::Disengage
             | Self::Reset
             | Self::UndoSeed

@@ -21,6 +21,7 @@ fn rehearsal(drops: usize) -> NeedleRehearsal {
         acceleration_m_per_s2: 2.0,
         retract_to_m: -0.01,
         strand_pitch_m: (drops > 1).then_some(0.01),
+        stabilising: Vec::new(),
         drops_m: needle(drops).seeds_m,
     }
 }
@@ -55,11 +56,28 @@ fn all() -> Vec<Request> {
         Request::SaveFlight,
         Request::Rehearse(rehearsal(1)),
         Request::Rehearse(rehearsal(MAX_SEEDS)),
+        Request::Rehearse(NeedleRehearsal {
+            stabilising: vec![
+                StabilisingNeedle {
+                    entry_m: [0.01, 0.02, -0.01],
+                    direction: [0.0, 0.0, 1.0],
+                    depth_m: 0.04,
+                };
+                crate::MAX_LEFT_NEEDLES
+            ],
+            ..rehearsal(MAX_SEEDS)
+        }),
         Request::StopHand,
         Request::ExpectNeedle(NeedleAxis {
             entry_m: [0.01, 0.02, 0.03],
             direction: [0.0, 0.0, 1.0],
         }),
+        Request::LeaveNeedle,
+        Request::TakeNeedle(7),
+        Request::DrawNeedle {
+            number: 3,
+            speed_m_per_s: 0.05,
+        },
     ]
 }
 
@@ -84,13 +102,13 @@ fn every_request_survives_its_record() {
         numbers.push(command.kind);
     }
     numbers.dedup();
-    // The wire values of schema 5, and one of schema 7.
-    assert_eq!(numbers, (1..=14).collect::<Vec<u32>>());
+    // The wire values of schema 5, one of schema 7, and three of schema 9.
+    assert_eq!(numbers, (1..=17).collect::<Vec<u32>>());
 }
 
 #[test]
 fn a_payload_that_does_not_fit_is_not_sent() {
-    let long = Request::SetPlan(Some(needle(MAX_SEEDS + 5)));
+    let long = Request::SetPlan(Some(needle(MAX_SEEDS + 20)));
     assert!(long.encode(1, 1).is_err());
     // One that fits but is too long is refused by the reader.
     let command = Request::SetPlan(Some(needle(MAX_SEEDS + 1)))
@@ -115,8 +133,8 @@ fn ten_thousand_random_records_never_panic_and_what_is_accepted_survives() {
         let mut command = Command::zeroed();
         // Half of them of a known kind and a possible count, so that the payload is looked at.
         if round % 2 == 0 {
-            command.kind = (xorshift(&mut seed) % 15) as u32;
-            command.value_count = (xorshift(&mut seed) % 410) as u32;
+            command.kind = (xorshift(&mut seed) % 18) as u32;
+            command.value_count = (xorshift(&mut seed) % 440) as u32;
         } else {
             (command.kind, command.value_count) = (xorshift(&mut seed) as u32, xorshift(&mut seed) as u32);
         }
@@ -165,7 +183,11 @@ fn every_malformed_payload_is_refused_with_its_reason() {
         (K::SetParameters, &[1e9, 1.0][..], C::UnknownParameter),
         (K::SetParameters, &[0.5, 1.0], C::UnknownParameter),
         (K::SetParameters, &[-1.0, 1.0], C::UnknownParameter),
-        (K::SetParameters, &[40.0, 1.0], C::UnknownParameter),
+        (
+            K::SetParameters,
+            &[crate::PARAMETER_COUNT as f64, 1.0],
+            C::UnknownParameter,
+        ),
         (K::SetParameters, &[1.0], C::ValueCount),
         (K::SetParameters, &[], C::ValueCount),
         (K::SetParameters, &[0.0, f64::NAN], C::NotFinite),
@@ -186,9 +208,14 @@ fn every_malformed_payload_is_refused_with_its_reason() {
         (K::DropSeed, &[0.5], C::ValueOutOfLimits),
         (K::DropSeed, &[0.0], C::ValueOutOfLimits),
         (K::DropSeed, &[0.01, 0.01], C::ValueCount),
-        (K::Rehearse, &[0.0; 12], C::ValueCount),
-        (K::Rehearse, &[0.0; 16], C::ValueCount),
-        (K::Rehearse, &[0.0; 15], C::NotUnitDirection),
+        (K::Rehearse, &[0.0; 13], C::ValueCount),
+        (K::Rehearse, &[0.0; 17], C::ValueCount),
+        (K::Rehearse, &[0.0; 16], C::NotUnitDirection),
+        (K::TakeNeedle, &[], C::ValueCount),
+        (K::TakeNeedle, &[0.0], C::NoLeftNeedle),
+        (K::TakeNeedle, &[1.5], C::NoLeftNeedle),
+        (K::DrawNeedle, &[1.0, 9.0], C::ValueOutOfLimits),
+        (K::DrawNeedle, &[1.0], C::ValueCount),
         (K::LoadBuiltinScene, &[3.0], C::UnknownScene),
         (K::LoadBuiltinScene, &[0.5], C::UnknownScene),
         (K::LoadBuiltinScene, &[-1.0], C::UnknownScene),
@@ -217,7 +244,7 @@ fn a_rehearsal_lists_every_bad_value() {
         (RefusalCode::ValueOutOfLimits, 6),
         (RefusalCode::ValueOutOfLimits, 9),
         (RefusalCode::ValueOutOfLimits, 11),
-        (RefusalCode::PlaceTooFar, 15),
+        (RefusalCode::PlaceTooFar, 16),
     ];
     assert_eq!(reasons, expected);
 }

@@ -74,7 +74,7 @@ fn turn(wrist: Wrist, late_ticks: usize, gain: f64) -> (f64, f64, f64) {
             buttons: 0,
             sequence: tick as u64,
         };
-        let output = step_on_line(&parameters, &info, &mut chain, &sample, &mut line, TICK_S);
+        let output = step_on_line(&parameters, &info, &mut chain, &sample, &mut line, None, TICK_S);
         torques.rotate_right(1);
         torques[0] = output.wrench.torque_nm.x;
         most_nm = most_nm.max(torques[0].abs());

@@ -7,7 +7,7 @@ use super::scene;
 use crate::link::Snapshot;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use stylet_shm_schema::{Event, EventKind, MAX_SEEDS, SnapshotHeader, TickRecord, Vertex};
+use stylet_shm_schema::{Event, EventKind, MAX_LEFT_NEEDLES, MAX_SEEDS, SnapshotHeader, TickRecord, Vertex};
 
 /// Where each kind of message goes, and the name and text of its schema.
 pub struct Channel {
@@ -192,6 +192,9 @@ fn tissue_schema() -> Value {
             "seeds": { "type": "array", "items": { "type": "object", "properties": {
                 "position_m": vector(3, "m"), "axis": vector(3, "unit vector"), "dropped_at_m": vector(3, "m"),
             } } },
+            "needles_left_in": { "type": "array", "items": { "type": "object", "properties": {
+                "number": whole("of the needle"), "tip_m": vector(3, "m"), "direction": vector(3, "unit vector"),
+            } } },
         }),
     )
 }
@@ -200,12 +203,15 @@ pub fn tissue(snapshot: &Snapshot) -> Value {
     let h = &snapshot.header;
     let seeds = h.seeds.iter().take(h.seed_count as usize);
     let seeds = seeds.map(|s| json!({ "position_m": s.position_m, "axis": s.axis, "dropped_at_m": s.dropped_at_m }));
+    let left = h.left().iter();
+    let left = left.map(|l| json!({ "number": l.number, "tip_m": l.tip_m, "direction": l.direction }));
     json!({
         "session_id": h.session_id, "tissue_tick": h.tissue_tick, "time_ns": h.time_ns,
         "tip_in_scene_m": h.tip_in_scene_m, "needle_direction": h.needle_direction, "held_in_scene_m": h.held_in_scene_m,
         "bend_m": h.bends_m(), "bend_spacing_m": h.bend_spacing_m,
         "held_element": (h.held_element != u32::MAX).then_some(h.held_element), "phase": h.phase, "residual": h.residual,
         "max_displacement_m": h.max_displacement_m, "work_ns": h.work_ns, "seeds": seeds.collect::<Vec<_>>(),
+        "needles_left_in": left.collect::<Vec<_>>(),
     })
 }
 
@@ -230,6 +236,16 @@ struct Tissue {
     max_displacement_m: f64,
     work_ns: u64,
     seeds: Vec<Seed>,
+    /// Earlier versions know none.
+    #[serde(default)]
+    needles_left_in: Vec<LeftIn>,
+}
+
+#[derive(Deserialize)]
+struct LeftIn {
+    number: u64,
+    tip_m: [f64; 3],
+    direction: [f64; 3],
 }
 
 /// The header of a snapshot, as far as [`tissue`] keeps it.
@@ -248,8 +264,12 @@ pub fn tissue_of(data: &[u8]) -> Option<SnapshotHeader> {
         held_element: t.held_element.unwrap_or(u32::MAX),
         phase: t.phase,
         seed_count: t.seeds.len().min(MAX_SEEDS) as u32,
+        left_count: t.needles_left_in.len().min(MAX_LEFT_NEEDLES) as u32,
         ..SnapshotHeader::default()
     };
+    for (to, from) in header.left.iter_mut().zip(t.needles_left_in) {
+        (to.number, to.tip_m, to.direction) = (from.number, from.tip_m, from.direction);
+    }
     for (to, from) in header.seeds.iter_mut().zip(t.seeds) {
         (to.position_m, to.axis, to.dropped_at_m) = (from.position_m, from.axis, from.dropped_at_m);
     }

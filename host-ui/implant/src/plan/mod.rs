@@ -15,6 +15,7 @@ mod needle;
 pub mod optimise;
 pub mod rehearse;
 pub mod seeds;
+pub mod stabilise;
 mod template;
 
 pub use anatomy::Anatomy;

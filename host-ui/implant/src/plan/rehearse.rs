@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Link, LinkError, LinkStatus};
 use stylet_procedure::{NeedleWay, Pace};
-use stylet_shm_schema::{NeedleRehearsal, Request};
+use stylet_shm_schema::{NeedleRehearsal, Request, StabilisingNeedle};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);
 /// The largest scene takes a second for a second.
@@ -61,8 +61,8 @@ impl Drops {
         }
     }
 
-    /// Has the core rehearse them.
-    pub fn rehearsal(&self, pace: &Pace) -> NeedleRehearsal {
+    /// Has the core rehearse them, beside needles that go in before and stay.
+    pub fn rehearsal(&self, pace: &Pace, stabilising: &[StabilisingNeedle]) -> NeedleRehearsal {
         NeedleRehearsal {
             entry_m: self.entry_m,
             direction: self.direction,
@@ -72,6 +72,7 @@ impl Drops {
             acceleration_m_per_s2: pace.acceleration_m_per_s2,
             retract_to_m: self.retract_to_m,
             strand_pitch_m: self.strand_pitch_m,
+            stabilising: stabilising.to_vec(),
             drops_m: self.drops_m().collect(),
         }
     }
@@ -128,13 +129,15 @@ pub struct LinkRehearser<'a> {
     pub link: &'a mut Link,
     /// Ends a rehearsal early.
     pub interrupted: &'a Interrupt,
+    /// Needles that go in before and stay.
+    pub stabilising: &'a [StabilisingNeedle],
 }
 
 impl Rehearser for LinkRehearser<'_> {
     fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError> {
         let link = &mut *self.link;
         let scene = link.scene().map(|s| s.header.id());
-        let request = Request::Rehearse(drops.rehearsal(pace));
+        let request = Request::Rehearse(drops.rehearsal(pace, self.stabilising));
         let id = link.send(&request)?;
         let begun = Instant::now();
         while begun.elapsed() < LONGEST {

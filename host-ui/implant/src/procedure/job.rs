@@ -5,7 +5,8 @@ use crate::pairing;
 use crate::plan::compensate::summary_m;
 use crate::plan::exchange;
 use crate::plan::rehearse::{Drops, LinkRehearser};
-use crate::plan::{Anatomy, Compensation, Hole, ImplantPlan, Limits, Needle, check, compensate};
+use crate::plan::stabilise::{Stabilising, stabilising};
+use crate::plan::{Anatomy, Compensation, Hole, ImplantPlan, Limits, Needle, Template, check, compensate};
 use crate::workflow::{NeedlePlan, NeedleTask, Pace, plan_with_seeds};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -49,6 +50,8 @@ pub struct Job {
     pub tasks: Vec<NeedleTask>,
     /// By the number of the needle, where it was asked for and possible.
     pub compensations: BTreeMap<usize, Compensation>,
+    /// Needles that go in first and stay until the others have left their seeds.
+    pub stabilising: Vec<Stabilising>,
 }
 
 impl Job {
@@ -59,6 +62,7 @@ impl Job {
             implant: None,
             tasks: vec![NeedleTask::as_planned(plan)],
             compensations: BTreeMap::new(),
+            stabilising: Vec::new(),
         }
     }
 
@@ -81,19 +85,52 @@ impl Job {
             tasks: loaded.map(|n| NeedleTask::of(n, Drops::as_planned(n))).collect(),
             implant: Some(plan),
             compensations: BTreeMap::new(),
+            stabilising: Vec::new(),
         })
+    }
+
+    /// Chooses that many stabilising needles, as far apart as the template has room for; fewer where it has not, which is reported.
+    pub fn stabilise(&mut self, scene: &SceneModel, count: usize) -> Result<(), ProcedureError> {
+        let anatomy = Anatomy::of(scene)?;
+        let template = match &self.implant {
+            Some(plan) => plan.template,
+            None => Template::before(&scene.header),
+        };
+        let needles: Vec<Needle> = match &self.implant {
+            Some(plan) => plan.needles.clone(),
+            None => self.tasks.iter().map(|task| needle_of(&task.plan)).collect(),
+        };
+        self.stabilising = stabilising(&template, &anatomy, &needles, count);
+        let holes: Vec<String> = self.stabilising.iter().map(|s| s.hole.to_string()).collect();
+        println!(
+            "stabilising needles: {}",
+            if holes.is_empty() {
+                "none".to_owned()
+            } else {
+                holes.join(", ")
+            }
+        );
+        if holes.len() < count {
+            println!("note: no more holes keep clear of the plan's needles and of what is spared");
+        }
+        Ok(())
     }
 
     /// Rehearses every needle and moves its drops so that the seeds rest on plan.
     pub fn compensate(&mut self, link: &mut Link, pace: &Pace, interrupted: &Interrupt) -> Result<(), ProcedureError> {
         let count = self.tasks.len();
+        let beside: Vec<_> = self.stabilising.iter().map(|s| s.needle).collect();
         for (number, task) in self.tasks.iter_mut().enumerate() {
             let needle = match &self.implant {
                 Some(plan) => plan.needles.iter().filter(|n| !n.seeds.is_empty()).nth(number).cloned(),
                 None => None,
             };
             let needle = needle.unwrap_or_else(|| needle_of(&task.plan));
-            let mut rehearser = LinkRehearser { link, interrupted };
+            let mut rehearser = LinkRehearser {
+                link,
+                interrupted,
+                stabilising: &beside,
+            };
             let done = match compensate(&needle, pace, &Limits::default(), &mut rehearser) {
                 Ok(done) => done,
                 Err(why) if interrupted.asked() => return Err(why.into()),

@@ -46,6 +46,7 @@ pub fn write(
             "insert_speed_mm_s": pace.insert_m_per_s * 1e3, "retract_speed_mm_s": pace.retract_m_per_s * 1e3,
         },
         "compensation": compensation(job),
+        "stabilising_needles": stabilising(job, seen),
         "largest_displacement_before_puncture_mm": seen.displacement_before_puncture_m * 1e3,
         "tissue_folded_from_mm": folded_from_mm(&seen.records),
         "parameters": parameters(link),
@@ -135,6 +136,19 @@ fn deflections_m(job: &Job, records: &[TickRecord]) -> Vec<f64> {
         }
     }
     largest_m
+}
+
+/// Those that were asked for, each with where its tip was when it stayed in; `null` where it did not.
+fn stabilising(job: &Job, seen: &Seen) -> Vec<Value> {
+    let each = job.stabilising.iter().enumerate();
+    each.map(|(number, of_plan)| {
+        json!({
+            "hole": of_plan.hole.to_string(), "entry_mm": mm(of_plan.needle.entry_m),
+            "direction": of_plan.needle.direction, "depth_mm": of_plan.needle.depth_m * 1e3,
+            "tip_mm": seen.left.get(number).map(|left| mm(left.tip_m)),
+        })
+    })
+    .collect()
 }
 
 /// As the rehearsals had it.

@@ -2,6 +2,7 @@
 
 use super::{NeedlePlan, plan_request};
 use crate::pairing;
+use crate::plan::stabilise::{Stabilising, first_left};
 use crate::plan::{Drops, Needle};
 use std::time::{Duration, Instant};
 use stylet_host::link::{Link, LinkError, LinkStatus};
@@ -162,6 +163,7 @@ impl Placed {
 /// One scripted implantation. Call [`Run::advance`] after each [`Link::poll`].
 pub struct Run {
     tasks: Vec<NeedleTask>,
+    stabilising: Vec<Stabilising>,
     procedure: Procedure,
     status: RunStatus,
     session_id: Option<u64>,
@@ -190,6 +192,22 @@ impl Run {
         Self::of(tasks, Procedure::continuing(ways, pace, &placed.done))
     }
 
+    /// With needles that go in first, stay while the others come and go, and are drawn out at the end.
+    #[must_use]
+    pub fn stabilised(self, stabilising: &[Stabilising]) -> Self {
+        let ways = stabilising.iter().map(Stabilising::way).collect();
+        Self {
+            procedure: self.procedure.stabilised(ways),
+            stabilising: stabilising.to_vec(),
+            ..self
+        }
+    }
+
+    /// Which stabilising needle is at work, counted from 0; `None` while one that leaves seeds is.
+    pub fn stabilising(&self) -> Option<usize> {
+        self.procedure.stabilising()
+    }
+
     /// How long it waits for what does not arrive; without this, until the operator decides.
     #[must_use]
     pub fn with_patience(self, patience: Patience) -> Self {
@@ -200,6 +218,7 @@ impl Run {
     fn of(tasks: Vec<NeedleTask>, procedure: Procedure) -> Self {
         Self {
             tasks,
+            stabilising: Vec::new(),
             procedure: procedure.with_patience(Patience::Operator),
             status: RunStatus::Working,
             session_id: None,
@@ -294,6 +313,18 @@ impl Run {
         let sent = link.send(&match request {
             HandRequest::Reset => Request::Reset,
             HandRequest::PublishPlan { needle } => plan_request(&self.tasks[needle].plan),
+            HandRequest::ExpectStabilising { number } => {
+                let needle = &self.stabilising[number].needle;
+                Request::ExpectNeedle(NeedleAxis {
+                    entry_m: needle.entry_m,
+                    direction: needle.direction,
+                })
+            }
+            HandRequest::LeaveNeedle => Request::LeaveNeedle,
+            HandRequest::DrawFirstLeft { speed_m_per_s } => Request::DrawNeedle {
+                number: first_left(link).unwrap_or(u32::MAX),
+                speed_m_per_s,
+            },
             HandRequest::Engage => Request::Engage,
             HandRequest::MoveHand(goal) => Request::MoveHand(goal),
             HandRequest::DropSeed { strand_pitch_m } => Request::DropSeed { strand_pitch_m },

@@ -3,6 +3,7 @@
 mod debrief;
 mod guide;
 mod job;
+mod left;
 mod plan;
 mod progress;
 mod run;
@@ -293,7 +294,9 @@ fn retract_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         if undo.on_hover_text("Ctrl+Z").clicked() {
             actions.push(Action::Send(Request::UndoSeed));
         }
+        left::leave_ui(ui, shown, actions);
     });
+    left::left_ui(ui, shown, actions);
 }
 
 fn force_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {

@@ -150,7 +150,12 @@ pub fn next_action(shown: &Shown) -> Option<Action> {
                 Operation::Drop(_) => Some(Action::DropSeed),
                 Operation::DrawBack(_) => needle.next_drop_m.map(Action::MoveTo),
                 Operation::Retract | Operation::TakeOut => Some(Action::Retract),
-                Operation::Reset | Operation::PublishPlan | Operation::Engage | Operation::Settle => None,
+                Operation::Reset
+                | Operation::PublishPlan
+                | Operation::Engage
+                | Operation::Leave
+                | Operation::DrawOut
+                | Operation::Settle => None,
             }
         }
     }

@@ -108,7 +108,7 @@ impl Overlay<'_> {
         }
         self.crosshair();
         self.planned();
-        self.needle();
+        self.needles();
         self.placed();
         self.measure();
         self.letters();
@@ -182,12 +182,20 @@ impl Overlay<'_> {
         }
     }
 
+    /// The one that moves over those that stay in.
+    fn needles(&self) {
+        for left in &self.shown.left {
+            let (tip, direction) = (Vector3::from(left.tip_m), Vector3::from(left.direction));
+            self.needle(&[tip, tip - direction * NEEDLE_M]);
+        }
+        if let Some(points_m) = self.shown.needle_points_m(NEEDLE_M) {
+            let points: Vec<Vector3<f64>> = points_m.into_iter().map(Vector3::from).collect();
+            self.needle(&points);
+        }
+    }
+
     /// The part in the plane as a line; where the needle only goes through, a dot; a ring about a tip in the plane.
-    fn needle(&self) {
-        let Some(points_m) = self.shown.needle_points_m(NEEDLE_M) else {
-            return;
-        };
-        let points: Vec<Vector3<f64>> = points_m.into_iter().map(Vector3::from).collect();
+    fn needle(&self, points: &[Vector3<f64>]) {
         let width = (1.27e-3 / self.plane.m_per_point).clamp(2.0, 8.0) as f32;
         let pieces: Vec<[Pos2; 2]> = points
             .windows(2)

@@ -5,8 +5,10 @@ use super::link::EventDetails;
 use super::parameters::order_from_both;
 use super::requests::{hand_goal, needle_run, plan_in_force};
 use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
+use crate::rt::tissue_tape::LeftTape;
 use stylet_shm_schema::{EventKind, ParameterChange, PlannedNeedle, Refusal, RefusalCode, Request};
 use stylet_sim::active::activate;
+use stylet_sim::line::LeftNeedles;
 
 /// Requests carried out in one pass. More are refused, so that a flood reaches neither loop.
 const MAX_REQUESTS_PER_PASS: u32 = 16;
@@ -58,6 +60,19 @@ impl Bridge {
                 self.link.answer(ticket, Ok(0));
                 Ok(())
             }
+            Request::LeaveNeedle => {
+                self.make_room_for_left();
+                self.order_haptic(HapticOrder::LeaveNeedle { ticket })
+            }
+            Request::TakeNeedle(number) => self.order_haptic(HapticOrder::TakeNeedle {
+                ticket,
+                number: u64::from(number),
+            }),
+            Request::DrawNeedle { number, speed_m_per_s } => self.order_haptic(HapticOrder::DrawNeedle {
+                ticket,
+                number: u64::from(number),
+                speed_m_per_s,
+            }),
             Request::StopHand => self.order_haptic(HapticOrder::StopHand { ticket }),
             Request::Engage => self.order_haptic(HapticOrder::Engage { ticket }),
             Request::Disengage => self.order_haptic(HapticOrder::Disengage { ticket }),
@@ -124,6 +139,8 @@ impl Bridge {
             force: active.force,
         };
         self.order_both((haptic, TissueOrder::Limits(active.limits)))?;
+        // Both rings were emptied lately: there is room for one more.
+        let _ = self.loops.tissue_orders.push(TissueOrder::Migration(active.migration));
         self.parameters.ordered(generation, set);
         self.lines.take_bending(bends);
         Ok(())
@@ -140,8 +157,20 @@ impl Bridge {
             .expect_planned(plan.map(|plan| (plan.entry_m, plan.direction)));
     }
 
+    /// Neither loop allocates: what they keep needles in that stay is made here, with the first.
+    fn make_room_for_left(&mut self) {
+        if !std::mem::replace(&mut self.left_rooms.0, true) {
+            let _ = self.loops.rooms.push(LeftNeedles::with_room());
+        }
+        let generation = self.scene.generation();
+        if self.left_rooms.1.replace(generation) != Some(generation) {
+            let _ = self.loops.tissue_orders.push(TissueOrder::LeftRoom(LeftTape::new()));
+        }
+    }
+
     fn reset(&mut self, ticket: Ticket) -> Result<(), Refusal> {
         self.order_both((HapticOrder::Reset { ticket }, TissueOrder::Reset))?;
+        self.lines.forget_tracks();
         self.link.event(EventKind::Reset, EventDetails::now());
         Ok(())
     }

@@ -2,8 +2,9 @@
 
 use crate::rt::haptic_tape::HapticFlight;
 use crate::rt::tissue_tape::TissueFlight;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
-use stylet_sim::line::LineSource;
+use stylet_sim::line::{LineSource, LineStations};
 
 /// No tape reaches back so far: the tissue loop's has room for 10 s.
 const KEPT: Duration = Duration::from_secs(60);
@@ -17,6 +18,7 @@ pub(super) enum Half {
 
 struct KeptLine {
     source: LineSource,
+    stations: Arc<LineStations>,
     /// When each half came back; `None` while a loop has it.
     returned: [Option<Instant>; 2],
 }
@@ -29,10 +31,11 @@ pub(super) struct LineArchive {
 
 impl LineArchive {
     /// Both halves go to their loops.
-    pub fn keep(&mut self, source: LineSource) {
+    pub fn keep(&mut self, source: LineSource, stations: Arc<LineStations>) {
         self.drop_old(Instant::now());
         self.lines.push(KeptLine {
             source,
+            stations,
             returned: [None; 2],
         });
     }
@@ -47,6 +50,12 @@ impl LineArchive {
     fn drop_old(&mut self, now: Instant) {
         let is_old = |at: &Option<Instant>| at.is_some_and(|at| now.duration_since(at) > KEPT);
         self.lines.retain(|line| !line.returned.iter().all(is_old));
+    }
+
+    /// Where those load the body that a loop has: a needle may stay in on any of them.
+    pub fn in_use(&self) -> impl Iterator<Item = &Arc<LineStations>> {
+        let is_in_use = |line: &&KeptLine| line.returned.iter().any(Option::is_none);
+        self.lines.iter().filter(is_in_use).map(|line| &line.stations)
     }
 
     /// Those that a recording names.
@@ -74,13 +83,17 @@ mod tests {
     #[test]
     fn a_line_is_kept_while_a_loop_has_it_and_for_a_tape_after_that() {
         let mut archive = LineArchive::default();
-        archive.keep(source(1));
-        archive.keep(source(2));
+        let stations = |n| Arc::new(LineStations::none(n));
+        archive.keep(source(1), stations(1));
+        archive.keep(source(2), stations(2));
+        assert_eq!(archive.in_use().count(), 2);
         archive.returned(1, Half::Hand);
         let later = Instant::now() + 2 * KEPT;
         archive.drop_old(later);
         assert_eq!(archive.lines.len(), 2, "the tissue loop has the first");
         archive.returned(1, Half::Body);
+        let in_use: Vec<u64> = archive.in_use().map(|stations| stations.generation).collect();
+        assert_eq!(in_use, [2]);
         archive.drop_old(Instant::now());
         assert_eq!(archive.lines.len(), 2, "a tape may name it");
         archive.drop_old(later);

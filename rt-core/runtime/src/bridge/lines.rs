@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::{TickRecord, flags};
-use stylet_sim::line::{Line, LineSource, ReadyLine};
+use stylet_sim::line::{HandLine, Line, ReadyLine, Track};
 use stylet_sim::scene::{SceneSource, TissueKind};
 
 /// So long the needle keeps its axis before a line is begun.
@@ -30,13 +30,13 @@ struct Finished {
     scene_generation: u64,
     bends: bool,
     body: Option<LineBody>,
-    line: Result<(ReadyLine, LineSource), NoLine>,
+    line: Result<ReadyLine, NoLine>,
 }
 
 /// A line that waits for its needle.
 struct Kept {
     axis: Line,
-    line: (ReadyLine, LineSource),
+    line: ReadyLine,
 }
 
 struct LineTask {
@@ -66,6 +66,8 @@ pub struct LinePreparer {
     /// The needle bends: lines are solved for across as well.
     bends: bool,
     archive: LineArchive,
+    /// Tracks that needles have cut since the tissue was new, the newest last.
+    tracks: Vec<Track>,
 }
 
 impl LinePreparer {
@@ -83,6 +85,7 @@ impl LinePreparer {
             tissue,
             bends: false,
             archive: LineArchive::default(),
+            tracks: Vec::new(),
         }
     }
 
@@ -99,6 +102,7 @@ impl LinePreparer {
         self.without.clear();
         self.expected.clear();
         self.kept.clear();
+        self.tracks.clear();
         self.give_up();
     }
 
@@ -110,6 +114,11 @@ impl LinePreparer {
             self.give_up();
         }
         self.bends = bends;
+    }
+
+    /// The tissue is new: no needle has been in it.
+    pub fn forget_tracks(&mut self) {
+        self.tracks.clear();
     }
 
     /// The needle of a plan that has come, entry and direction; `None` where it was withdrawn.
@@ -137,6 +146,7 @@ impl LinePreparer {
     pub(super) fn pass(&mut self, newest: Option<&TickRecord>, scene_generation: u64, loops: &mut LoopRings) {
         while let Ok(line) = loops.old_hand_lines.pop() {
             self.archive.returned(line.generation, Half::Hand);
+            self.keep_track(&line);
         }
         while let Ok(line) = loops.old_body_lines.pop() {
             self.archive.returned(line.generation, Half::Body);
@@ -160,9 +170,19 @@ impl LinePreparer {
         }
     }
 
+    fn keep_track(&mut self, line: &HandLine) {
+        const MOST: usize = 256;
+        if let Some(track) = line.track() {
+            if self.tracks.len() >= MOST {
+                self.tracks.remove(0);
+            }
+            self.tracks.push(track);
+        }
+    }
+
     /// The axis that a needle outside of the tissue stands on, where the loops have no line for it.
     fn axis_without_line(&mut self, record: &TickRecord) -> Option<Line> {
-        if record.flags & flags::IN_CONTACT != 0 {
+        if record.flags & (flags::IN_CONTACT | flags::HAND_EMPTY) != 0 {
             self.steady = None;
             return None;
         }
@@ -210,6 +230,8 @@ impl LinePreparer {
         let generation = self.generation;
         let kept = self.body.take().filter(|(of, _)| *of == scene_generation);
         let (source, tissue, bends) = (Arc::clone(&self.source), self.tissue, self.bends);
+        let waiting = self.kept.iter().map(|kept| &kept.line.stations);
+        let others: Vec<_> = self.archive.in_use().chain(waiting).cloned().collect();
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let work = move || {
@@ -221,12 +243,8 @@ impl LinePreparer {
             let mut goes_on = || !stopped.load(Ordering::Relaxed);
             let (body, line) = match body {
                 Ok(Some(body)) => {
-                    let line = body.prepare(generation, axis.entry_m, axis.axes[0], bends, &mut goes_on);
-                    let with_source = line.map(|line| {
-                        let source = line.hand.source();
-                        (line, source)
-                    });
-                    (Some(body), with_source)
+                    let line = body.prepare_beside(generation, axis.entry_m, axis.axes[0], bends, &others, &mut goes_on);
+                    (Some(body), line)
                 }
                 Ok(None) => (None, Err(stylet_sim::line::LineError::NoTissue.into())),
                 Err(why) => (None, Err(why)),
@@ -277,9 +295,16 @@ impl LinePreparer {
         }
     }
 
-    fn hand_over(&mut self, axis: Line, (line, source): (ReadyLine, LineSource), loops: &mut LoopRings) {
-        let ReadyLine { hand, body } = line;
-        self.archive.keep(source);
+    fn hand_over(&mut self, axis: Line, line: ReadyLine, loops: &mut LoopRings) {
+        let ReadyLine {
+            mut hand,
+            body,
+            stations,
+        } = line;
+        for track in &self.tracks {
+            hand.open_track(track);
+        }
+        self.archive.keep(hand.source(), stations);
         // Both rings are emptied at every tick: one that is full belongs to a loop that has ended.
         let _ = loops.tissue_orders.push(TissueOrder::Line(body));
         let _ = loops.lines.push(hand);

@@ -90,6 +90,8 @@ pub struct Bridge {
     loader: SceneLoader,
     rehearsals: RehearsalRunner,
     lines: LinePreparer,
+    /// The loops have room for needles that stay in: the force loop, and the tissue loop's tape of that scene.
+    left_rooms: (bool, Option<u64>),
     supervisor: Supervisor,
 }
 
@@ -116,6 +118,7 @@ impl Bridge {
                 tissue_notices: loops.tissue_notices,
                 old_worlds: loops.old_worlds,
                 lines: loops.lines,
+                rooms: loops.rooms,
                 old_hand_lines: loops.old_hand_lines,
                 old_body_lines: loops.old_body_lines,
             },
@@ -131,6 +134,7 @@ impl Bridge {
             loader: SceneLoader::default(),
             lines: LinePreparer::new(Arc::clone(&setup.source), setup.tissue),
             rehearsals: RehearsalRunner::new(setup.source, setup.tissue, setup.device),
+            left_rooms: (false, None),
             supervisor: Supervisor::default(),
         }
     }

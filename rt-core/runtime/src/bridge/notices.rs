@@ -5,7 +5,7 @@ use super::link::EventDetails;
 use crate::rt::exchange::{HapticOrder, Notice, TissueOrder};
 use crate::rt::world::World;
 use stylet_shm_schema::{EventKind, TickRecord};
-use stylet_sim::line::{BodyLine, HandLine};
+use stylet_sim::line::{BodyLine, HandLine, LeftNeedles};
 
 /// Ends of the rings to and from both loops.
 pub(super) struct LoopRings {
@@ -16,6 +16,7 @@ pub(super) struct LoopRings {
     pub tissue_notices: rtrb::Consumer<Notice>,
     pub old_worlds: rtrb::Consumer<Box<World>>,
     pub lines: rtrb::Producer<Box<HandLine>>,
+    pub rooms: rtrb::Producer<Box<LeftNeedles>>,
     pub old_hand_lines: rtrb::Consumer<Box<HandLine>>,
     pub old_body_lines: rtrb::Consumer<Box<BodyLine>>,
 }

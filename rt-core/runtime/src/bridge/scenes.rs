@@ -104,12 +104,13 @@ impl Bridge {
         let (scene, source) = scene?;
         let scene = scene.with_tissue(self.tissue);
         // Changes on their way to the tissue loop reach it before the scene does.
-        let limits = activate(&self.parameters.with(&[]), &self.device)?.limits;
+        let active = activate(&self.parameters.with(&[]), &self.device)?;
         let (generation, session_id) = (self.scene.generation() + 1, self.link.session.session_id);
         let mut picture = ScenePicture::of(&scene, session_id, generation, wanted.patient);
         picture.header.name = Text::new(&wanted.name);
-        let world = World::new(scene, limits, generation)
+        let mut world = World::new(scene, active.limits, generation)
             .map_err(|why| Refusal::new(RefusalCode::SceneNotBuilt, why.to_string()))?;
+        world.migration = active.migration;
         let source = Arc::new(source);
         let order = TissueOrder::World {
             ticket: wanted.ticket,

@@ -20,7 +20,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use stylet_hw::{DeviceInfo, Hand};
 use stylet_shm_schema::{
-    MAX_SEEDS, NeedleAxis, ParameterProblems, ParameterSet, Reason, Refusal, RefusalCode, SeedPose, flags,
+    MAX_LEFT_NEEDLES, MAX_SEEDS, NeedleAxis, ParameterProblems, ParameterSet, Reason, Refusal, RefusalCode, SeedPose,
+    StabilisingNeedle, flags,
 };
 use stylet_sim::active::activate;
 use stylet_sim::line::{LineError, ReadyLine};
@@ -47,6 +48,12 @@ pub enum RehearseError {
     /// More drops than there are seeds.
     #[error("{0} drops; at most {MAX_SEEDS}")]
     TooManyDrops(usize),
+    /// More needles than may stay in.
+    #[error("{0} needles that stay in; at most {MAX_LEFT_NEEDLES}")]
+    TooManyLeft(usize),
+    /// Eq. 6 knows no needle that stays in.
+    #[error("with --tissue paper no needle can stay in: it has no lines")]
+    NoneStaysIn,
     /// An earlier rehearsal ended without returning its body.
     #[error("the last rehearsal lost its body")]
     BodyLost,
@@ -101,6 +108,8 @@ pub struct NeedleRun {
     pub retract_to_m: f64,
     /// From middle to middle of two seeds, m, where they are one strand.
     pub strand_pitch_m: Option<f64>,
+    /// Needles that go in before it and stay.
+    pub stabilising: Vec<StabilisingNeedle>,
     /// Places of the drops in their order, m.
     pub drops_m: Vec<Vector3<f64>>,
 }
@@ -131,8 +140,8 @@ pub struct Stage {
     world: Option<Box<World>>,
     /// Where needles have lines.
     lines: Option<LineBody>,
-    /// The line of the last needle: compensation rehearses the same needle several times.
-    kept: Option<(NeedleAxis, bool, ReadyLine)>,
+    /// The lines of the last rehearsal, those of needles that stay in first: compensation rehearses the same needle several times.
+    kept: Vec<(NeedleAxis, bool, ReadyLine)>,
     device: DeviceInfo,
     hand: Hand,
     target: TargetElements,
@@ -150,7 +159,7 @@ impl Stage {
         Ok(Self {
             world: Some(Box::new(world)),
             lines,
-            kept: None,
+            kept: Vec::new(),
             device,
             hand: Hand::steady(),
             target,
@@ -162,25 +171,43 @@ impl Stage {
         self.hand = hand;
     }
 
-    /// A line for the needle, at rest; `None` in tissue that needs none.
-    fn line(&mut self, run: &NeedleRun, bends: bool, stop: &AtomicBool) -> Result<Option<ReadyLine>, RehearseError> {
-        let Some(body) = &self.lines else { return Ok(None) };
-        let axis = NeedleAxis {
+    /// A line for each needle, at rest, the one that leaves seeds last; none in tissue that needs none.
+    fn lines(&mut self, run: &NeedleRun, bends: bool, stop: &AtomicBool) -> Result<Vec<ReadyLine>, RehearseError> {
+        let Some(body) = &self.lines else {
+            return match run.stabilising.is_empty() {
+                true => Ok(Vec::new()),
+                false => Err(RehearseError::NoneStaysIn),
+            };
+        };
+        let own = NeedleAxis {
             entry_m: run.entry_m.into(),
             direction: run.direction.into(),
         };
-        if let Some((.., line)) = self.kept.as_ref().filter(|(of, bent, _)| *of == axis && *bent == bends) {
-            return Ok(Some(line.clone()));
+        let stabilising = run.stabilising.iter().map(|needle| NeedleAxis {
+            entry_m: needle.entry_m,
+            direction: needle.direction,
+        });
+        let wanted: Vec<NeedleAxis> = stabilising.chain([own]).collect();
+        let same = self
+            .kept
+            .iter()
+            .zip(&wanted)
+            .take_while(|((of, bent, _), axis)| of == *axis && *bent == bends)
+            .count();
+        self.kept.truncate(same);
+        for (number, axis) in wanted.iter().enumerate().skip(same) {
+            // SYNC: set by the bridge when it ends; nothing but the flag is carried.
+            let mut goes_on = || !stop.load(Ordering::Relaxed);
+            let others: Vec<_> = self.kept.iter().map(|(.., line)| line.stations.clone()).collect();
+            let generation = number as u64 + 1;
+            let line = body.prepare_beside(generation, axis.entry_m, axis.direction, bends, &others, &mut goes_on);
+            let line = line.map_err(|why| match why {
+                NoLine::Line(LineError::Stopped) => RehearseError::Stopped,
+                why => RehearseError::Line(why),
+            })?;
+            self.kept.push((*axis, bends, line));
         }
-        // SYNC: set by the bridge when it ends; nothing but the flag is carried.
-        let mut goes_on = || !stop.load(Ordering::Relaxed);
-        let line = body.prepare(1, axis.entry_m, axis.direction, bends, &mut goes_on);
-        let line = line.map_err(|why| match why {
-            NoLine::Line(LineError::Stopped) => RehearseError::Stopped,
-            why => RehearseError::Line(why),
-        })?;
-        self.kept = Some((axis, bends, line.clone()));
-        Ok(Some(line))
+        Ok(self.kept.iter().map(|(.., line)| line.clone()).collect())
     }
 
     /// From rest, under these parameters; ends early, with an error, when `stop` is set.
@@ -193,17 +220,19 @@ impl Stage {
         if run.drops_m.len() > MAX_SEEDS {
             return Err(RehearseError::TooManyDrops(run.drops_m.len()));
         }
+        if run.stabilising.len() > MAX_LEFT_NEEDLES {
+            return Err(RehearseError::TooManyLeft(run.stabilising.len()));
+        }
         let active = activate(set, &self.device)?;
         let scattered = Scatter::of(set).map(|scatter| scatter.apply(run));
         let run = scattered.as_ref().unwrap_or(run);
-        let line = self.line(run, active.force.bending.is_on(), stop)?;
+        let lines = self.lines(run, active.force.bending.is_on(), stop)?;
         let mut world = self.world.take().ok_or(RehearseError::BodyLost)?;
         world.tissue.return_to_rest();
         world.set_limits(active.limits.clone());
+        world.migration = active.migration;
         let mut rig = Rig::new(world, &active, (&self.device, self.hand), run);
-        if let Some(line) = line {
-            rig.take_line(line);
-        }
+        rig.take_lines(lines);
         let outcome = perform(&mut rig, run, Motion::new(&self.target), stop);
         self.world = Some(rig.into_world());
         outcome
@@ -215,6 +244,19 @@ fn perform(rig: &mut Rig, run: &NeedleRun, mut motion: Motion, stop: &AtomicBool
     let mut displacement_before_puncture_m = 0.0_f64;
     let (mut punctured, mut contact_s) = (false, None);
     let mut deflection_m = 0.0_f64;
+    while !script.is_at_needle() {
+        // SYNC: as below.
+        if stop.load(Ordering::Relaxed) {
+            return Err(RehearseError::Stopped);
+        }
+        if rig.seconds() > LONGEST_S {
+            return Err(RehearseError::TooLong);
+        }
+        rig.tick();
+        script.advance(rig)?;
+    }
+    motion.begin(rig.deformed());
+    rig.forget_peaks();
     let mut dropped_after_s = Vec::new();
     while rig.seconds() < LONGEST_S {
         // SYNC: set by the bridge when it ends; nothing but the flag is carried.

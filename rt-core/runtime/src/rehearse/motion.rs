@@ -26,10 +26,21 @@ impl TargetElements {
     }
 }
 
+#[cfg(test)]
+impl TargetElements {
+    /// Mean displacement, m.
+    pub fn mean_m(&self, body: Deformed<'_>) -> Vector3<f64> {
+        let mut motion = Motion::new(self);
+        motion.sum_m(body) / self.0.len().max(1) as f64
+    }
+}
+
 /// The largest displacements so far.
 pub struct Motion<'a> {
     elements: &'a [u32],
     displacements_m: Vec<[f32; 3]>,
+    /// Sum over the target before the needle came: needles that stay in have moved it.
+    before_m: Vector3<f64>,
     pub largest_m: f64,
     pub target_m: f64,
 }
@@ -39,6 +50,7 @@ impl<'a> Motion<'a> {
         Self {
             displacements_m: vec![[0.0; 3]; target.0.len()],
             elements: &target.0,
+            before_m: Vector3::zeros(),
             largest_m: 0.0,
             target_m: 0.0,
         }
@@ -47,11 +59,18 @@ impl<'a> Motion<'a> {
     /// After a tick of the tissue.
     pub fn look(&mut self, displacement_m: f64, body: Deformed<'_>) {
         self.largest_m = self.largest_m.max(displacement_m);
-        body.write_displacements(self.elements, &mut self.displacements_m);
-        let sum = self
-            .displacements_m
-            .iter()
-            .fold(Vector3::zeros(), |sum, d| sum + Vector3::from(d.map(f64::from)));
+        let sum = self.sum_m(body) - self.before_m;
         self.target_m = self.target_m.max(sum.norm() / self.elements.len().max(1) as f64);
+    }
+
+    /// What is measured from: the body as it is before the needle.
+    pub fn begin(&mut self, body: Deformed<'_>) {
+        self.before_m = self.sum_m(body);
+    }
+
+    fn sum_m(&mut self, body: Deformed<'_>) -> Vector3<f64> {
+        body.write_displacements(self.elements, &mut self.displacements_m);
+        let each = self.displacements_m.iter();
+        each.fold(Vector3::zeros(), |sum, d| sum + Vector3::from(d.map(f64::from)))
     }
 }

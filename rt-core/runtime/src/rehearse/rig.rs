@@ -8,7 +8,7 @@ use crate::stepped::{HAPTIC_TICKS_PER_TISSUE_TICK, SteppedLoops};
 use stylet_hw::{DeviceInfo, Hand, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
 use stylet_shm_schema::{HandMove, HapticState, RefusalCode, SeedPose};
 use stylet_sim::active::Active;
-use stylet_sim::line::ReadyLine;
+use stylet_sim::line::{LeftNeedles, ReadyLine};
 use stylet_sim::tissue::Deformed;
 
 /// The tip begins at this distance before the entry, and comes to it as in a run.
@@ -17,6 +17,8 @@ const RUN_UP_M: f64 = 0.01;
 pub struct Rig {
     loops: SteppedLoops,
     refusal: Option<RefusalCode>,
+    /// Lines of the needles still to come, the next one last.
+    lines: Vec<ReadyLine>,
 }
 
 impl Rig {
@@ -35,6 +37,27 @@ impl Rig {
         Self {
             loops: SteppedLoops::new(world, Box::new(phantom), &memory, HAPTIC_TICKS_PER_TISSUE_TICK),
             refusal: None,
+            lines: Vec::new(),
+        }
+    }
+
+    /// In the order of the needles; the first is taken up at once.
+    pub fn take_lines(&mut self, mut lines: Vec<ReadyLine>) {
+        lines.reverse();
+        let others = lines.len();
+        self.lines = lines;
+        if others == 1 {
+            self.next_line();
+        } else if others > 1 {
+            let bridge = &mut self.loops.bridge;
+            let _ = bridge.rooms.push(LeftNeedles::with_room());
+        }
+    }
+
+    /// The next needle has its line from now on.
+    pub fn next_line(&mut self) {
+        if let Some(line) = self.lines.pop() {
+            self.take_line(line);
         }
     }
 
@@ -50,6 +73,7 @@ impl Rig {
         let tissue_tick = self.loops.tissue.response().tick;
         self.loops.step();
         let bridge = &mut self.loops.bridge;
+        while bridge.old_hand_lines.pop().is_ok() || bridge.old_body_lines.pop().is_ok() {}
         for notices in [&mut bridge.haptic_notices, &mut bridge.tissue_notices] {
             while let Ok(notice) = notices.pop() {
                 if let Notice::Refused { why, .. } = notice {
@@ -74,6 +98,19 @@ impl Rig {
     pub fn reset(&mut self) {
         let _ = self.loops.bridge.haptic_orders.push(HapticOrder::Reset { ticket: 0 });
         let _ = self.loops.bridge.tissue_orders.push(TissueOrder::Reset);
+    }
+
+    pub fn leave_needle(&mut self) {
+        let _ = self
+            .loops
+            .bridge
+            .haptic_orders
+            .push(HapticOrder::LeaveNeedle { ticket: 0 });
+    }
+
+    /// What stabilising needles took to go in is not the needle's.
+    pub fn forget_peaks(&mut self) {
+        self.loops.haptic.state.peak_force_n = 0.0;
     }
 
     pub fn move_hand(&mut self, hand: &HandMove) {

@@ -42,6 +42,7 @@ impl Scatter {
             entry_m,
             direction,
             drops_m: run.drops_m.iter().map(moved).collect(),
+            stabilising: run.stabilising.clone(),
             ..*run
         }
     }
@@ -80,6 +81,7 @@ mod tests {
             acceleration_m_per_s2: 2.0,
             retract_to_m: 0.0,
             strand_pitch_m: None,
+            stabilising: Vec::new(),
             drops_m: vec![Vector3::new(x_m, 0.02, 0.08)],
         }
     }

@@ -2,6 +2,7 @@
 
 use super::rig::Rig;
 use super::{NeedleRun, RehearseError};
+use nalgebra::Vector3;
 use stylet_procedure::{HandRequest, NeedleWay, Next, Observed, Pace, Procedure, Reply};
 
 pub struct Script(Procedure);
@@ -21,7 +22,22 @@ impl Script {
             approach_m_per_s: run.approach_m_per_s,
             acceleration_m_per_s2: run.acceleration_m_per_s2,
         };
-        Self(Procedure::rehearsal(way, pace))
+        let stabilising = run.stabilising.iter().map(|needle| {
+            let (entry_m, direction) = (Vector3::from(needle.entry_m), Vector3::from(needle.direction));
+            NeedleWay {
+                entry_m,
+                direction,
+                drops_m: vec![entry_m + direction * needle.depth_m],
+                retract_to_m: 0.0,
+                strand_pitch_m: None,
+            }
+        });
+        Self(Procedure::rehearsal_beside(way, pace, stabilising.collect()))
+    }
+
+    /// Every needle that stays in does: the one that leaves seeds is at work.
+    pub fn is_at_needle(&self) -> bool {
+        self.0.stabilising().is_none()
     }
 
     /// After each tick of the force; true when all is done. A drop that is refused ends a rehearsal, since its seeds are
@@ -42,7 +58,10 @@ impl Script {
             Next::Send(HandRequest::MoveHand(goal)) => rig.move_hand(&goal),
             Next::Send(HandRequest::DropSeed { strand_pitch_m }) => rig.drop_seed(strand_pitch_m),
             // A rehearsal begins from rest and shows its plan to nobody.
-            Next::Send(HandRequest::Reset | HandRequest::PublishPlan { .. }) => {}
+            Next::Send(HandRequest::ExpectStabilising { .. } | HandRequest::PublishPlan { .. }) => rig.next_line(),
+            Next::Send(HandRequest::LeaveNeedle) => rig.leave_needle(),
+            // A rehearsal begins from rest, and ends with the needles in that stay.
+            Next::Send(HandRequest::Reset | HandRequest::DrawFirstLeft { .. }) => {}
             Next::Wait | Next::Continue | Next::Done => {}
         }
         Ok(next == Next::Done)

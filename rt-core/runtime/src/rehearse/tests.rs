@@ -7,6 +7,8 @@ use stylet_sim::limits::Limits;
 use stylet_sim::tissue::{Deformed, Held, StepReport, TissueModel};
 
 mod bending;
+mod left;
+mod migration;
 mod order;
 
 fn stage_of(tissue: TissueKind) -> Stage {
@@ -33,6 +35,7 @@ fn needle() -> NeedleRun {
         acceleration_m_per_s2: 2.0,
         retract_to_m: 0.0,
         strand_pitch_m: None,
+        stabilising: Vec::new(),
         drops_m: [0.8, 0.5, 0.2].map(at).to_vec(),
     }
 }

@@ -39,15 +39,14 @@ pub fn solve_again(
     let mut again = LinesAgain::default();
     let mut body = None;
     for generation in recorded.line_numbers() {
+        if again.bodies.iter().any(|body| body.generation == generation) {
+            continue;
+        }
         let source = source_of(flight, generation)?;
         if !recorded.is_pushed_by(generation) {
             // Its columns do not count.
-            again.bodies.push(BodyLine {
-                generation,
-                line: source.line,
-                whole_m_per_n: 0.0,
-                answer: BodyAnswer::Columns(Vec::new()),
-            });
+            let nothing = BodyAnswer::Columns(Vec::new());
+            again.bodies.push(BodyLine::new(generation, source.line, 0.0, nothing));
             continue;
         }
         let body = match &mut body {
@@ -57,7 +56,7 @@ pub fn solve_again(
                 none.insert(of_scene.ok_or(RepeatError::NoLine(generation))?)
             }
         };
-        let ready = body.prepare_along(generation, source.line, source.bends(), &mut |progress| {
+        let ready = body.prepare_along(generation, source.line, source.bends(), &[], &mut |progress| {
             report(LineProgress {
                 generation,
                 ready: progress.ready,

@@ -6,6 +6,7 @@ use crate::lines::NoLine;
 use crate::rt::exchange::{HapticOrder, TissueOrder};
 use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticEntry, HapticFlight, HapticTape};
+use crate::rt::line_loads::AllLoads;
 use crate::rt::response::TissueResponse;
 use crate::rt::tissue::TissueLoop;
 use crate::rt::tissue_tape::{TapedOrder, TissueEntry, TissueFlight, TissueMemory, TissueTape};
@@ -14,6 +15,7 @@ use crate::rt::world::{World, WorldError};
 use std::sync::Arc;
 use stylet_hw::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
 use stylet_shm_schema::TickRecord;
+use stylet_sim::line::LeftNeedles;
 
 /// The result of repeating one loop.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -109,6 +111,12 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, Repe
         }
         again.resume_line(line);
     }
+    if recorded.left.line_numbers().next().is_some()
+        && !again.resume_left(&recorded.left, |generation| hand_line(flight, generation).ok())
+    {
+        return Err(RepeatError::OtherLeft);
+    }
+    let _ = bridge.rooms.push(LeftNeedles::with_room());
     let mut found = Repeated::default();
     let mut orders = recorded.orders.iter().peekable();
     let mut lines = recorded.lines.iter().peekable();
@@ -162,6 +170,9 @@ pub enum RepeatError {
     /// The recorded state has another size than the line.
     #[error("the recorded state of needle line {0} is not one of that line: the file was changed")]
     OtherLine(u64),
+    /// The needles that stayed in are not those of the recorded lines.
+    #[error("the recorded needles that stay in the tissue do not fit their lines: the file was changed")]
+    OtherLeft,
     /// A line cannot be used, or its columns cannot be solved again.
     #[error(transparent)]
     Line(#[from] NoLine),
@@ -188,8 +199,17 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
         0 => None,
         line => Some(lines.take(line).ok_or(RepeatError::NoLine(line))?),
     };
-    again.remember(&recorded.memory, before);
-    *haptic.loads.input_buffer_mut() = recorded.memory.loads;
+    let left = recorded.memory.left.iter().map(|left| {
+        let generation = left.generation;
+        lines.take(generation).ok_or(RepeatError::NoLine(generation))
+    });
+    let left = left.collect::<Result<Vec<_>, _>>()?;
+    again.remember(&recorded.memory, before, left);
+    let mut all = AllLoads {
+        line: recorded.memory.loads,
+        ..AllLoads::default()
+    };
+    *haptic.loads.input_buffer_mut() = all;
     haptic.loads.publish();
     let mut compare = Bodies {
         reference,
@@ -200,6 +220,7 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
         },
     };
     let mut loads = recorded.loads.iter().peekable();
+    let mut left = recorded.left.iter().peekable();
     let mut orders = recorded.orders.iter().peekable();
     for (index, entry) in recorded.ticks.iter().enumerate() {
         if let Some((_, memory)) = recorded.middle.as_ref().filter(|(tick, _)| *tick == index as u64) {
@@ -209,7 +230,13 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
             let _ = bridge.tissue_orders.push(order_of(order, &mut lines)?);
         }
         while let Some((_, loads)) = loads.next_if(|(tick, _)| *tick == index as u64) {
-            *haptic.loads.input_buffer_mut() = *loads;
+            all.line = *loads;
+            *haptic.loads.input_buffer_mut() = all;
+            haptic.loads.publish();
+        }
+        while let Some((_, left)) = left.next_if(|(tick, _)| *tick == index as u64) {
+            all.left = *left;
+            *haptic.loads.input_buffer_mut() = all;
             haptic.loads.publish();
         }
         haptic.pose.write(entry.pose);
@@ -225,6 +252,7 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
 fn order_of(order: &TapedOrder, lines: &mut LinesAgain) -> Result<TissueOrder, RepeatError> {
     Ok(match order {
         TapedOrder::Limits(limits) => TissueOrder::Limits(limits.clone()),
+        TapedOrder::Migration(migration) => TissueOrder::Migration(*migration),
         TapedOrder::DropSeed { strand_pitch_m } => TissueOrder::DropSeed {
             ticket: 0,
             strand_pitch_m: *strand_pitch_m,

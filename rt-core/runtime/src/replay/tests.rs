@@ -18,6 +18,8 @@ use stylet_sim::line::{LineSource, NeedleBending, PronyTerm, ReadyLine};
 use stylet_sim::needle::NeedleParameters;
 use stylet_sim::scene::{Labels, SceneSource, TissueKind};
 
+mod left;
+
 /// The loops with their tapes, and what the bridge would keep beside them.
 struct Recorded {
     loops: SteppedLoops,

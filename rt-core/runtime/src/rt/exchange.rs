@@ -1,6 +1,6 @@
 //! What the bridge and the loops hand each other: orders, notices and snapshot slots, through wait-free rings.
 
-use crate::rt::tissue_tape::TissueTape;
+use crate::rt::tissue_tape::{LeftTape, TissueTape};
 use crate::rt::world::World;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -9,6 +9,7 @@ use stylet_shm_schema::{Fault, RefusalCode, SnapshotHeader, Vertex};
 use stylet_sim::force::ForceParameters;
 use stylet_sim::limits::Limits;
 use stylet_sim::line::BodyLine;
+use stylet_sim::migration::Migration;
 use stylet_sim::needle::NeedleParameters;
 
 /// Number that joins an order to the host's request; 0 when nobody waits for an answer.
@@ -52,6 +53,27 @@ pub enum HapticOrder {
         /// Number of the request.
         ticket: Ticket,
     },
+    /// Leave the needle where it is.
+    LeaveNeedle {
+        /// Number of the request.
+        ticket: Ticket,
+    },
+    /// Take up a needle that stays in.
+    TakeNeedle {
+        /// Number of the request.
+        ticket: Ticket,
+        /// Number of its line.
+        number: u64,
+    },
+    /// Draw out a needle that stays in.
+    DrawNeedle {
+        /// Number of the request.
+        ticket: Ticket,
+        /// Number of its line.
+        number: u64,
+        /// How fast.
+        speed_m_per_s: f64,
+    },
     /// Hand the flight recording over; the loop records anew once it has it back.
     HandOverTape,
     /// Hold the simulated hand where it is.
@@ -65,6 +87,8 @@ pub enum HapticOrder {
 pub enum TissueOrder {
     /// Keep these limits from this tick on.
     Limits(Limits),
+    /// Let seeds migrate like that from this tick on.
+    Migration(Migration),
     /// Leave a seed at the tip.
     DropSeed {
         /// Number of the request.
@@ -90,6 +114,8 @@ pub enum TissueOrder {
     },
     /// Hand the flight recording over; the loop records anew once it has it back.
     HandOverTape,
+    /// Room to record what needles that stay in do to the body.
+    LeftRoom(Box<LeftTape>),
     /// Columns for a needle that goes in where they were made; the force loop gets its half beside them.
     Line(Box<BodyLine>),
 }

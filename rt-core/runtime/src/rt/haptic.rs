@@ -21,6 +21,7 @@ use stylet_sim::line::HandLine;
 
 mod deflection;
 mod flight;
+mod left;
 mod line;
 mod orders;
 mod record;
@@ -44,6 +45,8 @@ pub struct HapticLoop {
     line: Option<Box<HandLine>>,
     /// The last tick was one on it.
     on_line: bool,
+    /// Needles that stay in.
+    left: left::Left,
     watchdog: Watchdog,
     /// What the device answered in this tick, for the recording.
     answer: DeviceAnswer,
@@ -98,6 +101,10 @@ impl HapticLoop {
             goal: memory.goal,
             line: None,
             on_line: memory.on_line,
+            left: left::Left {
+                is_hand_empty: memory.is_hand_empty,
+                ..left::Left::default()
+            },
             watchdog: memory.watchdog,
             answer: DeviceAnswer::default(),
             state: memory.state,
@@ -147,6 +154,7 @@ impl HapticLoop {
         let sample = self.read();
         self.mark();
         let tissue = *self.ports.response.read();
+        self.look_after_left(&sample, &tissue);
         self.watch(woke_ns, missed, &tissue);
         let response = self.respond(&sample, &tissue);
         self.mark();
@@ -227,14 +235,15 @@ impl HapticLoop {
         self.pose.released_contact = self.contact;
         self.chain.end_contact();
         if let Some(line) = &mut self.line {
-            line.reset();
+            line.forget();
         }
+        self.give_up_left();
         self.leave_line();
     }
 
     /// Where the tip meets tissue, unless this loop has ended that contact already.
     fn touch(&mut self, tissue: &TissueResponse) -> Option<Touch> {
-        if tissue.contact <= self.pose.released_contact {
+        if tissue.contact <= self.pose.released_contact || self.left.is_hand_empty {
             return None;
         }
         self.contact = tissue.contact;
@@ -271,6 +280,7 @@ impl HapticLoop {
             return output;
         }
         self.leave_line();
+        self.step_left();
         let touch = self.touch(tissue);
         chain::step(
             &self.parameters,
@@ -292,6 +302,7 @@ impl HapticLoop {
         self.pose.held_travel_m = self.chain.held_travel_m;
         self.pose.innermost_layer = self.chain.path.innermost();
         self.pose.seen_layer = self.chain.path.seen();
+        self.pose.hand_is_empty = self.left.is_hand_empty;
         self.ports.pose.write(self.pose);
     }
 }

@@ -11,7 +11,7 @@ use stylet_hw::{DeviceFault, DeviceInfo, HandGoal, Sample};
 use stylet_shm_schema::{HapticState, TickRecord, flags};
 use stylet_sim::force::ForceParameters;
 use stylet_sim::force::chain::{ChainParameters, ChainState};
-use stylet_sim::line::LineState;
+use stylet_sim::line::{LeftNeedles, LeftRecord, LineState};
 use stylet_sim::needle::NeedleParameters;
 
 /// Ticks between two checkpoints.
@@ -40,6 +40,8 @@ pub struct HapticMemory {
     pub line: u64,
     /// The last tick was one on it.
     pub on_line: bool,
+    /// The hand holds no needle. The record of those that stay in stands beside the memory.
+    pub is_hand_empty: bool,
     /// Watchdog with the fault that it keeps.
     pub watchdog: Watchdog,
     /// State as hosts see it.
@@ -63,6 +65,7 @@ impl HapticMemory {
             goal: None,
             line: 0,
             on_line: false,
+            is_hand_empty: false,
             watchdog: Watchdog::default(),
             state,
         }
@@ -97,6 +100,8 @@ pub struct HapticTape {
     pub checkpoints: Last<(u64, HapticMemory)>,
     /// State of the line beside each checkpoint; without stations where there was none.
     line_states: Last<LineState>,
+    /// The needles that stay in, beside each checkpoint.
+    left: Last<LeftRecord>,
 }
 
 impl HapticTape {
@@ -115,6 +120,7 @@ impl HapticTape {
             lines: Last::new(&(0, 0), LINES),
             checkpoints: Last::new(&(0, *memory), CHECKPOINTS),
             line_states: Last::of_slots((0..CHECKPOINTS).map(|_| LineState::with_room()).collect()),
+            left: Last::of_slots((0..CHECKPOINTS).map(|_| LeftRecord::with_room()).collect()),
         }
     }
 
@@ -123,12 +129,19 @@ impl HapticTape {
         self.ticks.next().is_multiple_of(CHECKPOINT_EVERY)
     }
 
-    /// Keeps what the tick that begins now starts from: with the state of the line, where the loop has one.
-    pub fn checkpoint(&mut self, memory: HapticMemory, line: Option<&LineState>) {
+    /// Keeps what the tick that begins now starts from: with the state of the line, where the loop has one, and with needles that stay
+    /// in.
+    pub fn checkpoint(&mut self, memory: HapticMemory, line: Option<&LineState>, left: Option<&LeftNeedles>) {
         self.checkpoints.push((self.ticks.next(), memory));
         if let Some(slot) = self.line_states.advance() {
             match line {
                 Some(state) => slot.copy_from(state),
+                None => slot.clear(),
+            }
+        }
+        if let Some(slot) = self.left.advance() {
+            match left {
+                Some(left) => slot.copy_from(left),
                 None => slot.clear(),
             }
         }
@@ -148,14 +161,20 @@ impl HapticTape {
     pub fn flight(&self) -> Option<HapticFlight> {
         let complete = complete_from(&self.orders).max(complete_from(&self.lines));
         let possible = self.ticks.first().max(complete)..self.ticks.next();
-        let pairs = self.checkpoints.since(0).zip(self.line_states.since(0));
-        let ((first, memory), line_state) = pairs.into_iter().find(|((tick, _), _)| possible.contains(tick))?;
+        let points = self
+            .checkpoints
+            .since(0)
+            .zip(self.line_states.since(0))
+            .zip(self.left.since(0));
+        let (((first, memory), line_state), left) =
+            points.into_iter().find(|(((tick, _), _), _)| possible.contains(tick))?;
         let orders = self.orders.since(0).filter(|(tick, _)| tick >= first);
         let lines = self.lines.since(0).filter(|(tick, _)| tick >= first);
         Some(HapticFlight {
             memory: *memory,
             ticks: self.ticks.since(*first).copied().collect(),
             orders: orders.map(|(tick, order)| (tick - first, *order)).collect(),
+            left: left.clone(),
             line_state: (memory.line != 0).then(|| line_state.clone()),
             lines: lines.map(|(tick, line)| (tick - first, *line)).collect(),
         })
@@ -169,6 +188,7 @@ impl Tape for HapticTape {
         self.lines.clear();
         self.checkpoints.clear();
         self.line_states.clear();
+        self.left.clear();
     }
 
     fn is_for(&self, _scene_generation: u64) -> bool {
@@ -187,6 +207,8 @@ pub struct HapticFlight {
     pub orders: Vec<(u64, HapticOrder)>,
     /// State of the line of `memory`, where there is one.
     pub line_state: Option<LineState>,
+    /// Needles that stay in.
+    pub left: LeftRecord,
     /// Numbers of lines, each with the index of the tick that took it up.
     pub lines: Vec<(u64, u64)>,
 }
@@ -195,7 +217,8 @@ impl HapticFlight {
     /// Numbers of the lines that the loop had, in their order.
     pub fn line_numbers(&self) -> impl Iterator<Item = u64> {
         let first = (self.memory.line != 0).then_some(self.memory.line);
-        first.into_iter().chain(self.lines.iter().map(|(_, line)| *line))
+        let first = first.into_iter().chain(self.left.line_numbers());
+        first.chain(self.lines.iter().map(|(_, line)| *line))
     }
 
     /// Ticks in which the needle was on a prepared line.

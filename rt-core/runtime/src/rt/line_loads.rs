@@ -1,11 +1,21 @@
 //! What the force loop does to the body on a prepared line: forces for the tissue loop's columns.
 
+use crate::rt::left_loads::LeftLoads;
 use serde::{Deserialize, Serialize};
 use stylet_sim::line::MAX_STATIONS;
 use stylet_sim::line::beam::{BentNeedle, MAX_ACROSS};
 
 /// Shaft and tip of each station, and stations across along both directions.
 const MOST: usize = 2 * MAX_STATIONS + 2 * MAX_ACROSS;
+
+/// Forces of all needles in the newest tick.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct AllLoads {
+    /// Of the needle that moves.
+    pub line: LineLoads,
+    /// Of those that stay in.
+    pub left: LeftLoads,
+}
 
 /// Forces of the newest tick on a line.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]

@@ -19,6 +19,7 @@ pub mod exchange;
 pub mod haptic;
 pub mod haptic_tape;
 pub mod layers_met;
+pub mod left_loads;
 pub mod line_loads;
 pub mod pin;
 pub mod pose;

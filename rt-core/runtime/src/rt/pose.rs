@@ -27,6 +27,8 @@ pub struct TipPose {
     pub innermost_layer: u64,
     /// Largest number of a layer that the force loop has taken up so far.
     pub seen_layer: u64,
+    /// The hand holds no needle: it meets nothing.
+    pub hand_is_empty: bool,
 }
 
 impl Default for TipPose {
@@ -42,6 +44,7 @@ impl Default for TipPose {
             released_contact: 0,
             innermost_layer: 0,
             seen_layer: 0,
+            hand_is_empty: false,
         }
     }
 }

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use stylet_sim::force::LocalResponse;
 use stylet_sim::force::chain::Touch;
+use stylet_sim::line::MAX_LEFT;
 use stylet_sim::needle::LayerKind;
 
 /// Where the tip meets tissue and what the body answers, once in each tick of the tissue loop.
@@ -48,6 +49,8 @@ pub struct TissueResponse {
     pub solved_ns: u64,
     /// The tip of that pose, scene frame, m.
     pub solved_tip_in_scene: Vector3<f64>,
+    /// Those of needles that stay in, whose columns it has; 0 for none.
+    pub left: [u64; MAX_LEFT],
     /// The step has not converged and the needle would feel it.
     pub unsolved: bool,
 }
@@ -88,6 +91,7 @@ impl Default for TissueResponse {
             line: 0,
             solved_ns: 0,
             solved_tip_in_scene: Vector3::zeros(),
+            left: [0; MAX_LEFT],
             unsolved: false,
         }
     }

@@ -18,6 +18,8 @@ pub struct Seed {
     pub dropped_at_m: [f64; 3],
     /// From middle to middle to the seed before it, m, where a spacer joins them.
     pub strand_pitch_m: Option<f64>,
+    /// Along the open track that it lies in towards the entry, unit vector at rest; `None` where there is none.
+    pub track_to_entry: Option<[f64; 3]>,
 }
 
 /// Places and axes in the deformed body, scene frame, in the order of the drops.

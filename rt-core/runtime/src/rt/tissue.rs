@@ -5,25 +5,28 @@ use crate::rt::clock::{self, Grid};
 use crate::rt::contact::Contact;
 use crate::rt::exchange::{Notice, Ticket, TissueOrder};
 use crate::rt::layers_met::LayersMet;
+use crate::rt::left_loads::LeftLoads;
 use crate::rt::line_loads::LineLoads;
 use crate::rt::pose::TipPose;
 use crate::rt::response::TissueResponse;
 use crate::rt::seed::{self, Seed};
 use crate::rt::timing::Probe;
-use crate::rt::tissue_tape::TapedOrder;
+use crate::rt::tissue_tape::{LeftTape, TapedOrder};
 use crate::rt::wiring::TissuePorts;
 use crate::rt::world::World;
 use nalgebra::Vector3;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_shm_schema::{MAX_SEEDS, SeedPose};
 use stylet_sim::force::LocalResponse;
-use stylet_sim::line::BodyLine;
+use stylet_sim::line::{BodyLine, MAX_LEFT};
 use stylet_sim::tissue::{Held, StepReport};
 
 mod contact;
 mod flight;
 mod folds;
+mod left;
 mod line;
+mod migration;
 mod seeds;
 mod snapshot;
 
@@ -41,6 +44,11 @@ pub struct TissueLoop {
     in_by_line: bool,
     /// Forces on the line that the last tick used.
     loads: LineLoads,
+    /// Columns of needles that stay in, and all of their loads in this tick.
+    left: Vec<left::LeftBody>,
+    left_loads: LeftLoads,
+    /// Room to record those, until the tape is there.
+    left_room: Option<Box<LeftTape>>,
     layers: LayersMet,
     /// The tip has been outside since the last contact.
     clear: bool,
@@ -77,6 +85,9 @@ impl TissueLoop {
             line: None,
             in_by_line: false,
             loads: LineLoads::default(),
+            left: Vec::with_capacity(MAX_LEFT),
+            left_loads: LeftLoads::default(),
+            left_room: None,
             layers: LayersMet::default(),
             clear: true,
             held: None,
@@ -144,6 +155,7 @@ impl TissueLoop {
     /// One tick; in the order of the data.
     pub fn tick(&mut self, woke_ns: u64) {
         self.checkpoint();
+        self.follow_left();
         self.take_orders();
         let before = self.pose;
         self.pose = *self.ports.pose.read();
@@ -158,9 +170,10 @@ impl TissueLoop {
             self.hold(travel);
         }
         self.mark();
-        let report = on_line.unwrap_or_else(|| self.world.tissue.step(self.held, self.period_s));
+        let report = on_line.unwrap_or_else(|| self.step_off_line());
         self.report = Some(report);
         self.mark();
+        self.migrate();
         self.respond(woke_ns, &report);
         self.look_for_folds();
         self.tape(woke_ns, report.residual);
@@ -180,6 +193,10 @@ impl TissueLoop {
                     self.tape_order(TapedOrder::Limits(limits.clone()));
                     self.world.set_limits(limits);
                 }
+                TissueOrder::Migration(migration) => {
+                    self.tape_order(TapedOrder::Migration(migration));
+                    self.world.migration = migration;
+                }
                 TissueOrder::DropSeed { ticket, strand_pitch_m } => {
                     self.tape_order(TapedOrder::DropSeed { strand_pitch_m });
                     self.drop_seed(ticket, strand_pitch_m);
@@ -197,6 +214,7 @@ impl TissueLoop {
                     self.ports.flight.replace(tape);
                     self.checkpoint();
                 }
+                TissueOrder::LeftRoom(room) => self.left_room = self.left_room.take().or(Some(room)),
                 TissueOrder::HandOverTape => self.hand_over_tape(),
                 TissueOrder::Line(line) => {
                     self.tape_order(TapedOrder::Line {
@@ -239,6 +257,7 @@ impl TissueLoop {
             std::mem::forget(old);
         }
         self.drop_line();
+        self.drop_left();
         self.leave_line();
         self.seeds.clear();
         self.response.seed_count = 0;

@@ -2,6 +2,7 @@
 
 use crate::rt::contact::Contact;
 use crate::rt::layers_met::LayersMet;
+use crate::rt::left_loads::{LeftLoads, NeedleLoads};
 use crate::rt::line_loads::LineLoads;
 use crate::rt::pose::TipPose;
 use crate::rt::recorder::{Last, Tape, complete_from};
@@ -12,6 +13,8 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use stylet_shm_schema::MAX_SEEDS;
 use stylet_sim::limits::Limits;
+use stylet_sim::line::MAX_LEFT;
+use stylet_sim::migration::Migration;
 use stylet_sim::scene::{SceneSource, TissueKind};
 use stylet_sim::tissue::Held;
 
@@ -26,6 +29,8 @@ pub const MAX_BODY_BYTES: usize = 8 << 20;
 pub enum TapedOrder {
     /// See [`TissueOrder::Limits`](crate::rt::exchange::TissueOrder).
     Limits(Limits),
+    /// See [`TissueOrder::Migration`](crate::rt::exchange::TissueOrder).
+    Migration(Migration),
     /// See [`TissueOrder::DropSeed`](crate::rt::exchange::TissueOrder).
     DropSeed {
         /// As in the order.
@@ -55,6 +60,8 @@ pub struct TissueMemory {
     pub in_by_line: bool,
     /// Forces on it that the last tick used.
     pub loads: LineLoads,
+    /// Needles that stay in: the loads that the body's share of each was made from.
+    pub left: Vec<NeedleLoads>,
     /// Layers on the path of the needle.
     pub layers: LayersMet,
     /// The tip has been outside since the last contact.
@@ -67,6 +74,8 @@ pub struct TissueMemory {
     pub response: TissueResponse,
     /// Limits in use.
     pub limits: Limits,
+    /// How seeds migrate.
+    pub migration: Migration,
     /// As the tissue model saves it.
     pub body: Vec<u8>,
 }
@@ -86,6 +95,19 @@ pub struct TissueEntry {
     pub response: TissueResponse,
 }
 
+/// Room for what needles that stay in do to the body; made when the first is left, for as many ticks as a tape has.
+pub struct LeftTape(Last<(u64, LeftLoads)>);
+
+impl LeftTape {
+    /// Blank.
+    pub fn new() -> Box<Self> {
+        Box::new(Self(Last::new(
+            &(0, LeftLoads::default()),
+            2 * CHECKPOINT_EVERY as usize,
+        )))
+    }
+}
+
 /// The last ticks of the tissue loop in one scene. Numbers count from the first tick on the tape.
 pub struct TissueTape {
     scene_generation: u64,
@@ -96,6 +118,8 @@ pub struct TissueTape {
     pub orders: Last<(u64, TapedOrder)>,
     /// Forces on a needle line, each with the number of the first tick that used them.
     loads: Last<(u64, LineLoads)>,
+    /// Those of needles that stay in; room from when the first is left on.
+    left: Option<Box<LeftTape>>,
     /// Written alternately, each with the tick that it comes before.
     checkpoints: [(u64, TissueMemory); 2],
     /// Checkpoints so far, and the tick from which on the next is due.
@@ -118,12 +142,14 @@ impl TissueTape {
             contacts: 0,
             in_by_line: false,
             loads: LineLoads::default(),
+            left: Vec::with_capacity(MAX_LEFT),
             layers: LayersMet::default(),
             clear: true,
             held: None,
             pose: TipPose::default(),
             response: TissueResponse::default(),
             limits: world.limits.clone(),
+            migration: world.migration,
             body: vec![0; if not_kept { 0 } else { body_len }],
         };
         let blank = TissueEntry {
@@ -141,6 +167,7 @@ impl TissueTape {
             ticks: Last::new(&blank, room(!not_kept)),
             orders: Last::new(&(0, TapedOrder::Reset), ORDERS),
             loads: Last::new(&(0, LineLoads::default()), room(!not_kept && tissue.has_lines())),
+            left: None,
             checkpoints: [(0, memory()), (0, memory())],
             points: 0,
             next_due: 0,
@@ -172,6 +199,25 @@ impl TissueTape {
         }
     }
 
+    /// From now on there is room for what needles that stay in do.
+    pub fn take_left_room(&mut self, room: &mut Option<Box<LeftTape>>) {
+        if self.left.is_none() {
+            self.left = room.take();
+        }
+    }
+
+    /// Keeps what needles that stay in did to the body in the tick that runs, where it is other than before.
+    pub fn left_loads(&mut self, loads: &LeftLoads) {
+        let tick = self.ticks.next();
+        if let Some(left) = &mut self.left
+            && !left.0.newest().is_some_and(|(_, newest)| newest.is_same(loads))
+            && let Some(slot) = left.0.advance()
+        {
+            slot.0 = tick;
+            slot.1.copy_from(loads);
+        }
+    }
+
     /// Keeps an order of the tick that runs.
     pub fn order(&mut self, order: TapedOrder) {
         self.orders.push((self.ticks.next(), order));
@@ -189,6 +235,7 @@ impl TissueTape {
             return None;
         }
         let complete = complete_from(&self.orders).max(complete_from(&self.loads));
+        let complete = complete.max(self.left.as_ref().map_or(0, |left| complete_from(&left.0)));
         let possible = self.ticks.first().max(complete)..next;
         let written = self.checkpoints.iter().take(self.points);
         let mut points: Vec<&(u64, TissueMemory)> = written.filter(|(tick, _)| possible.contains(tick)).collect();
@@ -196,6 +243,10 @@ impl TissueTape {
         let (first, memory) = points.first()?;
         let loads = self.loads.since(0).filter(|(tick, _)| tick >= first);
         let orders = self.orders.since(0).filter(|(tick, _)| tick >= first);
+        let left = self.left.iter().flat_map(|left| left.0.since(0)).copied();
+        // What was so before the stretch holds on in it.
+        let (before, left): (Vec<_>, Vec<_>) = left.partition(|(tick, _)| tick < first);
+        let before = before.last().map(|(_, loads)| (0, *loads));
         Some(TissueFlight {
             scene: (*self.scene).clone(),
             tissue: self.tissue,
@@ -205,6 +256,10 @@ impl TissueTape {
             ticks: self.ticks.since(*first).copied().collect(),
             orders: orders.map(|(tick, order)| (tick - first, order.clone())).collect(),
             loads: loads.map(|(tick, loads)| (tick - first, *loads)).collect(),
+            left: before
+                .into_iter()
+                .chain(left.into_iter().map(|(tick, loads)| (tick - first, loads)))
+                .collect(),
         })
     }
 }
@@ -214,6 +269,9 @@ impl Tape for TissueTape {
         self.ticks.clear();
         self.orders.clear();
         self.loads.clear();
+        if let Some(left) = &mut self.left {
+            left.0.clear();
+        }
         self.points = 0;
         self.next_due = 0;
     }
@@ -242,6 +300,8 @@ pub struct TissueFlight {
     pub orders: Vec<(u64, TapedOrder)>,
     /// Forces on a needle line, each with the index of the first tick that used them.
     pub loads: Vec<(u64, LineLoads)>,
+    /// Those of needles that stay in, likewise.
+    pub left: Vec<(u64, LeftLoads)>,
 }
 
 impl TissueFlight {
@@ -253,11 +313,19 @@ impl TissueFlight {
             TapedOrder::Line { generation } => Some(*generation),
             _ => None,
         });
-        first.into_iter().chain(taken)
+        let left = self.memory.left.iter().map(|left| left.generation);
+        first.into_iter().chain(left).chain(taken)
     }
 
     /// Whether a needle on that line pushed tissue, so that its columns count.
     pub fn is_pushed_by(&self, generation: u64) -> bool {
+        let left = self.left.iter().flat_map(|(_, left)| left.needles());
+        if left
+            .chain(&self.memory.left)
+            .any(|left| left.generation == generation && left.is_any())
+        {
+            return true;
+        }
         let all = self.loads.iter().map(|(_, loads)| loads).chain([&self.memory.loads]);
         all.into_iter()
             .any(|loads| loads.generation == generation && loads.is_any())

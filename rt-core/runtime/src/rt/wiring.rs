@@ -2,14 +2,14 @@
 
 use crate::rt::exchange::{HapticOrder, Notice, SnapshotReturn, SnapshotSlot, TissueOrder};
 use crate::rt::haptic_tape::HapticTape;
-use crate::rt::line_loads::LineLoads;
+use crate::rt::line_loads::AllLoads;
 use crate::rt::pose::TipPose;
 use crate::rt::recorder::{Recorder, TapePort, recorder};
 use crate::rt::response::TissueResponse;
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use stylet_shm_schema::TickRecord;
-use stylet_sim::line::{BodyLine, HandLine};
+use stylet_sim::line::{BodyLine, HandLine, LeftNeedles, MAX_LEFT};
 
 /// Places in each ring, all at least one.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +47,10 @@ impl Capacities {
 
 /// Lines on their way in each direction; the bridge frees what has come back before it sends another.
 const LINES: usize = 2;
+/// Lines on their way back: those that stay in may all come at once.
+const OLD_LINES: usize = LINES + 2 * MAX_LEFT;
+/// Room for needles that stay in, sent once.
+const ROOMS: usize = 2;
 
 /// Ends that the force loop owns.
 pub struct HapticPorts {
@@ -64,8 +68,10 @@ pub struct HapticPorts {
     pub lines: rtrb::Consumer<Box<HandLine>>,
     /// Replaced ones, to the bridge, which frees them.
     pub old_lines: rtrb::Producer<Box<HandLine>>,
+    /// Room for needles that stay in.
+    pub rooms: rtrb::Consumer<Box<LeftNeedles>>,
     /// Forces on the line, to the tissue loop.
-    pub loads: triple_buffer::Input<LineLoads>,
+    pub loads: triple_buffer::Input<AllLoads>,
     /// Flight recording.
     pub flight: Recorder<HapticTape>,
 }
@@ -85,7 +91,7 @@ pub struct TissuePorts {
     /// Replaced columns of a line, to the bridge, which frees them.
     pub old_lines: rtrb::Producer<Box<BodyLine>>,
     /// Forces on the line, of the force loop.
-    pub loads: triple_buffer::Output<LineLoads>,
+    pub loads: triple_buffer::Output<AllLoads>,
     /// Loaned snapshot memory.
     pub slots: rtrb::Consumer<SnapshotSlot>,
     /// Loaned memory that goes back to the bridge.
@@ -110,6 +116,8 @@ pub struct BridgePorts {
     pub old_worlds: rtrb::Consumer<Box<World>>,
     /// Lines that are ready, to the force loop; their columns go with an order to the tissue loop.
     pub lines: rtrb::Producer<Box<HandLine>>,
+    /// Room for needles that stay in, to the force loop.
+    pub rooms: rtrb::Producer<Box<LeftNeedles>>,
     /// Lines to be freed.
     pub old_hand_lines: rtrb::Consumer<Box<HandLine>>,
     /// Columns to be freed.
@@ -151,9 +159,10 @@ impl Wiring {
         let (tissue_notice_in, tissue_notices) = rtrb::RingBuffer::new(capacities.notices);
         let (old_world_in, old_worlds) = rtrb::RingBuffer::new(capacities.old_worlds);
         let (lines, line_out) = rtrb::RingBuffer::new(LINES);
-        let (old_hand_line_in, old_hand_lines) = rtrb::RingBuffer::new(LINES);
-        let (old_body_line_in, old_body_lines) = rtrb::RingBuffer::new(LINES);
-        let (loads_in, loads_out) = triple_buffer::triple_buffer(&LineLoads::default());
+        let (rooms, room_out) = rtrb::RingBuffer::new(ROOMS);
+        let (old_hand_line_in, old_hand_lines) = rtrb::RingBuffer::new(OLD_LINES);
+        let (old_body_line_in, old_body_lines) = rtrb::RingBuffer::new(OLD_LINES);
+        let (loads_in, loads_out) = triple_buffer::triple_buffer(&AllLoads::default());
         let (slots, slot_out) = rtrb::RingBuffer::new(capacities.snapshots);
         let (filled_in, filled) = rtrb::RingBuffer::new(capacities.snapshots);
         let (haptic_flight, haptic_tapes) = recorder(haptic_tape);
@@ -167,6 +176,7 @@ impl Wiring {
                 records: record_in,
                 lines: line_out,
                 old_lines: old_hand_line_in,
+                rooms: room_out,
                 loads: loads_in,
                 flight: haptic_flight,
             },
@@ -190,6 +200,7 @@ impl Wiring {
                 tissue_notices,
                 old_worlds,
                 lines,
+                rooms,
                 old_hand_lines,
                 old_body_lines,
                 slots,

@@ -1,6 +1,7 @@
 //! The scene as the tissue loop owns it: built by another thread, swapped in whole.
 
 use stylet_sim::limits::Limits;
+use stylet_sim::migration::Migration;
 use stylet_sim::needle::LayerKind;
 use stylet_sim::scene::{Scene, TissueKind};
 use stylet_sim::tissue::{ChainMailTissue, FemTissue, MaterialPoint, TissueModel};
@@ -22,6 +23,8 @@ pub struct World {
     pub tissue: Box<dyn TissueModel>,
     /// Limits that the tissue keeps now.
     pub limits: Limits,
+    /// What seeds do after they were dropped; off in a new world.
+    pub migration: Migration,
 }
 
 impl World {
@@ -40,6 +43,7 @@ impl World {
             tissue,
             scene,
             limits,
+            migration: Migration::default(),
         })
     }
 

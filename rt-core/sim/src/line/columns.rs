@@ -1,9 +1,11 @@
 //! A queue of columns: the body's answer to one newton at each station, eight at once, in slices of bounded work.
 
+use super::cross::LineStations;
 use super::stations::Stations;
 use crate::tissue::fem::Compiled;
 use crate::tissue::fem::batch::{BatchModel, BatchState, LOADS, NodeWeight};
 use crate::tissue::{ElementField, PackedField};
+use std::sync::Arc;
 
 /// Residual over load down to which columns are solved: the compliance then is right to 6e-4 and the field to 7e-3 (paper's
 /// gland, nu 0.49; `docs/adr/0010-condensed-needle-line.md`).
@@ -30,6 +32,8 @@ pub struct Column {
     pub field: PackedField,
     /// Displacement at the stations, m/N: of shaft and tip along the line, or of the shaft across it.
     pub samples_m: Vec<f64>,
+    /// Displacement at the stations of the lines beside, m/N, along them: see [`ColumnQueue::read_beside`].
+    pub beside_m: Vec<f64>,
     /// Force of the foundation on the body.
     pub foundation_n: [f64; 3],
     /// Of the solver, over the load.
@@ -68,6 +72,8 @@ pub struct ColumnQueue<T = f32> {
     columns: Vec<Column>,
     /// Loads in order of the columns.
     loads: Vec<Vec<NodeWeight>>,
+    /// Loads of other lines, at which every column is read as well.
+    beside: Vec<Vec<NodeWeight>>,
     /// What columns are sampled with: `2 m` along the line, then those across it along each direction.
     ready: usize,
     stations: usize,
@@ -102,12 +108,14 @@ impl<T: Compiled> ColumnQueue<T> {
                     2 * m
                 }
             ],
+            beside_m: Vec::new(),
             foundation_n: [0.0; 3],
             residual: f64::INFINITY,
         };
         ColumnQueue {
             loads: wanted.iter().map(weights).collect(),
             columns: wanted.iter().map(column).collect(),
+            beside: Vec::new(),
             ready: 0,
             stations: m,
             across,
@@ -116,6 +124,17 @@ impl<T: Compiled> ColumnQueue<T> {
             next: Slice::Begin,
             tolerance,
         }
+    }
+
+    /// Reads every column that is not solved yet at the stations of other lines in the same body as well, shaft and then tip of
+    /// each.
+    #[must_use]
+    pub fn read_beside(mut self, others: &[Arc<LineStations>]) -> Self {
+        self.beside = others.iter().flat_map(|other| other.loads.iter().cloned()).collect();
+        for column in &mut self.columns {
+            column.beside_m = vec![0.0; self.beside.len()];
+        }
+        self
     }
 
     /// How far the queue is.
@@ -202,6 +221,9 @@ impl<T: Compiled> ColumnQueue<T> {
             _ => &self.loads[..2 * m],
         };
         for (value, weights) in column.samples_m.iter_mut().zip(sampled) {
+            *value = self.state.sample(lane, weights);
+        }
+        for (value, weights) in column.beside_m.iter_mut().zip(&self.beside) {
             *value = self.state.sample(lane, weights);
         }
         self.state.write(model, lane, &mut self.unpacked);

@@ -16,11 +16,11 @@ use sets::{Scratch, Tip};
 mod sets;
 
 /// Solutions in one tick at most: the tip goes on, a membrane gives way, the tip goes on again.
-const MAX_PASSES: u32 = 12;
+pub(super) const MAX_PASSES: u32 = 12;
 /// A gap at the tip that another pass would be wasted on.
-const CLOSED_M: f64 = 1e-7;
+pub(super) const CLOSED_M: f64 = 1e-7;
 /// The line is not followed further than this from its entry.
-const FURTHEST_M: f64 = 10.0;
+pub(super) const FURTHEST_M: f64 = 10.0;
 
 /// Where the needle is in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +41,7 @@ pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> Line
         };
     }
     let tip_m = input.tip_m.clamp(-FURTHEST_M, FURTHEST_M);
+    state.leave_company();
     if state.tip.material_m == f64::NEG_INFINITY {
         state.tip.material_m = tip_m.min(0.0);
     }
@@ -92,12 +93,17 @@ pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> Line
 }
 
 /// Stations that reached their friction stick to where they are now.
-fn slip(model: &LineModel, state: &mut LineState, tip_m: f64) {
+pub(super) fn slip(model: &LineModel, state: &mut LineState, tip_m: f64) {
     for n in 0..state.in_contact {
         if state.shaft_n[n].abs() >= limit_n(model, state.tip.material_m, n) {
             state.anchor_m[n] = tip_m - state.u_m[n];
         }
     }
+}
+
+/// [`touch`] for a tick beside other needles.
+pub(super) fn touch_beside(model: &LineModel, state: &mut LineState, tip_m: f64) {
+    touch(model, state, tip_m, &mut Scratch::new());
 }
 
 /// Which stations the shaft touches, and where the tip loads. A station that is new sticks to where it is.
@@ -140,8 +146,8 @@ fn touch(model: &LineModel, state: &mut LineState, tip_m: f64, scratch: &mut Scr
 }
 
 /// A membrane is stiffer than what it holds: between the place of the tip and the body as a whole it is a spring, of such a
-/// stiffness that both of its limits, force and depth, are met at once (eq. 10). It is relaxed when the tip meets it.
-fn press(model: &LineModel, state: &mut LineState, membrane: Option<usize>) {
+/// stiffness that both of its limits, force and depth, are met at once (eq. 10). It is relaxed when the tip meets it. Returns what it leaves of the dent, where one holds the tip.
+pub(super) fn press(model: &LineModel, state: &mut LineState, membrane: Option<usize>) -> Option<f64> {
     let whole = model.compliance.common_m_per_n();
     let count = state.in_contact;
     let held_by = membrane.map_or(0, |n| n as u32 + 1);
@@ -151,14 +157,12 @@ fn press(model: &LineModel, state: &mut LineState, membrane: Option<usize>) {
         state.tip.met_dent_m = if held_by == 0 {
             0.0
         } else {
-            state.tip_u_m - whole_m(state, whole, load_n)
+            state.tip_u_m - whole_m(state, whole, load_n) - state.beside_whole_m
         };
         state.tip.held_by = held_by;
     }
     (state.tip_offset_m, state.membrane_n_per_m) = (0.0, 0.0);
-    let Some(kept) = membrane.and_then(|n| model.kept_of_dent(n, state.tip_own)) else {
-        return;
-    };
+    let kept = membrane.and_then(|n| model.kept_of_dent(n, state.tip_own))?;
     state.membrane_n_per_m = (1.0 / kept - 1.0) / (state.tip_own - whole);
     // Tissue that gives way within the tick leaves the spring more of the dent.
     let gain = state.memory.gain;
@@ -176,6 +180,7 @@ fn press(model: &LineModel, state: &mut LineState, membrane: Option<usize>) {
         // Of the dent that the past leaves, the spring leaves that part as well.
         state.tip_offset_m -= (1.0 - kept) * (past_at_tip_m(model, state) - state.memory.whole_offset_m);
     }
+    Some(kept)
 }
 
 /// Displacement of the material at the tip that the past leaves.
@@ -197,7 +202,7 @@ fn whole_m(state: &LineState, whole_m_per_n: f64, load_n: f64) -> f64 {
 
 /// Friction that each station can have, by how much of it the shaft is in.
 #[inline]
-fn limit_n(model: &LineModel, place_m: f64, n: usize) -> f64 {
+pub(super) fn limit_n(model: &LineModel, place_m: f64, n: usize) -> f64 {
     let ds = model.compliance.spacing_m;
     model.friction_n_per_m[n] * (place_m - n as f64 * ds).clamp(0.0, ds)
 }
@@ -354,11 +359,11 @@ fn whole_n(model: &LineModel, state: &LineState) -> f64 {
         return 0.0;
     }
     let load_n = state.shaft_n[..state.in_contact].iter().sum::<f64>() + state.tip.force_n;
-    let dent_m = state.tip_u_m - whole_m(state, model.compliance.common_m_per_n(), load_n);
+    let dent_m = state.tip_u_m - whole_m(state, model.compliance.common_m_per_n(), load_n) - state.beside_whole_m;
     state.membrane_n_per_m * (dent_m - state.tip.met_dent_m)
 }
 
-fn finish(model: &LineModel, state: &mut LineState, output: &mut LineOutput) {
+pub(super) fn finish(model: &LineModel, state: &mut LineState, output: &mut LineOutput) {
     let m = model.compliance.stations;
     let count = state.in_contact;
     state.whole_n = whole_n(model, state);

@@ -27,6 +27,8 @@ pub mod beam;
 mod columns;
 mod compliance;
 mod contact;
+mod cross;
+mod left;
 mod model;
 pub mod prony;
 mod ready;
@@ -38,9 +40,13 @@ mod tip;
 pub use columns::{Column, ColumnQueue, Load, QueueProgress, TOLERANCE};
 pub use compliance::Compliance;
 pub use contact::{LineInput, step};
+pub use cross::{Cross, LineStations};
+pub use left::{LeftNeedle, LeftNeedles, LeftRecord, LeftShare, MAX_LEFT, MAX_LEFT_LOADS};
 pub use model::{LineLayer, LineModel, LineProblem, LineSettings, MAX_LAYERS, MAX_STATIONS};
 pub use prony::PronyTerm;
-pub use ready::{BodyAnswer, BodyLine, HandLine, LayerForces, LineError, LineSource, NeedleBending, ReadyLine};
+pub use ready::{
+    BodyAnswer, BodyLine, BodyShare, HandLine, LayerForces, LineError, LineSource, NeedleBending, ReadyLine, Track,
+};
 pub use rows::Rows;
 pub use state::{LineOutput, LineState, TipState};
 pub use stations::{Line, StationSettings, Stations};

@@ -5,6 +5,7 @@
 use super::columns::{ColumnQueue, QueueProgress, TOLERANCE};
 use super::compliance::Compliance;
 use super::contact::{LineInput, step};
+use super::cross::{Cross, LineStations};
 use super::model::{LineModel, LineSettings, MAX_STATIONS};
 use super::prony::PronyTerm;
 use super::state::{LineOutput, LineState};
@@ -12,16 +13,20 @@ use super::stations::{Line, StationSettings, Stations};
 use crate::needle::{LayerKind, Layers};
 use crate::scene::Lattice;
 use crate::tissue::fem::batch::BatchModel;
-use crate::tissue::{BodyShift, PackedField};
 use nalgebra::Vector3;
+use std::sync::Arc;
 
 mod bend;
+mod body;
 mod source;
+mod track;
 mod way;
 
 use bend::Bending;
 pub use bend::NeedleBending;
+pub use body::{BodyAnswer, BodyLine, BodyShare};
 pub use source::LineSource;
+pub use track::Track;
 use way::{Way, layer};
 
 /// The needle is on a line whose entry it would meet so far from it, and whose direction is that close to its own.
@@ -42,6 +47,8 @@ pub struct ReadyLine {
     pub hand: Box<HandLine>,
     /// For the tissue loop.
     pub body: Box<BodyLine>,
+    /// Where it loads the body: lines that are prepared later are read there.
+    pub stations: Arc<LineStations>,
 }
 
 /// What the force loop needs: how the stations move with the forces on them, and what has happened so far.
@@ -51,55 +58,12 @@ pub struct HandLine {
     pub generation: u64,
     line: Line,
     way: Way,
-    model: LineModel,
-    state: LineState,
+    pub(super) model: LineModel,
+    pub(super) state: LineState,
+    /// How it moves with lines that were there when it was solved for.
+    pub(super) beside: Vec<Cross>,
     /// Where the body was solved for forces across the line as well.
     bending: Option<Box<Bending>>,
-}
-
-/// What the tissue loop needs: the body's answer to a newton at each station.
-#[derive(Clone, Debug)]
-pub struct BodyLine {
-    /// That of the [`HandLine`] made with it.
-    pub generation: u64,
-    /// Where the line is at rest.
-    pub line: Line,
-    /// How far a newton moves the body as a whole on its foundation, m; 0 where something holds it.
-    pub whole_m_per_n: f64,
-    /// For each newton: shaft of each station, then tip at each, then stations across along each direction.
-    pub answer: BodyAnswer,
-}
-
-/// What a tissue model takes of the body's answers to the loads of a line.
-#[derive(Clone, Debug)]
-pub enum BodyAnswer {
-    /// Displacement of every element, m/N: tissue that adds them up.
-    Columns(Vec<PackedField>),
-    /// The same of a coarser body, which carries tissue that finds the rest by itself and is held by something.
-    Carrying(Vec<PackedField>),
-    /// Motion of the body as a whole, per newton: it carries tissue that nothing holds.
-    Shifts(Vec<BodyShift>),
-}
-
-impl BodyAnswer {
-    /// For tissue that does not add columns up: they carry it, or in a body that nothing holds no more of them than the
-    /// motion as a whole.
-    pub fn carry(&mut self, body: &Lattice, is_held: bool) {
-        let Self::Columns(columns) = self else { return };
-        *self = if is_held {
-            Self::Carrying(std::mem::take(columns))
-        } else {
-            Self::Shifts(columns.iter().map(|column| BodyShift::of_field(body, column)).collect())
-        };
-    }
-
-    /// Displacements of every element; none where the motion as a whole is all.
-    pub fn columns(&self) -> &[PackedField] {
-        match self {
-            Self::Columns(columns) | Self::Carrying(columns) => columns,
-            Self::Shifts(_) => &[],
-        }
-    }
 }
 
 /// What the layers on the way resist with.
@@ -148,8 +112,9 @@ pub enum LineError {
 
 impl ReadyLine {
     /// Solves for a line of needle at rest; some seconds for a body of 20,000 elements. `layer_of` says what an element of `lattice`
-    /// is to a needle, and nothing of what no needle enters. `report` is called between slices of work and ends it by returning
+    /// is to a needle, and nothing of what no needle enters. `others` are the lines beside which the needle may come. `report` is called between slices of work and ends it by returning
     /// false.
+    #[expect(clippy::too_many_arguments, reason = "each says one thing of the line that is wanted")]
     pub fn prepare(
         generation: u64,
         body: &BatchModel<f32>,
@@ -157,6 +122,7 @@ impl ReadyLine {
         layer_of: &dyn Fn(u32) -> Option<LayerKind>,
         line: Line,
         bends: bool,
+        others: &[Arc<LineStations>],
         report: &mut dyn FnMut(QueueProgress) -> bool,
     ) -> Result<ReadyLine, LineError> {
         let settings = StationSettings::of_lattice(body.spacing_m());
@@ -168,7 +134,7 @@ impl ReadyLine {
         if stations.count() == 0 {
             return Err(LineError::NoTissue);
         }
-        let mut queue = ColumnQueue::new(body, &stations, bends, TOLERANCE);
+        let mut queue = ColumnQueue::new(body, &stations, bends, TOLERANCE).read_beside(others);
         while !queue.prepare(body, SLICES).is_done() {
             if !report(queue.progress()) {
                 return Err(LineError::Stopped);
@@ -177,14 +143,20 @@ impl ReadyLine {
         let compliance = Compliance::of_columns(body, &stations, queue.columns()).ok_or(LineError::NoTissue)?;
         let compliance = compliance.behind_needle(STIFFEST_N_PER_M);
         let whole_m_per_n = compliance.whole_m_per_n;
+        let axial = queue.columns().get(..2 * stations.count()).unwrap_or(&[]);
+        let beside = Cross::of_columns(axial, line.axes[0], whole_m_per_n, others);
         Ok(ReadyLine {
-            hand: Box::new(HandLine::new(generation, line, way, compliance)?),
-            body: Box::new(BodyLine {
+            stations: Arc::new(LineStations::of(generation, &stations)),
+            hand: Box::new(HandLine {
+                beside,
+                ..HandLine::new(generation, line, way, compliance)?
+            }),
+            body: Box::new(BodyLine::new(
                 generation,
                 line,
                 whole_m_per_n,
-                answer: BodyAnswer::Columns(queue.into_fields()),
-            }),
+                BodyAnswer::Columns(queue.into_fields()),
+            )),
         })
     }
 }
@@ -204,6 +176,7 @@ impl HandLine {
             state: LineState::new(&model),
             model,
             bending,
+            beside: Vec::new(),
         })
     }
 
@@ -229,7 +202,7 @@ impl HandLine {
 
     /// How far the tip is along the line from the entry at rest, m.
     pub fn along_m(&self, tip_m: &Vector3<f64>) -> f64 {
-        (tip_m - Vector3::from(self.line.entry_m)).dot(&Vector3::from(self.line.axes[0]))
+        (tip_m - Vector3::from(self.line.entry_m)).dot(&Vector3::from(self.line.axes[0])) + self.state.grip_m
     }
 
     /// One tick of the needle, whose tip goes no farther than the bone.
@@ -281,9 +254,30 @@ impl HandLine {
         depth_m.filter(|d| d.is_finite()).unwrap_or(0.0)
     }
 
-    /// Tissue at rest that no needle has touched.
+    /// Tissue at rest, with the tracks that were open when the line was taken up.
     pub fn reset(&mut self) {
         self.state.reset();
+    }
+
+    /// Tissue at rest that no needle has touched.
+    pub fn forget(&mut self) {
+        (self.state.open_m, self.state.open_layers) = (0.0, 0);
+        self.state.reset();
+    }
+
+    /// The tip presses on a membrane that is whole.
+    pub fn is_held_by_membrane(&self) -> bool {
+        self.state.tip.held_by != 0 && self.state.tip.force_n > 0.0
+    }
+
+    /// The hand holds the needle so far behind where its tip is, m.
+    pub fn grip_ahead(&mut self, ahead_m: f64) {
+        self.state.grip_m = ahead_m;
+    }
+
+    /// A needle that was taken up again is from now on where the hand has it; for one that is out.
+    pub fn let_grip_go(&mut self) {
+        self.state.grip_m = 0.0;
     }
 }
 

@@ -81,6 +81,15 @@ pub struct LineState {
     pub(super) memory: Memory,
     /// Forces and track across the line, of a needle that bends.
     pub(super) beam: BeamState,
+    /// How far the needles beside it move the body as a whole along the line, m.
+    pub(super) beside_whole_m: f64,
+    /// The last tick was one beside other needles: what they move is in the memory's offset.
+    pub(super) is_beside: bool,
+    /// How far the tip is ahead of where the hand has it: a needle that was taken up again, m.
+    pub(super) grip_m: f64,
+    /// End of a track that an earlier needle cut where this line lies, and the layers that it opened.
+    pub(super) open_m: f64,
+    pub(super) open_layers: u32,
     pub(super) loads_n: Vec<f64>,
     pub(super) last: LineOutput,
 }
@@ -113,6 +122,11 @@ impl LineState {
             whole_n: 0.0,
             memory: Memory::new(2 * stations),
             beam: BeamState::default(),
+            beside_whole_m: 0.0,
+            is_beside: false,
+            grip_m: 0.0,
+            open_m: 0.0,
+            open_layers: 0,
             loads_n: vec![value; 2 * stations],
             last: LineOutput::default(),
         }
@@ -188,7 +202,7 @@ impl LineState {
         0.5 * (shaft.map(|(f, u)| f * u).sum::<f64>() + self.tip.force_n * self.tip_u_m)
     }
 
-    /// Tissue at rest that no needle has touched, as [`LineState::new`]; does not allocate.
+    /// Tissue at rest, with the tracks that were open before the line was taken up; does not allocate.
     pub fn reset(&mut self) {
         for field in [
             &mut self.shaft_n,
@@ -201,6 +215,8 @@ impl LineState {
         }
         self.tip = TipState {
             material_m: f64::NEG_INFINITY,
+            track_m: self.open_m,
+            opened: self.open_layers,
             ..TipState::default()
         };
         self.tip_u_m = 0.0;
@@ -211,7 +227,25 @@ impl LineState {
         (self.tip_offset_m, self.membrane_n_per_m, self.whole_n) = (0.0, 0.0, 0.0);
         self.memory.reset();
         self.beam = BeamState::default();
+        (self.beside_whole_m, self.is_beside, self.grip_m) = (0.0, false, 0.0);
         self.last = LineOutput::default();
+    }
+
+    /// The needle holds nothing any more; its track stays.
+    pub(super) fn clear_loads(&mut self) {
+        self.shaft_n.fill(0.0);
+        self.loads_n.fill(0.0);
+        self.in_contact = 0;
+        self.tip.force_n = 0.0;
+        self.tip.material_m = self.tip.material_m.min(0.0);
+    }
+
+    /// The needle is alone from now on.
+    pub(super) fn leave_company(&mut self) {
+        if std::mem::take(&mut self.is_beside) {
+            self.memory.offset_m.fill(0.0);
+            self.beside_whole_m = 0.0;
+        }
     }
 
     pub(super) fn fits(&self, model: &LineModel) -> bool {

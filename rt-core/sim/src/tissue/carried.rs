@@ -1,7 +1,7 @@
 //! A displacement of the whole body that a model has on top of what its own steps do.
 
-use super::field::add_up;
-use super::{BodyShift, PackedField};
+use super::field::{add_fields, add_up};
+use super::{BodyShift, ElementField, PackedField};
 use crate::scene::{Lattice, Scene};
 use crate::simd::Simd;
 use std::sync::Arc;
@@ -15,6 +15,8 @@ pub enum Carry<'a> {
     Shift(BodyShift),
     /// By the answers of a coarser body, m/N, to the loads, N: something holds it, so that it cannot move as one piece.
     Columns(&'a [PackedField], &'a [f64]),
+    /// As by `Columns`, and by fields of that body as well, m.
+    Fields(&'a [PackedField], &'a [f64], &'a [&'a ElementField]),
 }
 
 /// How a body is carried.
@@ -93,7 +95,13 @@ impl CarriedField {
 
     /// The sum of loads times answers; does not allocate.
     pub fn set(&mut self, columns: &[PackedField], loads_n: &[f64]) {
+        self.set_with(columns, loads_n, &[]);
+    }
+
+    /// The same with fields besides, m; does not allocate.
+    pub fn set_with(&mut self, columns: &[PackedField], loads_n: &[f64], fields: &[&ElementField]) {
         add_up(self.simd, columns, loads_n, 1.0, &mut self.of_element);
+        add_fields(fields, 1.0, &mut self.of_element);
         self.spread();
     }
 

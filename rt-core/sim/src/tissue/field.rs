@@ -7,6 +7,25 @@ use crate::simd::{Simd, vectorised};
 pub struct ElementField(pub [Vec<f32>; 3]);
 
 impl ElementField {
+    /// Zeros for that many elements, every page of which was written to.
+    pub fn with_room(elements: usize) -> Self {
+        ElementField(std::array::from_fn(|_| {
+            let mut axis = vec![1.0; elements];
+            axis.fill(0.0);
+            axis
+        }))
+    }
+
+    /// How many elements it has.
+    pub fn elements(&self) -> usize {
+        self.0[0].len()
+    }
+
+    /// Becomes the sum of answers times loads, m. Does not allocate.
+    pub fn load(&mut self, columns: &[PackedField], loads_n: &[f64]) {
+        add_up(Simd::detect(), columns, loads_n, 1.0, &mut self.0);
+    }
+
     /// Zeros for that many elements.
     pub fn zeros(elements: usize) -> Self {
         ElementField(std::array::from_fn(|_| vec![0.0; elements]))
@@ -50,6 +69,11 @@ impl PackedField {
     /// Every displacement as bits, to be compared.
     pub fn is_identical(&self, other: &PackedField) -> bool {
         self.step_m.to_bits() == other.step_m.to_bits() && self.steps == other.steps
+    }
+
+    /// How many elements it has.
+    pub fn elements(&self) -> usize {
+        self.steps[0].len()
     }
 
     /// Bytes of the displacements.
@@ -96,6 +120,17 @@ pub(crate) fn add_up(simd: Simd, fields: &[PackedField], factors: &[f64], scale:
                 let from = (block * BLOCK).min(field.steps[axis].len());
                 let factor = (factor * scale * f64::from(field.step_m)) as f32;
                 add(simd, sum, factor, &field.steps[axis][from..]);
+            }
+        }
+    }
+}
+
+/// Adds other fields, m, times a scale.
+pub(crate) fn add_fields(fields: &[&ElementField], scale: f32, sum: &mut [Vec<f32>; 3]) {
+    for field in fields {
+        for (sum, axis) in sum.iter_mut().zip(&field.0) {
+            for (sum, u) in sum.iter_mut().zip(axis) {
+                *sum += scale * u;
             }
         }
     }

@@ -1,6 +1,6 @@
 //! What every tissue model is: a body that takes steps and can be read.
 
-use super::{Carry, Deformed, PackedField};
+use super::{Carry, Deformed, ElementField, PackedField};
 use crate::limits::Limits;
 
 use serde::{Deserialize, Serialize};
@@ -88,6 +88,12 @@ pub trait TissueModel: Send {
     /// the model knew of it is dropped.
     /// Obligations as for `step`. `None` from a model whose answers do not add up.
     fn displace(&mut self, _columns: &[PackedField], _loads_n: &[f64], _whole_m: [f64; 3]) -> Option<StepReport> {
+        None
+    }
+
+    /// Displaces the body by these fields (m) on top of what [`displace`](Self::displace) has just done, and reports anew. Obligations as
+    /// for `step`. `None` from a model whose answers do not add up.
+    fn add(&mut self, _fields: &[&ElementField]) -> Option<StepReport> {
         None
     }
 

@@ -52,6 +52,12 @@ impl MaterialPoint {
         })
     }
 
+    /// Its place while the body is at rest, m.
+    pub fn rest_m(&self, lattice: &Lattice) -> [f64; 3] {
+        let centre_m = lattice.rest_m(self.element);
+        [0, 1, 2].map(|a| centre_m[a] + f64::from(self.local[a]) * lattice.spacing_m)
+    }
+
     /// The same by a walk from `element` alone: as cheap where there is no tissue.
     pub fn locate_from(body: &Deformed, point_m: [f64; 3], element: u32) -> Option<MaterialPoint> {
         let p = in_reach(body, point_m)?;

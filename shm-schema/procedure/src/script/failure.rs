@@ -28,6 +28,9 @@ pub enum StepFailure {
     /// A seed was dropped and is not in the tissue.
     #[error("waited {0:.1} s for the seed in the tissue")]
     NoSeed(f64),
+    /// A needle was not left in the tissue, or not drawn out of it.
+    #[error("waited {0:.0} s for the needle to stay in the tissue, or to be drawn out of it")]
+    NotLeft(f64),
     /// The tissue did not come to be ready for the needle.
     #[error(
         "waited {0:.0} s for the tissue to be ready for the needle where it is placed; rt-core prepares that beside \

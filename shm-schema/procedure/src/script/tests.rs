@@ -56,6 +56,8 @@ impl Obedient {
         if let Next::Send(request) = next {
             match request {
                 HandRequest::MoveHand(goal) => self.state.tip_in_scene_m = goal.tip_m,
+                HandRequest::LeaveNeedle => self.state.left_count += 1,
+                HandRequest::DrawFirstLeft { .. } => self.state.left_count -= 1,
                 HandRequest::DropSeed { .. } if !lost.contains(&drops) => self.state.seed_count += 1,
                 _ => {}
             }
@@ -297,4 +299,39 @@ fn a_procedure_goes_on_from_wherever_it_was_stopped_with_no_seed_twice_and_none_
         words(&hand.sent)[..4],
         ["plan 1", "Engage", "20 mm at 50 mm/s", "DropSeed"]
     );
+}
+
+#[test]
+fn stabilising_needles_go_in_first_stay_and_are_drawn_out_at_the_end() {
+    let beside = |x: f64| NeedleWay {
+        entry_m: Vector3::new(x, 0.0, 0.0),
+        drops_m: vec![Vector3::new(x, 0.0, 0.03)],
+        ..way()
+    };
+    let ways = vec![way()];
+    let mut procedure =
+        Procedure::of_needles(ways, Pace::default()).stabilised(vec![beside(0.0), beside(0.02)]);
+    let (mut hand, mut most, mut left_at_drops) = (Obedient::new(), 0, Vec::new());
+    let mut which = vec![procedure.stabilising()];
+    while hand.step(&mut procedure, &[]).expect("goes on") != Next::Done {
+        most = most.max(hand.state.left_count);
+        left_at_drops.resize(hand.state.seed_count as usize, hand.state.left_count);
+        if which.last() != Some(&procedure.stabilising()) {
+            which.push(procedure.stabilising());
+        }
+        assert_eq!(procedure.needle(), 0);
+    }
+    assert_eq!((most, hand.state.left_count, hand.state.seed_count), (2, 0, 2));
+    assert_eq!(left_at_drops, [2, 2], "both stay in while seeds are dropped");
+    // The reset comes before the first; the last two are drawn out.
+    assert_eq!(which, [None, Some(0), Some(1), None, Some(0), Some(1)]);
+    let names: Vec<_> = hand.sent.iter().map(HandRequest::name).collect();
+    assert_eq!(names.iter().filter(|name| **name == "LeaveNeedle").count(), 2);
+    assert_eq!(names.iter().filter(|name| **name == "Engage").count(), 1);
+    assert_eq!(names.first(), Some(&"Reset"));
+    // A rehearsal beside them ends with both in.
+    let mut rehearsal = Procedure::rehearsal_beside(way(), Pace::default(), vec![beside(0.0), beside(0.02)]);
+    let mut hand = Obedient::new();
+    while hand.step(&mut rehearsal, &[]).expect("goes on") != Next::Done {}
+    assert_eq!((hand.state.left_count, hand.state.seed_count), (2, 2));
 }

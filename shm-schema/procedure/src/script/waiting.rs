@@ -35,6 +35,8 @@ pub enum WaitsFor {
     Effect(&'static str),
     /// The seed that was dropped.
     Seed,
+    /// A needle to stay in the tissue, or to be out of it.
+    Left,
     /// The tissue, prepared for the needle where it is placed.
     Line,
     /// The tip at its target.
@@ -53,6 +55,7 @@ impl fmt::Display for WaitsFor {
             Self::Reply(request) => write!(f, "a reply to {request}"),
             Self::Effect(request) => write!(f, "{request} to take effect"),
             Self::Seed => write!(f, "the seed in the tissue"),
+            Self::Left => write!(f, "the needle to stay in, or to be drawn out"),
             Self::Line => write!(f, "the tissue to be ready for the needle"),
             Self::Tip { off_along_m } => write!(f, "the tip, {:.1} mm from its target", off_along_m.abs() * 1e3),
             Self::Rest => write!(f, "the tissue to rest"),

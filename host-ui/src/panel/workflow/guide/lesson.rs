@@ -93,9 +93,12 @@ fn operation_lesson(shown: &Shown, felt: &Felt, needle: &AtHand, operation: Oper
             "All seeds are dropped. Take the needle out: hold S, or press Enter.",
             &["Watch the seeds as the tissue goes back to where it was."],
         ),
-        Operation::Reset | Operation::PublishPlan | Operation::Engage | Operation::Settle => {
-            of("Wait until the tissue rests.", &[])
-        }
+        Operation::Reset
+        | Operation::PublishPlan
+        | Operation::Engage
+        | Operation::Leave
+        | Operation::DrawOut
+        | Operation::Settle => of("Wait until the tissue rests.", &[]),
     }
 }
 

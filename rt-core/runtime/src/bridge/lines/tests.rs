@@ -16,6 +16,7 @@ fn rings() -> (LoopRings, HapticPorts, TissuePorts) {
         tissue_notices: bridge.tissue_notices,
         old_worlds: bridge.old_worlds,
         lines: bridge.lines,
+        rooms: bridge.rooms,
         old_hand_lines: bridge.old_hand_lines,
         old_body_lines: bridge.old_body_lines,
     };

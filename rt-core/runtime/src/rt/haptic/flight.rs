@@ -5,7 +5,7 @@ use crate::rt::exchange::HapticOrder;
 use crate::rt::haptic_tape::{HapticEntry, HapticMemory};
 use crate::rt::response::TissueResponse;
 use stylet_shm_schema::TickRecord;
-use stylet_sim::line::HandLine;
+use stylet_sim::line::{HandLine, LeftNeedles, LeftRecord};
 
 impl HapticLoop {
     /// Names every field, so that a new one is not forgotten.
@@ -23,6 +23,8 @@ impl HapticLoop {
             goal,
             line,
             on_line,
+            // Their record stands beside the memory.
+            left,
             watchdog,
             answer: _,
             state,
@@ -39,6 +41,7 @@ impl HapticLoop {
             goal: *goal,
             line: line.as_ref().map_or(0, |line| line.generation),
             on_line: *on_line,
+            is_hand_empty: left.is_hand_empty,
             watchdog: *watchdog,
             state: *state,
         }
@@ -48,6 +51,21 @@ impl HapticLoop {
     pub fn resume_line(&mut self, mut line: Box<HandLine>) {
         line.set_forces(&self.parameters.layer_forces());
         self.line = Some(line);
+    }
+
+    /// Goes on with the needles that stayed in, by their record, after [`resume_line`](Self::resume_line). False where they do not fit it.
+    pub fn resume_left(&mut self, record: &LeftRecord, line: impl FnMut(u64) -> Option<Box<HandLine>>) -> bool {
+        let mut needles = LeftNeedles::with_room();
+        let forces = self.parameters.layer_forces();
+        let mut line = line;
+        let with_forces = |generation: u64| {
+            let mut line = line(generation)?;
+            line.set_forces(&forces);
+            Some(line)
+        };
+        let fits = needles.take_record(record, with_forces, self.line.as_deref());
+        self.left.needles = Some(needles);
+        fits
     }
 
     /// The end counts as an order, so that its ramp can be repeated.
@@ -68,7 +86,8 @@ impl HapticLoop {
         if due {
             let memory = self.memory();
             if let Some(tape) = self.ports.flight.tape() {
-                tape.checkpoint(memory, self.line.as_ref().map(|line| line.state()));
+                let left = self.left.needles.as_deref().filter(|left| !left.is_empty());
+                tape.checkpoint(memory, self.line.as_ref().map(|line| line.state()), left);
             }
         }
     }

@@ -6,11 +6,20 @@ use crate::rt::response::TissueResponse;
 use stylet_hw::Sample;
 use stylet_sim::force::chain::{ChainOutput, step_on_line};
 use stylet_sim::line::beam::BeamOutput;
+use stylet_sim::line::Track;
 
 /// A needle is taken for one outside up to so far behind the entry: plans name entries on the surface, which is one of cells.
 const BEGINS_WITHIN_M: f64 = 1e-3;
 
+/// A needle that was taken up again is released that far before the entry, m.
+const OUT_M: f64 = 4e-3;
+
 impl HapticLoop {
+    /// The track that the needle on the present line has cut.
+    pub fn line_track(&self) -> Option<Track> {
+        self.line.as_ref()?.track()
+    }
+
     /// A line is changed only while the needle is out of the tissue; the old one goes back to be freed.
     pub(super) fn take_line(&mut self) {
         let in_tissue = self.line.as_ref().is_some_and(|line| line.is_in_tissue());
@@ -23,9 +32,13 @@ impl HapticLoop {
                 tape.line(next.generation);
             }
             if let Some(old) = self.line.replace(next) {
+                if let (Some(track), Some(line)) = (old.track(), &mut self.line) {
+                    line.open_track(&track);
+                }
                 // There is room: it was looked at above, and this thread alone fills the ring.
                 let _ = self.ports.old_lines.push(old);
             }
+            self.left.pair(self.line.as_deref());
         }
     }
 
@@ -35,12 +48,22 @@ impl HapticLoop {
     pub(super) fn is_on_line(&mut self, sample: &Sample, tissue: &TissueResponse) -> bool {
         let in_other_contact = tissue.contact > self.pose.released_contact;
         let was_on_line = self.on_line;
+        if self.left.is_hand_empty {
+            return false;
+        }
+        let others = self.left.needles.as_deref().filter(|others| !others.is_empty());
+        let moving = others.map(|others| others.moving());
         self.line.as_mut().is_some_and(|line| {
-            if line.generation != tissue.line {
+            let is_known = line.generation == tissue.line || tissue.left.contains(&line.generation);
+            // Beside needles that it does not know it is none, either.
+            if !is_known || moving.is_some_and(|moving| moving != line.generation) {
                 line.reset();
                 return false;
             }
             let tip = &sample.tip_in_world;
+            if line.along_m(tip) < -OUT_M && !line.is_in_tissue() {
+                line.let_grip_go();
+            }
             let may_begin = was_on_line || (!in_other_contact && line.along_m(tip) <= BEGINS_WITHIN_M);
             line.is_in_tissue() || (may_begin && line.is_met_by(tip, &sample.direction_in_world()))
         })
@@ -55,10 +78,12 @@ impl HapticLoop {
             &mut self.chain,
             sample,
             line,
+            self.left.any_mut(),
             self.period_s,
         );
         let state = line.state();
-        let loads = self.ports.loads.input_buffer_mut();
+        let buffer = self.ports.loads.input_buffer_mut();
+        let loads = &mut buffer.line;
         loads.generation = line.generation;
         loads.in_tissue = line.is_in_tissue();
         loads.tip_material_m = state.tip().material_m;
@@ -76,6 +101,7 @@ impl HapticLoop {
             *slot = *load;
             loads.count += 1;
         }
+        self.left.show(&mut buffer.left);
         self.ports.loads.publish();
         self.on_line = true;
         Some(output)
@@ -84,7 +110,9 @@ impl HapticLoop {
     /// The needle is on no line from now on.
     pub(super) fn leave_line(&mut self) {
         if std::mem::take(&mut self.on_line) {
-            *self.ports.loads.input_buffer_mut() = LineLoads::default();
+            let buffer = self.ports.loads.input_buffer_mut();
+            buffer.line = LineLoads::default();
+            self.left.show(&mut buffer.left);
             self.ports.loads.publish();
         }
     }

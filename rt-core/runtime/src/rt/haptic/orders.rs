@@ -24,6 +24,9 @@ impl HapticLoop {
                     if let Some(line) = &mut self.line {
                         line.set_forces(&forces);
                     }
+                    if let Some(left) = self.left.any_mut() {
+                        left.set_forces(&forces);
+                    }
                     self.state.parameters_generation = generation;
                     self.notify(Notice::ParametersActive {
                         ticket,
@@ -50,6 +53,13 @@ impl HapticLoop {
                     self.chain.gate.release();
                     self.notify(Notice::Done { ticket, tick });
                 }
+                HapticOrder::LeaveNeedle { ticket } => self.leave_needle(ticket),
+                HapticOrder::TakeNeedle { ticket, number } => self.take_needle(ticket, number),
+                HapticOrder::DrawNeedle {
+                    ticket,
+                    number,
+                    speed_m_per_s,
+                } => self.draw_needle(ticket, number, speed_m_per_s),
                 HapticOrder::Reset { ticket } => self.reset(ticket, tick),
                 HapticOrder::HandOverTape => self.ports.flight.hand_over(),
             }

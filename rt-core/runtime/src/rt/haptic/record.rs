@@ -28,6 +28,7 @@ impl HapticLoop {
             | bit(at_goal, flags::AT_GOAL)
             | bit(self.on_line && !self.lacks_beam(), flags::LINE_READY)
             | bit(tissue.least_corner <= 0.0, flags::FOLDED)
+            | bit(self.left.is_hand_empty, flags::HAND_EMPTY)
     }
 
     pub(super) fn record(
@@ -93,6 +94,7 @@ impl HapticLoop {
         s.fault = self.watchdog.fault() as u32;
         s.flags = now_flags;
         s.seed_count = tissue.seed_count;
+        s.left_count = self.left.count() as u32;
         let work_ns = clock::now_ns().saturating_sub(woke_ns);
         s.worst_work_ns = s.worst_work_ns.max(work_ns);
         let record = TickRecord {

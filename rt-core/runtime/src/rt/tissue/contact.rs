@@ -31,6 +31,10 @@ impl TissueLoop {
         if self.contact.is_some() || self.pose.time_ns == 0 {
             return;
         }
+        if self.pose.hand_is_empty || self.has_no_answer_off_line() {
+            self.clear = false;
+            return;
+        }
         let inside = self.locate(&self.pose.tip_in_scene, None);
         let Some(point) = inside else {
             self.clear = true;

@@ -1,6 +1,7 @@
 //! The tissue loop's side of the flight recorder: all that one tick leaves to the next, out and in.
 
 use super::TissueLoop;
+use super::left::LeftBody;
 use crate::rt::tissue_tape::{TapedOrder, TissueEntry, TissueMemory, TissueTape};
 use stylet_sim::line::BodyLine;
 use stylet_sim::tissue::{Deformed, Held};
@@ -19,6 +20,9 @@ impl TissueLoop {
             line: _,
             in_by_line,
             loads,
+            left,
+            left_loads: _,
+            left_room: _,
             layers,
             clear,
             held,
@@ -36,17 +40,26 @@ impl TissueLoop {
         to.contacts = *contacts;
         to.in_by_line = *in_by_line;
         to.loads = *loads;
+        to.left.clear();
+        to.left.extend(left.iter().map(|left| left.used));
         to.layers = *layers;
         to.clear = *clear;
         to.held = *held;
         to.pose = *pose;
         to.response = *response;
         to.limits.clone_from(&world.limits);
+        to.migration = world.migration;
         world.tissue.save(&mut to.body);
     }
 
-    /// Continues from the memory of another loop, with the line that it had.
-    pub fn remember(&mut self, memory: &TissueMemory, line: Option<Box<BodyLine>>) {
+    /// Continues from the memory of another loop, with the line that it had, and those of needles that stayed in.
+    pub fn remember(&mut self, memory: &TissueMemory, line: Option<Box<BodyLine>>, left: Vec<Box<BodyLine>>) {
+        self.left.clear();
+        for (line, used) in left.into_iter().zip(&memory.left) {
+            let mut body = LeftBody { line, used: *used };
+            body.stay(used);
+            self.left.push(body);
+        }
         self.seeds.clear();
         self.seeds.extend_from_slice(&memory.seeds);
         self.contact = memory.contact;
@@ -60,6 +73,7 @@ impl TissueLoop {
         self.pose = memory.pose;
         self.response = memory.response;
         self.world.set_limits(memory.limits.clone());
+        self.world.migration = memory.migration;
         self.world.tissue.load(&memory.body);
     }
 
@@ -91,8 +105,14 @@ impl TissueLoop {
 
     pub(super) fn tape(&mut self, woke_ns: u64, residual: f64) {
         let (pose, held, response) = (self.pose, self.held, self.response);
+        if self.left_room.is_some()
+            && let Some(tape) = self.ports.flight.tape()
+        {
+            tape.take_left_room(&mut self.left_room);
+        }
         if let Some(tape) = self.ports.flight.tape() {
             tape.loads(&self.loads);
+            tape.left_loads(&self.left_loads);
             tape.ticks.push(TissueEntry {
                 woke_ns,
                 pose,

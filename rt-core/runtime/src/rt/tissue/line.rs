@@ -30,7 +30,7 @@ impl TissueLoop {
     }
 
     /// By the bridge: freeing has no place in a tick. The bridge empties the ring before it sends another line.
-    fn free(&mut self, line: Box<BodyLine>) {
+    pub(super) fn free(&mut self, line: Box<BodyLine>) {
         if let Err(rtrb::PushError::Full(line)) = self.ports.old_lines.push(line) {
             std::mem::forget(line);
         }
@@ -38,31 +38,51 @@ impl TissueLoop {
 
     /// The step of a tick on the line; `None` where the needle is on none that this loop has.
     pub(super) fn step_on_line(&mut self) -> Option<StepReport> {
-        let loads = *self.ports.loads.read();
-        self.loads = loads;
-        let line = self.line.as_ref().filter(|line| line.generation == loads.generation)?;
+        let loads = self.loads;
+        // Taken out meanwhile, so that the body can be moved by it.
+        let line = self.line.take_if(|line| line.generation == loads.generation)?;
         let axis = line.line;
         let mut whole_m = axis.axes[0].map(|c| c * loads.whole_m);
         if let Some(bent) = loads.bent {
             add_bevel(&mut whole_m, &axis, &bent, line.whole_m_per_n);
         }
         let report = match &line.answer {
-            BodyAnswer::Columns(columns) => self.world.tissue.displace(columns, loads.loads_n(), whole_m)?,
+            BodyAnswer::Columns(columns) => {
+                let alone = self.world.tissue.displace(columns, loads.loads_n(), whole_m);
+                match self.left.is_empty() {
+                    true => alone,
+                    false => self.with_left(|this, fields| this.world.tissue.add(fields)),
+                }
+            }
             BodyAnswer::Shifts(shifts) => {
                 let mut shift = BodyShift::sum(shifts, loads.loads_n());
+                if !self.left.is_empty() {
+                    let by_left = self.left_shift();
+                    for axis in 0..3 {
+                        shift.shift_m[axis] += by_left.shift_m[axis];
+                        shift.turn_rad[axis] += by_left.turn_rad[axis];
+                    }
+                }
                 for (sum, whole_m) in shift.shift_m.iter_mut().zip(whole_m) {
                     *sum += whole_m;
                 }
                 self.world.tissue.carry(Carry::Shift(shift));
                 let held = self.held_on_line(&axis, &loads);
-                self.world.tissue.step(held, self.period_s)
+                Some(self.world.tissue.step(held, self.period_s))
             }
             BodyAnswer::Carrying(columns) => {
-                self.world.tissue.carry(Carry::Columns(columns, loads.loads_n()));
+                match self.left.is_empty() {
+                    true => self.world.tissue.carry(Carry::Columns(columns, loads.loads_n())),
+                    false => self.with_left(|this, fields| {
+                        this.world.tissue.carry(Carry::Fields(columns, loads.loads_n(), fields));
+                    }),
+                }
                 let held = self.held_on_line(&axis, &loads);
-                self.world.tissue.step(held, self.period_s)
+                Some(self.world.tissue.step(held, self.period_s))
             }
         };
+        self.line = Some(line);
+        let report = report?;
         let entry = Vector3::from(axis.entry_m);
         let direction = Vector3::from(axis.axes[0]);
         if self.contact.is_some() {
@@ -100,7 +120,10 @@ impl TissueLoop {
     /// The needle is on no line: a contact that was reported ends.
     pub(super) fn leave_line(&mut self) {
         if std::mem::take(&mut self.in_by_line) {
-            self.world.tissue.carry(Carry::Not);
+            // Those that stay in go on carrying the body.
+            if self.left.is_empty() {
+                self.world.tissue.carry(Carry::Not);
+            }
             let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
             self.notify(Notice::LeftTissue { tick, time_ns });
         }

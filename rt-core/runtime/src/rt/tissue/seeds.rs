@@ -34,12 +34,15 @@ impl TissueLoop {
                 // Room for MAX_SEEDS was reserved: this push does not allocate.
                 let is_behind = |pitch_m: &f64| self.is_behind_the_last(*pitch_m);
                 let strand_pitch_m = strand_pitch_m.filter(is_behind);
+                let on = self.line.as_ref().filter(|_| on_line.is_some());
+                let track_to_entry = on.map(|line| line.line.axes[0].map(|c| -c));
                 self.seeds.push(Seed {
                     tip,
                     tail,
                     axis: self.pose.direction.into(),
                     dropped_at_m: tip_m.into(),
                     strand_pitch_m,
+                    track_to_entry,
                 });
                 let tick = self.response.tick;
                 self.response.seed_count = self.seeds.len() as u32;

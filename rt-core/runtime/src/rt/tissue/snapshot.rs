@@ -4,7 +4,8 @@ use super::TissueLoop;
 use crate::rt::clock;
 use crate::rt::exchange::{SnapshotReturn, SnapshotSlot};
 use crate::rt::seed;
-use stylet_shm_schema::{MAX_BEND_POINTS, MAX_SEEDS, SnapshotHeader, Vertex};
+use stylet_shm_schema::{LeftNeedlePose, MAX_BEND_POINTS, MAX_SEEDS, SnapshotHeader, Vertex};
+use stylet_sim::line::MAX_LEFT;
 use stylet_sim::tissue::StepReport;
 
 /// Ticks from one snapshot to the next while the needle moves: 67 Hz, above the rate of most screens. What moves by itself,
@@ -19,6 +20,7 @@ pub struct Shown {
     tip_in_scene: [f64; 3],
     direction: [f64; 3],
     seeds: usize,
+    left: usize,
     scene_generation: u64,
 }
 
@@ -41,6 +43,7 @@ impl TissueLoop {
             tip_in_scene: self.pose.tip_in_scene.into(),
             direction: self.pose.direction.into(),
             seeds: self.seeds.len(),
+            left: self.left.len(),
             scene_generation: self.world.generation,
         };
         if !self.is_snapshot_due(&now) {
@@ -101,9 +104,21 @@ impl TissueLoop {
             bend_count: 0,
             bend_spacing_m: 0.0,
             bend_m: [[0.0; 3]; MAX_BEND_POINTS],
+            left_count: self.left.len() as u32,
+            reserved: 0,
             seed_count: self.seeds.len() as u32,
             seeds: [bytemuck::Zeroable::zeroed(); MAX_SEEDS],
+            left: [bytemuck::Zeroable::zeroed(); MAX_LEFT],
         };
+        for (slot, left) in header.left.iter_mut().zip(&self.left) {
+            let line = &left.line.line;
+            *slot = LeftNeedlePose {
+                number: left.line.generation,
+                entry_m: line.entry_m,
+                direction: line.axes[0],
+                tip_m: line.point_m(left.used.tip_m, [0.0; 2]),
+            };
+        }
         self.fill_bend(header);
         for (slot, pose) in header.seeds.iter_mut().zip(seed::poses(&self.seeds, body)) {
             *slot = pose;

@@ -5,7 +5,7 @@
 use super::{ChainOutput, ChainParameters, ChainState, guard};
 use crate::force::law::{self, ForceInput, ForceTerms};
 use crate::line::beam::BeamOutput;
-use crate::line::{HandLine, LayerForces, LineOutput};
+use crate::line::{HandLine, LayerForces, LeftNeedles, LineOutput};
 use crate::needle::{LayerKind, Phase};
 use nalgebra::Vector3;
 use stylet_hw::{DeviceInfo, Sample};
@@ -24,13 +24,14 @@ impl ChainParameters {
     }
 }
 
-/// One tick of a needle that is on `line`, in tissue or before it.
+/// One tick of a needle that is on `line`, in tissue or before it, and of those that stay in beside it.
 pub fn step_on_line(
     parameters: &ChainParameters,
     device: &DeviceInfo,
     state: &mut ChainState,
     sample: &Sample,
     line: &mut HandLine,
+    mut left: Option<&mut LeftNeedles>,
     dt_s: f64,
 ) -> ChainOutput {
     let tip = sample.tip_in_world;
@@ -39,7 +40,10 @@ pub fn step_on_line(
     let axis = Vector3::from(line.line().axes[0]);
     let along_m = line.along_m(&tip);
     let was_in = line.is_in_tissue();
-    let answer = line.step(along_m, dt_s);
+    let answer = match &mut left {
+        Some(left) => left.step_beside(line, along_m, dt_s),
+        None => line.step(along_m, dt_s),
+    };
     let is_in = line.is_in_tissue();
     let speed_along_m_per_s = velocity_m_per_s.dot(&axis);
     let phase = phase(
@@ -73,7 +77,8 @@ pub fn step_on_line(
     };
     let (bone_n, bone_j) = line.bone(along_m);
     let bent = line.bend(&tip, &sample.world_from_tool, &answer);
-    let tissue_j = line.state().elastic_j() + bone_j;
+    let left_j = left.map_or(0.0, |left| left.elastic_j());
+    let tissue_j = line.state().elastic_j() + bone_j + left_j;
     let mut terms = terms(parameters, &input, &axis, &answer, bone_n, tissue_j);
     if let Some(bent) = bent.as_ref().filter(|_| phase != Phase::Outside) {
         bend(&mut terms, bent, &axis, line.across());

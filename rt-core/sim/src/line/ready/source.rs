@@ -3,7 +3,7 @@
 use super::way::Way;
 use super::{HandLine, LineError, STIFFEST_N_PER_M};
 use crate::line::beam::MAX_ACROSS;
-use crate::line::{Compliance, Line, LineState, MAX_STATIONS, Rows};
+use crate::line::{Compliance, Cross, Line, LineState, MAX_STATIONS, Rows};
 use crate::needle::LayerKind;
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +17,9 @@ pub struct LineSource {
     pub line: Line,
     way: Way,
     compliance: Compliance,
+    beside: Vec<Cross>,
+    /// End of the track that was open there, and the layers that it opened.
+    open: (f64, u32),
 }
 
 impl LineSource {
@@ -35,7 +38,7 @@ impl LineSource {
         &mut self.compliance
     }
 
-    /// Whether two lines are the same in every bit, whatever their number in the run.
+    /// Whether two lines are the same in every bit, whatever their number in the run and what they know of others.
     pub fn is_identical(&self, other: &LineSource) -> bool {
         let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
         let place = |s: &LineSource| [bits(&s.line.entry_m), bits(s.line.axes.as_flattened())];
@@ -75,6 +78,8 @@ impl HandLine {
             line: self.line,
             way: self.way.clone(),
             compliance: self.model.compliance.clone(),
+            beside: self.beside.clone(),
+            open: (self.state.open_m, self.state.open_layers),
         }
     }
 
@@ -101,6 +106,19 @@ impl HandLine {
         Self::new(self.generation, self.line, self.way.clone(), compliance)
     }
 
+    /// A line of a made-up body, for tests.
+    #[cfg(test)]
+    pub(in crate::line) fn made_up(generation: u64, line: Line, compliance: Compliance, beside: Vec<Cross>) -> Self {
+        let way = Way {
+            kinds: vec![(0.0, LayerKind::Gland, true)],
+            bone_m: None,
+        };
+        Self {
+            beside,
+            ..Self::new(generation, line, way, compliance).expect("valid")
+        }
+    }
+
     /// The line in tissue at rest, with the default forces of its layers.
     ///
     /// # Errors
@@ -112,7 +130,14 @@ impl HandLine {
             line,
             way,
             compliance,
+            beside,
+            open,
         } = source;
+        if !beside.iter().all(|cross| cross.is_whole(2 * compliance.stations)) {
+            return Err(LineError::Unusable(
+                "what it knows of other lines is not whole".to_owned(),
+            ));
+        }
         let [first, second] = &compliance.across;
         let across = first.size();
         let is_whole = compliance.rows.is_whole(2 * compliance.stations)
@@ -121,7 +146,13 @@ impl HandLine {
         if compliance.stations > MAX_STATIONS || across > MAX_ACROSS || !is_whole {
             return Err(LineError::Unusable("its compliance is not whole".to_owned()));
         }
-        Self::new(generation, line, way, compliance)
+        let mut line = Self {
+            beside,
+            ..Self::new(generation, line, way, compliance)?
+        };
+        (line.state.open_m, line.state.open_layers) = open;
+        line.state.reset();
+        Ok(line)
     }
 
     /// Goes on from that state; false, and nothing changes, where it is one of another line.

@@ -40,6 +40,7 @@ fn ready(scene: &Scene, body: &BatchModel<f32>) -> ReadyLine {
         &|_| Some(LayerKind::Gland),
         line,
         false,
+        &[],
         &mut |_| true,
     )
     .unwrap()
@@ -81,6 +82,7 @@ fn the_body_follows_the_loads_of_the_line_and_is_at_rest_without_them() {
     let ReadyLine {
         mut hand,
         body: columns,
+        ..
     } = ready(&scene, &body);
     let mut tissue = FemTissue::<f32>::new(&scene).unwrap();
     let mut tip_m = 0.0;
@@ -257,6 +259,7 @@ fn a_coarser_pelvis_beside_one_of_all_cells() {
         &|_| Some(LayerKind::Gland),
         line,
         false,
+        &[],
         &mut |_| true,
     )
     .unwrap();
@@ -308,6 +311,7 @@ fn a_line_that_is_prepared_twice_is_the_same_in_every_bit() {
         &|_| Some(LayerKind::Gland),
         other,
         false,
+        &[],
         &mut |_| true,
     )
     .unwrap();

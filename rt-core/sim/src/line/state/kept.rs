@@ -46,6 +46,11 @@ impl LineState {
             whole_n,
             memory,
             beam,
+            beside_whole_m,
+            is_beside,
+            grip_m,
+            open_m,
+            open_layers,
             loads_n,
             last,
         } = from;
@@ -64,6 +69,8 @@ impl LineState {
         self.whole_n = *whole_n;
         self.memory.copy_from(memory);
         self.beam = *beam;
+        (self.beside_whole_m, self.is_beside, self.grip_m) = (*beside_whole_m, *is_beside, *grip_m);
+        (self.open_m, self.open_layers) = (*open_m, *open_layers);
         self.loads_n.clone_from(loads_n);
         self.last = *last;
     }

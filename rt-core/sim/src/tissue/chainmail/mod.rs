@@ -115,6 +115,7 @@ impl TissueModel for ChainMailTissue {
             (Some(field), Carry::Columns(columns, loads_n)) if loads_n.iter().any(|n| *n != 0.0) => {
                 field.set(columns, loads_n);
             }
+            (Some(field), Carry::Fields(columns, loads_n, fields)) => field.set_with(columns, loads_n, fields),
             (Some(field), _) if !field.is_at_rest() => field.clear(),
             _ => {}
         }

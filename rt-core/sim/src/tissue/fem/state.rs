@@ -4,7 +4,7 @@ use super::grip::Grip;
 use super::model::FemModel;
 use super::real::Real;
 use super::sweep::touched;
-use crate::tissue::{PackedField, add_up};
+use crate::tissue::{ElementField, PackedField, add_fields, add_up};
 
 /// Displacements of all elements, and what the solver keeps from tick to tick.
 #[derive(Clone, Debug)]
@@ -89,6 +89,18 @@ impl<T: Real> FemState<T> {
                 u.iter_mut().for_each(|u| *u += by);
             }
         }
+        self.measure()
+    }
+
+    /// Displaces every element by these fields as well, m; how many are displaced.
+    pub fn add(&mut self, model: &FemModel<T>, fields: &[&ElementField]) -> u32 {
+        let per_element = (1.0 / model.lattice.spacing_m) as f32;
+        add_fields(fields, per_element, &mut self.displacement);
+        self.measure()
+    }
+
+    /// The largest displacement; returns how many are displaced.
+    fn measure(&mut self) -> u32 {
         let [x, y, z] = &self.displacement;
         let (mut largest, mut moved) = (0.0_f32, 0);
         for ((x, y), z) in x.iter().zip(y).zip(z) {

@@ -7,7 +7,7 @@ use super::solve::{SolveSettings, TipPatch};
 use super::state::FemState;
 use crate::limits::Limits;
 use crate::scene::Scene;
-use crate::tissue::{Carried, Deformed, Held, HeldOutcome, PackedField, Solve, StepReport, TissueModel};
+use crate::tissue::{Carried, Deformed, ElementField, Held, HeldOutcome, PackedField, Solve, StepReport, TissueModel};
 
 /// What surrounds a body: 20 mm of fat of 5 kPa, per surface area (assumed).
 pub const SURROUNDINGS_PA_PER_M: f64 = 5e3 / 20e-3;
@@ -66,6 +66,23 @@ fn patch(held: Held) -> TipPatch {
     }
 }
 
+impl<T: Compiled> FemTissue<T> {
+    /// The report of a step that added answers up.
+    fn displaced(&self, moved: u32) -> StepReport {
+        StepReport {
+            passes: 0,
+            // What the columns were solved to is theirs; the sum adds nothing.
+            residual: 0.0,
+            moved,
+            converged: self.state.max_displacement.is_finite(),
+            max_displacement: self.state.max_displacement,
+            held: HeldOutcome::None,
+            solve: Solve::Nothing,
+            tip_force_n: None,
+        }
+    }
+}
+
 impl<T: Compiled> TissueModel for FemTissue<T> {
     /// Quasi-static: `dt_s` plays no part, and tissue that nothing holds is at rest at once.
     fn step(&mut self, held: Option<Held>, _dt_s: f64) -> StepReport {
@@ -93,17 +110,12 @@ impl<T: Compiled> TissueModel for FemTissue<T> {
 
     fn displace(&mut self, columns: &[PackedField], loads_n: &[f64], whole_m: [f64; 3]) -> Option<StepReport> {
         let moved = self.state.displace(&self.model, columns, loads_n, whole_m);
-        Some(StepReport {
-            passes: 0,
-            // What the columns were solved to is theirs; the sum adds nothing.
-            residual: 0.0,
-            moved,
-            converged: self.state.max_displacement.is_finite(),
-            max_displacement: self.state.max_displacement,
-            held: HeldOutcome::None,
-            solve: Solve::Nothing,
-            tip_force_n: None,
-        })
+        Some(self.displaced(moved))
+    }
+
+    fn add(&mut self, fields: &[&ElementField]) -> Option<StepReport> {
+        let moved = self.state.add(&self.model, fields);
+        Some(self.displaced(moved))
     }
 
     fn may_be_felt(&self, report: &StepReport) -> bool {

@@ -1,0 +1,113 @@
+//! Holes for needles that go in first and stay, to hold the gland while the others come and go.
+
+use super::template::{Hole, PITCH_M, Template};
+use super::{Anatomy, Needle};
+use nalgebra::Vector3;
+use stylet_host::link::Link;
+use stylet_procedure::NeedleWay;
+use stylet_shm_schema::StabilisingNeedle;
+
+/// A stabilising needle keeps that far from the way of every needle of the plan, m.
+const FROM_NEEDLES_M: f64 = 0.8 * PITCH_M;
+/// It keeps that far from what is spared.
+const FROM_SPARED_M: f64 = 2e-3;
+/// Its tip stays before the far side of the target by that share of its way through it.
+const SHORT: f64 = 0.2;
+/// It goes through at least so much of the target, m.
+const LEAST_M: f64 = 10e-3;
+
+/// A stabilising needle: where it goes in, and where its tip stays.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stabilising {
+    /// Hole of the template.
+    pub hole: Hole,
+    /// The needle as the core takes it.
+    pub needle: StabilisingNeedle,
+}
+
+impl Stabilising {
+    /// Where its tip goes.
+    pub fn way(&self) -> NeedleWay {
+        let (entry_m, direction) = (Vector3::from(self.needle.entry_m), Vector3::from(self.needle.direction));
+        NeedleWay {
+            entry_m,
+            direction,
+            drops_m: vec![entry_m + direction * self.needle.depth_m],
+            retract_to_m: 0.0,
+            strand_pitch_m: None,
+        }
+    }
+}
+
+/// At most `count` needles as far from each other as the template has holes for, the first as far from the middle of the target as
+/// may be; fewer where no more holes keep clear of the plan and of what is spared.
+pub fn stabilising(template: &Template, anatomy: &Anatomy, needles: &[Needle], count: usize) -> Vec<Stabilising> {
+    let direction = template.inwards;
+    let across_m = |a: [f64; 3], b: [f64; 3]| {
+        let off = Vector3::from(a) - Vector3::from(b);
+        let axis = Vector3::from(direction);
+        (off - axis * off.dot(&axis)).norm()
+    };
+    let mut free: Vec<Stabilising> = Hole::all()
+        .filter_map(|hole| at_hole(template, anatomy, hole))
+        .filter(|found| {
+            let beside = |needle: &Needle| across_m(needle.entry_m, found.needle.entry_m);
+            needles.iter().all(|needle| beside(needle) >= FROM_NEEDLES_M)
+        })
+        .collect();
+    let mut chosen: Vec<Stabilising> = Vec::new();
+    while chosen.len() < count {
+        let clear_m = |found: &Stabilising| {
+            let to = chosen.iter().map(|c| across_m(c.needle.entry_m, found.needle.entry_m));
+            match chosen.is_empty() {
+                true => across_m(found.needle.entry_m, template.middle_m),
+                false => to.fold(f64::INFINITY, f64::min),
+            }
+        };
+        let best = (0..free.len()).max_by(|&a, &b| clear_m(&free[a]).total_cmp(&clear_m(&free[b])));
+        let Some(best) = best.filter(|&best| chosen.is_empty() || clear_m(&free[best]) > 0.5 * PITCH_M) else {
+            break;
+        };
+        chosen.push(free.remove(best));
+    }
+    chosen
+}
+
+fn at_hole(template: &Template, anatomy: &Anatomy, hole: Hole) -> Option<Stabilising> {
+    let (entry_m, direction) = (template.hole_m(hole), template.inwards);
+    let (low, high) = anatomy.target.bounds_m();
+    let reach_m =
+        (Vector3::from(high) - Vector3::from(low)).norm() + (Vector3::from(low) - Vector3::from(entry_m)).norm();
+    let pieces = anatomy.target.pieces_m(entry_m, direction, reach_m);
+    let (first, last) = (pieces.first()?[0], pieces.last()?[1]);
+    if last - first < LEAST_M {
+        return None;
+    }
+    let depth_m = last - SHORT * (last - first);
+    let is_in_bone = |along_m: f64| {
+        let place_m = [0, 1, 2].map(|a| entry_m[a] + direction[a] * along_m);
+        anatomy
+            .bone
+            .iter()
+            .any(|body| body.is_near(place_m, direction, FROM_SPARED_M))
+    };
+    let is_spared = anatomy
+        .spared_in_the_way(entry_m, direction, depth_m, FROM_SPARED_M)
+        .is_some();
+    let steps = (depth_m / 1e-3) as usize;
+    let is_clear = !is_spared && !(0..=steps).any(|n| is_in_bone(n as f64 * 1e-3));
+    is_clear.then_some(Stabilising {
+        hole,
+        needle: StabilisingNeedle {
+            entry_m,
+            direction,
+            depth_m,
+        },
+    })
+}
+
+/// Number of the needle that was left first, of those that stay in.
+pub fn first_left(link: &Link) -> Option<u32> {
+    let left = link.snapshot()?.header.left().first()?.number;
+    u32::try_from(left).ok()
+}

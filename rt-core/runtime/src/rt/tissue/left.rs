@@ -1,0 +1,170 @@
+//! The body under needles that stay in: which of their columns this loop has, and what they add to each tick.
+
+use super::TissueLoop;
+use crate::rt::left_loads::NeedleLoads;
+use stylet_sim::line::{BodyAnswer, BodyLine, MAX_LEFT};
+use stylet_sim::tissue::{BodyShift, Carry, ElementField, StepReport};
+
+/// One that stays in: its columns, and the loads that its share of the body's displacement was made from.
+pub(super) struct LeftBody {
+    pub line: Box<BodyLine>,
+    pub used: NeedleLoads,
+}
+
+impl LeftBody {
+    /// Loads the body anew.
+    pub fn stay(&mut self, loads: &NeedleLoads) {
+        self.used = *loads;
+        self.line.stay(&loads.of_columns());
+    }
+}
+
+impl TissueLoop {
+    /// Which needles stay in is the force loop's to say, by the loads of this tick: one that was left takes its columns along, one that is
+    /// taken up again gets them back.
+    pub(super) fn follow_left(&mut self) {
+        let loads = self.ports.loads.read();
+        self.loads = loads.line;
+        if self.left.is_empty() && loads.left.needles().is_empty() {
+            return;
+        }
+        let loads = *loads;
+        while let Some(at) = self.left.iter().position(|left| {
+            let named = loads.left.needles().iter();
+            !named
+                .map(|n| n.generation)
+                .any(|generation| generation == left.line.generation)
+        }) {
+            self.take_from_left(at);
+        }
+        for needle in loads.left.needles() {
+            self.take_to_left(needle);
+        }
+        // A body moves little in one tick by a needle that stays in: one of them is added up in each.
+        let count = self.left.len().max(1) as u64;
+        let due = (self.response.tick % count) as usize;
+        for (n, left) in self.left.iter_mut().enumerate() {
+            let is_due = n == due || matches!(left.line.answer, BodyAnswer::Shifts(_));
+            let loads = loads
+                .left
+                .needles()
+                .iter()
+                .find(|n| n.generation == left.line.generation);
+            if let Some(loads) = loads {
+                left.used.tip_m = loads.tip_m;
+                if is_due {
+                    left.stay(loads);
+                }
+            }
+        }
+        self.name_left();
+        self.left_loads.copy_from(&loads.left);
+    }
+
+    fn take_from_left(&mut self, at: usize) {
+        let LeftBody { line, .. } = self.left.remove(at);
+        if line.generation == self.loads.generation {
+            self.drop_line();
+            self.response.line = line.generation;
+            self.line = Some(line);
+        } else {
+            self.free(line);
+        }
+        if self.left.is_empty() {
+            self.world.tissue.carry(Carry::Not);
+        }
+    }
+
+    fn take_to_left(&mut self, needle: &NeedleLoads) {
+        let has_it = self
+            .line
+            .as_ref()
+            .is_some_and(|line| line.generation == needle.generation);
+        if !has_it || self.left.len() >= MAX_LEFT {
+            return;
+        }
+        if let Some(line) = self.line.take() {
+            self.response.line = 0;
+            self.leave_line();
+            let mut left = LeftBody {
+                line,
+                used: NeedleLoads::default(),
+            };
+            left.stay(needle);
+            self.left.push(left);
+        }
+    }
+
+    fn name_left(&mut self) {
+        self.response.left = [0; MAX_LEFT];
+        for (slot, left) in self.response.left.iter_mut().zip(&self.left) {
+            *slot = left.line.generation;
+        }
+    }
+
+    /// New tissue: their columns are of no use any more.
+    pub(super) fn drop_left(&mut self) {
+        while let Some(LeftBody { line, .. }) = self.left.pop() {
+            self.free(line);
+        }
+        self.name_left();
+        self.left_loads.clear();
+    }
+
+    /// What they do to a body whose columns are added up.
+    pub(super) fn with_left<R>(&mut self, then: impl FnOnce(&mut Self, &[&ElementField]) -> R) -> R {
+        // Taken out meanwhile, so that the body can be moved.
+        let left = std::mem::take(&mut self.left);
+        let none = ElementField::default();
+        let mut fields = [&none; MAX_LEFT];
+        for (slot, left) in fields.iter_mut().zip(&left) {
+            *slot = &left.line.share.field;
+        }
+        let result = then(self, fields.get(..left.len()).unwrap_or(&[]));
+        self.left = left;
+        result
+    }
+
+    /// The motion of the body as a whole by them.
+    pub(super) fn left_shift(&self) -> BodyShift {
+        let mut sum = BodyShift::default();
+        for left in &self.left {
+            let shift = &left.line.share.shift;
+            for axis in 0..3 {
+                sum.shift_m[axis] += shift.shift_m[axis];
+                sum.turn_rad[axis] += shift.turn_rad[axis];
+            }
+        }
+        sum
+    }
+
+    /// The step of a tick in which no needle moves on a line.
+    pub(super) fn step_off_line(&mut self) -> StepReport {
+        let Some(first) = self.left.first() else {
+            return self.world.tissue.step(self.held, self.period_s);
+        };
+        match &first.line.answer {
+            BodyAnswer::Columns(_) => self.with_left(|this, fields| {
+                let tissue = &mut this.world.tissue;
+                tissue.displace(&[], &[], [0.0; 3]);
+                let report = tissue.add(fields);
+                report.unwrap_or_else(|| tissue.step(None, this.period_s))
+            }),
+            BodyAnswer::Shifts(_) => {
+                let shift = self.left_shift();
+                self.world.tissue.carry(Carry::Shift(shift));
+                self.world.tissue.step(self.held, self.period_s)
+            }
+            BodyAnswer::Carrying(_) => self.with_left(|this, fields| {
+                this.world.tissue.carry(Carry::Fields(&[], &[], fields));
+                this.world.tissue.step(this.held, this.period_s)
+            }),
+        }
+    }
+
+    /// Whether a needle without a line meets nothing: the body has no answer for one beside needles that stay in.
+    pub(super) fn has_no_answer_off_line(&self) -> bool {
+        let first = self.left.first();
+        first.is_some_and(|left| matches!(left.line.answer, BodyAnswer::Columns(_)))
+    }
+}

@@ -1,0 +1,113 @@
+//! How two lines in one body move each other: `W12 = B1 K^-1 B2'`.
+//!
+//! The columns of the line that is solved for later are read at the stations of those that were there before. By reciprocity that is
+//! how the later line's stations move with the loads of the earlier ones, too, so each pair is solved for once.
+
+use super::columns::Column;
+use super::stations::Stations;
+use crate::tissue::fem::batch::NodeWeight;
+use serde::{Deserialize, Serialize};
+
+/// Where a line loads its body: shaft of each station along the line, then tip at each. Kept while other lines may come beside it.
+#[derive(Clone, Debug)]
+pub struct LineStations {
+    /// That of its [`HandLine`](super::HandLine).
+    pub generation: u64,
+    /// Unit vector inwards.
+    pub direction: [f64; 3],
+    pub(super) loads: Vec<Vec<NodeWeight>>,
+}
+
+impl LineStations {
+    /// Of a line that loads nothing, for tests and examples.
+    pub fn none(generation: u64) -> Self {
+        Self {
+            generation,
+            direction: [0.0, 0.0, 1.0],
+            loads: Vec::new(),
+        }
+    }
+
+    pub(super) fn of(generation: u64, stations: &Stations) -> Self {
+        let all = stations.shaft.iter().chain(&stations.tip);
+        Self {
+            generation,
+            direction: stations.line.axes[0],
+            loads: all.map(|weights| stations.load(weights, 0)).collect(),
+        }
+    }
+}
+
+/// How the rows of one line move with a newton at each row of another, m/N; shaft of each station, then tip at each.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cross {
+    /// Number of the other line.
+    pub with: u64,
+    /// Of the body as a whole on its foundation, along both lines.
+    pub whole_m_per_n: f64,
+    own_rows: usize,
+    other_rows: usize,
+    values: Vec<f64>,
+}
+
+impl Cross {
+    /// From a function of own row and other row.
+    pub fn from_rows(
+        with: u64,
+        whole_m_per_n: f64,
+        [own_rows, other_rows]: [usize; 2],
+        entry: impl Fn(usize, usize) -> f64,
+    ) -> Self {
+        let at = |n: usize| entry(n / other_rows, n % other_rows);
+        Self {
+            with,
+            whole_m_per_n,
+            own_rows,
+            other_rows,
+            values: (0..own_rows * other_rows).map(at).collect(),
+        }
+    }
+
+    /// One for each of `others`, from columns that were read there; `whole_m_per_n` is that of the body.
+    pub(super) fn of_columns(
+        columns: &[Column],
+        direction: [f64; 3],
+        whole_m_per_n: f64,
+        others: &[std::sync::Arc<LineStations>],
+    ) -> Vec<Self> {
+        let mut first = 0;
+        let mut all = Vec::with_capacity(others.len());
+        for other in others {
+            let rows = other.loads.len();
+            let cosine: f64 = (0..3).map(|a| direction[a] * other.direction[a]).sum();
+            let entry =
+                |own: usize, of_other: usize| columns[own].beside_m.get(first + of_other).copied().unwrap_or(0.0);
+            all.push(Self::from_rows(
+                other.generation,
+                cosine * whole_m_per_n,
+                [columns.len(), rows],
+                entry,
+            ));
+            first += rows;
+        }
+        all
+    }
+
+    /// How own row `own` moves with a newton at row `other` of the other line, and the other way round.
+    #[inline]
+    pub fn at(&self, own: usize, other: usize) -> f64 {
+        self.values.get(own * self.other_rows + other).copied().unwrap_or(0.0)
+    }
+
+    /// Rows of both lines.
+    pub fn rows(&self) -> [usize; 2] {
+        [self.own_rows, self.other_rows]
+    }
+
+    /// Whether it is one of lines of so many rows: one that was read from a file may not be.
+    pub(super) fn is_whole(&self, own_rows: usize) -> bool {
+        self.own_rows == own_rows
+            && self.own_rows.checked_mul(self.other_rows) == Some(self.values.len())
+            && self.values.iter().all(|value| value.is_finite())
+    }
+}

@@ -1,0 +1,102 @@
+//! The compliance of all needles that stay in, and how it is joined with that of the one that moves.
+
+use super::{LeftNeedle, LeftNeedles};
+use crate::line::cross::Cross;
+use crate::line::model::MAX_STATIONS;
+use crate::line::ready::HandLine;
+
+/// What joins two lines, from either side.
+#[derive(Clone, Copy)]
+pub(super) struct Between<'a> {
+    cross: &'a Cross,
+    is_turned: bool,
+}
+
+/// `None` where neither knows the other.
+pub(super) fn between<'a>(a: &'a HandLine, b: &'a HandLine) -> Option<Between<'a>> {
+    let rows = [a, b].map(|line| 2 * line.model.compliance.stations);
+    let found = |of: &'a HandLine, with: &HandLine, is_turned: bool| {
+        let cross = of.beside.iter().find(|cross| cross.with == with.generation)?;
+        let wanted = if is_turned { [rows[1], rows[0]] } else { rows };
+        (cross.rows() == wanted).then_some(Between { cross, is_turned })
+    };
+    found(a, b, false).or_else(|| found(b, a, true))
+}
+
+impl Between<'_> {
+    fn at(&self, a: usize, b: usize) -> f64 {
+        if self.is_turned {
+            self.cross.at(b, a)
+        } else {
+            self.cross.at(a, b)
+        }
+    }
+}
+
+impl LeftNeedle {
+    /// Rows of its line that an element loads, each with its share.
+    fn rows(&self, element: usize) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
+        let state = &self.line.state;
+        let m = self.line.model.compliance.stations;
+        let is_tip = element == self.stations;
+        let tip = state.tip_range.clone().zip(&state.tip_weights);
+        let tip = tip.filter(move |_| is_tip).map(move |(n, weight)| (m + n, *weight));
+        (!is_tip).then_some((element, 1.0)).into_iter().chain(tip)
+    }
+}
+
+impl LeftNeedles {
+    /// Every matrix anew: after a needle was left or taken, or another moves beside them.
+    pub(super) fn assemble(&mut self, moving: Option<&HandLine>) {
+        let last = self.needles.last();
+        self.count = last.map_or(0, |needle| needle.first + needle.stations + 1);
+        self.stride = self.count.next_multiple_of(8);
+        self.own[..self.count * self.stride].fill(0.0);
+        for (n, a) in self.needles.iter().enumerate() {
+            for b in &self.needles[n..] {
+                let joined = between(&a.line, &b.line);
+                let is_same = std::ptr::eq(a, b);
+                let rows = &a.line.model.compliance;
+                for i in 0..=a.stations {
+                    for j in 0..=b.stations {
+                        let pairs = a.rows(i).flat_map(|(p, w)| b.rows(j).map(move |(q, v)| (p, q, w * v)));
+                        let entry: f64 = pairs
+                            .map(|(p, q, w)| {
+                                w * if is_same {
+                                    rows.at(p, q)
+                                } else {
+                                    joined.map_or(0.0, |joined| joined.at(p, q))
+                                }
+                            })
+                            .sum();
+                        self.own[(a.first + i) * self.stride + b.first + j] = entry;
+                        self.own[(b.first + j) * self.stride + a.first + i] = entry;
+                    }
+                }
+            }
+        }
+        self.join(moving);
+        self.limit();
+    }
+
+    fn join(&mut self, moving: Option<&HandLine>) {
+        self.moving = moving.map_or(0, |line| line.generation);
+        self.moving_rows = moving.map_or(0, |line| 2 * line.model.compliance.stations);
+        self.added_m.fill(0.0);
+        let Some(moving) = moving else { return };
+        for needle in &self.needles {
+            let Some(joined) = between(&needle.line, moving) else {
+                continue;
+            };
+            for i in 0..=needle.stations {
+                let k = needle.first + i;
+                self.whole[k] = joined.cross.whole_m_per_n;
+                for row in 0..self.moving_rows {
+                    let entry: f64 = needle.rows(i).map(|(p, w)| w * joined.at(p, row)).sum();
+                    self.to_moving[k * 2 * MAX_STATIONS + row] = entry;
+                    self.from_moving[row * self.stride + k] = entry;
+                }
+            }
+        }
+    }
+}

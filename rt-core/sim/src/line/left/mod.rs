@@ -1,0 +1,376 @@
+//! Needles that stay in: each is a line whose place along itself is held by the template, beside the needle that moves.
+//!
+//! A needle that is left keeps what its shaft and tip hold. Friction goes on as ever, implicit Coulomb with anchors in the tissue; its tip
+//! pushes up to the force at which it cuts, on the patch that it had when it was left. All needles together are one convex
+//! problem over the stations of all lines (`docs/physics.md`, *Several needles*), solved once a tick of the force loop in
+//! [`solve`]. A needle alone never comes here.
+
+mod assemble;
+mod record;
+mod solve;
+
+use super::contact::{LineInput, limit_n};
+use super::model::MAX_STATIONS;
+use super::ready::{HandLine, LayerForces};
+use super::state::LineOutput;
+use crate::simd::Simd;
+pub use record::LeftRecord;
+use stylet_shm_schema::MAX_LEFT_NEEDLES;
+
+/// Needles that stay in at most.
+pub const MAX_LEFT: usize = MAX_LEFT_NEEDLES;
+/// Loads of one of them at most: its shaft's, and the tip's at the stations around it.
+pub const MAX_LEFT_LOADS: usize = MAX_STATIONS + 28;
+/// Shaft of each station, and one tip.
+const MAX_ELEMENTS: usize = MAX_LEFT * (MAX_STATIONS + 1);
+
+/// One needle that stays in.
+#[derive(Clone, Debug)]
+pub struct LeftNeedle {
+    line: Box<HandLine>,
+    /// Its first element, and how many stations its shaft touches; the tip follows them.
+    first: usize,
+    stations: usize,
+    /// Where its tip is along the line in the world.
+    held_m: f64,
+    /// How far it has been drawn back since it was left, and how fast it is, m/s.
+    drawn_m: f64,
+    drawing_m_per_s: f64,
+}
+
+/// What the tissue has of one of them.
+#[derive(Clone, Copy, Debug)]
+pub struct LeftShare<'a> {
+    /// Number of its line.
+    pub generation: u64,
+    /// Stations of its line.
+    pub stations: usize,
+    /// Force of each shaft station that it touches.
+    pub shaft_n: &'a [f64],
+    /// First station of the tip's load, and its share at each.
+    pub tip: (usize, &'a [f64]),
+    /// Force of the tip.
+    pub tip_n: f64,
+}
+
+/// All needles that stay in. Made with room for the longest lines, and allocates nothing after that.
+#[derive(Clone, Debug)]
+pub struct LeftNeedles {
+    needles: Vec<LeftNeedle>,
+    simd: Simd,
+    /// Elements of all needles, and from one row of `own` to the next.
+    count: usize,
+    stride: usize,
+    own: Vec<f64>,
+    force_n: Vec<f64>,
+    /// Displacement along its own needle at which the element holds nothing, and that it has.
+    rest_m: Vec<f64>,
+    u_m: Vec<f64>,
+    low_n: Vec<f64>,
+    high_n: Vec<f64>,
+    /// The line of the needle that moves, and how its rows move with a newton at each element.
+    moving: u64,
+    moving_rows: usize,
+    to_moving: Vec<f64>,
+    /// The same the other way round: elements by a newton at each row of that line, and by one at its tip.
+    from_moving: Vec<f64>,
+    by_tip: Vec<f64>,
+    /// Of the body as a whole along each element and the moving line, m/N.
+    whole: Vec<f64>,
+    /// What was added to the displacements of the moving line, m.
+    added_m: Vec<f64>,
+    /// Nothing has moved in the last tick.
+    is_still: bool,
+}
+
+impl LeftNeedles {
+    /// None yet; every page is written to, so that no tick is the first to touch one.
+    pub fn with_room() -> Box<Self> {
+        let each = |length: usize| {
+            let mut values = vec![1.0; length];
+            values.fill(0.0);
+            values
+        };
+        let stride = MAX_ELEMENTS.next_multiple_of(8);
+        Box::new(LeftNeedles {
+            needles: Vec::with_capacity(MAX_LEFT),
+            simd: Simd::detect(),
+            count: 0,
+            stride: 0,
+            own: each(MAX_ELEMENTS * stride),
+            force_n: each(MAX_ELEMENTS),
+            rest_m: each(MAX_ELEMENTS),
+            u_m: each(MAX_ELEMENTS),
+            low_n: each(MAX_ELEMENTS),
+            high_n: each(MAX_ELEMENTS),
+            moving: 0,
+            moving_rows: 0,
+            to_moving: each(MAX_ELEMENTS * 2 * MAX_STATIONS),
+            from_moving: each(2 * MAX_STATIONS * stride),
+            by_tip: each(MAX_ELEMENTS),
+            whole: each(MAX_ELEMENTS),
+            added_m: each(2 * MAX_STATIONS),
+            is_still: true,
+        })
+    }
+
+    /// Bytes of the room.
+    pub fn bytes(&self) -> usize {
+        let all = [
+            &self.own,
+            &self.force_n,
+            &self.rest_m,
+            &self.u_m,
+            &self.low_n,
+            &self.high_n,
+            &self.to_moving,
+            &self.from_moving,
+            &self.by_tip,
+            &self.whole,
+            &self.added_m,
+        ];
+        all.iter().map(|values| 8 * values.len()).sum()
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.needles.len()
+    }
+
+    /// None is left in.
+    pub fn is_empty(&self) -> bool {
+        self.needles.is_empty()
+    }
+
+    /// In the order in which they were left.
+    pub fn needles(&self) -> &[LeftNeedle] {
+        &self.needles
+    }
+
+    /// Number of the line that moves beside them; 0 for none.
+    pub fn moving(&self) -> u64 {
+        self.moving
+    }
+
+    /// Whether `line` and every needle that stays in know how they move each other.
+    pub fn knows(&self, line: &HandLine) -> bool {
+        self.needles
+            .iter()
+            .all(|needle| assemble::between(&needle.line, line).is_some())
+    }
+
+    /// Leaves the needle of `line` where its tip is. It comes back where there is no room, and where it does not know the others.
+    ///
+    /// # Errors
+    ///
+    /// The line.
+    pub fn leave(&mut self, line: Box<HandLine>) -> Result<(), Box<HandLine>> {
+        if self.needles.len() >= MAX_LEFT || !self.knows(&line) {
+            return Err(line);
+        }
+        let (first, stations) = (self.count, line.state.in_contact);
+        self.force_n[first..first + stations].copy_from_slice(&line.state.shaft_n[..stations]);
+        self.force_n[first + stations] = line.state.tip.force_n;
+        self.needles.push(LeftNeedle {
+            first,
+            stations,
+            // Where the world has it, by the last tick.
+            held_m: line.state.tip.material_m + line.state.tip_u_m,
+            drawn_m: 0.0,
+            drawing_m_per_s: 0.0,
+            line,
+        });
+        self.assemble(None);
+        self.displace(None);
+        self.rest_where_it_is(self.needles.len() - 1);
+        Ok(())
+    }
+
+    /// Takes the needle of that line up again, as it is; no needle moves beside the others until [`beside`](Self::beside) says so.
+    pub fn take(&mut self, generation: u64) -> Option<Box<HandLine>> {
+        let at = self.needles.iter().position(|n| n.line.generation == generation)?;
+        let needle = self.remove(at);
+        Some(needle.line)
+    }
+
+    /// Begins to draw that needle out; at 0 m/s it is held again. False where there is none of that number.
+    pub fn draw_out(&mut self, generation: u64, speed_m_per_s: f64) -> bool {
+        self.is_still = false;
+        let needle = self.needles.iter_mut().find(|n| n.line.generation == generation);
+        needle.map(|n| n.drawing_m_per_s = speed_m_per_s.max(0.0)).is_some()
+    }
+
+    /// One that has been drawn out of the tissue, if any.
+    pub fn drawn_out(&mut self) -> Option<Box<HandLine>> {
+        let is_out = |needle: &LeftNeedle| needle.drawn_m > 0.0 && needle.depth_m() <= 0.0;
+        let at = self.needles.iter().position(is_out)?;
+        let mut line = self.remove(at).line;
+        line.state.clear_loads();
+        Some(line)
+    }
+
+    /// Gives up all of them, one at each call.
+    pub fn give_up(&mut self) -> Option<Box<HandLine>> {
+        let mut line = self.needles.pop()?.line;
+        line.state.clear_loads();
+        self.assemble(None);
+        Some(line)
+    }
+
+    /// From now on the needle of `line` moves beside them, or none does. False where it does not know one of them.
+    pub fn beside(&mut self, line: Option<&HandLine>) -> bool {
+        let is_known = line.is_none_or(|line| self.knows(line));
+        self.assemble(line.filter(|_| is_known));
+        is_known
+    }
+
+    /// Takes up the layers' forces.
+    pub fn set_forces(&mut self, forces: &LayerForces) {
+        for needle in &mut self.needles {
+            needle.line.set_forces(forces);
+        }
+        self.limit();
+    }
+
+    /// One tick in which no needle moves beside them.
+    pub fn step_alone(&mut self, dt_s: f64) {
+        self.draw(dt_s);
+        if !self.is_still {
+            self.displace(None);
+            self.solve_alone();
+        }
+    }
+
+    /// One tick of the needle on `line` beside them, whose tip goes no farther than the bone.
+    pub fn step_beside(&mut self, line: &mut HandLine, tip_m: f64, dt_s: f64) -> LineOutput {
+        let tip_m = tip_m - line.in_bone_m(tip_m);
+        self.draw(dt_s);
+        solve::step_beside(self, line, &LineInput { tip_m, dt_s })
+    }
+
+    /// What the tissue has of each.
+    pub fn shares(&self) -> impl Iterator<Item = LeftShare<'_>> {
+        self.needles.iter().map(|needle| {
+            let (first, tip) = (needle.first, needle.first + needle.stations);
+            let state = &needle.line.state;
+            LeftShare {
+                generation: needle.line.generation,
+                stations: needle.line.model.compliance.stations,
+                shaft_n: &self.force_n[first..tip],
+                tip: (state.tip_range.start, &state.tip_weights[..state.tip_range.len()]),
+                tip_n: self.force_n[tip],
+            }
+        })
+    }
+
+    /// Half of force times displacement, J. Does not allocate.
+    pub fn elastic_j(&self) -> f64 {
+        let each = self.force_n.iter().zip(&self.u_m).take(self.count);
+        0.5 * each.map(|(f, u)| f * u).sum::<f64>()
+    }
+
+    /// Forces of all elements, needle by needle: its shaft's, then its tip's.
+    pub fn forces_n(&self) -> &[f64] {
+        &self.force_n[..self.count]
+    }
+
+    fn draw(&mut self, dt_s: f64) {
+        let mut is_drawn = false;
+        for needle in self.needles.iter_mut().filter(|needle| needle.drawing_m_per_s > 0.0) {
+            let by_m = needle.drawing_m_per_s * dt_s;
+            needle.drawn_m += by_m;
+            needle.held_m -= by_m;
+            for rest_m in &mut self.rest_m[needle.first..=needle.first + needle.stations] {
+                *rest_m -= by_m;
+            }
+            is_drawn = true;
+        }
+        if is_drawn {
+            self.is_still = false;
+            self.limit();
+        }
+    }
+
+    /// Friction of each station by how much of it the shaft is in; the tip pushes up to its cutting force.
+    fn limit(&mut self) {
+        for needle in &self.needles {
+            let model = &needle.line.model;
+            let (first, tip) = (needle.first, needle.first + needle.stations);
+            for (n, (low, high)) in (self.low_n[first..tip].iter_mut().zip(&mut self.high_n[first..tip])).enumerate() {
+                *high = limit_n(model, needle.depth_m(), n);
+                *low = -*high;
+            }
+            let is_in = needle.depth_m() > 0.0;
+            let front = model.front(&needle.line.state.tip);
+            (self.low_n[tip], self.high_n[tip]) = (0.0, if is_in { front.limit_n } else { 0.0 });
+        }
+        self.is_still = false;
+    }
+
+    /// Each element of that needle holds what it holds where it is now.
+    fn rest_where_it_is(&mut self, at: usize) {
+        let needle = &self.needles[at];
+        let elements = needle.first..=needle.first + needle.stations;
+        self.rest_m[elements.clone()].copy_from_slice(&self.u_m[elements]);
+        self.is_still = false;
+    }
+
+    /// The line gets its state back.
+    fn remove(&mut self, at: usize) -> LeftNeedle {
+        let mut needle = self.needles.remove(at);
+        let (first, tip) = (needle.first, needle.first + needle.stations);
+        let state = &mut needle.line.state;
+        for (n, k) in (first..tip).enumerate() {
+            state.shaft_n[n] = self.force_n[k];
+            state.u_m[n] = self.u_m[k];
+            state.anchor_m[n] = needle.held_m - self.rest_m[k];
+        }
+        let reached_m = needle.held_m - self.rest_m[tip];
+        state.tip_u_m = self.u_m[tip];
+        state.tip.force_n = self.force_n[tip];
+        state.tip.track_m = state.tip.track_m.max(reached_m);
+        state.tip.material_m = reached_m.min(needle.held_m - self.u_m[tip]);
+        state.in_contact = needle.stations;
+        // Those behind it move up.
+        let gap = needle.stations + 1;
+        let end = self.count;
+        for values in [&mut self.force_n, &mut self.rest_m, &mut self.u_m] {
+            values.copy_within(first + gap..end, first);
+        }
+        for later in &mut self.needles[at..] {
+            later.first -= gap;
+        }
+        self.assemble(None);
+        needle
+    }
+}
+
+impl LeftNeedle {
+    /// Number of its line.
+    pub fn generation(&self) -> u64 {
+        self.line.generation
+    }
+
+    /// Its line.
+    pub fn line(&self) -> &HandLine {
+        &self.line
+    }
+
+    /// Where its tip is along the line in the world, m.
+    pub fn held_m(&self) -> f64 {
+        self.held_m
+    }
+
+    /// It is being drawn out.
+    pub fn is_drawn(&self) -> bool {
+        self.drawing_m_per_s > 0.0
+    }
+
+    /// Depth of its tip in the material, m.
+    pub fn depth_m(&self) -> f64 {
+        self.line.state.tip.material_m - self.drawn_m
+    }
+}
+
+#[cfg(test)]
+mod tests;

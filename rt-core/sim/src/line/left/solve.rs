@@ -1,0 +1,380 @@
+//! One tick of all needles at once: projected Gauss-Seidel over the stations of the needle that moves, its tip, and the elements of those
+//! that stay in.
+
+use super::{LeftNeedle, LeftNeedles};
+use crate::line::contact::{CLOSED_M, FURTHEST_M, LineInput, MAX_PASSES, finish, limit_n, press, slip, step, touch_beside};
+use crate::line::model::{LineModel, MAX_STATIONS};
+use crate::line::ready::HandLine;
+use crate::line::rows::{add_scaled, dot};
+use crate::line::state::{LineOutput, LineState};
+use crate::line::tip::{Place, follow};
+use crate::simd::{Simd, vectorised};
+
+/// A needle that far before its entry at rest meets nothing, wherever the others have moved its surface.
+const BEFORE_M: f64 = 20e-3;
+/// Corrections of an element that stays in by less than that share of the tolerance are left out: most of them are.
+const SKIPPED: f64 = 0.02;
+
+/// One tick of the needle on `line`, and of those that stay in.
+pub(super) fn step_beside(left: &mut LeftNeedles, line: &mut HandLine, input: &LineInput) -> LineOutput {
+    let (model, state) = (&line.model, &mut line.state);
+    let is_idle = left.is_still && state.in_contact == 0 && state.tip.force_n == 0.0 && input.tip_m < -BEFORE_M;
+    if left.needles.is_empty() || left.moving != line.generation || is_idle {
+        left.step_rest();
+        return step(model, state, input);
+    }
+    if !(input.tip_m.is_finite() && input.dt_s.is_finite() && input.dt_s > 0.0 && state.fits(model)) {
+        return LineOutput {
+            is_refused: true,
+            ..state.last
+        };
+    }
+    let tip_m = input.tip_m.clamp(-FURTHEST_M, FURTHEST_M);
+    if state.tip.material_m == f64::NEG_INFINITY {
+        state.tip.material_m = tip_m.min(0.0);
+    }
+    left.enter(model, state, input.dt_s);
+    let mut output = LineOutput::default();
+    let mut before = None;
+    if !has_met(model, state, tip_m) {
+        left.step_rest();
+        touch_beside(model, state, tip_m);
+        press(model, state, None);
+        finish(model, state, &mut output);
+        return output;
+    }
+    for _ in 0..MAX_PASSES {
+        let front = model.front(&state.tip);
+        touch_beside(model, state, tip_m);
+        meet(model, state, front.membrane);
+        let kept = press(model, state, front.membrane);
+        if let Some(kept) = kept.filter(|_| state.memory.is_on()) {
+            // What the others add to the past's offset is no past.
+            let m = model.compliance.stations;
+            let weights = state.tip_range.clone().zip(state.tip_weights);
+            let added: f64 = weights.map(|(n, w)| w * left.added_m[m + n]).sum();
+            state.tip_offset_m += (1.0 - kept) * added;
+        }
+        left.reach(model, state, kept);
+        left.displace(Some(state));
+        let gap_m = solve_vectorised(
+            model.simd,
+            model,
+            state,
+            left,
+            tip_m,
+            front.limit_n,
+            input.dt_s,
+            &mut output,
+        );
+        left.add_to(state);
+        output.held_by = front.membrane;
+        let is_pushed = state.tip.force_n >= front.limit_n;
+        if let (Some(layer), true) = (front.membrane, state.tip.force_n > 0.0) {
+            let pushed_m = tip_m - gap_m - state.tip.material_m - state.tip.met_u_m;
+            if is_pushed || pushed_m >= model.layers[layer].puncture_depth_m {
+                state.tip.opened |= 1 << layer;
+                output.punctured = output.punctured.or(Some(layer));
+                before = None;
+                continue;
+            }
+        }
+        let goes_on = gap_m > CLOSED_M && is_pushed && front.membrane.is_none();
+        let goes_back = gap_m < -CLOSED_M && state.tip.force_n <= 0.0;
+        let place = Place {
+            material_m: state.tip.material_m,
+            gap_m,
+        };
+        if !(goes_on || goes_back) || !follow(model, state, tip_m, front.to_m, place, before) {
+            break;
+        }
+        // Beyond that it is another force that holds the tip.
+        before = (state.tip.material_m < front.to_m).then_some(place);
+    }
+    slip(model, state, tip_m);
+    left.slip();
+    finish(model, state, &mut output);
+    output
+}
+
+/// Whether the needle is in the tissue or has come to its surface, which the others have moved.
+fn has_met(model: &LineModel, state: &mut LineState, tip_m: f64) -> bool {
+    let is_out = state.in_contact == 0 && state.tip.force_n == 0.0 && state.tip.material_m <= 0.0;
+    if !is_out {
+        return true;
+    }
+    let surface_m = state
+        .memory
+        .offset_m
+        .get(model.compliance.stations)
+        .copied()
+        .unwrap_or(0.0);
+    state.tip.material_m = (tip_m - surface_m).min(0.0);
+    state.tip.material_m >= 0.0
+}
+
+/// A membrane is met where the tissue in front of it is by now: the others may have moved it before the tip was there.
+fn meet(model: &LineModel, state: &mut LineState, membrane: Option<usize>) {
+    let held_by = membrane.map_or(0, |n| n as u32 + 1);
+    if held_by == state.tip.held_by || held_by == 0 {
+        return;
+    }
+    let (m, count) = (model.compliance.stations, state.in_contact);
+    let weights = state.tip_range.clone().zip(state.tip_weights);
+    let by_others: f64 = weights.map(|(n, w)| w * state.memory.offset_m[m + n]).sum();
+    let own = dot(&state.tip_column[..count], &state.shaft_n[..count]) + state.tip_own * state.tip.force_n;
+    state.tip_u_m = state.memory.gain * own + by_others;
+}
+
+impl LeftNeedles {
+    /// Beside a needle that does not reach them.
+    fn step_rest(&mut self) {
+        if !self.is_still {
+            self.displace(None);
+            self.solve_alone();
+        }
+    }
+
+    /// What they move the line by is put into its offset, beside what the past leaves there.
+    fn enter(&mut self, model: &LineModel, state: &mut LineState, dt_s: f64) {
+        let (rows, terms) = (&model.compliance.rows, &model.settings.prony);
+        if !terms.iter().any(|term| term.strength > 0.0) {
+            state.memory.offset_m.fill(0.0);
+        }
+        state.memory.begin(rows, model.compliance.common_m_per_n(), terms, dt_s);
+        state.is_beside = true;
+        self.added_m.fill(0.0);
+        self.add_to(state);
+    }
+
+    fn add_to(&mut self, state: &mut LineState) {
+        let rows = self.moving_rows;
+        for (offset, added) in state.memory.offset_m.iter_mut().zip(&mut self.added_m[..rows]) {
+            *offset -= *added;
+            *added = 0.0;
+        }
+        for k in (0..self.count).filter(|&k| self.force_n[k] != 0.0) {
+            let first = k * 2 * MAX_STATIONS;
+            add_scaled(
+                self.force_n[k],
+                &self.to_moving[first..first + rows],
+                &mut self.added_m[..rows],
+            );
+        }
+        for (offset, added) in state.memory.offset_m.iter_mut().zip(&self.added_m[..rows]) {
+            *offset += *added;
+        }
+        state.beside_whole_m = dot(&self.whole[..self.count], &self.force_n[..self.count]);
+    }
+
+    /// How each element moves with the tip's force where it is now; a membrane that holds it takes its part of the dent.
+    fn reach(&mut self, model: &LineModel, state: &LineState, kept: Option<f64>) {
+        let (m, count) = (model.compliance.stations, self.count);
+        self.by_tip[..count].fill(0.0);
+        for (n, weight) in state.tip_range.clone().zip(state.tip_weights) {
+            let first = (m + n) * self.stride;
+            add_scaled(
+                weight,
+                &self.from_moving[first..first + count],
+                &mut self.by_tip[..count],
+            );
+        }
+        let is_loaded = !state.tip_range.is_empty();
+        if let Some(kept) = kept.filter(|_| is_loaded) {
+            for (by_tip, whole) in self.by_tip[..count].iter_mut().zip(&self.whole) {
+                *by_tip = whole + kept * (*by_tip - whole);
+            }
+        }
+    }
+
+    /// Displacement of each element by all forces as they are; of the moving needle's with `moving`.
+    pub(super) fn displace(&mut self, moving: Option<&LineState>) {
+        let (count, stride) = (self.count, self.stride);
+        for k in 0..count {
+            let row = &self.own[k * stride..k * stride + count];
+            self.u_m[k] = dot(row, &self.force_n[..count]);
+        }
+        let Some(state) = moving else { return };
+        for n in (0..state.in_contact).filter(|&n| state.shaft_n[n] != 0.0) {
+            let row = &self.from_moving[n * stride..n * stride + count];
+            add_scaled(state.shaft_n[n], row, &mut self.u_m[..count]);
+        }
+        add_scaled(state.tip.force_n, &self.by_tip[..count], &mut self.u_m[..count]);
+    }
+
+    /// Among themselves.
+    pub(super) fn solve_alone(&mut self) {
+        let sweeps_and_tolerance = self.needles.first().map(|n| {
+            let settings = &n.line.model.settings;
+            (settings.sweeps, settings.tolerance_m)
+        });
+        let Some((sweeps, tolerance_m)) = sweeps_and_tolerance else {
+            return;
+        };
+        let mut has_moved = false;
+        for sweep in 0..sweeps {
+            let simd = self.simd;
+            let largest_m = sweep_alone(simd, self, sweep % 2 == 0, SKIPPED * tolerance_m);
+            has_moved |= largest_m > 0.0;
+            if largest_m <= tolerance_m {
+                break;
+            }
+        }
+        self.slip();
+        self.is_still = !has_moved && !self.needles.iter().any(LeftNeedle::is_drawn);
+    }
+
+    /// What reached its limit holds from where it is now.
+    fn slip(&mut self) {
+        for k in 0..self.count {
+            if self.force_n[k] >= self.high_n[k] || (self.low_n[k] < 0.0 && self.force_n[k] <= self.low_n[k]) {
+                self.rest_m[k] = self.u_m[k];
+            }
+        }
+    }
+}
+
+/// Corrects one element; returns the change of its force, and how far it moves the element itself.
+#[inline(always)]
+fn correct(left: &mut LeftNeedles, k: usize, skipped_m: f64) -> (f64, f64) {
+    let own = left.own[k * left.stride + k];
+    let free_n = left.force_n[k] + (left.rest_m[k] - left.u_m[k]) / own;
+    let change = free_n.clamp(left.low_n[k], left.high_n[k]) - left.force_n[k];
+    let moved_m = (change * own).abs();
+    if moved_m <= skipped_m {
+        return (0.0, 0.0);
+    }
+    left.force_n[k] += change;
+    let (count, stride) = (left.count, left.stride);
+    add_scaled(
+        change,
+        &left.own[k * stride..k * stride + count],
+        &mut left.u_m[..count],
+    );
+    (change, moved_m)
+}
+
+vectorised! {
+    fn sweep_alone(left: &mut LeftNeedles, is_backwards: bool, skipped_m: f64) -> f64 {
+        let mut largest_m = 0.0_f64;
+        for n in 0..left.count {
+            let k = if is_backwards { left.count - 1 - n } else { n };
+            largest_m = largest_m.max(correct(left, k, skipped_m).1);
+        }
+        largest_m
+    }
+}
+
+vectorised! {
+    /// [`solve`] for the instructions that the processor has; the same bits with all of them.
+    fn solve_vectorised(
+        model: &LineModel,
+        state: &mut LineState,
+        left: &mut LeftNeedles,
+        tip_m: f64,
+        tip_limit_n: f64,
+        dt_s: f64,
+        output: &mut LineOutput,
+    ) -> f64 {
+        solve(model, state, left, tip_m, tip_limit_n, dt_s, output)
+    }
+}
+
+/// Forces of shaft, tip and all elements; returns how far the tip is beyond where the material has it.
+#[inline(always)]
+fn solve(
+    model: &LineModel,
+    state: &mut LineState,
+    left: &mut LeftNeedles,
+    tip_m: f64,
+    tip_limit_n: f64,
+    dt_s: f64,
+    output: &mut LineOutput,
+) -> f64 {
+    let rows = &model.compliance.rows;
+    let (m, count, gain) = (model.compliance.stations, state.in_contact, state.memory.gain);
+    let place_m = state.tip.material_m;
+    let LineState {
+        ref mut shaft_n,
+        ref anchor_m,
+        ref mut u_m,
+        ref tip_column,
+        ref memory,
+        ..
+    } = *state;
+    let (shaft_n, anchor_m, u_m) = (&mut shaft_n[..count], &anchor_m[..count], &mut u_m[..count]);
+    let tip_column = &tip_column[..count];
+    let elements = left.count;
+    // By the past alone: what the others add goes by `by_tip`, in which a membrane has its part.
+    let past = |n: usize| memory.offset_m[m + n] - left.added_m[m + n];
+    let weights = state.tip_range.clone().zip(state.tip_weights);
+    let offset: f64 = weights.map(|(n, w)| w * past(n)).sum();
+    let offset = offset + state.tip_offset_m + dot(&left.by_tip[..elements], &left.force_n[..elements]);
+    let mut tip_u_m = gain * (dot(tip_column, shaft_n) + state.tip_own * state.tip.force_n) + offset;
+    let mut tip_n = state.tip.force_n;
+    let tip_gain = gain * state.tip_own;
+    let slowness = model.settings.viscous_n_s_per_m2 / dt_s;
+    let skipped_m = SKIPPED * model.settings.tolerance_m;
+    let mut has_moved = count > 0;
+    for sweep in 0..model.settings.sweeps {
+        let is_backwards = sweep % 2 == 0;
+        let mut largest_m = 0.0_f64;
+        for step in 0..count {
+            let n = if is_backwards { count - 1 - step } else { step };
+            let row = &rows.row(n)[..count];
+            let own = gain * row[n];
+            let limit = limit_n(model, place_m, n);
+            let free_n = shaft_n[n] + (tip_m - anchor_m[n] - u_m[n]) / own;
+            let mut wanted = free_n.clamp(-limit, limit);
+            if slowness > 0.0 && wanted != free_n {
+                let drag =
+                    slowness * (place_m - n as f64 * model.compliance.spacing_m).clamp(0.0, model.compliance.spacing_m);
+                wanted += (free_n - wanted) * drag * own / (1.0 + drag * own);
+            }
+            let change = wanted - shaft_n[n];
+            if change != 0.0 {
+                shaft_n[n] = wanted;
+                add_scaled(gain * change, row, u_m);
+                tip_u_m += gain * change * tip_column[n];
+                let first = n * left.stride;
+                add_scaled(
+                    change,
+                    &left.from_moving[first..first + elements],
+                    &mut left.u_m[..elements],
+                );
+                largest_m = largest_m.max((change * own).abs());
+            }
+        }
+        if tip_gain > 0.0 {
+            let wanted = (tip_n + (tip_m - place_m - tip_u_m) / tip_gain).clamp(0.0, tip_limit_n);
+            let change = wanted - tip_n;
+            if change != 0.0 {
+                tip_n = wanted;
+                add_scaled(gain * change, tip_column, u_m);
+                tip_u_m += tip_gain * change;
+                add_scaled(change, &left.by_tip[..elements], &mut left.u_m[..elements]);
+                largest_m = largest_m.max((change * tip_gain).abs());
+            }
+        }
+        for step in 0..elements {
+            let k = if is_backwards { elements - 1 - step } else { step };
+            let (change, moved_m) = correct(left, k, skipped_m);
+            if change != 0.0 {
+                let first = k * 2 * MAX_STATIONS;
+                add_scaled(change, &left.to_moving[first..first + count], u_m);
+                tip_u_m += change * left.by_tip[k];
+                largest_m = largest_m.max(moved_m);
+                has_moved = true;
+            }
+        }
+        output.sweeps += 1;
+        output.residual_m = largest_m;
+        if largest_m <= model.settings.tolerance_m {
+            break;
+        }
+    }
+    state.tip.force_n = tip_n;
+    state.tip_u_m = tip_u_m;
+    left.is_still = !has_moved && tip_n == 0.0 && !left.needles.iter().any(LeftNeedle::is_drawn);
+    tip_m - place_m - tip_u_m
+}

@@ -1,0 +1,12 @@
+//! How many seeds migrate, and how fast: settings of the tissue loop's law (docs/physics.md, *Seeds that migrate*).
+
+use serde::{Deserialize, Serialize};
+
+/// Off with a share of 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Migration {
+    /// Share of the loose seeds that migrate.
+    pub share: f64,
+    /// How fast, along the track to its entry.
+    pub speed_m_per_s: f64,
+}

@@ -1,0 +1,79 @@
+//! Needles that go in first and stay while the others come and go.
+
+use super::Procedure;
+use crate::tolerance::TISSUE_REST_M;
+use crate::{NeedleWay, Operation, Pace};
+use std::collections::VecDeque;
+
+impl Procedure {
+    /// The same with needles that go in first, stay in without a seed while the others come and go, and are drawn out at the end.
+    #[must_use]
+    pub fn stabilised(self, stabilising: Vec<NeedleWay>) -> Self {
+        if stabilising.is_empty() {
+            return self;
+        }
+        let mut own = self.ahead;
+        let mut ahead = VecDeque::new();
+        let first = self.ways.len();
+        // What the first needle begins with, the stabilising ones begin with.
+        if own.front() == Some(&(0, Operation::Reset)) {
+            ahead.extend(own.pop_front());
+        }
+        own.retain(|(_, operation)| *operation != Operation::Engage);
+        ahead.extend(stay(first, stabilising.len()));
+        ahead.append(&mut own);
+        for number in 0..stabilising.len() {
+            ahead.push_back((first + number, Operation::DrawOut));
+        }
+        ahead.push_back((first + stabilising.len() - 1, Operation::Settle));
+        Self {
+            stabilising,
+            ahead,
+            ..self
+        }
+    }
+
+    /// The same beside needles that go in before it, and stay.
+    pub fn rehearsal_beside(way: NeedleWay, pace: Pace, stabilising: Vec<NeedleWay>) -> Self {
+        let mut rehearsal = Self::rehearsal(way, pace);
+        if !stabilising.is_empty() {
+            rehearsal.ahead.pop_front();
+            let mut ahead: VecDeque<_> = stay(1, stabilising.len()).collect();
+            ahead.push_back((0, Operation::PublishPlan));
+            ahead.append(&mut rehearsal.ahead);
+            rehearsal.ahead = ahead;
+            rehearsal.stabilising = stabilising;
+        }
+        rehearsal
+    }
+
+    /// Which stabilising needle is at work, counted from 0; `None` while one that leaves seeds is.
+    pub fn stabilising(&self) -> Option<usize> {
+        let (needle, _) = self.ahead.front()?;
+        needle.checked_sub(self.ways.len())
+    }
+
+    /// Whether the tissue has stayed where it was: with needles in it, it rests elsewhere.
+    pub(super) fn keeps(&mut self, displacement_m: f64) -> bool {
+        let keeps = (displacement_m - self.kept_m).abs() < TISSUE_REST_M;
+        if !keeps {
+            self.kept_m = displacement_m;
+        }
+        keeps
+    }
+}
+
+/// Needles from that number on go in and stay.
+fn stay(first: usize, count: usize) -> impl Iterator<Item = (usize, Operation)> {
+    (first..first + count).flat_map(move |needle| {
+        let begins = (needle == first).then_some(Operation::Engage);
+        let before = std::iter::once(Operation::PublishPlan).chain(begins);
+        let then = [
+            Operation::Place,
+            Operation::Insert,
+            Operation::Leave,
+            Operation::TakeOut,
+        ];
+        before.chain(then).map(move |operation| (needle, operation))
+    })
+}
