@@ -1,6 +1,6 @@
 //! Counts of seeds settled by the fit: where the signal leaves a doubt, one seed more and one fewer are fitted too.
 //!
-//! The signal of a component alone does not tell two faint seeds from three strong ones; how well they explain the voxels does.
+//! The signal of a component alone does not distinguish two strong seeds from three faint ones; how well they explain the voxels does.
 
 use super::components::Component;
 use super::counts::Counts;

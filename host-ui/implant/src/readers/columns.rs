@@ -1,6 +1,6 @@
 //! Which column of a table is what: names of ours, headers that state a quantity and its unit, or what a person says.
 
-use super::table::shown;
+use super::table::{LineError, shown};
 use std::str::FromStr;
 
 /// Words for the axes of a place.
@@ -121,7 +121,7 @@ pub(super) fn of_header(
     headers: &[String],
     known: &[&str],
     mapped: &[Mapped],
-) -> Result<(Vec<Column>, Vec<String>), String> {
+) -> Result<(Vec<Column>, Vec<String>), LineError> {
     let mut problems = Vec::new();
     let (mut columns, mut passed_over) = (Vec::new(), Vec::new());
     for header in headers {
@@ -170,7 +170,7 @@ pub(super) fn of_header(
     }
     match problems.is_empty() {
         true => Ok((columns, passed_over)),
-        false => Err(problems.join("; ")),
+        false => Err(LineError::new(problems.join("; "))),
     }
 }
 
@@ -262,7 +262,7 @@ fn recognised(words: &[String], unit: Option<&str>) -> Option<&'static str> {
     }
     match words[..] {
         ["strength"] | ["air", "kerma", "strength"] | ["aks"] | ["sk"] => Some("strength_u"),
-        // Some call an activity a strength, and its unit tells.
+        // Some call an activity a strength, and its unit shows which it is.
         ["activity"] | ["apparent", "activity"] | ["seed", "activity"] => match unit {
             Some(unit) if Quantity::Strength.unit(unit).is_some() => Some("strength_u"),
             _ => Some("activity_mci"),
@@ -292,7 +292,7 @@ mod tests {
     fn columns(headers: &[&str], mapped: &[&str]) -> Result<(Vec<(String, f64)>, Vec<String>), String> {
         let headers: Vec<String> = headers.iter().map(|h| h.to_lowercase()).collect();
         let mapped: Vec<Mapped> = mapped.iter().map(|m| m.parse().unwrap()).collect();
-        let (columns, passed) = of_header(&headers, &KNOWN, &mapped)?;
+        let (columns, passed) = of_header(&headers, &KNOWN, &mapped).map_err(|why| why.to_string())?;
         Ok((columns.into_iter().map(|c| (c.name, c.factor)).collect(), passed))
     }
 

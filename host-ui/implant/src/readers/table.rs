@@ -148,7 +148,7 @@ fn parse_lines<T>(
         .map(|c| c.trim_start_matches('\u{feff}').to_lowercase())
         .collect();
     let in_header = |why: String| LineError::new(format!("line {}: {why}", line_of(0)));
-    let (columns, passed_over) = columns::of_header(&headers, known, mapped).map_err(in_header)?;
+    let (columns, passed_over) = columns::of_header(&headers, known, mapped).map_err(|why| in_header(why.0))?;
     check_place(&columns, known).map_err(in_header)?;
     let (mut all, mut problems) = (Vec::new(), Vec::new());
     for (index, record) in reader.records().enumerate() {
