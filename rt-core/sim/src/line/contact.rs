@@ -9,7 +9,7 @@
 use super::model::LineModel;
 use super::rows::{add_scaled, dot};
 use super::state::{LineOutput, LineState};
-use super::tip::{Place, follow};
+use super::tip::follow;
 use crate::simd::{Simd, vectorised};
 use sets::{Scratch, Tip};
 
@@ -51,7 +51,6 @@ pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> Line
         .begin(rows, common_m_per_n, &model.settings.prony, input.dt_s);
     let mut output = LineOutput::default();
     let mut scratch = Scratch::new();
-    let mut before = None;
     for _ in 0..MAX_PASSES {
         let front = model.front(&state.tip);
         touch(model, state, tip_m, &mut scratch);
@@ -71,21 +70,14 @@ pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> Line
             if is_pushed || pushed_m >= model.layers[layer].puncture_depth_m {
                 state.tip.opened |= 1 << layer;
                 output.punctured = output.punctured.or(Some(layer));
-                before = None;
                 continue;
             }
         }
         let goes_on = gap_m > CLOSED_M && is_pushed && front.membrane.is_none();
         let goes_back = gap_m < -CLOSED_M && state.tip.force_n <= 0.0;
-        let place = Place {
-            material_m: state.tip.material_m,
-            gap_m,
-        };
-        if !(goes_on || goes_back) || !follow(model, state, tip_m, front.to_m, place, before) {
+        if !(goes_on || goes_back) || !follow(model, state, tip_m, gap_m, front.to_m) {
             break;
         }
-        // Beyond that it is another force that holds the tip.
-        before = (state.tip.material_m < front.to_m).then_some(place);
     }
     slip(model, state, tip_m);
     finish(model, state, &mut output);
@@ -136,8 +128,15 @@ fn touch(model: &LineModel, state: &mut LineState, tip_m: f64, scratch: &mut Scr
     }
     let (gain, force_n) = (state.memory.gain, state.tip.force_n);
     scratch.count = now;
-    sets::displacement(model.simd, &c.rows, &state.shaft_n, scratch);
-    for ((n, &of_tip), of_shaft) in column.iter().enumerate().zip(scratch.u_m.numbers()) {
+    if model.settings.by_sets {
+        sets::displacement(model.simd, &c.rows, &state.shaft_n, scratch);
+    }
+    for ((n, &of_tip), &of_shaft) in column.iter().enumerate().zip(scratch.u_m.numbers()) {
+        let of_shaft = if model.settings.by_sets {
+            of_shaft
+        } else {
+            dot(&c.rows.row(n)[..now], &state.shaft_n[..now])
+        };
         state.u_m[n] = gain * (of_shaft + of_tip * force_n) + state.memory.offset_m[n];
         if n >= before {
             state.anchor_m[n] = tip_m - state.u_m[n];
@@ -220,7 +219,7 @@ fn solve(
     let place_m = state.tip.material_m;
     let offset_m = past_at_tip_m(model, state);
     let of_shaft = dot(&state.tip_column, &state.shaft_n[..state.in_contact]);
-    state.tip_u_m = gain * (of_shaft + state.tip_own * state.tip.force_n) + offset_m + state.tip_offset_m;
+    state.tip_u_m = gain * (of_shaft + state.tip_own * state.tip.force_n) + (offset_m + state.tip_offset_m);
     let rate = model.settings.viscous_n_s_per_m2 / dt_s;
     if rate != 0.0 || !model.settings.by_sets || !solve_by_sets(model, state, tip_m, tip_limit_n, scratch, output) {
         solve_by_sweeps(model.simd, model, state, tip_m, tip_limit_n, rate, output);

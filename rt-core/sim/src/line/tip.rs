@@ -9,14 +9,9 @@ const LEAST_KEPT: f64 = 0.02;
 /// Places closer than this are the same.
 const SAME_M: f64 = 1e-9;
 /// The tip's place is found to this.
-const PLACE_M: f64 = 1e-11;
+const PLACE_M: f64 = 1e-13;
 /// Where tissue in front is pressed together so far, a step through it counts at most so many times its length.
 const MOST_PRESSED: f64 = 10.0;
-/// Between two places close together, the gap closes by so much of the way between them.
-const LEAST_CLOSED: f64 = 0.5;
-const MOST_CLOSED: f64 = 3.0;
-/// Part of the gap that is left when the way to the second place was the right one.
-const LEFT: f64 = 0.5;
 /// Stations around the tip that a pass can reach.
 const WINDOW: usize = 64;
 
@@ -151,34 +146,9 @@ impl<'a> Around<'a> {
     }
 }
 
-/// A place of the tip that was tried, and how far the needle is beyond it then.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
-    pub material_m: f64,
-    pub gap_m: f64,
-}
-
-/// Where the gap closes if it goes on changing as it did from the place before to this one; `None` where that says nothing.
-fn onward_m(before: Place, now: Place) -> Option<f64> {
-    let closed = (before.gap_m - now.gap_m) / (now.material_m - before.material_m);
-    let is_plain = (LEAST_CLOSED..MOST_CLOSED).contains(&closed) && now.gap_m.abs() < LEFT * before.gap_m.abs();
-    is_plain.then(|| now.material_m + now.gap_m / closed)
-}
-
-/// Moves the tip through the material to where the world has it, but not past `to_m`; returns whether it moved. `before` is the
-/// place that was tried before.
-pub(super) fn follow(
-    model: &LineModel,
-    state: &mut LineState,
-    tip_m: f64,
-    to_m: f64,
-    now: Place,
-    before: Option<Place>,
-) -> bool {
-    let (from_m, gap_m) = (now.material_m, now.gap_m);
-    if let Some(place_m) = before.and_then(|before| onward_m(before, now)).filter(|m| *m <= to_m) {
-        return set_place(model, state, place_m, to_m);
-    }
+/// Moves the tip through the material to where the world has it, but not past `to_m`; returns whether it moved.
+pub(super) fn follow(model: &LineModel, state: &mut LineState, tip_m: f64, gap_m: f64, to_m: f64) -> bool {
+    let from_m = state.tip.material_m;
     let spacing_m = model.compliance.spacing_m;
     // One pass goes no further than some stations; the next goes on.
     let reach_m = (MOST_PRESSED * gap_m.abs()).min(8.0 * spacing_m);
@@ -189,17 +159,6 @@ pub(super) fn follow(
         from_m - reach_m
     };
     let place_m = root(&around, tip_m, from_m, gap_m, furthest_m);
-    set_place(model, state, place_m, to_m)
-}
-
-/// At a membrane or not at all: a hair before the surface the tip would be held without anything to press on.
-fn set_place(model: &LineModel, state: &mut LineState, place_m: f64, to_m: f64) -> bool {
-    let from_m = state.tip.material_m;
-    let place_m = if (to_m - place_m).abs() <= SAME_M {
-        to_m
-    } else {
-        place_m
-    };
     state.tip.material_m = place_m;
     state.tip.track_m = state.tip.track_m.max(place_m.min(model.length_m()));
     place_m != from_m

@@ -128,14 +128,14 @@ fn find<V: Vector<f64>>(rows: &Rows, scratch: &mut Scratch) -> bool {
     for _ in 0..MOST_SETS {
         choose(scratch);
         let is_found = scratch.residual_m <= scratch.tolerance_m;
-        to_limits::<V>(rows, scratch, is_found);
+        to_limits::<V>(rows, scratch);
         if is_found {
             return true;
         }
         hold::<V>(rows, scratch);
     }
     choose(scratch);
-    to_limits::<V>(rows, scratch, false);
+    to_limits::<V>(rows, scratch);
     false
 }
 }
@@ -199,9 +199,9 @@ fn places(numbers: &Each, count: usize, places: &mut [u16; MAX_STATIONS]) -> usi
     at
 }
 
-/// Gives those that do not stick the force they have then, and adds what that moves unless it `is_found` to be too little.
+/// Gives those that do not stick the force they have then, and adds what that moves.
 #[inline(always)]
-fn to_limits<V: Vector<f64>>(rows: &Rows, scratch: &mut Scratch, is_found: bool) {
+fn to_limits<V: Vector<f64>>(rows: &Rows, scratch: &mut Scratch) {
     let mut at = [0; MAX_STATIONS];
     let count = places(&scratch.change_n, scratch.count, &mut at);
     if count == 0 && scratch.tip.change_n == 0.0 {
@@ -212,9 +212,6 @@ fn to_limits<V: Vector<f64>>(rows: &Rows, scratch: &mut Scratch, is_found: bool)
         scratch.force_n.0[b] = scratch.bounded_n.0[b];
     }
     scratch.tip.force_n = scratch.tip.bounded_n;
-    if is_found {
-        return;
-    }
     let change_n = scratch.tip.change_n;
     let tip = answer::<V>(rows, scratch, &at[..count], Of::Changes, change_n);
     for b in 0..scratch.blocks() {

@@ -27,6 +27,10 @@ fn sets_give_what_sweeps_give_in_every_tick_of_a_random_hand() {
         (9, vec![GLAND], LineSettings::default()),
     ] {
         let spacing_m = 42e-3 / stations as f64;
+        let settings = LineSettings {
+            by_sets: true,
+            ..settings
+        };
         let model = made_up(stations, spacing_m, &layers, settings);
         let slow = LineSettings {
             by_sets: false,
