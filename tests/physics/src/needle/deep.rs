@@ -3,7 +3,6 @@
 use super::*;
 use crate::rows::{Row, keep};
 use stylet_benches::rig::hand_envelope;
-use stylet_sim::scene::{Labels, Role, Structure};
 
 /// Two steps of the encoders: an oscillation that they can see.
 const SEEN_M: f64 = 6e-5;
@@ -213,93 +212,6 @@ fn a_handle_that_is_carried_may_be_lifted() {
         warning: "",
     });
     assert!(weight_n > 1.0);
-}
-
-/// A block, and a needle that comes to its face at a small angle.
-#[test]
-fn a_needle_that_grazes_the_surface_goes_in_and_out_again() {
-    let mut gland = Structure::soft("gland", 1);
-    gland.role = Role::Target;
-    let labels = Labels {
-        dims: [40, 24, 20],
-        spacing_m: 2e-3,
-        cells: vec![1; 40 * 24 * 20],
-        structures: vec![gland],
-    };
-    let source = SceneSource::of_labels("block", &labels);
-    for (kind, degrees) in KINDS.into_iter().flat_map(|kind| [(kind, 45.0_f64), (kind, 75.0)]) {
-        let (sine, cosine) = degrees.to_radians().sin_cos();
-        let direction = Vector3::new(sine, 0.0, cosine);
-        let entry = Vector3::new(15e-3, 24e-3, 0.0);
-        let scene = source.build().expect("valid").with_tissue(kind);
-        let limits = TissueParameters::default().validate().expect("defaults are valid");
-        let world = Box::new(World::new(scene, limits, 1).expect("can be used"));
-        let start = entry - direction * 10e-3;
-        let body = LineBody::of_source(&source, kind)
-            .expect("can be solved")
-            .expect("has lines");
-        let line = body
-            .prepare(1, start.into(), direction.into(), &mut || true)
-            .expect("through the block");
-        println!("{:?}", line.hand.source().stations());
-        println!("{:?} along {}", line.hand.line(), line.hand.along_m(&start));
-        let hand = (Hand::steady(), LinkFaults::default());
-        let mut session = Session::on_line(world, (start, line), hand, ForceParameters::default());
-        session.aim(direction);
-        session.go_to(start, 0.05);
-        session.run(1.5);
-        session.go_to(entry + direction * 35e-3, 0.05);
-        let inwards = session.run(1.5);
-        for tick in [0, 300, 600, 900, 1499] {
-            let o = &inwards[tick];
-            println!(
-                "tick {tick}: {:?} along {:.4} speed {:.4} axis {:?} total {:?}",
-                o.phase, o.depth_m, o.speed_along_m_per_s, o.axis, o.terms.total_n
-            );
-        }
-        println!(
-            "tip {:?} line {} contact {} entry {:?}",
-            session.true_tip_in_world(),
-            session.response().line,
-            session.response().contact,
-            session.chain().needle
-        );
-        let (deep_m, largest_m) = (inwards[inwards.len() - 1].depth_m, largest(&session));
-        session.go_to(start, 0.05);
-        let out = session.run(8.0);
-        let forces = || inwards.iter().chain(&out).map(|o| o.wrench.force_n);
-        let step_n = forces()
-            .zip(forces().skip(1))
-            .map(|(a, b)| (b - a).norm())
-            .fold(0.0, f64::max);
-        let peak_n = forces().map(|f| f.norm()).fold(0.0, f64::max);
-        let left_m = largest(&session);
-        keep(&Row {
-            number: 40,
-            case: if degrees < 60.0 {
-                "a face met at 45 degrees"
-            } else {
-                "a face grazed, at 75 degrees from its normal"
-            },
-            model: kind.name(),
-            should: "35 mm in, at most 0.5 N a tick, out again and at rest",
-            happened: format!(
-                "{:.1} mm deep, peak {peak_n:.2} N, largest step {step_n:.3} N, {:.1} mm of displacement, {:.3} mm left",
-                deep_m * 1e3,
-                largest_m * 1e3,
-                left_m * 1e3
-            ),
-            met: (deep_m - 35e-3).abs() < 1e-3 && step_n <= 0.5 + 1e-9 && left_m < 0.05e-3 && largest_m < 20e-3,
-            warning: "",
-        });
-    }
-}
-
-fn largest(session: &Session) -> f64 {
-    let body = session.world().tissue.deformed();
-    let elements = 0..body.lattice.element_count() as u32;
-    let sizes = elements.map(|e| Vector3::from(body.displacement(e)).norm());
-    sizes.fold(0.0, f64::max) * body.lattice.spacing_m
 }
 
 /// Follows its path to a micrometre whatever the force.
