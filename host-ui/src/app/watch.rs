@@ -8,12 +8,24 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use stylet_base::job::{Job, JobUpdate};
 use stylet_host::link::{Link, Played};
-use stylet_host::record;
+use stylet_host::record::{self, RecordError, ShowError};
 
 /// One needle through the gland of `paper`, recorded by `make example`.
 pub(super) const EXAMPLE: &[u8] = include_bytes!("../../example/insertion.mcap");
 
-type Read = Job<Result<Played, String>>;
+/// The text of an error follows the name of the file.
+type Read = Job<Result<Played, WatchError>>;
+
+/// Why a recording is not shown.
+#[derive(Debug, thiserror::Error)]
+enum WatchError {
+    #[error(transparent)]
+    File(#[from] RecordError),
+    #[error("the example: {0}")]
+    Example(#[from] ShowError),
+    #[error("the reader ended before the file was read")]
+    Ended,
+}
 
 /// The recording that is read or shown.
 #[derive(Default)]
@@ -41,14 +53,14 @@ impl Recording {
         let path = path.to_owned();
         let job = Job::begin("recording", move |answer, interrupt| {
             // The window may be closed by now; then nobody reads the answer. So below.
-            let _ = answer.send(record::played(&path, interrupt).map_err(|why| why.to_string()));
+            let _ = answer.send(record::played(&path, interrupt).map_err(WatchError::from));
         });
         self.reading = Some((name, job));
     }
 
     fn read_example(&mut self) {
         let job = Job::begin("example", |answer, interrupt| {
-            let _ = answer.send(record::played_of(EXAMPLE, interrupt));
+            let _ = answer.send(record::played_of(EXAMPLE, interrupt).map_err(WatchError::from));
         });
         self.reading = Some(("Example".to_owned(), job));
     }
@@ -94,7 +106,7 @@ impl App {
         self.recording.reading = None;
         match read {
             Ok(played) => self.open_recording(name, played),
-            Err(why) => self.shown.note = Some(refusal(format!("{name}: {why}"))),
+            Err(why) => self.shown.note = Some(refusal(why.to_string())),
         }
         self.show_recording();
     }

@@ -223,4 +223,5 @@ fn carry(record: &TickRecord, state: &mut HapticState) {
     (state.tip_in_scene_m, state.force_on_hand_n) = (record.tip_in_scene_m, record.force_on_hand_n);
     (state.depth_m, state.speed_m_per_s) = (record.depth_m, record.speed_m_per_s);
     (state.force_terms_n, state.tissue_tick) = (record.force_terms_n, record.tissue_tick);
+    state.tip_deflection_m = record.tip_deflection_m;
 }

@@ -56,6 +56,20 @@ pub enum RecordError {
     Write(#[from] WriteError),
 }
 
+/// Why the bytes of a recording cannot be shown; the text follows the name of the file.
+#[derive(Debug, thiserror::Error)]
+pub enum ShowError {
+    /// Another kind of file.
+    #[error("it is no recording of host-ui record (not an MCAP file)")]
+    NotMcap,
+    /// An earlier version recorded it.
+    #[error("it holds no scene: an earlier version recorded it; record it again to look at it")]
+    NoScene,
+    /// Nothing of use stands before the place at which reading ended.
+    #[error("{0}")]
+    Damaged(String),
+}
+
 impl RecordError {
     /// An error about a file, which it names.
     pub(super) fn of_file(path: &Path, why: impl ToString) -> Self {

@@ -7,7 +7,9 @@ use super::scene;
 use crate::link::Snapshot;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use stylet_shm_schema::{Event, EventKind, MAX_LEFT_NEEDLES, MAX_SEEDS, SnapshotHeader, TickRecord, Vertex};
+use stylet_shm_schema::{
+    Event, EventKind, MAX_BEND_POINTS, MAX_LEFT_NEEDLES, MAX_SEEDS, SnapshotHeader, TickRecord, Vertex,
+};
 
 /// Where each kind of message goes, and the name and text of its schema.
 pub struct Channel {
@@ -239,6 +241,11 @@ struct Tissue {
     /// Earlier versions know none.
     #[serde(default)]
     needles_left_in: Vec<LeftIn>,
+    /// Recordings of an older version have none. So of the spacing.
+    #[serde(default)]
+    bend_m: Vec<[f64; 3]>,
+    #[serde(default)]
+    bend_spacing_m: f64,
 }
 
 #[derive(Deserialize)]
@@ -265,10 +272,15 @@ pub fn tissue_of(data: &[u8]) -> Option<SnapshotHeader> {
         phase: t.phase,
         seed_count: t.seeds.len().min(MAX_SEEDS) as u32,
         left_count: t.needles_left_in.len().min(MAX_LEFT_NEEDLES) as u32,
+        bend_count: t.bend_m.len().min(MAX_BEND_POINTS) as u32,
+        bend_spacing_m: t.bend_spacing_m,
         ..SnapshotHeader::default()
     };
     for (to, from) in header.left.iter_mut().zip(t.needles_left_in) {
         (to.number, to.tip_m, to.direction) = (from.number, from.tip_m, from.direction);
+    }
+    for (to, from) in header.bend_m.iter_mut().zip(t.bend_m) {
+        *to = from;
     }
     for (to, from) in header.seeds.iter_mut().zip(t.seeds) {
         (to.position_m, to.axis, to.dropped_at_m) = (from.position_m, from.axis, from.dropped_at_m);

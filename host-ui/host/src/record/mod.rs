@@ -16,7 +16,7 @@ mod setting;
 mod stream;
 mod writer;
 
-pub use error::RecordError;
+pub use error::{RecordError, ShowError};
 pub use export::{Export, export};
 pub use gaps::{Gap, Gaps};
 pub use played::{played, played_of};

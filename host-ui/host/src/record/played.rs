@@ -1,6 +1,6 @@
 //! A recording read for a window: what the core said, each with its time.
 
-use super::error::RecordError;
+use super::error::{RecordError, ShowError};
 use super::messages::{GLAND, TICK, TISSUE, Tick, gland_of, tissue_of};
 use super::scene::{self, FIELD, SCENE};
 use super::setting::{self, PARAMETERS_CHANNEL, PLAN, SESSION, STATE};
@@ -18,11 +18,11 @@ const MOST_BYTES: usize = 1 << 30;
 pub fn played(path: &Path, interrupt: &Interrupt) -> Result<Played, RecordError> {
     let invalid = |why: String| RecordError::of_file(path, why);
     let bytes = stylet_base::input::read(path, MOST_BYTES as u64).map_err(|why| invalid(why.to_string()))?;
-    played_of(&bytes, interrupt).map_err(invalid)
+    played_of(&bytes, interrupt).map_err(|why| invalid(why.to_string()))
 }
 
 /// As [`played`], of the bytes of a file; the text of an error follows the name of the file.
-pub fn played_of(bytes: &[u8], interrupt: &Interrupt) -> Result<Played, String> {
+pub fn played_of(bytes: &[u8], interrupt: &Interrupt) -> Result<Played, ShowError> {
     let mut reader = Reader::default();
     let cut_off = stream::each(bytes, |topic, time_ns, data| match interrupt.asked() {
         true => Err("reading was cancelled".to_owned()),
@@ -107,11 +107,9 @@ impl Reader {
         Ok(())
     }
 
-    fn end(mut self, cut_off: Option<String>) -> Result<Played, String> {
+    fn end(mut self, cut_off: Option<String>) -> Result<Played, ShowError> {
         let Some(session) = self.session.filter(|_| self.has_scene) else {
-            return Err(cut_off.unwrap_or_else(|| {
-                "it holds no scene: an earlier version recorded it; record it again to look at it".to_owned()
-            }));
+            return Err(cut_off.map_or(ShowError::NoScene, ShowError::Damaged));
         };
         // The thread that takes what arrives has states and snapshots a moment later than ticks.
         self.pieces.sort_by_key(|(time_ns, _)| *time_ns);

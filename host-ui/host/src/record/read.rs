@@ -34,7 +34,7 @@ pub fn read(path: &Path) -> Result<Recording, RecordError> {
         }
         Ok(())
     });
-    recording.cut_off = cut_off.map_err(invalid)?;
+    recording.cut_off = cut_off.map_err(|why| invalid(why.to_string()))?;
     if recording.ticks.is_empty() {
         return Err(invalid("holds no tick of Stylet".to_owned()));
     }

@@ -207,6 +207,13 @@ struct State {
     gate_interventions: u64,
     parameters_generation: u64,
     seed_count: u32,
+    least_corner: f64,
+    folded_from_m: f64,
+    tip_deflection_m: [f64; 3],
+    lag_ns: u64,
+    lag_m: f64,
+    worst_lag_ns: u64,
+    worst_lag_m: f64,
 }
 
 pub fn state(s: &HapticState) -> Value {
@@ -228,6 +235,13 @@ pub fn state(s: &HapticState) -> Value {
         gate_interventions: s.gate_interventions,
         parameters_generation: s.parameters_generation,
         seed_count: s.seed_count,
+        least_corner: s.least_corner,
+        folded_from_m: s.folded_from_m,
+        tip_deflection_m: s.tip_deflection_m,
+        lag_ns: s.lag_ns,
+        lag_m: s.lag_m,
+        worst_lag_ns: s.worst_lag_ns,
+        worst_lag_m: s.worst_lag_m,
     };
     serde_json::to_value(state).unwrap_or_default()
 }
@@ -253,6 +267,13 @@ pub fn state_of(data: &[u8]) -> Option<HapticState> {
         gate_interventions: s.gate_interventions,
         parameters_generation: s.parameters_generation,
         seed_count: s.seed_count,
+        least_corner: s.least_corner,
+        folded_from_m: s.folded_from_m,
+        tip_deflection_m: s.tip_deflection_m,
+        lag_ns: s.lag_ns,
+        lag_m: s.lag_m,
+        worst_lag_ns: s.worst_lag_ns,
+        worst_lag_m: s.worst_lag_m,
         ..HapticState::zeroed()
     })
 }

@@ -1,5 +1,6 @@
 //! The messages of an MCAP file, whatever its bytes are.
 
+use super::error::ShowError;
 use mcap::records::Record;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::collections::BTreeMap;
@@ -14,9 +15,9 @@ const LONGEST_RECORD_BYTES: usize = 64 << 20;
 pub fn each(
     bytes: &[u8],
     mut take: impl FnMut(&str, u64, &[u8]) -> Result<(), String>,
-) -> Result<Option<String>, String> {
+) -> Result<Option<String>, ShowError> {
     if !bytes.starts_with(mcap::MAGIC) {
-        return Err("it is no recording of host-ui record (not an MCAP file)".to_owned());
+        return Err(ShowError::NotMcap);
     }
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)

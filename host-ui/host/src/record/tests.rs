@@ -100,6 +100,7 @@ fn said() -> (Vec<Item>, TickRecord, HapticState, Snapshot) {
     let mut state = HapticState::zeroed();
     (state.time_ns, state.puncture_depth_m, state.force_scale) = (1_000_000 * 20, 8e-3, 0.25);
     state.needle_direction = [0.0, 0.6, 0.8];
+    (state.folded_from_m, state.lag_ns, state.worst_lag_m) = (7.93e-3, 5_000_001, 1e-3 / 3.0);
     let mut header = SnapshotHeader {
         session_id: 1,
         scene_generation: 3,
@@ -110,6 +111,8 @@ fn said() -> (Vec<Item>, TickRecord, HapticState, Snapshot) {
         ..SnapshotHeader::default()
     };
     header.seeds[0].position_m = [0.01, 0.02, 1.0 / 7.0];
+    (header.bend_count, header.bend_spacing_m) = (2, 5e-3);
+    header.bend_m[..2].copy_from_slice(&[[1.0 / 3.0 * 1e-3, 0.0, 0.0], [1e-4, -1e-5, 0.0]]);
     let surface_m = vec![[0.1, 0.2, 0.300_001], [0.333, 0.0, 0.0], [0.0, 0.7, 0.0]];
     let snapshot = Snapshot::of_parts(header, surface_m, vec![[1e-7, 0.0, 0.0]; 2]).unwrap();
     let mut plan = PlanInForce::zeroed();
@@ -162,6 +165,10 @@ fn a_recording_holds_all_that_a_window_shows_in_the_same_bits() {
             Piece::State(found) => {
                 kinds[1] += 1;
                 assert_eq!(found.puncture_depth_m, state.puncture_depth_m);
+                assert_eq!(
+                    (found.folded_from_m, found.lag_ns, found.worst_lag_m),
+                    (7.93e-3, 5_000_001, state.worst_lag_m)
+                );
                 assert_eq!(
                     (found.force_scale, found.needle_direction),
                     (0.25, state.needle_direction)
