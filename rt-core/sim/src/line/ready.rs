@@ -114,7 +114,10 @@ impl ReadyLine {
     /// Solves for a line of needle at rest; some seconds for a body of 20,000 elements. `layer_of` says what an element of `lattice`
     /// is to a needle, and nothing of what no needle enters. `others` are the lines beside which the needle may come. `report` is called between slices of work and ends it by returning
     /// false.
-    #[expect(clippy::too_many_arguments, reason = "each says one thing of the line that is wanted")]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "each says one thing of the line that is wanted"
+    )]
     pub fn prepare(
         generation: u64,
         body: &BatchModel<f32>,

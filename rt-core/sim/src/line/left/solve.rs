@@ -2,7 +2,9 @@
 //! that stay in.
 
 use super::{LeftNeedle, LeftNeedles};
-use crate::line::contact::{CLOSED_M, FURTHEST_M, LineInput, MAX_PASSES, finish, limit_n, press, slip, step, touch_beside};
+use crate::line::contact::{
+    CLOSED_M, FURTHEST_M, LineInput, MAX_PASSES, finish, limit_n, press, slip, step, touch_beside,
+};
 use crate::line::model::{LineModel, MAX_STATIONS};
 use crate::line::ready::HandLine;
 use crate::line::rows::{add_scaled, dot};
