@@ -52,7 +52,7 @@ fn insert_and_hold(creep: [PronyTerm; 2]) -> Vec<[f64; 2]> {
             buttons: 0,
             sequence: tick,
         };
-        let output = step_on_line(&parameters, &info, &mut state, &sample, &mut line, DT_S);
+        let output = step_on_line(&parameters, &info, &mut state, &sample, &mut line, None, DT_S);
         ticks.push([-output.terms.friction_n.z, -output.wrench.force_n.z]);
     }
     ticks.split_off(way as usize)
