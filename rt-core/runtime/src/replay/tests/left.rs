@@ -10,7 +10,7 @@ const APART_M: f64 = 4e-3;
 impl Recorded {
     /// In tissue that does not move whole, with room for needles that stay in.
     fn with_left(kind: TissueKind) -> Self {
-        let mut run = Self::new(kind);
+        let mut run = Self::new(kind, &ForceParameters::default());
         run.haptic(HapticOrder::Engage { ticket: 0 });
         run.haptic(HapticOrder::Parameters {
             ticket: 0,
