@@ -23,8 +23,8 @@ use stylet_host::record;
 use stylet_implant::procedure;
 use stylet_implant::readers::{SeedDefaults, read_seeds};
 use stylet_manual::ManualArgs;
-use stylet_shm_schema::{MAX_LEFT_NEEDLES, ParameterChange};
 use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::{MAX_LEFT_NEEDLES, ParameterChange};
 
 const SCENE_HELP: &str = concat!(
     "A scene file is TOML. All fields but [volume] may be omitted; omitted fields are inferred from the name of the structure:\n\n",

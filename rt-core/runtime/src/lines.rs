@@ -109,8 +109,7 @@ impl LineBody {
                 .copied()
                 .unwrap_or(Some(LayerKind::default()))
         };
-        let mut ready =
-            ReadyLine::prepare(generation, &self.batch, lattice, &layer_of, line, bends, others, report)?;
+        let mut ready = ReadyLine::prepare(generation, &self.batch, lattice, &layer_of, line, bends, others, report)?;
         if !self.tissue.adds_columns() {
             ready.body.carry(&self.scene.body, self.scene.is_held());
         }

@@ -243,7 +243,8 @@ impl LinePreparer {
             let mut goes_on = || !stopped.load(Ordering::Relaxed);
             let (body, line) = match body {
                 Ok(Some(body)) => {
-                    let line = body.prepare_beside(generation, axis.entry_m, axis.axes[0], bends, &others, &mut goes_on);
+                    let line =
+                        body.prepare_beside(generation, axis.entry_m, axis.axes[0], bends, &others, &mut goes_on);
                     (Some(body), line)
                 }
                 Ok(None) => (None, Err(stylet_sim::line::LineError::NoTissue.into())),

@@ -80,7 +80,16 @@ impl NeedleLoads {
     }
 
     fn is_same(&self, other: &Self) -> bool {
-        let numbers = |n: &Self| (n.generation, n.tip_m.to_bits(), n.of_line, n.stations, n.tip_first, n.tip_count);
+        let numbers = |n: &Self| {
+            (
+                n.generation,
+                n.tip_m.to_bits(),
+                n.of_line,
+                n.stations,
+                n.tip_first,
+                n.tip_count,
+            )
+        };
         let count = (self.stations + self.tip_count) as usize;
         let pairs = self.loads_n.iter().zip(&other.loads_n).take(count);
         numbers(self) == numbers(other) && pairs.into_iter().all(|(a, b)| a.to_bits() == b.to_bits())

@@ -309,8 +309,7 @@ fn stabilising_needles_go_in_first_stay_and_are_drawn_out_at_the_end() {
         ..way()
     };
     let ways = vec![way()];
-    let mut procedure =
-        Procedure::of_needles(ways, Pace::default()).stabilised(vec![beside(0.0), beside(0.02)]);
+    let mut procedure = Procedure::of_needles(ways, Pace::default()).stabilised(vec![beside(0.0), beside(0.02)]);
     let (mut hand, mut most, mut left_at_drops) = (Obedient::new(), 0, Vec::new());
     let mut which = vec![procedure.stabilising()];
     while hand.step(&mut procedure, &[]).expect("goes on") != Next::Done {

@@ -35,7 +35,9 @@ impl Recorded {
         let body = LineBody::of_source(&block(), kind).expect("valid").expect("has lines");
         let entry_m = self.entry_m + Vector3::x() * apart_m;
         let others = [self.line.stations.clone()];
-        let line = body.prepare_beside(generation, entry_m.into(), [0.0, 0.0, 1.0], false, &others, &mut || true);
+        let line = body.prepare_beside(generation, entry_m.into(), [0.0, 0.0, 1.0], false, &others, &mut || {
+            true
+        });
         line.expect("through the block")
     }
 

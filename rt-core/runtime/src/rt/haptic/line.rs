@@ -5,8 +5,8 @@ use crate::rt::line_loads::{BentTip, LineLoads};
 use crate::rt::response::TissueResponse;
 use stylet_hw::Sample;
 use stylet_sim::force::chain::{ChainOutput, step_on_line};
-use stylet_sim::line::beam::BeamOutput;
 use stylet_sim::line::Track;
+use stylet_sim::line::beam::BeamOutput;
 
 /// A needle is taken for one outside up to so far behind the entry: plans name entries on the surface, which is one of cells.
 const BEGINS_WITHIN_M: f64 = 1e-3;
