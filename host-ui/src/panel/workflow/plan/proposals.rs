@@ -25,7 +25,7 @@ pub fn proposals_ui(ui: &mut egui::Ui, shown: &Shown, free: bool, actions: &mut 
     };
     let plan = shown.planning.implant.as_ref().map(|implant| &implant.plan);
     let chosen = proposals.iter().position(|proposal| Some(&proposal.plan) == plan);
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         for (number, proposal) in proposals.iter().enumerate() {
             let button = Button::new(proposal.name).selected(chosen == Some(number));
             let response = ui.add_enabled(free, button).on_hover_text(hint(proposal));
@@ -37,7 +37,7 @@ pub fn proposals_ui(ui: &mut egui::Ui, shown: &Shown, free: bool, actions: &mut 
     picture_ui(ui, proposals, chosen);
     let text = match chosen.and_then(|number| proposals.get(number)) {
         Some(proposal) => words(proposal),
-        None => "The plan was changed since; a button takes its proposal back.".to_owned(),
+        None => "Changed since; a button takes one back.".to_owned(),
     };
     super::weak_line(ui, text);
 }
@@ -89,14 +89,14 @@ fn hint(proposal: &FirstPlan) -> String {
     format!("{}\n{}", proposal.why, words(proposal))
 }
 
-/// "25 needles, V150 42 %; 96 % of trials keep D90".
+/// "25 needles, V150 42 %, 96 % keep D90": so many of the trials.
 fn words(proposal: &FirstPlan) -> String {
     let needles = proposal.plan.needles.len();
     let Some(Measures { figures, robust, .. }) = &proposal.measures else {
         return format!("{needles} needles");
     };
     format!(
-        "{needles} needles, V150 {:.0} %; {:.0} % of trials keep D90",
+        "{needles} needles, V150 {:.0} %, {:.0} % keep D90",
         figures.v150,
         robust * 100.0
     )
