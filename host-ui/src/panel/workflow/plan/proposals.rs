@@ -1,7 +1,7 @@
 //! Proposals of the automatic plan to choose from, with what each keeps when seeds miss their places against what it costs.
 
 use crate::action::{Action, PlanAction};
-use crate::panel::axis::plot;
+use crate::panel::axis::{marks, plot};
 use crate::shown::Shown;
 use crate::theme;
 use egui::{Button, RichText};
@@ -56,6 +56,8 @@ fn picture_ui(ui: &mut egui::Ui, proposals: &[FirstPlan], chosen: Option<usize>)
         .include_x(SHOWN_V150[1])
         .include_y(SHOWN_KEPT[0])
         .include_y(SHOWN_KEPT[1])
+        .x_grid_spacer(|_| marks(30.0, 10.0, 3))
+        .y_grid_spacer(|_| marks(50.0, 25.0, 2))
         .show(ui, |plot| {
             plot.hline(
                 HLine::new("95 % of trials", TRIALS_KEPT)
