@@ -98,10 +98,7 @@ impl App {
         let (name, read) = match job.poll() {
             JobUpdate::Pending => return self.show_recording(),
             JobUpdate::Message(read) => (name.clone(), read),
-            JobUpdate::Ended => (
-                name.clone(),
-                Err("the reader ended before the file was read".to_owned()),
-            ),
+            JobUpdate::Ended => (name.clone(), Err(WatchError::Ended)),
         };
         self.recording.reading = None;
         match read {
