@@ -9,7 +9,7 @@ use crate::line::model::{LineModel, MAX_STATIONS};
 use crate::line::ready::HandLine;
 use crate::line::rows::{add_scaled, dot};
 use crate::line::state::{LineOutput, LineState};
-use crate::line::tip::{Place, follow};
+use crate::line::tip::follow;
 use crate::simd::{Simd, vectorised};
 
 /// A needle that far before its entry at rest meets nothing, wherever the others have moved its surface.
@@ -37,7 +37,6 @@ pub(super) fn step_beside(left: &mut LeftNeedles, line: &mut HandLine, input: &L
     }
     left.enter(model, state, input.dt_s);
     let mut output = LineOutput::default();
-    let mut before = None;
     if !has_met(model, state, tip_m) {
         left.step_rest();
         touch_beside(model, state, tip_m);
@@ -77,21 +76,14 @@ pub(super) fn step_beside(left: &mut LeftNeedles, line: &mut HandLine, input: &L
             if is_pushed || pushed_m >= model.layers[layer].puncture_depth_m {
                 state.tip.opened |= 1 << layer;
                 output.punctured = output.punctured.or(Some(layer));
-                before = None;
                 continue;
             }
         }
         let goes_on = gap_m > CLOSED_M && is_pushed && front.membrane.is_none();
         let goes_back = gap_m < -CLOSED_M && state.tip.force_n <= 0.0;
-        let place = Place {
-            material_m: state.tip.material_m,
-            gap_m,
-        };
-        if !(goes_on || goes_back) || !follow(model, state, tip_m, front.to_m, place, before) {
+        if !(goes_on || goes_back) || !follow(model, state, tip_m, gap_m, front.to_m) {
             break;
         }
-        // Beyond that it is another force that holds the tip.
-        before = (state.tip.material_m < front.to_m).then_some(place);
     }
     slip(model, state, tip_m);
     left.slip();
