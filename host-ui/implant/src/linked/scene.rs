@@ -74,14 +74,14 @@ pub fn write(
     like: Option<&Path>,
     report: &dyn Fn(f32) -> ControlFlow<()>,
 ) -> Result<Vec<String>, SceneStudyError> {
-    let go_on = |share: f32| match report(share) {
+    let proceed = |share: f32| match report(share) {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(SceneStudyError::Cancelled),
     };
     let patient = scene.header.patient();
     let (of_plan, source) = (exchange::seed_plan(plan, &patient)?, known(plan)?);
     let kernel = DoseKernel::new(&source, Interval::ALL);
-    go_on(0.0)?;
+    proceed(0.0)?;
     let (drawn, mut notes) = match like.map(of_file).transpose()?.flatten() {
         Some(drawn) => (drawn, Vec::new()),
         None => {
@@ -94,7 +94,7 @@ pub fn write(
             (drawn, vec!["patient, study and frame of reference are new".to_owned()])
         }
     };
-    go_on(0.02)?;
+    proceed(0.02)?;
     let in_patient = |seed: Seed| Seed {
         position_m: patient.patient_from_scene(seed.position_m),
         axis: seed.axis.map(|axis| patient.patient_from_scene_direction(axis)),
@@ -110,13 +110,13 @@ pub fn write(
         POINTS,
     )?;
     let verdict = judge.judge(&kernel, &plan.seeds());
-    go_on(0.05)?;
+    proceed(0.05)?;
     let mut dose = grid(&seeds, &drawn.structures)?;
     // Sums of doses are exact, so that the order in which seeds are added does not matter.
     let parts = seeds.len().div_ceil(TOGETHER);
     for (n, part) in seeds.chunks(TOGETHER).enumerate() {
         dose.add(&kernel, part);
-        go_on(0.05 + SHARE_OF_DOSE * (n + 1) as f32 / parts as f32)?;
+        proceed(0.05 + SHARE_OF_DOSE * (n + 1) as f32 / parts as f32)?;
     }
     let number = |name: &str| drawn.structures.iter().position(|s| s.name == name).map(|n| n + 1);
     let histograms: Vec<(usize, &Dvh)> = judge
