@@ -209,7 +209,7 @@ fn a_part_that_one_corner_holds_is_refused_or_stays_in_reach() {
         let body = LineBody::of_source(&source, kind)
             .expect("can be solved")
             .expect("has lines");
-        let line = body.prepare(1, [13e-3, 11e-3, -5e-3], [0.0, 0.0, 1.0], &mut || true);
+        let line = body.prepare(1, [13e-3, 11e-3, -5e-3], [0.0, 0.0, 1.0], false, &mut || true);
         let (happened, met) = match line {
             Err(why) => (format!("refused: {why}"), true),
             Ok(line) => {
@@ -281,7 +281,7 @@ fn a_line_past_a_thin_capsule_an_incompressible_inclusion_and_bone_off_the_grid_
         .expect("can be solved")
         .expect("has lines");
     let line = body
-        .prepare(1, [21e-3, 24e-3, -5e-3], [0.0, 0.0, 1.0], &mut || true)
+        .prepare(1, [21e-3, 24e-3, -5e-3], [0.0, 0.0, 1.0], false, &mut || true)
         .expect("through the gland");
     let settings = |tolerance: f64| TwinSettings {
         stations: StationSettings::of_lattice(scene.body.spacing_m),
