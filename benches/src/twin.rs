@@ -97,6 +97,7 @@ fn columns<T: Compiled>(batch: &BatchModel<T>, stations: &Stations, tolerance: f
                 load: *load,
                 field: packed,
                 samples_m: wanted.iter().map(|(_, load)| state.sample(lane, load)).collect(),
+                beside_m: Vec::new(),
                 foundation_n: state.foundation_n(batch, lane),
                 residual,
             });
