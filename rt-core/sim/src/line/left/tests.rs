@@ -80,7 +80,8 @@ fn needles_far_apart_in_tissue_that_is_held_do_not_feel_each_other() {
     let before = left.forces_n().to_vec();
     let beside_n = go(&mut second, Some(&mut left), -1e-3, 22e-3, 1e-4);
     let alone_n = go(&mut line(3, [1.0, 0.0, 0.0], &[], 0.0), None, -1e-3, 22e-3, 1e-4);
-    assert!((beside_n - alone_n).abs() < 1e-9, "{beside_n} {alone_n}");
+    // A needle alone is solved for by sets, those of several by sweeps down to 2 nm.
+    assert!((beside_n - alone_n).abs() < 1e-6, "{beside_n} {alone_n}");
     let off = before.iter().zip(left.forces_n()).map(|(a, b)| (a - b).abs());
     assert!(off.fold(0.0, f64::max) < 1e-9);
     // Nearer they do.
@@ -92,7 +93,7 @@ fn needles_far_apart_in_tissue_that_is_held_do_not_feel_each_other() {
 /// All stations of both in one matrix, what sticks solved for at once by elimination, and what slips at its limit.
 #[test]
 fn two_needles_are_what_the_dense_problem_of_all_stations_gives() {
-    let mut worst = 0.0_f64;
+    let (mut worst, mut mixed) = (0.0_f64, 0);
     for (apart_m, depths_m) in [
         (8e-3, [25e-3, 24.2e-3]),
         (4e-3, [18e-3, 18.6e-3]),
@@ -102,77 +103,84 @@ fn two_needles_are_what_the_dense_problem_of_all_stations_gives() {
         go(&mut second, Some(&mut left), -1e-3, depths_m[0], 1e-4);
         go(&mut second, Some(&mut left), depths_m[0], depths_m[1], 1e-4);
         // One more tick, from known anchors.
-        let anchors: Vec<f64> = second.state.anchor_m[..second.state.in_contact].to_vec();
-        let rests: Vec<f64> = left.rest_m[..left.count].to_vec();
-        let tip_m = depths_m[1] - 6e-3;
-        left.step_beside(&mut second, tip_m, DT_S);
-        let (m, k) = (second.state.in_contact, left.count);
-        let lines = [*second.line(), *left.needles[0].line.line()];
-        // Rows: shaft of the second, its tip, shaft and tip of the first, each with its share at places of the body.
-        let own = |line: usize, n: usize| vec![(place(&lines[line], n), 1.0, Some((line, n)))];
-        let tip = |line: usize, state: &crate::line::LineState| {
-            let weights = state.tip_range.clone().zip(state.tip_weights);
-            weights
-                .map(|(n, w)| (place(&lines[line], n), w, None))
-                .collect::<Vec<_>>()
-        };
-        let mut rows: Vec<_> = (0..m).map(|n| own(0, n)).collect();
-        rows.push(tip(0, &second.state));
-        rows.extend((0..k - 1).map(|n| own(1, n)));
-        rows.push(tip(1, &left.needles[0].line.state));
-        let entry = |i: usize, j: usize| {
-            let pairs = rows[i].iter().flat_map(|a| rows[j].iter().map(move |b| (a, b)));
-            pairs
-                .map(|((p, w, a), (q, v, b))| {
-                    let same = if a.is_some() && a == b { 0.014 } else { 0.0 };
-                    w * v * (kernel(*p, *q, WHOLE) + same)
-                })
-                .sum::<f64>()
-        };
-        let dense = DMatrix::from_fn(m + 1 + k, m + 1 + k, entry);
-        let found = DVector::from_iterator(
-            m + 1 + k,
-            second.state.shaft_n[..m]
-                .iter()
-                .chain([&second.state.tip.force_n])
-                .chain(&left.force_n[..k])
-                .copied(),
-        );
-        let mut wanted_m: Vec<f64> = anchors[..m].iter().map(|anchor| tip_m - anchor).collect();
-        wanted_m.push(tip_m - second.state.tip.material_m);
-        wanted_m.extend(&rests);
-        let mut limits: Vec<[f64; 2]> = (0..m)
-            .map(|n| limit_n(&second.model, second.state.tip.material_m, n))
-            .map(|high| [-high, high])
-            .collect();
-        limits.push([0.0, second.model.front(&second.state.tip).limit_n]);
-        limits.extend((0..k).map(|n| [left.low_n[n], left.high_n[n]]));
-        let is_free = |n: &usize| found[*n] > limits[*n][0] + 1e-9 && found[*n] < limits[*n][1] - 1e-9;
-        let free: Vec<usize> = (0..found.len()).filter(is_free).collect();
-        let (some, all) = (free.len(), found.len());
-        assert!(some > 5 && some < all, "{some} of {all} stick");
-        let matrix = DMatrix::from_fn(some, some, |i, j| dense[(free[i], free[j])]);
-        let right = DVector::from_fn(some, |i, _| {
-            let slips = (0..all).filter(|n| !free.contains(n));
-            wanted_m[free[i]] - slips.map(|n| dense[(free[i], n)] * found[n]).sum::<f64>()
-        });
-        let solved = matrix.lu().solve(&right).expect("regular");
-        let largest_n = found.iter().fold(0.0_f64, |l, f| l.max(f.abs()));
-        for (n, f) in free.iter().zip(solved.iter()) {
-            worst = worst.max((f - found[*n]).abs() / largest_n);
-        }
-        // What slips does so against its limit, and no other way.
-        let u = &dense * &found;
-        for n in (0..all).filter(|n| !free.contains(n) && limits[*n][0] < limits[*n][1]) {
-            let beyond_m = wanted_m[n] - u[n];
-            let is_at_top = found[n] >= limits[n][1] - 1e-9;
-            assert!(
-                if is_at_top { beyond_m > -1e-7 } else { beyond_m < 1e-7 },
-                "{n} of {m}+{k}: {beyond_m}"
+        for back_m in [2e-3, 3e-3, 3.5e-3, 4e-3, 4.5e-3, 5e-3] {
+            let (mut left, mut second) = (left.clone(), second.clone());
+            let anchors: Vec<f64> = second.state.anchor_m[..second.state.in_contact].to_vec();
+            let rests: Vec<f64> = left.rest_m[..left.count].to_vec();
+            let tip_m = depths_m[1] - back_m;
+            left.step_beside(&mut second, tip_m, DT_S);
+            let (m, k) = (second.state.in_contact, left.count);
+            let lines = [*second.line(), *left.needles[0].line.line()];
+            // Rows: shaft of the second, its tip, shaft and tip of the first, each with its share at places of the body.
+            let own = |line: usize, n: usize| vec![(place(&lines[line], n), 1.0, Some((line, n)))];
+            let tip = |line: usize, state: &crate::line::LineState| {
+                let weights = state.tip_range.clone().zip(state.tip_weights);
+                weights
+                    .map(|(n, w)| (place(&lines[line], n), w, None))
+                    .collect::<Vec<_>>()
+            };
+            let mut rows: Vec<_> = (0..m).map(|n| own(0, n)).collect();
+            rows.push(tip(0, &second.state));
+            rows.extend((0..k - 1).map(|n| own(1, n)));
+            rows.push(tip(1, &left.needles[0].line.state));
+            let entry = |i: usize, j: usize| {
+                let pairs = rows[i].iter().flat_map(|a| rows[j].iter().map(move |b| (a, b)));
+                pairs
+                    .map(|((p, w, a), (q, v, b))| {
+                        let same = if a.is_some() && a == b { 0.014 } else { 0.0 };
+                        w * v * (kernel(*p, *q, WHOLE) + same)
+                    })
+                    .sum::<f64>()
+            };
+            let dense = DMatrix::from_fn(m + 1 + k, m + 1 + k, entry);
+            let found = DVector::from_iterator(
+                m + 1 + k,
+                second.state.shaft_n[..m]
+                    .iter()
+                    .chain([&second.state.tip.force_n])
+                    .chain(&left.force_n[..k])
+                    .copied(),
             );
+            let mut wanted_m: Vec<f64> = anchors[..m].iter().map(|anchor| tip_m - anchor).collect();
+            wanted_m.push(tip_m - second.state.tip.material_m);
+            wanted_m.extend(&rests);
+            let mut limits: Vec<[f64; 2]> = (0..m)
+                .map(|n| limit_n(&second.model, second.state.tip.material_m, n))
+                .map(|high| [-high, high])
+                .collect();
+            limits.push([0.0, second.model.front(&second.state.tip).limit_n]);
+            limits.extend((0..k).map(|n| [left.low_n[n], left.high_n[n]]));
+            let is_free = |n: &usize| found[*n] > limits[*n][0] + 1e-9 && found[*n] < limits[*n][1] - 1e-9;
+            let free: Vec<usize> = (0..found.len()).filter(is_free).collect();
+            let (some, all) = (free.len(), found.len());
+            if some < 6 {
+                continue;
+            }
+            mixed += usize::from(some < all);
+            let matrix = DMatrix::from_fn(some, some, |i, j| dense[(free[i], free[j])]);
+            let right = DVector::from_fn(some, |i, _| {
+                let slips = (0..all).filter(|n| !free.contains(n));
+                wanted_m[free[i]] - slips.map(|n| dense[(free[i], n)] * found[n]).sum::<f64>()
+            });
+            let solved = matrix.lu().solve(&right).expect("regular");
+            let largest_n = found.iter().fold(0.0_f64, |l, f| l.max(f.abs()));
+            for (n, f) in free.iter().zip(solved.iter()) {
+                worst = worst.max((f - found[*n]).abs() / largest_n);
+            }
+            // What slips does so against its limit, and no other way.
+            let u = &dense * &found;
+            for n in (0..all).filter(|n| !free.contains(n) && limits[*n][0] < limits[*n][1]) {
+                let beyond_m = wanted_m[n] - u[n];
+                let is_at_top = found[n] >= limits[n][1] - 1e-9;
+                assert!(
+                    if is_at_top { beyond_m > -1e-7 } else { beyond_m < 1e-7 },
+                    "{n} of {m}+{k}: {beyond_m}"
+                );
+            }
         }
     }
-    println!("against the dense solution: {worst:.1e} of the largest force");
+    assert!(mixed >= 3, "{mixed} ticks in which some slip and some stick");
+    println!("{mixed} ticks against the dense solution: {worst:.1e} of the largest force");
     assert!(worst < 1e-6, "{worst}");
 }
 
