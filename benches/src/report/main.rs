@@ -1,6 +1,7 @@
 //! `make report`: every tissue model over the same insertions; speed, error, and what to pick.
 
 mod budget;
+mod findings;
 mod fit;
 mod models;
 mod page;
@@ -62,7 +63,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let points = table::points(&rows);
     table::write(&rows, &out.join("speed-vs-error.csv"))?;
     picture::draw(&points, &out.join("speed-vs-error.svg"))?;
-    let found = page::Findings {
+    let found = findings::Findings {
         machine: &machine,
         rows: &rows,
         points: &points,

@@ -1,30 +1,11 @@
 //! The page that says in words what was measured, and which model to pick for what.
 
-use crate::budget::Cause;
-use crate::models::{Family, Fitted};
+use crate::findings::Findings;
+use crate::models::Family;
 use crate::page_parts::{causes, passes, what_ships};
-use crate::passes::Passes;
-use crate::ships::Ships;
 use crate::table::{Point, Row, pareto};
 use std::fmt::Write as _;
 use stylet_benches::insertions::{GLAND, TICK_S};
-
-/// Everything that the page is written from.
-pub struct Findings<'a> {
-    pub machine: &'a [(String, String)],
-    pub rows: &'a [Row],
-    pub points: &'a [Point],
-    pub fitted: &'a Fitted,
-    /// Spacing (mm) and how far its seeds are from those of the finest spacing (mm, RMS and largest).
-    pub refinement: &'a [(f64, f64, f64)],
-    /// What ships, beside the converged solution of each tick.
-    pub ships: &'a [Ships],
-    /// Causes of the error of a needle's line.
-    pub causes: &'a [Cause],
-    /// One pass over a body in which everything moves.
-    pub passes: &'a [Passes],
-    pub seconds: f64,
-}
 
 /// The error that is asked for, in percent of the tip's travel.
 const ASKED_PERCENT: f64 = 10.0;

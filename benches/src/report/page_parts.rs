@@ -1,7 +1,7 @@
 //! The page's parts about what ships, causes of error, and the textbook's passes.
 
 use crate::budget::Cause;
-use crate::page::Findings;
+use crate::findings::Findings;
 use crate::passes::Passes;
 use std::fmt::Write as _;
 

@@ -311,7 +311,7 @@ impl<'a> Reader<'a> {
     /// Drops of a rehearsal: as many as are left.
     fn drops(&mut self) -> Vec<[f64; 3]> {
         let left = self.values.len().saturating_sub(self.at);
-        if left == 0 || left % 3 != 0 || left / 3 > MAX_SEEDS {
+        if left == 0 || !left.is_multiple_of(3) || left / 3 > MAX_SEEDS {
             let count = self.values.len();
             self.errors.push(RequestError::count(CommandKind::Rehearse, count));
             return Vec::new();

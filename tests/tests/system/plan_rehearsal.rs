@@ -59,6 +59,7 @@ fn rehearsed(link: &mut Link, task: &NeedleTask) -> Rest {
     let mut rehearser = LinkRehearser {
         link,
         interrupted: &Interrupt::default(),
+        stabilising: &[],
     };
     rehearser.rehearse(&task.drops, &Pace::default()).expect("goes through")
 }

@@ -289,7 +289,10 @@ mod tests {
         "strength_date",
     ];
 
-    fn columns(headers: &[&str], mapped: &[&str]) -> Result<(Vec<(String, f64)>, Vec<String>), String> {
+    /// Names with factors, and headers that are passed over.
+    type Columns = (Vec<(String, f64)>, Vec<String>);
+
+    fn columns(headers: &[&str], mapped: &[&str]) -> Result<Columns, String> {
         let headers: Vec<String> = headers.iter().map(|h| h.to_lowercase()).collect();
         let mapped: Vec<Mapped> = mapped.iter().map(|m| m.parse().unwrap()).collect();
         let (columns, passed) = of_header(&headers, &KNOWN, &mapped).map_err(|why| why.to_string())?;

@@ -257,6 +257,7 @@ fn lead(model: &BeamModel, state: &mut BeamState, scratch: &BeamScratch, needle:
     if off_m <= model.gap_m {
         return;
     }
+    #[expect(clippy::needless_range_loop, reason = "one index over several arrays")]
     for side in 0..2 {
         let wanted_m = lies_m[side] * (model.gap_m / off_m);
         let by_hole = &scratch.by_hole[side][..tied];

@@ -99,7 +99,7 @@ fn put(folder: &Path, name: &str, object: InMemDicomObject) -> PathBuf {
 fn write_series(folder: &Path, series: &str, slices: &[usize]) -> PathBuf {
     let name = |k: &usize| format!("{series}.{}.dcm", (k * 7 + 3) % 5);
     let paths = slices.iter().map(|k| put(folder, &name(k), slice(series, *k)));
-    paths.last().unwrap()
+    paths.reduce(|_, last| last).unwrap()
 }
 
 fn check(volume: &VoxelValues<f32>) {

@@ -157,6 +157,7 @@ fn displacement<V: Vector<f64>>(rows: &Rows, force_n: &[f64], scratch: &mut Scra
 fn choose(scratch: &mut Scratch) {
     let mut off = [0.0_f64; LANES];
     for b in 0..scratch.blocks() {
+        #[expect(clippy::needless_range_loop, reason = "one index over several arrays")]
         for l in 0..LANES {
             let (force, limit) = (scratch.force_n.0[b][l], scratch.limit_n.0[b][l]);
             let free = force + (scratch.stuck_m.0[b][l] - scratch.u_m.0[b][l]) * scratch.n_per_own_m.0[b][l];
@@ -334,8 +335,8 @@ fn part<V: Vector<f64>, const N: usize>(rows: &Rows, places: &[u16], numbers: &[
             sum[n] = sum[n].add(number.mul(V::load(&row[n])));
         }
     }
-    for n in 0..N {
-        sum[n].store(&mut sums.0[from + n]);
+    for (sum, to) in sum.into_iter().zip(&mut sums.0[from..from + N]) {
+        sum.store(to);
     }
 }
 

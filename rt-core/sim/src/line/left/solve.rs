@@ -261,6 +261,7 @@ vectorised! {
 
 vectorised! {
     /// [`solve`] for the instructions that the processor has; the same bits with all of them.
+    #[expect(clippy::too_many_arguments, reason = "those of `solve`, and the instructions")]
     fn solve_vectorised(
         model: &LineModel,
         state: &mut LineState,

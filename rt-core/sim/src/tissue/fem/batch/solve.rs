@@ -94,8 +94,8 @@ impl<T: Real> BatchState<T> {
         }
         for (lane, load) in loads.iter().take(LOADS).enumerate() {
             for entry in load.iter().filter(|entry| model.is_free(entry.node)) {
-                for c in 0..3 {
-                    r[entry.node as usize][c].0[lane] += T::of(entry.weight[c]);
+                for (value, weight) in r[entry.node as usize].iter_mut().zip(entry.weight) {
+                    value.0[lane] += T::of(weight);
                 }
             }
         }
