@@ -298,7 +298,7 @@ mod tests {
         // Full batches, sent without a pause, hold at least as much at 1 kHz.
         assert!(Duration::from_millis(MAX_BATCH as u64) >= BATCH_EVERY);
         let bytes = (MAX_HOSTS + 2) * (RECORD_BUFFER + 4) * MAX_BATCH * size_of::<TickRecord>();
-        assert!(bytes < 36_000_000, "{bytes} bytes in /dev/shm");
+        assert!(bytes < 38_000_000, "{bytes} bytes in /dev/shm");
     }
 
     #[test]

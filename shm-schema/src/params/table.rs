@@ -78,6 +78,6 @@ parameters! {
     EntryScatter "needle.entry_scatter" "Scatter of the entry" Needle "mm" 1e3, 0.0, 10.0, 0.0, "physics.md, Scatter", "Rehearsals and studies: standard deviation of how far a needle enters beside its hole, in each direction across. 0 is off.";
     SkinDeflection "needle.skin_deflection" "Deflection at the skin" Needle "deg" (1.0 / RAD), 0.0, 10.0, 0.0, "physics.md, Scatter", "Rehearsals and studies: standard deviation of the angle by which template and skin turn a needle about its entry, in each direction across. 0 is off; with 1.5 mm of scatter, 3.7 is what Moreira 2018 measured in patients.";
     ScatterSeed "needle.scatter_seed" "Scatter: seed" Needle "" 1.0, 1.0, 1e6, 1.0, "ours", "Which of the random numbers scatter and deflection are. The same seed gives the same needle the same error.";
-    MigratingShare "seeds.migrating_share" "Seeds that migrate" Seeds "%" 100.0, 0.0, 100.0, 0.0, "off; 0.47 % of 19,236 in patients (1748-717X-6-130)", "Share of the loose seeds that go back along the open track of their needle once it is out; 0 turns it off.";
+    MigratingShare "seeds.migrating_share" "Seeds that migrate" Seeds "%" 100.0, 0.0, 100.0, 0.0, "off; 1748-717X-6-130", "Share of the loose seeds that go back along the open track of their needle once it is out; 0 turns it off. In patients 0.47 % of 19,236 migrated.";
     MigrationSpeed "seeds.migration_speed" "Speed of migration" Seeds "mm/s" 1e3, 0.0, 50.0, 0.5, "ours, assumed", "How fast a seed that migrates moves along its track towards the entry.";
 }

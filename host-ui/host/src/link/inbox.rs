@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, Rehearsal, Reply, Session, TickRecord};
 
-/// Records that wait for the host: five minutes at 1 kHz, 65 MB.
+/// Records that wait for the host: five minutes at 1 kHz, 72 MB.
 pub const RECORDS_KEPT: usize = 300_000;
 /// Events that wait for the host: 1 MB.
 const EVENTS_KEPT: usize = 4096;
@@ -118,7 +118,7 @@ mod tests {
         let taken = inbox.take();
         assert_eq!(taken.records.len(), RECORDS_KEPT);
         assert_eq!(taken.records.front().map(|r| r.tick), Some(10));
-        assert!(size_of::<TickRecord>() * RECORDS_KEPT <= 65_000_000);
+        assert!(size_of::<TickRecord>() * RECORDS_KEPT <= 72_000_000);
         assert!(inbox.take().records.is_empty(), "taken once");
     }
 }

@@ -2,7 +2,7 @@
 //! made of such a file.
 //!
 //! The link's thread takes what arrives in shared memory, another encodes and writes it. A disk may be slow for five minutes
-//! before a tick is lost (65 MB, `link`), and a program that is stopped altogether for 12 s (`service::RECORD_BUFFER`). What
+//! before a tick is lost (72 MB, `link`), and a program that is stopped altogether for 12 s (`service::RECORD_BUFFER`). What
 //! is lost all the same is counted and listed, for each kind of message.
 
 mod error;
