@@ -61,7 +61,7 @@ impl Default for Look {
 struct Key {
     what: What,
     tip: [f64; 3],
-    /// Places along the needle.
+    /// Places along the needle without its hub, which trembles with the hand far more than what is in tissue.
     needle: Vec<[f64; 3]>,
     force: [f64; 3],
     seeds: Vec<[f64; 3]>,
@@ -300,7 +300,7 @@ impl Scene3d {
         let key = Key {
             what,
             tip: shown.tip_m().unwrap_or_default(),
-            needle: shown.needle_points_m(NEEDLE_LENGTH_M).unwrap_or_default(),
+            needle: bent_part(shown),
             force: shown.state.map_or([0.0; 3], |s| s.force_on_hand_n),
             seeds: shown.seeds.iter().map(|s| s.position_m).collect(),
         };
@@ -368,6 +368,12 @@ fn collect_fixed(marks: &mut Marks, shown: &Shown, look: Look, tokens: &'static 
         }
     }
     corner
+}
+
+fn bent_part(shown: &Shown) -> Vec<[f64; 3]> {
+    let mut points_m = shown.needle_points_m(NEEDLE_LENGTH_M).unwrap_or_default();
+    points_m.pop();
+    points_m
 }
 
 fn collect_live(marks: &mut Marks, (shown, view): (&Shown, &ViewState), look: Look, tokens: &'static Tokens) {

@@ -139,7 +139,9 @@ fn undisturbed(seconds: u32) {
     }
 }
 
+/// `make causes`.
 #[test]
+#[ignore = "depends on what else the machine does; run by `make causes`"]
 fn three_injected_causes_are_named_and_none_where_nothing_was_injected() {
     if let Some(why) = no_trace() {
         eprintln!("skipped: {why}");

@@ -160,7 +160,11 @@ impl Driven {
     /// As [`Driven::compare`] where tissue and seeds have moved, never to the same place twice: the slices are covered too, and
     /// figures may differ by so many pixels.
     pub fn compare_live(&mut self, name: &str, pixels: usize) {
-        self.draw();
+        // What moves is drawn coarser: until the hand has come to rest.
+        for _ in 0..10 {
+            self.draw();
+            std::thread::sleep(Duration::from_millis(50));
+        }
         let slices =
             ["Axial slice", "Sagittal slice", "Coronal slice"].map(|label| self.window.get_by_label(label).rect());
         slices.into_iter().for_each(|rect| self.window.mask(rect));
