@@ -80,7 +80,8 @@ pub fn causes(pieces: &[Piece], woke_ns: u64) -> Vec<Cause> {
     let mut all: Vec<Cause> = Vec::new();
     // The loop still ran when its time came: the tick before had not ended.
     let mut own_before = true;
-    for piece in pieces {
+    for piece in pieces.iter().flat_map(|piece| piece.cut_at(woke_ns)) {
+        let piece = &piece;
         own_before &= piece.own == Loop::Running;
         let working = piece.holder == Holder::OwnLoop && piece.from_ns >= woke_ns;
         let found = if working {

@@ -19,8 +19,12 @@ fn after_sleep(to: &str, lines: &[&str]) -> String {
     let mut text = format!(
         "          haptic-500     [001] d..2.  10.000020: sched_switch: prev_comm=haptic prev_pid=500 prev_prio=19 prev_state=S ==> {to}\n"
     );
+    // An interrupt stands in the name of the thread that it interrupts: that of the line before.
+    let mut thread = "<idle>-0";
     for line in lines {
-        text += &format!("  {line}\n");
+        let (of, rest) = line.split_once(' ').expect("a thread and an event");
+        thread = if of == "x-9" { thread } else { of };
+        text += &format!("  {thread} {rest}\n");
     }
     text
 }
@@ -48,6 +52,45 @@ fn a_wake_up_in_time_has_no_cause() {
         ],
     );
     assert_eq!(causes(&text, 1_012), []);
+}
+
+/// Some kernels record no switch away from the idle thread; then the name that stands before each event says who has the core.
+#[test]
+fn a_rival_is_named_where_the_kernel_records_no_switch_from_idle() {
+    let text = after_sleep(
+        TO_IDLE,
+        &[
+            "<idle>-0 [001] d.h1. 10.000900: local_timer_entry: vector=236",
+            "<idle>-0 [001] d.h3. 10.000901: sched_waking: comm=rival pid=600 prio=9 target_cpu=001",
+            "<idle>-0 [001] d.h1. 10.000903: local_timer_exit: vector=236",
+            "rival-600 [001] d.h.. 10.001002: local_timer_entry: vector=236",
+            WAKES,
+            "rival-600 [001] d.h1. 10.001007: local_timer_exit: vector=236",
+            "rival-600 [001] d.h.. 10.001407: local_timer_entry: vector=236",
+            "rival-600 [001] d.h1. 10.001408: local_timer_exit: vector=236",
+            "rival-600 [001] d..2. 10.001507: sched_switch: prev_comm=rival prev_pid=600 prev_prio=9 prev_state=S ==> next_comm=haptic next_pid=500 next_prio=19",
+        ],
+    );
+    let cause = first(&text, 1_510);
+    assert_eq!(
+        (cause.kind, cause.who.as_str(), cause.priority),
+        (Kind::HigherPriority, "rival", Some(90))
+    );
+    assert!((cause.us - 499.0).abs() < 2.0, "{cause:?}");
+    // The loop itself, taken from the idle core without a switch: its long work is its own.
+    let text = after_sleep(
+        TO_IDLE,
+        &[
+            "<idle>-0 [001] d.h1. 10.001002: local_timer_entry: vector=236",
+            WAKES,
+            "<idle>-0 [001] d.h1. 10.001007: local_timer_exit: vector=236",
+            "haptic-500 [001] d..2. 10.001900: sched_switch: prev_comm=haptic prev_pid=500 prev_prio=19 prev_state=S ==> next_comm=swapper/1 next_pid=0 next_prio=120",
+        ],
+    );
+    let ns = |us: u64| 10_000_000_000 + us * 1_000;
+    let pieces = timeline::pieces(&event::events(&text, 0), LOOP, PRIORITY, ns(1_000), ns(1_900)).expect("covered");
+    let all = blame::causes(&pieces, ns(1_010));
+    assert_eq!(all.iter().map(|c| c.kind).collect::<Vec<_>>(), [Kind::SlowWork], "{all:?}");
 }
 
 #[test]

@@ -51,6 +51,14 @@ impl Piece {
     pub fn length_ns(&self) -> u64 {
         self.to_ns - self.from_ns
     }
+
+    /// What of it lies before a moment, and what after.
+    pub fn cut_at(&self, at_ns: u64) -> impl Iterator<Item = Self> + use<> {
+        let at_ns = at_ns.clamp(self.from_ns, self.to_ns);
+        let [mut before, mut after] = [self.clone(), self.clone()];
+        (before.to_ns, after.from_ns) = (at_ns, at_ns);
+        [before, after].into_iter().filter(|piece| piece.from_ns < piece.to_ns)
+    }
 }
 
 /// The walk's state.
@@ -65,6 +73,8 @@ struct Walk {
     calls: BTreeMap<i32, String>,
     work: BTreeMap<i32, String>,
     wakers: BTreeMap<i32, String>,
+    /// Threads as the scheduler named them last.
+    known: BTreeMap<i32, Task>,
 }
 
 /// The pieces of `[from_ns, to_ns]` on the core of `events`; `own_pid` is the loop's thread, `own_priority` the kernel's
@@ -76,6 +86,7 @@ pub fn pieces(events: &[Event], own_pid: i32, own_priority: i32, from_ns: u64, t
     let mut last_ns = first.at_ns;
     for e in events {
         let at_ns = e.at_ns.max(last_ns);
+        walk.see(e);
         push(&mut pieces, &walk, last_ns.max(from_ns), at_ns.min(to_ns));
         walk.take(e);
         last_ns = at_ns;
@@ -131,7 +142,22 @@ impl Walk {
             calls: BTreeMap::new(),
             work: BTreeMap::new(),
             wakers: BTreeMap::new(),
+            known: BTreeMap::new(),
         }
+    }
+
+    /// Each event stands in the name of the thread that has the core. Some kernels record no switch away from the idle
+    /// thread: then the thread has had the core since the event before.
+    fn see(&mut self, e: &Event) {
+        if e.pid == self.current.pid {
+            return;
+        }
+        let task = self.known.get(&e.pid).cloned().unwrap_or_else(|| Task {
+            name: e.name.clone(),
+            pid: e.pid,
+            priority: 120,
+        });
+        self.give_to(&task);
     }
 
     fn holder(&self) -> Holder {
@@ -155,7 +181,7 @@ impl Walk {
 
     fn take(&mut self, e: &Event) {
         match &e.what {
-            What::Switch { from, left_as, to } => self.switch(from.pid, *left_as, to),
+            What::Switch { from, left_as, to } => self.switch(from, *left_as, to),
             What::Waking(task) => self.waking(e, task),
             What::Begin(i) => self.interruptions.push(i.clone()),
             What::End(i) => self.end(i),
@@ -168,8 +194,11 @@ impl Walk {
         }
     }
 
-    fn switch(&mut self, from: i32, left_as: char, to: &Task) {
-        if from == self.own_pid {
+    fn switch(&mut self, from: &Task, left_as: char, to: &Task) {
+        for task in [from, to] {
+            self.known.insert(task.pid, task.clone());
+        }
+        if from.pid == self.own_pid {
             self.own = match left_as {
                 'R' => Loop::Runnable,
                 'T' | 't' => Loop::Stopped,
@@ -178,6 +207,10 @@ impl Walk {
             };
             self.passed_over = self.own == Loop::Runnable && to.priority > self.own_priority;
         }
+        self.give_to(to);
+    }
+
+    fn give_to(&mut self, to: &Task) {
         if to.pid == self.own_pid {
             (self.own, self.own_priority, self.passed_over) = (Loop::Running, to.priority, false);
         } else if self.own == Loop::Runnable {
@@ -190,6 +223,7 @@ impl Walk {
     }
 
     fn waking(&mut self, e: &Event, task: &Task) {
+        self.known.insert(task.pid, task.clone());
         if task.pid == self.own_pid {
             self.own_priority = task.priority;
             if matches!(self.own, Loop::Asleep | Loop::Blocked | Loop::Stopped) {
