@@ -6,8 +6,15 @@ use stylet_controllers::{SLOWEST_M_PER_S, Wish};
 
 /// A tip that is held back lags behind the hand that drives it by no more than this.
 const LEAD_M: f64 = 0.004;
-/// The hand goes on for so long without another goal: a slow frame does not stop the needle, a window that hangs does.
-const HOLD_S: f64 = 0.5;
+/// The hand goes on without another goal for so many times the longest of the last frames: frames that are slow one after the
+/// other do not stop the needle, a window that hangs does. Nobody can know earlier, since keys are read once a frame.
+const HOLD_FRAMES: f64 = 1.5;
+/// At least for so long, however fast the frames are, and at most for so long, however slow.
+const HOLD_S: [f64; 2] = [0.1, 0.5];
+/// So many frames of this drive count.
+const FRAMES: usize = 8;
+/// Stands for the frames before a drive, which may be rare because nothing changed.
+const FIRST_FRAME_S: f64 = 0.16;
 /// The needle may be drawn back so far before the entry.
 pub const BEFORE_ENTRY_M: f64 = 0.02;
 /// Goals are sent no more often, whatever the frame rate.
@@ -33,6 +40,37 @@ pub struct Drive {
     /// `None` until this window has chosen one or found a needle in the tissue.
     beside_m: Option<[f64; 2]>,
     unsent_s: f64,
+    /// For how long the hand goes on after the last goal.
+    hold_s: f64,
+    frames: RecentFrames,
+}
+
+/// How long the last frames took, while the needle was driven.
+#[derive(Clone, Debug, PartialEq)]
+struct RecentFrames {
+    took_s: [f64; FRAMES],
+    next: usize,
+}
+
+impl Default for RecentFrames {
+    fn default() -> Self {
+        Self {
+            took_s: [FIRST_FRAME_S; FRAMES],
+            next: 0,
+        }
+    }
+}
+
+impl RecentFrames {
+    fn take(&mut self, took_s: f64) {
+        self.took_s[self.next % FRAMES] = took_s;
+        self.next = (self.next + 1) % FRAMES;
+    }
+
+    fn hold_s(&self) -> f64 {
+        let longest = self.took_s.iter().copied().fold(0.0, f64::max);
+        (HOLD_FRAMES * longest).clamp(HOLD_S[0], HOLD_S[1])
+    }
 }
 
 impl Drive {
@@ -69,13 +107,25 @@ impl Drive {
 
     /// The next goal, where it is time for one. The wish must be one that is followed, and `frame_s` the time since the last frame.
     pub fn step(&mut self, wish: &Wish, tip: &TipOnPath, frame_s: f64) -> Option<Goal> {
-        self.unsent_s += frame_s.clamp(0.0, HOLD_S);
+        let frame_s = frame_s.clamp(0.0, HOLD_S[1]);
+        self.unsent_s += frame_s;
+        if self.is_on() {
+            self.frames.take(frame_s);
+        } else {
+            self.frames = RecentFrames::default();
+        }
         if self.is_on() && self.unsent_s < GOALS_EVERY.as_secs_f64() {
             return None;
         }
         // The hand was at rest until now, or went on as it was asked to, for so long at most.
-        let went_s = if self.is_on() { self.unsent_s.min(HOLD_S) } else { 0.0 };
+        let went_s = if self.is_on() {
+            self.unsent_s.min(self.hold_s)
+        } else {
+            0.0
+        };
         self.unsent_s = 0.0;
+        let hold_s = self.frames.hold_s();
+        self.hold_s = hold_s;
         let along = wish.along_m_per_s;
         let on_path = |depth_m: f64| depth_m.clamp(-BEFORE_ENTRY_M, tip.length_m.max(-BEFORE_ENTRY_M));
         let went_m = self.at_m.unwrap_or(tip.depth_m) + along * went_s;
@@ -90,14 +140,14 @@ impl Drive {
                 let in_room = |m: f64| m.clamp(low.min(high), high.max(low));
                 let went_m = beside_m[axis] + across * went_s;
                 beside_m[axis] = in_room(went_m.clamp(tip.beside_m[axis] - LEAD_M, tip.beside_m[axis] + LEAD_M));
-                goes_on_m[axis] = in_room(beside_m[axis] + across * HOLD_S);
+                goes_on_m[axis] = in_room(beside_m[axis] + across * hold_s);
             }
             self.beside_m = Some(beside_m);
             beside_m = goes_on_m;
         }
         let speed = along.abs().max(across[0].hypot(across[1]));
         Some(Goal {
-            depth_m: on_path(at_m + along * HOLD_S),
+            depth_m: on_path(at_m + along * hold_s),
             beside_m,
             speed_m_per_s: speed.max(SLOWEST_M_PER_S),
         })
@@ -152,7 +202,7 @@ mod tests {
     /// A frame of more than 100 ms stopped the needle, and frames that were slow one after the other drove it at a part of its speed.
     #[test]
     fn the_needle_goes_as_fast_as_it_is_wished_whatever_the_frames_and_goals_are_bounded() {
-        for frame_s in [0.001, 0.004, 0.016, 0.040, 0.150, 0.400] {
+        for frame_s in [0.001, 0.004, 0.016, 0.040, 0.111, 0.200, 0.240] {
             let (mut drive, mut tip, mut goals, mut time_s) = (Drive::default(), OUTSIDE, 0, 0.0);
             let mut last = None;
             while time_s < 1.2 {
@@ -173,12 +223,43 @@ mod tests {
         }
     }
 
+    /// The hand went on for 0.5 s, 20 mm at the speed of the keys, however fast the frames had been.
     #[test]
-    fn a_window_that_hangs_stops_the_needle() {
+    fn a_window_that_hangs_stops_the_needle_after_a_tenth_of_a_second_or_one_and_a_half_frames() {
+        for (frame_s, goes_on_s) in [
+            (0.004, 0.1),
+            (0.016, 0.1),
+            (0.060, 0.1),
+            (0.111, 0.1665),
+            (0.200, 0.3),
+            (3.0, 0.5),
+        ] {
+            let (mut drive, mut tip, mut last) = (Drive::default(), OUTSIDE, None);
+            for _ in 0..40 {
+                tip.depth_m = 0.02;
+                last = drive.step(&along(0.04), &tip, frame_s).or(last);
+            }
+            let goal = last.expect("a goal");
+            let from_m = drive.at_m.expect("it is driven");
+            goes(&mut tip, &goal, 60.0);
+            let went_m = tip.depth_m - from_m;
+            assert!((went_m - 0.04 * goes_on_s).abs() < 1e-12, "{frame_s}: {went_m}");
+        }
+    }
+
+    /// One slow frame among fast ones: the needle waits for the window, and goes on from where it is.
+    #[test]
+    fn a_frame_that_nobody_foresaw_holds_the_needle_until_the_window_is_back() {
         let (mut drive, mut tip) = (Drive::default(), OUTSIDE);
-        let goal = drive.step(&along(0.04), &tip, 0.016).expect("a goal");
-        goes(&mut tip, &goal, 60.0);
-        assert!((tip.depth_m - 0.04 * HOLD_S).abs() < 1e-12, "{}", tip.depth_m);
+        let mut goal = drive.step(&along(0.04), &tip, 0.016).expect("a goal");
+        for frame_s in [0.016; 20].into_iter().chain([0.3]).chain([0.016; 20]) {
+            let before_m = tip.depth_m;
+            goes(&mut tip, &goal, frame_s);
+            assert!(tip.depth_m - before_m <= 0.04 * frame_s.min(HOLD_S[0]) + 1e-12);
+            goal = drive.step(&along(0.04), &tip, frame_s).expect("a goal");
+        }
+        let driven_s = 40.0 * 0.016 + HOLD_S[0];
+        assert!((tip.depth_m - 0.04 * driven_s).abs() < 1e-9, "{}", tip.depth_m);
     }
 
     #[test]
@@ -187,7 +268,7 @@ mod tests {
         for frame_s in [0.016, 100.0] {
             for _ in 0..1000 {
                 let goal = drive.step(&along(0.04), &OUTSIDE, frame_s).expect("a goal");
-                assert!(goal.depth_m <= LEAD_M + 0.04 * HOLD_S + 1e-12);
+                assert!(goal.depth_m <= LEAD_M + 0.04 * HOLD_S[1] + 1e-12);
             }
         }
     }
@@ -251,7 +332,7 @@ mod tests {
         assert!(drive.stop(&tip));
         assert!(!drive.stop(&tip));
         let goal = drive.step(&along(0.04), &tip, 0.016).expect("a goal");
-        assert!((goal.depth_m - 0.0123 - 0.04 * HOLD_S).abs() < 1e-12);
+        assert!((goal.depth_m - 0.0123 - 0.04 * HOLD_FRAMES * FIRST_FRAME_S).abs() < 1e-12);
     }
 
     #[test]
@@ -288,7 +369,7 @@ mod tests {
         let (mut drive, mut tip) = (Drive::default(), OUTSIDE);
         for _ in 0..1000 {
             let goal = drive.step(&wish, &tip, 0.016).expect("a goal");
-            assert!((goal.beside_m[0] - tip.beside_m[0]).abs() <= LEAD_M + 0.01 * HOLD_S + 1e-12);
+            assert!((goal.beside_m[0] - tip.beside_m[0]).abs() <= LEAD_M + 0.01 * HOLD_S[1] + 1e-12);
             tip.beside_m = drive.beside_m();
         }
         assert_eq!(drive.beside_m(), [0.03, -0.03]);

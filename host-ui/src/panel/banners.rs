@@ -218,12 +218,16 @@ pub fn banners_ui(ctx: &egui::Context, pictures: Rect, list: &[Banner]) -> Optio
         let most = SHARE * pictures.height();
         // It would scroll from 64 points on.
         let scroll = egui::ScrollArea::vertical().max_height(most).min_scrolled_height(most);
-        let inner = scroll.show(ui, |ui| {
-            ui.spacing_mut().item_spacing.y = 1.0;
-            // The last one that was clicked.
-            list.iter().filter_map(|banner| banner_ui(ui, banner)).last()
+        // Between two banners the pictures would be seen.
+        let backed = egui::Frame::new().fill(theme::of(ui).panel);
+        let inner = backed.show(ui, |ui| {
+            scroll.show(ui, |ui| {
+                ui.spacing_mut().item_spacing.y = 1.0;
+                // The last one that was clicked.
+                list.iter().filter_map(|banner| banner_ui(ui, banner)).last()
+            })
         });
-        inner.inner
+        inner.inner.inner
     });
     shown.inner
 }

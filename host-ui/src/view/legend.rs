@@ -12,7 +12,18 @@ use stylet_base::format;
 
 /// Height of a row of the legend, and the share of the picture that all of them may take.
 const ROW: f32 = 16.0;
-const MOST_SHARE: f32 = 0.5;
+const MOST_SHARE: f32 = 0.4;
+/// Height of a word (points).
+const WORD: f32 = 12.0;
+/// How much of the picture the legend covers where it stands.
+const BACKING: f32 = 0.7;
+
+/// A shape and what it means.
+pub struct Row {
+    name: String,
+    color: Color32,
+    filled: bool,
+}
 
 pub struct Legend<'a> {
     pub painter: &'a Painter,
@@ -29,30 +40,41 @@ impl Legend<'_> {
         Some(self.rect.min + Vec2::new(x * self.rect.width(), y * self.rect.height()))
     }
 
-    fn word(&self, place: Pos2, anchor: Align2, text: &str, color: Color32) {
+    fn size_of(&self, text: &str) -> Vec2 {
+        let font = FontId::proportional(WORD);
         self.painter
-            .text(place, anchor, text, FontId::proportional(12.0), color);
+            .layout_no_wrap(text.to_owned(), font, Color32::WHITE)
+            .size()
     }
 
-    pub fn landmarks(&self, corner_m: Option<[f32; 3]>, view: &ViewState) {
+    fn word(&self, place: Pos2, anchor: Align2, text: &str, color: Color32) {
+        self.painter
+            .text(place, anchor, text, FontId::proportional(WORD), color);
+    }
+
+    /// Axes and entry, with no word where the legend is: the axes lie in the same corner.
+    pub fn landmarks(&self, corner_m: Option<[f32; 3]>, view: &ViewState, rows: &[Row]) {
+        let legend = self.place_of(rows);
+        let word = |place: Pos2, anchor: Align2, text: &str, color: Color32| {
+            let size = self.size_of(text);
+            if !anchor.anchor_size(place, size).intersects(legend) {
+                self.word(place, anchor, text, color);
+            }
+        };
         if let Some(corner) = corner_m {
             for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
                 let mut end = corner;
                 end[axis] += 0.0145;
                 if let Some(place) = self.at(end) {
-                    self.word(place, Align2::CENTER_CENTER, name, self.tokens.weak);
+                    word(place, Align2::CENTER_CENTER, name, self.tokens.weak);
                 }
             }
         }
         if let Some(plan) = &self.shown.plan
             && let Some(place) = self.at(plan.entry_m.map(|c| c as f32))
         {
-            self.word(
-                place - Vec2::new(0.0, 16.0),
-                Align2::CENTER_BOTTOM,
-                "entry",
-                self.tokens.entry,
-            );
+            let above = place - Vec2::new(0.0, 16.0);
+            word(above, Align2::CENTER_BOTTOM, "entry", self.tokens.entry);
         }
         if let ([a, b], Some(length_m)) = (view.measure.points_m(), view.measure.length_m()) {
             let middle = (a + b) / 2.0;
@@ -92,12 +114,19 @@ impl Legend<'_> {
         );
     }
 
-    /// From below upwards; a filled dot is a surface, a ring a mark that is only planned.
-    pub fn rows(&self, look: Look, dose: Option<&DoseResult>) {
-        let mut rows: Vec<(String, Color32, bool)> = Vec::new();
+    /// What is drawn, from above downwards; nothing in a small picture, where it would lie over what it explains.
+    pub fn listed(&self, look: Look, dose: Option<&DoseResult>) -> Vec<Row> {
+        let mut rows = Vec::new();
+        let mut list = |name: &str, color, filled| {
+            rows.push(Row {
+                name: name.to_owned(),
+                color,
+                filled,
+            });
+        };
         let t = self.tokens;
         if let Some(scene) = &self.shown.scene {
-            rows.push(("gland".to_owned(), t.gland, true));
+            list("gland", t.gland, true);
             let others: Vec<Kind> = kinds(Some(scene)).collect();
             for (kind, name) in [
                 (Kind::Spared, "to be spared"),
@@ -105,36 +134,139 @@ impl Legend<'_> {
                 (Kind::Body, "body"),
             ] {
                 if others.contains(&kind) {
-                    rows.push((name.to_owned(), kind.color(t), true));
+                    list(name, kind.color(t), true);
                 }
             }
         }
         if look.rest_shape {
-            rows.push(("gland at rest".to_owned(), t.ghost, true));
+            list("gland at rest", t.ghost, true);
         }
         if self.shown.plan.is_some() || self.shown.planning.implant.is_some() {
-            rows.push(("planned seed".to_owned(), t.seed_planned, false));
+            list("planned seed", t.seed_planned, false);
         }
         if !self.shown.seeds.is_empty() {
-            rows.push(("placed seed".to_owned(), t.seed_placed, true));
+            list("placed seed", t.seed_placed, true);
         }
         for shell in dose.iter().flat_map(|d| &d.shells).filter(|s| !s.points_m.is_empty()) {
             let text = format!("{:.0} % isodose", LEVELS[shell.level] * 100.0);
-            rows.push((text, IMAGE.isodose[shell.level], true));
+            list(&text, IMAGE.isodose[shell.level], true);
         }
-        // In a small picture it would lie over what it explains.
         if rows.len() as f32 * ROW > MOST_SHARE * self.rect.height() {
+            rows.clear();
+        }
+        rows
+    }
+
+    /// Where the rows stand, with a margin.
+    fn place_of(&self, rows: &[Row]) -> Rect {
+        if rows.is_empty() {
+            return Rect::NOTHING;
+        }
+        let widest = rows.iter().map(|row| self.size_of(&row.name).x).fold(0.0, f32::max);
+        let corner = self.rect.left_bottom() + Vec2::new(6.0, -4.0);
+        let size = Vec2::new(27.0 + widest, ROW * rows.len() as f32 + 4.0);
+        Rect::from_min_max(corner - Vec2::new(0.0, size.y), corner + Vec2::new(size.x, 0.0))
+    }
+
+    /// A filled dot is a surface, a ring a mark that is only planned.
+    pub fn rows(&self, rows: &[Row]) {
+        if rows.is_empty() {
             return;
         }
+        // Needle and grid go through the same corner.
+        let backing = self.tokens.background.gamma_multiply(BACKING);
+        self.painter.rect_filled(self.place_of(rows), 3.0, backing);
         let mut place = self.rect.left_bottom() + Vec2::new(16.0, -14.0);
-        for (name, color, filled) in rows.into_iter().rev() {
-            if filled {
-                self.painter.circle_filled(place, 4.5, color);
+        for row in rows.iter().rev() {
+            if row.filled {
+                self.painter.circle_filled(place, 4.5, row.color);
             } else {
-                self.painter.circle_stroke(place, 4.0, Stroke::new(1.5, color));
+                self.painter.circle_stroke(place, 4.0, Stroke::new(1.5, row.color));
             }
-            self.word(place + Vec2::new(11.0, 0.0), Align2::LEFT_CENTER, &name, t.weak);
+            self.word(
+                place + Vec2::new(11.0, 0.0),
+                Align2::LEFT_CENTER,
+                &row.name,
+                self.tokens.weak,
+            );
             place.y -= ROW;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::theme::DARK;
+    use bytemuck::Zeroable;
+    use egui::Shape;
+    use stylet_shm_schema::PlanInForce;
+
+    /// "z" of the axes stood under "body", and "entry" under "gland", in the picture of a small window. No test saw it: without a
+    /// graphics device there is no picture, and no words over it.
+    #[test]
+    fn no_word_of_the_picture_lies_over_its_legend_however_it_is_turned() {
+        let mut shown = Shown::empty("lab");
+        let mut plan = PlanInForce::zeroed();
+        plan.entry_m = [0.03, 0.03, -0.02];
+        shown.plan = Some(plan);
+        let names = ["gland", "to be spared", "bone", "body", "planned seed", "placed seed"];
+        let rows = names.map(|name| Row {
+            name: name.to_owned(),
+            color: Color32::WHITE,
+            filled: true,
+        });
+        let tokens = &DARK;
+        let (mut left_out, mut painted) = (0, 0);
+        for size in [[336.0, 236.0], [331.0, 366.0], [664.0, 734.0]] {
+            for turn in 0..96 {
+                let mut camera = Camera::default();
+                camera.orbit([turn as f32 * 0.131, 0.2 * (turn % 7) as f32 - 0.6]);
+                let rect = Rect::from_min_size(Pos2::new(10.0, 20.0), size.into());
+                let words = words(rect, &camera, &shown, tokens, &rows);
+                let (of_legend, others): (Vec<_>, Vec<_>) =
+                    words.iter().partition(|(word, _)| names.contains(&word.as_str()));
+                assert_eq!(of_legend.len(), names.len());
+                painted += others.len();
+                left_out += 4 - others.len();
+                for (word, place) in &others {
+                    for (name, row) in &of_legend {
+                        assert!(
+                            !place.shrink(0.5).intersects(row.shrink(0.5)),
+                            "{word} over {name}, turn {turn}, {size:?}"
+                        );
+                    }
+                }
+            }
+        }
+        assert!(
+            left_out > 5 && painted > 3 * left_out,
+            "{left_out} left out, {painted} painted"
+        );
+    }
+
+    fn words(rect: Rect, camera: &Camera, shown: &Shown, tokens: &'static Tokens, rows: &[Row]) -> Vec<(String, Rect)> {
+        let ctx = egui::Context::default();
+        let output = ctx.run_ui(egui::RawInput::default(), |ui| {
+            let painter = ui.painter();
+            let legend = Legend {
+                painter,
+                rect,
+                camera,
+                tokens,
+                shown,
+            };
+            legend.landmarks(Some([0.06, -0.01, -0.03]), &ViewState::default(), rows);
+            legend.rows(rows);
+        });
+        let word = |shape: &Shape| match shape {
+            Shape::Text(text) => Some((text.galley.text().to_owned(), text.visual_bounding_rect())),
+            _ => None,
+        };
+        output
+            .shapes
+            .iter()
+            .filter_map(|clipped| word(&clipped.shape))
+            .collect()
     }
 }

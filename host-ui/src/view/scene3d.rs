@@ -219,11 +219,12 @@ impl Scene3d {
                     tokens,
                     shown,
                 };
-                legend.landmarks(self.corner_m, view);
-                legend.scale_bar();
                 // Beside the slices, these show the levels already.
                 let alone = dose.filter(|_| rect.width() > ALONE);
-                legend.rows(self.look, alone.map(|d| &**d));
+                let rows = legend.listed(self.look, alone.map(|d| &**d));
+                legend.landmarks(self.corner_m, view, &rows);
+                legend.scale_bar();
+                legend.rows(&rows);
             }
             None if rect.height() >= super::slice::ROOM_FOR_REASON => {
                 painter.rect_filled(rect, 0.0, tokens.background);

@@ -95,10 +95,10 @@ pub fn run(args: &FleetArgs) -> Result<u8, FleetError> {
     write_whole(&args.out.join(PAGE), page.as_bytes())?;
     for pc in &pcs {
         println!(
-            "{:<14} {} ({} reports, latest of {})",
+            "{:<14} {} ({}, latest of {})",
             pc.latest().outcome.words(),
             pc.name,
-            pc.entries.len(),
+            page::counted(pc.entries.len(), "report", "reports"),
             pc.latest().made_at
         );
     }

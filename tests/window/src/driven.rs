@@ -157,14 +157,18 @@ impl Driven {
         image_snapshot_options(&with_fewer_greys(&picture, 51), name, &tolerant());
     }
 
-    /// As [`Driven::compare`] where tissue and seeds have moved, never to the same place twice: the slices are covered too, and
-    /// figures may differ by so many pixels.
-    pub fn compare_live(&mut self, name: &str, pixels: usize) {
-        // What moves is drawn coarser: until the hand has come to rest.
+    /// What moves is drawn coarser: frames until hand and tissue have come to rest.
+    pub fn come_to_rest(&mut self) {
         for _ in 0..10 {
             self.draw();
             std::thread::sleep(Duration::from_millis(50));
         }
+    }
+
+    /// As [`Driven::compare`] where tissue and seeds have moved, never to the same place twice: the slices are covered too, and
+    /// figures may differ by so many pixels.
+    pub fn compare_live(&mut self, name: &str, pixels: usize) {
+        self.come_to_rest();
         let slices =
             ["Axial slice", "Sagittal slice", "Coronal slice"].map(|label| self.window.get_by_label(label).rect());
         slices.into_iter().for_each(|rect| self.window.mask(rect));

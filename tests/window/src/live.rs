@@ -50,6 +50,7 @@ fn four_steps_by_label_move_the_gland_and_drop_a_seed() {
     driven.until("a seed", |app| {
         app.link().snapshot().is_some_and(|s| s.header.seed_count == 1)
     });
+    driven.come_to_rest();
     keep_for_docs(&driven.picture("window"), "window");
     driven.click("Retract");
     driven.until("the needle outside", |app| phase(app) == Phase::Outside as u32);

@@ -198,6 +198,12 @@ fn assert_in_place(pixels: [f32; 2], scales: &[f32]) {
     );
 }
 
+/// The smallest window.
+#[test]
+fn no_text_is_cut_off_or_lies_over_another_at_960_x_600() {
+    assert_in_place([960.0, 600.0], &[1.0, 1.5]);
+}
+
 #[test]
 fn no_text_is_cut_off_or_lies_over_another_at_1280_x_720() {
     assert_in_place([1280.0, 720.0], &[1.0, 1.5, 2.0]);

@@ -158,8 +158,13 @@ impl SliceGpu {
         self.body = None;
         let (info, nodes_info) = (model.header.labels, model.header.nodes);
         let longest = self.state.device.limits().max_texture_dimension_3d;
-        let has_cells = |grid: &GridInfo| grid.dims.iter().all(|&d| d > 0 && d + 2 <= longest);
-        if !has_cells(&info) || !has_cells(&nodes_info) || model.labels.is_empty() {
+        let border = speckle::border_cells(info.spacing_m);
+        let has_cells = |grid: &GridInfo, border: usize| {
+            grid.dims
+                .iter()
+                .all(|&d| d > 0 && d as usize + 2 * border <= longest as usize)
+        };
+        if !has_cells(&info, border) || !has_cells(&nodes_info, 0) || model.labels.is_empty() {
             return;
         }
         let (dims, bytes) = speckle::brightness_volume(&model.header, &model.labels);
@@ -173,7 +178,9 @@ impl SliceGpu {
             nodes,
             nodes_info,
             at_rest: false,
-            volume_corner_m: info.origin_m.map(|c| (c - 1.5 * info.spacing_m) as f32),
+            volume_corner_m: info
+                .origin_m
+                .map(|c| (c - (border as f64 + 0.5) * info.spacing_m) as f32),
             volume_size_m: dims.map(|d| (d as f64 * info.spacing_m) as f32),
             scene_from_patient,
             patient: model.header.patient(),

@@ -47,7 +47,14 @@ const BY_ORGAN: [(Organ, f32); 5] = [
     (Organ::Perineum, 0.48),
 ];
 
-/// Brightness of every cell of a scene's labels, with one cell of nothing around them, as bytes; and its size.
+/// Cells of nothing around the labels. The outermost must not shine for an edge within the labels, which fill their grid from
+/// face to face: the graphics card goes on with the outermost cell as far as the picture reaches.
+pub fn border_cells(spacing_m: f64) -> usize {
+    // Labels finer than any image would need more; a number from shared memory must not ask for all of the card.
+    (REACH_M / spacing_m).ceil().min(64.0) as usize + 1
+}
+
+/// Brightness of every cell of a scene's labels, with a border of nothing around them, as bytes; and its size.
 pub fn brightness_volume(scene: &SceneHeader, labels: &[u8]) -> ([usize; 3], Vec<u8>) {
     let byte = |value: f32| (value * 255.0).round() as u8;
     let mut of_label = [byte(OUTSIDE); 256];
@@ -55,11 +62,12 @@ pub fn brightness_volume(scene: &SceneHeader, labels: &[u8]) -> ([usize; 3], Vec
         *slot = byte(brightness(structure));
     }
     let inner = scene.labels.dims.map(|d| d as usize);
-    let dims = inner.map(|d| d + 2);
+    let border = border_cells(scene.labels.spacing_m);
+    let dims = inner.map(|d| d + 2 * border);
     let mut volume = vec![of_label[0]; dims.iter().product()];
     for (row, cells) in labels.chunks_exact(inner[0].max(1)).enumerate() {
-        let (y, z) = (row % inner[1] + 1, row / inner[1] + 1);
-        let start = (z * dims[1] + y) * dims[0] + 1;
+        let (y, z) = (row % inner[1] + border, row / inner[1] + border);
+        let start = (z * dims[1] + y) * dims[0] + border;
         for (slot, &label) in volume[start..].iter_mut().zip(cells) {
             *slot = of_label[usize::from(label)];
         }
@@ -179,15 +187,45 @@ mod tests {
     #[test]
     fn cells_land_where_their_labels_are_inside_a_border_of_nothing() {
         let mut scene = SceneHeader::zeroed();
-        scene.labels.dims = [2, 1, 2];
+        (scene.labels.dims, scene.labels.spacing_m) = ([2, 1, 2], 1e-3);
         scene.structure_count = 2;
         (scene.structures[0].role, scene.structures[0].name) = (role::TARGET, Text::new("gland"));
         scene.structures[1].name = Text::new("bladder content");
         let (dims, volume) = brightness_volume(&scene, &[1, 0, 2, 1]);
-        assert_eq!(dims, [4, 3, 4]);
-        let at = |x: usize, y: usize, z: usize| volume[(z * 3 + y) * 4 + x];
+        assert_eq!(dims, [6, 5, 6], "two cells where 0.8 mm reach into the next");
+        let at = |x: usize, y: usize, z: usize| volume[(z * 5 + y) * 6 + x];
         let outside = at(0, 0, 0);
-        assert_eq!(at(1, 1, 1), 102, "the gland's");
-        assert_eq!((at(2, 1, 1), at(1, 1, 2), at(2, 1, 2)), (outside, 5, 102));
+        assert_eq!(at(2, 2, 2), 102, "the gland's");
+        assert_eq!((at(3, 2, 2), at(2, 2, 3), at(3, 2, 3)), (outside, 5, 102));
+    }
+
+    /// A gland touches the faces of its grid. The cell beside it shone, was the last of the volume, and went on as a bright band
+    /// to the edge of the picture.
+    #[test]
+    fn the_faces_of_the_volume_are_dark_however_the_beam_goes() {
+        let mut scene = SceneHeader::zeroed();
+        scene.labels.dims = [9, 10, 11];
+        scene.structure_count = 1;
+        (scene.structures[0].role, scene.structures[0].name) = (role::TARGET, Text::new("gland"));
+        let beams = [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [0.6, 0.64, 0.48]];
+        for (spacing_m, beam) in [0.2e-3, 0.4e-3, 0.8e-3, 1.36e-3]
+            .into_iter()
+            .flat_map(|s| beams.map(|b| (s, b)))
+        {
+            scene.labels.spacing_m = spacing_m;
+            let (dims, volume) = brightness_volume(&scene, &[1; 990]);
+            let shining = with_edges(&volume, dims, spacing_m, beam);
+            let outside = (f32::from(volume[0]) / LARGEST_LEVEL).round() as u8;
+            let on_face = |n: usize| {
+                let at = [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]];
+                (0..3).any(|a| at[a] == 0 || at[a] + 1 == dims[a])
+            };
+            let faces = (0..shining.len()).filter(|&n| on_face(n));
+            let bright = faces.filter(|&n| shining[n] != outside).count();
+            assert_eq!(bright, 0, "cells on faces, spacing {spacing_m}, beam {beam:?}");
+            let brightest = |cells: &[u8]| f32::from(cells.iter().copied().max().unwrap_or(0));
+            let level = brightest(&shining) * LARGEST_LEVEL;
+            assert!(level > brightest(&volume) + 2.0, "the gland's edge shines");
+        }
     }
 }

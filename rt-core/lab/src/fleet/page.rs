@@ -18,20 +18,21 @@ pub fn page(pcs: &[Pc], unread: &[Unread]) -> Result<String, DrawError> {
         .collect();
     let reports: usize = pcs.iter().map(|pc| pc.entries.len()).sum();
     let times = || pcs.iter().flat_map(|pc| pc.entries.iter().map(|e| e.made_at.as_str()));
+    let heading = format!("Latency of {}", counted(pcs.len(), "PC", "PCs"));
     let page = html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
-                title { "Latency of " (pcs.len()) " PCs" }
+                title { (heading) }
                 meta name="viewport" content="width=device-width";
                 style { (PreEscaped(STYLE)) }
             }
             body {
                 main {
-                    header { h1 { "Latency of " (pcs.len()) " PCs" } }
+                    header { h1 { (heading) } }
                     p class="sub" {
-                        (reports) " reports, " (times().min().unwrap_or_default()) " to " (times().max().unwrap_or_default())
+                        (counted(reports, "report", "reports")) ", " (times().min().unwrap_or_default()) " to " (times().max().unwrap_or_default())
                         ". Times are wake-up latencies of the force loop."
                     }
                     (cards(pcs, growths.len()))
@@ -54,17 +55,22 @@ pub fn page(pcs: &[Pc], unread: &[Unread]) -> Result<String, DrawError> {
     Ok(page.into_string() + "\n")
 }
 
+/// A count with the noun that goes with it.
+pub(super) fn counted(count: usize, one: &str, more: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { more })
+}
+
 fn cards(pcs: &[Pc], grown: usize) -> Markup {
     let with = |outcome| pcs.iter().filter(|pc| pc.latest().outcome == outcome).count();
     let cards = [
-        ("PCs pass", with(Outcome::Pass)),
-        ("PCs fail", with(Outcome::Fail)),
-        ("PCs not measurable", with(Outcome::NotMeasurable)),
-        ("tails grew", grown),
+        ("PC passes", "PCs pass", with(Outcome::Pass)),
+        ("PC fails", "PCs fail", with(Outcome::Fail)),
+        ("PC not measurable", "PCs not measurable", with(Outcome::NotMeasurable)),
+        ("tail grew", "tails grew", grown),
     ];
     html! {
         section class="cards four" {
-            @for (what, count) in cards { div { b { (count) } br; span { (what) } } }
+            @for (one, more, count) in cards { div { b { (count) } br; span { (if count == 1 { one } else { more }) } } }
         }
     }
 }

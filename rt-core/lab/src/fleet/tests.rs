@@ -8,6 +8,14 @@ use serde_json::{Value, json};
 /// Folder of the reports, removed at the end.
 struct Folder(PathBuf);
 
+impl Folder {
+    fn new(name: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("stylet-fleet-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&folder);
+        Self(folder)
+    }
+}
+
 impl Drop for Folder {
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.0);
@@ -50,8 +58,7 @@ fn put(folder: &Path, name: &str, report: &Value) {
 
 /// Five PCs with four reports each. The tail of `bravo` grows with its kernel, that of `delta` with nothing recorded.
 fn twenty(name: &str) -> Folder {
-    let folder = Folder(std::env::temp_dir().join(format!("stylet-fleet-{name}-{}", std::process::id())));
-    let _ = std::fs::remove_dir_all(&folder.0);
+    let folder = Folder::new(name);
     for i in 0..4_u32 {
         let day = 1 + 7 * i;
         let late = i >= 2;
@@ -111,8 +118,8 @@ fn page_names_who_passes_what_grew_and_what_changed_with_it() {
     assert_eq!(code, 1, "bravo fails");
     for (count, what) in [
         (3, "PCs pass"),
-        (1, "PCs fail"),
-        (1, "PCs not measurable"),
+        (1, "PC fails"),
+        (1, "PC not measurable"),
         (2, "tails grew"),
     ] {
         assert!(
@@ -120,6 +127,7 @@ fn page_names_who_passes_what_grew_and_what_changed_with_it() {
             "{count} {what}"
         );
     }
+    assert!(page.contains("<h1>Latency of 5 PCs</h1>") && page.contains("20 reports, "));
     // What needs attention stands first.
     let latest = section(&page, "Latest report");
     let place = |pc: &str| latest.find(&format!("<b>{pc}</b>")).expect("every PC has a row");
@@ -228,4 +236,19 @@ fn page_to_look_at() {
         out,
     };
     run(&args).expect("there are reports");
+}
+
+/// The page of one PC was headed "Latency of 1 PCs", "1 reports".
+#[test]
+fn one_pc_with_one_report_is_one() {
+    let folder = Folder::new("one");
+    put(
+        &folder.0,
+        "alpha/1",
+        &report("alpha", 1, 19.0, "6.1.0-rt", "menu", "PASS"),
+    );
+    let (_, page, _) = fleet(&folder);
+    assert!(page.contains("<h1>Latency of 1 PC</h1>"), "heading");
+    assert!(page.contains(">1 report, "), "{}", section(&page, "Latest"));
+    assert!(page.contains("<b>1</b><br><span>PC passes</span>"), "card");
 }
