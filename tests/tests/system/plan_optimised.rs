@@ -3,11 +3,13 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 use stylet_dose::decay::Interval;
+use stylet_dose::perturb::{Errors, Perturbation};
 use stylet_dose::{DoseKernel, Source};
 use stylet_files::dicom::structures::StructureSet;
 use stylet_files::dicom::{self, Identity};
 use stylet_implant::linked::scene;
 use stylet_implant::plan::automatic::{self, Aims};
+use stylet_implant::plan::optimise::robust::Trials;
 use stylet_implant::plan::optimise::{self, Engine, Method, Objectives};
 use stylet_implant::plan::{Anatomy, Needle, Template, check};
 use stylet_implant::readers::DoseFile;
@@ -66,7 +68,15 @@ fn the_automatic_plan_of_the_pelvis_keeps_its_limits() {
             assert!(wrong.is_empty(), "{wrong:?}");
             assert_eq!(found.figures.broken(), Vec::<String>::new());
             assert!(found.plan.needles.len() <= 25);
-            assert!(found.robust >= 0.95, "{}", found.robust);
+            // Other trials than those of the search.
+            let how = Perturbation {
+                errors: Errors::of_sigma(4e-3),
+                trials: 1000,
+                random_seed: 1,
+            };
+            let trials = Trials::new(&anatomy.target, &kernel, (&seeds, &[]), how);
+            println!("  D90 is kept in {:.1} % of 1,000 trials", trials.kept(145.0) * 100.0);
+            assert!(trials.kept(145.0) >= 0.95, "{}", trials.kept(145.0));
         }
     }
 }
@@ -120,10 +130,10 @@ fn a_plan_of_a_scene_becomes_three_files_that_belong_together() {
             .filter(|&&cell| usize::from(cell) == number + 1)
             .count();
         let expected_m3 = cells as f64 * cell_m3;
-        // Thin ones are read back larger than their cells, by up to 3.2 %.
+        // They lay half a voxel off, and thin ones were read back up to 3.2 % larger than their cells.
         println!("{name}: {:.3} of its cells", found_m3 / expected_m3);
         assert!(
-            (found_m3 / expected_m3 - 1.0).abs() < 0.04,
+            (found_m3 / expected_m3 - 1.0).abs() < 1e-6,
             "{name}: {found_m3} of {expected_m3} m3"
         );
     }

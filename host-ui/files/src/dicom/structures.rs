@@ -1,5 +1,6 @@
 //! RT Structure Set: named contours, as a label volume on the grid of their images.
 
+mod cells;
 mod outline;
 mod planes;
 mod raster;
@@ -23,7 +24,8 @@ use stylet_anatomy::ras_from_lps;
 
 const MAX_STRUCTURES: usize = 255;
 const MAX_MM: f64 = 10_000.0;
-/// Side of a voxel where there are no images.
+/// Side of a voxel where there are no images, and where contours do not run along cells, whose sides are then divided into such parts
+/// at most.
 const SIDE_M: f64 = 0.5e-3;
 /// Contours that are farther apart are of different planes.
 const SAME_PLANE_M: f64 = 0.05e-3;
@@ -164,11 +166,12 @@ impl StructureSet {
         let grid = match grid {
             Some(grid) => grid,
             None => {
+                let grid = self.grid_around()?;
                 notes.push(format!(
-                    "its images are not beside it: a grid of {} mm in the plane of the contours is taken",
-                    SIDE_M * 1e3
+                    "its images are not beside it: a grid of {} in the plane of the contours is taken",
+                    in_mm(&grid.frame)
                 ));
-                self.grid_around()?
+                grid
             }
         };
         let (labels, lost) = raster::labels(&self.structures, &grid)?;
@@ -185,7 +188,7 @@ impl StructureSet {
         Ok(with_warning(voxels, (!notes.is_empty()).then(|| notes.join("; "))))
     }
 
-    /// Two voxels larger than all contours on each side.
+    /// Two voxels larger than all contours on each side; their faces, not their middles, lie along the outermost contours.
     fn grid_around(&self) -> Result<Grid, ContentError> {
         let points = || self.structures.iter().flat_map(|s| s.contours.iter().flatten());
         let largest = self
@@ -205,20 +208,27 @@ impl StructureSet {
         let across = (across - normal * across.dot(&normal)).normalize();
         let axes = Matrix3::from_columns(&[across, normal.cross(&across), normal]);
         let step_m = self.plane_distance_m()?;
-        let sides = [SIDE_M, SIDE_M, step_m];
+        let along = |a: usize| points().map(move |p| axes.column(a).dot(p));
+        let side_m = |a: usize| match cells::pitch_m(along(a)) {
+            Some(pitch_m) => pitch_m / (pitch_m / SIDE_M).ceil(),
+            None => SIDE_M,
+        };
+        let sides = [side_m(0), side_m(1), step_m];
         let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
         for p in points() {
             let along = axes.transpose() * p;
             (low, high) = (low.inf(&along), high.sup(&along));
         }
-        let margin = Vector3::new(2.0 * SIDE_M, 2.0 * SIDE_M, step_m);
-        let low = low - margin;
-        let dims = [0, 1, 2].map(|a| ((high[a] + margin[a] - low[a]) / sides[a] - 1e-6).ceil() as u64 + 1);
+        // Planes lie in the middle of their voxels.
+        let half = Vector3::new(sides[0], sides[1], 0.0) / 2.0;
+        let margin = Vector3::new(2.0 * sides[0], 2.0 * sides[1], step_m);
+        let first = low - margin + half;
+        let dims = [0, 1, 2].map(|a| ((high[a] + margin[a] - half[a] - first[a]) / sides[a] - 1e-6).ceil() as u64 + 1);
         voxel_count(&dims)?;
         let columns = axes * Matrix3::from_diagonal(&Vector3::from(sides));
         Ok(Grid {
             dims: dims.map(|d| d as usize),
-            frame: VoxelFrame::new(columns, axes * low, "contours")?,
+            frame: VoxelFrame::new(columns, axes * first, "contours")?,
         })
     }
 
@@ -235,6 +245,16 @@ impl StructureSet {
             "each of its structures has contours in one plane only, so none has a thickness; put its images beside it"
                 .into(),
         )
+    }
+}
+
+/// Sides of the voxels of a slice.
+fn in_mm(frame: &VoxelFrame) -> String {
+    let [x, y] = [0, 1].map(|a| format!("{:.2}", frame.spacing_m[a] * 1e3));
+    if x == y {
+        format!("{x} mm")
+    } else {
+        format!("{x} x {y} mm")
     }
 }
 

@@ -139,12 +139,11 @@ impl Column {
             .map(|h| &h.dvh)
     }
 
-    /// Histogram of the first structure that is called like an organ.
+    /// Histogram of the first structure that is called like an organ; the wall of the rectum stands for it where it is drawn alone.
     pub fn organ(&self, organ: Organ) -> Option<&Dvh> {
-        self.histograms
-            .iter()
-            .find(|h| organ.is_mentioned_in(&h.name))
-            .map(|h| &h.dvh)
+        let called = |organ: Organ| self.histograms.iter().find(|h| organ.is_mentioned_in(&h.name));
+        let wall = || (organ == Organ::Rectum).then(|| called(Organ::RectalWall)).flatten();
+        called(organ).or_else(wall).map(|h| &h.dvh)
     }
 }
 

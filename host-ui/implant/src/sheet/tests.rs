@@ -77,3 +77,27 @@ fn the_page_has_every_figure_of_the_report_or_why_there_is_none() {
     assert!(json["states"][0]["figures"]["target D90 [Gy]"].as_f64().unwrap() > 100.0);
     assert!(json["states"][1]["figures"]["effect BED of target D90 [Gy]"]["not_computed"].is_string());
 }
+
+/// The page of `pelvis`, which draws the wall alone, had no rectum, while the plan kept its limit.
+#[test]
+fn the_wall_of_the_rectum_stands_for_it_where_it_is_drawn_alone() {
+    let (implant, at) = (implant(None), |low: f64| {
+        ([-0.01, low, -0.016], [0.01, low + 0.004, 0.016])
+    });
+    let kernel = DoseKernel::new(&implant.source, Interval::ALL);
+    let d2cc = |names: &[(&str, f64)]| {
+        let mut state = state();
+        for (name, low) in names {
+            let (low, high) = at(*low);
+            state.structures.push(Structure::of_box(name, low, high, 1e-3));
+        }
+        let columns = [Column::of(&implant, &kernel, state, None)];
+        let rows = rows(&implant, &columns);
+        let row = rows.iter().find(|r| r.group == "rectum" && r.name == "D2cc").unwrap();
+        row.values[0].clone().unwrap()
+    };
+    let wall = d2cc(&[("rectal wall", -0.024)]);
+    assert_eq!(wall, d2cc(&[("Rectum", -0.024)]));
+    // A rectum that is drawn counts, whichever comes first.
+    assert_eq!(wall, d2cc(&[("rectal wall", -0.03), ("Rectum", -0.024)]));
+}

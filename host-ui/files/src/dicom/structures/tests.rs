@@ -6,6 +6,8 @@ use super::*;
 use nalgebra::Rotation3;
 use std::f64::consts::PI;
 
+mod without_images;
+
 fn grid(dims: [usize; 3], sides_mm: [f64; 3]) -> Grid {
     let turned = Rotation3::from_euler_angles(0.2, -0.3, 0.4);
     let columns = turned.matrix() * Matrix3::from_diagonal(&(Vector3::from(sides_mm) * 1e-3));
@@ -164,21 +166,6 @@ fn planes_farther_apart_than_slices_fill_the_slices_between_but_not_a_gap() {
         .filter(|k| v.labels[k * 1600..(k + 1) * 1600].contains(&1))
         .collect();
     assert_eq!(used, [1, 2, 3, 4, 5, 6, 13, 14, 15, 16]);
-}
-
-#[test]
-fn without_images_the_grid_is_around_the_contours() {
-    let grid = grid([60, 60, 8], [0.5, 0.5, 3.0]);
-    let contours = (1..7)
-        .map(|k| circle(&grid, f64::from(k), [14.0, 15.0], 11.0))
-        .collect();
-    let v = set(vec![("Prostate", contours)]).voxels(None).unwrap();
-    let expected = PI * 121.0 * 18.0;
-    assert!((volume_mm3(&v, 1) / expected - 1.0).abs() < 0.01);
-    assert!((v.frame.spacing_m[2] - 3e-3).abs() < 1e-9);
-    let normal = grid.frame.directions.column(2);
-    assert!(v.frame.directions.column(2).dot(&normal).abs() > 1.0 - 1e-9);
-    assert!(v.frame.warning.unwrap().contains("images are not beside"));
 }
 
 /// A seeded scatter of blobs with holes and voxels that touch at corners.

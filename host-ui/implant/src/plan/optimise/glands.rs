@@ -1,14 +1,17 @@
-//! Twelve irregular glands with urethra, rectum and, in some, a pubic arch in the way.
+//! Irregular glands with urethra, rectum and, in some, a pubic arch in the way: twelve that were chosen, and any number that are drawn.
 
 use crate::plan::anatomy::{Body, ball, body_of};
 use crate::plan::{Anatomy, PITCH_M, Template};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
 use stylet_anatomy::PatientFrame;
 
 const MIDDLE_M: [f64; 3] = [0.05, 0.05, 0.08];
 
 /// One gland; x to the patient's left, y anterior, z into the body.
+#[derive(Clone, Copy)]
 pub struct Gland {
-    pub name: &'static str,
+    pub number: usize,
     pub cc: f64,
     /// Not looked at while the search was tuned.
     pub is_kept_aside: bool,
@@ -23,7 +26,7 @@ pub struct Gland {
 }
 
 const fn gland(
-    name: &'static str,
+    number: usize,
     cc: f64,
     is_kept_aside: bool,
     arch_mm: Option<f64>,
@@ -32,7 +35,7 @@ const fn gland(
     bend_per_m: f64,
 ) -> Gland {
     Gland {
-        name,
+        number,
         cc,
         is_kept_aside,
         arch_mm,
@@ -43,18 +46,18 @@ const fn gland(
 }
 
 pub const GLANDS: [Gland; 12] = [
-    gland("1", 25.0, false, None, [1.25, 0.9, 1.0], [0.05, 0.03, 0.02], 0.0),
-    gland("2", 28.0, true, None, [1.2, 0.95, 1.05], [0.03, 0.06, 0.03], 4.0),
-    gland("3", 31.0, false, Some(7.0), [1.3, 0.9, 1.0], [0.04, 0.04, 0.04], 2.0),
-    gland("4", 34.0, false, None, [1.15, 1.0, 1.0], [0.06, 0.02, 0.05], 5.0),
-    gland("5", 37.0, true, None, [1.3, 0.85, 1.1], [0.05, 0.05, 0.02], 3.0),
-    gland("6", 40.0, false, Some(6.0), [1.25, 0.95, 0.95], [0.03, 0.05, 0.05], 0.0),
-    gland("7", 43.0, false, None, [1.2, 0.9, 1.15], [0.07, 0.03, 0.03], 6.0),
-    gland("8", 46.0, false, None, [1.3, 1.0, 0.9], [0.04, 0.06, 0.04], 3.0),
-    gland("9", 49.0, true, Some(7.0), [1.25, 0.9, 1.05], [0.05, 0.04, 0.05], 2.0),
-    gland("10", 52.0, false, None, [1.2, 0.95, 1.1], [0.06, 0.05, 0.02], 4.0),
-    gland("11", 56.0, false, Some(5.0), [1.3, 0.95, 1.0], [0.03, 0.03, 0.06], 0.0),
-    gland("12", 60.0, true, None, [1.25, 1.0, 1.05], [0.05, 0.05, 0.04], 5.0),
+    gland(1, 25.0, false, None, [1.25, 0.9, 1.0], [0.05, 0.03, 0.02], 0.0),
+    gland(2, 28.0, true, None, [1.2, 0.95, 1.05], [0.03, 0.06, 0.03], 4.0),
+    gland(3, 31.0, false, Some(7.0), [1.3, 0.9, 1.0], [0.04, 0.04, 0.04], 2.0),
+    gland(4, 34.0, false, None, [1.15, 1.0, 1.0], [0.06, 0.02, 0.05], 5.0),
+    gland(5, 37.0, true, None, [1.3, 0.85, 1.1], [0.05, 0.05, 0.02], 3.0),
+    gland(6, 40.0, false, Some(6.0), [1.25, 0.95, 0.95], [0.03, 0.05, 0.05], 0.0),
+    gland(7, 43.0, false, None, [1.2, 0.9, 1.15], [0.07, 0.03, 0.03], 6.0),
+    gland(8, 46.0, false, None, [1.3, 1.0, 0.9], [0.04, 0.06, 0.04], 3.0),
+    gland(9, 49.0, true, Some(7.0), [1.25, 0.9, 1.05], [0.05, 0.04, 0.05], 2.0),
+    gland(10, 52.0, false, None, [1.2, 0.95, 1.1], [0.06, 0.05, 0.02], 4.0),
+    gland(11, 56.0, false, Some(5.0), [1.3, 0.95, 1.0], [0.03, 0.03, 0.06], 0.0),
+    gland(12, 60.0, true, None, [1.25, 1.0, 1.05], [0.05, 0.05, 0.04], 5.0),
 ];
 
 pub const TEMPLATE: Template = Template {
@@ -86,6 +89,34 @@ fn rod(name: &str, from_m: [f64; 3], to_m: [f64; 3], half_m: [f64; 2], bend_per_
         let at = centre + axis * p[2] + u * (p[0] * out * half_m[0]) + v * (p[1] * out * half_m[1]);
         let z = at.z - centre.z;
         [at.x, at.y + bend_per_m * z * z, at.z]
+    })
+}
+
+/// Volumes of drawn glands, cc, and what else is drawn: the ranges of the twelve.
+const VOLUMES_CC: [f64; 2] = [25.0, 60.0];
+const SHAPES: [[f64; 2]; 3] = [[1.15, 1.3], [0.85, 1.0], [0.9, 1.15]];
+const BUMPS: [f64; 2] = [0.02, 0.07];
+const BENDS_PER_M: [f64; 2] = [0.0, 6.0];
+const ARCHES_MM: [f64; 2] = [5.0, 7.0];
+
+/// Four glands, one from each quarter of the volumes, that follow from a random seed alone; one of three has a pubic arch in the way.
+/// Their numbers go on from those of the twelve.
+pub fn drawn(random_seed: u64) -> [Gland; 4] {
+    let mut random = ChaCha8Rng::seed_from_u64(random_seed);
+    let mut within = |[low, high]: [f64; 2]| {
+        let unit = (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+        low + (high - low) * unit
+    };
+    std::array::from_fn(|n| {
+        let [least, most] = VOLUMES_CC;
+        let cc = (least + (most - least) / 4.0 * (n as f64 + within([0.0, 1.0]))).round();
+        let has_arch = within([0.0, 3.0]) < 1.0;
+        let arch_mm = within(ARCHES_MM);
+        let shape = SHAPES.map(&mut within);
+        let bumps = [BUMPS; 3].map(&mut within);
+        let bend_per_m = within(BENDS_PER_M);
+        let number = GLANDS.len() + 4 * (random_seed as usize - 1) + n + 1;
+        gland(number, cc, true, has_arch.then_some(arch_mm), shape, bumps, bend_per_m)
     })
 }
 

@@ -145,6 +145,11 @@ impl Proposal {
         let order = |p: &Self| [p.figures.beyond(), p.shortfall, p.figures.v150];
         order(self) < order(other)
     }
+
+    /// Whether it keeps all limits, and the coverage that was asked for when seeds miss their places.
+    fn is_as_asked(&self) -> bool {
+        self.figures.beyond() == 0.0 && self.shortfall == 0.0
+    }
 }
 
 #[cfg(test)]

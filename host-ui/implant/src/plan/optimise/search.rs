@@ -15,6 +15,9 @@ use std::ops::ControlFlow;
 /// Places in the catalogue that a search may begin with, 0.36, 0.44 and 0.52 U for I-125; the one whose greedy choice costs least is
 /// taken.
 const FIRST_STRENGTHS: [usize; 3] = [3, 7, 11];
+/// Where that leads to no plan that is all that was asked for, another attempt begins so many places weaker than the last one ended:
+/// more and weaker seeds depend less on each of them, and annealing hardly changes the strength by much.
+const WEAKER: usize = 6;
 /// The search, and corrections of it by what the full engine found.
 const ROUNDS: usize = 3;
 const FIRST_SEARCH: Schedule = Schedule {
@@ -25,9 +28,12 @@ const CORRECTION: Schedule = Schedule {
     moves: 20_000,
     temperatures: [0.002, 0.0003],
 };
-/// Share of all that is reported once the samples are there, after the search begins and after its first round.
-const SAMPLED: f32 = 0.05;
-const BEGUN: f32 = 0.1;
+/// Another correction of an attempt is made where the last one left less than this share of what was short.
+const WORTHWHILE: f64 = 0.6;
+/// Share of all that is reported once the samples are there, and after each attempt.
+const ATTEMPTED: [f32; 4] = [0.05, 0.6, 0.8, 1.0];
+/// Share of an attempt that is reported after its greedy choice, and after its first round.
+const GREEDY: f32 = 0.05;
 const SEARCHED: f32 = 0.7;
 /// Share of annealing in a round.
 const ANNEALED: f32 = 0.7;
@@ -70,7 +76,7 @@ impl<'a> Search<'a> {
         let bodies = bodies(anatomy);
         let usual = (objectives.prescription_gy, strengths_u[strengths_u.len() / 2]);
         let samples = Samples::new(bodies, &candidates, kernel, usual, objectives.misplacement);
-        go_on(report(SAMPLED))?;
+        go_on(report(ATTEMPTED[0]))?;
         Ok(Self {
             anatomy,
             kernel,
@@ -83,48 +89,72 @@ impl<'a> Search<'a> {
 
     /// A plan for these objectives, which differ from those of [`Search::new`] in needles and robustness alone.
     pub fn find(&self, objectives: &Objectives, method: Method, report: Report<'_>) -> Result<Proposal, PlanError> {
-        let mut kept = FIRST_KEPT;
-        let mut state = self.begin(objectives, limits(objectives, kept, None), report)?;
         let mut best: Option<Proposal> = None;
+        let mut first_strengths = FIRST_STRENGTHS.to_vec();
+        for attempt in 1..ATTEMPTED.len() {
+            let [from, to] = [attempt - 1, attempt].map(|n| ATTEMPTED[n]);
+            let within = |share: f32| report(from + (to - from) * share);
+            let mut state = self.begin(objectives, &first_strengths, &within)?;
+            self.attempt(&mut state, objectives, method, &mut best, &within)?;
+            if best.as_ref().is_some_and(Proposal::is_as_asked) || state.strength == 0 {
+                break;
+            }
+            first_strengths = vec![state.strength.saturating_sub(WEAKER)];
+        }
+        best.ok_or(PlanError::NoDose)
+    }
+
+    /// Searches on from a state, and leaves in `best` what is better than it; ends where that is all that was asked for, and where a
+    /// correction did not help much.
+    fn attempt(
+        &self,
+        state: &mut State,
+        objectives: &Objectives,
+        method: Method,
+        best: &mut Option<Proposal>,
+        report: Report<'_>,
+    ) -> Result<(), PlanError> {
+        let (mut kept, mut short) = (FIRST_KEPT, f64::INFINITY);
         for round in 0..ROUNDS {
             let span = match round {
-                0 => [BEGUN, SEARCHED],
+                0 => [GREEDY, SEARCHED],
                 n => [n - 1, n].map(|n| SEARCHED + (1.0 - SEARCHED) * n as f32 / (ROUNDS - 1) as f32),
             };
             let within = |share: f32| report(span[0] + (span[1] - span[0]) * share);
             let schedule = if round == 0 { FIRST_SEARCH } else { CORRECTION };
             go_on(match method {
-                Method::GreedyExchange => greedy::exchange(&mut state, MOST_EXCHANGES, &within),
-                Method::Annealing => anneal(&mut state, &schedule, &within),
+                Method::GreedyExchange => greedy::exchange(state, MOST_EXCHANGES, &within),
+                Method::Annealing => anneal(state, &schedule, &within),
             })?;
-            let (found, trials) = self.judge(&mut state, objectives)?;
+            let (found, trials) = self.judge(state, objectives)?;
             let prescription_gy = objectives.prescription_gy / state.strength_u();
             let more = trials.strengthening(objectives.robust, prescription_gy);
             kept = (kept * more.map_or(1.0, |f| f as f32)).clamp(FIRST_KEPT, HIGHEST_KEPT);
             state.set_limits(limits(objectives, kept, Some((&found.figures, &found.sampled))));
+            let is_hopeless = found.figures.beyond() == 0.0 && found.shortfall > WORTHWHILE * short;
+            short = found.shortfall;
             if best.as_ref().is_none_or(|best| found.is_better_than(best)) {
-                best = Some(found);
+                *best = Some(found);
             }
-            let is_met = |best: &Proposal| best.figures.beyond() == 0.0 && best.shortfall == 0.0;
-            if best.as_ref().is_some_and(is_met) {
+            if is_hopeless || best.as_ref().is_some_and(Proposal::is_as_asked) {
                 break;
             }
         }
-        best.ok_or(PlanError::NoDose)
+        Ok(())
     }
 
-    /// The best greedy choice of the first strengths.
+    /// The greedy choice that costs least, from these strengths of the catalogue.
     fn begin<'s>(
         &'s self,
         objectives: &'s Objectives,
-        limits: Limits,
+        first_strengths: &[usize],
         report: Report<'_>,
     ) -> Result<State<'s>, PlanError> {
-        let strengths_u = &objectives.strengths_u;
+        let (strengths_u, limits) = (&objectives.strengths_u, limits(objectives, FIRST_KEPT, None));
         let mut begun: Option<State> = None;
-        for strength in FIRST_STRENGTHS.into_iter().filter(|s| *s < strengths_u.len()) {
+        for &strength in first_strengths.iter().filter(|s| **s < strengths_u.len()) {
             let mut state = State::empty(&self.candidates, &self.samples, strengths_u, strength, limits);
-            go_on(greedy::build(&mut state, &|_| report(BEGUN)))?;
+            go_on(greedy::build(&mut state, &|_| report(GREEDY)))?;
             if begun.as_ref().is_none_or(|begun| state.cost < begun.cost) {
                 begun = Some(state);
             }

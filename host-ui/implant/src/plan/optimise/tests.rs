@@ -1,7 +1,7 @@
 //! Plans of synthetic glands keep their limits, cancel, and are the same each time.
 
 use super::candidates::Candidates;
-use super::glands::{GLANDS, Gland, TEMPLATE};
+use super::glands::{GLANDS, Gland, TEMPLATE, drawn};
 use super::robust::Trials;
 use super::*;
 use crate::plan::automatic::{self, Aims};
@@ -66,8 +66,9 @@ fn straightforward_s(engine: &Engine, kernel: &DoseKernel, plan: &ImplantPlan) -
     begun.elapsed().as_secs_f64()
 }
 
-fn study(glands: impl Iterator<Item = &'static Gland>) {
+fn study<'a>(glands: impl Iterator<Item = &'a Gland>) {
     let (source, kernel) = iodine();
+    let mut missed = Vec::new();
     println!(
         "| gland | method | V100 | D90 | V150 | urethra D10 | D30 | rectum D2cc | needles | seeds | U | s | limits kept |"
     );
@@ -77,7 +78,7 @@ fn study(glands: impl Iterator<Item = &'static Gland>) {
         let engine = Engine::new(&kernel, bodies(&anatomy));
         let aside = if gland.is_kept_aside { ", aside" } else { "" };
         let arch = if gland.arch_mm.is_some() { ", arch" } else { "" };
-        let name = format!("{} ({} cc{arch}{aside})", gland.name, gland.cc);
+        let name = format!("{} ({} cc{arch}{aside})", gland.number, gland.cc);
         let begun = Instant::now();
         let proceed = |_| ControlFlow::Continue(());
         let today = automatic::plan(TEMPLATE, &anatomy, &kernel, &source.model, &Aims::new(145.0), proceed).unwrap();
@@ -102,13 +103,19 @@ fn study(glands: impl Iterator<Item = &'static Gland>) {
                 found.sampled.rectum_d2cc.unwrap_or(0.0),
                 found.figures.broken()
             );
-            println!("  robust {:.2?}", robustness(&anatomy, &engine, &kernel, &found.plan));
+            let robust = robustness(&anatomy, &engine, &kernel, &found.plan);
+            println!("  robust {robust:.2?}");
+            if method == Method::default() {
+                missed.extend((robust[0] < 95.0).then(|| format!("{name}: {:.1} % of the trials", robust[0])));
+            }
             let wrong = problems(&found.plan, &anatomy);
             assert!(wrong.is_empty(), "{name}: {wrong:?}");
             assert!(found.plan.needles.len() <= 25);
-            assert_eq!(found.figures.broken(), Vec::<String>::new(), "{name}, {words}");
+            let broken = found.figures.broken();
+            missed.extend(broken.iter().map(|what| format!("{name}, {words}: {what}")));
         }
     }
+    assert_eq!(missed, Vec::<String>::new());
 }
 
 /// The peripheral pattern gave V150 84.5 % and a urethra D10 of 291 Gy in `pelvis`, and nothing aimed at either.
@@ -234,4 +241,11 @@ fn glands_that_the_search_was_tuned_on() {
 #[ignore = "minutes; the command is in docs/plan.md"]
 fn glands_that_were_kept_aside() {
     study(GLANDS.iter().filter(|g| g.is_kept_aside));
+}
+
+/// No choice of the search or of its settings was made with these.
+#[test]
+#[ignore = "minutes; the command is in docs/plan.md"]
+fn glands_that_were_drawn_once_the_search_was_done() {
+    study([1, 2, 3, 4, 5].map(drawn).as_flattened().iter());
 }
