@@ -2,8 +2,8 @@
 //!
 //! Each station of the shaft sticks to the tissue until the force between them reaches the friction of its length, and slips
 //! with that force from then on. The tip pushes, and never pulls: against a membrane up to the force at which it gives way, in tissue up
-//! to the cutting force. All at once this is a convex problem with one solution, which is found from that of the last tick: by projected
-//! Gauss-Seidel, or by sets of stations that stick (`sets`) where the settings ask for it and no rate term is on. Nothing depends on speed
+//! to the cutting force. All at once this is a convex problem with one solution, which is found from that of the last tick by sets of
+//! stations that stick (`sets`); by projected Gauss-Seidel where a rate term is on, or where sets go round in a circle. Nothing depends on speed
 //! unless a rate term is asked for.
 
 use super::model::LineModel;

@@ -141,11 +141,12 @@ fn a_face_met_at_an_angle_is_felt_as_one_met_squarely() {
                 let [square, found] =
                     [0.0, degrees].map(|degrees| insert(source, kind, point(degrees), tilted(degrees), on_line));
                 let ratio = [found.held_n / square.held_n, found.rest_n / square.rest_n];
-                let model = format!(
-                    "{}, {}",
-                    kind.name(),
-                    if on_line { "needle line" } else { "off the line" }
-                );
+                let model = match (kind, on_line) {
+                    (TissueKind::Fem, true) => "fem, needle line",
+                    (TissueKind::Fem, false) => "fem, off the line",
+                    (_, true) => "chainmail, needle line",
+                    (_, false) => "chainmail, off the line",
+                };
                 let is_near = |ratio: f64| (ratio - 1.0).abs() <= 0.1;
                 keep(&Row {
                     number: 40,
