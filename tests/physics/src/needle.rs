@@ -13,6 +13,7 @@ use stylet_sim::line::ReadyLine;
 use stylet_sim::scene::{SceneSource, TissueKind};
 
 mod deep;
+mod grazing;
 mod hard;
 
 const KINDS: [TissueKind; 2] = [TissueKind::ChainMail, TissueKind::Fem];

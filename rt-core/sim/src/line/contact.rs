@@ -2,25 +2,30 @@
 //!
 //! Each station of the shaft sticks to the tissue until the force between them reaches the friction of its length, and slips
 //! with that force from then on. The tip pushes, and never pulls: against a membrane up to the force at which it gives way, in tissue up
-//! to the cutting force. All at once this is a convex problem with one solution, which is found from that of the last tick: by projected
-//! Gauss-Seidel, or by sets of stations that stick (`sets`) where the settings ask for it and no rate term is on. Nothing depends on speed
+//! to the cutting force. All at once this is a convex problem with one solution, which is found from that of the last tick by sets of
+//! stations that stick (`sets`); by projected Gauss-Seidel where a rate term is on, or where sets go round in a circle. Nothing depends on speed
 //! unless a rate term is asked for.
 
 use super::model::LineModel;
 use super::rows::{add_scaled, dot};
 use super::state::{LineOutput, LineState};
-use super::tip::follow;
-use crate::simd::{Simd, vectorised};
-use sets::{Scratch, Tip};
+use super::tip::{Place, follow};
+pub(super) use forces::find_by_sets;
+use forces::solve;
+use sets::LINE_BLOCKS;
 
-mod sets;
+mod forces;
+pub(super) mod sets;
+
+/// For the stations of one line.
+type Scratch = sets::Scratch<LINE_BLOCKS>;
 
 /// Solutions in one tick at most: the tip goes on, a membrane gives way, the tip goes on again.
-pub(super) const MAX_PASSES: u32 = 12;
+const MAX_PASSES: u32 = 12;
 /// A gap at the tip that another pass would be wasted on.
-pub(super) const CLOSED_M: f64 = 1e-7;
+const CLOSED_M: f64 = 1e-7;
 /// The line is not followed further than this from its entry.
-pub(super) const FURTHEST_M: f64 = 10.0;
+const FURTHEST_M: f64 = 10.0;
 
 /// Where the needle is in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,29 +45,74 @@ pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> Line
             ..state.last
         };
     }
-    let tip_m = input.tip_m.clamp(-FURTHEST_M, FURTHEST_M);
     state.leave_company();
-    if state.tip.material_m == f64::NEG_INFINITY {
-        state.tip.material_m = tip_m.min(0.0);
-    }
     let (rows, common_m_per_n) = (&model.compliance.rows, model.compliance.common_m_per_n());
     state
         .memory
         .begin(rows, common_m_per_n, &model.settings.prony, input.dt_s);
+    advance(model, state, input, &mut Alone(Scratch::new()))
+}
+
+/// What a needle shares a tick with: nothing, or needles that stay in.
+pub(super) trait Company {
+    /// Where the shaft touches and the tip loads is known; membrane and tip are made ready for [`solve`](Self::solve).
+    fn begin(&mut self, model: &LineModel, state: &mut LineState, tip_m: f64, membrane: Option<usize>);
+    /// Forces of all; returns how far the tip is beyond where the material has it.
+    fn solve(
+        &mut self,
+        model: &LineModel,
+        state: &mut LineState,
+        input: &LineInput,
+        limit_n: f64,
+        output: &mut LineOutput,
+    ) -> f64;
+    /// The needle that moves is outside of the tissue.
+    fn rest(&mut self) {}
+    /// The forces of the tick are found.
+    fn end(&mut self) {}
+}
+
+struct Alone(Scratch);
+
+impl Company for Alone {
+    fn begin(&mut self, model: &LineModel, state: &mut LineState, tip_m: f64, membrane: Option<usize>) {
+        touch(model, state, tip_m, &mut self.0);
+        meet(model, state, membrane);
+        press(model, state, membrane);
+    }
+
+    fn solve(
+        &mut self,
+        model: &LineModel,
+        state: &mut LineState,
+        input: &LineInput,
+        limit_n: f64,
+        output: &mut LineOutput,
+    ) -> f64 {
+        solve(model, state, input.tip_m, limit_n, input.dt_s, (&mut self.0, output))
+    }
+}
+
+/// The tick of a needle whose memory has begun it, with an input that is finite.
+pub(super) fn advance(
+    model: &LineModel,
+    state: &mut LineState,
+    input: &LineInput,
+    company: &mut impl Company,
+) -> LineOutput {
+    let tip_m = input.tip_m.clamp(-FURTHEST_M, FURTHEST_M);
+    let input = &LineInput { tip_m, ..*input };
     let mut output = LineOutput::default();
-    let mut scratch = Scratch::new();
+    if !has_met(model, state, tip_m) {
+        company.rest();
+        stay_outside(model, state, tip_m, &mut output);
+        return output;
+    }
+    let mut before = None;
     for _ in 0..MAX_PASSES {
         let front = model.front(&state.tip);
-        touch(model, state, tip_m, &mut scratch);
-        press(model, state, front.membrane);
-        let gap_m = solve(
-            model,
-            state,
-            tip_m,
-            front.limit_n,
-            input.dt_s,
-            (&mut scratch, &mut output),
-        );
+        company.begin(model, state, tip_m, front.membrane);
+        let gap_m = company.solve(model, state, input, front.limit_n, &mut output);
         output.held_by = front.membrane;
         let is_pushed = state.tip.force_n >= front.limit_n;
         if let (Some(layer), true) = (front.membrane, state.tip.force_n > 0.0) {
@@ -70,27 +120,75 @@ pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> Line
             if is_pushed || pushed_m >= model.layers[layer].puncture_depth_m {
                 state.tip.opened |= 1 << layer;
                 output.punctured = output.punctured.or(Some(layer));
+                before = None;
                 continue;
             }
         }
         let goes_on = gap_m > CLOSED_M && is_pushed && front.membrane.is_none();
         let goes_back = gap_m < -CLOSED_M && state.tip.force_n <= 0.0;
-        if !(goes_on || goes_back) || !follow(model, state, tip_m, gap_m, front.to_m) {
+        if goes_back && !has_met(model, state, tip_m) {
             break;
         }
+        let place = Place {
+            material_m: state.tip.material_m,
+            gap_m,
+        };
+        if !(goes_on || goes_back) || !follow(model, state, tip_m, front.to_m, place, before) {
+            break;
+        }
+        // Beyond that it is another force that holds the tip.
+        before = (state.tip.material_m < front.to_m).then_some(place);
     }
     slip(model, state, tip_m);
+    company.end();
     finish(model, state, &mut output);
     output
 }
 
 /// Stations that reached their friction stick to where they are now.
-pub(super) fn slip(model: &LineModel, state: &mut LineState, tip_m: f64) {
+fn slip(model: &LineModel, state: &mut LineState, tip_m: f64) {
     for n in 0..state.in_contact {
         if state.shaft_n[n].abs() >= limit_n(model, state.tip.material_m, n) {
             state.anchor_m[n] = tip_m - state.u_m[n];
         }
     }
+}
+
+/// Whether the needle is in the tissue or has come to its surface, which the past and other needles have moved. A tip that is
+/// outside is where the hand has it: one that stopped a hair before the surface is not held there.
+fn has_met(model: &LineModel, state: &mut LineState, tip_m: f64) -> bool {
+    let is_out = state.in_contact == 0 && state.tip.force_n == 0.0 && state.tip.material_m <= 0.0;
+    if !is_out {
+        return true;
+    }
+    let mut weights = [0.0; 64];
+    let range = model.tip_weights(0.0, &mut weights);
+    let first = model.compliance.stations + range.start;
+    let surface_m = dot(
+        &state.memory.offset_m[first..first + range.len()],
+        &weights[..range.len()],
+    );
+    state.tip.material_m = (tip_m - surface_m).min(0.0);
+    state.tip.material_m >= 0.0
+}
+
+/// A tick of a needle that has not met the surface.
+fn stay_outside(model: &LineModel, state: &mut LineState, tip_m: f64, output: &mut LineOutput) {
+    touch_beside(model, state, tip_m);
+    press(model, state, None);
+    state.tip_u_m = 0.0;
+    finish(model, state, output);
+}
+
+/// A membrane is met where the tissue in front of it is by now: past loads and other needles may have moved it before the tip was there.
+pub(super) fn meet(model: &LineModel, state: &mut LineState, membrane: Option<usize>) {
+    let held_by = membrane.map_or(0, |n| n as u32 + 1);
+    if held_by == state.tip.held_by || held_by == 0 {
+        return;
+    }
+    let count = state.in_contact;
+    let own = dot(&state.tip_column[..count], &state.shaft_n[..count]) + state.tip_own * state.tip.force_n;
+    state.tip_u_m = state.memory.gain * own + past_at_tip_m(model, state);
 }
 
 /// [`touch`] for a tick beside other needles.
@@ -206,152 +304,6 @@ pub(super) fn limit_n(model: &LineModel, place_m: f64, n: usize) -> f64 {
     model.friction_n_per_m[n] * (place_m - n as f64 * ds).clamp(0.0, ds)
 }
 
-/// Forces of shaft and tip; returns how far the tip is beyond where the material has it.
-fn solve(
-    model: &LineModel,
-    state: &mut LineState,
-    tip_m: f64,
-    tip_limit_n: f64,
-    dt_s: f64,
-    (scratch, output): (&mut Scratch, &mut LineOutput),
-) -> f64 {
-    let gain = state.memory.gain;
-    let place_m = state.tip.material_m;
-    let offset_m = past_at_tip_m(model, state);
-    let of_shaft = dot(&state.tip_column, &state.shaft_n[..state.in_contact]);
-    state.tip_u_m = gain * (of_shaft + state.tip_own * state.tip.force_n) + (offset_m + state.tip_offset_m);
-    let rate = model.settings.viscous_n_s_per_m2 / dt_s;
-    if rate != 0.0 || !model.settings.by_sets || !solve_by_sets(model, state, tip_m, tip_limit_n, scratch, output) {
-        solve_by_sweeps(model.simd, model, state, tip_m, tip_limit_n, rate, output);
-    }
-    tip_m - place_m - state.tip_u_m
-}
-
-/// Returns whether that found the forces; if not, the state is one to go on from.
-fn solve_by_sets(
-    model: &LineModel,
-    state: &mut LineState,
-    tip_m: f64,
-    tip_limit_n: f64,
-    scratch: &mut Scratch,
-    output: &mut LineOutput,
-) -> bool {
-    let count = state.in_contact;
-    let place_m = state.tip.material_m;
-    (scratch.count, scratch.gain) = (count, state.memory.gain);
-    scratch.tolerance_m = model.settings.tolerance_m;
-    scratch
-        .stuck_m
-        .set(count, state.anchor_m.iter().map(|anchor| tip_m - anchor));
-    scratch
-        .limit_n
-        .set(count, (0..count).map(|n| limit_n(model, place_m, n)));
-    scratch.column.set(count, state.tip_column.iter().copied());
-    scratch.force_n.set(count, state.shaft_n.iter().copied());
-    scratch.u_m.set(count, state.u_m.iter().copied());
-    scratch.tip = Tip {
-        own_m_per_n: state.tip_own,
-        stuck_m: tip_m - place_m,
-        limit_n: tip_limit_n,
-        force_n: state.tip.force_n,
-        u_m: state.tip_u_m,
-        ..Tip::default()
-    };
-    scratch.products = 0;
-    let is_found = sets::find(model.simd, &model.compliance.rows, scratch);
-    let found = scratch.force_n.numbers().iter().zip(scratch.limit_n.numbers());
-    for (to, (force, &limit)) in state.shaft_n[..count].iter_mut().zip(found) {
-        *to = force.max(-limit).min(limit);
-    }
-    state.u_m[..count].copy_from_slice(&scratch.u_m.numbers()[..count]);
-    state.tip.force_n = scratch.tip.force_n.max(0.0).min(tip_limit_n);
-    state.tip_u_m = scratch.tip.u_m;
-    output.sweeps += scratch.products;
-    output.residual_m = scratch.residual_m;
-    is_found
-}
-
-vectorised! {
-    /// [`sweep`] for the instructions that the processor has; the same bits with all of them.
-    fn solve_by_sweeps(
-        model: &LineModel,
-        state: &mut LineState,
-        tip_m: f64,
-        tip_limit_n: f64,
-        slowness: f64,
-        output: &mut LineOutput,
-    ) {
-        sweep(model, state, tip_m, tip_limit_n, slowness, output)
-    }
-}
-
-/// Forces of shaft and tip by projected Gauss-Seidel.
-#[inline(always)]
-fn sweep(
-    model: &LineModel,
-    state: &mut LineState,
-    tip_m: f64,
-    tip_limit_n: f64,
-    slowness: f64,
-    output: &mut LineOutput,
-) {
-    let rows = &model.compliance.rows;
-    let (count, gain) = (state.in_contact, state.memory.gain);
-    let place_m = state.tip.material_m;
-    let LineState {
-        ref mut shaft_n,
-        ref anchor_m,
-        ref mut u_m,
-        ref tip_column,
-        ..
-    } = *state;
-    let (shaft_n, anchor_m, u_m) = (&mut shaft_n[..count], &anchor_m[..count], &mut u_m[..count]);
-    let tip_column = &tip_column[..count];
-    let (mut tip_n, mut tip_u_m) = (state.tip.force_n, state.tip_u_m);
-    let tip_gain = gain * state.tip_own;
-    for sweep in 0..model.settings.sweeps {
-        let mut largest_m = 0.0_f64;
-        for step in 0..count {
-            let n = if sweep % 2 == 0 { count - 1 - step } else { step };
-            let row = &rows.row(n)[..count];
-            let own = gain * row[n];
-            let limit = limit_n(model, place_m, n);
-            let free_n = shaft_n[n] + (tip_m - anchor_m[n] - u_m[n]) / own;
-            let mut wanted = free_n.clamp(-limit, limit);
-            if slowness > 0.0 && wanted != free_n {
-                // Beyond the limit by what the slip of this tick adds.
-                let drag =
-                    slowness * (place_m - n as f64 * model.compliance.spacing_m).clamp(0.0, model.compliance.spacing_m);
-                wanted += (free_n - wanted) * drag * own / (1.0 + drag * own);
-            }
-            let change = wanted - shaft_n[n];
-            if change != 0.0 {
-                shaft_n[n] = wanted;
-                add_scaled(gain * change, row, u_m);
-                tip_u_m += gain * change * tip_column[n];
-                largest_m = largest_m.max((change * own).abs());
-            }
-        }
-        if tip_gain > 0.0 {
-            let wanted = (tip_n + (tip_m - place_m - tip_u_m) / tip_gain).clamp(0.0, tip_limit_n);
-            let change = wanted - tip_n;
-            if change != 0.0 {
-                tip_n = wanted;
-                add_scaled(gain * change, tip_column, u_m);
-                tip_u_m += tip_gain * change;
-                largest_m = largest_m.max((change * tip_gain).abs());
-            }
-        }
-        output.sweeps += 1;
-        output.residual_m = largest_m;
-        if largest_m <= model.settings.tolerance_m {
-            break;
-        }
-    }
-    state.tip.force_n = tip_n;
-    state.tip_u_m = tip_u_m;
-}
-
 /// What the spring of a membrane that is stretched passes on to the body as a whole.
 fn whole_n(model: &LineModel, state: &LineState) -> f64 {
     if state.membrane_n_per_m == 0.0 {
@@ -362,7 +314,7 @@ fn whole_n(model: &LineModel, state: &LineState) -> f64 {
     state.membrane_n_per_m * (dent_m - state.tip.met_dent_m)
 }
 
-pub(super) fn finish(model: &LineModel, state: &mut LineState, output: &mut LineOutput) {
+fn finish(model: &LineModel, state: &mut LineState, output: &mut LineOutput) {
     let m = model.compliance.stations;
     let count = state.in_contact;
     state.whole_n = whole_n(model, state);

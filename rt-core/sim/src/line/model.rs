@@ -63,7 +63,7 @@ impl Default for LineSettings {
             track_cutting_ratio: 0.2,
             viscous_n_s_per_m2: 0.0,
             prony: [PronyTerm::default(); 2],
-            by_sets: false,
+            by_sets: true,
             sweeps: 60,
             tolerance_m: 2e-9,
         }

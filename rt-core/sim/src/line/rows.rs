@@ -29,6 +29,24 @@ impl Rows {
         }
     }
 
+    /// Zeros, with room for matrices up to that size.
+    pub(super) fn with_room(size: usize) -> Self {
+        let mut rows = Rows::new(size, |_, _| 1.0);
+        rows.values.fill(0.0);
+        rows
+    }
+
+    /// Becomes a matrix of zeros of that size, for which there is room; does not allocate. False, and nothing changes, where there is none.
+    pub(super) fn begin(&mut self, size: usize) -> bool {
+        let stride = size.next_multiple_of(LANES);
+        let has_room = self.values.get(..size * stride).is_some();
+        if has_room {
+            (self.size, self.stride) = (size, stride);
+            self.values[..size * stride].fill(0.0);
+        }
+        has_room
+    }
+
     /// Rows, and columns.
     pub fn size(&self) -> usize {
         self.size

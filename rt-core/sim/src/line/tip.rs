@@ -9,9 +9,14 @@ const LEAST_KEPT: f64 = 0.02;
 /// Places closer than this are the same.
 const SAME_M: f64 = 1e-9;
 /// The tip's place is found to this.
-const PLACE_M: f64 = 1e-13;
+const PLACE_M: f64 = 1e-11;
 /// Where tissue in front is pressed together so far, a step through it counts at most so many times its length.
 const MOST_PRESSED: f64 = 10.0;
+/// Between two places close together, the gap closes by so much of the way between them.
+const LEAST_CLOSED: f64 = 0.5;
+const MOST_CLOSED: f64 = 3.0;
+/// Part of the gap that is left when the way to the second place was the right one.
+const LEFT: f64 = 0.5;
 /// Stations around the tip that a pass can reach.
 const WINDOW: usize = 64;
 
@@ -146,22 +151,53 @@ impl<'a> Around<'a> {
     }
 }
 
-/// Moves the tip through the material to where the world has it, but not past `to_m`; returns whether it moved.
-pub(super) fn follow(model: &LineModel, state: &mut LineState, tip_m: f64, gap_m: f64, to_m: f64) -> bool {
-    let from_m = state.tip.material_m;
-    let spacing_m = model.compliance.spacing_m;
+/// A place of the tip that was tried, and how far the needle is beyond it then.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub material_m: f64,
+    pub gap_m: f64,
+}
+
+/// Where the gap closes if it goes on changing as it did from the place before to this one; `None` where that says nothing.
+fn onward_m(before: Place, now: Place) -> Option<f64> {
+    let closed = (before.gap_m - now.gap_m) / (now.material_m - before.material_m);
+    let is_plain = (LEAST_CLOSED..MOST_CLOSED).contains(&closed) && now.gap_m.abs() < LEFT * before.gap_m.abs();
+    is_plain.then(|| now.material_m + now.gap_m / closed)
+}
+
+/// Moves the tip through the material to where the world has it, but not past `to_m`; returns whether it moved. `before` is the
+/// place that was tried before with the same front.
+pub(super) fn follow(
+    model: &LineModel,
+    state: &mut LineState,
+    tip_m: f64,
+    to_m: f64,
+    now: Place,
+    before: Option<Place>,
+) -> bool {
+    let onward_m = before.and_then(|before| onward_m(before, now));
+    let place_m = match onward_m.filter(|m| (0.0..=to_m).contains(m)) {
+        Some(place_m) => place_m,
+        None => nearest_m(model, state, tip_m, to_m, now),
+    };
+    state.tip.material_m = place_m;
+    state.tip.track_m = state.tip.track_m.max(place_m.min(model.length_m()));
+    place_m != now.material_m
+}
+
+/// The nearest place that is where the world has the tip, by the present loads.
+fn nearest_m(model: &LineModel, state: &LineState, tip_m: f64, to_m: f64, now: Place) -> f64 {
+    let (from_m, gap_m) = (now.material_m, now.gap_m);
     // One pass goes no further than some stations; the next goes on.
-    let reach_m = (MOST_PRESSED * gap_m.abs()).min(8.0 * spacing_m);
+    let reach_m = (MOST_PRESSED * gap_m.abs()).min(8.0 * model.compliance.spacing_m);
     let around = Around::new(model, state, reach_m);
     let furthest_m = if gap_m > 0.0 {
         (from_m + reach_m).min(to_m)
     } else {
-        from_m - reach_m
+        // Beyond the surface there is no material to go back through.
+        (from_m - reach_m).max(0.0)
     };
-    let place_m = root(&around, tip_m, from_m, gap_m, furthest_m);
-    state.tip.material_m = place_m;
-    state.tip.track_m = state.tip.track_m.max(place_m.min(model.length_m()));
-    place_m != from_m
+    root(&around, tip_m, from_m, gap_m, furthest_m)
 }
 
 /// Place between `from_m` and `furthest_m` that is at `tip_m` in the world, the nearest found; or `furthest_m`.

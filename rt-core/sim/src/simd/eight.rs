@@ -198,8 +198,40 @@ mod wide {
 }
 
 /// Makes a function as `vectorised` does, whose body is written in vectors: its second parameter of type is [`Number::Wide`]
-/// where there is AVX2, and [`Eight`] elsewhere. For one type of numbers: `<V: Vector<f64>>`.
+/// where there is AVX2, and [`Eight`] elsewhere. For one type of numbers: `<V: Vector<f64>>`, and `<V: Vector<f64>, const B: usize>`.
 macro_rules! in_vectors {
+    (
+        $(#[$attribute:meta])*
+        fn $name:ident<$v:ident: Vector<$t:ty>, const $b:ident: usize>($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? $body:block
+    ) => {
+        $(#[$attribute])*
+        pub(super) fn $name<const $b: usize>(simd: $crate::simd::Simd, $($argument: $type),*) $(-> $result)? {
+            #[inline(always)]
+            fn with<$v: $crate::simd::Vector<$t>, const $b: usize>($($argument: $type),*) $(-> $result)? $body
+
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx2")]
+            fn avx2<const $b: usize>($($argument: $type),*) $(-> $result)? {
+                with::<<$t as $crate::simd::Number>::Wide, $b>($($argument),*)
+            }
+
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx512f,avx512vl")]
+            fn avx512<const $b: usize>($($argument: $type),*) $(-> $result)? {
+                with::<<$t as $crate::simd::Number>::Wide, $b>($($argument),*)
+            }
+
+            match simd {
+                #[cfg(target_arch = "x86_64")]
+                // SAFETY: `detect` has found AVX-512F and VL.
+                $crate::simd::Simd::Avx512 => unsafe { avx512::<$b>($($argument),*) },
+                #[cfg(target_arch = "x86_64")]
+                // SAFETY: `detect` has found AVX2.
+                $crate::simd::Simd::Avx2 => unsafe { avx2::<$b>($($argument),*) },
+                $crate::simd::Simd::Portable => with::<$crate::simd::Eight<$t>, $b>($($argument),*),
+            }
+        }
+    };
     (
         $(#[$attribute:meta])*
         fn $name:ident<$v:ident: Vector<$t:ty>>($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? $body:block

@@ -8,6 +8,7 @@
 use super::super::model::MAX_STATIONS;
 use super::super::rows::Rows;
 use crate::simd::{LANES, Vector, in_vectors};
+use stylet_shm_schema::MAX_LEFT_NEEDLES;
 
 /// Sets that are tried before the sweeps take over.
 const MOST_SETS: u32 = 10;
@@ -16,15 +17,18 @@ const MOST_PRODUCTS: u32 = 60;
 /// Part of the tolerance to which the forces of a set are found.
 const WITHIN: f64 = 0.3;
 
-const BLOCKS: usize = MAX_STATIONS / LANES;
+/// Blocks of the stations of one line.
+pub(in crate::line) const LINE_BLOCKS: usize = MAX_STATIONS / LANES;
+/// Numbers in the largest problem: all needles that stay in, and the one that moves.
+const MOST: usize = (MAX_LEFT_NEEDLES + 1) * (MAX_STATIONS + 1) + LANES;
 
 /// A number for each station. In the last block that is in use, those past the last station are zero.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-pub(super) struct Each([[f64; LANES]; BLOCKS]);
+pub(in crate::line) struct Each<const B: usize>([[f64; LANES]; B]);
 
-impl Each {
-    const ZEROS: Each = Each([[0.0; LANES]; BLOCKS]);
+impl<const B: usize> Each<B> {
+    const ZEROS: Self = Each([[0.0; LANES]; B]);
 
     #[inline(always)]
     pub fn set(&mut self, count: usize, numbers: impl Iterator<Item = f64>) {
@@ -41,8 +45,8 @@ impl Each {
 }
 
 /// The tip, as one more station.
-#[derive(Clone, Copy, Default)]
-pub(super) struct Tip {
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::line) struct Tip {
     /// How far it moves for each newton, without the gain.
     pub own_m_per_n: f64,
     /// Displacement with which it is where the material has it, and the most force it has.
@@ -57,45 +61,48 @@ pub(super) struct Tip {
 }
 
 /// What a tick works in, for all of its solutions.
-pub(super) struct Scratch {
+#[derive(Clone, Debug)]
+pub(in crate::line) struct Scratch<const B: usize> {
     /// Stations in contact.
     pub count: usize,
     /// Displacement for each newton, over that of the compliance.
     pub gain: f64,
     pub tolerance_m: f64,
-    /// Displacement with which each station stays where it sticks, and the most force it has.
-    pub stuck_m: Each,
-    pub limit_n: Each,
+    /// Displacement with which each station stays where it sticks, and the least and the most force it has.
+    pub stuck_m: Each<B>,
+    pub low_n: Each<B>,
+    pub high_n: Each<B>,
     /// How each station moves with the tip's force, m/N.
-    pub column: Each,
+    pub column: Each<B>,
     /// Forces, and the displacements that they make.
-    pub force_n: Each,
-    pub u_m: Each,
+    pub force_n: Each<B>,
+    pub u_m: Each<B>,
     pub tip: Tip,
     /// Products with the compliance.
     pub products: u32,
     /// How far a station is off its place at most.
     pub residual_m: f64,
-    own_m_per_n: Each,
-    n_per_own_m: Each,
+    own_m_per_n: Each<B>,
+    n_per_own_m: Each<B>,
     /// 1 for those that stick.
-    sticks: Each,
+    sticks: Each<B>,
     /// Force of those that do not, and how much more that is than they have.
-    bounded_n: Each,
-    change_n: Each,
-    left_m: Each,
-    along_n: Each,
-    moved_m: Each,
+    bounded_n: Each<B>,
+    change_n: Each<B>,
+    left_m: Each<B>,
+    along_n: Each<B>,
+    moved_m: Each<B>,
 }
 
-impl Scratch {
+impl<const B: usize> Scratch<B> {
     pub fn new() -> Self {
         Scratch {
             count: 0,
             gain: 1.0,
             tolerance_m: 0.0,
             stuck_m: Each::ZEROS,
-            limit_n: Each::ZEROS,
+            low_n: Each::ZEROS,
+            high_n: Each::ZEROS,
             column: Each::ZEROS,
             force_n: Each::ZEROS,
             u_m: Each::ZEROS,
@@ -115,58 +122,59 @@ impl Scratch {
 
     #[inline(always)]
     fn blocks(&self) -> usize {
-        self.count.div_ceil(LANES).min(BLOCKS)
+        self.count.div_ceil(LANES).min(B)
     }
 }
 
 in_vectors! {
 /// Finds the forces from those of the last solution; returns whether they are within the tolerance.
-fn find<V: Vector<f64>>(rows: &Rows, scratch: &mut Scratch) -> bool {
+fn find<V: Vector<f64>, const B: usize>(rows: &Rows, scratch: &mut Scratch<B>) -> bool {
     let (count, gain) = (scratch.count, scratch.gain);
     scratch.own_m_per_n.set(count, (0..count).map(|n| gain * rows.row(n).get(n).copied().unwrap_or(1.0)));
     scratch.n_per_own_m.set(count, scratch.own_m_per_n.numbers().iter().map(|own| 1.0 / own));
     for _ in 0..MOST_SETS {
         choose(scratch);
         let is_found = scratch.residual_m <= scratch.tolerance_m;
-        to_limits::<V>(rows, scratch);
+        to_limits::<V, B>(rows, scratch);
         if is_found {
             return true;
         }
-        hold::<V>(rows, scratch);
+        hold::<V, B>(rows, scratch);
     }
     choose(scratch);
-    to_limits::<V>(rows, scratch);
+    to_limits::<V, B>(rows, scratch);
     false
 }
 }
 
 in_vectors! {
 /// Displacement of the first `count` stations for these forces.
-fn displacement<V: Vector<f64>>(rows: &Rows, force_n: &[f64], scratch: &mut Scratch) {
-    let (mut places, mut at) = ([0; MAX_STATIONS], 0);
-    for (n, force) in force_n.iter().enumerate().take(scratch.count.min(MAX_STATIONS)) {
+fn displacement<V: Vector<f64>, const B: usize>(rows: &Rows, force_n: &[f64], scratch: &mut Scratch<B>) {
+    let (mut places, mut at) = ([0; MOST], 0);
+    for (n, force) in force_n.iter().enumerate().take(scratch.count.min(MOST)) {
         places[at] = n as u16;
         at += usize::from(*force != 0.0);
     }
-    product::<V>(rows, scratch.blocks(), &places[..at], force_n, &mut scratch.u_m);
+    product::<V, B>(rows, scratch.blocks(), &places[..at], force_n, &mut scratch.u_m);
 }
 }
 
 /// Which stations stick, by where they are; and how far one is off at most.
 #[inline(always)]
-fn choose(scratch: &mut Scratch) {
+fn choose<const B: usize>(scratch: &mut Scratch<B>) {
     let mut off = [0.0_f64; LANES];
     for b in 0..scratch.blocks() {
         #[expect(clippy::needless_range_loop, reason = "one index over several arrays")]
         for l in 0..LANES {
-            let (force, limit) = (scratch.force_n.0[b][l], scratch.limit_n.0[b][l]);
+            let force = scratch.force_n.0[b][l];
+            let (low, high) = (scratch.low_n.0[b][l], scratch.high_n.0[b][l]);
             let free = force + (scratch.stuck_m.0[b][l] - scratch.u_m.0[b][l]) * scratch.n_per_own_m.0[b][l];
-            let bounded = if free > limit { limit } else { free };
-            let bounded = if bounded < -limit { -limit } else { bounded };
+            let bounded = if free > high { high } else { free };
+            let bounded = if bounded < low { low } else { bounded };
             let change = bounded - force;
             let by = (change * scratch.own_m_per_n.0[b][l]).abs();
             off[l] = if by > off[l] { by } else { off[l] };
-            let sticks = free.abs() < limit;
+            let sticks = low < free && free < high;
             scratch.sticks.0[b][l] = if sticks { 1.0 } else { 0.0 };
             scratch.bounded_n.0[b][l] = if sticks { force } else { bounded };
             scratch.change_n.0[b][l] = if sticks { 0.0 } else { change };
@@ -191,7 +199,7 @@ fn choose(scratch: &mut Scratch) {
 
 /// The stations whose number is not zero.
 #[inline(always)]
-fn places(numbers: &Each, count: usize, places: &mut [u16; MAX_STATIONS]) -> usize {
+fn places<const B: usize>(numbers: &Each<B>, count: usize, places: &mut [u16; MOST]) -> usize {
     let mut at = 0;
     for (n, number) in numbers.numbers().iter().enumerate().take(count) {
         places[at] = n as u16;
@@ -202,8 +210,8 @@ fn places(numbers: &Each, count: usize, places: &mut [u16; MAX_STATIONS]) -> usi
 
 /// Gives those that do not stick the force they have then, and adds what that moves.
 #[inline(always)]
-fn to_limits<V: Vector<f64>>(rows: &Rows, scratch: &mut Scratch) {
-    let mut at = [0; MAX_STATIONS];
+fn to_limits<V: Vector<f64>, const B: usize>(rows: &Rows, scratch: &mut Scratch<B>) {
+    let mut at = [0; MOST];
     let count = places(&scratch.change_n, scratch.count, &mut at);
     if count == 0 && scratch.tip.change_n == 0.0 {
         return;
@@ -214,7 +222,7 @@ fn to_limits<V: Vector<f64>>(rows: &Rows, scratch: &mut Scratch) {
     }
     scratch.tip.force_n = scratch.tip.bounded_n;
     let change_n = scratch.tip.change_n;
-    let tip = answer::<V>(rows, scratch, &at[..count], Of::Changes, change_n);
+    let tip = answer::<V, B>(rows, scratch, &at[..count], Of::Changes, change_n);
     for b in 0..scratch.blocks() {
         add::<V>(&mut scratch.u_m.0[b], 1.0, &scratch.moved_m.0[b]);
     }
@@ -224,9 +232,9 @@ fn to_limits<V: Vector<f64>>(rows: &Rows, scratch: &mut Scratch) {
 
 /// Conjugate gradients for the forces with which those that stick do not move.
 #[inline(always)]
-fn hold<V: Vector<f64>>(rows: &Rows, scratch: &mut Scratch) {
+fn hold<V: Vector<f64>, const B: usize>(rows: &Rows, scratch: &mut Scratch<B>) {
     let blocks = scratch.blocks();
-    let mut at = [0; MAX_STATIONS];
+    let mut at = [0; MOST];
     let count = places(&scratch.sticks, scratch.count, &mut at);
     let mut sum = V::splat(0.0);
     for b in 0..blocks {
@@ -245,7 +253,7 @@ fn hold<V: Vector<f64>>(rows: &Rows, scratch: &mut Scratch) {
         if square <= enough {
             break;
         }
-        let tip_moved = answer::<V>(rows, scratch, &at[..count], Of::Along, tip_along);
+        let tip_moved = answer::<V, B>(rows, scratch, &at[..count], Of::Along, tip_along);
         let mut sum = V::splat(0.0);
         for b in 0..blocks {
             sum = sum.add(V::load(&scratch.along_n.0[b]).mul(V::load(&scratch.moved_m.0[b])));
@@ -287,13 +295,19 @@ enum Of {
 
 /// Displacement `moved_m` for forces of some stations, by number, and of the tip; returns that of the tip.
 #[inline(always)]
-fn answer<V: Vector<f64>>(rows: &Rows, scratch: &mut Scratch, places: &[u16], of: Of, tip_n: f64) -> f64 {
+fn answer<V: Vector<f64>, const B: usize>(
+    rows: &Rows,
+    scratch: &mut Scratch<B>,
+    places: &[u16],
+    of: Of,
+    tip_n: f64,
+) -> f64 {
     let blocks = scratch.blocks();
     let force_n = match of {
         Of::Changes => &scratch.change_n,
         Of::Along => &scratch.along_n,
     };
-    product::<V>(rows, blocks, places, force_n.numbers(), &mut scratch.moved_m);
+    product::<V, B>(rows, blocks, places, force_n.numbers(), &mut scratch.moved_m);
     let mut sum = V::splat(0.0);
     for b in 0..blocks {
         let column = V::load(&scratch.column.0[b]);
@@ -306,24 +320,36 @@ fn answer<V: Vector<f64>>(rows: &Rows, scratch: &mut Scratch, places: &[u16], of
 
 /// Sum of the rows of some stations times their numbers, in the first so many blocks.
 #[inline(always)]
-fn product<V: Vector<f64>>(rows: &Rows, blocks: usize, places: &[u16], numbers: &[f64], sums: &mut Each) {
+fn product<V: Vector<f64>, const B: usize>(
+    rows: &Rows,
+    blocks: usize,
+    places: &[u16],
+    numbers: &[f64],
+    sums: &mut Each<B>,
+) {
     let mut b = 0;
     // As many blocks at once as there are registers for: no sum waits for the one before it.
     while b + 5 <= blocks {
-        part::<V, 5>(rows, places, numbers, b, sums);
+        part::<V, B, 5>(rows, places, numbers, b, sums);
         b += 5;
     }
     match blocks - b {
-        4 => part::<V, 4>(rows, places, numbers, b, sums),
-        3 => part::<V, 3>(rows, places, numbers, b, sums),
-        2 => part::<V, 2>(rows, places, numbers, b, sums),
-        1 => part::<V, 1>(rows, places, numbers, b, sums),
+        4 => part::<V, B, 4>(rows, places, numbers, b, sums),
+        3 => part::<V, B, 3>(rows, places, numbers, b, sums),
+        2 => part::<V, B, 2>(rows, places, numbers, b, sums),
+        1 => part::<V, B, 1>(rows, places, numbers, b, sums),
         _ => {}
     }
 }
 
 #[inline(always)]
-fn part<V: Vector<f64>, const N: usize>(rows: &Rows, places: &[u16], numbers: &[f64], from: usize, sums: &mut Each) {
+fn part<V: Vector<f64>, const B: usize, const N: usize>(
+    rows: &Rows,
+    places: &[u16],
+    numbers: &[f64],
+    from: usize,
+    sums: &mut Each<B>,
+) {
     let mut sum = [V::splat(0.0); N];
     for &place in places {
         let row = rows.blocks(place as usize);

@@ -8,6 +8,7 @@ use crate::line::columns::{ColumnQueue, TOLERANCE, tests::paper};
 use crate::line::{Compliance, LineLayer, LineSettings, PronyTerm};
 use stylet_heap as heap;
 
+mod balance;
 mod behaviour;
 mod bits;
 mod creep;
@@ -264,14 +265,41 @@ fn ten_thousand_random_cycles_make_no_energy() {
 /// What a hand that goes to and fro at random can have had at most out of any stretch of ticks beyond what was stored, J.
 fn random_cycles(model: &LineModel, cycles: u32, stored: impl Fn(&LineState, &LineModel) -> f64) -> f64 {
     let mut state = LineState::new(model);
-    let mut random = Random(11);
-    let (mut tip_m, mut stored_j, mut force_n) = (-1e-3, 0.0, 0.0);
+    let (mut stored_j, mut force_n) = (0.0, 0.0);
     let (mut excess_j, mut worst_j, mut sampled_j, mut worst_sampled_j) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
     let (mut work_j, mut ticks, mut punctures) = (0.0, 0_u64, 0);
+    random_hand(cycles, |is_new, tip_m, by_m| {
+        if is_new {
+            state = LineState::new(model);
+            (stored_j, force_n, excess_j, sampled_j) = (0.0, 0.0, 0.0, 0.0);
+        }
+        let output = step(model, &mut state, &at(tip_m));
+        punctures += u32::from(output.punctured.is_some());
+        let now_j = stored(&state, model);
+        let hand_j = -output.force_on_hand_n * by_m;
+        work_j += hand_j;
+        excess_j = (excess_j + (now_j - stored_j) - hand_j).max(0.0);
+        sampled_j = (sampled_j + (now_j - stored_j) + force_n * by_m).max(0.0);
+        worst_j = worst_j.max(excess_j);
+        worst_sampled_j = worst_sampled_j.max(sampled_j);
+        (stored_j, force_n) = (now_j, output.force_on_hand_n);
+        ticks += 1;
+    });
+    println!(
+        "{ticks} ticks, {punctures} punctures, {work_j:.1} J of work; excess {:.3e} uJ; force of the tick before: {:.1} uJ",
+        1e6 * worst_j,
+        1e6 * worst_sampled_j
+    );
+    worst_j
+}
+
+/// A hand that goes to and fro: whether the tissue is new, where the tip is, and by how much it has moved.
+fn random_hand(cycles: u32, mut tick: impl FnMut(bool, f64, f64)) {
+    let mut random = Random(11);
+    let (mut tip_m, mut is_new) = (-1e-3, true);
     for cycle in 0..cycles {
         if cycle % 50 == 0 {
-            state = LineState::new(model);
-            (tip_m, stored_j, force_n, excess_j, sampled_j) = (-1e-3, 0.0, 0.0, 0.0, 0.0);
+            (tip_m, is_new) = (-1e-3, true);
         }
         // Some cycles are large, some hardly leave the place.
         let size = if cycle % 3 == 0 { 2e-3 } else { 45e-3 };
@@ -285,29 +313,13 @@ fn random_cycles(model: &LineModel, cycles: u32, stored: impl Fn(&LineState, &Li
             while tip_m != end_m {
                 let by_m = (end_m - tip_m).clamp(-speed, speed);
                 tip_m += by_m;
-                let output = step(model, &mut state, &at(tip_m));
-                punctures += u32::from(output.punctured.is_some());
-                let now_j = stored(&state, model);
-                let hand_j = -output.force_on_hand_n * by_m;
-                work_j += hand_j;
-                excess_j = (excess_j + (now_j - stored_j) - hand_j).max(0.0);
-                sampled_j = (sampled_j + (now_j - stored_j) + force_n * by_m).max(0.0);
-                worst_j = worst_j.max(excess_j);
-                worst_sampled_j = worst_sampled_j.max(sampled_j);
-                (stored_j, force_n) = (now_j, output.force_on_hand_n);
-                ticks += 1;
+                tick(std::mem::take(&mut is_new), tip_m, by_m);
                 if by_m == 0.0 {
                     break;
                 }
             }
         }
     }
-    println!(
-        "{ticks} ticks, {punctures} punctures, {work_j:.1} J of work; excess {:.3e} uJ; force of the tick before: {:.1} uJ",
-        1e6 * worst_j,
-        1e6 * worst_sampled_j
-    );
-    worst_j
 }
 
 /// Numbers that look random and are the same on every run (splitmix64).

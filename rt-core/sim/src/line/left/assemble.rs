@@ -84,6 +84,19 @@ impl LeftNeedles {
         self.moving_rows = moving.map_or(0, |line| 2 * line.model.compliance.stations);
         self.added_m.fill(0.0);
         let Some(moving) = moving else { return };
+        let stations = moving.model.compliance.stations;
+        let elements = self.count;
+        if !self.all.begin(elements + stations) {
+            return;
+        }
+        for k in 0..elements {
+            let own = &self.own[k * self.stride..k * self.stride + elements];
+            self.all.row_mut(k)[..elements].copy_from_slice(own);
+        }
+        for n in 0..stations {
+            let row = &moving.model.compliance.rows.row(n)[..stations];
+            self.all.row_mut(elements + n)[elements..elements + stations].copy_from_slice(row);
+        }
         for needle in &self.needles {
             let Some(joined) = between(&needle.line, moving) else {
                 continue;
@@ -95,6 +108,10 @@ impl LeftNeedles {
                     let entry: f64 = needle.rows(i).map(|(p, w)| w * joined.at(p, row)).sum();
                     self.to_moving[k * 2 * MAX_STATIONS + row] = entry;
                     self.from_moving[row * self.stride + k] = entry;
+                    if row < stations {
+                        self.all.row_mut(k)[elements + row] = entry;
+                        self.all.row_mut(elements + row)[k] = entry;
+                    }
                 }
             }
         }

@@ -6,14 +6,17 @@
 //! [`solve`]. A needle alone never comes here.
 
 mod assemble;
+mod by_sets;
 mod record;
 mod solve;
 
+use super::contact::sets::Scratch;
 use super::contact::{LineInput, limit_n};
 use super::model::MAX_STATIONS;
 use super::ready::{HandLine, LayerForces};
+use super::rows::Rows;
 use super::state::LineOutput;
-use crate::simd::Simd;
+use crate::simd::{LANES, Simd};
 pub use record::LeftRecord;
 use stylet_shm_schema::MAX_LEFT_NEEDLES;
 
@@ -23,6 +26,8 @@ pub const MAX_LEFT: usize = MAX_LEFT_NEEDLES;
 pub const MAX_LEFT_LOADS: usize = MAX_STATIONS + 28;
 /// Shaft of each station, and one tip.
 const MAX_ELEMENTS: usize = MAX_LEFT * (MAX_STATIONS + 1);
+/// Those of all needles that stay in, and of the line of the one that moves.
+const ALL_BLOCKS: usize = (MAX_ELEMENTS + MAX_STATIONS).div_ceil(LANES);
 
 /// One needle that stays in.
 #[derive(Clone, Debug)]
@@ -81,6 +86,9 @@ pub struct LeftNeedles {
     added_m: Vec<f64>,
     /// Nothing has moved in the last tick.
     is_still: bool,
+    /// How all elements and then the stations of the moving line move with each, and what their forces are found in.
+    all: Rows,
+    scratch: Box<Scratch<ALL_BLOCKS>>,
 }
 
 impl LeftNeedles {
@@ -111,6 +119,8 @@ impl LeftNeedles {
             whole: each(MAX_ELEMENTS),
             added_m: each(2 * MAX_STATIONS),
             is_still: true,
+            all: Rows::with_room(ALL_BLOCKS * LANES),
+            scratch: Box::new(Scratch::new()),
         })
     }
 
@@ -129,7 +139,8 @@ impl LeftNeedles {
             &self.whole,
             &self.added_m,
         ];
-        all.iter().map(|values| 8 * values.len()).sum()
+        let values: usize = all.iter().map(|values| 8 * values.len()).sum();
+        values + 8 * (ALL_BLOCKS * LANES).pow(2) + size_of::<Scratch<ALL_BLOCKS>>()
     }
 
     /// How many there are.

@@ -1,21 +1,18 @@
-//! One tick of all needles at once: projected Gauss-Seidel over the stations of the needle that moves, its tip, and the elements of those
-//! that stay in.
+//! One tick of all needles at once, over the stations of the needle that moves, its tip, and the elements of those that stay in: by sets as
+//! for a needle alone, or by projected Gauss-Seidel.
 
 use super::{LeftNeedle, LeftNeedles};
-use crate::line::contact::{
-    CLOSED_M, FURTHEST_M, LineInput, MAX_PASSES, finish, limit_n, press, slip, step, touch_beside,
-};
+use crate::line::contact::{Company, LineInput, advance, limit_n, meet, press, step, touch_beside};
 use crate::line::model::{LineModel, MAX_STATIONS};
 use crate::line::ready::HandLine;
 use crate::line::rows::{add_scaled, dot};
 use crate::line::state::{LineOutput, LineState};
-use crate::line::tip::follow;
 use crate::simd::{Simd, vectorised};
 
 /// A needle that far before its entry at rest meets nothing, wherever the others have moved its surface.
 const BEFORE_M: f64 = 20e-3;
 /// Corrections of an element that stays in by less than that share of the tolerance are left out: most of them are.
-const SKIPPED: f64 = 0.02;
+pub(super) const SKIPPED: f64 = 0.02;
 
 /// One tick of the needle on `line`, and of those that stay in.
 pub(super) fn step_beside(left: &mut LeftNeedles, line: &mut HandLine, input: &LineInput) -> LineOutput {
@@ -31,93 +28,50 @@ pub(super) fn step_beside(left: &mut LeftNeedles, line: &mut HandLine, input: &L
             ..state.last
         };
     }
-    let tip_m = input.tip_m.clamp(-FURTHEST_M, FURTHEST_M);
-    if state.tip.material_m == f64::NEG_INFINITY {
-        state.tip.material_m = tip_m.min(0.0);
-    }
     left.enter(model, state, input.dt_s);
-    let mut output = LineOutput::default();
-    if !has_met(model, state, tip_m) {
-        left.step_rest();
+    advance(model, state, input, left)
+}
+
+impl Company for LeftNeedles {
+    fn begin(&mut self, model: &LineModel, state: &mut LineState, tip_m: f64, membrane: Option<usize>) {
         touch_beside(model, state, tip_m);
-        press(model, state, None);
-        finish(model, state, &mut output);
-        return output;
-    }
-    for _ in 0..MAX_PASSES {
-        let front = model.front(&state.tip);
-        touch_beside(model, state, tip_m);
-        meet(model, state, front.membrane);
-        let kept = press(model, state, front.membrane);
+        meet(model, state, membrane);
+        let kept = press(model, state, membrane);
         if let Some(kept) = kept.filter(|_| state.memory.is_on()) {
             // What the others add to the past's offset is no past.
             let m = model.compliance.stations;
             let weights = state.tip_range.clone().zip(state.tip_weights);
-            let added: f64 = weights.map(|(n, w)| w * left.added_m[m + n]).sum();
+            let added: f64 = weights.map(|(n, w)| w * self.added_m[m + n]).sum();
             state.tip_offset_m += (1.0 - kept) * added;
         }
-        left.reach(model, state, kept);
-        left.displace(Some(state));
-        let gap_m = solve_vectorised(
-            model.simd,
-            model,
-            state,
-            left,
-            tip_m,
-            front.limit_n,
-            input.dt_s,
-            &mut output,
-        );
-        left.add_to(state);
-        output.held_by = front.membrane;
-        let is_pushed = state.tip.force_n >= front.limit_n;
-        if let (Some(layer), true) = (front.membrane, state.tip.force_n > 0.0) {
-            let pushed_m = tip_m - gap_m - state.tip.material_m - state.tip.met_u_m;
-            if is_pushed || pushed_m >= model.layers[layer].puncture_depth_m {
-                state.tip.opened |= 1 << layer;
-                output.punctured = output.punctured.or(Some(layer));
-                continue;
-            }
-        }
-        let goes_on = gap_m > CLOSED_M && is_pushed && front.membrane.is_none();
-        let goes_back = gap_m < -CLOSED_M && state.tip.force_n <= 0.0;
-        if !(goes_on || goes_back) || !follow(model, state, tip_m, gap_m, front.to_m) {
-            break;
-        }
+        self.reach(model, state, kept);
+        self.displace(Some(state));
     }
-    slip(model, state, tip_m);
-    left.slip();
-    finish(model, state, &mut output);
-    output
-}
 
-/// Whether the needle is in the tissue or has come to its surface, which the others have moved.
-fn has_met(model: &LineModel, state: &mut LineState, tip_m: f64) -> bool {
-    let is_out = state.in_contact == 0 && state.tip.force_n == 0.0 && state.tip.material_m <= 0.0;
-    if !is_out {
-        return true;
+    fn solve(
+        &mut self,
+        model: &LineModel,
+        state: &mut LineState,
+        input: &LineInput,
+        limit_n: f64,
+        output: &mut LineOutput,
+    ) -> f64 {
+        let gap_m = self
+            .solve_by_sets(model, state, input, limit_n, output)
+            .unwrap_or_else(|| {
+                solve_vectorised(model.simd, model, state, self, input.tip_m, limit_n, input.dt_s, output)
+            });
+        self.add_to(state);
+        gap_m
     }
-    let surface_m = state
-        .memory
-        .offset_m
-        .get(model.compliance.stations)
-        .copied()
-        .unwrap_or(0.0);
-    state.tip.material_m = (tip_m - surface_m).min(0.0);
-    state.tip.material_m >= 0.0
-}
 
-/// A membrane is met where the tissue in front of it is by now: the others may have moved it before the tip was there.
-fn meet(model: &LineModel, state: &mut LineState, membrane: Option<usize>) {
-    let held_by = membrane.map_or(0, |n| n as u32 + 1);
-    if held_by == state.tip.held_by || held_by == 0 {
-        return;
+    fn rest(&mut self) {
+        self.step_rest();
     }
-    let (m, count) = (model.compliance.stations, state.in_contact);
-    let weights = state.tip_range.clone().zip(state.tip_weights);
-    let by_others: f64 = weights.map(|(n, w)| w * state.memory.offset_m[m + n]).sum();
-    let own = dot(&state.tip_column[..count], &state.shaft_n[..count]) + state.tip_own * state.tip.force_n;
-    state.tip_u_m = state.memory.gain * own + by_others;
+
+    fn end(&mut self) {
+        self.slip();
+    }
 }
 
 impl LeftNeedles {

@@ -78,8 +78,13 @@ fn one_left(apart_m: f64, whole: f64) -> (Box<LeftNeedles>, Box<HandLine>) {
 fn needles_far_apart_in_tissue_that_is_held_do_not_feel_each_other() {
     let (mut left, mut second) = one_left(1.0, 0.0);
     let before = left.forces_n().to_vec();
+    let mut alone = line(3, [1.0, 0.0, 0.0], &[], 0.0);
+    // Solved farther than what is asked: gradients over more elements end elsewhere within the tolerance.
+    for line in [&mut second, &mut alone] {
+        line.model.settings.tolerance_m = 1e-13;
+    }
     let beside_n = go(&mut second, Some(&mut left), -1e-3, 22e-3, 1e-4);
-    let alone_n = go(&mut line(3, [1.0, 0.0, 0.0], &[], 0.0), None, -1e-3, 22e-3, 1e-4);
+    let alone_n = go(&mut alone, None, -1e-3, 22e-3, 1e-4);
     assert!((beside_n - alone_n).abs() < 1e-9, "{beside_n} {alone_n}");
     let off = before.iter().zip(left.forces_n()).map(|(a, b)| (a - b).abs());
     assert!(off.fold(0.0, f64::max) < 1e-9);

@@ -2,11 +2,11 @@
 
 use super::*;
 
-/// Made before tissue could creep; a change of the contact itself makes it anew.
-const BITS: u64 = 0x8e98_08d9_07a1_f7db;
+/// Made with the forces by sets and the surface that a tip meets where it is by then; a change of the contact itself makes it anew.
+const BITS: u64 = 0xf7e1_8ad7_08f9_067d;
 
-/// The same as [`made_up`] without functions that round otherwise on another machine; its layers resist with that part of their forces.
-pub fn exact(part: f64, settings: LineSettings) -> LineModel {
+/// The same as [`made_up`] without functions that round otherwise on another machine.
+pub fn exact(settings: LineSettings) -> LineModel {
     let (stations, spacing_m) = (30, 1.364e-3);
     let entry = |i: usize, j: usize| {
         let distance_m = (i % stations).abs_diff(j % stations) as f64 * spacing_m;
@@ -16,18 +16,18 @@ pub fn exact(part: f64, settings: LineSettings) -> LineModel {
     let mut compliance = Compliance::from_rows(stations, spacing_m, 4e-3, entry);
     compliance.whole_m_per_n = 1.0 / 1434.0;
     let gland = LineLayer {
-        puncture_force_n: part * 5.6,
-        cutting_force_n: part * 1.5,
-        shaft_friction_n_per_m: part * 80.0,
+        puncture_force_n: 5.6,
+        cutting_force_n: 1.5,
+        shaft_friction_n_per_m: 80.0,
         ..GLAND
     };
     let layers = [
         gland,
         LineLayer {
             from_m: 17e-3,
-            puncture_force_n: part * 2.0,
-            cutting_force_n: part * 0.8,
-            shaft_friction_n_per_m: part * 40.0,
+            puncture_force_n: 2.0,
+            cutting_force_n: 0.8,
+            shaft_friction_n_per_m: 40.0,
             ..GLAND
         },
     ];
@@ -36,7 +36,7 @@ pub fn exact(part: f64, settings: LineSettings) -> LineModel {
 
 #[test]
 fn rate_terms_that_are_off_leave_every_bit_as_it_was() {
-    let model = exact(1.0, LineSettings::default());
+    let model = exact(LineSettings::default());
     let mut state = LineState::new(&model);
     let mut random = Random(23);
     let (mut tip_m, mut hash) = (-1e-3, 0xcbf2_9ce4_8422_2325_u64);

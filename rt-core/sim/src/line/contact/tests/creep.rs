@@ -14,7 +14,7 @@ const CREEP: [PronyTerm; 2] = [
     },
 ];
 
-fn creeping() -> LineSettings {
+pub fn creeping() -> LineSettings {
     LineSettings {
         prony: CREEP,
         ..LineSettings::default()
@@ -22,7 +22,7 @@ fn creeping() -> LineSettings {
 }
 
 /// Of the tissue under its own loads and that of the membrane's spring, of that spring, and of the chain.
-fn stored_j(state: &LineState, model: &LineModel) -> f64 {
+pub fn stored_j(state: &LineState, model: &LineModel) -> f64 {
     let (m, rows, common) = (
         model.compliance.stations,
         &model.compliance.rows,
@@ -49,25 +49,21 @@ fn stored_j(state: &LineState, model: &LineModel) -> f64 {
     0.5 * (own + whole + spring) + state.memory.stored_j(rows, common, &model.settings.prony)
 }
 
-/// Forces of the layers, so that tissue that has crept is displaced as far as in the cycles without creep: beyond, linear tissue folds
-/// before the tip, and a tip that goes on through it goes back in the world.
-const PART: f64 = 1.0 / 2.6;
-
 /// Membranes that are no stiffer than what they hold, as in the cycles without creep.
 #[test]
 fn ten_thousand_random_cycles_in_tissue_that_creeps_make_no_energy() {
     let layers = [
         LineLayer {
-            puncture_force_n: PART * 1.2,
-            cutting_force_n: PART * 1.5,
-            shaft_friction_n_per_m: PART * 80.0,
+            puncture_force_n: 1.2,
+            cutting_force_n: 1.5,
+            shaft_friction_n_per_m: 80.0,
             ..GLAND
         },
         LineLayer {
             from_m: 17e-3,
-            puncture_force_n: PART * 2.0,
-            cutting_force_n: PART * 0.8,
-            shaft_friction_n_per_m: PART * 40.0,
+            puncture_force_n: 2.0,
+            cutting_force_n: 0.8,
+            shaft_friction_n_per_m: 40.0,
             ..GLAND
         },
     ];
@@ -76,19 +72,20 @@ fn ten_thousand_random_cycles_in_tissue_that_creeps_make_no_energy() {
     assert!(worst_j < 1e-6, "{worst_j}");
 }
 
-/// A stiff membrane passes load on to the body as a whole, which creeps as well.
+/// A stiff membrane passes load on to the body as a whole, which creeps as well. A tip that met a surface that had crept was held there
+/// with the dent of a surface at rest, and the cycles made 99 uJ.
 #[test]
 fn stiff_membranes_in_tissue_that_creeps_make_no_energy() {
-    let worst_j = random_cycles(&exact(1.0, LineSettings::default()), 2_000, stored_j);
-    println!("elastic: {:.3} uJ", 1e6 * worst_j);
-    let worst_j = random_cycles(&exact(PART, creeping()), 2_000, stored_j);
-    assert!(worst_j < 1e-6, "{worst_j}");
+    for settings in [LineSettings::default(), creeping()] {
+        let worst_j = random_cycles(&exact(settings), 2_000, stored_j);
+        assert!(worst_j < 1e-6, "{worst_j}");
+    }
 }
 
 /// With what the past leaves, the spring of a membrane and the tissue under it carry the tip between them.
 #[test]
 fn loads_handed_on_move_the_tissue_to_where_the_needle_has_it() {
-    let model = exact(PART, creeping());
+    let model = exact(creeping());
     let mut state = LineState::new(&model);
     let rows = &model.compliance.rows;
     for n in 0..3000 {

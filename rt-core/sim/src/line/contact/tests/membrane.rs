@@ -82,3 +82,24 @@ fn a_membrane_met_in_the_middle_of_a_cut_is_relaxed_there() {
     );
     assert!((2e-3..7e-3).contains(&(opened_m - met_m)) && held_n > inner.puncture_force_n);
 }
+
+/// A tip that stopped within a nanometre before the surface was held by the membrane there and laid no load on it: it went through the
+/// body without a force. Encoders bring a needle there where the plan's entry lies on one of their steps.
+#[test]
+fn a_tip_that_stops_a_hair_before_the_surface_is_held_by_it_as_one_that_reaches_it() {
+    let model = on_foundation(&[GLAND]);
+    let forces = |stop_m: f64| {
+        let mut state = LineState::new(&model);
+        let places = (0..=400).map(|n| if n == 100 { stop_m } else { 1e-4 * f64::from(n - 100) });
+        let outputs: Vec<_> = places.map(|place_m| step(&model, &mut state, &at(place_m))).collect();
+        assert!(outputs.iter().any(|o| o.punctured.is_some()), "stopped at {stop_m} m");
+        outputs
+    };
+    let wanted = forces(0.0);
+    for stop_m in [-1e-12, -1e-10, -0.9e-9, -1.1e-9, -1e-8, 1e-12, 1e-9] {
+        for (ours, wanted) in forces(stop_m).iter().zip(&wanted) {
+            let apart_n = (ours.force_on_hand_n - wanted.force_on_hand_n).abs();
+            assert!(apart_n < 1e-4, "stopped at {stop_m} m: {ours:?}, wanted {wanted:?}");
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! The forces of shaft and tip with the tip where it is: by sets of stations that stick, or by sweeps.
+
+use super::sets::{self, Tip};
+use super::{Scratch, limit_n, past_at_tip_m};
+use crate::line::model::LineModel;
+use crate::line::rows::{Rows, add_scaled, dot};
+use crate::line::state::{LineOutput, LineState};
+use crate::simd::{Simd, vectorised};
+
+/// Forces of shaft and tip; returns how far the tip is beyond where the material has it.
+pub(super) fn solve(
+    model: &LineModel,
+    state: &mut LineState,
+    tip_m: f64,
+    tip_limit_n: f64,
+    dt_s: f64,
+    (scratch, output): (&mut Scratch, &mut LineOutput),
+) -> f64 {
+    let gain = state.memory.gain;
+    let place_m = state.tip.material_m;
+    let offset_m = past_at_tip_m(model, state);
+    let of_shaft = dot(&state.tip_column, &state.shaft_n[..state.in_contact]);
+    state.tip_u_m = gain * (of_shaft + state.tip_own * state.tip.force_n) + (offset_m + state.tip_offset_m);
+    let rate = model.settings.viscous_n_s_per_m2 / dt_s;
+    if rate != 0.0 || !model.settings.by_sets || !solve_by_sets(model, state, tip_m, tip_limit_n, scratch, output) {
+        solve_by_sweeps(model.simd, model, state, tip_m, tip_limit_n, rate, output);
+    }
+    tip_m - place_m - state.tip_u_m
+}
+
+/// Returns whether that found the forces; if not, the state is one to go on from.
+fn solve_by_sets(
+    model: &LineModel,
+    state: &mut LineState,
+    tip_m: f64,
+    tip_limit_n: f64,
+    scratch: &mut Scratch,
+    output: &mut LineOutput,
+) -> bool {
+    let count = state.in_contact;
+    let place_m = state.tip.material_m;
+    (scratch.count, scratch.gain) = (count, state.memory.gain);
+    scratch.tolerance_m = model.settings.tolerance_m;
+    scratch
+        .stuck_m
+        .set(count, state.anchor_m.iter().map(|anchor| tip_m - anchor));
+    scratch
+        .high_n
+        .set(count, (0..count).map(|n| limit_n(model, place_m, n)));
+    scratch
+        .low_n
+        .set(count, (0..count).map(|n| -limit_n(model, place_m, n)));
+    scratch.column.set(count, state.tip_column.iter().copied());
+    scratch.force_n.set(count, state.shaft_n.iter().copied());
+    scratch.u_m.set(count, state.u_m.iter().copied());
+    scratch.tip = Tip {
+        own_m_per_n: state.tip_own,
+        stuck_m: tip_m - place_m,
+        limit_n: tip_limit_n,
+        force_n: state.tip.force_n,
+        u_m: state.tip_u_m,
+        ..Tip::default()
+    };
+    scratch.products = 0;
+    let is_found = sets::find(model.simd, &model.compliance.rows, scratch);
+    let found = scratch.force_n.numbers().iter().zip(scratch.high_n.numbers());
+    for (to, (force, &limit)) in state.shaft_n[..count].iter_mut().zip(found) {
+        *to = force.max(-limit).min(limit);
+    }
+    state.u_m[..count].copy_from_slice(&scratch.u_m.numbers()[..count]);
+    state.tip.force_n = scratch.tip.force_n.max(0.0).min(tip_limit_n);
+    state.tip_u_m = scratch.tip.u_m;
+    output.sweeps += scratch.products;
+    output.residual_m = scratch.residual_m;
+    is_found
+}
+
+/// [`sets::find`], for a tick beside other needles.
+pub(in crate::line) fn find_by_sets<const B: usize>(simd: Simd, rows: &Rows, scratch: &mut sets::Scratch<B>) -> bool {
+    sets::find(simd, rows, scratch)
+}
+
+vectorised! {
+    /// [`sweep`] for the instructions that the processor has; the same bits with all of them.
+    fn solve_by_sweeps(
+        model: &LineModel,
+        state: &mut LineState,
+        tip_m: f64,
+        tip_limit_n: f64,
+        slowness: f64,
+        output: &mut LineOutput,
+    ) {
+        sweep(model, state, tip_m, tip_limit_n, slowness, output)
+    }
+}
+
+/// Forces of shaft and tip by projected Gauss-Seidel.
+#[inline(always)]
+fn sweep(
+    model: &LineModel,
+    state: &mut LineState,
+    tip_m: f64,
+    tip_limit_n: f64,
+    slowness: f64,
+    output: &mut LineOutput,
+) {
+    let rows = &model.compliance.rows;
+    let (count, gain) = (state.in_contact, state.memory.gain);
+    let place_m = state.tip.material_m;
+    let LineState {
+        ref mut shaft_n,
+        ref anchor_m,
+        ref mut u_m,
+        ref tip_column,
+        ..
+    } = *state;
+    let (shaft_n, anchor_m, u_m) = (&mut shaft_n[..count], &anchor_m[..count], &mut u_m[..count]);
+    let tip_column = &tip_column[..count];
+    let (mut tip_n, mut tip_u_m) = (state.tip.force_n, state.tip_u_m);
+    let tip_gain = gain * state.tip_own;
+    for sweep in 0..model.settings.sweeps {
+        let mut largest_m = 0.0_f64;
+        for step in 0..count {
+            let n = if sweep % 2 == 0 { count - 1 - step } else { step };
+            let row = &rows.row(n)[..count];
+            let own = gain * row[n];
+            let limit = limit_n(model, place_m, n);
+            let free_n = shaft_n[n] + (tip_m - anchor_m[n] - u_m[n]) / own;
+            let mut wanted = free_n.clamp(-limit, limit);
+            if slowness > 0.0 && wanted != free_n {
+                // Beyond the limit by what the slip of this tick adds.
+                let drag =
+                    slowness * (place_m - n as f64 * model.compliance.spacing_m).clamp(0.0, model.compliance.spacing_m);
+                wanted += (free_n - wanted) * drag * own / (1.0 + drag * own);
+            }
+            let change = wanted - shaft_n[n];
+            if change != 0.0 {
+                shaft_n[n] = wanted;
+                add_scaled(gain * change, row, u_m);
+                tip_u_m += gain * change * tip_column[n];
+                largest_m = largest_m.max((change * own).abs());
+            }
+        }
+        if tip_gain > 0.0 {
+            let wanted = (tip_n + (tip_m - place_m - tip_u_m) / tip_gain).clamp(0.0, tip_limit_n);
+            let change = wanted - tip_n;
+            if change != 0.0 {
+                tip_n = wanted;
+                add_scaled(gain * change, tip_column, u_m);
+                tip_u_m += tip_gain * change;
+                largest_m = largest_m.max((change * tip_gain).abs());
+            }
+        }
+        output.sweeps += 1;
+        output.residual_m = largest_m;
+        if largest_m <= model.settings.tolerance_m {
+            break;
+        }
+    }
+    state.tip.force_n = tip_n;
+    state.tip_u_m = tip_u_m;
+}
