@@ -2,11 +2,14 @@
 
 use super::FinderError;
 use super::level::Level;
+use super::shape::Patch;
 use nalgebra::Vector3;
 use stylet_files::VoxelValues;
 
 /// Voxels so far around a component hold the rest of its signal.
 const REACH_M: f64 = 2.5e-3;
+/// Voxels around a component's box that show the tissue.
+const ROOM: usize = 2;
 /// A larger share of the volume above the threshold is no implant.
 const MOST_SHARE: f64 = 0.05;
 const NONE: u32 = 0;
@@ -18,7 +21,9 @@ pub struct Component {
     pub voxels: Vec<usize>,
     /// Value above the tissue, of each of the voxels.
     pub excess: Vec<f64>,
-    /// Sum of the values above the tissue.
+    /// What the tissue around it is above that of the volume: tissue is not even, and a component has many voxels.
+    pub tissue: f64,
+    /// Sum of the values above the tissue around it.
     pub signal: f64,
     /// Middle of the signal.
     pub middle_m: Vector3<f64>,
@@ -101,7 +106,8 @@ fn component(volume: &VoxelValues<f32>, level: &Level, mut voxels: Vec<usize>) -
         _ => 0.0,
     };
     let excess: Vec<f64> = voxels.iter().map(excess).collect();
-    let signal: f64 = excess.iter().sum();
+    let tissue = tissue_around(volume, level, &voxels);
+    let signal = excess.iter().map(|excess| excess - tissue).sum();
     let weighted = voxels
         .iter()
         .zip(&excess)
@@ -109,10 +115,22 @@ fn component(volume: &VoxelValues<f32>, level: &Level, mut voxels: Vec<usize>) -
     let weight: f64 = excess.iter().map(|e| e.max(0.0)).sum();
     Component {
         middle_m: weighted.sum::<Vector3<f64>>() / weight.max(f64::MIN_POSITIVE),
+        tissue,
         signal,
         excess,
         voxels,
     }
+}
+
+/// The median of what the voxels around a component are above the tissue of the volume; other seeds have fewer than half of them.
+fn tissue_around(volume: &VoxelValues<f32>, level: &Level, voxels: &[usize]) -> f64 {
+    let patch = Patch::of(volume.dims, volume.frame.spacing_m, voxels);
+    let around = patch.with_room(volume.dims, ROOM);
+    let outside = around.into_iter().filter(|n| voxels.binary_search(n).is_err());
+    let values = outside.map(|n| f64::from(volume.values[n])).filter(|v| v.is_finite());
+    let mut above: Vec<f64> = values.map(|value| value - level.tissue).collect();
+    above.sort_by(f64::total_cmp);
+    above.get(above.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// Middle of a voxel, along the axes of the volume.

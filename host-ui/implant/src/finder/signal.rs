@@ -27,10 +27,11 @@ impl Fitter<'_> {
         components.iter().zip(lines).zip(tissue).map(of_component).collect()
     }
 
-    /// What the tissue around a component is above that of the volume: the median of what its dim voxels have beyond the seeds so far.
+    /// What the tissue around a component is above that of the volume: the median of what its dim voxels have beyond the seeds so far;
+    /// without seeds, and where few are dim, that of the voxels around it.
     pub fn tissue_beside(&self, component: &Component, lines: &[Line], others: &[f64]) -> f64 {
         if lines.is_empty() {
-            return 0.0;
+            return component.tissue;
         }
         let patch = Patch::of(self.volume.dims, self.volume.frame.spacing_m, &component.voxels);
         let mut own = vec![0.0; component.voxels.len()];
@@ -39,7 +40,7 @@ impl Fitter<'_> {
         let dim = voxels.filter(|((n, _), own)| **own + others[**n] < DIM * self.level.noise);
         let mut left: Vec<f64> = dim.map(|((n, excess), own)| excess - own - others[*n]).collect();
         if left.len() < FEWEST_DIM {
-            return 0.0;
+            return component.tissue;
         }
         left.sort_by(f64::total_cmp);
         left[left.len() / 2]

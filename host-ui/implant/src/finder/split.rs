@@ -105,7 +105,7 @@ impl<'a> Fitter<'a> {
         singles.truncate(CALIBRATED);
         let tasks: Vec<(Task, &Component)> = singles
             .iter()
-            .map(|&n| (fitter.task(&components[n], None, 0.0), &components[n]))
+            .map(|&n| (fitter.task(&components[n], None, components[n].tissue), &components[n]))
             .collect();
         let mut best = (f64::INFINITY, fitter.look, Matrix3::zeros());
         for blur_m in BLURS_M {
@@ -151,7 +151,7 @@ impl<'a> Fitter<'a> {
         let mut lines: Vec<Vec<Line>> = vec![Vec::new(); components.len()];
         let mut fits = vec![Fitted::default(); components.len()];
         let mut counts = first.clone();
-        let mut tissue = vec![0.0; components.len()];
+        let mut tissue: Vec<f64> = components.iter().map(|component| component.tissue).collect();
         for sweep in 0..SWEEPS {
             for (n, component) in components.iter().enumerate() {
                 if counts.seeds[n] == 0 && lines[n].is_empty() {
@@ -186,7 +186,7 @@ impl<'a> Fitter<'a> {
 
     /// A component as one seed at the middle of its signal.
     pub fn centre(&self, component: &Component) -> Fitted {
-        let task = self.task(component, None, 0.0);
+        let task = self.task(component, None, component.tissue);
         let line = self.start(component, &task.data);
         self.fitted(&task, &[line])
     }

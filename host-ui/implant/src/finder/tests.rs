@@ -97,7 +97,7 @@ fn a_hundred_seeds_are_found_within_a_millimetre_and_give_the_same_d90() {
     }
 }
 
-/// Share of implants that meet both bars, beside the two above.
+/// Uneven tissue counted as signal: a seed that lay alone in a dark place was left out as too faint, and another one was made up for it.
 #[test]
 #[ignore = "a minute or two; the command is in docs/after-implant.md"]
 fn implants_one_to_twelve_are_found() {
