@@ -32,6 +32,11 @@ impl Counts {
         if own > 0.0 { own / (own + others) } else { 0.0 }
     }
 
+    /// Square of what the signal of a component is off so many seeds, in variances.
+    pub fn cost(&self, component: usize, seeds: usize) -> f64 {
+        cost(self.signal(component), seeds) / self.spread.powi(2)
+    }
+
     fn total_cost(&self) -> f64 {
         let each = (0..self.signals.len()).filter(|&n| self.seeds[n] > 0 || self.signal(n) < 1.0);
         each.map(|n| cost(self.signal(n), self.seeds[n])).sum::<f64>() / self.spread.powi(2)

@@ -28,7 +28,8 @@ pub struct Fits {
     pub tissue: Vec<f64>,
 }
 
-/// Another count for a component, with its seeds and what the sum of squares grows by.
+/// Another count for a component, with its seeds and what the sum of squares grows by, that of the signal among them: more seeds
+/// always explain the voxels a little better, and a count that the signal excludes is not worth that.
 struct Change {
     component: usize,
     lines: Vec<Line>,
@@ -43,7 +44,7 @@ impl Fitter<'_> {
         let doubtful = (0..components.len()).filter(is_open);
         let mut changes: Vec<Change> = Vec::new();
         for n in doubtful.collect::<Vec<_>>() {
-            changes.extend(self.changes(components, fits, n));
+            changes.extend(self.changes(components, fits, counts, n));
         }
         for _ in 0..CHANGES {
             let total: usize = counts.seeds.iter().sum();
@@ -66,32 +67,33 @@ impl Fitter<'_> {
             let changed: Vec<usize> = chosen.iter().map(|&at| changes[at].component).collect();
             changes.retain(|change| !changed.contains(&change.component));
             for n in changed {
-                changes.extend(self.changes(components, fits, n));
+                changes.extend(self.changes(components, fits, counts, n));
             }
         }
     }
 
     /// One seed more, and one fewer where one is left.
-    fn changes(&self, components: &[Component], fits: &mut Fits, n: usize) -> Vec<Change> {
+    fn changes(&self, components: &[Component], fits: &mut Fits, by_signal: &Counts, n: usize) -> Vec<Change> {
         let component = &components[n];
         let own = fits.lines[n].clone();
         self.spread(component, &own, -1.0, &mut fits.field);
         let task = self.task(component, Some(&fits.field), fits.tissue[n]);
         self.spread(component, &own, 1.0, &mut fits.field);
         let before = self.residuals(&task, &own).norm_squared();
-        let counts = [own.len().checked_sub(1).filter(|&count| count > 0), Some(own.len() + 1)];
+        let others = [own.len().checked_sub(1).filter(|&count| count > 0), Some(own.len() + 1)];
         let other = |count: usize| {
             let mut lines = self.starts(&task, component, count);
             self.improve(&task, &mut lines);
             self.exchange(&task, component, &mut lines);
+            let of_signal = by_signal.cost(n, count) - by_signal.cost(n, own.len());
             Change {
                 component: n,
-                cost: self.residuals(&task, &lines).norm_squared() - before,
+                cost: self.residuals(&task, &lines).norm_squared() - before + of_signal,
                 is_more: count > own.len(),
                 lines,
             }
         };
-        counts.into_iter().flatten().map(other).collect()
+        others.into_iter().flatten().map(other).collect()
     }
 }
 
