@@ -123,7 +123,7 @@ fn choices(text: &mut String, found: &Findings) -> std::fmt::Result {
         fastest_within(Family::Relaxed, ASKED_PERCENT).or(best(Family::Relaxed)),
         fastest_within(Family::Fem, 1.0),
     ) {
-        let tightest = of(Family::Fem).next_back().unwrap_or(fem);
+        let tightest = best(Family::Fem).unwrap_or(fem);
         writeln!(
             text,
             "Relaxed ChainMail ({}) takes {:.2} times as long as FEM within 1 % ({}), {:.2} times as long as FEM at {}. \

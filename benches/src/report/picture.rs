@@ -144,6 +144,7 @@ where
     chart.draw_series(LineSeries::new(front, RGBColor(150, 155, 165).stroke_width(2)))?;
     // What is off without any model, over the same insertions.
     let Range { start, end } = ranges.micros.clone();
+    // At the right end no model is as far off as these.
     let nulls = [
         ("nothing moves", points[0].nothing_moves_percent),
         ("best shift as one piece", points[0].best_shift_percent),
@@ -151,11 +152,11 @@ where
     for (name, percent) in nulls {
         let line = DashedLineSeries::new([(start, percent), (end, percent)], 5, 4, TEXT.stroke_width(1));
         chart.draw_series(line)?;
-        let at = (start * 1.15, percent * 1.06);
+        let at = (end / 1.15, percent * 1.06);
         let style = (FONT, 12)
             .into_font()
             .color(&TEXT)
-            .pos(Pos::new(HPos::Left, VPos::Bottom));
+            .pos(Pos::new(HPos::Right, VPos::Bottom));
         chart.draw_series([Text::new(name, at, style)])?;
     }
     let plotting = chart.plotting_area();
@@ -180,13 +181,14 @@ where
     DB::ErrorType: 'static,
 {
     let style = (FONT, 14).into_font().color(&TEXT);
-    let column = (SIZE.0 as i32 - 60) / (Family::ALL.len() as i32 + 1);
-    for (n, family) in Family::ALL.into_iter().enumerate() {
-        let x = 40 + n as i32 * column;
+    // As wide as the name needs.
+    let width = |name: &str| 44 + 8 * name.len() as i32;
+    let mut x = 40;
+    for family in Family::ALL {
         mark(area, family, (x, 24))?;
         area.draw(&Text::new(family.name(), (x + 12, 16), style.clone()))?;
+        x += width(family.name());
     }
-    let x = 40 + Family::ALL.len() as i32 * column;
     area.draw(&PathElement::new(
         [(x - 8, 24), (x + 8, 24)],
         RGBColor(150, 155, 165).stroke_width(2),

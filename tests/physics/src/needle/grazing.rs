@@ -135,46 +135,48 @@ fn a_face_met_at_an_angle_is_felt_as_one_met_squarely() {
             45.0,
         ),
     ];
-    for kind in KINDS {
-        for on_line in [true, false] {
-            for &(case, source, point, degrees) in &places {
-                let [square, found] =
-                    [0.0, degrees].map(|degrees| insert(source, kind, point(degrees), tilted(degrees), on_line));
-                let ratio = [found.held_n / square.held_n, found.rest_n / square.rest_n];
-                let model = match (kind, on_line) {
-                    (TissueKind::Fem, true) => "fem, needle line",
-                    (TissueKind::Fem, false) => "fem, off the line",
-                    (_, true) => "chainmail, needle line",
-                    (_, false) => "chainmail, off the line",
-                };
-                let is_near = |ratio: f64| (ratio - 1.0).abs() <= 0.1;
-                keep(&Row {
-                    number: 40,
-                    case,
-                    model,
-                    should: "membrane and rest as squarely to 10 %, force along the needle to 5 %, at most 0.5 N a tick, out again and at rest",
-                    happened: format!(
-                        "gives way at {:.2} N ({:.2} N squarely), {:.2} N at {:.1} mm ({:.2} N at {:.1} mm); across {:.1} %; largest step {:.3} N; {:.1} mm of displacement, {:.3} mm left",
-                        found.held_n,
-                        square.held_n,
-                        found.rest_n,
-                        found.depth_m * 1e3,
-                        square.rest_n,
-                        square.depth_m * 1e3,
-                        found.across * 1e2,
-                        found.step_n,
-                        found.moved_m * 1e3,
-                        found.left_m * 1e3
-                    ),
-                    met: found.punctures == 1
-                        && ratio.into_iter().all(is_near)
-                        && found.across <= 0.05
-                        && found.step_n <= SLEW_N
-                        && found.left_m < 0.05e-3
-                        && found.moved_m < 20e-3,
-                    warning: if on_line { "" } else { "the window says NO LINE" },
-                });
-            }
+    // Finite elements off their line turn the force off where they are not solved in time: rows 32.
+    for (kind, on_line) in [
+        (TissueKind::ChainMail, true),
+        (TissueKind::ChainMail, false),
+        (TissueKind::Fem, true),
+    ] {
+        for &(case, source, point, degrees) in &places {
+            let [square, found] =
+                [0.0, degrees].map(|degrees| insert(source, kind, point(degrees), tilted(degrees), on_line));
+            let ratio = [found.held_n / square.held_n, found.rest_n / square.rest_n];
+            let model = match (kind, on_line) {
+                (TissueKind::Fem, _) => "fem, needle line",
+                (_, true) => "chainmail, needle line",
+                (_, false) => "chainmail, off the line",
+            };
+            let is_near = |ratio: f64| (ratio - 1.0).abs() <= 0.1;
+            keep(&Row {
+                number: 40,
+                case,
+                model,
+                should: "membrane and rest as squarely to 10 %, force along the needle to 5 %, at most 0.5 N a tick, out again and at rest",
+                happened: format!(
+                    "gives way at {:.2} N ({:.2} N squarely), {:.2} N at {:.1} mm ({:.2} N at {:.1} mm); across {:.1} %; largest step {:.3} N; {:.1} mm of displacement, {:.3} mm left",
+                    found.held_n,
+                    square.held_n,
+                    found.rest_n,
+                    found.depth_m * 1e3,
+                    square.rest_n,
+                    square.depth_m * 1e3,
+                    found.across * 1e2,
+                    found.step_n,
+                    found.moved_m * 1e3,
+                    found.left_m * 1e3
+                ),
+                met: found.punctures == 1
+                    && ratio.into_iter().all(is_near)
+                    && found.across <= 0.05
+                    && found.step_n <= SLEW_N
+                    && found.left_m < 0.05e-3
+                    && found.moved_m < 20e-3,
+                warning: if on_line { "" } else { "the window says NO LINE" },
+            });
         }
     }
 }
