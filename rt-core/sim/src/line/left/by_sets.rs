@@ -64,10 +64,10 @@ impl LeftNeedles {
         let is_found = find_by_sets(model.simd, &self.all, scratch);
         let (forces, moved) = (scratch.force_n.numbers(), scratch.u_m.numbers());
         let mut has_moved = count > 0;
-        for k in 0..elements {
-            let force_n = forces[k].max(self.low_n[k]).min(self.high_n[k]);
-            has_moved |=
-                (force_n - self.force_n[k]).abs() * self.own[k * self.stride + k] > SKIPPED * settings.tolerance_m;
+        for (k, force) in forces[..elements].iter().enumerate() {
+            let force_n = force.max(self.low_n[k]).min(self.high_n[k]);
+            let moved_m = (force_n - self.force_n[k]).abs() * self.own[k * self.stride + k];
+            has_moved |= moved_m > SKIPPED * settings.tolerance_m;
             self.force_n[k] = force_n;
         }
         self.u_m[..elements].copy_from_slice(&moved[..elements]);
