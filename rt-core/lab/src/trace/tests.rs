@@ -90,7 +90,11 @@ fn a_rival_is_named_where_the_kernel_records_no_switch_from_idle() {
     let ns = |us: u64| 10_000_000_000 + us * 1_000;
     let pieces = timeline::pieces(&event::events(&text, 0), LOOP, PRIORITY, ns(1_000), ns(1_900)).expect("covered");
     let all = blame::causes(&pieces, ns(1_010));
-    assert_eq!(all.iter().map(|c| c.kind).collect::<Vec<_>>(), [Kind::SlowWork], "{all:?}");
+    assert_eq!(
+        all.iter().map(|c| c.kind).collect::<Vec<_>>(),
+        [Kind::SlowWork],
+        "{all:?}"
+    );
 }
 
 #[test]
