@@ -120,18 +120,21 @@ fn a_face_met_at_an_angle_is_felt_as_one_met_squarely() {
     let middle = (Vector3::from(low) + Vector3::from(high)) / 2.0;
     let block = block();
     let on_face = Vector3::new(15e-3, 24e-3, 0.0);
-    let places: [(&str, &SceneSource, &dyn Fn(f64) -> Vector3<f64>, f64); 3] = [
-        ("a block's face met at 45 degrees", &block, &|_| on_face, 45.0),
+    // A place that the needle goes through, and how far before it the path begins.
+    let places = [
+        ("a block's face met at 45 degrees", &block, on_face, 0.0, 45.0),
         (
             "a block's face grazed, at 75 degrees from its normal",
             &block,
-            &|_| on_face,
+            on_face,
+            0.0,
             75.0,
         ),
         (
             "the gland of `paper` met through its middle at 45 degrees",
             &gland,
-            &|degrees| middle - tilted(degrees) * 60e-3,
+            middle,
+            60e-3,
             45.0,
         ),
     ];
@@ -141,9 +144,11 @@ fn a_face_met_at_an_angle_is_felt_as_one_met_squarely() {
         (TissueKind::ChainMail, false),
         (TissueKind::Fem, true),
     ] {
-        for &(case, source, point, degrees) in &places {
-            let [square, found] =
-                [0.0, degrees].map(|degrees| insert(source, kind, point(degrees), tilted(degrees), on_line));
+        for (case, source, through, before_m, degrees) in places {
+            let [square, found] = [0.0, degrees].map(|degrees| {
+                let along = tilted(degrees);
+                insert(source, kind, through - along * before_m, along, on_line)
+            });
             let ratio = [found.held_n / square.held_n, found.rest_n / square.rest_n];
             let model = match (kind, on_line) {
                 (TissueKind::Fem, _) => "fem, needle line",
