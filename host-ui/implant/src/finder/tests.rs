@@ -72,7 +72,7 @@ fn outcome(phantom: &Phantom, found: &Found) -> Outcome {
 #[test]
 fn a_hundred_seeds_are_found_within_a_millimetre_and_give_the_same_d90() {
     // In the second implant 101 seeds were found and D90 was 3.7 % off: uneven tissue counted as signal.
-    for random_seed in [1, 2] {
+    for random_seed in [1, 2, 5, 6] {
         let phantom = Phantom::new(random_seed, None);
         let search = Search {
             count: Some(phantom.seeds.len()),

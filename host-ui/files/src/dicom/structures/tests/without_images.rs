@@ -18,7 +18,7 @@ fn without_images_the_grid_is_around_the_contours() {
 }
 
 /// The middles of the outermost voxels lay on the outermost contours: structures of whole half millimetres were read half a millimetre
-/// wider, a rod of 3 mm by 36 %, and the urethra of `pelvis` by 3.2 %.
+/// wider, the urethra of `pelvis` by 3.2 % in volume.
 #[test]
 fn rods_that_are_outlined_along_cells_have_the_volume_of_their_cells() {
     for side_mm in [0.3, 0.5, 0.93, 1.0, 1.7, 2.0] {
