@@ -9,9 +9,9 @@ use stylet_dose::decay::Interval;
 use stylet_dose::isodose::isodose;
 use stylet_dose::{DoseGrid, DoseKernel, Seed, Source};
 use stylet_host::link::SceneModel;
-use stylet_host::mesh::{self, SurfaceVertex};
 use stylet_implant::plan::exchange::USUAL_SOURCE;
 use stylet_shm_schema::{SceneId, SeedPose};
+use stylet_surfaces::mesh::{self, SurfaceVertex};
 
 /// Doses that are drawn, as shares of the prescription.
 pub const LEVELS: [f64; 4] = [0.5, 1.0, 1.5, 2.0];

@@ -4,10 +4,10 @@ use super::Failure;
 use nalgebra::Vector3;
 use stylet_anatomy::PatientFrame;
 use stylet_host::link::SceneModel;
-use stylet_host::mesh::cut;
 use stylet_implant::plan::anatomy::Body;
 use stylet_implant::plan::{Anatomy, HOLES, Hole, Template};
 use stylet_shm_schema::SceneId;
+use stylet_surfaces::mesh::cut;
 
 /// From one layer of outlines to the next.
 const LAYER_M: f64 = 1e-3;

@@ -1,9 +1,9 @@
 //! Where the drawn surfaces of the scene are now: computed once a frame, for all pictures.
 
 use std::sync::Arc;
-use stylet_host::bodies::Bodies;
 use stylet_host::link::{SceneModel, Snapshot};
 use stylet_shm_schema::SceneId;
+use stylet_surfaces::bodies::Bodies;
 
 /// The surfaces of the scene that is shown, as the last snapshot has them.
 #[derive(Default)]

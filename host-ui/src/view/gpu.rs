@@ -17,8 +17,8 @@ use growing::{Growing, allocate};
 use pipelines::{Pipelines, pipelines};
 use std::mem::size_of;
 use std::ops::Range;
-use stylet_host::mesh::SurfaceVertex;
-use stylet_host::mesh::coarse::coarse;
+use stylet_surfaces::mesh::SurfaceVertex;
+use stylet_surfaces::mesh::coarse::coarse;
 use targets::{FINE, ONE_SAMPLE, Targets};
 
 const LARGEST_SIDE: u32 = 4096;

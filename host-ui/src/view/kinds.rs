@@ -3,9 +3,9 @@
 use crate::theme::Tokens;
 use egui::Color32;
 use std::ops::Range;
-use stylet_host::bodies::{Bodies, shown_alone};
-use stylet_host::mesh;
 use stylet_shm_schema::{SceneHeader, role};
+use stylet_surfaces::bodies::{Bodies, shown_alone};
+use stylet_surfaces::mesh;
 
 /// What a surface is of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

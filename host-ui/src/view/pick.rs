@@ -1,7 +1,7 @@
 //! Which place of a surface the pointer is on.
 
 use nalgebra::Vector3;
-use stylet_host::mesh::SurfaceVertex;
+use stylet_surfaces::mesh::SurfaceVertex;
 
 /// The nearest place where a ray meets a triangle, from in front or from behind (Möller and Trumbore).
 pub fn pick(

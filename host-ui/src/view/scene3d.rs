@@ -20,8 +20,8 @@ use eframe::egui_wgpu::RenderState;
 use egui::{PointerButton, Rect, Sense};
 use nalgebra::Vector3;
 use std::sync::Arc;
-use stylet_host::mesh::Surface;
 use stylet_shm_schema::SceneId;
+use stylet_surfaces::mesh::Surface;
 
 const TURN_PER_POINT_RAD: f32 = 0.008;
 /// Behind the entry, where the template is held.

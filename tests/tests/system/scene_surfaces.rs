@@ -3,10 +3,10 @@
 
 use std::collections::HashMap;
 use std::time::Instant;
-use stylet_host::bodies::{Bodies, Segmentation, shown_alone};
 use stylet_host::link::SceneModel;
 use stylet_runtime::bridge::ScenePicture;
 use stylet_sim::scene::{Labels, Scene};
+use stylet_surfaces::bodies::{Bodies, Segmentation, shown_alone};
 
 type Place = [f64; 3];
 

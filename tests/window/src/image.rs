@@ -8,7 +8,7 @@ use nalgebra::{Rotation3, Vector3};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use stylet_files::{Image, Progress};
-use stylet_host::field::Field;
+use stylet_surfaces::field::Field;
 use stylet_tests::scratch;
 
 const DIMS: [usize; 3] = [90, 100, 110];
@@ -112,7 +112,7 @@ fn agreement(driven: &mut Driven, image: &Image) -> [Agreement; 2] {
     let picture = driven.window.render().expect("a picture");
     let app: &App = driven.window.state();
     let (scene, snapshot) = (app.link().scene().expect("live"), app.link().snapshot().expect("live"));
-    let field = Field::of(scene, snapshot).expect("fits");
+    let field = Field::of(scene.header.nodes, &snapshot.displacements_m).expect("fits");
     let rect = driven.window.get_by_label("Sagittal slice").rect();
     let plane = app.middle().plane(Orientation::Sagittal, rect);
     let [low, high] = image.range.map(f64::from);

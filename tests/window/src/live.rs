@@ -9,8 +9,8 @@ use host_ui::app::{App, Options};
 use host_ui::view::orientation::Orientation;
 use nalgebra::Vector3;
 use std::time::Duration;
-use stylet_host::field::Field;
 use stylet_shm_schema::{Phase, flags};
+use stylet_surfaces::field::Field;
 
 fn phase(app: &App) -> u32 {
     app.link().state().map_or(0, |s| s.phase)
@@ -127,7 +127,7 @@ fn keys_drive_the_needle_and_letting_go_stops_it() {
 /// Vertices of the surface are sent in full, displacements inside on a coarse grid: both must say the same of a vertex.
 fn assert_inside_moves_as_the_surface_does(app: &App) {
     let (scene, snapshot) = (app.link().scene().expect("live"), app.link().snapshot().expect("live"));
-    let field = Field::of(scene, snapshot).expect("the snapshot is the scene's");
+    let field = Field::of(scene.header.nodes, &snapshot.displacements_m).expect("the snapshot is the scene's");
     let errors_m: Vec<f64> = scene
         .rest_m
         .iter()

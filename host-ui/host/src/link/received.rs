@@ -1,9 +1,9 @@
 //! What a host knows of the core, as types of its own.
 
-use crate::bodies::{Bodies, Segmentation};
 use std::sync::OnceLock;
 use std::time::Duration;
 use stylet_shm_schema::{Reason, Refusal, RefusalCode, Reply, ReplyStatus, SceneHeader, SnapshotHeader, Vertex, check};
+use stylet_surfaces::bodies::{Bodies, Segmentation};
 
 /// Whether the core runs.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,9 +7,9 @@ use stylet_anatomy::{Organ, PatientFrame};
 use stylet_dose::mesh::Mesh;
 use stylet_dose::structure::Region;
 use stylet_dose::{Structure, structure};
-use stylet_host::bodies::{Bodies, Follows, shown_alone};
 use stylet_host::link::SceneModel;
 use stylet_shm_schema::{StructureInfo, role};
+use stylet_surfaces::bodies::{Bodies, Follows, shown_alone};
 
 /// Steps in which a needle's way is looked at.
 const STEP_M: f64 = 0.5e-3;

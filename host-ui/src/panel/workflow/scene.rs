@@ -12,8 +12,8 @@ use crate::words::Explained;
 use egui::{Button, RichText};
 use std::path::PathBuf;
 use stylet_base::format;
-use stylet_host::bodies::has_every_label;
 use stylet_shm_schema::{BUILTIN_SCENES, MAX_LABEL_CELLS, SceneHeader, role};
+use stylet_surfaces::bodies::has_every_label;
 
 /// The button beside the field.
 const OPEN_WIDTH: f32 = 78.0;

@@ -4,7 +4,7 @@ use super::super::marks::MarkVertex;
 use super::targets::{COLOR, DEPTH};
 use eframe::wgpu;
 use std::mem::size_of;
-use stylet_host::mesh::SurfaceVertex;
+use stylet_surfaces::mesh::SurfaceVertex;
 
 /// Pipelines of one picture.
 pub struct Pipelines {

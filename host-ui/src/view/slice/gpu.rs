@@ -15,9 +15,9 @@ use pipeline::{layout, pipeline};
 use std::mem::size_of;
 use stylet_anatomy::PatientFrame;
 use stylet_files::Image;
-use stylet_host::field::Field;
 use stylet_host::link::SceneModel;
 use stylet_shm_schema::GridInfo;
+use stylet_surfaces::field::Field;
 use texture::{extent, volume, write};
 
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;

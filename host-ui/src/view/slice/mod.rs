@@ -24,10 +24,10 @@ use overlay::{Lines, Overlay};
 pub use plane::Plane;
 use std::sync::Arc;
 use stylet_files::Image;
-use stylet_host::bodies::Bodies;
-use stylet_host::field::Field;
 use stylet_host::link::{SceneModel, Snapshot};
 use stylet_shm_schema::{SceneHeader, SceneId, Text};
+use stylet_surfaces::bodies::Bodies;
+use stylet_surfaces::field::Field;
 
 /// Of the target, this much is seen at first.
 const MARGIN: f64 = 1.45;
@@ -110,7 +110,7 @@ impl Slices {
             return;
         }
         self.snapshot = Some(key);
-        if let Some(field) = Field::of(model, snapshot)
+        if let Some(field) = Field::of(model.header.nodes, &snapshot.displacements_m)
             && field != self.field
         {
             if let Some(gpu) = &mut self.gpu {

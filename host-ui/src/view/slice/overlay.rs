@@ -12,7 +12,7 @@ use egui::{Align, Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, V
 use nalgebra::Vector3;
 use std::sync::Arc;
 use stylet_base::format;
-use stylet_host::mesh::cut;
+use stylet_surfaces::mesh::cut;
 
 /// What lies nearer to the plane than this is in it.
 const IN_PLANE_M: f64 = 1.5e-3;

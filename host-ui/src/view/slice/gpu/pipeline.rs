@@ -2,7 +2,7 @@
 
 use super::COLOR;
 use eframe::wgpu;
-use stylet_host::field::{SEEN_M, STEPS};
+use stylet_surfaces::field::{SEEN_M, STEPS};
 
 /// Uniform, four volumes and two samplers.
 pub fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {

@@ -1,6 +1,5 @@
-//! The displacements of a snapshot as a texture takes them, and which material point lies at a place.
+//! The field of displacements as a texture takes it, and which material point lies at a place.
 
-use crate::link::{SceneModel, Snapshot};
 use half::f16;
 use nalgebra::Vector3;
 use stylet_shm_schema::GridInfo;
@@ -22,14 +21,13 @@ pub struct Field {
 }
 
 impl Field {
-    /// `None` where the snapshot does not fit the scene.
-    pub fn of(scene: &SceneModel, snapshot: &Snapshot) -> Option<Self> {
-        let info = scene.header.nodes;
-        let fits = info.node_count() == Some(snapshot.displacements_m.len()) && info.dims.iter().all(|&d| d > 0);
+    /// `None` where the displacements are not one for each node.
+    pub fn of(info: GridInfo, displacements_m: &[[f32; 3]]) -> Option<Self> {
+        let fits = info.node_count() == Some(displacements_m.len()) && info.dims.iter().all(|&d| d > 0);
         fits.then(|| Self {
             info,
-            at_rest: snapshot.displacements_m.iter().flatten().all(|c| c.abs() < SEEN_M),
-            displacements_m: snapshot.displacements_m.clone(),
+            at_rest: displacements_m.iter().flatten().all(|c| c.abs() < SEEN_M),
+            displacements_m: displacements_m.to_vec(),
         })
     }
 

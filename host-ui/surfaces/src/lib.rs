@@ -1,0 +1,8 @@
+//! What is computed for each picture of the body: its surfaces, found in the labels, carried by the tissue and cut by planes, and the
+//! field of displacements. No port, no window.
+
+#![warn(missing_docs)]
+
+pub mod bodies;
+pub mod field;
+pub mod mesh;
