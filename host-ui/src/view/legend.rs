@@ -16,7 +16,7 @@ const MOST_SHARE: f32 = 0.4;
 /// Height of a word (points).
 const WORD: f32 = 12.0;
 /// How much of the picture the legend covers where it stands.
-const BACKING: f32 = 0.7;
+const BACKING: f32 = 0.85;
 
 /// A shape and what it means.
 pub struct Row {
@@ -99,19 +99,24 @@ impl Legend<'_> {
             .unwrap_or(500.0_f32);
         let end = self.rect.right_bottom() - Vec2::new(16.0, 12.0);
         let start = end - Vec2::new(length_mm * points_per_mm, 0.0);
+        let text = format!("{length_mm:.0} mm");
+        let middle = start + (end - start) * 0.5 - Vec2::new(0.0, 5.0);
+        let word = Align2::CENTER_BOTTOM.anchor_size(middle, self.size_of(&text));
+        let bar = Rect::from_two_pos(start, end).expand(4.0);
+        self.back(bar.union(word).expand2(Vec2::new(3.0, 1.0)));
         let stroke = Stroke::new(2.0, self.tokens.path);
         self.painter.line_segment([start, end], stroke);
         for place in [start, end] {
             self.painter
                 .line_segment([place - Vec2::new(0.0, 4.0), place + Vec2::new(0.0, 4.0)], stroke);
         }
-        let middle = start + (end - start) * 0.5 - Vec2::new(0.0, 5.0);
-        self.word(
-            middle,
-            Align2::CENTER_BOTTOM,
-            &format!("{length_mm:.0} mm"),
-            self.tokens.path,
-        );
+        self.word(middle, Align2::CENTER_BOTTOM, &text, self.tokens.path);
+    }
+
+    /// Needles, seeds and the grid go through the same corners as the words.
+    fn back(&self, rect: Rect) {
+        let backing = self.tokens.background.gamma_multiply(BACKING);
+        self.painter.rect_filled(rect, 3.0, backing);
     }
 
     /// What is drawn, from above downwards; nothing in a small picture, where it would lie over what it explains.
@@ -173,9 +178,7 @@ impl Legend<'_> {
         if rows.is_empty() {
             return;
         }
-        // Needle and grid go through the same corner.
-        let backing = self.tokens.background.gamma_multiply(BACKING);
-        self.painter.rect_filled(self.place_of(rows), 3.0, backing);
+        self.back(self.place_of(rows));
         let mut place = self.rect.left_bottom() + Vec2::new(16.0, -14.0);
         for row in rows.iter().rev() {
             if row.filled {

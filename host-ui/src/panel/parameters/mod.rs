@@ -168,7 +168,7 @@ pub fn parameters_ui(ctx: &egui::Context, shown: &Shown, state: &mut ParametersS
                 );
             }
             search_ui(ui, state);
-            let height = (screen.y - 330.0).clamp(80.0, 640.0);
+            let height = (screen.y - 240.0).clamp(80.0, 640.0);
             egui::ScrollArea::both()
                 .max_height(height)
                 .min_scrolled_height(height)

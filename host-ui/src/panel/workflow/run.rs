@@ -99,7 +99,8 @@ fn begin_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         actions.push(Action::RunAll);
     }
     if shown.continues_at.is_none() {
-        ui.add(egui::Label::new(theme::small(run_help(shown))).truncate());
+        // The whole sentence, which has no room here, is the button's help.
+        ui.add(egui::Label::new(theme::small("By a scripted hand")).truncate());
         return;
     }
     let anew = ui.add_enabled(shown.is_live(), Button::new("Start over"));
