@@ -115,9 +115,23 @@ impl App {
             self.shown.continues_at = None;
         } else if self.placed_found.elapsed() >= FIND_PLACED_EVERY {
             self.placed_found = Instant::now();
-            let tasks: Vec<NeedleTask> = self.planner.tasks().into_iter().map(|(_, task)| task).collect();
+            let (numbers, tasks): (Vec<usize>, Vec<NeedleTask>) = self.planner.tasks().into_iter().unzip();
             let placed = self.placed(&tasks);
             self.shown.continues_at = placed.is_partial().then(|| (placed.next_needle(), tasks.len()));
+            // A window that was opened anew knows of no needle.
+            if placed.is_partial() && self.planner.progress().begun() == 0 {
+                self.mark_placed(&numbers, &placed);
+            }
+        }
+    }
+
+    /// The needles before the next are done.
+    fn mark_placed(&mut self, numbers: &[usize], placed: &Placed) {
+        let mut before = 0;
+        for (at, &number) in numbers.iter().enumerate().take(placed.next_needle()) {
+            self.planner.begin_needle(number, before);
+            self.planner.finish_needle();
+            before += placed.seeds_of(at);
         }
     }
 
@@ -130,12 +144,7 @@ impl App {
             return self.start_over();
         }
         self.planner.restart();
-        let mut before = 0;
-        for (at, &number) in numbers.iter().enumerate().take(placed.next_needle()) {
-            self.planner.begin_needle(number, before);
-            self.planner.finish_needle();
-            before += placed.seeds_of(at);
-        }
+        self.mark_placed(&numbers, &placed);
         self.run = Some(Run::continuing(tasks, self.pace, &placed));
         (self.run_needles, self.run_placed) = (numbers, placed);
         self.drive = Drive::default();

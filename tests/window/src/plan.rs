@@ -262,6 +262,12 @@ fn a_script_that_was_stopped_goes_on_in_this_window_and_in_the_next() {
         app.planner().plan().is_some_and(|plan| plan.needles.len() == 2)
     });
     wait_long_for_label(&mut driven, "Continue at needle 2 of 2");
+    let found = driven.window.state().planner().progress();
+    assert_eq!(
+        found.state(0),
+        NeedleState::Done,
+        "the list said planned until the script went on"
+    );
     driven.click("Continue at needle 2 of 2");
     wait_long(&mut driven, "all needles", |app| app.planner().progress().done() == 2);
     wait_long_for_label(&mut driven, "All 2 needles are done.");
