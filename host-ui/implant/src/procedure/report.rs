@@ -4,6 +4,7 @@ use super::Seen;
 use super::error::ProcedureError;
 use super::job::{Job, PlannedDrop, placed};
 use crate::pairing::SeedOffset;
+use crate::plan::compensate::edges::BESIDE_M;
 use crate::plan::compensate::summary_m;
 use crate::workflow::{NeedleTask, Pace};
 use nalgebra::Vector3;
@@ -160,8 +161,23 @@ fn compensation(job: &Job) -> Option<Value> {
             "mean_error_before_mm": mean_before, "mean_error_after_mm": mean_after,
             "worst_error_before_mm": worst_before, "worst_error_after_mm": worst_after,
             "rehearsals": job.compensations.values().map(|c| c.rehearsals).sum::<usize>(),
+            "rehearsals_for_edges": job.compensations.values().map(|c| c.for_edges).sum::<usize>(),
+            "sensitive_seeds": sensitive(job),
         })
     })
+}
+
+/// Seeds that rest elsewhere if the tip stops a little deeper or shallower; `null` where they would be lost.
+fn sensitive(job: &Job) -> Vec<Value> {
+    let each = job.compensations.iter();
+    each.flat_map(|(needle, done)| done.sensitive.iter().map(move |found| (needle, found)))
+        .map(|(needle, found)| {
+            json!({
+                "needle": needle + 1, "seed_of_needle": found.seed + 1, "moves_mm": found.moves_m.map(|m| m * 1e3),
+                "beside_mm": BESIDE_M * 1e3,
+            })
+        })
+        .collect()
 }
 
 fn along(direction: [f64; 3], r: &TickRecord) -> f64 {
