@@ -11,17 +11,23 @@ use crate::plan::rehearse::{Drops, RehearsalError};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// Every drop is tried so much deeper and so much shallower. A live hand counts as arrived within that distance of its goal
+/// Every drop is tried up to so much deeper and so much shallower. A live hand counts as arrived within that distance of its goal
 /// (`stylet_procedure::tolerance`); it stops within 0.1 mm of where the rehearsed one does, steps of the encoder and late ticks included.
 pub const BESIDE_M: f64 = stylet_procedure::tolerance::AT_TARGET_M;
-/// A seed whose place changes by more than so many times the change of its drop is on an edge.
-const STEADY: f64 = 2.0;
+/// Stops on either side of a drop.
+const STOPS: i8 = 2;
+/// From one stop to the next.
+const STEP_M: f64 = BESIDE_M / STOPS as f64;
+/// A seed whose place changes by more than so many times the way between two stops is on an edge. On the way out seeds follow their drops
+/// by up to three times as much where nothing gives way; a live hand that stops 0.1 mm from the rehearsed one leaves a seed that is on none
+/// within 0.35 mm of where it was rehearsed.
+const STEADY: f64 = 3.5;
 /// Edges of one needle that are moved away from, one after the other, at most.
 const ROUNDS: usize = 3;
 /// Rehearsals, at most, that seek the drops of the seeds behind one that was moved.
 const SEEK_AGAIN: usize = 12;
 
-/// A seed on an edge: it rests elsewhere if the tip stops [`BESIDE_M`] deeper or shallower.
+/// A seed on an edge: it rests elsewhere if the tip stops up to [`BESIDE_M`] deeper or shallower.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensitive {
     /// Number of the seed, deepest first.
@@ -36,55 +42,63 @@ impl std::fmt::Display for Sensitive {
         match self.moves_m {
             Some(m) => write!(
                 f,
-                "seed {number} is sensitive: it rests {:.1} mm elsewhere if the tip stops {beside_mm:.1} mm deeper or shallower",
+                "seed {number} is sensitive: it rests up to {:.1} mm elsewhere if the tip stops up to {beside_mm:.1} mm deeper or shallower",
                 m * 1e3
             ),
             None => write!(
                 f,
-                "seed {number} is sensitive: it is lost if the tip stops {beside_mm:.1} mm deeper or shallower"
+                "seed {number} is sensitive: it is lost if the tip stops up to {beside_mm:.1} mm deeper or shallower"
             ),
         }
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Side {
-    Shallower,
-    Here,
-    Deeper,
+/// What one seed does with shallower and with deeper stops.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Beside {
+    /// Whether its place jumps somewhere between the stops on that side.
+    jumps: [bool; 2],
+    /// Farthest that it rests from where it does otherwise, m; infinite where it is lost.
+    moves_m: f64,
 }
 
-impl Side {
-    fn aside_m(self) -> f64 {
-        match self {
-            Side::Shallower => -BESIDE_M,
-            Side::Here => 0.0,
-            Side::Deeper => BESIDE_M,
+impl Beside {
+    /// By where it rests at the stops of one side, the nearest first.
+    fn look(&mut self, side: usize, here_m: Vector3<f64>, rests_m: impl Iterator<Item = Vector3<f64>>) {
+        let mut last_m = here_m;
+        for rest_m in rests_m {
+            self.jumps[side] |= (rest_m - last_m).norm() > STEADY * STEP_M;
+            self.moves_m = self.moves_m.max((rest_m - here_m).norm());
+            last_m = rest_m;
         }
     }
-}
 
-/// How far each seed rests from where it does otherwise, with a shallower and a deeper drop; infinite where it is lost.
-#[derive(Clone, Debug, PartialEq)]
-struct Moves(Vec<[f64; 2]>);
-
-impl Moves {
-    fn is_edge(moves_m: f64) -> bool {
-        moves_m > STEADY * BESIDE_M
+    fn lose(&mut self, side: usize) {
+        (self.jumps[side], self.moves_m) = (true, f64::INFINITY);
     }
 
+    fn is_on_edge(&self) -> bool {
+        self.jumps.contains(&true)
+    }
+}
+
+/// What every seed of a needle does.
+#[derive(Clone, Debug, PartialEq)]
+struct Moves(Vec<Beside>);
+
+impl Moves {
     /// The deepest seed on an edge.
     fn first(&self) -> Option<(usize, [bool; 2])> {
-        let each = self.0.iter().map(|sides| sides.map(Self::is_edge));
-        each.enumerate().find(|(_, sides)| sides.contains(&true))
+        let each = self.0.iter().map(|beside| beside.jumps);
+        each.enumerate().find(|(_, jumps)| jumps.contains(&true))
     }
 
     fn sensitive(&self) -> Vec<Sensitive> {
-        let each = self.0.iter().map(|sides| sides[0].max(sides[1])).enumerate();
-        each.filter(|(_, moves_m)| Self::is_edge(*moves_m))
-            .map(|(seed, moves_m)| Sensitive {
+        let each = self.0.iter().enumerate();
+        each.filter(|(_, beside)| beside.is_on_edge())
+            .map(|(seed, beside)| Sensitive {
                 seed,
-                moves_m: moves_m.is_finite().then_some(moves_m),
+                moves_m: beside.moves_m.is_finite().then_some(beside.moves_m),
             })
             .collect()
     }
@@ -92,74 +106,98 @@ impl Moves {
     /// What seeds are off in the mean where every edge is on the wrong side, m.
     fn worst_mean_m(&self, tried: &Tried) -> f64 {
         let each = tried.error_m.iter().zip(&self.0);
-        let off = |(error, sides): (&Vector3<f64>, &[f64; 2])| {
-            let moves_m = sides[0].max(sides[1]);
-            error.norm() + if Self::is_edge(moves_m) { moves_m } else { 0.0 }
+        let off = |(error, beside): (&Vector3<f64>, &Beside)| {
+            error.norm() + if beside.is_on_edge() { beside.moves_m } else { 0.0 }
         };
         each.map(off).sum::<f64>() / tried.error_m.len().max(1) as f64
     }
 }
 
-/// Where the tip stops beside the drops: on the way in before, at and beyond the first, on the way out beyond and before the others.
-fn stops(drops: &Drops, sides: &[Side]) -> Vec<(usize, Side, f64)> {
-    let beside = |(seed, along_m): (usize, &f64)| {
-        let along_m = *along_m;
-        sides.iter().map(move |side| (seed, *side, along_m + side.aside_m()))
+/// One stop beside a drop: so many steps deeper.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stop {
+    seed: usize,
+    steps: i8,
+    along_m: f64,
+}
+
+/// Where the tip stops beside the drops: on the way in before and beyond the first, on the way out beyond and before the others.
+fn stops(drops: &Drops, steps: &[i8]) -> Vec<Stop> {
+    let beside = |(seed, drop_m): (usize, &f64)| {
+        let drop_m = *drop_m;
+        steps.iter().map(move |&steps| Stop {
+            seed,
+            steps,
+            along_m: drop_m + f64::from(steps) * STEP_M,
+        })
     };
-    let mut stops: Vec<_> = drops.along_m.iter().enumerate().flat_map(beside).collect();
-    let way_in = |&(seed, _, along_m): &(usize, Side, f64)| (seed > 0, if seed > 0 { -along_m } else { along_m });
+    let mut stops: Vec<Stop> = drops.along_m.iter().enumerate().flat_map(beside).collect();
+    let order = |stop: &Stop| match stop.seed {
+        0 => (false, stop.along_m),
+        _ => (true, -stop.along_m),
+    };
     stops.sort_by(|a, b| {
-        let (a, b) = (way_in(a), way_in(b));
+        let (a, b) = (order(a), order(b));
         a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
     });
     stops
 }
 
-/// One rehearsal with a loose seed at every stop: how far each rests from where it does otherwise.
-fn at_stops(rehearsals: &mut Rehearsals, at: &Tried, sides: &[Side]) -> Result<Moves, RehearsalError> {
+/// One rehearsal with a loose seed at every stop on these sides, 0 shallower and 1 deeper.
+fn at_stops(rehearsals: &mut Rehearsals, at: &Tried, sides: &[usize]) -> Result<Moves, RehearsalError> {
     let is_strand = matches!(rehearsals.needle.loading, Loading::Stranded { .. });
-    // A strand's seeds rest where all of it does, so seeds are compared that are not in one.
-    let sides: Vec<Side> = sides.iter().copied().chain(is_strand.then_some(Side::Here)).collect();
-    let stops = stops(&at.drops, &sides);
+    let of_side = |side: usize, step: i8| if side == 0 { -step } else { step };
+    let mut steps: Vec<i8> = sides
+        .iter()
+        .flat_map(|&side| (1..=STOPS).map(move |step| of_side(side, step)))
+        .collect();
+    // A strand's seeds rest where all of it does, so its seeds are compared with loose ones.
+    steps.extend(is_strand.then_some(0));
+    let stops = stops(&at.drops, &steps);
     let drops = Drops {
-        along_m: stops.iter().map(|(_, _, along_m)| *along_m).collect(),
+        along_m: stops.iter().map(|stop| stop.along_m).collect(),
         strand_pitch_m: None,
         ..at.drops.clone()
     };
     let rests_m = rehearsals.rests_m(&drops)?;
-    let rest_m = |seed: usize, side: Side| {
-        let number = stops.iter().position(|(s, of, _)| (*s, *of) == (seed, side))?;
+    let rest_m = |seed: usize, steps: i8| {
+        let number = stops.iter().position(|stop| stop.seed == seed && stop.steps == steps)?;
         rests_m.get(number).copied()
     };
-    let planned: Vec<Vector3<f64>> = rehearsals.needle.seeds_m().map(Vector3::from).collect();
-    let moves_m = |seed: usize, side: Side| {
-        let here_m = match is_strand {
-            true => rest_m(seed, Side::Here)?,
-            false => planned.get(seed)? + at.error_m.get(seed)?,
-        };
-        Some((rest_m(seed, side)? - here_m).norm())
+    let planned = rehearsals.needle.seeds_m().map(Vector3::from);
+    let look = |(seed, (planned_m, error_m)): (usize, (Vector3<f64>, &Vector3<f64>))| {
+        let here_m = rest_m(seed, 0).unwrap_or(planned_m + error_m);
+        let mut beside = Beside::default();
+        for &side in sides {
+            beside.look(
+                side,
+                here_m,
+                (1..=STOPS).filter_map(|step| rest_m(seed, of_side(side, step))),
+            );
+        }
+        beside
     };
-    let each = |seed| [Side::Shallower, Side::Deeper].map(|side| moves_m(seed, side).unwrap_or(0.0));
-    Ok(Moves((0..at.error_m.len()).map(each).collect()))
+    Ok(Moves(planned.zip(&at.error_m).enumerate().map(look).collect()))
 }
 
-/// All seeds in one rehearsal; where one of them would be left outside the tissue, deeper and shallower apart.
+/// All seeds in one rehearsal; where one of them would be left outside the tissue, shallower and deeper apart.
 fn look(rehearsals: &mut Rehearsals, at: &Tried) -> Result<Moves, RehearsalError> {
-    match at_stops(rehearsals, at, &[Side::Shallower, Side::Deeper]) {
+    match at_stops(rehearsals, at, &[0, 1]) {
         Err(RehearsalError::Refused(_)) => {}
         looked => return looked,
     }
-    let mut moves = Moves(vec![[0.0; 2]; at.error_m.len()]);
-    // Deeper the first seed may be beyond the tissue, shallower the last before it.
+    let mut moves = Moves(vec![Beside::default(); at.error_m.len()]);
+    // Shallower the last seed may be before the tissue, deeper the first beyond it.
     let last = at.error_m.len().saturating_sub(1);
-    for (n, side, lost) in [(0, Side::Shallower, last), (1, Side::Deeper, 0)] {
+    for (side, lost) in [(0, last), (1, 0)] {
         match at_stops(rehearsals, at, &[side]) {
             Ok(found) => {
-                for (seed, sides) in found.0.iter().enumerate() {
-                    moves.0[seed][n] = sides[n];
+                for (beside, found) in moves.0.iter_mut().zip(&found.0) {
+                    beside.jumps[side] = found.jumps[side];
+                    beside.moves_m = beside.moves_m.max(found.moves_m);
                 }
             }
-            Err(RehearsalError::Refused(_)) => moves.0[lost][n] = f64::INFINITY,
+            Err(RehearsalError::Refused(_)) => moves.0[lost].lose(side),
             Err(why) => return Err(why),
         }
     }
@@ -187,7 +225,7 @@ pub(super) fn keep_clear(rehearsals: &mut Rehearsals, found: Tried) -> Result<(T
         let Some((seed, [before, beyond])) = moves.first() else {
             break;
         };
-        // From an edge somewhere between here and the stop on that side, the next drop is as far as the stops.
+        // An edge lies somewhere between here and the last stop on that side: the next drop is clear of it by as much.
         let shallower_m = if before { -2.0 * BESIDE_M } else { -BESIDE_M };
         let deeper_m = if beyond { 2.0 * BESIDE_M } else { BESIDE_M };
         let mut better = None;

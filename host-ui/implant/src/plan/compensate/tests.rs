@@ -227,7 +227,10 @@ fn where_edges_are_everywhere_the_seed_is_named_with_how_far_it_moves() {
     };
     let moves_m = found.moves_m.expect("in the tissue");
     assert!(found.seed == 0 && (3.6e-3..4.4e-3).contains(&moves_m), "{found:?}");
-    assert!(found.to_string().contains("seed 1 is sensitive: it rests"), "{found}");
+    assert!(
+        found.to_string().contains("seed 1 is sensitive: it rests up to"),
+        "{found}"
+    );
     assert!(done.errors_after_m().all(|e| e < 0.1e-3), "{:?}", done.after_m);
 }
 
@@ -265,4 +268,13 @@ fn an_edge_is_not_made_of_a_core_that_went() {
         &mut Gone(0),
     );
     assert_eq!(done, Err(RehearsalError::Interrupted));
+}
+
+#[test]
+fn a_seed_that_follows_its_drop_steeply_is_on_no_edge() {
+    // Three times as far as the drop.
+    let mut known = tissue(|z| 2e-3 - 2.0 * (z - 0.04));
+    let done = run(&needle(Loading::Loose), &mut known);
+    assert!(done.sensitive.is_empty() && done.for_edges == 1, "{done:?}");
+    assert!(done.errors_after_m().all(|e| e < 0.1e-3), "{:?}", done.after_m);
 }
