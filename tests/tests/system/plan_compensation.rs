@@ -167,7 +167,7 @@ one shift applies to all their seeds.
   it. They count only after compensation.
 - *Not possible*: needles that no way was found for to leave their last seeds inside the tissue.
 - *For edges*: rehearsals, of all, that looked for edges beside the drops or for drops clear of them (docs/plan.md, Edges). One for each needle finds that there is none.
-- *Sensitive*: seeds on an edge even so: how many, and how far one of them rests from where it was rehearsed, at most, if the tip stops 0.3 mm deeper or shallower.
+- *Sensitive*: seeds on an edge even so: how many, and how far one of them rests from where it was rehearsed, at most, if the tip stops up to 0.3 mm deeper or shallower.
 
 A strand does not stretch (docs/physics.md, Strands), so one shift can bring all its seeds to their places.
 

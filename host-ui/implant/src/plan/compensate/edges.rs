@@ -5,23 +5,26 @@
 //! rehearsal stops at one place; a live hand stops near it.
 
 use super::search::seek;
-use super::tried::{Rehearsals, Tried, keep_within};
+use super::tried::{Left, Rehearsals, Tried, keep_within};
 use crate::plan::Loading;
 use crate::plan::rehearse::{Drops, RehearsalError};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use stylet_shm_schema::MAX_SEEDS;
 
-/// Every drop is tried up to so much deeper and so much shallower. A live hand counts as arrived within that distance of its goal
+/// An edge within so much of a drop, deeper or shallower, is looked for. A live hand counts as arrived within that distance of its goal
 /// (`stylet_procedure::tolerance`); it stops within 0.1 mm of where the rehearsed one does, steps of the encoder and late ticks included.
 pub const BESIDE_M: f64 = stylet_procedure::tolerance::AT_TARGET_M;
-/// Stops on either side of a drop.
-const STOPS: i8 = 2;
-/// From one stop to the next.
-const STEP_M: f64 = BESIDE_M / STOPS as f64;
-/// A seed whose place changes by more than so many times the way between two stops is on an edge. On the way out seeds follow their drops
-/// by up to three times as much where nothing gives way; a live hand that stops 0.1 mm from the rehearsed one leaves a seed that is on none
-/// within 0.35 mm of where it was rehearsed.
-const STEADY: f64 = 3.5;
+/// From one stop beside a drop to the next.
+const STEP_M: f64 = 0.5 * BESIDE_M;
+/// Stops on either side: a hand that sticks arrives up to [`BESIDE_M`] before its goal, so they go twice as far.
+const STOPS: i8 = 4;
+/// Between two stops a seed follows its drop by up to so many times as much, and a little more; else there is an edge between them. A
+/// live hand that stops 0.1 mm from the rehearsed one leaves a seed that is on none within 0.35 mm of where it was rehearsed.
+const STEADY: f64 = 2.0;
+const UNSTEADY_M: f64 = 0.15e-3;
+/// Places closer than this are the same.
+const SAME_M: f64 = 1e-9;
 /// Edges of one needle that are moved away from, one after the other, at most.
 const ROUNDS: usize = 3;
 /// Rehearsals, at most, that seek the drops of the seeds behind one that was moved.
@@ -53,32 +56,71 @@ impl std::fmt::Display for Sensitive {
     }
 }
 
+/// An edge between two stops on one side of a drop: how far the tip is from it at each.
+type Edge = Option<[f64; 2]>;
+
 /// What one seed does with shallower and with deeper stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Beside {
-    /// Whether its place jumps somewhere between the stops on that side.
-    jumps: [bool; 2],
-    /// Farthest that it rests from where it does otherwise, m; infinite where it is lost.
+    /// The nearest edge on each side.
+    edges: [Edge; 2],
+    /// Farthest that it rests, beyond an edge, from where it does otherwise, m; infinite where it is lost.
     moves_m: f64,
 }
 
 impl Beside {
-    /// By where it rests at the stops of one side, the nearest first.
-    fn look(&mut self, side: usize, here_m: Vector3<f64>, rests_m: impl Iterator<Item = Vector3<f64>>) {
-        let mut last_m = here_m;
-        for rest_m in rests_m {
-            self.jumps[side] |= (rest_m - last_m).norm() > STEADY * STEP_M;
-            self.moves_m = self.moves_m.max((rest_m - here_m).norm());
-            last_m = rest_m;
+    /// Of a seed that is dropped with the tip at `tip_m`, by what becomes of it at stops beside that.
+    fn of(tip_m: f64, mut stops: Vec<Left>) -> Self {
+        stops.sort_by(|a, b| a.tip_m.total_cmp(&b.tip_m));
+        let mut beside = Self::default();
+        for pair in stops.windows(2) {
+            let [from, to] = [pair[0], pair[1]];
+            let moved_m = (to.rest_m - from.rest_m).norm();
+            let [low_m, high_m] = [from.tip_m - tip_m, to.tip_m - tip_m];
+            let is_near = low_m < BESIDE_M - SAME_M && high_m > SAME_M - BESIDE_M;
+            if is_near && moved_m > STEADY * (high_m - low_m) + UNSTEADY_M {
+                beside.moves_m = beside.moves_m.max(moved_m);
+                // Of several on one side the nearest counts.
+                if low_m < -SAME_M {
+                    beside.edges[0] = Some([(-high_m).max(0.0), -low_m]);
+                }
+                if high_m > SAME_M {
+                    beside.edges[1].get_or_insert([low_m.max(0.0), high_m]);
+                }
+            }
         }
+        beside
     }
 
+    fn merge(&mut self, other: &Self) {
+        for (edge, other) in self.edges.iter_mut().zip(other.edges) {
+            *edge = edge.or(other);
+        }
+        self.moves_m = self.moves_m.max(other.moves_m);
+    }
+
+    /// It is left outside the tissue.
     fn lose(&mut self, side: usize) {
-        (self.jumps[side], self.moves_m) = (true, f64::INFINITY);
+        (self.edges[side], self.moves_m) = (Some([0.0, BESIDE_M]), f64::INFINITY);
     }
 
     fn is_on_edge(&self) -> bool {
-        self.jumps.contains(&true)
+        self.edges.iter().any(Option::is_some)
+    }
+
+    /// Ways to be clear of its edges: so much deeper.
+    fn ways_m(&self) -> Vec<f64> {
+        let way = |side: usize, sign: f64| {
+            let [own, other] = [self.edges[side], self.edges[1 - side]];
+            match (own, other) {
+                // Beyond the edge on that side.
+                (Some([_, far_m]), _) => Some(sign * (far_m + BESIDE_M)),
+                // Away from the one on the other.
+                (None, Some([near_m, _])) => Some(sign * (BESIDE_M - near_m)),
+                (None, None) => None,
+            }
+        };
+        [way(0, -1.0), way(1, 1.0)].into_iter().flatten().collect()
     }
 }
 
@@ -88,9 +130,8 @@ struct Moves(Vec<Beside>);
 
 impl Moves {
     /// The deepest seed on an edge.
-    fn first(&self) -> Option<(usize, [bool; 2])> {
-        let each = self.0.iter().map(|beside| beside.jumps);
-        each.enumerate().find(|(_, jumps)| jumps.contains(&true))
+    fn first(&self) -> Option<(usize, &Beside)> {
+        self.0.iter().enumerate().find(|(_, beside)| beside.is_on_edge())
     }
 
     fn sensitive(&self) -> Vec<Sensitive> {
@@ -113,21 +154,20 @@ impl Moves {
     }
 }
 
-/// One stop beside a drop: so many steps deeper.
+/// One stop beside a drop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Stop {
     seed: usize,
-    steps: i8,
     along_m: f64,
 }
 
-/// Where the tip stops beside the drops: on the way in before and beyond the first, on the way out beyond and before the others.
+/// Where the tip stops beside the drops: on the way in from before the first to beyond it, on the way out from beyond to before the
+/// others.
 fn stops(drops: &Drops, steps: &[i8]) -> Vec<Stop> {
     let beside = |(seed, drop_m): (usize, &f64)| {
         let drop_m = *drop_m;
         steps.iter().map(move |&steps| Stop {
             seed,
-            steps,
             along_m: drop_m + f64::from(steps) * STEP_M,
         })
     };
@@ -143,60 +183,47 @@ fn stops(drops: &Drops, steps: &[i8]) -> Vec<Stop> {
     stops
 }
 
-/// One rehearsal with a loose seed at every stop on these sides, 0 shallower and 1 deeper.
-fn at_stops(rehearsals: &mut Rehearsals, at: &Tried, sides: &[usize]) -> Result<Moves, RehearsalError> {
-    let is_strand = matches!(rehearsals.needle.loading, Loading::Stranded { .. });
-    let of_side = |side: usize, step: i8| if side == 0 { -step } else { step };
-    let mut steps: Vec<i8> = sides
-        .iter()
-        .flat_map(|&side| (1..=STOPS).map(move |step| of_side(side, step)))
-        .collect();
-    // A strand's seeds rest where all of it does, so its seeds are compared with loose ones.
-    steps.extend(is_strand.then_some(0));
-    let stops = stops(&at.drops, &steps);
+/// One rehearsal with a loose seed at every drop and at every stop beside it, so many steps shallower and deeper.
+fn at_stops(rehearsals: &mut Rehearsals, at: &Tried, [shallower, deeper]: [i8; 2]) -> Result<Moves, RehearsalError> {
+    let steps: Vec<i8> = (-shallower..=deeper).collect();
+    let mut stops = stops(&at.drops, &steps);
+    stops.truncate(MAX_SEEDS);
     let drops = Drops {
         along_m: stops.iter().map(|stop| stop.along_m).collect(),
+        // A strand's seeds rest where all of it does.
         strand_pitch_m: None,
         ..at.drops.clone()
     };
-    let rests_m = rehearsals.rests_m(&drops)?;
-    let rest_m = |seed: usize, steps: i8| {
-        let number = stops.iter().position(|stop| stop.seed == seed && stop.steps == steps)?;
-        rests_m.get(number).copied()
+    let left = rehearsals.left(&drops)?;
+    let of = |seed: usize| {
+        stops
+            .iter()
+            .zip(&left)
+            .filter(move |(stop, _)| stop.seed == seed)
+            .map(|(_, left)| *left)
     };
-    let planned = rehearsals.needle.seeds_m().map(Vector3::from);
-    let look = |(seed, (planned_m, error_m)): (usize, (Vector3<f64>, &Vector3<f64>))| {
-        let here_m = rest_m(seed, 0).unwrap_or(planned_m + error_m);
-        let mut beside = Beside::default();
-        for &side in sides {
-            beside.look(
-                side,
-                here_m,
-                (1..=STOPS).filter_map(|step| rest_m(seed, of_side(side, step))),
-            );
-        }
-        beside
-    };
-    Ok(Moves(planned.zip(&at.error_m).enumerate().map(look).collect()))
+    let look = |(seed, here): (usize, &Left)| Beside::of(here.tip_m, of(seed).collect());
+    Ok(Moves(at.left.iter().enumerate().map(look).collect()))
 }
 
-/// All seeds in one rehearsal; where one of them would be left outside the tissue, shallower and deeper apart.
+/// All seeds in one rehearsal; where one of them would be left outside the tissue, with fewer stops, then shallower and deeper apart.
 fn look(rehearsals: &mut Rehearsals, at: &Tried) -> Result<Moves, RehearsalError> {
-    match at_stops(rehearsals, at, &[0, 1]) {
-        Err(RehearsalError::Refused(_)) => {}
-        looked => return looked,
+    for steps in [STOPS, STOPS / 2] {
+        match at_stops(rehearsals, at, [steps; 2]) {
+            Err(RehearsalError::Refused(_)) => {}
+            looked => return looked,
+        }
     }
     let mut moves = Moves(vec![Beside::default(); at.error_m.len()]);
     // Shallower the last seed may be before the tissue, deeper the first beyond it.
     let last = at.error_m.len().saturating_sub(1);
-    for (side, lost) in [(0, last), (1, 0)] {
-        match at_stops(rehearsals, at, &[side]) {
-            Ok(found) => {
-                for (beside, found) in moves.0.iter_mut().zip(&found.0) {
-                    beside.jumps[side] = found.jumps[side];
-                    beside.moves_m = beside.moves_m.max(found.moves_m);
-                }
-            }
+    for (side, steps, lost) in [(0, [STOPS / 2, 0], last), (1, [0, STOPS / 2], 0)] {
+        match at_stops(rehearsals, at, steps) {
+            Ok(found) => moves
+                .0
+                .iter_mut()
+                .zip(&found.0)
+                .for_each(|(beside, found)| beside.merge(found)),
             Err(RehearsalError::Refused(_)) => moves.0[lost].lose(side),
             Err(why) => return Err(why),
         }
@@ -222,15 +249,10 @@ pub(super) fn keep_clear(rehearsals: &mut Rehearsals, found: Tried) -> Result<(T
     let mut moves = look(rehearsals, &found)?;
     let mut best = found;
     for _ in 0..ROUNDS {
-        let Some((seed, [before, beyond])) = moves.first() else {
-            break;
-        };
-        // An edge lies somewhere between here and the last stop on that side: the next drop is clear of it by as much.
-        let shallower_m = if before { -2.0 * BESIDE_M } else { -BESIDE_M };
-        let deeper_m = if beyond { 2.0 * BESIDE_M } else { BESIDE_M };
+        let Some((seed, beside)) = moves.first() else { break };
         let mut better = None;
         let mut least_m = moves.worst_mean_m(&best);
-        for by_m in [shallower_m, deeper_m] {
+        for by_m in beside.ways_m() {
             let Some(tried) = moved_along(rehearsals, &best, seed, by_m) else {
                 continue;
             };

@@ -19,21 +19,40 @@ pub(super) struct Rehearsals<'a> {
     pub count: usize,
 }
 
+/// Where one seed was left, and where it rests.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Left {
+    /// Where the tip was, from the entry along the needle, m.
+    pub tip_m: f64,
+    /// Place at rest, m.
+    pub rest_m: Vector3<f64>,
+}
+
 impl Rehearsals<'_> {
     pub fn try_it(&mut self, drops: Drops) -> Result<Tried, RehearsalError> {
-        let rests_m = self.rests_m(&drops)?;
-        let off = |(rest, planned): (&Vector3<f64>, [f64; 3])| rest - Vector3::from(planned);
+        let left = self.left(&drops)?;
+        let off = |(left, planned): (&Left, [f64; 3])| left.rest_m - Vector3::from(planned);
         Ok(Tried {
-            error_m: rests_m.iter().zip(self.needle.seeds_m()).map(off).collect(),
+            error_m: left.iter().zip(self.needle.seeds_m()).map(off).collect(),
+            left,
             drops,
         })
     }
 
-    /// Where the seeds rest, in the order of the drops.
-    pub fn rests_m(&mut self, drops: &Drops) -> Result<Vec<Vector3<f64>>, RehearsalError> {
+    /// What becomes of the seeds, in the order of the drops.
+    pub fn left(&mut self, drops: &Drops) -> Result<Vec<Left>, RehearsalError> {
         self.count += 1;
-        let Rest { seeds_m, .. } = self.rehearser.rehearse(drops, self.pace)?;
-        Ok(seeds_m.into_iter().map(Vector3::from).collect())
+        let Rest {
+            seeds_m, dropped_at_m, ..
+        } = self.rehearser.rehearse(drops, self.pace)?;
+        let (entry_m, direction) = (Vector3::from(drops.entry_m), Vector3::from(drops.direction));
+        let each = seeds_m.into_iter().zip(dropped_at_m);
+        Ok(each
+            .map(|(rest_m, tip_m)| Left {
+                tip_m: (Vector3::from(tip_m) - entry_m).dot(&direction),
+                rest_m: rest_m.into(),
+            })
+            .collect())
     }
 }
 
@@ -41,6 +60,7 @@ impl Rehearsals<'_> {
 #[derive(Clone)]
 pub(super) struct Tried {
     pub drops: Drops,
+    pub left: Vec<Left>,
     /// Rest minus plan.
     pub error_m: Vec<Vector3<f64>>,
 }
