@@ -27,6 +27,8 @@ const UNSTEADY_M: f64 = 0.15e-3;
 const SAME_M: f64 = 1e-9;
 /// Edges of one needle that are moved away from, one after the other, at most.
 const ROUNDS: usize = 3;
+/// Steps to one side, until a drop is clear there, at most.
+const STEPS_ASIDE: usize = 3;
 /// Rehearsals, at most, that seek the drops of the seeds behind one that was moved.
 const SEEK_AGAIN: usize = 12;
 
@@ -108,19 +110,17 @@ impl Beside {
         self.edges.iter().any(Option::is_some)
     }
 
-    /// Ways to be clear of its edges: so much deeper.
-    fn ways_m(&self) -> Vec<f64> {
-        let way = |side: usize, sign: f64| {
-            let [own, other] = [self.edges[side], self.edges[1 - side]];
-            match (own, other) {
-                // Beyond the edge on that side.
-                (Some([_, far_m]), _) => Some(sign * (far_m + BESIDE_M)),
-                // Away from the one on the other.
-                (None, Some([near_m, _])) => Some(sign * (BESIDE_M - near_m)),
-                (None, None) => None,
-            }
+    /// So much deeper, on that side of here, the drop is clear of the edge that lies next to it by [`BESIDE_M`]; `None` where there is none.
+    fn way_m(&self, side: usize) -> Option<f64> {
+        let sign = if side == 0 { -1.0 } else { 1.0 };
+        let clear_m = match (self.edges[side], self.edges[1 - side]) {
+            // Beyond the edge on that side.
+            (Some([_, far_m]), _) => far_m + BESIDE_M,
+            // Away from the one on the other.
+            (None, Some([near_m, _])) => BESIDE_M - near_m,
+            (None, None) => return None,
         };
-        [way(0, -1.0), way(1, 1.0)].into_iter().flatten().collect()
+        Some(sign * clear_m)
     }
 }
 
@@ -130,8 +130,8 @@ struct Moves(Vec<Beside>);
 
 impl Moves {
     /// The deepest seed on an edge.
-    fn first(&self) -> Option<(usize, &Beside)> {
-        self.0.iter().enumerate().find(|(_, beside)| beside.is_on_edge())
+    fn first(&self) -> Option<usize> {
+        self.0.iter().position(Beside::is_on_edge)
     }
 
     fn sensitive(&self) -> Vec<Sensitive> {
@@ -243,20 +243,45 @@ fn moved_along(rehearsals: &mut Rehearsals, from: &Tried, seed: usize, by_m: f64
     Some(seek(rehearsals, seed + 1, tried.clone(), tried, SEEK_AGAIN))
 }
 
+/// Moves the drop of that seed to one side until it is clear of the edges there. A hand that sticks stops where it stopped before,
+/// so one step may not be enough.
+fn to_side(
+    rehearsals: &mut Rehearsals,
+    from: &Tried,
+    moves: &Moves,
+    (seed, side): (usize, usize),
+) -> Result<Option<(Tried, Moves)>, RehearsalError> {
+    let mut by_m = 0.0;
+    let mut at: Option<(Tried, Moves)> = None;
+    for _ in 0..STEPS_ASIDE {
+        let beside = at.as_ref().map_or(&moves.0[seed], |(_, moves)| &moves.0[seed]);
+        let Some(more_m) = beside.way_m(side) else { break };
+        by_m += match at {
+            Some(_) => more_m + STEP_M.copysign(more_m),
+            None => more_m,
+        };
+        let Some(tried) = moved_along(rehearsals, from, seed, by_m) else {
+            break;
+        };
+        let moves = look(rehearsals, &tried)?;
+        at = Some((tried, moves));
+    }
+    Ok(at)
+}
+
 /// Drops clear of edges, as far as there are such: moved to the side on which less is lost. Beside them the seeds that are on an
 /// edge even so.
 pub(super) fn keep_clear(rehearsals: &mut Rehearsals, found: Tried) -> Result<(Tried, Vec<Sensitive>), RehearsalError> {
     let mut moves = look(rehearsals, &found)?;
     let mut best = found;
     for _ in 0..ROUNDS {
-        let Some((seed, beside)) = moves.first() else { break };
+        let Some(seed) = moves.first() else { break };
         let mut better = None;
         let mut least_m = moves.worst_mean_m(&best);
-        for by_m in beside.ways_m() {
-            let Some(tried) = moved_along(rehearsals, &best, seed, by_m) else {
+        for side in [0, 1] {
+            let Some((tried, found)) = to_side(rehearsals, &best, &moves, (seed, side))? else {
                 continue;
             };
-            let found = look(rehearsals, &tried)?;
             let worst_m = found.worst_mean_m(&tried);
             if worst_m < least_m {
                 least_m = worst_m;

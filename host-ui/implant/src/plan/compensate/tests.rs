@@ -11,6 +11,8 @@ struct Known<F> {
     /// Before and beyond this the tip is outside.
     tissue_from_m: f64,
     tissue_to_m: f64,
+    /// The hand stops at multiples of this; 0 stops anywhere.
+    sticks_m: f64,
     asked: usize,
 }
 
@@ -24,13 +26,17 @@ impl<F: Fn(f64) -> f64> Rehearser for Known<F> {
         {
             return Err(RehearsalError::Refused("the tip is outside the tissue".to_owned()));
         }
-        let rest = |&z: &f64| {
+        let tip = |&z: &f64| match self.sticks_m {
+            0.0 => z,
+            by_m => (z / by_m).round() * by_m,
+        };
+        let rest = |z: f64| {
             let p = drops.at_m(z - (self.ahead_m)(z));
             [0, 1, 2].map(|a| p[a] + self.across_m[a])
         };
         Ok(Rest {
-            seeds_m: drops.along_m.iter().map(rest).collect(),
-            dropped_at_m: drops.drops_m().collect(),
+            seeds_m: drops.along_m.iter().map(tip).map(rest).collect(),
+            dropped_at_m: drops.along_m.iter().map(tip).map(|z| drops.at_m(z)).collect(),
             dropped_after_s: vec![0.0; drops.along_m.len()],
             peak_force_n: 0.0,
             displacement_before_puncture_m: 0.0,
@@ -60,6 +66,7 @@ fn tissue<F: Fn(f64) -> f64>(ahead_m: F) -> Known<F> {
         across_m: [0.0; 3],
         tissue_from_m: 0.0,
         tissue_to_m: 1.0,
+        sticks_m: 0.0,
         asked: 0,
     }
 }
@@ -278,4 +285,16 @@ fn a_seed_that_follows_its_drop_steeply_is_on_no_edge() {
     let done = run(&needle(Loading::Loose), &mut known);
     assert!(done.sensitive.is_empty() && done.for_edges == 1, "{done:?}");
     assert!(done.errors_after_m().all(|e| e < 0.1e-3), "{:?}", done.after_m);
+}
+
+/// A needle that was moved from its edge by as much as the edge was near stuck where it had been, and the other side was taken.
+#[test]
+fn a_hand_that_sticks_is_sent_on_until_its_tip_is_clear() {
+    let mut known = tissue(|z| if z < 0.05205 { 2e-3 } else { -5e-3 });
+    known.sticks_m = 0.4e-3;
+    let done = run(&needle(Loading::Loose), &mut known);
+    assert!(done.sensitive.is_empty(), "{:?}", done.sensitive);
+    let rest_m = 0.05 + done.after_m[0][2];
+    let tip_m = rest_m + 2e-3;
+    assert!(tip_m <= 0.05205 - edges::BESIDE_M && tip_m > 0.051, "{tip_m}");
 }
