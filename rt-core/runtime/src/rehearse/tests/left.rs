@@ -150,7 +150,7 @@ fn seeds_rest_where_they_are_once_the_needles_that_stay_in_are_drawn_out() {
         let held = rig.seeds();
         for number in 1..=2 {
             rig.draw_needle(number);
-            (0..6000).for_each(|_| drop(rig.tick()));
+            (0..6000).for_each(|_| _ = rig.tick());
         }
         assert_eq!(rig.state().left_count, 0);
         let apart_m = |a: &SeedPose, b: &SeedPose| (Vector3::from(a.position_m) - Vector3::from(b.position_m)).norm();
