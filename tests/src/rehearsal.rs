@@ -63,6 +63,7 @@ impl Rehearser for Theatre {
             .map_err(|e| RehearsalError::Refused(e.to_string()))?;
         Ok(Rest {
             seeds_m: done.seeds.iter().map(|s| s.position_m).collect(),
+            dropped_at_m: done.seeds.iter().map(|s| s.dropped_at_m).collect(),
             dropped_after_s: done.dropped_after_s,
             peak_force_n: done.peak_force_n,
             displacement_before_puncture_m: done.displacement_before_puncture_m,

@@ -3,6 +3,7 @@
 mod child;
 mod debrief;
 mod error;
+mod gland;
 /// What a procedure does: its needles, planned and dropped.
 pub mod job;
 mod parameters;
@@ -12,6 +13,7 @@ use crate::provenance;
 use crate::workflow::{Pace, Patience, Run, RunStatus, Step};
 use child::Core;
 pub use error::ProcedureError;
+use gland::TargetMotion;
 use job::Job;
 pub use parameters::{NoParameter, parameter};
 use std::path::{Path, PathBuf};
@@ -120,8 +122,8 @@ pub struct Options {
 }
 
 /// What was seen while the script ran.
-#[derive(Default)]
 struct Seen {
+    motion: TargetMotion,
     records: Vec<TickRecord>,
     punctured: bool,
     displacement_before_puncture_m: f64,
@@ -191,7 +193,7 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
     if options.compensate {
         job.compensate(&mut link, &pace, &interrupted)?;
     }
-    let mut seen = Seen::default();
+    let mut seen = Seen::of(&scene);
     let outcome = perform(&mut link, &job, pace, &interrupted, &mut seen);
     if outcome.is_err() {
         // Nobody holds the device any more: the force must go off.
@@ -325,6 +327,11 @@ fn perform(
         }
         seen.take(link, begun);
         seen.most_left(link);
+        if run.stabilising().is_none()
+            && let (Some(scene), Some(snapshot)) = (link.scene(), link.snapshot())
+        {
+            seen.motion.take(run.needle(), scene, snapshot);
+        }
         for number in run.lost().iter().skip(seen.lost.len()) {
             println!("note: seed {} is lost: the tip was outside the tissue", number + 1);
         }
@@ -338,6 +345,19 @@ fn perform(
 }
 
 impl Seen {
+    fn of(scene: &SceneModel) -> Self {
+        Self {
+            motion: TargetMotion::of(scene),
+            records: Vec::new(),
+            punctured: false,
+            displacement_before_puncture_m: 0.0,
+            last_event: None,
+            events: Vec::new(),
+            lost: Vec::new(),
+            left: Vec::new(),
+        }
+    }
+
     fn most_left(&mut self, link: &Link) {
         if let Some(snapshot) = link.snapshot().filter(|s| s.header.left().len() > self.left.len()) {
             self.left = snapshot.header.left().to_vec();

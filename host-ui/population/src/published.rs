@@ -24,7 +24,7 @@ pub struct Published {
 /// What a published value is to the parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Use {
-    /// A parameter of `docs/study/people.toml` was fitted to it; agreement says nothing.
+    /// A parameter was fitted to it or set by it; agreement says nothing.
     Fitted,
     /// No parameter was fitted to it: it checks.
     Check,
@@ -93,7 +93,7 @@ pub const PUBLISHED: &[Published] = &[
         how: "0.3 to 21.6; tapped 0.9, 0 to 2",
         source: "Lagerburg 2006",
         used: Use::Check,
-        note: "unverified: not compared with the publication. A tapped needle is not simulated.",
+        note: "unverified: not compared with the publication. A tapped needle is not simulated. Here the largest shift of the middle of the gland in an insertion; what surrounds the body has no spread.",
     },
     Published {
         beside: "",
@@ -132,8 +132,8 @@ pub const PUBLISHED: &[Published] = &[
         unit: "N",
         how: "mean",
         source: "Podder 2006",
-        used: Use::Check,
-        note: "patients; unverified: the layer it belongs to was not compared with the publication. The skin is part of `pelvis` alone.",
+        used: Use::Fitted,
+        note: "patients; unverified: the layer it belongs to was not compared with the publication. The skin of `pelvis` gives way at 9 N by it, and `paper` has no skin. A hand feels 0.9 of the needle's force (force.scale).",
     },
     Published {
         beside: "",

@@ -115,6 +115,7 @@ impl Planner {
 mod tests {
     use super::*;
     use stylet_implant::plan::Drops;
+    use stylet_implant::plan::compensate::edges::Sensitive;
 
     #[test]
     fn a_plan_is_found_again_with_its_compensation() {
@@ -126,6 +127,11 @@ mod tests {
             before_m: None,
             after_m: vec![[1e-4, 0.0, 0.0]; plan.needles[1].seeds.len()],
             rehearsals: 3,
+            for_edges: 1,
+            sensitive: vec![Sensitive {
+                seed: 0,
+                moves_m: Some(2e-3),
+            }],
         };
         let frames = PatientFrame::default();
         let scene = SceneId {
@@ -141,7 +147,7 @@ mod tests {
         let found = Kept::read(&path, &frames).expect("found");
         assert_eq!(found.plan.needles.len(), plan.needles.len());
         assert_eq!(found.compensated.len(), 1);
-        assert_eq!(found.compensated[0].1.rehearsals, 3);
+        assert_eq!(found.compensated[0].1, done);
         std::fs::write(&path, b"{}").expect("written");
         assert!(Kept::read(&path, &frames).is_none(), "what is not whole is not used");
         let _removed = std::fs::remove_file(&path);

@@ -6,6 +6,7 @@ use super::outlines::AnatomyOutlines;
 use std::sync::Arc;
 use stylet_dose::Seed;
 use stylet_implant::plan::check::Problem;
+use stylet_implant::plan::compensate::edges::Sensitive;
 use stylet_implant::plan::first::FirstPlan;
 use stylet_implant::plan::{Compensation, History, ImplantPlan, Needle};
 
@@ -69,6 +70,8 @@ pub struct Implant {
     pub states: Vec<NeedleState>,
     /// Mean distance of the seeds of each needle from plan at rest, where that was rehearsed, m.
     pub rest_errors_m: Vec<Option<f64>>,
+    /// Seeds of each needle that are on an edge, where it was rehearsed.
+    pub sensitive: Vec<Vec<Sensitive>>,
     /// Depths of the drops of each needle, by rehearsal or as planned, m.
     pub drops_m: Vec<Vec<f64>>,
     /// Whether a change can be undone.
@@ -91,6 +94,7 @@ impl Implant {
             let done = found(needle)?;
             Some(done.errors_after_m().sum::<f64>() / done.after_m.len().max(1) as f64)
         };
+        let sensitive = |needle: &Needle| found(needle).map_or_else(Vec::new, |done| done.sensitive.clone());
         let drops_m = |needle: &Needle| match found(needle) {
             Some(done) => done.drops.along_m.clone(),
             None => needle.seeds.iter().map(|s| s.along_m).collect(),
@@ -101,6 +105,7 @@ impl Implant {
             problems,
             states: (0..plan.needles.len()).map(|n| progress.state(n)).collect(),
             rest_errors_m: plan.needles.iter().map(rest_error_m).collect(),
+            sensitive: plan.needles.iter().map(sensitive).collect(),
             drops_m: plan.needles.iter().map(drops_m).collect(),
             can_undo: history.can_undo(),
             can_redo: history.can_redo(),

@@ -98,6 +98,8 @@ fn what_was_rehearsed_for_a_needle_holds_until_the_needle_is_changed() {
         before_m: None,
         after_m: vec![[0.0; 3]; 2],
         rehearsals: 1,
+        for_edges: 0,
+        sensitive: Vec::new(),
     };
     planner.compensated.push((needle, done));
     assert_eq!(planner.task(0).unwrap().drops.along_m[0], 0.082);

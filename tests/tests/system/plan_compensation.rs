@@ -30,6 +30,10 @@ struct Row {
     /// Mean and worst, before and after.
     errors_m: [[f64; 2]; 2],
     rehearsals: usize,
+    /// Of them for edges.
+    for_edges: usize,
+    /// Seeds on an edge even so, and how far one of them moves at most.
+    sensitive: (usize, f64),
     seconds: f64,
 }
 
@@ -117,11 +121,13 @@ fn row(gland: &'static str, mut theatre: Theatre, needles: &[Needle], insert_m_p
         match compensate(needle, &pace, &limits, &mut theatre) {
             Ok(c) => {
                 println!(
-                    "{gland} {hole} at {}: before {}, after {} mm, {} rehearsals",
+                    "{gland} {hole} at {}: before {}, after {} mm, {} rehearsals, {} of them for edges; {:?}",
                     mm(along),
                     mm(c.errors_before_m().collect()),
                     mm(c.errors_after_m().collect()),
-                    c.rehearsals
+                    c.rehearsals,
+                    c.for_edges,
+                    c.sensitive
                 );
                 done.push(c);
             }
@@ -137,6 +143,12 @@ fn row(gland: &'static str, mut theatre: Theatre, needles: &[Needle], insert_m_p
         not_possible: needles.len() - done.len(),
         errors_m: summary_m(&done),
         rehearsals: theatre.rehearsals,
+        for_edges: done.iter().map(|c| c.for_edges).sum(),
+        sensitive: {
+            let moves = || done.iter().flat_map(|c| &c.sensitive);
+            let largest_m = moves().map(|s| s.moves_m.unwrap_or(f64::INFINITY)).fold(0.0, f64::max);
+            (moves().count(), largest_m)
+        },
         seconds: begun.elapsed().as_secs_f64(),
     }
 }
@@ -154,11 +166,13 @@ one shift applies to all their seeds.
 - *Not as planned*: needles whose last drop, if dropped as planned, would leave the tip outside the tissue, which has moved ahead of
   it. They count only after compensation.
 - *Not possible*: needles that no way was found for to leave their last seeds inside the tissue.
+- *For edges*: rehearsals, of all, that looked for edges beside the drops or for drops clear of them (docs/plan.md, Edges). One for each needle finds that there is none.
+- *Sensitive*: seeds on an edge even so: how many, and how far one of them rests from where it was rehearsed, at most, if the tip stops up to 0.3 mm deeper or shallower.
 
 A strand does not stretch (docs/physics.md, Strands), so one shift can bring all its seeds to their places.
 
-| gland | speed in | needles | not as planned | not possible | seeds | mean before | mean after | worst before | worst after | rehearsals | time |
-|---|---|---|---|---|---|---|---|---|---|---|---|
+| gland | speed in | needles | not as planned | not possible | seeds | mean before | mean after | worst before | worst after | rehearsals | for edges | sensitive | time |
+|---|---|---|---|---|---|---|---|---|---|---|---|---|---|
 ";
 
 fn page() -> PathBuf {
@@ -171,7 +185,7 @@ fn text(rows: &[Row]) -> String {
         let [[mean, worst], [mean_after, worst_after]] = r.errors_m.map(|e| e.map(|m| m * 1e3));
         let _ = writeln!(
             text,
-            "| {} | {:.0} mm/s | {} | {} | {} | {} | {mean:.2} mm | {mean_after:.2} mm | {worst:.2} mm | {worst_after:.2} mm | {} | {:.0} s |",
+            "| {} | {:.0} mm/s | {} | {} | {} | {} | {mean:.2} mm | {mean_after:.2} mm | {worst:.2} mm | {worst_after:.2} mm | {} | {} | {} | {:.0} s |",
             r.gland,
             r.insert_m_per_s * 1e3,
             r.needles,
@@ -179,6 +193,11 @@ fn text(rows: &[Row]) -> String {
             r.not_possible,
             r.seeds,
             r.rehearsals,
+            r.for_edges,
+            match r.sensitive {
+                (0, _) => "0".to_owned(),
+                (count, largest_m) => format!("{count}, {:.1} mm", largest_m * 1e3),
+            },
             r.seconds
         );
     }

@@ -83,6 +83,8 @@ impl Drops {
 pub struct Rest {
     /// In the order of the drops.
     pub seeds_m: Vec<[f64; 3]>,
+    /// Where the tip was when it left each: the hand stops near where it is sent to.
+    pub dropped_at_m: Vec<[f64; 3]>,
     /// When each was dropped, after the tip's first contact with tissue.
     pub dropped_after_s: Vec<f64>,
     /// Largest force on the hand, N.
@@ -159,6 +161,7 @@ impl Rehearser for LinkRehearser<'_> {
                     let after_ns = &rehearsal.dropped_after_ns[..count];
                     return Ok(Rest {
                         seeds_m: rehearsal.seeds[..count].iter().map(|s| s.position_m).collect(),
+                        dropped_at_m: rehearsal.seeds[..count].iter().map(|s| s.dropped_at_m).collect(),
                         dropped_after_s: after_ns.iter().map(|&ns| ns as f64 * 1e-9).collect(),
                         peak_force_n: rehearsal.peak_force_n,
                         displacement_before_puncture_m: rehearsal.displacement_before_puncture_m,

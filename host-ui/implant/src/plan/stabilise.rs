@@ -11,6 +11,8 @@ use stylet_shm_schema::StabilisingNeedle;
 const FROM_NEEDLES_M: f64 = 0.8 * PITCH_M;
 /// It keeps that far from what is spared.
 const FROM_SPARED_M: f64 = 2e-3;
+/// Halfway through the target it keeps that far from the target's side: a needle along the edge holds next to nothing.
+const FROM_SIDE_M: f64 = 5e-3;
 /// Its tip stays before the far side of the target by that share of its way through it.
 const SHORT: f64 = 0.2;
 /// It goes through at least so much of the target, m.
@@ -81,6 +83,17 @@ fn at_hole(template: &Template, anatomy: &Anatomy, hole: Hole) -> Option<Stabili
     let pieces = anatomy.target.pieces_m(entry_m, direction, reach_m);
     let (first, last) = (pieces.first()?[0], pieces.last()?[1]);
     if last - first < LEAST_M {
+        return None;
+    }
+    let halfway_m = 0.5 * (first + last);
+    let is_inside = |[right, up]: [f64; 2]| {
+        let off = |a: usize| right * template.columns[a] + up * template.rows[a];
+        anatomy
+            .target
+            .contains([0, 1, 2].map(|a| entry_m[a] + direction[a] * halfway_m + FROM_SIDE_M * off(a)))
+    };
+    let sides = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+    if !sides.into_iter().all(is_inside) {
         return None;
     }
     let depth_m = last - SHORT * (last - first);

@@ -150,6 +150,9 @@ impl Job {
                 done.rehearsals,
                 after * 1e3
             );
+            for found in &done.sensitive {
+                println!("note: needle {} of {count}: {found}", number + 1);
+            }
             task.drops.clone_from(&done.drops);
             self.compensations.insert(number, done);
         }

@@ -2,8 +2,10 @@
 
 use super::Seen;
 use super::error::ProcedureError;
+use super::gland::Largest;
 use super::job::{Job, PlannedDrop, placed};
 use crate::pairing::SeedOffset;
+use crate::plan::compensate::edges::BESIDE_M;
 use crate::plan::compensate::summary_m;
 use crate::workflow::{NeedleTask, Pace};
 use nalgebra::Vector3;
@@ -42,7 +44,7 @@ pub fn write(
         "lag": link.state().map(|s| json!({ "worst_ms": s.worst_lag_ns as f64 / 1e6, "worst_mm": s.worst_lag_m * 1e3 })),
         "timing": timing(link, seen),
         "plan": {
-            "entry_mm": mm(first.plan.entry_m), "direction": direction, "needles": needles(job, &seen.records),
+            "entry_mm": mm(first.plan.entry_m), "direction": direction, "needles": needles(job, seen),
             "insert_speed_mm_s": pace.insert_m_per_s * 1e3, "retract_speed_mm_s": pace.retract_m_per_s * 1e3,
         },
         "compensation": compensation(job),
@@ -104,17 +106,26 @@ fn seeds(link: &Link, planned: &[PlannedDrop], lost: &[usize]) -> Vec<Value> {
         .collect()
 }
 
-fn needles(job: &Job, records: &[TickRecord]) -> Vec<Value> {
-    let deflections_m = deflections_m(job, records);
-    let of_task = |(task, deflection_m): (&NeedleTask, f64)| {
+fn needles(job: &Job, seen: &Seen) -> Vec<Value> {
+    let deflections_m = deflections_m(job, &seen.records);
+    let of_task = |(number, (task, deflection_m)): (usize, (&NeedleTask, f64))| {
+        let motion = seen.motion.of_needle(number);
+        let tip_along_mm = |largest: &Largest| {
+            let from_entry = Vector3::from(largest.tip_m) - Vector3::from(task.drops.entry_m);
+            from_entry.dot(&Vector3::from(task.drops.direction)) * 1e3
+        };
         json!({
+            "target_motion_mm": motion.map(|m| m.target.size_m * 1e3),
+            "target_motion_tip_along_mm": motion.map(|m| tip_along_mm(&m.target)),
+            "largest_displacement_mm": motion.map(|m| m.tissue.size_m * 1e3),
+            "largest_displacement_tip_along_mm": motion.map(|m| tip_along_mm(&m.tissue)),
             "entry_mm": mm(task.drops.entry_m), "direction": task.drops.direction,
             "planned_along_mm": task.plan.deepest_first().into_iter().map(|s| task.plan.along_m(s) * 1e3).collect::<Vec<_>>(),
             "dropped_along_mm": task.drops.along_m.iter().map(|a| a * 1e3).collect::<Vec<_>>(),
             "deflection_mm": deflection_m * 1e3,
         })
     };
-    job.tasks.iter().zip(deflections_m).map(of_task).collect()
+    job.tasks.iter().zip(deflections_m).enumerate().map(of_task).collect()
 }
 
 /// Largest deflection of the tip of each needle, from where a rigid one would have it. A tick counts for the needle on whose line
@@ -160,8 +171,23 @@ fn compensation(job: &Job) -> Option<Value> {
             "mean_error_before_mm": mean_before, "mean_error_after_mm": mean_after,
             "worst_error_before_mm": worst_before, "worst_error_after_mm": worst_after,
             "rehearsals": job.compensations.values().map(|c| c.rehearsals).sum::<usize>(),
+            "rehearsals_for_edges": job.compensations.values().map(|c| c.for_edges).sum::<usize>(),
+            "sensitive_seeds": sensitive(job),
         })
     })
+}
+
+/// Seeds that rest elsewhere if the tip stops a little deeper or shallower; `null` where they would be lost.
+fn sensitive(job: &Job) -> Vec<Value> {
+    let each = job.compensations.iter();
+    each.flat_map(|(needle, done)| done.sensitive.iter().map(move |found| (needle, found)))
+        .map(|(needle, found)| {
+            json!({
+                "needle": needle + 1, "seed_of_needle": found.seed + 1, "moves_mm": found.moves_m.map(|m| m * 1e3),
+                "beside_mm": BESIDE_M * 1e3,
+            })
+        })
+        .collect()
 }
 
 fn along(direction: [f64; 3], r: &TickRecord) -> f64 {
@@ -273,6 +299,30 @@ fn all<'a>(list: &'a Value, key: &'a str) -> impl Iterator<Item = f64> + 'a {
         .filter_map(move |v| v[key].as_f64())
 }
 
+/// How far needles moved the target, and which of them most.
+fn motion_line(needles: &Value) {
+    let each = || needles.as_array().into_iter().flatten().enumerate();
+    let most = |key: &str| {
+        let all = each().filter_map(|(n, needle)| Some((n + 1, needle, needle[key].as_f64()?)));
+        all.max_by(|a, b| a.2.total_cmp(&b.2))
+    };
+    let (Some(target), Some(tissue)) = (most("target_motion_mm"), most("largest_displacement_mm")) else {
+        return;
+    };
+    let motions_mm: Vec<f64> = all(needles, "target_motion_mm").collect();
+    let at_mm = |needle: &Value, key: &str| needle[key].as_f64().unwrap_or(f64::NAN);
+    println!(
+        "motion of the target: mean {:.1} mm, largest {:.1} mm (needle {}, tip {:.0} mm from its entry); of any tissue at most {:.1} mm (needle {}, tip {:.0} mm from its entry)",
+        motions_mm.iter().sum::<f64>() / motions_mm.len() as f64,
+        target.2,
+        target.0,
+        at_mm(target.1, "target_motion_tip_along_mm"),
+        tissue.2,
+        tissue.0,
+        at_mm(tissue.1, "largest_displacement_tip_along_mm")
+    );
+}
+
 fn table(result: &Value) {
     println!("seed  along the needle (mm)  across (mm)  total (mm)");
     for (index, seed) in result["seeds"].as_array().into_iter().flatten().enumerate() {
@@ -285,6 +335,7 @@ fn table(result: &Value) {
             value("error_mm")
         );
     }
+    motion_line(&result["plan"]["needles"]);
     let bent: Vec<f64> = all(&result["plan"]["needles"], "deflection_mm")
         .filter(|d| *d > 0.0)
         .collect();

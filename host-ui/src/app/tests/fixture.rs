@@ -13,6 +13,7 @@ use stylet_dose::Metric;
 use stylet_dose::criteria::{Figure, Limit};
 use stylet_host::link::LinkStatus;
 use stylet_implant::plan::check::Problem;
+use stylet_implant::plan::compensate::edges::Sensitive;
 use stylet_implant::plan::first::{FirstPlan, Measures};
 use stylet_implant::plan::optimise::Figures;
 use stylet_implant::plan::{Hole, ImplantPlan};
@@ -222,6 +223,13 @@ pub fn many_needles(count: usize, begun: usize) -> Shown {
         problems: Some(Arc::new((0..count).map(problem).collect())),
         states: (0..count).map(|n| progress.state(n)).collect(),
         rest_errors_m: vec![Some(1.23e-3); count],
+        sensitive: vec![
+            vec![Sensitive {
+                seed: 0,
+                moves_m: Some(6.88e-3)
+            }];
+            count
+        ],
         drops_m: plan
             .needles
             .iter()

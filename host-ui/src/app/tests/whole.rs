@@ -10,6 +10,7 @@ use bytemuck::Zeroable;
 use stylet_host::link::LinkStatus;
 use stylet_procedure::{Step, Waiting, WaitsFor};
 use stylet_shm_schema::{Fault, Text, TickRecord, flags};
+use stylet_shm_schema::{LeftNeedlePose, MAX_LEFT_NEEDLES};
 
 pub type State = (&'static str, fn(&mut App));
 
@@ -82,6 +83,15 @@ pub const STATES: &[State] = &[
     ("dropping", |app| {
         app.shown = one_needle(0.06, 2);
         app.shown.dose = Some(dose(2));
+    }),
+    ("needles that stay in, at a drop", |app| {
+        app.shown = one_needle(0.06, 2);
+        stay_in(&mut app.shown);
+    }),
+    ("needles that stay in, at the end", |app| {
+        app.shown = one_needle(0.0, 5);
+        app.shown.dose = Some(dose(5));
+        stay_in(&mut app.shown);
     }),
     ("debrief", |app| {
         app.shown = one_needle(0.0, 5);
@@ -158,6 +168,11 @@ fn guided(app: &mut App, shown: Shown) {
 fn running(shown: &mut Shown, waits: Option<Waiting>) {
     (shown.running, shown.run_step, shown.run_needle) = (true, Some(Step::Place), Some((1, 19)));
     shown.run_waits = waits;
+}
+
+/// As many needles as may stay in.
+fn stay_in(shown: &mut Shown) {
+    shown.left = vec![LeftNeedlePose::zeroed(); MAX_LEFT_NEEDLES];
 }
 
 fn every_banner(shown: &mut Shown) {

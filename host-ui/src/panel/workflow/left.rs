@@ -22,21 +22,25 @@ pub(super) fn leave_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Actio
 /// A row for each needle that stays in.
 pub(super) fn left_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     let may = shown.is_live() && !shown.running;
+    if !shown.left.is_empty() {
+        ui.label(theme::small("Needles that stay in"));
+    }
     for (number, left) in shown.left.iter().enumerate() {
-        ui.horizontal(|ui| {
-            ui.label(theme::small(format!("Stays in: {}", number + 1)));
+        // Larger text needs a second line.
+        ui.horizontal_wrapped(|ui| {
+            ui.label(theme::small(format!("{}", number + 1)));
             let take = ui.add_enabled(may && is_at(shown, left), Button::new("Take up").small());
             let help = "Bring the hand along this needle to its tip first";
             if take.on_hover_text(help).on_disabled_hover_text(help).clicked() {
                 actions.extend(of(left).map(|number| Action::Send(Request::TakeNeedle(number))));
             }
             let (to, tip_m) = match is_beside(shown, left) {
-                true => ("Hand to its entry", left.entry_m),
-                false => ("Hand to its tip", left.tip_m),
+                true => ("To its entry", left.entry_m),
+                false => ("To its tip", left.tip_m),
             };
             let hand = ui.add_enabled(may && !shown.has_flag(flags::IN_CONTACT), Button::new(to).small());
             if hand
-                .on_hover_text("The hand is empty on the way of a needle that stays in")
+                .on_hover_text("Moves the hand, which is empty on the way of a needle that stays in")
                 .clicked()
             {
                 let pace = Pace::default();

@@ -191,6 +191,10 @@ fn step_ui(
             Progress::Retract => retract_ui(ui, shown, actions),
             Progress::Debrief => debrief::debrief_ui(ui, shown, actions),
         }
+        // Steps with a needle in have the rows beside its buttons.
+        if matches!(step, Progress::Plan | Progress::Place | Progress::Debrief) {
+            left::left_ui(ui, shown, actions);
+        }
     });
 }
 

@@ -281,7 +281,11 @@ fn perform(rig: &mut Rig, run: &NeedleRun, mut motion: Motion, stop: &AtomicBool
         if script.advance(rig)? {
             let simulated_s = rig.seconds();
             return Ok(Rehearsed {
-                seeds: rig.seeds(),
+                // Needles that stay in hold the tissue elsewhere until they are drawn out, and seeds are planned in tissue at rest.
+                seeds: match run.stabilising.is_empty() {
+                    true => rig.seeds(),
+                    false => rig.seeds_at_rest(),
+                },
                 dropped_after_s,
                 peak_force_n: rig.state().peak_force_n,
                 displacement_before_puncture_m,

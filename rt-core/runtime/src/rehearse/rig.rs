@@ -142,6 +142,21 @@ impl Rig {
         self.loops.tissue.seeds().collect()
     }
 
+    /// As they will be without a needle in the tissue.
+    pub fn seeds_at_rest(&self) -> Vec<SeedPose> {
+        self.loops.tissue.seeds_at_rest().collect()
+    }
+
+    #[cfg(test)]
+    pub fn draw_needle(&mut self, number: u64) {
+        let order = HapticOrder::DrawNeedle {
+            ticket: 0,
+            number,
+            speed_m_per_s: 0.05,
+        };
+        let _ = self.loops.bridge.haptic_orders.push(order);
+    }
+
     pub fn deformed(&self) -> Deformed<'_> {
         self.loops.tissue.world().tissue.deformed()
     }

@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_shm_schema::{MAX_SEEDS, SeedPose};
 use stylet_sim::force::LocalResponse;
 use stylet_sim::line::{BodyLine, MAX_LEFT};
-use stylet_sim::tissue::{Held, StepReport};
+use stylet_sim::tissue::{Carried, Deformed, Held, StepReport};
 
 mod contact;
 mod flight;
@@ -120,6 +120,16 @@ impl TissueLoop {
     /// Places of the seeds now, scene frame, in the order of the drops.
     pub fn seeds(&self) -> impl Iterator<Item = SeedPose> {
         seed::poses(&self.seeds, self.world.tissue.deformed())
+    }
+
+    /// Where they will be once nothing moves the tissue any more, scene frame, in the order of the drops.
+    pub fn seeds_at_rest(&self) -> impl Iterator<Item = SeedPose> {
+        let at_rest = Deformed {
+            scale: 0.0,
+            carried: Carried::Not,
+            ..self.world.tissue.deformed()
+        };
+        seed::poses(&self.seeds, at_rest)
     }
 
     /// Largest displacement of an element after the last tick, m.

@@ -121,13 +121,19 @@ fn compensated_ui(ui: &mut egui::Ui, implant: &Implant) {
         return;
     }
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    let sensitive = implant.sensitive.iter().flatten().count();
     let text = format!(
-        "{} of {} needles compensated, to {:.2} mm",
+        "{} of {} needles compensated, to {:.2} mm{}",
         errors.len(),
         implant.plan.needles.len(),
-        format::mm(mean)
+        format::mm(mean),
+        match sensitive {
+            0 => String::new(),
+            1 => "; 1 seed sensitive".to_owned(),
+            n => format!("; {n} seeds sensitive"),
+        }
     );
-    super::weak_line(ui, text);
+    super::weak_line(ui, text).explained("sensitive");
 }
 
 fn strength_ui(ui: &mut egui::Ui, implant: &Implant, free: bool, actions: &mut Vec<Action>) {

@@ -158,6 +158,6 @@ pub(super) fn next_needle_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec
     }
 }
 
-fn weak_line(ui: &mut egui::Ui, text: impl Into<String>) {
-    ui.add(egui::Label::new(theme::small(text)).truncate());
+fn weak_line(ui: &mut egui::Ui, text: impl Into<String>) -> egui::Response {
+    ui.add(egui::Label::new(theme::small(text)).truncate())
 }

@@ -68,6 +68,13 @@ fn head_ui(ui: &mut egui::Ui, implant: &Implant, number: usize, can: bool, actio
         if let Some(error_m) = implant.rest_errors_m[number] {
             ui.label(theme::small(format!("rest error {:.2} mm", format::mm(error_m))));
         }
+        if !implant.sensitive[number].is_empty() {
+            let each = implant.sensitive[number].iter().map(|found| format!("{found}."));
+            let words = each.collect::<Vec<_>>().join("\n");
+            ui.label(theme::small("sensitive"))
+                .on_hover_text(words)
+                .explained("sensitive");
+        }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let remove = ui.add_enabled(can, Button::new("Remove"));
             if remove.on_hover_text("Delete in the template").clicked() {

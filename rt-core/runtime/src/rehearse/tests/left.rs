@@ -127,3 +127,42 @@ fn a_needle_goes_in_across_the_way_of_one_that_stays_in() {
         assert!(across.peak_force_n < 1.5 * alone.peak_force_n && across.target_shift_m < alone.target_shift_m);
     }
 }
+
+/// Seeds were reported where the needles that stay in held them, millimetres from where they rest once those are out.
+#[test]
+fn seeds_rest_where_they_are_once_the_needles_that_stay_in_are_drawn_out() {
+    let (set, stop) = (ParameterSet::default(), AtomicBool::new(false));
+    for kind in [TissueKind::ChainMail, TissueKind::Fem] {
+        let mut stage = stage_of(kind);
+        let run = stabilised(2);
+        let rehearsed = stage.rehearse(&run, &set, &stop).expect("goes through");
+        let active = activate(&set, &stage.device).expect("valid");
+        let lines = stage.lines(&run, false, &stop).expect("kept");
+        let mut world = stage.world.take().expect("given back");
+        world.tissue.return_to_rest();
+        let mut rig = Rig::new(world, &active, (&stage.device, stage.hand), &run);
+        rig.take_lines(lines);
+        let mut script = Script::new(&run);
+        rig.tick();
+        while !script.advance(&mut rig).expect("goes on") {
+            rig.tick();
+        }
+        let held = rig.seeds();
+        for number in 1..=2 {
+            rig.draw_needle(number);
+            (0..6000).for_each(|_| _ = rig.tick());
+        }
+        assert_eq!(rig.state().left_count, 0);
+        let apart_m = |a: &SeedPose, b: &SeedPose| (Vector3::from(a.position_m) - Vector3::from(b.position_m)).norm();
+        for ((rest, out), held) in rehearsed.seeds.iter().zip(&rig.seeds()).zip(&held) {
+            println!(
+                "{}: rehearsed {:.3} mm from where it is at last, held {:.3} mm from there",
+                kind.name(),
+                apart_m(rest, out) * 1e3,
+                apart_m(held, out) * 1e3
+            );
+            assert!(apart_m(rest, out) < 0.05e-3 && apart_m(held, out) > 0.3e-3);
+        }
+        stage.world = Some(rig.into_world());
+    }
+}

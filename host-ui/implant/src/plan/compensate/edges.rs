@@ -1,0 +1,295 @@
+//! Edges: drops beside which the tissue does something else, so that a tip that stops a little deeper or shallower than it
+//! should leaves its seed elsewhere.
+//!
+//! A membrane that gives way, or a layer that ends in front of the tip, moves the tissue by millimetres at one place of the tip. A
+//! rehearsal stops at one place; a live hand stops near it.
+
+use super::search::seek;
+use super::tried::{Left, Rehearsals, Tried, keep_within};
+use crate::plan::Loading;
+use crate::plan::rehearse::{Drops, RehearsalError};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use stylet_shm_schema::MAX_SEEDS;
+
+/// An edge within so much of a drop, deeper or shallower, is looked for. A live hand counts as arrived within that distance of its goal
+/// (`stylet_procedure::tolerance`); it stops within 0.1 mm of where the rehearsed one does, steps of the encoder and late ticks included.
+pub const BESIDE_M: f64 = stylet_procedure::tolerance::AT_TARGET_M;
+/// From one stop beside a drop to the next.
+const STEP_M: f64 = 0.5 * BESIDE_M;
+/// Stops on either side: a hand that sticks arrives up to [`BESIDE_M`] before its goal, so they go twice as far.
+const STOPS: i8 = 4;
+/// Between two stops a seed follows its drop by up to so many times as much, and a little more; else there is an edge between them. A
+/// live hand that stops 0.1 mm from the rehearsed one leaves a seed that is on none within 0.35 mm of where it was rehearsed.
+const STEADY: f64 = 2.0;
+const UNSTEADY_M: f64 = 0.15e-3;
+/// Places closer than this are the same.
+const SAME_M: f64 = 1e-9;
+/// Edges of one needle that are moved away from, one after the other, at most.
+const ROUNDS: usize = 3;
+/// Steps to one side, until a drop is clear there, at most.
+const STEPS_ASIDE: usize = 3;
+/// Rehearsals, at most, that seek the drops of the seeds behind one that was moved.
+const SEEK_AGAIN: usize = 12;
+
+/// A seed on an edge: it rests elsewhere if the tip stops up to [`BESIDE_M`] deeper or shallower.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sensitive {
+    /// Number of the seed, deepest first.
+    pub seed: usize,
+    /// How far from where it rests otherwise, m; `None` where it would be left outside the tissue.
+    pub moves_m: Option<f64>,
+}
+
+impl std::fmt::Display for Sensitive {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (number, beside_mm) = (self.seed + 1, BESIDE_M * 1e3);
+        match self.moves_m {
+            Some(m) => write!(
+                f,
+                "seed {number} is sensitive: it rests up to {:.1} mm elsewhere if the tip stops up to {beside_mm:.1} mm deeper or shallower",
+                m * 1e3
+            ),
+            None => write!(
+                f,
+                "seed {number} is sensitive: it is lost if the tip stops up to {beside_mm:.1} mm deeper or shallower"
+            ),
+        }
+    }
+}
+
+/// An edge between two stops on one side of a drop: how far the tip is from it at each.
+type Edge = Option<[f64; 2]>;
+
+/// What one seed does with shallower and with deeper stops.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Beside {
+    /// The nearest edge on each side.
+    edges: [Edge; 2],
+    /// Farthest that it rests, beyond an edge, from where it does otherwise, m; infinite where it is lost.
+    moves_m: f64,
+}
+
+impl Beside {
+    /// Of a seed that is dropped with the tip at `tip_m`, by what becomes of it at stops beside that.
+    fn of(tip_m: f64, mut stops: Vec<Left>) -> Self {
+        stops.sort_by(|a, b| a.tip_m.total_cmp(&b.tip_m));
+        let mut beside = Self::default();
+        for pair in stops.windows(2) {
+            let [from, to] = [pair[0], pair[1]];
+            let moved_m = (to.rest_m - from.rest_m).norm();
+            let [low_m, high_m] = [from.tip_m - tip_m, to.tip_m - tip_m];
+            let is_near = low_m < BESIDE_M - SAME_M && high_m > SAME_M - BESIDE_M;
+            if is_near && moved_m > STEADY * (high_m - low_m) + UNSTEADY_M {
+                beside.moves_m = beside.moves_m.max(moved_m);
+                // Of several on one side the nearest counts.
+                if low_m < -SAME_M {
+                    beside.edges[0] = Some([(-high_m).max(0.0), -low_m]);
+                }
+                if high_m > SAME_M {
+                    beside.edges[1].get_or_insert([low_m.max(0.0), high_m]);
+                }
+            }
+        }
+        beside
+    }
+
+    fn merge(&mut self, other: &Self) {
+        for (edge, other) in self.edges.iter_mut().zip(other.edges) {
+            *edge = edge.or(other);
+        }
+        self.moves_m = self.moves_m.max(other.moves_m);
+    }
+
+    /// It is left outside the tissue.
+    fn lose(&mut self, side: usize) {
+        (self.edges[side], self.moves_m) = (Some([0.0, BESIDE_M]), f64::INFINITY);
+    }
+
+    fn is_on_edge(&self) -> bool {
+        self.edges.iter().any(Option::is_some)
+    }
+
+    /// So much deeper, on that side of here, the drop is clear of the edge that lies next to it by [`BESIDE_M`]; `None` where there is none.
+    fn way_m(&self, side: usize) -> Option<f64> {
+        let sign = if side == 0 { -1.0 } else { 1.0 };
+        let clear_m = match (self.edges[side], self.edges[1 - side]) {
+            // Beyond the edge on that side.
+            (Some([_, far_m]), _) => far_m + BESIDE_M,
+            // Away from the one on the other.
+            (None, Some([near_m, _])) => BESIDE_M - near_m,
+            (None, None) => return None,
+        };
+        Some(sign * clear_m)
+    }
+}
+
+/// What every seed of a needle does.
+#[derive(Clone, Debug, PartialEq)]
+struct Moves(Vec<Beside>);
+
+impl Moves {
+    /// The deepest seed on an edge.
+    fn first(&self) -> Option<usize> {
+        self.0.iter().position(Beside::is_on_edge)
+    }
+
+    fn sensitive(&self) -> Vec<Sensitive> {
+        let each = self.0.iter().enumerate();
+        each.filter(|(_, beside)| beside.is_on_edge())
+            .map(|(seed, beside)| Sensitive {
+                seed,
+                moves_m: beside.moves_m.is_finite().then_some(beside.moves_m),
+            })
+            .collect()
+    }
+
+    /// What seeds are off in the mean where every edge is on the wrong side, m.
+    fn worst_mean_m(&self, tried: &Tried) -> f64 {
+        let each = tried.error_m.iter().zip(&self.0);
+        let off = |(error, beside): (&Vector3<f64>, &Beside)| {
+            error.norm() + if beside.is_on_edge() { beside.moves_m } else { 0.0 }
+        };
+        each.map(off).sum::<f64>() / tried.error_m.len().max(1) as f64
+    }
+}
+
+/// One stop beside a drop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stop {
+    seed: usize,
+    along_m: f64,
+}
+
+/// Where the tip stops beside the drops: on the way in from before the first to beyond it, on the way out from beyond to before the
+/// others.
+fn stops(drops: &Drops, steps: &[i8]) -> Vec<Stop> {
+    let beside = |(seed, drop_m): (usize, &f64)| {
+        let drop_m = *drop_m;
+        steps.iter().map(move |&steps| Stop {
+            seed,
+            along_m: drop_m + f64::from(steps) * STEP_M,
+        })
+    };
+    let mut stops: Vec<Stop> = drops.along_m.iter().enumerate().flat_map(beside).collect();
+    let order = |stop: &Stop| match stop.seed {
+        0 => (false, stop.along_m),
+        _ => (true, -stop.along_m),
+    };
+    stops.sort_by(|a, b| {
+        let (a, b) = (order(a), order(b));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    });
+    stops
+}
+
+/// One rehearsal with a loose seed at every drop and at every stop beside it, so many steps shallower and deeper.
+fn at_stops(rehearsals: &mut Rehearsals, at: &Tried, [shallower, deeper]: [i8; 2]) -> Result<Moves, RehearsalError> {
+    let steps: Vec<i8> = (-shallower..=deeper).collect();
+    let mut stops = stops(&at.drops, &steps);
+    stops.truncate(MAX_SEEDS);
+    let drops = Drops {
+        along_m: stops.iter().map(|stop| stop.along_m).collect(),
+        // A strand's seeds rest where all of it does.
+        strand_pitch_m: None,
+        ..at.drops.clone()
+    };
+    let left = rehearsals.left(&drops)?;
+    let of = |seed: usize| {
+        stops
+            .iter()
+            .zip(&left)
+            .filter(move |(stop, _)| stop.seed == seed)
+            .map(|(_, left)| *left)
+    };
+    let look = |(seed, here): (usize, &Left)| Beside::of(here.tip_m, of(seed).collect());
+    Ok(Moves(at.left.iter().enumerate().map(look).collect()))
+}
+
+/// All seeds in one rehearsal; where one of them would be left outside the tissue, with fewer stops, then shallower and deeper apart.
+fn look(rehearsals: &mut Rehearsals, at: &Tried) -> Result<Moves, RehearsalError> {
+    for steps in [STOPS, STOPS / 2] {
+        match at_stops(rehearsals, at, [steps; 2]) {
+            Err(RehearsalError::Refused(_)) => {}
+            looked => return looked,
+        }
+    }
+    let mut moves = Moves(vec![Beside::default(); at.error_m.len()]);
+    // Shallower the last seed may be before the tissue, deeper the first beyond it.
+    let last = at.error_m.len().saturating_sub(1);
+    for (side, steps, lost) in [(0, [STOPS / 2, 0], last), (1, [0, STOPS / 2], 0)] {
+        match at_stops(rehearsals, at, steps) {
+            Ok(found) => moves
+                .0
+                .iter_mut()
+                .zip(&found.0)
+                .for_each(|(beside, found)| beside.merge(found)),
+            Err(RehearsalError::Refused(_)) => moves.0[lost].lose(side),
+            Err(why) => return Err(why),
+        }
+    }
+    Ok(moves)
+}
+
+/// The same drops with that seed moved along, and those behind it sought again; `None` where it cannot be dropped there.
+fn moved_along(rehearsals: &mut Rehearsals, from: &Tried, seed: usize, by_m: f64) -> Option<Tried> {
+    let mut drops = from.drops.clone();
+    match rehearsals.needle.loading {
+        Loading::Loose => drops.along_m[seed] += by_m,
+        Loading::Stranded { .. } => drops.along_m.iter_mut().for_each(|along_m| *along_m += by_m),
+    }
+    keep_within(rehearsals.needle, rehearsals.limits, &mut drops);
+    let tried = rehearsals.try_it(drops).ok()?;
+    Some(seek(rehearsals, seed + 1, tried.clone(), tried, SEEK_AGAIN))
+}
+
+/// Moves the drop of that seed to one side until it is clear of the edges there. A hand that sticks stops where it stopped before,
+/// so one step may not be enough.
+fn to_side(
+    rehearsals: &mut Rehearsals,
+    from: &Tried,
+    moves: &Moves,
+    (seed, side): (usize, usize),
+) -> Result<Option<(Tried, Moves)>, RehearsalError> {
+    let mut by_m = 0.0;
+    let mut at: Option<(Tried, Moves)> = None;
+    for _ in 0..STEPS_ASIDE {
+        let beside = at.as_ref().map_or(&moves.0[seed], |(_, moves)| &moves.0[seed]);
+        let Some(more_m) = beside.way_m(side) else { break };
+        by_m += match at {
+            Some(_) => more_m + STEP_M.copysign(more_m),
+            None => more_m,
+        };
+        let Some(tried) = moved_along(rehearsals, from, seed, by_m) else {
+            break;
+        };
+        let moves = look(rehearsals, &tried)?;
+        at = Some((tried, moves));
+    }
+    Ok(at)
+}
+
+/// Drops clear of edges, as far as there are such: moved to the side on which less is lost. Beside them the seeds that are on an
+/// edge even so.
+pub(super) fn keep_clear(rehearsals: &mut Rehearsals, found: Tried) -> Result<(Tried, Vec<Sensitive>), RehearsalError> {
+    let mut moves = look(rehearsals, &found)?;
+    let mut best = found;
+    for _ in 0..ROUNDS {
+        let Some(seed) = moves.first() else { break };
+        let mut better = None;
+        let mut least_m = moves.worst_mean_m(&best);
+        for side in [0, 1] {
+            let Some((tried, found)) = to_side(rehearsals, &best, &moves, (seed, side))? else {
+                continue;
+            };
+            let worst_m = found.worst_mean_m(&tried);
+            if worst_m < least_m {
+                least_m = worst_m;
+                better = Some((tried, found));
+            }
+        }
+        let Some((tried, found)) = better else { break };
+        (best, moves) = (tried, found);
+    }
+    Ok((best, moves.sensitive()))
+}

@@ -1,0 +1,168 @@
+//! The search for drops that leave seeds on plan, one seed after the other, deepest first.
+
+use super::Limits;
+use super::tried::{Rehearsals, Tried, aside, keep_within};
+use crate::plan::rehearse::Drops;
+use crate::plan::{Loading, Needle};
+
+/// A drop is not sought any closer.
+const LEAST_MOVE_M: f64 = 0.05e-3;
+/// Between two drops the next one keeps from both by this part of their distance.
+const KEPT_FROM_ENDS: f64 = 0.1;
+/// Where a step leaves a seed on the same side, the next one is so many times as long.
+const LONGER: f64 = 1.5;
+/// Rehearsals for one seed, at most.
+const PER_SEED: usize = 9;
+/// Where dropping as planned is not possible, drops are tried so much deeper at a time.
+pub(super) const DEEPER_M: f64 = 1e-3;
+
+/// Seeks the drops of the seeds from that number on; those before it stay as they are in `last`. Returns the best that was
+/// rehearsed, `best` among them, after at most so many rehearsals.
+pub(super) fn seek(rehearsals: &mut Rehearsals, from: usize, mut best: Tried, mut last: Tried, most: usize) -> Tried {
+    let (needle, limits) = (rehearsals.needle, rehearsals.limits);
+    let sought = match needle.loading {
+        Loading::Loose => best.error_m.len(),
+        // A strand keeps its pitch: one step for all.
+        Loading::Stranded { .. } => 1,
+    };
+    if from >= sought {
+        return best;
+    }
+    let until = rehearsals.count + most;
+    let mut search = Search::begin(from, needle, last.clone());
+    let mut others_move = true;
+    let mut next = search.next_m(needle, limits);
+    while rehearsals.count < until && best.worst_m() > limits.enough_m {
+        let Some(drop_m) = next else {
+            if search.seed + 1 >= sought {
+                break;
+            }
+            last = search.nearest.clone();
+            search = Search::begin(search.seed + 1, needle, last.clone());
+            next = search.next_m(needle, limits);
+            continue;
+        };
+        let drops = moved(needle, &search, &last, drop_m, others_move, limits);
+        let asked_m = drops.along_m[search.seed];
+        match rehearsals.try_it(drops) {
+            Ok(new) => {
+                search.take(needle, &new);
+                if new.mean_m() < best.mean_m() {
+                    best = new.clone();
+                }
+                last = new;
+                others_move = true;
+            }
+            // It may be another seed that cannot be dropped where it was moved along to.
+            Err(_) if others_move && search.seed + 1 < sought => {
+                others_move = false;
+                continue;
+            }
+            Err(_) => search.refuse(asked_m),
+        }
+        next = search.next_m(needle, limits);
+    }
+    best
+}
+
+/// Where one seed's drop is sought, while those before it stay; of a strand, that of its first seed.
+struct Search {
+    /// Number of the seed.
+    seed: usize,
+    /// The deepest drop that leaves it short of its place, and the shallowest that leaves it beyond; how far, unless it could not be
+    /// dropped there.
+    short: Option<(f64, Option<f64>)>,
+    beyond: Option<(f64, Option<f64>)>,
+    /// The rehearsal that brought it nearest.
+    nearest: Tried,
+    step_m: f64,
+    tries: usize,
+}
+
+impl Search {
+    fn begin(seed: usize, needle: &Needle, from: Tried) -> Self {
+        let mut search = Self {
+            seed,
+            short: None,
+            beyond: None,
+            nearest: from.clone(),
+            step_m: 0.0,
+            tries: 0,
+        };
+        search.take(needle, &from);
+        search
+    }
+
+    fn take(&mut self, needle: &Needle, tried: &Tried) {
+        let (drop_m, off_m) = (tried.drops.along_m[self.seed], tried.off_m(needle, self.seed));
+        if off_m.abs() < self.nearest.off_m(needle, self.seed).abs() {
+            self.nearest = tried.clone();
+        }
+        if off_m < 0.0 && self.short.is_none_or(|(at_m, _)| drop_m > at_m) {
+            self.short = Some((drop_m, Some(off_m)));
+            self.beyond = self.beyond.filter(|(at_m, _)| *at_m > drop_m);
+        } else if off_m >= 0.0 && self.beyond.is_none_or(|(at_m, _)| drop_m < at_m) {
+            self.beyond = Some((drop_m, Some(off_m)));
+            self.short = self.short.filter(|(at_m, _)| *at_m < drop_m);
+        }
+    }
+
+    /// It could not be dropped there.
+    fn refuse(&mut self, drop_m: f64) {
+        if drop_m > self.nearest.drops.along_m[self.seed] {
+            self.beyond = Some((drop_m, None));
+        } else {
+            self.short = Some((drop_m, None));
+        }
+    }
+
+    /// The next drop to try; `None` where it is near enough, or nothing better is to be expected.
+    fn next_m(&mut self, needle: &Needle, limits: &Limits) -> Option<f64> {
+        let is_near = self.nearest.off_m(needle, self.seed).abs() <= limits.enough_m;
+        if is_near || self.tries >= PER_SEED {
+            return None;
+        }
+        self.tries += 1;
+        let planned_m = needle.seeds[self.seed].along_m;
+        let deepest_m = (planned_m + limits.along_m).min(limits.reach_m);
+        let shallowest_m = (planned_m - limits.along_m).max(0.0);
+        match (self.short, self.beyond) {
+            (Some((from_m, short)), Some((to_m, beyond))) => {
+                let part = match (short, beyond) {
+                    // By turns, as the rest of a seed may hardly depend on its drop on one side.
+                    (Some(short), Some(beyond)) if self.tries % 2 == 1 => short / (short - beyond),
+                    _ => 0.5,
+                };
+                let part = part.clamp(KEPT_FROM_ENDS, 1.0 - KEPT_FROM_ENDS);
+                (to_m - from_m > LEAST_MOVE_M).then_some(from_m + part * (to_m - from_m))
+            }
+            (Some((from_m, off)), None) => {
+                self.step_m = off.unwrap_or(DEEPER_M).abs().max(LONGER * self.step_m);
+                (from_m < deepest_m - LEAST_MOVE_M).then_some((from_m + self.step_m).min(deepest_m))
+            }
+            (None, Some((from_m, off))) => {
+                self.step_m = off.unwrap_or(DEEPER_M).abs().max(LONGER * self.step_m);
+                (from_m > shallowest_m + LEAST_MOVE_M).then_some((from_m - self.step_m).max(shallowest_m))
+            }
+            (None, None) => None,
+        }
+    }
+}
+
+/// The drops of the nearest rehearsal with that of the sought seed at `drop_m`; those after it by what they were off last.
+fn moved(needle: &Needle, search: &Search, last: &Tried, drop_m: f64, others_move: bool, limits: &Limits) -> Drops {
+    let mut drops = search.nearest.drops.clone();
+    let by_m = drop_m - drops.along_m[search.seed];
+    let after = search.seed + 1..drops.along_m.len();
+    drops.along_m[search.seed] = drop_m;
+    for seed in after {
+        drops.along_m[seed] = match needle.loading {
+            Loading::Stranded { .. } => drops.along_m[seed] + by_m,
+            Loading::Loose if others_move => last.drops.along_m[seed] - last.off_m(needle, seed),
+            Loading::Loose => drops.along_m[seed],
+        };
+    }
+    keep_within(needle, limits, &mut drops);
+    aside(needle, last, limits, &mut drops);
+    drops
+}

@@ -1,0 +1,137 @@
+//! How far each needle moves the target while it is in, and how far tissue is displaced anywhere.
+
+use crate::plan::Anatomy;
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+use stylet_host::field::Field;
+use stylet_host::link::{SceneModel, Snapshot};
+
+/// The target is looked at at some so many points, evenly in all of it.
+const POINTS: f64 = 500.0;
+
+/// A displacement, and where the tip was when it was largest.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Largest {
+    /// Size, m.
+    pub size_m: f64,
+    /// Place of the tip, scene frame, m.
+    pub tip_m: [f64; 3],
+}
+
+impl Largest {
+    fn take(&mut self, size_m: f64, tip_m: [f64; 3]) {
+        if size_m > self.size_m {
+            *self = Self { size_m, tip_m };
+        }
+    }
+}
+
+/// What one needle did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NeedleMotion {
+    /// Mean displacement of the target, from where it was before the needle.
+    pub target: Largest,
+    /// Displacement of any tissue, from where it is at rest: the skin under a tip that has not gone through it, and what sticks to the shaft.
+    pub tissue: Largest,
+    before_m: Vector3<f64>,
+}
+
+/// Adds up the motion of every needle of a procedure, snapshot by snapshot.
+pub struct TargetMotion {
+    points_m: Vec<Vector3<f64>>,
+    needles: BTreeMap<usize, NeedleMotion>,
+    last_tick: Option<u64>,
+}
+
+impl TargetMotion {
+    /// Of the scene's target; without one no needle has a motion.
+    pub fn of(scene: &SceneModel) -> Self {
+        let target = Anatomy::of(scene).ok().map(|anatomy| anatomy.target);
+        let points_m = target.map_or_else(Vec::new, |target| {
+            let (low_m, high_m) = target.bounds_m();
+            let sides_m = [0, 1, 2].map(|a| high_m[a] - low_m[a]);
+            let pitch_m = (sides_m.iter().product::<f64>() / POINTS).cbrt();
+            let counts = sides_m.map(|side_m| (side_m / pitch_m).ceil() as usize);
+            let point_m = |n: usize| {
+                let at = [n % counts[0], n / counts[0] % counts[1], n / counts[0] / counts[1]];
+                [0, 1, 2].map(|a| low_m[a] + (at[a] as f64 + 0.5) * sides_m[a] / counts[a] as f64)
+            };
+            let all = (0..counts.iter().product()).map(point_m);
+            all.filter(|&place_m| target.contains(place_m))
+                .map(Vector3::from)
+                .collect()
+        });
+        Self {
+            points_m,
+            needles: BTreeMap::new(),
+            last_tick: None,
+        }
+    }
+
+    /// A snapshot while that needle, counted from 0, is at work.
+    pub fn take(&mut self, needle: usize, scene: &SceneModel, snapshot: &Snapshot) {
+        let header = &snapshot.header;
+        if self.points_m.is_empty() || self.last_tick == Some(header.tissue_tick) {
+            return;
+        }
+        self.last_tick = Some(header.tissue_tick);
+        let Some(field) = Field::of(scene, snapshot) else {
+            return;
+        };
+        let sum = self
+            .points_m
+            .iter()
+            .fold(Vector3::zeros(), |sum, place_m| sum + field.displacement_m(*place_m));
+        let mean_m = sum / self.points_m.len() as f64;
+        self.note(needle, mean_m, header.max_displacement_m, header.tip_in_scene_m);
+    }
+
+    fn note(&mut self, needle: usize, target_m: Vector3<f64>, tissue_m: f64, tip_m: [f64; 3]) {
+        let motion = self.needles.entry(needle).or_insert_with(|| NeedleMotion {
+            target: Largest::default(),
+            tissue: Largest::default(),
+            before_m: target_m,
+        });
+        motion.target.take((target_m - motion.before_m).norm(), tip_m);
+        motion.tissue.take(tissue_m, tip_m);
+    }
+
+    /// Of that needle; `None` where nothing was seen of it.
+    pub fn of_needle(&self, needle: usize) -> Option<&NeedleMotion> {
+        self.needles.get(&needle)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_needle_has_its_largest_motion_from_where_the_target_was_before_it() {
+        let mut motion = TargetMotion {
+            points_m: Vec::new(),
+            needles: BTreeMap::new(),
+            last_tick: None,
+        };
+        let along = |z: f64| Vector3::new(0.0, 0.0, z);
+        // The second finds the target 1 mm from its place: needles that stay in hold it there.
+        for (needle, target_m, tissue_m, tip_m) in [
+            (0, 0.0, 0.0, 0.0),
+            (0, 3e-3, 11e-3, 0.02),
+            (0, 4e-3, 9e-3, 0.06),
+            (0, -1e-3, 2e-3, 0.05),
+            (1, 1e-3, 1e-3, 0.0),
+            (1, -2e-3, 5e-3, 0.07),
+        ] {
+            motion.note(needle, along(target_m), tissue_m, [0.0, 0.0, tip_m]);
+        }
+        let of = |needle| {
+            motion
+                .of_needle(needle)
+                .map(|m| [m.target, m.tissue].map(|l| (l.size_m, l.tip_m[2])))
+        };
+        assert_eq!(of(0), Some([(4e-3, 0.06), (11e-3, 0.02)]));
+        assert_eq!(of(1), Some([(3e-3, 0.07), (5e-3, 0.07)]));
+        assert_eq!(of(2), None);
+    }
+}
