@@ -327,7 +327,9 @@ fn perform(
         }
         seen.take(link, begun);
         seen.most_left(link);
+        // The first plan is published before stabilising needles move the target.
         if run.stabilising().is_none()
+            && run.step() > Step::Plan
             && let (Some(scene), Some(snapshot)) = (link.scene(), link.snapshot())
         {
             seen.motion.take(run.needle(), scene, snapshot);

@@ -124,3 +124,9 @@ pub fn first_left(link: &Link) -> Option<u32> {
     let left = link.snapshot()?.header.left().first()?.number;
     u32::try_from(left).ok()
 }
+
+/// Whether a snapshot shows the needles that stay in by now: one may be older than the state that counts them.
+pub fn shows_left(link: &Link) -> bool {
+    let counts = link.snapshot().zip(link.state());
+    counts.is_none_or(|(snapshot, state)| snapshot.header.left_count == state.left_count)
+}

@@ -31,7 +31,7 @@ impl Largest {
 pub struct NeedleMotion {
     /// Mean displacement of the target, from where it was before the needle.
     pub target: Largest,
-    /// Displacement of any tissue, from where it is at rest: the skin under a tip that has not gone through it, and what sticks to the shaft.
+    /// Displacement of any tissue, from where it is at rest: the skin under a tip before it gives way, and what sticks to the shaft.
     pub tissue: Largest,
     before_m: Vector3<f64>,
 }

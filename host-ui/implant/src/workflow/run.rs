@@ -2,7 +2,7 @@
 
 use super::{NeedlePlan, plan_request};
 use crate::pairing;
-use crate::plan::stabilise::{Stabilising, first_left};
+use crate::plan::stabilise::{Stabilising, first_left, shows_left};
 use crate::plan::{Drops, Needle};
 use std::time::{Duration, Instant};
 use stylet_host::link::{Link, LinkError, LinkStatus};
@@ -279,7 +279,8 @@ impl Run {
         if !self.has_core(link)? {
             return Ok(Next::Wait);
         }
-        if !self.knows_left(link) {
+        let draws_next = self.sent.is_none() && self.step() == Step::Retract && self.stabilising().is_some();
+        if draws_next && !shows_left(link) {
             return Ok(Next::Wait);
         }
         let now_s = self.started.elapsed().as_secs_f64();
@@ -292,13 +293,6 @@ impl Run {
             self.sent = Some(self.send(link, request)?);
         }
         Ok(next)
-    }
-
-    /// Which needle is drawn out next stands in a snapshot, which may be older than the state that says that one is out.
-    fn knows_left(&self, link: &Link) -> bool {
-        let is_next = self.sent.is_none() && self.step() == Step::Retract && self.stabilising().is_some();
-        let counts = link.snapshot().zip(link.state());
-        !is_next || counts.is_none_or(|(snapshot, state)| snapshot.header.left_count == state.left_count)
     }
 
     /// False while it is to be waited for.

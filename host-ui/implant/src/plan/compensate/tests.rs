@@ -258,9 +258,9 @@ fn a_drop_at_the_end_of_the_tissue_is_moved_into_it() {
 
 /// Who ends a compensation does not want its seeds called lost.
 #[test]
-fn an_edge_is_not_made_of_a_core_that_went() {
-    struct Gone(usize);
-    impl Rehearser for Gone {
+fn an_edge_is_not_made_of_a_core_that_ended() {
+    struct Closed(usize);
+    impl Rehearser for Closed {
         fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError> {
             self.0 += 1;
             match self.0 {
@@ -273,7 +273,7 @@ fn an_edge_is_not_made_of_a_core_that_went() {
         &needle(Loading::Loose),
         &Pace::default(),
         &Limits::default(),
-        &mut Gone(0),
+        &mut Closed(0),
     );
     assert_eq!(done, Err(RehearsalError::Interrupted));
 }
