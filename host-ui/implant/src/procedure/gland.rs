@@ -3,8 +3,8 @@
 use crate::plan::Anatomy;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
-use stylet_host::field::Field;
 use stylet_host::link::{SceneModel, Snapshot};
+use stylet_surfaces::field::Field;
 
 /// The target is looked at at some so many points, evenly in all of it.
 const POINTS: f64 = 500.0;
@@ -75,7 +75,7 @@ impl TargetMotion {
             return;
         }
         self.last_tick = Some(header.tissue_tick);
-        let Some(field) = Field::of(scene, snapshot) else {
+        let Some(field) = Field::of(scene.header.nodes, &snapshot.displacements_m) else {
             return;
         };
         let sum = self

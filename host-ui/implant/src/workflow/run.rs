@@ -279,12 +279,10 @@ impl Run {
         if !self.has_core(link)? {
             return Ok(Next::Wait);
         }
-        let draws_next = self.sent.is_none() && self.step() == Step::Retract && self.stabilising().is_some();
-        if draws_next && !shows_left(link) {
+        if self.sent.is_none() && self.stabilising().is_some() && !shows_left(link) {
             return Ok(Next::Wait);
         }
-        let now_s = self.started.elapsed().as_secs_f64();
-        let state = link.state().copied();
+        let (now_s, state) = (self.started.elapsed().as_secs_f64(), link.state().copied());
         let reply = state.as_ref().map_or(Reply::Pending, |state| self.reply(link, state));
         let displacement_m = link.snapshot().map(|s| s.header.max_displacement_m);
         let observed = state.as_ref().map(|state| Observed { state, displacement_m });
