@@ -32,7 +32,7 @@ fn run(words: &str) {
     );
 }
 
-/// A namespace with a cable to this one; gone when it is dropped.
+/// A namespace with a cable to this one; removed when it is dropped.
 struct Line {
     name: String,
     number: usize,
