@@ -2,9 +2,10 @@
 
 SHELL := /bin/bash
 CARGO ?= cargo
+RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),target)) $(CARGO)
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: help run test build package package-test picture example report causes fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: help run test build package package-test picture example report causes relay relay-class relay-faults relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -40,6 +41,18 @@ report: ## Measure speed against error of every tissue model; writes benches/run
 causes: ## Inject ten causes of late ticks into measurements, and see which of them the trace names (as root, about a minute)
 	$(CARGO) build --release --workspace --bin rt-core
 	$(CARGO) test --release -p stylet-tests-lab -- eight_of_ten --ignored --nocapture --test-threads=1
+
+relay: ## Build the relay, which carries a core to other machines; the other targets neither need nor build it
+	$(RELAY) build --release --bin relay
+
+relay-test: deps-test build ## Test the relay with whole processes (about three minutes)
+	$(RELAY) test --release -- --test-threads=1
+
+relay-class: deps-test build ## Measure the relay over a line of 100 Mbit/s and with 20 observers in network namespaces (as root, two minutes)
+	$(RELAY) test --release --test system -- --test-threads=1 --nocapture --ignored line
+
+relay-faults: deps-test build ## Stop, kill and cut off server, observer and operator, 100 times each in an insertion (some 20 minutes)
+	STYLET_RELAY_FAULTS=100 $(RELAY) test --release --test system -- --test-threads=1 --nocapture faults
 
 fuzz: ## Fuzz each file reader for FUZZ_SECONDS (600) seconds
 	docs/tools/fuzz

@@ -27,7 +27,7 @@ fn sources(endings: &[&str]) -> Vec<(String, String)> {
 fn no_folders_of_a_crate_import_each_other_in_a_circle() {
     let read = |path: &str| std::fs::read_to_string(tree::root().join(path)).ok();
     let mut found = Vec::new();
-    for root in tree::members().iter().flat_map(|member| tree::crate_roots(member)) {
+    for root in tree::packages().iter().flat_map(|member| tree::crate_roots(member)) {
         let circles = circles::circles(&imports::read_crate(&root, &read));
         found.extend(circles.into_iter().map(|line| format!("{root}: {line}")));
     }
@@ -36,9 +36,22 @@ fn no_folders_of_a_crate_import_each_other_in_a_circle() {
 
 #[test]
 fn no_crate_depends_on_what_its_layer_may_not_know() {
-    let members = tree::members().into_iter();
+    let members = tree::packages().into_iter();
     let manifests = members.map(|folder| (folder.clone(), tree::manifest(&format!("{folder}/Cargo.toml"))));
     assert_none(&crates::forbidden(&tree::manifest("Cargo.toml"), &manifests.collect()));
+}
+
+/// Whoever wants no relay neither downloads nor builds anything of it (ADR 18).
+#[test]
+fn the_workspace_takes_nothing_of_the_relay() {
+    let packages = |lock: &str| {
+        let lock = tree::manifest(lock);
+        let listed = lock["package"].as_array().into_iter().flatten();
+        let names = listed.filter_map(|package| package["name"].as_str().map(str::to_string));
+        names.filter(|name| name.starts_with("zenoh") || name == "quinn").count()
+    };
+    assert_eq!(packages("Cargo.lock"), 0);
+    assert!(packages("host-ui/relay/Cargo.lock") > 0, "the test looks for the wrong names");
 }
 
 #[test]
@@ -97,7 +110,7 @@ fn no_source_file_is_longer_than_the_house_allows() {
 
 #[test]
 fn no_public_function_returns_its_error_as_prose() {
-    let members = tree::members();
+    let members = tree::packages();
     let product = |path: &str| !path.starts_with("tests/") && !path.starts_with("benches/") && path.contains("/src/");
     let of_member = |path: &str| members.iter().any(|member| path.starts_with(&format!("{member}/src/")));
     assert_none(

@@ -213,6 +213,12 @@ pub const LAYERS: &[Layer] = &[
         not_itself: &[PORTS, ARGUMENTS, DICOM],
     },
     Layer {
+        folder: "host-ui/relay",
+        may_use: &["shm-schema"],
+        never: &[WINDOW, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
         folder: "host-ui/controllers",
         may_use: &["host-ui/base"],
         never: &[WINDOW, PORTS, DICOM],

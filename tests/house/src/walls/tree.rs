@@ -51,6 +51,15 @@ pub fn members() -> Vec<String> {
         .collect()
 }
 
+/// Packages beside the workspace that depend on its crates, with a lock file of their own.
+const ALONE: [&str; 1] = ["host-ui/relay"];
+
+/// Folders of the members of the workspace and of the packages beside it.
+pub fn packages() -> Vec<String> {
+    let alone = ALONE.into_iter().map(str::to_string);
+    members().into_iter().chain(alone).collect()
+}
+
 /// Root files of the library and the programs of a member.
 pub fn crate_roots(member: &str) -> Vec<String> {
     let manifest = manifest(&format!("{member}/Cargo.toml"));

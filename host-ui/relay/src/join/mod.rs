@@ -1,0 +1,210 @@
+//! On another machine: the services of the core as if it ran here, and the requests of hosts here to the server.
+
+mod order;
+mod rounds;
+mod streams;
+
+use crate::keys::Invitation;
+use crate::net::{self, Place, Priority, Session};
+use crate::wire::{self, Kind, Stamp, encode};
+use crate::{RelayError, now_ns};
+use rounds::Rounds;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use stylet_shm_schema::service::Instance;
+
+/// Messages that may wait for a thread; more are dropped, and records among them asked for again.
+const WAITING: usize = 4096;
+const SNAPSHOTS_WAITING: usize = 32;
+const PASS: Duration = Duration::from_millis(2);
+/// A server that was not heard for so long is taken for lost, until it is heard again.
+const SILENCE_NS: u64 = 300_000_000;
+
+/// How to join.
+pub struct Options {
+    /// The instance that hosts here use.
+    pub instance: Instance,
+    /// Address and port of the server.
+    pub server: String,
+    /// Who this is.
+    pub invitation: Invitation,
+}
+
+/// What the threads of a member share.
+struct Member {
+    session: Session,
+    instance: Instance,
+    seat: u16,
+    // SYNC: what follows are figures on their own; no other data is published by them.
+    end: AtomicBool,
+    server_run: AtomicU64,
+    /// Newest time of the server, by its clock.
+    heard_ns: AtomicU64,
+    /// When the server was heard last, by this machine's clock.
+    heard_at_ns: AtomicU64,
+    /// Records lost for good.
+    lost: AtomicU64,
+    /// Snapshots that never came.
+    snapshots_lost: AtomicU64,
+    /// Changes the number of the core's run for hosts here, where its board cannot be made under its own.
+    salt: AtomicU64,
+}
+
+impl Member {
+    fn ends(&self) -> bool {
+        self.end.load(Ordering::Relaxed)
+    }
+
+    /// The run of the core as hosts here know it.
+    fn run(&self, session_id: u64) -> u64 {
+        session_id ^ self.salt.load(Ordering::Relaxed)
+    }
+
+    fn heard(&self, stamp: &Stamp) {
+        if self.server_run.swap(stamp.run, Ordering::Relaxed) != stamp.run {
+            self.heard_ns.store(stamp.sent_ns, Ordering::Relaxed);
+        }
+        self.heard_ns.fetch_max(stamp.sent_ns, Ordering::Relaxed);
+        self.heard_at_ns.store(now_ns(), Ordering::Relaxed);
+    }
+
+    fn has_server(&self) -> bool {
+        let at = self.heard_at_ns.load(Ordering::Relaxed);
+        at != 0 && now_ns().saturating_sub(at) < SILENCE_NS
+    }
+
+    fn stamp(&self, number: u64) -> Stamp {
+        Stamp {
+            run: self.server_run.load(Ordering::Relaxed),
+            number,
+            sent_ns: now_ns(),
+            heard_ns: self.heard_ns.load(Ordering::Relaxed),
+        }
+    }
+
+    /// A message that may be lost: another comes soon.
+    fn say(&self, kind: Kind, number: u64, body: &[u8]) {
+        let bytes = encode(kind, self.stamp(number), &[body]);
+        net::put(&self.session, Place::Ask(self.seat), Priority::InteractiveHigh, bytes);
+    }
+
+    /// A message that is not to be lost while there is a connection.
+    fn ask(&self, kind: Kind, parts: &[&[u8]]) {
+        let bytes = encode(kind, self.stamp(0), parts);
+        net::put_whole(&self.session, Place::Ask(self.seat), Priority::InteractiveHigh, bytes);
+    }
+}
+
+/// A message as a callback hands it to a thread.
+type Bytes = Vec<u8>;
+
+/// Where messages go by their kind.
+struct Queues {
+    records: SyncSender<Bytes>,
+    snapshots: SyncSender<Bytes>,
+    rest: SyncSender<Bytes>,
+}
+
+impl Queues {
+    fn take(&self, member: &Member, bytes: &[u8]) {
+        let Ok(message) = wire::decode(bytes) else { return };
+        member.heard(&message.stamp);
+        let queue = match message.kind {
+            Kind::Records | Kind::Missing => &self.records,
+            Kind::Snapshot => &self.snapshots,
+            _ => &self.rest,
+        };
+        let _ = queue.try_send(bytes.to_vec());
+    }
+}
+
+fn check_time(invitation: &Invitation) -> Result<(), RelayError> {
+    let now_s = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .map_or(0, |t| t.as_secs() as i64);
+    match now_s > invitation.until_s {
+        true => Err(RelayError(
+            "the invitation has expired: ask the lab for another".to_owned(),
+        )),
+        false => Ok(()),
+    }
+}
+
+/// Joins until `stop`.
+pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
+    check_time(&options.invitation)?;
+    let session = net::join(&options.server, &options.invitation.identity())?;
+    let seat = options.invitation.seat;
+    let member = Arc::new(Member {
+        session: session.clone(),
+        instance: options.instance.clone(),
+        seat,
+        end: AtomicBool::new(false),
+        server_run: AtomicU64::new(0),
+        heard_ns: AtomicU64::new(0),
+        heard_at_ns: AtomicU64::new(0),
+        lost: AtomicU64::new(0),
+        snapshots_lost: AtomicU64::new(0),
+        salt: AtomicU64::new(0),
+    });
+    let (to_records, records) = sync_channel(WAITING);
+    let (to_snapshots, snapshots) = sync_channel(SNAPSHOTS_WAITING);
+    let (to_rest, rest) = sync_channel(WAITING);
+    let mut rounds = Rounds::new(Arc::clone(&member), &options.invitation)?;
+    let threads = [
+        spawn("records", &member, move |member| streams::records(member, &records))?,
+        spawn("snapshots", &member, {
+            let scenes = rounds.scenes();
+            move |member| streams::snapshots(member, &snapshots, &scenes)
+        })?,
+    ];
+    let queues = Arc::new(Queues {
+        records: to_records,
+        snapshots: to_snapshots,
+        rest: to_rest,
+    });
+    for place in [Place::Records, Place::Rest, Place::To(seat)] {
+        let (queues, member) = (Arc::clone(&queues), Arc::clone(&member));
+        net::hear(&session, &place.key(), move |_, bytes| queues.take(&member, bytes))?;
+    }
+    println!(
+        "joining {} as {} ({}); hosts here use instance \"{}\"",
+        options.server,
+        options.invitation.name,
+        options.invitation.role,
+        options.instance.name()
+    );
+    while !stop.load(Ordering::Relaxed) && !threads.iter().any(std::thread::JoinHandle::is_finished) {
+        rounds.pass();
+        // One wait for a message in place of a pause, so that a message does not wait.
+        if let Ok(bytes) = rest.recv_timeout(PASS) {
+            rounds.take(&bytes);
+            rest.try_iter().take(WAITING).for_each(|bytes| rounds.take(&bytes));
+        }
+    }
+    member.end.store(true, Ordering::Relaxed);
+    let mut ended = Ok(());
+    for thread in threads {
+        // A panic there was reported when it happened.
+        ended = thread.join().unwrap_or(Ok(())).and(ended);
+    }
+    drop(rounds);
+    net::close(session);
+    ended
+}
+
+type Thread = std::thread::JoinHandle<Result<(), RelayError>>;
+
+fn spawn(
+    name: &str,
+    member: &Arc<Member>,
+    run: impl FnOnce(&Member) -> Result<(), RelayError> + Send + 'static,
+) -> Result<Thread, RelayError> {
+    let member = Arc::clone(member);
+    std::thread::Builder::new()
+        .name(name.to_owned())
+        .spawn(move || run(&member))
+        .map_err(|e| RelayError(format!("no thread could be started: {e}")))
+}

@@ -1,0 +1,335 @@
+//! One pass of a member after the other: what is in force goes to hosts here, their requests go to the server.
+
+use super::streams::Scenes;
+use super::{Member, SILENCE_NS};
+use crate::control::{Order, Orders};
+use crate::keys::Invitation;
+use crate::ports::{Far, FarBoard};
+use crate::wire::{self, Hello, Kind, Rest, Who};
+use crate::{RelayError, now_ns};
+use bytemuck::Zeroable;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use stylet_shm_schema::check::{self, Invalid};
+use stylet_shm_schema::{
+    Event, EventKind, HapticState, ParametersInForce, PlanInForce, Rehearsal, Reply, ReplyStatus, SCHEMA_VERSION,
+    Session, Text,
+};
+
+const HELLO_EVERY: Duration = Duration::from_millis(50);
+/// A greeting that did not come whole is asked for again after so long.
+const GREETING_EVERY: Duration = Duration::from_millis(400);
+/// For so long an event that was missed is waited for.
+const EVENT_PATIENCE: Duration = Duration::from_millis(500);
+const CLEAN_EVERY: Duration = Duration::from_secs(1);
+
+/// What a greeting brings.
+struct Awaited {
+    session: bool,
+    parameters: bool,
+    plan: bool,
+    since: Instant,
+}
+
+impl Awaited {
+    fn now() -> Self {
+        Self {
+            session: true,
+            parameters: true,
+            plan: true,
+            since: Instant::now(),
+        }
+    }
+
+    /// A greeting may be sent before the server knows that this member listens.
+    fn is_due(&self, has_scene: bool) -> bool {
+        let complete = has_scene && !self.session && !self.parameters && !self.plan;
+        !complete && self.since.elapsed() >= GREETING_EVERY
+    }
+}
+
+/// All of a member but the threads of records and snapshots.
+pub(super) struct Rounds {
+    member: Arc<Member>,
+    // The board before the ports, and those before their node.
+    board: Option<(u64, FarBoard)>,
+    far: Far,
+    orders: Orders,
+    scenes: Scenes,
+    scene: (u64, u64),
+    /// Run of the core and number of the last event that hosts here had.
+    event: (u64, u64),
+    /// Since when an event between that one and the next is missed.
+    event_missed: Option<Instant>,
+    who: Who,
+    name: String,
+    hello: Instant,
+    epoch: u64,
+    /// What is in force and has not come since it was asked for, and when that was.
+    awaited: Awaited,
+    has_server: bool,
+    round_trip_ns: u64,
+    cleaned: Instant,
+    process: u64,
+}
+
+impl Rounds {
+    pub(super) fn new(member: Arc<Member>, invitation: &Invitation) -> Result<Self, RelayError> {
+        let now = Instant::now();
+        Ok(Self {
+            board: None,
+            far: Far::new(&member.instance)?,
+            orders: Orders::listen(&member.instance)?,
+            member,
+            scenes: Arc::new(Mutex::new(Arc::new(Rest::default()))),
+            scene: (0, 0),
+            event: (0, 0),
+            event_missed: None,
+            who: Who::default(),
+            name: invitation.name.clone(),
+            hello: now,
+            epoch: 0,
+            awaited: Awaited::now(),
+            has_server: false,
+            round_trip_ns: 0,
+            cleaned: now,
+            process: now_ns(),
+        })
+    }
+
+    pub(super) fn scenes(&self) -> Scenes {
+        Arc::clone(&self.scenes)
+    }
+
+    pub(super) fn pass(&mut self) {
+        self.far.update_connections();
+        let has_server = self.member.has_server();
+        if has_server != self.has_server {
+            self.has_server = has_server;
+            // What was sent meanwhile was lost: all that is in force is asked for again.
+            if has_server {
+                self.ask_for_all();
+            }
+            println!(
+                "{}",
+                if has_server {
+                    "connected"
+                } else {
+                    "the server is not heard; requests are refused"
+                }
+            );
+        }
+        if has_server && self.awaited.is_due(self.scene != (0, 0)) {
+            self.ask_for_all();
+        }
+        if self.hello.elapsed() >= HELLO_EVERY {
+            self.hello = Instant::now();
+            let hello = Hello {
+                epoch: self.epoch,
+                scene_session: self.scene.0,
+                scene_generation: self.scene.1,
+                round_trip_ns: self.round_trip_ns,
+                lost: self.member.lost.load(Ordering::Relaxed),
+            };
+            self.member.say(Kind::Hello, self.process, bytemuck::bytes_of(&hello));
+        }
+        self.take_requests();
+        let (member, words) = (&self.member, self.words());
+        self.orders.pass(|order| match order {
+            Order::Status => words,
+            order => {
+                member.ask(Kind::Lease, &[order.line().as_bytes()]);
+                "asked; 'relay lease status' shows who operates".to_owned()
+            }
+        });
+        if self.cleaned.elapsed() >= CLEAN_EVERY {
+            self.cleaned = Instant::now();
+            let _ = self.far.node.try_cleanup_dead_nodes();
+        }
+    }
+
+    fn ask_for_all(&mut self) {
+        self.epoch += 1;
+        self.awaited = Awaited::now();
+    }
+
+    fn words(&self) -> String {
+        let state = match self.has_server {
+            true => format!(
+                "connected as {}, round trip {:.1} ms",
+                self.name,
+                self.round_trip_ns as f64 * 1e-6
+            ),
+            false => "the server is not heard".to_owned(),
+        };
+        let lost = self.member.lost.load(Ordering::Relaxed);
+        let pictures = self.member.snapshots_lost.load(Ordering::Relaxed);
+        format!(
+            "{state}, {lost} records lost, {pictures} snapshots lost\n{}",
+            self.who.words()
+        )
+    }
+
+    /// Without a server each request is answered at once: none waits and is carried out later.
+    fn take_requests(&mut self) {
+        while let Ok(Some(sample)) = self.far.commands.receive() {
+            let command = *sample.payload();
+            match self.has_server {
+                true => self.member.ask(Kind::Command, &[bytemuck::bytes_of(&command)]),
+                false => self.refuse((command.host_id, command.command_id)),
+            }
+        }
+        while let Ok(Some(sample)) = self.far.uploads.receive() {
+            let header = *sample.user_header();
+            match self.has_server {
+                true => self
+                    .member
+                    .ask(Kind::Upload, &[bytemuck::bytes_of(&header), sample.payload()]),
+                false => self.refuse((header.host_id, header.command_id)),
+            }
+        }
+    }
+
+    fn refuse(&self, (host_id, command_id): (u64, u64)) {
+        let mut reply = Reply::zeroed();
+        (reply.session_id, reply.host_id, reply.command_id) = (self.member.run(self.event.0), host_id, command_id);
+        reply.status = ReplyStatus::Refused as u32;
+        reply.text = Text::new("the machine with rt-core is not heard; wait until it is, and ask again");
+        let _ = self.far.replies.send_copy(reply);
+    }
+
+    /// A message for hosts here; dropped where it is invalid.
+    pub(super) fn take(&mut self, bytes: &[u8]) {
+        let Ok(message) = wire::decode(bytes) else { return };
+        let taken = match message.kind {
+            Kind::Session => self.take_session(message.body),
+            Kind::State => self.take_state(message.body),
+            Kind::Scene => self.take_scene(message.body),
+            Kind::Event => self.take_event(message.body),
+            Kind::Parameters => self.take_parameters(message.body),
+            Kind::Plan => self.take_plan(message.body),
+            Kind::Reply => self.take_reply(message.body),
+            Kind::Rehearsal => self.take_rehearsal(message.body),
+            Kind::Who => Who::of_bytes(message.body).map(|who| self.who = who),
+            Kind::Echo => wire::one::<u64>(message.body).map(|sent_ns| {
+                self.round_trip_ns = now_ns().saturating_sub(sent_ns).min(SILENCE_NS * 100);
+            }),
+            _ => Err(Invalid("kind of message")),
+        };
+        if let Err(invalid) = taken {
+            println!("dropped: {:?} of the server: {invalid}", message.kind);
+        }
+    }
+
+    fn take_session(&mut self, body: &[u8]) -> Result<(), Invalid> {
+        let mut session: Session = wire::one(body)?;
+        if session.schema_version != SCHEMA_VERSION || session.period_ns == 0 {
+            return Err(Invalid("session"));
+        }
+        if self.board.as_ref().is_none_or(|(id, _)| *id != session.session_id) {
+            self.board = None;
+            self.open_board(session.session_id);
+        }
+        self.awaited.session = false;
+        session.session_id = self.member.run(session.session_id);
+        let _ = self.far.session.send_copy(session);
+        Ok(())
+    }
+
+    /// Under another number where a member that was killed has left its board, which nobody can write any more.
+    fn open_board(&mut self, session_id: u64) {
+        for _ in 0..3 {
+            if let Ok(board) = FarBoard::create(&self.far.node, self.member.run(session_id)) {
+                self.board = Some((session_id, board));
+                return;
+            }
+            self.member.salt.store(now_ns().rotate_left(20), Ordering::Relaxed);
+        }
+    }
+
+    fn take_state(&mut self, body: &[u8]) -> Result<(), Invalid> {
+        let state: HapticState = wire::one(body)?;
+        check::state(&state)?;
+        if let Some((_, board)) = &self.board {
+            board.write(&state);
+        }
+        Ok(())
+    }
+
+    fn take_scene(&mut self, body: &[u8]) -> Result<(), Invalid> {
+        let (mut header, words) = wire::scene(body)?;
+        let rest = Arc::new(Rest::of_scene(&header, &words));
+        *self.scenes.lock().unwrap_or_else(PoisonError::into_inner) = rest;
+        self.scene = (header.session_id, header.generation);
+        header.session_id = self.member.run(header.session_id);
+        match crate::ports::send_slice(&self.far.scene, &header, &words) {
+            true => Ok(()),
+            false => Err(Invalid("scene without room in shared memory")),
+        }
+    }
+
+    fn take_event(&mut self, body: &[u8]) -> Result<(), Invalid> {
+        let mut event: Event = wire::one(body)?;
+        let finite = event.value.is_finite() && event.position_m.iter().all(|c| c.is_finite());
+        if !finite || EventKind::from_number(event.kind).is_none() {
+            return Err(Invalid("event"));
+        }
+        let (session, last) = self.event;
+        // What was sent again to one who has it.
+        if event.session_id == session && event.sequence <= last {
+            return Ok(());
+        }
+        // All that is in force is asked for again, the last events with it; those that are not kept are not waited for.
+        if event.session_id == session && event.sequence > last + 1 {
+            let missed = self
+                .event_missed
+                .replace(self.event_missed.unwrap_or_else(Instant::now));
+            if missed.is_none() {
+                self.ask_for_all();
+            }
+            if missed.is_none_or(|since| since.elapsed() < EVENT_PATIENCE) {
+                return Ok(());
+            }
+        }
+        self.event_missed = None;
+        self.event = (event.session_id, event.sequence);
+        event.session_id = self.member.run(event.session_id);
+        let _ = self.far.events.send_copy(event);
+        Ok(())
+    }
+
+    fn take_parameters(&mut self, body: &[u8]) -> Result<(), Invalid> {
+        let mut parameters: ParametersInForce = wire::one(body)?;
+        check::parameters(&parameters)?;
+        self.awaited.parameters = false;
+        parameters.session_id = self.member.run(parameters.session_id);
+        let _ = self.far.parameters.send_copy(parameters);
+        Ok(())
+    }
+
+    fn take_plan(&mut self, body: &[u8]) -> Result<(), Invalid> {
+        let mut plan: PlanInForce = wire::one(body)?;
+        check::plan(&plan)?;
+        self.awaited.plan = false;
+        plan.session_id = self.member.run(plan.session_id);
+        let _ = self.far.plan.send_copy(plan);
+        Ok(())
+    }
+
+    fn take_reply(&mut self, body: &[u8]) -> Result<(), Invalid> {
+        let mut reply: Reply = wire::one(body)?;
+        ReplyStatus::from_number(reply.status).ok_or(Invalid("status of a reply"))?;
+        reply.session_id = self.member.run(reply.session_id);
+        let _ = self.far.replies.send_copy(reply);
+        Ok(())
+    }
+
+    fn take_rehearsal(&mut self, body: &[u8]) -> Result<(), Invalid> {
+        let mut rehearsal: Rehearsal = wire::one(body)?;
+        check::rehearsal(&rehearsal)?;
+        rehearsal.session_id = self.member.run(rehearsal.session_id);
+        let _ = self.far.rehearsals.send_copy(rehearsal);
+        Ok(())
+    }
+}

@@ -1,0 +1,108 @@
+//! Certificates by `rcgen`: one authority, which signs machines and seats.
+
+use crate::RelayError;
+use crate::keys::seat_name;
+use rcgen::{
+    BasicConstraints, CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair,
+    KeyUsagePurpose,
+};
+use time::{Duration, OffsetDateTime};
+
+/// From when until when a certificate is valid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Validity {
+    from: OffsetDateTime,
+    until: OffsetDateTime,
+}
+
+impl Validity {
+    /// So many days from now on. A clock that is an hour behind accepts it too.
+    pub fn days(days: u32) -> Self {
+        let now = OffsetDateTime::now_utc();
+        Self {
+            from: now - Duration::hours(1),
+            until: now + Duration::days(i64::from(days)),
+        }
+    }
+
+    /// One that ended an hour ago.
+    pub fn ended() -> Self {
+        let now = OffsetDateTime::now_utc();
+        Self {
+            from: now - Duration::days(2),
+            until: now - Duration::hours(1),
+        }
+    }
+
+    /// Its end, seconds since 1970.
+    pub fn until_s(&self) -> i64 {
+        self.until.unix_timestamp()
+    }
+}
+
+/// Whom a certificate is for.
+pub enum Subject<'a> {
+    /// The machine with the core, by its names and addresses.
+    Machine(&'a [String]),
+    /// A member.
+    Seat(u16),
+}
+
+/// The lab's authority, PEM.
+pub struct Authority {
+    /// Its certificate, which everybody has.
+    pub certificate: String,
+    /// Its key, which stays in the lab.
+    pub key: String,
+}
+
+fn failed(why: rcgen::Error) -> RelayError {
+    RelayError(format!("no certificate could be made: {why}"))
+}
+
+fn named(hosts: &[String], name: &str) -> Result<CertificateParams, RelayError> {
+    let mut params = CertificateParams::new(hosts.to_vec()).map_err(failed)?;
+    params.distinguished_name = DistinguishedName::new();
+    params.distinguished_name.push(DnType::CommonName, name);
+    Ok(params)
+}
+
+/// The same each time, so that the authority can be put together again from its key.
+fn authority() -> Result<CertificateParams, RelayError> {
+    let mut params = named(&[], "Stylet lab")?;
+    params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
+    params.key_usages = vec![KeyUsagePurpose::KeyCertSign, KeyUsagePurpose::CrlSign];
+    Ok(params)
+}
+
+impl Authority {
+    /// A new one, valid for twenty years.
+    pub fn make() -> Result<Self, RelayError> {
+        let key = KeyPair::generate().map_err(failed)?;
+        let mut params = authority()?;
+        let now = OffsetDateTime::now_utc();
+        (params.not_before, params.not_after) = (now - Duration::days(3), now + Duration::days(7300));
+        let certificate = params.self_signed(&key).map_err(failed)?;
+        Ok(Self {
+            certificate: certificate.pem(),
+            key: key.serialize_pem(),
+        })
+    }
+
+    /// Certificate and key of a subject, PEM.
+    pub fn sign(&self, subject: &Subject<'_>, validity: Validity) -> Result<(String, String), RelayError> {
+        let (mut params, usage) = match subject {
+            Subject::Machine(hosts) => (named(hosts, "relay")?, ExtendedKeyUsagePurpose::ServerAuth),
+            Subject::Seat(seat) => (named(&[], &seat_name(*seat))?, ExtendedKeyUsagePurpose::ClientAuth),
+        };
+        params.is_ca = IsCa::ExplicitNoCa;
+        params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
+        params.extended_key_usages = vec![usage];
+        params.use_authority_key_identifier_extension = true;
+        (params.not_before, params.not_after) = (validity.from, validity.until);
+        let signer = Issuer::new(authority()?, KeyPair::from_pem(&self.key).map_err(failed)?);
+        let key = KeyPair::generate().map_err(failed)?;
+        let certificate = params.signed_by(&key, &signer).map_err(failed)?;
+        Ok((certificate.pem(), key.serialize_pem()))
+    }
+}

@@ -1,0 +1,293 @@
+//! The keys of a lab: its authority, the certificate of the machine with the core, and its members with their roles.
+//!
+//! A member's certificate names a *seat*, a number that is never given twice; who sits there, in which role and until when stands in
+//! `members.json` beside the authority's key. So a role is what the lab says now, and not what a certificate said when it was made.
+
+mod certificate;
+
+use crate::RelayError;
+pub use certificate::Validity;
+use certificate::{Authority, Subject};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::fs;
+use std::io::Write;
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+
+/// Seats of a lab: that many certificates can be made by one authority.
+pub const SEATS: u16 = 256;
+
+/// Certificate, key and authority of one side, PEM.
+#[derive(Clone)]
+pub struct Identity {
+    /// The certificate of the lab's authority.
+    pub authority: String,
+    /// This side's certificate.
+    pub certificate: String,
+    /// This side's key.
+    pub key: String,
+}
+
+/// The common name of the certificate of a seat.
+pub fn seat_name(seat: u16) -> String {
+    format!("seat-{seat:03}")
+}
+
+/// The seat of a common name.
+pub fn seat_of(name: &str) -> Option<u16> {
+    let seat = name.strip_prefix("seat-")?.parse().ok()?;
+    ((1..=SEATS).contains(&seat) && seat_name(seat) == name).then_some(seat)
+}
+
+/// What a member may do; see `serve::rights`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Moves the needle, while it has the lease.
+    Operator,
+    /// Stops the hand, changes parameters and scene.
+    Instructor,
+    /// Watches.
+    Observer,
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Operator => "operator",
+            Self::Instructor => "instructor",
+            Self::Observer => "observer",
+        })
+    }
+}
+
+/// Somebody with a certificate.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Member {
+    /// Number of the seat, 1 to [`SEATS`].
+    pub seat: u16,
+    /// Name for people.
+    pub name: String,
+    /// What the member may do.
+    pub role: Role,
+    /// End of the certificate, seconds since 1970.
+    pub until_s: i64,
+    /// Nothing is accepted from the member any more.
+    pub revoked: bool,
+}
+
+/// Everybody with a certificate.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Members {
+    /// In the order of their seats.
+    pub members: Vec<Member>,
+}
+
+impl Members {
+    /// Who sits there, revoked or not.
+    pub fn at(&self, seat: u16) -> Option<&Member> {
+        self.members.iter().find(|member| member.seat == seat)
+    }
+
+    /// Seats whose members are revoked.
+    pub fn revoked(&self) -> Vec<u16> {
+        self.members.iter().filter(|m| m.revoked).map(|m| m.seat).collect()
+    }
+}
+
+/// What a member gets, as one file: all that `relay join` needs.
+#[derive(Clone, Serialize, Deserialize)]
+pub struct Invitation {
+    /// Address of the lab's machine, with or without a port.
+    pub server: String,
+    /// Name of the member.
+    pub name: String,
+    /// What the member may do.
+    pub role: Role,
+    /// The seat.
+    pub seat: u16,
+    /// End of the certificate, seconds since 1970.
+    pub until_s: i64,
+    /// Certificate of the lab's authority, PEM.
+    pub authority: String,
+    /// Certificate of the member, PEM.
+    pub certificate: String,
+    /// Key of the member, PEM: who has it is the member.
+    pub key: String,
+}
+
+impl Invitation {
+    /// From the file that `relay keys invite` wrote.
+    pub fn read(path: &Path) -> Result<Self, RelayError> {
+        let text = read(path)?;
+        let invitation: Self = serde_json::from_str(&text).map_err(|e| {
+            RelayError(format!(
+                "{}: not an invitation of 'relay keys invite': {e}",
+                path.display()
+            ))
+        })?;
+        match (1..=SEATS).contains(&invitation.seat) {
+            true => Ok(invitation),
+            false => Err(RelayError(format!(
+                "{}: there is no seat {}",
+                path.display(),
+                invitation.seat
+            ))),
+        }
+    }
+
+    /// Certificate, key and authority.
+    pub fn identity(&self) -> Identity {
+        Identity {
+            authority: self.authority.clone(),
+            certificate: self.certificate.clone(),
+            key: self.key.clone(),
+        }
+    }
+}
+
+/// The folder with a lab's keys.
+#[derive(Clone, Debug)]
+pub struct Lab {
+    folder: PathBuf,
+}
+
+fn failed(path: &Path, why: impl fmt::Display) -> RelayError {
+    RelayError(format!("{}: {why}", path.display()))
+}
+
+fn read(path: &Path) -> Result<String, RelayError> {
+    fs::read_to_string(path).map_err(|e| failed(path, e))
+}
+
+/// Written beside and renamed, readable for its owner alone.
+fn write(path: &Path, text: &str) -> Result<(), RelayError> {
+    let beside = path.with_extension("new");
+    let _ = fs::remove_file(&beside);
+    let file = fs::OpenOptions::new()
+        .write(true)
+        .create_new(true)
+        .mode(0o600)
+        .open(&beside);
+    let written = file.and_then(|mut file| file.write_all(text.as_bytes()).and_then(|()| file.sync_all()));
+    written
+        .and_then(|()| fs::rename(&beside, path))
+        .map_err(|e| failed(path, e))
+}
+
+impl Lab {
+    /// The lab in `folder`.
+    pub fn new(folder: &Path) -> Self {
+        Self {
+            folder: folder.to_owned(),
+        }
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// Makes an authority, and the certificate of the machine with the core under the names and addresses in `hosts`.
+    pub fn make(&self, hosts: &[String]) -> Result<(), RelayError> {
+        if self.file("authority.key").exists() {
+            let why = "there is a lab here already; its members would be shut out. Choose another folder with --keys";
+            return Err(failed(&self.folder, why));
+        }
+        fs::create_dir_all(&self.folder).map_err(|e| failed(&self.folder, e))?;
+        let authority = Authority::make()?;
+        let (certificate, key) = authority.sign(&Subject::Machine(hosts), Validity::days(3650))?;
+        write(&self.file("authority.pem"), &authority.certificate)?;
+        write(&self.file("authority.key"), &authority.key)?;
+        write(&self.file("relay.pem"), &certificate)?;
+        write(&self.file("relay.key"), &key)?;
+        self.keep(&Members::default())
+    }
+
+    /// Certificate, key and authority of the machine with the core.
+    pub fn identity(&self) -> Result<Identity, RelayError> {
+        let hint = |e: RelayError| RelayError(format!("{e}. 'relay keys new --host ADDRESS' makes a lab's keys"));
+        Ok(Identity {
+            authority: read(&self.file("authority.pem")).map_err(hint)?,
+            certificate: read(&self.file("relay.pem"))?,
+            key: read(&self.file("relay.key"))?,
+        })
+    }
+
+    /// Everybody with a certificate.
+    pub fn members(&self) -> Result<Members, RelayError> {
+        let path = self.file("members.json");
+        serde_json::from_str(&read(&path)?).map_err(|e| failed(&path, e))
+    }
+
+    fn keep(&self, members: &Members) -> Result<(), RelayError> {
+        let text = serde_json::to_string_pretty(members).map_err(|e| RelayError(e.to_string()))?;
+        write(&self.file("members.json"), &text)
+    }
+
+    /// Makes a member's key and certificate. Names are used once, as seats are.
+    pub fn invite(&self, name: &str, role: Role, server: &str, validity: Validity) -> Result<Invitation, RelayError> {
+        let mut members = self.members()?;
+        if name.is_empty() || name.chars().count() > 40 || name.chars().any(char::is_control) {
+            return Err(RelayError("a name has 1 to 40 characters".to_owned()));
+        }
+        if members.members.iter().any(|m| m.name == name && !m.revoked) {
+            return Err(RelayError(format!(
+                "{name} has a certificate; revoke it first ('relay keys revoke'), or use another name"
+            )));
+        }
+        let seat = members.members.iter().map(|m| m.seat).max().unwrap_or(0) + 1;
+        if seat > SEATS {
+            return Err(RelayError(format!("all {SEATS} seats have been given: make a new lab")));
+        }
+        let (authority, key) = (read(&self.file("authority.pem"))?, read(&self.file("authority.key"))?);
+        let signer = Authority {
+            certificate: authority,
+            key,
+        };
+        let (certificate, key) = signer.sign(&Subject::Seat(seat), validity)?;
+        let until_s = validity.until_s();
+        members.members.push(Member {
+            seat,
+            name: name.to_owned(),
+            role,
+            until_s,
+            revoked: false,
+        });
+        self.keep(&members)?;
+        Ok(Invitation {
+            server: server.to_owned(),
+            name: name.to_owned(),
+            role,
+            seat,
+            until_s,
+            authority: signer.certificate,
+            certificate,
+            key,
+        })
+    }
+
+    /// Revokes everybody of that name; how many there were.
+    pub fn revoke(&self, name: &str) -> Result<usize, RelayError> {
+        let mut members = self.members()?;
+        let mut count = 0;
+        for member in members.members.iter_mut().filter(|m| m.name == name && !m.revoked) {
+            (member.revoked, count) = (true, count + 1);
+        }
+        match count {
+            0 => Err(RelayError(format!(
+                "nobody of the name {name} has a certificate: see 'relay keys list'"
+            ))),
+            _ => self.keep(&members).map(|()| count),
+        }
+    }
+}
+
+/// Writes an invitation where only its owner can read it.
+pub fn write_invitation(path: &Path, invitation: &Invitation) -> Result<(), RelayError> {
+    let text = serde_json::to_string_pretty(invitation).map_err(|e| RelayError(e.to_string()))?;
+    write(path, &text)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,42 @@
+use super::*;
+
+fn scratch(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("stylet-relay-{name}-{}", std::process::id()));
+    let _ = fs::remove_dir_all(&folder);
+    folder
+}
+
+#[test]
+fn seats_have_one_name_each_and_no_other_name_is_a_seat() {
+    for seat in [1, 42, SEATS] {
+        assert_eq!(seat_of(&seat_name(seat)), Some(seat));
+    }
+    for name in ["seat-000", "seat-257", "seat-1", "seat-0001", "relay", "seat-+01", ""] {
+        assert_eq!(seat_of(name), None, "{name}");
+    }
+}
+
+#[test]
+fn a_lab_is_made_once_and_its_seats_are_never_given_twice() {
+    let folder = scratch("lab");
+    let lab = Lab::new(&folder);
+    lab.make(&["127.0.0.1".to_owned()]).expect("made");
+    assert!(lab.make(&[]).is_err(), "a second authority would shut everybody out");
+    let invite = |name| lab.invite(name, Role::Observer, "127.0.0.1", Validity::days(1));
+    let first = invite("Anna").expect("invited");
+    assert!(invite("Anna").is_err(), "the name is in use");
+    assert_eq!(lab.revoke("Anna").expect("revoked"), 1);
+    assert!(lab.revoke("Anna").is_err());
+    let second = invite("Anna").expect("invited again");
+    assert_eq!((first.seat, second.seat), (1, 2));
+    assert_eq!(lab.members().expect("kept").revoked(), [1]);
+    let file = folder.join("anna.invitation");
+    write_invitation(&file, &second).expect("written");
+    assert_eq!(Invitation::read(&file).expect("read").seat, 2);
+    use std::os::unix::fs::PermissionsExt;
+    for name in ["anna.invitation", "authority.key", "relay.key"] {
+        let mode = fs::metadata(folder.join(name)).expect("there").permissions().mode();
+        assert_eq!(mode & 0o077, 0, "{name} is readable for others");
+    }
+    fs::remove_dir_all(folder).expect("ours");
+}

@@ -1,0 +1,33 @@
+//! Carries the services of a core to hosts on other machines and their requests back, over zenoh and QUIC with certificates on both sides.
+//!
+//! `serve` runs beside the core as one more host; `join` makes the same services on another machine. Data goes
+//! *core → `serve` → `net` → `join` → hosts*; requests go back through `serve::rights` and `serve::lease`.
+
+#![warn(missing_docs)]
+
+pub mod control;
+pub mod join;
+pub mod keys;
+pub mod net;
+pub mod ports;
+pub mod serve;
+pub mod wire;
+
+/// Why the relay ended or did not begin; the text says what to do.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct RelayError(pub String);
+
+impl From<stylet_shm_schema::service::ServiceError> for RelayError {
+    fn from(why: stylet_shm_schema::service::ServiceError) -> Self {
+        Self(why.0)
+    }
+}
+
+/// `CLOCK_MONOTONIC` of this machine.
+pub fn now_ns() -> u64 {
+    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `time` is valid for writes; this clock always exists.
+    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut time) };
+    time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
+}

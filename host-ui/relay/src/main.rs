@@ -1,0 +1,247 @@
+//! The command line of `relay`.
+
+use clap::{Parser, Subcommand};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use stylet_relay::control::{self, Order};
+use stylet_relay::keys::{Invitation, Lab, Role, Validity, write_invitation};
+use stylet_relay::net::PORT;
+use stylet_relay::serve::{self, End, keeper};
+use stylet_relay::{RelayError, join};
+use stylet_shm_schema::service::Instance;
+
+/// Carries a running Stylet to other machines: a class that watches, an instructor elsewhere, an operator at another screen.
+///
+/// On the machine with rt-core: `relay keys new --host ADDRESS` once, `relay keys invite NAME --role observer` for each person, then `relay
+/// serve`. On another machine: `relay join --invitation FILE`, and host-ui, record and everything else run there as they do beside the core.
+#[derive(Parser)]
+#[command(name = "relay", version)]
+struct Cli {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Serve the core of this machine to the lab's members
+    Serve {
+        /// The core's instance, as in `rt-core --instance`
+        #[arg(long, default_value = "main")]
+        instance: String,
+        /// Address and port to listen on; may be given several times
+        #[arg(long, value_name = "ADDRESS:PORT", required = true)]
+        listen: Vec<String>,
+        /// Folder of the lab's keys
+        #[arg(long, value_name = "DIR", default_value = "lab-keys")]
+        keys: PathBuf,
+        /// Set by the process that watches over the server
+        #[arg(long, hide = true)]
+        kept: bool,
+    },
+    /// Show the core of another machine here, as if it ran here
+    Join {
+        /// Address of the machine that serves, with or without a port [default: that of the invitation]
+        host: Option<String>,
+        /// The file that `relay keys invite` wrote
+        #[arg(long, value_name = "FILE")]
+        invitation: PathBuf,
+        /// The instance that hosts here use; no core may run under it
+        #[arg(long, default_value = "main")]
+        instance: String,
+    },
+    /// Make a lab's keys, invite people, revoke them
+    Keys {
+        #[command(subcommand)]
+        task: KeysTask,
+        /// Folder of the lab's keys
+        #[arg(long, value_name = "DIR", default_value = "lab-keys", global = true)]
+        keys: PathBuf,
+    },
+    /// Ask for the needle, hand it over, or see who is there
+    Lease {
+        #[command(subcommand)]
+        task: LeaseTask,
+        /// The instance of the relay on this machine
+        #[arg(long, default_value = "main", global = true)]
+        instance: String,
+    },
+}
+
+#[derive(Subcommand)]
+enum KeysTask {
+    /// Make the lab's authority and the certificate of this machine
+    New {
+        /// A name or an address under which members reach this machine; may be given several times
+        #[arg(long, value_name = "ADDRESS", required = true)]
+        host: Vec<String>,
+    },
+    /// Make a member's key and write it as an invitation: whoever has that file is the member
+    Invite {
+        /// Name of the person
+        name: String,
+        /// What the person may do: an operator moves the needle, an instructor stops the hand and changes parameters and scene, an observer watches
+        #[arg(long)]
+        role: Role,
+        /// Address of this machine, with or without a port, as the member reaches it
+        #[arg(long, value_name = "ADDRESS")]
+        server: String,
+        /// Days until the certificate expires
+        #[arg(long, default_value_t = 180)]
+        days: u32,
+        /// The file [default: NAME.invitation]
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+    },
+    /// Accept nothing from a person any more; everybody is connected anew, within a second
+    Revoke {
+        /// Name of the person
+        name: String,
+    },
+    /// List everybody with a certificate
+    List,
+}
+
+#[derive(Subcommand)]
+enum LeaseTask {
+    /// Operate from this machine
+    Take,
+    /// Operate no longer
+    Release,
+    /// Hand the needle to somebody who is connected
+    Give {
+        /// Name of the person
+        name: String,
+    },
+    /// Show who is connected, who operates, round trips and losses
+    Status,
+}
+
+fn main() -> ExitCode {
+    match run(Cli::parse().task) {
+        Ok(code) => code,
+        Err(why) => {
+            eprintln!("relay: {why}");
+            ExitCode::from(keeper::CANNOT)
+        }
+    }
+}
+
+fn on_signals() -> Result<Arc<AtomicBool>, RelayError> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(|e| RelayError(format!("signals: {e}")))?;
+    }
+    Ok(stop)
+}
+
+/// An address with the usual port where it has none.
+fn with_port(host: &str) -> String {
+    let has_port = host
+        .rsplit_once(':')
+        .is_some_and(|(name, port)| port.parse::<u16>().is_ok() && (!name.contains(':') || name.ends_with(']')));
+    match has_port {
+        true => host.to_owned(),
+        false => format!("{host}:{PORT}"),
+    }
+}
+
+fn run(task: Task) -> Result<ExitCode, RelayError> {
+    match task {
+        Task::Serve {
+            instance,
+            listen,
+            keys,
+            kept,
+        } => {
+            let instance = Instance::new(&instance)?;
+            let stop = on_signals()?;
+            if !kept {
+                let arguments: Vec<_> = std::env::args_os().skip(1).collect();
+                keeper::keep(&instance, &arguments, &stop)?;
+                return Ok(ExitCode::SUCCESS);
+            }
+            let options = serve::Options {
+                instance,
+                listen,
+                lab: Lab::new(&keys),
+            };
+            let mut beat = keeper::Beat::of_stdin();
+            match serve::run(&options, &stop, |operated| beat.pass(operated))? {
+                End::Stopped => Ok(ExitCode::SUCCESS),
+                End::Revoked => Ok(ExitCode::from(keeper::AGAIN)),
+            }
+        }
+        Task::Join {
+            host,
+            invitation,
+            instance,
+        } => {
+            let invitation = Invitation::read(&invitation)?;
+            let server = with_port(host.as_deref().unwrap_or(&invitation.server));
+            let instance = Instance::new(&instance)?;
+            let options = join::Options {
+                instance,
+                server,
+                invitation,
+            };
+            let stop = on_signals()?;
+            join::run(&options, &stop)?;
+            Ok(ExitCode::SUCCESS)
+        }
+        Task::Keys { task, keys } => keys_task(task, &Lab::new(&keys)).map(|()| ExitCode::SUCCESS),
+        Task::Lease { task, instance } => {
+            let order = match task {
+                LeaseTask::Take => Order::Take,
+                LeaseTask::Release => Order::Release,
+                LeaseTask::Give { name } => Order::Give(name),
+                LeaseTask::Status => Order::Status,
+            };
+            println!("{}", control::ask(&Instance::new(&instance)?, &order)?);
+            Ok(ExitCode::SUCCESS)
+        }
+    }
+}
+
+fn keys_task(task: KeysTask, lab: &Lab) -> Result<(), RelayError> {
+    match task {
+        KeysTask::New { host } => {
+            lab.make(&host)?;
+            println!("made the lab's authority and the certificate of {}", host.join(", "));
+        }
+        KeysTask::Invite {
+            name,
+            role,
+            server,
+            days,
+            out,
+        } => {
+            let invitation = lab.invite(&name, role, &server, Validity::days(days))?;
+            let out = out.unwrap_or_else(|| PathBuf::from(format!("{}.invitation", name.replace(['/', ' '], "-"))));
+            write_invitation(&out, &invitation)?;
+            println!(
+                "{}: {name} may join as {role}; send it as you would send a password",
+                out.display()
+            );
+        }
+        KeysTask::Revoke { name } => {
+            lab.revoke(&name)?;
+            println!("nothing is accepted from {name} any more");
+        }
+        KeysTask::List => {
+            for member in lab.members()?.members {
+                let state = if member.revoked { "revoked" } else { "valid" };
+                let until = time::OffsetDateTime::from_unix_timestamp(member.until_s)
+                    .map_or("?".to_owned(), |until| until.date().to_string());
+                println!(
+                    "{:3}  {:<11} {state:<8} until {until}  {}",
+                    member.seat,
+                    member.role.to_string(),
+                    member.name
+                );
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,209 @@
+//! What the core publishes beside records and snapshots: sent to all as it comes, and to one member all that is in force.
+
+use super::Server;
+use super::streams::Job;
+use crate::net::{Place, Priority, put};
+use crate::now_ns;
+use crate::ports::{Board, Near};
+use crate::wire::{Hello, Kind, Stamp, encode};
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::mpsc::SyncSender;
+use std::time::{Duration, Instant};
+use stylet_shm_schema::{Event, ParametersInForce, PlanInForce, Reply, SCHEMA_VERSION, Session, check};
+
+const STATE_EVERY: Duration = Duration::from_millis(10);
+const BOARD_EVERY: Duration = Duration::from_millis(20);
+const OPEN_EVERY: Duration = Duration::from_secs(1);
+/// Ports that have heard no announcement for so long are made anew: another core may have swept their folder.
+const SILENT_PORTS: Duration = Duration::from_secs(4);
+const CLEAN_EVERY: Duration = Duration::from_secs(1);
+const EVENTS_KEPT: usize = 64;
+const REPLIES_KEPT: usize = 32;
+
+/// The ports, and what is in force.
+pub struct Announcements {
+    server: Arc<Server>,
+    // The board before the ports, and those before their node.
+    board: Option<Board>,
+    near: Option<Near>,
+    tried: Option<Instant>,
+    board_tried: Option<Instant>,
+    heard: Instant,
+    cleaned: Instant,
+    state_sent: Instant,
+    session: Option<Session>,
+    parameters: Option<ParametersInForce>,
+    plan: Option<PlanInForce>,
+    /// Identity and payload.
+    scene: Option<((u64, u64), Vec<u8>)>,
+    events: VecDeque<Event>,
+    replies: VecDeque<Reply>,
+}
+
+impl Announcements {
+    pub fn new(server: Arc<Server>) -> Self {
+        let now = Instant::now();
+        Self {
+            server,
+            board: None,
+            near: None,
+            tried: None,
+            board_tried: None,
+            heard: now,
+            cleaned: now,
+            state_sent: now,
+            session: None,
+            parameters: None,
+            plan: None,
+            scene: None,
+            events: VecDeque::new(),
+            replies: VecDeque::new(),
+        }
+    }
+
+    /// The ports to the core, when there are any.
+    pub fn near(&self) -> Option<&Near> {
+        self.near.as_ref()
+    }
+
+    /// The run of the core.
+    pub fn session_id(&self) -> u64 {
+        self.session.map_or(0, |session| session.session_id)
+    }
+
+    fn message(&self, kind: Kind, parts: &[&[u8]]) -> Vec<u8> {
+        let stamp = Stamp {
+            run: self.server.run,
+            number: 0,
+            sent_ns: now_ns(),
+            heard_ns: 0,
+        };
+        encode(kind, stamp, parts)
+    }
+
+    /// To everybody.
+    pub fn send(&self, kind: Kind, parts: &[&[u8]]) {
+        let priority = match kind {
+            Kind::State => Priority::InteractiveHigh,
+            Kind::Scene => Priority::Data,
+            _ => Priority::InteractiveLow,
+        };
+        put(&self.server.session, Place::Rest, priority, self.message(kind, parts));
+    }
+
+    pub fn pass(&mut self) {
+        self.open();
+        if let Some(near) = self.near.take() {
+            self.receive(&near);
+            self.read_board(&near);
+            if self.heard.elapsed() > CLEAN_EVERY && self.cleaned.elapsed() > CLEAN_EVERY {
+                self.cleaned = Instant::now();
+                let _ = near.node.try_cleanup_dead_nodes();
+            }
+            self.near = Some(near);
+        }
+    }
+
+    fn open(&mut self) {
+        let now = Instant::now();
+        let is_due = self.tried.is_none_or(|tried| now - tried >= OPEN_EVERY);
+        if is_due && (self.near.is_none() || now - self.heard >= SILENT_PORTS) {
+            (self.tried, self.board, self.near, self.heard) = (Some(now), None, None, now);
+            self.near = Near::new(&self.server.instance).ok();
+        }
+    }
+
+    fn receive(&mut self, near: &Near) {
+        while let Ok(Some(sample)) = near.session.receive() {
+            let session = *sample.payload();
+            let is_older = self.session.is_some_and(|old| old.started_ns > session.started_ns);
+            if session.schema_version != SCHEMA_VERSION || is_older {
+                continue;
+            }
+            if self.session.is_none_or(|old| old.session_id != session.session_id) {
+                (self.board, self.board_tried) = (None, None);
+                self.events.clear();
+                self.replies.clear();
+            }
+            (self.session, self.heard) = (Some(session), Instant::now());
+            self.send(Kind::Session, &[bytemuck::bytes_of(&session)]);
+        }
+        while let Ok(Some(sample)) = near.parameters.receive() {
+            self.parameters = Some(*sample.payload());
+            self.send(Kind::Parameters, &[bytemuck::bytes_of(sample.payload())]);
+        }
+        while let Ok(Some(sample)) = near.plan.receive() {
+            self.plan = Some(*sample.payload());
+            self.send(Kind::Plan, &[bytemuck::bytes_of(sample.payload())]);
+        }
+        while let Ok(Some(sample)) = near.scene.receive() {
+            let header = *sample.user_header();
+            if check::scene(&header, sample.payload()).is_ok() {
+                let body = [bytemuck::bytes_of(&header), bytemuck::cast_slice(sample.payload())].concat();
+                self.send(Kind::Scene, &[&body]);
+                self.scene = Some(((header.session_id, header.generation), body));
+            }
+        }
+        while let Ok(Some(sample)) = near.events.receive() {
+            let event = *sample.payload();
+            self.events.push_back(event);
+            self.events.drain(..self.events.len().saturating_sub(EVENTS_KEPT));
+            self.send(Kind::Event, &[bytemuck::bytes_of(&event)]);
+        }
+        // Before the replies: whoever has the reply to a rehearsal has its result.
+        while let Ok(Some(sample)) = near.rehearsals.receive() {
+            self.send(Kind::Rehearsal, &[bytemuck::bytes_of(sample.payload())]);
+        }
+        while let Ok(Some(sample)) = near.replies.receive() {
+            let reply = *sample.payload();
+            self.replies.push_back(reply);
+            self.replies.drain(..self.replies.len().saturating_sub(REPLIES_KEPT));
+            self.send(Kind::Reply, &[bytemuck::bytes_of(&reply)]);
+        }
+    }
+
+    fn read_board(&mut self, near: &Near) {
+        let Some(session) = &self.session else { return };
+        if self.board.is_none() && self.board_tried.is_none_or(|tried| tried.elapsed() >= BOARD_EVERY) {
+            self.board_tried = Some(Instant::now());
+            self.board = Board::open(&near.node, session.session_id).ok();
+        }
+        if self.state_sent.elapsed() < STATE_EVERY {
+            return;
+        }
+        if let Some(board) = &self.board {
+            let state = board.read();
+            self.state_sent = Instant::now();
+            self.send(Kind::State, &[bytemuck::bytes_of(&state)]);
+        }
+    }
+
+    /// All that is in force, to a member that has just come or was cut off.
+    pub fn greet(&self, seat: u16, hello: &Hello, jobs: &SyncSender<Job>) {
+        let send = |kind, parts: &[&[u8]]| {
+            // A full queue is one of a member that asks again.
+            let _ = jobs.try_send(Job::Message(seat, self.message(kind, parts)));
+        };
+        if let Some(session) = &self.session {
+            send(Kind::Session, &[bytemuck::bytes_of(session)]);
+        }
+        if let Some((id, body)) = &self.scene
+            && *id != (hello.scene_session, hello.scene_generation)
+        {
+            send(Kind::Scene, &[body]);
+        }
+        if let Some(parameters) = &self.parameters {
+            send(Kind::Parameters, &[bytemuck::bytes_of(parameters)]);
+        }
+        if let Some(plan) = &self.plan {
+            send(Kind::Plan, &[bytemuck::bytes_of(plan)]);
+        }
+        for event in &self.events {
+            send(Kind::Event, &[bytemuck::bytes_of(event)]);
+        }
+        for reply in &self.replies {
+            send(Kind::Reply, &[bytemuck::bytes_of(reply)]);
+        }
+    }
+}

@@ -1,0 +1,225 @@
+//! One message of a member, from its certificate's seat to what the core gets of it. Nothing passes that is not asked for by right.
+
+use super::lease::Holder;
+use super::rights::{Right, right, right_to_upload};
+use super::rounds::{Presence, Rounds};
+use super::streams::Job;
+use crate::control::Order;
+use crate::keys::{Member, Role};
+use crate::now_ns;
+use crate::wire::{self, Batches, Hello, Kind, Message, Stamp, encode};
+use bytemuck::Zeroable;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use stylet_shm_schema::{Command, CommandKind, Reply, ReplyStatus, Request, Text};
+
+/// A request that left its member so long ago, by what the member had heard of the server, is not carried out: the
+/// hand that made it does not know what happened since.
+const LATE_NS: u64 = 500_000_000;
+
+pub(super) fn take(rounds: &mut Rounds, seat: u16, bytes: &[u8], now_ns: u64) {
+    let message = match wire::decode(bytes) {
+        Ok(message) => message,
+        Err(why) => return rounds.refuse(seat, "a message", &why.to_string(), false),
+    };
+    rounds.read_members_for(seat);
+    let is_greeting = message.kind == Kind::Hello;
+    let member = match valid(rounds, seat) {
+        Ok(member) => member,
+        Err(why) => return refuse(rounds, seat, &message, &why, is_greeting),
+    };
+    // A clock that another start of this machine had may be ahead.
+    let late = message.stamp.heard_ns > now_ns || now_ns - message.stamp.heard_ns > LATE_NS;
+    match message.kind {
+        Kind::Hello => greeting(rounds, seat, &message, late),
+        Kind::Seen => {
+            if let Some(pace) = super::lock(&rounds.server.paces).get_mut(&seat) {
+                pace.seen(message.stamp.number, Instant::now());
+            }
+        }
+        Kind::Again => {
+            if let Ok(batches) = wire::one::<Batches>(message.body)
+                && message.stamp.run == rounds.server.run
+                && batches.from <= batches.to
+            {
+                // A full queue is one of members that ask again.
+                let _ = rounds.jobs.try_send(Job::Again(seat, batches));
+            }
+        }
+        Kind::Command | Kind::Upload | Kind::Lease if late => {
+            let why = "it was made before the connection was lost, or arrives late: look, and ask again";
+            refuse(rounds, seat, &message, why, false);
+        }
+        Kind::Command => command(rounds, seat, &member, &message),
+        Kind::Upload => upload(rounds, seat, &member, &message),
+        Kind::Lease => lease(rounds, seat, &member, &message),
+        _ => rounds.refuse(seat, "a message", "members do not send this kind", false),
+    }
+}
+
+/// The member, while its place in the list and its time last.
+fn valid(rounds: &Rounds, seat: u16) -> Result<Member, String> {
+    let member = rounds.members.at(seat).ok_or("nobody was given this seat")?;
+    let now_s = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .map_or(i64::MAX, |t| t.as_secs() as i64);
+    if member.revoked {
+        return Err("the certificate is revoked".to_owned());
+    }
+    if now_s > member.until_s {
+        return Err("the certificate has expired".to_owned());
+    }
+    Ok(member.clone())
+}
+
+fn greeting(rounds: &mut Rounds, seat: u16, message: &Message<'_>, late: bool) {
+    let Ok(hello) = wire::one::<Hello>(message.body) else {
+        return rounds.refuse(seat, "a greeting", "length of a payload", true);
+    };
+    let (now, epoch) = (Instant::now(), (message.stamp.number, hello.epoch));
+    if !late {
+        rounds.lease.heard(seat, now);
+    }
+    let known = rounds.present.get(&seat).map(|presence| presence.epoch);
+    if known != Some(epoch) {
+        if known.is_none() {
+            println!("connected: {}", rounds.name(seat));
+        }
+        rounds.announcements.greet(seat, &hello, &rounds.jobs);
+        super::lock(&rounds.server.paces).entry(seat).or_default();
+    }
+    let presence = Presence {
+        epoch,
+        heard: now,
+        round_trip_ns: hello.round_trip_ns,
+        lost: hello.lost,
+    };
+    rounds.present.insert(seat, presence);
+    answer(rounds, seat, Kind::Echo, bytemuck::bytes_of(&message.stamp.sent_ns));
+}
+
+fn answer(rounds: &Rounds, seat: u16, kind: Kind, body: &[u8]) {
+    let stamp = Stamp {
+        run: rounds.server.run,
+        number: 0,
+        sent_ns: now_ns(),
+        heard_ns: 0,
+    };
+    // A full queue is one of a member that asks again.
+    let _ = rounds.jobs.try_send(Job::Message(seat, encode(kind, stamp, &[body])));
+}
+
+/// Says so here, and to the host that asked.
+fn refuse(rounds: &mut Rounds, seat: u16, message: &Message<'_>, why: &str, is_greeting: bool) {
+    let (what, asker) = match message.kind {
+        Kind::Command => match wire::one::<Command>(message.body) {
+            Ok(command) => {
+                let kind = CommandKind::try_from(command.kind);
+                let what = kind.map_or("an unknown request".to_owned(), |kind| format!("{kind:?}"));
+                (what, Some((command.host_id, command.command_id)))
+            }
+            Err(_) => ("a request of invalid length".to_owned(), None),
+        },
+        Kind::Upload => {
+            let header = message
+                .body
+                .get(..size_of::<[u64; 2]>())
+                .map(bytemuck::pod_read_unaligned::<[u64; 2]>);
+            (
+                "a volume".to_owned(),
+                header.map(|[host_id, command_id]| (host_id, command_id)),
+            )
+        }
+        Kind::Hello => ("to connect".to_owned(), None),
+        Kind::Lease => ("the needle".to_owned(), None),
+        _ => ("a message".to_owned(), None),
+    };
+    rounds.refuse(seat, &what, why, is_greeting);
+    if let Some((host_id, command_id)) = asker {
+        let mut reply = Reply::zeroed();
+        (reply.session_id, reply.host_id, reply.command_id) = (rounds.announcements.session_id(), host_id, command_id);
+        reply.status = ReplyStatus::Refused as u32;
+        reply.text = Text::new(&format!("the relay refused it: {why}"));
+        answer(rounds, seat, Kind::Reply, bytemuck::bytes_of(&reply));
+    }
+}
+
+/// Whether the member has the right now; the lease is taken where nobody has it.
+fn allowed(rounds: &mut Rounds, seat: u16, member: &Member, right: Option<Right>) -> Result<(), String> {
+    match right {
+        None => Err(format!("an {} may not do this", member.role)),
+        Some(Right::Role) => Ok(()),
+        Some(Right::Lease) => {
+            let before = rounds.lease.holder();
+            let taken = rounds.lease.take(seat, Instant::now());
+            if taken.is_ok() && before != Holder::Seat(seat) {
+                println!("operates now: {}", rounds.name(seat));
+            }
+            taken.map_err(|held| rounds.held_words(held))
+        }
+    }
+}
+
+fn command(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_>) {
+    let checked = wire::one::<Command>(message.body)
+        .map_err(|invalid| invalid.to_string())
+        .and_then(|command| {
+            let request = Request::decode(&command).map_err(|errors| errors.to_string())?;
+            Ok((command, right(member.role, request.kind())))
+        });
+    let passed = checked.and_then(|(command, right)| {
+        allowed(rounds, seat, member, right)?;
+        let near = rounds.announcements.near().ok_or("no core runs there")?;
+        near.commands.send_copy(command).map_err(|e| format!("{e:?}"))
+    });
+    if let Err(why) = passed {
+        refuse(rounds, seat, message, &why, false);
+    }
+}
+
+fn upload(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_>) {
+    let passed = allowed(rounds, seat, member, right_to_upload(member.role)).and_then(|()| {
+        let (header, cells) = wire::upload(message.body).map_err(|invalid| invalid.to_string())?;
+        rounds.upload = None;
+        let near = rounds.announcements.near().ok_or("no core runs there")?;
+        rounds.upload = Some(near.upload(&header, &cells).map_err(|e| e.0)?);
+        Ok(())
+    });
+    if let Err(why) = passed {
+        refuse(rounds, seat, message, &why, false);
+    }
+}
+
+/// To operate, to stop operating, or to hand over to somebody else.
+fn lease(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_>) {
+    let order = std::str::from_utf8(message.body).ok().and_then(Order::of_line);
+    let mine = rounds.lease.holder() == Holder::Seat(seat);
+    let passed = match order {
+        _ if member.role != Role::Operator => Err(format!("an {} does not operate", member.role)),
+        Some(Order::Take) => allowed(rounds, seat, member, Some(Right::Lease)),
+        Some(Order::Release) if mine => {
+            rounds.hand_over(Holder::Nobody, Instant::now());
+            Ok(())
+        }
+        Some(Order::Give(name)) if mine => give(rounds, &name),
+        Some(Order::Release | Order::Give(_)) => Err("only who operates hands over".to_owned()),
+        _ => Err("an unknown word".to_owned()),
+    };
+    if let Err(why) = passed {
+        refuse(rounds, seat, message, &why, false);
+    }
+}
+
+fn give(rounds: &mut Rounds, name: &str) -> Result<(), String> {
+    let operators = rounds
+        .members
+        .members
+        .iter()
+        .filter(|m| m.role == Role::Operator && !m.revoked);
+    let to = operators
+        .filter(|m| rounds.present.contains_key(&m.seat))
+        .find(|m| m.name == name)
+        .map(|m| m.seat)
+        .ok_or_else(|| format!("{name} is no operator who is connected"))?;
+    rounds.hand_over(Holder::Seat(to), Instant::now());
+    Ok(())
+}

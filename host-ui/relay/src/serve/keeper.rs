@@ -1,0 +1,150 @@
+//! The process that starts the server and outlives it: where the server is killed or stands still while somebody on the net
+//! operates, it stops the hand; it starts a server that was killed again.
+
+use super::lease::SILENCE;
+use crate::ports::to;
+use crate::{RelayError, now_ns};
+use iceoryx2::port::update_connections::UpdateConnections;
+use std::ffi::OsString;
+use std::io::{ErrorKind, Read, Write};
+use std::os::fd::{AsFd, OwnedFd};
+use std::os::unix::net::UnixStream;
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use stylet_shm_schema::Request;
+use stylet_shm_schema::service::{self, Instance, ServiceError};
+
+/// Exit code of a server that is to be started again at once.
+pub const AGAIN: u8 = 3;
+/// Exit code of a server that says itself why it cannot serve.
+pub const CANNOT: u8 = 1;
+const BEAT_EVERY: Duration = Duration::from_millis(50);
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+/// A server that was killed is started again after so long.
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// The server's side: says twenty times a second that it runs, and whether somebody on the net operates.
+pub struct Beat {
+    to_keeper: Option<UnixStream>,
+    sent: Instant,
+    operated: bool,
+}
+
+impl Beat {
+    /// Over the standard input, which the keeper made.
+    pub fn of_stdin() -> Self {
+        let stream = std::io::stdin().as_fd().try_clone_to_owned().map(UnixStream::from);
+        let stream = stream.and_then(|stream| stream.set_nonblocking(true).map(|()| stream));
+        Self {
+            to_keeper: stream.ok(),
+            sent: Instant::now(),
+            operated: false,
+        }
+    }
+
+    /// With each pass of the server.
+    pub fn pass(&mut self, operated: bool) {
+        if operated != self.operated || self.sent.elapsed() >= BEAT_EVERY {
+            (self.operated, self.sent) = (operated, Instant::now());
+            if let Some(stream) = &mut self.to_keeper {
+                // A keeper that was killed has this process stopped by the kernel.
+                let _ = stream.write(&[u8::from(operated)]);
+            }
+        }
+    }
+}
+
+/// Runs this program with `arguments` and `--kept`, again and again until `stop`.
+pub fn keep(instance: &Instance, arguments: &[OsString], stop: &AtomicBool) -> Result<(), RelayError> {
+    let failed = |e: std::io::Error| RelayError(format!("the server cannot be started: {e}"));
+    loop {
+        let (mut mine, theirs) = UnixStream::pair().map_err(failed)?;
+        mine.set_read_timeout(Some(LOOK_EVERY)).map_err(failed)?;
+        let mut child = start(arguments, theirs).map_err(failed)?;
+        watch(instance, &mut mine, &child, stop);
+        let status = child.wait().map_err(failed)?;
+        // SYNC: set by a signal; nothing but the flag is carried.
+        match (stop.load(Ordering::Relaxed), status.code()) {
+            (true, _) | (_, Some(0)) => return Ok(()),
+            (_, Some(code)) if code == i32::from(AGAIN) => {}
+            (_, Some(code)) if code == i32::from(CANNOT) => {
+                return Err(RelayError("the server ended; what it printed says why".to_owned()));
+            }
+            _ => {
+                println!("the server ended with {status}; it is started again");
+                std::thread::sleep(PAUSE);
+            }
+        }
+    }
+}
+
+fn start(arguments: &[OsString], theirs: UnixStream) -> std::io::Result<Child> {
+    let mut command = Command::new(std::env::current_exe()?);
+    command
+        .args(arguments)
+        .arg("--kept")
+        .stdin(Stdio::from(OwnedFd::from(theirs)));
+    // SAFETY: between fork and exec it only makes a system call.
+    unsafe { command.pre_exec(end_with_keeper) };
+    command.spawn()
+}
+
+/// Without its keeper a server ends, and stops the hand as it does.
+fn end_with_keeper() -> std::io::Result<()> {
+    // SAFETY: a system call with plain arguments.
+    match unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGTERM) } {
+        0 => Ok(()),
+        _ => Err(std::io::Error::last_os_error()),
+    }
+}
+
+/// Until the server has ended.
+fn watch(instance: &Instance, from_server: &mut UnixStream, child: &Child, stop: &AtomicBool) {
+    let (mut operated, mut is_stopped, mut heard, mut asked) = (false, false, Instant::now(), false);
+    let mut beats = [0; 64];
+    loop {
+        match from_server.read(&mut beats) {
+            Ok(0) => break,
+            Ok(count) => (operated, is_stopped, heard) = (beats[count - 1] == 1, false, Instant::now()),
+            Err(e)
+                if matches!(
+                    e.kind(),
+                    ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted
+                ) => {}
+            Err(_) => break,
+        }
+        if operated && !is_stopped && heard.elapsed() >= SILENCE {
+            is_stopped = true;
+            stop_hand(instance, "the relay stands still");
+        }
+        // SYNC: as above.
+        if stop.load(Ordering::Relaxed) && !asked {
+            asked = true;
+            // SAFETY: a signal to a child that was not waited for yet.
+            unsafe { libc::kill(child.id() as libc::pid_t, libc::SIGTERM) };
+        }
+    }
+    if operated && !is_stopped && !asked {
+        stop_hand(instance, "the relay was killed");
+    }
+}
+
+fn stop_hand(instance: &Instance, why: &str) {
+    println!("the hand is stopped: {why}");
+    let send = || -> Result<(), ServiceError> {
+        let node = instance.node()?;
+        let port = to(service::commands(&node)?, "commands")?;
+        let _ = port.update_connections();
+        if let Ok(command) = Request::StopHand.encode(now_ns(), 1) {
+            let _ = port.send_copy(command);
+        }
+        // The core connects to a new port within one of its passes, and takes what is there.
+        std::thread::sleep(Duration::from_millis(30));
+        Ok(())
+    };
+    if let Err(why) = send() {
+        println!("the hand could not be stopped: {why}");
+    }
+}

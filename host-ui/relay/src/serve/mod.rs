@@ -1,0 +1,179 @@
+//! Beside the core: one more host of normal priority, which sends what the core publishes and checks what members ask.
+
+mod announce;
+mod asked;
+pub mod keeper;
+pub mod lease;
+mod pace;
+pub mod rights;
+mod rounds;
+mod streams;
+
+use crate::keys::{Lab, seat_of};
+use crate::net::{self, Session};
+use crate::{RelayError, now_ns};
+use pace::Pace;
+use rounds::Rounds;
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+use stylet_shm_schema::service::Instance;
+
+/// Batches that are kept for members that miss them: a minute, 18 MB.
+const KEPT: usize = 3000;
+/// Requests that may wait; more are dropped and counted.
+const ASKED: usize = 512;
+const JOBS: usize = 1024;
+const PASS: Duration = Duration::from_millis(2);
+
+/// How to serve.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The core's instance.
+    pub instance: Instance,
+    /// Addresses with ports.
+    pub listen: Vec<String>,
+    /// Folder of the lab's keys.
+    pub lab: Lab,
+}
+
+/// What the threads of a server share.
+pub struct Server {
+    session: Session,
+    instance: Instance,
+    run: u64,
+    // SYNC: a flag alone, no data is published by it.
+    end: AtomicBool,
+    kept: Mutex<VecDeque<(u64, Arc<Vec<u8>>)>>,
+    /// Of each member that is connected.
+    paces: Mutex<BTreeMap<u16, Pace>>,
+}
+
+/// What one request came as.
+struct Asked {
+    seat: u16,
+    bytes: Vec<u8>,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // What is behind the locks is whole after each statement.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Server {
+    fn ends(&self) -> bool {
+        // SYNC: see the field.
+        self.end.load(Ordering::Relaxed)
+    }
+
+    fn keep(&self, number: u64, bytes: Vec<u8>) {
+        let mut kept = lock(&self.kept);
+        kept.push_back((number, Arc::new(bytes)));
+        while kept.len() > KEPT {
+            kept.pop_front();
+        }
+    }
+
+    /// Those of the batches that are kept, and the number of the first of them or of the one after all.
+    fn kept(&self, from: u64, to: u64) -> (Vec<Vec<u8>>, u64) {
+        let kept: Vec<(u64, Arc<Vec<u8>>)> = {
+            let all = lock(&self.kept);
+            all.iter().filter(|(n, _)| (from..=to).contains(n)).cloned().collect()
+        };
+        let first = kept.first().map_or(to.saturating_add(1), |(number, _)| *number);
+        (kept.iter().map(|(_, bytes)| bytes.to_vec()).collect(), first)
+    }
+}
+
+/// Why serving ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// It was asked to.
+    Stopped,
+    /// Somebody was revoked: the next session shuts that seat out.
+    Revoked,
+}
+
+/// Serves until `stop`; calls `beat` with each pass, with whether somebody on the net operates.
+pub fn run(options: &Options, stop: &AtomicBool, beat: impl FnMut(bool)) -> Result<End, RelayError> {
+    let members = options.lab.members()?;
+    let session = net::serve(&options.listen, &options.lab.identity()?, &members.revoked())?;
+    let server = Arc::new(Server {
+        session: session.clone(),
+        instance: options.instance.clone(),
+        run: now_ns(),
+        end: AtomicBool::new(false),
+        kept: Mutex::new(VecDeque::new()),
+        paces: Mutex::new(BTreeMap::new()),
+    });
+    let (to_asked, asked) = sync_channel(ASKED);
+    net::hear(&session, &net::every_ask(), move |key, bytes| {
+        // The access rules let a certificate put under its own seat alone.
+        if let Some(seat) = key.rsplit('/').next().and_then(seat_of) {
+            let _ = to_asked.try_send(Asked {
+                seat,
+                bytes: bytes.to_vec(),
+            });
+        }
+    })?;
+    let (to_jobs, jobs) = sync_channel(JOBS);
+    let threads = [
+        spawn("records", &server, |server| streams::records(server)),
+        spawn("snapshots", &server, |server| streams::snapshots(server)),
+        spawn("again", &server, move |server| streams::jobs(server, &jobs)),
+    ];
+    println!(
+        "serving instance \"{}\" on {}",
+        options.instance.name(),
+        options.listen.join(", ")
+    );
+    let rounds = Rounds::new(Arc::clone(&server), options.lab.clone(), members, to_jobs);
+    let end = rounds.and_then(|rounds| serve(rounds, &asked, stop, beat));
+    // SYNC: see the field.
+    server.end.store(true, Ordering::Relaxed);
+    for thread in threads {
+        // A panic there was reported when it happened.
+        let _ = thread.map(std::thread::JoinHandle::join);
+    }
+    net::close(session);
+    end
+}
+
+fn serve(
+    mut rounds: Rounds,
+    asked: &Receiver<Asked>,
+    stop: &AtomicBool,
+    mut beat: impl FnMut(bool),
+) -> Result<End, RelayError> {
+    let end = loop {
+        // SYNC: set by a signal; nothing but the flag is carried.
+        if stop.load(Ordering::Relaxed) {
+            break End::Stopped;
+        }
+        if rounds.pass() {
+            break End::Revoked;
+        }
+        for request in asked.try_iter().take(ASKED) {
+            rounds.take(request.seat, &request.bytes);
+        }
+        beat(rounds.is_operated_from_the_net());
+        std::thread::sleep(PASS);
+    };
+    rounds.stop_hand_of_the_net("the relay ends");
+    // The core looks every 2 ms; the ports go with this thread's end.
+    std::thread::sleep(10 * PASS);
+    Ok(end)
+}
+
+fn spawn(
+    name: &str,
+    server: &Arc<Server>,
+    run: impl FnOnce(&Server) + Send + 'static,
+) -> Result<std::thread::JoinHandle<()>, std::io::Error> {
+    let server = Arc::clone(server);
+    std::thread::Builder::new()
+        .name(name.to_owned())
+        .spawn(move || run(&server))
+}

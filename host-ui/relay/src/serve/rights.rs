@@ -1,0 +1,79 @@
+//! What a role may ask of the core. What is not listed is refused.
+
+use crate::keys::Role;
+use stylet_shm_schema::{CommandKind, RefusalCode};
+
+/// What a request from the net needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Right {
+    /// The role alone.
+    Role,
+    /// The lease: one hand holds the needle.
+    Lease,
+}
+
+/// What `role` needs for a request of that kind; `None` where it may never make one.
+pub fn right(role: Role, kind: CommandKind) -> Option<Right> {
+    use CommandKind as K;
+    match (role, kind) {
+        (Role::Observer, _) | (_, K::Shutdown) => None,
+        // What takes force or motion away is nobody's alone.
+        (_, K::StopHand | K::Disengage | K::SaveFlight | K::Rehearse) => Some(Right::Role),
+        (Role::Instructor, K::SetParameters | K::LoadBuiltinScene | K::SetPlan) => Some(Right::Role),
+        (Role::Instructor, _) => None,
+        (Role::Operator, _) => Some(Right::Lease),
+    }
+}
+
+/// What a volume in place of the scene needs.
+pub fn right_to_upload(role: Role) -> Option<Right> {
+    right(role, CommandKind::LoadBuiltinScene)
+}
+
+/// Whether a request of a host beside the core shows that somebody operates there.
+pub fn operates(kind: CommandKind) -> bool {
+    right(Role::Operator, kind) == Some(Right::Lease)
+}
+
+/// A request that a refusal of the relay answers has no code of its own in the core's list.
+pub const REFUSED: RefusalCode = RefusalCode::TooManyRequests;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kinds() -> impl Iterator<Item = CommandKind> {
+        (0..64).filter_map(|number| CommandKind::try_from(number).ok())
+    }
+
+    #[test]
+    fn an_observer_may_ask_for_nothing_and_nobody_may_end_the_core() {
+        assert!(kinds().count() >= 17);
+        for kind in kinds() {
+            assert_eq!(right(Role::Observer, kind), None, "{kind:?}");
+        }
+        for role in [Role::Operator, Role::Instructor, Role::Observer] {
+            assert_eq!(right(role, CommandKind::Shutdown), None);
+        }
+    }
+
+    #[test]
+    fn what_moves_the_needle_needs_the_lease_and_an_instructor_never_moves_it() {
+        use CommandKind as K;
+        for kind in [
+            K::MoveHand,
+            K::DropSeed,
+            K::Engage,
+            K::Reset,
+            K::UndoSeed,
+            K::LeaveNeedle,
+            K::TakeNeedle,
+            K::DrawNeedle,
+        ] {
+            assert_eq!(right(Role::Operator, kind), Some(Right::Lease), "{kind:?}");
+            assert_eq!(right(Role::Instructor, kind), None, "{kind:?}");
+        }
+        assert_eq!(right(Role::Instructor, K::StopHand), Some(Right::Role));
+        assert_eq!(right(Role::Operator, K::StopHand), Some(Right::Role));
+    }
+}

@@ -1,0 +1,279 @@
+//! One pass of the server after the other: what the core says, who is alive, who operates, and the hand that is stopped.
+
+use super::announce::Announcements;
+use super::lease::{Held, Holder, Lease};
+use super::rights::operates;
+use super::streams::Job;
+use super::{Server, asked};
+use crate::control::{Order, Orders};
+use crate::keys::{Lab, Members, Role};
+use crate::ports::SlicesTo;
+use crate::wire::{Kind, Present, Who};
+use crate::{RelayError, now_ns};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::mpsc::SyncSender;
+use std::time::{Duration, Instant};
+use stylet_shm_schema::{Request, UploadHeader};
+
+const WHO_EVERY: Duration = Duration::from_millis(200);
+const MEMBERS_EVERY: Duration = Duration::from_millis(500);
+/// The list is read for a seat that is not in it so often at most.
+const UNKNOWN_EVERY: Duration = Duration::from_millis(20);
+/// A member that was silent for so long has left.
+const LEFT_AFTER: Duration = Duration::from_secs(2);
+/// The same refusal of a greeting is printed once in this time.
+const REFUSAL_EVERY: Duration = Duration::from_secs(10);
+/// What the server calls a host beside the core.
+const LOCAL: &str = "a window beside the core";
+
+/// A member that is connected.
+pub(super) struct Presence {
+    /// Which run and silence of the member it is.
+    pub epoch: (u64, u64),
+    pub heard: Instant,
+    pub round_trip_ns: u64,
+    pub lost: u64,
+}
+
+/// All of the server but the threads of the streams.
+pub(super) struct Rounds {
+    pub(super) server: Arc<Server>,
+    pub(super) announcements: Announcements,
+    pub(super) lease: Lease,
+    pub(super) present: BTreeMap<u16, Presence>,
+    pub(super) members: Members,
+    pub(super) jobs: SyncSender<Job>,
+    pub(super) upload: Option<SlicesTo<u8, UploadHeader>>,
+    revoked_at_start: Vec<u16>,
+    refusals: BTreeMap<u16, Instant>,
+    orders: Orders,
+    lab: Lab,
+    host_id: u64,
+    stops: u64,
+    who_sent: Instant,
+    members_read: Instant,
+    members_due: bool,
+    passed: Instant,
+}
+
+impl Rounds {
+    pub(super) fn new(
+        server: Arc<Server>,
+        lab: Lab,
+        members: Members,
+        jobs: SyncSender<Job>,
+    ) -> Result<Self, RelayError> {
+        let now = Instant::now();
+        Ok(Self {
+            announcements: Announcements::new(Arc::clone(&server)),
+            orders: Orders::listen(&server.instance)?,
+            lease: Lease::new(now),
+            present: BTreeMap::new(),
+            revoked_at_start: members.revoked(),
+            refusals: BTreeMap::new(),
+            members,
+            jobs,
+            upload: None,
+            lab,
+            // No host takes the answers to the server's own requests.
+            host_id: server.run ^ 0x5354_5954_4c45_5400,
+            stops: 0,
+            who_sent: now,
+            members_read: now,
+            members_due: false,
+            passed: now,
+            server,
+        })
+    }
+
+    /// True when somebody was revoked since the session began.
+    pub(super) fn pass(&mut self) -> bool {
+        let now = Instant::now();
+        if now - self.passed >= super::lease::SILENCE {
+            // This process stood still itself: whoever operated could not be heard.
+            self.stop_hand_of_the_net("the relay stood still");
+        }
+        self.passed = now;
+        self.announcements.pass();
+        self.watch_local_hosts(now);
+        if let Some(seat) = self.lease.silent(now) {
+            let name = self.name(seat);
+            self.stop_hand(&format!("{name} operated and is silent"));
+        }
+        self.present.retain(|_, presence| now - presence.heard < LEFT_AFTER);
+        super::lock(&self.server.paces).retain(|seat, _| self.present.contains_key(seat));
+        if self.who_sent.elapsed() >= WHO_EVERY {
+            self.who_sent = now;
+            self.announcements.send(Kind::Who, &[&self.who().to_bytes()]);
+        }
+        self.take_order(now);
+        self.read_members()
+    }
+
+    /// At once where a seat is not in the list: it may have been given a moment ago.
+    pub(super) fn read_members_for(&mut self, seat: u16) {
+        if self.members.at(seat).is_none() && self.members_read.elapsed() >= UNKNOWN_EVERY {
+            self.members_due = true;
+            self.read_members();
+        }
+    }
+
+    /// A list that cannot be read leaves the one before in force.
+    fn read_members(&mut self) -> bool {
+        if self.members_due || self.members_read.elapsed() >= MEMBERS_EVERY {
+            self.members_due = false;
+            self.members_read = Instant::now();
+            if let Ok(members) = self.lab.members() {
+                self.members = members;
+            }
+        }
+        self.members.revoked() != self.revoked_at_start
+    }
+
+    /// A hand beside the core goes before any on the net.
+    fn watch_local_hosts(&mut self, now: Instant) {
+        let Some(near) = self.announcements.near() else { return };
+        let mine = near.commands.id();
+        let mut local = false;
+        while let Ok(Some(sample)) = near.requests.receive() {
+            if sample.header().publisher_id() != mine {
+                local |= Request::decode(sample.payload()).is_ok_and(|request| operates(request.kind()));
+            }
+        }
+        if local && let Some(seat) = self.lease.local_operates(now) {
+            println!("{LOCAL} operates now, and {} no longer", self.name(seat));
+        }
+    }
+
+    pub(super) fn is_operated_from_the_net(&self) -> bool {
+        matches!(self.lease.holder(), Holder::Seat(_))
+    }
+
+    pub(super) fn stop_hand_of_the_net(&mut self, why: &str) {
+        if self.is_operated_from_the_net() {
+            self.lease.give(Holder::Nobody, Instant::now());
+            self.stop_hand(why);
+        }
+    }
+
+    fn stop_hand(&mut self, why: &str) {
+        self.stops += 1;
+        println!("the hand is stopped: {why}");
+        let command = Request::StopHand.encode(self.host_id, self.stops);
+        if let (Some(near), Ok(command)) = (self.announcements.near(), command) {
+            let _ = near.commands.send_copy(command);
+        }
+    }
+
+    /// Name and role for the log.
+    pub(super) fn name(&self, seat: u16) -> String {
+        match self.members.at(seat) {
+            Some(member) => format!("{} ({}, seat {seat})", member.name, member.role),
+            None => format!("seat {seat}, which nobody was given"),
+        }
+    }
+
+    /// Says who was refused what and why; greetings come twenty times a second and are said once in a while.
+    pub(super) fn refuse(&mut self, seat: u16, what: &str, why: &str, is_greeting: bool) {
+        let last = self.refusals.get(&seat).copied();
+        if is_greeting && last.is_some_and(|last| last.elapsed() < REFUSAL_EVERY) {
+            return;
+        }
+        if is_greeting {
+            self.refusals.insert(seat, Instant::now());
+        }
+        println!("refused: {}: {what}: {why}", self.name(seat));
+    }
+
+    pub(super) fn take(&mut self, seat: u16, bytes: &[u8]) {
+        asked::take(self, seat, bytes, now_ns());
+    }
+
+    /// Why a seat does not operate, in words.
+    pub(super) fn held_words(&self, held: Held) -> String {
+        match held {
+            Held::ByLocal => format!("{LOCAL} operates; ask there to hand over"),
+            Held::BySeat(other) => format!("{} operates; ask for the needle to be handed over", self.name(other)),
+        }
+    }
+
+    fn who(&self) -> Who {
+        let name = |seat| {
+            self.members
+                .at(seat)
+                .map_or_else(|| format!("seat {seat}"), |m| m.name.clone())
+        };
+        let present = self.present.iter().map(|(seat, presence)| Present {
+            name: name(*seat),
+            role: self.members.at(*seat).filter(|m| !m.revoked).map(|m| m.role),
+            round_trip_ms: presence.round_trip_ns as f64 * 1e-6,
+            lost: presence.lost,
+            silent_ms: presence.heard.elapsed().as_secs_f64() * 1e3,
+        });
+        Who {
+            operator: match self.lease.holder() {
+                Holder::Nobody => None,
+                Holder::Local => Some(LOCAL.to_owned()),
+                Holder::Seat(seat) => Some(name(seat)),
+            },
+            asked: self.lease.asked().map(name),
+            present: present.collect(),
+        }
+    }
+
+    /// An order from this machine: whoever sits here decides who operates.
+    fn take_order(&mut self, now: Instant) {
+        let mut given = None;
+        let who = self.who();
+        let members = self
+            .members
+            .members
+            .iter()
+            .filter(|m| self.present.contains_key(&m.seat));
+        let operators: Vec<(u16, String)> = members
+            .filter(|m| m.role == Role::Operator && !m.revoked)
+            .map(|m| (m.seat, m.name.clone()))
+            .collect();
+        self.orders.pass(|order| match order {
+            Order::Status => who.words(),
+            Order::Take => {
+                given = Some(Holder::Local);
+                "a window here operates now".to_owned()
+            }
+            Order::Release => {
+                given = Some(Holder::Nobody);
+                "the first operator who asks may operate".to_owned()
+            }
+            Order::Give(name) => match operators.iter().find(|(_, known)| *known == name) {
+                Some((seat, _)) => {
+                    given = Some(Holder::Seat(*seat));
+                    format!("{name} operates now")
+                }
+                None => format!("{name} is no operator who is connected"),
+            },
+        });
+        if let Some(to) = given {
+            self.hand_over(to, now);
+        }
+    }
+
+    /// The hand does not go on for one who has handed it over.
+    pub(super) fn hand_over(&mut self, to: Holder, now: Instant) {
+        let before = self.lease.give(to, now);
+        if before != to {
+            if let Holder::Seat(seat) = before {
+                let name = self.name(seat);
+                self.stop_hand(&format!("{name} operates no longer"));
+            }
+            println!(
+                "operates now: {}",
+                match to {
+                    Holder::Nobody => "nobody".to_owned(),
+                    Holder::Local => LOCAL.to_owned(),
+                    Holder::Seat(seat) => self.name(seat),
+                }
+            );
+        }
+    }
+}

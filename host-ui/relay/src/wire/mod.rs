@@ -1,0 +1,182 @@
+//! Messages between the two sides: a head and a payload; one encoder, one decoder that trusts no length.
+
+mod control;
+mod thin;
+
+pub use control::{Batches, Hello, Present, Who};
+pub use thin::{Displacements, MAX_THIN_BYTES, Rest, decode_snapshot, encode_snapshot};
+
+use bytemuck::{Pod, Zeroable};
+use num_enum::TryFromPrimitive;
+use stylet_shm_schema::check::Invalid;
+use stylet_shm_schema::{SCHEMA_VERSION, SceneHeader, UploadHeader};
+
+/// First word of every message: rises with the form of messages and with the schema.
+const MAGIC: u32 = u32::from_le_bytes(*b"sty\0") ^ (SCHEMA_VERSION << 24);
+
+/// What a message holds, by stable number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, TryFromPrimitive)]
+#[repr(u32)]
+pub enum Kind {
+    /// A `Session`.
+    Session = 1,
+    /// A `HapticState`.
+    State = 2,
+    /// `TickRecord`s of one batch.
+    Records = 3,
+    /// A thinned snapshot.
+    Snapshot = 4,
+    /// A `SceneHeader` and its words.
+    Scene = 5,
+    /// An `Event`.
+    Event = 6,
+    /// `ParametersInForce`.
+    Parameters = 7,
+    /// A `PlanInForce`.
+    Plan = 8,
+    /// A `Reply`.
+    Reply = 9,
+    /// A `Rehearsal`.
+    Rehearsal = 10,
+    /// Who is connected and who operates, as JSON.
+    Who = 11,
+    /// Answer to a [`Kind::Hello`]: its `sent_ns`.
+    Echo = 12,
+    /// Batches that are not kept any more: the first and the last number.
+    Missing = 13,
+    /// A member is alive; `number` is its process.
+    Hello = 20,
+    /// A `Command` of a member's host.
+    Command = 21,
+    /// An `UploadHeader` and its cells.
+    Upload = 22,
+    /// Batches to send again: the first and the last number.
+    Again = 23,
+    /// What a member asks of the lease: a word.
+    Lease = 24,
+    /// A member has had the snapshot of that number.
+    Seen = 25,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Head {
+    magic: u32,
+    kind: u32,
+    run: u64,
+    number: u64,
+    sent_ns: u64,
+    heard_ns: u64,
+}
+
+/// What stands before the payload of a message.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stamp {
+    /// Which run of the sender.
+    pub run: u64,
+    /// Rises by one within a kind of message that has numbers.
+    pub number: u64,
+    /// The sender's clock.
+    pub sent_ns: u64,
+    /// From a member: `sent_ns` of the newest message that it had from the server. It shows how late the message is, by the
+    /// server's own clock.
+    pub heard_ns: u64,
+}
+
+/// A message whose head is valid; its payload is still to be read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Message<'a> {
+    /// What the payload holds.
+    pub kind: Kind,
+    /// Run, number and times.
+    pub stamp: Stamp,
+    /// The payload.
+    pub body: &'a [u8],
+}
+
+/// The bytes of a message whose payload stands in parts.
+pub fn encode(kind: Kind, stamp: Stamp, parts: &[&[u8]]) -> Vec<u8> {
+    let head = Head {
+        magic: MAGIC,
+        kind: kind as u32,
+        run: stamp.run,
+        number: stamp.number,
+        sent_ns: stamp.sent_ns,
+        heard_ns: stamp.heard_ns,
+    };
+    let length = parts.iter().map(|part| part.len()).sum::<usize>();
+    let mut bytes = Vec::with_capacity(size_of::<Head>() + length);
+    bytes.extend_from_slice(bytemuck::bytes_of(&head));
+    parts.iter().for_each(|part| bytes.extend_from_slice(part));
+    bytes
+}
+
+/// The message in `bytes`.
+pub fn decode(bytes: &[u8]) -> Result<Message<'_>, Invalid> {
+    let (head, body) = bytes
+        .split_at_checked(size_of::<Head>())
+        .ok_or(Invalid("message without a head"))?;
+    let head: Head = bytemuck::pod_read_unaligned(head);
+    if head.magic != MAGIC {
+        return Err(Invalid("message of another version"));
+    }
+    let kind = Kind::try_from(head.kind).map_err(|_| Invalid("kind of message"))?;
+    let stamp = Stamp {
+        run: head.run,
+        number: head.number,
+        sent_ns: head.sent_ns,
+        heard_ns: head.heard_ns,
+    };
+    Ok(Message { kind, stamp, body })
+}
+
+/// A payload of one value.
+pub fn one<T: Pod>(body: &[u8]) -> Result<T, Invalid> {
+    match body.len() == size_of::<T>() {
+        true => Ok(bytemuck::pod_read_unaligned(body)),
+        false => Err(Invalid("length of a payload")),
+    }
+}
+
+/// A payload of values of one type, `most` at most.
+pub fn many<T: Pod>(body: &[u8], most: usize) -> Result<Vec<T>, Invalid> {
+    if body.len() % size_of::<T>() != 0 || body.len() / size_of::<T>() > most {
+        return Err(Invalid("length of a payload"));
+    }
+    Ok(body
+        .chunks_exact(size_of::<T>())
+        .map(bytemuck::pod_read_unaligned)
+        .collect())
+}
+
+fn headed<H: Pod, T: Pod>(body: &[u8], most: usize) -> Result<(H, Vec<T>), Invalid> {
+    let (header, rest) = body
+        .split_at_checked(size_of::<H>())
+        .ok_or(Invalid("payload without its header"))?;
+    Ok((bytemuck::pod_read_unaligned(header), many(rest, most)?))
+}
+
+/// Words of a scene at most.
+pub const MAX_SCENE_WORDS: usize = 16 << 20;
+/// Cells of an upload at most.
+pub const MAX_UPLOAD_CELLS: usize = 64 << 20;
+
+/// A scene with its words, checked.
+pub fn scene(body: &[u8]) -> Result<(SceneHeader, Vec<u32>), Invalid> {
+    let (header, words) = headed::<SceneHeader, u32>(body, MAX_SCENE_WORDS)?;
+    stylet_shm_schema::check::scene(&header, &words)?;
+    Ok((header, words))
+}
+
+/// A volume with its cells; the core checks what they mean.
+pub fn upload(body: &[u8]) -> Result<(UploadHeader, Vec<u8>), Invalid> {
+    let (header, cells) = headed::<UploadHeader, u8>(body, MAX_UPLOAD_CELLS)?;
+    let expected = header.dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(u64::from(d)));
+    match expected == Some(cells.len() as u64) && !cells.is_empty() {
+        true => Ok((header, cells)),
+        false => Err(Invalid("cells of a volume")),
+    }
+}
+
+#[cfg(test)]
+mod tests;

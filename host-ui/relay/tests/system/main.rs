@@ -1,0 +1,9 @@
+//! Whole processes: a core, a relay beside it, and relays that join under other instances of this machine, as other machines would.
+
+mod carries;
+mod faults;
+mod fixture;
+mod lease;
+mod line;
+mod proxy;
+mod rights;

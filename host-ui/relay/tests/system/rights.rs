@@ -1,0 +1,141 @@
+//! No command passes without the right to it, and each refusal says who asked what.
+
+use crate::fixture::{Host, Keys, Named, core, go, join, still_moving_m, until};
+use std::time::Duration;
+use stylet_relay::keys::{Lab, Role, Validity, write_invitation};
+use stylet_shm_schema::Request;
+
+fn hand_of(host: &mut Host) -> [f64; 3] {
+    host.state().expect("seen").tip_in_scene_m
+}
+
+#[test]
+fn an_observer_sees_and_moves_nothing_and_a_revoked_one_sees_no_longer() {
+    let (near, far) = (Named::new(), Named::new());
+    let _core = core(&near, &[]);
+    let keys = Keys::new();
+    let served = keys.serve(&near);
+    let joined = join(&keys.invite("olga", Role::Observer, Validity::days(1)), &far);
+    let mut host = Host::new(&far);
+    assert!(host.sees_the_core(Duration::from_secs(10)), "{}", joined.log());
+    let scene = host.scene.expect("seen");
+    let before = hand_of(&mut host);
+    for request in [
+        go(&scene, 0.0, 0.1),
+        Request::Engage,
+        Request::StopHand,
+        Request::Reset,
+        Request::Shutdown,
+    ] {
+        let refused = host.ask(&request).expect_err("an observer");
+        assert!(refused.contains("observer"), "{refused}");
+    }
+    assert_eq!(hand_of(&mut host), before, "the hand has moved");
+    let log = served.log();
+    for kind in ["MoveHand", "Engage", "StopHand", "Reset", "Shutdown"] {
+        let line = format!("refused: olga (observer, seat 1): {kind}");
+        assert!(log.contains(&line), "{line} is missing in {log}");
+    }
+
+    keys.lab.revoke("olga").expect("known");
+    assert!(joined.says("is not heard", Duration::from_secs(10)), "{}", served.log());
+    host.taken.clear();
+    std::thread::sleep(Duration::from_secs(2));
+    host.poll();
+    host.taken.clear();
+    host.send(&Request::StopHand);
+    std::thread::sleep(Duration::from_secs(1));
+    host.poll();
+    assert!(
+        host.taken.is_empty(),
+        "a revoked member sees {} records",
+        host.taken.len()
+    );
+    assert!(
+        !served.log().contains("StopHand: the certificate"),
+        "zenoh's rules let nothing of a closed seat through"
+    );
+}
+
+#[test]
+fn an_instructor_stops_the_hand_and_does_not_move_it() {
+    let (near, far) = (Named::new(), Named::new());
+    let _core = core(&near, &[]);
+    let keys = Keys::new();
+    let _served = keys.serve(&near);
+    let joined = join(&keys.invite("ina", Role::Instructor, Validity::days(1)), &far);
+    let (mut host, mut local) = (Host::new(&far), Host::new(&near));
+    assert!(host.sees_the_core(Duration::from_secs(10)), "{}", joined.log());
+    assert!(local.sees_the_core(Duration::from_secs(10)));
+    let scene = local.scene.expect("seen");
+    local.ask(&go(&scene, 0.0, 0.005)).expect("a hand beside the core");
+    assert!(
+        until(Duration::from_secs(5), || still_moving_m(&mut local) > 1e-4),
+        "the hand is on its way"
+    );
+    assert!(
+        host.ask(&go(&scene, 0.01, 0.1))
+            .expect_err("an instructor")
+            .contains("instructor")
+    );
+    host.ask(&Request::StopHand).expect("allowed");
+    assert!(
+        until(Duration::from_secs(3), || still_moving_m(&mut local) < 1e-6),
+        "the hand goes on"
+    );
+    host.ask(&Request::SetPlan(None)).expect("allowed");
+}
+
+/// Nothing comes to a member whose certificate is not accepted, and nothing of it passes.
+fn is_shut_out(validity: Validity, of_another_lab: bool) -> String {
+    let (near, far) = (Named::new(), Named::new());
+    let core = core(&near, &[]);
+    let keys = Keys::new();
+    let served = keys.serve(&near);
+    let path = keys.invite("eve", Role::Operator, validity);
+    if of_another_lab {
+        // The same names, signed by an authority that she made herself.
+        let folder = keys.folder.join("of-eve");
+        let own = Lab::new(&folder);
+        own.make(&["127.0.0.1".to_owned()]).expect("made");
+        let mut forged = own.invite("eve", Role::Operator, "127.0.0.1", validity).expect("made");
+        let invitation = crate::fixture::invitation(&path);
+        (forged.server, forged.authority) = (invitation.server, invitation.authority);
+        write_invitation(&path, &forged).expect("written");
+    } else {
+        // A member's program refuses by itself an invitation that has expired; this one is changed not to know.
+        let mut invitation = crate::fixture::invitation(&path);
+        invitation.until_s = i64::MAX;
+        write_invitation(&path, &invitation).expect("written");
+    }
+    let joined = join(&path, &far);
+    let mut host = Host::new(&far);
+    assert!(!host.sees_the_core(Duration::from_secs(4)), "{}", joined.log());
+    let mut local = Host::new(&near);
+    assert!(local.sees_the_core(Duration::from_secs(10)), "{}", core.log());
+    let before = hand_of(&mut local);
+    let scene = local.scene.expect("seen");
+    host.send(&go(&scene, 0.0, 0.2));
+    std::thread::sleep(Duration::from_secs(1));
+    assert_eq!(hand_of(&mut local), before, "the hand has moved");
+    let log = served.log();
+    assert!(!log.contains("connected: "), "{log}");
+    log
+}
+
+#[test]
+fn an_expired_certificate_is_refused_and_logged() {
+    let log = is_shut_out(Validity::ended(), false);
+    println!("{log}");
+    assert!(
+        log.contains("refused: a connection") && log.to_lowercase().contains("expired"),
+        "{log}"
+    );
+}
+
+#[test]
+fn a_certificate_of_ones_own_is_refused_and_logged() {
+    let log = is_shut_out(Validity::days(1), true);
+    println!("{log}");
+    assert!(log.contains("refused: a connection"), "{log}");
+}
