@@ -132,7 +132,7 @@ fn no_hand_sings_in_coupled_mode() {
                 given_j * 1e3
             ),
             met: singing == 0 && given_j <= 0.0,
-            warning: "the window says NO LINE, and that the energy account is in debt while it damps",
+            warning: "the window says NO LINE",
         });
     }
 }
