@@ -5,6 +5,7 @@ pub mod error;
 pub mod insertions;
 pub mod live;
 pub mod machine;
+pub mod own;
 pub mod patch;
 pub mod rig;
 pub mod session;

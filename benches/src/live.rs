@@ -1,8 +1,9 @@
 //! The two loops through one insertion, as a scene ships, tick by tick beside the converged solution of the same tick.
 
-use crate::error::{Field, MOVED, best_shift_m, norm};
+use crate::error::{Field, MOVED, best_shift_m, field, norm};
+use crate::own::{LATE, OwnTwin};
 use crate::session::{Session, axis_start};
-use crate::twin::{Mean, Twin, TwinSettings};
+use crate::twin::{Mean, Twin, TwinSettings, default_forces};
 use nalgebra::Vector3;
 use std::sync::Arc;
 use std::time::Instant;
@@ -11,10 +12,9 @@ use stylet_runtime::lines::LineBody;
 use stylet_runtime::rt::world::World;
 use stylet_runtime::stepped::HAPTIC_TICKS_PER_TISSUE_TICK;
 use stylet_sim::force::ForceParameters;
-use stylet_sim::force::chain::{ChainOutput, ChainParameters};
+use stylet_sim::force::chain::ChainOutput;
 use stylet_sim::limits::TissueParameters;
-use stylet_sim::line::{HandLine, LayerForces, ReadyLine, StationSettings};
-use stylet_sim::needle::NeedleParameters;
+use stylet_sim::line::{HandLine, ReadyLine, StationSettings};
 use stylet_sim::scene::{SceneSource, TissueKind};
 use stylet_sim::tissue::PackedField;
 
@@ -53,6 +53,29 @@ pub struct LiveTick {
     pub tip_n: [f64; 2],
     /// Force of tip and shaft on the hand against the way in, as it ships and converged.
     pub hand_n: [f64; 2],
+    /// ChainMail beside its own converged answer.
+    pub own: Option<OwnTick>,
+}
+
+/// ChainMail in one tick beside what it would be with nothing left to do.
+#[derive(Clone, Copy, Debug)]
+pub struct OwnTick {
+    /// Largest displacement of an element, converged.
+    pub largest_m: f64,
+    /// Distance of the elements that move from the converged ones of this tick and of those before it, RMS; of one tick alone in a large body.
+    pub late_rms_m: [f64; LATE],
+    /// The same of a converged body that was at rest before this tick.
+    pub without_history_rms_m: f64,
+    /// Force of the tip, as it ships and converged.
+    pub tip_n: [f64; 2],
+}
+
+/// What a session is compared with.
+pub struct Twins<'a> {
+    /// Finite elements.
+    pub fem: &'a mut Twin,
+    /// ChainMail's own, beside ChainMail.
+    pub own: Option<OwnTwin>,
 }
 
 /// One insertion.
@@ -123,8 +146,18 @@ impl Theatre {
         }
     }
 
-    /// The insertion: in, half a second of rest, half the way out, rest. The first round is compared with `twin`.
-    pub fn run(&self, tissue: TissueKind, line: &ReadyLine, twin: &mut Twin, rounds: usize) -> Live {
+    /// ChainMail's own converged twin of the line that ships in it, to a residual of its columns.
+    pub fn own_twin(&self, like: &HandLine, tolerance: f64) -> OwnTwin {
+        OwnTwin::of(
+            &self.source,
+            like,
+            tolerance,
+            HAPTIC_TICKS_PER_TISSUE_TICK as f64 * 1e-3,
+        )
+    }
+
+    /// The insertion: in, half a second of rest, half the way out, rest. The first round is compared with the twins.
+    pub fn run(&self, tissue: TissueKind, line: &ReadyLine, twins: &mut Twins<'_>, rounds: usize) -> Live {
         let mut live = Live {
             ticks: Vec::new(),
             haptic_us: Vec::new(),
@@ -139,7 +172,7 @@ impl Theatre {
             world.tissue.return_to_rest();
             let hand = (Hand::steady(), LinkFaults::default());
             let session = Session::on_line(world, (self.start, line.clone()), hand, ForceParameters::default());
-            let mut watch = (round == 0).then(|| Watch::new(line.hand.as_ref(), twin));
+            let mut watch = (round == 0).then(|| Watch::new(line.hand.as_ref(), twins));
             world = self.round(session, &mut live, watch.as_mut(), round);
         }
         live
@@ -173,6 +206,9 @@ impl Theatre {
                 *at += 1;
                 if let Some(watch) = &mut watch {
                     watch.step(&session, &output);
+                    if is_tissue_tick {
+                        watch.step_tissue();
+                    }
                     if is_tissue_tick && tissue % COMPARED == 0 {
                         live.ticks.extend(watch.compare(session.world()));
                     }
@@ -196,32 +232,23 @@ fn world(source: &SceneSource, tissue: TissueKind) -> World {
     World::new(scene, limits, 1).expect("can be used")
 }
 
-/// Layers' forces of the default parameters, as a run sets them.
-pub fn default_forces() -> LayerForces {
-    let parameters = ChainParameters {
-        needle: NeedleParameters::default(),
-        force: ForceParameters::default(),
-    };
-    parameters.layer_forces()
-}
-
-/// Follows the needle of a session with a copy of its line, and with the twin.
-struct Watch<'a> {
+/// Follows the needle of a session with a copy of its line, and with the twins.
+struct Watch<'a, 'b> {
     ships: HandLine,
-    twin: &'a mut Twin,
+    twins: &'a mut Twins<'b>,
     mean: Option<Mean>,
 }
 
-impl<'a> Watch<'a> {
-    fn new(ships: &HandLine, twin: &'a mut Twin) -> Self {
+impl<'a, 'b> Watch<'a, 'b> {
+    fn new(ships: &HandLine, twins: &'a mut Twins<'b>) -> Self {
         let mut ships = ships.clone();
-        for hand in [&mut ships, &mut twin.hand] {
+        for hand in [&mut ships, &mut twins.fem.hand] {
             hand.reset();
             hand.set_forces(&default_forces());
         }
         Self {
             ships,
-            twin,
+            twins,
             mean: None,
         }
     }
@@ -233,7 +260,10 @@ impl<'a> Watch<'a> {
         };
         let along_m = self.ships.along_m(&tip);
         let ships = self.ships.step(along_m, 1e-3);
-        self.twin.hand.step(along_m, 1e-3);
+        self.twins.fem.hand.step(along_m, 1e-3);
+        if let Some(own) = &mut self.twins.own {
+            own.line.hand.step(along_m, 1e-3);
+        }
         // The copy is the loop's own line, or nothing here means anything.
         let felt_n = (output.terms.membrane_n + output.terms.friction_n).z;
         assert!(
@@ -243,15 +273,42 @@ impl<'a> Watch<'a> {
         );
     }
 
+    fn step_tissue(&mut self) {
+        if let Some(own) = &mut self.twins.own {
+            own.step();
+        }
+    }
+
+    /// ChainMail beside its own answer.
+    fn compare_own(&mut self, shown: &Field) -> Option<OwnTick> {
+        let own = self.twins.own.as_mut()?;
+        let now = own.field();
+        let largest_m = now.iter().map(|&u| norm(u)).fold(0.0, f64::max);
+        let late_rms_m = std::array::from_fn(|ticks| {
+            let before = own.field_before(ticks);
+            let of = if ticks == 0 { Some(&now) } else { before };
+            of.map_or(f64::NAN, |of| rms_m(of, shown, largest_m))
+        });
+        let without_history_rms_m = rms_m(&now, &own.field_without_history(), largest_m);
+        let lines = [&self.ships, &own.line.hand];
+        Some(OwnTick {
+            largest_m,
+            late_rms_m,
+            without_history_rms_m,
+            tip_n: lines.map(|line| line.state().tip().force_n),
+        })
+    }
+
     fn compare(&mut self, world: &World) -> Option<LiveTick> {
         let body = world.tissue.deformed();
         let h = body.lattice.spacing_m;
-        let converged = self.twin.field();
+        let converged = self.twins.fem.field();
         let moved = |element: u32| body.displacement(element).map(|u| u * h);
+        let own = self.compare_own(&field(&body));
         let shown: Field = if body.lattice.element_count() == converged.len() {
             (0..converged.len() as u32).map(moved).collect()
         } else {
-            let reference = Arc::clone(&self.twin.body);
+            let reference = Arc::clone(&self.twins.fem.body);
             let mean = self.mean.get_or_insert_with(|| Mean::over(body.lattice, &reference));
             mean.of(moved)
         };
@@ -273,7 +330,7 @@ impl<'a> Watch<'a> {
             worst_m = worst_m.max(apart(there, here));
             count += 1.0;
         }
-        let lines = [&self.ships, &self.twin.hand];
+        let lines = [&self.ships, &self.twins.fem.hand];
         let state = lines.map(|line| line.state());
         Some(LiveTick {
             largest_m,
@@ -281,6 +338,17 @@ impl<'a> Watch<'a> {
             worst_m,
             tip_n: state.map(|s| s.tip().force_n),
             hand_n: state.map(|s| s.shaft_n().iter().sum::<f64>() + s.tip().force_n),
+            own,
         })
     }
+}
+
+/// Distance of two fields where the first moves, RMS.
+fn rms_m(of: &Field, shown: &Field, largest_m: f64) -> f64 {
+    let (mut square, mut count) = (0.0, 0.0_f64);
+    for (there, here) in of.iter().zip(shown).filter(|(u, _)| norm(**u) > MOVED * largest_m) {
+        square += norm([0, 1, 2].map(|a| there[a] - here[a])).powi(2);
+        count += 1.0;
+    }
+    (square / count.max(1.0)).sqrt()
 }

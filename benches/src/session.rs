@@ -172,13 +172,29 @@ impl Session {
     /// # Panics
     /// When a fault turned the force off: what is measured then is no insertion.
     pub fn step(&mut self) -> ChainOutput {
+        let output = self.step_in_any_state();
+        assert_eq!(self.fault(), 0, "the force loop raised a fault");
+        output
+    }
+
+    /// The same, faults included.
+    pub fn step_in_any_state(&mut self) -> ChainOutput {
         let output = self.loops.step();
         let bridge = &mut self.loops.bridge;
         for notices in [&mut bridge.haptic_notices, &mut bridge.tissue_notices] {
             while notices.pop().is_ok() {}
         }
-        assert_eq!(self.loops.haptic.state.fault, 0, "the force loop raised a fault");
         output
+    }
+
+    /// Number of the fault that turned the force off; 0 for none.
+    pub fn fault(&self) -> u32 {
+        self.loops.haptic.state.fault
+    }
+
+    /// Where the body is solved to, relative to what the tip's patch needs: the largest so far.
+    pub fn worst_residual(&self) -> f64 {
+        self.loops.tissue.response().worst_residual
     }
 
     /// No force of the device is larger, N.

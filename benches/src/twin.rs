@@ -2,7 +2,10 @@
 
 use crate::error::Field;
 use std::sync::Arc;
-use stylet_sim::line::{Column, Compliance, HandLine, Load, StationSettings, Stations};
+use stylet_sim::force::ForceParameters;
+use stylet_sim::force::chain::ChainParameters;
+use stylet_sim::line::{Column, Compliance, HandLine, LayerForces, Load, StationSettings, Stations};
+use stylet_sim::needle::NeedleParameters;
 use stylet_sim::scene::{Lattice, Scene};
 use stylet_sim::tissue::fem::Compiled;
 use stylet_sim::tissue::fem::batch::{BatchModel, BatchState, LOADS, NodeWeight};
@@ -62,6 +65,11 @@ impl Twin {
         }
     }
 
+    /// Displacement of every element by a newton on each shaft station, then on the tip at each, m/N.
+    pub fn columns(&self) -> &[PackedField] {
+        &self.columns
+    }
+
     /// Displacement of every element of the body by the loads of now, m.
     pub fn field(&self) -> Field {
         self.field_of(&self.hand)
@@ -114,6 +122,15 @@ fn solved<T: Compiled>(batch: &BatchModel<T>, state: &mut BatchState<T>, toleran
             return progress.residual;
         }
     }
+}
+
+/// Layers' forces of the default parameters, as a run sets them.
+pub fn default_forces() -> LayerForces {
+    let parameters = ChainParameters {
+        needle: NeedleParameters::default(),
+        force: ForceParameters::default(),
+    };
+    parameters.layer_forces()
 }
 
 /// Loads times columns and a shift of all, m.

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use stylet_anatomy::{Beyond, Surroundings};
 use stylet_benches::error::{Field, MOVED, norm};
-use stylet_benches::live::{LiveCase, Theatre, default_forces};
-use stylet_benches::twin::{self, Mean, Twin, TwinSettings};
+use stylet_benches::live::{LiveCase, Theatre};
+use stylet_benches::twin::{self, Mean, Twin, TwinSettings, default_forces};
 use stylet_sim::line::{HandLine, ReadyLine, StationSettings};
 use stylet_sim::scene::{Labels, Lattice, Role, Scene, Structure, TissueKind};
 

@@ -16,15 +16,16 @@ pub fn what_ships(text: &mut String, found: &Findings) -> std::fmt::Result {
          `pelvis`) on the body that `--tissue fem` has, behind the same law of contact, on the tip's path of that session. Field: RMS \
          distance over the elements that move, in percent of the tick's largest displacement; null models as above, in the same ticks. \
          Forces: in percent of the insertion's largest. ChainMail is compared where its elements are, in `pelvis` with the means over \
-         the elements of the finite elements.\n\n",
+         the elements of the finite elements. *Own*: ChainMail beside itself with nothing left to do in any tick: columns of its own \
+         coarser body to 1e-7, limits to 1e-4 elements in as many passes as that takes, on the same path from the same past. Finite \
+         elements are their own.\n\n",
     );
-    text.push_str("| scene | tissue | beside, mm | mm/s | elements | largest, mm | field, mean | p99 | worst | nothing moves | best shift | tip, p99 | worst | hand, p99 | worst | met |\n");
-    text.push_str("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+    text.push_str("| scene | tissue | beside, mm | mm/s | elements | largest, mm | field, mean | p99 | worst | nothing moves | best shift | tip, p99 | worst | hand, p99 | worst | own field, mean | worst | own tip, worst | met | own met |\n");
+    text.push_str("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for s in found.ships {
-        let is_met = s.field_worst_percent <= FIELD_PERCENT && s.tip_worst_percent <= TIP_PERCENT;
         writeln!(
             text,
-            "| `{}` | {} | {:.0} | {:.0} | {} | {:.1} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} | {:.2} | {:.2} | {:.2} | {:.2} | {} |",
+            "| `{}` | {} | {:.0} | {:.0} | {} | {:.1} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} | {} | {} |",
             s.scene,
             s.tissue,
             s.beside_mm,
@@ -40,7 +41,11 @@ pub fn what_ships(text: &mut String, found: &Findings) -> std::fmt::Result {
             s.tip_worst_percent,
             s.hand_p99_percent,
             s.hand_worst_percent,
-            if is_met { "yes" } else { "**no**" }
+            s.own_field_percent,
+            s.own_field_worst_percent,
+            s.own_tip_worst_percent,
+            met(s.field_worst_percent, s.tip_worst_percent),
+            met(s.own_field_worst_percent, s.own_tip_worst_percent)
         )?;
     }
     writeln!(
@@ -69,6 +74,14 @@ pub fn what_ships(text: &mut String, found: &Findings) -> std::fmt::Result {
     }
     text.push('\n');
     Ok(())
+}
+
+fn met(field_percent: f64, tip_percent: f64) -> &'static str {
+    if field_percent <= FIELD_PERCENT && tip_percent <= TIP_PERCENT {
+        "yes"
+    } else {
+        "**no**"
+    }
 }
 
 pub fn causes(text: &mut String, causes: &[Cause]) -> std::fmt::Result {

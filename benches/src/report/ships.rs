@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use std::path::Path;
-use stylet_benches::live::{Live, LiveCase, LiveTick, Theatre};
+use stylet_benches::live::{Live, LiveCase, LiveTick, OwnTick, Theatre, Twins};
 use stylet_sim::scene::TissueKind;
 
 /// One insertion in one tissue.
@@ -27,6 +27,17 @@ pub struct Ships {
     pub tip_worst_percent: f64,
     pub hand_p99_percent: f64,
     pub hand_worst_percent: f64,
+    /// Beside the model's own converged answer: as `field_*`, `tip_*`. Finite elements are their own.
+    pub own_field_percent: f64,
+    pub own_field_p99_percent: f64,
+    pub own_field_worst_percent: f64,
+    pub own_tip_p99_percent: f64,
+    pub own_tip_worst_percent: f64,
+    /// The mean beside its own converged answer of one, two and three ticks before; beside one without history: ChainMail alone.
+    pub own_late_1_percent: f64,
+    pub own_late_2_percent: f64,
+    pub own_late_3_percent: f64,
+    pub own_without_history_percent: f64,
     pub haptic_p50_us: f64,
     pub haptic_p999_us: f64,
     pub tissue_p50_us: f64,
@@ -84,11 +95,23 @@ pub fn measure(rounds: usize) -> Vec<Ships> {
         let mut twin = theatre.twin(&fem.0.hand, [CONVERGED, CONVERGED_SINGLE]);
         let chainmail = theatre.line(TissueKind::ChainMail);
         for (kind, (line, prepared_s)) in [(TissueKind::Fem, fem), (TissueKind::ChainMail, chainmail)] {
-            let live = theatre.run(kind, &line, &mut twin, rounds);
+            let own = (kind == TissueKind::ChainMail).then(|| theatre.own_twin(&line.hand, CONVERGED));
+            let mut twins = Twins { fem: &mut twin, own };
+            let live = theatre.run(kind, &line, &mut twins, rounds);
             let row = row(case, kind, &live, prepared_s, twin.residual);
             eprintln!(
-                "  {}: field {:.2} % of {:.1} mm on average, {:.2} % at worst",
-                row.tissue, row.field_percent, row.largest_mm, row.field_worst_percent
+                "  {}: field {:.2} % of {:.1} mm on average, {:.2} % at worst; beside its own {:.3} and {:.3} %, tip {:.3} %; {:.2}, {:.2}, {:.2} % by ticks before, {:.2} % by history",
+                row.tissue,
+                row.field_percent,
+                row.largest_mm,
+                row.field_worst_percent,
+                row.own_field_percent,
+                row.own_field_worst_percent,
+                row.own_tip_worst_percent,
+                row.own_late_1_percent,
+                row.own_late_2_percent,
+                row.own_late_3_percent,
+                row.own_without_history_percent
             );
             rows.push(row);
         }
@@ -109,6 +132,15 @@ fn row(case: LiveCase, kind: TissueKind, live: &Live, prepared_s: f64, twin_resi
             .collect::<Vec<_>>()
     };
     let (tip, hand) = (force(|t| t.tip_n), force(|t| t.hand_n));
+    let own: Vec<OwnTick> = ticks.iter().filter_map(|t| t.own).collect();
+    let own_share = |of: &dyn Fn(&OwnTick) -> f64| own.iter().map(|t| 100.0 * of(t) / t.largest_m).collect::<Vec<_>>();
+    let (own_field, own_tip) = if own.is_empty() {
+        (field.clone(), tip.clone())
+    } else {
+        let peak_n = own.iter().map(|t| t.tip_n[1].abs()).fold(0.0, f64::max);
+        let off = own.iter().map(|t| 100.0 * (t.tip_n[0] - t.tip_n[1]).abs() / peak_n);
+        (own_share(&|t| t.late_rms_m[0]), off.collect())
+    };
     Ships {
         scene: case.scene,
         tissue: kind.name(),
@@ -127,6 +159,15 @@ fn row(case: LiveCase, kind: TissueKind, live: &Live, prepared_s: f64, twin_resi
         tip_worst_percent: quantile(&tip, 1.0),
         hand_p99_percent: quantile(&hand, 0.99),
         hand_worst_percent: quantile(&hand, 1.0),
+        own_field_percent: mean(&own_field),
+        own_field_p99_percent: quantile(&own_field, 0.99),
+        own_field_worst_percent: quantile(&own_field, 1.0),
+        own_tip_p99_percent: quantile(&own_tip, 0.99),
+        own_tip_worst_percent: quantile(&own_tip, 1.0),
+        own_late_1_percent: mean(&own_share(&|t| t.late_rms_m[1])),
+        own_late_2_percent: mean(&own_share(&|t| t.late_rms_m[2])),
+        own_late_3_percent: mean(&own_share(&|t| t.late_rms_m[3])),
+        own_without_history_percent: mean(&own_share(&|t| t.without_history_rms_m)),
         haptic_p50_us: quantile(&live.haptic_us, 0.5),
         haptic_p999_us: quantile(&live.haptic_us, 0.999),
         tissue_p50_us: quantile(&live.tissue_us, 0.5),

@@ -111,7 +111,7 @@ impl LineBody {
         };
         let mut ready = ReadyLine::prepare(generation, &self.batch, lattice, &layer_of, line, bends, others, report)?;
         if !self.tissue.adds_columns() {
-            ready.body.carry(&self.scene.body, self.scene.is_held());
+            ready.body.answer.carry();
         }
         Ok(ready)
     }

@@ -2,9 +2,8 @@
 
 use crate::rows::{Row, keep};
 use stylet_anatomy::{Beyond, Surroundings};
-use stylet_benches::live::default_forces;
 use stylet_benches::patch::{PATCH_M, PERIOD_S, PatchTick, STRAIGHT, Way, converged, insertion};
-use stylet_benches::twin::{Twin, TwinSettings};
+use stylet_benches::twin::{Twin, TwinSettings, default_forces};
 use stylet_runtime::lines::LineBody;
 use stylet_sim::line::{HandLine, StationSettings};
 use stylet_sim::scene::{Labels, Role, Scene, SceneSource, Structure, TissueKind};

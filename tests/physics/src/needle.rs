@@ -15,6 +15,7 @@ use stylet_sim::scene::{SceneSource, TissueKind};
 mod deep;
 mod grazing;
 mod hard;
+mod off_line;
 
 const KINDS: [TissueKind; 2] = [TissueKind::ChainMail, TissueKind::Fem];
 

@@ -223,7 +223,9 @@ impl HapticLoop {
             woke_ns,
             missed,
             tissue_ns: tissue.time_ns,
-            tissue_unsolved: tissue.unsolved,
+            // Without coupling no force goes by the tissue's answer: one that lags is seen, not felt.
+            tissue_unsolved: tissue.unsolved
+                && (self.parameters.force.coupling > 0.0 || !tissue.local.displacement_m.iter().all(|u| u.is_finite())),
             engaged: self.chain.gate.engaged(),
         });
         if let Some(fault) = fault {

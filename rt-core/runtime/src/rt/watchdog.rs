@@ -26,7 +26,7 @@ pub struct Watched {
     pub missed: u32,
     /// When the newest tissue response was made.
     pub tissue_ns: u64,
-    /// The newest tissue response did not converge.
+    /// The newest tissue response did not converge, and the force goes by it.
     pub tissue_unsolved: bool,
     /// The force is on: only then do late tissue and late ticks matter.
     pub engaged: bool,

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use stylet_hw::{DeviceInfo, Sample, Wrench};
 
-use super::coupling;
+use super::coupling::{self, TissueForce};
 use super::friction::FrictionState;
 use super::gate::{self, GateInput};
 use super::law::{ForceInput, ForceTerms, force};
@@ -110,7 +110,8 @@ fn follow_path(
     state.path.front(layers, along_m)
 }
 
-/// Eq. 6 against the membrane in front; gives `u_tip` as well, 0 outside.
+/// Eq. 6 against the membrane in front; gives `u_tip` as well, 0 outside. In coupled mode the tip slips in the tissue only against
+/// the tissue's force: what slips with it would be driven by it.
 fn follow_needle(
     parameters: &ChainParameters,
     state: &mut ChainState,
@@ -129,7 +130,12 @@ fn follow_needle(
         speed_m_per_s: velocity_m_per_s.norm(),
         tip_step_m: *moved_m,
     };
-    let output = needle::step(&needle_parameters, &mut state.needle, &input);
+    let mut output = needle::step(&needle_parameters, &mut state.needle, &input);
+    let slip_m = axis * (1.0 - output.transmission) * moved_m.dot(axis);
+    if parameters.force.coupling > 0.0 && state.coupling.drives(&slip_m) {
+        // By eq. 6 alone the hand gets 1 / K_ret times what the tissue held.
+        (output.transmission, output.held_step_m) = (1.0, *moved_m);
+    }
     (output, front.map_or(0.0, |f| f.depth_m))
 }
 
@@ -145,7 +151,7 @@ fn in_tissue(
     let blend_ticks = (super::TISSUE_PERIOD_S / dt_s).round().clamp(1.0, 100.0) as u32;
     let travel_m = state.held_travel_m;
     let stiffness = parameters.force.tissue_stiffness_n_per_m;
-    let tissue_n = coupling::step(
+    let answer = coupling::step(
         &mut state.coupling,
         &touch.local,
         &travel_m,
@@ -167,9 +173,20 @@ fn in_tissue(
         phase: tip.phase,
         punctured: state.needle.punctured,
         guided: state.path.sections().first().is_some_and(|s| s.open),
-        tissue_n: tissue_n.map(|n| if state.needle.punctured { n } else { n.min(0.0) }),
+        answer: answer.map(|answer| unpulled(answer, state.needle.punctured)),
     };
     force(&parameters.force, &mut state.law, &input)
+}
+
+/// A membrane that is whole lets go of a tip that leaves it.
+fn unpulled(answer: TissueForce, is_punctured: bool) -> TissueForce {
+    if is_punctured || answer.along_n <= 0.0 {
+        return answer;
+    }
+    TissueForce {
+        along_n: 0.0,
+        stored_j: 0.0,
+    }
 }
 
 /// Outside there is only the weight; the sum says so if the sample was no number.
@@ -189,7 +206,7 @@ fn free(parameters: &ChainParameters, state: &mut ChainState, tip: &Tip) -> Forc
         phase: Phase::Outside,
         punctured: false,
         guided: false,
-        tissue_n: None,
+        answer: None,
     };
     force(&parameters.force, &mut state.law, &input)
 }

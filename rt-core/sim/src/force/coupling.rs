@@ -62,6 +62,20 @@ impl CouplingState {
     pub fn release(&mut self) {
         *self = Self::default();
     }
+
+    /// Whether the tissue's force would drive a tip that slips by `slip_m`: friction does not, so the tissue goes along instead.
+    pub fn drives(&self, slip_m: &Vector3<f64>) -> bool {
+        self.force_n.dot(slip_m) > 0.0
+    }
+}
+
+/// The tissue's answer along the path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TissueForce {
+    /// On the hand, positive inwards.
+    pub along_n: f64,
+    /// What the tissue holds along the path and may give back: half of force times displacement.
+    pub stored_j: f64,
 }
 
 /// The tissue's force on the hand now, along `axis`; `blend_ticks` is one tissue period in ticks of the caller.
@@ -72,13 +86,14 @@ pub fn step(
     stiffness_n_per_m: f64,
     axis: &Vector3<f64>,
     blend_ticks: u32,
-) -> Option<f64> {
+) -> Option<TissueForce> {
     if response.tick == 0 {
         state.release();
         return None;
     }
     let (force_n, stiffness_n_per_m) = response.linear(stiffness_n_per_m);
-    let ahead_n = force_n - (travel_m - response.travel_m) * stiffness_n_per_m;
+    let ahead_m = travel_m - response.travel_m;
+    let ahead_n = force_n - ahead_m * stiffness_n_per_m;
     if response.tick != state.answered {
         let first = state.answered == 0;
         state.answered = response.tick;
@@ -91,7 +106,11 @@ pub fn step(
     }
     state.share = (state.share - 1.0 / f64::from(blend_ticks.max(1))).max(0.0);
     state.force_n = ahead_n + state.correction_n * state.share;
-    Some(state.force_n.dot(axis))
+    let along_n = state.force_n.dot(axis);
+    Some(TissueForce {
+        along_n,
+        stored_j: 0.5 * (along_n * (response.displacement_m + ahead_m).dot(axis)).abs(),
+    })
 }
 
 #[cfg(test)]
@@ -118,7 +137,7 @@ mod tests {
                     force_n: Some(AXIS * exact(z)),
                 };
             }
-            if let Some(force) = force {
+            if let Some(TissueForce { along_n: force, .. }) = force {
                 worst = worst.max((force - exact(z)).abs());
                 longest = longest.max(before.map_or(0.0, |b: f64| (force - b).abs()));
                 before = Some(force);
@@ -145,8 +164,11 @@ mod tests {
             ..LocalResponse::default()
         };
         let mut state = CouplingState::default();
-        let force = step(&mut state, &response, &(AXIS * 1e-3), 700.0, &AXIS, 5);
-        assert!((force.unwrap() + 700.0 * 3e-3).abs() < 1e-12);
+        let force = step(&mut state, &response, &(AXIS * 1e-3), 700.0, &AXIS, 5).unwrap();
+        assert!((force.along_n + 700.0 * 3e-3).abs() < 1e-12);
+        assert!((force.stored_j - 0.5 * 700.0 * 3e-3 * 3e-3).abs() < 1e-12);
+        // Pulled back, the tissue would push the needle through itself; pushed on, it resists.
+        assert!(state.drives(&(AXIS * -1e-5)) && !state.drives(&(AXIS * 1e-5)));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use super::coupling::TissueForce;
 use super::friction::{FrictionLimits, FrictionState, friction};
 use super::parameters::ForceParameters;
 use crate::needle::{Layer, Phase};
@@ -36,8 +37,8 @@ pub struct ForceInput {
     pub punctured: bool,
     /// The tip is in the tissue proper: some membrane is open, or there is none.
     pub guided: bool,
-    /// What the deformed tissue answers at the tip, along the path on the hand; `None` where it does not say.
-    pub tissue_n: Option<f64>,
+    /// What the deformed tissue answers at the tip; `None` where it does not say.
+    pub answer: Option<TissueForce>,
 }
 
 /// The terms of eq. 8 and 9 one by one, each on the operator's hand.
@@ -104,19 +105,20 @@ pub fn force(parameters: &ForceParameters, state: &mut ForceState, input: &Force
         };
     };
     // What the tissue answers takes the place of what eq. 9 and 10 say along the path.
-    let coupling = if input.tissue_n.is_some() {
+    let coupling = if input.answer.is_some() {
         parameters.coupling
     } else {
         0.0
     };
-    let tissue_n = axis * (input.tissue_n.unwrap_or(0.0) * coupling);
+    let tissue_n = axis * (input.answer.map_or(0.0, |answer| answer.along_n) * coupling);
+    let tissue_j = input.answer.map_or(0.0, |answer| answer.stored_j) * coupling;
     let membrane_n = membrane(parameters, input, &axis) * (1.0 - coupling);
     let guide_n = guide(parameters, input, &axis);
     let elastic_n = membrane_n + tissue_n;
     let damping_n = damping(parameters, input, &axis, &elastic_n);
     let limits = friction_limits(parameters, input);
     let friction_n = shaft(&limits, &mut state.friction, input, &axis) * (1.0 - coupling);
-    let springs_j = 0.5 * (elastic_n.norm() * input.depth_m.abs() + guide_n.norm() * offset(input, &axis).norm());
+    let springs_j = 0.5 * (membrane_n.norm() * input.depth_m.abs() + guide_n.norm() * offset(input, &axis).norm());
     ForceTerms {
         membrane_n,
         guide_n,
@@ -126,7 +128,7 @@ pub fn force(parameters: &ForceParameters, state: &mut ForceState, input: &Force
         tissue_n,
         total_n: membrane_n + guide_n + damping_n + friction_n + gravity_n + tissue_n,
         torque_nm: guide_torque(parameters, input, &axis),
-        stored_j: springs_j + state.friction.stored_j(&limits),
+        stored_j: springs_j + tissue_j + state.friction.stored_j(&limits) * (1.0 - coupling),
     }
 }
 

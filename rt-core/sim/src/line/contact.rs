@@ -10,8 +10,8 @@ use super::model::LineModel;
 use super::rows::{add_scaled, dot};
 use super::state::{LineOutput, LineState};
 use super::tip::{Place, follow};
-pub(super) use forces::find_by_sets;
 use forces::solve;
+pub(super) use forces::{Neighbours, find_by_sets, sweep};
 use sets::LINE_BLOCKS;
 
 mod forces;

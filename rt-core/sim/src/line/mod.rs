@@ -44,9 +44,7 @@ pub use cross::{Cross, LineStations};
 pub use left::{LeftNeedle, LeftNeedles, LeftRecord, LeftShare, MAX_LEFT, MAX_LEFT_LOADS};
 pub use model::{LineLayer, LineModel, LineProblem, LineSettings, MAX_LAYERS, MAX_STATIONS};
 pub use prony::PronyTerm;
-pub use ready::{
-    BodyAnswer, BodyLine, BodyShare, HandLine, LayerForces, LineError, LineSource, NeedleBending, ReadyLine, Track,
-};
+pub use ready::{BodyAnswer, BodyLine, HandLine, LayerForces, LineError, LineSource, NeedleBending, ReadyLine, Track};
 pub use rows::Rows;
 pub use state::{LineOutput, LineState, TipState};
 pub use stations::{Line, StationSettings, Stations};

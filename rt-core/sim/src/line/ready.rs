@@ -24,7 +24,7 @@ mod way;
 
 use bend::Bending;
 pub use bend::NeedleBending;
-pub use body::{BodyAnswer, BodyLine, BodyShare};
+pub use body::{BodyAnswer, BodyLine};
 pub use source::LineSource;
 pub use track::Track;
 use way::{Way, layer};

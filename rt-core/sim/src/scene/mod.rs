@@ -116,11 +116,6 @@ impl Scene {
         self.tissue.most_line_elements().map(|most| self.coarser_body(most))
     }
 
-    /// Something of it never moves.
-    pub fn is_held(&self) -> bool {
-        self.structures.iter().any(|structure| structure.material.fixed)
-    }
-
     fn coarser_body(&self, most_elements: usize) -> Arc<Lattice> {
         let mut body = Arc::clone(&self.lattice);
         while body.element_count() > most_elements {

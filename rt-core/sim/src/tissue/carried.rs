@@ -1,22 +1,37 @@
 //! A displacement of the whole body that a model has on top of what its own steps do.
 
 use super::field::{add_fields, add_up};
-use super::{BodyShift, ElementField, PackedField};
+use super::{ElementField, PackedField};
 use crate::scene::{Lattice, Scene};
 use crate::simd::Simd;
 use std::sync::Arc;
 
-/// How a body is to be carried from now on.
-#[derive(Clone, Copy, Debug)]
-pub enum Carry<'a> {
+/// How a body is to be carried from now on: by what a coarser body answers to the loads of needles.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Carry<'a> {
+    /// Displacement of every element of that body, m/N, and the load of each, N.
+    pub columns: &'a [PackedField],
+    /// As many as there are columns; what has no load counts as 0.
+    pub loads_n: &'a [f64],
+    /// Displacements of that body besides, m.
+    pub fields: &'a [&'a ElementField],
+    /// How far all of it is moved besides, m.
+    pub whole_m: [f64; 3],
+}
+
+impl Carry<'_> {
     /// Not at all.
-    Not,
-    /// As one piece, on what surrounds it.
-    Shift(BodyShift),
-    /// By the answers of a coarser body, m/N, to the loads, N: something holds it, so that it cannot move as one piece.
-    Columns(&'a [PackedField], &'a [f64]),
-    /// As by `Columns`, and by fields of that body as well, m.
-    Fields(&'a [PackedField], &'a [f64], &'a [&'a ElementField]),
+    pub const NOT: Self = Carry {
+        columns: &[],
+        loads_n: &[],
+        fields: &[],
+        whole_m: [0.0; 3],
+    };
+
+    fn is_at_rest(&self) -> bool {
+        let is_loaded = !self.columns.is_empty() && self.loads_n.iter().any(|n| *n != 0.0);
+        !is_loaded && self.fields.is_empty() && self.whole_m == [0.0; 3]
+    }
 }
 
 /// How a body is carried.
@@ -25,8 +40,6 @@ pub enum Carried<'a> {
     /// Not at all.
     #[default]
     Not,
-    /// As one piece.
-    Shift(&'a BodyShift),
     /// By a field of a coarser body.
     Field(&'a CarriedField),
 }
@@ -36,23 +49,18 @@ impl Carried<'_> {
     pub fn at_m(&self, lattice: &Lattice, element: u32) -> [f64; 3] {
         match self {
             Self::Not => [0.0; 3],
-            Self::Shift(shift) => shift.at_m(lattice.rest_m(element)),
             Self::Field(field) => field.at_m(lattice, element),
         }
     }
 
     /// No element is displaced farther, m.
-    pub fn largest_m(&self, lattice: &Lattice) -> f64 {
+    pub fn largest_m(&self) -> f64 {
         match self {
             Self::Not => 0.0,
-            Self::Shift(shift) => shift.largest_m(lattice),
             Self::Field(field) => f64::from(field.largest_m),
         }
     }
 }
-
-/// Takes its displacement from no element.
-const NONE: u32 = u32::MAX;
 
 /// Displacements of a coarser body's elements, between whose centres they are interpolated. What is fixed stays.
 #[derive(Clone, Debug)]
@@ -63,8 +71,8 @@ pub struct CarriedField {
     /// The same at each cell of a box with one empty cell around the body: what is beside the body moves with it. The fourth
     /// number is empty, so that a cell is one register.
     of_cell_m: Vec<[f32; 4]>,
-    /// Element that a cell of the box takes its displacement from.
-    source: Vec<u32>,
+    /// Cells of the box that take their displacement from an element, with that element: a body may fill little of its box.
+    source: Vec<[u32; 2]>,
     /// Cells of the box along x, y, z.
     dims: [usize; 3],
     /// Where the centres of the scene's cells lie along x, y, z: the cell of the box before it, and how far to the next.
@@ -78,37 +86,43 @@ impl CarriedField {
     /// At rest; `coarse` is a coarser lattice of the scene's cells.
     pub fn new(scene: &Scene, coarse: Arc<Lattice>) -> Self {
         let dims = coarse.dims.map(|n| n + 2);
-        let source: Vec<u32> = (0..dims.iter().product())
-            .map(|at: usize| nearest(&coarse, [at % dims[0], at / dims[0] % dims[1], at / dims[0] / dims[1]]))
-            .collect();
+        let cells = dims.iter().product::<usize>();
+        let cell = |at: usize| [at % dims[0], at / dims[0] % dims[1], at / dims[0] / dims[1]];
+        let (steps, is_full) = (steps_outward(), mostly_full(&scene.lattice, &coarse));
+        let source = (0..cells).filter_map(|at| Some([at as u32, nearest(&coarse, cell(at), &steps, &is_full)?]));
         CarriedField {
             simd: Simd::detect(),
             between: [0, 1, 2].map(|a| between(&scene.lattice, &coarse, a)),
             of_element: std::array::from_fn(|_| vec![0.0; coarse.element_count()]),
-            of_cell_m: vec![[0.0; 4]; source.len()],
-            source,
+            of_cell_m: vec![[0.0; 4]; cells],
+            source: source.collect(),
             dims,
             is_fixed: scene.structures.iter().map(|s| s.material.fixed).collect(),
             largest_m: 0.0,
         }
     }
 
-    /// The sum of loads times answers; does not allocate.
-    pub fn set(&mut self, columns: &[PackedField], loads_n: &[f64]) {
-        self.set_with(columns, loads_n, &[]);
-    }
-
-    /// The same with fields besides, m; does not allocate.
-    pub fn set_with(&mut self, columns: &[PackedField], loads_n: &[f64], fields: &[&ElementField]) {
-        add_up(self.simd, columns, loads_n, 1.0, &mut self.of_element);
-        add_fields(fields, 1.0, &mut self.of_element);
+    /// The sum of loads times answers, fields and a shift; does not allocate.
+    pub fn set(&mut self, by: Carry<'_>) {
+        if by.is_at_rest() {
+            return self.clear();
+        }
+        add_up(self.simd, by.columns, by.loads_n, 1.0, &mut self.of_element);
+        add_fields(by.fields, 1.0, &mut self.of_element);
+        for (axis, whole_m) in self.of_element.iter_mut().zip(by.whole_m) {
+            // Most often there is none.
+            if whole_m != 0.0 {
+                axis.iter_mut().for_each(|u| *u += whole_m as f32);
+            }
+        }
         self.spread();
     }
 
-    /// At rest; does not allocate.
-    pub fn clear(&mut self) {
-        self.of_element.iter_mut().for_each(|axis| axis.fill(0.0));
-        self.spread();
+    fn clear(&mut self) {
+        if !self.is_at_rest() {
+            self.of_element.iter_mut().for_each(|axis| axis.fill(0.0));
+            self.spread();
+        }
     }
 
     /// Nothing is displaced by it.
@@ -119,10 +133,13 @@ impl CarriedField {
     fn spread(&mut self) {
         let [x, y, z] = &self.of_element;
         let mut largest = 0.0_f32;
-        for (cell, &source) in self.of_cell_m.iter_mut().zip(&self.source) {
-            let at = |axis: &Vec<f32>| axis.get(source as usize).copied().unwrap_or(0.0);
-            *cell = [at(x), at(y), at(z), 0.0];
-            let square = cell.iter().map(|c| c * c).sum::<f32>();
+        for &[cell, element] in &self.source {
+            let at = |axis: &Vec<f32>| axis.get(element as usize).copied().unwrap_or(0.0);
+            let moved_m = [at(x), at(y), at(z), 0.0];
+            if let Some(slot) = self.of_cell_m.get_mut(cell as usize) {
+                *slot = moved_m;
+            }
+            let square = moved_m.iter().map(|c| c * c).sum::<f32>();
             // What is no number stays, so that nobody takes the answer for one.
             largest = if square <= largest { largest } else { square };
         }
@@ -201,15 +218,42 @@ fn between(lattice: &Lattice, coarse: &Lattice, axis: usize) -> Vec<(u32, f32)> 
         .collect()
 }
 
-/// The element of a cell of the box, or else one of a neighbouring cell: first over faces, then edges, then corners.
-fn nearest(coarse: &Lattice, cell: [usize; 3]) -> u32 {
-    let mut steps: Vec<[i64; 3]> = (0..27).map(|n| [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1]).collect();
-    steps.sort_by_key(|step| step.iter().map(|c| c.abs()).sum::<i64>());
+/// The element of a cell of the box, or else one of the neighbouring cells, in the order of `steps`; one that is mostly full where there is
+/// one: an element that is not is as soft as it is empty, and at the rim moves farther than what it holds.
+fn nearest(coarse: &Lattice, cell: [usize; 3], steps: &[[i64; 3]; 27], is_full: &[bool]) -> Option<u32> {
     let element = |step: &[i64; 3]| {
         let [i, j, k] = [0, 1, 2].map(|a| usize::try_from(cell[a] as i64 - 1 + step[a]).ok());
         coarse.element_of_cell(i?, j?, k?)
     };
-    steps.iter().find_map(element).unwrap_or(NONE)
+    let full = |e: &u32| is_full.get(*e as usize).copied().unwrap_or(false);
+    let mut around = steps.iter().filter_map(element);
+    let first = around.next()?;
+    if full(&first) {
+        return Some(first);
+    }
+    around.find(full).or(Some(first))
+}
+
+/// By element of the coarser body, whether more than half of it is cells of the scene.
+fn mostly_full(lattice: &Lattice, coarse: &Lattice) -> Vec<bool> {
+    let per_edge = (coarse.spacing_m / lattice.spacing_m).round().max(1.0) as usize;
+    let mut cells = vec![0_usize; coarse.element_count()];
+    for element in 0..lattice.element_count() as u32 {
+        let [i, j, k] = lattice.cell(element).map(|c| c / per_edge);
+        if let Some(of) = coarse.element_of_cell(i, j, k)
+            && let Some(count) = cells.get_mut(of as usize)
+        {
+            *count += 1;
+        }
+    }
+    cells.into_iter().map(|count| 2 * count > per_edge.pow(3)).collect()
+}
+
+/// To the cell itself, then over its faces, edges and corners.
+fn steps_outward() -> [[i64; 3]; 27] {
+    let mut steps = std::array::from_fn(|n| n as i64).map(|n| [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1]);
+    steps.sort_by_key(|step: &[i64; 3]| step.iter().map(|c| c.abs()).sum::<i64>());
+    steps
 }
 
 #[cfg(test)]

@@ -36,7 +36,6 @@ mod field;
 mod fold;
 mod model;
 mod point;
-mod shift;
 mod violation;
 
 pub use ahead::element_ahead;
@@ -49,5 +48,4 @@ pub(crate) use field::{add_fields, add_up};
 pub use fold::least_corner;
 pub use model::{Held, HeldOutcome, REACH, Solve, StepReport, TissueModel};
 pub use point::MaterialPoint;
-pub use shift::BodyShift;
 pub use violation::largest_violation;

@@ -74,8 +74,11 @@ fn session(mut world: Box<World>, hand: Hand, late_ticks: usize, rest_m: f64) ->
     let (excess_j, bound_j) = excess(&ticks, 0.0);
     let case = Case {
         name: format!(
-            "{} kg, {} N s/m, {} N/m, {late_ticks} late",
-            hand.mass_kg, hand.damping_n_s_per_m, hand.stiffness_n_per_m
+            "{:.0} mm, {} kg, {} N s/m, {} N/m, {late_ticks} late",
+            rest_m * 1e3,
+            hand.mass_kg,
+            hand.damping_n_s_per_m,
+            hand.stiffness_n_per_m
         ),
         early_m,
         late_m,
@@ -106,6 +109,14 @@ fn no_hand_sings_in_coupled_mode() {
                 }
             }
         }
+        for case in all.iter().filter(|case| case.sings()) {
+            println!(
+                "sings: {}, {:.3} then {:.3} mm",
+                case.name,
+                case.early_m * 1e3,
+                case.late_m * 1e3
+            );
+        }
         let singing = all.iter().filter(|case| case.sings()).count();
         let (late_m, where_late) = worst(&all, |c| c.late_m);
         let (given_j, where_given) = worst(&all, |c| c.excess_j - c.bound_j);
@@ -121,7 +132,7 @@ fn no_hand_sings_in_coupled_mode() {
                 given_j * 1e3
             ),
             met: singing == 0 && given_j <= 0.0,
-            warning: "the window says NO LINE, and that the energy account is in debt while it damps",
+            warning: "the window says NO LINE",
         });
     }
 }

@@ -3,7 +3,7 @@
 use super::TissueLoop;
 use crate::rt::left_loads::NeedleLoads;
 use stylet_sim::line::{BodyAnswer, BodyLine, MAX_LEFT};
-use stylet_sim::tissue::{BodyShift, Carry, ElementField, StepReport};
+use stylet_sim::tissue::{Carry, ElementField, StepReport};
 
 /// One that stays in: its columns, and the loads that its share of the body's displacement was made from.
 pub(super) struct LeftBody {
@@ -44,7 +44,6 @@ impl TissueLoop {
         let count = self.left.len().max(1) as u64;
         let due = (self.response.tick % count) as usize;
         for (n, left) in self.left.iter_mut().enumerate() {
-            let is_due = n == due || matches!(left.line.answer, BodyAnswer::Shifts(_));
             let loads = loads
                 .left
                 .needles()
@@ -52,7 +51,7 @@ impl TissueLoop {
                 .find(|n| n.generation == left.line.generation);
             if let Some(loads) = loads {
                 left.used.tip_m = loads.tip_m;
-                if is_due {
+                if n == due {
                     left.stay(loads);
                 }
             }
@@ -71,7 +70,7 @@ impl TissueLoop {
             self.free(line);
         }
         if self.left.is_empty() {
-            self.world.tissue.carry(Carry::Not);
+            self.world.tissue.carry(Carry::NOT);
         }
     }
 
@@ -118,24 +117,11 @@ impl TissueLoop {
         let none = ElementField::default();
         let mut fields = [&none; MAX_LEFT];
         for (slot, left) in fields.iter_mut().zip(&left) {
-            *slot = &left.line.share.field;
+            *slot = &left.line.share;
         }
         let result = then(self, fields.get(..left.len()).unwrap_or(&[]));
         self.left = left;
         result
-    }
-
-    /// The motion of the body as a whole by them.
-    pub(super) fn left_shift(&self) -> BodyShift {
-        let mut sum = BodyShift::default();
-        for left in &self.left {
-            let shift = &left.line.share.shift;
-            for axis in 0..3 {
-                sum.shift_m[axis] += shift.shift_m[axis];
-                sum.turn_rad[axis] += shift.turn_rad[axis];
-            }
-        }
-        sum
     }
 
     /// The step of a tick in which no needle moves on a line.
@@ -150,13 +136,8 @@ impl TissueLoop {
                 let report = tissue.add(fields);
                 report.unwrap_or_else(|| tissue.step(None, this.period_s))
             }),
-            BodyAnswer::Shifts(_) => {
-                let shift = self.left_shift();
-                self.world.tissue.carry(Carry::Shift(shift));
-                self.world.tissue.step(self.held, self.period_s)
-            }
             BodyAnswer::Carrying(_) => self.with_left(|this, fields| {
-                this.world.tissue.carry(Carry::Fields(&[], &[], fields));
+                this.world.tissue.carry(Carry { fields, ..Carry::NOT });
                 this.world.tissue.step(this.held, this.period_s)
             }),
         }

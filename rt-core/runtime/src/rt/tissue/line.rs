@@ -1,12 +1,12 @@
-//! The tissue tick while the needle is on a prepared line: the body is the sum of the line's loads times its columns, or moves as a
-//! whole by them while the tip holds what it presses on.
+//! The tissue tick while the needle is on a prepared line: the body is the sum of the line's loads times its columns, or is carried
+//! by that of a coarser body while the tip holds what it presses on.
 
 use super::TissueLoop;
 use crate::rt::exchange::Notice;
 use crate::rt::line_loads::{BentTip, LineLoads};
 use nalgebra::Vector3;
 use stylet_sim::line::{BodyAnswer, BodyLine, Line};
-use stylet_sim::tissue::{BodyShift, Carry, Held, MaterialPoint, StepReport};
+use stylet_sim::tissue::{Carry, Held, MaterialPoint, StepReport};
 
 impl TissueLoop {
     /// Takes up the columns of a new line; the old ones go back to be freed.
@@ -54,30 +54,24 @@ impl TissueLoop {
                     false => self.with_left(|this, fields| this.world.tissue.add(fields)),
                 }
             }
-            BodyAnswer::Shifts(shifts) => {
-                let mut shift = BodyShift::sum(shifts, loads.loads_n());
-                if !self.left.is_empty() {
-                    let by_left = self.left_shift();
-                    for axis in 0..3 {
-                        shift.shift_m[axis] += by_left.shift_m[axis];
-                        shift.turn_rad[axis] += by_left.turn_rad[axis];
-                    }
-                }
-                for (sum, whole_m) in shift.shift_m.iter_mut().zip(whole_m) {
-                    *sum += whole_m;
-                }
-                self.world.tissue.carry(Carry::Shift(shift));
-                let held = self.held_on_line(&axis, &loads);
-                Some(self.world.tissue.step(held, self.period_s))
-            }
             BodyAnswer::Carrying(columns) => {
-                match self.left.is_empty() {
-                    true => self.world.tissue.carry(Carry::Columns(columns, loads.loads_n())),
-                    false => self.with_left(|this, fields| {
-                        this.world.tissue.carry(Carry::Fields(columns, loads.loads_n(), fields));
-                    }),
-                }
                 let held = self.held_on_line(&axis, &loads);
+                // A tip that has come out on the far side is in no element: what the line's end still has of its load moves nothing.
+                let stations = loads.loads_n().len().saturating_sub(2 * loads.across) / 2;
+                let loads_n = match held {
+                    Some(_) => loads.loads_n(),
+                    None => loads.loads_n().get(..stations).unwrap_or(&[]),
+                };
+                let by = Carry {
+                    columns,
+                    loads_n,
+                    whole_m,
+                    fields: &[],
+                };
+                match self.left.is_empty() {
+                    true => self.world.tissue.carry(by),
+                    false => self.with_left(|this, fields| this.world.tissue.carry(Carry { fields, ..by })),
+                }
                 Some(self.world.tissue.step(held, self.period_s))
             }
         };
@@ -122,7 +116,7 @@ impl TissueLoop {
         if std::mem::take(&mut self.in_by_line) {
             // Those that stay in go on carrying the body.
             if self.left.is_empty() {
-                self.world.tissue.carry(Carry::Not);
+                self.world.tissue.carry(Carry::NOT);
             }
             let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
             self.notify(Notice::LeftTissue { tick, time_ns });

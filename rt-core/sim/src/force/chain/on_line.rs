@@ -73,7 +73,7 @@ pub fn step_on_line(
         phase,
         punctured: state.needle.punctured,
         guided: is_in && answer.tip_material_m > 0.0,
-        tissue_n: None,
+        answer: None,
     };
     let (bone_n, bone_j) = line.bone(along_m);
     let bent = line.bend(&tip, &sample.world_from_tool, &answer);

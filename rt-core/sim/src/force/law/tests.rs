@@ -24,7 +24,7 @@ fn input(depth_m: f64, punctured: bool, phase: Phase) -> ForceInput {
         phase,
         punctured,
         guided: punctured,
-        tissue_n: None,
+        answer: None,
     }
 }
 
@@ -180,7 +180,10 @@ fn coupled_the_tissue_answers_for_membrane_and_friction_and_for_nothing_else() {
     let mut at = input(0.02, true, Phase::Penetration);
     at.tip_in_world.x = 2e-3;
     at.velocity_m_per_s = Vector3::z() * 0.02;
-    at.tissue_n = Some(-3.0);
+    at.answer = Some(TissueForce {
+        along_n: -3.0,
+        stored_j: 6e-3,
+    });
     let terms = force(&coupled, &mut ForceState::default(), &at);
     let alone = fresh(&at);
     assert_eq!(
@@ -189,8 +192,14 @@ fn coupled_the_tissue_answers_for_membrane_and_friction_and_for_nothing_else() {
     );
     assert_eq!((terms.guide_n, terms.damping_n), (alone.guide_n, alone.damping_n));
     assert_eq!(terms.tissue_n, Vector3::z() * -3.0);
+    // What the tissue holds, and the guide's spring.
+    assert!(
+        (terms.stored_j - 6e-3 - 0.5 * 400.0 * 2e-3 * 2e-3).abs() < 1e-12,
+        "{}",
+        terms.stored_j
+    );
     // Without an answer eq. 8-10 stand.
-    at.tissue_n = None;
+    at.answer = None;
     assert_eq!(force(&coupled, &mut ForceState::default(), &at).total_n, alone.total_n);
 }
 

@@ -62,7 +62,7 @@ fn solve_by_sets(
         ..Tip::default()
     };
     scratch.products = 0;
-    let is_found = sets::find(model.simd, &model.compliance.rows, scratch);
+    let is_found = sets::find(model.simd, &model.compliance.rows, None, scratch);
     let found = scratch.force_n.numbers().iter().zip(scratch.high_n.numbers());
     for (to, (force, &limit)) in state.shaft_n[..count].iter_mut().zip(found) {
         *to = force.max(-limit).min(limit);
@@ -76,8 +76,13 @@ fn solve_by_sets(
 }
 
 /// [`sets::find`], for a tick beside other needles.
-pub(in crate::line) fn find_by_sets<const B: usize>(simd: Simd, rows: &Rows, scratch: &mut sets::Scratch<B>) -> bool {
-    sets::find(simd, rows, scratch)
+pub(in crate::line) fn find_by_sets<const B: usize>(
+    simd: Simd,
+    rows: &Rows,
+    inverse: Option<&Rows>,
+    scratch: &mut sets::Scratch<B>,
+) -> bool {
+    sets::find(simd, rows, inverse, scratch)
 }
 
 vectorised! {
@@ -90,18 +95,38 @@ vectorised! {
         slowness: f64,
         output: &mut LineOutput,
     ) {
-        sweep(model, state, tip_m, tip_limit_n, slowness, output)
+        sweep(model, state, (tip_m, tip_limit_n, slowness), &mut (), output)
     }
 }
 
-/// Forces of shaft and tip by projected Gauss-Seidel.
+/// What shares the sweeps of a needle: nothing, or needles that stay in.
+pub(in crate::line) trait Neighbours {
+    /// The force of a station of the shaft has changed.
+    fn feel_shaft(&mut self, n: usize, change_n: f64);
+    /// The tip's has.
+    fn feel_tip(&mut self, change_n: f64);
+    /// Corrects its own forces, and adds what that moves of the stations and the tip; returns the largest correction.
+    fn sweep(&mut self, is_backwards: bool, u_m: &mut [f64], tip_u_m: &mut f64) -> f64;
+}
+
+impl Neighbours for () {
+    #[inline(always)]
+    fn feel_shaft(&mut self, _n: usize, _change_n: f64) {}
+    #[inline(always)]
+    fn feel_tip(&mut self, _change_n: f64) {}
+    #[inline(always)]
+    fn sweep(&mut self, _is_backwards: bool, _u_m: &mut [f64], _tip_u_m: &mut f64) -> f64 {
+        0.0
+    }
+}
+
+/// Forces of shaft, tip and neighbours by projected Gauss-Seidel. Slowness is a rate term over the time of a tick.
 #[inline(always)]
-fn sweep(
+pub(in crate::line) fn sweep(
     model: &LineModel,
     state: &mut LineState,
-    tip_m: f64,
-    tip_limit_n: f64,
-    slowness: f64,
+    (tip_m, tip_limit_n, slowness): (f64, f64, f64),
+    neighbours: &mut impl Neighbours,
     output: &mut LineOutput,
 ) {
     let rows = &model.compliance.rows;
@@ -119,9 +144,10 @@ fn sweep(
     let (mut tip_n, mut tip_u_m) = (state.tip.force_n, state.tip_u_m);
     let tip_gain = gain * state.tip_own;
     for sweep in 0..model.settings.sweeps {
+        let is_backwards = sweep % 2 == 0;
         let mut largest_m = 0.0_f64;
         for step in 0..count {
-            let n = if sweep % 2 == 0 { count - 1 - step } else { step };
+            let n = if is_backwards { count - 1 - step } else { step };
             let row = &rows.row(n)[..count];
             let own = gain * row[n];
             let limit = limit_n(model, place_m, n);
@@ -138,6 +164,7 @@ fn sweep(
                 shaft_n[n] = wanted;
                 add_scaled(gain * change, row, u_m);
                 tip_u_m += gain * change * tip_column[n];
+                neighbours.feel_shaft(n, change);
                 largest_m = largest_m.max((change * own).abs());
             }
         }
@@ -148,9 +175,11 @@ fn sweep(
                 tip_n = wanted;
                 add_scaled(gain * change, tip_column, u_m);
                 tip_u_m += tip_gain * change;
+                neighbours.feel_tip(change);
                 largest_m = largest_m.max((change * tip_gain).abs());
             }
         }
+        largest_m = largest_m.max(neighbours.sweep(is_backwards, u_m, &mut tip_u_m));
         output.sweeps += 1;
         output.residual_m = largest_m;
         if largest_m <= model.settings.tolerance_m {

@@ -8,7 +8,10 @@
 use super::super::model::MAX_STATIONS;
 use super::super::rows::Rows;
 use crate::simd::{LANES, Vector, in_vectors};
+use gradients::{Of, add, answer, hold, places, product};
 use stylet_shm_schema::MAX_LEFT_NEEDLES;
+
+mod gradients;
 
 /// Sets that are tried before the sweeps take over.
 const MOST_SETS: u32 = 10;
@@ -90,6 +93,8 @@ pub(in crate::line) struct Scratch<const B: usize> {
     bounded_n: Each<B>,
     change_n: Each<B>,
     left_m: Each<B>,
+    /// About the forces that take away what is left.
+    near_n: Each<B>,
     along_n: Each<B>,
     moved_m: Each<B>,
 }
@@ -115,6 +120,7 @@ impl<const B: usize> Scratch<B> {
             bounded_n: Each::ZEROS,
             change_n: Each::ZEROS,
             left_m: Each::ZEROS,
+            near_n: Each::ZEROS,
             along_n: Each::ZEROS,
             moved_m: Each::ZEROS,
         }
@@ -127,8 +133,9 @@ impl<const B: usize> Scratch<B> {
 }
 
 in_vectors! {
-/// Finds the forces from those of the last solution; returns whether they are within the tolerance.
-fn find<V: Vector<f64>, const B: usize>(rows: &Rows, scratch: &mut Scratch<B>) -> bool {
+/// Finds the forces from those of the last solution; returns whether they are within the tolerance. `inverse` is that of the compliance
+/// of the first so many stations: of needles that stay in, most of whose stations stick in every set.
+fn find<V: Vector<f64>, const B: usize>(rows: &Rows, inverse: Option<&Rows>, scratch: &mut Scratch<B>) -> bool {
     let (count, gain) = (scratch.count, scratch.gain);
     scratch.own_m_per_n.set(count, (0..count).map(|n| gain * rows.row(n).get(n).copied().unwrap_or(1.0)));
     scratch.n_per_own_m.set(count, scratch.own_m_per_n.numbers().iter().map(|own| 1.0 / own));
@@ -139,7 +146,7 @@ fn find<V: Vector<f64>, const B: usize>(rows: &Rows, scratch: &mut Scratch<B>) -
         if is_found {
             return true;
         }
-        hold::<V, B>(rows, scratch);
+        hold::<V, B>(rows, inverse, scratch);
     }
     choose(scratch);
     to_limits::<V, B>(rows, scratch);
@@ -197,17 +204,6 @@ fn choose<const B: usize>(scratch: &mut Scratch<B>) {
     }
 }
 
-/// The stations whose number is not zero.
-#[inline(always)]
-fn places<const B: usize>(numbers: &Each<B>, count: usize, places: &mut [u16; MOST]) -> usize {
-    let mut at = 0;
-    for (n, number) in numbers.numbers().iter().enumerate().take(count) {
-        places[at] = n as u16;
-        at += usize::from(*number != 0.0);
-    }
-    at
-}
-
 /// Gives those that do not stick the force they have then, and adds what that moves.
 #[inline(always)]
 fn to_limits<V: Vector<f64>, const B: usize>(rows: &Rows, scratch: &mut Scratch<B>) {
@@ -228,153 +224,4 @@ fn to_limits<V: Vector<f64>, const B: usize>(rows: &Rows, scratch: &mut Scratch<
     }
     scratch.tip.u_m += tip;
     scratch.products += 1;
-}
-
-/// Conjugate gradients for the forces with which those that stick do not move.
-#[inline(always)]
-fn hold<V: Vector<f64>, const B: usize>(rows: &Rows, scratch: &mut Scratch<B>) {
-    let blocks = scratch.blocks();
-    let mut at = [0; MOST];
-    let count = places(&scratch.sticks, scratch.count, &mut at);
-    let mut sum = V::splat(0.0);
-    for b in 0..blocks {
-        let gap = V::load(&scratch.stuck_m.0[b]).sub(V::load(&scratch.u_m.0[b]));
-        let gap = gap.mul(V::load(&scratch.sticks.0[b]));
-        gap.store(&mut scratch.left_m.0[b]);
-        gap.store(&mut scratch.along_n.0[b]);
-        sum = sum.add(gap.mul(gap));
-    }
-    let tip_sticks = scratch.tip.sticks;
-    let mut tip_left = tip_sticks * (scratch.tip.stuck_m - scratch.tip.u_m);
-    let mut tip_along = tip_left;
-    let mut square = total(sum) + tip_left * tip_left;
-    let enough = WITHIN * scratch.tolerance_m * WITHIN * scratch.tolerance_m;
-    for _ in 0..MOST_PRODUCTS {
-        if square <= enough {
-            break;
-        }
-        let tip_moved = answer::<V, B>(rows, scratch, &at[..count], Of::Along, tip_along);
-        let mut sum = V::splat(0.0);
-        for b in 0..blocks {
-            sum = sum.add(V::load(&scratch.along_n.0[b]).mul(V::load(&scratch.moved_m.0[b])));
-        }
-        let length = square / (total(sum) + tip_along * tip_moved);
-        if !(length.is_finite() && length > 0.0) {
-            break;
-        }
-        let mut sum = V::splat(0.0);
-        for b in 0..blocks {
-            add::<V>(&mut scratch.force_n.0[b], length, &scratch.along_n.0[b]);
-            add::<V>(&mut scratch.u_m.0[b], length, &scratch.moved_m.0[b]);
-            let by = V::load(&scratch.moved_m.0[b]).mul(V::load(&scratch.sticks.0[b]));
-            let gap = V::load(&scratch.left_m.0[b]).sub(V::splat(length).mul(by));
-            gap.store(&mut scratch.left_m.0[b]);
-            sum = sum.add(gap.mul(gap));
-        }
-        scratch.tip.force_n += length * tip_along;
-        scratch.tip.u_m += length * tip_moved;
-        tip_left -= tip_sticks * length * tip_moved;
-        let before = square;
-        square = total(sum) + tip_left * tip_left;
-        let keep = square / before;
-        for b in 0..blocks {
-            let next = V::load(&scratch.left_m.0[b]).add(V::splat(keep).mul(V::load(&scratch.along_n.0[b])));
-            next.store(&mut scratch.along_n.0[b]);
-        }
-        tip_along = tip_left + keep * tip_along;
-        scratch.products += 1;
-    }
-}
-
-/// Which forces [`answer`] is asked for.
-#[derive(Clone, Copy, PartialEq)]
-enum Of {
-    Changes,
-    Along,
-}
-
-/// Displacement `moved_m` for forces of some stations, by number, and of the tip; returns that of the tip.
-#[inline(always)]
-fn answer<V: Vector<f64>, const B: usize>(
-    rows: &Rows,
-    scratch: &mut Scratch<B>,
-    places: &[u16],
-    of: Of,
-    tip_n: f64,
-) -> f64 {
-    let blocks = scratch.blocks();
-    let force_n = match of {
-        Of::Changes => &scratch.change_n,
-        Of::Along => &scratch.along_n,
-    };
-    product::<V, B>(rows, blocks, places, force_n.numbers(), &mut scratch.moved_m);
-    let mut sum = V::splat(0.0);
-    for b in 0..blocks {
-        let column = V::load(&scratch.column.0[b]);
-        let u = V::load(&scratch.moved_m.0[b]).add(V::splat(tip_n).mul(column));
-        u.mul(V::splat(scratch.gain)).store(&mut scratch.moved_m.0[b]);
-        sum = sum.add(column.mul(V::load(&force_n.0[b])));
-    }
-    scratch.gain * (total(sum) + scratch.tip.own_m_per_n * tip_n)
-}
-
-/// Sum of the rows of some stations times their numbers, in the first so many blocks.
-#[inline(always)]
-fn product<V: Vector<f64>, const B: usize>(
-    rows: &Rows,
-    blocks: usize,
-    places: &[u16],
-    numbers: &[f64],
-    sums: &mut Each<B>,
-) {
-    let mut b = 0;
-    // As many blocks at once as there are registers for: no sum waits for the one before it.
-    while b + 5 <= blocks {
-        part::<V, B, 5>(rows, places, numbers, b, sums);
-        b += 5;
-    }
-    match blocks - b {
-        4 => part::<V, B, 4>(rows, places, numbers, b, sums),
-        3 => part::<V, B, 3>(rows, places, numbers, b, sums),
-        2 => part::<V, B, 2>(rows, places, numbers, b, sums),
-        1 => part::<V, B, 1>(rows, places, numbers, b, sums),
-        _ => {}
-    }
-}
-
-#[inline(always)]
-fn part<V: Vector<f64>, const B: usize, const N: usize>(
-    rows: &Rows,
-    places: &[u16],
-    numbers: &[f64],
-    from: usize,
-    sums: &mut Each<B>,
-) {
-    let mut sum = [V::splat(0.0); N];
-    for &place in places {
-        let row = rows.blocks(place as usize);
-        let (Some(row), Some(&number)) = (row.get(from..from + N), numbers.get(place as usize)) else {
-            continue;
-        };
-        let number = V::splat(number);
-        for n in 0..N {
-            sum[n] = sum[n].add(number.mul(V::load(&row[n])));
-        }
-    }
-    for (sum, to) in sum.into_iter().zip(&mut sums.0[from..from + N]) {
-        sum.store(to);
-    }
-}
-
-#[inline(always)]
-fn add<V: Vector<f64>>(to: &mut [f64; LANES], length: f64, along: &[f64; LANES]) {
-    V::load(to).add(V::splat(length).mul(V::load(along))).store(to);
-}
-
-#[inline(always)]
-fn total<V: Vector<f64>>(sums: V) -> f64 {
-    let mut each = [0.0; LANES];
-    sums.store(&mut each);
-    let [a, b, c, d, e, f, g, h] = each;
-    ((a + b) + (c + d)) + ((e + f) + (g + h))
 }

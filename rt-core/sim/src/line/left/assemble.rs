@@ -4,6 +4,8 @@ use super::{LeftNeedle, LeftNeedles};
 use crate::line::cross::Cross;
 use crate::line::model::MAX_STATIONS;
 use crate::line::ready::HandLine;
+use crate::line::rows::{Rows, add_scaled};
+use crate::simd::{Simd, vectorised};
 
 /// What joins two lines, from either side.
 #[derive(Clone, Copy)]
@@ -75,8 +77,23 @@ impl LeftNeedles {
                 }
             }
         }
+        self.invert();
         self.join(moving);
         self.limit();
+    }
+
+    fn invert(&mut self) {
+        let count = self.count;
+        if !self.inverse.begin(count) {
+            return;
+        }
+        for k in 0..count {
+            let own = &self.own[k * self.stride..k * self.stride + count];
+            self.inverse.row_mut(k)[..count].copy_from_slice(own);
+        }
+        if !invert(self.simd, &mut self.inverse, &mut self.pivot) {
+            self.inverse.begin(0);
+        }
     }
 
     fn join(&mut self, moving: Option<&HandLine>) {
@@ -115,5 +132,58 @@ impl LeftNeedles {
                 }
             }
         }
+    }
+}
+
+vectorised! {
+    /// A symmetric, positive definite matrix becomes its inverse, by elimination; false, and nothing to be used, where it is none.
+    fn invert(rows: &mut Rows, pivot: &mut [f64]) -> bool {
+        let size = rows.size();
+        let pivot = &mut pivot[..size];
+        for k in 0..size {
+            pivot.copy_from_slice(&rows.row(k)[..size]);
+            if !(pivot[k] > 0.0 && pivot[k].is_finite()) {
+                return false;
+            }
+            let by = 1.0 / pivot[k];
+            pivot.iter_mut().for_each(|entry| *entry *= by);
+            pivot[k] = by;
+            for i in 0..size {
+                let row = &mut rows.row_mut(i)[..size];
+                if i == k {
+                    row.copy_from_slice(pivot);
+                    continue;
+                }
+                let factor = std::mem::take(&mut row[k]);
+                add_scaled(-factor, pivot, row);
+            }
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_inverse_is_one_and_what_has_none_is_seen() {
+        let size = 37;
+        let entry = |i: usize, j: usize| (-(i.abs_diff(j) as f64) / 5.0).exp() + if i == j { 3.0 } else { 0.7 };
+        let matrix = Rows::new(size, entry);
+        let mut pivot = vec![0.0; size];
+        for simd in Simd::all() {
+            let mut inverse = matrix.clone();
+            assert!(invert(simd, &mut inverse, &mut pivot));
+            for i in 0..size {
+                for j in 0..size {
+                    let one: f64 = (0..size).map(|k| matrix.row(i)[k] * inverse.row(k)[j]).sum();
+                    let wanted = if i == j { 1.0 } else { 0.0 };
+                    assert!((one - wanted).abs() < 1e-12, "{i} {j}: {one}");
+                }
+            }
+        }
+        let mut indefinite = Rows::new(4, |i, j| if i == j { 1.0 } else { 2.0 });
+        assert!(!invert(Simd::detect(), &mut indefinite, &mut pivot));
     }
 }

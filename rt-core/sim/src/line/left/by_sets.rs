@@ -61,7 +61,8 @@ impl LeftNeedles {
             u_m: by_own + state.tip_offset_m + by_others,
             ..Tip::default()
         };
-        let is_found = find_by_sets(model.simd, &self.all, scratch);
+        let inverse = (self.inverse.size() == elements).then_some(&self.inverse);
+        let is_found = find_by_sets(model.simd, &self.all, inverse, scratch);
         let (forces, moved) = (scratch.force_n.numbers(), scratch.u_m.numbers());
         let mut has_moved = count > 0;
         for (k, force) in forces[..elements].iter().enumerate() {

@@ -67,6 +67,10 @@ pub struct LeftNeedles {
     count: usize,
     stride: usize,
     own: Vec<f64>,
+    /// The inverse of `own`: with it, forces of the elements are found in a few products as long as most of them stick.
+    inverse: Rows,
+    /// For making it.
+    pivot: Vec<f64>,
     force_n: Vec<f64>,
     /// Displacement along its own needle at which the element holds nothing, and that it has.
     rest_m: Vec<f64>,
@@ -86,6 +90,8 @@ pub struct LeftNeedles {
     added_m: Vec<f64>,
     /// Nothing has moved in the last tick.
     is_still: bool,
+    /// Corrections of an element by less are left out of sweeps, m.
+    skipped_m: f64,
     /// How all elements and then the stations of the moving line move with each, and what their forces are found in.
     all: Rows,
     scratch: Box<Scratch<ALL_BLOCKS>>,
@@ -106,6 +112,8 @@ impl LeftNeedles {
             count: 0,
             stride: 0,
             own: each(MAX_ELEMENTS * stride),
+            inverse: Rows::with_room(MAX_ELEMENTS),
+            pivot: each(MAX_ELEMENTS),
             force_n: each(MAX_ELEMENTS),
             rest_m: each(MAX_ELEMENTS),
             u_m: each(MAX_ELEMENTS),
@@ -119,6 +127,7 @@ impl LeftNeedles {
             whole: each(MAX_ELEMENTS),
             added_m: each(2 * MAX_STATIONS),
             is_still: true,
+            skipped_m: 0.0,
             all: Rows::with_room(ALL_BLOCKS * LANES),
             scratch: Box::new(Scratch::new()),
         })
@@ -140,7 +149,8 @@ impl LeftNeedles {
             &self.added_m,
         ];
         let values: usize = all.iter().map(|values| 8 * values.len()).sum();
-        values + 8 * (ALL_BLOCKS * LANES).pow(2) + size_of::<Scratch<ALL_BLOCKS>>()
+        let rows = 8 * ((ALL_BLOCKS * LANES).pow(2) + MAX_ELEMENTS * MAX_ELEMENTS.next_multiple_of(LANES));
+        values + rows + size_of::<Scratch<ALL_BLOCKS>>()
     }
 
     /// How many there are.

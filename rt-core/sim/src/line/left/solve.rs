@@ -2,7 +2,7 @@
 //! for a needle alone, or by projected Gauss-Seidel.
 
 use super::{LeftNeedle, LeftNeedles};
-use crate::line::contact::{Company, LineInput, advance, limit_n, meet, press, step, touch_beside};
+use crate::line::contact::{Company, LineInput, Neighbours, advance, meet, press, step, sweep, touch_beside};
 use crate::line::model::{LineModel, MAX_STATIONS};
 use crate::line::ready::HandLine;
 use crate::line::rows::{add_scaled, dot};
@@ -59,7 +59,8 @@ impl Company for LeftNeedles {
         let gap_m = self
             .solve_by_sets(model, state, input, limit_n, output)
             .unwrap_or_else(|| {
-                solve_vectorised(model.simd, model, state, self, input.tip_m, limit_n, input.dt_s, output)
+                let rate = model.settings.viscous_n_s_per_m2 / input.dt_s;
+                self.solve_by_sweeps(model, state, (input.tip_m, limit_n, rate), output)
             });
         self.add_to(state);
         gap_m
@@ -101,14 +102,14 @@ impl LeftNeedles {
             *offset -= *added;
             *added = 0.0;
         }
-        for k in (0..self.count).filter(|&k| self.force_n[k] != 0.0) {
-            let first = k * 2 * MAX_STATIONS;
-            add_scaled(
-                self.force_n[k],
-                &self.to_moving[first..first + rows],
-                &mut self.added_m[..rows],
-            );
-        }
+        let forces_n = &self.force_n[..self.count];
+        add_rows(
+            self.simd,
+            forces_n,
+            &self.to_moving,
+            2 * MAX_STATIONS,
+            &mut self.added_m[..rows],
+        );
         for (offset, added) in state.memory.offset_m.iter_mut().zip(&self.added_m[..rows]) {
             *offset += *added;
         }
@@ -137,16 +138,13 @@ impl LeftNeedles {
 
     /// Displacement of each element by all forces as they are; of the moving needle's with `moving`.
     pub(super) fn displace(&mut self, moving: Option<&LineState>) {
-        let (count, stride) = (self.count, self.stride);
-        for k in 0..count {
-            let row = &self.own[k * stride..k * stride + count];
-            self.u_m[k] = dot(row, &self.force_n[..count]);
-        }
+        let (count, stride, simd) = (self.count, self.stride, self.simd);
+        let u_m = &mut self.u_m[..count];
+        u_m.fill(0.0);
+        // Symmetric: its rows are its columns.
+        add_rows(simd, &self.force_n[..count], &self.own, stride, u_m);
         let Some(state) = moving else { return };
-        for n in (0..state.in_contact).filter(|&n| state.shaft_n[n] != 0.0) {
-            let row = &self.from_moving[n * stride..n * stride + count];
-            add_scaled(state.shaft_n[n], row, &mut self.u_m[..count]);
-        }
+        add_rows(simd, &state.shaft_n[..state.in_contact], &self.from_moving, stride, u_m);
         add_scaled(state.tip.force_n, &self.by_tip[..count], &mut self.u_m[..count]);
     }
 
@@ -177,6 +175,72 @@ impl LeftNeedles {
         for k in 0..self.count {
             if self.force_n[k] >= self.high_n[k] || (self.low_n[k] < 0.0 && self.force_n[k] <= self.low_n[k]) {
                 self.rest_m[k] = self.u_m[k];
+            }
+        }
+    }
+}
+
+impl LeftNeedles {
+    /// Forces of shaft, tip and all elements by sweeps; returns how far the tip is beyond where the material has it.
+    fn solve_by_sweeps(
+        &mut self,
+        model: &LineModel,
+        state: &mut LineState,
+        (tip_m, tip_limit_n, slowness): (f64, f64, f64),
+        output: &mut LineOutput,
+    ) -> f64 {
+        let (m, elements, gain) = (model.compliance.stations, self.count, state.memory.gain);
+        // By the past alone: what the others add goes by `by_tip`, in which a membrane has its part.
+        let past = |n: usize| state.memory.offset_m[m + n] - self.added_m[m + n];
+        let weights = state.tip_range.clone().zip(state.tip_weights);
+        let offset: f64 = weights.map(|(n, w)| w * past(n)).sum();
+        let offset = offset + state.tip_offset_m + dot(&self.by_tip[..elements], &self.force_n[..elements]);
+        let of_shaft = dot(&state.tip_column, &state.shaft_n[..state.in_contact]);
+        state.tip_u_m = gain * (of_shaft + state.tip_own * state.tip.force_n) + offset;
+        self.is_still = state.in_contact == 0;
+        self.skipped_m = SKIPPED * model.settings.tolerance_m;
+        sweep_beside(model.simd, model, state, self, tip_m, tip_limit_n, slowness, output);
+        self.is_still &= state.tip.force_n == 0.0 && !self.needles.iter().any(LeftNeedle::is_drawn);
+        tip_m - state.tip.material_m - state.tip_u_m
+    }
+}
+
+impl Neighbours for LeftNeedles {
+    #[inline(always)]
+    fn feel_shaft(&mut self, n: usize, change_n: f64) {
+        let row = &self.from_moving[n * self.stride..n * self.stride + self.count];
+        add_scaled(change_n, row, &mut self.u_m[..self.count]);
+    }
+
+    #[inline(always)]
+    fn feel_tip(&mut self, change_n: f64) {
+        add_scaled(change_n, &self.by_tip[..self.count], &mut self.u_m[..self.count]);
+    }
+
+    #[inline(always)]
+    fn sweep(&mut self, is_backwards: bool, u_m: &mut [f64], tip_u_m: &mut f64) -> f64 {
+        let mut largest_m = 0.0_f64;
+        for step in 0..self.count {
+            let k = if is_backwards { self.count - 1 - step } else { step };
+            let (change, moved_m) = correct(self, k, self.skipped_m);
+            if change != 0.0 {
+                let first = k * 2 * MAX_STATIONS;
+                add_scaled(change, &self.to_moving[first..first + u_m.len()], u_m);
+                *tip_u_m += change * self.by_tip[k];
+                largest_m = largest_m.max(moved_m);
+                self.is_still = false;
+            }
+        }
+        largest_m
+    }
+}
+
+vectorised! {
+    /// Adds up rows, that far apart, each times its factor.
+    fn add_rows(factors: &[f64], rows: &[f64], stride: usize, sum: &mut [f64]) {
+        for (row, factor) in rows.chunks(stride.max(1)).zip(factors) {
+            if *factor != 0.0 {
+                add_scaled(*factor, row, sum);
             }
         }
     }
@@ -214,116 +278,17 @@ vectorised! {
 }
 
 vectorised! {
-    /// [`solve`] for the instructions that the processor has; the same bits with all of them.
-    #[expect(clippy::too_many_arguments, reason = "those of `solve`, and the instructions")]
-    fn solve_vectorised(
+    /// [`sweep`] beside needles that stay in, for the instructions that the processor has; the same bits with all of them.
+    #[expect(clippy::too_many_arguments, reason = "those of `sweep`, and the instructions")]
+    fn sweep_beside(
         model: &LineModel,
         state: &mut LineState,
         left: &mut LeftNeedles,
         tip_m: f64,
         tip_limit_n: f64,
-        dt_s: f64,
+        slowness: f64,
         output: &mut LineOutput,
-    ) -> f64 {
-        solve(model, state, left, tip_m, tip_limit_n, dt_s, output)
+    ) {
+        sweep(model, state, (tip_m, tip_limit_n, slowness), left, output)
     }
-}
-
-/// Forces of shaft, tip and all elements; returns how far the tip is beyond where the material has it.
-#[inline(always)]
-fn solve(
-    model: &LineModel,
-    state: &mut LineState,
-    left: &mut LeftNeedles,
-    tip_m: f64,
-    tip_limit_n: f64,
-    dt_s: f64,
-    output: &mut LineOutput,
-) -> f64 {
-    let rows = &model.compliance.rows;
-    let (m, count, gain) = (model.compliance.stations, state.in_contact, state.memory.gain);
-    let place_m = state.tip.material_m;
-    let LineState {
-        ref mut shaft_n,
-        ref anchor_m,
-        ref mut u_m,
-        ref tip_column,
-        ref memory,
-        ..
-    } = *state;
-    let (shaft_n, anchor_m, u_m) = (&mut shaft_n[..count], &anchor_m[..count], &mut u_m[..count]);
-    let tip_column = &tip_column[..count];
-    let elements = left.count;
-    // By the past alone: what the others add goes by `by_tip`, in which a membrane has its part.
-    let past = |n: usize| memory.offset_m[m + n] - left.added_m[m + n];
-    let weights = state.tip_range.clone().zip(state.tip_weights);
-    let offset: f64 = weights.map(|(n, w)| w * past(n)).sum();
-    let offset = offset + state.tip_offset_m + dot(&left.by_tip[..elements], &left.force_n[..elements]);
-    let mut tip_u_m = gain * (dot(tip_column, shaft_n) + state.tip_own * state.tip.force_n) + offset;
-    let mut tip_n = state.tip.force_n;
-    let tip_gain = gain * state.tip_own;
-    let slowness = model.settings.viscous_n_s_per_m2 / dt_s;
-    let skipped_m = SKIPPED * model.settings.tolerance_m;
-    let mut has_moved = count > 0;
-    for sweep in 0..model.settings.sweeps {
-        let is_backwards = sweep % 2 == 0;
-        let mut largest_m = 0.0_f64;
-        for step in 0..count {
-            let n = if is_backwards { count - 1 - step } else { step };
-            let row = &rows.row(n)[..count];
-            let own = gain * row[n];
-            let limit = limit_n(model, place_m, n);
-            let free_n = shaft_n[n] + (tip_m - anchor_m[n] - u_m[n]) / own;
-            let mut wanted = free_n.clamp(-limit, limit);
-            if slowness > 0.0 && wanted != free_n {
-                let drag =
-                    slowness * (place_m - n as f64 * model.compliance.spacing_m).clamp(0.0, model.compliance.spacing_m);
-                wanted += (free_n - wanted) * drag * own / (1.0 + drag * own);
-            }
-            let change = wanted - shaft_n[n];
-            if change != 0.0 {
-                shaft_n[n] = wanted;
-                add_scaled(gain * change, row, u_m);
-                tip_u_m += gain * change * tip_column[n];
-                let first = n * left.stride;
-                add_scaled(
-                    change,
-                    &left.from_moving[first..first + elements],
-                    &mut left.u_m[..elements],
-                );
-                largest_m = largest_m.max((change * own).abs());
-            }
-        }
-        if tip_gain > 0.0 {
-            let wanted = (tip_n + (tip_m - place_m - tip_u_m) / tip_gain).clamp(0.0, tip_limit_n);
-            let change = wanted - tip_n;
-            if change != 0.0 {
-                tip_n = wanted;
-                add_scaled(gain * change, tip_column, u_m);
-                tip_u_m += tip_gain * change;
-                add_scaled(change, &left.by_tip[..elements], &mut left.u_m[..elements]);
-                largest_m = largest_m.max((change * tip_gain).abs());
-            }
-        }
-        for step in 0..elements {
-            let k = if is_backwards { elements - 1 - step } else { step };
-            let (change, moved_m) = correct(left, k, skipped_m);
-            if change != 0.0 {
-                let first = k * 2 * MAX_STATIONS;
-                add_scaled(change, &left.to_moving[first..first + count], u_m);
-                tip_u_m += change * left.by_tip[k];
-                largest_m = largest_m.max(moved_m);
-                has_moved = true;
-            }
-        }
-        output.sweeps += 1;
-        output.residual_m = largest_m;
-        if largest_m <= model.settings.tolerance_m {
-            break;
-        }
-    }
-    state.tip.force_n = tip_n;
-    state.tip_u_m = tip_u_m;
-    left.is_still = !has_moved && tip_n == 0.0 && !left.needles.iter().any(LeftNeedle::is_drawn);
-    tip_m - place_m - tip_u_m
 }

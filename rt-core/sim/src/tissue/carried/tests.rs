@@ -51,7 +51,11 @@ fn an_affine_field_is_interpolated_exactly_and_what_is_fixed_stays() {
     let half = packed(&coarse, |place_m| affine(place_m).map(|c| 0.5 * c));
     let mut field = CarriedField::new(&scene, coarse);
     assert!(field.is_at_rest());
-    field.set(&[half.clone(), half], &[3.0, -1.0]);
+    field.set(Carry {
+        columns: &[half.clone(), half],
+        loads_n: &[3.0, -1.0],
+        ..Carry::NOT
+    });
     let mut seen = [0; 3];
     for element in 0..scene.lattice.element_count() as u32 {
         let place_m = scene.lattice.rest_m(element);
@@ -70,10 +74,15 @@ fn an_affine_field_is_interpolated_exactly_and_what_is_fixed_stays() {
         let off_m = off(found, affine(place_m));
         assert!(off_m <= bound_m, "{cell:?}: {off_m}");
         let size_m = found.iter().map(|c| c * c).sum::<f64>().sqrt();
-        assert!(size_m <= Carried::Field(&field).largest_m(&scene.lattice) * (1.0 + 1e-6));
+        assert!(size_m <= Carried::Field(&field).largest_m() * (1.0 + 1e-6));
     }
     assert!(seen[0] > 2000 && seen[1] > 1000, "{seen:?}");
-    field.clear();
+    field.set(Carry {
+        whole_m: [1e-3, 0.0, -2e-3],
+        ..Carry::NOT
+    });
+    assert!(off(field.at_m(&scene.lattice, 3000), [1e-3, 0.0, -2e-3]) < 1e-9);
+    field.set(Carry::NOT);
     assert!(field.is_at_rest() && field.at_m(&scene.lattice, 3000) == [0.0; 3]);
 }
 
@@ -81,7 +90,11 @@ fn an_affine_field_is_interpolated_exactly_and_what_is_fixed_stays() {
 fn a_saved_field_is_the_same_in_every_bit_and_another_length_changes_nothing() {
     let (scene, coarse) = held_scene();
     let mut field = CarriedField::new(&scene, coarse.clone());
-    field.set(&[packed(&coarse, affine)], &[0.7]);
+    field.set(Carry {
+        columns: &[packed(&coarse, affine)],
+        loads_n: &[0.7],
+        ..Carry::NOT
+    });
     let mut memory = vec![0; field.memory_len()];
     field.save(&mut memory);
     let mut other = CarriedField::new(&scene, coarse);

@@ -41,7 +41,10 @@ pub use state::TissueState;
 
 use crate::limits::Limits;
 use crate::scene::Scene;
-use crate::tissue::{BodyShift, Carried, CarriedField, Carry, Deformed, Held, StepReport, TissueModel};
+use crate::tissue::{Carried, CarriedField, Carry, Deformed, Held, StepReport, TissueModel};
+
+/// Runs that have moved by less besides what carries them are not looked at one by one, in elements.
+const SLIGHT: f32 = 0.05;
 
 /// Restricted ChainMail as a tissue model.
 #[derive(Clone)]
@@ -50,9 +53,7 @@ pub struct ChainMailTissue {
     pub model: ChainMail,
     /// Where every element is, in the body as it is carried.
     pub state: TissueState,
-    /// How the body is carried as one piece.
-    shift: BodyShift,
-    /// How it is carried where something holds it; only in such a scene.
+    /// How the body is carried by the loads of needles on lines; none in a scene whose needles have none.
     field: Option<CarriedField>,
 }
 
@@ -61,27 +62,45 @@ impl ChainMailTissue {
     pub fn new(scene: &Scene, limits: Limits) -> Self {
         let model = ChainMail::new(scene, limits);
         let state = TissueState::at_rest(&model);
-        let coarse = scene.body_of_lines().filter(|_| scene.is_held());
         ChainMailTissue {
             model,
             state,
-            shift: BodyShift::default(),
-            field: coarse.map(|coarse| CarriedField::new(scene, coarse)),
+            field: scene.body_of_lines().map(|coarse| CarriedField::new(scene, coarse)),
         }
     }
 
     fn carried(&self) -> Carried<'_> {
         match &self.field {
             Some(field) if !field.is_at_rest() => Carried::Field(field),
-            _ if self.shift != BodyShift::default() => Carried::Shift(&self.shift),
             _ => Carried::Not,
         }
     }
 
+    /// No element is farther from rest, in elements: what is carried the farthest, or has moved besides.
+    fn farthest(&self) -> f32 {
+        let (carried, scale) = (self.largest_carried(), self.state.scale());
+        if !carried.is_finite() {
+            return carried;
+        }
+        let body = self.deformed();
+        let mut farthest = carried + SLIGHT;
+        for (run, square) in self.model.rows.runs.iter().zip(&self.state.run_square) {
+            let most = scale * square.sqrt();
+            if most <= SLIGHT || most + carried <= farthest {
+                continue;
+            }
+            for element in run.first..run.end() {
+                let moved = body.displacement(element).iter().map(|u| u * u).sum::<f64>().sqrt();
+                // Never rounded down.
+                farthest = farthest.max(moved as f32 * 1.000_001);
+            }
+        }
+        farthest
+    }
+
     /// No element is carried farther, in elements.
     fn largest_carried(&self) -> f32 {
-        let lattice = &self.model.lattice;
-        (self.carried().largest_m(lattice) / lattice.spacing_m) as f32
+        (self.carried().largest_m() / self.model.lattice.spacing_m) as f32
     }
 }
 
@@ -100,24 +119,14 @@ impl TissueModel for ChainMailTissue {
             }
         });
         let mut report = step(&self.model, &mut self.state, in_body, dt_s);
-        let largest = self.largest_carried();
-        report.max_displacement += largest;
-        report.converged &= largest.is_finite();
+        report.max_displacement = self.farthest();
+        report.converged &= report.max_displacement.is_finite();
         report
     }
 
     fn carry(&mut self, by: Carry<'_>) {
-        self.shift = match by {
-            Carry::Shift(shift) => shift,
-            _ => BodyShift::default(),
-        };
-        match (&mut self.field, by) {
-            (Some(field), Carry::Columns(columns, loads_n)) if loads_n.iter().any(|n| *n != 0.0) => {
-                field.set(columns, loads_n);
-            }
-            (Some(field), Carry::Fields(columns, loads_n, fields)) => field.set_with(columns, loads_n, fields),
-            (Some(field), _) if !field.is_at_rest() => field.clear(),
-            _ => {}
+        if let Some(field) = &mut self.field {
+            field.set(by);
         }
     }
 
@@ -134,7 +143,7 @@ impl TissueModel for ChainMailTissue {
 
     fn return_to_rest(&mut self) {
         self.state.return_to_rest(&self.model);
-        self.carry(Carry::Not);
+        self.carry(Carry::NOT);
     }
 
     fn set_limits(&mut self, limits: Limits) {
@@ -144,14 +153,10 @@ impl TissueModel for ChainMailTissue {
 
     fn memory_len(&self) -> usize {
         let state = self.state.memory().iter().map(|part| part.len()).sum::<usize>();
-        state + self.field.as_ref().map_or(0, CarriedField::memory_len) + size_of::<BodyShift>()
+        state + self.field.as_ref().map_or(0, CarriedField::memory_len)
     }
 
     fn save(&self, to: &mut [u8]) {
-        let Some((to, shift)) = to.split_last_chunk_mut::<{ size_of::<BodyShift>() }>() else {
-            return;
-        };
-        shift.copy_from_slice(bytemuck::bytes_of(&self.shift));
         let field_len = self.field.as_ref().map_or(0, CarriedField::memory_len);
         let (state, field) = to.split_at_mut(to.len().saturating_sub(field_len));
         self.state.save(state);
@@ -161,12 +166,6 @@ impl TissueModel for ChainMailTissue {
     }
 
     fn load(&mut self, from: &[u8]) {
-        let Some((from, shift)) = from.split_last_chunk::<{ size_of::<BodyShift>() }>() else {
-            return;
-        };
-        let shift: BodyShift = bytemuck::pod_read_unaligned(shift);
-        let is_motion = shift.shift_m.iter().chain(&shift.turn_rad).all(|c| c.is_finite());
-        self.shift = if is_motion { shift } else { BodyShift::default() };
         let field_len = self.field.as_ref().map_or(0, CarriedField::memory_len);
         let (state, field) = from.split_at(from.len().saturating_sub(field_len));
         self.state.load(&self.model, state);

@@ -167,11 +167,12 @@ fn as_many_as_there_is_room_for_move_together_without_the_heap() {
     assert_eq!(given_up, MAX_LEFT);
 }
 
-/// Time of a tick by how many needles are left, stations as in the paper's gland:
+/// Time of a tick by how many needles are left, stations as in the paper's gland; the least of some rounds, each tick by itself:
 /// `cargo test --release -p stylet-sim --lib times_beside -- --ignored --nocapture`.
 #[test]
 #[ignore = "times"]
 fn times_beside() {
+    const ROUNDS: usize = 8;
     let mut lines: Vec<Box<HandLine>> = Vec::new();
     let mut left = LeftNeedles::with_room();
     println!("room for {MAX_LEFT}: {:.1} MB", left.bytes() as f64 / 1e6);
@@ -180,30 +181,45 @@ fn times_beside() {
         let at_m = [6e-3 * (n % 3) as f64, 6e-3 * (n / 3) as f64, 0.0];
         lines.push(line(n as u64 + 1, at_m, &others, WHOLE));
     }
-    for mut needle in lines {
+    for needle in lines {
         left.beside(Some(&needle));
-        let mut times_us = Vec::new();
-        let mut sweeps = Vec::new();
-        for n in 0..700 {
-            let tip_m = -1e-3 + 5e-5 * f64::from(if n < 620 { n } else { 1240 - n });
-            let begun = std::time::Instant::now();
-            let output = left.step_beside(&mut needle, tip_m, DT_S);
-            times_us.push(begun.elapsed().as_nanos() as f64 / 1e3);
-            sweeps.push(output.sweeps);
+        let mut ticks = [true, false].map(|_| vec![(f64::INFINITY, 0); 700]);
+        let mut last = None;
+        for round in 0..2 * ROUNDS {
+            let (mut left, mut needle) = (left.clone(), needle.clone());
+            let without = round % 2;
+            if without == 1 {
+                left.inverse.begin(0);
+            }
+            for (n, tick) in ticks[without].iter_mut().enumerate() {
+                let tip_m = -1e-3 + 5e-5 * f64::from(if n < 620 { n as u32 } else { 1240 - n as u32 });
+                let begun = std::time::Instant::now();
+                let output = left.step_beside(&mut needle, tip_m, DT_S);
+                let us = begun.elapsed().as_nanos() as f64 / 1e3;
+                *tick = (us.min(tick.0), output.sweeps);
+            }
+            if without == 0 {
+                last = Some((left, needle));
+            }
         }
-        times_us.sort_by(f64::total_cmp);
-        sweeps.sort_unstable();
-        let at = |part: f64| times_us[(part * (times_us.len() - 1) as f64) as usize];
-        println!(
-            "{} left, {} elements: p50 {:.1}, p99 {:.1}, max {:.1} us; sweeps p50 {}, p99 {}",
-            left.len(),
-            left.count,
-            at(0.5),
-            at(0.99),
-            at(1.0),
-            sweeps[350],
-            sweeps[693]
-        );
+        println!("{} left, {} elements", left.len(), left.count);
+        for (words, ticks) in ["with the inverse", "without"].iter().zip(&ticks) {
+            let mut products: Vec<u32> = ticks.iter().map(|t| t.1).collect();
+            let mut times_us: Vec<f64> = ticks.iter().map(|t| t.0).collect();
+            times_us.sort_by(f64::total_cmp);
+            products.sort_unstable();
+            let at = |part: f64| (part * (times_us.len() - 1) as f64) as usize;
+            println!(
+                "    {words}: p50 {:.1}, p99 {:.1}, max {:.1} us; products p50 {}, p99 {}",
+                times_us[at(0.5)],
+                times_us[at(0.99)],
+                times_us[at(1.0)],
+                products[at(0.5)],
+                products[at(0.99)]
+            );
+        }
+        let (after, needle) = last.expect("rounds");
+        left = after;
         if left.len() < MAX_LEFT {
             left.leave(needle).expect("room");
         }

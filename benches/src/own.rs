@@ -1,0 +1,126 @@
+//! ChainMail on the path of a session with nothing left to do in any tick: the columns of its own coarser body solved to the end, and
+//! limits met as far as f32 has them. What ships is compared with that, beside the comparison with finite elements.
+
+use crate::error::{Field, field};
+use crate::twin::{Twin, TwinSettings, default_forces};
+use stylet_sim::limits::TissueParameters;
+use stylet_sim::line::{HandLine, StationSettings};
+use stylet_sim::scene::{SceneSource, TissueKind};
+use stylet_sim::tissue::{Carry, ChainMailTissue, Held, MaterialPoint, TissueModel};
+
+/// Steps of one tick at most, each as many passes as what ships has for a tick.
+const MOST_STEPS: u32 = 20;
+/// The finest tolerance that limits are met to, in elements.
+const FINEST: f64 = 1e-4;
+/// Ticks that what ships may be late by, and is compared at.
+pub const LATE: usize = 4;
+
+/// The converged twin of a ChainMail session.
+pub struct OwnTwin {
+    /// Its line: contact, friction and membranes, as in the force loop.
+    pub line: Twin,
+    tissue: ChainMailTissue,
+    /// A body that is at rest before each tick: what of the answer is history.
+    fresh: ChainMailTissue,
+    /// Fields of the last ticks, newest first; those of large bodies are not kept.
+    before: Vec<Field>,
+    period_s: f64,
+    /// Steps and passes that the last tick took.
+    pub steps: u32,
+}
+
+impl OwnTwin {
+    /// Beside a line that ships.
+    ///
+    /// # Panics
+    ///
+    /// If the scene's ChainMail has no lines.
+    pub fn of(source: &SceneSource, like: &HandLine, tolerance: f64, period_s: f64) -> Self {
+        let scene = source.build().expect("built in").with_tissue(TissueKind::ChainMail);
+        let coarse = scene.clone().for_lines(TissueKind::ChainMail).expect("has lines");
+        let settings = TwinSettings {
+            stations: StationSettings::of_lattice(coarse.body.spacing_m),
+            most: like.source().stations(),
+            tolerance,
+            whole_of: None,
+        };
+        let mut line = Twin::of::<f64>(&coarse, like, settings);
+        line.hand.reset();
+        line.hand.set_forces(&default_forces());
+        let limits = TissueParameters {
+            residual_tolerance: FINEST,
+            ..TissueParameters::default()
+        };
+        let tissue = ChainMailTissue::new(&scene, limits.validate().expect("valid"));
+        OwnTwin {
+            line,
+            fresh: tissue.clone(),
+            tissue,
+            before: Vec::new(),
+            period_s,
+            steps: 0,
+        }
+    }
+
+    /// One tick of the tissue loop, after the line has had those of the force loop.
+    pub fn step(&mut self) {
+        let held = held(&self.tissue, &self.line.hand);
+        self.steps = settle(&mut self.tissue, &self.line, held, self.period_s);
+        if self.tissue.deformed().lattice.element_count() < 30_000 {
+            self.before.insert(0, field(&self.tissue.deformed()));
+            self.before.truncate(LATE);
+        }
+    }
+
+    /// Displacements now, m.
+    pub fn field(&self) -> Field {
+        field(&self.tissue.deformed())
+    }
+
+    /// Displacements so many ticks ago, m.
+    pub fn field_before(&self, ticks: usize) -> Option<&Field> {
+        self.before.get(ticks)
+    }
+
+    /// Displacements of a body that was at rest before this tick, m.
+    pub fn field_without_history(&mut self) -> Field {
+        let held = held(&self.tissue, &self.line.hand);
+        self.fresh.return_to_rest();
+        settle(&mut self.fresh, &self.line, held, self.period_s);
+        field(&self.fresh.deformed())
+    }
+}
+
+/// Steps until nothing is left to move; the first recovers by the period.
+fn settle(tissue: &mut ChainMailTissue, line: &Twin, held: Option<Held>, period_s: f64) -> u32 {
+    let axis = line.hand.line().axes[0];
+    tissue.carry(Carry {
+        columns: line.columns(),
+        loads_n: line.hand.state().loads_n(),
+        whole_m: axis.map(|c| c * line.hand.whole_m()),
+        fields: &[],
+    });
+    for step in 0..MOST_STEPS {
+        let report = tissue.step(held, if step == 0 { period_s } else { 0.0 });
+        if report.converged && report.passes == 0 {
+            return step;
+        }
+    }
+    MOST_STEPS
+}
+
+/// As the tissue loop holds it: the material at the tip where the line has it.
+fn held(tissue: &ChainMailTissue, hand: &HandLine) -> Option<Held> {
+    let (line, along_m) = (hand.line(), hand.state().tip().material_m);
+    if !hand.is_in_tissue() || !along_m.is_finite() {
+        return None;
+    }
+    let body = &tissue.model.lattice();
+    let element = MaterialPoint::at_rest(body, line.point_m(along_m.max(0.0), [0.0; 2]))?.element;
+    let (rest_m, by_m) = (body.rest_m(element), hand.tip_displacement_m());
+    Some(Held {
+        element,
+        position_m: [0, 1, 2].map(|a| rest_m[a] + by_m * line.axes[0][a]),
+        patch_m: TissueKind::ChainMail.tip_patch_m(),
+    })
+}
