@@ -49,6 +49,7 @@ relay-test: deps-test build ## Test the relay with whole processes (about three 
 	$(RELAY) test --release -- --test-threads=1
 
 relay-class: deps-test build ## Measure the relay over a line of 100 Mbit/s and with 20 observers in network namespaces (as root, two minutes)
+	@docs/tools/need iproute2
 	$(RELAY) test --release --test system -- --test-threads=1 --nocapture --ignored line
 
 relay-faults: deps-test build ## Stop, kill and cut off server, observer and operator, 100 times each in an insertion (some 20 minutes)

@@ -48,10 +48,15 @@ fn the_workspace_takes_nothing_of_the_relay() {
         let lock = tree::manifest(lock);
         let listed = lock["package"].as_array().into_iter().flatten();
         let names = listed.filter_map(|package| package["name"].as_str().map(str::to_string));
-        names.filter(|name| name.starts_with("zenoh") || name == "quinn").count()
+        names
+            .filter(|name| name.starts_with("zenoh") || name == "quinn")
+            .count()
     };
     assert_eq!(packages("Cargo.lock"), 0);
-    assert!(packages("host-ui/relay/Cargo.lock") > 0, "the test looks for the wrong names");
+    assert!(
+        packages("host-ui/relay/Cargo.lock") > 0,
+        "the test looks for the wrong names"
+    );
 }
 
 #[test]

@@ -120,8 +120,8 @@ pub fn run(options: &Options, stop: &AtomicBool, beat: impl FnMut(bool)) -> Resu
     })?;
     let (to_jobs, jobs) = sync_channel(JOBS);
     let threads = [
-        spawn("records", &server, |server| streams::records(server)),
-        spawn("snapshots", &server, |server| streams::snapshots(server)),
+        spawn("records", &server, streams::records),
+        spawn("snapshots", &server, streams::snapshots),
         spawn("again", &server, move |server| streams::jobs(server, &jobs)),
     ];
     println!(

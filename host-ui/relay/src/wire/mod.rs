@@ -140,7 +140,7 @@ pub fn one<T: Pod>(body: &[u8]) -> Result<T, Invalid> {
 
 /// A payload of values of one type, `most` at most.
 pub fn many<T: Pod>(body: &[u8], most: usize) -> Result<Vec<T>, Invalid> {
-    if body.len() % size_of::<T>() != 0 || body.len() / size_of::<T>() > most {
+    if !body.len().is_multiple_of(size_of::<T>()) || body.len() / size_of::<T>() > most {
         return Err(Invalid("length of a payload"));
     }
     Ok(body

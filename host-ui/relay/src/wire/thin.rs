@@ -90,9 +90,8 @@ pub fn encode_snapshot(
     bytes.extend_from_slice(bytemuck::bytes_of(&share));
     for (i, vertex) in vertices.iter().enumerate().skip(phase).step_by(stride) {
         let place = rest.place_m(i);
-        for a in 0..3 {
-            let moved = f16::from_f32(vertex.position_m[a] - place[a]);
-            bytes.extend_from_slice(&moved.to_le_bytes());
+        for (at, rest) in vertex.position_m.iter().zip(place) {
+            bytes.extend_from_slice(&f16::from_f32(at - rest).to_le_bytes());
         }
     }
     Some(bytes)

@@ -160,9 +160,11 @@ fn a_late_and_lossy_cable_costs_no_record() {
         "20 ms and 1 % each way: {} records, {missing} missing; {} snapshots, p50 {:.0} ms old, the oldest {:.0} ms\n{words}",
         ticks.len(),
         shown.len(),
-        ages_ms[ages_ms.len() / 2],
-        ages_ms.last().expect("snapshots")
+        ages_ms.get(ages_ms.len() / 2).unwrap_or(&f64::NAN),
+        ages_ms.last().unwrap_or(&f64::NAN)
     );
+    // How many snapshots pass depends on what QUIC makes of such a line: ADR 18 says how few they have been.
+    assert!(ticks.len() > 500, "{} records", ticks.len());
     assert_eq!(missing, 0);
     assert!(words.contains(" 0 records lost"), "{words}");
 }
