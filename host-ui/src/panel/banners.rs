@@ -131,14 +131,15 @@ fn force_is_off(shown: &Shown) -> Option<Banner> {
     })
 }
 
-/// Until the needle is out.
+/// While it is; results keep from which displacement on it was.
 fn folded(shown: &Shown) -> Option<Banner> {
-    shown.folded_from_m().map(|folded_from_m| Banner {
+    let folded_from_m = shown.folded_from_m().filter(|_| shown.is_folded());
+    folded_from_m.map(|folded_from_m| Banner {
         level: BannerLevel::Warn,
         title: "Tissue folded",
         text: format!(
-            "The linear answer of the tissue at the tip is folded from {:.1} mm of displacement on. Force and places there are no longer \
-             those of tissue.",
+            "The linear answer of the tissue at the tip is folded from {:.1} mm of displacement on. Until that eases, force and places \
+             there are not those of tissue.",
             stylet_base::format::mm(folded_from_m)
         ),
         remedy: None,
@@ -310,10 +311,15 @@ mod tests {
     }
 
     #[test]
-    fn folded_tissue_has_a_banner_that_says_from_where_on() {
+    fn folded_tissue_has_a_banner_while_it_is_folded_that_says_from_where_on() {
         let mut shown = live();
         if let Some(state) = &mut shown.state {
             state.folded_from_m = 7.93e-3;
+        }
+        // Where it was: a membrane that gave way has eased it.
+        assert!(banners(&shown).is_empty());
+        if let Some(state) = &mut shown.state {
+            state.flags |= stylet_shm_schema::flags::FOLDED;
         }
         let list = banners(&shown);
         assert_eq!(list.len(), 1);

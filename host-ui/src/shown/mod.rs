@@ -160,6 +160,11 @@ impl Shown {
         self.state.map(|s| s.folded_from_m).filter(|m| *m > 0.0)
     }
 
+    /// The tissue at the tip is folded now.
+    pub fn is_folded(&self) -> bool {
+        self.has_flag(flags::FOLDED)
+    }
+
     pub fn is_real_time(&self) -> bool {
         self.has_flag(flags::REAL_TIME)
     }
