@@ -103,7 +103,7 @@ impl Legend<'_> {
         let middle = start + (end - start) * 0.5 - Vec2::new(0.0, 5.0);
         let word = Align2::CENTER_BOTTOM.anchor_size(middle, self.size_of(&text));
         let bar = Rect::from_two_pos(start, end).expand(4.0);
-        self.back(bar.union(word).expand2(Vec2::new(3.0, 1.0)));
+        self.fill_backing(bar.union(word).expand2(Vec2::new(3.0, 1.0)));
         let stroke = Stroke::new(2.0, self.tokens.path);
         self.painter.line_segment([start, end], stroke);
         for place in [start, end] {
@@ -114,7 +114,7 @@ impl Legend<'_> {
     }
 
     /// Needles, seeds and the grid go through the same corners as the words.
-    fn back(&self, rect: Rect) {
+    fn fill_backing(&self, rect: Rect) {
         let backing = self.tokens.background.gamma_multiply(BACKING);
         self.painter.rect_filled(rect, 3.0, backing);
     }
@@ -178,7 +178,7 @@ impl Legend<'_> {
         if rows.is_empty() {
             return;
         }
-        self.back(self.place_of(rows));
+        self.fill_backing(self.place_of(rows));
         let mut place = self.rect.left_bottom() + Vec2::new(16.0, -14.0);
         for row in rows.iter().rev() {
             if row.filled {
