@@ -2,16 +2,12 @@
 
 use crate::sample::histogram;
 use hdrhistogram::Histogram;
-use iceoryx2::port::publisher::Publisher;
-use iceoryx2::port::subscriber::Subscriber;
-use iceoryx2::prelude::BackpressureStrategy;
-use std::fmt::Debug;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use stylet_runtime::rt::clock;
 use stylet_runtime::rt::timing::PoseTimes;
-use stylet_shm_schema::service::{self, Instance, Ipc, ServiceError};
+use stylet_shm_schema::service::{self, Instance, Publisher, ServiceError, SliceSubscriber, Subscriber};
 use stylet_shm_schema::{Command, Event, EventKind, HandMove, Request, SnapshotHeader, TickRecord, Vertex};
 use stylet_sim::scene::Scene;
 
@@ -62,34 +58,20 @@ impl Script {
 }
 
 struct Ports {
-    snapshots: Subscriber<Ipc, [Vertex], SnapshotHeader>,
-    records: Subscriber<Ipc, [TickRecord], u64>,
-    events: Subscriber<Ipc, Event, ()>,
-    commands: Publisher<Ipc, Command, ()>,
+    snapshots: SliceSubscriber<Vertex, SnapshotHeader>,
+    records: SliceSubscriber<TickRecord, u64>,
+    events: Subscriber<Event>,
+    commands: Publisher<Command>,
 }
 
 impl Ports {
     fn new(instance: &Instance) -> Result<Self, ServiceError> {
         let node = instance.node()?;
-        let failed = |e: &dyn Debug| ServiceError(format!("the measuring host cannot use shared memory: {e:?}"));
         Ok(Self {
-            snapshots: service::snapshots(&node)?
-                .subscriber_builder()
-                .create()
-                .map_err(|e| failed(&e))?,
-            records: service::records(&node)?
-                .subscriber_builder()
-                .create()
-                .map_err(|e| failed(&e))?,
-            events: service::events(&node)?
-                .subscriber_builder()
-                .create()
-                .map_err(|e| failed(&e))?,
-            commands: service::commands(&node)?
-                .publisher_builder()
-                .backpressure_strategy(BackpressureStrategy::DiscardData)
-                .create()
-                .map_err(|e| failed(&e))?,
+            snapshots: service::snapshots::subscriber(&node)?,
+            records: service::records::subscriber(&node)?,
+            events: service::events::subscriber(&node)?,
+            commands: service::commands::publisher(&node)?,
         })
     }
 }
@@ -175,8 +157,8 @@ impl Host {
     }
 
     fn look(&mut self, now_ns: u64) {
-        while let Ok(Some(sample)) = self.ports.snapshots.receive() {
-            let header = sample.user_header();
+        while let Some(sample) = self.ports.snapshots.receive() {
+            let header = sample.header();
             self.report.snapshots += 1;
             let since = |time_ns: u64| now_ns.saturating_sub(time_ns);
             self.report.tissue_to_host.saturating_record(since(header.time_ns));
@@ -184,8 +166,8 @@ impl Host {
                 self.report.tip_to_host.saturating_record(since(pose_ns));
             }
         }
-        while let Ok(Some(sample)) = self.ports.records.receive() {
-            for record in sample.payload() {
+        while let Some(sample) = self.ports.records.receive() {
+            for record in sample.values() {
                 if self.last_tick > 0 {
                     self.report.records_missing += record.tick.saturating_sub(self.last_tick + 1);
                 }
@@ -193,7 +175,7 @@ impl Host {
                 self.report.records += 1;
             }
         }
-        while let Ok(Some(sample)) = self.ports.events.receive() {
+        while let Some(sample) = self.ports.events.receive() {
             self.report.faults += u64::from(sample.kind == EventKind::FaultRaised as u32);
         }
     }
@@ -230,7 +212,7 @@ impl Host {
         self.sent += 1;
         if let Ok(command) = request.encode(1, self.sent) {
             // The next cycle sends the commands again.
-            let _ = self.ports.commands.send_copy(command);
+            let _ = self.ports.commands.send(command);
         }
     }
 }

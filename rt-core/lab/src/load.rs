@@ -1,7 +1,6 @@
 //! Work of normal priority beside the loops: child processes of this program, so that none of their memory is locked.
 
 use clap::ValueEnum;
-use iceoryx2::port::subscriber::Subscriber;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io;
@@ -9,7 +8,7 @@ use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
-use stylet_shm_schema::service::{self, Instance, Ipc, ServiceError};
+use stylet_shm_schema::service::{self, Instance, ServiceError, SliceSubscriber};
 use stylet_shm_schema::{SnapshotHeader, TickRecord, Vertex};
 
 /// What runs beside the loops.
@@ -239,15 +238,15 @@ fn write_and_sync(path: &Path, stopped: impl Fn() -> bool) -> std::io::Result<()
     Ok(())
 }
 
-type Snapshots = Subscriber<Ipc, [Vertex], SnapshotHeader>;
-type Records = Subscriber<Ipc, [TickRecord], u64>;
+type Snapshots = SliceSubscriber<Vertex, SnapshotHeader>;
+type Records = SliceSubscriber<TickRecord, u64>;
 
 fn listen(instance: &Instance) -> Result<(Snapshots, Records), ServiceError> {
     let node = instance.node()?;
-    let failed = |e: &dyn std::fmt::Debug| ServiceError(format!("the ui load cannot listen: {e:?}"));
-    let snapshots = service::snapshots(&node)?.subscriber_builder().create();
-    let records = service::records(&node)?.subscriber_builder().create();
-    Ok((snapshots.map_err(|e| failed(&e))?, records.map_err(|e| failed(&e))?))
+    Ok((
+        service::snapshots::subscriber(&node)?,
+        service::records::subscriber(&node)?,
+    ))
 }
 
 /// Services appear and disappear while a core starts; after this many tries the cause is another.
@@ -272,14 +271,14 @@ fn copy_all(instance: &Instance, stopped: impl Fn() -> bool) -> Result<(), Servi
     let mut kept = Vec::new();
     while !stopped() {
         let mut idle = true;
-        while let Ok(Some(sample)) = snapshots.receive() {
+        while let Some(sample) = snapshots.receive() {
             vertices.clear();
-            vertices.extend_from_slice(sample.payload());
+            vertices.extend_from_slice(sample.values());
             idle = false;
         }
-        while let Ok(Some(sample)) = records.receive() {
+        while let Some(sample) = records.receive() {
             kept.clear();
-            kept.extend_from_slice(sample.payload());
+            kept.extend_from_slice(sample.values());
             idle = false;
         }
         // What a window does with a picture: go over it again and again.

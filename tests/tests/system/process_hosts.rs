@@ -1,7 +1,6 @@
 //! Hosts that are killed, stopped, starved, or that flood: the hand does not feel them.
 
 use bytemuck::Zeroable;
-use iceoryx2::prelude::BackpressureStrategy;
 use std::process::{Child, Command as Process, Stdio};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::service::{self, Instance};
@@ -183,14 +182,10 @@ fn stopped_and_starved_hosts_are_not_felt_and_go_on_by_themselves() {
 /// Sends as fast as it can for a while; how many were taken in by the queue.
 fn flood(instance: &Instance, time: Duration, mut next: impl FnMut(u64) -> Command) -> u64 {
     let node = instance.node().expect("same user");
-    let commands = service::commands(&node).expect("service");
-    let port = commands
-        .publisher_builder()
-        .backpressure_strategy(BackpressureStrategy::DiscardData)
-        .create();
-    let (port, begun, mut sent) = (port.expect("a free place"), Instant::now(), 0);
+    let port = service::commands::publisher(&node).expect("a free place");
+    let (begun, mut sent) = (Instant::now(), 0);
     while begun.elapsed() < time {
-        sent += u64::from(port.send_copy(next(sent)).is_ok());
+        sent += u64::from(port.send(next(sent)).is_ok());
     }
     sent
 }
@@ -239,8 +234,7 @@ fn ten_thousand_invalid_commands_are_all_refused_and_counted() {
         let before = hand.link.session().expect("live").refused;
         let parameters = hand.link.parameters().expect("live").generation;
         let node = core.instance.node().expect("same user");
-        let commands = service::commands(&node).expect("service");
-        let port = commands.publisher_builder().create().expect("a free place");
+        let port = service::commands::publisher(&node).expect("a free place");
         let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
         let mut random = move || {
             seed ^= seed << 13;
@@ -260,7 +254,10 @@ fn ten_thousand_invalid_commands_are_all_refused_and_counted() {
             } else {
                 command.kind |= 1 << 31;
             }
-            port.send_copy(command).expect("sent");
+            // Each one is to arrive: again where the queue is full.
+            while port.send(command).expect("sent") == 0 {
+                hand.watch(Duration::from_millis(2));
+            }
             // No faster than the queue of 64 is read: each one is to be counted.
             if n % 32 == 31 {
                 hand.watch(Duration::from_millis(8));
@@ -277,7 +274,7 @@ fn ten_thousand_invalid_commands_are_all_refused_and_counted() {
             "an invalid command changed a parameter"
         );
         assert_undisturbed(&hand.records);
-        drop((port, commands, node));
+        drop((port, node));
         finish(core, hand);
     });
 }

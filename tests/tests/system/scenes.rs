@@ -1,7 +1,6 @@
 //! Scenes of many structures, live: built in, sent by a host, and refused with every reason while the running one goes on.
 
 use bytemuck::Zeroable;
-use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
 use std::process::Command;
 use std::time::Duration;
 use stylet_host::link::Link;
@@ -116,9 +115,8 @@ fn the_default_needle_reaches_the_gland_in_the_pelvis_past_bone_urethra_and_rect
 
 /// A host of its own that sends volumes with structures.
 struct Sender {
-    uploads: service::Slices<u8, UploadHeader>,
-    replies: iceoryx2::port::subscriber::Subscriber<service::Ipc, Reply, ()>,
-    _node: iceoryx2::node::Node<service::Ipc>,
+    replies: service::Subscriber<Reply>,
+    node: service::Node,
     sent: u64,
 }
 
@@ -127,11 +125,9 @@ const HOST: u64 = 77;
 impl Sender {
     fn new(core: &Core) -> Self {
         let node = core.instance.node().expect("same user");
-        let replies = service::replies(&node).expect("service");
         Self {
-            uploads: service::uploads(&node).expect("service"),
-            replies: replies.subscriber_builder().create().expect("a free place"),
-            _node: node,
+            replies: service::replies::subscriber(&node).expect("a free place"),
+            node,
             sent: 0,
         }
     }
@@ -139,26 +135,18 @@ impl Sender {
     /// The core's answer, or every reason against it.
     fn send(&mut self, header: &UploadHeader, cells: &[u8]) -> Result<(), String> {
         self.sent += 1;
-        let port = self.uploads.publisher_builder();
-        let port = port
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .allocation_strategy(AllocationStrategy::PowerOfTwo)
-            .initial_max_slice_len(cells.len())
-            .override_sample_preallocation(|_| 2)
-            .create()
-            .expect("a free place");
-        let mut sample = port.loan_slice_uninit(cells.len()).expect("loaned");
-        *sample.user_header_mut() = UploadHeader {
+        let port = service::uploads::publisher(&self.node, cells.len()).expect("a free place");
+        let header = UploadHeader {
             host_id: HOST,
             command_id: self.sent,
             ..*header
         };
-        sample.write_from_slice(cells).send().expect("sent");
+        port.send(&header, cells).expect("sent");
         let mut answer = None;
         until(Duration::from_secs(20), || {
-            while let Ok(Some(reply)) = self.replies.receive() {
+            while let Some(reply) = self.replies.receive() {
                 if (reply.host_id, reply.command_id) == (HOST, self.sent) {
-                    answer = Some(*reply);
+                    answer = Some(reply);
                 }
             }
             answer.is_some()

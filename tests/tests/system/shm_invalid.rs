@@ -1,10 +1,9 @@
 //! Invalid records in shared memory neither crash nor stop either side, and are refused with a reason.
 
 use bytemuck::{Pod, Zeroable, pod_read_unaligned};
-use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
 use std::time::Duration;
 use stylet_host::link::{Link, LinkStatus};
-use stylet_shm_schema::service::{self, create_state_board};
+use stylet_shm_schema::service::{self, StateBoard};
 use stylet_shm_schema::*;
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Alone, Core, ask, fresh_instance, until};
@@ -38,19 +37,14 @@ fn core_refuses_invalid_records_of_hosts_and_runs_on() {
         let mut link = core.host();
         let before = *link.state().expect("live");
         let node = core.instance.node().expect("same user");
-        let commands = service::commands(&node).expect("service");
-        let commands = commands
-            .publisher_builder()
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .create();
-        let commands = commands.expect("a free place");
+        let commands = service::commands::publisher(&node).expect("a free place");
         let mut sent = 0;
         for mut command in invalid::<Command>() {
             // A record that happens to be a valid request to end is obeyed, as it must be.
             if command.kind == CommandKind::Shutdown as u32 {
                 command.kind = u32::MAX;
             }
-            commands.send_copy(command).expect("sent");
+            commands.send(command).expect("sent");
             sent += 1;
             if sent % 16 == 0 {
                 std::thread::sleep(Duration::from_millis(10));
@@ -61,22 +55,15 @@ fn core_refuses_invalid_records_of_hosts_and_runs_on() {
                 let mut command = Command::zeroed();
                 (command.kind, command.value_count) = (kind, 8);
                 command.values = [bad; MAX_COMMAND_VALUES];
-                commands.send_copy(command).expect("sent");
+                commands.send(command).expect("sent");
                 std::thread::sleep(Duration::from_millis(1));
             }
         }
-        let uploads = service::uploads(&node).expect("service");
-        let uploads = uploads
-            .publisher_builder()
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .allocation_strategy(AllocationStrategy::PowerOfTwo)
-            .initial_max_slice_len(64)
-            .create()
-            .expect("a free place");
+        let uploads = service::uploads::publisher(&node, 64).expect("a free place");
         for header in invalid::<UploadHeader>() {
-            let mut sample = uploads.loan_slice_uninit(64).expect("loaned");
-            *sample.user_header_mut() = header;
-            sample.write_from_fn(|i| i as u8).send().expect("sent");
+            uploads
+                .send(&header, &std::array::from_fn::<u8, 64, _>(|i| i as u8))
+                .expect("sent");
             std::thread::sleep(Duration::from_millis(1));
         }
         let went_on = until(Duration::from_secs(5), || {
@@ -120,35 +107,16 @@ fn host_drops_invalid_records_of_a_core_and_goes_on() {
     let alone = Alone(fresh_instance());
     let node = alone.0.node().expect("shared memory");
     let session_id = 7;
-    let board = create_state_board(&node, session_id).expect("board");
-    let writer = board.writer_builder().create().expect("writer");
-    let entry = writer.entry::<HapticState>(&service::STATE_KEY).expect("entry");
-    macro_rules! publisher {
-        ($factory:expr) => {
-            $factory
-                .expect("service")
-                .publisher_builder()
-                .create()
-                .expect("publisher")
-        };
-        ($factory:expr, slices) => {
-            $factory
-                .expect("service")
-                .publisher_builder()
-                .allocation_strategy(AllocationStrategy::PowerOfTwo)
-                .initial_max_slice_len(64)
-                .create()
-                .expect("publisher")
-        };
-    }
-    let sessions = publisher!(service::session(&node));
-    let events = publisher!(service::events(&node));
-    let parameters = publisher!(service::parameters(&node));
-    let plans = publisher!(service::plan(&node));
-    let replies = publisher!(service::replies(&node));
-    let records = publisher!(service::records(&node), slices);
-    let snapshots = publisher!(service::snapshots(&node), slices);
-    let scenes = publisher!(service::scene(&node), slices);
+    let board = StateBoard::create(&node, session_id).expect("board");
+    let board = board.writer().expect("writer");
+    let sessions = service::session::publisher(&node).expect("publisher");
+    let events = service::events::publisher(&node).expect("publisher");
+    let parameters = service::parameters::publisher(&node).expect("publisher");
+    let plans = service::plan::publisher(&node).expect("publisher");
+    let replies = service::replies::publisher(&node).expect("publisher");
+    let records = service::records::publisher(&node, 64).expect("publisher");
+    let snapshots = service::snapshots::publisher(&node, 64).expect("publisher");
+    let scenes = service::scene::publisher(&node, 64).expect("publisher");
 
     let mut link = Link::new(alone.0.clone());
     let mut good = Session::zeroed();
@@ -168,21 +136,15 @@ fn host_drops_invalid_records_of_a_core_and_goes_on() {
     let mut sent = 0;
     for i in (0..states.len()).cycle().take(ROUNDS * states.len()) {
         good.time_ns += 1;
-        sessions.send_copy(good).expect("sent");
-        entry.update_with_copy(states[i]);
-        events.send_copy(bad_events[i]).expect("sent");
-        parameters.send_copy(bad_parameters[i]).expect("sent");
-        plans.send_copy(bad_plans[i]).expect("sent");
-        replies.send_copy(bad_replies[i]).expect("sent");
-        let mut sample = records.loan_slice_uninit(4).expect("loaned");
-        *sample.user_header_mut() = session_id;
-        sample.write_from_fn(|_| bad_records[i]).send().expect("sent");
-        let mut sample = snapshots.loan_slice_uninit(8).expect("loaned");
-        *sample.user_header_mut() = bad_snapshots[i];
-        sample.write_from_fn(|_| bad_vertices[i]).send().expect("sent");
-        let mut sample = scenes.loan_slice_uninit(9).expect("loaned");
-        *sample.user_header_mut() = bad_scenes[i];
-        sample.write_from_fn(|_| u32::MAX).send().expect("sent");
+        sessions.send(good).expect("sent");
+        board.write(&states[i]);
+        events.send(bad_events[i]).expect("sent");
+        parameters.send(bad_parameters[i]).expect("sent");
+        plans.send(bad_plans[i]).expect("sent");
+        replies.send(bad_replies[i]).expect("sent");
+        records.send(&session_id, &[bad_records[i]; 4]).expect("sent");
+        snapshots.send(&bad_snapshots[i], &[bad_vertices[i]; 8]).expect("sent");
+        scenes.send(&bad_scenes[i], &[u32::MAX; 9]).expect("sent");
         sent += 8;
         link.poll();
         link.take_records();
@@ -190,7 +152,7 @@ fn host_drops_invalid_records_of_a_core_and_goes_on() {
     println!("{sent} invalid messages, {} dropped", link.invalid_dropped());
     // And invalid sessions.
     for session in invalid::<Session>() {
-        sessions.send_copy(session).expect("sent");
+        sessions.send(session).expect("sent");
         link.poll();
     }
     assert!(

@@ -4,12 +4,12 @@
 //! this thread looks every two milliseconds.
 
 use super::inbox::Inbox;
-use super::ports::{Board, Ports, UploadPort};
+use super::ports::Ports;
 use super::thread::lock;
 use super::{ABSENT_AFTER, SceneModel, Snapshot};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::{Instance, MAX_HOSTS};
+use stylet_shm_schema::service::{self, Instance, MAX_HOSTS, SlicePublisher, StateReader};
 use stylet_shm_schema::*;
 
 const CLEAN_EVERY: Duration = Duration::from_secs(1);
@@ -28,8 +28,8 @@ pub enum Outgoing {
 /// The thread's side: one pass over all ports after the other.
 pub struct Passes {
     // Dropped in this order: handles before the ports, and those before their node.
-    board: Option<Board>,
-    upload_port: Option<UploadPort>,
+    board: Option<StateReader>,
+    upload_port: Option<SlicePublisher<u8, UploadHeader>>,
     ports: Option<Ports>,
     instance: Instance,
     host_id: u64,
@@ -116,22 +116,18 @@ impl Passes {
 
     fn send_command(&self, command: &Command) -> Result<(), String> {
         let ports = self.ports.as_ref().ok_or("there is no connection to rt-core")?;
-        match ports.commands.send_copy(*command) {
+        match ports.commands.send(*command) {
             Ok(0) => Err("the core did not accept the command: its queue is full or it has just ended".to_owned()),
             Ok(_) => Ok(()),
-            Err(e) => Err(format!("the command could not be sent: {e:?}")),
+            Err(e) => Err(format!("the command could not be sent: {e}")),
         }
     }
 
     fn send_volume(&mut self, header: &UploadHeader, cells: &[u8]) -> Result<(), String> {
         self.upload_port = None;
         let ports = self.ports.as_ref().ok_or("there is no connection to rt-core")?;
-        let port = ports.upload_port(cells.len()).map_err(|e| e.0)?;
-        let mut sample = port
-            .loan_slice_uninit(cells.len())
-            .map_err(|e| format!("no room in shared memory for {} cells: {e:?}", cells.len()))?;
-        *sample.user_header_mut() = *header;
-        let taken = sample.write_from_slice(cells).send();
+        let port = service::uploads::publisher(&ports.node, cells.len()).map_err(|e| e.0)?;
+        let taken = port.send(header, cells);
         // The core still has to map the port's memory.
         self.upload_port = Some(port);
         match taken {
@@ -139,7 +135,7 @@ impl Passes {
                 "the core did not accept the volume; at most {MAX_HOSTS} hosts can be connected"
             )),
             Ok(_) => Ok(()),
-            Err(e) => Err(format!("the volume could not be sent: {e:?}")),
+            Err(e) => Err(format!("the volume of {} cells could not be sent: {e}", cells.len())),
         }
     }
 
@@ -151,8 +147,8 @@ impl Passes {
         let id = self.session.map(|s| s.session_id);
         let mut invalid = 0;
         let inbox = &mut *lock(&self.inbox);
-        while let Ok(Some(sample)) = ports.records.receive() {
-            for record in sample.payload() {
+        while let Some(batch) = ports.records.receive() {
+            for record in batch.values() {
                 match check::record(record) {
                     Ok(()) if id == Some(record.session_id) => inbox.put_record(*record),
                     Ok(()) => {}
@@ -160,8 +156,7 @@ impl Passes {
                 }
             }
         }
-        while let Ok(Some(sample)) = ports.events.receive() {
-            let event = *sample.payload();
+        while let Some(event) = ports.events.receive() {
             let finite = event.value.is_finite() && event.position_m.iter().all(|c| c.is_finite());
             if finite && EventKind::from_number(event.kind).is_some() {
                 inbox.put_event(event);
@@ -170,29 +165,27 @@ impl Passes {
             }
         }
         // Before the replies: whoever has the reply to a rehearsal has its result.
-        while let Ok(Some(sample)) = ports.rehearsals.receive() {
-            let rehearsal = *sample.payload();
+        while let Some(rehearsal) = ports.rehearsals.receive() {
             match check::rehearsal(&rehearsal) {
                 Ok(()) if rehearsal.host_id == self.host_id => inbox.put_rehearsal(rehearsal),
                 Ok(()) => {}
                 Err(_) => invalid += 1,
             }
         }
-        while let Ok(Some(sample)) = ports.replies.receive() {
-            let reply = *sample.payload();
+        while let Some(reply) = ports.replies.receive() {
             if reply.host_id == self.host_id {
                 inbox.put_reply(reply);
             }
         }
-        while let Ok(Some(sample)) = ports.parameters.receive() {
-            match check::parameters(sample.payload()) {
-                Ok(()) => inbox.parameters = Some(*sample.payload()),
+        while let Some(parameters) = ports.parameters.receive() {
+            match check::parameters(&parameters) {
+                Ok(()) => inbox.parameters = Some(parameters),
                 Err(_) => invalid += 1,
             }
         }
-        while let Ok(Some(sample)) = ports.plan.receive() {
-            match check::plan(sample.payload()) {
-                Ok(()) => inbox.plan = Some(*sample.payload()),
+        while let Some(plan) = ports.plan.receive() {
+            match check::plan(&plan) {
+                Ok(()) => inbox.plan = Some(plan),
                 Err(_) => invalid += 1,
             }
         }
@@ -212,8 +205,7 @@ impl Passes {
 
     fn receive_session(&mut self, ports: &Ports) {
         let mut newest = None;
-        while let Ok(Some(sample)) = ports.session.receive() {
-            let session = *sample.payload();
+        while let Some(session) = ports.session.receive() {
             if session.schema_version == SCHEMA_VERSION && session.period_ns > 0 {
                 // Two publishers, a dead one and its successor, are not received in the order of time.
                 if newest.is_none_or(|n: Session| n.time_ns <= session.time_ns) {
@@ -242,19 +234,19 @@ impl Passes {
             return None;
         }
         let mut newest = None;
-        while let Ok(Some(sample)) = ports.snapshots.receive() {
+        while let Some(sample) = ports.snapshots.receive() {
             newest = Some(sample);
         }
         let sample = newest?;
         self.snapshot_taken = Some(Instant::now());
-        Some(Snapshot::of_vertices(sample.user_header(), sample.payload()))
+        Some(Snapshot::of_vertices(sample.header(), sample.values()))
     }
 
     fn read_board(&mut self, ports: &Ports) {
         let Some(session) = &self.session else { return };
         if self.board.is_none() && self.board_tried.is_none_or(|t| t.elapsed() >= OPEN_BOARD_EVERY) {
             self.board_tried = Some(Instant::now());
-            self.board = Board::open(&ports.node, session.session_id).ok();
+            self.board = StateReader::open(&ports.node, session.session_id).ok();
         }
         let Some(board) = &self.board else { return };
         let state = board.read();
@@ -290,7 +282,7 @@ impl Passes {
         if silent > CLEAN_AFTER && self.cleaned.elapsed() >= CLEAN_EVERY {
             self.cleaned = Instant::now();
             if let Some(ports) = &self.ports {
-                let _removed = ports.node.try_cleanup_dead_nodes();
+                ports.node.clean_up();
             }
         }
     }
@@ -299,8 +291,8 @@ impl Passes {
 /// With the run that each belongs to; nothing for one that does not hold together.
 fn receive_scene(ports: &Ports) -> Vec<Option<(u64, Arc<SceneModel>)>> {
     let mut scenes = Vec::new();
-    while let Ok(Some(sample)) = ports.scene.receive() {
-        let (header, words) = (*sample.user_header(), sample.payload());
+    while let Some(sample) = ports.scene.receive() {
+        let (header, words) = (*sample.header(), sample.values());
         scenes.push(SceneModel::of_words(&header, words).map(|model| (header.session_id, Arc::new(model))));
     }
     scenes

@@ -2,7 +2,6 @@
 
 use super::*;
 use bytemuck::Zeroable;
-use iceoryx2::prelude::PortFactory;
 use std::time::Instant;
 use stylet_shm_schema::service;
 
@@ -43,16 +42,13 @@ fn until(link: &mut Link, mut holds: impl FnMut(&mut Link) -> bool) -> bool {
 fn connected(instance: &Instance) -> Link {
     // Two that create a service at the same moment may both fail.
     let node = instance.node().unwrap();
-    let sessions = service::session(&node).unwrap();
-    let scene = service::scene(&node).unwrap();
-    let commands = service::commands(&node).unwrap();
+    let sessions = service::session::watch(&node).unwrap();
+    let scene = service::scene::watch(&node).unwrap();
+    let commands = service::commands::watch(&node).unwrap();
     let mut link = Link::new(instance.clone());
     assert!(until(&mut link, |_| {
-        let subscribers = [
-            sessions.dynamic_config().number_of_subscribers(),
-            scene.dynamic_config().number_of_subscribers(),
-        ];
-        subscribers == [1; 2] && commands.dynamic_config().number_of_publishers() == 1
+        let subscribers = [sessions.connected().subscribers, scene.connected().subscribers];
+        subscribers == [1; 2] && commands.connected().publishers == 1
     }));
     link
 }
@@ -82,17 +78,11 @@ fn a_restarted_core_is_found_and_nothing_of_the_first_run_is_left() {
     let mut link = connected(&instance);
     for run in 1..=3_u64 {
         let node = instance.node().unwrap();
-        let board = service::create_state_board(&node, run).unwrap();
-        let writer = board.writer_builder().create().unwrap();
-        let entry = writer.entry::<HapticState>(&service::STATE_KEY).unwrap();
+        let board = service::StateBoard::create(&node, run).unwrap().writer().unwrap();
         let mut state = HapticState::zeroed();
         state.tick = 10 * run;
-        entry.update_with_copy(state);
-        let parameters = service::parameters(&node)
-            .unwrap()
-            .publisher_builder()
-            .create()
-            .unwrap();
+        board.write(&state);
+        let parameters = service::parameters::publisher(&node).unwrap();
         let in_force = ParametersInForce {
             session_id: run,
             generation: run,
@@ -100,12 +90,12 @@ fn a_restarted_core_is_found_and_nothing_of_the_first_run_is_left() {
             set: ParameterSet::default(),
         };
         // Before the announcement: the link keeps it.
-        parameters.send_copy(in_force).unwrap();
+        parameters.send(in_force).unwrap();
         std::thread::sleep(Duration::from_millis(20));
         link.poll();
         assert!(link.parameters().is_none_or(|p| p.session_id == run - 1));
-        let sessions = service::session(&node).unwrap().publisher_builder().create().unwrap();
-        sessions.send_copy(announce(run, run)).unwrap();
+        let sessions = service::session::publisher(&node).unwrap();
+        sessions.send(announce(run, run)).unwrap();
         let begun = |link: &mut Link| link.session().is_some_and(|s| s.session_id == run) && link.state().is_some();
         assert!(until(&mut link, begun));
         assert_eq!(link.state().unwrap().tick, 10 * run);
@@ -119,15 +109,15 @@ fn invalid_messages_are_counted_and_not_used() {
     let instance = instance("invalid");
     let mut link = connected(&instance);
     let node = instance.node().unwrap();
-    let sessions = service::session(&node).unwrap().publisher_builder().create().unwrap();
-    sessions.send_copy(announce(7, 1)).unwrap();
-    let plans = service::plan(&node).unwrap().publisher_builder().create().unwrap();
+    let sessions = service::session::publisher(&node).unwrap();
+    sessions.send(announce(7, 1)).unwrap();
+    let plans = service::plan::publisher(&node).unwrap();
     plans
-        .send_copy(bytemuck::pod_read_unaligned(&vec![0xff; size_of::<PlanInForce>()]))
+        .send(bytemuck::pod_read_unaligned(&vec![0xff; size_of::<PlanInForce>()]))
         .unwrap();
-    let events = service::events(&node).unwrap().publisher_builder().create().unwrap();
+    let events = service::events::publisher(&node).unwrap();
     events
-        .send_copy(bytemuck::pod_read_unaligned(&vec![0xff; size_of::<Event>()]))
+        .send(bytemuck::pod_read_unaligned(&vec![0xff; size_of::<Event>()]))
         .unwrap();
     assert!(until(&mut link, |link| link.invalid_dropped() >= 2));
     assert!(link.plan().is_none() && link.events().is_empty());
@@ -139,25 +129,25 @@ fn a_command_and_a_volume_arrive_and_are_answered_once() {
     let instance = instance("answer");
     let mut link = connected(&instance);
     let node = instance.node().unwrap();
-    let sessions = service::session(&node).unwrap().publisher_builder().create().unwrap();
-    let replies = service::replies(&node).unwrap().publisher_builder().create().unwrap();
-    let commands = service::commands(&node).unwrap().subscriber_builder().create().unwrap();
-    let uploads = service::uploads(&node).unwrap().subscriber_builder().create().unwrap();
-    sessions.send_copy(announce(9, 1)).unwrap();
+    let sessions = service::session::publisher(&node).unwrap();
+    let replies = service::replies::publisher(&node).unwrap();
+    let commands = service::commands::subscriber(&node).unwrap();
+    let uploads = service::uploads::subscriber(&node).unwrap();
+    sessions.send(announce(9, 1)).unwrap();
     assert!(until(&mut link, |link| link.status() == LinkStatus::Live));
 
     let request = Request::LoadBuiltinScene(2);
     let id = link.send(&request).unwrap();
     let mut arrived = None;
     assert!(until(&mut link, |_| {
-        arrived = commands.receive().unwrap();
+        arrived = commands.receive();
         arrived.is_some()
     }));
-    let command = *arrived.unwrap();
+    let command = arrived.unwrap();
     assert_eq!((command.command_id, Request::decode(&command)), (id, Ok(request)));
     for (host_id, text) in [(command.host_id, "mine"), (command.host_id ^ 1, "another's")] {
         let refusal = Refusal::new(RefusalCode::SceneLoading, text);
-        replies.send_copy(Reply::new(9, (host_id, id), Err(&refusal))).unwrap();
+        replies.send(Reply::new(9, (host_id, id), Err(&refusal))).unwrap();
     }
     let mut answer = None;
     assert!(until(&mut link, |link| {
@@ -183,36 +173,32 @@ fn a_command_and_a_volume_arrive_and_are_answered_once() {
         let id = link.upload(&volume).unwrap();
         let mut arrived = None;
         assert!(until(&mut link, |_| {
-            arrived = uploads.receive().unwrap();
+            arrived = uploads.receive();
             arrived.is_some()
         }));
         let sample = arrived.unwrap();
-        assert_eq!(sample.user_header().command_id, id);
-        assert_eq!(sample.payload(), &volume.cells[..]);
+        assert_eq!(sample.header().command_id, id);
+        assert_eq!(sample.values(), &volume.cells[..]);
     }
 }
 
 fn sends_records(instance: &Instance, session_id: u64, batches: u64, every: Duration) {
     let node = instance.node().unwrap();
-    let sessions = service::session(&node).unwrap().publisher_builder().create().unwrap();
-    sessions.send_copy(announce(session_id, 1)).unwrap();
-    let records = service::records(&node).unwrap();
-    let records = records.publisher_builder().initial_max_slice_len(service::MAX_BATCH);
-    let records = records.create().unwrap();
+    let sessions = service::session::publisher(&node).unwrap();
+    sessions.send(announce(session_id, 1)).unwrap();
+    let records = service::records::publisher(&node, service::MAX_BATCH).unwrap();
     std::thread::sleep(Duration::from_millis(50));
     for batch in 0..batches {
         if batch % 100 == 0 {
             // The heartbeat: without it the host would make its ports again.
-            sessions.send_copy(announce(session_id, 2 + batch)).unwrap();
+            sessions.send(announce(session_id, 2 + batch)).unwrap();
         }
-        let mut sample = records.loan_slice_uninit(2).unwrap();
-        *sample.user_header_mut() = session_id;
         let two = [1, 2].map(|n| TickRecord {
             session_id,
             tick: 2 * batch + n,
             ..TickRecord::zeroed()
         });
-        sample.write_from_slice(&two).send().unwrap();
+        records.send(&session_id, &two).unwrap();
         std::thread::sleep(every);
     }
 }
@@ -255,8 +241,8 @@ fn a_request_that_cannot_be_sent_is_answered() {
     let instance = instance("unsent");
     let mut link = connected(&instance);
     let node = instance.node().unwrap();
-    let sessions = service::session(&node).unwrap().publisher_builder().create().unwrap();
-    sessions.send_copy(announce(3, 1)).unwrap();
+    let sessions = service::session::publisher(&node).unwrap();
+    sessions.send(announce(3, 1)).unwrap();
     assert!(until(&mut link, |link| link.status() == LinkStatus::Live));
     // Nobody takes commands.
     let id = link.send(&Request::Engage).unwrap();

@@ -4,7 +4,7 @@ use super::streams::Scenes;
 use super::{Member, SILENCE_NS};
 use crate::control::{Order, Orders};
 use crate::keys::Invitation;
-use crate::ports::{Far, FarBoard};
+use crate::ports::Far;
 use crate::wire::{self, Hello, Kind, Rest, Who};
 use crate::{RelayError, now_ns};
 use bytemuck::Zeroable;
@@ -12,6 +12,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::check::{self, Invalid};
+use stylet_shm_schema::service::{StateBoard, StateWriter};
 use stylet_shm_schema::{
     Event, EventKind, HapticState, ParametersInForce, PlanInForce, Rehearsal, Reply, ReplyStatus, SCHEMA_VERSION,
     Session, Text,
@@ -53,7 +54,7 @@ impl Awaited {
 pub(super) struct Rounds {
     member: Arc<Member>,
     // The board before the ports, and those before their node.
-    board: Option<(u64, FarBoard)>,
+    board: Option<(u64, StateWriter)>,
     far: Far,
     orders: Orders,
     scenes: Scenes,
@@ -103,7 +104,7 @@ impl Rounds {
     }
 
     pub(super) fn pass(&mut self) {
-        self.far.update_connections();
+        self.far.connect();
         let has_server = self.member.has_server();
         if has_server != self.has_server {
             self.has_server = has_server;
@@ -173,19 +174,18 @@ impl Rounds {
 
     /// Without a server each request is answered at once: none waits and is carried out later.
     fn take_requests(&mut self) {
-        while let Ok(Some(sample)) = self.far.commands.receive() {
-            let command = *sample.payload();
+        while let Some(command) = self.far.commands.receive() {
             match self.has_server {
                 true => self.member.ask(Kind::Command, &[bytemuck::bytes_of(&command)]),
                 false => self.refuse((command.host_id, command.command_id)),
             }
         }
-        while let Ok(Some(sample)) = self.far.uploads.receive() {
-            let header = *sample.user_header();
+        while let Some(sample) = self.far.uploads.receive() {
+            let header = *sample.header();
             match self.has_server {
                 true => self
                     .member
-                    .ask(Kind::Upload, &[bytemuck::bytes_of(&header), sample.payload()]),
+                    .ask(Kind::Upload, &[bytemuck::bytes_of(&header), sample.values()]),
                 false => self.refuse((header.host_id, header.command_id)),
             }
         }
@@ -196,7 +196,7 @@ impl Rounds {
         (reply.session_id, reply.host_id, reply.command_id) = (self.member.run(self.event.0), host_id, command_id);
         reply.status = ReplyStatus::Refused as u32;
         reply.text = Text::new("the machine with rt-core is not heard; wait until it is, and ask again");
-        let _ = self.far.replies.send_copy(reply);
+        let _ = self.far.replies.send(reply);
     }
 
     /// A message for hosts here; dropped where it is invalid.
@@ -233,14 +233,16 @@ impl Rounds {
         }
         self.awaited.session = false;
         session.session_id = self.member.run(session.session_id);
-        let _ = self.far.session.send_copy(session);
+        let _ = self.far.session.send(session);
         Ok(())
     }
 
     /// Under another number where a member that was killed has left its board, which nobody can write any more.
     fn open_board(&mut self, session_id: u64) {
         for _ in 0..3 {
-            if let Ok(board) = FarBoard::create(&self.far.node, self.member.run(session_id)) {
+            if let Ok(board) =
+                StateBoard::create(&self.far.node, self.member.run(session_id)).and_then(StateBoard::writer)
+            {
                 self.board = Some((session_id, board));
                 return;
             }
@@ -263,7 +265,7 @@ impl Rounds {
         *self.scenes.lock().unwrap_or_else(PoisonError::into_inner) = rest;
         self.scene = (header.session_id, header.generation);
         header.session_id = self.member.run(header.session_id);
-        match crate::ports::send_slice(&self.far.scene, &header, &words) {
+        match self.far.scene.send(&header, &words).is_ok() {
             true => Ok(()),
             false => Err(Invalid("scene without room in shared memory")),
         }
@@ -295,7 +297,7 @@ impl Rounds {
         self.event_missed = None;
         self.event = (event.session_id, event.sequence);
         event.session_id = self.member.run(event.session_id);
-        let _ = self.far.events.send_copy(event);
+        let _ = self.far.events.send(event);
         Ok(())
     }
 
@@ -304,7 +306,7 @@ impl Rounds {
         check::parameters(&parameters)?;
         self.awaited.parameters = false;
         parameters.session_id = self.member.run(parameters.session_id);
-        let _ = self.far.parameters.send_copy(parameters);
+        let _ = self.far.parameters.send(parameters);
         Ok(())
     }
 
@@ -313,7 +315,7 @@ impl Rounds {
         check::plan(&plan)?;
         self.awaited.plan = false;
         plan.session_id = self.member.run(plan.session_id);
-        let _ = self.far.plan.send_copy(plan);
+        let _ = self.far.plan.send(plan);
         Ok(())
     }
 
@@ -321,7 +323,7 @@ impl Rounds {
         let mut reply: Reply = wire::one(body)?;
         ReplyStatus::from_number(reply.status).ok_or(Invalid("status of a reply"))?;
         reply.session_id = self.member.run(reply.session_id);
-        let _ = self.far.replies.send_copy(reply);
+        let _ = self.far.replies.send(reply);
         Ok(())
     }
 
@@ -329,7 +331,7 @@ impl Rounds {
         let mut rehearsal: Rehearsal = wire::one(body)?;
         check::rehearsal(&rehearsal)?;
         rehearsal.session_id = self.member.run(rehearsal.session_id);
-        let _ = self.far.rehearsals.send_copy(rehearsal);
+        let _ = self.far.rehearsals.send(rehearsal);
         Ok(())
     }
 }

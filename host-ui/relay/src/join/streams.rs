@@ -3,7 +3,7 @@
 use super::order::Order;
 use super::{Bytes, Member};
 use crate::RelayError;
-use crate::ports::{far_records, far_snapshots, send_slice};
+use crate::ports::{far_records, far_snapshots};
 use crate::wire::{self, Batches, Displacements, Kind, Rest, decode_snapshot};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::Receiver;
@@ -34,7 +34,7 @@ pub(super) fn records(member: &Member, messages: &Receiver<Bytes>) -> Result<(),
                 record.session_id = member.run(record.session_id);
             }
             if let Some(first) = batch.first() {
-                let _ = send_slice(&port, &first.session_id, &batch);
+                let _ = port.send(&first.session_id, &batch);
             }
         }
         if let Some((from, to)) = order.missing(now) {
@@ -88,7 +88,7 @@ pub(super) fn snapshots(member: &Member, messages: &Receiver<Bytes>, scenes: &Sc
         let rest = Arc::clone(&scenes.lock().unwrap_or_else(PoisonError::into_inner));
         if let Ok(Some((mut header, vertices))) = decode_snapshot(&rest, &mut known, message.body) {
             header.session_id = member.run(header.session_id);
-            let _ = send_slice(&port, &header, &vertices);
+            let _ = port.send(&header, &vertices);
         }
     }
     Ok(())

@@ -4,12 +4,13 @@ use super::Server;
 use super::streams::Job;
 use crate::net::{Place, Priority, put};
 use crate::now_ns;
-use crate::ports::{Board, Near};
+use crate::ports::Near;
 use crate::wire::{Hello, Kind, Stamp, encode};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
+use stylet_shm_schema::service::StateReader;
 use stylet_shm_schema::{Event, ParametersInForce, PlanInForce, Reply, SCHEMA_VERSION, Session, check};
 
 const STATE_EVERY: Duration = Duration::from_millis(10);
@@ -25,7 +26,7 @@ const REPLIES_KEPT: usize = 32;
 pub struct Announcements {
     server: Arc<Server>,
     // The board before the ports, and those before their node.
-    board: Option<Board>,
+    board: Option<StateReader>,
     near: Option<Near>,
     tried: Option<Instant>,
     board_tried: Option<Instant>,
@@ -115,8 +116,7 @@ impl Announcements {
     }
 
     fn receive(&mut self, near: &Near) {
-        while let Ok(Some(sample)) = near.session.receive() {
-            let session = *sample.payload();
+        while let Some(session) = near.session.receive() {
             let is_older = self.session.is_some_and(|old| old.started_ns > session.started_ns);
             if session.schema_version != SCHEMA_VERSION || is_older {
                 continue;
@@ -129,34 +129,32 @@ impl Announcements {
             (self.session, self.heard) = (Some(session), Instant::now());
             self.send(Kind::Session, &[bytemuck::bytes_of(&session)]);
         }
-        while let Ok(Some(sample)) = near.parameters.receive() {
-            self.parameters = Some(*sample.payload());
-            self.send(Kind::Parameters, &[bytemuck::bytes_of(sample.payload())]);
+        while let Some(sample) = near.parameters.receive() {
+            self.parameters = Some(sample);
+            self.send(Kind::Parameters, &[bytemuck::bytes_of(&sample)]);
         }
-        while let Ok(Some(sample)) = near.plan.receive() {
-            self.plan = Some(*sample.payload());
-            self.send(Kind::Plan, &[bytemuck::bytes_of(sample.payload())]);
+        while let Some(sample) = near.plan.receive() {
+            self.plan = Some(sample);
+            self.send(Kind::Plan, &[bytemuck::bytes_of(&sample)]);
         }
-        while let Ok(Some(sample)) = near.scene.receive() {
-            let header = *sample.user_header();
-            if check::scene(&header, sample.payload()).is_ok() {
-                let body = [bytemuck::bytes_of(&header), bytemuck::cast_slice(sample.payload())].concat();
+        while let Some(sample) = near.scene.receive() {
+            let header = *sample.header();
+            if check::scene(&header, sample.values()).is_ok() {
+                let body = [bytemuck::bytes_of(&header), bytemuck::cast_slice(sample.values())].concat();
                 self.send(Kind::Scene, &[&body]);
                 self.scene = Some(((header.session_id, header.generation), body));
             }
         }
-        while let Ok(Some(sample)) = near.events.receive() {
-            let event = *sample.payload();
+        while let Some(event) = near.events.receive() {
             self.events.push_back(event);
             self.events.drain(..self.events.len().saturating_sub(EVENTS_KEPT));
             self.send(Kind::Event, &[bytemuck::bytes_of(&event)]);
         }
         // Before the replies: whoever has the reply to a rehearsal has its result.
-        while let Ok(Some(sample)) = near.rehearsals.receive() {
-            self.send(Kind::Rehearsal, &[bytemuck::bytes_of(sample.payload())]);
+        while let Some(sample) = near.rehearsals.receive() {
+            self.send(Kind::Rehearsal, &[bytemuck::bytes_of(&sample)]);
         }
-        while let Ok(Some(sample)) = near.replies.receive() {
-            let reply = *sample.payload();
+        while let Some(reply) = near.replies.receive() {
             self.replies.push_back(reply);
             self.replies.drain(..self.replies.len().saturating_sub(REPLIES_KEPT));
             self.send(Kind::Reply, &[bytemuck::bytes_of(&reply)]);
@@ -167,7 +165,7 @@ impl Announcements {
         let Some(session) = &self.session else { return };
         if self.board.is_none() && self.board_tried.is_none_or(|tried| tried.elapsed() >= BOARD_EVERY) {
             self.board_tried = Some(Instant::now());
-            self.board = Board::open(&near.node, session.session_id).ok();
+            self.board = StateReader::open(&near.node, session.session_id).ok();
         }
         if self.state_sent.elapsed() < STATE_EVERY {
             return;

@@ -169,7 +169,7 @@ fn command(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_
     let passed = checked.and_then(|(command, right)| {
         allowed(rounds, seat, member, right)?;
         let near = rounds.announcements.near().ok_or("no core runs there")?;
-        near.commands.send_copy(command).map_err(|e| format!("{e:?}"))
+        near.commands.send(command).map_err(|e| format!("{e:?}"))
     });
     if let Err(why) = passed {
         refuse(rounds, seat, message, &why, false);

@@ -2,9 +2,7 @@
 //! operates, it stops the hand; it starts a server that was killed again.
 
 use super::lease::SILENCE;
-use crate::ports::to;
 use crate::{RelayError, now_ns};
-use iceoryx2::port::update_connections::UpdateConnections;
 use std::ffi::OsString;
 use std::io::{ErrorKind, Read, Write};
 use std::os::fd::{AsFd, OwnedFd};
@@ -135,10 +133,10 @@ fn stop_hand(instance: &Instance, why: &str) {
     println!("the hand is stopped: {why}");
     let send = || -> Result<(), ServiceError> {
         let node = instance.node()?;
-        let port = to(service::commands(&node)?, "commands")?;
-        let _ = port.update_connections();
+        let port = service::commands::publisher(&node)?;
+        port.connect();
         if let Ok(command) = Request::StopHand.encode(now_ns(), 1) {
-            let _ = port.send_copy(command);
+            let _ = port.send(command);
         }
         // The core connects to a new port within one of its passes, and takes what is there.
         std::thread::sleep(Duration::from_millis(30));

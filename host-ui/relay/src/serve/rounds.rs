@@ -7,13 +7,13 @@ use super::streams::Job;
 use super::{Server, asked};
 use crate::control::{Order, Orders};
 use crate::keys::{Lab, Members, Role};
-use crate::ports::SlicesTo;
 use crate::wire::{Kind, Present, Who};
 use crate::{RelayError, now_ns};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
+use stylet_shm_schema::service::SlicePublisher;
 use stylet_shm_schema::{Request, UploadHeader};
 
 const WHO_EVERY: Duration = Duration::from_millis(200);
@@ -44,7 +44,7 @@ pub(super) struct Rounds {
     pub(super) present: BTreeMap<u16, Presence>,
     pub(super) members: Members,
     pub(super) jobs: SyncSender<Job>,
-    pub(super) upload: Option<SlicesTo<u8, UploadHeader>>,
+    pub(super) upload: Option<SlicePublisher<u8, UploadHeader>>,
     revoked_at_start: Vec<u16>,
     refusals: BTreeMap<u16, Instant>,
     orders: Orders,
@@ -136,9 +136,9 @@ impl Rounds {
         let Some(near) = self.announcements.near() else { return };
         let mine = near.commands.id();
         let mut local = false;
-        while let Ok(Some(sample)) = near.requests.receive() {
+        while let Some(sample) = near.requests.receive() {
             if sample.header().publisher_id() != mine {
-                local |= Request::decode(sample.payload()).is_ok_and(|request| operates(request.kind()));
+                local |= Request::decode(&sample).is_ok_and(|request| operates(request.kind()));
             }
         }
         if local && let Some(seat) = self.lease.local_operates(now) {
@@ -162,7 +162,7 @@ impl Rounds {
         println!("the hand is stopped: {why}");
         let command = Request::StopHand.encode(self.host_id, self.stops);
         if let (Some(near), Ok(command)) = (self.announcements.near(), command) {
-            let _ = near.commands.send_copy(command);
+            let _ = near.commands.send(command);
         }
     }
 

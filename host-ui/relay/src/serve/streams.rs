@@ -3,12 +3,10 @@
 use super::{Server, lock};
 use crate::net::{Place, Priority, put, put_whole};
 use crate::now_ns;
-use crate::ports::{SlicesFrom, slices_from};
 use crate::wire::{Batches, Kind, Rest, Stamp, encode, encode_snapshot};
-use iceoryx2::prelude::Node;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::{self, Ipc, ServiceError};
+use stylet_shm_schema::service::{self, Node, ServiceError, SliceSubscriber};
 use stylet_shm_schema::{SceneHeader, SnapshotHeader, TickRecord, Vertex};
 
 /// How often the queue of records is looked at: a batch waits half of it on average.
@@ -21,7 +19,7 @@ const OPEN_EVERY: Duration = Duration::from_secs(1);
 
 /// Ports of one thread, made again when they are silent.
 struct Watched<P> {
-    ports: Option<(P, Node<Ipc>)>,
+    ports: Option<(P, Node)>,
     tried: Option<Instant>,
     heard: Instant,
 }
@@ -35,7 +33,7 @@ impl<P> Watched<P> {
         }
     }
 
-    fn get(&mut self, make: impl FnOnce() -> Result<(P, Node<Ipc>), ServiceError>) -> Option<&P> {
+    fn get(&mut self, make: impl FnOnce() -> Result<(P, Node), ServiceError>) -> Option<&P> {
         let now = Instant::now();
         let is_due = self.tried.is_none_or(|tried| now - tried >= OPEN_EVERY);
         if is_due && (self.ports.is_none() || now - self.heard >= SILENT_PORTS) {
@@ -48,16 +46,16 @@ impl<P> Watched<P> {
 
 /// Sends each batch of records under the next number, and keeps it for those that miss it.
 pub fn records(server: &Server) {
-    let mut watched = Watched::<SlicesFrom<TickRecord, u64>>::new();
+    let mut watched = Watched::<SliceSubscriber<TickRecord, u64>>::new();
     let mut number = 0;
     while !server.ends() {
         let make = || {
             let node = server.instance.node()?;
-            Ok((slices_from(service::records(&node)?, "records")?, node))
+            Ok((service::records::subscriber(&node)?, node))
         };
         let mut any = false;
         if let Some(port) = watched.get(make) {
-            while let Ok(Some(sample)) = port.receive() {
+            while let Some(sample) = port.receive() {
                 (number, any) = (number + 1, true);
                 let stamp = Stamp {
                     run: server.run,
@@ -65,7 +63,7 @@ pub fn records(server: &Server) {
                     sent_ns: now_ns(),
                     heard_ns: 0,
                 };
-                let bytes = encode(Kind::Records, stamp, &[bytemuck::cast_slice(sample.payload())]);
+                let bytes = encode(Kind::Records, stamp, &[bytemuck::cast_slice(sample.values())]);
                 server.keep(number, bytes.clone());
                 put(&server.session, Place::Records, Priority::RealTime, bytes);
             }
@@ -77,7 +75,7 @@ pub fn records(server: &Server) {
     }
 }
 
-type Pictures = (SlicesFrom<Vertex, SnapshotHeader>, SlicesFrom<u32, SceneHeader>);
+type Pictures = (SliceSubscriber<Vertex, SnapshotHeader>, SliceSubscriber<u32, SceneHeader>);
 
 /// Sends the newest snapshot, thinned, 60 times a second, to each member as much of it as its line carries.
 pub fn snapshots(server: &Server) {
@@ -87,23 +85,23 @@ pub fn snapshots(server: &Server) {
         let begun = Instant::now();
         let make = || {
             let node = server.instance.node()?;
-            let snapshots = slices_from(service::snapshots(&node)?, "snapshots")?;
-            Ok(((snapshots, slices_from(service::scene(&node)?, "scene")?), node))
+            let snapshots = service::snapshots::subscriber(&node)?;
+            Ok(((snapshots, service::scene::subscriber(&node)?), node))
         };
         let mut any = false;
         if let Some((snapshots, scenes)) = watched.get(make) {
-            while let Ok(Some(sample)) = scenes.receive() {
-                if stylet_shm_schema::check::scene(sample.user_header(), sample.payload()).is_ok() {
-                    rest = Rest::of_scene(sample.user_header(), sample.payload());
+            while let Some(sample) = scenes.receive() {
+                if stylet_shm_schema::check::scene(sample.header(), sample.values()).is_ok() {
+                    rest = Rest::of_scene(sample.header(), sample.values());
                 }
             }
             let mut newest = None;
-            while let Ok(Some(sample)) = snapshots.receive() {
+            while let Some(sample) = snapshots.receive() {
                 newest = Some(sample);
             }
             if let Some(snapshot) = newest {
                 any = true;
-                send_snapshot(server, &rest, snapshot.user_header(), snapshot.payload());
+                send_snapshot(server, &rest, snapshot.header(), snapshot.values());
             }
         }
         if any {

@@ -8,7 +8,6 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use stylet_relay::keys::{Role, Validity, write_invitation};
 use stylet_relay::now_ns;
-use stylet_relay::ports::slices_from;
 use stylet_shm_schema::service::{self, Instance};
 
 /// Of each measurement; `STYLET_RELAY_S` makes it longer for a figure.
@@ -20,12 +19,12 @@ fn seconds() -> f64 {
 /// When each tick was seen first, by a host that looks every 0.1 ms.
 pub fn arrivals(instance: &Instance, until: Instant) -> BTreeMap<u64, Instant> {
     let node = instance.node().expect("shared memory");
-    let port = slices_from(service::records(&node).expect("a service"), "records").expect("a port");
+    let port = service::records::subscriber(&node).expect("a port");
     let mut seen = BTreeMap::new();
     while Instant::now() < until {
-        while let Ok(Some(sample)) = port.receive() {
+        while let Some(sample) = port.receive() {
             let now = Instant::now();
-            seen.extend(sample.payload().iter().map(|record| (record.tick, now)));
+            seen.extend(sample.values().iter().map(|record| (record.tick, now)));
         }
         std::thread::sleep(Duration::from_micros(100));
     }
@@ -35,11 +34,11 @@ pub fn arrivals(instance: &Instance, until: Instant) -> BTreeMap<u64, Instant> {
 /// How old each snapshot was when it came, ms, by its tissue tick. Both sides are on this machine, so their clock is one.
 pub fn pictures(instance: &Instance, until: Instant) -> Vec<(u64, f64)> {
     let node = instance.node().expect("shared memory");
-    let port = slices_from(service::snapshots(&node).expect("a service"), "snapshots").expect("a port");
+    let port = service::snapshots::subscriber(&node).expect("a port");
     let mut seen = Vec::new();
     while Instant::now() < until {
-        while let Ok(Some(sample)) = port.receive() {
-            let header = sample.user_header();
+        while let Some(sample) = port.receive() {
+            let header = sample.header();
             let age_ms = now_ns().saturating_sub(header.time_ns) as f64 * 1e-6;
             seen.push((header.tissue_tick, age_ms));
         }

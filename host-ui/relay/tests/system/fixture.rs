@@ -1,14 +1,13 @@
 //! A core, a lab, and the two sides of the relay, each ended when it is dropped.
 
-use iceoryx2::prelude::Node;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 use stylet_relay::keys::{Invitation, Lab, Role, Validity, write_invitation};
-use stylet_relay::ports::{Board, Near, SlicesFrom, slices_from};
-use stylet_shm_schema::service::{self, Instance, Ipc};
+use stylet_relay::ports::Near;
+use stylet_shm_schema::service::{self, Instance, Node, SliceSubscriber, StateReader};
 use stylet_shm_schema::{HapticState, PlanInForce, Reply, ReplyStatus, Request, SceneHeader, Session, TickRecord};
 
 /// A program of the workspace, built beside the relay.
@@ -212,10 +211,10 @@ pub fn invitation(path: &Path) -> Invitation {
 
 /// A host of the smallest kind: it asks, and takes what the core says.
 pub struct Host {
-    board: Option<Board>,
+    board: Option<StateReader>,
     near: Near,
-    records: SlicesFrom<TickRecord, u64>,
-    _node: Node<Ipc>,
+    records: SliceSubscriber<TickRecord, u64>,
+    _node: Node,
     pub session: Option<Session>,
     pub scene: Option<SceneHeader>,
     pub plan: Option<PlanInForce>,
@@ -228,7 +227,7 @@ pub struct Host {
 impl Host {
     pub fn new(named: &Named) -> Self {
         let node = named.0.node().expect("shared memory");
-        let records = slices_from(service::records(&node).expect("a service"), "records").expect("a port");
+        let records = service::records::subscriber(&node).expect("a port");
         Self {
             board: None,
             near: Near::new(&named.0).expect("ports"),
@@ -245,27 +244,27 @@ impl Host {
     }
 
     pub fn poll(&mut self) {
-        while let Ok(Some(sample)) = self.near.session.receive() {
-            let session = *sample.payload();
+        while let Some(sample) = self.near.session.receive() {
+            let session = sample;
             if self.session.is_none_or(|s| s.session_id != session.session_id) {
                 self.board = None;
             }
             self.session = Some(session);
         }
-        while let Ok(Some(sample)) = self.records.receive() {
-            self.taken.extend_from_slice(sample.payload());
+        while let Some(sample) = self.records.receive() {
+            self.taken.extend_from_slice(sample.values());
         }
-        while let Ok(Some(sample)) = self.near.scene.receive() {
-            self.scene = Some(*sample.user_header());
+        while let Some(sample) = self.near.scene.receive() {
+            self.scene = Some(*sample.header());
         }
-        while let Ok(Some(sample)) = self.near.plan.receive() {
-            self.plan = Some(*sample.payload());
+        while let Some(sample) = self.near.plan.receive() {
+            self.plan = Some(sample);
         }
-        while let Ok(Some(sample)) = self.near.replies.receive() {
-            self.replies.push(*sample.payload());
+        while let Some(sample) = self.near.replies.receive() {
+            self.replies.push(sample);
         }
         if let (None, Some(session)) = (&self.board, &self.session) {
-            self.board = Board::open(&self.near.node, session.session_id).ok();
+            self.board = StateReader::open(&self.near.node, session.session_id).ok();
         }
     }
 
@@ -285,7 +284,7 @@ impl Host {
         let id = self.next;
         self.next += 1;
         let command = request.encode(self.id, id).expect("fits");
-        self.near.commands.send_copy(command).expect("sent");
+        self.near.commands.send(command).expect("sent");
         id
     }
 

@@ -17,9 +17,7 @@ impl Bridge {
     /// True when a host asked to end.
     pub(super) fn take_commands(&mut self) -> bool {
         let mut carried_out = 0;
-        while let Ok(Some(sample)) = self.link.ports.commands.receive() {
-            let command = *sample.payload();
-            drop(sample);
+        while let Some(command) = self.link.ports.commands.receive() {
             let asker = (command.host_id, command.command_id);
             match Request::decode(&command) {
                 Ok(Request::Shutdown) => {
@@ -152,7 +150,7 @@ impl Bridge {
         self.plan.generation = if plan.is_some() { generation } else { 0 };
         self.plan.session_id = self.link.session.session_id;
         self.plan.scene_generation = self.scene.generation();
-        let _ = self.link.ports.plan.send_copy(self.plan);
+        let _ = self.link.ports.plan.send(self.plan);
         self.lines
             .expect_planned(plan.map(|plan| (plan.entry_m, plan.direction)));
     }

@@ -3,9 +3,8 @@
 use super::ports::Ports;
 use crate::rt::clock;
 use crate::rt::exchange::Ticket;
-use iceoryx2::node::Node;
 use std::collections::HashMap;
-use stylet_shm_schema::service::{BATCH_EVERY, Ipc, MAX_BATCH};
+use stylet_shm_schema::service::{BATCH_EVERY, MAX_BATCH, Node};
 use stylet_shm_schema::{Event, EventKind, Refusal, Reply, Session, Text, TickRecord};
 
 const ANNOUNCE_NS: u64 = 200_000_000;
@@ -16,7 +15,7 @@ pub type Asker = (u64, u64);
 
 /// Everything that hosts hear.
 pub struct Link {
-    node: Node<Ipc>,
+    node: Node,
     pub ports: Ports,
     pub session: Session,
     /// Who waits for an answer, behind each ticket.
@@ -61,7 +60,7 @@ impl EventDetails<'_> {
 }
 
 impl Link {
-    pub fn new(node: Node<Ipc>, ports: Ports, session: Session) -> Self {
+    pub fn new(node: Node, ports: Ports, session: Session) -> Self {
         Self {
             node,
             ports,
@@ -79,16 +78,16 @@ impl Link {
 
     /// Connects hosts, sends the heartbeat, and frees what hosts that died have left.
     pub fn announce(&mut self) {
-        self.ports.update_connections();
+        self.ports.connect();
         let now_ns = clock::now_ns();
         if now_ns - self.announced_ns >= ANNOUNCE_NS {
             self.announced_ns = now_ns;
             self.session.time_ns = now_ns;
-            let _ = self.ports.session.send_copy(self.session);
+            let _ = self.ports.session.send(self.session);
         }
         if now_ns - self.cleaned_ns >= CLEAN_UP_NS {
             self.cleaned_ns = now_ns;
-            self.node.try_cleanup_dead_nodes();
+            self.node.clean_up();
         }
     }
 
@@ -121,16 +120,13 @@ impl Link {
             return;
         }
         self.sent_ns = clock::now_ns();
-        if let Ok(mut sample) = self.ports.records.loan_slice_uninit(self.batch.len()) {
-            *sample.user_header_mut() = self.session.session_id;
-            let _ = sample.write_from_slice(&self.batch).send();
-        }
+        let _ = self.ports.records.send(&self.session.session_id, &self.batch);
         self.batch.clear();
     }
 
     pub fn event(&mut self, kind: EventKind, details: EventDetails<'_>) {
         self.events += 1;
-        let _ = self.ports.events.send_copy(Event {
+        let _ = self.ports.events.send(Event {
             session_id: self.session.session_id,
             sequence: self.events,
             time_ns: details.time_ns,
@@ -164,7 +160,7 @@ impl Link {
 
     pub fn reply(&self, asker: Asker, result: Result<u64, &Refusal>) {
         let reply = Reply::new(self.session.session_id, asker, result);
-        let _ = self.ports.replies.send_copy(reply);
+        let _ = self.ports.replies.send(reply);
     }
 
     /// A refusal before there was a ticket.

@@ -21,7 +21,6 @@ use crate::replay::file::Flight;
 use crate::rt::wiring::BridgePorts;
 use flight::FlightKeeper;
 pub use flight::SaveError;
-use iceoryx2::node::Node;
 use lines::LinePreparer;
 use link::{EventDetails, Link};
 use loader::SceneLoader;
@@ -36,7 +35,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 use stylet_hw::DeviceInfo;
-use stylet_shm_schema::service::Ipc;
+use stylet_shm_schema::service::Node;
 use stylet_shm_schema::{EventKind, Fault, PlanInForce, Refusal, RefusalCode, Rehearsal, Session};
 use stylet_sim::scene::{SceneSource, TissueKind};
 use supervisor::Supervisor;
@@ -97,14 +96,14 @@ pub struct Bridge {
 
 impl Bridge {
     /// Announces parameters and plan; everything else follows in [`run`](Self::run).
-    pub fn new(node: Node<Ipc>, ports: Ports, loops: BridgePorts, setup: BridgeSetup) -> Self {
+    pub fn new(node: Node, ports: Ports, loops: BridgePorts, setup: BridgeSetup) -> Self {
         let session_id = setup.session.session_id;
         let mut plan: PlanInForce = bytemuck::Zeroable::zeroed();
         plan.session_id = session_id;
         let parameters = ParameterChanges::new(session_id);
         let link = Link::new(node, ports, setup.session);
-        let _ = link.ports.parameters.send_copy(parameters.in_force);
-        let _ = link.ports.plan.send_copy(plan);
+        let _ = link.ports.parameters.send(parameters.in_force);
+        let _ = link.ports.plan.send(plan);
         let tapes = (loops.haptic_tapes, loops.tissue_tapes);
         Self {
             link,
@@ -216,7 +215,7 @@ impl Bridge {
             return;
         };
         if let (Ok(result), Some((host_id, command_id))) = (&ended.outcome, self.link.asker(ended.ticket)) {
-            let _ = self.link.ports.rehearsals.send_copy(Rehearsal {
+            let _ = self.link.ports.rehearsals.send(Rehearsal {
                 session_id: self.link.session.session_id,
                 host_id,
                 command_id,

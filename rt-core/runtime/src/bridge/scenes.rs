@@ -20,13 +20,7 @@ impl RunningScene {
 
     /// Sends the picture once; tried again at the next pass when there is no room.
     pub(super) fn send(&mut self, link: &Link) {
-        if self.sent {
-            return;
-        }
-        if let Ok(mut sample) = link.ports.scene.loan_slice_uninit(self.picture.words.len()) {
-            *sample.user_header_mut() = self.picture.header;
-            self.sent = sample.write_from_slice(&self.picture.words).send().is_ok();
-        }
+        self.sent = self.sent || link.ports.scene.send(&self.picture.header, &self.picture.words).is_ok();
     }
 }
 
@@ -47,10 +41,10 @@ impl Bridge {
     }
 
     pub(super) fn take_uploads(&mut self) {
-        while let Ok(Some(sample)) = self.link.ports.uploads.receive() {
-            let header = *sample.user_header();
+        while let Some(slice) = self.link.ports.uploads.receive() {
+            let header = *slice.header();
             let asker: Asker = (header.host_id, header.command_id);
-            let labels = match upload::labels(&header, sample.payload()) {
+            let labels = match upload::labels(&header, slice.values()) {
                 Ok(labels) => labels,
                 Err(why) => {
                     let refusal = Refusal::new(RefusalCode::InvalidVolume, why.to_string());
@@ -58,7 +52,7 @@ impl Bridge {
                     continue;
                 }
             };
-            drop(sample);
+            drop(slice);
             let (ticket, name) = (self.link.ticket(asker), header.name.read());
             let wanted = Wanted {
                 ticket,
@@ -135,7 +129,7 @@ impl Bridge {
             self.scene.send(&self.link);
             self.plan = bytemuck::Zeroable::zeroed();
             self.plan.session_id = self.link.session.session_id;
-            let _ = self.link.ports.plan.send_copy(self.plan);
+            let _ = self.link.ports.plan.send(self.plan);
         }
         let name = self.scene.picture.header.name.read();
         self.link.event(

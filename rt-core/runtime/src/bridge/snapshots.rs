@@ -2,11 +2,10 @@
 
 use crate::bridge::ports::Ports;
 use crate::rt::exchange::{SnapshotReturn, SnapshotSlot};
-use iceoryx2::sample_mut::SampleMut;
-use stylet_shm_schema::service::{Ipc, SNAPSHOTS_AHEAD};
+use stylet_shm_schema::service::{self, SNAPSHOTS_AHEAD};
 use stylet_shm_schema::{SnapshotHeader, Vertex};
 
-type Loan = SampleMut<Ipc, [Vertex], SnapshotHeader>;
+type Loan = service::Loan<Vertex, SnapshotHeader>;
 
 /// How much one snapshot of a scene holds.
 #[derive(Clone, Copy)]
@@ -63,11 +62,10 @@ impl SnapshotLoans {
         let Some(index) = self.out.iter().position(Option::is_none) else {
             return false;
         };
-        let Ok(mut loan) = ports.snapshots.loan_slice(size.total()) else {
+        let Some(mut loan) = ports.snapshots.loan(size.total()) else {
             return false;
         };
-        let header: *mut SnapshotHeader = loan.user_header_mut();
-        let vertices = loan.payload_mut().as_mut_ptr();
+        let (header, vertices) = loan.parts();
         let slot = SnapshotSlot {
             index: index as u32,
             scene_generation,

@@ -13,10 +13,9 @@ use crate::rt::tissue::TissueLoop;
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::wiring::{BridgePorts, Capacities, Wiring};
 use crate::rt::world::World;
-use iceoryx2::node::Node;
 use std::sync::Arc;
 use stylet_hw::{Device, DeviceInfo};
-use stylet_shm_schema::service::{self, Ipc, StateBoard};
+use stylet_shm_schema::service::{Node, StateBoard};
 use stylet_shm_schema::{ParameterSet, flags};
 use stylet_sim::active::{Active, activate};
 use stylet_sim::scene::{Scene, SceneSource};
@@ -46,7 +45,7 @@ pub(super) struct Loops {
 
 /// The process's place in shared memory.
 pub(super) struct SharedMemory {
-    pub node: Node<Ipc>,
+    pub node: Node,
     pub ports: Ports,
     pub board: StateBoard,
 }
@@ -90,7 +89,7 @@ impl Setup {
         let node = options.instance.node()?;
         let (snapshot_len, words) = (self.picture.snapshot_size().total(), self.picture.word_count());
         let ports = Ports::new(&node, snapshot_len, words)?;
-        let board = service::create_state_board(&node, self.session_id)?;
+        let board = StateBoard::create(&node, self.session_id)?;
         options.instance.secure_room()?;
         Ok(SharedMemory { node, ports, board })
     }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::thread::JoinHandle;
-use stylet_shm_schema::service::{STATE_KEY, StateBoard};
+use stylet_shm_schema::service::StateBoard;
 use stylet_shm_schema::{HapticState, ThreadReport};
 
 /// A loop's thread, and what the kernel granted it.
@@ -92,12 +92,11 @@ fn run_tissue(mut tissue: TissueLoop, armed: &Armed, end: &AtomicBool) -> LoopRe
 }
 
 fn run_haptic(mut haptic: HapticLoop, board: StateBoard, armed: &Armed, end: &AtomicBool) -> LoopReport {
-    // The entry is made in the thread that uses it; making it allocates, so it comes before the loop.
-    let writer = board.writer_builder().create().ok();
-    let entry = writer.as_ref().and_then(|w| w.entry::<HapticState>(&STATE_KEY).ok());
+    // The writer is made in the thread that uses it; making it allocates, so it comes before the loop.
+    let writer = board.writer().ok();
     let publish = |state: &HapticState| {
-        if let Some(entry) = &entry {
-            entry.update_with_copy(*state);
+        if let Some(writer) = &writer {
+            writer.write(state);
         }
     };
     publish(&haptic.state);

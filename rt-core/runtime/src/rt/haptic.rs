@@ -9,11 +9,9 @@ use crate::rt::response::TissueResponse;
 use crate::rt::timing::Probe;
 use crate::rt::watchdog::{Watchdog, Watched, at_gate, device_fault};
 use crate::rt::wiring::HapticPorts;
-use iceoryx2::port::writer::EntryHandleMut;
 use nalgebra::Vector3;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_hw::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
-use stylet_shm_schema::service::Ipc;
 use stylet_shm_schema::{Fault, HapticState};
 use stylet_sim::force::ForceFault;
 use stylet_sim::force::chain::{self, ChainOutput, ChainParameters, ChainState, Touch};
@@ -25,9 +23,6 @@ mod left;
 mod line;
 mod orders;
 mod record;
-
-/// The blackboard entry; made and used by the haptic thread alone.
-pub type StateEntry = EntryHandleMut<Ipc, u64, HapticState>;
 
 /// Everything that the haptic thread owns.
 pub struct HapticLoop {

@@ -9,6 +9,7 @@ const WINDOW: &[&str] = &[
     "wgpu",
     "winit",
 ];
+/// `shm-schema` alone makes ports (ADR 19).
 const PORTS: &[&str] = &["iceoryx2"];
 const ARGUMENTS: &[&str] = &["clap"];
 const PROGRAM: &[&str] = &["indicatif", "signal-hook"];
@@ -96,7 +97,7 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema/anatomy",
         ],
         never: &[WINDOW, PROGRAM, DICOM],
-        not_itself: &[],
+        not_itself: &[PORTS],
     },
     Layer {
         folder: "rt-core/lab",
@@ -110,7 +111,7 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema/write",
         ],
         never: &[WINDOW, DICOM],
-        not_itself: &[],
+        not_itself: &[PORTS],
     },
     Layer {
         folder: "rt-core/study",
@@ -140,7 +141,7 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema/manual",
         ],
         never: &[WINDOW, DICOM],
-        not_itself: &[],
+        not_itself: &[PORTS],
     },
     // The host's side.
     Layer {
@@ -177,7 +178,7 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema/anatomy",
         ],
         never: &[WINDOW, DEVICES],
-        not_itself: &[DICOM],
+        not_itself: &[PORTS, DICOM],
     },
     Layer {
         folder: "host-ui/implant",
@@ -216,7 +217,7 @@ pub const LAYERS: &[Layer] = &[
         folder: "host-ui/relay",
         may_use: &["shm-schema"],
         never: &[WINDOW, DEVICES, DICOM],
-        not_itself: &[],
+        not_itself: &[PORTS],
     },
     Layer {
         folder: "host-ui/controllers",
@@ -242,7 +243,7 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema/manual",
         ],
         never: &[],
-        not_itself: &[],
+        not_itself: &[PORTS],
     },
 ];
 

@@ -1,0 +1,294 @@
+//! Names, configuration and ports of every service, so that all programs meet without reading a foreign file.
+//!
+//! Each service has one way to make its ports. Nobody else makes any: no other crate knows iceoryx2.
+
+use crate::*;
+use iceoryx2::prelude::{BackpressureStrategy, ServiceName};
+use iceoryx2::service::ipc;
+use iceoryx2::service::port_factory::PortFactory as _;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use std::time::Duration;
+
+mod board;
+mod instance;
+mod ports;
+
+pub use board::{StateBoard, StateReader, StateWriter};
+pub use instance::Instance;
+pub use ports::{
+    Connected, Loan, Node, Publisher, SendError, Slice, SlicePublisher, SliceSubscriber, Subscriber, Watch,
+};
+
+/// The form of service that all programs use.
+type Ipc = ipc::Service;
+
+/// Records in one batch at most.
+pub const MAX_BATCH: usize = 32;
+/// A batch that is not full is sent after this time, so that the queue of batches holds a known time.
+pub const BATCH_EVERY: Duration = Duration::from_millis(20);
+/// Batches that a slow host may be behind before the oldest is dropped: 12 s. The memory for all hosts is 35 MB in `/dev/shm`.
+pub const RECORD_BUFFER: usize = 600;
+/// Snapshots that the bridge loans ahead.
+pub const SNAPSHOTS_AHEAD: usize = 4;
+/// Hosts at once.
+pub const MAX_HOSTS: usize = 6;
+
+/// Why shared memory could not be used; the text says what to do.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct ServiceError(pub String);
+
+fn failed(what: &str, why: impl std::fmt::Debug) -> ServiceError {
+    ServiceError(format!(
+        "{what}: {why:?}. Both programs must run as the same user and come from the same build, and /dev/shm needs room (df -h /dev/shm)"
+    ))
+}
+
+/// Why a port of the core, or of what stands in its place, could not be made.
+fn core_failed(service: &str, why: impl std::fmt::Debug) -> ServiceError {
+    ServiceError(format!(
+        "cannot use shared memory: {service}: {why:?}. Is another rt-core or relay running under this instance name? Choose another with \
+         --instance"
+    ))
+}
+
+/// Why a port of a host could not be made.
+fn host_failed(service: &str, why: impl std::fmt::Debug) -> ServiceError {
+    ServiceError(format!(
+        "{service}: {why:?}. At most {MAX_HOSTS} hosts can watch one core; close another window, or check the room in /dev/shm"
+    ))
+}
+
+fn name(service: &str) -> Result<ServiceName, ServiceError> {
+    ServiceName::new(&format!("stylet/{SCHEMA_VERSION}/{service}")).map_err(|e| failed(service, e))
+}
+
+/// Who publishes a service decides how many may, and whose mistake it is when a port cannot be made.
+macro_rules! publishers {
+    (core) => {
+        1
+    };
+    (hosts) => {
+        MAX_HOSTS
+    };
+}
+macro_rules! publisher_failed {
+    (core) => {
+        core_failed
+    };
+    (hosts) => {
+        host_failed
+    };
+}
+macro_rules! subscriber_failed {
+    (core) => {
+        host_failed
+    };
+    (hosts) => {
+        core_failed
+    };
+}
+
+macro_rules! service {
+    ($(#[$doc:meta])* $module:ident: $value:ty, by $who:ident, history $history:expr, buffer $buffer:expr) => {
+        $(#[$doc])*
+        pub mod $module {
+            use super::*;
+
+            const NAME: &str = stringify!($module);
+
+            fn open(node: &Node) -> Result<PortFactory<Ipc, $value, ()>, ServiceError> {
+                node.inner()
+                    .service_builder(&name(NAME)?)
+                    .publish_subscribe::<$value>()
+                    .max_publishers(publishers!($who))
+                    .max_subscribers(MAX_HOSTS + 2)
+                    .max_nodes(MAX_HOSTS + 4)
+                    .history_size($history)
+                    .subscriber_max_buffer_size($buffer)
+                    .open_or_create()
+                    .map_err(|e| failed(NAME, e))
+            }
+
+            /// Sends; what a full queue has no room for is dropped.
+            pub fn publisher(node: &Node) -> Result<Publisher<$value>, ServiceError> {
+                open(node)?
+                    .publisher_builder()
+                    .backpressure_strategy(BackpressureStrategy::DiscardData)
+                    .create()
+                    .map(Publisher::new)
+                    .map_err(|e| publisher_failed!($who)(NAME, e))
+            }
+
+            /// Receives.
+            pub fn subscriber(node: &Node) -> Result<Subscriber<$value>, ServiceError> {
+                open(node)?
+                    .subscriber_builder()
+                    .create()
+                    .map(Subscriber::new)
+                    .map_err(|e| subscriber_failed!($who)(NAME, e))
+            }
+
+            /// Who is connected.
+            pub fn watch(node: &Node) -> Result<Watch, ServiceError> {
+                let service = open(node)?;
+                Ok(Watch::new(move || {
+                    let config = service.dynamic_config();
+                    Connected {
+                        subscribers: config.number_of_subscribers(),
+                        publishers: config.number_of_publishers(),
+                    }
+                }))
+            }
+        }
+    };
+    (
+        $(#[$doc:meta])*
+        $module:ident: [$value:ty] under $header:ty, by $who:ident, history $history:expr, buffer $buffer:expr,
+        loans $loans:expr, kept $kept:expr
+    ) => {
+        $(#[$doc])*
+        pub mod $module {
+            use super::*;
+
+            const NAME: &str = stringify!($module);
+
+            fn open(node: &Node) -> Result<PortFactory<Ipc, [$value], $header>, ServiceError> {
+                node.inner()
+                    .service_builder(&name(NAME)?)
+                    .publish_subscribe::<[$value]>()
+                    .user_header::<$header>()
+                    // One more, while one takes the place of another.
+                    .max_publishers(publishers!($who) + 1)
+                    .max_subscribers(MAX_HOSTS + 2)
+                    .max_nodes(MAX_HOSTS + 4)
+                    .history_size($history)
+                    .subscriber_max_buffer_size($buffer)
+                    .open_or_create()
+                    .map_err(|e| failed(NAME, e))
+            }
+
+            /// Sends slices, of at most `length` values without taking more memory; what a full queue has no room for is
+            /// dropped.
+            pub fn publisher(node: &Node, length: usize) -> Result<SlicePublisher<$value, $header>, ServiceError> {
+                let service = open(node)?;
+                SlicePublisher::new(length, move |length| {
+                    service
+                        .publisher_builder()
+                        .backpressure_strategy(BackpressureStrategy::DiscardData)
+                        .initial_max_slice_len(length)
+                        .max_loaned_samples($loans)
+                        .override_sample_preallocation($kept)
+                        .create()
+                })
+                .map_err(|e| publisher_failed!($who)(NAME, e))
+            }
+
+            /// Receives.
+            pub fn subscriber(node: &Node) -> Result<SliceSubscriber<$value, $header>, ServiceError> {
+                open(node)?
+                    .subscriber_builder()
+                    .create()
+                    .map(SliceSubscriber::new)
+                    .map_err(|e| subscriber_failed!($who)(NAME, e))
+            }
+
+            /// Who is connected.
+            pub fn watch(node: &Node) -> Result<Watch, ServiceError> {
+                let service = open(node)?;
+                Ok(Watch::new(move || {
+                    let config = service.dynamic_config();
+                    Connected {
+                        subscribers: config.number_of_subscribers(),
+                        publishers: config.number_of_publishers(),
+                    }
+                }))
+            }
+        }
+    };
+}
+
+service!(
+    /// Which run this is: [`Session`].
+    session: Session, by core, history 1, buffer 2);
+service!(
+    /// What happened: [`Event`].
+    events: Event, by core, history 64, buffer 512);
+service!(
+    /// Parameters that took effect: [`ParametersInForce`].
+    parameters: ParametersInForce, by core, history 1, buffer 2);
+service!(
+    /// The plan: [`PlanInForce`].
+    plan: PlanInForce, by core, history 1, buffer 2);
+service!(
+    /// Requests of hosts: [`Command`].
+    commands: Command, by hosts, history 0, buffer 64);
+service!(
+    /// Answers to them: [`Reply`].
+    replies: Reply, by core, history 0, buffer 64);
+service!(
+    /// Results of rehearsals: [`Rehearsal`].
+    rehearsals: Rehearsal, by core, history 0, buffer 8);
+service!(
+    /// Every tick of the force loop; the header is the run of the core.
+    records: [TickRecord] under u64, by core, history 0, buffer RECORD_BUFFER, loans 2, kept |all| all);
+
+// Slices that memory is taken for: iceoryx2 would take enough for every host to hold every slice that it may, hundreds of MB of
+// locked memory for a large scene. Two wait in the queues; beside them stand what is being filled and one for each host that
+// stopped while it read. When all are held, nothing is sent until one returns.
+service!(
+    /// The deformed surface and displacements inside.
+    snapshots: [Vertex] under SnapshotHeader, by core, history 1, buffer 2,
+    loans 2 * SNAPSHOTS_AHEAD, kept |_| 2 * SNAPSHOTS_AHEAD + 2 + MAX_HOSTS);
+service!(
+    /// Rest surface, structures and labels; sent again under a new generation when the scene changes.
+    scene: [u32] under SceneHeader, by core, history 1, buffer 2, loans 2, kept |_| 6);
+service!(
+    /// Volumes that hosts send, each through a port of its own: its memory is as large as the volume, and the core maps all of it.
+    uploads: [u8] under UploadHeader, by hosts, history 0, buffer 2, loans 2, kept |_| 2);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each pass of the bridge sent a batch: the queue held 0.13 s of them, and a recorder that stalled for longer lost ticks.
+    /// A port that grew ended the core when a host had stopped while it read: more slices were held than it began with.
+    #[test]
+    fn slices_that_nobody_returns_are_refused_and_longer_ones_find_room() {
+        let instance = Instance::new(&format!("held-{}", std::process::id())).unwrap();
+        let node = instance.node().unwrap();
+        let sends = scene::publisher(&node, 4).unwrap();
+        let takes: Vec<_> = (0..4).map(|_| scene::subscriber(&node).unwrap()).collect();
+        sends.connect();
+        let header = SceneHeader::default();
+        let mut held = Vec::new();
+        let mut refused = 0;
+        for n in 0..20 {
+            refused += u32::from(sends.send(&header, &[n; 4]).is_err());
+            held.extend(takes[n as usize % 4].receive());
+        }
+        assert!(refused > 0 && !held.is_empty(), "{refused} refused");
+        held.clear();
+        for take in &takes {
+            while take.receive().is_some() {}
+        }
+        for length in [4, 100, 3000] {
+            sends.send(&header, &vec![7; length]).unwrap();
+            for take in &takes {
+                assert_eq!(take.receive().unwrap().values(), vec![7; length]);
+            }
+        }
+        drop((sends, takes, node));
+        instance.sweep();
+    }
+
+    #[test]
+    fn a_host_that_stalls_for_ten_seconds_loses_no_record() {
+        let held = BATCH_EVERY * RECORD_BUFFER as u32;
+        assert!(held >= Duration::from_secs(10), "{held:?}");
+        // Full batches, sent without a pause, hold at least as much at 1 kHz.
+        assert!(Duration::from_millis(MAX_BATCH as u64) >= BATCH_EVERY);
+        let bytes = (MAX_HOSTS + 2) * (RECORD_BUFFER + 4) * MAX_BATCH * size_of::<TickRecord>();
+        assert!(bytes < 38_000_000, "{bytes} bytes in /dev/shm");
+    }
+}

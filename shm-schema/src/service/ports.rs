@@ -1,0 +1,337 @@
+//! What a program holds of a service. Behind each port stands a trait object, so that iceoryx2, which is generic through
+//! and through, is compiled for this crate alone (ADR 19), and so that no other crate can make a port in another way.
+
+use super::Ipc;
+use bytemuck::Zeroable;
+use iceoryx2::node;
+use iceoryx2::port::publisher::PublisherCreateError;
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::port::{publisher, subscriber};
+use iceoryx2::prelude::ZeroCopySend;
+use iceoryx2::sample::Sample;
+use iceoryx2::sample_mut::SampleMut;
+use std::cell::{Cell, RefCell};
+use std::fmt::Debug;
+
+/// Why something could not be sent.
+#[derive(Debug, thiserror::Error)]
+#[error("no room in shared memory: {0}")]
+pub struct SendError(String);
+
+impl SendError {
+    fn of(why: impl Debug) -> Self {
+        Self(format!("{why:?}"))
+    }
+}
+
+/// A program's place in shared memory; every port is made on one, and goes before it.
+pub struct Node(Box<dyn InnerNode + Send>);
+
+trait InnerNode {
+    fn inner(&self) -> &node::Node<Ipc>;
+}
+
+impl InnerNode for node::Node<Ipc> {
+    fn inner(&self) -> &node::Node<Ipc> {
+        self
+    }
+}
+
+impl Node {
+    pub(super) fn new(node: node::Node<Ipc>) -> Self {
+        Self(Box::new(node))
+    }
+
+    pub(super) fn inner(&self) -> &node::Node<Ipc> {
+        self.0.inner()
+    }
+
+    /// Frees what programs that died have left.
+    pub fn clean_up(&self) {
+        // What another program cleans at the same time is left to it.
+        let _ = self.inner().try_cleanup_dead_nodes();
+    }
+}
+
+/// Sends single values.
+pub struct Publisher<T>(Box<dyn Sends<T>>);
+
+/// Receives single values.
+pub struct Subscriber<T>(Box<dyn Receives<T>>);
+
+/// Sends slices under a header.
+pub struct SlicePublisher<T, H>(Box<dyn SendsSlices<T, H>>);
+
+/// Receives slices under a header.
+pub struct SliceSubscriber<T, H>(Box<dyn ReceivesSlices<T, H>>);
+
+/// A slice in shared memory, read where it lies.
+pub struct Slice<T, H>(Box<dyn Held<T, H>>);
+
+/// A slice in shared memory to be filled, then sent.
+pub struct Loan<T, H>(Box<dyn Loaned<T, H>>);
+
+trait Sends<T> {
+    fn send(&self, value: T) -> Result<usize, SendError>;
+    fn connect(&self);
+}
+
+trait Receives<T> {
+    fn receive(&self) -> Option<T>;
+}
+
+trait SendsSlices<T, H> {
+    fn send(&self, header: &H, values: &[T]) -> Result<usize, SendError>;
+    fn loan(&self, length: usize) -> Option<Loan<T, H>>;
+    fn connect(&self);
+}
+
+trait ReceivesSlices<T, H> {
+    fn receive(&self) -> Option<Slice<T, H>>;
+}
+
+trait Held<T, H> {
+    fn header(&self) -> &H;
+    fn values(&self) -> &[T];
+}
+
+trait Loaned<T, H> {
+    fn parts(&mut self) -> (*mut H, *mut T);
+    fn send(self: Box<Self>) -> Result<usize, SendError>;
+}
+
+impl<T: ZeroCopySend + Debug + Copy + 'static> Sends<T> for publisher::Publisher<Ipc, T, ()> {
+    fn send(&self, value: T) -> Result<usize, SendError> {
+        self.send_copy(value).map_err(SendError::of)
+    }
+
+    fn connect(&self) {
+        // A host that cannot be connected now is connected the next time.
+        let _ = self.update_connections();
+    }
+}
+
+impl<T: ZeroCopySend + Debug + Copy + 'static> Receives<T> for subscriber::Subscriber<Ipc, T, ()> {
+    fn receive(&self) -> Option<T> {
+        self.receive().ok().flatten().map(|sample| *sample)
+    }
+}
+
+/// A port whose memory is taken once. A slice that is longer than those before it gets a port of its own, which takes its
+/// place: a port of iceoryx2 0.10 that grows ends the program as soon as more slices are held than it began with.
+struct Growing<T: ZeroCopySend + Debug + 'static, H: ZeroCopySend + Debug + 'static, F> {
+    port: RefCell<publisher::Publisher<Ipc, [T], H>>,
+    length: Cell<usize>,
+    make: F,
+}
+
+impl<T, H, F> Growing<T, H, F>
+where
+    T: ZeroCopySend + Debug + Copy + Zeroable + 'static,
+    H: ZeroCopySend + Debug + Copy + Default + 'static,
+    F: Fn(usize) -> Result<publisher::Publisher<Ipc, [T], H>, PublisherCreateError>,
+{
+    fn make_room(&self, length: usize) -> Result<(), SendError> {
+        if length > self.length.get() {
+            let enough = length.next_power_of_two();
+            self.port.replace((self.make)(enough).map_err(SendError::of)?);
+            self.length.set(enough);
+        }
+        Ok(())
+    }
+}
+
+impl<T, H, F> SendsSlices<T, H> for Growing<T, H, F>
+where
+    T: ZeroCopySend + Debug + Copy + Zeroable + 'static,
+    H: ZeroCopySend + Debug + Copy + Default + 'static,
+    F: Fn(usize) -> Result<publisher::Publisher<Ipc, [T], H>, PublisherCreateError>,
+{
+    fn send(&self, header: &H, values: &[T]) -> Result<usize, SendError> {
+        self.make_room(values.len())?;
+        let port = self.port.borrow();
+        let mut sample = port.loan_slice_uninit(values.len()).map_err(SendError::of)?;
+        *sample.user_header_mut() = *header;
+        sample.write_from_slice(values).send().map_err(SendError::of)
+    }
+
+    fn loan(&self, length: usize) -> Option<Loan<T, H>> {
+        self.make_room(length).ok()?;
+        let slice = self.port.borrow().loan_slice_uninit(length).ok()?;
+        Some(Loan(Box::new(slice.write_from_fn(|_| T::zeroed()))))
+    }
+
+    fn connect(&self) {
+        // A host that cannot be connected now is connected the next time.
+        let _ = self.port.borrow().update_connections();
+    }
+}
+
+impl<T, H> ReceivesSlices<T, H> for subscriber::Subscriber<Ipc, [T], H>
+where
+    T: ZeroCopySend + Debug + 'static,
+    H: ZeroCopySend + Debug + 'static,
+{
+    fn receive(&self) -> Option<Slice<T, H>> {
+        Some(Slice(Box::new(self.receive().ok().flatten()?)))
+    }
+}
+
+impl<T, H> Held<T, H> for Sample<Ipc, [T], H>
+where
+    T: ZeroCopySend + Debug,
+    H: ZeroCopySend + Debug,
+{
+    fn header(&self) -> &H {
+        self.user_header()
+    }
+
+    fn values(&self) -> &[T] {
+        self.payload()
+    }
+}
+
+impl<T, H> Loaned<T, H> for SampleMut<Ipc, [T], H>
+where
+    T: ZeroCopySend + Debug,
+    H: ZeroCopySend + Debug,
+{
+    fn parts(&mut self) -> (*mut H, *mut T) {
+        let header: *mut H = self.user_header_mut();
+        (header, self.payload_mut().as_mut_ptr())
+    }
+
+    fn send(self: Box<Self>) -> Result<usize, SendError> {
+        (*self).send().map_err(SendError::of)
+    }
+}
+
+impl<T> Publisher<T> {
+    pub(super) fn new(port: publisher::Publisher<Ipc, T, ()>) -> Self
+    where
+        T: ZeroCopySend + Debug + Copy + 'static,
+    {
+        Self(Box::new(port))
+    }
+
+    /// Sends to everybody who is connected; to how many.
+    pub fn send(&self, value: T) -> Result<usize, SendError> {
+        self.0.send(value)
+    }
+
+    /// Connects programs that came and drops those that went.
+    pub fn connect(&self) {
+        self.0.connect();
+    }
+}
+
+impl<T> Subscriber<T> {
+    pub(super) fn new(port: subscriber::Subscriber<Ipc, T, ()>) -> Self
+    where
+        T: ZeroCopySend + Debug + Copy + 'static,
+    {
+        Self(Box::new(port))
+    }
+
+    /// The next value; none where there is none, or none can be had.
+    pub fn receive(&self) -> Option<T> {
+        self.0.receive()
+    }
+}
+
+impl<T, H> SlicePublisher<T, H>
+where
+    T: ZeroCopySend + Debug + Copy + Zeroable + 'static,
+    H: ZeroCopySend + Debug + Copy + Default + 'static,
+{
+    /// `make` makes a port for slices of at most so many values.
+    pub(super) fn new(
+        length: usize,
+        make: impl Fn(usize) -> Result<publisher::Publisher<Ipc, [T], H>, PublisherCreateError> + 'static,
+    ) -> Result<Self, PublisherCreateError> {
+        Ok(Self(Box::new(Growing {
+            port: RefCell::new(make(length)?),
+            length: Cell::new(length),
+            make,
+        })))
+    }
+}
+
+impl<T, H> SlicePublisher<T, H> {
+    /// Sends to everybody who is connected; to how many.
+    pub fn send(&self, header: &H, values: &[T]) -> Result<usize, SendError> {
+        self.0.send(header, values)
+    }
+
+    /// A slice of that length, to be filled where it lies; none where there is no room.
+    pub fn loan(&self, length: usize) -> Option<Loan<T, H>> {
+        self.0.loan(length)
+    }
+
+    /// Connects programs that came and drops those that went.
+    pub fn connect(&self) {
+        self.0.connect();
+    }
+}
+
+impl<T, H> SliceSubscriber<T, H> {
+    pub(super) fn new(port: subscriber::Subscriber<Ipc, [T], H>) -> Self
+    where
+        T: ZeroCopySend + Debug + 'static,
+        H: ZeroCopySend + Debug + 'static,
+    {
+        Self(Box::new(port))
+    }
+
+    /// The next slice; none where there is none, or none can be had.
+    pub fn receive(&self) -> Option<Slice<T, H>> {
+        self.0.receive()
+    }
+}
+
+impl<T, H> Slice<T, H> {
+    /// What stands over the slice.
+    pub fn header(&self) -> &H {
+        self.0.header()
+    }
+
+    /// The slice.
+    pub fn values(&self) -> &[T] {
+        self.0.values()
+    }
+}
+
+impl<T, H> Loan<T, H> {
+    /// Where header and values lie, for a thread that fills them while the loan stays here.
+    pub fn parts(&mut self) -> (*mut H, *mut T) {
+        self.0.parts()
+    }
+
+    /// Sends it to everybody who is connected; to how many.
+    pub fn send(self) -> Result<usize, SendError> {
+        self.0.send()
+    }
+}
+
+/// Programs that take what a service sends, and those that send.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Connected {
+    /// How many take.
+    pub subscribers: usize,
+    /// How many send.
+    pub publishers: usize,
+}
+
+/// Who is connected to a service.
+pub struct Watch(Box<dyn Fn() -> Connected>);
+
+impl Watch {
+    pub(super) fn new(connected: impl Fn() -> Connected + 'static) -> Self {
+        Self(Box::new(connected))
+    }
+
+    /// Who is connected now.
+    pub fn connected(&self) -> Connected {
+        (self.0)()
+    }
+}
