@@ -44,7 +44,42 @@ fn failed(what: &str, why: impl std::fmt::Debug) -> ServiceError {
     ))
 }
 
-/// Why a port of the core, or of what stands in its place, could not be made.
+fn name(service: &str) -> Result<ServiceName, ServiceError> {
+    ServiceName::new(&format!("stylet/{SCHEMA_VERSION}/{service}")).map_err(|e| failed(service, e))
+}
+
+/// Who publishes a service; everybody else subscribes.
+#[derive(Clone, Copy)]
+enum By {
+    /// The core, or a relay in its place.
+    Core,
+    Hosts,
+}
+
+impl By {
+    const fn publishers(self) -> usize {
+        match self {
+            Self::Core => 1,
+            Self::Hosts => MAX_HOSTS,
+        }
+    }
+
+    fn publisher_failed(self, service: &str, why: impl std::fmt::Debug) -> ServiceError {
+        match self {
+            Self::Core => core_failed(service, why),
+            Self::Hosts => host_failed(service, why),
+        }
+    }
+
+    fn subscriber_failed(self, service: &str, why: impl std::fmt::Debug) -> ServiceError {
+        match self {
+            Self::Core => host_failed(service, why),
+            Self::Hosts => core_failed(service, why),
+        }
+    }
+}
+
+/// Why a port of the core, or of a relay in its place, could not be made.
 fn core_failed(service: &str, why: impl std::fmt::Debug) -> ServiceError {
     ServiceError(format!(
         "cannot use shared memory: {service}: {why:?}. Is another rt-core or relay running under this instance name? Choose another with \
@@ -59,36 +94,6 @@ fn host_failed(service: &str, why: impl std::fmt::Debug) -> ServiceError {
     ))
 }
 
-fn name(service: &str) -> Result<ServiceName, ServiceError> {
-    ServiceName::new(&format!("stylet/{SCHEMA_VERSION}/{service}")).map_err(|e| failed(service, e))
-}
-
-/// Who publishes a service decides how many may, and whose mistake it is when a port cannot be made.
-macro_rules! publishers {
-    (core) => {
-        1
-    };
-    (hosts) => {
-        MAX_HOSTS
-    };
-}
-macro_rules! publisher_failed {
-    (core) => {
-        core_failed
-    };
-    (hosts) => {
-        host_failed
-    };
-}
-macro_rules! subscriber_failed {
-    (core) => {
-        host_failed
-    };
-    (hosts) => {
-        core_failed
-    };
-}
-
 macro_rules! service {
     ($(#[$doc:meta])* $module:ident: $value:ty, by $who:ident, history $history:expr, buffer $buffer:expr) => {
         $(#[$doc])*
@@ -101,7 +106,7 @@ macro_rules! service {
                 node.inner()
                     .service_builder(&name(NAME)?)
                     .publish_subscribe::<$value>()
-                    .max_publishers(publishers!($who))
+                    .max_publishers(By::$who.publishers())
                     .max_subscribers(MAX_HOSTS + 2)
                     .max_nodes(MAX_HOSTS + 4)
                     .history_size($history)
@@ -117,7 +122,7 @@ macro_rules! service {
                     .backpressure_strategy(BackpressureStrategy::DiscardData)
                     .create()
                     .map(Publisher::new)
-                    .map_err(|e| publisher_failed!($who)(NAME, e))
+                    .map_err(|e| By::$who.publisher_failed(NAME, e))
             }
 
             /// Receives.
@@ -126,7 +131,7 @@ macro_rules! service {
                     .subscriber_builder()
                     .create()
                     .map(Subscriber::new)
-                    .map_err(|e| subscriber_failed!($who)(NAME, e))
+                    .map_err(|e| By::$who.subscriber_failed(NAME, e))
             }
 
             /// Who is connected.
@@ -159,7 +164,7 @@ macro_rules! service {
                     .publish_subscribe::<[$value]>()
                     .user_header::<$header>()
                     // One more, while one takes the place of another.
-                    .max_publishers(publishers!($who) + 1)
+                    .max_publishers(By::$who.publishers() + 1)
                     .max_subscribers(MAX_HOSTS + 2)
                     .max_nodes(MAX_HOSTS + 4)
                     .history_size($history)
@@ -181,7 +186,7 @@ macro_rules! service {
                         .override_sample_preallocation($kept)
                         .create()
                 })
-                .map_err(|e| publisher_failed!($who)(NAME, e))
+                .map_err(|e| By::$who.publisher_failed(NAME, e))
             }
 
             /// Receives.
@@ -190,7 +195,7 @@ macro_rules! service {
                     .subscriber_builder()
                     .create()
                     .map(SliceSubscriber::new)
-                    .map_err(|e| subscriber_failed!($who)(NAME, e))
+                    .map_err(|e| By::$who.subscriber_failed(NAME, e))
             }
 
             /// Who is connected.
@@ -210,42 +215,42 @@ macro_rules! service {
 
 service!(
     /// Which run this is: [`Session`].
-    session: Session, by core, history 1, buffer 2);
+    session: Session, by Core, history 1, buffer 2);
 service!(
     /// What happened: [`Event`].
-    events: Event, by core, history 64, buffer 512);
+    events: Event, by Core, history 64, buffer 512);
 service!(
     /// Parameters that took effect: [`ParametersInForce`].
-    parameters: ParametersInForce, by core, history 1, buffer 2);
+    parameters: ParametersInForce, by Core, history 1, buffer 2);
 service!(
     /// The plan: [`PlanInForce`].
-    plan: PlanInForce, by core, history 1, buffer 2);
+    plan: PlanInForce, by Core, history 1, buffer 2);
 service!(
     /// Requests of hosts: [`Command`].
-    commands: Command, by hosts, history 0, buffer 64);
+    commands: Command, by Hosts, history 0, buffer 64);
 service!(
     /// Answers to them: [`Reply`].
-    replies: Reply, by core, history 0, buffer 64);
+    replies: Reply, by Core, history 0, buffer 64);
 service!(
     /// Results of rehearsals: [`Rehearsal`].
-    rehearsals: Rehearsal, by core, history 0, buffer 8);
+    rehearsals: Rehearsal, by Core, history 0, buffer 8);
 service!(
     /// Every tick of the force loop; the header is the run of the core.
-    records: [TickRecord] under u64, by core, history 0, buffer RECORD_BUFFER, loans 2, kept |all| all);
+    records: [TickRecord] under u64, by Core, history 0, buffer RECORD_BUFFER, loans 2, kept |all| all);
 
 // Slices that memory is taken for: iceoryx2 would take enough for every host to hold every slice that it may, hundreds of MB of
 // locked memory for a large scene. Two wait in the queues; beside them stand what is being filled and one for each host that
 // stopped while it read. When all are held, nothing is sent until one returns.
 service!(
     /// The deformed surface and displacements inside.
-    snapshots: [Vertex] under SnapshotHeader, by core, history 1, buffer 2,
+    snapshots: [Vertex] under SnapshotHeader, by Core, history 1, buffer 2,
     loans 2 * SNAPSHOTS_AHEAD, kept |_| 2 * SNAPSHOTS_AHEAD + 2 + MAX_HOSTS);
 service!(
     /// Rest surface, structures and labels; sent again under a new generation when the scene changes.
-    scene: [u32] under SceneHeader, by core, history 1, buffer 2, loans 2, kept |_| 6);
+    scene: [u32] under SceneHeader, by Core, history 1, buffer 2, loans 2, kept |_| 6);
 service!(
     /// Volumes that hosts send, each through a port of its own: its memory is as large as the volume, and the core maps all of it.
-    uploads: [u8] under UploadHeader, by hosts, history 0, buffer 2, loans 2, kept |_| 2);
+    uploads: [u8] under UploadHeader, by Hosts, history 0, buffer 2, loans 2, kept |_| 2);
 
 #[cfg(test)]
 mod tests {
