@@ -20,6 +20,7 @@ mod process_restart;
 mod recorder_flight;
 mod recorder_mcap;
 mod rt_contract;
+mod scene_memory;
 mod scene_surfaces;
 mod scenes;
 mod shm_invalid;
