@@ -44,7 +44,7 @@ pub use params::{
     PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet,
     ParameterSpec, ParametersInForce, folding,
 };
-pub use plan::{MAX_LEFT_NEEDLES, MAX_SEEDS, PlanInForce, PlannedSeed};
+pub use plan::{MAX_EARLIER_NEEDLES, MAX_LEFT_NEEDLES, MAX_SEEDS, PlanInForce, PlannedSeed};
 pub use record::TickRecord;
 pub use refusal::{Reason, Refusal, RefusalCode};
 pub use rehearsal::Rehearsal;

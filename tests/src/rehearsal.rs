@@ -55,6 +55,7 @@ impl Rehearser for Theatre {
             retract_to_m: drops.retract_to_m,
             strand_pitch_m: drops.strand_pitch_m,
             stabilising: Vec::new(),
+            earlier: Vec::new(),
             drops_m: drops.drops_m().map(Vector3::from).collect(),
         };
         let done = self

@@ -1,7 +1,7 @@
 //! The banners under the bar: what is wrong with the core, the force and the controllers, and what to do.
 
 use crate::action::{Action, WatchAction};
-use crate::shown::{Shown, Watched};
+use crate::shown::{NeedleLine, Shown, Watched};
 use crate::theme;
 use crate::theme::Tokens;
 use egui::{Color32, Rect, RichText};
@@ -109,6 +109,7 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
     if shown.state.is_some() && fault == Some(Fault::None) {
         list.extend(force_is_off(shown));
     }
+    list.extend(without_line(shown));
     list.extend(folded(shown));
     list.extend(refused(shown));
     list
@@ -127,6 +128,27 @@ fn force_is_off(shown: &Shown) -> Option<Banner> {
         level: BannerLevel::Warn,
         title: "The force waits",
         text: "It would begin with a jump. Move the needle until it is small, best outside the tissue.".to_owned(),
+        remedy: None,
+    })
+}
+
+/// While the needle is in tissue that was not prepared for it: force and places are then worth less, and may come late.
+fn without_line(shown: &Shown) -> Option<Banner> {
+    let is_missing = shown.needle_line() == Some(NeedleLine::Missing);
+    is_missing.then(|| Banner {
+        level: BannerLevel::Warn,
+        title: "No line",
+        text: match shown.lag() {
+            Some((lag_s, lag_m)) => format!(
+                "The tissue was not prepared for this needle, and its answer is {:.0} ms and {} behind: neither force nor seeds are to be \
+                 relied on. Take the needle out, and wait for LINE READY.",
+                lag_s * 1e3,
+                stylet_base::format::length(lag_m)
+            ),
+            None => "The tissue was not prepared for this needle: its force follows the paper's law, and its seeds may rest up to 2 cm \
+                     from where they should. Take it out, and wait for LINE READY."
+                .to_owned(),
+        },
         remedy: None,
     })
 }
@@ -272,85 +294,4 @@ fn banner_ui(ui: &mut egui::Ui, banner: &Banner) -> Option<Action> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use bytemuck::Zeroable;
-    use stylet_shm_schema::{HapticState, flags};
-
-    fn live() -> Shown {
-        let mut shown = Shown::empty("lab");
-        shown.status = LinkStatus::Live;
-        let mut state = HapticState::zeroed();
-        state.flags = flags::REAL_TIME | flags::ENGAGED;
-        shown.state = Some(state);
-        shown
-    }
-
-    #[test]
-    fn no_banner_without_a_problem_and_absence_shows_what_to_type() {
-        assert!(banners(&live()).is_empty());
-        let list = banners(&Shown::empty("lab"));
-        assert!(list[0].text.contains("rt-core --instance lab"), "{}", list[0].text);
-    }
-
-    #[test]
-    fn a_force_that_is_off_or_waits_and_a_refusal_each_have_their_banner() {
-        let titles = |shown: &Shown| banners(shown).iter().map(|b| b.title).collect::<Vec<_>>();
-        let mut shown = live();
-        if let Some(state) = &mut shown.state {
-            state.flags |= flags::WAITING;
-        }
-        assert_eq!(titles(&shown), ["The force waits"]);
-        if let Some(state) = &mut shown.state {
-            state.flags = flags::REAL_TIME;
-        }
-        shown.refusals = 2;
-        shown.last_refusal = "needle.puncture_depth = 1000 mm".to_owned();
-        assert_eq!(titles(&shown), ["The force is off", "rt-core refused"]);
-        assert!(banners(&shown)[1].text.contains("puncture_depth"));
-    }
-
-    #[test]
-    fn folded_tissue_has_a_banner_while_it_is_folded_that_says_from_where_on() {
-        let mut shown = live();
-        if let Some(state) = &mut shown.state {
-            state.folded_from_m = 7.93e-3;
-        }
-        // Where it was: a membrane that gave way has eased it.
-        assert!(banners(&shown).is_empty());
-        if let Some(state) = &mut shown.state {
-            state.flags |= stylet_shm_schema::flags::FOLDED;
-        }
-        let list = banners(&shown);
-        assert_eq!(list.len(), 1);
-        assert!(list[0].text.contains("folded from 7.9 mm"), "{}", list[0].text);
-    }
-
-    #[test]
-    fn an_unplugged_controller_and_one_without_rights_are_shown_with_or_without_a_core() {
-        for mut shown in [live(), Shown::empty("lab")] {
-            let before = banners(&shown).len();
-            shown.disconnected = Some("Pad".to_owned());
-            shown
-                .controllers
-                .denied
-                .push("Cap may not be read. Run: that".to_owned());
-            let list = banners(&shown);
-            assert_eq!(list.len(), before + 2);
-            assert!(list[before].text.contains("Pad. The needle stays where it is"));
-            assert_eq!(list[before].remedy, Some(("Dismiss", Action::DismissDisconnected)));
-            assert!(list[before + 1].text.contains("Run: that"));
-        }
-    }
-
-    #[test]
-    fn fault_comes_first_and_an_unknown_one_is_a_fault() {
-        let mut shown = live();
-        if let Some(state) = &mut shown.state {
-            (state.fault, state.flags) = (999, 0);
-        }
-        let list = banners(&shown);
-        assert_eq!(list[0].level, BannerLevel::Bad);
-        assert_eq!(list[1].title, "Not real-time");
-    }
-}
+mod tests;

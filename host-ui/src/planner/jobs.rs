@@ -174,6 +174,7 @@ fn all(
         let _ = messages.send(JobMessage::Progress(progress));
         let mut rehearser = LinkRehearser {
             stabilising: &[],
+            earlier: &[],
             link: &mut link,
             interrupted: interrupt,
         };

@@ -113,6 +113,7 @@ fn run(needle: &Needle, drawn: &Drawn) -> NeedleRun {
         retract_to_m: needle.retract_to_mm * 1e-3,
         strand_pitch_m: needle.strand_pitch_mm.map(|pitch| pitch * 1e-3),
         stabilising: Vec::new(),
+        earlier: Vec::new(),
         drops_m: needle
             .seeds
             .iter()

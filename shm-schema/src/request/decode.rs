@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::check::{MAX_COORDINATE_M, is_unit};
-use crate::{MAX_COMMAND_VALUES, MAX_LEFT_NEEDLES, Reason, Refusal, RefusalCode};
+use crate::{MAX_COMMAND_VALUES, MAX_EARLIER_NEEDLES, MAX_LEFT_NEEDLES, Reason, Refusal, RefusalCode};
 
 /// What is wrong with one record. `at` is the place of the first value concerned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -124,7 +124,7 @@ fn takes(kind: CommandKind) -> String {
         CommandKind::TakeNeedle => "the number of a needle".to_owned(),
         CommandKind::DrawNeedle => "the number of a needle, and a speed".to_owned(),
         CommandKind::Rehearse => format!(
-            "13 values, seven for each of at most {MAX_LEFT_NEEDLES} needles that stay in, and 1 to {MAX_SEEDS} drops of three values each"
+            "14 values, seven for each of at most {MAX_LEFT_NEEDLES} needles that stay in and at most {MAX_EARLIER_NEEDLES} that were there before, and 1 to {MAX_SEEDS} drops of three values each"
         ),
         _ => "no values".to_owned(),
     }
@@ -153,7 +153,7 @@ impl Request {
 }
 
 const PLAN_HEAD: usize = 6;
-const REHEARSAL_HEAD: usize = 13;
+const REHEARSAL_HEAD: usize = 14;
 const STABILISING: usize = 7;
 
 fn count_fits(kind: CommandKind, count: usize) -> bool {
@@ -169,8 +169,8 @@ fn count_fits(kind: CommandKind, count: usize) -> bool {
         CommandKind::DropSeed => count <= 1,
         // Without a value: the first scene.
         CommandKind::LoadBuiltinScene => count <= 1,
-        // How many needles stay in is a value; see `Reader::drops`.
-        CommandKind::Rehearse => (0..=MAX_LEFT_NEEDLES)
+        // How many needles stay in, and how many were there before, are values; see `Reader::drops`.
+        CommandKind::Rehearse => (0..=MAX_LEFT_NEEDLES + MAX_EARLIER_NEEDLES)
             .any(|n| places_after(REHEARSAL_HEAD + STABILISING * n).is_some_and(|n| (1..=MAX_SEEDS).contains(&n))),
         // A payload where there is none has always been ignored.
         _ => count <= MAX_COMMAND_VALUES,
@@ -225,7 +225,8 @@ impl<'a> Reader<'a> {
                 acceleration_m_per_s2: self.within("acceleration in m/s2", ACCELERATION_RANGE_M_PER_S2),
                 retract_to_m: self.within("place drawn back to, in m from the entry,", RETRACT_RANGE_M),
                 strand_pitch_m: self.strand_pitch(),
-                stabilising: self.stabilising(),
+                stabilising: self.needles("number of needles that stay in", MAX_LEFT_NEEDLES),
+                earlier: self.needles("number of needles that were there before", MAX_EARLIER_NEEDLES),
                 drops_m: self.drops(),
             }),
             CommandKind::StopHand => Request::StopHand,
@@ -297,13 +298,13 @@ impl<'a> Reader<'a> {
         Some(self.within("pitch of a strand in m", STRAND_PITCH_RANGE_M))
     }
 
-    fn stabilising(&mut self) -> Vec<StabilisingNeedle> {
-        let count = self.within("number of needles that stay in", [0.0, MAX_LEFT_NEEDLES as f64]);
-        let count = whole(count).filter(|&n| n as usize <= MAX_LEFT_NEEDLES).unwrap_or(0);
+    fn needles(&mut self, number: &'static str, most: usize) -> Vec<StabilisingNeedle> {
+        let count = self.within(number, [0.0, most as f64]);
+        let count = whole(count).filter(|&n| n as usize <= most).unwrap_or(0);
         let mut needle = |_| StabilisingNeedle {
             entry_m: self.place(),
             direction: self.direction(),
-            depth_m: self.within("depth of a needle that stays in, in m,", LEFT_DEPTH_RANGE_M),
+            depth_m: self.within("depth of a needle, in m,", LEFT_DEPTH_RANGE_M),
         };
         (0..count).map(&mut needle).collect()
     }

@@ -153,6 +153,9 @@ pub struct NeedleRehearsal {
     pub strand_pitch_m: Option<f64>,
     /// Needles that go in before it and stay, at most [`crate::MAX_LEFT_NEEDLES`].
     pub stabilising: Vec<StabilisingNeedle>,
+    /// Needles that went that deep and came out again beside those that stay, in their order, at most [`crate::MAX_EARLIER_NEEDLES`]: each
+    /// leaves those that stay, and the tissue that they hold, a little elsewhere. Nothing without needles that stay.
+    pub earlier: Vec<StabilisingNeedle>,
     /// Where the tip leaves each seed, m, in the order of the drops: 1 to [`MAX_SEEDS`].
     pub drops_m: Vec<[f64; 3]>,
 }
@@ -211,12 +214,11 @@ impl Request {
                     run.retract_to_m,
                     run.strand_pitch_m.unwrap_or_default(),
                 ];
-                let mut stabilising = vec![run.stabilising.len() as f64];
-                for needle in &run.stabilising {
-                    stabilising.extend(needle.entry_m.iter().chain(&needle.direction));
-                    stabilising.push(needle.depth_m);
-                }
-                joined(&[&run.entry_m, &run.direction, &pace, &stabilising], &run.drops_m)
+                let others = [&run.stabilising, &run.earlier].map(|needles| needle_values(needles));
+                joined(
+                    &[&run.entry_m, &run.direction, &pace, &others[0], &others[1]],
+                    &run.drops_m,
+                )
             }
             Self::DropSeed { strand_pitch_m } => strand_pitch_m.iter().copied().collect(),
             Self::TakeNeedle(number) => vec![f64::from(*number)],
@@ -231,6 +233,16 @@ impl Request {
             | Self::StopHand => Vec::new(),
         }
     }
+}
+
+/// How many there are, then entry, direction and depth of each.
+fn needle_values(needles: &[StabilisingNeedle]) -> Vec<f64> {
+    let mut values = vec![needles.len() as f64];
+    for needle in needles {
+        values.extend(needle.entry_m.iter().chain(&needle.direction));
+        values.push(needle.depth_m);
+    }
+    values
 }
 
 fn joined(head: &[&[f64]], places: &[[f64; 3]]) -> Vec<f64> {

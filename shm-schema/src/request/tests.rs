@@ -22,7 +22,16 @@ fn rehearsal(drops: usize) -> NeedleRehearsal {
         retract_to_m: -0.01,
         strand_pitch_m: (drops > 1).then_some(0.01),
         stabilising: Vec::new(),
+        earlier: Vec::new(),
         drops_m: needle(drops).seeds_m,
+    }
+}
+
+fn other(depth_m: f64) -> StabilisingNeedle {
+    StabilisingNeedle {
+        entry_m: [0.01, 0.02, -0.01],
+        direction: [0.0, 0.0, 1.0],
+        depth_m,
     }
 }
 
@@ -57,15 +66,15 @@ fn all() -> Vec<Request> {
         Request::Rehearse(rehearsal(1)),
         Request::Rehearse(rehearsal(MAX_SEEDS)),
         Request::Rehearse(NeedleRehearsal {
-            stabilising: vec![
-                StabilisingNeedle {
-                    entry_m: [0.01, 0.02, -0.01],
-                    direction: [0.0, 0.0, 1.0],
-                    depth_m: 0.04,
-                };
-                crate::MAX_LEFT_NEEDLES
-            ],
+            stabilising: vec![other(0.04); crate::MAX_LEFT_NEEDLES],
             ..rehearsal(MAX_SEEDS)
+        }),
+        Request::Rehearse(NeedleRehearsal {
+            stabilising: vec![other(0.04)],
+            earlier: (1..=crate::MAX_EARLIER_NEEDLES)
+                .map(|n| other(1e-3 * n as f64))
+                .collect(),
+            ..rehearsal(10)
         }),
         Request::StopHand,
         Request::ExpectNeedle(NeedleAxis {
@@ -115,6 +124,22 @@ fn a_payload_that_does_not_fit_is_not_sent() {
         .encode(1, 1)
         .expect("fits");
     assert!(Request::decode(&command).is_err());
+}
+
+/// Needles that were there before and those that stay in are counted apart.
+#[test]
+fn too_many_needles_before_a_rehearsed_one_are_refused() {
+    let of = |earlier: usize| NeedleRehearsal {
+        stabilising: vec![other(0.04)],
+        earlier: vec![other(0.03); earlier],
+        ..rehearsal(3)
+    };
+    let decoded = |earlier: usize| Request::decode(&Request::Rehearse(of(earlier)).encode(1, 1).expect("fits"));
+    assert_eq!(
+        decoded(crate::MAX_EARLIER_NEEDLES),
+        Ok(Request::Rehearse(of(crate::MAX_EARLIER_NEEDLES)))
+    );
+    assert!(decoded(crate::MAX_EARLIER_NEEDLES + 1).is_err());
 }
 
 /// A small generator, so that every run sees the same records.
@@ -209,8 +234,8 @@ fn every_malformed_payload_is_refused_with_its_reason() {
         (K::DropSeed, &[0.0], C::ValueOutOfLimits),
         (K::DropSeed, &[0.01, 0.01], C::ValueCount),
         (K::Rehearse, &[0.0; 13], C::ValueCount),
-        (K::Rehearse, &[0.0; 17], C::ValueCount),
-        (K::Rehearse, &[0.0; 16], C::NotUnitDirection),
+        (K::Rehearse, &[0.0; 18], C::ValueCount),
+        (K::Rehearse, &[0.0; 17], C::NotUnitDirection),
         (K::TakeNeedle, &[], C::ValueCount),
         (K::TakeNeedle, &[0.0], C::NoLeftNeedle),
         (K::TakeNeedle, &[1.5], C::NoLeftNeedle),
@@ -244,7 +269,7 @@ fn a_rehearsal_lists_every_bad_value() {
         (RefusalCode::ValueOutOfLimits, 6),
         (RefusalCode::ValueOutOfLimits, 9),
         (RefusalCode::ValueOutOfLimits, 11),
-        (RefusalCode::PlaceTooFar, 16),
+        (RefusalCode::PlaceTooFar, 17),
     ];
     assert_eq!(reasons, expected);
 }

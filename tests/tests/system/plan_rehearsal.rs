@@ -60,6 +60,7 @@ fn rehearsed(link: &mut Link, task: &NeedleTask) -> Rest {
         link,
         interrupted: &Interrupt::default(),
         stabilising: &[],
+        earlier: &[],
     };
     rehearser.rehearse(&task.drops, &Pace::default()).expect("goes through")
 }
@@ -161,7 +162,7 @@ fn one_rehearsal_at_a_time_and_the_run_does_not_notice() {
         let mut link = core.host();
         let plan = default_plan(&link.scene().expect("live").header);
         let drops: Drops = NeedleTask::as_planned(plan).drops;
-        let rehearsal = drops.rehearsal(&Pace::default(), &[]);
+        let rehearsal = drops.rehearsal(&Pace::default(), &[], &[]);
         let request = Request::Rehearse(rehearsal.clone());
         let first = link.send(&request).expect("sent");
         let second = link.send(&request).expect("sent");

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Link, LinkError, LinkStatus};
 use stylet_procedure::{NeedleWay, Pace};
-use stylet_shm_schema::{NeedleRehearsal, Request, StabilisingNeedle};
+use stylet_shm_schema::{MAX_COMMAND_VALUES, MAX_EARLIER_NEEDLES, NeedleRehearsal, Request, StabilisingNeedle};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);
 /// The largest scene takes a second for a second.
@@ -50,6 +50,24 @@ impl Drops {
         self.along_m.iter().map(|&along| self.at_m(along))
     }
 
+    /// How many needles that were there before a request has room for; they matter beside needles that stay in alone.
+    fn room_for_earlier(&self, stabilising: usize) -> usize {
+        if stabilising == 0 {
+            return 0;
+        }
+        let taken = 15 + 7 * stabilising + 3 * self.along_m.len();
+        (MAX_COMMAND_VALUES.saturating_sub(taken) / 7).min(MAX_EARLIER_NEEDLES)
+    }
+
+    /// The needle as one that comes and goes, to its deepest drop.
+    pub fn pass(&self) -> StabilisingNeedle {
+        StabilisingNeedle {
+            entry_m: self.entry_m,
+            direction: self.direction,
+            depth_m: self.along_m.iter().copied().fold(0.0, f64::max),
+        }
+    }
+
     /// Where the tip goes.
     pub fn way(&self) -> NeedleWay {
         NeedleWay {
@@ -61,8 +79,13 @@ impl Drops {
         }
     }
 
-    /// Has the core rehearse them, beside needles that go in before and stay.
-    pub fn rehearsal(&self, pace: &Pace, stabilising: &[StabilisingNeedle]) -> NeedleRehearsal {
+    /// Has the core rehearse them, beside needles that go in before and stay, after others that came and went beside these.
+    pub fn rehearsal(
+        &self,
+        pace: &Pace,
+        stabilising: &[StabilisingNeedle],
+        earlier: &[StabilisingNeedle],
+    ) -> NeedleRehearsal {
         NeedleRehearsal {
             entry_m: self.entry_m,
             direction: self.direction,
@@ -73,6 +96,8 @@ impl Drops {
             retract_to_m: self.retract_to_m,
             strand_pitch_m: self.strand_pitch_m,
             stabilising: stabilising.to_vec(),
+            // The last ones, where a request has no room for all.
+            earlier: earlier[earlier.len().saturating_sub(self.room_for_earlier(stabilising.len()))..].to_vec(),
             drops_m: self.drops_m().collect(),
         }
     }
@@ -133,13 +158,15 @@ pub struct LinkRehearser<'a> {
     pub interrupted: &'a Interrupt,
     /// Needles that go in before and stay.
     pub stabilising: &'a [StabilisingNeedle],
+    /// Needles that come and go beside those, before this one.
+    pub earlier: &'a [StabilisingNeedle],
 }
 
 impl Rehearser for LinkRehearser<'_> {
     fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError> {
         let link = &mut *self.link;
         let scene = link.scene().map(|s| s.header.id());
-        let request = Request::Rehearse(drops.rehearsal(pace, self.stabilising));
+        let request = Request::Rehearse(drops.rehearsal(pace, self.stabilising, self.earlier));
         let id = link.send(&request)?;
         let begun = Instant::now();
         while begun.elapsed() < LONGEST {

@@ -120,6 +120,8 @@ impl Job {
     pub fn compensate(&mut self, link: &mut Link, pace: &Pace, interrupted: &Interrupt) -> Result<(), ProcedureError> {
         let count = self.tasks.len();
         let beside: Vec<_> = self.stabilising.iter().map(|s| s.needle).collect();
+        // What needles do to those that stay in, those that come later find.
+        let mut earlier = Vec::new();
         for (number, task) in self.tasks.iter_mut().enumerate() {
             let needle = match &self.implant {
                 Some(plan) => plan.needles.iter().filter(|n| !n.seeds.is_empty()).nth(number).cloned(),
@@ -130,12 +132,14 @@ impl Job {
                 link,
                 interrupted,
                 stabilising: &beside,
+                earlier: &earlier,
             };
             let done = match compensate(&needle, pace, &Limits::default(), &mut rehearser) {
                 Ok(done) => done,
                 Err(why) if interrupted.asked() => return Err(why.into()),
                 Err(why) => {
                     println!("note: needle {} of {count} is not compensated: {why}", number + 1);
+                    earlier.push(task.drops.pass());
                     continue;
                 }
             };
@@ -154,6 +158,7 @@ impl Job {
                 println!("note: needle {} of {count}: {found}", number + 1);
             }
             task.drops.clone_from(&done.drops);
+            earlier.push(task.drops.pass());
             self.compensations.insert(number, done);
         }
         Ok(())

@@ -24,6 +24,7 @@ pub fn needle_run(run: &NeedleRehearsal) -> NeedleRun {
         retract_to_m: run.retract_to_m,
         strand_pitch_m: run.strand_pitch_m,
         stabilising: run.stabilising.clone(),
+        earlier: run.earlier.clone(),
         drops_m: run.drops_m.iter().map(|&drop| drop.into()).collect(),
     }
 }
@@ -67,6 +68,7 @@ mod tests {
             retract_to_m: -0.01,
             strand_pitch_m: None,
             stabilising: Vec::new(),
+            earlier: Vec::new(),
             drops_m: vec![[0.1, 0.0, 0.0], [0.0, 0.0, 0.2]],
         });
         assert_eq!((run.drops_m[0].x, run.drops_m[1].z, run.drops_m.len()), (0.1, 0.2, 2));

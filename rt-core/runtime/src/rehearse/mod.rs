@@ -8,6 +8,7 @@ mod motion;
 mod rig;
 mod scatter;
 mod script;
+mod standing;
 
 use crate::lines::{LineBody, NoLine};
 use crate::rt::world::{World, WorldError};
@@ -16,6 +17,8 @@ use nalgebra::Vector3;
 use rig::Rig;
 use scatter::Scatter;
 use script::Script;
+use standing::Standing;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use stylet_hw::{DeviceInfo, Hand};
@@ -23,8 +26,8 @@ use stylet_shm_schema::{
     MAX_LEFT_NEEDLES, MAX_SEEDS, NeedleAxis, ParameterProblems, ParameterSet, Reason, Refusal, RefusalCode, SeedPose,
     StabilisingNeedle, flags,
 };
-use stylet_sim::active::activate;
-use stylet_sim::line::{LineError, ReadyLine};
+use stylet_sim::active::{Active, activate};
+use stylet_sim::line::{LineError, LineStations, ReadyLine};
 use stylet_sim::scene::{SceneSource, TissueKind};
 
 /// A rehearsal that takes longer than this, in its own time, has failed.
@@ -110,6 +113,8 @@ pub struct NeedleRun {
     pub strand_pitch_m: Option<f64>,
     /// Needles that go in before it and stay.
     pub stabilising: Vec<StabilisingNeedle>,
+    /// Needles that came and went beside those before it.
+    pub earlier: Vec<StabilisingNeedle>,
     /// Places of the drops in their order, m.
     pub drops_m: Vec<Vector3<f64>>,
 }
@@ -142,6 +147,8 @@ pub struct Stage {
     lines: Option<LineBody>,
     /// The lines of the last rehearsal, those of needles that stay in first: compensation rehearses the same needle several times.
     kept: Vec<(NeedleAxis, bool, ReadyLine)>,
+    /// How needles that stay in stand after earlier ones.
+    standing: Option<Standing>,
     device: DeviceInfo,
     hand: Hand,
     target: TargetElements,
@@ -160,6 +167,7 @@ impl Stage {
             world: Some(Box::new(world)),
             lines,
             kept: Vec::new(),
+            standing: None,
             device,
             hand: Hand::steady(),
             target,
@@ -201,13 +209,26 @@ impl Stage {
             let others: Vec<_> = self.kept.iter().map(|(.., line)| line.stations.clone()).collect();
             let generation = number as u64 + 1;
             let line = body.prepare_beside(generation, axis.entry_m, axis.direction, bends, &others, &mut goes_on);
-            let line = line.map_err(|why| match why {
-                NoLine::Line(LineError::Stopped) => RehearseError::Stopped,
-                why => RehearseError::Line(why),
-            })?;
-            self.kept.push((*axis, bends, line));
+            self.kept.push((*axis, bends, line.map_err(stopped)?));
         }
         Ok(self.kept.iter().map(|(.., line)| line.clone()).collect())
+    }
+
+    /// A line for one more needle, which is not kept.
+    fn line_beside(
+        &self,
+        generation: u64,
+        run: &NeedleRun,
+        bends: bool,
+        others: &[Arc<LineStations>],
+        stop: &AtomicBool,
+    ) -> Result<ReadyLine, RehearseError> {
+        let body = self.lines.as_ref().ok_or(RehearseError::NoneStaysIn)?;
+        // SYNC: as above.
+        let mut goes_on = || !stop.load(Ordering::Relaxed);
+        let (entry_m, direction) = (run.entry_m.into(), run.direction.into());
+        let line = body.prepare_beside(generation, entry_m, direction, bends, others, &mut goes_on);
+        line.map_err(stopped)
     }
 
     /// From rest, under these parameters; ends early, with an error, when `stop` is set.
@@ -227,20 +248,39 @@ impl Stage {
         let scattered = Scatter::of(set).map(|scatter| scatter.apply(run));
         let run = scattered.as_ref().unwrap_or(run);
         let lines = self.lines(run, active.force.bending.is_on(), stop)?;
+        if !run.stabilising.is_empty() && !run.earlier.is_empty() {
+            return self.rehearse_after(run, set, &active, lines, stop);
+        }
+        let mut rig = self.rig(run, &active)?;
+        rig.take_lines(lines);
+        let outcome = perform(&mut rig, run, (Script::new(run), Motion::new(&self.target)), stop);
+        self.world = Some(rig.into_world());
+        outcome
+    }
+
+    /// Loops over the body at rest; the body comes back by [`Rig::into_world`].
+    fn rig(&mut self, run: &NeedleRun, active: &Active) -> Result<Rig, RehearseError> {
         let mut world = self.world.take().ok_or(RehearseError::BodyLost)?;
         world.tissue.return_to_rest();
         world.set_limits(active.limits.clone());
         world.migration = active.migration;
-        let mut rig = Rig::new(world, &active, (&self.device, self.hand), run);
-        rig.take_lines(lines);
-        let outcome = perform(&mut rig, run, Motion::new(&self.target), stop);
-        self.world = Some(rig.into_world());
-        outcome
+        Ok(Rig::new(world, active, (&self.device, self.hand), run))
     }
 }
 
-fn perform(rig: &mut Rig, run: &NeedleRun, mut motion: Motion, stop: &AtomicBool) -> Result<Rehearsed, RehearseError> {
-    let mut script = Script::new(run);
+fn stopped(why: NoLine) -> RehearseError {
+    match why {
+        NoLine::Line(LineError::Stopped) => RehearseError::Stopped,
+        why => RehearseError::Line(why),
+    }
+}
+
+fn perform(
+    rig: &mut Rig,
+    run: &NeedleRun,
+    (mut script, mut motion): (Script, Motion),
+    stop: &AtomicBool,
+) -> Result<Rehearsed, RehearseError> {
     let mut displacement_before_puncture_m = 0.0_f64;
     let (mut punctured, mut contact_s) = (false, None);
     let mut deflection_m = 0.0_f64;

@@ -8,7 +8,7 @@ use crate::stepped::{HAPTIC_TICKS_PER_TISSUE_TICK, SteppedLoops};
 use stylet_hw::{DeviceInfo, Hand, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
 use stylet_shm_schema::{HandMove, HapticState, RefusalCode, SeedPose};
 use stylet_sim::active::Active;
-use stylet_sim::line::{LeftNeedles, ReadyLine};
+use stylet_sim::line::{LeftNeedles, LeftRecord, ReadyLine};
 use stylet_sim::tissue::Deformed;
 
 /// The tip begins at this distance before the entry, and comes to it as in a run.
@@ -43,15 +43,39 @@ impl Rig {
 
     /// In the order of the needles; the first is taken up at once.
     pub fn take_lines(&mut self, mut lines: Vec<ReadyLine>) {
-        lines.reverse();
-        let others = lines.len();
-        self.lines = lines;
-        if others == 1 {
-            self.next_line();
-        } else if others > 1 {
-            let bridge = &mut self.loops.bridge;
-            let _ = bridge.rooms.push(LeftNeedles::with_room());
+        if lines.len() > 1 {
+            self.take_lines_of_many(lines);
+        } else if let Some(line) = lines.pop() {
+            self.take_line(line);
         }
+    }
+
+    /// In the order of the needles, some of which stay in; each is taken up by [`next_line`](Self::next_line).
+    pub fn take_lines_of_many(&mut self, mut lines: Vec<ReadyLine>) {
+        lines.reverse();
+        self.lines = lines;
+        let _ = self.loops.bridge.rooms.push(LeftNeedles::with_room());
+    }
+
+    /// Before the first tick: needles that stay in stand as `record` has them, on those of `lines` that it names.
+    pub fn stand(&mut self, lines: &[ReadyLine], record: &LeftRecord) -> bool {
+        let of = |generation: u64| lines.iter().find(|line| line.hand.generation == generation);
+        let fits = self
+            .loops
+            .haptic
+            .resume_left(record, |n| of(n).map(|line| line.hand.clone()));
+        let bodies = record
+            .line_numbers()
+            .filter_map(|n| of(n).map(|line| line.body.clone()));
+        self.loops
+            .tissue
+            .begin_beside(bodies.collect(), &self.loops.haptic.left_loads());
+        fits
+    }
+
+    /// How needles that stay in stand now.
+    pub fn standing(&self) -> LeftRecord {
+        self.loops.haptic.left_record()
     }
 
     /// The next needle has its line from now on.
@@ -155,6 +179,11 @@ impl Rig {
             speed_m_per_s: 0.05,
         };
         let _ = self.loops.bridge.haptic_orders.push(order);
+    }
+
+    #[cfg(test)]
+    pub fn forget_carry(&mut self) {
+        self.loops.tissue.forget_carry();
     }
 
     pub fn deformed(&self) -> Deformed<'_> {

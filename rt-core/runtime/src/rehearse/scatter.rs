@@ -43,6 +43,7 @@ impl Scatter {
             direction,
             drops_m: run.drops_m.iter().map(moved).collect(),
             stabilising: run.stabilising.clone(),
+            earlier: run.earlier.clone(),
             ..*run
         }
     }
@@ -82,6 +83,7 @@ mod tests {
             retract_to_m: 0.0,
             strand_pitch_m: None,
             stabilising: Vec::new(),
+            earlier: Vec::new(),
             drops_m: vec![Vector3::new(x_m, 0.02, 0.08)],
         }
     }

@@ -8,7 +8,7 @@ use stylet_procedure::{HandRequest, NeedleWay, Next, Observed, Pace, Procedure, 
 pub struct Script(Procedure);
 
 impl Script {
-    pub fn new(run: &NeedleRun) -> Self {
+    fn way(run: &NeedleRun) -> (NeedleWay, Pace) {
         let way = NeedleWay {
             entry_m: run.entry_m,
             direction: run.direction,
@@ -22,6 +22,11 @@ impl Script {
             approach_m_per_s: run.approach_m_per_s,
             acceleration_m_per_s2: run.acceleration_m_per_s2,
         };
+        (way, pace)
+    }
+
+    pub fn new(run: &NeedleRun) -> Self {
+        let (way, pace) = Self::way(run);
         let stabilising = run.stabilising.iter().map(|needle| {
             let (entry_m, direction) = (Vector3::from(needle.entry_m), Vector3::from(needle.direction));
             NeedleWay {
@@ -33,6 +38,21 @@ impl Script {
             }
         });
         Self(Procedure::rehearsal_beside(way, pace, stabilising.collect()))
+    }
+
+    /// Of a needle beside those that stay in by now.
+    pub fn beside(run: &NeedleRun) -> Self {
+        let alone = NeedleRun {
+            stabilising: Vec::new(),
+            ..run.clone()
+        };
+        Self::new(&alone)
+    }
+
+    /// Of a needle that comes and goes beside them, without a seed.
+    pub fn pass(run: &NeedleRun) -> Self {
+        let (way, pace) = Self::way(run);
+        Self(Procedure::pass(way, pace))
     }
 
     /// Every needle that stays in does: the one that leaves seeds is at work.

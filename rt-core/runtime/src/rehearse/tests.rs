@@ -7,9 +7,11 @@ use stylet_sim::limits::Limits;
 use stylet_sim::tissue::{Deformed, Held, StepReport, TissueModel};
 
 mod bending;
+mod carrying;
 mod left;
 mod migration;
 mod order;
+mod sequence;
 
 fn stage_of(tissue: TissueKind) -> Stage {
     let source = SceneSource::Builtin("paper".to_owned());
@@ -36,6 +38,7 @@ fn needle() -> NeedleRun {
         retract_to_m: 0.0,
         strand_pitch_m: None,
         stabilising: Vec::new(),
+        earlier: Vec::new(),
         drops_m: [0.8, 0.5, 0.2].map(at).to_vec(),
     }
 }

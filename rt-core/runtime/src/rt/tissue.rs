@@ -14,16 +14,18 @@ use crate::rt::timing::Probe;
 use crate::rt::tissue_tape::{LeftTape, TapedOrder};
 use crate::rt::wiring::TissuePorts;
 use crate::rt::world::World;
+use last_carry::LastCarry;
 use nalgebra::Vector3;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_shm_schema::{MAX_SEEDS, SeedPose};
 use stylet_sim::force::LocalResponse;
 use stylet_sim::line::{BodyLine, MAX_LEFT};
-use stylet_sim::tissue::{Carried, Deformed, Held, StepReport};
+use stylet_sim::tissue::{Carried, Deformed, Held, MaterialPoint, StepReport};
 
 mod contact;
 mod flight;
 mod folds;
+mod last_carry;
 mod left;
 mod line;
 mod migration;
@@ -49,6 +51,7 @@ pub struct TissueLoop {
     left_loads: LeftLoads,
     /// Room to record those, until the tape is there.
     left_room: Option<Box<LeftTape>>,
+    last_carry: LastCarry,
     layers: LayersMet,
     /// The tip has been outside since the last contact.
     clear: bool,
@@ -88,6 +91,7 @@ impl TissueLoop {
             left: Vec::with_capacity(MAX_LEFT),
             left_loads: LeftLoads::default(),
             left_room: None,
+            last_carry: LastCarry::new(),
             layers: LayersMet::default(),
             clear: true,
             held: None,
@@ -243,6 +247,7 @@ impl TissueLoop {
 
     fn reset(&mut self) {
         self.world.tissue.return_to_rest();
+        self.last_carry.forget();
         self.seeds.clear();
         self.end_contact();
         self.response.worst_residual = 0.0;
@@ -262,6 +267,7 @@ impl TissueLoop {
 
     fn swap(&mut self, ticket: Ticket, world: Box<World>) {
         let old = std::mem::replace(&mut self.world, world);
+        self.last_carry.forget();
         // The ring has room for every world that can be under way; else leak it rather than free it here.
         if let Err(rtrb::PushError::Full(old)) = self.ports.old_worlds.push(old) {
             std::mem::forget(old);
@@ -303,17 +309,28 @@ impl TissueLoop {
         self.ports.response.write(*response);
     }
 
+    /// Displacement of the tissue that answers, m. A membrane holds one element. Behind it the tip goes from element to element, and
+    /// an answer that was one element's jumped there: what is between them is that of the tissue between them.
+    fn displacement_at_tip_m(&self, held: u32, report: &StepReport) -> Vector3<f64> {
+        let body = self.world.tissue.deformed();
+        // A body that knows forces answers with that of what it holds.
+        let is_between = self.pose.punctured && report.tip_force_n.is_none();
+        let at_tip = is_between
+            .then(|| self.locate(&self.pose.tip_in_scene, Some(held)))
+            .flatten();
+        let point = at_tip.unwrap_or(MaterialPoint::centre(held));
+        point.displacement_m(&body).into()
+    }
+
     /// What the haptic loop carries on at its own rate; no answer while nothing is held.
     fn local_response(&self, report: &StepReport) -> LocalResponse {
         let Some(held) = self.held else {
             return LocalResponse::default();
         };
-        let rest_m = Vector3::from(self.world.scene.body.rest_m(held.element));
-        let now_m = Vector3::from(self.world.tissue.deformed().position_m(held.element));
         LocalResponse {
             tick: self.response.tick + 1,
             travel_m: self.pose.held_travel_m,
-            displacement_m: now_m - rest_m,
+            displacement_m: self.displacement_at_tip_m(held.element, report),
             force_n: report.tip_force_n.map(Vector3::from),
         }
     }

@@ -174,7 +174,7 @@ fn has_met(model: &LineModel, state: &mut LineState, tip_m: f64) -> bool {
 
 /// A tick of a needle that has not met the surface.
 fn stay_outside(model: &LineModel, state: &mut LineState, tip_m: f64, output: &mut LineOutput) {
-    touch_beside(model, state, tip_m);
+    touch(model, state, tip_m, &mut Scratch::new());
     press(model, state, None);
     state.tip_u_m = 0.0;
     finish(model, state, output);
@@ -191,13 +191,42 @@ pub(super) fn meet(model: &LineModel, state: &mut LineState, membrane: Option<us
     state.tip_u_m = state.memory.gain * own + past_at_tip_m(model, state);
 }
 
-/// [`touch`] for a tick beside other needles.
-pub(super) fn touch_beside(model: &LineModel, state: &mut LineState, tip_m: f64) {
-    touch(model, state, tip_m, &mut Scratch::new());
+/// Which stations the shaft touches, where the tip loads, and where they are. A station that is new sticks to where it is.
+fn touch(model: &LineModel, state: &mut LineState, tip_m: f64, scratch: &mut Scratch) {
+    let before = lay(model, state);
+    stick(model, state, tip_m, before, scratch);
 }
 
-/// Which stations the shaft touches, and where the tip loads. A station that is new sticks to where it is.
-fn touch(model: &LineModel, state: &mut LineState, tip_m: f64, scratch: &mut Scratch) {
+/// Where the stations are by the forces of the solution before; those from `before` on stick there.
+pub(super) fn stick<const B: usize>(
+    model: &LineModel,
+    state: &mut LineState,
+    tip_m: f64,
+    before: usize,
+    scratch: &mut sets::Scratch<B>,
+) {
+    let c = &model.compliance;
+    let (gain, force_n) = (state.memory.gain, state.tip.force_n);
+    let now = state.in_contact;
+    scratch.count = now;
+    if model.settings.by_sets {
+        sets::displacement(model.simd, &c.rows, &state.shaft_n, scratch);
+    }
+    for ((n, &of_tip), &of_shaft) in state.tip_column[..now].iter().enumerate().zip(scratch.u_m.numbers()) {
+        let of_shaft = if model.settings.by_sets {
+            of_shaft
+        } else {
+            dot(&c.rows.row(n)[..now], &state.shaft_n[..now])
+        };
+        state.u_m[n] = gain * (of_shaft + of_tip * force_n) + state.memory.offset_m[n];
+        if n >= before {
+            state.anchor_m[n] = tip_m - state.u_m[n];
+        }
+    }
+}
+
+/// Which stations the shaft touches, and where the tip loads; returns how many it touched before.
+pub(super) fn lay(model: &LineModel, state: &mut LineState) -> usize {
     let c = &model.compliance;
     let depth = state.tip.material_m / c.spacing_m;
     let now = if depth > 0.0 {
@@ -224,22 +253,7 @@ fn touch(model: &LineModel, state: &mut LineState, tip_m: f64, scratch: &mut Scr
         let tips = row[m..].iter().skip(state.tip_range.start).zip(&state.tip_weights);
         state.tip_own += weight * tips.take(state.tip_range.len()).map(|(r, w)| r * w).sum::<f64>();
     }
-    let (gain, force_n) = (state.memory.gain, state.tip.force_n);
-    scratch.count = now;
-    if model.settings.by_sets {
-        sets::displacement(model.simd, &c.rows, &state.shaft_n, scratch);
-    }
-    for ((n, &of_tip), &of_shaft) in column.iter().enumerate().zip(scratch.u_m.numbers()) {
-        let of_shaft = if model.settings.by_sets {
-            of_shaft
-        } else {
-            dot(&c.rows.row(n)[..now], &state.shaft_n[..now])
-        };
-        state.u_m[n] = gain * (of_shaft + of_tip * force_n) + state.memory.offset_m[n];
-        if n >= before {
-            state.anchor_m[n] = tip_m - state.u_m[n];
-        }
-    }
+    before
 }
 
 /// A membrane is stiffer than what it holds: between the place of the tip and the body as a whole it is a spring, of such a

@@ -13,7 +13,7 @@ const PLACE_M: f64 = 1e-11;
 /// Where tissue in front is pressed together so far, a step through it counts at most so many times its length.
 const MOST_PRESSED: f64 = 10.0;
 /// Between two places close together, the gap closes by so much of the way between them.
-const LEAST_CLOSED: f64 = 0.5;
+const LEAST_CLOSED: f64 = 0.25;
 const MOST_CLOSED: f64 = 3.0;
 /// Part of the gap that is left when the way to the second place was the right one.
 const LEFT: f64 = 0.5;

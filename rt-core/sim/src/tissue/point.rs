@@ -77,6 +77,32 @@ impl MaterialPoint {
         p.map(|c| c * body.lattice.spacing_m)
     }
 
+    /// Its displacement, m: between those of the elements around it, so that it does not jump from one element to the next.
+    pub fn displacement_m(&self, body: &Deformed) -> [f64; 3] {
+        let cell = body.lattice.cell(self.element);
+        let side = self.local.map(|l| if l < 0.0 { -1_i64 } else { 1 });
+        let mut sum = [0.0; 3];
+        for corner in 0..8 {
+            let goes = [0, 1, 2].map(|a| corner >> a & 1 == 1);
+            let share = |a: usize| {
+                let part = f64::from(self.local[a].abs()).min(0.5);
+                if goes[a] { part } else { 1.0 - part }
+            };
+            let weight = share(0) * share(1) * share(2);
+            let at = [0, 1, 2].map(|a| cell[a] as i64 + if goes[a] { side[a] } else { 0 });
+            let [x, y, z] = at.map(|c| usize::try_from(c).ok());
+            let beside = x
+                .zip(y)
+                .zip(z)
+                .and_then(|((x, y), z)| body.lattice.element_of_cell(x, y, z));
+            let u = body.displacement(beside.unwrap_or(self.element));
+            for (sum, u) in sum.iter_mut().zip(u) {
+                *sum += weight * u * body.lattice.spacing_m;
+            }
+        }
+        sum
+    }
+
     /// Where a direction of the tissue at rest points now, as a unit vector; unchanged if it has no length.
     pub fn direction(&self, body: &Deformed, rest_dir: [f64; 3]) -> [f64; 3] {
         let links = link_vectors(body, self.element);

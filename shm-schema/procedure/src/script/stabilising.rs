@@ -47,6 +47,18 @@ impl Procedure {
         rehearsal
     }
 
+    /// One needle that goes to its first drop and out again, without a seed, in tissue that then comes to rest.
+    pub fn pass(way: NeedleWay, pace: Pace) -> Self {
+        let then = [
+            Operation::Engage,
+            Operation::Place,
+            Operation::Insert,
+            Operation::TakeOut,
+            Operation::Settle,
+        ];
+        Self::new(vec![way], pace, then.map(|operation| (0, operation)).into())
+    }
+
     /// Which stabilising needle is at work, counted from 0; `None` while one that leaves seeds is.
     pub fn stabilising(&self) -> Option<usize> {
         let (needle, _) = self.ahead.front()?;

@@ -138,11 +138,11 @@ fn a_face_met_at_an_angle_is_felt_as_one_met_squarely() {
             45.0,
         ),
     ];
-    // Finite elements off their line turn the force off where they are not solved in time: rows 32.
     for (kind, on_line) in [
         (TissueKind::ChainMail, true),
         (TissueKind::ChainMail, false),
         (TissueKind::Fem, true),
+        (TissueKind::Fem, false),
     ] {
         for (case, source, through, before_m, degrees) in places {
             let [square, found] = [0.0, degrees].map(|degrees| {
@@ -151,7 +151,8 @@ fn a_face_met_at_an_angle_is_felt_as_one_met_squarely() {
             });
             let ratio = [found.held_n / square.held_n, found.rest_n / square.rest_n];
             let model = match (kind, on_line) {
-                (TissueKind::Fem, _) => "fem, needle line",
+                (TissueKind::Fem, true) => "fem, needle line",
+                (TissueKind::Fem, false) => "fem, off the line",
                 (_, true) => "chainmail, needle line",
                 (_, false) => "chainmail, off the line",
             };

@@ -3,7 +3,7 @@
 use super::*;
 
 /// Four about the middle, 40 mm deep.
-fn stabilised(count: usize) -> NeedleRun {
+pub(super) fn stabilised(count: usize) -> NeedleRun {
     let run = needle();
     let at = |n: usize| {
         let (sine, cosine) = (std::f64::consts::FRAC_PI_2 * (n as f64 + 0.5)).sin_cos();

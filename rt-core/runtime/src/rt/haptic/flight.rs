@@ -3,6 +3,7 @@
 use super::HapticLoop;
 use crate::rt::exchange::HapticOrder;
 use crate::rt::haptic_tape::{HapticEntry, HapticMemory};
+use crate::rt::left_loads::LeftLoads;
 use crate::rt::response::TissueResponse;
 use stylet_shm_schema::TickRecord;
 use stylet_sim::line::{HandLine, LeftNeedles, LeftRecord};
@@ -66,6 +67,24 @@ impl HapticLoop {
         let fits = needles.take_record(record, with_forces, self.line.as_deref());
         self.left.needles = Some(needles);
         fits
+    }
+
+    /// How the needles that stay in stand after the last tick.
+    pub fn left_record(&self) -> LeftRecord {
+        let mut record = LeftRecord::default();
+        if let Some(needles) = self.left.needles.as_deref() {
+            record.copy_from(needles);
+        }
+        record
+    }
+
+    /// What they do to the body.
+    pub fn left_loads(&self) -> LeftLoads {
+        let mut loads = LeftLoads::default();
+        if let Some(needles) = self.left.needles.as_deref() {
+            loads.set(needles.needles().iter().zip(needles.shares()));
+        }
+        loads
     }
 
     /// The end counts as an order, so that its ramp can be repeated.

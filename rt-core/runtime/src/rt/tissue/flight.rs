@@ -23,6 +23,8 @@ impl TissueLoop {
             left,
             left_loads: _,
             left_room: _,
+            // What it leaves out has the same bits.
+            last_carry: _,
             layers,
             clear,
             held,
@@ -54,6 +56,7 @@ impl TissueLoop {
 
     /// Continues from the memory of another loop, with the line that it had, and those of needles that stayed in.
     pub fn remember(&mut self, memory: &TissueMemory, line: Option<Box<BodyLine>>, left: Vec<Box<BodyLine>>) {
+        self.last_carry.forget();
         self.left.clear();
         for (line, used) in left.into_iter().zip(&memory.left) {
             let mut body = LeftBody { line, used: *used };

@@ -1,7 +1,7 @@
 //! The body under needles that stay in: which of their columns this loop has, and what they add to each tick.
 
 use super::TissueLoop;
-use crate::rt::left_loads::NeedleLoads;
+use crate::rt::left_loads::{LeftLoads, NeedleLoads};
 use stylet_sim::line::{BodyAnswer, BodyLine, MAX_LEFT};
 use stylet_sim::tissue::{Carry, ElementField, StepReport};
 
@@ -16,6 +16,15 @@ impl LeftBody {
     pub fn stay(&mut self, loads: &NeedleLoads) {
         self.used = *loads;
         self.line.stay(&loads.of_columns());
+    }
+
+    /// The same where its loads are others than before; then true.
+    fn follow(&mut self, loads: &NeedleLoads) -> bool {
+        let is_other = self.used.of_columns() != loads.of_columns();
+        if is_other {
+            self.stay(loads);
+        }
+        is_other
     }
 }
 
@@ -51,8 +60,8 @@ impl TissueLoop {
                 .find(|n| n.generation == left.line.generation);
             if let Some(loads) = loads {
                 left.used.tip_m = loads.tip_m;
-                if n == due {
-                    left.stay(loads);
+                if n == due && left.follow(loads) {
+                    self.last_carry.forget();
                 }
             }
         }
@@ -60,8 +69,25 @@ impl TissueLoop {
         self.left_loads.copy_from(&loads.left);
     }
 
+    /// Before the first tick: needles stay in with these loads, each by its columns.
+    pub fn begin_beside(&mut self, lines: Vec<Box<BodyLine>>, loads: &LeftLoads) {
+        for line in lines.into_iter().take(MAX_LEFT) {
+            if let Some(of_line) = loads.needles().iter().find(|n| n.generation == line.generation) {
+                let used = NeedleLoads::default();
+                let mut left = LeftBody { line, used };
+                left.stay(of_line);
+                self.left.push(left);
+            }
+        }
+        self.name_left();
+        self.left_loads.copy_from(loads);
+        // The force loop gives up needles whose columns this loop does not name.
+        self.ports.response.write(self.response);
+    }
+
     fn take_from_left(&mut self, at: usize) {
         let LeftBody { line, .. } = self.left.remove(at);
+        self.last_carry.forget();
         if line.generation == self.loads.generation {
             self.drop_line();
             self.response.line = line.generation;
@@ -91,6 +117,7 @@ impl TissueLoop {
             };
             left.stay(needle);
             self.left.push(left);
+            self.last_carry.forget();
         }
     }
 
@@ -106,6 +133,7 @@ impl TissueLoop {
         while let Some(LeftBody { line, .. }) = self.left.pop() {
             self.free(line);
         }
+        self.last_carry.forget();
         self.name_left();
         self.left_loads.clear();
     }
@@ -137,7 +165,9 @@ impl TissueLoop {
                 report.unwrap_or_else(|| tissue.step(None, this.period_s))
             }),
             BodyAnswer::Carrying(_) => self.with_left(|this, fields| {
-                this.world.tissue.carry(Carry { fields, ..Carry::NOT });
+                if !this.last_carry.is_again(0, &[], [0.0; 3]) {
+                    this.world.tissue.carry(Carry { fields, ..Carry::NOT });
+                }
                 this.world.tissue.step(this.held, this.period_s)
             }),
         }

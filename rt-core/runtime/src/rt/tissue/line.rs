@@ -19,6 +19,14 @@ impl TissueLoop {
         self.drop_line();
         self.response.line = line.generation;
         self.line = Some(line);
+        // Its number may have been another's.
+        self.last_carry.forget();
+    }
+
+    /// The next tick adds up what carries the body, whatever the one before did.
+    #[cfg(test)]
+    pub fn forget_carry(&mut self) {
+        self.last_carry.forget();
     }
 
     /// The body that they were solved for is replaced.
@@ -68,9 +76,12 @@ impl TissueLoop {
                     whole_m,
                     fields: &[],
                 };
-                match self.left.is_empty() {
-                    true => self.world.tissue.carry(by),
-                    false => self.with_left(|this, fields| this.world.tissue.carry(Carry { fields, ..by })),
+                // A hand that rests loads the line in every tick as in the one before.
+                if !self.last_carry.is_again(line.generation, loads_n, whole_m) {
+                    match self.left.is_empty() {
+                        true => self.world.tissue.carry(by),
+                        false => self.with_left(|this, fields| this.world.tissue.carry(Carry { fields, ..by })),
+                    }
                 }
                 Some(self.world.tissue.step(held, self.period_s))
             }
@@ -118,6 +129,7 @@ impl TissueLoop {
             if self.left.is_empty() {
                 self.world.tissue.carry(Carry::NOT);
             }
+            self.last_carry.forget();
             let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
             self.notify(Notice::LeftTissue { tick, time_ns });
         }

@@ -85,6 +85,8 @@ pub(in crate::line) struct Scratch<const B: usize> {
     pub products: u32,
     /// How far a station is off its place at most.
     pub residual_m: f64,
+    /// Of how many stations the compliance by itself is known from the solution before in the same tick; 0 at its begin.
+    pub owned: usize,
     own_m_per_n: Each<B>,
     n_per_own_m: Each<B>,
     /// 1 for those that stick.
@@ -114,6 +116,7 @@ impl<const B: usize> Scratch<B> {
             tip: Tip::default(),
             products: 0,
             residual_m: 0.0,
+            owned: 0,
             own_m_per_n: Each::ZEROS,
             n_per_own_m: Each::ZEROS,
             sticks: Each::ZEROS,
@@ -137,8 +140,11 @@ in_vectors! {
 /// of the first so many stations: of needles that stay in, most of whose stations stick in every set.
 fn find<V: Vector<f64>, const B: usize>(rows: &Rows, inverse: Option<&Rows>, scratch: &mut Scratch<B>) -> bool {
     let (count, gain) = (scratch.count, scratch.gain);
-    scratch.own_m_per_n.set(count, (0..count).map(|n| gain * rows.row(n).get(n).copied().unwrap_or(1.0)));
-    scratch.n_per_own_m.set(count, scratch.own_m_per_n.numbers().iter().map(|own| 1.0 / own));
+    if scratch.owned != count {
+        scratch.own_m_per_n.set(count, (0..count).map(|n| gain * rows.row(n).get(n).copied().unwrap_or(1.0)));
+        scratch.n_per_own_m.set(count, scratch.own_m_per_n.numbers().iter().map(|own| 1.0 / own));
+        scratch.owned = count;
+    }
     for _ in 0..MOST_SETS {
         choose(scratch);
         let is_found = scratch.residual_m <= scratch.tolerance_m;

@@ -8,6 +8,10 @@ use crate::line::model::LineModel;
 use crate::line::rows::dot;
 use crate::line::state::{LineOutput, LineState};
 
+/// A tip that is so far from its place will be solved for at another: until then forces are found to so many times the tolerance.
+const FAR_M: f64 = 1e-6;
+const FAR: f64 = 20.0;
+
 impl LeftNeedles {
     /// Forces over the elements and then the stations of the needle that moves; `None` where that has not found them: with
     /// rate terms and in tissue that creeps, where stations give way within the tick and elements do not, and where sets go round in a circle.
@@ -28,7 +32,7 @@ impl LeftNeedles {
         let all = elements + count;
         let limits = || (0..count).map(|n| limit_n(model, place_m, n));
         let scratch = &mut *self.scratch;
-        (scratch.count, scratch.gain, scratch.tolerance_m, scratch.products) = (all, 1.0, settings.tolerance_m, 0);
+        (scratch.count, scratch.gain, scratch.products) = (all, 1.0, 0);
         let stuck = self.rest_m[..elements].iter().copied();
         scratch.stuck_m.set(
             all,
@@ -62,7 +66,14 @@ impl LeftNeedles {
             ..Tip::default()
         };
         let inverse = (self.inverse.size() == elements).then_some(&self.inverse);
-        let is_found = find_by_sets(model.simd, &self.all, inverse, scratch);
+        scratch.tolerance_m = settings.tolerance_m * FAR;
+        let mut is_found = find_by_sets(model.simd, &self.all, inverse, scratch);
+        let tip = &scratch.tip;
+        let goes_on = tip.force_n >= tip_limit_n && tip.stuck_m - tip.u_m > FAR_M && state.tip.held_by == 0;
+        if !(is_found && goes_on) {
+            scratch.tolerance_m = settings.tolerance_m;
+            is_found = find_by_sets(model.simd, &self.all, inverse, scratch);
+        }
         let (forces, moved) = (scratch.force_n.numbers(), scratch.u_m.numbers());
         let mut has_moved = count > 0;
         for (k, force) in forces[..elements].iter().enumerate() {

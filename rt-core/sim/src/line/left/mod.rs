@@ -7,6 +7,7 @@
 
 mod assemble;
 mod by_sets;
+mod onward;
 mod record;
 mod solve;
 
@@ -95,6 +96,7 @@ pub struct LeftNeedles {
     /// How all elements and then the stations of the moving line move with each, and what their forces are found in.
     all: Rows,
     scratch: Box<Scratch<ALL_BLOCKS>>,
+    without_tip: onward::WithoutTip,
 }
 
 impl LeftNeedles {
@@ -130,6 +132,7 @@ impl LeftNeedles {
             skipped_m: 0.0,
             all: Rows::with_room(ALL_BLOCKS * LANES),
             scratch: Box::new(Scratch::new()),
+            without_tip: onward::WithoutTip::with_room(),
         })
     }
 
@@ -150,7 +153,7 @@ impl LeftNeedles {
         ];
         let values: usize = all.iter().map(|values| 8 * values.len()).sum();
         let rows = 8 * ((ALL_BLOCKS * LANES).pow(2) + MAX_ELEMENTS * MAX_ELEMENTS.next_multiple_of(LANES));
-        values + rows + size_of::<Scratch<ALL_BLOCKS>>()
+        values + rows + self.without_tip.bytes() + size_of::<Scratch<ALL_BLOCKS>>()
     }
 
     /// How many there are.

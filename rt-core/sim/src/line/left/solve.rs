@@ -2,12 +2,12 @@
 //! for a needle alone, or by projected Gauss-Seidel.
 
 use super::{LeftNeedle, LeftNeedles};
-use crate::line::contact::{Company, LineInput, Neighbours, advance, meet, press, step, sweep, touch_beside};
+use crate::line::contact::{Company, LineInput, Neighbours, advance, lay, meet, press, step, stick, sweep};
 use crate::line::model::{LineModel, MAX_STATIONS};
 use crate::line::ready::HandLine;
 use crate::line::rows::{add_scaled, dot};
 use crate::line::state::{LineOutput, LineState};
-use crate::simd::{Simd, vectorised};
+use crate::simd::{LANES, Simd, vectorised};
 
 /// A needle that far before its entry at rest meets nothing, wherever the others have moved its surface.
 const BEFORE_M: f64 = 20e-3;
@@ -34,7 +34,11 @@ pub(super) fn step_beside(left: &mut LeftNeedles, line: &mut HandLine, input: &L
 
 impl Company for LeftNeedles {
     fn begin(&mut self, model: &LineModel, state: &mut LineState, tip_m: f64, membrane: Option<usize>) {
-        touch_beside(model, state, tip_m);
+        let before = lay(model, state);
+        let goes_on = self.stations_go_on(model, state, tip_m, before);
+        if !goes_on {
+            stick(model, state, tip_m, before, &mut self.scratch);
+        }
         meet(model, state, membrane);
         let kept = press(model, state, membrane);
         if let Some(kept) = kept.filter(|_| state.memory.is_on()) {
@@ -45,7 +49,11 @@ impl Company for LeftNeedles {
             state.tip_offset_m += (1.0 - kept) * added;
         }
         self.reach(model, state, kept);
-        self.displace(Some(state));
+        if goes_on {
+            self.elements_go_on(state);
+        } else {
+            self.displace(Some(state));
+        }
     }
 
     fn solve(
@@ -56,12 +64,15 @@ impl Company for LeftNeedles {
         limit_n: f64,
         output: &mut LineOutput,
     ) -> f64 {
-        let gap_m = self
-            .solve_by_sets(model, state, input, limit_n, output)
-            .unwrap_or_else(|| {
-                let rate = model.settings.viscous_n_s_per_m2 / input.dt_s;
-                self.solve_by_sweeps(model, state, (input.tip_m, limit_n, rate), output)
-            });
+        let found = self.solve_by_sets(model, state, input, limit_n, output);
+        self.without_tip.stations = None;
+        if found.is_some() && state.tip.held_by == 0 {
+            self.keep_without_tip(state);
+        }
+        let gap_m = found.unwrap_or_else(|| {
+            let rate = model.settings.viscous_n_s_per_m2 / input.dt_s;
+            self.solve_by_sweeps(model, state, (input.tip_m, limit_n, rate), output)
+        });
         self.add_to(state);
         gap_m
     }
@@ -93,6 +104,8 @@ impl LeftNeedles {
         state.memory.begin(rows, model.compliance.common_m_per_n(), terms, dt_s);
         state.is_beside = true;
         self.added_m.fill(0.0);
+        self.without_tip.stations = None;
+        self.scratch.owned = 0;
         self.add_to(state);
     }
 
@@ -238,12 +251,38 @@ impl Neighbours for LeftNeedles {
 vectorised! {
     /// Adds up rows, that far apart, each times its factor.
     fn add_rows(factors: &[f64], rows: &[f64], stride: usize, sum: &mut [f64]) {
-        for (row, factor) in rows.chunks(stride.max(1)).zip(factors) {
-            if *factor != 0.0 {
-                add_scaled(*factor, row, sum);
+        let stride = stride.max(1);
+        let (wide, rest) = sum.as_chunks_mut::<{ 4 * LANES }>();
+        let (narrow, rest) = rest.as_chunks_mut::<LANES>();
+        let mut from = 0;
+        for part in wide {
+            add_parts(factors, rows, stride, from, part);
+            from += part.len();
+        }
+        for part in narrow {
+            add_parts(factors, rows, stride, from, part);
+            from += part.len();
+        }
+        for (row, factor) in rows.chunks(stride).zip(factors) {
+            if let Some(row) = row.get(from..) {
+                add_scaled(*factor, row, rest);
             }
         }
     }
+}
+
+/// A part of the columns, whose sums stay in registers.
+#[inline(always)]
+fn add_parts<const N: usize>(factors: &[f64], rows: &[f64], stride: usize, from: usize, sum: &mut [f64; N]) {
+    let mut held = *sum;
+    for (row, factor) in rows.chunks(stride).zip(factors) {
+        if let Some(part) = row.get(from..).and_then(<[f64]>::first_chunk::<N>) {
+            for n in 0..N {
+                held[n] += factor * part[n];
+            }
+        }
+    }
+    *sum = held;
 }
 
 /// Corrects one element; returns the change of its force, and how far it moves the element itself.

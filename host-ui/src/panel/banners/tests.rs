@@ -1,0 +1,139 @@
+//! Which banner stands over the pictures, and what it says.
+
+use super::*;
+use bytemuck::Zeroable;
+use stylet_shm_schema::{HapticState, flags};
+
+fn live() -> Shown {
+    let mut shown = Shown::empty("lab");
+    shown.status = LinkStatus::Live;
+    let mut state = HapticState::zeroed();
+    state.flags = flags::REAL_TIME | flags::ENGAGED;
+    shown.state = Some(state);
+    shown
+}
+
+#[test]
+fn no_banner_without_a_problem_and_absence_shows_what_to_type() {
+    assert!(banners(&live()).is_empty());
+    let list = banners(&Shown::empty("lab"));
+    assert!(list[0].text.contains("rt-core --instance lab"), "{}", list[0].text);
+}
+
+#[test]
+fn a_force_that_is_off_or_waits_and_a_refusal_each_have_their_banner() {
+    let titles = |shown: &Shown| banners(shown).iter().map(|b| b.title).collect::<Vec<_>>();
+    let mut shown = live();
+    if let Some(state) = &mut shown.state {
+        state.flags |= flags::WAITING;
+    }
+    assert_eq!(titles(&shown), ["The force waits"]);
+    if let Some(state) = &mut shown.state {
+        state.flags = flags::REAL_TIME;
+    }
+    shown.refusals = 2;
+    shown.last_refusal = "needle.puncture_depth = 1000 mm".to_owned();
+    assert_eq!(titles(&shown), ["The force is off", "rt-core refused"]);
+    assert!(banners(&shown)[1].text.contains("puncture_depth"));
+}
+
+#[test]
+fn folded_tissue_has_a_banner_while_it_is_folded_that_says_from_where_on() {
+    let mut shown = live();
+    if let Some(state) = &mut shown.state {
+        state.folded_from_m = 7.93e-3;
+    }
+    // Where it was: a membrane that gave way has eased it.
+    assert!(banners(&shown).is_empty());
+    if let Some(state) = &mut shown.state {
+        state.flags |= stylet_shm_schema::flags::FOLDED;
+    }
+    let list = banners(&shown);
+    assert_eq!(list.len(), 1);
+    assert!(list[0].text.contains("folded from 7.9 mm"), "{}", list[0].text);
+}
+
+/// A row of docs/stability.md that says no says what warns of it: it is looked for in what the window shows then.
+#[test]
+fn what_the_page_of_stability_says_no_to_is_warned_of_while_it_is_so() {
+    let page = include_str!("../../../../docs/stability.md");
+    let not_met = page
+        .lines()
+        .filter(|line| line.starts_with("| ") && line.contains("**no**"));
+    let mut numbers: Vec<u32> = not_met
+        .map(|line| line[2..].split(' ').next().unwrap_or("").parse().expect("a number"))
+        .collect();
+    numbers.dedup();
+    let texts = |shown: &Shown| {
+        banners(shown)
+            .into_iter()
+            .map(|b| format!("{}: {}", b.title, b.text))
+            .collect::<Vec<_>>()
+    };
+    for number in numbers {
+        let mut shown = live();
+        let state = shown.state.as_mut().expect("live");
+        let wanted = match number {
+            // Cells beside the tip fold.
+            3 | 5 | 14 => {
+                (state.flags, state.folded_from_m) = (state.flags | flags::FOLDED, 4e-3);
+                "Tissue folded: "
+            }
+            // The answer of finite elements off their line follows some ticks later.
+            7 => {
+                state.flags |= flags::LINE_NEEDED | flags::IN_CONTACT;
+                (state.lag_ns, state.lag_m) = (15_000_000, 1.5e-3);
+                "No line: The tissue was not prepared for this needle, and its answer is 15 ms"
+            }
+            32 | 42 | 48 => {
+                state.flags |= flags::LINE_NEEDED | flags::IN_CONTACT;
+                "No line: "
+            }
+            // Of the scene, as long as it is there: `panel/workflow/scene`.
+            35 => continue,
+            _ => panic!("row {number} of docs/stability.md is not met: what warns of it?"),
+        };
+        let list = texts(&shown);
+        assert!(
+            list.iter().any(|text| text.starts_with(wanted)),
+            "row {number}: {list:?}"
+        );
+    }
+    // A needle on its line, or outside, needs no warning.
+    let mut shown = live();
+    for flag in [
+        flags::LINE_NEEDED,
+        flags::LINE_NEEDED | flags::LINE_READY | flags::IN_CONTACT,
+    ] {
+        shown.state.as_mut().expect("live").flags = flags::REAL_TIME | flags::ENGAGED | flag;
+        assert!(banners(&shown).is_empty());
+    }
+}
+
+#[test]
+fn an_unplugged_controller_and_one_without_rights_are_shown_with_or_without_a_core() {
+    for mut shown in [live(), Shown::empty("lab")] {
+        let before = banners(&shown).len();
+        shown.disconnected = Some("Pad".to_owned());
+        shown
+            .controllers
+            .denied
+            .push("Cap may not be read. Run: that".to_owned());
+        let list = banners(&shown);
+        assert_eq!(list.len(), before + 2);
+        assert!(list[before].text.contains("Pad. The needle stays where it is"));
+        assert_eq!(list[before].remedy, Some(("Dismiss", Action::DismissDisconnected)));
+        assert!(list[before + 1].text.contains("Run: that"));
+    }
+}
+
+#[test]
+fn fault_comes_first_and_an_unknown_one_is_a_fault() {
+    let mut shown = live();
+    if let Some(state) = &mut shown.state {
+        (state.fault, state.flags) = (999, 0);
+    }
+    let list = banners(&shown);
+    assert_eq!(list[0].level, BannerLevel::Bad);
+    assert_eq!(list[1].title, "Not real-time");
+}

@@ -1,0 +1,188 @@
+//! Needles that stay in, as needles before have left them: each that comes and goes drags at them, and they hold the tissue elsewhere from then on.
+
+use super::rig::Rig;
+use super::script::Script;
+use super::{LONGEST_S, Motion, NeedleRun, RehearseError, Rehearsed, Stage, perform};
+use nalgebra::Vector3;
+use std::sync::atomic::{AtomicBool, Ordering};
+use stylet_hw::Hand;
+use stylet_shm_schema::{ParameterSet, StabilisingNeedle};
+use stylet_sim::active::Active;
+use stylet_sim::line::{LeftRecord, ReadyLine};
+
+/// Ticks of the force loop until the body is where needles that stay in hold it.
+const HELD_TICKS: usize = 20;
+
+/// Kept from one rehearsal to the next, as far as the needles before are the same.
+pub(super) struct Standing {
+    of: Of,
+    /// Once they are in, before any other.
+    first: LeftRecord,
+    /// After each that came and went.
+    after: Vec<(StabilisingNeedle, LeftRecord)>,
+}
+
+/// What a record of them depends on.
+#[derive(Clone, PartialEq)]
+struct Of {
+    stabilising: Vec<StabilisingNeedle>,
+    set: ParameterSet,
+    hand: Hand,
+    pace: [f64; 4],
+    bends: bool,
+}
+
+impl Stage {
+    /// As [`rehearse`](Stage::rehearse), beside needles that stay in and after `run.earlier`; `lines` are theirs and the needle's.
+    pub(super) fn rehearse_after(
+        &mut self,
+        run: &NeedleRun,
+        set: &ParameterSet,
+        active: &Active,
+        mut lines: Vec<ReadyLine>,
+        stop: &AtomicBool,
+    ) -> Result<Rehearsed, RehearseError> {
+        let own = lines.split_off(run.stabilising.len().min(lines.len()));
+        let record = self.standing(run, set, active, &lines, stop)?;
+        let mut rig = self.rig(run, active)?;
+        let outcome = match rig.stand(&lines, &record) {
+            true => {
+                rig.take_lines(own);
+                (0..HELD_TICKS).for_each(|_| _ = rig.tick());
+                let script = (Script::beside(run), Motion::new(&self.target));
+                perform(&mut rig, run, script, stop)
+            }
+            false => Err(RehearseError::BodyLost),
+        };
+        self.world = Some(rig.into_world());
+        outcome
+    }
+
+    /// How they stand after all that were there before.
+    fn standing(
+        &mut self,
+        run: &NeedleRun,
+        set: &ParameterSet,
+        active: &Active,
+        lines: &[ReadyLine],
+        stop: &AtomicBool,
+    ) -> Result<LeftRecord, RehearseError> {
+        let of = Of {
+            stabilising: run.stabilising.clone(),
+            set: *set,
+            hand: self.hand,
+            pace: [
+                run.insert_m_per_s,
+                run.retract_m_per_s,
+                run.approach_m_per_s,
+                run.acceleration_m_per_s2,
+            ],
+            bends: active.force.bending.is_on(),
+        };
+        let mut standing = match self.standing.take().filter(|standing| standing.of == of) {
+            Some(standing) => standing,
+            None => Standing {
+                first: self.put_in(run, active, lines, stop)?,
+                after: Vec::new(),
+                of,
+            },
+        };
+        let same = standing
+            .after
+            .iter()
+            .zip(&run.earlier)
+            .take_while(|((a, _), b)| a == *b)
+            .count();
+        standing.after.truncate(same);
+        for needle in run.earlier.iter().skip(same) {
+            let before = standing.after.last().map_or(&standing.first, |(_, record)| record);
+            let after = self.come_and_go((run, needle), active, lines, before, stop)?;
+            standing.after.push((*needle, after));
+        }
+        let record = standing
+            .after
+            .last()
+            .map_or(&standing.first, |(_, record)| record)
+            .clone();
+        self.standing = Some(standing);
+        Ok(record)
+    }
+
+    /// Those that stay in go in, and the hand is out again.
+    fn put_in(
+        &mut self,
+        run: &NeedleRun,
+        active: &Active,
+        lines: &[ReadyLine],
+        stop: &AtomicBool,
+    ) -> Result<LeftRecord, RehearseError> {
+        let mut rig = self.rig(run, active)?;
+        rig.take_lines_of_many(lines.to_vec());
+        let mut script = Script::new(run);
+        let done = drive(&mut rig, stop, |rig| {
+            script.advance(rig)?;
+            Ok(script.is_at_needle())
+        });
+        let record = rig.standing();
+        self.world = Some(rig.into_world());
+        done.map(|()| record)
+    }
+
+    /// One needle goes to its depth and out again, beside them.
+    fn come_and_go(
+        &mut self,
+        (run, needle): (&NeedleRun, &StabilisingNeedle),
+        active: &Active,
+        lines: &[ReadyLine],
+        before: &LeftRecord,
+        stop: &AtomicBool,
+    ) -> Result<LeftRecord, RehearseError> {
+        let direction = Vector3::from(needle.direction);
+        let entry_m = Vector3::from(needle.entry_m);
+        let run = NeedleRun {
+            entry_m,
+            direction,
+            drops_m: vec![entry_m + direction * needle.depth_m],
+            stabilising: Vec::new(),
+            earlier: Vec::new(),
+            ..run.clone()
+        };
+        let others: Vec<_> = lines.iter().map(|line| line.stations.clone()).collect();
+        let own = self.line_beside(
+            lines.len() as u64 + 1,
+            &run,
+            active.force.bending.is_on(),
+            &others,
+            stop,
+        )?;
+        let mut rig = self.rig(&run, active)?;
+        let mut done = Err(RehearseError::BodyLost);
+        if rig.stand(lines, before) {
+            rig.take_lines(vec![own]);
+            let mut script = Script::pass(&run);
+            done = drive(&mut rig, stop, |rig| script.advance(rig));
+        }
+        let record = rig.standing();
+        self.world = Some(rig.into_world());
+        done.map(|()| record)
+    }
+}
+
+/// Ticks until `advance` says that it is enough.
+fn drive(
+    rig: &mut Rig,
+    stop: &AtomicBool,
+    mut advance: impl FnMut(&mut Rig) -> Result<bool, RehearseError>,
+) -> Result<(), RehearseError> {
+    while rig.seconds() < LONGEST_S {
+        // SYNC: set by the bridge when it ends; nothing but the flag is carried.
+        if stop.load(Ordering::Relaxed) {
+            return Err(RehearseError::Stopped);
+        }
+        rig.tick();
+        if advance(rig)? {
+            return Ok(());
+        }
+    }
+    Err(RehearseError::TooLong)
+}
