@@ -1,7 +1,7 @@
 //! The threads of the streams: records as they come, snapshots thinned, and what one member asks for again.
 
 use super::{Server, lock};
-use crate::net::{Place, Priority, put, put_whole};
+use crate::net::{Place, Priority, put, put_newest, put_whole};
 use crate::now_ns;
 use crate::wire::{Batches, Kind, Rest, Stamp, encode, encode_snapshot};
 use std::sync::mpsc::Receiver;
@@ -130,7 +130,7 @@ fn send_snapshot(server: &Server, rest: &Rest, header: &SnapshotHeader, vertices
     }
     // Without the lock: this may wait for a line.
     for (seat, bytes) in messages {
-        put(&server.session, Place::To(seat), Priority::DataLow, bytes);
+        put_newest(&server.session, Place::To(seat), Priority::DataLow, bytes);
     }
 }
 

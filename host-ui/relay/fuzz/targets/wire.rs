@@ -1,0 +1,12 @@
+//! Messages from the net, at the server's end and at a member's.
+
+#![no_main]
+
+#[path = "../../tests/decoders/mod.rs"]
+mod decoders;
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    decoders::take(data);
+});
