@@ -46,7 +46,7 @@ igtl-test: deps-test build ## Compare OpenIGTLink with libOpenIGTLink and pyigtl
 	@docs/tools/need g++ libopenigtlink-dev python3-venv
 	python3 -m venv $(BIN)/pyigtl && $(BIN)/pyigtl/bin/pip install -q pyigtl==0.3.4
 	$(CARGO) test --release -p stylet-igtl --lib library -- --ignored --nocapture
-	STYLET_PYIGTL=$(abspath $(BIN))/pyigtl/bin/python STYLET_IGTL_S=10 $(CARGO) test --release -p stylet-tests --test system igtl::pyigtl -- --ignored --nocapture --test-threads=1
+	STYLET_PYIGTL=$(abspath $(BIN))/pyigtl/bin/python STYLET_IGTL_S=10 $(CARGO) test --release -p stylet-tests --test system igtl_python -- --ignored --nocapture --test-threads=1
 	STYLET_IGTL_S=$(or $(IGTL_SECONDS),600) $(CARGO) test --release -p stylet-tests --test system igtl::clients_that_hang -- --nocapture
 
 relay: ## Build the relay, which carries a core to other machines; the other targets neither need nor build it

@@ -82,6 +82,9 @@ mod tests {
         let columns = needle(&turned, tip_m, direction);
         let (its_tip_m, its_direction) = tip_and_direction(&turned, &columns).expect("rigid");
         assert!((0..3).all(|a| (its_tip_m[a] - tip_m[a]).abs() < 1e-7), "{its_tip_m:?}");
-        assert!((0..3).all(|a| (its_direction[a] - direction[a]).abs() < 1e-6), "{its_direction:?}");
+        assert!(
+            (0..3).all(|a| (its_direction[a] - direction[a]).abs() < 1e-6),
+            "{its_direction:?}"
+        );
     }
 }

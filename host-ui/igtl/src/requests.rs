@@ -39,14 +39,13 @@ impl Requests {
             // Without a core there is no hand to stop.
             let _ = link.send(&Request::StopHand);
         }
-        self.awaited
-            .retain(|(id, received)| match link.reply(*id) {
-                Some(answer) if !answer.accepted => {
-                    server.refuse(received.from, &received.device, &not_ready(answer.text));
-                    false
-                }
-                answer => answer.is_none(),
-            });
+        self.awaited.retain(|(id, received)| match link.reply(*id) {
+            Some(answer) if !answer.accepted => {
+                server.refuse(received.from, &received.device, &not_ready(answer.text));
+                false
+            }
+            answer => answer.is_none(),
+        });
     }
 
     /// The hand does not go on for a client that is served no longer.

@@ -207,7 +207,9 @@ fn start(
     })?;
     let (held, all, ends) = (client.clone(), shared.clone(), ended.clone());
     let started = thread("igtl-reader").spawn(move || incoming::read(reads, &held, &all, &ends));
-    started.map(drop).inspect_err(|_| client.end("no thread to read from it"))
+    started
+        .map(drop)
+        .inspect_err(|_| client.end("no thread to read from it"))
 }
 
 #[cfg(test)]

@@ -84,7 +84,7 @@ def watch(host, port, seconds):
             goal[:3, 3] += start[:3, 2] * 2.5 * (1 - math.cos(math.pi * (time.time() - begun)))
             client.send_message(pyigtl.TransformMessage(goal, device_name="Stylus"), wait=False)
         next_at = max(next_at + 1 / 60, time.time())
-        time.sleep(next_at - time.time())
+        time.sleep(max(next_at - time.time(), 0))
     off = None if start is None else float(np.linalg.norm(np.array(last["Needle"])[:3, 3] - start[:3, 3]))
     print(json.dumps({"counts": counts, "moved_mm": off, "connected": client.is_connected(), "State": last.get("State")}))
     client.stop()

@@ -14,8 +14,8 @@ use tracing::field::{Field, Visit};
 use tracing::span::{Attributes, Id, Record};
 use tracing::{Event, Level, Metadata, Subscriber};
 pub use zenoh::Session;
-pub use zenoh::qos::{CongestionControl, Priority};
 use zenoh::qos::Reliability;
+pub use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Config, Wait};
 
 /// Port where `serve` listens where no other is given.
@@ -169,7 +169,11 @@ fn access(closed: &[u16]) -> Value {
             "key_exprs": [Place::To(seat).key()],
         }));
         subjects.push(json!({ "id": name, "cert_common_names": [name] }));
-        let kinds: &[&str] = if closed.contains(&seat) { &["ask"] } else { &["ask", "hear", "to"] };
+        let kinds: &[&str] = if closed.contains(&seat) {
+            &["ask"]
+        } else {
+            &["ask", "hear", "to"]
+        };
         let of_seat: Vec<String> = kinds.iter().map(|kind| format!("{kind}-{name}")).collect();
         policies.push(json!({ "rules": of_seat, "subjects": [name] }));
     }

@@ -1,8 +1,10 @@
 //! Ports of shared memory: those of a host beside the core, and those of a core for hosts on another machine.
 
-use stylet_shm_schema::service::{self, Subscriber, Instance, MAX_BATCH, Node, ServiceError, SliceSubscriber, SlicePublisher, Publisher};
 use std::cell::RefCell;
 use std::collections::VecDeque;
+use stylet_shm_schema::service::{
+    self, Instance, MAX_BATCH, Node, Publisher, ServiceError, SlicePublisher, SliceSubscriber, Subscriber,
+};
 use stylet_shm_schema::*;
 
 /// What a host beside the core has but for records and snapshots, which have threads of their own.
@@ -76,7 +78,11 @@ impl Near {
     }
 
     /// A port for one volume, filled and sent; it must live until the core has mapped it.
-    pub fn upload(&self, header: &UploadHeader, cells: &[u8]) -> Result<SlicePublisher<u8, UploadHeader>, ServiceError> {
+    pub fn upload(
+        &self,
+        header: &UploadHeader,
+        cells: &[u8],
+    ) -> Result<SlicePublisher<u8, UploadHeader>, ServiceError> {
         let port = service::uploads::publisher(&self.node, cells.len())?;
         port.send(header, cells)
             .map_err(|e| ServiceError(format!("uploads: {e}")))?;

@@ -37,8 +37,14 @@ fn examples() -> Vec<(&'static str, Vec<u8>)> {
         ("who", message(Kind::Who, &[&who.to_bytes()])),
         ("hello", message(Kind::Hello, &[bytemuck::bytes_of(&Hello::default())])),
         ("command", message(Kind::Command, &[bytemuck::bytes_of(&command)])),
-        ("again", message(Kind::Again, &[bytemuck::bytes_of(&Batches { from: 1, to: 9 })])),
-        ("lease", message(Kind::Lease, &[Order::Give("Otto".to_owned()).line().as_bytes()])),
+        (
+            "again",
+            message(Kind::Again, &[bytemuck::bytes_of(&Batches { from: 1, to: 9 })]),
+        ),
+        (
+            "lease",
+            message(Kind::Lease, &[Order::Give("Otto".to_owned()).line().as_bytes()]),
+        ),
         ("seen", message(Kind::Seen, &[])),
     ]
 }
@@ -74,7 +80,10 @@ fn damaged_messages_are_refused_or_valid_and_never_panic() {
             }
         }
     }
-    assert!(accepted > 1000 && refused > 1000, "{accepted} accepted, {refused} refused");
+    assert!(
+        accepted > 1000 && refused > 1000,
+        "{accepted} accepted, {refused} refused"
+    );
 }
 
 /// `make fuzz` begins with these, and what it finds is kept among them.
@@ -87,7 +96,10 @@ fn the_corpus_is_taken_without_a_panic() {
             std::fs::write(folder.join(name), bytes).expect("written");
         }
     }
-    let files: Vec<_> = std::fs::read_dir(folder).expect("kept").map(|f| f.expect("readable").path()).collect();
+    let files: Vec<_> = std::fs::read_dir(folder)
+        .expect("kept")
+        .map(|f| f.expect("readable").path())
+        .collect();
     assert!(files.len() >= examples().len());
     for file in files {
         decoders::take(&std::fs::read(&file).expect("readable"));

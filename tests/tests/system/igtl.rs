@@ -3,7 +3,6 @@
 
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::TcpStream;
-use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -13,14 +12,14 @@ use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, program, until};
 
 /// The process, where it listens, and what it printed.
-struct Served {
+pub struct Served {
     child: Child,
-    address: String,
+    pub address: String,
     log: Arc<Mutex<String>>,
 }
 
 impl Served {
-    fn start(core: &Core, options: &[&str]) -> Self {
+    pub fn start(core: &Core, options: &[&str]) -> Self {
         let mut child = Command::new(program("host-ui"))
             .args(["igtl", "--instance", core.instance.name(), "--listen", "127.0.0.1:0"])
             .args(options)
@@ -44,11 +43,13 @@ impl Served {
 
     fn connect(&self) -> TcpStream {
         let stream = TcpStream::connect(&self.address).expect("it listens");
-        stream.set_read_timeout(Some(Duration::from_secs(10))).expect("a timeout");
+        stream
+            .set_read_timeout(Some(Duration::from_secs(10)))
+            .expect("a timeout");
         stream
     }
 
-    fn log(&self) -> String {
+    pub fn log(&self) -> String {
         self.log.lock().expect("whole").clone()
     }
 }
@@ -106,12 +107,12 @@ fn further(mut columns: [[f32; 3]; 4], mm: f32) -> [[f32; 3]; 4] {
     columns
 }
 
-fn tip_m(link: &mut Link) -> [f64; 3] {
+pub fn tip_m(link: &mut Link) -> [f64; 3] {
     link.poll();
     link.state().expect("live").tip_in_scene_m
 }
 
-fn distance_m(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub fn distance_m(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
 }
 
@@ -178,13 +179,19 @@ fn a_tracker_moves_the_needle_and_its_silence_stops_it() {
         std::thread::sleep(Duration::from_millis(15));
         (distance_m(tip_m(&mut link), rest_m) - 5e-3).abs() < 1e-4
     });
-    assert!(is_there, "{:.4} m; {}", distance_m(tip_m(&mut link), rest_m), served.log());
+    assert!(
+        is_there,
+        "{:.4} m; {}",
+        distance_m(tip_m(&mut link), rest_m),
+        served.log()
+    );
     let back = needle_of(&mut stream);
     assert_eq!(back[2], shown[2], "it points where it pointed");
 
-    // 200 mm take 10 s: whoever asked for them falls silent meanwhile.
+    // 200 mm take 10 s: whoever asked for them falls silent after 6 mm.
+    let there_m = tip_m(&mut link);
     send(&mut stream, "Stylus", further(shown, -200.0));
-    let moves = until(Duration::from_secs(10), || distance_m(tip_m(&mut link), rest_m) > 8e-3);
+    let moves = until(Duration::from_secs(10), || distance_m(tip_m(&mut link), there_m) > 1e-3);
     assert!(moves, "{}", served.log());
     let mut before = tip_m(&mut link);
     let rests = until(Duration::from_secs(5), || {
@@ -192,8 +199,8 @@ fn a_tracker_moves_the_needle_and_its_silence_stops_it() {
         let now = tip_m(&mut link);
         distance_m(now, std::mem::replace(&mut before, now)) < 1e-6
     });
-    let went_m = distance_m(tip_m(&mut link), rest_m);
-    assert!(rests && went_m < 0.15, "the hand goes on: {went_m} m");
+    let went_m = distance_m(tip_m(&mut link), there_m);
+    assert!(rests && went_m < 0.1, "the hand goes on: {went_m} m");
     drop((stream, served, link));
     core.finish();
 }
@@ -208,7 +215,11 @@ fn a_transform_that_nobody_agreed_to_is_refused_in_words_and_moves_nothing() {
     let shown = needle_of(&mut streams[0]);
     send(&mut streams[0], "Stylus", further(shown, 5.0));
     let status = refusal(&mut streams[0]);
-    assert_eq!((status.code, status.text.contains("--hand NAME")), (5, true), "{status:?}");
+    assert_eq!(
+        (status.code, status.text.contains("--hand NAME")),
+        (5, true),
+        "{status:?}"
+    );
     send(&mut streams[1], "Probe", further(shown, 5.0));
     assert!(refusal(&mut streams[1]).text.contains("\"Stylus\" alone"));
     // A place that no hand reaches is refused by the core, in its words.
@@ -224,7 +235,7 @@ fn a_transform_that_nobody_agreed_to_is_refused_in_words_and_moves_nothing() {
 }
 
 /// Of each measurement; `STYLET_IGTL_S` makes it longer for a figure.
-fn watched() -> Duration {
+pub fn watched() -> Duration {
     let asked = std::env::var("STYLET_IGTL_S").ok().and_then(|s| s.parse().ok());
     Duration::from_secs_f64(asked.unwrap_or(4.0))
 }
@@ -257,8 +268,13 @@ fn clients_that_hang_cost_no_frame_and_no_tick() {
         half.write_all(&[0, 1, b'T', b'R']).expect("sent");
         let mut noise = served.connect();
         noise.write_all(&[0x5a; 4096]).expect("sent");
-        let mut flood = served.connect();
-        flood.set_nonblocking(true).expect("a socket");
+        let address = served.address.clone();
+        let connect_to = |address: &str| {
+            let stream = TcpStream::connect(address).expect("it listens");
+            stream.set_nonblocking(true).expect("a socket");
+            stream
+        };
+        let mut flood = connect_to(&address);
         let end = Instant::now() + watched();
         let flooding = std::thread::spawn(move || {
             let message = Message {
@@ -272,7 +288,8 @@ fn clients_that_hang_cost_no_frame_and_no_tick() {
                 match flood.write(&bytes[at..]) {
                     Ok(length) => (sent, at) = (sent + length, (at + length) % bytes.len()),
                     Err(why) if why.kind() == ErrorKind::WouldBlock => {}
-                    Err(why) => panic!("{why}"),
+                    // It does not read either, and is disconnected for that: it comes again.
+                    Err(_) => (flood, at) = (connect_to(&address), 0),
                 }
                 // More than any tracker, and no more of the machine than one client may have.
                 std::thread::sleep(Duration::from_micros(200));
@@ -301,73 +318,12 @@ fn clients_that_hang_cost_no_frame_and_no_tick() {
         assert!(count as f64 > 30.0 * watched().as_secs_f64(), "{count} transforms");
         assert!(flooded > 1000, "{flooded} messages");
         assert!(ticks.len() > 1000 && missing == 0, "{missing} of {} ticks", ticks.len());
-        assert!(served.log().contains("disconnected, what it sent is no message"), "{}", served.log());
+        assert!(
+            served.log().contains("disconnected, what it sent is no message"),
+            "{}",
+            served.log()
+        );
         drop((good, served, link));
         core.finish();
     });
-}
-
-/// `make igtl-test` installs pyigtl in a folder of its own and names its Python in `STYLET_PYIGTL`.
-fn pyigtl(words: &[&str]) -> serde_json::Value {
-    let python = std::env::var("STYLET_PYIGTL").expect("STYLET_PYIGTL names a Python with pyigtl");
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-ui/igtl/tests/client.py");
-    let output = Command::new(python).arg(script).args(words).output().expect("python runs");
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && errors.is_empty(), "{errors}");
-    serde_json::from_slice(&output.stdout).expect("JSON")
-}
-
-#[test]
-#[ignore = "needs pyigtl: make igtl-test"]
-fn pyigtl_reads_every_message_but_status_of_which_it_knows_nothing() {
-    let goldens = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-ui/igtl/tests/goldens");
-    let seen = pyigtl(&["read", goldens.to_str().expect("text")]);
-    for (name, says) in [
-        ("transform", r#"[[0.0,-1.0,0.0,1.5],[1.0,0.0,0.0,-2.25],[0.0,0.0,1.0,30.125],[0.0,0.0,0.0,1.0]]"#),
-        (
-            "image",
-            r#"[[0,1,2,128,254,255],[[0.5,0.0,0.0,9.5],[0.0,0.25,0.0,-20.125],[0.0,0.0,2.0,5.5],[0.0,0.0,0.0,1.0]]]"#,
-        ),
-        ("point", r#"[[[1.0,2.0,3.0],[-4.0,5.5,6.25]],["Seed 1","Seed 2"]]"#),
-        (
-            "polydata",
-            r#"[[[0.0,0.0,0.0],[1.0,0.0,0.0],[0.0,1.0,0.0],[0.0,0.0,1.0]],[[3,0,2,1],[3,0,1,3]]]"#,
-        ),
-        ("string", r#""Depth 31 mm, force 1.25 N""#),
-    ] {
-        let message = &seen[name];
-        assert_eq!(message["says"].to_string(), says, "{name}");
-        assert_eq!((message["device"].as_str(), message["time"].as_f64()), (Some("Stylet"), Some(1_234_567_890.5)));
-    }
-    assert!(seen["status"].is_null(), "pyigtl has learned STATUS: compare it here");
-}
-
-#[test]
-#[ignore = "needs pyigtl: make igtl-test"]
-fn pyigtl_watches_and_moves_the_hand() {
-    let mut core = Core::start_with(&["--no-rt", "--scene", "pelvis"]);
-    let mut link = core.host();
-    let served = Served::start(&core, &["--hand", "Stylus"]);
-    let rest_m = tip_m(&mut link);
-    let (host, port) = served.address.rsplit_once(':').expect("a port");
-    let seconds = watched().as_secs_f64().to_string();
-    let watching = std::thread::scope(|scope| {
-        let watching = scope.spawn(|| pyigtl(&["watch", host, port, &seconds]));
-        let mut farthest_m = 0.0_f64;
-        while !watching.is_finished() {
-            farthest_m = farthest_m.max(distance_m(tip_m(&mut link), rest_m));
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        println!("the hand was up to {:.2} mm away", farthest_m * 1e3);
-        assert!((farthest_m - 5e-3).abs() < 5e-4, "{farthest_m} m; {}", served.log());
-        watching.join().expect("ran")
-    });
-    println!("{watching}");
-    assert!(watching["connected"].as_bool().expect("said"));
-    let count = |device: &str| watching["counts"][device].as_f64().unwrap_or(0.0);
-    assert!(count("Needle") > 20.0 * watched().as_secs_f64());
-    assert!(["Gland", "Seeds", "State"].iter().all(|device| count(device) > watched().as_secs_f64()));
-    assert!(!served.log().contains("refused"), "{}", served.log());
-    drop((served, link));
-    core.finish();
 }

@@ -121,7 +121,9 @@ impl Header {
         let content = around.and_then(|around| body.len().checked_sub(around));
         content
             .and_then(|length| body.get(usize::from(own)..)?.get(..length))
-            .ok_or(CodecError::Field("the second header states lengths that do not fit the body"))
+            .ok_or(CodecError::Field(
+                "the second header states lengths that do not fit the body",
+            ))
     }
 
     /// Its 58 bytes, of version 1.

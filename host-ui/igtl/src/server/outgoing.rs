@@ -73,7 +73,11 @@ impl Client {
         {
             let mut refused = lock(&self.refused);
             let too_soon = |(known, at): &(Refusal, Instant)| {
-                let every = if known == refusal { REFUSAL_EVERY } else { OTHER_REFUSAL_EVERY };
+                let every = if known == refusal {
+                    REFUSAL_EVERY
+                } else {
+                    OTHER_REFUSAL_EVERY
+                };
                 at.elapsed() < every
             };
             if refused.as_ref().is_some_and(too_soon) {

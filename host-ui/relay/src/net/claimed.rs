@@ -89,7 +89,12 @@ mod tests {
         params.distinguished_name.push(rcgen::DnType::CommonName, "seat-007");
         let certificate = params.self_signed(&key).expect("signed");
         assert_eq!(common_name(certificate.der()).as_deref(), Some("seat-007"));
-        for bytes in [&[][..], &COMMON_NAME, &[6, 3, 0x55, 4, 3, 0x0c, 9, b'a'], &[6, 3, 0x55, 4, 3, 0x0c, 0xff]] {
+        for bytes in [
+            &[][..],
+            &COMMON_NAME,
+            &[6, 3, 0x55, 4, 3, 0x0c, 9, b'a'],
+            &[6, 3, 0x55, 4, 3, 0x0c, 0xff],
+        ] {
             assert_eq!(common_name(bytes), None, "{bytes:?}");
         }
     }

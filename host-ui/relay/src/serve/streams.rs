@@ -75,7 +75,10 @@ pub fn records(server: &Server) {
     }
 }
 
-type Pictures = (SliceSubscriber<Vertex, SnapshotHeader>, SliceSubscriber<u32, SceneHeader>);
+type Pictures = (
+    SliceSubscriber<Vertex, SnapshotHeader>,
+    SliceSubscriber<u32, SceneHeader>,
+);
 
 /// Sends the newest snapshot, thinned, 60 times a second, to each member as much of it as its line carries.
 pub fn snapshots(server: &Server) {

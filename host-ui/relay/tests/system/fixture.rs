@@ -8,8 +8,8 @@ use std::time::Duration;
 use stylet_relay::keys::{Invitation, Lab, Role, Validity, write_invitation};
 use stylet_relay::ports::Near;
 use stylet_shm_schema::service::{self, Instance, Node, SliceSubscriber, StateReader};
-pub use stylet_test_kit::{program, until};
 use stylet_shm_schema::{HapticState, PlanInForce, Reply, ReplyStatus, Request, SceneHeader, Session, TickRecord};
+pub use stylet_test_kit::{program, until};
 
 /// A number that no other test of this process has.
 fn fresh() -> u32 {
@@ -247,7 +247,7 @@ impl Host {
 
     pub fn state(&mut self) -> Option<HapticState> {
         self.poll();
-        self.board.as_ref().map(Board::read)
+        self.board.as_ref().map(StateReader::read)
     }
 
     /// Waits until the core is seen with its scene.

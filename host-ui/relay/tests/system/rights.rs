@@ -133,5 +133,8 @@ fn an_expired_certificate_is_refused_and_logged() {
 fn a_certificate_of_ones_own_is_refused_and_logged() {
     let log = is_shut_out(Validity::days(1), true);
     println!("{log}");
-    assert!(log.contains("refused: a connection that calls itself seat-001"), "{log}");
+    assert!(
+        log.contains("refused: a connection that calls itself seat-001"),
+        "{log}"
+    );
 }

@@ -20,7 +20,11 @@ fn compiled(name: &str) -> PathBuf {
         .args(["-lOpenIGTLink", "-lpthread"])
         .output()
         .expect("g++ runs");
-    assert!(compiler.status.success(), "{}", String::from_utf8_lossy(&compiler.stderr));
+    assert!(
+        compiler.status.success(),
+        "{}",
+        String::from_utf8_lossy(&compiler.stderr)
+    );
     folder
 }
 
@@ -28,7 +32,13 @@ fn compiled(name: &str) -> PathBuf {
 #[ignore = "needs libopenigtlink-dev: make igtl-test"]
 fn goldens_are_what_the_library_writes_now() {
     let folder = compiled("goldens");
-    assert!(Command::new(folder.join("goldens")).arg(&folder).status().expect("runs").success());
+    assert!(
+        Command::new(folder.join("goldens"))
+            .arg(&folder)
+            .status()
+            .expect("runs")
+            .success()
+    );
     for (name, _) in examples() {
         let [written, kept] = [&folder, &sources().join("goldens")].map(|at| at.join(format!("{name}.bin")));
         assert_eq!(std::fs::read(written).unwrap(), std::fs::read(kept).unwrap(), "{name}");
@@ -42,7 +52,9 @@ fn message(kind: usize, random: &mut Random) -> Message {
     let place = |random: &mut Random| [0; 3].map(|_| number(random));
     let word = |random: &mut Random, most: usize| {
         let length = random.below(most + 1);
-        (0..length).map(|_| char::from(b'!' + random.below(94) as u8)).collect::<String>()
+        (0..length)
+            .map(|_| char::from(b'!' + random.below(94) as u8))
+            .collect::<String>()
     };
     let body = match kind {
         0 => Body::Transform([0; 4].map(|_| place(random))),
@@ -77,7 +89,9 @@ fn message(kind: usize, random: &mut Random) -> Message {
         3 => {
             let points: Vec<_> = (0..3 + random.below(60)).map(|_| place(random)).collect();
             let corner = |random: &mut Random| random.below(points.len()) as u32;
-            let triangles = (0..1 + random.below(80)).map(|_| [0; 3].map(|_| corner(random))).collect();
+            let triangles = (0..1 + random.below(80))
+                .map(|_| [0; 3].map(|_| corner(random)))
+                .collect();
             Body::PolyData(PolyData { points, triangles })
         }
         4 => Body::Status(Status {
@@ -104,7 +118,9 @@ fn message(kind: usize, random: &mut Random) -> Message {
 fn three_thousand_messages_come_back_from_the_library_byte_for_byte() {
     let folder = compiled("echo");
     let mut random = Random(1900);
-    let sent: Vec<Vec<u8>> = (0..3000).map(|i| message(i % 6, &mut random).encode().unwrap()).collect();
+    let sent: Vec<Vec<u8>> = (0..3000)
+        .map(|i| message(i % 6, &mut random).encode().unwrap())
+        .collect();
     let mut echo = Command::new(folder.join("echo"))
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
