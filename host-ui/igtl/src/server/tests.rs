@@ -91,7 +91,7 @@ fn transforms_are_taken_in_pieces_and_everything_else_is_refused_in_words() {
         device: "Stylus".to_owned(),
         columns: COLUMNS,
     };
-    assert_eq!(received(&server), [expected.clone()]);
+    assert_eq!(received(&server), std::slice::from_ref(&expected));
 
     // A type of the six and one that is not known are passed over, whatever their length.
     client.write_all(&text("Words", &"x".repeat(9000))).unwrap();

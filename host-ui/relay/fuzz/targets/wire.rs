@@ -2,8 +2,9 @@
 
 #![no_main]
 
-#[path = "../../tests/decoders/mod.rs"]
-mod decoders;
+mod decoders {
+    include!("../../tests/decoders/mod.rs");
+}
 
 use libfuzzer_sys::fuzz_target;
 

@@ -1,4 +1,5 @@
-//! Every decoder of what comes from the net, as the two sides call them; for the fuzzer and for the tests of its corpus.
+// Every decoder of what comes from the net, as the two sides call them; for the fuzzer, which includes this file, and for the tests of its
+// corpus.
 
 use bytemuck::Zeroable;
 use stylet_relay::control::Order;

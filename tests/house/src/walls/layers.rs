@@ -215,7 +215,7 @@ pub const LAYERS: &[Layer] = &[
     },
     Layer {
         folder: "host-ui/relay",
-        may_use: &["shm-schema", "shm-schema/manual"],
+        may_use: &["shm-schema", "shm-schema/manual", "tests/kit"],
         never: &[WINDOW, DEVICES, DICOM],
         not_itself: &[PORTS],
     },
