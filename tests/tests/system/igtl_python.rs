@@ -80,7 +80,10 @@ fn pyigtl_watches_and_moves_the_hand() {
             .iter()
             .all(|device| count(device) > watched().as_secs_f64())
     );
-    assert!(!served.log().contains("refused"), "{}", served.log());
+    // A core without real time may be behind on a busy machine, and says so.
+    let log = served.log();
+    let refused = log.lines().find(|line| line.contains("refused") && !line.contains("too many requests"));
+    assert_eq!(refused, None);
     drop((served, link));
     core.finish();
 }
