@@ -82,7 +82,9 @@ fn pyigtl_watches_and_moves_the_hand() {
     );
     // A core without real time may be behind on a busy machine, and says so.
     let log = served.log();
-    let refused = log.lines().find(|line| line.contains("refused") && !line.contains("too many requests"));
+    let refused = log
+        .lines()
+        .find(|line| line.contains("refused") && !line.contains("too many requests"));
     assert_eq!(refused, None);
     drop((served, link));
     core.finish();
