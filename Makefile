@@ -5,7 +5,7 @@ CARGO ?= cargo
 RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),target)) $(CARGO)
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: help run test build package package-test picture example report causes relay relay-class relay-faults relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: help run test build package package-test picture example report causes igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -42,6 +42,13 @@ causes: ## Inject ten causes of late ticks into measurements, and see which of t
 	$(CARGO) build --release --workspace --bin rt-core
 	$(CARGO) test --release -p stylet-tests-lab -- eight_of_ten --ignored --nocapture --test-threads=1
 
+igtl-test: deps-test build ## Compare OpenIGTLink with libOpenIGTLink and pyigtl, then serve IGTL_SECONDS (600) beside clients that hang (11 minutes)
+	@docs/tools/need g++ libopenigtlink-dev python3-venv
+	python3 -m venv $(BIN)/pyigtl && $(BIN)/pyigtl/bin/pip install -q pyigtl==0.3.4
+	$(CARGO) test --release -p stylet-igtl --lib library -- --ignored --nocapture
+	STYLET_PYIGTL=$(abspath $(BIN))/pyigtl/bin/python STYLET_IGTL_S=10 $(CARGO) test --release -p stylet-tests --test system igtl_python -- --ignored --nocapture --test-threads=1
+	STYLET_IGTL_S=$(or $(IGTL_SECONDS),600) $(CARGO) test --release -p stylet-tests --test system igtl::clients_that_hang -- --nocapture
+
 relay: ## Build the relay, which carries a core to other machines; the other targets neither need nor build it
 	$(RELAY) build --release --bin relay
 
@@ -57,6 +64,9 @@ relay-faults: deps-test build ## Stop, kill and cut off server, observer and ope
 
 fuzz: ## Fuzz each file reader for FUZZ_SECONDS (600) seconds
 	docs/tools/fuzz
+
+relay-fuzz: ## Fuzz what the relay takes from the net for FUZZ_SECONDS (600) seconds
+	docs/tools/fuzz wire
 
 soak: deps-soak build ## Measure the memory of the window during SOAK_SECONDS (3600) of procedures, on a virtual screen
 	docs/tools/soak "$(BIN)" $(SOAK_SECONDS)

@@ -125,6 +125,13 @@ enum Task {
         /// Transforms of the needle per second, 1 to 200
         #[arg(long, default_value_t = 60.0, value_name = "HZ")]
         hz: f64,
+        /// Let transforms of this name move the simulated hand: a tracker or a stepper behind PLUS. Anyone who reaches the address can
+        /// send them
+        #[arg(long, value_name = "NAME")]
+        hand: Option<String>,
+        /// As fast as this at most, 0.1 to 1000 mm/s
+        #[arg(long, default_value_t = 100.0, value_name = "MM/S", requires = "hand")]
+        hand_speed: f64,
     },
     /// Convert a recording into a table, or into a motion for rt-core's replay device
     Export {
@@ -230,14 +237,27 @@ impl Cli {
                 instance.sweep();
                 Ok(ended?)
             }
-            Some(Task::Igtl { instance, listen, hz }) => {
+            Some(Task::Igtl {
+                instance,
+                listen,
+                hz,
+                hand,
+                hand_speed,
+            }) => {
                 if !(1.0..=200.0).contains(&hz) {
                     return Err(format!("--hz {hz}: 1 to 200 Hz are possible").into());
+                }
+                if !(0.1..=1000.0).contains(&hand_speed) {
+                    return Err(format!("--hand-speed {hand_speed}: 0.1 to 1000 mm/s are possible").into());
                 }
                 let ended = stylet_igtl::serve::run(&stylet_igtl::serve::Options {
                     instance: instance.clone(),
                     listen,
                     rate_hz: hz,
+                    hand: hand.map(|device| stylet_igtl::hand::HandOptions {
+                        device,
+                        speed_m_per_s: hand_speed * 1e-3,
+                    }),
                 });
                 instance.sweep();
                 Ok(ended?)

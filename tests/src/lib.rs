@@ -5,17 +5,16 @@ pub mod phantom;
 pub mod rehearsal;
 pub mod stopped;
 pub mod window_process;
-pub mod witness;
 
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use stylet_host::link::{Link, LinkStatus};
 use stylet_shm_schema::Request;
 use stylet_shm_schema::service::Instance;
-pub use stylet_test_kit::{program, scratch};
+pub use stylet_test_kit::{program, scratch, until, witness};
 
 /// An instance name that no other test uses.
 pub fn fresh_instance() -> Instance {
@@ -181,18 +180,6 @@ pub fn left_behind(instance: &Instance) -> Vec<String> {
     let names = std::fs::read_dir("/dev/shm").into_iter().flatten().flatten();
     let names = names.map(|e| e.file_name().to_string_lossy().into_owned());
     names.filter(|n| n.starts_with(prefix.trim_end_matches('_'))).collect()
-}
-
-/// Polls `ready` every 2 ms; false when it has not come true in time.
-pub fn until(limit: Duration, mut ready: impl FnMut() -> bool) -> bool {
-    let start = Instant::now();
-    while start.elapsed() < limit {
-        if ready() {
-            return true;
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    false
 }
 
 /// Sends one command and waits for its answer: `Ok` with the first tick that knew it, or the reasons against it.

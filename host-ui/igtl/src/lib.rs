@@ -3,5 +3,8 @@
 #![warn(missing_docs)]
 
 pub mod codec;
+mod frame;
+pub mod hand;
+mod requests;
 pub mod serve;
 pub mod server;

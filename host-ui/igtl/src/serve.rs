@@ -1,11 +1,15 @@
-//! Sends what the core publishes: the needle, the seeds, the surface of the gland and the state in words, in RAS and mm.
+//! Sends what the core publishes: the needle, the seeds, the surface of the gland and the state in words, in RAS and mm. Moves the
+//! simulated hand where a client may.
 
 use crate::codec::{Body, CodecError, Message, Point, PolyData, Timestamp};
+use crate::frame::{needle, place_mm};
+use crate::hand::HandOptions;
+use crate::requests::Requests;
 use crate::server::{Server, ServerError};
 use std::collections::HashMap;
 use std::net::SocketAddr;
 use std::ops::Range;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 use stylet_anatomy::PatientFrame;
 use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Link, LinkStatus, SceneModel, Snapshot};
@@ -24,6 +28,8 @@ pub struct Options {
     pub listen: SocketAddr,
     /// Transforms of the needle in a second.
     pub rate_hz: f64,
+    /// Whose transforms move the hand, if any do.
+    pub hand: Option<HandOptions>,
 }
 
 /// Why serving ended with an error.
@@ -47,11 +53,13 @@ pub fn run(options: &Options) -> Result<(), ServeError> {
     println!("OpenIGTLink on {}; end with Ctrl-C", server.address());
     let mut link = Link::new(options.instance.clone());
     let every = Duration::from_secs_f64(1.0 / options.rate_hz);
+    let mut requests = Requests::new(options.hand.clone());
     let mut slow: Option<Instant> = None;
     let mut next = Instant::now();
     while !interrupted.asked() {
         link.poll();
         link.take_records();
+        requests.pass(&mut link, &server);
         let is_slow = slow.is_none_or(|at| at.elapsed() >= SLOW_EVERY);
         if is_slow {
             slow = Some(Instant::now());
@@ -62,14 +70,14 @@ pub fn run(options: &Options) -> Result<(), ServeError> {
         next = (next + every).max(Instant::now());
         std::thread::sleep(next.saturating_duration_since(Instant::now()));
     }
+    requests.end(&mut link);
     Ok(())
 }
 
 fn publish(server: &Server, device: &str, body: Body) -> Result<(), CodecError> {
-    let time = Timestamp::since_1970(SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default());
     let message = Message {
         device: device.to_owned(),
-        time,
+        time: Timestamp::now(),
         body,
     };
     server.publish(device, message.encode()?);
@@ -98,47 +106,6 @@ fn devices(link: &Link, is_slow: bool) -> Vec<(&'static str, Body)> {
         devices.push(("Gland", Body::PolyData(surface(&patient, scene, snapshot))));
     }
     devices
-}
-
-fn place_mm(patient: &PatientFrame, in_scene_m: [f64; 3]) -> [f32; 3] {
-    patient.patient_from_scene(in_scene_m).map(|m| (m * MM_PER_M) as f32)
-}
-
-/// Columns of the needle's frame in RAS: the third axis points where the needle goes, the origin is the tip.
-fn needle(patient: &PatientFrame, tip_in_scene_m: [f64; 3], direction_in_scene: [f64; 3]) -> [[f32; 3]; 4] {
-    let along = unit(patient.patient_from_scene_direction(direction_in_scene));
-    // Any axis that is not nearly parallel fixes the roll, which the needle does not have.
-    let aside = if along[0].abs() < 0.9 {
-        [1.0, 0.0, 0.0]
-    } else {
-        [0.0, 1.0, 0.0]
-    };
-    let second = unit(cross(along, aside));
-    let first = cross(second, along);
-    let axis = |v: [f64; 3]| v.map(|x| x as f32);
-    [
-        axis(first),
-        axis(second),
-        axis(along),
-        place_mm(patient, tip_in_scene_m),
-    ]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-fn unit(v: [f64; 3]) -> [f64; 3] {
-    let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
-    if length > 0.0 {
-        v.map(|x| x / length)
-    } else {
-        [0.0, 0.0, 1.0]
-    }
 }
 
 fn seeds(patient: &PatientFrame, snapshot: &Snapshot) -> Vec<Point> {
@@ -182,6 +149,7 @@ fn surface(patient: &PatientFrame, scene: &SceneModel, snapshot: &Snapshot) -> P
     PolyData { points, triangles }
 }
 
+/// Phase, depth, force and seeds; or why there is nothing.
 fn words(status: &LinkStatus, state: Option<&HapticState>) -> String {
     match (status, state) {
         (LinkStatus::Absent { why }, _) => why.clone(),
@@ -194,22 +162,5 @@ fn words(status: &LinkStatus, state: Option<&HapticState>) -> String {
             state.force_on_hand_n.iter().map(|f| f * f).sum::<f64>().sqrt(),
             state.seed_count
         ),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_needle_is_a_right_handed_frame_in_mm_whose_third_axis_is_its_direction() {
-        for direction in [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.3, -0.4, 0.866]] {
-            let [x, y, z, tip] = needle(&PatientFrame::default(), [0.01, -0.02, 0.03], direction);
-            let wide = |v: [f32; 3]| v.map(f64::from);
-            let third = cross(wide(x), wide(y));
-            assert!((0..3).all(|a| (third[a] - f64::from(z[a])).abs() < 1e-6));
-            assert!((0..3).all(|a| (f64::from(z[a]) - unit(direction)[a]).abs() < 1e-6));
-            assert_eq!(tip, [10.0, -20.0, 30.0]);
-        }
     }
 }

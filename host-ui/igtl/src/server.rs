@@ -1,22 +1,30 @@
-//! Sends messages to every client over TCP; one that does not read costs neither the sender nor the others anything.
+//! Sends messages to every client over TCP, and takes transforms from them; a client that does not read, or does not finish what it
+//! sends, costs neither the sender nor the others anything.
 //!
-//! Each client has a thread and keeps at most one message of each device that waits: a newer one replaces it. So memory is
-//! bounded, and a slow client sees what is newest.
+//! Each client has two threads. It keeps at most one message of each device that waits, and one transform of each device that it has
+//! sent: a newer one replaces it. So memory is bounded, and whoever is slow sees what is newest.
 
+mod incoming;
+mod outgoing;
+
+use crate::codec::Status;
+use outgoing::Client;
 use std::collections::BTreeMap;
-use std::io::{self, ErrorKind, Write};
+use std::io;
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
-/// A client that has not taken one message for so long is disconnected.
-const PATIENCE: Duration = Duration::from_secs(3);
 /// How often a thread looks whether the server has ended.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 const CLIENTS_AT_MOST: usize = 16;
+/// Devices whose transforms one client may send.
+const DEVICES_AT_MOST: usize = 16;
 
 type Bytes = Arc<[u8]>;
+/// Takes a line for each client that comes, goes or is refused.
+type Log = Arc<dyn Fn(String) + Send + Sync>;
 
 /// Why the server cannot serve.
 #[derive(Debug, thiserror::Error)]
@@ -34,11 +42,37 @@ pub enum ServerError {
     Thread(io::Error),
 }
 
-/// What one client is still to get, the newest message of each device.
-#[derive(Default)]
-struct Client {
-    waiting: Mutex<BTreeMap<String, Bytes>>,
-    arrived: Condvar,
+/// Why a message of a client is not carried out, as the protocol's STATUS says it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// The protocol's number.
+    pub code: u16,
+    /// Its name.
+    pub name: &'static str,
+    /// In words.
+    pub words: String,
+}
+
+impl Refusal {
+    fn status(&self) -> Status {
+        Status {
+            code: self.code,
+            subcode: 0,
+            error: self.name.to_owned(),
+            text: self.words.clone(),
+        }
+    }
+}
+
+/// A transform that a client sent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Received {
+    /// Which client.
+    pub from: SocketAddr,
+    /// Of which of its devices.
+    pub device: String,
+    /// Columns of the matrix: three axes, and the origin in mm.
+    pub columns: [[f32; 3]; 4],
 }
 
 #[derive(Default)]
@@ -46,6 +80,8 @@ struct Shared {
     /// The newest message of each device: what a new client gets first.
     newest: BTreeMap<String, Bytes>,
     clients: Vec<Arc<Client>>,
+    /// The newest transform of each client's devices that was not taken yet.
+    received: BTreeMap<(SocketAddr, String), [[f32; 3]; 4]>,
 }
 
 /// A server; it ends when it is dropped.
@@ -62,7 +98,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Server {
-    /// Listens on the address; port 0 lets the system choose one. `log` gets a line for each client that comes or goes.
+    /// Listens on the address; port 0 lets the system choose one.
     pub fn listen(address: SocketAddr, log: impl Fn(String) + Send + Sync + 'static) -> Result<Self, ServerError> {
         let failed = |source| ServerError::Listen { address, source };
         let listener = TcpListener::bind(address).map_err(failed)?;
@@ -73,9 +109,10 @@ impl Server {
             address: listener.local_addr().map_err(failed)?,
         };
         let (shared, ended) = (server.shared.clone(), server.ended.clone());
+        let log: Log = Arc::new(log);
         std::thread::Builder::new()
             .name("igtl-accept".to_owned())
-            .spawn(move || accept(&listener, &shared, &ended, &Arc::new(log)))
+            .spawn(move || accept(&listener, &shared, &ended, &log))
             .map_err(ServerError::Thread)?;
         Ok(server)
     }
@@ -96,8 +133,23 @@ impl Server {
         let mut shared = lock(&self.shared);
         shared.newest.insert(device.to_owned(), bytes.clone());
         for client in &shared.clients {
-            lock(&client.waiting).insert(device.to_owned(), bytes.clone());
-            client.arrived.notify_one();
+            client.put(device, bytes.clone());
+        }
+    }
+
+    /// The newest transform of each device of each client since the last call.
+    pub fn received(&self) -> Vec<Received> {
+        let all = std::mem::take(&mut lock(&self.shared).received);
+        all.into_iter()
+            .map(|((from, device), columns)| Received { from, device, columns })
+            .collect()
+    }
+
+    /// Answers a client's message with a STATUS, and logs it; the same words to the same client once in a while.
+    pub fn refuse(&self, from: SocketAddr, device: &str, refusal: &Refusal) {
+        let client = lock(&self.shared).clients.iter().find(|c| c.address == from).cloned();
+        if let Some(client) = client {
+            client.refuse(device, refusal);
         }
     }
 }
@@ -108,18 +160,13 @@ impl Drop for Server {
     }
 }
 
-fn accept<L: Fn(String) + Send + Sync + 'static>(
-    listener: &TcpListener,
-    shared: &Arc<Mutex<Shared>>,
-    ended: &Arc<AtomicBool>,
-    log: &Arc<L>,
-) {
+fn accept(listener: &TcpListener, shared: &Arc<Mutex<Shared>>, ended: &Arc<AtomicBool>, log: &Log) {
     while !ended.load(Ordering::Relaxed) {
         let Ok((stream, from)) = listener.accept() else {
             std::thread::sleep(LOOK_EVERY);
             continue;
         };
-        let client = Arc::new(Client::default());
+        let client = Arc::new(Client::new(from, log.clone()));
         {
             let mut shared = lock(shared);
             if shared.clients.len() >= CLIENTS_AT_MOST {
@@ -128,73 +175,41 @@ fn accept<L: Fn(String) + Send + Sync + 'static>(
                 ));
                 continue;
             }
-            lock(&client.waiting).clone_from(&shared.newest);
+            client.put_all(&shared.newest);
             shared.clients.push(client.clone());
         }
         log(format!("{from}: connected"));
-        let (all, ended, say) = (shared.clone(), ended.clone(), log.clone());
-        let held = client.clone();
-        let started = std::thread::Builder::new()
-            .name("igtl-client".to_owned())
-            .spawn(move || {
-                let why = serve(stream, &held, &ended);
-                lock(&all).clients.retain(|other| !Arc::ptr_eq(other, &held));
-                say(format!("{from}: disconnected, {why}"));
-            });
-        if let Err(error) = started {
+        if let Err(error) = start(stream, &client, shared, ended) {
             lock(shared).clients.retain(|other| !Arc::ptr_eq(other, &client));
             log(format!("{from}: disconnected, no thread for it: {error}"));
         }
     }
 }
 
-/// Sends until the client or the server ends; why it ended.
-fn serve(mut stream: TcpStream, client: &Client, ended: &AtomicBool) -> String {
-    let prepared = stream
-        .set_nonblocking(false)
-        .and_then(|()| stream.set_nodelay(true))
-        .and_then(|()| stream.set_write_timeout(Some(LOOK_EVERY)));
-    if let Err(error) = prepared {
-        return error.to_string();
-    }
-    while !ended.load(Ordering::Relaxed) {
-        let waiting = lock(&client.waiting);
-        let (mut waiting, _) = client
-            .arrived
-            .wait_timeout_while(waiting, LOOK_EVERY, |waiting| waiting.is_empty())
-            .unwrap_or_else(PoisonError::into_inner);
-        let batch = std::mem::take(&mut *waiting);
-        drop(waiting);
-        for bytes in batch.values() {
-            if let Err(why) = send(&mut stream, bytes, ended) {
-                return why;
-            }
-        }
-    }
-    "the server ends".to_owned()
-}
-
-fn send(stream: &mut TcpStream, mut bytes: &[u8], ended: &AtomicBool) -> Result<(), String> {
-    let begun = Instant::now();
-    while !bytes.is_empty() {
-        match stream.write(bytes) {
-            Ok(0) => return Err("it closed the connection".to_owned()),
-            Ok(sent) => bytes = &bytes[sent..],
-            Err(error)
-                if matches!(
-                    error.kind(),
-                    ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted
-                ) => {}
-            Err(error) => return Err(error.to_string()),
-        }
-        if ended.load(Ordering::Relaxed) {
-            return Err("the server ends".to_owned());
-        }
-        if !bytes.is_empty() && begun.elapsed() > PATIENCE {
-            return Err(format!("it did not take a message for {} s", PATIENCE.as_secs()));
-        }
-    }
-    Ok(())
+/// One thread sends, the other reads. A client may close its own direction and go on receiving.
+fn start(
+    stream: TcpStream,
+    client: &Arc<Client>,
+    shared: &Arc<Mutex<Shared>>,
+    ended: &Arc<AtomicBool>,
+) -> io::Result<()> {
+    stream.set_nonblocking(false)?;
+    stream.set_nodelay(true)?;
+    stream.set_write_timeout(Some(LOOK_EVERY))?;
+    stream.set_read_timeout(Some(LOOK_EVERY))?;
+    let reads = stream.try_clone()?;
+    let thread = |name: &str| std::thread::Builder::new().name(name.to_owned());
+    let (held, all, ends) = (client.clone(), shared.clone(), ended.clone());
+    thread("igtl-client").spawn(move || {
+        let why = held.send_to(stream, &ends);
+        lock(&all).clients.retain(|other| !Arc::ptr_eq(other, &held));
+        held.say(&format!("disconnected, {why}"));
+    })?;
+    let (held, all, ends) = (client.clone(), shared.clone(), ended.clone());
+    let started = thread("igtl-reader").spawn(move || incoming::read(reads, &held, &all, &ends));
+    started
+        .map(drop)
+        .inspect_err(|_| client.end("no thread to read from it"))
 }
 
 #[cfg(test)]

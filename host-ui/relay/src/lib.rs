@@ -6,10 +6,13 @@
 #![warn(missing_docs)]
 
 pub mod control;
+#[cfg(feature = "net")]
 pub mod join;
 pub mod keys;
+#[cfg(feature = "net")]
 pub mod net;
 pub mod ports;
+#[cfg(feature = "net")]
 pub mod serve;
 pub mod wire;
 

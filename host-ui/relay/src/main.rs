@@ -1,10 +1,11 @@
 //! The command line of `relay`.
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use stylet_manual::ManualArgs;
 use stylet_relay::control::{self, Order};
 use stylet_relay::keys::{Invitation, Lab, Role, Validity, write_invitation};
 use stylet_relay::net::PORT;
@@ -67,6 +68,8 @@ enum Task {
         #[arg(long, default_value = "main", global = true)]
         instance: String,
     },
+    /// Write the man pages and shell completions of this program
+    Manual(ManualArgs),
 }
 
 #[derive(Subcommand)]
@@ -170,7 +173,7 @@ fn run(task: Task) -> Result<ExitCode, RelayError> {
             let mut beat = keeper::Beat::of_stdin();
             match serve::run(&options, &stop, |operated| beat.pass(operated))? {
                 End::Stopped => Ok(ExitCode::SUCCESS),
-                End::Revoked => Ok(ExitCode::from(keeper::AGAIN)),
+                End::Closed => Ok(ExitCode::from(keeper::AGAIN)),
             }
         }
         Task::Join {
@@ -188,6 +191,10 @@ fn run(task: Task) -> Result<ExitCode, RelayError> {
             };
             let stop = on_signals()?;
             join::run(&options, &stop)?;
+            Ok(ExitCode::SUCCESS)
+        }
+        Task::Manual(args) => {
+            args.run(Cli::command()).map_err(|e| RelayError(e.to_string()))?;
             Ok(ExitCode::SUCCESS)
         }
         Task::Keys { task, keys } => keys_task(task, &Lab::new(&keys)).map(|()| ExitCode::SUCCESS),
@@ -244,4 +251,38 @@ fn keys_task(task: KeysTask, lab: &Lab) -> Result<(), RelayError> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pages and completions come from the same definition as the command line; see `tests/package` for what such files hold.
+    #[test]
+    fn every_command_has_its_page_and_every_option_its_place_in_it() {
+        let files = stylet_manual::files(Cli::command()).expect("in memory");
+        let text = |path: String| {
+            let page = files.iter().find(|(its, _)| its.to_str() == Some(&path));
+            let page = page.unwrap_or_else(|| panic!("{path} is missing"));
+            String::from_utf8_lossy(&page.1).replace('\\', "")
+        };
+        let bash = text("bash-completion/completions/relay".to_owned());
+        let mut waiting = vec![("relay".to_owned(), Cli::command())];
+        let mut options = 0;
+        while let Some((name, command)) = waiting.pop() {
+            let page = text(format!("man/man1/{name}.1"));
+            for option in command
+                .get_arguments()
+                .filter(|a| !a.is_hide_set())
+                .filter_map(|a| a.get_long())
+            {
+                assert!(page.contains(&format!("--{option}")), "{name}: --{option}");
+                assert!(bash.contains(&format!("--{option}")), "--{option}");
+                options += 1;
+            }
+            let below = command.get_subcommands().filter(|below| !below.is_hide_set());
+            waiting.extend(below.map(|below| (format!("{name}-{}", below.get_name()), below.clone())));
+        }
+        assert!(options > 10, "{options} options");
+    }
 }

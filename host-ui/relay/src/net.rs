@@ -1,5 +1,7 @@
 //! The session of zenoh: QUIC alone, certificates on both sides, no scouting, nothing allowed that is not listed.
 
+mod claimed;
+
 use crate::RelayError;
 use crate::keys::{Identity, SEATS, seat_name};
 use base64::Engine;
@@ -12,6 +14,7 @@ use tracing::field::{Field, Visit};
 use tracing::span::{Attributes, Id, Record};
 use tracing::{Event, Level, Metadata, Subscriber};
 pub use zenoh::Session;
+use zenoh::qos::Reliability;
 pub use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Config, Wait};
 
@@ -53,6 +56,11 @@ pub fn every_ask() -> String {
     format!("stylet/{SCHEMA_VERSION}/ask/*")
 }
 
+/// With datagrams beside its streams, for [`put_newest`].
+fn endpoint(at: &str) -> String {
+    format!("quic/{at}?mixed_rel=1")
+}
+
 fn base64(text: &str) -> String {
     base64::engine::general_purpose::STANDARD.encode(text)
 }
@@ -76,7 +84,7 @@ fn common(mode: &str, tls: Value) -> Value {
     })
 }
 
-/// What `serve` listens on: addresses with ports. Seats in `closed` may do nothing.
+/// What `serve` listens on: addresses with ports. Seats in `closed` hear nothing; what they ask is refused by name, by `serve::asked`.
 pub fn serve(listen: &[String], identity: &Identity, closed: &[u16]) -> Result<Session, RelayError> {
     let tls = json!({
         "root_ca_certificate_base64": base64(&identity.authority),
@@ -86,7 +94,7 @@ pub fn serve(listen: &[String], identity: &Identity, closed: &[u16]) -> Result<S
         "close_link_on_expiration": true,
     });
     let mut config = common("router", tls);
-    let endpoints: Vec<String> = listen.iter().map(|at| format!("quic/{at}")).collect();
+    let endpoints: Vec<String> = listen.iter().map(|at| endpoint(at)).collect();
     config["listen"] = json!({ "endpoints": endpoints, "exit_on_failure": true });
     config["access_control"] = access(closed);
     open(&config).map_err(|e| {
@@ -109,21 +117,22 @@ pub fn join(server: &str, identity: &Identity) -> Result<Session, RelayError> {
     });
     let mut config = common("client", tls);
     config["connect"] = json!({
-        "endpoints": [format!("quic/{server}")], "timeout_ms": -1, "exit_on_failure": false,
+        "endpoints": [endpoint(server)], "timeout_ms": -1, "exit_on_failure": false,
         "retry": { "period_init_ms": 200, "period_max_ms": 400, "period_increase_factor": 1.5 },
     });
     open(&config).map_err(|e| RelayError(format!("cannot connect to {server}: {e}")))
 }
 
 fn open(config: &Value) -> Result<Session, zenoh::Error> {
+    claimed::note_refused();
     // A second session of one program has the log already.
     let _ = tracing::subscriber::set_global_default(Log);
     zenoh::open(Config::from_json5(&config.to_string())?).wait()
 }
 
-/// Default deny; a seat may ask under its own name alone, and hear what is for all and for itself.
+/// Default deny; a seat may ask under its own name alone, and hear what is for all and for itself while it is open.
 fn access(closed: &[u16]) -> Value {
-    let seats = || (1..=SEATS).filter(|seat| !closed.contains(seat));
+    let open = || (1..=SEATS).filter(|seat| !closed.contains(seat));
     let mut rules = vec![json!({
         "id": "all", "permission": "allow", "flows": ["ingress", "egress"], "messages": ["declare_subscriber"],
         "key_exprs": [Place::Records.key(), Place::Rest.key()],
@@ -136,10 +145,16 @@ fn access(closed: &[u16]) -> Value {
         "id": "server", "permission": "allow", "flows": ["egress"], "messages": ["declare_subscriber"],
         "key_exprs": [every_ask()],
     }));
-    let names: Vec<String> = seats().map(seat_name).collect();
-    let mut subjects = vec![json!({ "id": "members", "cert_common_names": names })];
-    let mut policies = vec![json!({ "rules": ["all", "all-data", "server"], "subjects": ["members"] })];
-    for seat in seats() {
+    let names = |seats: &mut dyn Iterator<Item = u16>| seats.map(seat_name).collect::<Vec<_>>();
+    let mut subjects = vec![
+        json!({ "id": "members", "cert_common_names": names(&mut open()) }),
+        json!({ "id": "seats", "cert_common_names": names(&mut (1..=SEATS)) }),
+    ];
+    let mut policies = vec![
+        json!({ "rules": ["all", "all-data"], "subjects": ["members"] }),
+        json!({ "rules": ["server"], "subjects": ["seats"] }),
+    ];
+    for seat in 1..=SEATS {
         let name = seat_name(seat);
         rules.push(json!({
             "id": format!("ask-{name}"), "permission": "allow", "flows": ["ingress"], "messages": ["put"],
@@ -154,7 +169,12 @@ fn access(closed: &[u16]) -> Value {
             "key_exprs": [Place::To(seat).key()],
         }));
         subjects.push(json!({ "id": name, "cert_common_names": [name] }));
-        let of_seat = ["ask", "hear", "to"].map(|kind| format!("{kind}-{name}"));
+        let kinds: &[&str] = if closed.contains(&seat) {
+            &["ask"]
+        } else {
+            &["ask", "hear", "to"]
+        };
+        let of_seat: Vec<String> = kinds.iter().map(|kind| format!("{kind}-{name}")).collect();
         policies.push(json!({ "rules": of_seat, "subjects": [name] }));
     }
     json!({ "enabled": true, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies })
@@ -169,6 +189,18 @@ pub fn put(session: &Session, place: Place, priority: Priority, bytes: Vec<u8>) 
         .express(true)
         .wait();
     // A session that is closing sends nothing; its end is seen elsewhere.
+    let _ = sent;
+}
+
+/// The same in datagrams, which are never sent again: what is lost is not worth waiting for, and holds up nothing that comes after it.
+pub fn put_newest(session: &Session, place: Place, priority: Priority, bytes: Vec<u8>) {
+    let sent = session
+        .put(place.key(), bytes)
+        .congestion_control(CongestionControl::Drop)
+        .reliability(Reliability::BestEffort)
+        .priority(priority)
+        .express(true)
+        .wait();
     let _ = sent;
 }
 
@@ -218,7 +250,8 @@ fn reason(text: &str) -> String {
         .split_once("reason: \"")
         .and_then(|(_, rest)| rest.split('"').next());
     let quoted = quoted.unwrap_or(text).split(" time ").next().unwrap_or(text);
-    format!("refused: a connection, in its handshake: {quoted}")
+    let who = claimed::take().map_or_else(String::new, |name| format!(" that calls itself {name}"));
+    format!("refused: a connection{who}, in its handshake: {quoted}")
 }
 
 /// Prints what zenoh reports as an error or a warning: a refused certificate is one.

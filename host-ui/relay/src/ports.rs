@@ -1,6 +1,10 @@
 //! Ports of shared memory: those of a host beside the core, and those of a core for hosts on another machine.
 
-use stylet_shm_schema::service::{self, Subscriber, Instance, MAX_BATCH, Node, ServiceError, SliceSubscriber, SlicePublisher, Publisher};
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use stylet_shm_schema::service::{
+    self, Instance, MAX_BATCH, Node, Publisher, ServiceError, SlicePublisher, SliceSubscriber, Subscriber,
+};
 use stylet_shm_schema::*;
 
 /// What a host beside the core has but for records and snapshots, which have threads of their own.
@@ -19,13 +23,16 @@ pub struct Near {
     pub rehearsals: Subscriber<Rehearsal>,
     /// The scene that runs.
     pub scene: SliceSubscriber<u32, SceneHeader>,
-    /// Requests to the core.
-    pub commands: Publisher<Command>,
-    /// Requests of hosts beside the core, and those of this port.
-    pub requests: Subscriber<Command>,
+    commands: Publisher<Command>,
+    requests: Subscriber<Command>,
+    /// Host and number of what was sent from here and has not come back over `requests`.
+    sent: RefCell<VecDeque<(u64, u64)>>,
     /// The node of these ports.
     pub node: Node,
 }
+
+/// Requests that may be on their way back.
+const SENT_AT_MOST: usize = 1024;
 
 impl Near {
     /// Ports to the core of `instance`, which may not run yet.
@@ -41,12 +48,41 @@ impl Near {
             scene: service::scene::subscriber(&node)?,
             commands: service::commands::publisher(&node)?,
             requests: service::commands::subscriber(&node)?,
+            sent: RefCell::default(),
             node,
         })
     }
 
+    /// A request to the core.
+    pub fn ask(&self, command: Command) -> Result<(), ServiceError> {
+        let sent = self.commands.send(command);
+        sent.map_err(|e| ServiceError(format!("commands: {e}")))?;
+        let mut all = self.sent.borrow_mut();
+        all.push_back((command.host_id, command.command_id));
+        if all.len() > SENT_AT_MOST {
+            all.pop_front();
+        }
+        Ok(())
+    }
+
+    /// The next request of a host beside the core: one that was not sent from here.
+    pub fn request_of_others(&self) -> Option<Command> {
+        loop {
+            let command = self.requests.receive()?;
+            let mut sent = self.sent.borrow_mut();
+            let own = sent.iter().position(|id| *id == (command.host_id, command.command_id));
+            if own.and_then(|at| sent.remove(at)).is_none() {
+                return Some(command);
+            }
+        }
+    }
+
     /// A port for one volume, filled and sent; it must live until the core has mapped it.
-    pub fn upload(&self, header: &UploadHeader, cells: &[u8]) -> Result<SlicePublisher<u8, UploadHeader>, ServiceError> {
+    pub fn upload(
+        &self,
+        header: &UploadHeader,
+        cells: &[u8],
+    ) -> Result<SlicePublisher<u8, UploadHeader>, ServiceError> {
         let port = service::uploads::publisher(&self.node, cells.len())?;
         port.send(header, cells)
             .map_err(|e| ServiceError(format!("uploads: {e}")))?;

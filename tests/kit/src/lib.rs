@@ -1,6 +1,21 @@
-//! What every test of the system starts from: the built programs, the repository, a folder of its own.
+//! What every test of the system starts from: the built programs, the repository, a folder of its own, a machine that runs.
+
+pub mod witness;
 
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Polls `ready` every 2 ms; false when it has not come true in time.
+pub fn until(limit: Duration, mut ready: impl FnMut() -> bool) -> bool {
+    let start = Instant::now();
+    while start.elapsed() < limit {
+        if ready() {
+            return true;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    false
+}
 
 /// A file of the repository, by its path from the root.
 pub fn repository(path: &str) -> PathBuf {

@@ -7,6 +7,7 @@ mod dose_cli;
 mod force_insertions;
 mod formats;
 mod igtl;
+mod igtl_python;
 mod insertion;
 mod kill;
 mod lab_latency;

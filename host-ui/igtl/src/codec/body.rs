@@ -140,7 +140,7 @@ impl Body {
                 let length = usize::from(reader.u16()?);
                 Self::Text(String::from_utf8_lossy(reader.take(length)?).into_owned())
             }
-            other => return Err(CodecError::Type(other.to_owned())),
+            _ => return Err(CodecError::Field("a type without a body")),
         };
         reader.end()?;
         Ok(decoded)

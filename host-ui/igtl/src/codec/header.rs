@@ -2,11 +2,15 @@
 
 use super::CodecError;
 use super::reader::{Reader, put_text};
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Length of a header of version 1.
 pub const HEADER_BYTES: usize = 58;
 const VERSION: u16 = 1;
+/// Its bodies begin with a second header and end with pairs of words, which are passed over.
+const EXTENDED_VERSION: u16 = 2;
+/// What an extended body may be longer by.
+const EXTENSION_AT_MOST: u64 = 4096;
 
 /// Types and the largest bodies of them that are accepted or sent, in bytes.
 const LIMITS: [(&str, u64); 6] = [
@@ -28,6 +32,11 @@ pub struct Timestamp {
 }
 
 impl Timestamp {
+    /// By this machine's clock.
+    pub fn now() -> Self {
+        Self::since_1970(SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default())
+    }
+
     /// Of a time since 1970; seconds beyond 32 bits (the year 2106) are cut off.
     pub fn since_1970(time: Duration) -> Self {
         Self {
@@ -42,6 +51,8 @@ impl Timestamp {
 pub struct Header {
     /// One of the six types.
     pub kind: &'static str,
+    /// Of version 2, as protocol 3 sends it.
+    pub is_extended: bool,
     /// Name of the device.
     pub device: String,
     /// When it was measured.
@@ -66,9 +77,10 @@ impl Header {
     pub fn decode(bytes: &[u8]) -> Result<Self, CodecError> {
         let mut reader = Reader::new("header", bytes);
         let version = reader.u16()?;
-        if version != VERSION {
+        if ![VERSION, EXTENDED_VERSION].contains(&version) {
             return Err(CodecError::Version(version));
         }
+        let is_extended = version == EXTENDED_VERSION;
         let kind = reader.text(12)?;
         let device = reader.text(20)?;
         let time = Timestamp {
@@ -79,11 +91,17 @@ impl Header {
         let checksum = reader.u64()?;
         reader.end()?;
         let Some((kind, _)) = LIMITS.iter().find(|row| row.0 == kind) else {
-            return Err(CodecError::Type(kind));
+            return Err(CodecError::Type {
+                kind,
+                device,
+                body_bytes,
+            });
         };
-        check_length(kind, body_bytes)?;
+        let extension = if is_extended { EXTENSION_AT_MOST } else { 0 };
+        check_length(kind, body_bytes.saturating_sub(extension))?;
         Ok(Self {
             kind,
+            is_extended,
             device,
             time,
             body_bytes: body_bytes as usize,
@@ -91,7 +109,24 @@ impl Header {
         })
     }
 
-    /// Its 58 bytes.
+    /// What a body says, without the second header and the words that an extended one has around it.
+    pub(super) fn content<'a>(&self, body: &'a [u8]) -> Result<&'a [u8], CodecError> {
+        if !self.is_extended {
+            return Ok(body);
+        }
+        let mut reader = Reader::new("second header", body);
+        let (own, words_head, words) = (reader.u16()?, reader.u16()?, reader.u32()?);
+        let around = [usize::from(own), usize::from(words_head), words as usize];
+        let around = around.into_iter().try_fold(0_usize, usize::checked_add);
+        let content = around.and_then(|around| body.len().checked_sub(around));
+        content
+            .and_then(|length| body.get(usize::from(own)..)?.get(..length))
+            .ok_or(CodecError::Field(
+                "the second header states lengths that do not fit the body",
+            ))
+    }
+
+    /// Its 58 bytes, of version 1.
     pub fn encode(&self) -> Result<[u8; HEADER_BYTES], CodecError> {
         let mut bytes = Vec::with_capacity(HEADER_BYTES);
         bytes.extend(VERSION.to_be_bytes());

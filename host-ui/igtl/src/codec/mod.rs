@@ -1,4 +1,4 @@
-//! Bytes of OpenIGTLink messages, header version 1, and back. No I/O; every length is checked before memory is taken for it.
+//! Bytes of OpenIGTLink messages, header version 1, and back; version 2 is read, not written. No I/O; every length is checked before memory is taken for it.
 //!
 //! Source: the messages that libOpenIGTLink 1.11 writes, byte for byte.
 //! Lengths are in mm and places in the frame that the sender names, for Stylet the patient's (RAS).
@@ -27,14 +27,21 @@ pub enum CodecError {
         /// Bytes that there are.
         found: usize,
     },
-    /// A header of another version than 1.
-    #[error(
-        "header version 1 expected, {0} found; let the sender use protocol version 1 or 2 without extended headers"
-    )]
+    /// A header of a version that is not known.
+    #[error("header version 1 or 2 expected, {0} found")]
     Version(u16),
     /// A type of message that is not among the six.
-    #[error("message type {0:?} is not supported; supported are TRANSFORM, IMAGE, POINT, POLYDATA, STATUS and STRING")]
-    Type(String),
+    #[error(
+        "message type {kind:?} is not supported; supported are TRANSFORM, IMAGE, POINT, POLYDATA, STATUS and STRING"
+    )]
+    Type {
+        /// Its name.
+        kind: String,
+        /// Who sent it.
+        device: String,
+        /// Length of the body that the header states: to pass over it.
+        body_bytes: u64,
+    },
     /// The body is longer than this type may be.
     #[error("{kind} of {found} bytes: at most {limit} are accepted")]
     TooLong {
@@ -77,6 +84,7 @@ impl Message {
         header::check_length(kind, body.len() as u64)?;
         let header = Header {
             kind,
+            is_extended: false,
             device: self.device.clone(),
             time: self.time,
             body_bytes: body.len(),
@@ -114,7 +122,7 @@ impl Message {
         Ok(Self {
             device: header.device.clone(),
             time: header.time,
-            body: Body::decode(header.kind, body)?,
+            body: Body::decode(header.kind, header.content(body)?)?,
         })
     }
 }

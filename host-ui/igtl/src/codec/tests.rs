@@ -2,6 +2,8 @@
 
 use super::*;
 
+mod library;
+
 /// The messages of `tests/goldens.cpp`.
 pub fn examples() -> Vec<(&'static str, Message)> {
     let point = |name: &str, place_mm| Point {
@@ -75,6 +77,21 @@ fn messages_are_those_of_the_library_byte_for_byte() {
     }
 }
 
+/// Protocol 3 puts a second header before a body, and pairs of words behind it.
+#[test]
+fn an_extended_message_of_the_library_says_the_same() {
+    let golden = include_bytes!("../../tests/goldens/transform2.bin");
+    let (_, message) = &examples()[0];
+    assert_eq!(Message::decode(golden).as_ref(), Ok(message));
+    for at in HEADER_BYTES..HEADER_BYTES + 8 {
+        let mut bad = golden.to_vec();
+        bad[at] = 0xff;
+        let sum = crc64(&bad[HEADER_BYTES..]);
+        bad[50..58].copy_from_slice(&sum.to_be_bytes());
+        assert!(matches!(Message::decode(&bad), Err(CodecError::Field(_))), "byte {at}");
+    }
+}
+
 /// The check value of the catalogue of CRCs for CRC-64/ECMA-182.
 #[test]
 fn the_checksum_has_its_published_check_value() {
@@ -98,9 +115,11 @@ impl Random {
 fn mutated_messages_are_refused_or_decoded_and_never_panic() {
     let mut random = Random(19);
     let (mut accepted, mut refused) = (0, 0);
+    let mut originals: Vec<Vec<u8>> = examples().iter().map(|(_, m)| m.encode().unwrap()).collect();
+    originals.push(include_bytes!("../../tests/goldens/transform2.bin").to_vec());
     for round in 0..20_000 {
-        for (_, message) in examples() {
-            let mut bytes = message.encode().unwrap();
+        for original in &originals {
+            let mut bytes = original.clone();
             let from = if round % 4 == 0 { 0 } else { HEADER_BYTES };
             for _ in 0..=random.below(4) {
                 let at = from + random.below(bytes.len() - from);

@@ -2,8 +2,9 @@
 
 use super::*;
 use crate::codec::{Body, HEADER_BYTES, Header, Message, Timestamp};
-use std::io::Read;
+use std::io::{Read, Write};
 use std::sync::mpsc;
+use std::time::Instant;
 
 fn text(device: &str, text: &str) -> Vec<u8> {
     let (device, time) = (device.to_owned(), Timestamp::default());
@@ -46,4 +47,86 @@ fn a_client_that_hangs_is_disconnected_with_a_reason_and_the_other_gets_what_is_
     let line = disconnected.expect("the client that hangs stays connected");
     assert!(line.contains("did not take a message for 3 s"), "{line}");
     assert_eq!(server.clients(), 1);
+}
+
+const COLUMNS: [[f32; 3]; 4] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 2.0, 3.0]];
+
+fn transform(device: &str) -> Vec<u8> {
+    let (device, time) = (device.to_owned(), Timestamp::default());
+    let body = Body::Transform(COLUMNS);
+    Message { device, time, body }.encode().unwrap()
+}
+
+fn received(server: &Server) -> Vec<Received> {
+    let begun = Instant::now();
+    loop {
+        let all = server.received();
+        if !all.is_empty() || begun.elapsed() > Duration::from_secs(10) {
+            return all;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn refused(stream: &mut TcpStream) -> Status {
+    match next(stream).body {
+        Body::Status(status) => status,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn transforms_are_taken_in_pieces_and_everything_else_is_refused_in_words() {
+    let server = Server::listen("127.0.0.1:0".parse().unwrap(), |_| ()).unwrap();
+    let mut client = TcpStream::connect(server.address()).unwrap();
+    let mut hangs = TcpStream::connect(server.address()).unwrap();
+    hangs.write_all(&transform("Stylus")[..70]).unwrap();
+    let bytes = transform("Stylus");
+    for piece in bytes.chunks(40) {
+        client.write_all(piece).unwrap();
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let expected = Received {
+        from: client.local_addr().unwrap(),
+        device: "Stylus".to_owned(),
+        columns: COLUMNS,
+    };
+    assert_eq!(received(&server), std::slice::from_ref(&expected));
+
+    // A type of the six and one that is not known are passed over, whatever their length.
+    client.write_all(&text("Words", &"x".repeat(9000))).unwrap();
+    assert!(refused(&mut client).text.contains("STRING is not taken"));
+    std::thread::sleep(Duration::from_millis(60));
+    let mut unknown = text("Words", &"x".repeat(9000));
+    unknown[2..8].copy_from_slice(b"QTDATA");
+    client.write_all(&unknown).unwrap();
+    assert!(refused(&mut client).text.contains("QTDATA is not taken"));
+    client.write_all(&bytes).unwrap();
+    assert_eq!(received(&server), [expected]);
+
+    let mut changed = bytes.clone();
+    changed[HEADER_BYTES] ^= 1;
+    std::thread::sleep(Duration::from_millis(60));
+    client.write_all(&changed).unwrap();
+    assert_eq!(refused(&mut client).code, 9);
+    // Where the next message begins is not known after this.
+    let mut endless = bytes;
+    endless[42..50].copy_from_slice(&u64::MAX.to_be_bytes());
+    std::thread::sleep(Duration::from_millis(60));
+    client.write_all(&endless).unwrap();
+    assert!(refused(&mut client).text.contains("at most 48"));
+    assert_eq!(client.read(&mut [0]).unwrap(), 0, "the connection ends");
+    assert!(server.received().is_empty());
+}
+
+#[test]
+fn a_client_keeps_so_many_devices_and_no_more() {
+    let server = Server::listen("127.0.0.1:0".parse().unwrap(), |_| ()).unwrap();
+    let mut client = TcpStream::connect(server.address()).unwrap();
+    for number in 0..3 * DEVICES_AT_MOST {
+        client.write_all(&transform(&format!("Device {number}"))).unwrap();
+    }
+    client.write_all(&text("End", "")).unwrap();
+    assert_eq!(refused(&mut client).code, 12, "all was read");
+    assert_eq!(server.received().len(), DEVICES_AT_MOST);
 }

@@ -4,7 +4,7 @@ mod order;
 mod rounds;
 mod streams;
 
-use crate::keys::Invitation;
+use crate::keys::{Invitation, now_s};
 use crate::net::{self, Place, Priority, Session};
 use crate::wire::{self, Kind, Stamp, encode};
 use crate::{RelayError, now_ns};
@@ -12,7 +12,7 @@ use rounds::Rounds;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 use stylet_shm_schema::service::Instance;
 
 /// Messages that may wait for a thread; more are dropped, and records among them asked for again.
@@ -121,10 +121,7 @@ impl Queues {
 }
 
 fn check_time(invitation: &Invitation) -> Result<(), RelayError> {
-    let now_s = SystemTime::now()
-        .duration_since(UNIX_EPOCH)
-        .map_or(0, |t| t.as_secs() as i64);
-    match now_s > invitation.until_s {
+    match now_s() > invitation.until_s {
         true => Err(RelayError(
             "the invitation has expired: ask the lab for another".to_owned(),
         )),

@@ -146,7 +146,7 @@ impl Rounds {
         });
         if self.cleaned.elapsed() >= CLEAN_EVERY {
             self.cleaned = Instant::now();
-            let _ = self.far.node.try_cleanup_dead_nodes();
+            self.far.node.clean_up();
         }
     }
 

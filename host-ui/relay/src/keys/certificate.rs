@@ -8,6 +8,10 @@ use rcgen::{
 };
 use time::{Duration, OffsetDateTime};
 
+/// A seat's certificate still says whose it is for so long after its time, so that whoever is refused then is refused by name. What it
+/// is worth ends with its time, by the lab's list.
+const NAMED_AFTER: Duration = Duration::days(365);
+
 /// From when until when a certificate is valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Validity {
@@ -91,15 +95,23 @@ impl Authority {
 
     /// Certificate and key of a subject, PEM.
     pub fn sign(&self, subject: &Subject<'_>, validity: Validity) -> Result<(String, String), RelayError> {
-        let (mut params, usage) = match subject {
-            Subject::Machine(hosts) => (named(hosts, "relay")?, ExtendedKeyUsagePurpose::ServerAuth),
-            Subject::Seat(seat) => (named(&[], &seat_name(*seat))?, ExtendedKeyUsagePurpose::ClientAuth),
+        let (mut params, usage, after) = match subject {
+            Subject::Machine(hosts) => (
+                named(hosts, "relay")?,
+                ExtendedKeyUsagePurpose::ServerAuth,
+                Duration::ZERO,
+            ),
+            Subject::Seat(seat) => (
+                named(&[], &seat_name(*seat))?,
+                ExtendedKeyUsagePurpose::ClientAuth,
+                NAMED_AFTER,
+            ),
         };
         params.is_ca = IsCa::ExplicitNoCa;
         params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
         params.extended_key_usages = vec![usage];
         params.use_authority_key_identifier_extension = true;
-        (params.not_before, params.not_after) = (validity.from, validity.until);
+        (params.not_before, params.not_after) = (validity.from, validity.until + after);
         let signer = Issuer::new(authority()?, KeyPair::from_pem(&self.key).map_err(failed)?);
         let key = KeyPair::generate().map_err(failed)?;
         let certificate = params.signed_by(&key, &signer).map_err(failed)?;

@@ -14,6 +14,7 @@ use std::fs;
 use std::io::Write;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Seats of a lab: that many certificates can be made by one authority.
 pub const SEATS: u16 = 256;
@@ -77,6 +78,22 @@ pub struct Member {
     pub revoked: bool,
 }
 
+impl Member {
+    /// Why nothing is accepted from the member.
+    pub fn why_closed(&self, now_s: i64) -> Option<&'static str> {
+        if self.revoked {
+            return Some("the certificate is revoked");
+        }
+        (now_s > self.until_s).then_some("the certificate has expired")
+    }
+}
+
+/// Seconds since 1970; a clock before that is one that nothing is valid by.
+pub fn now_s() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(i64::MAX, |t| t.as_secs() as i64)
+}
+
 /// Everybody with a certificate.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Members {
@@ -90,9 +107,11 @@ impl Members {
         self.members.iter().find(|member| member.seat == seat)
     }
 
-    /// Seats whose members are revoked.
-    pub fn revoked(&self) -> Vec<u16> {
-        self.members.iter().filter(|m| m.revoked).map(|m| m.seat).collect()
+    /// Seats whose members are revoked, or whose time has ended.
+    pub fn closed(&self) -> Vec<u16> {
+        let now_s = now_s();
+        let closed = self.members.iter().filter(|m| m.why_closed(now_s).is_some());
+        closed.map(|m| m.seat).collect()
     }
 }
 

@@ -100,7 +100,7 @@ impl Announcements {
             self.read_board(&near);
             if self.heard.elapsed() > CLEAN_EVERY && self.cleaned.elapsed() > CLEAN_EVERY {
                 self.cleaned = Instant::now();
-                let _ = near.node.try_cleanup_dead_nodes();
+                near.node.clean_up();
             }
             self.near = Some(near);
         }

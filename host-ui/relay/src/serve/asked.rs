@@ -5,11 +5,11 @@ use super::rights::{Right, right, right_to_upload};
 use super::rounds::{Presence, Rounds};
 use super::streams::Job;
 use crate::control::Order;
-use crate::keys::{Member, Role};
+use crate::keys::{Member, Role, now_s};
 use crate::now_ns;
 use crate::wire::{self, Batches, Hello, Kind, Message, Stamp, encode};
 use bytemuck::Zeroable;
-use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use std::time::Instant;
 use stylet_shm_schema::{Command, CommandKind, Reply, ReplyStatus, Request, Text};
 
 /// A request that left its member so long ago, by what the member had heard of the server, is not carried out: the
@@ -59,16 +59,10 @@ pub(super) fn take(rounds: &mut Rounds, seat: u16, bytes: &[u8], now_ns: u64) {
 /// The member, while its place in the list and its time last.
 fn valid(rounds: &Rounds, seat: u16) -> Result<Member, String> {
     let member = rounds.members.at(seat).ok_or("nobody was given this seat")?;
-    let now_s = SystemTime::now()
-        .duration_since(UNIX_EPOCH)
-        .map_or(i64::MAX, |t| t.as_secs() as i64);
-    if member.revoked {
-        return Err("the certificate is revoked".to_owned());
+    match member.why_closed(now_s()) {
+        Some(why) => Err(why.to_owned()),
+        None => Ok(member.clone()),
     }
-    if now_s > member.until_s {
-        return Err("the certificate has expired".to_owned());
-    }
-    Ok(member.clone())
 }
 
 fn greeting(rounds: &mut Rounds, seat: u16, message: &Message<'_>, late: bool) {
@@ -169,7 +163,7 @@ fn command(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_
     let passed = checked.and_then(|(command, right)| {
         allowed(rounds, seat, member, right)?;
         let near = rounds.announcements.near().ok_or("no core runs there")?;
-        near.commands.send(command).map_err(|e| format!("{e:?}"))
+        near.ask(command).map_err(|e| e.to_string())
     });
     if let Err(why) = passed {
         refuse(rounds, seat, message, &why, false);

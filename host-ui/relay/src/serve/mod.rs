@@ -92,14 +92,14 @@ impl Server {
 pub enum End {
     /// It was asked to.
     Stopped,
-    /// Somebody was revoked: the next session shuts that seat out.
-    Revoked,
+    /// Somebody was revoked, or somebody's time has ended: the next session shuts that seat out.
+    Closed,
 }
 
 /// Serves until `stop`; calls `beat` with each pass, with whether somebody on the net operates.
 pub fn run(options: &Options, stop: &AtomicBool, beat: impl FnMut(bool)) -> Result<End, RelayError> {
     let members = options.lab.members()?;
-    let session = net::serve(&options.listen, &options.lab.identity()?, &members.revoked())?;
+    let session = net::serve(&options.listen, &options.lab.identity()?, &members.closed())?;
     let server = Arc::new(Server {
         session: session.clone(),
         instance: options.instance.clone(),
@@ -153,7 +153,7 @@ fn serve(
             break End::Stopped;
         }
         if rounds.pass() {
-            break End::Revoked;
+            break End::Closed;
         }
         for request in asked.try_iter().take(ASKED) {
             rounds.take(request.seat, &request.bytes);

@@ -58,12 +58,15 @@ impl Pace {
 
     /// The member has had it.
     pub fn seen(&mut self, number: u64, now: Instant) {
-        let Some((_, at)) = self.away.iter().find(|(away, _)| *away == number).copied() else {
+        let Some(earlier) = self.away.iter().position(|(away, _)| *away == number) else {
             return;
         };
-        self.away.retain(|(away, _)| *away > number);
+        let at = self.away[earlier].1;
+        self.away.drain(..=earlier);
         match now - at {
             late if late >= SLOW => self.less(),
+            // Snapshots are datagrams: of one that has lost a datagram nothing arrives, and a smaller one has fewer.
+            _ if earlier > 0 => self.bytes = (self.bytes / 4 * 3).max(LEAST_BYTES),
             early if early < FAST => self.bytes = (self.bytes + MORE_BYTES).min(MAX_THIN_BYTES),
             _ => {}
         }
@@ -98,6 +101,24 @@ mod tests {
             pace.seen(number, now);
         }
         assert_eq!(pace.room(now), Some(MAX_THIN_BYTES));
+    }
+
+    #[test]
+    fn a_line_that_loses_gets_less() {
+        let (mut pace, now) = (Pace::default(), Instant::now());
+        for lost in [true, false] {
+            pace.sent(now);
+            if !lost {
+                pace.seen(pace.next() - 1, now + FAST / 2);
+            }
+        }
+        assert_eq!(pace.room(now), Some(MAX_THIN_BYTES / 4 * 3));
+        for _ in 0..100 {
+            pace.sent(now);
+            pace.sent(now);
+            pace.seen(pace.next() - 1, now);
+        }
+        assert_eq!(pace.room(now), Some(LEAST_BYTES));
     }
 
     #[test]

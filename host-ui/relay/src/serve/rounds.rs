@@ -45,7 +45,7 @@ pub(super) struct Rounds {
     pub(super) members: Members,
     pub(super) jobs: SyncSender<Job>,
     pub(super) upload: Option<SlicePublisher<u8, UploadHeader>>,
-    revoked_at_start: Vec<u16>,
+    closed_at_start: Vec<u16>,
     refusals: BTreeMap<u16, Instant>,
     orders: Orders,
     lab: Lab,
@@ -70,7 +70,7 @@ impl Rounds {
             orders: Orders::listen(&server.instance)?,
             lease: Lease::new(now),
             present: BTreeMap::new(),
-            revoked_at_start: members.revoked(),
+            closed_at_start: members.closed(),
             refusals: BTreeMap::new(),
             members,
             jobs,
@@ -87,7 +87,7 @@ impl Rounds {
         })
     }
 
-    /// True when somebody was revoked since the session began.
+    /// True when another seat has been closed since the session began.
     pub(super) fn pass(&mut self) -> bool {
         let now = Instant::now();
         if now - self.passed >= super::lease::SILENCE {
@@ -128,18 +128,15 @@ impl Rounds {
                 self.members = members;
             }
         }
-        self.members.revoked() != self.revoked_at_start
+        self.members.closed() != self.closed_at_start
     }
 
     /// A hand beside the core goes before any on the net.
     fn watch_local_hosts(&mut self, now: Instant) {
         let Some(near) = self.announcements.near() else { return };
-        let mine = near.commands.id();
         let mut local = false;
-        while let Some(sample) = near.requests.receive() {
-            if sample.header().publisher_id() != mine {
-                local |= Request::decode(&sample).is_ok_and(|request| operates(request.kind()));
-            }
+        while let Some(command) = near.request_of_others() {
+            local |= Request::decode(&command).is_ok_and(|request| operates(request.kind()));
         }
         if local && let Some(seat) = self.lease.local_operates(now) {
             println!("{LOCAL} operates now, and {} no longer", self.name(seat));
@@ -162,7 +159,7 @@ impl Rounds {
         println!("the hand is stopped: {why}");
         let command = Request::StopHand.encode(self.host_id, self.stops);
         if let (Some(near), Ok(command)) = (self.announcements.near(), command) {
-            let _ = near.commands.send(command);
+            let _ = near.ask(command);
         }
     }
 

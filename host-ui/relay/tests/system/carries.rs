@@ -2,57 +2,14 @@
 
 use crate::fixture::{Host, Keys, Named, core, invitation, join, lease, program, scratch, until};
 use crate::proxy::Proxy;
+use crate::watch::{Seen, arrivals, quantile, seconds, settle, snapshots_lost};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use stylet_relay::keys::{Role, Validity, write_invitation};
-use stylet_relay::now_ns;
-use stylet_shm_schema::service::{self, Instance};
-
-/// Of each measurement; `STYLET_RELAY_S` makes it longer for a figure.
-fn seconds() -> f64 {
-    let asked = std::env::var("STYLET_RELAY_S").ok().and_then(|s| s.parse().ok());
-    asked.unwrap_or(5.0)
-}
-
-/// When each tick was seen first, by a host that looks every 0.1 ms.
-pub fn arrivals(instance: &Instance, until: Instant) -> BTreeMap<u64, Instant> {
-    let node = instance.node().expect("shared memory");
-    let port = service::records::subscriber(&node).expect("a port");
-    let mut seen = BTreeMap::new();
-    while Instant::now() < until {
-        while let Some(sample) = port.receive() {
-            let now = Instant::now();
-            seen.extend(sample.values().iter().map(|record| (record.tick, now)));
-        }
-        std::thread::sleep(Duration::from_micros(100));
-    }
-    seen
-}
-
-/// How old each snapshot was when it came, ms, by its tissue tick. Both sides are on this machine, so their clock is one.
-pub fn pictures(instance: &Instance, until: Instant) -> Vec<(u64, f64)> {
-    let node = instance.node().expect("shared memory");
-    let port = service::snapshots::subscriber(&node).expect("a port");
-    let mut seen = Vec::new();
-    while Instant::now() < until {
-        while let Some(sample) = port.receive() {
-            let header = sample.header();
-            let age_ms = now_ns().saturating_sub(header.time_ns) as f64 * 1e-6;
-            seen.push((header.tissue_tick, age_ms));
-        }
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    seen
-}
-
-/// Ages in order; the first, which was kept for whoever comes late, left out.
-pub fn ages_ms(shown: &[(u64, f64)]) -> Vec<f64> {
-    let mut ages: Vec<f64> = shown.iter().skip(1).map(|(_, age)| *age).collect();
-    ages.sort_by(f64::total_cmp);
-    ages
-}
+use stylet_shm_schema::service::Instance;
+use stylet_test_kit::witness::where_the_machine_runs;
 
 #[test]
 fn every_record_comes_in_order_and_snapshots_come_as_a_screen_shows_them() {
@@ -77,52 +34,33 @@ fn every_record_comes_in_order_and_snapshots_come_as_a_screen_shows_them() {
         "the scene is whole"
     );
 
-    let end = Instant::now() + Duration::from_secs_f64(seconds());
-    let (here, there, shown) = std::thread::scope(|scope| {
-        let here = scope.spawn(|| arrivals(&near.0, end));
-        let there = scope.spawn(|| arrivals(&far.0, end));
-        let shown = scope.spawn(|| pictures(&far.0, end));
-        (
-            here.join().expect("ran"),
-            there.join().expect("ran"),
-            shown.join().expect("ran"),
-        )
+    settle(&far);
+    where_the_machine_runs(|| {
+        let length = seconds(5.0);
+        let end = Instant::now() + Duration::from_secs_f64(length);
+        let lost_before = lease(&far, &["status"]);
+        let (here, seen) = std::thread::scope(|scope| {
+            let here = scope.spawn(|| arrivals(&near.0, end));
+            let seen = Seen::until(&far, end);
+            (here.join().expect("ran"), seen)
+        });
+        let there = &seen.records;
+        let mut ages_ms: Vec<f64> = there
+            .iter()
+            .filter_map(|(tick, at)| Some(at.saturating_duration_since(*here.get(tick)?).as_secs_f64() * 1e3))
+            .collect();
+        let [median, most, longest] = [0.5, 0.99, 1.0].map(|share| quantile(&mut ages_ms, share));
+        println!("age over the host beside the core: p50 {median:.2}, p99 {most:.2}, longest {longest:.2} ms");
+        println!("{}", seen.words("one machine"));
+        seen.has_every_record();
+        assert!(there.len() as f64 > 0.9 * here.len() as f64, "{} records", there.len());
+        let shown = &seen.snapshots;
+        assert!(shown.windows(2).all(|pair| pair[0].0 < pair[1].0), "in order");
+        assert!(shown.len() as f64 <= 61.0 * length, "{} snapshots", shown.len());
+        assert!(shown.len() > 20, "{} snapshots", shown.len());
+        let lost_before = snapshots_lost(&lost_before);
+        assert_eq!(seen.snapshots_lost() - lost_before, 0, "snapshots lost on one machine");
     });
-    let (first, last) = (
-        *there.keys().next().expect("records"),
-        *there.keys().next_back().expect("records"),
-    );
-    let missing = here
-        .keys()
-        .filter(|tick| (first..=last).contains(tick) && !there.contains_key(tick))
-        .count();
-    let mut ages_ms: Vec<f64> = there
-        .iter()
-        .filter_map(|(tick, at)| Some(at.saturating_duration_since(*here.get(tick)?).as_secs_f64() * 1e3))
-        .collect();
-    ages_ms.sort_by(f64::total_cmp);
-    let at = |share: f64| ages_ms[((ages_ms.len() - 1) as f64 * share) as usize];
-    println!(
-        "{} records, {missing} missing; age over the host beside the core: p50 {:.2}, p99 {:.2}, longest {:.2} ms; {} snapshots in {:.0} s",
-        there.len(),
-        at(0.5),
-        at(0.99),
-        at(1.0),
-        shown.len(),
-        seconds()
-    );
-    let words = lease(&far, &["status"]);
-    println!("{words}");
-    assert_eq!(missing, 0);
-    assert!(
-        there.len() as f64 > 0.9 * here.len() as f64 && there.len() > 500,
-        "{} records",
-        there.len()
-    );
-    assert!(words.contains(" 0 records lost"), "{words}");
-    assert!(shown.windows(2).all(|pair| pair[0].0 < pair[1].0), "in order");
-    assert!(shown.len() as f64 <= 61.0 * seconds(), "{} snapshots", shown.len());
-    assert!(shown.len() > 20, "{} snapshots", shown.len());
 }
 
 #[test]
@@ -145,27 +83,10 @@ fn a_late_and_lossy_cable_costs_no_record() {
         served.log(),
         joined.log()
     );
-    let end = Instant::now() + Duration::from_secs_f64(seconds());
-    let (there, shown) = std::thread::scope(|scope| {
-        let there = scope.spawn(|| arrivals(&far.0, end));
-        let shown = scope.spawn(|| pictures(&far.0, end));
-        (there.join().expect("ran"), shown.join().expect("ran"))
-    });
-    let ages_ms = ages_ms(&shown);
-    let ticks: Vec<u64> = there.keys().copied().collect();
-    let missing: u64 = ticks.windows(2).map(|pair| pair[1] - pair[0] - 1).sum();
-    let words = lease(&far, &["status"]);
-    println!(
-        "20 ms and 1 % each way: {} records, {missing} missing; {} snapshots, p50 {:.0} ms old, the oldest {:.0} ms\n{words}",
-        ticks.len(),
-        shown.len(),
-        ages_ms.get(ages_ms.len() / 2).unwrap_or(&f64::NAN),
-        ages_ms.last().unwrap_or(&f64::NAN)
-    );
-    // How many snapshots pass depends on what QUIC makes of such a line: ADR 18 says how few they have been.
-    assert!(ticks.len() > 500, "{} records", ticks.len());
-    assert_eq!(missing, 0);
-    assert!(words.contains(" 0 records lost"), "{words}");
+    settle(&far);
+    let seen = Seen::until(&far, Instant::now() + Duration::from_secs_f64(seconds(5.0)));
+    println!("{}", seen.words("20 ms and 1 % each way"));
+    seen.has_every_record();
 }
 
 fn record(instance: &Instance, out: &Path) -> std::process::Child {

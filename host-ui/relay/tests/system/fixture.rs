@@ -4,18 +4,12 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use stylet_relay::keys::{Invitation, Lab, Role, Validity, write_invitation};
 use stylet_relay::ports::Near;
 use stylet_shm_schema::service::{self, Instance, Node, SliceSubscriber, StateReader};
 use stylet_shm_schema::{HapticState, PlanInForce, Reply, ReplyStatus, Request, SceneHeader, Session, TickRecord};
-
-/// A program of the workspace, built beside the relay.
-pub fn program(name: &str) -> PathBuf {
-    let path = Path::new(env!("CARGO_BIN_EXE_relay")).with_file_name(name);
-    assert!(path.exists(), "{} is missing: `make build` makes it", path.display());
-    path
-}
+pub use stylet_test_kit::{program, until};
 
 /// A number that no other test of this process has.
 fn fresh() -> u32 {
@@ -43,24 +37,7 @@ impl Drop for Named {
 
 /// A folder for one test's files, emptied first.
 pub fn scratch(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_BIN_EXE_relay"))
-        .with_file_name("test-out")
-        .join(format!("relay-{name}-{}", fresh()));
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).expect("the target folder can be written");
-    folder
-}
-
-/// Polls every 2 ms; false when it has not come true in time.
-pub fn until(limit: Duration, mut ready: impl FnMut() -> bool) -> bool {
-    let start = Instant::now();
-    while start.elapsed() < limit {
-        if ready() {
-            return true;
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    false
+    stylet_test_kit::scratch(&format!("relay-{name}-{}", fresh()))
 }
 
 /// A process of ours, with what it prints in a file.
@@ -270,7 +247,7 @@ impl Host {
 
     pub fn state(&mut self) -> Option<HapticState> {
         self.poll();
-        self.board.as_ref().map(Board::read)
+        self.board.as_ref().map(StateReader::read)
     }
 
     /// Waits until the core is seen with its scene.
@@ -284,7 +261,7 @@ impl Host {
         let id = self.next;
         self.next += 1;
         let command = request.encode(self.id, id).expect("fits");
-        self.near.commands.send(command).expect("sent");
+        self.near.ask(command).expect("sent");
         id
     }
 

@@ -1,15 +1,14 @@
 //! Members behind lines of their own, in network namespaces: a line of 100 Mbit/s, and a class of twenty. As root, by `make relay-class`.
 
-use crate::fixture::{Host, Keys, Named, Running, core, lease, scratch, until};
+use crate::fixture::{Host, Keys, Named, Running, core, scratch, until};
+use crate::watch::{Seen, quantile, seconds, settle};
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 use stylet_relay::keys::{Role, Validity};
 
-/// Of each measurement; `STYLET_RELAY_S` makes it longer.
 fn measured() -> Duration {
-    let asked = std::env::var("STYLET_RELAY_S").ok().and_then(|s| s.parse().ok());
-    Duration::from_secs_f64(asked.unwrap_or(10.0))
+    Duration::from_secs_f64(seconds(10.0))
 }
 
 fn observers() -> usize {
@@ -97,14 +96,6 @@ impl Drop for Line {
     }
 }
 
-fn quantile(values: &mut [f64], share: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values
-        .get(((values.len().max(1) - 1) as f64 * share) as usize)
-        .copied()
-        .unwrap_or(f64::NAN)
-}
-
 #[test]
 #[ignore = "as root: it makes a network namespace"]
 fn a_line_of_100_megabits_carries_records_whole_and_snapshots_in_time() {
@@ -124,25 +115,10 @@ fn a_line_of_100_megabits_carries_records_whole_and_snapshots_in_time() {
         served.log(),
         joined.log()
     );
-    let end = Instant::now() + measured();
-    let (there, shown) = std::thread::scope(|scope| {
-        let there = scope.spawn(|| crate::carries::arrivals(&far.0, end));
-        let shown = scope.spawn(|| crate::carries::pictures(&far.0, end));
-        (there.join().expect("ran"), shown.join().expect("ran"))
-    });
-    let mut ages_ms = crate::carries::ages_ms(&shown);
-    let ticks: Vec<u64> = there.keys().copied().collect();
-    let missing: u64 = ticks.windows(2).map(|pair| pair[1] - pair[0] - 1).sum();
-    let words = lease(&far, &["status"]);
-    println!(
-        "100 Mbit/s: {} records, {missing} missing; {} snapshots, p50 {:.1}, p99 {:.1} ms old, the oldest {:.0} ms\n{words}",
-        ticks.len(),
-        shown.len(),
-        quantile(&mut ages_ms, 0.5),
-        quantile(&mut ages_ms, 0.99),
-        quantile(&mut ages_ms, 1.0)
-    );
-    assert_eq!(missing, 0);
+    settle(&far);
+    let seen = Seen::until(&far, Instant::now() + measured());
+    println!("{}", seen.words("100 Mbit/s"));
+    seen.has_every_record();
     drop(joined);
 }
 

@@ -7,3 +7,4 @@ mod lease;
 mod line;
 mod proxy;
 mod rights;
+mod watch;

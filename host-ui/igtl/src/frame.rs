@@ -1,0 +1,90 @@
+//! The needle's frame as a transform in RAS and mm, and back.
+
+use stylet_anatomy::PatientFrame;
+
+const MM_PER_M: f64 = 1000.0;
+/// Lengths and angles of the axes of a rigid body may be off by this.
+const AXES_OFF: f64 = 1e-3;
+
+pub fn place_mm(patient: &PatientFrame, in_scene_m: [f64; 3]) -> [f32; 3] {
+    patient.patient_from_scene(in_scene_m).map(|m| (m * MM_PER_M) as f32)
+}
+
+/// Columns of the needle's frame in RAS: the third axis points where the needle goes, the origin is the tip.
+pub fn needle(patient: &PatientFrame, tip_in_scene_m: [f64; 3], direction_in_scene: [f64; 3]) -> [[f32; 3]; 4] {
+    let along = unit(patient.patient_from_scene_direction(direction_in_scene));
+    // Any axis that is not nearly parallel fixes the roll, which the needle does not have.
+    let aside = if along[0].abs() < 0.9 {
+        [1.0, 0.0, 0.0]
+    } else {
+        [0.0, 1.0, 0.0]
+    };
+    let second = unit(cross(along, aside));
+    let first = cross(second, along);
+    let axis = |v: [f64; 3]| v.map(|x| x as f32);
+    [
+        axis(first),
+        axis(second),
+        axis(along),
+        place_mm(patient, tip_in_scene_m),
+    ]
+}
+
+pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+pub fn unit(v: [f64; 3]) -> [f64; 3] {
+    let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if length > 0.0 {
+        v.map(|x| x / length)
+    } else {
+        [0.0, 0.0, 1.0]
+    }
+}
+
+/// Tip (m) and direction in the scene by a transform of the same form; nothing where its axes are not those of a rigid body.
+pub fn tip_and_direction(patient: &PatientFrame, columns: &[[f32; 3]; 4]) -> Option<([f64; 3], [f64; 3])> {
+    let [x, y, z, origin_mm] = columns.map(|column| column.map(f64::from));
+    let product = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| a[i] * b[i]).sum::<f64>();
+    let is = |value: f64, expected: f64| (value - expected).abs() <= AXES_OFF;
+    let have_length_one = [x, y, z].iter().all(|axis| is(product(*axis, *axis).sqrt(), 1.0));
+    let stand_on_each_other = [(x, y), (y, z), (z, x)].iter().all(|(a, b)| is(product(*a, *b), 0.0));
+    let is_rigid = have_length_one && stand_on_each_other && product(cross(x, y), z) > 0.0;
+    let tip_m = patient.scene_from_patient(origin_mm.map(|mm| mm / MM_PER_M));
+    is_rigid.then(|| (tip_m, unit(patient.scene_from_patient_direction(z))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_needle_is_a_right_handed_frame_in_mm_whose_third_axis_is_its_direction() {
+        for direction in [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.3, -0.4, 0.866]] {
+            let [x, y, z, tip] = needle(&PatientFrame::default(), [0.01, -0.02, 0.03], direction);
+            let wide = |v: [f32; 3]| v.map(f64::from);
+            let third = cross(wide(x), wide(y));
+            assert!((0..3).all(|a| (third[a] - f64::from(z[a])).abs() < 1e-6));
+            assert!((0..3).all(|a| (f64::from(z[a]) - unit(direction)[a]).abs() < 1e-6));
+            assert_eq!(tip, [10.0, -20.0, 30.0]);
+        }
+    }
+
+    #[test]
+    fn a_needle_comes_back_from_its_transform_in_a_turned_patient() {
+        let turned = PatientFrame::of_wire(&[0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.1, 0.2, -0.3]);
+        let (tip_m, direction) = ([0.01, -0.02, 0.03], unit([0.3, -0.4, 0.866]));
+        let columns = needle(&turned, tip_m, direction);
+        let (its_tip_m, its_direction) = tip_and_direction(&turned, &columns).expect("rigid");
+        assert!((0..3).all(|a| (its_tip_m[a] - tip_m[a]).abs() < 1e-7), "{its_tip_m:?}");
+        assert!(
+            (0..3).all(|a| (its_direction[a] - direction[a]).abs() < 1e-6),
+            "{its_direction:?}"
+        );
+    }
+}

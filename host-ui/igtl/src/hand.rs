@@ -1,0 +1,166 @@
+//! The simulated hand that a tracker or a stepper moves: which client's transforms count, and which of them are possible.
+
+use crate::frame::tip_and_direction;
+use crate::server::{Received, Refusal};
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+use stylet_anatomy::PatientFrame;
+use stylet_shm_schema::HandMove;
+
+/// A client that is silent for so long moves the hand no longer, and the hand stops.
+pub const SILENCE: Duration = Duration::from_millis(300);
+const ACCELERATION_M_PER_S2: f64 = 2.0;
+
+/// How clients may move the hand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HandOptions {
+    /// The device whose transforms move it.
+    pub device: String,
+    /// As fast as this at most, m/s.
+    pub speed_m_per_s: f64,
+}
+
+/// Who moves the hand.
+pub struct Hand {
+    options: Option<HandOptions>,
+    holder: Option<(SocketAddr, Instant)>,
+    /// The last goal, which is not sent again while it does not change.
+    goal: Option<HandMove>,
+}
+
+impl Hand {
+    /// That nobody moves; without options nobody may.
+    pub fn new(options: Option<HandOptions>) -> Self {
+        Self {
+            options,
+            holder: None,
+            goal: None,
+        }
+    }
+
+    /// Where the hand goes by a transform; nothing where it goes there already.
+    pub fn take(
+        &mut self,
+        received: &Received,
+        patient: &PatientFrame,
+        now: Instant,
+    ) -> Result<Option<HandMove>, Refusal> {
+        let options = self.options.as_ref().ok_or_else(|| Refusal {
+            code: 5,
+            name: "Access denied",
+            words: "this server takes no transforms: start it with --hand NAME to let one move the needle".to_owned(),
+        })?;
+        if options.device != received.device {
+            return Err(Refusal {
+                code: 4,
+                name: "Not found",
+                words: format!("the needle is moved by the transform \"{}\" alone", options.device),
+            });
+        }
+        let (tip_m, direction) = tip_and_direction(patient, &received.columns).ok_or_else(|| Refusal {
+            code: 10,
+            name: "Configuration error",
+            words: "its axes are not those of a rigid body: three of length 1 that stand on each other, right-handed"
+                .to_owned(),
+        })?;
+        let goal = HandMove {
+            tip_m,
+            direction,
+            speed_m_per_s: options.speed_m_per_s,
+            acceleration_m_per_s2: ACCELERATION_M_PER_S2,
+        };
+        match self.holder {
+            Some((holder, heard)) if holder != received.from && now - heard < SILENCE => Err(Refusal {
+                code: 6,
+                name: "Busy",
+                words: "another client moves the needle".to_owned(),
+            }),
+            _ => {
+                self.holder = Some((received.from, now));
+                let is_new = self.goal.replace(goal) != Some(goal);
+                Ok(is_new.then_some(goal))
+            }
+        }
+    }
+
+    /// Whether a client moves it.
+    pub fn is_held(&self) -> bool {
+        self.holder.is_some()
+    }
+
+    /// True once when whoever moved the hand has fallen silent.
+    pub fn falls_silent(&mut self, now: Instant) -> bool {
+        let is_silent = self.holder.is_some_and(|(_, heard)| now - heard >= SILENCE);
+        if is_silent {
+            (self.holder, self.goal) = (None, None);
+        }
+        is_silent
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UPRIGHT: [[f32; 3]; 4] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [10.0, -20.0, 30.0]];
+
+    fn options() -> Option<HandOptions> {
+        Some(HandOptions {
+            device: "Stylus".to_owned(),
+            speed_m_per_s: 0.1,
+        })
+    }
+
+    fn sent(port: u16, device: &str, columns: [[f32; 3]; 4]) -> Received {
+        Received {
+            from: SocketAddr::from(([127, 0, 0, 1], port)),
+            device: device.to_owned(),
+            columns,
+        }
+    }
+
+    fn code(taken: Result<Option<HandMove>, Refusal>) -> u16 {
+        taken.expect_err("refused").code
+    }
+
+    #[test]
+    fn a_transform_moves_the_tip_to_its_origin_along_its_third_axis_and_is_sent_once() {
+        let (mut hand, now, frame) = (Hand::new(options()), Instant::now(), PatientFrame::default());
+        let goal = hand.take(&sent(1, "Stylus", UPRIGHT), &frame, now).expect("possible");
+        let goal = goal.expect("new");
+        assert!((0..3).all(|a| (goal.tip_m[a] - [0.01, -0.02, 0.03][a]).abs() < 1e-9));
+        assert_eq!((goal.direction, goal.speed_m_per_s), ([0.0, 0.0, 1.0], 0.1));
+        assert_eq!(hand.take(&sent(1, "Stylus", UPRIGHT), &frame, now), Ok(None));
+    }
+
+    #[test]
+    fn what_is_not_agreed_or_no_rigid_body_is_refused() {
+        let (now, frame) = (Instant::now(), PatientFrame::default());
+        assert_eq!(code(Hand::new(None).take(&sent(1, "Stylus", UPRIGHT), &frame, now)), 5);
+        let mut hand = Hand::new(options());
+        assert_eq!(code(hand.take(&sent(1, "Probe", UPRIGHT), &frame, now)), 4);
+        let mut longer = UPRIGHT;
+        longer[0][0] = 1.1;
+        let mut skewed = UPRIGHT;
+        skewed[1] = [0.6, 0.8, 0.0];
+        let mut mirrored = UPRIGHT;
+        mirrored[2][2] = -1.0;
+        for columns in [longer, skewed, mirrored, [[0.0; 3]; 4]] {
+            assert_eq!(code(hand.take(&sent(1, "Stylus", columns), &frame, now)), 10);
+        }
+        assert!(!hand.falls_silent(now + SILENCE), "nobody moved it");
+    }
+
+    #[test]
+    fn one_client_holds_the_hand_until_it_is_silent_and_then_it_stops_once() {
+        let (mut hand, start, frame) = (Hand::new(options()), Instant::now(), PatientFrame::default());
+        assert!(hand.take(&sent(1, "Stylus", UPRIGHT), &frame, start).is_ok());
+        let soon = start + SILENCE / 2;
+        assert_eq!(code(hand.take(&sent(2, "Stylus", UPRIGHT), &frame, soon)), 6);
+        assert!(!hand.falls_silent(soon));
+        assert!(hand.falls_silent(start + SILENCE));
+        assert!(!hand.falls_silent(start + SILENCE), "once");
+        let goal = hand.take(&sent(2, "Stylus", UPRIGHT), &frame, start + SILENCE);
+        assert!(goal.expect("nobody else").is_some(), "the hand was stopped");
+    }
+}

@@ -1,0 +1,81 @@
+//! From the transforms of clients to requests, and from the core's answers to clients.
+
+use crate::hand::{Hand, HandOptions};
+use crate::server::{Received, Refusal, Server};
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+use stylet_host::link::{Link, LinkStatus};
+use stylet_shm_schema::Request;
+
+/// Requests whose answer may be awaited.
+const AWAITED_AT_MOST: usize = 64;
+/// The link's thread has sent a request after so long.
+const SENT_AFTER: Duration = Duration::from_millis(100);
+
+/// What clients asked for.
+pub struct Requests {
+    hand: Hand,
+    /// Requests that the core has not answered yet, and for whom they were made.
+    awaited: VecDeque<(u64, Received)>,
+}
+
+impl Requests {
+    /// Of clients that may move the hand as `options` say, or not at all.
+    pub fn new(options: Option<HandOptions>) -> Self {
+        Self {
+            hand: Hand::new(options),
+            awaited: VecDeque::new(),
+        }
+    }
+
+    /// Takes what clients have sent, and hands on what the core answered.
+    pub fn pass(&mut self, link: &mut Link, server: &Server) {
+        for received in server.received() {
+            if let Err(refusal) = self.take(link, &received) {
+                server.refuse(received.from, &received.device, &refusal);
+            }
+        }
+        if self.hand.falls_silent(Instant::now()) {
+            // Without a core there is no hand to stop.
+            let _ = link.send(&Request::StopHand);
+        }
+        self.awaited.retain(|(id, received)| match link.reply(*id) {
+            Some(answer) if !answer.accepted => {
+                server.refuse(received.from, &received.device, &not_ready(answer.text));
+                false
+            }
+            answer => answer.is_none(),
+        });
+    }
+
+    /// The hand does not go on for a client that is served no longer.
+    pub fn end(&mut self, link: &mut Link) {
+        if self.hand.is_held() && link.send(&Request::StopHand).is_ok() {
+            std::thread::sleep(SENT_AFTER);
+        }
+    }
+
+    fn take(&mut self, link: &mut Link, received: &Received) -> Result<(), Refusal> {
+        let scene = match (link.scene(), link.status()) {
+            (Some(scene), LinkStatus::Live) => scene,
+            (_, LinkStatus::Absent { why }) => return Err(not_ready(why)),
+            _ => return Err(not_ready("rt-core is silent".to_owned())),
+        };
+        let patient = scene.header.patient();
+        if let Some(goal) = self.hand.take(received, &patient, Instant::now())? {
+            let sent = link.send(&Request::MoveHand(goal));
+            let id = sent.map_err(|error| not_ready(error.to_string()))?;
+            self.awaited.push_back((id, received.clone()));
+            self.awaited.drain(..self.awaited.len().saturating_sub(AWAITED_AT_MOST));
+        }
+        Ok(())
+    }
+}
+
+fn not_ready(words: String) -> Refusal {
+    Refusal {
+        code: 13,
+        name: "Not ready",
+        words,
+    }
+}

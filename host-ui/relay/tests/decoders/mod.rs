@@ -1,0 +1,78 @@
+// Every decoder of what comes from the net, as the two sides call them; for the fuzzer, which includes this file, and for the tests of its
+// corpus.
+
+use bytemuck::Zeroable;
+use stylet_relay::control::Order;
+use stylet_relay::wire::{self, Batches, Displacements, Hello, Kind, Rest, Who};
+use stylet_shm_schema::service::MAX_BATCH;
+use stylet_shm_schema::{
+    Command, Event, HapticState, ParametersInForce, PlanInForce, Rehearsal, Reply, Request, SceneHeader, Session,
+    SnapshotHeader, TickRecord, check,
+};
+
+/// Takes the bytes for one message, at the server's end and at a member's. What is accepted is valid by the checks of shared memory.
+/// True where the message was accepted.
+pub fn take(bytes: &[u8]) -> bool {
+    let Ok(message) = wire::decode(bytes) else {
+        return false;
+    };
+    let body = message.body;
+    match message.kind {
+        Kind::Session => wire::one::<Session>(body).is_ok(),
+        Kind::State => wire::one::<HapticState>(body).is_ok_and(|state| check::state(&state).is_ok()),
+        Kind::Records => {
+            let records = wire::many::<TickRecord>(body, MAX_BATCH);
+            records.is_ok_and(|batch| batch.iter().all(|record| check::record(record).is_ok()))
+        }
+        Kind::Snapshot => snapshot(body),
+        Kind::Scene => scene(body),
+        Kind::Event => wire::one::<Event>(body).is_ok(),
+        Kind::Parameters => wire::one::<ParametersInForce>(body).is_ok_and(|p| check::parameters(&p).is_ok()),
+        Kind::Plan => wire::one::<PlanInForce>(body).is_ok_and(|plan| check::plan(&plan).is_ok()),
+        Kind::Reply => wire::one::<Reply>(body).is_ok_and(|reply| !reply.text.read().contains('\0')),
+        Kind::Rehearsal => wire::one::<Rehearsal>(body).is_ok_and(|r| check::rehearsal(&r).is_ok()),
+        Kind::Who => Who::of_bytes(body).is_ok_and(|who| !who.words().is_empty()),
+        Kind::Echo => wire::one::<u64>(body).is_ok(),
+        Kind::Missing | Kind::Again => wire::one::<Batches>(body).is_ok(),
+        Kind::Hello => wire::one::<Hello>(body).is_ok(),
+        Kind::Command => wire::one::<Command>(body).is_ok_and(|command| Request::decode(&command).is_ok()),
+        Kind::Upload => wire::upload(body).is_ok(),
+        Kind::Lease => std::str::from_utf8(body).ok().and_then(Order::of_line).is_some(),
+        Kind::Seen => true,
+    }
+}
+
+fn scene(body: &[u8]) -> bool {
+    let Ok((header, words)) = wire::scene(body) else {
+        return false;
+    };
+    // A snapshot of the scene, as far as there can be one.
+    let _ = Rest::of_scene(&header, &words);
+    true
+}
+
+/// Against a scene of the counts that the snapshot states, where it is a small one, and against none.
+fn snapshot(body: &[u8]) -> bool {
+    let mut known = Displacements::default();
+    let of_none = wire::decode_snapshot(&Rest::default(), &mut known, body);
+    match wire::decode_snapshot(&rest_of(body), &mut known, body) {
+        Ok(Some((header, vertices))) => {
+            assert!(check::snapshot(&header, &vertices).is_ok());
+            true
+        }
+        _ => of_none.is_ok(),
+    }
+}
+
+const SMALL: u32 = 4096;
+
+fn rest_of(body: &[u8]) -> Rest {
+    let mut stated = SnapshotHeader::zeroed();
+    let length = body.len().min(size_of::<SnapshotHeader>());
+    bytemuck::bytes_of_mut(&mut stated)[..length].copy_from_slice(&body[..length]);
+    let mut scene = SceneHeader::zeroed();
+    (scene.session_id, scene.generation) = (stated.session_id, stated.scene_generation);
+    scene.vertex_count = stated.vertex_count.min(SMALL);
+    scene.nodes.dims = [stated.node_count.min(SMALL), 1, 1];
+    Rest::of_scene(&scene, &vec![0; 3 * scene.vertex_count as usize])
+}

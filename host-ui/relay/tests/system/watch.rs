@@ -1,0 +1,127 @@
+//! What arrives at a host: records by their ticks, and snapshots with their age.
+
+use crate::fixture::{Named, lease, until};
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+use stylet_relay::now_ns;
+use stylet_shm_schema::service::{self, Instance};
+
+/// Of each measurement, s; `STYLET_RELAY_S` makes it longer for a figure.
+pub fn seconds(everyday: f64) -> f64 {
+    let asked = std::env::var("STYLET_RELAY_S").ok().and_then(|s| s.parse().ok());
+    asked.unwrap_or(everyday)
+}
+
+/// When each tick was seen first, by a host that looks every 0.1 ms.
+pub fn arrivals(instance: &Instance, until: Instant) -> BTreeMap<u64, Instant> {
+    let node = instance.node().expect("shared memory");
+    let port = service::records::subscriber(&node).expect("a port");
+    let mut seen = BTreeMap::new();
+    while Instant::now() < until {
+        while let Some(sample) = port.receive() {
+            let now = Instant::now();
+            seen.extend(sample.values().iter().map(|record| (record.tick, now)));
+        }
+        std::thread::sleep(Duration::from_micros(100));
+    }
+    seen
+}
+
+/// How old each snapshot was when it came, ms, by its tissue tick. Both sides are on this machine, so their clock is one.
+pub fn pictures(instance: &Instance, until: Instant) -> Vec<(u64, f64)> {
+    let node = instance.node().expect("shared memory");
+    let port = service::snapshots::subscriber(&node).expect("a port");
+    let mut seen = Vec::new();
+    while Instant::now() < until {
+        while let Some(sample) = port.receive() {
+            let header = sample.header();
+            let age_ms = now_ns().saturating_sub(header.time_ns) as f64 * 1e-6;
+            seen.push((header.tissue_tick, age_ms));
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    seen
+}
+
+pub fn quantile(values: &mut [f64], share: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values
+        .get(((values.len().max(1) - 1) as f64 * share) as usize)
+        .copied()
+        .unwrap_or(f64::NAN)
+}
+
+/// Records and snapshots of one host for a while.
+pub struct Seen {
+    pub records: BTreeMap<u64, Instant>,
+    pub snapshots: Vec<(u64, f64)>,
+    /// What `relay lease status` prints there in the end.
+    pub words: String,
+}
+
+impl Seen {
+    pub fn until(far: &Named, end: Instant) -> Self {
+        let (records, snapshots) = std::thread::scope(|scope| {
+            let records = scope.spawn(|| arrivals(&far.0, end));
+            let snapshots = scope.spawn(|| pictures(&far.0, end));
+            (records.join().expect("ran"), snapshots.join().expect("ran"))
+        });
+        let words = lease(far, &["status"]);
+        Self {
+            records,
+            snapshots,
+            words,
+        }
+    }
+
+    /// Ticks between the first and the last whose record did not come.
+    pub fn missing(&self) -> u64 {
+        let ticks: Vec<u64> = self.records.keys().copied().collect();
+        ticks.windows(2).map(|pair| pair[1] - pair[0] - 1).sum()
+    }
+
+    /// Median, 99th percentile and largest age of the snapshots, ms; the first, which was kept for whoever comes late, left out.
+    pub fn ages_ms(&self) -> [f64; 3] {
+        let mut ages_ms: Vec<f64> = self.snapshots.iter().skip(1).map(|(_, age)| *age).collect();
+        [0.5, 0.99, 1.0].map(|share| quantile(&mut ages_ms, share))
+    }
+
+    /// See [`snapshots_lost`].
+    pub fn snapshots_lost(&self) -> u64 {
+        snapshots_lost(&self.words)
+    }
+
+    pub fn words(&self, line: &str) -> String {
+        let [median, most, oldest] = self.ages_ms();
+        format!(
+            "{line}: {} records, {} missing; {} snapshots, {} lost, p50 {median:.1}, p99 {most:.1} ms old, the oldest {oldest:.0} ms\n{}",
+            self.records.len(),
+            self.missing(),
+            self.snapshots.len(),
+            self.snapshots_lost(),
+            self.words
+        )
+    }
+
+    /// Every record, and the words of the member agree.
+    pub fn has_every_record(&self) {
+        assert!(self.records.len() > 500, "{} records", self.records.len());
+        assert_eq!(self.missing(), 0);
+        assert!(self.words.contains(" 0 records lost"), "{}", self.words);
+    }
+}
+
+/// Snapshots that never came since the member joined, of the words of `relay lease status` there.
+pub fn snapshots_lost(words: &str) -> u64 {
+    let before = words.split(" snapshots lost").next();
+    let number = before.and_then(|words| words.rsplit(' ').next());
+    number.and_then(|n| n.parse().ok()).unwrap_or_else(|| panic!("{words}"))
+}
+
+/// Waits for a host's first snapshots: the scene of a core, which is large, comes before them.
+pub fn settle(far: &Named) {
+    until(Duration::from_secs(10), || {
+        let end = Instant::now() + Duration::from_millis(300);
+        pictures(&far.0, end).len() > 5
+    });
+}
