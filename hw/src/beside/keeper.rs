@@ -38,6 +38,9 @@ pub trait Connect: Sized + Send + 'static {
 /// Takes the first result: a description, or why there is no connection.
 type First<C> = mpsc::Sender<Result<<C as Connect>::Description, <C as Connect>::Error>>;
 
+/// Gets the first result.
+pub type Opened<C> = mpsc::Receiver<Result<<C as Connect>::Description, <C as Connect>::Error>>;
+
 /// What every keeper has.
 pub struct Keeper<C: Connect> {
     stop: Arc<AtomicBool>,
@@ -55,11 +58,7 @@ pub struct KeeperThread {
 }
 
 /// Starts the thread. The receiver gets the result of the first attempt; when it fails, the thread ends.
-pub fn spawn<C: Connect>(
-    name: &str,
-    connect: C,
-    report: Report,
-) -> (KeeperThread, mpsc::Receiver<Result<C::Description, C::Error>>) {
+pub fn spawn<C: Connect>(name: &str, connect: C, report: Report) -> (KeeperThread, Opened<C>) {
     let stop = Arc::<AtomicBool>::default();
     let (first, opened) = mpsc::channel();
     let (end, ended) = mpsc::channel();
