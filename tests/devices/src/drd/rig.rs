@@ -122,7 +122,9 @@ impl Rig {
                 let _ = self.bridge.haptic_orders.push(HapticOrder::Engage { ticket: 0 });
             }
         }
-        (0..250).for_each(|_| drop(self.tick()));
+        for _ in 0..250 {
+            self.tick();
+        }
         let seen = self.move_to(PRESSED_M);
         seen.fault() == Fault::None && (1.0..8.5).contains(&seen.motors_n)
     }
