@@ -9,6 +9,8 @@ pub enum BackendKind {
     Phantom,
     /// A recorded motion.
     Replay,
+    /// A device of Force Dimension, or a Novint Falcon.
+    ForceDimension,
 }
 
 /// What may follow the name, behind a colon.
@@ -35,6 +37,8 @@ pub struct Backend {
     pub argument: Argument,
     /// One line for help texts.
     pub help: &'static str,
+    /// Nobody has tried it on the device itself, only on a fake of its driver.
+    pub untried: bool,
 }
 
 /// Every back end, the default first.
@@ -45,6 +49,7 @@ pub const BACKENDS: &[Backend] = &[
         aliases: &["sim"],
         argument: Argument::None,
         help: "a simulated Phantom Premium 1.5 in the grip of a simulated hand",
+        untried: false,
     },
     Backend {
         kind: BackendKind::Phantom,
@@ -52,6 +57,7 @@ pub const BACKENDS: &[Backend] = &[
         aliases: &[],
         argument: Argument::Optional("NAME"),
         help: "a Phantom through OpenHaptics: the driver's default device, or the one called NAME",
+        untried: true,
     },
     Backend {
         kind: BackendKind::Replay,
@@ -59,6 +65,15 @@ pub const BACKENDS: &[Backend] = &[
         aliases: &[],
         argument: Argument::Required("FILE"),
         help: "a recorded motion (from 'host-ui export --motion')",
+        untried: false,
+    },
+    Backend {
+        kind: BackendKind::ForceDimension,
+        name: "force-dimension",
+        aliases: &["drd"],
+        argument: Argument::Optional("NUMBER"),
+        help: "an omega, delta or sigma of Force Dimension, or a Falcon: the first one, or the one with this number, from 0",
+        untried: true,
     },
 ];
 
@@ -91,28 +106,33 @@ pub fn parse(text: &str) -> Result<(BackendKind, Option<&str>), UnknownBackend> 
         .ok_or_else(|| UnknownBackend(text.to_owned()))
 }
 
-/// Every accepted form, for messages: `simulated, phantom, phantom:NAME or replay:FILE`.
+/// Every accepted form, for messages.
 pub fn forms() -> String {
-    let mut forms = Vec::new();
-    for b in BACKENDS {
-        match b.argument {
-            Argument::None => forms.push(b.name.to_owned()),
-            Argument::Optional(shown) => forms.extend([b.name.to_owned(), format!("{}:{shown}", b.name)]),
-            Argument::Required(shown) => forms.push(format!("{}:{shown}", b.name)),
-        }
-    }
+    let mut forms: Vec<_> = BACKENDS.iter().flat_map(forms_of).collect();
     let last = forms.pop().unwrap_or_default();
     format!("{} or {last}", forms.join(", "))
 }
 
 /// The forms of every back end with their help, one per line.
 pub fn help() -> String {
-    let line = |b: &Backend| match b.argument {
-        Argument::None => format!("{}: {}", b.name, b.help),
-        Argument::Optional(shown) => format!("{0} or {0}:{shown}: {1}", b.name, b.help),
-        Argument::Required(shown) => format!("{}:{shown}: {}", b.name, b.help),
-    };
+    let line = |b: &Backend| format!("{}: {}{}", forms_of(b).join(" or "), b.help, b.untried_text());
     BACKENDS.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+impl Backend {
+    /// What help texts add where nobody has tried the back end on the device; else nothing.
+    pub fn untried_text(&self) -> &'static str {
+        if self.untried { " (not tried on the device)" } else { "" }
+    }
+}
+
+/// Every accepted form of one back end.
+pub fn forms_of(b: &Backend) -> Vec<String> {
+    match b.argument {
+        Argument::None => vec![b.name.to_owned()],
+        Argument::Optional(shown) => vec![b.name.to_owned(), format!("{}:{shown}", b.name)],
+        Argument::Required(shown) => vec![format!("{}:{shown}", b.name)],
+    }
 }
 
 #[cfg(test)]
@@ -148,6 +168,9 @@ mod tests {
         let help = help();
         assert_eq!(help.lines().count(), BACKENDS.len());
         assert!(help.contains("phantom or phantom:NAME: a Phantom"), "{help}");
+        for (line, b) in help.lines().zip(BACKENDS) {
+            assert_eq!(line.ends_with("(not tried on the device)"), b.untried, "{line}");
+        }
     }
 
     #[test]
@@ -165,9 +188,6 @@ mod tests {
             assert_eq!(parse(wrong), Err(UnknownBackend(wrong.to_owned())));
         }
         let text = UnknownBackend("falcon".to_owned()).to_string();
-        assert!(
-            text.contains("simulated, phantom, phantom:NAME or replay:FILE"),
-            "{text}"
-        );
+        assert!(text.contains("simulated, phantom, phantom:NAME, replay:FILE"), "{text}");
     }
 }

@@ -35,18 +35,20 @@ pub fn millinewton_metres_from_newton_metres(torque_nm: &Vector3<f64>) -> Vector
 /// Position (m) and orientation from a driver's homogeneous transform: column-major, in millimetres.
 /// `None` if it is not finite or its upper block is not close to a rotation.
 pub fn pose_from_column_major_mm(transform: &[f64; 16]) -> Option<(Vector3<f64>, UnitQuaternion<f64>)> {
-    if transform.iter().any(|x| !x.is_finite()) {
-        return None;
-    }
     let &[xx, xy, xz, _, yx, yy, yz, _, zx, zy, zz, _, px, py, pz, _] = transform;
     let rotation = Matrix3::new(xx, yx, zx, xy, yy, zy, xz, yz, zz);
-    let defect = (rotation.transpose() * rotation - Matrix3::identity()).norm();
-    if defect > 1e-3 || rotation.determinant() < 0.0 {
-        return None;
-    }
-    let orientation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+    let orientation = orientation_from_matrix(&rotation)?;
     let tip = metres_from_millimetres(&Vector3::new(px, py, pz));
-    Some((tip, orientation))
+    let finite = transform.iter().all(|x| x.is_finite());
+    finite.then_some((tip, orientation))
+}
+
+/// Orientation from a driver's matrix; `None` if it is not close to a rotation.
+pub fn orientation_from_matrix(rotation: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
+    let defect = (rotation.transpose() * rotation - Matrix3::identity()).norm();
+    // Numbers that are not finite fail the first comparison.
+    let proper = defect <= 1e-3 && rotation.determinant() > 0.0;
+    proper.then(|| UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*rotation)))
 }
 
 #[cfg(test)]

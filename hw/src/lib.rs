@@ -6,16 +6,28 @@
 #![warn(missing_docs)]
 
 pub mod backend;
+mod beside;
 pub mod conformance;
 pub mod convert;
 pub mod device;
+pub mod drd;
+mod finding;
 pub mod libhd;
+mod library;
+mod placement;
 pub mod replay;
 pub mod sim;
+mod usb;
 
 pub use backend::BackendKind;
+pub use beside::arm::{Arm, ArmError};
+pub use beside::keeper::Report;
 pub use device::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
+pub use drd::{ForceDimension, ForceDimensionConfig};
+pub use finding::{Finding, Severity};
 pub use libhd::{Phantom, PhantomConfig};
+pub use library::{Driver, LoadError, LoadFailure};
+pub use placement::{Axes, Placement};
 pub use replay::ReplayDevice;
 pub use sim::hand::{Effort, Hand};
 pub use sim::link::{BadLink, LinkFaults};

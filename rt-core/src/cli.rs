@@ -7,13 +7,14 @@ use std::path::PathBuf;
 use stylet_lab::args::LatencyArgs;
 use stylet_lab::campaign::CampaignArgs;
 use stylet_lab::credibility::CredibilityArgs;
+use stylet_lab::devices::DevicesArgs;
 use stylet_lab::doctor::DoctorArgs;
 use stylet_lab::fleet::FleetArgs;
 use stylet_lab::load::LoadProcess;
 use stylet_lab::verify::VerifyArgs;
 use stylet_manual::ManualArgs;
 use stylet_runtime::args::{OptionsError, RealTimeArgs, scenes};
-use stylet_runtime::device::{self, DeviceChoice};
+use stylet_runtime::device::{self, DeviceChoice, Libraries};
 use stylet_runtime::process::Options;
 use stylet_shm_schema::BUILTIN_SCENES;
 use stylet_sim::scene::TissueKind;
@@ -48,6 +49,8 @@ pub enum Task {
     Credibility(CredibilityArgs),
     /// Check whether this PC is fit for the force loop, and what to change; change it, measured before and after; undo it
     Doctor(DoctorArgs),
+    /// List the haptic devices that can be used: what of each is there, what it says, and what is missing
+    Devices(DevicesArgs),
     /// Show a flight recording, repeat it, and check that all forces and positions are bit-identical
     Replay(Replay),
     /// Run thousands of insertions over scenes, plans, hands and tissues, in shards that make Parquet files
@@ -104,6 +107,9 @@ pub struct RunArgs {
     /// The driver's library libHD.so [default: STYLET_LIBHD, else where the system has it]
     #[arg(long, value_name = "PATH")]
     libhd: Option<PathBuf>,
+    /// The library of the Force Dimension SDK, libdrd.so or libdhd.so [default: STYLET_LIBDRD, else where the system has it]
+    #[arg(long, value_name = "PATH")]
+    libdrd: Option<PathBuf>,
     /// On exit write to FILE, as JSON, what each loop cost
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
@@ -121,8 +127,7 @@ impl RunArgs {
         let mut options = self.real_time.options(&self.instance)?;
         options.tissue = self.tissue;
         options.device = self.device.clone();
-        let from_environment = || std::env::var_os("STYLET_LIBHD").map(PathBuf::from);
-        options.libhd = self.libhd.clone().or_else(from_environment);
+        options.libraries = Libraries::or_of_environment(self.libhd.as_deref(), self.libdrd.as_deref());
         if let Some(folder) = &self.flight_dir {
             options.flight_folder = folder.clone();
         }

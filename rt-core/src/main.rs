@@ -7,7 +7,7 @@ use std::error::Error;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stylet_lab::{campaign, credibility, doctor, fleet, latency, load, verify};
+use stylet_lab::{campaign, credibility, devices, doctor, fleet, latency, load, verify};
 use stylet_shm_schema::service::Instance;
 use stylet_sim::scene::Scene;
 
@@ -32,6 +32,7 @@ fn carry_out(cli: &Cli) -> Result<u8, Box<dyn Error>> {
         Some(Task::Fleet(args)) => fleet::run(args)?,
         Some(Task::Credibility(args)) => credibility::run(args)?,
         Some(Task::Doctor(args)) => doctor::run(args, &*stop_on_signal()?)?,
+        Some(Task::Devices(args)) => devices::run(args),
         Some(Task::Replay(replay)) => u8::from(!replay.run()?),
         #[cfg(feature = "study")]
         Some(Task::Study(args)) => args.run(&*stop_on_signal()?)?,

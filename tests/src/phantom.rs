@@ -1,24 +1,14 @@
 //! A Phantom that is not there: the fake `libHD.so`, found and commanded.
 
-use fake_hd::Control;
-use libloading::os::unix::Library;
+use fake_hd::{Block, Control};
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
-use stylet_hw::libhd::Placement;
-use stylet_hw::{Device, DeviceFault, Phantom, PhantomConfig, Sample, Wrench};
+use stylet_hw::{Axes, Device, DeviceFault, Phantom, PhantomConfig, Placement, Sample, Wrench};
 
-/// The built library. Cargo puts it beside the tests, or one folder up when it was built by itself; the newer one counts.
+/// The built library.
 pub fn library() -> PathBuf {
-    let test = std::env::current_exe().expect("a test knows its own file");
-    let deps = test.parent().expect("tests live in <target>/<profile>/deps");
-    let folders = [Some(deps), deps.parent()];
-    let found = folders.into_iter().flatten().map(|folder| folder.join("libfake_hd.so"));
-    let age = |path: &PathBuf| path.metadata().and_then(|m| m.modified()).ok();
-    found
-        .filter(|path| path.exists())
-        .max_by_key(age)
-        .expect("libfake_hd.so is missing: run `cargo build --release --workspace` first")
+    fake_control::library("libfake_hd.so")
 }
 
 /// The fake of this process: one at a time.
@@ -32,16 +22,7 @@ impl Fake {
     pub fn new() -> Self {
         static ALONE: Mutex<()> = Mutex::new(());
         let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-        // SAFETY: our own library; it has no constructors.
-        let library = unsafe { Library::new(library()) }.expect("the fake can be loaded");
-        // SAFETY: the function has this type, and its block is never freed.
-        let control = unsafe {
-            let get = library
-                .get::<extern "C" fn() -> *const Control>(b"fake_control")
-                .expect("exported");
-            &*get()
-        };
-        std::mem::forget(library);
+        let control: &Control = fake_control::block_of(&library());
         control.reset();
         Self { control, _alone: alone }
     }
@@ -64,7 +45,7 @@ pub fn config() -> PhantomConfig {
     PhantomConfig {
         library: Some(library()),
         name: None,
-        placement: Placement::facing_patient(nalgebra::Vector3::zeros()),
+        placement: Placement::facing_patient(Axes::OPEN_HAPTICS, nalgebra::Vector3::zeros()),
         servo_hz: 1000,
     }
 }

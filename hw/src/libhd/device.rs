@@ -1,16 +1,18 @@
 //! A Phantom as a [`Device`]: wait-free ends for the force loop.
 
-use core::time::Duration;
 use std::path::PathBuf;
-use std::sync::mpsc;
 
+use crate::beside::arm::Arm;
+use crate::beside::ends::{self, ForceLoopEnd};
+use crate::beside::keeper::{self, KeeperThread, Report};
+use crate::beside::open;
 use crate::device::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
-use crate::libhd::connector::{Connector, ConnectorThread, Report};
-use crate::libhd::exchange::{Command, Readings};
-use crate::libhd::ffi::{Api, LoadError};
-use crate::libhd::frame::Placement;
-use crate::libhd::servo::{Arm, Inner, Servo, State};
+use crate::libhd::connector::Connector;
+use crate::libhd::exchange::Readings;
+use crate::libhd::ffi::Api;
+use crate::libhd::servo::{Inner, Servo, State};
 use crate::libhd::session::{ConnectionError, Description};
+use crate::placement::Placement;
 
 /// Which device to open, and its place in the world.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,29 +29,14 @@ pub struct PhantomConfig {
 }
 
 /// Why a Phantom could not be opened; the text says what to do.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum OpenError {
-    /// The driver's library cannot be loaded.
-    #[error(transparent)]
-    Load(#[from] LoadError),
-    /// There is no connection to a device.
-    #[error(transparent)]
-    Connection(#[from] ConnectionError),
-    /// The driver does not return from initialisation.
-    #[error("the driver does not answer: check the device's power and cable, then try again")]
-    NoAnswer,
-}
-
-const OPEN_LIMIT: Duration = Duration::from_secs(15);
+pub type OpenError = open::OpenError<ConnectionError>;
 
 /// A Phantom; see the module [`libhd`](crate::libhd). Dropping it leaves zero force and a disabled device.
 pub struct Phantom {
     description: Description,
     servo: &'static Servo,
-    samples: triple_buffer::Output<Option<Sample>>,
-    commands: triple_buffer::Input<Command>,
-    number: u64,
-    _connector: ConnectorThread,
+    end: ForceLoopEnd,
+    _keeper: KeeperThread,
 }
 
 impl Phantom {
@@ -65,31 +52,23 @@ impl Phantom {
 
     /// As [`open`](Self::open), with a library that is already loaded.
     pub fn open_with(api: Api, config: PhantomConfig, arm: Arm, report: Report) -> Result<Self, OpenError> {
-        let (sample_in, samples) = triple_buffer::triple_buffer(&None);
-        let (commands, command_out) = triple_buffer::triple_buffer(&Command::default());
+        let (end, servo_end) = ends::pair();
         // Never freed, see `Servo`.
         let servo: &'static Servo = Box::leak(Box::new(Servo::new(Inner {
             api,
             placement: config.placement,
             arm,
-            samples: sample_in,
-            commands: command_out,
+            end: servo_end,
             servo_hz: config.servo_hz,
             state: State::default(),
         })));
-        let (first, opened) = mpsc::channel();
-        let connector = Connector::new(api, servo, config, report).spawn(first);
-        let description = match opened.recv_timeout(OPEN_LIMIT) {
-            Ok(description) => description?,
-            Err(_) => return Err(OpenError::NoAnswer),
-        };
+        let (keeper, opened) = keeper::spawn("phantom", Connector::new(api, servo, config), report);
+        let description = open::first(&opened)?;
         Ok(Self {
             description,
             servo,
-            samples,
-            commands,
-            number: 0,
-            _connector: connector,
+            end,
+            _keeper: keeper,
         })
     }
 
@@ -102,14 +81,6 @@ impl Phantom {
     pub fn readings(&self) -> Readings {
         self.servo.shared.readings()
     }
-
-    fn command(&mut self, wrench: Wrench) {
-        self.number += 1;
-        self.commands.write(Command {
-            wrench,
-            number: self.number,
-        });
-    }
 }
 
 impl Device for Phantom {
@@ -118,19 +89,10 @@ impl Device for Phantom {
     }
 
     fn read(&mut self, _dt_s: f64) -> Result<Sample, DeviceFault> {
-        match self.servo.shared.fault() {
-            Some(fault) => Err(fault),
-            None => self.samples.read().ok_or(DeviceFault::NotConnected),
-        }
+        self.end.read(self.servo.shared.fault.get())
     }
 
     fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceFault> {
-        if !wrench.is_finite() {
-            self.command(Wrench::zero());
-            return Err(DeviceFault::NonFiniteWrench);
-        }
-        // While there is a fault, which `read` reports, the servo thread exerts no force.
-        self.command(wrench.within(&self.description.info));
-        Ok(())
+        self.end.write(&self.description.info, wrench)
     }
 }

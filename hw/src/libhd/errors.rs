@@ -1,46 +1,9 @@
 //! The driver's errors: number, name, and what each means for the force.
 
+use crate::beside::errors::{find, pause, reconnect};
 use crate::device::DeviceFault;
 
-/// How the servo loop responds to an error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Response {
-    /// Turn the force off until the error has not returned for a while; the connection holds.
-    Pause,
-    /// The connection is lost: stop, disable, initialise again.
-    Reconnect,
-}
-
-/// An error of the interface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct KnownError {
-    /// Its number.
-    pub code: u32,
-    /// Its name in the vendor's documentation.
-    pub name: &'static str,
-    /// The fault that the force loop sees.
-    pub fault: DeviceFault,
-    /// How the servo loop responds.
-    pub response: Response,
-}
-
-const fn pause(code: u32, name: &'static str, fault: DeviceFault) -> KnownError {
-    KnownError {
-        code,
-        name,
-        fault,
-        response: Response::Pause,
-    }
-}
-
-const fn reconnect(code: u32, name: &'static str, fault: DeviceFault) -> KnownError {
-    KnownError {
-        code,
-        name,
-        fault,
-        response: Response::Reconnect,
-    }
-}
+pub use crate::beside::errors::{KnownError, Response};
 
 /// No error.
 pub const SUCCESS: u32 = 0;
@@ -78,10 +41,7 @@ pub const KNOWN: &[KnownError] = &[
 
 /// The entry of `code`; an unknown number pauses the force as a driver's error.
 pub fn known(code: u32) -> KnownError {
-    let found = KNOWN.iter().find(|k| k.code == code);
-    found
-        .copied()
-        .unwrap_or(pause(code, "unknown error", DeviceFault::Driver))
+    find(KNOWN, code)
 }
 
 /// What the operator can do about the error.

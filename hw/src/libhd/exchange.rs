@@ -1,19 +1,14 @@
 //! State that the servo thread, the force loop and the connector thread share without waiting.
 //!
-//! All atomics of the back end and their orderings stand here, except the two flags that guard a thread's entry and end
-//! ([`servo`](super::servo), [`connector`](super::connector)).
+//! All atomics of the back end and their orderings stand here, except the flag that guards a servo thread's entry
+//! ([`servo`](super::servo)) and what all back ends share ([`beside`](crate::beside)).
 
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
-use crate::device::{DeviceFault, Wrench};
+use crate::beside::ends::FaultCell;
+use crate::beside::loss::Errors;
+use crate::device::DeviceFault;
 use crate::libhd::ffi::{Handle, INVALID_HANDLE};
-
-/// The newest wrench, and how many have been written.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Command {
-    pub wrench: Wrench,
-    pub number: u64,
-}
 
 /// The device that a callback serves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,14 +33,10 @@ pub struct Shared {
     calls: AtomicU64,
     /// Servo: callbacks that wrote zero because of `release` or `lost`.
     released: AtomicU64,
-    /// Servo, and the connector while no callback runs: a [`DeviceFault`] by number, 0 for none.
-    fault: AtomicU32,
-    /// Servo sets it when the connection is lost, and the connector when the servo loop is silent; the connector clears it.
-    lost: AtomicBool,
-    /// Servo: the driver's last error, 0 for none.
-    error: AtomicU32,
-    /// Servo: number of errors.
-    errors: AtomicU64,
+    /// Servo, and the connector while no callback runs.
+    pub fault: FaultCell,
+    /// Servo, and the connector when the servo loop is silent.
+    pub errors: Errors,
     /// Servo: `f64` bits, as the two that follow.
     temperature: AtomicU64,
     speed: AtomicU64,
@@ -61,10 +52,8 @@ impl Default for Shared {
             arm: AtomicBool::new(false),
             calls: AtomicU64::new(0),
             released: AtomicU64::new(0),
-            fault: AtomicU32::new(DeviceFault::NotConnected.code()),
-            lost: AtomicBool::new(false),
-            error: AtomicU32::new(0),
-            errors: AtomicU64::new(0),
+            fault: FaultCell::default(),
+            errors: Errors::default(),
             temperature: AtomicU64::new(0),
             speed: AtomicU64::new(0),
             worst_callback: AtomicU64::new(0),
@@ -98,7 +87,7 @@ impl Shared {
         // SYNC: relaxed; the release store below publishes these four.
         self.torques.store(served.torques, Ordering::Relaxed);
         self.handle.store(served.handle, Ordering::Relaxed);
-        self.lost.store(false, Ordering::Relaxed);
+        self.errors.clear_lost();
         self.arm.store(true, Ordering::Relaxed);
         // SYNC: release pairs with the acquire load in `served`: a callback that may exert a force sees the four above.
         self.release.store(false, Ordering::Release);
@@ -121,14 +110,6 @@ impl Shared {
         // SYNC: relaxed; only a change of the number is looked for. Its partner is `count_call`.
         self.calls.load(Ordering::Relaxed)
     }
-
-    /// The driver's error behind a lost connection, if the connection is lost.
-    pub fn lost(&self) -> Option<u32> {
-        // SYNC: acquire pairs with the release in `set_lost`: the error that caused the loss is visible.
-        self.lost
-            .load(Ordering::Acquire)
-            .then(|| self.error.load(Ordering::Relaxed))
-    }
 }
 
 /// Calls of the servo thread.
@@ -144,9 +125,7 @@ impl Shared {
         // SYNC: acquire pairs with the release store in `serve`; it comes before every other load of this function and
         // before `take_arm`.
         let release = self.release.load(Ordering::Acquire);
-        // SYNC: relaxed; set by this thread, or by the connector, which then needs no more than that it arrives.
-        let lost = self.lost.load(Ordering::Relaxed);
-        (!release && !lost).then(|| self.last_served())
+        (!release && !self.errors.is_lost()).then(|| self.last_served())
     }
 
     /// The device that was served last, whether it is released or not.
@@ -168,13 +147,6 @@ impl Shared {
     pub fn count_released(&self) {
         // SYNC: release pairs with the acquire in `released`.
         self.released.fetch_add(1, Ordering::Release);
-    }
-
-    /// Notes an error of the driver.
-    pub fn note_error(&self, code: u32) {
-        // SYNC: relaxed; `set_lost` publishes the code where that matters, the count is for display.
-        self.error.store(code, Ordering::Relaxed);
-        self.errors.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Notes the temperature of the warmest motor, 0 to 1.
@@ -201,36 +173,15 @@ impl Shared {
 
 /// Calls of more than one thread.
 impl Shared {
-    /// Declares the connection lost. Servo thread, or the connector when the servo loop is silent.
-    pub fn set_lost(&self) {
-        // SYNC: release pairs with the acquire in `lost`.
-        self.lost.store(true, Ordering::Release);
-    }
-
-    /// Present fault, for the force loop and the connector.
-    pub fn fault(&self) -> Option<DeviceFault> {
-        // SYNC: acquire pairs with the release in `set_fault`: without a fault, the sample taken before is visible.
-        match self.fault.load(Ordering::Acquire) {
-            0 => None,
-            code => Some(DeviceFault::try_from(code).unwrap_or(DeviceFault::Driver)),
-        }
-    }
-
-    /// Sets or clears the fault. Servo thread, or the connector while no callback runs.
-    pub fn set_fault(&self, fault: Option<DeviceFault>) {
-        // SYNC: release pairs with the acquire in `fault`.
-        self.fault.store(fault.map_or(0, DeviceFault::code), Ordering::Release);
-    }
-
     /// Everything for display. The values may stem from different ticks.
     pub fn readings(&self) -> Readings {
         // SYNC: relaxed; every value stands for itself. The partners are the `note_` functions.
         let number = |bits: &AtomicU64| f64::from_bits(bits.load(Ordering::Relaxed));
         Readings {
             calls: self.calls(),
-            fault: self.fault(),
-            error: self.error.load(Ordering::Relaxed),
-            errors: self.errors.load(Ordering::Relaxed),
+            fault: self.fault.get(),
+            error: self.errors.last(),
+            errors: self.errors.count(),
             temperature: number(&self.temperature),
             speed_m_per_s: number(&self.speed),
             worst_callback_s: number(&self.worst_callback),
@@ -243,20 +194,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_fault_survives_the_way_through_its_number() {
-        let shared = Shared::default();
-        assert_eq!(shared.fault(), Some(DeviceFault::NotConnected));
-        for code in 1..=9 {
-            let fault = DeviceFault::try_from(code).expect("numbers 1 to 9 are faults");
-            shared.set_fault(Some(fault));
-            assert_eq!(shared.fault(), Some(fault));
-        }
-        shared.set_fault(None);
-        assert_eq!(shared.fault(), None);
-        assert!(DeviceFault::try_from(0).is_err() && DeviceFault::try_from(10).is_err());
-    }
-
-    #[test]
     fn a_callback_serves_only_between_serve_and_release_or_loss() {
         let shared = Shared::default();
         let served = Served {
@@ -267,11 +204,11 @@ mod tests {
         shared.serve(served);
         assert_eq!(shared.served(), Some(served));
         assert_eq!((shared.take_arm(), shared.take_arm()), (true, false), "armed once");
-        shared.note_error(0x0302);
-        shared.set_lost();
-        assert_eq!((shared.served(), shared.lost()), (None, Some(0x0302)));
+        shared.errors.note(0x0302);
+        shared.errors.set_lost();
+        assert_eq!((shared.served(), shared.errors.lost()), (None, Some(0x0302)));
         shared.serve(served);
-        assert_eq!((shared.served(), shared.lost()), (Some(served), None));
+        assert_eq!((shared.served(), shared.errors.lost()), (Some(served), None));
         shared.request_release();
         assert_eq!((shared.served(), shared.last_served()), (None, served));
     }

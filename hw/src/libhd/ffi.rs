@@ -1,15 +1,13 @@
 //! The C interface of `libHD.so`, as OpenHaptics 3.00 to 3.30 have it, loaded at run time.
 //!
 //! Types, numbers and the 36 functions are facts of the vendor's interface (HDAPI reference; names checked against the
-//! symbols of `libHD.so.3.0.0`). The library stays loaded until the process ends: its driver fails when it is loaded a
-//! second time after it was closed.
+//! symbols of `libHD.so.3.0.0`).
 
 #![allow(non_snake_case)]
 
 use core::ffi::{c_char, c_int, c_long, c_ulong, c_ushort, c_void};
-use std::path::{Path, PathBuf};
 
-use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_LAZY};
+use crate::library::{Driver, functions};
 
 /// Handle of a device; [`INVALID_HANDLE`] for none.
 pub type Handle = u32;
@@ -113,136 +111,50 @@ pub mod style {
     pub const INKWELL: u32 = 4;
 }
 
-macro_rules! functions {
-    ($(fn $name:ident($($argument:ty),*) $(-> $result:ty)?;)*) => {
-        /// Every function of the library.
-        #[derive(Clone, Copy)]
-        pub struct Api {
-            $(
-                #[doc = concat!("`", stringify!($name), "` of the HDAPI reference.")]
-                pub $name: unsafe extern "system" fn($($argument),*) $(-> $result)?,
-            )*
-        }
-
-        /// Names of the functions, in the order of [`Api`].
-        pub const FUNCTIONS: &[&str] = &[$(stringify!($name)),*];
-
-        impl Api {
-            /// All functions, or every name that the library lacks.
-            fn from_library(library: &Library) -> Result<Self, Vec<&'static str>> {
-                let missing: Vec<_> = FUNCTIONS.iter().copied().filter(|name| {
-                    // SAFETY: only the presence of the symbol is checked; it is not used.
-                    unsafe { library.get::<*mut c_void>(name.as_bytes()) }.is_err()
-                }).collect();
-                $(
-                    // SAFETY: the type is that of the vendor's interface, which has not changed from 3.00 to 3.30.
-                    let $name = unsafe {
-                        library.get::<unsafe extern "system" fn($($argument),*) $(-> $result)?>(stringify!($name).as_bytes())
-                    };
-                )*
-                match ($($name,)*) {
-                    ($(Ok($name),)*) => Ok(Self { $($name: *$name,)* }),
-                    _ => Err(missing),
-                }
-            }
-        }
-    };
-}
+/// The library, and the names under which it is installed.
+pub const DRIVER: Driver = Driver {
+    name: "OpenHaptics (libHD.so)",
+    files: &["libHD.so", "libHD.so.3.0", "libHD.so.3.4"],
+};
 
 functions! {
-    fn hdInitDevice(*const c_char) -> Handle;
-    fn hdDisableDevice(Handle);
-    fn hdMakeCurrentDevice(Handle);
-    fn hdGetCurrentDevice() -> Handle;
-    fn hdBeginFrame(Handle);
-    fn hdEndFrame(Handle);
-    fn hdGetError() -> ErrorInfo;
-    fn hdGetErrorString(u32) -> *const c_char;
-    fn hdEnable(Enum);
-    fn hdDisable(Enum);
-    fn hdIsEnabled(Enum) -> u8;
-    fn hdGetBooleanv(Enum, *mut u8);
-    fn hdGetIntegerv(Enum, *mut c_int);
-    fn hdGetFloatv(Enum, *mut f32);
-    fn hdGetDoublev(Enum, *mut f64);
-    fn hdGetLongv(Enum, *mut c_long);
-    fn hdGetString(Enum) -> *const c_char;
-    fn hdSetBooleanv(Enum, *const u8);
-    fn hdSetIntegerv(Enum, *const c_int);
-    fn hdSetFloatv(Enum, *const f32);
-    fn hdSetDoublev(Enum, *const f64);
-    fn hdSetLongv(Enum, *const c_long);
-    fn hdCheckCalibration() -> Enum;
-    fn hdCheckCalibrationStyle() -> Enum;
-    fn hdUpdateCalibrationMessage(Enum);
-    fn hdUpdateCalibration(Enum);
-    fn hdScaleGimbalAngles(f64, f64, f64, *mut f64);
-    fn hdDeploymentLicense(*const c_char, *const c_char, *const c_char) -> u8;
-    fn hdStartScheduler();
-    fn hdStopScheduler();
-    fn hdSetSchedulerRate(c_ulong);
-    fn hdScheduleSynchronous(Callback, *mut c_void, c_ushort);
-    fn hdScheduleAsynchronous(Callback, *mut c_void, c_ushort) -> Schedule;
-    fn hdUnschedule(Schedule);
-    fn hdWaitForCompletion(Schedule, u32) -> u8;
-    fn hdGetSchedulerTimeStamp() -> f64;
-}
-
-/// Names under which the library is installed, in the order in which they are tried.
-pub const LIBRARY_NAMES: &[&str] = &["libHD.so", "libHD.so.3.0", "libHD.so.3.4"];
-
-/// Why no library could be loaded: each name that was tried, with the reason.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("OpenHaptics (libHD.so) cannot be loaded{}", attempts(.0))]
-pub struct LoadError(pub Vec<(PathBuf, LoadFailure)>);
-
-/// Why one library could not be loaded.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum LoadFailure {
-    /// The message of the dynamic loader, unaltered.
-    #[error("{0}")]
-    Loader(String),
-    /// The library lacks these functions.
-    #[error("not OpenHaptics 3: it lacks {}", .0.join(", "))]
-    Incomplete(Vec<&'static str>),
-}
-
-fn attempts(tried: &[(PathBuf, LoadFailure)]) -> String {
-    let line = |(name, why): &(PathBuf, LoadFailure)| format!("\n  {}: {why}", name.display());
-    tried.iter().map(line).collect()
-}
-
-impl Api {
-    /// Loads the library at `path`, or the first of [`LIBRARY_NAMES`] that can be loaded, and never closes it.
-    pub fn load(path: Option<&Path>) -> Result<Self, LoadError> {
-        let names: Vec<PathBuf> = match path {
-            Some(path) => vec![path.to_owned()],
-            None => LIBRARY_NAMES.iter().map(PathBuf::from).collect(),
-        };
-        let mut tried = Vec::new();
-        for name in names {
-            match Self::load_one(&name) {
-                Ok(api) => return Ok(api),
-                Err(why) => tried.push((name, why)),
-            }
-        }
-        Err(LoadError(tried))
+    required {
+        fn hdInitDevice(*const c_char) -> Handle;
+        fn hdDisableDevice(Handle);
+        fn hdMakeCurrentDevice(Handle);
+        fn hdGetCurrentDevice() -> Handle;
+        fn hdBeginFrame(Handle);
+        fn hdEndFrame(Handle);
+        fn hdGetError() -> ErrorInfo;
+        fn hdGetErrorString(u32) -> *const c_char;
+        fn hdEnable(Enum);
+        fn hdDisable(Enum);
+        fn hdIsEnabled(Enum) -> u8;
+        fn hdGetBooleanv(Enum, *mut u8);
+        fn hdGetIntegerv(Enum, *mut c_int);
+        fn hdGetFloatv(Enum, *mut f32);
+        fn hdGetDoublev(Enum, *mut f64);
+        fn hdGetLongv(Enum, *mut c_long);
+        fn hdGetString(Enum) -> *const c_char;
+        fn hdSetBooleanv(Enum, *const u8);
+        fn hdSetIntegerv(Enum, *const c_int);
+        fn hdSetFloatv(Enum, *const f32);
+        fn hdSetDoublev(Enum, *const f64);
+        fn hdSetLongv(Enum, *const c_long);
+        fn hdCheckCalibration() -> Enum;
+        fn hdCheckCalibrationStyle() -> Enum;
+        fn hdUpdateCalibrationMessage(Enum);
+        fn hdUpdateCalibration(Enum);
+        fn hdScaleGimbalAngles(f64, f64, f64, *mut f64);
+        fn hdDeploymentLicense(*const c_char, *const c_char, *const c_char) -> u8;
+        fn hdStartScheduler();
+        fn hdStopScheduler();
+        fn hdSetSchedulerRate(c_ulong);
+        fn hdScheduleSynchronous(Callback, *mut c_void, c_ushort);
+        fn hdScheduleAsynchronous(Callback, *mut c_void, c_ushort) -> Schedule;
+        fn hdUnschedule(Schedule);
+        fn hdWaitForCompletion(Schedule, u32) -> u8;
+        fn hdGetSchedulerTimeStamp() -> f64;
     }
-
-    fn load_one(name: &Path) -> Result<Self, LoadFailure> {
-        // SAFETY: runs the constructors of a library that the operator installed for this purpose.
-        let library = unsafe { Library::open(Some(name), RTLD_LAZY | RTLD_GLOBAL) }
-            .map_err(|e| LoadFailure::Loader(message(&e)))?;
-        let api = Self::from_library(&library).map_err(LoadFailure::Incomplete);
-        core::mem::forget(library);
-        api
-    }
-}
-
-/// The message of the dynamic loader.
-fn message(error: &libloading::Error) -> String {
-    match error {
-        libloading::Error::DlOpen { desc } => format!("{desc:?}").trim_matches('"').to_owned(),
-        other => other.to_string(),
-    }
+    optional {}
 }

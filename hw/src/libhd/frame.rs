@@ -1,48 +1,6 @@
-//! Place of the device in the world, and the torques of its gimbal joints that make a torque in space.
+//! Torques of the gimbal joints that make a torque in space.
 
 use nalgebra::{UnitQuaternion, Vector3};
-
-use crate::convert::pose_from_column_major_mm;
-
-/// Pose of the device's frame in the world. The driver's frame has x to the operator's right, y up, z towards the operator.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Placement {
-    /// Origin of the device's frame, m.
-    pub origin_in_world: Vector3<f64>,
-    /// Rotation from the device's frame to the world.
-    pub world_from_device: UnitQuaternion<f64>,
-}
-
-impl Placement {
-    /// The operator sits before the perineum of a patient on the back: world z (superior) points away from the
-    /// operator, world y (anterior) up, world x (the patient's right) to the operator's left.
-    pub fn facing_patient(origin_in_world: Vector3<f64>) -> Self {
-        Self {
-            origin_in_world,
-            world_from_device: half_turn_about_y(),
-        }
-    }
-
-    /// Tip (m) and tool of a driver's transform. The stylus points along -z of its own frame, the needle along +z of
-    /// the tool frame. `None` for an invalid transform.
-    pub fn pose(&self, transform: &[f64; 16]) -> Option<(Vector3<f64>, UnitQuaternion<f64>)> {
-        let (tip_in_device, device_from_stylus) = pose_from_column_major_mm(transform)?;
-        let tip_in_world = self.origin_in_world + self.world_from_device * tip_in_device;
-        Some((
-            tip_in_world,
-            self.world_from_device * device_from_stylus * half_turn_about_y(),
-        ))
-    }
-
-    /// Rotates a force or a torque from the world into the device's frame.
-    pub fn to_device(&self, vector_in_world: &Vector3<f64>) -> Vector3<f64> {
-        self.world_from_device.inverse_transform_vector(vector_in_world)
-    }
-}
-
-fn half_turn_about_y() -> UnitQuaternion<f64> {
-    UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(0.0, 0.0, 1.0, 0.0))
-}
 
 /// Torques of the gimbal joints (turn, lift, roll; N m) that add up to `torque_nm` in the device's frame.
 ///
@@ -98,24 +56,6 @@ mod tests {
             let work_in_space = torque.dot(&turned) / 1e-6;
             assert!((joints[joint] - work_in_space).abs() < 1e-7, "joint {joint}");
         }
-    }
-
-    #[test]
-    fn a_stylus_that_points_away_from_the_operator_is_a_needle_along_world_z() {
-        let placement = Placement::facing_patient(Vector3::new(0.1, 0.2, 0.3));
-        let mut transform = [0.0; 16];
-        for i in 0..4 {
-            transform[5 * i] = 1.0;
-        }
-        (transform[12], transform[13], transform[14]) = (10.0, 20.0, -30.0);
-        let (tip, tool) = placement.pose(&transform).unwrap();
-        assert!(
-            (tip - Vector3::new(0.09, 0.22, 0.33)).norm() < 1e-12,
-            "right is -x, up is +y, away is +z"
-        );
-        assert!((tool * Vector3::z() - Vector3::z()).norm() < 1e-12);
-        let push_away = placement.to_device(&Vector3::z());
-        assert!((push_away + Vector3::z()).norm() < 1e-12);
     }
 
     #[test]

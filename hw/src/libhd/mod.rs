@@ -35,11 +35,8 @@ mod model;
 mod servo;
 mod session;
 
-pub use connector::Report;
 pub use device::{OpenError, Phantom, PhantomConfig};
-pub use diagnose::{Finding, Severity, diagnose};
+pub use diagnose::diagnose;
 pub use exchange::Readings;
-pub use ffi::{Api, LoadError, LoadFailure};
-pub use frame::Placement;
-pub use servo::{Arm, ArmError};
+pub use ffi::Api;
 pub use session::{ConnectionError, Description};

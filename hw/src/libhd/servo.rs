@@ -5,45 +5,29 @@
 
 use core::cell::UnsafeCell;
 use core::ffi::c_void;
-use core::fmt;
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use nalgebra::Vector3;
 
+use crate::beside::arm::{Arm, ArmError};
+use crate::beside::ends::ServoEnd;
+use crate::beside::hold::Hold;
 use crate::convert::{metres_from_millimetres, millinewton_metres_from_newton_metres, pose_from_column_major_mm};
 use crate::device::{DeviceFault, Sample, Wrench};
 use crate::libhd::errors::{self, Response};
-use crate::libhd::exchange::{Command, Served, Shared};
+use crate::libhd::exchange::{Served, Shared};
 use crate::libhd::ffi::{Api, CALLBACK_CONTINUE, CALLBACK_DONE, parameter};
-use crate::libhd::frame::{Placement, gimbal_torque_nm, within_joint_limits};
+use crate::libhd::frame::{gimbal_torque_nm, within_joint_limits};
 use crate::libhd::model::GIMBAL_TORQUE_LIMITS_NM;
+use crate::placement::Placement;
 
-/// A force that nobody renews for this long becomes zero: its writer has stopped.
-const DEAD_TIME_S: f64 = 0.1;
-/// After a fault the force stays off until there was none for this long.
-const QUIET_TIME_S: f64 = 0.5;
 /// Motors at this share of their temperature limit turn the force off, until they are below `COOL`.
 const HOT: f64 = 0.95;
 const COOL: f64 = 0.80;
 const TICKS_BETWEEN_TEMPERATURES: u64 = 100;
 /// More errors than this in one tick are left for the next.
 const MAX_ERRORS_PER_TICK: usize = 16;
-
-/// Arms the calling thread; returns a description of what the kernel granted.
-pub type Arm = Box<dyn Fn() -> Result<String, ArmError> + Send + Sync>;
-
-/// Why a thread could not be armed.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct ArmError(String);
-
-impl ArmError {
-    /// With the reason, in words for the operator.
-    pub fn new(reason: impl fmt::Display) -> Self {
-        Self(reason.to_string())
-    }
-}
 
 /// The callback and all that it owns. Lives until the process ends, because a driver may call once more after it was
 /// stopped.
@@ -63,8 +47,7 @@ pub struct Inner {
     pub api: Api,
     pub placement: Placement,
     pub arm: Arm,
-    pub samples: triple_buffer::Input<Option<Sample>>,
-    pub commands: triple_buffer::Output<Command>,
+    pub end: ServoEnd,
     pub servo_hz: u32,
     pub state: State,
 }
@@ -73,12 +56,7 @@ pub struct Inner {
 #[derive(Default)]
 pub struct State {
     sequence: u64,
-    fault: Option<DeviceFault>,
-    /// Ticks since the last fault.
-    quiet: u32,
-    command_number: u64,
-    /// Ticks since the last new command.
-    unrenewed: u32,
+    hold: Hold,
     hot: bool,
 }
 
@@ -140,12 +118,12 @@ impl Inner {
         unsafe { (self.api.hdBeginFrame)(served.handle) };
         let transform = self.read_pose(shared);
         self.read_temperature(shared, calls);
-        let wrench = self.newest_wrench();
+        let wrench = self.state.hold.wrench(self.end.commands.read(), self.servo_hz);
         self.exert(served, &wrench, &transform);
         // SAFETY: the handle is the driver's own.
         unsafe { (self.api.hdEndFrame)(served.handle) };
         self.drain_errors(shared);
-        self.publish_fault(shared);
+        shared.fault.set(self.state.hold.end_tick(self.servo_hz));
         // SAFETY: no preconditions.
         shared.note_callback_s(unsafe { (self.api.hdGetSchedulerTimeStamp)() });
     }
@@ -174,18 +152,19 @@ impl Inner {
             (self.api.hdGetIntegerv)(parameter::BUTTONS, &mut buttons);
         }
         let speed = metres_from_millimetres(&Vector3::from(velocity)).norm();
-        match self.placement.pose(&transform) {
-            Some((tip_in_world, world_from_tool)) if speed.is_finite() => {
+        match pose_from_column_major_mm(&transform) {
+            Some((tip_in_device, device_from_stylus)) if speed.is_finite() => {
+                let (tip_in_world, world_from_tool) = self.placement.pose(&tip_in_device, &device_from_stylus);
                 self.state.sequence += 1;
                 shared.note_speed_m_per_s(speed);
-                self.samples.write(Some(Sample {
+                self.end.samples.write(Some(Sample {
                     tip_in_world,
                     world_from_tool,
                     buttons: buttons as u32,
                     sequence: self.state.sequence,
                 }));
             }
-            _ => self.pause(DeviceFault::NonFiniteSample),
+            _ => self.state.hold.pause(DeviceFault::NonFiniteSample),
         }
         transform
     }
@@ -200,27 +179,7 @@ impl Inner {
             self.state.hot = warmest >= if self.state.hot { COOL } else { HOT };
         }
         if self.state.hot {
-            self.pause(DeviceFault::Overheated);
-        }
-    }
-
-    /// The newest command; zero when it is not renewed or there is a fault.
-    fn newest_wrench(&mut self) -> Wrench {
-        let command = *self.commands.read();
-        let renewed = command.number != self.state.command_number;
-        self.state.command_number = command.number;
-        self.state.unrenewed = if renewed {
-            0
-        } else {
-            self.state.unrenewed.saturating_add(1)
-        };
-        if self.lasts(self.state.unrenewed, DEAD_TIME_S) && command.wrench != Wrench::zero() {
-            self.pause(DeviceFault::TimedOut);
-        }
-        if self.state.fault.is_some() {
-            Wrench::zero()
-        } else {
-            command.wrench
+            self.state.hold.pause(DeviceFault::Overheated);
         }
     }
 
@@ -258,10 +217,10 @@ impl Inner {
             if error.code == errors::SUCCESS {
                 return;
             }
-            shared.note_error(error.code);
+            shared.errors.note(error.code);
             let known = errors::known(error.code);
             match known.response {
-                Response::Pause => self.pause(known.fault),
+                Response::Pause => self.state.hold.pause(known.fault),
                 Response::Reconnect => self.lose(shared, known.fault),
             }
         }
@@ -277,31 +236,11 @@ impl Inner {
         }
     }
 
-    /// Turns the force off. The first fault stays the reported one until there was none for `QUIET_TIME_S`.
-    fn pause(&mut self, fault: DeviceFault) {
-        self.state.fault.get_or_insert(fault);
-        self.state.quiet = 0;
-    }
-
-    /// Declares the connection lost. This fault replaces any other: without a connection the pose is invalid as well.
+    /// Declares the connection lost.
     fn lose(&mut self, shared: &Shared, fault: DeviceFault) {
-        self.state.fault = Some(fault);
-        self.state.quiet = 0;
-        shared.set_fault(self.state.fault);
-        shared.set_lost();
-    }
-
-    fn lasts(&self, ticks: u32, time_s: f64) -> bool {
-        f64::from(ticks) >= time_s * f64::from(self.servo_hz)
-    }
-
-    /// Clears a fault that has not returned for `QUIET_TIME_S`, and shows the force loop what is left.
-    fn publish_fault(&mut self, shared: &Shared) {
-        self.state.quiet = self.state.quiet.saturating_add(1);
-        if self.lasts(self.state.quiet, QUIET_TIME_S) {
-            self.state.fault = None;
-        }
-        shared.set_fault(self.state.fault);
+        self.state.hold.lose(fault);
+        shared.fault.set(Some(fault));
+        shared.errors.set_lost();
     }
 
     /// Zero force and torque, whatever the state of the device.

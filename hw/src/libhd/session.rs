@@ -1,16 +1,17 @@
 //! One connection to a device, from initialisation to disabling: the calls that may block, made by one thread.
 
-use core::ffi::{CStr, c_char, c_int};
+use core::ffi::{CStr, c_int};
 use core::fmt;
 use std::ffi::CString;
 
+use crate::beside::arm::ArmError;
 use crate::device::DeviceInfo;
 use crate::libhd::errors;
 use crate::libhd::ffi::{
     Api, Callback, Enum, Handle, INVALID_HANDLE, PRIORITY_MAX, Schedule, WAIT_CHECK_STATUS, capability, parameter,
 };
 use crate::libhd::model;
-use crate::libhd::servo::ArmError;
+use crate::library::text;
 
 /// Names that the driver's old and new set-up programs give the first device; no name at all fails on some systems.
 const DEVICE_NAMES: &[&CStr] = &[c"Default PHANToM", c"Default Device"];
@@ -88,17 +89,17 @@ impl fmt::Display for Description {
 }
 
 /// An initialised device.
-pub struct Session<'a> {
-    api: &'a Api,
+pub struct Session {
+    api: Api,
     /// The driver's handle of the device.
     pub handle: Handle,
     schedule: Option<Schedule>,
     started: bool,
 }
 
-impl<'a> Session<'a> {
+impl Session {
     /// Tries `name`, or the usual names and then the first device.
-    pub fn open(api: &'a Api, name: Option<&str>) -> Result<Self, ConnectionError> {
+    pub fn open(api: &Api, name: Option<&str>) -> Result<Self, ConnectionError> {
         discard_errors(api);
         let mut names: Vec<Option<CString>> = Vec::new();
         match name {
@@ -118,7 +119,7 @@ impl<'a> Session<'a> {
                 // SAFETY: the handle is the driver's own.
                 unsafe { (api.hdMakeCurrentDevice)(handle) };
                 return Ok(Self {
-                    api,
+                    api: *api,
                     handle,
                     schedule: None,
                     started: false,
@@ -152,7 +153,7 @@ impl<'a> Session<'a> {
             output_dof,
         };
         // An old driver may lack some of the strings.
-        discard_errors(self.api);
+        discard_errors(&self.api);
         Ok(description)
     }
 
@@ -215,11 +216,11 @@ impl<'a> Session<'a> {
             (self.api.hdDisable)(capability::FORCE_OUTPUT);
             (self.api.hdDisableDevice)(self.handle);
         }
-        discard_errors(self.api);
+        discard_errors(&self.api);
     }
 
     fn check(&self, call: &'static str) -> Result<(), ConnectionError> {
-        match last_error(self.api) {
+        match last_error(&self.api) {
             errors::SUCCESS => Ok(()),
             code => Err(ConnectionError::Call(call, code)),
         }
@@ -248,15 +249,4 @@ pub fn last_error(api: &Api) -> u32 {
 /// Empties the error stack of the driver.
 pub fn discard_errors(api: &Api) {
     let _ = last_error(api);
-}
-
-/// # Safety
-///
-/// `pointer` is null or a string that ends with zero.
-unsafe fn text(pointer: *const c_char) -> String {
-    if pointer.is_null() {
-        return "unknown".to_owned();
-    }
-    // SAFETY: by the contract of this function.
-    unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned()
 }

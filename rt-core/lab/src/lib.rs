@@ -2,7 +2,7 @@
 //!
 //! [`latency`] runs a measurement and writes a report, [`campaign`] one of hours and nights; [`verify`] verifies that a saved
 //! report is unaltered; [`fleet`] compares the reports of many PCs; [`doctor`] checks whether this PC is fit, and makes it fitter;
-//! [`credibility`] is the file for an auditor.
+//! [`devices`] lists the haptic devices that can be used; [`credibility`] is the file for an auditor.
 //! No report claims conformity with a standard.
 
 #![warn(missing_docs)]
@@ -14,6 +14,7 @@ mod collect;
 mod compare;
 pub mod cost;
 pub mod credibility;
+pub mod devices;
 pub mod doctor;
 mod external;
 mod extreme;

@@ -1,6 +1,6 @@
 //! Options that a run and a measurement share on the command line, and the settings of a run that they give.
 
-use crate::device::DeviceChoice;
+use crate::device::{DeviceChoice, Libraries};
 use crate::process::Options;
 use crate::replay;
 use crate::rt::arm::{self, Refused};
@@ -102,7 +102,7 @@ impl RealTimeArgs {
                 flight_folder: replay::file::default_folder(),
                 tissue: TissueKind::default(),
                 device: DeviceChoice::default(),
-                libhd: None,
+                libraries: Libraries::default(),
             }),
             _ => Err(OptionsError(problems)),
         }

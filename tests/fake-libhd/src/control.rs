@@ -1,10 +1,10 @@
-//! Commands of a test to the fake, and reports of the fake to the test: one block of atomics, in memory or in a file that
-//! both map.
+//! Commands of a test to the fake, and reports of the fake to the test: one block of atomics.
 //!
 //! A block of zeros is a healthy, calibrated Premium 1.5 6DOF that does not move.
 
-use std::path::Path;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+
+pub use fake_control::{Block, get, put};
 
 /// Number of ticks whose force is kept.
 pub const FORCES_KEPT: usize = 1 << 15;
@@ -92,53 +92,10 @@ pub struct Control {
     pub forces_n: [[AtomicU64; 3]; FORCES_KEPT],
 }
 
-/// Stores a number in a cell of the block.
-pub fn put(cell: &AtomicU64, value: f64) {
-    // SYNC: relaxed; see `Control`.
-    cell.store(value.to_bits(), Ordering::Relaxed);
-}
-
-/// Reads a number from a cell of the block.
-pub fn get(cell: &AtomicU64) -> f64 {
-    // SYNC: relaxed; see `Control`.
-    f64::from_bits(cell.load(Ordering::Relaxed))
-}
+// SAFETY: atomics of 4 and 8 bytes, and arrays of them.
+unsafe impl Block for Control {}
 
 impl Control {
-    /// A block of zeros that lives until the process ends.
-    pub fn in_memory() -> &'static Self {
-        let memory = memmap2::MmapMut::map_anon(size_of::<Self>()).expect("memory for the block");
-        Self::at(memory)
-    }
-
-    /// The block in `file`, which is created when it is missing.
-    pub fn in_file(file: &Path) -> &'static Self {
-        let mut options = std::fs::OpenOptions::new();
-        let opened = options.read(true).write(true).create(true).truncate(false).open(file);
-        let opened = opened.expect("the control file can be opened");
-        opened
-            .set_len(size_of::<Self>() as u64)
-            .expect("the control file can grow");
-        // SAFETY: both sides use the file through atomics alone.
-        Self::at(unsafe { memmap2::MmapMut::map_mut(&opened) }.expect("the control file can be mapped"))
-    }
-
-    fn at(memory: memmap2::MmapMut) -> &'static Self {
-        let start = Box::leak(Box::new(memory)).as_ptr();
-        // SAFETY: the map is never dropped, has this size, begins on a page, and every bit pattern is valid.
-        unsafe { &*start.cast::<Self>() }
-    }
-
-    /// Sets the block to zero: a healthy device, and no calls.
-    pub fn reset(&self) {
-        let start = core::ptr::from_ref(self).cast::<AtomicU32>();
-        for word in 0..size_of::<Self>() / size_of::<AtomicU32>() {
-            // SAFETY: the block is made of atomics, and this stays inside it.
-            // SYNC: relaxed; see `Control`.
-            unsafe { &*start.add(word) }.store(0, Ordering::Relaxed);
-        }
-    }
-
     /// The next `times` calls of `function` fail.
     pub fn fail(&self, function: &str, code: u32, times: u32) {
         let index = index_of(function);

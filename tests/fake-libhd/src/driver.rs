@@ -6,7 +6,7 @@ use std::time::Instant;
 use nalgebra::{UnitQuaternion, Vector3};
 use stylet_hw::{Device, HandGoal, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
 
-use crate::control::{Control, FORCES_KEPT, VARIABLE, get, put};
+use crate::control::{Block, Control, FORCES_KEPT, VARIABLE, get, put};
 // SYNC: relaxed where nothing else is said; see `Control`.
 use std::sync::atomic::Ordering::{Acquire, Relaxed};
 
@@ -39,10 +39,7 @@ pub struct Driver {
 
 pub fn control() -> &'static Control {
     static CONTROL: OnceLock<&'static Control> = OnceLock::new();
-    CONTROL.get_or_init(|| match std::env::var_os(VARIABLE) {
-        Some(file) => Control::in_file(file.as_ref()),
-        None => Control::in_memory(),
-    })
+    CONTROL.get_or_init(|| Control::of_environment(VARIABLE))
 }
 
 pub fn driver() -> MutexGuard<'static, Driver> {

@@ -13,3 +13,4 @@ mod scheduler;
 pub mod table;
 
 pub use control::Control;
+pub use fake_control::Block;

@@ -139,9 +139,13 @@ fn rules_for_devices_name_the_vendors_that_the_programs_look_for() {
         (
             "70-stylet-haptic.rules",
             "rt-core/lab/src/doctor/devices.rs",
-            ["2988", "0x000b99"],
+            &["2988", "0x000b99", "1451"][..],
         ),
-        ("70-stylet.rules", "host-ui/controllers/src/found.rs", ["256f", "046d"]),
+        (
+            "70-stylet.rules",
+            "host-ui/controllers/src/found.rs",
+            &["256f", "046d"][..],
+        ),
     ] {
         let rules = text(&files[&format!("/usr/lib/udev/rules.d/{rules}")]);
         let source = text(&repository(source));

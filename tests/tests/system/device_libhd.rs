@@ -1,5 +1,6 @@
 //! The Phantom over a driver that misbehaves: what the force loop sees, what the motors get, and how it ends.
 
+use fake_hd::Block;
 use fake_hd::control::{get, put};
 use nalgebra::Vector3;
 use std::sync::atomic::Ordering::Relaxed;
@@ -7,8 +8,8 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use stylet_heap as heap;
-use stylet_hw::libhd::{Api, Arm, ArmError, ConnectionError, OpenError, diagnose};
-use stylet_hw::{Device, DeviceFault, Phantom, PhantomConfig, Wrench, conformance};
+use stylet_hw::libhd::{Api, ConnectionError, OpenError, diagnose};
+use stylet_hw::{Arm, ArmError, Device, DeviceFault, Phantom, PhantomConfig, Severity, Wrench, conformance};
 use stylet_tests::phantom::{Fake, config, drive, library};
 use stylet_tests::until;
 
@@ -577,15 +578,15 @@ fn the_doctor_names_what_the_driver_says_of_the_device() {
         let found = findings.iter().find(|f| f.what.contains(word));
         found.unwrap_or_else(|| panic!("{word}: {findings:#?}")).clone()
     };
-    assert_eq!(worst("PHANTOM Premium 1.5 6DOF").severity, diagnose::Severity::Good);
-    assert_eq!(worst("is calibrated").severity, diagnose::Severity::Good);
+    assert_eq!(worst("PHANTOM Premium 1.5 6DOF").severity, Severity::Good);
+    assert_eq!(worst("is calibrated").severity, Severity::Good);
     fake.control.uncalibrated.store(1, Relaxed);
     assert!(worst("not calibrated").cure.contains("neutral pose"));
     fake.control.uncalibrated.store(0, Relaxed);
     fake.control.model.store(1, Relaxed);
-    assert_eq!(worst("no torques").severity, diagnose::Severity::Note);
+    assert_eq!(worst("no torques").severity, Severity::Note);
     fake.control.model.store(3, Relaxed);
-    assert_eq!(worst("Novint Falcon").severity, diagnose::Severity::Problem);
+    assert_eq!(worst("Novint Falcon").severity, Severity::Problem);
     fake.control.unplugged.store(1, Relaxed);
     assert!(worst("no device").cure.contains("power and cable"));
     let mut held = Vec::new();

@@ -1,7 +1,7 @@
 //! The whole procedure with a Phantom: the fake driver in the core's process, its hand led from here.
 
-use fake_hd::Control;
 use fake_hd::control::{VARIABLE, get};
+use fake_hd::{Block, Control};
 use nalgebra::Vector3;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;

@@ -3,11 +3,13 @@
 use std::fs;
 use std::path::Path;
 
-use super::{Finding, Severity, Surroundings};
+use super::Surroundings;
+use crate::finding::{Finding, Severity};
 use crate::libhd::calibrate::{self, Calibration};
 use crate::libhd::errors;
-use crate::libhd::ffi::{Api, LoadError, LoadFailure};
+use crate::libhd::ffi::Api;
 use crate::libhd::session::{ConnectionError, Session};
+use crate::library::{LoadError, LoadFailure};
 
 /// Libraries that `libHD.so` needs: a part of the name, and how to install it.
 const NEEDED: &[(&str, &str)] = &[
@@ -40,7 +42,7 @@ const NEEDED: &[(&str, &str)] = &[
 ];
 
 pub fn of_library(library: &Result<(), LoadError>) -> Vec<Finding> {
-    let Err(LoadError(tried)) = library else {
+    let Err(LoadError { tried, .. }) = library else {
         return vec![Finding::good("OpenHaptics (libHD.so) can be loaded")];
     };
     let findings = tried.iter().map(|(name, why)| {

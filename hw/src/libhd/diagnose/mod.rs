@@ -9,47 +9,11 @@ mod tests;
 
 use std::path::{Path, PathBuf};
 
-use crate::libhd::ffi::{Api, LoadError};
+use crate::finding::Finding;
+use crate::libhd::ffi::Api;
+use crate::library::LoadError;
 
 pub use driver::of_device;
-
-/// How much a finding matters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Severity {
-    /// Nothing to do.
-    Good,
-    /// Matters for some devices only.
-    Note,
-    /// Works, but not well.
-    Warning,
-    /// No device will be found.
-    Problem,
-}
-
-/// Result of one check.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Finding {
-    /// How much it matters.
-    pub severity: Severity,
-    /// What was found.
-    pub what: String,
-    /// What to do, with the command to type; empty when there is nothing to do.
-    pub cure: String,
-}
-
-impl Finding {
-    fn new(severity: Severity, what: impl Into<String>, cure: impl Into<String>) -> Self {
-        Self {
-            severity,
-            what: what.into(),
-            cure: cure.into(),
-        }
-    }
-
-    fn good(what: impl Into<String>) -> Self {
-        Self::new(Severity::Good, what, "")
-    }
-}
 
 /// The user and the result of loading the library; everything else is in files.
 #[derive(Clone, Debug)]

@@ -4,7 +4,8 @@ use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-use super::{Finding, Severity, Surroundings};
+use super::Surroundings;
+use crate::finding::{Finding, Severity};
 
 const LINKS: [(&str, &str); 2] = [
     ("dev/phnepp", "/dev/parport0"),

@@ -5,7 +5,8 @@ use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 
 use super::*;
-use crate::libhd::ffi::LoadFailure;
+use crate::finding::Severity;
+use crate::library::LoadFailure;
 
 const MODES: &str = "proc/sys/dev/parport/parport0/modes";
 
@@ -79,8 +80,15 @@ impl Faked {
     }
 }
 
+fn failed(why: LoadFailure) -> LoadError {
+    LoadError {
+        driver: "OpenHaptics",
+        tried: vec![(PathBuf::from("libHD.so"), why)],
+    }
+}
+
 fn load_error(why: &str) -> LoadError {
-    LoadError(vec![(PathBuf::from("libHD.so"), LoadFailure::Loader(why.to_owned()))])
+    failed(LoadFailure::Loader(why.to_owned()))
 }
 
 #[test]
@@ -202,10 +210,10 @@ fn each_missing_library_is_named_with_its_cure() {
 fn a_library_without_a_function_is_not_openhaptics() {
     let mut faked = Faked::fit();
     let failure = LoadFailure::Incomplete(vec!["hdInitDevice", "hdGetError"]);
-    faked.here.library = Err(LoadError(vec![(PathBuf::from("libHD.so"), failure)]));
+    faked.here.library = Err(failed(failure));
     faked.bad(
         Severity::Problem,
-        "libHD.so: not OpenHaptics 3: it lacks hdInitDevice, hdGetError",
+        "libHD.so: another version, or another library: it lacks hdInitDevice, hdGetError",
         "again",
     );
 }

@@ -3,10 +3,13 @@
 use super::{Finding, FindingLevel};
 use crate::machine::Machine;
 use std::path::Path;
+use stylet_hw::Severity;
 use stylet_hw::libhd::diagnose::{self, Surroundings};
 
 /// USB vendor of 3D Systems: Touch and Touch X, as in the udev rules of its driver.
 const USB_VENDOR: &str = "2988";
+/// USB vendor of Force Dimension, as in the udev rules that its users publish.
+const FORCE_DIMENSION_VENDOR: &str = "1451";
 /// IEEE 1394 vendor of SensAble, the maker of the Phantoms, as registered (OUI 00-0B-99).
 const FIREWIRE_VENDOR: &str = "0x000b99";
 
@@ -16,6 +19,7 @@ fn connected(machine: &Machine) -> Vec<String> {
     for (bus, file, vendor, name_of_bus) in [
         ("firewire", "vendor", FIREWIRE_VENDOR, "FireWire"),
         ("usb", "idVendor", USB_VENDOR, "USB"),
+        ("usb", "idVendor", FORCE_DIMENSION_VENDOR, "USB"),
     ] {
         let folder = format!("sys/bus/{bus}/devices");
         for name in machine.names(&folder) {
@@ -98,9 +102,9 @@ pub fn driver(machine: &Machine, here: &Surroundings) -> Vec<Finding> {
     findings
         .map(|f| {
             let severity = match f.severity {
-                diagnose::Severity::Good => FindingLevel::Good,
-                diagnose::Severity::Note => FindingLevel::Note,
-                diagnose::Severity::Warning | diagnose::Severity::Problem => worst,
+                Severity::Good => FindingLevel::Good,
+                Severity::Note => FindingLevel::Note,
+                Severity::Warning | Severity::Problem => worst,
             };
             Finding::new(PHANTOM, severity, f.what, f.cure)
         })

@@ -7,12 +7,14 @@ use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use stylet_hw::backend::{self, BackendKind, UnknownBackend};
-use stylet_hw::libhd::{ArmError, OpenError, Placement};
-use stylet_hw::{Device, Phantom, PhantomConfig, SimulatedPhantom, SimulatedPhantomConfig};
+use stylet_hw::{
+    Arm, ArmError, Axes, Device, ForceDimension, ForceDimensionConfig, Phantom, PhantomConfig, Placement, Report,
+    SimulatedPhantom, SimulatedPhantomConfig, drd, libhd,
+};
 use stylet_shm_schema::ThreadReport;
 use stylet_sim::scene::Scene;
 
-/// Rate of the driver's servo loop.
+/// Rate of a servo loop beside the force loop.
 const SERVO_HZ: u32 = 1000;
 /// The servo thread has priority over the force loop, which waits for its samples.
 const SERVO_AHEAD: u32 = 5;
@@ -49,12 +51,41 @@ pub fn help() -> String {
     backend::help()
 }
 
+/// Libraries of makers where they are not where the system has them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Libraries {
+    /// OpenHaptics.
+    pub libhd: Option<PathBuf>,
+    /// The SDK of Force Dimension.
+    pub libdrd: Option<PathBuf>,
+}
+
+impl Libraries {
+    /// What the command line names, else what the environment does: `STYLET_LIBHD`, `STYLET_LIBDRD`.
+    pub fn or_of_environment(libhd: Option<&Path>, libdrd: Option<&Path>) -> Self {
+        let or = |named: Option<&Path>, variable| {
+            let from_environment = || std::env::var_os(variable).map(PathBuf::from);
+            named.map(Path::to_owned).or_else(from_environment)
+        };
+        Self {
+            libhd: or(libhd, "STYLET_LIBHD"),
+            libdrd: or(libdrd, "STYLET_LIBDRD"),
+        }
+    }
+}
+
 /// Why a device could not be opened; the text says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
     /// The Phantom.
     #[error("{0}\nOr start with --device simulated.")]
-    Phantom(#[from] OpenError),
+    Phantom(#[from] libhd::OpenError),
+    /// The device of Force Dimension.
+    #[error("{0}\nOr start with --device simulated.")]
+    ForceDimension(#[from] drd::OpenError),
+    /// What followed the colon is not the number of a device.
+    #[error("--device force-dimension:{0}: give the number of a device, from 0; rt-core devices lists them")]
+    Number(String),
     /// The recorded motion.
     #[error(transparent)]
     Motion(#[from] motion::MotionError),
@@ -64,7 +95,7 @@ pub enum DeviceError {
 /// the force loop's thread asks for, `servo_core` the processor of the driver's own thread.
 pub fn open(
     choice: &DeviceChoice,
-    library: Option<PathBuf>,
+    libraries: &Libraries,
     scene: &Scene,
     force_loop: Ask,
     servo_core: Option<usize>,
@@ -87,29 +118,45 @@ pub fn open(
         }
         BackendKind::Phantom => {
             let config = PhantomConfig {
-                library,
+                library: libraries.libhd.clone(),
                 name: choice.argument.clone(),
-                placement: Placement::facing_patient(start),
+                placement: Placement::facing_patient(Axes::OPEN_HAPTICS, start),
                 servo_hz: SERVO_HZ,
             };
-            let ask = Ask {
-                priority: force_loop.priority.map(|p| (p + SERVO_AHEAD).min(98)),
-                core: servo_core,
+            Ok(Box::new(Phantom::open(config, arm(force_loop, servo_core), report())?))
+        }
+        BackendKind::ForceDimension => {
+            let number = choice.argument.as_deref().unwrap_or("0");
+            let config = ForceDimensionConfig {
+                library: libraries.libdrd.clone(),
+                number: number.parse().map_err(|_| DeviceError::Number(number.to_owned()))?,
+                placement: Placement::facing_patient(Axes::FORCE_DIMENSION, start),
+                servo_hz: SERVO_HZ,
             };
-            Ok(Box::new(open_phantom(config, ask)?))
+            Ok(Box::new(ForceDimension::open(
+                config,
+                arm(force_loop, servo_core),
+                report(),
+            )?))
         }
     }
 }
 
-/// `ask` is for the driver's servo thread.
-fn open_phantom(config: PhantomConfig, ask: Ask) -> Result<Phantom, OpenError> {
-    let arm = move || {
+/// Arms the servo thread of a device, ahead of the force loop.
+fn arm(force_loop: Ask, core: Option<usize>) -> Arm {
+    let ask = Ask {
+        priority: force_loop.priority.map(|p| (p + SERVO_AHEAD).min(98)),
+        core,
+    };
+    Box::new(move || {
         arm::arm(ask)
             .map(|armed| granted_text(&armed.report))
             .map_err(ArmError::new)
-    };
-    let report = |text: &str| eprintln!("rt-core: device: {text}");
-    Phantom::open(config, Box::new(arm), Box::new(report))
+    })
+}
+
+fn report() -> Report {
+    Box::new(|text| eprintln!("rt-core: device: {text}"))
 }
 
 /// What a thread was granted.
@@ -145,6 +192,10 @@ mod tests {
         assert_eq!(
             "phantom:Left arm".parse(),
             choice(BackendKind::Phantom, Some("Left arm"))
+        );
+        assert_eq!(
+            "force-dimension:1".parse(),
+            choice(BackendKind::ForceDimension, Some("1"))
         );
         assert_eq!("replay:a.motion".parse(), choice(BackendKind::Replay, Some("a.motion")));
         for wrong in ["", "phantom:", "Phantom", "simulated:x", "falcon"] {

@@ -5,7 +5,7 @@ mod setup;
 mod threads;
 
 use crate::bridge::{Bridge, BridgeSetup};
-use crate::device::{DeviceChoice, DeviceError};
+use crate::device::{DeviceChoice, DeviceError, Libraries};
 use crate::rt::arm::{Refused, Usage};
 use crate::rt::timing::Probes;
 use crate::rt::world::WorldError;
@@ -49,8 +49,8 @@ pub struct Options {
     pub tissue: TissueKind,
     /// Haptic device.
     pub device: DeviceChoice,
-    /// Library of the Phantom's driver; `None` tries its usual names.
-    pub libhd: Option<PathBuf>,
+    /// Libraries of makers.
+    pub libraries: Libraries,
 }
 
 /// What a run cost.

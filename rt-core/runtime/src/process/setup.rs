@@ -67,8 +67,13 @@ impl Setup {
             core: options.haptic_core,
         };
         // The driver's servo thread goes to the core of the tissue loop, which can wait for it longer than the force loop.
-        let library = options.libhd.clone();
-        let device = device::open(&options.device, library, &scene, force_loop, options.tissue_core)?;
+        let device = device::open(
+            &options.device,
+            &options.libraries,
+            &scene,
+            force_loop,
+            options.tissue_core,
+        )?;
         let info = device.info();
         let active = activate(&ParameterSet::default(), &info)?;
         let session_id = clock::now_ns() ^ (u64::from(std::process::id()) << 40);

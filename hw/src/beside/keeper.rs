@@ -1,0 +1,151 @@
+//! The thread of normal priority that connects a device, watches it, and connects it again after a loss.
+
+use core::fmt::Display;
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
+use std::sync::{Arc, mpsc};
+use std::thread::{self, Thread};
+
+/// Takes a message for the operator.
+pub type Report = Box<dyn Fn(&str) + Send>;
+
+/// Between two attempts to connect.
+const RETRY_EVERY: Duration = Duration::from_millis(500);
+/// Longest wait for the thread to end; a driver that hangs is abandoned.
+const END_LIMIT: Duration = Duration::from_secs(3);
+
+/// What the keeper of one kind of device does. Each call may block.
+pub trait Connect: Sized + Send + 'static {
+    /// One connection, from opening to closing.
+    type Session;
+    /// What is known of a connected device.
+    type Description: Send + 'static;
+    /// Why there is no connection.
+    type Error: Display + Send + 'static;
+
+    /// Opens a connection.
+    fn open(&mut self) -> Result<Self::Session, Self::Error>;
+    /// Makes the connection serve, and calls [`Keeper::opened`]; false when the thread is to end.
+    fn prepare(&mut self, keeper: &mut Keeper<Self>, session: &mut Self::Session) -> Result<bool, Self::Error>;
+    /// Returns when the device is lost, with the reason, or when the thread is to end.
+    fn watch(&mut self, keeper: &mut Keeper<Self>, session: &Self::Session) -> Option<String>;
+    /// Leaves zero force and closes the connection.
+    fn release(&mut self, keeper: &mut Keeper<Self>, session: Self::Session);
+    /// No device is connected.
+    fn not_connected(&self);
+}
+
+/// Takes the first result: a description, or why there is no connection.
+type First<C> = mpsc::Sender<Result<<C as Connect>::Description, <C as Connect>::Error>>;
+
+/// Gets the first result.
+pub type Opened<C> = mpsc::Receiver<Result<<C as Connect>::Description, <C as Connect>::Error>>;
+
+/// What every keeper has.
+pub struct Keeper<C: Connect> {
+    stop: Arc<AtomicBool>,
+    report: Report,
+    /// The last message, so that a retry does not repeat it.
+    last_message: String,
+    first: Option<First<C>>,
+}
+
+/// A running keeper. Dropping it releases the device and waits until that is done.
+pub struct KeeperThread {
+    stop: Arc<AtomicBool>,
+    thread: Option<Thread>,
+    ended: mpsc::Receiver<()>,
+}
+
+/// Starts the thread. The receiver gets the result of the first attempt; when it fails, the thread ends.
+pub fn spawn<C: Connect>(name: &str, connect: C, report: Report) -> (KeeperThread, Opened<C>) {
+    let stop = Arc::<AtomicBool>::default();
+    let (first, opened) = mpsc::channel();
+    let (end, ended) = mpsc::channel();
+    let keeper: Keeper<C> = Keeper {
+        stop: Arc::clone(&stop),
+        report,
+        last_message: String::new(),
+        first: Some(first),
+    };
+    let spawned = thread::Builder::new()
+        .name(name.to_owned())
+        .stack_size(512 * 1024)
+        .spawn(move || {
+            keeper.run(connect);
+            // The receiver may have given up.
+            let _ = end.send(());
+        });
+    let thread = spawned.ok().map(|handle| handle.thread().clone());
+    (KeeperThread { stop, thread, ended }, opened)
+}
+
+impl<C: Connect> Keeper<C> {
+    fn run(mut self, mut connect: C) {
+        while !self.stopped() {
+            let lost = match self.connect(&mut connect) {
+                Ok(Some(session)) => {
+                    let lost = connect.watch(&mut self, &session);
+                    connect.release(&mut self, session);
+                    lost
+                }
+                Ok(None) => None,
+                Err(error) => {
+                    connect.not_connected();
+                    if let Some(first) = self.first.take() {
+                        let _ = first.send(Err(error));
+                        return;
+                    }
+                    Some(error.to_string())
+                }
+            };
+            if let Some(why) = lost {
+                self.report(&why);
+                thread::park_timeout(RETRY_EVERY);
+            }
+        }
+    }
+
+    /// `None` when the thread is to end.
+    fn connect(&mut self, connect: &mut C) -> Result<Option<C::Session>, C::Error> {
+        let mut session = connect.open()?;
+        let prepared = connect.prepare(self, &mut session);
+        if let Ok(true) = prepared {
+            return Ok(Some(session));
+        }
+        connect.release(self, session);
+        prepared.map(|_| None)
+    }
+
+    /// Whether the thread is to end.
+    pub fn stopped(&self) -> bool {
+        // SYNC: relaxed; the flag carries nothing with it. Its partner is the store in `drop`.
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Reports a message that is not the last one again.
+    pub fn report(&mut self, message: &str) {
+        if self.last_message != message {
+            (self.report)(message);
+            message.clone_into(&mut self.last_message);
+        }
+    }
+
+    /// The device can be used, or waits for the operator: whoever opened it goes on.
+    pub fn opened(&mut self, description: C::Description) {
+        if let Some(first) = self.first.take() {
+            let _ = first.send(Ok(description));
+        }
+    }
+}
+
+impl Drop for KeeperThread {
+    fn drop(&mut self) {
+        // SYNC: relaxed; its partner is the load in `stopped`, and `unpark` orders the two.
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = &self.thread {
+            thread.unpark();
+            let _ = self.ended.recv_timeout(END_LIMIT);
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! The keeper of a Force Dimension device: connects it, starts its servo thread, watches it, and reconnects it after a loss.
+
+use core::time::Duration;
+use std::sync::{Arc, mpsc};
+use std::thread::{self, JoinHandle};
+use std::time::Instant;
+
+use crate::beside::keeper::{self, Connect};
+use crate::device::{DeviceFault, DeviceInfo};
+use crate::drd::exchange::Shared;
+use crate::drd::ffi::Api;
+use crate::drd::servo::Servo;
+use crate::drd::session::{ConnectionError, Description, Session};
+use crate::drd::status::{Health, health};
+
+/// Between two checks of a running device.
+const CHECK_EVERY: Duration = Duration::from_millis(20);
+/// A servo loop that does not tick for this long waits in a call of the SDK.
+const SILENT_FOR: Duration = Duration::from_millis(250);
+const CALIBRATION_EVERY: Duration = Duration::from_millis(50);
+/// A servo thread that has not ended after this time waits in a call of the SDK.
+const RELEASE_LIMIT: Duration = Duration::from_millis(50);
+const ARMED_LIMIT: Duration = Duration::from_secs(2);
+const FIRST_SAMPLE_LIMIT: Duration = Duration::from_millis(100);
+
+/// What a device can do about a driver that hangs.
+const WITHOUT_WATCHDOG: &str =
+    "the device has no watchdog that this SDK can arm: a driver that hangs leaves its last force";
+const HANGS: &str = "the driver does not return from a call: the watchdog of the device drops the force";
+const NEEDS_CALIBRATION: &str = "the device is not calibrated: calibrate it as its manual says; rt-core waits";
+
+/// Owns the connection; see the module.
+pub struct Connector {
+    api: Api,
+    number: u8,
+    shared: Arc<Shared>,
+    /// `None` while the servo thread has it.
+    servo: Option<Servo>,
+    /// The limits that the force loop uses, fixed by the first connection.
+    info: Option<DeviceInfo>,
+}
+
+/// An open device and the thread that serves it.
+pub struct Running {
+    session: Session,
+    servo: Option<JoinHandle<Servo>>,
+}
+
+type Keeper = keeper::Keeper<Connector>;
+
+impl Connect for Connector {
+    type Session = Running;
+    type Description = Description;
+    type Error = ConnectionError;
+
+    fn open(&mut self) -> Result<Running, ConnectionError> {
+        if self.servo.is_none() {
+            return Err(ConnectionError::NoServo);
+        }
+        let session = Session::open(&self.api, self.number)?;
+        Ok(Running { session, servo: None })
+    }
+
+    fn prepare(&mut self, keeper: &mut Keeper, running: &mut Running) -> Result<bool, ConnectionError> {
+        let mut description = running.session.describe()?;
+        same_model(&mut self.info, &description)?;
+        if !self.calibrate(keeper, &running.session, &description)? {
+            return Ok(false);
+        }
+        description.watchdog_s = running.session.guard(&description.info);
+        running.session.turn_on()?;
+        let granted = self.start(running, &description.info)?;
+        let watchdog = match description.watchdog_s {
+            Some(s) => format!("the device drops a force that is not renewed for {:.0} ms", s * 1e3),
+            None => WITHOUT_WATCHDOG.to_owned(),
+        };
+        keeper.report(&format!("{description}; {watchdog}; servo thread: {granted}"));
+        keeper.opened(description);
+        Ok(true)
+    }
+
+    fn watch(&mut self, keeper: &mut Keeper, running: &Running) -> Option<String> {
+        let (mut ticks, mut since) = (0, Instant::now());
+        while !keeper.stopped() {
+            let now = self.shared.ticks();
+            if now != ticks {
+                (ticks, since) = (now, Instant::now());
+            }
+            if let Some(code) = self.shared.errors.lost() {
+                let why = match code {
+                    0 => "by its own status".to_owned(),
+                    code => ConnectionError::Call("the servo loop", code).to_string(),
+                };
+                return Some(format!("the device is lost: {why}"));
+            }
+            if since.elapsed() > SILENT_FOR || running.servo.as_ref().is_none_or(JoinHandle::is_finished) {
+                self.shared.errors.set_lost();
+                self.shared.fault.set(Some(DeviceFault::TimedOut));
+                return Some(HANGS.to_owned());
+            }
+            thread::park_timeout(CHECK_EVERY);
+        }
+        None
+    }
+
+    /// Ends the servo thread, which leaves zero force, and closes the device. While the servo thread hangs in a call no other call
+    /// is made, and nothing can be closed.
+    fn release(&mut self, keeper: &mut Keeper, running: Running) {
+        self.shared.request_release();
+        if let Some(servo) = running.servo {
+            let begun = Instant::now();
+            while !servo.is_finished() {
+                if keeper.stopped() && begun.elapsed() > SILENT_FOR {
+                    return;
+                }
+                if begun.elapsed() > RELEASE_LIMIT {
+                    keeper.report(HANGS);
+                }
+                thread::park_timeout(Duration::from_millis(1));
+            }
+            self.servo = servo.join().ok();
+        }
+        running.session.close();
+        if self.shared.fault.get().is_none() {
+            self.not_connected();
+        }
+    }
+
+    fn not_connected(&self) {
+        self.shared.fault.set(Some(DeviceFault::NotConnected));
+    }
+}
+
+impl Connector {
+    pub fn new(api: Api, number: u8, shared: Arc<Shared>, servo: Servo) -> Self {
+        Self {
+            api,
+            number,
+            shared,
+            servo: Some(servo),
+            info: None,
+        }
+    }
+
+    /// Waits until the device is calibrated; false when the thread is to end.
+    fn calibrate(
+        &self,
+        keeper: &mut Keeper,
+        session: &Session,
+        description: &Description,
+    ) -> Result<bool, ConnectionError> {
+        while !keeper.stopped() {
+            match health(&session.status()?, false) {
+                Health::Lost(_) => return Err(ConnectionError::Call("dhdGetStatus", 2)),
+                Health::Pause(fault) => {
+                    self.shared.fault.set(Some(fault));
+                    keeper.report(NEEDS_CALIBRATION);
+                    keeper.opened(description.clone());
+                }
+                Health::Good | Health::Off { .. } => return Ok(true),
+            }
+            thread::park_timeout(CALIBRATION_EVERY);
+        }
+        Ok(false)
+    }
+
+    /// Starts the servo thread and waits for its first sample; returns what it was granted.
+    fn start(&mut self, running: &mut Running, info: &DeviceInfo) -> Result<String, ConnectionError> {
+        let mut servo = self.servo.take().ok_or(ConnectionError::NoServo)?;
+        servo.begin(running.session.id, info.peak_torque_nm > 0.0);
+        self.shared.serve();
+        let shared = Arc::clone(&self.shared);
+        let (armed, granted) = mpsc::channel();
+        let serve = move || {
+            let outcome = servo.arm();
+            let may_serve = outcome.is_ok();
+            let _ = armed.send(outcome);
+            drop(armed);
+            if may_serve {
+                servo.run(&shared);
+            }
+            servo
+        };
+        let thread = thread::Builder::new().name("dhd-servo".to_owned()).spawn(serve);
+        running.servo = Some(thread.map_err(|_| ConnectionError::NoServo)?);
+        let granted = granted
+            .recv_timeout(ARMED_LIMIT)
+            .map_err(|_| ConnectionError::NoServo)?;
+        let granted = granted.map_err(ConnectionError::NotArmed)?;
+        let begun = Instant::now();
+        while self.shared.fault.get().is_some() && begun.elapsed() < FIRST_SAMPLE_LIMIT {
+            thread::park_timeout(Duration::from_millis(1));
+        }
+        Ok(granted)
+    }
+}
+
+/// Keeps the limits of the first connection, and refuses another model.
+pub fn same_model(first: &mut Option<DeviceInfo>, now: &Description) -> Result<(), ConnectionError> {
+    match first {
+        Some(info) if *info != now.info => Err(ConnectionError::OtherModel {
+            was: info.name,
+            is: now.info.name,
+        }),
+        _ => {
+            *first = Some(now.info);
+            Ok(())
+        }
+    }
+}

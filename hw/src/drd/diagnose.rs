@@ -1,0 +1,95 @@
+//! What of a Force Dimension device is there, and what is missing; tried without a force.
+
+use std::fs::File;
+use std::path::Path;
+
+use crate::drd::errors;
+use crate::drd::ffi::Api;
+use crate::drd::session::{ConnectionError, Session, sdk_version, version_text};
+use crate::drd::status::{Health, health};
+use crate::finding::{Finding, Severity};
+use crate::library::LoadError;
+use crate::usb;
+
+/// USB vendor of Force Dimension, as in the udev rules that its users publish.
+const VENDOR: &str = "1451";
+const INSTALL: &str = "install the vendor's SDK and run sudo ldconfig, or name the file with --libdrd";
+
+/// Library and USB, without a call to the device. `root` is `/`, or a folder that stands for it.
+pub fn diagnose(root: &Path, library: &Result<Api, LoadError>) -> Vec<Finding> {
+    let mut findings = match library {
+        Ok(api) => {
+            let version = sdk_version(api).map_or("of an unknown version".to_owned(), version_text);
+            vec![Finding::good(format!(
+                "the Force Dimension SDK {version} can be loaded"
+            ))]
+        }
+        Err(LoadError { tried, .. }) => tried
+            .iter()
+            .map(|(name, why)| Finding::new(Severity::Problem, format!("{}: {why}", name.display()), INSTALL))
+            .collect(),
+    };
+    let seen = usb::devices_of(root, VENDOR);
+    if seen.is_empty() {
+        let what = "no Force Dimension device is seen on USB";
+        findings.push(Finding::new(Severity::Note, what, "plug it in and switch it on"));
+    }
+    for device in seen {
+        let usable = File::options()
+            .read(true)
+            .write(true)
+            .open(root.join(&device.file))
+            .is_ok();
+        let what = format!("USB {}: {}", device.place, device.product);
+        findings.push(match usable {
+            true => Finding::good(what),
+            false => Finding::new(
+                Severity::Problem,
+                format!("{what}; /{} cannot be read and written by this user", device.file),
+                errors::cure(4),
+            ),
+        });
+    }
+    findings
+}
+
+/// How many devices the SDK counts.
+pub fn device_count(api: &Api) -> u8 {
+    // SAFETY: no preconditions.
+    let count = unsafe { (api.dhdGetDeviceCount)() };
+    u8::try_from(count.max(0)).unwrap_or(u8::MAX)
+}
+
+/// Opens the device, asks what it is and how it is, and closes it. Its forces stay off. Do not call it while `rt-core` uses it.
+pub fn of_device(api: &Api, number: u8) -> Vec<Finding> {
+    let session = match Session::open(api, number) {
+        Ok(session) => session,
+        Err(why) => return vec![problem(&why)],
+    };
+    let mut findings = Vec::new();
+    findings.push(match session.describe() {
+        Ok(description) => Finding::good(description.to_string()),
+        Err(why) => problem(&why),
+    });
+    findings.push(match session.status().map(|numbers| health(&numbers, false)) {
+        Ok(Health::Good | Health::Off { .. }) => Finding::good("the device is ready"),
+        Ok(Health::Pause(_)) => Finding::new(Severity::Warning, "the device is not calibrated", errors::cure(12)),
+        Ok(Health::Lost(fault)) => Finding::new(Severity::Problem, fault.to_string(), errors::cure(2)),
+        Err(why) => problem(&why),
+    });
+    if api.dhdSetWatchdog.is_none() {
+        let what = "this SDK cannot arm the device's watchdog: a driver that hangs leaves its last force";
+        findings.push(Finding::new(Severity::Warning, what, "install a newer SDK"));
+    }
+    session.close_untouched();
+    findings
+}
+
+fn problem(why: &ConnectionError) -> Finding {
+    let cure = match why {
+        ConnectionError::NoDevice { code, .. } | ConnectionError::Call(_, code) => errors::cure(*code),
+        ConnectionError::WrongModel { .. } => "use a device of a known model",
+        _ => "",
+    };
+    Finding::new(Severity::Problem, why.to_string(), cure)
+}

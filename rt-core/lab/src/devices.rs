@@ -1,0 +1,206 @@
+//! `rt-core devices`: every back end, what of it is there, what it says of itself without a force, and what is missing.
+
+use clap::Args;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+use std::time::Duration;
+use stylet_hw::backend::{BACKENDS, Backend, BackendKind, forms_of};
+use stylet_hw::libhd::diagnose::{self as phantom, Surroundings};
+use stylet_hw::{Device, Finding, Severity, SimulatedPhantom, SimulatedPhantomConfig, drd};
+use stylet_runtime::device::Libraries;
+
+/// A driver that does not answer for this long is left alone.
+const TRIAL_LIMIT: Duration = Duration::from_secs(15);
+/// As many devices of one maker are asked.
+const MAX_DEVICES: u8 = 4;
+
+/// What the list is asked for.
+#[derive(Args, Debug)]
+pub struct DevicesArgs {
+    /// As JSON
+    #[arg(long)]
+    json: bool,
+    /// Look at files and cables only: open no device
+    #[arg(long)]
+    look_only: bool,
+    /// The driver's library libHD.so [default: STYLET_LIBHD, else where the system has it]
+    #[arg(long, value_name = "PATH")]
+    libhd: Option<PathBuf>,
+    /// The library of the Force Dimension SDK, libdrd.so or libdhd.so [default: STYLET_LIBDRD, else where the system has it]
+    #[arg(long, value_name = "PATH")]
+    libdrd: Option<PathBuf>,
+}
+
+/// One back end.
+#[derive(Debug, Serialize)]
+struct Listed {
+    /// What to write after `--device`.
+    forms: Vec<String>,
+    help: &'static str,
+    /// Nobody has tried it on the device itself.
+    untried: bool,
+    /// A run can use it now.
+    usable: bool,
+    findings: Vec<Line>,
+}
+
+#[derive(Debug, Serialize)]
+struct Line {
+    severity: &'static str,
+    what: String,
+    cure: String,
+}
+
+/// Lists, and prints the list; 0.
+pub fn run(args: &DevicesArgs) -> u8 {
+    let libraries = Libraries::or_of_environment(args.libhd.as_deref(), args.libdrd.as_deref());
+    let listed: Vec<_> = BACKENDS
+        .iter()
+        .map(|b| list(b, Path::new("/"), &libraries, !args.look_only))
+        .collect();
+    if args.json {
+        println!("{:#}", serde_json::json!({ "devices": listed }));
+    } else {
+        listed.iter().for_each(|l| println!("{}", text(l)));
+    }
+    0
+}
+
+fn list(backend: &Backend, root: &Path, libraries: &Libraries, try_it: bool) -> Listed {
+    let findings = match backend.kind {
+        BackendKind::Simulated => simulated(),
+        BackendKind::Phantom => phantom(root, libraries.libhd.as_deref(), try_it),
+        BackendKind::Replay => vec![Finding {
+            severity: Severity::Note,
+            what: "needs the file of a motion".to_owned(),
+            cure: "host-ui record --out S.mcap, then host-ui export S.mcap --motion FILE".to_owned(),
+        }],
+        BackendKind::ForceDimension => force_dimension(root, libraries.libdrd.as_deref(), try_it),
+    };
+    // A note is about what another device of the maker needs.
+    let usable = findings.iter().all(|f| f.severity != Severity::Problem)
+        && findings.iter().any(|f| f.severity == Severity::Good);
+    Listed {
+        forms: forms_of(backend),
+        help: backend.help,
+        untried: backend.untried,
+        usable,
+        findings: findings.into_iter().map(line).collect(),
+    }
+}
+
+fn simulated() -> Vec<Finding> {
+    let mut device = SimulatedPhantom::new(SimulatedPhantomConfig::default());
+    let (severity, what) = match device.read(1e-3) {
+        Ok(_) => (Severity::Good, "ready".to_owned()),
+        Err(why) => (Severity::Problem, why.to_string()),
+    };
+    let cure = String::new();
+    vec![Finding { severity, what, cure }]
+}
+
+fn phantom(root: &Path, library: Option<&Path>, try_it: bool) -> Vec<Finding> {
+    let (here, api) = Surroundings::of_this_process(library);
+    let mut findings = phantom::diagnose(root, &here);
+    if let Some(api) = api.filter(|_| try_it) {
+        findings.extend(within_limit(move || phantom::of_device(&api, None)));
+    }
+    findings
+}
+
+fn force_dimension(root: &Path, library: Option<&Path>, try_it: bool) -> Vec<Finding> {
+    let api = drd::Api::load(library);
+    let mut findings = drd::diagnose(root, &api);
+    if let Some(api) = api.ok().filter(|_| try_it) {
+        findings.extend(within_limit(move || {
+            let count = drd::device_count(&api).clamp(1, MAX_DEVICES);
+            (0..count).flat_map(|number| drd::of_device(&api, number)).collect()
+        }));
+    }
+    findings
+}
+
+/// What the trial finds, or that the driver does not answer; its thread is then left alone.
+fn within_limit(trial: impl FnOnce() -> Vec<Finding> + Send + 'static) -> Vec<Finding> {
+    let (found, findings) = mpsc::channel();
+    std::thread::spawn(move || {
+        // The receiver may have given up.
+        let _ = found.send(trial());
+    });
+    findings.recv_timeout(TRIAL_LIMIT).unwrap_or_else(|_| {
+        vec![Finding {
+            severity: Severity::Problem,
+            what: "the driver does not answer".to_owned(),
+            cure: "check the device's power and cable, then try again".to_owned(),
+        }]
+    })
+}
+
+fn line(finding: Finding) -> Line {
+    let severity = match finding.severity {
+        Severity::Good => "good",
+        Severity::Note => "note",
+        Severity::Warning => "warning",
+        Severity::Problem => "missing",
+    };
+    let (what, cure) = (finding.what, finding.cure);
+    Line { severity, what, cure }
+}
+
+fn text(listed: &Listed) -> String {
+    let state = if listed.usable {
+        "can be used"
+    } else {
+        "cannot be used now"
+    };
+    let mut out = format!("--device {}: {state}\n  {}\n", listed.forms.join(" or "), listed.help);
+    if listed.untried {
+        out += "  Not tried on the device: Stylet's tests have only a fake of its driver.\n";
+    }
+    for f in &listed.findings {
+        out += &format!("  {:<8} {}\n", f.severity, f.what);
+        if !f.cure.is_empty() {
+            out += &format!("  {:<8} -> {}\n", "", f.cure);
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn nowhere() -> Libraries {
+        Libraries {
+            libhd: Some("/nonexistent/libHD.so".into()),
+            libdrd: Some("/nonexistent/libdrd.so".into()),
+        }
+    }
+
+    #[test]
+    fn every_back_end_is_listed_with_its_forms_and_whether_anybody_has_tried_it() {
+        let root = Path::new("/nonexistent");
+        for backend in BACKENDS {
+            let listed = list(backend, root, &nowhere(), true);
+            let text = text(&listed);
+            println!("{text}");
+            assert!(listed.forms.iter().all(|form| text.contains(form.as_str())), "{text}");
+            assert_eq!(text.contains("Not tried on the device"), backend.untried, "{text}");
+            assert!(!listed.findings.is_empty());
+            assert_eq!(listed.usable, backend.kind == BackendKind::Simulated, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_missing_library_is_said_with_what_to_do() {
+        let root = Path::new("/nonexistent");
+        let backend = BACKENDS.iter().find(|b| b.kind == BackendKind::ForceDimension);
+        let text = text(&list(backend.expect("listed"), root, &nowhere(), true));
+        assert!(text.contains("missing  /nonexistent/libdrd.so: "), "{text}");
+        assert!(
+            text.contains("--libdrd") && text.contains("cannot be used now"),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,131 @@
+//! The whole haptic loop over a stepped Force Dimension device, against a membrane at z = 0: one thread, one clock.
+
+use fake_drd::control::put;
+use nalgebra::Vector3;
+use std::sync::atomic::Ordering::Relaxed;
+use stylet_hw::Device;
+use stylet_hw::drd::Stepped;
+use stylet_runtime::rt::exchange::HapticOrder;
+use stylet_runtime::rt::haptic::HapticLoop;
+use stylet_runtime::rt::haptic_tape::HapticMemory;
+use stylet_runtime::rt::response::TissueResponse;
+use stylet_runtime::rt::wiring::{BridgePorts, Capacities, TissuePorts, Wiring};
+use stylet_shm_schema::{Fault, TickRecord};
+use stylet_sim::force::ForceParameters;
+use stylet_sim::needle::{LayerKind, NeedleParameters};
+
+use super::fake::{Fake, api, config};
+
+const TICK_NS: u64 = 1_000_000;
+/// Where the hand waits, and how deep it presses.
+const OUTSIDE_M: f64 = -0.005;
+const PRESSED_M: f64 = 0.006;
+const SPEED_M_PER_TICK: f64 = 4e-5;
+
+pub struct Rig {
+    pub fake: Fake,
+    haptic: HapticLoop,
+    tissue: TissueResponse,
+    tissue_ports: TissuePorts,
+    bridge: BridgePorts,
+    contacts: u64,
+    now_ns: u64,
+    hand_m: f64,
+}
+
+/// What one tick ended with.
+pub struct Seen {
+    pub record: TickRecord,
+    /// Force of the device's motors, N.
+    pub motors_n: f64,
+}
+
+impl Seen {
+    pub fn fault(&self) -> Fault {
+        Fault::from_number(self.record.fault).expect("a known fault")
+    }
+}
+
+impl Rig {
+    pub fn new() -> Self {
+        let fake = Fake::new();
+        let now_ns = 1_000_000_000;
+        fake.control.now_us.store(now_ns / 1000, Relaxed);
+        let control = fake.control;
+        let runs = Box::new(move || control.hang.load(Relaxed) == 0);
+        let device = Stepped::open(api(), &config(), runs).expect("a healthy device");
+        let parameters = (NeedleParameters::default(), ForceParameters::default());
+        let memory = HapticMemory::new(&device.info(), parameters, 0);
+        let wiring = Wiring::new(Capacities::STEPPED, None, None);
+        let mut rig = Self {
+            fake,
+            haptic: HapticLoop::new(1, Box::new(device), wiring.haptic, &memory, 1e-3),
+            tissue: TissueResponse::default(),
+            tissue_ports: wiring.tissue,
+            bridge: wiring.bridge,
+            contacts: 0,
+            now_ns,
+            hand_m: OUTSIDE_M,
+        };
+        rig.hold(OUTSIDE_M);
+        rig
+    }
+
+    /// The hand holds the tip at this depth.
+    fn hold(&mut self, depth_m: f64) {
+        self.hand_m = depth_m;
+        // World +z is away from the operator: -x of the device.
+        put(&self.fake.control.tip_m[0], -depth_m);
+    }
+
+    pub fn tick(&mut self) -> Seen {
+        self.now_ns += TICK_NS;
+        self.fake.control.now_us.store(self.now_ns / 1000, Relaxed);
+        self.tissue.time_ns = self.now_ns;
+        self.tissue_ports.response.write(self.tissue);
+        self.haptic.tick(self.now_ns, self.now_ns, 0);
+        while self.bridge.haptic_notices.pop().is_ok() {}
+        let record = self.bridge.records.pop().expect("a record for each tick");
+        // The membrane is met where the tip passes it, and left where it is well outside.
+        let depth_m = record.tip_in_scene_m[2];
+        if depth_m > 0.0 && self.tissue.contact == 0 {
+            self.contacts += 1;
+            self.tissue.contact = self.contacts;
+            (self.tissue.layer, self.tissue.layer_number) = (LayerKind::Gland, self.contacts);
+        } else if depth_m < -2e-3 {
+            self.tissue.contact = 0;
+        }
+        let motors_n = Vector3::from(self.fake.control.motors_n(self.now_ns / 1000)).norm();
+        Seen { record, motors_n }
+    }
+
+    fn move_to(&mut self, depth_m: f64) -> Seen {
+        loop {
+            let left_m = depth_m - self.hand_m;
+            self.hold(self.hand_m + left_m.clamp(-SPEED_M_PER_TICK, SPEED_M_PER_TICK));
+            let seen = self.tick();
+            if left_m == 0.0 {
+                return seen;
+            }
+        }
+    }
+
+    /// Draws back, arms again, and presses until the membrane resists. False where the force did not come back.
+    pub fn press(&mut self) -> bool {
+        self.move_to(OUTSIDE_M);
+        for _ in 0..3000 {
+            let seen = self.tick();
+            if seen.fault() == Fault::None && self.haptic.state.flags & stylet_shm_schema::flags::ENGAGED != 0 {
+                break;
+            }
+            if self.bridge.haptic_orders.slots() > 1 {
+                let _ = self.bridge.haptic_orders.push(HapticOrder::Engage { ticket: 0 });
+            }
+        }
+        for _ in 0..250 {
+            self.tick();
+        }
+        let seen = self.move_to(PRESSED_M);
+        seen.fault() == Fault::None && (1.0..8.5).contains(&seen.motors_n)
+    }
+}
