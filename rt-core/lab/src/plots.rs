@@ -325,9 +325,9 @@ where
 
 /// In the upper right corner.
 fn legend(root: &Area, entries: &[(String, RGBColor)]) -> Drawn {
+    let right = root.dim_in_pixel().0 as i32 - 30;
     for (i, (name, color)) in entries.iter().enumerate() {
         let y = 22 + 18 * i as i32;
-        let right = SIZE.0 as i32 - 30;
         root.draw(&Rectangle::new([(right - 10, y - 5), (right, y + 5)], color.filled()))?;
         let style = label().pos(Pos::new(HPos::Right, VPos::Center));
         root.draw(&Text::new(name.clone(), (right - 16, y), style))?;

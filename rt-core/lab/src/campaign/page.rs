@@ -122,11 +122,14 @@ fn pictures(r: &CampaignReport) -> Result<Markup, DrawError> {
             windows: p
                 .maxima
                 .iter()
-                .map(|m| (m.at_s, m.worst_wake_us, m.worst_work_us))
+                .map(|m| {
+                    let measured = f64::from(m.ticks) + f64::from(m.missed);
+                    (measured / f64::from(p.part.rate), m.worst_wake_us, m.worst_work_us)
+                })
                 .collect(),
         })
         .collect();
-    let maxima = plots::maxima(&parts, r.window_s)?;
+    let maxima = plots::maxima(&parts)?;
     // The quietest and the loudest part show the range; all of them would lie over each other.
     let median = |p: &PartReport| p.force.wake_times.value_at_quantile(0.99);
     let least = measured().min_by_key(|(p, _)| median(p));

@@ -9,32 +9,29 @@ const SIZE: (u32, u32) = (1_120, 320);
 /// One part of a campaign.
 pub struct MaximaPart<'a> {
     pub name: &'a str,
-    /// Begin of each window in seconds since 1970, worst wake-up and longest tick in microseconds.
+    /// How long each window was measured, s, its worst wake-up and longest tick in microseconds.
     pub windows: Vec<(f64, f64, f64)>,
 }
 
 /// Begin and end of each window in seconds of measurement: breaks between sessions are left out.
-fn places(parts: &[MaximaPart], window_s: f64) -> Vec<Vec<(f64, f64)>> {
+fn places(parts: &[MaximaPart]) -> Vec<Vec<(f64, f64)>> {
     let mut at = 0.0;
     let mut place = |part: &MaximaPart| {
-        let mut all = Vec::with_capacity(part.windows.len());
-        for (i, window) in part.windows.iter().enumerate() {
-            let next = part.windows.get(i + 1).map(|next| next.0 - window.0);
-            // A session that ended within a window leaves a shorter one.
-            let end = at + next.map_or(window_s, |gap| gap.clamp(0.0, window_s));
-            all.push((at, end));
-            at = end;
-        }
-        all
+        let windows = part.windows.iter().map(|window| {
+            let begin = at;
+            at += window.0;
+            (begin, at)
+        });
+        windows.collect()
     };
     parts.iter().map(&mut place).collect()
 }
 
 /// Wake-ups and own work, logarithmic microseconds over hours; a line parts the parts.
-pub fn maxima(parts: &[MaximaPart], window_s: f64) -> Result<String, DrawError> {
+pub fn maxima(parts: &[MaximaPart]) -> Result<String, DrawError> {
     picture_of(SIZE, |root| {
-        let places = places(parts, window_s);
-        let end_s = places.iter().flatten().map(|(_, end)| *end).fold(window_s, f64::max);
+        let places = places(parts);
+        let end_s = places.iter().flatten().map(|(_, end)| *end).fold(1.0, f64::max);
         let (unit_s, unit) = if end_s >= 7_200.0 {
             (3_600.0, "hours")
         } else {
@@ -42,7 +39,8 @@ pub fn maxima(parts: &[MaximaPart], window_s: f64) -> Result<String, DrawError> 
         };
         let all = || parts.iter().flat_map(|p| p.windows.iter().flat_map(|w| [w.1, w.2]));
         let low = all().fold(10.0, f64::min).max(0.1).log10().floor();
-        let high = decade_above(all().fold(10.0, f64::max) * 2.0);
+        // The legend has the highest decade to itself.
+        let high = 10.0 * decade_above(all().fold(10.0, f64::max));
         let mut chart = ChartBuilder::on(root)
             .margin(10)
             .margin_right(22)
@@ -90,15 +88,16 @@ pub fn maxima(parts: &[MaximaPart], window_s: f64) -> Result<String, DrawError> 
 mod tests {
     use super::*;
 
+    /// Each session's last window was drawn as long as the others, and an hour in five sessions was 74 minutes wide.
     #[test]
-    fn breaks_between_sessions_take_no_room_and_short_windows_stay_short() {
-        let part = |begins: &[f64]| MaximaPart {
+    fn windows_are_as_wide_as_they_were_measured() {
+        let part = |lengths: &[f64]| MaximaPart {
             name: "none",
-            windows: begins.iter().map(|s| (*s, 10.0, 5.0)).collect(),
+            windows: lengths.iter().map(|s| (*s, 10.0, 5.0)).collect(),
         };
-        // The second window was cut short after 100 s; an hour passed between the third and the fourth.
-        let at = places(&[part(&[0.0, 300.0, 400.0, 4_000.0]), part(&[9_000.0])], 300.0);
-        let first = vec![(0.0, 300.0), (300.0, 400.0), (400.0, 700.0), (700.0, 1_000.0)];
-        assert_eq!(at, [first, vec![(1_000.0, 1_300.0)]]);
+        // Two sessions were ended within a window.
+        let at = places(&[part(&[300.0, 100.0, 300.0, 20.0]), part(&[300.0])]);
+        let first = vec![(0.0, 300.0), (300.0, 400.0), (400.0, 700.0), (700.0, 720.0)];
+        assert_eq!(at, [first, vec![(720.0, 1_020.0)]]);
     }
 }
