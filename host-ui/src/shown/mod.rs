@@ -173,6 +173,11 @@ impl Shown {
         self.has_flag(flags::PUNCTURED)
     }
 
+    /// The tip touches tissue, or is behind a membrane.
+    pub fn is_in_tissue(&self) -> bool {
+        self.has_punctured() || self.has_flag(flags::IN_CONTACT)
+    }
+
     /// `None` for a number that this program does not know, which is a fault too.
     pub fn fault(&self) -> Option<Fault> {
         Fault::from_number(self.state.map_or(0, |s| s.fault))
@@ -290,7 +295,7 @@ impl Shown {
             length_m: self.path_length_m()?,
             beside_m,
             room_m,
-            is_free: !self.has_punctured() && !self.has_flag(flags::IN_CONTACT),
+            is_free: !self.is_in_tissue(),
         })
     }
 

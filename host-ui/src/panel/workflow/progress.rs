@@ -3,6 +3,7 @@
 use crate::action::{Action, PlanAction};
 use crate::shown::Shown;
 use stylet_base::format;
+use stylet_procedure::tolerance::PLACED_WITHIN_M;
 use stylet_procedure::{AtHand, Operation, Step};
 
 /// A step of the procedure.
@@ -66,9 +67,12 @@ pub fn progress(shown: &Shown) -> Progress {
 
 /// The needle at work; `None` without a plan or a tip.
 pub fn needle_at_hand(shown: &Shown) -> Option<AtHand> {
+    let (depth_m, beside_m) = (shown.path_depth_m()?, shown.off_path_m()?);
+    // Before the hole of another needle the tip may be deeper along this one's path than its entry.
+    let is_elsewhere = beside_m > PLACED_WITHIN_M && !shown.is_in_tissue();
     Some(AtHand {
-        depth_m: shown.path_depth_m()?,
-        beside_m: shown.off_path_m()?,
+        depth_m: if is_elsewhere { depth_m.min(0.0) } else { depth_m },
+        beside_m,
         speed_m_per_s: shown.state.map(|s| s.speed_m_per_s),
         dropped: shown.own_seeds().len(),
         deepest_drop_m: shown.deepest_seed_m(),

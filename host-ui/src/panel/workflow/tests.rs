@@ -72,6 +72,22 @@ fn the_next_needle_is_the_thing_to_do_once_one_is_outside_and_its_seeds_are_drop
     assert_eq!((progress(&last), next_action(&last)), (Progress::Debrief, None));
 }
 
+/// A window that was opened while the tip stood before the next hole said "Take the needle out".
+#[test]
+fn a_tip_before_another_hole_is_outside_however_deep_it_is_along_the_path_before() {
+    let mut planner = planner();
+    planner.begin_needle(0, 0);
+    let mut elsewhere = shown(&mut planner, 5e-3, &[0.08, 0.07]);
+    assert_eq!(progress(&elsewhere), Progress::Retract, "on its path");
+    let tip_m = &mut elsewhere.state.as_mut().expect("a state").tip_in_scene_m;
+    *tip_m = [tip_m[0] + 5e-3, tip_m[1], tip_m[2]];
+    assert!(is_needle_done(&elsewhere));
+    assert_eq!(progress(&elsewhere), Progress::Place);
+    // In tissue beside its path it still has to come out.
+    elsewhere.state.as_mut().expect("a state").flags |= flags::IN_CONTACT;
+    assert_eq!(progress(&elsewhere), Progress::Retract);
+}
+
 /// The button said "all four steps" over a list of seven.
 #[test]
 fn the_button_names_the_steps_of_the_panel_that_the_script_does() {
