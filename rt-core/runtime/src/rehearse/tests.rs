@@ -11,6 +11,7 @@ mod carrying;
 mod left;
 mod migration;
 mod order;
+mod paper;
 mod sequence;
 
 fn stage_of(tissue: TissueKind) -> Stage {

@@ -1,0 +1,85 @@
+//! The mode `paper` keeps its bits: eight scripted procedures, stepped without a clock, and one number over all of their ticks.
+
+use super::script::Script;
+use super::*;
+
+/// FNV-1a, 64 bits.
+struct Digest(u64);
+
+impl Digest {
+    fn take(&mut self, values: &[f64]) {
+        for byte in values.iter().flat_map(|v| v.to_bits().to_le_bytes()) {
+            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
+        }
+    }
+}
+
+/// Tip, force, torque, depth, speed and displacement of every tick, then the seeds and the largest force.
+fn digest(stage: &mut Stage, run: &NeedleRun) -> u64 {
+    let active = activate(&ParameterSet::default(), &stage.device).expect("valid");
+    let mut world = stage.world.take().expect("given back");
+    world.tissue.return_to_rest();
+    let mut rig = Rig::new(world, &active, (&stage.device, stage.hand), run);
+    let (mut script, mut all) = (Script::new(run), Digest(0xcbf2_9ce4_8422_2325));
+    loop {
+        rig.tick();
+        let state = rig.state();
+        all.take(&state.tip_in_scene_m);
+        all.take(&state.force_on_hand_n);
+        all.take(&state.torque_on_hand_nm);
+        all.take(&[state.depth_m, state.speed_m_per_s, rig.displacement_m()]);
+        assert!(rig.seconds() < 120.0, "it does not end");
+        if script.advance(&mut rig).expect("goes on") {
+            break;
+        }
+    }
+    for seed in rig.seeds() {
+        all.take(&seed.position_m);
+    }
+    all.take(&[rig.state().peak_force_n]);
+    stage.world = Some(rig.into_world());
+    all.0
+}
+
+/// Through the target of a scene, so far beside its middle, with three drops.
+fn through(scene: &str, speed_m_per_s: f64, beside_m: f64) -> (Stage, NeedleRun) {
+    let source = SceneSource::Builtin(scene.to_owned());
+    let stage = Stage::build(&source, TissueKind::Paper, DeviceInfo::phantom_premium_1_5()).expect("built in");
+    let built = stylet_sim::scene::Scene::builtin(scene).expect("built in");
+    let (low, high) = built.target_bounds_m();
+    let (outside, _) = built.lattice.bounds_m();
+    let (x, y) = ((low[0] + high[0]) / 2.0 + beside_m, (low[1] + high[1]) / 2.0);
+    let at = |share: f64| Vector3::new(x, y, low[2] + share * (high[2] - low[2]));
+    let run = NeedleRun {
+        entry_m: Vector3::new(x, y, outside[2] - 0.01),
+        insert_m_per_s: speed_m_per_s,
+        retract_m_per_s: speed_m_per_s,
+        drops_m: [0.8, 0.5, 0.2].map(at).to_vec(),
+        ..needle()
+    };
+    (stage, run)
+}
+
+/// As the last commit before the needle line has them (097ef98).
+const KEPT: [u64; 8] = [
+    0x77dc_8ed7_802c_7a90,
+    0x4f92_e141_4347_4a35,
+    0xbd1d_2490_452f_b805,
+    0xef0c_0ee9_5422_7cf0,
+    0x212a_595c_0369_36e4,
+    0xe574_d9d5_f4e9_9fef,
+    0xca80_6868_9896_0b9f,
+    0xa625_4abe_fb5d_02d8,
+];
+
+#[test]
+fn the_paper_as_printed_keeps_its_bits() {
+    let mut found = Vec::new();
+    for scene in ["paper", "pelvis"] {
+        for (speed_m_per_s, beside_m) in [(0.01, 0.0), (0.05, 0.0), (0.123, 0.0), (0.05, 0.004)] {
+            let (mut stage, run) = through(scene, speed_m_per_s, beside_m);
+            found.push(digest(&mut stage, &run));
+        }
+    }
+    assert_eq!(found, KEPT, "{found:#018x?}");
+}
