@@ -147,7 +147,8 @@ where
     // At the right end no model is as far off as these.
     let nulls = [
         ("nothing moves", points[0].nothing_moves_percent),
-        ("best shift as one piece", points[0].best_shift_percent),
+        // Short: to its left are models.
+        ("best shift", points[0].best_shift_percent),
     ];
     for (name, percent) in nulls {
         let line = DashedLineSeries::new([(start, percent), (end, percent)], 5, 4, TEXT.stroke_width(1));
