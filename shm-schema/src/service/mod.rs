@@ -137,13 +137,7 @@ macro_rules! service {
             /// Who is connected.
             pub fn watch(node: &Node) -> Result<Watch, ServiceError> {
                 let service = open(node)?;
-                Ok(Watch::new(move || {
-                    let config = service.dynamic_config();
-                    Connected {
-                        subscribers: config.number_of_subscribers(),
-                        publishers: config.number_of_publishers(),
-                    }
-                }))
+                Ok(Watch::new(move || service.dynamic_config().into()))
             }
         }
     };
@@ -201,13 +195,7 @@ macro_rules! service {
             /// Who is connected.
             pub fn watch(node: &Node) -> Result<Watch, ServiceError> {
                 let service = open(node)?;
-                Ok(Watch::new(move || {
-                    let config = service.dynamic_config();
-                    Connected {
-                        subscribers: config.number_of_subscribers(),
-                        publishers: config.number_of_publishers(),
-                    }
-                }))
+                Ok(Watch::new(move || service.dynamic_config().into()))
             }
         }
     };

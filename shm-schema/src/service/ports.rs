@@ -10,6 +10,8 @@ use iceoryx2::port::{publisher, subscriber};
 use iceoryx2::prelude::ZeroCopySend;
 use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
+use iceoryx2::service::Service;
+use iceoryx2::service::dynamic_config::publish_subscribe::DynamicConfig;
 use std::cell::{Cell, RefCell};
 use std::fmt::Debug;
 
@@ -320,6 +322,15 @@ pub struct Connected {
     pub subscribers: usize,
     /// How many send.
     pub publishers: usize,
+}
+
+impl From<&DynamicConfig<<Ipc as Service>::Bag>> for Connected {
+    fn from(config: &DynamicConfig<<Ipc as Service>::Bag>) -> Self {
+        Self {
+            subscribers: config.number_of_subscribers(),
+            publishers: config.number_of_publishers(),
+        }
+    }
 }
 
 /// Who is connected to a service.
