@@ -158,13 +158,6 @@ fn line_ui(ui: &mut egui::Ui, shown: &Shown) {
     badge(ui, word, color)
         .on_hover_text(hint)
         .explained("needle line ready");
-    if let Some((lag_s, lag_m)) = shown.lag() {
-        let lag = format!("{:.0} ms, {} behind", lag_s * 1e3, format::length(lag_m));
-        ui.label(RichText::new(lag).size(12.0).color(tokens.bad)).on_hover_text(
-            "How old the pose of the needle is that the tissue has answered, and how far the tip has come since. On a line there is \
-             no such lag.",
-        );
-    }
 }
 
 fn badge(ui: &mut egui::Ui, word: &str, color: Color32) -> egui::Response {

@@ -32,6 +32,13 @@ pub const STATES: &[State] = &[
         app.shown = live();
         every_banner(&mut app.shown);
     }),
+    ("no line, folded, force waits", |app| {
+        app.shown = without_line(flags::WAITING | flags::FOLDED);
+        if let Some(state) = &mut app.shown.state {
+            (state.lag_ns, state.lag_m, state.folded_from_m) = (1_234_000_000, 12.3e-3, 12.3e-3);
+        }
+    }),
+    ("no line, by the law of the paper", |app| app.shown = without_line(0)),
     ("recording", |app| recorded(app, one_needle(0.03, 2), false)),
     ("recording with the guide", |app| {
         recorded(app, one_needle(0.03, 2), false);
@@ -173,6 +180,15 @@ fn running(shown: &mut Shown, waits: Option<Waiting>) {
 /// As many needles as may stay in.
 fn stay_in(shown: &mut Shown) {
     shown.left = vec![LeftNeedlePose::zeroed(); MAX_LEFT_NEEDLES];
+}
+
+/// A needle in tissue that was not prepared for it.
+fn without_line(more: u32) -> Shown {
+    let mut shown = one_needle(0.03, 2);
+    if let Some(state) = &mut shown.state {
+        state.flags = flags::REAL_TIME | flags::ENGAGED | flags::IN_CONTACT | flags::LINE_NEEDED | more;
+    }
+    shown
 }
 
 fn every_banner(shown: &mut Shown) {
