@@ -53,6 +53,10 @@ pub struct LatencyArgs {
     /// Measure nothing: compare a capture of the pin (sigrok CSV or VCD, WAV) with the record of --toggle in DIR
     #[arg(long, value_name = "FILE", conflicts_with_all = ["toggle", "trace", "compare"])]
     pub external: Option<PathBuf>,
+    /// Input of the capture that shows when the handle moves, such as an accelerometer: delays after it are given as well, from motion to
+    /// photon and from motion to force
+    #[arg(long, value_name = "INPUT", requires = "external")]
+    pub motion: Option<String>,
     /// Limits in a TOML file, one `name = value` a line
     #[arg(long, value_name = "FILE")]
     pub limits: Option<PathBuf>,
