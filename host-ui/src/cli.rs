@@ -58,7 +58,7 @@ pub struct Cli {
     /// Print each second how many frames were drawn and what they cost
     #[arg(long)]
     count_frames: bool,
-    /// Show a square in the lower left corner that turns from dark to light or back when the tip has moved by 0.5 mm, for a photodiode
+    /// Show a square in the lower right corner that turns from dark to light or back when the tip has moved by 0.5 mm, for a photodiode
     #[arg(long)]
     patch: bool,
     #[command(subcommand)]

@@ -1,6 +1,6 @@
 //! A patch in a corner of the window that changes when the tip moves, for a photodiode: from motion to photon.
 
-use egui::{Color32, Context, Id, LayerId, Order, Pos2, Rect, Vec2};
+use egui::{Color32, Context, Id, LayerId, Order, Rect, Vec2};
 use nalgebra::{Point3, distance};
 
 /// Side of the square; a photodiode with its holder covers it.
@@ -32,10 +32,10 @@ impl Patch {
     }
 }
 
-/// Draws it over everything else, in the lower left corner.
+/// Draws it over everything else, in the lower right corner, where nothing can be pressed.
 pub(super) fn patch_ui(ctx: &Context, is_light: bool) {
     let window = ctx.content_rect();
-    let corner = Pos2::new(window.left(), window.bottom() - SIDE);
+    let corner = window.max - Vec2::splat(SIDE);
     let colour = if is_light { Color32::WHITE } else { Color32::BLACK };
     let painter = ctx.layer_painter(LayerId::new(Order::Tooltip, Id::unique("patch")));
     painter.rect_filled(Rect::from_min_size(corner, Vec2::splat(SIDE)), 0.0, colour);
