@@ -60,6 +60,8 @@ impl FromStr for Pin {
 }
 
 /// The port of a serial device, as its driver has it.
+// Read with the command line, before any loop.
+#[allow(clippy::disallowed_methods)]
 fn register_of(device: &Path) -> Result<String, String> {
     let name = device.file_name().unwrap_or_default();
     let port = std::fs::read_to_string(Path::new("/sys/class/tty").join(name).join("port")).unwrap_or_default();
