@@ -61,8 +61,8 @@ fn files_of_killed_programs_go_with_the_next_start_and_those_of_living_ones_stay
     let mut next = Core::start();
     drop(next.host());
     // The killed core had another name than the one that comes next, as the campaign had.
-    for gone in [&of_campaign, &of_core] {
-        assert_eq!(left_behind(gone), [""; 0], "{}", gone.name());
+    for swept in [&of_campaign, &of_core] {
+        assert_eq!(left_behind(swept), [""; 0], "{}", swept.name());
     }
     // It serves, and a host that comes late finds it.
     link.poll();
