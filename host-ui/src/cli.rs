@@ -58,6 +58,9 @@ pub struct Cli {
     /// Print each second how many frames were drawn and what they cost
     #[arg(long)]
     count_frames: bool,
+    /// Show a square in the lower right corner that turns from dark to light or back when the tip has moved by 0.5 mm, for a photodiode
+    #[arg(long)]
+    patch: bool,
     #[command(subcommand)]
     task: Option<Task>,
 }
@@ -212,6 +215,7 @@ impl Cli {
                     controllers: !self.no_controllers,
                     pause: !self.without_pause,
                     count_frames: self.count_frames,
+                    patch: self.patch,
                 });
                 instance.sweep();
                 Ok(ended?)

@@ -1,6 +1,6 @@
 //! Where each part of the window stands. Nothing that comes and goes moves anything else.
 
-use super::App;
+use super::{App, patch};
 use crate::action::Action;
 use crate::panel::parameters::parameters_ui;
 use crate::panel::workflow::{Progress, editor_ui, foot_height, foot_ui, run_ui, workflow_ui};
@@ -52,6 +52,10 @@ impl App {
         actions.extend(banners::banners_ui(ui.ctx(), pictures, &banners::banners(&self.shown)));
         parameters_ui(ui.ctx(), &self.shown, &mut self.parameters);
         help::help_ui(ui.ctx(), &self.shown, &mut self.help);
+        if let Some(patch) = &mut self.patch {
+            let tip = self.shown.state.map(|s| s.tip_in_scene_m);
+            patch::patch_ui(ui.ctx(), patch.take(tip));
+        }
         actions
     }
 

@@ -6,6 +6,7 @@ mod drive;
 mod files;
 mod frames;
 mod layout;
+mod patch;
 mod plan;
 mod take;
 mod watch;
@@ -58,6 +59,8 @@ pub struct Options {
     pub pause: bool,
     /// Prints each second how many frames were drawn and what they cost.
     pub count_frames: bool,
+    /// Shows a patch that changes when the tip moves.
+    pub patch: bool,
 }
 
 /// A command that has not been answered yet.
@@ -110,6 +113,7 @@ pub struct App {
     controllers: Controllers,
     pause: bool,
     count_frames: bool,
+    patch: Option<patch::Patch>,
     frames: frames::Frames,
     /// The core that was left to the force loop.
     left_core: Option<u32>,
@@ -250,6 +254,7 @@ impl App {
             },
             pause: options.pause,
             count_frames: options.count_frames,
+            patch: options.patch.then(patch::Patch::default),
             frames: frames::Frames::new(Instant::now()),
             left_core: None,
             drive: drive::Drive::default(),

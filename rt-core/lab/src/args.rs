@@ -43,7 +43,7 @@ pub struct LatencyArgs {
     /// Rounds of the comparison; each measures both sides once, 0 measures none
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(0..=100), value_name = "N")]
     pub rounds: u32,
-    /// Let the force loop toggle a pin for an instrument: serial:0x3F8:rts, serial:0x3F8:dtr or parallel:0x378; needs root
+    /// Let the force loop toggle a pin for an instrument: serial:0x3F8:rts, serial:0x3F8:dtr, /dev/ttyS0:rts or parallel:0x378; needs root
     ///
     /// One instruction writes the register, at irregular times of 20 to 83 ticks, and the loop notes when: DIR/toggles.csv. The
     /// addresses of the ports are in /proc/ioports. Record the pin with a logic analyser, or with a sound card through a
@@ -53,6 +53,10 @@ pub struct LatencyArgs {
     /// Measure nothing: compare a capture of the pin (sigrok CSV or VCD, WAV) with the record of --toggle in DIR
     #[arg(long, value_name = "FILE", conflicts_with_all = ["toggle", "trace", "compare"])]
     pub external: Option<PathBuf>,
+    /// Input of the capture that shows when the handle moves, such as an accelerometer: delays after it are given as well, from motion to
+    /// photon and from motion to force
+    #[arg(long, value_name = "INPUT", requires = "external")]
+    pub motion: Option<String>,
     /// Limits in a TOML file, one `name = value` a line
     #[arg(long, value_name = "FILE")]
     pub limits: Option<PathBuf>,

@@ -62,7 +62,7 @@ pub enum LatencyError {
 /// The exit code is the verdict: 0 pass, 1 fail, 2 not measurable.
 pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyError> {
     if let Some(file) = &args.external {
-        return Ok(external::run(&args.out, file)?);
+        return Ok(external::run(&args.out, file, args.motion.as_deref())?);
     }
     let mut options = args.options()?;
     let whose = args.whose.read()?;

@@ -1,11 +1,10 @@
 //! Where programs meet: the user's and the instance's part of every name in shared memory.
 
+use super::sweep::Turn;
 use super::{Ipc, Node, ServiceError, failed};
 use iceoryx2::config::Config;
-use iceoryx2::node::{self, NodeBuilder, NodeState, NodeView};
-use iceoryx2::prelude::{
-    CallbackProgression, FileName, LogLevel, Path, SemanticString, SignalHandlingMode, set_log_level,
-};
+use iceoryx2::node::NodeBuilder;
+use iceoryx2::prelude::{FileName, LogLevel, Path, SemanticString, SignalHandlingMode, set_log_level};
 use std::time::Duration;
 
 /// Where two programs meet: the same user and the same instance name.
@@ -37,12 +36,10 @@ impl Instance {
 
     /// Begins the name of every shared-memory object.
     pub fn prefix(&self) -> String {
-        // SAFETY: getuid has no preconditions.
-        let user = unsafe { libc::getuid() };
-        format!("stylet_{user}_{}_", self.0)
+        format!("{}{}_", prefix_of_user(), self.0)
     }
 
-    fn config(&self) -> Result<Config, ServiceError> {
+    pub(super) fn config(&self) -> Result<Config, ServiceError> {
         let mut config = Config::default();
         config
             .global
@@ -59,6 +56,7 @@ impl Instance {
         if free < MIN_ROOM_BYTES {
             return Err(failed("shared memory is full", format!("{free} bytes left")));
         }
+        let _turn = Turn::start();
         NodeBuilder::new()
             .config(&self.config()?)
             .signal_handling_mode(SignalHandlingMode::Disabled)
@@ -94,43 +92,13 @@ impl Instance {
         }
         Ok(())
     }
+}
 
-    /// Removes every file of this instance, unless a program still uses it. For the program that ends last.
-    pub fn sweep(&self) {
-        self.sweep_unless(|_| true);
-    }
-
-    /// The same for a program that ends although a thread of its own may keep its node from being dropped.
-    pub fn sweep_at_end(&self) {
-        let me = std::process::id();
-        self.sweep_unless(|pid| pid != Some(me));
-    }
-
-    /// `counts` says whether a node of that process is in use.
-    fn sweep_unless(&self, counts: impl Fn(Option<u32>) -> bool) {
-        let Ok(config) = self.config() else { return };
-        let mut used = false;
-        let listed = node::Node::<Ipc>::list(&config, |state| {
-            used |= match &state {
-                NodeState::Dead(_) => false,
-                NodeState::Alive(view) => counts(view.id().pid::<Ipc>().ok().map(|pid| pid.value() as u32)),
-                // An unknown state is taken as alive.
-                _ => true,
-            };
-            CallbackProgression::Continue
-        });
-        if used || listed.is_err() {
-            return;
-        }
-        // Another program may remove the same files at the same time.
-        let _ = std::fs::remove_dir_all(self.root());
-        let prefix = self.prefix();
-        for entry in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
-            if entry.file_name().to_string_lossy().starts_with(&prefix) {
-                let _ = std::fs::remove_file(entry.path());
-            }
-        }
-    }
+/// Begins the names of all instances of this user.
+pub(super) fn prefix_of_user() -> String {
+    // SAFETY: getuid has no preconditions.
+    let user = unsafe { libc::getuid() };
+    format!("stylet_{user}_")
 }
 
 /// Less than this, and even the first objects of a program might not fit.

@@ -12,6 +12,7 @@ use std::time::Duration;
 mod board;
 mod instance;
 mod ports;
+mod sweep;
 
 pub use board::{StateBoard, StateReader, StateWriter};
 pub use instance::Instance;

@@ -16,6 +16,7 @@ mod plan_compensation;
 mod plan_optimised;
 mod plan_rehearsal;
 mod process_hosts;
+mod process_killed;
 mod process_loops;
 mod process_restart;
 mod recorder_flight;

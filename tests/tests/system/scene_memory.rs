@@ -58,4 +58,10 @@ fn memory_over_four_hundred_changes() {
         "MB by hundreds {hundreds:.2?}, last of the second {:.4}",
         hundreds[3] / hundreds[1]
     );
+    // A line under way takes 20 MB and more, and chance decides whether one is: the least is without.
+    let least: Vec<f64> = memory_mb
+        .chunks(100)
+        .map(|hundred| hundred.iter().copied().fold(f64::MAX, f64::min))
+        .collect();
+    println!("least of each hundred {least:.2?}");
 }

@@ -51,6 +51,7 @@ impl Driven {
             controllers: false,
             pause: true,
             count_frames: false,
+            patch: false,
         };
         let window = Harness::builder()
             .with_size(size)

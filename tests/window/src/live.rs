@@ -83,6 +83,7 @@ fn a_window_that_comes_moves_nothing_by_itself() {
         controllers: false,
         pause: true,
         count_frames: false,
+        patch: false,
     };
     let mut second = Harness::builder()
         .with_size([1280.0, 800.0])

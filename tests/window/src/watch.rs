@@ -29,6 +29,7 @@ fn the_example_opens_with_one_click_without_a_core_and_shows_an_insertion() {
         controllers: false,
         pause: true,
         count_frames: false,
+        patch: false,
     };
     let mut window = Harness::builder()
         .with_size([1280.0, 800.0])

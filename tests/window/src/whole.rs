@@ -44,6 +44,7 @@ fn window_of(instance: &str, size: [f32; 2]) -> Window {
         controllers: false,
         pause: true,
         count_frames: false,
+        patch: false,
     };
     Window {
         harness: Harness::builder()

@@ -34,6 +34,7 @@ pub fn options() -> Options {
         controllers: false,
         pause: true,
         count_frames: false,
+        patch: false,
     }
 }
 

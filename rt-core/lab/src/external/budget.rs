@@ -1,4 +1,4 @@
-//! The delay from the pin to another input, with an uncertainty budget after the GUM (NIST TN 1297): each term named.
+//! The delay from one input to another, with an uncertainty budget after the GUM (NIST TN 1297): each term named.
 
 use super::align::Alignment;
 use super::capture::{Capture, CaptureError, Channel};
@@ -17,6 +17,8 @@ pub struct Term {
 /// A delay with its uncertainty.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Delay {
+    /// The input at whose edges it begins.
+    pub from: String,
     pub channel: String,
     pub pairs: usize,
     pub mean_us: f64,
@@ -34,20 +36,49 @@ const LATEST_S: f64 = 0.5;
 /// Answers that must be there.
 const FEWEST: usize = 10;
 
-/// From each edge of the pin to the next one of `channel`, in seconds of our clock.
+/// An input that moves has rested for so long before a motion begins.
+const REST_S: f64 = 0.3;
+
+/// Edges of an input at which something begins that others answer to.
+pub struct Begins<'a> {
+    pub channel: &'a Channel,
+    pub edges_s: Vec<f64>,
+}
+
+impl<'a> Begins<'a> {
+    /// The edges that are toggles of the run.
+    pub fn at_pin(pin: &'a Channel, alignment: &Alignment) -> Self {
+        Self {
+            channel: pin,
+            edges_s: alignment.pairs.iter().map(|&(_, edge)| pin.edges_s[edge]).collect(),
+        }
+    }
+
+    /// The first edge of each motion: a handle goes on, and an accelerometer rings.
+    pub fn at_motion(channel: &'a Channel) -> Self {
+        let mut last_s = f64::MIN;
+        let begins = channel.edges_s.iter().copied().filter(|&edge_s| {
+            let rested = edge_s - last_s > REST_S;
+            last_s = edge_s;
+            rested
+        });
+        Self {
+            channel,
+            edges_s: begins.collect(),
+        }
+    }
+}
+
+/// From each edge of `from` to the next one of `channel`, in seconds of our clock.
 pub fn delay(
     capture: &Capture,
-    pin: &Channel,
+    from: &Begins<'_>,
     alignment: &Alignment,
     channel: &Channel,
 ) -> Result<Delay, CaptureError> {
     let mut delays: Vec<f64> = Vec::new();
-    for (i, &(_, edge)) in alignment.pairs.iter().enumerate() {
-        let at_s = pin.edges_s[edge];
-        let next_s = alignment
-            .pairs
-            .get(i + 1)
-            .map_or(f64::MAX, |&(_, next)| pin.edges_s[next]);
+    for (i, &at_s) in from.edges_s.iter().enumerate() {
+        let next_s = from.edges_s.get(i + 1).copied().unwrap_or(f64::MAX);
         let place = channel.edges_s.partition_point(|e| *e < at_s);
         if let Some(answer_s) = channel
             .edges_s
@@ -58,12 +89,13 @@ pub fn delay(
             delays.push((answer_s - at_s) / (1.0 + alignment.drift));
         }
     }
-    if delays.len() < FEWEST || 2 * delays.len() < alignment.pairs.len() {
+    if delays.len() < FEWEST || 2 * delays.len() < from.edges_s.len() {
         return Err(format!(
-            "{}: {} answers to {} edges of the pin; expected one to most of them",
+            "{}: {} answers to {} edges of {}; expected one to most of them, and {FEWEST} at least",
             channel.name,
             delays.len(),
-            alignment.pairs.len()
+            from.edges_s.len(),
+            from.channel.name
         )
         .into());
     }
@@ -98,10 +130,10 @@ pub fn delay(
         term(
             "threshold",
             'B',
-            (pin.rise_s.powi(2) + channel.rise_s.powi(2)).sqrt() / 12_f64.sqrt(),
+            (from.channel.rise_s.powi(2) + channel.rise_s.powi(2)).sqrt() / 12_f64.sqrt(),
             format!(
                 "an edge lasts {:.2} and {:.2} us (rectangles)",
-                pin.rise_s * 1e6,
+                from.channel.rise_s * 1e6,
                 channel.rise_s * 1e6
             ),
         ),
@@ -118,6 +150,7 @@ pub fn delay(
     ];
     let combined_us = terms.iter().map(|t| t.us * t.us).sum::<f64>().sqrt();
     Ok(Delay {
+        from: from.channel.name.clone(),
         channel: channel.name.clone(),
         pairs: delays.len(),
         mean_us: mean_s * 1e6,

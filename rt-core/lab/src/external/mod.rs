@@ -13,7 +13,7 @@ mod tests;
 
 use crate::collect::ToggleTime;
 use align::{Alignment, align};
-use budget::Delay;
+use budget::{Begins, Delay};
 use capture::{Capture, CaptureError};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -114,14 +114,14 @@ fn read_toggles(folder: &Path) -> Result<Vec<ToggleTime>, ExternalError> {
 ///
 /// # Errors
 /// The capture is not one of this run, or a file cannot be read or written.
-pub fn run(folder: &Path, file: &Path) -> Result<u8, ExternalError> {
+pub fn run(folder: &Path, file: &Path, motion: Option<&str>) -> Result<u8, ExternalError> {
     let toggles = read_toggles(folder)?;
     let failed = |why| ExternalError::Capture {
         path: file.to_owned(),
         why,
     };
     let capture = capture::read(file).map_err(failed)?;
-    let external = evaluate(&toggles, &capture, &file.display().to_string()).map_err(failed)?;
+    let external = evaluate(&toggles, &capture, &file.display().to_string(), motion).map_err(failed)?;
     let json = serde_json::to_string_pretty(&external).unwrap_or_default() + "\n";
     write_whole(&folder.join(JSON), json.as_bytes())?;
     write_whole(&folder.join(PAGE), page::page(&external).as_bytes())?;
@@ -131,8 +131,8 @@ pub fn run(folder: &Path, file: &Path) -> Result<u8, ExternalError> {
     );
     for d in &external.delays {
         println!(
-            "{}: {:.1} +- {:.1} us after the pin (k = 2)",
-            d.channel, d.mean_us, d.expanded_us
+            "{}: {:.1} +- {:.1} us after {} (k = 2)",
+            d.channel, d.mean_us, d.expanded_us, d.from
         );
     }
     external.without.iter().for_each(|why| println!("no delay: {why}"));
@@ -140,8 +140,13 @@ pub fn run(folder: &Path, file: &Path) -> Result<u8, ExternalError> {
     Ok(0)
 }
 
-/// The pin is the input that agrees best with the notes.
-fn evaluate(toggles: &[ToggleTime], capture: &Capture, name: &str) -> Result<External, CaptureError> {
+/// The pin is the input that agrees best with the notes; `motion` is the input that shows when the handle moves.
+fn evaluate(
+    toggles: &[ToggleTime],
+    capture: &Capture,
+    name: &str,
+    motion: Option<&str>,
+) -> Result<External, CaptureError> {
     let first_ns = toggles.first().map_or(0, |t| t.before_ns);
     let middle_s = |t: &ToggleTime| ((t.before_ns - first_ns) as f64 + (t.after_ns - t.before_ns) as f64 / 2.0) / 1e9;
     let ours: Vec<f64> = toggles.iter().map(middle_s).collect();
@@ -158,20 +163,7 @@ fn evaluate(toggles: &[ToggleTime], capture: &Capture, name: &str) -> Result<Ext
         return Err(refused.join("; ").into());
     };
     let pin_channel = &capture.channels[pin];
-    let (mut delays, mut without) = (Vec::new(), Vec::new());
-    for (i, channel) in capture
-        .channels
-        .iter()
-        .enumerate()
-        .filter(|(_, c)| !c.edges_s.is_empty())
-    {
-        if i != pin {
-            match budget::delay(capture, pin_channel, &alignment, channel) {
-                Ok(delay) => delays.push(delay),
-                Err(why) => without.push(why.to_string()),
-            }
-        }
-    }
+    let (delays, without) = delays(capture, pin, &alignment, motion)?;
     let worst = |all: &mut dyn Iterator<Item = f64>| all.fold(0.0, f64::max);
     let mut due_to_pin: Vec<f64> = alignment
         .pairs
@@ -200,6 +192,41 @@ fn evaluate(toggles: &[ToggleTime], capture: &Capture, name: &str) -> Result<Ext
         delays,
         without,
     })
+}
+
+/// From the pin to every other input, then from the motion to every input but the pin; and what has none, with the reason.
+fn delays(
+    capture: &Capture,
+    pin: usize,
+    alignment: &Alignment,
+    motion: Option<&str>,
+) -> Result<(Vec<Delay>, Vec<String>), CaptureError> {
+    let pin = &capture.channels[pin];
+    let named = |name: &str| {
+        let names = || {
+            capture
+                .channels
+                .iter()
+                .map(|c| c.name.as_str())
+                .collect::<Vec<_>>()
+                .join(", ")
+        };
+        let found = capture.channels.iter().find(|c| c.name == name && c.name != pin.name);
+        found.ok_or_else(|| format!("{name:?} is no input beside the pin; there are {}", names()))
+    };
+    let motion = motion.map(named).transpose()?.map(Begins::at_motion);
+    let from_pin = Begins::at_pin(pin, alignment);
+    let (mut delays, mut without) = (Vec::new(), Vec::new());
+    for from in [Some(&from_pin), motion.as_ref()].into_iter().flatten() {
+        let others = capture.channels.iter().filter(|c| !c.edges_s.is_empty());
+        for to in others.filter(|c| c.name != pin.name && c.name != from.channel.name) {
+            match budget::delay(capture, from, alignment, to) {
+                Ok(delay) => delays.push(delay),
+                Err(why) => without.push(why.to_string()),
+            }
+        }
+    }
+    Ok((delays, without))
 }
 
 /// Standard deviation of what is left of the pairs.

@@ -82,7 +82,7 @@ fn delay(d: &Delay) -> Markup {
     ]);
     let columns = [Column::Text, Column::Text, Column::Number, Column::Wide];
     html! {
-        h2 { "From the pin to " (d.channel) }
+        h2 { "From " (d.from) " to " (d.channel) }
         p {
             b { (format!("{:.1} \u{b1} {:.1} \u{b5}s", d.mean_us, d.expanded_us)) } " (mean of " (d.pairs) ", between "
             (num(d.least_us)) " and " (num(d.most_us)) " \u{b5}s)"

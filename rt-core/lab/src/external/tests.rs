@@ -56,7 +56,7 @@ fn sampled(edges: &[Vec<f64>; 2], rate_hz: f64) -> Vec<[bool; 2]> {
 
 #[track_caller]
 fn recovered(toggles: &[ToggleTime], capture: &Capture) {
-    let e = evaluate(toggles, capture, "synthetic").expect("of this run");
+    let e = evaluate(toggles, capture, "synthetic", None).expect("of this run");
     assert!(
         (e.drift_ppm - 20.0).abs() <= e.drift_expanded_ppm,
         "{} +- {} ppm",
@@ -129,9 +129,9 @@ fn a_capture_of_another_run_or_of_a_clock_is_refused() {
         channels: vec![channel(edges_s)],
     };
     let [own, _] = edges(&ours, 2);
-    assert!(evaluate(&ours, &capture(own.clone()), "").is_ok());
+    assert!(evaluate(&ours, &capture(own.clone()), "", None).is_ok());
     // Part of it is enough, and so is one that began later.
-    assert!(evaluate(&ours, &capture(own[50..90].to_vec()), "").is_ok());
+    assert!(evaluate(&ours, &capture(own[50..90].to_vec()), "", None).is_ok());
     let [other, _] = edges(&toggles(77, 200), 2);
     let clock: Vec<f64> = (0..400).map(|i| f64::from(i) * 0.05).collect();
     for (edges_s, why) in [
@@ -139,10 +139,58 @@ fn a_capture_of_another_run_or_of_a_clock_is_refused() {
         (clock, "not a capture"),
         (own[..9].to_vec(), "at least 20"),
     ] {
-        let refused = evaluate(&ours, &capture(edges_s), "")
+        let refused = evaluate(&ours, &capture(edges_s), "", None)
             .expect_err("of something else")
             .to_string();
         assert!(refused.contains(why), "{refused}");
+    }
+}
+
+/// A handle is struck each second and rings for 20 ms; the patch of the screen answers after 38 to 42 ms, and at no time of the pin.
+#[test]
+fn motion_to_photon_is_measured_beside_the_pin() {
+    let ours = toggles(3, 400);
+    let [pin, _] = edges(&ours, 4);
+    let mut random = SplitMix(5);
+    let (mut handle, mut patch) = (Vec::new(), Vec::new());
+    for strike in 0..20 {
+        let at_s = 0.6 + f64::from(strike) + (random.next_u64() % 1_000) as f64 * 1e-4;
+        handle.extend((0..5).map(|ring| at_s + f64::from(ring) * 0.004));
+        patch.push(at_s + (0.038 + (random.next_u64() % 4_000) as f64 * 1e-6) * (1.0 + DRIFT));
+    }
+    let channel = |name: &str, edges_s, rise_s| Channel {
+        name: name.to_owned(),
+        edges_s,
+        rise_s,
+    };
+    let capture = Capture {
+        kind: "VCD",
+        step_s: 1e-6,
+        channels: vec![
+            channel("pin", pin, 0.0),
+            channel("handle", handle, 0.001),
+            channel("patch", patch, 0.002),
+        ],
+    };
+    let e = evaluate(&ours, &capture, "", Some("handle")).expect("of this run");
+    let d = e
+        .delays
+        .iter()
+        .find(|d| d.from == "handle" && d.channel == "patch")
+        .expect("a delay");
+    assert!((d.mean_us - 40_000.0).abs() <= d.expanded_us, "{d:?}");
+    assert!(d.pairs == 20 && d.expanded_us < 3_000.0, "{d:?}");
+    // What moves when it likes is no answer to the pin.
+    assert!(
+        e.without.iter().any(|why| why.contains("edges of pin")),
+        "{:?}",
+        e.without
+    );
+    for none in ["pin", "gyroscope"] {
+        let why = evaluate(&ours, &capture, "", Some(none))
+            .expect_err("no such input")
+            .to_string();
+        assert!(why.contains(none) && why.contains("handle, patch"), "{why}");
     }
 }
 

@@ -223,7 +223,8 @@ fn nothing_found_is_an_error_that_says_what_was_expected() {
     assert!(run(&args(&folder.0.join("missing"))).is_err());
 }
 
-/// Writes the page of the twenty reports for whoever wants to look at it: STYLET_FLEET_OUT names the folder.
+/// Writes the page of the twenty reports for whoever wants to look at it: STYLET_FLEET_OUT names the folder, and STYLET_FLEET_ALSO one
+/// with measured reports that join them.
 #[test]
 #[ignore = "for looking at the page"]
 fn page_to_look_at() {
@@ -231,11 +232,9 @@ fn page_to_look_at() {
     let out = std::env::var_os("STYLET_FLEET_OUT")
         .map(PathBuf::from)
         .expect("STYLET_FLEET_OUT names a folder");
-    let args = FleetArgs {
-        folders: vec![folder.0.clone()],
-        out,
-    };
-    run(&args).expect("there are reports");
+    let measured = std::env::var_os("STYLET_FLEET_ALSO").map(PathBuf::from);
+    let folders = std::iter::once(folder.0.clone()).chain(measured).collect();
+    run(&FleetArgs { folders, out }).expect("there are reports");
 }
 
 /// The page of one PC was headed "Latency of 1 PCs", "1 reports".

@@ -91,6 +91,7 @@ impl Setup {
     }
 
     pub fn open_shared_memory(&self, options: &Options) -> Result<SharedMemory, RunError> {
+        options.instance.sweep_dead();
         let node = options.instance.node()?;
         let (snapshot_len, words) = (self.picture.snapshot_size().total(), self.picture.word_count());
         let ports = Ports::new(&node, snapshot_len, words)?;

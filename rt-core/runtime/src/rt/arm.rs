@@ -61,7 +61,7 @@ pub fn arm(ask: Ask) -> Result<Armed, Refused> {
 }
 
 /// From this size on a block is mapped by itself.
-const LARGE_BLOCK_BYTES: libc::c_int = 1 << 17;
+const LARGE_BLOCK_BYTES: libc::c_int = 1 << 15;
 
 /// Locks present and future pages; the error names the limit to raise.
 pub fn lock_memory() -> Result<(), Refused> {

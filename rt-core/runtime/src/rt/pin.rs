@@ -3,6 +3,7 @@
 //! One instruction writes it, without a system call, so that the contract of the loops holds. The right to the register is
 //! taken before the threads start, which inherit it.
 
+use std::path::Path;
 use std::str::FromStr;
 
 /// A register with its two values.
@@ -29,9 +30,11 @@ pub struct PinError(String);
 impl FromStr for Pin {
     type Err = String;
 
-    /// `serial:0x3F8:rts`, `serial:0x3F8:dtr` or `parallel:0x378`, which toggles pin 2.
+    /// `serial:0x3F8:rts`, `serial:0x3F8:dtr`, `/dev/ttyS0:rts`, which is the same by its name, or `parallel:0x378`, which
+    /// toggles pin 2.
     fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || format!("{text:?}: expected serial:0x3F8:rts, serial:0x3F8:dtr or parallel:0x378");
+        let expected =
+            || format!("{text:?}: expected serial:0x3F8:rts, serial:0x3F8:dtr, /dev/ttyS0:rts or parallel:0x378");
         let address = |word: &str| {
             let digits = word
                 .strip_prefix("0x")
@@ -43,12 +46,9 @@ impl FromStr for Pin {
         };
         let words: Vec<&str> = text.split(':').collect();
         match words[..] {
-            ["serial", port, line @ ("rts" | "dtr")] => {
-                let bit = if line == "rts" { RTS } else { DTR };
-                Ok(Self {
-                    port: address(port)? + MODEM_CONTROL,
-                    values: [OUT2, OUT2 | bit],
-                })
+            ["serial", port, line @ ("rts" | "dtr")] => Ok(Self::serial(address(port)?, line)),
+            [device, line @ ("rts" | "dtr")] if device.starts_with("/dev/") => {
+                Ok(Self::serial(address(&register_of(Path::new(device))?)?, line))
             }
             ["parallel", port] => Ok(Self {
                 port: address(port)?,
@@ -59,7 +59,31 @@ impl FromStr for Pin {
     }
 }
 
+/// The port of a serial device, as its driver has it.
+// Read with the command line, before any loop.
+#[allow(clippy::disallowed_methods)]
+fn register_of(device: &Path) -> Result<String, String> {
+    let name = device.file_name().unwrap_or_default();
+    let port = std::fs::read_to_string(Path::new("/sys/class/tty").join(name).join("port")).unwrap_or_default();
+    match port.trim() {
+        "" | "0x0" => Err(format!(
+            "{}: no serial port of this PC. Adapters on USB and terminals have no register that the force loop could write by one \
+             instruction, and it makes no system call for a pin",
+            device.display()
+        )),
+        port => Ok(port.to_owned()),
+    }
+}
+
 impl Pin {
+    fn serial(port: u16, line: &str) -> Self {
+        let bit = if line == "rts" { RTS } else { DTR };
+        Self {
+            port: port + MODEM_CONTROL,
+            values: [OUT2, OUT2 | bit],
+        }
+    }
+
     /// Takes the right to the register for this thread and those that it starts; needs root.
     ///
     /// # Errors
@@ -156,6 +180,28 @@ mod tests {
             "parallel:0xffff",
         ] {
             assert!(pin(none).is_err(), "{none}");
+        }
+    }
+
+    /// A pseudo-terminal has neither modem lines nor a register.
+    #[test]
+    fn a_terminal_is_refused_by_its_name_and_a_serial_port_is_found_by_its_own() {
+        // SAFETY: no preconditions; the ends close with the test.
+        let master = unsafe { libc::posix_openpt(libc::O_RDWR | libc::O_NOCTTY) };
+        let mut name = [0_u8; 64];
+        // SAFETY: `name` is valid for writes of its length.
+        let named = unsafe { libc::ptsname_r(master, name.as_mut_ptr().cast(), name.len()) };
+        assert_eq!((master >= 0, named), (true, 0), "{}", std::io::Error::last_os_error());
+        let name = std::ffi::CStr::from_bytes_until_nul(&name)
+            .expect("ends")
+            .to_str()
+            .expect("ASCII");
+        let why = format!("{name}:rts").parse::<Pin>().expect_err("no modem lines");
+        assert!(why.contains(name) && why.contains("no register"), "{why}");
+        // SAFETY: opened above.
+        unsafe { libc::close(master) };
+        if std::fs::read_to_string("/sys/class/tty/ttyS0/port").is_ok_and(|p| p.trim() == "0x3F8") {
+            assert_eq!("/dev/ttyS0:dtr".parse::<Pin>(), "serial:0x3F8:dtr".parse());
         }
     }
 
