@@ -85,6 +85,8 @@ pub struct LeftNeedles {
     /// The same the other way round: elements by a newton at each row of that line, and by one at its tip.
     from_moving: Vec<f64>,
     by_tip: Vec<f64>,
+    /// What dents take from each other where a membrane holds the tip that moves; 0 where none does.
+    taken_n_per_m: f64,
     /// Of the body as a whole along each element and the moving line, m/N.
     whole: Vec<f64>,
     /// What was added to the displacements of the moving line, m.
@@ -126,6 +128,7 @@ impl LeftNeedles {
             to_moving: each(MAX_ELEMENTS * 2 * MAX_STATIONS),
             from_moving: each(2 * MAX_STATIONS * stride),
             by_tip: each(MAX_ELEMENTS),
+            taken_n_per_m: 0.0,
             whole: each(MAX_ELEMENTS),
             added_m: each(2 * MAX_STATIONS),
             is_still: true,
@@ -258,6 +261,7 @@ impl LeftNeedles {
 
     /// One tick in which no needle moves beside them.
     pub fn step_alone(&mut self, dt_s: f64) {
+        self.taken_n_per_m = 0.0;
         self.draw(dt_s);
         if !self.is_still {
             self.displace(None);
