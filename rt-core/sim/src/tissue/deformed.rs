@@ -20,28 +20,21 @@ pub struct Deformed<'a> {
 
 impl Deformed<'_> {
     /// Displacement from rest of one element, in elements; the last element's for a number past the end.
-    #[inline(never)]
     pub fn displacement(&self, element: u32) -> [f64; 3] {
         let u = self.not_carried(element);
-        match self.carried {
-            Carried::Not => u,
-            Carried::Field(_) => self.carried_by(element, u),
+        if matches!(self.carried, Carried::Not) {
+            return u;
         }
-    }
-
-    /// Without what carries the whole body.
-    #[inline(always)]
-    fn not_carried(&self, element: u32) -> [f64; 3] {
-        let e = (element as usize).min(self.lattice.element_count().saturating_sub(1));
-        self.u.map(|c| c.get(e).map_or(0.0, |u| f64::from(self.scale * u)))
-    }
-
-    /// Kept out of the loops over a body that nothing carries.
-    #[inline(never)]
-    fn carried_by(&self, element: u32, u: [f64; 3]) -> [f64; 3] {
         let e = (element as usize).min(self.lattice.element_count().saturating_sub(1));
         let carried_m = self.carried.at_m(self.lattice, e as u32);
         [0, 1, 2].map(|a| u[a] + carried_m[a] / self.lattice.spacing_m)
+    }
+
+    /// Without what carries the whole body: loops over a body that nothing carries look for that once.
+    #[inline(always)]
+    pub(super) fn not_carried(&self, element: u32) -> [f64; 3] {
+        let e = (element as usize).min(self.lattice.element_count().saturating_sub(1));
+        self.u.map(|c| c.get(e).map_or(0.0, |u| f64::from(self.scale * u)))
     }
 
     /// Centre of an element in the scene frame; the last element's for a number past the end.

@@ -7,6 +7,7 @@
 
 mod assemble;
 mod by_sets;
+mod needle;
 mod onward;
 mod record;
 mod solve;
@@ -370,33 +371,6 @@ impl LeftNeedles {
         }
         self.assemble(None);
         needle
-    }
-}
-
-impl LeftNeedle {
-    /// Number of its line.
-    pub fn generation(&self) -> u64 {
-        self.line.generation
-    }
-
-    /// Its line.
-    pub fn line(&self) -> &HandLine {
-        &self.line
-    }
-
-    /// Where its tip is along the line in the world, m.
-    pub fn held_m(&self) -> f64 {
-        self.held_m
-    }
-
-    /// It is being drawn out.
-    pub fn is_drawn(&self) -> bool {
-        self.drawing_m_per_s > 0.0
-    }
-
-    /// Depth of its tip in the material, m.
-    pub fn depth_m(&self) -> f64 {
-        self.line.state.tip.material_m - self.drawn_m
     }
 }
 
