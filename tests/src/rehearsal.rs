@@ -7,7 +7,7 @@ use stylet_hw::DeviceInfo;
 use stylet_implant::plan::rehearse::{Drops, RehearsalError, Rehearser, Rest};
 use stylet_implant::workflow::Pace;
 use stylet_runtime::bridge::ScenePicture;
-use stylet_runtime::rehearse::{NeedleRun, Stage};
+use stylet_runtime::rehearse::{NeedleRun, RehearseError, Stage};
 use stylet_shm_schema::ParameterSet;
 use stylet_sim::scene::TissueKind;
 use stylet_sim::scene::{Labels, Scene, SceneSource};
@@ -61,7 +61,14 @@ impl Rehearser for Theatre {
         let done = self
             .stage
             .rehearse(&run, &ParameterSet::default(), &AtomicBool::new(false))
-            .map_err(|e| RehearsalError::Refused(e.to_string()))?;
+            .map_err(|e| RehearsalError::Refused {
+                text: e.to_string(),
+                drop: match e {
+                    RehearseError::Refused { drop, .. } => Some(drop as usize),
+                    _ => None,
+                },
+            });
+        let done = done?;
         Ok(Rest {
             seeds_m: done.seeds.iter().map(|s| s.position_m).collect(),
             dropped_at_m: done.seeds.iter().map(|s| s.dropped_at_m).collect(),

@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Link, LinkError, LinkStatus};
 use stylet_procedure::{NeedleWay, Pace};
-use stylet_shm_schema::{MAX_COMMAND_VALUES, MAX_EARLIER_NEEDLES, NeedleRehearsal, Request, StabilisingNeedle};
+use stylet_shm_schema::{
+    MAX_COMMAND_VALUES, MAX_EARLIER_NEEDLES, NeedleRehearsal, Reason, RefusalCode, Request, StabilisingNeedle,
+};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);
 /// The largest scene takes a second for a second.
@@ -131,8 +133,13 @@ pub enum RehearsalError {
     #[error(transparent)]
     Link(#[from] LinkError),
     /// The core refused, or the rehearsal did not come to its end; the text says why.
-    #[error("the rehearsal failed: {0}")]
-    Refused(String),
+    #[error("the rehearsal failed: {text}")]
+    Refused {
+        /// Why, for people.
+        text: String,
+        /// Number of the drop, from 0, where one was refused.
+        drop: Option<usize>,
+    },
     /// A reply came without its result.
     #[error("the core sent no result of the rehearsal")]
     NoResult,
@@ -178,7 +185,13 @@ impl Rehearser for LinkRehearser<'_> {
                 return Err(RehearsalError::Absent(why));
             }
             match link.reply(id) {
-                Some(answer) if !answer.accepted => return Err(RehearsalError::Refused(answer.text)),
+                Some(answer) if !answer.accepted => {
+                    let drop = answer.reasons.first().and_then(|reason| refused_drop(reason, drops));
+                    return Err(RehearsalError::Refused {
+                        text: answer.text,
+                        drop,
+                    });
+                }
                 Some(_) => {
                     let rehearsal = link.rehearsal(id).ok_or(RehearsalError::NoResult)?;
                     if Some(rehearsal.scene_id()) != scene || rehearsal.seed_count as usize != drops.along_m.len() {
@@ -199,4 +212,10 @@ impl Rehearser for LinkRehearser<'_> {
         }
         Err(RehearsalError::TooLong)
     }
+}
+
+/// Which of these drops a reason is about.
+fn refused_drop(reason: &Reason, drops: &Drops) -> Option<usize> {
+    let is_of_loop = reason.code() != Some(RefusalCode::RehearsalFailed);
+    (is_of_loop && (reason.subject as usize) < drops.along_m.len()).then_some(reason.subject as usize)
 }

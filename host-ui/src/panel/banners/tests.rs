@@ -1,6 +1,7 @@
 //! Which banner stands over the pictures, and what it says.
 
 use super::*;
+use crate::panel::workflow::scene::solved_in;
 use bytemuck::Zeroable;
 use stylet_shm_schema::{HapticState, flags};
 
@@ -89,8 +90,16 @@ fn what_the_page_of_stability_says_no_to_is_warned_of_while_it_is_so() {
                 state.flags |= flags::LINE_NEEDED | flags::IN_CONTACT;
                 "No line: "
             }
-            // Of the scene, as long as it is there: `panel/workflow/scene`.
-            35 => continue,
+            // Of the scene, as long as it is there, and not a banner.
+            35 => {
+                let mut scene = stylet_shm_schema::SceneHeader::zeroed();
+                (scene.spacing_m, scene.body_edge) = (1.364e-3, 1);
+                assert_eq!(solved_in(&scene), None);
+                scene.body_edge = 2;
+                let said = solved_in(&scene);
+                assert_eq!(said.as_deref(), Some("Tissue solved in elements of 2.7 mm"));
+                continue;
+            }
             _ => panic!("row {number} of docs/stability.md is not met: what warns of it?"),
         };
         let list = texts(&shown);

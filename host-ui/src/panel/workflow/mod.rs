@@ -7,7 +7,7 @@ mod left;
 mod plan;
 mod progress;
 mod run;
-mod scene;
+pub(super) mod scene;
 
 use crate::action::Action;
 use crate::recent::{Missing, Recent};

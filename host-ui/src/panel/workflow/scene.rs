@@ -18,6 +18,11 @@ use stylet_surfaces::bodies::has_every_label;
 /// The button beside the field.
 const OPEN_WIDTH: f32 = 78.0;
 
+/// What stands under a scene whose tissue is solved in elements larger than its own.
+pub fn solved_in(scene: &SceneHeader) -> Option<String> {
+    (scene.body_edge > 1).then(|| format!("Tissue solved in elements of {:.1} mm", scene.body_spacing_m() * 1e3))
+}
+
 pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, actions: &mut Vec<Action>) {
     let tokens = theme::of(ui);
     let name = match &shown.scene {
@@ -33,8 +38,9 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
         .add(egui::Label::new(name).truncate())
         .explained("scene")
         .explained("element");
-    if let Some(s) = shown.scene.as_ref().filter(|s| s.body_edge > 1) {
-        let solved = format!("Tissue solved in elements of {:.1} mm", s.body_spacing_m() * 1e3);
+    if let Some(s) = &shown.scene
+        && let Some(solved) = solved_in(s)
+    {
         ui.label(theme::small(&solved)).on_hover_text(format!(
             "{} elements of {:.1} mm are too many for finite elements at 200 Hz. Layers and the needle's entry stay those of the \
              scene.",

@@ -11,10 +11,13 @@ use super::rows::{add_scaled, dot};
 use super::state::{LineOutput, LineState};
 use super::tip::{Place, follow};
 use forces::solve;
-pub(super) use forces::{Neighbours, find_by_sets, sweep};
+pub(super) use forces::{Neighbours, Shaft, find_by_sets, sweep};
+pub(super) use membrane::{Spring, meet, press};
+use membrane::{past_at_tip_m, whole_n};
 use sets::LINE_BLOCKS;
 
 mod forces;
+mod membrane;
 pub(super) mod sets;
 
 /// For the stations of one line.
@@ -79,6 +82,10 @@ impl Company for Alone {
         touch(model, state, tip_m, &mut self.0);
         meet(model, state, membrane);
         press(model, state, membrane);
+        if let Some(spring) = Spring::of(model, state) {
+            let passed_n = spring.passed_n(state, past_at_tip_m(model, state));
+            spring.relieve(state, passed_n);
+        }
     }
 
     fn solve(
@@ -180,17 +187,6 @@ fn stay_outside(model: &LineModel, state: &mut LineState, tip_m: f64, output: &m
     finish(model, state, output);
 }
 
-/// A membrane is met where the tissue in front of it is by now: past loads and other needles may have moved it before the tip was there.
-pub(super) fn meet(model: &LineModel, state: &mut LineState, membrane: Option<usize>) {
-    let held_by = membrane.map_or(0, |n| n as u32 + 1);
-    if held_by == state.tip.held_by || held_by == 0 {
-        return;
-    }
-    let count = state.in_contact;
-    let own = dot(&state.tip_column[..count], &state.shaft_n[..count]) + state.tip_own * state.tip.force_n;
-    state.tip_u_m = state.memory.gain * own + past_at_tip_m(model, state);
-}
-
 /// Which stations the shaft touches, where the tip loads, and where they are. A station that is new sticks to where it is.
 fn touch(model: &LineModel, state: &mut LineState, tip_m: f64, scratch: &mut Scratch) {
     let before = lay(model, state);
@@ -256,76 +252,11 @@ pub(super) fn lay(model: &LineModel, state: &mut LineState) -> usize {
     before
 }
 
-/// A membrane is stiffer than what it holds: between the place of the tip and the body as a whole it is a spring, of such a
-/// stiffness that both of its limits, force and depth, are met at once (eq. 10). It is relaxed when the tip meets it. Returns what it leaves of the dent, where one holds the tip.
-pub(super) fn press(model: &LineModel, state: &mut LineState, membrane: Option<usize>) -> Option<f64> {
-    let whole = model.compliance.common_m_per_n();
-    let count = state.in_contact;
-    let held_by = membrane.map_or(0, |n| n as u32 + 1);
-    if held_by != state.tip.held_by {
-        let load_n = state.shaft_n[..count].iter().sum::<f64>() + state.tip.force_n;
-        state.tip.met_u_m = if held_by == 0 { 0.0 } else { state.tip_u_m };
-        state.tip.met_dent_m = if held_by == 0 {
-            0.0
-        } else {
-            state.tip_u_m - whole_m(state, whole, load_n) - state.beside_whole_m
-        };
-        state.tip.held_by = held_by;
-    }
-    (state.tip_offset_m, state.membrane_n_per_m) = (0.0, 0.0);
-    let kept = membrane.and_then(|n| model.kept_of_dent(n, state.tip_own))?;
-    state.membrane_n_per_m = (1.0 / kept - 1.0) / (state.tip_own - whole);
-    // Tissue that gives way within the tick leaves the spring more of the dent.
-    let gain = state.memory.gain;
-    let kept = if gain == 1.0 {
-        kept
-    } else {
-        kept / (kept + gain * (1.0 - kept))
-    };
-    state.tip_own = whole + kept * (state.tip_own - whole);
-    for of_tip in &mut state.tip_column[..count] {
-        *of_tip = whole + kept * (*of_tip - whole);
-    }
-    state.tip_offset_m = (1.0 - kept) * state.tip.met_dent_m;
-    if state.memory.is_on() {
-        // Of the dent that the past leaves, the spring leaves that part as well.
-        state.tip_offset_m -= (1.0 - kept) * (past_at_tip_m(model, state) - state.memory.whole_offset_m);
-    }
-    Some(kept)
-}
-
-/// Displacement of the material at the tip that the past leaves.
-fn past_at_tip_m(model: &LineModel, state: &LineState) -> f64 {
-    let places = state.tip_range.clone().zip(state.tip_weights);
-    places
-        .map(|(n, w)| w * state.memory.offset_m[model.compliance.stations + n])
-        .sum()
-}
-
-/// How far loads of that sum displace the body as a whole, with what the past leaves.
-fn whole_m(state: &LineState, whole_m_per_n: f64, load_n: f64) -> f64 {
-    if state.memory.is_on() {
-        state.memory.gain * whole_m_per_n * load_n + state.memory.whole_offset_m
-    } else {
-        whole_m_per_n * load_n
-    }
-}
-
 /// Friction that each station can have, by how much of it the shaft is in.
 #[inline]
 pub(super) fn limit_n(model: &LineModel, place_m: f64, n: usize) -> f64 {
     let ds = model.compliance.spacing_m;
     model.friction_n_per_m[n] * (place_m - n as f64 * ds).clamp(0.0, ds)
-}
-
-/// What the spring of a membrane that is stretched passes on to the body as a whole.
-fn whole_n(model: &LineModel, state: &LineState) -> f64 {
-    if state.membrane_n_per_m == 0.0 {
-        return 0.0;
-    }
-    let load_n = state.shaft_n[..state.in_contact].iter().sum::<f64>() + state.tip.force_n;
-    let dent_m = state.tip_u_m - whole_m(state, model.compliance.common_m_per_n(), load_n) - state.beside_whole_m;
-    state.membrane_n_per_m * (dent_m - state.tip.met_dent_m)
 }
 
 fn finish(model: &LineModel, state: &mut LineState, output: &mut LineOutput) {

@@ -233,6 +233,11 @@ impl HandLine {
         &self.state
     }
 
+    /// The elastic energy of needle and tissue, J.
+    pub fn elastic_j(&self) -> f64 {
+        self.state.elastic_j(&self.model)
+    }
+
     /// Displacement of the material at the tip along the line, m.
     pub fn tip_displacement_m(&self) -> f64 {
         let load_n: f64 = self.state.loads_n().iter().sum::<f64>() + self.state.whole_n();

@@ -185,23 +185,6 @@ impl LineState {
         self.in_contact > 0 || self.tip.force_n > 0.0
     }
 
-    /// The elastic energy, J: half of force times displacement at once, and what the tissue that creeps held before the tick.
-    /// Does not allocate.
-    pub fn elastic_j(&self) -> f64 {
-        if self.memory.is_on() {
-            let at_once = |(n, f): (usize, &f64)| f * (self.u_m[n] - self.memory.offset_m[n]);
-            let shaft_j: f64 = self.shaft_n.iter().enumerate().take(self.in_contact).map(at_once).sum();
-            let places = self.tip_range.clone().zip(self.tip_weights);
-            let past_m: f64 = places
-                .map(|(n, w)| w * self.memory.offset_m[self.shaft_n.len() + n])
-                .sum();
-            let tip_j = self.tip.force_n * (self.tip_u_m - self.tip_offset_m - past_m);
-            return 0.5 * (shaft_j + tip_j) / self.memory.gain + self.memory.held_j;
-        }
-        let shaft = self.shaft_n.iter().zip(&self.u_m).take(self.in_contact);
-        0.5 * (shaft.map(|(f, u)| f * u).sum::<f64>() + self.tip.force_n * self.tip_u_m)
-    }
-
     /// Tissue at rest, with the tracks that were open before the line was taken up; does not allocate.
     pub fn reset(&mut self) {
         for field in [

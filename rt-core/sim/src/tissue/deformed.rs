@@ -21,13 +21,20 @@ pub struct Deformed<'a> {
 impl Deformed<'_> {
     /// Displacement from rest of one element, in elements; the last element's for a number past the end.
     pub fn displacement(&self, element: u32) -> [f64; 3] {
-        let e = (element as usize).min(self.lattice.element_count().saturating_sub(1));
-        let u = self.u.map(|c| c.get(e).map_or(0.0, |u| f64::from(self.scale * u)));
+        let u = self.not_carried(element);
         if matches!(self.carried, Carried::Not) {
             return u;
         }
+        let e = (element as usize).min(self.lattice.element_count().saturating_sub(1));
         let carried_m = self.carried.at_m(self.lattice, e as u32);
         [0, 1, 2].map(|a| u[a] + carried_m[a] / self.lattice.spacing_m)
+    }
+
+    /// Without what carries the whole body: loops over a body that nothing carries look for that once.
+    #[inline(always)]
+    pub(super) fn not_carried(&self, element: u32) -> [f64; 3] {
+        let e = (element as usize).min(self.lattice.element_count().saturating_sub(1));
+        self.u.map(|c| c.get(e).map_or(0.0, |u| f64::from(self.scale * u)))
     }
 
     /// Centre of an element in the scene frame; the last element's for a number past the end.
@@ -49,8 +56,14 @@ impl Deformed<'_> {
     pub fn write_surface(&self, at_rest: &Lattice, surface: &Surface, positions_m: &mut [[f32; 3]]) {
         let vertices = surface.vertex_elements.iter();
         if surface.moved_by.is_empty() {
-            for (slot, &element) in positions_m.iter_mut().zip(vertices) {
-                *slot = self.position_m(element).map(|c| c as f32);
+            let place_m = |element: u32, u: [f64; 3]| {
+                let rest = self.lattice.rest_m(element);
+                [0, 1, 2].map(|a| (rest[a] + self.lattice.spacing_m * u[a]) as f32)
+            };
+            let slots = positions_m.iter_mut().zip(vertices);
+            match self.carried {
+                Carried::Not => slots.for_each(|(slot, &e)| *slot = place_m(e, self.not_carried(e))),
+                Carried::Field(_) => slots.for_each(|(slot, &e)| *slot = place_m(e, self.displacement(e))),
             }
             return;
         }

@@ -1,6 +1,6 @@
 //! A point of the tissue: the element it belongs to and where in that element; moves and turns with it.
 
-use super::Deformed;
+use super::{Carried, Deformed};
 use crate::scene::Lattice;
 use serde::{Deserialize, Serialize};
 
@@ -67,8 +67,17 @@ impl MaterialPoint {
 
     /// Where the point is now, in the scene frame.
     pub fn position_m(&self, body: &Deformed) -> [f64; 3] {
-        let links = link_vectors(body, self.element);
-        let mut p = centre(body, self.element);
+        match body.carried {
+            Carried::Not => self.position_by(body, |element| body.not_carried(element)),
+            Carried::Field(_) => self.position_by(body, |element| body.displacement(element)),
+        }
+    }
+
+    #[inline(always)]
+    fn position_by(&self, body: &Deformed, displacement: impl Fn(u32) -> [f64; 3]) -> [f64; 3] {
+        let links = links_by(body, self.element, &displacement);
+        let (cell, u) = (body.lattice.cell(self.element), displacement(self.element));
+        let mut p = [0, 1, 2].map(|a| cell[a] as f64 + 0.5 + u[a]);
         for (link, local) in links.iter().zip(self.local) {
             for axis in 0..3 {
                 p[axis] += f64::from(local) * link[axis];
@@ -131,12 +140,17 @@ fn centre(body: &Deformed, element: u32) -> [f64; 3] {
 /// Links through an element along each axis: central differences, one-sided at the surface, as at rest
 /// where there is no neighbour.
 fn link_vectors(body: &Deformed, element: u32) -> [[f64; 3]; 3] {
+    links_by(body, element, &|element| body.displacement(element))
+}
+
+#[inline(always)]
+fn links_by(body: &Deformed, element: u32, displacement: &impl Fn(u32) -> [f64; 3]) -> [[f64; 3]; 3] {
     let around = body.lattice.neighbours(element);
     [0, 1, 2].map(|axis| {
         let (below, above) = (around[2 * axis], around[2 * axis + 1]);
         let steps = f64::from(u8::from(below.is_some()) + u8::from(above.is_some()));
-        let lo = body.displacement(below.unwrap_or(element));
-        let hi = body.displacement(above.unwrap_or(element));
+        let lo = displacement(below.unwrap_or(element));
+        let hi = displacement(above.unwrap_or(element));
         let mut link = [0, 1, 2].map(|a| (hi[a] - lo[a]) / steps.max(1.0));
         link[axis] += 1.0;
         link

@@ -1,6 +1,6 @@
 //! The hands of the envelope in coupled mode, where the force is what the tissue answers at 200 Hz: a needle off its line, both models.
 
-use super::{Case, excess, to_and_fro, worst};
+use super::{Case, SINGING_M, excess, to_and_fro, worst};
 use crate::rows::{Row, keep};
 use nalgebra::Vector3;
 use stylet_benches::rig::{Tick, hand_envelope};
@@ -46,8 +46,12 @@ fn run(session: &mut Session, seconds: f64) -> Vec<Tick> {
     (0..(seconds * 1e3) as usize).map(|_| session.tick()).collect()
 }
 
-/// As `super::session`, with the tip brought to rest `rest_m` behind where the body begins.
-fn session(mut world: Box<World>, hand: Hand, late_ticks: usize, rest_m: f64) -> (Case, Box<World>) {
+/// Three quarters of a second each, from one second after the nudge on: those of a hand that still moves after two of them, which go on
+/// to the eighth second, as where a handle is turned.
+const LOOKS: usize = 9;
+
+/// As `super::session`, with the tip brought to rest `rest_m` behind where the body begins; and how far it moves to and fro from look to look.
+fn session(mut world: Box<World>, hand: Hand, late_ticks: usize, rest_m: f64) -> (Case, Vec<f64>, Box<World>) {
     world.tissue.return_to_rest();
     let start = axis_start(&world);
     let faults = LinkFaults {
@@ -65,10 +69,13 @@ fn session(mut world: Box<World>, hand: Hand, late_ticks: usize, rest_m: f64) ->
     let mut after = run(&mut session, 0.05);
     session.go_to(at(rest_m), 0.1);
     after.extend(run(&mut session, 0.95));
-    let (early, late) = (run(&mut session, 0.75), run(&mut session, 0.75));
-    let (early_m, late_m) = (to_and_fro(&early), to_and_fro(&late));
-    after.extend(early);
-    after.extend(late);
+    let mut looks_m: Vec<f64> = Vec::new();
+    while looks_m.len() < 2 || (looks_m.len() < LOOKS && looks_m.last().is_some_and(|m| *m > SINGING_M)) {
+        let look = run(&mut session, 0.75);
+        looks_m.push(to_and_fro(&look));
+        after.extend(look);
+    }
+    let (early_m, late_m) = (looks_m[0], looks_m[1]);
     let (given_j, hidden_j) = excess(&after, before.work_j);
     ticks.extend(after);
     let (excess_j, bound_j) = excess(&ticks, 0.0);
@@ -86,14 +93,14 @@ fn session(mut world: Box<World>, hand: Hand, late_ticks: usize, rest_m: f64) ->
         bound_j,
         after_j: given_j - hidden_j - 0.9 * before.output.terms.stored_j,
     };
-    (case, session.into_world())
+    (case, looks_m, session.into_world())
 }
 
 #[test]
 fn no_hand_sings_in_coupled_mode() {
     for kind in [TissueKind::ChainMail, TissueKind::Fem] {
         let mut world = block(kind);
-        let mut all = Vec::new();
+        let (mut all, mut resting) = (Vec::new(), Vec::new());
         // A tick of finite elements takes long.
         let latenesses: &[usize] = if kind == TissueKind::Fem {
             &[0, 3]
@@ -103,31 +110,34 @@ fn no_hand_sings_in_coupled_mode() {
         for rest_m in [4e-3, 20e-3] {
             for &late_ticks in latenesses {
                 for hand in hand_envelope() {
-                    let (case, back) = session(world, hand, late_ticks, rest_m);
+                    let (case, looks_m, back) = session(world, hand, late_ticks, rest_m);
                     world = back;
+                    if case.sings() {
+                        println!("still moves: {}, {looks_m:.6?} m", case.name);
+                        resting.push(looks_m);
+                    }
                     all.push(case);
                 }
             }
         }
-        for case in all.iter().filter(|case| case.sings()) {
-            println!(
-                "sings: {}, {:.3} then {:.3} mm",
-                case.name,
-                case.early_m * 1e3,
-                case.late_m * 1e3
-            );
-        }
-        let singing = all.iter().filter(|case| case.sings()).count();
+        // One that decays moves less from look to look, and is at rest by the last.
+        let rests = |looks_m: &[f64]| {
+            looks_m.windows(2).all(|pair| pair[1] < pair[0]) && looks_m.last().is_some_and(|m| *m <= SINGING_M)
+        };
+        let singing = resting.iter().filter(|looks_m| !rests(looks_m)).count();
+        let longest_s = 0.75 * resting.iter().map(Vec::len).max().unwrap_or(0) as f64;
         let (late_m, where_late) = worst(&all, |c| c.late_m);
         let (given_j, where_given) = worst(&all, |c| c.excess_j - c.bound_j);
         keep(&Row {
             number: 42,
             case: "coupled mode off the line, 27 hands, 0 to 3 ticks late (FEM: 0 and 3), pressed 4 mm and 20 mm deep",
             model: kind.name(),
-            should: "none oscillates, none is given more than it gave",
+            should: "all come to rest in eight seconds, each moving less from look to look; none is given more than it gave",
             happened: format!(
-                "{singing} of {}; widest {:.3} mm ({where_late}); given beyond taken and rounding {:.2} mJ ({where_given})",
+                "{singing} of {} do not; {} move for more than 2.5 s, for {:.2} s at most; widest then {:.3} mm ({where_late}); given beyond taken and rounding {:.2} mJ ({where_given})",
                 all.len(),
+                resting.len(),
+                1.0 + longest_s,
                 late_m * 1e3,
                 given_j * 1e3
             ),

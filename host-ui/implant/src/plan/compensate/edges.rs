@@ -210,7 +210,7 @@ fn at_stops(rehearsals: &mut Rehearsals, at: &Tried, [shallower, deeper]: [i8; 2
 fn look(rehearsals: &mut Rehearsals, at: &Tried) -> Result<Moves, RehearsalError> {
     for steps in [STOPS, STOPS / 2] {
         match at_stops(rehearsals, at, [steps; 2]) {
-            Err(RehearsalError::Refused(_)) => {}
+            Err(RehearsalError::Refused { .. }) => {}
             looked => return looked,
         }
     }
@@ -224,7 +224,7 @@ fn look(rehearsals: &mut Rehearsals, at: &Tried) -> Result<Moves, RehearsalError
                 .iter_mut()
                 .zip(&found.0)
                 .for_each(|(beside, found)| beside.merge(found)),
-            Err(RehearsalError::Refused(_)) => moves.0[lost].lose(side),
+            Err(RehearsalError::Refused { .. }) => moves.0[lost].lose(side),
             Err(why) => return Err(why),
         }
     }

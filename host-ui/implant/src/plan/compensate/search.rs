@@ -2,7 +2,7 @@
 
 use super::Limits;
 use super::tried::{Rehearsals, Tried, aside, keep_within};
-use crate::plan::rehearse::Drops;
+use crate::plan::rehearse::{Drops, RehearsalError};
 use crate::plan::{Loading, Needle};
 
 /// A drop is not sought any closer.
@@ -31,6 +31,8 @@ pub(super) fn seek(rehearsals: &mut Rehearsals, from: usize, mut best: Tried, mu
     let until = rehearsals.count + most;
     let mut search = Search::begin(from, needle, last.clone());
     let mut others_move = true;
+    // Drops behind the sought one that were refused: they are made no shallower.
+    let mut least_m = vec![0.0_f64; best.error_m.len()];
     let mut next = search.next_m(needle, limits);
     while rehearsals.count < until && best.worst_m() > limits.enough_m {
         let Some(drop_m) = next else {
@@ -39,11 +41,18 @@ pub(super) fn seek(rehearsals: &mut Rehearsals, from: usize, mut best: Tried, mu
             }
             last = search.nearest.clone();
             search = Search::begin(search.seed + 1, needle, last.clone());
+            least_m.fill(0.0);
             next = search.next_m(needle, limits);
             continue;
         };
-        let drops = moved(needle, &search, &last, drop_m, others_move, limits);
-        let asked_m = drops.along_m[search.seed];
+        let mut drops = moved(needle, &search, &last, drop_m, others_move, limits);
+        drops
+            .along_m
+            .iter_mut()
+            .zip(&least_m)
+            .for_each(|(along_m, least)| *along_m = along_m.max(*least));
+        keep_within(needle, limits, &mut drops);
+        let asked = drops.along_m.clone();
         match rehearsals.try_it(drops) {
             Ok(new) => {
                 search.take(needle, &new);
@@ -58,7 +67,14 @@ pub(super) fn seek(rehearsals: &mut Rehearsals, from: usize, mut best: Tried, mu
                 others_move = false;
                 continue;
             }
-            Err(_) => search.refuse(asked_m),
+            // The tissue is farther in than the one behind it would be dropped: with the sought one there, that goes deeper.
+            Err(RehearsalError::Refused {
+                drop: Some(refused), ..
+            }) if (search.seed + 1..sought).contains(&refused) && asked[refused] + DEEPER_M < asked[refused - 1] => {
+                least_m[refused] = asked[refused] + DEEPER_M;
+                continue;
+            }
+            Err(_) => search.refuse(asked[search.seed]),
         }
         next = search.next_m(needle, limits);
     }

@@ -19,12 +19,12 @@ struct Known<F> {
 impl<F: Fn(f64) -> f64> Rehearser for Known<F> {
     fn rehearse(&mut self, drops: &Drops, _: &Pace) -> Result<Rest, RehearsalError> {
         self.asked += 1;
-        if drops
-            .along_m
-            .iter()
-            .any(|&z| z > self.tissue_to_m || z < self.tissue_from_m)
-        {
-            return Err(RehearsalError::Refused("the tip is outside the tissue".to_owned()));
+        let is_outside = |&z: &f64| z > self.tissue_to_m || z < self.tissue_from_m;
+        if let Some(drop) = drops.along_m.iter().position(is_outside) {
+            return Err(RehearsalError::Refused {
+                text: "the tip is outside the tissue".to_owned(),
+                drop: Some(drop),
+            });
         }
         let tip = |&z: &f64| match self.sticks_m {
             0.0 => z,
@@ -297,4 +297,27 @@ fn a_hand_that_sticks_is_sent_on_until_its_tip_is_clear() {
     let rest_m = 0.05 + done.after_m[0][2];
     let tip_m = rest_m + 2e-3;
     assert!(tip_m <= 0.05205 - edges::BESIDE_M && tip_m > 0.051, "{tip_m}");
+}
+
+/// The deeper the first seed is dropped, the farther in the tissue begins for the last one: each refusal was taken for one of the first seed's
+/// drop, which was then sought no deeper, and left 10 mm short.
+#[test]
+fn a_seed_is_sought_deeper_although_the_last_one_cannot_be_dropped_as_before() {
+    struct Dragged;
+    impl Rehearser for Dragged {
+        fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError> {
+            let mut known = tissue(|z| 0.2 * z);
+            let begins_m = 0.034 + 0.5 * (drops.along_m[0] - 0.055);
+            if drops.along_m[2] < begins_m {
+                return Err(RehearsalError::Refused {
+                    text: "the tip is outside the tissue".to_owned(),
+                    drop: Some(2),
+                });
+            }
+            known.rehearse(drops, pace)
+        }
+    }
+    let done = run(&needle(Loading::Loose), &mut Dragged);
+    let errors: Vec<f64> = done.errors_after_m().collect();
+    assert!(errors[0] < 0.1e-3 && errors[1] < 0.1e-3, "{errors:?}");
 }

@@ -4,9 +4,45 @@ use super::*;
 use std::time::Instant;
 use stylet_sim::line::BodyAnswer;
 
-/// Ticks of the force loop: in to 30 mm at 50 mm/s, and then at rest.
-const IN: usize = 1_000;
-const TICKS: usize = 2_500;
+/// A body, a needle into it, and ticks of the force loop until it is in at 50 mm/s. Then it rests.
+struct Theatre {
+    stage: Stage,
+    run: NeedleRun,
+    going: usize,
+}
+
+impl Theatre {
+    fn paper() -> Self {
+        let run = NeedleRun {
+            drops_m: vec![needle().entry_m + Vector3::z() * 0.04],
+            ..needle()
+        };
+        Theatre {
+            stage: stage(),
+            run,
+            going: 1_000,
+        }
+    }
+
+    /// From before the skin on the same way to the same depth in the gland.
+    fn pelvis() -> Self {
+        let paper = Self::paper();
+        let source = SceneSource::Builtin("pelvis".to_owned());
+        let scene = source.build().expect("built in");
+        let before_m = paper.run.entry_m.z - (scene.lattice.bounds_m().0[2] - 0.01);
+        let stage = Stage::build(&source, TissueKind::ChainMail, DeviceInfo::phantom_premium_1_5());
+        Theatre {
+            stage: stage.expect("built in"),
+            run: NeedleRun {
+                entry_m: paper.run.entry_m - Vector3::z() * before_m,
+                ..paper.run
+            },
+            going: paper.going + (before_m / 0.05 * 1e3) as usize,
+        }
+    }
+}
+
+const RESTING: usize = 1_500;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Way {
@@ -18,18 +54,15 @@ enum Way {
 }
 
 /// Time of each tick of the force loop with one of the tissue loop's, and displacements after it.
-fn session(stage: &mut Stage, way: Way) -> (Vec<(usize, f64)>, Vec<[u64; 3]>) {
-    let run = NeedleRun {
-        drops_m: vec![needle().entry_m + Vector3::z() * 0.04],
-        ..needle()
-    };
+fn session(theatre: &mut Theatre, way: Way) -> (Vec<(usize, f64)>, Vec<[u64; 3]>) {
+    let Theatre { stage, run, going } = theatre;
     let (set, stop) = (ParameterSet::default(), AtomicBool::new(false));
     let active = activate(&set, &stage.device).expect("valid");
-    let mut lines = stage.lines(&run, false, &stop).expect("a line");
+    let mut lines = stage.lines(run, false, &stop).expect("a line");
     if way == Way::Never {
         lines[0].body.answer = BodyAnswer::Carrying(Vec::new());
     }
-    let mut rig = stage.rig(&run, &active).expect("a body");
+    let mut rig = stage.rig(run, &active).expect("a body");
     rig.take_lines(lines);
     rig.engage();
     rig.move_hand(&stylet_shm_schema::HandMove {
@@ -39,7 +72,7 @@ fn session(stage: &mut Stage, way: Way) -> (Vec<(usize, f64)>, Vec<[u64; 3]>) {
         acceleration_m_per_s2: run.acceleration_m_per_s2,
     });
     let (mut times_us, mut places) = (Vec::new(), Vec::new());
-    for n in 0..TICKS {
+    for n in 0..*going + RESTING {
         if way == Way::Always {
             rig.forget_carry();
         }
@@ -56,9 +89,9 @@ fn session(stage: &mut Stage, way: Way) -> (Vec<(usize, f64)>, Vec<[u64; 3]>) {
 
 #[test]
 fn what_is_left_out_of_a_tick_in_which_nothing_changed_changes_no_bit() {
-    let mut stage = stage();
-    let (_, as_it_is) = session(&mut stage, Way::AsItIs);
-    let (_, always) = session(&mut stage, Way::Always);
+    let mut theatre = Theatre::paper();
+    let (_, as_it_is) = session(&mut theatre, Way::AsItIs);
+    let (_, always) = session(&mut theatre, Way::Always);
     assert!(as_it_is == always);
     assert!(as_it_is[0] != as_it_is[as_it_is.len() - 3]);
 }
@@ -67,7 +100,12 @@ fn what_is_left_out_of_a_tick_in_which_nothing_changed_changes_no_bit() {
 #[test]
 #[ignore = "times"]
 fn times_of_a_tick_that_carries() {
-    let mut stage = stage();
+    for (scene, theatre) in [("paper", Theatre::paper()), ("pelvis", Theatre::pelvis())] {
+        times(scene, theatre);
+    }
+}
+
+fn times(scene: &str, mut theatre: Theatre) {
     let ways = [
         ("never", Way::Never),
         ("always", Way::Always),
@@ -76,7 +114,7 @@ fn times_of_a_tick_that_carries() {
     let mut least: Vec<Vec<(usize, f64)>> = vec![Vec::new(); ways.len()];
     for _ in 0..6 {
         for ((_, way), least) in ways.iter().zip(&mut least) {
-            let (times, _) = session(&mut stage, *way);
+            let (times, _) = session(&mut theatre, *way);
             if least.is_empty() {
                 *least = times;
             } else {
@@ -85,7 +123,10 @@ fn times_of_a_tick_that_carries() {
         }
     }
     for ((name, _), least) in ways.iter().zip(&least) {
-        for (phase, part) in [("going in", 300..IN), ("at rest", 1_700..TICKS)] {
+        for (phase, part) in [
+            ("going in", theatre.going - 700..theatre.going),
+            ("at rest", theatre.going + 700..theatre.going + RESTING),
+        ] {
             let mut us: Vec<f64> = least
                 .iter()
                 .filter(|(n, _)| part.contains(n))
@@ -94,7 +135,7 @@ fn times_of_a_tick_that_carries() {
             us.sort_by(f64::total_cmp);
             let at = |q: f64| us[((us.len() - 1) as f64 * q).round() as usize];
             println!(
-                "{name}, {phase}: p50 {:.1}, p99 {:.1}, max {:.1} us",
+                "{scene}, {name}, {phase}: p50 {:.1}, p99 {:.1}, max {:.1} us",
                 at(0.5),
                 at(0.99),
                 at(1.0)

@@ -78,7 +78,7 @@ pub fn step_on_line(
     let (bone_n, bone_j) = line.bone(along_m);
     let bent = line.bend(&tip, &sample.world_from_tool, &answer);
     let left_j = left.map_or(0.0, |left| left.elastic_j());
-    let tissue_j = line.state().elastic_j() + bone_j + left_j;
+    let tissue_j = line.elastic_j() + bone_j + left_j;
     let mut terms = terms(parameters, &input, &axis, &answer, bone_n, tissue_j);
     if let Some(bent) = bent.as_ref().filter(|_| phase != Phase::Outside) {
         bend(&mut terms, bent, &axis, line.across());

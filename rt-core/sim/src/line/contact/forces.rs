@@ -1,7 +1,7 @@
 //! The forces of shaft and tip with the tip where it is: by sets of stations that stick, or by sweeps.
 
 use super::sets::{self, Tip};
-use super::{Scratch, limit_n, past_at_tip_m};
+use super::{Scratch, Spring, limit_n, past_at_tip_m};
 use crate::line::model::LineModel;
 use crate::line::rows::{Rows, add_scaled, dot};
 use crate::line::state::{LineOutput, LineState};
@@ -51,6 +51,8 @@ fn solve_by_sets(
         .low_n
         .set(count, (0..count).map(|n| -limit_n(model, place_m, n)));
     scratch.column.set(count, state.tip_column.iter().copied());
+    let common = std::iter::repeat(model.compliance.common_m_per_n());
+    scratch.hold_by(Spring::of(model, state), common);
     scratch.force_n.set(count, state.shaft_n.iter().copied());
     scratch.u_m.set(count, state.u_m.iter().copied());
     scratch.tip = Tip {
@@ -99,23 +101,31 @@ vectorised! {
     }
 }
 
+/// The stations of the needle that moves, to its neighbours.
+pub(in crate::line) struct Shaft<'a> {
+    pub u_m: &'a mut [f64],
+    /// How each moves with the tip's force.
+    pub column: &'a [f64],
+    pub spring: Option<Spring>,
+}
+
 /// What shares the sweeps of a needle: nothing, or needles that stay in.
 pub(in crate::line) trait Neighbours {
-    /// The force of a station of the shaft has changed.
-    fn feel_shaft(&mut self, n: usize, change_n: f64);
+    /// The force of a station of the shaft has changed; dents of as much take `taken_n` from those of the neighbours.
+    fn feel_shaft(&mut self, n: usize, change_n: f64, taken_n: f64);
     /// The tip's has.
     fn feel_tip(&mut self, change_n: f64);
     /// Corrects its own forces, and adds what that moves of the stations and the tip; returns the largest correction.
-    fn sweep(&mut self, is_backwards: bool, u_m: &mut [f64], tip_u_m: &mut f64) -> f64;
+    fn sweep(&mut self, is_backwards: bool, shaft: Shaft<'_>, tip_u_m: &mut f64) -> f64;
 }
 
 impl Neighbours for () {
     #[inline(always)]
-    fn feel_shaft(&mut self, _n: usize, _change_n: f64) {}
+    fn feel_shaft(&mut self, _n: usize, _change_n: f64, _taken_n: f64) {}
     #[inline(always)]
     fn feel_tip(&mut self, _change_n: f64) {}
     #[inline(always)]
-    fn sweep(&mut self, _is_backwards: bool, _u_m: &mut [f64], _tip_u_m: &mut f64) -> f64 {
+    fn sweep(&mut self, _is_backwards: bool, _shaft: Shaft<'_>, _tip_u_m: &mut f64) -> f64 {
         0.0
     }
 }
@@ -132,6 +142,7 @@ pub(in crate::line) fn sweep(
     let rows = &model.compliance.rows;
     let (count, gain) = (state.in_contact, state.memory.gain);
     let place_m = state.tip.material_m;
+    let spring = Spring::of(model, state);
     let LineState {
         ref mut shaft_n,
         ref anchor_m,
@@ -149,7 +160,9 @@ pub(in crate::line) fn sweep(
         for step in 0..count {
             let n = if is_backwards { count - 1 - step } else { step };
             let row = &rows.row(n)[..count];
-            let own = gain * row[n];
+            let dent = spring.map_or(0.0, |spring| tip_column[n] - spring.common_m_per_n);
+            let taken = spring.map_or(0.0, |spring| spring.n_per_m * dent);
+            let own = gain * (row[n] - taken * dent);
             let limit = limit_n(model, place_m, n);
             let free_n = shaft_n[n] + (tip_m - anchor_m[n] - u_m[n]) / own;
             let mut wanted = free_n.clamp(-limit, limit);
@@ -164,7 +177,12 @@ pub(in crate::line) fn sweep(
                 shaft_n[n] = wanted;
                 add_scaled(gain * change, row, u_m);
                 tip_u_m += gain * change * tip_column[n];
-                neighbours.feel_shaft(n, change);
+                if let Some(spring) = spring {
+                    for (u, of_tip) in u_m.iter_mut().zip(tip_column) {
+                        *u -= gain * change * taken * (of_tip - spring.common_m_per_n);
+                    }
+                }
+                neighbours.feel_shaft(n, change, change * taken);
                 largest_m = largest_m.max((change * own).abs());
             }
         }
@@ -179,7 +197,12 @@ pub(in crate::line) fn sweep(
                 largest_m = largest_m.max((change * tip_gain).abs());
             }
         }
-        largest_m = largest_m.max(neighbours.sweep(is_backwards, u_m, &mut tip_u_m));
+        let shaft = Shaft {
+            u_m: &mut *u_m,
+            column: tip_column,
+            spring,
+        };
+        largest_m = largest_m.max(neighbours.sweep(is_backwards, shaft, &mut tip_u_m));
         output.sweeps += 1;
         output.residual_m = largest_m;
         if largest_m <= model.settings.tolerance_m {

@@ -7,6 +7,7 @@
 
 use super::super::model::MAX_STATIONS;
 use super::super::rows::Rows;
+use super::Spring;
 use crate::simd::{LANES, Vector, in_vectors};
 use gradients::{Of, add, answer, hold, places, product};
 use stylet_shm_schema::MAX_LEFT_NEEDLES;
@@ -77,6 +78,9 @@ pub(in crate::line) struct Scratch<const B: usize> {
     pub high_n: Each<B>,
     /// How each station moves with the tip's force, m/N.
     pub column: Each<B>,
+    /// How much of that is a dent, and what dents take from each other where a membrane holds the tip ([`Spring`]); 0 for none.
+    pub dent: Each<B>,
+    pub taken_n_per_m: f64,
     /// Forces, and the displacements that they make.
     pub force_n: Each<B>,
     pub u_m: Each<B>,
@@ -111,6 +115,8 @@ impl<const B: usize> Scratch<B> {
             low_n: Each::ZEROS,
             high_n: Each::ZEROS,
             column: Each::ZEROS,
+            dent: Each::ZEROS,
+            taken_n_per_m: 0.0,
             force_n: Each::ZEROS,
             u_m: Each::ZEROS,
             tip: Tip::default(),
@@ -129,6 +135,25 @@ impl<const B: usize> Scratch<B> {
         }
     }
 
+    /// The membrane that holds the tip, if one does; `column` is set, and of it `whole` is no dent.
+    pub fn hold_by(&mut self, spring: Option<Spring>, whole: impl Iterator<Item = f64>) {
+        let taken_n_per_m = spring.map_or(0.0, |spring| spring.n_per_m);
+        if taken_n_per_m != 0.0 {
+            self.dent.set(
+                self.count,
+                self.column
+                    .numbers()
+                    .iter()
+                    .zip(whole)
+                    .map(|(of_tip, whole)| of_tip - whole),
+            );
+        }
+        if taken_n_per_m != 0.0 || self.taken_n_per_m != 0.0 {
+            self.owned = 0;
+        }
+        self.taken_n_per_m = taken_n_per_m;
+    }
+
     #[inline(always)]
     fn blocks(&self) -> usize {
         self.count.div_ceil(LANES).min(B)
@@ -141,7 +166,10 @@ in_vectors! {
 fn find<V: Vector<f64>, const B: usize>(rows: &Rows, inverse: Option<&Rows>, scratch: &mut Scratch<B>) -> bool {
     let (count, gain) = (scratch.count, scratch.gain);
     if scratch.owned != count {
-        scratch.own_m_per_n.set(count, (0..count).map(|n| gain * rows.row(n).get(n).copied().unwrap_or(1.0)));
+        let (taken, dent) = (scratch.taken_n_per_m, scratch.dent.numbers());
+        let taken_m = |n: usize| if taken == 0.0 { 0.0 } else { taken * dent[n] * dent[n] };
+        let own = |n: usize| gain * (rows.row(n).get(n).copied().unwrap_or(1.0) - taken_m(n));
+        scratch.own_m_per_n.set(count, (0..count).map(own));
         scratch.n_per_own_m.set(count, scratch.own_m_per_n.numbers().iter().map(|own| 1.0 / own));
         scratch.owned = count;
     }

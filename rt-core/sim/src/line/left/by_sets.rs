@@ -3,7 +3,7 @@
 use super::solve::SKIPPED;
 use super::{LeftNeedle, LeftNeedles};
 use crate::line::contact::sets::Tip;
-use crate::line::contact::{LineInput, find_by_sets, limit_n};
+use crate::line::contact::{LineInput, Spring, find_by_sets, limit_n};
 use crate::line::model::LineModel;
 use crate::line::rows::dot;
 use crate::line::state::{LineOutput, LineState};
@@ -51,6 +51,11 @@ impl LeftNeedles {
         scratch
             .column
             .set(all, each(&self.by_tip[..elements], &state.tip_column[..count]));
+        let common = std::iter::repeat(model.compliance.common_m_per_n());
+        scratch.hold_by(
+            Spring::of(model, state),
+            self.whole[..elements].iter().copied().chain(common),
+        );
         scratch
             .force_n
             .set(all, each(&self.force_n[..elements], &state.shaft_n[..count]));

@@ -7,6 +7,7 @@
 
 mod assemble;
 mod by_sets;
+mod needle;
 mod onward;
 mod record;
 mod solve;
@@ -85,6 +86,8 @@ pub struct LeftNeedles {
     /// The same the other way round: elements by a newton at each row of that line, and by one at its tip.
     from_moving: Vec<f64>,
     by_tip: Vec<f64>,
+    /// What dents take from each other where a membrane holds the tip that moves; 0 where none does.
+    taken_n_per_m: f64,
     /// Of the body as a whole along each element and the moving line, m/N.
     whole: Vec<f64>,
     /// What was added to the displacements of the moving line, m.
@@ -126,6 +129,7 @@ impl LeftNeedles {
             to_moving: each(MAX_ELEMENTS * 2 * MAX_STATIONS),
             from_moving: each(2 * MAX_STATIONS * stride),
             by_tip: each(MAX_ELEMENTS),
+            taken_n_per_m: 0.0,
             whole: each(MAX_ELEMENTS),
             added_m: each(2 * MAX_STATIONS),
             is_still: true,
@@ -258,6 +262,7 @@ impl LeftNeedles {
 
     /// One tick in which no needle moves beside them.
     pub fn step_alone(&mut self, dt_s: f64) {
+        self.taken_n_per_m = 0.0;
         self.draw(dt_s);
         if !self.is_still {
             self.displace(None);
@@ -366,33 +371,6 @@ impl LeftNeedles {
         }
         self.assemble(None);
         needle
-    }
-}
-
-impl LeftNeedle {
-    /// Number of its line.
-    pub fn generation(&self) -> u64 {
-        self.line.generation
-    }
-
-    /// Its line.
-    pub fn line(&self) -> &HandLine {
-        &self.line
-    }
-
-    /// Where its tip is along the line in the world, m.
-    pub fn held_m(&self) -> f64 {
-        self.held_m
-    }
-
-    /// It is being drawn out.
-    pub fn is_drawn(&self) -> bool {
-        self.drawing_m_per_s > 0.0
-    }
-
-    /// Depth of its tip in the material, m.
-    pub fn depth_m(&self) -> f64 {
-        self.line.state.tip.material_m - self.drawn_m
     }
 }
 

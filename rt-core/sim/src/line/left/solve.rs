@@ -2,7 +2,9 @@
 //! for a needle alone, or by projected Gauss-Seidel.
 
 use super::{LeftNeedle, LeftNeedles};
-use crate::line::contact::{Company, LineInput, Neighbours, advance, lay, meet, press, step, stick, sweep};
+use crate::line::contact::{
+    Company, LineInput, Neighbours, Shaft, Spring, advance, lay, meet, press, step, stick, sweep,
+};
 use crate::line::model::{LineModel, MAX_STATIONS};
 use crate::line::ready::HandLine;
 use crate::line::rows::{add_scaled, dot};
@@ -54,6 +56,10 @@ impl Company for LeftNeedles {
         } else {
             self.displace(Some(state));
         }
+        self.taken_n_per_m = 0.0;
+        if let Some(spring) = Spring::of(model, state) {
+            self.relieve(model, state, &spring);
+        }
     }
 
     fn solve(
@@ -89,6 +95,7 @@ impl Company for LeftNeedles {
 impl LeftNeedles {
     /// Beside a needle that does not reach them.
     fn step_rest(&mut self) {
+        self.taken_n_per_m = 0.0;
         if !self.is_still {
             self.displace(None);
             self.solve_alone();
@@ -149,6 +156,28 @@ impl LeftNeedles {
         }
     }
 
+    /// Takes from stations and elements what the spring of the membrane that holds the tip passes on; of the elements `by_tip` has taken
+    /// what it passes on of the tip's force.
+    fn relieve(&mut self, model: &LineModel, state: &mut LineState, spring: &Spring) {
+        let count = self.count;
+        self.taken_n_per_m = spring.n_per_m;
+        let by_others_m = dot(&self.by_tip[..count], &self.force_n[..count]);
+        let passed_n = spring.passed_n(state, self.past_m(model, state) + by_others_m);
+        spring.relieve(state, passed_n);
+        let by = (passed_n - (1.0 - spring.kept) * state.tip.force_n) / spring.kept;
+        for (u_m, (by_tip, whole)) in self.u_m[..count].iter_mut().zip(self.by_tip.iter().zip(&self.whole)) {
+            *u_m -= by * (by_tip - whole);
+        }
+    }
+
+    /// What the past alone displaces the tip by: what the others do goes by `by_tip`, in which a membrane has its part.
+    fn past_m(&self, model: &LineModel, state: &LineState) -> f64 {
+        let m = model.compliance.stations;
+        let past = |n: usize| state.memory.offset_m[m + n] - self.added_m[m + n];
+        let weights = state.tip_range.clone().zip(state.tip_weights);
+        weights.map(|(n, w)| w * past(n)).sum()
+    }
+
     /// Displacement of each element by all forces as they are; of the moving needle's with `moving`.
     pub(super) fn displace(&mut self, moving: Option<&LineState>) {
         let (count, stride, simd) = (self.count, self.stride, self.simd);
@@ -202,12 +231,9 @@ impl LeftNeedles {
         (tip_m, tip_limit_n, slowness): (f64, f64, f64),
         output: &mut LineOutput,
     ) -> f64 {
-        let (m, elements, gain) = (model.compliance.stations, self.count, state.memory.gain);
-        // By the past alone: what the others add goes by `by_tip`, in which a membrane has its part.
-        let past = |n: usize| state.memory.offset_m[m + n] - self.added_m[m + n];
-        let weights = state.tip_range.clone().zip(state.tip_weights);
-        let offset: f64 = weights.map(|(n, w)| w * past(n)).sum();
-        let offset = offset + state.tip_offset_m + dot(&self.by_tip[..elements], &self.force_n[..elements]);
+        let (elements, gain) = (self.count, state.memory.gain);
+        let offset =
+            self.past_m(model, state) + state.tip_offset_m + dot(&self.by_tip[..elements], &self.force_n[..elements]);
         let of_shaft = dot(&state.tip_column, &state.shaft_n[..state.in_contact]);
         state.tip_u_m = gain * (of_shaft + state.tip_own * state.tip.force_n) + offset;
         self.is_still = state.in_contact == 0;
@@ -220,9 +246,12 @@ impl LeftNeedles {
 
 impl Neighbours for LeftNeedles {
     #[inline(always)]
-    fn feel_shaft(&mut self, n: usize, change_n: f64) {
+    fn feel_shaft(&mut self, n: usize, change_n: f64, taken_n: f64) {
         let row = &self.from_moving[n * self.stride..n * self.stride + self.count];
         add_scaled(change_n, row, &mut self.u_m[..self.count]);
+        if taken_n != 0.0 {
+            take(taken_n, self);
+        }
     }
 
     #[inline(always)]
@@ -231,7 +260,8 @@ impl Neighbours for LeftNeedles {
     }
 
     #[inline(always)]
-    fn sweep(&mut self, is_backwards: bool, u_m: &mut [f64], tip_u_m: &mut f64) -> f64 {
+    fn sweep(&mut self, is_backwards: bool, shaft: Shaft<'_>, tip_u_m: &mut f64) -> f64 {
+        let Shaft { u_m, column, spring } = shaft;
         let mut largest_m = 0.0_f64;
         for step in 0..self.count {
             let k = if is_backwards { self.count - 1 - step } else { step };
@@ -240,6 +270,12 @@ impl Neighbours for LeftNeedles {
                 let first = k * 2 * MAX_STATIONS;
                 add_scaled(change, &self.to_moving[first..first + u_m.len()], u_m);
                 *tip_u_m += change * self.by_tip[k];
+                if let Some(spring) = spring {
+                    let taken_n = change * spring.n_per_m * (self.by_tip[k] - self.whole[k]);
+                    for (u, of_tip) in u_m.iter_mut().zip(column) {
+                        *u -= taken_n * (of_tip - spring.common_m_per_n);
+                    }
+                }
                 largest_m = largest_m.max(moved_m);
                 self.is_still = false;
             }
@@ -288,7 +324,9 @@ fn add_parts<const N: usize>(factors: &[f64], rows: &[f64], stride: usize, from:
 /// Corrects one element; returns the change of its force, and how far it moves the element itself.
 #[inline(always)]
 fn correct(left: &mut LeftNeedles, k: usize, skipped_m: f64) -> (f64, f64) {
-    let own = left.own[k * left.stride + k];
+    let dent = left.by_tip[k] - left.whole[k];
+    let taken = left.taken_n_per_m * dent;
+    let own = left.own[k * left.stride + k] - taken * dent;
     let free_n = left.force_n[k] + (left.rest_m[k] - left.u_m[k]) / own;
     let change = free_n.clamp(left.low_n[k], left.high_n[k]) - left.force_n[k];
     let moved_m = (change * own).abs();
@@ -302,7 +340,19 @@ fn correct(left: &mut LeftNeedles, k: usize, skipped_m: f64) -> (f64, f64) {
         &left.own[k * stride..k * stride + count],
         &mut left.u_m[..count],
     );
+    if taken != 0.0 {
+        take(change * taken, left);
+    }
     (change, moved_m)
+}
+
+/// Takes from the elements what the spring of a membrane does that is dented by so much more.
+#[inline(always)]
+fn take(taken_n: f64, left: &mut LeftNeedles) {
+    let count = left.count;
+    for (u_m, (by_tip, whole)) in left.u_m[..count].iter_mut().zip(left.by_tip.iter().zip(&left.whole)) {
+        *u_m -= taken_n * (by_tip - whole);
+    }
 }
 
 vectorised! {

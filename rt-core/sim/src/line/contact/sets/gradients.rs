@@ -149,6 +149,15 @@ pub(super) fn answer<V: Vector<f64>, const B: usize>(
         Of::Along => &scratch.along_n,
     };
     product::<V, B>(rows, blocks, places, force_n.numbers(), &mut scratch.moved_m);
+    if scratch.taken_n_per_m != 0.0 {
+        take::<V, B>(
+            &scratch.dent,
+            scratch.taken_n_per_m,
+            blocks,
+            force_n,
+            &mut scratch.moved_m,
+        );
+    }
     let mut sum = V::splat(0.0);
     for b in 0..blocks {
         let column = V::load(&scratch.column.0[b]);
@@ -157,6 +166,25 @@ pub(super) fn answer<V: Vector<f64>, const B: usize>(
         sum = sum.add(column.mul(V::load(&force_n.0[b])));
     }
     scratch.gain * (total(sum) + scratch.tip.own_m_per_n * tip_n)
+}
+
+/// Takes what the spring of a membrane takes from displacements by these forces.
+#[inline(always)]
+fn take<V: Vector<f64>, const B: usize>(
+    dent: &Each<B>,
+    taken_n_per_m: f64,
+    blocks: usize,
+    force_n: &Each<B>,
+    moved_m: &mut Each<B>,
+) {
+    let mut sum = V::splat(0.0);
+    for b in 0..blocks {
+        sum = sum.add(V::load(&dent.0[b]).mul(V::load(&force_n.0[b])));
+    }
+    let by = -taken_n_per_m * total(sum);
+    for b in 0..blocks {
+        add::<V>(&mut moved_m.0[b], by, &dent.0[b]);
+    }
 }
 
 /// Sum of the rows of some stations times their numbers, in the first so many blocks.

@@ -12,8 +12,7 @@ fn random(seed: &mut u64) -> f64 {
 }
 
 fn stored_j(line: &HandLine, left: &LeftNeedles) -> f64 {
-    // What a membrane is relaxed at is no displacement of the tissue.
-    line.state.elastic_j() - 0.5 * line.state.tip.force_n * line.state.tip_offset_m + left.elastic_j()
+    line.elastic_j() + left.elastic_j()
 }
 
 /// The hand's work in each tick, by the force after it, is at least what is stored more: from an energy `E` on, no motion gets more than

@@ -1,0 +1,160 @@
+//! A membrane that holds the tip: a spring between the tip and the body as a whole, and what it takes from the tissue around.
+
+use crate::line::model::LineModel;
+use crate::line::rows::dot;
+use crate::line::state::LineState;
+
+/// A membrane is met where the tissue in front of it is by now: past loads and other needles may have moved it before the tip was there.
+pub(in crate::line) fn meet(model: &LineModel, state: &mut LineState, membrane: Option<usize>) {
+    let held_by = membrane.map_or(0, |n| n as u32 + 1);
+    if held_by == state.tip.held_by || held_by == 0 {
+        return;
+    }
+    let count = state.in_contact;
+    let own = dot(&state.tip_column[..count], &state.shaft_n[..count]) + state.tip_own * state.tip.force_n;
+    state.tip_u_m = state.memory.gain * own + past_at_tip_m(model, state);
+}
+
+/// A membrane is stiffer than what it holds: between the place of the tip and the body as a whole it is a spring, of such a
+/// stiffness that both of its limits, force and depth, are met at once (eq. 10). It is relaxed when the tip meets it. Returns what it leaves of the dent, where one holds the tip.
+pub(in crate::line) fn press(model: &LineModel, state: &mut LineState, membrane: Option<usize>) -> Option<f64> {
+    let whole = model.compliance.common_m_per_n();
+    let count = state.in_contact;
+    let held_by = membrane.map_or(0, |n| n as u32 + 1);
+    if held_by != state.tip.held_by {
+        let load_n = state.shaft_n[..count].iter().sum::<f64>() + state.tip.force_n;
+        state.tip.met_u_m = if held_by == 0 { 0.0 } else { state.tip_u_m };
+        state.tip.met_dent_m = if held_by == 0 {
+            0.0
+        } else {
+            state.tip_u_m - whole_m(state, whole, load_n) - state.beside_whole_m
+        };
+        state.tip.held_by = held_by;
+    }
+    (state.tip_offset_m, state.membrane_n_per_m) = (0.0, 0.0);
+    let kept = membrane.and_then(|n| model.kept_of_dent(n, state.tip_own))?;
+    state.membrane_n_per_m = (1.0 / kept - 1.0) / (state.tip_own - whole);
+    // Tissue that gives way within the tick leaves the spring more of the dent.
+    let gain = state.memory.gain;
+    let kept = if gain == 1.0 {
+        kept
+    } else {
+        kept / (kept + gain * (1.0 - kept))
+    };
+    state.tip_own = whole + kept * (state.tip_own - whole);
+    for of_tip in &mut state.tip_column[..count] {
+        *of_tip = whole + kept * (*of_tip - whole);
+    }
+    state.tip_offset_m = (1.0 - kept) * state.tip.met_dent_m;
+    if state.memory.is_on() {
+        // Of the dent that the past leaves, the spring leaves that part as well.
+        state.tip_offset_m -= (1.0 - kept) * (past_at_tip_m(model, state) - state.memory.whole_offset_m);
+    }
+    Some(kept)
+}
+
+/// Displacement of the material at the tip that the past leaves.
+pub(super) fn past_at_tip_m(model: &LineModel, state: &LineState) -> f64 {
+    let places = state.tip_range.clone().zip(state.tip_weights);
+    places
+        .map(|(n, w)| w * state.memory.offset_m[model.compliance.stations + n])
+        .sum()
+}
+
+/// How far loads of that sum displace the body as a whole, with what the past leaves.
+fn whole_m(state: &LineState, whole_m_per_n: f64, load_n: f64) -> f64 {
+    if state.memory.is_on() {
+        state.memory.gain * whole_m_per_n * load_n + state.memory.whole_offset_m
+    } else {
+        whole_m_per_n * load_n
+    }
+}
+
+/// What the spring of a membrane that is stretched passes on to the body as a whole.
+pub(super) fn whole_n(model: &LineModel, state: &LineState) -> f64 {
+    if state.membrane_n_per_m == 0.0 {
+        return 0.0;
+    }
+    let load_n = state.shaft_n[..state.in_contact].iter().sum::<f64>() + state.tip.force_n;
+    let dent_m = state.tip_u_m - whole_m(state, model.compliance.common_m_per_n(), load_n) - state.beside_whole_m;
+    state.membrane_n_per_m * (dent_m - state.tip.met_dent_m)
+}
+
+/// The membrane's spring as the stations meet it. It passes a part of what dents the tissue at the tip to the body as a whole, so it takes
+/// from each place `e s`: `s` is what it passes on, and `e` how much a newton at the tip dents the tissue there.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::line) struct Spring {
+    /// What the dents that forces make by the columns as they are left, `e'`, take from each other: `n_per_m e' e'`.
+    pub n_per_m: f64,
+    /// What of a dent is left, `e' = kept e`.
+    pub kept: f64,
+    /// How far any force moves all of the line.
+    pub common_m_per_n: f64,
+    gain: f64,
+}
+
+impl Spring {
+    /// `None` where no membrane holds the tip.
+    pub fn of(model: &LineModel, state: &LineState) -> Option<Self> {
+        if state.membrane_n_per_m == 0.0 {
+            return None;
+        }
+        let (gain, common_m_per_n) = (state.memory.gain, model.compliance.common_m_per_n());
+        let own_m_per_n = state.tip_own - common_m_per_n;
+        let stiffness = gain * state.membrane_n_per_m;
+        let kept = 1.0 - stiffness * own_m_per_n;
+        Some(Spring {
+            n_per_m: stiffness / kept,
+            kept,
+            common_m_per_n,
+            gain,
+        })
+    }
+
+    /// What it passes on by the forces as they are. `moved_m` is what the past and other needles move the tip by, as the membrane leaves it.
+    pub fn passed_n(&self, state: &LineState, moved_m: f64) -> f64 {
+        let count = state.in_contact;
+        let shaft = &state.shaft_n[..count];
+        let load_n = shaft.iter().sum::<f64>() + state.tip.force_n;
+        let own_m = dot(&state.tip_column[..count], shaft) + state.tip_own * state.tip.force_n;
+        let dent_m = self.gain * (own_m - self.common_m_per_n * load_n) + moved_m + state.tip_offset_m;
+        let past_m = state.memory.whole_offset_m + state.beside_whole_m;
+        self.n_per_m * self.kept / self.gain * (dent_m - past_m - state.tip.met_dent_m)
+    }
+
+    /// Work of the shaft over what the dent with which the membrane was met adds to its displacements.
+    pub fn relaxed_j(&self, state: &LineState) -> f64 {
+        let shaft = state.shaft_n.iter().zip(&state.tip_column).take(state.in_contact);
+        let dent_j: f64 = shaft.map(|(f, of_tip)| f * (of_tip - self.common_m_per_n)).sum();
+        state.tip_offset_m / (state.tip_own - self.common_m_per_n) * dent_j
+    }
+
+    /// Takes from the stations what the spring passes on.
+    pub fn relieve(&self, state: &mut LineState, passed_n: f64) {
+        let by = self.gain * passed_n / self.kept;
+        for (u_m, of_tip) in state.u_m[..state.in_contact].iter_mut().zip(&state.tip_column) {
+            *u_m -= by * (of_tip - self.common_m_per_n);
+        }
+    }
+}
+
+impl LineState {
+    /// The elastic energy, J: half of force times displacement at once, and what the tissue that creeps held before the tick. What a
+    /// membrane was relaxed at is no displacement of the tissue. Does not allocate.
+    pub fn elastic_j(&self, model: &LineModel) -> f64 {
+        if self.memory.is_on() {
+            let at_once = |(n, f): (usize, &f64)| f * (self.u_m[n] - self.memory.offset_m[n]);
+            let shaft_j: f64 = self.shaft_n.iter().enumerate().take(self.in_contact).map(at_once).sum();
+            let places = self.tip_range.clone().zip(self.tip_weights);
+            let past_m: f64 = places
+                .map(|(n, w)| w * self.memory.offset_m[self.shaft_n.len() + n])
+                .sum();
+            let tip_j = self.tip.force_n * (self.tip_u_m - self.tip_offset_m - past_m);
+            let relaxed_j = Spring::of(model, self).map_or(0.0, |spring| spring.relaxed_j(self));
+            return 0.5 * (shaft_j + tip_j - relaxed_j) / self.memory.gain + self.memory.held_j;
+        }
+        let shaft = self.shaft_n.iter().zip(&self.u_m).take(self.in_contact);
+        let moved_j = 0.5 * (shaft.map(|(f, u)| f * u).sum::<f64>() + self.tip.force_n * self.tip_u_m);
+        moved_j - 0.5 * self.whole_n * self.tip.met_dent_m
+    }
+}

@@ -1,0 +1,31 @@
+//! One needle that stays in, as others see it.
+
+use super::LeftNeedle;
+use crate::line::ready::HandLine;
+
+impl LeftNeedle {
+    /// Number of its line.
+    pub fn generation(&self) -> u64 {
+        self.line.generation
+    }
+
+    /// Its line.
+    pub fn line(&self) -> &HandLine {
+        &self.line
+    }
+
+    /// Where its tip is along the line in the world, m.
+    pub fn held_m(&self) -> f64 {
+        self.held_m
+    }
+
+    /// It is being drawn out.
+    pub fn is_drawn(&self) -> bool {
+        self.drawing_m_per_s > 0.0
+    }
+
+    /// Depth of its tip in the material, m.
+    pub fn depth_m(&self) -> f64 {
+        self.line.state.tip.material_m - self.drawn_m
+    }
+}
