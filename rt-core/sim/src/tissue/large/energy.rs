@@ -4,6 +4,9 @@
 //! determinant. A corner has mu / 2 (|F|² - 3) - mu ln J, a cell lambda / 2 (mean J - 1)²: so the mean dilatation carries what is
 //! volumetric, as in the linear body. Below [`OPEN`] the logarithm goes on as its parabola: a cell that is folded is pushed open.
 
+// Corners and axes are numbers that several arrays are read by.
+#![allow(clippy::needless_range_loop)]
+
 use super::grid::{Grid, ROW};
 use crate::simd::{Vector, in_vectors};
 

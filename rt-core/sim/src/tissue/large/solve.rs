@@ -153,7 +153,7 @@ impl Solver {
                 keep(&self.now, &mut self.best);
             }
             let slope = dot(self.simd, &self.direction, &self.gradient);
-            let is_far = slope > OVERSHOT * -self.slope || !(there < GREW * square);
+            let is_far = slope > OVERSHOT * -self.slope || there.is_nan() || there >= GREW * square;
             self.is_trial = is_far;
             if is_far {
                 // Back, to where the slope would end if it were a straight line.
@@ -173,7 +173,7 @@ impl Solver {
     fn set_out(&mut self) -> bool {
         self.aim();
         self.slope = dot(self.simd, &self.direction, &self.gradient);
-        if !(self.slope < 0.0) {
+        if self.slope.is_nan() || self.slope >= 0.0 {
             return false;
         }
         keep(&self.gradient, &mut self.before);

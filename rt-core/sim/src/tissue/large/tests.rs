@@ -7,6 +7,8 @@ use crate::simd::Simd;
 use crate::tissue::fem::{FemModel, FemSettings, FemState, Material, SolveSettings, TipPatch, step};
 use crate::tissue::{Carried, Deformed, least_corner};
 
+mod reference;
+
 /// The gland of `paper` with a patch of 4 mm moved by a millimetre, so many elements behind the surface.
 struct Pushed {
     scene: Scene,
