@@ -9,7 +9,7 @@ use crate::simd::Simd;
 const KEPT: usize = 5;
 /// No centre moves farther in a step, in elements.
 const FARTHEST: f32 = 0.3;
-/// A step has gone too far if it ends on a slope up that is that part of the one down, or if the gradient's square has grown so.
+/// A step is too long if it ends on a slope up that is that part of the one down, or if the gradient's square has grown so.
 const OVERSHOT: f32 = 0.7;
 const GREW: f32 = 4.0;
 
