@@ -186,6 +186,11 @@ impl Rig {
         self.loops.tissue.forget_carry();
     }
 
+    #[cfg(test)]
+    pub fn response(&self) -> &crate::rt::response::TissueResponse {
+        self.loops.tissue.response()
+    }
+
     pub fn deformed(&self) -> Deformed<'_> {
         self.loops.tissue.world().tissue.deformed()
     }

@@ -8,6 +8,7 @@ use stylet_sim::tissue::{Deformed, Held, StepReport, TissueModel};
 
 mod bending;
 mod carrying;
+mod folds;
 mod left;
 mod migration;
 mod order;

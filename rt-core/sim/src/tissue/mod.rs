@@ -34,6 +34,7 @@ mod deformed;
 pub mod fem;
 mod field;
 mod fold;
+mod large;
 mod model;
 mod point;
 mod violation;

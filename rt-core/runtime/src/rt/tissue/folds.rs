@@ -14,7 +14,13 @@ impl TissueLoop {
             (self.response.least_corner, self.response.folded_from_m) = (1.0, 0.0);
             return;
         };
-        let least = least_corner(&body, element);
+        let mut least = least_corner(&body, element);
+        if self.in_by_line {
+            // Off the line the model keeps what it adds up; on it each tick adds up anew.
+            self.world.tissue.unfold(element, least);
+            least = least_corner(&self.world.tissue.deformed(), element);
+        }
+        let body = self.world.tissue.deformed();
         let displacement = body.displacement(element).iter().map(|u| u * u).sum::<f64>().sqrt();
         let spacing_m = body.lattice.spacing_m;
         self.response.least_corner = least;

@@ -62,6 +62,8 @@ pub use compiled::{Compiled, prepare, step};
 pub use material::{FemProblem, FemSettings, Integration, MAX_POISSON_RATIO, Material, Structure};
 pub use model::FemModel;
 pub use real::Real;
+#[cfg(test)]
+pub(in crate::tissue) use solve::hold_cells;
 pub use solve::{FemReport, SolveSettings, TipPatch};
 pub use state::FemState;
 pub use tissue::FemTissue;

@@ -127,7 +127,7 @@ fn cells_of<T: Real>(model: &FemModel<T>, held: &TipPatch) -> Option<([[usize; 2
 }
 
 /// Holds the nodes of all elements in a box of cells of the finest grid, moved by `by_m` from rest.
-pub(super) fn hold_cells<T: Real>(
+pub(in crate::tissue) fn hold_cells<T: Real>(
     model: &FemModel<T>,
     state: &mut FemState<T>,
     cells: [[usize; 2]; 3],

@@ -7,6 +7,7 @@ use super::solve::{SolveSettings, TipPatch};
 use super::state::FemState;
 use crate::limits::Limits;
 use crate::scene::Scene;
+use crate::tissue::large::{BEGINS, LargeStrain};
 use crate::tissue::{Carried, Deformed, ElementField, Held, HeldOutcome, PackedField, Solve, StepReport, TissueModel};
 
 /// What surrounds a body: 20 mm of fat of 5 kPa, per surface area (assumed).
@@ -27,6 +28,7 @@ pub struct FemTissue<T = f32> {
     pub state: FemState<T>,
     /// When a step ends.
     pub settings: SolveSettings,
+    large: LargeStrain,
 }
 
 impl<T: Compiled> FemTissue<T> {
@@ -49,6 +51,7 @@ impl<T: Compiled> FemTissue<T> {
         let model = FemModel::coarser(&scene.lattice, &scene.body, &settings)?;
         Ok(FemTissue {
             state: FemState::at_rest(&model),
+            large: LargeStrain::new(scene),
             model,
             settings: SolveSettings {
                 relative_tolerance: 1e-3,
@@ -118,6 +121,16 @@ impl<T: Compiled> TissueModel for FemTissue<T> {
         Some(self.displaced(moved))
     }
 
+    fn unfold(&mut self, element: u32, least_corner: f64) {
+        if least_corner < BEGINS {
+            let lattice = self.model.lattice();
+            self.large
+                .correct(lattice, &mut self.state.displacement, element, least_corner);
+        } else {
+            self.large.forget();
+        }
+    }
+
     fn may_be_felt(&self, report: &StepReport) -> bool {
         report.residual <= FELT && report.max_displacement.is_finite()
     }
@@ -135,12 +148,13 @@ impl<T: Compiled> TissueModel for FemTissue<T> {
 
     fn return_to_rest(&mut self) {
         self.state.forget();
+        self.large.forget();
         step(&self.model, &mut self.state, None, &self.settings);
     }
 
-    /// Displacements alone: see [`is_all_saved`](TissueModel::is_all_saved).
+    /// Displacements, and how far the window near the tip is from them: see [`is_all_saved`](TissueModel::is_all_saved).
     fn memory_len(&self) -> usize {
-        self.state.memory_len()
+        self.state.memory_len() + self.large.memory_len()
     }
 
     /// While a patch is held, or was and is kept for when it is held again, its answers and the solver's are not.
@@ -149,11 +163,19 @@ impl<T: Compiled> TissueModel for FemTissue<T> {
     }
 
     fn save(&self, to: &mut [u8]) {
-        self.state.save(to);
+        if to.len() == self.memory_len() {
+            let (state, large) = to.split_at_mut(self.state.memory_len());
+            self.state.save(state);
+            self.large.save(large);
+        }
     }
 
     fn load(&mut self, from: &[u8]) {
-        self.state.load(from);
+        if from.len() == self.memory_len() {
+            let (state, large) = from.split_at(self.state.memory_len());
+            self.state.load(state);
+            self.large.load(large);
+        }
     }
 
     /// Elasticity has no limits.

@@ -1,0 +1,197 @@
+//! Finite elements on a line with and without large strain near the tip: whether a cell folds, what moves, and what a tick costs.
+
+use super::*;
+use std::time::Instant;
+use stylet_shm_schema::HandMove;
+use stylet_sim::scene::Role;
+use stylet_sim::tissue::{ElementField, FemTissue, PackedField};
+
+/// Finite elements as they were: nothing is corrected.
+struct Linear(FemTissue<f32>);
+
+impl TissueModel for Linear {
+    fn step(&mut self, held: Option<Held>, dt_s: f64) -> StepReport {
+        self.0.step(held, dt_s)
+    }
+
+    fn displace(&mut self, columns: &[PackedField], loads_n: &[f64], whole_m: [f64; 3]) -> Option<StepReport> {
+        self.0.displace(columns, loads_n, whole_m)
+    }
+
+    fn add(&mut self, fields: &[&ElementField]) -> Option<StepReport> {
+        self.0.add(fields)
+    }
+
+    fn may_be_felt(&self, report: &StepReport) -> bool {
+        self.0.may_be_felt(report)
+    }
+
+    fn deformed(&self) -> Deformed<'_> {
+        self.0.deformed()
+    }
+
+    fn return_to_rest(&mut self) {
+        self.0.return_to_rest();
+    }
+
+    fn set_limits(&mut self, limits: Limits) {
+        self.0.set_limits(limits);
+    }
+}
+
+/// What came of one insertion.
+struct Insertion {
+    /// Of each tick with one of the tissue loop's, the least of the rounds.
+    times_us: Vec<f64>,
+    /// Smallest volume of a corner in each tick, and how far the material at the tip is displaced, m.
+    corners: Vec<f64>,
+    moved_m: Vec<f64>,
+    peak_n: f64,
+    /// The farthest that one of a hundred elements went in a tick, m.
+    widest_m: f64,
+}
+
+fn insertion(stage: &mut Stage, run: &NeedleRun, set: &ParameterSet) -> Insertion {
+    let stop = AtomicBool::new(false);
+    let active = activate(set, &stage.device).expect("valid");
+    let lines = stage.lines(run, false, &stop).expect("a line");
+    let mut rig = stage.rig(run, &active).expect("a body");
+    rig.take_lines(lines);
+    rig.engage();
+    let mut done = Insertion {
+        times_us: Vec::new(),
+        corners: Vec::new(),
+        moved_m: Vec::new(),
+        peak_n: 0.0,
+        widest_m: 0.0,
+    };
+    let mut before: Vec<[f64; 3]> = Vec::new();
+    // In to the first drop, at rest, and some of the way out.
+    let way_m = (run.drops_m[0] - run.entry_m).norm();
+    let inwards = (1e3 * way_m / run.insert_m_per_s) as usize + 400;
+    for n in 0..inwards + 800 {
+        if n == 0 || n == inwards {
+            let depth_m = if n == 0 { way_m } else { way_m - 25e-3 };
+            rig.move_hand(&HandMove {
+                tip_m: (run.entry_m + run.direction * depth_m).into(),
+                direction: run.direction.into(),
+                speed_m_per_s: run.insert_m_per_s,
+                acceleration_m_per_s2: run.acceleration_m_per_s2,
+            });
+        }
+        let begun = Instant::now();
+        if rig.tick() {
+            done.times_us.push(begun.elapsed().as_secs_f64() * 1e6);
+            done.corners.push(rig.response().least_corner);
+            done.moved_m.push(rig.displacement_m());
+            let body = rig.deformed();
+            let count = body.lattice.element_count() as u32;
+            let now = (0..count).step_by(97).map(|e| body.position_m(e));
+            let now: Vec<[f64; 3]> = now.collect();
+            for (a, b) in now.iter().zip(&before) {
+                done.widest_m = done.widest_m.max((Vector3::from(*a) - Vector3::from(*b)).norm());
+            }
+            before = now;
+        }
+        done.peak_n = done.peak_n.max(rig.state().peak_force_n);
+    }
+    stage.world = Some(rig.into_world());
+    done
+}
+
+fn least(of: &[f64]) -> f64 {
+    of.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+fn most(of: &[f64]) -> f64 {
+    of.iter().copied().fold(0.0, f64::max)
+}
+
+/// Linear and corrected by turns.
+fn both(scene: &str, run: &NeedleRun, set: &ParameterSet, rounds: usize) -> [Insertion; 2] {
+    let source = SceneSource::Builtin(scene.to_owned());
+    let mut stage = Stage::build(&source, TissueKind::Fem, DeviceInfo::phantom_premium_1_5()).expect("built in");
+    let mut found: [Option<Insertion>; 2] = [None, None];
+    for _ in 0..rounds {
+        for (is_large, found) in found.iter_mut().enumerate() {
+            let world = stage.world.as_mut().expect("given back");
+            let fem = FemTissue::new(&world.scene).expect("valid");
+            world.tissue = if is_large == 1 {
+                Box::new(fem)
+            } else {
+                Box::new(Linear(fem))
+            };
+            let now = insertion(&mut stage, run, set);
+            match found {
+                None => *found = Some(now),
+                Some(least) => least
+                    .times_us
+                    .iter_mut()
+                    .zip(now.times_us)
+                    .for_each(|(a, b)| *a = a.min(b)),
+            }
+        }
+    }
+    for (name, one) in ["linear", "corrected"].iter().zip(found.iter().flatten()) {
+        let mut us = one.times_us.clone();
+        us.sort_by(f64::total_cmp);
+        let at = |q: f64| us[((us.len() - 1) as f64 * q).round() as usize];
+        println!(
+            "{scene}, {name}: corner {:.3}, {} ticks folded, {:.2} mm moved, {:.2} N, at most {:.2} mm in a tick; p50 {:.0}, p99 {:.0}, p99.9 {:.0}, max {:.0} us",
+            least(&one.corners),
+            one.corners.iter().filter(|c| **c < -1e-3).count(),
+            1e3 * most(&one.moved_m),
+            one.peak_n,
+            1e3 * one.widest_m,
+            at(0.5),
+            at(0.99),
+            at(0.999),
+            at(1.0),
+        );
+    }
+    found.map(|one| one.expect("a round"))
+}
+
+/// A membrane that holds until it is pushed in by 12 mm: what a tip does to tissue at most.
+fn pushed_far() -> ParameterSet {
+    let mut set = ParameterSet::default();
+    set.set(ParameterId::PunctureDepth, 12e-3);
+    set
+}
+
+fn no_cell_folds(scene: &str, run: &NeedleRun, rounds: usize) {
+    for set in [ParameterSet::default(), pushed_far()] {
+        let [linear, large] = both(scene, run, &set, rounds);
+        // The force is that of the linear body.
+        assert_eq!(linear.peak_n, large.peak_n);
+        assert!(least(&large.corners) > -1e-3);
+        assert!(large.widest_m < 2.0 * linear.widest_m);
+    }
+}
+
+#[test]
+fn no_cell_folds_beside_a_tip_on_a_line_of_finite_elements() {
+    no_cell_folds("paper", &needle(), 1);
+}
+
+/// `cargo test --release -p stylet-runtime --lib folds -- --ignored --nocapture`; each tick the least of the rounds.
+#[test]
+#[ignore = "times, and a minute of columns"]
+fn times_and_folds_in_both_scenes() {
+    no_cell_folds("paper", &needle(), 6);
+    let pelvis = stylet_sim::scene::Scene::builtin("pelvis").expect("built in");
+    let is_target = |e: &u32| {
+        let structure = usize::from(pelvis.lattice.structure(*e));
+        pelvis.structures[structure].role == Role::Target
+    };
+    let of_target = (0..pelvis.lattice.element_count() as u32).filter(is_target);
+    let places: Vec<_> = of_target.map(|e| Vector3::from(pelvis.lattice.rest_m(e))).collect();
+    let middle = places.iter().sum::<Vector3<f64>>() / places.len() as f64;
+    let skin_m = pelvis.lattice.bounds_m().0[2];
+    let run = NeedleRun {
+        entry_m: Vector3::new(middle.x + 6e-3, middle.y, skin_m - 5e-3),
+        drops_m: vec![middle + Vector3::new(6e-3, 0.0, 5e-3)],
+        ..needle()
+    };
+    no_cell_folds("pelvis", &run, 6);
+}

@@ -1,0 +1,198 @@
+//! Energy of neo-Hookean cells between element centres, and of linear ones: the forces on the centres.
+//!
+//! A cell has eight corners, at each of which the three links that meet there are the columns of the deformation gradient F, with J its
+//! determinant. A corner has mu / 2 (|F|² - 3) - mu ln J, a cell lambda / 2 (mean J - 1)²: so the mean dilatation carries what is
+//! volumetric, as in the linear body. Below [`OPEN`] the logarithm goes on as its parabola: a cell that is folded is pushed open.
+
+// Corners and axes are numbers that several arrays are read by.
+#![allow(clippy::needless_range_loop)]
+
+use super::grid::{Grid, ROW};
+use crate::simd::{Vector, in_vectors};
+
+/// Volume of a corner, over that at rest, below which the logarithm is a parabola.
+const OPEN: f32 = 0.1;
+
+/// Three numbers for each node.
+pub(super) type Nodes = [Vec<f32>; 3];
+
+/// What cells are made of, by their lowest node.
+#[derive(Clone, Debug)]
+pub(super) struct Cells {
+    /// Shear moduli of corners; 0 where three links do not meet.
+    pub mu: [Vec<f32>; 8],
+    /// Lambda of the cell over the sum of those.
+    pub lambda: Vec<f32>,
+}
+
+in_vectors! {
+/// Becomes the gradient of the energy where centres are displaced by `u` elements.
+fn neo_hookean<V: Vector<f32>>(grid: &Grid, cells: &Cells, u: &Nodes, out: &mut Nodes) {
+    out.iter_mut().for_each(|axis| axis.fill(0.0));
+    let one = V::splat(1.0);
+    for at in grid.rows_of_cells() {
+        let mut links = links::<V>(grid, u, at);
+        for axis in 0..3 {
+            for link in &mut links[axis] {
+                link[axis] = link[axis].add(one);
+            }
+        }
+        let mut j = [V::splat(0.0); 8];
+        let mut mean = V::splat(0.0);
+        for corner in 0..8 {
+            let f = at_corner(&links, corner);
+            j[corner] = dot(f[0], cross(f[1], f[2]));
+            mean = mean.add(load::<V>(&cells.mu[corner], at).mul(j[corner].sub(one)));
+        }
+        let mean = mean.mul(load::<V>(&cells.lambda, at));
+        let mut forces = [[[V::splat(0.0); 3]; 4]; 3];
+        for corner in 0..8 {
+            let mu = load::<V>(&cells.mu[corner], at);
+            let f = at_corner(&links, corner);
+            let cof = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])];
+            let pressure = mu.mul(mean.sub(slope(j[corner])));
+            for axis in 0..3 {
+                let force = &mut forces[axis][beside(axis, corner)];
+                for c in 0..3 {
+                    force[c] = force[c].add(mu.mul(f[axis][c]).add(pressure.mul(cof[axis][c])));
+                }
+            }
+        }
+        spread(grid, &forces, out, at);
+    }
+}
+}
+
+in_vectors! {
+/// The same of the linear energy that it has near rest.
+fn linear<V: Vector<f32>>(grid: &Grid, cells: &Cells, u: &Nodes, out: &mut Nodes) {
+    out.iter_mut().for_each(|axis| axis.fill(0.0));
+    for at in grid.rows_of_cells() {
+        let links = links::<V>(grid, u, at);
+        let mut mean = V::splat(0.0);
+        for corner in 0..8 {
+            let f = at_corner(&links, corner);
+            mean = mean.add(load::<V>(&cells.mu[corner], at).mul(f[0][0].add(f[1][1]).add(f[2][2])));
+        }
+        let mean = mean.mul(load::<V>(&cells.lambda, at));
+        let mut forces = [[[V::splat(0.0); 3]; 4]; 3];
+        for corner in 0..8 {
+            let mu = load::<V>(&cells.mu[corner], at);
+            let f = at_corner(&links, corner);
+            for axis in 0..3 {
+                let force = &mut forces[axis][beside(axis, corner)];
+                for c in 0..3 {
+                    force[c] = force[c].add(mu.mul(f[axis][c].add(f[c][axis])));
+                }
+                force[axis] = force[axis].add(mu.mul(mean));
+            }
+        }
+        spread(grid, &forces, out, at);
+    }
+}
+}
+
+/// Of the logarithm.
+#[inline(always)]
+fn slope<V: Vector<f32>>(j: V) -> V {
+    let mut lanes = [0.0; ROW];
+    j.store(&mut lanes);
+    for j in &mut lanes {
+        let inverse = 1.0 / j.max(OPEN);
+        *j = inverse + inverse * inverse * (j.max(OPEN) - *j);
+    }
+    V::load(&lanes)
+}
+
+#[inline(always)]
+fn load<V: Vector<f32>>(of: &[f32], at: usize) -> V {
+    V::load(of[at..at + ROW].try_into().expect("a row"))
+}
+
+/// A link along an axis: by where it lies along the two others.
+type Links<V> = [[[V; 3]; 4]; 3];
+
+/// Which of an axis' links a corner has.
+#[inline(always)]
+fn beside(axis: usize, corner: usize) -> usize {
+    let bit = |a: usize| corner >> a & 1;
+    match axis {
+        0 => bit(1) + 2 * bit(2),
+        1 => bit(0) + 2 * bit(2),
+        _ => bit(0) + 2 * bit(1),
+    }
+}
+
+/// Lowest node of such a link.
+#[inline(always)]
+fn lowest(axis: usize, beside: usize) -> usize {
+    let (low, high) = (beside & 1, beside >> 1);
+    match axis {
+        0 => low << 1 | high << 2,
+        1 => low | high << 2,
+        _ => low | high << 1,
+    }
+}
+
+#[inline(always)]
+fn links<V: Vector<f32>>(grid: &Grid, u: &Nodes, at: usize) -> Links<V> {
+    let mut links = [[[V::splat(0.0); 3]; 4]; 3];
+    for c in 0..3 {
+        let mut nodes = [V::splat(0.0); 8];
+        for (n, node) in nodes.iter_mut().enumerate() {
+            *node = load::<V>(&u[c], at + grid.step(n));
+        }
+        for axis in 0..3 {
+            for beside in 0..4 {
+                let low = lowest(axis, beside);
+                links[axis][beside][c] = nodes[low | 1 << axis].sub(nodes[low]);
+            }
+        }
+    }
+    links
+}
+
+/// Columns along x, y, z.
+#[inline(always)]
+fn at_corner<V: Vector<f32>>(links: &Links<V>, corner: usize) -> [[V; 3]; 3] {
+    [
+        links[0][beside(0, corner)],
+        links[1][beside(1, corner)],
+        links[2][beside(2, corner)],
+    ]
+}
+
+#[inline(always)]
+fn cross<V: Vector<f32>>(a: [V; 3], b: [V; 3]) -> [V; 3] {
+    [
+        a[1].mul(b[2]).sub(a[2].mul(b[1])),
+        a[2].mul(b[0]).sub(a[0].mul(b[2])),
+        a[0].mul(b[1]).sub(a[1].mul(b[0])),
+    ]
+}
+
+#[inline(always)]
+fn dot<V: Vector<f32>>(a: [V; 3], b: [V; 3]) -> V {
+    a[0].mul(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]))
+}
+
+/// From links to nodes.
+#[inline(always)]
+fn spread<V: Vector<f32>>(grid: &Grid, forces: &Links<V>, out: &mut Nodes, at: usize) {
+    for c in 0..3 {
+        let mut nodes = [V::splat(0.0); 8];
+        for axis in 0..3 {
+            for beside in 0..4 {
+                let low = lowest(axis, beside);
+                let high = low | 1 << axis;
+                nodes[high] = nodes[high].add(forces[axis][beside][c]);
+                nodes[low] = nodes[low].sub(forces[axis][beside][c]);
+            }
+        }
+        for (n, node) in nodes.into_iter().enumerate() {
+            let from = at + grid.step(n);
+            let to: &mut [f32; ROW] = (&mut out[c][from..from + ROW]).try_into().expect("a row");
+            V::load(to).add(node).store(to);
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! Large strain near the tip: neo-Hookean tissue between element centres, in a window that the linear answer surrounds.
+//!
+//! A linear answer folds cells beside a tip that has moved by some of them. In a window of [`SIDE`] centres the loads are those that the
+//! linear answer stands for, the rim is where it has it, and so is the place of the loads: what it does not know is how the tissue
+//! between them gives way. Where strain is small this is the linear answer again. The solver goes on from the window of the tick
+//! before, a fixed number of evaluations a tick (`docs/adr/0020-large-strain-near-the-tip.md`).
+
+mod energy;
+mod grid;
+mod kernels;
+mod precondition;
+mod solve;
+
+use crate::scene::{Lattice, Scene};
+use energy::Nodes;
+use solve::Solver;
+
+/// Element centres along an edge of the window.
+const SIDE: usize = 13;
+/// Evaluations of the energy's gradient in a tick.
+const EVALUATIONS: usize = 12;
+/// Lambda over mu at most: that of a Poisson ratio of 0.45. What is nearer to incompressible takes more evaluations than a tick has.
+const FIRMEST: f32 = 9.0;
+/// Smallest volume of a corner of the linear answer at which the window begins to count, and at which it counts in full.
+pub const BEGINS: f64 = 0.6;
+const IN_FULL: f64 = 0.3;
+/// No window.
+const NOWHERE: u32 = u32::MAX;
+
+/// A window and what it is made of.
+#[derive(Clone, Debug)]
+pub struct LargeStrain {
+    solver: Solver,
+    /// Shear modulus of each structure, over that of the first that is not fixed; 0 for one that is.
+    moduli: Vec<f32>,
+    /// Element in the middle of the window of the tick before.
+    around: u32,
+    /// How far centres were from where the linear answer had them, in elements.
+    off: Nodes,
+    /// Elements at the window's nodes, [`NOWHERE`] where there is none.
+    elements: Vec<u32>,
+}
+
+impl LargeStrain {
+    /// For the body of a scene.
+    pub fn new(scene: &Scene) -> Self {
+        let materials = scene.structures.iter().map(|s| &s.material);
+        let shear = materials.map(|m| if m.fixed { 0.0 } else { m.young_pa / (1.0 + m.poisson) });
+        let shear: Vec<f64> = shear.collect();
+        let first = shear.iter().copied().find(|&s| s > 0.0).unwrap_or(1.0);
+        let solver = Solver::new(SIDE);
+        LargeStrain {
+            off: solve::nodes(&solver.grid),
+            elements: vec![NOWHERE; solver.grid.len()],
+            solver,
+            moduli: shear.into_iter().map(|s| (s / first) as f32).collect(),
+            around: NOWHERE,
+        }
+    }
+
+    /// The next window begins at the linear answer.
+    pub fn forget(&mut self) {
+        if self.around != NOWHERE {
+            self.around = NOWHERE;
+            self.off.iter_mut().for_each(|axis| axis.fill(0.0));
+        }
+    }
+
+    /// Moves the centres around `element`, which `u` displaces by the linear answer, in elements; `least` is the smallest volume of a
+    /// corner there. Does not allocate.
+    pub fn correct(&mut self, lattice: &Lattice, u: &mut [Vec<f32>; 3], element: u32, least: f64) {
+        self.follow(lattice, element);
+        self.open(lattice, u, element);
+        let solver = &mut self.solver;
+        solver.begin();
+        for c in 0..3 {
+            for (n, now) in solver.now[c].iter_mut().enumerate() {
+                *now = solver.linear[c][n] + solver.free[n] * self.off[c][n];
+            }
+        }
+        solver.meet();
+        solver.minimise(EVALUATIONS);
+        let mut is_finite = true;
+        for c in 0..3 {
+            for (n, off) in self.off[c].iter_mut().enumerate() {
+                *off = solver.free[n] * (solver.now[c][n] - solver.linear[c][n]);
+                is_finite &= off.is_finite();
+            }
+        }
+        if !is_finite {
+            return self.forget();
+        }
+        let part = ((BEGINS - least) / (BEGINS - IN_FULL)).clamp(0.0, 1.0) as f32;
+        for (c, u) in u.iter_mut().enumerate() {
+            for (off, &element) in self.off[c].iter().zip(&self.elements) {
+                if let Some(u) = u.get_mut(element as usize) {
+                    *u += part * off;
+                }
+            }
+        }
+    }
+
+    /// The window goes along with the tip: what is known of a centre stays with it.
+    fn follow(&mut self, lattice: &Lattice, element: u32) {
+        if self.around != NOWHERE && self.around != element {
+            let (from, to) = (lattice.cell(self.around), lattice.cell(element));
+            let by = [0, 1, 2].map(|a| to[a] as i64 - from[a] as i64);
+            let grid = &self.solver.grid;
+            for c in 0..3 {
+                self.solver.before[c].copy_from_slice(&self.off[c]);
+                self.off[c].fill(0.0);
+            }
+            for place in grid.places() {
+                let old = [0, 1, 2].map(|a| place[a] as i64 + by[a]);
+                if old.iter().all(|&c| (0..SIDE as i64).contains(&c)) {
+                    let (to, from) = (grid.at(place), grid.at(old.map(|c| c as usize)));
+                    for c in 0..3 {
+                        self.off[c][to] = self.solver.before[c][from];
+                    }
+                }
+            }
+        }
+        self.around = element;
+    }
+
+    /// Takes the linear answer and the material around an element.
+    fn open(&mut self, lattice: &Lattice, u: &[Vec<f32>; 3], element: u32) {
+        let Solver {
+            grid,
+            cells,
+            free,
+            linear,
+            before: shear,
+            ..
+        } = &mut self.solver;
+        let middle = lattice.cell(element);
+        let shear = &mut shear[0];
+        for place in grid.places() {
+            let cell = [0, 1, 2].map(|a| middle[a] as i64 + place[a] as i64 - (SIDE / 2) as i64);
+            let (at, there) = (grid.at(place), lattice.element_at(cell));
+            self.elements[at] = there.unwrap_or(NOWHERE);
+            for (linear, u) in linear.iter_mut().zip(u) {
+                linear[at] = there.and_then(|e| u.get(e as usize)).copied().unwrap_or(0.0);
+            }
+            let structure = there.map(|e| usize::from(lattice.structure(e)));
+            shear[at] = structure.map_or(0.0, |s| self.moduli.get(s).copied().unwrap_or(0.0));
+            free[at] = 0.0;
+        }
+        let is_there = |at: usize| self.elements.get(at).is_some_and(|&e| e != NOWHERE);
+        for place in grid.places().filter(|p| p.iter().all(|&c| c < SIDE - 1)) {
+            let at = grid.at(place);
+            let mut sum = 0.0;
+            for corner in 0..8 {
+                let four = [corner, corner ^ 1, corner ^ 2, corner ^ 4].map(|n| at + grid.step(n));
+                let mu = match four.iter().all(|&n| is_there(n)) {
+                    true => four.iter().map(|&n| shear[n]).sum::<f32>() / 32.0,
+                    false => 0.0,
+                };
+                cells.mu[corner][at] = mu;
+                sum += mu;
+                for n in four.into_iter().filter(|&n| mu > 0.0 && shear[n] > 0.0) {
+                    free[n] = 1.0;
+                }
+            }
+            cells.lambda[at] = if sum > 0.0 { FIRMEST / sum } else { 0.0 };
+        }
+        let is_rim = |p: &[usize; 3]| p.iter().any(|&c| c == 0 || c == SIDE - 1);
+        grid.places()
+            .filter(is_rim)
+            .for_each(|place| free[grid.at(place)] = 0.0);
+    }
+
+    /// Bytes of [`Self::save`].
+    pub fn memory_len(&self) -> usize {
+        size_of_val(&self.around) + self.off.iter().map(|axis| size_of_val(axis.as_slice())).sum::<usize>()
+    }
+
+    /// Writes what the next tick needs; nothing where `to` has another length.
+    pub fn save(&self, to: &mut [u8]) {
+        if to.len() == self.memory_len() {
+            let (around, mut rest) = to.split_at_mut(size_of_val(&self.around));
+            around.copy_from_slice(bytemuck::bytes_of(&self.around));
+            for axis in &self.off {
+                let bytes: &[u8] = bytemuck::cast_slice(axis);
+                let (here, after) = rest.split_at_mut(bytes.len());
+                here.copy_from_slice(bytes);
+                rest = after;
+            }
+        }
+    }
+
+    /// Takes up what another window of the same body saved; nothing where `from` has another length.
+    pub fn load(&mut self, from: &[u8]) {
+        if from.len() == self.memory_len() {
+            let (around, mut rest) = from.split_at(size_of_val(&self.around));
+            bytemuck::bytes_of_mut(&mut self.around).copy_from_slice(around);
+            for axis in &mut self.off {
+                let bytes: &mut [u8] = bytemuck::cast_slice_mut(axis);
+                let (here, after) = rest.split_at(bytes.len());
+                bytes.copy_from_slice(here);
+                rest = after;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,224 @@
+//! Minimises the energy of a window under its loads: L-BFGS on top of the Laplacian, a bounded number of evaluations.
+
+use super::energy::{Cells, Nodes, linear, neo_hookean};
+use super::grid::Grid;
+use super::kernels::{add, differ, dot, farthest, mask};
+use super::precondition::Laplacian;
+use crate::simd::Simd;
+
+const KEPT: usize = 5;
+/// No centre moves farther in a step, in elements.
+const FARTHEST: f32 = 0.3;
+/// A step is too long if it ends on a slope up that is that part of the one down, or if the gradient's square has grown so.
+const OVERSHOT: f32 = 0.7;
+const GREW: f32 = 4.0;
+
+#[derive(Clone, Debug)]
+pub(super) struct Pair {
+    pub step: Nodes,
+    pub change: Nodes,
+    inverse: f32,
+}
+
+/// Everything that a solve works in.
+#[derive(Clone, Debug)]
+pub(super) struct Solver {
+    pub grid: Grid,
+    pub cells: Cells,
+    /// 1 where a node may move, else 0.
+    pub free: Vec<f32>,
+    laplacian: Laplacian,
+    simd: Simd,
+    /// Where the linear answer has the nodes, and where they are; in elements.
+    pub linear: Nodes,
+    pub now: Nodes,
+    load: Nodes,
+    /// The load over its length.
+    along: Nodes,
+    gradient: Nodes,
+    pub before: Nodes,
+    direction: Nodes,
+    room: Vec<f32>,
+    pairs: Vec<Pair>,
+    alphas: [f32; KEPT],
+    used: usize,
+    /// Down the direction, how much of it was taken, and whether it is still to be shortened.
+    slope: f32,
+    part: f32,
+    is_trial: bool,
+    best: Nodes,
+    /// What the Laplacian answers to `along`, and its share of it.
+    answer: Nodes,
+    share: f32,
+}
+
+fn keep(from: &Nodes, to: &mut Nodes) {
+    for (from, to) in from.iter().zip(to) {
+        to.copy_from_slice(from);
+    }
+}
+
+pub(super) fn nodes(grid: &Grid) -> Nodes {
+    std::array::from_fn(|_| vec![0.0; grid.len()])
+}
+
+impl Solver {
+    pub fn new(side: usize) -> Self {
+        let grid = Grid::new(side);
+        let zero = || nodes(&grid);
+        Solver {
+            cells: Cells {
+                mu: std::array::from_fn(|_| vec![0.0; grid.len()]),
+                lambda: vec![0.0; grid.len()],
+            },
+            free: vec![0.0; grid.len()],
+            laplacian: Laplacian::new(&grid),
+            simd: Simd::detect(),
+            linear: zero(),
+            now: zero(),
+            load: zero(),
+            along: zero(),
+            gradient: zero(),
+            before: zero(),
+            direction: zero(),
+            room: vec![0.0; grid.len()],
+            pairs: (0..KEPT)
+                .map(|_| Pair {
+                    step: zero(),
+                    change: zero(),
+                    inverse: 0.0,
+                })
+                .collect(),
+            alphas: [0.0; KEPT],
+            used: 0,
+            slope: 0.0,
+            part: 0.0,
+            is_trial: false,
+            best: zero(),
+            answer: zero(),
+            share: 0.0,
+            grid,
+        }
+    }
+
+    /// Takes the loads that the linear answer stands for.
+    pub fn begin(&mut self) {
+        self.used = 0;
+        linear(self.simd, &self.grid, &self.cells, &self.linear, &mut self.load);
+        mask(self.simd, &mut self.load, &self.free);
+        let length = dot(self.simd, &self.load, &self.load).sqrt();
+        for (along, load) in self.along.iter_mut().zip(&self.load) {
+            for (along, load) in along.iter_mut().zip(load) {
+                *along = load / length.max(f32::MIN_POSITIVE);
+            }
+        }
+        for (answer, along) in self.answer.iter_mut().zip(&self.along) {
+            answer.copy_from_slice(along);
+        }
+        self.laplacian
+            .apply(self.simd, &self.grid, &mut self.answer, &mut self.room);
+        mask(self.simd, &mut self.answer, &self.free);
+        self.share = dot(self.simd, &self.along, &self.answer).max(f32::MIN_POSITIVE);
+    }
+
+    /// Moves the place of the load to where the linear answer has it.
+    pub fn meet(&mut self) {
+        let short = dot(self.simd, &self.along, &self.linear) - dot(self.simd, &self.along, &self.now);
+        add(self.simd, &mut self.now, short / self.share, &self.answer);
+    }
+
+    /// Forces less the loads, and less what holds the place of the load; returns their square.
+    fn evaluate(&mut self) -> f32 {
+        neo_hookean(self.simd, &self.grid, &self.cells, &self.now, &mut self.gradient);
+        mask(self.simd, &mut self.gradient, &self.free);
+        add(self.simd, &mut self.gradient, -1.0, &self.load);
+        let held = dot(self.simd, &self.answer, &self.gradient) / self.share;
+        add(self.simd, &mut self.gradient, -held, &self.along);
+        dot(self.simd, &self.gradient, &self.gradient)
+    }
+
+    /// That many evaluations of the gradient; ends where it was smallest.
+    pub fn minimise(&mut self, evaluations: usize) {
+        let mut smallest = self.evaluate();
+        keep(&self.now, &mut self.best);
+        let mut square = smallest;
+        for _ in 1..evaluations {
+            let is_down = self.is_trial || self.set_out();
+            if !is_down {
+                break;
+            }
+            let there = self.evaluate();
+            if there < smallest {
+                smallest = there;
+                keep(&self.now, &mut self.best);
+            }
+            let slope = dot(self.simd, &self.direction, &self.gradient);
+            let is_far = slope > OVERSHOT * -self.slope || there.is_nan() || there >= GREW * square;
+            self.is_trial = is_far;
+            if is_far {
+                // Back, to where the slope would end if it were a straight line.
+                let to = self.part * (self.slope / (self.slope - slope)).clamp(0.1, 0.5);
+                add(self.simd, &mut self.now, to - self.part, &self.direction);
+                self.part = to;
+            } else {
+                square = there;
+                self.remember();
+            }
+        }
+        self.is_trial = false;
+        keep(&self.best, &mut self.now);
+    }
+
+    /// A step down from where the gradient was taken; false where there is none.
+    fn set_out(&mut self) -> bool {
+        self.aim();
+        self.slope = dot(self.simd, &self.direction, &self.gradient);
+        if self.slope.is_nan() || self.slope >= 0.0 {
+            return false;
+        }
+        keep(&self.gradient, &mut self.before);
+        self.part = (FARTHEST / farthest(self.simd, &self.direction)).min(1.0);
+        add(self.simd, &mut self.now, self.part, &self.direction);
+        true
+    }
+
+    fn remember(&mut self) {
+        self.pairs.rotate_right(1);
+        let Some(pair) = self.pairs.first_mut() else { return };
+        differ(
+            self.simd,
+            pair,
+            self.part,
+            &self.direction,
+            &self.gradient,
+            &self.before,
+        );
+        let curvature = dot(self.simd, &pair.step, &pair.change);
+        if curvature > 0.0 {
+            pair.inverse = 1.0 / curvature;
+            self.used = (self.used + 1).min(KEPT);
+        } else {
+            self.pairs.rotate_left(1);
+        }
+    }
+
+    /// Down, by what the last steps have shown.
+    fn aim(&mut self) {
+        for (direction, gradient) in self.direction.iter_mut().zip(&self.gradient) {
+            for (direction, gradient) in direction.iter_mut().zip(gradient) {
+                *direction = -gradient;
+            }
+        }
+        for (pair, alpha) in self.pairs[..self.used].iter().zip(&mut self.alphas) {
+            *alpha = pair.inverse * dot(self.simd, &pair.step, &self.direction);
+            add(self.simd, &mut self.direction, -*alpha, &pair.change);
+        }
+        self.laplacian
+            .apply(self.simd, &self.grid, &mut self.direction, &mut self.room);
+        mask(self.simd, &mut self.direction, &self.free);
+        for (pair, alpha) in self.pairs[..self.used].iter().zip(&self.alphas).rev() {
+            let beta = pair.inverse * dot(self.simd, &pair.change, &self.direction);
+            add(self.simd, &mut self.direction, alpha - beta, &pair.step);
+        }
+    }
+}
