@@ -11,6 +11,7 @@ use crate::rt::world::World;
 use crate::stepped::{HAPTIC_TICKS_PER_TISSUE_TICK, SteppedLoops};
 use nalgebra::Vector3;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use stylet_hw::{Device, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
 use stylet_sim::force::ForceParameters;
 use stylet_sim::limits::TissueParameters;
@@ -178,7 +179,10 @@ impl Recorded {
 }
 
 fn through_a_file(flight: &Flight) -> Flight {
-    let path = std::env::temp_dir().join(format!("stylet-line-{}.flight", std::process::id()));
+    // Tests of one process run beside each other.
+    static FILES: AtomicU64 = AtomicU64::new(0);
+    let number = FILES.fetch_add(1, Ordering::Relaxed);
+    let path = std::env::temp_dir().join(format!("stylet-line-{}-{number}.flight", std::process::id()));
     flight.write(&path).expect("written");
     let bytes = std::fs::metadata(&path).expect("there").len();
     println!("file of {bytes} bytes");
