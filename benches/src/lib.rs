@@ -11,4 +11,5 @@ pub mod rig;
 pub mod session;
 pub mod solvers;
 pub mod twin;
+pub mod unfolded;
 pub mod wall;

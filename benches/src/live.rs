@@ -4,6 +4,7 @@ use crate::error::{Field, MOVED, best_shift_m, field, norm};
 use crate::own::{LATE, OwnTwin};
 use crate::session::{Session, axis_start};
 use crate::twin::{Mean, Twin, TwinSettings, default_forces};
+use crate::unfolded::Unfolded;
 use nalgebra::Vector3;
 use std::sync::Arc;
 use std::time::Instant;
@@ -72,8 +73,9 @@ pub struct OwnTick {
 
 /// What a session is compared with.
 pub struct Twins<'a> {
-    /// Finite elements.
+    /// Finite elements, and their tissue near the tip.
     pub fem: &'a mut Twin,
+    pub near_tip: Unfolded,
     /// ChainMail's own, beside ChainMail.
     pub own: Option<OwnTwin>,
 }
@@ -144,6 +146,15 @@ impl Theatre {
         } else {
             Twin::of::<f64>(&scene, like, settings(double))
         }
+    }
+
+    /// The body of the converged line, at rest.
+    ///
+    /// # Panics
+    ///
+    /// If the scene has no finite elements.
+    pub fn near_tip(&self) -> Unfolded {
+        Unfolded::new(&self.source.build().expect("built in").with_tissue(TissueKind::Fem))
     }
 
     /// ChainMail's own converged twin of the line that ships in it, to a residual of its columns.
@@ -302,7 +313,7 @@ impl<'a, 'b> Watch<'a, 'b> {
     fn compare(&mut self, world: &World) -> Option<LiveTick> {
         let body = world.tissue.deformed();
         let h = body.lattice.spacing_m;
-        let converged = self.twins.fem.field();
+        let converged = self.twins.near_tip.field(self.twins.fem);
         let moved = |element: u32| body.displacement(element).map(|u| u * h);
         let own = self.compare_own(&field(&body));
         let shown: Field = if body.lattice.element_count() == converged.len() {

@@ -96,11 +96,16 @@ pub fn measure(rounds: usize) -> Vec<Ships> {
         let chainmail = theatre.line(TissueKind::ChainMail);
         for (kind, (line, prepared_s)) in [(TissueKind::Fem, fem), (TissueKind::ChainMail, chainmail)] {
             let own = (kind == TissueKind::ChainMail).then(|| theatre.own_twin(&line.hand, CONVERGED));
-            let mut twins = Twins { fem: &mut twin, own };
+            let mut twins = Twins {
+                fem: &mut twin,
+                near_tip: theatre.near_tip(),
+                own,
+            };
             let live = theatre.run(kind, &line, &mut twins, rounds);
+            let left_mm = twins.near_tip.left_m * 1e3;
             let row = row(case, kind, &live, prepared_s, twin.residual);
             eprintln!(
-                "  {}: field {:.2} % of {:.1} mm on average, {:.2} % at worst; beside its own {:.3} and {:.3} %, tip {:.3} %; {:.2}, {:.2}, {:.2} % by ticks before, {:.2} % by history",
+                "  {}: field {:.2} % of {:.1} mm on average, {:.2} % at worst; beside its own {:.3} and {:.3} %, tip {:.3} %; {:.2}, {:.2}, {:.2} % by ticks before, {:.2} % by history; near the tip within {left_mm:.4} mm of rest",
                 row.tissue,
                 row.field_percent,
                 row.largest_mm,
