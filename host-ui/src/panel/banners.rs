@@ -244,8 +244,6 @@ pub fn banners_ui(ctx: &egui::Context, pictures: Rect, list: &[Banner]) -> Optio
         // Between two banners the pictures would be seen.
         let backed = egui::Frame::new().fill(theme::of(ui).panel);
         let inner = backed.show(ui, |ui| {
-            // Else a line that is scrolled out lies over the picture below.
-            ui.visuals_mut().clip_rect_margin = 0.0;
             scroll.show(ui, |ui| {
                 ui.spacing_mut().item_spacing.y = 1.0;
                 // The last one that was clicked.
