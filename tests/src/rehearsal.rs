@@ -67,8 +67,7 @@ impl Rehearser for Theatre {
                     RehearseError::Refused { drop, .. } => Some(drop as usize),
                     _ => None,
                 },
-            });
-        let done = done?;
+            })?;
         Ok(Rest {
             seeds_m: done.seeds.iter().map(|s| s.position_m).collect(),
             dropped_at_m: done.seeds.iter().map(|s| s.dropped_at_m).collect(),

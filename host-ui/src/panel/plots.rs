@@ -179,7 +179,9 @@ fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
         let text = format!("missed deadlines {}", format::count(s.missed_deadlines));
         ui.label(RichText::new(text).color(color).strong())
             .explained("missed deadline");
-        ui.label(theme::small(format!("of {} ticks", format::count(s.tick))))
+        // A procedure begins with a reset, but the number of the tick goes on: no share of it.
+        ui.label(theme::small("since the last reset"))
+            .on_hover_text(format!("{} ticks since rt-core started", format::count(s.tick)))
             .explained("tick");
     });
     let text = format!(

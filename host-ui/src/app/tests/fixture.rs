@@ -9,6 +9,7 @@ use crate::shown::Shown;
 use bytemuck::Zeroable;
 use egui::{Event, MouseWheelUnit, Pos2, RawInput, Rect, Vec2};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use stylet_dose::Metric;
 use stylet_dose::criteria::{Figure, Limit};
 use stylet_host::link::LinkStatus;
@@ -23,10 +24,13 @@ use stylet_shm_schema::{
     flags, role,
 };
 
-/// Of a window without a core.
+/// Those of a window without a core, under a name of its own: windows of other tests come and go beside it.
 pub fn options() -> Options {
+    static WINDOWS: AtomicU64 = AtomicU64::new(0);
+    // No other memory depends on the number.
+    let number = WINDOWS.fetch_add(1, Ordering::Relaxed);
     Options {
-        instance: Instance::new("ui-drawn").expect("a valid name"),
+        instance: Instance::new(&format!("ui-drawn-{}-{number}", std::process::id())).expect("a valid name"),
         scene: None,
         label: None,
         image: None,
@@ -45,6 +49,16 @@ pub struct Drawn {
     size: Vec2,
     scale: f32,
     time: f64,
+    _swept: Swept,
+}
+
+/// Removes what a window leaves in shared memory, after the window itself.
+struct Swept(Instance);
+
+impl Drop for Swept {
+    fn drop(&mut self) {
+        self.0.sweep();
+    }
 }
 
 impl Drawn {
@@ -52,7 +66,9 @@ impl Drawn {
     pub fn new(pixels: [f32; 2], scale: f32) -> Self {
         let ctx = egui::Context::default();
         ctx.enable_accesskit();
-        let app = App::new(&eframe::CreationContext::_new_kittest(ctx.clone()), options());
+        let options = options();
+        let swept = Swept(options.instance.clone());
+        let app = App::new(&eframe::CreationContext::_new_kittest(ctx.clone()), options);
         ctx.all_styles_mut(|style| style.interaction.tooltip_delay = 1e9);
         Self {
             app,
@@ -60,6 +76,7 @@ impl Drawn {
             size: Vec2::from(pixels) / scale,
             scale,
             time: 0.0,
+            _swept: swept,
         }
     }
 

@@ -179,7 +179,7 @@ impl Recorded {
 }
 
 fn through_a_file(flight: &Flight) -> Flight {
-    // Tests of one process run beside each other.
+    // Tests of one process run beside each other; no other memory depends on the number.
     static FILES: AtomicU64 = AtomicU64::new(0);
     let number = FILES.fetch_add(1, Ordering::Relaxed);
     let path = std::env::temp_dir().join(format!("stylet-line-{}-{number}.flight", std::process::id()));
