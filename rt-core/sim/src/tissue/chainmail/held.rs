@@ -41,25 +41,31 @@ pub(super) fn grip(model: &ChainMail, held: Option<Held>) -> (Option<Grip>, Held
 /// Puts what is held in place; what that moves is active. Whether anything was not there.
 pub(super) fn put(model: &ChainMail, state: &mut TissueState, grip: &Grip) -> bool {
     let mut moved = false;
-    let [_, j, k] = model.lattice.cell(grip.element);
-    for k in around(k, grip, model.lattice.dims[2]) {
-        for j in around(j, grip, model.lattice.dims[1]) {
+    let [planes, rows] = planes_and_rows(model, grip);
+    for k in planes {
+        for j in rows.clone() {
             moved |= put_row(model, state, grip, [j, k]);
         }
     }
     moved
 }
 
+/// Where something is held: the planes, and the rows of each.
+pub(super) fn planes_and_rows(model: &ChainMail, grip: &Grip) -> [std::ops::Range<usize>; 2] {
+    let [_, j, k] = model.lattice.cell(grip.element);
+    [
+        around(k, grip, model.lattice.dims[2]),
+        around(j, grip, model.lattice.dims[1]),
+    ]
+}
+
 fn around(centre: usize, grip: &Grip, count: usize) -> std::ops::Range<usize> {
     centre.saturating_sub(grip.beside)..(centre + grip.beside + 1).min(count)
 }
 
-/// As `put`, for what is held in one row; nothing if nothing is.
+/// As `put`, for what is held in one row of `planes_and_rows`.
 pub(super) fn put_row(model: &ChainMail, state: &mut TissueState, grip: &Grip, [j, k]: [usize; 2]) -> bool {
-    let [held_i, held_j, held_k] = model.lattice.cell(grip.element);
-    if j.abs_diff(held_j) > grip.beside || k.abs_diff(held_k) > grip.beside {
-        return false;
-    }
+    let [held_i, ..] = model.lattice.cell(grip.element);
     let part = model.part(grip.element);
     let cells = around(held_i, grip, model.lattice.dims[0]);
     let wanted = Stretch {

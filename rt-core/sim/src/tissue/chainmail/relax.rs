@@ -12,6 +12,7 @@ use super::state::TissueState;
 use crate::limits::Relaxation;
 
 /// One pass over the rows whose j + k is even (`parity` 0) or odd (1); what is held stays.
+#[inline(always)]
 pub(super) fn half_pass<K: RowSprings>(
     model: &ChainMail,
     state: &mut TissueState,
@@ -21,8 +22,12 @@ pub(super) fn half_pass<K: RowSprings>(
 ) {
     let ny = model.lattice.dims[1];
     let uniform = [0, 1, 2].map(|component| shares(relaxation, component, &[1.0; 6]));
+    let held = grip.map(|grip| (grip, held::planes_and_rows(model, grip)));
     for (k, &[first, end]) in model.rows_of_plane.iter().enumerate() {
         for j in (first..end).filter(|j| (j + k) % 2 == parity) {
+            let held_here = held
+                .as_ref()
+                .filter(|(_, [planes, rows])| planes.contains(&k) && rows.contains(&j));
             for segment in model.segments.of_row(j + ny * k) {
                 for (component, uniform) in uniform.iter().enumerate() {
                     let u = &mut state.u[component];
@@ -32,7 +37,7 @@ pub(super) fn half_pass<K: RowSprings>(
                     }
                 }
                 // At once, before the next segment of the row reads it.
-                if let Some(grip) = grip {
+                if let Some((grip, _)) = held_here {
                     held::put_row(model, state, grip, [j, k]);
                 }
             }

@@ -6,7 +6,6 @@ use super::kernels::Portable;
 use super::loops::Loops;
 use super::model::ChainMail;
 use super::propagate::{MAX_SWEEPS, propagate};
-use super::relax;
 use super::state::TissueState;
 use super::sweep::Pass;
 use crate::tissue::{Held, Solve, StepReport};
@@ -75,7 +74,7 @@ fn solve<K: Loops>(model: &ChainMail, state: &mut TissueState, mut grip: Option<
         && (grip.is_some() || state.max_displacement > 0.0)
     {
         for half in 0..2 * relaxation.iterations {
-            relax::half_pass::<K>(model, state, grip.as_ref(), relaxation, half as usize % 2);
+            K::relax_rows(model, state, grip.as_ref(), relaxation, half as usize % 2);
         }
         report.passes += relaxation.iterations;
         residual = settle::<K>(model, state, grip.as_ref(), slack, report);
