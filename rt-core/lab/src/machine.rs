@@ -1,5 +1,9 @@
 //! What the kernel reports about this PC, read below a root path so that tests can show it another machine.
 
+mod threads;
+
+pub use threads::Process;
+
 use flate2::read::GzDecoder;
 use std::collections::BTreeSet;
 use std::io::Read;
@@ -33,6 +37,11 @@ impl Preemption {
         })
     }
 
+    /// A thread that works inside the kernel gives way to a real-time thread at once.
+    pub fn gives_way(self) -> bool {
+        matches!(self, Self::RealTime | Self::Full | Self::Lazy)
+    }
+
     pub fn name(self) -> &'static str {
         match self {
             Self::RealTime => "PREEMPT_RT",
@@ -61,6 +70,11 @@ impl Machine {
 
     pub fn at(root: impl Into<PathBuf>) -> Self {
         Self { root: root.into() }
+    }
+
+    /// Not one that is made of files.
+    fn is_this(&self) -> bool {
+        self.root == Path::new("/")
     }
 
     /// `path` without its leading slash.
@@ -303,16 +317,6 @@ impl Machine {
         let mask = status.lines().find_map(|l| l.strip_prefix("CapEff:"));
         let mask = mask.and_then(|m| u64::from_str_radix(m.trim(), 16).ok()).unwrap_or(0);
         mask >> bit & 1 == 1
-    }
-
-    /// Whether a program of this name runs.
-    pub fn runs(&self, name: &str) -> bool {
-        let processes = self
-            .names("proc")
-            .into_iter()
-            .filter(|n| n.bytes().all(|b| b.is_ascii_digit()));
-        let mut commands = processes.filter_map(|p| self.text(&format!("proc/{p}/comm")));
-        commands.any(|c| c == name)
     }
 
     pub fn exists(&self, path: &str) -> bool {

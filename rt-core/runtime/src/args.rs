@@ -115,6 +115,8 @@ fn try_real_time() -> Result<(), Refused> {
         priority: Some(1),
         core: None,
     };
+    // Otherwise this thread would leave a heap of its own to threads that come later.
+    arm::keep_one_heap();
     let armed = std::thread::spawn(move || arm::arm(ask).map(drop)).join();
     armed.unwrap_or_else(|_| Err(Refused("the trial of real-time scheduling ended by itself".to_owned())))?;
     // SAFETY: both calls have no preconditions; what is locked now is unlocked again.

@@ -5,6 +5,7 @@
 
 mod cores;
 mod devices;
+mod display;
 mod kernel;
 mod memory;
 mod mend;
@@ -86,6 +87,7 @@ pub fn examine(machine: &Machine, haptic_core: usize, here: &Surroundings) -> Ve
         cores::count(machine),
         cores::isolation(machine, haptic_core),
         cores::interrupts(machine, haptic_core),
+        display::servers(machine, haptic_core),
         cores::siblings(machine, haptic_core),
         cores::governor(machine, haptic_core),
         cores::sleep_states(machine, haptic_core),

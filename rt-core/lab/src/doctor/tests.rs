@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// A machine made of files; removed when dropped.
-struct Fake(PathBuf);
+pub(super) struct Fake(PathBuf);
 
 impl Fake {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         static NEXT: AtomicU32 = AtomicU32::new(0);
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         let root = std::env::temp_dir().join(format!("stylet-doctor-{}-{number}", std::process::id()));
@@ -16,15 +16,19 @@ impl Fake {
         Self(root)
     }
 
-    fn with(self, path: &str, text: &str) -> Self {
+    pub(super) fn with(self, path: &str, text: &str) -> Self {
         let path = self.0.join(path);
         std::fs::create_dir_all(path.parent().expect("below the root")).expect("made");
         std::fs::write(path, text).expect("written");
         self
     }
 
-    fn see(&self, check: impl Fn(&Machine) -> Finding) -> Finding {
-        check(&Machine::at(&self.0))
+    pub(super) fn see(&self, check: impl Fn(&Machine) -> Finding) -> Finding {
+        self.of(check)
+    }
+
+    pub(super) fn of<T>(&self, read: impl FnOnce(&Machine) -> T) -> T {
+        read(&Machine::at(&self.0))
     }
 }
 
@@ -42,7 +46,7 @@ const RELEASE: &str = "proc/sys/kernel/osrelease";
 
 /// FindingLevel as expected, and a cure exactly where something is to be done.
 #[track_caller]
-fn expect(finding: &Finding, severity: FindingLevel, says: &str) {
+pub(super) fn expect(finding: &Finding, severity: FindingLevel, says: &str) {
     assert_eq!(finding.severity, severity, "{finding:?}");
     assert!(finding.what.contains(says), "{finding:?}");
     if severity >= FindingLevel::Warning {

@@ -10,6 +10,8 @@ pub struct Tunable {
     pub check: &'static str,
     /// Without the leading slash.
     pub path: String,
+    /// Of the cores that a thread may run on: when it began ([`Machine::began`]).
+    pub began: Option<u64>,
     pub now: String,
     pub wanted: String,
 }
@@ -20,8 +22,11 @@ impl Tunable {
     }
 }
 
-/// The value in force: of `a [b] c` the word in brackets.
+/// The value in force: of `a [b] c` the word in brackets, of a thread the cores that it may run on.
 pub fn value(machine: &Machine, path: &str) -> Option<String> {
+    if let Some(allowed) = machine.allowed_cores(path) {
+        return Some(allowed);
+    }
     let text = machine.text(path)?;
     let chosen = text
         .split_once('[')
@@ -122,6 +127,7 @@ pub fn all(machine: &Machine, core: usize) -> Vec<Tunable> {
             all.push(Tunable {
                 check,
                 path,
+                began: None,
                 now,
                 wanted: wanted.to_owned(),
             });
@@ -175,7 +181,7 @@ pub fn all(machine: &Machine, core: usize) -> Vec<Tunable> {
 }
 
 /// `0,1,2` as `0-2`, so that what is read back is what was written.
-fn as_kernel_prints(list: &str) -> String {
+pub fn as_kernel_prints(list: &str) -> String {
     let all: Vec<usize> = cores(list).into_iter().collect();
     let mut ranges: Vec<(usize, usize)> = Vec::new();
     for core in all {

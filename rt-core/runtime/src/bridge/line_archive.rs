@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use stylet_sim::line::{LineSource, LineStations};
 
 /// No tape reaches back so far: the tissue loop's has room for 10 s.
-const KEPT: Duration = Duration::from_secs(60);
+const KEPT: Duration = Duration::from_secs(15);
 
 /// The loop that had a half of a line.
 #[derive(Clone, Copy, Debug)]

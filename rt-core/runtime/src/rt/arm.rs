@@ -60,21 +60,21 @@ pub fn arm(ask: Ask) -> Result<Armed, Refused> {
     })
 }
 
-/// From this size on a block is mapped by itself.
-const LARGE_BLOCK_BYTES: libc::c_int = 1 << 15;
+/// One heap for all threads, which keeps what it has; a heap that a thread was given before this was called stays. Large
+/// blocks are not in it ([`stylet_heap`]).
+pub fn keep_one_heap() {
+    // SAFETY: the options take any value.
+    unsafe {
+        libc::mallopt(libc::M_ARENA_MAX, 1);
+        libc::mallopt(libc::M_TRIM_THRESHOLD, -1);
+    }
+}
 
 /// Locks present and future pages; the error names the limit to raise.
 pub fn lock_memory() -> Result<(), Refused> {
     // SAFETY: no preconditions.
     if unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } == 0 {
-        // Freed memory is kept in one heap for all threads. Large blocks, of scenes and needle lines, are mapped and given
-        // back whole: served from what is kept they left holes, and 400 changes of the scene took twice the memory.
-        // SAFETY: the options take any value.
-        unsafe {
-            libc::mallopt(libc::M_ARENA_MAX, 1);
-            libc::mallopt(libc::M_TRIM_THRESHOLD, -1);
-            libc::mallopt(libc::M_MMAP_THRESHOLD, LARGE_BLOCK_BYTES);
-        }
+        keep_one_heap();
         return Ok(());
     }
     let why = std::io::Error::last_os_error();

@@ -76,10 +76,14 @@ impl VelocityEstimator {
         }
         self.filled = (self.filled + 1).min(WINDOW + 1);
         let samples = self.history.get(..self.filled).unwrap_or(&[]);
+        let mut per_s = [0.0; WINDOW + 1];
+        for (per_s, (_, age_s)) in per_s.iter_mut().zip(&self.history) {
+            *per_s = 1.0 / age_s;
+        }
         let slopes = [
-            slope(samples, |p| p.x, self.step_m),
-            slope(samples, |p| p.y, self.step_m),
-            slope(samples, |p| p.z, self.step_m),
+            slope(samples, &per_s, |p| p.x, self.step_m),
+            slope(samples, &per_s, |p| p.y, self.step_m),
+            slope(samples, &per_s, |p| p.z, self.step_m),
         ];
         self.velocity_m_per_s = slopes.map(|(slope, _)| slope).into();
         self.window_s = slopes.map(|(_, window_s)| window_s).into();
@@ -87,25 +91,84 @@ impl VelocityEstimator {
     }
 }
 
-/// Slope of the longest admissible line through the newest of `samples`, on one axis, and how long it is.
-fn slope(samples: &[(Vector3<f64>, f64)], axis: impl Fn(&Vector3<f64>) -> f64, band_m: f64) -> (f64, f64) {
+/// Roundings of a comparison with the band are at most so many of the positions' own. Each has three of its own, and each
+/// of the bounds below five.
+const ROUNDINGS: f64 = 64.0 * f64::EPSILON;
+
+/// Slopes that pass each sample, so far, within a width.
+struct Slopes {
+    least: f64,
+    most: f64,
+}
+
+impl Slopes {
+    /// One that is infinite passes nothing, not even the newest sample.
+    const ALL: Self = Slopes {
+        least: f64::MIN,
+        most: f64::MAX,
+    };
+
+    #[inline(always)]
+    fn hold(&self, slope: f64) -> bool {
+        (self.least <= slope) & (slope <= self.most)
+    }
+
+    #[inline(always)]
+    fn pass(&mut self, middle: f64, half: f64) {
+        let (least, most) = (middle - half, middle + half);
+        self.least = if least > self.least { least } else { self.least };
+        self.most = if most < self.most { most } else { self.most };
+    }
+}
+
+/// Slope of the longest admissible line through the newest of `samples`, on one axis, and how long it is. `per_s` is one
+/// over the age of each.
+///
+/// Samples bound the slopes of all longer lines, so that each line is compared with two numbers and not with every sample. Only where
+/// rounding could decide is it compared with the samples.
+fn slope(
+    samples: &[(Vector3<f64>, f64)],
+    per_s: &[f64; WINDOW + 1],
+    axis: impl Fn(&Vector3<f64>) -> f64,
+    band_m: f64,
+) -> (f64, f64) {
     let Some((newest, _)) = samples.first() else {
         return (0.0, 0.0);
     };
     let newest = axis(newest);
+    let largest_m = samples.iter().fold(0.0, |most: f64, (p, _)| most.max(axis(p).abs()));
+    let doubt_m = ROUNDINGS * (largest_m + band_m);
+    let (mut surely, mut perhaps) = (Slopes::ALL, Slopes::ALL);
     let mut found = (0.0, 0.0);
-    for (n, (oldest, age_s)) in samples.iter().enumerate().skip(1) {
+    for (n, ((oldest, age_s), per_s)) in samples.iter().zip(per_s).enumerate().skip(1) {
         let candidate = (newest - axis(oldest)) / age_s;
-        let fits = samples
-            .iter()
-            .take(n)
-            .all(|(p, age)| (newest - candidate * age - axis(p)).abs() <= band_m);
+        let fits = if surely.hold(candidate) {
+            true
+        } else {
+            perhaps.hold(candidate) && passes(samples.get(..n).unwrap_or(&[]), candidate, newest, &axis, band_m)
+        };
         if !fits {
             break;
         }
         found = (candidate, *age_s);
+        surely.pass(candidate, (band_m - doubt_m) * per_s);
+        perhaps.pass(candidate, (band_m + doubt_m) * per_s);
     }
     found
+}
+
+/// Whether a line through the newest passes each of the samples within the band.
+#[cold]
+fn passes(
+    samples: &[(Vector3<f64>, f64)],
+    slope: f64,
+    newest: f64,
+    axis: impl Fn(&Vector3<f64>) -> f64,
+    band_m: f64,
+) -> bool {
+    samples
+        .iter()
+        .all(|(p, age)| (newest - slope * age - axis(p)).abs() <= band_m)
 }
 
 #[cfg(test)]
@@ -184,6 +247,57 @@ mod tests {
             .skip(201)
             .position(|v| v.abs() < 0.01);
         assert!(seen.is_some_and(|ticks| ticks <= 4), "{seen:?}");
+    }
+
+    /// The longest line that passes every sample under it, each compared with each.
+    fn by_brute_force(samples: &[f64], dt_s: f64) -> (f64, f64) {
+        let band_m = VelocityEstimator::new(STEP_M).step_m;
+        let mut ages_s = vec![0.0];
+        ages_s.extend((0..WINDOW).scan(0.0, |age_s, _| {
+            *age_s += dt_s;
+            Some(*age_s)
+        }));
+        let newest = samples[0];
+        let mut found = (0.0, 0.0);
+        for n in 1..samples.len().min(WINDOW + 1) {
+            let slope = (newest - samples[n]) / ages_s[n];
+            let is_passed = |i: usize| (newest - slope * ages_s[i] - samples[i]).abs() <= band_m;
+            if !(0..n).all(is_passed) {
+                break;
+            }
+            found = (slope, ages_s[n]);
+        }
+        found
+    }
+
+    /// Bit by bit, on paths that lie on the edge of the band or beside it by roundings.
+    #[test]
+    fn bounds_of_slopes_give_what_comparing_every_sample_gives() {
+        let mut drawn = 1_u64;
+        let mut draw = |of: u64| {
+            drawn = drawn.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (drawn >> 33) % of
+        };
+        let exact = STEP_M * (1.0 + 1e-6) + 1e-12;
+        for path in 0..400 {
+            let dt_s = [1e-3, 1e-4, 0.8e-3][path % 3];
+            let start_m = [0.0, 0.1, -0.25, 7.0][path % 4];
+            let (mut estimator, mut x, mut samples) = (VelocityEstimator::new(STEP_M), start_m, Vec::new());
+            for _ in 0..200 {
+                x += match path % 5 {
+                    0 => exact * draw(3) as f64 - exact,
+                    1 => STEP_M * (draw(2) as f64),
+                    2 => exact * (draw(2) as f64) * (1.0 + f64::EPSILON * draw(9) as f64),
+                    3 => 1e-6 * draw(100) as f64,
+                    _ => 0.0,
+                };
+                samples.insert(0, x);
+                let given = estimator.update(&Vector3::new(x, 0.0, -x), dt_s);
+                let (slope, window_s) = by_brute_force(&samples, dt_s);
+                assert_eq!(given.x.to_bits(), slope.to_bits(), "path {path}");
+                assert_eq!(2.0 * estimator.delay_s().x, window_s);
+            }
+        }
     }
 
     #[test]

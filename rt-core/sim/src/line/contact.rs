@@ -20,8 +20,8 @@ mod forces;
 mod membrane;
 pub(super) mod sets;
 
-/// For the stations of one line.
-type Scratch = sets::Scratch<LINE_BLOCKS>;
+/// For the stations of one line. It is kept from tick to tick: what a tick reads of it, the tick has written.
+pub(super) type Scratch = sets::Scratch<LINE_BLOCKS>;
 
 /// Solutions in one tick at most: the tip goes on, a membrane gives way, the tip goes on again.
 const MAX_PASSES: u32 = 12;
@@ -42,6 +42,16 @@ pub struct LineInput {
 /// One tick. Its work is bounded, it does not allocate, and every finite input gives finite forces. A state of another model
 /// is left as it is.
 pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> LineOutput {
+    step_in(model, state, input, &mut Scratch::new())
+}
+
+/// The same in a scratch that other ticks have used.
+pub(super) fn step_in(
+    model: &LineModel,
+    state: &mut LineState,
+    input: &LineInput,
+    scratch: &mut Scratch,
+) -> LineOutput {
     if !(input.tip_m.is_finite() && input.dt_s.is_finite() && input.dt_s > 0.0 && state.fits(model)) {
         return LineOutput {
             is_refused: true,
@@ -53,7 +63,8 @@ pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> Line
     state
         .memory
         .begin(rows, common_m_per_n, &model.settings.prony, input.dt_s);
-    advance(model, state, input, &mut Alone(Scratch::new()))
+    scratch.begin();
+    advance(model, state, input, &mut Alone(scratch))
 }
 
 /// What a needle shares a tick with: nothing, or needles that stay in.
@@ -75,11 +86,11 @@ pub(super) trait Company {
     fn end(&mut self) {}
 }
 
-struct Alone(Scratch);
+struct Alone<'a>(&'a mut Scratch);
 
-impl Company for Alone {
+impl Company for Alone<'_> {
     fn begin(&mut self, model: &LineModel, state: &mut LineState, tip_m: f64, membrane: Option<usize>) {
-        touch(model, state, tip_m, &mut self.0);
+        touch(model, state, tip_m, self.0);
         meet(model, state, membrane);
         press(model, state, membrane);
         if let Some(spring) = Spring::of(model, state) {
@@ -96,7 +107,7 @@ impl Company for Alone {
         limit_n: f64,
         output: &mut LineOutput,
     ) -> f64 {
-        solve(model, state, input.tip_m, limit_n, input.dt_s, (&mut self.0, output))
+        solve(model, state, input.tip_m, limit_n, input.dt_s, (self.0, output))
     }
 }
 
@@ -112,7 +123,7 @@ pub(super) fn advance(
     let mut output = LineOutput::default();
     if !has_met(model, state, tip_m) {
         company.rest();
-        stay_outside(model, state, tip_m, &mut output);
+        stay_outside(model, state, &mut output);
         return output;
     }
     let mut before = None;
@@ -180,8 +191,9 @@ fn has_met(model: &LineModel, state: &mut LineState, tip_m: f64) -> bool {
 }
 
 /// A tick of a needle that has not met the surface.
-fn stay_outside(model: &LineModel, state: &mut LineState, tip_m: f64, output: &mut LineOutput) {
-    touch(model, state, tip_m, &mut Scratch::new());
+fn stay_outside(model: &LineModel, state: &mut LineState, output: &mut LineOutput) {
+    // No station is touched, so none has to be found where it sticks.
+    lay(model, state);
     press(model, state, None);
     state.tip_u_m = 0.0;
     finish(model, state, output);

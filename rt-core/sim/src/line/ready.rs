@@ -4,7 +4,7 @@
 
 use super::columns::{ColumnQueue, QueueProgress, TOLERANCE};
 use super::compliance::Compliance;
-use super::contact::{LineInput, step};
+use super::contact::{LineInput, Scratch, step_in};
 use super::cross::{Cross, LineStations};
 use super::model::{LineModel, LineSettings, MAX_STATIONS};
 use super::prony::PronyTerm;
@@ -60,6 +60,8 @@ pub struct HandLine {
     way: Way,
     pub(super) model: LineModel,
     pub(super) state: LineState,
+    /// What its ticks work in.
+    scratch: Box<Scratch>,
     /// How it moves with lines that were there when it was solved for.
     pub(super) beside: Vec<Cross>,
     /// Where the body was solved for forces across the line as well.
@@ -177,6 +179,7 @@ impl HandLine {
             line,
             way,
             state: LineState::new(&model),
+            scratch: Box::new(Scratch::new()),
             model,
             bending,
             beside: Vec::new(),
@@ -211,7 +214,8 @@ impl HandLine {
     /// One tick of the needle, whose tip goes no farther than the bone.
     pub fn step(&mut self, tip_m: f64, dt_s: f64) -> LineOutput {
         let tip_m = tip_m - self.in_bone_m(tip_m);
-        step(&self.model, &mut self.state, &LineInput { tip_m, dt_s })
+        let input = LineInput { tip_m, dt_s };
+        step_in(&self.model, &mut self.state, &input, &mut self.scratch)
     }
 
     /// How far a hand wants the tip to be in bone, m; what is no number stays.

@@ -27,6 +27,9 @@ pub struct Change {
     pub check: String,
     /// Without the leading slash.
     pub path: String,
+    /// Of a thread's cores: when it began, so that they are not given to another of that number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub began: Option<u64>,
     pub before: String,
     pub after: String,
     pub state: State,
@@ -40,6 +43,13 @@ pub struct Changes {
     /// Which start of the PC: a restart undoes them by itself.
     boot: String,
     pub changes: Vec<Change>,
+}
+
+impl Change {
+    /// Of a thread that is there no more, though its number may be another's.
+    fn has_ended(&self, machine: &Machine) -> bool {
+        self.began.is_some() && machine.began(&self.path) != self.began
+    }
 }
 
 fn boot() -> String {
@@ -58,6 +68,7 @@ impl Changes {
                 .map(|t| Change {
                     check: t.check.to_owned(),
                     path: t.path.clone(),
+                    began: t.began,
                     before: t.now.clone(),
                     after: t.wanted.clone(),
                     state: State::Planned,
@@ -91,9 +102,13 @@ impl Changes {
     /// Writes each value and reads it back.
     pub fn apply(&mut self, machine: &Machine) {
         for change in &mut self.changes {
-            change.state = match put(machine, &change.path, &change.after) {
-                Ok(()) => State::Applied,
-                Err(why) => State::Refused(why),
+            change.state = if change.has_ended(machine) {
+                State::Refused("the thread has ended".to_owned())
+            } else {
+                match put(machine, &change.path, &change.after) {
+                    Ok(()) => State::Applied,
+                    Err(why) => State::Refused(why),
+                }
             };
         }
     }
@@ -107,7 +122,7 @@ impl Changes {
                 continue;
             }
             let now = tunable::value(machine, &change.path).unwrap_or_default();
-            change.state = if now == change.before {
+            change.state = if now == change.before || change.has_ended(machine) {
                 State::Undone
             } else if now != change.after {
                 State::Foreign(now)
@@ -152,7 +167,11 @@ impl Changes {
 }
 
 fn put(machine: &Machine, path: &str, value: &str) -> Result<(), String> {
-    std::fs::write(machine.path(path), value).map_err(|e| e.to_string())?;
+    if machine.allowed_cores(path).is_some() {
+        machine.allow_cores(path, value)?;
+    } else {
+        std::fs::write(machine.path(path), value).map_err(|e| e.to_string())?;
+    }
     match tunable::value(machine, path) {
         Some(now) if now == value => Ok(()),
         now => Err(format!("the kernel took it, and reports {:?}", now.unwrap_or_default())),

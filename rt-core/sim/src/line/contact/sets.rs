@@ -135,6 +135,11 @@ impl<const B: usize> Scratch<B> {
         }
     }
 
+    /// Nothing of the ticks before is known in the one that begins.
+    pub fn begin(&mut self) {
+        (self.owned, self.taken_n_per_m) = (0, 0.0);
+    }
+
     /// The membrane that holds the tip, if one does; `column` is set, and of it `whole` is no dent.
     pub fn hold_by(&mut self, spring: Option<Spring>, whole: impl Iterator<Item = f64>) {
         let taken_n_per_m = spring.map_or(0.0, |spring| spring.n_per_m);

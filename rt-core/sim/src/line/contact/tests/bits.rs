@@ -63,3 +63,51 @@ fn rate_terms_that_are_off_leave_every_bit_as_it_was() {
     }
     assert_eq!(hash, BITS, "{hash:#x}");
 }
+
+/// A scratch was made anew in each tick, of 17 KB of zeros. What another line has left in one must not be read.
+#[test]
+fn a_scratch_that_another_line_has_used_changes_no_bit() {
+    let settings = LineSettings::default();
+    let membrane = LineLayer {
+        puncture_force_n: 3.0,
+        ..GLAND
+    };
+    let models = [
+        exact(settings),
+        made_up(
+            40,
+            1e-3,
+            &[
+                GLAND,
+                LineLayer {
+                    from_m: 20e-3,
+                    ..membrane
+                },
+            ],
+            settings,
+        ),
+    ];
+    let mut shared = Scratch::new();
+    let mut states = models
+        .each_ref()
+        .map(|model| [LineState::new(model), LineState::new(model)]);
+    let (mut random, mut tips_m, mut ends_m) = (Random(5), [-1e-3; 2], [-1e-3; 2]);
+    for tick in 0..40_000 {
+        let n = tick % 2;
+        if tips_m[n] == ends_m[n] {
+            ends_m[n] = 45e-3 * random.unit() - 2e-3;
+        }
+        tips_m[n] += f64::clamp(ends_m[n] - tips_m[n], -1.5e-4, 1.5e-4);
+        let [alone, together] = &mut states[n];
+        let input = at(tips_m[n]);
+        let expected = step(&models[n], alone, &input);
+        assert_eq!(
+            step_in(&models[n], together, &input, &mut shared),
+            expected,
+            "tick {tick}"
+        );
+    }
+    for [alone, together] in &states {
+        assert_eq!(alone, together);
+    }
+}
