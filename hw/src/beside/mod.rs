@@ -12,3 +12,5 @@ pub mod hold;
 pub mod keeper;
 pub mod loss;
 pub mod open;
+pub mod serving;
+pub mod shared;

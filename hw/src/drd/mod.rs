@@ -15,7 +15,6 @@ mod connector;
 mod device;
 mod diagnose;
 pub mod errors;
-mod exchange;
 pub mod ffi;
 mod model;
 mod servo;

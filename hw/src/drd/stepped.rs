@@ -6,10 +6,10 @@
 use std::sync::Arc;
 
 use crate::beside::ends::{self, ForceLoopEnd};
+use crate::beside::shared::Shared;
 use crate::device::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
 use crate::drd::connector::same_model;
 use crate::drd::device::{ForceDimensionConfig, OpenError, Readings, readings};
-use crate::drd::exchange::Shared;
 use crate::drd::ffi::Api;
 use crate::drd::servo::Servo;
 use crate::drd::session::{ConnectionError, Description, Session};
