@@ -23,6 +23,7 @@ mod usb;
 pub use backend::BackendKind;
 pub use beside::arm::{Arm, ArmError};
 pub use beside::keeper::Report;
+pub use beside::served::{Described, Readings, Served};
 pub use device::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
 pub use drd::{ForceDimension, ForceDimensionConfig};
 pub use finding::{Finding, Severity};

@@ -4,6 +4,7 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::beside::ends::FaultCell;
 use crate::beside::loss::Errors;
+use crate::device::DeviceFault;
 
 /// Each field has one writer, which its comment names, unless it says otherwise.
 #[derive(Debug, Default)]
@@ -32,6 +33,18 @@ impl Shared {
     pub fn request_release(&self) {
         // SYNC: relaxed; the flag carries nothing with it. Joining the thread confirms it.
         self.serve.store(false, Ordering::Relaxed);
+    }
+
+    /// No device is connected. Keeper, while no servo thread runs.
+    pub fn not_connected(&self) {
+        self.fault.set(Some(DeviceFault::NotConnected));
+    }
+
+    /// The connection is closed; a fault that ended it stays the present one. Keeper, after the servo thread.
+    pub fn released(&self) {
+        if self.fault.get().is_none() {
+            self.not_connected();
+        }
     }
 
     /// Whether the servo thread goes on. Servo.

@@ -120,13 +120,11 @@ impl Connect for Connector {
             self.servo = servo.join().ok();
         }
         running.session.close();
-        if self.shared.fault.get().is_none() {
-            self.not_connected();
-        }
+        self.shared.released();
     }
 
     fn not_connected(&self) {
-        self.shared.fault.set(Some(DeviceFault::NotConnected));
+        self.shared.not_connected();
     }
 }
 

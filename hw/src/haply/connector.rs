@@ -7,7 +7,6 @@ use std::thread::{self, JoinHandle};
 use crate::beside::keeper::{self, Connect};
 use crate::beside::serving;
 use crate::beside::shared::Shared;
-use crate::device::DeviceFault;
 use crate::haply::servo::{Servo, loss};
 use crate::haply::session::{self, ConnectionError, Description, Wanted};
 use crate::haply::socket::{Service, Socket};
@@ -102,13 +101,11 @@ impl Connect for Connector {
             }
             Connection::Given => {}
         }
-        if self.shared.fault.get().is_none() {
-            self.not_connected();
-        }
+        self.shared.released();
     }
 
     fn not_connected(&self) {
-        self.shared.fault.set(Some(DeviceFault::NotConnected));
+        self.shared.not_connected();
     }
 }
 

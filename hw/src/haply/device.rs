@@ -1,13 +1,9 @@
-//! An Inverse3 as a [`Device`]: wait-free ends for the force loop.
-
-use std::sync::Arc;
+//! An Inverse3, opened.
 
 use crate::beside::arm::Arm;
-use crate::beside::ends::{self, ForceLoopEnd};
-use crate::beside::keeper::{self, KeeperThread, Report};
+use crate::beside::keeper::Report;
 use crate::beside::open;
-use crate::beside::shared::Shared;
-use crate::device::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
+use crate::beside::served::Served;
 use crate::haply::connector::Connector;
 use crate::haply::servo::Servo;
 use crate::haply::session::{ConnectionError, Description, Wanted};
@@ -30,72 +26,16 @@ pub struct HaplyConfig {
 /// Why a device could not be opened; the text says what to do.
 pub type OpenError = open::OpenError<ConnectionError>;
 
-/// State of the connection beside the pose.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Readings {
-    /// Servo ticks so far.
-    pub ticks: u64,
-    /// Present fault.
-    pub fault: Option<DeviceFault>,
-    /// Number of errors so far: states that are none, and lost connections.
-    pub errors: u64,
-}
-
 /// An Inverse3; see the module [`haply`](crate::haply). Dropping it leaves zero force and a closed connection.
-pub struct Haply {
-    description: Description,
-    shared: Arc<Shared>,
-    end: ForceLoopEnd,
-    _keeper: KeeperThread,
-}
+pub type Haply = Served<Description>;
 
 impl Haply {
     /// Connects to the service and finds the device. `arm` runs once in each servo thread, before its first tick; `report`
     /// receives messages for the operator, from a thread of normal priority.
     pub fn open(config: HaplyConfig, arm: Arm, report: Report) -> Result<Self, OpenError> {
-        let (end, servo_end) = ends::pair();
-        let shared = Arc::<Shared>::default();
-        let servo = Servo::new(config.placement, arm, servo_end, config.servo_hz);
-        let connector = Connector::new(config.service, config.wanted, Arc::clone(&shared), servo);
-        let (keeper, opened) = keeper::spawn("haply", connector, report);
-        let description = open::first(&opened)?;
-        Ok(Self {
-            description,
-            shared,
-            end,
-            _keeper: keeper,
+        Self::start("haply", report, |shared, end| {
+            let servo = Servo::new(config.placement, arm, end, config.servo_hz);
+            Connector::new(config.service, config.wanted, shared, servo)
         })
-    }
-
-    /// Properties of the device at the first connection.
-    pub fn description(&self) -> &Description {
-        &self.description
-    }
-
-    /// State of the connection beside the pose.
-    pub fn readings(&self) -> Readings {
-        readings(&self.shared)
-    }
-}
-
-pub fn readings(shared: &Shared) -> Readings {
-    Readings {
-        ticks: shared.ticks(),
-        fault: shared.fault.get(),
-        errors: shared.errors.count(),
-    }
-}
-
-impl Device for Haply {
-    fn info(&self) -> DeviceInfo {
-        self.description.info
-    }
-
-    fn read(&mut self, _dt_s: f64) -> Result<Sample, DeviceFault> {
-        self.end.read(self.shared.fault.get())
-    }
-
-    fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceFault> {
-        self.end.write(&self.description.info, wrench)
     }
 }

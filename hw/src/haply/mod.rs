@@ -23,7 +23,7 @@ mod socket;
 mod stepped;
 mod wire;
 
-pub use device::{Haply, HaplyConfig, OpenError, Readings};
+pub use device::{Haply, HaplyConfig, OpenError};
 pub use diagnose::diagnose;
 pub use session::{ConnectionError, Description, Wanted};
 pub use socket::{BadAddress, Service};

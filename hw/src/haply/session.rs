@@ -7,6 +7,7 @@ use std::str::FromStr;
 use std::time::Instant;
 
 use crate::beside::arm::ArmError;
+use crate::beside::served::Described;
 use crate::device::DeviceInfo;
 use crate::haply::message::{self, Frame, Inverse};
 use crate::haply::model;
@@ -132,6 +133,12 @@ pub struct Description {
     pub service: Option<String>,
     /// Number of a handle that gives the orientation; without one the needle is held straight.
     pub grip: Option<String>,
+}
+
+impl Described for Description {
+    fn info(&self) -> DeviceInfo {
+        self.info
+    }
 }
 
 impl fmt::Display for Description {

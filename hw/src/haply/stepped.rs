@@ -1,117 +1,72 @@
-//! An Inverse3 on the caller's thread and without a clock: each reading is a tick of the servo loop.
-//!
-//! For tests and measurements of what the back end does after a fault, which then does not depend on the machine. The ticks,
-//! the first messages and their errors are those of the device with threads.
+//! An Inverse3 without threads; see [`stepped`](crate::beside::stepped).
 
-use std::sync::Arc;
 use std::time::Instant;
 
-use crate::beside::ends::{self, ForceLoopEnd};
 use crate::beside::shared::Shared;
-use crate::device::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
-use crate::haply::device::{Readings, readings};
+use crate::beside::stepped::{self, Step};
 use crate::haply::servo::Servo;
 use crate::haply::session::{self, ConnectionError, Description, Wanted};
 use crate::haply::wire::Wire;
 use crate::placement::Placement;
 
+/// An Inverse3 on the caller's thread and without a clock.
+pub type Stepped = stepped::Stepped<Steps>;
+
 /// Opens a connection to a service, with the service's version; `None` where none answers.
 pub type Opener = Box<dyn FnMut() -> Option<(Box<dyn Wire>, Option<String>)> + Send>;
 
-/// Ticks between two attempts to connect.
-const TICKS_BETWEEN_ATTEMPTS: u32 = 500;
-
-/// See the module.
-pub struct Stepped {
+/// Its servo loop and its connection.
+pub struct Steps {
     opener: Opener,
-    description: Description,
+    known: Option<Description>,
     servo: Servo,
-    shared: Arc<Shared>,
-    end: ForceLoopEnd,
-    connected: bool,
-    unconnected: u32,
 }
 
 impl Stepped {
     /// Opens the first device of the service.
-    pub fn open(mut opener: Opener, placement: Placement, servo_hz: u32) -> Result<Self, ConnectionError> {
-        let (end, servo_end) = ends::pair();
-        let mut servo = Servo::new(placement, Box::new(|| Ok(String::new())), servo_end, servo_hz);
-        let shared = Arc::<Shared>::default();
-        let description = connect(&mut opener, None, &mut servo, &shared)?;
-        Ok(Self {
-            opener,
-            description,
-            servo,
-            shared,
-            end,
-            connected: true,
-            unconnected: 0,
+    pub fn open(opener: Opener, placement: Placement, servo_hz: u32) -> Result<Self, ConnectionError> {
+        Self::over(|end, shared| {
+            let mut steps = Steps {
+                opener,
+                known: None,
+                servo: Servo::new(placement, Box::new(|| Ok(String::new())), end, servo_hz),
+            };
+            let description = steps.open(shared)?;
+            let info = description.info;
+            steps.known = Some(description);
+            Ok((steps, info))
         })
     }
+}
 
-    /// State of the connection beside the pose.
-    pub fn readings(&self) -> Readings {
-        readings(&self.shared)
-    }
-
-    fn tick(&mut self) {
-        if self.connected && self.shared.errors.is_lost() {
-            self.servo.end_connection();
-            (self.connected, self.unconnected) = (false, 0);
+impl Steps {
+    fn open(&mut self, shared: &Shared) -> Result<Description, ConnectionError> {
+        let (mut wire, version) = (self.opener)().ok_or_else(|| ConnectionError::NoService {
+            address: "a test".to_owned(),
+            why: "none".to_owned(),
+        })?;
+        let opened = session::open(&mut *wire, &Wanted::First, self.known.as_ref(), version);
+        match &opened {
+            Ok(description) => {
+                self.servo.begin(wire, description);
+                shared.serve();
+            }
+            Err(_) => wire.close(),
         }
-        if self.connected {
-            self.servo.tick(&self.shared, Instant::now());
-            return;
-        }
-        self.unconnected += 1;
-        if self.unconnected.is_multiple_of(TICKS_BETWEEN_ATTEMPTS) {
-            let known = Some(&self.description);
-            self.connected = connect(&mut self.opener, known, &mut self.servo, &self.shared).is_ok();
-        }
+        opened
     }
 }
 
-fn connect(
-    opener: &mut Opener,
-    known: Option<&Description>,
-    servo: &mut Servo,
-    shared: &Shared,
-) -> Result<Description, ConnectionError> {
-    let (mut wire, version) = opener().ok_or_else(|| ConnectionError::NoService {
-        address: "a test".to_owned(),
-        why: "none".to_owned(),
-    })?;
-    match session::open(&mut *wire, &Wanted::First, known, version) {
-        Ok(description) => {
-            servo.begin(wire, &description);
-            shared.serve();
-            Ok(description)
-        }
-        Err(error) => {
-            wire.close();
-            Err(error)
-        }
-    }
-}
-
-impl Device for Stepped {
-    fn info(&self) -> DeviceInfo {
-        self.description.info
+impl Step for Steps {
+    fn connect(&mut self, shared: &Shared) -> bool {
+        self.open(shared).is_ok()
     }
 
-    fn read(&mut self, _dt_s: f64) -> Result<Sample, DeviceFault> {
-        self.tick();
-        self.end.read(self.shared.fault.get())
-    }
-
-    fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceFault> {
-        self.end.write(&self.description.info, wrench)
-    }
-}
-
-impl Drop for Stepped {
-    fn drop(&mut self) {
+    fn close(&mut self) {
         self.servo.end_connection();
+    }
+
+    fn tick(&mut self, shared: &Shared) {
+        self.servo.tick(shared, Instant::now());
     }
 }

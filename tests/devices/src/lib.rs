@@ -5,6 +5,8 @@ mod drawn;
 #[cfg(test)]
 mod drd;
 #[cfg(test)]
+mod driven;
+#[cfg(test)]
 mod haply;
 #[cfg(test)]
 mod rig;

@@ -153,6 +153,14 @@ impl Service {
 }
 
 impl State {
+    /// Nothing goes wrong any more, and the device is the one of the beginning.
+    pub fn heal(&mut self) {
+        (self.wrong, self.in_use, self.axes) = (Wrong::Nothing, false, None);
+        self.id = "049D".to_owned();
+        self.kind = "inverse3".to_owned();
+        self.version = Some("3.5.0.0".to_owned());
+    }
+
     /// The time of the service.
     pub fn now_ms(&self) -> u64 {
         self.now_ms.unwrap_or_else(|| self.begun.elapsed().as_millis() as u64)

@@ -1,11 +1,11 @@
 //! What is opened and what is refused, and what `rt-core devices` says of it.
 
 use fake_haply::{Server, Service, Wrong};
-use std::time::Duration;
 use stylet_hw::Severity;
 use stylet_hw::haply::{Wanted, diagnose};
 
-use super::threads::{config, drive, open, refused, until};
+use super::threads::{config, open, refused};
+use crate::driven::{LONG, drive, until};
 use stylet_hw::{Device, Wrench};
 
 #[test]
@@ -35,11 +35,7 @@ fn what_cannot_be_used_is_refused_in_words_that_help() {
     let why = |set: &dyn Fn(&mut fake_haply::State)| {
         set(&mut service.state());
         let text = refused(config(&server));
-        let healthy = Service::default();
-        let mut state = service.state();
-        let fresh = healthy.state();
-        (state.wrong, state.in_use, state.axes) = (Wrong::Nothing, false, None);
-        (state.kind, state.id, state.version) = (fresh.kind.clone(), fresh.id.clone(), fresh.version.clone());
+        service.state().heal();
         text
     };
     let text = why(&|s| s.version = Some("3.4.9".to_owned()));
@@ -117,5 +113,5 @@ fn a_service_of_an_unknown_version_is_used_and_said_to_be_so() {
     assert!(drive(&mut device, &Wrench::zero(), Result::is_ok));
     assert_eq!(device.info().peak_torque_nm, 0.0);
     drop(device);
-    assert!(until(Duration::from_secs(10), || service.state().force_at_close_n == [0.0; 3]));
+    assert!(until(LONG, || service.state().force_at_close_n == [0.0; 3]));
 }

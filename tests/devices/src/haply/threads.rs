@@ -3,10 +3,9 @@
 use fake_haply::{Server, Service, Wrong};
 use nalgebra::Vector3;
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
 use stylet_hw::{ArmError, Axes, Device, DeviceFault, Haply, HaplyConfig, Placement, Sample, Wrench, conformance};
 
-const LONG: Duration = Duration::from_secs(10);
+use crate::driven::{LONG, drive, until};
 
 pub fn config(server: &Server) -> HaplyConfig {
     HaplyConfig {
@@ -34,27 +33,6 @@ fn open_listening(server: &Server) -> (Haply, Arc<Mutex<Vec<String>>>) {
 pub fn refused(config: HaplyConfig) -> String {
     let opened = Haply::open(config, Box::new(|| Ok(String::new())), Box::new(|_| ()));
     opened.map(drop).expect_err("refused").to_string()
-}
-
-/// Waits for `ready`; false when it has not come true in time.
-pub fn until(limit: Duration, mut ready: impl FnMut() -> bool) -> bool {
-    let begun = Instant::now();
-    while begun.elapsed() < limit {
-        if ready() {
-            return true;
-        }
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    false
-}
-
-/// Drives `device` as the force loop does, every millisecond, until `ready`; false when it has not come true in time.
-pub fn drive(device: &mut Haply, wrench: &Wrench, mut ready: impl FnMut(&Result<Sample, DeviceFault>) -> bool) -> bool {
-    until(LONG, || {
-        let sample = device.read(1e-3);
-        let _ = device.write(wrench);
-        ready(&sample)
-    })
 }
 
 fn push() -> Wrench {
