@@ -44,7 +44,7 @@ impl Connect for Connector {
         let version = self.service.version();
         let socket = self.service.connect().map_err(|why| ConnectionError::NoService {
             address: self.service.to_string(),
-            why,
+            why: why.to_string(),
         })?;
         Ok(Connection::Open(Box::new(socket), version))
     }

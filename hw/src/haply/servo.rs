@@ -33,7 +33,7 @@ pub mod loss {
     /// The service owes an answer.
     pub const SILENT: u32 = 2;
     /// The device is not among those of the service.
-    pub const GONE: u32 = 3;
+    pub const UNPLUGGED: u32 = 3;
     /// A tick panicked.
     pub const PANIC: u32 = 4;
 
@@ -42,7 +42,7 @@ pub mod loss {
         match code {
             CLOSED => "the service closed the connection; it is opened again automatically",
             SILENT => "the service does not answer: restart it; it is connected again automatically",
-            GONE => "it is unplugged or switched off; it is connected again automatically",
+            UNPLUGGED => "it is unplugged or switched off; it is connected again automatically",
             _ => "an error in rt-core: report it",
         }
     }
@@ -193,7 +193,7 @@ impl Servo {
         };
         let found = self.link.as_ref().and_then(|link| frame.device(&link.id));
         let Some(device) = found else {
-            return self.lose(shared, DeviceFault::NotConnected, loss::GONE);
+            return self.lose(shared, DeviceFault::NotConnected, loss::UNPLUGGED);
         };
         match self.sample(device, frame.grip()) {
             Ok(sample) => self.end.samples.write(Some(sample)),

@@ -94,7 +94,7 @@ pub enum ConnectionError {
     #[error("the device {0} is in use by another program: close it")]
     InUse(String),
     /// Another device answers after a reconnection.
-    #[error("the device {was} is gone and {is} is there in its place: plug {was} in, or restart rt-core")]
+    #[error("the device {was} is not there and {is} is in its place: plug {was} in, or restart rt-core")]
     OtherDevice {
         /// The device of the first connection.
         was: String,

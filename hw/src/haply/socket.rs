@@ -33,6 +33,17 @@ pub struct Service {
 #[error("\"{0}\" is no address of an Inverse service; give ws://HOST:PORT, as in ws://localhost:10001")]
 pub struct BadAddress(String);
 
+/// Why no websocket opens.
+#[derive(Debug, thiserror::Error)]
+pub enum NoSocket {
+    /// Nothing listens there.
+    #[error("{0}")]
+    Connection(#[from] std::io::Error),
+    /// What listens there is no websocket.
+    #[error("no websocket: {0}")]
+    Handshake(String),
+}
+
 impl Default for Service {
     fn default() -> Self {
         Self {
@@ -66,15 +77,15 @@ impl FromStr for Service {
 }
 
 impl Service {
-    /// Opens a websocket; in words why not.
-    pub fn connect(&self) -> Result<Socket, String> {
-        let stream = self.stream(CONNECT_LIMIT).map_err(|e| e.to_string())?;
+    /// Opens a websocket.
+    pub fn connect(&self) -> Result<Socket, NoSocket> {
+        let stream = self.stream(CONNECT_LIMIT)?;
         let config = WebSocketConfig::default()
             .max_message_size(Some(LONGEST_MESSAGE))
             .max_frame_size(Some(LONGEST_MESSAGE));
         let shaken = tungstenite::client::client_with_config(self.to_string(), stream, Some(config));
-        let (socket, _) = shaken.map_err(|e| format!("no websocket: {e}"))?;
-        socket.get_ref().set_nonblocking(true).map_err(|e| e.to_string())?;
+        let (socket, _) = shaken.map_err(|e| NoSocket::Handshake(e.to_string()))?;
+        socket.get_ref().set_nonblocking(true)?;
         Ok(Socket(socket))
     }
 
@@ -115,7 +126,7 @@ pub struct Socket(WebSocket<TcpStream>);
 
 impl Wire for Socket {
     fn send(&mut self, text: &str) -> Result<(), WireError> {
-        // A service that reads so little that a few forces fill the socket is as good as gone.
+        // A service that reads so little that a few forces fill the socket has as good as closed it.
         self.0.send(Message::text(text)).map_err(|_| WireError::Closed)
     }
 

@@ -30,7 +30,7 @@ pub enum Wrong {
     /// The answer is no state, in one of six ways.
     Broken(u32),
     /// The device is not in the list.
-    Gone,
+    Unplugged,
     /// Another device is in its place.
     Other,
     /// The device is not calibrated.
@@ -169,7 +169,7 @@ impl State {
     /// Force of the motors: the last one, unless it was not renewed or the device has none.
     pub fn motors_n(&self) -> [f64; 3] {
         let renewed = self.now_ms() - self.force_ms <= IDLE_AFTER_MS;
-        let is_there = !matches!(self.wrong, Wrong::Gone | Wrong::Other | Wrong::NoPower);
+        let is_there = !matches!(self.wrong, Wrong::Unplugged | Wrong::Other | Wrong::NoPower);
         if renewed && is_there { self.force_n } else { [0.0; 3] }
     }
 
@@ -289,7 +289,7 @@ impl State {
                 "started": true,
             },
         });
-        let devices = if self.wrong == Wrong::Gone {
+        let devices = if self.wrong == Wrong::Unplugged {
             vec![]
         } else {
             vec![device]

@@ -35,7 +35,7 @@ impl Led for Service {
     }
 
     fn plug(&self, plugged: bool) {
-        self.state().wrong = if plugged { Wrong::Nothing } else { Wrong::Gone };
+        self.state().wrong = if plugged { Wrong::Nothing } else { Wrong::Unplugged };
     }
 }
 

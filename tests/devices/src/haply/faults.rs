@@ -46,7 +46,7 @@ impl Drawn for Fault {
             4 => Wrong::NoNumber(kind % 5),
             5 => Wrong::Far,
             6 => Wrong::Broken(kind % 6),
-            7 => Wrong::Gone,
+            7 => Wrong::Unplugged,
             8 => Wrong::NotCalibrated,
             9 => Wrong::NotReady,
             10 => Wrong::NoPower,
@@ -72,7 +72,7 @@ impl Drawn for Fault {
         let mut state = fake.state();
         match self.wrong {
             Wrong::Hangs if tick == self.then => state.wrong = Wrong::Nothing,
-            Wrong::Gone if tick == 400 => {
+            Wrong::Unplugged if tick == 400 => {
                 state.wrong = if self.then == 0 { Wrong::Other } else { Wrong::Nothing };
                 state.kind = if self.then == 1 { "minverse" } else { "inverse3" }.to_owned();
                 state.in_use = self.then == 2;
@@ -97,7 +97,7 @@ impl Drawn for Fault {
             Wrong::Old => (vec![Named::DeviceError], IDLE_AFTER_MS as usize + 1),
             Wrong::Late(_) | Wrong::Silent => (vec![Named::DeviceSilent, Named::DeviceError], LATE_TICKS),
             Wrong::NoNumber(0) | Wrong::BadGrip(_) => (vec![Named::NonFiniteInput], 1),
-            Wrong::Gone | Wrong::NoPower | Wrong::Closes | Wrong::Long => (vec![Named::DeviceLost], 1),
+            Wrong::Unplugged | Wrong::NoPower | Wrong::Closes | Wrong::Long => (vec![Named::DeviceLost], 1),
             Wrong::NotCalibrated => (vec![Named::DeviceNotCalibrated], 1),
             _ => (vec![Named::DeviceError], 1),
         }

@@ -42,7 +42,7 @@ fn what_cannot_be_used_is_refused_in_words_that_help() {
     assert!(text.contains("version 3.4.9") && text.contains("update it"), "{text}");
     let text = why(&|s| s.version = Some("4.0.0".to_owned()));
     assert!(text.contains("version 4.0.0"), "{text}");
-    let text = why(&|s| s.wrong = Wrong::Gone);
+    let text = why(&|s| s.wrong = Wrong::Unplugged);
     assert!(text.contains("none at all") && text.contains("switch it on"), "{text}");
     let text = why(&|s| s.kind = "minverse".to_owned());
     assert!(text.contains("\"minverse\"") && text.contains("inverse3x"), "{text}");
@@ -65,9 +65,9 @@ fn what_cannot_be_used_is_refused_in_words_that_help() {
     });
     assert!(text.contains("no Inverse3 \"A14\", only 049D"), "{text}");
     assert_eq!(service.state().peak_n, 0.0);
-    let gone = config(&server);
+    let stopped = config(&server);
     drop(server);
-    let text = refused(gone);
+    let text = refused(stopped);
     assert!(
         text.contains("no Inverse service answers") && text.contains("--haply-url"),
         "{text}"
@@ -95,7 +95,7 @@ fn the_list_of_devices_names_service_version_device_and_cure_and_sends_nothing()
         (Wrong::NotCalibrated, "not calibrated", Severity::Warning),
         (Wrong::NotReady, "not ready", Severity::Warning),
         (Wrong::NoPower, "no power", Severity::Problem),
-        (Wrong::Gone, "has no Inverse3", Severity::Problem),
+        (Wrong::Unplugged, "has no Inverse3", Severity::Problem),
     ] {
         service.state().wrong = wrong;
         assert!(says(text, severity), "{wrong:?}: {:#?}", listed());

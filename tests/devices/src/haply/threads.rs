@@ -186,11 +186,11 @@ fn unplugged_and_plugged_in_again_and_another_device_in_its_place_is_refused() {
     let (mut device, heard) = open_listening(&server);
     let named = |text: &str| heard.lock().unwrap().iter().any(|t| t.contains(text));
     assert!(drive(&mut device, &push(), |s| s.is_ok() && feels(&service, 1.0)));
-    service.state().wrong = Wrong::Gone;
+    service.state().wrong = Wrong::Unplugged;
     assert!(drive(&mut device, &push(), |s| *s == Err(DeviceFault::NotConnected)));
     assert!(until(LONG, || named("unplugged or switched off")));
     service.state().wrong = Wrong::Other;
-    assert!(until(LONG, || named("0BAD is there in its place")));
+    assert!(until(LONG, || named("0BAD is in its place")));
     assert!(device.read(1e-3).is_err());
     service.state().wrong = Wrong::Nothing;
     assert!(drive(&mut device, &push(), |s| s.is_ok() && feels(&service, 1.0)));
