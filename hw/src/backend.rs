@@ -11,6 +11,8 @@ pub enum BackendKind {
     Replay,
     /// A device of Force Dimension, or a Novint Falcon.
     ForceDimension,
+    /// An Inverse3 of Haply.
+    Haply,
 }
 
 /// What may follow the name, behind a colon.
@@ -73,6 +75,14 @@ pub const BACKENDS: &[Backend] = &[
         aliases: &["drd"],
         argument: Argument::Optional("NUMBER"),
         help: "an omega, delta or sigma of Force Dimension, or a Falcon: the first one, or the one with this number, from 0",
+        untried: true,
+    },
+    Backend {
+        kind: BackendKind::Haply,
+        name: "haply",
+        aliases: &["inverse3"],
+        argument: Argument::Optional("NUMBER"),
+        help: "an Inverse3 of Haply through its Inverse service: the first one, the one with this number, from 0, or with this id",
         untried: true,
     },
 ];

@@ -1,5 +1,7 @@
 //! Place of a device in the world.
 
+use core::f64::consts::FRAC_1_SQRT_2;
+
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// How a maker lays the axes of a device and of its handle.
@@ -23,6 +25,12 @@ impl Axes {
     pub const FORCE_DIMENSION: Self = Self {
         world_from_device: Quaternion::new(0.5, -0.5, 0.5, 0.5),
         handle_from_tool: Quaternion::new(0.5, 0.5, -0.5, -0.5),
+    };
+    /// Haply: x to the operator's right, y forward, z up (docs.haply.co, "Basis Permutation"). Which way a VerseGrip points in its
+    /// own frame was not found; here its orientation counts from how it was held at the start, which is straight ahead.
+    pub const HAPLY: Self = Self {
+        world_from_device: Quaternion::new(0.0, 0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2),
+        handle_from_tool: Quaternion::new(0.0, 0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2),
     };
 }
 
@@ -79,7 +87,11 @@ mod tests {
     #[test]
     fn right_is_minus_x_up_is_y_away_is_z_and_a_handle_at_rest_points_away() {
         let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
-        let makers = [(Axes::OPEN_HAPTICS, [x, y, -z]), (Axes::FORCE_DIMENSION, [y, z, -x])];
+        let makers = [
+            (Axes::OPEN_HAPTICS, [x, y, -z]),
+            (Axes::FORCE_DIMENSION, [y, z, -x]),
+            (Axes::HAPLY, [x, z, y]),
+        ];
         for (axes, frame) in makers {
             let (tip, needle) = moved(axes, frame);
             assert!((tip - Vector3::new(-1.0, 2.0, 3.0)).norm() < 1e-12, "{axes:?}: {tip}");

@@ -110,6 +110,9 @@ pub struct RunArgs {
     /// The library of the Force Dimension SDK, libdrd.so or libdhd.so [default: STYLET_LIBDRD, else where the system has it]
     #[arg(long, value_name = "PATH")]
     libdrd: Option<PathBuf>,
+    /// The Inverse service of Haply [default: STYLET_HAPLY_URL, else ws://localhost:10001]
+    #[arg(long, value_name = "URL")]
+    haply_url: Option<String>,
     /// On exit write to FILE, as JSON, what each loop cost
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
@@ -127,7 +130,8 @@ impl RunArgs {
         let mut options = self.real_time.options(&self.instance)?;
         options.tissue = self.tissue;
         options.device = self.device.clone();
-        options.libraries = Libraries::or_of_environment(self.libhd.as_deref(), self.libdrd.as_deref());
+        options.libraries =
+            Libraries::or_of_environment(self.libhd.as_deref(), self.libdrd.as_deref(), self.haply_url.as_deref());
         if let Some(folder) = &self.flight_dir {
             options.flight_folder = folder.clone();
         }

@@ -12,3 +12,7 @@ pub mod hold;
 pub mod keeper;
 pub mod loss;
 pub mod open;
+pub mod served;
+pub mod serving;
+pub mod shared;
+pub mod stepped;

@@ -1,13 +1,14 @@
 //! The keeper of a Force Dimension device: connects it, starts its servo thread, watches it, and reconnects it after a loss.
 
 use core::time::Duration;
-use std::sync::{Arc, mpsc};
+use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::Instant;
 
 use crate::beside::keeper::{self, Connect};
+use crate::beside::serving;
+use crate::beside::shared::Shared;
 use crate::device::{DeviceFault, DeviceInfo};
-use crate::drd::exchange::Shared;
 use crate::drd::ffi::Api;
 use crate::drd::servo::Servo;
 use crate::drd::session::{ConnectionError, Description, Session};
@@ -20,8 +21,6 @@ const SILENT_FOR: Duration = Duration::from_millis(250);
 const CALIBRATION_EVERY: Duration = Duration::from_millis(50);
 /// A servo thread that has not ended after this time waits in a call of the SDK.
 const RELEASE_LIMIT: Duration = Duration::from_millis(50);
-const ARMED_LIMIT: Duration = Duration::from_secs(2);
-const FIRST_SAMPLE_LIMIT: Duration = Duration::from_millis(100);
 
 /// What a device can do about a driver that hangs.
 const WITHOUT_WATCHDOG: &str =
@@ -121,13 +120,11 @@ impl Connect for Connector {
             self.servo = servo.join().ok();
         }
         running.session.close();
-        if self.shared.fault.get().is_none() {
-            self.not_connected();
-        }
+        self.shared.released();
     }
 
     fn not_connected(&self) {
-        self.shared.fault.set(Some(DeviceFault::NotConnected));
+        self.shared.not_connected();
     }
 }
 
@@ -168,30 +165,10 @@ impl Connector {
     fn start(&mut self, running: &mut Running, info: &DeviceInfo) -> Result<String, ConnectionError> {
         let mut servo = self.servo.take().ok_or(ConnectionError::NoServo)?;
         servo.begin(running.session.id, info.peak_torque_nm > 0.0);
-        self.shared.serve();
-        let shared = Arc::clone(&self.shared);
-        let (armed, granted) = mpsc::channel();
-        let serve = move || {
-            let outcome = servo.arm();
-            let may_serve = outcome.is_ok();
-            let _ = armed.send(outcome);
-            drop(armed);
-            if may_serve {
-                servo.run(&shared);
-            }
-            servo
-        };
-        let thread = thread::Builder::new().name("dhd-servo".to_owned()).spawn(serve);
-        running.servo = Some(thread.map_err(|_| ConnectionError::NoServo)?);
-        let granted = granted
-            .recv_timeout(ARMED_LIMIT)
-            .map_err(|_| ConnectionError::NoServo)?;
-        let granted = granted.map_err(ConnectionError::NotArmed)?;
-        let begun = Instant::now();
-        while self.shared.fault.get().is_some() && begun.elapsed() < FIRST_SAMPLE_LIMIT {
-            thread::park_timeout(Duration::from_millis(1));
-        }
-        Ok(granted)
+        let started = serving::start("dhd-servo", servo, &self.shared).ok_or(ConnectionError::NoServo)?;
+        running.servo = Some(started.thread);
+        let granted = started.granted.ok_or(ConnectionError::NoServo)?;
+        granted.map_err(ConnectionError::NotArmed)
     }
 }
 

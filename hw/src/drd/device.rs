@@ -1,15 +1,12 @@
-//! A Force Dimension device as a [`Device`]: wait-free ends for the force loop.
+//! A Force Dimension device, opened.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use crate::beside::arm::Arm;
-use crate::beside::ends::{self, ForceLoopEnd};
-use crate::beside::keeper::{self, KeeperThread, Report};
+use crate::beside::keeper::Report;
 use crate::beside::open;
-use crate::device::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
+use crate::beside::served::Served;
 use crate::drd::connector::Connector;
-use crate::drd::exchange::Shared;
 use crate::drd::ffi::Api;
 use crate::drd::servo::Servo;
 use crate::drd::session::{ConnectionError, Description};
@@ -31,28 +28,8 @@ pub struct ForceDimensionConfig {
 /// Why a device could not be opened; the text says what to do.
 pub type OpenError = open::OpenError<ConnectionError>;
 
-/// State of the driver beside the pose.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Readings {
-    /// Servo ticks so far.
-    pub ticks: u64,
-    /// Present fault.
-    pub fault: Option<DeviceFault>,
-    /// The SDK's last error by number, 0 for none.
-    pub error: u32,
-    /// Number of errors so far.
-    pub errors: u64,
-    /// Ticks in which the motors could not give all of the force.
-    pub saturated: u64,
-}
-
 /// A Force Dimension device; see the module [`drd`](crate::drd). Dropping it leaves zero force and a stopped device.
-pub struct ForceDimension {
-    description: Description,
-    shared: Arc<Shared>,
-    end: ForceLoopEnd,
-    _keeper: KeeperThread,
-}
+pub type ForceDimension = Served<Description>;
 
 impl ForceDimension {
     /// Loads the SDK and finds the device. `arm` runs once in each servo thread, before its first tick; `report` receives
@@ -66,51 +43,9 @@ impl ForceDimension {
 
     /// As [`open`](Self::open), with a library that is already loaded.
     pub fn open_with(api: Api, config: ForceDimensionConfig, arm: Arm, report: Report) -> Result<Self, OpenError> {
-        let (end, servo_end) = ends::pair();
-        let shared = Arc::<Shared>::default();
-        let servo = Servo::new(api, config.placement, arm, servo_end, config.servo_hz);
-        let connector = Connector::new(api, config.number, Arc::clone(&shared), servo);
-        let (keeper, opened) = keeper::spawn("force-dimension", connector, report);
-        let description = open::first(&opened)?;
-        Ok(Self {
-            description,
-            shared,
-            end,
-            _keeper: keeper,
+        Self::start("force-dimension", report, |shared, end| {
+            let servo = Servo::new(api, config.placement, arm, end, config.servo_hz);
+            Connector::new(api, config.number, shared, servo)
         })
-    }
-
-    /// Properties of the device at the first connection.
-    pub fn description(&self) -> &Description {
-        &self.description
-    }
-
-    /// State of the driver beside the pose.
-    pub fn readings(&self) -> Readings {
-        readings(&self.shared)
-    }
-}
-
-pub fn readings(shared: &Shared) -> Readings {
-    Readings {
-        ticks: shared.ticks(),
-        fault: shared.fault.get(),
-        error: shared.errors.last(),
-        errors: shared.errors.count(),
-        saturated: shared.saturated(),
-    }
-}
-
-impl Device for ForceDimension {
-    fn info(&self) -> DeviceInfo {
-        self.description.info
-    }
-
-    fn read(&mut self, _dt_s: f64) -> Result<Sample, DeviceFault> {
-        self.end.read(self.shared.fault.get())
-    }
-
-    fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceFault> {
-        self.end.write(&self.description.info, wrench)
     }
 }

@@ -15,7 +15,6 @@ mod connector;
 mod device;
 mod diagnose;
 pub mod errors;
-mod exchange;
 pub mod ffi;
 mod model;
 mod servo;
@@ -23,7 +22,7 @@ mod session;
 mod status;
 mod stepped;
 
-pub use device::{ForceDimension, ForceDimensionConfig, OpenError, Readings};
+pub use device::{ForceDimension, ForceDimensionConfig, OpenError};
 pub use diagnose::{device_count, diagnose, of_device};
 pub use ffi::Api;
 pub use session::{ConnectionError, Description};

@@ -4,20 +4,17 @@
 //! logs nothing. The force goes out in every tick, also when it is zero, because that renews the device's watchdog.
 
 use core::ffi::c_int;
-use core::time::Duration;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::thread;
-use std::time::Instant;
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::beside::arm::{Arm, ArmError};
 use crate::beside::ends::ServoEnd;
 use crate::beside::hold::Hold;
+use crate::beside::serving::{self, Serve};
+use crate::beside::shared::Shared;
 use crate::convert::orientation_from_matrix;
 use crate::device::{DeviceFault, Sample, Wrench};
 use crate::drd::errors::{self, Response};
-use crate::drd::exchange::Shared;
 use crate::drd::ffi::{Api, Id, MOTOR_SATURATED, STATUS_ROOM, TIMEGUARD};
 use crate::drd::session::last_error;
 use crate::drd::status::{Health, health};
@@ -75,32 +72,6 @@ impl Servo {
         }
         (self.id, self.torques) = (id, torques);
         (self.ticks, self.checks_off) = (0, 0);
-    }
-
-    /// Arms the calling thread.
-    pub fn arm(&self) -> Result<String, ArmError> {
-        (self.arm)()
-    }
-
-    /// Ticks until the connector or a lost connection ends it, and leaves zero force.
-    pub fn run(&mut self, shared: &Shared) {
-        let period = Duration::from_secs(1) / self.servo_hz.max(1);
-        let mut due = Instant::now();
-        let ticks = catch_unwind(AssertUnwindSafe(|| {
-            while shared.serves() {
-                self.tick(shared);
-                due += period;
-                // A late tick is not made up for.
-                due = due.max(Instant::now());
-                thread::sleep(due.saturating_duration_since(Instant::now()));
-            }
-        }));
-        if let Err(payload) = ticks {
-            // Dropping the payload could unwind once more.
-            core::mem::forget(payload);
-            self.lose(shared, DeviceFault::Driver);
-        }
-        self.send(&Wrench::zero());
     }
 
     /// One servo tick; in the order of the data.
@@ -234,5 +205,18 @@ impl Servo {
         self.hold.lose(fault);
         shared.fault.set(Some(fault));
         shared.errors.set_lost();
+    }
+}
+
+impl Serve for Servo {
+    fn arm(&self) -> Result<String, ArmError> {
+        (self.arm)()
+    }
+
+    fn run(&mut self, shared: &Shared) {
+        if !serving::at_rate(shared, self.servo_hz, |_| self.tick(shared)) {
+            self.lose(shared, DeviceFault::Driver);
+        }
+        self.send(&Wrench::zero());
     }
 }

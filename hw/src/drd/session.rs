@@ -4,6 +4,7 @@ use core::ffi::{c_int, c_uchar};
 use core::fmt;
 
 use crate::beside::arm::ArmError;
+use crate::beside::served::Described;
 use crate::device::DeviceInfo;
 use crate::drd::errors;
 use crate::drd::ffi::{Api, Id, STATUS_ROOM};
@@ -68,6 +69,12 @@ pub struct Description {
     pub sdk: Option<[i32; 4]>,
     /// After how long the device drops a force by itself, once that is armed.
     pub watchdog_s: Option<f64>,
+}
+
+impl Described for Description {
+    fn info(&self) -> DeviceInfo {
+        self.info
+    }
 }
 
 impl fmt::Display for Description {

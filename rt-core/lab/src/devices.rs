@@ -7,7 +7,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 use stylet_hw::backend::{BACKENDS, Backend, BackendKind, forms_of};
 use stylet_hw::libhd::diagnose::{self as phantom, Surroundings};
-use stylet_hw::{Device, Finding, Severity, SimulatedPhantom, SimulatedPhantomConfig, drd};
+use stylet_hw::{Device, Finding, Severity, SimulatedPhantom, SimulatedPhantomConfig, drd, haply};
 use stylet_runtime::device::Libraries;
 
 /// A driver that does not answer for this long is left alone.
@@ -30,6 +30,9 @@ pub struct DevicesArgs {
     /// The library of the Force Dimension SDK, libdrd.so or libdhd.so [default: STYLET_LIBDRD, else where the system has it]
     #[arg(long, value_name = "PATH")]
     libdrd: Option<PathBuf>,
+    /// The Inverse service of Haply [default: STYLET_HAPLY_URL, else ws://localhost:10001]
+    #[arg(long, value_name = "URL")]
+    haply_url: Option<String>,
 }
 
 /// One back end.
@@ -54,7 +57,8 @@ struct Line {
 
 /// Lists, and prints the list; 0.
 pub fn run(args: &DevicesArgs) -> u8 {
-    let libraries = Libraries::or_of_environment(args.libhd.as_deref(), args.libdrd.as_deref());
+    let libraries =
+        Libraries::or_of_environment(args.libhd.as_deref(), args.libdrd.as_deref(), args.haply_url.as_deref());
     let listed: Vec<_> = BACKENDS
         .iter()
         .map(|b| list(b, Path::new("/"), &libraries, !args.look_only))
@@ -77,6 +81,7 @@ fn list(backend: &Backend, root: &Path, libraries: &Libraries, try_it: bool) -> 
             cure: "host-ui record --out S.mcap, then host-ui export S.mcap --motion FILE".to_owned(),
         }],
         BackendKind::ForceDimension => force_dimension(root, libraries.libdrd.as_deref(), try_it),
+        BackendKind::Haply => inverse3(libraries, try_it),
     };
     // A note is about what another device of the maker needs.
     let usable = findings.iter().all(|f| f.severity != Severity::Problem)
@@ -119,6 +124,23 @@ fn force_dimension(root: &Path, library: Option<&Path>, try_it: bool) -> Vec<Fin
         }));
     }
     findings
+}
+
+/// The service has the device, and nobody else sees it: to look at files and cables only says nothing.
+fn inverse3(libraries: &Libraries, try_it: bool) -> Vec<Finding> {
+    match libraries.inverse_service() {
+        Ok(service) if try_it => within_limit(move || haply::diagnose(&service)),
+        Ok(service) => vec![Finding {
+            severity: Severity::Note,
+            what: format!("the Inverse service at {service} was not asked"),
+            cure: "rt-core devices without --look-only asks it".to_owned(),
+        }],
+        Err(why) => vec![Finding {
+            severity: Severity::Problem,
+            what: why.to_string(),
+            cure: "correct --haply-url, or the variable STYLET_HAPLY_URL".to_owned(),
+        }],
+    }
 }
 
 /// What the trial finds, or that the driver does not answer; its thread is then left alone.
@@ -175,6 +197,7 @@ mod tests {
         Libraries {
             libhd: Some("/nonexistent/libHD.so".into()),
             libdrd: Some("/nonexistent/libdrd.so".into()),
+            haply_url: Some("ws://127.0.0.1:1".into()),
         }
     }
 
@@ -202,5 +225,23 @@ mod tests {
             text.contains("--libdrd") && text.contains("cannot be used now"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn a_service_that_is_not_there_is_said_with_what_to_do_and_is_left_alone_where_only_looks_are_wanted() {
+        let backend = BACKENDS.iter().find(|b| b.kind == BackendKind::Haply).expect("listed");
+        let listed = |libraries: &Libraries, try_it| text(&list(backend, Path::new("/nonexistent"), libraries, try_it));
+        let asked = listed(&nowhere(), true);
+        assert!(
+            asked.contains("missing  no Inverse service answers at ws://127.0.0.1:1"),
+            "{asked}"
+        );
+        assert!(asked.contains("systemctl start haply-inverse-service"), "{asked}");
+        assert!(listed(&nowhere(), false).contains("was not asked"));
+        let misspelt = Libraries {
+            haply_url: Some("localhost".into()),
+            ..nowhere()
+        };
+        assert!(listed(&misspelt, true).contains("STYLET_HAPLY_URL"));
     }
 }

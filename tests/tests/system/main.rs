@@ -2,6 +2,7 @@
 
 mod device_abi;
 mod device_libhd;
+mod device_others;
 mod device_procedure;
 mod dose_cli;
 mod force_insertions;

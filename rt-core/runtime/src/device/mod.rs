@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use stylet_hw::backend::{self, BackendKind, UnknownBackend};
 use stylet_hw::{
-    Arm, ArmError, Axes, Device, ForceDimension, ForceDimensionConfig, Phantom, PhantomConfig, Placement, Report,
-    SimulatedPhantom, SimulatedPhantomConfig, drd, libhd,
+    Arm, ArmError, Axes, Device, ForceDimension, ForceDimensionConfig, Haply, HaplyConfig, Phantom, PhantomConfig,
+    Placement, Report, SimulatedPhantom, SimulatedPhantomConfig, drd, haply, libhd,
 };
 use stylet_shm_schema::ThreadReport;
 use stylet_sim::scene::Scene;
@@ -51,18 +51,20 @@ pub fn help() -> String {
     backend::help()
 }
 
-/// Libraries of makers where they are not where the system has them.
+/// Libraries of makers and addresses of their services, where they are not the usual ones.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Libraries {
     /// OpenHaptics.
     pub libhd: Option<PathBuf>,
     /// The SDK of Force Dimension.
     pub libdrd: Option<PathBuf>,
+    /// The Inverse service of Haply.
+    pub haply_url: Option<String>,
 }
 
 impl Libraries {
-    /// What the command line names, else what the environment does: `STYLET_LIBHD`, `STYLET_LIBDRD`.
-    pub fn or_of_environment(libhd: Option<&Path>, libdrd: Option<&Path>) -> Self {
+    /// What the command line names, else what the environment does: `STYLET_LIBHD`, `STYLET_LIBDRD`, `STYLET_HAPLY_URL`.
+    pub fn or_of_environment(libhd: Option<&Path>, libdrd: Option<&Path>, haply_url: Option<&str>) -> Self {
         let or = |named: Option<&Path>, variable| {
             let from_environment = || std::env::var_os(variable).map(PathBuf::from);
             named.map(Path::to_owned).or_else(from_environment)
@@ -70,7 +72,17 @@ impl Libraries {
         Self {
             libhd: or(libhd, "STYLET_LIBHD"),
             libdrd: or(libdrd, "STYLET_LIBDRD"),
+            haply_url: haply_url
+                .map(str::to_owned)
+                .or_else(|| std::env::var("STYLET_HAPLY_URL").ok()),
         }
+    }
+
+    /// The Inverse service that is named, or the usual one.
+    pub fn inverse_service(&self) -> Result<haply::Service, haply::BadAddress> {
+        self.haply_url
+            .as_deref()
+            .map_or(Ok(haply::Service::default()), str::parse)
     }
 }
 
@@ -83,6 +95,12 @@ pub enum DeviceError {
     /// The device of Force Dimension.
     #[error("{0}\nOr start with --device simulated.")]
     ForceDimension(#[from] drd::OpenError),
+    /// The device of Haply.
+    #[error("{0}\nOr start with --device simulated.")]
+    Haply(#[from] haply::OpenError),
+    /// What `--haply-url` or its variable names.
+    #[error("--haply-url: {0}")]
+    Service(#[from] haply::BadAddress),
     /// What followed the colon is not the number of a device.
     #[error("--device force-dimension:{0}: give the number of a device, from 0; rt-core devices lists them")]
     Number(String),
@@ -138,6 +156,16 @@ pub fn open(
                 arm(force_loop, servo_core),
                 report(),
             )?))
+        }
+        BackendKind::Haply => {
+            let wanted = choice.argument.as_deref().map(str::parse);
+            let config = HaplyConfig {
+                service: libraries.inverse_service()?,
+                wanted: wanted.and_then(Result::ok).unwrap_or_default(),
+                placement: Placement::facing_patient(Axes::HAPLY, start),
+                servo_hz: SERVO_HZ,
+            };
+            Ok(Box::new(Haply::open(config, arm(force_loop, servo_core), report())?))
         }
     }
 }
@@ -197,6 +225,7 @@ mod tests {
             "force-dimension:1".parse(),
             choice(BackendKind::ForceDimension, Some("1"))
         );
+        assert_eq!("haply:049D".parse(), choice(BackendKind::Haply, Some("049D")));
         assert_eq!("replay:a.motion".parse(), choice(BackendKind::Replay, Some("a.motion")));
         for wrong in ["", "phantom:", "Phantom", "simulated:x", "falcon"] {
             assert!(wrong.parse::<DeviceChoice>().is_err(), "{wrong}");

@@ -8,7 +8,8 @@ use stylet_hw::drd::ffi::{self, SIGNATURES};
 use stylet_hw::drd::{Api, ForceDimension, OpenError, diagnose};
 use stylet_hw::{DeviceFault, Severity};
 
-use super::fake::{Fake, api, config, drive, library, library_without};
+use super::fake::{Fake, api, config, library, library_without};
+use crate::driven::drive;
 
 /// The type in Rust that a C type has on 64 bit Linux.
 fn in_rust(c: &str) -> &str {

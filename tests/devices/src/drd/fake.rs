@@ -4,11 +4,8 @@ use fake_drd::{Block, Control};
 use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
 use stylet_hw::drd::{Api, ForceDimension, ForceDimensionConfig};
-use stylet_hw::{Axes, Device, DeviceFault, Placement, Sample, Wrench};
-
-pub const LONG: Duration = Duration::from_secs(10);
+use stylet_hw::{Axes, Placement};
 
 /// The built library.
 pub fn library() -> PathBuf {
@@ -72,29 +69,4 @@ pub fn config() -> ForceDimensionConfig {
         placement: Placement::facing_patient(Axes::FORCE_DIMENSION, Vector3::zeros()),
         servo_hz: 1000,
     }
-}
-
-/// Waits for `ready`; false when it has not come true in time.
-pub fn until(limit: Duration, mut ready: impl FnMut() -> bool) -> bool {
-    let begun = Instant::now();
-    while begun.elapsed() < limit {
-        if ready() {
-            return true;
-        }
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    false
-}
-
-/// Drives `device` as the force loop does, every millisecond, until `ready`; false when it has not come true in time.
-pub fn drive(
-    device: &mut ForceDimension,
-    wrench: &Wrench,
-    mut ready: impl FnMut(&Result<Sample, DeviceFault>) -> bool,
-) -> bool {
-    until(LONG, || {
-        let sample = device.read(1e-3);
-        let _ = device.write(wrench);
-        ready(&sample)
-    })
 }

@@ -1,18 +1,21 @@
 //! Faults drawn at random, one after another: no newton of surprise, and each is named.
 
-use fake_drd::Control;
+use fake_drd::control::put;
 use fake_drd::table::ERRORS;
+use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
-use std::collections::BTreeMap;
+use rand_chacha::rand_core::Rng;
 use std::sync::atomic::Ordering::Relaxed;
+use stylet_hw::drd::Stepped;
 use stylet_hw::drd::errors;
 use stylet_hw::drd::ffi::{off_cause, status};
 use stylet_runtime::rt::watchdog::{SILENT_SAMPLES, device_fault};
 use stylet_shm_schema::Fault;
-use stylet_sim::force::gate::{GateParameters, RAMP_OUT_TICKS};
+use stylet_sim::force::gate::RAMP_OUT_TICKS;
 
-use super::rig::Rig;
+use super::fake::{Fake, api, config};
+use crate::drawn::{Drawn, below, campaign};
+use crate::rig::{Led, Rig};
 
 /// The device drops a force that is not renewed for this long.
 const WATCHDOG_TICKS: usize = 20;
@@ -42,51 +45,50 @@ enum Wrong {
     OldPose,
 }
 
-fn below(random: &mut ChaCha8Rng, count: usize) -> usize {
-    (random.next_u64() % count as u64) as usize
-}
+impl Drawn for Wrong {
+    type Fake = Fake;
 
-fn draw(random: &mut ChaCha8Rng) -> Wrong {
-    const CALLS: [&str; 3] = [
-        "dhdSetForceAndTorqueAndGripperForce",
-        "dhdGetPositionAndOrientationFrame",
-        "dhdGetStatus",
-    ];
-    const PLACES: [usize; 5] = [
-        status::POWER,
-        status::CONNECTED,
-        status::RESET,
-        status::FORCE,
-        status::ERROR,
-    ];
-    let call = CALLS[below(random, CALLS.len())];
-    let code = below(random, ERRORS.len() + 3) as u32;
-    match below(random, 9) {
-        0 => Wrong::Fails(call, code),
-        1 => Wrong::FailsTimes(call, code, 1 + below(random, 50) as u32),
-        2 => Wrong::Unplugged {
-            in_use: below(random, 2) == 0,
-            other: below(random, 2) == 0,
-        },
-        3 => {
-            let place = PLACES[below(random, PLACES.len())];
-            let good = i32::from([status::POWER, status::CONNECTED, status::FORCE].contains(&place));
-            let numbers = [1 - good, -1, 2, random.next_u64() as i32 | 4];
-            Wrong::Status(place, numbers[below(random, numbers.len())])
+    fn draw(random: &mut ChaCha8Rng) -> Self {
+        const CALLS: [&str; 3] = [
+            "dhdSetForceAndTorqueAndGripperForce",
+            "dhdGetPositionAndOrientationFrame",
+            "dhdGetStatus",
+        ];
+        const PLACES: [usize; 5] = [
+            status::POWER,
+            status::CONNECTED,
+            status::RESET,
+            status::FORCE,
+            status::ERROR,
+        ];
+        let call = CALLS[below(random, CALLS.len())];
+        let code = below(random, ERRORS.len() + 3) as u32;
+        match below(random, 9) {
+            0 => Wrong::Fails(call, code),
+            1 => Wrong::FailsTimes(call, code, 1 + below(random, 50) as u32),
+            2 => Wrong::Unplugged {
+                in_use: below(random, 2) == 0,
+                other: below(random, 2) == 0,
+            },
+            3 => {
+                let place = PLACES[below(random, PLACES.len())];
+                let good = i32::from([status::POWER, status::CONNECTED, status::FORCE].contains(&place));
+                let numbers = [1 - good, -1, 2, random.next_u64() as i32 | 4];
+                Wrong::Status(place, numbers[below(random, numbers.len())])
+            }
+            4 => Wrong::TurnsOff {
+                cause: 1 + below(random, 7) as u32,
+                stays: below(random, 2) == 0,
+            },
+            5 => Wrong::BadPose(1 + below(random, 3) as u32),
+            6 => Wrong::Frozen,
+            7 => Wrong::Hangs(SILENT_SAMPLES as usize + 5 + below(random, 400)),
+            _ => Wrong::OldPose,
         }
-        4 => Wrong::TurnsOff {
-            cause: 1 + below(random, 7) as u32,
-            stays: below(random, 2) == 0,
-        },
-        5 => Wrong::BadPose(1 + below(random, 3) as u32),
-        6 => Wrong::Frozen,
-        7 => Wrong::Hangs(SILENT_SAMPLES as usize + 5 + below(random, 400)),
-        _ => Wrong::OldPose,
     }
-}
 
-impl Wrong {
-    fn begin(self, control: &Control) {
+    fn begin(self, fake: &Fake) {
+        let control = fake.control;
         match self {
             Self::Fails(call, code) => control.fail(call, code, u32::MAX),
             Self::FailsTimes(call, code, times) => control.fail(call, code, times),
@@ -103,8 +105,8 @@ impl Wrong {
         }
     }
 
-    /// What changes while the fault lasts.
-    fn go_on(self, tick: usize, control: &Control) {
+    fn go_on(self, tick: usize, fake: &Fake) {
+        let control = fake.control;
         match self {
             Self::Hangs(ticks) if tick == ticks => control.hang.store(0, Relaxed),
             Self::Unplugged { in_use, other } if tick == 600 => {
@@ -116,7 +118,8 @@ impl Wrong {
         }
     }
 
-    fn end(self, control: &Control) {
+    fn end(self, fake: &Fake) {
+        let control = fake.control;
         for (cell, left) in control.fail.iter().zip(&control.fail_times) {
             cell.store(0, Relaxed);
             left.store(0, Relaxed);
@@ -138,7 +141,6 @@ impl Wrong {
         control.force_mode.store(1, Relaxed);
     }
 
-    /// The names that the screen may give it, and the ticks until the motors are without force, at most.
     fn bound(self) -> (Vec<Fault>, usize) {
         let silent = (SILENT_SAMPLES + RAMP_OUT_TICKS) as usize;
         match self {
@@ -172,88 +174,37 @@ impl Wrong {
         }
     }
 
-    /// Ticks for which it stays, at least until it is named: the SDK's rate is known after two seconds.
+    /// The SDK's rate is known after two seconds.
     fn lasts(self) -> usize {
         if matches!(self, Self::Frozen) { 2500 } else { 800 }
     }
-
-    fn kind(self) -> String {
-        let text = format!("{self:?}");
-        text.split(['(', ' ']).next().unwrap_or_default().to_owned()
-    }
 }
 
-/// Ticks until the motors were without force and until the fault was named, at most, for one kind of fault.
-#[derive(Default)]
-struct Worst {
-    count: usize,
-    force_ticks: usize,
-    named_ticks: usize,
-}
+impl Led for Fake {
+    fn at(&self, now_ns: u64) {
+        self.control.now_us.store(now_ns / 1000, Relaxed);
+    }
 
-fn one(rig: &mut Rig, random: &mut ChaCha8Rng, number: usize) -> (Wrong, usize, usize) {
-    let wrong = draw(random);
-    assert!(rig.press(), "{number}: before {wrong:?} the membrane resists");
-    for _ in 0..below(random, 50) {
-        rig.tick();
+    fn hold(&self, depth_m: f64) {
+        // World +z is away from the operator: -x of the device.
+        put(&self.control.tip_m[0], -depth_m);
     }
-    let limit_n = GateParameters::default().max_force_n * (1.0 + 1e-9);
-    let before_n = rig.tick().motors_n;
-    wrong.begin(rig.fake.control);
-    let (names, bound) = wrong.bound();
-    let (mut last_force, mut named) = (0, None);
-    for tick in 1..=wrong.lasts() {
-        wrong.go_on(tick, rig.fake.control);
-        let seen = rig.tick();
-        assert!(
-            seen.motors_n <= limit_n.min(before_n + 0.05),
-            "{number} {wrong:?}: {} N in tick {tick}",
-            seen.motors_n
-        );
-        if seen.motors_n > 0.0 {
-            last_force = tick;
-        }
-        if seen.fault() != Fault::None && named.is_none() {
-            assert!(
-                names.contains(&seen.fault()),
-                "{number} {wrong:?} is called {:?}",
-                seen.fault()
-            );
-            named = Some(tick);
-        }
+
+    fn motors_n(&self) -> f64 {
+        Vector3::from(self.control.motors_n(self.control.now_us.load(Relaxed))).norm()
     }
-    assert!(
-        last_force <= bound,
-        "{number} {wrong:?}: force until tick {last_force}, allowed are {bound}"
-    );
-    let named = named.unwrap_or_else(|| panic!("{number} {wrong:?} is not named"));
-    wrong.end(rig.fake.control);
-    (wrong, last_force, named)
 }
 
 fn faults(seed: u64, count: usize) {
-    let mut rig = Rig::new();
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut table = BTreeMap::<String, Worst>::new();
-    for number in 0..count {
-        let (wrong, force_ticks, named_ticks) = one(&mut rig, &mut random, number);
-        let worst = table.entry(wrong.kind()).or_default();
-        worst.count += 1;
-        worst.force_ticks = worst.force_ticks.max(force_ticks);
-        worst.named_ticks = worst.named_ticks.max(named_ticks);
-    }
+    let runs = |fake: &Fake| {
+        let control = fake.control;
+        Box::new(move || control.hang.load(Relaxed) == 0)
+    };
+    let rig = Rig::over(Fake::new(), |fake| {
+        Box::new(Stepped::open(api(), &config(), runs(fake)).expect("a healthy device"))
+    });
+    let rig = campaign::<Wrong>(rig, seed, count, 9);
     assert_eq!(rig.fake.control.non_finite_forces.load(Relaxed), 0);
-    println!(
-        "{:12} {:>5} {:>22} {:>14}",
-        "fault", "count", "ms until no force", "ms until named"
-    );
-    for (kind, worst) in &table {
-        println!(
-            "{kind:12} {:>5} {:>22} {:>14}",
-            worst.count, worst.force_ticks, worst.named_ticks
-        );
-    }
-    assert_eq!(table.len(), 9, "every kind was drawn");
 }
 
 #[test]

@@ -3,5 +3,4 @@
 mod abi;
 mod fake;
 mod faults;
-mod rig;
 mod threads;

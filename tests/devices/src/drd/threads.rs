@@ -11,7 +11,8 @@ use stylet_heap as heap;
 use stylet_hw::drd::ffi::status;
 use stylet_hw::{ArmError, Device, DeviceFault, ForceDimension, Wrench, conformance};
 
-use super::fake::{Fake, LONG, api, config, drive, until};
+use super::fake::{Fake, api, config};
+use crate::driven::{LONG, drive, until};
 
 fn push() -> Wrench {
     Wrench::from_force(Vector3::y())

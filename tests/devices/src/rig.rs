@@ -1,10 +1,6 @@
-//! The whole haptic loop over a stepped Force Dimension device, against a membrane at z = 0: one thread, one clock.
+//! The whole haptic loop over a stepped device, against a membrane at z = 0: one thread, one clock.
 
-use fake_drd::control::put;
-use nalgebra::Vector3;
-use std::sync::atomic::Ordering::Relaxed;
 use stylet_hw::Device;
-use stylet_hw::drd::Stepped;
 use stylet_runtime::rt::exchange::HapticOrder;
 use stylet_runtime::rt::haptic::HapticLoop;
 use stylet_runtime::rt::haptic_tape::HapticMemory;
@@ -14,16 +10,24 @@ use stylet_shm_schema::{Fault, TickRecord};
 use stylet_sim::force::ForceParameters;
 use stylet_sim::needle::{LayerKind, NeedleParameters};
 
-use super::fake::{Fake, api, config};
-
 const TICK_NS: u64 = 1_000_000;
 /// Where the hand waits, and how deep it presses.
 const OUTSIDE_M: f64 = -0.005;
 const PRESSED_M: f64 = 0.006;
 const SPEED_M_PER_TICK: f64 = 4e-5;
 
-pub struct Rig {
-    pub fake: Fake,
+/// A fake device that a test leads.
+pub trait Led {
+    /// What the fake does by time is at this time.
+    fn at(&self, now_ns: u64);
+    /// The hand holds the tip at this depth along world z.
+    fn hold(&self, depth_m: f64);
+    /// Force of the device's motors, N.
+    fn motors_n(&self) -> f64;
+}
+
+pub struct Rig<F: Led> {
+    pub fake: F,
     haptic: HapticLoop,
     tissue: TissueResponse,
     tissue_ports: TissuePorts,
@@ -46,20 +50,18 @@ impl Seen {
     }
 }
 
-impl Rig {
-    pub fn new() -> Self {
-        let fake = Fake::new();
+impl<F: Led> Rig<F> {
+    /// Over the device that `open` gives for this fake.
+    pub fn over(fake: F, open: impl FnOnce(&F) -> Box<dyn Device>) -> Self {
         let now_ns = 1_000_000_000;
-        fake.control.now_us.store(now_ns / 1000, Relaxed);
-        let control = fake.control;
-        let runs = Box::new(move || control.hang.load(Relaxed) == 0);
-        let device = Stepped::open(api(), &config(), runs).expect("a healthy device");
+        fake.at(now_ns);
+        let device = open(&fake);
         let parameters = (NeedleParameters::default(), ForceParameters::default());
         let memory = HapticMemory::new(&device.info(), parameters, 0);
         let wiring = Wiring::new(Capacities::STEPPED, None, None);
         let mut rig = Self {
             fake,
-            haptic: HapticLoop::new(1, Box::new(device), wiring.haptic, &memory, 1e-3),
+            haptic: HapticLoop::new(1, device, wiring.haptic, &memory, 1e-3),
             tissue: TissueResponse::default(),
             tissue_ports: wiring.tissue,
             bridge: wiring.bridge,
@@ -74,13 +76,12 @@ impl Rig {
     /// The hand holds the tip at this depth.
     fn hold(&mut self, depth_m: f64) {
         self.hand_m = depth_m;
-        // World +z is away from the operator: -x of the device.
-        put(&self.fake.control.tip_m[0], -depth_m);
+        self.fake.hold(depth_m);
     }
 
     pub fn tick(&mut self) -> Seen {
         self.now_ns += TICK_NS;
-        self.fake.control.now_us.store(self.now_ns / 1000, Relaxed);
+        self.fake.at(self.now_ns);
         self.tissue.time_ns = self.now_ns;
         self.tissue_ports.response.write(self.tissue);
         self.haptic.tick(self.now_ns, self.now_ns, 0);
@@ -95,8 +96,10 @@ impl Rig {
         } else if depth_m < -2e-3 {
             self.tissue.contact = 0;
         }
-        let motors_n = Vector3::from(self.fake.control.motors_n(self.now_ns / 1000)).norm();
-        Seen { record, motors_n }
+        Seen {
+            record,
+            motors_n: self.fake.motors_n(),
+        }
     }
 
     fn move_to(&mut self, depth_m: f64) -> Seen {

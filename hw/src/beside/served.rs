@@ -1,0 +1,94 @@
+//! A device behind a servo thread, as the force loop uses it: wait-free ends.
+
+use std::sync::Arc;
+
+use crate::beside::ends::{self, ForceLoopEnd, ServoEnd};
+use crate::beside::keeper::{self, Connect, KeeperThread, Report};
+use crate::beside::open::{self, OpenError};
+use crate::beside::shared::Shared;
+use crate::device::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
+
+/// What is known of a connected device.
+pub trait Described: Send + 'static {
+    /// Limits of the device.
+    fn info(&self) -> DeviceInfo;
+}
+
+/// State of the driver beside the pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Readings {
+    /// Servo ticks so far.
+    pub ticks: u64,
+    /// Present fault.
+    pub fault: Option<DeviceFault>,
+    /// The driver's last error by number, 0 for none.
+    pub error: u32,
+    /// Number of errors so far.
+    pub errors: u64,
+    /// Ticks in which the motors could not give all of the force, where the driver says so.
+    pub saturated: u64,
+}
+
+/// A device that a servo thread serves and a keeper connects. Dropping it leaves zero force and a closed connection.
+pub struct Served<D> {
+    description: D,
+    shared: Arc<Shared>,
+    end: ForceLoopEnd,
+    _keeper: KeeperThread,
+}
+
+impl<D: Described> Served<D> {
+    /// Starts the keeper that `connector` makes, called `name`, and waits for its first result.
+    pub(crate) fn start<C>(
+        name: &str,
+        report: Report,
+        connector: impl FnOnce(Arc<Shared>, ServoEnd) -> C,
+    ) -> Result<Self, OpenError<C::Error>>
+    where
+        C: Connect<Description = D>,
+        C::Error: core::error::Error,
+    {
+        let (end, servo_end) = ends::pair();
+        let shared = Arc::<Shared>::default();
+        let connector = connector(Arc::clone(&shared), servo_end);
+        let (keeper, opened) = keeper::spawn(name, connector, report);
+        let description = open::first(&opened)?;
+        Ok(Self {
+            description,
+            shared,
+            end,
+            _keeper: keeper,
+        })
+    }
+
+    /// Properties of the device at the first connection.
+    pub fn description(&self) -> &D {
+        &self.description
+    }
+
+    /// State of the driver beside the pose.
+    pub fn readings(&self) -> Readings {
+        let shared = &self.shared;
+        Readings {
+            ticks: shared.ticks(),
+            fault: shared.fault.get(),
+            error: shared.errors.last(),
+            errors: shared.errors.count(),
+            saturated: shared.saturated(),
+        }
+    }
+}
+
+impl<D: Described> Device for Served<D> {
+    fn info(&self) -> DeviceInfo {
+        self.description.info()
+    }
+
+    fn read(&mut self, _dt_s: f64) -> Result<Sample, DeviceFault> {
+        self.end.read(self.shared.fault.get())
+    }
+
+    fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceFault> {
+        self.end.write(&self.description.info(), wrench)
+    }
+}

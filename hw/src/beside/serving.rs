@@ -1,0 +1,69 @@
+//! The servo thread of a device that has no thread of its own: started, armed, called at its rate, and ended.
+
+use core::time::Duration;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, mpsc};
+use std::thread::{self, JoinHandle};
+use std::time::Instant;
+
+use crate::beside::arm::ArmError;
+use crate::beside::shared::Shared;
+
+const ARMED_LIMIT: Duration = Duration::from_secs(2);
+const FIRST_SAMPLE_LIMIT: Duration = Duration::from_millis(100);
+
+/// What a servo thread runs.
+pub trait Serve: Send + 'static {
+    /// Arms the calling thread; returns what it was granted.
+    fn arm(&self) -> Result<String, ArmError>;
+    /// Ticks until the keeper or a lost connection ends it, and leaves zero force.
+    fn run(&mut self, shared: &Shared);
+}
+
+/// A servo thread, and what it was granted; it serves only if it was armed.
+pub struct Started<S> {
+    pub thread: JoinHandle<S>,
+    /// `None` where the thread gave no answer.
+    pub granted: Option<Result<String, ArmError>>,
+}
+
+/// Starts the servo thread and waits for its first sample. `None` where no thread starts.
+pub fn start<S: Serve>(name: &str, mut servo: S, shared: &Arc<Shared>) -> Option<Started<S>> {
+    shared.serve();
+    let in_thread = Arc::clone(shared);
+    let (armed, granted) = mpsc::channel();
+    let serve = move || {
+        let outcome = servo.arm();
+        let may_serve = outcome.is_ok();
+        let _ = armed.send(outcome);
+        drop(armed);
+        if may_serve {
+            servo.run(&in_thread);
+        }
+        servo
+    };
+    let thread = thread::Builder::new().name(name.to_owned()).spawn(serve).ok()?;
+    let granted = granted.recv_timeout(ARMED_LIMIT).ok();
+    let begun = Instant::now();
+    while matches!(granted, Some(Ok(_))) && shared.fault.get().is_some() && begun.elapsed() < FIRST_SAMPLE_LIMIT {
+        thread::park_timeout(Duration::from_millis(1));
+    }
+    Some(Started { thread, granted })
+}
+
+/// Calls `tick` with the end of its period until `shared` no longer serves; false when it panicked.
+pub fn at_rate(shared: &Shared, servo_hz: u32, mut tick: impl FnMut(Instant)) -> bool {
+    let period = Duration::from_secs(1) / servo_hz.max(1);
+    let mut due = Instant::now();
+    let ticks = catch_unwind(AssertUnwindSafe(|| {
+        while shared.serves() {
+            due += period;
+            tick(due);
+            // A late tick is not made up for.
+            due = due.max(Instant::now());
+            thread::sleep(due.saturating_duration_since(Instant::now()));
+        }
+    }));
+    // Dropping the payload could unwind once more.
+    ticks.map_err(core::mem::forget).is_ok()
+}

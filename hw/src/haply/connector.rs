@@ -1,0 +1,122 @@
+//! The keeper of an Inverse3: connects it, starts its servo thread, watches it, and connects it again after a loss.
+
+use core::time::Duration;
+use std::sync::Arc;
+use std::thread::{self, JoinHandle};
+
+use crate::beside::keeper::{self, Connect};
+use crate::beside::serving;
+use crate::beside::shared::Shared;
+use crate::haply::servo::{Servo, loss};
+use crate::haply::session::{self, ConnectionError, Description, Wanted};
+use crate::haply::socket::{Service, Socket};
+use crate::haply::wire::Wire;
+
+/// Between two checks of a running device.
+const CHECK_EVERY: Duration = Duration::from_millis(20);
+
+/// Owns the connection; see the module.
+pub struct Connector {
+    service: Service,
+    wanted: Wanted,
+    shared: Arc<Shared>,
+    /// `None` while the servo thread has it.
+    servo: Option<Servo>,
+    /// The device of the first connection, whose limits the force loop uses.
+    known: Option<Description>,
+}
+
+/// A connection, before and while a thread serves it.
+pub enum Connection {
+    Open(Box<Socket>, Option<String>),
+    Served(JoinHandle<Servo>),
+    Given,
+}
+
+type Keeper = keeper::Keeper<Connector>;
+
+impl Connect for Connector {
+    type Session = Connection;
+    type Description = Description;
+    type Error = ConnectionError;
+
+    fn open(&mut self) -> Result<Connection, ConnectionError> {
+        let version = self.service.version();
+        let socket = self.service.connect().map_err(|why| ConnectionError::NoService {
+            address: self.service.to_string(),
+            why: why.to_string(),
+        })?;
+        Ok(Connection::Open(Box::new(socket), version))
+    }
+
+    fn prepare(&mut self, keeper: &mut Keeper, connection: &mut Connection) -> Result<bool, ConnectionError> {
+        let Connection::Open(mut socket, version) = core::mem::replace(connection, Connection::Given) else {
+            return Err(ConnectionError::NoServo);
+        };
+        let opened = session::open(&mut *socket, &self.wanted, self.known.as_ref(), version);
+        let description = match opened {
+            Ok(description) => description,
+            Err(error) => {
+                socket.close();
+                return Err(error);
+            }
+        };
+        let mut servo = self.servo.take().ok_or(ConnectionError::NoServo)?;
+        servo.begin(socket, &description);
+        let started = serving::start("haply-servo", servo, &self.shared).ok_or(ConnectionError::NoServo)?;
+        *connection = Connection::Served(started.thread);
+        let granted = started.granted.ok_or(ConnectionError::NoServo)?;
+        let granted = granted.map_err(ConnectionError::NotArmed)?;
+        keeper.report(&format!("{description}; servo thread: {granted}"));
+        self.known.get_or_insert_with(|| description.clone());
+        keeper.opened(description);
+        Ok(true)
+    }
+
+    fn watch(&mut self, keeper: &mut Keeper, connection: &Connection) -> Option<String> {
+        while !keeper.stopped() {
+            if let Some(code) = self.shared.errors.lost() {
+                return Some(format!("the device is lost: {}", loss::text(code)));
+            }
+            let ended = !matches!(connection, Connection::Served(servo) if !servo.is_finished());
+            if ended {
+                return Some(ConnectionError::NoServo.to_string());
+            }
+            thread::park_timeout(CHECK_EVERY);
+        }
+        None
+    }
+
+    /// Ends the servo thread, which leaves zero force and closes the connection. None of its calls blocks.
+    fn release(&mut self, _keeper: &mut Keeper, connection: Connection) {
+        self.shared.request_release();
+        match connection {
+            Connection::Open(mut socket, _) => socket.close(),
+            Connection::Served(thread) => {
+                self.servo = thread.join().ok();
+                // A thread that could not be armed has not closed it.
+                if let Some(servo) = &mut self.servo {
+                    servo.end_connection();
+                }
+            }
+            Connection::Given => {}
+        }
+        self.shared.released();
+    }
+
+    fn not_connected(&self) {
+        self.shared.not_connected();
+    }
+}
+
+impl Connector {
+    pub fn new(service: Service, wanted: Wanted, shared: Arc<Shared>, servo: Servo) -> Self {
+        Self {
+            service,
+            wanted,
+            shared,
+            servo: Some(servo),
+            known: None,
+        }
+    }
+}

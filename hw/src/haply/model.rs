@@ -1,0 +1,33 @@
+//! Limits of each type of device, which the service does not report.
+
+use crate::device::DeviceInfo;
+
+/// No force, stiffness or encoder step of an Inverse3 was found in public text. The peak is the safety limit that Isaac Lab
+/// (`isaaclab.devices.haply`, `limit_force`) gives to the same device through the same service; half of it for any time, the
+/// stiffness and the step of 10 um are our own choice.
+const MODELS: &[(&str, DeviceInfo)] = &[
+    ("inverse3", model("Haply Inverse3")),
+    ("inverse3x", model("Haply Inverse3x")),
+];
+
+const fn model(name: &'static str) -> DeviceInfo {
+    DeviceInfo {
+        name,
+        peak_force_n: 2.0,
+        continuous_force_n: 1.0,
+        peak_torque_nm: 0.0,
+        max_stiffness_n_per_m: 500.0,
+        position_step_m: 1e-5,
+        simulated: false,
+    }
+}
+
+/// Figures of the type that the service reports; `None` for an unknown one.
+pub fn figures(kind: &str) -> Option<DeviceInfo> {
+    MODELS.iter().find(|(known, _)| *known == kind).map(|(_, info)| *info)
+}
+
+/// Names of all known types, for messages.
+pub fn known_types() -> String {
+    MODELS.iter().map(|(kind, _)| *kind).collect::<Vec<_>>().join(", ")
+}
