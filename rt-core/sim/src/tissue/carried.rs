@@ -1,7 +1,7 @@
 //! A displacement of the whole body that a model has on top of what its own steps do.
 
 use super::field::{add_fields, add_up};
-use super::{ElementField, PackedField};
+use super::{ElementField, LargeStrain, PackedField, parts};
 use crate::scene::{Lattice, Scene};
 use crate::simd::Simd;
 use std::sync::Arc;
@@ -42,6 +42,8 @@ pub enum Carried<'a> {
     Not,
     /// By a field of a coarser body.
     Field(&'a CarriedField),
+    /// By one, and near the tip as far as that has to give way.
+    Unfolded(&'a CarriedField, &'a LargeStrain),
 }
 
 impl Carried<'_> {
@@ -50,14 +52,22 @@ impl Carried<'_> {
         match self {
             Self::Not => [0.0; 3],
             Self::Field(field) => field.at_m(lattice, element),
+            Self::Unfolded(field, near_tip) => {
+                let (field_m, moved) = (field.at_m(lattice, element), near_tip.at(lattice, element));
+                [0, 1, 2].map(|a| field_m[a] + lattice.spacing_m * f64::from(moved[a]))
+            }
         }
     }
 
-    /// No element is displaced farther, m.
-    pub fn largest_m(&self) -> f64 {
+    /// No element is displaced farther, m; the body's elements have that spacing.
+    pub fn largest_m(&self, spacing_m: f64) -> f64 {
         match self {
             Self::Not => 0.0,
             Self::Field(field) => f64::from(field.largest_m),
+            Self::Unfolded(field, near_tip) => {
+                let moved = f64::from(near_tip.farthest()) * 3.0_f64.sqrt();
+                f64::from(field.largest_m) + spacing_m * moved
+            }
         }
     }
 }
@@ -166,38 +176,26 @@ impl CarriedField {
         [x_m, y_m, z_m].map(f64::from)
     }
 
+    fn memory(&self) -> [&[u8]; 3] {
+        self.of_element.each_ref().map(|axis| bytemuck::cast_slice(axis))
+    }
+
     /// Bytes of [`Self::save`].
     pub fn memory_len(&self) -> usize {
-        self.of_element.iter().map(|axis| size_of_val(axis.as_slice())).sum()
+        parts::len(&self.memory())
     }
 
     /// Writes what the next tick needs; nothing where `to` has another length.
     pub fn save(&self, to: &mut [u8]) {
-        if to.len() != self.memory_len() {
-            return;
-        }
-        let mut rest = to;
-        for axis in &self.of_element {
-            let bytes: &[u8] = bytemuck::cast_slice(axis);
-            let (part, left) = rest.split_at_mut(bytes.len());
-            part.copy_from_slice(bytes);
-            rest = left;
-        }
+        parts::save(&self.memory(), to);
     }
 
     /// Takes up what another field of the same body saved; nothing where `from` has another length.
     pub fn load(&mut self, from: &[u8]) {
-        if from.len() != self.memory_len() {
-            return;
+        let mut axes = self.of_element.each_mut().map(|axis| bytemuck::cast_slice_mut(axis));
+        if parts::load(&mut axes, from) {
+            self.spread();
         }
-        let mut rest = from;
-        for axis in &mut self.of_element {
-            let bytes: &mut [u8] = bytemuck::cast_slice_mut(axis);
-            let (part, left) = rest.split_at(bytes.len());
-            bytes.copy_from_slice(part);
-            rest = left;
-        }
-        self.spread();
     }
 }
 

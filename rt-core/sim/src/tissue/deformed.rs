@@ -63,7 +63,7 @@ impl Deformed<'_> {
             let slots = positions_m.iter_mut().zip(vertices);
             match self.carried {
                 Carried::Not => slots.for_each(|(slot, &e)| *slot = place_m(e, self.not_carried(e))),
-                Carried::Field(_) => slots.for_each(|(slot, &e)| *slot = place_m(e, self.displacement(e))),
+                _ => slots.for_each(|(slot, &e)| *slot = place_m(e, self.displacement(e))),
             }
             return;
         }

@@ -36,6 +36,7 @@ mod field;
 mod fold;
 mod large;
 mod model;
+mod parts;
 mod point;
 mod violation;
 
@@ -47,6 +48,7 @@ pub use fem::FemTissue;
 pub use field::{ElementField, PackedField};
 pub(crate) use field::{add_fields, add_up};
 pub use fold::least_corner;
+pub use large::LargeStrain;
 pub use model::{Held, HeldOutcome, REACH, Solve, StepReport, TissueModel};
 pub use point::MaterialPoint;
 pub use violation::largest_violation;

@@ -97,9 +97,11 @@ pub trait TissueModel: Send {
         None
     }
 
-    /// Called after [`displace`](Self::displace) with the smallest volume of a corner around an element, at which the tip is: a model whose
-    /// answer knows no limit corrects it there. Obligations as for `step`.
-    fn unfold(&mut self, _element: u32, _least_corner: f64) {}
+    /// Called after a step, or [`displace`](Self::displace) in place of one, with the smallest volume of a corner around an element, at which the tip is: a model whose
+    /// answer knows no limit corrects it there, until the next step. Whether it has. Obligations as for `step`.
+    fn unfold(&mut self, _element: u32, _least_corner: f64) -> bool {
+        false
+    }
 
     /// Displaces the whole body, on top of what its steps do, until the next call. Nothing in a model that does not know such a
     /// displacement. Obligations as for `step`.

@@ -69,7 +69,7 @@ impl MaterialPoint {
     pub fn position_m(&self, body: &Deformed) -> [f64; 3] {
         match body.carried {
             Carried::Not => self.position_by(body, |element| body.not_carried(element)),
-            Carried::Field(_) => self.position_by(body, |element| body.displacement(element)),
+            _ => self.position_by(body, |element| body.displacement(element)),
         }
     }
 

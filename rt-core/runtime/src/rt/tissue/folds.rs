@@ -8,16 +8,15 @@ impl TissueLoop {
     /// Limits keep ChainMail's cells open; a linear answer, of the body or of what carries it, is looked at.
     pub(super) fn look_for_folds(&mut self) {
         let body = self.world.tissue.deformed();
-        let is_linear = self.world.scene.tissue() == TissueKind::Fem || matches!(body.carried, Carried::Field(_));
+        let is_linear = self.world.scene.tissue() == TissueKind::Fem || !matches!(body.carried, Carried::Not);
         let at_tip = if is_linear { self.element_at_tip() } else { None };
         let Some(element) = at_tip else {
             (self.response.least_corner, self.response.folded_from_m) = (1.0, 0.0);
             return;
         };
         let mut least = least_corner(&body, element);
-        if self.in_by_line {
-            // Off the line the model keeps what it adds up; on it each tick adds up anew.
-            self.world.tissue.unfold(element, least);
+        // Off the line the model keeps what it adds up; on it each tick adds up anew.
+        if self.in_by_line && self.world.tissue.unfold(element, least) {
             least = least_corner(&self.world.tissue.deformed(), element);
         }
         let body = self.world.tissue.deformed();

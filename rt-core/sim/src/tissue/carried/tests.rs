@@ -74,7 +74,7 @@ fn an_affine_field_is_interpolated_exactly_and_what_is_fixed_stays() {
         let off_m = off(found, affine(place_m));
         assert!(off_m <= bound_m, "{cell:?}: {off_m}");
         let size_m = found.iter().map(|c| c * c).sum::<f64>().sqrt();
-        assert!(size_m <= Carried::Field(&field).largest_m() * (1.0 + 1e-6));
+        assert!(size_m <= Carried::Field(&field).largest_m(scene.lattice.spacing_m) * (1.0 + 1e-6));
     }
     assert!(seen[0] > 2000 && seen[1] > 1000, "{seen:?}");
     field.set(Carry {

@@ -2,6 +2,7 @@
 
 use super::model::ChainMail;
 use super::state::TissueState;
+use crate::tissue::parts;
 use bytemuck::{bytes_of, bytes_of_mut, cast_slice, cast_slice_mut};
 
 const PARTS: usize = 18;
@@ -63,30 +64,18 @@ impl TissueState {
         ]
     }
 
+    pub(super) fn memory_len(&self) -> usize {
+        parts::len(&self.memory())
+    }
+
     pub(super) fn save(&self, to: &mut [u8]) {
-        let parts = self.memory();
-        if to.len() != parts.iter().map(|part| part.len()).sum::<usize>() {
-            return;
-        }
-        let mut rest = to;
-        for part in parts {
-            let (here, after) = rest.split_at_mut(part.len());
-            here.copy_from_slice(part);
-            rest = after;
-        }
+        parts::save(&self.memory(), to);
     }
 
     /// Stretches that are not of this body would be followed out of it: such a memory leaves the body at rest.
     pub(super) fn load(&mut self, model: &ChainMail, from: &[u8]) {
-        let parts = self.memory_mut();
-        if from.len() != parts.iter().map(|part| part.len()).sum::<usize>() {
+        if !parts::load(&mut self.memory_mut(), from) {
             return;
-        }
-        let mut rest = from;
-        for part in parts {
-            let (here, after) = rest.split_at(part.len());
-            part.copy_from_slice(here);
-            rest = after;
         }
         let sets = [&self.active, &self.next, &self.moved];
         if !sets.iter().all(|set| set.is_of(&model.rows, model.lattice.dims)) {

@@ -41,7 +41,7 @@ pub use state::TissueState;
 
 use crate::limits::Limits;
 use crate::scene::Scene;
-use crate::tissue::{Carried, CarriedField, Carry, Deformed, Held, StepReport, TissueModel};
+use crate::tissue::{Carried, CarriedField, Carry, Deformed, Held, LargeStrain, StepReport, TissueModel};
 
 /// Runs that have moved by less besides what carries them are not looked at one by one, in elements.
 const SLIGHT: f32 = 0.05;
@@ -55,6 +55,8 @@ pub struct ChainMailTissue {
     pub state: TissueState,
     /// How the body is carried by the loads of needles on lines; none in a scene whose needles have none.
     field: Option<CarriedField>,
+    /// Where such a body would fold near the tip, this opens it; on top of the last step.
+    near_tip: Option<LargeStrain>,
 }
 
 impl ChainMailTissue {
@@ -62,16 +64,19 @@ impl ChainMailTissue {
     pub fn new(scene: &Scene, limits: Limits) -> Self {
         let model = ChainMail::new(scene, limits);
         let state = TissueState::at_rest(&model);
+        let field = scene.body_of_lines().map(|coarse| CarriedField::new(scene, coarse));
         ChainMailTissue {
             model,
             state,
-            field: scene.body_of_lines().map(|coarse| CarriedField::new(scene, coarse)),
+            near_tip: field.as_ref().map(|_| LargeStrain::new(scene)),
+            field,
         }
     }
 
     fn carried(&self) -> Carried<'_> {
-        match &self.field {
-            Some(field) if !field.is_at_rest() => Carried::Field(field),
+        match (&self.field, &self.near_tip) {
+            (Some(field), Some(near_tip)) if near_tip.is_shown() => Carried::Unfolded(field, near_tip),
+            (Some(field), _) if !field.is_at_rest() => Carried::Field(field),
             _ => Carried::Not,
         }
     }
@@ -100,12 +105,17 @@ impl ChainMailTissue {
 
     /// No element is carried farther, in elements.
     fn largest_carried(&self) -> f32 {
-        (self.carried().largest_m() / self.model.lattice.spacing_m) as f32
+        let spacing_m = self.model.lattice.spacing_m;
+        (self.carried().largest_m(spacing_m) / spacing_m) as f32
     }
 }
 
 impl TissueModel for ChainMailTissue {
     fn step(&mut self, held: Option<Held>, dt_s: f64) -> StepReport {
+        // What holds the tip, and what follows from it, knows nothing of large strain.
+        if let Some(near_tip) = &mut self.near_tip {
+            near_tip.hide();
+        }
         let carried = self.carried();
         if matches!(carried, Carried::Not) {
             return step(&self.model, &mut self.state, held, dt_s);
@@ -130,6 +140,17 @@ impl TissueModel for ChainMailTissue {
         }
     }
 
+    fn unfold(&mut self, element: u32, least_corner: f64) -> bool {
+        let (Some(field), Some(near_tip)) = (&self.field, &mut self.near_tip) else {
+            return false;
+        };
+        let body = self.state.deformed(&self.model);
+        let lattice = body.lattice;
+        let carried = |element| field.at_m(lattice, element).map(|m| (m / lattice.spacing_m) as f32);
+        let besides = |element| body.not_carried(element).map(|u| u as f32);
+        near_tip.unfold(lattice, [&carried, &besides], element, least_corner)
+    }
+
     fn deformed(&self) -> Deformed<'_> {
         let body = self.state.deformed(&self.model);
         // A corner lies half an element from its element along each axis; a coarser body's elements have twice the edge at least.
@@ -144,6 +165,9 @@ impl TissueModel for ChainMailTissue {
     fn return_to_rest(&mut self) {
         self.state.return_to_rest(&self.model);
         self.carry(Carry::NOT);
+        if let Some(near_tip) = &mut self.near_tip {
+            near_tip.forget();
+        }
     }
 
     fn set_limits(&mut self, limits: Limits) {
@@ -152,25 +176,34 @@ impl TissueModel for ChainMailTissue {
     }
 
     fn memory_len(&self) -> usize {
-        let state = self.state.memory().iter().map(|part| part.len()).sum::<usize>();
-        state + self.field.as_ref().map_or(0, CarriedField::memory_len)
+        let field = self.field.as_ref().map_or(0, CarriedField::memory_len);
+        let near_tip = self.near_tip.as_ref().map_or(0, LargeStrain::memory_len);
+        self.state.memory_len() + field + near_tip
     }
 
     fn save(&self, to: &mut [u8]) {
-        let field_len = self.field.as_ref().map_or(0, CarriedField::memory_len);
-        let (state, field) = to.split_at_mut(to.len().saturating_sub(field_len));
+        if to.len() != self.memory_len() {
+            return;
+        }
+        let (state, to) = to.split_at_mut(self.state.memory_len());
         self.state.save(state);
-        if let Some(carried) = &self.field {
-            carried.save(field);
+        if let (Some(field), Some(near_tip)) = (&self.field, &self.near_tip) {
+            let (of_field, of_tip) = to.split_at_mut(field.memory_len());
+            field.save(of_field);
+            near_tip.save(of_tip);
         }
     }
 
     fn load(&mut self, from: &[u8]) {
-        let field_len = self.field.as_ref().map_or(0, CarriedField::memory_len);
-        let (state, field) = from.split_at(from.len().saturating_sub(field_len));
+        if from.len() != self.memory_len() {
+            return;
+        }
+        let (state, from) = from.split_at(self.state.memory_len());
         self.state.load(&self.model, state);
-        if let Some(carried) = &mut self.field {
-            carried.load(field);
+        if let (Some(field), Some(near_tip)) = (&mut self.field, &mut self.near_tip) {
+            let (of_field, of_tip) = from.split_at(field.memory_len());
+            field.load(of_field);
+            near_tip.load(of_tip);
         }
     }
 }

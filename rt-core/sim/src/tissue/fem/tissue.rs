@@ -7,8 +7,9 @@ use super::solve::{SolveSettings, TipPatch};
 use super::state::FemState;
 use crate::limits::Limits;
 use crate::scene::Scene;
-use crate::tissue::large::{BEGINS, LargeStrain};
-use crate::tissue::{Carried, Deformed, ElementField, Held, HeldOutcome, PackedField, Solve, StepReport, TissueModel};
+use crate::tissue::{
+    Carried, Deformed, ElementField, Held, HeldOutcome, LargeStrain, PackedField, Solve, StepReport, TissueModel,
+};
 
 /// What surrounds a body: 20 mm of fat of 5 kPa, per surface area (assumed).
 pub const SURROUNDINGS_PA_PER_M: f64 = 5e3 / 20e-3;
@@ -121,14 +122,20 @@ impl<T: Compiled> TissueModel for FemTissue<T> {
         Some(self.displaced(moved))
     }
 
-    fn unfold(&mut self, element: u32, least_corner: f64) {
-        if least_corner < BEGINS {
-            let lattice = self.model.lattice();
-            self.large
-                .correct(lattice, &mut self.state.displacement, element, least_corner);
-        } else {
-            self.large.forget();
+    fn unfold(&mut self, element: u32, least_corner: f64) -> bool {
+        let u = &mut self.state.displacement;
+        let linear = |e: u32| u.each_ref().map(|u| u.get(e as usize).copied().unwrap_or(0.0));
+        let is_corrected = self
+            .large
+            .unfold(self.model.lattice(), [&linear, &|_| [0.0; 3]], element, least_corner);
+        for (element, moved) in self.large.moved() {
+            for (u, moved) in u.iter_mut().zip(moved) {
+                if let Some(u) = u.get_mut(element as usize) {
+                    *u += moved;
+                }
+            }
         }
+        is_corrected
     }
 
     fn may_be_felt(&self, report: &StepReport) -> bool {

@@ -8,6 +8,7 @@
 mod energy;
 mod grid;
 mod kernels;
+mod memory;
 mod precondition;
 mod solve;
 
@@ -22,7 +23,7 @@ const EVALUATIONS: usize = 12;
 /// Lambda over mu at most: that of a Poisson ratio of 0.45. What is nearer to incompressible takes more evaluations than a tick has.
 const FIRMEST: f32 = 9.0;
 /// Smallest volume of a corner of the linear answer at which the window begins to count, and at which it counts in full.
-pub const BEGINS: f64 = 0.6;
+const BEGINS: f64 = 0.6;
 const IN_FULL: f64 = 0.3;
 /// No window.
 const NOWHERE: u32 = u32::MAX;
@@ -37,6 +38,12 @@ pub struct LargeStrain {
     around: u32,
     /// How far centres were from where the linear answer had them, in elements.
     off: Nodes,
+    /// The same less what displaced them besides the linear answer.
+    moved: Nodes,
+    /// How much of that counts, from 0 to 1.
+    part: f32,
+    /// No centre is farther off along an axis.
+    farthest: f32,
     /// Elements at the window's nodes, [`NOWHERE`] where there is none.
     elements: Vec<u32>,
 }
@@ -51,53 +58,117 @@ impl LargeStrain {
         let solver = Solver::new(SIDE);
         LargeStrain {
             off: solve::nodes(&solver.grid),
+            moved: solve::nodes(&solver.grid),
             elements: vec![NOWHERE; solver.grid.len()],
             solver,
             moduli: shear.into_iter().map(|s| (s / first) as f32).collect(),
             around: NOWHERE,
+            part: 0.0,
+            farthest: 0.0,
         }
     }
 
     /// The next window begins at the linear answer.
     pub fn forget(&mut self) {
         if self.around != NOWHERE {
-            self.around = NOWHERE;
+            (self.around, self.part) = (NOWHERE, 0.0);
             self.off.iter_mut().for_each(|axis| axis.fill(0.0));
         }
     }
 
-    /// Moves the centres around `element`, which `u` displaces by the linear answer, in elements; `least` is the smallest volume of a
-    /// corner there. Does not allocate.
-    pub fn correct(&mut self, lattice: &Lattice, u: &mut [Vec<f32>; 3], element: u32, least: f64) {
-        self.follow(lattice, element);
-        self.open(lattice, u, element);
+    /// Nothing is moved until the next call of [`Self::unfold`], which goes on from here all the same.
+    pub fn hide(&mut self) {
+        self.part = 0.0;
+    }
+
+    /// Something is moved.
+    pub fn is_shown(&self) -> bool {
+        self.part > 0.0
+    }
+
+    /// Looks for where the centres around `element` are to be, if the smallest volume of a corner there is too small. `linear` displaces
+    /// elements by the linear answer, `besides` by what a model does on top of it: the rim keeps both. In elements. Whether any is moved.
+    /// Does not allocate.
+    pub fn unfold(
+        &mut self,
+        lattice: &Lattice,
+        [linear, besides]: [&dyn Fn(u32) -> [f32; 3]; 2],
+        element: u32,
+        least_corner: f64,
+    ) -> bool {
+        if least_corner < BEGINS {
+            self.follow(lattice, element);
+            self.open(lattice, [linear, besides], element);
+            self.correct(least_corner);
+        } else {
+            self.forget();
+        }
+        self.is_shown()
+    }
+
+    /// Elements of the window and how far each is moved from where both have it, in elements.
+    pub fn moved(&self) -> impl Iterator<Item = (u32, [f32; 3])> {
+        let nodes = self.elements.iter().enumerate();
+        let is_moved = nodes.filter(|(_, element)| **element != NOWHERE && self.is_shown());
+        is_moved.map(|(n, &element)| (element, self.at_node(n)))
+    }
+
+    /// How far an element is moved from where both have it, in elements.
+    pub fn at(&self, lattice: &Lattice, element: u32) -> [f32; 3] {
+        if !self.is_shown() {
+            return [0.0; 3];
+        }
+        let (middle, cell) = (lattice.cell(self.around), lattice.cell(element));
+        let place = [0, 1, 2].map(|a| (cell[a] + SIDE / 2).wrapping_sub(middle[a]));
+        match place.iter().all(|&c| c < SIDE) {
+            true => self.at_node(self.solver.grid.at(place)),
+            false => [0.0; 3],
+        }
+    }
+
+    /// No element is moved farther along an axis, in elements.
+    pub fn farthest(&self) -> f32 {
+        self.part * self.farthest
+    }
+
+    fn at_node(&self, n: usize) -> [f32; 3] {
+        let moved = |axis: &Vec<f32>| axis.get(n).copied().unwrap_or(0.0);
+        self.moved.each_ref().map(|axis| self.part * moved(axis))
+    }
+
+    fn correct(&mut self, least_corner: f64) {
         let solver = &mut self.solver;
         solver.begin();
         for c in 0..3 {
             for (n, now) in solver.now[c].iter_mut().enumerate() {
-                *now = solver.linear[c][n] + solver.free[n] * self.off[c][n];
+                let besides = if solver.free[n] > 0.0 {
+                    self.off[c][n]
+                } else {
+                    solver.besides[c][n]
+                };
+                *now = solver.linear[c][n] + besides;
             }
         }
         solver.meet();
         solver.minimise(EVALUATIONS);
-        let mut is_finite = true;
+        self.farthest = 0.0;
         for c in 0..3 {
             for (n, off) in self.off[c].iter_mut().enumerate() {
                 *off = solver.free[n] * (solver.now[c][n] - solver.linear[c][n]);
-                is_finite &= off.is_finite();
+                let moved = *off - solver.free[n] * solver.besides[c][n];
+                self.moved[c][n] = moved;
+                // What is no number stays.
+                self.farthest = if moved.abs() <= self.farthest {
+                    self.farthest
+                } else {
+                    moved.abs()
+                };
             }
         }
-        if !is_finite {
+        if !self.farthest.is_finite() {
             return self.forget();
         }
-        let part = ((BEGINS - least) / (BEGINS - IN_FULL)).clamp(0.0, 1.0) as f32;
-        for (c, u) in u.iter_mut().enumerate() {
-            for (off, &element) in self.off[c].iter().zip(&self.elements) {
-                if let Some(u) = u.get_mut(element as usize) {
-                    *u += part * off;
-                }
-            }
-        }
+        self.part = ((BEGINS - least_corner) / (BEGINS - IN_FULL)).clamp(0.0, 1.0) as f32;
     }
 
     /// The window goes along with the tip: what is known of a centre stays with it.
@@ -123,13 +194,14 @@ impl LargeStrain {
         self.around = element;
     }
 
-    /// Takes the linear answer and the material around an element.
-    fn open(&mut self, lattice: &Lattice, u: &[Vec<f32>; 3], element: u32) {
+    /// Takes both and the material around an element.
+    fn open(&mut self, lattice: &Lattice, [of_linear, of_besides]: [&dyn Fn(u32) -> [f32; 3]; 2], element: u32) {
         let Solver {
             grid,
             cells,
             free,
             linear,
+            besides,
             before: shear,
             ..
         } = &mut self.solver;
@@ -139,8 +211,10 @@ impl LargeStrain {
             let cell = [0, 1, 2].map(|a| middle[a] as i64 + place[a] as i64 - (SIDE / 2) as i64);
             let (at, there) = (grid.at(place), lattice.element_at(cell));
             self.elements[at] = there.unwrap_or(NOWHERE);
-            for (linear, u) in linear.iter_mut().zip(u) {
-                linear[at] = there.and_then(|e| u.get(e as usize)).copied().unwrap_or(0.0);
+            for (to, of) in [(&mut *linear, of_linear), (&mut *besides, of_besides)] {
+                for (axis, u) in to.iter_mut().zip(there.map_or([0.0; 3], of)) {
+                    axis[at] = u;
+                }
             }
             let structure = there.map(|e| usize::from(lattice.structure(e)));
             shear[at] = structure.map_or(0.0, |s| self.moduli.get(s).copied().unwrap_or(0.0));
@@ -168,39 +242,6 @@ impl LargeStrain {
         grid.places()
             .filter(is_rim)
             .for_each(|place| free[grid.at(place)] = 0.0);
-    }
-
-    /// Bytes of [`Self::save`].
-    pub fn memory_len(&self) -> usize {
-        size_of_val(&self.around) + self.off.iter().map(|axis| size_of_val(axis.as_slice())).sum::<usize>()
-    }
-
-    /// Writes what the next tick needs; nothing where `to` has another length.
-    pub fn save(&self, to: &mut [u8]) {
-        if to.len() == self.memory_len() {
-            let (around, mut rest) = to.split_at_mut(size_of_val(&self.around));
-            around.copy_from_slice(bytemuck::bytes_of(&self.around));
-            for axis in &self.off {
-                let bytes: &[u8] = bytemuck::cast_slice(axis);
-                let (here, after) = rest.split_at_mut(bytes.len());
-                here.copy_from_slice(bytes);
-                rest = after;
-            }
-        }
-    }
-
-    /// Takes up what another window of the same body saved; nothing where `from` has another length.
-    pub fn load(&mut self, from: &[u8]) {
-        if from.len() == self.memory_len() {
-            let (around, mut rest) = from.split_at(size_of_val(&self.around));
-            bytemuck::bytes_of_mut(&mut self.around).copy_from_slice(around);
-            for axis in &mut self.off {
-                let bytes: &mut [u8] = bytemuck::cast_slice_mut(axis);
-                let (here, after) = rest.split_at(bytes.len());
-                bytes.copy_from_slice(here);
-                rest = after;
-            }
-        }
     }
 }
 

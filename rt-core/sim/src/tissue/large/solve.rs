@@ -12,6 +12,8 @@ const FARTHEST: f32 = 0.3;
 /// A step is too long if it ends on a slope up that is that part of the one down, or if the gradient's square has grown so.
 const OVERSHOT: f32 = 0.7;
 const GREW: f32 = 4.0;
+/// A window rests where the gradient is that part of the load: it is within about a thousandth of an element then.
+const RESTS: f32 = 5e-4;
 
 #[derive(Clone, Debug)]
 pub(super) struct Pair {
@@ -29,10 +31,13 @@ pub(super) struct Solver {
     pub free: Vec<f32>,
     laplacian: Laplacian,
     simd: Simd,
-    /// Where the linear answer has the nodes, and where they are; in elements.
+    /// Where the linear answer has the nodes, what displaces them besides, and where they are; in elements.
     pub linear: Nodes,
+    pub besides: Nodes,
     pub now: Nodes,
     load: Nodes,
+    /// Of the load.
+    length: f32,
     /// The load over its length.
     along: Nodes,
     gradient: Nodes,
@@ -75,8 +80,10 @@ impl Solver {
             laplacian: Laplacian::new(&grid),
             simd: Simd::detect(),
             linear: zero(),
+            besides: zero(),
             now: zero(),
             load: zero(),
+            length: 0.0,
             along: zero(),
             gradient: zero(),
             before: zero(),
@@ -106,10 +113,11 @@ impl Solver {
         self.used = 0;
         linear(self.simd, &self.grid, &self.cells, &self.linear, &mut self.load);
         mask(self.simd, &mut self.load, &self.free);
-        let length = dot(self.simd, &self.load, &self.load).sqrt();
+        self.length = dot(self.simd, &self.load, &self.load).sqrt();
+        let length = self.length.max(f32::MIN_POSITIVE);
         for (along, load) in self.along.iter_mut().zip(&self.load) {
             for (along, load) in along.iter_mut().zip(load) {
-                *along = load / length.max(f32::MIN_POSITIVE);
+                *along = load / length;
             }
         }
         for (answer, along) in self.answer.iter_mut().zip(&self.along) {
@@ -137,14 +145,14 @@ impl Solver {
         dot(self.simd, &self.gradient, &self.gradient)
     }
 
-    /// That many evaluations of the gradient; ends where it was smallest.
+    /// That many evaluations of the gradient, or as many as it takes until the window rests; ends where the gradient was smallest.
     pub fn minimise(&mut self, evaluations: usize) {
         let mut smallest = self.evaluate();
         keep(&self.now, &mut self.best);
         let mut square = smallest;
+        let rests = (RESTS * self.length).powi(2);
         for _ in 1..evaluations {
-            let is_down = self.is_trial || self.set_out();
-            if !is_down {
+            if smallest <= rests || !(self.is_trial || self.set_out()) {
                 break;
             }
             let there = self.evaluate();

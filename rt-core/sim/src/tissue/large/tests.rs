@@ -67,12 +67,18 @@ impl Pushed {
     fn corrected(&self, large: &mut LargeStrain, by_mm: f32) -> [Vec<f32>; 3] {
         let mut u = self.linear(by_mm);
         let least = self.least(&u);
-        if least < BEGINS {
-            large.correct(&self.scene.body, &mut u, self.element, least);
-        } else {
-            large.forget();
-        }
+        self.unfold(large, &mut u, self.element, least);
         u
+    }
+
+    fn unfold(&self, large: &mut LargeStrain, u: &mut [Vec<f32>; 3], element: u32, least: f64) {
+        let linear = |e: u32| u.each_ref().map(|u| u[e as usize]);
+        large.unfold(&self.scene.body, [&linear, &|_| [0.0; 3]], element, least);
+        for (element, moved) in large.moved() {
+            for (u, moved) in u.iter_mut().zip(moved) {
+                u[element as usize] += moved;
+            }
+        }
     }
 }
 
@@ -127,7 +133,7 @@ fn nothing_changes_where_no_corner_is_small_and_next_to_nothing_where_strain_is(
         large.forget();
         for _ in 0..20 {
             u = pushed.linear(by_mm);
-            large.correct(&pushed.scene.body, &mut u, pushed.element, IN_FULL);
+            pushed.unfold(&mut large, &mut u, pushed.element, IN_FULL);
         }
         off.push(apart(&u, &pushed.linear(by_mm)) / (by_mm * 0.73));
     }
@@ -148,13 +154,12 @@ fn what_is_saved_goes_on_with_the_same_bits() {
     let mut other = LargeStrain::new(&pushed.scene);
     other.load(&bytes);
     let calls = stylet_heap::calls_of_this_thread();
-    let lattice = &pushed.scene.body;
     let mut u = pushed.linear(7.1);
     let begun = stylet_heap::calls_of_this_thread();
-    large.correct(lattice, &mut u, pushed.element, 0.2);
+    pushed.unfold(&mut large, &mut u, pushed.element, 0.2);
     assert_eq!(stylet_heap::calls_of_this_thread(), begun, "allocates");
     let mut again = pushed.linear(7.1);
-    other.correct(lattice, &mut again, pushed.element, 0.2);
+    pushed.unfold(&mut other, &mut again, pushed.element, 0.2);
     assert!(calls <= begun && u == again);
     assert!(
         pushed.corrected(&mut LargeStrain::new(&pushed.scene), 7.1) != u,
@@ -172,12 +177,12 @@ fn a_window_that_moves_on_carries_its_answer_along() {
     let mut settled = pushed.linear(by_mm);
     for _ in 0..10 {
         settled = pushed.linear(by_mm);
-        large.correct(&pushed.scene.body, &mut settled, pushed.element, least);
+        pushed.unfold(&mut large, &mut settled, pushed.element, least);
     }
     let [i, j, k] = pushed.scene.body.cell(pushed.element);
     let next = pushed.scene.body.element_of_cell(i, j, k + 1).expect("tissue");
     let mut moved = pushed.linear(by_mm);
-    large.correct(&pushed.scene.body, &mut moved, next, least);
+    pushed.unfold(&mut large, &mut moved, next, least);
     let jump = apart(&moved, &settled);
     println!("{jump} elements");
     // As far as a needle at 70 mm/s moves it in a tick.
