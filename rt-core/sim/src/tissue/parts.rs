@@ -20,7 +20,7 @@ pub(super) fn save(parts: &[&[u8]], to: &mut [u8]) {
 
 /// Takes them up; nothing where `from` has another length, and then false.
 pub(super) fn load(parts: &mut [&mut [u8]], from: &[u8]) -> bool {
-    if from.len() != parts.iter().map(|part| part.len()).sum() {
+    if from.len() != parts.iter().map(|part| part.len()).sum::<usize>() {
         return false;
     }
     let mut rest = from;
