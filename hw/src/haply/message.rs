@@ -264,7 +264,7 @@ mod tests {
         for wrong in [
             "",
             "{",
-            "[]",
+            "[1]",
             "NaN",
             r#"{"inverse3": 3}"#,
             r#"{"inverse3": [{"state": {}}]}"#,

@@ -16,6 +16,9 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 /// The type is `repr(C)` and consists of atomics of 4 and 8 bytes, and of arrays of them.
 // SYNC: every value of a block stands for itself, so each access is relaxed; its partner is the other side's access of the same field.
 pub unsafe trait Block: Sized + Sync + 'static {
+    /// Name of the function by which the library gives its block: another one for each fake, so that one test may have several.
+    const EXPORT: &str;
+
     /// A block of zeros that lives until the process ends.
     fn in_memory() -> &'static Self {
         let memory = memmap2::MmapMut::map_anon(size_of::<Self>()).expect("memory for the block");
@@ -86,7 +89,7 @@ pub fn block_of<T: Block>(path: &Path) -> &'static T {
     // SAFETY: the function has this type, and its block is never freed.
     let block = unsafe {
         let get = library
-            .get::<extern "C" fn() -> *const T>(b"fake_control")
+            .get::<extern "C" fn() -> *const T>(T::EXPORT.as_bytes())
             .expect("exported");
         &*get()
     };

@@ -22,7 +22,7 @@ thread_local! {
 
 /// The block of this library.
 #[unsafe(no_mangle)]
-extern "C" fn fake_control() -> *const Control {
+extern "C" fn fake_drd_control() -> *const Control {
     control()
 }
 

@@ -25,7 +25,7 @@ pub struct ErrorInfo {
 
 /// The block of this library.
 #[unsafe(no_mangle)]
-extern "C" fn fake_control() -> *const Control {
+extern "C" fn fake_hd_control() -> *const Control {
     control()
 }
 

@@ -93,7 +93,9 @@ pub struct Control {
 }
 
 // SAFETY: atomics of 4 and 8 bytes, and arrays of them.
-unsafe impl Block for Control {}
+unsafe impl Block for Control {
+    const EXPORT: &str = "fake_hd_control";
+}
 
 impl Control {
     /// The next `times` calls of `function` fail.
