@@ -98,7 +98,7 @@ pub trait TissueModel: Send {
     }
 
     /// Called after a step, or [`displace`](Self::displace) in place of one, with the smallest volume of a corner around an element, at which the tip is: a model whose
-    /// answer knows no limit corrects it there, until the next step. Whether it has. Obligations as for `step`.
+    /// answer knows no limit corrects it there, until the next step; what is held may be elsewhere until then. Whether it has. Obligations as for `step`.
     fn unfold(&mut self, _element: u32, _least_corner: f64) -> bool {
         false
     }

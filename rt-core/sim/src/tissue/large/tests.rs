@@ -189,6 +189,17 @@ fn a_window_that_moves_on_carries_its_answer_along() {
     assert!(jump < 0.25, "{jump}");
 }
 
+/// The hand rests: the window goes on in every tick until it rests as well.
+#[test]
+fn a_window_under_the_same_loads_goes_on_until_it_rests() {
+    let pushed = Pushed::new(12);
+    let mut large = LargeStrain::new(&pushed.scene);
+    let answers: Vec<_> = (0..60).map(|_| pushed.corrected(&mut large, 9.0)).collect();
+    let (first, last) = (apart(&answers[0], &answers[59]), apart(&answers[58], &answers[59]));
+    println!("{first} elements in 60 ticks, {last} in the last");
+    assert!(first > 0.05 && last < 1e-3, "{first}, {last}");
+}
+
 fn random(solver: &Solver, size: f32) -> Nodes {
     let mut random = crate::scene::test_bodies::Random(3);
     std::array::from_fn(|_| (0..solver.grid.len()).map(|_| size * random.signed() as f32).collect())

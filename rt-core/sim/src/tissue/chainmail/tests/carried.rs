@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::scene::{Lattice, Scene, TissueKind};
-use crate::tissue::{Carry, ElementField, MaterialPoint, PackedField, TissueModel};
+use crate::tissue::{Carry, ElementField, MaterialPoint, PackedField, TissueModel, least_corner};
 
 fn tissue() -> (Scene, ChainMailTissue) {
     let scene = Scene::builtin("paper").unwrap();
@@ -94,6 +94,64 @@ fn how_a_body_is_carried_is_part_of_its_memory() {
     let (a, b) = (tissue.deformed(), other.deformed());
     assert!((0..scene.lattice.element_count() as u32).all(|e| a.displacement(e) == b.displacement(e)));
     assert_ne!(a.displacement(0), [0.0; 3]);
+}
+
+/// A newton squeezes the body along z, more and more towards the middle.
+#[test]
+fn a_body_that_is_carried_too_far_gives_way_until_the_next_step_and_remembers_how() {
+    let (scene, mut tissue) = tissue();
+    let coarse = scene.body_of_lines().expect("has lines");
+    let element = scene.lattice.element_of_cell(53, 31, 80).unwrap();
+    let middle_m = scene.lattice.rest_m(element);
+    let mut by = ElementField::zeros(coarse.element_count());
+    for n in 0..coarse.element_count() as u32 {
+        let square = coarse
+            .rest_m(n)
+            .iter()
+            .zip(middle_m)
+            .map(|(a, b)| (a - b).powi(2))
+            .sum::<f64>();
+        by.0[2][n as usize] = (9e-3 * (-square / 6e-3_f64.powi(2)).exp()) as f32;
+    }
+    let mut column = PackedField::zeros(coarse.element_count());
+    column.pack(&by);
+    tissue.carry(Carry {
+        columns: &[column],
+        loads_n: &[1.0],
+        ..Carry::NOT
+    });
+    tissue.step(None, 5e-3);
+    let least = least_corner(&tissue.deformed(), element);
+    assert!(least < 0.3, "{least}");
+    let places = |tissue: &ChainMailTissue| {
+        let body = tissue.deformed();
+        let all = (0..scene.lattice.element_count() as u32).map(|e| body.displacement(e).map(f64::to_bits));
+        all.collect::<Vec<_>>()
+    };
+    let carried = places(&tissue);
+    let calls = stylet_heap::calls_of_this_thread();
+    for _ in 0..10 {
+        assert!(tissue.unfold(element, least));
+    }
+    assert_eq!(stylet_heap::calls_of_this_thread(), calls, "allocates");
+    let opened = least_corner(&tissue.deformed(), element);
+    println!("{least} to {opened}");
+    assert!(opened > least + 0.1, "{least} to {opened}");
+    let body = tissue.deformed();
+    let is_found = |e: u32| MaterialPoint::locate(&body, body.position_m(e), None).is_some();
+    assert!(is_found(element) && is_found(element + 1));
+    let mut memory = vec![0; tissue.memory_len()];
+    tissue.save(&mut memory);
+    let (_, mut other) = self::tissue();
+    other.load(&memory);
+    assert!(places(&tissue) == places(&other));
+    for tissue in [&mut tissue, &mut other] {
+        tissue.unfold(element, least);
+    }
+    assert!(places(&tissue) == places(&other) && places(&tissue) != carried);
+    // What holds the tip in the next step knows nothing of it.
+    tissue.step(None, 0.0);
+    assert!(places(&tissue) == carried);
 }
 
 #[test]
