@@ -6,10 +6,12 @@ use crate::twin::{Twin, TwinSettings, default_forces};
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::line::{HandLine, StationSettings};
 use stylet_sim::scene::{SceneSource, TissueKind};
-use stylet_sim::tissue::{Carry, ChainMailTissue, Held, MaterialPoint, TissueModel};
+use stylet_sim::tissue::{Carry, ChainMailTissue, Held, MaterialPoint, TissueModel, least_corner};
 
 /// Steps of one tick at most, each as many passes as what ships has for a tick.
 const MOST_STEPS: u32 = 20;
+/// Ticks' worth of large strain near the tip at most: it rests by then.
+const MOST_CALLS: usize = 60;
 /// The finest tolerance that limits are met to, in elements.
 const FINEST: f64 = 1e-4;
 /// Ticks that what ships may be late by, and is compared at.
@@ -91,7 +93,7 @@ impl OwnTwin {
     }
 }
 
-/// Steps until nothing is left to move; the first recovers by the period.
+/// Steps until nothing is left to move, and large strain near the tip until it rests; the first recovers by the period.
 fn settle(tissue: &mut ChainMailTissue, line: &Twin, held: Option<Held>, period_s: f64) -> u32 {
     let axis = line.hand.line().axes[0];
     tissue.carry(Carry {
@@ -100,13 +102,20 @@ fn settle(tissue: &mut ChainMailTissue, line: &Twin, held: Option<Held>, period_
         whole_m: axis.map(|c| c * line.hand.whole_m()),
         fields: &[],
     });
-    for step in 0..MOST_STEPS {
-        let report = tissue.step(held, if step == 0 { period_s } else { 0.0 });
-        if report.converged && report.passes == 0 {
-            return step;
+    let mut is_left = |step: &u32| {
+        let report = tissue.step(held, if *step == 0 { period_s } else { 0.0 });
+        !report.converged || report.passes > 0
+    };
+    let steps = (0..MOST_STEPS).take_while(&mut is_left).count() as u32;
+    if let Some(Held { element, .. }) = held {
+        let least = least_corner(&tissue.deformed(), element);
+        for _ in 0..MOST_CALLS {
+            if !tissue.unfold(element, least) {
+                break;
+            }
         }
     }
-    MOST_STEPS
+    steps
 }
 
 /// As the tissue loop holds it: the material at the tip where the line has it.

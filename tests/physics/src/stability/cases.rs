@@ -16,7 +16,7 @@ pub const SHORT: [(u32, Kind, &str); 4] = [
     (
         3,
         Kind::Fem,
-        "small strain has no limit for a cell: when the tip moves by more than an element or two in a body this small, cells beside it fold; on a needle line tissue near the tip is solved for large strain (ADR 20), held without a line as here it is not; live, the state, the banner *Tissue folded* and `result.json` say from which displacement on",
+        "small strain has no limit for a cell: when the tip moves by more than an element or two in a body this small, cells beside it fold; on a needle line tissue near the tip is solved for large strain (ADR 20), in ChainMail as well, held without a line as here it is not; live, the state, the banner *Tissue folded* and `result.json` say from which displacement on",
     ),
     (
         5,

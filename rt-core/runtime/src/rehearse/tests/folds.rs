@@ -187,6 +187,18 @@ fn no_cell_folds(scene: &str, kind: TissueKind, run: &NeedleRun, rounds: usize) 
         assert_eq!(linear.peak_n, large.peak_n);
         assert!(least(&large.corners) > -1e-3 && large.around > -1e-3);
         assert!(large.widest_m < 2.0 * linear.widest_m);
+        // In each tick in which it counts in full, whether loads have changed or the hand rests.
+        let pairs = || linear.corners.iter().zip(&large.corners);
+        assert!(pairs().all(|(linear, large)| *linear > 0.1 || large > linear));
+        let above = |of: &Insertion| -> f64 {
+            let times = of.times_us.iter().zip(&linear.corners);
+            times.filter(|(_, corner)| **corner >= 0.6).map(|(us, _)| us).sum()
+        };
+        let count = linear.corners.iter().filter(|corner| **corner >= 0.6).count();
+        println!(
+            "{count} ticks with no corner under 0.6: {:.3} of before",
+            above(&large) / above(&linear)
+        );
     }
 }
 
@@ -194,6 +206,23 @@ fn no_cell_folds(scene: &str, kind: TissueKind, run: &NeedleRun, rounds: usize) 
 fn no_cell_folds_beside_a_tip_on_a_line() {
     no_cell_folds("paper", TissueKind::Fem, &needle(), 1);
     no_cell_folds("paper", TissueKind::ChainMail, &needle(), 1);
+}
+
+/// The window is part of a rehearsal, and no force and no seed knows of it.
+#[test]
+fn seeds_and_forces_of_a_rehearsal_are_those_of_the_body_that_is_not_corrected() {
+    let (mut stage, run, stop) = (stage(), needle(), AtomicBool::new(false));
+    let [linear, large] = [false, true].map(|is_large| {
+        let world = stage.world.as_mut().expect("given back");
+        let tissue = tissue_of(world);
+        world.tissue = if is_large { tissue } else { Box::new(Linear(tissue)) };
+        stage
+            .rehearse(&run, &ParameterSet::default(), &stop)
+            .expect("goes through")
+    });
+    assert_eq!((&linear.seeds, linear.peak_force_n), (&large.seeds, large.peak_force_n));
+    assert_eq!(linear.dropped_after_s, large.dropped_after_s);
+    assert_ne!(linear.target_shift_m, large.target_shift_m);
 }
 
 /// Into the gland of `pelvis`, beside its middle.
