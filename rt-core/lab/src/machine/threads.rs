@@ -2,6 +2,7 @@
 
 use super::{Machine, cores};
 use std::collections::BTreeSet;
+use std::io;
 
 /// A process.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -57,11 +58,11 @@ impl Machine {
         rest.split_whitespace().nth(19)?.parse().ok()
     }
 
-    /// Lets a thread run on these cores alone; the error is for people.
-    pub fn allow_cores(&self, path: &str, list: &str) -> Result<(), String> {
-        let thread = thread_of(path).ok_or_else(|| format!("/{path} is no thread's"))?;
+    /// Lets a thread run on these cores alone.
+    pub fn allow_cores(&self, path: &str, list: &str) -> io::Result<()> {
+        let thread = thread_of(path).ok_or(io::ErrorKind::NotFound)?;
         if !self.is_this() {
-            return Err("the threads of another machine cannot be moved".to_owned());
+            return Err(io::Error::other("the threads of another machine cannot be moved"));
         }
         // SAFETY: all zeros is an empty set of cores.
         let mut set: libc::cpu_set_t = unsafe { std::mem::zeroed() };
@@ -73,7 +74,7 @@ impl Machine {
         // SAFETY: `set` is valid for reads of its size.
         match unsafe { libc::sched_setaffinity(thread, size_of::<libc::cpu_set_t>(), &set) } {
             0 => Ok(()),
-            _ => Err(std::io::Error::last_os_error().to_string()),
+            _ => Err(io::Error::last_os_error()),
         }
     }
 }

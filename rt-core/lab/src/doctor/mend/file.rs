@@ -168,7 +168,7 @@ impl Changes {
 
 fn put(machine: &Machine, path: &str, value: &str) -> Result<(), String> {
     if machine.allowed_cores(path).is_some() {
-        machine.allow_cores(path, value)?;
+        machine.allow_cores(path, value).map_err(|e| e.to_string())?;
     } else {
         std::fs::write(machine.path(path), value).map_err(|e| e.to_string())?;
     }

@@ -64,7 +64,7 @@ fn rate_terms_that_are_off_leave_every_bit_as_it_was() {
     assert_eq!(hash, BITS, "{hash:#x}");
 }
 
-/// A scratch was made anew in each tick, of 17 KB of zeros. What another line has left in one must not be read.
+/// A scratch was made anew in each tick, of 17 KB of zeros. What another line has left in one is never read.
 #[test]
 fn a_scratch_that_another_line_has_used_changes_no_bit() {
     let settings = LineSettings::default();
