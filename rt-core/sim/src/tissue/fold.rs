@@ -6,7 +6,7 @@
 use super::Deformed;
 
 /// Elements to each side that are looked at: the patch that a tip presses, and what lies before it.
-const REACH: usize = 4;
+pub(super) const REACH: usize = 4;
 const WIDTH: usize = 2 * REACH + 1;
 
 type Point = [f32; 3];
@@ -16,7 +16,25 @@ type Places = [[[Point; WIDTH]; WIDTH]; WIDTH];
 /// Smallest volume that three links of an element span, one along each axis, over that at rest: over all corners between elements
 /// up to four from `element`. At rest it is 1; at 0 and below a cell is folded. 1 where no three links meet. Does not allocate.
 pub fn least_corner(body: &Deformed, element: u32) -> f64 {
-    let places = places(body, element);
+    let low = body.lattice.cell(element).map(|c| c as i64 - REACH as i64);
+    least_corner_of(|step| {
+        let there = body.lattice.element_at([0, 1, 2].map(|a| low[a] + step[a] as i64))?;
+        Some(body.displacement(there).map(|u| u as f32))
+    })
+}
+
+/// The same of displacements in elements, over [`WIDTH`] elements along each axis; `None` where there is none.
+pub(super) fn least_corner_of(displacement: impl Fn([usize; 3]) -> Option<[f32; 3]>) -> f64 {
+    let mut places = [[[[f32::NAN; 3]; WIDTH]; WIDTH]; WIDTH];
+    for (k, plane) in places.iter_mut().enumerate() {
+        for (j, line) in plane.iter_mut().enumerate() {
+            for (i, place) in line.iter_mut().enumerate() {
+                if let Some(u) = displacement([i, j, k]) {
+                    *place = [i as f32 + u[0], j as f32 + u[1], k as f32 + u[2]];
+                }
+            }
+        }
+    }
     let mut least = f32::INFINITY;
     for k in 0..WIDTH - 1 {
         for j in 0..WIDTH - 1 {
@@ -27,23 +45,6 @@ pub fn least_corner(body: &Deformed, element: u32) -> f64 {
         }
     }
     if least < f32::INFINITY { f64::from(least) } else { 1.0 }
-}
-
-fn places(body: &Deformed, element: u32) -> Places {
-    let low = body.lattice.cell(element).map(|c| c as i64 - REACH as i64);
-    let mut places = [[[[f32::NAN; 3]; WIDTH]; WIDTH]; WIDTH];
-    for (k, plane) in places.iter_mut().enumerate() {
-        for (j, line) in plane.iter_mut().enumerate() {
-            for (i, place) in line.iter_mut().enumerate() {
-                let step = [i, j, k];
-                if let Some(there) = body.lattice.element_at([0, 1, 2].map(|a| low[a] + step[a] as i64)) {
-                    let u = body.displacement(there);
-                    *place = [0, 1, 2].map(|a| (step[a] as f64 + u[a]) as f32);
-                }
-            }
-        }
-    }
-    places
 }
 
 /// Over the eight corners of the cell between eight centres; not a number, or of those that are there, where some are missing.

@@ -258,3 +258,16 @@ fn times_and_folds_of_finite_elements_in_both_scenes() {
     no_cell_folds("paper", TissueKind::Fem, &needle(), 6);
     no_cell_folds("pelvis", TissueKind::Fem, &needle_in_pelvis(), 6);
 }
+
+/// Beside the middle and near the far side of the gland, where the linear answer is at its worst: twelve evaluations left cells folded.
+#[test]
+fn no_cell_folds_before_the_far_side_of_a_body_of_finite_elements() {
+    let entry_m = Vector3::new(73e-3, 54.3e-3, 86.9e-3);
+    let run = NeedleRun {
+        entry_m,
+        drops_m: vec![entry_m + 58e-3 * Vector3::z()],
+        ..needle()
+    };
+    let [linear, large] = both("paper", TissueKind::Fem, &run, &ParameterSet::default(), 1);
+    assert!(least(&linear.corners) < -1.0 && least(&large.corners) > -1e-3);
+}

@@ -12,6 +12,7 @@ mod memory;
 mod precondition;
 mod solve;
 
+use super::fold::{REACH, least_corner_of};
 use crate::scene::{Lattice, Scene};
 use energy::Nodes;
 use solve::Solver;
@@ -20,6 +21,8 @@ use solve::Solver;
 const SIDE: usize = 13;
 /// Evaluations of the energy's gradient in a tick.
 const EVALUATIONS: usize = 12;
+/// The same in a tick whose window is folded even so.
+const MOST_EVALUATIONS: usize = 24;
 /// Lambda over mu at most: that of a Poisson ratio of 0.45. What is nearer to incompressible takes more evaluations than a tick has.
 const FIRMEST: f32 = 9.0;
 /// Smallest volume of a corner of the linear answer at which the window begins to count, and at which it counts in full.
@@ -150,7 +153,14 @@ impl LargeStrain {
             }
         }
         solver.meet();
-        solver.minimise(EVALUATIONS);
+        let elements = &self.elements;
+        solver.minimise([EVALUATIONS, MOST_EVALUATIONS], |grid, now| {
+            least_corner_of(|step| {
+                let at = grid.at(step.map(|c| c + SIDE / 2 - REACH));
+                let is_there = elements.get(at).is_some_and(|&element| element != NOWHERE);
+                is_there.then(|| now.each_ref().map(|axis| axis.get(at).copied().unwrap_or(0.0)))
+            }) <= 0.0
+        });
         self.farthest = 0.0;
         for c in 0..3 {
             for (n, off) in self.off[c].iter_mut().enumerate() {

@@ -145,13 +145,17 @@ impl Solver {
         dot(self.simd, &self.gradient, &self.gradient)
     }
 
-    /// That many evaluations of the gradient, or as many as it takes until the window rests; ends where the gradient was smallest.
-    pub fn minimise(&mut self, evaluations: usize) {
+    /// Evaluations of the gradient: as many as it takes until the window rests, at most `evaluations`, and where it is folded then at
+    /// most `most`. Ends where the gradient was smallest.
+    pub fn minimise(&mut self, [evaluations, most]: [usize; 2], is_folded: impl Fn(&Grid, &Nodes) -> bool) {
         let mut smallest = self.evaluate();
         keep(&self.now, &mut self.best);
         let mut square = smallest;
         let rests = (RESTS * self.length).powi(2);
-        for _ in 1..evaluations {
+        for number in 1..most {
+            if number >= evaluations && !is_folded(&self.grid, &self.best) {
+                break;
+            }
             if smallest <= rests || !(self.is_trial || self.set_out()) {
                 break;
             }
