@@ -77,6 +77,7 @@ impl RehearsalRunner {
             let stage = kept.map_or_else(|| Stage::build(&source, tissue, device), |(_, stage)| Ok(stage));
             let (stage, outcome, wall_ns) = match stage {
                 Ok(mut stage) => {
+                    stage.seeds_and_forces_alone();
                     let (outcome, wall_ns) = timed(|| stage.rehearse(&run, &set, &stop));
                     (Some(stage), outcome, wall_ns)
                 }

@@ -25,6 +25,8 @@ pub struct World {
     pub limits: Limits,
     /// What seeds do after they were dropped; off in a new world.
     pub migration: Migration,
+    /// Tissue near the tip is looked at and opened where it folds. Seeds and forces are the same without, and the tissue loop is faster.
+    pub looks_near_tip: bool,
 }
 
 impl World {
@@ -44,6 +46,7 @@ impl World {
             scene,
             limits,
             migration: Migration::default(),
+            looks_near_tip: true,
         })
     }
 

@@ -223,6 +223,9 @@ fn seeds_and_forces_of_a_rehearsal_are_those_of_the_body_that_is_not_corrected()
     assert_eq!((&linear.seeds, linear.peak_force_n), (&large.seeds, large.peak_force_n));
     assert_eq!(linear.dropped_after_s, large.dropped_after_s);
     assert_ne!(linear.target_shift_m, large.target_shift_m);
+    stage.seeds_and_forces_alone();
+    let alone = stage.rehearse(&run, &ParameterSet::default(), &stop);
+    assert_eq!(alone.expect("goes through"), linear);
 }
 
 /// Into the gland of `pelvis`, beside its middle.

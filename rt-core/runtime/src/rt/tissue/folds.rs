@@ -7,6 +7,9 @@ use stylet_sim::tissue::{Carried, MaterialPoint, least_corner};
 impl TissueLoop {
     /// Limits keep ChainMail's cells open; a linear answer, of the body or of what carries it, is looked at.
     pub(super) fn look_for_folds(&mut self) {
+        if !self.world.looks_near_tip {
+            return;
+        }
         let body = self.world.tissue.deformed();
         let is_linear = self.world.scene.tissue() == TissueKind::Fem || !matches!(body.carried, Carried::Not);
         let at_tip = if is_linear { self.element_at_tip() } else { None };
