@@ -21,6 +21,7 @@
 
 #![warn(missing_docs)]
 
+pub mod affinity;
 pub mod check;
 mod command;
 mod event;

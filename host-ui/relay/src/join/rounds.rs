@@ -11,6 +11,7 @@ use bytemuck::Zeroable;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
+use stylet_shm_schema::affinity::Left;
 use stylet_shm_schema::check::{self, Invalid};
 use stylet_shm_schema::service::{StateBoard, StateWriter};
 use stylet_shm_schema::{
@@ -56,6 +57,7 @@ pub(super) struct Rounds {
     // The board before the ports, and those before their node.
     board: Option<(u64, StateWriter)>,
     far: Far,
+    left_core: Left,
     orders: Orders,
     scenes: Scenes,
     scene: (u64, u64),
@@ -81,6 +83,7 @@ impl Rounds {
         Ok(Self {
             board: None,
             far: Far::new(&member.instance)?,
+            left_core: Left::default(),
             orders: Orders::listen(&member.instance)?,
             member,
             scenes: Arc::new(Mutex::new(Arc::new(Rest::default()))),
@@ -232,6 +235,7 @@ impl Rounds {
             self.open_board(session.session_id);
         }
         self.awaited.session = false;
+        self.left_core.leave(&session);
         session.session_id = self.member.run(session.session_id);
         let _ = self.far.session.send(session);
         Ok(())

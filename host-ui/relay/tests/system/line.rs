@@ -144,6 +144,7 @@ fn a_class_of_twenty_gets_its_records_and_the_core_does_not_notice() {
             local.poll();
             false
         });
+        assert!(local.taken.len() > 500, "{} records", local.taken.len());
         local
             .taken
             .iter()
