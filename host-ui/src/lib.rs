@@ -6,7 +6,6 @@
 #![warn(missing_docs)]
 
 mod action;
-mod affinity;
 pub mod app;
 pub mod cli;
 mod command;

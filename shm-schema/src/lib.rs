@@ -13,6 +13,7 @@
 //! | `commands` | [`Command`] | hosts | bridge | a [`Request`] as plain data |
 //! | `replies` | [`Reply`] | bridge | hosts | accepted, or refused and why |
 //! | `rehearsals` | [`Rehearsal`] | bridge | hosts | where the seeds of a needle would end |
+//! | `relayed` | [`Relayed`], newest one kept | a relay in place of the core | hosts | server, role, round trip, age and losses |
 //! | `uploads` | label cells under an [`UploadHeader`] | hosts | bridge | a segmented volume |
 //!
 //! Every type is plain old data, valid for every bit pattern: no `bool`, `enum` or `char`, no padding, no pointer.
@@ -21,6 +22,7 @@
 
 #![warn(missing_docs)]
 
+pub mod affinity;
 pub mod check;
 mod command;
 mod event;
@@ -30,6 +32,7 @@ mod plan;
 mod record;
 mod refusal;
 mod rehearsal;
+mod relayed;
 mod request;
 mod scene;
 pub mod service;
@@ -48,6 +51,7 @@ pub use plan::{MAX_EARLIER_NEEDLES, MAX_LEFT_NEEDLES, MAX_SEEDS, PlanInForce, Pl
 pub use record::TickRecord;
 pub use refusal::{Reason, Refusal, RefusalCode};
 pub use rehearsal::Rehearsal;
+pub use relayed::Relayed;
 pub use request::{
     ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, LEFT_DEPTH_RANGE_M, NeedleAxis, NeedleRehearsal,
     ParameterChange, PlannedNeedle, RETRACT_RANGE_M, Request, RequestError, RequestErrors, SPEED_RANGE_M_PER_S,

@@ -65,4 +65,9 @@ impl ThreadReport {
     pub fn is_fifo(&self) -> bool {
         self.policy == 1
     }
+
+    /// The core that a thread of real-time priority has, and that hosts on its machine leave to it.
+    pub fn own_core(&self) -> Option<usize> {
+        (self.is_fifo() && self.core != u32::MAX).then_some(self.core as usize)
+    }
 }

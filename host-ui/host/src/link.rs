@@ -194,6 +194,12 @@ impl Link {
         self.latest.plan.get()
     }
 
+    /// The line to the core where that runs on another machine.
+    pub fn relayed(&self) -> Option<&Relayed> {
+        let id = self.latest.id();
+        self.latest.relayed.as_ref().filter(|r| id == Some(r.session_id))
+    }
+
     /// Every record since the last call. Ticks whose record this host did not see are missing in their numbers.
     pub fn take_records(&mut self) -> Vec<TickRecord> {
         std::mem::take(&mut self.records).into()

@@ -14,6 +14,7 @@ pub mod net;
 pub mod ports;
 #[cfg(feature = "net")]
 pub mod serve;
+pub mod slice;
 pub mod wire;
 
 /// Why the relay ended or did not begin; the text says what to do.

@@ -104,6 +104,8 @@ pub struct Far {
     pub replies: Publisher<Reply>,
     /// Results of rehearsals.
     pub rehearsals: Publisher<Rehearsal>,
+    /// The line itself.
+    pub relayed: Publisher<Relayed>,
     /// The scene that runs.
     pub scene: SlicePublisher<u32, SceneHeader>,
     /// Requests of hosts here.
@@ -125,6 +127,7 @@ impl Far {
             plan: service::plan::publisher(&node)?,
             replies: service::replies::publisher(&node)?,
             rehearsals: service::rehearsals::publisher(&node)?,
+            relayed: service::relayed::publisher(&node)?,
             scene: service::scene::publisher(&node, 1 << 16)?,
             commands: service::commands::subscriber(&node)?,
             uploads: service::uploads::subscriber(&node)?,
@@ -140,6 +143,7 @@ impl Far {
         self.plan.connect();
         self.replies.connect();
         self.rehearsals.connect();
+        self.relayed.connect();
         self.scene.connect();
     }
 }

@@ -35,6 +35,7 @@ use stylet_host::core_args::SceneChoice;
 use stylet_host::link::{Link, LinkStatus};
 use stylet_implant::score::Trace;
 use stylet_implant::workflow::{NeedleTask, Pace, Placed, Run};
+use stylet_shm_schema::affinity::Left;
 use stylet_shm_schema::service::Instance;
 
 const LIVE_FRAME: Duration = Duration::from_millis(16);
@@ -116,7 +117,7 @@ pub struct App {
     patch: Option<patch::Patch>,
     frames: frames::Frames,
     /// The core that was left to the force loop.
-    left_core: Option<u32>,
+    left_core: Left,
     drive: drive::Drive,
     /// Buttons of gamepads and 3D mice since the last frame.
     pressed: Vec<Action>,
@@ -256,7 +257,7 @@ impl App {
             count_frames: options.count_frames,
             patch: options.patch.then(patch::Patch::default),
             frames: frames::Frames::new(Instant::now()),
-            left_core: None,
+            left_core: Left::default(),
             drive: drive::Drive::default(),
             pressed: Vec::new(),
             pulled_to_m: None,

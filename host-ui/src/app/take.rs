@@ -3,7 +3,6 @@
 use super::drive::Drive;
 use super::{App, refusal};
 use crate::action::Action;
-use crate::affinity;
 use crate::dose_worker::{DoseOf, DoseRequest};
 use crate::loader::Loaded;
 use crate::panel::workflow::SCRIPTED_STEPS;
@@ -61,11 +60,8 @@ impl App {
         if self.watches() {
             return;
         }
-        let haptic = self.shown.session.map(|s| s.haptic).filter(|h| h.is_fifo());
-        let core = haptic.map(|h| h.core).filter(|&core| core != u32::MAX);
-        if let Some(core) = core.filter(|_| core != self.left_core) {
-            self.left_core = Some(core);
-            affinity::keep_off(core as usize);
+        if let Some(session) = &self.shown.session {
+            self.left_core.leave(session);
         }
     }
 

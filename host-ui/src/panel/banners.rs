@@ -6,7 +6,7 @@ use crate::theme;
 use crate::theme::Tokens;
 use egui::{Color32, Rect, RichText};
 use stylet_host::link::LinkStatus;
-use stylet_shm_schema::{Fault, Request};
+use stylet_shm_schema::{Fault, Relayed, Request};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BannerLevel {
@@ -77,6 +77,9 @@ fn of_controllers(shown: &Shown) -> Vec<Banner> {
 fn of_core(shown: &Shown) -> Vec<Banner> {
     match &shown.status {
         LinkStatus::Absent { why } => return vec![absent(shown, why)],
+        LinkStatus::Silent { .. } if shown.relayed.is_some_and(|r| r.is_heard == 0) => {
+            return shown.relayed.as_ref().map(of_line).into_iter().collect();
+        }
         LinkStatus::Silent { since } => {
             return vec![Banner {
                 level: BannerLevel::Bad,
@@ -112,7 +115,43 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
     list.extend(without_line(shown));
     list.extend(folded(shown));
     list.extend(refused(shown));
+    list.extend(shown.relayed.as_ref().map(of_line));
     list
+}
+
+/// Whom the window shows, over which relay, how old that is and what was lost.
+fn of_line(line: &Relayed) -> Banner {
+    let age_s = line.snapshot_age_ns as f64 * 1e-9;
+    let (server, name) = (line.server.read(), line.name.read());
+    if line.is_heard == 0 {
+        return Banner {
+            level: BannerLevel::Bad,
+            title: "The relay is not heard",
+            text: format!(
+                "{server} has sent {name} nothing for {age_s:.1} s: what is shown is out of date, and requests are refused. The window goes \
+                 on by itself when the line is back."
+            ),
+            remedy: None,
+        };
+    }
+    let operator = match (line.operates, line.operator.read()) {
+        (1, _) => "You operate".to_owned(),
+        (_, nobody) if nobody.is_empty() => "Nobody operates".to_owned(),
+        (_, other) => format!("{} operates", capital(&other)),
+    };
+    Banner {
+        level: BannerLevel::Info,
+        title: "Over a relay",
+        text: format!(
+            "{name}, {}, at {server}. {operator}. Shown {:.0} ms late, round trip {:.0} ms; {} records and {} snapshots lost.",
+            line.role.read(),
+            age_s * 1e3,
+            line.round_trip_ns as f64 * 1e-6,
+            line.records_lost,
+            line.snapshots_lost
+        ),
+        remedy: None,
+    }
 }
 
 fn force_is_off(shown: &Shown) -> Option<Banner> {
@@ -214,11 +253,16 @@ fn not_real_time(shown: &Shown) -> Banner {
 }
 
 fn sentence(text: &str) -> String {
+    match text {
+        "" => String::new(),
+        text => format!("{}.", capital(text)),
+    }
+}
+
+fn capital(text: &str) -> String {
     let mut chars = text.chars();
-    chars
-        .next()
-        .map(|first| format!("{}{}.", first.to_uppercase(), chars.as_str()))
-        .unwrap_or_default()
+    let first = chars.next().map(|first| first.to_uppercase().to_string());
+    first.unwrap_or_default() + chars.as_str()
 }
 
 /// Over so much of the pictures at most.

@@ -18,8 +18,8 @@ use stylet_host::link::{Link, LinkStatus};
 use stylet_implant::plan::{HOLES, Template};
 use stylet_implant::workflow::{Step, Waiting};
 use stylet_shm_schema::{
-    EventKind, Fault, HapticState, LeftNeedlePose, ParametersInForce, Phase, PlanInForce, PlannedSeed, SceneHeader,
-    SeedPose, Session, flags,
+    EventKind, Fault, HapticState, LeftNeedlePose, ParametersInForce, Phase, PlanInForce, PlannedSeed, Relayed,
+    SceneHeader, SeedPose, Session, flags,
 };
 
 /// Past the deepest seed the needle may go this far, and the path is drawn this far.
@@ -30,6 +30,8 @@ pub struct Shown {
     pub instance: String,
     pub status: LinkStatus,
     pub session: Option<Session>,
+    /// The line to the core, where that runs on another machine.
+    pub relayed: Option<Relayed>,
     pub state: Option<HapticState>,
     pub scene: Option<SceneHeader>,
     /// Only a plan with at least one seed.
@@ -79,6 +81,7 @@ impl Shown {
             instance: instance.to_owned(),
             status: LinkStatus::Absent { why: String::new() },
             session: None,
+            relayed: None,
             state: None,
             scene: None,
             plan: None,
@@ -112,6 +115,7 @@ impl Shown {
     pub fn take(&mut self, link: &Link) {
         self.status = link.status();
         self.session = link.session().copied();
+        self.relayed = link.relayed().copied();
         self.state = link.state().copied();
         self.scene = link.scene().map(|s| s.header);
         self.plan = link.plan().filter(|p| p.generation > 0 && p.seed_count > 0).copied();

@@ -224,6 +224,9 @@ service!(
     /// Results of rehearsals: [`Rehearsal`].
     rehearsals: Rehearsal, by Core, history 0, buffer 8);
 service!(
+    /// The line to a core on another machine: [`Relayed`].
+    relayed: Relayed, by Core, history 1, buffer 2);
+service!(
     /// Every tick of the force loop; the header is the run of the core.
     records: [TickRecord] under u64, by Core, history 0, buffer RECORD_BUFFER, loans 2, kept |all| all);
 

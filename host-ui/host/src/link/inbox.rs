@@ -7,7 +7,9 @@ use super::{SceneModel, Snapshot};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Instant;
-use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, Rehearsal, Reply, Session, TickRecord};
+use stylet_shm_schema::{
+    Event, HapticState, ParametersInForce, PlanInForce, Rehearsal, Relayed, Reply, Session, TickRecord,
+};
 
 /// Records that wait for the host: five minutes at 1 kHz, 72 MB.
 pub const RECORDS_KEPT: usize = 300_000;
@@ -41,6 +43,7 @@ pub struct Inbox {
     pub snapshot: Option<Snapshot>,
     pub parameters: Option<ParametersInForce>,
     pub plan: Option<PlanInForce>,
+    pub relayed: Option<Relayed>,
     pub events: VecDeque<Event>,
     pub rehearsals: VecDeque<Box<Rehearsal>>,
     /// To this host.

@@ -47,6 +47,7 @@ pub struct Latest {
     pub snapshot: PerSession<Snapshot>,
     pub parameters: PerSession<ParametersInForce>,
     pub plan: PerSession<PlanInForce>,
+    pub relayed: Option<Relayed>,
     pub events: VecDeque<Event>,
     early_events: VecDeque<Event>,
     /// Numbers that are missing among the events of this run.
@@ -115,6 +116,7 @@ impl Link {
         if let Some(p) = inbox.parameters {
             self.latest.parameters.put(id, p.session_id, p);
         }
+        self.latest.relayed = inbox.relayed.or(self.latest.relayed);
         if let Some(p) = inbox.plan {
             self.latest.plan.put(id, p.session_id, p);
         }

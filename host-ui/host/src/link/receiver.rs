@@ -189,6 +189,9 @@ impl Passes {
                 Err(_) => invalid += 1,
             }
         }
+        while let Some(relayed) = ports.relayed.receive() {
+            inbox.relayed = Some(relayed);
+        }
         for scene in scene {
             match scene {
                 Some(scene) => inbox.scene = Some(scene),

@@ -1,5 +1,6 @@
 //! On another machine: the services of the core as if it ran here, and the requests of hosts here to the server.
 
+mod line;
 mod order;
 mod rounds;
 mod streams;
@@ -48,6 +49,8 @@ struct Member {
     lost: AtomicU64,
     /// Snapshots that never came.
     snapshots_lost: AtomicU64,
+    /// When the newest snapshot was made, by this machine's clock but for half a round trip; 0 for none.
+    snapshot_made_ns: AtomicU64,
     /// Changes the number of the core's run for hosts here, where its board cannot be made under its own.
     salt: AtomicU64,
 }
@@ -132,6 +135,8 @@ fn check_time(invitation: &Invitation) -> Result<(), RelayError> {
 /// Joins until `stop`.
 pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
     check_time(&options.invitation)?;
+    // Before there are threads, of zenoh as well.
+    crate::slice::shorten();
     let session = net::join(&options.server, &options.invitation.identity())?;
     let seat = options.invitation.seat;
     let member = Arc::new(Member {
@@ -144,12 +149,13 @@ pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
         heard_at_ns: AtomicU64::new(0),
         lost: AtomicU64::new(0),
         snapshots_lost: AtomicU64::new(0),
+        snapshot_made_ns: AtomicU64::new(0),
         salt: AtomicU64::new(0),
     });
     let (to_records, records) = sync_channel(WAITING);
     let (to_snapshots, snapshots) = sync_channel(SNAPSHOTS_WAITING);
     let (to_rest, rest) = sync_channel(WAITING);
-    let mut rounds = Rounds::new(Arc::clone(&member), &options.invitation)?;
+    let mut rounds = Rounds::new(Arc::clone(&member), options)?;
     let threads = [
         spawn("records", &member, move |member| streams::records(member, &records))?,
         spawn("snapshots", &member, {

@@ -1,9 +1,9 @@
 //! One pass of a member after the other: what is in force goes to hosts here, their requests go to the server.
 
+use super::line::Line;
 use super::streams::Scenes;
-use super::{Member, SILENCE_NS};
+use super::{Member, Options, SILENCE_NS};
 use crate::control::{Order, Orders};
-use crate::keys::Invitation;
 use crate::ports::Far;
 use crate::wire::{self, Hello, Kind, Rest, Who};
 use crate::{RelayError, now_ns};
@@ -11,6 +11,7 @@ use bytemuck::Zeroable;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
+use stylet_shm_schema::affinity::Left;
 use stylet_shm_schema::check::{self, Invalid};
 use stylet_shm_schema::service::{StateBoard, StateWriter};
 use stylet_shm_schema::{
@@ -56,6 +57,7 @@ pub(super) struct Rounds {
     // The board before the ports, and those before their node.
     board: Option<(u64, StateWriter)>,
     far: Far,
+    left_core: Left,
     orders: Orders,
     scenes: Scenes,
     scene: (u64, u64),
@@ -64,7 +66,7 @@ pub(super) struct Rounds {
     /// Since when an event between that one and the next is missed.
     event_missed: Option<Instant>,
     who: Who,
-    name: String,
+    line: Line,
     hello: Instant,
     epoch: u64,
     /// What is in force and has not come since it was asked for, and when that was.
@@ -76,11 +78,12 @@ pub(super) struct Rounds {
 }
 
 impl Rounds {
-    pub(super) fn new(member: Arc<Member>, invitation: &Invitation) -> Result<Self, RelayError> {
+    pub(super) fn new(member: Arc<Member>, options: &Options) -> Result<Self, RelayError> {
         let now = Instant::now();
         Ok(Self {
             board: None,
             far: Far::new(&member.instance)?,
+            left_core: Left::default(),
             orders: Orders::listen(&member.instance)?,
             member,
             scenes: Arc::new(Mutex::new(Arc::new(Rest::default()))),
@@ -88,7 +91,7 @@ impl Rounds {
             event: (0, 0),
             event_missed: None,
             who: Who::default(),
-            name: invitation.name.clone(),
+            line: Line::new(options),
             hello: now,
             epoch: 0,
             awaited: Awaited::now(),
@@ -136,6 +139,9 @@ impl Rounds {
             self.member.say(Kind::Hello, self.process, bytemuck::bytes_of(&hello));
         }
         self.take_requests();
+        if let Some(relayed) = self.line.due(&self.member, &self.who, has_server, self.round_trip_ns) {
+            let _ = self.far.relayed.send(relayed);
+        }
         let (member, words) = (&self.member, self.words());
         self.orders.pass(|order| match order {
             Order::Status => words,
@@ -159,7 +165,7 @@ impl Rounds {
         let state = match self.has_server {
             true => format!(
                 "connected as {}, round trip {:.1} ms",
-                self.name,
+                self.line.name(),
                 self.round_trip_ns as f64 * 1e-6
             ),
             false => "the server is not heard".to_owned(),
@@ -232,7 +238,9 @@ impl Rounds {
             self.open_board(session.session_id);
         }
         self.awaited.session = false;
+        self.left_core.leave(&session);
         session.session_id = self.member.run(session.session_id);
+        self.line.session_id = session.session_id;
         let _ = self.far.session.send(session);
         Ok(())
     }

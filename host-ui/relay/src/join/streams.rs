@@ -2,9 +2,9 @@
 
 use super::order::Order;
 use super::{Bytes, Member};
-use crate::RelayError;
 use crate::ports::{far_records, far_snapshots};
 use crate::wire::{self, Batches, Displacements, Kind, Rest, decode_snapshot};
+use crate::{RelayError, now_ns};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -87,6 +87,10 @@ pub(super) fn snapshots(member: &Member, messages: &Receiver<Bytes>, scenes: &Sc
         member.say(Kind::Seen, at.1, &[]);
         let rest = Arc::clone(&scenes.lock().unwrap_or_else(PoisonError::into_inner));
         if let Ok(Some((mut header, vertices))) = decode_snapshot(&rest, &mut known, message.body) {
+            let age_ns = message.stamp.sent_ns.saturating_sub(header.time_ns);
+            member
+                .snapshot_made_ns
+                .store(now_ns().saturating_sub(age_ns), Ordering::Relaxed);
             header.session_id = member.run(header.session_id);
             let _ = port.send(&header, &vertices);
         }

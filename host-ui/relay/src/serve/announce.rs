@@ -10,6 +10,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
+use stylet_shm_schema::affinity::Left;
 use stylet_shm_schema::service::StateReader;
 use stylet_shm_schema::{Event, ParametersInForce, PlanInForce, Reply, SCHEMA_VERSION, Session, check};
 
@@ -33,6 +34,7 @@ pub struct Announcements {
     heard: Instant,
     cleaned: Instant,
     state_sent: Instant,
+    left_core: Left,
     session: Option<Session>,
     parameters: Option<ParametersInForce>,
     plan: Option<PlanInForce>,
@@ -54,6 +56,7 @@ impl Announcements {
             heard: now,
             cleaned: now,
             state_sent: now,
+            left_core: Left::default(),
             session: None,
             parameters: None,
             plan: None,
@@ -127,6 +130,7 @@ impl Announcements {
                 self.replies.clear();
             }
             (self.session, self.heard) = (Some(session), Instant::now());
+            self.left_core.leave(&session);
             self.send(Kind::Session, &[bytemuck::bytes_of(&session)]);
         }
         while let Some(sample) = near.parameters.receive() {

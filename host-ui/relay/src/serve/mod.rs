@@ -98,6 +98,8 @@ pub enum End {
 
 /// Serves until `stop`; calls `beat` with each pass, with whether somebody on the net operates.
 pub fn run(options: &Options, stop: &AtomicBool, beat: impl FnMut(bool)) -> Result<End, RelayError> {
+    // Before there are threads, of zenoh as well.
+    crate::slice::shorten();
     let members = options.lab.members()?;
     let session = net::serve(&options.listen, &options.lab.identity()?, &members.closed())?;
     let server = Arc::new(Server {

@@ -44,15 +44,8 @@ impl<P> Watched<P> {
     }
 }
 
-/// The kernel may wake a thread 50 us late, to wake several at once; this one wakes when it asked to.
-fn wake_in_time() {
-    // SAFETY: a figure of this thread alone; a refusal leaves it as it is.
-    unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1_usize) };
-}
-
 /// Sends each batch of records under the next number, and keeps it for those that miss it.
 pub fn records(server: &Server) {
-    wake_in_time();
     let mut watched = Watched::<SliceSubscriber<TickRecord, u64>>::new();
     let mut number = 0;
     while !server.ends() {

@@ -252,9 +252,11 @@ impl Host {
 
     /// Waits until the core is seen with its scene.
     pub fn sees_the_core(&mut self, limit: Duration) -> bool {
-        until(limit, || {
-            self.state().is_some_and(|s| s.tick > 0) && self.scene.is_some()
-        })
+        until(limit, || self.sees_it_now())
+    }
+
+    pub fn sees_it_now(&mut self) -> bool {
+        self.state().is_some_and(|s| s.tick > 0) && self.scene.is_some()
     }
 
     pub fn send(&mut self, request: &Request) -> u64 {

@@ -39,6 +39,41 @@ fn a_force_that_is_off_or_waits_and_a_refusal_each_have_their_banner() {
 }
 
 #[test]
+fn a_window_over_a_relay_says_who_sits_there_who_operates_and_what_the_line_costs() {
+    let mut shown = live();
+    let mut line = stylet_shm_schema::Relayed {
+        is_heard: 1,
+        snapshot_age_ns: 34_000_000,
+        round_trip_ns: 3_000_000,
+        snapshots_lost: 7,
+        server: stylet_shm_schema::Text::new("192.168.1.5:7461"),
+        name: stylet_shm_schema::Text::new("Ina"),
+        operator: stylet_shm_schema::Text::new("élodie"),
+        role: stylet_shm_schema::Text::new("instructor"),
+        ..stylet_shm_schema::Relayed::zeroed()
+    };
+    shown.relayed = Some(line);
+    let list = banners(&shown);
+    assert_eq!(
+        list.iter().map(|b| b.text.as_str()).collect::<Vec<_>>(),
+        [
+            "Ina, instructor, at 192.168.1.5:7461. Élodie operates. Shown 34 ms late, round trip 3 ms; 0 records and 7 snapshots lost."
+        ]
+    );
+    line.operates = 1;
+    shown.relayed = Some(line);
+    assert!(banners(&shown)[0].text.contains("You operate"));
+    (line.is_heard, line.snapshot_age_ns) = (0, 2_500_000_000);
+    shown.relayed = Some(line);
+    shown.status = LinkStatus::Silent {
+        since: std::time::Duration::from_secs(2),
+    };
+    let list = banners(&shown);
+    assert_eq!(list.len(), 1, "one cause, one banner");
+    assert!(list[0].text.contains("nothing for 2.5 s"), "{}", list[0].text);
+}
+
+#[test]
 fn folded_tissue_has_a_banner_while_it_is_folded_that_says_from_where_on() {
     let mut shown = live();
     if let Some(state) = &mut shown.state {

@@ -98,6 +98,7 @@ impl Bridge {
     /// Announces parameters and plan; everything else follows in [`run`](Self::run).
     pub fn new(node: Node, ports: Ports, loops: BridgePorts, setup: BridgeSetup) -> Self {
         let session_id = setup.session.session_id;
+        let is_real_time = setup.session.haptic.is_fifo();
         let mut plan: PlanInForce = bytemuck::Zeroable::zeroed();
         plan.session_id = session_id;
         let parameters = ParameterChanges::new(session_id);
@@ -134,7 +135,7 @@ impl Bridge {
             lines: LinePreparer::new(Arc::clone(&setup.source), setup.tissue),
             rehearsals: RehearsalRunner::new(setup.source, setup.tissue, setup.device),
             left_rooms: (false, None),
-            supervisor: Supervisor::default(),
+            supervisor: Supervisor::new(is_real_time, setup.device.simulated),
         }
     }
 

@@ -1,0 +1,62 @@
+//! What hosts here are shown of the line to the server.
+
+use super::{Member, Options};
+use crate::now_ns;
+use crate::wire::Who;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+use stylet_shm_schema::{Relayed, Text};
+
+const EVERY: Duration = Duration::from_millis(200);
+
+/// Who sits here, at which server, and when hosts were shown that last.
+pub(super) struct Line {
+    /// The run of the core, as hosts here know it.
+    pub session_id: u64,
+    server: String,
+    name: String,
+    role: String,
+    said: Option<Instant>,
+}
+
+impl Line {
+    pub fn new(options: &Options) -> Self {
+        Self {
+            session_id: 0,
+            server: options.server.clone(),
+            name: options.invitation.name.clone(),
+            role: options.invitation.role.to_string(),
+            said: None,
+        }
+    }
+
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What hosts are shown, five times a second.
+    pub fn due(&mut self, member: &Member, who: &Who, is_heard: bool, round_trip_ns: u64) -> Option<Relayed> {
+        if self.said.is_some_and(|said| said.elapsed() < EVERY) {
+            return None;
+        }
+        self.said = Some(Instant::now());
+        let made_ns = match member.snapshot_made_ns.load(Ordering::Relaxed) {
+            0 => now_ns(),
+            made_ns => made_ns,
+        };
+        let operator = who.operator.as_deref().unwrap_or_default();
+        Some(Relayed {
+            session_id: self.session_id,
+            round_trip_ns,
+            snapshot_age_ns: now_ns().saturating_sub(made_ns) + round_trip_ns / 2,
+            records_lost: member.lost.load(Ordering::Relaxed),
+            snapshots_lost: member.snapshots_lost.load(Ordering::Relaxed),
+            is_heard: u32::from(is_heard),
+            operates: u32::from(is_heard && operator == self.name),
+            server: Text::new(&self.server),
+            name: Text::new(&self.name),
+            operator: Text::new(operator),
+            role: Text::new(&self.role),
+        })
+    }
+}
