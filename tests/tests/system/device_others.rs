@@ -191,7 +191,6 @@ impl<L: Led> Rig<L> {
 }
 
 #[test]
-#[ignore = "has not been seen to pass: until the stiffness of the device was raised the core refused the scene"]
 fn a_run_with_an_inverse3_is_felt_is_lost_and_comes_back() {
     where_the_machine_runs(|| {
         let service = Service::default();
