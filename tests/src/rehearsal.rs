@@ -34,9 +34,12 @@ impl Theatre {
         let picture = ScenePicture::first(scene, 1);
         let (header, words) = picture.parts();
         let device = DeviceInfo::phantom_premium_1_5();
+        let mut stage = Stage::build(source, TissueKind::ChainMail, device).expect("the scene was built before");
+        // As the core does.
+        stage.seeds_and_forces_alone();
         Self {
             scene: SceneModel::of_words(header, words).expect("the core's own picture holds together"),
-            stage: Stage::build(source, TissueKind::ChainMail, device).expect("the scene was built before"),
+            stage,
             rehearsals: 0,
         }
     }
