@@ -30,6 +30,7 @@
 mod ahead;
 mod carried;
 pub mod chainmail;
+mod corners;
 mod deformed;
 pub mod fem;
 mod field;

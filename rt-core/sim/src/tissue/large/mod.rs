@@ -12,7 +12,7 @@ mod memory;
 mod precondition;
 mod solve;
 
-use super::fold::{REACH, least_corner_of};
+use super::corners::{REACH, least_corner_of};
 use crate::scene::{Lattice, Scene};
 use energy::Nodes;
 use solve::Solver;
