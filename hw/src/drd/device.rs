@@ -35,7 +35,7 @@ impl ForceDimension {
     /// Loads the SDK and finds the device. `arm` runs once in each servo thread, before its first tick; `report` receives
     /// messages for the operator, from a thread of normal priority.
     ///
-    /// A device that is not calibrated is opened: it reads [`DeviceFault::NotCalibrated`] until the operator has done it.
+    /// A device that is not calibrated is opened: it reads [`crate::DeviceFault::NotCalibrated`] until the operator has done it.
     pub fn open(config: ForceDimensionConfig, arm: Arm, report: Report) -> Result<Self, OpenError> {
         let api = Api::load(config.library.as_deref())?;
         Self::open_with(api, config, arm, report)
