@@ -9,7 +9,7 @@ use crate::shown::{LoadState, Note, Shown, Watched};
 use bytemuck::Zeroable;
 use stylet_host::link::LinkStatus;
 use stylet_procedure::{Step, Waiting, WaitsFor};
-use stylet_shm_schema::{Fault, Text, TickRecord, flags};
+use stylet_shm_schema::{Fault, Relayed, Text, TickRecord, flags};
 use stylet_shm_schema::{LeftNeedlePose, MAX_LEFT_NEEDLES};
 
 pub type State = (&'static str, fn(&mut App));
@@ -39,6 +39,17 @@ pub const STATES: &[State] = &[
         }
     }),
     ("no line, by the law of the paper", |app| app.shown = without_line(0)),
+    ("over a relay", |app| {
+        app.shown = one_needle(0.03, 2);
+        app.shown.relayed = Some(line_to_a_core(true));
+    }),
+    ("over a relay that is not heard", |app| {
+        app.shown = one_needle(0.03, 2);
+        app.shown.relayed = Some(line_to_a_core(false));
+        app.shown.status = LinkStatus::Silent {
+            since: std::time::Duration::from_secs(12_345),
+        };
+    }),
     ("recording", |app| recorded(app, one_needle(0.03, 2), false)),
     ("recording with the guide", |app| {
         recorded(app, one_needle(0.03, 2), false);
@@ -143,6 +154,22 @@ pub const STATES: &[State] = &[
         app.shown.continues_at = Some((1, 19));
     }),
 ];
+
+/// To another machine, with the longest names that it takes.
+fn line_to_a_core(is_heard: bool) -> Relayed {
+    Relayed {
+        is_heard: u32::from(is_heard),
+        snapshot_age_ns: 12_345_000_000,
+        round_trip_ns: 1_234_000_000,
+        records_lost: 123_456,
+        snapshots_lost: 12_345,
+        server: Text::new("simulator-of-the-department-of-radiation-oncology.example:65535"),
+        name: Text::new("Prof. Dr. Maximiliane Wolfeschlegelsteinhausenbergerdorff"),
+        operator: Text::new("Dr. Bartholomew Featherstonehaugh-Cholmondeley, visiting"),
+        role: Text::new("instructor"),
+        ..Relayed::zeroed()
+    }
+}
 
 /// In place of a core.
 fn recorded(app: &mut App, shown: Shown, has_ended: bool) {

@@ -208,7 +208,7 @@ fn no_cell_folds_beside_a_tip_on_a_line() {
     no_cell_folds("paper", TissueKind::ChainMail, &needle(), 1);
 }
 
-/// The window is part of a rehearsal, and no force and no seed knows of it.
+/// No force and no seed knows of the window near the tip; the shift of the target does.
 #[test]
 fn seeds_and_forces_of_a_rehearsal_are_those_of_the_body_that_is_not_corrected() {
     let (mut stage, run, stop) = (stage(), needle(), AtomicBool::new(false));
