@@ -165,11 +165,7 @@ fn a_class_of_twenty_gets_its_records_and_the_core_does_not_notice() {
         let mut hosts: Vec<Host> = far.iter().map(Host::new).collect();
         // All of them in each round: what waits for a host that is not polled is bounded.
         let all_see = until(Duration::from_secs(30), || {
-            hosts
-                .iter_mut()
-                .filter_map(|host| (!host.sees_it_now()).then_some(()))
-                .count()
-                == 0
+            hosts.iter_mut().map(Host::sees_it_now).filter(|sees| *sees).count() == far.len()
         });
         assert!(all_see, "{}", served.log());
         for host in &mut hosts {
