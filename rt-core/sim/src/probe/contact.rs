@@ -19,7 +19,9 @@ const PASSES: usize = 40;
 const PASSES_ON_THE_WAY: usize = 2;
 /// A pass that leaves no pad farther than that from the probe's surface, on the wrong side, and no force turned farther from it, is the last.
 const CLOSED_M: f64 = 2e-8;
-const TURNED: f64 = 1e-6;
+const TURNED: f64 = 1e-5;
+/// From that pass on a force turns half as far as the surface does: a pad that is hardly pressed may be in contact in every other pass.
+const HALF_FROM: usize = 12;
 
 /// What came of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -134,9 +136,9 @@ fn steps_between(from: &ProbePose, to: &ProbePose) -> usize {
 }
 
 fn press(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside_m: &[f64], passes: usize) {
-    for _ in 0..passes {
+    for pass in 0..passes {
         state.report.passes += 1;
-        look(probe, state, pose, beside_m);
+        look(probe, state, pose, beside_m, if pass < HALF_FROM { 1.0 } else { 0.5 });
         let n = state.near.len();
         state.problem.count = n;
         for a in 0..n {
@@ -161,21 +163,29 @@ fn press(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside_m:
     }
 }
 
-/// Pads near the probe, where its surface is there, and how far each gap would be without the forces.
-fn look(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside_m: &[f64]) {
+/// Pads near the probe, where its surface is there, and how far each gap would be without the forces. Forces turn that part of the way.
+fn look(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside_m: &[f64], part: f64) {
     state.near.clear();
     for (n, pad) in probe.wall.pads.iter().enumerate() {
         let (gap_m, outward) = gap(probe, state, pose, beside_m, n);
         let facing = (0..3).map(|c| outward[c] * pad.outward[c]).sum::<f64>();
         let is_pressed = state.pressed_n[n] > 0.0;
-        if is_pressed || (gap_m < NEAR_M && facing < FACING) {
+        if facing < FACING && (is_pressed || gap_m < NEAR_M) {
             let at = state.near.len();
+            let outward = if is_pressed { turned(state, n, outward, part) } else { outward };
             let moved_m: f64 = (0..3).map(|c| outward[c] * state.moved_m[3 * n + c]).sum();
             state.outward[at] = outward;
             state.problem.free_m[at] = gap_m - moved_m;
             state.near.push(n as u32);
         }
     }
+}
+
+/// The direction of the force on a pad, that part of the way to another.
+fn turned(state: &ProbeState, n: usize, outward: [f64; 3], part: f64) -> [f64; 3] {
+    let before = Vector3::from_fn(|c, _| state.loads_n[3 * n + c] / state.pressed_n[n]);
+    let mixed = before + (Vector3::from(outward) - before) * part;
+    mixed.try_normalize(1e-9).map_or(outward, Into::into)
 }
 
 fn gap(probe: &ReadyProbe, state: &ProbeState, pose: &ProbePose, beside_m: &[f64], n: usize) -> (f64, [f64; 3]) {

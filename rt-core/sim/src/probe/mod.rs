@@ -22,6 +22,7 @@
     deny(clippy::disallowed_macros, clippy::disallowed_methods, clippy::disallowed_types)
 )]
 
+mod body;
 mod columns;
 mod complementarity;
 mod contact;
@@ -29,6 +30,7 @@ mod response;
 mod shape;
 mod wall;
 
+pub use body::BodyProbe;
 pub use columns::{ProbeQueue, ReadyProbe};
 pub use contact::{ContactReport, ProbeState, displace, step};
 pub use response::{ProbeResponse, Wrench};

@@ -29,29 +29,32 @@ impl Fixture {
         Fixture { scene, body, probe }
     }
 
-    /// Height of the axis at which the shaft meets the wall on the side of the target, m.
-    pub fn touching_y_m(&self) -> f64 {
-        let above = self.probe.wall.pads.iter().filter(|p| p.outward[1] < -0.5);
-        let lowest = above.map(|p| p.place_m[1]).fold(f64::INFINITY, f64::min);
-        lowest - self.probe.shape.radius_m
-    }
-
-    /// A pose whose axis lies along z in the middle, so far above where it meets the wall, and whose tip is so far beyond the target's middle.
+    /// Along z in the middle, so far above where it meets the wall, its tip so far beyond the target's middle.
     pub fn pose(&self, pressed_m: f64, beyond_m: f64) -> ProbePose {
-        let (low, high) = self.scene.target_bounds_m();
-        let middle = [0, 1, 2].map(|a| 0.5 * (low[a] + high[a]));
-        let tip_m = [middle[0], self.touching_y_m() + pressed_m, middle[2] + beyond_m];
-        ProbePose::new(tip_m, [0.0, 0.0, 1.0]).expect("a pose")
+        let probe = &self.probe;
+        probe.wall.pose_below_target(&self.scene, &probe.shape, pressed_m, beyond_m)
     }
 
-    /// In from outside at the height at which it touches, then pressed, in ticks at 50 mm/s.
+    /// So far above where it meets the wall is the axis in the middle of the hollow.
+    fn middle_m(&self) -> f64 {
+        let heights = self.probe.wall.pads.iter().map(|p| p.place_m[1]);
+        let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(y), h.max(y)));
+        0.5 * (low + high) - self.pose(0.0, 0.0).tip_m[1]
+    }
+
+    /// In from outside in the middle of the hollow, to where it meets the wall, then pressed, in ticks at 50 mm/s.
     pub fn go_in_and_press(&self, state: &mut ProbeState, pressed_m: f64, beyond_m: f64) -> ProbeResponse {
         const TICK_M: f64 = 0.25e-3;
         let mut response = ProbeResponse::default();
         let outside_m = beyond_m - 0.12;
         for n in 0..=60 {
             let at = outside_m + (beyond_m - outside_m) * f64::from(n) / 60.0;
-            response = step(&self.probe, state, &self.pose(0.0, at), &[]);
+            response = step(&self.probe, state, &self.pose(self.middle_m(), at), &[]);
+        }
+        let down = (self.middle_m() / TICK_M).ceil() as i32;
+        for n in 1..=down {
+            let part = 1.0 - f64::from(n) / f64::from(down);
+            response = step(&self.probe, state, &self.pose(part * self.middle_m(), beyond_m), &[]);
         }
         let ticks = (pressed_m / TICK_M).round() as i32;
         for n in 1..=ticks {

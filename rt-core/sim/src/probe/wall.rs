@@ -1,14 +1,15 @@
 //! The wall that the probe can press: the inside of the rectum, in pads.
 
+use super::shape::{ProbePose, ProbeShape};
 use crate::scene::{Lattice, Scene};
 use crate::tissue::fem::batch::BatchModel;
 use stylet_anatomy::{Beyond, Organ};
 
 /// Faces of cells are staircases: each is moved to the mean of those that face the same way and lie so close, m.
 const SMOOTHED_M: f64 = 2.5e-3;
-/// The end through which the probe comes in is a closed cap in a scene, and open in the patient: where the wall faces inwards more than that it
+/// The canal through which the probe comes in is closed in a scene, and wide enough in the patient: what is so close to that end of the hollow
 /// resists nothing.
-const CAP: f64 = 0.7;
+const CANAL_M: f64 = 12e-3;
 /// The probe gets so far beyond the target at either end, m.
 const BEYOND_TARGET_M: f64 = 20e-3;
 
@@ -72,9 +73,13 @@ impl Wall {
             return Err(NoWall::NoRectum);
         }
         let (low, high) = scene.target_bounds_m();
+        // A hollow that goes on to the end of the volume has no end there.
+        let faces_inwards = |f: &&Face| f.outward[2] > 0.5;
+        let end_m = all.iter().filter(faces_inwards).map(|f| f.place_m[2]);
+        let open_m = end_m.fold(f64::INFINITY, f64::min) + CANAL_M;
         let is_beside = |f: &Face| {
             let z = f.place_m[2];
-            z >= low[2] - BEYOND_TARGET_M && z <= high[2] + BEYOND_TARGET_M
+            z >= low[2] - BEYOND_TARGET_M && z <= high[2] + BEYOND_TARGET_M && !(z < open_m && open_m.is_finite())
         };
         let within: Vec<Face> = smoothed(&all).into_iter().filter(is_beside).collect();
         // Straight faces of a staircase say little of how the wall runs; their mean does.
@@ -91,11 +96,23 @@ impl Wall {
         }
         let face_m2 = scene.lattice.spacing_m.powi(2);
         let pads: Vec<Pad> = pads.into_iter().filter_map(|faces| pad(faces, face_m2)).collect();
-        let open: Vec<Pad> = pads.into_iter().filter(|pad| pad.outward[2] < CAP).collect();
-        if open.is_empty() {
+        if pads.is_empty() {
             return Err(NoWall::OutOfReach);
         }
-        Ok(Wall { pads: open })
+        Ok(Wall { pads })
+    }
+
+    /// A probe along z below the middle of the target, whose shaft is so far above where it first meets the wall towards the target, and whose
+    /// tip is so far beyond the target's middle, m.
+    pub fn pose_below_target(&self, scene: &Scene, shape: &ProbeShape, pressed_m: f64, beyond_m: f64) -> ProbePose {
+        let towards_target = self.pads.iter().filter(|pad| pad.outward[1] < -0.5);
+        let lowest_m = towards_target.map(|pad| pad.place_m[1]).fold(f64::INFINITY, f64::min);
+        let (low, high) = scene.target_bounds_m();
+        let middle = [0, 1, 2].map(|a| 0.5 * (low[a] + high[a]));
+        ProbePose {
+            tip_m: [middle[0], lowest_m - shape.radius_m + pressed_m, middle[2] + beyond_m],
+            axis: [0.0, 0.0, 1.0],
+        }
     }
 }
 
