@@ -4,13 +4,10 @@ use crate::rt::world::WorldError;
 use std::sync::Arc;
 use stylet_sim::line::{Line, LineError, LineStations, QueueProgress, ReadyLine};
 use stylet_sim::needle::LayerKind;
-use stylet_sim::probe::{BodyProbe, NoWall, ProbePose, ProbeQueue, ProbeShape, Wall};
+use stylet_sim::probe::{BodyProbe, NoWall, PADS_APART_M, ProbePose, ProbeQueue, ProbeShape, Wall};
 use stylet_sim::scene::{Scene, SceneError, SceneSource, TissueKind};
 use stylet_sim::tissue::fem::batch::BatchModel;
 use stylet_sim::tissue::{FemTissue, MaterialPoint};
-
-/// Pads of the rectum's wall are so far apart.
-const PADS_APART_M: f64 = 5e-3;
 
 /// Why there is no line; the text is for people.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

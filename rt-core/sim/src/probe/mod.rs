@@ -35,7 +35,7 @@ pub use columns::{ProbeQueue, ReadyProbe};
 pub use contact::{ContactReport, ProbeState, displace, step};
 pub use response::{ProbeResponse, Wrench};
 pub use shape::{ProbePose, ProbeShape};
-pub use wall::{NoWall, Pad, Wall};
+pub use wall::{NoWall, PADS_APART_M, Pad, Wall};
 
 #[cfg(test)]
 mod tests;

@@ -36,7 +36,7 @@ impl Fixture {
     }
 
     /// So far above where it meets the wall is the axis in the middle of the hollow.
-    fn middle_m(&self) -> f64 {
+    pub fn middle_m(&self) -> f64 {
         let heights = self.probe.wall.pads.iter().map(|p| p.place_m[1]);
         let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(y), h.max(y)));
         0.5 * (low + high) - self.pose(0.0, 0.0).tip_m[1]

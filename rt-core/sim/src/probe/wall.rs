@@ -13,6 +13,9 @@ const CANAL_M: f64 = 12e-3;
 /// The probe gets so far beyond the target at either end, m.
 const BEYOND_TARGET_M: f64 = 20e-3;
 
+/// Pads are so far apart in a run.
+pub const PADS_APART_M: f64 = 5e-3;
+
 /// Why a scene has no wall for the probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoWall {

@@ -20,6 +20,9 @@ pub(in crate::probe) struct Reference<'a> {
     wall: &'a Wall,
     weights: Vec<Vec<(u32, f64)>>,
     solver: BatchState<f32>,
+    moved: Vec<[f64; 3]>,
+    is_in: Vec<bool>,
+    pressed: Vec<f64>,
     /// On the tissue, N.
     pub loads_n: Vec<[f64; 3]>,
     /// Displacement of the element centres, m.
@@ -33,6 +36,9 @@ impl<'a> Reference<'a> {
         Reference {
             weights: weights.collect(),
             solver: BatchState::new(&fixture.body),
+            moved: vec![[0.0; 3]; wall.pads.len()],
+            is_in: vec![false; wall.pads.len()],
+            pressed: vec![0.0; wall.pads.len()],
             loads_n: vec![[0.0; 3]; wall.pads.len()],
             field: ElementField::zeros(fixture.body.element_count()),
             solutions: 0,
@@ -82,12 +88,12 @@ impl<'a> Reference<'a> {
         })
     }
 
-    /// Forces with which no pad is in the probe and none is pulled; `first` are pads to begin with.
-    pub fn press(&mut self, pose: &ProbePose, near: &[bool]) {
+    /// Forces with which no pad is in the probe and none is pulled, from those of the pose before.
+    pub fn press(&mut self, pose: &ProbePose) {
         let count = self.wall.pads.len();
-        let mut moved = vec![[0.0; 3]; count];
-        let mut is_in = near.to_vec();
-        let mut pressed = vec![0.0; count];
+        let mut moved = std::mem::take(&mut self.moved);
+        let mut is_in = std::mem::take(&mut self.is_in);
+        let mut pressed = std::mem::take(&mut self.pressed);
         for _ in 0..40 {
             let gaps: Vec<_> = (0..count)
                 .map(|n| {
@@ -111,7 +117,7 @@ impl<'a> Reference<'a> {
                 for n in 0..count {
                     let facing = outward[n].dot(&Vector3::from(self.wall.pads[n].outward)) < 0.2;
                     let gap_m = free[n] + outward[n].dot(&Vector3::from(moved[n]));
-                    let stays = if is_in[n] { pressed[n] > 0.0 } else { facing && gap_m < -CLOSED_M };
+                    let stays = facing && if is_in[n] { pressed[n] > 0.0 } else { gap_m < -CLOSED_M };
                     changed |= stays != is_in[n];
                     is_in[n] = stays;
                     if !stays {
@@ -132,6 +138,7 @@ impl<'a> Reference<'a> {
                 break;
             }
         }
+        (self.moved, self.is_in, self.pressed) = (moved, is_in, pressed);
         self.solver.write(&self.fixture.body, 0, &mut self.field);
     }
 
@@ -200,11 +207,14 @@ pub(in crate::probe) fn beside_reference(fixture: &Fixture, wall: &Wall, pressed
     let mut state = ProbeState::new(&fixture.probe);
     let response = fixture.go_in_and_press(&mut state, pressed_m, beyond_m);
     displace(&fixture.probe, &mut state);
-    let pose = fixture.pose(pressed_m, beyond_m);
     let mut full = Reference::new(fixture, wall);
-    // Pads towards the target, which the shaft is behind: another way to the same set.
-    let near: Vec<bool> = wall.pads.iter().map(|p| p.outward[1] < -0.7 && p.place_m[2] < pose.tip_m[2] - 10e-3).collect();
-    full.press(&pose, &near);
+    // From the middle of the hollow, where it is at once, on another way than ours.
+    let begin_m = fixture.middle_m();
+    let steps = ((pressed_m - begin_m).abs() / 2e-3).ceil().max(1.0) as i32;
+    for n in 0..=steps {
+        let part = f64::from(n) / f64::from(steps);
+        full.press(&fixture.pose(begin_m + part * (pressed_m - begin_m), beyond_m));
+    }
     let compared = compare(fixture, &state.share, &full.field, &|name| name == "gland" || name == "capsule");
     let (ours, theirs) = (Vector3::from(response.wrench.force_n()), Vector3::from(full.force_n()));
     println!(
