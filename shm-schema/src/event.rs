@@ -54,6 +54,10 @@ pub enum EventKind {
     InvalidRefused = 9,
     /// `text`: the file, or why none could be written.
     FlightSaved = 10,
+    /// As [`FaultRaised`](Self::FaultRaised), of the second device; the needle's goes on.
+    SecondFaultRaised = 20,
+    /// The force of the second device was armed again after a fault.
+    SecondRearmed = 21,
 }
 
 impl EventKind {

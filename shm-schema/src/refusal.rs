@@ -56,6 +56,8 @@ pub enum RefusalCode {
     NotAtNeedle = 50,
     /// The needle is on no line, and only one on a line may stay in.
     NeedleWithoutLine = 51,
+    /// The run has no second device.
+    NoSecondDevice = 55,
     /// Another scene is being loaded.
     SceneLoading = 60,
     /// The uploaded volume is invalid.
@@ -108,6 +110,9 @@ impl RefusalCode {
             Self::NotAtNeedle => "bring the hand along that needle to within 2 mm of its tip, then take it up",
             Self::NeedleWithoutLine => {
                 "the tissue was not prepared for this needle (no line): draw it back, wait, and go in again"
+            }
+            Self::NoSecondDevice => {
+                "this run has no second device: start rt-core with --device-2 simulated, or another"
             }
             Self::SceneLoading => "another scene is being loaded; wait until it is ready",
             Self::InvalidVolume => "the volume is invalid",

@@ -31,6 +31,7 @@ mod left;
 mod line;
 mod migration;
 mod pressed;
+mod second;
 mod seeds;
 mod snapshot;
 
@@ -178,6 +179,7 @@ impl TissueLoop {
         self.checkpoint();
         self.follow_left();
         self.take_orders();
+        self.follow_second();
         self.follow_probe();
         let before = self.pose;
         self.pose = *self.ports.pose.read();
@@ -197,6 +199,7 @@ impl TissueLoop {
         self.mark();
         self.migrate();
         self.respond(woke_ns, &report);
+        self.answer_second(woke_ns);
         self.look_for_folds();
         self.tape(woke_ns, report.residual);
         self.mark();
