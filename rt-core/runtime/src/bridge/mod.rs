@@ -210,7 +210,7 @@ impl Bridge {
     fn serve_probe(&mut self, generation: u64) {
         let Some(probe) = &mut self.probe else { return };
         if let Some(why) = probe.pass(generation, &mut self.loops) {
-            eprintln!("The probe presses nothing in this scene: {why}.");
+            eprintln!("rt-core: the probe presses nothing in this scene: {why}");
         }
     }
 

@@ -11,7 +11,7 @@ pub struct ProbeShape {
 }
 
 impl Default for ProbeShape {
-    /// 20 mm across, as biplane transrectal probes are (`docs/adr/0021-probe.md`).
+    /// 20 mm across: assumed (`docs/adr/0021-probe.md`).
     fn default() -> Self {
         ProbeShape { radius_m: 10e-3 }
     }

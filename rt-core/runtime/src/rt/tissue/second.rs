@@ -25,7 +25,7 @@ impl TissueLoop {
         let tick = self.response.tick;
         let Some(second) = &mut self.ports.second else { return };
         // The pose that this tick has used: the buffer is not asked again.
-        let pose = second.pose.peek_output_buffer();
+        let pose = second.pose.output_buffer();
         let mut response = ProbeResponse {
             time_ns: woke_ns,
             tick,
