@@ -87,7 +87,11 @@ impl LineBody {
     }
 
     /// Solves for what an ultrasound probe in the rectum can press. `goes_on` is given how many columns are ready, and of how many.
-    pub fn prepare_probe(&self, shape: ProbeShape, goes_on: &mut dyn FnMut([usize; 2]) -> bool) -> Result<BodyProbe, NoWall> {
+    pub fn prepare_probe(
+        &self,
+        shape: ProbeShape,
+        goes_on: &mut dyn FnMut([usize; 2]) -> bool,
+    ) -> Result<BodyProbe, NoWall> {
         let wall = Wall::of(&self.scene, PADS_APART_M)?;
         let queue = ProbeQueue::new(&self.batch, wall, shape)?;
         Ok(BodyProbe::new(queue.prepare(&self.batch, goes_on)?))
@@ -96,7 +100,9 @@ impl LineBody {
     /// Where a probe lies below the target, pressed so far above where it meets the wall.
     pub fn probe_below_target(&self, probe: &BodyProbe, pressed_m: f64, beyond_m: f64) -> ProbePose {
         let ready = probe.ready();
-        ready.wall.pose_below_target(&self.scene, &ready.shape, pressed_m, beyond_m)
+        ready
+            .wall
+            .pose_below_target(&self.scene, &ready.shape, pressed_m, beyond_m)
     }
 
     /// Solves for a line that enters the body where it says. `report` is called between slices of work and ends it by

@@ -31,7 +31,11 @@ impl Pressed {
         let fem = FemTissue::<f32>::new(&scene).map_err(CostError::FiniteElements)?;
         let body = BatchModel::new(&fem.model);
         let pressed_m = |tick: usize| {
-            let jump_m = if tick % JUMP_EVERY == JUMP_EVERY / 2 { JUMP_M } else { 0.0 };
+            let jump_m = if tick % JUMP_EVERY == JUMP_EVERY / 2 {
+                JUMP_M
+            } else {
+                0.0
+            };
             2.0 * PRESSED_M * tick.min(TICKS - tick) as f64 / TICKS as f64 - jump_m
         };
         let shape = ProbeShape::default();

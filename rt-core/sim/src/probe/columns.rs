@@ -93,7 +93,11 @@ impl ProbeQueue {
     }
 
     /// Solves for all of them; `goes_on` is asked between slices of work.
-    pub fn prepare(mut self, body: &BatchModel<f32>, goes_on: &mut dyn FnMut([usize; 2]) -> bool) -> Result<ReadyProbe, NoWall> {
+    pub fn prepare(
+        mut self,
+        body: &BatchModel<f32>,
+        goes_on: &mut dyn FnMut([usize; 2]) -> bool,
+    ) -> Result<ReadyProbe, NoWall> {
         while self.next < self.ready.rows() {
             if !goes_on(self.progress()) {
                 return Err(NoWall::Stopped);

@@ -113,7 +113,13 @@ pub fn step(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside
         let steps = steps_between(&from, &pose);
         for n in 1..=steps {
             let here = from.towards(&pose, n as f64 / steps as f64);
-            press(probe, state, &here, beside_m, if n < steps { PASSES_ON_THE_WAY } else { PASSES });
+            press(
+                probe,
+                state,
+                &here,
+                beside_m,
+                if n < steps { PASSES_ON_THE_WAY } else { PASSES },
+            );
         }
         state.pose = Some(pose);
     }
@@ -172,7 +178,11 @@ fn look(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside_m: 
         let is_pressed = state.pressed_n[n] > 0.0;
         if facing < FACING && (is_pressed || gap_m < NEAR_M) {
             let at = state.near.len();
-            let outward = if is_pressed { turned(state, n, outward, part) } else { outward };
+            let outward = if is_pressed {
+                turned(state, n, outward, part)
+            } else {
+                outward
+            };
             let moved_m: f64 = (0..3).map(|c| outward[c] * state.moved_m[3 * n + c]).sum();
             state.outward[at] = outward;
             state.problem.free_m[at] = gap_m - moved_m;
@@ -190,7 +200,13 @@ fn turned(state: &ProbeState, n: usize, outward: [f64; 3], part: f64) -> [f64; 3
 
 fn gap(probe: &ReadyProbe, state: &ProbeState, pose: &ProbePose, beside_m: &[f64], n: usize) -> (f64, [f64; 3]) {
     let rest_m = probe.wall.pads[n].place_m;
-    let by_others = |c: usize| beside_m.get(3 * n + c).copied().filter(|m| m.is_finite()).unwrap_or(0.0);
+    let by_others = |c: usize| {
+        beside_m
+            .get(3 * n + c)
+            .copied()
+            .filter(|m| m.is_finite())
+            .unwrap_or(0.0)
+    };
     let place_m = [0, 1, 2].map(|c| rest_m[c] + state.moved_m[3 * n + c] + by_others(c));
     probe.shape.gap_m(pose, place_m)
 }
@@ -247,9 +263,8 @@ fn respond(state: &mut ProbeState, probe: &ReadyProbe, pose: &ProbePose, beside_
     let arm = |state: &ProbeState, at: usize| {
         let pad = state.near[at] as usize;
         let rest_m = Vector3::from(probe.wall.pads[pad].place_m);
-        let moved_m = Vector3::from_fn(|c, _| {
-            state.moved_m[3 * pad + c] + beside_m.get(3 * pad + c).copied().unwrap_or(0.0)
-        });
+        let moved_m =
+            Vector3::from_fn(|c, _| state.moved_m[3 * pad + c] + beside_m.get(3 * pad + c).copied().unwrap_or(0.0));
         let outward = Vector3::from(state.outward[at]);
         let turning = (rest_m + moved_m - tip).cross(&outward);
         [outward.x, outward.y, outward.z, turning.x, turning.y, turning.z]

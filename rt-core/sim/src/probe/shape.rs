@@ -43,7 +43,9 @@ impl ProbePose {
         let (from, to) = (Vector3::from(self.axis), Vector3::from(other.axis));
         let sine = from.cross(&to);
         let angle = sine.norm().atan2(from.dot(&to));
-        let turned = sine.try_normalize(1e-12).map_or(Vector3::zeros(), |about| about * angle);
+        let turned = sine
+            .try_normalize(1e-12)
+            .map_or(Vector3::zeros(), |about| about * angle);
         [moved.x, moved.y, moved.z, turned.x, turned.y, turned.z]
     }
 
@@ -62,9 +64,7 @@ impl ProbeShape {
         let from_middle = Vector3::from(point_m) - Vector3::from(pose.tip_m) + axis * self.radius_m;
         let from_middle = from_middle - axis * from_middle.dot(&axis).min(0.0);
         let distance_m = from_middle.norm();
-        let outward = from_middle
-            .try_normalize(1e-12)
-            .unwrap_or_else(|| across(&axis));
+        let outward = from_middle.try_normalize(1e-12).unwrap_or_else(|| across(&axis));
         (distance_m - self.radius_m, outward.into())
     }
 }

@@ -3,8 +3,8 @@
 use super::wall::Wall;
 use super::*;
 use crate::scene::{Labels, Material, Role, Scene, Structure, Surroundings, TissueKind};
-use crate::tissue::fem::batch::BatchModel;
 use crate::tissue::fem::FemTissue;
+use crate::tissue::fem::batch::BatchModel;
 use std::sync::OnceLock;
 use stylet_anatomy::Beyond;
 
@@ -32,7 +32,9 @@ impl Fixture {
     /// Along z in the middle, so far above where it meets the wall, its tip so far beyond the target's middle.
     pub fn pose(&self, pressed_m: f64, beyond_m: f64) -> ProbePose {
         let probe = &self.probe;
-        probe.wall.pose_below_target(&self.scene, &probe.shape, pressed_m, beyond_m)
+        probe
+            .wall
+            .pose_below_target(&self.scene, &probe.shape, pressed_m, beyond_m)
     }
 
     /// So far above where it meets the wall is the axis in the middle of the hollow.

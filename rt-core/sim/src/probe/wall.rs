@@ -166,7 +166,11 @@ fn faces(scene: &Scene) -> Vec<Face> {
 /// Faces at the edge of the volume are where the scene ends.
 fn at_edge(lattice: &Lattice, element: u32, side: usize) -> bool {
     let at = lattice.cell(element)[side / 2];
-    if side % 2 == 0 { at == 0 } else { at + 1 == lattice.dims[side / 2] }
+    if side % 2 == 0 {
+        at == 0
+    } else {
+        at + 1 == lattice.dims[side / 2]
+    }
 }
 
 fn face(lattice: &Lattice, element: u32, side: usize) -> Face {
@@ -243,7 +247,10 @@ fn spread(faces: &[Face], spacing_m: f64) -> Vec<usize> {
 fn pad(faces: Vec<Face>, face_m2: f64) -> Option<Pad> {
     let count = faces.len() as f64;
     let mean = |of: &dyn Fn(&Face) -> [f64; 3]| {
-        let sum = faces.iter().map(of).fold([0.0; 3], |s, v| [0, 1, 2].map(|c| s[c] + v[c]));
+        let sum = faces
+            .iter()
+            .map(of)
+            .fold([0.0; 3], |s, v| [0, 1, 2].map(|c| s[c] + v[c]));
         sum.map(|c| c / count)
     };
     let (place_m, normal) = (mean(&|f| f.place_m), mean(&|f| f.outward));

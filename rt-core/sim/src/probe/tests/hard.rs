@@ -3,6 +3,7 @@
 use super::small;
 use crate::probe::{ProbePose, ProbeState, Wrench, displace, step};
 use nalgebra::Vector3;
+use stylet_heap as heap;
 
 /// Deepest pad in the probe, or under a force and off it, that a tick may leave, m.
 const OPEN_M: f64 = 1e-6;
@@ -16,7 +17,10 @@ fn a_probe_that_is_withdrawn_leaves_tissue_at_rest_to_the_bit() {
     let fixture = small();
     let mut state = ProbeState::new(&fixture.probe);
     let pressed = fixture.go_in_and_press(&mut state, 8e-3, 20e-3);
-    assert!(pressed.contacts > 5 && pressed.wrench.force_n()[1] < -0.5, "{pressed:?}");
+    assert!(
+        pressed.contacts > 5 && pressed.wrench.force_n()[1] < -0.5,
+        "{pressed:?}"
+    );
     displace(&fixture.probe, &mut state);
     assert!(state.share.0[1].iter().any(|u| *u > 1e-3));
     // Lifted at once, then out.
@@ -55,7 +59,9 @@ fn no_pad_sinks_in_or_pulls_whatever_the_hand_does() {
     // A hand that presses obliquely, slides, jumps by 5 mm in a tick, lifts and comes back: drawn by a fixed rule.
     let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
     let mut random = || {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (seed >> 33) as f64 / f64::from(1_u32 << 30) - 1.0
     };
     let mut at = Vector3::from(middle);
@@ -71,7 +77,10 @@ fn no_pad_sinks_in_or_pulls_whatever_the_hand_does() {
             (axis.y + 0.02 * random()).clamp(-0.25, 0.25),
             1.0,
         );
+        let calls = heap::calls_of_this_thread();
         let response = step(&fixture.probe, &mut state, &pose(at.into(), axis.into()), &[]);
+        displace(&fixture.probe, &mut state);
+        assert_eq!(heap::calls_of_this_thread(), calls, "tick {tick} touched the heap");
         let report = state.report();
         worst_m = worst_m.max(report.open_m);
         passes.push(report.passes);
@@ -89,7 +98,13 @@ fn no_pad_sinks_in_or_pulls_whatever_the_hand_does() {
         }
     }
     passes.sort_unstable();
-    println!("deepest at a pad after a tick: {:.4} um; passes p50 {}, p99 {}, most {}", 1e6 * worst_m, passes[750], passes[1485], passes[1499]);
+    println!(
+        "deepest at a pad after a tick: {:.4} um; passes p50 {}, p99 {}, most {}",
+        1e6 * worst_m,
+        passes[750],
+        passes[1485],
+        passes[1499]
+    );
 }
 
 #[test]
@@ -97,7 +112,10 @@ fn a_pose_that_is_no_number_changes_nothing() {
     let fixture = small();
     let mut state = ProbeState::new(&fixture.probe);
     let before = fixture.go_in_and_press(&mut state, 4e-3, 20e-3);
-    let broken = ProbePose { tip_m: [f64::NAN, 0.0, 0.0], axis: [0.0, 0.0, 1.0] };
+    let broken = ProbePose {
+        tip_m: [f64::NAN, 0.0, 0.0],
+        axis: [0.0, 0.0, 1.0],
+    };
     let after = step(&fixture.probe, &mut state, &broken, &[]);
     assert_eq!(after.pose, before.pose);
     for c in 0..6 {
@@ -115,12 +133,19 @@ fn the_stiffness_is_that_of_a_small_motion() {
     let pressed_m = 6e-3;
     let response = fixture.go_in_and_press(&mut state, pressed_m, 20e-3);
     let here = fixture.pose(pressed_m, 20e-3);
-    let up = ProbePose { tip_m: [here.tip_m[0], here.tip_m[1] + 1e-4, here.tip_m[2]], ..here };
+    let up = ProbePose {
+        tip_m: [here.tip_m[0], here.tip_m[1] + 1e-4, here.tip_m[2]],
+        ..here
+    };
     let goes_on = response.wrench_at(&up);
     let answered = step(&fixture.probe, &mut state, &up, &[]);
     let change = Vector3::from(answered.wrench.force_n()) - Vector3::from(response.wrench.force_n());
     let off = Vector3::from(answered.wrench.force_n()) - Vector3::from(goes_on.force_n());
-    println!("0.1 mm on: force changes by {:.4} N, extrapolated to {:.4} N of it", change.norm(), off.norm());
+    println!(
+        "0.1 mm on: force changes by {:.4} N, extrapolated to {:.4} N of it",
+        change.norm(),
+        off.norm()
+    );
     assert!(off.norm() < 0.1 * change.norm(), "{off:?} of {change:?}");
     // Lifted farther than it was pressed in: no pull.
     let lifted = response.wrench_at(&fixture.pose(-20e-3, 20e-3));

@@ -48,7 +48,11 @@ fn finer_pads() {
     let fixture = pelvis();
     for spacing_m in [7e-3, 3.5e-3] {
         let wall = Wall::of(&fixture.scene, spacing_m).expect("a rectum");
-        println!("reference with {} pads {:.1} mm apart:", wall.pads.len(), 1e3 * spacing_m);
+        println!(
+            "reference with {} pads {:.1} mm apart:",
+            wall.pads.len(),
+            1e3 * spacing_m
+        );
         beside_reference(fixture, &wall, PRESSED_M, BEYOND_M);
     }
 }
@@ -152,6 +156,9 @@ fn times_of_ticks() {
     for (which, name) in ["contact", "contact and body"].into_iter().enumerate() {
         let mut micros: Vec<f64> = best.iter().map(|b| b[which]).collect();
         micros.sort_by(f64::total_cmp);
-        println!("{name}: p50 {:.0}, p99 {:.0}, max {:.0} us; {passes} passes at most", micros[120], micros[237], micros[239]);
+        println!(
+            "{name}: p50 {:.0}, p99 {:.0}, max {:.0} us; {passes} passes at most",
+            micros[120], micros[237], micros[239]
+        );
     }
 }

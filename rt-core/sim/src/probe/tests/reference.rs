@@ -149,7 +149,13 @@ impl<'a> Reference<'a> {
             let loads: Vec<[f64; 3]> = (0..count).map(|n| (outward[n] * p[n]).into()).collect();
             let moved = this.answer(&loads);
             (0..count)
-                .map(|n| if is_in[n] { outward[n].dot(&Vector3::from(moved[n])) } else { 0.0 })
+                .map(|n| {
+                    if is_in[n] {
+                        outward[n].dot(&Vector3::from(moved[n]))
+                    } else {
+                        0.0
+                    }
+                })
                 .collect()
         };
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -179,12 +185,19 @@ impl<'a> Reference<'a> {
 
     /// Of the tissue on the probe, N.
     pub fn force_n(&self) -> [f64; 3] {
-        self.loads_n.iter().fold([0.0; 3], |s, f| [0, 1, 2].map(|c| s[c] - f[c]))
+        self.loads_n
+            .iter()
+            .fold([0.0; 3], |s, f| [0, 1, 2].map(|c| s[c] - f[c]))
     }
 }
 
 /// Of element centres whose structure is asked for: mean and largest displacement of the reference, RMS and largest difference.
-pub(in crate::probe) fn compare(fixture: &Fixture, ours: &ElementField, full: &ElementField, is_asked: &dyn Fn(&str) -> bool) -> [f64; 4] {
+pub(in crate::probe) fn compare(
+    fixture: &Fixture,
+    ours: &ElementField,
+    full: &ElementField,
+    is_asked: &dyn Fn(&str) -> bool,
+) -> [f64; 4] {
     let body = &fixture.scene.body;
     let (mut sum, mut count, mut largest, mut square, mut worst) = (0.0, 0.0, 0.0_f64, 0.0, 0.0_f64);
     for e in 0..body.element_count() {
@@ -203,7 +216,12 @@ pub(in crate::probe) fn compare(fixture: &Fixture, ours: &ElementField, full: &E
 }
 
 /// What was measured beside the reference, and what the reference took.
-pub(in crate::probe) fn beside_reference(fixture: &Fixture, wall: &Wall, pressed_m: f64, beyond_m: f64) -> ([f64; 4], f64) {
+pub(in crate::probe) fn beside_reference(
+    fixture: &Fixture,
+    wall: &Wall,
+    pressed_m: f64,
+    beyond_m: f64,
+) -> ([f64; 4], f64) {
     let mut state = ProbeState::new(&fixture.probe);
     let response = fixture.go_in_and_press(&mut state, pressed_m, beyond_m);
     displace(&fixture.probe, &mut state);
@@ -215,7 +233,9 @@ pub(in crate::probe) fn beside_reference(fixture: &Fixture, wall: &Wall, pressed
         let part = f64::from(n) / f64::from(steps);
         full.press(&fixture.pose(begin_m + part * (pressed_m - begin_m), beyond_m));
     }
-    let compared = compare(fixture, &state.share, &full.field, &|name| name == "gland" || name == "capsule");
+    let compared = compare(fixture, &state.share, &full.field, &|name| {
+        name == "gland" || name == "capsule"
+    });
     let (ours, theirs) = (Vector3::from(response.wrench.force_n()), Vector3::from(full.force_n()));
     println!(
         "pressed {:.1} mm: force {:.3?} N, in full {:.3?} N, off by {:.2e}; target moves {:.3} mm mean, {:.3} mm at most, off by {:.4} mm rms, {:.4} mm at most; {} solutions",
