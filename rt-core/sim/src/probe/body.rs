@@ -1,7 +1,7 @@
 //! A probe as the tissue loop has it: what it can press, what it has done, and its share of the body's displacement.
 
 use super::columns::ReadyProbe;
-use super::contact::{ContactReport, ProbeState, displace, step};
+use super::contact::{ContactReport, ProbeState, step};
 use super::response::ProbeResponse;
 use super::shape::ProbePose;
 use crate::tissue::{ElementField, PackedField};
@@ -14,15 +14,28 @@ pub struct BodyProbe {
     response: ProbeResponse,
     /// How far others displace each pad, along x, y, z, m.
     beside_m: Vec<f64>,
+    share: ElementField,
     /// Loads that the share was made from.
     shared_n: Vec<f64>,
+    /// Those that the next one is made from, and how many of its parts are.
+    coming_n: Vec<f64>,
+    made: usize,
+    parts: usize,
 }
+
+/// A larger body is added up over several ticks, so many elements in each: the picture is late by so many, the force is not.
+const ELEMENTS_A_TICK: usize = 16_384;
 
 impl BodyProbe {
     /// Out of the body.
     pub fn new(ready: ReadyProbe) -> Self {
         let rows = ready.rows();
+        let elements = ready.columns.first().map_or(0, PackedField::elements);
         BodyProbe {
+            share: ElementField::with_room(elements),
+            coming_n: vec![0.0; rows],
+            made: 0,
+            parts: elements.div_ceil(ELEMENTS_A_TICK).max(1),
             state: ProbeState::new(&ready),
             response: ProbeResponse::default(),
             beside_m: vec![0.0; rows],
@@ -48,7 +61,7 @@ impl BodyProbe {
 
     /// Displacement of the body by the probe, m.
     pub fn share(&self) -> &ElementField {
-        &self.state.share
+        &self.share
     }
 
     /// It presses the wall, or did in the tick before.
@@ -90,20 +103,32 @@ impl BodyProbe {
     /// The probe is at this pose. Whether it displaces the body otherwise than before.
     pub fn follow(&mut self, pose: &ProbePose) -> bool {
         self.response = step(&self.ready, &mut self.state, pose, &self.beside_m);
-        let is_other = self.shared_n != self.state.loads_n();
-        if is_other {
-            displace(&self.ready, &mut self.state);
-            self.shared_n.copy_from_slice(self.state.loads_n());
+        if self.made == 0 {
+            if self.shared_n == self.state.loads_n() {
+                return false;
+            }
+            self.coming_n.copy_from_slice(self.state.loads_n());
         }
-        is_other
+        let making = &mut self.state.share;
+        making.load_part(&self.ready.columns, &self.coming_n, [self.made, self.parts]);
+        self.made += 1;
+        let is_whole = self.made == self.parts;
+        if is_whole {
+            std::mem::swap(&mut self.share, making);
+            self.shared_n.copy_from_slice(&self.coming_n);
+            self.made = 0;
+        }
+        is_whole
     }
 
     /// Tissue at rest.
     pub fn reset(&mut self) {
         self.state.reset();
-        self.shared_n.fill(0.0);
-        self.beside_m.fill(0.0);
-        displace(&self.ready, &mut self.state);
+        for values in [&mut self.shared_n, &mut self.coming_n, &mut self.beside_m] {
+            values.fill(0.0);
+        }
+        self.made = 0;
+        self.share.0.iter_mut().for_each(|axis| axis.fill(0.0));
         self.response = ProbeResponse::nothing(self.response.pose);
     }
 }

@@ -1,6 +1,7 @@
 //! What a hand does with a probe, and what the contact must not do then: stick, sink in, pull, or fail to end.
 
 use super::small;
+use crate::probe::BodyProbe;
 use crate::probe::{ProbePose, ProbeState, Wrench, displace, step};
 use nalgebra::Vector3;
 use stylet_heap as heap;
@@ -165,4 +166,20 @@ fn what_moves_the_wall_besides_changes_the_contact() {
     let lower = fixture.go_in_and_press(&mut less, 3e-3, 20e-3);
     assert!(beside_it.wrench.force_n()[1] > alone.wrench.force_n()[1] + 0.05);
     assert!((beside_it.wrench.force_n()[1] - lower.wrench.force_n()[1]).abs() < 1e-4);
+}
+
+#[test]
+fn the_loop_s_probe_displaces_the_body_as_its_loads_do_and_lets_it_go() {
+    let fixture = small();
+    let mut body = BodyProbe::new(fixture.probe.clone());
+    let mut state = ProbeState::new(&fixture.probe);
+    for beyond_m in [-0.1, -0.02, 20e-3] {
+        assert!(body.follow(&fixture.pose(3e-3, beyond_m)) == (beyond_m > -0.05));
+        step(&fixture.probe, &mut state, &fixture.pose(3e-3, beyond_m), &[]);
+    }
+    displace(&fixture.probe, &mut state);
+    assert!(body.displaces() && body.share() == &state.share);
+    assert!(!body.follow(&fixture.pose(3e-3, 20e-3)) || body.report().passes > 0);
+    body.follow(&fixture.pose(3e-3, -0.1));
+    assert!(!body.displaces() && body.share().0.iter().flatten().all(|u| *u == 0.0));
 }

@@ -95,7 +95,14 @@ fn between_the_pads() {
 #[test]
 #[ignore = "a measurement"]
 fn pressed_step_by_step() {
-    let fixture = pelvis();
+    println!("elements of ChainMail's lines:");
+    pressed_in(pelvis());
+    println!("elements half as large, of finite elements:");
+    let scene = Scene::builtin("pelvis").expect("built in").for_lines(TissueKind::Fem);
+    pressed_in(&Fixture::new(scene.expect("has lines"), PADS_APART_M));
+}
+
+fn pressed_in(fixture: &Fixture) {
     let mut state = ProbeState::new(&fixture.probe);
     for pressed_mm in [0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0] {
         let response = fixture.go_in_and_press(&mut state, pressed_mm * 1e-3, BEYOND_M);
