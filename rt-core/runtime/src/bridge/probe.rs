@@ -68,7 +68,10 @@ impl ProbePreparer {
         self.is_settled = true;
         match task.thread.join() {
             Ok(Ok(probe)) => {
-                let _ = loops.tissue_orders.push(TissueOrder::Probe(Box::new(probe)));
+                let _ = loops.tissue_orders.push(TissueOrder::Probe {
+                    generation: scene_generation,
+                    probe: Box::new(probe),
+                });
                 None
             }
             Ok(Err(why)) => Some(why.to_string()),

@@ -119,8 +119,13 @@ pub enum TissueOrder {
     LeftRoom(Box<LeftTape>),
     /// Columns for a needle that goes in where they were made; the force loop gets its half beside them.
     Line(Box<BodyLine>),
-    /// The ultrasound probe of the scene that runs.
-    Probe(Box<BodyProbe>),
+    /// The ultrasound probe of a scene: of no use to another.
+    Probe {
+        /// Of the scene.
+        generation: u64,
+        /// What it can press.
+        probe: Box<BodyProbe>,
+    },
 }
 
 /// Either loop to the bridge: what happened, once each.

@@ -241,7 +241,7 @@ impl TissueLoop {
                 }
                 TissueOrder::LeftRoom(room) => self.left_room = self.left_room.take().or(Some(room)),
                 TissueOrder::HandOverTape => self.hand_over_tape(),
-                TissueOrder::Probe(probe) => self.take_probe(probe),
+                TissueOrder::Probe { generation, probe } => self.take_probe(generation, probe),
                 TissueOrder::Line(line) => {
                     self.tape_order(TapedOrder::Line {
                         generation: line.generation,

@@ -140,7 +140,11 @@ fn the_second_hand_presses_the_gland_and_feels_it() {
     let mut tissue = TissueLoop::new(0, wiring.tissue, world, 5e-3);
     let mut second = SecondLoop::new(0, Box::new(device), ports, &memory, 1e-3);
     let probe = Box::new(theatre.probe.clone());
-    assert!(wiring.bridge.tissue_orders.push(TissueOrder::Probe(probe)).is_ok());
+    // One of another scene is of no use.
+    for (generation, probe) in [(1, probe.clone()), (2, probe)] {
+        let order = TissueOrder::Probe { generation, probe };
+        assert!(wiring.bridge.tissue_orders.push(order).is_ok());
+    }
     let mut now_ns = 1_000_000_000;
     let mut go = |to: ProbePose, ticks: usize| {
         let goal = HandGoal {

@@ -20,7 +20,11 @@ impl TissueLoop {
         self.pressed.as_deref()
     }
 
-    pub(super) fn take_probe(&mut self, probe: Box<BodyProbe>) {
+    /// One of a scene that was replaced meanwhile goes back.
+    pub(super) fn take_probe(&mut self, generation: u64, probe: Box<BodyProbe>) {
+        if generation != self.world.generation {
+            return self.free_probe(probe);
+        }
         self.drop_probe();
         self.pressed = Some(probe);
     }
@@ -29,9 +33,13 @@ impl TissueLoop {
     pub(super) fn drop_probe(&mut self) {
         if let Some(old) = self.pressed.take() {
             self.last_carry.forget();
-            if let Err(rtrb::PushError::Full(old)) = self.ports.old_probes.push(old) {
-                std::mem::forget(old);
-            }
+            self.free_probe(old);
+        }
+    }
+
+    fn free_probe(&mut self, old: Box<BodyProbe>) {
+        if let Err(rtrb::PushError::Full(old)) = self.ports.old_probes.push(old) {
+            std::mem::forget(old);
         }
     }
 
