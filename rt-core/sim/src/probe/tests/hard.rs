@@ -14,7 +14,7 @@ fn pose(tip_m: [f64; 3], axis: [f64; 3]) -> ProbePose {
 }
 
 #[test]
-fn a_probe_that_is_withdrawn_leaves_tissue_at_rest_to_the_bit() {
+fn a_probe_that_is_withdrawn_leaves_tissue_bit_identical_to_rest() {
     let fixture = small();
     let mut state = ProbeState::new(&fixture.probe);
     let pressed = fixture.go_in_and_press(&mut state, 8e-3, 20e-3);
