@@ -147,8 +147,7 @@ impl Problem {
                 let ridge = if r == c { RIDGE * mean } else { 0.0 };
                 let left = self.matrix[i as usize * n + j as usize] + ridge - dot(row, other);
                 let value = if r == c {
-                    // NaN as well.
-                    if !(left > 0.0) {
+                    if left.is_nan() || left <= 0.0 {
                         return false;
                     }
                     left.sqrt()

@@ -274,28 +274,28 @@ fn respond(state: &mut ProbeState, probe: &ReadyProbe, pose: &ProbePose, beside_
         if force_n > 0.0 {
             response.contacts += 1;
             let arm = arm(state, at);
-            for c in 0..6 {
-                response.wrench.0[c] -= force_n * arm[c];
+            for (sum, arm) in response.wrench.0.iter_mut().zip(arm) {
+                *sum -= force_n * arm;
             }
         }
     }
     if response.contacts == 0 {
         return response;
     }
-    let set = state.problem.set.len();
+    // The room is taken out meanwhile, so that the factor beside it can be read.
+    let mut room = std::mem::take(&mut state.problem.work);
+    let values = room.get_mut(..state.problem.set.len()).unwrap_or(&mut []);
     for motion in 0..6 {
-        let mut values = std::mem::take(&mut state.problem.work);
-        for at in 0..set {
-            values[at] = arm(state, state.problem.set[at] as usize)[motion];
+        for (value, &at) in values.iter_mut().zip(&state.problem.set) {
+            *value = arm(state, at as usize)[motion];
         }
-        state.problem.back(&mut values[..set]);
-        for at in 0..set {
-            let arm = arm(state, state.problem.set[at] as usize);
-            for c in 0..6 {
-                response.stiffness[c][motion] -= values[at] * arm[c];
+        state.problem.back(values);
+        for (value, &at) in values.iter().zip(&state.problem.set) {
+            for (row, arm) in response.stiffness.iter_mut().zip(arm(state, at as usize)) {
+                row[motion] -= value * arm;
             }
         }
-        state.problem.work = values;
     }
+    state.problem.work = room;
     response
 }

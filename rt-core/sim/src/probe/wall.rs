@@ -166,7 +166,7 @@ fn faces(scene: &Scene) -> Vec<Face> {
 /// Faces at the edge of the volume are where the scene ends.
 fn at_edge(lattice: &Lattice, element: u32, side: usize) -> bool {
     let at = lattice.cell(element)[side / 2];
-    if side % 2 == 0 {
+    if side.is_multiple_of(2) {
         at == 0
     } else {
         at + 1 == lattice.dims[side / 2]
@@ -174,7 +174,7 @@ fn at_edge(lattice: &Lattice, element: u32, side: usize) -> bool {
 }
 
 fn face(lattice: &Lattice, element: u32, side: usize) -> Face {
-    let sign = if side % 2 == 0 { -1.0 } else { 1.0 };
+    let sign = if side.is_multiple_of(2) { -1.0 } else { 1.0 };
     let centre_m = lattice.rest_m(element);
     let along = |part: f64| {
         let mut place_m = centre_m;
