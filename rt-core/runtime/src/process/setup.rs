@@ -5,7 +5,7 @@ use crate::bridge::ScenePicture;
 use crate::bridge::ports::Ports;
 use crate::device;
 use crate::rt::arm::{self, Ask, CoresAwake};
-use crate::rt::clock::{self, TISSUE_PERIOD_NS};
+use crate::rt::clock::{self, TISSUE_PERIOD_NS, TISSUE_PHASE};
 use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticMemory, HapticTape};
 use crate::rt::timing::Probes;
@@ -123,9 +123,10 @@ impl Body {
         let seconds = |ns: u64| ns as f64 / 1e9;
         let period_s = seconds(options.haptic_period_ns);
         let mut haptic = HapticLoop::new(session_id, self.device, wiring.haptic, &memory, period_s);
-        haptic.spin_ns = options.spin_ns;
+        haptic.wait = options.wait;
         let period_s = seconds(TISSUE_PERIOD_NS);
         let mut tissue = TissueLoop::new(session_id, wiring.tissue, self.world, period_s);
+        tissue.phase_ns = clock::phase_ns(TISSUE_PHASE, options.haptic_period_ns);
         if let Some(probes) = probes {
             haptic.probe = Some(Box::new(probes.haptic));
             tissue.probe = Some(Box::new(probes.tissue));

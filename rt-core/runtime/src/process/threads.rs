@@ -79,7 +79,7 @@ impl Threads {
 
 fn run_tissue(mut tissue: TissueLoop, armed: &Armed, end: &AtomicBool) -> LoopReport {
     let start = Usage::now();
-    tissue.run(armed, end);
+    let sleeps = tissue.run(armed, end);
     let usage = Usage::now().since(start);
     let r = tissue.response();
     LoopReport {
@@ -87,6 +87,7 @@ fn run_tissue(mut tissue: TissueLoop, armed: &Armed, end: &AtomicBool) -> LoopRe
         ticks: r.tick,
         missed: r.missed,
         worst_wake_ns: r.worst_wake_ns,
+        sleeps,
         usage,
     }
 }
@@ -101,7 +102,7 @@ fn run_haptic(mut haptic: HapticLoop, board: StateBoard, armed: &Armed, end: &At
     };
     publish(&haptic.state);
     let start = Usage::now();
-    haptic.run(armed, end, publish);
+    let sleeps = haptic.run(armed, end, publish);
     let usage = Usage::now().since(start);
     let s = &haptic.state;
     LoopReport {
@@ -109,6 +110,7 @@ fn run_haptic(mut haptic: HapticLoop, board: StateBoard, armed: &Armed, end: &At
         ticks: s.tick,
         missed: s.missed_deadlines,
         worst_wake_ns: s.worst_wake_ns,
+        sleeps,
         usage,
     }
 }

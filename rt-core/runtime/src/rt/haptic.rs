@@ -1,7 +1,7 @@
 //! The haptic tick, 1 kHz: read → chain (velocity, needle, force law, gate) → write → pose → record.
 
 use crate::rt::arm::Armed;
-use crate::rt::clock::{self, Grid};
+use crate::rt::clock::{self, Grid, HAPTIC_PHASE, Wait};
 use crate::rt::exchange::Notice;
 use crate::rt::haptic_tape::HapticMemory;
 use crate::rt::pose::TipPose;
@@ -49,8 +49,8 @@ pub struct HapticLoop {
     pub state: HapticState,
     /// Present in a measurement.
     pub probe: Option<Box<Probe>>,
-    /// Spinning before each deadline; 0 for none.
-    pub spin_ns: u64,
+    /// How it waits for each deadline.
+    pub wait: Wait,
     period_s: f64,
 }
 
@@ -104,7 +104,7 @@ impl HapticLoop {
             answer: DeviceAnswer::default(),
             state: memory.state,
             probe: None,
-            spin_ns: 0,
+            wait: Wait::default(),
             period_s,
         }
     }
@@ -116,10 +116,11 @@ impl HapticLoop {
         }
     }
 
-    /// Runs on the ideal grid until `stop`, then ramps the force to zero and ends.
-    pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool, mut publish: impl FnMut(&HapticState)) {
-        let mut grid = Grid::from(clock::now_ns(), (self.period_s * 1e9) as u64);
-        let mut missed = 0;
+    /// Runs on the ideal grid until `stop`, then ramps the force to zero and ends. Returns how often it slept.
+    pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool, mut publish: impl FnMut(&HapticState)) -> u64 {
+        let period_ns = (self.period_s * 1e9).round() as u64;
+        let mut grid = Grid::at_phase(clock::now_ns(), period_ns, clock::phase_ns(HAPTIC_PHASE, period_ns));
+        let (mut missed, mut sleeps) = (0, 0);
         let mut last_ticks = self.parameters.force.gate.ramp_out_ticks + 1;
         while last_ticks > 0 {
             // SYNC: pairs with the bridge's release store; nothing but the flag is carried.
@@ -127,17 +128,18 @@ impl HapticLoop {
                 self.release_for_the_end();
                 last_ticks -= 1;
             }
-            let slept = clock::wait_until(grid.due_ns, self.spin_ns);
+            sleeps += self.wait.until(grid.due_ns);
             let woke_ns = clock::now_ns();
             self.tick(grid.due_ns, woke_ns, missed);
             publish(&self.state);
             if let Some(probe) = &mut self.probe {
-                probe.finish(grid.due_ns, woke_ns, missed, slept);
+                probe.finish(grid.due_ns, woke_ns, missed);
             }
             missed = grid.advance(clock::now_ns());
         }
         let _ = self.device.write(&Wrench::zero());
         self.ports.flight.hand_over();
+        sleeps
     }
 
     /// One tick; in the order of the data. Returns what the force chain gave.

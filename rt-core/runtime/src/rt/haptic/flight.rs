@@ -30,7 +30,7 @@ impl HapticLoop {
             answer: _,
             state,
             probe: _,
-            spin_ns: _,
+            wait: _,
             period_s: _,
         } = self;
         HapticMemory {
