@@ -3,9 +3,8 @@
 use super::Server;
 use super::streams::Job;
 use crate::net::{Place, Priority, put};
-use crate::now_ns;
 use crate::ports::Near;
-use crate::wire::{Hello, Kind, Stamp, encode};
+use crate::wire::{Hello, Kind, encode};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
@@ -77,13 +76,7 @@ impl Announcements {
     }
 
     fn message(&self, kind: Kind, parts: &[&[u8]]) -> Vec<u8> {
-        let stamp = Stamp {
-            run: self.server.run,
-            number: 0,
-            sent_ns: now_ns(),
-            heard_ns: 0,
-        };
-        encode(kind, stamp, parts)
+        encode(kind, self.server.stamp(), parts)
     }
 
     /// To everybody.

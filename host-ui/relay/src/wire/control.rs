@@ -21,13 +21,15 @@ pub struct Hello {
     pub lost: u64,
 }
 
-/// Batches of one run of the server, from the first to the last.
+/// Ticks of one run of the core, from the first to the last.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-pub struct Batches {
-    /// Number of the first.
+pub struct Ticks {
+    /// The run of the core.
+    pub session_id: u64,
+    /// The first.
     pub from: u64,
-    /// Number of the last.
+    /// The last.
     pub to: u64,
 }
 
