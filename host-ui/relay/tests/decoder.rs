@@ -27,6 +27,7 @@ fn examples() -> Vec<(&'static str, Vec<u8>)> {
     let command = hand.encode(1, 2).expect("fits");
     let who = Who {
         operator: Some("Otto".to_owned()),
+        local: false,
         asked: None,
         present: vec![Present::default()],
     };

@@ -197,16 +197,8 @@ fn lease(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_>)
 }
 
 fn give(rounds: &mut Rounds, name: &str) -> Result<(), String> {
-    let operators = rounds
-        .members
-        .members
-        .iter()
-        .filter(|m| m.role == Role::Operator && !m.revoked);
-    let to = operators
-        .filter(|m| rounds.present.contains_key(&m.seat))
-        .find(|m| m.name == name)
-        .map(|m| m.seat)
-        .ok_or_else(|| format!("{name} is no operator who is connected"))?;
+    let to = rounds.operator(name);
+    let to = to.ok_or_else(|| format!("{name} is no operator who is connected"))?;
     rounds.hand_over(Holder::Seat(to), Instant::now());
     Ok(())
 }

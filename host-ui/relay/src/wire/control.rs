@@ -53,6 +53,9 @@ pub struct Present {
 pub struct Who {
     /// Name of who operates; "the window beside the core", or nobody.
     pub operator: Option<String>,
+    /// Whether that is a host beside the core.
+    #[serde(default)]
+    pub local: bool,
     /// Name of who asked to operate.
     pub asked: Option<String>,
     /// Everybody who is connected.
