@@ -14,7 +14,6 @@ use crate::command::record::RecordArgs;
 use crate::command::study::StudyArgs;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 use stylet_base::format::printable;
 use stylet_base::interrupt;
 use stylet_controllers as controller;

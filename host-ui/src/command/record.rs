@@ -7,7 +7,7 @@ use std::time::Duration;
 use stylet_host::record::{self, To};
 use stylet_shm_schema::service::Instance;
 
-#[derive(Args)]
+#[derive(Args, Debug)]
 pub struct RecordArgs {
     /// Name that rt-core was started under
     #[arg(long, default_value = "main", value_parser = Instance::new)]
