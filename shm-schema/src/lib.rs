@@ -14,6 +14,8 @@
 //! | `replies` | [`Reply`] | bridge | hosts | accepted, or refused and why |
 //! | `rehearsals` | [`Rehearsal`] | bridge | hosts | where the seeds of a needle would end |
 //! | `relayed` | [`Relayed`], newest one kept | a relay in place of the core | hosts | server, role, round trip, age and losses |
+//! | `class` | [`Class`], newest one kept | a relay | hosts | who is connected, who operates, who asks to |
+//! | `lease` | [`LeaseOrder`] | hosts | a relay | a [`LeaseRequest`] as plain data |
 //! | `uploads` | label cells under an [`UploadHeader`] | hosts | bridge | a segmented volume |
 //!
 //! Every type is plain old data, valid for every bit pattern: no `bool`, `enum` or `char`, no padding, no pointer.
@@ -24,6 +26,7 @@
 
 pub mod affinity;
 pub mod check;
+mod class;
 mod command;
 mod event;
 pub mod motion;
@@ -41,6 +44,7 @@ mod snapshot;
 mod state;
 mod text;
 
+pub use class::{Class, ClassMember, LeaseOrder, LeaseRequest, MAX_CLASS};
 pub use command::{Command, MAX_COMMAND_VALUES, MAX_REASONS, Reply, ReplyStatus};
 pub use event::{Event, EventKind};
 pub use params::{

@@ -67,6 +67,12 @@ impl App {
     pub(super) fn act(&mut self, action: Action, ctx: &egui::Context) {
         match action {
             Action::ToggleHelp => self.help = !self.help,
+            Action::ToggleClass => self.class = !self.class,
+            Action::Lease(request) => {
+                if let Err(e) = self.link.lease(&request) {
+                    self.shown.note = Some(refusal(format!("Needle: {e}")));
+                }
+            }
             Action::OpenParameters => self.parameters.open = !self.parameters.open,
             Action::ResetView => self.middle.reset_view(&self.shown),
             Action::LookFrom(preset) => self.middle.solid.look_from(preset, &self.shown),

@@ -4,7 +4,7 @@ use super::{App, patch};
 use crate::action::Action;
 use crate::panel::parameters::parameters_ui;
 use crate::panel::workflow::{Progress, editor_ui, foot_height, foot_ui, run_ui, workflow_ui};
-use crate::panel::{banners, help, plots, status};
+use crate::panel::{banners, class, help, plots, status};
 use crate::theme;
 use egui::{CentralPanel, Frame, Margin, Panel, Rect, ScrollArea};
 
@@ -51,6 +51,7 @@ impl App {
         };
         actions.extend(banners::banners_ui(ui.ctx(), pictures, &banners::banners(&self.shown)));
         parameters_ui(ui.ctx(), &self.shown, &mut self.parameters);
+        actions.extend(class::class_ui(ui.ctx(), &self.shown, &mut self.class));
         help::help_ui(ui.ctx(), &self.shown, &mut self.help);
         if let Some(patch) = &mut self.patch {
             let tip = self.shown.state.map(|s| s.tip_in_scene_m);

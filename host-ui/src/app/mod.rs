@@ -129,6 +129,7 @@ pub struct App {
     workflow: WorkflowState,
     parameters: ParametersState,
     help: bool,
+    class: bool,
     /// What stands in the middle where there is no room for the right panel.
     narrow: layout::Narrow,
 }
@@ -267,6 +268,7 @@ impl App {
             settings,
             parameters: ParametersState::default(),
             help: false,
+            class: false,
             narrow: layout::Narrow::default(),
         }
     }
@@ -351,7 +353,7 @@ impl eframe::App for App {
         actions.extend(self.dropped_file(&ctx));
         actions.extend(self.picked_file());
         if ctx.input(|i| i.key_pressed(egui::Key::Escape)) {
-            (self.help, self.parameters.open) = (false, false);
+            (self.help, self.class, self.parameters.open) = (false, false, false);
         }
         for action in actions {
             self.act(action, &ctx);

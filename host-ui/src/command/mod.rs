@@ -11,4 +11,5 @@ pub mod find_seeds;
 pub mod perturb;
 pub mod plan;
 pub mod post_implant;
+pub mod record;
 pub mod study;

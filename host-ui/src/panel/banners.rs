@@ -1,5 +1,6 @@
 //! The banners under the bar: what is wrong with the core, the force and the controllers, and what to do.
 
+use super::class;
 use crate::action::{Action, WatchAction};
 use crate::shown::{NeedleLine, Shown, Watched};
 use crate::theme;
@@ -115,6 +116,7 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
     list.extend(without_line(shown));
     list.extend(folded(shown));
     list.extend(refused(shown));
+    list.extend(class::banners(shown));
     list.extend(shown.relayed.as_ref().map(of_line));
     list
 }
@@ -150,7 +152,7 @@ fn of_line(line: &Relayed) -> Banner {
             line.records_lost,
             line.snapshots_lost
         ),
-        remedy: None,
+        remedy: Some(("Who is there", Action::ToggleClass)),
     }
 }
 

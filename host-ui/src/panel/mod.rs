@@ -2,6 +2,7 @@
 
 mod axis;
 pub mod banners;
+pub mod class;
 pub mod field;
 pub mod help;
 mod histogram;

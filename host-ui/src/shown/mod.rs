@@ -18,7 +18,7 @@ use stylet_host::link::{Link, LinkStatus};
 use stylet_implant::plan::{HOLES, Template};
 use stylet_implant::workflow::{Step, Waiting};
 use stylet_shm_schema::{
-    EventKind, Fault, HapticState, LeftNeedlePose, ParametersInForce, Phase, PlanInForce, PlannedSeed, Relayed,
+    Class, EventKind, Fault, HapticState, LeftNeedlePose, ParametersInForce, Phase, PlanInForce, PlannedSeed, Relayed,
     SceneHeader, SeedPose, Session, flags,
 };
 
@@ -32,6 +32,8 @@ pub struct Shown {
     pub session: Option<Session>,
     /// The line to the core, where that runs on another machine.
     pub relayed: Option<Relayed>,
+    /// Who is connected over a relay of this machine.
+    pub class: Option<Class>,
     pub state: Option<HapticState>,
     pub scene: Option<SceneHeader>,
     /// Only a plan with at least one seed.
@@ -82,6 +84,7 @@ impl Shown {
             status: LinkStatus::Absent { why: String::new() },
             session: None,
             relayed: None,
+            class: None,
             state: None,
             scene: None,
             plan: None,
@@ -116,6 +119,7 @@ impl Shown {
         self.status = link.status();
         self.session = link.session().copied();
         self.relayed = link.relayed().copied();
+        self.class = link.class().copied();
         self.state = link.state().copied();
         self.scene = link.scene().map(|s| s.header);
         self.plan = link.plan().filter(|p| p.generation > 0 && p.seed_count > 0).copied();
