@@ -42,6 +42,8 @@ pub enum Action {
     /// Loads the scene of this index in [`stylet_shm_schema::BUILTIN_SCENES`].
     LoadBuiltinScene(usize),
     OpenParameters,
+    /// Shows or hides the instructor's dialog.
+    ToggleInstructor,
     ToggleHelp,
     ResetView,
     LookFrom(Viewpoint),
